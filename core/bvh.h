@@ -53,6 +53,13 @@ struct bvh_plane {
 } __attribute__((aligned(32))); /* half a cache line */
 const struct bvh_plane *bvh_plane(const struct bvh *bvh, uint32_t triangle);
 
+/* 1: a face of the same corners with a lower number stands for this triangle, which is never met. */
+int bvh_is_twin(const struct bvh *bvh, uint32_t triangle);
+
+/* So near to a border of a triangle, across the ray, the BVH may miss what a ray from a station really meets: one that
+ * sees the triangle at a smaller angle than its origin does. 0: nothing is missed. */
+double bvh_border_m(const struct bvh *bvh, uint32_t triangle, const double station_m[3]);
+
 enum {
     BVH_CHUNK = 1024, /* rays that are cast together */
     BVH_NO_TRIANGLE = 0xffffffff,
@@ -119,12 +126,30 @@ int bvh_work_create(struct bvh_work **out, struct sh_err *err);
 void bvh_work_free(struct bvh_work *work);
 void bvh_work_set_profile(struct bvh_work *work, struct bvh_profile *profile); /* NULL: none */
 const struct bvh_counters *bvh_work_counters(const struct bvh_work *work);
+struct bvh_profile *bvh_work_profile(const struct bvh_work *work);
 /* Directions of the last chunk, as Embree gets them. */
 struct vec3_floats bvh_work_directions(const struct bvh_work *work);
+/* Sets them, for n <= BVH_CHUNK rays that something else than bvh_hits decides. */
+void bvh_work_set_directions(struct bvh_work *work, const struct vec3_in *dir, uint32_t n);
 
 /* Exact hits. What a ray begins on, within half a micrometre, it does not meet. Range error: see
  * tests/accuracy. Allocates nothing. */
 void bvh_hits(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays);
+
+/* ---- for rays from one point whose triangles are known otherwise (core/sight); no scene with holes. */
+
+/* Rays from .. to - 1 meet that triangle, or nothing (BVH_NO_TRIANGLE): their ranges, labels and steepness, bit by
+ * bit what bvh_hits has. Up to seven more of the rays may be overwritten, so later ones are to be set after. */
+void bvh_ranges_of(const struct bvh *bvh, uint32_t triangle, const struct bvh_rays *rays, uint32_t from, uint32_t to);
+/* The range of one plane along a ray, by the same arithmetic. */
+double bvh_range_of(const struct bvh *bvh, uint32_t triangle, const double at_m[3], const double dir[3]);
+/* Ray i met one of these triangles, or none. All are tried in double, as a proposal in doubt is: the nearest
+ * wins, and within 1e-12 of its range the lowest number. */
+void bvh_decide_among(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays, uint32_t i,
+                      const uint32_t *triangle, uint32_t n);
+/* bvh_hits as if bvh_order_exactly had been called: what lies near each hit is looked for in the BVH, ray by
+ * ray. Some microseconds a ray. */
+void bvh_hits_ordered(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays);
 
 /* Cosine of the incidence on the triangles that were hit, 0..1; NaN where there is none. */
 void bvh_cosines(const struct bvh *bvh, const uint32_t *triangle, const struct vec3_in *dir, uint32_t n,

@@ -76,8 +76,10 @@ struct cast_beam {
 /* What stays the same for all pulses of a scan (the movers' poses: of a run). */
 struct cast_setup {
     const struct bvh *bvh;
-    /* NULL: none. Else of the BVH and of station_m: rays that begin there are looked up in it. A head that moves
-     * has none. */
+    /* NULL: none. Else of the BVH and of station_m: rays that begin there are looked up in it, with the same
+     * hits. The BVH has all others: beams that begin beside the station, sub-rays, what glass and mirrors show,
+     * bodies that move. Where the sight is exact, those meet surfaces in the BVH's order: bvh_order_exactly makes
+     * it the same. A head that moves has none. */
     const struct sight *sight;
     const struct georef *georef; /* geo layout */
     double station_m[3];         /* the head's origin, prcs */
@@ -113,6 +115,7 @@ struct cast_setup {
 /* What became of pulses, counted. */
 struct cast_counters {
     uint64_t near_border, decided, went_on, undecided; /* struct bvh_counters */
+    uint64_t few, asked;                               /* with a sight: struct sight_counters */
     uint64_t unfit;   /* echoes whose position did not fit into the wire's integers: sent as shots without echo */
     uint64_t faint;   /* hits below the detection threshold, or in a blind time: shots without echo, or echoes less */
     uint64_t crowded; /* echoes beyond max_echoes: the weakest, left out */

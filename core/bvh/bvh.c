@@ -119,6 +119,7 @@ void bvh_free(struct bvh *bvh)
     free(bvh->triangle);
     free(bvh->rival_first);
     free(bvh->rival);
+    free(bvh->twin);
     free(bvh);
 }
 

@@ -5,16 +5,46 @@
 #include "core/bvh/bvh_inside.h"
 #include "core/vec3.h"
 
+enum { MOST_TIED = 8 };
+
+/* A hit, and how far float may misjudge the order of other planes there. */
+struct rivalry {
+    double range_m, width_m, steep; /* 1 / the cosine of the incidence */
+};
+
 struct search {
     const struct decide_ray *ray;
     double point_m[3], radius_m; /* of the query, local frame */
+    const struct rivalry *only;  /* try only what float can't order; NULL: all */
     uint32_t proposed;
     uint32_t prim;            /* best so far */
     double range_m, border_m; /* its range, and how far the ray passes from its nearest edge */
-    uint32_t near_prim;       /* the one that the ray misses by least; gap 1: double precision can't decide */
-    double near_gap, near_range_m;
-    int holes; /* the ray passed through one */
+    /* All that were met within 1e-12 of the nearest: of them the lowest number is the best, in whatever order they
+     * came. Of more than there is room for the highest numbers are left out. */
+    struct {
+        uint32_t prim;
+        double range_m, border_m;
+    } tied[MOST_TIED];
+    uint32_t n_tied;
+    double first_m;      /* the nearest; INFINITY: none */
+    uint32_t near_prim;  /* missed by less than double precision can decide; of those the nearest */
+    double near_range_m; /* INFINITY: none */
+    int holes;           /* the ray passed through one */
 };
+
+static void forget(struct search *s)
+{
+    s->prim = s->near_prim = RTC_INVALID_GEOMETRY_ID;
+    s->range_m = s->first_m = s->near_range_m = INFINITY;
+    s->n_tied = 0;
+}
+
+static struct search search_for(const struct decide_ray *ray)
+{
+    struct search s = {.ray = ray, .proposed = RTC_INVALID_GEOMETRY_ID};
+    forget(&s);
+    return s;
+}
 
 static int before(const double a[3], const double b[3])
 {
@@ -138,8 +168,8 @@ static int is_hole(struct search *s, uint32_t prim, double v[3][3], double range
     return 1;
 }
 
-/* Remembers the triangle that the ray misses by least, in units of what double precision resolves at its
- * edges. */
+/* Remembers a triangle that the ray misses by less than double precision resolves at its edges. Of several the
+ * frontmost: what else is tried further away makes no difference. */
 static void note_miss(struct search *s, uint32_t prim, double v[3][3], const double side[3])
 {
     const double *dir = s->ray->dir;
@@ -148,16 +178,41 @@ static void note_miss(struct search *s, uint32_t prim, double v[3][3], const dou
     for (int i = 0; i < 3; i++) {
         const double *a = v[i], *b = v[(i + 1) % 3];
         double out = -sign * side[i] / blur(a, b);
+        if (out > 1.0) return;
         if (out <= gap) continue;
         gap = out;
         range = edge_range(a, b, dir);
     }
-    if (range <= BVH_AT_ORIGIN_M) return;
-    if (s->holes && gap <= 1.0 && s->near_gap <= 1.0 ? range >= s->near_range_m : gap >= s->near_gap) return;
-    if (gap <= 1.0 && is_hole(s, prim, v, range)) return;
-    s->near_gap = gap;
+    if (range <= BVH_AT_ORIGIN_M || range > s->near_range_m || is_hole(s, prim, v, range)) return;
+    if (range == s->near_range_m && prim > s->near_prim) return;
     s->near_prim = prim;
     s->near_range_m = range;
+}
+
+static void note_hit(struct search *s, uint32_t prim, double range_m, double border_m)
+{
+    uint32_t n = 0, last = 0;
+    if (range_m > s->first_m + 1e-12 * s->first_m) return;
+    s->first_m = fmin(s->first_m, range_m);
+    for (uint32_t i = 0; i < s->n_tied; i++) {
+        if (s->tied[i].range_m > s->first_m + 1e-12 * s->first_m || s->tied[i].prim == prim) continue;
+        s->tied[n] = s->tied[i];
+        if (s->tied[n].prim > s->tied[last].prim) last = n;
+        n++;
+    }
+    s->n_tied = n;
+    const uint32_t at = n < MOST_TIED ? s->n_tied++ : last;
+    if (n < MOST_TIED || prim < s->tied[last].prim) {
+        s->tied[at].prim = prim;
+        s->tied[at].range_m = range_m;
+        s->tied[at].border_m = border_m;
+    }
+    for (uint32_t i = 0; i < s->n_tied; i++) {
+        if (i != 0 && s->tied[i].prim >= s->prim) continue;
+        s->prim = s->tied[i].prim;
+        s->range_m = s->tied[i].range_m;
+        s->border_m = s->tied[i].border_m;
+    }
 }
 
 /* Returns whether the ray meets it. */
@@ -172,13 +227,24 @@ static int try_triangle(struct search *s, uint32_t prim)
     }
     double range = held_range(s->ray, prim, v);
     if (!(range > BVH_AT_ORIGIN_M) || is_hole(s, prim, v, range)) return 0;
-    double same = 1e-12 * range;
-    if (range < s->range_m - same || (range <= s->range_m + same && prim < s->prim)) {
-        s->prim = prim;
-        s->range_m = range;
-        s->border_m = edge_distance(v, side);
-    }
+    note_hit(s, prim, range, edge_distance(v, side));
     return 1;
+}
+
+static struct rivalry rivalry_of(const struct decide_ray *ray, uint32_t prim, double range_m)
+{
+    const double *n = ray->bvh->triangle[prim].n;
+    return (struct rivalry){range_m, bvh_width_m(ray->bvh, prim), sqrt(vec3_dot(n, n)) / fabs(vec3_dot(n, ray->dir))};
+}
+
+/* False where the ray meets a plane clearly before or after the hit. */
+static int may_be_rival(const struct decide_ray *ray, const struct rivalry *own, uint32_t prim)
+{
+    const struct bvh_plane *tri = &ray->bvh->triangle[prim];
+    double along = fabs(vec3_dot(tri->n, ray->dir)), length = sqrt(vec3_dot(tri->n, tri->n));
+    double gap = fabs((tri->d - vec3_dot(tri->n, ray->o_local)) / vec3_dot(tri->n, ray->dir) - own->range_m);
+    double width_m = 4.0 * fmax(own->width_m, bvh_width_m(ray->bvh, prim));
+    return !(gap * along > width_m * (own->steep * along + length));
 }
 
 /* Embree names all triangles whose boxes, or those of their leaf, are near. What lies further than the
@@ -188,7 +254,8 @@ static bool visit(struct RTCPointQueryFunctionArguments *args)
     const struct search *s = args->userPtr;
     const struct bvh_plane *tri = &s->ray->bvh->triangle[args->primID];
     double off = vec3_dot(tri->n, s->point_m) - tri->d, reach = s->radius_m;
-    if (args->primID != s->proposed && off * off <= reach * reach * vec3_dot(tri->n, tri->n))
+    if (args->primID != s->proposed && off * off <= reach * reach * vec3_dot(tri->n, tri->n) &&
+        (s->only == NULL || may_be_rival(s->ray, s->only, args->primID)))
         try_triangle(args->userPtr, args->primID);
     return false;
 }
@@ -218,25 +285,14 @@ static double slack_m(const struct decide_ray *ray, uint32_t prim, double width_
     return 4.0 * width_m * (1.0 + 1.0 / fmax(cosine, 1e-6));
 }
 
-/* Rivals whose planes the ray meets within what float can't order are tried; the others lie clearly before or
- * after it. */
+/* Rivals whose planes the ray meets within what float can't order are tried. */
 static void try_rivals(struct search *s, uint32_t prim, double range_m)
 {
-    const struct decide_ray *ray = s->ray;
-    const struct bvh *bvh = ray->bvh;
-    if (bvh->rival_first == NULL) return;
-    const struct bvh_plane *own = &bvh->triangle[prim];
-    uint32_t end = bvh->rival_first[prim + 1];
-    if (bvh->rival_first[prim] == end) return;
-    double own_m = bvh_width_m(bvh, prim);
-    double steep = sqrt(vec3_dot(own->n, own->n)) / fabs(vec3_dot(own->n, ray->dir));
-    for (uint32_t k = bvh->rival_first[prim]; k < end; k++) {
-        const struct bvh_plane *tri = &bvh->triangle[bvh->rival[k]];
-        double along = fabs(vec3_dot(tri->n, ray->dir)), length = sqrt(vec3_dot(tri->n, tri->n));
-        double gap = fabs((tri->d - vec3_dot(tri->n, ray->o_local)) / vec3_dot(tri->n, ray->dir) - range_m);
-        double width_m = 4.0 * fmax(own_m, bvh_width_m(bvh, bvh->rival[k]));
-        if (!(gap * along > width_m * (steep * along + length))) try_triangle(s, bvh->rival[k]);
-    }
+    const struct bvh *bvh = s->ray->bvh;
+    if (bvh->rival_first == NULL || bvh->rival_first[prim] == bvh->rival_first[prim + 1]) return;
+    const struct rivalry own = rivalry_of(s->ray, prim, range_m);
+    for (uint32_t k = bvh->rival_first[prim]; k < bvh->rival_first[prim + 1]; k++)
+        if (may_be_rival(s->ray, &own, bvh->rival[k])) try_triangle(s, bvh->rival[k]);
 }
 
 void decide_prefetch(const struct bvh *bvh, const uint32_t *prim, const uint32_t *ray, uint32_t n)
@@ -257,13 +313,11 @@ static void to_floats(const struct decide_ray *ray, float org[3], float dir[3])
     }
 }
 
-/* What was tried may lie anywhere on the ray; it counts up to limit_m: beyond, not everything was tried. */
-static int is_found(struct search *s, double limit_m)
+/* What was tried may lie anywhere on the ray. Up to limit_m everything was tried; a hit beyond is one, but something
+ * may lie before it. */
+static int is_found(const struct search *s, double limit_m)
 {
-    if (s->range_m <= limit_m || (s->near_gap <= 1.0 && s->near_range_m <= limit_m)) return 1;
-    s->prim = s->near_prim = RTC_INVALID_GEOMETRY_ID;
-    s->range_m = s->near_gap = INFINITY;
-    return 0;
+    return s->range_m <= limit_m || s->near_range_m <= limit_m;
 }
 
 static int is_met(void *search, uint32_t prim)
@@ -281,14 +335,19 @@ static void look_through(struct search *s)
     bvh_walk_along(s->ray->bvh, org, dir, s->ray->t_max, &walk);
 }
 
+static void finish(struct search *s, struct bvh_counters *counters, struct decide_hit *hit)
+{
+    /* So near to an edge that double precision can't separate its sides: the edge is hit, nothing passes. */
+    const int near = s->near_prim != RTC_INVALID_GEOMETRY_ID && !(s->range_m <= s->near_range_m);
+    counters->undecided += (uint64_t)near;
+    hit->prim = near ? s->near_prim : s->prim;
+    hit->range_m = near ? s->near_range_m : s->range_m;
+}
+
 void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct bvh_counters *counters,
                 struct decide_hit *hit)
 {
-    struct search s = {.ray = ray,
-                       .range_m = INFINITY,
-                       .prim = RTC_INVALID_GEOMETRY_ID,
-                       .near_prim = RTC_INVALID_GEOMETRY_ID,
-                       .near_gap = INFINITY};
+    struct search s = search_for(ray);
     counters->near_border++;
     /* Each round begins further along the ray, so they end. A ray that passes many wide triangles needs many:
      * none may be given up, for what lies behind would be lost. */
@@ -301,11 +360,11 @@ void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct bvh
         if (s.prim == prim && s.border_m > width_m) break;
         counters->decided++;
         if (s.holes) break;
-        double range_m = (double)t, slack = slack_m(ray, prim, width_m), limit_m = range_m + slack;
+        double range_m = (double)t, slack = slack_m(ray, prim, width_m);
         double radius_m = fmin(slack, 0.01 * range_m + 4.0 * width_m);
         try_around(&s, range_m, radius_m);
         if (s.holes) break;
-        if (is_found(&s, limit_m)) break;
+        if (is_found(&s, range_m + radius_m)) break;
         counters->went_on++;
         float org[3], dir[3];
         to_floats(ray, org, dir);
@@ -316,12 +375,49 @@ void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct bvh
     }
     if (s.holes) look_through(&s);
     if (s.prim != RTC_INVALID_GEOMETRY_ID) try_rivals(&s, s.prim, s.range_m);
-    /* So near to an edge that double precision can't separate its sides: the edge is hit, nothing passes. */
-    if (s.near_gap <= 1.0 && !(s.range_m <= s.near_range_m)) {
-        counters->undecided++;
-        s.prim = s.near_prim;
-        s.range_m = s.near_range_m;
+    finish(&s, counters, hit);
+}
+
+void decide_among(const struct decide_ray *ray, const uint32_t *prim, uint32_t n, struct bvh_counters *counters,
+                  struct decide_hit *hit)
+{
+    struct search s = search_for(ray);
+    for (uint32_t i = 0; i < n; i++)
+        try_triangle(&s, prim[i]);
+    finish(&s, counters, hit);
+}
+
+/* How many widths around a hit are searched. Float may misjudge what lies within two of them over the cosine of the
+ * incidence; where it is smaller than one by so many, all that is proposed up to the hit is tried. */
+enum { WIDE = 64, MOST_STEPS = 64 };
+
+static void step_along(struct search *s)
+{
+    struct bvh_one one = {.t_min = 0.0F, .t_max = s->ray->t_max};
+    float org[3], dir[3];
+    to_floats(s->ray, org, dir);
+    for (int k = 0; k < MOST_STEPS; k++) {
+        bvh_intersect_one(s->ray->bvh, org, dir, &one);
+        if (one.prim == RTC_INVALID_GEOMETRY_ID || (double)one.t > s->first_m + s->radius_m) return;
+        try_triangle(s, one.prim);
+        one.t_min = nextafterf(one.t, INFINITY);
+        one.t_max = s->ray->t_max;
     }
-    hit->prim = s.prim;
-    hit->range_m = s.range_m;
+}
+
+void decide_again(const struct decide_ray *ray, struct decide_hit *hit)
+{
+    struct search s = search_for(ray);
+    struct bvh_counters none = {0};
+    const double width_m = bvh_width_m(ray->bvh, hit->prim);
+    const struct rivalry own = rivalry_of(ray, hit->prim, hit->range_m);
+    struct decide_hit found;
+    s.proposed = hit->prim;
+    s.only = &own;
+    try_triangle(&s, hit->prim);
+    try_around(&s, hit->range_m,
+               fmin(WIDE / 4 * slack_m(ray, hit->prim, width_m), 0.01 * hit->range_m + 4.0 * width_m));
+    if (!(own.steep < WIDE)) step_along(&s);
+    finish(&s, &none, &found);
+    if (found.prim != RTC_INVALID_GEOMETRY_ID) *hit = found;
 }

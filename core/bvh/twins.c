@@ -51,7 +51,21 @@ static int same_holes(const struct scene *scene, uint32_t a, uint32_t b)
     return 1;
 }
 
-int bvh_drop_twins(const struct bvh *bvh, float *vertex, const struct sh_report *report, struct sh_err *err)
+/* The bitmap is only there where there are twins. */
+static int note_twin(struct bvh *bvh, uint32_t prim, struct sh_err *err)
+{
+    if (bvh->twin == NULL) bvh->twin = calloc((size_t)bvh->scene->n_triangles / 64 + 1, sizeof *bvh->twin);
+    if (bvh->twin == NULL) return sh_fail(err, SH_ENOMEM, "bvh: no memory to mark triangles that stand twice");
+    bvh->twin[prim / 64] |= 1ULL << prim % 64;
+    return SH_OK;
+}
+
+int bvh_is_twin(const struct bvh *bvh, uint32_t triangle)
+{
+    return bvh->twin != NULL && (bvh->twin[triangle / 64] >> triangle % 64 & 1) != 0;
+}
+
+int bvh_drop_twins(struct bvh *bvh, float *vertex, const struct sh_report *report, struct sh_err *err)
 {
     const struct scene *scene = bvh->scene;
     uint64_t size = 16;
@@ -72,6 +86,7 @@ int bvh_drop_twins(const struct bvh *bvh, float *vertex, const struct sh_report 
             if (scene->cutout != NULL && !same_holes(scene, prim, table[at])) continue;
             for (int i = 0; i < 9; i++)
                 vertex[9 * (size_t)prim + (size_t)i] = NAN; /* Embree leaves out what is not finite */
+            rc = note_twin(bvh, prim, err);
             break;
         }
         if (table[at] == UINT32_MAX) table[at] = prim;

@@ -30,11 +30,13 @@ int caster_create(struct caster **out, struct sh_err *err)
     struct caster *c = *out = aligned_alloc(64, (sizeof *c + 63) / 64 * 64);
     if (c == NULL) return sh_fail(err, SH_ENOMEM, "cast: no memory for a caster");
     c->bvh = NULL; /* the arrays are not touched until they are needed */
+    c->sight = NULL;
     c->sub_rays = NULL;
     c->profile = NULL;
     c->steps.ready = 0;
     memset(&c->counters, 0, sizeof c->counters);
     int rc = bvh_work_create(&c->bvh, err);
+    if (rc == SH_OK) rc = sight_work_create(&c->sight, err);
     if (rc == SH_OK) c->sub_rays = aligned_alloc(64, (sizeof *c->sub_rays + 63) / 64 * 64); /* likewise */
     if (rc == SH_OK && c->sub_rays == NULL) rc = sh_fail(err, SH_ENOMEM, "cast: no memory for a caster");
     if (rc == SH_OK) return SH_OK;
@@ -47,6 +49,7 @@ void caster_free(struct caster *caster)
 {
     if (caster == NULL) return;
     bvh_work_free(caster->bvh);
+    sight_work_free(caster->sight);
     free(caster->sub_rays);
     free(caster);
 }
@@ -54,11 +57,14 @@ void caster_free(struct caster *caster)
 void caster_get_counters(const struct caster *caster, struct cast_counters *counters)
 {
     const struct bvh_counters *bvh = bvh_work_counters(caster->bvh);
+    const struct sight_counters *sight = sight_work_counters(caster->sight);
     *counters = caster->counters;
     counters->near_border = bvh->near_border;
     counters->decided = bvh->decided;
     counters->went_on = bvh->went_on;
     counters->undecided = bvh->undecided;
+    counters->few = sight->few;
+    counters->asked = sight->asked;
 }
 
 void caster_hits(struct caster *caster, const struct bvh *bvh, const struct bvh_rays *rays)

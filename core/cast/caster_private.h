@@ -97,6 +97,7 @@ struct sub_ray_work;
 
 struct caster {
     struct bvh_work *bvh;
+    struct sight_work *sight;
     struct sub_ray_work *sub_rays; /* touched only where pulses have a footprint */
     struct bvh_profile *profile;
     struct cast_counters counters;

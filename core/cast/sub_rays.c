@@ -227,19 +227,21 @@ static int sees_glass(const struct caster *c, const struct cast_setup *s, uint32
 }
 
 /* Pulses of an adaptive beam for which one ray may not be enough. */
-static uint32_t find_candidates(struct caster *c, const struct cast_setup *s, uint32_t n)
+static uint32_t find_candidates(struct caster *c, const struct chunk *k)
 {
     struct sub_ray_work *w = c->sub_rays;
+    const struct cast_setup *s = k->s;
+    const uint32_t n = k->n;
     const struct vec3_floats dir = bvh_work_directions(c->bvh);
     const int glass = s->detect != NULL && s->detect->depth > 0;
     uint32_t found, all = 0;
     _Static_assert((int)CHUNK <= (int)BEAM_NEAR_MOST, "all at once");
     found = beam_near_outlines(s->beam->outlines, &s->beam->beam, &dir, n, glass ? w->reach : w->candidate);
     if (!glass) return found;
-    for (uint32_t p = 0, k = 0; p < n; p++) {
-        int near = k < found && w->reach[k].pulse == p;
-        if (near || sees_glass(c, s, p)) w->candidate[all++] = near ? w->reach[k] : (struct beam_near){.pulse = p};
-        k += (uint32_t)near;
+    for (uint32_t p = 0, at = 0; p < n; p++) {
+        int near = at < found && w->reach[at].pulse == p;
+        if (near || sees_glass(c, s, p)) w->candidate[all++] = near ? w->reach[at] : (struct beam_near){.pulse = p};
+        at += (uint32_t)near;
     }
     return all;
 }
@@ -334,7 +336,9 @@ void caster_sub_rays(struct caster *c, const struct chunk *k)
     const struct cast_beam *b = k->s->beam;
     w->n_jobs = w->pool.n = w->n_echoes = w->n_near = w->n_again = 0;
     if (b->mode == BEAM_ADAPTIVE) {
-        cast_parts(c, k, find_candidates(c, k->s, k->n));
+        /* What lies beyond may or may not have been met. */
+        kernel_limit(l->range_m, 0.0, k->s->range_max_m, k->n);
+        cast_parts(c, k, find_candidates(c, k));
         cast_whole(c, k, w->again, w->n_again);
         c->counters.outlined += w->n_near;
         beam_plane_means(&b->beam, w->steep, k->n, l->range_m);

@@ -1,17 +1,28 @@
-/* Rays looked up in the map. */
+/* Rays looked up in the map, a chunk at a time. */
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/sight/sight_inside.h"
+#include "core/sight/hits_inside.h"
 
 struct sight_work {
     struct sight_counters counters;
+    struct sight_places places;
+    struct sight_run run[HITS_ROOM];
+    uint32_t triangle[HITS_ROOM]; /* of a run's rays */
+    /* Rays that the BVH is asked for. */
+    uint8_t asks[HITS_ROOM]; /* 1: of the chunk's */
+    uint32_t ray[HITS_ROOM]; /* which ones are cast */
+    double x[HITS_ROOM], y[HITS_ROOM], z[HITS_ROOM], range_m[HITS_ROOM];
+    uint32_t met[HITS_ROOM], label[HITS_ROOM];
+    float steep[HITS_ROOM];
 };
 
 int sight_work_create(struct sight_work **out, struct sh_err *err)
 {
-    *out = calloc(1, sizeof **out);
-    return *out != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "sight: no memory");
+    struct sight_work *w = *out = aligned_alloc(64, (sizeof *w + 63) / 64 * 64);
+    if (w == NULL) return sh_fail(err, SH_ENOMEM, "sight: no memory");
+    memset(w, 0, sizeof *w);
+    return SH_OK;
 }
 
 void sight_work_free(struct sight_work *work)
@@ -24,9 +35,136 @@ const struct sight_counters *sight_work_counters(const struct sight_work *work)
     return &work->counters;
 }
 
+static void decide_open(struct bvh_work *bvh_work, const struct sight *s, const struct bvh_rays *rays,
+                        const uint32_t *list, uint32_t from, uint32_t to)
+{
+    uint32_t triangle[SIGHT_MAX_LIST];
+    for (uint32_t j = 0; j < list[0]; j++)
+        triangle[j] = s->record[list[1 + j]].triangle;
+    for (uint32_t i = from; i < to; i++)
+        bvh_decide_among(bvh_work, s->bvh, rays, i, triangle, list[0]);
+}
+
+static void ask(struct sight_work *w, uint32_t from, uint32_t to, uint32_t *asked)
+{
+    memset(w->asks + from, 1, to - from);
+    *asked += to - from;
+}
+
+/* Of rays that meet one of a few, those that meet the same one are done together. In exact order, what the records
+ * can't decide double does, as it would decide the BVH's proposals; else, or where the BVH might propose nothing, those
+ * rays ask. */
+static void do_few(struct sight_work *w, struct bvh_work *bvh_work, const struct sight *s, const struct bvh_rays *rays,
+                   const struct sight_run *run, uint32_t *asked)
+{
+    const uint32_t *list = s->list + (run->leaf & SIGHT_NUMBER), n = run[1].from - run->from;
+    few_decide(s, rays, list, run->from, run[1].from, w->triangle);
+    for (uint32_t i = 0, end; i < n; i = end) {
+        const uint32_t it = w->triangle[i];
+        for (end = i + 1; end < n && w->triangle[end] == it;)
+            end++;
+        if (it != FEW_OPEN && it != FEW_ASK)
+            bvh_ranges_of(s->bvh, it, rays, run->from + i, run->from + end);
+        else if (it == FEW_ASK || !s->among)
+            ask(w, run->from + i, run->from + end, asked);
+        else
+            decide_open(bvh_work, s, rays, list, run->from + i, run->from + end);
+    }
+}
+
+/* Later runs after earlier ones: bvh_ranges_of says why. */
+static uint32_t do_runs(struct sight_work *w, struct bvh_work *bvh_work, const struct sight *s,
+                        const struct bvh_rays *rays, uint32_t runs)
+{
+    uint32_t asked = 0;
+    for (const struct sight_run *run = w->run; run < w->run + runs; run++) {
+        if (run->leaf == SIGHT_ASK) {
+            ask(w, run->from, run[1].from, &asked);
+        } else if (sight_kind(run->leaf) == SIGHT_FEW) {
+            w->counters.few += run[1].from - run->from;
+            do_few(w, bvh_work, s, rays, run, &asked);
+        } else {
+            bvh_ranges_of(s->bvh, run->leaf, rays, run->from, run[1].from);
+        }
+    }
+    return asked;
+}
+
+/* Which rays are cast for those that ask: in exact order themselves; else their whole packets, as bvh_hits would have
+ * cut them from the chunk, so that the BVH proposes the same. */
+static uint32_t gather(struct sight_work *w, const struct sight *s, const struct bvh_rays *rays)
+{
+    struct bvh_info info;
+    uint32_t m = 0;
+    bvh_get_info(s->bvh, &info);
+    const uint32_t packet = s->among ? 1 : info.packet;
+    for (uint32_t at = 0; at < rays->n; at += packet) {
+        const uint32_t end = rays->n - at < packet ? rays->n : at + packet;
+        uint32_t any = 0;
+        for (uint32_t i = at; i < end; i++)
+            any |= w->asks[i];
+        for (uint32_t i = at; any && i < end; i++)
+            w->ray[m++] = i;
+    }
+    for (uint32_t k = 0; k < m; k++) {
+        w->x[k] = rays->dir.x[w->ray[k]];
+        w->y[k] = rays->dir.y[w->ray[k]];
+        w->z[k] = rays->dir.z[w->ray[k]];
+    }
+    return m;
+}
+
+static void ask_bvh(struct sight_work *w, struct bvh_work *bvh_work, const struct sight *s, const struct bvh_rays *rays)
+{
+    struct bvh_rays asked = {.n = gather(w, s, rays),
+                             .from = rays->from,
+                             .dir = VEC3_IN(*w, 0),
+                             .range_max_m = rays->range_max_m,
+                             .range_m = w->range_m,
+                             .triangle = w->met,
+                             .label = w->label,
+                             .steep = rays->steep != NULL ? w->steep : NULL};
+    if (s->exact)
+        bvh_hits_ordered(bvh_work, s->bvh, &asked);
+    else
+        bvh_hits(bvh_work, s->bvh, &asked);
+    for (uint32_t k = 0; k < asked.n; k++) {
+        const uint32_t i = w->ray[k];
+        if (!w->asks[i]) continue;
+        rays->range_m[i] = w->range_m[k];
+        rays->triangle[i] = w->met[k];
+        if (rays->label != NULL) rays->label[i] = w->label[k];
+        if (rays->steep != NULL) rays->steep[i] = w->steep[k];
+    }
+    memset(w->asks, 0, rays->n);
+    bvh_work_set_directions(bvh_work, &rays->dir, rays->n);
+}
+
+static void look_up_chunk(struct sight_work *w, struct bvh_work *bvh_work, const struct sight *s,
+                          const struct bvh_rays *rays)
+{
+    struct bvh_profile *profile = bvh_work_profile(bvh_work);
+    const struct vec3_floats dir = bvh_work_directions(bvh_work);
+    bvh_work_set_directions(bvh_work, &rays->dir, rays->n);
+    const uint32_t runs = sight_find_runs(s, &dir, rays->n, &w->places, w->run);
+    bvh_stage_ends(profile, BVH_STAGE_PREPARE);
+    const uint32_t asked = do_runs(w, bvh_work, s, rays, runs);
+    bvh_stage_ends(profile, BVH_STAGE_REFINE);
+    w->counters.asked += asked;
+    if (asked != 0) ask_bvh(w, bvh_work, s, rays);
+}
+
 void sight_hits(struct sight_work *work, struct bvh_work *bvh_work, const struct sight *sight,
                 const struct bvh_rays *rays)
 {
-    work->counters.asked += rays->n;
-    bvh_hits(bvh_work, sight->bvh, rays);
+    for (uint32_t at = 0; at < rays->n; at += BVH_CHUNK) {
+        struct bvh_rays part = *rays;
+        part.n = rays->n - at < BVH_CHUNK ? rays->n - at : BVH_CHUNK;
+        part.dir = VEC3_IN(rays->dir, at);
+        part.range_m = rays->range_m + at;
+        part.triangle = rays->triangle + at;
+        part.label = rays->label != NULL ? rays->label + at : NULL;
+        part.steep = rays->steep != NULL ? rays->steep + at : NULL;
+        look_up_chunk(work, bvh_work, sight, &part);
+    }
 }

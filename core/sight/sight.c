@@ -1,34 +1,166 @@
-/* A sight: made, asked about, given back. */
+/* A sight: made by several threads, region by region, and given back. */
+#include <math.h>
+#include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
+#include <unistd.h>
 
-#include "core/sight/sight_inside.h"
+#include "core/sight/build_inside.h"
+
+enum { MAX_THREADS = 64, FEW_RAYS = 4 };
 
 int sight_possible(const struct scene *scene)
 {
     return scene->cutout == NULL && scene->n_triangles < SIGHT_NUMBER;
 }
 
+uint64_t build_take(struct build_shared *b, struct build_arena *arena, uint64_t n, uint64_t size)
+{
+    if (atomic_fetch_add_explicit(&b->bytes, n * size, memory_order_relaxed) + n * size <= b->spec->memory_bytes) {
+        const uint64_t at = atomic_fetch_add_explicit(&arena->used, n, memory_order_relaxed);
+        if (at + n <= arena->room) return at;
+        atomic_fetch_sub_explicit(&arena->used, n, memory_order_relaxed);
+    }
+    atomic_fetch_sub_explicit(&b->bytes, n * size, memory_order_relaxed);
+    return UINT64_MAX;
+}
+
+static uint64_t tiles_of(uint32_t cells)
+{
+    const uint64_t edge = cells / SIGHT_TILE;
+    return SIGHT_FACES * edge * edge;
+}
+
+/* So many that FEW_RAYS rays come to each, and that most of the memory is left for what they say. */
+uint32_t sight_cells(double rays, uint64_t memory_bytes)
+{
+    uint32_t cells = SIGHT_MIN_CELLS;
+    while (cells < SIGHT_MAX_CELLS && SIGHT_FACES * 4.0 * cells * cells * FEW_RAYS <= rays &&
+           tiles_of(2 * cells) * sizeof(uint32_t) * 4 <= memory_bytes)
+        cells *= 2;
+    return cells;
+}
+
+/* Arrays as large as they may become: what is never touched takes no memory. */
+static void *take_array(struct build_shared *b, struct build_arena *arena, uint64_t most, uint64_t size)
+{
+    const uint64_t within = b->spec->memory_bytes / size + 1;
+    arena->room = most < within ? most : within;
+    if (arena->room > SIGHT_NUMBER) arena->room = SIGHT_NUMBER;
+    return aligned_alloc(128, (arena->room * size + 127) / 128 * 128);
+}
+
+static int take_arrays(struct build_shared *b, struct sh_err *err)
+{
+    struct sight *s = b->sight;
+    s->tile = malloc((tiles_of(s->cells) + 1) * sizeof *s->tile);
+    s->leaf = take_array(b, &b->leaf, tiles_of(s->cells) * SIGHT_BLOCK, sizeof *s->leaf);
+    s->list = take_array(b, &b->list, UINT64_MAX, sizeof *s->list);
+    s->record = take_array(b, &b->record, UINT64_MAX, sizeof *s->record);
+    if (s->tile == NULL || s->leaf == NULL || s->list == NULL || s->record == NULL)
+        return sh_fail(err, SH_ENOMEM, "sight: no memory for %u cells", s->cells);
+    for (uint64_t i = 0; i <= tiles_of(s->cells); i++)
+        s->tile[i] = SIGHT_ASK;
+    b->bytes = tiles_of(s->cells) * sizeof *s->tile;
+    return SH_OK;
+}
+
+static void *thread_main(void *shared)
+{
+    struct build_shared *b = shared;
+    struct build_work w = {0};
+    const uint32_t regions = SIGHT_FACES * b->regions * b->regions;
+    for (;;) {
+        const uint32_t region = atomic_fetch_add(&b->next, 1);
+        if (region >= regions || atomic_load(&b->failed) != 0) break;
+        const int rc = sh_stopped(b->report) ? SH_ESTOPPED : build_region(b, &w, region);
+        if (rc != SH_OK) atomic_store(&b->failed, rc);
+    }
+    atomic_fetch_add(&b->given_back, w.taken);
+    build_work_free(&w);
+    return NULL;
+}
+
+static int build_all(struct build_shared *b, unsigned threads, struct sh_err *err)
+{
+    pthread_t other[MAX_THREADS];
+    unsigned n = 0;
+    if (threads == 0) threads = (unsigned)sysconf(_SC_NPROCESSORS_ONLN);
+    while (n + 1 < threads && n < MAX_THREADS && pthread_create(&other[n], NULL, thread_main, b) == 0)
+        n++;
+    thread_main(b);
+    for (unsigned i = 0; i < n; i++)
+        pthread_join(other[i], NULL);
+    if (b->failed == SH_ESTOPPED) return sh_fail_stopped(err);
+    return b->failed != 0 ? sh_fail(err, SH_ENOMEM, "sight: no memory") : SH_OK;
+}
+
+/* Arrays shrink to what they hold; where that fails they stay. */
+static void *keep(void *array, uint64_t used, uint64_t size)
+{
+    void *kept = realloc(array, used * size + 1);
+    return kept != NULL ? kept : array;
+}
+
+static void finish(struct build_shared *b)
+{
+    struct sight *s = b->sight;
+    struct sight_info *info = &s->info;
+    double all = 0.0;
+    s->leaf = keep(s->leaf, b->leaf.used, sizeof *s->leaf);
+    s->list = keep(s->list, b->list.used, sizeof *s->list);
+    for (int i = 0; i < 4; i++)
+        all += (double)b->cells[i];
+    all = all > 0.0 ? all : 1.0;
+    *info = (struct sight_info){.cells = s->cells,
+                                .one = (double)b->cells[0] / all,
+                                .nothing = (double)b->cells[1] / all,
+                                .few = (double)b->cells[2] / all,
+                                .ask = (double)b->cells[3] / all,
+                                .lists = b->list.used,
+                                .records = b->record.used,
+                                .bytes = b->bytes - b->given_back,
+                                .peak_bytes = b->bytes};
+}
+
+static int build(struct build_shared *b, unsigned threads, struct sh_err *err)
+{
+    int rc = take_arrays(b, err);
+    if (rc == SH_OK) rc = build_bins(b, err);
+    if (rc == SH_OK) rc = build_all(b, threads, err);
+    if (rc == SH_OK) finish(b);
+    free(b->seen);
+    free(b->bin);
+    free(b->binned);
+    return rc;
+}
+
 int sight_create(const struct sight_spec *spec, unsigned threads, const struct sh_report *report, struct sight **out,
                  struct sh_err *err)
 {
     struct sight *s = *out = calloc(1, sizeof *s);
+    struct timespec from, to;
+    double origin_m[3];
     if (s == NULL) return sh_fail(err, SH_ENOMEM, "sight: no memory");
+    clock_gettime(CLOCK_MONOTONIC, &from);
     s->bvh = spec->bvh;
     memcpy(s->station_m, spec->station_m, sizeof s->station_m);
     s->exact = spec->exact;
-    s->cells = SIGHT_MIN_CELLS;
-    const size_t tiles = (size_t)SIGHT_FACES * (s->cells / SIGHT_TILE) * (s->cells / SIGHT_TILE);
-    s->tile = malloc(tiles * sizeof *s->tile);
-    if (s->tile == NULL) {
+    bvh_origin(spec->bvh, origin_m);
+    s->among = s->exact && memcmp(origin_m, s->station_m, sizeof origin_m) == 0;
+    s->cells = sight_cells(spec->rays, spec->memory_bytes);
+    struct build_shared b = {.sight = s, .spec = spec, .report = report};
+    b.regions = s->cells / SIGHT_TILE < BUILD_REGIONS ? s->cells / SIGHT_TILE : BUILD_REGIONS;
+    b.region_cells = s->cells / b.regions;
+    int rc = build(&b, threads, err);
+    if (rc != SH_OK) {
         sight_free(s);
         *out = NULL;
-        return sh_fail(err, SH_ENOMEM, "sight: no memory");
+        return rc;
     }
-    for (size_t i = 0; i < tiles; i++)
-        s->tile[i] = SIGHT_ASK;
-    (void)threads;
-    (void)report;
+    clock_gettime(CLOCK_MONOTONIC, &to);
+    s->info.build_s = (double)(to.tv_sec - from.tv_sec) + 1e-9 * (double)(to.tv_nsec - from.tv_nsec);
     return SH_OK;
 }
 

@@ -36,7 +36,7 @@ enum sight_kind {
     SIGHT_OTHER,
 };
 enum { SIGHT_KIND_SHIFT = 30, SIGHT_NUMBER = (1U << SIGHT_KIND_SHIFT) - 1 };
-static const uint32_t SIGHT_NOTHING = 0xffffffff, SIGHT_ASK = 0xfffffffe;
+static const uint32_t SIGHT_NOTHING = 0xffffffff, SIGHT_ASK = 0xfffffffe, SIGHT_NO_LEAF = 0xfffffffd;
 
 static inline enum sight_kind sight_kind(uint32_t leaf)
 {
@@ -57,9 +57,24 @@ struct sight_record {
     uint32_t triangle;
 } __attribute__((aligned(128)));
 
+/* What double precision leaves in doubt of an edge's side, against the distance of its farther end times its
+ * length: 8 units of 2^-53 in core/bvh/decide.c, 10 here (the difference of the corners 1, the cross product 6,
+ * the product with a direction 3), and 8 more within which decide.c takes an edge for hit. */
+#define SIGHT_EDGE_DOUBT (32.0 * 0x1p-53)
+/* Of plane . d, against the plane's length: its components 1, the product 3; twice, here and there. */
+#define SIGHT_PLANE_DOUBT (16.0 * 0x1p-53)
+/* Sines of angles below this are not decided here: decide.c holds ranges between edges below 1e-6, and beyond
+ * 1 / BVH_MAX_SLANT a BVH promises nothing. */
+#define SIGHT_GRAZE 0x1p-15
+/* Embree's distance, as a share: this times (F + k (L + F / 20)) / h. F: the farthest corner from where Embree
+ * sees it; L: the longest edge (the widened triangle is up to F / 20 larger); k: how much the normal of a sliver
+ * loses, the product of its two longer edges by twice the area; h: the height of the station above the plane. */
+#define SIGHT_FLOAT_DOUBT (20.0 * 0x1p-24)
+#define SIGHT_MAX_REL     0.25
+
 /* core/bvh/decide.c takes ranges within 1e-12 of each other for the same: the lowest triangle wins. Below
  * SIGHT_SURE_SAME they are for certain, above SIGHT_SAME they are not. */
-#define SIGHT_SAME 4e-12
+#define SIGHT_SAME      4e-12
 #define SIGHT_SURE_SAME 0.25e-12
 /* 1 / m. What a ray begins on it does not meet (BVH_AT_ORIGIN_M); nearer than twice that, the BVH decides. */
 #define SIGHT_NEAR 1e6
@@ -67,10 +82,10 @@ struct sight_record {
 struct sight {
     const struct bvh *bvh;
     double station_m[3];
-    int exact;
-    uint32_t cells; /* power of two */
-    uint32_t *tile; /* [SIGHT_FACES][cells / SIGHT_TILE][cells / SIGHT_TILE], v outside, u inside */
-    uint32_t *leaf; /* blocks */
+    int exact, among; /* among: the BVH misses nothing that double precision finds, and exact */
+    uint32_t cells;   /* power of two */
+    uint32_t *tile;   /* [SIGHT_FACES][cells / SIGHT_TILE][cells / SIGHT_TILE], v outside, u inside; one that asks */
+    uint32_t *leaf;   /* blocks */
     uint32_t *list;
     struct sight_record *record;
     struct sight_info info;

@@ -274,6 +274,8 @@ static int follow(struct recording *r, struct sh_err *err)
 static int start_scan(struct recording *r, uint32_t station, struct sh_err *err)
 {
     int rc = wait_idle(r, err);
+    if (rc == SH_OK && !r->interrupted && r->o->prepare != NULL) rc = r->o->prepare(r->o->ctx, station, err);
+    if (rc == SH_ESTOPPED && is_interrupted(r)) return SH_OK;
     if (rc == SH_OK && r->interrupted) return SH_OK;
     if (rc == SH_OK && station != 0) rc = set(r, "HEAD:STATION", (long)station, err);
     if (rc == SH_OK && r->o->frames >= 0) rc = set(r, "SCAN:FRAM", r->o->frames, err);
@@ -349,10 +351,11 @@ int recording_run(struct scanhead *sh, const struct recording_options *options, 
     memset(result, 0, sizeof *result);
     const int64_t start_ns = clock_now_ns();
     struct recording r = {.sh = sh, .o = options, .result = result, .next_report_ns = start_ns + 1000000000};
+    if (options->hash) scanhead_hash_start(sh);
     int rc = options->listen ? record_listening(&r, err) : record_stations(&r, err);
     result->wall_s = 1e-9 * (double)(clock_now_ns() - start_ns);
     scanhead_get_stats(sh, &result->stream);
-    scanhead_hash_hex(sh, result->sha256);
+    if (options->hash) scanhead_hash_hex(sh, result->sha256);
     if (rc == SH_ECLOSED && options->listen && result->frames == 0)
         return sh_fail(err, SH_EFORMAT, "the stream ended without a single frame");
     if (rc == SH_ECLOSED && options->listen && !result->counts.within) return SH_OK;

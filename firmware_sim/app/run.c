@@ -17,7 +17,7 @@ struct run_options {
     struct device_options device;
     const char *stats;
     long ready_fd;
-    int quiet, frames_given;
+    int quiet, no_hash, frames_given;
 };
 
 static void say_what_runs(const struct config *cfg, const struct site *site, const struct loop *loop)
@@ -166,14 +166,17 @@ static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
     struct site *site = NULL;
     struct device *device = NULL;
     struct loop *loop = NULL;
-    struct loop_options options = {.hash = o->stats != NULL, .report = &app_report_stderr};
+    struct loop_options options = {.hash = o->stats != NULL && !o->no_hash, .report = &app_report_stderr};
     o->device.start |= cfg->head.start;
     o->device.one_scan = o->device.one_scan && o->device.start;
-    if (o->device.start && o->device.duration_s > 0.0 && !o->frames_given) cfg->head.settings.frames = 0;
     if (cfg->n_links == 0)
         return sh_fail(err, SH_EINPUT, "%s: links: none; run needs at least one of pty, tcp, udp, usb, file, null",
                        cfg->file);
     int rc = site_load(cfg, &app_report_stderr, &site, err);
+    if (rc == SH_OK) rc = site_open_sights(site, 0, site->n_stations, &app_report_stderr, err);
+    /* After the plan, which is made for the configuration: a replayed journal gives the same stream without
+     * --start. */
+    if (o->device.start && o->device.duration_s > 0.0 && !o->frames_given) cfg->head.settings.frames = 0;
     if (rc == SH_OK) rc = site_warn_rate(site, &app_report_stderr, err);
     if (rc == SH_OK) rc = device_create(site, &o->device, &device, err);
     if (rc == SH_OK) rc = loop_create(site, device, &options, &loop, err);
@@ -222,6 +225,7 @@ static const struct app_option OPTIONS[] = {
     {APP_KEY, "threads", "N", .key = "loop.threads", .help = "threads that cast; 0: one per processor"},
     OPTION_SET,
     {APP_TEXT, "stats", "FILE", .at = AT(stats), .help = "write statistics as JSON at the end; - is standard output"},
+    OPTION_NO_HASH(AT(no_hash)),
     {APP_TEXT, "journal", "FILE", .at = AT(device.journal),
      .help = "write every command that had an effect, with its device time, and the end"},
     {APP_TEXT, "replay-journal", "FILE", .at = AT(device.replay),

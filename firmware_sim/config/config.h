@@ -252,6 +252,11 @@ struct config_beam {
     uint32_t rings;
 };
 
+struct config_cast {
+    enum config_choice sight; /* core/sight.h */
+    double sight_mib;
+};
+
 struct config_noise {
     enum config_range_noise range;
     int angle;
@@ -285,6 +290,7 @@ struct config {
     struct link_spec link[CONFIG_MAX_LINKS];
     uint32_t n_links;
     struct config_beam beam;
+    struct config_cast cast;
     struct plan_tolerance plan;
     struct config_noise noise;
     struct config_signal signal;
@@ -339,6 +345,9 @@ uint32_t config_threads(const struct config *cfg);
 /* Why the beams of a scan do not all begin at one place of a scene that stands still; NULL: they do. That is
  * what an adaptive beam needs. */
 const char *config_beam_moves(const struct config *cfg);
+
+/* Why rays do not all begin at the head's station, as a sight needs it (core/sight.h); NULL: they do. */
+const char *config_rays_move(const struct config *cfg);
 
 /* The reference: every key with type, unit, default, range and help. */
 void config_print_reference(FILE *out);

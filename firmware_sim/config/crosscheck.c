@@ -157,14 +157,32 @@ static void check_platform(struct cfg_reader *rd, struct config *cfg)
     check_part(rd, cfg);
 }
 
+static const char *offset_of(const struct config *cfg)
+{
+    if (cfg->instrument.transit_offset_m == 0.0 && cfg->instrument.mirror_offset_m == 0.0) return NULL;
+    return "instrument.transit_offset_m or mirror_offset_m moves the beam";
+}
+
 const char *config_beam_moves(const struct config *cfg)
 {
     int moves = cfg->platform.kind != PLATFORM_STATIC;
     for (uint32_t i = 0; i < cfg->scene.n_meshes; i++)
         moves |= config_mesh_moves(&cfg->scene.mesh[i]);
-    if (moves) return "the head or a mesh moves";
-    if (cfg->instrument.transit_offset_m == 0.0 && cfg->instrument.mirror_offset_m == 0.0) return NULL;
-    return "instrument.transit_offset_m or mirror_offset_m moves the beam";
+    return moves ? "the head or a mesh moves" : offset_of(cfg);
+}
+
+const char *config_rays_move(const struct config *cfg)
+{
+    return config_head_moves(&cfg->platform) ? "the head moves" : offset_of(cfg);
+}
+
+/* The rest of it, only the loaded scene and the plan can say (firmware_sim/site/sights.c). */
+static void check_sight(struct cfg_reader *rd, const struct config *cfg)
+{
+    const char *why = config_rays_move(cfg);
+    if (cfg->cast.sight != CHOICE_ON || !CFG_SOUND(rd, 0, "platform.kind", "beam.mode")) return;
+    if (why == NULL && cfg->beam.mode == BEAM_RINGS) why = "beam.mode is rings, which have no ray for the centre";
+    if (why != NULL) cfg_fail_key(rd, "cast.sight", 0, "on, but %s; allowed auto, off", why);
 }
 
 static const double LEAST_PULSE_NS = 0.1; /* 15 mm of range */
@@ -237,6 +255,7 @@ void cfg_check(struct cfg_reader *rd, struct config *cfg)
     cfg_check_links(rd, cfg);
     cfg_check_link_protocols(rd, cfg);
     check_beam(rd, cfg);
+    check_sight(rd, cfg);
     check_loop(rd, cfg);
     check_time(rd, cfg);
     cfg_check_signal(rd, cfg);

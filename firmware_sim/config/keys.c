@@ -76,7 +76,8 @@ static const struct cfg_key config_keys[] = {
     {KEY(scene.order_exactly), CFG_ENUM, .def = "auto",
      WORDS([CHOICE_AUTO] = "auto", [CHOICE_OFF] = "off", [CHOICE_ON] = "on"),
      .help = "Orders surfaces that overlap or cross in double. It costs loading time, and speed where surfaces "
-             "overlap. auto: on where float's resolution in the scene is coarser than plan.tolerance_m."},
+             "overlap. auto: on where float's resolution in the scene is coarser than plan.tolerance_m, and where a map of "
+             "what the station sees (cast.sight) gives it for nothing."},
     {KEY(scene.cutouts), CFG_BOOL, .def = "on",
      .help = "Rays pass where a texture's alpha or opacity map is below a half, as between leaves. Textures are then "
              "read when the scene is loaded; without such a texture it costs nothing more."},
@@ -276,6 +277,16 @@ static const struct cfg_key config_keys[] = {
     {"beam.echoes", SETTING(echoes), CFG_ENUM, .def = "all",
      WORDS([BEAM_ALL] = "all", [BEAM_FIRST] = "first", [BEAM_LAST] = "last", [BEAM_STRONGEST] = "strongest"),
      .help = "Which echoes of a pulse are sent. Those of glass, and of what is seen through it, are among them."},
+
+    {"cast", .type = CFG_MAP, .help = "How a ray finds what it meets."},
+    {KEY(cast.sight), CFG_ENUM, .def = "auto",
+     WORDS([CHOICE_AUTO] = "auto", [CHOICE_OFF] = "off", [CHOICE_ON] = "on"),
+     .help = "on: before a scan the head maps what its station sees of each direction, and looks rays up in that. Only "
+             "where head and beam stand still, and no texture cuts holes. Hits are the same, to the last bit. off: the "
+             "BVH is asked for each ray. auto: on where the scan's pulses pay for the map, as `scanhead plan` says."},
+    {KEY(cast.sight_mib), CFG_REAL, "MiB", "64", 1, 65536,
+     .help = "Memory that the maps of all stations may take together, also while they are made. Directions that don't "
+             "fit are left to the BVH."},
 
     {"plan", .type = CFG_MAP,
      .help = "Tolerances. Each stage uses the cheapest method that holds them (`scanhead plan`)."},

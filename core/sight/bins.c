@@ -1,0 +1,145 @@
+/* Which triangles may be seen in which region. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/sight/build_inside.h"
+#include "core/vec3.h"
+
+/* A triangle's regions on a face; none where u1 < u0. */
+struct range {
+    uint32_t u0, u1, v0, v1;
+};
+
+/* The side planes of the face's pyramid, a little wider than the face. */
+#define WIDER (1.0 + 4.0 * SIGHT_PAD)
+
+/* Whether all corners lie beyond one of the pyramid's four sides, or behind the station. a, b across, w along. */
+static int is_beside(const double w[3], const double a[3], const double b[3])
+{
+    int out = 31;
+    for (int i = 0; i < 3; i++) {
+        const double k = WIDER * w[i];
+        out &= (a[i] > k) | (-a[i] > k) << 1 | (b[i] > k) << 2 | (-b[i] > k) << 3 | (w[i] < 0.0) << 4;
+    }
+    return out != 0;
+}
+
+static uint32_t region_at(double x, uint32_t regions)
+{
+    const double at = (x + 1.0) * 0.5 * regions;
+    return at <= 0.0 ? 0 : at >= regions ? regions - 1 : (uint32_t)at;
+}
+
+static void across(const double w[3], const double a[3], uint32_t regions, uint32_t *from, uint32_t *to)
+{
+    double lo = INFINITY, hi = -INFINITY;
+    for (int i = 0; i < 3; i++) {
+        lo = fmin(lo, a[i] / w[i]);
+        hi = fmax(hi, a[i] / w[i]);
+    }
+    *from = region_at(lo - 4.0 * SIGHT_PAD, regions);
+    *to = region_at(hi + 4.0 * SIGHT_PAD, regions);
+}
+
+/* All of the face's regions where a corner lies behind the station, or almost. */
+static int range_of(double v[3][3], uint32_t face, uint32_t regions, struct range *r)
+{
+    const uint32_t axis = face / 2, n1 = (axis + 1) % 3, n2 = (axis + 2) % 3;
+    const double sign = face & 1 ? -1.0 : 1.0;
+    const double w[3] = {sign * v[0][axis], sign * v[1][axis], sign * v[2][axis]};
+    const double a[3] = {v[0][n1], v[1][n1], v[2][n1]}, b[3] = {v[0][n2], v[1][n2], v[2][n2]};
+    if (is_beside(w, a, b)) return 0;
+    *r = (struct range){0, regions - 1, 0, regions - 1};
+    const double near_w = fmin(w[0], fmin(w[1], w[2])), far_w = fmax(w[0], fmax(w[1], w[2]));
+    if (!(near_w > 1e-6 * far_w)) return 1;
+    across(w, a, regions, &r->u0, &r->u1);
+    across(w, b, regions, &r->v0, &r->v1);
+    return 1;
+}
+
+static uint32_t region_number(const struct build_shared *b, uint32_t face, uint32_t u, uint32_t v)
+{
+    return (face * b->regions + v) * b->regions + u;
+}
+
+/* Directions of a region: its middle, and how far its corners lie from that. */
+static void find_seen(struct build_shared *b)
+{
+    const double half = 1.0 / b->regions;
+    for (uint32_t face = 0; face < SIGHT_FACES; face++)
+        for (uint32_t j = 0; j < b->regions; j++)
+            for (uint32_t i = 0; i < b->regions; i++) {
+                const uint32_t axis = face / 2;
+                const double u = (2.0 * i + 1.0) * half - 1.0, v = (2.0 * j + 1.0) * half - 1.0;
+                const double length = sqrt(1.0 + u * u + v * v);
+                double d[3];
+                d[axis] = (face & 1 ? -1.0 : 1.0) / length;
+                d[(axis + 1) % 3] = u / length;
+                d[(axis + 2) % 3] = v / length;
+                /* No corner is further from the middle than on the plane of the face. */
+                const double radius_rad = 1.5 * half + 4.0 * SIGHT_PAD;
+                b->seen[region_number(b, face, i, j)] =
+                    b->spec->sees == NULL || b->spec->sees(b->spec->ctx, d, radius_rad) != 0;
+            }
+}
+
+/* Counts triangle by region into bin, or, after that, writes it there. */
+static void put(struct build_shared *b, uint32_t triangle, int write)
+{
+    double v[3][3];
+    struct range r;
+    sight_corners(b->sight, triangle, v);
+    for (uint32_t face = 0; face < SIGHT_FACES; face++) {
+        if (!range_of(v, face, b->regions, &r)) continue;
+        for (uint32_t j = r.v0; j <= r.v1; j++)
+            for (uint32_t i = r.u0; i <= r.u1; i++) {
+                const uint32_t at = region_number(b, face, i, j);
+                if (!b->seen[at]) continue;
+                if (write)
+                    b->binned[b->bin[at]++] = triangle;
+                else
+                    b->bin[at + 1]++;
+            }
+    }
+}
+
+static int put_all(struct build_shared *b, int write, struct sh_err *err)
+{
+    const uint32_t n = bvh_scene(b->sight->bvh)->n_triangles;
+    int rc = SH_OK;
+    for (uint32_t t = 0; t < n && rc == SH_OK; t++) {
+        if ((t & 0xffff) == 0) rc = sh_check_stop(b->report, err);
+        put(b, t, write);
+    }
+    return rc;
+}
+
+int build_bins(struct build_shared *b, struct sh_err *err)
+{
+    const uint32_t regions = SIGHT_FACES * b->regions * b->regions;
+    b->seen = malloc(regions);
+    b->bin = calloc((size_t)regions + 2, sizeof *b->bin);
+    if (b->seen == NULL || b->bin == NULL) return sh_fail(err, SH_ENOMEM, "sight: no memory for %u regions", regions);
+    find_seen(b);
+    /* Counted one place too far, so that each region's begin moves to its end while it is filled. */
+    b->bin++;
+    int rc = put_all(b, 0, err);
+    for (uint32_t i = 0; i < regions; i++)
+        b->bin[i + 1] += b->bin[i];
+    const uint64_t bytes = b->bin[regions] * sizeof *b->binned;
+    if (b->bytes + bytes > b->spec->memory_bytes) {
+        memset(b->seen, 0, regions);
+        memset(b->bin, 0, (regions + 1) * sizeof *b->bin);
+    } else {
+        b->bytes += bytes;
+        b->given_back += bytes;
+    }
+    b->binned = malloc((b->bin[regions] + 1) * sizeof *b->binned);
+    if (rc == SH_OK && b->binned == NULL)
+        rc = sh_fail(err, SH_ENOMEM, "sight: no memory for %llu triangles in regions",
+                     (unsigned long long)b->bin[regions]);
+    if (rc == SH_OK) rc = put_all(b, 1, err);
+    b->bin--;
+    return rc;
+}

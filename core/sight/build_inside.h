@@ -1,0 +1,80 @@
+/* Private to core/sight: how a sight is made.
+ *
+ * Triangles are sorted into regions, squares of cells on the faces (bins.c). Each region is then divided as
+ * Warnock's algorithm does (J. Warnock, A hidden surface algorithm, 1969): a square with the triangles that may
+ * be seen in it is a leaf where one of them covers it all and hides the rest, or where there are none; else its
+ * quarters are looked at, down to a cell (region.c). */
+#ifndef CORE_SIGHT_BUILD_INSIDE_H
+#define CORE_SIGHT_BUILD_INSIDE_H
+
+#include <stdatomic.h>
+
+#include "core/sight/sight_inside.h"
+
+enum {
+    BUILD_REGIONS = 16, /* along an edge of a face, at most */
+    BUILD_NO_RECORD = 0xffffffff,
+};
+
+/* A triangle in a region: functions linear in u and v, as constant and slopes f[0] + f[1] u + f[2] v. What they
+ * mean and are scaled by: struct sight_record. */
+struct build_candidate {
+    double edge[3][3], edge_slope[3]; /* |f[1]| + |f[2]| */
+    double plane[3], plane_slope;
+    double slack, rel, graze;
+    double near_m; /* no point of it is nearer to the station */
+    uint32_t triangle;
+    uint32_t record; /* BUILD_NO_RECORD: not yet in a list */
+};
+
+/* Arrays that all threads take from, and none may outgrow. */
+struct build_arena {
+    _Atomic uint64_t used;
+    uint64_t room; /* elements */
+};
+
+struct build_shared {
+    struct sight *sight;
+    const struct sight_spec *spec;
+    const struct sh_report *report;
+    uint32_t regions, region_cells; /* along an edge of a face; cells along an edge of a region */
+    uint8_t *seen;                  /* [regions of all faces] 0: no ray goes there */
+    uint64_t *bin;                  /* [regions of all faces + 1] of binned */
+    uint32_t *binned;               /* triangles by region */
+    _Atomic uint32_t next;          /* region to be divided */
+    _Atomic uint64_t bytes;         /* taken, of spec->memory_bytes */
+    _Atomic uint64_t given_back;    /* of these, when all is done */
+    struct build_arena leaf, list, record;
+    _Atomic uint64_t cells[4]; /* by what they say: one, nothing, few, ask */
+    _Atomic int failed;        /* SH_ENOMEM, SH_ESTOPPED */
+};
+
+/* Takes n elements of `size` bytes. UINT64_MAX: there is no more room. */
+uint64_t build_take(struct build_shared *b, struct build_arena *arena, uint64_t n, uint64_t size);
+
+/* ---- bins.c: fills seen, bin and binned. Where these are more than the memory allows, no region is seen. */
+int build_bins(struct build_shared *b, struct sh_err *err);
+
+/* ---- candidate.c */
+/* Corners relative to the station. */
+void sight_corners(const struct sight *sight, uint32_t triangle, double v[3][3]);
+/* False where no ray meets the triangle: it has no area, or another one stands for it. */
+int build_candidate(const struct sight *sight, uint32_t face, uint32_t triangle, struct build_candidate *c);
+void build_record(const struct build_candidate *c, uint32_t face, struct sight_record *r);
+
+/* ---- region.c */
+/* Working memory of one thread. */
+struct build_work {
+    struct build_candidate *candidate;
+    size_t n, room;
+    struct build_where *where; /* [where_room] of candidates, while a square is looked at */
+    size_t where_room;
+    uint32_t *stack; /* numbers of candidates, square within square */
+    size_t stack_room;
+    uint64_t taken; /* bytes of build_shared's */
+};
+void build_work_free(struct build_work *w);
+/* Divides one region, numbered as in bin. 0 or SH_ENOMEM. */
+int build_region(struct build_shared *b, struct build_work *w, uint32_t region);
+
+#endif

@@ -1,0 +1,116 @@
+/* The figures of a triangle as seen from the station: where it is, how far, and how well that is known. */
+#include <math.h>
+
+#include "core/sight/build_inside.h"
+#include "core/vec3.h"
+
+void sight_corners(const struct sight *sight, uint32_t triangle, double v[3][3])
+{
+    const struct scene *scene = bvh_scene(sight->bvh);
+    for (int i = 0; i < 3; i++)
+        vec3_sub(scene->vertex_m[scene->triangle[triangle][i]], sight->station_m, v[i]);
+}
+
+/* A function linear in the direction, in the coordinates of a face. */
+static void to_face(const double f[3], uint32_t face, double out[3])
+{
+    const uint32_t axis = face / 2;
+    out[0] = face & 1 ? -f[axis] : f[axis];
+    out[1] = f[(axis + 1) % 3];
+    out[2] = f[(axis + 2) % 3];
+}
+
+static void from_face(const double f[3], uint32_t face, double out[3])
+{
+    const uint32_t axis = face / 2;
+    out[axis] = face & 1 ? -f[0] : f[0];
+    out[(axis + 1) % 3] = f[1];
+    out[(axis + 2) % 3] = f[2];
+}
+
+/* The side of edge a-b, in units of its doubt (sight_inside.h), which is border_m across the ray at least. */
+static void set_edge(const double a[3], const double b[3], double sign, double border_m, uint32_t face, double out[3])
+{
+    double e[3], side[3];
+    vec3_sub(b, a, e);
+    vec3_cross(a, e, side);
+    const double far_m = sqrt(fmax(vec3_dot(a, a), vec3_dot(b, b)));
+    const double scale = sign / (fmax(SIGHT_EDGE_DOUBT * far_m, border_m) * vec3_length(e));
+    for (int i = 0; i < 3; i++)
+        side[i] *= scale;
+    to_face(side, face, out);
+}
+
+/* How far the BVH's float distance may be wrong, as a share of the distance times the height of the station above
+ * the plane (sight_inside.h). */
+static double float_doubt_m(double v[3][3], double area2, const double o_local[3])
+{
+    double longest = 0.0, far_m = 0.0, product = 1.0;
+    for (int i = 0; i < 3; i++) {
+        const double length = vec3_distance(v[(i + 1) % 3], v[i]);
+        longest = fmax(longest, length);
+        product *= length;
+        far_m = fmax(far_m, vec3_length(v[i]));
+    }
+    far_m += 2.0 * vec3_length(o_local);
+    return SIGHT_FLOAT_DOUBT * (far_m + product / (longest * area2) * (longest + 0.05 * far_m));
+}
+
+static int set_plane(const struct sight *sight, struct build_candidate *c, double v[3][3], uint32_t face)
+{
+    const struct bvh_plane *p = bvh_plane(sight->bvh, c->triangle);
+    double origin_m[3], o_local[3], m[3];
+    bvh_origin(sight->bvh, origin_m);
+    vec3_sub(sight->station_m, origin_m, o_local);
+    const double length = vec3_length(p->n), off = p->d - vec3_dot(p->n, o_local);
+    if (!(length > 0.0)) return 0;
+    const double height_m = fabs(off) / length;
+    for (int i = 0; i < 3; i++)
+        m[i] = p->n[i] / off;
+    if (!(vec3_length(m) < 1e300)) { /* the station lies in the plane: to be decided wherever its edges don't say */
+        c->plane[0] = c->plane[1] = c->plane[2] = c->plane_slope = c->slack = c->rel = 0.0;
+        c->graze = 1e300;
+        return 1;
+    }
+    to_face(m, face, c->plane);
+    c->plane_slope = fabs(c->plane[1]) + fabs(c->plane[2]);
+    c->slack = SIGHT_PLANE_DOUBT / height_m;
+    c->graze = SIGHT_GRAZE / height_m;
+    c->rel = sight->exact ? 0.0 : float_doubt_m(v, length, o_local) / height_m;
+    if (c->rel > SIGHT_MAX_REL) c->graze = 1e300;
+    return 1;
+}
+
+int build_candidate(const struct sight *sight, uint32_t face, uint32_t triangle, struct build_candidate *c)
+{
+    double v[3][3], n[3], longest2 = 0.0, near2 = INFINITY;
+    c->triangle = triangle;
+    c->record = BUILD_NO_RECORD;
+    sight_corners(sight, triangle, v);
+    if (bvh_is_twin(sight->bvh, triangle) || !set_plane(sight, c, v, face)) return 0;
+    vec3_cross(v[1], v[2], n);
+    const double sign = vec3_dot(v[0], n) < 0.0 ? -1.0 : 1.0;
+    const double border_m = bvh_border_m(sight->bvh, triangle, sight->station_m);
+    for (int i = 0; i < 3; i++) {
+        double e[3];
+        set_edge(v[i], v[(i + 1) % 3], sign, border_m, face, c->edge[i]);
+        c->edge_slope[i] = fabs(c->edge[i][1]) + fabs(c->edge[i][2]);
+        if (!(c->edge_slope[i] < INFINITY)) return 0; /* two corners in one place: no area */
+        vec3_sub(v[(i + 1) % 3], v[i], e);
+        longest2 = fmax(longest2, vec3_dot(e, e));
+        near2 = fmin(near2, vec3_dot(v[i], v[i]));
+    }
+    c->near_m = fmax(0.0, (sqrt(near2) - sqrt(longest2)) * (1.0 - 1e-12));
+    return 1;
+}
+
+void build_record(const struct build_candidate *c, uint32_t face, struct sight_record *r)
+{
+    for (int i = 0; i < 3; i++)
+        from_face(c->edge[i], face, r->edge[i]);
+    from_face(c->plane, face, r->plane);
+    r->slack = c->slack;
+    r->rel = c->rel;
+    r->graze = c->graze;
+    r->triangle = c->triangle;
+}

@@ -1,0 +1,386 @@
+/* A region, divided until its squares are leaves. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/grow.h"
+#include "core/sight/build_inside.h"
+#include "core/vecmath.h"
+
+enum { NO_CANDIDATE = 0xffffffff };
+
+/* A square of cells on the face, `size` cells wide, and its middle. */
+struct square {
+    uint32_t u, v, size;
+    double mid_u, mid_v, half;
+};
+
+/* Candidates that may be seen in a square. */
+struct seen {
+    uint32_t *list, n; /* numbers of candidates, with the bit COVERS where it does */
+    uint32_t *above;   /* where the stack is free */
+    uint32_t cover;    /* hides all others that there are; or NO_CANDIDATE */
+    uint32_t *leaf;    /* the leaf of this list, once it has been made; squares with the same list share it */
+    uint32_t own_leaf;
+};
+enum { COVERS = 1U << 31, NO_LEAF = 0xffffffff };
+
+/* What is known of a region while it is divided. */
+struct division {
+    struct build_shared *b;
+    struct build_work *w;
+    uint32_t face;
+    uint32_t *block; /* leaves of the tile at hand, where squares are smaller than a tile */
+    uint32_t block_u, block_v;
+    uint64_t cells[4];
+};
+
+/* Four quarters of a square at a time. */
+typedef double quad __attribute__((vector_size(32)));
+typedef int64_t quad_mask __attribute__((vector_size(32)));
+
+struct quarters {
+    struct square square[4];
+    struct seen seen[4];
+    quad u, v;   /* their middles */
+    double half; /* of each, with the pad */
+    /* The planes of what covers each; cover is NO_CANDIDATE, and first 0, where nothing does. */
+    quad_mask cover;
+    quad first, plane[3], slope, slack, rel;
+};
+
+/* What pass by pass becomes known of a candidate in the four quarters. */
+struct build_where {
+    quad_mask outside, covers;
+};
+
+/* Vectors go by address: compilers warn of a changed way to pass them where there is no AVX. */
+VEC_INLINE void at_middles(const double f[3], const struct quarters *four, quad *out)
+{
+    *out = f[0] + f[1] * four->u + f[2] * four->v;
+}
+
+VEC_INLINE void choose(const quad_mask *which, const quad *yes, quad *no)
+{
+    *no = (quad)(((quad_mask)*yes & *which) | ((quad_mask)*no & ~*which));
+}
+
+/* Where the plane is seen at so small an angle, or from so near, that its distance says nothing: 0. */
+VEC_INLINE void find_clear(const struct build_candidate *c, const quad *middle, double half, quad_mask *clear)
+{
+    const double r = c->plane_slope * half;
+    *clear = (quad_mask)(*middle - r > 2.0 * c->graze) & (quad_mask)(*middle + r < SIGHT_NEAR);
+}
+
+/* Which candidates lie outside of each quarter, which cover it, and which of those comes first in its middle. Rays
+ * here are 1 to sqrt(3) long, since a direction's largest component is 1: doubts count twice. */
+VEC_INLINE void find_covers(const struct build_work *w, const struct seen *in, struct quarters *four)
+{
+    quad first = {0.0, 0.0, 0.0, 0.0};
+    quad_mask cover = {NO_CANDIDATE, NO_CANDIDATE, NO_CANDIDATE, NO_CANDIDATE};
+    for (uint32_t i = 0; i < in->n; i++) {
+        const uint32_t number = in->list[i] & ~(uint32_t)COVERS;
+        const struct build_candidate *c = &w->candidate[number];
+        quad_mask outside = {0, 0, 0, 0}, covers = {-1, -1, -1, -1}, better;
+        quad e;
+        for (int k = 0; k < 3; k++) {
+            const double r = 2.0 + c->edge_slope[k] * four->half;
+            at_middles(c->edge[k], four, &e);
+            outside |= (quad_mask)(e < -r);
+            covers &= (quad_mask)(e > r);
+        }
+        at_middles(c->plane, four, &e);
+        find_clear(c, &e, four->half, &better);
+        better &= covers & (quad_mask)(e > first);
+        choose(&better, &e, &first);
+        cover = (((quad_mask){number, number, number, number}) & better) | (cover & ~better);
+        w->where[i] = (struct build_where){outside, covers};
+    }
+    four->first = first;
+    four->cover = cover;
+}
+
+/* The planes of what covers, side by side. Returns 0 where nothing covers anything. */
+VEC_INLINE int take_covers(const struct build_work *w, struct quarters *four)
+{
+    int any = 0;
+    for (int k = 0; k < 4; k++) {
+        if ((uint32_t)four->cover[k] == NO_CANDIDATE) continue;
+        const struct build_candidate *c = &w->candidate[four->cover[k]];
+        for (int j = 0; j < 3; j++)
+            four->plane[j][k] = c->plane[j];
+        four->slope[k] = c->plane_slope;
+        four->slack[k] = c->slack;
+        four->rel[k] = c->rel;
+        any = 1;
+    }
+    return any;
+}
+
+/* In which quarters all of a candidate lies behind what covers them. One that is seen at too small an angle is
+ * compared as a whole. */
+VEC_INLINE void find_behind(const struct build_candidate *c, const struct quarters *four, quad_mask *behind)
+{
+    const double half = four->half;
+    const quad across = four->plane[1] - c->plane[1], up = four->plane[2] - c->plane[2], reach = four->slope * half;
+    const quad doubt = 2.0 * (c->slack + four->slack) + (c->rel + four->rel + SIGHT_SAME) * (four->first + reach);
+    quad mine, a = -across, b = -up;
+    quad_mask clear;
+    at_middles(c->plane, four, &mine);
+    find_clear(c, &mine, half, &clear);
+    const quad_mask a_less = (quad_mask)(a < across), b_less = (quad_mask)(b < up);
+    choose(&a_less, &across, &a);
+    choose(&b_less, &up, &b);
+    *behind = (clear & (quad_mask)(four->first - mine - (a + b) * half > doubt)) |
+              (~clear & (quad_mask)(c->near_m * (four->first - reach) > 2.0));
+}
+
+/* Of a square's candidates those that may be seen in each quarter. */
+VEC_CLONES
+static void look(const struct build_work *w, const struct seen *in, struct quarters *four)
+{
+    uint32_t n[4] = {0, 0, 0, 0};
+    find_covers(w, in, four);
+    const int hides = take_covers(w, four) && in->n > 1;
+    for (uint32_t i = 0; i < in->n; i++) {
+        const uint32_t number = in->list[i] & ~(uint32_t)COVERS;
+        const quad_mask mine = {number, number, number, number}, covers = w->where[i].covers;
+        quad_mask gone = w->where[i].outside;
+        if (hides) {
+            quad_mask behind;
+            find_behind(&w->candidate[number], four, &behind);
+            gone |= behind & (quad_mask)(mine != four->cover);
+        }
+        for (int k = 0; k < 4; k++) {
+            four->seen[k].list[n[k]] = number | ((uint32_t)covers[k] & COVERS);
+            n[k] += gone[k] == 0;
+        }
+    }
+    for (int k = 0; k < 4; k++) {
+        four->seen[k].n = n[k];
+        four->seen[k].cover = (uint32_t)four->cover[k];
+    }
+}
+
+/* A square's leaf: tiles as a whole, or in the block at hand. */
+static void put_leaf(const struct division *d, const struct square *q, uint32_t leaf)
+{
+    struct sight *s = d->b->sight;
+    if (q->size < SIGHT_TILE) {
+        uint32_t *to = &d->block[(q->v - d->block_v) * SIGHT_TILE + q->u - d->block_u];
+        for (uint32_t v = 0; v < q->size; v++)
+            for (uint32_t u = 0; u < q->size; u++)
+                to[v * SIGHT_TILE + u] = leaf;
+        return;
+    }
+    const uint32_t tiles = s->cells / SIGHT_TILE;
+    for (uint32_t v = q->v / SIGHT_TILE; v < (q->v + q->size) / SIGHT_TILE; v++)
+        for (uint32_t u = q->u / SIGHT_TILE; u < (q->u + q->size) / SIGHT_TILE; u++)
+            s->tile[(d->face * tiles + v) * tiles + u] = leaf;
+}
+
+static uint32_t record_of(const struct division *d, struct build_candidate *c)
+{
+    if (c->record != BUILD_NO_RECORD) return c->record;
+    const uint64_t at = build_take(d->b, &d->b->record, 1, sizeof(struct sight_record));
+    if (at == UINT64_MAX) return BUILD_NO_RECORD;
+    build_record(c, d->face, &d->b->sight->record[at]);
+    return c->record = (uint32_t)at;
+}
+
+static uint32_t make_list(const struct division *d, const struct seen *seen)
+{
+    if (seen->n > SIGHT_MAX_LIST) return SIGHT_ASK;
+    const uint64_t at = build_take(d->b, &d->b->list, seen->n + 1, sizeof(uint32_t));
+    if (at == UINT64_MAX) return SIGHT_ASK;
+    uint32_t *list = &d->b->sight->list[at];
+    list[0] = seen->n;
+    for (uint32_t i = 0; i < seen->n; i++) {
+        list[i + 1] = record_of(d, &d->w->candidate[seen->list[i] & ~(uint32_t)COVERS]);
+        if (list[i + 1] == BUILD_NO_RECORD) return SIGHT_ASK;
+    }
+    return (uint32_t)SIGHT_FEW << SIGHT_KIND_SHIFT | (uint32_t)at;
+}
+
+enum { ONE, NOTHING, FEW, ASK };
+
+static void end(struct division *d, const struct square *q, uint32_t leaf, int what)
+{
+    put_leaf(d, q, leaf);
+    d->cells[what] += (uint64_t)q->size * q->size;
+}
+
+static void end_few(struct division *d, const struct square *q, const struct seen *seen)
+{
+    if (*seen->leaf == NO_LEAF) *seen->leaf = make_list(d, seen);
+    end(d, q, *seen->leaf, *seen->leaf == SIGHT_ASK ? ASK : FEW);
+}
+
+static int all_cover(const struct seen *seen)
+{
+    uint32_t all = COVERS;
+    for (uint32_t i = 0; i < seen->n; i++)
+        all &= seen->list[i];
+    return all != 0;
+}
+
+static void divide(struct division *d, const struct square *q, const struct seen *seen);
+
+static void make_quarters(const struct square *q, const struct seen *seen, struct quarters *four)
+{
+    const double half = 0.5 * q->half;
+    for (uint32_t k = 0; k < 4; k++) {
+        four->square[k] = (struct square){.u = q->u + (k & 1) * (q->size / 2),
+                                          .v = q->v + (k >> 1) * (q->size / 2),
+                                          .size = q->size / 2,
+                                          .mid_u = q->mid_u + (k & 1 ? half : -half),
+                                          .mid_v = q->mid_v + (k & 2 ? half : -half),
+                                          .half = half};
+        four->u[k] = four->square[k].mid_u;
+        four->v[k] = four->square[k].mid_v;
+        four->seen[k].list = seen->above + k * (size_t)seen->n;
+        four->seen[k].above = seen->above + 4 * (size_t)seen->n;
+    }
+}
+
+static void divide_quarters(struct division *d, const struct square *q, const struct seen *seen)
+{
+    struct quarters four = {.half = 0.5 * q->half + SIGHT_PAD};
+    make_quarters(q, seen, &four);
+    look(d->w, seen, &four);
+    for (uint32_t k = 0; k < 4; k++) {
+        struct seen *mine = &four.seen[k];
+        mine->own_leaf = NO_LEAF;
+        mine->leaf = mine->n == seen->n ? seen->leaf : &mine->own_leaf;
+        divide(d, &four.square[k], mine);
+    }
+}
+
+/* A tile whose leaves differ: they are made beside each other, and become a block. */
+static void divide_tile(struct division *d, const struct square *q, const struct seen *seen)
+{
+    uint32_t block[SIGHT_BLOCK], same = 1;
+    d->block = block;
+    d->block_u = q->u;
+    d->block_v = q->v;
+    divide_quarters(d, q, seen);
+    while (same < SIGHT_BLOCK && block[same] == block[0])
+        same++;
+    if (same == SIGHT_BLOCK) {
+        put_leaf(d, q, block[0]);
+        return;
+    }
+    const uint64_t at = build_take(d->b, &d->b->leaf, SIGHT_BLOCK, sizeof(uint32_t));
+    if (at == UINT64_MAX) {
+        put_leaf(d, q, SIGHT_ASK);
+        return;
+    }
+    memcpy(&d->b->sight->leaf[at], block, sizeof block);
+    put_leaf(d, q, (uint32_t)SIGHT_TILED << SIGHT_KIND_SHIFT | (uint32_t)at);
+}
+
+/* Where all that is left covers the square, a few of them, their planes cross or lie in each other: rays are
+ * decided. */
+static void divide(struct division *d, const struct square *q, const struct seen *seen)
+{
+    if (seen->n == 0)
+        end(d, q, SIGHT_NOTHING, NOTHING);
+    else if (seen->n == 1 && seen->cover != NO_CANDIDATE)
+        end(d, q, d->w->candidate[seen->cover].triangle, ONE);
+    else if (q->size == 1 || (seen->n <= SIGHT_MAX_LIST && seen->cover != NO_CANDIDATE && all_cover(seen)))
+        end_few(d, q, seen);
+    else if (q->size == SIGHT_TILE)
+        divide_tile(d, q, seen);
+    else
+        divide_quarters(d, q, seen);
+}
+
+void build_work_free(struct build_work *w)
+{
+    free(w->candidate);
+    free(w->stack);
+    free(w->where);
+}
+
+/* Its vectors are aligned. */
+static int grow_where(struct build_work *w, size_t n)
+{
+    if (n <= w->where_room) return 1;
+    free(w->where);
+    w->where_room = n + n / 2;
+    w->where = aligned_alloc(sizeof *w->where, w->where_room * sizeof *w->where);
+    if (w->where == NULL) w->where_room = 0;
+    return w->where != NULL;
+}
+
+/* Each square's candidates stand above those of the square that it is a quarter of: four lists a level. */
+static size_t stacked(const struct build_shared *b, size_t n)
+{
+    size_t lists = 5;
+    for (uint32_t size = b->region_cells; size > 1; size /= 2)
+        lists += 4;
+    return lists * n;
+}
+
+/* Whether the memory allows to divide a region of n triangles. What grows does so by half. */
+static int may_take(struct build_shared *b, struct build_work *w, size_t n)
+{
+    const uint64_t each = sizeof *w->candidate + sizeof *w->where;
+    const uint64_t need = 3 * (n * each + stacked(b, n) * sizeof *w->stack) / 2;
+    if (need <= w->taken) return 1;
+    const uint64_t more = need - w->taken;
+    if (atomic_fetch_add(&b->bytes, more) + more > b->spec->memory_bytes) {
+        atomic_fetch_sub(&b->bytes, more);
+        return 0;
+    }
+    w->taken = need;
+    return 1;
+}
+
+/* Candidates of a region. *fits is 0 where there are too many. */
+static int gather(struct build_shared *b, struct build_work *w, uint32_t region, uint32_t face, int *fits)
+{
+    const size_t n = b->bin[region + 1] - b->bin[region];
+    w->n = 0;
+    *fits = may_take(b, w, n);
+    if (!*fits) return SH_OK;
+    if (!grow(&w->candidate, &w->room, n, sizeof *w->candidate) || !grow_where(w, n) ||
+        !grow(&w->stack, &w->stack_room, stacked(b, n), sizeof *w->stack))
+        return SH_ENOMEM;
+    for (uint64_t i = b->bin[region]; i < b->bin[region + 1]; i++)
+        w->n += (size_t)build_candidate(b->sight, face, b->binned[i], &w->candidate[w->n]);
+    for (uint32_t i = 0; i < w->n; i++)
+        w->stack[i] = i;
+    return SH_OK;
+}
+
+static struct square square_of(const struct build_shared *b, uint32_t region)
+{
+    const uint32_t at = region % (b->regions * b->regions), size = b->region_cells;
+    const double cell = 2.0 / b->sight->cells;
+    struct square q = {
+        .u = at % b->regions * size, .v = at / b->regions * size, .size = size, .half = 0.5 * size * cell};
+    q.mid_u = (q.u + 0.5 * size) * cell - 1.0;
+    q.mid_v = (q.v + 0.5 * size) * cell - 1.0;
+    return q;
+}
+
+int build_region(struct build_shared *b, struct build_work *w, uint32_t region)
+{
+    struct division d = {.b = b, .w = w, .face = region / (b->regions * b->regions)};
+    const struct square all = square_of(b, region);
+    int fits;
+    if (!b->seen[region]) return SH_OK;
+    int rc = gather(b, w, region, d.face, &fits);
+    if (rc != SH_OK) return rc;
+    struct seen seen = {
+        .list = w->stack, .n = (uint32_t)w->n, .above = w->stack + w->n, .cover = NO_CANDIDATE, .own_leaf = NO_LEAF};
+    seen.leaf = &seen.own_leaf;
+    if (fits)
+        divide(&d, &all, &seen);
+    else
+        end(&d, &all, SIGHT_ASK, ASK);
+    for (int i = 0; i < 4; i++)
+        atomic_fetch_add_explicit(&b->cells[i], d.cells[i], memory_order_relaxed);
+    return SH_OK;
+}
