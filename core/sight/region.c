@@ -303,7 +303,7 @@ void build_work_free(struct build_work *w)
 }
 
 /* Its vectors are aligned. */
-static int grow_where(struct build_work *w, uint64_t n)
+static int grow_where(struct build_work *w, size_t n)
 {
     if (n <= w->where_room) return 1;
     free(w->where);
@@ -314,16 +314,39 @@ static int grow_where(struct build_work *w, uint64_t n)
 }
 
 /* Each square's candidates stand above those of the square that it is a quarter of: four lists a level. */
-static int gather(struct build_shared *b, struct build_work *w, uint32_t region, uint32_t face)
+static size_t stacked(const struct build_shared *b, size_t n)
 {
-    const uint64_t n = b->bin[region + 1] - b->bin[region];
-    uint32_t levels = 1;
+    size_t lists = 5;
     for (uint32_t size = b->region_cells; size > 1; size /= 2)
-        levels++;
-    if (!grow(&w->candidate, &w->room, n + 1, sizeof *w->candidate) || !grow_where(w, n + 1) ||
-        !grow(&w->stack, &w->stack_room, (n + 1) * (4 * levels + 1), sizeof *w->stack))
-        return SH_ENOMEM;
+        lists += 4;
+    return lists * n;
+}
+
+/* Whether the memory allows to divide a region of n triangles. What grows does so by half. */
+static int may_take(struct build_shared *b, struct build_work *w, size_t n)
+{
+    const uint64_t each = sizeof *w->candidate + sizeof *w->where;
+    const uint64_t need = 3 * (n * each + stacked(b, n) * sizeof *w->stack) / 2;
+    if (need <= w->taken) return 1;
+    const uint64_t more = need - w->taken;
+    if (atomic_fetch_add(&b->bytes, more) + more > b->spec->memory_bytes) {
+        atomic_fetch_sub(&b->bytes, more);
+        return 0;
+    }
+    w->taken = need;
+    return 1;
+}
+
+/* Candidates of a region. *fits is 0 where there are too many. */
+static int gather(struct build_shared *b, struct build_work *w, uint32_t region, uint32_t face, int *fits)
+{
+    const size_t n = b->bin[region + 1] - b->bin[region];
     w->n = 0;
+    *fits = may_take(b, w, n);
+    if (!*fits) return SH_OK;
+    if (!grow(&w->candidate, &w->room, n, sizeof *w->candidate) || !grow_where(w, n) ||
+        !grow(&w->stack, &w->stack_room, stacked(b, n), sizeof *w->stack))
+        return SH_ENOMEM;
     for (uint64_t i = b->bin[region]; i < b->bin[region + 1]; i++)
         w->n += (size_t)build_candidate(b->sight, face, b->binned[i], &w->candidate[w->n]);
     for (uint32_t i = 0; i < w->n; i++)
@@ -331,23 +354,32 @@ static int gather(struct build_shared *b, struct build_work *w, uint32_t region,
     return SH_OK;
 }
 
+static struct square square_of(const struct build_shared *b, uint32_t region)
+{
+    const uint32_t at = region % (b->regions * b->regions), size = b->region_cells;
+    const double cell = 2.0 / b->sight->cells;
+    struct square q = {
+        .u = at % b->regions * size, .v = at / b->regions * size, .size = size, .half = 0.5 * size * cell};
+    q.mid_u = (q.u + 0.5 * size) * cell - 1.0;
+    q.mid_v = (q.v + 0.5 * size) * cell - 1.0;
+    return q;
+}
+
 int build_region(struct build_shared *b, struct build_work *w, uint32_t region)
 {
-    const uint32_t face = region / (b->regions * b->regions), at = region % (b->regions * b->regions);
-    const uint32_t size = b->region_cells;
-    const double cell = 2.0 / b->sight->cells;
-    struct division d = {.b = b, .w = w, .face = face};
+    struct division d = {.b = b, .w = w, .face = region / (b->regions * b->regions)};
+    const struct square all = square_of(b, region);
+    int fits;
     if (!b->seen[region]) return SH_OK;
-    int rc = gather(b, w, region, face);
+    int rc = gather(b, w, region, d.face, &fits);
     if (rc != SH_OK) return rc;
-    struct square all = {
-        .u = at % b->regions * size, .v = at / b->regions * size, .size = size, .half = 0.5 * size * cell};
-    all.mid_u = (all.u + 0.5 * size) * cell - 1.0;
-    all.mid_v = (all.v + 0.5 * size) * cell - 1.0;
     struct seen seen = {
         .list = w->stack, .n = (uint32_t)w->n, .above = w->stack + w->n, .cover = NO_CANDIDATE, .own_leaf = NO_LEAF};
     seen.leaf = &seen.own_leaf;
-    divide(&d, &all, &seen);
+    if (fits)
+        divide(&d, &all, &seen);
+    else
+        end(&d, &all, SIGHT_ASK, ASK);
     for (int i = 0; i < 4; i++)
         atomic_fetch_add_explicit(&b->cells[i], d.cells[i], memory_order_relaxed);
     return SH_OK;

@@ -25,10 +25,11 @@ static uint32_t all_threads(const struct bench_options *o)
     return n < 1 ? 1 : n > 64 ? 64 : (uint32_t)n;
 }
 
-static int measure_case(const struct bench_options *o, const struct bench_case *c, struct bench_scene_report *out,
-                        struct sh_err *err)
+static int measure_stages(const struct bench_options *o, const struct bench_case *c, struct bench_scene_report *out,
+                          struct sh_err *err)
 {
     cpu_set_t before;
+    out->stages = 1;
     pin(&before);
     int rc = bench_measure(c, &out->result, err);
     unpin(&before);
@@ -37,6 +38,34 @@ static int measure_case(const struct bench_options *o, const struct bench_case *
         rc = bench_loop(c, &out->result, threads[i], &out->loop[i], err);
         if (rc == SH_OK) out->n_loop++;
     }
+    return rc;
+}
+
+/* Of small scenes a scan costs little anyway, and in huge ones the first pulse is long cast when a map is built. */
+static const char *scans_of(const struct bench_options *o, const struct bench_target *target)
+{
+    const uint32_t triangles = target->scene->n_triangles;
+    if (o->pulses != NULL) return strcmp(o->pulses, "none") == 0 ? "" : o->pulses;
+    if (bench_is_house(target->name)) return "22.5M,1M";
+    return triangles >= 90000 && triangles <= 2000000 ? "22.5M,2.8M" : "";
+}
+
+static int measure_sights(const struct bench_options *o, const struct bench_case *c, struct bench_scene_report *out,
+                          struct sh_err *err)
+{
+    const char *list = scans_of(o, c->target);
+    char pulses[32];
+    cpu_set_t before;
+    int rc = SH_OK;
+    pin(&before);
+    while (rc == SH_OK && (list = bench_next_name(list, pulses, sizeof pulses)) != NULL) {
+        struct bench_scan scan;
+        fprintf(stderr, "bench: %s, %s pulses\n", c->target->name, pulses);
+        bench_scan_of(bench_pulses(pulses), o->whole ? 1 : 0, &scan);
+        rc = bench_sight(c, &scan, &out->sight[out->n_sights], err);
+        if (rc == SH_OK) out->n_sights++;
+    }
+    unpin(&before);
     return rc;
 }
 
@@ -56,7 +85,8 @@ static int measure_target(const struct bench_options *o, const struct bench_targ
         out->load_s = target->load_s;
         out->embree_build_s = embree.build_s;
         bvh_get_info(c.bvh, &out->info);
-        rc = measure_case(o, &c, out, err);
+        if (!o->only_sight) rc = measure_stages(o, &c, out, err);
+        if (rc == SH_OK) rc = measure_sights(o, &c, out, err);
     }
     bvh_free(c.bvh);
     embree_alone_free(&embree);
@@ -70,9 +100,9 @@ static int measure_scene(const struct bench_options *o, const char *name, struct
 {
     struct bench_target target;
     const char *house = o->house != NULL ? o->house : BENCH_HOUSE_FILE;
-    if (strcmp(name, "house") == 0 && o->house == NULL && access(house, R_OK) != 0) {
+    if (bench_is_house(name) && o->house == NULL && access(house, R_OK) != 0) {
         snprintf(report->note[report->n_notes++ % BENCH_MAX_NOTES], sizeof report->note[0],
-                 "house left out: %s: %s (Debian: assimp-testmodels; or --house FILE)", house, strerror(errno));
+                 "%s left out: %s: %s (Debian: assimp-testmodels; or --house FILE)", name, house, strerror(errno));
         return SH_OK;
     }
     fprintf(stderr, "bench: %s\n", name);

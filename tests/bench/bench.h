@@ -23,20 +23,29 @@ struct bench_target {
 };
 /* Triangles that a name like 10k, 1M or 25000 stands for; 0: it is no number of 100 to 100M. */
 uint32_t bench_count(const char *name);
-/* "house" reads the IFC file; a number makes closed terrain, 200 m wide and 3 m rough, seen from 4.7 m above
- * its middle. */
+int bench_is_house(const char *name); /* one of the two below that need its file */
+/* "house" reads the IFC file, seen from its living room, and "garden" from outside; a number makes closed
+ * terrain, 200 m wide and 3 m rough, seen from 4.7 m above its middle. */
 int bench_target_load(const char *name, const char *house, const struct sh_report *report, struct bench_target *out,
                       struct sh_err *err);
 void bench_target_free(struct bench_target *target);
 
-/* ---- rays.c: a normal scan: lines of 100 degrees, 2500 pulses each, spread over a turn of the pan */
+/* ---- rays.c: a normal scan: lines of 100 degrees, spread over a turn of the pan */
+enum { BENCH_LOWEST_DEG = -40, BENCH_HIGHEST_DEG = 60 };
 struct bench_rays {
     struct schedule_segment segment;
-    uint32_t lines, n;    /* lines * BENCH_LINE_PULSES */
+    uint32_t lines, line_pulses, n;
     double *dx, *dy, *dz; /* unit vectors, prcs */
     float *fx, *fy, *fz;  /* the same for Embree */
 };
+/* A turn of so many lines, BENCH_LINE_PULSES each, or `pulses` each. */
 void bench_schedule(uint32_t lines, uint32_t frames, struct schedule_spec *spec);
+void bench_schedule_of(uint32_t lines, uint32_t pulses, uint32_t frames, struct schedule_spec *spec);
+/* Room for some lines of a turn; then the rays of those from first_line on. */
+int bench_rays_room(const struct schedule_spec *spec, uint32_t lines, uint32_t line_pulses, struct bench_rays *out,
+                    struct sh_err *err);
+void bench_rays_aim(struct bench_rays *rays, uint32_t first_line);
+/* A whole turn of so many lines. */
 int bench_rays_create(uint32_t lines, struct bench_rays *out, struct sh_err *err);
 void bench_rays_free(struct bench_rays *rays);
 /* A block of them, to be worked on while it lies in the cache, as the pipeline has its rays. */
@@ -45,7 +54,8 @@ struct bench_block {
     double dx[BENCH_BLOCK], dy[BENCH_BLOCK], dz[BENCH_BLOCK];
     float fx[BENCH_BLOCK], fy[BENCH_BLOCK], fz[BENCH_BLOCK];
 };
-void bench_rays_block(const struct bench_rays *rays, uint32_t first, struct bench_block *out);
+/* Up to a block's rays; returns how many. */
+uint32_t bench_rays_block(const struct bench_rays *rays, uint32_t first, struct bench_block *out);
 
 /* ---- setup.c: what a scan needs beside the mesh, with the figures of a real head */
 struct bench_case {

@@ -11,14 +11,18 @@
 #include "tests/bench/bench.h"
 #include "tests/bench/print.h"
 
-#define DEFAULT_SCENES "10k,100k,1M,10M,house"
+#define DEFAULT_SCENES "10k,100k,1M,10M,house,garden"
 
 static const char HELP[] =
     "bench [options]: speed figures as JSON on standard output\n\n"
     "  --scenes LIST   names with commas between: a number of triangles (10k, 2M, 25000) is generated closed terrain,\n"
-    "                  house is the IFC model; default " DEFAULT_SCENES "\n"
+    "                  house is the IFC model from its living room, garden from outside; default " DEFAULT_SCENES "\n"
     "  --house FILE    the IFC model; default " BENCH_HOUSE_FILE "\n"
     "  --seconds S     measure each scene for S seconds, but at least seven rounds; default 3\n"
+    "  --pulses LIST   whole scans with and without a sight, of so many pulses (22.5M, 300k), or none; default 22.5M,\n"
+    "                  and 1M in the house, 2.8M elsewhere, in scenes of 100k triangles and more\n"
+    "  --whole         cast all lines of these scans, not some in each of 5,000,000 pulses\n"
+    "  --only-sight    measure nothing but these scans\n"
     "  --threads N     casters of the run on all threads; default: one per processor\n"
     "  --leaks N       aim N rays at edges and corners of closed meshes and count those that slip through (fails\n"
     "                  when one does); without --scenes nothing else is done\n"
@@ -28,11 +32,14 @@ static const char HELP[] =
     "Ratios are medians over the rounds of Embree's time by ours. Then the same through the real loop with the null\n"
     "link.\n";
 
-enum { OPT_SCENES = 256, OPT_HOUSE, OPT_SECONDS, OPT_THREADS, OPT_LEAKS };
+enum { OPT_SCENES = 256, OPT_HOUSE, OPT_PULSES, OPT_WHOLE, OPT_ONLY_SIGHT, OPT_SECONDS, OPT_THREADS, OPT_LEAKS };
 
 static const struct option OPTIONS[] = {{"scenes", required_argument, NULL, OPT_SCENES},
                                         {"house", required_argument, NULL, OPT_HOUSE},
                                         {"seconds", required_argument, NULL, OPT_SECONDS},
+                                        {"pulses", required_argument, NULL, OPT_PULSES},
+                                        {"whole", no_argument, NULL, OPT_WHOLE},
+                                        {"only-sight", no_argument, NULL, OPT_ONLY_SIGHT},
                                         {"threads", required_argument, NULL, OPT_THREADS},
                                         {"leaks", required_argument, NULL, OPT_LEAKS},
                                         {"help", no_argument, NULL, 'h'},
@@ -77,6 +84,15 @@ static int parse_option(struct bench_options *o, int opt, char **argv)
     case OPT_HOUSE:
         o->house = optarg;
         return BENCH_OK;
+    case OPT_PULSES:
+        o->pulses = optarg;
+        return BENCH_OK;
+    case OPT_WHOLE:
+        o->whole = 1;
+        return BENCH_OK;
+    case OPT_ONLY_SIGHT:
+        o->only_sight = 1;
+        return BENCH_OK;
     case 'o':
         o->out = optarg;
         return BENCH_OK;
@@ -107,9 +123,30 @@ static int check_scenes(const char *list)
     uint32_t n = 0;
     if (*list == '\0') return usage("--scenes: a list is needed, such as %s", DEFAULT_SCENES);
     while ((list = bench_next_name(list, name, sizeof name)) != NULL)
-        if ((strcmp(name, "house") != 0 && bench_count(name) == 0) || ++n > BENCH_MAX_SCENES)
-            return usage("--scenes %s: allowed are up to %d of house and numbers of triangles from 100 to 100M", name,
-                         BENCH_MAX_SCENES);
+        if ((!bench_is_house(name) && bench_count(name) == 0) || ++n > BENCH_MAX_SCENES)
+            return usage("--scenes %s: allowed are up to %d of house, garden and numbers of triangles from 100 to 100M",
+                         name, BENCH_MAX_SCENES);
+    return BENCH_OK;
+}
+
+double bench_pulses(const char *name)
+{
+    char *end;
+    if (name[0] < '0' || name[0] > '9') return 0.0;
+    double n = strtod(name, &end);
+    if (*end == 'k' || *end == 'M') n *= *end++ == 'k' ? 1e3 : 1e6;
+    return *end == '\0' && n >= 1e3 && n <= 1e8 ? n : 0.0;
+}
+
+static int check_pulses(const char *list)
+{
+    char name[32];
+    uint32_t n = 0;
+    if (strcmp(list, "none") == 0) return BENCH_OK;
+    if (*list == '\0') return usage("--pulses: a list is needed, such as 22.5M,1M, or none");
+    while ((list = bench_next_name(list, name, sizeof name)) != NULL)
+        if (bench_pulses(name) == 0.0 || ++n > BENCH_MAX_SCANS)
+            return usage("--pulses %s: allowed are none, or up to %d numbers from 1k to 100M", name, BENCH_MAX_SCANS);
     return BENCH_OK;
 }
 
@@ -129,5 +166,6 @@ int bench_parse(struct bench_options *o, int argc, char **argv)
     if (optind != argc) return usage("%s: it takes no arguments, only options", argv[optind]);
     if (o->scenes == NULL && o->leaks == 0.0) o->scenes = DEFAULT_SCENES;
     if (o->scenes != NULL) status = check_scenes(o->scenes);
+    if (status == BENCH_OK && o->pulses != NULL) status = check_pulses(o->pulses);
     return status == BENCH_OK ? -1 : status;
 }

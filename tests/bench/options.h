@@ -14,12 +14,17 @@ struct bench_options {
     const char *out;    /* file for the JSON; NULL: standard output */
     double seconds;     /* for each scene */
     long threads;       /* of the run on all threads; 0: one per processor */
+    const char *pulses; /* of the whole scans, with commas between; "none"; NULL: as README.md says */
+    int whole;          /* all lines of them are cast */
+    int only_sight;     /* nothing but these scans */
     double leaks;       /* rays at edges and corners; 0: none */
 };
 
 /* Returns -1 to go on, else the exit status. */
 int bench_parse(struct bench_options *o, int argc, char **argv);
 
+/* A number of pulses like 22.5M or 300k; 0: it is none of 1,000 to 100M. */
+double bench_pulses(const char *name);
 /* The next name of a list with commas into name; NULL at the list's end, else the rest of the list. */
 const char *bench_next_name(const char *list, char *name, size_t len);
 

@@ -95,12 +95,9 @@ static void put_loop(struct json *json, const struct bench_scene_report *s)
     json_double(json, "pulses_per_s_all_threads", s->loop[s->n_loop - 1].pulses_per_s);
 }
 
-static void put_scene(struct json *json, const struct bench_scene_report *s)
+static void put_result(struct json *json, const struct bench_scene_report *s)
 {
     const struct bench_result *r = &s->result;
-    json_open_object(json, NULL);
-    json_string(json, "scene", s->name);
-    json_uint(json, "triangles", s->triangles);
     json_double(json, "embree_mrays_s", 1e3 / r->embree_ns);
     json_double(json, "cast_ratio", r->cast_ratio);
     json_double(json, "pipeline_ratio", r->pipeline_ratio);
@@ -125,10 +122,19 @@ static void put_scene(struct json *json, const struct bench_scene_report *s)
     json_string(json, "embree_feed", r->embree_feed == EMBREE_PREPARED ? "prepared" : "loaded");
     json_uint(json, "rounds", r->rounds);
     json_uint(json, "pulses", r->pulses);
+}
+
+static void put_scene(struct json *json, const struct bench_scene_report *s)
+{
+    json_open_object(json, NULL);
+    json_string(json, "scene", s->name);
+    json_uint(json, "triangles", s->triangles);
+    if (s->stages) put_result(json, s);
     json_double(json, "load_s", s->load_s);
     json_double(json, "build_s", s->info.build_s);
     json_double(json, "embree_build_s", s->embree_build_s);
     json_double(json, "bytes_per_triangle", (double)s->info.bytes / s->triangles);
+    bench_put_sights(json, s);
     json_close_object(json);
 }
 
@@ -220,12 +226,13 @@ void bench_print_table(FILE *out, const struct bench_report *report)
     cpu_name(cpu, sizeof cpu);
     embree_name(embree);
     fprintf(out, "%s, %s, Embree %s\n\n", cpu, isa(), embree);
-    if (report->n_scenes != 0) {
+    if (report->n_scenes != 0 && report->scene[0].stages) {
         fprintf(out, "Embree: million rays/s alone; cast, pipeline: speed of exact hits and of everything, "
                      "Embree alone = 1\n");
         table_speed(out, report);
         table_stages(out, report);
     }
+    bench_table_sights(out, report);
     if (report->have_leaks) table_leaks(out, report);
     for (uint32_t i = 0; i < report->n_notes; i++)
         fprintf(out, "\n%s\n", report->note[i]);

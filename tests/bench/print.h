@@ -4,9 +4,11 @@
 
 #include <stdio.h>
 
+#include "firmware_sim/base/json.h"
 #include "tests/bench/bench.h"
+#include "tests/bench/sight.h"
 
-enum { BENCH_MAX_SCENES = 16, BENCH_MAX_NOTES = 8 };
+enum { BENCH_MAX_SCENES = 16, BENCH_MAX_NOTES = 8, BENCH_MAX_SCANS = 4 };
 
 struct bench_scene_report {
     char name[32];
@@ -16,6 +18,9 @@ struct bench_scene_report {
     struct bench_result result;
     struct bench_threads loop[2]; /* one thread, all threads */
     uint32_t n_loop;
+    int stages; /* result was measured; else only the sights are there */
+    struct bench_sight sight[BENCH_MAX_SCANS];
+    uint32_t n_sights;
 };
 
 struct bench_report {
@@ -29,5 +34,9 @@ struct bench_report {
 
 int bench_print_json(FILE *out, const struct bench_report *report, struct sh_err *err);
 void bench_print_table(FILE *out, const struct bench_report *report);
+
+/* ---- print_sight.c */
+void bench_put_sights(struct json *json, const struct bench_scene_report *scene);
+void bench_table_sights(FILE *out, const struct bench_report *report);
 
 #endif

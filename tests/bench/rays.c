@@ -7,43 +7,54 @@
 
 enum { LINES_HZ = 480 };
 
-void bench_schedule(uint32_t lines, uint32_t frames, struct schedule_spec *spec)
+void bench_schedule_of(uint32_t lines, uint32_t pulses, uint32_t frames, struct schedule_spec *spec)
 {
     *spec = (struct schedule_spec){.lines_uhz = LINES_HZ * INT64_C(1000000),
-                                   .prr_uhz = LINES_HZ * INT64_C(1000000) * BENCH_LINE_PULSES,
+                                   .prr_uhz = LINES_HZ * INT64_C(1000000) * pulses,
                                    .pan_udeg_s = INT64_C(360000000) * LINES_HZ / lines,
-                                   .fov_min_udeg = -40000000,
-                                   .sweep_udeg = 100000000,
-                                   .line_start_udeg = -40000000,
-                                   .line_stop_udeg = 60000000,
+                                   .fov_min_udeg = BENCH_LOWEST_DEG * INT64_C(1000000),
+                                   .sweep_udeg = (BENCH_HIGHEST_DEG - BENCH_LOWEST_DEG) * INT64_C(1000000),
+                                   .line_start_udeg = BENCH_LOWEST_DEG * INT64_C(1000000),
+                                   .line_stop_udeg = BENCH_HIGHEST_DEG * INT64_C(1000000),
                                    .pan_stop_udeg = 360000000,
                                    .frames = frames};
 }
 
-static void fill_line(struct bench_rays *rays, uint32_t l, double *mirror_turn, double *pan_turn)
+void bench_schedule(uint32_t lines, uint32_t frames, struct schedule_spec *spec)
+{
+    bench_schedule_of(lines, BENCH_LINE_PULSES, frames, spec);
+}
+
+static void fill_line(struct bench_rays *rays, uint32_t line, size_t at)
 {
     static const double levelled[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
-    struct schedule_line line;
+    double mirror_turn[BENCH_LINE_PULSES], pan_turn[BENCH_LINE_PULSES];
+    struct schedule_line place;
     struct schedule_run run;
-    size_t at = (size_t)l * BENCH_LINE_PULSES;
-    schedule_get_line(&rays->segment, l, &line);
-    schedule_get_run(&rays->segment, &line, line.cast0, BENCH_LINE_PULSES, &run);
+    schedule_get_line(&rays->segment, line, &place);
+    schedule_get_run(&rays->segment, &place, place.cast0, rays->line_pulses, &run);
     kernel_angles(&run, 0, run.n, mirror_turn, pan_turn);
     const struct vec3_out d = {rays->dx + at, rays->dy + at, rays->dz + at};
     kernel_directions(&(struct kernel_turns){run.n, mirror_turn, pan_turn}, levelled, &d);
     bvh_to_float(&VEC3_IN(d, 0), run.n, rays->fx + at, rays->fy + at, rays->fz + at);
 }
 
-int bench_rays_create(uint32_t lines, struct bench_rays *out, struct sh_err *err)
+void bench_rays_aim(struct bench_rays *rays, uint32_t first_line)
 {
-    struct schedule_spec spec;
+    for (uint32_t l = 0; l < rays->lines; l++)
+        fill_line(rays, first_line + l, (size_t)l * rays->line_pulses);
+}
+
+int bench_rays_room(const struct schedule_spec *spec, uint32_t lines, uint32_t line_pulses, struct bench_rays *out,
+                    struct sh_err *err)
+{
     memset(out, 0, sizeof *out);
-    bench_schedule(lines, 0, &spec);
-    schedule_start(&out->segment, &spec);
+    schedule_start(&out->segment, spec);
     out->lines = lines;
-    out->n = lines * BENCH_LINE_PULSES;
+    out->line_pulses = line_pulses;
+    out->n = lines * line_pulses;
     size_t n = ((size_t)out->n + 15) / 16 * 16;
-    double *d = aligned_alloc(64, 3 * n * sizeof *d), angles[2 * BENCH_LINE_PULSES];
+    double *d = aligned_alloc(64, 3 * n * sizeof *d);
     float *f = aligned_alloc(64, 3 * n * sizeof *f);
     out->dx = d;
     out->fx = f;
@@ -55,19 +66,29 @@ int bench_rays_create(uint32_t lines, struct bench_rays *out, struct sh_err *err
     out->dz = d + 2 * n;
     out->fy = f + n;
     out->fz = f + 2 * n;
-    for (uint32_t l = 0; l < lines; l++)
-        fill_line(out, l, angles, angles + BENCH_LINE_PULSES);
     return SH_OK;
 }
 
-void bench_rays_block(const struct bench_rays *rays, uint32_t first, struct bench_block *out)
+int bench_rays_create(uint32_t lines, struct bench_rays *out, struct sh_err *err)
 {
-    memcpy(out->dx, rays->dx + first, sizeof out->dx);
-    memcpy(out->dy, rays->dy + first, sizeof out->dy);
-    memcpy(out->dz, rays->dz + first, sizeof out->dz);
-    memcpy(out->fx, rays->fx + first, sizeof out->fx);
-    memcpy(out->fy, rays->fy + first, sizeof out->fy);
-    memcpy(out->fz, rays->fz + first, sizeof out->fz);
+    struct schedule_spec spec;
+    bench_schedule(lines, 0, &spec);
+    int rc = bench_rays_room(&spec, lines, BENCH_LINE_PULSES, out, err);
+    if (rc == SH_OK) bench_rays_aim(out, 0);
+    return rc;
+}
+
+uint32_t bench_rays_block(const struct bench_rays *rays, uint32_t first, struct bench_block *out)
+{
+    const uint32_t n = rays->n - first < BENCH_BLOCK ? rays->n - first : BENCH_BLOCK;
+    const size_t wide = n * sizeof(double), narrow = n * sizeof(float);
+    memcpy(out->dx, rays->dx + first, wide);
+    memcpy(out->dy, rays->dy + first, wide);
+    memcpy(out->dz, rays->dz + first, wide);
+    memcpy(out->fx, rays->fx + first, narrow);
+    memcpy(out->fy, rays->fy + first, narrow);
+    memcpy(out->fz, rays->fz + first, narrow);
+    return n;
 }
 
 void bench_rays_free(struct bench_rays *rays)

@@ -22,11 +22,17 @@ uint32_t bench_count(const char *name)
     return n >= 100 && n <= 100000000 ? (uint32_t)n : 0;
 }
 
+int bench_is_house(const char *name)
+{
+    return strcmp(name, "house") == 0 || strcmp(name, "garden") == 0;
+}
+
 static int load_house(const char *file, const struct sh_report *report, struct bench_target *t, struct sh_err *err)
 {
     static const double living_room_m[3] = {5.5, 2.2, 1.6}; /* of config/demo.yaml */
+    static const double garden_m[3] = {6.0, -2.6, 1.7};
     struct scene_mesh_spec spec = {.file = file, .up = SCENE_UP_Y, .scale = 1.0};
-    memcpy(t->station_m, living_room_m, sizeof t->station_m);
+    memcpy(t->station_m, strcmp(t->name, "garden") == 0 ? garden_m : living_room_m, sizeof t->station_m);
     return scene_load(&spec, 1, 1e-4, report, &t->scene, err);
 }
 
@@ -38,7 +44,7 @@ int bench_target_load(const char *name, const char *house, const struct sh_repor
     snprintf(out->name, sizeof out->name, "%s", name);
     int64_t start_ns = clock_now_ns();
     int rc;
-    if (strcmp(name, "house") == 0) {
+    if (bench_is_house(name)) {
         rc = load_house(house, report, out, err);
     } else {
         out->station_m[2] = 4.7;
