@@ -166,7 +166,7 @@ endef
 # The readers for LAS and E57 are npm's, in the versions of the lock file. Without npm's registry their tests are skipped.
 READERS = $(BUILD)/readers
 deps: deps-test $(READERS)/installed
-$(READERS)/installed: $(wildcard tests/readers/*) | deps-test
+$(READERS)/installed: $(wildcard tests/readers/*) | $(if $(DEPS_ARE_THERE),,deps-test)
 	@mkdir -p $(@D)
 	@cp tests/readers/* $(@D)
 	@if [ '$(DEPS)' = no ]; then echo "DEPS=no: the readers for LAS and E57 are not installed: their tests will be skipped"; \
@@ -200,8 +200,9 @@ RUN = SCANHEAD=$(BUILD)/test/scanhead READERS=$(READERS)
 # `make test T=test_ring` builds and runs that one alone, of whatever folder; also a script: T=check_includes, T=test_usbip_tcp.
 T ?=
 ifeq ($(T),)
-test: deps
-	$(SUBMAKE) $(STRICT) BUILD=$(BUILD)/test test-programs
+test: deps-test
+	@$(MAKE) --no-print-directory DEPS_ARE_THERE=1 $(READERS)/installed & status=0; \
+	$(MAKE) --no-print-directory -j$(JOBS) $(STRICT) BUILD=$(BUILD)/test test-programs || status=1; wait; exit $$status
 	@command -v clang >/dev/null || echo "no clang: its warnings are not looked at"
 	@$(MAKE) --no-print-directory $(READERS)/pcl_vlp16 & status=0; \
 	! command -v clang >/dev/null || $(MAKE) --no-print-directory -j$(JOBS) $(CLANG) objects || status=1; wait; exit $$status
