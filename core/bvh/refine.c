@@ -124,34 +124,48 @@ uint32_t bvh_refine(const struct bvh_proposals *p)
     return p->bvh->rival_first != NULL ? doubt_rivals(p) : doubts;
 }
 
-VEC_CLONES
-static void ranges(const struct bvh_proposals *p)
-{
-    refine(p, FROM_ONE, 0);
-}
+enum { LANES = 8 };
 
-VEC_CLONES
-static void ranges_steep(const struct bvh_proposals *p)
+/* Rays at .. at + n of one plane. */
+VEC_INLINE void ranges_of(const struct bvh_rays *rays, const double *tri, double off, uint32_t triangle, uint32_t at,
+                          uint32_t n)
 {
-    refine(p, FROM_ONE_STEEP, 0);
-}
-
-void bvh_ranges(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays)
-{
-    for (uint32_t at = 0; at < rays->n; at += BVH_CHUNK) {
-        struct bvh_proposals p = {.bvh = bvh,
-                                  .n = rays->n - at < BVH_CHUNK ? rays->n - at : BVH_CHUNK,
-                                  .dir = VEC3_IN(rays->dir, at),
-                                  .prim = rays->triangle + at,
-                                  .range_m = rays->range_m + at,
-                                  .label = rays->label != NULL ? rays->label + at : bvh_work_labels(work),
-                                  .steep = rays->steep != NULL ? rays->steep + at : NULL};
-        vec3_sub(rays->from.at_m, bvh->origin_m, p.o);
-        if (p.steep != NULL)
-            ranges_steep(&p);
-        else
-            ranges(&p);
+    const double nx = tri[0], ny = tri[1], nz = tri[2], nn = nx * nx + ny * ny + nz * nz, above = tri[3] - off;
+    const double *dx = rays->dir.x + at, *dy = rays->dir.y + at, *dz = rays->dir.z + at;
+    const uint32_t label = label_of(ny, nz);
+    double *range_m = rays->range_m + at, along[LANES];
+    VEC_LOOP
+    for (uint32_t i = 0; i < n; i++) {
+        along[i] = nx * dx[i] + ny * dy[i] + nz * dz[i];
+        range_m[i] = above / along[i];
     }
+    for (uint32_t i = 0; i < n; i++)
+        rays->triangle[at + i] = triangle;
+    for (uint32_t i = 0; rays->label != NULL && i < n; i++)
+        rays->label[at + i] = label;
+    for (uint32_t i = 0; rays->steep != NULL && i < n; i++)
+        rays->steep[at + i] = (float)nn / (float)(along[i] * along[i]);
+}
+
+double bvh_range_of(const struct bvh *bvh, uint32_t triangle, const double at_m[3], const double dir[3])
+{
+    const struct bvh_plane *tri = &bvh->triangle[triangle];
+    double o[3];
+    vec3_sub(at_m, bvh->origin_m, o);
+    return (tri->d - vec3_dot(tri->n, o)) / vec3_dot(tri->n, dir);
+}
+
+VEC_CLONES
+void bvh_ranges_of(const struct bvh *bvh, uint32_t triangle, const struct bvh_rays *rays, uint32_t from, uint32_t to)
+{
+    const uint32_t n_triangles = bvh->scene->n_triangles;
+    const double *tri = (const double *)(bvh->triangle + (triangle < n_triangles ? triangle : n_triangles));
+    double o[3];
+    vec3_sub(rays->from.at_m, bvh->origin_m, o);
+    const double off = tri[0] * o[0] + tri[1] * o[1] + tri[2] * o[2];
+    for (; from < to && rays->n - from >= LANES; from += LANES)
+        ranges_of(rays, tri, off, triangle, from, LANES);
+    if (from < to) ranges_of(rays, tri, off, triangle, from, to - from);
 }
 
 VEC_CLONES

@@ -141,6 +141,31 @@ static double offset_m(double v[3][3], const double unit_n[3], double width_m, d
     return width_m * (above_m * BVH_MAX_SLANT > far_m ? far_m / above_m : BVH_MAX_SLANT);
 }
 
+/* The sine of the angle at which the farthest corner is seen from a point of the local frame. */
+static double slant(double v[3][3], const double unit_n[3], const double from_m[3], double reach_m)
+{
+    double to[3], far_m = 0.0;
+    for (int i = 0; i < 3; i++) {
+        vec3_sub(v[i], from_m, to);
+        far_m = fmax(far_m, vec3_length(to));
+    }
+    return fabs(vec3_dot(to, unit_n)) / (far_m + reach_m);
+}
+
+double bvh_border_m(const struct bvh *bvh, uint32_t triangle, const double station_m[3])
+{
+    static const double origin[3] = {0.0, 0.0, 0.0};
+    double v[3][3], n[3], longest, at[3];
+    vec3_sub(station_m, bvh->origin_m, at);
+    if (at[0] == 0.0 && at[1] == 0.0 && at[2] == 0.0) return 0.0;
+    bvh_corners(bvh, triangle, v);
+    const double area2 = measure(v, n, &longest);
+    for (int j = 0; j < 3; j++)
+        n[j] /= area2;
+    if (slant(v, n, at, 0.0) > 1.01 * slant(v, n, origin, bvh->station_reach_m)) return 0.0;
+    return 2.0 * bvh_width_m(bvh, triangle);
+}
+
 static void widen(double v[3][3], double offset, double width_m, double wide[3][3])
 {
     for (int i = 0; i < 3; i++)

@@ -122,8 +122,6 @@ void caster_aim(struct caster *c, struct chunk *k);
 void caster_aim_read(struct caster *c, struct chunk *k);
 
 /* ---- nearest.c */
-/* True where rays are looked up in the sight: all begin at the station. */
-int caster_sees(const struct cast_setup *s, const struct bvh_origins *from);
 void caster_nearest(struct caster *c, const struct cast_setup *s, const struct met *met);
 /* ---- texels.c: labels of what has been met get the reflectance there, as surface_texel has it. Nothing
  * where the surfaces have no textures. */

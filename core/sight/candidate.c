@@ -28,14 +28,14 @@ static void from_face(const double f[3], uint32_t face, double out[3])
     out[(axis + 2) % 3] = f[2];
 }
 
-/* The side of edge a-b, in units of its doubt (sight_inside.h). */
-static void set_edge(const double a[3], const double b[3], double sign, uint32_t face, double out[3])
+/* The side of edge a-b, in units of its doubt (sight_inside.h), which is border_m across the ray at least. */
+static void set_edge(const double a[3], const double b[3], double sign, double border_m, uint32_t face, double out[3])
 {
     double e[3], side[3];
     vec3_sub(b, a, e);
     vec3_cross(a, e, side);
     const double far_m = sqrt(fmax(vec3_dot(a, a), vec3_dot(b, b)));
-    const double scale = sign / (SIGHT_EDGE_DOUBT * far_m * vec3_length(e));
+    const double scale = sign / (fmax(SIGHT_EDGE_DOUBT * far_m, border_m) * vec3_length(e));
     for (int i = 0; i < 3; i++)
         side[i] *= scale;
     to_face(side, face, out);
@@ -90,9 +90,10 @@ int build_candidate(const struct sight *sight, uint32_t face, uint32_t triangle,
     if (bvh_is_twin(sight->bvh, triangle) || !set_plane(sight, c, v, face)) return 0;
     vec3_cross(v[1], v[2], n);
     const double sign = vec3_dot(v[0], n) < 0.0 ? -1.0 : 1.0;
+    const double border_m = bvh_border_m(sight->bvh, triangle, sight->station_m);
     for (int i = 0; i < 3; i++) {
         double e[3];
-        set_edge(v[i], v[(i + 1) % 3], sign, face, c->edge[i]);
+        set_edge(v[i], v[(i + 1) % 3], sign, border_m, face, c->edge[i]);
         c->edge_slope[i] = fabs(c->edge[i][1]) + fabs(c->edge[i][2]);
         if (!(c->edge_slope[i] < INFINITY)) return 0; /* two corners in one place: no area */
         vec3_sub(v[(i + 1) % 3], v[i], e);

@@ -36,7 +36,7 @@ enum sight_kind {
     SIGHT_OTHER,
 };
 enum { SIGHT_KIND_SHIFT = 30, SIGHT_NUMBER = (1U << SIGHT_KIND_SHIFT) - 1 };
-static const uint32_t SIGHT_NOTHING = 0xffffffff, SIGHT_ASK = 0xfffffffe;
+static const uint32_t SIGHT_NOTHING = 0xffffffff, SIGHT_ASK = 0xfffffffe, SIGHT_NO_LEAF = 0xfffffffd;
 
 static inline enum sight_kind sight_kind(uint32_t leaf)
 {
@@ -82,10 +82,10 @@ struct sight_record {
 struct sight {
     const struct bvh *bvh;
     double station_m[3];
-    int exact;
-    uint32_t cells; /* power of two */
-    uint32_t *tile; /* [SIGHT_FACES][cells / SIGHT_TILE][cells / SIGHT_TILE], v outside, u inside */
-    uint32_t *leaf; /* blocks */
+    int exact, among; /* among: the BVH misses nothing that double precision finds, and exact */
+    uint32_t cells;   /* power of two */
+    uint32_t *tile;   /* [SIGHT_FACES][cells / SIGHT_TILE][cells / SIGHT_TILE], v outside, u inside; one that asks */
+    uint32_t *leaf;   /* blocks */
     uint32_t *list;
     struct sight_record *record;
     struct sight_info info;
