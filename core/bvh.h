@@ -122,12 +122,28 @@ int bvh_work_create(struct bvh_work **out, struct sh_err *err);
 void bvh_work_free(struct bvh_work *work);
 void bvh_work_set_profile(struct bvh_work *work, struct bvh_profile *profile); /* NULL: none */
 const struct bvh_counters *bvh_work_counters(const struct bvh_work *work);
+struct bvh_profile *bvh_work_profile(const struct bvh_work *work);
 /* Directions of the last chunk, as Embree gets them. */
 struct vec3_floats bvh_work_directions(const struct bvh_work *work);
+/* Sets them, for n <= BVH_CHUNK rays that something else than bvh_hits decides. */
+void bvh_work_set_directions(struct bvh_work *work, const struct vec3_in *dir, uint32_t n);
 
 /* Exact hits. What a ray begins on, within half a micrometre, it does not meet. Range error: see
  * tests/accuracy. Allocates nothing. */
 void bvh_hits(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays);
+
+/* ---- for rays from one point whose triangles are known otherwise (core/sight); no scene with holes. */
+
+/* Ranges, labels and steepness where the rays meet the planes of rays->triangle, bit by bit what bvh_hits has.
+ * BVH_NO_TRIANGLE: NaN and BVH_NO_LABEL. */
+void bvh_ranges(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays);
+/* Ray i met one of these triangles, or none. All are tried in double, as a proposal in doubt is: the nearest
+ * wins, and within 1e-12 of its range the lowest number. */
+void bvh_decide_among(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays, uint32_t i,
+                      const uint32_t *triangle, uint32_t n);
+/* bvh_hits as if bvh_order_exactly had been called: what lies near each hit is looked for in the BVH, ray by
+ * ray. Some microseconds a ray. */
+void bvh_hits_ordered(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays);
 
 /* Cosine of the incidence on the triangles that were hit, 0..1; NaN where there is none. */
 void bvh_cosines(const struct bvh *bvh, const uint32_t *triangle, const struct vec3_in *dir, uint32_t n,

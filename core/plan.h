@@ -26,7 +26,7 @@ struct plan_option {
     char method[32];
     double error_m;    /* bound; NaN: not known */
     double echo_share; /* bound, likewise */
-    double cost_ns;    /* per pulse, beyond a single ray; NaN: it depends on the scene */
+    double cost_ns;    /* per pulse, beyond a single ray, less than 0 where it saves; NaN: depends on the scene */
     char why_not[96];  /* why it is not possible; empty: it is */
 };
 
@@ -105,14 +105,40 @@ void plan_sample_beam(struct plan_sample *sample, enum beam_mode mode, uint32_t 
  * pulse whose way is longer than that counts as wrong, too: nothing is known of what it meets further on. */
 void plan_sample_optics(struct plan_sample *sample, uint32_t depth, struct plan_option *option);
 
+/* ---- sight */
+
+/* What a map of the directions from a station (core/sight.h) has to pay for, and with what. */
+struct plan_sight_need {
+    double pulses;       /* cast from a station in a scan */
+    double cells;        /* of the map, where rays go; sight_cells */
+    double cell_rad;     /* across */
+    double n_triangles;  /* of the scene */
+    int saves_order;     /* without a map surfaces have to be ordered by bvh_order_exactly */
+    int forced;          /* by cast.sight, 1: a map; 0: none; -1: not */
+    const char *why_not; /* no map is possible; NULL: it is */
+};
+
+/* Of the pulses, shares that go to a cell that shows one triangle, nothing, a few triangles, many. */
+struct plan_sight_found {
+    double one, nothing, few, ask;
+};
+
+/* False where so few pulses pay for no map, whatever they meet: there is no need to look. */
+int plan_sight_may_pay(const struct plan_sight_need *need);
+/* Casts around pulses of the head, at the corners of cells. */
+void plan_sample_sight(struct plan_sample *sample, double cell_rad, struct plan_sight_found *found);
+/* Chooses and fills row. found NULL: nobody has looked. Returns 1: a map. */
+int plan_sight(const struct plan_sight_need *need, const struct plan_sight_found *found, struct plan_row *row);
+
 /* ---- the other stages */
 
 /* What of beam and optics a scan uses. */
 struct plan_methods {
     enum beam_mode beam; /* BEAM_SINGLE, BEAM_RINGS, BEAM_ADAPTIVE */
     uint32_t rings;      /* of sub-rays; adaptive: for footprints with more edges than it tells apart */
-    int order_exactly;   /* bvh_order_exactly */
+    int order_exactly;   /* surfaces are ordered in double: by bvh_order_exactly, or by a sight */
     uint32_t depth;      /* of glass and mirrors */
+    int sight;           /* first hits are looked up in a map of the station's */
 };
 
 /* A beam's name, and its cost where that does not depend on the scene. Its error is not known yet. */

@@ -45,6 +45,8 @@ struct sight_info {
 
 /* True where a sight can be had: no surface has holes, and triangles are few enough to be numbered. */
 int sight_possible(const struct scene *scene);
+/* Cells along an edge of the cube's faces, for rays and memory_bytes as of struct sight_spec. */
+uint32_t sight_cells(double rays, uint64_t memory_bytes);
 /* Made by `threads` threads (0: all). SH_ESTOPPED where report asks to stop, SH_ENOMEM. */
 int sight_create(const struct sight_spec *spec, unsigned threads, const struct sh_report *report, struct sight **out,
                  struct sh_err *err);

@@ -27,8 +27,7 @@
  * then such rivals are known from the start (rivals.c), and a hit on one compares its plane with those of
  * the others.
  *
- * Triangles with holes (scene->cutout) are marked as if they had rivals, so that all their hits are
- * decided in double. A hit in a hole is none. The ray is then cast once more, alone, past every triangle
+ * Triangles with holes (scene->cutout) are marked, so that all their hits are decided in double. A hit in a hole is none. The ray is then cast once more, alone, past every triangle
  * that Embree proposes on its way, and each of them is decided in double: there is no place where the ray
  * sets out again, nothing that it could meet twice or step over, and no limit to the number of layers. */
 #ifndef CORE_BVH_BVH_INSIDE_H
@@ -46,7 +45,7 @@ enum {
 
 /* The planes lie two to a cache line, and are gathered as doubles (refine.c).
  * The lowest 12 bits of each component of n carry something else: of n[0] the guard (8 bits of a double's
- * exponent, 4 of its mantissa, rounded up), of n[1] and n[2] the label and whether it has rivals. They are
+ * exponent, 4 of its mantissa, rounded up), of n[1] and n[2] the label and whether it has holes. They are
  * part of n, and d goes with that n, so the plane still passes exactly through the triangle; it is tilted by
  * less than 2^-40, which at the far end of a triangle of 100 m is 0.1 nm. */
 _Static_assert(sizeof(struct bvh_plane) == 4 * sizeof(double), "gathered as doubles");
@@ -68,8 +67,8 @@ static inline uint16_t bvh_label(const struct bvh_plane *tri)
     return (uint16_t)(bvh_spare(tri->n[1]) | (bvh_spare(tri->n[2]) & 15) << BVH_SPARE_BITS);
 }
 
-/* The last spare bit of n[2]: the triangle has rivals, or a texture with holes; each hit is decided. */
-enum { BVH_RIVAL_BIT = 1 << (BVH_SPARE_BITS - 1) };
+/* The last spare bit of n[2]: the triangle has a texture with holes; each hit is decided. */
+enum { BVH_HOLES_BIT = 1 << (BVH_SPARE_BITS - 1) };
 
 struct bvh {
     RTCDevice device;
@@ -77,9 +76,9 @@ struct bvh {
     const struct scene *scene;
     struct bvh_plane *triangle; /* one more than there are: the last stands for a miss, all NaN */
     double origin_m[3];
-    uint32_t *rival_first,
-        *rival; /* rivals of triangle i: rival[rival_first[i] .. rival_first[i + 1]); NULL: there are none */
-    uint64_t *twin;         /* bits: a face of the same corners stands for this one; NULL: for none */
+    /* Rivals of triangle i: rival[rival_first[i] .. rival_first[i + 1]), none of a miss. NULL: there are none. */
+    uint32_t *rival_first, *rival;
+    uint64_t *twin; /* bits: a face of the same corners stands for this one; NULL: for none */
     double station_reach_m; /* rays begin at most this far from the origin */
     struct bvh_info info;
     int64_t bytes; /* as Embree reports */
@@ -148,8 +147,6 @@ int bvh_commit(struct bvh *bvh, RTCScene scene, const struct sh_report *report, 
  * buffer. */
 int bvh_drop_twins(struct bvh *bvh, float *vertex, const struct sh_report *report, struct sh_err *err);
 
-/* Marks a triangle as having rivals or holes; its plane is made anew to go with that. */
-void bvh_mark_rival(struct bvh *bvh, uint32_t prim);
 /* ---- refine.c */
 /* What Embree proposed, and what double precision makes of it. */
 struct bvh_proposals {
@@ -166,6 +163,8 @@ struct bvh_proposals {
 };
 /* Returns how many are in doubt. */
 uint32_t bvh_refine(const struct bvh_proposals *proposals);
+/* Room for the labels of a chunk that nobody asked for. */
+uint32_t *bvh_work_labels(struct bvh_work *work);
 /* 1 / cos^2 for one; RTC_INVALID_GEOMETRY_ID: NaN. */
 float bvh_steep(const struct bvh *bvh, uint32_t prim, const double dir[3]);
 
@@ -186,9 +185,15 @@ void decide_prefetch(const struct bvh *bvh, const uint32_t *prim, const uint32_t
 
 /* What Embree proposed near a border, decided in double: the nearest triangle that the ray really meets.
  * Every triangle near the proposed point is tried with edge functions that two triangles of an edge share bit
- * by bit, so that no ray passes between them; of those that are hit at the same range (to 1e-12) the lowest
- * number wins. When none is hit the ray goes on. */
+ * by bit, so that no ray passes between them; of those that are hit at the same range (to 1e-12 of the nearest)
+ * the lowest number wins. When none is hit the ray goes on. In which order they are tried makes no difference,
+ * nor what else is tried that lies behind. */
 void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct bvh_counters *counters,
                 struct decide_hit *hit);
+/* Among these triangles alone. */
+void decide_among(const struct decide_ray *ray, const uint32_t *prim, uint32_t n, struct bvh_counters *counters,
+                  struct decide_hit *hit);
+/* Whether something else is met before a hit within what float can't order. Rivals need not be known. */
+void decide_again(const struct decide_ray *ray, struct decide_hit *hit);
 
 #endif

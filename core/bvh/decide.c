@@ -5,16 +5,40 @@
 #include "core/bvh/bvh_inside.h"
 #include "core/vec3.h"
 
+enum { MOST_TIED = 8 };
+
 struct search {
     const struct decide_ray *ray;
     double point_m[3], radius_m; /* of the query, local frame */
     uint32_t proposed;
     uint32_t prim;            /* best so far */
     double range_m, border_m; /* its range, and how far the ray passes from its nearest edge */
-    uint32_t near_prim;       /* the one that the ray misses by least; gap 1: double precision can't decide */
-    double near_gap, near_range_m;
-    int holes; /* the ray passed through one */
+    /* All that were met within 1e-12 of the nearest: of them the lowest number is the best, in whatever order they
+     * came. Of more than there is room for the highest numbers are left out. */
+    struct {
+        uint32_t prim;
+        double range_m, border_m;
+    } tied[MOST_TIED];
+    uint32_t n_tied;
+    double first_m;      /* the nearest; INFINITY: none */
+    uint32_t near_prim;  /* missed by less than double precision can decide; of those the nearest */
+    double near_range_m; /* INFINITY: none */
+    int holes;           /* the ray passed through one */
 };
+
+static void forget(struct search *s)
+{
+    s->prim = s->near_prim = RTC_INVALID_GEOMETRY_ID;
+    s->range_m = s->first_m = s->near_range_m = INFINITY;
+    s->n_tied = 0;
+}
+
+static struct search search_for(const struct decide_ray *ray)
+{
+    struct search s = {.ray = ray, .proposed = RTC_INVALID_GEOMETRY_ID};
+    forget(&s);
+    return s;
+}
 
 static int before(const double a[3], const double b[3])
 {
@@ -138,8 +162,8 @@ static int is_hole(struct search *s, uint32_t prim, double v[3][3], double range
     return 1;
 }
 
-/* Remembers the triangle that the ray misses by least, in units of what double precision resolves at its
- * edges. */
+/* Remembers a triangle that the ray misses by less than double precision resolves at its edges. Of several the
+ * frontmost: what else is tried further away makes no difference. */
 static void note_miss(struct search *s, uint32_t prim, double v[3][3], const double side[3])
 {
     const double *dir = s->ray->dir;
@@ -148,16 +172,41 @@ static void note_miss(struct search *s, uint32_t prim, double v[3][3], const dou
     for (int i = 0; i < 3; i++) {
         const double *a = v[i], *b = v[(i + 1) % 3];
         double out = -sign * side[i] / blur(a, b);
+        if (out > 1.0) return;
         if (out <= gap) continue;
         gap = out;
         range = edge_range(a, b, dir);
     }
-    if (range <= BVH_AT_ORIGIN_M) return;
-    if (s->holes && gap <= 1.0 && s->near_gap <= 1.0 ? range >= s->near_range_m : gap >= s->near_gap) return;
-    if (gap <= 1.0 && is_hole(s, prim, v, range)) return;
-    s->near_gap = gap;
+    if (range <= BVH_AT_ORIGIN_M || range > s->near_range_m || is_hole(s, prim, v, range)) return;
+    if (range == s->near_range_m && prim > s->near_prim) return;
     s->near_prim = prim;
     s->near_range_m = range;
+}
+
+static void note_hit(struct search *s, uint32_t prim, double range_m, double border_m)
+{
+    uint32_t n = 0, last = 0;
+    if (range_m > s->first_m + 1e-12 * s->first_m) return;
+    s->first_m = fmin(s->first_m, range_m);
+    for (uint32_t i = 0; i < s->n_tied; i++) {
+        if (s->tied[i].range_m > s->first_m + 1e-12 * s->first_m || s->tied[i].prim == prim) continue;
+        s->tied[n] = s->tied[i];
+        if (s->tied[n].prim > s->tied[last].prim) last = n;
+        n++;
+    }
+    s->n_tied = n;
+    const uint32_t at = n < MOST_TIED ? s->n_tied++ : last;
+    if (n < MOST_TIED || prim < s->tied[last].prim) {
+        s->tied[at].prim = prim;
+        s->tied[at].range_m = range_m;
+        s->tied[at].border_m = border_m;
+    }
+    for (uint32_t i = 0; i < s->n_tied; i++) {
+        if (i != 0 && s->tied[i].prim >= s->prim) continue;
+        s->prim = s->tied[i].prim;
+        s->range_m = s->tied[i].range_m;
+        s->border_m = s->tied[i].border_m;
+    }
 }
 
 /* Returns whether the ray meets it. */
@@ -172,12 +221,7 @@ static int try_triangle(struct search *s, uint32_t prim)
     }
     double range = held_range(s->ray, prim, v);
     if (!(range > BVH_AT_ORIGIN_M) || is_hole(s, prim, v, range)) return 0;
-    double same = 1e-12 * range;
-    if (range < s->range_m - same || (range <= s->range_m + same && prim < s->prim)) {
-        s->prim = prim;
-        s->range_m = range;
-        s->border_m = edge_distance(v, side);
-    }
+    note_hit(s, prim, range, edge_distance(v, side));
     return 1;
 }
 
@@ -260,9 +304,8 @@ static void to_floats(const struct decide_ray *ray, float org[3], float dir[3])
 /* What was tried may lie anywhere on the ray; it counts up to limit_m: beyond, not everything was tried. */
 static int is_found(struct search *s, double limit_m)
 {
-    if (s->range_m <= limit_m || (s->near_gap <= 1.0 && s->near_range_m <= limit_m)) return 1;
-    s->prim = s->near_prim = RTC_INVALID_GEOMETRY_ID;
-    s->range_m = s->near_gap = INFINITY;
+    if (s->range_m <= limit_m || s->near_range_m <= limit_m) return 1;
+    forget(s);
     return 0;
 }
 
@@ -281,14 +324,19 @@ static void look_through(struct search *s)
     bvh_walk_along(s->ray->bvh, org, dir, s->ray->t_max, &walk);
 }
 
+static void finish(struct search *s, struct bvh_counters *counters, struct decide_hit *hit)
+{
+    /* So near to an edge that double precision can't separate its sides: the edge is hit, nothing passes. */
+    const int near = s->near_prim != RTC_INVALID_GEOMETRY_ID && !(s->range_m <= s->near_range_m);
+    counters->undecided += (uint64_t)near;
+    hit->prim = near ? s->near_prim : s->prim;
+    hit->range_m = near ? s->near_range_m : s->range_m;
+}
+
 void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct bvh_counters *counters,
                 struct decide_hit *hit)
 {
-    struct search s = {.ray = ray,
-                       .range_m = INFINITY,
-                       .prim = RTC_INVALID_GEOMETRY_ID,
-                       .near_prim = RTC_INVALID_GEOMETRY_ID,
-                       .near_gap = INFINITY};
+    struct search s = search_for(ray);
     counters->near_border++;
     /* Each round begins further along the ray, so they end. A ray that passes many wide triangles needs many:
      * none may be given up, for what lies behind would be lost. */
@@ -316,12 +364,35 @@ void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct bvh
     }
     if (s.holes) look_through(&s);
     if (s.prim != RTC_INVALID_GEOMETRY_ID) try_rivals(&s, s.prim, s.range_m);
-    /* So near to an edge that double precision can't separate its sides: the edge is hit, nothing passes. */
-    if (s.near_gap <= 1.0 && !(s.range_m <= s.near_range_m)) {
-        counters->undecided++;
-        s.prim = s.near_prim;
-        s.range_m = s.near_range_m;
+    finish(&s, counters, hit);
+}
+
+void decide_among(const struct decide_ray *ray, const uint32_t *prim, uint32_t n, struct bvh_counters *counters,
+                  struct decide_hit *hit)
+{
+    struct search s = search_for(ray);
+    for (uint32_t i = 0; i < n; i++)
+        try_triangle(&s, prim[i]);
+    finish(&s, counters, hit);
+}
+
+/* How many widths around a hit are searched. Float may order what lies within two of them over the cosine of the
+ * incidence; of planes that are seen at a smaller angle, and end between the two hits, it is this cosine's inverse. */
+enum { WIDE = 64, MOST_ROUNDS = 8 };
+
+void decide_again(const struct decide_ray *ray, struct decide_hit *hit)
+{
+    struct search s = search_for(ray);
+    uint32_t was = RTC_INVALID_GEOMETRY_ID;
+    struct decide_hit at = *hit;
+    for (int k = 0; k < MOST_ROUNDS && at.prim != was; k++) {
+        struct bvh_counters none = {0};
+        const double width_m = bvh_width_m(ray->bvh, at.prim), slack = WIDE / 4 * slack_m(ray, at.prim, width_m);
+        was = s.proposed = at.prim;
+        try_triangle(&s, at.prim);
+        try_around(&s, at.range_m, fmin(slack, 0.01 * at.range_m + 4.0 * width_m));
+        finish(&s, &none, &at);
+        if (at.prim == RTC_INVALID_GEOMETRY_ID) return;
     }
-    hit->prim = s.prim;
-    hit->range_m = s.range_m;
+    *hit = at;
 }

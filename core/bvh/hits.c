@@ -53,6 +53,21 @@ struct vec3_floats bvh_work_directions(const struct bvh_work *w)
     return (struct vec3_floats){w->dir.x, w->dir.y, w->dir.z};
 }
 
+void bvh_work_set_directions(struct bvh_work *w, const struct vec3_in *dir, uint32_t n)
+{
+    bvh_to_float(dir, n, w->dir.x, w->dir.y, w->dir.z);
+}
+
+struct bvh_profile *bvh_work_profile(const struct bvh_work *work)
+{
+    return work->profile;
+}
+
+uint32_t *bvh_work_labels(struct bvh_work *work)
+{
+    return work->label;
+}
+
 static void set_origin(struct decide_ray *ray, const double at_m[3])
 {
     for (int i = 0; i < 3; i++) {
@@ -61,29 +76,38 @@ static void set_origin(struct decide_ray *ray, const double at_m[3])
     }
 }
 
-static void decide_one(struct bvh_work *w, struct decide_ray *ray, const struct bvh_rays *rays,
-                       const struct bvh_proposals *p, uint32_t i)
+static void set_ray(struct decide_ray *ray, const struct bvh_rays *rays, uint32_t i)
 {
     const double dir[3] = VEC3_AT(rays->dir, i);
-    struct decide_hit hit;
     if (rays->from.own.x != NULL) set_origin(ray, (const double[3])VEC3_AT(rays->from.own, i));
     memcpy(ray->dir, dir, sizeof dir);
+}
+
+/* What was decided of ray i, but for its triangle. */
+static void put(const struct decide_ray *ray, const struct decide_hit *hit, const struct bvh_rays *rays, uint32_t i)
+{
+    const int none = hit->prim == RTC_INVALID_GEOMETRY_ID;
+    rays->range_m[i] = none ? (double)NAN : hit->range_m;
+    if (rays->label != NULL) rays->label[i] = none ? BVH_NO_LABEL : bvh_label(&ray->bvh->triangle[hit->prim]);
+    if (rays->steep != NULL) rays->steep[i] = bvh_steep(ray->bvh, hit->prim, ray->dir);
+}
+
+static void decide_one(struct bvh_work *w, struct decide_ray *ray, const struct bvh_rays *rays, uint32_t i)
+{
+    struct decide_hit hit;
+    set_ray(ray, rays, i);
     decide_hit(ray, w->prim[i], w->t[i], &w->counters, &hit);
-    int none = hit.prim == RTC_INVALID_GEOMETRY_ID;
     w->prim[i] = hit.prim;
-    p->label[i] = none ? BVH_NO_LABEL : bvh_label(&ray->bvh->triangle[hit.prim]);
-    p->range_m[i] = none ? (double)NAN : hit.range_m;
-    if (p->steep != NULL) p->steep[i] = bvh_steep(ray->bvh, hit.prim, dir);
+    put(ray, &hit, rays, i);
 }
 
 /* Doubts are few: whole groups without any are passed at once. Each costs a chain of cache misses, so they
  * are looked up together. */
-static void decide(struct bvh_work *w, struct decide_ray *ray, const struct bvh_rays *rays,
-                   const struct bvh_proposals *p)
+static void decide(struct bvh_work *w, struct decide_ray *ray, const struct bvh_rays *rays)
 {
     uint32_t doubts = 0, in_doubt[BVH_CHUNK];
-    for (uint32_t base = 0; base < p->n; base += DOUBTS_TOGETHER) {
-        uint32_t any = 0, end = p->n - base < DOUBTS_TOGETHER ? p->n : base + DOUBTS_TOGETHER;
+    for (uint32_t base = 0; base < rays->n; base += DOUBTS_TOGETHER) {
+        uint32_t any = 0, end = rays->n - base < DOUBTS_TOGETHER ? rays->n : base + DOUBTS_TOGETHER;
         for (uint32_t i = base; i < base + DOUBTS_TOGETHER; i++)
             any |= w->doubt[i]; /* beyond n: stale, but there; a doubt too many costs a look */
         for (uint32_t i = base; any != 0 && i < end; i++)
@@ -92,7 +116,7 @@ static void decide(struct bvh_work *w, struct decide_ray *ray, const struct bvh_
     if (doubts == 0) return;
     decide_prefetch(ray->bvh, w->prim, in_doubt, doubts);
     for (uint32_t k = 0; k < doubts; k++)
-        decide_one(w, ray, rays, p, in_doubt[k]);
+        decide_one(w, ray, rays, in_doubt[k]);
 }
 
 VEC_CLONES
@@ -148,15 +172,21 @@ static void cast_chunk(struct bvh_work *w, struct decide_ray *ray, const struct 
     bvh_stage_ends(w->profile, BVH_STAGE_EMBREE);
     uint32_t doubts = bvh_refine(&proposals);
     bvh_stage_ends(w->profile, BVH_STAGE_REFINE);
-    if (doubts != 0) decide(w, ray, rays, &proposals);
+    if (doubts != 0) decide(w, ray, rays);
     memcpy(rays->triangle, w->prim, n * sizeof *rays->triangle);
     bvh_stage_ends(w->profile, BVH_STAGE_DECIDE);
 }
 
-void bvh_hits(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays)
+static struct decide_ray ray_from(const struct bvh *bvh, const struct bvh_rays *rays)
 {
     struct decide_ray ray = {.bvh = bvh, .t_max = (float)(rays->range_max_m * 1.001)};
     set_origin(&ray, rays->from.at_m);
+    return ray;
+}
+
+void bvh_hits(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays)
+{
+    struct decide_ray ray = ray_from(bvh, rays);
     for (uint32_t at = 0; at < rays->n; at += BVH_CHUNK) {
         struct bvh_rays part = *rays;
         part.n = rays->n - at < BVH_CHUNK ? rays->n - at : BVH_CHUNK;
@@ -168,4 +198,31 @@ void bvh_hits(struct bvh_work *work, const struct bvh *bvh, const struct bvh_ray
         part.steep = rays->steep != NULL ? rays->steep + at : NULL;
         cast_chunk(work, &ray, &part);
     }
+}
+
+void bvh_decide_among(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays, uint32_t i,
+                      const uint32_t *triangle, uint32_t n)
+{
+    struct decide_ray ray = ray_from(bvh, rays);
+    struct decide_hit hit;
+    set_ray(&ray, rays, i);
+    decide_among(&ray, triangle, n, &work->counters, &hit);
+    rays->triangle[i] = hit.prim;
+    put(&ray, &hit, rays, i);
+}
+
+void bvh_hits_ordered(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays)
+{
+    struct decide_ray ray = ray_from(bvh, rays);
+    bvh_hits(work, bvh, rays);
+    if (bvh->rival_first != NULL) return;
+    for (uint32_t i = 0; i < rays->n; i++) {
+        struct decide_hit hit = {rays->triangle[i], rays->range_m[i]};
+        if (hit.prim == RTC_INVALID_GEOMETRY_ID) continue;
+        set_ray(&ray, rays, i);
+        decide_again(&ray, &hit);
+        rays->triangle[i] = hit.prim;
+        put(&ray, &hit, rays, i);
+    }
+    bvh_stage_ends(work->profile, BVH_STAGE_DECIDE);
 }

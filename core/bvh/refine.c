@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "core/bvh/bvh_inside.h"
+#include "core/vec3.h"
 #include "core/vecmath.h"
 
 /* Embree sorts a packet's directions by their signs, but takes what is smaller than 1e-18 for positive when
@@ -35,7 +36,7 @@ VEC_INLINE uint32_t label_of(double ny, double nz)
 }
 
 /* Whether a hit is so near to its triangle's border that the proposal is in doubt, or the triangle has
- * rivals. slope: what the guard counts in, bvh_inside.h. */
+ * holes. slope: what the guard counts in, bvh_inside.h. */
 VEC_INLINE uint32_t in_doubt(double nx, double nz, double slope, float u, float v)
 {
     float w = 1.0f - u - v;
@@ -47,13 +48,14 @@ VEC_INLINE uint32_t in_doubt(double nx, double nz, double slope, float u, float 
     bits = ((bits & ((1U << BVH_SPARE_BITS) - 1)) + BVH_GUARD_BASE) << BVH_GUARD_SHIFT;
     memcpy(&guard, &bits, sizeof guard);
     memcpy(&high, &nz, sizeof high);
-    return ((double)least * slope < guard) | (uint32_t)((high & BVH_RIVAL_BIT) != 0);
+    return ((double)least * slope < guard) | (uint32_t)((high & BVH_HOLES_BIT) != 0);
 }
 
 enum how { FROM_ONE, FROM_ONE_STEEP, FROM_OWN };
 
-/* A miss has the highest number there is and reads the record after the last triangle, which is all NaN. */
-VEC_INLINE uint32_t refine(const struct bvh_proposals *p, enum how how)
+/* A miss has the highest number there is and reads the record after the last triangle, which is all NaN.
+ * judge 0: the triangles are what the rays meet, and nothing is in doubt. */
+VEC_INLINE uint32_t refine(const struct bvh_proposals *p, enum how how, int judge)
 {
     const double *tri = (const double *)p->bvh->triangle, *dx = p->dir.x, *dy = p->dir.y, *dz = p->dir.z;
     const double *px = p->own.x, *py = p->own.y, *pz = p->own.z, ox = p->o[0], oy = p->o[1], oz = p->o[2];
@@ -72,6 +74,7 @@ VEC_INLINE uint32_t refine(const struct bvh_proposals *p, enum how how)
         range_m[i] = (tri[at + 3] - off) / along;
         if (how == FROM_ONE_STEEP) steep[i] = (float)(nx * nx + ny * ny + nz * nz) / (float)(along * along);
         label[i] = label_of(ny, nz);
+        if (!judge) continue;
         doubt[i] = (in_doubt(nx, nz, slanted ? fabs(along) : 1.0, u[i], v[i]) | (range_m[i] <= BVH_AT_ORIGIN_M)) &
                    (prim[i] < n_triangles);
         doubts += doubt[i];
@@ -83,24 +86,72 @@ VEC_INLINE uint32_t refine(const struct bvh_proposals *p, enum how how)
 VEC_CLONES
 static uint32_t refine_from_one(const struct bvh_proposals *p)
 {
-    return refine(p, FROM_ONE);
+    return refine(p, FROM_ONE, 1);
 }
 
 VEC_CLONES
 static uint32_t refine_steep(const struct bvh_proposals *p)
 {
-    return refine(p, FROM_ONE_STEEP);
+    return refine(p, FROM_ONE_STEEP, 1);
 }
 
 VEC_CLONES
 static uint32_t refine_from_own(const struct bvh_proposals *p)
 {
-    return refine(p, FROM_OWN);
+    return refine(p, FROM_OWN, 1);
+}
+
+/* All hits on triangles that have rivals are in doubt, too. */
+VEC_CLONES
+static uint32_t doubt_rivals(const struct bvh_proposals *p)
+{
+    const uint32_t *first = p->bvh->rival_first, n_triangles = p->bvh->scene->n_triangles, n = p->n, *prim = p->prim;
+    uint32_t *doubt = p->doubt, doubts = 0;
+    VEC_LOOP
+    for (uint32_t i = 0; i < n; i++) {
+        const int64_t at = (int64_t)(prim[i] < n_triangles ? prim[i] : n_triangles);
+        doubt[i] |= first[at] != first[at + 1];
+        doubts += doubt[i];
+    }
+    return doubts;
 }
 
 uint32_t bvh_refine(const struct bvh_proposals *p)
 {
-    return p->own.x != NULL ? refine_from_own(p) : p->steep != NULL ? refine_steep(p) : refine_from_one(p);
+    const uint32_t doubts = p->own.x != NULL   ? refine_from_own(p)
+                            : p->steep != NULL ? refine_steep(p)
+                                               : refine_from_one(p);
+    return p->bvh->rival_first != NULL ? doubt_rivals(p) : doubts;
+}
+
+VEC_CLONES
+static void ranges(const struct bvh_proposals *p)
+{
+    refine(p, FROM_ONE, 0);
+}
+
+VEC_CLONES
+static void ranges_steep(const struct bvh_proposals *p)
+{
+    refine(p, FROM_ONE_STEEP, 0);
+}
+
+void bvh_ranges(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays)
+{
+    for (uint32_t at = 0; at < rays->n; at += BVH_CHUNK) {
+        struct bvh_proposals p = {.bvh = bvh,
+                                  .n = rays->n - at < BVH_CHUNK ? rays->n - at : BVH_CHUNK,
+                                  .dir = VEC3_IN(rays->dir, at),
+                                  .prim = rays->triangle + at,
+                                  .range_m = rays->range_m + at,
+                                  .label = rays->label != NULL ? rays->label + at : bvh_work_labels(work),
+                                  .steep = rays->steep != NULL ? rays->steep + at : NULL};
+        vec3_sub(rays->from.at_m, bvh->origin_m, p.o);
+        if (p.steep != NULL)
+            ranges_steep(&p);
+        else
+            ranges(&p);
+    }
 }
 
 VEC_CLONES
@@ -118,10 +169,10 @@ void bvh_cosines(const struct bvh *bvh, const uint32_t *restrict triangle, const
     }
 }
 
+/* The same operations as in refine: it does not matter who decides a ray. */
 float bvh_steep(const struct bvh *bvh, uint32_t prim, const double dir[3])
 {
-    const struct vec3_in one = {&dir[0], &dir[1], &dir[2]};
-    double cosine;
-    bvh_cosines(bvh, &prim, &one, 1, &cosine);
-    return prim < bvh->scene->n_triangles ? (float)(1.0 / (cosine * cosine)) : NAN;
+    const uint32_t n_triangles = bvh->scene->n_triangles;
+    const double *n = bvh->triangle[prim < n_triangles ? prim : n_triangles].n, along = vec3_dot(n, dir);
+    return (float)vec3_dot(n, n) / (float)(along * along);
 }

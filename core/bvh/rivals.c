@@ -87,6 +87,7 @@ static int share_a_corner(struct shape *a, struct shape *b)
 static int are_rivals(const struct bvh *bvh, uint32_t i, uint32_t j)
 {
     struct shape a, b;
+    if (bvh_is_twin(bvh, i) || bvh_is_twin(bvh, j)) return 0;
     look_at(bvh, i, &a);
     look_at(bvh, j, &b);
     double blur_m = 2.0 * fmax(bvh_width_m(bvh, i), bvh_width_m(bvh, j));
@@ -155,13 +156,13 @@ static int order_pairs(const void *a, const void *b)
     return p[1] < q[1] ? -1 : p[1] > q[1];
 }
 
-/* Sorted pairs -> lists by triangle, each rival once; the triangles that have some are marked. */
+/* Sorted pairs -> lists by triangle, each rival once. One list more than there are triangles, for a miss. */
 static int make_lists(struct bvh *bvh, struct pairs *p, struct sh_err *err)
 {
     if (p->n == 0) return SH_OK;
     uint32_t n = bvh->scene->n_triangles;
     qsort(p->pair, p->n, sizeof *p->pair, order_pairs);
-    bvh->rival_first = calloc((size_t)n + 1, sizeof *bvh->rival_first);
+    bvh->rival_first = calloc((size_t)n + 2, sizeof *bvh->rival_first);
     bvh->rival = malloc(p->n * sizeof *bvh->rival);
     if (bvh->rival_first == NULL || bvh->rival == NULL)
         return sh_fail(err, SH_ENOMEM, "cast: no memory for %zu rivals", p->n);
@@ -170,9 +171,8 @@ static int make_lists(struct bvh *bvh, struct pairs *p, struct sh_err *err)
         if (k > 0 && order_pairs(p->pair[k - 1], p->pair[k]) == 0) continue;
         bvh->rival[kept++] = p->pair[k][1];
         bvh->rival_first[p->pair[k][0] + 1]++;
-        bvh_mark_rival(bvh, p->pair[k][0]);
     }
-    for (uint32_t i = 0; i < n; i++)
+    for (uint32_t i = 0; i <= n; i++)
         bvh->rival_first[i + 1] += bvh->rival_first[i];
     return SH_OK;
 }

@@ -123,12 +123,12 @@ static void set_exact(struct bvh_plane *tri, double v[3][3], double guard, uint1
     set_offset(tri, v);
 }
 
-void bvh_mark_rival(struct bvh *bvh, uint32_t prim)
+static void mark_holes(struct bvh *bvh, uint32_t prim)
 {
     struct bvh_plane *tri = &bvh->triangle[prim];
     double v[3][3];
     bvh_corners(bvh, prim, v);
-    tri->n[2] = with_spare(tri->n[2], bvh_spare(tri->n[2]) | BVH_RIVAL_BIT);
+    tri->n[2] = with_spare(tri->n[2], bvh_spare(tri->n[2]) | BVH_HOLES_BIT);
     set_offset(tri, v);
 }
 
@@ -200,7 +200,7 @@ int bvh_fill(struct bvh *bvh, RTCGeometry geometry, const struct sh_report *repo
     for (uint32_t i = 0; i < 3 * n; i++)
         index[i] = i;
     for (uint32_t i = 0; i < n && scene->cutout != NULL; i++)
-        if (scene_cutout(scene, i) != NULL) bvh_mark_rival(bvh, i);
+        if (scene_cutout(scene, i) != NULL) mark_holes(bvh, i);
     bvh->triangle[n] = (struct bvh_plane){
         .n = {NAN, with_spare(NAN, BVH_NO_LABEL & 0xfff), with_spare(NAN, BVH_NO_LABEL >> BVH_SPARE_BITS)}, .d = NAN};
     return bvh_drop_twins(bvh, vertex, report, err);

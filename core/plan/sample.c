@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/mat3.h"
 #include "core/plan.h"
 #include "core/plan/cost.h"
 #include "core/rng.h"
@@ -20,6 +21,9 @@ enum {
     OPTICS_DRAWN = 8192,
     TRIES = 1 << 23, /* in all, a second or two: where the field of view is narrow, most are not cast */
     ROOM = 64,       /* in the block; more than LINE_MAX_ECHOES */
+    SIGHT_DRAWN = 1024,
+    SIGHT_RAYS = 5, /* to the middle of a cell, and to its corners */
+    SIGHT_FEW = 3,  /* so many triangles among them are a few */
 };
 
 struct echoes {
@@ -309,4 +313,64 @@ void plan_sample_optics(struct plan_sample *s, uint32_t depth, struct plan_optio
     }
     conclude(&tally, s->n_ways, option);
     option->cost_ns = depth == 0 ? 0.0 : PLAN_COST_SUB_RAY * tally.further / s->n_ways;
+}
+
+/* ---- sight */
+
+/* Unit vectors to a pulse's direction, and to the corners of a square around it. */
+static void square_around(const struct plan_place *p, uint64_t pulse, double across_rad, double d[3][SIGHT_RAYS])
+{
+    const double pan = 2.0 * M_PI * schedule_pan_turn(&p->segment, pulse), half = 0.5 * across_rad;
+    const double mirror = 2.0 * M_PI * schedule_mirror_turn(&p->segment, pulse);
+    const double right[3] = {cos(pan), -sin(pan), 0.0};
+    const double ahead[3] = {sin(pan) * cos(mirror), cos(pan) * cos(mirror), sin(mirror)};
+    const double up[3] = {-sin(pan) * sin(mirror), -cos(pan) * sin(mirror), cos(mirror)};
+    for (int i = 0; i < SIGHT_RAYS; i++) {
+        const double a = i == 0 ? 0.0 : i & 1 ? half : -half, b = i == 0 ? 0.0 : i & 2 ? half : -half;
+        double s[3], v[3];
+        for (int k = 0; k < 3; k++)
+            s[k] = (ahead[k] + a * right[k] + b * up[k]) / sqrt(1.0 + a * a + b * b);
+        mat3_apply(p->setup.rotation, s, v);
+        for (int k = 0; k < 3; k++)
+            d[k][i] = v[k];
+    }
+}
+
+static uint32_t count_different(const uint32_t *triangle)
+{
+    uint32_t n = 0;
+    for (int i = 0; i < SIGHT_RAYS; i++) {
+        int k = 0;
+        while (triangle[k] != triangle[i])
+            k++;
+        n += k == i;
+    }
+    return n;
+}
+
+void plan_sample_sight(struct plan_sample *s, double cell_rad, struct plan_sight_found *found)
+{
+    struct look look;
+    double d[3][SIGHT_RAYS], range_m[SIGHT_RAYS];
+    uint32_t triangle[SIGHT_RAYS], n = 0;
+    memset(found, 0, sizeof *found);
+    for (; n < SIGHT_DRAWN && draw(s, &look); n++) {
+        const struct plan_place *p = &s->place[look.place];
+        const double *at_m = p->setup.station_m;
+        const struct bvh_rays rays = {.n = SIGHT_RAYS,
+                                      .from.at_m = {at_m[0], at_m[1], at_m[2]},
+                                      .dir = {d[0], d[1], d[2]},
+                                      .range_max_m = p->setup.range_max_m,
+                                      .range_m = range_m,
+                                      .triangle = triangle};
+        square_around(p, look.pulse, cell_rad, d);
+        caster_hits(s->caster, p->setup.bvh, &rays);
+        const uint32_t kinds = count_different(triangle);
+        *(kinds > SIGHT_FEW                ? &found->ask
+          : kinds > 1                      ? &found->few
+          : triangle[0] == BVH_NO_TRIANGLE ? &found->nothing
+                                           : &found->one) += 1.0;
+    }
+    if (n == 0) found->ask = n = 1;
+    *found = (struct plan_sight_found){found->one / n, found->nothing / n, found->few / n, found->ask / n};
 }

@@ -127,6 +127,14 @@ int build_bins(struct build_shared *b, struct sh_err *err)
     int rc = put_all(b, 0, err);
     for (uint32_t i = 0; i < regions; i++)
         b->bin[i + 1] += b->bin[i];
+    const uint64_t bytes = b->bin[regions] * sizeof *b->binned;
+    if (b->bytes + bytes > b->spec->memory_bytes) {
+        memset(b->seen, 0, regions);
+        memset(b->bin, 0, (regions + 1) * sizeof *b->bin);
+    } else {
+        b->bytes += bytes;
+        b->given_back += bytes;
+    }
     b->binned = malloc((b->bin[regions] + 1) * sizeof *b->binned);
     if (rc == SH_OK && b->binned == NULL)
         rc = sh_fail(err, SH_ENOMEM, "sight: no memory for %llu triangles in regions",

@@ -43,6 +43,7 @@ struct build_shared {
     uint32_t *binned;               /* triangles by region */
     _Atomic uint32_t next;          /* region to be divided */
     _Atomic uint64_t bytes;         /* taken, of spec->memory_bytes */
+    _Atomic uint64_t given_back;    /* of these, when all is done */
     struct build_arena leaf, list, record;
     _Atomic uint64_t cells[4]; /* by what they say: one, nothing, few, ask */
     _Atomic int failed;        /* SH_ENOMEM, SH_ESTOPPED */
@@ -51,7 +52,7 @@ struct build_shared {
 /* Takes n elements of `size` bytes. UINT64_MAX: there is no more room. */
 uint64_t build_take(struct build_shared *b, struct build_arena *arena, uint64_t n, uint64_t size);
 
-/* ---- bins.c: fills seen, bin and binned. */
+/* ---- bins.c: fills seen, bin and binned. Where these are more than the memory allows, no region is seen. */
 int build_bins(struct build_shared *b, struct sh_err *err);
 
 /* ---- candidate.c */
@@ -66,8 +67,11 @@ void build_record(const struct build_candidate *c, uint32_t face, struct sight_r
 struct build_work {
     struct build_candidate *candidate;
     size_t n, room;
+    struct build_where *where; /* [where_room] of candidates, while a square is looked at */
+    size_t where_room;
     uint32_t *stack; /* numbers of candidates, square within square */
     size_t stack_room;
+    uint64_t taken; /* bytes of build_shared's */
 };
 void build_work_free(struct build_work *w);
 /* Divides one region, numbered as in bin. 0 or SH_ENOMEM. */

@@ -43,7 +43,7 @@ static void set_edge(const double a[3], const double b[3], double sign, uint32_t
 
 /* How far the BVH's float distance may be wrong, as a share of the distance times the height of the station above
  * the plane (sight_inside.h). */
-static double float_doubt_m(const struct sight *sight, double v[3][3], double area2, const double o_local[3])
+static double float_doubt_m(double v[3][3], double area2, const double o_local[3])
 {
     double longest = 0.0, far_m = 0.0, product = 1.0;
     for (int i = 0; i < 3; i++) {
@@ -52,7 +52,6 @@ static double float_doubt_m(const struct sight *sight, double v[3][3], double ar
         product *= length;
         far_m = fmax(far_m, vec3_length(v[i]));
     }
-    (void)sight;
     far_m += 2.0 * vec3_length(o_local);
     return SIGHT_FLOAT_DOUBT * (far_m + product / (longest * area2) * (longest + 0.05 * far_m));
 }
@@ -77,7 +76,7 @@ static int set_plane(const struct sight *sight, struct build_candidate *c, doubl
     c->plane_slope = fabs(c->plane[1]) + fabs(c->plane[2]);
     c->slack = SIGHT_PLANE_DOUBT / height_m;
     c->graze = SIGHT_GRAZE / height_m;
-    c->rel = sight->exact ? 0.0 : float_doubt_m(sight, v, length, o_local) / height_m;
+    c->rel = sight->exact ? 0.0 : float_doubt_m(v, length, o_local) / height_m;
     if (c->rel > SIGHT_MAX_REL) c->graze = 1e300;
     return 1;
 }
@@ -88,7 +87,7 @@ int build_candidate(const struct sight *sight, uint32_t face, uint32_t triangle,
     c->triangle = triangle;
     c->record = BUILD_NO_RECORD;
     sight_corners(sight, triangle, v);
-    if (!set_plane(sight, c, v, face)) return 0;
+    if (bvh_is_twin(sight->bvh, triangle) || !set_plane(sight, c, v, face)) return 0;
     vec3_cross(v[1], v[2], n);
     const double sign = vec3_dot(v[0], n) < 0.0 ? -1.0 : 1.0;
     for (int i = 0; i < 3; i++) {

@@ -35,28 +35,6 @@ struct division {
     uint64_t cells[4];
 };
 
-static const struct build_candidate *candidate_of(const struct build_work *w, uint32_t listed)
-{
-    return &w->candidate[listed & ~(uint32_t)COVERS];
-}
-
-static double at_middle(const double f[3], const struct square *q)
-{
-    return f[0] + f[1] * q->mid_u + f[2] * q->mid_v;
-}
-
-/* Whether all of a square, c lies behind what covers it. Rays here are 1 to sqrt(3) long, since a direction's
- * largest component is 1: doubts count twice. */
-static int is_behind(const struct build_candidate *c, const struct build_candidate *cover, const struct square *q)
-{
-    const double half = q->half + SIGHT_PAD, mine = at_middle(c->plane, q), its = at_middle(cover->plane, q);
-    const double r = cover->plane_slope * half, own = c->plane_slope * half;
-    if (!(mine - own > 2.0 * c->graze) || !(mine + own < SIGHT_NEAR)) return c->near_m * (its - r) > 2.0;
-    const double spread = (fabs(cover->plane[1] - c->plane[1]) + fabs(cover->plane[2] - c->plane[2])) * half;
-    const double doubt = 2.0 * (c->slack + cover->slack) + (c->rel + cover->rel + SIGHT_SAME) * (its + r);
-    return its - mine - spread > doubt;
-}
-
 /* Four quarters of a square at a time. */
 typedef double quad __attribute__((vector_size(32)));
 typedef int64_t quad_mask __attribute__((vector_size(32)));
@@ -64,59 +42,124 @@ typedef int64_t quad_mask __attribute__((vector_size(32)));
 struct quarters {
     struct square square[4];
     struct seen seen[4];
+    quad u, v;   /* their middles */
+    double half; /* of each, with the pad */
+    /* The planes of what covers each; cover is NO_CANDIDATE, and first 0, where nothing does. */
+    quad_mask cover;
+    quad first, plane[3], slope, slack, rel;
 };
 
-/* Of a square's candidates, those that may be seen in each quarter, and which one of those that cover it comes
- * first in its middle. */
-VEC_CLONES
-static void look(const struct build_candidate *candidate, const struct seen *in, struct quarters *out)
+/* What pass by pass becomes known of a candidate in the four quarters. */
+struct build_where {
+    quad_mask outside, covers;
+};
+
+/* Vectors go by address: compilers warn of a changed way to pass them where there is no AVX. */
+VEC_INLINE void at_middles(const double f[3], const struct quarters *four, quad *out)
 {
-    const struct square *q = out->square;
-    const quad u = {q[0].mid_u, q[1].mid_u, q[2].mid_u, q[3].mid_u},
-               v = {q[0].mid_v, q[1].mid_v, q[2].mid_v, q[3].mid_v};
-    const double half = q[0].half + SIGHT_PAD;
-    uint32_t n[4] = {0, 0, 0, 0};
+    *out = f[0] + f[1] * four->u + f[2] * four->v;
+}
+
+VEC_INLINE void choose(const quad_mask *which, const quad *yes, quad *no)
+{
+    *no = (quad)(((quad_mask)*yes & *which) | ((quad_mask)*no & ~*which));
+}
+
+/* Where the plane is seen at so small an angle, or from so near, that its distance says nothing: 0. */
+VEC_INLINE void find_clear(const struct build_candidate *c, const quad *middle, double half, quad_mask *clear)
+{
+    const double r = c->plane_slope * half;
+    *clear = (quad_mask)(*middle - r > 2.0 * c->graze) & (quad_mask)(*middle + r < SIGHT_NEAR);
+}
+
+/* Which candidates lie outside of each quarter, which cover it, and which of those comes first in its middle. Rays
+ * here are 1 to sqrt(3) long, since a direction's largest component is 1: doubts count twice. */
+VEC_INLINE void find_covers(const struct build_work *w, const struct seen *in, struct quarters *four)
+{
     quad first = {0.0, 0.0, 0.0, 0.0};
     quad_mask cover = {NO_CANDIDATE, NO_CANDIDATE, NO_CANDIDATE, NO_CANDIDATE};
     for (uint32_t i = 0; i < in->n; i++) {
         const uint32_t number = in->list[i] & ~(uint32_t)COVERS;
-        const struct build_candidate *c = &candidate[number];
-        quad_mask outside = {0, 0, 0, 0}, covers = {-1, -1, -1, -1};
+        const struct build_candidate *c = &w->candidate[number];
+        quad_mask outside = {0, 0, 0, 0}, covers = {-1, -1, -1, -1}, better;
+        quad e;
         for (int k = 0; k < 3; k++) {
-            const double *f = c->edge[k], r = 2.0 + c->edge_slope[k] * half;
-            const quad e = f[0] + f[1] * u + f[2] * v;
+            const double r = 2.0 + c->edge_slope[k] * four->half;
+            at_middles(c->edge[k], four, &e);
             outside |= (quad_mask)(e < -r);
             covers &= (quad_mask)(e > r);
         }
-        const double *f = c->plane, r = c->plane_slope * half;
-        const quad middle = f[0] + f[1] * u + f[2] * v;
-        const quad_mask better = covers & (quad_mask)(middle > first) & (quad_mask)(middle - r > 2.0 * c->graze) &
-                                 (quad_mask)(middle + r < SIGHT_NEAR);
-        const quad_mask mine = {number, number, number, number};
-        first = (quad)(((quad_mask)middle & better) | ((quad_mask)first & ~better));
-        cover = (mine & better) | (cover & ~better);
+        at_middles(c->plane, four, &e);
+        find_clear(c, &e, four->half, &better);
+        better &= covers & (quad_mask)(e > first);
+        choose(&better, &e, &first);
+        cover = (((quad_mask){number, number, number, number}) & better) | (cover & ~better);
+        w->where[i] = (struct build_where){outside, covers};
+    }
+    four->first = first;
+    four->cover = cover;
+}
+
+/* The planes of what covers, side by side. Returns 0 where nothing covers anything. */
+VEC_INLINE int take_covers(const struct build_work *w, struct quarters *four)
+{
+    int any = 0;
+    for (int k = 0; k < 4; k++) {
+        if ((uint32_t)four->cover[k] == NO_CANDIDATE) continue;
+        const struct build_candidate *c = &w->candidate[four->cover[k]];
+        for (int j = 0; j < 3; j++)
+            four->plane[j][k] = c->plane[j];
+        four->slope[k] = c->plane_slope;
+        four->slack[k] = c->slack;
+        four->rel[k] = c->rel;
+        any = 1;
+    }
+    return any;
+}
+
+/* In which quarters all of a candidate lies behind what covers them. One that is seen at too small an angle is
+ * compared as a whole. */
+VEC_INLINE void find_behind(const struct build_candidate *c, const struct quarters *four, quad_mask *behind)
+{
+    const double half = four->half;
+    const quad across = four->plane[1] - c->plane[1], up = four->plane[2] - c->plane[2], reach = four->slope * half;
+    const quad doubt = 2.0 * (c->slack + four->slack) + (c->rel + four->rel + SIGHT_SAME) * (four->first + reach);
+    quad mine, a = -across, b = -up;
+    quad_mask clear;
+    at_middles(c->plane, four, &mine);
+    find_clear(c, &mine, half, &clear);
+    const quad_mask a_less = (quad_mask)(a < across), b_less = (quad_mask)(b < up);
+    choose(&a_less, &across, &a);
+    choose(&b_less, &up, &b);
+    *behind = (clear & (quad_mask)(four->first - mine - (a + b) * half > doubt)) |
+              (~clear & (quad_mask)(c->near_m * (four->first - reach) > 2.0));
+}
+
+/* Of a square's candidates those that may be seen in each quarter. */
+VEC_CLONES
+static void look(const struct build_work *w, const struct seen *in, struct quarters *four)
+{
+    uint32_t n[4] = {0, 0, 0, 0};
+    find_covers(w, in, four);
+    const int hides = take_covers(w, four) && in->n > 1;
+    for (uint32_t i = 0; i < in->n; i++) {
+        const uint32_t number = in->list[i] & ~(uint32_t)COVERS;
+        const quad_mask mine = {number, number, number, number}, covers = w->where[i].covers;
+        quad_mask gone = w->where[i].outside;
+        if (hides) {
+            quad_mask behind;
+            find_behind(&w->candidate[number], four, &behind);
+            gone |= behind & (quad_mask)(mine != four->cover);
+        }
         for (int k = 0; k < 4; k++) {
-            out->seen[k].list[n[k]] = number | ((uint32_t)covers[k] & COVERS);
-            n[k] += outside[k] == 0;
+            four->seen[k].list[n[k]] = number | ((uint32_t)covers[k] & COVERS);
+            n[k] += gone[k] == 0;
         }
     }
     for (int k = 0; k < 4; k++) {
-        out->seen[k].n = n[k];
-        out->seen[k].cover = (uint32_t)cover[k];
+        four->seen[k].n = n[k];
+        four->seen[k].cover = (uint32_t)four->cover[k];
     }
-}
-
-/* What lies behind the one that covers is dropped. */
-static void drop_hidden(const struct build_work *w, struct seen *seen, const struct square *q)
-{
-    uint32_t kept = 0;
-    const uint32_t cover = seen->cover;
-    if (cover == NO_CANDIDATE || seen->n == 1) return;
-    for (uint32_t i = 0; i < seen->n; i++) {
-        const struct build_candidate *c = candidate_of(w, seen->list[i]);
-        if (c == &w->candidate[cover] || !is_behind(c, &w->candidate[cover], q)) seen->list[kept++] = seen->list[i];
-    }
-    seen->n = kept;
 }
 
 /* A square's leaf: tiles as a whole, or in the block at hand. */
@@ -193,6 +236,8 @@ static void make_quarters(const struct square *q, const struct seen *seen, struc
                                           .mid_u = q->mid_u + (k & 1 ? half : -half),
                                           .mid_v = q->mid_v + (k & 2 ? half : -half),
                                           .half = half};
+        four->u[k] = four->square[k].mid_u;
+        four->v[k] = four->square[k].mid_v;
         four->seen[k].list = seen->above + k * (size_t)seen->n;
         four->seen[k].above = seen->above + 4 * (size_t)seen->n;
     }
@@ -200,12 +245,11 @@ static void make_quarters(const struct square *q, const struct seen *seen, struc
 
 static void divide_quarters(struct division *d, const struct square *q, const struct seen *seen)
 {
-    struct quarters four;
+    struct quarters four = {.half = 0.5 * q->half + SIGHT_PAD};
     make_quarters(q, seen, &four);
-    look(d->w->candidate, seen, &four);
+    look(d->w, seen, &four);
     for (uint32_t k = 0; k < 4; k++) {
         struct seen *mine = &four.seen[k];
-        drop_hidden(d->w, mine, &four.square[k]);
         mine->own_leaf = NO_LEAF;
         mine->leaf = mine->n == seen->n ? seen->leaf : &mine->own_leaf;
         divide(d, &four.square[k], mine);
@@ -255,19 +299,54 @@ void build_work_free(struct build_work *w)
 {
     free(w->candidate);
     free(w->stack);
+    free(w->where);
+}
+
+/* Its vectors are aligned. */
+static int grow_where(struct build_work *w, size_t n)
+{
+    if (n <= w->where_room) return 1;
+    free(w->where);
+    w->where_room = n + n / 2;
+    w->where = aligned_alloc(sizeof *w->where, w->where_room * sizeof *w->where);
+    if (w->where == NULL) w->where_room = 0;
+    return w->where != NULL;
 }
 
 /* Each square's candidates stand above those of the square that it is a quarter of: four lists a level. */
-static int gather(struct build_shared *b, struct build_work *w, uint32_t region, uint32_t face)
+static size_t stacked(const struct build_shared *b, size_t n)
 {
-    const uint64_t n = b->bin[region + 1] - b->bin[region];
-    uint32_t levels = 1;
+    size_t lists = 5;
     for (uint32_t size = b->region_cells; size > 1; size /= 2)
-        levels++;
-    if (!grow(&w->candidate, &w->room, n + 1, sizeof *w->candidate) ||
-        !grow(&w->stack, &w->stack_room, (n + 1) * (4 * levels + 1), sizeof *w->stack))
-        return SH_ENOMEM;
+        lists += 4;
+    return lists * n;
+}
+
+/* Whether the memory allows to divide a region of n triangles. What grows does so by half. */
+static int may_take(struct build_shared *b, struct build_work *w, size_t n)
+{
+    const uint64_t each = sizeof *w->candidate + sizeof *w->where;
+    const uint64_t need = 3 * (n * each + stacked(b, n) * sizeof *w->stack) / 2;
+    if (need <= w->taken) return 1;
+    const uint64_t more = need - w->taken;
+    if (atomic_fetch_add(&b->bytes, more) + more > b->spec->memory_bytes) {
+        atomic_fetch_sub(&b->bytes, more);
+        return 0;
+    }
+    w->taken = need;
+    return 1;
+}
+
+/* Candidates of a region. *fits is 0 where there are too many. */
+static int gather(struct build_shared *b, struct build_work *w, uint32_t region, uint32_t face, int *fits)
+{
+    const size_t n = b->bin[region + 1] - b->bin[region];
     w->n = 0;
+    *fits = may_take(b, w, n);
+    if (!*fits) return SH_OK;
+    if (!grow(&w->candidate, &w->room, n, sizeof *w->candidate) || !grow_where(w, n) ||
+        !grow(&w->stack, &w->stack_room, stacked(b, n), sizeof *w->stack))
+        return SH_ENOMEM;
     for (uint64_t i = b->bin[region]; i < b->bin[region + 1]; i++)
         w->n += (size_t)build_candidate(b->sight, face, b->binned[i], &w->candidate[w->n]);
     for (uint32_t i = 0; i < w->n; i++)
@@ -275,23 +354,32 @@ static int gather(struct build_shared *b, struct build_work *w, uint32_t region,
     return SH_OK;
 }
 
+static struct square square_of(const struct build_shared *b, uint32_t region)
+{
+    const uint32_t at = region % (b->regions * b->regions), size = b->region_cells;
+    const double cell = 2.0 / b->sight->cells;
+    struct square q = {
+        .u = at % b->regions * size, .v = at / b->regions * size, .size = size, .half = 0.5 * size * cell};
+    q.mid_u = (q.u + 0.5 * size) * cell - 1.0;
+    q.mid_v = (q.v + 0.5 * size) * cell - 1.0;
+    return q;
+}
+
 int build_region(struct build_shared *b, struct build_work *w, uint32_t region)
 {
-    const uint32_t face = region / (b->regions * b->regions), at = region % (b->regions * b->regions);
-    const uint32_t size = b->region_cells;
-    const double cell = 2.0 / b->sight->cells;
-    struct division d = {.b = b, .w = w, .face = face};
+    struct division d = {.b = b, .w = w, .face = region / (b->regions * b->regions)};
+    const struct square all = square_of(b, region);
+    int fits;
     if (!b->seen[region]) return SH_OK;
-    int rc = gather(b, w, region, face);
+    int rc = gather(b, w, region, d.face, &fits);
     if (rc != SH_OK) return rc;
-    struct square all = {
-        .u = at % b->regions * size, .v = at / b->regions * size, .size = size, .half = 0.5 * size * cell};
-    all.mid_u = (all.u + 0.5 * size) * cell - 1.0;
-    all.mid_v = (all.v + 0.5 * size) * cell - 1.0;
     struct seen seen = {
         .list = w->stack, .n = (uint32_t)w->n, .above = w->stack + w->n, .cover = NO_CANDIDATE, .own_leaf = NO_LEAF};
     seen.leaf = &seen.own_leaf;
-    divide(&d, &all, &seen);
+    if (fits)
+        divide(&d, &all, &seen);
+    else
+        end(&d, &all, SIGHT_ASK, ASK);
     for (int i = 0; i < 4; i++)
         atomic_fetch_add_explicit(&b->cells[i], d.cells[i], memory_order_relaxed);
     return SH_OK;

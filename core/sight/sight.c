@@ -26,19 +26,20 @@ uint64_t build_take(struct build_shared *b, struct build_arena *arena, uint64_t 
     return UINT64_MAX;
 }
 
-/* So many cells that FEW_RAYS rays come to each. */
-static uint32_t choose_cells(double rays)
+static uint64_t tiles_of(uint32_t cells)
 {
-    uint32_t cells = SIGHT_MIN_CELLS;
-    while (cells < SIGHT_MAX_CELLS && SIGHT_FACES * 4.0 * cells * cells * FEW_RAYS <= rays)
-        cells *= 2;
-    return cells;
+    const uint64_t edge = cells / SIGHT_TILE;
+    return SIGHT_FACES * edge * edge;
 }
 
-static uint64_t tiles_of(const struct sight *s)
+/* So many that FEW_RAYS rays come to each, and that most of the memory is left for what they say. */
+uint32_t sight_cells(double rays, uint64_t memory_bytes)
 {
-    const uint64_t edge = s->cells / SIGHT_TILE;
-    return SIGHT_FACES * edge * edge;
+    uint32_t cells = SIGHT_MIN_CELLS;
+    while (cells < SIGHT_MAX_CELLS && SIGHT_FACES * 4.0 * cells * cells * FEW_RAYS <= rays &&
+           tiles_of(2 * cells) * sizeof(uint32_t) * 4 <= memory_bytes)
+        cells *= 2;
+    return cells;
 }
 
 /* Arrays as large as they may become: what is never touched takes no memory. */
@@ -53,14 +54,15 @@ static void *take_array(struct build_shared *b, struct build_arena *arena, uint6
 static int take_arrays(struct build_shared *b, struct sh_err *err)
 {
     struct sight *s = b->sight;
-    s->tile = malloc(tiles_of(s) * sizeof *s->tile);
-    s->leaf = take_array(b, &b->leaf, tiles_of(s) * SIGHT_BLOCK, sizeof *s->leaf);
+    s->tile = malloc(tiles_of(s->cells) * sizeof *s->tile);
+    s->leaf = take_array(b, &b->leaf, tiles_of(s->cells) * SIGHT_BLOCK, sizeof *s->leaf);
     s->list = take_array(b, &b->list, UINT64_MAX, sizeof *s->list);
     s->record = take_array(b, &b->record, UINT64_MAX, sizeof *s->record);
     if (s->tile == NULL || s->leaf == NULL || s->list == NULL || s->record == NULL)
         return sh_fail(err, SH_ENOMEM, "sight: no memory for %u cells", s->cells);
-    for (uint64_t i = 0; i < tiles_of(s); i++)
+    for (uint64_t i = 0; i < tiles_of(s->cells); i++)
         s->tile[i] = SIGHT_ASK;
+    b->bytes = tiles_of(s->cells) * sizeof *s->tile;
     return SH_OK;
 }
 
@@ -75,6 +77,7 @@ static void *thread_main(void *shared)
         const int rc = sh_stopped(b->report) ? SH_ESTOPPED : build_region(b, &w, region);
         if (rc != SH_OK) atomic_store(&b->failed, rc);
     }
+    atomic_fetch_add(&b->given_back, w.taken);
     build_work_free(&w);
     return NULL;
 }
@@ -117,7 +120,8 @@ static void finish(struct build_shared *b)
                                 .ask = (double)b->cells[3] / all,
                                 .lists = b->list.used,
                                 .records = b->record.used,
-                                .bytes = tiles_of(s) * sizeof *s->tile + b->bytes};
+                                .bytes = b->bytes - b->given_back,
+                                .peak_bytes = b->bytes};
 }
 
 static int build(struct build_shared *b, unsigned threads, struct sh_err *err)
@@ -142,7 +146,7 @@ int sight_create(const struct sight_spec *spec, unsigned threads, const struct s
     s->bvh = spec->bvh;
     memcpy(s->station_m, spec->station_m, sizeof s->station_m);
     s->exact = spec->exact;
-    s->cells = choose_cells(spec->rays);
+    s->cells = sight_cells(spec->rays, spec->memory_bytes);
     struct build_shared b = {.sight = s, .spec = spec, .report = report};
     b.regions = s->cells / SIGHT_TILE < BUILD_REGIONS ? s->cells / SIGHT_TILE : BUILD_REGIONS;
     b.region_cells = s->cells / b.regions;

@@ -18,6 +18,7 @@ struct map_run {
     double pixel_m;
     int quiet;
     struct map *map;
+    struct offline offline;
     /* 1: a scene in ECEF, drawn in east, north, up of station 1. 0: drawn along the axes of the scene. */
     int turned;
     double origin_m[3], to_enu[9];
@@ -49,6 +50,12 @@ static int add_frame(void *ctx, struct scanhead *sh, const struct scanhead_frame
         first += (uint32_t)n;
     }
     return SH_OK;
+}
+
+static int prepare(void *ctx, uint32_t station, struct sh_err *err)
+{
+    struct map_run *run = ctx;
+    return offline_prepare(&run->offline, station, &app_report_stderr, err);
 }
 
 static void include(struct map_spec *spec, const double p[3])
@@ -103,21 +110,22 @@ static int create_map(struct map_run *run, const struct site *site, struct sh_er
 static int draw(struct config *cfg, void *ctx, struct sh_err *err)
 {
     struct map_run *run = ctx;
-    struct offline offline = {0};
+    struct offline *offline = &run->offline;
     struct recording_result result;
     struct recording_options options = {.first_station = 1,
                                         .frames = 1,
                                         .progress = !run->quiet,
                                         .report = &app_report_stderr,
+                                        .prepare = prepare,
                                         .frame = add_frame,
                                         .ctx = run,
                                         .interrupted = app_interrupted};
     app_catch_signals();
     cfg->output.layout = LINE_GEO;
-    int rc = offline_open(cfg, 0.0, &app_report_stderr, &offline, err);
-    if (rc == SH_OK) options.last_station = offline.site->n_stations;
-    if (rc == SH_OK) rc = create_map(run, offline.site, err);
-    if (rc == SH_OK) rc = recording_run(offline.sh, &options, &result, err);
+    int rc = offline_open(cfg, 0.0, &app_report_stderr, offline, err);
+    if (rc == SH_OK) options.last_station = offline->site->n_stations;
+    if (rc == SH_OK) rc = create_map(run, offline->site, err);
+    if (rc == SH_OK) rc = recording_run(offline->sh, &options, &result, err);
     if (rc == SH_OK && app_interrupted()) rc = sh_fail(err, SH_EIO, "interrupted; nothing written");
     if (rc == SH_OK) rc = map_write_png(run->map, run->output, err);
     if (rc == SH_OK && !run->quiet) {
@@ -127,7 +135,7 @@ static int draw(struct config *cfg, void *ctx, struct sh_err *err)
                 (unsigned long long)counts.drawn, (unsigned long long)counts.outside);
     }
     map_free(run->map);
-    offline_close(&offline);
+    offline_close(offline);
     return rc;
 }
 

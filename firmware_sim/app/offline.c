@@ -40,6 +40,12 @@ int offline_open(struct config *cfg, double scan_s, const struct sh_report *repo
     return rc == SH_OK ? loop_start(off->loop, err) : rc;
 }
 
+int offline_prepare(struct offline *off, uint32_t station, const struct sh_report *report, struct sh_err *err)
+{
+    if (station == 0) station = off->site->cfg->head.settings.station;
+    return site_open_sights(off->site, station - 1, 1, report, err);
+}
+
 void offline_close(struct offline *offline)
 {
     struct loop_stats stats;

@@ -21,6 +21,8 @@ struct offline {
  * on. `offline` begins as zeros and is to be closed, also after an error. */
 int offline_open(struct config *cfg, double scan_s, const struct sh_report *report, struct offline *offline,
                  struct sh_err *err);
+/* Makes ready for a scan from a station, from 1; 0: where the head stands at power-up. While none is on. */
+int offline_prepare(struct offline *offline, uint32_t station, const struct sh_report *report, struct sh_err *err);
 void offline_close(struct offline *offline);
 
 #endif

@@ -19,9 +19,10 @@ struct record {
     int crs_given, quiet;
     long station; /* 0: as the head is set; APP_WORD: all */
     double wait_s;
-    struct sh_report notes; /* of the recorders */
-    int64_t reported_ns;    /* when their progress was printed last */
-    int interrupted;        /* before the files were completed, which an interrupted recording does, too */
+    struct sh_report notes;  /* of the recorders */
+    int64_t reported_ns;     /* when their progress was printed last */
+    struct offline *offline; /* of a configuration */
+    int interrupted;         /* before the files were completed, which an interrupted recording does, too */
     struct recording_options recording;
 };
 
@@ -36,6 +37,12 @@ static int write_frame(void *ctx, struct scanhead *sh, const struct scanhead_fra
 {
     struct record *r = ctx;
     return record_files_frame(&r->files, sh, frame, err);
+}
+
+static int prepare(void *ctx, uint32_t station, struct sh_err *err)
+{
+    struct record *r = ctx;
+    return offline_prepare(r->offline, station, &app_report_stderr, err);
 }
 
 static void say_result(const struct record *r, const struct recording_result *result)
@@ -172,6 +179,8 @@ static int record_config(struct config *cfg, void *ctx, struct sh_err *err)
         rc = record_files_check_degrees(&r->files, err);
     if (rc == SH_OK) rc = offline_open(cfg, r->recording.duration_s, &app_report_stderr, &offline, err);
     r->recording.head_ends = 1;
+    r->recording.prepare = prepare;
+    r->offline = &offline;
     if (rc == SH_OK && r->station == APP_WORD) {
         r->recording.first_station = 1;
         r->recording.last_station = offline.site->n_stations;

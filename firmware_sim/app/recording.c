@@ -274,6 +274,8 @@ static int follow(struct recording *r, struct sh_err *err)
 static int start_scan(struct recording *r, uint32_t station, struct sh_err *err)
 {
     int rc = wait_idle(r, err);
+    if (rc == SH_OK && !r->interrupted && r->o->prepare != NULL) rc = r->o->prepare(r->o->ctx, station, err);
+    if (rc == SH_ESTOPPED && is_interrupted(r)) return SH_OK;
     if (rc == SH_OK && r->interrupted) return SH_OK;
     if (rc == SH_OK && station != 0) rc = set(r, "HEAD:STATION", (long)station, err);
     if (rc == SH_OK && r->o->frames >= 0) rc = set(r, "SCAN:FRAM", r->o->frames, err);

@@ -22,6 +22,8 @@ struct recording_options {
     int progress;                         /* 1: to the report, about once a second */
     uint64_t source_bytes;                /* of a stream in a file, for progress; 0: not known */
     const struct sh_report *report;
+    /* Before each scan, while the head is idle; station as above. NULL: there is nothing to do. */
+    int (*prepare)(void *ctx, uint32_t station, struct sh_err *err);
     /* Gets each frame, in order. A negative SH_E ends the recording with it. */
     int (*frame)(void *ctx, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
     void *ctx;

@@ -169,11 +169,14 @@ static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
     struct loop_options options = {.hash = o->stats != NULL, .report = &app_report_stderr};
     o->device.start |= cfg->head.start;
     o->device.one_scan = o->device.one_scan && o->device.start;
-    if (o->device.start && o->device.duration_s > 0.0 && !o->frames_given) cfg->head.settings.frames = 0;
     if (cfg->n_links == 0)
         return sh_fail(err, SH_EINPUT, "%s: links: none; run needs at least one of pty, tcp, udp, usb, file, null",
                        cfg->file);
     int rc = site_load(cfg, &app_report_stderr, &site, err);
+    if (rc == SH_OK) rc = site_open_sights(site, 0, site->n_stations, &app_report_stderr, err);
+    /* After the plan, which is made for the configuration: a replayed journal gives the same stream without
+     * --start. */
+    if (o->device.start && o->device.duration_s > 0.0 && !o->frames_given) cfg->head.settings.frames = 0;
     if (rc == SH_OK) rc = site_warn_rate(site, &app_report_stderr, err);
     if (rc == SH_OK) rc = device_create(site, &o->device, &device, err);
     if (rc == SH_OK) rc = loop_create(site, device, &options, &loop, err);

@@ -1,9 +1,11 @@
 /* Casters: threads that claim ticks ahead of their time, compute them and put them into the stream. */
-#include <errno.h>
 #include <stdio.h>
 #include <string.h>
 
+#include "firmware_sim/base/clock.h"
 #include "firmware_sim/loop/loop_inside.h"
+
+static const int64_t SAY_NS = 2000000; /* ticks that take long are not kept back for others */
 
 /* With claim_lock held. */
 static int may_claim(struct loop *loop)
@@ -76,27 +78,45 @@ static int compute(struct loop_caster *caster, const struct device_work *work, s
     return 0;
 }
 
+/* A tick is ready. The pacing thread is told of a batch at once: of all that were made when this caster goes to
+ * sleep, and else before the ticks ahead are used up. */
+static void note_ready(struct loop_caster *caster)
+{
+    struct loop *loop = caster->loop;
+    if (!loop->stream.waits) return;
+    const int64_t now_ns = clock_now_ns();
+    caster->unsaid++;
+    if (caster->unsaid * loop->casters.n < loop->casters.ahead_ticks / 2 && now_ns - caster->said_ns < SAY_NS) return;
+    stream_say_ready(&loop->stream);
+    caster->unsaid = 0;
+    caster->said_ns = now_ns;
+}
+
+static void sleep_caster(struct loop_caster *caster)
+{
+    if (caster->unsaid != 0) stream_say_ready(&caster->loop->stream);
+    caster->unsaid = 0;
+    stream_wait_for_work(&caster->loop->stream);
+}
+
 static void *caster_main(void *arg)
 {
     struct loop_caster *caster = arg;
     struct loop *loop = caster->loop;
-    struct stream *stream = &loop->stream;
     struct device_work work;
     for (;;) {
         struct ring_slot *slot = NULL;
         int got = claim(loop, &work, &slot);
         if (got < 0) break;
         if (got == 0) {
-            while (sem_wait(&stream->work) != 0 && errno == EINTR)
-                continue;
+            sleep_caster(caster);
             continue;
         }
         if (!compute(caster, &work, slot)) device_lost(loop->device, &work);
         atomic_fetch_sub(&loop->casters.n_computing, 1);
-        if (stream->waits) sem_post(&stream->ready);
+        note_ready(caster);
     }
-    if (stream->waits) sem_post(&stream->ready);
-    sem_post(&stream->work); /* the next one learns of the end, too */
+    stream_poke(&loop->stream); /* the others learn of the end, too */
     return NULL;
 }
 

@@ -47,6 +47,7 @@ static void *hasher_main(void *arg)
         enum ring_read got = ring_read(&h->stream->ring, STREAM_HASH_READER, h->cursor, tick);
         if (got == RING_NONE) {
             eventfd_t n;
+            stream_rest_reader(h->stream);
             if (over || (eventfd_read(h->wake_fd, &n) != 0 && errno != EINTR)) break;
             continue;
         }
@@ -86,7 +87,7 @@ int hasher_start(struct stream *stream, struct hasher **out, struct sh_err *err)
         return sh_fail(err, SH_EIO, "the stream hash cannot start: %s", strerror(failed));
     }
     stream_set_reader(stream, STREAM_HASH_READER, 0, 1);
-    stream_listen(stream, h->wake_fd);
+    stream_listen(stream, h->wake_fd, stream->lazy_ticks);
     *out = h;
     return SH_OK;
 }

@@ -17,6 +17,8 @@ struct loop_caster {
     struct loop *loop;
     struct worker *worker;
     pthread_t thread;
+    uint64_t unsaid; /* ticks made, and the pacing thread was not told since */
+    int64_t said_ns; /* when it was, clock_now_ns() */
 };
 
 /* casters.c */

@@ -75,7 +75,7 @@ static void pace_waiting(struct loop *loop)
     for (uint64_t tick = 0; !atomic_load(&loop->stopping) && tick < atomic_load(&loop->final_tick);) {
         struct ring_slot *slot = ring_peek(&stream->ring, tick);
         if (slot == NULL)
-            sem_wait(&stream->ready);
+            stream_wait_for_casters(stream);
         else if (!stream_has_room(stream, tick))
             stream_wait_for_readers(stream, tick);
         else

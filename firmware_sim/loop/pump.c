@@ -41,7 +41,7 @@ int pump_open(struct links *links, uint32_t index, const struct link_spec *spec,
         pump_close(pump);
         return rc;
     }
-    pump->listener = stream_listen(links->stream, pump->wake_fd);
+    pump->listener = stream_listen(links->stream, pump->wake_fd, 1);
     *out = pump;
     return SH_OK;
 }
@@ -145,18 +145,20 @@ static int has_more(struct pump *pump)
     return 0;
 }
 
-/* The stream wakes this thread at ticks with frames, and at those that a protocol needs besides. Returns 1 when such a
- * tick passed meanwhile. */
+/* The stream wakes this thread at ticks with frames while there are sessions, and at those that a protocol needs
+ * besides. Returns 1 when such a tick passed meanwhile. */
 static int set_wake(struct pump *pump)
 {
+    const int by_frames = pump->protocol->passes_native || pump->stream->waits; /* the latter: and by empty ticks */
     uint64_t tick = UINT64_MAX;
-    if (pump->protocol->passes_native || pump->stream->waits) return 0; /* the latter are woken at each tick */
+    int sessions = 0;
     for (int i = 0; i < LINK_MAX_SESSIONS; i++) {
         const struct session *s = &pump->session[i];
-        uint64_t wake = s->open ? session_wake_tick(pump, s) : UINT64_MAX;
+        uint64_t wake = s->open && !by_frames ? session_wake_tick(pump, s) : UINT64_MAX;
         if (wake < tick) tick = wake;
+        sessions |= s->open;
     }
-    return stream_wake_at(pump->stream, pump->listener, tick);
+    return stream_wake_at(pump->stream, pump->listener, sessions, tick);
 }
 
 static void *pump_main(void *arg)
@@ -174,6 +176,7 @@ static void *pump_main(void *arg)
         want_write = 0;
         for (int i = 0; i < LINK_MAX_SESSIONS; i++)
             if (pump->session[i].open && session_write(pump, &pump->session[i], i)) want_write |= 1U << i;
+        stream_rest_reader(pump->stream);
         at_once = pump_rest(pump);
         at_once |= set_wake(pump);
     }

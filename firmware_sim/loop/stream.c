@@ -1,8 +1,6 @@
 #include "firmware_sim/loop/stream.h"
 
-#include <errno.h>
 #include <sys/eventfd.h>
-#include <time.h>
 
 #include "drivers/protocol/native_encode.h"
 #include "firmware_sim/base/clock.h"
@@ -12,26 +10,60 @@ static const int64_t PATIENCE_NS = 2000000000;
 int stream_create(struct stream *stream, const struct ring_size *size, int64_t tick_ns, struct sh_err *err)
 {
     stream->tick_ns = tick_ns;
-    sem_init(&stream->work, 0, 0);
-    sem_init(&stream->ready, 0, 0);
-    sem_init(&stream->progress, 0, 0);
+    /* In the paces that wait casters and readers share the queue: the ones fill it while the others empty it. */
+    stream->say_ticks = 1 + (stream->waits ? size->queue_ticks : size->ahead_ticks) / 4;
+    stream->lazy_ticks = 1 + size->queue_ticks / 8;
+    atomic_store(&stream->wanted, UINT64_MAX);
+    bell_create(&stream->work);
+    bell_create(&stream->pace);
     return ring_create(&stream->ring, size, err);
 }
 
 void stream_free(struct stream *stream)
 {
     ring_free(&stream->ring);
-    sem_destroy(&stream->work);
-    sem_destroy(&stream->ready);
-    sem_destroy(&stream->progress);
+    bell_free(&stream->work);
+    bell_free(&stream->pace);
 }
 
-/* all: also those that want nothing of this tick. */
-static void wake_readers(struct stream *stream, uint64_t tick, int all)
+/* Real time: those that wait for this tick. */
+static void wake_readers(struct stream *stream, uint64_t tick, int frames)
 {
+    for (uint32_t i = 0; i < stream->n_listeners; i++) {
+        struct stream_listener *listener = &stream->listener[i];
+        listener->pending |=
+            (frames && atomic_load(&listener->wants_frames)) || atomic_load(&listener->wake_tick) <= tick;
+        if (!listener->pending || tick < listener->quiet_until) continue;
+        listener->pending = 0;
+        listener->quiet_until = tick + listener->every;
+        eventfd_write(listener->fd, 1); /* a full counter is a wake-up, too */
+    }
+}
+
+static void wake_casters(struct stream *stream)
+{
+    bell_ring(&stream->work, stream->unsaid < stream->n_casters ? (uint32_t)stream->unsaid : stream->n_casters);
+    stream->unsaid = 0;
+}
+
+/* The paces that wait: readers must see empty ticks pass, too. */
+static void say_released(struct stream *stream)
+{
+    if (stream->unsaid == 0) return;
     for (uint32_t i = 0; i < stream->n_listeners; i++)
-        if (all || atomic_load(&stream->listener[i].wake_tick) <= tick)
-            eventfd_write(stream->listener[i].fd, 1); /* a full counter is a wake-up, too */
+        if (atomic_load(&stream->listener[i].wants_frames)) eventfd_write(stream->listener[i].fd, 1);
+    wake_casters(stream);
+}
+
+static void wake(struct stream *stream, uint64_t tick, int frames)
+{
+    stream->unsaid++;
+    if (!stream->waits) wake_readers(stream, tick, frames);
+    if (stream->unsaid < stream->say_ticks) return;
+    if (stream->waits)
+        say_released(stream);
+    else
+        wake_casters(stream);
 }
 
 /* Line ends get their counts of echoes; 0 says that blocks of the line are missing. */
@@ -120,18 +152,16 @@ void stream_release(struct stream *stream, struct ring_slot *slot, uint64_t tick
         kept_put(&stream->kept, frame);
     }
     slot->n_frames = stream->seq - slot->first_seq;
-    /* Where the pacing thread waits for readers, they must see empty ticks pass, too. */
-    const int all = made->len != 0 || stream->waits;
+    const int frames = made->len != 0; /* a released slot is no longer ours */
     ring_release(&stream->ring, tick);
-    wake_readers(stream, tick, all);
-    sem_post(&stream->work);
+    wake(stream, tick, frames);
 }
 
 int stream_lose(struct stream *stream, uint64_t tick)
 {
     if (!ring_lose(&stream->ring, tick)) return 0;
     stream->line_broken = 1;
-    sem_post(&stream->work);
+    wake(stream, tick, 0);
     return 1;
 }
 
@@ -148,49 +178,78 @@ int stream_has_room(const struct stream *stream, uint64_t tick)
     return 1;
 }
 
+void stream_wait_for_casters(struct stream *stream)
+{
+    say_released(stream);
+    bell_sleep(&stream->pace);
+}
+
+/* A reader that came to `wanted` rings; one that comes less far rings before it sleeps. */
 void stream_wait_for_readers(struct stream *stream, uint64_t tick)
 {
-    if (!atomic_load(&stream->ending)) {
-        sem_wait(&stream->progress);
-        return;
+    say_released(stream);
+    atomic_store(&stream->wanted, tick + 2 - stream->ring.queue_ticks + stream->ring.queue_ticks / 4);
+    if (stream_has_room(stream, tick)) {
+        /* it went on meanwhile */
+    } else if (!atomic_load(&stream->ending)) {
+        bell_sleep(&stream->pace);
+    } else if (bell_sleep_until(&stream->pace, clock_now_ns() + PATIENCE_NS)) {
+        for (int i = 0; i < RING_MAX_READERS; i++)
+            if (holds_back(stream, i, tick)) atomic_store(&stream->reader[i].active, 0);
     }
-    int64_t until_ns = clock_now_ns() + PATIENCE_NS;
-    struct timespec until = {.tv_sec = until_ns / 1000000000, .tv_nsec = until_ns % 1000000000};
-    if (sem_clockwait(&stream->progress, CLOCK_MONOTONIC, &until) == 0 || errno != ETIMEDOUT) return;
-    for (int i = 0; i < RING_MAX_READERS; i++)
-        if (holds_back(stream, i, tick)) atomic_store(&stream->reader[i].active, 0);
+    atomic_store(&stream->wanted, UINT64_MAX);
 }
 
 void stream_end(struct stream *stream)
 {
     atomic_store(&stream->over, 1);
-    wake_readers(stream, 0, 1);
+    for (uint32_t i = 0; i < stream->n_listeners; i++)
+        eventfd_write(stream->listener[i].fd, 1);
 }
 
-struct stream_listener *stream_listen(struct stream *stream, int fd)
+struct stream_listener *stream_listen(struct stream *stream, int fd, uint64_t every)
 {
     struct stream_listener *listener = &stream->listener[stream->n_listeners++];
-    listener->fd = fd;
+    *listener = (struct stream_listener){.fd = fd, .every = every};
+    atomic_store(&listener->wants_frames, 1);
     atomic_store(&listener->wake_tick, UINT64_MAX);
     return listener;
 }
 
-int stream_wake_at(struct stream *stream, struct stream_listener *listener, uint64_t tick)
+int stream_wake_at(struct stream *stream, struct stream_listener *listener, int frames, uint64_t tick)
 {
+    const int wanted = atomic_exchange(&listener->wants_frames, frames);
     atomic_store(&listener->wake_tick, tick);
-    return tick < stream_released(stream);
+    return tick < stream_released(stream) || (frames && !wanted);
 }
 
 void stream_set_reader(struct stream *stream, int reader, uint64_t cursor, int active)
 {
     atomic_store(&stream->reader[reader].active, active);
-    stream_move_reader(stream, reader, cursor);
+    atomic_store(&stream->reader[reader].cursor, cursor);
+    stream_rest_reader(stream);
 }
 
 void stream_move_reader(struct stream *stream, int reader, uint64_t cursor)
 {
-    atomic_store(&stream->reader[reader].cursor, cursor);
-    if (stream->waits) sem_post(&stream->progress);
+    const uint64_t from = atomic_exchange(&stream->reader[reader].cursor, cursor);
+    const uint64_t wanted = atomic_load(&stream->wanted);
+    if (from < wanted && wanted <= cursor) bell_ring(&stream->pace, 1);
+}
+
+void stream_rest_reader(struct stream *stream)
+{
+    if (atomic_load(&stream->wanted) != UINT64_MAX) bell_ring(&stream->pace, 1);
+}
+
+void stream_wait_for_work(struct stream *stream)
+{
+    bell_sleep(&stream->work);
+}
+
+void stream_say_ready(struct stream *stream)
+{
+    bell_ring(&stream->pace, 1);
 }
 
 uint64_t stream_released(const struct stream *stream)
@@ -212,10 +271,6 @@ uint64_t stream_pass(struct stream *stream, uint64_t total_ns)
 
 void stream_poke(struct stream *stream)
 {
-    for (uint32_t i = 0; i < stream->n_casters; i++)
-        sem_post(&stream->work);
-    if (stream->waits) {
-        sem_post(&stream->ready);
-        sem_post(&stream->progress);
-    }
+    bell_ring(&stream->work, stream->n_casters);
+    bell_ring(&stream->pace, 1);
 }

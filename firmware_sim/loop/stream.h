@@ -7,14 +7,21 @@
  * release, the time that a peer granted (pace step), and all wake-ups. It knows nothing of casting, of links
  * or of commands.
  *
+ * Who is woken, and when. In real time a link is woken at each tick that it wants; casters once a quarter of the ticks
+ * ahead is free, and the hash once an eighth of the queue was released: they have time. In the paces that wait for
+ * readers nobody waits for a single tick. There wake-ups are saved up, and ticks pass from thread to thread in
+ * batches. One rule keeps that from standing still: who is about to sleep first wakes all who may go on by what it
+ * did. Casters say what they made before they sleep, the pacing thread what it released, readers how far they are.
+ * So while all sleep, each has seen all that the others did, and nobody can go on: there is nothing to do. Batches
+ * change when a tick is read, never its bytes.
+ *
  * Units: ticks from power-up, device time in ns. */
 #ifndef FIRMWARE_SIM_LOOP_STREAM_H
 #define FIRMWARE_SIM_LOOP_STREAM_H
 
-#include <semaphore.h>
-
 #include "drivers/link/link.h"
 #include "firmware_sim/device/device.h"
+#include "firmware_sim/loop/bell.h"
 #include "firmware_sim/loop/kept.h"
 #include "firmware_sim/loop/ring.h"
 
@@ -35,7 +42,11 @@ struct stream_reader {
 /* An eventfd that is written to when something was released: a tick with frames, and any tick from wake_tick on. */
 struct stream_listener {
     int fd;
-    _Atomic uint64_t wake_tick; /* UINT64_MAX: frames are all it wants */
+    _Atomic int wants_frames;
+    _Atomic uint64_t wake_tick; /* UINT64_MAX: none */
+    /* of the pacing thread alone */
+    uint64_t every, quiet_until; /* so many ticks lie between two writes, at least; the first that may have one */
+    int pending;                 /* something that it wants was released since the last write */
 };
 
 struct stream {
@@ -62,27 +73,33 @@ struct stream {
     _Atomic int ending;          /* the run is to end: readers that stand still are not waited for any longer */
     _Atomic int over;            /* nothing will be released any more */
 
-    sem_t work;     /* a tick may be claimed */
-    sem_t ready;    /* a tick is ready; only in the paces that wait */
-    sem_t progress; /* a reader went on, or time was granted; likewise */
+    struct bell work;        /* for casters: a tick may be claimed */
+    struct bell pace;        /* for the pacing thread, in the paces that wait: a tick is ready, or a reader went on */
+    _Atomic uint64_t wanted; /* the pacing thread sleeps until a reader has come to this tick; UINT64_MAX: it doesn't */
+    /* of the pacing thread alone */
+    uint64_t unsaid;     /* ticks that were released, and casters (or in the paces that wait: nobody) was woken since */
+    uint64_t say_ticks;  /* when it is so many, they are */
+    uint64_t lazy_ticks; /* an eighth of the queue */
     uint32_t n_casters;
     struct stream_listener listener[STREAM_MAX_LISTENERS];
     uint32_t n_listeners;
 };
 
-/* A stream as long as `size`, in ticks of tick_ns. tick_bytes, waits, counters and n_casters are the caller's
- * to set, before any thread starts. */
+/* A stream as long as `size`, in ticks of tick_ns. The caller sets waits before; tick_bytes, counters and n_casters
+ * before any thread starts. */
 int stream_create(struct stream *stream, const struct ring_size *size, int64_t tick_ns, struct sh_err *err);
 void stream_free(struct stream *stream);
 
 /* ---- the pacing thread; real-time safe */
 /* Completes the slot's line ends and the counts of its telemetry and of a scan's end, numbers its frames, counts
- * it, publishes it and wakes readers and casters. */
+ * it, publishes it, and wakes readers and casters when it is time to. */
 void stream_release(struct stream *stream, struct ring_slot *slot, uint64_t tick, int64_t now_ns);
 /* Gives a tick up. 0 when it became ready in the same moment. */
 int stream_lose(struct stream *stream, uint64_t tick);
 /* True when every active reader has gone on so far that this tick may be released. */
 int stream_has_room(const struct stream *stream, uint64_t tick);
+/* Waits until a tick may be ready. */
+void stream_wait_for_casters(struct stream *stream);
 /* Waits until a reader went on. Once the run is to end, readers that stand still for 2 s hold back nothing
  * any more. */
 void stream_wait_for_readers(struct stream *stream, uint64_t tick);
@@ -90,15 +107,26 @@ void stream_wait_for_readers(struct stream *stream, uint64_t tick);
 void stream_end(struct stream *stream);
 
 /* ---- readers */
-/* An eventfd to be written to at each release of frames. Returns its listener. Before the pacing thread starts. */
-struct stream_listener *stream_listen(struct stream *stream, int fd);
-/* From this tick on it is written to at every tick's release, until it is told otherwise. Returns 1 when that tick was
- * released already: nobody may have written. */
-int stream_wake_at(struct stream *stream, struct stream_listener *listener, uint64_t tick);
+/* An eventfd to be written to when frames were released, in real time at most once in `every` ticks; and at the end.
+ * Returns its listener. Before the pacing thread starts. */
+struct stream_listener *stream_listen(struct stream *stream, int fd, uint64_t every);
+/* frames: whether frames are to wake it from now on. And from this tick on every tick's release does, until it is told
+ * otherwise. Returns 1 when nobody may have written for what it wants: that tick was released already, or it did not
+ * want frames before. */
+int stream_wake_at(struct stream *stream, struct stream_listener *listener, int frames, uint64_t tick);
 /* A reader begins (active) or ends, and has read everything before a tick. */
 void stream_set_reader(struct stream *stream, int reader, uint64_t cursor, int active);
-/* It has read everything before a tick. */
+/* It has read everything before a tick, and goes on. */
 void stream_move_reader(struct stream *stream, int reader, uint64_t cursor);
+/* A reader is about to sleep: what it read may let the pacing thread go on. */
+void stream_rest_reader(struct stream *stream);
+/* ---- casters */
+/* Waits until a tick may be claimed. */
+void stream_wait_for_work(struct stream *stream);
+/* Some ticks are ready: the pacing thread looks again. Not needed in real time. */
+void stream_say_ready(struct stream *stream);
+
+/* ---- any thread */
 uint64_t stream_released(const struct stream *stream);
 /* A peer grants time. Returns the sum of all grants, ns. */
 uint64_t stream_grant(struct stream *stream, uint64_t ns);

@@ -304,6 +304,7 @@ static void fill_pulses(struct worker *worker, const struct device_work *work)
         worker->stretch = SIZE_MAX;
     }
     worker->anchored = work->stretch;
+    worker->setup.sight = worker->site->station[work->station].sight; /* made anew since the station's last scan */
     worker->setup.echoes = (enum beam_select)work->echoes;
     site_set_program(worker->site, work->segment.spec.prr_uhz, &worker->setup);
     worker->setup.scan_key = rng_scan(work->station + 1, work->station_scan);

@@ -9,8 +9,17 @@ static int build(const struct site *site, const struct scene *scene, const struc
                  const struct sh_report *report, struct bvh **out, struct sh_err *err)
 {
     *out = NULL;
+    const int order = site->plan.methods.order_exactly && !site_order_can_wait(site);
     int rc = bvh_create(scene, from->centre_m, from->radius_m, site->cfg->loop.threads, report, out, err);
-    return rc == SH_OK && site->plan.methods.order_exactly ? bvh_order_exactly(*out, report, err) : rc;
+    return rc == SH_OK && order ? bvh_order_exactly(*out, report, err) : rc;
+}
+
+int site_order_bvhs(struct site *site, const struct sh_report *report, struct sh_err *err)
+{
+    int rc = SH_OK;
+    for (uint32_t i = 0; i < site->n_bvh && rc == SH_OK; i++)
+        rc = bvh_order_exactly(site->bvh[i], report, err);
+    return rc;
 }
 
 int site_build_mover_bvhs(struct site *site, const struct sh_report *report, struct sh_err *err)

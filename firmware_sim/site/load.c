@@ -123,6 +123,7 @@ static int load(struct site *site, const struct sh_report *report, struct sh_err
     if (rc == SH_OK) rc = site_warn_doubts(site, report, err); /* trying beams may take long where little is seen */
     if (rc == SH_OK) rc = site_georeference(site, report, err);
     if (rc == SH_OK) rc = site_choose_methods(site, report, err);
+    if (rc == SH_OK) rc = site_plan_sight(site, report, err);
     return rc;
 }
 
@@ -135,6 +136,7 @@ static int create(const struct config *cfg, int measures, const struct sh_report
     site->measures = measures;
     site->moving = config_head_moves(&cfg->platform);
     int rc = load(site, report, err);
+    if (rc == SH_OK && measures) rc = site_open_sights(site, 0, site->n_stations, report, err);
     if (rc == SH_OK && measures) rc = site_plan_rows(site, err);
     if (rc == SH_OK) return SH_OK;
     site_free(site);
@@ -155,6 +157,7 @@ int site_load_plan(const struct config *cfg, const struct sh_report *report, str
 void site_free(struct site *site)
 {
     if (site == NULL) return;
+    site_close_sights(site);
     free(site->direction);
     free(site->knot);
     free(site->stop);

@@ -145,13 +145,14 @@ int site_plan_rows(struct site *site, struct sh_err *err)
     bvh_get_info(site->station[0].bvh, &bvh);
     size_t n = plan_head(&head, of_head);
     free(plan->row);
-    plan->row = calloc(n + 9 + site->n_stations, sizeof *plan->row);
+    plan->row = calloc(n + 10 + site->n_stations, sizeof *plan->row);
     if (plan->row == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     plan->n = 0;
     add_emitter(site, plan);
     add_program(site, plan);
     plan_mesh(mesh_error_m(site), &plan->row[plan->n++]);
     plan_cast(bvh.packet, &plan->row[plan->n++]);
+    plan->row[plan->n++] = plan->sight;
     plan->row[plan->n++] = plan->order;
     for (size_t i = 0; i < n; i++) {
         plan->row[plan->n++] = of_head[i];
@@ -170,6 +171,6 @@ void site_plan_text(const struct site *site, char *text, size_t room)
 {
     const struct site_plan *plan = &site->plan;
     int polar = site->cfg->output.layout == LINE_POLAR;
-    snprintf(text, room, "order %s; beam %s; optics %s; georef %s", plan->order.method, plan->beam.method,
-             plan->optics.method, polar ? "none" : site->station[0].plan.method);
+    snprintf(text, room, "sight %s; order %s; beam %s; optics %s; georef %s", plan->sight.method, plan->order.method,
+             plan->beam.method, plan->optics.method, polar ? "none" : site->station[0].plan.method);
 }

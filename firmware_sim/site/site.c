@@ -129,6 +129,7 @@ void site_cast_setup(const struct site *site, uint32_t station, struct cast_setu
     const struct site_station *s = &site->station[station];
     memset(setup, 0, sizeof *setup);
     setup->bvh = s->bvh;
+    setup->sight = s->sight;
     setup->georef = s->georef;
     memcpy(setup->station_m, s->at.position_m, sizeof setup->station_m);
     memcpy(setup->rotation, s->at.rotation, sizeof setup->rotation);

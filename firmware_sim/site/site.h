@@ -21,6 +21,7 @@ struct site_leg {
 struct site_station {
     const struct config_station *station; /* of the configuration, or of stops */
     struct bvh *bvh;                      /* shared where stations are near each other */
+    struct sight *_Atomic sight;          /* what it sees; NULL: rays go to the BVH (site_open_sights) */
     struct georef *georef;
     struct placement at;
     struct cast_beam *beam;         /* NULL: one ray per pulse */
@@ -55,7 +56,8 @@ struct site_detect {
 /* What was planned. Scans take their methods from here alone. */
 struct site_plan {
     struct plan_methods methods;
-    struct plan_row order, beam, optics;
+    struct plan_row sight, order, beam, optics;
+    double sight_rays;    /* of a map: what its cells follow (sight_spec) */
     struct plan_row *row; /* `plan`: all stages in their order, then the total; else NULL */
     size_t n;
 };
@@ -108,6 +110,14 @@ int site_load(const struct config *cfg, const struct sh_report *report, struct s
 /* The same for `plan`: site->plan.row is filled, with bounds also of what is forced. */
 int site_load_plan(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err);
 void site_free(struct site *site);
+
+/* A site holds the maps of so many stations at a time. Where there are more, a run has none, and a recording
+ * that of the station at hand; whether a map is used then changes no hit. */
+enum { SITE_MAX_SIGHTS = 16 };
+
+/* Makes the maps of n stations from `first` on, where the plan says so, and gives back those of others. Before
+ * their scans, and while none is on: casters take the map with the station's setup. */
+int site_open_sights(struct site *site, uint32_t first, uint32_t n, const struct sh_report *report, struct sh_err *err);
 
 /* The grid of output.crs utm, as georef_spec has it: one for all stations of an anchored scene, that of the
  * anchor or of the first station, unless output.utm_zone or the scene's own grid says it; else by position.

@@ -52,6 +52,9 @@ struct site_sphere {
 int site_add_bvh(struct site *site, const struct site_sphere *from, const struct sh_report *report, struct bvh **out,
                  struct sh_err *err);
 
+/* Orders the surfaces of all of them in double, where that was put off (site_order_can_wait). */
+int site_order_bvhs(struct site *site, const struct sh_report *report, struct sh_err *err);
+
 /* Once the order of surfaces is planned and all stations are placed. */
 int site_build_mover_bvhs(struct site *site, const struct sh_report *report, struct sh_err *err);
 /* For heads that stand; stations near each other share one. */
@@ -89,6 +92,36 @@ void site_look_open(struct site_look *look, const struct site *site);
  * optics, and makes the stations' beams. Warns where nothing holds the tolerances. For `plan`
  * (site->measures) the error of what is forced is measured, too. */
 int site_choose_methods(struct site *site, const struct sh_report *report, struct sh_err *err);
+
+/* ---- view.c: the directions that a station's rays may go to. */
+
+enum { SITE_VIEW_BANDS = EMITTER_MAX_BEAMS };
+struct site_view {
+    double rotation[9]; /* socs -> prcs */
+    double margin_rad;  /* rays may go so far beyond the bands */
+    uint32_t n;
+    struct site_band {
+        double low_rad, high_rad;           /* elevation, socs */
+        double azimuth_rad, azimuth_to_rad; /* middle, and how far to both sides; pi: all around */
+    } band[SITE_VIEW_BANDS];
+};
+
+/* For the settings at power-up. */
+void site_view_of(const struct site *site, uint32_t station, struct site_view *view);
+/* As sight_spec's sees; ctx: the view. */
+int site_view_sees(const void *ctx, const double dir[3], double radius_rad);
+/* Of all directions, the share within radius_rad of those that it sees. */
+double site_view_share(const struct site_view *view, double radius_rad);
+
+/* ---- sights.c: maps of what the stations see: whether one is made, and making it. */
+
+/* Before BVHs are built: whether bvh_order_exactly, if planned, waits until it is known that no sight takes its
+ * place. So it is where each ray is a first hit of what stands still. */
+int site_order_can_wait(const struct site *site);
+/* Beam and optics are chosen. Sets site->plan.methods.sight and the row, and where order comes free, the row of
+ * the order. Orders BVHs that have waited for that in vain. */
+int site_plan_sight(struct site *site, const struct sh_report *report, struct sh_err *err);
+void site_close_sights(struct site *site);
 
 /* ---- doubts.c: what is allowed, and hardly meant. Once the scene has its BVHs. */
 

@@ -1,0 +1,38 @@
+/* A room full of what a sight must get right, and two casts of it: one asks the BVH for each ray, one has a sight. */
+#ifndef TESTS_ACCURACY_SEEN_ROOM_H
+#define TESTS_ACCURACY_SEEN_ROOM_H
+
+#include "core/cast.h"
+#include "core/surface.h"
+#include "tests/common/cases.h"
+
+/* Labels: walls, a pane, a mirror, and 12 kinds of things. */
+enum { ROOM_WALL, ROOM_PANE, ROOM_MIRROR, ROOM_THING, ROOM_LABELS = ROOM_THING + 12 };
+enum { ROOM_LINES = 24, ROOM_PULSES = 1500 };
+
+struct seen_room {
+    struct scene *scene, *body_scene; /* a box that moves */
+    struct bvh *bvh, *ordered;        /* of the same scene; ordered exactly */
+    struct bvh *body;
+    struct sight *sight, *exact; /* of bvh; of ordered, exact */
+    struct georef *georef;
+    struct surface_table table;
+    uint16_t kind[ROOM_LABELS];
+    struct beam_outlines *outlines;
+    struct cast_beam beam;
+    struct schedule_segment segment;
+    struct cast_setup setup; /* single rays, polar, no noise, without sight */
+    /* 0: without sight, 1: with */
+    struct caster *caster[2];
+    struct line_block block[2];
+};
+
+/* Things, overlaps, needles, pairs of faces that lie less apart than float resolves, a hole to the outside;
+ * everything around at_m. */
+void seen_room_open(struct seen_room *room, uint64_t seed, const double at_m[3]);
+void seen_room_close(struct seen_room *room);
+
+/* Casts all lines both ways: what is told must be the same, bit by bit. Returns the number of echoes. */
+uint64_t seen_room_compare(struct seen_room *room, const struct cast_setup *without, const struct cast_setup *with);
+
+#endif

@@ -1,0 +1,28 @@
+/* Scenes of a few triangles, put together at random from what is hard to see rightly: needles, slivers, faces
+ * that overlap, cross, stand twice or lie next to each other, folds, boxes in boxes, giants beside dwarfs;
+ * and a station, now and then on a face, in its plane, or in line with an edge. */
+#ifndef TESTS_COMMON_ODD_SCENES_H
+#define TESTS_COMMON_ODD_SCENES_H
+
+#include <stdint.h>
+
+#include "core/scene.h"
+
+enum { ODD_MOST = 400, ODD_LABELS = 5, ODD_PARTS = 18 };
+
+struct odd_scene {
+    double corner[ODD_MOST][3][3]; /* prcs */
+    uint16_t label[ODD_MOST];
+    uint32_t n;
+    double station_m[3];
+    uint32_t parts;  /* a bit for each kind of part that is in it */
+    char stands[24]; /* where the station is */
+};
+
+/* The same number gives the same scene. at_most: triangles, up to ODD_MOST; the last part may be cut short. */
+void odd_scene_make(uint64_t number, uint32_t at_most, struct odd_scene *out);
+const char *odd_part_name(int part);
+/* Its triangles, those without area left out. weld: equal corners become one vertex. */
+int odd_scene_build(const struct odd_scene *odd, int weld, struct scene **out, struct sh_err *err);
+
+#endif

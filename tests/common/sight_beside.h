@@ -1,0 +1,39 @@
+/* A sight beside the BVH that it was made for: the same rays through both, and each bit compared. */
+#ifndef TESTS_COMMON_SIGHT_BESIDE_H
+#define TESTS_COMMON_SIGHT_BESIDE_H
+
+#include "core/sight.h"
+
+enum { SIGHT_BESIDE_KEPT = 8 };
+
+/* A ray that they disagree about: [0] is the BVH's, [1] the sight's. */
+struct sight_difference {
+    double dir[3], range_m[2];
+    uint32_t triangle[2], label[2];
+    float steep[2];
+};
+
+struct sight_beside {
+    const struct bvh *bvh; /* what the sight is compared with */
+    struct sight *sight;
+    struct sight_info info;
+    double station_m[3];
+    uint64_t rays, hits, few, asked;
+    uint64_t differ;                                 /* rays of which any bit differs; NaN is NaN, whatever its bits */
+    struct sight_difference kept[SIGHT_BESIDE_KEPT]; /* the first of them */
+    struct sight_work *work;
+    struct bvh_work *bvh_work;
+};
+
+/* The sight of spec; its hits are compared with those of `bvh`: spec->bvh itself, or where spec->exact is set
+ * one over the same scene that orders exactly. */
+int sight_beside_create(const struct sight_spec *spec, const struct bvh *bvh, struct sight_beside *out,
+                        struct sh_err *err);
+void sight_beside_free(struct sight_beside *beside);
+/* range_m and triangle: what the sight says of each; NULL: not wanted. */
+void sight_beside_cast(struct sight_beside *beside, uint32_t n, const struct vec3_in *dir, double range_max_m,
+                       double *range_m, uint32_t *triangle);
+/* What there is to say of the first rays that differ, on standard output, as TAP comments. */
+void sight_beside_print(const struct sight_beside *beside);
+
+#endif

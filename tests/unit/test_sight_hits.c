@@ -1,0 +1,377 @@
+/* A sight's hits are those of the BVH, bit by bit: random scenes with all that makes surfaces hard to order, and rays
+ * aimed at edges, corners and the borders of the map's cells. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/sight.h"
+#include "core/vec3.h"
+#include "tests/common/cases.h"
+
+#ifndef SCENES
+#define SCENES 24 /* of each kind */
+#endif
+enum { MOST = 400, RAYS = 6001, SHOWN = 40 };
+
+/* A scene is put together triangle by triangle; corners in one place are one vertex. */
+struct soup {
+    double vertex[3 * MOST][3];
+    uint32_t triangle[MOST][3];
+    uint16_t label[MOST];
+    uint32_t n_vertices, n;
+};
+
+static double between(uint64_t *state, double lo, double hi)
+{
+    return lo + (hi - lo) * case_unit(state);
+}
+
+static uint32_t add_vertex(struct soup *s, const double p[3])
+{
+    for (uint32_t i = 0; i < s->n_vertices; i++)
+        if (memcmp(s->vertex[i], p, sizeof s->vertex[i]) == 0) return i;
+    memcpy(s->vertex[s->n_vertices], p, sizeof s->vertex[0]);
+    return s->n_vertices++;
+}
+
+static void add(struct soup *s, const double a[3], const double b[3], const double c[3])
+{
+    if (s->n == MOST) return;
+    s->label[s->n] = (uint16_t)(s->n % 5);
+    const uint32_t t[3] = {add_vertex(s, a), add_vertex(s, b), add_vertex(s, c)};
+    if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) return;
+    memcpy(s->triangle[s->n++], t, sizeof t);
+}
+
+static void any_point(uint64_t *state, double half, double p[3])
+{
+    for (int k = 0; k < 3; k++)
+        p[k] = between(state, -half, half);
+}
+
+static void near_point(uint64_t *state, const double at[3], double most, double p[3])
+{
+    any_point(state, most, p);
+    vec3_add(p, at, p);
+}
+
+/* Triangles anywhere, of all sizes; every third one a needle. */
+static void soup_of_any(struct soup *s, uint64_t *state)
+{
+    const uint32_t n = (uint32_t)case_between(state, 2, 300);
+    for (uint32_t i = 0; i < n; i++) {
+        double a[3], b[3], c[3], size = exp(between(state, -5.0, 2.5));
+        any_point(state, 10.0, a);
+        near_point(state, a, size, b);
+        near_point(state, i % 3 == 0 ? b : a, i % 3 == 0 ? size * exp(between(state, -12.0, -1.0)) : size, c);
+        add(s, a, b, c);
+    }
+}
+
+/* Sheets in common planes, cut into triangles in different ways, some of them faces that stand there already. */
+static void soup_of_overlaps(struct soup *s, uint64_t *state)
+{
+    const uint32_t sheets = (uint32_t)case_between(state, 2, 30);
+    const double tilt = case_between(state, 0, 1) ? 0.0 : 0.37;
+    for (uint32_t i = 0; i < sheets; i++) {
+        const int axis = (int)case_between(state, 0, 2);
+        const double at = 0.5 * (double)case_between(state, -8, 8), x0 = 0.25 * (double)case_between(state, -20, 16),
+                     y0 = 0.25 * (double)case_between(state, -20, 16), w = 0.25 * (double)case_between(state, 1, 24),
+                     h = 0.25 * (double)case_between(state, 1, 24);
+        double corner[4][3];
+        for (int k = 0; k < 4; k++) {
+            const double x = x0 + (k == 1 || k == 2 ? w : 0.0), y = y0 + (k >= 2 ? h : 0.0);
+            corner[k][axis] = at + tilt * x;
+            corner[k][(axis + 1) % 3] = x;
+            corner[k][(axis + 2) % 3] = y;
+        }
+        add(s, corner[0], corner[1], corner[2]);
+        add(s, corner[0], corner[2], corner[3]);
+        if (case_between(state, 0, 3) == 0) add(s, corner[2], corner[0], corner[1]); /* twice */
+        if (case_between(state, 0, 3) == 0) add(s, corner[1], corner[3], corner[0]);
+    }
+}
+
+/* Sheets one after the other, as near as float can hardly tell them apart. */
+static void soup_of_layers(struct soup *s, uint64_t *state)
+{
+    const uint32_t n = (uint32_t)case_between(state, 2, 60);
+    double a[3], b[3], c[3];
+    for (uint32_t i = 0; i < n; i++) {
+        if (i % 6 == 0) {
+            any_point(state, 8.0, a);
+            any_point(state, 8.0, b);
+            any_point(state, 8.0, c);
+        }
+        const double gap = exp(between(state, -32.0, -9.0));
+        double p[3], q[3], r[3];
+        near_point(state, a, gap, p);
+        near_point(state, b, gap, q);
+        near_point(state, c, gap, r);
+        add(s, p, q, r);
+    }
+}
+
+/* Sheets that are folded at shared edges and corners, at all angles. */
+static void soup_of_folds(struct soup *s, uint64_t *state)
+{
+    const uint32_t n = (uint32_t)case_between(state, 1, 40);
+    for (uint32_t i = 0; i < n; i++) {
+        double a[3], b[3], c[3], d[3], e[3];
+        any_point(state, 8.0, a);
+        any_point(state, 8.0, b);
+        any_point(state, 8.0, c);
+        near_point(state, c, exp(between(state, -12.0, 2.0)), d);
+        near_point(state, b, exp(between(state, -12.0, 2.0)), e);
+        add(s, a, b, c);
+        add(s, d, b, a);
+        if (i % 2 == 0) add(s, e, d, a);
+    }
+}
+
+/* Boxes with common corners and faces, some within others. */
+static void soup_of_boxes(struct soup *s, uint64_t *state)
+{
+    static const int face[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+    const uint32_t n = (uint32_t)case_between(state, 1, 24);
+    for (uint32_t i = 0; i < n; i++) {
+        double lo[3], hi[3], corner[8][3];
+        for (int k = 0; k < 3; k++) {
+            lo[k] = 0.5 * (double)case_between(state, -12, 8);
+            hi[k] = lo[k] + 0.5 * (double)case_between(state, 1, 12);
+        }
+        for (int c = 0; c < 8; c++)
+            for (int k = 0; k < 3; k++)
+                corner[c][k] = c >> k & 1 ? hi[k] : lo[k];
+        for (int f = 0; f < 12; f++)
+            add(s, corner[face[f][0]], corner[face[f][1]], corner[face[f][2]]);
+    }
+}
+
+static void (*const KINDS[])(struct soup *, uint64_t *) = {soup_of_any, soup_of_overlaps, soup_of_layers, soup_of_folds,
+                                                           soup_of_boxes};
+enum { N_KINDS = sizeof KINDS / sizeof *KINDS };
+
+struct hits {
+    double range_m[RAYS];
+    uint32_t triangle[RAYS], label[RAYS];
+    float steep[RAYS];
+};
+
+struct rig {
+    struct soup soup;
+    struct scene *scene;
+    struct bvh *bvh, *ordered;
+    struct sight *sight, *exact;
+    struct bvh_work *work;
+    struct sight_work *sight_work;
+    double station_m[3], off_m[3];
+    double x[RAYS], y[RAYS], z[RAYS];
+    struct hits want, got;
+    uint64_t differ, few, asked;
+};
+
+static void check(int rc, const struct sh_err *err)
+{
+    if (rc != SH_OK) fail_msg("%s", err->text);
+}
+
+static struct sight *make_sight(const struct rig *r, int exact, double rays, uint64_t memory_bytes)
+{
+    struct sh_err err;
+    struct sight *sight;
+    const struct sight_spec spec = {.bvh = r->bvh,
+                                    .station_m = {r->station_m[0], r->station_m[1], r->station_m[2]},
+                                    .rays = rays,
+                                    .memory_bytes = memory_bytes,
+                                    .exact = exact};
+    check(sight_create(&spec, 1, NULL, &sight, &err), &err);
+    return sight;
+}
+
+static void open_rig(struct rig *r, double reach_m, double rays)
+{
+    struct sh_err err;
+    double origin_m[3];
+    for (uint32_t i = 0; i < r->soup.n_vertices; i++)
+        vec3_add(r->soup.vertex[i], r->off_m, r->soup.vertex[i]);
+    vec3_add(r->station_m, r->off_m, r->station_m);
+    const struct scene_surface surface[5] = {
+        {.object = "a"}, {.object = "b"}, {.object = "c"}, {.object = "d"}, {.object = "e"}};
+    const struct scene_arrays arrays = {(const double(*)[3])r->soup.vertex,
+                                        r->soup.n_vertices,
+                                        (const uint32_t(*)[3])r->soup.triangle,
+                                        r->soup.n,
+                                        r->soup.label,
+                                        surface,
+                                        5};
+    check(scene_from_arrays(&arrays, &r->scene, &err), &err);
+    memcpy(origin_m, r->station_m, sizeof origin_m);
+    origin_m[0] += 0.5 * reach_m;
+    check(bvh_create(r->scene, origin_m, reach_m, 1, NULL, &r->bvh, &err), &err);
+    check(bvh_create(r->scene, origin_m, reach_m, 1, NULL, &r->ordered, &err), &err);
+    check(bvh_order_exactly(r->ordered, NULL, &err), &err);
+    r->sight = make_sight(r, 0, rays, 16 << 20);
+    r->exact = make_sight(r, 1, rays, 16 << 20);
+    check(bvh_work_create(&r->work, &err), &err);
+    check(sight_work_create(&r->sight_work, &err), &err);
+}
+
+static void close_rig(struct rig *r)
+{
+    r->few += sight_work_counters(r->sight_work)->few;
+    r->asked += sight_work_counters(r->sight_work)->asked;
+    sight_work_free(r->sight_work);
+    bvh_work_free(r->work);
+    sight_free(r->exact);
+    sight_free(r->sight);
+    bvh_free(r->ordered);
+    bvh_free(r->bvh);
+    scene_free(r->scene);
+}
+
+static void aim(struct rig *r, uint32_t i, const double d[3])
+{
+    const double length = vec3_length(d);
+    r->x[i] = d[0] / length;
+    r->y[i] = d[1] / length;
+    r->z[i] = d[2] / length;
+}
+
+/* Some units of the last place away. */
+static double shaken(double x, uint64_t *state)
+{
+    for (int64_t k = case_between(state, -4, 4); k != 0; k += k < 0 ? 1 : -1)
+        x = nextafter(x, k < 0 ? -INFINITY : INFINITY);
+    return x;
+}
+
+/* The border of a cell, for any number of cells up to 2,048; on the borders of faces, too. */
+static void aim_at_cell(struct rig *r, uint32_t i, uint64_t *state)
+{
+    const int axis = (int)case_between(state, 0, 2), both = (int)case_between(state, 0, 1);
+    double d[3], u = (double)case_between(state, -64, 64) / 64.0;
+    d[axis] = case_between(state, 0, 1) ? 1.0 : -1.0;
+    d[(axis + 1) % 3] = shaken(u, state);
+    d[(axis + 2) % 3] = both ? shaken((double)case_between(state, -1024, 1024) / 1024.0, state) : between(state, -1, 1);
+    if (case_between(state, 0, 1)) { /* without the division that would shift it */
+        r->x[i] = d[0];
+        r->y[i] = d[1];
+        r->z[i] = d[2];
+    }
+    aim(r, i, d);
+}
+
+/* At a corner, an edge or the inside of a triangle, to the last places. */
+static void aim_at_triangle(struct rig *r, uint32_t i, uint64_t *state)
+{
+    const struct soup *s = &r->soup;
+    const uint32_t *t = s->triangle[case_between(state, 0, (int64_t)s->n - 1)], k = (uint32_t)case_between(state, 0, 2);
+    const double *a = s->vertex[t[k]], *b = s->vertex[t[(k + 1) % 3]], *c = s->vertex[t[(k + 2) % 3]];
+    const int64_t how = case_between(state, 0, 2);
+    const double p = how == 0 ? 0.0 : case_unit(state), q = how == 2 ? (1.0 - p) * case_unit(state) : 0.0;
+    double d[3];
+    for (int j = 0; j < 3; j++)
+        d[j] = shaken(a[j] + p * (b[j] - a[j]) + q * (c[j] - a[j]) - r->station_m[j], state);
+    aim(r, i, d);
+}
+
+static void aim_all(struct rig *r, uint64_t *state)
+{
+    for (uint32_t i = 0; i < RAYS; i++) {
+        double d[3];
+        any_point(state, 1.0, d);
+        aim(r, i, d);
+        if (i % 4 == 1) aim_at_cell(r, i, state);
+        if (i % 4 >= 2) aim_at_triangle(r, i, state);
+    }
+}
+
+static struct bvh_rays rays_of(struct rig *r, struct hits *hits, uint32_t n)
+{
+    memset(hits, 0xee, sizeof *hits);
+    return (struct bvh_rays){.n = n,
+                             .from.at_m = {r->station_m[0], r->station_m[1], r->station_m[2]},
+                             .dir = {r->x, r->y, r->z},
+                             .range_max_m = 1000.0,
+                             .range_m = hits->range_m,
+                             .triangle = hits->triangle,
+                             .label = hits->label,
+                             .steep = hits->steep};
+}
+
+static int same_double(double a, double b)
+{
+    return memcmp(&a, &b, sizeof a) == 0 || (isnan(a) && isnan(b));
+}
+
+static void compare(struct rig *r, const char *what, uint32_t n)
+{
+    for (uint32_t i = 0; i < n; i++) {
+        const struct hits *w = &r->want, *g = &r->got;
+        if (same_double(w->range_m[i], g->range_m[i]) && w->triangle[i] == g->triangle[i] &&
+            w->label[i] == g->label[i] && same_double((double)w->steep[i], (double)g->steep[i]))
+            continue;
+        if (r->differ++ < SHOWN)
+            print_message("%s, ray %u (%.17g %.17g %.17g): triangle %u at %.17g, label %u, steep %.9g; by sight %u at "
+                          "%.17g, %u, %.9g\n",
+                          what, i, r->x[i], r->y[i], r->z[i], w->triangle[i], w->range_m[i], w->label[i],
+                          (double)w->steep[i], g->triangle[i], g->range_m[i], g->label[i], (double)g->steep[i]);
+    }
+}
+
+/* All rays, at once, by both. */
+static void cast_both(struct rig *r, const char *what, const struct bvh *bvh, const struct sight *sight, uint32_t n)
+{
+    const struct bvh_rays want = rays_of(r, &r->want, n), got = rays_of(r, &r->got, n);
+    bvh_hits(r->work, bvh, &want);
+    sight_hits(r->sight_work, r->work, sight, &got);
+    compare(r, what, n);
+}
+
+static void run_kind(struct rig *r, uint32_t kind, uint64_t seed)
+{
+    static const double far_m[3] = {512345.678, 5412345.678, 321.5};
+    uint64_t state = seed * 2 + 1;
+    for (int k = 0; k < 8; k++)
+        case_u64(&state);
+    r->soup.n = r->soup.n_vertices = 0;
+    KINDS[kind](&r->soup, &state);
+    any_point(&state, case_between(&state, 0, 1) ? 2.0 : 12.0, r->station_m);
+    if (case_between(&state, 0, 3) == 0)
+        for (int k = 0; k < 3; k++)
+            r->station_m[k] = 0.5 * round(2.0 * r->station_m[k]); /* in planes and edges of boxes */
+    for (int k = 0; k < 3; k++)
+        r->off_m[k] = case_between(&state, 0, 3) == 0 ? far_m[k] : 0.0;
+    if (r->soup.n == 0) return;
+    open_rig(r, case_between(&state, 0, 1) ? 0.0 : 5.0, exp(between(&state, 5.0, 17.0)));
+    aim_all(r, &state);
+    const uint64_t before = r->differ;
+    cast_both(r, "float order", r->bvh, r->sight, RAYS);
+    cast_both(r, "exact order", r->ordered, r->exact, RAYS);
+    if (r->differ != before) print_message("kind %u, seed %llu\n", kind, (unsigned long long)seed);
+    close_rig(r);
+}
+
+static void hits_are_those_of_the_bvh(void **state)
+{
+    (void)state;
+    static struct rig r;
+    for (uint32_t kind = 0; kind < N_KINDS; kind++) {
+        r.few = r.asked = 0;
+        for (uint64_t seed = 0; seed < SCENES; seed++)
+            run_kind(&r, kind, 1000 * kind + seed);
+        print_message("kind %u: %.2f %% of the rays few, %.2f %% asked\n", kind,
+                      100.0 * (double)r.few / (2.0 * SCENES * RAYS), 100.0 * (double)r.asked / (2.0 * SCENES * RAYS));
+    }
+    assert_int_equal(r.differ, 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(hits_are_those_of_the_bvh),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
