@@ -61,7 +61,7 @@ VEC_INLINE uint32_t refine(const struct bvh_proposals *p, enum how how, int judg
     const double *px = p->own.x, *py = p->own.y, *pz = p->own.z, ox = p->o[0], oy = p->o[1], oz = p->o[2];
     const uint32_t n_triangles = p->bvh->scene->n_triangles, n = p->n, *prim = p->prim;
     const float *u = p->u, *v = p->v;
-    const int slanted = how != FROM_ONE || p->bvh->station_reach_m > 0.0;
+    const int slanted = p->bvh->station_reach_m > 0.0;
     double *range_m = p->range_m;
     float *steep = p->steep;
     uint32_t *label = p->label, *doubt = p->doubt, doubts = 0;
