@@ -23,7 +23,7 @@ enum {
     SIGHT_BLOCK = SIGHT_TILE * SIGHT_TILE,
     SIGHT_MIN_CELLS = 64,
     SIGHT_MAX_CELLS = 2048, /* a cell is then a thousand times its pad */
-    SIGHT_MAX_LIST = 12,
+    SIGHT_MAX_LIST = 32,
 };
 /* Of the coordinates on a face: 8 times what single precision leaves of them. */
 #define SIGHT_PAD 0x1p-20
