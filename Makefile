@@ -124,7 +124,7 @@ $(BUILD)/scanhead: $(BUILD)/firmware_sim/main.c.o $(BUILD)/modules.a
 #   benches.a   what the programs of tests/bench share                      build/bench and the charts'
 #   its rigs    tests/unit/cast_rig.c where it includes cast_rig.h          tests of a folder; tests/rigs.sh finds which
 #   modules.a   the head, without main.c                                    all of them
-FIGURES = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_georef chart_widths beam plain velodyne loop_cost)
+FIGURES = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_sight chart_georef chart_widths beam plain velodyne loop_cost)
 BENCH_MAINS = $(FIGURES:$(BUILD)/%=%.c) tests/bench/bench.c
 COMMON = $(wildcard tests/common/*.c)
 BENCHES = $(filter-out $(BENCH_MAINS),$(wildcard tests/bench/*.c))
@@ -246,7 +246,7 @@ bench: deps-build
 	@$(BUILD)/bench --scenes 10k,100k,1M,10M,house,garden --leaks 1e8 -o $(BUILD)/bench.json
 # Each program of the chart writes its panel's rows; the first one the head of the table.
 CHART = $(BUILD)/chart/speed_accuracy
-CHARTS = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_georef chart_widths beam)
+CHARTS = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_sight chart_georef chart_widths beam)
 # Footprints: cost, and error against 1,000 sub-rays; a few minutes.
 bench-beam: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/beam
@@ -269,6 +269,7 @@ chart: deps-build
 	@$(MAKE) --no-print-directory -j2 $(CHARTS)
 	@mkdir -p $(BUILD)/chart
 	$(BUILD)/tests/bench/chart > $(CHART).csv
+	$(BUILD)/tests/bench/chart_sight >> $(CHART).csv
 	$(BUILD)/tests/bench/chart_georef >> $(CHART).csv
 	$(BUILD)/tests/bench/chart_widths >> $(CHART).csv
 	$(BUILD)/tests/bench/beam --chart house wires foliage >> $(CHART).csv

@@ -101,7 +101,8 @@ struct caster {
     struct sub_ray_work *sub_rays; /* touched only where pulses have a footprint */
     struct bvh_profile *profile;
     struct cast_counters counters;
-    struct chunk_vectors d; /* direction of the beam, prcs */
+    struct kernel_steps steps; /* of the run at hand */
+    struct chunk_vectors d;    /* direction of the beam, prcs */
     uint32_t hit[CHUNK_ROOM];
     uint8_t body[CHUNK];
     struct echo_list list;
