@@ -14,6 +14,7 @@ pulses(s, f) = table(in_panel("pulses", s), family . last_word . "if (f == \"" .
 planned(s) = table(in_panel("pulses", s) . " && $8 == 1", last_word . "print w[n] \",\" $4")
 array line[3] = ["float", "decided", "sight"]
 array line_like[3] = [2, 5, 6]
+named(f) = f eq "decided" ? "BVH, decided" : f
 n_rows = 3
 
 do for [out in "svg png"] {
@@ -22,11 +23,11 @@ do for [out in "svg png"] {
     set multiplot
     eval place(0, n_rows)
     eval legend_on
-    set key center center horizontal maxrows 2 samplen 1.6 spacing 1.35 width 1
+    set key at graph 0.5, graph 0.95 center top horizontal maxrows 2 samplen 1.6 spacing 1.35 width 1
     set label 1 "Symbol: 99.9 % of the errors are smaller. Bar: up to the largest one; a miss is wrong by its whole range.\n" \
         . "Along a line, from the left: 16, 8, 4 and 1 rays in a packet. Further left is faster, further down more exact." \
-        at screen 0.5, screen 1 - 190.0 / (head + n_rows * high) center font ",17"
-    plot for [k = 1:n] NaN with linespoints lw 2 pt symbol[k] ps 2.6 lc rgb colour[k] title word(families, k), \
+        at screen 0.5, screen 1 - 158.0 / (head + n_rows * high) center font ",17"
+    plot for [k = 1:n] NaN with linespoints lw 2 pt symbol[k] ps 2.6 lc rgb colour[k] title named(word(families, k)), \
         NaN with lines lc rgb "#000000" lw 3 dt 2 title "front", \
         NaN with points pt 6 ps 5 lw 3.5 lc rgb "#000000" title "default"
     unset label 1
@@ -40,7 +41,6 @@ do for [out in "svg png"] {
         set title title[i] offset 0, -0.4
         set xrange [*:*]
         set yrange [*:*]
-        stats marked(s, 1 == 1 ? 7 : 7) using 1:2 nooutput name "front"
         stats table(in_panel("cast", s), ns_error) using 1:2 nooutput name "low"
         stats table(in_panel("cast", s), ns_error) using 1:3 nooutput name "high"
         set xrange [low_min_x / 1.3 : low_max_x * 1.2]
@@ -50,7 +50,7 @@ do for [out in "svg png"] {
             for [k = 1:n] of(s, word(families, k)) using 1:2:2:3 with yerrorbars pt symbol[k] ps 2.2 lw 1.5 lc rgb colour[k], \
             marked(s, 8) using 1:2 with points pt 6 ps 5 lw 3.5 lc rgb "#000000"
     }
-    set xlabel "pulses of a scan"
+    set xlabel "pulses of a scan" offset 0, 0.5
     set ylabel "ns per pulse"
     set format x "10^{%T}"
     set format y "%g"
@@ -70,5 +70,4 @@ do for [out in "svg png"] {
     unset output
     set format x "%h"
     set format y "10^{%T}"
-    set xlabel "ns per pulse, one thread"
 }

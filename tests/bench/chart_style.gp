@@ -13,8 +13,6 @@ in_panel(panel, scene) = "$1 == \"" . panel . "\" && $3 == \"" . scene . "\""
 
 array colour[8] = ["#d55e00", "#e69f00", "#0072b2", "#56b4e9", "#7a7a7a", "#009e73", "#cc79a7", "#000000"]
 array symbol[8] = [8, 9, 6, 7, 13, 5, 11, 3]
-array units[4]
-units[1] = 1; units[2] = 2; units[3] = 5
 
 set style line 20 lc rgb "#dddddd" lw 1
 set border lw 1.5
@@ -22,13 +20,11 @@ set tics scale 0.8
 set logscale xy
 set format y "10^{%T}"
 set grid xtics ytics ls 20
-set xlabel "ns per pulse, one thread" offset 0, 0.4
-set ylabel offset 0.6, 0
 unset key
 
 # A picture of two columns: a legend on top, then so many rows of plots. All in pixels.
 wide = 1800.0
-head = 240.0
+head = 215.0
 high = 620.0
 size_of(n_rows) = sprintf("%d, %d", wide, head + n_rows * high)
 terminal(out, n_rows) = out eq "svg" ? \
@@ -41,5 +37,6 @@ place(p, n_rows) = p == 0 ? \
         (n_rows - 1 - (p - 1) / 2) * high / (head + n_rows * high), high / (head + n_rows * high))
 legend_on = "unset border; unset tics; unset xlabel; unset ylabel; unset grid; unset logscale; " \
     . "set xrange [0:1]; set yrange [0:1]; set lmargin 0; set rmargin 0; set tmargin 0; set bmargin 0"
-legend_off = "set border lw 1.5; set tics scale 0.8; set grid xtics ytics ls 20; set logscale xy; unset key; " \
-    . "set lmargin 9; set rmargin 1.5; set tmargin 2.2; set bmargin 3.4"
+legend_off = "set border 31 lw 1.5; set tics scale 0.8; set grid xtics ytics ls 20; set logscale xy; unset key; " \
+    . "set lmargin 9; set rmargin 1.5; set tmargin 2.2; set bmargin 3.4; " \
+    . "set xlabel 'ns per pulse, one thread' offset 0, 0.5"
