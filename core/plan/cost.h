@@ -16,11 +16,10 @@
 #define PLAN_COST_SIGHT_ONE 5.0   /* looked up: one triangle or nothing there, */
 #define PLAN_COST_SIGHT_FEW 50.0  /* one of a few, */
 #define PLAN_COST_SIGHT_ASK 220.0 /* the BVH is asked after all: such rays have nothing in common */
-/* To make it: in any case, a triangle, a cell that shows more than one, and more of one that shows many. */
+/* To make it: in any case, by triangle, and by cell that shows more than one. */
 #define PLAN_COST_SIGHT          2e6
-#define PLAN_COST_SIGHT_TRIANGLE 700.0
-#define PLAN_COST_SIGHT_CELL     500.0
-#define PLAN_COST_SIGHT_LONG     1000.0
+#define PLAN_COST_SIGHT_TRIANGLE 260.0
+#define PLAN_COST_SIGHT_CELL     400.0
 /* bvh_order_exactly: a triangle, and a ray's first hit in a scene of few overlaps. */
 #define PLAN_COST_ORDER   6000.0
 #define PLAN_COST_ORDERED 20.0

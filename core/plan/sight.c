@@ -38,7 +38,7 @@ static double least_build_ns(const struct plan_sight_need *need)
 static double build_ns(const struct plan_sight_need *need, const struct plan_sight_found *f)
 {
     const double mixed = (f->few + f->ask) * need->cells;
-    return least_build_ns(need) + PLAN_COST_SIGHT_CELL * mixed + PLAN_COST_SIGHT_LONG * f->ask * need->cells;
+    return least_build_ns(need) + PLAN_COST_SIGHT_CELL * mixed;
 }
 
 int plan_sight_may_pay(const struct plan_sight_need *need)
