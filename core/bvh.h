@@ -56,6 +56,10 @@ const struct bvh_plane *bvh_plane(const struct bvh *bvh, uint32_t triangle);
 /* 1: a face of the same corners with a lower number stands for this triangle, which is never met. */
 int bvh_is_twin(const struct bvh *bvh, uint32_t triangle);
 
+/* So near to a border of a triangle, across the ray, the BVH may miss what a ray from a station really meets: one that
+ * sees the triangle at a smaller angle than its origin does. 0: nothing is missed. */
+double bvh_border_m(const struct bvh *bvh, uint32_t triangle, const double station_m[3]);
+
 enum {
     BVH_CHUNK = 1024, /* rays that are cast together */
     BVH_NO_TRIANGLE = 0xffffffff,
@@ -134,9 +138,11 @@ void bvh_hits(struct bvh_work *work, const struct bvh *bvh, const struct bvh_ray
 
 /* ---- for rays from one point whose triangles are known otherwise (core/sight); no scene with holes. */
 
-/* Ranges, labels and steepness where the rays meet the planes of rays->triangle, bit by bit what bvh_hits has.
- * BVH_NO_TRIANGLE: NaN and BVH_NO_LABEL. */
-void bvh_ranges(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays);
+/* Rays from .. to - 1 meet that triangle, or nothing (BVH_NO_TRIANGLE): their ranges, labels and steepness, bit by
+ * bit what bvh_hits has. Up to three more of the rays may be overwritten, so later ones are to be set after. */
+void bvh_ranges_of(const struct bvh *bvh, uint32_t triangle, const struct bvh_rays *rays, uint32_t from, uint32_t to);
+/* The range of one plane along a ray, by the same arithmetic. */
+double bvh_range_of(const struct bvh *bvh, uint32_t triangle, const double at_m[3], const double dir[3]);
 /* Ray i met one of these triangles, or none. All are tried in double, as a proposal in doubt is: the nearest
  * wins, and within 1e-12 of its range the lowest number. */
 void bvh_decide_among(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays, uint32_t i,

@@ -151,7 +151,7 @@ int cast_outlines(const struct beam_outlines_spec *spec, const struct bvh *bvh, 
 /* Cost by stage, for measuring. */
 enum cast_stage {
     CAST_DIRECTIONS = BVH_STAGE_PREPARE,
-    CAST_EMBREE = BVH_STAGE_EMBREE, /* or looking up in a sight */
+    CAST_EMBREE = BVH_STAGE_EMBREE,
     CAST_REFINE = BVH_STAGE_REFINE,
     CAST_DECIDE = BVH_STAGE_DECIDE,
     CAST_DETECT = BVH_STAGES,

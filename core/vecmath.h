@@ -36,6 +36,15 @@ VEC_INLINE double vec_round(double x, uint64_t *bits)
     return shifted - magic;
 }
 
+/* A whole number below 2^52 as a double. Below AVX-512 vectors know no conversion from 64 bits. */
+VEC_INLINE double vec_from_u64(uint64_t whole)
+{
+    const uint64_t bits = whole | 0x4330000000000000ULL; /* 2^52 + whole */
+    double x;
+    memcpy(&x, &bits, sizeof x);
+    return x - 0x1p52;
+}
+
 /* Sine and cosine of an angle in turns, |turn| < 2^49: reduction to an eighth of a turn is exact, then Taylor
  * series to y^15 and y^16 with |y| <= pi/4, whose remainders are below 5e-17. Error below 2.5e-16
  * (tests/unit/test_vecmath.c). */
@@ -67,6 +76,59 @@ VEC_INLINE void vec_sincos_turn(double turn, double *sine, double *cosine)
     *cosine = (quadrant + 1) & 2 ? -b : b;
 }
 
+/* x * y - product, exact, where the product is x * y rounded: Dekker's (1971), with Veltkamp's splitting. */
+VEC_INLINE double vec_product_rest(double x, double y, double product)
+{
+    double xs = 134217729.0 * x, ys = 134217729.0 * y; /* 2^27 + 1 */
+    double xh = xs - (xs - x), yh = ys - (ys - y), xl = x - xh, yl = y - yh;
+    return ((xh * yh - product) + xh * yl + xl * yh) + xl * yl;
+}
+
+/* x + y - sum, exact, where the sum is x + y rounded: Knuth's. */
+VEC_INLINE double vec_sum_rest(double x, double y, double sum)
+{
+    double t = sum - x;
+    return (x - (sum - t)) + (y - t);
+}
+
+/* Sine and cosine of turn + rest beyond the last bit: s[0] + s[1] and c[0] + c[1], where the second is at most half
+ * the last bit of the first. |rest| is at most a last bit of turn. Sine to y^17. Error below 4e-17
+ * (tests/unit/test_vecmath.c). */
+VEC_INLINE void vec_sincos_turn_fine(double turn, double rest, double sine[2], double cosine[2])
+{
+    const double two_pi = 6.283185307179586477, two_pi_rest = 2.4492935982947064e-16;
+    uint64_t quadrant;
+    double q = vec_round(4.0 * turn, &quadrant), f = turn - 0.25 * q;
+    double y = f * two_pi, y1 = vec_product_rest(f, two_pi, y) + (f * two_pi_rest + rest * two_pi);
+    double z = y * y, z1 = vec_product_rest(y, y, z);
+    double s = 1.0 / 355687428096000.0;
+    s = s * z - 1.0 / 1307674368000.0;
+    s = s * z + 1.0 / 6227020800.0;
+    s = s * z - 1.0 / 39916800.0;
+    s = s * z + 1.0 / 362880.0;
+    s = s * z - 1.0 / 5040.0;
+    s = s * z + 1.0 / 120.0;
+    s = s * z - 1.0 / 6.0;
+    s = y * (z * s);
+    double c = 1.0 / 20922789888000.0;
+    c = c * z - 1.0 / 87178291200.0;
+    c = c * z + 1.0 / 479001600.0;
+    c = c * z - 1.0 / 3628800.0;
+    c = c * z + 1.0 / 40320.0;
+    c = c * z - 1.0 / 720.0;
+    c = c * z + 1.0 / 24.0;
+    c = z * (z * c);
+    double half = 0.5 * z, sh = y + s, ch = 1.0 - half;
+    double sl = (y - sh + s) + y1 * (ch + c), cl = (1.0 - ch - half) + (c - 0.5 * z1 - y1 * sh);
+    double s0 = sh + sl, s1 = sh - s0 + sl, c0 = ch + cl, c1 = ch - c0 + cl;
+    double a = quadrant & 1 ? c0 : s0, b = quadrant & 1 ? s0 : c0;
+    double a1 = quadrant & 1 ? c1 : s1, b1 = quadrant & 1 ? s1 : c1;
+    sine[0] = quadrant & 2 ? -a : a;
+    sine[1] = quadrant & 2 ? -a1 : a1;
+    cosine[0] = (quadrant + 1) & 2 ? -b : b;
+    cosine[1] = (quadrant + 1) & 2 ? -b1 : b1;
+}
+
 /* Natural logarithm of a normal positive number: x = 2^e m, m in [sqrt(1/2), sqrt(2)), log m = 2
  * artanh((m-1)/(m+1)) by its series to the 21st power, whose remainder is below 1e-17; relative error below
  * 1e-15 away from x = 1. */
@@ -75,9 +137,8 @@ VEC_INLINE double vec_log(double x)
     uint64_t bits;
     memcpy(&bits, &x, sizeof bits);
     uint64_t shifted = bits - 0x3fe6a09e667f3bcdULL; /* bits of sqrt(1/2) */
-    int64_t e = (int64_t)(shifted & 0xfff0000000000000ULL);
-    uint64_t mbits = bits - (uint64_t)e;
-    double m, k = (double)(int32_t)(e >> 52);
+    uint64_t mbits = bits - (shifted & 0xfff0000000000000ULL);
+    double m, k = vec_from_u64(shifted >> 52 ^ 2048) - 2048.0; /* the exponent has a sign */
     memcpy(&m, &mbits, sizeof m);
     double t = (m - 1.0) / (m + 1.0), z = t * t;
     double p = 1.0 / 21.0;

@@ -7,9 +7,15 @@
 
 enum { MOST_TIED = 8 };
 
+/* A hit, and how far float may misjudge the order of other planes there. */
+struct rivalry {
+    double range_m, width_m, steep; /* 1 / the cosine of the incidence */
+};
+
 struct search {
     const struct decide_ray *ray;
     double point_m[3], radius_m; /* of the query, local frame */
+    const struct rivalry *only;  /* try only what float can't order; NULL: all */
     uint32_t proposed;
     uint32_t prim;            /* best so far */
     double range_m, border_m; /* its range, and how far the ray passes from its nearest edge */
@@ -93,7 +99,7 @@ static double edge_gap(const double a[3], const double b[3], const double dir[3]
     return sqrt(vec3_dot(w, w));
 }
 
-/* Range to a triangle that the ray does meet. Where the ray lies almost in its plane the plane's range runs
+/* Range to a triangle that the ray does meet, or misses by less than can be told. Where the ray lies almost in its plane the plane's range runs
  * away: it is kept between the edges that the ray passes. */
 static double held_range(const struct decide_ray *ray, uint32_t prim, double v[3][3])
 {
@@ -166,18 +172,11 @@ static int is_hole(struct search *s, uint32_t prim, double v[3][3], double range
  * frontmost: what else is tried further away makes no difference. */
 static void note_miss(struct search *s, uint32_t prim, double v[3][3], const double side[3])
 {
-    const double *dir = s->ray->dir;
     double sign = side[0] + side[1] + side[2] < 0.0 ? -1.0 : 1.0; /* of n . dir */
-    double gap = -INFINITY, range = 0.0;
-    for (int i = 0; i < 3; i++) {
-        const double *a = v[i], *b = v[(i + 1) % 3];
-        double out = -sign * side[i] / blur(a, b);
-        if (out > 1.0) return;
-        if (out <= gap) continue;
-        gap = out;
-        range = edge_range(a, b, dir);
-    }
-    if (range <= BVH_AT_ORIGIN_M || range > s->near_range_m || is_hole(s, prim, v, range)) return;
+    for (int i = 0; i < 3; i++)
+        if (-sign * side[i] / blur(v[i], v[(i + 1) % 3]) > 1.0) return;
+    const double range = held_range(s->ray, prim, v);
+    if (!(range > BVH_AT_ORIGIN_M) || range > s->near_range_m || is_hole(s, prim, v, range)) return;
     if (range == s->near_range_m && prim > s->near_prim) return;
     s->near_prim = prim;
     s->near_range_m = range;
@@ -225,6 +224,22 @@ static int try_triangle(struct search *s, uint32_t prim)
     return 1;
 }
 
+static struct rivalry rivalry_of(const struct decide_ray *ray, uint32_t prim, double range_m)
+{
+    const double *n = ray->bvh->triangle[prim].n;
+    return (struct rivalry){range_m, bvh_width_m(ray->bvh, prim), sqrt(vec3_dot(n, n)) / fabs(vec3_dot(n, ray->dir))};
+}
+
+/* False where the ray meets a plane clearly before or after the hit. */
+static int may_be_rival(const struct decide_ray *ray, const struct rivalry *own, uint32_t prim)
+{
+    const struct bvh_plane *tri = &ray->bvh->triangle[prim];
+    double along = fabs(vec3_dot(tri->n, ray->dir)), length = sqrt(vec3_dot(tri->n, tri->n));
+    double gap = fabs((tri->d - vec3_dot(tri->n, ray->o_local)) / vec3_dot(tri->n, ray->dir) - own->range_m);
+    double width_m = 4.0 * fmax(own->width_m, bvh_width_m(ray->bvh, prim));
+    return !(gap * along > width_m * (own->steep * along + length));
+}
+
 /* Embree names all triangles whose boxes, or those of their leaf, are near. What lies further than the
  * query's radius is left out by its plane. */
 static bool visit(struct RTCPointQueryFunctionArguments *args)
@@ -232,7 +247,8 @@ static bool visit(struct RTCPointQueryFunctionArguments *args)
     const struct search *s = args->userPtr;
     const struct bvh_plane *tri = &s->ray->bvh->triangle[args->primID];
     double off = vec3_dot(tri->n, s->point_m) - tri->d, reach = s->radius_m;
-    if (args->primID != s->proposed && off * off <= reach * reach * vec3_dot(tri->n, tri->n))
+    if (args->primID != s->proposed && off * off <= reach * reach * vec3_dot(tri->n, tri->n) &&
+        (s->only == NULL || may_be_rival(s->ray, s->only, args->primID)))
         try_triangle(args->userPtr, args->primID);
     return false;
 }
@@ -262,25 +278,14 @@ static double slack_m(const struct decide_ray *ray, uint32_t prim, double width_
     return 4.0 * width_m * (1.0 + 1.0 / fmax(cosine, 1e-6));
 }
 
-/* Rivals whose planes the ray meets within what float can't order are tried; the others lie clearly before or
- * after it. */
+/* Rivals whose planes the ray meets within what float can't order are tried. */
 static void try_rivals(struct search *s, uint32_t prim, double range_m)
 {
-    const struct decide_ray *ray = s->ray;
-    const struct bvh *bvh = ray->bvh;
-    if (bvh->rival_first == NULL) return;
-    const struct bvh_plane *own = &bvh->triangle[prim];
-    uint32_t end = bvh->rival_first[prim + 1];
-    if (bvh->rival_first[prim] == end) return;
-    double own_m = bvh_width_m(bvh, prim);
-    double steep = sqrt(vec3_dot(own->n, own->n)) / fabs(vec3_dot(own->n, ray->dir));
-    for (uint32_t k = bvh->rival_first[prim]; k < end; k++) {
-        const struct bvh_plane *tri = &bvh->triangle[bvh->rival[k]];
-        double along = fabs(vec3_dot(tri->n, ray->dir)), length = sqrt(vec3_dot(tri->n, tri->n));
-        double gap = fabs((tri->d - vec3_dot(tri->n, ray->o_local)) / vec3_dot(tri->n, ray->dir) - range_m);
-        double width_m = 4.0 * fmax(own_m, bvh_width_m(bvh, bvh->rival[k]));
-        if (!(gap * along > width_m * (steep * along + length))) try_triangle(s, bvh->rival[k]);
-    }
+    const struct bvh *bvh = s->ray->bvh;
+    if (bvh->rival_first == NULL || bvh->rival_first[prim] == bvh->rival_first[prim + 1]) return;
+    const struct rivalry own = rivalry_of(s->ray, prim, range_m);
+    for (uint32_t k = bvh->rival_first[prim]; k < bvh->rival_first[prim + 1]; k++)
+        if (may_be_rival(s->ray, &own, bvh->rival[k])) try_triangle(s, bvh->rival[k]);
 }
 
 void decide_prefetch(const struct bvh *bvh, const uint32_t *prim, const uint32_t *ray, uint32_t n)
@@ -301,12 +306,11 @@ static void to_floats(const struct decide_ray *ray, float org[3], float dir[3])
     }
 }
 
-/* What was tried may lie anywhere on the ray; it counts up to limit_m: beyond, not everything was tried. */
-static int is_found(struct search *s, double limit_m)
+/* What was tried may lie anywhere on the ray. Up to limit_m everything was tried; a hit beyond is one, but something
+ * may lie before it. */
+static int is_found(const struct search *s, double limit_m)
 {
-    if (s->range_m <= limit_m || s->near_range_m <= limit_m) return 1;
-    forget(s);
-    return 0;
+    return s->range_m <= limit_m || s->near_range_m <= limit_m;
 }
 
 static int is_met(void *search, uint32_t prim)
@@ -324,13 +328,22 @@ static void look_through(struct search *s)
     bvh_walk_along(s->ray->bvh, org, dir, s->ray->t_max, &walk);
 }
 
-static void finish(struct search *s, struct bvh_counters *counters, struct decide_hit *hit)
+/* So near to an edge that double precision can't separate its sides: the edge is hit, nothing passes. */
+static int is_near_miss(const struct search *s)
 {
-    /* So near to an edge that double precision can't separate its sides: the edge is hit, nothing passes. */
-    const int near = s->near_prim != RTC_INVALID_GEOMETRY_ID && !(s->range_m <= s->near_range_m);
-    counters->undecided += (uint64_t)near;
-    hit->prim = near ? s->near_prim : s->prim;
-    hit->range_m = near ? s->near_range_m : s->range_m;
+    return s->near_prim != RTC_INVALID_GEOMETRY_ID && !(s->range_m <= s->near_range_m);
+}
+
+static struct decide_hit best_of(const struct search *s)
+{
+    return is_near_miss(s) ? (struct decide_hit){s->near_prim, s->near_range_m}
+                           : (struct decide_hit){s->prim, s->range_m};
+}
+
+static void finish(const struct search *s, struct bvh_counters *counters, struct decide_hit *hit)
+{
+    counters->undecided += (uint64_t)is_near_miss(s);
+    *hit = best_of(s);
 }
 
 void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct bvh_counters *counters,
@@ -349,11 +362,12 @@ void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct bvh
         if (s.prim == prim && s.border_m > width_m) break;
         counters->decided++;
         if (s.holes) break;
-        double range_m = (double)t, slack = slack_m(ray, prim, width_m), limit_m = range_m + slack;
+        double range_m = (double)t, slack = slack_m(ray, prim, width_m);
         double radius_m = fmin(slack, 0.01 * range_m + 4.0 * width_m);
         try_around(&s, range_m, radius_m);
+        try_rivals(&s, prim, range_m);
         if (s.holes) break;
-        if (is_found(&s, limit_m)) break;
+        if (is_found(&s, range_m + radius_m)) break;
         counters->went_on++;
         float org[3], dir[3];
         to_floats(ray, org, dir);
@@ -363,7 +377,8 @@ void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct bvh
         t = one.t;
     }
     if (s.holes) look_through(&s);
-    if (s.prim != RTC_INVALID_GEOMETRY_ID) try_rivals(&s, s.prim, s.range_m);
+    const struct decide_hit found = best_of(&s);
+    if (found.prim != RTC_INVALID_GEOMETRY_ID) try_rivals(&s, found.prim, found.range_m);
     finish(&s, counters, hit);
 }
 
@@ -376,23 +391,35 @@ void decide_among(const struct decide_ray *ray, const uint32_t *prim, uint32_t n
     finish(&s, counters, hit);
 }
 
-/* How many widths around a hit are searched. Float may order what lies within two of them over the cosine of the
- * incidence; of planes that are seen at a smaller angle, and end between the two hits, it is this cosine's inverse. */
-enum { WIDE = 64, MOST_ROUNDS = 8 };
+/* How many widths around a hit are searched. Float may misjudge what lies within two of them over the cosine of the
+ * incidence; where it is smaller than one by so many, all that is proposed up to the hit is tried. */
+enum { WIDE = 64, MOST_STEPS = 64 };
+
+static void step_along(struct search *s)
+{
+    struct bvh_one one = {.t_min = 0.0F, .t_max = s->ray->t_max};
+    float org[3], dir[3];
+    to_floats(s->ray, org, dir);
+    for (int k = 0; k < MOST_STEPS; k++) {
+        bvh_intersect_one(s->ray->bvh, org, dir, &one);
+        if (one.prim == RTC_INVALID_GEOMETRY_ID || (double)one.t > s->first_m + s->radius_m) return;
+        try_triangle(s, one.prim);
+        one.t_min = nextafterf(one.t, INFINITY);
+        one.t_max = s->ray->t_max;
+    }
+}
 
 void decide_again(const struct decide_ray *ray, struct decide_hit *hit)
 {
     struct search s = search_for(ray);
-    uint32_t was = RTC_INVALID_GEOMETRY_ID;
-    struct decide_hit at = *hit;
-    for (int k = 0; k < MOST_ROUNDS && at.prim != was; k++) {
-        struct bvh_counters none = {0};
-        const double width_m = bvh_width_m(ray->bvh, at.prim), slack = WIDE / 4 * slack_m(ray, at.prim, width_m);
-        was = s.proposed = at.prim;
-        try_triangle(&s, at.prim);
-        try_around(&s, at.range_m, fmin(slack, 0.01 * at.range_m + 4.0 * width_m));
-        finish(&s, &none, &at);
-        if (at.prim == RTC_INVALID_GEOMETRY_ID) return;
-    }
-    *hit = at;
+    const double width_m = bvh_width_m(ray->bvh, hit->prim);
+    const struct rivalry own = rivalry_of(ray, hit->prim, hit->range_m);
+    s.proposed = hit->prim;
+    s.only = &own;
+    try_triangle(&s, hit->prim);
+    try_around(&s, hit->range_m,
+               fmin(WIDE / 4 * slack_m(ray, hit->prim, width_m), 0.01 * hit->range_m + 4.0 * width_m));
+    if (!(own.steep < WIDE)) step_along(&s);
+    const struct decide_hit found = best_of(&s);
+    if (found.prim != RTC_INVALID_GEOMETRY_ID) *hit = found;
 }

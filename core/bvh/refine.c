@@ -61,7 +61,7 @@ VEC_INLINE uint32_t refine(const struct bvh_proposals *p, enum how how, int judg
     const double *px = p->own.x, *py = p->own.y, *pz = p->own.z, ox = p->o[0], oy = p->o[1], oz = p->o[2];
     const uint32_t n_triangles = p->bvh->scene->n_triangles, n = p->n, *prim = p->prim;
     const float *u = p->u, *v = p->v;
-    const int slanted = how != FROM_ONE || p->bvh->station_reach_m > 0.0;
+    const int slanted = p->bvh->station_reach_m > 0.0;
     double *range_m = p->range_m;
     float *steep = p->steep;
     uint32_t *label = p->label, *doubt = p->doubt, doubts = 0;
@@ -124,34 +124,83 @@ uint32_t bvh_refine(const struct bvh_proposals *p)
     return p->bvh->rival_first != NULL ? doubt_rivals(p) : doubts;
 }
 
-VEC_CLONES
-static void ranges(const struct bvh_proposals *p)
+enum { LANES = 4 };
+typedef double lanes __attribute__((vector_size(LANES * sizeof(double))));
+
+/* A plane, and where rays meet it. */
+struct one_plane {
+    double nx, ny, nz, nn, above; /* above: d - n . o */
+    uint32_t triangle, label;
+};
+
+VEC_INLINE void range_of_one(const struct one_plane *p, const struct bvh_rays *rays, uint32_t i)
 {
-    refine(p, FROM_ONE, 0);
+    const double along = p->nx * rays->dir.x[i] + p->ny * rays->dir.y[i] + p->nz * rays->dir.z[i];
+    rays->range_m[i] = p->above / along;
+    rays->triangle[i] = p->triangle;
+    if (rays->label != NULL) rays->label[i] = p->label;
+    if (rays->steep != NULL) rays->steep[i] = (float)p->nn / (float)(along * along);
+}
+
+/* Lanes by hand: compilers leave so short a loop as it is. */
+VEC_INLINE void ranges_of_lanes(const struct one_plane *p, const struct bvh_rays *rays, uint32_t at)
+{
+    lanes x, y, z;
+    memcpy(&x, rays->dir.x + at, sizeof x);
+    memcpy(&y, rays->dir.y + at, sizeof y);
+    memcpy(&z, rays->dir.z + at, sizeof z);
+    const lanes along = p->nx * x + p->ny * y + p->nz * z, range_m = p->above / along;
+    memcpy(rays->range_m + at, &range_m, sizeof range_m);
+    for (uint32_t i = 0; i < LANES; i++)
+        rays->triangle[at + i] = p->triangle;
+    for (uint32_t i = 0; rays->label != NULL && i < LANES; i++)
+        rays->label[at + i] = p->label;
+    for (uint32_t i = 0; rays->steep != NULL && i < LANES; i++)
+        rays->steep[at + i] = (float)p->nn / (float)(along[i] * along[i]);
+}
+
+double bvh_range_of(const struct bvh *bvh, uint32_t triangle, const double at_m[3], const double dir[3])
+{
+    const struct bvh_plane *tri = &bvh->triangle[triangle];
+    double o[3];
+    vec3_sub(at_m, bvh->origin_m, o);
+    return (tri->d - vec3_dot(tri->n, o)) / vec3_dot(tri->n, dir);
+}
+
+/* What meets nothing, without arithmetic. */
+static void say_nothing(const struct bvh_rays *rays, uint32_t from, uint32_t to)
+{
+    for (uint32_t i = from; i < to; i++)
+        rays->range_m[i] = (double)NAN;
+    for (uint32_t i = from; i < to; i++)
+        rays->triangle[i] = BVH_NO_TRIANGLE;
+    for (uint32_t i = from; rays->label != NULL && i < to; i++)
+        rays->label[i] = BVH_NO_LABEL;
+    for (uint32_t i = from; rays->steep != NULL && i < to; i++)
+        rays->steep[i] = NAN;
 }
 
 VEC_CLONES
-static void ranges_steep(const struct bvh_proposals *p)
+void bvh_ranges_of(const struct bvh *bvh, uint32_t triangle, const struct bvh_rays *rays, uint32_t from, uint32_t to)
 {
-    refine(p, FROM_ONE_STEEP, 0);
-}
-
-void bvh_ranges(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays)
-{
-    for (uint32_t at = 0; at < rays->n; at += BVH_CHUNK) {
-        struct bvh_proposals p = {.bvh = bvh,
-                                  .n = rays->n - at < BVH_CHUNK ? rays->n - at : BVH_CHUNK,
-                                  .dir = VEC3_IN(rays->dir, at),
-                                  .prim = rays->triangle + at,
-                                  .range_m = rays->range_m + at,
-                                  .label = rays->label != NULL ? rays->label + at : bvh_work_labels(work),
-                                  .steep = rays->steep != NULL ? rays->steep + at : NULL};
-        vec3_sub(rays->from.at_m, bvh->origin_m, p.o);
-        if (p.steep != NULL)
-            ranges_steep(&p);
-        else
-            ranges(&p);
+    if (triangle == BVH_NO_TRIANGLE) {
+        say_nothing(rays, from, to);
+        return;
     }
+    const struct bvh_plane *tri = &bvh->triangle[triangle];
+    double o[3];
+    vec3_sub(rays->from.at_m, bvh->origin_m, o);
+    const struct one_plane p = {.nx = tri->n[0],
+                                .ny = tri->n[1],
+                                .nz = tri->n[2],
+                                .nn = vec3_dot(tri->n, tri->n),
+                                .above = tri->d - vec3_dot(tri->n, o),
+                                .triangle = triangle,
+                                .label = label_of(tri->n[1], tri->n[2])};
+    for (; from < to && rays->n - from >= LANES; from += LANES)
+        ranges_of_lanes(&p, rays, from);
+    for (; from < to; from++)
+        range_of_one(&p, rays, from);
 }
 
 VEC_CLONES

@@ -4,8 +4,13 @@
  *
  * Embree's collision of the scene with itself gives pairs whose boxes meet; of those stay the pairs that no
  * axis separates by more than what float may blur there (separating axes of two triangles: normals, edges
- * crossed, edges in their planes). Neighbours that share a corner are rivals only where they overlap in one
- * plane: at their common border the border test looks anyway. */
+ * crossed, edges in their planes).
+ *
+ * Neighbours that share a corner or an edge touch in any case. Two sheets with the angle a between them are met by
+ * a ray at the distance b from their edge, across the ray; float may misjudge their order where b is less than
+ * width / sin(a / 2). The border test looks anyway where b is less than the width, twice what float needs in
+ * practice. So what is folded by less than 60 degrees is a pair of rivals, and so is what crosses, or lies beside
+ * the corner one over the other. */
 #include <math.h>
 #include <pthread.h>
 #include <stdlib.h>
@@ -55,18 +60,17 @@ static void look_at(const struct bvh *bvh, uint32_t prim, struct shape *s)
     vec3_cross(s->e[0], s->e[1], s->n);
 }
 
-/* True when the triangles come nearer than blur_m; within == 1: when they overlap in their planes by more
- * than that. */
-static int no_axis_separates(struct shape *a, struct shape *b, double blur_m, int within)
+/* True when the triangles come nearer than blur_m. */
+static int no_axis_separates(struct shape *a, struct shape *b, double blur_m)
 {
-    double axis[3], limit = within ? -blur_m : blur_m;
+    double axis[3];
     if (gap_along(a->v, b->v, a->n) > blur_m || gap_along(a->v, b->v, b->n) > blur_m) return 0;
     for (int i = 0; i < 3; i++) {
         vec3_cross(a->e[i], a->n, axis);
-        if (gap_along(a->v, b->v, axis) > limit) return 0;
+        if (gap_along(a->v, b->v, axis) > blur_m) return 0;
         vec3_cross(b->e[i], b->n, axis);
-        if (gap_along(a->v, b->v, axis) > limit) return 0;
-        for (int j = 0; j < 3 && !within; j++) {
+        if (gap_along(a->v, b->v, axis) > blur_m) return 0;
+        for (int j = 0; j < 3; j++) {
             vec3_cross(a->e[i], b->e[j], axis);
             /* Edges that are almost parallel have no axis of their own to speak of. */
             if (vec3_dot(axis, axis) < 1e-12 * vec3_dot(a->e[i], a->e[i]) * vec3_dot(b->e[j], b->e[j])) continue;
@@ -76,28 +80,106 @@ static int no_axis_separates(struct shape *a, struct shape *b, double blur_m, in
     return 1;
 }
 
-static int share_a_corner(struct shape *a, struct shape *b)
+/* Corners that both have: how many, and where the last one is. */
+static int shared_corners(const struct shape *a, const struct shape *b, int *in_a, int *in_b)
 {
+    int n = 0;
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)
-            if (memcmp(a->v[i], b->v[j], sizeof a->v[i]) == 0) return 1;
-    return 0;
+            if (memcmp(a->v[i], b->v[j], sizeof a->v[i]) == 0) {
+                n++;
+                *in_a = i;
+                *in_b = j;
+            }
+    return n;
+}
+
+static const double LATERAL = -1e-7, FOLDED = 0.5, ABOVE = 0.866; /* cosine and sine of 60 degrees */
+
+static void unit(const double a[3], double out[3])
+{
+    const double length = vec3_length(a);
+    for (int i = 0; i < 3; i++)
+        out[i] = a[i] / length;
+}
+
+/* From corner k along both edges, unit vectors. */
+static void edges_from(const struct shape *s, int k, double out[2][3])
+{
+    const double *e = s->e[(k + 2) % 3], back[3] = {-e[0], -e[1], -e[2]};
+    unit(s->e[k], out[0]);
+    unit(back, out[1]);
+}
+
+/* The gap between two angles with one corner, along an axis through it: a on one side, b on the other. */
+static double angle_gap(double a[2][3], double b[2][3], const double axis[3])
+{
+    const double a0 = vec3_dot(a[0], axis), a1 = vec3_dot(a[1], axis), b0 = vec3_dot(b[0], axis),
+                 b1 = vec3_dot(b[1], axis);
+    const double up = fmin(fmin(a0, a1), fmin(-b0, -b1)), down = fmin(fmin(-a0, -a1), fmin(b0, b1));
+    return fmax(up, down) / vec3_length(axis);
+}
+
+/* Triangles with one corner in common. Beside each other, one of their edges has them on either side; else one lies
+ * over the other, or they cross. */
+static int meet_beyond_corner(const struct shape *s, const struct shape *t, int in_s, int in_t)
+{
+    double a[2][3], b[2][3], axis[3];
+    edges_from(s, in_s, a);
+    edges_from(t, in_t, b);
+    for (int i = 0; i < 2; i++) {
+        vec3_cross(a[i], s->n, axis);
+        if (angle_gap(a, b, axis) > LATERAL) return 0;
+        vec3_cross(b[i], t->n, axis);
+        if (angle_gap(a, b, axis) > LATERAL) return 0;
+    }
+    unit(s->n, axis);
+    const double over_s =
+        fmax(fmin(vec3_dot(b[0], axis), vec3_dot(b[1], axis)), -fmax(vec3_dot(b[0], axis), vec3_dot(b[1], axis)));
+    unit(t->n, axis);
+    const double over_t =
+        fmax(fmin(vec3_dot(a[0], axis), vec3_dot(a[1], axis)), -fmax(vec3_dot(a[0], axis), vec3_dot(a[1], axis)));
+    return over_s < ABOVE && over_t < ABOVE;
+}
+
+/* Triangles with an edge in common: the angle between them, from that edge. The corner that is not shared: from the
+ * last shared one, across the edge. */
+static int fold_back(const struct shape *s, const struct shape *t)
+{
+    const struct shape *of[2] = {s, t};
+    double across[2][3], edge[3];
+    int other[2] = {0, 0};
+    for (int k = 0; k < 2; k++)
+        for (int i = 0; i < 3; i++) {
+            int shared = 0;
+            for (int j = 0; j < 3; j++)
+                shared |= memcmp(of[k]->v[i], of[1 - k]->v[j], sizeof of[k]->v[i]) == 0;
+            if (!shared) other[k] = i;
+        }
+    unit(s->e[(other[0] + 1) % 3], edge);
+    for (int k = 0; k < 2; k++) {
+        const double *tip = of[k]->v[other[k]], *foot = s->v[(other[0] + 1) % 3];
+        double from[3];
+        vec3_sub(tip, foot, from);
+        const double along = vec3_dot(from, edge);
+        for (int i = 0; i < 3; i++)
+            from[i] -= along * edge[i];
+        unit(from, across[k]);
+    }
+    return vec3_dot(across[0], across[1]) > FOLDED;
 }
 
 static int are_rivals(const struct bvh *bvh, uint32_t i, uint32_t j)
 {
     struct shape a, b;
+    int in_a = 0, in_b = 0;
     if (bvh_is_twin(bvh, i) || bvh_is_twin(bvh, j)) return 0;
     look_at(bvh, i, &a);
     look_at(bvh, j, &b);
-    double blur_m = 2.0 * fmax(bvh_width_m(bvh, i), bvh_width_m(bvh, j));
-    int corner = share_a_corner(&a, &b);
-    if (corner) { /* only where one lies flat on the other */
-        double c[3];
-        vec3_cross(a.n, b.n, c);
-        if (vec3_dot(c, c) > 1e-6 * vec3_dot(a.n, a.n) * vec3_dot(b.n, b.n)) return 0;
-    }
-    return no_axis_separates(&a, &b, blur_m, corner);
+    const int shared = shared_corners(&a, &b, &in_a, &in_b);
+    if (shared >= 2) return fold_back(&a, &b);
+    if (shared == 1) return meet_beyond_corner(&a, &b, in_a, in_b);
+    return no_axis_separates(&a, &b, 2.0 * fmax(bvh_width_m(bvh, i), bvh_width_m(bvh, j)));
 }
 
 static void add_pair(struct pairs *p, uint32_t i, uint32_t j)

@@ -46,14 +46,20 @@ static void aim_ideal(struct caster *c, struct chunk *k, const struct kernel_tur
     const int geo = s->layout == LINE_GEO, moves = s->n_knots != 0;
     const double *rotation = moves ? mat3_unit : s->rotation;
     const struct vec3_out d = moves ? VEC3_OUT(c->socs, 0) : VEC3_OUT(c->d, 0);
+    const struct vec3_out read = moves ? VEC3_OUT(c->read, 0) : VEC3_OUT(c->list.e, 0);
+    const struct kernel_sweep sweep = {k->run, k->first, *turns};
+    const int even = kernel_sweep_steps(&c->steps, k->run);
     double to_crs[9];
-    if (geo) {
-        k->linear = !moves && reading_rotation(s, to_crs);
-        kernel_directions_read(s, turns, rotation, moves ? mat3_unit : to_crs, &d,
-                               moves ? &VEC3_OUT(c->read, 0) : &VEC3_OUT(c->list.e, 0));
-    } else {
+    if (geo) k->linear = !moves && reading_rotation(s, to_crs);
+    const double *q = moves ? mat3_unit : to_crs;
+    if (geo && even)
+        kernel_sweep_read(&c->steps, &sweep, s, rotation, q, &d, &read);
+    else if (geo)
+        kernel_directions_read(s, turns, rotation, q, &d, &read);
+    else if (even)
+        kernel_sweep(&c->steps, &sweep, rotation, &d);
+    else
         kernel_directions(turns, rotation, &d);
-    }
     if (!moves) return;
     const struct move m = {VEC3_IN(c->socs, 0), geo ? VEC3_IN(c->read, 0) : (struct vec3_in){0}, VEC3_OUT(c->d, 0),
                            VEC3_OUT(c->list.e, 0), VEC3_OUT(c->list.p, 0)};

@@ -33,6 +33,7 @@ int caster_create(struct caster **out, struct sh_err *err)
     c->sight = NULL;
     c->sub_rays = NULL;
     c->profile = NULL;
+    c->steps.ready = 0;
     memset(&c->counters, 0, sizeof c->counters);
     int rc = bvh_work_create(&c->bvh, err);
     if (rc == SH_OK) rc = sight_work_create(&c->sight, err);

@@ -101,7 +101,8 @@ struct caster {
     struct sub_ray_work *sub_rays; /* touched only where pulses have a footprint */
     struct bvh_profile *profile;
     struct cast_counters counters;
-    struct chunk_vectors d; /* direction of the beam, prcs */
+    struct kernel_steps steps; /* of the run at hand */
+    struct chunk_vectors d;    /* direction of the beam, prcs */
     uint32_t hit[CHUNK_ROOM];
     uint8_t body[CHUNK];
     struct echo_list list;
@@ -122,8 +123,6 @@ void caster_aim(struct caster *c, struct chunk *k);
 void caster_aim_read(struct caster *c, struct chunk *k);
 
 /* ---- nearest.c */
-/* True where rays are looked up in the sight: all begin at the station. */
-int caster_sees(const struct cast_setup *s, const struct bvh_origins *from);
 void caster_nearest(struct caster *c, const struct cast_setup *s, const struct met *met);
 /* ---- texels.c: labels of what has been met get the reflectance there, as surface_texel has it. Nothing
  * where the surfaces have no textures. */

@@ -2,6 +2,7 @@
 
 #include <math.h>
 
+#include "core/cast/aim_inline.h"
 #include "core/light.h"
 #include "core/rng.h"
 #include "core/vecmath.h"
@@ -12,9 +13,9 @@ void kernel_angles(const struct schedule_run *run, uint32_t first, uint32_t n, d
 {
     const double mirror0 = run->mirror0_turn, per_r = run->mirror_turn_per_r, pan0 = run->pan0_turn;
     const double step = run->pan_step_turn, place0 = (double)(run->in_line + first);
-    const int64_t r0 = (int64_t)(run->r + first * run->num), num = (int64_t)run->num;
+    const double r0 = (double)(run->r + first * run->num), num = (double)run->num; /* r < 2^53 */
     for (uint32_t i = 0; i < n; i++) {
-        mirror_turn[i] = mirror0 + (double)(r0 + (int64_t)i * num) * per_r;
+        mirror_turn[i] = mirror0 + (r0 + (double)(int32_t)i * num) * per_r;
         pan_turn[i] = pan0 + (place0 + (double)(int32_t)i) * step;
     }
 }
@@ -36,9 +37,9 @@ void kernel_angles_table(const struct schedule_run *run, uint32_t first, uint32_
 }
 
 VEC_CLONES
-void kernel_directions(const struct kernel_turns *turns, const double m[9], const struct vec3_out *out)
+void kernel_directions(const struct kernel_turns *turns, const double rotation[9], const struct vec3_out *out)
 {
-    const double m0 = m[0], m1 = m[1], m2 = m[2], m3 = m[3], m4 = m[4], m5 = m[5], m6 = m[6], m7 = m[7], m8 = m[8];
+    const struct aim_matrix m = aim_matrix(rotation);
     const struct kernel_turns t = *turns;
     const struct vec3_out d = *out;
     VEC_LOOP
@@ -46,45 +47,28 @@ void kernel_directions(const struct kernel_turns *turns, const double m[9], cons
         double sm, cm, sp, cp;
         vec_sincos_turn(t.mirror[i], &sm, &cm);
         vec_sincos_turn(t.pan[i], &sp, &cp);
-        double x = sp * cm, y = cp * cm;
-        d.x[i] = m0 * x + m1 * y + m2 * sm;
-        d.y[i] = m3 * x + m4 * y + m5 * sm;
-        d.z[i] = m6 * x + m7 * y + m8 * sm;
+        aim_direction(m, sm, cm, sp, cp, d, i);
     }
 }
 
-/* The error of an encoder is at most half a count, d: sin(a + d) = sin a + d cos a - d^2/2 sin a leaves
- * d^3/6, below
- * 1e-12 for 2^12 counts per turn and more. Ideal encoders have no error. */
 VEC_CLONES
-void kernel_directions_read(const struct cast_setup *setup, const struct kernel_turns *turns, const double m[9],
-                            const double q[9], const struct vec3_out *out, const struct vec3_out *read)
+void kernel_directions_read(const struct cast_setup *setup, const struct kernel_turns *turns, const double rotation[9],
+                            const double to_crs[9], const struct vec3_out *out, const struct vec3_out *read)
 {
-    const double m0 = m[0], m1 = m[1], m2 = m[2], m3 = m[3], m4 = m[4], m5 = m[5], m6 = m[6], m7 = m[7], m8 = m[8];
-    const double q0 = q[0], q1 = q[1], q2 = q[2], q3 = q[3], q4 = q[4], q5 = q[5], q6 = q[6], q7 = q[7], q8 = q[8];
-    const double mirror_counts = setup->mirror_counts, pan_counts = setup->pan_counts;
-    const double use = mirror_counts >= 4294967296.0 && pan_counts >= 4294967296.0 ? 0.0 : 1.0;
-    const double mirror_step = use * VEC_TURN_RAD / mirror_counts, pan_step = use * VEC_TURN_RAD / pan_counts;
+    const struct aim_encoder mirror = aim_encoder(setup, setup->mirror_counts);
+    const struct aim_encoder pan = aim_encoder(setup, setup->pan_counts);
+    const struct aim_matrix m = aim_matrix(rotation), q = aim_matrix(to_crs);
     const struct kernel_turns t = *turns;
     const struct vec3_out d = *out, e = *read;
     VEC_LOOP
     for (uint32_t i = 0; i < t.n; i++) {
         double sm, cm, sp, cp;
-        uint64_t bits;
         vec_sincos_turn(t.mirror[i], &sm, &cm);
         vec_sincos_turn(t.pan[i], &sp, &cp);
-        double x = sp * cm, y = cp * cm;
-        d.x[i] = m0 * x + m1 * y + m2 * sm;
-        d.y[i] = m3 * x + m4 * y + m5 * sm;
-        d.z[i] = m6 * x + m7 * y + m8 * sm;
-        double mc = t.mirror[i] * mirror_counts, pc = t.pan[i] * pan_counts;
-        double dm = (vec_round(mc, &bits) - mc) * mirror_step, dp = (vec_round(pc, &bits) - pc) * pan_step;
-        double hm = 1.0 - 0.5 * dm * dm, hp = 1.0 - 0.5 * dp * dp;
-        double rsm = sm * hm + cm * dm, rcm = cm * hm - sm * dm, rsp = sp * hp + cp * dp, rcp = cp * hp - sp * dp;
-        double rx = rsp * rcm, ry = rcp * rcm;
-        e.x[i] = q0 * rx + q1 * ry + q2 * rsm;
-        e.y[i] = q3 * rx + q4 * ry + q5 * rsm;
-        e.z[i] = q6 * rx + q7 * ry + q8 * rsm;
+        aim_direction(m, sm, cm, sp, cp, d, i);
+        aim_read(mirror, t.mirror[i], &sm, &cm);
+        aim_read(pan, t.pan[i], &sp, &cp);
+        aim_direction(q, sm, cm, sp, cp, e, i);
     }
 }
 
@@ -241,22 +225,55 @@ static void times_of_table(const struct schedule_run *run, uint32_t *dt_ns)
     }
 }
 
+/* What TIMES pulses in a row add: whole nanoseconds, and 1 / den of one, below den. */
+enum { TIMES = 64 };
+struct times {
+    int64_t part[TIMES + 1];
+    uint32_t ns[TIMES + 1];
+};
+
 /* The remainder is below the divisor, so each step adds the quotient or one more. */
+static void make_times(const struct schedule_run *run, uint32_t n, struct times *t)
+{
+    const int64_t rem = (int64_t)run->ns_rem, den = (int64_t)run->ns_den;
+    int64_t part = 0;
+    uint32_t ns = 0;
+    for (uint32_t i = 0; i <= n; i++) {
+        t->part[i] = part;
+        t->ns[i] = ns;
+        part += rem;
+        ns += (uint32_t)run->ns_quot + (part >= den);
+        part -= part >= den ? den : 0;
+    }
+}
+
+VEC_CLONES
+static void add_times(const struct times *t, uint32_t begin_ns, int64_t begin_part, int64_t den, uint32_t n,
+                      uint32_t *restrict dt_ns)
+{
+    const int64_t *restrict part = t->part;
+    const uint32_t *restrict ns = t->ns;
+    for (uint32_t i = 0; i < n; i++)
+        dt_ns[i] = begin_ns + ns[i] + (begin_part + part[i] >= den);
+}
+
+/* Block by block. */
 void kernel_times(const struct schedule_run *run, uint32_t *dt_ns)
 {
+    const int64_t den = (int64_t)run->ns_den; /* below 2^62, as pulse rates are */
+    int64_t part = (int64_t)run->ns_acc;
+    uint32_t ns = 0;
+    struct times t;
     if (run->sequence_ticks != 0) {
         times_of_table(run, dt_ns);
         return;
     }
-    uint64_t acc = run->ns_acc;
-    const uint64_t rem = run->ns_rem, den = run->ns_den;
-    uint32_t dt = 0;
-    const uint32_t quot = (uint32_t)run->ns_quot;
-    for (uint32_t i = 0; i < run->n; i++) {
-        dt_ns[i] = dt;
-        acc += rem;
-        uint64_t carry = acc >= den;
-        acc -= carry ? den : 0;
-        dt += quot + (uint32_t)carry;
+    make_times(run, run->n < TIMES ? run->n : TIMES, &t);
+    for (uint32_t at = 0, n; at < run->n; at += n) {
+        n = run->n - at < TIMES ? run->n - at : TIMES;
+        add_times(&t, ns, part, den, n, dt_ns + at);
+        part += t.part[n];
+        ns += t.ns[n] + (part >= den);
+        part -= part >= den ? den : 0;
     }
 }

@@ -23,6 +23,30 @@ void kernel_directions(const struct kernel_turns *turns, const double rotation[9
 void kernel_directions_read(const struct cast_setup *setup, const struct kernel_turns *turns, const double rotation[9],
                             const double to_crs[9], const struct vec3_out *d, const struct vec3_out *e);
 
+/* ---- kernels_sweep.c: the same for a run whose axes turn evenly, for a fraction of the cost */
+enum { KERNEL_BLOCK = 64 };
+/* Sine, and cosine less 1, of -32 .. 31 steps. */
+struct kernel_steps {
+    int ready;
+    double mirror_turn, pan_turn; /* a step */
+    double sm[KERNEL_BLOCK], cm[KERNEL_BLOCK], sp[KERNEL_BLOCK], cp[KERNEL_BLOCK];
+};
+/* The steps of a run; where they are those of the run before nothing is done. 0 where the run has a table, or its
+ * steps are too large. */
+int kernel_sweep_steps(struct kernel_steps *steps, const struct schedule_run *run);
+/* Up to BVH_CHUNK pulses of a run, from its pulse `first` on. */
+struct kernel_sweep {
+    const struct schedule_run *run;
+    uint32_t first;
+    struct kernel_turns turns; /* from kernel_angles */
+};
+/* As kernel_directions, and kernel_directions_read. */
+void kernel_sweep(const struct kernel_steps *steps, const struct kernel_sweep *sweep, const double rotation[9],
+                  const struct vec3_out *d);
+void kernel_sweep_read(const struct kernel_steps *steps, const struct kernel_sweep *sweep,
+                       const struct cast_setup *setup, const double rotation[9], const double to_crs[9],
+                       const struct vec3_out *d, const struct vec3_out *e);
+
 /* ---- kernels_moving.c: pulses between two poses of a moving head */
 struct kernel_leg {
     double before_ns, span_ns;         /* from the first pose to the run's t0; to the second pose */

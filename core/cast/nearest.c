@@ -65,21 +65,18 @@ static void cast_mover(struct caster *c, const struct cast_setup *s, uint32_t wh
     keep_nearer(c, m, (uint8_t)(which + 1), met);
 }
 
-int caster_sees(const struct cast_setup *s, const struct bvh_origins *from)
+static int is_from_station(const struct cast_setup *s, const struct bvh_origins *from)
 {
-    return s->sight != NULL && from->own.x == NULL && memcmp(from->at_m, s->station_m, sizeof from->at_m) == 0;
+    return from->own.x == NULL && memcmp(from->at_m, s->station_m, sizeof from->at_m) == 0;
 }
 
 void caster_nearest(struct caster *c, const struct cast_setup *s, const struct met *met)
 {
     const struct bvh_rays *rays = &met->rays;
-    if (caster_sees(s, &rays->from)) {
-        bvh_stage_ends(c->profile, CAST_DIRECTIONS);
+    if (s->sight != NULL && is_from_station(s, &rays->from))
         sight_hits(c->sight, c->bvh, s->sight, rays);
-        bvh_stage_ends(c->profile, CAST_EMBREE);
-    } else {
+    else
         bvh_hits(c->bvh, s->bvh, rays);
-    }
     if (met->body != NULL) {
         bvh_cosines(s->bvh, rays->triangle, &rays->dir, rays->n, met->cosine);
         memset(met->body, 0, rays->n * sizeof *met->body);

@@ -226,22 +226,13 @@ static int sees_glass(const struct caster *c, const struct cast_setup *s, uint32
     return s->detect != NULL && s->detect->depth > 0 && !isnan(l->range_m[pulse]) && caster_goes_on(s, l->label[pulse]);
 }
 
-/* Of the central rays. Where they were looked up in the sight, the BVH has not seen them. */
-static struct vec3_floats float_directions(struct caster *c, const struct chunk *k)
-{
-    struct sub_ray_work *w = c->sub_rays;
-    if (!caster_sees(k->s, &k->from)) return bvh_work_directions(c->bvh);
-    bvh_to_float(&VEC3_IN(c->d, 0), k->n, w->dir.x, w->dir.y, w->dir.z);
-    return (struct vec3_floats){w->dir.x, w->dir.y, w->dir.z};
-}
-
 /* Pulses of an adaptive beam for which one ray may not be enough. */
 static uint32_t find_candidates(struct caster *c, const struct chunk *k)
 {
     struct sub_ray_work *w = c->sub_rays;
     const struct cast_setup *s = k->s;
     const uint32_t n = k->n;
-    const struct vec3_floats dir = float_directions(c, k);
+    const struct vec3_floats dir = bvh_work_directions(c->bvh);
     const int glass = s->detect != NULL && s->detect->depth > 0;
     uint32_t found, all = 0;
     _Static_assert((int)CHUNK <= (int)BEAM_NEAR_MOST, "all at once");

@@ -50,10 +50,7 @@ struct job {
 };
 
 struct sub_ray_work {
-    float steep[CHUNK]; /* of an adaptive beam's central rays */
-    struct {
-        float x[CHUNK_ROOM], y[CHUNK_ROOM], z[CHUNK_ROOM];
-    } dir;                             /* theirs; touched only where they are looked up in a sight */
+    float steep[CHUNK];                /* of an adaptive beam's central rays */
     struct beam_near candidate[CHUNK]; /* pulses to look at */
     struct beam_near reach[CHUNK];     /* with glass or mirrors: those near outlines */
     uint32_t near[CHUNK], n_near;      /* those with sub-rays, in order */

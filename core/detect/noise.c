@@ -12,9 +12,14 @@ void detect_range_noise(const struct detect_signal *signal, const struct detect_
     const uint64_t range_key = signal->range_key ^ echoes->scan_key, *restrict key = echoes->key;
     const double *restrict amplitude = echoes->amplitude;
     double *restrict range_m = echoes->range_m;
-    for (uint32_t i = 0; i < echoes->n; i++) {
-        double sigma = sqrt(floor2 + jitter2 / (amplitude[i] * amplitude[i])) + per_distance * range_m[i];
-        range_m[i] += sigma * rng_normal(range_key, key[i]);
+    const uint32_t n = echoes->n;
+    uint64_t bits[RNG_BLOCK];
+    for (uint32_t at = 0, m; at < n; at += m) {
+        const double *restrict a = amplitude + at;
+        double *restrict r = range_m + at;
+        m = rng_bits(range_key, key + at, n - at, bits);
+        for (uint32_t i = 0; i < m; i++)
+            r[i] += (sqrt(floor2 + jitter2 / (a[i] * a[i])) + per_distance * r[i]) * rng_normal_of(bits[i]);
     }
 }
 
@@ -22,8 +27,13 @@ VEC_CLONES
 void detect_fixed_noise(double sigma0_m, double sigma1, uint64_t range_key, uint32_t n, const uint64_t *restrict key,
                         double *restrict range_m)
 {
-    for (uint32_t i = 0; i < n; i++)
-        range_m[i] += (sigma0_m + sigma1 * range_m[i]) * rng_normal(range_key, key[i]);
+    uint64_t bits[RNG_BLOCK];
+    for (uint32_t at = 0, m; at < n; at += m) {
+        double *restrict r = range_m + at;
+        m = rng_bits(range_key, key + at, n - at, bits);
+        for (uint32_t i = 0; i < m; i++)
+            r[i] += (sigma0_m + sigma1 * r[i]) * rng_normal_of(bits[i]);
+    }
 }
 
 VEC_CLONES

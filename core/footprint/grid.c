@@ -5,12 +5,8 @@
 
 #include "core/footprint/outlines.h"
 #include "core/vec3.h"
-#include "core/vecmath.h"
 
-enum {
-    N_CELLS = 6 * OUTLINE_CELLS * OUTLINE_CELLS,
-    TOGETHER = 8, /* pulses on either side of one for which it is asked */
-};
+enum { N_CELLS = 6 * OUTLINE_CELLS * OUTLINE_CELLS };
 #define NEAREST_M 0.02 /* nearer than this, all directions are near each other */
 #define PIECE     0.1  /* the longest piece of an edge, by its distance */
 
@@ -216,6 +212,34 @@ static int sort_cells(struct beam_outlines *o, const struct beam_outlines_spec *
     return SH_OK;
 }
 
+/* Edges in the order in which cells name them, so that pulses near each other read edges near each other.
+ * Those that no cell names are left out. */
+static int order_edges(struct beam_outlines *o, struct sh_err *err)
+{
+    const uint32_t none = 0xffffffff;
+    uint32_t *to = malloc((size_t)(o->n_edges + 1) * sizeof *to), n = 0;
+    struct outline_edge *was = o->edge, *edge = malloc((size_t)(o->n_edges + 1) * sizeof *edge);
+    if (to == NULL || edge == NULL) {
+        free(to);
+        free(edge);
+        return sh_fail(err, SH_ENOMEM, "beam: no memory for outlines");
+    }
+    memset(to, 0xff, (size_t)o->n_edges * sizeof *to);
+    for (uint64_t i = 0; i < o->n_entries; i++) {
+        uint32_t from = o->entry[i].edge;
+        if (to[from] == none) {
+            edge[n] = was[from];
+            to[from] = n++;
+        }
+        o->entry[i].edge = to[from];
+    }
+    o->edge = edge;
+    o->n_edges = n;
+    free(was);
+    free(to);
+    return SH_OK;
+}
+
 static int fill_cells(struct beam_outlines *o, const struct beam_outlines_spec *spec, const struct stretches *s,
                       struct sh_err *err)
 {
@@ -235,7 +259,7 @@ static int fill_cells(struct beam_outlines *o, const struct beam_outlines_spec *
     if (rc == SH_OK) rc = draw_all(o, spec, s, AROUND, NULL, err);
     if (rc == SH_OK) rc = sort_cells(o, spec, err);
     o->n_entries = n;
-    return rc;
+    return rc == SH_OK ? order_edges(o, err) : rc;
 }
 
 int beam_outlines_create(const struct beam_outlines_spec *spec, const struct beam_probe *probe,
@@ -270,121 +294,4 @@ void beam_outlines_free(struct beam_outlines *o)
     free(o->around);
     free(o->entry);
     free(o);
-}
-
-/* Square of the longest way from one direction to the next. */
-VEC_CLONES
-static float longest_step2(const struct vec3_floats *dir, uint32_t n)
-{
-    const float *dx = dir->x, *dy = dir->y, *dz = dir->z;
-    uint32_t most = 0;
-    for (uint32_t i = 0; i + 1 < n; i++) {
-        float x = dx[i + 1] - dx[i], y = dy[i + 1] - dy[i], z = dz[i + 1] - dz[i], step2 = x * x + y * y + z * z;
-        uint32_t bits; /* in the order of the numbers, which are not negative */
-        memcpy(&bits, &step2, sizeof bits);
-        most = bits > most ? bits : most;
-    }
-    float longest;
-    memcpy(&longest, &most, sizeof longest);
-    return longest;
-}
-
-VEC_CLONES
-static void cells_of(const struct vec3_floats *dir, uint32_t n, uint32_t *restrict cell)
-{
-    const float *dx = dir->x, *dy = dir->y, *dz = dir->z;
-    VEC_LOOP
-    for (uint32_t i = 0; i < n; i++)
-        cell[i] = outline_cell(dx[i], dy[i], dz[i]);
-}
-
-/* Directions looked up together. */
-struct few {
-    float x[BEAM_NEAR_MOST], y[BEAM_NEAR_MOST], z[BEAM_NEAR_MOST];
-    uint32_t cell[BEAM_NEAR_MOST];
-};
-
-static void take_direction(struct few *few, uint32_t to, const struct vec3_floats *dir, uint32_t from)
-{
-    few->x[to] = dir->x[from];
-    few->y[to] = dir->y[from];
-    few->z[to] = dir->z[from];
-}
-
-static int is_set(const uint32_t *bits, uint32_t cell)
-{
-    return bits[cell / 32] >> cell % 32 & 1;
-}
-
-/* Pulses some way around which there are outlines: of so many at a time, that is asked of the middle one. */
-static uint32_t list_around(const struct beam_outlines *o, const struct vec3_floats *dir, uint32_t n, struct few *few,
-                            uint32_t *pulse)
-{
-    const float reach = (float)OUTLINE_AROUND_RAD, step = sqrtf(longest_step2(dir, n)) + 1e-6f;
-    const uint32_t half = step * TOGETHER > reach ? (uint32_t)(reach / step) : TOGETHER, group = 2 * half + 1;
-    uint32_t found = 0, groups = 0, base = 0;
-    if (n == 0) return 0;
-    do {
-        uint32_t middle = base + half < n ? base + half : n - 1;
-        take_direction(few, groups++, dir, middle);
-        base += group;
-    } while (base < n);
-    cells_of(&(struct vec3_floats){few->x, few->y, few->z}, groups, few->cell);
-    for (uint32_t k = 0; k < groups; k++) {
-        uint32_t end = (k + 1) * group < n ? (k + 1) * group : n;
-        for (uint32_t i = k * group; i < end && is_set(o->around, few->cell[k]); i++)
-            pulse[found++] = i;
-    }
-    return found;
-}
-
-/* Pulses in cells that lead to some; near->first: the cell. */
-static uint32_t in_cells(const struct beam_outlines *o, const struct vec3_floats *dir, uint32_t n,
-                         struct beam_near *near)
-{
-    struct few few;
-    uint32_t pulse[BEAM_NEAR_MOST], around = list_around(o, dir, n, &few, pulse), found = 0;
-    for (uint32_t k = 0; k < around; k++)
-        take_direction(&few, k, dir, pulse[k]);
-    cells_of(&(struct vec3_floats){few.x, few.y, few.z}, around, few.cell);
-    for (uint32_t k = 0; k < around; k++) {
-        near[found].pulse = pulse[k];
-        near[found].first = few.cell[k];
-        found += (uint32_t)is_set(o->any, few.cell[k]);
-    }
-    return found;
-}
-
-/* Brings what looking for lines is going to read, step by step for all pulses at once. */
-static void look_up(const struct beam_outlines *o, struct beam_near *near, uint32_t n)
-{
-    for (uint32_t k = 0; k < n; k++)
-        __builtin_prefetch(&o->first[near[k].first], 0, 3);
-    for (uint32_t k = 0; k < n; k++) {
-        const uint32_t *first = &o->first[near[k].first];
-        near[k].first = first[0];
-        near[k].end = first[1];
-        __builtin_prefetch(&o->entry[first[0]], 0, 3);
-    }
-}
-
-/* Most cells lead to none, and most of those that lead to some are wider than the footprint; ranges are
- * looked at later. */
-uint32_t beam_near_outlines(const struct beam_outlines *o, const struct beam *beam, const struct vec3_floats *dir,
-                            uint32_t n, struct beam_near *near)
-{
-    uint32_t left = 0;
-    if (o->n_entries == 0) return 0;
-    uint32_t found = in_cells(o, dir, n, near);
-    look_up(o, near, found);
-    for (uint32_t k = 0; k < found; k++) {
-        struct beam_near one = near[k];
-        const float d[3] = VEC3_AT(*dir, one.pulse);
-        while (one.first < one.end && outline_is_clear(beam, &o->entry[one.first], d))
-            one.first++;
-        if (one.first == one.end) continue;
-        __builtin_prefetch(&o->edge[o->entry[one.first].edge], 0, 3);
-        near[left++] = one;
-    }
-    return left;
 }

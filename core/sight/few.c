@@ -1,90 +1,130 @@
-/* Rays decided among a few triangles, by rules that sight_inside.h explains. */
+/* Rays decided among a few triangles, by rules that sight_inside.h explains: four rays of a list at a time. */
 #include <math.h>
 
 #include "core/sight/hits_inside.h"
-#include "core/vec3.h"
+#include "core/vecmath.h"
 
-/* What one ray makes of one record. */
-struct look {
-    double side; /* the least of its edges' */
-    double q;    /* 1 / range; 0: not met for certain */
+enum { LANES = 4 };
+typedef double quad __attribute__((vector_size(32)));
+typedef int64_t quad_mask __attribute__((vector_size(32)));
+
+/* What rays make of the records of a list. Lane by lane. */
+struct looks {
+    quad x, y, z;
+    quad q[SIGHT_MAX_LIST];                             /* of the records: 1 / range */
+    quad_mask met[SIGHT_MAX_LIST], may[SIGHT_MAX_LIST]; /* the ray passes inside for certain; may do so */
+    quad first_q;
+    quad_mask first, any; /* the one that comes first; something may be met */
+    quad_mask open, asks; /* not decided; nor to be decided in double */
 };
 
-static inline double least(double a, double b)
+VEC_INLINE void choose(const quad_mask *which, const quad *yes, quad *no)
 {
-    return a < b ? a : b;
+    *no = (quad)(((quad_mask)*yes & *which) | ((quad_mask)*no & ~*which));
 }
 
-static inline struct look look_at(const struct sight_record *r, const double d[3])
+/* Of each record, on which side of its edges the rays pass, and when they meet its plane. Which of those that are met
+ * for certain comes first. Another one may come before that where it is met, or may be, and its plane does not lie
+ * behind for certain. */
+VEC_INLINE void look_at(const struct sight *s, const uint32_t *list, struct looks *w)
 {
-    const double a = vec3_dot(r->edge[0], d), b = vec3_dot(r->edge[1], d), c = vec3_dot(r->edge[2], d);
-    const double side = least(a, least(b, c)), q = vec3_dot(r->plane, d);
-    return (struct look){side, side <= -1.0 ? 0.0 : q};
-}
-
-/* How the others of a list stand to the one that is met first. */
-struct order {
-    int open;          /* one of them may come first, or can't be decided */
-    uint32_t triangle; /* the lowest number of those at the same range */
-};
-
-static struct order compare(const struct sight *s, const uint32_t *list, const struct look *look, uint32_t first)
-{
-    const struct sight_record *best = &s->record[list[1 + first]];
-    const double q = look[first].q;
-    struct order order = {0, best->triangle};
-    for (uint32_t i = 0; i < list[0]; i++) {
-        const struct sight_record *r = &s->record[list[1 + i]];
-        if (i == first || look[i].q == 0.0) continue;
-        const double gap = q - look[i].q, slack = best->slack + r->slack;
-        if (gap > slack + (best->rel + r->rel + SIGHT_SAME) * q) continue;
-        /* What the ranges themselves leave in doubt is less than what is left up to 1e-12. */
-        const int same = s->exact && look[i].side >= 1.0 && gap <= SIGHT_SURE_SAME * q && slack <= SIGHT_SURE_SAME * q;
-        order.open |= !same;
-        if (r->triangle < order.triangle) order.triangle = r->triangle;
-    }
-    return order;
-}
-
-/* Returns 0 where the records can't decide the ray. */
-static int decide(const struct sight *s, const double d[3], const uint32_t *list, uint32_t *triangle)
-{
-    struct look look[SIGHT_MAX_LIST];
-    double q = 0.0;
-    uint32_t first = BVH_NO_TRIANGLE;
-    int open = 0, other = 0;
-    for (uint32_t i = 0; i < list[0]; i++) {
-        const struct sight_record *r = &s->record[list[1 + i]];
-        look[i] = look_at(r, d);
-        if (look[i].q == 0.0 && look[i].side <= -1.0) continue;
-        open |= !(look[i].q >= r->graze && look[i].q <= SIGHT_NEAR);
-        other++;
-        if (!(look[i].side >= 1.0) || look[i].q <= q) continue;
-        q = look[i].q;
-        first = i;
-    }
-    *triangle = BVH_NO_TRIANGLE;
-    if (open) return 0;
-    if (other == 0) return 1;
-    if (first == BVH_NO_TRIANGLE) return 0;
-    if (other > 1) {
-        const struct order order = compare(s, list, look, first);
-        if (order.open) return 0;
-        *triangle = order.triangle;
-        return 1;
-    }
-    *triangle = s->record[list[1 + first]].triangle;
-    return 1;
-}
-
-uint32_t few_decide(const struct sight *s, const struct vec3_in *dir, const uint32_t *leaf, uint32_t *ray, uint32_t n,
-                    uint32_t *triangle)
-{
-    uint32_t open = 0;
+    const quad x = w->x, y = w->y, z = w->z;
+    quad first_q = {0.0, 0.0, 0.0, 0.0}, slack = first_q, rel = first_q;
+    quad_mask first = {-1, -1, -1, -1}, any = {0, 0, 0, 0}, asks = any, open = any;
+    const uint32_t n = list[0];
     for (uint32_t k = 0; k < n; k++) {
-        const uint32_t i = ray[k];
-        const double d[3] = VEC3_AT(*dir, i);
-        if (!decide(s, d, s->list + (leaf[i] & SIGHT_NUMBER), &triangle[i])) ray[open++] = i;
+        const struct sight_record *r = &s->record[list[1 + k]];
+        const quad a = r->edge[0][0] * x + r->edge[0][1] * y + r->edge[0][2] * z;
+        const quad b = r->edge[1][0] * x + r->edge[1][1] * y + r->edge[1][2] * z;
+        const quad c = r->edge[2][0] * x + r->edge[2][1] * y + r->edge[2][2] * z;
+        const quad q = r->plane[0] * x + r->plane[1] * y + r->plane[2] * z;
+        const quad_mask may = ~((quad_mask)(a <= -1.0) | (quad_mask)(b <= -1.0) | (quad_mask)(c <= -1.0));
+        const quad_mask sure = (quad_mask)(q >= r->graze) & (quad_mask)(q <= SIGHT_NEAR);
+        const quad_mask met = (quad_mask)(a >= 1.0) & (quad_mask)(b >= 1.0) & (quad_mask)(c >= 1.0);
+        const quad_mask better = met & (quad_mask)(q > first_q);
+        const quad its_slack = {r->slack, r->slack, r->slack, r->slack}, its_rel = {r->rel, r->rel, r->rel, r->rel};
+        const quad_mask number = {k, k, k, k};
+        w->met[k] = met;
+        w->may[k] = may;
+        w->q[k] = q;
+        any |= may;
+        asks |= may & ~sure;
+        first = (number & better) | (first & ~better);
+        choose(&better, &q, &first_q);
+        choose(&better, &its_slack, &slack);
+        choose(&better, &its_rel, &rel);
     }
-    return open;
+    for (uint32_t k = 0; k < n; k++) {
+        const struct sight_record *r = &s->record[list[1 + k]];
+        const quad_mask number = {k, k, k, k};
+        const quad_mask behind =
+            (quad_mask)(first_q - w->q[k] > slack + r->slack + (rel + r->rel + SIGHT_SAME) * first_q);
+        open |= ~behind & w->may[k] & (quad_mask)(number != first);
+    }
+    w->first_q = first_q;
+    w->first = first;
+    w->any = any;
+    w->asks = asks;
+    w->open = open | asks | (any & (first >> 63));
+}
+
+/* Rays that several planes are met by at the same place, all within the borders: by the rule of core/bvh/decide.c,
+ * and by its ranges. */
+static uint32_t decide_tie(const struct sight *s, const struct bvh_rays *rays, const uint32_t *list,
+                           const struct looks *w, int i)
+{
+    const double dir[3] = {w->x[i], w->y[i], w->z[i]};
+    const struct sight_record *first = &s->record[list[1 + w->first[i]]];
+    double range_m[SIGHT_MAX_LIST], first_m = INFINITY;
+    uint32_t lowest = FEW_OPEN;
+    for (uint32_t k = 0; k < list[0]; k++) {
+        const struct sight_record *r = &s->record[list[1 + k]];
+        const double q = w->q[k][i];
+        range_m[k] = INFINITY;
+        if (!w->may[k][i]) continue;
+        if (w->first_q[i] - q > first->slack + r->slack + SIGHT_SAME * w->first_q[i]) continue;
+        if (!w->met[k][i]) return FEW_OPEN;
+        range_m[k] = bvh_range_of(s->bvh, r->triangle, rays->from.at_m, dir);
+        first_m = fmin(first_m, range_m[k]);
+    }
+    for (uint32_t k = 0; k < list[0]; k++)
+        if (range_m[k] <= first_m + 1e-12 * first_m && s->record[list[1 + k]].triangle < lowest)
+            lowest = s->record[list[1 + k]].triangle;
+    return lowest;
+}
+
+static uint32_t of_lane(const struct sight *s, const struct bvh_rays *rays, const uint32_t *list, const struct looks *w,
+                        int i)
+{
+    if (!w->any[i]) return BVH_NO_TRIANGLE;
+    if (!w->open[i]) return s->record[list[1 + w->first[i]]].triangle;
+    if (w->asks[i]) return FEW_ASK;
+    return s->exact && w->first[i] >= 0 ? decide_tie(s, rays, list, w, i) : (uint32_t)FEW_OPEN;
+}
+
+VEC_INLINE void take(struct looks *w, const struct vec3_in *dir, uint32_t at, uint32_t n)
+{
+    for (uint32_t i = 0; i < LANES; i++) {
+        const uint32_t from = at + (i < n ? i : 0);
+        w->x[i] = dir->x[from];
+        w->y[i] = dir->y[from];
+        w->z[i] = dir->z[from];
+    }
+}
+
+VEC_CLONES
+void few_decide(const struct sight *s, const struct bvh_rays *rays, const uint32_t *list, uint32_t from, uint32_t to,
+                uint32_t *triangle)
+{
+    struct looks w;
+    for (uint32_t at = from; at < to; at += LANES) {
+        const uint32_t n = to - at < LANES ? to - at : LANES;
+        if (rays->n - at >= LANES)
+            take(&w, &rays->dir, at, LANES);
+        else
+            take(&w, &rays->dir, at, n);
+        look_at(s, list, &w);
+        for (uint32_t i = 0; i < n; i++)
+            triangle[at - from + i] = of_lane(s, rays, list, &w, (int)i);
+    }
 }

@@ -1,12 +1,31 @@
-/* Private to core/sight: how rays are looked up. */
+/* Private to core/sight: how rays are looked up. Neighbours share a leaf, mostly: rays are cut into runs of one leaf,
+ * and what a leaf says is done for a run at a time. */
 #ifndef CORE_SIGHT_HITS_INSIDE_H
 #define CORE_SIGHT_HITS_INSIDE_H
 
 #include "core/sight/sight_inside.h"
 
-/* Rays ray[0 .. n-1], whose leaves are lists -> their triangles, BVH_NO_TRIANGLE for nothing. Those that the records
- * can't decide come first in ray afterwards, and have no triangle yet. Returns how many. */
-uint32_t few_decide(const struct sight *sight, const struct vec3_in *dir, const uint32_t *leaf, uint32_t *ray,
-                    uint32_t n, uint32_t *triangle);
+enum { HITS_ROOM = BVH_CHUNK + 48 }; /* arrays of a power of two would get into each other's way in a cache */
+
+/* Rays from here on, up to the next run, have this leaf. */
+struct sight_run {
+    uint32_t from, leaf;
+};
+
+/* ---- places.c */
+struct sight_places {
+    int32_t tile[HITS_ROOM], within[HITS_ROOM];
+    uint8_t changes[HITS_ROOM];
+};
+/* Cuts up to BVH_CHUNK rays into runs. Returns how many; one more then says where the last ends. */
+uint32_t sight_find_runs(const struct sight *sight, const struct vec3_floats *dir, uint32_t n,
+                         struct sight_places *places, struct sight_run *run);
+
+/* ---- few.c */
+/* Rays from .. to - 1, which have that list -> triangle[0 ..]: BVH_NO_TRIANGLE for nothing, FEW_OPEN where
+ * the records can't decide; FEW_ASK where one of them is seen at so small an angle that the BVH may not propose it. */
+enum { FEW_OPEN = 0xfffffffe, FEW_ASK = 0xfffffffd };
+void few_decide(const struct sight *sight, const struct bvh_rays *rays, const uint32_t *list, uint32_t from,
+                uint32_t to, uint32_t *triangle);
 
 #endif

@@ -54,13 +54,13 @@ static void *take_array(struct build_shared *b, struct build_arena *arena, uint6
 static int take_arrays(struct build_shared *b, struct sh_err *err)
 {
     struct sight *s = b->sight;
-    s->tile = malloc(tiles_of(s->cells) * sizeof *s->tile);
+    s->tile = malloc((tiles_of(s->cells) + 1) * sizeof *s->tile);
     s->leaf = take_array(b, &b->leaf, tiles_of(s->cells) * SIGHT_BLOCK, sizeof *s->leaf);
     s->list = take_array(b, &b->list, UINT64_MAX, sizeof *s->list);
     s->record = take_array(b, &b->record, UINT64_MAX, sizeof *s->record);
     if (s->tile == NULL || s->leaf == NULL || s->list == NULL || s->record == NULL)
         return sh_fail(err, SH_ENOMEM, "sight: no memory for %u cells", s->cells);
-    for (uint64_t i = 0; i < tiles_of(s->cells); i++)
+    for (uint64_t i = 0; i <= tiles_of(s->cells); i++)
         s->tile[i] = SIGHT_ASK;
     b->bytes = tiles_of(s->cells) * sizeof *s->tile;
     return SH_OK;
@@ -141,11 +141,14 @@ int sight_create(const struct sight_spec *spec, unsigned threads, const struct s
 {
     struct sight *s = *out = calloc(1, sizeof *s);
     struct timespec from, to;
+    double origin_m[3];
     if (s == NULL) return sh_fail(err, SH_ENOMEM, "sight: no memory");
     clock_gettime(CLOCK_MONOTONIC, &from);
     s->bvh = spec->bvh;
     memcpy(s->station_m, spec->station_m, sizeof s->station_m);
     s->exact = spec->exact;
+    bvh_origin(spec->bvh, origin_m);
+    s->among = s->exact && memcmp(origin_m, s->station_m, sizeof origin_m) == 0;
     s->cells = sight_cells(spec->rays, spec->memory_bytes);
     struct build_shared b = {.sight = s, .spec = spec, .report = report};
     b.regions = s->cells / SIGHT_TILE < BUILD_REGIONS ? s->cells / SIGHT_TILE : BUILD_REGIONS;

@@ -23,7 +23,7 @@ enum {
     SIGHT_BLOCK = SIGHT_TILE * SIGHT_TILE,
     SIGHT_MIN_CELLS = 64,
     SIGHT_MAX_CELLS = 2048, /* a cell is then a thousand times its pad */
-    SIGHT_MAX_LIST = 12,
+    SIGHT_MAX_LIST = 32,
 };
 /* Of the coordinates on a face: 8 times what single precision leaves of them. */
 #define SIGHT_PAD 0x1p-20
@@ -36,7 +36,7 @@ enum sight_kind {
     SIGHT_OTHER,
 };
 enum { SIGHT_KIND_SHIFT = 30, SIGHT_NUMBER = (1U << SIGHT_KIND_SHIFT) - 1 };
-static const uint32_t SIGHT_NOTHING = 0xffffffff, SIGHT_ASK = 0xfffffffe;
+static const uint32_t SIGHT_NOTHING = 0xffffffff, SIGHT_ASK = 0xfffffffe, SIGHT_NO_LEAF = 0xfffffffd;
 
 static inline enum sight_kind sight_kind(uint32_t leaf)
 {
@@ -61,6 +61,8 @@ struct sight_record {
  * length: 8 units of 2^-53 in core/bvh/decide.c, 10 here (the difference of the corners 1, the cross product 6,
  * the product with a direction 3), and 8 more within which decide.c takes an edge for hit. */
 #define SIGHT_EDGE_DOUBT (32.0 * 0x1p-53)
+/* Of a . (b x c), against the product of their lengths, here and in core/bvh/decide.c together. */
+#define SIGHT_VOLUME_DOUBT (32.0 * 0x1p-53)
 /* Of plane . d, against the plane's length: its components 1, the product 3; twice, here and there. */
 #define SIGHT_PLANE_DOUBT (16.0 * 0x1p-53)
 /* Sines of angles below this are not decided here: decide.c holds ranges between edges below 1e-6, and beyond
@@ -82,10 +84,10 @@ struct sight_record {
 struct sight {
     const struct bvh *bvh;
     double station_m[3];
-    int exact;
-    uint32_t cells; /* power of two */
-    uint32_t *tile; /* [SIGHT_FACES][cells / SIGHT_TILE][cells / SIGHT_TILE], v outside, u inside */
-    uint32_t *leaf; /* blocks */
+    int exact, among; /* among: the BVH misses nothing that double precision finds, and exact */
+    uint32_t cells;   /* power of two */
+    uint32_t *tile;   /* [SIGHT_FACES][cells / SIGHT_TILE][cells / SIGHT_TILE], v outside, u inside; one that asks */
+    uint32_t *leaf;   /* blocks */
     uint32_t *list;
     struct sight_record *record;
     struct sight_info info;

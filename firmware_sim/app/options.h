@@ -43,6 +43,9 @@ struct app_option {
 
 /* Rows that are the same in every table. */
 #define OPTION_SET {APP_SET, "set", "KEY=VALUE", .help = "another value of a configuration key; may be repeated"}
+#define OPTION_NO_HASH(offset) \
+    {APP_FLAG, "no-hash", NULL, .at = offset, \
+     .help = "leave stream_sha256 out of --stats (null); it takes 10 to 20 ns of processor time a pulse"}
 #define OPTION_END {.kind = APP_LAST}
 /* clang-format on */
 

@@ -16,7 +16,7 @@ struct record {
     struct app_input in;
     const char *source, *stats;
     struct record_files files;
-    int crs_given, quiet;
+    int crs_given, quiet, no_hash;
     long station; /* 0: as the head is set; APP_WORD: all */
     double wait_s;
     struct sh_report notes;  /* of the recorders */
@@ -104,7 +104,7 @@ static void warn_of_little(const struct record *r, const struct recording_result
 static int record(struct record *r, struct scanhead *sh, struct sh_err *err)
 {
     struct recording_result result = {0};
-    if (r->stats != NULL) scanhead_hash_start(sh);
+    r->recording.hash = r->stats != NULL && !r->no_hash;
     r->notes = (struct sh_report){r, print_note, print_completing, gives_up};
     r->files.recorder.report = &r->notes;
     int rc = record_files_open(&r->files, err);
@@ -177,6 +177,7 @@ static int record_config(struct config *cfg, void *ctx, struct sh_err *err)
     if (rc == SH_OK) rc = set_layout(r, cfg, err);
     if (rc == SH_OK && cfg->output.layout == LINE_GEO && cfg->output.crs == GEOREF_GEODETIC)
         rc = record_files_check_degrees(&r->files, err);
+    if (rc == SH_OK) rc = record_files_check_emitter(&r->files, cfg->profile.emitter.kind, err);
     if (rc == SH_OK) rc = offline_open(cfg, r->recording.duration_s, &app_report_stderr, &offline, err);
     r->recording.head_ends = 1;
     r->recording.prepare = prepare;
@@ -334,6 +335,7 @@ static const struct app_option OPTIONS[] = {
     {APP_FLAG, "empty-shots", NULL, .at = AT(files.recorder.empty_shots),
      .help = "keep shots without echo: .ply with NaN coordinates, .e57 with its invalid state"},
     {APP_TEXT, "stats", "FILE", .at = AT(stats), .help = "write what was received as JSON; - is standard output"},
+    OPTION_NO_HASH(AT(no_hash)),
     OPTION_SET,
     {APP_KEY_GIVEN, "crs", "CRS", .key = "output.crs", .at = AT(crs_given),
      .help = "local, ecef, utm or geodetic: write points in it, as output.layout=geo does, too"},

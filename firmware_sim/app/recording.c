@@ -351,10 +351,11 @@ int recording_run(struct scanhead *sh, const struct recording_options *options, 
     memset(result, 0, sizeof *result);
     const int64_t start_ns = clock_now_ns();
     struct recording r = {.sh = sh, .o = options, .result = result, .next_report_ns = start_ns + 1000000000};
+    if (options->hash) scanhead_hash_start(sh);
     int rc = options->listen ? record_listening(&r, err) : record_stations(&r, err);
     result->wall_s = 1e-9 * (double)(clock_now_ns() - start_ns);
     scanhead_get_stats(sh, &result->stream);
-    scanhead_hash_hex(sh, result->sha256);
+    if (options->hash) scanhead_hash_hex(sh, result->sha256);
     if (rc == SH_ECLOSED && options->listen && result->frames == 0)
         return sh_fail(err, SH_EFORMAT, "the stream ended without a single frame");
     if (rc == SH_ECLOSED && options->listen && !result->counts.within) return SH_OK;

@@ -19,6 +19,7 @@ struct recording_options {
     double duration_s;                    /* > 0: stop each scan after this device time ... */
     int head_ends;                        /* ... which the head does by itself: no command is needed */
     double replug_s;                      /* > 0: how long to wait for a head that was unplugged, to go on then */
+    int hash;                             /* keep stream_sha256 */
     int progress;                         /* 1: to the report, about once a second */
     uint64_t source_bytes;                /* of a stream in a file, for progress; 0: not known */
     const struct sh_report *report;
@@ -39,7 +40,7 @@ struct recording_result {
     char missing[128];              /* what was asked for and left out because of `interrupted`; empty: nothing */
     double wall_s;                  /* how long the recording took */
     struct scanhead_stats stream;   /* as the client counts */
-    char sha256[65];                /* of the stream, where scanhead_hash_start was called */
+    char sha256[65];                /* of the stream; empty where none was kept */
     uint64_t replugs, broken_scans; /* how often the head was away and came back; scans in which it was away */
     uint64_t bus_resets;            /* how often its USB bus was reset, which ended the session */
 };

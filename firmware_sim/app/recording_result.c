@@ -31,7 +31,7 @@ void recording_put(struct json *json, const void *ctx)
     json_double(json, "wall_s", result->wall_s);
     json_double(json, "cpu_s", clock_cpu_s());
     json_double(json, "pulses_per_s", result->wall_s > 0.0 ? (double)counts->pulses / result->wall_s : 0.0);
-    json_string(json, "stream_sha256", result->sha256);
+    json_string(json, "stream_sha256", result->sha256[0] != '\0' ? result->sha256 : NULL);
     json_close_object(json);
 }
 

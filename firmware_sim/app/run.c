@@ -17,7 +17,7 @@ struct run_options {
     struct device_options device;
     const char *stats;
     long ready_fd;
-    int quiet, frames_given;
+    int quiet, no_hash, frames_given;
 };
 
 static void say_what_runs(const struct config *cfg, const struct site *site, const struct loop *loop)
@@ -166,7 +166,7 @@ static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
     struct site *site = NULL;
     struct device *device = NULL;
     struct loop *loop = NULL;
-    struct loop_options options = {.hash = o->stats != NULL, .report = &app_report_stderr};
+    struct loop_options options = {.hash = o->stats != NULL && !o->no_hash, .report = &app_report_stderr};
     o->device.start |= cfg->head.start;
     o->device.one_scan = o->device.one_scan && o->device.start;
     if (cfg->n_links == 0)
@@ -225,6 +225,7 @@ static const struct app_option OPTIONS[] = {
     {APP_KEY, "threads", "N", .key = "loop.threads", .help = "threads that cast; 0: one per processor"},
     OPTION_SET,
     {APP_TEXT, "stats", "FILE", .at = AT(stats), .help = "write statistics as JSON at the end; - is standard output"},
+    OPTION_NO_HASH(AT(no_hash)),
     {APP_TEXT, "journal", "FILE", .at = AT(device.journal),
      .help = "write every command that had an effect, with its device time, and the end"},
     {APP_TEXT, "replay-journal", "FILE", .at = AT(device.replay),

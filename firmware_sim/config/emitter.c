@@ -114,8 +114,8 @@ static void set_beams(struct cfg_reader *rd, struct config_profile *p)
         cfg_fail_key(rd, "firing_ns", 0, "%.15g ns are longer than a turn at lines_max_hz; allowed up to %.15g ns",
                      firing_ns, 1e9 / lines_max_hz);
     else if (1e9 * c->n_beams / firing_ns > PRR_MOST_HZ)
-        cfg_fail_key(rd, "firing_ns", 0, "%u beams in %.15g ns make %.10g pulses/s; allowed up to %.10g", c->n_beams,
-                     firing_ns, 1e9 * c->n_beams / firing_ns, PRR_MOST_HZ);
+        cfg_fail_key(rd, "firing_ns", 0, "%u beam%s in %.15g ns make %.10g pulses/s; allowed up to %.10g", c->n_beams,
+                     c->n_beams == 1 ? "" : "s", firing_ns, 1e9 * c->n_beams / firing_ns, PRR_MOST_HZ);
     else
         p->prr_min_uhz = p->prr_max_uhz = emitter_rate_uhz(&p->emitter);
 }

@@ -16,7 +16,6 @@ struct hasher {
     struct stream *stream;
     struct sha256_ctx sha;
     int wake_fd;
-    struct ring_copy tick;
     uint64_t cursor;
     uint32_t next_seq;
     int lost;
@@ -38,25 +37,32 @@ static void hash_frames(struct hasher *h, const uint8_t *bytes, uint32_t len)
     }
 }
 
+/* Hashes the next tick, where it lies in the ring. */
+static enum ring_read take_tick(struct hasher *h)
+{
+    struct ring *ring = &h->stream->ring;
+    struct ring_copy tick = {.buf = NULL};
+    enum ring_read got = ring_look(ring, STREAM_HASH_READER, h->cursor, &tick);
+    if (got == RING_READ && tick.n_frames != 0) {
+        /* Nobody is woken for empty ticks, so old ones may be gone; only a gap in the numbers is a loss. */
+        if (tick.first_seq != h->next_seq) h->lost = 1;
+        h->next_seq = tick.first_seq + tick.n_frames;
+        hash_frames(h, tick.buf, tick.len);
+    }
+    ring_leave(ring, STREAM_HASH_READER);
+    return got;
+}
+
 static void *hasher_main(void *arg)
 {
     struct hasher *h = arg;
-    struct ring_copy *tick = &h->tick;
     for (;;) {
         int over = atomic_load(&h->stream->over);
-        enum ring_read got = ring_read(&h->stream->ring, STREAM_HASH_READER, h->cursor, tick);
-        if (got == RING_NONE) {
+        if (take_tick(h) == RING_NONE) {
             eventfd_t n;
             stream_rest_reader(h->stream);
             if (over || (eventfd_read(h->wake_fd, &n) != 0 && errno != EINTR)) break;
             continue;
-        }
-        if (got == RING_READ && tick->n_frames != 0) {
-            /* Nobody is woken for empty ticks, so old ones may be gone; only a gap in the numbers is a
-             * loss. */
-            if (tick->first_seq != h->next_seq) h->lost = 1;
-            h->next_seq = tick->first_seq + tick->n_frames;
-            hash_frames(h, tick->buf, tick->len);
         }
         stream_move_reader(h->stream, STREAM_HASH_READER, ++h->cursor);
     }
@@ -66,7 +72,6 @@ static void *hasher_main(void *arg)
 static void hasher_free(struct hasher *h)
 {
     if (h->wake_fd >= 0) close(h->wake_fd);
-    free(h->tick.buf);
     free(h);
 }
 
@@ -76,11 +81,9 @@ int hasher_start(struct stream *stream, struct hasher **out, struct sh_err *err)
     struct hasher *h = calloc(1, sizeof *h);
     if (h == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     h->stream = stream;
-    h->tick.cap = stream->tick_bytes;
-    h->tick.buf = malloc(h->tick.cap);
     h->wake_fd = eventfd(0, EFD_CLOEXEC);
     sha256_init(&h->sha);
-    int failed = h->tick.buf == NULL ? ENOMEM : h->wake_fd < 0 ? errno : 0;
+    int failed = h->wake_fd < 0 ? errno : 0;
     if (failed == 0) failed = pthread_create(&h->thread, NULL, hasher_main, h);
     if (failed != 0) {
         hasher_free(h);

@@ -2,6 +2,7 @@
  * own, and reported to the error queue. Pulses that the head could not compute in time are another matter:
  * device/overrun.c. */
 #include <stdio.h>
+#include <string.h>
 
 #include "drivers/protocol/native_encode.h"
 #include "firmware_sim/loop/pump_inside.h"
@@ -32,14 +33,18 @@ void session_count_units(struct pump *pump, struct session *s, uint64_t n)
     report(pump, s);
 }
 
-/* Announces it to the reader in a frame of its own. */
-static void announce(struct pump *pump, struct session *s, uint32_t frames, uint64_t pulses)
+/* Announces it to the reader in a frame of its own, before the tick's: these make room for it. */
+static void announce(struct pump *pump, struct session *s, const struct ring_copy *tick, uint32_t frames,
+                     uint64_t pulses)
 {
+    uint8_t said[REPLY_ROOM / 8];
     struct native_event event = {.code = NATIVE_EV_READER_LOST, .a = frames, .b = pulses, .c = s->lost.frames};
     int64_t now_ns = (int64_t)stream_released(pump->stream) * pump->stream->tick_ns;
     snprintf(event.text, sizeof event.text, "%u frames lost: the reader is too slow", frames);
-    s->out_len +=
-        (uint32_t)native_encode_event(s->out + s->out_len, pump->out_cap - s->out_len, &event, now_ns, NATIVE_LOCAL);
+    const size_t len = native_encode_event(said, sizeof said, &event, now_ns, NATIVE_LOCAL);
+    memmove(tick->buf + len, tick->buf, tick->len);
+    memcpy(tick->buf, said, len);
+    s->out_len += (uint32_t)len;
 }
 
 uint32_t session_check_lost(struct pump *pump, struct session *s, const struct ring_copy *tick, uint64_t released)
@@ -52,7 +57,7 @@ uint32_t session_check_lost(struct pump *pump, struct session *s, const struct r
         s->lost.frames += frames;
         count_lost(pump, frames, pulses);
         report(pump, s);
-        if (pump->protocol->passes_native) announce(pump, s, frames, pulses);
+        if (pump->protocol->passes_native) announce(pump, s, tick, frames, pulses);
     } else if (released - s->cursor < pump->stream->ring.queue_ticks / 8 && s->units.n == 0) {
         s->lost.lagging = 0;
     }

@@ -80,7 +80,8 @@ void session_close(struct pump *pump, struct session *s);
 int session_write(struct pump *pump, struct session *s, int index);
 
 /* lost_frames.c: the one place that counts what a reader got and what it lost. */
-/* Compares the number of a tick's first frame with the one expected, and counts a gap; a native reader is told.
+/* Compares the number of a tick's first frame with the one expected, and counts a gap; a native reader is told, in a
+ * frame before the tick's, which lie at the end of its buffer with REPLY_ROOM / 8 bytes free after them.
  * `released`: ticks released when the tick was read. Returns how many frames are missing. */
 uint32_t session_check_lost(struct pump *pump, struct session *s, const struct ring_copy *tick, uint64_t released);
 /* Counts n units of a protocol. */

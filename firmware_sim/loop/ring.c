@@ -131,7 +131,7 @@ int ring_lose(struct ring *ring, uint64_t tick)
     return 1;
 }
 
-enum ring_read ring_read(struct ring *ring, int reader, uint64_t tick, struct ring_copy *copy)
+enum ring_read ring_look(struct ring *ring, int reader, uint64_t tick, struct ring_copy *copy)
 {
     uint64_t released = atomic_load(&ring->released);
     if (tick >= released) return RING_NONE;
@@ -140,16 +140,27 @@ enum ring_read ring_read(struct ring *ring, int reader, uint64_t tick, struct ri
      * old. */
     released = atomic_load(&ring->released);
     struct ring_slot *slot = slot_of(ring, tick);
-    enum ring_read result = RING_LOST;
-    if (tick + ring->queue_ticks >= released && atomic_load(&slot->state) == state_of(tick, READY)) {
-        copy->len = slot->tick.len;
-        copy->n_frames = slot->n_frames;
-        copy->first_seq = slot->first_seq;
-        copy->n_cast = slot->tick.n_cast;
-        copy->pulses_before = slot->pulses_before;
-        if (copy->len != 0 && copy->len <= copy->cap) memcpy(copy->buf, slot->tick.bytes, copy->len);
-        result = RING_READ;
-    }
+    if (tick + ring->queue_ticks < released || atomic_load(&slot->state) != state_of(tick, READY)) return RING_LOST;
+    copy->buf = slot->tick.bytes;
+    copy->len = slot->tick.len;
+    copy->n_frames = slot->n_frames;
+    copy->first_seq = slot->first_seq;
+    copy->n_cast = slot->tick.n_cast;
+    copy->pulses_before = slot->pulses_before;
+    return RING_READ;
+}
+
+void ring_leave(struct ring *ring, int reader)
+{
     atomic_store(&ring->hazard[reader], 0);
+}
+
+enum ring_read ring_read(struct ring *ring, int reader, uint64_t tick, struct ring_copy *copy)
+{
+    uint8_t *to = copy->buf;
+    enum ring_read result = ring_look(ring, reader, tick, copy);
+    if (result == RING_READ && copy->len != 0 && copy->len <= copy->cap) memcpy(to, copy->buf, copy->len);
+    copy->buf = to;
+    ring_leave(ring, reader);
     return result;
 }

@@ -7,7 +7,7 @@
  * released.
  *
  * Nobody waits for a reader here (stream.h does, in the paces fast and step). A reader in the middle of a
- * copy says so (hazard), and the slot is not claimed until the copy is over.
+ * copy, or of a look, says so (hazard), and the slot is not claimed until that is over.
  *
  * Memory: each slot has room for a usual tick from the start, and more once a tick needed more. The caster
  * makes that room while the slot is its own, so that the pacing thread never allocates.
@@ -111,5 +111,9 @@ enum ring_read { RING_READ, RING_NONE, RING_LOST };
 /* Copies the frames of `tick`. RING_NONE: it is not released yet. RING_LOST: it is too old, or the head
  * itself lost it. RING_READ with len > cap: it did not fit, and nothing was copied. */
 enum ring_read ring_read(struct ring *ring, int reader, uint64_t tick, struct ring_copy *copy);
+/* The same without a copy, for readers that never wait: buf is the slot's own, until ring_leave. cap is not looked at.
+ * ring_leave may follow any result. */
+enum ring_read ring_look(struct ring *ring, int reader, uint64_t tick, struct ring_copy *copy);
+void ring_leave(struct ring *ring, int reader);
 
 #endif

@@ -55,9 +55,9 @@ void session_close(struct pump *pump, struct session *s)
 static int take_tick(struct pump *pump, struct session *s)
 {
     struct ring *ring = &pump->stream->ring;
-    uint32_t at = s->out_len + REPLY_ROOM / 8; /* leaves room for a frame that says what was lost */
-    if (at >= pump->out_cap) return 0;
-    struct ring_copy tick = {.buf = s->out + at, .cap = pump->out_cap - at};
+    uint32_t end = s->out_len + REPLY_ROOM / 8; /* leaves room for a frame that says what was lost */
+    if (end >= pump->out_cap) return 0;
+    struct ring_copy tick = {.buf = s->out + s->out_len, .cap = pump->out_cap - end};
     enum ring_read got = ring_read(ring, s->reader, s->cursor, &tick);
     if (got == RING_NONE || (got == RING_READ && tick.len > tick.cap)) return 0;
     uint64_t released = stream_released(pump->stream);
@@ -68,7 +68,6 @@ static int take_tick(struct pump *pump, struct session *s)
     s->cursor++;
     if (got != RING_READ) return 1;
     session_check_lost(pump, s, &tick, released);
-    memmove(s->out + s->out_len, tick.buf, tick.len);
     s->out_len += tick.len;
     return 1;
 }

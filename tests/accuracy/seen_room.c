@@ -182,7 +182,6 @@ static void open_sights(struct seen_room *r, const double at_m[3])
     memcpy(spec.station_m, at_m, sizeof spec.station_m);
     must(sight_create(&spec, 2, NULL, &r->sight, &err), &err);
     spec.exact = 1;
-    spec.bvh = r->ordered;
     must(sight_create(&spec, 2, NULL, &r->exact, &err), &err);
 }
 

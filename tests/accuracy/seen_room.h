@@ -14,7 +14,7 @@ struct seen_room {
     struct scene *scene, *body_scene; /* a box that moves */
     struct bvh *bvh, *ordered;        /* of the same scene; ordered exactly */
     struct bvh *body;
-    struct sight *sight, *exact; /* of bvh; of ordered, exact */
+    struct sight *sight, *exact; /* of bvh: as it is, and with exact order */
     struct georef *georef;
     struct surface_table table;
     uint16_t kind[ROOM_LABELS];

@@ -51,6 +51,7 @@ struct look {
     struct odd_scene odd;
     struct scene *scene;
     struct bvh *plain, *ordered; /* the second one orders surfaces exactly */
+    double reach_m;              /* of the station from their origin */
 };
 
 /* A cap about an axis, as a head sees that doesn't turn all the way round. */
@@ -70,7 +71,7 @@ static void make_bvhs(struct look *look)
     double origin_m[3], off_m = case_between(&look->random, 0, 3) ? 0.0 : 50.0 * case_unit(&look->random);
     memcpy(origin_m, look->odd.station_m, sizeof origin_m);
     origin_m[look->number % 3] += off_m;
-    const double reach_m = vec3_distance(origin_m, look->odd.station_m);
+    const double reach_m = look->reach_m = vec3_distance(origin_m, look->odd.station_m);
     if (bvh_create(look->scene, origin_m, reach_m, 1, NULL, &look->plain, &err) != SH_OK ||
         bvh_create(look->scene, origin_m, reach_m, 1, NULL, &look->ordered, &err) != SH_OK ||
         bvh_order_exactly(look->ordered, NULL, &err) != SH_OK)
@@ -126,11 +127,11 @@ static void look_through_sight(struct look *look, int exact, uint32_t rays, stru
     tally->differ += beside.differ;
     for (int i = 0; i < ODD_PARTS; i++)
         tally->differ_by_part[i] += look->odd.parts >> i & 1 ? beside.differ : 0;
-    if (beside.differ != 0 && tally->wrong_scenes++ < 20) {
-        printf("# scene %llu, %u triangles, station %s, exact %d, for %.3g rays, %llu bytes, %u cells%s: %llu of %u "
-               "rays differ\n",
-               (unsigned long long)look->number, look->scene->n_triangles, look->odd.stands, exact, spec.rays,
-               (unsigned long long)spec.memory_bytes, beside.info.cells, spec.sees != NULL ? ", a cap" : "",
+    if (beside.differ != 0 && tally->wrong_scenes++ < 2000) {
+        printf("# scene %llu, %u triangles, station %s, exact %d, BVH %.3g m off, for %.3g rays, %llu bytes, %u "
+               "cells%s: %llu of %u rays differ\n",
+               (unsigned long long)look->number, look->scene->n_triangles, look->odd.stands, exact, look->reach_m,
+               spec.rays, (unsigned long long)spec.memory_bytes, beside.info.cells, spec.sees != NULL ? ", a cap" : "",
                (unsigned long long)beside.differ, rays);
         sight_beside_print(&beside);
         print_truth(look, &beside);

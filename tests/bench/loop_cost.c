@@ -47,7 +47,7 @@ struct costs {
 };
 
 static char folder[] = "/tmp/scanhead-loop-XXXXXX";
-static char config_path[PATH_ROOM], mesh_path[PATH_ROOM], stats_path[PATH_ROOM];
+static char config_path[PATH_ROOM], mesh_path[PATH_ROOM], stats_path[PATH_ROOM], messages_path[PATH_ROOM];
 
 /* ---- what is scanned */
 
@@ -125,9 +125,19 @@ static void become(const struct options *o, const char *program, double seconds)
     while (n < MAX_WORDS && (arg[n] = strtok_r(NULL, " ", &save)) != NULL)
         n++;
     arg[n] = NULL;
+    if (freopen(messages_path, "w", stderr) == NULL) _exit(127);
     execvp(arg[0], arg);
-    fprintf(stderr, "loop_cost: %s: %s\n", arg[0], strerror(errno));
+    perror(arg[0]);
     _exit(127);
+}
+
+static void show_messages(void)
+{
+    char line[512];
+    FILE *f = fopen(messages_path, "r");
+    while (f != NULL && fgets(line, sizeof line, f) != NULL)
+        fputs(line, stderr);
+    if (f != NULL) fclose(f);
 }
 
 static int run_once(const struct options *o, const char *program, double seconds, struct figures *out,
@@ -138,8 +148,9 @@ static int run_once(const struct options *o, const char *program, double seconds
     pid_t pid = fork();
     if (pid < 0) return sh_fail(err, SH_EIO, "fork: %s", strerror(errno));
     if (pid == 0) become(o, program, seconds);
-    if (waitpid(pid, &status, 0) != pid || status != 0) return sh_fail(err, SH_EIO, "%s failed", program);
-    return read_figures(out, err);
+    if (waitpid(pid, &status, 0) == pid && status == 0) return read_figures(out, err);
+    show_messages();
+    return sh_fail(err, SH_EIO, "%s failed", program);
 }
 
 /* ---- all of them */
@@ -226,6 +237,7 @@ int main(int argc, char **argv)
     if (mkdtemp(folder) == NULL) return BENCH_FAILED;
     snprintf(config_path, sizeof config_path, "%s/terrain.yaml", folder);
     snprintf(mesh_path, sizeof mesh_path, "%s/terrain.obj", folder);
+    snprintf(messages_path, sizeof messages_path, "%s/messages", folder);
     snprintf(stats_path, sizeof stats_path, "%s/stats.json", folder);
     int rc = o.config != NULL ? SH_OK : write_mesh(&err);
     if (rc == SH_OK && o.config == NULL) rc = write_config(&err);
@@ -233,6 +245,7 @@ int main(int argc, char **argv)
     unlink(config_path);
     unlink(mesh_path);
     unlink(stats_path);
+    unlink(messages_path);
     rmdir(folder);
     if (rc != SH_OK) fprintf(stderr, "loop_cost: %s\n", err.text);
     return rc == SH_OK ? BENCH_OK : BENCH_FAILED;

@@ -6,22 +6,35 @@
 
 enum { PART = 4 * BVH_CHUNK };
 
+static int take_works(struct sight_beside *beside, struct sh_err *err)
+{
+    int rc = sight_work_create(&beside->work, err);
+    if (rc == SH_OK) rc = bvh_work_create(&beside->bvh_work, err);
+    if (rc != SH_OK) sight_beside_free(beside);
+    return rc;
+}
+
 int sight_beside_create(const struct sight_spec *spec, const struct bvh *bvh, struct sight_beside *out,
                         struct sh_err *err)
 {
     *out = (struct sight_beside){.bvh = bvh};
     memcpy(out->station_m, spec->station_m, sizeof out->station_m);
     int rc = sight_create(spec, 1, NULL, &out->sight, err);
-    if (rc == SH_OK) rc = sight_work_create(&out->work, err);
-    if (rc == SH_OK) rc = bvh_work_create(&out->bvh_work, err);
-    if (rc == SH_OK) sight_get_info(out->sight, &out->info);
-    if (rc != SH_OK) sight_beside_free(out);
-    return rc;
+    if (rc != SH_OK) return rc;
+    sight_get_info(out->sight, &out->info);
+    return take_works(out, err);
+}
+
+int sight_beside_join(const struct sight_beside *other, struct sight_beside *out, struct sh_err *err)
+{
+    *out = (struct sight_beside){.bvh = other->bvh, .sight = other->sight, .borrowed = 1, .info = other->info};
+    memcpy(out->station_m, other->station_m, sizeof out->station_m);
+    return take_works(out, err);
 }
 
 void sight_beside_free(struct sight_beside *beside)
 {
-    sight_free(beside->sight);
+    if (!beside->borrowed) sight_free(beside->sight);
     if (beside->work != NULL) sight_work_free(beside->work);
     if (beside->bvh_work != NULL) bvh_work_free(beside->bvh_work);
     beside->sight = NULL;
@@ -76,6 +89,18 @@ static struct bvh_rays rays_of(const struct sight_beside *beside, uint32_t n, co
                              .steep = to->steep};
 }
 
+static void compare(struct sight_beside *beside, uint32_t n, const struct vec3_in *dir, const struct results *bvh,
+                    const struct results *sight)
+{
+    for (uint32_t i = 0; i < n; i++) {
+        beside->hits += bvh->triangle[i] != BVH_NO_TRIANGLE;
+        if (is_same(bvh, sight, i)) continue;
+        keep(beside, dir, bvh, sight, i);
+        beside->differ++;
+    }
+    beside->rays += n;
+}
+
 static void cast_part(struct sight_beside *beside, uint32_t n, const struct vec3_in *dir, double range_max_m,
                       struct results *sight)
 {
@@ -85,13 +110,14 @@ static void cast_part(struct sight_beside *beside, uint32_t n, const struct vec3
     rays = rays_of(beside, n, dir, range_max_m, sight);
     memset(sight, 0x5a, sizeof *sight); /* what is not written differs */
     sight_hits(beside->work, beside->bvh_work, beside->sight, &rays);
-    for (uint32_t i = 0; i < n; i++) {
-        beside->hits += bvh.triangle[i] != BVH_NO_TRIANGLE;
-        if (is_same(&bvh, sight, i)) continue;
-        keep(beside, dir, &bvh, sight, i);
-        beside->differ++;
-    }
-    beside->rays += n;
+    compare(beside, n, dir, &bvh, sight);
+}
+
+static void count(struct sight_beside *beside)
+{
+    const struct sight_counters *counters = sight_work_counters(beside->work);
+    beside->few = counters->few;
+    beside->asked = counters->asked;
 }
 
 void sight_beside_cast(struct sight_beside *beside, uint32_t n, const struct vec3_in *dir, double range_max_m,
@@ -105,9 +131,24 @@ void sight_beside_cast(struct sight_beside *beside, uint32_t n, const struct vec
         if (range_m != NULL) memcpy(range_m + at, sight.range_m, some * sizeof *range_m);
         if (triangle != NULL) memcpy(triangle + at, sight.triangle, some * sizeof *triangle);
     }
-    const struct sight_counters *counters = sight_work_counters(beside->work);
-    beside->few = counters->few;
-    beside->asked = counters->asked;
+    count(beside);
+}
+
+void sight_beside_check(struct sight_beside *beside, uint32_t n, const struct vec3_in *dir, double range_max_m,
+                        const double *range_m, const uint32_t *triangle)
+{
+    struct results bvh, sight;
+    for (uint32_t at = 0; at < n; at += PART) {
+        const uint32_t some = n - at < PART ? n - at : PART;
+        const struct vec3_in part = VEC3_IN(*dir, at);
+        const struct bvh_rays rays = rays_of(beside, some, &part, range_max_m, &sight);
+        sight_hits(beside->work, beside->bvh_work, beside->sight, &rays);
+        bvh = sight;
+        memcpy(bvh.range_m, range_m + at, some * sizeof *range_m);
+        memcpy(bvh.triangle, triangle + at, some * sizeof *triangle);
+        compare(beside, some, &part, &bvh, &sight);
+    }
+    count(beside);
 }
 
 void sight_beside_print(const struct sight_beside *beside)

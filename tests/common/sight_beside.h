@@ -16,6 +16,7 @@ struct sight_difference {
 struct sight_beside {
     const struct bvh *bvh; /* what the sight is compared with */
     struct sight *sight;
+    int borrowed; /* the sight is another one's */
     struct sight_info info;
     double station_m[3];
     uint64_t rays, hits, few, asked;
@@ -29,10 +30,15 @@ struct sight_beside {
  * one over the same scene that orders exactly. */
 int sight_beside_create(const struct sight_spec *spec, const struct bvh *bvh, struct sight_beside *out,
                         struct sh_err *err);
+/* The same sight for another thread; `other` must outlive it. */
+int sight_beside_join(const struct sight_beside *other, struct sight_beside *out, struct sh_err *err);
 void sight_beside_free(struct sight_beside *beside);
 /* range_m and triangle: what the sight says of each; NULL: not wanted. */
 void sight_beside_cast(struct sight_beside *beside, uint32_t n, const struct vec3_in *dir, double range_max_m,
                        double *range_m, uint32_t *triangle);
+/* Compares with hits that the BVH has given already, for all n in one call; of labels it says nothing. */
+void sight_beside_check(struct sight_beside *beside, uint32_t n, const struct vec3_in *dir, double range_max_m,
+                        const double *range_m, const uint32_t *triangle);
 /* What there is to say of the first rays that differ, on standard output, as TAP comments. */
 void sight_beside_print(const struct sight_beside *beside);
 

@@ -6,6 +6,9 @@
 #include <string.h>
 
 #include "core/rng.h"
+#include "tests/common/sight_beside.h"
+
+static const double RANGE_MAX_M = 1e5;
 
 static double distance_m(const double a[3], const double b[3])
 {
@@ -126,10 +129,27 @@ void rig_look(struct rig *rig)
     }
 }
 
+/* For as many rays as a quick scan has. */
+static void check_sight(struct rig *rig)
+{
+    struct sight_beside beside;
+    struct sh_err err;
+    struct sight_spec spec = {.bvh = rig->bvh, .rays = 1e6, .memory_bytes = 64 << 20, .exact = rig->exact_order};
+    const struct vec3_in dir = {rig->dx, rig->dy, rig->dz};
+    memcpy(spec.station_m, rig->station_m, sizeof spec.station_m);
+    if (sight_beside_create(&spec, rig->bvh, &beside, &err) != SH_OK) fail_msg("%s", err.text);
+    sight_beside_check(&beside, rig->n, &dir, RANGE_MAX_M, rig->range_m, rig->triangle);
+    sight_beside_print(&beside);
+    const uint64_t differ = beside.differ;
+    sight_beside_free(&beside);
+    if (differ != 0) fail_msg("%llu of %u rays differ by sight", (unsigned long long)differ, rig->n);
+}
+
 void rig_cast(struct rig *rig)
 {
-    hits_from(rig->caster, rig->bvh, rig->station_m, 1e5, rig->n, rig->dx, rig->dy, rig->dz, rig->range_m,
-                rig->triangle);
+    hits_from(rig->caster, rig->bvh, rig->station_m, RANGE_MAX_M, rig->n, rig->dx, rig->dy, rig->dz, rig->range_m,
+              rig->triangle);
+    check_sight(rig);
 }
 
 void rig_cast_naive(struct rig *rig, const double origin_m[3], int robust, unsigned packet)

@@ -1,4 +1,7 @@
 /* Casting: ranges against planes worked out in long double, independence of the cuts, limits and noise. */
+#include <math.h>
+
+#include "core/cast/kernels.h"
 #include "tests/common/hits.h"
 #include "tests/unit/cast_rig.h"
 
@@ -247,6 +250,16 @@ static void blocks_carry_the_schedule_s_times(void **state)
     cast_rig_close(rig);
 }
 
+/* Both limits are within. */
+static void limits_are_allowed_ranges(void **state)
+{
+    (void)state;
+    double range_m[] = {1.0, 2.0, nextafter(1.0, 0.0), nextafter(2.0, 3.0), NAN};
+    kernel_limit(range_m, 1.0, 2.0, 5);
+    assert_true(range_m[0] == 1.0 && range_m[1] == 2.0);
+    assert_true(isnan(range_m[2]) && isnan(range_m[3]) && isnan(range_m[4]));
+}
+
 /* Two walls, one behind the other, seen head on. Nearer than the head can measure: the beam is blocked all
  * the same. */
 static void limits_block_or_swallow_the_echo(void **state)
@@ -259,7 +272,8 @@ static void limits_block_or_swallow_the_echo(void **state)
     static const struct {
         double min, max;
         int hit;
-    } limit[] = {{0, 10, 1}, {1.001, 10, 0}, {0.999, 10, 1}, {1, 1, 1}, {0, 0.999, 0}, {2, 6, 0}, {0, 1.001, 1}};
+    } limit[] = {{0, 10, 1},    {1.001, 10, 0}, {0.999, 10, 1}, {0.9999999999999998, 1.0000000000000002, 1},
+                 {0, 0.999, 0}, {2, 6, 0},      {0, 1.001, 1}}; /* the fourth: level but for the mirror's last bit */
     struct scene *scene;
     struct sh_err err;
     if (scene_from_arrays(&(struct scene_arrays){vertex, 8, triangle, 4, NULL, NULL, 0}, &scene, &err) != 0)
@@ -402,6 +416,7 @@ int main(void)
         cmocka_unit_test(the_width_of_packets_does_not_matter),
         cmocka_unit_test(cuts_leave_no_trace),
         cmocka_unit_test(blocks_carry_the_schedule_s_times),
+        cmocka_unit_test(limits_are_allowed_ranges),
         cmocka_unit_test(limits_block_or_swallow_the_echo),
         cmocka_unit_test(noise_has_its_sigma),
     };

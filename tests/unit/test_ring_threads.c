@@ -10,13 +10,15 @@
 
 /* Two casters fill slots with what only a tick's number tells; the pacing thread
  * releases them, numbers their frames, and gives up what is not ready where the test says so; it waits for
- * two of the readers, as in the pace `fast`, and not for the third. Slots grow all the while. */
+ * two of the readers, as in the pace `fast`, and not for the slow ones; one of these looks at slots where they lie.
+ * Slots grow all the while. For one tick in seven caster and pacing thread race: 8,600 times, so that what goes wrong
+ * once in 2,900 races is seen in 95 of 100 runs. */
 #ifdef SH_SANITIZE /* sanitizers are for the code, not for the count */
 enum { TICKS = 30000 };
 #else
-enum { TICKS = 120000 };
+enum { TICKS = 60000 };
 #endif
-enum { CASTERS = 2, READERS = 3, SLOW = 2, MAX_BYTES = 3 * SLOT_BYTES };
+enum { CASTERS = 2, READERS = 4, SLOW = 2, LOOKING = 3, MAX_BYTES = 3 * SLOT_BYTES };
 
 static struct {
     pthread_mutex_t claim_lock;
@@ -78,7 +80,7 @@ static void *caster_main(void *arg)
 static int readers_have_room(uint64_t tick)
 {
     for (int r = 0; r < READERS; r++)
-        if (r != SLOW && atomic_load(&all.cursor[r]) + QUEUE <= tick + 1) return 0;
+        if (r < SLOW && atomic_load(&all.cursor[r]) + QUEUE <= tick + 1) return 0;
     return 1;
 }
 
@@ -126,7 +128,9 @@ static void *reader_main(void *arg)
     struct ring_copy copy = {.buf = bytes, .cap = sizeof bytes};
     uint32_t next_seq = 0;
     for (uint64_t tick = 0; tick < TICKS;) {
-        switch (ring_read(&ring, me, tick, &copy)) {
+        const enum ring_read got =
+            me == LOOKING ? ring_look(&ring, me, tick, &copy) : ring_read(&ring, me, tick, &copy);
+        switch (got) {
         case RING_NONE:
             sched_yield();
             continue;
@@ -138,13 +142,16 @@ static void *reader_main(void *arg)
             break;
         case RING_READ:
             all.got[me]++;
+            for (int i = 0; me == LOOKING && i < 20; i++)
+                sched_yield();
             if (!is_whole(tick, &copy) || copy.first_seq < next_seq) atomic_fetch_add(&all.bad, 1);
-            if (me != SLOW && copy.first_seq != next_seq) atomic_fetch_add(&all.bad, 1);
+            if (me < SLOW && copy.first_seq != next_seq) atomic_fetch_add(&all.bad, 1);
             next_seq = copy.first_seq + copy.n_frames;
             for (int i = 0; me == SLOW && i < 20; i++)
                 sched_yield();
             break;
         }
+        ring_leave(&ring, me);
         atomic_store(&all.cursor[me], ++tick);
     }
     return NULL;
@@ -171,15 +178,16 @@ static void no_tick_is_torn_with_all_threads_at_work(void **state)
     uint64_t head_lost = 0;
     for (int i = 0; i < TICKS; i++)
         head_lost += all.head_lost[i];
-    print_message("# %u ticks, %u lost by the head; the slow reader got %u\n", (unsigned)TICKS, (unsigned)head_lost,
-                  (unsigned)all.got[SLOW]);
+    print_message("# %u ticks, %u lost by the head; the slow readers got %u and %u\n", (unsigned)TICKS,
+                  (unsigned)head_lost, (unsigned)all.got[SLOW], (unsigned)all.got[LOOKING]);
     assert_true(atomic_load(&all.bad) == 0);
     for (int i = 0; i < READERS; i++) {
         assert_true(all.got[i] + all.too_old[i] + all.lost_by_head[i] == TICKS);
         assert_true(all.lost_by_head[i] == head_lost);
-        if (i != SLOW) assert_true(all.too_old[i] == 0); /* they were waited for */
+        if (i < SLOW) assert_true(all.too_old[i] == 0); /* they were waited for */
     }
-    assert_true(all.got[SLOW] > 0 && all.too_old[SLOW] > 0);
+    for (int i = SLOW; i < READERS; i++)
+        assert_true(all.got[i] > 0 && all.too_old[i] > 0);
 }
 
 int main(void)

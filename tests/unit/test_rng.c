@@ -142,6 +142,50 @@ static void nothing_lies_beyond_the_largest(void **state)
     }
 }
 
+/* Box and Muller's formula in long double, whose mantissa is 2048 times finer. */
+static double error_of(uint64_t bits)
+{
+    const long double h = ((long double)(bits >> 32) + 0.5L) * 0x1p-32L,
+                      a = (long double)(bits & 0xffffffffU) * 0x1p-32L;
+    /* log1p: near 1 the logarithm goes through 0. cos(2 pi a) as a sine: likewise at quarters of a turn. */
+    const long double radius = sqrtl(-2.0L * (h > 0.5L ? log1pl(h - 1.0L) : logl(h)));
+    const long double two_pi = 6.283185307179586476925286766559L;
+    return fabs((double)((long double)rng_normal_of(bits) - radius * sinl(two_pi * (fabsl(a - 0.5L) - 0.25L))));
+}
+
+/* The tail, too: all radii down to the smallest and up to the largest, at angles all around. */
+static void the_arithmetic_is_good_to_4e_12(void **state)
+{
+    (void)state;
+    const uint64_t key = rng_key(11, RNG_RANGE);
+    double worst = 0.0;
+    for (uint64_t i = 0; i < N; i++)
+        worst = fmax(worst, error_of(rng_u64(key, i)));
+    for (uint64_t power = 0; power < 32; power++)
+        for (uint64_t beside = 0; beside < 2000; beside++) {
+            const uint64_t h = (UINT64_C(1) << power) + beside - 1000, l = rng_u64(key, beside);
+            worst = fmax(worst, error_of(h << 32 | (l & 0xffffffffU)));
+            worst = fmax(worst, error_of(~h << 32 | (l & 0xffffffffU)));
+            worst = fmax(worst, error_of(l << 32 | (h & 0xffffffffU)));
+        }
+    print_message("# worst error %.3g of a standard deviation\n", worst);
+    assert_true(worst < 4e-12);
+}
+
+/* Blocks give what pulses give one by one. */
+static void a_block_is_its_pulses(void **state)
+{
+    (void)state;
+    uint64_t pulse[RNG_BLOCK + 5], bits[RNG_BLOCK], key = rng_key(12, RNG_RANGE);
+    for (uint64_t i = 0; i < RNG_BLOCK + 5; i++)
+        pulse[i] = i * 77;
+    assert_int_equal(rng_bits(key, pulse, RNG_BLOCK + 5, bits), RNG_BLOCK);
+    for (uint64_t i = 0; i < RNG_BLOCK; i++)
+        assert_true(rng_normal_of(bits[i]) == rng_normal(key, pulse[i]));
+    assert_int_equal(rng_bits(key, pulse + RNG_BLOCK, 5, bits), 5);
+    assert_true(bits[4] == rng_u64(key, pulse[RNG_BLOCK + 4]));
+}
+
 /* Quantile of chi-square by Wilson and Hilferty, good to 1 % in the tail from 64 degrees of freedom on. */
 static double chi2_limit(double dof, double z)
 {
@@ -210,6 +254,8 @@ int main(void)
         cmocka_unit_test(streams_are_uncorrelated),
         cmocka_unit_test(the_distribution_is_normal),
         cmocka_unit_test(nothing_lies_beyond_the_largest),
+        cmocka_unit_test(the_arithmetic_is_good_to_4e_12),
+        cmocka_unit_test(a_block_is_its_pulses),
         cmocka_unit_test(bits_are_even),
         cmocka_unit_test(bytes_are_even),
     };

@@ -11,7 +11,7 @@
 #ifndef SCENES
 #define SCENES 24 /* of each kind */
 #endif
-enum { MOST = 400, RAYS = 6001, SHOWN = 40 };
+enum { MOST = 400, RAYS = 6001, SHOWN = 5 };
 
 /* A scene is put together triangle by triangle; corners in one place are one vertex. */
 struct soup {

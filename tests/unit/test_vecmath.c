@@ -103,6 +103,29 @@ static void they_lie_on_the_unit_circle(void **state)
     assert_true(worst <= 2.0 * sqrt(2.0) * SINCOS_ERROR);
 }
 
+/* Beyond the last bit: a part of a turn, with what its double leaves out. */
+static void fine_sine_and_cosine(void **state)
+{
+    (void)state;
+    const long double two_pi = 6.283185307179586476925286766559L;
+    uint64_t seed = 6;
+    double worst = 0.0, at = 0.0;
+    for (int i = 0; i < CASES; i++) {
+        double turn = 6.0 * case_unit(&seed) - 3.0, rest = (2.0 * case_unit(&seed) - 1.0) * 2e-16, s[2], c[2];
+        long double rad = two_pi * (fmodl((long double)turn, 1.0L) + (long double)rest);
+        vec_sincos_turn_fine(turn, rest, s, c);
+        double es = (double)fabsl((long double)s[0] + s[1] - sinl(rad));
+        double ec = (double)fabsl((long double)c[0] + c[1] - cosl(rad)), error = es > ec ? es : ec;
+        if (error > worst) {
+            worst = error;
+            at = turn;
+        }
+        assert_true(s[0] + s[1] == s[0] && c[0] + c[1] == c[0]);
+    }
+    print_message("# fine sine, cosine: worst error %.3g at %.17g turns\n", worst, at);
+    assert_true(worst < 4e-17);
+}
+
 static double log_error(double x)
 {
     long double expected = logl((long double)x);
@@ -222,6 +245,7 @@ int main(void)
         cmocka_unit_test(quarter_turns_are_exact),
         cmocka_unit_test(whole_turns_change_nothing),
         cmocka_unit_test(they_lie_on_the_unit_circle),
+        cmocka_unit_test(fine_sine_and_cosine),
         cmocka_unit_test(logarithm_of_a_million_numbers),
         cmocka_unit_test(exponential_of_a_million_numbers),
         cmocka_unit_test(logarithm_at_its_edges),

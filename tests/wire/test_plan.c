@@ -228,7 +228,9 @@ static void test_sight(void **state)
 static void test_program(void **state)
 {
     struct wire *wire = *state;
-    const char *const args[] = {"plan", "config/foliage.yaml", "--json", "--set", "head.prr_hz=1200000", NULL};
+    const char *const args[] = {"plan",  "config/foliage.yaml", "--json", "--set", "head.prr_hz=1200000",
+                                "--set", "beam.mode=single", /* planned in a fifth of the time */
+                                NULL};
     char *json = plan(wire, args, 0), *text = row(json, "program", 0);
     assert_non_null(text);
     assert_non_null(strstr(text, "\"method\": \"1200 kHz\""));
@@ -314,6 +316,7 @@ static void test_forced_as_chosen(void **state)
     static const char *const keys[] = {"\"error_m\": ", "\"echo_share\": "};
     struct wire *wire = *state;
     double figure[2][2];
+    char *chosen = NULL;
     for (int i = 0; i < 2; i++) {
         const char *const args[] = {"plan", "config/glass.yaml", "--json", "--set", modes[i], NULL};
         char *json = plan(wire, args, 0), *text = row(json, "beam", 0);
@@ -322,13 +325,16 @@ static void test_forced_as_chosen(void **state)
         for (int k = 0; k < 2; k++)
             figure[i][k] = number_of(text, keys[k]);
         free(text);
-        free(json);
+        if (i == 0)
+            chosen = json;
+        else
+            free(json);
     }
     const char *const args[] = {"plan", "config/glass.yaml", "--json", NULL};
-    char *json = plan(wire, args, 0), *again = plan(wire, args, 0);
-    *strstr(json, "\"total\"") = *strstr(again, "\"total\"") = '\0'; /* which is measured */
-    assert_string_equal(json, again);                                /* the same configuration, the same plan */
-    free(json);
+    char *again = plan(wire, args, 0);
+    *strstr(chosen, "\"total\"") = *strstr(again, "\"total\"") = '\0'; /* which is measured */
+    assert_string_equal(chosen, again);                                /* the same configuration, the same plan */
+    free(chosen);
     free(again);
     assert_true(figure[0][0] > 0.0 && figure[0][1] > 0.0);
     assert_true(figure[0][0] == figure[1][0] && figure[0][1] == figure[1][1]);

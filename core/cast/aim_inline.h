@@ -1,0 +1,49 @@
+/* Private to core/cast/kernels*.c: what their loops over directions have in common. */
+#ifndef CORE_CAST_AIM_INLINE_H
+#define CORE_CAST_AIM_INLINE_H
+
+#include "core/cast/kernels.h"
+#include "core/vecmath.h"
+
+/* A matrix as values of its own, which no store to an array can change. */
+struct aim_matrix {
+    double xx, xy, xz, yx, yy, yz, zx, zy, zz;
+};
+VEC_INLINE struct aim_matrix aim_matrix(const double m[9])
+{
+    return (struct aim_matrix){m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8]};
+}
+
+/* m times (sin p cos m, cos p cos m, sin m). */
+VEC_INLINE void aim_direction(struct aim_matrix m, double sm, double cm, double sp, double cp, struct vec3_out d,
+                              uint32_t i)
+{
+    const double x = sp * cm, y = cp * cm;
+    d.x[i] = m.xx * x + m.xy * y + m.xz * sm;
+    d.y[i] = m.yx * x + m.yy * y + m.yz * sm;
+    d.z[i] = m.zx * x + m.zy * y + m.zz * sm;
+}
+
+/* An encoder: counts per turn, and a count in radians; 0 where both of a head are ideal: they have no error. */
+struct aim_encoder {
+    double counts, count_rad;
+};
+VEC_INLINE struct aim_encoder aim_encoder(const struct cast_setup *setup, double counts)
+{
+    const int ideal = setup->mirror_counts >= 4294967296.0 && setup->pan_counts >= 4294967296.0;
+    return (struct aim_encoder){counts, ideal ? 0.0 : VEC_TURN_RAD / counts};
+}
+
+/* Sine and cosine of an angle become those of what the encoder reads, whole counts. Its error d is at most half
+ * a count: sin(a + d) = sin a + d cos a - d^2/2 sin a leaves d^3/6, which is 1e-12 for 2^14 counts per turn,
+ * 5e-18 for 2^20. */
+VEC_INLINE void aim_read(struct aim_encoder e, double turn, double *sine, double *cosine)
+{
+    uint64_t bits;
+    const double counts = turn * e.counts, d = (vec_round(counts, &bits) - counts) * e.count_rad;
+    const double h = 1.0 - 0.5 * d * d, s = *sine, c = *cosine;
+    *sine = s * h + c * d;
+    *cosine = c * h - s * d;
+}
+
+#endif

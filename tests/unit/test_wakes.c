@@ -1,0 +1,218 @@
+/* Nobody sleeps for ever: bells, and the whole loop with queues of a few ticks, where each thread waits for each other
+ * one again and again. A lost wake-up shows as a time-out. */
+#include "tests/unit/device_rig.h"
+
+#include <poll.h>
+#include <pthread.h>
+#include <signal.h>
+#include <stdatomic.h>
+#include <sys/socket.h>
+
+#include "firmware_sim/base/clock.h"
+#include "firmware_sim/loop/bell.h"
+#include "firmware_sim/loop/loop.h"
+#include "tests/common/cases.h"
+
+static const int64_t DEADLINE_NS = 60000000000;
+
+/* ---- bells */
+
+enum { TURNS = 20000, SLEEPERS = 3 };
+
+static struct {
+    struct bell here, there;
+    _Atomic uint32_t ball;
+    _Atomic int in_time;
+} game;
+
+static void *play(void *arg)
+{
+    const uint32_t mine = (uint32_t)(intptr_t)arg;
+    struct bell *hear = mine == 0 ? &game.here : &game.there, *ring = mine == 0 ? &game.there : &game.here;
+    const int64_t until_ns = clock_now_ns() + DEADLINE_NS;
+    for (uint32_t ball; (ball = atomic_load(&game.ball)) < TURNS;) {
+        if (ball % 2 == mine) {
+            atomic_store(&game.ball, ball + 1);
+            bell_ring(ring, 1);
+        } else if (bell_sleep_until(hear, until_ns)) {
+            atomic_store(&game.in_time, 0);
+            break;
+        }
+    }
+    return NULL;
+}
+
+static void a_ring_is_never_lost(void **state)
+{
+    (void)state;
+    pthread_t player[2];
+    bell_create(&game.here);
+    bell_create(&game.there);
+    atomic_store(&game.in_time, 1);
+    for (intptr_t i = 0; i < 2; i++)
+        assert_int_equal(pthread_create(&player[i], NULL, play, (void *)i), 0);
+    for (int i = 0; i < 2; i++)
+        pthread_join(player[i], NULL);
+    bell_free(&game.here);
+    bell_free(&game.there);
+    assert_true(game.in_time && game.ball == TURNS);
+}
+
+static void rings_are_not_counted(void **state)
+{
+    (void)state;
+    struct bell bell;
+    bell_create(&bell);
+    for (int i = 0; i < 1000; i++)
+        bell_ring(&bell, SLEEPERS);
+    for (int i = 0; i < SLEEPERS; i++)
+        bell_sleep(&bell); /* each finds one */
+    assert_true(bell_sleep_until(&bell, clock_now_ns() + 1000000));
+    bell_free(&bell);
+}
+
+/* ---- the loop */
+
+struct peer {
+    int fd;
+    uint64_t seed, received, leaves; /* after so many bytes it goes away */
+    uint32_t steps;                  /* to be granted; 0: it only reads */
+    _Atomic int end;
+};
+
+/* Reads a little at a time, and now and then nothing for a while. Before it goes away it lets the loop wait for it. */
+static void *read_slowly(void *arg)
+{
+    struct peer *peer = arg;
+    static uint8_t bytes[65536];
+    for (ssize_t n = 1; n > 0; peer->received += (uint64_t)n) {
+        if (peer->received > peer->leaves) {
+            clock_sleep_until_ns(clock_now_ns() + 20000000);
+            shutdown(peer->fd, SHUT_RDWR);
+            break;
+        }
+        if (case_between(&peer->seed, 0, 40) == 0) clock_sleep_until_ns(clock_now_ns() + 3000000);
+        n = read(peer->fd, bytes, (size_t)case_between(&peer->seed, 1, sizeof bytes));
+    }
+    return NULL;
+}
+
+static int is_reply(const uint8_t *bytes, ssize_t n)
+{
+    for (ssize_t i = 1; i < n; i++)
+        if (bytes[i - 1] == '\r' && bytes[i] == '\n') return 1;
+    return 0;
+}
+
+/* Grants one step after the other, each after the reply to the last one. The head boots and spins up in 230 ms. */
+static void *grant_steps(void *arg)
+{
+    struct peer *peer = arg;
+    static uint8_t bytes[65536];
+    ssize_t n = 1;
+    for (uint32_t step = 0; step < peer->steps && n > 0; step++) {
+        char line[64];
+        const int len = snprintf(line, sizeof line, "TIME:STEP %d US\n", (int)case_between(&peer->seed, 1, 4000));
+        assert_int_equal(write(peer->fd, line, (size_t)len), len);
+        do {
+            n = read(peer->fd, bytes, sizeof bytes);
+            peer->received += n > 0 ? (uint64_t)n : 0;
+        } while (n > 0 && !is_reply(bytes, n));
+    }
+    atomic_store(&peer->end, 1);
+    return read_slowly(arg);
+}
+
+struct loop_case {
+    const char *sets[6];
+    uint32_t steps;
+    uint64_t leaves;
+};
+
+/* Runs it to its end in time; the stream's hash. */
+static void run_case(const struct loop_case *c, uint64_t seed, char sha256[65])
+{
+    int fd[2], n_sets = 0;
+    assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, fd), 0);
+    const struct link_spec spec = {.type = LINK_FD, .fd = fd[0]};
+    const struct loop_options options = {.hash = 1, .extra = &spec};
+    struct peer peer = {.fd = fd[1], .seed = seed, .steps = c->steps, .leaves = c->leaves};
+    struct sh_err err;
+    struct loop *loop;
+    struct loop_stats stats;
+    pthread_t thread;
+    while (n_sets < 6 && c->sets[n_sets] != NULL)
+        n_sets++;
+    struct rig *rig =
+        rig_open(&(struct device_options){.start = 1, .duration_s = c->steps != 0 ? 0.0 : 0.2}, c->sets, n_sets);
+    need(loop_create(rig->site, rig->device, &options, &loop, &err), &err);
+    assert_int_equal(pthread_create(&thread, NULL, c->steps != 0 ? grant_steps : read_slowly, &peer), 0);
+    need(loop_start(loop, &err), &err);
+    const int64_t until_ns = clock_now_ns() + DEADLINE_NS;
+    for (int ending = 0; !loop_is_over(loop) && clock_now_ns() < until_ns; poll(NULL, 0, 2))
+        if (atomic_load(&peer.end) && !ending) {
+            ending = 1;
+            loop_end(loop);
+        }
+    if (!loop_is_over(loop)) fail_msg("%s %s %s: it stands still", c->sets[0], c->sets[1], c->sets[2]);
+    loop_join(loop, &stats);
+    loop_free(loop); /* closes the peer's other end */
+    pthread_join(thread, NULL);
+    close(fd[1]);
+    rig_close(rig);
+    assert_true(stats.have_hash && stats.counters.lost_ticks == 0 && stats.counters.reader_lost_frames == 0);
+    assert_true(peer.received > 0 && stats.counters.pulses > 0);
+    memcpy(sha256, stats.sha256, sizeof stats.sha256);
+}
+
+#ifdef SH_SANITIZE /* sanitizers are for the code, not for the count */
+enum { EVERY = 5, STEPS = 250 };
+#else
+enum { EVERY = 1, STEPS = 600 };
+#endif
+
+/* The same ticks in all of them, so the same bytes. */
+static void a_fast_loop_never_stands_still(void **state)
+{
+    (void)state;
+    static const char *const ahead[] = {"loop.ahead_ms=2", "loop.ahead_ms=9", "loop.ahead_ms=64"};
+    static const char *const queue[] = {"loop.queue_ms=10", "loop.queue_ms=15", "loop.queue_ms=250"};
+    static const char *const threads[] = {"loop.threads=1", "loop.threads=2", "loop.threads=5"};
+    static const char *const ticks[] = {"loop.tick_hz=100", "loop.tick_hz=1000", "loop.tick_hz=10000"};
+    char first[3][65] = {{0}}, sha256[65];
+    for (int i = 0; i < 81; i += EVERY) {
+        const int t = i % 3;
+        const struct loop_case c = {
+            .sets = {ahead[i / 3 % 3], queue[i / 9 % 3], threads[i / 27], ticks[t], "loop.pace=fast", "head.frames=0"},
+            .leaves = i % 2 == 0 ? UINT64_MAX : 200000};
+        run_case(&c, (uint64_t)i + 1, sha256);
+        if (first[t][0] == '\0') memcpy(first[t], sha256, sizeof sha256);
+        assert_string_equal(sha256, first[t]);
+    }
+}
+
+static void a_stepped_loop_never_stands_still(void **state)
+{
+    (void)state;
+    char sha256[65];
+    for (int i = 0; i < 3; i++) {
+        const struct loop_case c = {.sets = {"loop.pace=step", i == 0 ? "loop.ahead_ms=2" : "loop.ahead_ms=64",
+                                             i == 2 ? "loop.threads=3" : "loop.threads=1", "loop.queue_ms=10",
+                                             "head.frames=0"},
+                                    .steps = STEPS,
+                                    .leaves = UINT64_MAX};
+        run_case(&c, (uint64_t)i + 1, sha256);
+    }
+}
+
+int main(void)
+{
+    signal(SIGPIPE, SIG_IGN);
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_ring_is_never_lost),
+        cmocka_unit_test(rings_are_not_counted),
+        cmocka_unit_test(a_fast_loop_never_stands_still),
+        cmocka_unit_test(a_stepped_loop_never_stands_still),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}
