@@ -321,6 +321,15 @@ static struct decide_hit best_of(const struct search *s)
                            : (struct decide_hit){s->prim, s->range_m};
 }
 
+/* What meets the best one at its border. */
+static void try_neighbours(struct search *s)
+{
+    if (s->prim == RTC_INVALID_GEOMETRY_ID) return;
+    s->only = NULL;
+    s->proposed = s->prim;
+    try_around(s, s->range_m, slack_m(s->ray, s->prim, bvh_width_m(s->ray->bvh, s->prim)));
+}
+
 /* How far around a hit its rivals are tried, in slacks. */
 enum { WIDE = 16 };
 
@@ -342,6 +351,7 @@ void decide_again(const struct decide_ray *ray, struct decide_hit *hit)
         const uint32_t prim = bvh->rival[k];
         if (is_near(&s, prim) && may_be_rival(ray, &own, prim) && is_close(&s, prim)) try_triangle(&s, prim);
     }
+    if (s.prim != hit->prim || !(s.border_m > own.width_m)) try_neighbours(&s);
     const struct decide_hit found = best_of(&s);
     if (found.prim != RTC_INVALID_GEOMETRY_ID) *hit = found;
 }
