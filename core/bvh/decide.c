@@ -17,9 +17,9 @@ struct search {
     const struct decide_ray *ray;
     double point_m[3], radius_m; /* of the query, local frame */
     const struct rivalry *only;  /* try only rivals; NULL: all */
-    uint32_t proposed;
-    uint32_t prim;            /* best so far */
-    double range_m, border_m; /* its range, and how far the ray passes from its nearest edge */
+    uint32_t proposed, rivals;   /* rivals: how many were tried */
+    uint32_t prim;               /* best so far */
+    double range_m, border_m;    /* its range, and how far the ray passes from its nearest edge */
     /* All that were met within 1e-12 of the nearest: of them the lowest number is the best, in whatever order they
      * came. Of more than there is room for the highest numbers are left out. */
     struct {
@@ -269,13 +269,15 @@ static int is_close(const struct search *s, uint32_t prim)
  * query's radius is left out by its plane. */
 static bool visit(struct RTCPointQueryFunctionArguments *args)
 {
-    const struct search *s = args->userPtr;
+    struct search *s = args->userPtr;
     const uint32_t prim = args->primID;
     if (prim == s->proposed || !is_near(s, prim)) return false;
-    if (s->only != NULL &&
-        !(may_be_rival(s->ray, s->only, prim) && is_close(s, prim) && bvh_are_rivals(s->ray->bvh, s->only->prim, prim)))
-        return false;
-    try_triangle(args->userPtr, prim);
+    if (s->only != NULL) {
+        if (!may_be_rival(s->ray, s->only, prim) || !is_close(s, prim)) return false;
+        if (!bvh_are_rivals(s->ray->bvh, s->only->prim, prim)) return false;
+        s->rivals++;
+    }
+    try_triangle(s, prim);
     return false;
 }
 
@@ -349,8 +351,11 @@ void decide_again(const struct decide_ray *ray, struct decide_hit *hit)
     for (uint32_t k = bvh->ordered ? bvh->rival_first[hit->prim] : 0;
          bvh->ordered && k < bvh->rival_first[hit->prim + 1]; k++) {
         const uint32_t prim = bvh->rival[k];
-        if (is_near(&s, prim) && may_be_rival(ray, &own, prim) && is_close(&s, prim)) try_triangle(&s, prim);
+        if (!is_near(&s, prim) || !may_be_rival(ray, &own, prim) || !is_close(&s, prim)) continue;
+        s.rivals++;
+        try_triangle(&s, prim);
     }
+    if (s.rivals == 0) return;
     if (s.prim != hit->prim || !(s.border_m > own.width_m)) try_neighbours(&s);
     const struct decide_hit found = best_of(&s);
     if (found.prim != RTC_INVALID_GEOMETRY_ID) *hit = found;
