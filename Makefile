@@ -124,7 +124,7 @@ $(BUILD)/scanhead: $(BUILD)/firmware_sim/main.c.o $(BUILD)/modules.a
 #   benches.a   what the programs of tests/bench share                      build/bench and the charts'
 #   its rigs    tests/unit/cast_rig.c where it includes cast_rig.h          tests of a folder; tests/rigs.sh finds which
 #   modules.a   the head, without main.c                                    all of them
-FIGURES = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_georef chart_widths beam plain velodyne loop_cost kernels)
+FIGURES = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_sight chart_georef chart_widths beam plain velodyne loop_cost kernels)
 BENCH_MAINS = $(FIGURES:$(BUILD)/%=%.c) tests/bench/bench.c
 COMMON = $(wildcard tests/common/*.c)
 BENCHES = $(filter-out $(BENCH_MAINS),$(wildcard tests/bench/*.c))
@@ -166,7 +166,7 @@ endef
 # The readers for LAS and E57 are npm's, in the versions of the lock file. Without npm's registry their tests are skipped.
 READERS = $(BUILD)/readers
 deps: deps-test $(READERS)/installed
-$(READERS)/installed: $(wildcard tests/readers/*) | deps-test
+$(READERS)/installed: $(wildcard tests/readers/*) | $(if $(DEPS_ARE_THERE),,deps-test)
 	@mkdir -p $(@D)
 	@cp tests/readers/* $(@D)
 	@if [ '$(DEPS)' = no ]; then echo "DEPS=no: the readers for LAS and E57 are not installed: their tests will be skipped"; \
@@ -190,17 +190,19 @@ demo: deps-build
 
 # ---- tests. Warnings are errors. Three builds: all with gcc; what is in the head once more with clang, for its warnings
 # alone; the unit tests and what they need with sanitizers, without optimiser (and so without the warnings that it makes).
+# -g1, the lines alone, is an eighth less to compile.
 JOBS ?= $(shell getconf _NPROCESSORS_ONLN)
-STRICT = WERROR=-Werror
-ASAN = $(STRICT) BUILD=$(BUILD)/asan OPT=-O0 CFLAGS=-w CPPFLAGS=-DSH_SANITIZE SAN="-g1 -fsanitize=address,undefined -fno-sanitize-recover=all"
-CLANG = $(STRICT) BUILD=$(BUILD)/clang CC=clang CXX=clang++ OPT=-O0 CFLAGS=-g0 CXXFLAGS=-g0
+STRICT = WERROR=-Werror CFLAGS=-g1 CXXFLAGS=-g1
+ASAN = WERROR=-Werror BUILD=$(BUILD)/asan OPT=-O0 CFLAGS=-w CPPFLAGS=-DSH_SANITIZE SAN="-g1 -fsanitize=address,undefined -fno-sanitize-recover=all"
+CLANG = WERROR=-Werror BUILD=$(BUILD)/clang CC=clang CXX=clang++ OPT=-O0 CFLAGS=-g0 CXXFLAGS=-g0
 SUBMAKE = @$(MAKE) --no-print-directory -j$(JOBS)
 RUN = SCANHEAD=$(BUILD)/test/scanhead READERS=$(READERS)
 # `make test T=test_ring` builds and runs that one alone, of whatever folder; also a script: T=check_includes, T=test_usbip_tcp.
 T ?=
 ifeq ($(T),)
-test: deps
-	$(SUBMAKE) $(STRICT) BUILD=$(BUILD)/test test-programs
+test: deps-test
+	@$(MAKE) --no-print-directory DEPS_ARE_THERE=1 $(READERS)/installed & status=0; \
+	$(MAKE) --no-print-directory -j$(JOBS) $(STRICT) BUILD=$(BUILD)/test test-programs || status=1; wait; exit $$status
 	@command -v clang >/dev/null || echo "no clang: its warnings are not looked at"
 	@$(MAKE) --no-print-directory $(READERS)/pcl_vlp16 & status=0; \
 	! command -v clang >/dev/null || $(MAKE) --no-print-directory -j$(JOBS) $(CLANG) objects || status=1; wait; exit $$status
@@ -244,7 +246,7 @@ bench: deps-build
 	@$(BUILD)/bench --scenes 10k,100k,1M,10M,house,garden --leaks 1e8 -o $(BUILD)/bench.json
 # Each program of the chart writes its panel's rows; the first one the head of the table.
 CHART = $(BUILD)/chart/speed_accuracy
-CHARTS = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_georef chart_widths beam)
+CHARTS = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_sight chart_georef chart_widths beam)
 # Footprints: cost, and error against 1,000 sub-rays; a few minutes.
 bench-beam: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/beam
@@ -263,16 +265,18 @@ bench-kernels: deps-build
 	@$(BUILD)/tests/bench/kernels
 	@$(if $(filter x86_64-%,$(TARGET)),$(MAKE) --no-print-directory -j2 BUILD=$(BUILD)/avx2 CPPFLAGS='$(CPPFLAGS) -DVEC_ONE' \
 		CFLAGS='$(CFLAGS) -march=x86-64-v3 -w' $(BUILD)/avx2/tests/bench/kernels && echo "AVX2:" && $(BUILD)/avx2/tests/bench/kernels)
-# The real loop, processor time a pulse. In turns with others: make bench-loop WITH="'/path/scanhead' '/other --option'".
+# The real loop, processor time a pulse, with and without stream_sha256. In turns with others: make bench-loop
+# WITH="'/path/scanhead' '/other --option'".
 WITH ?=
 bench-loop: deps-build
 	@$(MAKE) --no-print-directory -j2 all $(BUILD)/tests/bench/loop_cost
-	@$(BUILD)/tests/bench/loop_cost $(BUILD)/scanhead $(WITH)
+	@$(BUILD)/tests/bench/loop_cost $(BUILD)/scanhead '$(BUILD)/scanhead --no-hash' $(WITH)
 chart: deps-build
 	$(call install_missing,$(DEPS_CHART))
 	@$(MAKE) --no-print-directory -j2 $(CHARTS)
 	@mkdir -p $(BUILD)/chart
 	$(BUILD)/tests/bench/chart > $(CHART).csv
+	$(BUILD)/tests/bench/chart_sight >> $(CHART).csv
 	$(BUILD)/tests/bench/chart_georef >> $(CHART).csv
 	$(BUILD)/tests/bench/chart_widths >> $(CHART).csv
 	$(BUILD)/tests/bench/beam --chart house wires foliage >> $(CHART).csv

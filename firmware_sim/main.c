@@ -1,6 +1,7 @@
 /* scanhead: the command line. */
 #include <errno.h>
 #include <string.h>
+#include <sys/resource.h>
 
 #include "drivers/host/scanhead.h"
 #include "firmware_sim/app/app.h"
@@ -54,10 +55,22 @@ static int run(int argc, char **argv)
     return fail_unknown(argv[1]);
 }
 
+/* Configurations and blocks of pulses lie on stacks, which threads get as large as this limit; 384 KiB were enough. */
+static int check_stack(void)
+{
+    enum { NEEDED_KIB = 1024 };
+    struct rlimit limit;
+    if (getrlimit(RLIMIT_STACK, &limit) != 0 || limit.rlim_cur >= NEEDED_KIB * 1024) return APP_OK;
+    fprintf(stderr, "scanhead: the stack is limited to %llu KiB; allowed %d and more: ulimit -s %d\n",
+            (unsigned long long)limit.rlim_cur / 1024, NEEDED_KIB, NEEDED_KIB);
+    return APP_USAGE;
+}
+
 /* What a command printed may still be in the buffer. A full disk or a closed pipe shows only here. */
 int main(int argc, char **argv)
 {
-    int status = run(argc, argv);
+    int status = check_stack();
+    if (status == APP_OK) status = run(argc, argv);
     errno = 0;
     const int failed = fflush(stdout) != 0 || ferror(stdout) != 0;
     if (!failed || status != APP_OK) return status;

@@ -10,6 +10,10 @@
  * Rays from elsewhere (stations that share a BVH) find the same guarantee except at borders that they see
  * at a far smaller angle than the origin does.
  *
+ * Edges are moved by moving corners. Where a corner is so sharp that it would have to move too far (below about
+ * 6e-5 rad), another triangle in the same plane takes the float triangle's place: twice as long as the longest edge,
+ * and as wide as it takes (widen.c). All its hits are decided in double.
+ *
  * So Embree need not be robust, and its faster test (Moeller and Trumbore 1997) will do. The budget, in
  * units of 2^-24 of the farthest coordinate in play, R (vertex of the triangle from the BVH's origin, plus
  * the ray's origin from it): rounding of a vertex 1, of the ray's direction 1, of its origin 1 (none where
@@ -77,6 +81,7 @@ struct bvh {
     struct bvh_plane *triangle; /* one more than there are: the last stands for a miss, all NaN */
     double origin_m[3];
     /* Rivals of triangle i: rival[rival_first[i] .. rival_first[i + 1]), none of a miss. NULL: there are none. */
+    int ordered; /* bvh_order_exactly was called */
     uint32_t *rival_first, *rival;
     uint64_t *twin; /* bits: a face of the same corners stands for this one; NULL: for none */
     double station_reach_m; /* rays begin at most this far from the origin */

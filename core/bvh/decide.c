@@ -99,7 +99,7 @@ static double edge_gap(const double a[3], const double b[3], const double dir[3]
     return sqrt(vec3_dot(w, w));
 }
 
-/* Range to a triangle that the ray does meet. Where the ray lies almost in its plane the plane's range runs
+/* Range to a triangle that the ray does meet, or misses by less than can be told. Where the ray lies almost in its plane the plane's range runs
  * away: it is kept between the edges that the ray passes. */
 static double held_range(const struct decide_ray *ray, uint32_t prim, double v[3][3])
 {
@@ -172,18 +172,11 @@ static int is_hole(struct search *s, uint32_t prim, double v[3][3], double range
  * frontmost: what else is tried further away makes no difference. */
 static void note_miss(struct search *s, uint32_t prim, double v[3][3], const double side[3])
 {
-    const double *dir = s->ray->dir;
     double sign = side[0] + side[1] + side[2] < 0.0 ? -1.0 : 1.0; /* of n . dir */
-    double gap = -INFINITY, range = 0.0;
-    for (int i = 0; i < 3; i++) {
-        const double *a = v[i], *b = v[(i + 1) % 3];
-        double out = -sign * side[i] / blur(a, b);
-        if (out > 1.0) return;
-        if (out <= gap) continue;
-        gap = out;
-        range = edge_range(a, b, dir);
-    }
-    if (range <= BVH_AT_ORIGIN_M || range > s->near_range_m || is_hole(s, prim, v, range)) return;
+    for (int i = 0; i < 3; i++)
+        if (-sign * side[i] / blur(v[i], v[(i + 1) % 3]) > 1.0) return;
+    const double range = held_range(s->ray, prim, v);
+    if (!(range > BVH_AT_ORIGIN_M) || range > s->near_range_m || is_hole(s, prim, v, range)) return;
     if (range == s->near_range_m && prim > s->near_prim) return;
     s->near_prim = prim;
     s->near_range_m = range;
@@ -335,13 +328,22 @@ static void look_through(struct search *s)
     bvh_walk_along(s->ray->bvh, org, dir, s->ray->t_max, &walk);
 }
 
-static void finish(struct search *s, struct bvh_counters *counters, struct decide_hit *hit)
+/* So near to an edge that double precision can't separate its sides: the edge is hit, nothing passes. */
+static int is_near_miss(const struct search *s)
 {
-    /* So near to an edge that double precision can't separate its sides: the edge is hit, nothing passes. */
-    const int near = s->near_prim != RTC_INVALID_GEOMETRY_ID && !(s->range_m <= s->near_range_m);
-    counters->undecided += (uint64_t)near;
-    hit->prim = near ? s->near_prim : s->prim;
-    hit->range_m = near ? s->near_range_m : s->range_m;
+    return s->near_prim != RTC_INVALID_GEOMETRY_ID && !(s->range_m <= s->near_range_m);
+}
+
+static struct decide_hit best_of(const struct search *s)
+{
+    return is_near_miss(s) ? (struct decide_hit){s->near_prim, s->near_range_m}
+                           : (struct decide_hit){s->prim, s->range_m};
+}
+
+static void finish(const struct search *s, struct bvh_counters *counters, struct decide_hit *hit)
+{
+    counters->undecided += (uint64_t)is_near_miss(s);
+    *hit = best_of(s);
 }
 
 void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct bvh_counters *counters,
@@ -363,6 +365,7 @@ void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct bvh
         double range_m = (double)t, slack = slack_m(ray, prim, width_m);
         double radius_m = fmin(slack, 0.01 * range_m + 4.0 * width_m);
         try_around(&s, range_m, radius_m);
+        try_rivals(&s, prim, range_m);
         if (s.holes) break;
         if (is_found(&s, range_m + radius_m)) break;
         counters->went_on++;
@@ -374,7 +377,8 @@ void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct bvh
         t = one.t;
     }
     if (s.holes) look_through(&s);
-    if (s.prim != RTC_INVALID_GEOMETRY_ID) try_rivals(&s, s.prim, s.range_m);
+    const struct decide_hit found = best_of(&s);
+    if (found.prim != RTC_INVALID_GEOMETRY_ID) try_rivals(&s, found.prim, found.range_m);
     finish(&s, counters, hit);
 }
 
@@ -408,16 +412,14 @@ static void step_along(struct search *s)
 void decide_again(const struct decide_ray *ray, struct decide_hit *hit)
 {
     struct search s = search_for(ray);
-    struct bvh_counters none = {0};
     const double width_m = bvh_width_m(ray->bvh, hit->prim);
     const struct rivalry own = rivalry_of(ray, hit->prim, hit->range_m);
-    struct decide_hit found;
     s.proposed = hit->prim;
     s.only = &own;
     try_triangle(&s, hit->prim);
     try_around(&s, hit->range_m,
                fmin(WIDE / 4 * slack_m(ray, hit->prim, width_m), 0.01 * hit->range_m + 4.0 * width_m));
     if (!(own.steep < WIDE)) step_along(&s);
-    finish(&s, &none, &found);
+    const struct decide_hit found = best_of(&s);
     if (found.prim != RTC_INVALID_GEOMETRY_ID) *hit = found;
 }

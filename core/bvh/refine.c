@@ -124,27 +124,41 @@ uint32_t bvh_refine(const struct bvh_proposals *p)
     return p->bvh->rival_first != NULL ? doubt_rivals(p) : doubts;
 }
 
-enum { LANES = 8 };
+enum { LANES = 4 };
+typedef double lanes __attribute__((vector_size(LANES * sizeof(double))));
+typedef float lanes_f __attribute__((vector_size(LANES * sizeof(float))));
 
-/* Rays at .. at + n of one plane. */
-VEC_INLINE void ranges_of(const struct bvh_rays *rays, const double *tri, double off, uint32_t triangle, uint32_t at,
-                          uint32_t n)
+/* A plane, and where rays meet it. */
+struct one_plane {
+    double nx, ny, nz, nn, above; /* above: d - n . o */
+    uint32_t triangle, label;
+};
+
+VEC_INLINE void range_of_one(const struct one_plane *p, const struct bvh_rays *rays, uint32_t i)
 {
-    const double nx = tri[0], ny = tri[1], nz = tri[2], nn = nx * nx + ny * ny + nz * nz, above = tri[3] - off;
-    const double *dx = rays->dir.x + at, *dy = rays->dir.y + at, *dz = rays->dir.z + at;
-    const uint32_t label = label_of(ny, nz);
-    double *range_m = rays->range_m + at, along[LANES];
-    VEC_LOOP
-    for (uint32_t i = 0; i < n; i++) {
-        along[i] = nx * dx[i] + ny * dy[i] + nz * dz[i];
-        range_m[i] = above / along[i];
-    }
-    for (uint32_t i = 0; i < n; i++)
-        rays->triangle[at + i] = triangle;
-    for (uint32_t i = 0; rays->label != NULL && i < n; i++)
-        rays->label[at + i] = label;
-    for (uint32_t i = 0; rays->steep != NULL && i < n; i++)
-        rays->steep[at + i] = (float)nn / (float)(along[i] * along[i]);
+    const double along = p->nx * rays->dir.x[i] + p->ny * rays->dir.y[i] + p->nz * rays->dir.z[i];
+    rays->range_m[i] = p->above / along;
+    rays->triangle[i] = p->triangle;
+    if (rays->label != NULL) rays->label[i] = p->label;
+    if (rays->steep != NULL) rays->steep[i] = (float)p->nn / (float)(along * along);
+}
+
+/* Lanes by hand: compilers leave so short a loop as it is. */
+VEC_INLINE void ranges_of_lanes(const struct one_plane *p, const struct bvh_rays *rays, uint32_t at)
+{
+    lanes x, y, z;
+    memcpy(&x, rays->dir.x + at, sizeof x);
+    memcpy(&y, rays->dir.y + at, sizeof y);
+    memcpy(&z, rays->dir.z + at, sizeof z);
+    const lanes along = p->nx * x + p->ny * y + p->nz * z, range_m = p->above / along;
+    memcpy(rays->range_m + at, &range_m, sizeof range_m);
+    for (uint32_t i = 0; i < LANES; i++)
+        rays->triangle[at + i] = p->triangle;
+    for (uint32_t i = 0; rays->label != NULL && i < LANES; i++)
+        rays->label[at + i] = p->label;
+    if (rays->steep == NULL) return;
+    const lanes_f steep = (float)p->nn / __builtin_convertvector(along * along, lanes_f);
+    memcpy(rays->steep + at, &steep, sizeof steep);
 }
 
 double bvh_range_of(const struct bvh *bvh, uint32_t triangle, const double at_m[3], const double dir[3])
@@ -155,17 +169,62 @@ double bvh_range_of(const struct bvh *bvh, uint32_t triangle, const double at_m[
     return (tri->d - vec3_dot(tri->n, o)) / vec3_dot(tri->n, dir);
 }
 
+/* What meets nothing, without arithmetic. */
+static void say_nothing(const struct bvh_rays *rays, uint32_t from, uint32_t to)
+{
+    for (uint32_t i = from; i < to; i++)
+        rays->range_m[i] = (double)NAN;
+    for (uint32_t i = from; i < to; i++)
+        rays->triangle[i] = BVH_NO_TRIANGLE;
+    for (uint32_t i = from; rays->label != NULL && i < to; i++)
+        rays->label[i] = BVH_NO_LABEL;
+    for (uint32_t i = from; rays->steep != NULL && i < to; i++)
+        rays->steep[i] = NAN;
+}
+
+VEC_INLINE void set_plane(struct one_plane *p, const struct bvh *bvh, uint32_t triangle, const double o[3])
+{
+    const struct bvh_plane *tri = &bvh->triangle[triangle];
+    *p = (struct one_plane){.nx = tri->n[0],
+                            .ny = tri->n[1],
+                            .nz = tri->n[2],
+                            .nn = vec3_dot(tri->n, tri->n),
+                            .above = tri->d - vec3_dot(tri->n, o),
+                            .triangle = triangle,
+                            .label = label_of(tri->n[1], tri->n[2])};
+}
+
 VEC_CLONES
 void bvh_ranges_of(const struct bvh *bvh, uint32_t triangle, const struct bvh_rays *rays, uint32_t from, uint32_t to)
 {
-    const uint32_t n_triangles = bvh->scene->n_triangles;
-    const double *tri = (const double *)(bvh->triangle + (triangle < n_triangles ? triangle : n_triangles));
+    struct one_plane p;
+    double o[3];
+    if (triangle == BVH_NO_TRIANGLE) {
+        say_nothing(rays, from, to);
+        return;
+    }
+    vec3_sub(rays->from.at_m, bvh->origin_m, o);
+    set_plane(&p, bvh, triangle, o);
+    for (; from < to && rays->n - from >= LANES; from += LANES)
+        ranges_of_lanes(&p, rays, from);
+    for (; from < to; from++)
+        range_of_one(&p, rays, from);
+}
+
+void bvh_ranges_each(const struct bvh *bvh, const uint32_t *triangle, const struct bvh_rays *rays, uint32_t from,
+                     uint32_t to)
+{
+    struct one_plane p;
     double o[3];
     vec3_sub(rays->from.at_m, bvh->origin_m, o);
-    const double off = tri[0] * o[0] + tri[1] * o[1] + tri[2] * o[2];
-    for (; from < to && rays->n - from >= LANES; from += LANES)
-        ranges_of(rays, tri, off, triangle, from, LANES);
-    if (from < to) ranges_of(rays, tri, off, triangle, from, to - from);
+    for (uint32_t i = from; i < to; i++) {
+        if (triangle[i - from] == BVH_NO_TRIANGLE) {
+            say_nothing(rays, i, i + 1);
+        } else if (triangle[i - from] < bvh->scene->n_triangles) {
+            set_plane(&p, bvh, triangle[i - from], o);
+            range_of_one(&p, rays, i);
+        }
+    }
 }
 
 VEC_CLONES

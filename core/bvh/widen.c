@@ -37,6 +37,16 @@ static void widen_corner(double v[3][3], int i, double offset_m, double most_m, 
         out[j] = v[i][j] - factor * move[j];
 }
 
+/* A corner so sharp that it would have to move too far for both its edges to move by offset_m. */
+static int is_too_sharp(double v[3][3], int i, double offset_m, double most_m)
+{
+    double e1[3], e2[3], c[3];
+    vec3_sub(v[(i + 1) % 3], v[i], e1);
+    vec3_sub(v[(i + 2) % 3], v[i], e2);
+    vec3_cross(e1, e2, c);
+    return 2.0 * offset_m * vec3_length(e1) * vec3_length(e2) > most_m * vec3_length(c) && vec3_dot(e1, e2) > 0.0;
+}
+
 static void edge_lengths(double v[3][3], double length[3])
 {
     for (int i = 0; i < 3; i++)
@@ -172,6 +182,38 @@ static void widen(double v[3][3], double offset, double width_m, double wide[3][
         widen_corner(v, i, offset, BVH_MAX_MOVE * width_m, wide[i]);
 }
 
+/* Around a triangle with a corner that is too sharp: one twice as long as its longest edge, with the new corner
+ * beyond the end of that edge which the third corner is further from. At that end the new edges are as far from the
+ * longest one as half of what they are at the other, so all of the triangle lies offset inside of them. */
+static void widen_sharp(double v[3][3], const double unit_n[3], double offset, double wide[3][3])
+{
+    double length[3], along[3], up[3], to[3];
+    edge_lengths(v, length);
+    int p = length[0] >= length[1] && length[0] >= length[2] ? 0 : length[1] >= length[2] ? 1 : 2, q = (p + 1) % 3;
+    const double *third = v[(p + 2) % 3];
+    if (vec3_distance(third, v[p]) < vec3_distance(third, v[q])) {
+        int swap = p;
+        p = q;
+        q = swap;
+    }
+    const double longest = vec3_distance(v[q], v[p]);
+    for (int j = 0; j < 3; j++)
+        along[j] = (v[q][j] - v[p][j]) / longest;
+    vec3_cross(unit_n, along, up);
+    vec3_sub(third, v[p], to);
+    double height = vec3_dot(to, up), low = 2.02 * offset, high = 2.02 * (offset + fabs(height));
+    if (height < 0.0) {
+        double swap = low;
+        low = high;
+        high = swap;
+    }
+    for (int j = 0; j < 3; j++) {
+        wide[0][j] = v[p][j] - (longest + offset) * along[j];
+        wide[1][j] = v[q][j] + offset * along[j] + high * up[j];
+        wide[2][j] = v[q][j] + offset * along[j] - low * up[j];
+    }
+}
+
 /* The longest edge lies opposite the first corner (bvh_inside.h). */
 static void set_vertices(double wide[3][3], float *vertex)
 {
@@ -181,6 +223,27 @@ static void set_vertices(double wide[3][3], float *vertex)
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)
             vertex[3 * i + j] = (float)wide[(first + i) % 3][j];
+}
+
+/* Where a corner is too sharp to move. Its new edges are up to twice as long, and one corner lies further away, so
+ * the offset grows. Returns 0 for triangles that need no such thing, or are seen at so small an angle that no corner
+ * could move far enough. */
+static int replace_sharp(const struct bvh *bvh, double v[3][3], const double unit_n[3], double width_m, double offset,
+                         double far_m, double wide[3][3])
+{
+    double length[3];
+    if (offset > 0.03125 * BVH_MAX_MOVE * width_m) return 0;
+    int sharp = 0;
+    for (int i = 0; i < 3; i++)
+        sharp |= is_too_sharp(v, i, offset, BVH_MAX_MOVE * width_m);
+    if (!sharp) return 0;
+    edge_lengths(v, length);
+    const double longest = fmax(length[0], fmax(length[1], length[2])), most = 2.1 * longest + 20.0 * offset;
+    const double new_length[3] = {most, most, offset < 0.004 * longest ? 0.1 * most : most};
+    const double new_far_m = far_m + longest + 4.0 * offset;
+    const double new_width_m = 1.01 * float_error_m(bvh, new_far_m, new_length);
+    widen_sharp(v, unit_n, offset_m(v, unit_n, new_width_m, new_far_m), wide);
+    return 1;
 }
 
 static void fill_triangle(struct bvh *bvh, uint32_t prim, float *vertex)
@@ -202,9 +265,11 @@ static void fill_triangle(struct bvh *bvh, uint32_t prim, float *vertex)
         widen(v, offset, width_m, wide);
         edge_lengths(wide, length);
     }
+    const int sharp = replace_sharp(bvh, v, unit, width_m, offset, far_m, wide);
     set_vertices(wide, vertex);
     double area2_wide = measure(wide, wide_n, &longest);
-    set_exact(tri, v, guard(bvh, offset, width_m, longest, area2_wide, area2), bvh->scene->label[prim]);
+    double border = sharp ? (double)INFINITY : guard(bvh, offset, width_m, longest, area2_wide, area2);
+    set_exact(tri, v, border, bvh->scene->label[prim]);
 }
 
 int bvh_fill(struct bvh *bvh, RTCGeometry geometry, const struct sh_report *report, struct sh_err *err)

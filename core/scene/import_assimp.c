@@ -246,7 +246,10 @@ static const struct aiScene *import_file(struct scene_build *b, struct import_lo
     aiDetachLogStream(&stream);
     if (in == NULL || in->mRootNode == NULL) {
         const char *why = in == NULL ? aiGetErrorString() : "nothing in it";
-        build_fail(b, SH_EINPUT, err, "%s", *why != '\0' ? why : "not readable");
+        const char *hint = strstr(why, "could not open referenced file") != NULL
+                               ? "; its geometry is in that file, which belongs in the same folder: copy it there"
+                               : "";
+        build_fail(b, SH_EINPUT, err, "%s%s", *why != '\0' ? why : "not readable", hint);
         if (in != NULL) aiReleaseImport(in);
         in = NULL;
     }

@@ -76,9 +76,43 @@ static int set_plane(const struct sight *sight, struct build_candidate *c, doubl
     c->plane_slope = fabs(c->plane[1]) + fabs(c->plane[2]);
     c->slack = SIGHT_PLANE_DOUBT / height_m;
     c->graze = SIGHT_GRAZE / height_m;
-    c->rel = sight->exact ? 0.0 : float_doubt_m(v, length, o_local) / height_m;
-    if (c->rel > SIGHT_MAX_REL) c->graze = 1e300;
+    const double rel = float_doubt_m(v, length, o_local) / height_m;
+    c->rel = sight->exact ? 0.0 : rel;
+    if (rel > SIGHT_MAX_REL) c->graze = 1e300; /* float may have the plane behind the station */
     return 1;
+}
+
+/* A triangle of which double precision can't say from which side the station sees it: on which side of its edges a ray
+ * passes has no sign. Two strips of directions hold all that may meet it; the narrower one takes the place of the
+ * edges, so that what lies beside it is outside for certain, and nothing is inside.
+ * - Those along the plane. What meets a plane at a larger angle does so where the ray begins (SIGHT_NEAR),
+ *   be it that the plane is where the station is up to rounding.
+ * - Those past the longest edge by no more than the triangle is wide: inside, the sides of all three edges together
+ *   are n . d, and have one sign. */
+static void set_strip(const struct sight *sight, struct build_candidate *c, double v[3][3], uint32_t face)
+{
+    const struct bvh_plane *p = bvh_plane(sight->bvh, c->triangle);
+    double e[3], side[3], far_m = 0.0, longest = 0.0;
+    int k = 0;
+    for (int i = 0; i < 3; i++) {
+        const double length = vec3_distance(v[(i + 1) % 3], v[i]);
+        far_m = fmax(far_m, vec3_length(v[i]));
+        if (length > longest) k = i;
+        longest = fmax(longest, length);
+    }
+    const double area2 = vec3_length(p->n), height_m = fabs(vec3_dot(p->n, v[k])) / area2;
+    const double sine = fmax(SIGHT_GRAZE, (height_m + SIGHT_TILT_DOUBT * longest + 0x1p-47 * far_m) * 4.0 * SIGHT_NEAR);
+    vec3_sub(v[(k + 1) % 3], v[k], e);
+    vec3_cross(v[k], e, side);
+    const double past = 1.0 / (2.0 * area2 + 2.0 * SIGHT_EDGE_DOUBT * far_m * longest);
+    const int slim = vec3_length(side) * past > 1.0 / sine;
+    for (int i = 0; i < 3; i++)
+        e[i] = slim ? side[i] * past : p->n[i] / (area2 * sine);
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++)
+            side[j] = i == 1 ? -e[j] : e[j];
+        to_face(side, face, c->edge[i]);
+    }
 }
 
 int build_candidate(const struct sight *sight, uint32_t face, uint32_t triangle, struct build_candidate *c)
@@ -89,7 +123,8 @@ int build_candidate(const struct sight *sight, uint32_t face, uint32_t triangle,
     sight_corners(sight, triangle, v);
     if (bvh_is_twin(sight->bvh, triangle) || !set_plane(sight, c, v, face)) return 0;
     vec3_cross(v[1], v[2], n);
-    const double sign = vec3_dot(v[0], n) < 0.0 ? -1.0 : 1.0;
+    const double volume = vec3_dot(v[0], n), sign = volume < 0.0 ? -1.0 : 1.0;
+    double doubt = SIGHT_VOLUME_DOUBT * vec3_length(v[0]) * vec3_length(v[1]) * vec3_length(v[2]);
     const double border_m = bvh_border_m(sight->bvh, triangle, sight->station_m);
     for (int i = 0; i < 3; i++) {
         double e[3];
@@ -100,6 +135,10 @@ int build_candidate(const struct sight *sight, uint32_t face, uint32_t triangle,
         longest2 = fmax(longest2, vec3_dot(e, e));
         near2 = fmin(near2, vec3_dot(v[i], v[i]));
     }
+    doubt += SIGHT_TILT_DOUBT * sqrt(longest2) * vec3_length(bvh_plane(sight->bvh, triangle)->n);
+    if (!(fabs(volume) > doubt)) set_strip(sight, c, v, face);
+    for (int i = 0; i < 3; i++)
+        c->edge_slope[i] = fabs(c->edge[i][1]) + fabs(c->edge[i][2]);
     c->near_m = fmax(0.0, (sqrt(near2) - sqrt(longest2)) * (1.0 - 1e-12));
     return 1;
 }

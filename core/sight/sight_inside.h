@@ -23,7 +23,7 @@ enum {
     SIGHT_BLOCK = SIGHT_TILE * SIGHT_TILE,
     SIGHT_MIN_CELLS = 64,
     SIGHT_MAX_CELLS = 2048, /* a cell is then a thousand times its pad */
-    SIGHT_MAX_LIST = 12,
+    SIGHT_MAX_LIST = 32,
 };
 /* Of the coordinates on a face: 8 times what single precision leaves of them. */
 #define SIGHT_PAD 0x1p-20
@@ -61,6 +61,11 @@ struct sight_record {
  * length: 8 units of 2^-53 in core/bvh/decide.c, 10 here (the difference of the corners 1, the cross product 6,
  * the product with a direction 3), and 8 more within which decide.c takes an edge for hit. */
 #define SIGHT_EDGE_DOUBT (32.0 * 0x1p-53)
+/* Of a . (b x c), against the product of their lengths, here and in core/bvh/decide.c together. */
+#define SIGHT_VOLUME_DOUBT (32.0 * 0x1p-53)
+/* How far the plane that core/bvh has of a triangle may lie off it, against its longest edge: it is tilted by up to
+ * 2^-40. */
+#define SIGHT_TILT_DOUBT 0x1p-38
 /* Of plane . d, against the plane's length: its components 1, the product 3; twice, here and there. */
 #define SIGHT_PLANE_DOUBT (16.0 * 0x1p-53)
 /* Sines of angles below this are not decided here: decide.c holds ranges between edges below 1e-6, and beyond

@@ -208,7 +208,7 @@ static void ptx_release(void *rec)
 const struct recorder_ops recorder_ptx = {
     .ending = ".ptx",
     .size = sizeof(struct ptx),
-    .track = {.scan = ptx_scan, .points = ptx_points, .metres = 1},
+    .track = {.scan = ptx_scan, .points = ptx_points, .metres = 1, .grid = 1},
     .begin = ptx_begin,
     .finish = ptx_finish,
     .release = ptx_release,

@@ -29,6 +29,7 @@ struct track_ops {
      * frame, or in the scene frame where the head moves. NULL: no points wanted. */
     int (*points)(void *rec, int n, struct sh_err *err);
     int metres;           /* 1: SH_EFORMAT where points of a scan are in geodetic coordinates */
+    int grid;             /* 1: a file of rows and columns: no head that fires beams in turn or along a list */
     int wants_attributes; /* 1: it has a place for amplitude and width */
 };
 

@@ -72,6 +72,7 @@ static int apply(const struct app_command *command, const struct app_option *row
         *(int *)at = 1;
         return APP_OK;
     case APP_TEXT:
+        if (*(const char **)at != NULL) return app_usage(command, "--%s: given twice; one is allowed", row->name);
         *(const char **)at = text;
         return APP_OK;
     case APP_NUMBER:
@@ -314,8 +315,7 @@ int app_parse(const struct app_command *command, int argc, char **argv, struct a
             if (n < APP_MAX_WORDS) words[n++] = optarg;
             continue;
         }
-        if (opt == 'h')
-            return help(command, argc > optind && argv[optind][0] != '-' ? argv[optind] : NULL);
+        if (opt == 'h') return help(command, argc > optind && argv[optind][0] != '-' ? argv[optind] : NULL);
         const int status = take_option(command, opt, argv[at], in, values, &done);
         if (status != APP_OK || done) return status;
     }

@@ -177,6 +177,7 @@ static int record_config(struct config *cfg, void *ctx, struct sh_err *err)
     if (rc == SH_OK) rc = set_layout(r, cfg, err);
     if (rc == SH_OK && cfg->output.layout == LINE_GEO && cfg->output.crs == GEOREF_GEODETIC)
         rc = record_files_check_degrees(&r->files, err);
+    if (rc == SH_OK) rc = record_files_check_emitter(&r->files, cfg->profile.emitter.kind, err);
     if (rc == SH_OK) rc = offline_open(cfg, r->recording.duration_s, &app_report_stderr, &offline, err);
     r->recording.head_ends = 1;
     r->recording.prepare = prepare;

@@ -33,6 +33,18 @@ int record_files_check_degrees(const struct record_files *files, struct sh_err *
     return SH_OK;
 }
 
+int record_files_check_emitter(const struct record_files *files, enum emitter_kind kind, struct sh_err *err)
+{
+    if (kind != EMITTER_BEAMS && kind != EMITTER_DIRECTIONS) return SH_OK;
+    for (int i = 0; i < files->n; i++)
+        if (files->file[i].ops->track.grid)
+            return sh_fail(err, SH_EINPUT,
+                           "record: -o %s: a grid has rows and columns, and this head fires %s; allowed .ply .las "
+                           ".e57 .shs",
+                           files->file[i].path, kind == EMITTER_BEAMS ? "beams in turn" : "along a list");
+    return SH_OK;
+}
+
 static int open_file(const struct record_files *files, struct record_file *file, struct sh_err *err)
 {
     char *path = NULL;

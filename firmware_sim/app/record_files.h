@@ -4,6 +4,7 @@
 #ifndef FIRMWARE_SIM_APP_RECORD_FILES_H
 #define FIRMWARE_SIM_APP_RECORD_FILES_H
 
+#include "core/emitter.h"
 #include "drivers/record/recorder.h"
 
 enum { RECORD_MAX_FILES = 8 };
@@ -29,6 +30,8 @@ int record_files_add(struct record_files *files, const char *path, struct sh_err
 int record_files_have(const struct record_files *files, const char *ending);
 /* For a stream of geodetic coordinates: SH_EINPUT where a file can hold only metres. */
 int record_files_check_degrees(const struct record_files *files, struct sh_err *err);
+/* SH_EINPUT where a file is a grid, and such a head fires without rows and columns. */
+int record_files_check_emitter(const struct record_files *files, enum emitter_kind kind, struct sh_err *err);
 int record_files_open(struct record_files *files, struct sh_err *err);
 int record_files_frame(struct record_files *files, struct scanhead *sh, const struct scanhead_frame *frame,
                        struct sh_err *err);

@@ -16,11 +16,6 @@ static const char *given_of(const struct cfg_reader *rd, const char *first, cons
     return !cfg_is_given(rd, first, 0) && cfg_is_given(rd, second, 0) ? second : first;
 }
 
-static double from_micro(int64_t micro)
-{
-    return (double)micro / 1e6;
-}
-
 /* Settings within the head profile: limits that a row of keys.c names by min_key and max_key. */
 static void check_limits(struct cfg_reader *rd, const struct config *cfg)
 {

@@ -5,11 +5,6 @@
 #include <stdio.h>
 #include <string.h>
 
-static double from_micro(int64_t micro)
-{
-    return 1e-6 * (double)micro;
-}
-
 /* `5 to 20`, or `25` where both are the same. */
 static const char *span(double low, double high, char buf[64])
 {
@@ -153,7 +148,8 @@ static void put_emitter(const struct cfg_reader *rd, const struct config_profile
         fprintf(out, "%u steps a turn, %u to %u cast, %u ahead, %s", c->steps_per_turn, c->first_step, c->last_step,
                 c->front_step, turn_of(p));
     if (c->kind == EMITTER_BEAMS)
-        fprintf(out, "%u beams, %.10g ns a sequence, %s", c->n_beams, from_micro(c->firing_fs), turn_of(p));
+        fprintf(out, "%u beam%s, %.10g ns a sequence, %s", c->n_beams, c->n_beams == 1 ? "" : "s",
+                from_micro(c->firing_fs), turn_of(p));
     if (c->kind == EMITTER_SPHERE) fprintf(out, "%u pulses a ring, %u rings", p->emitter.steps, p->emitter.rings);
     if (c->kind == EMITTER_DIRECTIONS) fprintf(out, "%u directions", p->emitter.steps);
     fprintf(out, "; %s lines/s\n", span(from_micro(p->lines_min_uhz), from_micro(p->lines_max_uhz), lines));

@@ -10,11 +10,6 @@
 static const double WHITE = 0.9, GREY = 0.2; /* reflectances that data sheets give ranges for */
 static const double USED_WITHIN = 0.02;      /* of used_hz: data sheets round it, 42 kHz for 41.67 */
 
-static double from_micro(int64_t micro)
-{
-    return 1e-6 * (double)micro;
-}
-
 /* ---- widths */
 
 void cfg_convert_widths(struct cfg_reader *rd, struct config_profile *p)

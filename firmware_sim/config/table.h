@@ -52,6 +52,12 @@ struct cfg_key {
     const char *help;
 };
 
+/* A figure of CFG_MICRO in its unit: the double nearest to what was written, so that errors and lists print just that. */
+static inline double from_micro(int64_t micro)
+{
+    return (double)micro / 1e6;
+}
+
 struct cfg_table {
     const struct cfg_key *keys;
     size_t n;
@@ -177,6 +183,8 @@ void cfg_list_profile(const struct cfg_reader *rd, const struct config_profile *
 extern const char *const cfg_from_names[];
 /* emitter.c: which keys of a profile belong to which emitter, and what follows from them. */
 void cfg_check_emitter(struct cfg_reader *rd, struct config_profile *profile);
+/* Whether profiles of some emitters need the key; then `words` names these. */
+int cfg_needed_by_emitter(const struct cfg_key *key, char *words, size_t len);
 /* The settings of a head whose pulse rate follows from its lines. */
 void cfg_check_emitter_settings(struct cfg_reader *rd, struct config *cfg);
 /* owned.c: keys that only some kinds of link have, and what a link needs. */

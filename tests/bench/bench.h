@@ -31,7 +31,7 @@ int bench_target_load(const char *name, const char *house, const struct sh_repor
 void bench_target_free(struct bench_target *target);
 
 /* ---- rays.c: a normal scan: lines of 100 degrees, spread over a turn of the pan */
-enum { BENCH_LOWEST_DEG = -40, BENCH_HIGHEST_DEG = 60 };
+enum { BENCH_LOWEST_DEG = -40, BENCH_HIGHEST_DEG = 60, BENCH_MAX_LINE = 6000 /* pulses */ };
 struct bench_rays {
     struct schedule_segment segment;
     uint32_t lines, line_pulses, n;

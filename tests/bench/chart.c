@@ -15,9 +15,11 @@
 #include "tests/bench/bench.h"
 #include "tests/bench/ground_truth.h"
 #include "tests/bench/pin.h"
+#include "tests/bench/sight.h"
 
-enum { LINES = 200, ROUNDS = 9, CHUNK = 256, SAMPLE_STEP = 1, WIDTHS = 4, METHODS = 20 };
-enum kind { FLOAT, REFINED, DECIDED }; /* the last one with the program's own BVH */
+enum { LINES = 200, ROUNDS = 9, CHUNK = 256, SAMPLE_STEP = 1, WIDTHS = 4, METHODS = 21 };
+enum kind { FLOAT, REFINED, DECIDED, SIGHT }; /* the last two are the program's own */
+#define WHOLE_SCAN 22.5e6 /* pulses of a turn at 0.04 degrees: what a sight is made for, and shared by */
 
 static const uint32_t WIDTH[WIDTHS] = {1, 4, 8, 16};
 
@@ -50,6 +52,10 @@ struct chart {
     struct embree_alone embree[2]; /* not robust, robust */
     struct bvh *bvh;
     struct caster *caster;
+    struct bench_scan scan;
+    struct sight *sight;
+    struct sight_work *work;
+    struct bvh_work *bvh_work;
     double *plane; /* n, d of each triangle from the station; one more, all NaN, for misses */
     double *range_m;
     uint32_t *prim;
@@ -62,12 +68,14 @@ struct chart {
 static void add_methods(struct chart *c)
 {
     struct method *m = c->method;
+    const int sight = bench_scan_chosen(&c->scan, c->scene->n_triangles);
     for (int kind = FLOAT; kind <= DECIDED; kind++)
         for (int robust = kind == DECIDED; robust < 2; robust++)
             for (int w = 0; w < WIDTHS; w++, m++) {
                 *m = (struct method){.kind = (enum kind)kind, .robust = robust, .width = WIDTH[w]};
-                m->is_default = kind == DECIDED && m->width == c->native;
+                m->is_default = !sight && kind == DECIDED && m->width == c->native;
             }
+    *m = (struct method){.kind = SIGHT, .robust = 1, .width = c->native, .is_default = sight};
 }
 
 /* Planes through the double vertices. */
@@ -106,14 +114,43 @@ static void refine(const double *restrict plane, uint32_t n_triangles, const uin
     }
 }
 
+/* Anew for each round: what it costs belongs to the cast. */
+static int make_sight(struct chart *c, double *cost_s, struct sh_err *err)
+{
+    struct sight_spec spec;
+    bench_scan_spec(&c->scan, c->bvh, c->station_m, 0, &spec);
+    sight_free(c->sight);
+    c->sight = NULL;
+    double start_s = bench_process_s();
+    int rc = sight_create(&spec, 1, NULL, &c->sight, err);
+    *cost_s = bench_process_s() - start_s;
+    return rc;
+}
+
+static void look_up(struct chart *c)
+{
+    const struct bench_rays *r = &c->rays;
+    struct bvh_rays rays = {.n = r->n,
+                            .dir = {r->dx, r->dy, r->dz},
+                            .range_max_m = BENCH_RANGE_MAX_M,
+                            .range_m = c->range_m,
+                            .triangle = c->prim};
+    memcpy(rays.from.at_m, c->station_m, sizeof rays.from.at_m);
+    sight_hits(c->work, c->bvh_work, c->sight, &rays);
+}
+
 static void cast(struct chart *c, const struct method *m)
 {
     const struct embree_alone *e = &c->embree[m->robust];
     const struct bench_rays *rays = &c->rays;
+    if (m->kind >= DECIDED) bvh_set_packet(c->bvh, m->width);
+    if (m->kind == SIGHT) {
+        look_up(c);
+        return;
+    }
     if (m->kind == DECIDED) {
-        bvh_set_packet(c->bvh, m->width);
-        hits_from(c->caster, c->bvh, c->station_m, BENCH_RANGE_MAX_M, rays->n, rays->dx, rays->dy, rays->dz,
-                    c->range_m, c->prim);
+        hits_from(c->caster, c->bvh, c->station_m, BENCH_RANGE_MAX_M, rays->n, rays->dx, rays->dy, rays->dz, c->range_m,
+                  c->prim);
         return;
     }
     for (uint32_t at = 0; at < rays->n; at += CHUNK) {
@@ -148,16 +185,21 @@ static void measure_error(struct chart *c, struct method *m)
     m->err_max_m = c->error_m[c->n_sample - 1];
 }
 
-static void measure_speed(struct chart *c)
+static int measure_speed(struct chart *c, struct sh_err *err)
 {
+    double build_s = 0.0;
     for (int round = 0; round < ROUNDS; round++)
         for (int i = 0; i < METHODS; i++) {
+            struct method *m = &c->method[i];
+            if (m->kind == SIGHT && make_sight(c, &build_s, err) != SH_OK) return err->code;
             double start_s = bench_thread_s();
-            cast(c, &c->method[i]);
-            c->method[i].ns[round] = 1e9 * (bench_thread_s() - start_s) / c->rays.n;
+            cast(c, m);
+            m->ns[round] = 1e9 * (bench_thread_s() - start_s) / c->rays.n;
+            if (m->kind == SIGHT) m->ns[round] += 1e9 * build_s / (double)c->scan.pulses;
         }
     for (int i = 0; i < METHODS; i++)
         c->method[i].ns_median = bench_median(c->method[i].ns, ROUNDS);
+    return SH_OK;
 }
 
 /* On the front: no other one is at least as fast and, in both figures, at least as exact, and better in one of them. */
@@ -236,6 +278,11 @@ static int set_up(struct chart *c, struct sh_err *err)
     }
     if (rc == SH_OK) rc = bvh_create(c->scene, c->station_m, 0.0, 0, NULL, &c->bvh, err);
     if (rc == SH_OK) rc = caster_create(&c->caster, err);
+    if (rc == SH_OK) rc = bvh_work_create(&c->bvh_work, err);
+    if (rc == SH_OK) rc = sight_work_create(&c->work, err);
+    bench_scan_of(WHOLE_SCAN, 1, &c->scan);
+    double cost_s;
+    if (rc == SH_OK) rc = make_sight(c, &cost_s, err);
     if (rc != SH_OK) return rc;
     if (c->spec->at_edges) aim_at_edges(c);
     bvh_get_info(c->bvh, &info);
@@ -249,6 +296,9 @@ static int set_up(struct chart *c, struct sh_err *err)
 static void tear_down(struct chart *c)
 {
     caster_free(c->caster);
+    sight_work_free(c->work);
+    bvh_work_free(c->bvh_work);
+    sight_free(c->sight);
     bvh_free(c->bvh);
     embree_alone_free(&c->embree[0]);
     embree_alone_free(&c->embree[1]);
@@ -267,12 +317,14 @@ static void print_rows(const struct method *method, const char *scene)
     static const char *const kind[] = {"float", "refined", "decided"};
     for (int i = 0; i < METHODS; i++) {
         const struct method *m = &method[i];
-        printf("cast,%s%s %u,%s,%.3f,%.3g,%.3g,%d,%d,,\n",
-               m->kind == DECIDED ? ""
-               : m->robust        ? "robust "
-                                  : "plain ",
-               kind[m->kind], m->width, scene, m->ns_median, m->err_p999_m, m->err_max_m, m->front, m->is_default);
+        if (m->kind == SIGHT)
+            printf("cast,sight");
+        else
+            printf("cast,%s%s %u", m->kind == DECIDED ? "" : m->robust ? "robust " : "plain ", kind[m->kind], m->width);
+        printf(",%s,%.3f,%.3g,%.3g,%d,%d,,\n", scene, m->ns_median, m->err_p999_m, m->err_max_m, m->front,
+               m->is_default);
     }
+    fflush(stdout);
 }
 
 /* What a method costs in normal scans, and its worst error in any. */
@@ -302,7 +354,9 @@ static int draw_scene(const struct chart_scene *spec, struct method *all, struct
         add_methods(c);
         for (int i = 0; i < METHODS; i++)
             measure_error(c, &c->method[i]);
-        measure_speed(c);
+        rc = measure_speed(c, err);
+    }
+    if (rc == SH_OK) {
         mark_front(c->method);
         print_rows(c->method, spec->name);
         add_to_all(all, c, 2);

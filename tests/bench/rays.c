@@ -28,7 +28,7 @@ void bench_schedule(uint32_t lines, uint32_t frames, struct schedule_spec *spec)
 static void fill_line(struct bench_rays *rays, uint32_t line, size_t at)
 {
     static const double levelled[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
-    double mirror_turn[BENCH_LINE_PULSES], pan_turn[BENCH_LINE_PULSES];
+    double mirror_turn[BENCH_MAX_LINE], pan_turn[BENCH_MAX_LINE];
     struct schedule_line place;
     struct schedule_run run;
     schedule_get_line(&rays->segment, line, &place);

@@ -292,6 +292,7 @@ static int run(struct rows *r, struct sh_err *err)
     if (rc == SH_OK) rc = build(r, 0, 0, err);
     if (rc != SH_OK) return rc;
     sight_get_info(r->sight, &r->out->info);
+    r->out->chosen = bench_scan_chosen(&r->out->scan, r->c->target->scene->n_triangles);
     compare(r);
     for (uint32_t round = 0; round < BENCH_SIGHT_ROUNDS; round++) {
         rc = round_of(r, round, err);

@@ -20,6 +20,8 @@ int bench_scan_sees(const void *ctx, const double dir[3], double radius_rad);
 /* What a sight is made of for it. */
 void bench_scan_spec(const struct bench_scan *scan, const struct bvh *bvh, const double station_m[3], int exact,
                      struct sight_spec *out);
+/* The plan takes a sight for it. */
+int bench_scan_chosen(const struct bench_scan *scan, uint32_t triangles);
 double bench_process_s(void); /* processor time of all threads */
 
 struct bench_sight {

@@ -17,8 +17,8 @@ ends_soon() {
     kill $head_pid
     wait_for 5 sh -c "! kill -0 $head_pid"
 }
-packet=512
-[ $speed = high ] || packet=1024
+packet=512 replugs=20
+[ $speed = high ] || packet=1024 replugs=5 # the speed is no matter of plugs: only that it is there again
 if [ $speed = high ]; then
     sed "\$alinks: [{type: usb, backend: functionfs, speed: super}]" /head.yaml >fast.yaml
     scanhead run fast.yaml --duration 0.01 2>fast.err
@@ -36,7 +36,7 @@ note "recorded at $(uptime_s) s"
 records_only && return
 head_start "{type: usb, backend: functionfs, speed: $speed}" --set head.prr_hz=4000 --set loop.tick_hz=100
 wait_for 10 is_plugged
-REPLUGS=20 UNPLUG="sh unplug.sh" PLUG="sh plug.sh" tap "$speed" test_stream
+REPLUGS=$replugs UNPLUG="sh unplug.sh" PLUG="sh plug.sh" tap "$speed" test_stream
 note "streamed at $(uptime_s) s"
 # Without a configuration a head has nothing to do on its bus: it rests, and is there again with the next one.
 cpu_ticks() {

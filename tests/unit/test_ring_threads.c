@@ -11,11 +11,12 @@
 /* Two casters fill slots with what only a tick's number tells; the pacing thread
  * releases them, numbers their frames, and gives up what is not ready where the test says so; it waits for
  * two of the readers, as in the pace `fast`, and not for the slow ones; one of these looks at slots where they lie.
- * Slots grow all the while. */
+ * Slots grow all the while. For one tick in seven caster and pacing thread race: 8,600 times, so that what goes wrong
+ * once in 2,900 races is seen in 95 of 100 runs. */
 #ifdef SH_SANITIZE /* sanitizers are for the code, not for the count */
 enum { TICKS = 30000 };
 #else
-enum { TICKS = 120000 };
+enum { TICKS = 60000 };
 #endif
 enum { CASTERS = 2, READERS = 4, SLOW = 2, LOOKING = 3, MAX_BYTES = 3 * SLOT_BYTES };
 

@@ -173,6 +173,15 @@ static void wrong_use_says_what_is_allowed(void **state)
     assert_int_equal(RUN(wire, "init", "points.obj"), 2);
     contains(text, "no triangles in it");
     contains(text, "export it again");
+    wire_write_text(
+        wire, "apart.gltf",
+        "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0}],"
+        "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}],"
+        "\"buffers\":[{\"uri\":\"gone.bin\",\"byteLength\":36}],"
+        "\"bufferViews\":[{\"buffer\":0,\"byteLength\":36}],"
+        "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"}]}\n");
+    assert_int_equal(RUN(wire, "init", "apart.gltf"), 2);
+    contains(text, "gone.bin\"; its geometry is in that file, which belongs in the same folder");
     assert_int_equal(RUN(wire, "init", "none.obj"), 2);
     contains(text, "none.obj: No such file or directory");
     assert_int_equal(RUN(wire, "init", "room.obj", "-o", "no/room.yaml"), 2);

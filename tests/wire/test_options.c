@@ -90,6 +90,7 @@ static const struct {
     {{"record", "CONFIG", "-o", "DIR/x.ply", "--las-version", "1.2"}, {"--las-version: no .las"}},
     {{"record", "CONFIG", "-o", "DIR/x.ptx", "--colour", "label"}, {"--colour: no .ply or .las"}},
     {{"map", "CONFIG"}, {"-o"}},
+    {{"map", "CONFIG", "-o", "DIR/a.png", "-o", "DIR/b.png"}, {"--output", "given twice"}},
     {{"list", "all"}, {"no arguments"}},
 };
 

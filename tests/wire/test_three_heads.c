@@ -1,12 +1,12 @@
 /* A Hokuyo, a SICK and a VLP-16 at once, each with clients of its personality, of the native stream and of the GNSS
- * receiver, for 20 s of device time on whatever processors there are: nothing is lost. */
+ * receiver, for 15 s of device time on whatever processors there are: nothing is lost. */
 #include "tests/wire/wire.h"
 
 #include <math.h>
 #include <pthread.h>
 #include <termios.h>
 
-enum { SECONDS = 20, N_HEADS = 3, N_READERS = 9 };
+enum { SECONDS = 15, N_HEADS = 3, N_READERS = 9 };
 
 /* One reader, in a thread of its own. */
 struct reader {

@@ -254,9 +254,24 @@ static void test_system_failures(void **state)
     close(fd);
     assert_int_equal(usage_complaints, 0);
 }
+
+/* A limit of the shell that is too small for any command: an error, no crash. */
+static void test_small_stack(void **state)
+{
+    struct wire *wire = *state;
+    const char *const args[] = {"-c", "ulimit -s 64; exec \"$0\" --version", wire_program(), NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn_program(wire, "/bin/sh", args, "out", "err", -1)), 2);
+    char *text = wire_read(wire_path(wire, "err"), NULL);
+    assert_non_null(strstr(text, "64 KiB"));
+    assert_non_null(strstr(text, "ulimit -s 1024"));
+    assert_ptr_equal(strchr(text, '\n'), text + strlen(text) - 1);
+    free(text);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_small_stack, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_configurations, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_meshes, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_links, wire_setup, wire_teardown),
