@@ -192,7 +192,7 @@ demo: deps-build
 # alone; the unit tests and what they need with sanitizers, without optimiser (and so without the warnings that it makes).
 # -g1, the lines alone, is an eighth less to compile.
 JOBS ?= $(shell getconf _NPROCESSORS_ONLN)
-STRICT = WERROR=-Werror CFLAGS=-g1 CXXFLAGS=-g1
+STRICT = WERROR=-Werror CFLAGS="-g1 $(CFLAGS)" CXXFLAGS="-g1 $(CXXFLAGS)"
 ASAN = WERROR=-Werror BUILD=$(BUILD)/asan OPT=-O0 CFLAGS=-w CPPFLAGS=-DSH_SANITIZE SAN="-g1 -fsanitize=address,undefined -fno-sanitize-recover=all"
 CLANG = WERROR=-Werror BUILD=$(BUILD)/clang CC=clang CXX=clang++ OPT=-O0 CFLAGS=-g0 CXXFLAGS=-g0
 SUBMAKE = @$(MAKE) --no-print-directory -j$(JOBS)
