@@ -126,6 +126,7 @@ uint32_t bvh_refine(const struct bvh_proposals *p)
 
 enum { LANES = 4 };
 typedef double lanes __attribute__((vector_size(LANES * sizeof(double))));
+typedef float lanes_f __attribute__((vector_size(LANES * sizeof(float))));
 
 /* A plane, and where rays meet it. */
 struct one_plane {
@@ -155,8 +156,9 @@ VEC_INLINE void ranges_of_lanes(const struct one_plane *p, const struct bvh_rays
         rays->triangle[at + i] = p->triangle;
     for (uint32_t i = 0; rays->label != NULL && i < LANES; i++)
         rays->label[at + i] = p->label;
-    for (uint32_t i = 0; rays->steep != NULL && i < LANES; i++)
-        rays->steep[at + i] = (float)p->nn / (float)(along[i] * along[i]);
+    if (rays->steep == NULL) return;
+    const lanes_f steep = (float)p->nn / __builtin_convertvector(along * along, lanes_f);
+    memcpy(rays->steep + at, &steep, sizeof steep);
 }
 
 double bvh_range_of(const struct bvh *bvh, uint32_t triangle, const double at_m[3], const double dir[3])
