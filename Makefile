@@ -281,6 +281,7 @@ chart: deps-build
 	$(BUILD)/tests/bench/chart_widths >> $(CHART).csv
 	$(BUILD)/tests/bench/beam --chart house wires foliage >> $(CHART).csv
 	gnuplot -e "csv='$(CHART).csv'; base='$(CHART)'" tests/bench/chart.gp
+	gnuplot -e "csv='$(CHART).csv'; base='$(CHART)_more'" tests/bench/chart_more.gp
 objects: $(EVERYTHING)
 test-unit-programs: $(UNIT)
 test-programs: all $(BUILD)/bench $(TESTS) $(FIGURES)
