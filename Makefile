@@ -259,11 +259,12 @@ bench-plain: deps-build
 bench-velodyne: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/velodyne
 	@$(BUILD)/tests/bench/velodyne
-# The real loop, processor time a pulse. In turns with others: make bench-loop WITH="'/path/scanhead' '/other --option'".
+# The real loop, processor time a pulse, with and without stream_sha256. In turns with others: make bench-loop
+# WITH="'/path/scanhead' '/other --option'".
 WITH ?=
 bench-loop: deps-build
 	@$(MAKE) --no-print-directory -j2 all $(BUILD)/tests/bench/loop_cost
-	@$(BUILD)/tests/bench/loop_cost $(BUILD)/scanhead $(WITH)
+	@$(BUILD)/tests/bench/loop_cost $(BUILD)/scanhead '$(BUILD)/scanhead --no-hash' $(WITH)
 chart: deps-build
 	$(call install_missing,$(DEPS_CHART))
 	@$(MAKE) --no-print-directory -j2 $(CHARTS)

@@ -141,6 +141,9 @@ void bvh_hits(struct bvh_work *work, const struct bvh *bvh, const struct bvh_ray
 /* Rays from .. to - 1 meet that triangle, or nothing (BVH_NO_TRIANGLE): their ranges, labels and steepness, bit by
  * bit what bvh_hits has. Up to three more of the rays may be overwritten, so later ones are to be set after. */
 void bvh_ranges_of(const struct bvh *bvh, uint32_t triangle, const struct bvh_rays *rays, uint32_t from, uint32_t to);
+/* The same where each has its own triangle[0 ..]; numbers beyond the scene's are passed over. */
+void bvh_ranges_each(const struct bvh *bvh, const uint32_t *triangle, const struct bvh_rays *rays, uint32_t from,
+                     uint32_t to);
 /* The range of one plane along a ray, by the same arithmetic. */
 double bvh_range_of(const struct bvh *bvh, uint32_t triangle, const double at_m[3], const double dir[3]);
 /* Ray i met one of these triangles, or none. All are tried in double, as a proposal in doubt is: the nearest

@@ -81,6 +81,7 @@ struct bvh {
     struct bvh_plane *triangle; /* one more than there are: the last stands for a miss, all NaN */
     double origin_m[3];
     /* Rivals of triangle i: rival[rival_first[i] .. rival_first[i + 1]), none of a miss. NULL: there are none. */
+    int ordered; /* bvh_order_exactly was called */
     uint32_t *rival_first, *rival;
     uint64_t *twin; /* bits: a face of the same corners stands for this one; NULL: for none */
     double station_reach_m; /* rays begin at most this far from the origin */

@@ -126,6 +126,7 @@ uint32_t bvh_refine(const struct bvh_proposals *p)
 
 enum { LANES = 4 };
 typedef double lanes __attribute__((vector_size(LANES * sizeof(double))));
+typedef float lanes_f __attribute__((vector_size(LANES * sizeof(float))));
 
 /* A plane, and where rays meet it. */
 struct one_plane {
@@ -155,8 +156,9 @@ VEC_INLINE void ranges_of_lanes(const struct one_plane *p, const struct bvh_rays
         rays->triangle[at + i] = p->triangle;
     for (uint32_t i = 0; rays->label != NULL && i < LANES; i++)
         rays->label[at + i] = p->label;
-    for (uint32_t i = 0; rays->steep != NULL && i < LANES; i++)
-        rays->steep[at + i] = (float)p->nn / (float)(along[i] * along[i]);
+    if (rays->steep == NULL) return;
+    const lanes_f steep = (float)p->nn / __builtin_convertvector(along * along, lanes_f);
+    memcpy(rays->steep + at, &steep, sizeof steep);
 }
 
 double bvh_range_of(const struct bvh *bvh, uint32_t triangle, const double at_m[3], const double dir[3])
@@ -180,27 +182,49 @@ static void say_nothing(const struct bvh_rays *rays, uint32_t from, uint32_t to)
         rays->steep[i] = NAN;
 }
 
+VEC_INLINE void set_plane(struct one_plane *p, const struct bvh *bvh, uint32_t triangle, const double o[3])
+{
+    const struct bvh_plane *tri = &bvh->triangle[triangle];
+    *p = (struct one_plane){.nx = tri->n[0],
+                            .ny = tri->n[1],
+                            .nz = tri->n[2],
+                            .nn = vec3_dot(tri->n, tri->n),
+                            .above = tri->d - vec3_dot(tri->n, o),
+                            .triangle = triangle,
+                            .label = label_of(tri->n[1], tri->n[2])};
+}
+
 VEC_CLONES
 void bvh_ranges_of(const struct bvh *bvh, uint32_t triangle, const struct bvh_rays *rays, uint32_t from, uint32_t to)
 {
+    struct one_plane p;
+    double o[3];
     if (triangle == BVH_NO_TRIANGLE) {
         say_nothing(rays, from, to);
         return;
     }
-    const struct bvh_plane *tri = &bvh->triangle[triangle];
-    double o[3];
     vec3_sub(rays->from.at_m, bvh->origin_m, o);
-    const struct one_plane p = {.nx = tri->n[0],
-                                .ny = tri->n[1],
-                                .nz = tri->n[2],
-                                .nn = vec3_dot(tri->n, tri->n),
-                                .above = tri->d - vec3_dot(tri->n, o),
-                                .triangle = triangle,
-                                .label = label_of(tri->n[1], tri->n[2])};
+    set_plane(&p, bvh, triangle, o);
     for (; from < to && rays->n - from >= LANES; from += LANES)
         ranges_of_lanes(&p, rays, from);
     for (; from < to; from++)
         range_of_one(&p, rays, from);
+}
+
+void bvh_ranges_each(const struct bvh *bvh, const uint32_t *triangle, const struct bvh_rays *rays, uint32_t from,
+                     uint32_t to)
+{
+    struct one_plane p;
+    double o[3];
+    vec3_sub(rays->from.at_m, bvh->origin_m, o);
+    for (uint32_t i = from; i < to; i++) {
+        if (triangle[i - from] == BVH_NO_TRIANGLE) {
+            say_nothing(rays, i, i + 1);
+        } else if (triangle[i - from] < bvh->scene->n_triangles) {
+            set_plane(&p, bvh, triangle[i - from], o);
+            range_of_one(&p, rays, i);
+        }
+    }
 }
 
 VEC_CLONES

@@ -295,6 +295,7 @@ int bvh_order_exactly(struct bvh *bvh, const struct sh_report *report, struct sh
     pthread_mutex_init(&p.lock, NULL);
     int rc = collide(bvh, &p, err);
     if (rc == SH_OK) rc = make_lists(bvh, &p, err);
+    bvh->ordered = rc == SH_OK;
     free(p.pair);
     pthread_mutex_destroy(&p.lock);
     return rc;

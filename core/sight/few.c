@@ -1,5 +1,6 @@
 /* Rays decided among a few triangles, by rules that sight_inside.h explains: four rays of a list at a time. */
 #include <math.h>
+#include <string.h>
 
 #include "core/sight/hits_inside.h"
 #include "core/vecmath.h"
@@ -104,27 +105,39 @@ static uint32_t of_lane(const struct sight *s, const struct bvh_rays *rays, cons
 
 VEC_INLINE void take(struct looks *w, const struct vec3_in *dir, uint32_t at, uint32_t n)
 {
+    double d[3][LANES];
+    if (n >= LANES) {
+        memcpy(&w->x, dir->x + at, sizeof w->x);
+        memcpy(&w->y, dir->y + at, sizeof w->y);
+        memcpy(&w->z, dir->z + at, sizeof w->z);
+        return;
+    }
     for (uint32_t i = 0; i < LANES; i++) {
         const uint32_t from = at + (i < n ? i : 0);
-        w->x[i] = dir->x[from];
-        w->y[i] = dir->y[from];
-        w->z[i] = dir->z[from];
+        d[0][i] = dir->x[from];
+        d[1][i] = dir->y[from];
+        d[2][i] = dir->z[from];
     }
+    memcpy(&w->x, d[0], sizeof w->x);
+    memcpy(&w->y, d[1], sizeof w->y);
+    memcpy(&w->z, d[2], sizeof w->z);
 }
 
 VEC_CLONES
-void few_decide(const struct sight *s, const struct bvh_rays *rays, const uint32_t *list, uint32_t from, uint32_t to,
-                uint32_t *triangle)
+int few_decide(const struct sight *s, const struct bvh_rays *rays, const uint32_t *list, uint32_t from, uint32_t to,
+               uint32_t *triangle)
 {
     struct looks w;
+    uint32_t open = 0;
     for (uint32_t at = from; at < to; at += LANES) {
         const uint32_t n = to - at < LANES ? to - at : LANES;
-        if (rays->n - at >= LANES)
-            take(&w, &rays->dir, at, LANES);
-        else
-            take(&w, &rays->dir, at, n);
+        take(&w, &rays->dir, at, rays->n - at);
         look_at(s, list, &w);
-        for (uint32_t i = 0; i < n; i++)
-            triangle[at - from + i] = of_lane(s, rays, list, &w, (int)i);
+        for (uint32_t i = 0; i < n; i++) {
+            const uint32_t it = of_lane(s, rays, list, &w, (int)i);
+            triangle[at - from + i] = it;
+            open |= it == FEW_OPEN || it == FEW_ASK;
+        }
     }
+    return open != 0;
 }

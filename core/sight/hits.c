@@ -51,24 +51,20 @@ static void ask(struct sight_work *w, uint32_t from, uint32_t to, uint32_t *aske
     *asked += to - from;
 }
 
-/* Of rays that meet one of a few, those that meet the same one are done together. In exact order, what the records
- * can't decide double does, as it would decide the BVH's proposals; else, or where the BVH might propose nothing, those
- * rays ask. */
+/* Rays that meet one of a few. In exact order, what the records can't decide double does, as it would decide the
+ * BVH's proposals; else, or where the BVH might propose nothing, those rays ask. */
 static void do_few(struct sight_work *w, struct bvh_work *bvh_work, const struct sight *s, const struct bvh_rays *rays,
                    const struct sight_run *run, uint32_t *asked)
 {
-    const uint32_t *list = s->list + (run->leaf & SIGHT_NUMBER), n = run[1].from - run->from;
-    few_decide(s, rays, list, run->from, run[1].from, w->triangle);
-    for (uint32_t i = 0, end; i < n; i = end) {
-        const uint32_t it = w->triangle[i];
-        for (end = i + 1; end < n && w->triangle[end] == it;)
-            end++;
-        if (it != FEW_OPEN && it != FEW_ASK)
-            bvh_ranges_of(s->bvh, it, rays, run->from + i, run->from + end);
-        else if (it == FEW_ASK || !s->among)
-            ask(w, run->from + i, run->from + end, asked);
-        else
-            decide_open(bvh_work, s, rays, list, run->from + i, run->from + end);
+    const uint32_t *list = s->list + (run->leaf & SIGHT_NUMBER), from = run->from, to = run[1].from;
+    const int open = few_decide(s, rays, list, from, to, w->triangle);
+    bvh_ranges_each(s->bvh, w->triangle, rays, from, to);
+    for (uint32_t i = from; i < to && open; i++) {
+        const uint32_t it = w->triangle[i - from];
+        if (it == FEW_ASK || (it == FEW_OPEN && !s->among))
+            ask(w, i, i + 1, asked);
+        else if (it == FEW_OPEN)
+            decide_open(bvh_work, s, rays, list, i, i + 1);
     }
 }
 

@@ -324,6 +324,7 @@ static void print_rows(const struct method *method, const char *scene)
         printf(",%s,%.3f,%.3g,%.3g,%d,%d,,\n", scene, m->ns_median, m->err_p999_m, m->err_max_m, m->front,
                m->is_default);
     }
+    fflush(stdout);
 }
 
 /* What a method costs in normal scans, and its worst error in any. */
