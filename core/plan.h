@@ -109,11 +109,17 @@ void plan_sample_optics(struct plan_sample *sample, uint32_t depth, struct plan_
 
 /* What a map of the directions from a station (core/sight.h) has to pay for, and with what. */
 struct plan_sight_need {
-    double pulses;       /* cast from a station in a scan */
-    double cells;        /* of the map, where rays go; sight_cells */
-    double cell_rad;     /* across */
-    double n_triangles;  /* of the scene */
-    int saves_order;     /* without a map surfaces have to be ordered by bvh_order_exactly */
+    double pulses;         /* cast from a station in a scan */
+    double share;          /* of all directions that the map shows */
+    double n_triangles;    /* of the scene */
+    uint32_t packet;       /* rays per Embree call */
+    uint64_t memory_bytes; /* that a map may take */
+    enum plan_sight_order {
+        PLAN_ORDER_FLOAT,   /* as the BVH has it */
+        PLAN_ORDER_FREE,    /* in double, where that costs no more than a scan without a map */
+        PLAN_ORDER_DOUBLE,  /* in double, by a BVH that is ordered in any case */
+        PLAN_ORDER_INSTEAD, /* in double; without a map the BVH would have to be ordered for that */
+    } order;
     int forced;          /* by cast.sight, 1: a map; 0: none; -1: not */
     const char *why_not; /* no map is possible; NULL: it is */
 };
@@ -123,12 +129,23 @@ struct plan_sight_found {
     double one, nothing, few, ask;
 };
 
-/* False where so few pulses pay for no map, whatever they meet: there is no need to look. */
+struct plan_sight_choice {
+    int map, ordered; /* a map is made; it orders surfaces in double */
+    double order_ns;  /* per pulse, what that costs */
+};
+
+/* Chooses and fills row. Looks at some pulses of the places, where so many may pay at all. */
+int plan_sight(const struct plan_sight_need *need, struct plan_place *place, uint32_t n_places,
+               const struct sh_report *report, struct plan_sight_choice *choice, struct plan_row *row,
+               struct sh_err *err);
+
+/* The steps of that. False where so few pulses pay for no map, whatever they meet. */
 int plan_sight_may_pay(const struct plan_sight_need *need);
-/* Casts around pulses of the head, at the corners of cells. */
+/* Casts around pulses of the head, at the corners of cells so far across. */
 void plan_sample_sight(struct plan_sample *sample, double cell_rad, struct plan_sight_found *found);
-/* Chooses and fills row. found NULL: nobody has looked. Returns 1: a map. */
-int plan_sight(const struct plan_sight_need *need, const struct plan_sight_found *found, struct plan_row *row);
+/* found NULL: nobody has looked. */
+void plan_sight_choose(const struct plan_sight_need *need, const struct plan_sight_found *found,
+                       struct plan_sight_choice *choice, struct plan_row *row);
 
 /* ---- the other stages */
 

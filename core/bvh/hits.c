@@ -215,7 +215,7 @@ void bvh_hits_ordered(struct bvh_work *work, const struct bvh *bvh, const struct
 {
     struct decide_ray ray = ray_from(bvh, rays);
     bvh_hits(work, bvh, rays);
-    if (bvh->rival_first != NULL) return;
+    if (bvh->ordered) return;
     for (uint32_t i = 0; i < rays->n; i++) {
         struct decide_hit hit = {rays->triangle[i], rays->range_m[i]};
         if (hit.prim == RTC_INVALID_GEOMETRY_ID) continue;

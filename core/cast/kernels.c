@@ -198,6 +198,32 @@ uint32_t kernel_geo(const struct vec3_in *p, const double scale[3], uint32_t n, 
            counts_of(p->z, 1.0 / scale[2], n, out->c);
 }
 
+/* All three coordinates are NaN, or none is. What does not fit is none of three: the entry is no echo. */
+VEC_CLONES
+uint32_t kernel_place(const struct vec3_in *direction, const double *restrict range_m, const double scale[3],
+                      uint32_t n, const struct kernel_wire *out)
+{
+    const double per_x = 1.0 / scale[0], per_y = 1.0 / scale[1], per_z = 1.0 / scale[2];
+    const double *restrict dx = direction->x, *restrict dy = direction->y, *restrict dz = direction->z;
+    uint32_t *restrict a = out->a, *restrict b = out->b, *restrict c = out->c;
+    uint64_t unfit = 0;
+    for (uint32_t i = 0; i < n; i++) {
+        uint64_t x_bits, y_bits, z_bits;
+        double x = dx[i] * range_m[i] * per_x, y = dy[i] * range_m[i] * per_y, z = dz[i] * range_m[i] * per_z;
+        double most = fabs(x) > fabs(y) ? fabs(x) : fabs(y);
+        most = most > fabs(z) ? most : fabs(z);
+        uint64_t fits = most < 2147483647.0;
+        vec_round(x, &x_bits);
+        vec_round(y, &y_bits);
+        vec_round(z, &z_bits);
+        unfit |= (uint64_t)(range_m[i] == range_m[i]) & (fits ^ 1);
+        a[i] = (uint32_t)(fits ? x_bits : (uint64_t)(uint32_t)LINE_XYZ_NONE);
+        b[i] = (uint32_t)(fits ? y_bits : (uint64_t)(uint32_t)LINE_XYZ_NONE);
+        c[i] = (uint32_t)(fits ? z_bits : (uint64_t)(uint32_t)LINE_XYZ_NONE);
+    }
+    return (uint32_t)unfit;
+}
+
 VEC_CLONES
 void kernel_scale(const double *restrict range_m, uint32_t n, const struct vec3_out *position)
 {

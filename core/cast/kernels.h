@@ -89,6 +89,9 @@ void kernel_polar(const struct cast_setup *setup, const double *range_m, const s
 /* Coordinates in counts of scale[], LINE_XYZ_NONE for NaN and for what doesn't fit. Returns how many
  * coordinates did not. */
 uint32_t kernel_geo(const struct vec3_in *p, const double scale[3], uint32_t n, const struct kernel_wire *out);
+/* The same of direction * range, where that is the position already. 0 where all fit. */
+uint32_t kernel_place(const struct vec3_in *direction, const double *range_m, const double scale[3], uint32_t n,
+                      const struct kernel_wire *out);
 void kernel_scale(const double *range_m, uint32_t n, const struct vec3_out *e);
 
 /* Firing times after the run's first pulse: j * quot + floor((acc + j * rem) / den). */

@@ -22,7 +22,7 @@ static void follow_pulse(struct caster *c, const struct chunk *k)
 }
 
 /* Positions as a head computes them, from ranges and what its encoders read: the three numbers of echoes at
- * .. at + n of the list. Returns how many coordinates did not fit; they are LINE_XYZ_NONE. */
+ * .. at + n of the list. Returns 0 where all fit; what does not is LINE_XYZ_NONE. */
 static uint32_t place(struct caster *c, const struct chunk *k, uint32_t at, uint32_t n, const struct kernel_wire *out)
 {
     const struct cast_setup *s = k->s;
@@ -33,11 +33,12 @@ static uint32_t place(struct caster *c, const struct chunk *k, uint32_t at, uint
         kernel_polar(s, range_m, &(struct kernel_turns){n, l->mirror_turn + at, l->pan_turn + at}, out);
         return 0;
     }
+    if (k->linear) return kernel_place(&VEC3_IN(e, 0), range_m, s->xyz_scale, n, out);
     if (s->n_knots != 0)
         kernel_scale_from(range_m, &VEC3_IN(l->p, at), s->station_m, n, &e);
     else
         kernel_scale(range_m, n, &e);
-    if (!k->linear) georef_forward(s->georef, n, VEC3_IN(e, 0), e);
+    georef_forward(s->georef, n, VEC3_IN(e, 0), e);
     return kernel_geo(&VEC3_IN(e, 0), s->xyz_scale, n, out);
 }
 

@@ -5,21 +5,33 @@
 #ifndef CORE_PLAN_COST_H
 #define CORE_PLAN_COST_H
 
+#include <stdint.h>
+
 #define PLAN_COST_SUB_RAY  70.0   /* a ray of a ring, or beyond glass */
 #define PLAN_COST_OUTLINES 8.0    /* adaptive: asking whether an outline is near, for each pulse */
 #define PLAN_COST_CUT      1000.0 /* adaptive: a pulse that one cuts */
 
-/* ---- a ray's first hit, and the map of core/sight */
-#define PLAN_COST_RAY       50.0  /* met by the BVH, */
-#define PLAN_COST_RAY_OUT   27.0  /* of one that meets nothing, */
-#define PLAN_COST_BORDER    150.0 /* and more of one that passes near a border */
-#define PLAN_COST_SIGHT_ONE 5.0   /* looked up: one triangle or nothing there, */
-#define PLAN_COST_SIGHT_FEW 50.0  /* one of a few, */
-#define PLAN_COST_SIGHT_ASK 220.0 /* the BVH is asked after all: such rays have nothing in common */
-/* To make it: in any case, by triangle, and by cell that shows more than one. */
+/* ---- a ray's first hit, and the map of core/sight (build/bench --only-sight) */
+
+/* Of the BVH, by how many rays Embree takes at once: met something, met nothing, and more where a border is near. */
+struct plan_ray_cost {
+    uint32_t packet;
+    double met, out, border;
+};
+static const struct plan_ray_cost plan_ray_costs[] = {
+    {16, 13.5, 8.0, 20.0}, {8, 21.0, 12.0, 20.0}, {4, 50.0, 30.0, 30.0}};
+
+#define PLAN_COST_SIGHT_ONE 9.0   /* looked up: one triangle or nothing there, */
+#define PLAN_COST_SIGHT_FEW 80.0  /* one of a few, */
+#define PLAN_COST_SIGHT_ASK 180.0 /* the BVH is asked after all: such rays have nothing in common; */
+#define PLAN_COST_ASK_ORDER 320.0 /* and more where surfaces are ordered in double */
+/* What is more in a scene of a million triangles, whose planes lie in no cache; by the root of their number. */
+#define PLAN_COST_MILLION 25.0
+/* To make it: in any case, by triangle, and by cell that shows more than one; such a cell's memory. */
 #define PLAN_COST_SIGHT          2e6
 #define PLAN_COST_SIGHT_TRIANGLE 260.0
 #define PLAN_COST_SIGHT_CELL     400.0
+#define PLAN_SIGHT_CELL_BYTES    60.0
 /* bvh_order_exactly: a triangle, and a ray's first hit in a scene of few overlaps. */
 #define PLAN_COST_ORDER   6000.0
 #define PLAN_COST_ORDERED 20.0

@@ -12,21 +12,26 @@ static const double LEAST_LEFT = 0.3;
 
 enum { NO_MAP, MAP, OPTIONS };
 
-/* ns per pulse; without a map, and looked up in one. */
-static double bvh_ns(const struct plan_sight_found *f)
+static const struct plan_ray_cost *ray_cost(const struct plan_sight_need *need)
 {
-    return f->nothing * PLAN_COST_RAY_OUT + (1.0 - f->nothing) * PLAN_COST_RAY + (f->few + f->ask) * PLAN_COST_BORDER;
+    const struct plan_ray_cost *cost = plan_ray_costs;
+    const struct plan_ray_cost *last = cost + sizeof plan_ray_costs / sizeof plan_ray_costs[0] - 1;
+    while (cost < last && cost->packet > need->packet)
+        cost++;
+    return cost;
 }
 
-static double map_ns(const struct plan_sight_found *f)
+/* Of a triangle's plane, which both ways need. */
+static double plane_ns(const struct plan_sight_need *need)
 {
-    return (f->one + f->nothing) * PLAN_COST_SIGHT_ONE + f->few * PLAN_COST_SIGHT_FEW + f->ask * PLAN_COST_SIGHT_ASK;
+    return PLAN_COST_MILLION * fmin(1.0, sqrt(1e-6 * need->n_triangles));
 }
 
-/* Without a map, where surfaces are to be ordered exactly, the BVH has to be prepared for that, too. */
-static double ordering_ns(const struct plan_sight_need *need)
+/* Cells of the whole cube, as many as its maker takes for so many pulses. */
+static double cells(const struct plan_sight_need *need)
 {
-    return need->saves_order ? PLAN_COST_ORDER * need->n_triangles + PLAN_COST_ORDERED * need->pulses : 0.0;
+    const double edge = sight_cells(need->pulses / need->share, need->memory_bytes);
+    return 6.0 * edge * edge;
 }
 
 /* A map costs at least that, whatever it shows. */
@@ -35,66 +40,105 @@ static double least_build_ns(const struct plan_sight_need *need)
     return PLAN_COST_SIGHT + PLAN_COST_SIGHT_TRIANGLE * need->n_triangles;
 }
 
-static double build_ns(const struct plan_sight_need *need, const struct plan_sight_found *f)
+/* Without a map, where surfaces are to be ordered exactly, the BVH has to be prepared for that, too. */
+static double ordering_ns(const struct plan_sight_need *need)
 {
-    const double mixed = (f->few + f->ask) * need->cells;
-    return least_build_ns(need) + PLAN_COST_SIGHT_CELL * mixed;
+    const double all_ns = PLAN_COST_ORDER * need->n_triangles + PLAN_COST_ORDERED * need->pulses;
+    return need->order == PLAN_ORDER_INSTEAD ? all_ns : 0.0;
+}
+
+/* Of a scan, ns: per pulse, but build. */
+struct costs {
+    double bvh, map, order, build;
+};
+
+static void estimate(const struct plan_sight_need *need, const struct plan_sight_found *f, struct costs *c)
+{
+    const struct plan_ray_cost *cost = ray_cost(need);
+    const double mixed = (f->few + f->ask) * need->share * cells(need);
+    const double fits = fmin(1.0, (double)need->memory_bytes / (PLAN_SIGHT_CELL_BYTES * (mixed + 1.0)));
+    const double few = fits * f->few, ask = f->ask + f->few - few;
+    c->bvh =
+        f->nothing * cost->out + (1.0 - f->nothing) * (cost->met + plane_ns(need)) + (f->few + f->ask) * cost->border;
+    c->map = (f->one + f->nothing) * PLAN_COST_SIGHT_ONE + f->one * plane_ns(need) + few * PLAN_COST_SIGHT_FEW +
+             ask * (c->bvh + PLAN_COST_SIGHT_ASK);
+    c->order = need->order == PLAN_ORDER_FLOAT ? 0.0 : ask * PLAN_COST_ASK_ORDER;
+    c->build = least_build_ns(need) + PLAN_COST_SIGHT_CELL * fits * mixed;
+}
+
+static int pays(const struct plan_sight_need *need, const struct costs *c, int ordered)
+{
+    const double map_ns = c->map + (ordered ? c->order : 0.0);
+    return (1.0 - LEAST_LEFT) * (c->bvh - map_ns) * need->pulses + ordering_ns(need) > c->build;
 }
 
 int plan_sight_may_pay(const struct plan_sight_need *need)
 {
-    const double saved_ns = (1.0 - LEAST_LEFT) * (PLAN_COST_RAY - PLAN_COST_SIGHT_ONE) * need->pulses;
-    return saved_ns + ordering_ns(need) > least_build_ns(need);
+    const double saved_ns = ray_cost(need)->met + ray_cost(need)->border - PLAN_COST_SIGHT_ONE;
+    return (1.0 - LEAST_LEFT) * saved_ns * need->pulses + ordering_ns(need) > least_build_ns(need);
 }
 
-/* found NULL: too few pulses to look. */
-static void fill_options(const struct plan_sight_need *need, const struct plan_sight_found *found,
-                         struct plan_option option[OPTIONS])
+static void say_why(const struct plan_sight_need *need, const struct plan_sight_found *found, const struct costs *c,
+                    int it_pays, struct plan_row *row)
 {
-    const struct plan_sight_found best = {.one = 1.0}, *f = found != NULL ? found : &best;
-    option[NO_MAP] = (struct plan_option){.method = "none"};
-    option[MAP] = (struct plan_option){.method = "map"};
-    snprintf(option[MAP].why_not, sizeof option[MAP].why_not, "%s", need->why_not != NULL ? need->why_not : "");
-    if (need->why_not != NULL)
-        option[MAP].cost_ns = (double)NAN;
-    else
-        option[MAP].cost_ns = map_ns(f) - bvh_ns(f) + (build_ns(need, f) - ordering_ns(need)) / fmax(1.0, need->pulses);
-}
-
-static void say_why(const struct plan_sight_need *need, const struct plan_sight_found *f, int map, struct plan_row *row)
-{
-    const double saved_ns = bvh_ns(f) - map_ns(f), build_s = 1e-9 * build_ns(need, f);
     size_t used = 0;
     if (row->forced) used = (size_t)snprintf(row->why, sizeof row->why, "forced by cast.sight; ");
-    snprintf(row->why + used, sizeof row->why - used,
-             "%.3g million pulses from a station %s for about %.2g s to make a map, which saves about %.2g ns each; "
-             "%.3g %% meet a cell of one surface or none",
-             1e-6 * need->pulses, map ? "pay" : "do not pay", build_s, fmax(0.0, saved_ns),
-             100.0 * (f->one + f->nothing));
+    char *why = row->why + used;
+    const size_t room = sizeof row->why - used;
+    const double pulses_m = 1e-6 * need->pulses, plain = found != NULL ? 100.0 * (found->one + found->nothing) : 0.0;
+    if (need->why_not != NULL)
+        snprintf(why, room, "%s", need->why_not);
+    else if (found == NULL)
+        snprintf(why, room, "%.4g million pulses of a scan are too few to pay for a map", pulses_m);
+    else if (!it_pays && c->map >= c->bvh)
+        snprintf(why, room, "a map saves nothing: only %.3g %% of the pulses go to a cell of one surface or none",
+                 plain);
+    else
+        snprintf(why, room,
+                 "%.4g million pulses of a scan %s for a map, which saves %.2g ns each and takes %.2g s to make; "
+                 "%.3g %% go to a cell of one surface or none",
+                 pulses_m, it_pays ? "pay" : "do not pay", c->bvh - c->map, 1e-9 * c->build, plain);
 }
 
-int plan_sight(const struct plan_sight_need *need, const struct plan_sight_found *found, struct plan_row *row)
+void plan_sight_choose(const struct plan_sight_need *need, const struct plan_sight_found *found,
+                       struct plan_sight_choice *choice, struct plan_row *row)
 {
     static const struct plan_tolerance any = {INFINITY, 1.0};
-    struct plan_option option[OPTIONS];
-    fill_options(need, found, option);
-    /* What it costs is shown; whether it pays is asked with room for doubt. */
-    const double cost_ns = option[MAP].cost_ns;
-    int pays = 0;
-    if (found != NULL && need->why_not == NULL) {
-        const double saved_ns = (1.0 - LEAST_LEFT) * (bvh_ns(found) - map_ns(found)) * need->pulses;
-        pays = saved_ns + ordering_ns(need) > build_ns(need, found);
+    static const struct plan_sight_found best = {.one = 1.0};
+    struct plan_option option[OPTIONS] = {[NO_MAP] = {.method = "none"}, [MAP] = {.method = "map"}};
+    struct costs c;
+    estimate(need, found != NULL ? found : &best, &c);
+    const int can = need->why_not == NULL, must_order = need->order >= PLAN_ORDER_DOUBLE;
+    const int ordered_pays = can && found != NULL && pays(need, &c, 1);
+    const int it_pays = ordered_pays || (can && found != NULL && !must_order && pays(need, &c, 0));
+    if (can)
+        option[MAP].cost_ns = c.map - c.bvh + (c.build - ordering_ns(need)) / fmax(1.0, need->pulses);
+    else
+        snprintf(option[MAP].why_not, sizeof option[MAP].why_not, "%s", need->why_not);
+    if (!can) option[MAP].cost_ns = (double)NAN;
+    if (!it_pays && option[MAP].cost_ns < 0.0) option[MAP].cost_ns = 0.0; /* not beyond doubt */
+    const struct plan_choice ask = {"sight", option, OPTIONS, need->forced, "cast.sight", any};
+    choice->map = plan_choose(&ask, row) == MAP;
+    choice->ordered = choice->map && need->order != PLAN_ORDER_FLOAT && (ordered_pays || must_order || row->forced);
+    choice->order_ns = choice->ordered && found != NULL ? c.order : 0.0;
+    say_why(need, found, &c, it_pays, row);
+}
+
+int plan_sight(const struct plan_sight_need *need, struct plan_place *place, uint32_t n_places,
+               const struct sh_report *report, struct plan_sight_choice *choice, struct plan_row *row,
+               struct sh_err *err)
+{
+    const int looks = need->why_not == NULL && need->forced != 0 && plan_sight_may_pay(need);
+    struct plan_sight_found found;
+    if (looks) {
+        struct plan_sample *sample;
+        int rc = plan_sample_create(place, n_places, report, &sample, err);
+        if (rc != SH_OK) return rc;
+        plan_sample_sight(sample, sqrt(4.0 * M_PI / cells(need)), &found);
+        plan_sample_free(sample);
+        rc = sh_check_stop(report, err);
+        if (rc != SH_OK) return rc;
     }
-    if (need->why_not == NULL && !pays) option[MAP].cost_ns = fmax(0.0, cost_ns);
-    const struct plan_choice choice = {"sight", option, OPTIONS, need->forced, "cast.sight", any};
-    const int map = plan_choose(&choice, row) == MAP;
-    if (need->why_not != NULL) {
-        snprintf(row->why, sizeof row->why, "%s%s", row->forced ? "forced by cast.sight; " : "", need->why_not);
-    } else if (found != NULL) {
-        say_why(need, found, row->forced ? pays : map, row);
-    } else {
-        snprintf(row->why, sizeof row->why, "%s%.3g million pulses from a station are too few to pay for a map",
-                 row->forced ? "forced by cast.sight; " : "", 1e-6 * need->pulses);
-    }
-    return map;
+    plan_sight_choose(need, looks ? &found : NULL, choice, row);
+    return SH_OK;
 }

@@ -101,7 +101,7 @@ static void set_strip(const struct sight *sight, struct build_candidate *c, doub
         longest = fmax(longest, length);
     }
     const double area2 = vec3_length(p->n), height_m = fabs(vec3_dot(p->n, v[k])) / area2;
-    const double sine = fmax(SIGHT_GRAZE, (height_m + 0x1p-38 * longest + 0x1p-47 * far_m) * 4.0 * SIGHT_NEAR);
+    const double sine = fmax(SIGHT_GRAZE, (height_m + SIGHT_TILT_DOUBT * longest + 0x1p-47 * far_m) * 4.0 * SIGHT_NEAR);
     vec3_sub(v[(k + 1) % 3], v[k], e);
     vec3_cross(v[k], e, side);
     const double past = 1.0 / (2.0 * area2 + 2.0 * SIGHT_EDGE_DOUBT * far_m * longest);
@@ -124,7 +124,7 @@ int build_candidate(const struct sight *sight, uint32_t face, uint32_t triangle,
     if (bvh_is_twin(sight->bvh, triangle) || !set_plane(sight, c, v, face)) return 0;
     vec3_cross(v[1], v[2], n);
     const double volume = vec3_dot(v[0], n), sign = volume < 0.0 ? -1.0 : 1.0;
-    const int has_sign = fabs(volume) > SIGHT_VOLUME_DOUBT * vec3_length(v[0]) * vec3_length(v[1]) * vec3_length(v[2]);
+    double doubt = SIGHT_VOLUME_DOUBT * vec3_length(v[0]) * vec3_length(v[1]) * vec3_length(v[2]);
     const double border_m = bvh_border_m(sight->bvh, triangle, sight->station_m);
     for (int i = 0; i < 3; i++) {
         double e[3];
@@ -135,7 +135,8 @@ int build_candidate(const struct sight *sight, uint32_t face, uint32_t triangle,
         longest2 = fmax(longest2, vec3_dot(e, e));
         near2 = fmin(near2, vec3_dot(v[i], v[i]));
     }
-    if (!has_sign) set_strip(sight, c, v, face);
+    doubt += SIGHT_TILT_DOUBT * sqrt(longest2) * vec3_length(bvh_plane(sight->bvh, triangle)->n);
+    if (!(fabs(volume) > doubt)) set_strip(sight, c, v, face);
     for (int i = 0; i < 3; i++)
         c->edge_slope[i] = fabs(c->edge[i][1]) + fabs(c->edge[i][2]);
     c->near_m = fmax(0.0, (sqrt(near2) - sqrt(longest2)) * (1.0 - 1e-12));

@@ -23,7 +23,7 @@ struct seen {
     uint32_t *leaf;    /* the leaf of this list, once it has been made; squares with the same list share it */
     uint32_t own_leaf;
 };
-enum { COVERS = 1U << 31, NO_LEAF = 0xffffffff };
+enum { COVERS_BIT = 31, COVERS = 1U << COVERS_BIT, NO_LEAF = 0xffffffff };
 
 /* What is known of a region while it is divided. */
 struct division {
@@ -49,15 +49,20 @@ struct quarters {
     quad first, plane[3], slope, slack, rel;
 };
 
-/* What pass by pass becomes known of a candidate in the four quarters. */
-struct build_where {
-    quad_mask outside, covers;
-};
+/* What becomes known of a candidate in the four quarters: outside, covers. */
+enum { OUTSIDE_BITS = 15, COVERS_SHIFT = 4 }; /* four bits each, a quarter each */
 
 /* Vectors go by address: compilers warn of a changed way to pass them where there is no AVX. */
 VEC_INLINE void at_middles(const double f[3], const struct quarters *four, quad *out)
 {
     *out = f[0] + f[1] * four->u + f[2] * four->v;
+}
+
+/* A bit for each lane that is set. */
+VEC_INLINE uint32_t bits_of(const quad_mask *which)
+{
+    const quad_mask bit = *which & (quad_mask){1, 2, 4, 8};
+    return (uint32_t)(bit[0] | bit[1] | bit[2] | bit[3]);
 }
 
 VEC_INLINE void choose(const quad_mask *which, const quad *yes, quad *no)
@@ -94,7 +99,7 @@ VEC_INLINE void find_covers(const struct build_work *w, const struct seen *in, s
         better &= covers & (quad_mask)(e > first);
         choose(&better, &e, &first);
         cover = (((quad_mask){number, number, number, number}) & better) | (cover & ~better);
-        w->where[i] = (struct build_where){outside, covers};
+        w->where[i] = (uint8_t)(bits_of(&outside) | bits_of(&covers) << COVERS_SHIFT);
     }
     four->first = first;
     four->cover = cover;
@@ -103,7 +108,9 @@ VEC_INLINE void find_covers(const struct build_work *w, const struct seen *in, s
 /* The planes of what covers, side by side. Returns 0 where nothing covers anything. */
 VEC_INLINE int take_covers(const struct build_work *w, struct quarters *four)
 {
+    const quad none = {0.0, 0.0, 0.0, 0.0};
     int any = 0;
+    four->plane[0] = four->plane[1] = four->plane[2] = four->slope = four->slack = four->rel = none;
     for (int k = 0; k < 4; k++) {
         if ((uint32_t)four->cover[k] == NO_CANDIDATE) continue;
         const struct build_candidate *c = &w->candidate[four->cover[k]];
@@ -124,14 +131,13 @@ VEC_INLINE void find_behind(const struct build_candidate *c, const struct quarte
     const double half = four->half;
     const quad across = four->plane[1] - c->plane[1], up = four->plane[2] - c->plane[2], reach = four->slope * half;
     const quad doubt = 2.0 * (c->slack + four->slack) + (c->rel + four->rel + SIGHT_SAME) * (four->first + reach);
-    quad mine, a = -across, b = -up;
+    const quad_mask positive = {INT64_MAX, INT64_MAX, INT64_MAX, INT64_MAX};
+    const quad spread = ((quad)((quad_mask)across & positive) + (quad)((quad_mask)up & positive)) * half;
+    quad mine;
     quad_mask clear;
     at_middles(c->plane, four, &mine);
     find_clear(c, &mine, half, &clear);
-    const quad_mask a_less = (quad_mask)(a < across), b_less = (quad_mask)(b < up);
-    choose(&a_less, &across, &a);
-    choose(&b_less, &up, &b);
-    *behind = (clear & (quad_mask)(four->first - mine - (a + b) * half > doubt)) |
+    *behind = (clear & (quad_mask)(four->first - mine - spread > doubt)) |
               (~clear & (quad_mask)(c->near_m * (four->first - reach) > 2.0));
 }
 
@@ -143,17 +149,17 @@ static void look(const struct build_work *w, const struct seen *in, struct quart
     find_covers(w, in, four);
     const int hides = take_covers(w, four) && in->n > 1;
     for (uint32_t i = 0; i < in->n; i++) {
-        const uint32_t number = in->list[i] & ~(uint32_t)COVERS;
-        const quad_mask mine = {number, number, number, number}, covers = w->where[i].covers;
-        quad_mask gone = w->where[i].outside;
-        if (hides) {
+        const uint32_t number = in->list[i] & ~(uint32_t)COVERS, where = w->where[i];
+        uint32_t gone = where & OUTSIDE_BITS;
+        if (hides && gone != OUTSIDE_BITS) {
             quad_mask behind;
             find_behind(&w->candidate[number], four, &behind);
-            gone |= behind & (quad_mask)(mine != four->cover);
+            behind &= (quad_mask)(((quad_mask){number, number, number, number}) != four->cover);
+            gone |= bits_of(&behind);
         }
         for (int k = 0; k < 4; k++) {
-            four->seen[k].list[n[k]] = number | ((uint32_t)covers[k] & COVERS);
-            n[k] += gone[k] == 0;
+            four->seen[k].list[n[k]] = number | (where >> (COVERS_SHIFT + k) & 1) << COVERS_BIT;
+            n[k] += ~(gone >> k) & 1;
         }
     }
     for (int k = 0; k < 4; k++) {
@@ -245,7 +251,8 @@ static void make_quarters(const struct square *q, const struct seen *seen, struc
 
 static void divide_quarters(struct division *d, const struct square *q, const struct seen *seen)
 {
-    struct quarters four = {.half = 0.5 * q->half + SIGHT_PAD};
+    struct quarters four;
+    four.half = 0.5 * q->half + SIGHT_PAD;
     make_quarters(q, seen, &four);
     look(d->w, seen, &four);
     for (uint32_t k = 0; k < 4; k++) {
@@ -302,17 +309,6 @@ void build_work_free(struct build_work *w)
     free(w->where);
 }
 
-/* Its vectors are aligned. */
-static int grow_where(struct build_work *w, size_t n)
-{
-    if (n <= w->where_room) return 1;
-    free(w->where);
-    w->where_room = n + n / 2;
-    w->where = aligned_alloc(sizeof *w->where, w->where_room * sizeof *w->where);
-    if (w->where == NULL) w->where_room = 0;
-    return w->where != NULL;
-}
-
 /* Each square's candidates stand above those of the square that it is a quarter of: four lists a level. */
 static size_t stacked(const struct build_shared *b, size_t n)
 {
@@ -344,7 +340,8 @@ static int gather(struct build_shared *b, struct build_work *w, uint32_t region,
     w->n = 0;
     *fits = may_take(b, w, n);
     if (!*fits) return SH_OK;
-    if (!grow(&w->candidate, &w->room, n, sizeof *w->candidate) || !grow_where(w, n) ||
+    if (!grow(&w->candidate, &w->room, n, sizeof *w->candidate) ||
+        !grow(&w->where, &w->where_room, n, sizeof *w->where) ||
         !grow(&w->stack, &w->stack_room, stacked(b, n), sizeof *w->stack))
         return SH_ENOMEM;
     for (uint64_t i = b->bin[region]; i < b->bin[region + 1]; i++)

@@ -63,6 +63,9 @@ struct sight_record {
 #define SIGHT_EDGE_DOUBT (32.0 * 0x1p-53)
 /* Of a . (b x c), against the product of their lengths, here and in core/bvh/decide.c together. */
 #define SIGHT_VOLUME_DOUBT (32.0 * 0x1p-53)
+/* How far the plane that core/bvh has of a triangle may lie off it, against its longest edge: it is tilted by up to
+ * 2^-40. */
+#define SIGHT_TILT_DOUBT 0x1p-38
 /* Of plane . d, against the plane's length: its components 1, the product 3; twice, here and there. */
 #define SIGHT_PLANE_DOUBT (16.0 * 0x1p-53)
 /* Sines of angles below this are not decided here: decide.c holds ranges between edges below 1e-6, and beyond

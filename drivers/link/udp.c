@@ -6,7 +6,7 @@
  * is used for it. (SO_BINDTODEVICE would do without, but takes a privilege.) Multicast is refused.
  *
  * A receiver that is not there is no failure: what was sent is gone, and so is what the system had no room for on its
- * way out. What arrives at the socket can be read. */
+ * way out. Both are counted: a datagram that is refused when the refusal comes, which several may share. What arrives at the socket can be read. */
 #include <errno.h>
 #include <ifaddrs.h>
 #include <net/if.h>
@@ -26,6 +26,7 @@ enum { SEND_BUFFER_BYTES = 1 << 20 };
 struct udp_link {
     int fd;
     int reported_opened;
+    uint64_t refused;
     char name[80];
 };
 
@@ -177,7 +178,7 @@ static int udp_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
     if ((fds[1].revents & POLLERR) != 0) { /* a refusal that came back, else poll would spin */
         int error;
         socklen_t len = sizeof error;
-        getsockopt(udp->fd, SOL_SOCKET, SO_ERROR, &error, &len);
+        if (getsockopt(udp->fd, SOL_SOCKET, SO_ERROR, &error, &len) == 0 && error != 0) udp->refused++;
     }
     return events.n;
 }
@@ -199,8 +200,16 @@ static ssize_t udp_write(void *link, int session, const void *buf, size_t len)
         if (send(udp->fd, buf, len, MSG_DONTWAIT | MSG_NOSIGNAL) >= 0) return (ssize_t)len;
         if (errno == EAGAIN || errno == EWOULDBLOCK) return 0;
         if (errno != ECONNREFUSED && errno != EINTR) break;
+        udp->refused += errno == ECONNREFUSED;
     }
+    udp->refused++;
     return (ssize_t)len; /* no route, no memory: gone as on any way */
+}
+
+static uint64_t udp_refused(const void *link)
+{
+    const struct udp_link *udp = link;
+    return udp->refused;
 }
 
 static void udp_close(void *link)
@@ -217,5 +226,6 @@ const struct link_ops link_udp = {
     .poll = udp_poll,
     .read = udp_read,
     .write = udp_write,
+    .refused = udp_refused,
     .close = udp_close,
 };

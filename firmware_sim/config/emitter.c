@@ -4,6 +4,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 enum {
     LINE = 1 << EMITTER_LINE,
@@ -32,15 +33,25 @@ static const struct owned_key {
 static const double PRR_MOST_HZ = 1e7;
 
 /* "planar, beams" */
-static const char *words_of(const struct cfg_reader *rd, int emitters, char *buf, size_t len)
+static const char *words_of(int emitters, char *buf, size_t len)
 {
+    const char *const *names = cfg_find(&cfg_profile_table, "emitter")->names;
     size_t used = 0;
     buf[0] = '\0';
     for (int kind = EMITTER_LINE; kind <= EMITTER_DIRECTIONS && used < len; kind++)
         if (emitters & 1 << kind)
-            used +=
-                (size_t)snprintf(buf + used, len - used, "%s%s", used > 0 ? ", " : "", cfg_word(rd, "emitter", kind));
+            used += (size_t)snprintf(buf + used, len - used, "%s%s", used > 0 ? ", " : "", names[kind]);
     return buf;
+}
+
+int cfg_needed_by_emitter(const struct cfg_key *key, char *words, size_t len)
+{
+    for (size_t i = 0; i < CFG_LEN(owned); i++)
+        if (owned[i].needed && strcmp(owned[i].path, key->path) == 0) {
+            words_of(owned[i].emitters, words, len);
+            return 1;
+        }
+    return 0;
 }
 
 static void check_owners(struct cfg_reader *rd, int emitter)
@@ -51,7 +62,7 @@ static void check_owners(struct cfg_reader *rd, int emitter)
         const int given = cfg_is_given(rd, key->path, 0), has = (key->emitters & emitter) != 0;
         if (given && !has)
             cfg_fail_key(rd, key->path, 0, "no key of this emitter; allowed only with emitter: %s",
-                         words_of(rd, key->emitters, words, sizeof words));
+                         words_of(key->emitters, words, sizeof words));
         else if (!given && has && key->needed)
             cfg_fail_missing(rd, cfg_find(&rd->table, key->path), 0);
     }

@@ -40,7 +40,7 @@ static void print_wrapped(const char *text, int indent, const char *mark, FILE *
 
 static void print_key(const struct cfg_key *key, FILE *out)
 {
-    char allowed[CFG_ALLOWED_MAX];
+    char allowed[CFG_ALLOWED_MAX], emitters[64];
     fprintf(out, "%s\n    %s", key->path, type_name(key));
     if (key->type != CFG_MAP) {
         if (key->unit != NULL) fprintf(out, ", %s", key->unit);
@@ -51,6 +51,8 @@ static void print_key(const struct cfg_key *key, FILE *out)
             fprintf(out, "; default from the head profile, its %s", key->def + 1);
         else if (key->def != NULL && key->def[0] != '\0')
             fprintf(out, "; default %s", key->def);
+        else if (cfg_needed_by_emitter(key, emitters, sizeof emitters))
+            fprintf(out, "; required with emitter: %s", emitters);
         else
             fputs("; optional", out);
     }

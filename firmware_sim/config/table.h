@@ -183,6 +183,8 @@ void cfg_list_profile(const struct cfg_reader *rd, const struct config_profile *
 extern const char *const cfg_from_names[];
 /* emitter.c: which keys of a profile belong to which emitter, and what follows from them. */
 void cfg_check_emitter(struct cfg_reader *rd, struct config_profile *profile);
+/* Whether profiles of some emitters need the key; then `words` names these. */
+int cfg_needed_by_emitter(const struct cfg_key *key, char *words, size_t len);
 /* The settings of a head whose pulse rate follows from its lines. */
 void cfg_check_emitter_settings(struct cfg_reader *rd, struct config *cfg);
 /* owned.c: keys that only some kinds of link have, and what a link needs. */

@@ -70,6 +70,11 @@ void pump_get_place(const struct pump *pump, struct link_place *place)
 void pump_get_counts(const struct pump *pump, struct link_counts *counts)
 {
     *counts = pump->counts;
+    if (pump->ops->refused == NULL || pump->link == NULL) return;
+    uint64_t refused = pump->ops->refused(pump->link);
+    if (refused > counts->sent_units) refused = counts->sent_units;
+    counts->sent_units -= refused;
+    counts->lost_units += refused;
 }
 
 /* The first link that could not write what it had to makes the run a failure. */

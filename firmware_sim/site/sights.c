@@ -53,70 +53,71 @@ static double pulses_of(const struct plan_place *place, uint32_t frames)
     return all != 0 ? fired * (double)cast / (double)all : 0.0;
 }
 
-static void ask_need(struct site *site, const struct site_look *look, struct plan_sight_need *need)
+/* Of all maps together. */
+static uint64_t memory_bytes(const struct site *site)
 {
-    const struct config *cfg = site->cfg;
-    struct site_view view;
-    site_view_of(site, look->at[0].station, &view);
-    const double share = site_view_share(&view, SQUARE_RAD);
-    need->pulses = pulses_of(&look->place[0], cfg->head.settings.frames);
-    site->plan.sight_rays = need->pulses / share;
-    const double edge = sight_cells(site->plan.sight_rays, (uint64_t)(cfg->cast.sight_mib * 0x1p20));
-    need->cells = 6.0 * edge * edge * share;
-    need->cell_rad = sqrt(4.0 * M_PI / (6.0 * edge * edge));
-    need->n_triangles = site->scene->n_triangles;
-    need->saves_order = site->plan.methods.order_exactly && site_order_can_wait(site);
+    return (uint64_t)(site->cfg->cast.sight_mib * 0x1p20);
 }
 
-static int choose(struct site *site, const struct sh_report *report, struct sh_err *err)
+static enum plan_sight_order order_of(const struct site *site)
 {
-    const enum config_choice asked = site->cfg->cast.sight;
-    struct plan_sight_need need = {.forced = asked == CHOICE_AUTO ? -1 : asked == CHOICE_ON, .why_not = why_not(site)};
-    struct plan_sight_found found;
-    struct plan_sample *sample = NULL;
-    struct site_look look;
-    int rc = SH_OK, looks = 0;
-    if (need.why_not == NULL) {
-        site_look_open(&look, site);
-        ask_need(site, &look, &need);
-        looks = asked != CHOICE_OFF && plan_sight_may_pay(&need);
-    }
-    if (looks) rc = plan_sample_create(look.place, look.n, report, &sample, err);
-    if (looks && rc == SH_OK) plan_sample_sight(sample, need.cell_rad, &found);
-    plan_sample_free(sample);
-    if (rc == SH_OK) rc = sh_check_stop(report, err);
-    if (rc == SH_OK) site->plan.methods.sight = plan_sight(&need, looks ? &found : NULL, &site->plan.sight);
-    return rc;
+    if (site->plan.methods.order_exactly) return site_order_can_wait(site) ? PLAN_ORDER_INSTEAD : PLAN_ORDER_DOUBLE;
+    return site->cfg->scene.order_exactly == CHOICE_AUTO && only_first_hits(site) ? PLAN_ORDER_FREE : PLAN_ORDER_FLOAT;
 }
 
-/* Surfaces are ordered in double by the map, which costs nothing. */
-static void order_for_nothing(struct site *site)
+/* Surfaces are ordered in double by the map. */
+static void take_order(struct site *site, const struct plan_sight_choice *choice)
 {
     struct plan_row *row = &site->plan.order;
-    if (!site->plan.methods.sight || !only_first_hits(site)) return;
-    if (!site->plan.methods.order_exactly && site->cfg->scene.order_exactly == CHOICE_AUTO) {
-        struct plan_option none = {.method = "none", .error_m = row->error_m};
-        snprintf(none.why_not, sizeof none.why_not, "saves nothing where there is a map");
-        plan_say(row, "order", "double", 0.0, 0.0, "");
+    if (!site->plan.methods.order_exactly) {
+        struct plan_option none = {.error_m = row->error_m};
+        snprintf(none.method, sizeof none.method, "%s", row->method);
+        snprintf(none.why_not, sizeof none.why_not, "less exact, and it saves next to nothing");
+        plan_say(row, "order", "double", 0.0, 0.0, "with a map (sight) it is free");
         row->left[row->n_left++] = none;
-        site->plan.methods.order_exactly = 1;
+    } else {
+        const size_t used = strlen(row->why);
+        snprintf(row->why + used, sizeof row->why - used, "; by the map (sight)");
     }
-    if (!site->plan.methods.order_exactly) return;
-    row->cost_ns = 0.0;
-    const size_t used = strlen(row->why);
-    snprintf(row->why + used, sizeof row->why - used, "%sfree: the map of sight has the order", used != 0 ? "; " : "");
+    row->cost_ns = choice->order_ns;
+    site->plan.methods.order_exactly = 1;
+}
+
+static int choose(struct site *site, const struct sh_report *report, struct plan_sight_choice *choice,
+                  struct sh_err *err)
+{
+    const struct config *cfg = site->cfg;
+    const enum config_choice asked = cfg->cast.sight;
+    struct site_look look;
+    struct site_view view;
+    struct bvh_info bvh;
+    bvh_get_info(site->station[0].bvh, &bvh);
+    site_look_open(&look, site);
+    site_view_of(site, look.at[0].station, &view);
+    const struct plan_sight_need need = {.pulses = pulses_of(&look.place[0], cfg->head.settings.frames),
+                                         .share = site_view_share(&view, SQUARE_RAD),
+                                         .n_triangles = site->scene->n_triangles,
+                                         .packet = bvh.packet,
+                                         .memory_bytes = memory_bytes(site),
+                                         .order = order_of(site),
+                                         .forced = asked == CHOICE_AUTO ? -1 : asked == CHOICE_ON,
+                                         .why_not = why_not(site)};
+    site->plan.sight_rays = need.pulses / need.share;
+    return plan_sight(&need, look.place, look.n, report, choice, &site->plan.sight, err);
 }
 
 int site_plan_sight(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
+    struct plan_sight_choice choice;
     const char *why = why_not(site);
     const int waits = site->plan.methods.order_exactly && site_order_can_wait(site);
     if (site->cfg->cast.sight == CHOICE_ON && why != NULL)
         return sh_fail(err, SH_EINPUT, "%s: cast.sight: on, but %s; allowed auto, off", site->cfg->file, why);
-    int rc = choose(site, report, err);
+    int rc = choose(site, report, &choice, err);
     if (rc != SH_OK) return rc;
-    order_for_nothing(site);
-    return waits && !site->plan.methods.sight ? site_order_bvhs(site, report, err) : SH_OK;
+    site->plan.methods.sight = choice.map;
+    if (choice.ordered && only_first_hits(site)) take_order(site, &choice);
+    return waits && !choice.map ? site_order_bvhs(site, report, err) : SH_OK;
 }
 
 /* ---- making them */
@@ -131,7 +132,7 @@ static int make(struct site *site, uint32_t station, uint32_t of, const struct s
     site_view_of(site, station, &view);
     struct sight_spec spec = {.bvh = s->bvh,
                               .rays = site->plan.sight_rays,
-                              .memory_bytes = (uint64_t)(cfg->cast.sight_mib * 0x1p20) / of,
+                              .memory_bytes = memory_bytes(site) / of,
                               .exact = site->plan.methods.order_exactly,
                               .sees = site_view_sees,
                               .ctx = &view};

@@ -102,7 +102,7 @@ static void look_through_sight(struct look *look, int exact, uint32_t rays, stru
     struct sh_err err;
     struct sight_beside beside;
     struct cap cap = {.angle_rad = 3.0 * case_unit(&look->random)};
-    struct sight_spec spec = {.bvh = exact ? look->ordered : look->plain,
+    struct sight_spec spec = {.bvh = exact && look->number % 2 == 0 ? look->ordered : look->plain,
                               .station_m = {look->odd.station_m[0], look->odd.station_m[1], look->odd.station_m[2]},
                               .rays = pow(10.0, 2.0 + 5.5 * case_unit(&look->random)),
                               .memory_bytes = MEMORY[case_between(&look->random, 0, 4)],

@@ -76,6 +76,7 @@ static void end_with_receiver(struct bench *bench, const struct sockaddr_in *at)
     assert_int_equal(bind(fd, (const struct sockaddr *)at, sizeof *at), 0);
     assert_int_equal(bench->ops->write(bench->link, 0, "here", 4), 4);
     expect_datagram(fd, "here", 4);
+    assert_true(bench->ops->refused(bench->link) > 0); /* what went before; not this one */
     bench_close(bench);
     close(fd);
 }
@@ -91,6 +92,7 @@ static void a_receiver_that_is_not_there(void **state)
         bench_poll(&bench, 0, 0); /* refusals of the system may wake it; they are taken */
         assert_int_equal(bench_poll(&bench, 0, 0), 0);
     }
+    assert_true(bench.ops->refused(bench.link) == 100);
     end_with_receiver(&bench, &at);
 }
 

@@ -112,11 +112,94 @@ static void test_cast(void **state)
     assert_true(row.error_m == 1e-6 && row.cost_ns == 0.0 && row.n_left == 0);
 }
 
+/* 2,000 million pulses on one triangle each, of a head whose Embree takes 4 rays at once: a map saves dozens of ns. */
+static const struct plan_sight_need SIGHT = {
+    .pulses = 2e9, .share = 0.8, .n_triangles = 30000, .packet = 4, .memory_bytes = 64 << 20, .forced = -1};
+static const struct plan_sight_found PLAIN = {.one = 0.95, .few = 0.05}, MIXED = {.few = 0.1, .ask = 0.9};
+
+static struct plan_sight_choice choose_sight(const struct plan_sight_need *need, const struct plan_sight_found *found,
+                                             const char *method, const char *why)
+{
+    struct plan_sight_choice choice;
+    struct plan_row row;
+    plan_sight_choose(need, found, &choice, &row);
+    expect(&row, method, need->forced >= 0, why);
+    assert_string_equal(row.stage, "sight");
+    assert_int_equal(choice.map, strcmp(method, "map") == 0);
+    assert_true(row.error_m == 0.0 && (need->forced >= 0 || row.cost_ns <= 0.0));
+    return choice;
+}
+
+/* A map is made where the pulses of a scan pay for it, whatever else is said. */
+static void test_sight_pays(void **state)
+{
+    (void)state;
+    struct plan_sight_need need = SIGHT;
+    assert_true(plan_sight_may_pay(&need));
+    choose_sight(&need, &PLAIN, "map", "2000 million pulses of a scan pay for a map");
+    choose_sight(&need, &MIXED, "none", "a map saves nothing: only 0 % of the pulses");
+    need.pulses = 3e5;
+    choose_sight(&need, &PLAIN, "none", "0.3 million pulses of a scan do not pay");
+    need.pulses = 1e4;
+    assert_false(plan_sight_may_pay(&need));
+    choose_sight(&need, NULL, "none", "0.01 million pulses of a scan are too few");
+    need.n_triangles = 0; /* what it saves by triangle is lost to what it takes in any case */
+    assert_false(plan_sight_may_pay(&need));
+    need = SIGHT;
+    need.memory_bytes = 1 << 20; /* most cells do not fit, and ask the BVH */
+    choose_sight(&need, &(struct plan_sight_found){.one = 0.5, .few = 0.5}, "none", "a map saves nothing");
+}
+
+static void test_sight_forced(void **state)
+{
+    (void)state;
+    struct plan_sight_need need = SIGHT;
+    need.forced = 0;
+    choose_sight(&need, NULL, "none", "forced by cast.sight");
+    need.forced = 1;
+    need.pulses = 10.0;
+    choose_sight(&need, NULL, "map", "forced by cast.sight; 1e-05 million pulses of a scan are too few");
+    need = SIGHT;
+    need.why_not = "the head moves";
+    choose_sight(&need, NULL, "none", "the head moves");
+}
+
+/* The order of surfaces comes with a map where few rays ask the BVH; where it has to be had, it pays for the map. */
+static void test_sight_orders(void **state)
+{
+    (void)state;
+    static const struct plan_sight_found some = {.one = 0.94, .ask = 0.06};
+    struct plan_sight_need need = SIGHT;
+    struct plan_sight_choice choice = choose_sight(&need, &PLAIN, "map", "pay");
+    assert_false(choice.ordered);
+    need.order = PLAN_ORDER_FREE;
+    choice = choose_sight(&need, &PLAIN, "map", "pay");
+    assert_true(choice.ordered && choice.order_ns == 0.0);
+    choice = choose_sight(&need, &some, "map", "pay");
+    assert_true(choice.ordered && choice.order_ns > 5.0 && choice.order_ns < 50.0);
+    need.order = PLAN_ORDER_FREE;
+    need.pulses = 1.5e6;
+    choice = choose_sight(&need, &some, "map", "pay");
+    assert_false(choice.ordered); /* with its cost a map would not pay */
+    need.pulses = 1e4;
+    need.order = PLAN_ORDER_INSTEAD;
+    assert_true(plan_sight_may_pay(&need));
+    choice = choose_sight(&need, &PLAIN, "map", "pay");
+    assert_true(choice.ordered);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_cheapest_that_holds), cmocka_unit_test(test_forced), cmocka_unit_test(test_least_off),
-        cmocka_unit_test(test_what_cannot_be_had),  cmocka_unit_test(test_order),  cmocka_unit_test(test_cast),
+        cmocka_unit_test(test_cheapest_that_holds),
+        cmocka_unit_test(test_forced),
+        cmocka_unit_test(test_least_off),
+        cmocka_unit_test(test_what_cannot_be_had),
+        cmocka_unit_test(test_order),
+        cmocka_unit_test(test_cast),
+        cmocka_unit_test(test_sight_pays),
+        cmocka_unit_test(test_sight_forced),
+        cmocka_unit_test(test_sight_orders),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

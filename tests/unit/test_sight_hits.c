@@ -234,6 +234,10 @@ static void close_rig(struct rig *r)
 static void aim(struct rig *r, uint32_t i, const double d[3])
 {
     const double length = vec3_length(d);
+    if (!(length > 0.0)) { /* the station itself */
+        aim(r, i, (const double[3]){0.0, 0.0, 1.0});
+        return;
+    }
     r->x[i] = d[0] / length;
     r->y[i] = d[1] / length;
     r->z[i] = d[2] / length;
@@ -330,22 +334,28 @@ static void cast_both(struct rig *r, const char *what, const struct bvh *bvh, co
     compare(r, what, n);
 }
 
-static void run_kind(struct rig *r, uint32_t kind, uint64_t seed)
+/* A scene of a kind, a station in it, and where both are. */
+static void open_kind(struct rig *r, uint32_t kind, uint64_t *state)
 {
     static const double far_m[3] = {512345.678, 5412345.678, 321.5};
-    uint64_t state = seed * 2 + 1;
-    for (int k = 0; k < 8; k++)
-        case_u64(&state);
     r->soup.n = r->soup.n_vertices = 0;
-    KINDS[kind](&r->soup, &state);
-    any_point(&state, case_between(&state, 0, 1) ? 2.0 : 12.0, r->station_m);
-    if (case_between(&state, 0, 3) == 0)
+    while (r->soup.n == 0)
+        KINDS[kind](&r->soup, state);
+    any_point(state, case_between(state, 0, 1) ? 2.0 : 12.0, r->station_m);
+    if (case_between(state, 0, 3) == 0)
         for (int k = 0; k < 3; k++)
             r->station_m[k] = 0.5 * round(2.0 * r->station_m[k]); /* in planes and edges of boxes */
     for (int k = 0; k < 3; k++)
-        r->off_m[k] = case_between(&state, 0, 3) == 0 ? far_m[k] : 0.0;
-    if (r->soup.n == 0) return;
-    open_rig(r, case_between(&state, 0, 1) ? 0.0 : 5.0, exp(between(&state, 5.0, 17.0)));
+        r->off_m[k] = case_between(state, 0, 3) == 0 ? far_m[k] : 0.0;
+    open_rig(r, case_between(state, 0, 1) ? 0.0 : 5.0, exp(between(state, 5.0, 17.0)));
+}
+
+static void run_kind(struct rig *r, uint32_t kind, uint64_t seed)
+{
+    uint64_t state = seed * 2 + 1;
+    for (int k = 0; k < 8; k++)
+        case_u64(&state);
+    open_kind(r, kind, &state);
     aim_all(r, &state);
     const uint64_t before = r->differ;
     cast_both(r, "float order", r->bvh, r->sight, RAYS);
@@ -368,10 +378,170 @@ static void hits_are_those_of_the_bvh(void **state)
     assert_int_equal(r.differ, 0);
 }
 
+/* Whatever the width of packets, and for any number of rays, in chunks or not. */
+static void packets_and_numbers_make_no_difference(void **state)
+{
+    (void)state;
+    static const uint32_t width[] = {1, 4, 8, 16}, number[] = {1, 3, 17, 1023, 1024, 1025, 2049, 5000};
+    static struct rig r;
+    uint64_t seed = 4711;
+    for (uint32_t kind = 0; kind < N_KINDS; kind++) {
+        open_kind(&r, kind, &seed);
+        for (uint32_t k = 0; k < sizeof width / sizeof *width; k++) {
+            bvh_set_packet(r.bvh, width[k]);
+            bvh_set_packet(r.ordered, width[k]);
+            for (uint32_t i = 0; i < sizeof number / sizeof *number; i++) {
+                aim_all(&r, &seed);
+                cast_both(&r, "float order", r.bvh, r.sight, number[i]);
+                cast_both(&r, "exact order", r.ordered, r.exact, number[i]);
+            }
+        }
+        close_rig(&r);
+    }
+    assert_int_equal(r.differ, 0);
+}
+
+/* Labels and steepness left out change no range; nothing is written beyond the last ray. */
+static void what_is_not_asked_for_is_left_alone(void **state)
+{
+    (void)state;
+    enum { N = 1500 };
+    static struct rig r;
+    uint64_t seed = 815;
+    for (uint32_t kind = 0; kind < N_KINDS; kind++) {
+        open_kind(&r, kind, &seed);
+        aim_all(&r, &seed);
+        for (int exact = 0; exact < 2; exact++) {
+            struct bvh_rays rays = rays_of(&r, &r.want, N);
+            const struct sight *sight = exact ? r.exact : r.sight;
+            sight_hits(r.sight_work, r.work, sight, &rays);
+            rays = rays_of(&r, &r.got, N);
+            rays.label = NULL;
+            rays.steep = NULL;
+            sight_hits(r.sight_work, r.work, sight, &rays);
+            for (uint32_t i = 0; i < RAYS; i++) {
+                assert_true(same_double(r.got.range_m[i], r.want.range_m[i]));
+                assert_int_equal(r.got.triangle[i], r.want.triangle[i]);
+                assert_int_equal(r.got.label[i], 0xeeeeeeee);
+                assert_true(i < N || r.want.label[i] == 0xeeeeeeee);
+            }
+        }
+        close_rig(&r);
+    }
+}
+
+/* Once, with steepness asked for, doubt was counted in other units: at edges of large triangles float alone decided. */
+static void steepness_decides_nothing(void **state)
+{
+    (void)state;
+    static struct rig r;
+    uint64_t seed = 99;
+    for (uint32_t kind = 0; kind < N_KINDS; kind++) {
+        open_kind(&r, kind, &seed);
+        aim_all(&r, &seed);
+        struct bvh_rays rays = rays_of(&r, &r.want, RAYS);
+        bvh_hits(r.work, r.bvh, &rays);
+        rays = rays_of(&r, &r.got, RAYS);
+        rays.steep = NULL;
+        bvh_hits(r.work, r.bvh, &rays);
+        memcpy(r.got.steep, r.want.steep, sizeof r.got.steep);
+        compare(&r, "without steepness", RAYS);
+        close_rig(&r);
+    }
+    assert_int_equal(r.differ, 0);
+}
+
+static void a_face_that_stands_twice_is_a_twin(void **state)
+{
+    (void)state;
+    static const double p[4][3] = {{5, -1, -1}, {5, 2, -1}, {5, 0, 3}, {5, 2, 3}};
+    static struct rig r;
+    add(&r.soup, p[0], p[1], p[2]);
+    add(&r.soup, p[1], p[3], p[2]);
+    add(&r.soup, p[2], p[0], p[1]);
+    add(&r.soup, p[1], p[0], p[2]);
+    open_rig(&r, 0.0, 1e5);
+    for (uint32_t i = 0; i < r.soup.n; i++)
+        assert_int_equal(bvh_is_twin(r.bvh, i), i >= 2);
+    close_rig(&r);
+}
+
+/* No ray meets anything; and directions with components of nearly nothing. */
+static void nothing_to_be_seen(void **state)
+{
+    (void)state;
+    static const double p[3][3] = {{5, -1, -1}, {5, 2, -1}, {5, 0, 3}};
+    static struct rig r;
+    uint64_t seed = 3;
+    add(&r.soup, p[0], p[1], p[2]);
+    open_rig(&r, 0.0, 1e5);
+    aim_all(&r, &seed);
+    for (uint32_t i = 0; i < RAYS; i++)
+        r.x[i] = -fabs(r.x[i]) - 1e-3;
+    cast_both(&r, "behind", r.bvh, r.sight, RAYS);
+    for (uint32_t i = 0; i < RAYS; i++)
+        assert_int_equal(r.got.triangle[i], BVH_NO_TRIANGLE);
+    for (uint32_t i = 0; i < RAYS; i++) { /* along axes and the cube's edges, all but exactly */
+        const double odd[] = {0.0, -0.0, 1.0, -1.0, 1e-20, -1e-20, 1e-310};
+        const double d[3] = {odd[case_between(&seed, 0, 6)], odd[case_between(&seed, 0, 6)], odd[2 + i % 2]};
+        aim(&r, i, d);
+    }
+    cast_both(&r, "axes", r.bvh, r.sight, RAYS);
+    cast_both(&r, "axes", r.ordered, r.exact, RAYS);
+    close_rig(&r);
+    assert_int_equal(r.differ, 0);
+}
+
+/* Two sheets folded at a common edge, or crossing at a common corner. Rays beside the edge, nearer to it than float can
+ * tell the sheets apart: in exact order the nearer one is met. */
+static void folded_sheets_are_ordered(void **state)
+{
+    (void)state;
+    enum { FOLDS = 60 };
+    static struct rig r;
+    uint64_t seed = 12, wrong = 0, met = 0;
+    for (int fold = 0; fold < FOLDS; fold++) {
+        const double angle = exp(between(&seed, -7.0, 0.0)), turn = between(&seed, 0.3, 2.0);
+        const double p[4][3] = {{10, -5, 0},
+                                {10, 5, 0.3},
+                                {10 + 4 * cos(turn), 0.1, 4 * sin(turn)},
+                                {10 + 4 * cos(turn + angle), -0.2, 4 * sin(turn + angle)}};
+        memset(r.station_m, 0, sizeof r.station_m);
+        r.soup.n = r.soup.n_vertices = 0;
+        add(&r.soup, p[0], p[1], p[2]);
+        add(&r.soup, p[1], p[0], p[3]);
+        open_rig(&r, 0.0, 1e5);
+        for (uint32_t i = 0; i < RAYS; i++) {
+            const double along = case_unit(&seed), beside = exp(between(&seed, -11.0, -3.0));
+            const double d[3] = {10, -5 + 10 * along, 0.3 * along + beside};
+            aim(&r, i, d);
+        }
+        const struct bvh_rays rays = rays_of(&r, &r.got, RAYS);
+        bvh_hits(r.work, r.ordered, &rays);
+        for (uint32_t i = 0; i < RAYS; i++) {
+            if (r.got.triangle[i] == BVH_NO_TRIANGLE) continue;
+            /* Near the middle of the edge both are met, and the planes tell which is nearer. */
+            const double d[3] = {r.x[i], r.y[i], r.z[i]};
+            const struct bvh_plane *a = bvh_plane(r.ordered, 0), *b = bvh_plane(r.ordered, 1);
+            const double in_a = a->d / vec3_dot(a->n, d), in_b = b->d / vec3_dot(b->n, d), mid = d[1] / d[0];
+            if (fabs(mid) > 0.3 || !(in_a > 0.0) || !(in_b > 0.0)) continue;
+            if (in_a * d[2] > 1.0 || in_b * d[2] > 1.0 || fabs(in_a - in_b) < 1e-10) continue;
+            met++;
+            wrong += fabs(r.got.range_m[i] - fmin(in_a, in_b)) > 1e-10;
+        }
+        close_rig(&r);
+    }
+    assert_true(met > FOLDS * RAYS / 10);
+    assert_int_equal(wrong, 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(hits_are_those_of_the_bvh),
+        cmocka_unit_test(hits_are_those_of_the_bvh),           cmocka_unit_test(packets_and_numbers_make_no_difference),
+        cmocka_unit_test(what_is_not_asked_for_is_left_alone), cmocka_unit_test(steepness_decides_nothing),
+        cmocka_unit_test(a_face_that_stands_twice_is_a_twin),  cmocka_unit_test(nothing_to_be_seen),
+        cmocka_unit_test(folded_sheets_are_ordered),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

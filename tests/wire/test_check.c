@@ -70,6 +70,7 @@ static void test_help_of_a_section(void **state)
         char *out = wire_read(wire_path(wire, "out"), NULL);
         assert_int_equal(strncmp(out, begins[i], strlen(begins[i])), 0);
         assert_true(strstr(out, "\nloop") == NULL && strstr(out, "usage:") == NULL);
+        if (i == 3) assert_non_null(strstr(out, "allowed -180 to 360 deg; required with emitter: line\n"));
         free(out);
     }
 }

@@ -124,6 +124,31 @@ static void test_hash_of_an_idle_head(void **state)
     assert_string_equal(hash, "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
 }
 
+static void expect_no_hash(const struct wire *wire)
+{
+    char *text = wire_read(wire_path(wire, "stats.json"), NULL);
+    if (strstr(text, "\"stream_sha256\": null") == NULL) fail_msg("a hash, or no key for it, in %s", text);
+    free(text);
+    assert_true(stats_uint(wire, "pulses") > 0);
+}
+
+/* Figures without a hash. */
+static void test_no_hash(void **state)
+{
+    struct wire *wire = *state;
+    char stats[352], config[352];
+    room_write(wire);
+    snprintf(config, sizeof config, "%s", room_config_write(wire, &SHORT));
+    snprintf(stats, sizeof stats, "%s", wire_path(wire, "stats.json"));
+    const char *const args[] = {"record", config, "--stats", stats, "--no-hash", "--quiet", NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "head.out", "head.err", -1)), 0);
+    expect_no_hash(wire);
+    const char *const more[] = {"--start", "--pace", "fast", "--duration", "0.3", "--no-hash", NULL};
+    struct head head = head_start(wire, config, more);
+    head_end(&head, 0);
+    expect_no_hash(wire);
+}
+
 static void take_points(struct scanhead *sh, int frames)
 {
     struct scanhead_frame frame;
@@ -238,6 +263,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_pace_threads_link, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_hash_tells_streams_apart, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_hash_of_an_idle_head, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_no_hash, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_journal_ends_where_its_session_ended, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_journal_brings_back_a_session, wire_setup, wire_teardown),
     };

@@ -1,0 +1,114 @@
+/* What a station sees, mapped or not: the ready configurations give the same stream with cast.sight on and off, and a
+ * head that can have no map says so. */
+#include "tests/wire/wire.h"
+
+static const char HOUSE[] = "/usr/share/assimp/models/IFC/AC14-FZK-Haus.ifc";
+
+struct recipe {
+    const char *config;
+    int house;
+    const char *sets[5]; /* short scans, of which a map shows all */
+};
+
+/* foliage: single rays, and the beam that its plan takes, without the seconds of planning it. Where the pan of a
+ * recipe stands still, one that moves as well. */
+static const struct recipe RECIPES[] = {
+    {"demo", 1, {"head.station=3", "head.pan_stop_deg=30"}},
+    {"demo", 1, {"head.station=1", "head.pan_stop_deg=20", "output.layout=polar", "beam.mode=adaptive"}},
+    {"foliage", 0, {"beam.mode=single", "head.pan_start_deg=20", "head.pan_stop_deg=30"}},
+    {"foliage", 0, {"beam.mode=adaptive", "head.pan_start_deg=28", "head.pan_stop_deg=30"}},
+    {"glass", 0, {"optics.depth=4", "head.pan_stop_deg=40", "beam.mode=single"}},
+    {"glass", 0, {"optics.depth=0", "head.pan_stop_deg=40", "beam.mode=single"}},
+    {"glass",
+     0,
+     {"instrument.collimation_deg=0.1", "instrument.trunnion_deg=-0.2", "noise.angle=on", "beam.mode=single"}},
+    {"hokuyo", 1, {"head.frames=20"}},
+    {"sick", 1, {"head.frames=20"}},
+    {"velodyne", 1, {"head.frames=1"}},
+    {"speed", 1, {"head.frames=1", "head.pan_stop_deg=2"}},
+    {"vz600i_house", 1, {"head.frames=1", "head.pan_stop_deg=6"}},
+};
+
+/* What `record` makes of it: the hash, and how many pulses. */
+static uint64_t record(struct wire *wire, const struct recipe *recipe, const char *sight, const char *order,
+                       char hash[65])
+{
+    char config[128], stats[352];
+    const char *args[WIRE_MAX_ARGS] = {"record", config, "--stats", stats, "--quiet", "--set", sight, "--set", order};
+    int n = 9;
+    snprintf(config, sizeof config, "config/%s.yaml", recipe->config);
+    snprintf(stats, sizeof stats, "%s", wire_path(wire, "stats.json"));
+    for (int i = 0; recipe->sets[i] != NULL; i++) {
+        args[n++] = "--set";
+        args[n++] = recipe->sets[i];
+    }
+    int status = wire_wait(wire, wire_spawn(wire, args, "out", "err", -1));
+    if (status != 0) wire_show(wire, "err");
+    assert_int_equal(status, 0);
+    stats_hash(wire, hash);
+    return stats_uint(wire, "pulses");
+}
+
+static void test_recipes(void **state)
+{
+    struct wire *wire = *state;
+    const int no_house = access(HOUSE, R_OK) != 0;
+    if (no_house) printf("# %s is not there: package assimp-testmodels\n", HOUSE);
+    for (size_t i = 0; i < sizeof RECIPES / sizeof RECIPES[0]; i++) {
+        char with[65], without[65];
+        if (RECIPES[i].house && no_house) continue;
+        const uint64_t pulses = record(wire, &RECIPES[i], "cast.sight=on", "scene.order_exactly=off", with);
+        const uint64_t as_many = record(wire, &RECIPES[i], "cast.sight=off", "scene.order_exactly=off", without);
+        if (pulses < 1000 || pulses != as_many || strcmp(with, without) != 0)
+            fail_msg("%s %s: %" PRIu64 " pulses; with a map %s, without %s", RECIPES[i].config, RECIPES[i].sets[0],
+                     pulses, with, without);
+    }
+}
+
+/* In the house walls lie within each other: their order in double is another than by float, and the same by map
+ * and by BVH. */
+static void test_order(void **state)
+{
+    static const struct recipe garden = {"demo", 1, {"head.pan_stop_deg=1", "beam.mode=single", "output.layout=polar"}};
+    struct wire *wire = *state;
+    char hash[4][65];
+    if (access(HOUSE, R_OK) != 0) {
+        printf("# %s is not there: package assimp-testmodels\n", HOUSE);
+        skip();
+    }
+    record(wire, &garden, "cast.sight=on", "scene.order_exactly=on", hash[0]);
+    record(wire, &garden, "cast.sight=off", "scene.order_exactly=on", hash[1]);
+    record(wire, &garden, "cast.sight=on", "scene.order_exactly=auto", hash[2]); /* the map orders them */
+    record(wire, &garden, "cast.sight=off", "scene.order_exactly=off", hash[3]);
+    assert_string_equal(hash[0], hash[1]);
+    assert_string_equal(hash[0], hash[2]);
+    assert_string_not_equal(hash[0], hash[3]);
+}
+
+/* One line: key, reason, what is allowed. */
+static void test_not_possible(void **state)
+{
+    struct wire *wire = *state;
+    static const struct {
+        const char *config, *set, *why;
+    } cases[] = {{"config/car.yaml", "head.frames=1", "cast.sight: on, but the head moves; allowed auto, off\n"},
+                 {"config/glass.yaml", "instrument.mirror_offset_m=0.01", "mirror_offset_m moves the beam; allowed"},
+                 {"config/glass.yaml", "beam.mode=rings", "no ray for the centre; allowed auto, off\n"}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        const char *const args[] = {"check", cases[i].config, "--set", "cast.sight=on", "--set", cases[i].set, NULL};
+        assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 2);
+        char *text = wire_read(wire_path(wire, "err"), NULL);
+        if (strstr(text, cases[i].why) == NULL || strchr(text, '\n')[1] != '\0') fail_msg("%s", text);
+        free(text);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_recipes, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_order, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_not_possible, wire_setup, wire_teardown),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
