@@ -173,6 +173,10 @@ uint32_t *bvh_work_labels(struct bvh_work *work);
 /* 1 / cos^2 for one; RTC_INVALID_GEOMETRY_ID: NaN. */
 float bvh_steep(const struct bvh *bvh, uint32_t prim, const double dir[3]);
 
+/* ---- rivals.c */
+/* Whether float may not be able to order two triangles along some ray. */
+int bvh_are_rivals(const struct bvh *bvh, uint32_t i, uint32_t j);
+
 /* ---- decide.c */
 struct decide_ray {
     const struct bvh *bvh;
@@ -198,7 +202,7 @@ void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct bvh
 /* Among these triangles alone. */
 void decide_among(const struct decide_ray *ray, const uint32_t *prim, uint32_t n, struct bvh_counters *counters,
                   struct decide_hit *hit);
-/* Whether something else is met before a hit within what float can't order. Rivals need not be known. */
+/* Whether a rival is met before a hit. Rivals need not be known. */
 void decide_again(const struct decide_ray *ray, struct decide_hit *hit);
 
 #endif

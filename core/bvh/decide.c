@@ -9,16 +9,17 @@ enum { MOST_TIED = 8 };
 
 /* A hit, and how far float may misjudge the order of other planes there. */
 struct rivalry {
+    uint32_t prim;
     double range_m, width_m, steep; /* 1 / the cosine of the incidence */
 };
 
 struct search {
     const struct decide_ray *ray;
     double point_m[3], radius_m; /* of the query, local frame */
-    const struct rivalry *only;  /* try only what float can't order; NULL: all */
-    uint32_t proposed;
-    uint32_t prim;            /* best so far */
-    double range_m, border_m; /* its range, and how far the ray passes from its nearest edge */
+    const struct rivalry *only;  /* try only rivals; NULL: all */
+    uint32_t proposed, rivals;   /* rivals: how many were tried */
+    uint32_t prim;               /* best so far */
+    double range_m, border_m;    /* its range, and how far the ray passes from its nearest edge */
     /* All that were met within 1e-12 of the nearest: of them the lowest number is the best, in whatever order they
      * came. Of more than there is room for the highest numbers are left out. */
     struct {
@@ -100,20 +101,22 @@ static double edge_gap(const double a[3], const double b[3], const double dir[3]
 }
 
 /* Range to a triangle that the ray does meet, or misses by less than can be told. Where the ray lies almost in its plane the plane's range runs
- * away: it is kept between the edges that the ray passes. */
+ * away: it is kept between the edges that the ray passes. NaN: it passes none, and meets nothing. */
 static double held_range(const struct decide_ray *ray, uint32_t prim, double v[3][3])
 {
     const double *n = ray->bvh->triangle[prim].n;
-    double range = plane_range(ray, prim), lo = INFINITY, hi = -INFINITY;
+    double range = plane_range(ray, prim), lo = INFINITY, hi = -INFINITY, longest = 0.0;
     if (fabs(vec3_dot(n, ray->dir)) > 1e-6 * sqrt(vec3_dot(n, n))) return range;
+    for (int i = 0; i < 3; i++)
+        longest = fmax(longest, vec3_distance(v[i], v[(i + 1) % 3]));
     for (int i = 0; i < 3; i++) {
         const double *a = v[i], *b = v[(i + 1) % 3];
         double t = edge_range(a, b, ray->dir), blur = 0x1p-40 * vec3_distance(a, b) + 0x1p-46 * fabs(t);
-        if (edge_gap(a, b, ray->dir, t) > blur + 1e-6 * vec3_distance(a, b)) continue; /* the ray does not pass here */
+        if (edge_gap(a, b, ray->dir, t) > blur + 1e-6 * longest) continue; /* the ray does not pass here */
         lo = fmin(lo, t);
         hi = fmax(hi, t);
     }
-    if (!(lo <= hi)) return range;
+    if (!(lo <= hi)) return NAN; /* it only seemed to be inside: what is seen so flat is left at an edge */
     return range < lo || isnan(range) ? lo : range > hi ? hi : range;
 }
 
@@ -227,7 +230,8 @@ static int try_triangle(struct search *s, uint32_t prim)
 static struct rivalry rivalry_of(const struct decide_ray *ray, uint32_t prim, double range_m)
 {
     const double *n = ray->bvh->triangle[prim].n;
-    return (struct rivalry){range_m, bvh_width_m(ray->bvh, prim), sqrt(vec3_dot(n, n)) / fabs(vec3_dot(n, ray->dir))};
+    return (struct rivalry){prim, range_m, bvh_width_m(ray->bvh, prim),
+                            sqrt(vec3_dot(n, n)) / fabs(vec3_dot(n, ray->dir))};
 }
 
 /* False where the ray meets a plane clearly before or after the hit. */
@@ -240,33 +244,62 @@ static int may_be_rival(const struct decide_ray *ray, const struct rivalry *own,
     return !(gap * along > width_m * (own->steep * along + length));
 }
 
+/* By its plane. */
+static int is_near(const struct search *s, uint32_t prim)
+{
+    const struct bvh_plane *tri = &s->ray->bvh->triangle[prim];
+    double off = vec3_dot(tri->n, s->point_m) - tri->d, reach = s->radius_m;
+    return off * off <= reach * reach * vec3_dot(tri->n, tri->n);
+}
+
+/* By its box. */
+static int is_close(const struct search *s, uint32_t prim)
+{
+    double v[3][3], off2 = 0.0;
+    bvh_corners(s->ray->bvh, prim, v);
+    for (int i = 0; i < 3; i++) {
+        double lo = fmin(v[0][i], fmin(v[1][i], v[2][i])), hi = fmax(v[0][i], fmax(v[1][i], v[2][i]));
+        double off = fmax(0.0, fmax(lo - s->point_m[i], s->point_m[i] - hi));
+        off2 += off * off;
+    }
+    return off2 <= s->radius_m * s->radius_m;
+}
+
 /* Embree names all triangles whose boxes, or those of their leaf, are near. What lies further than the
  * query's radius is left out by its plane. */
 static bool visit(struct RTCPointQueryFunctionArguments *args)
 {
-    const struct search *s = args->userPtr;
-    const struct bvh_plane *tri = &s->ray->bvh->triangle[args->primID];
-    double off = vec3_dot(tri->n, s->point_m) - tri->d, reach = s->radius_m;
-    if (args->primID != s->proposed && off * off <= reach * reach * vec3_dot(tri->n, tri->n) &&
-        (s->only == NULL || may_be_rival(s->ray, s->only, args->primID)))
-        try_triangle(args->userPtr, args->primID);
+    struct search *s = args->userPtr;
+    const uint32_t prim = args->primID;
+    if (prim == s->proposed || !is_near(s, prim)) return false;
+    if (s->only != NULL) {
+        if (!may_be_rival(s->ray, s->only, prim) || !is_close(s, prim)) return false;
+        if (!bvh_are_rivals(s->ray->bvh, s->only->prim, prim)) return false;
+        s->rivals++;
+    }
+    try_triangle(s, prim);
     return false;
+}
+
+/* The ball that is searched. */
+static void set_ball(struct search *s, double range_m, double radius_m)
+{
+    for (int i = 0; i < 3; i++)
+        s->point_m[i] = s->ray->o_local[i] + range_m * s->ray->dir[i];
+    s->radius_m = radius_m;
 }
 
 /* All triangles near the point at range_m on the ray. */
 static void try_around(struct search *s, double range_m, double radius_m)
 {
     struct RTCPointQueryContext context;
-    struct RTCPointQuery query = {.radius = (float)radius_m};
-    const struct decide_ray *ray = s->ray;
+    struct RTCPointQuery query = {.radius = (float)(1.001 * radius_m)};
     rtcInitPointQueryContext(&context);
-    for (int i = 0; i < 3; i++)
-        s->point_m[i] = ray->o_local[i] + range_m * ray->dir[i];
-    s->radius_m = radius_m;
+    set_ball(s, range_m, radius_m);
     query.x = (float)s->point_m[0];
     query.y = (float)s->point_m[1];
     query.z = (float)s->point_m[2];
-    rtcPointQuery(ray->bvh->rtc, &query, &context, visit, s);
+    rtcPointQuery(s->ray->bvh->rtc, &query, &context, visit, s);
 }
 
 /* How far from the proposed point along the ray an edge's neighbours may be met, and the plane itself: the
@@ -278,14 +311,59 @@ static double slack_m(const struct decide_ray *ray, uint32_t prim, double width_
     return 4.0 * width_m * (1.0 + 1.0 / fmax(cosine, 1e-6));
 }
 
-/* Rivals whose planes the ray meets within what float can't order are tried. */
-static void try_rivals(struct search *s, uint32_t prim, double range_m)
+/* So near to an edge that double precision can't separate its sides: the edge is hit, nothing passes. */
+static int is_near_miss(const struct search *s)
 {
-    const struct bvh *bvh = s->ray->bvh;
-    if (bvh->rival_first == NULL || bvh->rival_first[prim] == bvh->rival_first[prim + 1]) return;
-    const struct rivalry own = rivalry_of(s->ray, prim, range_m);
-    for (uint32_t k = bvh->rival_first[prim]; k < bvh->rival_first[prim + 1]; k++)
-        if (may_be_rival(s->ray, &own, bvh->rival[k])) try_triangle(s, bvh->rival[k]);
+    return s->near_prim != RTC_INVALID_GEOMETRY_ID && !(s->range_m <= s->near_range_m);
+}
+
+static struct decide_hit best_of(const struct search *s)
+{
+    return is_near_miss(s) ? (struct decide_hit){s->near_prim, s->near_range_m}
+                           : (struct decide_hit){s->prim, s->range_m};
+}
+
+/* What meets the best one at its border. */
+static void try_neighbours(struct search *s)
+{
+    if (s->prim == RTC_INVALID_GEOMETRY_ID) return;
+    s->only = NULL;
+    s->proposed = s->prim;
+    try_around(s, s->range_m, slack_m(s->ray, s->prim, bvh_width_m(s->ray->bvh, s->prim)));
+}
+
+/* How far around a hit its rivals are tried, in slacks. */
+enum { WIDE = 16 };
+
+/* Rivals whose planes the ray meets within what float can't order, and that are near the hit, are tried: those that
+ * are known, or else what the BVH has there. In both cases the same ones. */
+void decide_again(const struct decide_ray *ray, struct decide_hit *hit)
+{
+    const struct bvh *bvh = ray->bvh;
+    struct search s = search_for(ray);
+    const struct rivalry own = rivalry_of(ray, hit->prim, hit->range_m);
+    const double radius_m = WIDE * slack_m(ray, hit->prim, own.width_m);
+    s.proposed = hit->prim;
+    s.only = &own;
+    try_triangle(&s, hit->prim);
+    set_ball(&s, hit->range_m, radius_m);
+    if (!bvh->ordered) try_around(&s, hit->range_m, radius_m);
+    for (uint32_t k = bvh->ordered ? bvh->rival_first[hit->prim] : 0;
+         bvh->ordered && k < bvh->rival_first[hit->prim + 1]; k++) {
+        const uint32_t prim = bvh->rival[k];
+        if (!is_near(&s, prim) || !may_be_rival(ray, &own, prim) || !is_close(&s, prim)) continue;
+        s.rivals++;
+        try_triangle(&s, prim);
+    }
+    if (s.rivals == 0) return;
+    if (s.prim != hit->prim || !(s.border_m > own.width_m)) try_neighbours(&s);
+    const struct decide_hit found = best_of(&s);
+    if (found.prim != RTC_INVALID_GEOMETRY_ID) *hit = found;
+}
+
+static int has_rivals(const struct bvh *bvh, uint32_t prim)
+{
+    return bvh->rival_first != NULL && bvh->rival_first[prim] != bvh->rival_first[prim + 1];
 }
 
 void decide_prefetch(const struct bvh *bvh, const uint32_t *prim, const uint32_t *ray, uint32_t n)
@@ -328,18 +406,6 @@ static void look_through(struct search *s)
     bvh_walk_along(s->ray->bvh, org, dir, s->ray->t_max, &walk);
 }
 
-/* So near to an edge that double precision can't separate its sides: the edge is hit, nothing passes. */
-static int is_near_miss(const struct search *s)
-{
-    return s->near_prim != RTC_INVALID_GEOMETRY_ID && !(s->range_m <= s->near_range_m);
-}
-
-static struct decide_hit best_of(const struct search *s)
-{
-    return is_near_miss(s) ? (struct decide_hit){s->near_prim, s->near_range_m}
-                           : (struct decide_hit){s->prim, s->range_m};
-}
-
 static void finish(const struct search *s, struct bvh_counters *counters, struct decide_hit *hit)
 {
     counters->undecided += (uint64_t)is_near_miss(s);
@@ -365,7 +431,6 @@ void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct bvh
         double range_m = (double)t, slack = slack_m(ray, prim, width_m);
         double radius_m = fmin(slack, 0.01 * range_m + 4.0 * width_m);
         try_around(&s, range_m, radius_m);
-        try_rivals(&s, prim, range_m);
         if (s.holes) break;
         if (is_found(&s, range_m + radius_m)) break;
         counters->went_on++;
@@ -377,9 +442,8 @@ void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct bvh
         t = one.t;
     }
     if (s.holes) look_through(&s);
-    const struct decide_hit found = best_of(&s);
-    if (found.prim != RTC_INVALID_GEOMETRY_ID) try_rivals(&s, found.prim, found.range_m);
     finish(&s, counters, hit);
+    if (hit->prim != RTC_INVALID_GEOMETRY_ID && has_rivals(ray->bvh, hit->prim)) decide_again(ray, hit);
 }
 
 void decide_among(const struct decide_ray *ray, const uint32_t *prim, uint32_t n, struct bvh_counters *counters,
@@ -389,37 +453,4 @@ void decide_among(const struct decide_ray *ray, const uint32_t *prim, uint32_t n
     for (uint32_t i = 0; i < n; i++)
         try_triangle(&s, prim[i]);
     finish(&s, counters, hit);
-}
-
-/* How many widths around a hit are searched. Float may misjudge what lies within two of them over the cosine of the
- * incidence; where it is smaller than one by so many, all that is proposed up to the hit is tried. */
-enum { WIDE = 64, MOST_STEPS = 64 };
-
-static void step_along(struct search *s)
-{
-    struct bvh_one one = {.t_min = 0.0F, .t_max = s->ray->t_max};
-    float org[3], dir[3];
-    to_floats(s->ray, org, dir);
-    for (int k = 0; k < MOST_STEPS; k++) {
-        bvh_intersect_one(s->ray->bvh, org, dir, &one);
-        if (one.prim == RTC_INVALID_GEOMETRY_ID || (double)one.t > s->first_m + s->radius_m) return;
-        try_triangle(s, one.prim);
-        one.t_min = nextafterf(one.t, INFINITY);
-        one.t_max = s->ray->t_max;
-    }
-}
-
-void decide_again(const struct decide_ray *ray, struct decide_hit *hit)
-{
-    struct search s = search_for(ray);
-    const double width_m = bvh_width_m(ray->bvh, hit->prim);
-    const struct rivalry own = rivalry_of(ray, hit->prim, hit->range_m);
-    s.proposed = hit->prim;
-    s.only = &own;
-    try_triangle(&s, hit->prim);
-    try_around(&s, hit->range_m,
-               fmin(WIDE / 4 * slack_m(ray, hit->prim, width_m), 0.01 * hit->range_m + 4.0 * width_m));
-    if (!(own.steep < WIDE)) step_along(&s);
-    const struct decide_hit found = best_of(&s);
-    if (found.prim != RTC_INVALID_GEOMETRY_ID) *hit = found;
 }

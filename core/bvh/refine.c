@@ -124,8 +124,10 @@ uint32_t bvh_refine(const struct bvh_proposals *p)
     return p->bvh->rival_first != NULL ? doubt_rivals(p) : doubts;
 }
 
-enum { LANES = 4 };
+enum { LANES = 8 };
 typedef double lanes __attribute__((vector_size(LANES * sizeof(double))));
+typedef float float_lanes __attribute__((vector_size(LANES * sizeof(float))));
+typedef uint32_t number_lanes __attribute__((vector_size(LANES * sizeof(uint32_t))));
 typedef float lanes_f __attribute__((vector_size(LANES * sizeof(float))));
 
 /* A plane, and where rays meet it. */
@@ -146,18 +148,17 @@ VEC_INLINE void range_of_one(const struct one_plane *p, const struct bvh_rays *r
 /* Lanes by hand: compilers leave so short a loop as it is. */
 VEC_INLINE void ranges_of_lanes(const struct one_plane *p, const struct bvh_rays *rays, uint32_t at)
 {
+    const number_lanes triangle = (number_lanes){0} + p->triangle, label = (number_lanes){0} + p->label;
     lanes x, y, z;
     memcpy(&x, rays->dir.x + at, sizeof x);
     memcpy(&y, rays->dir.y + at, sizeof y);
     memcpy(&z, rays->dir.z + at, sizeof z);
     const lanes along = p->nx * x + p->ny * y + p->nz * z, range_m = p->above / along;
     memcpy(rays->range_m + at, &range_m, sizeof range_m);
-    for (uint32_t i = 0; i < LANES; i++)
-        rays->triangle[at + i] = p->triangle;
-    for (uint32_t i = 0; rays->label != NULL && i < LANES; i++)
-        rays->label[at + i] = p->label;
+    memcpy(rays->triangle + at, &triangle, sizeof triangle);
+    if (rays->label != NULL) memcpy(rays->label + at, &label, sizeof label);
     if (rays->steep == NULL) return;
-    const lanes_f steep = (float)p->nn / __builtin_convertvector(along * along, lanes_f);
+    const float_lanes steep = (float)p->nn / __builtin_convertvector(along * along, float_lanes);
     memcpy(rays->steep + at, &steep, sizeof steep);
 }
 
@@ -205,10 +206,11 @@ void bvh_ranges_of(const struct bvh *bvh, uint32_t triangle, const struct bvh_ra
     }
     vec3_sub(rays->from.at_m, bvh->origin_m, o);
     set_plane(&p, bvh, triangle, o);
-    for (; from < to && rays->n - from >= LANES; from += LANES)
-        ranges_of_lanes(&p, rays, from);
+    const struct bvh_rays r = *rays; /* what is written may not change it */
+    for (; from < to && r.n - from >= LANES; from += LANES)
+        ranges_of_lanes(&p, &r, from);
     for (; from < to; from++)
-        range_of_one(&p, rays, from);
+        range_of_one(&p, &r, from);
 }
 
 void bvh_ranges_each(const struct bvh *bvh, const uint32_t *triangle, const struct bvh_rays *rays, uint32_t from,

@@ -169,7 +169,7 @@ static int fold_back(const struct shape *s, const struct shape *t)
     return vec3_dot(across[0], across[1]) > FOLDED;
 }
 
-static int are_rivals(const struct bvh *bvh, uint32_t i, uint32_t j)
+int bvh_are_rivals(const struct bvh *bvh, uint32_t i, uint32_t j)
 {
     struct shape a, b;
     int in_a = 0, in_b = 0;
@@ -201,7 +201,7 @@ static void on_collision(void *user, struct RTCCollision *collision, unsigned n)
     if (sh_stopped(p->report)) return;
     for (unsigned k = 0; k < n; k++) {
         uint32_t i = p->first + collision[k].primID0, j = collision[k].primID1;
-        if (i != j && are_rivals(p->bvh, i, j)) add_pair(p, i, j);
+        if (i != j && bvh_are_rivals(p->bvh, i, j)) add_pair(p, i, j);
     }
 }
 

@@ -12,15 +12,21 @@ struct range {
 };
 
 /* The side planes of the face's pyramid, a little wider than the face. */
-#define WIDER (1.0 + 4.0 * SIGHT_PAD)
+#define WIDER  (1.0 + 4.0 * SIGHT_PAD)
+#define BESIDE (1e6 * SIGHT_TILT_DOUBT)
 
-/* Whether all corners lie beyond one of the pyramid's four sides, or behind the station. a, b across, w along. */
+/* Whether all corners lie beyond one of the pyramid's four sides, or behind the station. a, b across, w along.
+ * Corners that touch a side count as within: what is seen edge-on may be met a little beside its end (SIGHT_TILT_DOUBT,
+ * over the sine of 1e-6 below which core/bvh holds ranges between edges). */
 static int is_beside(const double w[3], const double a[3], const double b[3])
 {
     int out = 31;
+    double far_m = 0.0;
+    for (int i = 0; i < 3; i++)
+        far_m = fmax(far_m, fmax(fabs(w[i]), fmax(fabs(a[i]), fabs(b[i]))));
     for (int i = 0; i < 3; i++) {
-        const double k = WIDER * w[i];
-        out &= (a[i] > k) | (-a[i] > k) << 1 | (b[i] > k) << 2 | (-b[i] > k) << 3 | (w[i] < 0.0) << 4;
+        const double k = WIDER * w[i] + BESIDE * far_m, behind = -BESIDE * far_m;
+        out &= (a[i] > k) | (-a[i] > k) << 1 | (b[i] > k) << 2 | (-b[i] > k) << 3 | (w[i] < behind) << 4;
     }
     return out != 0;
 }
@@ -52,7 +58,7 @@ static int range_of(double v[3][3], uint32_t face, uint32_t regions, struct rang
     if (is_beside(w, a, b)) return 0;
     *r = (struct range){0, regions - 1, 0, regions - 1};
     const double near_w = fmin(w[0], fmin(w[1], w[2])), far_w = fmax(w[0], fmax(w[1], w[2]));
-    if (!(near_w > 1e-6 * far_w)) return 1;
+    if (!(near_w > 1e-5 * far_w)) return 1;
     across(w, a, regions, &r->u0, &r->u1);
     across(w, b, regions, &r->v0, &r->v1);
     return 1;
