@@ -124,7 +124,7 @@ $(BUILD)/scanhead: $(BUILD)/firmware_sim/main.c.o $(BUILD)/modules.a
 #   benches.a   what the programs of tests/bench share                      build/bench and the charts'
 #   its rigs    tests/unit/cast_rig.c where it includes cast_rig.h          tests of a folder; tests/rigs.sh finds which
 #   modules.a   the head, without main.c                                    all of them
-FIGURES = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_sight chart_georef chart_widths beam plain velodyne loop_cost)
+FIGURES = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_sight chart_georef chart_widths beam plain velodyne loop_cost kernels)
 BENCH_MAINS = $(FIGURES:$(BUILD)/%=%.c) tests/bench/bench.c
 COMMON = $(wildcard tests/common/*.c)
 BENCHES = $(filter-out $(BENCH_MAINS),$(wildcard tests/bench/*.c))
@@ -192,7 +192,7 @@ demo: deps-build
 # alone; the unit tests and what they need with sanitizers, without optimiser (and so without the warnings that it makes).
 # -g1, the lines alone, is an eighth less to compile.
 JOBS ?= $(shell getconf _NPROCESSORS_ONLN)
-STRICT = WERROR=-Werror CFLAGS=-g1 CXXFLAGS=-g1
+STRICT = WERROR=-Werror CFLAGS="-g1 $(CFLAGS)" CXXFLAGS="-g1 $(CXXFLAGS)"
 ASAN = WERROR=-Werror BUILD=$(BUILD)/asan OPT=-O0 CFLAGS=-w CPPFLAGS=-DSH_SANITIZE SAN="-g1 -fsanitize=address,undefined -fno-sanitize-recover=all"
 CLANG = WERROR=-Werror BUILD=$(BUILD)/clang CC=clang CXX=clang++ OPT=-O0 CFLAGS=-g0 CXXFLAGS=-g0
 SUBMAKE = @$(MAKE) --no-print-directory -j$(JOBS)
@@ -259,6 +259,12 @@ bench-plain: deps-build
 bench-velodyne: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/velodyne
 	@$(BUILD)/tests/bench/velodyne
+# The arithmetic around the cast, ns a pulse: as on this CPU, and as x86 has it without AVX-512.
+bench-kernels: deps-build
+	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/kernels
+	@$(BUILD)/tests/bench/kernels
+	@$(if $(filter x86_64-%,$(TARGET)),$(MAKE) --no-print-directory -j2 BUILD=$(BUILD)/avx2 CPPFLAGS='$(CPPFLAGS) -DVEC_ONE' \
+		CFLAGS='$(CFLAGS) -march=x86-64-v3 -w' $(BUILD)/avx2/tests/bench/kernels && echo "AVX2:" && $(BUILD)/avx2/tests/bench/kernels)
 # The real loop, processor time a pulse, with and without stream_sha256. In turns with others: make bench-loop
 # WITH="'/path/scanhead' '/other --option'".
 WITH ?=
@@ -275,6 +281,7 @@ chart: deps-build
 	$(BUILD)/tests/bench/chart_widths >> $(CHART).csv
 	$(BUILD)/tests/bench/beam --chart house wires foliage >> $(CHART).csv
 	gnuplot -e "csv='$(CHART).csv'; base='$(CHART)'" tests/bench/chart.gp
+	gnuplot -e "csv='$(CHART).csv'; base='$(CHART)_more'" tests/bench/chart_more.gp
 objects: $(EVERYTHING)
 test-unit-programs: $(UNIT)
 test-programs: all $(BUILD)/bench $(TESTS) $(FIGURES)
@@ -298,6 +305,6 @@ format:
 clean:
 	rm -rf $(BUILD)
 .PHONY: ALWAYS all deps deps-test deps-build deps-guest demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb \
-	test-usb-million test-hostile objects test-unit-programs test-programs bench bench-beam bench-plain bench-velodyne bench-loop chart install format clean
+	test-usb-million test-hostile objects test-unit-programs test-programs bench bench-beam bench-plain bench-velodyne bench-loop bench-kernels chart install format clean
 .SECONDARY:
 -include $(shell find $(BUILD) -type f -name '*.d' 2>/dev/null)

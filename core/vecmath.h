@@ -6,9 +6,10 @@
 #include <stdint.h>
 #include <string.h>
 
-/* The best version of a loop for the CPU at hand, chosen once at start. Sanitizers can't follow the resolver;
- * before version 18 clang gives it a name that other files don't find (llvm-project pull request 71706). */
-#if defined(__clang__) && __clang_major__ < 18
+/* The best version of a loop for the CPU at hand, chosen once at start. VEC_ONE, for measuring: the one version is
+ * that of the compiler's options. Sanitizers can't follow the resolver; before version 18 clang gives it a name that
+ * other files don't find (llvm-project pull request 71706). */
+#if defined(VEC_ONE) || (defined(__clang__) && __clang_major__ < 18)
 #define VEC_CLONES
 #elif defined(__x86_64__) && !defined(SH_SANITIZE) && defined(__clang__)
 #define VEC_CLONES __attribute__((target_clones("avx512f", "avx2", "default")))

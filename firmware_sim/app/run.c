@@ -20,6 +20,23 @@ struct run_options {
     int quiet, no_hash, frames_given;
 };
 
+static void say_sights(const struct site *site)
+{
+    double build_s = 0.0, mib = 0.0;
+    unsigned n = 0;
+    for (uint32_t i = 0; i < site->n_stations; i++) {
+        struct sight_info info;
+        if (site->station[i].sight == NULL) continue;
+        sight_get_info(site->station[i].sight, &info);
+        build_s += info.build_s;
+        mib += 0x1p-20 * (double)info.bytes;
+        n++;
+    }
+    if (n == 0) return;
+    fprintf(stderr, "scanhead: maps of what is seen from %u station%s in %.2f s, %.1f MiB\n", n, n > 1 ? "s" : "",
+            build_s, mib);
+}
+
 static void say_what_runs(const struct config *cfg, const struct site *site, const struct loop *loop)
 {
     struct bvh_info info;
@@ -28,6 +45,7 @@ static void say_what_runs(const struct config *cfg, const struct site *site, con
             "scanhead: %s %s, %s, %u triangles, %u surfaces; BVH in %.2f s, %.0f bytes per triangle, packets of %u\n",
             cfg->profile.maker, cfg->profile.model, cfg->profile.name, site->scene->n_triangles,
             site->scene->n_surfaces, info.build_s, (double)info.bytes / site->scene->n_triangles, info.packet);
+    say_sights(site);
     char plan[512];
     struct link_place place;
     site_plan_text(site, plan, sizeof plan);

@@ -70,11 +70,17 @@ static int compute(struct loop_caster *caster, const struct device_work *work, s
         ring_drop(slot);
         return 0;
     }
+    struct casters *casters = &loop->casters;
     int whole = put(loop, slot, worker_fill(caster->worker, work));
-    if (ring_ready(slot, work->tick)) return whole;
+    if (ring_ready(slot, work->tick)) {
+        if (atomic_load(&casters->in_vain)) atomic_store(&casters->in_vain, 0);
+        return whole;
+    }
     /* Computed in vain: the next ones are as late. Taking up each in turn just before its time is over would
-     * lose them all. So leave out as many as give the ones after them half the time ahead. */
-    atomic_store(&loop->casters.drop_until, stream_released(&loop->stream) + loop->casters.ahead_ticks / 2);
+     * lose them all. So leave out as many as give the ones after them half the time ahead; all of it, where half was
+     * not enough. */
+    const uint64_t lead = atomic_exchange(&casters->in_vain, 1) ? casters->ahead_ticks - 1 : casters->ahead_ticks / 2;
+    atomic_store(&casters->drop_until, stream_released(&loop->stream) + lead);
     return 0;
 }
 

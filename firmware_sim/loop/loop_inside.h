@@ -30,6 +30,7 @@ struct casters {
     uint64_t next_tick;           /* under claim_lock */
     _Atomic uint32_t n_computing; /* claimed ticks, neither ready nor reported lost yet */
     _Atomic uint64_t drop_until;  /* ticks before this one are not worth computing any more */
+    _Atomic int in_vain;          /* the last tick that was computed came too late */
     _Atomic int no_memory;        /* the last tick had no room in its slot; the error queue has heard of it */
 };
 

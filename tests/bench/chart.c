@@ -53,6 +53,7 @@ struct chart {
     struct bvh *bvh;
     struct caster *caster;
     struct bench_scan scan;
+    struct plan_sight_choice plan;
     struct sight *sight;
     struct sight_work *work;
     struct bvh_work *bvh_work;
@@ -68,7 +69,7 @@ struct chart {
 static void add_methods(struct chart *c)
 {
     struct method *m = c->method;
-    const int sight = bench_scan_chosen(&c->scan, c->scene->n_triangles);
+    const int sight = c->plan.map;
     for (int kind = FLOAT; kind <= DECIDED; kind++)
         for (int robust = kind == DECIDED; robust < 2; robust++)
             for (int w = 0; w < WIDTHS; w++, m++) {
@@ -282,6 +283,7 @@ static int set_up(struct chart *c, struct sh_err *err)
     if (rc == SH_OK) rc = sight_work_create(&c->work, err);
     bench_scan_of(WHOLE_SCAN, 1, &c->scan);
     double cost_s;
+    if (rc == SH_OK) rc = bench_scan_plan(&c->scan, c->bvh, c->station_m, &c->plan, err);
     if (rc == SH_OK) rc = make_sight(c, &cost_s, err);
     if (rc != SH_OK) return rc;
     if (c->spec->at_edges) aim_at_edges(c);

@@ -31,15 +31,15 @@ do for [out in "svg png"] {
     eval place(1, n_rows)
     set size 1, high / (head + n_rows * high)
     n = words(radii)
-    set key outside right center samplen 1 spacing 1.4 title "within"
+    set key at graph 0.985, graph 0.8 right top horizontal maxrows 1 samplen 1 width 1 title "points within" left
     set title "Georeferencing to UTM, by the order of the polynomial" offset 0, -0.4
     set ylabel "error of the position, m"
     set format y "10^{%T}"
     set ytics 1e-18, 1e3, 1e6
     set xtics (0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
-    set xrange [0.2:1000]
+    set xrange [0.25:900]
     set yrange [2e-11:3e2]
-    set label 2 "tolerance" at 20, 3e-6 font ",17" tc rgb "#7a7a7a"
+    set label 2 "tolerance" at 5, 4e-6 font ",17" tc rgb "#7a7a7a"
     plot 1e-6 with lines lc rgb "#7a7a7a" lw 2 dt 3 notitle, \
         for [k = 1:n] within(word(radii, k), " && $7 == 1") using 1:2 with lines lc rgb colour[k] lw 2 dt 2 notitle, \
         for [k = 1:n] within(word(radii, k), "") using 1:2:2:3 with yerrorbars pt symbol[k] ps 2.2 lw 1.5 lc rgb colour[k] \
@@ -52,11 +52,15 @@ do for [out in "svg png"] {
 
     n = words(scenes)
     set xtics (20, 50, 100, 200, 500, "1000" 1000, 2000, 5000, "10^4" 10000)
-    set key top right horizontal maxrows 1 samplen 1 width -1 notitle
     do for [p = 1:2] {
         y = 8 + p
         eval place(2 + p, n_rows)
         set title title[p] offset 0, -0.4
+        if (p == 1) {
+            set key at graph 0.985, graph 0.965 right top horizontal maxrows 1 samplen 1 width 0 title ""
+        } else {
+            set key at graph 0.985, graph 0.4 right top vertical maxrows 3 samplen 1 width 0 title ""
+        }
         set ylabel label[p]
         if (p == 1) {
             set ytics 1e-6, 10, 10
@@ -73,7 +77,7 @@ do for [out in "svg png"] {
             for [k = 1:n] of(k, y, "") . best using 1:2 with lines lc rgb colour[k] lw 2.5 dt 2 notitle, \
             for [k = 1:n] of(k, y, "") using 1:2 with points pt symbol[k] ps 2.2 lw 1.5 lc rgb colour[k] notitle, \
             for [k = 1:n:2] of(k, y, " && $2 == \"single\"") using 1:2:3 with labels offset 0, 0.9 font ",17" notitle, \
-            for [k = 1:n] of(k, y, " && $2 == \"adaptive\"") using 1:2:3 with labels left offset 1.2, (k == 1 ? 0.5 : -0.5) \
+            for [k = 1:n] of(k, y, " && $2 == \"adaptive\"") using 1:2:3 with labels left offset 1.2, (k == 1 ? 0.5 : -0.8) \
             font ",17" tc rgb colour[k] notitle, \
             for [k = 1:n] NaN with points pt symbol[k] ps 2.6 lc rgb colour[k] title word(scenes, k), \
             for [k = 1:n] of(k, y, " && $8 == 1") using 1:2 with points pt 6 ps 5 lw 3.5 lc rgb "#000000" notitle

@@ -23,7 +23,7 @@ static void print_rows(const char *scene, double pulses, const struct bench_sigh
     static const char *const name[] = {"float", "decided", "sight"};
     for (int i = 0; i < 3; i++)
         printf("pulses,%s %.0e,%s,%.3f,,,%d,%d,,\n", name[i], pulses, scene, ns[i],
-               i == 0 ? ns[0] < exact_ns : ns[i] <= exact_ns, i != 0 && s->chosen == (i == 2));
+               i == 0 ? ns[0] < exact_ns : ns[i] <= exact_ns, i != 0 && s->plan.map == (i == 2));
     fflush(stdout);
 }
 

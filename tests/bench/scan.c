@@ -29,23 +29,49 @@ int bench_scan_sees(const void *ctx, const double dir[3], double radius_rad)
            elevation_rad - radius_rad <= BENCH_HIGHEST_DEG * RAD;
 }
 
+static double share(void) /* of the sphere */
+{
+    return (sin(BENCH_HIGHEST_DEG * RAD) - sin(BENCH_LOWEST_DEG * RAD)) / 2.0;
+}
+
 void bench_scan_spec(const struct bench_scan *scan, const struct bvh *bvh, const double station_m[3], int exact,
                      struct sight_spec *out)
 {
-    const double seen = (sin(BENCH_HIGHEST_DEG * RAD) - sin(BENCH_LOWEST_DEG * RAD)) / 2.0; /* of the sphere */
     *out = (struct sight_spec){.bvh = bvh,
-                               .rays = (double)scan->pulses / seen,
+                               .rays = (double)scan->pulses / share(),
                                .memory_bytes = (uint64_t)BENCH_SIGHT_MIB << 20,
                                .exact = exact,
                                .sees = bench_scan_sees};
     memcpy(out->station_m, station_m, sizeof out->station_m);
 }
 
-int bench_scan_chosen(const struct bench_scan *scan, uint32_t triangles)
+int bench_scan_plan(const struct bench_scan *scan, const struct bvh *bvh, const double station_m[3],
+                    struct plan_sight_choice *choice, struct sh_err *err)
 {
-    (void)scan;
-    (void)triangles;
-    return 1;
+    struct schedule_spec spec;
+    struct bvh_info info;
+    struct plan_row row;
+    struct plan_place place = {.setup = {.bvh = bvh,
+                                         .range_min_m = 0.5,
+                                         .range_max_m = BENCH_RANGE_MAX_M,
+                                         .mirror_counts = BENCH_ENCODER,
+                                         .pan_counts = BENCH_ENCODER,
+                                         .layout = LINE_POLAR,
+                                         .range_scale_m = BENCH_SCALE_M},
+                               .pulses = scan->pulses};
+    bench_schedule_of(scan->lines, scan->line_pulses, 0, &spec);
+    schedule_start(&place.segment, &spec);
+    memcpy(place.setup.station_m, station_m, sizeof place.setup.station_m);
+    pose_heading(0.0, place.setup.rotation);
+    bvh_get_info(bvh, &info);
+    const struct plan_sight_need need = {.pulses = (double)scan->pulses,
+                                         .share = share(),
+                                         .n_triangles = bvh_scene(bvh)->n_triangles,
+                                         .packet = info.packet,
+                                         .memory_bytes = (uint64_t)BENCH_SIGHT_MIB << 20,
+                                         .order = PLAN_ORDER_FREE,
+                                         .forced = -1};
+    return plan_sight(&need, &place, 1, NULL, choice, &row, err);
 }
 
 double bench_process_s(void)

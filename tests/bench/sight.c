@@ -9,7 +9,7 @@
 #include "tests/common/hits.h"
 
 enum { EMBREE, WITHOUT, SIGHT, EXACT, PIPELINE_WITHOUT, PIPELINE, N_METHODS };
-enum { KINDS = 3 /* one or nothing, few, ask */, EXACT_ROUNDS = 5, WIDTHS = 3, TRIES = 3 };
+enum { KINDS = 3 /* one or nothing, few, ask */, WIDTHS = 3, TRIES = 3 };
 
 struct sums { /* of the least squares: what a block cost by what was in it */
     double a[KINDS][KINDS], b[KINDS];
@@ -244,19 +244,19 @@ static int round_of(struct rows *r, uint32_t round, struct sh_err *err)
     solve(&sums, of_kind);
     for (int k = 0; k < KINDS; k++)
         r->kind_ns[k][round] = of_kind[k];
-    if (round >= EXACT_ROUNDS) return SH_OK;
     rc = build(r, 1, round, err);
     if (rc == SH_OK) r->ns[EXACT][round] = timed_pass(r, EXACT, every, NULL);
     return rc;
 }
 
-/* One method's time by another's, each with building or not. */
-static double ratio(const struct rows *r, int base, int method, int built)
+/* One method's time by another's; a sight's building belongs to what needs it. */
+static double ratio(const struct rows *r, int base, int method)
 {
+    const int built = method == SIGHT || method == EXACT || method == PIPELINE, exact = method == EXACT;
+    const double pulses = (double)r->out->scan.pulses;
     double q[BENCH_SIGHT_ROUNDS];
     for (uint32_t i = 0; i < r->out->rounds; i++)
-        q[i] =
-            r->ns[base][i] / (r->ns[method][i] + (built ? 1e9 * r->build_s[0][i] / (double)r->out->scan.pulses : 0.0));
+        q[i] = r->ns[base][i] / (r->ns[method][i] + (built ? 1e9 * r->build_s[exact][i] / pulses : 0.0));
     return bench_median(q, r->out->rounds);
 }
 
@@ -264,12 +264,12 @@ static void summarise(struct rows *r)
 {
     struct bench_sight *out = r->out;
     const uint32_t n = out->rounds;
-    out->cast_ratio = ratio(r, EMBREE, SIGHT, 1); /* before the medians: those sort */
-    out->cast_ratio_without = ratio(r, EMBREE, WITHOUT, 0);
-    out->pipeline_ratio = ratio(r, EMBREE, PIPELINE, 1);
-    out->pipeline_ratio_without = ratio(r, EMBREE, PIPELINE_WITHOUT, 0);
-    out->gain = ratio(r, WITHOUT, SIGHT, 1);
-    out->chosen_ratio = out->chosen ? out->gain : 1.0;
+    out->cast_ratio = ratio(r, EMBREE, SIGHT); /* before the medians: those sort */
+    out->cast_ratio_without = ratio(r, EMBREE, WITHOUT);
+    out->pipeline_ratio = ratio(r, EMBREE, PIPELINE);
+    out->pipeline_ratio_without = ratio(r, EMBREE, PIPELINE_WITHOUT);
+    out->gain = ratio(r, WITHOUT, SIGHT);
+    out->plan_ratio = !out->plan.map ? 1.0 : out->plan.ordered ? ratio(r, WITHOUT, EXACT) : out->gain;
     out->build_s = bench_median(r->build_s[0], n);
     out->build_ns = 1e9 * out->build_s / (double)out->scan.pulses;
     out->embree_ns = bench_median(r->ns[EMBREE], n);
@@ -280,19 +280,21 @@ static void summarise(struct rows *r)
     out->one_ns = bench_median(r->kind_ns[0], n);
     out->few_ns = bench_median(r->kind_ns[1], n);
     out->ask_ns = bench_median(r->kind_ns[2], n);
-    for (uint32_t i = 0; i < EXACT_ROUNDS; i++)
+    for (uint32_t i = 0; i < n; i++)
         r->ns[EXACT][i] += 1e9 * r->build_s[1][i] / (double)out->scan.pulses;
-    out->exact_ns = bench_median(r->ns[EXACT], EXACT_ROUNDS);
-    out->exact_build_s = bench_median(r->build_s[1], EXACT_ROUNDS);
+    out->exact_ns = bench_median(r->ns[EXACT], n);
+    out->exact_build_s = bench_median(r->build_s[1], n);
 }
 
 static int run(struct rows *r, struct sh_err *err)
 {
     int rc = choose_embree(r, err);
+    const double start_s = bench_process_s();
+    if (rc == SH_OK) rc = bench_scan_plan(&r->out->scan, r->c->bvh, r->c->target->station_m, &r->out->plan, err);
+    r->out->plan_s = bench_process_s() - start_s;
     if (rc == SH_OK) rc = build(r, 0, 0, err);
     if (rc != SH_OK) return rc;
     sight_get_info(r->sight, &r->out->info);
-    r->out->chosen = bench_scan_chosen(&r->out->scan, r->c->target->scene->n_triangles);
     compare(r);
     for (uint32_t round = 0; round < BENCH_SIGHT_ROUNDS; round++) {
         rc = round_of(r, round, err);

@@ -3,6 +3,7 @@
 #ifndef TESTS_BENCH_SIGHT_H
 #define TESTS_BENCH_SIGHT_H
 
+#include "core/plan.h"
 #include "tests/bench/bench.h"
 
 enum { BENCH_SIGHT_ROUNDS = 15, BENCH_SIGHT_MIB = 64 /* cast.sight_mib */ };
@@ -20,8 +21,9 @@ int bench_scan_sees(const void *ctx, const double dir[3], double radius_rad);
 /* What a sight is made of for it. */
 void bench_scan_spec(const struct bench_scan *scan, const struct bvh *bvh, const double station_m[3], int exact,
                      struct sight_spec *out);
-/* The plan takes a sight for it. */
-int bench_scan_chosen(const struct bench_scan *scan, uint32_t triangles);
+/* What the plan takes for it, where surfaces are ordered in double if that costs nothing (scene.order_exactly: auto). */
+int bench_scan_plan(const struct bench_scan *scan, const struct bvh *bvh, const double station_m[3],
+                    struct plan_sight_choice *choice, struct sh_err *err);
 double bench_process_s(void); /* processor time of all threads */
 
 struct bench_sight {
@@ -37,10 +39,10 @@ struct bench_sight {
     double exact_ns, exact_build_s;          /* surfaces ordered in double: cast and building */
     double cast_ratio, pipeline_ratio;       /* Embree's time by building and ours: medians of the rounds */
     double cast_ratio_without, pipeline_ratio_without;
-    double gain;         /* of the cast: without by with, building included */
-    int chosen;          /* the plan takes it for so many pulses */
-    double chosen_ratio; /* without by what the plan takes */
-    uint64_t different;  /* pulses of a round that met something else than without */
+    double gain;                   /* of the cast: without by with, building included */
+    struct plan_sight_choice plan; /* for so many pulses */
+    double plan_s, plan_ratio;     /* what choosing took; without by what the plan takes */
+    uint64_t different;            /* pulses of a round that met something else than without */
     struct sight_info info;
 };
 

@@ -6,7 +6,7 @@
 
 /* Thin triangles across a room of 40 m: their boxes all overlap, which no bounding volume hierarchy can sort. What the
  * station sees of them (cast.sight) would make them cheap, so it is off. */
-enum { NEEDLES = 4000 };
+enum { NEEDLES = 2000 };
 
 static double between(uint64_t *x, double lo, double hi)
 {
