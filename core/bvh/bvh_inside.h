@@ -152,6 +152,9 @@ int bvh_commit(struct bvh *bvh, RTCScene scene, const struct sh_report *report, 
  * buffer. */
 int bvh_drop_twins(struct bvh *bvh, float *vertex, const struct sh_report *report, struct sh_err *err);
 
+/* rivals.c: whether float can't order two triangles somewhere. */
+int bvh_are_rivals(const struct bvh *bvh, uint32_t i, uint32_t j);
+
 /* ---- refine.c */
 /* What Embree proposed, and what double precision makes of it. */
 struct bvh_proposals {
@@ -172,10 +175,6 @@ uint32_t bvh_refine(const struct bvh_proposals *proposals);
 uint32_t *bvh_work_labels(struct bvh_work *work);
 /* 1 / cos^2 for one; RTC_INVALID_GEOMETRY_ID: NaN. */
 float bvh_steep(const struct bvh *bvh, uint32_t prim, const double dir[3]);
-
-/* ---- rivals.c */
-/* Whether float may not be able to order two triangles along some ray. */
-int bvh_are_rivals(const struct bvh *bvh, uint32_t i, uint32_t j);
 
 /* ---- decide.c */
 struct decide_ray {
@@ -204,5 +203,7 @@ void decide_among(const struct decide_ray *ray, const uint32_t *prim, uint32_t n
                   struct decide_hit *hit);
 /* Whether a rival is met before a hit. Rivals need not be known. */
 void decide_again(const struct decide_ray *ray, struct decide_hit *hit);
+/* The same among these triangles. */
+void decide_among_rivals(const struct decide_ray *ray, const uint32_t *prim, uint32_t n, struct decide_hit *hit);
 
 #endif
