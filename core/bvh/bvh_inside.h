@@ -31,8 +31,9 @@
  * then such rivals are known from the start (rivals.c), and a hit on one compares its plane with those of
  * the others.
  *
- * Triangles with holes (scene->cutout) are marked, so that all their hits are decided in double. A hit in a hole is none. The ray is then cast once more, alone, past every triangle
- * that Embree proposes on its way, and each of them is decided in double: there is no place where the ray
+ * Triangles with holes (scene->cutout) are marked, so that all their hits are decided in double. A hit in a
+ * hole is none. The ray is then cast once more, alone, past every triangle that Embree proposes on its way,
+ * and each of them is decided in double: there is no place where the ray
  * sets out again, nothing that it could meet twice or step over, and no limit to the number of layers. */
 #ifndef CORE_BVH_BVH_INSIDE_H
 #define CORE_BVH_BVH_INSIDE_H
@@ -203,7 +204,5 @@ void decide_among(const struct decide_ray *ray, const uint32_t *prim, uint32_t n
                   struct decide_hit *hit);
 /* Whether a rival is met before a hit. Rivals need not be known. */
 void decide_again(const struct decide_ray *ray, struct decide_hit *hit);
-/* The same among these triangles. */
-void decide_among_rivals(const struct decide_ray *ray, const uint32_t *prim, uint32_t n, struct decide_hit *hit);
 
 #endif

@@ -54,8 +54,9 @@ static double plane_range(const struct decide_ray *ray, uint32_t prim)
     return (tri->d - vec3_dot(tri->n, ray->o_local)) / vec3_dot(tri->n, ray->dir);
 }
 
-/* Range to a triangle that the ray does meet, or misses by less than can be told. Where the ray lies almost in its plane the plane's range runs
- * away: it is kept between the edges that the ray passes. NaN: it passes none, and meets nothing. */
+/* Range to a triangle that the ray does meet, or misses by less than can be told. Where the ray lies almost in its
+ * plane the plane's range runs away: it is kept between the edges that the ray passes. NaN: it passes none, and meets
+ * nothing. */
 static double held_range(const struct decide_ray *ray, uint32_t prim, double v[3][3])
 {
     const double *n = ray->bvh->triangle[prim].n;
@@ -280,12 +281,11 @@ static void end_rivals(struct search *s, const struct rivalry *own, struct decid
     if (found.prim != RTC_INVALID_GEOMETRY_ID) *hit = found;
 }
 
-/* known: all of them are rivals. */
-static void try_listed(struct search *s, const struct rivalry *own, const uint32_t *prim, uint32_t n, int known)
+static void try_listed(struct search *s, const struct rivalry *own, const uint32_t *prim, uint32_t n)
 {
     for (uint32_t k = 0; k < n; k++) {
         if (prim[k] == own->prim || !is_near(s, prim[k]) || !may_be_rival(s->ray, own, prim[k])) continue;
-        if (!is_close(s, prim[k]) || !(known || bvh_are_rivals(s->ray->bvh, own->prim, prim[k]))) continue;
+        if (!is_close(s, prim[k])) continue;
         s->rivals++;
         try_triangle(s, prim[k]);
     }
@@ -302,16 +302,8 @@ void decide_again(const struct decide_ray *ray, struct decide_hit *hit)
         try_around(&s, hit->range_m, s.radius_m);
     } else if (bvh->rival_first != NULL) {
         const uint32_t first = bvh->rival_first[hit->prim];
-        try_listed(&s, &own, bvh->rival + first, bvh->rival_first[hit->prim + 1] - first, 1);
+        try_listed(&s, &own, bvh->rival + first, bvh->rival_first[hit->prim + 1] - first);
     }
-    end_rivals(&s, &own, hit);
-}
-
-void decide_among_rivals(const struct decide_ray *ray, const uint32_t *prim, uint32_t n, struct decide_hit *hit)
-{
-    struct search s = search_for(ray);
-    const struct rivalry own = begin_rivals(&s, hit);
-    try_listed(&s, &own, prim, n, 0);
     end_rivals(&s, &own, hit);
 }
 

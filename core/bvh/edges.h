@@ -1,5 +1,5 @@
-/* Private to core/bvh: on which side of a triangle's edges a ray passes, in double. Corners are relative to the ray's
- * origin. */
+/* Private to core/bvh: on which side of a triangle's edges a ray passes, and how near, in double. Corners are relative
+ * to the ray's origin. */
 #ifndef CORE_BVH_EDGES_H
 #define CORE_BVH_EDGES_H
 

@@ -211,18 +211,6 @@ void bvh_decide_among(struct bvh_work *work, const struct bvh *bvh, const struct
     put(&ray, &hit, rays, i);
 }
 
-void bvh_order_among(const struct bvh *bvh, const struct bvh_rays *rays, uint32_t i, const uint32_t *triangle,
-                     uint32_t n)
-{
-    struct decide_ray ray = ray_from(bvh, rays);
-    struct decide_hit hit = {rays->triangle[i], rays->range_m[i]};
-    if (hit.prim == RTC_INVALID_GEOMETRY_ID) return;
-    set_ray(&ray, rays, i);
-    decide_among_rivals(&ray, triangle, n, &hit);
-    rays->triangle[i] = hit.prim;
-    put(&ray, &hit, rays, i);
-}
-
 void bvh_hits_ordered(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays, const uint8_t *order)
 {
     struct decide_ray ray = ray_from(bvh, rays);

@@ -9,12 +9,6 @@ struct sight_work {
     struct sight_places places;
     struct sight_run run[HITS_ROOM];
     uint32_t triangle[HITS_ROOM]; /* of a run's rays */
-    /* Of exact order: rays of a list that the BVH is asked for, which may not propose all of them. */
-    struct {
-        uint32_t ray;
-        const uint32_t *list;
-    } again[HITS_ROOM];
-    uint32_t n_again;
     /* Rays that the BVH is asked for. */
     uint8_t asks[HITS_ROOM];  /* 1: of the chunk's */
     uint32_t ray[HITS_ROOM];  /* which ones are cast */
@@ -42,32 +36,14 @@ const struct sight_counters *sight_work_counters(const struct sight_work *work)
     return &work->counters;
 }
 
-/* The triangles of a list. Returns how many. */
-static uint32_t triangles_of(const struct sight *s, const uint32_t *list, uint32_t triangle[SIGHT_MAX_LIST])
-{
-    for (uint32_t j = 0; j < list[0]; j++)
-        triangle[j] = s->record[list[1 + j]].triangle;
-    return list[0];
-}
-
 static void decide_open(struct bvh_work *bvh_work, const struct sight *s, const struct bvh_rays *rays,
                         const uint32_t *list, uint32_t from, uint32_t to)
 {
     uint32_t triangle[SIGHT_MAX_LIST];
-    const uint32_t n = triangles_of(s, list, triangle);
+    for (uint32_t j = 0; j < list[0]; j++)
+        triangle[j] = s->record[list[1 + j]].triangle;
     for (uint32_t i = from; i < to; i++)
-        bvh_decide_among(bvh_work, s->bvh, rays, i, triangle, n);
-}
-
-/* What the BVH has found of these, against the rest of their lists. */
-static void look_again(struct sight_work *w, const struct sight *s, const struct bvh_rays *rays)
-{
-    for (uint32_t k = 0; k < w->n_again; k++) {
-        uint32_t triangle[SIGHT_MAX_LIST];
-        const uint32_t n = triangles_of(s, w->again[k].list, triangle);
-        bvh_order_among(s->bvh, rays, w->again[k].ray, triangle, n);
-    }
-    w->n_again = 0;
+        bvh_decide_among(bvh_work, s->bvh, rays, i, triangle, list[0]);
 }
 
 static void ask(struct sight_work *w, uint32_t from, uint32_t to, uint32_t *asked)
@@ -86,12 +62,9 @@ static void do_few(struct sight_work *w, struct bvh_work *bvh_work, const struct
     bvh_ranges_each(s->bvh, w->triangle, rays, from, to);
     for (uint32_t i = from; i < to && open; i++) {
         const uint32_t it = w->triangle[i - from];
-        if (it == FEW_ASK || (it == FEW_OPEN && !s->among)) {
+        if (it == FEW_ASK || (it == FEW_OPEN && !s->among))
             ask(w, i, i + 1, asked);
-            w->again[w->n_again].ray = i;
-            w->again[w->n_again].list = list;
-            w->n_again += (uint32_t)s->exact;
-        } else if (it == FEW_OPEN)
+        else if (it == FEW_OPEN)
             decide_open(bvh_work, s, rays, list, i, i + 1);
     }
 }
@@ -162,7 +135,6 @@ static void ask_bvh(struct sight_work *w, struct bvh_work *bvh_work, const struc
         if (rays->label != NULL) rays->label[i] = w->label[k];
         if (rays->steep != NULL) rays->steep[i] = w->steep[k];
     }
-    look_again(w, s, rays);
     memset(w->asks, 0, rays->n);
     bvh_work_set_directions(bvh_work, &rays->dir, rays->n);
 }
