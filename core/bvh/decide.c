@@ -263,30 +263,48 @@ static void try_neighbours(struct search *s)
 /* How far around a hit its rivals are tried, in slacks. */
 enum { WIDE = 16 };
 
-/* Rivals whose planes the ray meets within what float can't order, and that are near the hit, are tried: those that
- * are known, or else what the BVH has there. In both cases the same ones. */
+/* Rivals whose planes the ray meets within what float can't order, and that are near the hit, are tried. */
+static struct rivalry begin_rivals(struct search *s, const struct decide_hit *hit)
+{
+    const struct rivalry own = rivalry_of(s->ray, hit->prim, hit->range_m);
+    s->proposed = hit->prim;
+    try_triangle(s, hit->prim);
+    set_ball(s, hit->range_m, WIDE * slack_m(s->ray, hit->prim, own.width_m));
+    return own;
+}
+
+static void end_rivals(struct search *s, const struct rivalry *own, struct decide_hit *hit)
+{
+    if (s->rivals == 0) return;
+    if (s->prim != hit->prim || !(s->border_m > own->width_m)) try_neighbours(s);
+    const struct decide_hit found = best_of(s);
+    if (found.prim != RTC_INVALID_GEOMETRY_ID) *hit = found;
+}
+
+static void try_listed(struct search *s, const struct rivalry *own, const uint32_t *prim, uint32_t n)
+{
+    for (uint32_t k = 0; k < n; k++) {
+        if (prim[k] == own->prim || !is_near(s, prim[k]) || !may_be_rival(s->ray, own, prim[k])) continue;
+        if (!is_close(s, prim[k])) continue;
+        s->rivals++;
+        try_triangle(s, prim[k]);
+    }
+}
+
+/* Those that are known, or else what the BVH has there: the same ones. */
 void decide_again(const struct decide_ray *ray, struct decide_hit *hit)
 {
     const struct bvh *bvh = ray->bvh;
     struct search s = search_for(ray);
-    const struct rivalry own = rivalry_of(ray, hit->prim, hit->range_m);
-    const double radius_m = WIDE * slack_m(ray, hit->prim, own.width_m);
-    s.proposed = hit->prim;
-    s.only = &own;
-    try_triangle(&s, hit->prim);
-    set_ball(&s, hit->range_m, radius_m);
-    if (!bvh->ordered) try_around(&s, hit->range_m, radius_m);
-    for (uint32_t k = bvh->ordered ? bvh->rival_first[hit->prim] : 0;
-         bvh->ordered && k < bvh->rival_first[hit->prim + 1]; k++) {
-        const uint32_t prim = bvh->rival[k];
-        if (!is_near(&s, prim) || !may_be_rival(ray, &own, prim) || !is_close(&s, prim)) continue;
-        s.rivals++;
-        try_triangle(&s, prim);
+    const struct rivalry own = begin_rivals(&s, hit);
+    if (!bvh->ordered) {
+        s.only = &own;
+        try_around(&s, hit->range_m, s.radius_m);
+    } else if (bvh->rival_first != NULL) {
+        const uint32_t first = bvh->rival_first[hit->prim];
+        try_listed(&s, &own, bvh->rival + first, bvh->rival_first[hit->prim + 1] - first);
     }
-    if (s.rivals == 0) return;
-    if (s.prim != hit->prim || !(s.border_m > own.width_m)) try_neighbours(&s);
-    const struct decide_hit found = best_of(&s);
-    if (found.prim != RTC_INVALID_GEOMETRY_ID) *hit = found;
+    end_rivals(&s, &own, hit);
 }
 
 static int has_rivals(const struct bvh *bvh, uint32_t prim)
