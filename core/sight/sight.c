@@ -145,10 +145,13 @@ static int build(struct build_shared *b, unsigned threads, struct sh_err *err)
 {
     int rc = take_arrays(b, err);
     if (rc == SH_OK) rc = build_bins(b, err);
+    if (rc == SH_OK) build_figures(b);
     if (rc == SH_OK) rc = build_all(b, threads, err);
     if (rc == SH_OK) rc = keep_records(b, err);
     if (rc == SH_OK) finish(b);
     free(b->seen);
+    free(b->figures);
+    free(b->kept);
     free(b->bin);
     free(b->binned);
     return rc;
