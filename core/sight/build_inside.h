@@ -49,6 +49,8 @@ struct build_shared {
     _Atomic uint64_t given_back;     /* of these, when all is done */
     struct build_arena leaf, list, record;
     _Atomic uint64_t cells[4]; /* by what they say: one, nothing, few, ask */
+    int may_coarsen;           /* where the memory is full, it is better to begin again with larger cells */
+    _Atomic int full;          /* bytes would have become more than the memory */
     _Atomic int failed;        /* SH_ENOMEM, SH_ESTOPPED */
 };
 

@@ -8,7 +8,7 @@
 
 #include "core/sight/build_inside.h"
 
-enum { MAX_THREADS = 64, FEW_RAYS = 4 };
+enum { MAX_THREADS = 64, FEW_RAYS = 4, TOO_FINE = 1 };
 
 int sight_possible(const struct scene *scene)
 {
@@ -23,6 +23,7 @@ uint64_t build_take(struct build_shared *b, struct build_arena *arena, uint64_t 
         atomic_fetch_sub_explicit(&arena->used, n, memory_order_relaxed);
     }
     atomic_fetch_sub_explicit(&b->bytes, n * size, memory_order_relaxed);
+    atomic_store_explicit(&b->full, 1, memory_order_relaxed);
     return UINT64_MAX;
 }
 
@@ -66,6 +67,12 @@ static int take_arrays(struct build_shared *b, struct sh_err *err)
     return SH_OK;
 }
 
+/* Coarser cells, all of them, are better than some fine ones; but not if they have to be much coarser. */
+static int is_too_fine(const struct build_shared *b)
+{
+    return b->may_coarsen && atomic_load_explicit(&b->full, memory_order_relaxed);
+}
+
 static void *thread_main(void *shared)
 {
     struct build_shared *b = shared;
@@ -73,7 +80,7 @@ static void *thread_main(void *shared)
     const uint32_t regions = SIGHT_FACES * b->regions * b->regions;
     for (;;) {
         const uint32_t region = atomic_fetch_add(&b->next, 1);
-        if (region >= regions || atomic_load(&b->failed) != 0) break;
+        if (region >= regions || atomic_load(&b->failed) != 0 || is_too_fine(b)) break;
         const int rc = sh_stopped(b->report) ? SH_ESTOPPED : build_region(b, &w, region);
         if (rc != SH_OK) atomic_store(&b->failed, rc);
     }
@@ -147,7 +154,7 @@ static int build(struct build_shared *b, unsigned threads, struct sh_err *err)
     if (rc == SH_OK) rc = build_bins(b, err);
     if (rc == SH_OK) build_figures(b);
     if (rc == SH_OK) rc = build_all(b, threads, err);
-    if (rc == SH_OK) rc = keep_records(b, err);
+    if (rc == SH_OK && !is_too_fine(b)) rc = keep_records(b, err);
     if (rc == SH_OK) finish(b);
     free(b->seen);
     free(b->figures);
@@ -155,6 +162,38 @@ static int build(struct build_shared *b, unsigned threads, struct sh_err *err)
     free(b->bin);
     free(b->binned);
     return rc;
+}
+
+static void free_arrays(struct sight *s)
+{
+    free(s->tile);
+    free(s->leaf);
+    free(s->list);
+    free(s->record);
+    s->tile = s->leaf = s->list = NULL;
+    s->record = NULL;
+}
+
+/* With the cells at hand. TOO_FINE where the memory does not hold them, and may_coarsen. */
+static int try_cells(struct sight *s, const struct sight_spec *spec, unsigned threads, const struct sh_report *report,
+                     int may_coarsen, struct sh_err *err)
+{
+    struct build_shared b = {.sight = s, .spec = spec, .report = report, .may_coarsen = may_coarsen};
+    b.regions = s->cells / SIGHT_TILE < BUILD_REGIONS ? s->cells / SIGHT_TILE : BUILD_REGIONS;
+    b.region_cells = s->cells / b.regions;
+    int rc = build(&b, threads, err);
+    return rc == SH_OK && is_too_fine(&b) ? TOO_FINE : rc;
+}
+
+static int make(struct sight *s, const struct sight_spec *spec, unsigned threads, const struct sh_report *report,
+                struct sh_err *err)
+{
+    s->cells = sight_cells(spec->rays, spec->memory_bytes);
+    int rc = try_cells(s, spec, threads, report, s->cells > SIGHT_MIN_CELLS, err);
+    if (rc != TOO_FINE) return rc;
+    free_arrays(s);
+    s->cells /= 2;
+    return try_cells(s, spec, threads, report, 0, err);
 }
 
 int sight_create(const struct sight_spec *spec, unsigned threads, const struct sh_report *report, struct sight **out,
@@ -170,11 +209,7 @@ int sight_create(const struct sight_spec *spec, unsigned threads, const struct s
     s->exact = spec->exact;
     bvh_origin(spec->bvh, origin_m);
     s->among = s->exact && memcmp(origin_m, s->station_m, sizeof origin_m) == 0;
-    s->cells = sight_cells(spec->rays, spec->memory_bytes);
-    struct build_shared b = {.sight = s, .spec = spec, .report = report};
-    b.regions = s->cells / SIGHT_TILE < BUILD_REGIONS ? s->cells / SIGHT_TILE : BUILD_REGIONS;
-    b.region_cells = s->cells / b.regions;
-    int rc = build(&b, threads, err);
+    int rc = make(s, spec, threads, report, err);
     if (rc != SH_OK) {
         sight_free(s);
         *out = NULL;
@@ -188,10 +223,7 @@ int sight_create(const struct sight_spec *spec, unsigned threads, const struct s
 void sight_free(struct sight *sight)
 {
     if (sight == NULL) return;
-    free(sight->tile);
-    free(sight->leaf);
-    free(sight->list);
-    free(sight->record);
+    free_arrays(sight);
     free(sight);
 }
 
