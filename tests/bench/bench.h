@@ -45,6 +45,8 @@ void bench_schedule_of(uint32_t lines, uint32_t pulses, uint32_t frames, struct 
 int bench_rays_room(const struct schedule_spec *spec, uint32_t lines, uint32_t line_pulses, struct bench_rays *out,
                     struct sh_err *err);
 void bench_rays_aim(struct bench_rays *rays, uint32_t first_line);
+/* Those of the first `bundle` of each bundle * every lines. */
+void bench_rays_spread(struct bench_rays *rays, uint32_t bundle, uint32_t every);
 /* A whole turn of so many lines. */
 int bench_rays_create(uint32_t lines, struct bench_rays *out, struct sh_err *err);
 void bench_rays_free(struct bench_rays *rays);

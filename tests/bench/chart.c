@@ -17,7 +17,7 @@
 #include "tests/bench/pin.h"
 #include "tests/bench/sight.h"
 
-enum { LINES = 200, ROUNDS = 9, CHUNK = 256, SAMPLE_STEP = 1, WIDTHS = 4, METHODS = 21 };
+enum { LINES = 104 /* cast, of a whole scan's */, ROUNDS = 9, CHUNK = 256, SAMPLE_STEP = 1, WIDTHS = 4, METHODS = 21 };
 enum kind { FLOAT, REFINED, DECIDED, SIGHT }; /* the last two are the program's own */
 #define WHOLE_SCAN 22.5e6 /* pulses of a turn at 0.04 degrees: what a sight is made for, and shared by */
 
@@ -268,10 +268,14 @@ static void aim_at_edges(struct chart *c)
 static int set_up(struct chart *c, struct sh_err *err)
 {
     static const double centre_m[2] = {0.0, 0.0};
+    struct schedule_spec spec;
     struct bvh_info info;
     c->station_m[2] = 4.7;
     int rc = generate_terrain(c->spec->triangles, c->spec->side_m, c->spec->rough_m, centre_m, 1, &c->scene, err);
-    if (rc == SH_OK) rc = bench_rays_create(LINES, &c->rays, err);
+    bench_scan_of(WHOLE_SCAN, 1, &c->scan);
+    bench_schedule_of(c->scan.lines, c->scan.line_pulses, 0, &spec);
+    if (rc == SH_OK) rc = bench_rays_room(&spec, LINES, c->scan.line_pulses, &c->rays, err);
+    if (rc == SH_OK) bench_rays_spread(&c->rays, c->scan.bundle, c->scan.lines / LINES);
     for (int robust = 0; robust < 2 && rc == SH_OK; robust++) {
         struct embree_alone *e = &c->embree[robust];
         rc = bench_embree(c->scene, c->station_m, robust, e, err);
@@ -281,7 +285,6 @@ static int set_up(struct chart *c, struct sh_err *err)
     if (rc == SH_OK) rc = caster_create(&c->caster, err);
     if (rc == SH_OK) rc = bvh_work_create(&c->bvh_work, err);
     if (rc == SH_OK) rc = sight_work_create(&c->work, err);
-    bench_scan_of(WHOLE_SCAN, 1, &c->scan);
     double cost_s;
     if (rc == SH_OK) rc = bench_scan_plan(&c->scan, c->bvh, c->station_m, &c->plan, err);
     if (rc == SH_OK) rc = make_sight(c, &cost_s, err);

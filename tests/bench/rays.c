@@ -45,6 +45,12 @@ void bench_rays_aim(struct bench_rays *rays, uint32_t first_line)
         fill_line(rays, first_line + l, (size_t)l * rays->line_pulses);
 }
 
+void bench_rays_spread(struct bench_rays *rays, uint32_t bundle, uint32_t every)
+{
+    for (uint32_t l = 0; l < rays->lines; l++)
+        fill_line(rays, l / bundle * bundle * every + l % bundle, (size_t)l * rays->line_pulses);
+}
+
 int bench_rays_room(const struct schedule_spec *spec, uint32_t lines, uint32_t line_pulses, struct bench_rays *out,
                     struct sh_err *err)
 {

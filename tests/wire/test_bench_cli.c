@@ -29,7 +29,7 @@ static double number_of(const char *from, const char *key)
 
 static void test_keys(void **state)
 {
-    static const char *const args[] = {"--scenes", "10k", "--seconds", "0.1", NULL};
+    static const char *const args[] = {"--scenes", "10k", "--seconds", "0.1", "--pulses", "none", NULL};
     static const char *const stages[] = {"schedule", "directions", "embree", "refine", "decide", "detect",
                                          "noise",    "georef",     "encode", "crc",    "rest"};
     struct wire *wire = *state;
@@ -55,6 +55,33 @@ static void test_keys(void **state)
                 1e-6 * sum); /* with the rest they are the whole, up to rounding */
     assert_non_null(strstr(scenes, "\"stages_give_same_bytes\": true"));
     assert_true(number_of(scenes, "pulses_per_s_all_threads") > 0.0);
+    free(text);
+}
+
+/* Whole scans: what building a sight costs is in the ratio, and it changes no hit. */
+static void test_sight(void **state)
+{
+    static const char *const args[] = {"--scenes", "10k", "--only-sight", "--pulses", "50k,100k", NULL};
+    static const char *const parts[] = {
+        "cast_ratio_without", "pipeline_ratio", "gain", "plan_ratio", "build", "exact", "cells", "peak_mib"};
+    struct wire *wire = *state;
+    assert_int_equal(bench(wire, args), 0);
+    char *text = wire_read(wire_path(wire, "out"), NULL), *at = strstr(text, "\"sight\": [");
+    assert_non_null(at);
+    for (int i = 0; i < 2; i++) {
+        at = strstr(at + 1, "\"pulses\": ");
+        assert_non_null(at);
+        assert_true(fabs(number_of(at, "pulses") / (50000.0 * (i + 1)) - 1.0) < 0.05); /* of whole lines */
+        assert_true(number_of(at, "rounds") >= 9.0);
+        const char *ns = strstr(at, "\"ns_per_pulse\": {");
+        assert_non_null(ns);
+        /* A median of ratios lies near the ratio of medians: within half even where other programs run. */
+        const double sum_ns = number_of(ns, "build") + number_of(ns, "cast");
+        assert_true(fabs(number_of(at, "cast_ratio") * sum_ns / number_of(ns, "embree") - 1.0) < 0.5);
+        for (size_t k = 0; k < sizeof parts / sizeof parts[0]; k++)
+            assert_true(number_of(at, parts[k]) > 0.0);
+        assert_true(number_of(at, "different") == 0.0);
+    }
     free(text);
 }
 
@@ -87,9 +114,10 @@ static void test_leaks(void **state)
 static void test_wrong_usage(void **state)
 {
     static const char *const wrong[][4] = {
-        {"--scenes", "10q", NULL},  {"--scenes", "", NULL},   {"--scenes", "10k,,1M", NULL}, {"--scenes", "-10k", NULL},
-        {"--scenes", "200M", NULL}, {"--threads", "0", NULL}, {"--seconds", "nan", NULL},    {"--leaks", "-1", NULL},
-        {"something", NULL, NULL},  {"--what", NULL, NULL}};
+        {"--scenes", "10q", NULL},    {"--scenes", "", NULL},     {"--scenes", "10k,,1M", NULL},
+        {"--scenes", "-10k", NULL},   {"--scenes", "200M", NULL}, {"--threads", "0", NULL},
+        {"--seconds", "nan", NULL},   {"--leaks", "-1", NULL},    {"--pulses", "12", NULL},
+        {"--pulses", "1M,,1M", NULL}, {"something", NULL, NULL},  {"--what", NULL, NULL}};
     struct wire *wire = *state;
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         assert_int_equal(bench(wire, wrong[i]), 2);
@@ -106,6 +134,7 @@ int main(void)
 {
     static const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_keys, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_sight, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_leaks, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_wrong_usage, wire_setup, wire_teardown),
     };
