@@ -233,6 +233,11 @@ test-hostile: deps
 	@HOSTILE_EVERY=1 $(BUILD)/test/tests/unit/test_hostile_files
 	@HOSTILE_EVERY=1 $(BUILD)/asan/tests/unit/test_hostile_files
 
+# What a station sees, by its map and by the BVH, in 50,000 random scenes: some minutes.
+test-sight: deps
+	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test $(BUILD)/test/tests/accuracy/test_sight
+	@SIGHT_SCENES=50000 $(BUILD)/test/tests/accuracy/test_sight
+
 # A million pulses over each kind of USB, each with the hash that TCP gives: some minutes in an emulated machine.
 test-usb-million: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test test-programs
@@ -305,6 +310,6 @@ format:
 clean:
 	rm -rf $(BUILD)
 .PHONY: ALWAYS all deps deps-test deps-build deps-guest demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb \
-	test-usb-million test-hostile objects test-unit-programs test-programs bench bench-beam bench-plain bench-velodyne bench-loop bench-kernels chart install format clean
+	test-usb-million test-hostile test-sight objects test-unit-programs test-programs bench bench-beam bench-plain bench-velodyne bench-loop bench-kernels chart install format clean
 .SECONDARY:
 -include $(shell find $(BUILD) -type f -name '*.d' 2>/dev/null)

@@ -382,7 +382,8 @@ void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct bvh
         counters->went_on++;
         float org[3], dir[3];
         to_floats(ray, org, dir);
-        struct bvh_one one = {.t_min = nextafterf((float)(range_m + 0.5 * radius_m), INFINITY), .t_max = ray->t_max};
+        /* No further: of what is much larger than this, float may be wrong by more than the radius. */
+        struct bvh_one one = {.t_min = nextafterf(t, INFINITY), .t_max = ray->t_max};
         bvh_intersect_one(ray->bvh, org, dir, &one);
         prim = one.prim;
         t = one.t;

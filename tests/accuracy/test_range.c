@@ -33,6 +33,11 @@ static const uint32_t SHARE = 1;
 static const double BOUND_M = 1e-6;
 static const double RANGE_MAX_M = 1e4;
 
+/* Of ordinary scans: what a sight leaves to the BVH, or the BVH could do everything. Found were 0.0 % in the room, 3.0 %
+ * on the terrain and 3.1 % in the house, with 0.15 to 0.8 M rays; each cell that an outline cuts may ask in full, and
+ * twice as many such cells should be noticed. */
+static const double MOST_ASKED = 0.06;
+
 struct place {
     const char *name;
     double offset_m[3];
@@ -197,6 +202,7 @@ static void scan(const struct scene *scene, const double station_m[3], const dou
     assert_true(sum.hits > 1000 / SHARE);
     assert_true(sum.differ == 0);
     assert_true(sum.by_sight == 0);
+    assert_true((double)sum.asked <= MOST_ASKED * (double)sum.rays);
     assert_true(sum.max_m <= BOUND_M);
 }
 

@@ -177,6 +177,9 @@ static void test_same_bits(void **state)
             printf("# with %-10s %llu\n", odd_part_name(i), (unsigned long long)tally.differ_by_part[i]);
     assert_true(tally.refused <= tally.scenes / 100);
     assert_true(tally.hits > tally.rays / 4);
+    /* Half of these rays are aimed where nothing but the BVH decides, or at caps and with memory for nothing; of all
+     * 50 % ask and 26 % are decided among a few. A sight that always asks knows nothing. */
+    assert_true(tally.asked < tally.rays * 2 / 3 && tally.few > tally.rays / 10);
     assert_true(tally.differ == 0);
 }
 

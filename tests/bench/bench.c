@@ -142,7 +142,7 @@ static int judge(const struct bench_report *report, struct sh_err *err)
 {
     uint64_t leaks = 0; /* what passes its target by has slipped through, too */
     for (int i = 0; i < BENCH_LEAK_MESHES && report->have_leaks; i++)
-        leaks += report->leaks[i].leaks + report->leaks[i].passed;
+        leaks += report->leaks[i].leaks + report->leaks[i].passed + report->leaks[i].sight_differ;
     return leaks == 0 ? SH_OK : sh_fail(err, SH_ESTATE, "bench: %llu rays leaked", (unsigned long long)leaks);
 }
 

@@ -137,6 +137,7 @@ struct bench_leaks {
     double ns_per_ray;            /* processor time */
     struct cast_counters counters;
     uint64_t plain_rays, plain_leaks; /* Embree alone, robust, in packets */
+    uint64_t sight_rays, sight_differ, sight_asked; /* by sight: a bit differs from the cast; the BVH was asked */
 };
 int bench_leaks(uint64_t rays, uint64_t seed, uint32_t threads, const struct sh_report *report,
                 struct bench_leaks out[BENCH_LEAK_MESHES], struct sh_err *err);

@@ -2,7 +2,9 @@
  *
  * A ray leaks when it hits nothing, when it reports the outer wall of nested meshes, or when behind its
  * target it hits a face from outside: then it has left the mesh. One that meets the inside of the mesh behind its
- * target has passed an edge that it was aimed at: no leak, but no less wrong, and counted apart. */
+ * target has passed an edge that it was aimed at: no leak, but no less wrong, and counted apart.
+ *
+ * The same rays are looked up in a sight of the station: each must be the cast's, bit by bit. */
 #include <math.h>
 #include <stdio.h>
 #include <pthread.h>
@@ -11,6 +13,7 @@
 #include <string.h>
 
 #include "tests/common/hits.h"
+#include "tests/common/sight_beside.h"
 #include "tests/common/generate.h"
 #include "core/rng.h"
 #include "tests/bench/bench.h"
@@ -22,6 +25,7 @@ enum { BATCH = 4096, ROW = 256, MAX_THREADS = 64, PLAIN_RAYS = 1000000 / BENCH_L
 struct job {
     const struct bench_mesh *mesh;
     struct bvh *bvh;
+    struct sight_beside sight; /* of the station; threads join it */
     uint64_t n, key;
     _Atomic uint64_t next; /* first ray that nobody has taken yet */
     pthread_mutex_t lock;  /* of what follows */
@@ -35,8 +39,23 @@ struct batch {
     uint32_t prim[BATCH];
 };
 
+/* Onto the nearest border of two cells of the sight, and up to 4 units in the last place beside it. */
+static void to_border(uint32_t cells, uint64_t r, double d[3], double *length)
+{
+    int axis = fabs(d[0]) >= fabs(d[1]) ? 0 : 1;
+    if (fabs(d[2]) > fabs(d[axis])) axis = 2;
+    const double most = fabs(d[axis]), half = 0.5 * cells;
+    double *x = &d[(axis + 1 + (int)(r & 1)) % 3];
+    *x = floor((*x / most + 1.0) * half + 0.5) / half - 1.0;
+    for (uint32_t i = (uint32_t)(r >> 1) % 5; i > 0; i--)
+        *x = nextafter(*x, r & 64 ? INFINITY : -INFINITY);
+    *x *= most;
+    *length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+}
+
 /* Ray number i: to a corner, or to a point of an edge. Four rays each to a row of neighbouring triangles,
- * which begins anywhere: rays of a packet are near each other, as in a scan. */
+ * which begins anywhere: rays of a packet are near each other, as in a scan. Of four, one goes on to a border of
+ * the sight's cells. */
 static void aim(const struct job *job, uint64_t i, struct batch *b, uint32_t k)
 {
     const struct scene *scene = job->mesh->scene;
@@ -53,6 +72,10 @@ static void aim(const struct job *job, uint64_t i, struct batch *b, uint32_t k)
     }
     double length = sqrt(length2);
     b->target_m[k] = length;
+    if (job->sight.sight != NULL && i % 4 == 3) {
+        to_border(job->sight.info.cells, r, d, &length);
+        b->target_m[k] = INFINITY; /* it has left the edge, and may only not get out */
+    }
     b->dx[k] = d[0] / length;
     b->dy[k] = d[1] / length;
     b->dz[k] = d[2] / length;
@@ -87,8 +110,10 @@ static void *job_main(void *arg)
     struct job *job = arg;
     struct sh_err err;
     struct caster *caster = NULL;
+    struct sight_beside sight = {0};
     struct batch *b = aligned_alloc(64, sizeof *b);
-    if (b == NULL || caster_create(&caster, &err) != SH_OK) {
+    if (b == NULL || caster_create(&caster, &err) != SH_OK || sight_beside_join(&job->sight, &sight, &err) != SH_OK) {
+        caster_free(caster);
         free(b);
         return NULL;
     }
@@ -100,9 +125,11 @@ static void *job_main(void *arg)
         for (uint32_t k = 0; k < n; k++)
             aim(job, first + k, b, k);
         hits_from(caster, job->bvh, job->mesh->station_m, BENCH_RANGE_MAX_M, n, b->dx, b->dy, b->dz, b->range_m,
-                    b->prim);
+                  b->prim);
         for (uint32_t k = 0; k < n; k++)
             counts[judge(job->mesh, b, k, b->range_m[k], b->prim[k], 1e-9)]++;
+        sight_beside_check(&sight, n, &(const struct vec3_in){b->dx, b->dy, b->dz}, BENCH_RANGE_MAX_M, b->range_m,
+                           b->prim);
     }
     caster_get_counters(caster, &c);
     pthread_mutex_lock(&job->lock);
@@ -110,11 +137,15 @@ static void *job_main(void *arg)
     job->out->rays += counts[0] + counts[1] + counts[2];
     job->out->leaks += counts[1];
     job->out->passed += counts[2];
+    job->out->sight_rays += sight.rays;
+    job->out->sight_differ += sight.differ;
+    job->out->sight_asked += sight.asked;
     job->out->counters.near_border += c.near_border;
     job->out->counters.decided += c.decided;
     job->out->counters.went_on += c.went_on;
     job->out->counters.undecided += c.undecided;
     pthread_mutex_unlock(&job->lock);
+    sight_beside_free(&sight);
     caster_free(caster);
     free(b);
     return NULL;
@@ -189,7 +220,13 @@ static int one_mesh(int which, uint64_t rays, uint64_t seed, uint32_t threads, c
         out->triangles = mesh.scene->n_triangles;
         rc = plain(&job, err);
     }
+    if (rc == SH_OK) {
+        struct sight_spec spec = {.bvh = job.bvh, .rays = (double)rays, .memory_bytes = 64 << 20};
+        memcpy(spec.station_m, mesh.station_m, sizeof spec.station_m);
+        rc = sight_beside_create(&spec, job.bvh, &job.sight, err);
+    }
     if (rc == SH_OK) rc = run_job(&job, threads, report, err);
+    sight_beside_free(&job.sight);
     bvh_free(job.bvh);
     scene_free(mesh.scene);
     pthread_mutex_destroy(&job.lock);

@@ -149,6 +149,9 @@ static void put_leaks(struct json *json, const struct bench_leaks *l)
     json_double(json, "ns_per_ray", l->ns_per_ray);
     json_uint(json, "plain_rays", l->plain_rays);
     json_uint(json, "plain_leaks", l->plain_leaks);
+    json_uint(json, "sight_rays", l->sight_rays);
+    json_uint(json, "sight_differ", l->sight_differ);
+    json_uint(json, "sight_asked", l->sight_asked);
     put_counters(json, "per_million", &l->counters, (double)l->rays);
     json_close_object(json);
 }

@@ -9,6 +9,7 @@
 
 #include "tests/common/hits.h"
 #include "tests/common/generate.h"
+#include "tests/common/sight_beside.h"
 #include "core/rng.h"
 #include "tests/stability/rig.h"
 
@@ -36,7 +37,7 @@ struct cage {
 enum aim { AIM_EDGES, AIM_VERTICES };
 
 struct leaks {
-    uint64_t ours, robust, single, fast; /* fast: without RTC_SCENE_FLAG_ROBUST */
+    uint64_t ours, robust, single, fast, sight; /* fast: without RTC_SCENE_FLAG_ROBUST */
 };
 
 struct job {
@@ -47,6 +48,7 @@ struct job {
     enum aim aim;
     uint64_t first, end;
     struct leaks leaks;
+    struct sight_beside beside;
     double dx[BATCH], dy[BATCH], dz[BATCH], range_m[BATCH];
     uint32_t triangle[BATCH];
 };
@@ -101,6 +103,7 @@ static void *run_job(void *argument)
             aim_ray(j, at + i, i);
         hits_from(j->caster, j->bvh, station_m, 1e5, n, j->dx, j->dy, j->dz, j->range_m, j->triangle);
         j->leaks.ours += count_leaks(j, n, 0.0);
+        sight_beside_check(&j->beside, n, &(const struct vec3_in){j->dx, j->dy, j->dz}, 1e5, j->range_m, j->triangle);
         if (at - j->first >= (j->end - j->first) / NAIVE_SHARE) continue;
         naive_hits(j->robust, 16, station_m, n, j->dx, j->dy, j->dz, j->range_m, j->triangle);
         j->leaks.robust += count_leaks(j, n, 1e-3);
@@ -123,6 +126,10 @@ static struct leaks run(const struct cage *cage, enum aim aim, uint64_t n)
     struct naive *robust = naive_create(scene, cage->station_m, 1, 1),
                  *fast = naive_create(scene, cage->station_m, 0, 1);
     assert_true(robust != NULL && fast != NULL);
+    struct sight_beside beside;
+    struct sight_spec spec = {.bvh = bvh, .rays = (double)n, .memory_bytes = 64 << 20};
+    memcpy(spec.station_m, cage->station_m, sizeof spec.station_m);
+    if (sight_beside_create(&spec, bvh, &beside, &err) != SH_OK) fail_msg("%s", err.text);
     for (unsigned i = 0; i < THREADS; i++) {
         job[i] = calloc(1, sizeof *job[i]);
         assert_non_null(job[i]);
@@ -134,6 +141,7 @@ static struct leaks run(const struct cage *cage, enum aim aim, uint64_t n)
                                .first = n * i / THREADS,
                                .end = n * (i + 1) / THREADS};
         assert_int_equal(caster_create(&job[i]->caster, &err), SH_OK);
+        assert_int_equal(sight_beside_join(&beside, &job[i]->beside, &err), SH_OK);
         assert_int_equal(pthread_create(&thread[i], NULL, run_job, job[i]), 0);
     }
     for (unsigned i = 0; i < THREADS; i++) {
@@ -141,9 +149,13 @@ static struct leaks run(const struct cage *cage, enum aim aim, uint64_t n)
         sum.ours += job[i]->leaks.ours;
         sum.robust += job[i]->leaks.robust;
         sum.fast += job[i]->leaks.fast;
+        sum.sight += job[i]->beside.differ;
+        sight_beside_print(&job[i]->beside);
+        sight_beside_free(&job[i]->beside);
         caster_free(job[i]->caster);
         free(job[i]);
     }
+    sight_beside_free(&beside);
     naive_free(robust);
     naive_free(fast);
     bvh_free(bvh);
@@ -157,6 +169,7 @@ static void cage_row(const struct cage *cage, const char *name, enum aim aim)
     struct leaks leaks = run(cage, aim, RAYS_PER_ROW);
     snprintf(regime, sizeof regime, "%.2f M rays at %s of %s", 1e-6 * (double)RAYS_PER_ROW,
              aim == AIM_EDGES ? "edges" : "vertices", name);
+    if (leaks.sight != 0) fail_msg("%s: %llu differ by sight", regime, (unsigned long long)leaks.sight);
     table_row(regime, "local frame, not robust", (double)leaks.fast, (double)leaks.ours, 0.0, "leaks");
     if (leaks.robust != 0)
         table_row(regime, "local frame, robust", (double)leaks.robust, (double)leaks.ours, 0.0, "leaks");
