@@ -151,8 +151,8 @@ double bvh_range_of(const struct bvh *bvh, uint32_t triangle, const double at_m[
 void bvh_decide_among(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays, uint32_t i,
                       const uint32_t *triangle, uint32_t n);
 /* bvh_hits as if bvh_order_exactly had been called: what lies near each hit is looked for in the BVH, ray by
- * ray. Some microseconds a ray. */
-void bvh_hits_ordered(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays);
+ * ray. Some microseconds a ray. order[i] 0: ray i is only cast along with the others of its packet. */
+void bvh_hits_ordered(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays, const uint8_t *order);
 
 /* Cosine of the incidence on the triangles that were hit, 0..1; NaN where there is none. */
 void bvh_cosines(const struct bvh *bvh, const uint32_t *triangle, const struct vec3_in *dir, uint32_t n,

@@ -31,8 +31,9 @@
  * then such rivals are known from the start (rivals.c), and a hit on one compares its plane with those of
  * the others.
  *
- * Triangles with holes (scene->cutout) are marked, so that all their hits are decided in double. A hit in a hole is none. The ray is then cast once more, alone, past every triangle
- * that Embree proposes on its way, and each of them is decided in double: there is no place where the ray
+ * Triangles with holes (scene->cutout) are marked, so that all their hits are decided in double. A hit in a
+ * hole is none. The ray is then cast once more, alone, past every triangle that Embree proposes on its way,
+ * and each of them is decided in double: there is no place where the ray
  * sets out again, nothing that it could meet twice or step over, and no limit to the number of layers. */
 #ifndef CORE_BVH_BVH_INSIDE_H
 #define CORE_BVH_BVH_INSIDE_H
@@ -152,6 +153,9 @@ int bvh_commit(struct bvh *bvh, RTCScene scene, const struct sh_report *report, 
  * buffer. */
 int bvh_drop_twins(struct bvh *bvh, float *vertex, const struct sh_report *report, struct sh_err *err);
 
+/* rivals.c: whether float can't order two triangles somewhere. */
+int bvh_are_rivals(const struct bvh *bvh, uint32_t i, uint32_t j);
+
 /* ---- refine.c */
 /* What Embree proposed, and what double precision makes of it. */
 struct bvh_proposals {
@@ -172,10 +176,6 @@ uint32_t bvh_refine(const struct bvh_proposals *proposals);
 uint32_t *bvh_work_labels(struct bvh_work *work);
 /* 1 / cos^2 for one; RTC_INVALID_GEOMETRY_ID: NaN. */
 float bvh_steep(const struct bvh *bvh, uint32_t prim, const double dir[3]);
-
-/* ---- rivals.c */
-/* Whether float may not be able to order two triangles along some ray. */
-int bvh_are_rivals(const struct bvh *bvh, uint32_t i, uint32_t j);
 
 /* ---- decide.c */
 struct decide_ray {

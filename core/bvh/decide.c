@@ -3,6 +3,7 @@
 #include <stdbool.h>
 
 #include "core/bvh/bvh_inside.h"
+#include "core/bvh/edges.h"
 #include "core/vec3.h"
 
 enum { MOST_TIED = 8 };
@@ -47,61 +48,15 @@ static struct search search_for(const struct decide_ray *ray)
     return s;
 }
 
-static int before(const double a[3], const double b[3])
-{
-    for (int i = 0; i < 3; i++)
-        if (a[i] != b[i]) return a[i] < b[i];
-    return 0;
-}
-
-/* On which side of the edge a-b the ray passes, as the distance across the ray times the edge's length;
- * corners relative to the ray's origin. Taken in one order of the corners whatever triangle asks, so that two
- * triangles of an edge get the same number with opposite signs. */
-static double edge_side(const double a[3], const double b[3], const double dir[3])
-{
-    int swap = before(b, a);
-    const double *p = swap ? b : a, *q = swap ? a : b;
-    double e[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]};
-    double side = dir[0] * (p[1] * e[2] - p[2] * e[1]) + dir[1] * (p[2] * e[0] - p[0] * e[2]) +
-                  dir[2] * (p[0] * e[1] - p[1] * e[0]);
-    return swap ? -side : side;
-}
-
 static double plane_range(const struct decide_ray *ray, uint32_t prim)
 {
     const struct bvh_plane *tri = &ray->bvh->triangle[prim];
     return (tri->d - vec3_dot(tri->n, ray->o_local)) / vec3_dot(tri->n, ray->dir);
 }
 
-/* Range along the ray of the point where it comes nearest to the segment. */
-static double edge_range(const double a[3], const double b[3], const double dir[3])
-{
-    double e[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
-    double ee = vec3_dot(e, e), ed = vec3_dot(e, dir), ae = vec3_dot(a, e), ad = vec3_dot(a, dir),
-           dd = vec3_dot(dir, dir);
-    double det = ee * dd - ed * ed;
-    double s = det > 0.0 ? (ed * ad - dd * ae) / det : 0.0;
-    s = s < 0.0 ? 0.0 : s > 1.0 ? 1.0 : s;
-    return (ad + s * ed) / dd;
-}
-
-/* Distance of the point at range t on the ray from the segment. */
-static double edge_gap(const double a[3], const double b[3], const double dir[3], double t)
-{
-    double e[3], w[3];
-    for (int i = 0; i < 3; i++) {
-        e[i] = b[i] - a[i];
-        w[i] = t * dir[i] - a[i];
-    }
-    double s = vec3_dot(w, e) / vec3_dot(e, e);
-    s = s < 0.0 ? 0.0 : s > 1.0 ? 1.0 : s;
-    for (int i = 0; i < 3; i++)
-        w[i] -= s * e[i];
-    return sqrt(vec3_dot(w, w));
-}
-
-/* Range to a triangle that the ray does meet, or misses by less than can be told. Where the ray lies almost in its plane the plane's range runs
- * away: it is kept between the edges that the ray passes. NaN: it passes none, and meets nothing. */
+/* Range to a triangle that the ray does meet, or misses by less than can be told. Where the ray lies almost in its
+ * plane the plane's range runs away: it is kept between the edges that the ray passes. NaN: it passes none, and meets
+ * nothing. */
 static double held_range(const struct decide_ray *ray, uint32_t prim, double v[3][3])
 {
     const double *n = ray->bvh->triangle[prim].n;
@@ -128,33 +83,6 @@ static void look_at(const struct decide_ray *ray, uint32_t prim, double v[3][3],
         vec3_sub(scene->vertex_m[scene->triangle[prim][i]], ray->station_m, v[i]);
     for (int i = 0; i < 3; i++)
         side[i] = edge_side(v[i], v[(i + 1) % 3], ray->dir);
-}
-
-/* How far the ray passes from the nearest edge, across the ray. */
-static double edge_distance(double v[3][3], const double side[3])
-{
-    double least = INFINITY;
-    for (int i = 0; i < 3; i++)
-        least = fmin(least, fabs(side[i]) / vec3_distance(v[i], v[(i + 1) % 3]));
-    return least;
-}
-
-static int is_inside(const double side[3])
-{
-    return (side[0] >= 0.0 && side[1] >= 0.0 && side[2] >= 0.0) || (side[0] <= 0.0 && side[1] <= 0.0 && side[2] <= 0.0);
-}
-
-/* The resolution of an edge's side in double precision. */
-static double blur(const double a[3], const double b[3])
-{
-    return 8.0 * 0x1p-53 * sqrt(fmax(vec3_dot(a, a), vec3_dot(b, b))) * vec3_distance(a, b);
-}
-
-/* A ray within the plane, as far as double precision shows, does not meet the triangle; what stands on its
- * edges it does. */
-static int is_edge_on(double v[3][3], const double side[3])
-{
-    return fabs(side[0] + side[1] + side[2]) <= blur(v[0], v[1]) + blur(v[1], v[2]) + blur(v[2], v[0]);
 }
 
 /* Whether the triangle has a hole where the ray is at that range. */
@@ -335,30 +263,48 @@ static void try_neighbours(struct search *s)
 /* How far around a hit its rivals are tried, in slacks. */
 enum { WIDE = 16 };
 
-/* Rivals whose planes the ray meets within what float can't order, and that are near the hit, are tried: those that
- * are known, or else what the BVH has there. In both cases the same ones. */
+/* Rivals whose planes the ray meets within what float can't order, and that are near the hit, are tried. */
+static struct rivalry begin_rivals(struct search *s, const struct decide_hit *hit)
+{
+    const struct rivalry own = rivalry_of(s->ray, hit->prim, hit->range_m);
+    s->proposed = hit->prim;
+    try_triangle(s, hit->prim);
+    set_ball(s, hit->range_m, WIDE * slack_m(s->ray, hit->prim, own.width_m));
+    return own;
+}
+
+static void end_rivals(struct search *s, const struct rivalry *own, struct decide_hit *hit)
+{
+    if (s->rivals == 0) return;
+    if (s->prim != hit->prim || !(s->border_m > own->width_m)) try_neighbours(s);
+    const struct decide_hit found = best_of(s);
+    if (found.prim != RTC_INVALID_GEOMETRY_ID) *hit = found;
+}
+
+static void try_listed(struct search *s, const struct rivalry *own, const uint32_t *prim, uint32_t n)
+{
+    for (uint32_t k = 0; k < n; k++) {
+        if (prim[k] == own->prim || !is_near(s, prim[k]) || !may_be_rival(s->ray, own, prim[k])) continue;
+        if (!is_close(s, prim[k])) continue;
+        s->rivals++;
+        try_triangle(s, prim[k]);
+    }
+}
+
+/* Those that are known, or else what the BVH has there: the same ones. */
 void decide_again(const struct decide_ray *ray, struct decide_hit *hit)
 {
     const struct bvh *bvh = ray->bvh;
     struct search s = search_for(ray);
-    const struct rivalry own = rivalry_of(ray, hit->prim, hit->range_m);
-    const double radius_m = WIDE * slack_m(ray, hit->prim, own.width_m);
-    s.proposed = hit->prim;
-    s.only = &own;
-    try_triangle(&s, hit->prim);
-    set_ball(&s, hit->range_m, radius_m);
-    if (!bvh->ordered) try_around(&s, hit->range_m, radius_m);
-    for (uint32_t k = bvh->ordered ? bvh->rival_first[hit->prim] : 0;
-         bvh->ordered && k < bvh->rival_first[hit->prim + 1]; k++) {
-        const uint32_t prim = bvh->rival[k];
-        if (!is_near(&s, prim) || !may_be_rival(ray, &own, prim) || !is_close(&s, prim)) continue;
-        s.rivals++;
-        try_triangle(&s, prim);
+    const struct rivalry own = begin_rivals(&s, hit);
+    if (!bvh->ordered) {
+        s.only = &own;
+        try_around(&s, hit->range_m, s.radius_m);
+    } else if (bvh->rival_first != NULL) {
+        const uint32_t first = bvh->rival_first[hit->prim];
+        try_listed(&s, &own, bvh->rival + first, bvh->rival_first[hit->prim + 1] - first);
     }
-    if (s.rivals == 0) return;
-    if (s.prim != hit->prim || !(s.border_m > own.width_m)) try_neighbours(&s);
-    const struct decide_hit found = best_of(&s);
-    if (found.prim != RTC_INVALID_GEOMETRY_ID) *hit = found;
+    end_rivals(&s, &own, hit);
 }
 
 static int has_rivals(const struct bvh *bvh, uint32_t prim)

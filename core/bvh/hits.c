@@ -211,14 +211,14 @@ void bvh_decide_among(struct bvh_work *work, const struct bvh *bvh, const struct
     put(&ray, &hit, rays, i);
 }
 
-void bvh_hits_ordered(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays)
+void bvh_hits_ordered(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays, const uint8_t *order)
 {
     struct decide_ray ray = ray_from(bvh, rays);
     bvh_hits(work, bvh, rays);
     if (bvh->ordered) return;
     for (uint32_t i = 0; i < rays->n; i++) {
         struct decide_hit hit = {rays->triangle[i], rays->range_m[i]};
-        if (hit.prim == RTC_INVALID_GEOMETRY_ID) continue;
+        if (!order[i] || hit.prim == RTC_INVALID_GEOMETRY_ID) continue;
         set_ray(&ray, rays, i);
         decide_again(&ray, &hit);
         rays->triangle[i] = hit.prim;

@@ -372,5 +372,7 @@ void plan_sample_sight(struct plan_sample *s, double cell_rad, struct plan_sight
                                            : &found->one) += 1.0;
     }
     if (n == 0) found->ask = n = 1;
+    found->few += 0.5 * found->ask; /* lists hold about half of those that look so */
+    found->ask *= 0.5;
     *found = (struct plan_sight_found){found->one / n, found->nothing / n, found->few / n, found->ask / n};
 }

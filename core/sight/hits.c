@@ -10,8 +10,9 @@ struct sight_work {
     struct sight_run run[HITS_ROOM];
     uint32_t triangle[HITS_ROOM]; /* of a run's rays */
     /* Rays that the BVH is asked for. */
-    uint8_t asks[HITS_ROOM]; /* 1: of the chunk's */
-    uint32_t ray[HITS_ROOM]; /* which ones are cast */
+    uint8_t asks[HITS_ROOM];  /* 1: of the chunk's */
+    uint32_t ray[HITS_ROOM];  /* which ones are cast */
+    uint8_t order[HITS_ROOM]; /* of those that are cast: 1 where it asks itself */
     double x[HITS_ROOM], y[HITS_ROOM], z[HITS_ROOM], range_m[HITS_ROOM];
     uint32_t met[HITS_ROOM], label[HITS_ROOM];
     float steep[HITS_ROOM];
@@ -86,14 +87,14 @@ static uint32_t do_runs(struct sight_work *w, struct bvh_work *bvh_work, const s
     return asked;
 }
 
-/* Which rays are cast for those that ask: in exact order themselves; else their whole packets, as bvh_hits would have
- * cut them from the chunk, so that the BVH proposes the same. */
+/* Which rays are cast for those that ask: their whole packets, as bvh_hits would have cut them from the chunk, so that
+ * the BVH proposes the same. */
 static uint32_t gather(struct sight_work *w, const struct sight *s, const struct bvh_rays *rays)
 {
     struct bvh_info info;
     uint32_t m = 0;
     bvh_get_info(s->bvh, &info);
-    const uint32_t packet = s->among ? 1 : info.packet;
+    const uint32_t packet = info.packet;
     for (uint32_t at = 0; at < rays->n; at += packet) {
         const uint32_t end = rays->n - at < packet ? rays->n : at + packet;
         uint32_t any = 0;
@@ -102,6 +103,8 @@ static uint32_t gather(struct sight_work *w, const struct sight *s, const struct
         for (uint32_t i = at; any && i < end; i++)
             w->ray[m++] = i;
     }
+    for (uint32_t k = 0; k < m; k++)
+        w->order[k] = w->asks[w->ray[k]];
     for (uint32_t k = 0; k < m; k++) {
         w->x[k] = rays->dir.x[w->ray[k]];
         w->y[k] = rays->dir.y[w->ray[k]];
@@ -121,7 +124,7 @@ static void ask_bvh(struct sight_work *w, struct bvh_work *bvh_work, const struc
                              .label = w->label,
                              .steep = rays->steep != NULL ? w->steep : NULL};
     if (s->exact)
-        bvh_hits_ordered(bvh_work, s->bvh, &asked);
+        bvh_hits_ordered(bvh_work, s->bvh, &asked, w->order);
     else
         bvh_hits(bvh_work, s->bvh, &asked);
     for (uint32_t k = 0; k < asked.n; k++) {

@@ -11,7 +11,27 @@
  *
  * A face has cells x cells squares, in tiles of SIGHT_TILE x SIGHT_TILE. A tile is one leaf, or a block of
  * leaves. Whoever looks a direction up may round its coordinates: each leaf holds SIGHT_PAD beyond its own
- * borders. */
+ * borders.
+ *
+ * Why a leaf says no more than is true. The hit of a ray, as core/bvh/decide.c has it, depends on the triangles
+ * that the ray meets or misses by less than double precision tells, and on where it meets their planes. So it
+ * is enough to show that all other triangles of the scene leave the hit as it is. A triangle is left out of a
+ * square only in one of three ways:
+ * - Beside it (bins.c, region.c): the side of one edge is below minus its doubt at the four corners of the square,
+ *   pad included. It is linear, so it is below that everywhere in the square: all rays miss the triangle, by more
+ *   than decide.c calls undecided. Regions hold every triangle whose corners are not all beyond one side of the
+ *   region's pyramid, which is wider than the region by some pads.
+ * - Behind (region.c): another one covers the square (all sides above their doubts at all corners, so every ray
+ *   passes inside), and its plane . d is larger at all corners by more than the doubts of both. So every ray comes
+ *   to it first, in whatever way its ranges are rounded. An edge that is nearly hit lies in its triangle's plane,
+ *   so it comes later as well.
+ * - Behind as a whole: where plane . d says nothing, since the plane is seen at a sine below SIGHT_GRAZE somewhere in
+ *   the square, the triangle's nearest point is further away than what covers the square is anywhere.
+ * What is left: one that covers is a leaf of its own; none at all is nothing; a few are decided ray by ray with the
+ * same doubts (few.c); where a doubt remains, core/bvh decides. Planes seen at a sine below SIGHT_GRAZE neither
+ * cover nor hide.
+ * Doubts are per unit length of a ray. A ray whose largest component is 1 is up to sqrt(3) long: over squares they
+ * count twice. */
 #ifndef CORE_SIGHT_SIGHT_INSIDE_H
 #define CORE_SIGHT_SIGHT_INSIDE_H
 

@@ -7,7 +7,7 @@
  * release, the time that a peer granted (pace step), and all wake-ups. It knows nothing of casting, of links
  * or of commands.
  *
- * Who is woken, and when. In real time a link is woken at each tick that it wants; casters once a quarter of the ticks
+ * Who is woken, and when. In real time a link is woken at each tick that it wants; casters once an eighth of the ticks
  * ahead is free, and the hash once an eighth of the queue was released: they have time. In the paces that wait for
  * readers nobody waits for a single tick. There wake-ups are saved up, and ticks pass from thread to thread in
  * batches. One rule keeps that from standing still: who is about to sleep first wakes all who may go on by what it

@@ -127,7 +127,7 @@ static void look_through_sight(struct look *look, int exact, uint32_t rays, stru
     tally->differ += beside.differ;
     for (int i = 0; i < ODD_PARTS; i++)
         tally->differ_by_part[i] += look->odd.parts >> i & 1 ? beside.differ : 0;
-    if (beside.differ != 0 && tally->wrong_scenes++ < 2000) {
+    if (beside.differ != 0 && tally->wrong_scenes++ < 20) {
         printf("# scene %llu, %u triangles, station %s, exact %d, BVH %.3g m off, for %.3g rays, %llu bytes, %u "
                "cells%s: %llu of %u rays differ\n",
                (unsigned long long)look->number, look->scene->n_triangles, look->odd.stands, exact, look->reach_m,

@@ -114,7 +114,7 @@ static void test_cast(void **state)
 
 /* 2,000 million pulses on one triangle each, of a head whose Embree takes 4 rays at once: a map saves dozens of ns. */
 static const struct plan_sight_need SIGHT = {
-    .pulses = 2e9, .share = 0.8, .n_triangles = 30000, .packet = 4, .memory_bytes = 64 << 20, .forced = -1};
+    .pulses = 2e9, .share = 0.8, .n_triangles = 30000, .packet = 4, .memory_bytes = 1 << 30, .forced = -1};
 static const struct plan_sight_found PLAIN = {.one = 0.95, .few = 0.05}, MIXED = {.few = 0.1, .ask = 0.9};
 
 static struct plan_sight_choice choose_sight(const struct plan_sight_need *need, const struct plan_sight_found *found,

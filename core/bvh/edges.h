@@ -1,0 +1,84 @@
+/* Private to core/bvh: on which side of a triangle's edges a ray passes, and how near, in double. Corners are relative
+ * to the ray's origin. */
+#ifndef CORE_BVH_EDGES_H
+#define CORE_BVH_EDGES_H
+
+#include <math.h>
+
+#include "core/vec3.h"
+
+static inline int before(const double a[3], const double b[3])
+{
+    for (int i = 0; i < 3; i++)
+        if (a[i] != b[i]) return a[i] < b[i];
+    return 0;
+}
+
+/* On which side of the edge a-b the ray passes, as the distance across the ray times the edge's length;
+ * corners relative to the ray's origin. Taken in one order of the corners whatever triangle asks, so that two
+ * triangles of an edge get the same number with opposite signs. */
+static inline double edge_side(const double a[3], const double b[3], const double dir[3])
+{
+    int swap = before(b, a);
+    const double *p = swap ? b : a, *q = swap ? a : b;
+    double e[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]};
+    double side = dir[0] * (p[1] * e[2] - p[2] * e[1]) + dir[1] * (p[2] * e[0] - p[0] * e[2]) +
+                  dir[2] * (p[0] * e[1] - p[1] * e[0]);
+    return swap ? -side : side;
+}
+
+/* Range along the ray of the point where it comes nearest to the segment. */
+static inline double edge_range(const double a[3], const double b[3], const double dir[3])
+{
+    double e[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+    double ee = vec3_dot(e, e), ed = vec3_dot(e, dir), ae = vec3_dot(a, e), ad = vec3_dot(a, dir),
+           dd = vec3_dot(dir, dir);
+    double det = ee * dd - ed * ed;
+    double s = det > 0.0 ? (ed * ad - dd * ae) / det : 0.0;
+    s = s < 0.0 ? 0.0 : s > 1.0 ? 1.0 : s;
+    return (ad + s * ed) / dd;
+}
+
+/* Distance of the point at range t on the ray from the segment. */
+static inline double edge_gap(const double a[3], const double b[3], const double dir[3], double t)
+{
+    double e[3], w[3];
+    for (int i = 0; i < 3; i++) {
+        e[i] = b[i] - a[i];
+        w[i] = t * dir[i] - a[i];
+    }
+    double s = vec3_dot(w, e) / vec3_dot(e, e);
+    s = s < 0.0 ? 0.0 : s > 1.0 ? 1.0 : s;
+    for (int i = 0; i < 3; i++)
+        w[i] -= s * e[i];
+    return sqrt(vec3_dot(w, w));
+}
+
+/* How far the ray passes from the nearest edge, across the ray. */
+static inline double edge_distance(double v[3][3], const double side[3])
+{
+    double least = INFINITY;
+    for (int i = 0; i < 3; i++)
+        least = fmin(least, fabs(side[i]) / vec3_distance(v[i], v[(i + 1) % 3]));
+    return least;
+}
+
+static inline int is_inside(const double side[3])
+{
+    return (side[0] >= 0.0 && side[1] >= 0.0 && side[2] >= 0.0) || (side[0] <= 0.0 && side[1] <= 0.0 && side[2] <= 0.0);
+}
+
+/* The resolution of an edge's side in double precision. */
+static inline double blur(const double a[3], const double b[3])
+{
+    return 8.0 * 0x1p-53 * sqrt(fmax(vec3_dot(a, a), vec3_dot(b, b))) * vec3_distance(a, b);
+}
+
+/* A ray within the plane, as far as double precision shows, does not meet the triangle; what stands on its
+ * edges it does. */
+static inline int is_edge_on(double v[3][3], const double side[3])
+{
+    return fabs(side[0] + side[1] + side[2]) <= blur(v[0], v[1]) + blur(v[1], v[2]) + blur(v[2], v[0]);
+}
+
+#endif
