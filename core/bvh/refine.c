@@ -128,7 +128,6 @@ enum { LANES = 8 };
 typedef double lanes __attribute__((vector_size(LANES * sizeof(double))));
 typedef float float_lanes __attribute__((vector_size(LANES * sizeof(float))));
 typedef uint32_t number_lanes __attribute__((vector_size(LANES * sizeof(uint32_t))));
-typedef float lanes_f __attribute__((vector_size(LANES * sizeof(float))));
 
 /* A plane, and where rays meet it. */
 struct one_plane {

@@ -90,6 +90,12 @@ static void find_seen(struct build_shared *b)
             }
 }
 
+static void count(struct build_shared *b, uint32_t region, uint32_t triangle)
+{
+    b->bin[region + 1]++;
+    b->kept[triangle]++;
+}
+
 /* Counts triangle by region into bin, or, after that, writes it there. */
 static void put(struct build_shared *b, uint32_t triangle, int write)
 {
@@ -105,7 +111,7 @@ static void put(struct build_shared *b, uint32_t triangle, int write)
                 if (write)
                     b->binned[b->bin[at]++] = triangle;
                 else
-                    b->bin[at + 1]++;
+                    count(b, at, triangle);
             }
     }
 }
@@ -126,14 +132,17 @@ int build_bins(struct build_shared *b, struct sh_err *err)
     const uint32_t regions = SIGHT_FACES * b->regions * b->regions;
     b->seen = malloc(regions);
     b->bin = calloc((size_t)regions + 2, sizeof *b->bin);
-    if (b->seen == NULL || b->bin == NULL) return sh_fail(err, SH_ENOMEM, "sight: no memory for %u regions", regions);
+    b->kept = calloc((size_t)bvh_scene(b->sight->bvh)->n_triangles + 1, sizeof *b->kept);
+    if (b->seen == NULL || b->bin == NULL || b->kept == NULL)
+        return sh_fail(err, SH_ENOMEM, "sight: no memory for %u regions", regions);
     find_seen(b);
     /* Counted one place too far, so that each region's begin moves to its end while it is filled. */
     b->bin++;
     int rc = put_all(b, 0, err);
     for (uint32_t i = 0; i < regions; i++)
         b->bin[i + 1] += b->bin[i];
-    const uint64_t bytes = b->bin[regions] * sizeof *b->binned;
+    const uint64_t bytes =
+        b->bin[regions] * sizeof *b->binned + bvh_scene(b->sight->bvh)->n_triangles * sizeof *b->kept;
     if (b->bytes + bytes > b->spec->memory_bytes) {
         memset(b->seen, 0, regions);
         memset(b->bin, 0, (regions + 1) * sizeof *b->bin);

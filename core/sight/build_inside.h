@@ -14,6 +14,7 @@
 enum {
     BUILD_REGIONS = 16, /* along an edge of a face, at most */
     BUILD_NO_RECORD = 0xffffffff,
+    BUILD_NOT_KEPT = 0xffffffff,
 };
 
 /* A triangle in a region: functions linear in u and v, as constant and slopes f[0] + f[1] u + f[2] v. What they
@@ -37,13 +38,15 @@ struct build_shared {
     struct sight *sight;
     const struct sight_spec *spec;
     const struct sh_report *report;
-    uint32_t regions, region_cells; /* along an edge of a face; cells along an edge of a region */
-    uint8_t *seen;                  /* [regions of all faces] 0: no ray goes there */
-    uint64_t *bin;                  /* [regions of all faces + 1] of binned */
-    uint32_t *binned;               /* triangles by region */
-    _Atomic uint32_t next;          /* region to be divided */
-    _Atomic uint64_t bytes;         /* taken, of spec->memory_bytes */
-    _Atomic uint64_t given_back;    /* of these, when all is done */
+    uint32_t regions, region_cells;  /* along an edge of a face; cells along an edge of a region */
+    struct build_candidate *figures; /* of triangles in many regions, in prcs, without slopes */
+    uint32_t *kept;                  /* [of all triangles] place in figures, or BUILD_NOT_KEPT; NULL: none are kept */
+    uint8_t *seen;                   /* [regions of all faces] 0: no ray goes there */
+    uint64_t *bin;                   /* [regions of all faces + 1] of binned */
+    uint32_t *binned;                /* triangles by region */
+    _Atomic uint32_t next;           /* region to be divided */
+    _Atomic uint64_t bytes;          /* taken, of spec->memory_bytes */
+    _Atomic uint64_t given_back;     /* of these, when all is done */
     struct build_arena leaf, list, record;
     _Atomic uint64_t cells[4]; /* by what they say: one, nothing, few, ask */
     _Atomic int failed;        /* SH_ENOMEM, SH_ESTOPPED */
@@ -58,8 +61,10 @@ int build_bins(struct build_shared *b, struct sh_err *err);
 /* ---- candidate.c */
 /* Corners relative to the station. */
 void sight_corners(const struct sight *sight, uint32_t triangle, double v[3][3]);
+/* Figures of triangles in many regions, ahead. */
+void build_figures(struct build_shared *b);
 /* False where no ray meets the triangle: it has no area, or another one stands for it. */
-int build_candidate(const struct sight *sight, uint32_t face, uint32_t triangle, struct build_candidate *c);
+int build_candidate(const struct build_shared *b, uint32_t face, uint32_t triangle, struct build_candidate *c);
 void build_record(const struct build_candidate *c, uint32_t face, struct sight_record *r);
 
 /* ---- region.c */

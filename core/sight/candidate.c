@@ -1,8 +1,13 @@
 /* The figures of a triangle as seen from the station: where it is, how far, and how well that is known. */
 #include <math.h>
+#include <stdlib.h>
+#include <string.h>
 
 #include "core/sight/build_inside.h"
 #include "core/vec3.h"
+
+/* Of triangles that lie in so many regions the figures are kept, where they take no larger share of the memory. */
+enum { MANY_REGIONS = 4, FIGURES_SHARE = 8 };
 
 void sight_corners(const struct sight *sight, uint32_t triangle, double v[3][3])
 {
@@ -29,16 +34,16 @@ static void from_face(const double f[3], uint32_t face, double out[3])
 }
 
 /* The side of edge a-b, in units of its doubt (sight_inside.h), which is border_m across the ray at least. */
-static void set_edge(const double a[3], const double b[3], double sign, double border_m, uint32_t face, double out[3])
+static void set_edge(const double a[3], const double b[3], double sign, double border_m, double side[3])
 {
-    double e[3], side[3];
+    double e[3];
     vec3_sub(b, a, e);
     vec3_cross(a, e, side);
-    const double far_m = sqrt(fmax(vec3_dot(a, a), vec3_dot(b, b)));
-    const double scale = sign / (fmax(SIGHT_EDGE_DOUBT * far_m, border_m) * vec3_length(e));
+    const double aa = vec3_dot(a, a), bb = vec3_dot(b, b), far_m = sqrt(aa > bb ? aa : bb);
+    const double doubt_m = SIGHT_EDGE_DOUBT * far_m, least_m = doubt_m > border_m ? doubt_m : border_m;
+    const double scale = sign / (least_m * vec3_length(e));
     for (int i = 0; i < 3; i++)
         side[i] *= scale;
-    to_face(side, face, out);
 }
 
 /* How far the BVH's float distance may be wrong, as a share of the distance times the height of the station above
@@ -56,7 +61,7 @@ static double float_doubt_m(double v[3][3], double area2, const double o_local[3
     return SIGHT_FLOAT_DOUBT * (far_m + product / (longest * area2) * (longest + 0.05 * far_m));
 }
 
-static int set_plane(const struct sight *sight, struct build_candidate *c, double v[3][3], uint32_t face)
+static int set_plane(const struct sight *sight, struct build_candidate *c, double v[3][3])
 {
     const struct bvh_plane *p = bvh_plane(sight->bvh, c->triangle);
     double origin_m[3], o_local[3], m[3];
@@ -68,12 +73,11 @@ static int set_plane(const struct sight *sight, struct build_candidate *c, doubl
     for (int i = 0; i < 3; i++)
         m[i] = p->n[i] / off;
     if (!(vec3_length(m) < 1e300)) { /* the station lies in the plane: to be decided wherever its edges don't say */
-        c->plane[0] = c->plane[1] = c->plane[2] = c->plane_slope = c->slack = c->rel = 0.0;
+        c->plane[0] = c->plane[1] = c->plane[2] = c->slack = c->rel = 0.0;
         c->graze = 1e300;
         return 1;
     }
-    to_face(m, face, c->plane);
-    c->plane_slope = fabs(c->plane[1]) + fabs(c->plane[2]);
+    memcpy(c->plane, m, sizeof m);
     c->slack = SIGHT_PLANE_DOUBT / height_m;
     c->graze = SIGHT_GRAZE / height_m;
     const double rel = float_doubt_m(v, length, o_local) / height_m;
@@ -89,7 +93,7 @@ static int set_plane(const struct sight *sight, struct build_candidate *c, doubl
  *   be it that the plane is where the station is up to rounding.
  * - Those past the longest edge by no more than the triangle is wide: inside, the sides of all three edges together
  *   are n . d, and have one sign. */
-static void set_strip(const struct sight *sight, struct build_candidate *c, double v[3][3], uint32_t face)
+static void set_strip(const struct sight *sight, struct build_candidate *c, double v[3][3])
 {
     const struct bvh_plane *p = bvh_plane(sight->bvh, c->triangle);
     double e[3], side[3], far_m = 0.0, longest = 0.0;
@@ -110,37 +114,84 @@ static void set_strip(const struct sight *sight, struct build_candidate *c, doub
         e[i] = slim ? side[i] * past : p->n[i] / (area2 * sine);
     for (int i = 0; i < 3; i++) {
         for (int j = 0; j < 3; j++)
-            side[j] = i == 1 ? -e[j] : e[j];
-        to_face(side, face, c->edge[i]);
+            c->edge[i][j] = i == 1 ? -e[j] : e[j];
     }
 }
 
-int build_candidate(const struct sight *sight, uint32_t face, uint32_t triangle, struct build_candidate *c)
+/* The figures in prcs. False where no ray meets the triangle: it has no area, or another one stands for it. */
+static int find_figures(const struct sight *sight, uint32_t triangle, struct build_candidate *c)
 {
     double v[3][3], n[3], longest2 = 0.0, near2 = INFINITY;
     c->triangle = triangle;
     c->record = BUILD_NO_RECORD;
     sight_corners(sight, triangle, v);
-    if (bvh_is_twin(sight->bvh, triangle) || !set_plane(sight, c, v, face)) return 0;
+    if (bvh_is_twin(sight->bvh, triangle) || !set_plane(sight, c, v)) return 0;
     vec3_cross(v[1], v[2], n);
     const double volume = vec3_dot(v[0], n), sign = volume < 0.0 ? -1.0 : 1.0;
     double doubt = SIGHT_VOLUME_DOUBT * vec3_length(v[0]) * vec3_length(v[1]) * vec3_length(v[2]);
     const double border_m = bvh_border_m(sight->bvh, triangle, sight->station_m);
     for (int i = 0; i < 3; i++) {
         double e[3];
-        set_edge(v[i], v[(i + 1) % 3], sign, border_m, face, c->edge[i]);
-        c->edge_slope[i] = fabs(c->edge[i][1]) + fabs(c->edge[i][2]);
-        if (!(c->edge_slope[i] < INFINITY)) return 0; /* two corners in one place: no area */
+        set_edge(v[i], v[(i + 1) % 3], sign, border_m, c->edge[i]);
+        if (!(fabs(c->edge[i][0]) + fabs(c->edge[i][1]) + fabs(c->edge[i][2]) < INFINITY))
+            return 0; /* two corners in one place: no area */
         vec3_sub(v[(i + 1) % 3], v[i], e);
         longest2 = fmax(longest2, vec3_dot(e, e));
         near2 = fmin(near2, vec3_dot(v[i], v[i]));
     }
     doubt += SIGHT_TILT_DOUBT * sqrt(longest2) * vec3_length(bvh_plane(sight->bvh, triangle)->n);
-    if (!(fabs(volume) > doubt)) set_strip(sight, c, v, face);
-    for (int i = 0; i < 3; i++)
-        c->edge_slope[i] = fabs(c->edge[i][1]) + fabs(c->edge[i][2]);
+    if (!(fabs(volume) > doubt)) set_strip(sight, c, v);
     c->near_m = fmax(0.0, (sqrt(near2) - sqrt(longest2)) * (1.0 - 1e-12));
     return 1;
+}
+
+/* The same in the coordinates of a face. */
+static void turn(const struct build_candidate *from, uint32_t face, struct build_candidate *c)
+{
+    *c = *from;
+    for (int i = 0; i < 3; i++) {
+        to_face(from->edge[i], face, c->edge[i]);
+        c->edge_slope[i] = fabs(c->edge[i][1]) + fabs(c->edge[i][2]);
+    }
+    to_face(from->plane, face, c->plane);
+    c->plane_slope = fabs(c->plane[1]) + fabs(c->plane[2]);
+}
+
+int build_candidate(const struct build_shared *b, uint32_t face, uint32_t triangle, struct build_candidate *c)
+{
+    struct build_candidate figures;
+    const uint32_t kept = b->kept == NULL ? BUILD_NOT_KEPT : b->kept[triangle];
+    if (kept == BUILD_NOT_KEPT) {
+        if (!find_figures(b->sight, triangle, &figures)) return 0;
+        turn(&figures, face, c);
+        return 1;
+    }
+    if (b->figures[kept].triangle == BVH_NO_TRIANGLE) return 0;
+    turn(&b->figures[kept], face, c);
+    return 1;
+}
+
+/* kept[i] is how many regions a triangle lies in; it becomes its place in figures. */
+void build_figures(struct build_shared *b)
+{
+    const uint32_t n = bvh_scene(b->sight->bvh)->n_triangles;
+    uint32_t places = 0;
+    for (uint32_t i = 0; i < n; i++)
+        b->kept[i] = b->kept[i] >= MANY_REGIONS ? places++ : BUILD_NOT_KEPT;
+    const uint64_t bytes = places * sizeof *b->figures;
+    if (bytes <= b->spec->memory_bytes / FIGURES_SHARE) b->figures = malloc(bytes + 1);
+    if (b->figures == NULL) {
+        free(b->kept);
+        b->kept = NULL;
+        return;
+    }
+    b->bytes += bytes;
+    b->given_back += bytes;
+    for (uint32_t i = 0; i < n; i++) {
+        const uint32_t at = b->kept[i];
+        if (at != BUILD_NOT_KEPT && !find_figures(b->sight, i, &b->figures[at]))
+            b->figures[at].triangle = BVH_NO_TRIANGLE;
+    }
 }
 
 void build_record(const struct build_candidate *c, uint32_t face, struct sight_record *r)

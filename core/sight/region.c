@@ -345,7 +345,7 @@ static int gather(struct build_shared *b, struct build_work *w, uint32_t region,
         !grow(&w->stack, &w->stack_room, stacked(b, n), sizeof *w->stack))
         return SH_ENOMEM;
     for (uint64_t i = b->bin[region]; i < b->bin[region + 1]; i++)
-        w->n += (size_t)build_candidate(b->sight, face, b->binned[i], &w->candidate[w->n]);
+        w->n += (size_t)build_candidate(b, face, b->binned[i], &w->candidate[w->n]);
     for (uint32_t i = 0; i < w->n; i++)
         w->stack[i] = i;
     return SH_OK;

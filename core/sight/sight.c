@@ -103,6 +103,23 @@ static void *keep(void *array, uint64_t used, uint64_t size)
     return kept != NULL ? kept : array;
 }
 
+/* Records begin at cache lines, which realloc does not promise. Room that is not given back is resident once the head
+ * locks its memory (mlockall), though nobody touches it. */
+static int keep_records(struct build_shared *b, struct sh_err *err)
+{
+    struct sight *s = b->sight;
+    const uint64_t bytes = b->record.used * sizeof *s->record;
+    s->record = keep(s->record, b->record.used, sizeof *s->record);
+    if ((uintptr_t)s->record % sizeof *s->record == 0) return SH_OK;
+    struct sight_record *aligned = aligned_alloc(sizeof *s->record, bytes + sizeof *s->record);
+    if (aligned == NULL)
+        return sh_fail(err, SH_ENOMEM, "sight: no memory for %llu triangles", (unsigned long long)b->record.used);
+    memcpy(aligned, s->record, bytes);
+    free(s->record);
+    s->record = aligned;
+    return SH_OK;
+}
+
 static void finish(struct build_shared *b)
 {
     struct sight *s = b->sight;
@@ -128,9 +145,13 @@ static int build(struct build_shared *b, unsigned threads, struct sh_err *err)
 {
     int rc = take_arrays(b, err);
     if (rc == SH_OK) rc = build_bins(b, err);
+    if (rc == SH_OK) build_figures(b);
     if (rc == SH_OK) rc = build_all(b, threads, err);
+    if (rc == SH_OK) rc = keep_records(b, err);
     if (rc == SH_OK) finish(b);
     free(b->seen);
+    free(b->figures);
+    free(b->kept);
     free(b->bin);
     free(b->binned);
     return rc;
