@@ -77,7 +77,7 @@ do for [out in "svg png"] {
             for [k = 1:n] of(k, y, "") . best using 1:2 with lines lc rgb colour[k] lw 2.5 dt 2 notitle, \
             for [k = 1:n] of(k, y, "") using 1:2 with points pt symbol[k] ps 2.2 lw 1.5 lc rgb colour[k] notitle, \
             for [k = 1:n:2] of(k, y, " && $2 == \"single\"") using 1:2:3 with labels offset 0, 0.9 font ",17" notitle, \
-            for [k = 1:n] of(k, y, " && $2 == \"adaptive\"") using 1:2:3 with labels left offset 1.2, (k == 1 ? 0.5 : -0.8) \
+            for [k = 1:n] of(k, y, " && $2 == \"adaptive\"") using 1:2:3 with labels left offset 0.5, -0.8 \
             font ",17" tc rgb colour[k] notitle, \
             for [k = 1:n] NaN with points pt symbol[k] ps 2.6 lc rgb colour[k] title word(scenes, k), \
             for [k = 1:n] of(k, y, " && $8 == 1") using 1:2 with points pt 6 ps 5 lw 3.5 lc rgb "#000000" notitle
