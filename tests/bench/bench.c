@@ -41,7 +41,7 @@ static int measure_stages(const struct bench_options *o, const struct bench_case
     return rc;
 }
 
-/* Of small scenes a scan costs little anyway, and in huge ones the first pulse is long cast when a map is built. */
+/* The smallest scene shows nothing that the next one doesn't; the largest takes too long to look at 15 times. */
 static const char *scans_of(const struct bench_options *o, const struct bench_target *target)
 {
     const uint32_t triangles = target->scene->n_triangles;

@@ -21,7 +21,7 @@ int bench_scan_sees(const void *ctx, const double dir[3], double radius_rad);
 /* What a sight is made of for it. */
 void bench_scan_spec(const struct bench_scan *scan, const struct bvh *bvh, const double station_m[3], int exact,
                      struct sight_spec *out);
-/* What the plan takes for it, where surfaces are ordered in double if that costs nothing (scene.order_exactly: auto). */
+/* What the plan takes for it. Surfaces are ordered in double where that is free (scene.order_exactly: auto). */
 int bench_scan_plan(const struct bench_scan *scan, const struct bvh *bvh, const double station_m[3],
                     struct plan_sight_choice *choice, struct sh_err *err);
 double bench_process_s(void); /* processor time of all threads */
