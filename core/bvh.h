@@ -56,8 +56,9 @@ const struct bvh_plane *bvh_plane(const struct bvh *bvh, uint32_t triangle);
 /* 1: a face of the same corners with a lower number stands for this triangle, which is never met. */
 int bvh_is_twin(const struct bvh *bvh, uint32_t triangle);
 
-/* So near to a border of a triangle, across the ray, the BVH may miss what a ray from a station really meets: one that
- * sees the triangle at a smaller angle than its origin does. 0: nothing is missed. */
+/* Width of the strip along a triangle's borders, across the ray, where the BVH may miss what a ray from that station
+ * really meets. 0: it misses nothing. More only where the station sees the triangle at a smaller angle than the BVH's
+ * origin does. */
 double bvh_border_m(const struct bvh *bvh, uint32_t triangle, const double station_m[3]);
 
 enum {

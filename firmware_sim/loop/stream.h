@@ -77,8 +77,8 @@ struct stream {
     struct bell pace;        /* for the pacing thread, in the paces that wait: a tick is ready, or a reader went on */
     _Atomic uint64_t wanted; /* the pacing thread sleeps until a reader has come to this tick; UINT64_MAX: it doesn't */
     /* of the pacing thread alone */
-    uint64_t unsaid;     /* ticks that were released, and casters (or in the paces that wait: nobody) was woken since */
-    uint64_t say_ticks;  /* when it is so many, they are */
+    uint64_t unsaid;     /* ticks released since casters were last woken; in the paces that wait: since anybody was */
+    uint64_t say_ticks;  /* after so many they are woken */
     uint64_t lazy_ticks; /* an eighth of the queue */
     uint32_t n_casters;
     struct stream_listener listener[STREAM_MAX_LISTENERS];

@@ -32,7 +32,7 @@ struct seen_room {
 void seen_room_open(struct seen_room *room, uint64_t seed, const double at_m[3]);
 void seen_room_close(struct seen_room *room);
 
-/* Casts all lines both ways: what is told must be the same, bit by bit. Returns the number of echoes. */
+/* Casts all lines both ways, and compares the blocks: each bit must be the same. Returns the number of echoes. */
 uint64_t seen_room_compare(struct seen_room *room, const struct cast_setup *without, const struct cast_setup *with);
 
 #endif
