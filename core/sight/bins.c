@@ -18,14 +18,13 @@ struct range {
 /* Whether all corners lie beyond one of the pyramid's four sides, or behind the station. a, b across, w along.
  * Corners that touch a side count as within: what is seen edge-on may be met a little beside its end (SIGHT_TILT_DOUBT,
  * over the sine of 1e-6 below which core/bvh holds ranges between edges). */
-static int is_beside(const double w[3], const double a[3], const double b[3])
+static int is_beside(const double w[3], const double a[3], const double b[3], double far_m)
 {
+    const double behind = -BESIDE * far_m;
     int out = 31;
-    double far_m = 0.0;
-    for (int i = 0; i < 3; i++)
-        far_m = fmax(far_m, fmax(fabs(w[i]), fmax(fabs(a[i]), fabs(b[i]))));
+    if (w[0] < behind && w[1] < behind && w[2] < behind) return 1;
     for (int i = 0; i < 3; i++) {
-        const double k = WIDER * w[i] + BESIDE * far_m, behind = -BESIDE * far_m;
+        const double k = WIDER * w[i] + BESIDE * far_m;
         out &= (a[i] > k) | (-a[i] > k) << 1 | (b[i] > k) << 2 | (-b[i] > k) << 3 | (w[i] < behind) << 4;
     }
     return out != 0;
@@ -37,27 +36,46 @@ static uint32_t region_at(double x, uint32_t regions)
     return at <= 0.0 ? 0 : at >= regions ? regions - 1 : (uint32_t)at;
 }
 
+static inline double least(double a, double b, double c)
+{
+    const double ab = a < b ? a : b;
+    return ab < c ? ab : c;
+}
+
+static inline double most(double a, double b, double c)
+{
+    return -least(-a, -b, -c);
+}
+
 static void across(const double w[3], const double a[3], uint32_t regions, uint32_t *from, uint32_t *to)
 {
-    double lo = INFINITY, hi = -INFINITY;
-    for (int i = 0; i < 3; i++) {
-        lo = fmin(lo, a[i] / w[i]);
-        hi = fmax(hi, a[i] / w[i]);
-    }
+    const double at[3] = {a[0] / w[0], a[1] / w[1], a[2] / w[2]};
+    const double lo = least(at[0], at[1], at[2]), hi = most(at[0], at[1], at[2]);
     *from = region_at(lo - 4.0 * SIGHT_PAD, regions);
     *to = region_at(hi + 4.0 * SIGHT_PAD, regions);
 }
 
+/* The largest of all coordinates. */
+static double farthest(double v[3][3])
+{
+    double far_m = 0.0;
+    for (int i = 0; i < 3; i++) {
+        const double m = most(fabs(v[i][0]), fabs(v[i][1]), fabs(v[i][2]));
+        far_m = m > far_m ? m : far_m;
+    }
+    return far_m;
+}
+
 /* All of the face's regions where a corner lies behind the station, or almost. */
-static int range_of(double v[3][3], uint32_t face, uint32_t regions, struct range *r)
+static int range_of(double v[3][3], double far_m, uint32_t face, uint32_t regions, struct range *r)
 {
     const uint32_t axis = face / 2, n1 = (axis + 1) % 3, n2 = (axis + 2) % 3;
     const double sign = face & 1 ? -1.0 : 1.0;
     const double w[3] = {sign * v[0][axis], sign * v[1][axis], sign * v[2][axis]};
     const double a[3] = {v[0][n1], v[1][n1], v[2][n1]}, b[3] = {v[0][n2], v[1][n2], v[2][n2]};
-    if (is_beside(w, a, b)) return 0;
+    if (is_beside(w, a, b, far_m)) return 0;
     *r = (struct range){0, regions - 1, 0, regions - 1};
-    const double near_w = fmin(w[0], fmin(w[1], w[2])), far_w = fmax(w[0], fmax(w[1], w[2]));
+    const double near_w = least(w[0], w[1], w[2]), far_w = most(w[0], w[1], w[2]);
     if (!(near_w > 1e-5 * far_w)) return 1;
     across(w, a, regions, &r->u0, &r->u1);
     across(w, b, regions, &r->v0, &r->v1);
@@ -102,8 +120,9 @@ static void put(struct build_shared *b, uint32_t triangle, int write)
     double v[3][3];
     struct range r;
     sight_corners(b->sight, triangle, v);
+    const double far_m = farthest(v);
     for (uint32_t face = 0; face < SIGHT_FACES; face++) {
-        if (!range_of(v, face, b->regions, &r)) continue;
+        if (!range_of(v, far_m, face, b->regions, &r)) continue;
         for (uint32_t j = r.v0; j <= r.v1; j++)
             for (uint32_t i = r.u0; i <= r.u1; i++) {
                 const uint32_t at = region_number(b, face, i, j);

@@ -69,12 +69,38 @@ static void do_few(struct sight_work *w, struct bvh_work *bvh_work, const struct
     }
 }
 
+/* What a run needs lies anywhere: where the map is larger than the cache each would wait for it. So it is asked for
+ * ahead; first of lists how long they are, then their records. */
+enum { LISTS_AHEAD = 12, RECORDS_AHEAD = 6, RECORDS_EACH = 4 };
+
+static inline void ask_list(const struct sight *s, const struct sight_run *run)
+{
+    if (sight_kind(run->leaf) == SIGHT_FEW)
+        __builtin_prefetch(&s->list[run->leaf & SIGHT_NUMBER]);
+    else if (sight_kind(run->leaf) == SIGHT_ONE)
+        __builtin_prefetch(bvh_plane(s->bvh, run->leaf));
+}
+
+static inline void ask_records(const struct sight *s, const struct sight_run *run)
+{
+    if (sight_kind(run->leaf) != SIGHT_FEW) return;
+    const uint32_t *list = &s->list[run->leaf & SIGHT_NUMBER], n = list[0] < RECORDS_EACH ? list[0] : RECORDS_EACH;
+    for (uint32_t k = 0; k < n; k++) {
+        const char *record = (const char *)&s->record[list[1 + k]];
+        __builtin_prefetch(record);
+        __builtin_prefetch(record + 64);
+    }
+}
+
 /* Later runs after earlier ones: bvh_ranges_of says why. */
 static uint32_t do_runs(struct sight_work *w, struct bvh_work *bvh_work, const struct sight *s,
                         const struct bvh_rays *rays, uint32_t runs)
 {
+    const struct sight_run *last = w->run + runs - 1;
     uint32_t asked = 0;
-    for (const struct sight_run *run = w->run; run < w->run + runs; run++) {
+    for (const struct sight_run *run = w->run; run <= last; run++) {
+        ask_list(s, last - run > LISTS_AHEAD ? run + LISTS_AHEAD : last);
+        ask_records(s, last - run > RECORDS_AHEAD ? run + RECORDS_AHEAD : last);
         if (run->leaf == SIGHT_ASK) {
             ask(w, run->from, run[1].from, &asked);
         } else if (sight_kind(run->leaf) == SIGHT_FEW) {

@@ -99,7 +99,8 @@ VEC_INLINE void find_covers(const struct build_work *w, const struct seen *in, s
         better &= covers & (quad_mask)(e > first);
         choose(&better, &e, &first);
         cover = (((quad_mask){number, number, number, number}) & better) | (cover & ~better);
-        w->where[i] = (uint8_t)(bits_of(&outside) | bits_of(&covers) << COVERS_SHIFT);
+        outside = (outside & (quad_mask){1, 2, 4, 8}) | (covers & (quad_mask){16, 32, 64, 128});
+        w->where[i] = (uint8_t)(outside[0] | outside[1] | outside[2] | outside[3]);
     }
     four->first = first;
     four->cover = cover;
@@ -147,7 +148,7 @@ static void look(const struct build_work *w, const struct seen *in, struct quart
 {
     uint32_t n[4] = {0, 0, 0, 0};
     find_covers(w, in, four);
-    const int hides = take_covers(w, four) && in->n > 1;
+    const int hides = in->n > 1 && take_covers(w, four);
     for (uint32_t i = 0; i < in->n; i++) {
         const uint32_t number = in->list[i] & ~(uint32_t)COVERS, where = w->where[i];
         uint32_t gone = where & OUTSIDE_BITS;
