@@ -147,10 +147,6 @@ void bvh_ranges_each(const struct bvh *bvh, const uint32_t *triangle, const stru
                      uint32_t to);
 /* The range of one plane along a ray, by the same arithmetic. */
 double bvh_range_of(const struct bvh *bvh, uint32_t triangle, const double at_m[3], const double dir[3]);
-/* Ray i met one of these triangles, or none. All are tried in double, as a proposal in doubt is: the nearest
- * wins, and within 1e-12 of its range the lowest number. */
-void bvh_decide_among(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays, uint32_t i,
-                      const uint32_t *triangle, uint32_t n);
 /* bvh_hits as if bvh_order_exactly had been called: what lies near each hit is looked for in the BVH, ray by
  * ray. Some microseconds a ray. order[i] 0: ray i is only cast along with the others of its packet. */
 void bvh_hits_ordered(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays, const uint8_t *order);

@@ -84,7 +84,8 @@ struct bvh {
     /* Rivals of triangle i: rival[rival_first[i] .. rival_first[i + 1]), none of a miss. NULL: there are none. */
     int ordered; /* bvh_order_exactly was called */
     uint32_t *rival_first, *rival;
-    uint64_t *twin; /* bits: a face of the same corners stands for this one; NULL: for none */
+    uint64_t *twin;         /* bits: a face of the same corners stands for this one; NULL: for none */
+    double widest_m;        /* the largest bvh_width_m */
     double station_reach_m; /* rays begin at most this far from the origin */
     struct bvh_info info;
     int64_t bytes; /* as Embree reports */
@@ -157,6 +158,10 @@ int bvh_drop_twins(struct bvh *bvh, float *vertex, const struct sh_report *repor
 int bvh_are_rivals(const struct bvh *bvh, uint32_t i, uint32_t j);
 
 /* ---- refine.c */
+enum bvh_doubt {
+    BVH_DOUBT_BORDER = 1, /* the hit is so near to the border, across the ray, that the proposal is in doubt */
+    BVH_DOUBT_ORDER = 2,  /* the triangle has rivals */
+};
 /* What Embree proposed, and what double precision makes of it. */
 struct bvh_proposals {
     const struct bvh *bvh;
@@ -168,7 +173,7 @@ struct bvh_proposals {
     double *range_m; /* out: (d - n . o) / (n . dir) of the proposed triangle's plane; NaN for none */
     uint32_t *label; /* out: of the proposed triangle; BVH_NO_LABEL for none */
     float *steep;    /* out: 1 / cos^2 of the incidence, for rays from one point; NULL: not asked for */
-    uint32_t *doubt; /* out: 1 where the hit is so near to the border, across the ray, that the proposal is in doubt */
+    uint32_t *doubt; /* out: enum bvh_doubt */
 };
 /* Returns how many are in doubt. */
 uint32_t bvh_refine(const struct bvh_proposals *proposals);
@@ -199,9 +204,6 @@ void decide_prefetch(const struct bvh *bvh, const uint32_t *prim, const uint32_t
  * nor what else is tried that lies behind. */
 void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct bvh_counters *counters,
                 struct decide_hit *hit);
-/* Among these triangles alone. */
-void decide_among(const struct decide_ray *ray, const uint32_t *prim, uint32_t n, struct bvh_counters *counters,
-                  struct decide_hit *hit);
 /* Whether a rival is met before a hit. Rivals need not be known. */
 void decide_again(const struct decide_ray *ray, struct decide_hit *hit);
 

@@ -12,6 +12,7 @@ enum { MOST_TIED = 8 };
 struct rivalry {
     uint32_t prim;
     double range_m, width_m, steep; /* 1 / the cosine of the incidence */
+    double reach;                   /* how far around the hit a rival is tried, against the larger width of the two */
 };
 
 struct search {
@@ -139,12 +140,21 @@ static void note_hit(struct search *s, uint32_t prim, double range_m, double bor
     }
 }
 
+/* A ray from a corner begins on the surface, and meets it nowhere else. The sides of two edges are 0 there, whatever
+ * way it goes, and the plane's range is what rounding leaves. */
+static int begins_at_corner(double v[3][3])
+{
+    for (int i = 0; i < 3; i++)
+        if (v[i][0] == 0.0 && v[i][1] == 0.0 && v[i][2] == 0.0) return 1;
+    return 0;
+}
+
 /* Returns whether the ray meets it. */
 static int try_triangle(struct search *s, uint32_t prim)
 {
     double v[3][3], side[3];
     look_at(s->ray, prim, v, side);
-    if (is_edge_on(v, side)) return 0;
+    if (is_edge_on(v, side) || begins_at_corner(v)) return 0;
     if (!is_inside(side)) {
         note_miss(s, prim, v, side);
         return 0;
@@ -155,11 +165,29 @@ static int try_triangle(struct search *s, uint32_t prim)
     return 1;
 }
 
+/* How far from the proposed point along the ray an edge's neighbours may be met, and the plane itself: the
+ * width, stretched by the incidence. */
+static double slack_m(const struct decide_ray *ray, uint32_t prim, double width_m)
+{
+    const struct bvh_plane *tri = &ray->bvh->triangle[prim];
+    double cosine = fabs(vec3_dot(tri->n, ray->dir)) / sqrt(vec3_dot(tri->n, tri->n));
+    return 4.0 * width_m * (1.0 + 1.0 / fmax(cosine, 1e-6));
+}
+
+/* How far around a hit its rivals are tried, in slacks. */
+enum { WIDE = 16 };
+
 static struct rivalry rivalry_of(const struct decide_ray *ray, uint32_t prim, double range_m)
 {
     const double *n = ray->bvh->triangle[prim].n;
     return (struct rivalry){prim, range_m, bvh_width_m(ray->bvh, prim),
-                            sqrt(vec3_dot(n, n)) / fabs(vec3_dot(n, ray->dir))};
+                            sqrt(vec3_dot(n, n)) / fabs(vec3_dot(n, ray->dir)), WIDE * slack_m(ray, prim, 1.0)};
+}
+
+/* The larger width of a hit and its rival. */
+static double wider_m(const struct bvh *bvh, const struct rivalry *own, uint32_t prim)
+{
+    return fmax(own->width_m, bvh_width_m(bvh, prim));
 }
 
 /* False where the ray meets a plane clearly before or after the hit. */
@@ -168,7 +196,7 @@ static int may_be_rival(const struct decide_ray *ray, const struct rivalry *own,
     const struct bvh_plane *tri = &ray->bvh->triangle[prim];
     double along = fabs(vec3_dot(tri->n, ray->dir)), length = sqrt(vec3_dot(tri->n, tri->n));
     double gap = fabs((tri->d - vec3_dot(tri->n, ray->o_local)) / vec3_dot(tri->n, ray->dir) - own->range_m);
-    double width_m = 4.0 * fmax(own->width_m, bvh_width_m(ray->bvh, prim));
+    double width_m = 4.0 * wider_m(ray->bvh, own, prim);
     return !(gap * along > width_m * (own->steep * along + length));
 }
 
@@ -193,17 +221,25 @@ static int is_close(const struct search *s, uint32_t prim)
     return off2 <= s->radius_m * s->radius_m;
 }
 
+/* What is large or far off, float may misjudge by more than the hit: the ball is that of the two together. */
+static int is_rival_here(struct search *s, const struct rivalry *own, uint32_t prim)
+{
+    s->radius_m = own->reach * wider_m(s->ray->bvh, own, prim);
+    return is_near(s, prim) && may_be_rival(s->ray, own, prim) && is_close(s, prim);
+}
+
 /* Embree names all triangles whose boxes, or those of their leaf, are near. What lies further than the
  * query's radius is left out by its plane. */
 static bool visit(struct RTCPointQueryFunctionArguments *args)
 {
     struct search *s = args->userPtr;
     const uint32_t prim = args->primID;
-    if (prim == s->proposed || !is_near(s, prim)) return false;
+    if (prim == s->proposed) return false;
     if (s->only != NULL) {
-        if (!may_be_rival(s->ray, s->only, prim) || !is_close(s, prim)) return false;
-        if (!bvh_are_rivals(s->ray->bvh, s->only->prim, prim)) return false;
+        if (!is_rival_here(s, s->only, prim) || !bvh_are_rivals(s->ray->bvh, s->only->prim, prim)) return false;
         s->rivals++;
+    } else if (!is_near(s, prim)) {
+        return false;
     }
     try_triangle(s, prim);
     return false;
@@ -230,15 +266,6 @@ static void try_around(struct search *s, double range_m, double radius_m)
     rtcPointQuery(s->ray->bvh->rtc, &query, &context, visit, s);
 }
 
-/* How far from the proposed point along the ray an edge's neighbours may be met, and the plane itself: the
- * width, stretched by the incidence. */
-static double slack_m(const struct decide_ray *ray, uint32_t prim, double width_m)
-{
-    const struct bvh_plane *tri = &ray->bvh->triangle[prim];
-    double cosine = fabs(vec3_dot(tri->n, ray->dir)) / sqrt(vec3_dot(tri->n, tri->n));
-    return 4.0 * width_m * (1.0 + 1.0 / fmax(cosine, 1e-6));
-}
-
 /* So near to an edge that double precision can't separate its sides: the edge is hit, nothing passes. */
 static int is_near_miss(const struct search *s)
 {
@@ -260,16 +287,13 @@ static void try_neighbours(struct search *s)
     try_around(s, s->range_m, slack_m(s->ray, s->prim, bvh_width_m(s->ray->bvh, s->prim)));
 }
 
-/* How far around a hit its rivals are tried, in slacks. */
-enum { WIDE = 16 };
-
 /* Rivals whose planes the ray meets within what float can't order, and that are near the hit, are tried. */
 static struct rivalry begin_rivals(struct search *s, const struct decide_hit *hit)
 {
     const struct rivalry own = rivalry_of(s->ray, hit->prim, hit->range_m);
     s->proposed = hit->prim;
     try_triangle(s, hit->prim);
-    set_ball(s, hit->range_m, WIDE * slack_m(s->ray, hit->prim, own.width_m));
+    set_ball(s, hit->range_m, own.reach * own.width_m);
     return own;
 }
 
@@ -284,8 +308,7 @@ static void end_rivals(struct search *s, const struct rivalry *own, struct decid
 static void try_listed(struct search *s, const struct rivalry *own, const uint32_t *prim, uint32_t n)
 {
     for (uint32_t k = 0; k < n; k++) {
-        if (prim[k] == own->prim || !is_near(s, prim[k]) || !may_be_rival(s->ray, own, prim[k])) continue;
-        if (!is_close(s, prim[k])) continue;
+        if (prim[k] == own->prim || !is_rival_here(s, own, prim[k])) continue;
         s->rivals++;
         try_triangle(s, prim[k]);
     }
@@ -299,7 +322,7 @@ void decide_again(const struct decide_ray *ray, struct decide_hit *hit)
     const struct rivalry own = begin_rivals(&s, hit);
     if (!bvh->ordered) {
         s.only = &own;
-        try_around(&s, hit->range_m, s.radius_m);
+        try_around(&s, hit->range_m, own.reach * fmax(own.width_m, bvh->widest_m));
     } else if (bvh->rival_first != NULL) {
         const uint32_t first = bvh->rival_first[hit->prim];
         try_listed(&s, &own, bvh->rival + first, bvh->rival_first[hit->prim + 1] - first);
@@ -391,13 +414,4 @@ void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct bvh
     if (s.holes) look_through(&s);
     finish(&s, counters, hit);
     if (hit->prim != RTC_INVALID_GEOMETRY_ID && has_rivals(ray->bvh, hit->prim)) decide_again(ray, hit);
-}
-
-void decide_among(const struct decide_ray *ray, const uint32_t *prim, uint32_t n, struct bvh_counters *counters,
-                  struct decide_hit *hit)
-{
-    struct search s = search_for(ray);
-    for (uint32_t i = 0; i < n; i++)
-        try_triangle(&s, prim[i]);
-    finish(&s, counters, hit);
 }

@@ -94,9 +94,12 @@ static void put(const struct decide_ray *ray, const struct decide_hit *hit, cons
 
 static void decide_one(struct bvh_work *w, struct decide_ray *ray, const struct bvh_rays *rays, uint32_t i)
 {
-    struct decide_hit hit;
+    struct decide_hit hit = {w->prim[i], rays->range_m[i]};
     set_ray(ray, rays, i);
-    decide_hit(ray, w->prim[i], w->t[i], &w->counters, &hit);
+    if (w->doubt[i] & BVH_DOUBT_BORDER)
+        decide_hit(ray, w->prim[i], w->t[i], &w->counters, &hit);
+    else
+        decide_again(ray, &hit);
     w->prim[i] = hit.prim;
     put(ray, &hit, rays, i);
 }
@@ -198,17 +201,6 @@ void bvh_hits(struct bvh_work *work, const struct bvh *bvh, const struct bvh_ray
         part.steep = rays->steep != NULL ? rays->steep + at : NULL;
         cast_chunk(work, &ray, &part);
     }
-}
-
-void bvh_decide_among(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays, uint32_t i,
-                      const uint32_t *triangle, uint32_t n)
-{
-    struct decide_ray ray = ray_from(bvh, rays);
-    struct decide_hit hit;
-    set_ray(&ray, rays, i);
-    decide_among(&ray, triangle, n, &work->counters, &hit);
-    rays->triangle[i] = hit.prim;
-    put(&ray, &hit, rays, i);
 }
 
 void bvh_hits_ordered(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays, const uint8_t *order)

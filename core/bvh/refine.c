@@ -101,7 +101,8 @@ static uint32_t refine_from_own(const struct bvh_proposals *p)
     return refine(p, FROM_OWN, 1);
 }
 
-/* All hits on triangles that have rivals are in doubt, too. */
+/* All hits on triangles that have rivals are in doubt, too. A hit of whose border there is no doubt stands, as it does
+ * without rivals, but for these. */
 VEC_CLONES
 static uint32_t doubt_rivals(const struct bvh_proposals *p)
 {
@@ -110,8 +111,9 @@ static uint32_t doubt_rivals(const struct bvh_proposals *p)
     VEC_LOOP
     for (uint32_t i = 0; i < n; i++) {
         const int64_t at = (int64_t)(prim[i] < n_triangles ? prim[i] : n_triangles);
-        doubt[i] |= first[at] != first[at + 1];
-        doubts += doubt[i];
+        const uint32_t rivals = first[at] != first[at + 1];
+        doubts += doubt[i] | rivals;
+        doubt[i] |= rivals * BVH_DOUBT_ORDER;
     }
     return doubts;
 }

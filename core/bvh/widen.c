@@ -256,6 +256,7 @@ static void fill_triangle(struct bvh *bvh, uint32_t prim, float *vertex)
         unit[j] = tri->n[j] / area2;
     edge_lengths(v, length);
     double width_m = float_error_m(bvh, far_m, length), offset = offset_m(v, unit, width_m, far_m);
+    bvh->widest_m = fmax(bvh->widest_m, width_m);
     widen(v, offset, width_m, wide);
     edge_lengths(wide, length);
     if (float_error_m(bvh, far_m, length) > width_m) { /* very small or thin: two sides make at most twice the third */

@@ -118,14 +118,23 @@ static void set_strip(const struct sight *sight, struct build_candidate *c, doub
     }
 }
 
-/* The figures in prcs. False where no ray meets the triangle: it has no area, or another one stands for it. */
+/* A triangle with a corner at the station: rays begin on it, and meet it nowhere else. */
+static int is_at_corner(double v[3][3])
+{
+    for (int i = 0; i < 3; i++)
+        if (v[i][0] == 0.0 && v[i][1] == 0.0 && v[i][2] == 0.0) return 1;
+    return 0;
+}
+
+/* The figures in prcs. False where no ray meets the triangle: it has no area, another one stands for it, or a corner is
+ * at the station. */
 static int find_figures(const struct sight *sight, uint32_t triangle, struct build_candidate *c)
 {
     double v[3][3], n[3], longest2 = 0.0, near2 = INFINITY;
     c->triangle = triangle;
     c->record = BUILD_NO_RECORD;
     sight_corners(sight, triangle, v);
-    if (bvh_is_twin(sight->bvh, triangle) || !set_plane(sight, c, v)) return 0;
+    if (bvh_is_twin(sight->bvh, triangle) || is_at_corner(v) || !set_plane(sight, c, v)) return 0;
     vec3_cross(v[1], v[2], n);
     const double volume = vec3_dot(v[0], n), sign = volume < 0.0 ? -1.0 : 1.0;
     double doubt = SIGHT_VOLUME_DOUBT * vec3_length(v[0]) * vec3_length(v[1]) * vec3_length(v[2]);

@@ -99,8 +99,7 @@ static uint32_t of_lane(const struct sight *s, const struct bvh_rays *rays, cons
 {
     if (!w->any[i]) return BVH_NO_TRIANGLE;
     if (!w->open[i]) return s->record[list[1 + w->first[i]]].triangle;
-    if (w->asks[i]) return FEW_ASK;
-    return s->exact && w->first[i] >= 0 ? decide_tie(s, rays, list, w, i) : (uint32_t)FEW_OPEN;
+    return s->exact && w->first[i] >= 0 && !w->asks[i] ? decide_tie(s, rays, list, w, i) : (uint32_t)FEW_OPEN;
 }
 
 VEC_INLINE void take(struct looks *w, const struct vec3_in *dir, uint32_t at, uint32_t n)
@@ -136,7 +135,7 @@ int few_decide(const struct sight *s, const struct bvh_rays *rays, const uint32_
         for (uint32_t i = 0; i < n; i++) {
             const uint32_t it = of_lane(s, rays, list, &w, (int)i);
             triangle[at - from + i] = it;
-            open |= it == FEW_OPEN || it == FEW_ASK;
+            open |= it == FEW_OPEN;
         }
     }
     return open != 0;

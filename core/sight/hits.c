@@ -36,36 +36,21 @@ const struct sight_counters *sight_work_counters(const struct sight_work *work)
     return &work->counters;
 }
 
-static void decide_open(struct bvh_work *bvh_work, const struct sight *s, const struct bvh_rays *rays,
-                        const uint32_t *list, uint32_t from, uint32_t to)
-{
-    uint32_t triangle[SIGHT_MAX_LIST];
-    for (uint32_t j = 0; j < list[0]; j++)
-        triangle[j] = s->record[list[1 + j]].triangle;
-    for (uint32_t i = from; i < to; i++)
-        bvh_decide_among(bvh_work, s->bvh, rays, i, triangle, list[0]);
-}
-
 static void ask(struct sight_work *w, uint32_t from, uint32_t to, uint32_t *asked)
 {
     memset(w->asks + from, 1, to - from);
     *asked += to - from;
 }
 
-/* Rays that meet one of a few. In exact order, what the records can't decide double does, as it would decide the
- * BVH's proposals; else, or where the BVH might propose nothing, those rays ask. */
-static void do_few(struct sight_work *w, struct bvh_work *bvh_work, const struct sight *s, const struct bvh_rays *rays,
+/* Rays that meet one of a few. What the records can't decide asks. */
+static void do_few(struct sight_work *w, const struct sight *s, const struct bvh_rays *rays,
                    const struct sight_run *run, uint32_t *asked)
 {
     const uint32_t *list = s->list + (run->leaf & SIGHT_NUMBER), from = run->from, to = run[1].from;
     const int open = few_decide(s, rays, list, from, to, w->triangle);
     bvh_ranges_each(s->bvh, w->triangle, rays, from, to);
     for (uint32_t i = from; i < to && open; i++) {
-        const uint32_t it = w->triangle[i - from];
-        if (it == FEW_ASK || (it == FEW_OPEN && !s->among))
-            ask(w, i, i + 1, asked);
-        else if (it == FEW_OPEN)
-            decide_open(bvh_work, s, rays, list, i, i + 1);
+        if (w->triangle[i - from] == FEW_OPEN) ask(w, i, i + 1, asked);
     }
 }
 
@@ -93,8 +78,7 @@ static inline void ask_records(const struct sight *s, const struct sight_run *ru
 }
 
 /* Later runs after earlier ones: bvh_ranges_of says why. */
-static uint32_t do_runs(struct sight_work *w, struct bvh_work *bvh_work, const struct sight *s,
-                        const struct bvh_rays *rays, uint32_t runs)
+static uint32_t do_runs(struct sight_work *w, const struct sight *s, const struct bvh_rays *rays, uint32_t runs)
 {
     const struct sight_run *last = w->run + runs - 1;
     uint32_t asked = 0;
@@ -105,7 +89,7 @@ static uint32_t do_runs(struct sight_work *w, struct bvh_work *bvh_work, const s
             ask(w, run->from, run[1].from, &asked);
         } else if (sight_kind(run->leaf) == SIGHT_FEW) {
             w->counters.few += run[1].from - run->from;
-            do_few(w, bvh_work, s, rays, run, &asked);
+            do_few(w, s, rays, run, &asked);
         } else {
             bvh_ranges_of(s->bvh, run->leaf, rays, run->from, run[1].from);
         }
@@ -173,7 +157,7 @@ static void look_up_chunk(struct sight_work *w, struct bvh_work *bvh_work, const
     bvh_work_set_directions(bvh_work, &rays->dir, rays->n);
     const uint32_t runs = sight_find_runs(s, &dir, rays->n, &w->places, w->run);
     bvh_stage_ends(profile, BVH_STAGE_PREPARE);
-    const uint32_t asked = do_runs(w, bvh_work, s, rays, runs);
+    const uint32_t asked = do_runs(w, s, rays, runs);
     bvh_stage_ends(profile, BVH_STAGE_REFINE);
     w->counters.asked += asked;
     if (asked != 0) ask_bvh(w, bvh_work, s, rays);

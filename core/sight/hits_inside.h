@@ -23,9 +23,8 @@ uint32_t sight_find_runs(const struct sight *sight, const struct vec3_floats *di
 
 /* ---- few.c */
 /* Rays from .. to - 1, which have that list -> triangle[0 ..]: BVH_NO_TRIANGLE for nothing, FEW_OPEN where
- * the records can't decide; FEW_ASK where one of them is seen at so small an angle that the BVH may not propose it. Returns
- * whether any of them has one of these two. */
-enum { FEW_OPEN = 0xfffffffe, FEW_ASK = 0xfffffffd };
+ * the records can't decide. Returns whether any of them has that. */
+enum { FEW_OPEN = 0xfffffffe };
 int few_decide(const struct sight *sight, const struct bvh_rays *rays, const uint32_t *list, uint32_t from, uint32_t to,
                uint32_t *triangle);
 

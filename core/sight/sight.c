@@ -201,14 +201,11 @@ int sight_create(const struct sight_spec *spec, unsigned threads, const struct s
 {
     struct sight *s = *out = calloc(1, sizeof *s);
     struct timespec from, to;
-    double origin_m[3];
     if (s == NULL) return sh_fail(err, SH_ENOMEM, "sight: no memory");
     clock_gettime(CLOCK_MONOTONIC, &from);
     s->bvh = spec->bvh;
     memcpy(s->station_m, spec->station_m, sizeof s->station_m);
     s->exact = spec->exact;
-    bvh_origin(spec->bvh, origin_m);
-    s->among = s->exact && memcmp(origin_m, s->station_m, sizeof origin_m) == 0;
     int rc = make(s, spec, threads, report, err);
     if (rc != SH_OK) {
         sight_free(s);

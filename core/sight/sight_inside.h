@@ -107,7 +107,7 @@ struct sight_record {
 struct sight {
     const struct bvh *bvh;
     double station_m[3];
-    int exact, among; /* among: the BVH misses nothing that double precision finds, and exact */
+    int exact;
     uint32_t cells;   /* power of two */
     uint32_t *tile;   /* [SIGHT_FACES][cells / SIGHT_TILE][cells / SIGHT_TILE], v outside, u inside; one that asks */
     uint32_t *leaf;   /* blocks */
