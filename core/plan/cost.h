@@ -19,18 +19,18 @@ struct plan_ray_cost {
     double met, out, border;
 };
 static const struct plan_ray_cost plan_ray_costs[] = {
-    {16, 13.5, 8.0, 20.0}, {8, 21.0, 12.0, 20.0}, {4, 50.0, 30.0, 30.0}};
+    {16, 13.0, 9.0, 10.0}, {8, 21.0, 12.0, 20.0}, {4, 50.0, 30.0, 30.0}};
 
-#define PLAN_COST_SIGHT_ONE 3.0   /* looked up: one triangle or nothing there, */
-#define PLAN_COST_SIGHT_FEW 52.0  /* one of a few, */
+#define PLAN_COST_SIGHT_ONE 2.0   /* looked up: one triangle or nothing there, */
+#define PLAN_COST_SIGHT_FEW 48.0  /* one of a few, */
 #define PLAN_COST_SIGHT_ASK 150.0 /* the BVH is asked after all: such rays have nothing in common; */
 #define PLAN_COST_ASK_ORDER 380.0 /* and more where surfaces are ordered in double */
 /* What is more in a scene of a million triangles, whose planes lie in no cache; by the root of their number. */
-#define PLAN_COST_MILLION 25.0
+#define PLAN_COST_MILLION 20.0
 /* To make it: in any case, by triangle, and by cell that shows more than one; such a cell's memory. */
-#define PLAN_COST_SIGHT          2e6
-#define PLAN_COST_SIGHT_TRIANGLE 260.0
-#define PLAN_COST_SIGHT_CELL     400.0
+#define PLAN_COST_SIGHT          3e6
+#define PLAN_COST_SIGHT_TRIANGLE 330.0
+#define PLAN_COST_SIGHT_CELL     180.0
 #define PLAN_SIGHT_CELL_BYTES    110.0
 /* bvh_order_exactly: a triangle, and a ray's first hit in a scene of few overlaps. */
 #define PLAN_COST_ORDER   6000.0

@@ -6,9 +6,10 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "core/huge.h"
 #include "core/sight/build_inside.h"
 
-enum { MAX_THREADS = 64, FEW_RAYS = 4, TOO_FINE = 1 };
+enum { MAX_THREADS = 64, FEW_RAYS = 4, TOO_FINE = 1, LARGE = 8 << 20 };
 
 int sight_possible(const struct scene *scene)
 {
@@ -43,13 +44,15 @@ uint32_t sight_cells(double rays, uint64_t memory_bytes)
     return cells;
 }
 
-/* Arrays as large as they may become: what is never touched takes no memory. */
+/* Arrays as large as they may become: what is never touched takes no memory. Large pages: they are filled at once, and
+ * read at random. */
 static void *take_array(struct build_shared *b, struct build_arena *arena, uint64_t most, uint64_t size)
 {
     const uint64_t within = b->spec->memory_bytes / size + 1;
     arena->room = most < within ? most : within;
     if (arena->room > SIGHT_NUMBER) arena->room = SIGHT_NUMBER;
-    return aligned_alloc(128, (arena->room * size + 127) / 128 * 128);
+    const uint64_t bytes = (arena->room * size + 127) / 128 * 128;
+    return bytes < LARGE ? aligned_alloc(128, bytes) : huge_alloc(bytes);
 }
 
 static int take_arrays(struct build_shared *b, struct sh_err *err)
