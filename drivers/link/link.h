@@ -77,7 +77,8 @@ struct link_ops {
     ssize_t (*read)(void *link, int session, void *buf, size_t len);
     ssize_t (*write)(void *link, int session, const void *buf, size_t len);
 
-    /* Writes that were taken and did not arrive, as far as the system says so: refused, or without a way. NULL: none. */
+    /* Writes that were taken and did not arrive, as far as the system reports it: refused, or without a route. NULL:
+     * none. After the link's thread has ended, or by that thread. */
     uint64_t (*refused)(const void *link);
 
     /* Ends a session from this side: what was written goes out, and a LINK_CLOSED follows from poll. NULL: sessions of

@@ -6,7 +6,8 @@
  * is used for it. (SO_BINDTODEVICE would do without, but takes a privilege.) Multicast is refused.
  *
  * A receiver that is not there is no failure: what was sent is gone, and so is what the system had no room for on its
- * way out. Both are counted: a datagram that is refused when the refusal comes, which several may share. What arrives at the socket can be read. */
+ * way out. Both are counted. A refused datagram counts when its refusal comes; several may share one refusal. What
+ * arrives at the socket can be read. */
 #include <errno.h>
 #include <ifaddrs.h>
 #include <net/if.h>

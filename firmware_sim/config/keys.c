@@ -76,8 +76,8 @@ static const struct cfg_key config_keys[] = {
     {KEY(scene.order_exactly), CFG_ENUM, .def = "auto",
      WORDS([CHOICE_AUTO] = "auto", [CHOICE_OFF] = "off", [CHOICE_ON] = "on"),
      .help = "Orders surfaces that overlap or cross in double. It costs loading time, and speed where surfaces "
-             "overlap. auto: on where float's resolution in the scene is coarser than plan.tolerance_m, and where a map of "
-             "what the station sees (cast.sight) gives it at no cost."},
+             "overlap. auto: on where float's resolution in the scene is coarser than plan.tolerance_m, and where a map "
+             "of what the station sees (cast.sight) gives it at no cost."},
     {KEY(scene.cutouts), CFG_BOOL, .def = "on",
      .help = "Rays pass where a texture's alpha or opacity map is below a half, as between leaves. Textures are then "
              "read when the scene is loaded; without such a texture it costs nothing more."},

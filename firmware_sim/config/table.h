@@ -52,7 +52,8 @@ struct cfg_key {
     const char *help;
 };
 
-/* A figure of CFG_MICRO in its unit: the double nearest to what was written, so that errors and lists print just that. */
+/* A figure of CFG_MICRO in its unit: the double nearest to what was written, so that errors and lists print just
+ * that. */
 static inline double from_micro(int64_t micro)
 {
     return (double)micro / 1e6;

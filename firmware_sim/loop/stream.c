@@ -10,8 +10,8 @@ static const int64_t PATIENCE_NS = 2000000000;
 int stream_create(struct stream *stream, const struct ring_size *size, int64_t tick_ns, struct sh_err *err)
 {
     stream->tick_ns = tick_ns;
-    /* Real time: casters keep the most of the time ahead, as they may have to wait for a processor. The paces that wait:
-     * some fill the queue while others empty it. */
+    /* Real time: casters keep most of the time ahead, as they may have to wait for a processor. In the paces that wait
+     * some threads fill the queue while others empty it. */
     stream->say_ticks = 1 + (stream->waits ? size->queue_ticks / 4 : size->ahead_ticks / 8);
     stream->lazy_ticks = 1 + size->queue_ticks / 8;
     atomic_store(&stream->wanted, UINT64_MAX);

@@ -157,7 +157,14 @@ int site_open_sights(struct site *site, uint32_t first, uint32_t n, const struct
     int rc = SH_OK;
     for (uint32_t i = 0; i < site->n_stations; i++)
         if (i < first || i - first >= n) close_sight(&site->station[i]);
-    if (!site->plan.methods.sight || n > SITE_MAX_SIGHTS) return SH_OK;
+    if (!site->plan.methods.sight) return SH_OK;
+    if (n > SITE_MAX_SIGHTS) {
+        sh_warn(report,
+                "%s: stations: a run makes no maps (cast.sight) for %u of them, allowed up to %d; rays ask the BVH, "
+                "with the same hits",
+                site->cfg->file, n, SITE_MAX_SIGHTS);
+        return SH_OK;
+    }
     for (uint32_t i = first; i - first < n && rc == SH_OK; i++)
         if (site->station[i].sight == NULL) rc = make(site, i, n, report, err);
     return rc;
