@@ -8,7 +8,7 @@
 
 /* Of what a map saves, so much must be left when it is paid for: costs here are rounded, and a wrong choice shall
  * not make a scan slower. */
-static const double LEAST_LEFT = 0.3;
+static const double LEAST_LEFT = 0.2;
 
 enum { NO_MAP, MAP, OPTIONS };
 
@@ -56,7 +56,8 @@ static void estimate(const struct plan_sight_need *need, const struct plan_sight
 {
     const struct plan_ray_cost *cost = ray_cost(need);
     const double mixed = (f->few + f->ask) * need->share * cells(need);
-    const double fits = fmin(1.0, (double)need->memory_bytes / (PLAN_SIGHT_CELL_BYTES * (mixed + 1.0)));
+    const double bytes = PLAN_SIGHT_CELL_BYTES * (mixed + 1.0) + PLAN_SIGHT_RECORD_BYTES * need->n_triangles;
+    const double fits = fmin(1.0, (double)need->memory_bytes / bytes);
     const double few = fits * f->few, ask = f->ask + f->few - few;
     c->bvh =
         f->nothing * cost->out + (1.0 - f->nothing) * (cost->met + plane_ns(need)) + (f->few + f->ask) * cost->border;

@@ -178,7 +178,7 @@ static void test_sight_orders(void **state)
     choice = choose_sight(&need, &some, "map", "pay");
     assert_true(choice.ordered && choice.order_ns > 5.0 && choice.order_ns < 50.0);
     need.order = PLAN_ORDER_FREE;
-    need.pulses = 1.5e6;
+    need.pulses = 0.8e6;
     choice = choose_sight(&need, &some, "map", "pay");
     assert_false(choice.ordered); /* with its cost a map would not pay */
     need.pulses = 1e4;
