@@ -67,7 +67,8 @@ const struct sight_counters *sight_work_counters(const struct sight_work *work);
 
 /* Exact hits, as bvh_hits. The rays begin at the station (rays->from.own.x is NULL, at_m the station's, bit by
  * bit); rays->begins and scattered are not used. What lies beyond range_max_m may or may not be reported.
- * bvh_work: for what the BVH is asked; bvh_work_directions are then those of the last chunk, as after bvh_hits.
+ * bvh_work: for what the BVH is asked; where rays->steep is given, bvh_work_directions are then those of the last
+ * chunk, as after bvh_hits.
  * Allocates nothing. */
 void sight_hits(struct sight_work *work, struct bvh_work *bvh_work, const struct sight *sight,
                 const struct bvh_rays *rays);

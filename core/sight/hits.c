@@ -146,21 +146,19 @@ static void ask_bvh(struct sight_work *w, struct bvh_work *bvh_work, const struc
         if (rays->steep != NULL) rays->steep[i] = w->steep[k];
     }
     memset(w->asks, 0, rays->n);
-    bvh_work_set_directions(bvh_work, &rays->dir, rays->n);
 }
 
 static void look_up_chunk(struct sight_work *w, struct bvh_work *bvh_work, const struct sight *s,
                           const struct bvh_rays *rays)
 {
     struct bvh_profile *profile = bvh_work_profile(bvh_work);
-    const struct vec3_floats dir = bvh_work_directions(bvh_work);
-    bvh_work_set_directions(bvh_work, &rays->dir, rays->n);
-    const uint32_t runs = sight_find_runs(s, &dir, rays->n, &w->places, w->run);
+    const uint32_t runs = sight_find_runs(s, &rays->dir, rays->n, &w->places, w->run);
     bvh_stage_ends(profile, BVH_STAGE_PREPARE);
     const uint32_t asked = do_runs(w, s, rays, runs);
     bvh_stage_ends(profile, BVH_STAGE_REFINE);
     w->counters.asked += asked;
     if (asked != 0) ask_bvh(w, bvh_work, s, rays);
+    if (rays->steep != NULL) bvh_work_set_directions(bvh_work, &rays->dir, rays->n);
 }
 
 void sight_hits(struct sight_work *work, struct bvh_work *bvh_work, const struct sight *sight,

@@ -18,8 +18,8 @@ struct sight_places {
     uint8_t changes[HITS_ROOM];
 };
 /* Cuts up to BVH_CHUNK rays into runs. Returns how many; one more then says where the last ends. */
-uint32_t sight_find_runs(const struct sight *sight, const struct vec3_floats *dir, uint32_t n,
-                         struct sight_places *places, struct sight_run *run);
+uint32_t sight_find_runs(const struct sight *sight, const struct vec3_in *dir, uint32_t n, struct sight_places *places,
+                         struct sight_run *run);
 
 /* ---- few.c */
 /* Rays from .. to - 1, which have that list -> triangle[0 ..]: BVH_NO_TRIANGLE for nothing, FEW_OPEN where

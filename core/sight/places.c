@@ -11,14 +11,15 @@
  * by e. Together 6 e and some e^2, less than half of SIGHT_PAD; so it also is where rounding chooses another face. What
  * is no direction belongs to `nowhere`. */
 VEC_CLONES
-static void find_places(uint32_t cells, const struct vec3_floats *dir, uint32_t n, int32_t nowhere,
-                        int32_t *restrict tile, int32_t *restrict within)
+static void find_places(uint32_t cells, const struct vec3_in *dir, uint32_t n, int32_t nowhere, int32_t *restrict tile,
+                        int32_t *restrict within)
 {
-    const float *dx = dir->x, *dy = dir->y, *dz = dir->z, half = 0.5F * (float)cells, end = (float)cells + 1.0F;
+    const double *dx = dir->x, *dy = dir->y, *dz = dir->z;
+    const float half = 0.5F * (float)cells, end = (float)cells + 1.0F;
     const int32_t last = (int32_t)cells - 1, tiles = (int32_t)cells / SIGHT_TILE;
     VEC_LOOP
     for (uint32_t i = 0; i < n; i++) {
-        const float x = dx[i], y = dy[i], z = dz[i], ax = fabsf(x), ay = fabsf(y), az = fabsf(z);
+        const float x = (float)dx[i], y = (float)dy[i], z = (float)dz[i], ax = fabsf(x), ay = fabsf(y), az = fabsf(z);
         const float xy = ax >= ay ? x : y, axy = ax >= ay ? ax : ay, a = axy >= az ? xy : z, aa = axy >= az ? axy : az;
         const int32_t axis = axy >= az ? (ax >= ay ? 0 : 2) : 4;
         const float b = axis == 0 ? y : axis == 2 ? z : x, c = axis == 0 ? z : axis == 2 ? x : y;
@@ -82,8 +83,8 @@ static uint32_t find_runs(const struct sight *s, uint32_t n, const struct sight_
     return m;
 }
 
-uint32_t sight_find_runs(const struct sight *sight, const struct vec3_floats *dir, uint32_t n,
-                         struct sight_places *places, struct sight_run *run)
+uint32_t sight_find_runs(const struct sight *sight, const struct vec3_in *dir, uint32_t n, struct sight_places *places,
+                         struct sight_run *run)
 {
     const uint32_t edge = sight->cells / SIGHT_TILE;
     find_places(sight->cells, dir, n, (int32_t)(SIGHT_FACES * edge * edge), places->tile, places->within);

@@ -108,9 +108,9 @@ struct sight {
     const struct bvh *bvh;
     double station_m[3];
     int exact;
-    uint32_t cells;   /* power of two */
-    uint32_t *tile;   /* [SIGHT_FACES][cells / SIGHT_TILE][cells / SIGHT_TILE], v outside, u inside; one that asks */
-    uint32_t *leaf;   /* blocks */
+    uint32_t cells; /* power of two */
+    uint32_t *tile; /* [SIGHT_FACES][cells / SIGHT_TILE][cells / SIGHT_TILE], v outside, u inside; one that asks */
+    uint32_t *leaf; /* blocks */
     uint32_t *list;
     struct sight_record *record;
     struct sight_info info;
