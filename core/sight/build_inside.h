@@ -74,7 +74,7 @@ void build_record(const struct build_candidate *c, uint32_t face, struct sight_r
 struct build_work {
     struct build_candidate *candidate;
     size_t n, room;
-    uint8_t *where; /* [where_room] of candidates, while a square is looked at */
+    uint16_t *where; /* [where_room] of candidates, while a square is looked at */
     size_t where_room;
     uint32_t *stack; /* numbers of candidates, square within square */
     size_t stack_room;

@@ -100,7 +100,7 @@ VEC_INLINE void find_covers(const struct build_work *w, const struct seen *in, s
         choose(&better, &e, &first);
         cover = (((quad_mask){number, number, number, number}) & better) | (cover & ~better);
         outside = (outside & (quad_mask){1, 2, 4, 8}) | (covers & (quad_mask){16, 32, 64, 128});
-        w->where[i] = (uint8_t)(outside[0] | outside[1] | outside[2] | outside[3]);
+        w->where[i] = (uint16_t)(outside[0] | outside[1] | outside[2] | outside[3]);
     }
     four->first = first;
     four->cover = cover;
