@@ -177,8 +177,6 @@ struct bvh_proposals {
 };
 /* Returns how many are in doubt. */
 uint32_t bvh_refine(const struct bvh_proposals *proposals);
-/* Room for the labels of a chunk that nobody asked for. */
-uint32_t *bvh_work_labels(struct bvh_work *work);
 /* 1 / cos^2 for one; RTC_INVALID_GEOMETRY_ID: NaN. */
 float bvh_steep(const struct bvh *bvh, uint32_t prim, const double dir[3]);
 

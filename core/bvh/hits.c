@@ -63,11 +63,6 @@ struct bvh_profile *bvh_work_profile(const struct bvh_work *work)
     return work->profile;
 }
 
-uint32_t *bvh_work_labels(struct bvh_work *work)
-{
-    return work->label;
-}
-
 static void set_origin(struct decide_ray *ray, const double at_m[3])
 {
     for (int i = 0; i < 3; i++) {

@@ -3,11 +3,9 @@
 #include <string.h>
 
 #include "core/sight/hits_inside.h"
-#include "core/vecmath.h"
+#include "core/sight/quad.h"
 
-enum { LANES = 4 };
-typedef double quad __attribute__((vector_size(32)));
-typedef int64_t quad_mask __attribute__((vector_size(32)));
+enum { LANES = QUAD_LANES };
 
 /* What rays make of the records of a list. Lane by lane. */
 struct looks {
@@ -18,11 +16,6 @@ struct looks {
     quad_mask first, any; /* the one that comes first; something may be met */
     quad_mask open, asks; /* not decided; nor to be decided in double */
 };
-
-VEC_INLINE void choose(const quad_mask *which, const quad *yes, quad *no)
-{
-    *no = (quad)(((quad_mask)*yes & *which) | ((quad_mask)*no & ~*which));
-}
 
 /* Of each record, on which side of its edges the rays pass, and when they meet its plane. Which of those that are met
  * for certain comes first. Another one may come before that where it is met, or may be, and its plane does not lie
@@ -51,9 +44,9 @@ VEC_INLINE void look_at(const struct sight *s, const uint32_t *list, struct look
         any |= may;
         asks |= may & ~sure;
         first = (number & better) | (first & ~better);
-        choose(&better, &q, &first_q);
-        choose(&better, &its_slack, &slack);
-        choose(&better, &its_rel, &rel);
+        quad_choose(&better, &q, &first_q);
+        quad_choose(&better, &its_slack, &slack);
+        quad_choose(&better, &its_rel, &rel);
     }
     for (uint32_t k = 0; k < n; k++) {
         const struct sight_record *r = &s->record[list[1 + k]];

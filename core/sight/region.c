@@ -5,7 +5,7 @@
 
 #include "core/grow.h"
 #include "core/sight/build_inside.h"
-#include "core/vecmath.h"
+#include "core/sight/quad.h"
 
 enum { NO_CANDIDATE = 0xffffffff };
 
@@ -36,9 +36,6 @@ struct division {
 };
 
 /* Four quarters of a square at a time. */
-typedef double quad __attribute__((vector_size(32)));
-typedef int64_t quad_mask __attribute__((vector_size(32)));
-
 struct quarters {
     struct square square[4];
     struct seen seen[4];
@@ -52,7 +49,6 @@ struct quarters {
 /* What becomes known of a candidate in the four quarters: outside, covers. */
 enum { OUTSIDE_BITS = 15, COVERS_SHIFT = 4 }; /* four bits each, a quarter each */
 
-/* Vectors go by address: compilers warn of a changed way to pass them where there is no AVX. */
 VEC_INLINE void at_middles(const double f[3], const struct quarters *four, quad *out)
 {
     *out = f[0] + f[1] * four->u + f[2] * four->v;
@@ -63,11 +59,6 @@ VEC_INLINE uint32_t bits_of(const quad_mask *which)
 {
     const quad_mask bit = *which & (quad_mask){1, 2, 4, 8};
     return (uint32_t)(bit[0] | bit[1] | bit[2] | bit[3]);
-}
-
-VEC_INLINE void choose(const quad_mask *which, const quad *yes, quad *no)
-{
-    *no = (quad)(((quad_mask)*yes & *which) | ((quad_mask)*no & ~*which));
 }
 
 /* Where the plane is seen at so small an angle, or from so near, that its distance says nothing: 0. */
@@ -97,7 +88,7 @@ VEC_INLINE void find_covers(const struct build_work *w, const struct seen *in, s
         at_middles(c->plane, four, &e);
         find_clear(c, &e, four->half, &better);
         better &= covers & (quad_mask)(e > first);
-        choose(&better, &e, &first);
+        quad_choose(&better, &e, &first);
         cover = (((quad_mask){number, number, number, number}) & better) | (cover & ~better);
         outside = (outside & (quad_mask){1, 2, 4, 8}) | (covers & (quad_mask){16, 32, 64, 128});
         w->where[i] = (uint16_t)(outside[0] | outside[1] | outside[2] | outside[3]);

@@ -97,10 +97,9 @@ struct sight_record {
 #define SIGHT_FLOAT_DOUBT (20.0 * 0x1p-24)
 #define SIGHT_MAX_REL     0.25
 
-/* core/bvh/decide.c takes ranges within 1e-12 of each other for the same: the lowest triangle wins. Below
- * SIGHT_SURE_SAME they are for certain, above SIGHT_SAME they are not. */
-#define SIGHT_SAME      4e-12
-#define SIGHT_SURE_SAME 0.25e-12
+/* core/bvh/decide.c takes ranges within 1e-12 of each other for the same: the lowest triangle wins. Above
+ * this they are not for certain. */
+#define SIGHT_SAME 4e-12
 /* 1 / m. What a ray begins on it does not meet (BVH_AT_ORIGIN_M); nearer than twice that, the BVH decides. */
 #define SIGHT_NEAR 1e6
 
