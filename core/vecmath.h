@@ -46,6 +46,31 @@ VEC_INLINE double vec_from_u64(uint64_t whole)
     return x - 0x1p52;
 }
 
+/* The lower terms of Taylor's series of (sin y - y) / y^3, z = y^2: s is the sum of those beyond. */
+VEC_INLINE double vec_sine_series(double s, double z)
+{
+    s = s * z + 1.0 / 6227020800.0;
+    s = s * z - 1.0 / 39916800.0;
+    s = s * z + 1.0 / 362880.0;
+    s = s * z - 1.0 / 5040.0;
+    s = s * z + 1.0 / 120.0;
+    s = s * z - 1.0 / 6.0;
+    return s;
+}
+
+/* The terms of (cos y - 1 + y^2 / 2) / y^4 up to y^16, z = y^2. */
+VEC_INLINE double vec_cosine_series(double z)
+{
+    double c = 1.0 / 20922789888000.0;
+    c = c * z - 1.0 / 87178291200.0;
+    c = c * z + 1.0 / 479001600.0;
+    c = c * z - 1.0 / 3628800.0;
+    c = c * z + 1.0 / 40320.0;
+    c = c * z - 1.0 / 720.0;
+    c = c * z + 1.0 / 24.0;
+    return c;
+}
+
 /* Sine and cosine of an angle in turns, |turn| < 2^49: reduction to an eighth of a turn is exact, then Taylor
  * series to y^15 and y^16 with |y| <= pi/4, whose remainders are below 5e-17. Error below 2.5e-16
  * (tests/unit/test_vecmath.c). */
@@ -56,20 +81,9 @@ VEC_INLINE void vec_sincos_turn(double turn, double *sine, double *cosine)
     double y = (turn - 0.25 * q) * 6.283185307179586477;
     double z = y * y;
     double s = -1.0 / 1307674368000.0;
-    s = s * z + 1.0 / 6227020800.0;
-    s = s * z - 1.0 / 39916800.0;
-    s = s * z + 1.0 / 362880.0;
-    s = s * z - 1.0 / 5040.0;
-    s = s * z + 1.0 / 120.0;
-    s = s * z - 1.0 / 6.0;
+    s = vec_sine_series(s, z);
     s = y + y * (z * s);
-    double c = 1.0 / 20922789888000.0;
-    c = c * z - 1.0 / 87178291200.0;
-    c = c * z + 1.0 / 479001600.0;
-    c = c * z - 1.0 / 3628800.0;
-    c = c * z + 1.0 / 40320.0;
-    c = c * z - 1.0 / 720.0;
-    c = c * z + 1.0 / 24.0;
+    double c = vec_cosine_series(z);
     c = c * z - 0.5;
     c = 1.0 + z * c;
     double a = quadrant & 1 ? c : s, b = quadrant & 1 ? s : c;
@@ -104,20 +118,9 @@ VEC_INLINE void vec_sincos_turn_fine(double turn, double rest, double sine[2], d
     double z = y * y, z1 = vec_product_rest(y, y, z);
     double s = 1.0 / 355687428096000.0;
     s = s * z - 1.0 / 1307674368000.0;
-    s = s * z + 1.0 / 6227020800.0;
-    s = s * z - 1.0 / 39916800.0;
-    s = s * z + 1.0 / 362880.0;
-    s = s * z - 1.0 / 5040.0;
-    s = s * z + 1.0 / 120.0;
-    s = s * z - 1.0 / 6.0;
+    s = vec_sine_series(s, z);
     s = y * (z * s);
-    double c = 1.0 / 20922789888000.0;
-    c = c * z - 1.0 / 87178291200.0;
-    c = c * z + 1.0 / 479001600.0;
-    c = c * z - 1.0 / 3628800.0;
-    c = c * z + 1.0 / 40320.0;
-    c = c * z - 1.0 / 720.0;
-    c = c * z + 1.0 / 24.0;
+    double c = vec_cosine_series(z);
     c = z * (z * c);
     double half = 0.5 * z, sh = y + s, ch = 1.0 - half;
     double sl = (y - sh + s) + y1 * (ch + c), cl = (1.0 - ch - half) + (c - 0.5 * z1 - y1 * sh);

@@ -6,7 +6,7 @@
 #include "core/sight/build_inside.h"
 #include "core/vec3.h"
 
-/* A triangle's regions on a face; none where u1 < u0. */
+/* A triangle's regions on a face. */
 struct range {
     uint32_t u0, u1, v0, v1;
 };
@@ -21,11 +21,11 @@ struct range {
 static int is_beside(const double w[3], const double a[3], const double b[3], double far_m)
 {
     const double behind = -BESIDE * far_m;
-    int out = 31;
+    int out = 15;
     if (w[0] < behind && w[1] < behind && w[2] < behind) return 1;
     for (int i = 0; i < 3; i++) {
         const double k = WIDER * w[i] + BESIDE * far_m;
-        out &= (a[i] > k) | (-a[i] > k) << 1 | (b[i] > k) << 2 | (-b[i] > k) << 3 | (w[i] < behind) << 4;
+        out &= (a[i] > k) | (-a[i] > k) << 1 | (b[i] > k) << 2 | (-b[i] > k) << 3;
     }
     return out != 0;
 }

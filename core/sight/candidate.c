@@ -89,8 +89,8 @@ static int set_plane(const struct sight *sight, struct build_candidate *c, doubl
 /* A triangle of which double precision can't say from which side the station sees it: on which side of its edges a ray
  * passes has no sign. Two strips of directions hold all that may meet it; the narrower one takes the place of the
  * edges, so that what lies beside it is outside for certain, and nothing is inside.
- * - Those along the plane. What meets a plane at a larger angle does so where the ray begins (SIGHT_NEAR),
- *   be it that the plane is where the station is up to rounding.
+ * - Those along the plane. What meets a plane at a larger angle does so where the ray begins (SIGHT_NEAR).
+ *   This also holds where the plane is at the station up to rounding.
  * - Those past the longest edge by no more than the triangle is wide: inside, the sides of all three edges together
  *   are n . d, and have one sign. */
 static void set_strip(const struct sight *sight, struct build_candidate *c, double v[3][3])
