@@ -27,16 +27,18 @@ Q = $(Q_$(V))
 
 # What a fresh Debian 12 needs. Building and the demo:
 DEPS_BUILD = gcc g++ make pkg-config libc6-dev libembree-dev libassimp-dev libgeographiclib-dev libyaml-dev libpng-dev \
-	libstb-dev nettle-dev libusb-1.0-0-dev libusbredirparser-dev assimp-testmodels
+	libstb-dev nettle-dev libusb-1.0-0-dev libusbredirparser-dev libwebsockets-dev assimp-testmodels
 # and the tests, with the second compiler and its sanitizers, clients and readers of recordings that are not ours:
 DEPS_TEST = $(DEPS_BUILD) libcmocka-dev clang libclang-rt-dev gpsd gpsd-clients cloudcompare mrpt-apps proj-bin python3-numpy \
-	$(if $(shell command -v npm),,nodejs npm)
+	parallel $(if $(shell command -v npm),,nodejs npm)
 # The guest tests; they are skipped where these can't be had. The kernel (linux-image-amd64) is fetched, not installed.
 DEPS_GUEST = qemu-system-x86 busybox-static cpio kmod xz-utils usbutils usbip
+# The browser that the page is tested in; these tests are skipped where it can't be had.
+DEPS_BROWSER = chromium
 
 # Without libusbredirparser everything builds but the back end that needs it.
 USBREDIR = $(eval USBREDIR := $$(shell $(PKG_CONFIG) --exists libusbredirparser-0.5 && echo libusbredirparser-0.5))$(USBREDIR)
-PKGS = yaml-0.1 libpng nettle libusb-1.0 $(USBREDIR)
+PKGS = yaml-0.1 libpng nettle libusb-1.0 libwebsockets $(USBREDIR)
 ask_pkg_config = $(shell $(PKG_CONFIG) $(1) $(PKGS))$(if $(filter-out 0,$(.SHELLSTATUS)),$(error $(PKG_CONFIG) does not \
 	find all of $(PKGS): make deps-build, or PKG_CONFIG=... for another machine))
 PKG_CFLAGS = $(eval PKG_CFLAGS := $$(call ask_pkg_config,--cflags))$(PKG_CFLAGS)
@@ -58,6 +60,7 @@ SAN ?=
 FP = -ffp-contract=off -fno-math-errno -fno-trapping-math
 HEADS_DIR = $(PREFIX)/share/scanhead/heads
 SCENES_DIR = $(PREFIX)/share/scanhead/scenes
+CAMPAIGN_DIR = $(PREFIX)/share/scanhead/campaign
 UDEV_DIR = $(PREFIX)/lib/udev/rules.d
 PC_DIR = $(PREFIX)/lib/pkgconfig
 ALL_CPPFLAGS = -I. -D_GNU_SOURCE -DSH_EMBREE=$(EMBREE_VERSION) $(if $(USBREDIR),-DHAVE_USBREDIR) -MMD -MP $(CPPFLAGS)
@@ -68,7 +71,7 @@ LDLIBS = -lembree$(EMBREE_VERSION) -lassimp -lGeographicLib $(PKG_LIBS) -lstdc++
 CORE = $(wildcard core/*.c core/*/*.c) core/georef/geographiclib_shim.cpp
 PROTO = $(wildcard drivers/protocol/*.c)
 HOST = $(wildcard drivers/host/*.c)
-SRC = $(CORE) $(wildcard drivers/*/*.c firmware_sim/*/*.c)
+SRC = $(CORE) $(wildcard drivers/*/*.c firmware_sim/*/*.c firmware_sim/*/*/*.c)
 OBJ = $(SRC:%=$(BUILD)/%.o)
 LIBOBJ = $(patsubst %,$(BUILD)/%.o,core/err.c $(PROTO) $(HOST))
 PROGRAMS = $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/$(1)/test_*.c))
@@ -94,6 +97,14 @@ $(BUILD)/usbredir $(BUILD)/embree: ALWAYS
 	@echo '$(CHOICE)' | cmp -s - $@ || echo '$(CHOICE)' >$@
 $(filter $(BUILD)/drivers/usb/usbredir%,$(OBJ)): $(BUILD)/usbredir
 $(patsubst %,$(BUILD)/%.o,$(wildcard core/bvh/*.c core/analysis/distance.c tests/*/*.c)): $(BUILD)/embree
+# The page's files, built in: one line a file for web_pages.c.
+WEB_FILES = $(sort $(filter-out %.md,$(wildcard drivers/link/web/*)))
+$(BUILD)/drivers/link/web_pages.inc: ALWAYS
+	@mkdir -p $(@D)
+	@n=0; for f in $(WEB_FILES); do n=$$((n + 1)); echo "WEB_PAGE($$n, \"$$f\", \"/$${f##*/}\")"; done >$@.new
+	@cmp -s $@.new $@ || cp $@.new $@; rm $@.new
+$(BUILD)/drivers/link/web_pages.c.o: private override ALL_CPPFLAGS += -I$(BUILD)
+$(BUILD)/drivers/link/web_pages.c.o: $(BUILD)/drivers/link/web_pages.inc $(WEB_FILES)
 ALWAYS:
 # All modules for the program and the tests, and the client library alone.
 $(BUILD)/modules.a: $(OBJ)
@@ -124,7 +135,7 @@ $(BUILD)/scanhead: $(BUILD)/firmware_sim/main.c.o $(BUILD)/modules.a
 #   benches.a   what the programs of tests/bench share                      build/bench and the charts'
 #   its rigs    tests/unit/cast_rig.c where it includes cast_rig.h          tests of a folder; tests/rigs.sh finds which
 #   modules.a   the head, without main.c                                    all of them
-FIGURES = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_sight chart_georef chart_widths beam plain velodyne loop_cost kernels)
+FIGURES = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_sight chart_georef chart_widths beam plain velodyne loop_cost kernels panorama)
 BENCH_MAINS = $(FIGURES:$(BUILD)/%=%.c) tests/bench/bench.c
 COMMON = $(wildcard tests/common/*.c)
 BENCHES = $(filter-out $(BENCH_MAINS),$(wildcard tests/bench/*.c))
@@ -141,6 +152,8 @@ $(FIGURES): $(BUILD)/%: $(BUILD)/%.c.o
 $(BUILD)/bench $(FIGURES): $(BUILD)/benches.a $(BUILD)/common.a $(BUILD)/modules.a
 	@echo "  LD    $@"
 	$(Q)$(CC) $(SAN) -o $@ $(filter %.o,$^) $(filter %.a,$^) $(LDLIBS)
+# stb_image_write shifts into the sign bit.
+$(BUILD)/tests/common/chart.c.o: private override SAN =
 # What computes little itself is built in half the time.
 $(BUILD)/tests/unit/% $(BUILD)/tests/wire/% $(BUILD)/tests/guest/%: private OPT += -O1
 .SECONDEXPANSION:
@@ -179,8 +192,11 @@ $(READERS)/pcl_vlp16: tests/readers/pcl_vlp16.in
 deps-test:
 	$(call install_missing,$(DEPS_TEST))
 	@$(MAKE) --no-print-directory deps-guest || echo "the guest tests will be skipped"
+	@$(MAKE) --no-print-directory deps-browser || echo "the tests of the page will be skipped"
 deps-guest:
 	$(call install_missing,$(DEPS_GUEST))
+deps-browser:
+	$(call install_missing,$(DEPS_BROWSER))
 deps-build:
 	$(call install_missing,$(DEPS_BUILD))
 
@@ -210,9 +226,9 @@ test: deps-test
 	@$(RUN) sh tests/run_all.sh $(BUILD)
 else
 ONE = $(patsubst $(BUILD)/%,%,$(filter %/$(T),$(TESTS)))
-SCRIPT = $(wildcard tests/$(T).sh tests/guest/$(T).sh)
+SCRIPT = $(wildcard tests/$(T).sh tests/guest/$(T).sh tests/page/$(T).sh)
 test: deps
-	@[ -n '$(ONE)$(SCRIPT)' ] || { echo "T=$(T): no tests/*/$(T).c, tests/$(T).sh or tests/guest/$(T).sh" >&2; exit 2; }
+	@[ -n '$(ONE)$(SCRIPT)' ] || { echo "T=$(T): no tests/*/$(T).c, and no $(T).sh in tests, tests/guest or tests/page" >&2; exit 2; }
 	$(SUBMAKE) $(STRICT) BUILD=$(BUILD)/test $(if $(filter-out tests/unit/%,$(ONE))$(SCRIPT),all $(BUILD)/test/bench) $(ONE:%=$(BUILD)/test/%) \
 		$(if $(filter tests/guest/%,$(SCRIPT)),$(patsubst $(BUILD)/%,$(BUILD)/test/%,$(call PROGRAMS,guest)))
 	@$(RUN) BUILD=$(BUILD) bash tests/run_tap.sh $(ONE:%=$(BUILD)/test/%) $(SCRIPT)
@@ -261,6 +277,21 @@ bench-plain: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/plain
 	@$(BUILD)/tests/bench/plain
 # The encoder of VLP-16 data packets, ns a firing.
+# A panorama of 0.1 degrees to binary PLY on one processor, beside Embree alone: every column, and coordinates as float.
+PANORAMA = taskset -c $(shell expr $(JOBS) - 1) $(BUILD)/tests/bench/panorama --set loop.threads=1
+bench-panorama: deps-build
+	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/panorama
+	@$(PANORAMA)
+	@$(PANORAMA) --columns xyz,float
+	@$(PANORAMA) --ending none
+# A browser beside a head at its limit, and how fast the page is; some minutes.
+bench-page: deps-build deps-browser
+	@$(MAKE) --no-print-directory -j2 all
+	@SCANHEAD=$(BUILD)/scanhead node tests/bench/page.mjs $(PAGE)
+# The page in three widths and both themes, to be looked at.
+page-pictures: deps-build deps-browser
+	@$(MAKE) --no-print-directory -j2 all
+	@SCANHEAD=$(BUILD)/scanhead node tests/page/pictures.mjs --out $(BUILD)/pictures
 bench-velodyne: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/velodyne
 	@$(BUILD)/tests/bench/velodyne
@@ -293,7 +324,7 @@ test-programs: all $(BUILD)/bench $(TESTS) $(FIGURES)
 
 install: all
 	install -d "$(DESTDIR)$(PREFIX)/bin" "$(DESTDIR)$(PREFIX)/lib" "$(DESTDIR)$(PREFIX)/include" "$(DESTDIR)$(HEADS_DIR)" \
-		"$(DESTDIR)$(SCENES_DIR)" "$(DESTDIR)$(UDEV_DIR)" "$(DESTDIR)$(PC_DIR)" "$(DESTDIR)$(PREFIX)/share/scanhead/python"
+		"$(DESTDIR)$(SCENES_DIR)" "$(DESTDIR)$(CAMPAIGN_DIR)" "$(DESTDIR)$(UDEV_DIR)" "$(DESTDIR)$(PC_DIR)" "$(DESTDIR)$(PREFIX)/share/scanhead/python"
 	install $(BUILD)/scanhead "$(DESTDIR)$(PREFIX)/bin/"
 	install -m 644 $(BUILD)/libscanhead.a "$(DESTDIR)$(PREFIX)/lib/"
 	install $(BUILD)/libscanhead.so "$(DESTDIR)$(PREFIX)/lib/libscanhead.so.1"
@@ -302,6 +333,7 @@ install: all
 	install -m 644 drivers/host/python/scanhead.py "$(DESTDIR)$(PREFIX)/share/scanhead/python/"
 	install -m 644 config/heads/*.yaml "$(DESTDIR)$(HEADS_DIR)/"
 	install -m 644 config/scenes/glass_room.obj "$(DESTDIR)$(SCENES_DIR)/"
+	install config/campaign/*.sh "$(DESTDIR)$(CAMPAIGN_DIR)/"
 	install -m 644 drivers/host/70-scanhead.rules "$(DESTDIR)$(UDEV_DIR)/"
 	sed "s|@PREFIX@|$(PREFIX)|; s|@VERSION@|$$(sed -n 's/^#define SCANHEAD_VERSION  *"\(.*\)"$$/\1/p' \
 		drivers/host/scanhead.h)|" drivers/host/libscanhead.pc.in > "$(DESTDIR)$(PC_DIR)/libscanhead.pc"
@@ -309,7 +341,7 @@ format:
 	clang-format -i $$(git ls-files '*.c' '*.h' '*.cpp')
 clean:
 	rm -rf $(BUILD)
-.PHONY: ALWAYS all deps deps-test deps-build deps-guest demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb \
-	test-usb-million test-hostile test-sight objects test-unit-programs test-programs bench bench-beam bench-plain bench-velodyne bench-loop bench-kernels chart install format clean
+.PHONY: ALWAYS all deps deps-test deps-build deps-guest deps-browser demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb \
+	test-usb-million test-hostile test-sight objects test-unit-programs test-programs bench bench-beam bench-plain bench-velodyne bench-page page-pictures bench-loop bench-kernels bench-panorama chart install format clean
 .SECONDARY:
 -include $(shell find $(BUILD) -type f -name '*.d' 2>/dev/null)

@@ -42,6 +42,9 @@ int bvh_order_exactly(struct bvh *bvh, const struct sh_report *report, struct sh
 /* Rays per Embree call: 1, 4, 8 or 16; for measuring and tests. Another width than the native one may find
  * another triangle where a ray passes through an edge; ranges agree. */
 void bvh_set_packet(struct bvh *bvh, uint32_t rays);
+/* What proposes the hits on this machine, in words: Embree's version, rays a packet, instructions. Where two machines
+ * say the same, the same rays meet the same triangles. */
+void bvh_engine(char *text, size_t len);
 void bvh_get_info(const struct bvh *bvh, struct bvh_info *info);
 void bvh_origin(const struct bvh *bvh, double origin_m[3]);
 const struct scene *bvh_scene(const struct bvh *bvh);

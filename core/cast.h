@@ -13,6 +13,7 @@
 #include <stdint.h>
 
 #include "core/bvh.h"
+#include "core/colour.h"
 #include "core/detect.h"
 #include "core/err.h"
 #include "core/footprint.h"
@@ -33,6 +34,16 @@ struct cast_mover {
     const struct bvh *bvh;
     double centre_m[3], radius_m; /* sphere around the body at rest */
     double rotation[9], shift_m[3];
+};
+
+/* What the head stands on, and so does not see. It is looked at for the pulse's first way alone: what mirrors
+ * show of it is legs, if there are any. */
+struct cast_tripod {
+    double down[3]; /* unit, prcs: along the plumb line, however the head is tilted */
+    double
+        cos_opening; /* a pulse whose beam's centre has a larger cosine with down is a shot without echo; 2: none has */
+    int has_legs;
+    struct cast_mover legs; /* a body that stands still */
 };
 
 /* Glass and mirrors that a pulse may meet, one after the other, and still be followed. */
@@ -73,6 +84,14 @@ struct cast_beam {
     const struct beam_outlines *outlines;
 };
 
+/* Colours of points. Range and height are those that are sent (the height along the beam as it went, where encoders
+ * err), the frame that of the pulse. */
+struct cast_colour {
+    struct colour_scale scale;
+    double frame;                           /* of a head that stands; a moving one has those of its knots */
+    const struct surface_colours *surfaces; /* texture; must outlive the scan */
+};
+
 /* What stays the same for all pulses of a scan (the movers' poses: of a run). */
 struct cast_setup {
     const struct bvh *bvh;
@@ -102,6 +121,7 @@ struct cast_setup {
         pulse_m; /* c tau / 2 of the pulse, a beam's resolution_m; for the widths of echoes, where a block has room */
     uint32_t n_movers;
     struct cast_mover mover[CAST_MAX_MOVERS];
+    const struct cast_tripod *tripod; /* NULL: none. Of a head that stands still */
     /* A moving head: poses of the head (socs -> prcs) in order of time, pose_between them. They cover the
      * firing times of the runs; before the first and after the last the head stands. station_m is then only
      * what geo positions are relative to, and rotation is not used. n_knots 0: the head stands still at
@@ -109,7 +129,9 @@ struct cast_setup {
     uint32_t n_knots;
     const struct pose_knot *knot;
     /* NULL: every hit within the limits is one echo, the head is ideal. Its max_echoes is also the beam's. */
+    const uint8_t *silent; /* by label: surfaces that hide what is behind them and give no echo; NULL: none */
     const struct cast_detect *detect;
+    const struct cast_colour *colour; /* for blocks with room for colours; NULL: none, and nothing is spent on them */
 };
 
 /* What became of pulses, counted. */
@@ -117,8 +139,10 @@ struct cast_counters {
     uint64_t near_border, decided, went_on, undecided; /* struct bvh_counters */
     uint64_t few, asked;                               /* with a sight: struct sight_counters */
     uint64_t unfit;   /* echoes whose position did not fit into the wire's integers: sent as shots without echo */
-    uint64_t faint;   /* hits below the detection threshold, or in a blind time: shots without echo, or echoes less */
+    uint64_t faint;   /* hits below the detection threshold, in a blind time, or on a surface without echo: shots
+                       * without echo, or echoes less */
     uint64_t crowded; /* echoes beyond max_echoes: the weakest, left out */
+    uint64_t hidden;  /* pulses into the tripod's cone: shots without echo */
     /* with a beam */
     uint64_t outlined; /* adaptive: pulses whose footprint an outline cuts */
     uint64_t sub_rays; /* cast beyond the central ones */
@@ -138,6 +162,23 @@ void caster_free(struct caster *caster);
  * the number of echoes. Allocates nothing. */
 uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
                      struct line_block *block);
+
+/* What the centre of a pulse meets, for those who want to know the triangle. */
+struct cast_hit {
+    double p_m[3], range_m; /* prcs; along the beam */
+    double cosine;          /* of the incidence, 0..1 */
+    uint32_t pulse;         /* of the run, from 0 */
+    uint32_t triangle;      /* of the scene, or of the body */
+    uint8_t body;           /* 0: what stands still; k + 1: mover k; CAST_MAX_MOVERS + 1: the legs of the tripod */
+    uint8_t front;          /* the triangle's corners go counter-clockwise as seen from there */
+};
+
+/* The hits of a run's pulses that the head can report, each pulse as one ray: within its ranges and zones, and of what
+ * comes back at least at the threshold, all without noise. Of a pane that is passed and what lies beyond, each is a
+ * hit; what is seen in mirrors is none: nothing is there. The head stands still. hit has room for (1 + depth) run->n.
+ * Packets are those of caster_cast. Returns the number of hits, in no order but that of chunks. Allocates nothing. */
+uint32_t caster_meet(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
+                     struct cast_hit *hit);
 
 /* Exact hits, with the caster's working memory; bvh.h. */
 void caster_hits(struct caster *caster, const struct bvh *bvh, const struct bvh_rays *rays);

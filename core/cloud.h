@@ -5,8 +5,12 @@
  * PLY: ASCII, or binary of either byte order, any number types. Element vertex has the properties x, y, z
  * and, where they are there, station (from 1), echo and label, as our recorder writes them. Everything else
  * is ignored. LAS: 1.2 to 1.4, not compressed. There the point source ID is the station, the return number
- * the echo, the extra bytes "label" the label. Ownership: cloud_read allocates, cloud_free releases. A cloud
- * is constant after cloud_read, any thread. */
+ * the echo, the extra bytes "label" the label. Further columns are read where they are asked for; colours are
+ * those of 8 bits in PLY, and in LAS the upper 8 of 16. Ownership:
+ * cloud_read allocates, cloud_free releases. A cloud is constant after cloud_read, any thread.
+ *
+ * Memory: 29 bytes a point; time 8, range, reflectance and amplitude 4 each, colours 3, the number of echoes 1. The
+ * file itself is in memory while it is read. */
 #ifndef CORE_CLOUD_H
 #define CORE_CLOUD_H
 
@@ -29,7 +33,17 @@ struct cloud {
     uint16_t *station;  /* [n] from 1; NULL: the file has none */
     uint16_t *label;    /* [n] CLOUD_LABEL_NONE: none; NULL: the file has none */
     uint8_t *echo;      /* [n] 0: shot without echo; NULL: the file has none */
-    int64_t epsg;       /* of the header's comment "epsg N", 0: scene frame; CLOUD_EPSG_UNKNOWN: it has none */
+    double count_m; /* what the file rounds coordinates to, on the ground: of LAS the scale, of a PLY as text the 1e-6
+                         * m that our recorder writes, in single precision two units in the last place; 0: nothing */
+    int has_own_counts; /* 1: a LAS file of ours: points of its first station stand as the stream's own counts */
+    /* Where they were asked for and the file has them, else NULL: */
+    double *time_s;        /* [n] PLY: since the scan's start; LAS: as the file counts it */
+    float *range_m;        /* [n] PLY alone; NaN: a shot without echo */
+    float *reflectance_db; /* [n] NaN: not modelled; LAS: of scanhead's own files, whose intensity holds it */
+    float *amplitude_db;   /* [n] PLY alone; NaN: none */
+    uint8_t *echo_count;   /* [n] echoes of the point's pulse; 0: shot without echo */
+    uint8_t (*rgb)[3];     /* [n] sRGB */
+    int64_t epsg;          /* of the header's comment "epsg N", 0: scene frame; CLOUD_EPSG_UNKNOWN: it has none */
 };
 
 /* Errors (SH_EINPUT, naming file and line, or byte): missing or unreadable, not a PLY or LAS file, x, y or z
@@ -37,6 +51,17 @@ struct cloud {
  * station, echo or label that is not a whole number in its range. Warns of other elements and of bytes after
  * the last one. */
 int cloud_read(const char *path, const struct sh_report *report, struct cloud *out, struct sh_err *err);
+enum cloud_column {
+    CLOUD_TIME = 1,
+    CLOUD_RANGE = 2,
+    CLOUD_REFLECTANCE = 4,
+    CLOUD_ECHO_COUNT = 8,
+    CLOUD_RGB = 16,
+    CLOUD_AMPLITUDE = 32
+};
+/* The same, with these columns. SH_ESTOPPED where report asks to stop. */
+int cloud_read_columns(const char *path, unsigned columns, const struct sh_report *report, struct cloud *out,
+                       struct sh_err *err);
 void cloud_free(struct cloud *cloud);
 
 /* How cloud_compare takes a point to the scene. */
@@ -56,9 +81,19 @@ struct cloud_site {
 
 /* Per point: its distance from the nearest triangle (NaN: shot without echo; INFINITY: nothing
  * within max_m) and that triangle's number, or CLOUD_TRIANGLE_NONE, also for a body's. Points without a
- * station are of the first one. SH_EINPUT: a point's station is not among n_stations. */
+ * station are of the first one. SH_EINPUT: a point's station is not among n_stations. SH_ESTOPPED. */
 int cloud_compare(const struct cloud *cloud, const struct cloud_site *site, const struct sh_report *report,
                   double *distance_m, uint32_t *triangle, struct sh_err *err);
+
+/* The station of point i, from 1, and its place in the scene. */
+static inline unsigned cloud_station(const struct cloud *cloud, size_t i)
+{
+    return cloud->station != NULL ? cloud->station[i] : 1;
+}
+void cloud_to_scene(const struct cloud *cloud, const struct cloud_site *site, size_t i, double p_prcs[3]);
+/* All points become places in the scene, once for all that follows; then there are no georefs any more. As
+ * cloud_compare fails; after that the cloud is of no more use. */
+int cloud_into_scene(struct cloud *cloud, struct cloud_site *site, const struct sh_report *report, struct sh_err *err);
 
 struct cloud_coverage {
     uint32_t surfaces_hit, triangles_hit;

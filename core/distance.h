@@ -23,7 +23,8 @@ struct distance_hit {
 int distance_create(const struct scene *scene, struct distance **out, struct sh_err *err);
 void distance_free(struct distance *index);
 
-/* Nearest point of the mesh within max_m. Returns 1 and fills hit, or 0 when nothing is that near.
+/* Nearest point of the mesh within max_m. Returns 1 and fills hit, or 0 when nothing is that near. Points farther than
+ * 1e18 m from the scene's centre along an axis have nothing near, whatever max_m is.
  * Thread: any number at once. */
 int distance_query(const struct distance *index, const double p_prcs[3], double max_m, struct distance_hit *hit);
 

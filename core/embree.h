@@ -11,9 +11,14 @@
 #error "SH_EMBREE is 3 or 4, as the Makefile says it"
 #endif
 
+#include <stdint.h>
+
 #include "core/err.h"
 
 /* The error that one of Embree's is. what: what was to be made. */
 int embree_fail(enum RTCError code, const char *what, struct sh_err *err);
+
+/* Rays a packet at which Embree is best on this machine: 4, 8 or 16. */
+uint32_t embree_packet(RTCDevice device);
 
 #endif

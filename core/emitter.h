@@ -9,8 +9,8 @@
  *   planar      a turn, from step 0 on           a line                `steps` a turn, those of first..last cast
  *   beams       a turn, from azimuth 0 on        a line                a firing sequence of up to 128 beams, over
  *                                                                      and over, while the azimuth turns
- *   sphere      a ring: one elevation            all rings, -90 up     `steps` a ring; of the first and the last
- *                                                to 90 deg             ring, which are poles, only one is cast
+ *   sphere      a ring: one elevation            all rings, -90 up     `steps` a ring; of rings at -90 and 90 deg,
+ *                                                to 90 deg, or some    which are poles, only one is cast
  *   directions  the list once                    a line                one each
  *
  * Time is counted in ticks. A tick of a beams head is the largest time that all its firing times are multiples
@@ -44,8 +44,10 @@ struct emitter {
     uint32_t steps;                             /* pulses of a line; line and beams: 0 */
     uint32_t first_step, last_step, front_step; /* planar: cast, both included; looks along y */
     int turn;                                   /* +1: clockwise seen from above; -1: the other way */
-    uint32_t rings;                             /* sphere */
-    int64_t asked_udeg;                         /* sphere: the step that was asked for */
+    /* sphere: `rings` of elevations -90 + 180 (first_ring + i) / gaps deg; gaps 0: one, at circle_udeg */
+    uint32_t rings, first_ring, gaps;
+    int64_t circle_udeg;
+    int64_t asked_udeg; /* sphere: the step that was asked for */
     /* beams */
     uint32_t n_beams;
     uint64_t tick_num, tick_den; /* of a tick, nanoseconds */
@@ -63,8 +65,24 @@ void emitter_set_planar(struct emitter *emitter, uint32_t steps, uint32_t first,
  * rise from 0, a sequence that ends before its last firing. */
 int emitter_set_beams(struct emitter *emitter, const struct emitter_beam *beam, uint32_t n, uint64_t sequence_ps,
                       int turn, struct sh_err *err);
-/* Steps and rings nearest to step_udeg (0.01 to 90 deg). */
+/* Steps and rings nearest to step_udeg (0.01 to 90 deg): a turn has 360 / step steps, and from pole to pole there are
+ * 180 / step gaps between rings, both rounded to whole numbers. */
 void emitter_set_sphere(struct emitter *emitter, int64_t step_udeg);
+/* Of a ring, with that step. */
+static inline uint32_t emitter_sphere_steps(int64_t step_udeg)
+{
+    return (uint32_t)((360000000 + step_udeg / 2) / step_udeg);
+}
+/* Whether the step of a sphere divides both, so that nothing was rounded. */
+int emitter_sphere_is_exact(const struct emitter *emitter);
+/* Of a sphere only the rings from start to stop, elevations of -90 to 90 deg, start <= stop. A ring within a
+ * micro-degree of a limit counts as inside. Where both are the same it is a circle: one ring, at just that
+ * elevation. SH_EINPUT: no ring lies there; the text names the nearest ones. */
+int emitter_set_rings(struct emitter *emitter, int64_t start_udeg, int64_t stop_udeg, struct sh_err *err);
+/* Elevation of ring i (0 .. rings - 1) of a sphere, in turns. */
+double emitter_ring_turn(const struct emitter *emitter, uint64_t ring);
+/* Whether all steps of that ring look along one line. */
+int emitter_ring_is_pole(const struct emitter *emitter, uint64_t ring);
 /* A list, which stays the owner's. */
 void emitter_set_directions(struct emitter *emitter, const struct emitter_firing *direction, uint32_t n);
 

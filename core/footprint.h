@@ -127,13 +127,14 @@ struct beam_return {
     double back;   /* what comes back of that, where surfaces are modelled; else the energy again */
     float sigma_m; /* of the ranges within it */
     uint32_t label;
+    uint32_t colour; /* goes along with the label */
 };
 
 struct beam_echo {
     double range_m;
     double energy, back; /* sums over its returns */
     float width_m;
-    uint32_t label;
+    uint32_t label, colour;
     uint8_t number; /* among the pulse's, from 0, those counted that were left out: for random numbers */
 };
 

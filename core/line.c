@@ -28,8 +28,16 @@ int line_block_alloc_attributes(struct line_block *block, struct sh_err *err)
     return sh_fail(err, SH_ENOMEM, "line: no memory for attributes of %u points", block->capacity);
 }
 
+int line_block_alloc_colours(struct line_block *block, struct sh_err *err)
+{
+    block->rgb = calloc(block->capacity, sizeof *block->rgb);
+    if (block->rgb != NULL) return SH_OK;
+    return sh_fail(err, SH_ENOMEM, "line: no memory for colours of %u points", block->capacity);
+}
+
 void line_block_free(struct line_block *block)
 {
+    free(block->rgb);
     free(block->amplitude_cdb);
     free(block->width_cns);
     free(block->dt_ns);

@@ -4,8 +4,8 @@
  * run of consecutive cast pulses of one line, with one entry per echo, and one entry for a shot without echo.
  * Entries are in order of pulse, then of range. Times and pulse numbers count from the scan's start.
  *
- * Ownership: line_block_alloc makes the arrays for `capacity` entries, line_block_alloc_attributes those that
- * are optional, line_block_free releases them all; a block belongs to one thread. Nothing else allocates. */
+ * Ownership: line_block_alloc makes the arrays for `capacity` entries, line_block_alloc_attributes and
+ * line_block_alloc_colours those that are optional, line_block_free releases them all; a block belongs to one thread. Nothing else allocates. */
 #ifndef CORE_LINE_H
 #define CORE_LINE_H
 
@@ -46,6 +46,7 @@ struct line_block {
     /* Attributes: both, or both NULL: not asked for, and nobody works them out. */
     int16_t *amplitude_cdb; /* 0.01 dB above the detection threshold, with the detector's noise; LINE_AMPLITUDE_NONE */
     uint16_t *width_cns;    /* width of the echo, full at half maximum, 0.01 ns; LINE_WIDTH_NONE, LINE_WIDTH_MOST */
+    uint8_t (*rgb)[3];      /* colour, sRGB; NULL: not asked for */
 };
 
 /* One line is over. */
@@ -70,6 +71,7 @@ enum {
 int line_block_alloc(struct line_block *block, uint32_t capacity, struct sh_err *err);
 /* For a block that has its other arrays. */
 int line_block_alloc_attributes(struct line_block *block, struct sh_err *err);
+int line_block_alloc_colours(struct line_block *block, struct sh_err *err);
 void line_block_free(struct line_block *block);
 
 #endif

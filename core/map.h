@@ -1,4 +1,4 @@
-/* The scan map: points seen from above, as a PNG (libpng). In: points and stations in prcs (metres). Out: an
+/* The scan map: points seen from above, as a PNG or SVG. In: points and stations in prcs (metres). Out: an
  * image.
  *
  * x goes to the right, y (north) up. Per pixel the map keeps which height levels were hit, and the lowest
@@ -7,7 +7,11 @@
  *              ceiling only is light, one without points is white. It does not depend on how dense the points
  *              lie, so far walls stand out as near ones do. Each point is drawn three pixels wide.
  *   hue        shows the height of the lowest point above the lowest of the map
- * Both are even steps of CIE L*a*b*. Below the map: scale bar, legend of heights, north arrow.
+ * Both are even steps of CIE L*a*b*. Below the map: scale bar, legend of heights, north arrow. Each station has a
+ * red triangle, a tick where its heading points, and its name and height beside it. A label stands where it covers
+ * neither another label nor a station, if there is such a place near its station, and walls as little as can be;
+ * without such a place it is left out and counted. An SVG has the points as an image, and all else as vectors;
+ * labels left out are titles there, as those of all stations are.
  *
  * Ownership: map_create allocates everything, map_free releases it. Thread: one at a time. Not real-time
  * safe. */
@@ -27,6 +31,7 @@ enum {
     MAP_MAX_PIXELS = 16777216, /* of the map: 16 bytes each while it is made, 256 MiB */
     MAP_MAX_STATIONS = 4096,
     MAP_MIN_WIDTH_PX = 512, /* of the image; a narrower map is centred */
+    MAP_NAME_LEN = 96,
 };
 
 struct map_spec {
@@ -44,8 +49,15 @@ void map_free(struct map *map);
 /* n points in prcs. A point with a coordinate that is not finite is a shot without echo: it is left out. */
 void map_add_points(struct map *map, size_t n, const double *x_m, const double *y_m, const double *z_m);
 
-/* A red triangle at a station. SH_EINPUT outside the area or beyond MAP_MAX_STATIONS. */
-int map_add_station(struct map *map, double x_m, double y_m, struct sh_err *err);
+struct map_station {
+    double x_m, y_m;
+    double heading_rad;        /* clockwise from y; NaN: no tick */
+    char name[MAP_NAME_LEN];   /* UTF-8; empty: none */
+    char height[MAP_NAME_LEN]; /* as it is to be read, under the name; empty: none */
+};
+
+/* SH_EINPUT outside the area or beyond MAP_MAX_STATIONS. */
+int map_add_station(struct map *map, const struct map_station *station, struct sh_err *err);
 
 struct map_counts {
     uint64_t drawn;   /* points that lie in the area */
@@ -63,8 +75,18 @@ struct map_layout {
 };
 void map_get_layout(const struct map *map, struct map_layout *layout);
 
+/* A label in the image: its box, and its station by the order in which they were added. */
+struct map_label {
+    double left, top, right, bottom;
+    uint32_t station;
+    int placed; /* 0: there was no room */
+};
+/* Chooses places for the labels of all stations: out has room for so many; gives how many were left out. */
+uint32_t map_place_labels(const struct map *map, struct map_label *out);
+
 /* Writes the image: to path.part beside it first, then renamed, so that path is whole or as it was. A map
  * without points is drawn as well. Errors name the path. */
 int map_write_png(const struct map *map, const char *path, struct sh_err *err);
+int map_write_svg(const struct map *map, const char *path, struct sh_err *err);
 
 #endif

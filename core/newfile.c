@@ -113,6 +113,24 @@ int newfile_open(const char *path, int *out, struct sh_err *err)
     return rc;
 }
 
+int newfile_append(const char *path, int *out, struct sh_err *err)
+{
+    struct stat st;
+    int rc = check_target(path, err), fd;
+    if (rc != SH_OK) return rc;
+    fd = open(path, O_RDWR | O_CREAT | O_APPEND | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC, 0666);
+    if (fd < 0) return fail(path, "be opened for writing", err);
+    if (fstat(fd, &st) != 0) rc = fail(path, "be opened for writing", err);
+    if (rc == SH_OK && st.st_nlink > 1) rc = fail_hard_link(path, &st, err);
+    if (rc == SH_OK && flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+        rc = sh_fail(err, SH_ESTATE, "%s: another process writes it", path);
+    if (rc != SH_OK)
+        close(fd);
+    else
+        *out = fd;
+    return rc;
+}
+
 /* ---- files that appear whole */
 
 /* One that is there, and not made just now: left by a writer that was killed, or put there by somebody. */
@@ -208,4 +226,15 @@ void newfile_drop(const char *part, int fd)
 {
     unlink(part); /* ours as long as it is locked */
     close(fd);
+}
+
+int newfile_check(const char *path, struct sh_err *err)
+{
+    char *part;
+    int fd;
+    if (asprintf(&part, "%s.part", path) < 0) return sh_fail(err, SH_ENOMEM, "%s: no memory", path);
+    int rc = newfile_part(path, part, &fd, err);
+    if (rc == SH_OK) newfile_drop(part, fd);
+    free(part);
+    return rc;
 }

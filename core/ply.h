@@ -23,6 +23,14 @@ enum ply_use {
     PLY_STATION,
     PLY_ECHO,
     PLY_LABEL,
+    PLY_TIME,
+    PLY_RANGE,
+    PLY_REFLECTANCE,
+    PLY_ECHO_COUNT,
+    PLY_AMPLITUDE,
+    PLY_RED,
+    PLY_GREEN,
+    PLY_BLUE,
     PLY_SCALARS,
     PLY_CORNERS = PLY_SCALARS /* the list of a face */
 };

@@ -135,6 +135,11 @@ struct scene_arrays {
 /* Builds a scene from arrays, all copied, with the checks of scene_load. */
 int scene_from_arrays(const struct scene_arrays *arrays, struct scene **out, struct sh_err *err);
 
+/* Leaves out all surfaces but those that are to be kept: keep[n_surfaces], by label. What is left has new labels and
+ * vertices, in the old order, and bounds of its own; there may be nothing left (n_triangles 0). SH_ENOMEM: the scene is
+ * as it was. Before anyone uses it, and before label0 is set. */
+int scene_keep(struct scene *scene, const uint8_t *keep, struct sh_err *err);
+
 void scene_free(struct scene *scene);
 
 /* The image of a texture: texture_read. */

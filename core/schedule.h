@@ -23,7 +23,7 @@ enum { SCHEDULE_PACKET = 16 }; /* pulses are cut at multiples of this from the l
 struct schedule_spec {
     int64_t prr_uhz, lines_uhz, pan_udeg_s;  /* micro-hertz, micro-degrees per second; lines <= pulses */
     int64_t fov_min_udeg, sweep_udeg;        /* line angle at phase 0, and how far the whole sweep goes */
-    int64_t line_start_udeg, line_stop_udeg; /* cast window, both ends included */
+    int64_t line_start_udeg, line_stop_udeg; /* cast window, both ends included; of a sphere also across azimuth 0 */
     int64_t pan_start_udeg, pan_stop_udeg;
     uint32_t frames; /* 0: without end */
     /* NULL: a line head. Else the pan keeps still; prr_uhz is steps * lines_uhz where the emitter has steps, and
@@ -45,6 +45,7 @@ struct schedule_segment {
     int64_t ns_quot;             /* a tick = ns_quot + ns_rem / tick_den nanoseconds */
     uint64_t ns_rem;
     uint64_t r_first, r_last; /* cast where r_first <= r <= r_last */
+    uint32_t front_step;      /* planar, sphere: the step that looks along y */
     uint32_t frame0;          /* frame at k0 */
     uint64_t frame0_end;      /* first line after that frame */
     uint64_t frame_lines;     /* lines of each later frame */

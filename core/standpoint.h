@@ -13,6 +13,7 @@
 #ifndef CORE_STANDPOINT_H
 #define CORE_STANDPOINT_H
 
+#include "core/bvh.h"
 #include "core/err.h"
 #include "core/scene.h"
 
@@ -39,5 +40,28 @@ struct standpoint {
  * stop. */
 int standpoint_find(const struct scene *scene, const struct standpoint_view *view, const struct sh_report *report,
                     struct standpoint *out, struct sh_err *err);
+
+/* ---- places to choose from: a grid of them, on all floors. */
+
+struct standpoint_grid {
+    double step_m;             /* of the grid along x and y; it lies in the middle of its area */
+    double height_m;           /* of the head's origin above the floor */
+    double min_m[3], max_m[3]; /* prcs; of z: the floors' own */
+};
+
+struct standpoint_place {
+    double position_m[3]; /* of the head's origin, whole millimetres */
+    double floor_m;       /* z of the floor */
+};
+
+enum { STANDPOINT_MAX_PLACES = 1000000 };
+
+/* Places where a tripod can stand: on a surface at most 20 degrees steep, with 0.2 m of room above the head; of 8
+ * spots 0.3 m around at least 6 on the same level within 0.15 m; nothing within 0.3 m of the head on its level. Which side
+ * of the surface is up does not matter: some of the places may lie within closed bodies. In order of x, then y, then z
+ * downward. The BVH reaches all of the scene above and within the grid. The caller frees *out. SH_EINPUT: more columns
+ * than STANDPOINT_MAX_PLACES. */
+int standpoint_places(const struct bvh *bvh, const struct standpoint_grid *grid, const struct sh_report *report,
+                      struct standpoint_place **out, uint32_t *n, struct sh_err *err);
 
 #endif

@@ -76,6 +76,24 @@ static inline uint32_t surface_of_label(uint32_t label)
     return label & 0xffff;
 }
 
+/* Colours by label, for clouds that show them: the texel at a hit, just as the image has it, and beside textures the
+ * mesh's diffuse colour, or else grey. Packed: red << 16 | green << 8 | blue, sRGB. */
+struct surface_image;
+struct surface_colours {
+    uint32_t n;
+    uint32_t *own;                /* [n] without a texel */
+    struct surface_image **image; /* [n] NULL where there is none */
+};
+int surface_colours_alloc(uint32_t n, struct surface_colours *colours, struct sh_err *err);
+void surface_colours_free(struct surface_colours *colours);
+/* Each entry is set first. */
+void surface_colours_set(struct surface_colours *colours, uint32_t label, const struct scene_surface *named);
+/* Entry `label` gets an image. SH_EINPUT, naming the file: can't be read; the entry stays as it is. */
+int surface_colours_texture(struct surface_colours *colours, uint32_t label, const struct scene_texture *texture,
+                            struct sh_err *err);
+/* Of a hit; uv finite, or NULL: not known. Labels beyond the entries are grey. */
+uint32_t surface_colour(const struct surface_colours *colours, uint32_t label, const double uv[2]);
+
 /* The surface of a label, entry n for one beyond the table. */
 static inline const struct surface *surface_at(const struct surface_table *table, uint32_t label)
 {

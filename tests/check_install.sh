@@ -78,6 +78,8 @@ example_passes() {
         "$work/root$prefix/bin/scanhead" check "$work/example.yaml"
 }
 check "the installed program's example passes its check" example_passes
+check "scripts for campaigns come with it" test -x "$work/root$prefix/share/scanhead/campaign/slurm.sh" -a \
+    -x "$work/root$prefix/share/scanhead/campaign/parallel.sh"
 check "the README's client, with the archive" compile client-static "$work/root$prefix/lib/libscanhead.a" -lnettle -lusb-1.0 -lm
 check "the README's client, with the shared library" compile client $(config --libs)
 check "and it reads a scan" reads_a_scan

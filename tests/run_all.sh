@@ -38,10 +38,10 @@ if wanted guest; then
     export BUILD="$build"
     set -- "$@" +tests/guest/guest.sh # it takes the programs of tests/guest with it
 fi
-if wanted unit; then set -- "$@" tests/check_includes.sh tests/check_make.sh $(programs unit); fi
+if wanted unit; then set -- "$@" tests/check_includes.sh tests/check_make.sh $(ls tests/check_page_*.sh) $(programs unit); fi
 if [ -z "$part" ]; then set -- "$@" $(programs unit "$build/asan"); fi
 if wanted wire; then for name in $beside; do set -- "$@" "+$build/test/tests/wire/test_$name"; done; fi
-if wanted wire; then set -- "$@" $(programs wire) tests/check_install.sh; fi
+if wanted wire; then set -- "$@" +tests/page/page.sh $(programs wire) tests/check_install.sh; fi # a browser beside them
 
 # apart NAME...: those programs of the wanted folders, and those of unit with the sanitizers in.
 apart() {
@@ -53,4 +53,4 @@ apart() {
     done
 }
 set -- "$@" --5 $(apart $waiting) -- $(apart $alone)
-exec bash tests/run_tap.sh -j "$(getconf _NPROCESSORS_ONLN)" "$@"
+exec bash tests/run_tap.sh -t 600 -j "$(getconf _NPROCESSORS_ONLN)" "$@"

@@ -10,8 +10,10 @@
 
 enum { HEADER_MIN = 227, HEADER_14 = 375, VLR_HEAD = 54, EXTRA_LEN = 192, EXTRA_UINT16 = 3, N_FORMATS = 11 };
 
-/* Of a point's record, without extra bytes, by format. */
+/* Of a point's record, without extra bytes, by format; where its GPS time and its colours stand, 0: nowhere. */
 static const unsigned standard_len[N_FORMATS] = {20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67};
+static const unsigned time_at[N_FORMATS] = {0, 20, 0, 20, 20, 20, 22, 22, 22, 22, 22};
+static const unsigned colours_at[N_FORMATS] = {0, 0, 20, 28, 0, 28, 0, 30, 30, 0, 30};
 
 struct las {
     struct text t; /* the whole file */
@@ -129,6 +131,45 @@ static int read_vlrs(struct las *las, struct sh_err *err)
     return SH_OK;
 }
 
+/* The intensity of our own files is a reflectance: 0.01 dB a count, 32768 is 0 dB; 0: not modelled. */
+static float reflectance_db(unsigned intensity)
+{
+    return intensity == 0 ? (float)NAN : (float)(((double)intensity - 32768.0) / 100.0);
+}
+
+static void read_columns(const struct las *las, size_t i, const uint8_t *p)
+{
+    struct cloud *c = las->cloud;
+    if (c->time_s != NULL) c->time_s[i] = get_double(p + time_at[las->format]);
+    if (c->reflectance_db != NULL) c->reflectance_db[i] = reflectance_db((unsigned)get(p + 12, 2));
+    if (c->echo_count != NULL) c->echo_count[i] = las->format >= 6 ? p[14] >> 4 : p[14] >> 3 & 7;
+}
+
+/* By the header's generating software. */
+static int is_ours(const struct las *las)
+{
+    return strncmp((const char *)las->data + 58, "scanhead", 32) == 0;
+}
+
+/* What the file has of what is asked for. */
+static unsigned columns_of(const struct las *las, unsigned asked)
+{
+    unsigned has = CLOUD_ECHO_COUNT;
+    if (time_at[las->format] != 0) has |= CLOUD_TIME;
+    if (colours_at[las->format] != 0) has |= CLOUD_RGB;
+    if (is_ours(las)) has |= CLOUD_REFLECTANCE;
+    return (asked & has) | CLOUD_HAS_STATION | CLOUD_HAS_ECHO | (las->label_at >= 0 ? CLOUD_HAS_LABEL : 0);
+}
+
+static double count_m(const struct las *las)
+{
+    const double to_m = las->cloud->epsg == 4979 ? 111320.0 : 1.0; /* a degree */
+    double scale[3];
+    for (int k = 0; k < 3; k++)
+        scale[k] = get_double(las->data + 131 + 8 * k);
+    return fmax(fmax(scale[0], scale[1]) * to_m, scale[2]);
+}
+
 static int read_points(struct las *las, struct sh_err *err)
 {
     struct cloud *c = las->cloud;
@@ -149,7 +190,12 @@ static int read_points(struct las *las, struct sh_err *err)
         c->station[i] = (uint16_t)get(p + (is_new ? 20 : 18), 2);
         if (c->station[i] == 0) las->n_no_station++;
         if (c->label != NULL) c->label[i] = (uint16_t)get(p + las->label_at, 2);
-        if ((i & 0xffff) == 0) sh_progress(las->report, "reading the points", (double)i / (double)c->n);
+        for (unsigned k = 0; c->rgb != NULL && k < 3; k++)
+            c->rgb[i][k] = p[colours_at[las->format] + 2 * k + 1];
+        read_columns(las, i, p);
+        if ((i & 0xffff) != 0) continue;
+        sh_progress(las->report, "reading the points", (double)i / (double)c->n);
+        if (sh_stopped(las->report)) return sh_fail_stopped(err);
     }
     if (las->n_no_station == c->n) { /* no ID at all */
         free(c->station);
@@ -160,17 +206,27 @@ static int read_points(struct las *las, struct sh_err *err)
     return SH_OK;
 }
 
-int cloud_read_las(const char *path, const struct sh_report *report, struct cloud *out, struct sh_err *err)
+static int progress(void *ctx, double fraction, struct sh_err *err)
+{
+    const struct las *las = ctx;
+    sh_progress(las->report, "reading the file", fraction);
+    return sh_check_stop(las->report, err);
+}
+
+int cloud_read_las(const char *path, unsigned columns, const struct sh_report *report, struct cloud *out,
+                   struct sh_err *err)
 {
     struct las las = {.cloud = out, .report = report, .label_at = -1};
-    int rc = text_open(&las.t, path, NULL, NULL, err);
+    int rc = text_open(&las.t, path, progress, &las, err);
     las.data = (const uint8_t *)las.t.data;
     if (rc == SH_OK) rc = read_header(&las, err);
     if (rc == SH_OK) rc = read_vlrs(&las, err);
-    if (rc == SH_OK)
-        rc = cloud_reserve(out, (size_t)las.n,
-                           CLOUD_HAS_STATION | CLOUD_HAS_ECHO | (las.label_at >= 0 ? CLOUD_HAS_LABEL : 0), err);
-    if (rc == SH_OK) rc = read_points(&las, err);
+    if (rc == SH_OK) rc = cloud_reserve(out, (size_t)las.n, columns_of(&las, columns), err);
+    if (rc == SH_OK) {
+        out->count_m = count_m(&las);
+        out->has_own_counts = is_ours(&las);
+        rc = read_points(&las, err);
+    }
     text_close(&las.t);
     return rc;
 }

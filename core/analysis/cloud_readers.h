@@ -7,7 +7,8 @@
 
 #include "core/cloud.h"
 
-enum { CLOUD_HAS_STATION = 1, CLOUD_HAS_LABEL = 2, CLOUD_HAS_ECHO = 4 };
+/* Beside enum cloud_column. */
+enum { CLOUD_HAS_STATION = 256, CLOUD_HAS_LABEL = 512, CLOUD_HAS_ECHO = 1024 };
 
 /* Arrays for n points: positions, and those named in `has`. */
 int cloud_reserve(struct cloud *cloud, size_t n, unsigned has, struct sh_err *err);
@@ -15,8 +16,10 @@ int cloud_reserve(struct cloud *cloud, size_t n, unsigned has, struct sh_err *er
 /* Does the file begin as a LAS file? */
 bool cloud_is_las(const char *path);
 
-/* As cloud_read; on failure the caller frees out. */
-int cloud_read_las(const char *path, const struct sh_report *report, struct cloud *out, struct sh_err *err);
-int cloud_read_ply(const char *path, const struct sh_report *report, struct cloud *out, struct sh_err *err);
+/* As cloud_read_columns; on failure the caller frees out. */
+int cloud_read_las(const char *path, unsigned columns, const struct sh_report *report, struct cloud *out,
+                   struct sh_err *err);
+int cloud_read_ply(const char *path, unsigned columns, const struct sh_report *report, struct cloud *out,
+                   struct sh_err *err);
 
 #endif

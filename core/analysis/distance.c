@@ -125,10 +125,20 @@ static double farthest_from(const double centre[3], const double p[3])
     return g;
 }
 
+/* Farther out a float can't hold the square of a distance. */
+static const double FARTHEST_M = 1e18;
+
+/* Whether the whole box of the scene is farther than max_m along one axis. */
+static int is_out_of_reach(const struct distance *index, double reach_m, double max_m)
+{
+    return !(reach_m <= FARTHEST_M) || reach_m * (1 - 1e-12) - index->half_m > max_m;
+}
+
 int distance_query(const struct distance *index, const double p_prcs[3], double max_m, struct distance_hit *hit)
 {
     if (!isfinite(p_prcs[0]) || !isfinite(p_prcs[1]) || !isfinite(p_prcs[2]) || !(max_m >= 0)) return 0;
     double reach = farthest_from(index->centre_m, p_prcs);
+    if (is_out_of_reach(index, reach, max_m)) return 0;
     struct search search = {
         .index = index,
         .p = p_prcs,

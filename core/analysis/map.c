@@ -104,17 +104,15 @@ void map_add_points(struct map *map, size_t n, const double *x_m, const double *
     }
 }
 
-int map_add_station(struct map *map, double x_m, double y_m, struct sh_err *err)
+int map_add_station(struct map *map, const struct map_station *station, struct sh_err *err)
 {
     uint32_t column, row;
     if (map->n_stations == MAP_MAX_STATIONS)
         return sh_fail(err, SH_EINPUT, "map: more than %d stations", (int)MAP_MAX_STATIONS);
-    if (!locate(map, x_m, y_m, &column, &row))
-        return sh_fail(err, SH_EINPUT, "map: station at x %g m, y %g m; allowed x %g to %g, y %g to %g", x_m, y_m,
-                       map->min_m[0], map->max_m[0], map->min_m[1], map->max_m[1]);
-    map->station_m[map->n_stations][0] = x_m;
-    map->station_m[map->n_stations][1] = y_m;
-    map->n_stations++;
+    if (!locate(map, station->x_m, station->y_m, &column, &row))
+        return sh_fail(err, SH_EINPUT, "map: station at x %g m, y %g m; allowed x %g to %g, y %g to %g", station->x_m,
+                       station->y_m, map->min_m[0], map->max_m[0], map->min_m[1], map->max_m[1]);
+    map->station[map->n_stations++] = *station;
     return SH_OK;
 }
 
@@ -137,10 +135,28 @@ void map_get_layout(const struct map *map, struct map_layout *layout)
 
 int map_write_png(const struct map *map, const char *path, struct sh_err *err)
 {
-    struct map_image image;
-    int rc = map_draw(map, &image, err);
-    if (rc != SH_OK) return rc;
-    rc = map_png_write(&image, path, err);
-    free(image.rgb);
+    struct picture picture = {0};
+    int rc = map_draw_pixels(map, &picture, err);
+    struct pen pen = picture_pen(&picture);
+    if (rc == SH_OK) rc = map_draw_marks(map, &pen, err);
+    if (rc == SH_OK) rc = picture_write_png(&picture, "map", path, err);
+    picture_free(&picture);
+    return rc;
+}
+
+int map_write_svg(const struct map *map, const char *path, struct sh_err *err)
+{
+    struct picture picture = {0};
+    struct svg *svg = NULL;
+    struct map_layout at;
+    map_get_layout(map, &at);
+    int rc = map_draw_pixels(map, &picture, err);
+    if (rc == SH_OK) rc = svg_begin(at.width, at.height, "Scan map", &svg, err);
+    if (rc == SH_OK) rc = svg_image(svg, &picture, (long)at.left, (long)at.top, at.map_width, at.map_height, err);
+    struct pen pen = svg_pen(svg);
+    if (rc == SH_OK) rc = map_draw_marks(map, &pen, err);
+    if (rc == SH_OK) rc = svg_write(svg, "map", path, err);
+    svg_end(svg);
+    picture_free(&picture);
     return rc;
 }

@@ -1,9 +1,10 @@
 /* Private to core/analysis: the parts of the map. Points (prcs, metres) make pixels (map.c); pixels make an
- * RGB image (map_draw.c, map_image.c), and that a PNG file (map_png.c). */
+ * image (map_draw.c), with labels where they find room (map_labels.c). */
 #ifndef CORE_ANALYSIS_MAP_INSIDE_H
 #define CORE_ANALYSIS_MAP_INSIDE_H
 
 #include "core/map.h"
+#include "core/picture.h"
 
 struct map_pixel {
     uint64_t levels; /* bit set: height levels hit, numbered modulo 64 */
@@ -18,28 +19,26 @@ struct map {
     uint32_t width, height;
     struct map_pixel *pixel; /* [height][width], the lowest y first */
     uint32_t n_stations;
-    double station_m[MAP_MAX_STATIONS][2];
+    struct map_station station[MAP_MAX_STATIONS];
     struct map_counts counts;
-};
-
-/* 8-bit RGB, row by row from the top. */
-struct map_image {
-    uint32_t width, height;
-    uint8_t *rgb;
 };
 
 /* Lightness 0..1 of structure and height 0..1 -> sRGB. */
 void map_colour(double structure, double height, uint8_t rgb[3]);
+/* The same of the pixels about a place, 0..1: 1 is a wall. */
+double map_structure(const struct map *map, uint32_t column, uint32_t row);
+/* Where a station is in the image. */
+void map_station_place(const struct map *map, uint32_t station, double place[2]);
 
-/* Outside the image nothing happens. */
-void map_image_fill(struct map_image *image, long column, long row, long width, long height, const uint8_t rgb[3]);
-/* Text of digits and "+-. mkN", 5 x 7 dots of `dot` pixels, upper left corner at column, row. */
-void map_image_text(struct map_image *image, long column, long row, long dot, const uint8_t rgb[3], const char *text);
-void map_image_triangle(struct map_image *image, const double corner[3][2], const uint8_t rgb[3]);
+enum {
+    MAP_STATION_PX = 9, /* from the centre of a station's mark to its corners */
+    MAP_TICK_PX = 24,   /* to the end of the tick of its heading */
+};
+extern const struct picture_type map_name_type, map_height_type;
 
-/* The whole image; the caller frees rgb. */
-int map_draw(const struct map *map, struct map_image *out, struct sh_err *err);
-
-int map_png_write(const struct map_image *image, const char *path, struct sh_err *err);
+/* Draws all but the pixels. */
+int map_draw_marks(const struct map *map, struct pen *pen, struct sh_err *err);
+/* The image with its pixels alone; the caller frees it. */
+int map_draw_pixels(const struct map *map, struct picture *out, struct sh_err *err);
 
 #endif

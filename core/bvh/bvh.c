@@ -65,13 +65,6 @@ static int build(struct bvh *bvh, const struct sh_report *report, struct sh_err 
     return rc;
 }
 
-static uint32_t native_packet(RTCDevice device)
-{
-    if (rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED)) return 16;
-    if (rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED)) return 8;
-    return 4;
-}
-
 static double seconds(void)
 {
     struct timespec t;
@@ -104,7 +97,7 @@ int bvh_create(const struct scene *scene, const double origin_m[3], double stati
         bvh_free(bvh);
         return rc;
     }
-    bvh->info.packet = native_packet(bvh->device);
+    bvh->info.packet = embree_packet(bvh->device);
     bvh->info.build_s = seconds() - start;
     bvh->info.bytes = (uint64_t)bvh->bytes + (uint64_t)scene->n_triangles * sizeof *bvh->triangle;
     *out = bvh;

@@ -1,5 +1,9 @@
 #include "core/embree.h"
 
+#include <stdio.h>
+
+#include "core/bvh.h"
+
 int embree_fail(enum RTCError code, const char *what, struct sh_err *err)
 {
     if (code == RTC_ERROR_OUT_OF_MEMORY)
@@ -8,4 +12,35 @@ int embree_fail(enum RTCError code, const char *what, struct sh_err *err)
     if (code == RTC_ERROR_UNSUPPORTED_CPU)
         return sh_fail(err, SH_EIO, "%s: this build of Embree can't run on this processor", what);
     return sh_fail(err, SH_EIO, "%s: Embree failed (RTCError %d)", what, (int)code);
+}
+
+uint32_t embree_packet(RTCDevice device)
+{
+    if (rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED)) return 16;
+    if (rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED)) return 8;
+    return 4;
+}
+
+/* In the steps in which Embree chooses its kernels. */
+static const char *instructions(void)
+{
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx512f")) return "AVX-512";
+    if (__builtin_cpu_supports("avx2")) return "AVX2";
+    if (__builtin_cpu_supports("avx")) return "AVX";
+    return __builtin_cpu_supports("sse4.2") ? "SSE4.2" : "SSE2";
+#elif defined(__aarch64__)
+    return "NEON";
+#else
+    return "plain";
+#endif
+}
+
+void bvh_engine(char *text, size_t len)
+{
+    RTCDevice device = rtcNewDevice("tessellation_cache_size=1,threads=1");
+    const int version = (int)rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_VERSION);
+    snprintf(text, len, "Embree %d.%d.%d, packets of %u, %s", version / 10000, version / 100 % 100, version % 100,
+             embree_packet(device), instructions());
+    rtcReleaseDevice(device);
 }

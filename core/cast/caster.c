@@ -3,6 +3,7 @@
  *     aim        aim.c            angles -> where the beam goes and begins, and what the encoders read of it
  *     nearest    nearest.c        the first surface that the beam's centre meets: what stands still, and
  *                                 bodies that move; exact (core/bvh.h)
+ *     tripod     tripod.c         what is hidden below the head
  *     optics     optics.c         where that is glass or a mirror: what is seen there (caster_follow)
  *     sub-rays   sub_rays.c       pulses with a footprint: which of them need more rays, and their echoes;
  *                sub_ray_plan.c   where in a footprint those rays lie
@@ -10,7 +11,7 @@
  *     points     points.c         positions, and entries of the block
  *
  * A stage that a setup does not need costs nothing. kernels*.c hold the arithmetic of the stages, texels.c
- * looks up textures. For setting up: outlines.c, floor.c. */
+ * looks up textures, colours.c has what else colours may show. For setting up: outlines.c, floor.c. */
 #include "core/cast.h"
 
 #include <stdlib.h>
@@ -87,6 +88,7 @@ static struct met centres(struct caster *c, const struct chunk *k)
 {
     const struct cast_setup *s = k->s;
     const int surfaces = s->detect != NULL && s->detect->surfaces != NULL && s->beam == NULL;
+    const int bodies = surfaces || (k->texels && caster_has_bodies(s)); /* of which a texel is to be known */
     return (struct met){.rays = {.n = k->n,
                                  .from = k->from,
                                  .dir = VEC3_IN(c->d, 0),
@@ -95,8 +97,9 @@ static struct met centres(struct caster *c, const struct chunk *k)
                                  .triangle = c->hit,
                                  .label = c->list.label,
                                  .steep = s->beam != NULL ? c->sub_rays->steep : NULL},
-                        .cosine = surfaces ? c->list.cosine : NULL,
-                        .body = surfaces ? c->body : NULL};
+                        .cosine = bodies ? c->list.cosine : NULL,
+                        .body = bodies ? c->body : NULL,
+                        .colour = k->texels ? c->list.colour : NULL};
 }
 
 /* Returns the number of echoes. */
@@ -109,8 +112,10 @@ static uint32_t cast_chunk(struct caster *c, struct chunk *k)
     begin_echoes(&c->list, k);
     const struct met met = centres(c, k);
     if (central) caster_nearest(c, s, &met);
-    if (met.body != NULL && s->detect->depth > 0) caster_follow(c, s, &met);
+    if (s->tripod != NULL && s->beam == NULL) caster_hide(c, k);
+    if (met.body != NULL && s->detect != NULL && s->detect->depth > 0) caster_follow(c, s, &met);
     if (s->beam != NULL) caster_sub_rays(c, k);
+    if (s->tripod != NULL && s->beam != NULL) caster_hide(c, k);
     caster_echoes(c, k);
     return caster_points(c, k);
 }
@@ -130,6 +135,8 @@ uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, cons
                      struct line_block *block)
 {
     struct chunk chunk = {.s = setup, .run = run, .block = block, .attributes = block->width_cns != NULL};
+    chunk.colours = block->rgb != NULL && setup->colour != NULL;
+    chunk.texels = chunk.colours && setup->colour->scale.mode == COLOUR_TEXTURE;
     uint32_t echoes = 0;
     begin_block(block, setup, run);
     /* With several entries a pulse, the pulses' times wait at the end of the array: no entry overtakes the

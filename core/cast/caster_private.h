@@ -30,6 +30,8 @@ struct chunk {
     struct bvh_origins from;
     int linear;     /* the directions that the encoders read are turned into the CRS already */
     int attributes; /* the block has room for them */
+    int colours;    /* likewise */
+    int texels;     /* colours are those of textures: they go along with what is met */
 };
 
 /* Rays, and what they meet first of all there is. */
@@ -38,6 +40,8 @@ struct met {
     /* only where surfaces are modelled or bodies move, else NULL: */
     double *cosine; /* of the incidence */
     uint8_t *body;  /* 0: what stands still; k + 1: mover k */
+    /* only where colours are those of textures, else NULL: */
+    uint32_t *colour; /* packed as surface_colour has it */
 };
 
 /* Echoes of a pulse after its first one: entries at .. at + n of the list. */
@@ -67,13 +71,15 @@ struct echo_list {
     double amplitude[CAST_LIST];
     int16_t refl_cdb[CAST_LIST], amplitude_cdb[CAST_LIST];
     float width_m[CAST_LIST];
+    uint32_t colour[CAST_LIST]; /* packed */
 };
 
 /* What a ray met after it passed glass or left a mirror. */
 struct path_hit {
     double range_m, cosine, energy; /* along the folded way; the share of the ray's energy */
     uint32_t label, next;           /* the ray's next one, or CAST_NO_PATH */
-    uint8_t ghost;
+    uint32_t triangle, colour;
+    uint8_t ghost, body;
 };
 
 /* Rays that go on through glass or off a mirror: where they begin, where they go, what they met before. */
@@ -85,7 +91,7 @@ struct path_rays {
     double energy[CHUNK];
     uint8_t ghost[CHUNK];
     double range_m[CHUNK], cosine[CHUNK];
-    uint32_t label[CHUNK], hit[CHUNK];
+    uint32_t label[CHUNK], hit[CHUNK], colour[CHUNK];
     uint8_t body[CHUNK];
     /* what was found on the ways, chained per ray: first[i] .. last[i] */
     uint32_t first[CHUNK], last[CHUNK];
@@ -124,8 +130,22 @@ void caster_aim_read(struct caster *c, struct chunk *k);
 
 /* ---- nearest.c */
 void caster_nearest(struct caster *c, const struct cast_setup *s, const struct met *met);
-/* ---- texels.c: labels of what has been met get the reflectance there, as surface_texel has it. Nothing
- * where the surfaces have no textures. */
+/* Number of the tripod's legs among the bodies, as in struct met. */
+enum { CAST_LEGS = CAST_MAX_MOVERS + 1 };
+/* Body k > 0 of those that a ray may meet. */
+static inline const struct cast_mover *caster_body(const struct cast_setup *s, uint8_t body)
+{
+    return body == CAST_LEGS ? &s->tripod->legs : &s->mover[body - 1];
+}
+static inline int caster_has_bodies(const struct cast_setup *s)
+{
+    return s->n_movers != 0 || (s->tripod != NULL && s->tripod->has_legs);
+}
+/* ---- tripod.c: pulses into the tripod's cone lose their echoes. With single rays before optics, so that nothing is
+ * followed; with footprints when those have become echoes. */
+void caster_hide(struct caster *c, const struct chunk *k);
+/* ---- texels.c: labels of what has been met get the reflectance there, as surface_texel has it, and met->colour
+ * the colour. Nothing where the surfaces have no textures, and no colours are asked for. */
 void caster_texels(const struct cast_setup *s, const struct met *met);
 
 /* ---- optics.c */
@@ -146,6 +166,9 @@ uint32_t echoes_further(struct echo_list *list, uint32_t pulse, uint32_t n);
 void caster_echoes(struct caster *c, const struct chunk *k);
 /* How many echoes a pulse may send. */
 uint32_t caster_max_echoes(const struct cast_setup *s);
+
+/* ---- colours.c: the colours of all echoes in the list that is to be sent. */
+void caster_colours(struct caster *c, const struct chunk *k);
 
 /* ---- points.c: entries of the block from k->at on. Returns the number of echoes. */
 uint32_t caster_points(struct caster *c, struct chunk *k);

@@ -5,6 +5,7 @@
 
 #include "core/cast/caster_private.h"
 #include "core/rng.h"
+#include "core/surface.h"
 
 uint32_t echoes_further(struct echo_list *l, uint32_t pulse, uint32_t n)
 {
@@ -32,6 +33,7 @@ static void list_paths(struct caster *c, const struct chunk *k)
             l->energy[at] = hit->energy;
             l->label[at] = hit->label;
             l->ghost[at] = hit->ghost;
+            if (k->texels) l->colour[at] = hit->colour;
             l->number[at] = (uint8_t)number++;
         }
     }
@@ -49,8 +51,9 @@ static int comes_back(const struct echo_list *l, uint32_t i)
 }
 
 /* Echo `at` of the list becomes what several returns are together. */
-static void take_echo(struct echo_list *l, uint32_t at, uint8_t number, const struct beam_echo *echo)
+static void take_echo(struct echo_list *l, uint32_t at, uint8_t number, const struct beam_echo *echo, int texels)
 {
+    if (texels) l->colour[at] = echo->colour;
     l->range_m[at] = echo->range_m;
     l->rho[at] = echo->back;
     l->label[at] = echo->label;
@@ -60,7 +63,7 @@ static void take_echo(struct echo_list *l, uint32_t at, uint8_t number, const st
 
 /* Returns of a pulse that are nearer to each other than the range resolution make one echo. One that nothing
  * comes back from stays apart, and keeps its number. */
-static uint32_t merge_pulse(struct echo_list *l, const struct beam_merging *how, const struct further *f)
+static uint32_t merge_pulse(struct echo_list *l, const struct beam_merging *how, const struct further *f, int texels)
 {
     const uint32_t n = f->n + 1;
     struct beam_return r[LINE_MAX_ECHOES];
@@ -71,6 +74,7 @@ static uint32_t merge_pulse(struct echo_list *l, const struct beam_merging *how,
         uint32_t i = place_of(f, j);
         r[j] = (struct beam_return){
             .range_m = l->range_m[i], .energy = l->rho[i], .back = l->rho[i], .label = l->label[i]};
+        if (texels) r[j].colour = l->colour[i];
     }
     for (uint32_t j = 0, end; j < n; j = end) {
         uint32_t found = 1;
@@ -80,11 +84,14 @@ static uint32_t merge_pulse(struct echo_list *l, const struct beam_merging *how,
             found = beam_merge(how, r + j, end - j, echo, &left_out);
         } else {
             end = j + 1;
-            echo[0] = (struct beam_echo){
-                .range_m = r[j].range_m, .back = r[j].back, .width_m = (float)how->pulse_m, .label = r[j].label};
+            echo[0] = (struct beam_echo){.range_m = r[j].range_m,
+                                         .back = r[j].back,
+                                         .width_m = (float)how->pulse_m,
+                                         .label = r[j].label,
+                                         .colour = r[j].colour};
         }
         for (uint32_t e = 0; e < found; e++, to++)
-            take_echo(l, place_of(f, to), (uint8_t)to, &echo[e]);
+            take_echo(l, place_of(f, to), (uint8_t)to, &echo[e], texels);
     }
     return to - 1;
 }
@@ -110,7 +117,7 @@ static void weigh_returns(struct caster *c, const struct chunk *k)
     for (uint32_t i = k->n; i < l->n; i++)
         l->label[i] += l->ghost[i] ? d->ghost_label : 0;
     for (uint32_t g = 0; g < l->n_further && d->separation_m > 0.0; g++)
-        l->further[g].n = merge_pulse(l, &how, &l->further[g]);
+        l->further[g].n = merge_pulse(l, &how, &l->further[g], k->texels);
 }
 
 static uint32_t count_echoes(const struct echo_list *l)
@@ -177,6 +184,7 @@ struct heard {
     uint32_t label;
     int16_t refl_cdb, amplitude_cdb;
     float width_m;
+    uint32_t colour;
 };
 
 static uint32_t hear(const struct echo_list *l, const double *strength, const struct further *f, struct heard *h)
@@ -185,8 +193,8 @@ static uint32_t hear(const struct echo_list *l, const double *strength, const st
     for (uint32_t j = 0; j <= f->n; j++) {
         uint32_t i = place_of(f, j);
         if (!isnan(l->range_m[i]))
-            h[n++] = (struct heard){l->range_m[i],  strength[i],         l->key[i],    l->label[i],
-                                    l->refl_cdb[i], l->amplitude_cdb[i], l->width_m[i]};
+            h[n++] = (struct heard){l->range_m[i],  strength[i],         l->key[i],     l->label[i],
+                                    l->refl_cdb[i], l->amplitude_cdb[i], l->width_m[i], l->colour[i]};
     }
     return n;
 }
@@ -255,9 +263,21 @@ static void choose_echoes(struct caster *c, const struct chunk *k)
             l->refl_cdb[i] = h[j].refl_cdb;
             l->amplitude_cdb[i] = h[j].amplitude_cdb;
             l->width_m[i] = h[j].width_m;
+            if (k->texels) l->colour[i] = h[j].colour;
         }
     }
     l->n = end;
+}
+
+/* What meets a surface that gives no echo. */
+static void silence(struct caster *c, const struct cast_setup *s)
+{
+    struct echo_list *l = &c->list;
+    for (uint32_t i = 0; i < l->n; i++) {
+        if (isnan(l->range_m[i]) || !s->silent[surface_of_label(l->label[i])]) continue;
+        l->range_m[i] = (double)NAN;
+        c->counters.faint++;
+    }
 }
 
 void caster_echoes(struct caster *c, const struct chunk *k)
@@ -266,6 +286,7 @@ void caster_echoes(struct caster *c, const struct chunk *k)
     struct echo_list *l = &c->list;
     if (s->beam == NULL && s->detect != NULL && s->detect->depth > 0) list_paths(c, k);
     kernel_limit(l->range_m, s->range_min_m, s->range_max_m, l->n);
+    if (s->silent != NULL) silence(c, s);
     if (s->beam == NULL && s->detect != NULL) weigh_returns(c, k);
     if (s->detect != NULL || s->noise_on) make_keys(l, k);
     if (s->detect != NULL) detect(c, k);

@@ -1,4 +1,4 @@
-/* What the rays of a chunk meet first: the scene that stands still, and the bodies that move in it. */
+/* What the rays of a chunk meet first: the scene that stands still, the bodies that move in it, the tripod's legs. */
 #include <math.h>
 #include <string.h>
 
@@ -32,10 +32,10 @@ static void keep_nearer(struct caster *c, const struct cast_mover *m, uint8_t bo
     }
 }
 
-/* A moving body, cast in its own frame: what it hides gives way. */
-static void cast_mover(struct caster *c, const struct cast_setup *s, uint32_t which, const struct met *met)
+/* A body that is not of the scene, cast in its own frame: what it hides gives way. */
+static void cast_body(struct caster *c, const struct cast_setup *s, uint8_t body, const struct met *met)
 {
-    const struct cast_mover *m = &s->mover[which];
+    const struct cast_mover *m = caster_body(s, body);
     const struct bvh_origins *from = &met->rays.from;
     const int own = from->own.x != NULL;
     const double at[3] = {own ? from->own.x[0] : from->at_m[0], own ? from->own.y[0] : from->at_m[1],
@@ -62,7 +62,7 @@ static void cast_mover(struct caster *c, const struct cast_setup *s, uint32_t wh
     rays.triangle = c->mover_hit;
     rays.label = c->mover_label;
     bvh_hits(c->bvh, m->bvh, &rays);
-    keep_nearer(c, m, (uint8_t)(which + 1), met);
+    keep_nearer(c, m, body, met);
 }
 
 static int is_from_station(const struct cast_setup *s, const struct bvh_origins *from)
@@ -82,6 +82,7 @@ void caster_nearest(struct caster *c, const struct cast_setup *s, const struct m
         memset(met->body, 0, rays->n * sizeof *met->body);
     }
     for (uint32_t i = 0; i < s->n_movers; i++)
-        cast_mover(c, s, i, met);
+        cast_body(c, s, (uint8_t)(i + 1), met);
+    if (s->tripod != NULL && s->tripod->has_legs) cast_body(c, s, CAST_LEGS, met);
     caster_texels(s, met);
 }

@@ -24,7 +24,7 @@ int caster_is_bare(const struct cast_setup *s, uint32_t label, double rho)
 /* Unit normal of a triangle, prcs. */
 static void normal_of(const struct cast_setup *s, uint8_t body, uint32_t hit, double n[3])
 {
-    const struct cast_mover *m = body != 0 ? &s->mover[body - 1] : NULL;
+    const struct cast_mover *m = body != 0 ? caster_body(s, body) : NULL;
     const double *at_rest = bvh_plane(m != NULL ? m->bvh : s->bvh, hit)->n;
     double length = sqrt(vec3_dot(at_rest, at_rest));
     for (int i = 0; i < 3; i++)
@@ -81,6 +81,7 @@ static void copy_ray(struct path_rays *p, uint32_t to, uint32_t from)
     p->label[to] = p->label[from];
     p->hit[to] = p->hit[from];
     p->body[to] = p->body[from];
+    p->colour[to] = p->colour[from];
 }
 
 /* Fills the last packet up. */
@@ -130,7 +131,10 @@ static void keep(struct path_rays *p, uint32_t k)
                                      .energy = p->energy[k],
                                      .label = p->label[k],
                                      .next = CAST_NO_PATH,
-                                     .ghost = p->ghost[k]};
+                                     .triangle = p->hit[k],
+                                     .colour = p->colour[k],
+                                     .ghost = p->ghost[k],
+                                     .body = p->body[k]};
     if (p->first[ray] == CAST_NO_PATH)
         p->first[ray] = at;
     else
@@ -155,7 +159,8 @@ void caster_follow(struct caster *c, const struct cast_setup *s, const struct me
                                          .triangle = p->hit,
                                          .label = p->label},
                                 .cosine = p->cosine,
-                                .body = p->body};
+                                .body = p->body,
+                                .colour = first->colour != NULL ? p->colour : NULL};
         caster_nearest(c, s, &met);
         for (uint32_t k = 0; k < p->n; k++) {
             if (k % SCHEDULE_PACKET == 0) on = fill_up(p, on);

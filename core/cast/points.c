@@ -42,6 +42,12 @@ static uint32_t place(struct caster *c, const struct chunk *k, uint32_t at, uint
     return kernel_geo(&VEC3_IN(e, 0), s->xyz_scale, n, out);
 }
 
+static void put_colour(uint8_t to[3], uint32_t colour)
+{
+    for (int i = 0; i < 3; i++)
+        to[i] = (uint8_t)(colour >> (16 - 8 * i));
+}
+
 /* Of all entries but their times and three numbers: the first echoes of the pulses. Returns how many there
  * are. */
 static uint32_t write_firsts(struct caster *c, const struct chunk *k)
@@ -54,6 +60,8 @@ static uint32_t write_firsts(struct caster *c, const struct chunk *k)
     uint32_t echoes = kernel_entries(l->range_m, l->label, k->n, b->echo + k->at, b->label + k->at);
     for (uint32_t i = 0; i < k->n; i++)
         refl_cdb[i] = signal && echo[i] != 0 ? l->refl_cdb[i] : (int16_t)LINE_REFL_NONE;
+    for (uint32_t i = 0; i < k->n && k->colours; i++)
+        put_colour(b->rgb[k->at + i], l->colour[i]);
     if (!k->attributes) return echoes;
     kernel_widths(l->width_m, echo, k->n, b->width_cns + k->at);
     for (uint32_t i = 0; i < k->n; i++)
@@ -70,6 +78,7 @@ static void move_entries(struct line_block *b, uint32_t to, uint32_t from, uint3
     memmove(b->refl_cdb + to, b->refl_cdb + from, n * sizeof *b->refl_cdb);
     memmove(b->label + to, b->label + from, n * sizeof *b->label);
     memmove(b->echo + to, b->echo + from, n * sizeof *b->echo);
+    if (b->rgb != NULL) memmove(b->rgb + to, b->rgb + from, n * sizeof *b->rgb);
     if (b->width_cns == NULL) return;
     memmove(b->width_cns + to, b->width_cns + from, n * sizeof *b->width_cns);
     memmove(b->amplitude_cdb + to, b->amplitude_cdb + from, n * sizeof *b->amplitude_cdb);
@@ -87,6 +96,7 @@ static void write_further(struct caster *c, const struct chunk *k, uint32_t to, 
     b->refl_cdb[to] = signal ? l->refl_cdb[i] : (int16_t)LINE_REFL_NONE;
     b->label[to] = (uint16_t)l->label[i];
     b->echo[to] = echo;
+    if (k->colours) put_colour(b->rgb[to], l->colour[i]);
     if (!k->attributes) return;
     kernel_widths(&l->width_m[i], &echo, 1, &b->width_cns[to]);
     b->amplitude_cdb[to] = signal ? l->amplitude_cdb[i] : (int16_t)LINE_AMPLITUDE_NONE;
@@ -137,6 +147,7 @@ static void keep_entry(struct line_block *b, uint32_t to, uint32_t from, int fit
     b->dt_ns[to] = b->dt_ns[from];
     b->refl_cdb[to] = fits ? b->refl_cdb[from] : (int16_t)LINE_REFL_NONE;
     b->label[to] = fits ? b->label[from] : (uint16_t)LINE_LABEL_NONE;
+    if (b->rgb != NULL) memmove(b->rgb[to], fits ? b->rgb[from] : colour_grey, sizeof *b->rgb);
     if (b->width_cns == NULL) return;
     b->amplitude_cdb[to] = fits ? b->amplitude_cdb[from] : (int16_t)LINE_AMPLITUDE_NONE;
     b->width_cns[to] = fits ? b->width_cns[from] : (uint16_t)LINE_WIDTH_NONE;
@@ -177,6 +188,7 @@ uint32_t caster_points(struct caster *c, struct chunk *k)
     const uint32_t further = l->n - k->n;
     uint32_t entries = l->n;
     if (further > 0) follow_pulse(c, k);
+    if (k->colours) caster_colours(c, k);
     if (d != NULL && d->ball != NULL) {
         const struct detect_points points = {l->n, l->key, l->range_m, l->mirror_turn, l->pan_turn, k->s->scan_key};
         detect_move_in_ball(d->ball, k->s->rotation, &points);

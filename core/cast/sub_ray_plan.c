@@ -84,6 +84,7 @@ static int known_centre(const struct caster *c, const struct chunk *k, struct jo
     r->energy = part->energy;
     r->sigma_m = k->attributes ? beam_part_sigma(&k->s->beam->beam, &job->sight, tri->n, r->range_m, part) : 0.0f;
     r->label = c->list.label[p];
+    if (k->texels) r->colour = c->list.colour[p];
     return 1;
 }
 

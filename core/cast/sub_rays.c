@@ -33,6 +33,7 @@ static void look_through(struct caster *c, const struct cast_setup *s, const str
             b->cosine[to] = p->found[k].cosine;
             b->share[to] = p->found[k].energy;
             b->label[to] = p->found[k].label;
+            if (met->colour != NULL) b->colour[to] = p->found[k].colour;
             b->ghost[to] = p->found[k].ghost;
         }
         b->count[at + i] = b->n - b->first[at + i];
@@ -63,11 +64,12 @@ static void mark_packets(struct sub_ray_work *w, uint32_t first)
 }
 
 /* Casts what is in the pool from ray `first` on. */
-static void cast_pool(struct caster *c, const struct cast_setup *s, uint32_t first)
+static void cast_pool(struct caster *c, const struct chunk *k, uint32_t first)
 {
+    const struct cast_setup *s = k->s;
     struct pool *p = &c->sub_rays->pool;
     mark_packets(c->sub_rays, first);
-    int plain = s->detect == NULL && s->n_movers == 0, through = s->detect != NULL && s->detect->depth > 0;
+    int plain = s->detect == NULL && !caster_has_bodies(s), through = s->detect != NULL && s->detect->depth > 0;
     if (first == 0) c->sub_rays->beyond.n = 0;
     c->counters.sub_rays += p->n - first;
     for (uint32_t at = first, n; at < p->n; at += n) {
@@ -83,11 +85,12 @@ static void cast_pool(struct caster *c, const struct cast_setup *s, uint32_t fir
                                    .triangle = p->triangle + at,
                                    .label = p->label + at},
                           .cosine = plain ? NULL : p->cosine + at,
-                          .body = plain ? NULL : p->body + at};
+                          .body = plain ? NULL : p->body + at,
+                          .colour = k->texels ? p->colour + at : NULL};
         caster_nearest(c, s, &met);
         met.rays.scattered = c->sub_rays->scattered;
         if (through) look_through(c, s, &met, at);
-        for (uint32_t i = at; i < at + n && s->n_movers != 0; i++)
+        for (uint32_t i = at; i < at + n && caster_has_bodies(s); i++)
             if (p->body[i] != 0) p->triangle[i] = BVH_NO_TRIANGLE; /* not of the scene */
     }
     weigh_pool(c, s, first);
@@ -108,7 +111,7 @@ static void look_further(struct caster *c, const struct chunk *k)
         double limit_m = far_m + 4.0 * beam_radius(&s->beam->beam, far_m);
         if (job->next_m < limit_m) plan_parts(c, k, job, limit_m, job->lines);
     }
-    if (w->pool.n != first) cast_pool(c, s, first);
+    if (w->pool.n != first) cast_pool(c, k, first);
 }
 
 /* A return, with rho of its surface. */
@@ -116,6 +119,10 @@ static void add_return(struct caster *c, const struct cast_setup *s, const struc
                        double rho)
 {
     struct beam_return *to = &c->sub_rays->returns[c->sub_rays->n_returns];
+    if (s->silent != NULL && s->silent[surface_of_label(r->label)]) {
+        c->sub_rays->is_silenced = 1;
+        return;
+    }
     *to = *r;
     to->back = r->energy;
     if (s->detect != NULL && s->detect->surfaces != NULL) {
@@ -152,12 +159,14 @@ static void add_met(struct caster *c, const struct chunk *k, const struct job *j
     const struct beyond *b = &c->sub_rays->beyond;
     struct beam_return r = {.range_m = p->range_m[i], .energy = p->energy[i], .label = p->label[i]};
     if (isnan(p->range_m[i])) return;
+    if (k->texels) r.colour = p->colour[i];
     if (k->attributes) r.sigma_m = met_sigma(c, s, job, i);
     add_return(c, s, &r, 1.0, p->rho[i]);
     if (s->detect == NULL || s->detect->depth == 0) return;
     for (uint32_t j = b->first[i]; j < b->first[i] + b->count[i]; j++) {
         r.range_m = b->range_m[j];
         r.label = b->label[j];
+        if (k->texels) r.colour = b->colour[j];
         if (k->attributes) r.sigma_m = beam_round_sigma(&s->beam->beam, r.range_m, b->cosine[j], (double)p->xx[i]);
         uint32_t before = c->sub_rays->n_returns;
         add_return(c, s, &r, b->share[j], b->rho[j]);
@@ -186,12 +195,14 @@ static void finish_job(struct caster *c, const struct chunk *k, const struct job
         return;
     }
     w->n_returns = 0;
+    w->is_silenced = 0;
     if (job->centre.energy > 0.0) add_centre(c, k->s, job);
     for (uint32_t i = job->first; i < job->first + job->n; i++)
         add_met(c, k, job, i);
     /* Detection decides which of many are left out. */
     beam_merging(&k->s->beam->beam, k->s->detect != NULL ? LINE_MAX_ECHOES : caster_max_echoes(k->s), &how);
     uint32_t n = beam_merge(&how, w->returns, w->n_returns, &w->echo[w->n_echoes], &c->counters.crowded);
+    c->counters.faint += w->is_silenced && n == 0;
     w->echoes_of[job->pulse].first = w->n_echoes;
     w->echoes_of[job->pulse].n = n;
     w->n_echoes += n;
@@ -200,7 +211,7 @@ static void finish_job(struct caster *c, const struct chunk *k, const struct job
 static void run_jobs(struct caster *c, const struct chunk *k)
 {
     struct sub_ray_work *w = c->sub_rays;
-    cast_pool(c, k->s, 0);
+    cast_pool(c, k, 0);
     for (int pass = 0; pass < MAX_PASSES && k->s->beam->mode == BEAM_ADAPTIVE; pass++)
         look_further(c, k);
     for (uint32_t j = 0; j < w->n_jobs; j++)
@@ -313,6 +324,7 @@ static void list_echoes(struct caster *c, const struct chunk *k)
             l->number[at] = e[j].number;
             l->rho[at] = (double)(float)e[j].back; /* as fine as beam_merge compares them */
             if (k->attributes) l->width_m[at] = e[j].width_m;
+            if (k->texels) l->colour[at] = e[j].colour;
         }
     }
 }

@@ -19,6 +19,7 @@ struct pool {
     double range_m[POOL_ROOM], cosine[POOL_ROOM], energy[POOL_ROOM];
     double rho[POOL_ROOM]; /* of the surface; touched only where surfaces are modelled */
     uint32_t triangle[POOL_ROOM], label[POOL_ROOM];
+    uint32_t colour[POOL_ROOM]; /* touched only where colours are those of textures */
     uint8_t body[POOL_ROOM];
     uint8_t begins[POOL_ROOM]; /* a packet */
     uint32_t n;
@@ -34,7 +35,7 @@ struct beyond {
     double range_m[POOL_ROOM * CAST_MAX_DEPTH], cosine[POOL_ROOM * CAST_MAX_DEPTH];
     double share[POOL_ROOM * CAST_MAX_DEPTH]; /* of the sub-ray's energy */
     double rho[POOL_ROOM * CAST_MAX_DEPTH];
-    uint32_t label[POOL_ROOM * CAST_MAX_DEPTH];
+    uint32_t label[POOL_ROOM * CAST_MAX_DEPTH], colour[POOL_ROOM * CAST_MAX_DEPTH];
     uint8_t ghost[POOL_ROOM * CAST_MAX_DEPTH];
 };
 
@@ -61,6 +62,7 @@ struct sub_ray_work {
     struct pool pool;
     struct beam_return returns[(BEAM_MAX_SUBRAYS + 1) * (1 + CAST_MAX_DEPTH)];
     uint32_t n_returns;
+    int is_silenced; /* the job at hand met a surface that gives no echo */
     struct {
         uint32_t first, n;
     } echoes_of[CHUNK]; /* by pulse */

@@ -4,29 +4,54 @@
 #include "core/cast/caster_private.h"
 #include "core/surface.h"
 
-void caster_texels(const struct cast_setup *s, const struct met *met)
+/* Of what ray i has met. 0: there are none. */
+static int uv_of(const struct cast_setup *s, const struct met *met, uint32_t i, double uv[2])
 {
     const struct bvh_rays *rays = &met->rays;
-    const struct surface_table *table = s->detect != NULL ? s->detect->surfaces : NULL;
-    if (table == NULL || table->texture == NULL) return;
+    const struct cast_mover *m = met->body != NULL && met->body[i] != 0 ? caster_body(s, met->body[i]) : NULL;
+    const struct scene *scene = bvh_scene(m != NULL ? m->bvh : s->bvh);
+    if (scene->uv == NULL) return 0;
+    const double d[3] = VEC3_AT(rays->dir, i);
+    double at[3], p[3];
+    bvh_origin_of(&rays->from, i, at);
+    for (int k = 0; k < 3; k++)
+        at[k] += rays->range_m[i] * d[k];
+    for (int k = 0; k < 3; k++) /* where that was at rest */
+        p[k] = m == NULL ? at[k]
+                         : m->rotation[k] * (at[0] - m->shift_m[0]) + m->rotation[3 + k] * (at[1] - m->shift_m[1]) +
+                               m->rotation[6 + k] * (at[2] - m->shift_m[2]);
+    const uint32_t *corner = scene->triangle[rays->triangle[i]];
+    const double *const vertex[3] = {scene->vertex_m[corner[0]], scene->vertex_m[corner[1]],
+                                     scene->vertex_m[corner[2]]};
+    scene_uv_at(scene, rays->triangle[i], vertex, p, uv);
+    return isfinite(uv[0]) && isfinite(uv[1]);
+}
+
+static void set_reflectances(const struct cast_setup *s, const struct met *met, const struct surface_table *table)
+{
+    const struct bvh_rays *rays = &met->rays;
+    double uv[2];
     for (uint32_t i = 0; i < rays->n; i++) {
         if (isnan(rays->range_m[i]) || rays->label[i] >= table->n || table->texture[rays->label[i]] == NULL) continue;
-        const struct cast_mover *m = met->body != NULL && met->body[i] != 0 ? &s->mover[met->body[i] - 1] : NULL;
-        const struct scene *scene = bvh_scene(m != NULL ? m->bvh : s->bvh);
-        if (scene->uv == NULL) continue;
-        const double d[3] = VEC3_AT(rays->dir, i);
-        double at[3], p[3], uv[2];
-        bvh_origin_of(&rays->from, i, at);
-        for (int k = 0; k < 3; k++)
-            at[k] += rays->range_m[i] * d[k];
-        for (int k = 0; k < 3; k++) /* where that was at rest */
-            p[k] = m == NULL ? at[k]
-                             : m->rotation[k] * (at[0] - m->shift_m[0]) + m->rotation[3 + k] * (at[1] - m->shift_m[1]) +
-                                   m->rotation[6 + k] * (at[2] - m->shift_m[2]);
-        const uint32_t *corner = scene->triangle[rays->triangle[i]];
-        const double *const vertex[3] = {scene->vertex_m[corner[0]], scene->vertex_m[corner[1]],
-                                         scene->vertex_m[corner[2]]};
-        scene_uv_at(scene, rays->triangle[i], vertex, p, uv);
-        if (isfinite(uv[0]) && isfinite(uv[1])) rays->label[i] = surface_texel(table, rays->label[i], uv);
+        if (uv_of(s, met, i, uv)) rays->label[i] = surface_texel(table, rays->label[i], uv);
     }
+}
+
+static void set_colours(const struct cast_setup *s, const struct met *met, const struct surface_colours *colours)
+{
+    const struct bvh_rays *rays = &met->rays;
+    double uv[2];
+    for (uint32_t i = 0; i < rays->n; i++) {
+        const uint32_t label = surface_of_label(rays->label[i]);
+        if (isnan(rays->range_m[i])) continue;
+        const int has_image = label < colours->n && colours->image[label] != NULL;
+        met->colour[i] = surface_colour(colours, label, has_image && uv_of(s, met, i, uv) ? uv : NULL);
+    }
+}
+
+void caster_texels(const struct cast_setup *s, const struct met *met)
+{
+    const struct surface_table *table = s->detect != NULL ? s->detect->surfaces : NULL;
+    if (table != NULL && table->texture != NULL) set_reflectances(s, met, table);
+    if (met->colour != NULL) set_colours(s, met, s->colour->surfaces);
 }

@@ -97,7 +97,8 @@ static int make_echo(const struct beam_merging *how, const struct beam_return *r
                                .energy = energy,
                                .back = back,
                                .width_m = (float)beam_echo_width(how->pulse_m, a.variance),
-                               .label = r[a.strongest].label};
+                               .label = r[a.strongest].label,
+                               .colour = r[a.strongest].colour};
     return 1;
 }
 

@@ -6,7 +6,7 @@
 #include "core/angle.h"
 #include "core/grow.h"
 #include "core/mat3.h"
-#include "core/pose/csv.h"
+#include "core/csv.h"
 #include "core/pose/trajectory.h"
 
 static const double STEP_S = 0.02;  /* of the samples that way-points are turned into */

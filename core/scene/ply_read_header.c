@@ -52,8 +52,20 @@ static int read_type(struct text *t, enum ply_type *type, struct text_span word,
     return fail(t, err, "unknown property type", word);
 }
 
-const char *const ply_scalar_name[PLY_SCALARS] = {
-    [PLY_X] = "x", [PLY_Y] = "y", [PLY_Z] = "z", [PLY_STATION] = "station", [PLY_ECHO] = "echo", [PLY_LABEL] = "label"};
+const char *const ply_scalar_name[PLY_SCALARS] = {[PLY_X] = "x",
+                                                  [PLY_Y] = "y",
+                                                  [PLY_Z] = "z",
+                                                  [PLY_STATION] = "station",
+                                                  [PLY_ECHO] = "echo",
+                                                  [PLY_LABEL] = "label",
+                                                  [PLY_TIME] = "time",
+                                                  [PLY_RANGE] = "range",
+                                                  [PLY_REFLECTANCE] = "reflectance",
+                                                  [PLY_ECHO_COUNT] = "echo_count",
+                                                  [PLY_AMPLITUDE] = "amplitude",
+                                                  [PLY_RED] = "red",
+                                                  [PLY_GREEN] = "green",
+                                                  [PLY_BLUE] = "blue"};
 
 static enum ply_use use_of(const struct ply_element *e, const struct ply_property *p, struct text_span name)
 {
@@ -91,8 +103,11 @@ static int read_property(struct ply_header *h, struct text *t, struct sh_err *er
     word = text_word(t);
     if (word.n == 0) return text_fail(t, t->line, SH_EINPUT, err, "a property has no name");
     p->use = use_of(e, p, word);
-    for (int i = e->first; i < h->n_properties - 1; i++)
-        if (p->use != PLY_SKIP && h->property[i].use == p->use) return fail(t, err, "property is there twice:", word);
+    for (int i = e->first; i < h->n_properties - 1; i++) {
+        if (p->use == PLY_SKIP || h->property[i].use != p->use) continue;
+        if (p->use < PLY_TIME || p->use >= PLY_SCALARS) return fail(t, err, "property is there twice:", word);
+        p->use = PLY_SKIP; /* of what says nothing about the place the first one counts */
+    }
     return SH_OK;
 }
 

@@ -30,9 +30,8 @@ static void set_sweep(const struct schedule_segment *seg, const struct schedule_
 static void set_ring(const struct schedule_segment *seg, const struct schedule_line *line, struct schedule_run *run)
 {
     const struct emitter *e = seg->spec.emitter;
-    const int64_t step = (int64_t)line->r_first_pulse - (int64_t)e->front_step;
-    if (e->kind == EMITTER_SPHERE)
-        run->mirror0_turn = (double)(line->line % e->rings) * 0.5 / (double)(e->rings - 1) - 0.25;
+    const int64_t step = (int64_t)line->r_first_pulse - (int64_t)seg->front_step;
+    if (e->kind == EMITTER_SPHERE) run->mirror0_turn = emitter_ring_turn(e, line->line % e->rings);
     run->pan0_turn = (double)(e->turn * step) / (double)e->steps;
     run->pan_step_turn = (double)e->turn / (double)e->steps;
 }

@@ -61,11 +61,52 @@ void emitter_set_sphere(struct emitter *e, int64_t step_udeg)
 {
     const int64_t half = step_udeg / 2;
     *e = (struct emitter){.kind = EMITTER_SPHERE,
-                          .steps = (uint32_t)((TURN_UDEG + half) / step_udeg),
-                          .rings = (uint32_t)((TURN_UDEG / 2 + half) / step_udeg) + 1,
+                          .steps = emitter_sphere_steps(step_udeg),
+                          .gaps = (uint32_t)((TURN_UDEG / 2 + half) / step_udeg),
                           .asked_udeg = step_udeg,
                           .turn = 1};
+    e->rings = e->gaps + 1;
     e->last_step = e->steps - 1;
+}
+
+int emitter_sphere_is_exact(const struct emitter *e)
+{
+    return TURN_UDEG % e->asked_udeg == 0 && TURN_UDEG / 2 % e->asked_udeg == 0;
+}
+
+double emitter_ring_turn(const struct emitter *e, uint64_t ring)
+{
+    if (e->gaps == 0) return (double)e->circle_udeg / (double)TURN_UDEG;
+    return (double)(e->first_ring + ring) * 0.5 / (double)e->gaps - 0.25;
+}
+
+int emitter_ring_is_pole(const struct emitter *e, uint64_t ring)
+{
+    if (e->gaps == 0) return e->circle_udeg == -TURN_UDEG / 4 || e->circle_udeg == TURN_UDEG / 4;
+    return e->first_ring + ring == 0 || e->first_ring + ring == e->gaps;
+}
+
+int emitter_set_rings(struct emitter *e, int64_t start_udeg, int64_t stop_udeg, struct sh_err *err)
+{
+    const int64_t half = TURN_UDEG / 2, from = start_udeg + half / 2, to = stop_udeg + half / 2, gaps = e->gaps;
+    if (start_udeg == stop_udeg) {
+        e->rings = 1;
+        e->first_ring = e->gaps = 0;
+        e->circle_udeg = start_udeg;
+        return SH_OK;
+    }
+    int64_t first = ((from > 0 ? from - 1 : 0) * gaps + half - 1) / half, last = (to + 1) * gaps / half;
+    if (last > gaps) last = gaps;
+    if (first > last)
+        return sh_fail(
+            err, SH_EINPUT,
+            "no ring lies from %.10g to %.10g deg; allowed are limits around one, such as %.10g or %.10g deg, "
+            "or twice the same: a circle",
+            1e-6 * (double)start_udeg, 1e-6 * (double)stop_udeg, 180.0 * (double)last / (double)gaps - 90.0,
+            180.0 * (double)first / (double)gaps - 90.0);
+    e->first_ring = (uint32_t)first;
+    e->rings = (uint32_t)(last - first) + 1;
+    return SH_OK;
 }
 
 void emitter_set_directions(struct emitter *e, const struct emitter_firing *direction, uint32_t n)
@@ -89,10 +130,18 @@ int64_t emitter_step_udeg(const struct emitter *e, int64_t step)
 
 static void describe_sphere(const struct emitter *e, char *buf, size_t len)
 {
-    const int exact = TURN_UDEG % e->asked_udeg == 0 && TURN_UDEG / 2 % e->asked_udeg == 0;
-    int n = snprintf(buf, len, "sphere, %u rings %.6g deg apart, of %u steps of %.6g deg", e->rings,
-                     180.0 / (e->rings - 1), e->steps, 360.0 / e->steps);
-    if (!exact && n > 0 && (size_t)n < len)
+    int n;
+    if (e->gaps == 0) {
+        n = snprintf(buf, len, "sphere, a circle at %.10g deg, of %u steps of %.6g deg",
+                     360.0 * emitter_ring_turn(e, 0), e->steps, 360.0 / e->steps);
+    } else {
+        n = snprintf(buf, len, "sphere, %u rings %.6g deg apart, of %u steps of %.6g deg", e->rings, 180.0 / e->gaps,
+                     e->steps, 360.0 / e->steps);
+        if (e->rings <= e->gaps && n > 0 && (size_t)n < len)
+            n += snprintf(buf + n, len - (size_t)n, "; elevations %.6g to %.6g deg", 360.0 * emitter_ring_turn(e, 0),
+                          360.0 * emitter_ring_turn(e, e->rings - 1));
+    }
+    if (!emitter_sphere_is_exact(e) && n > 0 && (size_t)n < len)
         snprintf(buf + n, len - (size_t)n, "; %.6g deg, as asked for, does not divide a turn",
                  1e-6 * (double)e->asked_udeg);
 }

@@ -39,13 +39,34 @@ static void set_rates(struct schedule_segment *seg, const struct schedule_spec *
     seg->ns_rem = seg->tick_num % seg->tick_den;
 }
 
-/* Steps of a planar head lie at line angles that need not be whole micro-degrees: those within one of a limit
- * count as inside. */
+/* Where the window goes across azimuth 0, a ring begins with its first step in it. */
+static void set_sector(struct schedule_segment *seg, const struct schedule_spec *spec)
+{
+    const uint64_t n = spec->emitter->steps, turn = (uint64_t)TURN_UDEG;
+    const uint64_t start = (uint64_t)spec->line_start_udeg, stop = (uint64_t)spec->line_stop_udeg + 1;
+    const uint64_t first = ceil_div((u128)(start > 0 ? start - 1 : 0) * n, turn),
+                   last = (uint64_t)((u128)stop * n / turn);
+    const uint64_t ahead = first < n ? n - first : 0; /* before azimuth 0 */
+    seg->r_first = first;
+    seg->r_last = last < n ? last : n - 1;
+    if (spec->line_start_udeg <= spec->line_stop_udeg) return;
+    seg->front_step = (uint32_t)ahead;
+    seg->r_first = 0;
+    seg->r_last = ahead + last < n ? ahead + last : n - 1;
+}
+
+/* Steps of a planar head or a sphere lie at line angles that need not be whole micro-degrees: those within one of a
+ * limit count as inside. */
 static void set_window(struct schedule_segment *seg, const struct schedule_spec *spec)
 {
     const struct emitter *e = spec->emitter;
     uint64_t sweep = (uint64_t)spec->sweep_udeg;
     int64_t start = spec->line_start_udeg - spec->fov_min_udeg, stop = spec->line_stop_udeg - spec->fov_min_udeg;
+    seg->front_step = e != NULL ? e->front_step : 0;
+    if (e != NULL && e->kind == EMITTER_SPHERE) {
+        set_sector(seg, spec);
+        return;
+    }
     if (e != NULL && e->kind == EMITTER_PLANAR) {
         start = start > 0 ? start - 1 : 0;
         stop++;
@@ -151,9 +172,8 @@ uint64_t schedule_line_of(const struct schedule_segment *seg, uint64_t k)
 /* Where all steps of a ring look along one line. */
 static int is_pole(const struct schedule_segment *seg, uint64_t n)
 {
-    if (kind_of(seg) != EMITTER_SPHERE) return 0;
-    const uint64_t ring = n % seg->spec.emitter->rings;
-    return ring == 0 || ring == seg->spec.emitter->rings - 1;
+    const struct emitter *e = seg->spec.emitter;
+    return kind_of(seg) == EMITTER_SPHERE && emitter_ring_is_pole(e, n % e->rings);
 }
 
 void schedule_get_line(const struct schedule_segment *seg, uint64_t n, struct schedule_line *line)

@@ -5,8 +5,7 @@
 #include "core/standpoint/survey.h"
 #include "core/vec3.h"
 
-int survey_open(struct survey *s, const struct scene *scene, const struct standpoint_view *view,
-                const struct sh_report *report, struct sh_err *err)
+static void set_up(struct survey *s, const struct scene *scene, const struct standpoint_view *view)
 {
     memset(s, 0, sizeof *s);
     s->scene = scene;
@@ -16,16 +15,30 @@ int survey_open(struct survey *s, const struct scene *scene, const struct standp
         s->centre_m[i] = scene->min_m[i] + 0.5 * s->size_m[i];
     }
     s->radius_m = 0.5 * vec3_length(s->size_m);
+}
+
+int survey_open(struct survey *s, const struct scene *scene, const struct standpoint_view *view,
+                const struct sh_report *report, struct sh_err *err)
+{
+    set_up(s, scene, view);
     /* Places outside are farther away: from there a ray may take one surface for another at their border, which
      * a survey can bear. With their reach most hits within would be in doubt. */
-    int rc = bvh_create(scene, s->centre_m, s->radius_m, 0, report, &s->bvh, err);
+    int rc = bvh_create(scene, s->centre_m, s->radius_m, 0, report, &s->own, err);
+    s->bvh = s->own;
     return rc == SH_OK ? bvh_work_create(&s->work, err) : rc;
+}
+
+int survey_borrow(struct survey *s, const struct bvh *bvh, const struct standpoint_view *view, struct sh_err *err)
+{
+    set_up(s, bvh_scene(bvh), view);
+    s->bvh = bvh;
+    return bvh_work_create(&s->work, err);
 }
 
 void survey_close(struct survey *s)
 {
     bvh_work_free(s->work);
-    bvh_free(s->bvh);
+    bvh_free(s->own);
 }
 
 void survey_add(struct survey *s, const double from_m[3], const double dir[3])

@@ -18,7 +18,8 @@ struct survey {
     const struct scene *scene;
     const struct standpoint_view *view;
     double centre_m[3], size_m[3], radius_m; /* of the bounds, and of the sphere around them */
-    struct bvh *bvh;
+    const struct bvh *bvh;
+    struct bvh *own; /* NULL: borrowed */
     struct bvh_work *work;
     struct survey_rays rays;
 };
@@ -26,6 +27,8 @@ struct survey {
 /* survey_close is due in any case. */
 int survey_open(struct survey *s, const struct scene *scene, const struct standpoint_view *view,
                 const struct sh_report *report, struct sh_err *err);
+/* The same with a BVH that is there. */
+int survey_borrow(struct survey *s, const struct bvh *bvh, const struct standpoint_view *view, struct sh_err *err);
 void survey_close(struct survey *s);
 
 /* Adds a ray; there is room for BVH_CHUNK. */

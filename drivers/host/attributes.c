@@ -1,4 +1,4 @@
-/* What comes beside the points: attributes of each, sums of each line. */
+/* What comes beside the points: attributes and colour of each, sums of each line. */
 #include <math.h>
 
 #include "drivers/host/host.h"
@@ -9,10 +9,16 @@ int scanhead_has_attributes(const struct scanhead *sh)
     return (sh->descriptor.content & NATIVE_HAS_ATTRIBUTES) != 0;
 }
 
-/* The frame that follows the last points directly, and is about the same ones. */
-static int is_of_points(const struct scanhead *sh, const struct scanhead_frame *frame)
+int scanhead_has_colours(const struct scanhead *sh)
 {
-    return sh->have_points && frame->seq == sh->points_seq + 1 && frame->pulse0 == sh->of_points.pulse0 &&
+    if (!sh->have_descriptor) return SCANHEAD_ESTATE;
+    return (sh->descriptor.content & NATIVE_HAS_COLOURS) != 0;
+}
+
+/* The frame that follows the last points as the `after`th one, and is about the same ones. */
+static int is_of_points(const struct scanhead *sh, const struct scanhead_frame *frame, uint32_t after)
+{
+    return sh->have_points && frame->seq == sh->points_seq + after && frame->pulse0 == sh->of_points.pulse0 &&
            frame->scan_line == sh->of_points.line && frame->n_points == sh->of_points.n_points;
 }
 
@@ -21,7 +27,7 @@ int scanhead_attributes(struct scanhead *sh, const struct scanhead_frame *frame,
 {
     int rc = host_check_last(sh, frame, SCANHEAD_ATTRIBUTES);
     if (rc != 0) return rc;
-    if (!is_of_points(sh, frame))
+    if (!is_of_points(sh, frame, 1))
         return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: attributes of points that were lost", sh->source.name);
     if (first >= frame->n_points) return 0;
     uint32_t n = frame->n_points - first;
@@ -31,6 +37,24 @@ int scanhead_attributes(struct scanhead *sh, const struct scanhead_frame *frame,
         native_decode_attribute(frame->payload, first + i, &a);
         attributes[i].amplitude_db = a.amplitude_cdb == NATIVE_AMPLITUDE_NONE ? (double)NAN : a.amplitude_cdb / 100.0;
         attributes[i].width_ns = a.width_cns == NATIVE_WIDTH_NONE ? (double)NAN : a.width_cns / 100.0;
+    }
+    return (int)n;
+}
+
+int scanhead_colours(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
+                     struct scanhead_colour *colours, uint32_t max)
+{
+    int rc = host_check_last(sh, frame, SCANHEAD_COLOURS);
+    if (rc != 0) return rc;
+    if (!is_of_points(sh, frame, scanhead_has_attributes(sh) == 1 ? 2 : 1))
+        return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: colours of points that were lost", sh->source.name);
+    if (first >= frame->n_points) return 0;
+    uint32_t n = frame->n_points - first;
+    if (n > max) n = max;
+    for (uint32_t i = 0; i < n; i++) {
+        uint8_t rgb[3];
+        native_decode_colour(frame->payload, first + i, rgb);
+        colours[i] = (struct scanhead_colour){rgb[0], rgb[1], rgb[2]};
     }
     return (int)n;
 }

@@ -1,6 +1,7 @@
 /* Points of a frame as doubles. The hot path of every recorder. */
 #include <math.h>
 
+#include "core/vecmath.h"
 #include "drivers/host/host.h"
 
 #define TWO_PI 6.283185307179586476925
@@ -12,21 +13,6 @@ void host_turn_table(struct scanhead *sh)
         sh->sin_part[i] = sin(a);
         sh->cos_part[i] = cos(a);
     }
-}
-
-/* sin and cos of u >= 0 turns: the table gives whole 1/256 turns, the series the rest. |r| <= pi/256, so the
- * first terms left out, r^7/7! and r^8/8!, are below 2^-56 and 2^-66: nothing against the rounding of u
- * itself, and nothing has to be reduced by a pi that is not exact. */
-static inline void sincos_turns(const struct scanhead *sh, double u, double *s, double *c)
-{
-    double part = u * HOST_TURN_PARTS;
-    int64_t k = (int64_t)(part + 0.5);
-    double r = (part - (double)k) * (TWO_PI / HOST_TURN_PARTS), r2 = r * r;
-    double sin_r = r + r * r2 * (-1.0 / 6 + r2 * (1.0 / 120));
-    double cos_r_1 = r2 * (-0.5 + r2 * (1.0 / 24 - r2 * (1.0 / 720)));
-    double sk = sh->sin_part[k & (HOST_TURN_PARTS - 1)], ck = sh->cos_part[k & (HOST_TURN_PARTS - 1)];
-    *s = sk + (ck * sin_r + sk * cos_r_1);
-    *c = ck + (ck * cos_r_1 - sk * sin_r);
 }
 
 /* Point i as on the wire; what all layouts share goes to p. */
@@ -94,11 +80,68 @@ static void points_geo(const struct scanhead *sh, const struct scanhead_frame *f
     }
 }
 
-/* u turns, folded into [lo, lo + 1). */
-static inline double fold(double u, double lo)
+/* ---- polar points, in blocks of arrays: the loops that compute are vectors */
+
+enum { BLOCK = 64 };
+struct polar_block {
+    double mirror[BLOCK], pan[BLOCK]; /* turns */
+    int one_mirror;                   /* it stands, as along a ring: of it only what is at 0 is worked out */
+    double sin_m[BLOCK], cos_m[BLOCK], sin_pan[BLOCK], cos_pan[BLOCK];
+    double mirror_rad[BLOCK], pan_rad[BLOCK];
+};
+
+/* The largest whole number that is not above |x| < 2^51. */
+VEC_INLINE double floor_of(double x, uint64_t *bits)
 {
-    double v = u - lo, whole = (double)(int64_t)v;
-    return u - (whole > v ? whole - 1 : whole);
+    const double near = vec_round(x, bits);
+    const uint64_t above = near > x;
+    *bits -= above;
+    return near - (double)(int)above;
+}
+
+/* sin and cos of u[n] >= 0 turns: the table gives whole 1/256 turns, the series the rest. |r| <= pi/256, so the
+ * first terms left out, r^7/7! and r^8/8!, are below 2^-56 and 2^-66: nothing against the rounding of u itself, and
+ * nothing has to be reduced by a pi that is not exact. */
+VEC_CLONES static void sincos_turns(const double *restrict sin_part, const double *restrict cos_part,
+                                    const double *restrict u, int n, double *restrict s, double *restrict c)
+{
+    for (int i = 0; i < n; i++) {
+        const double part = u[i] * HOST_TURN_PARTS;
+        uint64_t k;
+        const double whole = floor_of(part + 0.5, &k);
+        const double r = (part - whole) * (TWO_PI / HOST_TURN_PARTS), r2 = r * r;
+        const double sin_r = r + r * r2 * (-1.0 / 6 + r2 * (1.0 / 120));
+        const double cos_r_1 = r2 * (-0.5 + r2 * (1.0 / 24 - r2 * (1.0 / 720)));
+        const double sk = sin_part[k & (HOST_TURN_PARTS - 1)], ck = cos_part[k & (HOST_TURN_PARTS - 1)];
+        s[i] = sk + (ck * sin_r + sk * cos_r_1);
+        c[i] = ck + (ck * cos_r_1 - sk * sin_r);
+    }
+}
+
+/* u[n] turns, folded into [lo, lo + 1), as radians. */
+VEC_CLONES static void fold(const double *restrict u, int n, double lo, double *restrict rad)
+{
+    for (int i = 0; i < n; i++) {
+        uint64_t unused;
+        rad[i] = TWO_PI * (u[i] - floor_of(u[i] - lo, &unused));
+    }
+}
+
+static void points_of_block(const struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
+                            const struct polar_block *b, struct scanhead_point *p, uint32_t n)
+{
+    const double scale = sh->descriptor.range_scale_m;
+    for (uint32_t i = 0; i < n; i++, p++) {
+        const struct native_point w = take(frame->payload, first + i, frame->scan_t0_ns, p);
+        p->range_m = p->echo_count == 0 ? NAN : scale * w.a;
+        const uint32_t m = b->one_mirror ? 0 : i;
+        const double flat = p->range_m * b->cos_m[m];
+        p->x = flat * b->sin_pan[i];
+        p->y = flat * b->cos_pan[i];
+        p->z = p->range_m * b->sin_m[m];
+        p->mirror_rad = b->mirror_rad[m];
+        p->pan_rad = b->pan_rad[i];
+    }
 }
 
 static void points_polar(const struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
@@ -110,20 +153,22 @@ static void points_polar(const struct scanhead *sh, const struct scanhead_frame 
     const double middle = ((double)d->line_start_udeg + (double)d->line_stop_udeg) / 720e6;
     const double lo = (sh->emitter.kind == NATIVE_EMIT_LINE ? middle : 0) - 0.5;
     const double mirror_turns = 1 / d->mirror_counts_per_turn, pan_turns = 1 / d->pan_counts_per_turn;
-    const double scale = d->range_scale_m;
-    for (uint32_t i = first; i < first + n; i++, p++) {
-        const struct native_point w = take(frame->payload, i, frame->scan_t0_ns, p);
-        double mirror = w.b * mirror_turns, pan = w.c * pan_turns;
-        double sin_m, cos_m, sin_pan, cos_pan;
-        sincos_turns(sh, mirror, &sin_m, &cos_m);
-        sincos_turns(sh, pan, &sin_pan, &cos_pan);
-        p->range_m = p->echo_count == 0 ? NAN : scale * w.a;
-        double flat = p->range_m * cos_m;
-        p->x = flat * sin_pan;
-        p->y = flat * cos_pan;
-        p->z = p->range_m * sin_m;
-        p->mirror_rad = TWO_PI * fold(mirror, lo);
-        p->pan_rad = TWO_PI * fold(pan, 0);
+    struct polar_block b = {.mirror = {0}, .pan = {0}};
+    for (uint32_t at = 0; at < n; at += BLOCK) {
+        const int m = (int)(n - at < BLOCK ? n - at : BLOCK);
+        b.one_mirror = 1;
+        for (int i = 0; i < m; i++) {
+            struct native_point w;
+            native_decode_point(frame->payload, first + at + (uint32_t)i, &w);
+            b.mirror[i] = w.b * mirror_turns;
+            b.pan[i] = w.c * pan_turns;
+            b.one_mirror &= b.mirror[i] == b.mirror[0];
+        }
+        sincos_turns(sh->sin_part, sh->cos_part, b.mirror, b.one_mirror ? 1 : m, b.sin_m, b.cos_m);
+        sincos_turns(sh->sin_part, sh->cos_part, b.pan, m, b.sin_pan, b.cos_pan);
+        fold(b.mirror, b.one_mirror ? 1 : m, lo, b.mirror_rad);
+        fold(b.pan, m, 0, b.pan_rad);
+        points_of_block(sh, frame, first + at, &b, p + at, (uint32_t)m);
     }
 }
 

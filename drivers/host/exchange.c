@@ -6,7 +6,7 @@
 
 #include "drivers/host/host.h"
 
-enum { COMMAND_MAX = 1024, STALE_READS = 32, ANSWERS_MS = 200 };
+enum { COMMAND_MAX = 1024, STALE_READS = 32, ANSWERS_MS = 200, ASK_AGAIN_MS = 1000 };
 
 /* Keeps the frames that are in the parser. 1: the parser is at a text. */
 static int take_items(struct scanhead *sh)
@@ -114,6 +114,11 @@ static int is_identity(const char *text)
     return commas == 3 && strchr(text, '"') == NULL;
 }
 
+static int asks_identity(const char *command)
+{
+    return strncasecmp(command + strspn(command, " :"), "*IDN?", 5) == 0;
+}
+
 /* Skips lines until every question has its answer. A question that was given up may be lost. So once one
  * answer is there, the others have ANSWERS_MS to come. */
 static int pass_over(struct scanhead *sh, int64_t deadline_ns)
@@ -128,33 +133,44 @@ static int pass_over(struct scanhead *sh, int64_t deadline_ns)
         if (rc == 1) continue;
         if (rc == 0 && sh->ended) return host_gone(sh);
         if (rc == 0) rc = deadline_ns < host_deadline_ns(0) ? SH_ETIMEOUT : host_fill(sh, deadline_ns);
-        if (rc == SH_ETIMEOUT && answered)
-            sh->source.asked = 0;
-        else if (rc != 0)
-            return rc;
+        if (rc == SH_ETIMEOUT && answered) break; /* is_late knows the others, should they come yet */
+        if (rc != 0) return rc;
     }
     sh->source.unsettled = 0;
     return 0;
 }
 
+/* Whether a line is the answer to a question of settle() that comes after all, instead of the reply to this command. */
+static int is_late(struct scanhead *sh, const char *command)
+{
+    if (sh->source.asked == 0 || asks_identity(command) || !is_identity(sh->parser.text)) return 0;
+    sh->source.asked--;
+    return 1;
+}
+
 /* Before the first exchange on a terminal, and after a command that was given up. Between open() and raw mode
  * the terminal echoes what the head sends, and the head takes it for commands; another program may have left
  * half a line. So that line is ended, and the answers to all that are passed over up to the one to a question
- * of our own. */
+ * of our own. An answer behind half a frame of the program before is lost with it: so the question is asked
+ * again. */
 static int settle(struct scanhead *sh, int64_t deadline_ns)
 {
     static const char question[] = "\n*IDN?\n";
-    int rc = send_all(sh, question, sizeof question - 1, deadline_ns);
-    if (rc != 0) return rc;
-    sh->source.asked++;
-    return pass_over(sh, deadline_ns);
+    for (;;) {
+        int rc = send_all(sh, question, sizeof question - 1, deadline_ns);
+        if (rc != 0) return rc;
+        sh->source.asked++;
+        int64_t until_ns = host_deadline_ns(ASK_AGAIN_MS);
+        rc = pass_over(sh, until_ns < deadline_ns ? until_ns : deadline_ns);
+        if (rc != SH_ETIMEOUT || host_deadline_ns(0) >= deadline_ns) return rc;
+    }
 }
 
 /* The reply may come yet, and is not that of the next command: come into step before that. */
 static void give_up(struct host_source *source, const char *command)
 {
     source->unsettled = 1;
-    source->asked += strncasecmp(command + strspn(command, " :"), "*IDN?", 5) == 0;
+    source->asked += asks_identity(command);
 }
 
 int scanhead_command(struct scanhead *sh, const char *command, char *reply, size_t reply_len, int timeout_ms)
@@ -172,6 +188,10 @@ int scanhead_command(struct scanhead *sh, const char *command, char *reply, size
     if (rc == 0) rc = sh->ended ? host_gone(sh) : send_all(sh, line, len + 1, deadline_ns);
     while (rc == 0) {
         rc = take_items(sh);
+        if (rc == 1 && is_late(sh, command)) {
+            rc = 0;
+            continue;
+        }
         if (rc == 1) return copy_reply(sh, reply, reply_len);
         if (rc != 0) break;
         if (sh->ended) return host_gone(sh);

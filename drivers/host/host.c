@@ -12,7 +12,7 @@ _Static_assert(SCANHEAD_EINPUT == (int)SH_EINPUT && SCANHEAD_EIO == (int)SH_EIO 
                "the library's errors are those of core/err.h");
 _Static_assert(SCANHEAD_POINTS == (int)NATIVE_POINTS && SCANHEAD_POSES == (int)NATIVE_POSES &&
                    SCANHEAD_ATTRIBUTES == (int)NATIVE_ATTRIBUTES && SCANHEAD_EMITTER == (int)NATIVE_EMITTER &&
-                   SCANHEAD_EMIT_DIRECTIONS == (int)NATIVE_EMIT_DIRECTIONS &&
+                   SCANHEAD_COLOURS == (int)NATIVE_COLOURS && SCANHEAD_EMIT_DIRECTIONS == (int)NATIVE_EMIT_DIRECTIONS &&
                    SCANHEAD_MAX_BEAMS == (int)NATIVE_MAX_BEAMS && SCANHEAD_EV_PPS == (int)NATIVE_EV_PPS &&
                    SCANHEAD_POSE_NONE == (int)NATIVE_POSE_NONE && SCANHEAD_LOCAL == (int)NATIVE_LOCAL,
                "types, events and flags are those on the wire");
@@ -175,6 +175,15 @@ static void fill_attributes(struct scanhead_frame *frame)
     frame->pulse0 = attributes.pulse0;
 }
 
+static void fill_colours(struct scanhead_frame *frame)
+{
+    struct native_attributes colours;
+    if (native_decode_colours(frame->payload, frame->payload_len, &colours) != 0) return;
+    frame->scan_line = colours.line;
+    frame->n_points = colours.n_points;
+    frame->pulse0 = colours.pulse0;
+}
+
 static void fill_event(struct scanhead_frame *frame)
 {
     struct native_event event;
@@ -204,6 +213,7 @@ static int hand_out(struct scanhead *sh, const uint8_t *raw, struct scanhead_fra
     };
     if (header.type == NATIVE_POINTS) fill_points(sh, frame);
     if (header.type == NATIVE_ATTRIBUTES) fill_attributes(frame);
+    if (header.type == NATIVE_COLOURS) fill_colours(frame);
     if (header.type == NATIVE_EVENT) fill_event(frame);
     sh->payload = frame->payload;
     return SCANHEAD_OK;
@@ -212,7 +222,11 @@ static int hand_out(struct scanhead *sh, const uint8_t *raw, struct scanhead_fra
 int host_check_last(struct scanhead *sh, const struct scanhead_frame *frame, enum scanhead_frame_type type)
 {
     static const char *const name[] = {
-        [SCANHEAD_POINTS] = "points", [SCANHEAD_POSES] = "poses", [SCANHEAD_ATTRIBUTES] = "attributes"};
+        [SCANHEAD_POINTS] = "points",
+        [SCANHEAD_POSES] = "poses",
+        [SCANHEAD_ATTRIBUTES] = "attributes",
+        [SCANHEAD_COLOURS] = "colours",
+    };
     if (frame->type == (int)type && frame->payload != NULL && frame->payload == sh->payload) return 0;
     return sh_fail(&sh->err, SCANHEAD_EINPUT, "not the %s frame that scanhead_next returned last", name[type]);
 }

@@ -35,7 +35,7 @@ extern "C" {
 #endif
 
 /* Of this release, the only place that says it: program, library and libscanhead.pc have the same. */
-#define SCANHEAD_VERSION "1.0.0"
+#define SCANHEAD_VERSION     "1.0.0"
 #define SCANHEAD_API_VERSION 1
 
 /* SCANHEAD_VERSION of the library that the program runs with. */
@@ -113,6 +113,7 @@ enum scanhead_frame_type { /* as on the wire */
                            SCANHEAD_POSES = 8,
                            SCANHEAD_ATTRIBUTES = 9,
                            SCANHEAD_EMITTER = 10,
+                           SCANHEAD_COLOURS = 11,
 };
 enum scanhead_frame_flags { SCANHEAD_REPEAT = 1, SCANHEAD_LOCAL = 2 };
 
@@ -128,6 +129,7 @@ enum scanhead_event_code {
     SCANHEAD_EV_POSE_LATE = 9,
     SCANHEAD_EV_PPS = 10,  /* a full second: UTC (s since 1970), device time of the edge (ns), GPS time (s) */
     SCANHEAD_EV_TIME = 11, /* before each repeated descriptor: 0, device time (ns), its GPS time (ns) */
+    SCANHEAD_EV_SITE = 12, /* a station was moved (SITE:POSE): its number, warnings of the head about its place */
 };
 
 struct scanhead_frame {
@@ -138,7 +140,7 @@ struct scanhead_frame {
     size_t payload_len;
     const uint8_t *raw; /* the frame as on the wire, header and payload; valid as payload is */
     size_t raw_len;
-    /* of SCANHEAD_POINTS; of SCANHEAD_ATTRIBUTES scan_line, n_points and pulse0 alone */
+    /* of SCANHEAD_POINTS; of SCANHEAD_ATTRIBUTES and SCANHEAD_COLOURS scan_line, n_points and pulse0 alone */
     uint32_t scan_frame, scan_line, n_points, n_pulses;
     uint64_t pulse0;
     int64_t scan_t0_ns, line_t0_ns; /* since the scan's start: of pulse0, of the line's first pulse */
@@ -186,6 +188,17 @@ int scanhead_attributes(struct scanhead *sh, const struct scanhead_frame *frame,
 /* 1: a frame of attributes follows each frame of points; 0: the head sends none; SCANHEAD_ESTATE before the
  * descriptor has come. */
 int scanhead_has_attributes(const struct scanhead *sh);
+
+/* A colour for each point, sRGB: what it shows, the head's output.colour says. A shot without echo is grey. */
+struct scanhead_colour {
+    uint8_t red, green, blue;
+};
+/* Of a frame of SCANHEAD_COLOURS, as scanhead_attributes. It comes after the points, and after their attributes where
+ * the head sends both. */
+int scanhead_colours(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
+                     struct scanhead_colour *colours, uint32_t max);
+/* 1: a frame of colours follows each frame of points; else as scanhead_has_attributes. */
+int scanhead_has_colours(const struct scanhead *sh);
 
 struct scanhead_line_end {
     uint32_t scan_frame, scan_line;
@@ -241,12 +254,12 @@ struct scanhead_beam {
 };
 enum { SCANHEAD_MAX_BEAMS = 128 };
 struct scanhead_emitter {
-    int kind;                              /* enum scanhead_emitter_kind */
-    uint32_t steps;                        /* pulses of a line; beams: 0 */
-    int first_step, last_step, front_step; /* planar: cast, both included; looks along y */
-    int turn;                              /* +1: clockwise seen from above, -1: the other way */
-    uint32_t rings;                        /* sphere: elevations first_ring_deg + 180 deg i / (rings - 1) */
-    double first_ring_deg;
+    int kind;                                  /* enum scanhead_emitter_kind */
+    uint32_t steps;                            /* pulses of a line; beams: 0 */
+    int first_step, last_step, front_step;     /* planar: cast, both included; planar, sphere: looks along y */
+    int turn;                                  /* +1: clockwise seen from above, -1: the other way */
+    uint32_t rings;                            /* sphere: of a frame; the elevation of ring i is */
+    double first_ring_deg, ring_step_deg;      /* first_ring_deg + i ring_step_deg; ring_step_deg 0: one ring alone */
     int echoes;                                /* sent of a pulse's: 0 all, 1 first, 2 last, 3 strongest */
     uint64_t sequence_ns_num, sequence_ns_den; /* beams: a firing sequence lasts num / den nanoseconds */
     uint32_t n_beams;                          /* pulse k of a scan is firing k mod n_beams */

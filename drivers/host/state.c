@@ -1,4 +1,5 @@
 /* What the stream says of itself: descriptor, anchor, names, losses, hash. */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -77,6 +78,12 @@ static int absorb_attributes(struct scanhead *sh, const struct native_header *he
 {
     struct native_attributes attributes;
     return native_decode_attributes(payload, header->length, &attributes) != 0 ? bad(sh, "wrong attributes") : 0;
+}
+
+static int absorb_colours(struct scanhead *sh, const struct native_header *header, const uint8_t *payload)
+{
+    struct native_attributes colours;
+    return native_decode_colours(payload, header->length, &colours) != 0 ? bad(sh, "wrong colours") : 0;
 }
 
 /* The head's clock at a device time. GPS time fits: it is below 2^63 ns until 2272. */
@@ -179,6 +186,8 @@ int host_absorb(struct scanhead *sh, const struct native_header *header, const u
         return absorb_points(sh, header, payload);
     case NATIVE_ATTRIBUTES:
         return absorb_attributes(sh, header, payload);
+    case NATIVE_COLOURS:
+        return absorb_colours(sh, header, payload);
     case NATIVE_POSES:
         if (host_absorb_poses(sh, payload, header->length) == SH_EFORMAT) return bad(sh, "wrong poses");
         return sh->poses != NULL ? 0 : sh_fail(&sh->err, SH_ENOMEM, "no memory for poses");
@@ -227,6 +236,14 @@ int scanhead_get_info(const struct scanhead *sh, struct scanhead_info *info)
     return SCANHEAD_OK;
 }
 
+/* On the wire the first elevation is rounded to a micro-degree; it is a multiple of the step from -90 degrees. */
+static void set_rings(struct scanhead_emitter *out, uint32_t gaps)
+{
+    if (gaps == 0) return;
+    out->ring_step_deg = 180.0 / gaps;
+    out->first_ring_deg = floor((out->first_ring_deg + 90.0) * gaps / 180.0 + 0.5) * 180.0 / gaps - 90.0;
+}
+
 int scanhead_get_emitter(const struct scanhead *sh, struct scanhead_emitter *out)
 {
     memset(out, 0, sizeof *out);
@@ -240,6 +257,7 @@ int scanhead_get_emitter(const struct scanhead *sh, struct scanhead_emitter *out
     out->turn = e->turn;
     out->rings = e->rings;
     out->first_ring_deg = 1e-6 * (double)e->first_ring_udeg;
+    if (e->kind == NATIVE_EMIT_SPHERE) set_rings(out, e->gaps != 0 || e->rings == 0 ? e->gaps : e->rings - 1);
     out->echoes = (int)e->echoes;
     out->sequence_ns_num = e->sequence_ns_num;
     out->sequence_ns_den = e->sequence_ns_den;

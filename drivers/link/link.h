@@ -15,17 +15,25 @@
 
 enum { LINK_MAX_SESSIONS = 8, LINK_MAX_EVENTS = 2 * LINK_MAX_SESSIONS + 2 };
 
-enum link_type { LINK_NULL, LINK_FILE, LINK_PTY, LINK_TCP, LINK_USB, LINK_UDP, LINK_FD };
+enum link_type { LINK_NULL, LINK_FILE, LINK_PTY, LINK_TCP, LINK_USB, LINK_UDP, LINK_WEB, LINK_FD };
+
+/* Whether readers of a link hold back the paces fast and step, where nothing is lost. Those of the others lose frames
+ * as in real time. */
+enum link_waits { LINK_WAITS_BY_TYPE /* all but web do */, LINK_WAITS_YES, LINK_WAITS_NO };
+
+struct web_source; /* web.h */
 
 struct link_spec {
     enum link_type type;
     char path[256];     /* file: where to write; pty: symlink to the slave, may be empty; usb: see below */
-    char address[64];   /* tcp, udp: numeric or name; empty: 127.0.0.1 */
-    int port;           /* tcp: 0 lets the system choose; udp: of the receiver */
+    char address[64];   /* tcp, udp, web: numeric or name; empty: 127.0.0.1 */
+    int port;           /* tcp, web: 0 lets the system choose; udp: of the receiver */
     char interface[32]; /* udp: its name; needed for broadcasts. Empty: the system chooses */
-    int max_sessions;   /* tcp: 1..LINK_MAX_SESSIONS */
+    int max_sessions;   /* tcp, web: 1..LINK_MAX_SESSIONS */
     int protocol;       /* what its owner speaks on it; 0: the usual. Links don't look at it */
     int units; /* 1: what is written are units. Each write has one of them, or the rest of one, up to its end */
+    int waits; /* enum link_waits; its owner sees to it */
+    const struct web_source *web; /* web: what it serves beside the page; outlives the link. NULL: nothing */
     int fd;    /* fd: a connected stream descriptor (socket pair), taken over */
     /* usb; address, port and path as struct usb_backend_spec has them, which explains these as well */
     int backend; /* enum usb_backend_type */
@@ -56,6 +64,7 @@ struct link_event {
 
 struct link_ops {
     const char *name;
+    int messages; /* 1: each write goes out as one message; the owner puts text or frames into it, not both */
 
     /* Opens as spec says. When it fails, nothing of it stays. The text of err names the endpoint. */
     int (*open)(const struct link_spec *spec, void **link, struct sh_err *err);

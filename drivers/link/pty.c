@@ -21,7 +21,8 @@
  *     never showed. Clients that come one after the other give open, close, open, ... without equal
  *     neighbours: nothing is merged, the count is exact, and we report LINK_CLOSED and LINK_OPENED. Only
  *     clients that overlap can make the count wrong. Then two sessions may be reported as one, or one as two;
- *     the next hang-up sets it right. */
+ *     the next hang-up sets it right.
+ *   - Nothing is written while an open event is unread: it would be of the old session, for the new client. */
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -37,6 +38,7 @@ struct pty_link {
     int inotify, watch;
     int open;                   /* a session is on, as the caller knows or is about to learn */
     unsigned count;             /* clients of the session; 0 with open set: the last seems to be gone */
+    int open_event_due;         /* that client is counted, but its open event may be still to come */
     int due_closed, due_opened; /* events that the caller still has to get, in this order */
 };
 
@@ -82,12 +84,15 @@ static void pty_begin(struct pty_link *pty, unsigned count)
     pty->open = 1;
     pty->count = count;
     pty->due_opened = 1;
+    pty->open_event_due = 0;
 }
 
 static void pty_note(struct pty_link *pty, uint32_t mask)
 {
+    const int counted = pty->open_event_due;
+    pty->open_event_due = 0;
     if ((mask & IN_CLOSE) != 0 && pty->count > 0) pty->count--;
-    if ((mask & (IN_OPEN | IN_Q_OVERFLOW)) == 0) return;
+    if ((mask & (IN_OPEN | IN_Q_OVERFLOW)) == 0 || counted) return;
     if (!pty->open) {
         pty_begin(pty, 1);
     } else if (pty->count > 0) {
@@ -135,6 +140,7 @@ static int pty_end(struct pty_link *pty)
     if ((now & POLLHUP) == 0 || (now & POLLIN) != 0) {
         pty_read_inotify(pty, 0); /* one client is counted by what the master says */
         pty_begin(pty, 1);
+        pty->open_event_due = 1;
     }
     return SH_OK;
 }
@@ -197,6 +203,8 @@ static ssize_t pty_write(void *link, int session, const void *buf, size_t len)
 {
     struct pty_link *pty = link;
     if (session != 0 || !pty->open) return SH_ECLOSED;
+    pty_read_inotify(pty, 1);
+    if (pty->due_closed || pty->due_opened) return 0;
     ssize_t n = write(pty->device.master, buf, len);
     if (n >= 0) return n;
     return errno == EAGAIN || errno == EINTR ? 0 : SH_ECLOSED;

@@ -73,7 +73,7 @@ static const struct field emitter[] = {
     EMITTER(sequence_ns_den, FIELD_64),
     EMITTER(first_ring_udeg, FIELD_64),
     EMITTER(echoes, FIELD_32),
-    EMITTER(reserved, FIELD_32),
+    EMITTER(gaps, FIELD_32),
 };
 
 #define POINTS(member, kind) ROW(native_points, member, kind)

@@ -27,6 +27,8 @@ enum {
     NATIVE_MAX_POSES = (NATIVE_MAX_PAYLOAD - NATIVE_POSES_HEAD_LEN) / NATIVE_POSE_LEN,
     NATIVE_ATTRIBUTES_HEAD_LEN = 16,
     NATIVE_ATTRIBUTE_LEN = 4,
+    NATIVE_COLOURS_HEAD_LEN = NATIVE_ATTRIBUTES_HEAD_LEN,
+    NATIVE_COLOUR_LEN = 3,
     NATIVE_SURFACES_HEAD_LEN = 8,
     NATIVE_MAX_TEXT = 512, /* longest reply line, with its CR LF */
 };
@@ -42,6 +44,7 @@ enum native_type {
     NATIVE_POSES = 8,      /* where a moving head is while it measures what follows */
     NATIVE_ATTRIBUTES = 9, /* amplitude and width of the points in the frame before */
     NATIVE_EMITTER = 10,   /* how the head's beams are arranged; after the descriptor, unless it is a line head */
+    NATIVE_COLOURS = 11,   /* a colour for each of the points in the last points frame */
 };
 
 enum native_flags {
@@ -94,7 +97,8 @@ enum native_emitter_kind {
     NATIVE_EMIT_LINE = 0,   /* a mirror sweeps the elevation, the pan turns slowly. No frame is sent. */
     NATIVE_EMIT_PLANAR = 1, /* one plane, elevation 0: `steps` a turn; a line is a turn, from step 0 on */
     NATIVE_EMIT_BEAMS = 2,  /* a firing sequence of beams spins about the vertical; a line is a turn, from azimuth 0 */
-    NATIVE_EMIT_SPHERE = 3, /* rings of one elevation each, `steps` a turn; a line is a ring, a frame all of them; of the
+    NATIVE_EMIT_SPHERE =
+        3, /* rings of one elevation each, `steps` a turn; a line is a ring, a frame all of them; of the
                                 * first and the last, which are poles, one pulse is cast */
     NATIVE_EMIT_DIRECTIONS = 4, /* a list; a line and a frame are the list once */
 };
@@ -102,12 +106,13 @@ struct native_emitter { /* begin of an emitter payload, 64 bytes; then n_beams o
     uint32_t kind, n_beams;
     uint32_t steps;                /* planar, sphere: a turn; directions: in the list; beams: 0 */
     int32_t first_step, last_step; /* planar: cast, both included */
-    int32_t front_step;            /* planar: the step that looks along y; sphere: 0 */
+    int32_t front_step;            /* planar, sphere: the step that looks along y */
     int32_t turn;                  /* +1: steps and azimuth go clockwise seen from above, -1: the other way */
     uint32_t rings;                /* sphere */
     uint64_t sequence_ns_num, sequence_ns_den; /* beams: a firing sequence lasts num / den ns; else of one pulse */
-    int64_t first_ring_udeg;   /* sphere: elevation of ring 0; the others follow by 180 deg / (rings - 1) */
-    uint32_t echoes, reserved; /* enum native_echoes: which of a pulse's are sent */
+    int64_t first_ring_udeg; /* sphere: elevation of ring 0, rounded; the others follow by 180 deg / gaps */
+    uint32_t echoes;         /* enum native_echoes: which of a pulse's are sent */
+    uint32_t gaps;           /* sphere without all its rings: gaps between rings from pole to pole; else 0: rings - 1 */
 };
 enum native_echoes {
     NATIVE_ECHOES_ALL = 0,
@@ -121,7 +126,10 @@ struct native_beam { /* 0 i32 elevation, 4 i32 azimuth offset, 8 u32 firing time
     uint32_t offset_ns;
 };
 
-enum native_content { NATIVE_HAS_ATTRIBUTES = 1 }; /* a frame of attributes follows each one of points */
+enum native_content {
+    NATIVE_HAS_ATTRIBUTES = 1, /* a frame of attributes follows each one of points */
+    NATIVE_HAS_COLOURS = 2,    /* a frame of colours follows it, after that of the attributes */
+};
 
 /* Geodetic coordinates and the angles of the descriptor are in degrees. */
 #define NATIVE_RAD_PER_DEG (3.14159265358979323846 / 180.0)
@@ -184,7 +192,8 @@ static inline void native_decode_point(const uint8_t *payload, uint32_t i, struc
     out->echo_count = (uint8_t)(tail >> 28);
 }
 
-struct native_attributes { /* begin of an attributes payload, 16 bytes; then n attributes of 4 */
+struct native_attributes { /* begin of an attributes payload, 16 bytes; then n attributes of 4. Begin of a colours
+                            * payload, too; then n colours of 3: u8 red, green, blue, sRGB */
     uint64_t pulse0;
     uint32_t line, n_points; /* all three as in the points frame before it */
 };
@@ -235,6 +244,8 @@ enum native_event_code {
                            c: GPS time, s; the text is the UTC */
     NATIVE_EV_TIME = 11, /* the head's clock, before each repeated descriptor; a: 0, b: device time, ns, c: its GPS
                             time, ns */
+    NATIVE_EV_SITE = 12, /* a station was moved; a: its number, b: warnings that its place gave rise to; the text is its
+                            name */
 };
 struct native_event {
     uint32_t code, reserved;
@@ -251,6 +262,8 @@ void native_decode_beam(const uint8_t *payload, uint32_t i, struct native_beam *
 int native_decode_points(const uint8_t *payload, size_t len, struct native_points *out);
 int native_decode_attributes(const uint8_t *payload, size_t len, struct native_attributes *out);
 void native_decode_attribute(const uint8_t *payload, uint32_t i, struct native_attribute *out); /* i < n_points */
+int native_decode_colours(const uint8_t *payload, size_t len, struct native_attributes *out);
+void native_decode_colour(const uint8_t *payload, uint32_t i, uint8_t rgb[3]); /* i < n_points */
 int native_decode_line_end(const uint8_t *payload, size_t len, struct line_end *out);
 int native_decode_telemetry(const uint8_t *payload, size_t len, struct native_telemetry *out);
 int native_decode_event(const uint8_t *payload, size_t len, struct native_event *out);
@@ -302,8 +315,8 @@ void native_parser_finish(struct native_parser *parser);
 void native_parser_resume(struct native_parser *parser);
 
 /* 1 if a frame with this header belongs to stream_sha256: the hash runs over u8 type, u32 length (LE) and the
- * payload of each descriptor, emitter, anchor, points, line-end, poses and attributes frame that has neither
- * NATIVE_REPEAT nor NATIVE_LOCAL. */
+ * payload of each descriptor, emitter, anchor, points, line-end, poses, attributes and colours frame that has
+ * neither NATIVE_REPEAT nor NATIVE_LOCAL. */
 int native_is_hashed(const struct native_header *header);
 
 #endif

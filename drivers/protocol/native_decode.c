@@ -68,6 +68,19 @@ void native_decode_attribute(const uint8_t *payload, uint32_t i, struct native_a
     out->width_cns = le_get16(p + 2);
 }
 
+/* It begins as attributes do. */
+int native_decode_colours(const uint8_t *payload, size_t len, struct native_attributes *out)
+{
+    int rc = fields_decode(&fields_attributes, payload, len, out);
+    if (rc == 0 && out->n_points > (len - NATIVE_COLOURS_HEAD_LEN) / NATIVE_COLOUR_LEN) rc = SH_EFORMAT;
+    return rc;
+}
+
+void native_decode_colour(const uint8_t *payload, uint32_t i, uint8_t rgb[3])
+{
+    memcpy(rgb, payload + NATIVE_COLOURS_HEAD_LEN + (size_t)i * NATIVE_COLOUR_LEN, NATIVE_COLOUR_LEN);
+}
+
 int native_decode_line_end(const uint8_t *payload, size_t len, struct line_end *out)
 {
     return fields_decode(&fields_line_end, payload, len, out);
@@ -156,5 +169,5 @@ int native_is_hashed(const struct native_header *header)
     if ((header->flags & (NATIVE_REPEAT | NATIVE_LOCAL)) != 0) return 0;
     return header->type == NATIVE_DESCRIPTOR || header->type == NATIVE_ANCHOR || header->type == NATIVE_POINTS ||
            header->type == NATIVE_LINE_END || header->type == NATIVE_POSES || header->type == NATIVE_ATTRIBUTES ||
-           header->type == NATIVE_EMITTER;
+           header->type == NATIVE_EMITTER || header->type == NATIVE_COLOURS;
 }

@@ -106,6 +106,12 @@ size_t native_attributes_bound(uint32_t n_points)
            (size_t)n_points * NATIVE_ATTRIBUTE_LEN;
 }
 
+size_t native_colours_bound(uint32_t n_points)
+{
+    return frames_bound(n_points) * (NATIVE_HEADER_LEN + NATIVE_COLOURS_HEAD_LEN) +
+           (size_t)n_points * NATIVE_COLOUR_LEN;
+}
+
 /* Every pulse has an entry whose echo number is 0 or 1, and it is its first. */
 static int starts_pulse(uint8_t echo)
 {
@@ -169,6 +175,33 @@ static size_t put_attributes(uint8_t *dst, size_t cap, const struct line_block *
     return put_header(dst, NATIVE_ATTRIBUTES, 0, payload_len, t_ns);
 }
 
+/* Colours likewise. */
+static size_t put_colours(uint8_t *dst, size_t cap, const struct line_block *block, uint32_t first,
+                          const struct native_points *points, int64_t t_ns)
+{
+    const struct native_attributes head = {
+        .pulse0 = points->pulse0, .line = points->line, .n_points = points->n_points};
+    const size_t len = (size_t)head.n_points * NATIVE_COLOUR_LEN, payload_len = NATIVE_COLOURS_HEAD_LEN + len;
+    if (cap < NATIVE_HEADER_LEN + payload_len) return 0;
+    fields_encode(&fields_attributes, &head, dst + NATIVE_HEADER_LEN);
+    memcpy(dst + NATIVE_HEADER_LEN + NATIVE_COLOURS_HEAD_LEN, block->rgb + first, len);
+    return put_header(dst, NATIVE_COLOURS, 0, payload_len, t_ns);
+}
+
+/* What follows a points frame: 0 where there is no room for it. */
+static size_t put_beside(uint8_t *dst, size_t cap, const struct line_block *block, uint32_t first,
+                         const struct native_points *points, int64_t t_ns)
+{
+    size_t done = 0, len;
+    if (block->width_cns != NULL) {
+        done = put_attributes(dst, cap, block, first, points, t_ns);
+        if (done == 0) return 0;
+    }
+    if (block->rgb == NULL) return done;
+    len = put_colours(dst + done, cap - done, block, first, points, t_ns);
+    return len == 0 ? 0 : done + len;
+}
+
 size_t native_encode_points(uint8_t *dst, size_t cap, const struct line_block *block, int64_t scan_t0_ns)
 {
     size_t done = 0;
@@ -192,8 +225,8 @@ size_t native_encode_points(uint8_t *dst, size_t cap, const struct line_block *b
         fields_encode(&fields_points, &head, payload);
         if (put_points(payload + NATIVE_POINTS_HEAD_LEN, block, first, n, dt0_ns) != 0) return 0;
         done += put_header(dst + done, NATIVE_POINTS, 0, payload_len, scan_t0_ns + head.t0_ns);
-        if (block->width_cns != NULL) {
-            size_t len = put_attributes(dst + done, cap - done, block, first, &head, scan_t0_ns + head.t0_ns);
+        if (block->width_cns != NULL || block->rgb != NULL) {
+            size_t len = put_beside(dst + done, cap - done, block, first, &head, scan_t0_ns + head.t0_ns);
             if (len == 0) return 0;
             done += len;
         }

@@ -20,7 +20,7 @@ size_t native_encode_telemetry(uint8_t *dst, size_t cap, const struct native_tel
 size_t native_encode_event(uint8_t *dst, size_t cap, const struct native_event *e, int64_t t_ns, int flags);
 
 /* A block as one or more points frames of at most NATIVE_MAX_POINTS, and after each of them the frame of its
- * attributes where the block has some. Cuts lie between pulses, so that a pulse's echoes stay in one frame.
+ * attributes and that of its colours where the block has some. Cuts lie between pulses, so that a pulse's echoes stay in one frame.
  * scan_t0_ns: device time of the scan's start. */
 size_t native_encode_points(uint8_t *dst, size_t cap, const struct line_block *block, int64_t scan_t0_ns);
 size_t native_encode_line_end(uint8_t *dst, size_t cap, const struct line_end *end, int64_t scan_t0_ns);
@@ -43,8 +43,10 @@ size_t native_encode_surfaces(uint8_t *dst, size_t cap, size_t max_payload, stru
  * length. */
 size_t native_seal(uint8_t *frame, uint32_t seq);
 
-/* The most bytes that native_encode_points can need for n_points, and the most that their attributes add. */
+/* The most bytes that native_encode_points can need for n_points, and the most that their attributes and their
+ * colours add. */
 size_t native_points_bound(uint32_t n_points);
 size_t native_attributes_bound(uint32_t n_points);
+size_t native_colours_bound(uint32_t n_points);
 
 #endif

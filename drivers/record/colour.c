@@ -3,31 +3,85 @@
 #include <math.h>
 #include <string.h>
 
-static const double BLACK_DB = -30;
+#include "core/mat3.h"
+#include "drivers/protocol/native.h"
+#include "drivers/record/track.h"
 
-static void of_reflectance(double db, uint8_t rgb[3])
+static const double EARTH_M = 6371000;
+
+int colour_check(enum colour_mode mode, const struct track *t, struct sh_err *err)
 {
-    static const uint8_t unknown[3] = {96, 128, 255};
-    if (isnan(db)) {
-        memcpy(rgb, unknown, 3);
-        return;
-    }
-    memset(rgb, (int)lrint(255 * (1 - fmin(1, fmax(0, db / BLACK_DB)))), 3);
+    if (mode == COLOUR_FRAME && !t->info.moving && !t->info.stop)
+        return sh_fail(
+            err, SH_EFORMAT,
+            "%s: colour by frame, but the head is on no trajectory and at no stop of one: there are no frames",
+            t->path);
+    if (mode == COLOUR_RANGE && t->info.moving && t->info.geo)
+        return sh_fail(
+            err, SH_EFORMAT,
+            "%s: colour by range, but points of the geo layout do not say how far a head that moves was; allowed "
+            "output.colour: range, with limits, or output.layout: polar",
+            t->path);
+    if (mode == COLOUR_HEIGHT && t->info.moving && t->crs == NATIVE_CRS_ECEF)
+        return sh_fail(err, SH_EFORMAT,
+                       "%s: colour by height, but of a head that moves ECEF says no heights; allowed output.colour: "
+                       "height, with limits, or another output.crs",
+                       t->path);
+    return 0;
 }
 
-/* Hues a golden section of the circle apart: however many surfaces there are, neighbours in number differ. */
-static void of_label(uint16_t label, uint8_t rgb[3])
+/* Metres east and north of the anchor, and up from its level, where the CRS has such axes. */
+static void from_anchor(const struct track *t, const double p[3], double d[3])
 {
-    const double golden = 0.6180339887498949, hue = 6 * fmod(label * golden, 1.0);
-    for (int i = 0; i < 3; i++) { /* red is strongest at hue 0, green at 2, blue at 4 */
-        double away = fabs(remainder(hue - 2 * i, 6));
-        rgb[i] = (uint8_t)lrint(64 + 176 * fmin(1, fmax(0, 2 - away)));
+    const struct scanhead_info *info = &t->info;
+    const double *a = info->anchor, m_deg = EARTH_M * NATIVE_RAD_PER_DEG;
+    for (int i = 0; i < 3; i++)
+        d[i] = p[i] - a[i];
+    if (info->crs == NATIVE_CRS_GEODETIC) {
+        d[0] = remainder(p[1] - a[1], 360) * m_deg * cos(p[0] * NATIVE_RAD_PER_DEG);
+        d[1] = (p[0] - a[0]) * m_deg;
+    }
+    const int is_own = memcmp(info->station_m, a, sizeof info->station_m) == 0; /* the scene lies in the grid itself */
+    if ((info->crs == NATIVE_CRS_UTM && !is_own) || info->crs == NATIVE_CRS_GEODETIC)
+        d[2] += (d[0] * d[0] + d[1] * d[1]) / (2 * EARTH_M);
+}
+
+static double height_of(const struct track *t, const struct scanhead_point *point)
+{
+    double p[3] = {point->x, point->y, point->z}, d[3], scene[3];
+    if (!t->info.geo) {
+        station_pose_forward(&t->pose, p);
+        return p[2];
+    }
+    if (t->info.moving || t->info.crs == NATIVE_CRS_LOCAL) return p[2];
+    from_anchor(t, p, d);
+    mat3_apply_transposed(t->info.axes, d, scene);
+    return t->info.station_m[2] + scene[2];
+}
+
+double colour_figure(enum colour_mode mode, const struct track *t, int i)
+{
+    const struct scanhead_point *point = &t->point[i];
+    if (point->echo_count == 0) return (double)NAN;
+    switch (mode) {
+    case COLOUR_RANGE:
+        return point->range_m;
+    case COLOUR_HEIGHT:
+        return height_of(t, point);
+    case COLOUR_FRAME:
+        return t->info.moving ? t->frame[i] : t->info.frame;
+    default:
+        return (double)NAN;
     }
 }
 
-void colour_of(enum colour_kind kind, const struct scanhead_point *point, uint8_t rgb[3])
+void colour_of_point(const struct colour_scale *scale, const struct track *t, int i, uint8_t rgb[3])
 {
-    memset(rgb, 128, 3);
-    if (kind == COLOUR_REFLECTANCE) of_reflectance(point->reflectance_db, rgb);
-    if (kind == COLOUR_LABEL && point->label != SCANHEAD_NO_LABEL) of_label(point->label, rgb);
+    const struct scanhead_point *point = &t->point[i];
+    memcpy(rgb, colour_grey, 3);
+    if (point->echo_count == 0) return;
+    if (scale->mode == COLOUR_SOLID) memcpy(rgb, scale->rgb, 3);
+    if (scale->mode == COLOUR_REFLECTANCE) colour_reflectance(point->reflectance_db, rgb);
+    if (scale->mode == COLOUR_LABEL && point->label != SCANHEAD_NO_LABEL) colour_number(point->label, rgb);
+    if (colour_has_limits(scale->mode)) colour_between(scale->low, scale->high, colour_figure(scale->mode, t, i), rgb);
 }

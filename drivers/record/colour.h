@@ -1,19 +1,31 @@
-/* A colour per point, for viewers: made of what the stream says of the point. In: a point. Out: sRGB. The head
- * has no camera; these are no colours of things. Pure; any thread. */
+/* A colour per point, of what the stream says of it: for recordings whose colours the head does not send, or whose
+ * limits are known only at the end. In: the points of a track. Out: sRGB. A shot without echo is grey. Pure; any thread. */
 #ifndef DRIVERS_RECORD_COLOUR_H
 #define DRIVERS_RECORD_COLOUR_H
 
 #include <stdint.h>
 
-#include "drivers/host/scanhead.h"
+#include "core/colour.h"
+#include "core/err.h"
 
-enum colour_kind {
-    COLOUR_NONE,
-    COLOUR_REFLECTANCE, /* grey: black at -30 dB and below, white at 0 dB and above, even steps of dB between;
-                           blue where it is not modelled */
-    COLOUR_LABEL,       /* a hue for each surface; grey without one */
+struct track;
+
+/* Where a recording's colours come from. */
+struct colour_choice {
+    int given;                 /* 0: as the head sends them, if it does */
+    struct colour_scale scale; /* 1: made here, by this; not texture, which only the head knows */
 };
 
-void colour_of(enum colour_kind kind, const struct scanhead_point *point, uint8_t rgb[3]);
+/* Of the scan that begins: SH_EFORMAT where its points have no such figure (frames of a head on no trajectory;
+ * of one that moves ranges in the geo layout, heights in ECEF). */
+int colour_check(enum colour_mode mode, const struct track *track, struct sh_err *err);
+
+/* What range, height or frame shows of point i of the track's batch: metres, metres above the scene's zero, frame scalar.
+ * NaN: lost, or a shot without echo. Heights of geo points are taken back to the scene by the tangent at the station
+ * and the Earth's curvature. Those of a head that moves through a CRS on the Earth are the CRS's own. */
+double colour_figure(enum colour_mode mode, const struct track *track, int i);
+
+/* The colour of point i. */
+void colour_of_point(const struct colour_scale *scale, const struct track *track, int i, uint8_t rgb[3]);
 
 #endif

@@ -21,11 +21,29 @@ enum {
     FILE_HEADER_LEN = 48,
     SECTION_HEADER_LEN = 32,
     PACKET_HEADER_LEN = 6,
-    PACKET_RECORDS = 1920, /* a multiple of 8; their packet is shorter than 64 KiB */
+    PACKET_RECORDS = 1920,  /* a multiple of 8; their packet is shorter than 64 KiB */
+    PACKET_COLOURED = 1792, /* likewise, with colours */
     PACKET_MAX = 65536,
 };
-enum stream { X, Y, Z, INVALID, INTENSITY, NO_INTENSITY, TIME, RETURN, RETURNS, ROW, COLUMN, LABEL, N_STREAMS };
-static const unsigned stream_bits[N_STREAMS] = {32, 32, 32, 2, 16, 1, 64, 4, 4, 32, 32, 16};
+enum stream {
+    X,
+    Y,
+    Z,
+    INVALID,
+    INTENSITY,
+    NO_INTENSITY,
+    RED,
+    GREEN,
+    BLUE,
+    TIME,
+    RETURN,
+    RETURNS,
+    ROW,
+    COLUMN,
+    LABEL,
+    N_STREAMS
+};
+static const unsigned stream_bits[N_STREAMS] = {32, 32, 32, 2, 16, 1, 8, 8, 8, 64, 4, 4, 32, 32, 16};
 
 struct e57 {
     struct recorder base;
@@ -47,13 +65,21 @@ static int e57_begin(void *rec, struct sh_err *err)
     return e57_put(&e->pages, blank, sizeof blank, err);
 }
 
+static int has_stream(const struct e57 *e, int s)
+{
+    if (s == INVALID) return e->facts.empty_shots;
+    return s < RED || s > BLUE || e->base.track.has_colours;
+}
+
 /* The records gathered so far. */
 static int put_packet(struct e57 *e, struct sh_err *err)
 {
-    const uint16_t n_streams = e->facts.empty_shots ? N_STREAMS : N_STREAMS - 1;
+    uint16_t n_streams = 0;
+    for (int s = 0; s < N_STREAMS; s++)
+        n_streams = (uint16_t)(n_streams + has_stream(e, s));
     uint8_t *len_at = e->packet + PACKET_HEADER_LEN, *at = len_at + 2 * n_streams;
     for (int s = 0; s < N_STREAMS; s++) {
-        if (s == INVALID && !e->facts.empty_shots) continue;
+        if (!has_stream(e, s)) continue;
         size_t len = ((size_t)e->n * stream_bits[s] + 7) / 8;
         le_put16(len_at, (uint16_t)len);
         len_at += 2;
@@ -194,6 +220,7 @@ static void put_index(struct e57 *e, const struct scanhead_point *p, uint32_t ro
 static int e57_points(void *rec, int n, struct sh_err *err)
 {
     struct e57 *e = rec;
+    const unsigned most = e->base.track.has_colours ? PACKET_COLOURED : PACKET_RECORDS;
     if (!e->scan->have_start) set_start(e); /* the time may come late */
     for (int i = 0; i < n; i++) {
         const struct scanhead_point *p = &e->base.track.point[i];
@@ -202,9 +229,11 @@ static int e57_points(void *rec, int n, struct sh_err *err)
         if (rc != 0) return rc;
         put_intensity(e, p->reflectance_db);
         le_put_double(e->stream[TIME] + 8 * (size_t)e->n, (double)p->t_ns / 1e9);
+        for (int c = 0; c < 3 && e->base.track.has_colours; c++)
+            e->stream[RED + c][e->n] = e->base.track.rgb[i][c];
         put_index(e, p, e->base.track.row[i]);
         le_put16(e->stream[LABEL] + 2 * (size_t)e->n, p->label);
-        if (++e->n == PACKET_RECORDS) rc = put_packet(e, err);
+        if (++e->n == most) rc = put_packet(e, err);
         if (rc != 0) return rc;
     }
     return 0;
@@ -254,7 +283,7 @@ static void e57_release(void *rec)
 const struct recorder_ops recorder_e57 = {
     .ending = ".e57",
     .size = sizeof(struct e57),
-    .track = {.scan = begin_scan, .points = e57_points, .metres = 1},
+    .track = {.scan = begin_scan, .points = e57_points, .metres = 1, .wants_colours = 1},
     .begin = e57_begin,
     .finish = e57_finish_file,
     .release = e57_release,

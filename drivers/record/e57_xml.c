@@ -108,6 +108,19 @@ static void put_time(FILE *out, const char *tag, double gps_s)
     fprintf(out, "</%s>\n", tag);
 }
 
+static const char *const colour_name[] = {"Red", "Green", "Blue"};
+
+static void put_colour_limits(FILE *out)
+{
+    char tag[32];
+    open_structure(out, "colorLimits");
+    for (int i = 0; i < 6; i++) {
+        snprintf(tag, sizeof tag, "color%s%s", colour_name[i / 2], i % 2 == 0 ? "Minimum" : "Maximum");
+        put_integer(out, tag, i % 2 == 0 ? 0 : 255);
+    }
+    fputs("</colorLimits>\n", out);
+}
+
 /* In the order in which e57.c writes the streams, and of their widths. */
 static void put_prototype(FILE *out, const struct e57_facts *facts, const struct e57_scan *s)
 {
@@ -122,8 +135,12 @@ static void put_prototype(FILE *out, const struct e57_facts *facts, const struct
         fputs("<cartesianInvalidState type=\"Integer\" minimum=\"0\" maximum=\"2\">0</cartesianInvalidState>\n", out);
     fputs("<intensity type=\"ScaledInteger\" minimum=\"-32768\" maximum=\"32767\" scale=\"0.01\" "
           "offset=\"0\">0</intensity>\n"
-          "<isIntensityInvalid type=\"Integer\" minimum=\"0\" maximum=\"1\">0</isIntensityInvalid>\n"
-          "<timeStamp type=\"Float\" precision=\"double\">0</timeStamp>\n"
+          "<isIntensityInvalid type=\"Integer\" minimum=\"0\" maximum=\"1\">0</isIntensityInvalid>\n",
+          out);
+    for (int i = 0; i < 3 && facts->track->has_colours; i++)
+        fprintf(out, "<color%s type=\"Integer\" minimum=\"0\" maximum=\"255\">0</color%s>\n", colour_name[i],
+                colour_name[i]);
+    fputs("<timeStamp type=\"Float\" precision=\"double\">0</timeStamp>\n"
           "<returnIndex type=\"Integer\" minimum=\"0\" maximum=\"15\">0</returnIndex>\n"
           "<returnCount type=\"Integer\" minimum=\"0\" maximum=\"15\">0</returnCount>\n"
           "<rowIndex type=\"Integer\" minimum=\"0\" maximum=\"4294967295\">0</rowIndex>\n"
@@ -145,6 +162,7 @@ static void put_scan(FILE *out, const struct e57_facts *facts, const struct e57_
     put_pose(out, &s->pose);
     if (s->have_start) put_time(out, "acquisitionStart", s->start_gps_s);
     put_bounds(out, s);
+    if (facts->track->has_colours) put_colour_limits(out);
     fprintf(out, "<points type=\"CompressedVector\" fileOffset=\"%" PRIu64 "\" recordCount=\"%" PRIu64 "\">\n",
             e57_physical(s->section), s->n_records);
     put_prototype(out, facts, s);

@@ -32,7 +32,7 @@ static int las_begin(void *rec, struct sh_err *err)
     (void)err;
     las->facts.track = &las->base.track;
     las->facts.minor = las->base.options.las_minor == 2 ? 2 : 4;
-    las->facts.has_colour = las->base.options.colour != COLOUR_NONE;
+    las->facts.has_colour = las->base.track.has_colours;
     for (int i = 0; i < 3; i++)
         las->facts.scale[i] = 1;
     strcpy(las->facts.profile, "OTHER"); /* until points have come */
@@ -79,8 +79,10 @@ static int las_scan(void *rec, struct sh_err *err)
     struct las *las = rec;
     const struct track *t = &las->base.track;
     struct las_facts *f = &las->facts;
+    if (las->begun && strcmp(f->profile, t->info.profile) != 0) strcpy(f->profile, "MERGE"); /* as LAS calls it */
     if (las->begun) return 0;
     set_counts(las);
+    f->has_colour = t->has_colours;
     snprintf(f->profile, sizeof f->profile, "%s", t->info.profile);
     f->gps_time = scanhead_gps_time(t->sh, t->t0_ns, &f->created_gps_s) == 0;
     if (!(f->scale[0] > 0 && f->scale[1] > 0 && f->scale[2] > 0))
@@ -137,7 +139,7 @@ static int set_xyz(struct las *las, int32_t n[3], const double p[3], struct sh_e
 static int has_time(const struct track *t, int i, double *gps_s)
 {
     *gps_s = t->gps_s[i];
-    return t->has_attributes ? !isnan(*gps_s) : scanhead_gps_time(t->sh, t->point[i].t_ns, gps_s) == 0;
+    return t->waited ? !isnan(*gps_s) : scanhead_gps_time(t->sh, t->point[i].t_ns, gps_s) == 0;
 }
 
 static int set_time(const struct las *las, double *time_s, int i, struct sh_err *err)
@@ -199,7 +201,7 @@ static int put_point(struct las *las, uint8_t *to, int i, struct sh_err *err)
     set_returns(las, &las_point, point);
     if (!t->info.moving && las->facts.minor != 2) las_point.scan_angle = scan_angle(las, p_socs);
     if (t->has_attributes) set_attribute(&las_point, &t->attribute[i]);
-    if (las->facts.has_colour) colour_of(las->base.options.colour, point, las_point.rgb);
+    if (t->has_colours) memcpy(las_point.rgb, t->rgb[i], sizeof las_point.rgb);
     las_put_point(&las->facts, &las_point, to);
     return 0;
 }
@@ -270,7 +272,7 @@ static int las_finish(void *rec, struct sh_err *err)
 const struct recorder_ops recorder_las = {
     .ending = ".las",
     .size = sizeof(struct las),
-    .track = {.scan = las_scan, .points = las_points, .wants_attributes = 1},
+    .track = {.scan = las_scan, .points = las_points, .wants_attributes = 1, .wants_colours = 1},
     .begin = las_begin,
     .finish = las_finish,
 };

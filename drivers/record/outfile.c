@@ -1,6 +1,7 @@
 #include "drivers/record/outfile.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -22,7 +23,7 @@ int outfile_open(struct outfile *file, const char *path, struct sh_err *err)
     memset(file, 0, sizeof *file);
     file->fd = -1;
     file->path = strdup(path);
-    file->buf = malloc(OUTFILE_BUFFER);
+    file->buf = aligned_alloc(OUTFILE_BLOCK, OUTFILE_BUFFER);
     if (file->path == NULL || file->buf == NULL || asprintf(&file->part, "%s.part", path) < 0) {
         file->part = NULL;
         release(file);
@@ -36,12 +37,29 @@ int outfile_open(struct outfile *file, const char *path, struct sh_err *err)
     return rc;
 }
 
+/* Where the file system can't, or the system is older, it stays as it was. */
+static void set_direct(struct outfile *file, int on)
+{
+    if (file->is_direct == on) return;
+    const int flags = fcntl(file->fd, F_GETFL);
+    if (flags >= 0 && fcntl(file->fd, F_SETFL, on ? flags | O_DIRECT : flags & ~O_DIRECT) == 0)
+        file->is_direct = on;
+    else
+        file->may_be_direct = 0;
+}
+
 /* *at is moved on by what was written, also before a failure. */
-static int write_at(const struct outfile *file, uint64_t *at, const uint8_t *data, size_t len, struct sh_err *err)
+static int write_at(struct outfile *file, uint64_t *at, const uint8_t *data, size_t len, struct sh_err *err)
 {
     while (len > 0) {
         ssize_t n = pwrite(file->fd, data, len, (off_t)*at);
         if (n < 0 && errno == EINTR) continue;
+        if (n < 0 && errno == EINVAL && file->is_direct) { /* it can't after all, or wants larger blocks */
+            file->may_be_direct = 0;
+            set_direct(file, 0);
+            if (!file->is_direct) continue;
+            errno = EINVAL;
+        }
         if (n <= 0) return sh_fail(err, SH_EIO, "%s: cannot write: %s", file->part, strerror(n < 0 ? errno : ENOSPC));
         data += n;
         len -= (size_t)n;
@@ -50,20 +68,38 @@ static int write_at(const struct outfile *file, uint64_t *at, const uint8_t *dat
     return 0;
 }
 
-int outfile_flush(struct outfile *file, struct sh_err *err)
+/* The first len bytes of the buffer. After a failure the rest stays, so that a later attempt writes no byte twice. */
+static int write_buffered(struct outfile *file, size_t len, struct sh_err *err)
 {
     uint64_t before = file->written;
-    int rc = write_at(file, &file->written, file->buf, file->len, err);
+    int rc = write_at(file, &file->written, file->buf, len, err);
     size_t done = (size_t)(file->written - before);
-    /* after a failure the rest stays, so that a later attempt writes no byte twice */
     memmove(file->buf, file->buf + done, file->len - done);
     file->len -= done;
     return rc;
 }
 
+int outfile_flush(struct outfile *file, struct sh_err *err)
+{
+    set_direct(file, 0); /* the end is no whole block */
+    return write_buffered(file, file->len, err);
+}
+
+/* Makes room in the middle of a file. Direct, only whole blocks go. */
+static int make_room(struct outfile *file, struct sh_err *err)
+{
+    if (!file->may_be_direct || file->written < OUTFILE_DIRECT_FROM) return write_buffered(file, file->len, err);
+    const size_t rest = (size_t)((file->written + file->len) % OUTFILE_BLOCK);
+    if (rest >= file->len) return SH_OK;
+    set_direct(file, file->written % OUTFILE_BLOCK == 0);
+    return write_buffered(file, file->len - rest, err);
+}
+
 uint8_t *outfile_room(struct outfile *file, size_t n, struct sh_err *err)
 {
-    if (OUTFILE_BUFFER - file->len < n && outfile_flush(file, err) != 0) return NULL;
+    if (OUTFILE_BUFFER - file->len < n && make_room(file, err) != 0) return NULL;
+    if (OUTFILE_BUFFER - file->len < n && outfile_flush(file, err) != 0)
+        return NULL; /* almost all of it is asked for */
     return file->buf + file->len;
 }
 
@@ -87,11 +123,22 @@ int outfile_write(struct outfile *file, const void *data, size_t len, struct sh_
 
 int outfile_patch(struct outfile *file, uint64_t at, const void *data, size_t len, struct sh_err *err)
 {
+    set_direct(file, 0);
     return write_at(file, &at, data, len, err);
+}
+
+void outfile_yield(struct outfile *file)
+{
+    newfile_drop(file->part, file->fd);
+    file->fd = -1;
 }
 
 int outfile_close(struct outfile *file, int keep, struct sh_err *err)
 {
+    if (file->fd < 0) {
+        release(file);
+        return 0;
+    }
     int rc = keep ? outfile_flush(file, err) : 0;
     if (keep && rc == 0)
         rc = newfile_keep(file->path, file->part, file->fd, err);

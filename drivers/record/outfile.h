@@ -7,7 +7,11 @@
 
 #include "core/err.h"
 
-enum { OUTFILE_BUFFER = 1 << 20 };
+enum {
+    OUTFILE_BUFFER = 1 << 20,
+    OUTFILE_BLOCK = 4096,           /* of direct writing: places and lengths are multiples of it */
+    OUTFILE_DIRECT_FROM = 32 << 20, /* what is shorter stays in the system's cache, where it is read again soon */
+};
 
 struct outfile {
     int fd;
@@ -15,6 +19,11 @@ struct outfile {
     uint8_t *buf;
     size_t len;       /* bytes in buf */
     uint64_t written; /* bytes of the file that are before buf */
+    /* 1: what goes beyond OUTFILE_DIRECT_FROM is written past the system's cache (O_DIRECT), where the file system can
+     * do that. It saves copying, which is most of the cost of a long recording, but each write then waits for the disk:
+     * for writers that may wait. Set after opening. */
+    int may_be_direct;
+    int is_direct; /* the descriptor is, just now */
 };
 
 /* Errors name the path; SH_EPERM, SH_EINPUT (no such folder, a link, a device), SH_EIO, SH_ENOMEM. */
@@ -27,6 +36,9 @@ void outfile_used(struct outfile *file, size_t n);
 int outfile_flush(struct outfile *file, struct sh_err *err);
 /* Overwrites bytes that were flushed. */
 int outfile_patch(struct outfile *file, uint64_t at, const void *data, size_t len, struct sh_err *err);
+/* Gives the place up: PATH.part is removed, so that something else can be written as PATH. Only outfile_close may follow,
+ * which then frees alone. */
+void outfile_yield(struct outfile *file);
 /* keep: flush, sync, rename. Else, and when that fails, PATH.part is removed. Frees everything in any
  * case. */
 int outfile_close(struct outfile *file, int keep, struct sh_err *err);

@@ -18,7 +18,9 @@
 #include "drivers/record/ply_columns.h"
 #include "drivers/record/recorder.h"
 
-enum { RECORD_LEN = 4 * 8 + 4 + 8 + 1 + 1 + 2 + 2, FRAME_LEN = 8, ATTRIBUTES_LEN = 8, COLOUR_LEN = 3, TEXT_LEN = 512 };
+enum { ROW_MOST = 128, TEXT_LEN = 512 };
+
+_Static_assert(3 * 8 + 8 + 4 + 8 + 2 + 2 + 2 + 8 + 8 + 3 <= ROW_MOST && ROW_MOST <= TEXT_LEN, "room for a row");
 
 struct ply {
     struct recorder base;
@@ -35,7 +37,8 @@ static int ply_begin(void *rec, struct sh_err *err)
     ply->facts.ascii = ply->base.options.ascii;
     ply->facts.empty_shots = ply->base.options.empty_shots;
     ply->facts.scalar_names = ply->base.options.scalar_names;
-    ply->facts.colour = ply->base.options.colour;
+    ply->facts.columns = ply_columns_there(&ply->base.track, ply->base.options.columns); /* until points have come */
+    if (ply->base.options.n_heads > 1) ply->facts.more_heads = ply->base.options.n_heads - 1;
     return 0;
 }
 
@@ -55,43 +58,66 @@ static int make_room(struct ply *ply, uint32_t n_surfaces, struct sh_err *err)
     return rc;
 }
 
-/* A vertex, with what the file has properties for. */
+/* A row of the file. Which of its columns are there, the recorder says. */
 struct vertex {
-    struct scanhead_point point;
+    double xyz[3];
+    const struct scanhead_point *point;
     unsigned station;
-    const double *frame;                        /* NULL where there is no such property */
-    const struct scanhead_attribute *attribute; /* likewise */
-    int has_colour;
-    uint8_t rgb[3];
+    double frame;
+    const struct scanhead_attribute *attribute;
+    const uint8_t *rgb;
 };
 
-static size_t put_binary(uint8_t *to, const struct vertex *v)
+static inline uint8_t *put_length(uint8_t *to, double v, int as_float)
 {
-    const struct scanhead_point *p = &v->point;
-    size_t len = RECORD_LEN;
+    if (as_float)
+        le_put_float(to, (float)v);
+    else
+        le_put_double(to, v);
+    return to + (as_float ? 4 : 8);
+}
 
-    le_put_double(to, p->x);
-    le_put_double(to + 8, p->y);
-    le_put_double(to + 16, p->z);
-    le_put_double(to + 24, p->range_m);
-    le_put_float(to + 32, (float)p->reflectance_db);
-    le_put_double(to + 36, (double)p->t_ns / 1e9);
-    to[44] = p->echo;
-    to[45] = p->echo_count;
-    le_put16(to + 46, p->label);
-    le_put16(to + 48, (uint16_t)v->station);
-    if (v->frame != NULL) {
-        le_put_double(to + len, *v->frame);
-        len += FRAME_LEN;
+/* Where the row ends. Inlined where the columns are known, it has no branches. */
+static inline __attribute__((always_inline)) uint8_t *put_columns(uint8_t *to, const struct vertex *v, unsigned columns)
+{
+    const struct scanhead_point *p = v->point;
+    const int as_float = (columns & PLY_FLOAT) != 0;
+    for (int i = 0; i < 3; i++)
+        to = put_length(to, v->xyz[i], as_float);
+    if ((columns & PLY_RANGE) != 0) to = put_length(to, p->range_m, as_float);
+    if ((columns & PLY_REFLECTANCE) != 0) {
+        le_put_float(to, (float)p->reflectance_db);
+        to += 4;
     }
-    if (v->attribute != NULL) {
-        le_put_float(to + len, (float)v->attribute->amplitude_db);
-        le_put_float(to + len + 4, (float)v->attribute->width_ns);
-        len += ATTRIBUTES_LEN;
+    if ((columns & PLY_TIME) != 0) to = put_length(to, (double)p->t_ns / 1e9, 0);
+    if ((columns & PLY_ECHO) != 0) {
+        to[0] = p->echo;
+        to[1] = p->echo_count;
+        to += 2;
     }
-    if (!v->has_colour) return len;
-    memcpy(to + len, v->rgb, COLOUR_LEN);
-    return len + COLOUR_LEN;
+    if ((columns & PLY_LABEL) != 0) {
+        le_put16(to, p->label);
+        to += 2;
+    }
+    if ((columns & PLY_STATION) != 0) {
+        le_put16(to, (uint16_t)v->station);
+        to += 2;
+    }
+    return to;
+}
+
+static uint8_t *put_binary(uint8_t *to, const struct vertex *v, unsigned columns)
+{
+    to = put_columns(to, v, columns);
+    if ((columns & PLY_FRAME) != 0) to = put_length(to, v->frame, 0);
+    if ((columns & PLY_ATTRIBUTES) != 0) {
+        le_put_float(to, (float)v->attribute->amplitude_db);
+        le_put_float(to + 4, (float)v->attribute->width_ns);
+        to += 8;
+    }
+    if ((columns & PLY_COLOUR) == 0) return to;
+    memcpy(to, v->rgb, 3);
+    return to + 3;
 }
 
 /* Micrometres (1e-11 degrees) are the finest scale of the wire, 0.01 dB and nanoseconds its units: more
@@ -102,31 +128,43 @@ static size_t put_number(char *to, size_t room, int digits, double v)
     return n > 0 && (size_t)n < room ? (size_t)n : room;
 }
 
-/* The length, or more than TEXT_LEN where numbers are absurdly long. */
-static size_t put_ascii(char *to, const struct vertex *v, int degrees)
+/* Where the row ends, or NULL where numbers are absurdly long. */
+static uint8_t *put_ascii(uint8_t *row, const struct vertex *v, unsigned columns, int degrees)
 {
-    const struct scanhead_point *p = &v->point;
+    const struct scanhead_point *p = v->point;
     const int flat = degrees ? 12 : 6;
-    const struct {
+    char *to = (char *)row;
+    size_t n = 0;
+    struct {
         double v;
         int digits;
-    } number[] = {{p->x, flat},    {p->y, flat},           {p->z, 6},
-                  {p->range_m, 6}, {p->reflectance_db, 2}, {(double)p->t_ns / 1e9, 9}};
-    size_t n = 0;
-    for (size_t i = 0; i < sizeof number / sizeof number[0] && n < TEXT_LEN; i++)
+    } number[8] = {{v->xyz[0], flat}, {v->xyz[1], flat}, {v->xyz[2], 6}};
+    size_t k = 3;
+#define TAKE(part, value, places) \
+    if ((columns & (part)) != 0) number[k].v = (value), number[k++].digits = (places)
+    TAKE(PLY_RANGE, p->range_m, 6);
+    TAKE(PLY_REFLECTANCE, p->reflectance_db, 2);
+    TAKE(PLY_TIME, (double)p->t_ns / 1e9, 9);
+    for (size_t i = 0; i < k && n < TEXT_LEN; i++)
         n += put_number(to + n, TEXT_LEN - n, number[i].digits, number[i].v);
-    if (n >= TEXT_LEN) return TEXT_LEN + 1;
-    n += (size_t)snprintf(to + n, TEXT_LEN - n, "%u %u %u %u ", p->echo, p->echo_count, p->label, v->station);
-    if (v->frame != NULL && n < TEXT_LEN)
-        n += (size_t)(isnan(*v->frame) ? snprintf(to + n, TEXT_LEN - n, "nan ")
-                                       : snprintf(to + n, TEXT_LEN - n, "%.9g ", *v->frame));
-    if (v->attribute != NULL && n < TEXT_LEN) n += put_number(to + n, TEXT_LEN - n, 2, v->attribute->amplitude_db);
-    if (v->attribute != NULL && n < TEXT_LEN) n += put_number(to + n, TEXT_LEN - n, 2, v->attribute->width_ns);
-    if (v->has_colour && n < TEXT_LEN)
+    if (n >= TEXT_LEN) return NULL;
+    if ((columns & PLY_ECHO) != 0) n += (size_t)snprintf(to + n, TEXT_LEN - n, "%u %u ", p->echo, p->echo_count);
+    if ((columns & PLY_LABEL) != 0 && n < TEXT_LEN) n += (size_t)snprintf(to + n, TEXT_LEN - n, "%u ", p->label);
+    if ((columns & PLY_STATION) != 0 && n < TEXT_LEN) n += (size_t)snprintf(to + n, TEXT_LEN - n, "%u ", v->station);
+    if ((columns & PLY_FRAME) != 0 && n < TEXT_LEN)
+        n += (size_t)(isnan(v->frame) ? snprintf(to + n, TEXT_LEN - n, "nan ")
+                                      : snprintf(to + n, TEXT_LEN - n, "%.9g ", v->frame));
+    k = 0;
+    TAKE(PLY_ATTRIBUTES, v->attribute->amplitude_db, 2);
+    TAKE(PLY_ATTRIBUTES, v->attribute->width_ns, 2);
+#undef TAKE
+    for (size_t i = 0; i < k && n < TEXT_LEN; i++)
+        n += put_number(to + n, TEXT_LEN - n, number[i].digits, number[i].v);
+    if ((columns & PLY_COLOUR) != 0 && n < TEXT_LEN)
         n += (size_t)snprintf(to + n, TEXT_LEN - n, "%u %u %u ", v->rgb[0], v->rgb[1], v->rgb[2]);
-    if (n >= TEXT_LEN) return TEXT_LEN + 1;
+    if (n >= TEXT_LEN) return NULL;
     to[n - 1] = '\n'; /* the blank after the last number */
-    return n;
+    return row + n;
 }
 
 /* The time may come late. */
@@ -137,58 +175,127 @@ static void set_gps(struct ply *ply)
     facts->have_gps = track_start_gps(&ply->base.track, &facts->gps_s);
 }
 
+/* A float steps by 6e-8 of a number: enough about the origin of a scene, and metres on the Earth. */
+static const double FLOAT_MOST_M = 1000, FLOAT_PART = 0x1p-24;
+
+static int fail_float(const struct ply *ply, double most, struct sh_err *err)
+{
+    return sh_fail(err, SH_EINPUT,
+                   "%s: coordinates of %.0f m as float would be wrong by up to %.2g m; allowed without float, and for "
+                   "stations within %g m of the origin",
+                   ply->base.file.path, most, most * FLOAT_PART, FLOAT_MOST_M);
+}
+
+static double largest(const double p[3])
+{
+    return fmax(fabs(p[0]), fmax(fabs(p[1]), fabs(p[2])));
+}
+
+static int check_float(const struct ply *ply, struct sh_err *err)
+{
+    const struct track *t = &ply->base.track;
+    if ((ply->facts.columns & PLY_FLOAT) == 0) return 0;
+    if (t->crs == NATIVE_CRS_GEODETIC)
+        return sh_fail(err, SH_EINPUT, "%s: degrees as float would be wrong by metres; allowed without float",
+                       ply->base.file.path);
+    const double most = largest(t->pose.shift_m);
+    return most <= FLOAT_MOST_M ? 0 : fail_float(ply, most, err);
+}
+
+/* A head that moves comes to places that nobody knows before. Its points may be as much farther as those of a station. */
+static int check_floats_on_the_way(const struct ply *ply, int n, struct sh_err *err)
+{
+    const struct track *t = &ply->base.track;
+    double most = 0;
+    if ((ply->facts.columns & PLY_FLOAT) == 0 || !t->info.moving) return 0;
+    for (int i = 0; i < n; i++)
+        most = fmax(most, largest((const double[3]){t->point[i].x, t->point[i].y, t->point[i].z}));
+    return most <= FLOAT_MOST_M + t->info.range_max_m ? 0 : fail_float(ply, most, err);
+}
+
 /* Room for the header is made when the number of surfaces is known. */
 static int ply_scan(void *rec, struct sh_err *err)
 {
     struct ply *ply = rec;
     const struct scanhead_info *info = &ply->base.track.info;
     struct ply_facts *facts = &ply->facts;
-    snprintf(facts->idn, sizeof facts->idn, "%s", info->idn);
-    snprintf(facts->profile, sizeof facts->profile, "%s", info->profile);
-    return ply->begun ? 0 : make_room(ply, info->n_surfaces, err);
+    facts->columns = ply_columns_there(&ply->base.track, ply->base.options.columns);
+    struct ply_head head = {.station = info->station};
+    snprintf(head.idn, sizeof head.idn, "%s", info->idn);
+    snprintf(head.profile, sizeof head.profile, "%s", info->profile);
+    const struct ply_head *last = facts->n_heads > 0 ? &facts->head[facts->n_heads - 1] : NULL;
+    const int same = last != NULL && strcmp(last->idn, head.idn) == 0 && strcmp(last->profile, head.profile) == 0;
+    if (!same && facts->n_heads < PLY_MAX_HEADS) facts->head[facts->n_heads++] = head;
+    int rc = check_float(ply, err);
+    return rc != 0 || ply->begun ? rc : make_room(ply, info->n_surfaces, err);
 }
 
 /* Point i of the batch, placed; 0: it is left out. */
-static int take_vertex(struct ply *ply, int i, struct vertex *v)
+static inline int take_vertex(struct ply *ply, int i, struct vertex *v)
 {
     struct track *t = &ply->base.track;
-    struct scanhead_point *p = &v->point;
-    *v = (struct vertex){.point = t->point[i], .station = t->info.station};
+    const struct scanhead_point *p = &t->point[i];
     if (p->echo_count == 0 && !ply->facts.empty_shots) return 0;
-    if (t->info.moving || t->info.stop) v->frame = t->info.moving ? &t->frame[i] : &t->info.frame;
-    if (t->has_attributes) v->attribute = &t->attribute[i];
-    v->has_colour = ply->facts.colour != COLOUR_NONE;
-    if (v->has_colour) colour_of(ply->facts.colour, p, v->rgb);
+    v->point = p;
+    v->xyz[0] = p->x;
+    v->xyz[1] = p->y;
+    v->xyz[2] = p->z;
     if (t->info.geo) return 1;
-    double xyz[3] = {p->x, p->y, p->z};
-    station_pose_forward(&t->pose, xyz);
-    p->x = xyz[0];
-    p->y = xyz[1];
-    p->z = xyz[2];
-    return p->echo_count == 0 || !track_is_nowhere(t, p->x, p->y, p->z);
+    station_pose_forward(&t->pose, v->xyz);
+    return p->echo_count == 0 || !track_is_nowhere(t, v->xyz[0], v->xyz[1], v->xyz[2]);
+}
+
+/* Binary rows with the columns that every head's points have, which most recordings are made of. */
+static inline __attribute__((always_inline)) uint8_t *put_rows(struct ply *ply, int n, uint8_t *to, unsigned columns)
+{
+    struct vertex v = {.station = ply->base.track.info.station};
+    for (int i = 0; i < n; i++) {
+        if (!take_vertex(ply, i, &v)) continue;
+        to = put_columns(to, &v, columns);
+        ply->facts.n_vertices++;
+    }
+    return to;
+}
+
+/* NULL: a coordinate is too long. What was put before that counts. */
+static uint8_t *put_any_rows(struct ply *ply, int n, uint8_t **to, struct sh_err *err)
+{
+    const struct track *t = &ply->base.track;
+    const unsigned columns = ply->facts.columns;
+    const int degrees = t->crs == NATIVE_CRS_GEODETIC;
+    struct vertex v = {.station = t->info.station};
+    for (int i = 0; i < n; i++) {
+        if (!take_vertex(ply, i, &v)) continue;
+        v.frame = t->info.moving ? t->frame[i] : t->info.frame;
+        v.attribute = &t->attribute[i];
+        v.rgb = t->rgb[i];
+        uint8_t *end = ply->facts.ascii ? put_ascii(*to, &v, columns, degrees) : put_binary(*to, &v, columns);
+        if (end == NULL) {
+            recorder_fail_huge(&ply->base, v.xyz, err);
+            return NULL;
+        }
+        *to = end;
+        ply->facts.n_vertices++;
+    }
+    return *to;
 }
 
 static int ply_points(void *rec, int n, struct sh_err *err)
 {
+    enum { USUAL = PLY_RANGE | PLY_REFLECTANCE | PLY_TIME | PLY_ECHO | PLY_LABEL | PLY_STATION };
     struct ply *ply = rec;
-    const int degrees = ply->base.track.crs == NATIVE_CRS_GEODETIC;
-    int rc = 0;
-    uint8_t *to = outfile_room(&ply->base.file, TRACK_BATCH * TEXT_LEN, err);
-    if (to == NULL) return SH_EIO;
-    size_t used = 0;
+    uint8_t *from = outfile_room(&ply->base.file, TRACK_BATCH * TEXT_LEN, err), *to = from;
+    if (from == NULL) return SH_EIO;
     set_gps(ply);
-    for (int i = 0; i < n; i++) {
-        struct vertex v;
-        if (!take_vertex(ply, i, &v)) continue;
-        size_t len = ply->facts.ascii ? put_ascii((char *)to + used, &v, degrees) : put_binary(to + used, &v);
-        if (len > TEXT_LEN) {
-            rc = recorder_fail_huge(&ply->base, (double[]){v.point.x, v.point.y, v.point.z}, err);
-            break;
-        }
-        used += len;
-        ply->facts.n_vertices++;
-    }
-    outfile_used(&ply->base.file, used); /* also before a failure: the file may be kept */
+    int rc = check_floats_on_the_way(ply, n, err);
+    if (rc != 0) return rc;
+    if (!ply->facts.ascii && ply->facts.columns == USUAL)
+        to = put_rows(ply, n, to, USUAL);
+    else if (!ply->facts.ascii && (ply->facts.columns & ~(unsigned)(USUAL | PLY_FLOAT)) == 0)
+        to = put_rows(ply, n, to, ply->facts.columns);
+    else if (put_any_rows(ply, n, &to, err) == NULL)
+        rc = SH_EFORMAT;
+    outfile_used(&ply->base.file, (size_t)(to - from)); /* also before a failure: the file may be kept */
     return rc;
 }
 
@@ -241,7 +348,7 @@ static int ply_finish(void *rec, struct sh_err *err)
 const struct recorder_ops recorder_ply = {
     .ending = ".ply",
     .size = sizeof(struct ply),
-    .track = {.scan = ply_scan, .points = ply_points, .wants_attributes = 1},
+    .track = {.scan = ply_scan, .points = ply_points, .wants_attributes = 1, .wants_colours = 1},
     .begin = ply_begin,
     .frame = ply_frame,
     .finish = ply_finish,

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "drivers/protocol/native.h"
+#include "drivers/record/recorder.h"
 
 enum {
     PAD_LINE = 64,       /* old readers take lines of 128 bytes or little more */
@@ -25,44 +26,64 @@ static void printable(char *text)
         if ((unsigned char)*text < 0x20 || *text == 0x7f) *text = '?';
 }
 
-static const char *crs_text(const struct ply_facts *facts)
+const char *ply_crs_text(const struct track *t)
 {
     static const char *const text[] = {"scene frame, metres", "ECEF, metres",
                                        "UTM or UPS with ellipsoidal height, metres",
                                        "latitude and longitude in degrees, ellipsoidal height in metres"};
     static const char *const on_geoid[] = {"UTM or UPS with height above the geoid, metres",
                                            "latitude and longitude in degrees, height above the geoid in metres"};
-    const struct track *t = facts->track;
     if (!t->begun) return "unknown, no points were recorded";
     return t->geoid_heights && t->crs >= 2 ? on_geoid[t->crs - 2] : text[t->crs];
 }
 
-/* Of all surfaces that the stream has named so far. */
-static void put_names(FILE *out, const struct scanhead *sh)
+void ply_put_names(FILE *out, const char *before, const struct scanhead *sh)
 {
     const char *object, *material;
     for (uint32_t label = 0; sh != NULL && label < SCANHEAD_NO_LABEL; label++) {
         char line[NAMES_MAX];
         if (!scanhead_surface(sh, label, &object, &material)) continue;
-        snprintf(line, sizeof line, "comment label %u %s | %s", label, object, material);
+        snprintf(line, sizeof line, "label %u %s | %s", label, object, material);
         printable(line);
-        fprintf(out, "%s\n", line);
+        fprintf(out, "%s%s\n", before, line);
     }
+}
+
+static void put_head(FILE *out, const struct ply_head *head, int several)
+{
+    char idn[sizeof head->idn], profile[sizeof head->profile], whose[32] = "";
+    memcpy(idn, head->idn, sizeof idn);
+    memcpy(profile, head->profile, sizeof profile);
+    printable(idn);
+    printable(profile);
+    if (several) snprintf(whose, sizeof whose, "station %u ", head->station);
+    fprintf(out, "comment %sidn %s\n", whose, idn);
+    fprintf(out, "comment %sprofile %s\n", whose, profile);
+}
+
+static void put_colour_comment(FILE *out, const struct track *t)
+{
+    const struct colour_scale *scale = &t->colour.scale;
+    if (!t->colour.given)
+        fputs("comment red green blue as the head sent them (output.colour)\n", out);
+    else if (colour_has_limits(scale->mode))
+        fprintf(out, "comment red green blue show the %s, red is %.9g, blue %.9g%s\n", colour_words[scale->mode],
+                scale->low, scale->high, scale->mode == COLOUR_FRAME ? "" : " m");
+    else if (scale->mode == COLOUR_REFLECTANCE)
+        fputs("comment red green blue show the reflectance, black is -30 dB, white 0 dB, blue not modelled\n", out);
+    else
+        fprintf(out, "comment red green blue %s\n",
+                scale->mode == COLOUR_LABEL ? "show the label" : "are one colour for all");
 }
 
 static void put_comments(FILE *out, const struct ply_facts *facts)
 {
     const struct track *t = facts->track;
-    char idn[sizeof facts->idn], profile[sizeof facts->profile];
-    memcpy(idn, facts->idn, sizeof idn);
-    memcpy(profile, facts->profile, sizeof profile);
-    printable(idn);
-    printable(profile);
     const struct scanhead_stats *s = &facts->stats;
-    fprintf(out, "comment crs %s\n", crs_text(facts));
+    fprintf(out, "comment crs %s\n", ply_crs_text(t));
     fprintf(out, "comment epsg %d\n", t->epsg);
-    fprintf(out, "comment idn %s\n", idn);
-    fprintf(out, "comment profile %s\n", profile);
+    for (uint32_t i = 0; i < facts->n_heads || i == 0; i++) /* of a file without points all is empty */
+        put_head(out, &facts->head[i], facts->n_heads > 1);
     fprintf(out, "comment %s, time in seconds since the scan's start\n",
             t->begun && t->crs == NATIVE_CRS_GEODETIC ? "x latitude, y longitude in degrees, z range in metres"
                                                       : "x y z range in metres");
@@ -71,13 +92,14 @@ static void put_comments(FILE *out, const struct ply_facts *facts)
         fprintf(out, "comment the first scan starts at GPS week %.0f second %.6f\n", week,
                 facts->gps_s - week * WEEK_S);
     }
-    fputs("comment reflectance in dB, nan: not modelled\n", out);
-    if (t->has_attributes)
+    if ((facts->columns & PLY_REFLECTANCE) != 0) fputs("comment reflectance in dB, nan: not modelled\n", out);
+    if ((facts->columns & PLY_ATTRIBUTES) != 0)
         fprintf(out,
                 "comment amplitude in dB above the detection threshold, width of the echo in ns at half maximum\n"
                 "comment points_without_attributes %" PRIu64 "\n",
                 facts->n_without_attributes);
-    fputs("comment echo and echo_count 0: shot without echo; label 65535: none\n", out);
+    if ((facts->columns & (PLY_ECHO | PLY_LABEL)) != 0)
+        fputs("comment echo and echo_count 0: shot without echo; label 65535: none\n", out);
     if (t->moving)
         fprintf(
             out,
@@ -85,17 +107,14 @@ static void put_comments(FILE *out, const struct ply_facts *facts)
             "comment points_without_pose %" PRIu64 "\n",
             facts->n_without_pose);
     if (t->stops) fputs("comment the stations are stops on a trajectory; frame: its frame scalar there\n", out);
-    if (facts->colour != COLOUR_NONE)
-        fprintf(out, "comment red green blue show the %s\n",
-                facts->colour == COLOUR_LABEL ? "label"
-                                              : "reflectance, black is -30 dB, white 0 dB, blue not modelled");
+    if ((facts->columns & PLY_COLOUR) != 0) put_colour_comment(out, t);
     fprintf(out, "comment empty_shots %s\n", facts->empty_shots ? "kept" : "left out");
     fprintf(out,
             "comment frames_lost %" PRIu64 " reader_lost %" PRIu64 " dropped %" PRIu64 " bad_payload %" PRIu64 "\n",
             s->seq_lost, s->reader_lost, s->dropped, s->bad_payload);
     fprintf(out, "comment pulses_lost %" PRIu64 " points_before_descriptor %" PRIu64 "\n", s->pulses_lost,
             facts->n_unplaced);
-    put_names(out, t->sh);
+    ply_put_names(out, "comment ", t->named != NULL ? t->named : t->sh);
 }
 
 /* Lines of comment that take exactly n bytes; n is 0 or at least PAD_MIN. */
@@ -108,10 +127,65 @@ static void put_padding(FILE *out, size_t n)
     }
 }
 
-/* CloudCompare shows columns of other names than these only where it is told to. */
-static void put_column(FILE *out, const struct ply_facts *facts, const char *type, const char *name)
+const char *const ply_column_words[] = {"range", "reflectance", "time",   "echo",  "label", "station",
+                                        "frame", "attributes",  "colour", "float", "xyz",   NULL};
+
+int ply_columns_read(const char *text, unsigned *columns)
 {
-    fprintf(out, "property %s %s%s\n", type, facts->scalar_names ? "scalar_" : "", name);
+    *columns = 0;
+    for (;;) {
+        const size_t n = strcspn(text, ",");
+        unsigned i = 0;
+        while (ply_column_words[i] != NULL &&
+               (strlen(ply_column_words[i]) != n || strncmp(text, ply_column_words[i], n) != 0))
+            i++;
+        if (ply_column_words[i] == NULL || (*columns & 1U << i) != 0) return 0;
+        *columns |= 1U << i;
+        if (text[n] == '\0') return 1;
+        text += n + 1;
+    }
+}
+
+/* In the order of the file. */
+static const struct column {
+    unsigned part; /* of enum ply_column; 0: always */
+    const char *type, *name;
+    int plain; /* known by that name everywhere */
+} columns[] = {
+    {0, "double", "x", 1},
+    {0, "double", "y", 1},
+    {0, "double", "z", 1},
+    {PLY_RANGE, "double", "range", 0},
+    {PLY_REFLECTANCE, "float", "reflectance", 0},
+    {PLY_TIME, "double", "time", 0},
+    {PLY_ECHO, "uchar", "echo", 0},
+    {PLY_ECHO, "uchar", "echo_count", 0},
+    {PLY_LABEL, "ushort", "label", 0},
+    {PLY_STATION, "ushort", "station", 0},
+    {PLY_FRAME, "double", "frame", 0},
+    {PLY_ATTRIBUTES, "float", "amplitude", 0},
+    {PLY_ATTRIBUTES, "float", "width", 0},
+    {PLY_COLOUR, "uchar", "red", 1},
+    {PLY_COLOUR, "uchar", "green", 1},
+    {PLY_COLOUR, "uchar", "blue", 1},
+};
+
+unsigned ply_columns_there(const struct track *track, unsigned asked)
+{
+    if (asked == 0) asked = PLY_ALL;
+    asked &= ~(unsigned)PLY_XYZ;
+    if (!track->moving && !track->stops) asked &= ~(unsigned)PLY_FRAME;
+    if (!track->has_attributes) asked &= ~(unsigned)PLY_ATTRIBUTES;
+    if (!track->has_colours) asked &= ~(unsigned)PLY_COLOUR;
+    return asked;
+}
+
+/* CloudCompare shows columns of other names than these only where it is told to. */
+static void put_column(FILE *out, const struct ply_facts *facts, const struct column *c)
+{
+    const int as_float = (facts->columns & PLY_FLOAT) != 0 && (c->part == 0 || c->part == PLY_RANGE);
+    fprintf(out, "property %s %s%s\n", as_float ? "float" : c->type, facts->scalar_names && !c->plain ? "scalar_" : "",
+            c->name);
 }
 
 static void put_header(FILE *out, const struct ply_facts *facts, size_t padding)
@@ -120,19 +194,8 @@ static void put_header(FILE *out, const struct ply_facts *facts, size_t padding)
     put_comments(out, facts);
     put_padding(out, padding);
     fprintf(out, "element vertex %" PRIu64 "\n", facts->n_vertices);
-    for (int i = 0; i < 3; i++)
-        fprintf(out, "property double %c\n", "xyz"[i]);
-    static const char *const always[][2] = {{"double", "range"},  {"float", "reflectance"}, {"double", "time"},
-                                            {"uchar", "echo"},    {"uchar", "echo_count"},  {"ushort", "label"},
-                                            {"ushort", "station"}};
-    for (size_t i = 0; i < sizeof always / sizeof always[0]; i++)
-        put_column(out, facts, always[i][0], always[i][1]);
-    if (facts->track->moving || facts->track->stops) put_column(out, facts, "double", "frame");
-    if (facts->track->has_attributes) {
-        put_column(out, facts, "float", "amplitude");
-        put_column(out, facts, "float", "width");
-    }
-    if (facts->colour != COLOUR_NONE) fputs("property uchar red\nproperty uchar green\nproperty uchar blue\n", out);
+    for (size_t i = 0; i < sizeof columns / sizeof columns[0]; i++)
+        if (columns[i].part == 0 || (facts->columns & columns[i].part) != 0) put_column(out, facts, &columns[i]);
     fputs("end_header\n", out);
 }
 
@@ -162,6 +225,7 @@ size_t ply_header_reserve(const struct ply_facts *facts, uint32_t n_surfaces)
     size_t len;
     if (ply_header_make(facts, 0, &text, &len, NULL) != 0) return 0;
     free(text);
+    len += facts->more_heads * (sizeof(struct ply_head) + 48);
     if (facts->track->has_attributes) len += 20;
     for (uint32_t label = 0; label < n_surfaces; label++)
         if (!scanhead_surface(facts->track->sh, label, &object, &material)) len += NAME_ROOM;

@@ -5,24 +5,38 @@
 
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 
 #include "core/err.h"
 #include "drivers/host/scanhead.h"
-#include "drivers/record/colour.h"
 #include "drivers/record/track.h"
+
+enum { PLY_MAX_HEADS = 128 };
 
 struct ply_facts {
     const struct track *track; /* its kind of points, and the handle that knows the surfaces' names */
     int ascii, empty_shots, scalar_names;
-    enum colour_kind colour;
+    unsigned columns;                /* enum ply_column: that are asked for, and are there */
     uint64_t n_vertices, n_unplaced; /* points before their descriptor and anchor were seen */
     uint64_t n_without_pose;         /* points of a moving head whose pose was lost */
     uint64_t n_without_attributes;   /* echoes */
     int have_gps;
     double gps_s; /* GPS time of the first scan's start */
-    char idn[96], profile[32];
+    /* The heads: of the first scan, then wherever another one begins. */
+    struct ply_head {
+        uint32_t station;
+        char idn[96], profile[32];
+    } head[PLY_MAX_HEADS];
+    uint32_t n_heads, more_heads; /* room is to be left for so many more */
     struct scanhead_stats stats;
 };
+
+/* Of columns, those that points of the track have. Once the track has begun. */
+unsigned ply_columns_there(const struct track *track, unsigned columns);
+/* What the coordinates of the track's points are. */
+const char *ply_crs_text(const struct track *track);
+/* "label N OBJECT | MATERIAL", a line each with `before` in front, of all surfaces that the stream has named so far. */
+void ply_put_names(FILE *out, const char *before, const struct scanhead *sh);
 
 /* Bytes to leave for the header: all that is known now, and room for those names of n_surfaces that are
  * not. */

@@ -7,6 +7,8 @@
  * sphere a column a ring, and of a pole one shot. Beams and lists of directions have no rows and columns: they
  * are refused.
  *
+ * With colours each line goes on with red, green and blue, 0 to 255; all 0 for a place without a point.
+ *
  * A PTX grid has one point per shot: the first echo. Intensity is the reflectance as a fraction: 1 for a
  * white Lambertian target and for what is brighter, 0.5 where not modelled. What the grid had no room for is
  * reported at the end, with counts.
@@ -87,6 +89,18 @@ static void say_progress(struct ptx *ptx, uint32_t n_rows)
                 (double)ptx->n_columns / ((double)ptx->grid.column_max - ptx->grid.column_min + 1));
 }
 
+/* The length, or LINE_MAX_LEN and more. */
+static int put_cell(char *to, const struct ptx_cell *c, int coloured)
+{
+    const double *p = c->p_socs;
+    if (c->intensity < 0) return snprintf(to, LINE_MAX_LEN, "0 0 0 0.5%s\n", coloured ? " 0 0 0" : "");
+    int n = snprintf(to, LINE_MAX_LEN, "%.6f %.6f %.6f %.6f", p[0], p[1], p[2], (double)c->intensity);
+    if (n >= LINE_MAX_LEN) return n;
+    const size_t room = (size_t)(LINE_MAX_LEN - n);
+    if (!coloured) return n + snprintf(to + n, room, "\n");
+    return n + snprintf(to + n, room, " %u %u %u\n", c->rgb[0], c->rgb[1], c->rgb[2]);
+}
+
 static int put_column(void *ctx, const struct ptx_cell *column, uint32_t n_rows, struct sh_err *err)
 {
     struct ptx *ptx = ctx;
@@ -96,12 +110,8 @@ static int put_column(void *ctx, const struct ptx_cell *column, uint32_t n_rows,
         if (i % ROWS_BETWEEN_STOPS == ROWS_BETWEEN_STOPS - 1) rc = recorder_check_stop(&ptx->base, err);
         char *to = (char *)outfile_room(&ptx->base.file, LINE_MAX_LEN, err);
         if (to == NULL) return SH_EIO;
-        const struct ptx_cell *c = &column[i];
-        const double *p = c->p_socs;
-        int n = c->intensity < 0
-                    ? snprintf(to, LINE_MAX_LEN, "0 0 0 0.5\n")
-                    : snprintf(to, LINE_MAX_LEN, "%.6f %.6f %.6f %.6f\n", p[0], p[1], p[2], (double)c->intensity);
-        if (n >= LINE_MAX_LEN) return recorder_fail_huge(&ptx->base, p, err);
+        const int n = put_cell(to, &column[i], ptx->base.track.has_colours);
+        if (n >= LINE_MAX_LEN) return recorder_fail_huge(&ptx->base, column[i].p_socs, err);
         outfile_used(&ptx->base.file, (size_t)n);
     }
     return rc;
@@ -177,7 +187,11 @@ static int ptx_points(void *rec, int n, struct sh_err *err)
         ptx->last_row = t->row[i];
         ptx_grid_shot(&ptx->grid, t->line, t->row[i]);
         if (p->echo_count == 0) continue;
-        struct ptx_cell cell = {t->line, t->row[i], intensity(ptx, p->reflectance_db), {p->x, p->y, p->z}};
+        struct ptx_cell cell = {.column = t->line,
+                                .row = t->row[i],
+                                .intensity = intensity(ptx, p->reflectance_db),
+                                .p_socs = {p->x, p->y, p->z}};
+        if (t->has_colours) memcpy(cell.rgb, t->rgb[i], sizeof cell.rgb);
         if (t->info.geo) station_pose_reverse(&t->pose, cell.p_socs);
         if (track_is_nowhere(t, cell.p_socs[0], cell.p_socs[1], cell.p_socs[2])) continue;
         int rc = ptx_grid_cell(&ptx->grid, &cell, err);
@@ -208,7 +222,7 @@ static void ptx_release(void *rec)
 const struct recorder_ops recorder_ptx = {
     .ending = ".ptx",
     .size = sizeof(struct ptx),
-    .track = {.scan = ptx_scan, .points = ptx_points, .metres = 1, .grid = 1},
+    .track = {.scan = ptx_scan, .points = ptx_points, .metres = 1, .grid = 1, .wants_colours = 1},
     .begin = ptx_begin,
     .finish = ptx_finish,
     .release = ptx_release,

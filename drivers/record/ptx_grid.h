@@ -10,7 +10,8 @@
 
 struct ptx_cell {
     uint32_t column, row;
-    float intensity; /* 0..1 */
+    float intensity;        /* 0..1 */
+    uint8_t rgb[3], unused; /* no gap: cells are written as they are */
     double p_socs[3];
 };
 

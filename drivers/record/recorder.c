@@ -8,9 +8,10 @@
 
 /* The one list of formats. */
 extern const struct recorder_ops recorder_ply, recorder_las, recorder_ptx, recorder_e57, recorder_poses,
-    recorder_pcapng, recorder_shs;
+    recorder_pcapng, recorder_shs, recorder_mesh_ply, recorder_obj, recorder_gltf, recorder_glb, recorder_fbx;
 static const struct recorder_ops *const recorders[] = {&recorder_ply,   &recorder_las,    &recorder_ptx, &recorder_e57,
-                                                       &recorder_poses, &recorder_pcapng, &recorder_shs};
+                                                       &recorder_poses, &recorder_pcapng, &recorder_shs, &recorder_obj,
+                                                       &recorder_gltf,  &recorder_glb,    &recorder_fbx};
 
 enum { N_RECORDERS = sizeof recorders / sizeof recorders[0] };
 
@@ -27,6 +28,11 @@ const struct recorder_ops *recorder_find(const char *path, struct sh_err *err)
     return NULL;
 }
 
+const struct recorder_ops *recorder_shape(const struct recorder_ops *ops, const struct recorder_options *options)
+{
+    return ops == &recorder_ply && (options->mesh || options->sparse_per_m2 > 0) ? &recorder_mesh_ply : ops;
+}
+
 int recorder_open(const struct recorder_ops *ops, const char *path, const struct recorder_options *options,
                   struct recorder **out, struct sh_err *err)
 {
@@ -39,9 +45,13 @@ int recorder_open(const struct recorder_ops *ops, const char *path, const struct
     }
     rec->ops = ops;
     rec->options = *options;
+    rec->file.may_be_direct = options->may_wait;
     rec->track.path = rec->file.path;
     rec->track.ops = &ops->track;
     rec->track.rec = rec;
+    rec->track.colour = options->colour;
+    rec->track.has_colours =
+        ops->track.wants_colours && options->colour.given && options->colour.scale.mode != COLOUR_NONE;
     rc = ops->begin != NULL ? ops->begin(rec, err) : SH_OK;
     if (rc != SH_OK) {
         recorder_close(rec, 0, NULL);
@@ -49,6 +59,12 @@ int recorder_open(const struct recorder_ops *ops, const char *path, const struct
     }
     *out = rec;
     return SH_OK;
+}
+
+void recorder_set_limits(struct recorder *rec, double low, double high)
+{
+    rec->track.colour.scale.low = rec->options.colour.scale.low = low;
+    rec->track.colour.scale.high = rec->options.colour.scale.high = high;
 }
 
 int recorder_frame(struct recorder *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
@@ -86,6 +102,7 @@ static void report_losses(const struct recorder *rec)
     recorder_report(rec, t->missing.n_attributes_unheld,
                     "points whose amplitude and width are left out; this format has no place for them");
     recorder_report(rec, t->missing.n_without_attributes, "points without amplitude and width, which were lost");
+    recorder_report(rec, t->missing.n_without_colours, "points that are grey, since their colours were lost");
 }
 
 int recorder_close(struct recorder *rec, int keep, struct sh_err *err)

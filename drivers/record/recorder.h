@@ -18,12 +18,38 @@ struct recorder_padding {
     uint64_t n_shots, n_places;
 };
 
+/* Columns of .ply beside x, y and z. */
+enum ply_column {
+    PLY_RANGE = 1 << 0,
+    PLY_REFLECTANCE = 1 << 1,
+    PLY_TIME = 1 << 2,
+    PLY_ECHO = 1 << 3, /* and echo_count */
+    PLY_LABEL = 1 << 4,
+    PLY_STATION = 1 << 5,
+    PLY_FRAME = 1 << 6,      /* where there are frames */
+    PLY_ATTRIBUTES = 1 << 7, /* where the head sends them */
+    PLY_COLOUR = 1 << 8,     /* where there are colours */
+    PLY_ALL = (1 << 9) - 1,
+    PLY_FLOAT = 1 << 9, /* no column: x, y, z and range as float */
+    PLY_XYZ = 1 << 10,  /* no column: nothing else is asked for */
+};
+extern const char *const ply_column_words[]; /* by bit; NULL at the end */
+/* Such words with commas between them; "xyz" stands for none. 0: one is not known, or comes twice. */
+int ply_columns_read(const char *text, unsigned *columns);
+
 struct recorder_options {
-    int ascii;               /* PLY as text */
-    int empty_shots;         /* keep shots without echo, where the format can */
-    enum colour_kind colour; /* of .ply and .las */
-    int scalar_names;        /* PLY's columns besides coordinates and colour are called scalar_NAME */
-    int las_minor;           /* LAS 1.2 or 1.4: 2 or 4; 0: 4 */
+    int ascii;                   /* PLY as text */
+    int empty_shots;             /* keep shots without echo, where the format can */
+    struct colour_choice colour; /* of formats that hold one */
+    unsigned columns;            /* of .ply: enum ply_column; 0: all, in double */
+    int scalar_names;            /* PLY's columns besides coordinates and colour are called scalar_NAME */
+    uint32_t n_heads; /* that the scans are of, one after the other, in one scene; 0: one, as far as known */
+    int may_wait;  /* the stream waits for the recorder: large files are written past the system's cache (outfile.h) */
+    int las_minor; /* LAS 1.2 or 1.4: 2 or 4; 0: 4 */
+    int mesh;      /* .ply is a mesh of the scan's grid */
+    double long_edge;     /* of meshes: triangles with an edge of more than so many means are left out; 0: none */
+    double sparse_per_m2; /* > 0: .ply is points spread over the mesh, so many a square metre, ... */
+    uint64_t sparse_seed; /* ... drawn by this seed */
     /* Is given, at the end, what the format had no room for. Its stop gives up a file that is being completed, which may
      * take long. May be NULL; must live until close. */
     const struct sh_report *report;
@@ -42,6 +68,7 @@ struct recorder {
  * in err. */
 struct recorder_ops {
     const char *ending;     /* ".ply" */
+    int is_mesh;            /* of the scan's grid, or points spread over it */
     size_t size;            /* of the recorder's own struct; after its struct recorder it begins zeroed */
     struct track_ops track; /* takes points in batches */
     /* The file is open and empty. */
@@ -57,12 +84,17 @@ struct recorder_ops {
 /* By the path's ending. NULL, and the list of known endings in err, where there is none. */
 const struct recorder_ops *recorder_find(const char *path, struct sh_err *err);
 
+/* The format that these options make of it: .ply of a mesh. */
+const struct recorder_ops *recorder_shape(const struct recorder_ops *ops, const struct recorder_options *options);
+
 /* Opens path for writing. Nothing is written to path itself before close succeeds: the data go to a file
  * beside it (".part") that is renamed at the end. Options are copied. */
 int recorder_open(const struct recorder_ops *ops, const char *path, const struct recorder_options *options,
                   struct recorder **rec, struct sh_err *err);
+/* Other limits for its colours: before its first frame. */
+void recorder_set_limits(struct recorder *rec, double low, double high);
 /* Each frame of the stream, in order, with the handle for information, points and surfaces. The handle must
- * live until close. */
+ * live until close. Whole scans may come from different handles: heads in one scene, whose labels mean the same. */
 int recorder_frame(struct recorder *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
 /* Finishes the file, syncs and renames it; keep = 0: throws it away. rec is freed, also after a failure. */
 int recorder_close(struct recorder *rec, int keep, struct sh_err *err);

@@ -12,14 +12,6 @@ void station_pose_of(const struct scanhead_info *info, struct station_pose *pose
     memcpy(pose->shift_m, info->geo ? info->anchor : info->station_m, sizeof pose->shift_m);
 }
 
-void station_pose_forward(const struct station_pose *pose, double p[3])
-{
-    double turned[3];
-    mat3_apply(pose->rotation, p, turned);
-    for (int i = 0; i < 3; i++)
-        p[i] = pose->shift_m[i] + turned[i];
-}
-
 void station_pose_reverse(const struct station_pose *pose, double p[3])
 {
     const double *s = pose->shift_m, from_station[3] = {p[0] - s[0], p[1] - s[1], p[2] - s[2]};

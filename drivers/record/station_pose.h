@@ -9,6 +9,7 @@
 #ifndef DRIVERS_RECORD_STATION_POSE_H
 #define DRIVERS_RECORD_STATION_POSE_H
 
+#include "core/mat3.h"
 #include "drivers/host/scanhead.h"
 
 struct station_pose {
@@ -21,7 +22,13 @@ struct station_pose {
 void station_pose_of(const struct scanhead_info *info, struct station_pose *pose);
 
 /* p = shift + rotation * p, and back. */
-void station_pose_forward(const struct station_pose *pose, double p[3]);
+static inline void station_pose_forward(const struct station_pose *pose, double p[3])
+{
+    double turned[3];
+    mat3_apply(pose->rotation, p, turned);
+    for (int i = 0; i < 3; i++)
+        p[i] = pose->shift_m[i] + turned[i];
+}
 void station_pose_reverse(const struct station_pose *pose, double p[3]);
 
 /* The unit quaternion w, x, y, z of the rotation; w is not negative. */

@@ -1,7 +1,6 @@
-#include "drivers/record/track.h"
+#include "drivers/record/track_inside.h"
 
 #include <math.h>
-#include <stdlib.h>
 
 #include "drivers/protocol/native.h"
 
@@ -16,6 +15,12 @@ int track_start_gps(const struct track *track, double *gps_s)
 
 /* In steps of this the recording of a moving head holds 200 km in 32 bits. */
 static const double MOVING_SCALE_M = 1e-4;
+
+static int will_have_colours(const struct track *t)
+{
+    if (!t->ops->wants_colours) return 0;
+    return t->colour.given ? t->colour.scale.mode != COLOUR_NONE : scanhead_has_colours(t->sh) == 1;
+}
 
 static int check_info(struct track *t, struct sh_err *err)
 {
@@ -36,6 +41,9 @@ static int check_info(struct track *t, struct sh_err *err)
     if (t->begun && t->ops->wants_attributes && t->has_attributes != (scanhead_has_attributes(t->sh) == 1))
         return sh_fail(err, SH_EFORMAT, "%s: the stream went on %s attributes; a file holds one kind", t->path,
                        t->has_attributes ? "without" : "with");
+    if (t->begun && t->has_colours != will_have_colours(t))
+        return sh_fail(err, SH_EFORMAT, "%s: the stream went on %s colours; a file holds one kind", t->path,
+                       t->has_colours ? "without" : "with");
     if (info->station > UINT16_MAX)
         return sh_fail(err, SH_EFORMAT, "%s: station %u; a file holds stations up to 65535", t->path, info->station);
     t->crs = crs;
@@ -44,8 +52,13 @@ static int check_info(struct track *t, struct sh_err *err)
     t->moving = info->moving;
     t->stops = info->stop;
     t->has_attributes = t->ops->wants_attributes && scanhead_has_attributes(t->sh) == 1;
+    t->has_colours = will_have_colours(t);
     t->scale_m = info->moving && info->scale_m > 0 && info->scale_m < MOVING_SCALE_M ? MOVING_SCALE_M : info->scale_m;
     t->begun = 1;
+    if (t->named == NULL || info->n_surfaces > t->n_named) {
+        t->named = t->sh;
+        t->n_named = info->n_surfaces;
+    }
     return 0;
 }
 
@@ -79,6 +92,9 @@ static void set_limits(struct track *t, const struct native_descriptor *d)
     const double sweep_s =
         d->pan_udeg_s > 0 ? ((double)d->pan_stop_udeg - (double)d->pan_start_udeg) / (double)d->pan_udeg_s : 0;
     t->emitter.kind = SCANHEAD_EMIT_LINE;
+    t->cast_share =
+        d->sweep_udeg != 0 ? fabs(((double)d->line_stop_udeg - (double)d->line_start_udeg) / (double)d->sweep_udeg) : 1;
+    if (!(t->cast_share < 1)) t->cast_share = 1;
     t->max_pulses = lines_hz > 0 && prr_hz > 0 ? whole_u32(ceil(prr_hz / lines_hz) + 1) : UINT32_MAX;
     t->max_lines = d->frames > 0 ? whole_u32(d->frames * (ceil(fabs(sweep_s) * lines_hz) + 1)) : UINT32_MAX;
 }
@@ -130,13 +146,6 @@ static uint64_t number_rows(struct track *t, uint64_t row, int n)
     return row;
 }
 
-int track_is_nowhere(struct track *t, double x, double y, double z)
-{
-    int nowhere = !isfinite(x) || !isfinite(y) || !isfinite(z);
-    t->missing.n_nowhere += (uint64_t)nowhere;
-    return nowhere;
-}
-
 static void keep_point(struct track *t, int from, int to)
 {
     t->point[to] = t->point[from];
@@ -186,78 +195,6 @@ static int place_moving(struct track *t, int n, struct sh_err *err)
     return kept;
 }
 
-/* Points of a frame whose attributes may follow. */
-struct track_waiting {
-    uint32_t n;
-    struct waiting_point {
-        struct scanhead_point point;
-        double frame, gps_s;
-        uint32_t row, index; /* in its frame */
-    } point[NATIVE_MAX_POINTS];
-};
-
-static int begin_waiting(struct track *t, struct sh_err *err)
-{
-    if (!t->has_attributes) return 0;
-    if (t->waiting == NULL) t->waiting = malloc(sizeof *t->waiting);
-    if (t->waiting == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory for a frame of points", t->path);
-    t->waiting->n = 0;
-    return 0;
-}
-
-/* Keeps the present batch. */
-static void wait_for_attributes(struct track *t, int n)
-{
-    struct track_waiting *w = t->waiting;
-    for (int i = 0; i < n && w->n < NATIVE_MAX_POINTS; i++) { /* no frame holds more */
-        struct waiting_point *p = &w->point[w->n++];
-        *p = (struct waiting_point){.point = t->point[i], .row = t->row[i], .index = t->index[i]};
-        if (t->info.moving) p->frame = t->frame[i];
-        if (scanhead_gps_time(t->sh, p->point.t_ns, &p->gps_s) != 0) p->gps_s = (double)NAN;
-    }
-}
-
-/* attribute: of all points of their frame; NULL: lost. */
-static int hand_out(struct track *t, const struct scanhead_attribute *attribute, struct sh_err *err)
-{
-    static const struct scanhead_attribute none = {(double)NAN, (double)NAN};
-    struct track_waiting *w = t->waiting;
-    int rc = 0, n = 0;
-    for (uint32_t k = 0; w != NULL && k < w->n && rc == 0; k++) {
-        const struct waiting_point *p = &w->point[k];
-        t->point[n] = p->point;
-        t->row[n] = p->row;
-        t->frame[n] = p->frame;
-        t->gps_s[n] = p->gps_s;
-        t->attribute[n] = attribute != NULL ? attribute[p->index] : none;
-        if (attribute == NULL && p->point.echo_count != 0) t->missing.n_without_attributes++;
-        if (++n < TRACK_BATCH && k + 1 < w->n) continue;
-        rc = t->ops->points(t->rec, n, err);
-        n = 0;
-    }
-    if (w != NULL) w->n = 0;
-    return rc;
-}
-
-int track_flush(struct track *t, struct sh_err *err)
-{
-    return hand_out(t, NULL, err);
-}
-
-void track_free(struct track *t)
-{
-    free(t->waiting);
-    t->waiting = NULL;
-}
-
-static int take_attributes(struct track *t, const struct scanhead_frame *frame, struct sh_err *err)
-{
-    struct scanhead_attribute attribute[NATIVE_MAX_POINTS];
-    if (t->waiting == NULL || t->waiting->n == 0) return 0;
-    if (scanhead_attributes(t->sh, frame, 0, attribute, NATIVE_MAX_POINTS) < 0) return 0; /* of points that were lost */
-    return hand_out(t, attribute, err);
-}
-
 static void count_unheld(struct track *t, int n)
 {
     if (t->ops->wants_attributes || scanhead_has_attributes(t->sh) != 1) return;
@@ -268,14 +205,15 @@ static void count_unheld(struct track *t, int n)
 /* Takes the present batch: n points of the frame, from `first` on. */
 static int take_batch(struct track *t, uint32_t first, int n, struct sh_err *err)
 {
-    for (int i = 0; i < n && t->has_attributes; i++)
+    for (int i = 0; i < n && track_waits(t); i++)
         t->index[i] = first + (uint32_t)i;
     int kept = t->info.moving ? place_moving(t, n, err) : n;
     if (kept < 0) return kept;
     kept = leave_out_nowhere(t, kept);
     count_unheld(t, kept);
-    if (!t->has_attributes) return t->ops->points(t->rec, kept, err);
-    wait_for_attributes(t, kept);
+    t->waited = 0;
+    if (!track_waits(t)) return track_give(t, kept, err);
+    track_keep(t, kept);
     return 0;
 }
 
@@ -289,6 +227,8 @@ static int begin_scan(struct track *t, struct sh_err *err)
             err, SH_EFORMAT,
             "%s: this format holds metres, and output.crs is geodetic; allowed local, ecef, utm, or .las, .ply",
             t->path);
+    int rc = t->has_colours && t->colour.given ? colour_check(t->colour.scale.mode, t, err) : 0;
+    if (rc != 0) return rc;
     return t->ops->scan != NULL ? t->ops->scan(t->rec, err) : 0;
 }
 
@@ -317,11 +257,12 @@ static int take_points(struct track *t, const struct scanhead_frame *frame, stru
     int begins = begins_scan(t, frame);
     rc = check_info(t, err);
     t->line = frame->scan_line;
+    t->sweep = frame->scan_frame;
     t->t0_ns = frame->scan_t0_ns;
     if (rc == 0 && begins) rc = begin_scan(t, err);
     t->state.last_pulse0 = frame->pulse0;
     t->state.last_station = t->info.station;
-    if (rc == 0) rc = begin_waiting(t, err);
+    if (rc == 0) rc = track_begin_waiting(t, err);
     uint64_t row = first_row(t, frame);
     if (rc == 0 && row > UINT32_MAX - frame->n_points)
         rc = sh_fail(err, SH_EFORMAT, "%s: line %u has more than 2^32 pulses", t->path, t->line);
@@ -341,7 +282,8 @@ int track_frame(struct track *t, struct scanhead *sh, const struct scanhead_fram
 {
     t->sh = sh;
     if (frame->type == SCANHEAD_POINTS) return take_points(t, frame, err);
-    if (frame->type == SCANHEAD_ATTRIBUTES) return take_attributes(t, frame, err);
+    if (frame->type == SCANHEAD_ATTRIBUTES) return track_attributes(t, frame, err);
+    if (frame->type == SCANHEAD_COLOURS) return track_colours(t, frame, err);
     if (frame->type == SCANHEAD_LINE_END) take_line_end(t, frame);
     struct native_descriptor d;
     if (frame->type == SCANHEAD_DESCRIPTOR && native_decode_descriptor(frame->payload, frame->payload_len, &d) == 0)

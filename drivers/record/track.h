@@ -6,16 +6,17 @@
  * the CRS, as those of a standing head, and the pose is the first anchor's. Points of the polar layout whose
  * pose was lost are left out and counted. Those of the geo layout need no pose.
  *
- * Where a recorder wants attributes and the head sends them, points wait for the frame that follows theirs.
- * Where that frame was lost, they come out with the next points, or at the end. Their attributes are then
- * NaN, and are counted.
+ * Where a recorder wants attributes or colours and the head sends them, points wait for the frames that follow
+ * theirs. Where one of them was lost, they come out with the next points, or at the end. Their attributes are then
+ * NaN, their colour is grey, and they are counted. Colours that the head does not send are made here, of the points.
  *
- * The owner sets path, ops and rec in a zeroed struct. One thread per track. */
+ * The owner sets path, ops and rec, and colour where it wants another than the head's, in a zeroed struct. One thread per track. */
 #ifndef DRIVERS_RECORD_TRACK_H
 #define DRIVERS_RECORD_TRACK_H
 
 #include "core/err.h"
 #include "drivers/host/scanhead.h"
+#include "drivers/record/colour.h"
 #include "drivers/record/station_pose.h"
 
 enum { TRACK_BATCH = 256 };
@@ -31,6 +32,7 @@ struct track_ops {
     int metres;           /* 1: SH_EFORMAT where points of a scan are in geodetic coordinates */
     int grid;             /* 1: a file of rows and columns: no head that fires beams in turn or along a list */
     int wants_attributes; /* 1: it has a place for amplitude and width */
+    int wants_colours;    /* 1: it has a place for a colour */
 };
 
 /* Points that are not in the recording, or not with all that was sent. */
@@ -40,6 +42,7 @@ struct track_missing {
     uint64_t n_nowhere;            /* echoes whose coordinates are beyond any number, of a broken stream */
     uint64_t n_without_attributes; /* echoes whose attributes were lost */
     uint64_t n_attributes_unheld;  /* echoes with attributes that the recorder has no place for */
+    uint64_t n_without_colours;    /* echoes whose colour was lost */
 };
 
 /* Where in its scan the stream is; of track.c alone. */
@@ -54,12 +57,16 @@ struct track {
     const char *path; /* for messages */
     const struct track_ops *ops;
     void *rec; /* what ops are called with */
+    struct colour_choice colour;
     /* of the frame that the points at hand are in */
-    struct scanhead *sh; /* of the last frame of any kind */
+    struct scanhead *sh;    /* of the last frame of any kind */
+    struct scanhead *named; /* of all heads in a scene, which have the same labels, the one that names most of them */
+    uint32_t n_named;
     struct scanhead_info info;
     struct station_pose pose;
-    uint32_t line; /* in the scan, from 0 */
-    int64_t t0_ns; /* of the first point, since the scan's start */
+    uint32_t line;  /* in the scan, from 0 */
+    uint32_t sweep; /* of the pan (of all rings) in the scan, from 0 */
+    int64_t t0_ns;  /* of the first point, since the scan's start */
     /* of the stream so far; the first six only with points (begun) */
     int begun;
     int crs;  /* enum native_crs; of the recording's points: of the stream in the geo layout, else the scene frame */
@@ -69,6 +76,7 @@ struct track {
     struct track_missing missing;
     /* What the descriptor says a scan can have at most: lines, and pulses in one of them; UINT32_MAX: no end. */
     uint32_t max_lines, max_pulses;
+    double cast_share;               /* of a line's pulses, 0..1: those in the blind part are not cast */
     struct scanhead_emitter emitter; /* of the last descriptor */
     double scale_m; /* of coordinates in the recording: the stream's; coarser where the head moves far */
     struct scanhead_point point[TRACK_BATCH];
@@ -76,6 +84,9 @@ struct track {
     double frame[TRACK_BATCH]; /* of each point of a moving head: frame scalar of the trajectory; NaN: lost */
     int has_attributes;        /* wanted, and sent: */
     struct scanhead_attribute attribute[TRACK_BATCH];
+    int has_colours; /* wanted, and sent or made here: */
+    uint8_t rgb[TRACK_BATCH][3];
+    int waited;                /* the points of the batch waited: later frames may have come, so gps_s holds */
     double gps_s[TRACK_BATCH]; /* scanhead_gps_time of each, as of its own frame; NaN: not known */
     /* inner state */
     uint32_t index[TRACK_BATCH]; /* of each point in its frame, where it may wait */
@@ -84,15 +95,20 @@ struct track {
 };
 
 /* A new frame of the stream. SH_EFORMAT where the stream goes to what one file can't hold: another CRS,
- * another kind of heights, a head that begins or ceases to move or to send (wanted) attributes, a station
- * number above 65535. */
+ * another kind of heights, a head that begins or ceases to move or to send (wanted) attributes or colours, a
+ * station number above 65535; where its points have no figure that the colours show. */
 int track_frame(struct track *track, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
 
 /* 1 where an echo's position is infinite or no number: a broken stream's. It is counted, and to be left out. Points come
  * out of the track with finite coordinates; a recorder that transforms them asks again. */
-int track_is_nowhere(struct track *track, double x, double y, double z);
+static inline int track_is_nowhere(struct track *track, double x, double y, double z)
+{
+    if ((x - x) + (y - y) + (z - z) == 0) return 0; /* a difference is NaN where one of them is not finite */
+    track->missing.n_nowhere++;
+    return 1;
+}
 
-/* At the end: gives out the points that still wait for their attributes. */
+/* At the end: gives out the points that still wait for what follows them. */
 int track_flush(struct track *track, struct sh_err *err);
 void track_free(struct track *track);
 

@@ -90,10 +90,32 @@ int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, 
     return rc == SH_OK ? APP_OK : app_fail(&err);
 }
 
+static const char *warned_of; /* NULL: the work is one */
+
+void app_warn_of(const char *what)
+{
+    warned_of = what;
+}
+
+/* Whether it is new. A bound, so that endless work takes no endless memory: what is not kept is printed again. */
+static int is_new(const char *text)
+{
+    enum { MOST = 256 };
+    static char *known[MOST];
+    static int n;
+    for (int i = 0; i < n; i++)
+        if (strcmp(known[i], text) == 0) return 0;
+    if (n < MOST && (known[n] = strdup(text)) != NULL) n++;
+    return 1;
+}
+
 static void print_warning(void *ctx, const char *text)
 {
     (void)ctx;
-    fprintf(stderr, "scanhead: warning: %s\n", text);
+    if (warned_of == NULL)
+        fprintf(stderr, "scanhead: warning: %s\n", text);
+    else if (is_new(text))
+        fprintf(stderr, "scanhead: warning: %s: %s\n", warned_of, text);
 }
 
 static void print_progress(void *ctx, const char *what, double fraction)
@@ -110,6 +132,16 @@ static void print_progress(void *ctx, const char *what, double fraction)
         fprintf(stderr, "scanhead: %s: %.0f %%%s\n", what, 100.0 * fraction, left);
 }
 
+static void print_each_second(void *ctx, const char *what, double fraction)
+{
+    static int64_t printed_ns;
+    const int64_t now_ns = clock_now_ns();
+    if (printed_ns == 0) printed_ns = now_ns; /* none for short work */
+    if (now_ns - printed_ns < 1000000000) return;
+    printed_ns = now_ns;
+    print_progress(ctx, what, fraction);
+}
+
 static int asked_to_stop(void *ctx)
 {
     (void)ctx;
@@ -117,6 +149,8 @@ static int asked_to_stop(void *ctx)
 }
 
 const struct sh_report app_report_stderr = {NULL, print_warning, print_progress, asked_to_stop};
+const struct sh_report app_report_seconds = {NULL, print_warning, print_each_second, asked_to_stop};
+const struct sh_report app_report_quiet = {NULL, print_warning, NULL, asked_to_stop};
 
 void app_warn_left_out(uint64_t crowded, uint64_t unfit)
 {
@@ -163,4 +197,18 @@ int app_write_json(const char *path, void (*put)(struct json *json, const void *
         rc = sh_fail(err, why.code, "%s: %s", to_stdout ? "standard output" : path, why.text);
     if (!to_stdout && fclose(out) != 0 && rc == SH_OK) rc = sh_fail(err, SH_EIO, "%s: %s", path, strerror(errno));
     return rc;
+}
+
+int app_say_ready(long fd, void (*put)(struct json *json, const void *ctx), const void *ctx, struct sh_err *err)
+{
+    if (fd == 0) return SH_OK;
+    FILE *out = fdopen(dup((int)fd), "w");
+    if (out == NULL) return sh_fail(err, SH_EINPUT, "--ready-fd %ld: %s", fd, strerror(errno));
+    struct json json;
+    json_begin_one_line(&json, out);
+    put(&json, ctx);
+    int failed = json_end(&json, NULL) != SH_OK;
+    failed |= fclose(out) != 0;
+    close((int)fd);
+    return failed ? sh_fail(err, SH_EIO, "--ready-fd %ld: %s", fd, strerror(errno)) : SH_OK;
 }

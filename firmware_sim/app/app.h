@@ -14,7 +14,8 @@
 #include "firmware_sim/config/config.h"
 
 /* main.c lists them. */
-extern const struct app_command app_run, app_record, app_plan, app_map, app_report, app_check, app_list, app_init;
+extern const struct app_command app_run, app_record, app_plan, app_map, app_report, app_check, app_list, app_init,
+    app_batch, app_coverage, app_view;
 
 /* Prints "scanhead: TEXT" and gives the exit status for the error. */
 int app_fail(const struct sh_err *err);
@@ -28,6 +29,16 @@ int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, 
 /* Warnings and progress to standard error, each line with the program's name. Asks to stop once
  * interrupted. */
 extern const struct sh_report app_report_stderr;
+
+/* The same, but a line of progress a second at most: for work that reports every piece. */
+extern const struct sh_report app_report_seconds;
+
+/* Warnings alone. */
+extern const struct sh_report app_report_quiet;
+
+/* Warnings from now on name a part of the work, which must live on, and each is printed once, whichever part it is of.
+ * NULL: as it is at first. */
+void app_warn_of(const char *what);
 
 /* 1 after SIGINT or SIGTERM, once app_catch_signals was called: the command ends in good order. A second
  * signal within a second counts as the same one. A third, or one that comes later, ends the process at
@@ -47,5 +58,8 @@ void app_warn_empty(uint64_t pulses, uint64_t with_echo, uint64_t faint);
 /* One JSON value, written by `put`, to a file; path "-" is standard output. */
 int app_write_json(const char *path, void (*put)(struct json *json, const void *ctx), const void *ctx,
                    struct sh_err *err);
+
+/* --ready-fd: one JSON value in a line, written by `put`, to descriptor fd, which is closed then. fd 0: nothing to do. */
+int app_say_ready(long fd, void (*put)(struct json *json, const void *ctx), const void *ctx, struct sh_err *err);
 
 #endif

@@ -1,6 +1,7 @@
 /* scanhead check: validates configuration, scene and links. Nothing runs. */
 #include "core/vec3.h"
 #include "firmware_sim/app/app.h"
+#include "firmware_sim/app/check_heads.h"
 #include "firmware_sim/app/check_places.h"
 #include "firmware_sim/device/head_clock.h"
 #include "firmware_sim/loop/pose_feed.h"
@@ -50,7 +51,7 @@ static void print_links(const struct config *cfg)
 {
     for (uint32_t i = 0; i < cfg->n_links; i++) {
         const struct link_spec *link = &cfg->link[i];
-        const int has_port = link->type == LINK_TCP || link->type == LINK_UDP;
+        const int has_port = link->type == LINK_TCP || link->type == LINK_UDP || link->type == LINK_WEB;
         printf("link      %s", link_ops_get(link->type)->name);
         if (has_port && link->port != 0)
             printf(":%s:%d", link->address[0] != '\0' ? link->address : "127.0.0.1", link->port);
@@ -60,24 +61,31 @@ static void print_links(const struct config *cfg)
     }
 }
 
-static int print_summary(const struct config *cfg, const struct site *site, struct sh_err *err)
+static void print_target(const struct site *site)
 {
+    const struct config_target *target = &site->cfg->scene.target;
+    const struct site_target *t = &site->world->target;
+    if (target->n_objects == 0) return;
+    printf("target    %u of %u triangles, %u of %u surfaces; the others %s\n", t->triangles, t->all_triangles,
+           t->surfaces, t->all_surfaces,
+           target->others == OTHERS_HIDE ? "hide what is behind them and give no points" : "are left out");
+}
+
+static int print_summary(const struct config *cfg, const struct sites *sites, struct sh_err *err)
+{
+    const struct site *site = sites->first;
     const struct scene *scene = site->scene;
-    char emitter[160];
     int rc = SH_OK;
     printf("%s: ok\n", cfg->file);
-    printf("head      %s %s (%s), %g Hz pulses, %g lines/s, pan %g deg/s\n", cfg->profile.maker, cfg->profile.model,
-           cfg->profile.name, (double)cfg->head.settings.prr_uhz * 1e-6, (double)cfg->head.settings.lines_uhz * 1e-6,
-           (double)cfg->head.settings.pan_udeg_s * 1e-6);
-    emitter_describe(&cfg->profile.emitter, emitter, sizeof emitter);
-    if (emitter[0] != '\0') printf("emitter   %s\n", emitter);
+    check_print_heads(sites, stdout);
     printf("scene     %u triangles, %u surfaces, x %.3f..%.3f  y %.3f..%.3f  z %.3f..%.3f m\n", scene->n_triangles,
            scene->n_surfaces, scene->min_m[0], scene->max_m[0], scene->min_m[1], scene->max_m[1], scene->min_m[2],
            scene->max_m[2]);
+    print_target(site);
     check_print_anchor(site, stdout);
     if (site->stop != NULL) check_print_stops(site, stdout);
     for (uint32_t i = 0; i < site->n_stations && rc == SH_OK && site->stop == NULL; i++)
-        rc = check_print_station(site, i, stdout, err);
+        rc = check_print_station(sites_of(sites, i), i, stdout, err);
     print_platform(site);
     print_output(cfg, site);
     print_links(cfg);
@@ -103,12 +111,12 @@ static int print_time(const struct config *cfg, struct sh_err *err)
 static int check(struct config *cfg, void *ctx, struct sh_err *err)
 {
     (void)ctx;
-    struct site *site = NULL;
-    int rc = site_load(cfg, &app_report_stderr, &site, err);
+    struct sites sites = {0};
+    int rc = sites_load(cfg, &app_report_stderr, &sites, err);
     if (rc == SH_OK) rc = check_links(cfg, err);
-    if (rc == SH_OK) rc = print_summary(cfg, site, err);
+    if (rc == SH_OK) rc = print_summary(cfg, &sites, err);
     if (rc == SH_OK) rc = print_time(cfg, err);
-    site_free(site);
+    sites_free(&sites);
     return rc;
 }
 
@@ -148,9 +156,9 @@ const struct app_command app_check = {
     .summary = "validate configuration, scene and links; nothing runs",
     .options = OPTIONS,
     .notes =
-        "Prints where the scene and each station stand, in every frame that is known. Opens each link but files\n"
-        "and closes it again, so that a taken port or a wrong path shows. Of a wrong configuration all faults are\n"
-        "shown, up to 20, each with its line.\n"
+        "Prints the scanners, and where the scene and each station stand, in every frame that is known. Opens each\n"
+        "link but files and closes it again, so that a taken port or a wrong path shows. Of a wrong configuration\n"
+        "all faults are shown, up to 20, each with its line.\n"
         "\n"
         "--help SECTION prints the keys of one section: --help head, --help scene.anchor. --help profile prints\n"
         "those of head profiles.\n"

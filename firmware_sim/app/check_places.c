@@ -114,6 +114,14 @@ static int print_on_earth(const struct site *site, uint32_t i, FILE *out, struct
     return rc;
 }
 
+static void print_tripod(const struct site_station *s, const char *before, FILE *out)
+{
+    char text[200];
+    if (s->tripod.from == NULL) return;
+    site_describe_tripod(s, text, sizeof text);
+    fprintf(out, "%s%s", before, text);
+}
+
 int check_print_station(const struct site *site, uint32_t i, FILE *out, struct sh_err *err)
 {
     const struct site_station *s = &site->station[i];
@@ -125,6 +133,7 @@ int check_print_station(const struct site *site, uint32_t i, FILE *out, struct s
     fprintf(out, "  scene     %.4f %.4f %.4f m; heading %g, pitch %g, roll %g deg", s->at.position_m[0],
             s->at.position_m[1], s->at.position_m[2], c->heading_deg, c->pitch_deg, c->roll_deg);
     if (!isnan(s->at.floor_m)) fprintf(out, "; %g m above the floor", s->at.floor_m);
+    print_tripod(s, "\n  tripod    ", out);
     fputc('\n', out);
     return s->at.on_earth ? print_on_earth(site, i, out, err) : SH_OK;
 }
@@ -142,6 +151,7 @@ void check_print_stops(const struct site *site, FILE *out)
         if (s->at.on_earth)
             fprintf(out, "; lat %.9f lon %.9f deg, height %.4f m", s->at.place.lat_deg, s->at.place.lon_deg,
                     s->at.place.height_m);
+        print_tripod(s, "; tripod: ", out);
         fputc('\n', out);
     }
 }

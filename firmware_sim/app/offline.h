@@ -12,8 +12,10 @@ struct offline {
     struct scanhead *sh; /* the client's handle */
     struct site *site;
     /* inner state */
+    int fd; /* of the client */
     struct device *device;
     struct loop *loop;
+    int shares_site; /* it is the caller's */
 };
 
 /* Loads the scene and starts the head. Its own links stay closed. scan_s > 0: it ends each scan after this device
@@ -21,6 +23,18 @@ struct offline {
  * on. `offline` begins as zeros and is to be closed, also after an error. */
 int offline_open(struct config *cfg, double scan_s, const struct sh_report *report, struct offline *offline,
                  struct sh_err *err);
+/* The same in parts, for heads that are powered up one after the other at a loaded site: offline_load changes cfg and
+ * gives the site, which is site_free's; offline_open_at takes it. beside: a site to share a scene with, as
+ * site_load_beside has it; NULL: none. */
+int offline_load(struct config *cfg, const struct site *beside, const struct sh_report *report, struct site **site,
+                 struct sh_err *err);
+int offline_open_at(struct site *site, double scan_s, const struct sh_report *report, struct offline *offline,
+                    struct sh_err *err);
+/* The same beside another one, of another scanner of the file: the scene that both have is loaded once. */
+int offline_open_beside(struct config *cfg, const struct offline *other, double scan_s, const struct sh_report *report,
+                        struct offline *offline, struct sh_err *err);
+/* The head ends, its scene and threads are given back. What the client's handle was told stays. */
+void offline_stop(struct offline *offline);
 /* Makes ready for a scan from a station, from 1; 0: where the head stands at power-up. While none is on. */
 int offline_prepare(struct offline *offline, uint32_t station, const struct sh_report *report, struct sh_err *err);
 void offline_close(struct offline *offline);

@@ -58,6 +58,35 @@ static int parse_number(const struct app_command *command, const struct app_opti
                      whole ? "whole number" : "number", row->min, row->max);
 }
 
+static int pass(const struct app_command *command, const struct app_option *row, const char *text,
+                struct app_words *words)
+{
+    char *name = words->name[words->n_names];
+    for (int i = 0; i < words->n_names; i++)
+        if (strcmp(words->name[i] + 2, row->name) == 0)
+            return app_usage(command, "--%s: given twice; one is allowed", row->name);
+    snprintf(name, sizeof words->name[0], "--%s", row->name);
+    words->n_names++;
+    words->word[words->n++] = name;
+    if (text != NULL) words->word[words->n++] = text;
+    return APP_OK;
+}
+
+void app_pass_options(struct app_option *rows, const struct app_command *other, const char *const *names, size_t at)
+{
+    int n = 0;
+    while (rows[n].kind != APP_LAST)
+        n++;
+    for (const struct app_option *row = other->options; row->kind != APP_LAST && n < APP_MAX_OPTIONS; row++) {
+        const char *const *name = names;
+        while (*name != NULL && strcmp(*name, row->name) != 0)
+            name++;
+        if (*name != NULL)
+            rows[n++] = (struct app_option){APP_PASS, row->name, row->argument, .at = at, .help = row->help};
+    }
+    rows[n] = (struct app_option)OPTION_END;
+}
+
 static int apply(const struct app_command *command, const struct app_option *row, const char *text,
                  struct app_input *in, void *values)
 {
@@ -88,6 +117,8 @@ static int apply(const struct app_command *command, const struct app_option *row
         return add_key(&in->sets, row->key, text);
     case APP_SET:
         return app_add_set(&in->sets, text);
+    case APP_PASS:
+        return pass(command, row, text, at);
     default:
         return row->apply(values, text);
     }

@@ -11,7 +11,7 @@
 /* The exit status of a command. APP_GO_ON is none: the command line was read, the command can begin. */
 enum { APP_GO_ON = -1, APP_OK = 0, APP_FAILED = 1, APP_USAGE = 2 };
 
-enum { APP_WORD = -1, APP_MAX_SETS = 256, APP_MAX_OPERANDS = 2, APP_MAX_OPTIONS = 32 };
+enum { APP_WORD = -1, APP_MAX_SETS = 256, APP_MAX_OPERANDS = 2, APP_MAX_OPTIONS = 64 };
 
 /* clang-format off */
 enum app_option_kind {
@@ -24,6 +24,7 @@ enum app_option_kind {
     APP_KEY_GIVEN, /* the same, and sets an int to 1 */
     APP_SET,       /* any configuration key */
     APP_CALL,      /* calls apply */
+    APP_PASS,      /* adds --NAME, and its value, to a struct app_words */
     APP_PRINT      /* calls apply, which prints what was asked for: as with --help, the command does nothing else */
 };
 
@@ -70,6 +71,13 @@ struct app_sets {
     size_t used;
 };
 
+/* Options that go to another command as they are. */
+struct app_words {
+    const char *word[2 * APP_MAX_OPTIONS];
+    char name[APP_MAX_OPTIONS][32]; /* --NAME */
+    int n, n_names;
+};
+
 /* What a command line says, but for the command's own options. */
 struct app_input {
     const char *operand[APP_MAX_OPERANDS];
@@ -82,6 +90,10 @@ int app_parse(const struct app_command *command, int argc, char **argv, struct a
 
 /* Adds KEY=VALUE, which must live on. APP_OK, or APP_USAGE with the reason printed. */
 int app_add_set(struct app_sets *sets, const char *set);
+
+/* Adds to `rows`, which ends with OPTION_END and has room for APP_MAX_OPTIONS + 1, those options of another command that
+ * `names` has (ends with NULL), as APP_PASS to the struct app_words at `at`. Once. */
+void app_pass_options(struct app_option *rows, const struct app_command *other, const char *const *names, size_t at);
 
 /* Prints a usage error: one line that ends with where the help is. Returns APP_USAGE. */
 int app_usage(const struct app_command *command, const char *fmt, ...) __attribute__((format(printf, 2, 3)));

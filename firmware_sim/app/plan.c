@@ -94,6 +94,10 @@ static int plan(struct config *cfg, void *ctx, struct sh_err *err)
 {
     const struct plan_options *o = ctx;
     struct site *site = NULL;
+    if (!config_is_alone(cfg))
+        fprintf(stderr,
+                "scanhead: the plan of the scanner of station %u; others have other scanners: --set head.station=N\n",
+                cfg->head.settings.station);
     int rc = site_load_plan(cfg, &app_report_stderr, &site, err);
     if (rc == SH_OK && o->json) rc = app_write_json("-", put_rows, &site->plan, err);
     if (rc == SH_OK && !o->json) print_text(&site->plan);
@@ -131,6 +135,8 @@ static const char NOTES[] =
     "sight is a map of what the station sees, made where the pulses of a scan pay for it; head.frames: 0 counts as\n"
     "an hour. It changes no hit. Its cost is below 0: what it saves per pulse, making it included. Its map orders\n"
     "surfaces in double where that costs next to nothing.\n"
+    "\n"
+    "Where stations have scanners of their own, the plan is that of the scanner of head.station.\n"
     "\n"
     "georef is planned for each station, from output.crs, output.tolerance_m, the scene's extent and the head's\n"
     "range_max_m. There is one row for all stations where they get the same method, else one row each.\n"

@@ -7,17 +7,20 @@
 #include <unistd.h>
 
 #include "firmware_sim/app/app.h"
+#include "firmware_sim/app/watch/watch.h"
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/loop/loop.h"
 #include "firmware_sim/site/plan_rows.h"
 #include "firmware_sim/site/rate.h"
+
+enum { VIEW_SESSIONS = 4 };
 
 struct run_options {
     struct app_input in;
     struct device_options device;
     const char *stats;
     long ready_fd;
-    int quiet, no_hash, frames_given;
+    int quiet, no_hash, frames_given, view;
 };
 
 static void say_sights(const struct site *site)
@@ -40,33 +43,37 @@ static void say_sights(const struct site *site)
 static void say_what_runs(const struct config *cfg, const struct site *site, const struct loop *loop)
 {
     struct bvh_info info;
-    bvh_get_info(site->station[0].bvh, &info);
+    bvh_get_info(site->bvh[0], &info);
     fprintf(stderr,
             "scanhead: %s %s, %s, %u triangles, %u surfaces; BVH in %.2f s, %.0f bytes per triangle, packets of %u\n",
             cfg->profile.maker, cfg->profile.model, cfg->profile.name, site->scene->n_triangles,
             site->scene->n_surfaces, info.build_s, (double)info.bytes / site->scene->n_triangles, info.packet);
+    if (!config_is_alone(cfg))
+        fprintf(stderr,
+                "scanhead: it is the scanner of %u of %u stations; --set head.station=N serves that of another\n",
+                site_n_served(site), site->n_stations);
     say_sights(site);
     char plan[512];
     struct link_place place;
     site_plan_text(site, plan, sizeof plan);
     fprintf(stderr, "scanhead: plan: %s\n", plan);
     for (uint32_t i = 0; loop_get_place(loop, i, &place); i++)
-        fprintf(stderr, "scanhead: link %s%s%s\n", place.endpoint, place.protocol != NULL ? ", " : "",
-                place.protocol != NULL ? place.protocol : "");
+        if (strcmp(place.type, "fd") != 0) /* within this process */
+            fprintf(stderr, "scanhead: link %s%s%s\n", place.endpoint, place.protocol != NULL ? ", " : "",
+                    place.protocol != NULL ? place.protocol : "");
 }
 
-static int say_ready(const struct loop *loop, long fd, struct sh_err *err)
+static void put_endpoints(struct json *json, const void *loop)
 {
-    if (fd == 0) return SH_OK;
-    FILE *out = fdopen(dup((int)fd), "w");
-    if (out == NULL) return sh_fail(err, SH_EINPUT, "--ready-fd %ld: %s", fd, strerror(errno));
-    struct json json;
-    json_begin_one_line(&json, out);
-    loop_put_endpoints(loop, &json);
-    int failed = json_end(&json, NULL) != SH_OK;
-    failed |= fclose(out) != 0;
-    close((int)fd);
-    return failed ? sh_fail(err, SH_EIO, "--ready-fd %ld: %s", fd, strerror(errno)) : SH_OK;
+    loop_put_endpoints(loop, json);
+}
+
+static int say_view(const struct loop *loop, struct sh_err *err)
+{
+    struct link_place place;
+    for (uint32_t i = 0; loop_get_place(loop, i, &place); i++)
+        if (strcmp(place.type, "web") == 0) printf("%s\n", place.endpoint);
+    return fflush(stdout) == 0 ? SH_OK : sh_fail(err, SH_EIO, "standard output: %s", strerror(errno));
 }
 
 static void wait_for_end(struct loop *loop)
@@ -155,7 +162,8 @@ static int serve(const struct run_options *o, struct loop *loop, struct device *
     struct run_stats run = {.loop = loop};
     struct loop_stats *stats = &run.stats;
     int rc = loop_start(loop, err);
-    if (rc == SH_OK) rc = say_ready(loop, o->ready_fd, err);
+    if (rc == SH_OK) rc = app_say_ready(o->ready_fd, put_endpoints, loop, err);
+    if (rc == SH_OK && o->view) rc = say_view(loop, err);
     if (rc == SH_OK)
         wait_for_end(loop);
     else
@@ -178,25 +186,66 @@ static void warn_of_replay(const struct run_options *o, const struct device *dev
             o->device.replay);
 }
 
+/* --view: a web link, where the configuration has none. */
+static int add_view(struct config *cfg, struct sh_err *err)
+{
+    for (uint32_t i = 0; i < cfg->n_links; i++)
+        if (cfg->link[i].type == LINK_WEB) return SH_OK;
+    if (cfg->n_links == CONFIG_MAX_LINKS)
+        return sh_fail(err, SH_EINPUT, "%s: links: --view would be one more than the %d that are allowed", cfg->file,
+                       (int)CONFIG_MAX_LINKS);
+    cfg->link[cfg->n_links++] = (struct link_spec){.type = LINK_WEB, .max_sessions = VIEW_SESSIONS};
+    return SH_OK;
+}
+
+/* What a page is told beside the stream; where there is no web link there is nothing to tell. Where its readers hold
+ * back the head, the observer does, too, and sees all of it. */
+static int open_watch(const struct config *cfg, const struct site *site, struct device *device,
+                      struct loop_options *loop, struct watch **watch, struct sh_err *err)
+{
+    struct watch_options options = {.cpu_share = WATCH_CPU_SHARE,
+                                    .device = device,
+                                    .scene_triangles = WATCH_SCENE_TRIANGLES,
+                                    .report = &app_report_seconds};
+    int is_there = 0;
+    for (uint32_t i = 0; i < cfg->n_links; i++) {
+        is_there |= cfg->link[i].type == LINK_WEB;
+        options.waits |= cfg->link[i].type == LINK_WEB && cfg->link[i].waits == LINK_WAITS_YES;
+    }
+    if (!is_there) return SH_OK;
+    if (options.waits && cfg->loop.pace != PACE_REALTIME) options.cpu_share = 0.0;
+    const int rc = watch_open(cfg, site, &options, watch, err);
+    if (rc != SH_OK) return rc;
+    loop->extra = watch_link(*watch);
+    loop->web = watch_source(*watch);
+    return watch_start(*watch, err);
+}
+
 static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
 {
     struct run_options *o = ctx;
+    struct watch *watch = NULL;
     struct site *site = NULL;
     struct device *device = NULL;
     struct loop *loop = NULL;
     struct loop_options options = {.hash = o->stats != NULL && !o->no_hash, .report = &app_report_stderr};
+    o->device.report = &app_report_stderr;
     o->device.start |= cfg->head.start;
     o->device.one_scan = o->device.one_scan && o->device.start;
+    int rc = o->view ? add_view(cfg, err) : SH_OK;
+    if (rc != SH_OK) return rc;
     if (cfg->n_links == 0)
-        return sh_fail(err, SH_EINPUT, "%s: links: none; run needs at least one of pty, tcp, udp, usb, file, null",
+        return sh_fail(err, SH_EINPUT,
+                       "%s: links: none; run needs at least one of pty, tcp, udp, usb, web, file, null, or --view",
                        cfg->file);
-    int rc = site_load(cfg, &app_report_stderr, &site, err);
+    rc = site_load(cfg, &app_report_stderr, &site, err);
     if (rc == SH_OK) rc = site_open_sights(site, 0, site->n_stations, &app_report_stderr, err);
     /* After the plan, which is made for the configuration: a replayed journal gives the same stream without
      * --start. */
     if (o->device.start && o->device.duration_s > 0.0 && !o->frames_given) cfg->head.settings.frames = 0;
     if (rc == SH_OK) rc = site_warn_rate(site, &app_report_stderr, err);
     if (rc == SH_OK) rc = device_create(site, &o->device, &device, err);
+    if (rc == SH_OK) rc = open_watch(cfg, site, device, &options, &watch, err);
     if (rc == SH_OK) rc = loop_create(site, device, &options, &loop, err);
     if (rc == SH_OK) {
         if (!o->quiet) say_what_runs(cfg, site, loop);
@@ -204,6 +253,7 @@ static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
         rc = serve(o, loop, device, err);
     }
     loop_free(loop);
+    watch_close(watch);
     device_free(device);
     site_free(site);
     return rc;
@@ -233,6 +283,9 @@ static int run(int argc, char **argv)
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
     {APP_FLAG, "start", NULL, .at = AT(device.start), .help = "scan at once, no command needed"},
+    {APP_FLAG, "view", NULL, .at = AT(view),
+     .help = "with a page for a browser, which shows the scan and sets the head; its address is printed. A web link of "
+             "the configuration is used where there is one"},
     {APP_KEY, "pace", "PACE", .key = "loop.pace",
      .help = "realtime, fast (as fast as it computes), step (a peer grants time with TIME:STEP)"},
     {APP_NUMBER, "duration", "S", .min = 0.001, .max = 1e8, .at = AT(device.duration_s),

@@ -30,6 +30,12 @@ int command_fail(struct command_call *call, int number, const char *fmt, ...)
     return -1;
 }
 
+void command_refuse(struct command_device *dev, int number, const char *text, struct command_result *out)
+{
+    struct command_call call = {.dev = dev, .out = out};
+    command_fail(&call, number, "%s", text);
+}
+
 static const struct command_row *find_row(const struct command_request *req)
 {
     for (const struct command_row *row = command_rows; row->header != NULL; row++)
@@ -37,8 +43,7 @@ static const struct command_row *find_row(const struct command_request *req)
     return NULL;
 }
 
-/* MIN, MAX or DEF; 0 when the parameter is none of them. */
-static int parse_special(const char *param, enum command_value_kind *kind)
+int command_parse_special(const char *param, enum command_value_kind *kind)
 {
     static const char *const specials[] = {
         [COMMAND_VALUE_MIN] = "MINimum", [COMMAND_VALUE_MAX] = "MAXimum", [COMMAND_VALUE_DEF] = "DEFault"};
@@ -99,7 +104,7 @@ static int parse_value(struct command_call *call)
         return command_fail(call, CMD_E_NOT_ALLOWED, "%s takes one value", row->header);
     }
     if (row->setting != NULL && row->setting->words != NULL) return parse_word(call);
-    if (row->setting != NULL && parse_special(call->param, &call->value.kind)) return 0;
+    if (row->setting != NULL && command_parse_special(call->param, &call->value.kind)) return 0;
     call->value.kind = COMMAND_VALUE_NUMBER;
     command_clip(clip, call->param, strlen(call->param));
     const char *suffix = command_parse_decimal(call->param, &call->value.decimal);
@@ -116,7 +121,9 @@ static int do_query(struct command_call *call)
     const struct command_row *row = call->row;
     if (row->query == NULL) return command_fail(call, CMD_E_HEADER, "%s has no query form", row->header);
     call->value.kind = COMMAND_VALUE_NUMBER;
-    if (call->param[0] != '\0' && (row->setting == NULL || !parse_special(call->param, &call->value.kind)))
+    if (row->own) return row->query(call);
+    if (call->param[0] != '\0' && !row->word &&
+        (row->setting == NULL || !command_parse_special(call->param, &call->value.kind)))
         return command_fail(call, CMD_E_NOT_ALLOWED, "%s? takes %s", row->header,
                             row->setting == NULL ? "no parameter" : "no parameter but MIN, MAX or DEF");
     return row->query(call);
@@ -131,15 +138,18 @@ static int do_act(struct command_call *call)
         return command_fail(call, CMD_E_NOT_ALLOWED, "%s takes no parameter", row->header);
     if (row->unit != NULL && call->param[0] == '\0')
         return command_fail(call, CMD_E_MISSING, "%s takes a %s", row->header,
-                            row->setting != NULL && row->setting->words != NULL ? "word" : "number");
-    if (row->unit != NULL && parse_value(call) != 0) return -1;
+                            row->own                                              ? "station and its place"
+                            : row->setting != NULL && row->setting->words != NULL ? "word"
+                                                                                  : "number");
+    if (row->unit != NULL && !row->own && parse_value(call) != 0) return -1;
     if (!row->open && call->session != 0 && control != 0 && control != call->session)
         return command_fail(call, CMD_E_PROTECTED, "session %u has control, this is session %u", control,
                             call->session);
     if (row->act(call) != 0) return -1;
     struct command_result *out = call->out;
-    out->changes = out->effect != COMMAND_NONE && out->effect != COMMAND_RELEASE;
-    if (!out->changes || call->session == 0 || control != 0) return 0;
+    const int takes = out->effect != COMMAND_NONE && out->effect != COMMAND_RELEASE;
+    out->changes = takes && out->effect != COMMAND_TAKE;
+    if (!takes || call->session == 0 || control != 0) return 0;
     call->dev->control = call->session;
     out->took_control = 1;
     return 0;
@@ -162,7 +172,7 @@ void command_execute(struct command_device *dev, uint32_t session, const char *l
     if (call.row == NULL) {
         char clip[COMMAND_CLIP_LEN];
         command_clip(clip, req.header, req.header_len);
-        command_fail(&call, CMD_E_HEADER, "'%s'; HELP? lists all", clip);
+        command_fail(&call, CMD_E_HEADER, "'%s'; HELP? and HELP:SETtings? list all", clip);
     } else if (req.query) {
         do_query(&call);
     } else {

@@ -1,11 +1,14 @@
 /* The command set: one SCPI-style line in, one reply line out, and the error queue of SCPI-99 (21.8).
  *
- *   common    *IDN?  *RST  *CLS  *OPC?  *STB?  HELP?
+ *   common    *IDN?  *RST  *CLS  *OPC?  *STB?  HELP?  HELP:SETtings?
  *   system    SYSTem:ERRor[:NEXT]?  SYSTem:ERRor:COUNt?  SYSTem:VERSion?  SYSTem:PLAN?
  *             SYSTem:CONTrol?  SYSTem:CONTrol:RELease
- *   head      HEAD:PRR  HEAD:LINes  HEAD:PAN  HEAD:STATION  HEAD:STATe?
+ *   head      HEAD:PRR  HEAD:LINes  HEAD:PAN  HEAD:STATION  HEAD:STATe?  HEAD:RANGe:MIN  HEAD:RANGe:MAX
+ *             HEAD:NOISe  HEAD:NOISe:ANGLe  HEAD:NOISe:SIGMa  HEAD:NOISe:BALL
  *   scan      SCAN:STARt  SCAN:STOP  SCAN:COUNt?  SCAN:FRAMes  SCAN:ECHoes
  *             SCAN:LINE:STARt  SCAN:LINE:STOP  SCAN:PAN:STARt  SCAN:PAN:STOP
+ *             SCAN:STEP  SCAN:STEP:LINE  SCAN:STEP:PAN
+ *   site      SITE:POSE
  *   time      TIME?  TIME:UTC?  TIME:GPS?  TIME:STEP
  *
  * Headers have a short form (the capitals) and a long one, in any case. HEAD:STATION has no short one: STAT
@@ -13,10 +16,20 @@
  *
  * Values. A number may be MIN, MAX or DEF, and so may the parameter of a setting's query ("HEAD:PRR? MAX").
  * MIN and MAX are the limits as the profile and the other settings leave them now, so they are never refused.
- * A unit may follow as a suffix: HZ, KHZ, MHZ (mega, as SCPI has it); DEG; DEG/S; of a step NS (also
- * without), US, MS, S. Numbers are taken exactly or refused, never rounded. SCAN:ECHoes takes ALL, FIRSt,
+ * A unit may follow as a suffix: HZ, KHZ, MHZ (mega, as SCPI has it); DEG; DEG/S; M, MM, KM; of a step NS (also
+ * without), US, MS, S. Numbers are taken exactly or refused, never rounded; only SCAN:STEP sets the nearest rates,
+ * and its reply is the step that they give. SCAN:ECHoes takes ALL, FIRSt,
  * LAST, STRongest or DEF: which echoes of a pulse are sent. Of a head with fixed pulse rates HEAD:PRR takes these
  * alone; another rate is -222 with the list of them.
+ *
+ * Ranges, noise, and the step of a sphere hold from the next scan on, and can't change within one.
+ *
+ * Stations. HEAD:STATION goes to stations that have this scanner; one with another is -221.
+ *
+ * `SITE:POSE station, x, y, z, heading, pitch, roll` moves a station of this scanner while the head is idle: metres of
+ * the scene frame, degrees as the keys of a station. `SITE:POSE station, DEF` brings it back to its place of power-up;
+ * `SITE:POSE? station` has the place, with `, MIN`, `, MAX` or `, DEF` the limits and that of power-up. What is read can
+ * be sent back.
  *
  * Steps. With a live platform a step may carry the pose at its end: `TIME:STEP 10 MS, x, y, z, roll, pitch,
  * heading`, in metres of the scene frame and degrees (core/pose.h).
@@ -65,7 +78,7 @@ enum command_error {
 struct command_queue {
     struct {
         int number;
-        char text[160];
+        char text[400];
     } entry[COMMAND_QUEUE_LEN];
     uint32_t first, count, overflow;
 };
@@ -76,11 +89,20 @@ void command_queue_push(struct command_queue *queue, int number, const char *tex
 void command_queue_pop(struct command_queue *queue, char *buf, size_t len);
 const char *command_error_text(int number);
 
+/* Where a station stands: x, y, z (m, scene frame), heading, pitch, roll (degrees). */
+struct command_place {
+    double v[6];
+};
+
 /* The device as the command set sees it. The loop keeps it up to date. */
 struct command_device {
     const char *idn;
     const char *plan; /* the methods in use, in one line; NULL: not known */
     struct head_limits limits;
+    /* Whether a scan can be planned with these settings, whose values are within the limits. Returns 0, or -1 and why
+     * not. NULL: any can. */
+    int (*can_plan)(void *owner, const struct head_settings *settings, char *why, size_t len);
+    void *owner;
     struct head_settings settings; /* as they are now; a refused command leaves them */
     struct head_settings defaults; /* what *RST restores */
     enum head_state state;
@@ -91,7 +113,11 @@ struct command_device {
     char utc[40], gps[40]; /* the same as time of day, by the clock of the head; empty: unknown */
     int step_allowed;      /* 1 when the pace is `step` */
     int pose_allowed;      /* 1 when the platform is live: a step may carry a pose */
-    double pose_centre_m[3], pose_reach_m; /* how far from where the pose may be; scene frame */
+    double pose_centre_m[3], pose_reach_m;   /* how far from where the pose may be; scene frame */
+    const struct command_place *place;       /* [limits.n_stations] as they are now */
+    const struct command_place *first_place; /* at power-up */
+    const char *fixed;                       /* why no station can be moved; NULL: they can */
+    uint32_t moving;                         /* the station that is being moved; 0: none. Until then no scan starts */
 };
 
 enum command_effect {
@@ -101,6 +127,8 @@ enum command_effect {
     COMMAND_STOP,
     COMMAND_RESET,   /* settings are the defaults again; state event RESET accepted */
     COMMAND_STEP,    /* let step_ns of device time pass, then send the reply */
+    COMMAND_MOVE,    /* move a station; the reply is that of success */
+    COMMAND_TAKE,    /* control, and nothing else */
     COMMAND_RELEASE, /* control was given back */
 };
 
@@ -109,9 +137,12 @@ struct command_result {
     int64_t step_ns;
     int have_pose;
     double pose[6];   /* of the platform at the end of the step: x, y, z (m), roll, pitch, heading (degrees) */
-    int error;        /* 0, or the number that was queued */
-    int took_control; /* this command made the session the one in control */
-    int changes;      /* belongs in the journal: effect is not NONE or RELEASE */
+    uint32_t station; /* that is moved, from 1 */
+    int to_first;     /* back to its place of power-up; else to: */
+    struct command_place place;
+    int error;                     /* 0, or the number that was queued */
+    int took_control;              /* this command made the session the one in control */
+    int changes;                   /* belongs in the journal: effect is not NONE or RELEASE */
     char reply[COMMAND_MAX_REPLY]; /* one line without its end; empty for an empty line (no reply at all) */
 };
 
@@ -120,6 +151,9 @@ struct command_result {
  * A change of settings that is refused (-222, -221) leaves them as they were. While scanning, a change of
  * station is -221. */
 void command_execute(struct command_device *dev, uint32_t session, const char *line, struct command_result *out);
+
+/* What a command set in motion could not be done after all: into the queue, and as its reply. */
+void command_refuse(struct command_device *dev, int number, const char *text, struct command_result *out);
 
 /* Collects bytes into lines: LF, CR or CR LF end a line. */
 struct command_lines {

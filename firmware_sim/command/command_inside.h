@@ -76,6 +76,21 @@ struct command_bound {
     int64_t value;
 };
 
+struct command_call;
+
+/* A setting that follows from others, and sets them. Values are integers in its row's unit. */
+struct command_derived {
+    /* Why this head has no such setting; NULL: it has. */
+    const char *(*why_not)(const struct command_device *dev);
+    int64_t (*read)(const struct command_device *dev, const struct head_settings *settings);
+    /* What can be set now; min == max: it is a reading. */
+    void (*range)(const struct command_device *dev, int64_t *min, int64_t *max);
+    /* What gives that range: " as HEAD:PRR is 300000"; "" where nothing does. */
+    void (*because)(const struct command_device *dev, char *text, size_t len);
+    /* Into dev->settings; returns -1 when it failed. The value is within the range. */
+    int (*write)(struct command_call *call, int64_t value);
+};
+
 /* A setting, its range by the profile, and the setting that narrows it: other + least <= value <= other +
  * most. */
 struct command_setting {
@@ -85,9 +100,10 @@ struct command_setting {
     struct command_bound min, max;
     const char *other; /* header of the other setting; NULL: none */
     size_t other_offset;
-    int64_t least, most;      /* COMMAND_UNBOUND: no such bound */
-    int is_rate;              /* where the head has fixed pulse rates, only these */
-    const char *const *words; /* the values by name, from 0; NULL: values are numbers */
+    int64_t least, most;                   /* COMMAND_UNBOUND: no such bound */
+    int is_rate;                           /* where the head has fixed pulse rates, only these */
+    const char *const *words;              /* the values by name, from 0; NULL: values are numbers */
+    const struct command_derived *derived; /* NULL: it is a field of the settings */
 };
 #define COMMAND_UNBOUND INT64_MIN
 
@@ -125,12 +141,23 @@ struct command_row {
     const struct command_setting *setting;   /* NULL: MIN, MAX and DEF have no meaning */
     int open;                                /* act is open to all sessions */
     int pose;                                /* a pose may follow the number */
+    int own;                                 /* both forms take their parameters themselves */
+    int word;                                /* the query may have a word, in param */
+    int event; /* of an action that the states allow: enum head_event + 1; 0: it goes by no state */
 };
 
 extern const struct command_row command_rows[]; /* up to one without a header */
 
+/* MIN, MAX or DEF; 0 when the parameter is none of them. */
+int command_parse_special(const char *param, enum command_value_kind *kind);
+
 /* step_pose.c: call->pose as six numbers into call->out. Returns -1 when it failed. */
 int command_take_pose(struct command_call *call);
+
+/* site_pose.c */
+extern const struct command_unit command_unit_place;
+int command_place_query(struct command_call *call);
+int command_place_change(struct command_call *call);
 
 /* Queues the error and makes it the reply. Returns -1. */
 int command_fail(struct command_call *call, int number, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
@@ -141,6 +168,21 @@ int command_reply(struct command_call *call, const char *fmt, ...) __attribute__
 /* ---- setting.c: query and change of any setting */
 int command_setting_query(struct command_call *call);
 int command_setting_change(struct command_call *call);
+
+/* The range now: as profile and other settings leave it. */
+void command_setting_range(const struct command_call *call, int64_t *min, int64_t *max);
+/* The last of its words that the head takes. */
+uint32_t command_setting_last_word(const struct command_call *call);
+/* Whether it can be set in a state. */
+int command_setting_is_free(const struct command_device *dev, const struct command_setting *setting,
+                            enum head_state state);
+
+/* ---- step.c: angular steps, which follow from the rates */
+extern const struct command_derived command_step_both, command_step_line, command_step_pan;
+
+/* ---- help.c */
+int command_help(struct command_call *call);
+int command_help_settings(struct command_call *call);
 
 /* The number in call->value in the row's unit, or -222 with what is allowed (then returns -1). */
 int command_value_in_range(struct command_call *call, int64_t min, int64_t max, int64_t *value);

@@ -11,38 +11,57 @@
 #define NO_OTHER       NULL, 0, 0, 0, 0
 
 enum { TURN_UDEG = 360000000 };
+#define TURN_NDEG INT64_C(360000000000)
+#define NM_PER_M  INT64_C(1000000000)
 
 static const struct command_unit unit_hz = {"Hz", 6, "HZ, KHZ or MHZ", {{"HZ", 0}, {"KHZ", 3}, {"MHZ", 6}}};
 static const struct command_unit unit_deg = {"deg", 6, "DEG", {{"DEG", 0}}};
 static const struct command_unit unit_deg_s = {"deg/s", 6, "DEG/S", {{"DEG/S", 0}}};
 static const struct command_unit unit_ns = {"ns", 0, "NS, US, MS or S", {{"NS", 0}, {"US", 3}, {"MS", 6}, {"S", 9}}};
+static const struct command_unit unit_fine_deg = {"deg", 9, "DEG", {{"DEG", 0}}};
+static const struct command_unit unit_m = {"m", 9, "M, MM or KM", {{"M", 0}, {"MM", -3}, {"KM", 3}}};
 static const struct command_unit unit_count = {"", 0, "no unit", {{NULL, 0}}};
 
-enum { PRR, LINES, PAN, STATION, LINE_START, LINE_STOP, PAN_START, PAN_STOP, FRAMES, ECHOES };
+enum { PRR, LINES, PAN, STATION, LINE_START, LINE_STOP, PAN_START, PAN_STOP, FRAMES, ECHOES, RANGE_MIN, RANGE_MAX,
+       NOISE, ANGLE, SIGMA, BALL, STEP, STEP_LINE, STEP_PAN };
 
 /* In the order of enum beam_select. */
 static const char *const echo_words[] = {"ALL", "FIRSt", "LAST", "STRongest", NULL};
+/* In the order of enum config_range_noise. */
+static const char *const noise_words[] = {"OFF", "ON", "SIGNal", NULL};
+static const char *const switch_words[] = {"OFF", "ON", NULL};
 
 /* A pulse rate below the line rate would leave lines without a pulse. A line or a pan sweep without width has
  * nothing to scan. A pan sweep beyond a turn would scan things twice. */
 static const struct command_setting settings[] = {
-    /* field, is_u32, not_in_scan, min, max, other, its field, least, most, is_rate, words */
+    /* field, is_u32, not_in_scan, min, max, other, its field, least, most, is_rate, words, derived */
     [PRR] = {SETTING(prr_uhz), 0, 0, PROFILE(prr_min_uhz), PROFILE(prr_max_uhz),
-             "HEAD:LINes", SETTING(lines_uhz), 0, COMMAND_UNBOUND, 1, NULL},
+             "HEAD:LINes", SETTING(lines_uhz), 0, COMMAND_UNBOUND, 1, NULL, NULL},
     [LINES] = {SETTING(lines_uhz), 0, 0, PROFILE(lines_min_uhz), PROFILE(lines_max_uhz),
-               "HEAD:PRR", SETTING(prr_uhz), COMMAND_UNBOUND, 0, 0, NULL},
-    [PAN] = {SETTING(pan_udeg_s), 0, 0, CONSTANT(0), PROFILE(pan_max_udeg_s), NO_OTHER, NULL},
-    [STATION] = {SETTING(station), 1, 1, CONSTANT(1), PROFILE(n_stations), NO_OTHER, NULL},
+               "HEAD:PRR", SETTING(prr_uhz), COMMAND_UNBOUND, 0, 0, NULL, NULL},
+    [PAN] = {SETTING(pan_udeg_s), 0, 0, CONSTANT(0), PROFILE(pan_max_udeg_s), NO_OTHER, NULL, NULL},
+    [STATION] = {SETTING(station), 1, 1, CONSTANT(1), PROFILE(n_stations), NO_OTHER, NULL, NULL},
     [LINE_START] = {SETTING(line_start_udeg), 0, 0, PROFILE(fov_min_udeg), PROFILE(fov_max_udeg),
-                    "SCAN:LINE:STOP", SETTING(line_stop_udeg), COMMAND_UNBOUND, -1, 0, NULL},
+                    "SCAN:LINE:STOP", SETTING(line_stop_udeg), COMMAND_UNBOUND, -1, 0, NULL, NULL},
     [LINE_STOP] = {SETTING(line_stop_udeg), 0, 0, PROFILE(fov_min_udeg), PROFILE(fov_max_udeg),
-                   "SCAN:LINE:STARt", SETTING(line_start_udeg), 1, COMMAND_UNBOUND, 0, NULL},
+                   "SCAN:LINE:STARt", SETTING(line_start_udeg), 1, COMMAND_UNBOUND, 0, NULL, NULL},
     [PAN_START] = {SETTING(pan_start_udeg), 0, 0, PROFILE(pan_min_udeg), PROFILE(pan_max_udeg),
-                   "SCAN:PAN:STOP", SETTING(pan_stop_udeg), -TURN_UDEG, -1, 0, NULL},
+                   "SCAN:PAN:STOP", SETTING(pan_stop_udeg), -TURN_UDEG, -1, 0, NULL, NULL},
     [PAN_STOP] = {SETTING(pan_stop_udeg), 0, 0, PROFILE(pan_min_udeg), PROFILE(pan_max_udeg),
-                  "SCAN:PAN:STARt", SETTING(pan_start_udeg), 1, TURN_UDEG, 0, NULL},
-    [FRAMES] = {SETTING(frames), 1, 0, CONSTANT(0), CONSTANT(HEAD_MAX_FRAMES), NO_OTHER, NULL},
-    [ECHOES] = {SETTING(echoes), 1, 0, CONSTANT(0), CONSTANT(3), NO_OTHER, echo_words},
+                  "SCAN:PAN:STARt", SETTING(pan_start_udeg), 1, TURN_UDEG, 0, NULL, NULL},
+    [FRAMES] = {SETTING(frames), 1, 0, CONSTANT(0), CONSTANT(HEAD_MAX_FRAMES), NO_OTHER, NULL, NULL},
+    [ECHOES] = {SETTING(echoes), 1, 0, CONSTANT(0), CONSTANT(3), NO_OTHER, echo_words, NULL},
+    [RANGE_MIN] = {SETTING(range_min_nm), 0, 1, PROFILE(range_min_nm), PROFILE(near_most_nm),
+                   "HEAD:RANGe:MAX", SETTING(range_max_nm), COMMAND_UNBOUND, -1, 0, NULL, NULL},
+    [RANGE_MAX] = {SETTING(range_max_nm), 0, 1, PROFILE(far_least_nm), PROFILE(range_max_nm),
+                   "HEAD:RANGe:MIN", SETTING(range_min_nm), 1, COMMAND_UNBOUND, 0, NULL, NULL},
+    [NOISE] = {SETTING(noise), 1, 1, CONSTANT(0), PROFILE(noise_most), NO_OTHER, noise_words, NULL},
+    [ANGLE] = {SETTING(angle_noise), 1, 1, CONSTANT(0), PROFILE(angle_most), NO_OTHER, switch_words, NULL},
+    [SIGMA] = {SETTING(sigma_nm), 0, 1, PROFILE(sigma_min_nm), CONSTANT(10 * NM_PER_M), NO_OTHER, NULL, NULL},
+    [BALL] = {SETTING(ball_nm), 0, 1, CONSTANT(0), PROFILE(ball_max_nm), NO_OTHER, NULL, NULL},
+    [STEP] = {0, 0, 0, CONSTANT(1), CONSTANT(TURN_NDEG), NO_OTHER, NULL, &command_step_both},
+    [STEP_LINE] = {0, 0, 0, CONSTANT(1), CONSTANT(TURN_NDEG), NO_OTHER, NULL, &command_step_line},
+    [STEP_PAN] = {0, 0, 0, CONSTANT(0), CONSTANT(TURN_NDEG), NO_OTHER, NULL, &command_step_pan},
 };
 /* clang-format on */
 
@@ -122,21 +141,20 @@ static int query_gps(struct command_call *call)
     return reply_time_of_day(call, call->dev->gps);
 }
 
-static int query_help(struct command_call *call)
-{
-    size_t len = 0;
-    for (const struct command_row *row = command_rows; row->header != NULL && len < sizeof call->out->reply; row++)
-        len += (size_t)snprintf(call->out->reply + len, sizeof call->out->reply - len, "%s%s%s", len == 0 ? "" : " ",
-                                row->header,
-                                row->query == NULL ? ""
-                                : row->act == NULL ? "?"
-                                                   : "[?]");
-    return 0;
-}
-
 static int act_clear(struct command_call *call)
 {
     memset(&call->dev->queue, 0, sizeof call->dev->queue);
+    return command_reply(call, "OK");
+}
+
+static int query_session(struct command_call *call)
+{
+    return command_reply(call, "%u", call->session);
+}
+
+static int act_take(struct command_call *call)
+{
+    call->out->effect = COMMAND_TAKE;
     return command_reply(call, "OK");
 }
 
@@ -147,9 +165,10 @@ static int act_release(struct command_call *call)
     return command_reply(call, "OK");
 }
 
-/* The effect, or -221 where the state machine refuses the event. */
-static int act_event(struct command_call *call, enum head_event event, enum command_effect effect)
+/* The effect, or -221 where the state machine refuses the row's event. */
+static int act_event(struct command_call *call, enum command_effect effect)
 {
+    const enum head_event event = (enum head_event)(call->row->event - 1);
     if (head_next_state(call->dev->state, event) < 0)
         return command_fail(call, CMD_E_SETTINGS, "%s is not possible in state %s", call->row->header,
                             head_state_name(call->dev->state));
@@ -159,17 +178,20 @@ static int act_event(struct command_call *call, enum head_event event, enum comm
 
 static int act_start(struct command_call *call)
 {
-    return act_event(call, HEAD_EV_START, COMMAND_START);
+    if (call->dev->moving != 0)
+        return command_fail(call, CMD_E_SETTINGS, "%s waits for SITE:POSE: station %u is being moved",
+                            call->row->header, call->dev->moving);
+    return act_event(call, COMMAND_START);
 }
 
 static int act_stop(struct command_call *call)
 {
-    return act_event(call, HEAD_EV_STOP, COMMAND_STOP);
+    return act_event(call, COMMAND_STOP);
 }
 
 static int act_reset(struct command_call *call)
 {
-    if (act_event(call, HEAD_EV_RESET, COMMAND_RESET) != 0) return -1;
+    if (act_event(call, COMMAND_RESET) != 0) return -1;
     call->dev->settings = call->dev->defaults;
     return 0;
 }
@@ -188,14 +210,15 @@ static int act_step(struct command_call *call)
 }
 
 /* clang-format off */
-#define QUERY(header, query)       {header, query, NULL, NULL, NULL, 0, 0}
-#define ACTION(header, act, open)  {header, NULL, act, NULL, NULL, open, 0}
+#define QUERY(header, query)       {header, query, NULL, NULL, NULL, 0, 0, 0, 0, 0}
+#define ACTION(header, act, open)  {header, NULL, act, NULL, NULL, open, 0, 0, 0, 0}
+#define CHANGE(header, act, event) {header, NULL, act, NULL, NULL, 0, 0, 0, 0, (event) + 1}
 #define VALUE(header, unit, which) \
-    {header, command_setting_query, command_setting_change, &(unit), &settings[which], 0, 0}
+    {header, command_setting_query, command_setting_change, &(unit), &settings[which], 0, 0, 0, 0, 0}
 
 const struct command_row command_rows[] = {
     QUERY("*IDN", query_idn),
-    ACTION("*RST", act_reset, 0),
+    CHANGE("*RST", act_reset, HEAD_EV_RESET),
     ACTION("*CLS", act_clear, 1), /* open, as SYSTem:ERRor? empties the queue too */
     QUERY("*OPC", query_opc),
     QUERY("*STB", query_stb),
@@ -204,26 +227,40 @@ const struct command_row command_rows[] = {
     QUERY("SYSTem:VERSion", query_version),
     QUERY("SYSTem:CONTrol", query_control),
     QUERY("SYSTem:PLAN", query_plan),
+    ACTION("SYSTem:CONTrol:TAKE", act_take, 0),
     ACTION("SYSTem:CONTrol:RELease", act_release, 0),
+    QUERY("SYSTem:SESSion", query_session),
     VALUE("HEAD:PRR", unit_hz, PRR),
     VALUE("HEAD:LINes", unit_hz, LINES),
     VALUE("HEAD:PAN", unit_deg_s, PAN),
     QUERY("HEAD:STATe", query_state),
     VALUE("HEAD:STATION", unit_count, STATION), /* no short form: STAT is STATe */
+    VALUE("HEAD:RANGe:MIN", unit_m, RANGE_MIN),
+    VALUE("HEAD:RANGe:MAX", unit_m, RANGE_MAX),
+    VALUE("HEAD:NOISe", unit_count, NOISE),
+    VALUE("HEAD:NOISe:ANGLe", unit_count, ANGLE),
+    VALUE("HEAD:NOISe:SIGMa", unit_m, SIGMA),
+    VALUE("HEAD:NOISe:BALL", unit_m, BALL),
+    VALUE("SCAN:STEP", unit_fine_deg, STEP),
+    VALUE("SCAN:STEP:LINE", unit_fine_deg, STEP_LINE),
+    VALUE("SCAN:STEP:PAN", unit_fine_deg, STEP_PAN),
     VALUE("SCAN:LINE:STARt", unit_deg, LINE_START),
     VALUE("SCAN:LINE:STOP", unit_deg, LINE_STOP),
     VALUE("SCAN:PAN:STARt", unit_deg, PAN_START),
     VALUE("SCAN:PAN:STOP", unit_deg, PAN_STOP),
     VALUE("SCAN:FRAMes", unit_count, FRAMES),
     VALUE("SCAN:ECHoes", unit_count, ECHOES),
-    ACTION("SCAN:STARt", act_start, 0),
-    ACTION("SCAN:STOP", act_stop, 0),
+    CHANGE("SCAN:STARt", act_start, HEAD_EV_START),
+    CHANGE("SCAN:STOP", act_stop, HEAD_EV_STOP),
     QUERY("SCAN:COUNt", query_count),
-    QUERY("HELP", query_help),
+    {"SITE:POSE", command_place_query, command_place_change, &command_unit_place, NULL, 0, 0, 1, 0,
+     HEAD_EV_START + 1},
+    {"HELP", command_help, NULL, NULL, NULL, 0, 0, 0, 1, 0},
+    QUERY("HELP:SETtings", command_help_settings),
     QUERY("TIME", query_time),
     QUERY("TIME:UTC", query_utc),
     QUERY("TIME:GPS", query_gps),
-    {"TIME:STEP", NULL, act_step, &unit_ns, NULL, 0, 1},
+    {"TIME:STEP", NULL, act_step, &unit_ns, NULL, 0, 1, 0, 0, 0},
     {.header = NULL},
 };
 /* clang-format on */

@@ -1,12 +1,14 @@
 /* The head: its state machine as a pure function, its settings, and what its profile allows. In: a state and
  * an event. Out: the next state.
  *
- * Rates and angles are integers in micro-units (uhz = 1e-6 Hz, udeg = 1e-6 degree), so that they are
- * exact. */
+ * Rates and angles are integers in micro-units (uhz = 1e-6 Hz, udeg = 1e-6 degree), distances in nanometres, so
+ * that they are exact. */
 #ifndef FIRMWARE_SIM_COMMAND_HEAD_H
 #define FIRMWARE_SIM_COMMAND_HEAD_H
 
 #include <stdint.h>
+
+#include "core/emitter.h"
 
 /* The order is on the wire (telemetry, state events). */
 enum head_state {
@@ -45,11 +47,16 @@ enum { HEAD_MAX_FRAMES = 1000000 };
 
 struct head_settings {
     int64_t prr_uhz, lines_uhz, pan_udeg_s;
-    int64_t line_start_udeg, line_stop_udeg; /* start < stop, within the field of view */
+    int64_t line_start_udeg, line_stop_udeg; /* start < stop, or round: != ; within the field of view */
     int64_t pan_start_udeg, pan_stop_udeg;   /* start <= stop, at most a turn apart */
     uint32_t frames;                         /* frames per scan; 0: until stopped */
     uint32_t station;                        /* from 1 */
     uint32_t echoes;                         /* which echoes of a pulse are sent: enum beam_select */
+    uint32_t noise;                          /* of ranges: enum config_range_noise */
+    uint32_t angle_noise;                    /* 0: none */
+    int64_t range_min_nm, range_max_nm;      /* nothing nearer or farther is an echo */
+    int64_t sigma_nm, ball_nm;               /* one sigma of that noise, its fixed part; radius of the ball noise */
+    int64_t step_udeg;                       /* of a sphere, as it was asked for; else 0 */
 };
 
 enum { HEAD_MAX_RATES = 8 };
@@ -62,7 +69,30 @@ struct head_limits {
     int64_t fov_min_udeg, fov_max_udeg;
     int64_t pan_min_udeg, pan_max_udeg;
     uint32_t n_stations;
-    uint32_t line_pulses; /* of each line, so that the pulse rate follows from the lines; 0: it doesn't */
+    uint64_t elsewhere;   /* bit i: station i + 1 has another scanner than this head; 0 beyond 64 */
+    uint32_t line_pulses; /* of each line, so that the pulse rate follows from the lines; 0: it doesn't. Of a sphere
+                           * with the step of power-up: head_line_pulses() */
+    int round; /* line angles are azimuths of a ring: a window may go across 0, from a start above its stop */
+    enum emitter_kind emitter;
+    int64_t sweep_udeg;  /* a line head: how far the beam turns in a line, with the blind part */
+    int64_t sequence_ps; /* a head with beams: from firing sequence to firing sequence */
+    int step_fixed;      /* a sphere on a platform that moves keeps its step */
+    int64_t range_min_nm, range_max_nm;
+    int64_t near_most_nm, far_least_nm; /* so that something is left at each pulse rate: of the nearest, the farthest */
+    uint32_t noise_most, angle_most;    /* of the kinds of range and angle noise, by number */
+    int64_t sigma_min_nm, ball_max_nm;
 };
+
+/* Of each line; 0: as many as the rates give. */
+static inline uint32_t head_line_pulses(const struct head_limits *limits, const struct head_settings *settings)
+{
+    if (limits->emitter != EMITTER_SPHERE || settings->step_udeg <= 0) return limits->line_pulses;
+    return emitter_sphere_steps(settings->step_udeg);
+}
+
+static inline int head_is_elsewhere(const struct head_limits *limits, int64_t station)
+{
+    return station >= 1 && station <= 64 && (limits->elsewhere >> (station - 1) & 1) != 0;
+}
 
 #endif

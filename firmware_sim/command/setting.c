@@ -76,42 +76,96 @@ static int is_setting(const struct command_call *call, size_t offset)
 /* The pulse rate of a head whose lines have a fixed number of pulses. */
 static int64_t rate_of_lines(const struct command_call *call)
 {
-    return call->dev->settings.lines_uhz * call->dev->limits.line_pulses;
+    return call->dev->settings.lines_uhz * head_line_pulses(&call->dev->limits, &call->dev->settings);
 }
 
-/* The range now: that of the profile, narrowed by the other setting. */
-static void current_range(const struct command_call *call, int64_t *min, int64_t *max)
+/* MIN and MAX are stations of this head. */
+static void narrow_to_stations(const struct command_call *call, int64_t *min, int64_t *max)
+{
+    while (*min < *max && head_is_elsewhere(&call->dev->limits, *min))
+        ++*min;
+    while (*min < *max && head_is_elsewhere(&call->dev->limits, *max))
+        --*max;
+}
+
+static int is_line_angle(const struct command_call *call)
+{
+    return is_setting(call, offsetof(struct head_settings, line_start_udeg)) ||
+           is_setting(call, offsetof(struct head_settings, line_stop_udeg));
+}
+
+uint32_t command_setting_last_word(const struct command_call *call)
+{
+    return (uint32_t)read_bound(call, &call->row->setting->max);
+}
+
+static int is_sphere(const struct command_call *call)
+{
+    return call->dev->limits.emitter == EMITTER_SPHERE;
+}
+
+/* With more pulses a line fewer lines make the fastest pulse rate. */
+static int64_t most_lines_of_sphere(const struct command_call *call)
+{
+    return call->dev->limits.prr_max_uhz / head_line_pulses(&call->dev->limits, &call->dev->settings);
+}
+
+void command_setting_range(const struct command_call *call, int64_t *min, int64_t *max)
 {
     const struct command_setting *setting = call->row->setting;
+    if (setting->derived != NULL) {
+        setting->derived->range(call->dev, min, max);
+        return;
+    }
     *min = read_bound(call, &setting->min);
     *max = read_bound(call, &setting->max);
+    if (is_setting(call, offsetof(struct head_settings, station))) narrow_to_stations(call, min, max);
     if (setting->other == NULL) return;
     if (call->dev->limits.line_pulses != 0 && is_setting(call, offsetof(struct head_settings, prr_uhz))) {
         *min = *max = rate_of_lines(call);
         return;
     }
-    if (call->dev->limits.line_pulses != 0 && is_setting(call, offsetof(struct head_settings, lines_uhz))) return;
+    if (call->dev->limits.line_pulses != 0 && is_setting(call, offsetof(struct head_settings, lines_uhz))) {
+        if (is_sphere(call) && most_lines_of_sphere(call) < *max) *max = most_lines_of_sphere(call);
+        return;
+    }
+    if (call->dev->limits.round && is_line_angle(call)) return;
     const int64_t other = read_other(call);
     if (setting->least != COMMAND_UNBOUND && other + setting->least > *min) *min = other + setting->least;
     if (setting->most != COMMAND_UNBOUND && other + setting->most < *max) *max = other + setting->most;
     narrow_to_rates(call, min, max);
 }
 
+static int64_t read_value(const struct command_call *call, const struct head_settings *settings)
+{
+    const struct command_setting *setting = call->row->setting;
+    if (setting->derived != NULL) return setting->derived->read(call->dev, settings);
+    return read_field(settings, setting->offset, setting->is_u32);
+}
+
 static int64_t special_value(const struct command_call *call)
 {
     int64_t min, max;
-    current_range(call, &min, &max);
+    command_setting_range(call, &min, &max);
     if (call->value.kind == COMMAND_VALUE_MIN) return min;
     if (call->value.kind == COMMAND_VALUE_MAX) return max;
-    return read_field(&call->dev->defaults, call->row->setting->offset, call->row->setting->is_u32);
+    return read_value(call, &call->dev->defaults);
+}
+
+/* -221 where the head has no such setting. */
+static int check_has(struct command_call *call)
+{
+    const struct command_derived *derived = call->row->setting->derived;
+    const char *why = derived != NULL ? derived->why_not(call->dev) : NULL;
+    return why == NULL ? 0 : command_fail(call, CMD_E_SETTINGS, "%s: %s", call->row->header, why);
 }
 
 int command_setting_query(struct command_call *call)
 {
     const struct command_setting *setting = call->row->setting;
-    const int64_t value = call->value.kind == COMMAND_VALUE_NUMBER
-                              ? read_field(&call->dev->settings, setting->offset, setting->is_u32)
-                              : special_value(call);
+    if (check_has(call) != 0) return -1;
+    const int64_t value =
+        call->value.kind == COMMAND_VALUE_NUMBER ? read_value(call, &call->dev->settings) : special_value(call);
     if (setting->words != NULL) return command_reply(call, "%s", setting->words[value]);
     return command_reply(call, "%s", in_unit(call, value).text);
 }
@@ -178,37 +232,102 @@ static int check_rate(struct command_call *call)
                         call->row->unit->name);
 }
 
+/* What narrows the range, as the end of an error. */
+static void say_because(const struct command_call *call, int no_width, char *text, size_t len)
+{
+    const struct command_setting *setting = call->row->setting;
+    const char *other = setting->other;
+    text[0] = '\0';
+    if (setting->derived != NULL)
+        setting->derived->because(call->dev, text, len);
+    else if (is_sphere(call) && is_setting(call, offsetof(struct head_settings, lines_uhz)))
+        snprintf(text, len, " with this SCAN:STEP");
+    else if (other != NULL)
+        snprintf(text, len, "%s as %s is %s", no_width ? " but this," : "", other,
+                 in_unit(call, read_other(call)).text);
+}
+
 /* Checks against the other setting; the range of the profile was checked before. */
 static int check_other(struct command_call *call, int64_t value)
 {
     int64_t min, max;
-    current_range(call, &min, &max);
-    if (value >= min && value <= max) return 0;
-    const char *other = call->row->setting->other;
-    char with[NUMBER_LEN + 24] = "";
-    if (other != NULL) snprintf(with, sizeof with, " as %s is %s", other, in_unit(call, read_other(call)).text);
+    char with[NUMBER_LEN + 40];
+    command_setting_range(call, &min, &max);
+    const int no_width = call->dev->limits.round && is_line_angle(call) && value == read_other(call);
+    if (value >= min && value <= max && !no_width) return 0;
+    if (call->row->setting->words != NULL)
+        return command_fail(call, CMD_E_SETTINGS, "%s %s needs %s", call->row->header, call->row->setting->words[value],
+                            is_setting(call, offsetof(struct head_settings, noise))
+                                ? "signal.model: on"
+                                : "mirror_sigma_deg or pan_sigma_deg of the head profile");
+    say_because(call, no_width, with, sizeof with);
     return refuse_number(call, CMD_E_SETTINGS, value, min, max, with);
+}
+
+int command_setting_is_free(const struct command_device *dev, const struct command_setting *setting,
+                            enum head_state state)
+{
+    const int in_scan = state == HEAD_SPIN_UP || state == HEAD_SCANNING;
+    return !in_scan || (!setting->not_in_scan && (setting->derived == NULL || dev->limits.emitter != EMITTER_SPHERE));
+}
+
+static int take_value(struct command_call *call, int64_t *value)
+{
+    const struct command_setting *setting = call->row->setting;
+    if (call->value.kind == COMMAND_VALUE_WORD)
+        *value = call->value.word;
+    else if (call->value.kind != COMMAND_VALUE_NUMBER)
+        *value = special_value(call);
+    else if (check_rate(call) != 0 ||
+             command_value_in_range(call, read_bound(call, &setting->min), read_bound(call, &setting->max), value) != 0)
+        return -1;
+    return 0;
+}
+
+static int check_value(struct command_call *call, int64_t value)
+{
+    const struct command_setting *setting = call->row->setting;
+    const enum head_state state = call->dev->state;
+    if (is_setting(call, offsetof(struct head_settings, station)) && head_is_elsewhere(&call->dev->limits, value))
+        return command_fail(call, CMD_E_SETTINGS, "%s %lld has another scanner; run that: --set head.station=%lld",
+                            call->row->header, (long long)value, (long long)value);
+    const int as_before = setting->derived != NULL && call->value.kind == COMMAND_VALUE_DEF; /* rates of power-up */
+    const enum emitter_kind head = call->dev->limits.emitter;
+    const int sets = head == EMITTER_LINE || (head == EMITTER_SPHERE && setting->derived == &command_step_both);
+    if (!(as_before && sets) && check_other(call, value) != 0) return -1;
+    if (!command_setting_is_free(call->dev, setting, state) && value != read_value(call, &call->dev->settings))
+        return command_fail(call, CMD_E_SETTINGS, "%s can't change in state %s", call->row->header,
+                            head_state_name(state));
+    return 0;
+}
+
+/* The value into the settings, and what follows from it. */
+static int write_value(struct command_call *call, int64_t value)
+{
+    const struct command_setting *setting = call->row->setting;
+    struct command_device *dev = call->dev;
+    if (setting->derived == NULL)
+        write_field(&dev->settings, setting->offset, setting->is_u32, value);
+    else if (setting->derived->write(call, value) != 0)
+        return -1;
+    if (dev->limits.line_pulses != 0) dev->settings.prr_uhz = rate_of_lines(call);
+    return 0;
 }
 
 int command_setting_change(struct command_call *call)
 {
-    const struct command_setting *setting = call->row->setting;
+    struct command_device *dev = call->dev;
+    const struct head_settings before = dev->settings;
+    char why[COMMAND_TEXT_LEN];
     int64_t value;
-    if (call->value.kind == COMMAND_VALUE_WORD)
-        value = call->value.word;
-    else if (call->value.kind != COMMAND_VALUE_NUMBER)
-        value = special_value(call);
-    else if (check_rate(call) != 0 || command_value_in_range(call, read_bound(call, &setting->min),
-                                                             read_bound(call, &setting->max), &value) != 0)
-        return -1;
-    if (check_other(call, value) != 0) return -1;
-    const enum head_state state = call->dev->state;
-    const int in_scan = state == HEAD_SPIN_UP || state == HEAD_SCANNING;
-    if (setting->not_in_scan && in_scan && value != read_field(&call->dev->settings, setting->offset, setting->is_u32))
-        return command_fail(call, CMD_E_SETTINGS, "%s can't change in state %s", call->row->header,
-                            head_state_name(state));
-    write_field(&call->dev->settings, setting->offset, setting->is_u32, value);
-    if (call->dev->limits.line_pulses != 0) call->dev->settings.prr_uhz = rate_of_lines(call);
+    if (check_has(call) != 0 || take_value(call, &value) != 0 || check_value(call, value) != 0) return -1;
+    if (write_value(call, value) != 0) return -1;
+    if (dev->can_plan != NULL && dev->can_plan(dev->owner, &dev->settings, why, sizeof why) != 0) {
+        dev->settings = before;
+        return command_fail(call, CMD_E_SETTINGS, "%s: %s", call->row->header, why);
+    }
     call->out->effect = COMMAND_SETTINGS;
+    if (call->row->setting->derived != NULL)
+        return command_reply(call, "%s", in_unit(call, read_value(call, &dev->settings)).text);
     return command_reply(call, "OK");
 }

@@ -44,41 +44,86 @@ void cfg_fill_defaults(struct cfg_reader *rd, const struct config_profile *profi
     }
 }
 
+/* Which station's section `scanner` counts. */
+static void find_scanner(struct cfg_reader *rd, struct config *cfg, uint32_t station)
+{
+    const size_t row = cfg_row(rd, cfg_find(&rd->table, "head.station"));
+    const uint32_t given = rd->line[row][0] != 0 && !rd->bad[row][0] ? cfg->head.settings.station : 1;
+    const uint32_t i = cfg->n_stations == 1 ? 0 : (station != 0 ? station : given) - 1; /* stops are of one station */
+    rd->scanner = i < cfg->n_stations && cfg->station[i].has_scanner ? (int)i : -1;
+    if (station == 0) return;
+    cfg->head.settings.station = station;
+    rd->line[row][0] = rd->root_line;
+    rd->bad[row][0] = 0;
+    cfg_forget_list(rd, "links"); /* they are those of head.station's scanner */
+}
+
+static void read_scanner(struct cfg_reader *rd, struct cfg_document *doc, const char *const *sets, int n_sets)
+{
+    if (rd->scanner < 0) return;
+    cfg_read_scanner(rd, doc);
+    rd->in_scanner = 1;
+    for (int i = 0; i < n_sets; i++)
+        cfg_apply_set(rd, sets[i]);
+    rd->in_scanner = 0;
+    cfg_end_scanner(rd);
+}
+
 /* known: the profile, where it was read before; NULL: not yet. Returns whether cfg->profile is read. */
-static int load_once(const char *const *sets, int n_sets, struct config *cfg, const struct config_profile *known,
-                     struct config_faults *faults)
+static int load_once(const char *const *sets, int n_sets, uint32_t station, struct config *cfg,
+                     const struct config_profile *known, struct config_faults *faults)
 {
     struct cfg_reader rd;
+    struct cfg_document *doc;
     memset(faults, 0, sizeof *faults);
     cfg_reader_init(&rd, cfg->file, &cfg_config_table, cfg, faults);
     rd.profile = known;
-    if (cfg_read_file(&rd) != SH_OK) return 0;
+    if (cfg_open_file(&rd, &doc) != SH_OK) return 0;
     for (int i = 0; i < n_sets; i++)
         cfg_apply_set(&rd, sets[i]);
+    find_scanner(&rd, cfg, station);
+    read_scanner(&rd, doc, sets, n_sets);
+    cfg_close_file(doc);
     cfg_load_profile(&rd, cfg);
     cfg_fill_defaults(&rd, &cfg->profile);
     cfg_check(&rd, cfg);
     return rd.profile_read;
 }
 
+static void begin(const char *path, const char *const *sets, int n_sets, struct config *cfg)
+{
+    memset(cfg, 0, sizeof *cfg);
+    snprintf(cfg->file, sizeof cfg->file, "%s", path);
+    cfg->sets = sets;
+    cfg->n_sets = n_sets;
+}
+
+int cfg_load_for(const char *path, const char *const *sets, int n_sets, uint32_t station, struct config *cfg,
+                 struct config_faults *faults)
+{
+    begin(path, sets, n_sets, cfg);
+    const int has_profile = load_once(sets, n_sets, station, cfg, NULL, faults);
+    if (faults->n == 0) return SH_OK;
+    /* Values are read before the profile, but its limits belong into their errors: so once more. */
+    const struct config_profile profile = cfg->profile;
+    begin(path, sets, n_sets, cfg);
+    if (has_profile) load_once(sets, n_sets, station, cfg, &profile, faults);
+    return faults->fault[0].code;
+}
+
 int config_load_all(const char *path, const char *const *sets, int n_sets, struct config *cfg,
                     struct config_faults *faults)
 {
-    memset(cfg, 0, sizeof *cfg);
+    memset(faults, 0, sizeof *faults);
     if (strlen(path) >= sizeof cfg->file) {
+        memset(cfg, 0, sizeof *cfg);
         faults->n = 1;
         return sh_fail(&faults->fault[0], SH_EINPUT, "%.100s...: path too long; allowed up to %zu bytes", path,
                        sizeof cfg->file - 1);
     }
-    snprintf(cfg->file, sizeof cfg->file, "%s", path);
-    const int has_profile = load_once(sets, n_sets, cfg, NULL, faults);
-    if (faults->n == 0) return SH_OK;
-    /* Values are read before the profile, but its limits belong into their errors: so once more. */
-    const struct config_profile profile = cfg->profile;
-    memset(cfg, 0, sizeof *cfg);
-    snprintf(cfg->file, sizeof cfg->file, "%s", path);
-    if (has_profile) load_once(sets, n_sets, cfg, &profile, faults);
-    return faults->fault[0].code;
+    cfg_load_for(path, sets, n_sets, 0, cfg, faults);
+    cfg_check_scanners(cfg, faults);
+    return faults->n == 0 ? SH_OK : faults->fault[0].code;
 }
 
 int config_load(const char *path, const char *const *sets, int n_sets, struct config *cfg, struct sh_err *err)

@@ -15,6 +15,7 @@
 #include <stdint.h>
 #include <stdio.h>
 
+#include "core/colour.h"
 #include "core/footprint.h"
 #include "core/detect.h"
 #include "core/err.h"
@@ -55,6 +56,7 @@ struct config_program {
     int64_t used_uhz; /* pulses within the field of view */
     uint32_t max_echoes;
     double range_min_m, range_max_m;
+    double own_min_m, own_max_m;   /* the same without head.range_min_m and range_max_m */
     double reach_90_m, reach_20_m; /* as the file has them; 0: not given */
     struct config_reach reach[DETECT_MAX_REACHES];
     uint32_t n_reaches; /* at least 1 */
@@ -136,6 +138,18 @@ struct config_anchor {
 /* In which form a station's place on the Earth is given. */
 enum config_place { PLACE_NONE, PLACE_GEODETIC, PLACE_UTM, PLACE_ECEF };
 
+enum config_choice { CHOICE_AUTO, CHOICE_OFF, CHOICE_ON };
+
+/* What a station's head stands on (firmware_sim/site/tripod.c). */
+struct config_tripod {
+    int given; /* 0: nothing, which hides nothing */
+    double leg_m, opening_min_deg;
+    double head_above_m;     /* the head's origin above the tripod's top */
+    enum config_choice cone; /* hides what is below the head; auto: where there are no legs to hide it */
+    int legs;                /* three prisms that are in view, too */
+    double leg_diameter_m, legs_heading_deg;
+};
+
 struct config_station {
     char name[32];
     double position_m[3];                    /* of the head's origin in the scene frame */
@@ -149,6 +163,9 @@ struct config_station {
     int north;                         /* hemisphere */
     double easting_m, northing_m;
     double ecef_m[3];
+    struct config_tripod tripod;
+    int has_scanner;  /* there is a section `scanner` */
+    uint32_t scanner; /* the first station, from 1, of those with the same scanner */
 };
 
 enum config_platform_kind { PLATFORM_STATIC, PLATFORM_TRAJECTORY, PLATFORM_LIVE, PLATFORM_STOPS };
@@ -161,6 +178,7 @@ struct config_platform {
     double start_s, end_s;                                  /* part of the trajectory, after its first sample */
     int has_end;                                            /* 0: to its last sample */
     double step_s;                                          /* stops: from each to the next */
+    double frames_per_s, first_frame, last_frame, frame_step; /* stops: the same in frames; 0 frames a second: not */
     enum config_at_end at_end;
     double mount_m[3], mount_heading_deg, mount_pitch_deg, mount_roll_deg; /* of the head on the platform */
     double reach_m, extrapolate_ms;                                        /* live */
@@ -214,8 +232,6 @@ struct config_instrument {
     double range_offset_m, range_scale_ppm;
 };
 
-enum config_choice { CHOICE_AUTO, CHOICE_OFF, CHOICE_ON };
-
 /* Settings at power-up, within the profile (checked). */
 struct config_head {
     struct head_settings settings;
@@ -223,9 +239,23 @@ struct config_head {
     int start; /* scan when booted; run alone looks at it */
     enum detect_ambiguity ambiguity;
     uint32_t mta_zones;
+    /* of a sphere (core/emitter.h), and part of the profile's emitter from then on */
+    int64_t step_udeg, ring_start_udeg, ring_stop_udeg;
+    double range_min_m,
+        range_max_m; /* nothing nearer or farther is an echo; the profile in this struct has them, too */
+    double profile_min_m, profile_max_m; /* what the head profile's file has */
+};
+
+/* What is scanned of the meshes; n_objects 0: all. */
+enum { CONFIG_MAX_OBJECTS = 64 };
+struct config_target {
+    char object[CONFIG_MAX_OBJECTS][SCENE_NAME_LEN]; /* patterns */
+    uint32_t n_objects;
+    enum config_others { OTHERS_LEFT_OUT, OTHERS_HIDE } others;
 };
 
 struct config_scene {
+    struct config_target target;
     struct config_mesh mesh[CONFIG_MAX_MESHES];
     uint32_t n_meshes;
     double tolerance_m;
@@ -233,6 +263,13 @@ struct config_scene {
     int cutouts;                      /* rays pass where a texture's alpha is below a half */
     struct scene_import_limits import;
     struct config_anchor anchor;
+    /* What all scanners of the scene together need, so that they can share it; zeros where there is only one. */
+    struct config_shared {
+        int textures;       /* one of them models the signal */
+        double range_max_m; /* of any */
+        double beside_m;    /* rays begin up to so far from the head */
+        int passes_glass;   /* one follows pulses through glass or off mirrors */
+    } shared;
 };
 
 struct config_output {
@@ -244,6 +281,10 @@ struct config_output {
     enum georef_method georef; /* GEOREF_AUTO: as the plan says */
     double tolerance_m;        /* largest error of a georeferenced position */
     int attributes;            /* amplitude and width of each echo follow the points */
+    enum colour_mode colour;   /* a colour for each point follows, too */
+    double colour_rgb[3];      /* solid: 0..255 each, whole */
+    double colour_limits[2];   /* range, height, frame */
+    int colour_limited;        /* 0: no limits are given */
     double scale_m;            /* 0: the finest of 1e-6 x 10^n m that holds range_max_m (polar: 32 bits, geo: 31) */
 };
 
@@ -257,8 +298,13 @@ struct config_cast {
     double sight_mib;
 };
 
+struct config_coverage {
+    double cell_m, memory_mib; /* core/coverage.h */
+};
+
 struct config_noise {
     enum config_range_noise range;
+    double sigma_m; /* the profile in this struct has it, too, as range_sigma_m */
     int angle;
     uint64_t seed;
     struct config_ball ball;
@@ -276,9 +322,12 @@ struct config_loop {
     enum config_pace pace;
 };
 
-/* One member per section of the file. */
+/* One member per section of the file. A file may have several scanners: stations with a section `scanner`, whose
+ * keys stand in for those of the file's own sections. A struct config is that of one of them. */
 struct config {
     char file[CONFIG_PATH_LEN];
+    const char *const *sets; /* that it was loaded with; not copied */
+    int n_sets;
     char profile_file[CONFIG_PATH_LEN];
     struct config_profile profile;
     struct config_head head;
@@ -291,6 +340,7 @@ struct config {
     uint32_t n_links;
     struct config_beam beam;
     struct config_cast cast;
+    struct config_coverage coverage;
     struct plan_tolerance plan;
     struct config_noise noise;
     struct config_signal signal;
@@ -321,6 +371,14 @@ int config_load(const char *path, const char *const *sets, int n_sets, struct co
 int config_load_all(const char *path, const char *const *sets, int n_sets, struct config *cfg,
                     struct config_faults *faults);
 
+/* A configuration is loaded for the scanner of head.station. Whether station i, from 0, has this scanner, and
+ * whether all have. The stops of a platform have that of the one station. */
+int config_serves(const struct config *cfg, uint32_t i);
+int config_is_alone(const struct config *cfg);
+/* The configuration of the scanner at a station, from 1, with that one as its head.station. It has no links, but
+ * output and loop as cfg has them by now. The sets that cfg was loaded with must still be there. */
+int config_load_scanner(const struct config *cfg, uint32_t station, struct config *out, struct sh_err *err);
+
 /* The program of a pulse rate, as an index; 0 for a head without programs. */
 uint32_t config_program_of(const struct config_profile *profile, int64_t prr_uhz);
 /* The largest pulse rate that the head has up to prr_uhz; its smallest one where it has none. */
@@ -333,6 +391,28 @@ void config_signal_spec(const struct config_profile *profile, const struct confi
 /* The schedule of a head with some settings; of a list of directions without the list (site_fill_spec). */
 void config_fill_spec(const struct config_profile *profile, const struct head_settings *settings,
                       struct schedule_spec *spec);
+
+/* What the configuration would be with other ranges, noise and step of a sphere: as if its keys had them. cfg is a copy
+ * of one that was loaded; the settings are allowed for it (command.h). SH_EINPUT: no ring is left. */
+int config_apply_settings(struct config *cfg, const struct head_settings *settings, struct sh_err *err);
+
+/* head.range_min_m or range_max_m leaves less than the profile has. */
+static inline int config_limits_range(const struct config *cfg)
+{
+    return cfg->head.range_min_m > cfg->head.profile_min_m || cfg->head.range_max_m < cfg->head.profile_max_m;
+}
+
+/* The farthest that commands may set, whatever head.range_max_m says. */
+static inline double config_range_most_m(const struct config *cfg)
+{
+    return cfg->head.profile_max_m > cfg->profile.range_max_m ? cfg->head.profile_max_m : cfg->profile.range_max_m;
+}
+
+/* Whether the scene needs texture coordinates and textures. */
+static inline int config_wants_textures(const struct config *cfg)
+{
+    return cfg->signal.on || cfg->output.colour == COLOUR_TEXTURE || cfg->scene.shared.textures;
+}
 
 static inline int config_has_footprint(const struct config *cfg)
 {

@@ -43,12 +43,14 @@ static void check_head(struct cfg_reader *rd, const struct config *cfg)
                      "%.15g, or a lines_hz of at most %.15g",
                      from_micro(s->prr_uhz), from_micro(s->lines_uhz), from_micro(s->lines_uhz),
                      from_micro(s->prr_uhz));
-    if (s->line_start_udeg >= s->line_stop_udeg && CFG_SOUND(rd, 0, "head.line_start_deg", "head.line_stop_deg"))
-        cfg_fail_key(rd, given_of(rd, "head.line_stop_deg", "head.line_start_deg"), 0,
-                     "the line goes from %.15g to %.15g deg; allowed a line_start_deg below %.15g, or a "
-                     "line_stop_deg above %.15g",
-                     from_micro(s->line_start_udeg), from_micro(s->line_stop_udeg), from_micro(s->line_stop_udeg),
-                     from_micro(s->line_start_udeg));
+    if (!cfg_line_has_width(cfg) && CFG_SOUND(rd, 0, "head.line_start_deg", "head.line_stop_deg"))
+        cfg_fail_key(
+            rd, given_of(rd, "head.line_stop_deg", "head.line_start_deg"), 0,
+            "the line goes from %.15g to %.15g deg; allowed a line_start_deg %s %.15g, or a "
+            "line_stop_deg %s %.15g",
+            from_micro(s->line_start_udeg), from_micro(s->line_stop_udeg),
+            cfg->profile.emitter.kind == EMITTER_SPHERE ? "other than" : "below", from_micro(s->line_stop_udeg),
+            cfg->profile.emitter.kind == EMITTER_SPHERE ? "other than" : "above", from_micro(s->line_start_udeg));
     if ((span_udeg < 0 || span_udeg > 360000000) && CFG_SOUND(rd, 0, "head.pan_start_deg", "head.pan_stop_deg"))
         cfg_fail_key(rd, given_of(rd, "head.pan_stop_deg", "head.pan_start_deg"), 0,
                      "the pan goes from %.15g to %.15g deg; allowed a pan_stop_deg of %.15g to %.15g",
@@ -91,12 +93,39 @@ static void check_names(struct cfg_reader *rd, struct config *cfg)
     }
 }
 
+static void check_colour(struct cfg_reader *rd, struct config *cfg)
+{
+    struct config_output *o = &cfg->output;
+    const double *c = o->colour_rgb, *l = o->colour_limits;
+    o->colour_limited = cfg_is_given(rd, "output.colour_limits", 0);
+    if (c[0] != floor(c[0]) || c[1] != floor(c[1]) || c[2] != floor(c[2]))
+        cfg_fail_key(rd, "output.colour_rgb", 0, "[%.9g, %.9g, %.9g]; allowed whole numbers from 0 to 255", c[0], c[1],
+                     c[2]);
+    if (!CFG_SOUND(rd, 0, "output.colour")) return;
+    if (cfg_is_given(rd, "output.colour_rgb", 0) && o->colour != COLOUR_SOLID)
+        cfg_fail_key(rd, "output.colour_rgb", 0, "a colour, but output.colour is %s; allowed only with colour: solid",
+                     colour_words[o->colour]);
+    if (o->colour_limited && !colour_has_limits(o->colour))
+        cfg_fail_key(rd, "output.colour_limits", 0,
+                     "limits, but output.colour is %s; allowed only with colour: range, height, frame",
+                     colour_words[o->colour]);
+    else if (o->colour_limited && !(l[0] < l[1]) && CFG_SOUND(rd, 0, "output.colour_limits"))
+        cfg_fail_key(rd, "output.colour_limits", 0, "[%.9g, %.9g]; allowed a second number above the first", l[0],
+                     l[1]);
+    if (o->colour == COLOUR_FRAME && cfg->platform.kind != PLATFORM_TRAJECTORY &&
+        cfg->platform.kind != PLATFORM_STOPS && CFG_SOUND(rd, 0, "platform.kind"))
+        cfg_fail_key(rd, "output.colour", 0,
+                     "frame, but there are no frames: platform.kind is %s; allowed with trajectory, stops",
+                     cfg_word(rd, "platform.kind", (int)cfg->platform.kind));
+}
+
 static void check_output(struct cfg_reader *rd, struct config *cfg)
 {
     const struct config_output *output = &cfg->output;
     const int bits = output->layout == LINE_POLAR ? 32 : 31; /* a range has no sign */
     const double counts = ldexp(1.0, bits);
     cfg->output.layout_given = cfg_is_given(rd, "output.layout", 0);
+    check_colour(rd, cfg);
     if (!cfg_is_given(rd, "output.tolerance_m", 0)) cfg->output.tolerance_m = fmax(1e-7, 1e-3 * cfg->plan.range_m);
     if (!cfg_is_given(rd, "scene.tolerance_m", 0))
         cfg->scene.tolerance_m = cfg_is_given(rd, "plan.tolerance_m", 0) ? 0.1 * cfg->plan.range_m : 1.0;
@@ -118,40 +147,6 @@ static void check_output(struct cfg_reader *rd, struct config *cfg)
                      cfg->profile.range_max_m / counts);
 }
 
-/* Which part of the trajectory, and where on it to stop. How long it is, its file says
- * (firmware_sim/site/platform.c). */
-static void check_part(struct cfg_reader *rd, struct config *cfg)
-{
-    struct config_platform *p = &cfg->platform;
-    int stops = p->kind == PLATFORM_STOPS;
-    p->has_end = cfg_is_given(rd, "platform.end_s", 0);
-    if (p->has_end && (stops ? p->end_s < p->start_s : p->end_s <= p->start_s) && CFG_SOUND(rd, 0, "platform.start_s"))
-        cfg_fail_key(rd, "platform.end_s", 0, "%.9g s, and platform.start_s is %.9g; allowed %s %.9g s", p->end_s,
-                     p->start_s, stops ? "at least" : "more than", p->start_s);
-    if (!stops) return;
-    if (!(p->step_s > 0.0) && CFG_SOUND(rd, 0, "platform.step_s"))
-        cfg_fail_key(rd, cfg_is_given(rd, "platform.step_s", 0) ? "platform.step_s" : "platform.kind", 0,
-                     "stops need the time from each to the next, platform.step_s; allowed above 0, up to 1e9 s");
-    if (cfg->n_stations > 1)
-        cfg_fail_key(rd, "stations", 0,
-                     "%u of them, but platform.kind is stops, which are the stations; allowed one, which says where "
-                     "on the Earth the scene lies",
-                     cfg->n_stations);
-}
-
-static void check_platform(struct cfg_reader *rd, struct config *cfg)
-{
-    const struct config_platform *p = &cfg->platform;
-    if (!CFG_SOUND(rd, 0, "platform.kind") || !cfg_check_platform_keys(rd, p)) return;
-    if (p->kind == PLATFORM_LIVE && cfg->loop.pace == PACE_FAST)
-        cfg_fail_key(rd, "loop.pace", 0, "the poses of a live platform come in real time; allowed realtime, step");
-    if (p->kind != PLATFORM_TRAJECTORY && p->kind != PLATFORM_STOPS) return;
-    if ((p->file[0] != '\0') == (p->waypoints[0] != '\0') && CFG_SOUND(rd, 0, "platform.file", "platform.waypoints"))
-        cfg_fail_key(rd, p->file[0] != '\0' ? "platform.waypoints" : "platform.kind", 0,
-                     "a trajectory comes from one file; allowed either platform.file or platform.waypoints");
-    check_part(rd, cfg);
-}
-
 static const char *offset_of(const struct config *cfg)
 {
     if (cfg->instrument.transit_offset_m == 0.0 && cfg->instrument.mirror_offset_m == 0.0) return NULL;
@@ -163,7 +158,11 @@ const char *config_beam_moves(const struct config *cfg)
     int moves = cfg->platform.kind != PLATFORM_STATIC;
     for (uint32_t i = 0; i < cfg->scene.n_meshes; i++)
         moves |= config_mesh_moves(&cfg->scene.mesh[i]);
-    return moves ? "the head or a mesh moves" : offset_of(cfg);
+    if (moves) return "the head or a mesh moves";
+    for (uint32_t i = 0; i < cfg->n_stations; i++)
+        if (cfg->station[i].tripod.given && cfg->station[i].tripod.legs)
+            return "a tripod's legs (stations[].tripod.legs) have outlines that are not looked for";
+    return offset_of(cfg);
 }
 
 const char *config_rays_move(const struct config *cfg)
@@ -235,18 +234,30 @@ static void check_time(struct cfg_reader *rd, const struct config *cfg)
                      "float");
 }
 
+static void check_target(struct cfg_reader *rd, const struct config *cfg)
+{
+    if (cfg_is_given(rd, "scene.target.others", 0) && cfg->scene.target.n_objects == 0)
+        cfg_fail_key(rd, "scene.target.others", 0, "but there are no scene.target.objects; allowed with objects");
+    for (uint32_t i = 0; i < cfg->scene.target.n_objects; i++)
+        if (cfg->scene.target.object[i][0] == '\0')
+            cfg_fail_key(rd, "scene.target.objects[]", i, "empty; allowed a name, with * and ?");
+}
+
 void cfg_check(struct cfg_reader *rd, struct config *cfg)
 {
     cfg_check_emitter_settings(rd, cfg);
     cfg_check_rate(rd, cfg);
     check_limits(rd, cfg);
     check_head(rd, cfg);
+    cfg_limit_range(rd, cfg);
     for (uint32_t i = 0; i < cfg->scene.n_meshes; i++)
         check_mesh(rd, &cfg->scene.mesh[i], i);
+    check_target(rd, cfg);
     cfg_check_places(rd, cfg);
+    cfg_check_tripods(rd, cfg);
     check_names(rd, cfg);
     check_output(rd, cfg);
-    check_platform(rd, cfg);
+    cfg_check_platform(rd, cfg);
     cfg_check_links(rd, cfg);
     cfg_check_link_protocols(rd, cfg);
     check_beam(rd, cfg);
@@ -254,4 +265,5 @@ void cfg_check(struct cfg_reader *rd, struct config *cfg)
     check_loop(rd, cfg);
     check_time(rd, cfg);
     cfg_check_signal(rd, cfg);
+    cfg_take_scan_settings(cfg);
 }

@@ -190,11 +190,55 @@ static const char *given_line_key(const struct cfg_reader *rd)
     return cfg_is_given(rd, "head.line_start_deg", 0) ? "head.line_start_deg" : "head.line_stop_deg";
 }
 
+int cfg_line_has_width(const struct config *cfg)
+{
+    const struct head_settings *s = &cfg->head.settings;
+    const int round = cfg->profile.emitter.kind == EMITTER_SPHERE;
+    return round ? s->line_start_udeg != s->line_stop_udeg : s->line_start_udeg < s->line_stop_udeg;
+}
+
+static const char *const of_sphere[] = {"head.step_deg", "head.ring_start_deg", "head.ring_stop_deg"};
+
+/* The step and the rings that the configuration asks for. With many pulses a line the fastest line rate falls: no more
+ * pulses a second than any head may have. */
+static void set_sphere_settings(struct cfg_reader *rd, struct config *cfg)
+{
+    struct config_profile *p = &cfg->profile;
+    struct config_head *h = &cfg->head;
+    struct sh_err why;
+    if (!CFG_SOUND(rd, 0, "head.step_deg", "head.ring_start_deg", "head.ring_stop_deg")) return;
+    if (cfg_is_given(rd, "head.step_deg", 0)) {
+        emitter_set_sphere(&p->emitter, h->step_udeg);
+        const int64_t most_uhz = (int64_t)(1e6 * PRR_MOST_HZ) / p->emitter.steps;
+        if (p->lines_max_uhz > most_uhz) p->lines_max_uhz = most_uhz;
+        if (!cfg_is_given(rd, "head.lines_hz", 0)) h->settings.lines_uhz = p->lines_max_uhz;
+        set_rates(rd, "head.step_deg", p);
+        if (!cfg_is_given(rd, "head.prr_hz", 0)) h->settings.prr_uhz = p->prr_max_uhz;
+    }
+    if (h->ring_start_udeg > h->ring_stop_udeg)
+        cfg_fail_key(rd, cfg_is_given(rd, of_sphere[2], 0) ? of_sphere[2] : of_sphere[1], 0,
+                     "the rings go from %.15g to %.15g deg; allowed a ring_start_deg of at most %.15g, or a "
+                     "ring_stop_deg of at least %.15g",
+                     from_micro(h->ring_start_udeg), from_micro(h->ring_stop_udeg), from_micro(h->ring_stop_udeg),
+                     from_micro(h->ring_start_udeg));
+    else if (emitter_set_rings(&p->emitter, h->ring_start_udeg, h->ring_stop_udeg, &why) != SH_OK)
+        cfg_fail_key(rd, cfg_is_given(rd, of_sphere[2], 0) ? of_sphere[2] : of_sphere[1], 0, "%.300s", why.text);
+}
+
+static void refuse_sphere_settings(struct cfg_reader *rd, const struct config *cfg)
+{
+    for (size_t i = 0; i < CFG_LEN(of_sphere); i++)
+        if (cfg_is_given(rd, of_sphere[i], 0))
+            cfg_fail_key(rd, of_sphere[i], 0, "head profile %s has emitter: %s; allowed only with emitter: sphere",
+                         cfg->profile.name, emitter_names[cfg->profile.emitter.kind]);
+}
+
 void cfg_check_emitter_settings(struct cfg_reader *rd, struct config *cfg)
 {
     struct head_settings *s = &cfg->head.settings;
     const enum emitter_kind kind = cfg->profile.emitter.kind;
-    const uint32_t n = cfg->profile.emitter.steps;
+    if (rd->profile_read && kind == EMITTER_SPHERE) set_sphere_settings(rd, cfg);
+    if (rd->profile_read && kind != EMITTER_SPHERE) refuse_sphere_settings(rd, cfg);
     if (!rd->profile_read || kind == EMITTER_LINE) return;
     check_instrument(rd, cfg);
     if (kind == EMITTER_BEAMS && cfg->head.ambiguity != DETECT_AMBIGUITY_NONE)
@@ -203,6 +247,7 @@ void cfg_check_emitter_settings(struct cfg_reader *rd, struct config *cfg)
     if (kind == EMITTER_DIRECTIONS && (s->line_start_udeg != 0 || s->line_stop_udeg != cfg->profile.fov_max_udeg))
         cfg_fail_key(rd, given_line_key(rd), 0, "head profile %s has a list of directions; allowed without it",
                      cfg->profile.name);
+    const uint32_t n = cfg->profile.emitter.steps;
     if (n == 0 || !CFG_SOUND(rd, 0, "head.lines_hz", "head.prr_hz")) return;
     if (s->lines_uhz < cfg->profile.lines_min_uhz || s->lines_uhz > cfg->profile.lines_max_uhz) return;
     const int64_t prr_uhz = s->lines_uhz * n;

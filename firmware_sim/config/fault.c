@@ -6,12 +6,9 @@
 #include "firmware_sim/base/nearest.h"
 #include "firmware_sim/config/table.h"
 
-/* Puts a fault in the order of its place; the last one makes room. */
-static int add(struct cfg_reader *rd, int code, int line, const char *text)
+/* The last one makes room. */
+int cfg_add_fault(struct config_faults *faults, uint64_t place, int code, const char *text)
 {
-    struct config_faults *faults = rd->faults;
-    const uint64_t source = line == CFG_FROM_SET ? 1 : rd->table.keys == cfg_profile_table.keys ? 2 : 0;
-    const uint64_t place = source << 32 | (uint32_t)line;
     uint32_t at = faults->n < CONFIG_MAX_FAULTS ? faults->n : CONFIG_MAX_FAULTS;
     faults->n++;
     while (at > 0 && faults->place[at - 1] > place)
@@ -22,6 +19,12 @@ static int add(struct cfg_reader *rd, int code, int line, const char *text)
     memmove(&faults->place[at + 1], &faults->place[at], after * sizeof faults->place[0]);
     faults->place[at] = place;
     return sh_fail(&faults->fault[at], code, "%s", text);
+}
+
+static int add(struct cfg_reader *rd, int code, int line, const char *text)
+{
+    const uint64_t source = line == CFG_FROM_SET ? 1 : rd->table.keys == cfg_profile_table.keys ? 2 : 0;
+    return cfg_add_fault(rd->faults, source << 32 | (uint32_t)line, code, text);
 }
 
 static int fail(struct cfg_reader *rd, int code, int line, const char *name, const char *fmt, va_list ap)
@@ -56,11 +59,11 @@ int cfg_fail(struct cfg_reader *rd, int line, const char *name, const char *fmt,
 
 int cfg_fail_value(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, const char *fmt, ...)
 {
-    char name[CFG_PATH_MAX];
+    char name[2 * CFG_PATH_MAX];
     va_list ap;
     rd->bad[cfg_row(rd, key)][item] = 1;
     va_start(ap, fmt);
-    int code = fail(rd, SH_EINPUT, line, cfg_name(key->path, item, name), fmt, ap);
+    int code = fail(rd, SH_EINPUT, line, cfg_full_name(rd, key, item, name), fmt, ap);
     va_end(ap);
     return code;
 }
@@ -99,12 +102,17 @@ int cfg_are_sound(const struct cfg_reader *rd, uint32_t item, const char *const 
 int cfg_fail_key(struct cfg_reader *rd, const char *path, uint32_t item, const char *fmt, ...)
 {
     const struct cfg_key *key = cfg_find(&rd->table, path);
-    char name[CFG_PATH_MAX];
+    char name[2 * CFG_PATH_MAX], of[2 * CFG_PATH_MAX + 48];
     va_list ap;
     if (is_bad(rd, path, item)) return SH_EINPUT;
     rd->bad[cfg_row(rd, key)][item] = 1;
+    cfg_full_name(rd, key, item, name);
+    if (rd->scanner >= 0 && !rd->own[cfg_row(rd, key)]) { /* two things that don't fit, one of them the scanner's */
+        snprintf(of, sizeof of, "%s, for stations[%d].scanner", name, rd->scanner);
+        snprintf(name, sizeof name, "%.190s", of);
+    }
     va_start(ap, fmt);
-    int code = fail(rd, SH_EINPUT, cfg_where(rd, key, item), cfg_name(path, item, name), fmt, ap);
+    int code = fail(rd, SH_EINPUT, cfg_where(rd, key, item), name, fmt, ap);
     va_end(ap);
     return code;
 }
@@ -152,14 +160,17 @@ int cfg_fail_unknown(struct cfg_reader *rd, int line, const char *parent, uint32
 {
     /* Far more faults than are shown come from a hostile file: they cost no search of the table each. */
     if (rd->faults->n >= 10 * CONFIG_MAX_FAULTS) return cfg_fail(rd, line, "configuration", "unknown key");
-    char known[256] = "", section[CFG_PATH_MAX], hint[CFG_PATH_MAX], shown[CFG_SHOW_MAX], name[2 * CFG_PATH_MAX];
+    char known[256] = "", section[CFG_PATH_MAX], hint[CFG_PATH_MAX], shown[CFG_SHOW_MAX], name[3 * CFG_PATH_MAX];
+    char before[32] = "";
+    if (rd->in_scanner) snprintf(before, sizeof before, "stations[%d].scanner.", rd->scanner);
     for (size_t i = 0; i < rd->table.n; i++) {
-        const char *here = cfg_word_below(rd->table.keys[i].path, parent);
+        const char *path = rd->table.keys[i].path, *here = cfg_word_below(path, parent);
         size_t used = strlen(known);
-        if (here != NULL) snprintf(known + used, sizeof known - used, "%s%s", used > 0 ? ", " : "", here);
+        if (here != NULL && (!rd->in_scanner || cfg_is_of_scanner(path)))
+            snprintf(known + used, sizeof known - used, "%s%s", used > 0 ? ", " : "", here);
     }
     cfg_name(parent, item, section);
-    snprintf(name, sizeof name, "%s%s%s", section, section[0] != '\0' ? "." : "", cfg_show(word, shown));
+    snprintf(name, sizeof name, "%s%s%s%s", before, section, section[0] != '\0' ? "." : "", cfg_show(word, shown));
     const struct cfg_key *near = suggest(&rd->table, parent, word);
     if (near == NULL) return cfg_fail(rd, line, name, "unknown key; allowed %s", known);
     rd->bad[cfg_row(rd, near)][strstr(near->path, "[]") != NULL ? item : 0] = 1;

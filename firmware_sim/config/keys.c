@@ -14,6 +14,7 @@
 #define KEY(member)        #member, IN_CONFIG(member)
 #define MESH(member)       "scene.meshes[]." #member, CFG_MEMBER(struct config_mesh, member)
 #define STATION(member)    "stations[]." #member, IN_STATION(member)
+#define TRIPOD(member)      "stations[].tripod." #member, IN_STATION(tripod.member)
 #define LINK(member)       "links[]." #member, CFG_MEMBER(struct link_spec, member)
 #define RULE(member)       "surfaces[]." #member, CFG_MEMBER(struct surface_rule, member)
 #define SURFACE(member)    "surfaces[]." #member, CFG_MEMBER(struct surface_rule, surface.member)
@@ -47,11 +48,25 @@ static const struct cfg_key config_keys[] = {
      WITHIN("fov_min_deg", "fov_max_deg"), .help = "First line angle cast: 0 forward, 90 up, above 90 backward. Of a planar head: from its front step, in the "
              "direction of its steps; of beams and spheres an azimuth, 0 to 360."},
     {"head.line_stop_deg", SETTING(line_stop_udeg), CFG_MICRO, "deg", "@fov_max_deg",
-     WITHIN("fov_min_deg", "fov_max_deg"), .help = "Last line angle cast; above the first one."},
+     WITHIN("fov_min_deg", "fov_max_deg"), .help = "Last line angle cast; above the first one, but of a sphere: 350 to 10 goes across 0."},
+    {"head.step_deg", IN_CONFIG(head.step_udeg), CFG_MICRO, "deg", "", 0.01, 90, .example = "0.1",
+     .help = "sphere: from pulse to pulse and from ring to ring, in place of the profile's. Rounded to whole steps of a turn "
+             "and of half a turn, which is said."},
+    {"head.ring_start_deg", IN_CONFIG(head.ring_start_udeg), CFG_MICRO, "deg", "-90", -90, 90,
+     .help = "sphere: elevation of the lowest ring. Rings outside of the limits are no lines and cost no time."},
+    {"head.ring_stop_deg", IN_CONFIG(head.ring_stop_udeg), CFG_MICRO, "deg", "90", -90, 90,
+     .help = "sphere: elevation of the highest ring. As ring_start_deg: one ring, a circle, at just that elevation."},
     {"head.pan_start_deg", SETTING(pan_start_udeg), CFG_MICRO, "deg", "@pan_min_deg",
      WITHIN("pan_min_deg", "pan_max_deg"), .help = "Pan angle where a frame starts."},
     {"head.pan_stop_deg", SETTING(pan_stop_udeg), CFG_MICRO, "deg", "@pan_max_deg",
      WITHIN("pan_min_deg", "pan_max_deg"), .help = "Pan angle where a frame ends; at most a turn after its start."},
+    {KEY(head.range_min_m), CFG_REAL, "m", "@range_min_m", 0, 1e5,
+     .allowed = "range_min_m to range_max_m of the head profile, in m",
+     .help = "Nothing nearer is an echo: such pulses are shots without echo. It holds at every pulse rate, where the "
+             "profile doesn't have a larger one."},
+    {KEY(head.range_max_m), CFG_REAL, "m", "@range_max_m", 0, 1e5,
+     .allowed = "range_min_m to range_max_m of the head profile, in m",
+     .help = "Nothing farther is an echo, likewise. The descriptor on the wire has these limits."},
     {"head.frames", SETTING(frames), CFG_COUNT, NULL, "1", 0, HEAD_MAX_FRAMES,
      .help = "Frames (pan sweeps, or turns of a head without a pan) per scan; 0: until stopped."},
     {"head.station", SETTING(station), CFG_COUNT, NULL, "1", 1, CONFIG_MAX_STOPS,
@@ -104,6 +119,16 @@ static const struct cfg_key config_keys[] = {
     {MESH(cycle_s), CFG_REAL, "s", "0", 0, 86400,
      .help = "The motion goes back and forth within this time; 0: it goes on."},
 
+    {"scene.target", .type = CFG_MAP, .help = "What of the meshes is scanned; without objects all of them."},
+    {"scene.target.objects", .type = CFG_LIST, .min = 0, .max = CONFIG_MAX_OBJECTS,
+     LIST_OF(scene.target.object, scene.target.n_objects), .help = "Objects by name."},
+    {"scene.target.objects[]", 0, SCENE_NAME_LEN, CFG_TEXT, .def = "", .example = "Wall*",
+     .help = "Name; * and ? stand for others, as in a shell. It must fit an object."},
+    {KEY(scene.target.others), CFG_ENUM, .def = "left_out",
+     WORDS([OTHERS_LEFT_OUT] = "left_out", [OTHERS_HIDE] = "hide"),
+     .help = "All other objects. left_out: they are no part of the scene, so they give no points and hide nothing; hide: they "
+             "hide what is behind them; a pulse that meets them is a shot without echo."},
+
     {"scene.anchor", .type = CFG_MAP, .help = "How the scene lies on the Earth; all stations follow from it."},
     {KEY(scene.anchor.source), CFG_ENUM, .def = "none",
      WORDS([ANCHOR_NONE] = "none", [ANCHOR_EXPLICIT] = "explicit", [ANCHOR_IFC] = "ifc", [ANCHOR_UTM] = "utm",
@@ -154,12 +179,33 @@ static const struct cfg_key config_keys[] = {
     {STATION(northing_m), CFG_REAL, "m", "", -1e7, 2e7, .example = "5438800", .help = "Northing; with easting_m."},
     {STATION(ecef_m), CFG_VEC3, "m", "", -1e7, 1e7, .example = "[4138400, 613700, 4798000]", .help = "The head's origin in ECEF, WGS 84: X, Y, Z."},
 
+    {"stations[].tripod", .type = CFG_MAP,
+     .help = "What the head stands on. Its legs open as the head is lowered; what is below the head between them is hidden."},
+    {TRIPOD(leg_m), CFG_REAL, "m", "", 0.01, 100, .example = "1.8",
+     .help = "Length of a leg. Required with the other keys. Opening, from the vertical: its cosine is the top's height above "
+             "the ground divided by leg_m."},
+    {TRIPOD(opening_min_deg), CFG_REAL, "deg", "15", 0, 89,
+     .help = "Smallest opening. Where the head is higher than the legs then reach, the tripod hovers, which is a warning."},
+    {TRIPOD(head_above_m), CFG_REAL, "m", "0", 0, 100, .help = "The head's origin above the tripod's top."},
+    {TRIPOD(cone), CFG_ENUM, .def = "auto",
+     WORDS([CHOICE_AUTO] = "auto", [CHOICE_OFF] = "off", [CHOICE_ON] = "on"),
+     .help = "Pulses closer to straight down than the opening are shots without echo. auto: on where legs is off."},
+    {TRIPOD(legs), CFG_BOOL, .def = "off",
+     .help = "Three legs as a mesh: they hide what is behind them, and points on them have the object tripod, material leg."},
+    {TRIPOD(leg_diameter_m), CFG_REAL, "m", "0.03", 0.001, 1, .help = "legs: of a leg, a prism of six sides, from edge to edge."},
+    {TRIPOD(legs_heading_deg), CFG_REAL, "deg", "0", -360, 360,
+     .help = "legs: where the first one goes, clockwise from the scene's y axis; the others follow by 120 deg."},
+    {"stations[].scanner", 0, sizeof(struct config_station), CFG_MAP, .example = "{}",
+     .help = "A scanner of its own at this station: sections head, beam, cast, plan, noise, signal, surfaces, optics, "
+             "instrument with keys that differ from the file's. With a head.profile of its own, nothing of the file's "
+             "head and instrument holds for it. --set stations.1.scanner.head.lines_hz=10 works, too."},
+
     {"platform", .type = CFG_MAP, .help = "What the head stands on: a tripod, or something that moves."},
     {KEY(platform.kind), CFG_ENUM, .def = "static",
      WORDS([PLATFORM_STATIC] = "static", [PLATFORM_TRAJECTORY] = "trajectory", [PLATFORM_LIVE] = "live",
            [PLATFORM_STOPS] = "stops"),
      .help = "static: at the station; trajectory: along a file; stops: standing at some of its poses, which are the "
-             "scan's stations; live: as a peer says, by UDP or, with pace step, by TIME:STEP."},
+             "scan's stations, or without a file at the stations themselves, while meshes move; live: as a peer says, by UDP or, with pace step, by TIME:STEP."},
     {KEY(platform.file), CFG_PATH, .def = "", .example = "path.csv",
      .help = "trajectory, stops: CSV with t_s,x_m,y_m,z_m,roll_deg,pitch_deg,heading_deg (or qw,qx,qy,qz), scene "
              "frame."},
@@ -170,9 +216,17 @@ static const struct cfg_key config_keys[] = {
      .help = "trajectory, stops: where a scan, or the first stop, is on the trajectory: seconds after its first "
              "sample."},
     {KEY(platform.end_s), CFG_REAL, "s", "0", 0, 1e9,
-     .help = "trajectory, stops: where it ends, likewise; at the last sample when not given."},
+     .help = "trajectory, stops: where it ends, likewise; at the last sample when not given. Required for stops without "
+             "a trajectory."},
     {KEY(platform.step_s), CFG_REAL, "s", "0", 0, 1e9,
-     .help = "stops: time from each stop to the next, up to end_s. Required with kind: stops."},
+     .help = "stops: time from each stop to the next, up to end_s. Required with kind: stops, unless frames_per_s is."},
+    {KEY(platform.frames_per_s), CFG_REAL, "1/s", "0", 0, 1e6, .example = "25",
+     .help = "stops: first_frame, last_frame and frame_step say when they are, in place of start_s, end_s and step_s. "
+             "Frame 0 is at the trajectory's first sample, or at time 0. The points' frame scalar counts so, too."},
+    {KEY(platform.first_frame), CFG_REAL, NULL, "0", 0, 1e9, .help = "stops, with frames_per_s: the first one."},
+    {KEY(platform.last_frame), CFG_REAL, NULL, "0", 0, 1e9,
+     .help = "stops, with frames_per_s: none is after it; the trajectory's last sample when not given."},
+    {KEY(platform.frame_step), CFG_REAL, NULL, "1", 1e-6, 1e9, .help = "stops, with frames_per_s: from each to the next."},
     {KEY(platform.at_end), CFG_ENUM, .def = "stop", WORDS([PLATFORM_STOP] = "stop", [PLATFORM_HOLD] = "hold"),
      .help = "trajectory: at its end the scan stops, or the platform holds its last pose."},
     {KEY(platform.mount_m), CFG_VEC3, "m", "[0, 0, 0]", -1000, 1000,
@@ -212,6 +266,20 @@ static const struct cfg_key config_keys[] = {
     {KEY(output.attributes), CFG_BOOL, .def = "off",
      .help = "on: each points frame is followed by one with amplitude (needs signal.model: on) and width of its "
              "echoes, 4 bytes a point; .ply and .las recordings have them."},
+    {KEY(output.colour), CFG_ENUM, .def = "none",
+     WORDS([COLOUR_NONE] = "none", [COLOUR_SOLID] = "solid", [COLOUR_RANGE] = "range", [COLOUR_HEIGHT] = "height",
+           [COLOUR_REFLECTANCE] = "reflectance", [COLOUR_LABEL] = "label", [COLOUR_FRAME] = "frame",
+           [COLOUR_TEXTURE] = "texture"),
+     .help = "Colours of points. Other than none: each points frame is followed by one of 3 bytes a point; recordings "
+             "have them. range, height, frame (of a trajectory): red, yellow, green, blue between two limits; "
+             "reflectance: grey, -30 to 0 dB; label: a hue for each surface; texture: the texel that is hit, where "
+             "there is none the mesh's colour, or else grey."},
+    {KEY(output.colour_rgb), CFG_VEC3, NULL, "[255, 255, 255]", 0, 255,
+     .help = "The colour of colour: solid: red, green and blue, whole numbers."},
+    {KEY(output.colour_limits), CFG_PAIR, NULL, "", -1e9, 1e9, .example = "[0, 30]",
+     .help = "Limits of colour: range (m), height (m, z of the scene's frame) or frame. Not given: a stream takes the "
+             "head's range limits, the scene's lowest and highest point, the first and last frame of the trajectory; a "
+             "recording the smallest and largest figure in it."},
     {KEY(output.scale_m), CFG_REAL, "m", "0", 0, 1, .allowed = "0 (automatic) or 1e-6 to 1 m",
      .help = "Metres per count of a range; a count of a coordinate is no larger. The largest range must fit into 32 "
              "bits, a coordinate into 31. automatic: 1e-6 m up to 4294 m of range (geo: 2147 m), then ten times as "
@@ -222,8 +290,8 @@ static const struct cfg_key config_keys[] = {
     {"links[]", .type = CFG_MAP, .help = "A link."},
     {LINK(type), CFG_ENUM, .example = "tcp",
      WORDS([LINK_NULL] = "null", [LINK_FILE] = "file", [LINK_PTY] = "pty", [LINK_TCP] = "tcp", [LINK_USB] = "usb",
-           [LINK_UDP] = "udp"),
-     .help = "Kind of link."},
+           [LINK_UDP] = "udp", [LINK_WEB] = "web"),
+     .help = "Kind of link; web: a page for a browser, which shows the scan and sets the head."},
     {LINK(protocol), CFG_ENUM, .def = "native",
      WORDS([PROTOCOL_NATIVE] = "native", [PROTOCOL_NMEA] = "nmea", [PROTOCOL_SCIP] = "scip", [PROTOCOL_COLA] = "cola",
            [PROTOCOL_VELODYNE] = "velodyne", [PROTOCOL_VELODYNE_POSITION] = "velodyne-position",
@@ -235,16 +303,20 @@ static const struct cfg_key config_keys[] = {
      .help = "pty: symbolic link to the terminal (optional); file: file to write (required); usbredir: Unix socket, "
              "instead of a port."},
     {LINK(address), CFG_TEXT, .def = "", .example = "127.0.0.1",
-     .help = "tcp, usb: address to listen on, or with attach to connect to; udp: where the packets go. 127.0.0.1 when "
+     .help = "tcp, usb, web: address to listen on, or with attach to connect to; udp: where the packets go. 127.0.0.1 when "
              "not given."},
     {LINK(port), CFG_COUNT, NULL, "0", 0, 65535,
-     .help = "tcp, usb: port; 0: the system chooses; usbip, when not given: 3240. udp: the receiver's (required)."},
+     .help = "tcp, usb, web: port; 0: the system chooses; usbip, when not given: 3240. udp: the receiver's (required)."},
     {LINK(interface), CFG_TEXT, .def = "", .example = "eth1",
      .help = "udp: the packets' source is this interface's address. Required where they are broadcast, to "
              "255.255.255.255 or to its own broadcast address. Routes still say where packets to other addresses go: "
              "to bind a socket to an interface takes a privilege."},
     {LINK(max_sessions), CFG_COUNT, NULL, "4", 1, LINK_MAX_SESSIONS,
-     .help = "tcp: clients at a time; scip, when not given: 1."},
+     .help = "tcp, web: clients at a time; scip, when not given: 1."},
+    {LINK(waits), CFG_ENUM, .def = "by-type",
+     WORDS([LINK_WAITS_BY_TYPE] = "by-type", [LINK_WAITS_YES] = "yes", [LINK_WAITS_NO] = "no"),
+     .help = "Whether a reader that can't follow holds back the paces fast and step; no: it loses frames, as in real "
+             "time. by-type: those of web links lose, all others hold back."},
     {LINK(backend), CFG_ENUM, .def = "usbip",
      WORDS([USB_BACKEND_USBIP] = "usbip", [USB_BACKEND_USBREDIR] = "usbredir", [USB_BACKEND_FUNCTIONFS] = "functionfs"),
      .help = "usb: how the device reaches a host."},
@@ -288,6 +360,13 @@ static const struct cfg_key config_keys[] = {
      .help = "Memory that the maps of all stations may take together, also while they are made. Directions that don't "
              "fit are left to the BVH."},
 
+    {"coverage", .type = CFG_MAP, .help = "How `scanhead coverage` cuts the scene's surface."},
+    {KEY(coverage.cell_m), CFG_REAL, "m", "0.25", 1e-4, 1e4,
+     .help = "Size of a cell. A cell is seen where a pulse meets it, so it should be several times as wide as the points "
+             "are apart."},
+    {KEY(coverage.memory_mib), CFG_REAL, "MiB", "2048", 1, 1048576,
+     .help = "Memory that cells, or a mesh of them, may take. Cells too small for that are refused."},
+
     {"plan", .type = CFG_MAP,
      .help = "Tolerances. Each stage uses the cheapest method that holds them (`scanhead plan`)."},
     {"plan.tolerance_m", IN_CONFIG(plan.range_m), CFG_REAL, "m", "1e-3", 1e-6, 1,
@@ -301,6 +380,9 @@ static const struct cfg_key config_keys[] = {
      WORDS([RANGE_NOISE_OFF] = "off", [RANGE_NOISE_ON] = "on", [RANGE_NOISE_SIGNAL] = "signal"),
      .help = "Range noise. on: the profile's range_sigma_m and ppm, for any target; signal: that figure holds at "
              "range_sigma_at_m, and noise grows as the signal fades (signal.model: on); off: exact ranges."},
+    {KEY(noise.sigma_m), CFG_REAL, "m", "@range_sigma_m", 0, 10,
+     .help = "One sigma of the range noise, its fixed part, in place of the profile's range_sigma_m. With a signal model "
+             "at least the profile's range_sigma_floor_m."},
     {KEY(noise.angle), CFG_BOOL, .def = "off",
      .help = "Angle noise of the profile's mirror_sigma_deg and pan_sigma_deg: the beam deviates, the encoders do not "
              "show it."},

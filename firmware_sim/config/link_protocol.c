@@ -11,8 +11,8 @@ static const struct {
     const char *allowed;
 } ways[PROTOCOL_N] = {
     [PROTOCOL_NATIVE] = {1u << LINK_NULL | 1u << LINK_FILE | 1u << LINK_PTY | 1u << LINK_TCP | 1u << LINK_USB |
-                             1u << LINK_FD,
-                         "null, file, pty, tcp, usb"},
+                             1u << LINK_FD | 1u << LINK_WEB,
+                         "null, file, pty, tcp, usb, web"},
     [PROTOCOL_NMEA] = {1u << LINK_NULL | 1u << LINK_FILE | 1u << LINK_PTY | 1u << LINK_TCP | 1u << LINK_UDP,
                        "null, file, pty, tcp, udp"},
     [PROTOCOL_SCIP] = {1u << LINK_PTY | 1u << LINK_TCP | 1u << LINK_USB | 1u << LINK_FD, "pty, tcp, usb"},

@@ -76,8 +76,20 @@ static void check_surface(struct cfg_reader *rd, uint32_t i, const struct surfac
                      sum);
 }
 
+static void check_sigma(struct cfg_reader *rd, struct config *cfg)
+{
+    const double least_m = cfg->profile.range_sigma_floor_m;
+    if (!rd->profile_read || !CFG_SOUND(rd, 0, "noise.sigma_m")) return;
+    if (cfg->signal.on && cfg_is_given(rd, "noise.sigma_m", 0) && cfg->noise.sigma_m < least_m)
+        cfg_fail_key(rd, "noise.sigma_m", 0,
+                     "%.10g is below range_sigma_floor_m of head profile %s; allowed %.10g to 10 m", cfg->noise.sigma_m,
+                     cfg->profile.name, least_m);
+    cfg->profile.range_sigma_m = cfg->noise.sigma_m;
+}
+
 static void check_noise(struct cfg_reader *rd, struct config *cfg)
 {
+    check_sigma(rd, cfg);
     if (!cfg_is_given(rd, "noise.ball.seed", 0)) cfg->noise.ball.seed = cfg->noise.seed;
     if (cfg->noise.range == RANGE_NOISE_SIGNAL && !cfg->signal.on && CFG_SOUND(rd, 0, "signal.model"))
         cfg_fail_key(rd, "noise.range", 0, "signal, but no signal is modelled; allowed with signal.model: on");

@@ -59,10 +59,10 @@ static void check_link(struct cfg_reader *rd, struct config *cfg, uint32_t i)
 {
     static const struct owned_key keys[] = {
         {"links[].path", 1u << LINK_FILE | 1u << LINK_PTY | 1u << LINK_USB},
-        {"links[].address", 1u << LINK_TCP | 1u << LINK_USB | 1u << LINK_UDP},
-        {"links[].port", 1u << LINK_TCP | 1u << LINK_USB | 1u << LINK_UDP},
+        {"links[].address", 1u << LINK_TCP | 1u << LINK_USB | 1u << LINK_UDP | 1u << LINK_WEB},
+        {"links[].port", 1u << LINK_TCP | 1u << LINK_USB | 1u << LINK_UDP | 1u << LINK_WEB},
         {"links[].interface", 1u << LINK_UDP},
-        {"links[].max_sessions", 1u << LINK_TCP},
+        {"links[].max_sessions", 1u << LINK_TCP | 1u << LINK_WEB},
         {"links[].backend", 1u << LINK_USB},
         {"links[].attach", 1u << LINK_USB},
         {"links[].udc", 1u << LINK_USB},
@@ -71,14 +71,15 @@ static void check_link(struct cfg_reader *rd, struct config *cfg, uint32_t i)
         {"links[].pid", 1u << LINK_USB},
         {"links[].serial", 1u << LINK_USB},
     };
-    static const char *const has[] = {[LINK_NULL] = "type, protocol",
-                                      [LINK_FILE] = "type, path, protocol",
-                                      [LINK_PTY] = "type, path, protocol",
-                                      [LINK_TCP] = "type, address, port, max_sessions, protocol",
+    static const char *const has[] = {[LINK_NULL] = "type, waits, protocol",
+                                      [LINK_FILE] = "type, path, waits, protocol",
+                                      [LINK_PTY] = "type, path, waits, protocol",
+                                      [LINK_TCP] = "type, address, port, max_sessions, waits, protocol",
                                       [LINK_USB] =
                                           ("type, backend, address, port, path, attach, udc, speed, vid, pid, serial, "
-                                           "protocol"),
-                                      [LINK_UDP] = "type, address, port, interface, protocol"};
+                                           "waits, protocol"),
+                                      [LINK_UDP] = "type, address, port, interface, waits, protocol",
+                                      [LINK_WEB] = "type, address, port, max_sessions, waits, protocol"};
     struct link_spec *link = &cfg->link[i];
     char owner[64];
     if (!CFG_SOUND(rd, i, "links[].type")) return;
@@ -109,6 +110,10 @@ int cfg_check_platform_keys(struct cfg_reader *rd, const struct config_platform 
         {"platform.start_s", 1u << PLATFORM_TRAJECTORY | 1u << PLATFORM_STOPS},
         {"platform.end_s", 1u << PLATFORM_TRAJECTORY | 1u << PLATFORM_STOPS},
         {"platform.step_s", 1u << PLATFORM_STOPS},
+        {"platform.frames_per_s", 1u << PLATFORM_STOPS},
+        {"platform.first_frame", 1u << PLATFORM_STOPS},
+        {"platform.last_frame", 1u << PLATFORM_STOPS},
+        {"platform.frame_step", 1u << PLATFORM_STOPS},
         {"platform.at_end", 1u << PLATFORM_TRAJECTORY},
         {"platform.reach_m", 1u << PLATFORM_LIVE},
         {"platform.extrapolate_ms", 1u << PLATFORM_LIVE},
@@ -123,7 +128,8 @@ int cfg_check_platform_keys(struct cfg_reader *rd, const struct config_platform 
         [PLATFORM_STATIC] = "kind alone; the station says where the head stands",
         [PLATFORM_TRAJECTORY] = "file or waypoints, start_s, end_s, at_end, mount_...",
         [PLATFORM_LIVE] = "reach_m, extrapolate_ms, address, port, mount_...",
-        [PLATFORM_STOPS] = "file or waypoints, start_s, end_s, step_s, mount_...",
+        [PLATFORM_STOPS] =
+            "file or waypoints, start_s, end_s, step_s, frames_per_s, first_frame, last_frame, frame_step, mount_...",
     };
     char owner[64];
     snprintf(owner, sizeof owner, "a %s platform", cfg_word(rd, "platform.kind", (int)p->kind));

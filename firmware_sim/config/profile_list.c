@@ -150,7 +150,8 @@ static void put_emitter(const struct cfg_reader *rd, const struct config_profile
     if (c->kind == EMITTER_BEAMS)
         fprintf(out, "%u beam%s, %.10g ns a sequence, %s", c->n_beams, c->n_beams == 1 ? "" : "s",
                 from_micro(c->firing_fs), turn_of(p));
-    if (c->kind == EMITTER_SPHERE) fprintf(out, "%u pulses a ring, %u rings", p->emitter.steps, p->emitter.rings);
+    if (c->kind == EMITTER_SPHERE)
+        fprintf(out, "%u pulses a ring, %u rings; any step by head.step_deg", p->emitter.steps, p->emitter.rings);
     if (c->kind == EMITTER_DIRECTIONS) fprintf(out, "%u directions", p->emitter.steps);
     fprintf(out, "; %s lines/s\n", span(from_micro(p->lines_min_uhz), from_micro(p->lines_max_uhz), lines));
 }

@@ -13,6 +13,7 @@ void cfg_reader_init(struct cfg_reader *rd, const char *file, const struct cfg_t
     rd->base = base;
     rd->faults = faults;
     rd->root_line = 1;
+    rd->scanner = -1;
 }
 
 const struct cfg_key *cfg_find(const struct cfg_table *table, const char *path)
@@ -61,6 +62,17 @@ const char *cfg_name(const char *path, uint32_t item, char *buf)
         snprintf(buf, CFG_PATH_MAX, "%s", path);
     else
         snprintf(buf, CFG_PATH_MAX, "%.*s[%u]%s", (int)(bracket - path), path, item, bracket + 2);
+    return buf;
+}
+
+const char *cfg_full_name(const struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, char *buf)
+{
+    char name[CFG_PATH_MAX];
+    cfg_name(key->path, item, name);
+    if (rd->own[cfg_row(rd, key)])
+        snprintf(buf, 2 * CFG_PATH_MAX, "stations[%d].scanner.%s", rd->scanner, name);
+    else
+        snprintf(buf, 2 * CFG_PATH_MAX, "%s", name);
     return buf;
 }
 

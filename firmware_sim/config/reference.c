@@ -14,10 +14,10 @@ static const char PROFILE[] = "profile";
 static const char *type_name(const struct cfg_key *key)
 {
     static const char *const names[] = {
-        [CFG_MAP] = "section",       [CFG_LIST] = "list",          [CFG_BOOL] = "switch",
-        [CFG_ENUM] = "word",         [CFG_COUNT] = "whole number", [CFG_MICRO] = "number, exact to 1e-6",
-        [CFG_REAL] = "number",       [CFG_TEXT] = "text",          [CFG_PATH] = "path",
-        [CFG_VEC3] = "three numbers"};
+        [CFG_MAP] = "section",        [CFG_LIST] = "list",          [CFG_BOOL] = "switch",
+        [CFG_ENUM] = "word",          [CFG_COUNT] = "whole number", [CFG_MICRO] = "number, exact to 1e-6",
+        [CFG_REAL] = "number",        [CFG_TEXT] = "text",          [CFG_PATH] = "path",
+        [CFG_VEC3] = "three numbers", [CFG_PAIR] = "two numbers"};
     return names[key->type];
 }
 
@@ -160,7 +160,10 @@ static const char *value_of(const struct cfg_key *key, const struct config_profi
     if (text == NULL) return "";
     snprintf(buf, len, "%s", text);
     if (text[0] == '@') {
-        snprintf(buf, len, "%.15g", 1e-6 * (double)cfg_figure(profile, text + 1));
+        if (key->type == CFG_REAL)
+            snprintf(buf, len, "%.15g", cfg_real_figure(profile, text + 1));
+        else
+            snprintf(buf, len, "%.15g", 1e-6 * (double)cfg_figure(profile, text + 1));
     } else if (key->type == CFG_PATH && is_needed(key) && cfg_find_shared(text, shared) &&
                (whole = realpath(shared, NULL)) != NULL) {
         snprintf(buf, len, "%s", whole);
@@ -178,18 +181,22 @@ static void print_example_key(const struct cfg_key *key, const struct config_pro
     const char *dot = strrchr(key->path, '.'), *word = dot != NULL ? dot + 1 : key->path;
     const int is_element = strcmp(word + strlen(word) - 2, "[]") == 0;
     const char *hidden = (is_section ? has_needed(key->path) : is_needed(key)) ? "" : "#";
-    if (is_element) {
+    if (is_element && is_section) {
         fprintf(out, "%s%*s-\n", hidden, indent, "");
         return;
     }
     if (is_section) {
-        fprintf(out, "%s%s%*s%s:\n", indent == 0 ? "\n" : "", hidden, indent, "", word);
+        fprintf(out, "%s%s%*s%s:%s%s\n", indent == 0 ? "\n" : "", hidden, indent, "", word,
+                key->example != NULL ? " " : "", key->example != NULL ? key->example : "");
         print_wrapped(key->help, indent + 2, "# ", out);
         return;
     }
     snprintf(help, sizeof help, "%s (%s)", key->help, cfg_allowed(key, profile, allowed));
     print_wrapped(help, indent, "# ", out);
-    fprintf(out, "%s%*s%s: %s\n", hidden, indent, "", word, value_of(key, profile, value, sizeof value));
+    if (is_element)
+        fprintf(out, "%s%*s- %s\n", hidden, indent, "", value_of(key, profile, value, sizeof value));
+    else
+        fprintf(out, "%s%*s%s: %s\n", hidden, indent, "", word, value_of(key, profile, value, sizeof value));
 }
 
 int config_print_example(FILE *out, struct sh_err *err)

@@ -55,6 +55,11 @@ static int fail_unknown(struct cfg_reader *rd, struct set *set)
     *(dot == NULL ? parent : dot) = '\0';
     /* Below something that is no section nothing is known: then the top is listed. */
     const struct cfg_key *section = cfg_find(&rd->table, parent);
+    if (rd->in_scanner && strncmp(set->path, "surfaces.", 9) == 0)
+        return cfg_fail(rd, CFG_FROM_SET, set->name, "surfaces of a scanner are a list; allowed in the file alone");
+    if (rd->in_scanner && (section == NULL || section->type != CFG_MAP))
+        return cfg_fail_unknown(rd, CFG_FROM_SET, "", 0, set->path);
+    if (rd->in_scanner) return cfg_fail_unknown(rd, CFG_FROM_SET, parent, 0, word);
     if (parent[0] != '\0' && (section == NULL || section->type != CFG_MAP))
         return cfg_fail_unknown(rd, CFG_FROM_SET, "", 0, set->name);
     return cfg_fail_unknown(rd, CFG_FROM_SET, parent, set->item, word);
@@ -93,11 +98,37 @@ static int take_name(struct cfg_reader *rd, const char *text, const char *equals
     return SH_OK;
 }
 
+static const char SCANNER[] = "stations[].scanner";
+
+/* "stations[].scanner.head.prr_hz": 1 where it is this scanner's turn, and the path is that of the key there. */
+static int enter_scanner(struct cfg_reader *rd, struct set *set)
+{
+    const size_t len = strlen(SCANNER);
+    const struct cfg_key *section = cfg_find(&rd->table, SCANNER), *list = cfg_find(&rd->table, "stations");
+    if (!rd->in_scanner) {
+        if (reach_item(rd, set, list) != SH_OK) return 0;
+        ((struct config_station *)cfg_address(rd, section, set->item))->has_scanner = 1;
+        rd->line[cfg_row(rd, section)][set->item] = CFG_FROM_SET;
+        return 0;
+    }
+    if (rd->scanner != (int)set->item) return 0;
+    memmove(set->path, set->path + len + 1, strlen(set->path + len + 1) + 1);
+    set->item = 0;
+    const struct cfg_key *key = cfg_find(&rd->table, set->path);
+    if (key == NULL || cfg_is_of_scanner(set->path)) return 1;
+    cfg_fail(rd, CFG_FROM_SET, set->name, "the same for all scanners; allowed %s", cfg_sections_of_scanner);
+    return 0;
+}
+
 void cfg_apply_set(struct cfg_reader *rd, const char *text)
 {
     struct set set = {.item = 0};
     const char *equals = strchr(text, '=');
+    const int told = rd->in_scanner; /* whatever is wrong with a key's name, with the file's own keys */
+    if (told && (equals == NULL || equals == text || strncmp(text, "stations", 8) != 0)) return;
     if (take_name(rd, text, equals, &set) != SH_OK) return;
+    const int is_scanners = strncmp(set.path, SCANNER, strlen(SCANNER)) == 0 && set.path[strlen(SCANNER)] == '.';
+    if (is_scanners ? !enter_scanner(rd, &set) : rd->in_scanner) return;
     const struct cfg_key *key = cfg_find(&rd->table, set.path);
     if (key == NULL) {
         fail_unknown(rd, &set);
@@ -110,6 +141,7 @@ void cfg_apply_set(struct cfg_reader *rd, const char *text)
     }
     const struct cfg_key *list = cfg_list_of(&rd->table, key);
     if (list != NULL && reach_item(rd, &set, list) != SH_OK) return;
+    if (is_scanners) cfg_take_over(rd, key);
     rd->line[cfg_row(rd, key)][set.item] = CFG_FROM_SET;
     cfg_store(rd, key, set.item, CFG_FROM_SET, equals + 1, "");
 }

@@ -13,8 +13,8 @@
 
 enum cfg_type {
     CFG_MAP,   /* a section, or one element of a list; nothing is stored */
-    CFG_LIST,  /* offset, size: the array and its stride; count_offset: uint32_t; min..max elements. The next row,
-                * of type CFG_MAP, is an element. */
+    CFG_LIST,  /* offset, size: the array and its stride; count_offset: uint32_t; min..max elements. The next row is an
+                * element: of type CFG_MAP, or of CFG_TEXT. */
     CFG_BOOL,  /* off|on -> int */
     CFG_ENUM,  /* names[value] -> int or enum; false and true are read as off and on here, too */
     CFG_COUNT, /* whole number -> 4 or 8 bytes */
@@ -23,6 +23,7 @@ enum cfg_type {
     CFG_TEXT,  /* char[size] */
     CFG_PATH,  /* char[size]; relative to the file it stands in, to the working directory in --set */
     CFG_VEC3,  /* [x, y, z] -> double[3] */
+    CFG_PAIR,  /* [low, high] -> double[2] */
 };
 
 enum cfg_flags {
@@ -32,7 +33,7 @@ enum cfg_flags {
     CFG_NEEDED = 8, /* has no default that does in most configurations: the example gives it a value */
 };
 
-enum { CFG_MAX_ROWS = 192, CFG_MAX_ITEMS = 128, CFG_PATH_MAX = 96, CFG_FROM_SET = -1 };
+enum { CFG_MAX_ROWS = 256, CFG_MAX_ITEMS = 128, CFG_PATH_MAX = 96, CFG_FROM_SET = -1 };
 
 struct cfg_key {
     const char *path;
@@ -79,6 +80,10 @@ struct cfg_reader {
     const struct config_profile *profile;            /* for the limits in errors; NULL: not known */
     unsigned char from[CFG_MAX_ROWS][CFG_MAX_ITEMS]; /* of figures: 1 + enum config_from; 0: not given */
     struct config_faults *faults;
+    /* The scanner of a station (scanner.c): */
+    int scanner;                     /* station, from 0, whose section `scanner` counts; -1: none */
+    int in_scanner;                  /* that section is being read: paths begin there */
+    unsigned char own[CFG_MAX_ROWS]; /* 1: given there, so named so in faults */
 };
 
 /* ---- reader.c: rows and places */
@@ -94,6 +99,8 @@ void *cfg_address(const struct cfg_reader *rd, const struct cfg_key *key, uint32
 const char *cfg_word(const struct cfg_reader *rd, const char *path, int value);
 /* "stations[].name", 2 -> "stations[2].name". buf holds CFG_PATH_MAX. */
 const char *cfg_name(const char *path, uint32_t item, char *buf);
+/* The same with "stations[1].scanner." before it where the row was given there. buf holds 2 * CFG_PATH_MAX. */
+const char *cfg_full_name(const struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, char *buf);
 int cfg_is_given(const struct cfg_reader *rd, const char *path, uint32_t item);
 /* The line of a key, or of the nearest section around it that was given. */
 int cfg_where(const struct cfg_reader *rd, const struct cfg_key *key, uint32_t item);
@@ -137,6 +144,11 @@ enum cfg_number cfg_parse_decimal(const char *text, int decimals, __int128 *out)
 /* Stores one scalar; base_dir (with its '/', may be empty) is put before relative paths. */
 int cfg_store(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, const char *text,
               const char *base_dir);
+/* How many numbers a key of CFG_VEC3 or CFG_PAIR has. */
+static inline int cfg_axes(const struct cfg_key *key)
+{
+    return key->type == CFG_PAIR ? 2 : 3;
+}
 int cfg_store_vec3(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, int axis,
                    const char *text);
 /* "allowed 1 to 5 Hz": what a row takes. profile gives the limits that depend on it; NULL: those of all
@@ -150,7 +162,30 @@ const char *cfg_dir_of(const char *path, char *buf);
  * faults. */
 /* SH_OK, or the code of a fault that leaves nothing to check: no file, no YAML, no section. */
 int cfg_read_file(struct cfg_reader *rd);
+/* The same; the document stays open for the scanner. NULL after an error. */
+struct cfg_document;
+int cfg_open_file(struct cfg_reader *rd, struct cfg_document **doc);
+void cfg_close_file(struct cfg_document *doc);
+/* The section `scanner` of rd->scanner, over what was read. */
+void cfg_read_scanner(struct cfg_reader *rd, struct cfg_document *doc);
+/* Sets of the file's own keys, with in_scanner those of the scanner; the others are passed over. */
 void cfg_apply_set(struct cfg_reader *rd, const char *set);
+/* scanner.c: whether a scanner may have the section, or the key in it ... */
+int cfg_is_of_scanner(const char *path);
+extern const char cfg_sections_of_scanner[];
+/* ... which is about to be read there: what the file has of it counts no more. */
+void cfg_take_over(struct cfg_reader *rd, const struct cfg_key *key);
+/* All of the scanner was read: with a profile of its own it has the file's head no more. */
+void cfg_end_scanner(struct cfg_reader *rd);
+/* A list is as if nothing had been given. */
+void cfg_forget_list(struct cfg_reader *rd, const char *path);
+/* Loads for the scanner of a station, from 1; 0: of head.station. Faults are added to those there are. */
+int cfg_load_for(const char *path, const char *const *sets, int n_sets, uint32_t station, struct config *cfg,
+                 struct config_faults *faults);
+/* Loads the scanners of the other stations, adds their faults, and says in cfg who has which. */
+void cfg_check_scanners(struct config *cfg, struct config_faults *faults);
+/* Adds a fault in the order of its place. */
+int cfg_add_fault(struct config_faults *faults, uint64_t place, int code, const char *text);
 /* A key that is not given and has no default. */
 void cfg_fail_missing(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item);
 /* Values for what was not given or is bad, errors for what must be. profile may be NULL. */
@@ -163,12 +198,15 @@ int cfg_shared_path(int i, const char *name, char *buf);
 int cfg_find_shared(const char *name, char *buf);
 /* A figure of a profile that is written in 1e-6 units. */
 int64_t cfg_figure(const struct config_profile *profile, const char *path);
+double cfg_real_figure(const struct config_profile *profile, const char *path);
 /* Finds and reads the profile that head.profile names (cfg->profile_file holds the name, then the path). */
 void cfg_load_profile(struct cfg_reader *rd, struct config *cfg);
 /* Everything that concerns more than one key, as far as these were read well. */
 void cfg_check(struct cfg_reader *rd, struct config *cfg);
 /* places.c: the anchor, and the forms of a station's place. */
 void cfg_check_places(struct cfg_reader *rd, struct config *cfg);
+/* tripod.c: the tripods of stations. */
+void cfg_check_tripods(struct cfg_reader *rd, struct config *cfg);
 /* measurement.c: noise, signal, surfaces, and what of a profile concerns them. */
 void cfg_check_signal(struct cfg_reader *rd, struct config *cfg);
 void cfg_check_reaches(struct cfg_reader *rd, struct config_profile *profile);
@@ -186,6 +224,12 @@ extern const char *const cfg_from_names[];
 void cfg_check_emitter(struct cfg_reader *rd, struct config_profile *profile);
 /* Whether profiles of some emitters need the key; then `words` names these. */
 int cfg_needed_by_emitter(const struct cfg_key *key, char *words, size_t len);
+/* Whether a line has an angle to go: from start up to stop, of a sphere also across azimuth 0. */
+int cfg_line_has_width(const struct config *cfg);
+/* range.c: head.range_min_m and range_max_m, which then hold for the profile in cfg and its programs. */
+void cfg_limit_range(struct cfg_reader *rd, struct config *cfg);
+/* Ranges, noise and step as settings of a scan, which commands may change. Once all of them are checked. */
+void cfg_take_scan_settings(struct config *cfg);
 /* The settings of a head whose pulse rate follows from its lines. */
 void cfg_check_emitter_settings(struct cfg_reader *rd, struct config *cfg);
 /* owned.c: keys that only some kinds of link have, and what a link needs. */
@@ -195,6 +239,8 @@ void cfg_set_usb_serial(struct cfg_reader *rd, const struct config *cfg, struct 
 void cfg_set_usb_look(struct cfg_reader *rd, struct link_spec *link, uint32_t item);
 /* The same for keys of platforms. Returns whether all of them belong to this kind. */
 int cfg_check_platform_keys(struct cfg_reader *rd, const struct config_platform *platform);
+/* platform.c: the platform's keys with each other. Sets seconds from frames. */
+void cfg_check_platform(struct cfg_reader *rd, struct config *cfg);
 /* link_protocol.c: what the protocols of links need. */
 void cfg_check_link_protocols(struct cfg_reader *rd, struct config *cfg);
 /* Whether the protocol has words for a head of this emitter. */

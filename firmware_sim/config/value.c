@@ -81,6 +81,13 @@ int64_t cfg_figure(const struct config_profile *profile, const char *path)
     return value;
 }
 
+double cfg_real_figure(const struct config_profile *profile, const char *path)
+{
+    double value;
+    memcpy(&value, (const char *)profile + cfg_find(&cfg_profile_table, path)->offset, sizeof value);
+    return value;
+}
+
 /* A limit that a profile gives: its own figure, or what any profile may have. */
 static void profile_limit(const char *path, double any, const struct config_profile *profile, char *buf)
 {
@@ -90,7 +97,10 @@ static void profile_limit(const char *path, double any, const struct config_prof
 static void allowed_range(const struct cfg_key *key, const struct config_profile *profile, char *buf)
 {
     char low[64], high[64];
-    const char *kind = key->type == CFG_COUNT ? "a whole number, " : key->type == CFG_VEC3 ? "[x, y, z], each " : "";
+    const char *kind = key->type == CFG_COUNT  ? "a whole number, "
+                       : key->type == CFG_VEC3 ? "[x, y, z], each "
+                       : key->type == CFG_PAIR ? "[low, high], each "
+                                               : "";
     snprintf(low, sizeof low, "%.10g", key->min);
     snprintf(high, sizeof high, "%.10g", key->max);
     if (key->type == CFG_COUNT && key->max >= 0x1p64) snprintf(high, sizeof high, "%" PRIu64, UINT64_MAX);
@@ -237,23 +247,25 @@ static int store_text(const struct place *at, char *dst, const char *text, const
 /* "[1, 2, 3]", "1,2,3": from --set and defaults. */
 static int store_vec3_text(struct place *at, const char *text)
 {
+    const int last = cfg_axes(at->key) - 1;
+    const char *wrong = last == 1 ? "not [low, high]" : "not [x, y, z]";
     char part[CFG_SHOW_MAX];
     const char *p = text;
     int closed = *p == '[';
     p += closed;
-    for (int axis = 0; axis < 3; axis++) {
+    for (int axis = 0; axis <= last; axis++) {
         p += strspn(p, " ");
-        size_t len = strcspn(p, axis < 2 ? " ," : " ]");
-        if (len == 0 || len >= sizeof part) return refuse(at, text, "not [x, y, z]");
+        size_t len = strcspn(p, axis < last ? " ," : " ]");
+        if (len == 0 || len >= sizeof part) return refuse(at, text, wrong);
         memcpy(part, p, len);
         part[len] = '\0';
         p += len;
         p += strspn(p, " ");
-        if (axis < 2 && *p++ != ',') return refuse(at, text, "not [x, y, z]");
+        if (axis < last && *p++ != ',') return refuse(at, text, wrong);
         int code = cfg_store_vec3(at->rd, at->key, at->item, at->line, axis, part);
         if (code != SH_OK) return code;
     }
-    return strcmp(p, closed ? "]" : "") == 0 ? SH_OK : refuse(at, text, "not [x, y, z]");
+    return strcmp(p, closed ? "]" : "") == 0 ? SH_OK : refuse(at, text, wrong);
 }
 
 int cfg_store_vec3(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, int axis,
@@ -281,6 +293,7 @@ int cfg_store(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, i
     case CFG_PATH:
         return store_text(&at, dst, text, base_dir);
     case CFG_VEC3:
+    case CFG_PAIR:
         return store_vec3_text(&at, text);
     default:
         return refuse(&at, text, "not what belongs here");

@@ -1,25 +1,16 @@
 /* YAML to the struct, by the table. libyaml's document API keeps the line of each node. */
-#include "core/infile.h"
-#include "firmware_sim/config/table.h"
+#include "firmware_sim/config/yaml.h"
 
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <yaml.h>
-
-enum { FILE_MAX = 1 << 20, MAX_DEPTH = 16, MAX_ANCHORS = 256 };
 
 struct walk {
     struct cfg_reader *rd;
     yaml_document_t *doc;
+    const yaml_node_t **scanner; /* as above, filled in */
     char base_dir[CONFIG_PATH_LEN];
 };
-
-static int line_of(const yaml_node_t *node)
-{
-    return (int)node->start_mark.line + 1;
-}
 
 static const char *text_of(const yaml_node_t *node)
 {
@@ -49,7 +40,7 @@ static int has_tag(const yaml_node_t *node)
 static int wrong_kind(const struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
 {
     char allowed[CFG_ALLOWED_MAX];
-    return cfg_fail_value(w->rd, key, item, line_of(node), "here stands %s; %s", kind_of(node),
+    return cfg_fail_value(w->rd, key, item, cfg_line_of(node), "here stands %s; %s", kind_of(node),
                           cfg_allowed(key, w->rd->profile, allowed));
 }
 
@@ -66,14 +57,14 @@ static int check_scalar(const struct walk *w, const struct cfg_key *key, uint32_
     if (!is_text && !plain) why = "a text in quotes or of several lines";
     if (has_tag(node)) why = "a value with a tag, which is not supported";
     if (why == NULL) return SH_OK;
-    return cfg_fail_value(w->rd, key, item, line_of(node), "\"%s\" is %s; %s", cfg_show(text_of(node), shown), why,
+    return cfg_fail_value(w->rd, key, item, cfg_line_of(node), "\"%s\" is %s; %s", cfg_show(text_of(node), shown), why,
                           cfg_allowed(key, w->rd->profile, allowed));
 }
 
 static void read_scalar(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
 {
     if (check_scalar(w, key, item, node) == SH_OK)
-        cfg_store(w->rd, key, item, line_of(node), text_of(node), w->base_dir);
+        cfg_store(w->rd, key, item, cfg_line_of(node), text_of(node), w->base_dir);
 }
 
 static void read_vec3(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
@@ -84,15 +75,15 @@ static void read_vec3(struct walk *w, const struct cfg_key *key, uint32_t item, 
         return;
     }
     const yaml_node_item_t *first = node->data.sequence.items.start, *top = node->data.sequence.items.top;
-    if (top - first != 3) {
-        cfg_fail_value(w->rd, key, item, line_of(node), "has %td numbers instead of 3; %s", top - first,
-                       cfg_allowed(key, w->rd->profile, allowed));
+    if (top - first != cfg_axes(key)) {
+        cfg_fail_value(w->rd, key, item, cfg_line_of(node), "has %td numbers instead of %d; %s", top - first,
+                       cfg_axes(key), cfg_allowed(key, w->rd->profile, allowed));
         return;
     }
-    for (int axis = 0; axis < 3; axis++) {
+    for (int axis = 0; axis < cfg_axes(key); axis++) {
         const yaml_node_t *number = yaml_document_get_node(w->doc, first[axis]);
         if (check_scalar(w, key, item, number) == SH_OK)
-            cfg_store_vec3(w->rd, key, item, line_of(number), axis, text_of(number));
+            cfg_store_vec3(w->rd, key, item, cfg_line_of(number), axis, text_of(number));
     }
 }
 
@@ -117,7 +108,7 @@ static void refuse_part(struct walk *w, const struct cfg_key *key, uint32_t item
     char allowed[CFG_ALLOWED_MAX] = "a text in one line";
     for (size_t i = 0, used = 0; words != NULL && words[i] != NULL && used < sizeof allowed; i++)
         used += (size_t)snprintf(allowed + used, sizeof allowed - used, "%s%s", i > 0 ? ", " : "", words[i]);
-    cfg_fail_value(w->rd, key, item, line_of(node), "\"%s\" must say %s; allowed %s", figure_parts[part],
+    cfg_fail_value(w->rd, key, item, cfg_line_of(node), "\"%s\" must say %s; allowed %s", figure_parts[part],
                    part == FIGURE_FROM         ? "where the figure is from"
                    : part == FIGURE_DEFINITION ? "how the width is defined"
                                                : "it in words",
@@ -161,14 +152,14 @@ static void read_figure(struct walk *w, const struct cfg_key *key, uint32_t item
     static const char form[] = "allowed { value: V, from: data sheet }, or from: quoted, from: assumed";
     int given[FIGURE_PARTS] = {0};
     if (node->type != YAML_MAPPING_NODE) {
-        cfg_fail_value(w->rd, key, item, line_of(node), "here stands %s; %s", kind_of(node), form);
+        cfg_fail_value(w->rd, key, item, cfg_line_of(node), "here stands %s; %s", kind_of(node), form);
         return;
     }
     for (const yaml_node_pair_t *pair = node->data.mapping.pairs.start; pair < node->data.mapping.pairs.top; pair++) {
         const yaml_node_t *word = yaml_document_get_node(w->doc, pair->key);
         const int part = word_of(word, figure_parts);
         if (part < 0 || given[part]++ || (part == FIGURE_DEFINITION && key->definitions == NULL)) {
-            cfg_fail_value(w->rd, key, item, line_of(word),
+            cfg_fail_value(w->rd, key, item, cfg_line_of(word),
                            "a key that is unknown or given twice; %s, then source, note%s", form,
                            key->definitions != NULL ? ", definition" : "");
             return;
@@ -176,7 +167,7 @@ static void read_figure(struct walk *w, const struct cfg_key *key, uint32_t item
         read_part(w, key, item, (enum figure_part)part, yaml_document_get_node(w->doc, pair->value));
     }
     if (!given[FIGURE_VALUE] || !given[FIGURE_FROM])
-        cfg_fail_value(w->rd, key, item, line_of(node), "\"%s\" is missing; %s", given[0] ? "from" : "value", form);
+        cfg_fail_value(w->rd, key, item, cfg_line_of(node), "\"%s\" is missing; %s", given[0] ? "from" : "value", form);
 }
 
 static void read_map(struct walk *w, const yaml_node_t *node, const char *path, uint32_t item);
@@ -191,7 +182,7 @@ static void read_list(struct walk *w, const struct cfg_key *key, const yaml_node
     const yaml_node_item_t *first = node->data.sequence.items.start;
     ptrdiff_t n = node->data.sequence.items.top - first;
     if ((double)n > key->max) {
-        cfg_fail_value(w->rd, key, 0, line_of(node), "%td elements are too many; %s", n,
+        cfg_fail_value(w->rd, key, 0, cfg_line_of(node), "%td elements are too many; %s", n,
                        cfg_allowed(key, w->rd->profile, allowed));
         return;
     }
@@ -199,27 +190,40 @@ static void read_list(struct walk *w, const struct cfg_key *key, const yaml_node
     for (uint32_t i = 0; i < (uint32_t)n; i++) {
         const yaml_node_t *child = yaml_document_get_node(w->doc, first[i]);
         *cfg_list_count(w->rd, key) = i + 1;
-        w->rd->line[cfg_row(w->rd, element)][i] = line_of(child);
-        if (child->type == YAML_MAPPING_NODE)
+        w->rd->line[cfg_row(w->rd, element)][i] = cfg_line_of(child);
+        if (element->type != CFG_MAP)
+            read_scalar(w, element, i, child);
+        else if (child->type == YAML_MAPPING_NODE)
             read_map(w, child, element->path, i);
         else
             wrong_kind(w, element, i, child);
     }
 }
 
+/* Kept until it is known whose scanner is asked for. */
+static void keep_scanner(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
+{
+    struct config_station *station = cfg_address(w->rd, key, item);
+    if (node->type != YAML_MAPPING_NODE) wrong_kind(w, key, item, node);
+    station->has_scanner = node->type == YAML_MAPPING_NODE;
+    w->scanner[item] = station->has_scanner ? node : NULL;
+}
+
 static void read_value(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
 {
     if (node->type != YAML_SCALAR_NODE && has_tag(node)) {
-        cfg_fail_value(w->rd, key, item, line_of(node), "has a tag; allowed none");
+        cfg_fail_value(w->rd, key, item, cfg_line_of(node), "has a tag; allowed none");
     } else if (key->flags & CFG_FIGURE) {
         read_figure(w, key, item, node);
+    } else if (strcmp(key->path, "stations[].scanner") == 0) {
+        keep_scanner(w, key, item, node);
     } else if (key->type == CFG_MAP && node->type == YAML_MAPPING_NODE) {
         read_map(w, node, key->path, item);
     } else if (key->type == CFG_MAP) {
         wrong_kind(w, key, item, node);
     } else if (key->type == CFG_LIST) {
         read_list(w, key, node);
-    } else if (key->type == CFG_VEC3) {
+    } else if (key->type == CFG_VEC3 || key->type == CFG_PAIR) {
         read_vec3(w, key, item, node);
     } else {
         read_scalar(w, key, item, node);
@@ -238,7 +242,7 @@ static const struct cfg_key *row_below(const struct walk *w, const char *path, c
 static void read_pair(struct walk *w, const yaml_node_t *word, const yaml_node_t *value, const char *path,
                       uint32_t item)
 {
-    const int line = line_of(word);
+    const int line = cfg_line_of(word);
     if (word->type != YAML_SCALAR_NODE) {
         cfg_fail(w->rd, line, path[0] != '\0' ? path : "configuration", "a key that is %s; allowed words only",
                  kind_of(word));
@@ -249,6 +253,13 @@ static void read_pair(struct walk *w, const yaml_node_t *word, const yaml_node_t
         cfg_fail_unknown(w->rd, line, path, item, text_of(word));
         return;
     }
+    if (w->rd->in_scanner && !cfg_is_of_scanner(key->path)) {
+        char name[48 + CFG_PATH_MAX];
+        snprintf(name, sizeof name, "stations[%d].scanner.%s", w->rd->scanner, key->path);
+        cfg_fail(w->rd, line, name, "the same for all scanners; allowed %s", cfg_sections_of_scanner);
+        return;
+    }
+    if (w->rd->in_scanner) cfg_take_over(w->rd, key);
     int *given = &w->rd->line[cfg_row(w->rd, key)][item];
     if (*given != 0) {
         cfg_fail_value(w->rd, key, item, line, "given twice, first on line %d; allowed once", *given);
@@ -266,129 +277,33 @@ static void read_map(struct walk *w, const yaml_node_t *node, const char *path, 
                   item);
 }
 
-/* ---- the file */
+/* ---- the document */
 
-static int read_bytes(struct cfg_reader *rd, unsigned char **bytes, size_t *len)
+static void begin_walk(struct walk *w, struct cfg_reader *rd, struct cfg_document *doc)
 {
-    const char *why;
-    FILE *file = infile_open(rd->file, &why);
-    if (file == NULL) return cfg_fail_file(rd, SH_EINPUT, 0, "cannot be opened: %s; a YAML file is needed", why);
-    *bytes = malloc(FILE_MAX + 1);
-    int code = SH_OK;
-    if (*bytes == NULL) code = cfg_fail_file(rd, SH_ENOMEM, 0, "no memory to read it");
-    *len = code == SH_OK ? fread(*bytes, 1, FILE_MAX + 1, file) : 0;
-    if (code == SH_OK && ferror(file))
-        code = cfg_fail_file(rd, SH_EINPUT, 0, "cannot be read: %s; a YAML file is needed", strerror(errno));
-    if (code == SH_OK && *len > FILE_MAX)
-        code = cfg_fail_file(rd, SH_EINPUT, 0, "larger than 1 MiB; allowed up to 1048576 bytes");
-    fclose(file);
-    return code;
+    *w = (struct walk){.rd = rd, .doc = &doc->doc, .scanner = doc->scanner};
+    cfg_dir_of(rd->file, w->base_dir);
 }
 
-/* A line, counted from 1, in the bytes. */
-static int indented_by_tab(const unsigned char *bytes, size_t len, int line)
+int cfg_read_document(struct cfg_reader *rd, struct cfg_document *doc)
 {
-    const unsigned char *p = bytes, *end = bytes + len;
-    while (p < end && line > 1)
-        line -= *p++ == '\n';
-    while (p < end && *p == ' ')
-        p++;
-    return p < end && *p == '\t';
-}
-
-/* libyaml gives a mark for what it scans and parses, and a byte offset for bytes that are not UTF-8. */
-static int fail_syntax(struct cfg_reader *rd, const yaml_parser_t *parser, const unsigned char *bytes, size_t len)
-{
-    int line = (int)parser->problem_mark.line + 1;
-    if (parser->error == YAML_MEMORY_ERROR) return cfg_fail_file(rd, SH_ENOMEM, 0, "no memory to parse it");
-    if (parser->error == YAML_READER_ERROR) {
-        line = 1;
-        for (size_t i = 0; i < parser->problem_offset && i < len; i++)
-            line += bytes[i] == '\n';
-    }
-    const char *hint = indented_by_tab(bytes, len, line) ? "; indent with spaces, not with tabs" : "";
-    if (parser->error == YAML_READER_ERROR) hint = "; allowed UTF-8 text without control characters";
-    return cfg_fail_file(rd, SH_EINPUT, line, "not YAML: %s%s%s%s",
-                         parser->problem != NULL ? parser->problem : "unknown problem",
-                         parser->context != NULL ? " " : "", parser->context != NULL ? parser->context : "", hint);
-}
-
-/* A byte order mark is skipped here: libyaml would count it as a column and find the first line indented. */
-static int start_parser(struct cfg_reader *rd, yaml_parser_t *parser, const unsigned char *bytes, size_t len)
-{
-    size_t skip = len >= 3 && memcmp(bytes, "\xef\xbb\xbf", 3) == 0 ? 3 : 0;
-    if (!yaml_parser_initialize(parser)) return cfg_fail_file(rd, SH_ENOMEM, 0, "no memory to parse it");
-    yaml_parser_set_encoding(parser, YAML_UTF8_ENCODING);
-    yaml_parser_set_input_string(parser, bytes + skip, len - skip);
-    return SH_OK;
-}
-
-/* libyaml's scanner takes time with the square of the depth of "[[[[", and of the number of anchors: both are
- * bounded by a first pass over the events. What else is wrong is left to the second. */
-static int check_depth(struct cfg_reader *rd, const unsigned char *bytes, size_t len)
-{
-    yaml_parser_t parser;
-    yaml_event_t event;
-    int depth = 0, anchors = 0, done = 0;
-    int code = start_parser(rd, &parser, bytes, len);
-    if (code != SH_OK) return code;
-    while (code == SH_OK && !done && yaml_parser_parse(&parser, &event)) {
-        int line = (int)event.start_mark.line + 1;
-        done = event.type == YAML_STREAM_END_EVENT;
-        depth += event.type == YAML_SEQUENCE_START_EVENT || event.type == YAML_MAPPING_START_EVENT;
-        depth -= event.type == YAML_SEQUENCE_END_EVENT || event.type == YAML_MAPPING_END_EVENT;
-        anchors += (event.type == YAML_SCALAR_EVENT && event.data.scalar.anchor != NULL) ||
-                   (event.type == YAML_SEQUENCE_START_EVENT && event.data.sequence_start.anchor != NULL) ||
-                   (event.type == YAML_MAPPING_START_EVENT && event.data.mapping_start.anchor != NULL);
-        yaml_event_delete(&event);
-        if (depth > MAX_DEPTH)
-            code = cfg_fail_file(rd, SH_EINPUT, line, "nested too deep; allowed %d levels", MAX_DEPTH);
-        else if (anchors > MAX_ANCHORS)
-            code = cfg_fail_file(rd, SH_EINPUT, line, "too many anchors; allowed %d", MAX_ANCHORS);
-    }
-    yaml_parser_delete(&parser);
-    return code;
-}
-
-static int read_document(struct cfg_reader *rd, yaml_document_t *doc)
-{
-    struct walk w = {.rd = rd, .doc = doc};
-    const yaml_node_t *root = yaml_document_get_root_node(doc);
+    struct walk w;
+    const yaml_node_t *root = yaml_document_get_root_node(&doc->doc);
     if (root == NULL) return cfg_fail_file(rd, SH_EINPUT, 1, "empty; a section with keys is needed");
-    cfg_dir_of(rd->file, w.base_dir);
-    rd->root_line = line_of(root);
+    begin_walk(&w, rd, doc);
+    rd->root_line = cfg_line_of(root);
     if (root->type != YAML_MAPPING_NODE)
-        return cfg_fail_file(rd, SH_EINPUT, line_of(root), "here stands %s; allowed sections with keys", kind_of(root));
+        return cfg_fail_file(rd, SH_EINPUT, cfg_line_of(root), "here stands %s; allowed sections with keys",
+                             kind_of(root));
     read_map(&w, root, "", 0);
     return SH_OK;
 }
 
-static int read_documents(struct cfg_reader *rd, yaml_parser_t *parser, const unsigned char *bytes, size_t len)
+void cfg_read_scanner(struct cfg_reader *rd, struct cfg_document *doc)
 {
-    yaml_document_t doc, next;
-    if (!yaml_parser_load(parser, &doc)) return fail_syntax(rd, parser, bytes, len);
-    int code = read_document(rd, &doc);
-    yaml_document_delete(&doc);
-    if (code != SH_OK) return code;
-    if (!yaml_parser_load(parser, &next)) return fail_syntax(rd, parser, bytes, len);
-    const yaml_node_t *more = yaml_document_get_root_node(&next);
-    if (more != NULL) code = cfg_fail_file(rd, SH_EINPUT, line_of(more), "a second document; allowed one");
-    yaml_document_delete(&next);
-    return code;
-}
-
-int cfg_read_file(struct cfg_reader *rd)
-{
-    unsigned char *bytes = NULL;
-    size_t len = 0;
-    yaml_parser_t parser;
-    int code = read_bytes(rd, &bytes, &len);
-    if (code == SH_OK) code = check_depth(rd, bytes, len);
-    if (code == SH_OK) code = start_parser(rd, &parser, bytes, len);
-    if (code != SH_OK) goto free_bytes;
-    code = read_documents(rd, &parser, bytes, len);
-    yaml_parser_delete(&parser);
-free_bytes:
-    free(bytes);
-    return code;
+    struct walk w;
+    begin_walk(&w, rd, doc);
+    rd->in_scanner = 1;
+    if (doc->scanner[rd->scanner] != NULL) read_map(&w, doc->scanner[rd->scanner], "", 0);
+    rd->in_scanner = 0;
 }

@@ -8,7 +8,7 @@ static void change_settings(struct device *device)
 {
     if (!device->scan.on) return;
     struct schedule_spec spec;
-    site_fill_spec(device->site, &device->cmd.settings, &spec);
+    site_fill_spec(device->scan.site, &device->cmd.settings, &spec);
     schedule_change(&device->scan.segment, &device->scan.segment, &spec, device->scan.pulse_next);
     device->scan.describe = 1;
     device_push_event(device, NATIVE_EV_SETTINGS, device->scan.pulse_next, 0, 0, "");
@@ -25,6 +25,7 @@ static void stop(struct device *device, enum head_event event, uint64_t tick)
 static void carry_out(struct device *device, enum command_effect effect, uint64_t released)
 {
     switch (effect) {
+    case COMMAND_MOVE: /* begins it, and is carried out once it is planned */
     case COMMAND_SETTINGS:
         change_settings(device);
         break;
@@ -42,8 +43,16 @@ static void carry_out(struct device *device, enum command_effect effect, uint64_
         break;
     case COMMAND_STEP:
     case COMMAND_NONE:
+    case COMMAND_TAKE:
         break;
     }
+}
+
+/* A replayed journal moves stations itself. */
+static const char *why_fixed(const struct device *device, uint32_t session)
+{
+    const int replays = device->journal.at < device->journal.n_replay;
+    return session != 0 && replays ? "a journal is being replayed" : site_why_fixed(device->site);
 }
 
 /* once: the session does not keep control. */
@@ -53,6 +62,7 @@ static void do_command(struct device *device, uint32_t session, const char *line
     struct command_device *cmd = &device->cmd;
     cmd->state = device_visible_state(device, released);
     cmd->t_ns = (int64_t)released * device->tick_ns;
+    cmd->fixed = why_fixed(device, session);
     device_set_time_texts(device);
     command_execute(cmd, session, line, out);
     if (out->took_control && once)
@@ -61,7 +71,7 @@ static void do_command(struct device *device, uint32_t session, const char *line
         device_push_event(device, NATIVE_EV_CONTROL, session, 0, 0, "taken");
     if (out->error != 0)
         device_push_error(device, session, out->error, command_error_text(out->error));
-    else if (out->changes && device->journal.out != NULL && out->effect != COMMAND_STEP)
+    else if (out->changes && device->journal.out != NULL && out->effect != COMMAND_STEP && out->effect != COMMAND_MOVE)
         journal_write(device->journal.out, device->next_tick, cmd->t_ns, session, line);
     if (out->error == 0) carry_out(device, out->effect, released);
 }
@@ -71,6 +81,7 @@ void device_command(struct device *device, uint32_t session, const char *line, u
 {
     pthread_mutex_lock(&device->lock);
     do_command(device, session, line, released, 0, out);
+    if (out->effect == COMMAND_MOVE) device_begin_move(device, session, line, -1, out);
     pthread_mutex_unlock(&device->lock);
 }
 
@@ -122,11 +133,16 @@ void device_session_closed(struct device *device, uint32_t session, const char *
     if (in_control || scanning) device_report(device, CMD_E_CLIENT_LOST, text);
 }
 
-void device_run_replay(struct device *device, uint64_t tick)
+int device_run_replay(struct device *device, uint64_t tick)
 {
     while (device->journal.at < device->journal.n_replay && device->journal.replay[device->journal.at].tick <= tick) {
         const struct journal_entry *entry = &device->journal.replay[device->journal.at++];
         struct command_result result;
         do_command(device, 0, entry->line, (uint64_t)(entry->t_ns / device->tick_ns), 0, &result);
+        if (result.effect == COMMAND_MOVE) {
+            device_begin_move(device, entry->session, entry->line, entry->t_ns, &result);
+            return 1;
+        }
     }
+    return 0;
 }

@@ -18,6 +18,58 @@ static int check_live(const struct device *device, struct sh_err *err)
                    cfg->file, cfg->profile.name, SCHEDULE_PACKET * (double)device->tick_hz / (DEVICE_MAX_POSES - 3.0));
 }
 
+static int64_t to_nm(double m)
+{
+    return llround(1e9 * m);
+}
+
+/* Methods that were chosen by trying them on the scene, and the outlines of an adaptive beam, hold up to the range at
+ * power-up, and for less. */
+static int was_tried(const struct site *site)
+{
+    const struct config *cfg = site->cfg;
+    const int beam = config_has_footprint(cfg) && (cfg->beam.mode == BEAM_AUTO || cfg->beam.mode == BEAM_ADAPTIVE);
+    return beam || (site->detect.surfaces.has_optics && !cfg->optics.depth_given);
+}
+
+/* How near and how far commands may set the ranges: within the profile, with something left at each pulse rate. */
+static void set_range_limits(const struct site *site, struct head_limits *l)
+{
+    const struct config *cfg = site->cfg;
+    const struct config_profile *p = &cfg->profile;
+    double near_most_m = INFINITY, far_least_m = 0.0;
+    for (uint32_t i = 0; i < (p->n_programs > 0 ? p->n_programs : 1); i++) {
+        near_most_m = fmin(near_most_m, p->program[i].own_max_m);
+        far_least_m = fmax(far_least_m, p->program[i].own_min_m);
+    }
+    const int tried = was_tried(site);
+    l->range_min_nm = tried ? cfg->head.settings.range_min_nm : to_nm(cfg->head.profile_min_m);
+    l->range_max_nm = tried ? cfg->head.settings.range_max_nm : to_nm(cfg->head.profile_max_m);
+    l->near_most_nm = to_nm(near_most_m) - 1;
+    l->far_least_nm = to_nm(far_least_m) + 1;
+}
+
+static void set_noise_limits(const struct config *cfg, struct head_limits *l)
+{
+    static const double BALL_MOST_M = 100.0; /* as noise.ball.radius_m */
+    const int may_move = cfg->platform.kind == PLATFORM_STATIC || cfg->noise.ball.local;
+    l->noise_most = cfg->signal.on ? RANGE_NOISE_SIGNAL : RANGE_NOISE_ON;
+    l->angle_most = cfg->profile.mirror_sigma_deg > 0.0 || cfg->profile.pan_sigma_deg > 0.0;
+    l->sigma_min_nm = cfg->signal.on ? to_nm(cfg->profile.range_sigma_floor_m) : 0;
+    l->ball_max_nm = may_move ? to_nm(BALL_MOST_M) : 0;
+}
+
+static void set_pattern(const struct config *cfg, struct head_limits *l)
+{
+    const struct config_profile *p = &cfg->profile;
+    l->emitter = p->emitter.kind;
+    l->line_pulses = emitter_line_pulses(&p->emitter);
+    l->round = p->emitter.kind == EMITTER_SPHERE;
+    l->step_fixed = config_head_moves(&cfg->platform);
+    l->sweep_udeg = l->emitter == EMITTER_LINE ? llround(360e6 * p->optical_gain / p->facets) : 0;
+    l->sequence_ps = p->arrangement.firing_fs / 1000;
+}
+
 static int set_limits(struct device *device, struct sh_err *err)
 {
     const struct config *cfg = device->site->cfg;
@@ -32,10 +84,16 @@ static int set_limits(struct device *device, struct sh_err *err)
                                               .pan_min_udeg = p->pan_min_udeg,
                                               .pan_max_udeg = p->pan_max_udeg,
                                               .n_rates = p->n_programs,
-                                              .n_stations = device->site->n_stations,
-                                              .line_pulses = emitter_line_pulses(&p->emitter)};
+                                              .n_stations = device->site->n_stations};
+    set_pattern(cfg, &device->cmd.limits);
+    set_range_limits(device->site, &device->cmd.limits);
+    set_noise_limits(cfg, &device->cmd.limits);
+    device->cmd.can_plan = device_can_plan;
+    device->cmd.owner = device;
     for (uint32_t i = 0; i < p->n_programs; i++)
         device->cmd.limits.rate_uhz[i] = p->program[i].prr_uhz;
+    for (uint32_t i = 0; i < device->site->n_stations && i < 64; i++)
+        if (!config_serves(cfg, i)) device->cmd.limits.elsewhere |= (uint64_t)1 << i;
     device->cmd.settings = device->cmd.defaults = cfg->head.settings;
     int len = snprintf(device->idn, sizeof device->idn, "%s,%s,%s,scanhead native %d", p->maker, p->model,
                        cfg->head.serial, NATIVE_VERSION);
@@ -50,6 +108,9 @@ static int set_limits(struct device *device, struct sh_err *err)
     device->cmd.pose_allowed = cfg->platform.kind == PLATFORM_LIVE;
     memcpy(device->cmd.pose_centre_m, device->site->station[0].at.position_m, sizeof device->cmd.pose_centre_m);
     device->cmd.pose_reach_m = cfg->platform.reach_m;
+    device->cmd.fixed = site_why_fixed(device->site);
+    device->cmd.place = device->moves.place;
+    device->cmd.first_place = device->moves.first_place;
     return SH_OK;
 }
 
@@ -102,6 +163,7 @@ int device_create(const struct site *site, const struct device_options *options,
         device->end_tick = (uint64_t)ceil(options->duration_s * (double)device->tick_hz);
     device->station_scans = calloc(site->n_stations, sizeof *device->station_scans);
     int rc = device->station_scans != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory");
+    if (rc == SH_OK) rc = device_open_moves(device, err);
     if (rc == SH_OK) rc = set_limits(device, err);
     if (rc == SH_OK) rc = check_live(device, err);
     if (rc == SH_OK) rc = head_clock_create(site->cfg, &device->clock, err);
@@ -111,6 +173,7 @@ int device_create(const struct site *site, const struct device_options *options,
         device_free(device);
         return rc;
     }
+    if (site->cfg->loop.pace == PACE_REALTIME && options->replay != NULL) device_plan_ahead(device);
     device_before_scans(device);
     device_transition(device, HEAD_EV_POWER_ON, 0);
     *out = device;
@@ -136,8 +199,10 @@ void device_free(struct device *device)
 {
     if (device == NULL) return;
     journal_close(device->journal.out, NULL);
+    device_free_variants(device);
     free(device->journal.replay);
     free(device->station_scans);
+    device_close_moves(device);
     pthread_mutex_destroy(&device->lock);
     free(device);
 }
@@ -147,6 +212,21 @@ static int ends_scan(const struct device_work *work)
     for (uint32_t i = 0; i < work->n_events; i++)
         if (work->event[i].code == NATIVE_EV_SCAN_END) return 1;
     return 0;
+}
+
+/* Claims come one after the other: no tick passes while a station's new place is planned. */
+static void replay(struct device *device, uint64_t tick)
+{
+    struct command_result result;
+    while (device_run_replay(device, tick)) {
+        pthread_mutex_unlock(&device->lock);
+        device_plan_move(device);
+        pthread_mutex_lock(&device->lock);
+        device_take_move(device, device->moves.plan.t_ns, &result);
+        pthread_mutex_unlock(&device->lock);
+        device_end_move(device);
+        pthread_mutex_lock(&device->lock);
+    }
 }
 
 int device_claim(struct device *device, struct device_work *work)
@@ -162,10 +242,12 @@ int device_claim(struct device *device, struct device_work *work)
     int was_over = device->over;
     memset(work, 0, offsetof(struct device_work, event));
     work->describe = work->scanning = work->telemetry = work->cut_short = 0;
+    work->variant = NULL;
     work->surfaces_n = work->n_poses = 0;
     work->tick = tick;
     work->t_ns = (int64_t)tick * device->tick_ns;
-    device_run_replay(device, tick);
+    replay(device, tick);
+    device_use_site(device, work);
     device_run_timers(device, tick);
     device_say_overrun(device, tick);
     device_say_held(device, tick);
@@ -204,6 +286,7 @@ void device_end(struct device *device)
 {
     pthread_mutex_lock(&device->lock);
     device->ending = 1;
+    atomic_store(&device->moves.stops, 1);
     pthread_mutex_unlock(&device->lock);
 }
 

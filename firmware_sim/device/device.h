@@ -41,8 +41,9 @@ struct device_counters {
  * order of the members. */
 struct device_work {
     uint64_t tick;
-    int64_t t_ns;             /* device time at the tick's start */
-    uint32_t n_events_before; /* of event[]: those that go before the points; the others go after them */
+    struct device_version *version; /* where stations stand: device_site_of, until device_done; NULL: as at power-up */
+    int64_t t_ns;                   /* device time at the tick's start */
+    uint32_t n_events_before;       /* of event[]: those that go before the points; the others go after them */
     uint32_t n_events;
     struct native_event event[DEVICE_MAX_EVENTS];
     int describe, describe_flags; /* descriptor, emitter and anchor frames, with these flags */
@@ -52,7 +53,11 @@ struct device_work {
     struct native_anchor anchor;
     uint32_t surfaces_first, surfaces_n; /* names to send; 0: none */
     int scanning;
-    int64_t scan_t0_ns; /* device time of the scan's start */
+    /* That the scan is made with: that of the version, or one that is planned for its settings. It is there until
+     * device_done. */
+    const struct site *site;
+    struct device_variant *variant; /* NULL: that of the version */
+    int64_t scan_t0_ns;             /* device time of the scan's start */
     struct schedule_segment segment;
     uint32_t scan;              /* its number */
     uint64_t pulse0, pulse_end; /* pulses of this tick */
@@ -69,6 +74,7 @@ struct device_work {
 };
 
 struct device;
+struct device_version;
 
 struct device_options {
     int start;    /* scan at once when booted */
@@ -76,11 +82,12 @@ struct device_options {
     double
         duration_s; /* > 0: end the run after this time, from the first scan's start with `start`, else from power-up */
     double scan_s;  /* > 0: end each scan after this time, to the pulse */
-    const char *journal; /* NULL: none */
-    const char *replay;  /* NULL: none */
+    const char *journal;            /* NULL: none */
+    const char *replay;             /* NULL: none */
+    const struct sh_report *report; /* warnings of a station's new place, from the thread that plans it; NULL: none */
 };
 
-/* site must outlive the device. */
+/* site must outlive the device. What the device makes of it when stations move is freed with the device. */
 int device_create(const struct site *site, const struct device_options *options, struct device **out,
                   struct sh_err *err);
 void device_free(struct device *device);
@@ -96,6 +103,17 @@ int device_claim(struct device *device, struct device_work *work);
 /* A claimed tick was lost, and with it the pulses that it should have cast. They are counted. What else the
  * tick said is said again in a later one. */
 void device_lost(struct device *device, const struct device_work *work);
+/* The work is of no use any more, delivered or lost. Each that was claimed, once. Any thread; takes no lock. */
+void device_done(struct device_work *work);
+/* The site that a scan is made with, by the scan's number, for others than its works. NULL: that is not the scan at hand,
+ * or the last one, any more, or stations have moved since. It stays until device_let_go, before device_free; soon, once the
+ * scan is over. Takes the device's lock for a moment. Any thread. */
+struct device_held {
+    struct device_variant *variant;
+    struct device_version *version;
+};
+const struct site *device_hold_scan(struct device *device, uint32_t number, struct device_held *held);
+void device_let_go(struct device_held *held); /* holds nothing afterwards, as when all is 0 */
 /* True while nothing happens without a command. The pace `fast` waits then. */
 int device_is_idle(struct device *device);
 /* Ends the run: a running scan is stopped first. Async-signal-unsafe. */
@@ -116,6 +134,33 @@ void device_session_closed(struct device *device, uint32_t session, const char *
  * they are. Returns 0, or 1 for a pose that can't be used, which is counted: not later than the one before,
  * out of reach, or more than DEVICE_POSE_AHEAD_S ahead of device time (not in the pace step). */
 int device_pose(struct device *device, int64_t t_ns, const double v[6]);
+
+/* A command whose effect is COMMAND_MOVE has moved nothing yet. First device_plan_move: it takes as long as planning the
+ * station's new place takes (maps, beams), some milliseconds to seconds, without the device's lock, in any thread. Then
+ * device_finish_move: the station stands there from the next tick on, journalled, with an event; or the move is refused
+ * (-221) and nothing has changed. Either way *out has the reply. No other move and no scan begins in between. */
+void device_plan_move(struct device *device);
+void device_finish_move(struct device *device, uint64_t released, struct command_result *out);
+
+/* Where the stations are now. Any thread. */
+struct device_station {
+    char name[32];
+    struct site_place place;
+    int served;                        /* 0: it has another scanner */
+    int has_tripod;                    /* else the rest is 0 */
+    double leg_m;                      /* length of a leg */
+    double height_m;                   /* of the tripod's top above the ground; NaN: no ground below */
+    double opening_rad, foot_radius_m; /* of a leg from the vertical, and how far its foot is from the plumb line */
+    double head_above_m;               /* the head's origin above the tripod's top */
+    double legs_heading_deg;           /* of the first leg, from the scene's north */
+};
+uint32_t device_n_stations(const struct device *device);
+void device_get_station(struct device *device, uint32_t station, struct device_station *out); /* 0.. */
+/* The site as it is now, for who asks more of it. It is constant, and stays until it is given back (before device_free):
+ * soon, for it may hold maps of hundreds of MiB. */
+const struct site *device_hold_site(struct device *device, struct device_version **version);
+void device_give_back(struct device_version *version);
+const struct site *device_site_of(const struct device_version *version);
 
 /* Something for the error queue (enum command_error), and an event on the wire. */
 void device_report(struct device *device, int number, const char *text);

@@ -37,14 +37,26 @@ struct device_machine {
     uint32_t n_changes; /* since power-up */
 };
 
+/* The site, planned for settings that commands have given (site_vary). It is kept while a scan or its works use it. */
+struct device_variant {
+    struct device_variant *next;
+    struct device_version *version; /* that it is made of, and holds */
+    struct site *site;
+    struct head_settings settings;
+    uint32_t station; /* from 0 */
+    _Atomic uint32_t users;
+};
+
 /* The scan at hand, or the last one. */
 struct device_scan {
     int on;
-    uint32_t number;     /* from 1 */
-    uint64_t tick0;      /* its first */
-    uint64_t end_tick;   /* the first one after it, when none is on */
-    uint64_t pulse_next; /* next pulse to be claimed */
-    uint64_t cast;       /* of the pulses before, those that are cast */
+    const struct site *site;        /* that it is made with */
+    struct device_variant *variant; /* NULL: that is the device's */
+    uint32_t number;                /* from 1 */
+    uint64_t tick0;                 /* its first */
+    uint64_t end_tick;              /* the first one after it, when none is on */
+    uint64_t pulse_next;            /* next pulse to be claimed */
+    uint64_t cast;                  /* of the pulses before, those that are cast */
     struct schedule_segment segment;
     uint32_t station;      /* from 0 */
     uint32_t station_scan; /* which of its scans */
@@ -85,9 +97,38 @@ struct device_journal {
     uint64_t end_tick;   /* where the run at hand ended, once it is over */
 };
 
+/* A site as long as somebody uses it: the device, and ticks that were claimed while it was the device's. */
+struct device_version {
+    const struct site *site;
+    struct site *own;       /* NULL: the one the device was made with, which is its caller's */
+    _Atomic uint32_t users; /* but the device */
+    struct device_version *next;
+};
+
+/* Stations that are moved, one at a time (moves.c). Who plans has plan, made, ahead and err to itself, without the lock. */
+struct device_moves {
+    const struct site *first;       /* the site of power-up */
+    struct device_version *current; /* of device->site */
+    struct device_version *old;     /* those before that are not freed yet */
+    struct command_place *place, *first_place;
+    _Atomic int stops; /* the run ends: planning, too */
+    struct device_move {
+        uint32_t station, session;
+        int to_first, took_control;
+        int stays; /* it stands there already: nothing to plan, nothing to tell */
+        struct site_place to;
+        int64_t t_ns; /* of a replayed journal: when it was done; else -1 */
+        char line[COMMAND_MAX_LINE + 1];
+    } plan;
+    struct device_version *made;  /* NULL: err says why */
+    struct device_version *ahead; /* planned before they are due, in order (device_plan_ahead) */
+    struct sh_err err;
+};
+
 struct device {
     pthread_mutex_t lock;
-    const struct site *site;
+    const struct site *site; /* as of now */
+    struct device_moves moves;
     struct device_options options;
     struct device_counters counters;
     struct command_device cmd;
@@ -109,6 +150,7 @@ struct device {
     struct device_overrun overrun;
     struct device_live live;
     struct device_journal journal;
+    struct device_variant *variants;
 };
 
 /* ---- all with the lock held */
@@ -133,6 +175,16 @@ enum head_state device_visible_state(const struct device *device, uint64_t relea
 /* Ticks of a time, rounded up. */
 uint64_t device_ticks_of(const struct device *device, double s);
 
+/* variant.c */
+/* For scans from a station, from 0, with these settings; NULL: the device's site will do. */
+int device_find_variant(struct device *device, const struct head_settings *settings, uint32_t station,
+                        struct device_variant **out, struct sh_err *err);
+/* The same as command_device.can_plan; owner: the device. */
+int device_can_plan(void *owner, const struct head_settings *settings, char *why, size_t len);
+/* Those that no work and no scan uses. */
+void device_free_unused_variants(struct device *device);
+void device_free_variants(struct device *device);
+
 /* scan.c */
 void device_begin_scan(struct device *device, uint64_t tick);
 /* What the tick has of the scan that is on: descriptor, names, pulses; and the scan's end. */
@@ -147,8 +199,32 @@ void device_describe(struct device *device, struct device_work *work);
 void device_say_overrun(struct device *device, uint64_t tick);
 
 /* carry_out.c */
-/* Commands of the replayed journal that are due at the tick. */
-void device_run_replay(struct device *device, uint64_t tick);
+/* Commands of the replayed journal that are due at the tick. Returns 1 when one of them moves a station: that has to be
+ * planned and finished before the others. */
+int device_run_replay(struct device *device, uint64_t tick);
+
+/* versions.c */
+/* own: freed with it; NULL: it is its caller's. NULL: no memory. */
+struct device_version *device_make_version(const struct site *site, struct site *own);
+void device_free_version(struct device_version *version);
+void device_free_versions(struct device_version **list);
+/* Those before that nobody uses. Without the lock; by who plans moves. */
+void device_free_unused_sites(struct device_moves *moves);
+void device_set_places(const struct site *site, struct command_place *place);
+int device_open_moves(struct device *device, struct sh_err *err);
+void device_close_moves(struct device *device);
+/* The work's tick holds the site of now. */
+void device_use_site(struct device *device, struct device_work *work);
+
+/* moves.c */
+/* A move was commanded, and is to be planned (device_plan_move) by the thread that commanded it or one it has. */
+void device_begin_move(struct device *device, uint32_t session, const char *line, int64_t t_ns,
+                       const struct command_result *command);
+/* The moves of the journal to be replayed, before time begins: in real time nobody waits for them later. */
+void device_plan_ahead(struct device *device);
+/* It is planned: the first half of device_finish_move; then the second, without the lock. */
+void device_take_move(struct device *device, int64_t t_ns, struct command_result *out);
+void device_end_move(struct device *device);
 
 /* live_pose.c */
 /* The end of the head's path, since the scan's start; INT64_MAX: there is none. */

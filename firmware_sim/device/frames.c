@@ -1,16 +1,18 @@
 /* What the device says of itself: descriptor, anchor, telemetry. */
+#include <math.h>
 #include <string.h>
 
 #include "firmware_sim/device/device_state.h"
 
 void device_fill_descriptor(const struct device *device, struct native_descriptor *d)
 {
-    const struct config *cfg = device->site->cfg;
+    const struct site *site = device->scan.site;
+    const struct config *cfg = site->cfg;
     const struct schedule_spec *spec = &device->scan.segment.spec;
     struct cast_setup setup;
     struct bvh_info info;
-    site_cast_setup(device->site, device->scan.station, &setup);
-    site_set_program(device->site, spec->prr_uhz, &setup);
+    site_cast_setup(site, device->scan.station, &setup);
+    site_set_program(site, spec->prr_uhz, &setup);
     bvh_get_info(setup.bvh, &info);
     memset(d, 0, sizeof *d);
     memcpy(d->idn, device->idn, sizeof d->idn);
@@ -32,11 +34,12 @@ void device_fill_descriptor(const struct device *device, struct native_descripto
     d->range_min_m = setup.range_min_m;
     d->range_max_m = setup.range_max_m;
     d->max_echoes = setup.max_echoes;
-    d->n_surfaces = device->site->n_surfaces;
+    d->n_surfaces = site->n_surfaces;
     d->frames = spec->frames;
     d->scan = device->scan.number;
     d->seed = cfg->noise.seed;
     d->content = cfg->output.attributes ? (uint32_t)NATIVE_HAS_ATTRIBUTES : 0;
+    if (cfg->output.colour != COLOUR_NONE) d->content |= NATIVE_HAS_COLOURS;
 }
 
 static const uint32_t emit[] = {[EMITTER_LINE] = NATIVE_EMIT_LINE,
@@ -59,12 +62,15 @@ void device_fill_emitter(const struct device *device, struct native_emitter *e, 
                                  .steps = from->steps,
                                  .first_step = (int32_t)from->first_step,
                                  .last_step = (int32_t)from->last_step,
-                                 .front_step = (int32_t)from->front_step,
+                                 .front_step = (int32_t)device->scan.segment.front_step,
                                  .turn = from->turn,
                                  .rings = from->rings,
                                  .echoes = echoes_sent[device->cmd.settings.echoes]};
     schedule_sequence_ns(&device->scan.segment, &e->sequence_ns_num, &e->sequence_ns_den);
-    if (from->kind == EMITTER_SPHERE) e->first_ring_udeg = -90000000;
+    if (from->kind == EMITTER_SPHERE) {
+        e->first_ring_udeg = llround(360e6 * emitter_ring_turn(from, 0));
+        e->gaps = from->rings != from->gaps + 1 ? from->gaps : 0;
+    }
     for (uint32_t i = 0; i < from->n_beams; i++)
         beam[i] = (struct native_beam){(int32_t)from->beam[i].elevation_udeg, (int32_t)from->beam[i].azimuth_udeg,
                                        from->beam[i].offset_ns};

@@ -4,11 +4,28 @@
 
 #include "firmware_sim/device/device_state.h"
 
+/* Where no site can be planned for the settings, which the command has tried: out of memory, or at this station. */
+static int plan_scan(struct device *device, struct device_variant **variant, uint64_t tick)
+{
+    const struct head_settings *settings = &device->cmd.settings;
+    struct sh_err err;
+    if (device_find_variant(device, settings, settings->station - 1, variant, &err) == SH_OK) return 1;
+    command_queue_push(&device->cmd.queue, CMD_E_SETTINGS, err.text);
+    device_push_error(device, 0, CMD_E_SETTINGS, err.text);
+    device_transition(device, HEAD_EV_FAIL, tick);
+    return 0;
+}
+
 void device_begin_scan(struct device *device, uint64_t tick)
 {
     struct schedule_spec spec;
-    site_fill_spec(device->site, &device->cmd.settings, &spec);
+    struct device_variant *variant;
+    if (!plan_scan(device, &variant, tick)) return;
+    const struct site *site = variant != NULL ? variant->site : device->site;
+    site_fill_spec(site, &device->cmd.settings, &spec);
     device->scan = (struct device_scan){.on = 1,
+                                        .site = site,
+                                        .variant = variant,
                                         .number = device->scan.number + 1,
                                         .tick0 = tick,
                                         .station = device->cmd.settings.station - 1,
@@ -90,6 +107,9 @@ static int claim_pulses(struct device *device, uint64_t tick, struct device_work
     int64_t since = (int64_t)(tick - device->scan.tick0) * device->tick_ns;
     int stop = device->scan.stop_requested || device->ending || tick >= device->end_tick;
     work->scanning = 1;
+    work->site = device->scan.site;
+    work->variant = device->scan.variant;
+    if (work->variant != NULL) atomic_fetch_add(&work->variant->users, 1);
     work->scan_t0_ns = (int64_t)device->scan.tick0 * device->tick_ns;
     work->segment = *seg;
     work->station = device->scan.station;
@@ -125,7 +145,8 @@ static int claim_pulses(struct device *device, uint64_t tick, struct device_work
 int device_is_repeated(const struct device *device, uint64_t tick)
 {
     uint64_t since = tick - device->scan.tick0;
-    if (!device->scan.on) return device->machine.state >= HEAD_IDLE && tick % device->tick_hz == 0;
+    if (!device->scan.on)
+        return device->machine.state >= HEAD_IDLE && (tick % device->tick_hz == 0 || device->scan.anchor_lost);
     return (since != 0 && since % device->tick_hz == 0) || device->scan.anchor_lost;
 }
 
@@ -134,6 +155,7 @@ void device_before_scans(struct device *device)
     struct schedule_spec spec;
     site_fill_spec(device->site, &device->cmd.settings, &spec);
     schedule_start(&device->scan.segment, &spec);
+    device->scan.site = device->site;
     device->scan.station = device->cmd.settings.station - 1;
     device->scan.stretch = site_stretch_at(device->site, 0);
 }
@@ -144,7 +166,7 @@ void device_describe(struct device *device, struct device_work *work)
     work->describe_flags = device->scan.describe ? 0 : NATIVE_REPEAT;
     device_fill_descriptor(device, &work->descriptor);
     device_fill_emitter(device, &work->emitter, work->beam);
-    device_fill_anchor(device->site, device->scan.station, device->scan.stretch, &work->anchor);
+    device_fill_anchor(device->scan.site, device->scan.station, device->scan.stretch, &work->anchor);
     device->scan.describe = device->scan.anchor_lost = 0;
 }
 
@@ -157,6 +179,7 @@ void device_describe_now(struct device *device, struct device_work *work)
     device_describe(device, work);
     device->scan = was;
     work->t_ns = (int64_t)device->next_tick * device->tick_ns;
+    work->site = device->site; /* no station moves before the first tick is claimed */
     pthread_mutex_unlock(&device->lock);
 }
 

@@ -71,6 +71,9 @@ int device_fix(struct device *device, int64_t t_ns, struct nmea_fix *fix)
     if (n == 0) return 0;
     struct gnss_track track;
     const int64_t at_ns = gnss_time_ns(&device->gnss, n - 1);
+    struct device_version *version;
+    struct gnss gnss = device->gnss;
+    gnss.site = device_hold_site(device, &version); /* stations may move meanwhile */
     pthread_mutex_lock(&device->lock);
     uint32_t station = device->cmd.settings.station - 1;
     int moves = device_head_pose(device, at_ns, &track.at);
@@ -79,6 +82,7 @@ int device_fix(struct device *device, int64_t t_ns, struct nmea_fix *fix)
         device_head_pose(device, at_ns + GNSS_STEP_NS, &track.after);
     }
     pthread_mutex_unlock(&device->lock);
-    gnss_fix(&device->gnss, n - 1, station, moves ? &track : NULL, fix);
+    gnss_fix(&gnss, n - 1, station, moves ? &track : NULL, fix);
+    device_give_back(version);
     return 1;
 }

@@ -119,6 +119,7 @@ static void *caster_main(void *arg)
             continue;
         }
         if (!compute(caster, &work, slot)) device_lost(loop->device, &work);
+        device_done(&work);
         atomic_fetch_sub(&loop->casters.n_computing, 1);
         note_ready(caster);
     }

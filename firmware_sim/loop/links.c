@@ -15,7 +15,9 @@ static double stream_rate(const struct config *cfg)
     const struct head_settings *h = &cfg->head.settings;
     double sweep_udeg = 360e6 * cfg->profile.optical_gain / cfg->profile.facets;
     double used = (double)(h->line_stop_udeg - h->line_start_udeg) / sweep_udeg;
-    double point_len = NATIVE_POINT_LEN + (cfg->output.attributes ? NATIVE_ATTRIBUTE_LEN : 0);
+    if (used < 0.0) used += 1.0; /* across azimuth 0 */
+    double point_len = NATIVE_POINT_LEN + (cfg->output.attributes ? NATIVE_ATTRIBUTE_LEN : 0) +
+                       (cfg->output.colour != COLOUR_NONE ? NATIVE_COLOUR_LEN : 0);
     return (double)h->prr_uhz * 1e-6 * (used < 1.0 ? used : 1.0) * point_len;
 }
 
@@ -34,7 +36,9 @@ static int check_capacity(const struct config *cfg, const struct pump *pump, str
                    place.endpoint, 1e-6 * rate, 1e-6 * capacity,
                    floor(1e-6 * (double)config_rate_below(
                                     &cfg->profile, llround((double)cfg->head.settings.prr_uhz * capacity / rate))),
-                   cfg->output.attributes ? ", or leave out output.attributes" : "");
+                   cfg->output.attributes              ? ", or leave out output.attributes"
+                   : cfg->output.colour != COLOUR_NONE ? ", or leave out output.colour"
+                                                       : "");
 }
 
 static void identify(struct links *links, const struct config *cfg)

@@ -6,6 +6,7 @@
 #define FIRMWARE_SIM_LOOP_LINKS_H
 
 #include "drivers/protocol/protocol.h"
+#include "firmware_sim/loop/mover.h"
 #include "firmware_sim/loop/stream.h"
 
 struct pump;
@@ -32,7 +33,9 @@ struct links {
     /* set by the caller */
     struct stream *stream;
     struct device *device;
+    struct mover mover;
     const struct sh_report *report; /* NULL: none */
+    const struct web_source *web;   /* of links of type web; NULL: none */
     struct protocol_identity identity;
     uint32_t fixes_hz;     /* of the GNSS receiver */
     char data_address[64]; /* where the first velodyne link sends; empty: there is none */

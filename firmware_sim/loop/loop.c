@@ -51,6 +51,8 @@ int loop_create(const struct site *site, struct device *device, const struct loo
     loop->links.stream = &loop->stream;
     loop->links.device = device;
     loop->links.report = options->report;
+    mover_create(&loop->links.mover, device, &loop->stream);
+    loop->links.web = options->web;
     atomic_store(&loop->final_tick, UINT64_MAX);
     int rc = create_stream(loop, err);
     if (rc == SH_OK) rc = casters_create(loop, config_threads(cfg), err);
@@ -94,6 +96,7 @@ void loop_put_endpoints(const struct loop *loop, struct json *json)
     json_open_object(json, NULL);
     json_open_array(json, "endpoints");
     for (uint32_t i = 0; loop_get_place(loop, i, &place); i++) {
+        if (strcmp(place.type, link_ops_get(LINK_FD)->name) == 0) continue; /* nobody else reaches it */
         json_open_object(json, NULL);
         json_string(json, "type", place.type);
         json_string(json, "endpoint", place.endpoint);
@@ -180,6 +183,7 @@ void loop_join(struct loop *loop, struct loop_stats *stats)
     }
     casters_join(loop);
     pacer_join(loop);
+    mover_join(&loop->links.mover);
     links_join(&loop->links);
     pose_feed_close(loop->feed);
     loop->feed = NULL;

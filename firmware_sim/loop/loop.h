@@ -24,6 +24,7 @@ struct loop;
 struct loop_options {
     int hash;                       /* keep stream_sha256 */
     const struct link_spec *extra;  /* one more link than the configuration has; NULL: none */
+    const struct web_source *web;   /* what links of type web serve beside the page; NULL: nothing */
     const struct sh_report *report; /* warnings while running (from any thread); NULL: none */
 };
 

@@ -22,6 +22,8 @@ int pump_open(struct links *links, uint32_t index, const struct link_spec *spec,
     pump->protocol = protocol_ops_get((enum protocol_id)spec->protocol);
     pump->out_cap = links->stream->tick_bytes + BATCH_BYTES + REPLY_ROOM;
     struct link_spec with = *spec;
+    with.web = links->web;
+    pump->holds = spec->waits == LINK_WAITS_YES || (spec->waits == LINK_WAITS_BY_TYPE && spec->type != LINK_WEB);
     pump->wake_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     int rc = pump->wake_fd < 0 ? sh_fail(err, SH_EIO, "eventfd: %s", strerror(errno)) : SH_OK;
     for (uint32_t i = 0; i < LINK_MAX_SESSIONS; i++) {
@@ -144,7 +146,7 @@ static int has_more(struct pump *pump)
     for (int i = 0; i < LINK_MAX_SESSIONS; i++) {
         struct session *s = &pump->session[i];
         int pending = s->open && (s->out_pos < s->out_len || s->cursor < released || s->commands.reply_len != 0 ||
-                                  s->units.n != 0);
+                                  s->commands.moving || s->units.n != 0);
         if (pending && clock_now_ns() - s->moved_ns < DRAIN_NS) return 1;
     }
     return 0;

@@ -38,10 +38,23 @@ static void do_line(struct pump *pump, struct session *s, enum command_line_kind
     else
         device_command(device, s->id, s->commands.lines.buf, stream_released(pump->stream), &result);
     s->commands.wrong += result.error != 0;
-    if (result.effect == COMMAND_STEP)
+    if (result.effect == COMMAND_STEP) {
         start_step(pump, s, &result);
-    else
+    } else if (result.effect == COMMAND_MOVE) {
+        s->commands.moving = 1;
+        mover_ask(&pump->links->mover, &s->commands.move, pump->wake_fd);
+    } else {
         pump_add_reply(s, result.reply);
+    }
+}
+
+void pump_end_move(struct pump *pump, struct session *s)
+{
+    char reply[COMMAND_MAX_REPLY];
+    if (!s->commands.moving || !mover_take(&pump->links->mover, &s->commands.move, reply)) return;
+    s->commands.moving = 0;
+    s->commands.wrong += reply[0] == 'E';
+    pump_add_reply(s, reply);
 }
 
 static int has_reply_room(const struct session_commands *c)
@@ -53,7 +66,7 @@ void pump_take_lines(struct pump *pump, struct session *s)
 {
     struct session_commands *c = &s->commands;
     int done = 0;
-    while (c->in_pos < c->in_len && !c->stepping && c->wrong < WRONG_AT_ONCE && has_reply_room(c)) {
+    while (c->in_pos < c->in_len && !c->stepping && !c->moving && c->wrong < WRONG_AT_ONCE && has_reply_room(c)) {
         enum command_line_kind kind = command_lines_feed(&c->lines, c->in[c->in_pos++]);
         if (kind == COMMAND_LINE_NONE) continue;
         do_line(pump, s, kind);

@@ -28,6 +28,8 @@ struct session_commands {
     int stepping;   /* the reply to TIME:STEP waits until all before step_tick has gone out */
     uint64_t step_tick;
     char step_reply[COMMAND_MAX_REPLY];
+    int moving; /* the reply to SITE:POSE waits until the station's place is planned (mover.h) */
+    struct move_box move;
 };
 
 struct session {
@@ -43,7 +45,8 @@ struct session {
         int lagging; /* the error queue has heard of it */
     } lost;          /* lost_frames.c */
     uint8_t *out;
-    uint32_t out_len, out_pos; /* from out_pos on not written yet */
+    uint32_t out_len, out_pos;       /* from out_pos on not written yet */
+    uint32_t frames_from, frames_to; /* in out: replies before and after */
     struct session_commands commands;
     /* of a protocol that is not native */
     struct pump *pump;
@@ -66,6 +69,7 @@ struct pump {
     int wake_fd;
     struct stream_listener *listener;
     uint32_t out_cap; /* of each session */
+    int holds;        /* its readers hold back the paces fast and step */
     struct session session[LINK_MAX_SESSIONS];
     pthread_t thread;
     int running;
@@ -94,8 +98,10 @@ void session_leave(struct pump *pump, struct session *s);
 /* pump_commands.c */
 /* A reply line, after those that wait already. */
 void pump_add_reply(struct session *s, const char *text);
+/* The reply to SITE:POSE, once it is there. */
+void pump_end_move(struct pump *pump, struct session *s);
 /* Carries out the lines that were read. Each one is carried out and answered after the one before. Lines wait
- * while a step goes on, and while there is no room for their replies. Replies are lost only to a client that
+ * while a step or a move goes on, and while there is no room for their replies. Replies are lost only to a client that
  * sends on and on without reading. */
 void pump_take_lines(struct pump *pump, struct session *s);
 /* A client that is wrong as fast as it can be would cost a processor. So a link rests when one of its sessions had

@@ -13,9 +13,9 @@ static void clear(struct session *s)
 {
     struct session_commands *c = &s->commands;
     memset(&s->lost, 0, sizeof s->lost);
-    s->out_len = s->out_pos = 0;
+    s->out_len = s->out_pos = s->frames_from = s->frames_to = 0;
     c->reply_len = c->in_len = c->in_pos = 0;
-    c->stepping = c->replies_dropped = 0;
+    c->stepping = c->moving = c->replies_dropped = 0;
     c->wrong = 0;
     memset(&c->lines, 0, sizeof c->lines);
 }
@@ -33,7 +33,7 @@ void session_open(struct pump *pump, struct session *s, const char *peer)
         return;
     }
     s->open = 1;
-    stream_set_reader(pump->stream, s->reader, s->cursor, 1);
+    stream_set_reader(pump->stream, s->reader, s->cursor, pump->holds);
 }
 
 void session_close(struct pump *pump, struct session *s)
@@ -87,17 +87,27 @@ static void fill(struct pump *pump, struct session *s)
     struct session_commands *c = &s->commands;
     s->out_len = s->out_pos = 0;
     take_replies(pump, s);
+    s->frames_from = s->out_len;
     while (s->out_len < BATCH_BYTES && take_tick(pump, s))
         continue;
+    s->frames_to = s->out_len;
     /* The frames of a step go out before its reply: a client that has the reply has all of them. */
     while (c->stepping && (s->cursor >= c->step_tick || atomic_load(&pump->stream->over))) {
         c->stepping = 0;
         pump_add_reply(s, c->step_reply);
         pump_take_lines(pump, s);
     }
+    pump_end_move(pump, s);
     pump_take_lines(pump, s); /* those that waited for room */
     take_replies(pump, s);
     stream_move_reader(pump->stream, s->reader, s->cursor);
+}
+
+/* What is written next goes up to here: replies and frames go into messages of their own, where there are messages. */
+static uint32_t write_to(const struct pump *pump, const struct session *s)
+{
+    if (!pump->ops->messages) return s->out_len;
+    return s->out_pos < s->frames_from ? s->frames_from : s->out_pos < s->frames_to ? s->frames_to : s->out_len;
 }
 
 int session_write(struct pump *pump, struct session *s, int index)
@@ -106,7 +116,7 @@ int session_write(struct pump *pump, struct session *s, int index)
     for (;;) {
         if (s->out_pos == s->out_len) fill(pump, s);
         if (s->out_pos == s->out_len) return 0;
-        ssize_t n = pump->ops->write(pump->link, index, s->out + s->out_pos, s->out_len - s->out_pos);
+        ssize_t n = pump->ops->write(pump->link, index, s->out + s->out_pos, write_to(pump, s) - s->out_pos);
         if (n == 0) return 1;
         if (n < 0) {
             if (n != SH_ECLOSED) pump->failed = 1; /* the reason comes with LINK_CLOSED */

@@ -8,15 +8,16 @@
 #include "drivers/protocol/native_encode.h"
 
 struct worker {
-    const struct site *site;
-    struct ring_tick tick; /* what was made of the tick at hand */
-    uint32_t cap;          /* of tick.bytes */
+    const struct site *site; /* as it is for the tick at hand */
+    struct ring_tick tick;   /* what was made of the tick at hand */
+    uint32_t cap;            /* of tick.bytes */
     struct ring_mark mark[RING_MAX_MARKS];
     struct caster *caster;
     struct cast_counters counted; /* of the caster, as far as slots have them */
     struct line_block block;
     struct cast_setup setup;
     uint32_t setup_station; /* 1 + the station that setup is for; 0: none yet */
+    uint32_t setup_scan;    /* the scan that it is for */
     size_t stretch;         /* of a moving head's path, that setup is for */
     size_t anchored;        /* the one whose anchor went out last */
     /* a moving head: its poses for the pulses at hand, and as they go out */
@@ -41,8 +42,9 @@ int worker_create(const struct site *site, struct worker **out, struct sh_err *e
     int rc = worker->tick.bytes != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory");
     if (rc == SH_OK) rc = caster_create(&worker->caster, err);
     if (rc == SH_OK)
-        rc = line_block_alloc(&worker->block, device_tick_pulses(site->cfg) * site_points_per_pulse(site), err);
+        rc = line_block_alloc(&worker->block, device_tick_pulses(site->cfg) * site_most_points_per_pulse(site), err);
     if (rc == SH_OK && site->cfg->output.attributes) rc = line_block_alloc_attributes(&worker->block, err);
+    if (rc == SH_OK && site->cfg->output.colour != COLOUR_NONE) rc = line_block_alloc_colours(&worker->block, err);
     if (rc != SH_OK) {
         worker_free(worker);
         return rc;
@@ -68,6 +70,9 @@ static uint32_t line_bytes(const struct config *cfg, uint32_t n_points, uint32_t
     if (cfg->output.attributes)
         bytes += (uint32_t)native_attributes_bound(n_points) +
                  lines * (uint32_t)(NATIVE_HEADER_LEN + NATIVE_ATTRIBUTES_HEAD_LEN);
+    if (cfg->output.colour != COLOUR_NONE)
+        bytes +=
+            (uint32_t)native_colours_bound(n_points) + lines * (uint32_t)(NATIVE_HEADER_LEN + NATIVE_COLOURS_HEAD_LEN);
     return bytes;
 }
 
@@ -75,7 +80,7 @@ uint32_t worker_tick_bytes(const struct site *site)
 {
     const struct config *cfg = site->cfg;
     uint32_t poses = config_head_moves(&cfg->platform) ? NATIVE_MAX_FRAME : 0;
-    uint32_t n_points = device_tick_pulses(cfg) * site_points_per_pulse(site);
+    uint32_t n_points = device_tick_pulses(cfg) * site_most_points_per_pulse(site);
     return OVERHEAD_BYTES + poses + line_bytes(cfg, n_points, device_tick_lines(cfg));
 }
 
@@ -194,8 +199,8 @@ static void move_anchor(struct worker *worker, const struct device_work *work, s
     struct native_anchor anchor;
     if (stretch == worker->anchored) return;
     worker->anchored = stretch;
-    if (worker->site->station[work->station].leg == NULL) return;
-    device_fill_anchor(worker->site, work->station, stretch, &anchor);
+    if (work->site->station[work->station].leg == NULL) return;
+    device_fill_anchor(work->site, work->station, stretch, &anchor);
     add_anchor(worker, &anchor, work->t_ns, 0);
 }
 
@@ -203,7 +208,7 @@ static void move_anchor(struct worker *worker, const struct device_work *work, s
  * stretch, or end. */
 static uint64_t enter_stretch(struct worker *worker, const struct device_work *work, uint64_t k, uint64_t end)
 {
-    const struct site *site = worker->site;
+    const struct site *site = work->site;
     if (!site->moving) return end;
     size_t stretch = site_stretch_at(site, schedule_time_ns(&work->segment, k));
     if (stretch != worker->stretch) site_enter(site, work->station, stretch, &worker->setup);
@@ -298,15 +303,16 @@ static void end_line(struct worker *worker, const struct device_work *work, cons
 
 static void fill_pulses(struct worker *worker, const struct device_work *work)
 {
-    if (worker->setup_station != work->station + 1) {
-        site_cast_setup(worker->site, work->station, &worker->setup);
+    if (worker->setup_station != work->station + 1 || worker->setup_scan != work->scan) {
+        site_cast_setup(work->site, work->station, &worker->setup);
         worker->setup_station = work->station + 1;
+        worker->setup_scan = work->scan;
         worker->stretch = SIZE_MAX;
     }
     worker->anchored = work->stretch;
     worker->setup.sight = worker->site->station[work->station].sight; /* made anew since the station's last scan */
     worker->setup.echoes = (enum beam_select)work->echoes;
-    site_set_program(worker->site, work->segment.spec.prr_uhz, &worker->setup);
+    site_set_program(work->site, work->segment.spec.prr_uhz, &worker->setup);
     worker->setup.scan_key = rng_scan(work->station + 1, work->station_scan);
     if (worker->site->n_movers != 0)
         site_move(worker->site,
@@ -331,6 +337,7 @@ static void fill_pulses(struct worker *worker, const struct device_work *work)
 
 const struct ring_tick *worker_fill(struct worker *worker, const struct device_work *work)
 {
+    if (work->version != NULL) worker->site = device_site_of(work->version);
     worker->tick = (struct ring_tick){.bytes = worker->tick.bytes, .mark = worker->mark};
     fill_heads(worker, work);
     if (work->scanning) {

@@ -82,6 +82,7 @@ static int apply_beam(struct site *site, const struct sh_report *report, struct 
     int rc = SH_OK, adaptive = methods->beam == BEAM_ADAPTIVE;
     for (uint32_t i = 0; i < site->n_stations && rc == SH_OK; i++) {
         struct site_station *s = &site->station[i];
+        if (!config_serves(site->cfg, i)) continue;
         if (!adaptive) drop_beam(s, methods->beam == BEAM_SINGLE);
         if (methods->beam == BEAM_SINGLE) continue;
         rc = make_beam(site, s, adaptive, report, err);

@@ -4,21 +4,94 @@
 
 #include "core/vec3.h"
 
-/* Where *out is not NULL it is the caller's, even after an error. */
-static int build(const struct site *site, const struct scene *scene, const struct site_sphere *from,
-                 const struct sh_report *report, struct bvh **out, struct sh_err *err)
+static int create(const struct site *site, const struct scene *scene, const struct site_sphere *from, int order,
+                  const struct sh_report *report, struct bvh **out, struct sh_err *err)
 {
-    *out = NULL;
-    const int order = site->plan.methods.order_exactly && !site_order_can_wait(site);
     int rc = bvh_create(scene, from->centre_m, from->radius_m, site->cfg->loop.threads, report, out, err);
-    return rc == SH_OK && order ? bvh_order_exactly(*out, report, err) : rc;
+    if (rc == SH_OK && order) rc = bvh_order_exactly(*out, report, err);
+    if (rc == SH_OK) return rc;
+    bvh_free(*out);
+    *out = NULL;
+    return rc;
+}
+
+static int orders_now(const struct site *site)
+{
+    return site->plan.methods.order_exactly && !site_order_can_wait(site);
+}
+
+/* A BVH of the world for rays from the sphere, whose origin is up to within_m away. Its surfaces are ordered as this
+ * site would have them, so that its hits don't depend on who shares it. Where the order is put off, and another site
+ * has needed it after all, either will do. */
+static struct site_bvh *find(const struct site *site, const struct site_sphere *from, double within_m, int ordered)
+{
+    struct site_bvh *second = NULL;
+    const int waits = !ordered && site->plan.methods.order_exactly;
+    for (uint32_t i = 0; i < site->world->n_bvh; i++) {
+        struct site_bvh *entry = &site->world->bvh[i];
+        double origin_m[3];
+        bvh_origin(entry->bvh, origin_m);
+        const double d = vec3_distance(origin_m, from->centre_m);
+        if (d > within_m || d + from->radius_m > entry->reach_m) continue;
+        if (entry->is_ordered == ordered) return entry;
+        if (waits && second == NULL) second = entry;
+    }
+    return second;
+}
+
+static int add(struct site *site, const struct site_sphere *from, int order, const struct sh_report *report,
+               struct site_bvh **out, struct sh_err *err)
+{
+    struct bvh *bvh;
+    int rc = create(site, site->scene, from, order, report, &bvh, err);
+    if (rc != SH_OK) return rc;
+    rc = site_keep_bvh(site->world, bvh, from->radius_m, order, err);
+    if (rc != SH_OK) {
+        bvh_free(bvh);
+        return rc;
+    }
+    *out = &site->world->bvh[site->world->n_bvh - 1];
+    return SH_OK;
+}
+
+/* In place where no other site uses it; else there is another one for this site. */
+static int order(struct site *site, uint32_t i, const struct sh_report *report, struct sh_err *err)
+{
+    struct site_bvh *entry = site->world->bvh, *other;
+    double origin_m[3];
+    struct bvh *const was = site->bvh[i];
+    while (entry->bvh != was)
+        entry++;
+    if (entry->is_ordered) return SH_OK;
+    if (entry->n_users == 1) {
+        entry->is_ordered = 1;
+        return bvh_order_exactly(was, report, err);
+    }
+    bvh_origin(was, origin_m);
+    const struct site_sphere from = {origin_m, entry->reach_m};
+    entry->n_users--;
+    int rc = SH_OK;
+    if ((other = find(site, &from, 0.0, 1)) == NULL || !other->is_ordered)
+        rc = add(site, &from, 1, report, &other, err);
+    if (rc != SH_OK) return rc;
+    other->n_users++;
+    site->bvh[i] = other->bvh;
+    for (uint32_t k = 0; k < site->n_stations; k++)
+        if (site->station[k].bvh == was) site->station[k].bvh = other->bvh;
+    return SH_OK;
+}
+
+int site_build_body_bvh(const struct site *site, const struct scene *scene, const struct site_sphere *from,
+                        const struct sh_report *report, struct bvh **out, struct sh_err *err)
+{
+    return create(site, scene, from, orders_now(site), report, out, err);
 }
 
 int site_order_bvhs(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     int rc = SH_OK;
     for (uint32_t i = 0; i < site->n_bvh && rc == SH_OK; i++)
-        rc = bvh_order_exactly(site->bvh[i], report, err);
+        rc = order(site, i, report, err);
     return rc;
 }
 
@@ -27,8 +100,9 @@ int site_build_mover_bvhs(struct site *site, const struct sh_report *report, str
     int rc = SH_OK;
     for (uint32_t i = 0; i < site->n_movers && rc == SH_OK; i++) {
         struct site_mover *m = &site->mover[i];
-        rc = build(site, m->scene, &(struct site_sphere){m->centre_m, site->cfg->profile.range_max_m}, report, &m->bvh,
-                   err);
+        const struct site_sphere from = {m->centre_m, site_world_range_max_m(site)};
+        if (m->bvh == NULL) rc = create(site, m->scene, &from, orders_now(site), report, &m->bvh, err);
+        site->world->mover[i].bvh = m->bvh;
     }
     return rc;
 }
@@ -36,9 +110,12 @@ int site_build_mover_bvhs(struct site *site, const struct sh_report *report, str
 int site_add_bvh(struct site *site, const struct site_sphere *from, const struct sh_report *report, struct bvh **out,
                  struct sh_err *err)
 {
-    int rc = build(site, site->scene, from, report, out, err);
-    if (*out != NULL) site->bvh[site->n_bvh++] = *out;
-    return rc;
+    struct site_bvh *entry = find(site, from, 0.0, orders_now(site));
+    int rc = entry != NULL ? SH_OK : add(site, from, orders_now(site), report, &entry, err);
+    if (rc != SH_OK) return rc;
+    *out = entry->bvh;
+    site_use_bvh(site, entry);
+    return SH_OK;
 }
 
 /* Whether stations that share within that distance need no more BVHs than there may be. */
@@ -74,19 +151,9 @@ static double reach_of_stations(const struct site *site, const double origin_m[3
     for (uint32_t i = 0; i < site->n_stations; i++) {
         const double *at_m = site->station[i].at.position_m;
         double d = vec3_distance(at_m, origin_m);
-        if (d <= within_m) reach_m = fmax(reach_m, d + site_ray_reach_m(site, at_m));
+        if (d <= within_m) reach_m = fmax(reach_m, d + site_world_ray_reach_m(site, at_m));
     }
     return reach_m;
-}
-
-static struct bvh *find(const struct site *site, const double station_m[3], double within_m)
-{
-    for (uint32_t i = 0; i < site->n_bvh; i++) {
-        double origin_m[3];
-        bvh_origin(site->bvh[i], origin_m);
-        if (vec3_distance(origin_m, station_m) <= within_m) return site->bvh[i];
-    }
-    return NULL;
 }
 
 int site_build_station_bvhs(struct site *site, const struct sh_report *report, struct sh_err *err)
@@ -95,12 +162,20 @@ int site_build_station_bvhs(struct site *site, const struct sh_report *report, s
     int rc = SH_OK;
     for (uint32_t i = 0; i < site->n_stations && rc == SH_OK; i++) {
         struct site_station *s = &site->station[i];
-        s->bvh = find(site, s->at.position_m, within_m);
-        if (s->bvh != NULL) continue;
+        const struct site_sphere rays = {s->at.position_m, site_ray_reach_m(site, s->at.position_m)};
+        if (!config_serves(site->cfg, i)) continue;
+        struct site_bvh *entry = find(site, &rays, within_m, orders_now(site));
+        if (entry != NULL) {
+            s->bvh = entry->bvh;
+            site_use_bvh(site, entry);
+            continue;
+        }
         if (site->n_bvh == CONFIG_MAX_STATIONS)
             return sh_fail(err, SH_EINPUT, "%s: the stations are too far apart; allowed %d groups of %.0f m across",
                            site->cfg->file, CONFIG_MAX_STATIONS, 2.0 * SITE_BVH_REACH_M);
-        const struct site_sphere from = {s->at.position_m, reach_of_stations(site, s->at.position_m, within_m)};
+        double reach_m = reach_of_stations(site, s->at.position_m, within_m);
+        if (site->moved) reach_m = fmax(reach_m, within_m + site_world_ray_reach_m(site, s->at.position_m));
+        const struct site_sphere from = {s->at.position_m, reach_m};
         rc = site_add_bvh(site, &from, report, &s->bvh, err);
     }
     return rc;

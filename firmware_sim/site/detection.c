@@ -150,6 +150,37 @@ static int casts_footprints(const struct site *site)
     return site->cfg->beam.mode != BEAM_SINGLE || site->measures;
 }
 
+/* The instrument, which has the angle noise; kind of the range noise; the ball. */
+static void set_up_noise(const struct config *cfg, struct site_detect *d)
+{
+    set_up_instrument(cfg, &d->instrument);
+    d->cast.instrument = instrument_is_ideal(&d->instrument) ? NULL : &d->instrument;
+    d->cast.noise_by_signal = cfg->noise.range == RANGE_NOISE_SIGNAL;
+    d->cast.ball = NULL;
+    if (!(cfg->noise.ball.radius_m > 0.0)) return;
+    d->ball = (struct detect_ball){.radius_m = cfg->noise.ball.radius_m,
+                                   .per_distance_1_m = cfg->noise.ball.distance_1_m,
+                                   .local = cfg->noise.ball.local};
+    memcpy(d->ball.factor, cfg->noise.ball.factor, sizeof d->ball.factor);
+    detect_ball_keys(&d->ball, cfg->noise.ball.seed);
+    d->cast.ball = &d->ball;
+}
+
+static struct detect_signal *signal_in_use(const struct config *cfg, struct site_detect *d)
+{
+    return cfg->signal.on ? &d->signal[config_program_of(&cfg->profile, cfg->head.settings.prr_uhz)] : NULL;
+}
+
+int site_vary_detect(struct site *site, struct sh_err *err)
+{
+    struct site_detect *d = &site->detect;
+    int rc = site->cfg->signal.on ? set_up_signals(site, err) : SH_OK;
+    d->cast.signal = signal_in_use(site->cfg, d);
+    set_up_noise(site->cfg, d);
+    site_set_depth(site, d->cast.depth);
+    return rc;
+}
+
 int site_set_up_detect(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
@@ -164,9 +195,7 @@ int site_set_up_detect(struct site *site, const struct sh_report *report, struct
     if (rc != SH_OK) return rc;
     d->cast.depth = d->surfaces.has_optics ? cfg->optics.depth : 0;
     d->cast.surfaces = cfg->signal.on || d->cast.depth > 0 ? &d->surfaces : NULL;
-    const uint32_t in_use = config_program_of(&cfg->profile, cfg->head.settings.prr_uhz);
-    d->cast.signal = cfg->signal.on ? &d->signal[in_use] : NULL;
-    d->cast.noise_by_signal = cfg->noise.range == RANGE_NOISE_SIGNAL;
+    d->cast.signal = signal_in_use(cfg, d);
     d->cast.ghost_label = site->n_surfaces;
     if (d->cast.surfaces != NULL && casts_footprints(site)) {
         d->kind = calloc(d->surfaces.n + 1, sizeof *d->kind);
@@ -174,16 +203,7 @@ int site_set_up_detect(struct site *site, const struct sh_report *report, struct
                              : surface_kinds(&d->surfaces, d->kind, err);
     }
     if (rc == SH_OK && d->cast.depth > 0 && d->surfaces.has_mirror) rc = name_ghosts(site, err);
-    set_up_instrument(cfg, &d->instrument);
-    if (!instrument_is_ideal(&d->instrument)) d->cast.instrument = &d->instrument;
-    if (cfg->noise.ball.radius_m > 0.0) {
-        d->ball = (struct detect_ball){.radius_m = cfg->noise.ball.radius_m,
-                                       .per_distance_1_m = cfg->noise.ball.distance_1_m,
-                                       .local = cfg->noise.ball.local};
-        memcpy(d->ball.factor, cfg->noise.ball.factor, sizeof d->ball.factor);
-        detect_ball_keys(&d->ball, cfg->noise.ball.seed);
-        d->cast.ball = &d->ball;
-    }
+    set_up_noise(cfg, d);
     site_set_depth(site, d->cast.depth);
     return rc;
 }
@@ -225,7 +245,7 @@ double site_ray_reach_m(const struct site *site, const double station_m[3])
     if (site->detect.cast.depth == 0) return beside_m;
     /* What moves may be anywhere. */
     double beyond_m = site->n_movers > 0 ? INFINITY : site_farthest_m(site, station_m) + 1e-3;
-    return beside_m + fmin(beyond_m, site->cfg->profile.range_max_m);
+    return beside_m + fmin(beyond_m, config_range_most_m(site->cfg));
 }
 
 double site_ball_m(const struct site *site)

@@ -54,11 +54,29 @@ static void doubt_lines(const struct site *site, const struct sh_report *report)
         empty += line.cast_end <= line.cast0;
     }
     if (empty == 0) return;
+    const int64_t width_udeg = (s->line_stop_udeg - s->line_start_udeg + spec.sweep_udeg) % spec.sweep_udeg;
     sh_warn(report,
             "%s: head.line_start_deg, line_stop_deg: %u of %u lines cast no pulse: the window is %.4g deg wide, and "
             "pulses are %.4g deg apart (head.prr_hz, lines_hz)",
-            site->cfg->file, empty, n, 1e-6 * (double)(s->line_stop_udeg - s->line_start_udeg),
+            site->cfg->file, empty, n, 1e-6 * (double)width_udeg,
             1e-6 * (double)spec.sweep_udeg * (double)s->lines_uhz / (double)s->prr_uhz);
+}
+
+/* The step of a sphere is rounded to whole ones. */
+static void doubt_step(const struct site *site, const struct sh_report *report)
+{
+    const struct emitter *e = &site->emitter;
+    if (e->kind != EMITTER_SPHERE || emitter_sphere_is_exact(e)) return;
+    const double asked_deg = 1e-6 * (double)e->asked_udeg;
+    if (e->gaps == 0)
+        sh_warn(report, "%s: head.step_deg: %.9g deg does not divide 360 deg: used are %u steps of %.9g deg",
+                site->cfg->file, asked_deg, e->steps, 360.0 / e->steps);
+    else
+        sh_warn(
+            report,
+            "%s: head.step_deg: %.9g deg does not divide 180 and 360 deg: used are %u steps of %.9g deg from ring to "
+            "ring, and %u of %.9g deg along a ring",
+            site->cfg->file, asked_deg, e->gaps, 180.0 / e->gaps, e->steps, 360.0 / e->steps);
 }
 
 static void doubt_attributes(const struct site *site, const struct sh_report *report)
@@ -67,6 +85,15 @@ static void doubt_attributes(const struct site *site, const struct sh_report *re
     if (!cfg->output.attributes || cfg->signal.on) return;
     sh_warn(report, "%s: output.attributes: on, but signal.model is off: no echo has an amplitude%s", cfg->file,
             cfg->beam.mode == BEAM_SINGLE ? ", and with beam.mode single each has the pulse's width" : "");
+}
+
+static void doubt_colours(const struct site *site, const struct sh_report *report)
+{
+    const struct config *cfg = site->cfg;
+    if (cfg->output.colour != COLOUR_REFLECTANCE || cfg->signal.on) return;
+    sh_warn(report,
+            "%s: output.colour: reflectance, but signal.model is off: no point has one, all have the colour for that",
+            cfg->file);
 }
 
 /* A vertex within reach settles most cases without an index of distances. */
@@ -227,6 +254,7 @@ static int doubt_stations(const struct site *site, const struct sh_report *repor
     struct bvh_work *work = NULL;
     int rc = look != NULL ? bvh_work_create(&work, err) : sh_fail(err, SH_ENOMEM, "no memory to look from stations");
     for (uint32_t i = 0; i < site->n_stations && rc == SH_OK && !site->moving; i += step) {
+        if (!config_serves(site->cfg, i)) continue;
         rc = doubt_reach(site, i, report, err);
         if (rc != SH_OK || site->n_movers > 0) continue;
         rc = doubt_floor(site, i, work, look, report, err);
@@ -240,7 +268,9 @@ static int doubt_stations(const struct site *site, const struct sh_report *repor
 int site_warn_doubts(const struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     doubt_size(site, report);
+    doubt_step(site, report);
     doubt_lines(site, report);
     doubt_attributes(site, report);
+    doubt_colours(site, report);
     return doubt_stations(site, report, err);
 }

@@ -64,6 +64,7 @@ static int plan_legs(const struct site *site, struct site_station *s, struct sh_
     return SH_OK;
 }
 
+/* report NULL: of a station with another scanner, whose site says what is to be said. */
 static int plan_station(const struct site *site, struct site_station *s, const struct sh_report *report,
                         struct sh_err *err)
 {
@@ -186,6 +187,7 @@ static int scale_all(struct site *site, const struct sh_report *report, struct s
     int rc = choose_scale(site, err);
     if (rc == SH_OK) warn_of_coarse_counts(site, report);
     for (uint32_t i = 0; i < site->n_stations && rc == SH_OK && site->cfg->output.layout == LINE_GEO; i++) {
+        if (!config_serves(site->cfg, i)) continue;
         double most_m = count_m(site, &site->station[i]);
         if (most_m > site->scale_m * (1.0 + 1e-9))
             sh_warn(
@@ -210,7 +212,7 @@ static int add_georef(struct site *site, struct site_station *s, const struct sh
     if (epsg != first)
         sh_warn(report, "%s: station %s is in EPSG %d, station %s in %d: their points do not fit together", cfg->file,
                 s->station->name, epsg, site->station[0].station->name, first);
-    return plan_station(site, s, report, err);
+    return plan_station(site, s, config_serves(cfg, (uint32_t)(s - site->station)) ? report : NULL, err);
 }
 
 int site_georeference(struct site *site, const struct sh_report *report, struct sh_err *err)
@@ -219,4 +221,19 @@ int site_georeference(struct site *site, const struct sh_report *report, struct 
     for (uint32_t i = 0; i < site->n_stations && rc == SH_OK; i++)
         rc = add_georef(site, &site->station[i], report, err);
     return rc == SH_OK ? scale_all(site, report, err) : rc;
+}
+
+int site_georeference_one(struct site *site, uint32_t station, struct sh_err *err)
+{
+    int rc = add_georef(site, &site->station[station], NULL, err);
+    return rc == SH_OK ? scale_all(site, NULL, err) : rc;
+}
+
+void site_free_georeference(struct site *site, uint32_t station)
+{
+    struct site_station *s = &site->station[station];
+    for (size_t k = 0; s->leg != NULL && k < site->n_stretches; k++)
+        georef_free(s->leg[k].georef);
+    free(s->leg);
+    georef_free(s->georef);
 }

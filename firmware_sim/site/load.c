@@ -12,7 +12,7 @@ static struct scene_mesh_spec mesh_spec(const struct config *cfg, const struct c
         .file = mesh->file,
         .up = mesh->up,
         .scale = mesh->scale,
-        .textures = cfg->signal.on,
+        .textures = config_wants_textures(cfg),
         .cutouts = cfg->scene.cutouts,
         .limits = &cfg->scene.import,
     };
@@ -20,33 +20,46 @@ static struct scene_mesh_spec mesh_spec(const struct config *cfg, const struct c
     return spec;
 }
 
-/* A body by itself, in its own frame: its mesh, the sphere around it, and labels that follow those there
- * are. */
-static int add_mover(struct site *site, const struct config_mesh *mesh, const struct sh_report *report,
-                     struct sh_err *err)
+/* A body by itself, in its own frame. */
+static int add_mover(struct site *site, uint32_t number, const struct sh_report *report, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
     if (site->n_movers == CAST_MAX_MOVERS)
         return sh_fail(err, SH_EINPUT, "%s: scene.meshes: too many that move; at most %d", cfg->file, CAST_MAX_MOVERS);
     struct site_mover *m = &site->mover[site->n_movers++];
-    struct scene_mesh_spec spec = mesh_spec(cfg, mesh);
-    double half2 = 0.0;
-    m->mesh = mesh;
+    m->mesh = &cfg->scene.mesh[number];
+    m->number = number;
+    struct scene_mesh_spec spec = mesh_spec(cfg, m->mesh);
     int rc = scene_load(&spec, 1, cfg->scene.tolerance_m, report, &m->scene, err);
     if (rc != SH_OK) return rc;
     if (site->n_surfaces + m->scene->n_surfaces > SCENE_MAX_SURFACES)
-        return sh_fail(err, SH_EINPUT, "%s: too many surfaces; at most %d", mesh->file, SCENE_MAX_SURFACES);
-    for (uint32_t i = 0; i < m->scene->n_triangles; i++)
-        m->scene->label[i] = (uint16_t)(m->scene->label[i] + site->n_surfaces);
-    m->scene->label0 = site->n_surfaces;
+        return sh_fail(err, SH_EINPUT, "%s: too many surfaces; at most %d", m->mesh->file, SCENE_MAX_SURFACES);
     site->n_surfaces += m->scene->n_surfaces;
+    return SH_OK;
+}
+
+/* The sphere around a body, and labels that follow those there are. */
+static void place_mover(struct site_mover *m, uint32_t label)
+{
+    double half2 = 0.0;
+    for (uint32_t i = 0; i < m->scene->n_triangles; i++)
+        m->scene->label[i] = (uint16_t)(m->scene->label[i] + label);
+    m->scene->label0 = label;
     for (int i = 0; i < 3; i++) {
         double half = 0.5 * (m->scene->max_m[i] - m->scene->min_m[i]);
         m->centre_m[i] = m->scene->min_m[i] + half;
         half2 += half * half;
     }
     m->radius_m = sqrt(half2) * (1.0 + 1e-9) + 1e-6;
-    return SH_OK;
+}
+
+static void place_movers(struct site *site)
+{
+    uint32_t label = site->scene->n_surfaces;
+    for (uint32_t i = 0; i < site->n_movers; i++) {
+        place_mover(&site->mover[i], label);
+        label += site->mover[i].scene->n_surfaces;
+    }
 }
 
 static int load_scene(struct site *site, const struct sh_report *report, struct sh_err *err)
@@ -62,7 +75,23 @@ static int load_scene(struct site *site, const struct sh_report *report, struct 
     int rc = scene_load(spec, n, cfg->scene.tolerance_m, report, &site->scene, err);
     if (rc == SH_OK) site->n_surfaces = site->scene->n_surfaces;
     for (uint32_t i = 0; i < cfg->scene.n_meshes && rc == SH_OK; i++)
-        if (config_mesh_moves(&cfg->scene.mesh[i])) rc = add_mover(site, &cfg->scene.mesh[i], report, err);
+        if (config_mesh_moves(&cfg->scene.mesh[i])) rc = add_mover(site, i, report, err);
+    if (rc == SH_OK) rc = site_select_target(site, err);
+    if (rc == SH_OK) place_movers(site);
+    return rc;
+}
+
+/* Once in a world. */
+static int load_world(struct site *site, const struct sh_report *report, struct sh_err *err)
+{
+    struct site_world *world = site->world;
+    if (world->scene != NULL) return SH_OK;
+    int rc = load_scene(site, report, err);
+    world->n_loads++;
+    world->scene = site->scene; /* it owns what was loaded, also after an error */
+    world->n_movers = site->n_movers;
+    world->n_surfaces = site->n_surfaces;
+    memcpy(world->mover, site->mover, sizeof world->mover);
     return rc;
 }
 
@@ -115,11 +144,15 @@ static int load(struct site *site, const struct sh_report *report, struct sh_err
 {
     int rc = load_emitter(site, err);
     if (rc == SH_OK) rc = placement_find_anchor(site->cfg, report, &site->anchor, err);
-    if (rc == SH_OK) rc = load_scene(site, report, err);
+    if (rc == SH_OK) rc = load_world(site, report, err);
+    if (rc == SH_OK) rc = site_name_legs(site, err);
     if (rc == SH_OK) rc = site_set_up_detect(site, report, err);
+    if (rc == SH_OK) rc = site_set_up_silent(site, err);
     if (rc == SH_OK) rc = place_stations(site, report, err);
     if (rc == SH_OK) site_plan_order(site);
     if (rc == SH_OK) rc = build_bvhs(site, report, err);
+    if (rc == SH_OK) rc = site_set_up_tripods(site, report, err);
+    if (rc == SH_OK && site->cfg->output.colour != COLOUR_NONE) rc = site_set_up_colours(site, report, err);
     if (rc == SH_OK) rc = site_warn_doubts(site, report, err); /* trying beams may take long where little is seen */
     if (rc == SH_OK) rc = site_georeference(site, report, err);
     if (rc == SH_OK) rc = site_choose_methods(site, report, err);
@@ -127,17 +160,22 @@ static int load(struct site *site, const struct sh_report *report, struct sh_err
     return rc;
 }
 
-static int create(const struct config *cfg, int measures, const struct sh_report *report, struct site **out,
-                  struct sh_err *err)
+int site_create(const struct config *cfg, enum site_purpose purpose, const struct site *other,
+                const struct sh_report *report, struct site **out, struct sh_err *err)
 {
     struct site *site = *out = calloc(1, sizeof *site);
     if (site == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
+    struct site_listener heard;
+    site_listen(&heard, report, &site->said, purpose == SITE_MOVED ? &other->said : NULL);
     site->cfg = cfg;
-    site->measures = measures;
+    site->measures = purpose == SITE_FOR_PLAN;
+    site->moved = purpose == SITE_MOVED;
+    site->planned_frames = cfg->head.settings.frames;
     site->moving = config_head_moves(&cfg->platform);
-    int rc = load(site, report, err);
-    if (rc == SH_OK && measures) rc = site_open_sights(site, 0, site->n_stations, report, err);
-    if (rc == SH_OK && measures) rc = site_plan_rows(site, err);
+    int rc = site_enter_world(site, other, err);
+    if (rc == SH_OK) rc = load(site, &heard.report, err);
+    if (rc == SH_OK && site->measures) rc = site_open_sights(site, 0, site->n_stations, report, err);
+    if (rc == SH_OK && site->measures) rc = site_plan_rows(site, err);
     if (rc == SH_OK) return SH_OK;
     site_free(site);
     *out = NULL;
@@ -146,12 +184,18 @@ static int create(const struct config *cfg, int measures, const struct sh_report
 
 int site_load(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err)
 {
-    return create(cfg, 0, report, out, err);
+    return site_create(cfg, SITE_FOR_SCANS, NULL, report, out, err);
+}
+
+int site_load_beside(const struct config *cfg, const struct site *other, const struct sh_report *report,
+                     struct site **out, struct sh_err *err)
+{
+    return site_create(cfg, SITE_FOR_SCANS, other, report, out, err);
 }
 
 int site_load_plan(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err)
 {
-    return create(cfg, 1, report, out, err);
+    return site_create(cfg, SITE_FOR_PLAN, NULL, report, out, err);
 }
 
 void site_free(struct site *site)
@@ -163,24 +207,21 @@ void site_free(struct site *site)
     free(site->stop);
     for (uint32_t i = 0; i < site->n_stations; i++) {
         struct site_station *s = &site->station[i];
-        for (size_t k = 0; s->leg != NULL && k < site->n_stretches; k++)
-            georef_free(s->leg[k].georef);
-        free(s->leg);
-        georef_free(s->georef);
+        site_free_georeference(site, i);
         free(s->beam);
         beam_outlines_free(s->outlines);
+        site_free_tripod(&s->tripod);
     }
     free(site->plan.row);
     free(site->station);
-    for (uint32_t i = 0; i < site->n_bvh; i++)
-        bvh_free(site->bvh[i]);
-    for (uint32_t i = 0; i < site->n_movers; i++) {
-        bvh_free(site->mover[i].bvh);
-        scene_free(site->mover[i].scene);
-    }
-    scene_free(site->scene);
+    free(site->silent);
+    site_leave_world(site);
     georef_geoid_free(site->geoid);
     free(site->stretch);
     site_free_detect(site);
+    free(site->legs);
+    surface_colours_free(&site->colours.surfaces);
+    site_free_said(&site->said);
+    free(site->own_cfg);
     free(site);
 }

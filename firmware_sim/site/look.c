@@ -27,11 +27,21 @@ static void fill_place(const struct site *site, struct site_look_at *at, struct 
     site_cast_setup(site, at->station, &place->setup);
 }
 
+/* The k-th of those that this scanner scans from, k from 0. */
+static uint32_t served_station(const struct site *site, uint32_t k)
+{
+    uint32_t i = 0;
+    while (!config_serves(site->cfg, i) || k-- > 0)
+        i++;
+    return i;
+}
+
 void site_look_open(struct site_look *look, const struct site *site)
 {
-    look->n = site->n_stations < SITE_LOOK_STATIONS ? site->n_stations : SITE_LOOK_STATIONS;
+    const uint32_t served = site_n_served(site);
+    look->n = served < SITE_LOOK_STATIONS ? served : SITE_LOOK_STATIONS;
     for (uint32_t i = 0; i < look->n; i++) {
-        look->at[i] = (struct site_look_at){site, i * site->n_stations / look->n};
+        look->at[i] = (struct site_look_at){site, served_station(site, i * served / look->n)};
         fill_place(site, &look->at[i], &look->place[i]);
     }
 }

@@ -15,7 +15,7 @@ static double farthest_m(const struct site *site)
     double far_m = 0.0;
     if (site->moving || site->n_movers > 0) return cfg->profile.range_max_m;
     for (uint32_t s = 0; s < site->n_stations; s++)
-        far_m = fmax(far_m, site_farthest_m(site, site->station[s].at.position_m));
+        if (config_serves(cfg, s)) far_m = fmax(far_m, site_farthest_m(site, site->station[s].at.position_m));
     return fmin(far_m, cfg->profile.range_max_m);
 }
 
@@ -135,6 +135,37 @@ static void add_program(const struct site *site, struct site_plan *plan)
     plan_say(&plan->row[plan->n++], "program", method, 0.0, 0.0, why);
 }
 
+static void add_range(const struct site *site, struct site_plan *plan)
+{
+    const struct config_head *head = &site->cfg->head;
+    char method[32], why[160];
+    if (!config_limits_range(site->cfg)) return;
+    snprintf(method, sizeof method, "%.6g to %.6g m", head->range_min_m, head->range_max_m);
+    snprintf(why, sizeof why,
+             "head.range_min_m, range_max_m: beyond them there is no echo; the profile has %.6g to %.6g m",
+             head->profile_min_m, head->profile_max_m);
+    plan_say(&plan->row[plan->n++], "range", method, 0.0, 0.0, why);
+}
+
+/* The first tripod; how many more there are. */
+static void add_tripods(const struct site *site, struct site_plan *plan)
+{
+    char text[200], why[sizeof plan->row->why];
+    const struct site_station *first = NULL;
+    uint32_t n = 0;
+    for (uint32_t i = 0; i < site->n_stations; i++) {
+        if (site->station[i].tripod.from == NULL) continue;
+        if (n++ == 0) first = &site->station[i];
+    }
+    if (n == 0) return;
+    site_describe_tripod(first, text, sizeof text);
+    snprintf(why, sizeof why, "%.40s%s%.150s", n > 1 ? first->station->name : "", n > 1 ? ": " : "", text);
+    const char *method = !first->tripod.cast.has_legs           ? "cone"
+                         : first->tripod.cast.cos_opening > 1.0 ? "legs"
+                                                                : "cone and legs";
+    plan_say(&plan->row[plan->n++], "tripod", method, 0.0, 0.0, why);
+}
+
 int site_plan_rows(struct site *site, struct sh_err *err)
 {
     struct site_plan *plan = &site->plan;
@@ -142,14 +173,16 @@ int site_plan_rows(struct site *site, struct sh_err *err)
     struct plan_head head;
     struct bvh_info bvh;
     ask_head(site, &head);
-    bvh_get_info(site->station[0].bvh, &bvh);
+    bvh_get_info(site->bvh[0], &bvh);
     size_t n = plan_head(&head, of_head);
     free(plan->row);
-    plan->row = calloc(n + 10 + site->n_stations, sizeof *plan->row);
+    plan->row = calloc(n + 12 + site->n_stations, sizeof *plan->row);
     if (plan->row == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     plan->n = 0;
     add_emitter(site, plan);
     add_program(site, plan);
+    add_range(site, plan);
+    add_tripods(site, plan);
     plan_mesh(mesh_error_m(site), &plan->row[plan->n++]);
     plan_cast(bvh.packet, &plan->row[plan->n++]);
     plan->row[plan->n++] = plan->sight;

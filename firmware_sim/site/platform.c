@@ -14,7 +14,7 @@ static const int64_t LONGEST_NS = 10000000;
 
 /* The part of the trajectory that the configuration names, in its own times. */
 struct part {
-    struct trajectory *trajectory; /* to be freed by who opened it */
+    struct trajectory *trajectory; /* to be freed by who opened it; NULL: the head stands at its stations */
     double start_s, end_s;
 };
 
@@ -23,6 +23,10 @@ static int open_trajectory(const struct site *site, const struct sh_report *repo
 {
     const struct config_platform *p = &site->cfg->platform;
     double first_s, last_s;
+    if (p->file[0] == '\0' && p->waypoints[0] == '\0') { /* the head stands at its stations */
+        *part = (struct part){NULL, p->start_s, p->end_s};
+        return SH_OK;
+    }
     int rc = p->file[0] != '\0'
                  ? trajectory_read_csv(p->file, report, &part->trajectory, err)
                  : trajectory_read_waypoints(p->waypoints, site->anchor.known ? &site->anchor.frame : NULL, report,
@@ -165,10 +169,15 @@ static int count_stops(const struct site *site, const struct part *part, uint32_
 {
     const struct config_platform *p = &site->cfg->platform;
     double length_s = part->end_s - part->start_s, steps = floor(length_s / p->step_s + 1e-9);
+    const double n_each = part->trajectory != NULL ? 1 : site->cfg->n_stations;
+    if (n_each * (steps + 1.0) > CONFIG_MAX_STOPS && part->trajectory == NULL)
+        return sh_fail(err, SH_EINPUT,
+                       "%s: platform.step_s: %.0f stops at %.0f stations in %.9g s; allowed at most %d in all",
+                       site->cfg->file, steps + 1.0, n_each, length_s, CONFIG_MAX_STOPS);
     if (steps + 1.0 > CONFIG_MAX_STOPS)
         return sh_fail(err, SH_EINPUT, "%s: platform.step_s: %.0f stops in %.9g s; allowed at most %d, steps of %.9g s",
                        site->cfg->file, steps + 1.0, length_s, CONFIG_MAX_STOPS, length_s / (CONFIG_MAX_STOPS - 1));
-    *n = (uint32_t)steps + 1;
+    *n = (uint32_t)n_each * ((uint32_t)steps + 1);
     if (site->cfg->head.settings.station > *n)
         return sh_fail(err, SH_EINPUT, "%s: head.station: there is no stop %u; allowed 1 to %u", site->cfg->file,
                        site->cfg->head.settings.station, *n);
@@ -206,6 +215,32 @@ static void describe(const struct pose *head, uint32_t i, struct config_station 
     out->roll_deg = angle_deg(roll);
 }
 
+/* The k-th time: after the first sample, and as a frame where frames are counted. */
+static void set_time(const struct site *site, uint32_t k, struct site_station *s)
+{
+    const struct config_platform *p = &site->cfg->platform;
+    s->t_s = p->start_s + k * p->step_s;
+    if (!(p->frames_per_s > 0.0)) return;
+    s->frame = p->first_frame + k * p->frame_step;
+    s->t_s = s->frame / p->frames_per_s;
+}
+
+/* Without a trajectory: all stations of the configuration at the first time, then all at the next. They are numbered
+ * from 1 on, as way-points are. */
+static void add_standing(struct site *site, const struct site_station *standing, uint32_t i)
+{
+    const uint32_t n = site->cfg->n_stations, k = i / n;
+    struct site_station *s = &site->station[i];
+    const struct config_station *station = standing[i % n].station;
+    s->at = standing[i % n].at;
+    s->station = &site->stop[i];
+    site->stop[i] = *station;
+    s->frame = k + 1;
+    set_time(site, k, s);
+    snprintf(site->stop[i].name, sizeof site->stop[i].name, "%.*s frame %.9g", (int)sizeof site->stop[i].name - 24,
+             station->name, s->frame);
+}
+
 static int add_stop(struct site *site, const struct part *part, uint32_t i, struct sh_err *err)
 {
     const struct config_platform *p = &site->cfg->platform;
@@ -215,7 +250,7 @@ static int add_stop(struct site *site, const struct part *part, uint32_t i, stru
     double since_s = i * p->step_s;
     trajectory_at(part->trajectory, fmin(part->start_s + since_s, part->end_s), &body, &s->frame);
     pose_mount(&body, &site->mount, &head);
-    s->t_s = p->start_s + since_s;
+    set_time(site, i, s);
     s->station = &site->stop[i];
     describe(&head, i, &site->stop[i]);
     int rc = place(site, &head, &s->at, &why);
@@ -229,17 +264,37 @@ int site_load_stops(struct site *site, const struct sh_report *report, struct sh
     int rc = open_trajectory(site, report, &part, err);
     if (rc != SH_OK) return rc;
     rc = count_stops(site, &part, &n, err);
-    if (rc == SH_OK) rc = anchor_scene(site, err);
+    if (rc == SH_OK && part.trajectory != NULL) rc = anchor_scene(site, err);
+    struct site_station *standing = site->station;
     if (rc == SH_OK) {
-        free(site->station);
         site->station = calloc(n, sizeof *site->station);
         site->stop = calloc(n, sizeof *site->stop);
         site->n_stations = site->station != NULL ? n : 0;
         if (site->station == NULL || site->stop == NULL) rc = sh_fail(err, SH_ENOMEM, "no memory for %u stops", n);
     }
     set_mount(site);
-    for (uint32_t i = 0; i < n && rc == SH_OK; i++)
-        if ((rc = sh_check_stop(report, err)) == SH_OK) rc = add_stop(site, &part, i, err);
+    for (uint32_t i = 0; i < n && rc == SH_OK; i++) {
+        if ((rc = sh_check_stop(report, err)) != SH_OK) break;
+        if (part.trajectory != NULL)
+            rc = add_stop(site, &part, i, err);
+        else
+            add_standing(site, standing, i);
+    }
+    if (standing != site->station) free(standing);
+    trajectory_free(part.trajectory);
+    return rc;
+}
+
+int site_count_stations(const struct config *cfg, const struct sh_report *report, uint32_t *n, struct sh_err *err)
+{
+    struct site site = {.cfg = cfg};
+    struct part part;
+    *n = cfg->n_stations;
+    if (cfg->platform.kind != PLATFORM_STOPS) return SH_OK;
+    int rc = placement_find_anchor(cfg, report, &site.anchor, err);
+    if (rc == SH_OK) rc = open_trajectory(&site, report, &part, err);
+    if (rc != SH_OK) return rc;
+    rc = count_stops(&site, &part, n, err);
     trajectory_free(part.trajectory);
     return rc;
 }

@@ -39,11 +39,12 @@ static int open_gauge(struct gauge *g, const struct site *site, struct sh_err *e
     const uint32_t n_points = RUN * site_points_per_pulse(site);
     *g = (struct gauge){.key = rng_key(1, RNG_PLAN)};
     site_look_open(&g->look, site);
-    g->frame_bytes = native_points_bound(n_points) + native_attributes_bound(n_points);
+    g->frame_bytes = native_points_bound(n_points) + native_attributes_bound(n_points) + native_colours_bound(n_points);
     g->frame = malloc(g->frame_bytes);
     int rc = g->frame != NULL ? caster_create(&g->caster, err) : sh_fail(err, SH_ENOMEM, "no memory");
     if (rc == SH_OK) rc = line_block_alloc(&g->block, n_points, err);
     if (rc == SH_OK && site->cfg->output.attributes) rc = line_block_alloc_attributes(&g->block, err);
+    if (rc == SH_OK && site->cfg->output.colour != COLOUR_NONE) rc = line_block_alloc_colours(&g->block, err);
     return rc;
 }
 

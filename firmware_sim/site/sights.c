@@ -1,7 +1,9 @@
 #include "firmware_sim/site/site_inside.h"
 
 #include <math.h>
+#include <stdatomic.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 enum { LINES = 64 };
@@ -25,7 +27,7 @@ static const char *why_not(const struct site *site)
 static int only_first_hits(const struct site *site)
 {
     return site->plan.methods.beam == BEAM_SINGLE && site->plan.methods.depth == 0 && site->n_movers == 0 &&
-           site->n_stations <= SITE_MAX_SIGHTS;
+           site->legs == NULL && site_n_served(site) <= SITE_MAX_SIGHTS;
 }
 
 int site_order_can_wait(const struct site *site)
@@ -91,7 +93,7 @@ static int choose(struct site *site, const struct sh_report *report, struct plan
     struct site_look look;
     struct site_view view;
     struct bvh_info bvh;
-    bvh_get_info(site->station[0].bvh, &bvh);
+    bvh_get_info(site->bvh[0], &bvh);
     site_look_open(&look, site);
     site_view_of(site, look.at[0].station, &view);
     const struct plan_sight_need need = {.pulses = pulses_of(&look.place[0], cfg->head.settings.frames),
@@ -137,8 +139,14 @@ static int make(struct site *site, uint32_t station, uint32_t of, const struct s
                               .sees = site_view_sees,
                               .ctx = &view};
     memcpy(spec.station_m, s->at.position_m, sizeof spec.station_m);
+    s->sight_users = malloc(sizeof *s->sight_users);
+    if (s->sight_users == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a map");
+    atomic_init(s->sight_users, 1);
     int rc = sight_create(&spec, cfg->loop.threads, report, &sight, &why);
-    if (rc == SH_OK) s->sight = sight;
+    if (rc == SH_OK)
+        s->sight = sight;
+    else
+        free(s->sight_users);
     if (rc == SH_ESTOPPED) return sh_fail_stopped(err);
     return rc == SH_OK ? rc
                        : sh_fail(err, rc, "%s: station %u %s: %.300s; cast.sight: off does without", cfg->file,
@@ -149,7 +157,30 @@ static void close_sight(struct site_station *s)
 {
     struct sight *sight = s->sight;
     s->sight = NULL;
+    if (sight == NULL || atomic_fetch_sub(s->sight_users, 1) != 1) return;
     sight_free(sight);
+    free(s->sight_users);
+}
+
+/* A map depends on the BVH, the place and the directions that rays go to. How fine it is changes no hit. */
+static int still_holds(const struct site *site, const struct site *from, uint32_t i)
+{
+    const struct site_station *a = &site->station[i], *b = &from->station[i];
+    return b->sight != NULL && a->bvh == b->bvh &&
+           memcmp(&a->at.position_m, &b->at.position_m, sizeof a->at.position_m) == 0 &&
+           memcmp(&a->at.rotation, &b->at.rotation, sizeof a->at.rotation) == 0 &&
+           site->plan.methods.order_exactly == from->plan.methods.order_exactly;
+}
+
+void site_share_sights(struct site *site, const struct site *from)
+{
+    if (!site->plan.methods.sight) return;
+    for (uint32_t i = 0; i < site->n_stations; i++) {
+        if (!still_holds(site, from, i)) continue;
+        atomic_fetch_add(from->station[i].sight_users, 1);
+        site->station[i].sight_users = from->station[i].sight_users;
+        site->station[i].sight = from->station[i].sight;
+    }
 }
 
 int site_open_sights(struct site *site, uint32_t first, uint32_t n, const struct sh_report *report, struct sh_err *err)
@@ -158,15 +189,18 @@ int site_open_sights(struct site *site, uint32_t first, uint32_t n, const struct
     for (uint32_t i = 0; i < site->n_stations; i++)
         if (i < first || i - first >= n) close_sight(&site->station[i]);
     if (!site->plan.methods.sight) return SH_OK;
-    if (n > SITE_MAX_SIGHTS) {
+    uint32_t served = 0;
+    for (uint32_t i = first; i - first < n; i++)
+        served += config_serves(site->cfg, i) != 0;
+    if (served > SITE_MAX_SIGHTS) {
         sh_warn(report,
                 "%s: stations: a run makes no maps (cast.sight) for %u of them, allowed up to %d; rays ask the BVH, "
                 "with the same hits",
-                site->cfg->file, n, SITE_MAX_SIGHTS);
+                site->cfg->file, served, SITE_MAX_SIGHTS);
         return SH_OK;
     }
     for (uint32_t i = first; i - first < n && rc == SH_OK; i++)
-        if (site->station[i].sight == NULL) rc = make(site, i, n, report, err);
+        if (site->station[i].sight == NULL && config_serves(site->cfg, i)) rc = make(site, i, served, report, err);
     return rc;
 }
 

@@ -15,11 +15,30 @@ void site_fill_spec(const struct site *site, const struct head_settings *setting
     if (spec->emitter != NULL) spec->emitter = &site->emitter;
 }
 
+uint32_t site_n_served(const struct site *site)
+{
+    uint32_t n = 0;
+    for (uint32_t i = 0; i < site->n_stations; i++)
+        n += config_serves(site->cfg, i) != 0;
+    return n;
+}
+
 uint32_t site_points_per_pulse(const struct site *site)
 {
     const struct plan_methods *methods = &site->plan.methods;
     uint32_t most = methods->beam != BEAM_SINGLE ? LINE_MAX_ECHOES : 1 + methods->depth;
     return most < site->cfg->profile.max_echoes ? most : site->cfg->profile.max_echoes;
+}
+
+uint32_t site_most_points_per_pulse(const struct site *site)
+{
+    const struct config *cfg = site->cfg;
+    uint32_t most = site_points_per_pulse(site);
+    if (site_why_fixed(site) != NULL) return most;
+    if (site->detect.surfaces.has_optics && !cfg->optics.depth_given && most < 1 + CAST_MAX_DEPTH)
+        most = 1 + CAST_MAX_DEPTH;
+    if (config_has_footprint(cfg) && cfg->beam.mode == BEAM_AUTO) most = LINE_MAX_ECHOES;
+    return most < cfg->profile.max_echoes ? most : cfg->profile.max_echoes;
 }
 
 /* The mesh that a label of a real surface belongs to; *label becomes its number there. */
@@ -37,12 +56,14 @@ const struct scene_surface *site_surface(const struct site *site, uint32_t label
 {
     if (site->detect.ghost != NULL && label >= site->detect.n_real)
         return &site->detect.ghost[label - site->detect.n_real];
+    if (site->legs != NULL && label == site->legs_label) return site->legs;
     const struct scene *scene = find_mesh(site, &label);
     return &scene->surface[label];
 }
 
 const struct scene_texture *site_texture(const struct site *site, uint32_t label)
 {
+    if (site->legs != NULL && label == site->legs_label) return NULL;
     const struct scene *scene = find_mesh(site, &label);
     uint32_t number = scene->surface[label].texture;
     return number != 0 ? &scene->texture[number - 1] : NULL;
@@ -130,6 +151,7 @@ void site_cast_setup(const struct site *site, uint32_t station, struct cast_setu
     memset(setup, 0, sizeof *setup);
     setup->bvh = s->bvh;
     setup->sight = s->sight;
+    setup->silent = site->silent;
     setup->georef = s->georef;
     memcpy(setup->station_m, s->at.position_m, sizeof setup->station_m);
     memcpy(setup->rotation, s->at.rotation, sizeof setup->rotation);
@@ -141,11 +163,13 @@ void site_cast_setup(const struct site *site, uint32_t station, struct cast_setu
     setup->pan_counts = counts_or_ideal(profile->pan_counts);
     site_set_program(site, site->cfg->head.settings.prr_uhz, setup);
     setup->layout = site->cfg->output.layout;
+    setup->tripod = s->tripod.from != NULL ? &s->tripod.cast : NULL;
     setup->beam = s->beam;
     setup->echoes = (enum beam_select)site->cfg->head.settings.echoes;
     setup->pulse_m = site->detect.cast.separation_m;
     setup->range_scale_m = site->scale_m;
     memcpy(setup->xyz_scale, s->scale, sizeof setup->xyz_scale);
+    setup->colour = site->cfg->output.colour != COLOUR_NONE ? &s->colour : NULL;
 }
 
 size_t site_stretch_at(const struct site *site, int64_t t_ns)

@@ -1,6 +1,7 @@
 /* The site: what a configuration loads once and all scans share. In goes a checked configuration; out come
  * the scene, its BVHs, the stations' places (scene frame, metres) and georeferences, and the planned methods.
- * load.c makes it, site.c reads it. It is constant once loaded: any thread. */
+ * load.c makes it, site.c reads it. It is constant once loaded: any thread. A station that is moved is in another
+ * site, made beside this one (site_load_moved). */
 #ifndef FIRMWARE_SIM_SITE_SITE_H
 #define FIRMWARE_SIM_SITE_SITE_H
 
@@ -18,22 +19,38 @@ struct site_leg {
     double scale[3]; /* as below */
 };
 
+/* A station's tripod, once its height above the ground is known (tripod.c). */
+struct site_tripod {
+    const struct config_tripod *from; /* NULL: none */
+    double head_m;      /* the head's origin above the ground, along the plumb line; NaN: no ground below */
+    double height_m;    /* the tripod's top, likewise */
+    double opening_rad; /* of a leg, from the vertical */
+    double gap_m;       /* between feet and ground: more than 0 where it hovers */
+    struct cast_tripod cast;
+    struct scene *legs; /* NULL: not in view */
+    struct bvh *bvh;
+};
+
 struct site_station {
     const struct config_station *station; /* of the configuration, or of stops */
     struct bvh *bvh;                      /* shared where stations are near each other */
     struct sight *_Atomic sight;          /* what it sees; NULL: rays go to the BVH (site_open_sights) */
+    _Atomic uint32_t *sight_users;        /* sites that share the map */
     struct georef *georef;
     struct placement at;
+    struct site_tripod tripod;
     struct cast_beam *beam;         /* NULL: one ray per pulse */
     struct beam_outlines *outlines; /* an adaptive one's */
     double scale[3];                /* of geo points on the wire, units of the CRS per count */
     struct site_leg *leg;           /* one for each stretch of a trajectory, in the geo layout; else NULL */
     struct plan_row plan;           /* how the georef's method was chosen; of the worst leg */
+    struct cast_colour colour;      /* of its points; where output.colour is not none */
     double t_s, frame; /* a stop: when it is, after the trajectory's first sample; frame scalar of the trajectory */
 };
 
 struct site_mover {
     const struct config_mesh *mesh;
+    uint32_t number; /* of the mesh in the configuration */
     struct scene *scene;
     struct bvh *bvh;
     double centre_m[3], radius_m;
@@ -53,6 +70,12 @@ struct site_detect {
     uint16_t *kind;              /* [n_real] of surfaces, for outlines; NULL: not modelled */
 };
 
+/* Colours of points (colours.c): output.colour, with its limits. */
+struct site_colours {
+    struct colour_scale scale;
+    struct surface_colours surfaces; /* texture */
+};
+
 /* What was planned. Scans take their methods from here alone. */
 struct site_plan {
     struct plan_methods methods;
@@ -62,6 +85,28 @@ struct site_plan {
     size_t n;
 };
 
+/* What the sites of one scene share (world.c): the meshes, and the BVHs that any of them needed. The last site that
+ * goes frees it. Sites that share are loaded and freed by one thread; others may cast meanwhile. */
+struct site_world {
+    uint32_t n_users;
+    uint32_t n_loads; /* how often the meshes were read: once */
+    struct scene *scene;
+    struct site_mover mover[CAST_MAX_MOVERS];
+    uint32_t n_movers, n_surfaces;
+    struct site_target {
+        uint8_t *is_target;                   /* [n_surfaces] scene.target fits; NULL: all are scanned */
+        uint32_t surfaces, triangles;         /* that are scanned ... */
+        uint32_t all_surfaces, all_triangles; /* ... of so many in the files */
+    } target;
+    struct site_bvh {
+        struct bvh *bvh;
+        double reach_m;   /* rays may begin so far from its origin */
+        int is_ordered;   /* bvh_order_exactly */
+        uint32_t n_users; /* sites */
+    } * bvh;
+    uint32_t n_bvh; /* so many were built */
+};
+
 /* A stretch of a moving head's path. Its BVH reaches all of it. */
 struct site_stretch {
     int64_t until_ns; /* since the scan's start: whole milliseconds; INT64_MAX: the last one */
@@ -69,18 +114,36 @@ struct site_stretch {
     double centre_m[3], reach_m; /* all of it lies so near to that */
 };
 
+/* Warnings of loading, so that a site beside it says only what is new. */
+enum { SITE_MAX_SAID = 64 };
+struct site_said {
+    char *text[SITE_MAX_SAID];
+    uint32_t n;
+    uint32_t n_new;  /* those that the site before did not have */
+    char first[160]; /* of these */
+};
+
 struct site {
     const struct config *cfg;
+    struct config *own_cfg; /* of site_load_moved; else NULL */
+    struct site_said said;
     struct emitter emitter; /* the profile's, with its list of directions */
     struct emitter_firing *direction;
-    struct scene *scene; /* what stands still */
+    struct site_world *world;
+    struct scene *scene; /* what stands still; of the world, as movers and BVHs are */
     struct placement_anchor anchor;
     struct site_mover mover[CAST_MAX_MOVERS];
-    uint32_t n_movers, n_surfaces; /* surfaces of the scene, then of the movers, then their ghosts */
+    uint32_t n_movers, n_surfaces; /* surfaces of the scene, of the movers, of legs, then the ghosts of all */
+    struct scene_surface *legs;    /* what points on tripods' legs are of, with the label legs_label; NULL: no legs */
+    uint32_t legs_label;
+    uint8_t *silent; /* by label: hides and gives no echo; NULL: none (scene.target) */
     struct site_detect detect;
+    struct site_colours colours;
     struct site_plan plan;
+    int moved;               /* by site_load_moved */
+    uint32_t planned_frames; /* of a scan, as the plan counts its pulses; a run may scan on (--duration) */
     int measures; /* for `plan`: footprints are cast to find the error of a forced beam, even of single rays */
-    struct bvh *bvh[CONFIG_MAX_STATIONS];
+    struct bvh *bvh[CONFIG_MAX_STATIONS]; /* those of the world that it uses */
     uint32_t n_bvh;
     struct site_station *station;
     uint32_t n_stations;
@@ -107,9 +170,52 @@ struct site {
 
 /* cfg must outlive the site. */
 int site_load(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err);
+/* The same beside another site, of another scanner of the same file: what is the same scene is loaded no second time,
+ * and a BVH that will do is built no second time. `other` may be freed before or after. */
+int site_load_beside(const struct config *cfg, const struct site *other, const struct sh_report *report,
+                     struct site **out, struct sh_err *err);
 /* The same for `plan`: site->plan.row is filled, with bounds also of what is forced. */
 int site_load_plan(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err);
 void site_free(struct site *site);
+
+/* Whether two settings differ in what a site is planned for: ranges, noise, step of a sphere. */
+int site_varies(const struct head_settings *a, const struct head_settings *b);
+/* The site as it were if its configuration had the ranges, the noise and the sphere's step of the settings: detection,
+ * georeference of the station and scale on the wire are made again, by the same steps as in loading. All else is that
+ * of `from`, which must outlive it: scene, BVHs, maps, and the methods that were chosen by trying them on the scene
+ * (beam, optics). It serves scans from that station alone; maps are looked up in `from`. Milliseconds. SH_EINPUT: it
+ * can't be planned so. Freed by site_vary_free. */
+int site_vary(const struct site *from, const struct head_settings *settings, uint32_t station, struct site **out,
+              struct sh_err *err);
+void site_vary_free(struct site *site);
+/* Gives back the BVHs of its scene, also those of other sites that share it. What is loaded beside it then shares the
+ * meshes alone. Nobody casts at any of these sites any more: they can only be freed. */
+void site_drop_bvhs(struct site *site);
+
+/* Where a station stands and how it is turned, as its keys in the configuration say it: the head's origin in the scene
+ * frame, metres; degrees. */
+struct site_place {
+    double position_m[3], heading_deg, pitch_deg, roll_deg;
+};
+void site_get_place(const struct site *site, uint32_t station, struct site_place *out);
+/* Why no station of a site can be moved; NULL: they can. */
+const char *site_why_fixed(const struct site *site);
+/* The site beside `from` in which a station (0..) of this scanner stands at `to`; NULL: where it stood in `first`, the
+ * site that was loaded from the configuration. Loaded as a configuration with that place would be, with the maps of
+ * from's stations that still hold, and all others that are planned. Meshes are shared, and so is the BVH, up to
+ * SITE_BVH_REACH_M. Where none reaches the place yet, one more is built, which then reaches as far as the scene is large.
+ * from and first may be cast from meanwhile; sites of one world are loaded and freed by one thread at a time. report is
+ * warned of what loading `from` had not to say; out->said counts it. SH_EINPUT: nobody can stand there. */
+int site_load_moved(const struct site *from, const struct site *first, uint32_t station, const struct site_place *to,
+                    const struct sh_report *report, struct site **out, struct sh_err *err);
+/* Nobody casts from this site any more; but it is to be freed by its owner: gives back what it has alone. */
+void site_retire(const struct site *site);
+/* Gives back BVHs that no site of its world uses. */
+void site_drop_unused_bvhs(const struct site *site);
+
+/* How many stations a site of this configuration will have, before it is loaded: where the platform stops, its stops.
+ * Errors as of site_load. */
+int site_count_stations(const struct config *cfg, const struct sh_report *report, uint32_t *n, struct sh_err *err);
 
 /* A site holds the maps of so many stations at a time. Where there are more, a run has none, and a recording
  * that of the station at hand; whether a map is used then changes no hit. */
@@ -118,6 +224,9 @@ enum { SITE_MAX_SIGHTS = 16 };
 /* Makes the maps of n stations from `first` on, where the plan says so, and gives back those of others. Before
  * their scans, and while none is on: casters take the map with the station's setup. */
 int site_open_sights(struct site *site, uint32_t first, uint32_t n, const struct sh_report *report, struct sh_err *err);
+
+/* How many of its stations this scanner scans from (config_serves); the others only have a place. */
+uint32_t site_n_served(const struct site *site);
 
 /* The grid of output.crs utm, as georef_spec has it: one for all stations of an anchored scene, that of the
  * anchor or of the first station, unless output.utm_zone or the scene's own grid says it; else by position.
@@ -129,6 +238,8 @@ void site_fill_spec(const struct site *site, const struct head_settings *setting
 
 /* Entries that a pulse may need in a block: its echoes, as far as the plan allows for more than one. */
 uint32_t site_points_per_pulse(const struct site *site);
+/* The same whatever is planned once a station was moved. */
+uint32_t site_most_points_per_pulse(const struct site *site);
 
 /* Names of a label below n_surfaces. */
 const struct scene_surface *site_surface(const struct site *site, uint32_t label);
@@ -146,9 +257,16 @@ void site_enter(const struct site *site, uint32_t station, size_t stretch, struc
 const struct georef *site_georef(const struct site *site, uint32_t station, size_t stretch, const double **centre_m,
                                  const double **scale);
 
+/* "top 1.6 m above the ground, opening 27.3 deg, ..."; of a station with a tripod. */
+void site_describe_tripod(const struct site_station *station, char *text, size_t len);
+
 /* Poses of all movers at a time of the scan; at a stop they stand as at the stop's own (site_mover_time). */
 void site_move(const struct site *site, double t_s, struct cast_setup *setup);
 double site_mover_time(const struct site *site, uint32_t station, double scan_s);
+
+/* Whether a direction, socs, lies within what the head of a station scans with the settings at power-up. Heads that turn
+ * without a pan count with their whole field of view, as do spheres and lists. */
+int site_scans(const struct site *site, uint32_t station, const double dir_socs[3]);
 
 /* What the casters need to scan from a station (0..n_stations-1), at the configured pulse rate. */
 void site_cast_setup(const struct site *site, uint32_t station, struct cast_setup *setup);

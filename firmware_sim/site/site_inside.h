@@ -4,6 +4,31 @@
 
 #include "firmware_sim/site/site.h"
 
+/* ---- load.c */
+enum site_purpose {
+    SITE_FOR_SCANS,
+    SITE_FOR_PLAN, /* site_load_plan */
+    SITE_MOVED,    /* site_load_moved: a BVH that is built has room for further moves */
+};
+int site_create(const struct config *cfg, enum site_purpose purpose, const struct site *other,
+                const struct sh_report *report, struct site **out, struct sh_err *err);
+
+/* ---- said.c: warnings of loading. */
+struct site_listener {
+    struct sh_report report; /* to be handed on */
+    const struct sh_report *to;
+    struct site_said *said;
+    const struct site_said *before;
+};
+/* What is warned of goes into `said`, and to `to` unless it is in `before` (NULL: nothing is). */
+void site_listen(struct site_listener *listener, const struct sh_report *to, struct site_said *said,
+                 const struct site_said *before);
+void site_free_said(struct site_said *said);
+
+/* ---- colours.c: what colours show. The scene, detection, the stations and a head's path are there. Warns of textures
+ * that can't be read. */
+int site_set_up_colours(struct site *site, const struct sh_report *report, struct sh_err *err);
+
 /* ---- detection.c: what a site's scans do between a hit and a point (signal, surfaces, instrument, noise),
  * made once from the configuration and the loaded scene. */
 
@@ -11,6 +36,9 @@
  * ghosts. Warns of entries of `surfaces` that no surface fits. */
 int site_set_up_detect(struct site *site, const struct sh_report *report, struct sh_err *err);
 void site_free_detect(struct site *site);
+/* site is a copy of one that is set up, with another cfg: what of detection depends on ranges and noise, made again. What
+ * it points to stays that of the other. */
+int site_vary_detect(struct site *site, struct sh_err *err);
 
 /* How many surfaces of glass or mirrors pulses are followed through, once that is known. */
 void site_set_depth(struct site *site, uint32_t depth);
@@ -38,6 +66,28 @@ int site_load_stops(struct site *site, const struct sh_report *report, struct sh
 /* Reads the trajectory, and builds the BVHs that its path needs. */
 int site_load_platform(struct site *site, const struct sh_report *report, struct sh_err *err);
 
+/* ---- world.c: what sites share. */
+
+/* Joins the world of other (NULL: none) where its scene is the same, or gets a new, empty one. */
+int site_enter_world(struct site *site, const struct site *other, struct sh_err *err);
+/* Gives back what is used of it. */
+void site_leave_world(struct site *site);
+/* What its own configuration, or that of another scanner in the scene, needs. */
+double site_world_range_max_m(const struct site *site);
+double site_world_ray_reach_m(const struct site *site, const double station_m[3]);
+/* Notes a BVH that was built. */
+int site_keep_bvh(struct site_world *world, struct bvh *bvh, double reach_m, int is_ordered, struct sh_err *err);
+/* One more site uses it. */
+void site_use_bvh(struct site *site, struct site_bvh *entry);
+
+/* ---- target.c: scene.target. */
+
+/* The meshes are loaded, each with labels of its own: leaves out what is no target, or notes it. SH_EINPUT where a pattern fits nothing, or nothing is
+ * left. */
+int site_select_target(struct site *site, struct sh_err *err);
+/* Labels of ghosts are known: which give no echo. */
+int site_set_up_silent(struct site *site, struct sh_err *err);
+
 /* ---- bvhs.c: one BVH for each body that moves, and as many of the scene as the places of the head need. In: the
  * loaded scene, and where rays begin (prcs, metres). Out: site->bvh and the BVHs of movers; the site owns
  * them. */
@@ -57,8 +107,20 @@ int site_order_bvhs(struct site *site, const struct sh_report *report, struct sh
 
 /* Once the order of surfaces is planned and all stations are placed. */
 int site_build_mover_bvhs(struct site *site, const struct sh_report *report, struct sh_err *err);
+/* Of a body's scene, for rays that begin within the sphere. *out is the caller's, also after an error. */
+int site_build_body_bvh(const struct site *site, const struct scene *scene, const struct site_sphere *from,
+                        const struct sh_report *report, struct bvh **out, struct sh_err *err);
 /* For heads that stand; stations near each other share one. */
 int site_build_station_bvhs(struct site *site, const struct sh_report *report, struct sh_err *err);
+
+/* ---- tripod.c: what stations' heads stand on. In: the placed stations and their BVHs. Out: each tripod's opening, what
+ * it hides, and its legs where they are in view. */
+
+/* The scene and its movers are loaded: labels for what is seen of legs, if there are any. */
+int site_name_legs(struct site *site, struct sh_err *err);
+/* Warns of tripods that hover, and of those without a ground. */
+int site_set_up_tripods(struct site *site, const struct sh_report *report, struct sh_err *err);
+void site_free_tripod(struct site_tripod *tripod);
 
 /* ---- georeference.c: georeferencing of a site's stations: heights, CRS, method, and how many metres a
  * count is on the wire. */
@@ -66,6 +128,9 @@ int site_build_station_bvhs(struct site *site, const struct sh_report *report, s
 /* Stations are placed, the path of a moving head is known. Fills the stations' georef, plan, scale and leg,
  * and site->scale_m. Warns where a tolerance is not met. */
 int site_georeference(struct site *site, const struct sh_report *report, struct sh_err *err);
+/* The same for one station, which has none, and for the scale, which all of them decide; without warnings. */
+int site_georeference_one(struct site *site, uint32_t station, struct sh_err *err);
+void site_free_georeference(struct site *site, uint32_t station);
 
 /* ---- look.c: looking at the scene as the head does: the places that pulses are fired from, with setups as
  * the run's. For trying methods (core/plan draws the pulses), and for measuring what they cost. */
@@ -122,6 +187,8 @@ int site_order_can_wait(const struct site *site);
  * the order. Orders BVHs that have waited for that in vain. */
 int site_plan_sight(struct site *site, const struct sh_report *report, struct sh_err *err);
 void site_close_sights(struct site *site);
+/* Maps of another site's stations that stand as they did, before site_open_sights makes the others. */
+void site_share_sights(struct site *site, const struct site *from);
 
 /* ---- doubts.c: what is allowed, and hardly meant. Once the scene has its BVHs. */
 

@@ -1,6 +1,7 @@
 #include "firmware_sim/site/site_inside.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "core/angle.h"
 #include "core/instrument.h"
@@ -47,8 +48,18 @@ static void add_sweep(struct site_view *view, const struct head_settings *s)
               0.5 * turn_rad);
 }
 
-/* What a turning head sees is not cut by its window: that saves little. */
-static void add_emitter(struct site_view *view, const struct emitter *e)
+/* The rings of a sphere, and its sector; where poles are among them, what is around them. */
+static void add_rings(struct site_view *view, const struct emitter *e, const struct head_settings *s)
+{
+    const double start_rad = from_udeg(s->line_start_udeg), stop_rad = from_udeg(s->line_stop_udeg);
+    const double to_rad = start_rad <= stop_rad ? stop_rad - start_rad : stop_rad - start_rad + 2.0 * M_PI;
+    add_band(view, &(struct site_band){angle_rad(360.0 * emitter_ring_turn(e, 0)),
+                                       angle_rad(360.0 * emitter_ring_turn(e, e->rings - 1)), start_rad + 0.5 * to_rad,
+                                       0.5 * to_rad});
+}
+
+/* What heads with beams see is not cut by their window: that saves little. */
+static void add_emitter(struct site_view *view, const struct emitter *e, const struct head_settings *s)
 {
     const struct site_band all = {-M_PI_2, M_PI_2, 0.0, M_PI};
     if (e->kind == EMITTER_PLANAR) add_band(view, &(struct site_band){0.0, 0.0, 0.0, M_PI});
@@ -56,7 +67,8 @@ static void add_emitter(struct site_view *view, const struct emitter *e)
         const double elevation_rad = from_udeg(e->beam[i].elevation_udeg);
         add_band(view, &(struct site_band){elevation_rad, elevation_rad, 0.0, M_PI});
     }
-    if (e->kind == EMITTER_SPHERE || e->kind == EMITTER_DIRECTIONS) add_band(view, &all);
+    if (e->kind == EMITTER_SPHERE) add_rings(view, e, s);
+    if (e->kind == EMITTER_DIRECTIONS) add_band(view, &all);
 }
 
 void site_view_of(const struct site *site, uint32_t station, struct site_view *view)
@@ -71,7 +83,7 @@ void site_view_of(const struct site *site, uint32_t station, struct site_view *v
     if (site->emitter.kind == EMITTER_LINE)
         add_sweep(view, &site->cfg->head.settings);
     else
-        add_emitter(view, &site->emitter);
+        add_emitter(view, &site->emitter, &site->cfg->head.settings);
 }
 
 /* A cap of radius r around elevation e goes asin(sin r / cos e) to both sides in azimuth, if it holds no pole. */
@@ -103,4 +115,13 @@ double site_view_share(const struct site_view *view, double radius_rad)
         seen += site_view_sees(view, (const double[3]){r * cos(turn), r * sin(turn), z}, radius_rad) != 0;
     }
     return fmax(1.0, seen) / DIRECTIONS;
+}
+
+int site_scans(const struct site *site, uint32_t station, const double dir_socs[3])
+{
+    struct site_view view;
+    site_view_of(site, station, &view);
+    memcpy(view.rotation, mat3_unit, sizeof view.rotation);
+    view.margin_rad = 0.0;
+    return site_view_sees(&view, dir_socs, 0.0);
 }

@@ -1,22 +1,36 @@
-# Writes x, y, z of a PLY file's vertices, read by its header alone (Python's struct module).
+# Writes x, y, z of a PLY file's vertices, read by its header alone (Python's struct module); with a third name, the corners
+# of its faces there.
 import struct
 import sys
 
-TYPES = {"double": "d", "float": "f", "uchar": "B", "ushort": "H"}
+TYPES = {"double": "d", "float": "f", "uchar": "B", "ushort": "H", "int": "i"}
 with open(sys.argv[1], "rb") as ply, open(sys.argv[2], "w") as out:
-    names, layout, count = [], "<", 0
+    names, layout, count = {}, {}, {}
     for line in iter(ply.readline, b"end_header\n"):
         word = line.decode().split()
         if word[:1] == ["format"] and word[1] != "binary_little_endian":
             sys.exit("not little-endian")
-        if word[:2] == ["element", "vertex"]:
-            count = int(word[2])
-        if word[:1] == ["property"]:
-            layout += TYPES[word[1]]
-            names.append(word[2])
-    at = [names.index(n) for n in ("x", "y", "z")]
+        if word[:1] == ["element"]:
+            element = word[1]
+            names[element], layout[element], count[element] = [], "<", int(word[2])
+        if word[:2] == ["property", "list"]:
+            # triangles alone: three corners after their number
+            layout[element] += TYPES[word[2]] + 3 * TYPES[word[3]]
+            names[element] += ["n", 0, 1, 2]
+        elif word[:1] == ["property"]:
+            layout[element] += TYPES[word[1]]
+            names[element].append(word[2])
+    at = [names["vertex"].index(n) for n in ("x", "y", "z")]
     body = ply.read()
-    if len(body) != count * struct.calcsize(layout):
+    size = {e: count[e] * struct.calcsize(layout[e]) for e in count}
+    if len(body) != sum(size.values()):
         sys.exit("the body has another length")
-    for vertex in struct.iter_unpack(layout, body):
+    vertices = struct.iter_unpack(layout["vertex"], body[: size["vertex"]])
+    for vertex in vertices:
         print(*(repr(vertex[i]) for i in at), file=out)
+    if len(sys.argv) > 3:
+        with open(sys.argv[3], "w") as faces:
+            for face in struct.iter_unpack(layout["face"], body[size["vertex"] :]):
+                if face[0] != 3:
+                    sys.exit("not a triangle")
+                print(*face[1:4], file=faces)

@@ -1,5 +1,9 @@
 #include "tests/unit/command_device.h"
 
+static const struct command_place first_places[3] = {{{1, 2, 3, 0, 0, 0}}, {{4, 5, 6, 0, 0, 0}}, {{7, 8, 9, 0, 0, 0}}};
+static const struct command_place places[3] = {
+    {{1, 2, 3, 0, 0, 0}}, {{-0.1, 5e-7, 1e9, 359.5, -90, 1.0 / 3.0}}, {{7, 8, 9, 0, 0, 0}}};
+
 struct command_device command_test_device(void)
 {
     struct command_device dev = {
@@ -13,7 +17,15 @@ struct command_device command_test_device(void)
                    .fov_max_udeg = 60 * MICRO,
                    .pan_min_udeg = -180 * MICRO,
                    .pan_max_udeg = 360 * MICRO,
-                   .n_stations = 3},
+                   .n_stations = 3,
+                   .sweep_udeg = 360 * MICRO,
+                   .range_min_nm = 500 * MICRO,
+                   .range_max_nm = 800 * NANO,
+                   .near_most_nm = 250 * NANO,
+                   .far_least_nm = 2 * NANO,
+                   .noise_most = 1,
+                   .angle_most = 1,
+                   .ball_max_nm = 100 * NANO},
         .settings = {.prr_uhz = 300000 * MICRO,
                      .lines_uhz = 100 * MICRO,
                      .pan_udeg_s = 18 * MICRO,
@@ -22,13 +34,18 @@ struct command_device command_test_device(void)
                      .pan_start_udeg = 0,
                      .pan_stop_udeg = 180 * MICRO,
                      .frames = 1,
-                     .station = 1},
+                     .station = 1,
+                     .range_min_nm = NANO,
+                     .range_max_nm = 400 * NANO,
+                     .sigma_nm = 5 * MICRO},
         .state = HEAD_IDLE,
         .frames_done = 7,
         .t_ns = INT64_C(1234567890123),
         .utc = "2026-01-01T00:20:34.567890123Z",
         .gps = "2399,346852.567890123",
     };
+    dev.place = places;
+    dev.first_place = first_places;
     dev.defaults = dev.settings;
     return dev;
 }

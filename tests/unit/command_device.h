@@ -5,6 +5,7 @@
 #include "firmware_sim/command/command.h"
 
 #define MICRO INT64_C(1000000)
+#define NANO  INT64_C(1000000000)
 
 struct command_device command_test_device(void);
 

@@ -111,6 +111,7 @@ void rig_close(struct rig *rig)
 
 int rig_claim(struct rig *rig)
 {
+    device_done(&rig->work);
     if (device_claim(rig->device, &rig->work) != 0) {
         rig->over = 1;
         return 0;

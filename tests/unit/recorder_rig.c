@@ -111,6 +111,7 @@ int rig_record(const char *path, struct recorder_options options, int keep, stru
     options.report = &report;
     const struct recorder_ops *ops = recorder_find(path, err);
     assert_non_null(ops);
+    ops = recorder_shape(ops, &options);
     assert_int_equal(scanhead_open(rig_shs, &sh, NULL, 0), 0);
     int rc = recorder_open(ops, path, &options, &rec, err);
     if (rc == 0) {

@@ -154,6 +154,29 @@ static void what_is_missing_is_told_apart(void **state)
     cloud_free(&c);
 }
 
+/* Only where they are asked for; a second column of a name doesn't count. */
+static void columns_are_read_where_asked_for(void **state)
+{
+    (void)state;
+    static const char text[] =
+        TEXT "element vertex 2\n" XYZ "property double scalar_time\nproperty double time\nproperty double range\n"
+             "property float reflectance\nproperty uchar echo_count\nend_header\n"
+             "1 2 3 4.5 9 3.75 -6.5 2\n1 2 3 5.5 9 nan nan 0\n";
+    struct cloud c = must_read("columns.ply", text, sizeof text - 1);
+    assert_true(c.time_s == NULL && c.range_m == NULL && c.reflectance_db == NULL && c.echo_count == NULL);
+    cloud_free(&c);
+    struct sh_err err;
+    const unsigned all = CLOUD_TIME | CLOUD_RANGE | CLOUD_REFLECTANCE | CLOUD_ECHO_COUNT;
+    assert_int_equal(cloud_read_columns(write_file("columns.ply", text, sizeof text - 1), all, &report, &c, &err),
+                     SH_OK);
+    unlink(path);
+    assert_true(c.time_s[0] == 4.5 && c.time_s[1] == 5.5);
+    assert_true(c.range_m[0] == 3.75f && isnan(c.range_m[1]) && c.reflectance_db[0] == -6.5f);
+    assert_true(c.echo_count[0] == 2 && c.echo_count[1] == 0);
+    assert_true(c.count_m == 1e-6); /* six decimals; floats of 3 m are finer */
+    cloud_free(&c);
+}
+
 static void malformed_files_are_refused(void **state)
 {
     (void)state;
@@ -258,6 +281,7 @@ int main(void)
         cmocka_unit_test(test_scalar_names),
         cmocka_unit_test(all_encodings_are_read),
         cmocka_unit_test(what_is_missing_is_told_apart),
+        cmocka_unit_test(columns_are_read_where_asked_for),
         cmocka_unit_test(malformed_files_are_refused),
         cmocka_unit_test(broken_bytes_do_no_harm),
         cmocka_unit_test(losses_of_the_file_are_told),

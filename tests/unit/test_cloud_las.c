@@ -42,6 +42,12 @@ static void test_read(void **state)
         }
         assert_true(fabs(cloud.xyz_m[1][0] - 500003.251) < 1e-9 && fabs(cloud.xyz_m[1][1] - 4999995.999) < 2e-9);
         assert_true(fabs(cloud.xyz_m[1][2] - 412.126) < 1e-12);
+        assert_true(cloud.time_s == NULL && cloud.reflectance_db == NULL && cloud.has_own_counts);
+        cloud_free(&cloud);
+        const unsigned columns = CLOUD_TIME | CLOUD_REFLECTANCE | CLOUD_ECHO_COUNT | CLOUD_RANGE;
+        assert_int_equal(cloud_read_columns(rig_path("a.las"), columns, NULL, &cloud, &err), 0);
+        assert_true(fabs((double)cloud.reflectance_db[0] + 12.34) < 1e-5 && isnan(cloud.reflectance_db[1]));
+        assert_true(cloud.echo_count[0] == 2 && cloud.range_m == NULL && cloud.time_s[1] >= cloud.time_s[0]);
         cloud_free(&cloud);
         unlink(rig_path("a.las"));
     }

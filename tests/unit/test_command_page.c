@@ -46,7 +46,13 @@ static const struct {
               {offsetof(struct head_limits, fov_max_udeg), "`fov_max_deg`"},
               {offsetof(struct head_limits, pan_min_udeg), "`pan_min_deg`"},
               {offsetof(struct head_limits, pan_max_udeg), "`pan_max_deg`"},
-              {offsetof(struct head_limits, n_stations), "the number of stations"}};
+              {offsetof(struct head_limits, n_stations), "the number of stations"},
+              {offsetof(struct head_limits, range_min_nm), "`range_min_m`"},
+              {offsetof(struct head_limits, range_max_nm), "`range_max_m`"},
+              {offsetof(struct head_limits, near_most_nm), "below each program's reach"},
+              {offsetof(struct head_limits, far_least_nm), "above each program's `range_min_m`"},
+              {offsetof(struct head_limits, sigma_min_nm), "0, with a signal model `range_sigma_floor_m`,"},
+              {offsetof(struct head_limits, ball_max_nm), "100"}};
 
 static void add_bound(char text[256], const struct command_bound *bound, int decimals)
 {
@@ -63,6 +69,10 @@ static void add_range(char text[256], const struct command_row *row)
     for (int i = 0; s->words != NULL && s->words[i] != NULL; i++)
         add(text, "%s%s", i == 0 ? "" : ", ", s->words[i]);
     if (s->words != NULL) return;
+    if (s->derived != NULL) {
+        add(text, "what the head's rates give");
+        return;
+    }
     add_bound(text, &s->min, row->unit->decimals);
     add(text, " to ");
     add_bound(text, &s->max, row->unit->decimals);
@@ -81,7 +91,12 @@ static void add_range(char text[256], const struct command_row *row)
 static void fill_line(char line[256], const struct command_row *row, int query)
 {
     size_t len = strcspn(row->header, "[");
-    snprintf(line, 256, "%.*s%s", (int)len, row->header, query ? "?" : row->setting ? " DEF" : row->unit ? " 1" : "");
+    snprintf(line, 256, "%.*s%s", (int)len, row->header,
+             query          ? "?"
+             : row->own     ? " 1, DEF"
+             : row->setting ? " DEF"
+             : row->unit    ? " 1"
+                            : "");
 }
 
 static int refused(const struct command_row *row, enum head_state state, uint32_t control)
@@ -93,6 +108,9 @@ static int refused(const struct command_row *row, enum head_state state, uint32_
     dev.control = control;
     dev.step_allowed = 1;
     dev.settings.station = 2; /* so that DEF changes each setting */
+    dev.settings.noise = dev.settings.angle_noise = 1;
+    dev.settings.range_min_nm = dev.settings.sigma_nm = dev.settings.ball_nm = NANO + 1;
+    dev.settings.range_max_nm = 300 * NANO;
     fill_line(line, row, row->act == NULL);
     command_execute(&dev, 1, line, &result);
     return result.error;
@@ -115,7 +133,9 @@ static void columns(char text[256], const struct command_row *row)
     add(text, "| `%s` | %s | ", row->header, row->query == NULL ? "action" : row->act == NULL ? "query" : "setting");
     if (row->unit != NULL && row->unit->name[0] != 0) add(text, "%s (%s)", row->unit->name, row->unit->suffixes);
     add(text, " | ");
-    if (row->setting != NULL) {
+    if (row->own) {
+        add(text, "see *Moving a station*");
+    } else if (row->setting != NULL) {
         add_range(text, row);
     } else if (row->unit != NULL) {
         struct command_device dev = command_test_device();

@@ -126,6 +126,19 @@ static void settings_that_do_not_fit_are_refused(void **state)
         {"hokuyo-ust-20lx", "  lines_hz: 11\n",
          "11 is outside the limits of head profile hokuyo-ust-20lx; allowed 40 Hz"},
         {"hokuyo-urg-04lx", "  line_start_deg: -130\n", "allowed -119.53125 to 119.882813"},
+        {"velodyne-vlp16", "  step_deg: 1\n",
+         ":3: head.step_deg: head profile velodyne-vlp16 has emitter: beams; allowed only with emitter: sphere"},
+        {"riegl-vz400i", "  ring_stop_deg: 1\n", ":3: head.ring_stop_deg: head profile riegl-vz400i has emitter: line"},
+        {"sphere", "  step_deg: 0.009\n", "out of range; allowed 0.01 to 90 deg"},
+        {"sphere", "  ring_start_deg: 1\n  ring_stop_deg: 0.5\n",
+         ":4: head.ring_stop_deg: the rings go from 1 to 0.5 deg; allowed a ring_start_deg of at most 0.5, or a "
+         "ring_stop_deg of at least 1"},
+        {"sphere", "  ring_start_deg: 0.1\n  ring_stop_deg: 0.9\n",
+         "no ring lies from 0.1 to 0.9 deg; allowed are limits around one, such as 0 or 1 deg"},
+        {"sphere", "  line_start_deg: 90\n  line_stop_deg: 90\n",
+         "the line goes from 90 to 90 deg; allowed a line_start_deg other than 90"},
+        {"sphere", "  step_deg: 0.01\n  lines_hz: 278\n",
+         "278 is outside the limits of head profile sphere; allowed 1 to"},
         {"velodyne-vlp16", "  prr_hz: 300000\n", ":3: head.prr_hz: 300000 is outside"},
         {"velodyne-vlp16", "  ambiguity: folded\n", ":3: head.ambiguity: the pulses of head profile velodyne-vlp16"},
     };
@@ -220,6 +233,25 @@ static void spheres_go_to_their_limits(void **state)
     }
 }
 
+/* 3600 pulses a ring at a thousand rings a second; 36000 at no more than 1e7 pulses a second. */
+static void the_step_of_a_sphere_is_a_setting(void **state)
+{
+    (void)state;
+    assert_loads(load_settings("sphere", ""));
+    assert_int_equal(cfg->profile.emitter.steps, 360);
+    assert_loads(load_settings("sphere", "  step_deg: 0.1\n"));
+    assert_int_equal(cfg->profile.emitter.steps, 3600);
+    assert_int_equal(cfg->profile.emitter.rings, 1801);
+    assert_int_equal(cfg->head.settings.prr_uhz, INT64_C(3600000) * 1000000);
+    assert_loads(load_settings("sphere", "  step_deg: 0.01\n"));
+    assert_int_equal(cfg->head.settings.lines_uhz, 277777777);
+    assert_int_equal(cfg->head.settings.prr_uhz, INT64_C(36000) * 277777777);
+    assert_loads(
+        load_settings("sphere", "  step_deg: 2.2\n  lines_hz: 20\n  line_start_deg: 350\n  line_stop_deg: 10\n"));
+    assert_int_equal(cfg->head.settings.prr_uhz, INT64_C(164) * 20000000);
+    assert_int_equal(cfg->profile.emitter.rings, 83);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -228,6 +260,7 @@ int main(void)
         cmocka_unit_test(settings_that_do_not_fit_are_refused),
         cmocka_unit_test(lists_name_their_line),
         cmocka_unit_test(spheres_go_to_their_limits),
+        cmocka_unit_test(the_step_of_a_sphere_is_a_setting),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -39,6 +39,7 @@ static void rows_are_sound(void **state)
                         : key->type == CFG_COUNT                         ? key->size == 4 || key->size == 8
                         : key->type == CFG_BOOL || key->type == CFG_ENUM ? key->size == sizeof(int)
                         : key->type == CFG_VEC3                          ? key->size == 3 * sizeof(double)
+                        : key->type == CFG_PAIR                          ? key->size == 2 * sizeof(double)
                                                                          : 1;
             if (!sized) fail_msg("%s: its member has another size than its type", key->path);
             if (cfg_find(tables[t], key->path) != key) fail_msg("%s stands twice", key->path);

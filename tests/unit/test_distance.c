@@ -309,6 +309,19 @@ static void limits_and_ties(void **state)
     assert_int_equal(distance_query(index, nowhere, INFINITY, &hit), 0);
     assert_int_equal(distance_query(index, far, 1e9, &hit), 1);
     assert_true(hit.distance_m == 999999999);
+    /* whose squares a double or a float can't hold */
+    for (int k = 0; k < 3; k++) {
+        static const double size_m[] = {1e19, 1e30, 1e39, 1e160, 1e300};
+        for (int i = 0; i < 10; i++) {
+            double p[3] = {0.3, 0.3, 0};
+            p[k] = i % 2 == 0 ? size_m[i / 2] : -size_m[i / 2];
+            assert_int_equal(distance_query(index, p, 1e9, &hit), 0);
+            assert_int_equal(distance_query(index, p, INFINITY, &hit), 0);
+        }
+    }
+    const double beyond_utm[3] = {0.5, 0.25, -1e15};
+    assert_int_equal(distance_query(index, beyond_utm, INFINITY, &hit), 1);
+    assert_true(fabs(hit.distance_m - 1e15) <= 1);
     distance_free(index);
     scene_free(s);
     distance_free(NULL);

@@ -1,7 +1,7 @@
 /* E57 files by a small reader of their own: pages, sections, packets and bit streams as ASTM E2807 has them. */
 #include "tests/unit/recorder_rig.h"
 
-enum { PAGE = 1024, CONTENT = 1020, MAX_STREAMS = 12 };
+enum { PAGE = 1024, CONTENT = 1020, MAX_STREAMS = 15 };
 
 static uint8_t *content; /* without the CRCs */
 static size_t content_len, physical_len;
@@ -49,11 +49,14 @@ static void read_pages(const char *path)
     assert_string_equal(xml + xml_len - 11, "</e57Root>\n");
 }
 
+static int coloured; /* by label */
+
 static void record_e57(int empty_shots)
 {
     struct sh_err err = {0};
     const char *path = rig_path("a.e57");
-    int rc = rig_record(path, (struct recorder_options){.empty_shots = empty_shots}, 1, &err);
+    const struct colour_choice colour = {.given = coloured, .scale.mode = COLOUR_LABEL};
+    int rc = rig_record(path, (struct recorder_options){.empty_shots = empty_shots, .colour = colour}, 1, &err);
     if (rc != 0) fail_msg("%s", err.text);
     read_pages(path);
     unlink(path);
@@ -64,6 +67,7 @@ struct record {
     unsigned invalid, no_intensity, echo, echoes;
     uint32_t row, column;
     unsigned label;
+    uint8_t rgb[3]; /* where there are colours */
 };
 static struct record record[8192];
 static size_t n_records;
@@ -117,7 +121,7 @@ static void read_scan(int k, int empty_shots)
     size_t section = offset / PAGE * CONTENT + offset % PAGE;
     data = rig_uint(content + section + 16, 8);
     assert_int_equal(data / PAGE * CONTENT + data % PAGE, section + 32);
-    read_packets(content + section, empty_shots ? 12 : 11);
+    read_packets(content + section, (empty_shots ? 12U : 11U) + (coloured ? 3U : 0U));
     n_records = count;
     for (size_t i = 0; i < count; i++) {
         struct record *r = &record[i];
@@ -128,6 +132,8 @@ static void read_scan(int k, int empty_shots)
         r->invalid = empty_shots ? (unsigned)bits(s++, i, 2) : 0;
         r->intensity = ((double)bits(s++, i, 16) - 32768) / 100;
         r->no_intensity = (unsigned)bits(s++, i, 1);
+        for (int c = 0; c < 3 && coloured; c++)
+            r->rgb[c] = (uint8_t)bits(s++, i, 8);
         uint64_t t = bits(s++, i, 64);
         memcpy(&r->t_s, &t, 8);
         r->echo = (unsigned)bits(s++, i, 4);
@@ -264,6 +270,40 @@ static void test_packets(void **state)
     }
 }
 
+/* The colours of a record beside its label, over the edges of packets, and what the XML says of them. */
+static void test_colours(void **state)
+{
+    (void)state;
+    static struct rig_point many[4000];
+    static const char *const name[] = {"<colorRed type=\"Integer\" minimum=\"0\" maximum=\"255\">", "<colorGreen type",
+                                       "<colorBlue type"};
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1);
+    for (int i = 0; i < 4000; i++)
+        many[i] = i % 7 == 3 ? (struct rig_point){0, 0, 0, INT16_MIN, 0xffff, 0, 0}
+                             : (struct rig_point){i, -i, 2 * i, 0, (uint16_t)(i % 50), 1, 1};
+    rig_begin();
+    rig_descriptor(1, 1);
+    rig_anchor(&a);
+    rig_points(0, 0, 0, many, 3000);
+    rig_points(1, 3000, 3000, many + 3000, 1000);
+    coloured = 1;
+    record_e57(1);
+    read_scan(0, 1);
+    coloured = 0;
+    assert_int_equal(n_records, 4000);
+    for (int i = 0; i < 4000; i++) {
+        uint8_t rgb[3] = {128, 128, 128};
+        assert_int_equal(record[i].label, many[i].label);
+        if (many[i].count != 0) colour_number(many[i].label, rgb);
+        assert_memory_equal(record[i].rgb, rgb, 3);
+        assert_int_equal(record[i].invalid, many[i].count == 0 ? 2 : 0);
+    }
+    for (int i = 0; i < 3; i++)
+        assert_non_null(strstr(xml, name[i]));
+    assert_true(strstr(xml, name[0]) < strstr(xml, name[1]) && strstr(xml, name[1]) < strstr(xml, name[2]));
+    assert_true(number(xml, "colorRedMinimum") == 0 && number(xml, "colorBlueMaximum") == 255);
+}
+
 static void test_no_points(void **state)
 {
     (void)state;
@@ -323,6 +363,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_scans),     cmocka_unit_test(test_xml),        cmocka_unit_test(test_packets),
         cmocka_unit_test(test_no_points), cmocka_unit_test(test_same_bytes), cmocka_unit_test(test_disk_full),
+        cmocka_unit_test(test_colours),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }

@@ -28,6 +28,9 @@ struct head {
     char line[512]; /* what it has of a command */
     size_t len;
     const char *late; /* comes before the answer to the first line; NULL: nothing */
+    size_t half;      /* bytes of a frame that is never ended, before the first answer */
+    int slow;         /* answers no question until a second one came; the second's comes before the next command's */
+    int owed;
     int identities, errors;
 };
 
@@ -36,13 +39,19 @@ static void put(struct head *head, const char *text)
     assert_int_equal(write(head->master, text, strlen(text)), strlen(text));
 }
 
+static size_t make_event(uint8_t raw[512], uint32_t seq)
+{
+    struct native_event e = {.code = NATIVE_EV_ERROR, .text = "a line\r\nSCAN:STOP\r\n*RST\n"};
+    size_t len = native_encode_event(raw, 512, &e, 1, 0);
+    native_seal(raw, seq);
+    return len;
+}
+
 static void put_events(int fd, int n)
 {
     uint8_t raw[512];
     for (int i = 0; i < n; i++) {
-        struct native_event e = {.code = NATIVE_EV_ERROR, .text = "a line\r\nSCAN:STOP\r\n*RST\n"};
-        size_t len = native_encode_event(raw, sizeof raw, &e, 1, 0);
-        native_seal(raw, (uint32_t)i);
+        size_t len = make_event(raw, (uint32_t)i);
         assert_int_equal(write(fd, raw, len), len);
     }
 }
@@ -58,6 +67,22 @@ static void answer(struct head *head)
         put(head, head->late);
         head->late = NULL;
     }
+    if (head->half != 0) {
+        uint8_t raw[512];
+        assert_in_range(head->half, 1, make_event(raw, 0) - 1);
+        assert_int_equal(write(head->master, raw, head->half), head->half);
+        head->half = 0;
+    } else {
+        put_events(head->master, 1);
+    }
+    if (strcmp(head->line, "*IDN?") == 0 && head->slow && head->identities == 0) {
+        head->identities++;
+        head->owed = 1;
+        return;
+    }
+    if (strcmp(head->line, "*IDN?") != 0)
+        for (; head->owed > 0; head->owed--)
+            put(head, "Maker,Model,SN1,1.0\r\n");
     if (strcmp(head->line, "*IDN?") == 0) {
         head->identities++;
         put(head, "Maker,Model,SN1,1.0\r\n");
@@ -137,7 +162,7 @@ static void test_replies_in_order(void **state)
     expect_reply(sh, "SYST:ERR?", "-222,\"Data out of range; 1,2,3\"");
     expect_reply(sh, "NOSUCH", "ERR -113,\"Undefined header\"");
     end(&head, sh, slave);
-    assert_int_equal(head.identities, 1);
+    assert_true(head.identities >= 1); /* on a slow machine it asks again */
     assert_true(head.errors >= 2); /* the half line, and NOSUCH */
 }
 
@@ -187,7 +212,7 @@ static void check_late_head(int lost)
     expect_reply(sh, "*IDN?", "Maker,Model,SN1,1.0");
     expect_reply(sh, "TIME?", "12");
     end(&head, sh, slave);
-    assert_int_equal(head.identities, lost ? 2 : 5);
+    assert_true(head.identities >= (lost ? 2 : 5));
     assert_int_equal(head.errors, 0);
 }
 
@@ -198,10 +223,49 @@ static void test_late_head(void **state)
     check_late_head(1);
 }
 
+/* The head was in the middle of a frame for the program before: the first answer is lost in the rest of it. */
+static void test_half_a_frame(void **state)
+{
+    uint8_t raw[512];
+    (void)state;
+    const size_t whole = make_event(raw, 0), halves[] = {NATIVE_HEADER_LEN - 1, whole - 1};
+    for (size_t i = 0; i < sizeof halves / sizeof *halves; i++) {
+        char source[64];
+        int slave;
+        struct head head = {.half = halves[i]};
+        head.master = make_terminal(source, sizeof source, &slave);
+        struct scanhead *sh = open_head(source);
+        assert_int_equal(pthread_create(&head.thread, NULL, play, &head), 0);
+        expect_reply(sh, "TIME?", "12");
+        end(&head, sh, slave);
+        assert_true(head.identities >= 2);
+    }
+}
+
+/* A head so slow that it is asked twice: the answer that comes last is not taken for the reply to a command. */
+static void test_slow_head(void **state)
+{
+    char source[64];
+    int slave;
+    struct head head = {.slow = 1};
+    (void)state;
+    head.master = make_terminal(source, sizeof source, &slave);
+    struct scanhead *sh = open_head(source);
+    assert_int_equal(pthread_create(&head.thread, NULL, play, &head), 0);
+    expect_reply(sh, "TIME?", "12");
+    expect_reply(sh, "SYST:ERR?", "-222,\"Data out of range; 1,2,3\"");
+    expect_reply(sh, "*IDN?", "Maker,Model,SN1,1.0");
+    expect_reply(sh, "TIME?", "12");
+    end(&head, sh, slave);
+    assert_true(head.identities >= 3);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_replies_in_order),
+        cmocka_unit_test(test_slow_head),
+        cmocka_unit_test(test_half_a_frame),
         cmocka_unit_test(test_frames_after),
         cmocka_unit_test(test_late_head),
     };

@@ -276,7 +276,8 @@ static void test_las_12(void **state)
         rig_begin();
         put_scan(1, 1, &a);
         rig_points(1, 10, 10, six, 6);
-        record_las_with((struct recorder_options){.las_minor = 2, .colour = colour ? COLOUR_REFLECTANCE : COLOUR_NONE});
+        record_las_with(
+            (struct recorder_options){.las_minor = 2, .colour = {.given = colour, .scale.mode = COLOUR_REFLECTANCE}});
         check_12(colour);
         /* GeoTIFF's directory: a projected CRS, its code, metres */
         const uint8_t *keys = find_vlr("LASF_Projection", 34735);
@@ -297,13 +298,13 @@ static void test_colour(void **state)
     struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 7);
     rig_begin();
     put_scan(1, 1, &a);
-    record_las_with((struct recorder_options){.colour = COLOUR_LABEL});
+    record_las_with((struct recorder_options){.colour = {.given = 1, .scale.mode = COLOUR_LABEL}});
     const uint8_t *p = las + rig_uint(las + 96, 4);
     uint8_t rgb[3];
     assert_int_equal(las[25], 4);
     assert_int_equal(las[104], 7);
     assert_int_equal(rig_uint(las + 105, 2), POINT + 6);
-    colour_of(COLOUR_LABEL, &(struct scanhead_point){.label = 7}, rgb);
+    colour_number(7, rgb);
     for (int i = 0; i < 3; i++)
         assert_int_equal(rig_uint(p + 30 + 2 * i, 2), rgb[i] * 257);
     assert_int_equal(rig_uint(p + 36, 2), 7);

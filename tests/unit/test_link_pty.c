@@ -129,6 +129,26 @@ static void test_unseen_change(void **state)
     bench_close(&bench);
 }
 
+/* What is still to be written for a client that is gone does not reach the one that came since. */
+static void test_nothing_of_the_one_before(void **state)
+{
+    (void)state;
+    struct bench bench = bench_open(&plain);
+    int fd = client_open(&bench);
+    bench_expect(&bench, LINK_OPENED, 0);
+    close(fd);
+    fd = client_open(&bench);
+    assert_int_equal(bench.ops->write(bench.link, 0, "stale", 5), 0);
+    bench_expect(&bench, LINK_CLOSED, 0);
+    bench_expect(&bench, LINK_OPENED, 0);
+    int waiting = -1;
+    assert_int_equal(ioctl(fd, FIONREAD, &waiting), 0);
+    assert_int_equal(waiting, 0);
+    close(fd);
+    bench_expect(&bench, LINK_CLOSED, 0);
+    bench_close(&bench);
+}
+
 static void link_path(struct link_spec *spec, const char *dir, const char *name)
 {
     *spec = (struct link_spec){.type = LINK_PTY};
@@ -259,7 +279,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_raw_both_ways),  cmocka_unit_test(test_full),
         cmocka_unit_test(test_fresh_for_next), cmocka_unit_test(test_written_and_gone),
-        cmocka_unit_test(test_unseen_change),  cmocka_unit_test(test_symlink),
+        cmocka_unit_test(test_unseen_change),  cmocka_unit_test(test_nothing_of_the_one_before),
+        cmocka_unit_test(test_symlink),
         cmocka_unit_test(test_left_symlink),
         cmocka_unit_test(test_exclusive),
     };

@@ -180,6 +180,12 @@ static int count_red(const struct picture *picture, double *column, double *row)
     return n;
 }
 
+static int add_station(struct map *map, double x_m, double y_m, struct sh_err *err)
+{
+    const struct map_station station = {.x_m = x_m, .y_m = y_m, .heading_rad = NAN};
+    return map_add_station(map, &station, err);
+}
+
 static void test_station(void **state)
 {
     (void)state;
@@ -189,7 +195,7 @@ static void test_station(void **state)
     struct picture picture = draw(map);
     assert_int_equal(count_red(&picture, &column, &row), 0);
     free(picture.rgb);
-    assert_int_equal(map_add_station(map, 1.01, -2.01, &err), SH_OK);
+    assert_int_equal(add_station(map, 1.01, -2.01, &err), SH_OK);
     picture = draw(map);
     struct map_layout layout;
     map_get_layout(map, &layout);
@@ -199,12 +205,12 @@ static void test_station(void **state)
     /* the mean of the full pixels of a triangle about a place is that place, to half a pixel */
     assert_true(fabs(column - (want_column + 0.5)) < 0.5 && fabs(row - (want_row + 0.5)) < 1);
     free(picture.rgb);
-    assert_int_equal(map_add_station(map, 5.5, 0, &err), SH_EINPUT);
+    assert_int_equal(add_station(map, 5.5, 0, &err), SH_EINPUT);
     assert_non_null(strstr(err.text, "x 5.5 m"));
-    assert_int_equal(map_add_station(map, NAN, 0, &err), SH_EINPUT);
+    assert_int_equal(add_station(map, NAN, 0, &err), SH_EINPUT);
     for (int i = 1; i < MAP_MAX_STATIONS; i++)
-        assert_int_equal(map_add_station(map, -5, 5, &err), SH_OK); /* marks at the corner stay in the image */
-    assert_int_equal(map_add_station(map, 0, 0, &err), SH_EINPUT);
+        assert_int_equal(add_station(map, -5, 5, &err), SH_OK); /* marks at the corner stay in the image */
+    assert_int_equal(add_station(map, 0, 0, &err), SH_EINPUT);
     picture = draw(map);
     free(picture.rgb);
     map_free(map);

@@ -261,6 +261,36 @@ static void test_begin_before_rename(void **state)
     unlink(path);
 }
 
+/* ---- a file that grows */
+
+static void test_append(void **state)
+{
+    (void)state;
+    int fd, again;
+    char c;
+    assert_int_equal(newfile_append(path, &fd, &err), 0);
+    assert_int_equal(write(fd, "one", 3), 3);
+    expect_error(newfile_append(path, &again, &err), SH_ESTATE, path, "another process");
+    close(fd);
+    assert_int_equal(newfile_append(path, &fd, &err), 0); /* as it is, and free again */
+    assert_int_equal(pread(fd, &c, 1, 0), 1);
+    assert_int_equal(c, 'o');
+    assert_int_equal(write(fd, "two", 3), 3); /* at the end, though nothing was sought */
+    close(fd);
+    expect_text(path, "onetwo");
+    assert_int_equal(link(path, other), 0);
+    expect_error(newfile_append(path, &fd, &err), SH_EINPUT, path, "2 names (hard links)");
+    unlink(path);
+    assert_int_equal(symlink(other, path), 0);
+    expect_error(newfile_append(path, &fd, &err), SH_EINPUT, path, "symbolic link to");
+    unlink(path);
+    assert_int_equal(mkdir(path, 0700), 0);
+    expect_error(newfile_append(path, &fd, &err), SH_EINPUT, path, "is a directory");
+    rmdir(path);
+    expect_text(other, "onetwo");
+    unlink(other);
+}
+
 static int set_up(void **state)
 {
     (void)state;
@@ -288,6 +318,7 @@ int main(void)
         cmocka_unit_test(test_left_part),
         cmocka_unit_test(test_end_between_open_and_lock),
         cmocka_unit_test(test_begin_before_rename),
+        cmocka_unit_test(test_append),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

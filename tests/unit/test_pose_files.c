@@ -96,6 +96,14 @@ static void test_csv_errors(void **state)
     struct trajectory *tr;
     struct sh_err err;
     assert_int_equal(trajectory_read_csv("/nonexistent/x.csv", NULL, &tr, &err), SH_EINPUT);
+    /* a number does not end at a byte 0 */
+    static const char zero[] = NAMES "0,1\0002,2,3,4\n";
+    FILE *file = fopen(path, "wb");
+    assert_non_null(file);
+    assert_int_equal(fwrite(zero, 1, sizeof zero - 1, file), sizeof zero - 1);
+    assert_int_equal(fclose(file), 0);
+    assert_int_equal(trajectory_read_csv(path, NULL, &tr, &err), SH_EINPUT);
+    assert_non_null(strstr(err.text, "x_m is not a finite decimal number: \"1?2\""));
 }
 
 static void test_waypoints(void **state)

@@ -171,6 +171,8 @@ def hostile(path, seed):
                 head.pose(frame.fields["t0_ns"]), head.gps_time_ns(frame.fields["t0_ns"])
             elif frame.type == scanhead.ATTRIBUTES:
                 head.attributes(frame)
+            elif frame.type == scanhead.COLOURS:
+                head.colours(frame)
         except scanhead.ScanheadError:
             refused += 1
     assert head.parser.frames == 700
@@ -296,7 +298,7 @@ def words(value):
 
 def said_of(head, frame):
     """The words below a sample: fields as `name value;`, then records, one a line."""
-    names = "? descriptor anchor points line-end telemetry event surfaces poses attributes emitter".split()
+    names = "? descriptor anchor points line-end telemetry event surfaces poses attributes emitter colours".split()
     flags = "".join(f" {name}" for bit, name in ((1, "REPEAT"), (2, "LOCAL")) if frame.flags & bit)
     text = [f"{names[frame.type]}{flags}; seq {frame.seq}; t_ns {frame.t_ns}"]
     text += [f"{name} {words(value)}" for name, value in frame.fields.items()]
@@ -309,6 +311,8 @@ def said_of(head, frame):
                      f"head's frame {x} {y} {z}, scene {' '.join(scene)}"]
     if frame.type == scanhead.ATTRIBUTES:
         text += [f"amplitude {a:.2f} dB, width {w:.2f} ns" for a, w in zip(*head.attributes(frame))]
+    if frame.type == scanhead.COLOURS:
+        text += [f"rgb {r} {g} {b}" for r, g, b in zip(*head.colours(frame))]
     if frame.type == scanhead.EMITTER:
         text += [f"beam elevation {words(e)} deg, azimuth {words(a)} deg, {t} ns"
                  for e, a, t in head.emitter["beams"]]
@@ -339,7 +343,7 @@ CODES = {"u32": "I", "u64": "Q", "i32": "i", "i64": "q", "f64": "d", "char": "s"
 def tables_of(page):
     """For each type of frame, the struct format that the first table of its section gives."""
     found = {}
-    for kind, section in re.findall(r"\n### ([1-9]|10) [a-z ]+\n(.*?)(?=\n##)", open(page).read(), re.S):
+    for kind, section in re.findall(r"\n### ([1-9]|1[01]) [a-z ]+\n(.*?)(?=\n##)", open(page).read(), re.S):
         form = "<"
         for line in section[section.index("| ---"):].split("\n")[1:]:
             row = re.match(r"\| (\d+) \| ([a-z]+\d*)(?:\[(\d+)\])? \|", line)

@@ -32,7 +32,7 @@ static size_t read_hex(const char *page, int n, uint8_t *bytes, size_t room)
     return len;
 }
 
-/* The attributes of the block come from the frame after it. */
+/* The attributes of the block come from the frame after it, its colours from the one after that. */
 static size_t encode_block(const uint8_t *frame, const uint8_t *next, uint8_t *out, size_t room)
 {
     struct native_header header;
@@ -42,8 +42,11 @@ static size_t encode_block(const uint8_t *frame, const uint8_t *next, uint8_t *o
     native_read_header(frame, &header);
     assert_int_equal(native_decode_points(frame + 28, header.length, &points), 0);
     assert_int_equal(native_decode_attributes(next + 28, le_get32(next + 4), &attributes), 0);
+    const uint8_t *colours = next + native_frame_len(next);
+    assert_int_equal(native_decode_colours(colours + 28, le_get32(colours + 4), &attributes), 0);
     assert_int_equal(line_block_alloc(&block, points.n_points, NULL), 0);
     assert_int_equal(line_block_alloc_attributes(&block, NULL), 0);
+    assert_int_equal(line_block_alloc_colours(&block, NULL), 0);
     block.frame = points.frame;
     block.line = points.line;
     block.pulse0 = points.pulse0;
@@ -66,6 +69,7 @@ static size_t encode_block(const uint8_t *frame, const uint8_t *next, uint8_t *o
         block.echo[i] = (uint8_t)(p.echo | p.echo_count << 4);
         block.amplitude_cdb[i] = a.amplitude_cdb;
         block.width_cns[i] = a.width_cns;
+        native_decode_colour(colours + 28, i, block.rgb[i]);
     }
     size_t len = native_encode_points(out, room, &block, header.t_ns - points.t0_ns);
     line_block_free(&block);
@@ -193,7 +197,7 @@ static void test_frames(void **state)
         assert_memory_equal(again, frame, size);
         at += size;
     }
-    assert_int_equal(types, 0x7fe); /* 1 to 10 */
+    assert_int_equal(types, 0xffe); /* 1 to 11 */
     uint8_t digest[SHA256_DIGEST_SIZE];
     char hex[2 * SHA256_DIGEST_SIZE + 3] = "`";
     sha256_digest(&sha256, sizeof digest, digest);
@@ -226,13 +230,13 @@ static void test_words(void **state)
     }
     snprintf(stream, sizeof stream, "%s", wire_path(wire, "samples.shs"));
     char *said = ask_python(wire, "samples", page_path, stream), *page = wire_read(page_path, NULL);
-    assert_int_equal(strncmp(said, "6 1 2 3 9 4 7 8 5 10 6 ", 23), 0);
+    assert_int_equal(strncmp(said, "6 1 2 3 9 11 4 7 8 5 10 6 ", 26), 0);
     said[strcspn(said, "\n")] = 0;
-    assert_non_null(strstr(page, said + 23));
+    assert_non_null(strstr(page, said + 26));
     free(said);
     free(page);
     said = ask_python(wire, "tables", "drivers/protocol/PROTOCOL.md", stream);
-    assert_string_equal(said, "6 1 2 3 9 4 5 10 6\n"); /* names and poses have no fixed part that is decoded so */
+    assert_string_equal(said, "6 1 2 3 9 11 4 5 10 6\n"); /* names and poses have no fixed part that is decoded so */
     free(said);
 }
 

@@ -35,16 +35,17 @@ try:
 except ImportError:  # everything works without, slower
     np = None
 
-DESCRIPTOR, ANCHOR, POINTS, LINE_END, TELEMETRY, EVENT, SURFACES, POSES, ATTRIBUTES, EMITTER = range(1, 11)
+(DESCRIPTOR, ANCHOR, POINTS, LINE_END, TELEMETRY, EVENT, SURFACES, POSES, ATTRIBUTES, EMITTER,
+ COLOURS) = range(1, 12)
 REPEAT, LOCAL = 1, 2  # flags of a frame
 (EV_STATE, EV_SCAN_START, EV_SCAN_END, EV_OVERRUN, EV_READER_LOST, EV_CONTROL, EV_ERROR, EV_SETTINGS,
- EV_POSE_LATE, EV_PPS, EV_TIME) = range(1, 12)
+ EV_POSE_LATE, EV_PPS, EV_TIME, EV_SITE) = range(1, 13)
 POLAR, GEO = 0, 1  # layouts
 EMIT_LINE, EMIT_PLANAR, EMIT_BEAMS, EMIT_SPHERE, EMIT_DIRECTIONS = range(5)
 CRS_LOCAL, CRS_ECEF, CRS_UTM, CRS_GEODETIC = range(4)
 NO_LABEL = 0xFFFF
 
-_HASHED = (DESCRIPTOR, ANCHOR, POINTS, LINE_END, POSES, ATTRIBUTES, EMITTER)
+_HASHED = (DESCRIPTOR, ANCHOR, POINTS, LINE_END, POSES, ATTRIBUTES, EMITTER, COLOURS)
 _HEADER_LEN, _MAX_PAYLOAD, _MAX_TEXT = 28, 65536, 512
 _QUEUE_BYTES, _KEEP_POSES, _CHUNK = 64 << 20, 8192, 1 << 16
 _FRAME_BYTES = 512  # what a kept frame takes beside its payload
@@ -186,8 +187,9 @@ _LAYOUT = {
                 "errors_queued reader_lost_frames utc_ns"),
     EVENT: ("<IIQQQ96s", "code reserved a b c text"),
     ATTRIBUTES: ("<QII", "pulse0 line n_points"),
+    COLOURS: ("<QII", "pulse0 line n_points"),
     EMITTER: ("<3I4iIQQqII", "kind n_beams steps first_step last_step front_step turn rings sequence_ns_num "
-              "sequence_ns_den first_ring_udeg echoes reserved"),
+              "sequence_ns_den first_ring_udeg echoes gaps"),
 }
 _MORE = {  # what payloads may have behind that
     DESCRIPTOR: ("<II", "content reserved"),
@@ -431,6 +433,16 @@ def _empty_as_nan(values, count):
     if np is not None:
         return np.where(count == 0, _NAN, values)
     return [_NAN if n == 0 else v for v, n in zip(values, count)]
+
+
+def _rings(e: Dict) -> Dict:
+    """Of a sphere: ring i has the elevation first_ring_deg + i ring_step_deg. On the wire the first one is rounded."""
+    gaps = e["gaps"] or max(e["rings"], 1) - 1
+    first_deg = 1e-6 * e["first_ring_udeg"]
+    if gaps == 0:
+        return {"first_ring_deg": first_deg, "ring_step_deg": 0.0}
+    return {"first_ring_deg": math.floor((first_deg + 90) * gaps / 180 + 0.5) * 180 / gaps - 90,
+            "ring_step_deg": 180 / gaps}
 
 
 def _polar_points(p: Points, raw, d: Dict, is_line_head: bool) -> None:
@@ -1080,7 +1092,7 @@ class Head:
             frame = frame._replace(fields=_decode(frame.type, frame.payload))
         act = {DESCRIPTOR: self._absorb_descriptor, ANCHOR: self._absorb_anchor,
                POINTS: self._absorb_points, EVENT: self._absorb_event, SURFACES: self._absorb_surfaces,
-               POSES: self._absorb_poses, ATTRIBUTES: self._absorb_attributes,
+               POSES: self._absorb_poses, ATTRIBUTES: self._absorb_attributes, COLOURS: self._absorb_colours,
                EMITTER: self._absorb_emitter}.get(frame.type)
         if act is not None:
             act(frame)
@@ -1128,7 +1140,7 @@ class Head:
             raise ScanheadError("an emitter frame shorter than its beams")
         beams = (_BEAM.unpack_from(frame.payload, 64 + _BEAM.size * i) for i in range(e["n_beams"]))
         self.emitter = dict(e, beams=[(1e-6 * elevation, 1e-6 * azimuth, offset_ns)
-                                      for elevation, azimuth, offset_ns in beams])
+                                      for elevation, azimuth, offset_ns in beams], **_rings(e))
 
     def _absorb_anchor(self, frame: Frame) -> None:
         a = frame.fields
@@ -1158,6 +1170,10 @@ class Head:
     def _absorb_attributes(self, frame: Frame) -> None:
         if frame.fields["n_points"] > (len(frame.payload) - 16) // 4:
             raise ScanheadError("an attributes frame shorter than its attributes")
+
+    def _absorb_colours(self, frame: Frame) -> None:
+        if frame.fields["n_points"] > (len(frame.payload) - 16) // 3:
+            raise ScanheadError("a colours frame shorter than its colours")
 
     def _absorb_event(self, frame: Frame) -> None:
         code, a, b, c = (frame.fields[k] for k in ("code", "a", "b", "c"))
@@ -1209,10 +1225,26 @@ class Head:
         """Whether descriptor and anchor have come, so that points() works."""
         return self.descriptor is not None and self.anchor is not None
 
+    def _is_of_points(self, frame: Frame, after: int) -> bool:
+        """Whether it follows the last points as the frame of that number, from 1 on, and is about them."""
+        keys = ("pulse0", "line", "n_points")
+        return self._points_key == ((frame.seq - after + 1) % 2**32, *(frame.fields[k] for k in keys))
+
+    def colours(self, frame: Frame) -> Optional[Tuple]:
+        """Columns red, green and blue, 0 to 255, of the points in the last points frame; None: these were
+        lost."""
+        after = 2 if self.descriptor is not None and self.descriptor["content"] & 1 else 1
+        if not self._is_of_points(frame, after):
+            return None
+        data = frame.payload[16:16 + 3 * frame.fields["n_points"]]
+        if np is not None:
+            return tuple(np.frombuffer(data, np.uint8).reshape(-1, 3).T)
+        return tuple(list(data[k::3]) for k in range(3))
+
     def attributes(self, frame: Frame) -> Optional[Tuple]:
         """Columns amplitude_db and width_ns of the points in the frame before; None: those were lost."""
         n = frame.fields["n_points"]
-        if self._points_key != (frame.seq, frame.fields["pulse0"], frame.fields["line"], n):
+        if not self._is_of_points(frame, 1):
             return None
         raw = list(struct.iter_unpack("<hH", frame.payload[16:16 + 4 * n]))
         return (_column((_NAN if a == -32768 else a / 100.0 for a, _ in raw), n),
@@ -1294,7 +1326,7 @@ def _summary(head: Head) -> None:
             count = head.points(frame).echo_count
             echoes += int(np.count_nonzero(count)) if np is not None else sum(n > 0 for n in count)
     names = ("", "descriptors", "anchors", "points frames", "line ends", "telemetry", "events", "names",
-             "poses", "attributes", "emitters")
+             "poses", "attributes", "emitters", "colours")
     print(*(f"{kinds[k]} {names[k]}" for k in sorted(kinds) if k < len(names)), sep=", ")
     print(f"{echoes} echoes; frames lost: {head.parser.seq_lost}, bytes skipped: {head.parser.bad_bytes}")
     print(f"stream_sha256 {head.stream_sha256()}")

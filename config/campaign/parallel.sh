@@ -1,0 +1,16 @@
+#!/bin/sh
+# A campaign by GNU parallel: so many shards at a time, on this machine or on several; then all files checked.
+#
+#   sh parallel.sh CONFIG -o DIR [options of scanhead batch]
+#
+# SCANHEAD: the program (default: scanhead of PATH). SHARDS: into how many the campaign is cut (default: the processors of
+# this machine). JOBS: how many at a time on a machine (default: one per processor). THREADS: of each (default: 1).
+# MACHINES: a file with a line for each machine, as --sshloginfile has it.
+set -eu
+
+program=${SCANHEAD:-scanhead}
+shards=${SHARDS:-$(getconf _NPROCESSORS_ONLN)}
+seq "$shards" | parallel --will-cite --quote --jobs "${JOBS:-100%}" -I @SHARD@ --line-buffer \
+    ${MACHINES:+--sshloginfile "$MACHINES" --workdir .} \
+    "$program" batch "$@" --threads "${THREADS:-1}" --shard "@SHARD@/$shards" || exit 1
+exec "$program" batch "$@" --merge

@@ -1,0 +1,79 @@
+/* Colours of echoes, as they are to be sent. Those of textures came along with the hits. */
+#include "core/colour.h"
+
+#include <math.h>
+
+#include "core/cast/caster_private.h"
+
+static uint32_t packed(const uint8_t rgb[3])
+{
+    return (uint32_t)rgb[0] << 16 | (uint32_t)rgb[1] << 8 | rgb[2];
+}
+
+/* Frame scalar of a moving head when a pulse of the chunk fires; straight between two knots. */
+static double frame_at(const struct chunk *k, uint32_t pulse)
+{
+    const struct cast_setup *s = k->s;
+    const int64_t t_ns = k->run->t0_ns + (int64_t)k->dt_ns[pulse];
+    if (s->n_knots == 0) return s->colour->frame;
+    const size_t at = pose_find_knot(s->knot, s->n_knots, t_ns);
+    const struct pose_knot *a = &s->knot[at], *b = &s->knot[at + 1 < s->n_knots ? at + 1 : at];
+    if (t_ns <= a->t_ns || b == a) return a->frame;
+    const double f = (double)(t_ns - a->t_ns) / (double)(b->t_ns - a->t_ns);
+    return a->frame + fmin(1.0, f) * (b->frame - a->frame);
+}
+
+/* Of echo i, along the beam of its pulse. */
+static double height_of(const struct caster *c, const struct chunk *k, uint32_t i, uint32_t pulse)
+{
+    double from[3];
+    bvh_origin_of(&k->from, pulse, from);
+    return from[2] + c->list.range_m[i] * c->d.z[pulse];
+}
+
+/* Of echo i, one of this pulse's. */
+static uint32_t colour_of(const struct caster *c, const struct chunk *k, uint32_t i, uint32_t pulse)
+{
+    const struct colour_scale *scale = &k->s->colour->scale;
+    const struct echo_list *l = &c->list;
+    const int signal = k->s->detect != NULL && k->s->detect->signal != NULL;
+    uint8_t rgb[3] = {scale->rgb[0], scale->rgb[1], scale->rgb[2]};
+    switch (scale->mode) {
+    case COLOUR_RANGE:
+        colour_between(scale->low, scale->high, l->range_m[i], rgb);
+        break;
+    case COLOUR_HEIGHT:
+        colour_between(scale->low, scale->high, height_of(c, k, i, pulse), rgb);
+        break;
+    case COLOUR_FRAME:
+        colour_between(scale->low, scale->high, frame_at(k, pulse), rgb);
+        break;
+    case COLOUR_REFLECTANCE:
+        colour_reflectance(signal && l->refl_cdb[i] != LINE_REFL_NONE ? l->refl_cdb[i] / 100.0 : (double)NAN, rgb);
+        break;
+    case COLOUR_LABEL:
+        colour_number(l->label[i] & 0xffff, rgb);
+        break;
+    default:
+        break;
+    }
+    return packed(rgb);
+}
+
+static void set_colour(struct caster *c, const struct chunk *k, uint32_t i, uint32_t pulse)
+{
+    if (isnan(c->list.range_m[i]))
+        c->list.colour[i] = packed(colour_grey);
+    else if (!k->texels)
+        c->list.colour[i] = colour_of(c, k, i, pulse);
+}
+
+void caster_colours(struct caster *c, const struct chunk *k)
+{
+    const struct echo_list *l = &c->list;
+    for (uint32_t i = 0; i < k->n; i++)
+        set_colour(c, k, i, i);
+    for (uint32_t g = 0; g < l->n_further; g++)
+        for (uint32_t j = 0; j < l->further[g].n; j++)
+            set_colour(c, k, l->further[g].at + j, l->further[g].pulse);
+}

@@ -1,0 +1,125 @@
+/* What pulses meet, with the triangles: the first stages of a pulse (caster.c), and of the echoes only whether there
+ * is one. */
+#include <math.h>
+
+#include "core/cast/caster_private.h"
+#include "core/vec3.h"
+
+/* Hits of a chunk on their way out. */
+struct meeting {
+    const struct cast_setup *s;
+    const struct chunk *k;
+    double period_s;
+    struct cast_hit *hit;
+    uint32_t n;
+};
+
+/* What came of one ray. */
+struct seen {
+    uint32_t pulse, label, triangle; /* pulse: of the chunk */
+    uint8_t body;
+    double range_m, cosine, energy;
+};
+
+static int is_front(const struct cast_setup *s, const struct seen *seen, const double dir[3])
+{
+    const struct cast_mover *m = seen->body != 0 ? caster_body(s, seen->body) : NULL;
+    const double *n = bvh_plane(m != NULL ? m->bvh : s->bvh, seen->triangle)->n;
+    double along = 0.0;
+    for (int i = 0; i < 3; i++)
+        along += dir[i] * (m == NULL ? n[i] : vec3_dot(m->rotation + 3 * i, n));
+    return along < 0.0;
+}
+
+/* As caster_echoes has it, for an echo by itself and without noise. */
+static int is_reported(const struct meeting *m, const struct seen *seen)
+{
+    const struct cast_detect *d = m->s->detect;
+    double range_m = seen->range_m, rho = 1.0;
+    if (!(range_m >= m->s->range_min_m && range_m <= m->s->range_max_m)) return 0;
+    if (m->s->silent != NULL && m->s->silent[surface_of_label(seen->label)]) return 0;
+    if (d == NULL) return 1;
+    if (d->surfaces != NULL) {
+        surface_return(d->surfaces, 1, &seen->label, &seen->cosine, &rho);
+        rho *= seen->energy;
+        if (caster_is_bare(m->s, seen->label, rho)) return 0;
+    }
+    if (d->signal != NULL && !(detect_amplitude(d->signal, range_m, rho) >= 1.0)) return 0;
+    if (d->ambiguity != DETECT_AMBIGUITY_NONE)
+        detect_zones(d->ambiguity, m->period_s, d->zones, m->s->range_min_m, 1, &range_m);
+    return !isnan(range_m);
+}
+
+/* Glass is not refracted: what lies beyond is on the same line. */
+static void take(struct meeting *m, const struct met *met, const struct seen *seen)
+{
+    const double dir[3] = VEC3_AT(met->rays.dir, seen->pulse);
+    struct cast_hit *hit = &m->hit[m->n];
+    if (!is_reported(m, seen)) return;
+    bvh_origin_of(&met->rays.from, seen->pulse, hit->p_m);
+    for (int i = 0; i < 3; i++)
+        hit->p_m[i] += seen->range_m * dir[i];
+    hit->range_m = seen->range_m;
+    hit->cosine = seen->cosine;
+    hit->pulse = m->k->first + seen->pulse;
+    hit->triangle = seen->triangle;
+    hit->body = seen->body;
+    hit->front = (uint8_t)is_front(m->s, seen, dir);
+    m->n++;
+}
+
+static void take_paths(struct meeting *m, const struct met *met, const struct path_rays *paths, uint32_t i)
+{
+    for (uint32_t j = paths->first[i]; j != CAST_NO_PATH; j = paths->found[j].next) {
+        const struct path_hit *p = &paths->found[j];
+        if (p->ghost) continue;
+        take(m, met, &(struct seen){i, p->label, p->triangle, p->body, p->range_m, p->cosine, p->energy});
+    }
+}
+
+static void meet_chunk(struct caster *c, const struct chunk *k, struct meeting *m)
+{
+    const struct cast_setup *s = k->s;
+    const struct met met = {.rays = {.n = k->n,
+                                     .from = k->from,
+                                     .dir = VEC3_IN(c->d, 0),
+                                     .range_max_m = s->range_max_m,
+                                     .range_m = c->list.range_m,
+                                     .triangle = c->hit,
+                                     .label = c->list.label},
+                            .cosine = c->list.cosine,
+                            .body = c->body};
+    const int follows = s->detect != NULL && s->detect->surfaces != NULL && s->detect->depth > 0;
+    caster_nearest(c, s, &met);
+    if (s->tripod != NULL) caster_hide(c, k);
+    if (follows) caster_follow(c, s, &met);
+    m->k = k;
+    for (uint32_t i = 0; i < k->n; i++) {
+        if (isnan(met.rays.range_m[i])) continue;
+        take(m, &met,
+             &(struct seen){i, met.rays.label[i], met.rays.triangle[i], met.body[i], met.rays.range_m[i], met.cosine[i],
+                            1.0});
+        if (follows) take_paths(m, &met, &c->paths, i);
+    }
+}
+
+uint32_t caster_meet(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
+                     struct cast_hit *hit)
+{
+    struct meeting m = {
+        .s = setup, .hit = hit, .period_s = 1e-9 * ((double)run->ns_quot + (double)run->ns_rem / (double)run->ns_den)};
+    struct chunk chunk = {.s = setup, .run = run};
+    uint32_t lead = run->in_line % SCHEDULE_PACKET; /* as in caster_cast */
+    for (uint32_t first = 0; first < run->n; first += chunk.n) {
+        const uint32_t n = lead != 0 ? SCHEDULE_PACKET - lead : CHUNK;
+        chunk.first = first;
+        chunk.n = n < run->n - first ? n : run->n - first;
+        chunk.pulse0 = run->pulse0 + first;
+        caster->list.n = chunk.n;
+        caster->list.n_further = 0;
+        caster_aim(caster, &chunk);
+        meet_chunk(caster, &chunk, &m);
+        lead = 0;
+    }
+    return m.n;
+}

@@ -1,0 +1,48 @@
+/* Colours that show figures: a figure in, red, green and blue out (sRGB, 8 bits a channel). One place for recordings,
+ * maps, reports and the wire. Pure; any thread. */
+#ifndef CORE_COLOUR_H
+#define CORE_COLOUR_H
+
+#include <stdint.h>
+
+/* What the colours of a cloud show. */
+enum colour_mode {
+    COLOUR_NONE,
+    COLOUR_SOLID,       /* one colour for all */
+    COLOUR_RANGE,       /* metres: the ramp between two limits; so are height and frame */
+    COLOUR_HEIGHT,      /* metres, z of the scene's frame */
+    COLOUR_REFLECTANCE, /* colour_reflectance */
+    COLOUR_LABEL,       /* colour_number of the surface */
+    COLOUR_FRAME,       /* frame scalar of a trajectory, or of its stop */
+    COLOUR_TEXTURE,     /* the texel at the hit; without one the surface's own colour; without that colour_grey */
+    COLOUR_MODES
+};
+/* The words for them, as configuration and options have them. */
+extern const char *const colour_words[COLOUR_MODES];
+
+/* How figures become colours. A point that has no echo is colour_grey. */
+struct colour_scale {
+    enum colour_mode mode;
+    uint8_t rgb[3];   /* solid */
+    double low, high; /* range, height, frame: red at low, blue at high; all red where both are the same */
+};
+/* Whether the mode shows a figure between two limits. */
+static inline int colour_has_limits(enum colour_mode mode)
+{
+    return mode == COLOUR_RANGE || mode == COLOUR_HEIGHT || mode == COLOUR_FRAME;
+}
+/* A figure of these on the ramp. NaN: colour_unknown. */
+void colour_between(double low, double high, double figure, uint8_t rgb[3]);
+
+/* Red at 0, yellow at 1/3, green at 2/3, blue at 1, straight lines between them; below 0 and above 1 as at the ends.
+ * NaN: colour_unknown. */
+void colour_ramp(double part, uint8_t rgb[3]);
+/* Grey: black at -30 dB and below, white at 0 dB and above, even steps of dB between. NaN: colour_unknown. */
+void colour_reflectance(double db, uint8_t rgb[3]);
+/* A hue for each number, a golden section of the circle apart: however many there are, neighbours differ. */
+void colour_number(uint32_t number, uint8_t rgb[3]);
+
+extern const uint8_t colour_unknown[3]; /* a light blue: the figure is not modelled */
+extern const uint8_t colour_grey[3];    /* no surface, no colour */
+
+#endif

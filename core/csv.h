@@ -1,0 +1,29 @@
+/* A CSV file of numbers whose first line names the columns. In: a path, the names that are known. Out: line by line, the
+ * numbers by column. Empty lines, and those that begin with a number sign, do not count. Not real-time safe. */
+#ifndef CORE_CSV_H
+#define CORE_CSV_H
+
+#include "core/text.h"
+
+enum { CSV_MAX_COLUMNS = 16 };
+
+struct csv {
+    struct text text;
+    const char *const *known;    /* names of columns, NULL at the end; index is the column's number for csv_value */
+    int column[CSV_MAX_COLUMNS]; /* of the file: which known one */
+    int n_columns;
+    uint32_t has;                  /* bit per known column */
+    double value[CSV_MAX_COLUMNS]; /* of the line read last, by known column; 0 where there is none */
+    uint64_t line;                 /* its number */
+    const struct sh_report *report;
+};
+
+/* Reads the header; csv_close is due in any case. Unknown or doubled names are errors. Here and in
+ * csv_next the stop of report is heeded. */
+int csv_open(struct csv *csv, const char *path, const char *const *known, const struct sh_report *report,
+             struct sh_err *err);
+void csv_close(struct csv *csv);
+/* 1: a line is in value; 0: the end; or a negative error. */
+int csv_next(struct csv *csv, struct sh_err *err);
+
+#endif

@@ -1,0 +1,77 @@
+/* A scene without some of its surfaces. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/scene.h"
+
+/* Triangles of surfaces that are kept, with the new labels; their vertices get numbers in the old order. */
+static void keep_triangles(struct scene *s, const uint8_t *keep, const uint16_t *label, uint32_t *vertex)
+{
+    uint32_t n = 0;
+    for (uint32_t i = 0; i < s->n_triangles; i++) {
+        const uint16_t was = s->label[i];
+        if (!keep[was]) continue;
+        memcpy(s->triangle[n], s->triangle[i], sizeof s->triangle[n]);
+        if (s->uv != NULL) memcpy(s->uv[n], s->uv[i], sizeof s->uv[n]);
+        s->label[n++] = label[was];
+    }
+    s->n_triangles = n;
+    for (uint32_t i = 0; i < n; i++)
+        for (int c = 0; c < 3; c++)
+            vertex[s->triangle[i][c]] = 1;
+    n = 0;
+    for (uint32_t v = 0; v < s->n_vertices; v++) {
+        if (!vertex[v]) continue;
+        memcpy(s->vertex_m[n], s->vertex_m[v], sizeof s->vertex_m[n]);
+        vertex[v] = n++;
+    }
+    s->n_vertices = n;
+    for (uint32_t i = 0; i < s->n_triangles; i++)
+        for (int c = 0; c < 3; c++)
+            s->triangle[i][c] = vertex[s->triangle[i][c]];
+}
+
+static void find_bounds(struct scene *s)
+{
+    for (int k = 0; k < 3; k++) {
+        s->min_m[k] = INFINITY;
+        s->max_m[k] = -INFINITY;
+        for (uint32_t v = 0; v < s->n_vertices; v++) {
+            s->min_m[k] = fmin(s->min_m[k], s->vertex_m[v][k]);
+            s->max_m[k] = fmax(s->max_m[k], s->vertex_m[v][k]);
+        }
+    }
+}
+
+/* Gives back what is not needed; where that fails it stays. */
+static void shrink(void *array_of, size_t n, size_t size)
+{
+    void **array = array_of, *less = *array != NULL && n > 0 ? realloc(*array, n * size) : NULL;
+    if (less != NULL) *array = less;
+}
+
+int scene_keep(struct scene *s, const uint8_t *keep, struct sh_err *err)
+{
+    uint16_t *label = calloc((size_t)s->n_surfaces + 1, sizeof *label);
+    uint32_t *vertex = calloc((size_t)s->n_vertices + 1, sizeof *vertex), n = 0;
+    const int enough = label != NULL && vertex != NULL;
+    for (uint32_t i = 0; i < s->n_surfaces && enough; i++) {
+        if (!keep[i]) continue;
+        if (s->cutout != NULL) s->cutout[n] = s->cutout[i];
+        s->surface[n] = s->surface[i];
+        label[i] = (uint16_t)n++;
+    }
+    if (enough) {
+        keep_triangles(s, keep, label, vertex);
+        s->n_surfaces = n;
+        find_bounds(s);
+        shrink(&s->triangle, s->n_triangles, sizeof *s->triangle);
+        shrink(&s->label, s->n_triangles, sizeof *s->label);
+        shrink(&s->uv, s->n_triangles, sizeof *s->uv);
+        shrink(&s->vertex_m, s->n_vertices, sizeof *s->vertex_m);
+    }
+    free(label);
+    free(vertex);
+    return enough ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory to leave out surfaces");
+}

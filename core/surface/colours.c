@@ -1,0 +1,88 @@
+/* Colours of surfaces: their textures as they are, texel by texel. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/colour.h"
+#include "core/surface.h"
+
+/* Rows from the top. Shared by labels of the same image. */
+struct surface_image {
+    struct texture_frame frame;
+    uint32_t users;
+    const struct scene_texture *from;
+    uint8_t rgb[][3];
+};
+
+static uint32_t packed(const uint8_t rgb[3])
+{
+    return (uint32_t)rgb[0] << 16 | (uint32_t)rgb[1] << 8 | rgb[2];
+}
+
+int surface_colours_alloc(uint32_t n, struct surface_colours *colours, struct sh_err *err)
+{
+    *colours = (struct surface_colours){.n = n};
+    colours->own = calloc((size_t)n + 1, sizeof *colours->own);
+    colours->image = calloc((size_t)n + 1, sizeof *colours->image);
+    if (colours->own != NULL && colours->image != NULL) return SH_OK;
+    surface_colours_free(colours);
+    return sh_fail(err, SH_ENOMEM, "no memory for colours of %u surfaces", n);
+}
+
+void surface_colours_free(struct surface_colours *colours)
+{
+    for (uint32_t i = 0; colours->image != NULL && i < colours->n; i++)
+        if (colours->image[i] != NULL && --colours->image[i]->users == 0) free(colours->image[i]);
+    free(colours->image);
+    free(colours->own);
+    *colours = (struct surface_colours){.n = 0};
+}
+
+void surface_colours_set(struct surface_colours *colours, uint32_t label, const struct scene_surface *named)
+{
+    uint8_t rgb[3];
+    memcpy(rgb, colour_grey, sizeof rgb);
+    for (int i = 0; i < 3 && named->has_colour; i++)
+        rgb[i] = (uint8_t)lrint(255.0 * fmin(1.0, fmax(0.0, (double)named->colour[i])));
+    colours->own[label] = packed(rgb);
+}
+
+static int load(const struct scene_texture *from, struct surface_image **out, struct sh_err *err)
+{
+    struct texture_image image;
+    struct surface_image *to = NULL;
+    int rc = scene_read_texture(from, 0, &image, err);
+    const size_t n = rc == SH_OK ? (size_t)image.width * image.height : 0;
+    if (rc == SH_OK) to = malloc(sizeof *to + n * sizeof *to->rgb);
+    if (rc == SH_OK && to == NULL) rc = sh_fail(err, SH_ENOMEM, "%s: no memory", from->file);
+    if (to != NULL)
+        *to =
+            (struct surface_image){.frame = {image.width, image.height, {from->wrap[0], from->wrap[1]}}, .from = from};
+    for (size_t i = 0; i < n && to != NULL; i++)
+        memcpy(to->rgb[i], image.rgba + 4 * i, sizeof to->rgb[i]);
+    texture_image_free(&image);
+    *out = to;
+    return rc;
+}
+
+int surface_colours_texture(struct surface_colours *colours, uint32_t label, const struct scene_texture *texture,
+                            struct sh_err *err)
+{
+    struct surface_image *image = NULL;
+    for (uint32_t i = 0; i < colours->n && image == NULL; i++)
+        if (colours->image[i] != NULL && colours->image[i]->from == texture) image = colours->image[i];
+    int rc = image == NULL ? load(texture, &image, err) : SH_OK;
+    if (rc != SH_OK) return rc;
+    image->users++;
+    colours->image[label] = image;
+    return SH_OK;
+}
+
+uint32_t surface_colour(const struct surface_colours *colours, uint32_t label, const double uv[2])
+{
+    label = surface_of_label(label);
+    if (label >= colours->n) return packed(colour_grey);
+    const struct surface_image *image = uv != NULL ? colours->image[label] : NULL;
+    const int64_t at = image != NULL ? texture_at(&image->frame, uv) : -1;
+    return at < 0 ? colours->own[label] : packed(image->rgb[at]);
+}

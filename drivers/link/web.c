@@ -1,0 +1,345 @@
+/* The web link: the page and its owner's resources by HTTP, the stream and commands by WebSocket, on one port.
+ *
+ * A session is a WebSocket at /ws. What the owner writes in one call goes out as one message: text where its first byte
+ * is ASCII (replies), binary otherwise (frames). What comes in is text, whose lines are commands; the last line of a
+ * message need not have an end. So frames, replies and commands are those of the protocol, and nothing is cut.
+ *
+ * libwebsockets does HTTP and WebSocket, and waits (lws_service) for its connections, for the listening socket and
+ * for the owner's wake-up, which are given to it as plain descriptors. All is done in the owner's thread.
+ *
+ * Another site's page must not read or command a head on somebody's machine. A browser says who asks: Host is what the
+ * address bar had, Origin is the page that asks. So a Host that is neither a number nor a name of this machine is
+ * refused (a name of the other site's that leads here: DNS rebinding), and an Origin that is not this link gets no
+ * byte. Programs that aren't browsers have no Origin. */
+#include <arpa/inet.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <libwebsockets.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <unistd.h>
+
+#include "drivers/link/link_poll.h"
+#include "drivers/link/web_inside.h"
+#include "drivers/socket/socket.h"
+
+static int web_callback(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t len);
+
+static const struct lws_protocols protocols[] = {
+    {"http", web_callback, sizeof(struct web_conn), WEB_IN_ROOM / 4, 0, NULL, 0},
+    {"scanhead-native-1", web_callback, sizeof(struct web_conn), WEB_IN_ROOM / 4, 0, NULL, 0},
+    {WEB_BARE, web_bare_callback, 0, 0, 0, NULL, 0},
+    {NULL, NULL, 0, 0, 0, NULL, 0},
+};
+
+static int open_context(struct web_link *web)
+{
+    struct lws_context_creation_info info;
+    memset(&info, 0, sizeof info);
+    lws_set_log_level(0, NULL);
+    info.port = CONTEXT_PORT_NO_LISTEN_SERVER;
+    info.protocols = protocols;
+    info.user = web;
+    info.options = LWS_SERVER_OPTION_EXPLICIT_VHOSTS | LWS_SERVER_OPTION_SKIP_SERVER_CANONICAL_NAME;
+    info.fd_limit_per_thread = WEB_MAX_CONNECTIONS + 8;
+    info.max_http_header_data = 2 * WEB_MAX_REQUEST; /* web_accept.c has the limit */
+    info.max_http_header_pool = WEB_MAX_CONNECTIONS;
+    info.timeout_secs = WEB_PATIENCE_S;
+    info.keepalive_timeout = WEB_PATIENCE_S;
+    info.alpn = "http/1.1";
+    web->context = lws_create_context(&info);
+    if (web->context == NULL) return -1;
+    web->vhost = lws_create_vhost(web->context, &info);
+    return web->vhost != NULL ? 0 : -1;
+}
+
+static int web_open(const struct link_spec *spec, void **link, struct sh_err *err)
+{
+    const char *host = spec->address[0] != '\0' ? spec->address : "127.0.0.1";
+    if (spec->port < 0 || spec->port > 65535)
+        return sh_fail(err, SH_EINPUT, "link web:%s:%d: allowed ports are 0 to 65535", host, spec->port);
+    if (spec->max_sessions < 1 || spec->max_sessions > LINK_MAX_SESSIONS)
+        return sh_fail(err, SH_EINPUT, "link web:%s:%d: %d sessions; allowed are 1 to %d", host, spec->port,
+                       spec->max_sessions, LINK_MAX_SESSIONS);
+    struct web_link *web = calloc(1, sizeof *web);
+    if (web == NULL) return sh_fail(err, SH_ENOMEM, "link web:%s:%d: no memory", host, spec->port);
+    const struct socket_place place = {.what = "link web", .host = host, .port = spec->port};
+    int rc = socket_open(&place, &web->listener, web->at, sizeof web->at, err);
+    if (rc != SH_OK) {
+        free(web);
+        return rc;
+    }
+    snprintf(web->host, sizeof web->host, "%s", host);
+    web->port = atoi(strrchr(web->at, ':') + 1);
+    web->n_sessions = spec->max_sessions;
+    web->source = spec->web;
+    web->reserve_fd = open("/dev/null", O_RDONLY | O_CLOEXEC);
+    if (open_context(web) == 0) web->listening = web_wait_for(web, web->listener);
+    if (web->listening == NULL) {
+        if (web->vhost == NULL) close(web->listener);
+        if (web->context != NULL) lws_context_destroy(web->context);
+        if (web->reserve_fd >= 0) close(web->reserve_fd);
+        free(web);
+        return sh_fail(err, SH_ENOMEM, "link web:%s:%d: libwebsockets has no memory, or no descriptors", host,
+                       spec->port);
+    }
+    *link = web;
+    return SH_OK;
+}
+
+static void web_endpoint(const void *link, char *buf, size_t len)
+{
+    const struct web_link *web = link;
+    snprintf(buf, len, "http://%s/", web->at);
+}
+
+/* ---- sessions */
+
+static void session_open(struct web_link *web, struct web_conn *conn, struct lws *wsi)
+{
+    char peer[64] = "";
+    int slot = 0;
+    while (slot < web->n_sessions && web->session[slot].state != WEB_FREE)
+        slot++;
+    lws_get_peer_simple(wsi, peer, sizeof peer);
+    if (slot == web->n_sessions) {
+        snprintf(web->refused, sizeof web->refused, "%s", peer);
+        web->n_refused++;
+        return;
+    }
+    struct web_session *s = &web->session[slot];
+    s->state = WEB_OPENING;
+    s->wsi = wsi;
+    s->in_len = s->out_len = 0;
+    snprintf(s->peer, sizeof s->peer, "%s", peer);
+    conn->session = s;
+}
+
+/* A browser more than there are places: it is told so, by the words that a WebSocket closes with. */
+static int turn_away(struct web_link *web, struct lws *wsi)
+{
+    unsigned char why[80];
+    int n = web->n_sessions == 1
+                ? snprintf((char *)why, sizeof why, "the only place of this link is taken")
+                : snprintf((char *)why, sizeof why, "all %d places of this link are taken", web->n_sessions);
+    lws_close_reason(wsi, (enum lws_close_status)WEB_TRY_LATER, why, (size_t)n);
+    return -1;
+}
+
+static void session_gone(struct web_session *s)
+{
+    s->wsi = NULL;
+    s->state = s->state == WEB_OPENING ? WEB_FREE : WEB_ENDED; /* nobody has heard of it yet, or somebody has to */
+}
+
+/* Ends a session whose client does not keep to the rules: nothing more goes out but why. */
+static int close_for(struct web_conn *conn, struct lws *wsi, enum lws_close_status status, const char *why)
+{
+    unsigned char words[80];
+    session_gone(conn->session);
+    conn->session = NULL;
+    int n = snprintf((char *)words, sizeof words, "%s", why);
+    lws_close_reason(wsi, status, words, (size_t)n);
+    return -1;
+}
+
+static int take_text(struct web_conn *conn, struct lws *wsi, const void *in, size_t len)
+{
+    struct web_session *s = conn->session;
+    if (lws_frame_is_binary(wsi))
+        return close_for(conn, wsi, LWS_CLOSE_STATUS_UNACCEPTABLE_OPCODE, "commands are text");
+    if (lws_is_first_fragment(wsi)) s->message_len = 0;
+    s->message_len += len;
+    if (s->message_len > WEB_MAX_MESSAGE || len + 1 > WEB_IN_ROOM - s->in_len)
+        return close_for(conn, wsi, LWS_CLOSE_STATUS_MESSAGE_TOO_LARGE, "a message has at most 4096 bytes");
+    memcpy(s->in + s->in_len, in, len);
+    s->in_len += len;
+    if (lws_is_final_fragment(wsi) && s->in_len > 0 && s->in[s->in_len - 1] != '\n') s->in[s->in_len++] = '\n';
+    if (s->in_len > WEB_IN_ROOM / 2) lws_rx_flow_control(wsi, 0);
+    return 0;
+}
+
+static int send_message(struct web_session *s, struct lws *wsi)
+{
+    if (s->out_len == 0 && s->state == WEB_LEAVING) { /* all has gone out */
+        static unsigned char why[] = "the head has ended";
+        lws_close_reason(wsi, LWS_CLOSE_STATUS_GOINGAWAY, why, sizeof why - 1);
+        return -1;
+    }
+    if (s->out_len == 0) return 0;
+    unsigned char *from = s->out + LWS_PRE;
+    int n = lws_write(wsi, from, s->out_len, (from[0] & 0x80) != 0 ? LWS_WRITE_BINARY : LWS_WRITE_TEXT);
+    s->out_len = 0; /* what the socket did not take, libwebsockets holds; it calls again after that */
+    if (s->state == WEB_LEAVING) lws_callback_on_writable(wsi);
+    return n < 0 ? -1 : 0;
+}
+
+/* HTTP and WebSocket. user: struct web_conn of the connection. */
+static int web_callback(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t len)
+{
+    struct web_conn *conn = user;
+    struct web_link *web;
+    switch (reason) {
+    case LWS_CALLBACK_WSI_CREATE:
+        web_link_of(wsi)->n_connections++;
+        return 0;
+    case LWS_CALLBACK_WSI_DESTROY:
+        web_link_of(wsi)->n_connections--;
+        return 0;
+    case LWS_CALLBACK_HTTP:
+        return web_http_begin(web_link_of(wsi), conn, wsi, in);
+    case LWS_CALLBACK_HTTP_WRITEABLE:
+        return web_http_go_on(conn, wsi);
+    case LWS_CALLBACK_CLOSED_HTTP:
+        if (conn != NULL) web_http_end(conn);
+        return 0;
+    case LWS_CALLBACK_HTTP_CONFIRM_UPGRADE: /* before a protocol is chosen; "h2c" would be HTTP/2 */
+        return strcasecmp(in, "websocket") == 0 && web_may_upgrade(web_link_of(wsi), wsi) ? 0 : -1;
+    case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:
+        return web_may_upgrade(web_link_of(wsi), wsi) ? 0 : -1;
+    case LWS_CALLBACK_ESTABLISHED:
+        web = web_link_of(wsi);
+        memset(conn, 0, sizeof *conn);
+        session_open(web, conn, wsi);
+        if (conn->session == NULL) lws_callback_on_writable(wsi);
+        return 0;
+    case LWS_CALLBACK_RECEIVE:
+        return conn->session != NULL ? take_text(conn, wsi, in, len) : 0;
+    case LWS_CALLBACK_SERVER_WRITEABLE:
+        return conn->session != NULL ? send_message(conn->session, wsi) : turn_away(web_link_of(wsi), wsi);
+    case LWS_CALLBACK_CLOSED:
+        if (conn != NULL && conn->session != NULL) session_gone(conn->session);
+        return 0;
+    default:
+        return 0;
+    }
+}
+
+/* ---- the owner's side */
+
+static int take_wake_fd(struct web_link *web, int wake_fd)
+{
+    if (web->wake != NULL || wake_fd < 0) return SH_OK;
+    web->wake_fd = wake_fd;
+    int fd = dup(wake_fd); /* the context closes it */
+    web->wake = fd >= 0 ? web_wait_for(web, fd) : NULL;
+    return web->wake != NULL ? SH_OK : SH_EIO;
+}
+
+static void report_session(struct web_session *s, int slot, uint32_t want_write, struct link_events *events)
+{
+    if (s->state == WEB_ENDED && link_events_push(events, LINK_CLOSED, slot, s->peer)) s->state = WEB_FREE;
+    if (s->state == WEB_OPENING && link_events_push(events, LINK_OPENED, slot, s->peer)) s->state = WEB_OPEN;
+    if (s->state != WEB_OPEN) return;
+    if (s->in_len > 0) link_events_push(events, LINK_READABLE, slot, NULL);
+    if ((want_write >> slot & 1u) != 0 && s->out_len == 0) link_events_push(events, LINK_WRITABLE, slot, NULL);
+}
+
+static void report(struct web_link *web, uint32_t want_write, struct link_events *events)
+{
+    if (web->woken && link_events_push(events, LINK_WOKEN, 0, NULL)) web->woken = 0;
+    for (; web->n_refused > 0 && link_events_push(events, LINK_REFUSED, 0, web->refused); web->n_refused--)
+        continue;
+    for (int s = 0; s < web->n_sessions; s++)
+        report_session(&web->session[s], s, want_write, events);
+}
+
+static void time_is_over(lws_sorted_usec_list_t *timer)
+{
+    (void)timer; /* lws_service returns */
+}
+
+static int web_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *event, int max)
+{
+    struct web_link *web = link;
+    struct link_events events = {event, 0, max};
+    if (take_wake_fd(web, wake_fd) != SH_OK) return SH_EIO;
+    report(web, want_write, &events);
+    if (events.n > 0) timeout_ms = 0;
+    if (timeout_ms > 0) lws_sul_schedule(web->context, 0, &web->timer, time_is_over, (lws_usec_t)timeout_ms * 1000);
+    if (lws_service(web->context, timeout_ms == 0 ? -1 : 0) < 0) return SH_EIO;
+    lws_sul_schedule(web->context, 0, &web->timer, time_is_over, LWS_SET_TIMER_USEC_CANCEL);
+    if (events.n == 0) report(web, want_write, &events);
+    return events.n;
+}
+
+static struct web_session *web_session(struct web_link *web, int session)
+{
+    if (session < 0 || session >= web->n_sessions || web->session[session].state != WEB_OPEN) return NULL;
+    return &web->session[session];
+}
+
+static ssize_t web_read(void *link, int session, void *buf, size_t len)
+{
+    struct web_session *s = web_session(link, session);
+    if (s == NULL) return SH_ECLOSED;
+    if (len > s->in_len) len = s->in_len;
+    memcpy(buf, s->in, len);
+    memmove(s->in, s->in + len, s->in_len - len);
+    s->in_len -= len;
+    if (s->in_len <= WEB_IN_ROOM / 2) lws_rx_flow_control(s->wsi, 1);
+    return (ssize_t)len;
+}
+
+static ssize_t web_write(void *link, int session, const void *buf, size_t len)
+{
+    struct web_session *s = web_session(link, session);
+    if (s == NULL) return SH_ECLOSED;
+    if (s->out_len != 0 || len == 0) return 0;
+    if (len > s->out_room) {
+        unsigned char *out = realloc(s->out, LWS_PRE + len);
+        if (out == NULL) return 0; /* the reader loses frames, which is counted */
+        s->out = out;
+        s->out_room = len;
+    }
+    memcpy(s->out + LWS_PRE, buf, len);
+    s->out_len = len;
+    lws_callback_on_writable(s->wsi);
+    return (ssize_t)len;
+}
+
+static int any_session(const struct web_link *web)
+{
+    for (int s = 0; s < web->n_sessions; s++)
+        if (web->session[s].wsi != NULL) return 1;
+    return 0;
+}
+
+/* What was written goes out, and why there is no more of it. A client that does not take it has so long. */
+static void say_goodbye(struct web_link *web)
+{
+    for (int s = 0; s < web->n_sessions; s++) {
+        if (web->session[s].wsi == NULL) continue;
+        web->session[s].state = WEB_LEAVING;
+        lws_callback_on_writable(web->session[s].wsi);
+    }
+    lws_usec_t end = lws_now_usecs() + (lws_usec_t)WEB_GOODBYE_MS * 1000;
+    for (lws_usec_t now; any_session(web) && (now = lws_now_usecs()) < end;) {
+        lws_sul_schedule(web->context, 0, &web->timer, time_is_over, end - now);
+        if (lws_service(web->context, 0) < 0) break;
+    }
+    lws_sul_schedule(web->context, 0, &web->timer, time_is_over, LWS_SET_TIMER_USEC_CANCEL);
+}
+
+static void web_close(void *link)
+{
+    struct web_link *web = link;
+    say_goodbye(web);
+    lws_context_destroy(web->context);
+    if (web->reserve_fd >= 0) close(web->reserve_fd);
+    for (int s = 0; s < LINK_MAX_SESSIONS; s++)
+        free(web->session[s].out);
+    free(web);
+}
+
+const struct link_ops link_web = {
+    .name = "web",
+    .messages = 1,
+    .open = web_open,
+    .endpoint = web_endpoint,
+    .poll = web_poll,
+    .read = web_read,
+    .write = web_write,
+    .close = web_close,
+};

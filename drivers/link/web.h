@@ -1,0 +1,23 @@
+/* What a web link serves besides the page's own files: resources of its owner, by path. */
+#ifndef DRIVERS_LINK_WEB_H
+#define DRIVERS_LINK_WEB_H
+
+#include <stddef.h>
+
+#include "core/err.h"
+
+struct web_body {
+    const char *type; /* of the content: "application/json" */
+    char *bytes;      /* malloc'd; the link frees them */
+    size_t len;
+};
+
+struct web_source {
+    void *ctx;
+    /* path: "/scene"; query: what follows its '?', or "". Called by the thread that owns the link, whose sessions wait
+     * meanwhile: some milliseconds at most. SH_OK; SH_EINPUT: with an empty err there is nothing at that path, else
+     * err says what is wrong with the request; other SH_E: it can't be had, and err says why. */
+    int (*get)(void *ctx, const char *path, const char *query, struct web_body *out, struct sh_err *err);
+};
+
+#endif

@@ -1,0 +1,116 @@
+// The bar: state and control in words; start, stop; the banner when the head is gone.
+import {atMostEvery, byId, say, clock, grouped} from './page.js';
+import {stateWord, why} from './session.js';
+
+export class Bar {
+  #session;
+  #frames = 0;  // of a scan, 0: until it is stopped
+  #done = 0;
+  #share = null; // of the scan, 0 to 1
+  #frame_s = 0;
+  #showSoon = atMostEvery(250, () => say(byId('progress'), this.#progressText(this.#session.scan)));
+  #busy = false;
+
+  constructor(session, log) {
+    this.#session = session;
+    const run = (line) => () => this.#do(() => session.command(line), log);
+    byId('start').addEventListener('click', () => run(session.state === 'fault' ? '*RST' : 'SCAN:STARt')());
+    byId('stop').addEventListener('click', run('SCAN:STOP'));
+    byId('control').addEventListener('click', () =>
+      this.#do(() => (session.mine ? session.release() : session.take()), log));
+    session.addEventListener('change', () => this.show());
+    this.show();
+  }
+
+  name(info) {
+    const words = [info.maker, info.model].filter(Boolean).join(' ') || info.profile || '';
+    say(byId('model'), info.serial ? `${words} · ${info.serial}` : words);
+    byId('model').title = info.config ?? '';
+    document.title = words ? `${words} · scanhead` : 'scanhead';
+  }
+
+  // Of the scan: how many frames it has, how many are done, and how long a frame takes (0: not known).
+  progress({frames = this.#frames, done = this.#done, frame_s = this.#frame_s}) {
+    if (frames === this.#frames && done === this.#done && frame_s === this.#frame_s) return;
+    if (frames !== this.#frames || frame_s !== this.#frame_s || done < this.#done) this.#share = null;
+    this.#frames = frames;
+    this.#done = done;
+    this.#frame_s = frame_s;
+    this.show();
+  }
+
+  // How far the scan is: t_s since its start. Written a few times a second at most.
+  reached(t_s) {
+    if (!(this.#frames > 0 && this.#frame_s > 0 && t_s >= 0)) return;
+    const share = Math.min(0.99, t_s / (this.#frame_s * this.#frames), (this.#done + 1) / this.#frames);
+    if (this.#share !== null && share <= this.#share) return;
+    this.#share = share;
+    this.#showSoon();
+  }
+
+  async #do(action, log) {
+    if (this.#busy) return;
+    this.#busy = true;
+    this.show();
+    try {
+      await action();
+    } catch (error) {
+      log.add(`Refused: ${why(error)}`, 'bad');
+      this.notice(`The head refused: ${why(error)}`, 6000);
+    }
+    this.#busy = false;
+    this.show();
+  }
+
+  #timer = 0;
+  #notice = '';
+  notice(text, ms) {
+    clearTimeout(this.#timer);
+    this.#notice = text;
+    this.#timer = setTimeout(() => {
+      this.#notice = '';
+      this.show();
+    }, ms);
+    this.show();
+  }
+
+  show() {
+    const {link, state, mine, owner, scan, since} = this.#session;
+    const open = link === 'open';
+    document.body.dataset.link = link;
+    document.body.dataset.owner = mine ? 'page' : owner ? 'other' : 'nobody';
+    document.body.dataset.state = open ? state ?? '' : '';
+    say(byId('state-word'), open ? stateWord(state ?? '…') : link === 'closed' ? 'Not connected' : 'Connecting');
+    say(byId('progress'), this.#progressText(scan));
+    say(byId('owner'), !open ? '' : mine ? 'You have control' : owner ? `Session ${owner} has control` : 'Nobody has control');
+    say(byId('control'), mine ? 'Give back control' : 'Take control');
+    byId('control').classList.toggle('main', !mine);
+    byId('control').disabled = !open || this.#busy || (!mine && owner !== 0);
+    byId('control').title = !mine && owner ? `Session ${owner} has control. It has to give it back first.` : '';
+    say(byId('start'), state === 'fault' ? 'Reset' : 'Start');
+    byId('start').disabled = !mine || this.#busy || !['idle', 'fault'].includes(state);
+    byId('stop').disabled = !mine || this.#busy || !['spin-up', 'scanning'].includes(state);
+    this.#showBanner(link, since);
+  }
+
+  #progressText(scan) {
+    if (!scan) return this.#session.link === 'open' ? 'No scan yet' : '';
+    const name = `Scan ${grouped(scan)}`, frames = this.#frames, done = this.#done;
+    const plural = (n) => `${grouped(n)} frame${n === 1 ? '' : 's'}`;
+    if (!frames) return `${name}: ${plural(done)}`;
+    if (!['spin-up', 'scanning'].includes(this.#session.state)) {
+      return done >= frames ? `${name}: done` : `${name}: ended after ${grouped(done)} of ${plural(frames)}`;
+    }
+    const percent = this.#share === null ? '' : ` ${Math.floor(100 * this.#share)}\u00a0%`;
+    return frames === 1 ? `${name}:${percent || ' 1 frame'}` : `${name}:${percent}${percent && ','} frame ${grouped(Math.min(done + 1, frames))} of ${grouped(frames)}`;
+  }
+
+  #showBanner(link, since) {
+    const {words, wasOpen} = this.#session;
+    const gone = link !== 'closed' ? '' : wasOpen
+      ? `Not connected since ${clock(since)}: ${words}. What was received stays. The page connects again by itself.`
+      : `No connection: ${words}. The page tries again by itself.`;
+    say(byId('banner'), gone || this.#notice);
+    byId('banner').hidden = !(gone || this.#notice);
+  }
+}

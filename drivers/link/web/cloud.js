@@ -1,0 +1,230 @@
+// The points that are held: blocks of typed arrays, the newest `capacity` of them and less than a block more; the oldest
+// blocks go.
+//
+// Positions are Float32, relative to `origin` (Float64, scene frame): the place of the first point. So a cloud at UTM
+// coordinates keeps 0.03 mm within 500 m of it, where Float32 of the coordinates themselves would have 0.5 m.
+//
+// The order inside a closed block is such that its first k points are spread evenly over the block, for any k: one
+// point at random from each k-th of it. So a level of detail is a prefix of each block. Every k-th point would not do:
+// k may be the length of a line. The block that is still filled has the points as they came.
+
+export const BLOCK = 65536;
+
+// Nested scrambling (Owen 1995) of the numbers below 2^16 with their bits reversed: at each level one bit at random
+// tells which half comes first.
+let evenly = null;
+export function evenOrder(n) {
+  if (evenly === null) {
+    evenly = new Uint16Array(BLOCK);
+    for (let i = 0; i < BLOCK; i++) {
+      let out = 0;
+      let prefix = 1; // the bits decided so far, under a leading one
+      for (let bit = 0; bit < 16; bit++) {
+        const taken = ((i >> bit) & 1) ^ (mix(prefix) & 1);
+        out = (out << 1) | taken;
+        prefix = (prefix << 1) | taken;
+      }
+      evenly[i] = out;
+    }
+  }
+  return n === BLOCK ? evenly : evenly.filter((i) => i < n);
+}
+
+// Finalizer of MurmurHash3 (Appleby, public domain).
+function mix(h) {
+  h = Math.imul(h ^ (h >>> 16), 0x85ebca6b);
+  h = Math.imul(h ^ (h >>> 13), 0xc2b2ae35);
+  return (h ^ (h >>> 16)) >>> 8;
+}
+
+const MODELLED = ['reflectance', 'amplitude']; // NaN where not: an array of its own only where a block has any
+
+class Block {
+  n = 0;
+  closed = false;
+  order = null; // of a closed block: which of the points, as they came, stands at each place
+  lo = [Infinity, Infinity, Infinity]; // relative to the origin
+  hi = [-Infinity, -Infinity, -Infinity];
+  position = new Float32Array(3 * BLOCK);
+  t = new Float32Array(BLOCK);
+  range = new Float32Array(BLOCK);
+  label = new Uint16Array(BLOCK);
+  echo = new Uint8Array(BLOCK); // number, and times 16 how many the pulse has
+  pulse = new Uint32Array(BLOCK); // from pulse0 on
+  reflectance = null;
+  amplitude = null;
+  rgb = null; // in threes
+
+  constructor(first, batch) {
+    this.first = first; // number of its first point since the cloud was cleared
+    this.scan = batch.scan;
+    this.station = batch.station;
+    this.pulse0 = batch.n > 0 ? batch.pulse[0] : 0;
+  }
+
+  takes(batch, from) {
+    const pulses = batch.pulse[from] - this.pulse0;
+    return !this.closed && batch.scan === this.scan && batch.station === this.station && pulses >= 0 &&
+      batch.pulse[batch.n - 1] - this.pulse0 < 2 ** 32;
+  }
+
+  // How many of the batch it took, from `from` on.
+  append(batch, from, origin) {
+    const k = Math.min(batch.n - from, BLOCK - this.n);
+    const {lo, hi, position, pulse, echo, pulse0} = this;
+    const {x, y, z} = batch;
+    let at = 3 * this.n;
+    for (let i = from; i < from + k; i++, at += 3) {
+      const px = x[i] - origin[0], py = y[i] - origin[1], pz = z[i] - origin[2];
+      position[at] = px;
+      position[at + 1] = py;
+      position[at + 2] = pz;
+      if (px < lo[0]) lo[0] = px;
+      if (px > hi[0]) hi[0] = px;
+      if (py < lo[1]) lo[1] = py;
+      if (py > hi[1]) hi[1] = py;
+      if (pz < lo[2]) lo[2] = pz;
+      if (pz > hi[2]) hi[2] = pz;
+    }
+    for (let i = 0, to = this.n; i < k; i++, to++) {
+      pulse[to] = batch.pulse[from + i] - pulse0;
+      echo[to] = batch.echo[from + i] | (batch.echoes[from + i] << 4);
+    }
+    const part = (array, size = 1) => array.subarray(size * from, size * (from + k));
+    this.t.set(part(batch.t), this.n);
+    this.range.set(part(batch.range), this.n);
+    this.label.set(part(batch.label), this.n);
+    for (const name of MODELLED) {
+      const values = batch[name];
+      if (this[name] === null && values && !Number.isNaN(values[from])) this[name] = new Float32Array(BLOCK).fill(NaN);
+      if (this[name] === null && values && part(values).some((v) => v === v)) this[name] = new Float32Array(BLOCK).fill(NaN);
+      if (this[name] !== null && values) this[name].set(part(values), this.n);
+    }
+    if (this.rgb === null && batch.rgb) this.rgb = new Uint8Array(3 * BLOCK);
+    if (this.rgb !== null && batch.rgb) this.rgb.set(part(batch.rgb, 3), 3 * this.n);
+    this.n += k;
+    return k;
+  }
+
+  // No more points come: the even order, and no more memory than needed.
+  close() {
+    const order = evenOrder(this.n);
+    this.closed = true;
+    this.order = order;
+    for (const name of ['position', 't', 'range', 'label', 'echo', 'pulse', 'reflectance', 'amplitude', 'rgb']) {
+      const from = this[name];
+      if (from === null) continue;
+      const size = from.length / BLOCK;
+      const to = new from.constructor(size * this.n);
+      if (size === 1) for (let i = 0; i < order.length; i++) to[i] = from[order[i]];
+      else {
+        for (let i = 0, at = 0; i < order.length; i++, at += 3) {
+          const k = 3 * order[i];
+          to[at] = from[k];
+          to[at + 1] = from[k + 1];
+          to[at + 2] = from[k + 2];
+        }
+      }
+      this[name] = to;
+    }
+  }
+
+  bytes() {
+    let sum = 0;
+    for (const name of ['position', 't', 'range', 'label', 'echo', 'pulse', 'reflectance', 'amplitude', 'rgb']) {
+      if (this[name] !== null) sum += this[name].byteLength;
+    }
+    return sum;
+  }
+}
+
+export class Cloud {
+  total = 0; // points that came since it was cleared
+  gone = 0; // of these, no longer held
+  origin = null;
+  blocks = [];
+  changed = null; // called after each change
+  #gone_lo = [Infinity, Infinity, Infinity];
+  #gone_hi = [-Infinity, -Infinity, -Infinity];
+
+  constructor({capacity = 10_000_000} = {}) {
+    if (!(capacity >= 1)) throw new RangeError(`a cloud of ${capacity} points: at least 1`);
+    this.capacity = capacity;
+  }
+
+  get count() { return this.total - this.gone; }
+  get bytes() { return this.blocks.reduce((sum, block) => sum + block.bytes(), 0); }
+
+  add(batch) {
+    if (batch.n === 0) return;
+    this.origin ??= Float64Array.of(batch.x[0], batch.y[0], batch.z[0]).map((v) => (Number.isFinite(v) ? v : 0));
+    for (let from = 0; from < batch.n;) {
+      let block = this.blocks.at(-1);
+      if (!block?.takes(batch, from)) {
+        if (block && !block.closed) block.close();
+        block = new Block(this.total, batch);
+        block.pulse0 = batch.pulse[from];
+        this.blocks.push(block);
+      }
+      const k = block.append(batch, from, this.origin);
+      from += k;
+      this.total += k;
+      if (block.n === BLOCK) block.close();
+    }
+    this.#let_go();
+    this.changed?.();
+  }
+
+  // Whole blocks, as long as what remains is at least the capacity.
+  #let_go() {
+    let n = 0;
+    let over = this.count - this.capacity;
+    while (over > 0 && this.blocks[n].n <= over) over -= this.blocks[n++].n;
+    for (const block of this.blocks.splice(0, n)) {
+      this.gone += block.n;
+      for (let a = 0; a < 3; a++) {
+        this.#gone_lo[a] = Math.min(this.#gone_lo[a], block.lo[a]);
+        this.#gone_hi[a] = Math.max(this.#gone_hi[a], block.hi[a]);
+      }
+    }
+  }
+
+  clear() {
+    this.blocks = [];
+    this.total = this.gone = 0;
+    this.origin = null;
+    this.#gone_lo = [Infinity, Infinity, Infinity];
+    this.#gone_hi = [-Infinity, -Infinity, -Infinity];
+    this.changed?.();
+  }
+
+  // {min, max} in the scene frame, of the points held, or of all that came; null of none.
+  #within(lo, hi) {
+    lo = [...lo];
+    hi = [...hi];
+    for (const block of this.blocks) {
+      for (let a = 0; a < 3; a++) {
+        lo[a] = Math.min(lo[a], block.lo[a]);
+        hi[a] = Math.max(hi[a], block.hi[a]);
+      }
+    }
+    if (!(lo[0] <= hi[0])) return null;
+    return {min: lo.map((v, a) => v + this.origin[a]), max: hi.map((v, a) => v + this.origin[a])};
+  }
+
+  get bounds() { return this.#within([Infinity, Infinity, Infinity], [-Infinity, -Infinity, -Infinity]); }
+  get boundsOfAll() { return this.#within(this.#gone_lo, this.#gone_hi); }
+}
+
+// All figures of point i of a block.
+export function pointOf(cloud, block, i) {
+  const at = (axis) => block.position[3 * i + axis] + cloud.origin[axis];
+  return {
+    x: at(0), y: at(1), z: at(2), range: block.range[i], t: block.t[i],
+    reflectance: block.reflectance ? block.reflectance[i] : NaN,
+    amplitude: block.amplitude ? block.amplitude[i] : NaN,
+    label: block.label[i], echo: block.echo[i] & 15, echoes: block.echo[i] >> 4,
+    pulse: block.pulse0 + block.pulse[i], scan: block.scan, station: block.station,
+    rgb: block.rgb ? [...block.rgb.subarray(3 * i, 3 * i + 3)] : null,
+  };
+}

@@ -1,0 +1,156 @@
+// State in figures: what the head delivers, what of it came here, what was lost, what the page does with it.
+import {bodyOf, byId, duration, figureList, grouped, make, makeSvg, say, short, NONE} from './page.js';
+
+const HEAD = [
+  ['pulse-rate', 'Pulses a second', 'Delivered by the head, by its own time'],
+  ['echo-rate', 'Echoes a second'],
+  ['line-rate', 'Lines a second'],
+  ['pulses', 'Pulses', 'Delivered since power-up'],
+  ['echoes', 'Echoes a pulse', 'Since power-up'],
+  ['lost', 'Pulses lost by the head', 'Cast, but not computed in time'],
+  ['late', 'Late blocks', 'Blocks that were sent late, and by how much at most'],
+  ['queued', 'Errors in its queue', 'SYSTem:ERRor? reads and removes them, for all clients'],
+  ['time', 'Time', 'UTC as the head’s clock has it, or its time since power-up'],
+];
+const PAGE = [
+  ['received', 'Points a second', 'Received by this page'],
+  ['bytes', 'Bytes a second'],
+  ['lost-frames', 'Frames lost on the way', 'Missing in the sequence: left out because this page was too slow, or damaged'],
+  ['lost-pulses', 'Pulses left out', 'In the frames that the head left out because this page was too slow'],
+  ['dropped', 'Pulses dropped here', 'By the page itself, which could not take them'],
+  ['unplaced', 'Pulses without a place', 'Came before their anchor or pose, as when a page joins a scan: counted, not drawn'],
+  ['bad', 'Damaged bytes'],
+  ['decode', 'To decode a point'],
+  ['held', 'Points held'],
+  ['gone', 'Points gone', 'The oldest, which had no room any more'],
+  ['drawn', 'Pictures a second', 'Drawn of late; none are drawn while nothing changes'],
+];
+
+const SPARK_POINTS = 120; // seconds
+
+const number = (value) => (value === null || value === undefined ? NaN : Number(value));
+
+export class Figures {
+  #set;
+  #last = null;     // telemetry before, with its device time
+  #lastPage = null; // the page's own counts before
+  #rates = [];
+  #texts = {};
+  #path = makeSvg('path');
+  #peak = make('span', {class: 'note'});
+
+  constructor(head, cloud) {
+    this.head = head;
+    this.cloud = cloud;
+    const body = bodyOf('figures');
+    if (head) {
+      const spark = makeSvg('svg', {class: 'spark', viewBox: `0 0 ${SPARK_POINTS - 1} 30`, preserveAspectRatio: 'none',
+        role: 'img', 'aria-label': 'Pulses a second, of the last two minutes'},
+      makeSvg('line', {class: 'axis', x1: 0, x2: SPARK_POINTS, y1: 29.5, y2: 29.5}), this.#path);
+      body.append(make('div', {}, make('div', {class: 'spread'}, make('h3', {}, 'Head'), this.#peak), spark));
+    }
+    const ofHead = head ? figureList(body, HEAD) : () => {};
+    body.append(make('h3', {}, 'This page'));
+    const ofPage = figureList(body, head ? PAGE : PAGE.filter(([key]) => ['held', 'drawn'].includes(key)));
+    this.#set = (texts) => {
+      for (const [set, rows] of [[ofHead, HEAD], [ofPage, PAGE]]) {
+        set(Object.fromEntries(rows.map(([key]) => [key, texts[key]]).filter(([key, text]) => text !== undefined && byId(`figure-${key}`))));
+      }
+    };
+    head?.addEventListener('telemetry', ({detail}) => this.#telemetry(detail));
+    head?.addEventListener('close', () => this.#stopped());
+    setInterval(() => this.#page(), 1000);
+    setInterval(() => !document.hidden && this.#show(), 250);
+  }
+
+  #telemetry(t) {
+    const now = {t_s: number(t.t_ns) / 1e9, at: performance.now() / 1e3, pulses: number(t.pulses), echoes: number(t.echoes), lines: number(t.lines)};
+    if (!Number.isFinite(now.t_s)) now.t_s = now.at;
+    const before = this.#last;
+    // Two telemetries at one time, as at a scan's end, make no rate; a restarted head begins anew.
+    if (before && now.t_s - before.t_s < 0.2 && now.t_s >= before.t_s) return this.#counts(t, now);
+    this.#last = now;
+    const s = before ? now.t_s - before.t_s : 0;
+    if (s > 0 && now.pulses >= before.pulses) {
+      const rate = (key) => (now[key] - before[key]) / s;
+      Object.assign(this.#texts, {'pulse-rate': short(rate('pulses')), 'echo-rate': short(rate('echoes')),
+        'line-rate': short(rate('lines'))});
+      this.#spark(rate('pulses'));
+    }
+    this.#counts(t, now);
+  }
+
+  #counts(t, now) {
+    const late = number(t.late_blocks);
+    Object.assign(this.#texts, {
+      'pulses': short(now.pulses),
+      'echoes': now.pulses > 0 ? (now.echoes / now.pulses).toFixed(3) : NONE,
+      'lost': grouped(number(t.lost_pulses)),
+      'late': late > 0 ? `${grouped(late)}, up to ${duration(number(t.late_max_us) / 1e6)}` : '0',
+      'queued': grouped(number(t.errors_queued)),
+      'time': clockText(t.utc_ns, now.t_s),
+    });
+    mark('lost', number(t.lost_pulses) > 0);
+    mark('queued', number(t.errors_queued) > 0);
+  }
+
+  #spark(rate) {
+    this.#rates.push(rate);
+    if (this.#rates.length > SPARK_POINTS) this.#rates.shift();
+    const peak = Math.max(...this.#rates);
+    const first = SPARK_POINTS - this.#rates.length;
+    const y = (value) => (28.5 - (peak > 0 ? value / peak : 0) * 27).toFixed(1);
+    this.#path.setAttribute('d', this.#rates.map((value, i) => `${i ? 'L' : 'M'}${first + i} ${y(value)}`).join(''));
+    say(this.#peak, peak > 0 ? `peak ${short(peak)} pulses a second` : '');
+  }
+
+  #stopped() {
+    this.#last = this.#lastPage = null;
+    Object.assign(this.#texts, {'pulse-rate': NONE, 'echo-rate': NONE, 'line-rate': NONE, 'received': NONE, 'bytes': NONE});
+  }
+
+  #page() {
+    if (this.cloud) Object.assign(this.#texts, {held: grouped(this.cloud.count), gone: grouped(this.cloud.gone)});
+    if (!this.head) return;
+    const f = this.head.figures();
+    const now = {at: performance.now() / 1e3, points: number(f.points), bytes: number(f.bytes)};
+    const before = this.#lastPage;
+    this.#lastPage = now;
+    if (before) {
+      const rate = (key) => Math.max(0, (now[key] - before[key]) / (now.at - before.at));
+      Object.assign(this.#texts, {received: short(rate('points')), bytes: short(rate('bytes'), 'B')});
+    }
+    Object.assign(this.#texts, {
+      'lost-frames': grouped(number(f.lost_frames)),
+      'lost-pulses': grouped(number(f.left_out_pulses)),
+      'dropped': grouped(number(f.dropped_pulses)),
+      'unplaced': grouped(number(f.unplaced_pulses)),
+      'bad': grouped(number(f.bad_bytes)),
+      'decode': number(f.decode_ns_per_point) > 0 ? duration(number(f.decode_ns_per_point) / 1e9) : NONE,
+    });
+    mark('lost-frames', number(f.lost_frames) > 0);
+    mark('lost-pulses', number(f.left_out_pulses) > 0);
+    mark('dropped', number(f.dropped_pulses) > 0);
+    mark('unplaced', number(f.unplaced_pulses) > 0);
+    mark('bad', number(f.bad_bytes) > 0);
+  }
+
+  drawn({frames_per_s: rate, points}) {
+    this.#texts.drawn = `${short(Math.round(rate * 10) / 10)}${!points || this.cloud.count === 0 ? '' : `, ${short(points)} points`}`;
+  }
+
+  #show() {
+    this.#set(this.#texts);
+  }
+}
+
+const mark = (key, bad) => byId(`figure-${key}`)?.classList.toggle('bad', bad);
+
+function clockText(utc_ns, t_s) {
+  const utc = number(utc_ns);
+  if (utc > 0) return new Date(utc / 1e6).toISOString().slice(11, 19) + ' UTC';
+  if (!Number.isFinite(t_s)) return NONE;
+  const s = Math.floor(t_s), two = (n) => String(n).padStart(2, '0');
+  return `${Math.floor(s / 3600)}:${two(Math.floor(s / 60) % 60)}:${two(s % 60)} since power-up`;
+}
+

@@ -1,0 +1,252 @@
+// One head: its connection, commands and replies, control, what it says of itself, and what was lost.
+import {STATES} from './native.js';
+import {Losses} from './losses.js';
+import {CommandError, Replies} from './replies.js';
+import {Wire} from './wire.js';
+
+export {CommandError};
+const TIMEOUT_S = 5, FIRST_DELAY_S = 0.5, MAX_DELAY_S = 5, FULL_DELAY_S = 10, FULL = 1013;
+
+// Why a connection ended, for people.
+function closeWords(code, reason, wasOpen) {
+  if (code === FULL) return reason || 'all places of this link are taken';
+  if (reason) return reason;
+  if (!wasOpen) return 'the head is not there, or does not want this page';
+  return code === 1000 || code === 1001 ? 'the head has ended' : 'the connection broke: the head is gone';
+}
+
+/**
+ * Events, each with its value in `detail`:
+ * - `open` {connection}; `close` {code, words, again_s: when it tries again, or null, wasOpen}
+ * - `state` {state, before}; `control` {session: 0 nobody, own, mine}
+ * - `lost` {by, frames, pulses}, by 'head' (not computed in time), 'link' (this page was too slow), 'wire' (damaged) or
+ *   'page' (dropped here)
+ * - `scan` {scan, fired, cast, lost, received, missing} at a scan's end; null for what was lost on the way
+ * - `points`, `descriptor`, `anchor`, `emitter`, `names`, `line-end`, `telemetry`, `event`, `poses` as the Decoder has
+ *   them; `refused`, the words for a frame that was refused
+ */
+export class Head extends EventTarget {
+  isOpen = false;
+  state = null; // a word of STATES
+  session = 0; // this page's; 0: not known
+  controller = 0; // the session in control; 0: nobody
+  idn = '';
+  descriptor = null; // what came last of each, of this connection
+  anchor = null;
+  emitter = null;
+  telemetry = null;
+  names = new Map(); // label: {object, material}
+
+  #url;
+  #wire;
+  #replies;
+  #connection = 0; // as the wire numbers them
+  #delay_s = FIRST_DELAY_S;
+  #timer = 0;
+  #isClosed = false;
+  #figures = {};
+  #losses = null;
+  #told = ''; // who has control, as `control` said it last
+
+  /** url: "ws://host:port/ws", or "/ws" in a page. worker: false decodes in this thread. It connects at once, and again
+   * and again until close(). */
+  constructor(url, {worker = typeof Worker === 'function'} = {}) {
+    super();
+    this.#url = typeof location === 'undefined' ? url : new URL(url, location.href.replace(/^http/, 'ws')).href;
+    this.#replies = new Replies((line) => this.#wire.post({send: line}));
+    this.#forget();
+    this.#wire = worker ? this.#inWorker() : this.#inPage();
+    this.#wire.post({connect: this.#url});
+  }
+
+  get mine() {
+    return this.session !== 0 && this.session === this.controller;
+  }
+
+  // ---- commands
+
+  /** A promise of the reply to one command line. It throws CommandError {number, text} for an ERR; its number is 0
+   * where no reply came. */
+  command(line, {timeout_s = TIMEOUT_S} = {}) {
+    return this.#replies.ask(line, timeout_s);
+  }
+
+  /** Takes control and changes nothing else. It throws -203 where another session has it. */
+  async takeControl() {
+    await this.command('SYSTem:CONTrol:TAKE');
+    await this.#askControl();
+  }
+
+  async releaseControl() {
+    await this.command('SYSTem:CONTrol:RELease');
+    await this.#askControl();
+  }
+
+  async #askControl() {
+    this.#controlled(Number(await this.command('SYSTem:CONTrol?')));
+  }
+
+  /** Ends the connection for good. */
+  close() {
+    if (this.#isClosed) return;
+    this.#isClosed = true;
+    clearTimeout(this.#timer);
+    this.#wire.post({close: true});
+    this.#closed({code: 1000, reason: 'closed by this page'});
+    this.#wire.end();
+  }
+
+  /**
+   * Counts of this connection, by the words of PROTOCOL.md (*What the counts mean*). frames, bytes, points (records,
+   * shots without echo among them), pulses (received), empty; lost_frames: missing in the sequence, of which
+   * left_out_frames with left_out_pulses because this page was too slow; lost_pulses: lost by the head; missing_pulses:
+   * of all scans that ended here, delivered and not received; dropped_points, dropped_pulses: decoded, and dropped by
+   * the page itself; unplaced_points, unplaced_pulses: came before their anchor or their pose; bad_bytes, bad_payloads,
+   * refused; decode_ns_per_point; point_hash.
+   */
+  figures() {
+    const f = this.#figures, l = this.#losses;
+    return {...f, pulses: f.shots, dropped_pulses: f.dropped_shots, unplaced_pulses: f.unplaced_shots,
+      left_out_frames: l.leftOutFrames, left_out_pulses: l.leftOutPulses, missing_pulses: l.missing,
+      lost_pulses: l.byHead};
+  }
+
+  // ---- the wire, in a worker or here
+
+  #inWorker() {
+    const worker = new Worker(new URL('./wire_worker.js', import.meta.url), {type: 'module'});
+    worker.onmessage = ({data}) => {
+      this.#taken(data);
+      worker.postMessage({ack: true});
+    };
+    worker.onerror = (event) => { // it could not be loaded
+      event.preventDefault?.();
+      worker.terminate();
+      this.#wire = this.#inPage();
+      this.#wire.post({connect: this.#url});
+    };
+    return {post: (message) => worker.postMessage(message), end: () => worker.terminate()};
+  }
+
+  #inPage() {
+    const wire = new Wire((message) => queueMicrotask(() => {
+      this.#taken(message);
+      wire.take({ack: true});
+    }));
+    return {post: (message) => wire.take(message), end() {}};
+  }
+
+  #taken({connection, things, figures}) {
+    if (this.#isClosed) return;
+    const before = this.#figures;
+    this.#figures = figures;
+    for (const [name, value] of things) this.#take(name, value, connection);
+    const more = (key) => figures[key] - (connection === this.#connection ? before[key] ?? 0 : 0);
+    this.#connection = connection;
+    if (more('dropped_shots') > 0) this.#say('lost', {by: 'page', frames: 0, pulses: more('dropped_shots')});
+  }
+
+  #take(name, value, connection) {
+    switch (name) {
+      case 'open': this.#opened(connection); return;
+      case 'close': this.#closed(value); return;
+      case 'text': this.#replies.take(value); return;
+      case 'descriptor': this.#described(value); return;
+      case 'anchor': this.anchor = value; break;
+      case 'emitter': this.emitter = value; break;
+      case 'names': value.forEach(({label, ...words}) => this.names.set(label, words)); break;
+      case 'telemetry': this.#measured(value); break;
+      case 'event': this.#happened(value); break;
+      case 'points': this.#losses.points(value); break;
+      default:
+    }
+    this.#say(name, value);
+  }
+
+  #say(name, detail) {
+    this.dispatchEvent(new CustomEvent(name, {detail}));
+  }
+
+  // ---- connection
+
+  #forget() {
+    this.state = this.descriptor = this.anchor = this.emitter = this.telemetry = null;
+    this.session = this.controller = 0;
+    this.names.clear();
+    this.#figures = {points: 0, shots: 0, bytes: 0, frames: 0, lost_frames: 0, bad_bytes: 0, decode_ns_per_point: 0};
+    this.#losses = new Losses((name, detail) => this.#say(name, detail));
+  }
+
+  #opened(connection) {
+    const figures = this.#figures;
+    this.#forget();
+    this.#figures = figures;
+    this.isOpen = true;
+    this.#replies.open();
+    this.#say('open', {connection});
+    this.#introduce().catch(() => {}); // gone again, which `close` says
+  }
+
+  // Who the head is and what it does. HELP first: an older head does not know a session's number, and asking it would
+  // be an error in its queue.
+  async #introduce() {
+    const [idn, state, controller, help] = await Promise.all(
+      ['*IDN?', 'HEAD:STATe?', 'SYSTem:CONTrol?', 'HELP?'].map((line) => this.command(line)));
+    this.#delay_s = FIRST_DELAY_S;
+    this.idn = idn;
+    this.#become(state);
+    if (/SYSTem:SESSion/i.test(help)) this.session = Number(await this.command('SYSTem:SESSion?'));
+    this.#controlled(Number(controller));
+  }
+
+  #closed({code, reason}) {
+    const wasOpen = this.isOpen, words = closeWords(code, reason, wasOpen);
+    this.isOpen = false;
+    this.#replies.close(words);
+    const again_s = this.#isClosed ? null : code === FULL ? FULL_DELAY_S : this.#delay_s;
+    this.session = this.controller = 0;
+    this.#told = '';
+    this.state = null;
+    if (again_s !== null) {
+      this.#timer = setTimeout(() => this.#wire.post({connect: this.#url}), 1000 * again_s);
+      this.#delay_s = Math.min(2 * this.#delay_s, MAX_DELAY_S);
+    }
+    this.#say('close', {code, words, again_s, wasOpen});
+  }
+
+  // ---- what the head says of itself
+
+  #become(state) {
+    if (state === this.state || state === undefined) return;
+    const before = this.state;
+    this.state = state;
+    this.#say('state', {state, before});
+  }
+
+  #controlled(session) {
+    const now = `${session} ${this.session}`;
+    if (now === this.#told) return;
+    this.#told = now;
+    this.controller = session;
+    this.#say('control', {session, own: this.session, mine: this.mine});
+  }
+
+  #described(d) {
+    this.descriptor = d;
+    if (!d.repeat) this.emitter = null;
+    this.#losses.descriptor(d);
+    this.#say('descriptor', d);
+  }
+
+  #measured(t) {
+    this.telemetry = t;
+    this.#become(STATES[t.state]);
+    this.#losses.telemetry(t, this.#figures.lost_frames);
+  }
+
+  #happened(e) {
+    this.#losses.event(e);
+    if (e.name === 'STATE') this.#become(STATES[e.state]);
+    if (e.name === 'CONTROL') this.#controlled(e.session);
+  }
+}

@@ -1,0 +1,289 @@
+// The head's settings, as the head describes them: a field each, with limits, unit and the head's own refusals.
+import {bodyOf, byId, make, say, atMostEvery} from './page.js';
+import {describeSettings} from './describe.js';
+import {why} from './session.js';
+
+// What people call them, in the order of the page. A setting that is not here stands under "More" with its header.
+const GROUPS = [
+  ['Rates', [['HEAD:PRR', 'Pulses'], ['HEAD:LINes', 'Lines'], ['HEAD:PAN', 'Pan']]],
+  ['Angular step', [['SCAN:STEP', 'Both ways'], ['SCAN:STEP:LINE', 'In the line'], ['SCAN:STEP:PAN', 'Line to line']]],
+  ['Field of view', [['SCAN:LINE:STARt', 'Line from'], ['SCAN:LINE:STOP', 'Line to'],
+    ['SCAN:PAN:STARt', 'Pan from'], ['SCAN:PAN:STOP', 'Pan to']]],
+  ['Range', [['HEAD:RANGe:MIN', 'Nearest'], ['HEAD:RANGe:MAX', 'Farthest']]],
+  ['Scan', [['SCAN:FRAMes', 'Frames'], ['SCAN:ECHoes', 'Echoes'], ['HEAD:STATION', 'Station']]],
+  ['Noise', [['HEAD:NOISe', 'Of ranges'], ['HEAD:NOISe:SIGMa', 'One sigma'], ['HEAD:NOISe:BALL', 'Ball, its radius'],
+    ['HEAD:NOISe:ANGLe', 'Of angles']]],
+];
+const NOTES = {'SCAN:FRAMes': '0: endless'};
+const ELSEWHERE = ['SITE:POSE']; // the stations' panel has it
+
+const CHOICES = {ALL: 'All', FIRST: 'First', LAST: 'Last', STRONGEST: 'Strongest', OFF: 'Off', ON: 'On',
+  SIGNAL: 'By signal'};
+const choice = (word) => CHOICES[word.toUpperCase()] ?? word;
+const sameWord = (a, b) => a.toUpperCase() === b.toUpperCase()
+  || a.toUpperCase().startsWith(b.replace(/[a-z]+$/, '').toUpperCase()) && b.toUpperCase().startsWith(a.toUpperCase());
+
+// '1200000' -> '1 200 000'; the figures stay those of the head.
+function readable(text) {
+  const [whole, part] = text.split('.');
+  const grouped = whole.length > 5 ? whole.replace(/\B(?=(\d{3})+$)/g, '\u2009') : whole;
+  return (part ? `${grouped}.${part}` : grouped).replace('-', '−');
+}
+
+const decimals = (text) => (/^\d*\.(\d*)$/.exec(text)?.[1] ?? '').length;
+
+// A limit in few figures, where these are all it has: 1200000 -> '1.2 M'. A limit one step away from what may not be
+// reached is said by that: 59.999999 -> '< 60'; the whole number stands in the tooltip.
+export function limit(text, step = '', isUpper = false) {
+  const round = Number(Number(text).toFixed(Math.max(0, decimals(step) - 2)));
+  const off = Math.abs(round - Number(text));
+  if (decimals(step) > 3 && off > 0 && off <= 1.5 * Number(step)) {
+    return `${round > Number(text) ? '<' : '>'}\u2009${readable(String(round))}`;
+  }
+  const value = Number(text);
+  for (const [scale, prefix] of [[1e6, 'M'], [1e3, 'k']]) {
+    if (Math.abs(value) >= Math.max(scale, 1e4)) {
+      const few = value / scale;
+      if (Number(few.toPrecision(4)) === few) return `${String(few).replace('-', '−')}\u00a0${prefix}`;
+    }
+  }
+  return readable(text.replace(/^-?\d*\.\d+$/, (all) => inward(all, isUpper)));
+}
+
+// A number that takes more than four figures after its point is cut to four: a lower limit up, an upper one down, so
+// that what is read is allowed.
+function inward(text, isUpper) {
+  const value = Number(text), places = Math.min(12, 3 - Math.min(-1, Math.floor(Math.log10(Math.abs(value) || 1))));
+  if ((text.split('.')[1] ?? '').length <= places) return text;
+  const scale = 10 ** places;
+  return String(Number(((isUpper ? Math.floor : Math.ceil)(value * scale) / scale).toFixed(places)));
+}
+
+// Nothing else can be set now: one value is allowed, or, as at a pan that stands still, none but the one that holds.
+const isFixed = ({min, max}) => Boolean(min) && Boolean(max) && Number(min) >= Number(max);
+
+const unitName = (unit) => unit.replace('deg', '°');
+
+export class Knobs extends EventTarget {
+  #session;
+  #knobs = new Map(); // header -> {field, hint, box, setting, value}
+  #note = make('p', {class: 'note'});
+  #form = make('div', {class: 'groups'});
+  #again;
+
+  constructor(session) {
+    super();
+    this.#session = session;
+    const reset = make('button', {type: 'button', id: 'reset', click: () => this.#reset()}, 'Settings of power-up');
+    this.reset = reset;
+    bodyOf('knobs').append(this.#note, this.#form, make('div', {class: 'actions'}, reset));
+    this.#again = atMostEvery(500, () => this.#ask().catch(() => {}));
+    session.addEventListener('change', () => {
+      if (session.link === 'open' && this.#knobs.size === 0) this.load();
+      this.#allow();
+    });
+    session.head.addEventListener('open', () => this.load());
+    session.head.addEventListener('event', ({detail}) => {
+      if (['SETTINGS', 'SITE', 'SCAN_START', 'CONTROL'].includes(detail.name)) this.askAgain();
+    });
+    session.head.addEventListener('descriptor', ({detail}) => this.#described(detail));
+    setInterval(() => this.#watchOthers(), 2000);
+    this.#allow();
+  }
+
+  // A client in control may turn a knob between scans, of which no event tells; a glance every two seconds does.
+  #watchOthers() {
+    const {link, mine, owner} = this.#session;
+    if (link === 'open' && !mine && owner && !document.hidden && byId('panel-knobs').open) this.askAgain();
+  }
+
+  #lastDescriptor = '';
+  #described(d) {
+    const now = [d.prr_uhz, d.lines_uhz, d.pan_udeg_s, d.line_start_udeg, d.line_stop_udeg, d.range_max_m, d.frames].join();
+    if (now !== this.#lastDescriptor) this.askAgain();
+    this.#lastDescriptor = now;
+  }
+
+  askAgain() {
+    this.#again();
+  }
+
+  setting(header) {
+    return this.#knobs.get(header)?.setting;
+  }
+
+  #loading = false;
+  async load() {
+    if (this.#loading) return;
+    this.#loading = true;
+    try {
+      this.#build(await describeSettings(this.#session));
+      await this.#read();
+    } catch { /* the head is gone; it comes again with 'open' */ }
+    this.#loading = false;
+    this.#allow();
+  }
+
+  #build(settings) {
+    const has = new Map(settings.filter((s) => s.states && !ELSEWHERE.includes(s.header)).map((s) => [s.header, s]));
+    const known = new Set(GROUPS.flatMap(([, rows]) => rows.map(([header]) => header)));
+    const more = [...has.keys()].filter((header) => !known.has(header)).map((header) => [header, header]);
+    const groups = [...GROUPS, ['More', more]];
+    const same = [...has.keys()].join() === [...this.#knobs.keys()].sort((a, b) =>
+      [...has.keys()].indexOf(a) - [...has.keys()].indexOf(b)).join();
+    if (same) {
+      for (const [header, setting] of has) this.#describe(this.#knobs.get(header), setting);
+      return;
+    }
+    this.#knobs.clear();
+    this.#form.replaceChildren();
+    for (const [title, rows] of groups) {
+      const own = rows.filter(([header]) => has.has(header));
+      if (own.length > 0) this.#form.append(this.#makeGroup(title, own, has));
+    }
+  }
+
+  // A unit that all of a group have stands in its title.
+  #makeGroup(title, rows, has) {
+    const units = new Set(rows.map(([header]) => unitName(has.get(header).unit)));
+    const common = units.size === 1 ? [...units][0] : '';
+    const says = make('p', {class: 'refusal', role: 'status', id: `says-${title.replaceAll(' ', '-').toLowerCase()}`});
+    const knobs = rows.map(([header, name]) => {
+      const unit = common ? '' : unitName(has.get(header).unit);
+      return this.#makeKnob(has.get(header), unit ? `${name}, ${unit}` : name, says);
+    });
+    const columns = knobs.length % 3 === 0 || knobs.length > 4 ? 'three' : 'two';
+    return make('fieldset', {}, make('legend', {class: 'group'}, common ? `${title}, ${common}` : title),
+      make('div', {class: `knobs ${columns}`}, ...knobs), says);
+  }
+
+  #makeKnob(setting, name, says) {
+    const id = `knob-${setting.header.replaceAll(':', '-').toLowerCase()}`;
+    const knob = {setting, value: '', says};
+    const attributes = {id, name: setting.header, 'aria-describedby': `${id}-hint ${says.id}`, autocomplete: 'off'};
+    const isChoice = setting.kind === 'word' || setting.values.length > 0;
+    knob.field = isChoice ? make('select', attributes) : make('input', {...attributes, type: 'text', inputmode: 'decimal', spellcheck: 'false'});
+    knob.field.addEventListener('change', () => this.#set(knob));
+    knob.field.addEventListener('keydown', (event) => {
+      if (event.key === 'Escape') this.#put(knob, knob.value);
+      if (event.key === 'ArrowUp' || event.key === 'ArrowDown') this.#nudge(knob, event);
+    });
+    knob.hint = make('span', {class: 'hint', id: `${id}-hint`});
+    knob.box = make('div', {class: 'knob', title: setting.header}, make('label', {for: id}, name), knob.field, knob.hint);
+    this.#knobs.set(setting.header, knob);
+    this.#describe(knob, setting);
+    return knob.box;
+  }
+
+  #describe(knob, setting) {
+    knob.setting = setting;
+    if (knob.field.tagName === 'SELECT' && knob.options !== setting.values.join()) {
+      knob.options = setting.values.join();
+      const name = (value) => (setting.kind === 'word' ? choice(value) : readable(value));
+      knob.field.replaceChildren(...setting.values.map((value) => make('option', {value}, name(value))));
+      if (knob.value) this.#put(knob, knob.value);
+    }
+    this.#hint(knob);
+  }
+
+  // The head's refusal, in its own words.
+  #refuse(knob, text) {
+    for (const other of this.#knobs.values()) {
+      if (other.says === knob.says) other.field.removeAttribute('aria-invalid');
+    }
+    if (text) knob.field.setAttribute('aria-invalid', 'true');
+    say(knob.says, text);
+  }
+
+  #hint(knob) {
+    const {min, max, step, header} = knob.setting;
+    knob.hint.title = min ? `${min} to ${max}` : '';
+    if (knob.field.tagName === 'SELECT') return say(knob.hint, '');
+    if (isFixed(knob.setting)) return say(knob.hint, 'fixed');
+    return say(knob.hint, NOTES[header] ?? (min ? `${limit(min, step)}\u2009…\u2009${limit(max, step, true)}` : ''));
+  }
+
+  #put(knob, value) {
+    knob.value = value;
+    const option = knob.setting.values.find((word) => (knob.setting.kind === 'word' ? sameWord(word, value) : Number(word) === Number(value)));
+    knob.field.value = option ?? value;
+  }
+
+  async #read() {
+    await Promise.all([...this.#knobs.values()].map(async (knob) => {
+      const value = await this.#session.command(`${knob.setting.header}?`);
+      if (knob.field !== document.activeElement || knob.field.value === knob.value) this.#put(knob, value);
+      else knob.value = value; // somebody types: their text stays, Escape brings the value that holds
+    }));
+    this.dispatchEvent(new Event('values'));
+  }
+
+  value(header) {
+    return this.#knobs.get(header)?.value;
+  }
+
+  async #ask() {
+    if (this.#session.link !== 'open' || this.#loading) return;
+    const before = [...this.#knobs.values()].map((knob) => knob.value).join();
+    await this.#read();
+    if (before === [...this.#knobs.values()].map((knob) => knob.value).join()) return;
+    this.#build(await describeSettings(this.#session)); // limits depend on other settings
+    this.#allow();
+  }
+
+  async #set(knob) {
+    const value = knob.field.value.trim();
+    if (value === '' || value === knob.value) return this.#put(knob, knob.value);
+    knob.box.dataset.waiting = '';
+    try {
+      const reply = await this.#session.command(`${knob.setting.header} ${value}`);
+      this.#refuse(knob, '');
+      knob.value = reply === 'OK' ? value : reply;
+    } catch (error) {
+      this.#refuse(knob, why(error));
+      this.#put(knob, knob.value);
+    }
+    delete knob.box.dataset.waiting;
+    try {
+      await this.#read();
+      this.#build(await describeSettings(this.#session));
+    } catch { /* gone */ }
+    this.#allow();
+  }
+
+  // Arrow keys change the last figure that is shown by one; the head has the last word, as always.
+  #nudge(knob, event) {
+    if (knob.field.tagName === 'SELECT' || knob.field.readOnly) return;
+    const number = Number(knob.field.value);
+    if (!Number.isFinite(number)) return;
+    event.preventDefault();
+    const decimals = (knob.field.value.split('.')[1] ?? '').length;
+    const by = 10 ** -decimals * (event.shiftKey ? 10 : 1) * (event.key === 'ArrowUp' ? 1 : -1);
+    knob.field.value = (number + by).toFixed(decimals);
+  }
+
+  async #reset() {
+    try {
+      await this.#session.command('*RST');
+      for (const knob of this.#knobs.values()) this.#refuse(knob, '');
+      await this.load();
+    } catch (error) {
+      say(this.#note, why(error));
+    }
+  }
+
+  #allow() {
+    const common = this.#session.whyNot();
+    say(this.#note, this.#knobs.size === 0 ? 'The head has not yet said what can be set.'
+      : common ? common.replace('control first', 'control to change settings') : 'Sent on Enter, or when you leave a field.');
+    this.reset.disabled = common !== '';
+    this.reset.title = 'Sends *RST: all settings as at power-up. A scan is stopped.';
+    for (const knob of this.#knobs.values()) {
+      const not = this.#session.whyNot(knob.setting.states);
+      const fixed = isFixed(knob.setting) && knob.field.tagName !== 'SELECT';
+      knob.field.disabled = common !== '' || not !== '';
+      knob.field.readOnly = fixed;
+      knob.box.title = not && !common ? `${knob.setting.header}: ${not}` : knob.setting.header;
+    }
+  }
+}

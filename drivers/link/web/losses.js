@@ -1,0 +1,102 @@
+// What was lost of a connection's scans, by the words of PROTOCOL.md (*What the counts mean*), and where a scan ends
+// whose SCAN_END was lost (*A reader that lost SCAN_END*). Pure.
+import {STATES} from './native.js';
+
+const IN_SCAN = ['scanning', 'spin-down'];
+
+export class Losses {
+  leftOutFrames = 0; // for this page was too slow: by READER_LOST
+  leftOutPulses = 0;
+  missing = 0; // pulses of the scans that ended: delivered, and not received
+  #said = 0; // pulses lost by the head, as OVERRUN and
+  #ended = 0; // as the ends of scans have it: both count the same; of either, some may not have come
+  #damaged = 0; // frames missing that no READER_LOST accounts for, told
+  #unexplained = 0; // the same, as the last telemetry found it
+  #scan = null;
+  #isRunning = false;
+  #shots = 0; // pulses received before the scan
+  #counts = null; // the last telemetry
+  #say;
+
+  /** say(name, detail): 'lost' and 'scan', as Head's events. What comes has `shots`, the pulses received before it. */
+  constructor(say) {
+    this.#say = say;
+  }
+
+  /** Pulses that the head says it lost. */
+  get byHead() {
+    return Math.max(this.#said, this.#ended);
+  }
+
+  descriptor(d) {
+    this.#begin(d.scan, d.shots);
+  }
+
+  points(batch) {
+    this.#isRunning ||= batch.scan === this.#scan;
+  }
+
+  /** lost_frames: missing in the sequence so far. */
+  telemetry(t, lost_frames) {
+    this.#counts = t;
+    if (t.scan !== this.#scan) this.#end(this.#scan, null, t.shots);
+    else if (!IN_SCAN.includes(STATES[t.state])) this.#end(t.scan, t, t.shots);
+    // READER_LOST may come after the jump that it explains: what was missing at the telemetry before, and still is, is
+    // damage.
+    const now = Math.max(0, lost_frames - this.leftOutFrames), sure = Math.min(now, this.#unexplained);
+    if (sure > this.#damaged) this.#say('lost', {by: 'wire', frames: sure - this.#damaged, pulses: 0});
+    this.#damaged = Math.max(this.#damaged, sure);
+    this.#unexplained = now;
+  }
+
+  event(e) {
+    switch (e.name) {
+      case 'SCAN_START':
+        this.#begin(e.scan, e.shots);
+        this.#isRunning = true;
+        break;
+      case 'SCAN_END':
+        if (!this.#isRunning || e.scan !== this.#scan) this.#ended += e.lost;
+        this.#end(e.scan, this.#final(e.scan) ?? {scan_fired: e.fired, scan_cast: null, scan_lost: e.lost}, e.shots);
+        break;
+      case 'STATE': // without SCAN_END the next telemetry has the counts, if the last one has not
+        if (STATES[e.before] === 'scanning' && this.#final(this.#scan)) this.#end(this.#scan, this.#counts, e.shots);
+        break;
+      case 'OVERRUN':
+        this.#said += e.lost;
+        if (e.lost > 0) this.#say('lost', {by: 'head', frames: 0, pulses: e.lost});
+        break;
+      case 'READER_LOST':
+        this.leftOutFrames += e.frames;
+        this.leftOutPulses += e.pulses;
+        if (e.frames > 0) this.#say('lost', {by: 'link', frames: e.frames, pulses: e.pulses});
+        break;
+      default:
+    }
+  }
+
+  #begin(scan, shots) {
+    if (this.#scan === scan) return;
+    this.#end(this.#scan, null, shots);
+    this.#scan = scan;
+    this.#shots = shots;
+  }
+
+  // The telemetry directly before SCAN_END, of state spin-down, has the final counts.
+  #final(scan) {
+    const t = this.#counts;
+    return t !== null && t.scan === scan && STATES[t.state] === 'spin-down' ? t : null;
+  }
+
+  // counts: a telemetry's; null: they were lost. Of a scan that this page joined late, what came before it is missing,
+  // too.
+  #end(scan, counts, shots) {
+    if (!this.#isRunning || scan !== this.#scan) return;
+    this.#isRunning = false;
+    const {scan_fired: fired = null, scan_cast: cast = null, scan_lost: lost = null} = counts ?? {};
+    const received = shots - this.#shots, missing = cast === null ? null : cast - lost - received;
+    this.#ended += lost ?? 0;
+    this.missing += missing ?? 0;
+    this.#say('scan', {scan, fired, cast, lost, received, missing});
+  }
+}

@@ -1,0 +1,163 @@
+// Connects the page's modules: a head and its points, or a recording.
+import {byId, fetchJson, kept, say} from './page.js';
+import {Head} from './head.js';
+import {Cloud} from './cloud.js';
+import {Session, startTheme} from './session.js';
+import {Bar} from './bar.js';
+import {Knobs} from './knobs.js';
+import {Figures} from './figures.js';
+import {Quality} from './quality.js';
+import {Log, showPlan} from './log.js';
+import {Stations} from './stations.js';
+import {Display} from './display.js';
+import {Point} from './point.js';
+import {Recording} from './recording.js';
+
+const CAPACITY = 10e6; // points that are held
+const WIDE = '(min-width: 47rem)';
+
+// Which panels are open is kept; at first, a small screen has only a few.
+function startPanels() {
+  const few = ['panel-quality', 'panel-recording'];
+  for (const panel of document.querySelectorAll('.panel')) {
+    const was = kept.get(panel.id);
+    panel.open = was === null ? matchMedia(WIDE).matches || few.includes(panel.id) : was === 'open';
+    panel.addEventListener('toggle', () => kept.set(panel.id, panel.open ? 'open' : 'closed'));
+  }
+}
+
+// Without a picture the page goes on: figures and settings need none.
+async function makeView(cloud) {
+  try {
+    const {View} = await import('./view.js');
+    return new View(byId('picture'), cloud);
+  } catch (error) {
+    byId('picture').hidden = true;
+    say(byId('no-picture'), 'There is no picture: this browser has no WebGL 2, or it is switched off. '
+      + `Figures and settings work without it. (${error.message})`);
+    byId('no-picture').hidden = false;
+    return null;
+  }
+}
+
+// What people call things: surfaces and stations, as /head names them.
+class Names {
+  surfaces = new Map();
+  stations = null;
+
+  // list: [{label, object, material}]. Of an IFC model's object the type before its name and the id after it are left
+  // out.
+  add(list) {
+    for (const {label, object, material} of list) {
+      const name = object.replace(/Ifc[A-Z]\w+?_(?=.)/, '').replace(/_[0-9A-Za-z_$]{22}$/, '');
+      this.surfaces.set(label, material && material !== object ? `${name} · ${material}` : name);
+    }
+  }
+
+  of = (mode, label) => {
+    if (mode === 'label') return this.surfaces.get(label);
+    if (mode === 'station') return this.stations?.name(label);
+    return undefined;
+  };
+}
+
+async function fetchScene() {
+  try {
+    const answer = await fetch('/scene');
+    return answer.ok ? await answer.arrayBuffer() : null;
+  } catch {
+    return null;
+  }
+}
+
+// How long a frame takes by its descriptor; 0 where no pan turns through it.
+const frameSeconds = ({pan_start_udeg: from, pan_stop_udeg: to, pan_udeg_s: rate}) =>
+  (Number(rate) > 0 ? Math.abs(Number(to) - Number(from)) / Number(rate) : 0);
+
+function startHead(cloud, view, names) {
+  const head = new Head(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws`);
+  const session = new Session(head);
+  const log = new Log(session);
+  const bar = new Bar(session, log);
+  const knobs = new Knobs(session);
+  const stations = new Stations(session, knobs, view);
+  const figures = new Figures(head, cloud);
+  const display = new Display(view, names.of);
+  names.stations = stations;
+  display.station = () => Number(knobs.value('HEAD:STATION')) || 1;
+  new Quality(() => session.link === 'open' && byId('panel-quality').open);
+  new Point(view, names.of);
+
+  const countFrames = () => session.command('SCAN:COUNt?').then((done) => bar.progress({done: Number(done)}), () => {});
+  let before = ''; // who the head was
+  const learn = async () => {
+    countFrames();
+    const info = await fetchJson('/head');
+    if (!info) return;
+    const now = [info.config, info.maker, info.model, info.serial].join();
+    if (before && now !== before && cloud.count > 0) {
+      const words = 'This is another head. The points of the one before are still shown; Clear, under Display, removes them.';
+      bar.notice(words, 15000);
+      log.add(words, 'warn');
+    }
+    before = now;
+    names.add(info.surfaces ?? []);
+    bar.name(info);
+    stations.reload(info.stations ?? []).catch(() => {}); // gone again
+    showPlan();
+    display.setScene(await fetchScene());
+  };
+  stations.addEventListener('tell', ({detail}) => {
+    bar.notice(detail.text, 6000);
+    log.add(detail.text, detail.kind);
+  });
+  head.addEventListener('points', ({detail}) => {
+    cloud.add(detail);
+    bar.progress({done: detail.frame});
+    if (detail.n > 0) bar.reached(detail.t[detail.n - 1]);
+  });
+  head.addEventListener('descriptor', ({detail}) => bar.progress({frames: detail.frames, frame_s: frameSeconds(detail)}));
+  head.addEventListener('event', ({detail}) => {
+    if (detail.name === 'SCAN_END') countFrames();
+    if (detail.name === 'SCAN_START') bar.progress({done: 0});
+    if (detail.name === 'SITE') showPlan();
+  });
+  head.addEventListener('names', ({detail}) => names.add(detail));
+  head.addEventListener('open', learn);
+  view?.addEventListener('drawn', ({detail}) => figures.drawn(detail));
+  return head;
+}
+
+function startRecording(info, cloud, view, names) {
+  document.body.dataset.kind = 'recording';
+  for (const panel of ['knobs', 'quality', 'log', 'plan']) byId(`panel-${panel}`).hidden = true;
+  byId('panel-recording').hidden = false;
+  byId('left').append(byId('panel-figures'));
+  byId('right').hidden = true;
+  if (view) view.movable = false;
+  names.add(info.surfaces ?? []);
+  const figures = new Figures(null, cloud);
+  const stations = new Stations(null, null, view);
+  const display = new Display(view, names.of, true);
+  names.stations = stations;
+  display.station = () => stations.list[0]?.number;
+  stations.show(info.stations ?? []);
+  const point = new Point(view, names.of, {pulse: 'Number'});
+  point.t0_s = info.recording.t0_s ?? 0;
+  view?.addEventListener('drawn', ({detail}) => figures.drawn(detail));
+  return new Recording(info, cloud, view);
+}
+
+async function start() {
+  startTheme(byId('theme'));
+  startPanels();
+  const cloud = new Cloud({capacity: CAPACITY});
+  const view = await makeView(cloud);
+  const names = new Names();
+  const info = await fetchJson('/head');
+  window.scanhead = {head: null, cloud, view};
+  if (info?.recording) window.scanhead.recording = startRecording(info, cloud, view, names);
+  else window.scanhead.head = startHead(cloud, view, names);
+}
+
+start();

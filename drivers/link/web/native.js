@@ -1,0 +1,219 @@
+// The native protocol, from PROTOCOL.md alone: bytes to frames (Parser), frames to values and batches of points in the
+// scene frame (Decoder). Pure: it runs in a page, in a worker and in node.
+import {LOCAL, Parser, REPEAT} from './native_parser.js';
+import {readAnchor, readBeside, readDescriptor, readEmitter, readEvent, readLineEnd, readNames, readPoses,
+  readTelemetry, refuse, Refused} from './native_fields.js';
+import {Columns, geoPlacer, PointHash, polarPlacer} from './native_points.js';
+import {Poses} from './native_poses.js';
+
+export {LOCAL, Parser, REPEAT};
+export {crc32c} from './crc32c.js';
+const VERSION = 1;
+export const TYPES = ['', 'descriptor', 'anchor', 'points', 'line-end', 'telemetry', 'event', 'surfaces', 'poses',
+  'attributes', 'emitter', 'colours'];
+export const STATES = ['off', 'boot', 'idle', 'spin-up', 'scanning', 'spin-down', 'fault'];
+const [, DESCRIPTOR, ANCHOR, POINTS, LINE_END, TELEMETRY, EVENT, SURFACES, POSES, ATTRIBUTES, EMITTER, COLOURS] =
+  TYPES.keys();
+const HEAD = 40, RECORD = 20, MAX_POINTS = 3274, ROOM = 32768, NO_AMPLITUDE = -32768;
+
+/** Frames to values. What PROTOCOL.md says is void is forgotten; a frame that it says to refuse is counted, and is as
+ * if it had not come. Nothing is thrown but what a callback throws. */
+export class Decoder {
+  /** Each callback may be left out: points(batch), descriptor(d), anchor(a), emitter(e), names(list), lineEnd(l),
+   * telemetry(t), event(e), poses(list), refused(why, frame). All but lists have the header's `t_ns` (BigInt),
+   * and `repeat` and `local` from its flags. */
+  constructor(callbacks = {}) {
+    this.on = callbacks;
+    this.descriptor = this.anchor = null;
+    this.emitter = null; // null: a line head
+    this.stats = {points: 0, shots: 0, empty: 0, unplaced_points: 0, unplaced_shots: 0, refused: 0, unknown: 0};
+    this.hash = new PointHash();
+    this.poses = new Poses();
+    this.columns = new Columns(ROOM);
+    this.lastPulse0 = -1;
+    this.shots = 0;
+    this.batch = null; // what the points in the columns have in common
+    this.last = null; // the last points frame, until its attributes and colours have come
+    this.placer = null;
+  }
+
+  /** 16 hexadecimal digits over all records of all points frames so far. */
+  get pointHash() {
+    return this.hash.toString();
+  }
+
+  /** Whether points can be placed. */
+  get canPlace() {
+    return this.descriptor !== null && this.anchor !== null;
+  }
+
+  take(frame) {
+    if (frame.version !== VERSION) {
+      this.stats.unknown++;
+      return;
+    }
+    try {
+      this.#take(frame, new DataView(frame.payload.buffer, frame.payload.byteOffset, frame.payload.length));
+    } catch (error) {
+      if (!(error instanceof Refused)) throw error;
+      this.stats.refused++;
+      this.on.refused?.(error.message, frame);
+    }
+  }
+
+  /** Hands on the points that are there. A frame whose attributes or colours are still to come stays, unless `all`. */
+  flush(all = false) {
+    const {columns: c, batch} = this;
+    const waits = this.last !== null && !all; // what waits for its attributes or colours
+    const to = waits ? this.last.from : c.n, held = waits ? this.last.shots : 0;
+    if (batch === null || (to === 0 && this.shots === held)) return;
+    const copy = c.copy(0, to, batch.rgb);
+    const {scan, frame, line, station, pulse0} = batch;
+    const out = {n: to, shots: this.shots - held, scan, frame, line, station, pulse0, ...copy};
+    c.drop(to);
+    this.shots = held;
+    if (waits) {
+      this.last.from = 0;
+      batch.pulse0 = this.last.pulse0;
+    } else {
+      this.batch = this.last = null;
+    }
+    this.on.points?.(out);
+  }
+
+  #take(frame, view) {
+    const isOwn = (frame.flags & LOCAL) !== 0;
+    if (frame.type === POINTS) return this.#points(frame, view);
+    if (!isOwn && frame.type !== ATTRIBUTES && frame.type !== COLOURS) this.last = null;
+    const own = {t_ns: frame.t_ns, repeat: (frame.flags & REPEAT) !== 0, local: isOwn};
+    switch (frame.type) {
+      case DESCRIPTOR: return this.#descriptor(Object.assign(readDescriptor(view), own));
+      case ANCHOR: return this.#anchor(Object.assign(readAnchor(view), own));
+      case EMITTER: return this.#emitter(Object.assign(readEmitter(view), own));
+      case ATTRIBUTES: return this.#attributes(frame, view);
+      case COLOURS: return this.#colours(frame, view);
+      case LINE_END: return this.on.lineEnd?.(Object.assign(readLineEnd(view), own));
+      case TELEMETRY: return this.on.telemetry?.(Object.assign(readTelemetry(view), own));
+      case EVENT: return this.#event(Object.assign(readEvent(view), own));
+      case SURFACES: return this.on.names?.(readNames(view));
+      case POSES: return this.#poses(readPoses(view));
+      default: this.stats.unknown++; // of later heads
+    }
+    return undefined;
+  }
+
+  #forget() {
+    this.flush(true);
+    this.descriptor = this.anchor = this.emitter = this.placer = null;
+    this.lastPulse0 = -1;
+    this.poses.forget();
+  }
+
+  #descriptor(d) {
+    if (!d.repeat || this.descriptor === null || this.descriptor.scan !== d.scan) this.#forget();
+    this.descriptor = d;
+    this.on.descriptor?.(d);
+  }
+
+  // Without the descriptor of its scan an anchor may be one of the scan before.
+  #anchor(a) {
+    if (this.descriptor === null) return;
+    if (this.anchor !== null && !a.repeat) this.flush(true);
+    this.anchor = a;
+    this.placer = null;
+    this.on.anchor?.(a);
+  }
+
+  #emitter(e) {
+    this.emitter = e;
+    this.on.emitter?.(e);
+  }
+
+  #event(e) {
+    if (e.name === 'SCAN_START' && this.descriptor !== null && e.scan !== this.descriptor.scan) this.#forget();
+    this.on.event?.(e);
+  }
+
+  #poses(list) {
+    this.poses.add(list);
+    this.on.poses?.(list);
+  }
+
+  #points(frame, view) {
+    this.last = null;
+    if (view.byteLength < HEAD) refuse('points shorter than their header');
+    const n = view.getUint32(36, true), shots = view.getUint32(32, true);
+    if (n > (view.byteLength - HEAD) / RECORD) refuse('points fewer than their number');
+    const low = view.getUint32(8, true), high = view.getUint32(12, true), pulse0 = high * 2 ** 32 + low;
+    const t0_ns = view.getInt32(20, true) * 2 ** 32 + view.getUint32(16, true);
+    if (pulse0 < this.lastPulse0) this.#forget();
+    const until_ms = this.anchor?.until_ms ?? 0;
+    if (until_ms !== 0 && t0_ns >= until_ms * 1e6) this.anchor = null; // these have one that did not come
+    this.lastPulse0 = pulse0;
+    this.hash.add(view, n, low, high);
+    this.stats.shots += shots;
+    this.stats.points += n;
+    if (!this.canPlace) {
+      this.stats.unplaced_points += n;
+      this.stats.unplaced_shots += shots;
+      return;
+    }
+    this.#place(frame, view, {n, shots, pulse0, t0_ns, low, high});
+  }
+
+  #place(frame, view, {n, shots, pulse0, t0_ns, low, high}) {
+    const c = this.columns, number = view.getUint32(0, true), line = view.getUint32(4, true);
+    const {scan, content} = this.descriptor, {station} = this.anchor, b = this.batch;
+    const goesOn = b !== null && b.frame === number && b.line === line && b.scan === scan && b.station === station &&
+      c.n + MAX_POINTS <= c.room;
+    if (!goesOn) {
+      this.flush(true);
+      this.batch = {scan, frame: number, line, station, pulse0, rgb: (content & 2) !== 0};
+    }
+    this.placer ??= (this.descriptor.layout === 0 ? polarPlacer : geoPlacer)(this.descriptor, this.anchor);
+    const from = c.n;
+    this.placer(c, view, n, pulse0, t0_ns);
+    this.shots += shots;
+    c.amplitude.fill(NaN, from, c.n);
+    if (this.batch.rgb) c.rgb.fill(128, 3 * from, 3 * c.n);
+    if (this.descriptor.layout === 0 && this.anchor.moving & 1) this.#placeMoving(view, from, t0_ns);
+    this.stats.empty += n - (c.n - from);
+    if (content & 3) this.last = {from, shots, pulse0, low, high, line, n, seq: frame.seq, content};
+  }
+
+  #placeMoving(view, from, t0_ns) {
+    const c = this.columns;
+    const time = (i) => t0_ns + (view.getUint32(HEAD + RECORD * c.record[i] + 16, true) & 0xffffff);
+    const missing = this.poses.place(c, from, time);
+    this.stats.unplaced_points += missing;
+    if (missing > 0) c.dropNaN(from);
+  }
+
+  // The points frame that attributes or colours follow as number `after`; null: it was lost, or these are of another.
+  #besidePoints(frame, beside, after) {
+    const l = this.last;
+    const isOfIt = l !== null && frame.seq === (l.seq + after) >>> 0 && beside.pulse0_low === l.low &&
+      beside.pulse0_high === l.high && beside.line === l.line && beside.n_points === l.n;
+    return isOfIt ? l : null;
+  }
+
+  #attributes(frame, view) {
+    const beside = readBeside(view, 4, 'attributes'), of = this.#besidePoints(frame, beside, 1), c = this.columns;
+    if (of === null) return;
+    for (let i = of.from; i < c.n; i++) {
+      const amplitude = view.getInt16(16 + 4 * c.record[i], true);
+      c.amplitude[i] = amplitude === NO_AMPLITUDE ? NaN : amplitude / 100;
+    }
+    if (!(of.content & 2)) this.last = null;
+  }
+
+  #colours(frame, view) {
+    const beside = readBeside(view, 3, 'colours'), c = this.columns;
+    const of = this.#besidePoints(frame, beside, this.last?.content & 1 ? 2 : 1);
+    if (of === null) return;
+    for (let i = of.from; i < c.n; i++) {
+      for (let k = 0; k < 3; k++) c.rgb[3 * i + k] = view.getUint8(16 + 3 * c.record[i] + k);
+    }
+    this.last = null;
+  }
+}

@@ -1,0 +1,153 @@
+// Bytes into frames and reply lines, as PROTOCOL.md has it (*Frames*, *Resynchronisation*). Pure: no page, no network.
+import {crc32c} from './crc32c.js';
+
+const SYNC = 0xd5, HEADER = 28, MAX_PAYLOAD = 65536, MAX_TEXT = 512;
+export const REPEAT = 1, LOCAL = 2;
+const GOOD = 1, WAIT = 2, BAD = 3;
+
+/** A frame. `payload` and `t_ns` (BigInt, device time) read the parser's bytes: they are good until the call that
+ * has handed on the frame returns. */
+class Frame {
+  #view;
+  #at;
+  constructor(view, at, length) {
+    this.#view = view;
+    this.#at = at;
+    this.type = view.getUint8(at + 1);
+    this.version = view.getUint8(at + 2);
+    this.flags = view.getUint8(at + 3);
+    this.seq = view.getUint32(at + 8, true);
+    this.payload = new Uint8Array(view.buffer, view.byteOffset + at + HEADER, length);
+  }
+  get t_ns() {
+    return this.#view.getBigInt64(this.#at + 16, true);
+  }
+}
+
+const isPrintable = (byte) => byte >= 0x20 && byte <= 0x7e;
+
+/** Takes bytes as they come. It keeps what it has not understood yet: less than a frame, 64 KiB. */
+export class Parser {
+  /** frame(frame), text(line without its end), bad(n): n bytes that belong to nothing. Each may be left out. */
+  constructor({frame, text, bad} = {}) {
+    this.onFrame = frame ?? (() => {});
+    this.onText = text ?? (() => {});
+    this.onBad = bad ?? (() => {});
+    this.stats = {bytes: 0, frames: 0, texts: 0, bad_bytes: 0, bad_payloads: 0, jumps: 0, jumps_back: 0,
+      lost_frames: 0};
+    this.kept = new Uint8Array(0); // room
+    this.n = 0; // bytes kept in it
+    this.inStep = true;
+    this.expected = -1; // sequence number; -1: none came yet
+  }
+
+  /** Takes a Uint8Array (or Buffer), of any size. It is read only within this call. */
+  push(bytes) {
+    this.stats.bytes += bytes.length;
+    if (this.n === 0) {
+      this.#keep(bytes, this.#parse(bytes, bytes.length, false));
+      return;
+    }
+    const all = this.#append(bytes);
+    const used = this.#parse(all, this.n, false);
+    if (used > 0) all.copyWithin(0, used, this.n);
+    this.n -= used;
+  }
+
+  /** Nothing more will come, as at the end of a recording: what is kept is searched for frames. */
+  end() {
+    const n = this.n;
+    this.n = 0;
+    this.#parse(this.kept, n, true);
+    this.inStep = true;
+  }
+
+  #append(bytes) {
+    const need = this.n + bytes.length;
+    if (need > this.kept.length) {
+      const larger = new Uint8Array(Math.max(need, 2 * this.kept.length));
+      larger.set(this.kept.subarray(0, this.n));
+      this.kept = larger;
+    }
+    this.kept.set(bytes, this.n);
+    this.n = need;
+    return this.kept;
+  }
+
+  #keep(bytes, from) {
+    if (from === bytes.length) return;
+    this.n = 0;
+    this.#append(bytes.subarray(from));
+  }
+
+  // How many of the n bytes are done with.
+  #parse(bytes, n, last) {
+    const view = new DataView(bytes.buffer, bytes.byteOffset, n);
+    let at = 0;
+    while (at < n) {
+      let look = BAD, length = 0;
+      if (bytes[at] === SYNC) {
+        look = this.#lookFrame(view, at, n);
+        length = look === GOOD ? HEADER + view.getUint32(at + 4, true) : 0;
+        if (look === GOOD) this.#takeFrame(view, at, length);
+      } else if (this.inStep && isPrintable(bytes[at])) {
+        [look, length] = this.#lookText(bytes, at, n);
+        if (look === GOOD) this.#takeText(bytes, at, length - 2);
+      }
+      if (look === WAIT && !last) return at;
+      at = look === GOOD ? at + length : this.#skip(bytes, at, n);
+    }
+    return n;
+  }
+
+  #lookFrame(view, at, n) {
+    if (n - at < HEADER) return WAIT;
+    const length = view.getUint32(at + 4, true), begin = at + HEADER;
+    if (length > MAX_PAYLOAD || crc32c(view, at, at + 24) !== view.getUint32(at + 24, true)) return BAD;
+    if (n - begin < length) return WAIT;
+    if (crc32c(view, begin, begin + length) === view.getUint32(at + 12, true)) return GOOD;
+    this.stats.bad_payloads++;
+    return BAD;
+  }
+
+  #takeFrame(view, at, length) {
+    const frame = new Frame(view, at, length - HEADER);
+    this.inStep = true;
+    this.stats.frames++;
+    if (!(frame.flags & LOCAL)) this.#count(frame.seq);
+    this.onFrame(frame);
+  }
+
+  #count(seq) {
+    const jump = this.expected < 0 ? 0 : (seq - this.expected) >>> 0;
+    if (jump !== 0) {
+      this.stats.jumps++;
+      if (jump < 2 ** 31) this.stats.lost_frames += jump;
+      else this.stats.jumps_back++; // the head has started again: how much is missing isn't known
+    }
+    this.expected = (seq + 1) >>> 0;
+  }
+
+  #lookText(bytes, at, n) {
+    let end = at;
+    while (end < n && end - at < MAX_TEXT - 2 && isPrintable(bytes[end])) end++;
+    if (end < n && bytes[end] !== 0x0d) return [BAD, 0];
+    if (end + 1 < n) return [bytes[end + 1] === 0x0a ? GOOD : BAD, end + 2 - at];
+    return [WAIT, 0];
+  }
+
+  #takeText(bytes, at, length) {
+    this.stats.texts++;
+    this.onText(String.fromCharCode(...bytes.subarray(at, at + length)));
+  }
+
+  // Where the next sync byte stands.
+  #skip(bytes, at, n) {
+    const sync = bytes.indexOf(SYNC, at + 1);
+    const to = sync < 0 || sync > n ? n : sync;
+    this.inStep = false;
+    this.stats.bad_bytes += to - at;
+    this.onBad(to - at);
+    return to;
+  }
+}

@@ -1,0 +1,138 @@
+// What all panels share: making elements, writing figures, and doing things no more often than needed.
+
+// Makes an element: make('p', {id: 'x', class: 'y'}, 'text', child). A function as a value is a listener.
+export function make(name, attributes = {}, ...children) {
+  const element = document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) {
+    if (typeof value === 'function') element.addEventListener(key, value);
+    else if (value === true) element.setAttribute(key, '');
+    else if (value !== false && value !== null && value !== undefined) element.setAttribute(key, value);
+  }
+  element.append(...children.filter((child) => child !== null && child !== undefined));
+  return element;
+}
+
+const SVG = 'http://www.w3.org/2000/svg';
+export function makeSvg(name, attributes = {}, ...children) {
+  const element = document.createElementNS(SVG, name);
+  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+  element.append(...children);
+  return element;
+}
+
+export const byId = (id) => document.getElementById(id);
+export const bodyOf = (panel) => byId(`panel-${panel}`).querySelector('.body');
+
+// Writes a text only where it has changed: a reader's selection and a screen reader's place stay.
+export function say(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
+
+// Calls at most once in every `ms`; the last call always comes through.
+export function atMostEvery(ms, call) {
+  let timer = 0, last = -Infinity;
+  return () => {
+    if (timer) return;
+    timer = setTimeout(() => {
+      timer = 0;
+      last = performance.now();
+      call();
+    }, Math.max(0, last + ms - performance.now()));
+  };
+}
+
+export const NONE = '–';
+const known = (value) => typeof value === 'number' && Number.isFinite(value);
+
+// 1234567 -> '1 234 567' with thin spaces; at most `digits` after the point.
+export function grouped(value, digits = 0) {
+  if (typeof value === 'bigint') value = Number(value);
+  if (!known(value)) return NONE;
+  const [whole, part] = Math.abs(value).toFixed(digits).split('.');
+  const text = whole.replace(/\B(?=(\d{3})+$)/g, '\u2009') + (part ? `.${part}` : '');
+  return Number(text.replace(/\u2009/g, '')) !== 0 && value < 0 ? `−${text}` : text;
+}
+
+// 1234567 -> '1.23 M': three figures and a prefix, for rates and counts.
+export function short(value, unit = '') {
+  if (typeof value === 'bigint') value = Number(value);
+  if (!known(value)) return NONE;
+  const tail = (prefix) => (prefix || unit ? `\u00a0${prefix}${unit}` : '');
+  for (const [scale, prefix] of [[1e9, 'G'], [1e6, 'M'], [1e3, 'k']]) {
+    if (Math.abs(value) >= scale * 0.9995) return three(value / scale) + tail(prefix);
+  }
+  return (Number.isInteger(value) ? String(value) : three(value)) + tail('');
+}
+
+function three(value) {
+  const size = Math.abs(value);
+  return value.toFixed(size < 9.995 ? 2 : size < 99.95 ? 1 : 0);
+}
+
+// Metres as people read them: micrometres up to metres.
+export function metres(value) {
+  if (!known(value)) return NONE;
+  const size = Math.abs(value), sign = value < 0 ? '−' : '';
+  if (size === 0) return '0 mm';
+  if (size < 0.995e-8) return '<\u20090.01\u00a0µm';
+  if (size < 0.9995e-6) return `${sign}${(size * 1e6).toFixed(2)}\u00a0µm`;
+  if (size < 0.99995e-3) return `${sign}${(size * 1e6).toFixed(0)}\u00a0µm`;
+  if (size < 0.99995) return `${sign}${three(size * 1e3)}\u00a0mm`;
+  return `${sign}${three(size)}\u00a0m`;
+}
+
+// Seconds as people read them: nanoseconds up to minutes.
+export function duration(value_s) {
+  if (!known(value_s)) return NONE;
+  const size = Math.abs(value_s), sign = value_s < 0 ? '−' : '';
+  if (size === 0) return '0\u00a0s';
+  if (size >= 119.5) return `${sign}${Math.round(size / 60)}\u00a0min`;
+  for (const [scale, unit] of [[1, 's'], [1e-3, 'ms'], [1e-6, 'µs']]) {
+    if (size >= scale * 0.9995) return `${sign}${three(size / scale)}\u00a0${unit}`;
+  }
+  return `${sign}${three(size / 1e-9)}\u00a0ns`;
+}
+
+export const percent = (share, digits = 1) => (known(share) ? `${(share * 100).toFixed(digits)}\u00a0%` : NONE);
+
+export const clock = (date = new Date()) => date.toTimeString().slice(0, 8);
+
+// A list of names and figures: rows is [[key, name, title], ...]; the result sets them: set({key: text}).
+export function figureList(parent, rows, kind = '') {
+  const cells = {};
+  const list = make('dl', {class: `figures ${kind}`});
+  for (const [key, name, title] of rows) {
+    cells[key] = make('dd', {id: `figure-${key}`}, NONE);
+    list.append(make('div', {title}, make('dt', {}, name), cells[key]));
+  }
+  parent.append(list);
+  return (texts) => {
+    for (const [key, text] of Object.entries(texts)) say(cells[key], text);
+  };
+}
+
+// Something small kept in the browser; a browser that keeps nothing is no fault.
+export const kept = {
+  get(key) {
+    try {
+      return localStorage.getItem(`scanhead.${key}`);
+    } catch {
+      return null;
+    }
+  },
+  set(key, value) {
+    try {
+      localStorage.setItem(`scanhead.${key}`, value);
+    } catch { /* private windows */ }
+  },
+};
+
+// JSON of one of the link's resources; null where there is none or it does not come.
+export async function fetchJson(path) {
+  try {
+    const answer = await fetch(path, {cache: 'no-store'});
+    return answer.ok ? await answer.json() : null;
+  } catch {
+    return null;
+  }
+}

@@ -1,0 +1,119 @@
+// Command lines and their replies, by COMMANDS.md: each line has one reply, in the order of the lines. After a line
+// whose reply did not come in time the reply may still come: then the head is asked *IDN?, and all replies before the
+// answer to that are nobody's (*Coming into step*).
+
+/** A command that the head refused. number: SCPI's, text: the head's words. */
+export class CommandError extends Error {
+  constructor(line, number, text) {
+    super(`${line}: ${text} (${number})`);
+    this.name = 'CommandError';
+    this.number = number;
+    this.text = text;
+  }
+}
+
+const isIdentity = (reply) => !reply.includes('"') && reply.split(',').length === 4;
+const LATER_MS = 200; // how long further answers to *IDN? may take, where some were given up
+
+export class Replies {
+  #send;
+  #asked = []; // {line, resolve, reject, timer}, sent
+  #waiting = []; // the same, not sent yet: the order of replies isn't known at the moment
+  #settling = null; // {left}: answers to *IDN? that are still to come
+  #isOpen = false;
+  #timer = 0;
+
+  /** send(line): to the head. */
+  constructor(send) {
+    this.#send = send;
+  }
+
+  open() {
+    this.#isOpen = true;
+    this.#settling = null;
+  }
+
+  /** The connection is gone: all that was asked fails with these words. */
+  close(words) {
+    this.#isOpen = false;
+    this.#settling = null;
+    clearTimeout(this.#timer);
+    const all = [...this.#asked.splice(0), ...this.#waiting.splice(0)];
+    for (const one of all) this.#fail(one, new CommandError(one.line, 0, words));
+  }
+
+  /** A promise of the reply to one line. It throws CommandError; number 0: no reply came, or the line is none. */
+  ask(line, timeout_s) {
+    return new Promise((resolve, reject) => {
+      if (!/^[ -~]{1,256}$/.test(line) || line.trim() === '') {
+        reject(new CommandError(String(line), 0, 'a command is one line of 1 to 256 printable ASCII characters'));
+        return;
+      }
+      if (!this.#isOpen) {
+        reject(new CommandError(line, 0, 'the head is not connected'));
+        return;
+      }
+      const one = {line, resolve, reject, timer: 0};
+      one.timer = setTimeout(() => this.#late(one, timeout_s), 1000 * timeout_s);
+      if (this.#settling === null) this.#sendOne(one);
+      else this.#waiting.push(one);
+    });
+  }
+
+  /** A reply line came. */
+  take(reply) {
+    if (this.#settling !== null) {
+      if (isIdentity(reply)) this.#settled();
+      return;
+    }
+    const one = this.#asked.shift();
+    if (one === undefined) return;
+    clearTimeout(one.timer);
+    const refusal = /^ERR (-?\d+),"(.*)"$/.exec(reply);
+    if (refusal) one.reject(new CommandError(one.line, Number(refusal[1]), refusal[2]));
+    else one.resolve(reply);
+  }
+
+  #sendOne(one) {
+    this.#asked.push(one);
+    this.#send(one.line);
+  }
+
+  #fail(one, error) {
+    clearTimeout(one.timer);
+    one.reject(error);
+  }
+
+  // All that were sent after it are given up with it, as their replies can no longer be told apart.
+  #late(one, timeout_s) {
+    const waits = this.#waiting.indexOf(one);
+    const words = `no reply within ${timeout_s} s`;
+    if (waits >= 0) {
+      this.#waiting.splice(waits, 1);
+      this.#settling.left++; // the answer may have been lost, too
+      this.#send('*IDN?');
+      this.#fail(one, new CommandError(one.line, 0, words));
+      return;
+    }
+    const given = this.#asked.splice(0), names = given.filter(({line}) => /^\s*:?\*idn\?\s*$/i.test(line)).length;
+    for (const other of given) {
+      const why = other === one ? words : `given up, as ${one.line} had no reply`;
+      this.#fail(other, new CommandError(other.line, 0, why));
+    }
+    this.#settling = {left: names + 1};
+    this.#send('*IDN?');
+  }
+
+  // Answers to an earlier *IDN? may have been lost: after the first one the others have a moment.
+  #settled() {
+    clearTimeout(this.#timer);
+    this.#settling.left--;
+    if (this.#settling.left > 0) this.#timer = setTimeout(() => this.#goOn(), LATER_MS);
+    else this.#goOn();
+  }
+
+  #goOn() {
+    this.#settling = null;
+    for (const one of this.#waiting.splice(0)) this.#sendOne(one);
+  }
+}

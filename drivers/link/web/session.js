@@ -1,0 +1,125 @@
+// What the page knows of its head at any moment: connection, state, who has control. The panels ask it, and hear
+// 'change' of it.
+import {STATES} from './native.js';
+import {kept} from './page.js';
+
+const WORDS = {
+  'off': 'Off', 'boot': 'Self test', 'idle': 'Idle', 'spin-up': 'Spinning up', 'scanning': 'Scanning',
+  'spin-down': 'Spinning down', 'fault': 'Fault',
+};
+
+// The number of a state as its word; words stay.
+export const stateName = (state) => STATES[Number(state)] ?? String(state);
+export const stateWord = (state) => WORDS[state] ?? state;
+
+// A promise's ERR as a sentence: the words after the semicolon are what exactly was wrong.
+export function why(error) {
+  const text = String(error?.text ?? error?.message ?? error);
+  return text.includes('; ') ? text.slice(text.indexOf('; ') + 2) : text;
+}
+
+export class Session extends EventTarget {
+  link = 'opening'; // or 'open', 'closed'
+  state = null;     // a word of the protocol
+  scan = 0;
+  owner = 0;        // the session in control, 0: nobody
+  mine = false;     // it is this page that has control
+  since = null;     // when the connection ended, and why
+  words = '';
+  wasOpen = false;  // there was a connection
+
+  constructor(head) {
+    super();
+    this.head = head;
+    head.addEventListener('open', () => this.#opened());
+    head.addEventListener('close', ({detail}) => this.#closed(detail));
+    head.addEventListener('state', ({detail}) => this.#become(detail?.state ?? detail));
+    head.addEventListener('control', ({detail}) => this.#controlled(detail.session, detail.mine));
+    head.addEventListener('event', ({detail}) => {
+      if (detail.name !== 'SCAN_START') return;
+      this.scan = Number(detail.scan);
+      this.#changed();
+    });
+    head.addEventListener('telemetry', ({detail}) => {
+      this.#become(detail.state);
+      const scan = Number(detail.scan);
+      if (scan === this.scan) return;
+      this.scan = scan;
+      this.#changed();
+    });
+  }
+
+  // Why a setting can't be made now, in words; '' where it can. states: those in which it can, or 'all'.
+  whyNot(states = 'all') {
+    if (this.link !== 'open') return 'The head is not connected.';
+    if (!this.mine) return this.owner ? `Session ${this.owner} has control and has to give it back first.` : 'Take control first.';
+    if (states === 'all' || states.split(' ').includes(this.state)) return '';
+    return `Not while the head is ${stateWord(this.state ?? 'off').toLowerCase()}.`;
+  }
+
+  command(line, options) {
+    return this.head.command(line, options);
+  }
+
+  take() {
+    return this.head.takeControl();
+  }
+
+  release() {
+    return this.head.releaseControl();
+  }
+
+  #opened() {
+    this.link = 'open';
+    this.since = null;
+    this.#changed();
+  }
+
+  // again_s: when the head is tried again; words: why the connection ended.
+  #closed({words = '', wasOpen = true} = {}) {
+    if (wasOpen || this.link === 'opening') this.since = new Date();
+    if (wasOpen || this.words === '') this.words = words;
+    this.wasOpen ||= wasOpen;
+    this.link = 'closed';
+    this.state = null;
+    this.mine = false;
+    this.owner = 0;
+    this.#changed();
+  }
+
+  #become(state) {
+    const name = stateName(state);
+    if (name === this.state || state === null) return;
+    this.state = name;
+    this.#changed();
+  }
+
+  #controlled(session, mine) {
+    this.owner = session;
+    this.mine = mine;
+    this.#changed();
+  }
+
+  #changed() {
+    this.dispatchEvent(new Event('change'));
+  }
+}
+
+// Light, dark, or as the system has it: kept in the browser.
+export function startTheme(button) {
+  const system = matchMedia('(prefers-color-scheme: dark)');
+  const show = () => {
+    const theme = kept.get('theme') ?? (system.matches ? 'dark' : 'light');
+    document.documentElement.dataset.theme = theme;
+    button.textContent = theme === 'dark' ? 'Light' : 'Dark';
+    button.setAttribute('aria-label', `${button.textContent} colours`);
+    document.dispatchEvent(new CustomEvent('theme', {detail: theme}));
+  };
+  button.addEventListener('click', () => {
+    const next = document.documentElement.dataset.theme === 'dark' ? 'light' : 'dark';
+    kept.set('theme', next);
+    show();
+  });
+  system.addEventListener('change', show);
+  show();
+}

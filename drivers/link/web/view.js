@@ -1,0 +1,463 @@
+// The picture of a cloud: WebGL 2 points, the scene, the stations, and what is under the pointer. See README.md for what
+// it offers. While the view moves it draws a level of detail, as much as a frame's time allows; once it rests the rest is
+// added, a slice at a time; points that come are added to what is there.
+
+import {Camera, radians} from './view_camera.js';
+import {MODES} from './view_colours.js';
+import {Scale, boxOf} from './view_limits.js';
+import {Painter, progress, shares} from './view_draw.js';
+import {Points} from './view_parts.js';
+import {Solids} from './view_scene.js';
+import {Stations} from './view_stations.js';
+import {Input, KEYS} from './view_input.js';
+import {Overlay} from './view_overlay.js';
+import {programsOf} from './view_gl.js';
+import {searchSlowly} from './view_pick.js';
+import {readTheme} from './view_theme.js';
+import {pointOf} from './cloud.js';
+
+const REST_MS = 120; // without a movement: the view rests
+const SHOW_MS = 160; // between two showings of a picture that grows; at least twice the time that one takes
+const HOVER_MS = 70;
+const GONE_SHARE = 0.04; // of the points gone that are still drawn: drawn anew
+const PLAIN = 150_000; // points a frame: with fewer, it is plain
+const COARSE = 0.5; // scale of such a frame
+const SHADING = 260; // eye-dome lighting: per unit of logarithmic depth
+
+export class View extends EventTarget {
+  static keys = KEYS; // [[keys, what they do]], for a help text
+  static modes = MODES;
+  movable = true; // stations can be dragged
+  camera = new Camera();
+  shading = true;
+  #gl;
+  #painter;
+  #points;
+  #solids = new Solids();
+  #want = {camera: true, restart: null, show: true, resize: true, overlay: true};
+  #moving = false;
+  #movedAt = -Infinity;
+  #shownAt = -Infinity;
+  #lastFrame = 0;
+  #fps = 0;
+  #toldAt = -Infinity;
+  #scheduled = false;
+  #lost = false;
+  #touched = false;
+  #fitted = 0; // points there were when it was fitted
+  #pointSize = 2;
+  #hover = {timer: 0, stop: null, point: null};
+  #waiting = [];
+  #goneDrawn = 0;
+  #lastGone = 0;
+  #origin = null; // of the points that are drawn
+  #scale;
+  #pointsOn = true;
+  #made = null; // {target, camera} of a frame that is not on the page yet
+  #grown = false; // more is drawn than on the page
+  #showEvery = SHOW_MS;
+  #seen = this.camera; // with which what is on the page was drawn
+
+  constructor(canvas, cloud) {
+    super();
+    this.canvas = canvas;
+    this.cloud = cloud;
+    this.#gl = canvas.getContext('webgl2', {alpha: false, antialias: false, powerPreference: 'high-performance'});
+    if (!this.#gl) throw new Error('no WebGL 2');
+    this.overlay = new Overlay(canvas);
+    this.#scale = new Scale(cloud);
+    this.stations = new Stations(() => this.#ask('show'), (detail) => this.#emit('move', detail));
+    this.#attach();
+    this.#listen();
+    new Input(this);
+    cloud.changed = () => this.#schedule();
+    this.#schedule();
+  }
+
+  #emit(type, detail) { this.dispatchEvent(new CustomEvent(type, {detail})); }
+
+  #listen() {
+    const {canvas} = this;
+    canvas.addEventListener('webglcontextlost', (e) => {
+      e.preventDefault();
+      this.#lost = true;
+      this.#made = null;
+      this.#painter.forget();
+    });
+    canvas.addEventListener('webglcontextrestored', () => {
+      this.#lost = false;
+      this.#attach();
+      this.#want.resize = true;
+      this.cameraMoved();
+    });
+    new ResizeObserver(() => this.#ask('resize')).observe(canvas);
+    const themed = () => {
+      this.colours = null;
+      this.#ask('restart');
+    };
+    new MutationObserver(themed).observe(document.documentElement, {attributeFilter: ['data-theme', 'class', 'style']});
+    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', themed);
+    canvas.setAttribute('role', 'application');
+    canvas.setAttribute('aria-roledescription', 'picture of points in space');
+    if (!canvas.hasAttribute('aria-label')) canvas.setAttribute('aria-label', 'The points in space. Arrow keys turn, plus and minus zoom, Home shows all.');
+  }
+
+  // Everything on the GPU, also after a lost context.
+  #attach() {
+    const gl = this.#gl;
+    this.programs = programsOf(gl);
+    this.#painter = new Painter(gl);
+    this.#points = new Points(gl, this.programs, this.cloud);
+    this.#points.setMode(this.#scale.mode);
+    this.#solids.attach(gl, this.programs);
+    this.empty = gl.createVertexArray();
+  }
+
+  // ---- what the page asks for
+
+  setScene(bytes) {
+    this.#solids.setScene(bytes);
+    this.#fitUntouched();
+    this.#ask('restart');
+  }
+
+  setStations(list) {
+    this.stations.set(list);
+    this.#fitUntouched();
+  }
+
+  // {origin, positions, triangles, drawTriangles} or null.
+  setMesh(mesh) {
+    this.#solids.setMesh(mesh);
+    this.#fitUntouched();
+    this.#ask('restart');
+  }
+
+  // {points, scene, mesh, stations}: true or false; scene also 'glass' or 'solid'. What is not named stays.
+  show(what) {
+    const s = this.#solids;
+    if (what.points !== undefined) this.#pointsOn = Boolean(what.points);
+    if (what.mesh !== undefined) s.meshOn = Boolean(what.mesh);
+    if (what.stations !== undefined) s.stationsOn = Boolean(what.stations);
+    if (what.scene !== undefined) s.sceneMode = what.scene === 'solid' ? 'solid' : what.scene && what.scene !== 'off' ? 'glass' : 'off';
+    this.#ask('restart');
+  }
+
+  colour(mode) {
+    if (!(mode in MODES)) throw new RangeError(`colour ${mode}: one of ${Object.keys(MODES).join(', ')}`);
+    this.#points.setMode(mode);
+    this.#scale.colour(mode);
+    this.#ask('restart');
+  }
+
+  // From which value to which the ramp goes; without them: from what is there now.
+  limits(lo, hi) {
+    this.#scale.fix(lo, hi);
+    this.#ask('restart');
+  }
+
+  // See legendOf in view_colours.js.
+  legend() { return this.#scale.legend(); }
+
+  pointSize(px) {
+    this.#pointSize = Math.min(20, Math.max(0.5, Number(px)));
+    this.#ask('restart');
+  }
+
+  select(number) { this.stations.select(number); }
+
+  // From a station's head; a number, or as setStations() has it. Without one: from the first.
+  lookFrom(station = this.stations.list[0]) {
+    const s = typeof station === 'object' && station !== null ? station : this.stations.get(Number(station));
+    if (!s) return;
+    const {at, heading_deg} = this.stations.placeOf(s);
+    this.touched();
+    this.camera.lookFrom(at, radians(heading_deg));
+    this.cameraMoved();
+  }
+
+  fit() {
+    const box = boxOf(this.cloud, this.stations.list, this.#solids);
+    if (box) this.camera.fit(box);
+    this.cameraMoved();
+  }
+
+  // Turns about what is at a place of the canvas from now on, and goes half the way to it.
+  lookAt({x, y}) {
+    searchSlowly(this.cloud, this.camera, x, y, 12, (found) => {
+      if (!found) return;
+      const p = this.camera.at(x, y, found.w);
+      this.camera.inside = false;
+      this.camera.target = p;
+      this.camera.distance = Math.max(0.05, 0.5 * found.w);
+      this.cameraMoved();
+    });
+  }
+
+  // Resolves once all that is there is on the page.
+  screenshotReady() {
+    this.#ask('show');
+    return new Promise((resolve) => this.#waiting.push(resolve));
+  }
+
+  get state() {
+    const {drawn, left} = progress(this.#parts());
+    return {drawn, left, moving: this.#moving, frames_per_s: this.#fps, budget: this.#painter.moving.points, lost: this.#lost};
+  }
+
+  // ---- for the modules of the picture
+
+  cameraMoved() {
+    this.#want.camera = true;
+    this.#schedule();
+  }
+
+  touched() { this.#touched = true; }
+
+  // The pointer is at a place, or nowhere: its point is searched for once it stays.
+  hover(p) {
+    const h = this.#hover;
+    clearTimeout(h.timer);
+    h.stop?.();
+    h.stop = null;
+    if (p === null) return this.#picked(null);
+    const hit = this.#solids.stationsOn ? this.stations.hit(this.camera, p.x, p.y) : null;
+    this.canvas.style.cursor = hit && this.movable ? (hit.what === 'turn' ? 'crosshair' : 'move') : 'default';
+    h.timer = setTimeout(() => {
+      h.stop = searchSlowly(this.cloud, this.camera, p.x, p.y, 8, (found) => {
+        h.stop = null;
+        this.#picked(found && this.cloud.origin ? pointOf(this.cloud, found.block, found.i) : null);
+      });
+    }, HOVER_MS);
+  }
+
+  #picked(point) {
+    if (point === null && this.#hover.point === null) return;
+    this.#hover.point = point;
+    this.#emit('pick', point ? {point} : null);
+    this.#ask('overlay');
+  }
+
+  // ---- drawing
+
+  #ask(what) {
+    this.#want[what] = what === 'restart' ? 'now' : true;
+    this.#schedule();
+  }
+
+  #schedule() {
+    if (this.#scheduled || this.#lost) return;
+    this.#scheduled = true;
+    requestAnimationFrame((now) => {
+      this.#scheduled = false;
+      this.#frame(now);
+    });
+  }
+
+  #frame(now) {
+    if (this.#lost) return;
+    if (this.#painter.busy()) { // the GPU is still at it
+      this.#scheduled = true;
+      setTimeout(() => {
+        this.#scheduled = false;
+        this.#frame(performance.now());
+      }, 4);
+      return;
+    }
+    if (this.#made) {
+      this.#put(now);
+      return;
+    }
+    const want = this.#want;
+    if (want.resize) this.#resize();
+    if (this.canvas.width === 0 || this.canvas.height === 0) return;
+    this.colours ??= readTheme(this.canvas);
+    if (this.#follow()) want.restart ??= 'later';
+    const parts = this.#parts();
+    if (want.camera) this.#move(parts, now);
+    else this.#rest(parts, now);
+    if (want.overlay && !this.#made) this.#over();
+    this.#tell(now);
+    this.#next(parts);
+  }
+
+  #parts() {
+    if (!this.colours) return [];
+    return [...this.#solids.parts(this.camera, this.colours), ...(this.#pointsOn ? this.#points.parts : [])];
+  }
+
+  #aim(scale) {
+    this.#points.scale = scale;
+    this.#points.aim(this.camera);
+  }
+
+  #move(parts, now) {
+    const want = this.#want;
+    const painter = this.#painter;
+    Object.assign(want, {camera: false, restart: null, show: false});
+    this.#moving = true;
+    this.#movedAt = now;
+    this.#goneDrawn = 0;
+    const scale = this.#plain ? COARSE : 1;
+    this.#aim(scale);
+    painter.begin(parts, 0, scale);
+    const did = painter.draw(parts, painter.moving.points, shares);
+    this.#present();
+    painter.fence((ms) => painter.moving.took(ms, did));
+  }
+
+  #rest(parts, now) {
+    const want = this.#want;
+    const painter = this.#painter;
+    if (now - this.#movedAt < REST_MS && this.#moving) return;
+    if (this.#moving) want.show = true;
+    this.#moving = false;
+    this.#lastFrame = 0;
+    if (painter.swapped && painter.scale !== 1) want.restart ??= 'later';
+    this.#aim(1);
+    if (want.restart) {
+      const {drawn} = progress(parts);
+      painter.begin(parts, want.restart === 'later' ? drawn : Math.min(drawn, 300_000));
+      painter.draw(parts, 0);
+      this.#goneDrawn = 0;
+      want.restart = null;
+      want.show = true;
+    }
+    const {left} = progress(parts);
+    if (painter.swapped && (want.show || (this.#grown && (left === 0 || now - this.#shownAt > this.#showEvery)))) {
+      this.#present();
+      want.show = this.#grown = false;
+      painter.fence((ms) => { this.#showEvery = Math.max(SHOW_MS, 2 * ms); });
+    } else if (left > 0) {
+      const did = painter.draw(parts, painter.resting.points);
+      this.#grown = true;
+      painter.fence((ms) => painter.resting.took(ms, did));
+    }
+  }
+
+  // What is shown, shaded, with what stands over it: into a target that goes onto the page once it is done.
+  #present() {
+    const gl = this.#gl;
+    const {shade} = this.programs;
+    const {shown} = this.#painter;
+    const target = this.#painter.pageTarget();
+    target.bind();
+    gl.clearDepth(1);
+    gl.clear(gl.DEPTH_BUFFER_BIT);
+    gl.disable(gl.DEPTH_TEST);
+    gl.useProgram(shade.program);
+    gl.bindVertexArray(this.empty);
+    gl.activeTexture(gl.TEXTURE0);
+    gl.bindTexture(gl.TEXTURE_2D, shown.colour);
+    gl.activeTexture(gl.TEXTURE1);
+    gl.bindTexture(gl.TEXTURE_2D, shown.depth);
+    gl.uniform1i(shade.u_picture, 0);
+    gl.uniform1i(shade.u_depth, 1);
+    gl.uniform3fv(shade.u_ground, this.colours.ground);
+    gl.uniform1f(shade.u_strength, this.shading && shown.scale === 1 ? SHADING : 0);
+    gl.uniform1i(shade.u_step, Math.max(1, Math.round(this.ratio)));
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    this.#solids.overlay(this.camera, this.colours, this.stations, shown.depth, shown.scale !== 1);
+    this.#made = {target, camera: Object.assign(new Camera(), this.camera), moving: this.#moving};
+  }
+
+  // Onto the page, now that the GPU has it.
+  #put(now) {
+    const {target, camera, moving} = this.#made;
+    this.#made = null;
+    this.#shownAt = now;
+    target.toPage(this.canvas.width, this.canvas.height);
+    this.#seen = camera;
+    this.#over();
+    if (moving) {
+      if (this.#lastFrame > 0 && now - this.#lastFrame < 1000) {
+        const fps = 1000 / Math.max(1, now - this.#lastFrame);
+        this.#fps = this.#fps ? 0.8 * this.#fps + 0.2 * fps : fps;
+      }
+      this.#lastFrame = now;
+    }
+    this.#schedule();
+  }
+
+  #over() {
+    this.#want.overlay = false;
+    this.overlay.draw({camera: this.#seen, colours: this.colours.css, stations: this.#solids.stationsOn ? this.stations : null,
+      marked: this.#hover.point});
+  }
+
+  #next(parts) {
+    const {left} = progress(parts);
+    const want = this.#want;
+    const open = this.#moving || left > 0 || this.#made || this.#grown || want.show;
+    if (open || want.camera || want.restart || want.resize || this.#painter.busy()) this.#schedule();
+    else {
+      for (const resolve of this.#waiting.splice(0)) resolve();
+      this.#tell(performance.now(), true);
+    }
+  }
+
+  #tell(now, done = false) {
+    if (now - this.#toldAt < (done ? 250 : 500)) return;
+    this.#toldAt = now;
+    this.#emit('drawn', {frames_per_s: this.#fps, points: progress(this.#parts()).drawn});
+  }
+
+  #resize() {
+    const {canvas, camera} = this;
+    this.#want.resize = false;
+    const width = canvas.clientWidth, height = canvas.clientHeight;
+    const ratio = Math.min(2, globalThis.devicePixelRatio || 1);
+    const [w, h] = [Math.round(width * ratio), Math.round(height * ratio)];
+    if (w === 0 || h === 0) return;
+    if (canvas.width !== w || canvas.height !== h || !this.#painter.shown) {
+      canvas.width = w;
+      canvas.height = h;
+      this.#made = null;
+      this.#painter.resize(w, h);
+      this.#want.camera = true;
+    }
+    Object.assign(camera, {width, height});
+    this.ratio = ratio;
+    this.#fitUntouched();
+    this.overlay.resize(width, height, ratio);
+    this.#want.overlay = true;
+  }
+
+  // A frame of a moving view where the GPU is slow: half as wide and high, and without what costs by the pixel.
+  get #plain() { return this.#painter.moving.points < PLAIN; }
+
+  // ---- what follows from the cloud
+
+  // True: too much is drawn of what is gone, or the colours' limits have changed.
+  #follow() {
+    const {cloud} = this;
+    const gone = cloud.gone;
+    if (cloud.origin !== this.#origin) { // cleared, and perhaps filled again since
+      this.#origin = cloud.origin;
+      this.#lastGone = this.#goneDrawn = 0;
+      this.#scale.forget();
+      this.#fitted = 0;
+      this.#want.restart = 'now';
+    }
+    if (this.#points.follow()) this.#goneDrawn += gone - this.#lastGone;
+    this.#lastGone = gone;
+    this.#points.size = this.#pointSize * this.ratio;
+    const {first, changed} = this.#scale.follow();
+    this.#points.limits = this.#scale.limits ?? [0, 1];
+    if (first) this.#want.restart = 'now';
+    if (cloud.total >= 2 * this.#fitted && cloud.total > 1000 && this.#solids.scene === null) this.#fitUntouched();
+    if (this.#goneDrawn <= GONE_SHARE * cloud.capacity) return changed;
+    this.#goneDrawn = 0;
+    return true;
+  }
+
+  // Until the user has moved the view, it shows all: the scene, or where there is none the points so far.
+  #fitUntouched() {
+    if (this.#touched) return;
+    this.#fitted = this.cloud.total;
+    const box = boxOf(this.cloud, this.stations.list, this.#solids, true);
+    if (box === null) return;
+    this.camera.fit(box);
+    this.cameraMoved();
+  }
+}

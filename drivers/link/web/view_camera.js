@@ -1,0 +1,177 @@
+// The camera: where the eye is, where it looks, and what lies where on the screen. Pure; lengths in metres, angles in
+// radians, scene frame (x east, y north, z up) in doubles. Screen places are CSS pixels from the top left corner.
+//
+// Depth is logarithmic: from NEAR_M to FAR_M each doubling of the distance has the same share of the 24 bits, so two
+// points 1.2 um apart at 1 m, or 1.2 mm at 1 km, are told apart. Shaders and test have the same formula.
+
+export const NEAR_M = 1e-3;
+export const FAR_M = 1e6;
+const TURN = 2 * Math.PI;
+const STEEPEST = Math.PI / 2 - 1e-3;
+const FILLED = 0.97; // of the picture's width or height, by what is fitted into it
+
+export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+export const add = (a, b, k = 1) => [a[0] + k * b[0], a[1] + k * b[1], a[2] + k * b[2]];
+export const sub = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+export const clamp = (v, lo, hi) => Math.min(hi, Math.max(lo, v));
+export const degrees = (rad) => ((rad * 180 / Math.PI) % 360 + 360) % 360;
+export const radians = (deg) => deg * Math.PI / 180;
+
+// Of a distance along the line of sight: 0 at NEAR_M, 1 at FAR_M.
+export const depthOf = (w) => Math.log2(w / NEAR_M) / Math.log2(FAR_M / NEAR_M);
+
+// A double as the sum of two floats; the difference to a float coordinate, hi first, loses nothing near the eye.
+export function split(v) {
+  const hi = v.map(Math.fround);
+  return {hi, lo: v.map((c, a) => Math.fround(c - hi[a]))};
+}
+
+export class Camera {
+  target = [0, 0, 0];
+  distance = 10;
+  azimuth = radians(-35); // of the line of sight, clockwise from north
+  elevation = radians(-25);
+  fov = radians(50); // across the shorter side
+  inside = false; // the eye stays, as in a head: turning looks round
+  width = 1;
+  height = 1;
+
+  get forward() {
+    const c = Math.cos(this.elevation);
+    return [Math.sin(this.azimuth) * c, Math.cos(this.azimuth) * c, Math.sin(this.elevation)];
+  }
+  get right() { return [Math.cos(this.azimuth), -Math.sin(this.azimuth), 0]; }
+  get up() {
+    const s = -Math.sin(this.elevation);
+    return [Math.sin(this.azimuth) * s, Math.cos(this.azimuth) * s, Math.cos(this.elevation)];
+  }
+  get eye() { return add(this.target, this.forward, -this.distance); }
+
+  // Pixels of one metre at the distance of one metre.
+  get focal() { return 0.5 * Math.min(this.width, this.height) / Math.tan(0.5 * this.fov); }
+
+  // Rows: right, up, forward.
+  get rotation() { return [this.right, this.up, this.forward]; }
+
+  // {x, y, w}: w is the distance along the line of sight; at most 0: behind the eye.
+  project(p) {
+    const d = sub(p, this.eye);
+    const w = dot(d, this.forward);
+    const k = this.focal / w;
+    return {x: 0.5 * this.width + k * dot(d, this.right), y: 0.5 * this.height - k * dot(d, this.up), w};
+  }
+
+  // Direction of the ray through a place of the screen, with a length of 1 along the line of sight.
+  ray(x, y) {
+    const {focal} = this;
+    return add(add(this.forward, this.right, (x - 0.5 * this.width) / focal), this.up, (0.5 * this.height - y) / focal);
+  }
+
+  at(x, y, w) { return add(this.eye, this.ray(x, y), w); }
+
+  turn(dAzimuth, dElevation) {
+    const {eye} = this;
+    this.azimuth = (this.azimuth + dAzimuth) % TURN;
+    this.elevation = clamp(this.elevation + dElevation, -STEEPEST, STEEPEST);
+    if (this.inside) this.target = add(eye, this.forward, this.distance);
+  }
+
+  // Turns about any place, which stays where it is on the screen.
+  orbit(pivot, dAzimuth, dElevation) {
+    const d = sub(this.eye, pivot);
+    const seen = this.rotation.map((axis) => dot(axis, d));
+    this.azimuth = (this.azimuth + dAzimuth) % TURN;
+    this.elevation = clamp(this.elevation + dElevation, -STEEPEST, STEEPEST);
+    const axes = this.rotation;
+    let eye = pivot;
+    axes.forEach((axis, i) => { eye = add(eye, axis, seen[i]); });
+    this.target = add(eye, this.forward, this.distance);
+  }
+
+  // What lies at distance w goes with the pointer.
+  pan(dx, dy, w) {
+    const k = w / this.focal;
+    this.inside = false;
+    this.target = add(add(this.target, this.right, -dx * k), this.up, dy * k);
+  }
+
+  // factor < 1: nearer; the place p stays where it is on the screen. From inside the field of view changes instead.
+  zoom(factor, p) {
+    if (this.inside) {
+      this.fov = clamp(this.fov * factor, radians(2), radians(110));
+      return;
+    }
+    const distance = clamp(this.distance * factor, 2 * NEAR_M, 0.02 * FAR_M);
+    const k = distance / this.distance;
+    if (p) this.target = add(p, sub(this.target, p), k);
+    this.distance = distance;
+  }
+
+  // All of a box in sight.
+  fit({min, max}) {
+    if (this.inside) this.elevation = radians(-25);
+    this.inside = false;
+    this.fov = radians(50);
+    this.target = min.map((v, a) => 0.5 * (v + max[a]));
+    this.distance = 0.05;
+    const [right, up, forward] = this.rotation;
+    const across = 0.5 * FILLED * this.width / this.focal, along = 0.5 * FILLED * this.height / this.focal;
+    for (let k = 0; k < 8; k++) { // a corner is in sight from far enough
+      const d = [0, 1, 2].map((a) => (k >> a & 1 ? max : min)[a] - this.target[a]);
+      const least = Math.max(Math.abs(dot(d, right)) / across, Math.abs(dot(d, up)) / along) - dot(d, forward);
+      this.distance = Math.max(this.distance, least);
+    }
+  }
+
+  lookFrom(eye, heading, elevation = 0) {
+    this.inside = true;
+    this.fov = radians(80);
+    this.azimuth = heading;
+    this.elevation = elevation;
+    this.distance = 3;
+    this.target = add(eye, this.forward, this.distance);
+  }
+
+  // Is any of a box in the pyramid of sight? lo, hi: relative to origin. Never false where it is.
+  sees(lo, hi, origin) {
+    const eye = sub(this.eye, origin);
+    const [right, up, forward] = this.rotation;
+    const tx = 0.5 * this.width / this.focal, ty = 0.5 * this.height / this.focal;
+    const planes = [forward, add(right, forward, tx), add(right.map((c) => -c), forward, tx),
+      add(up, forward, ty), add(up.map((c) => -c), forward, ty)];
+    return planes.every((n) => {
+      let most = 0;
+      for (let a = 0; a < 3; a++) most += n[a] * ((n[a] > 0 ? hi[a] : lo[a]) - eye[a]);
+      return most >= -1e-3;
+    });
+  }
+}
+
+// Where the ray through a place of the screen meets the plane z = height; beyond `reach` from the eye, or where it
+// doesn't, the place at that reach in the ray's direction, on the plane.
+export function onPlane(camera, x, y, height, reach) {
+  const {eye} = camera;
+  const ray = camera.ray(x, y);
+  const t = (height - eye[2]) / ray[2];
+  const along = Math.hypot(ray[0], ray[1]);
+  const d = t > 0 && t * along < reach ? t * along : reach;
+  if (along < 1e-12) return [eye[0], eye[1], height];
+  return [eye[0] + d * ray[0] / along, eye[1] + d * ray[1] / along, height];
+}
+
+// Heading, degrees clockwise from north, from one place to another.
+export const headingTo = (from, to) => degrees(Math.atan2(to[0] - from[0], to[1] - from[1]));
+
+// A step of an arrow key along the axis of the scene that lies nearest to where the arrow points on the screen.
+export function arrowStep(camera, key, step) {
+  const turns = {ArrowUp: 0, ArrowRight: 1, ArrowDown: 2, ArrowLeft: 3}[key];
+  const quarter = (Math.round(camera.azimuth / (Math.PI / 2)) + turns) & 3;
+  return [[0, step], [step, 0], [0, -step], [-step, 0]][quarter];
+}
+
+// The largest of 1, 2, 5 times a power of ten that is at most v.
+export function roundBelow(v) {
+  const power = 10 ** Math.floor(Math.log10(v));
+  for (const k of [5, 2]) if (k * power <= v * (1 + 1e-12)) return k * power;
+  return power;
+}

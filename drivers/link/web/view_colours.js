@@ -1,0 +1,156 @@
+// Colours of points: what each mode shows, its ramp and limits, and the legend for it. Pure.
+//
+// A point has one number, which the shader turns into a colour: `ramp` by a table of 256 colours between the limits,
+// `list` by a table of colours by number, `rgb` as it is. What is not known is GREY, not the end of a ramp.
+
+export const NONE = Math.fround(-1e30); // in place of NaN, which shaders needn't know; the same in a Float32Array
+export const GREY = [128, 132, 138];
+
+// The modes, in the order in which they are offered. least: between a ramp's limits, so that it does not show rounding.
+export const MODES = {
+  height: {title: 'Height', unit: 'm', kind: 'ramp', ramp: 'spectrum', least: 0.01},
+  range: {title: 'Range', unit: 'm', kind: 'ramp', ramp: 'spectrum', least: 0.01},
+  reflectance: {title: 'Reflectance', unit: 'dB', kind: 'ramp', ramp: 'steel', least: 0.1},
+  amplitude: {title: 'Amplitude', unit: 'dB', kind: 'ramp', ramp: 'steel', least: 0.1},
+  label: {title: 'Surface', unit: '', kind: 'list'},
+  echo: {title: 'Echo', unit: '', kind: 'list'},
+  station: {title: 'Station', unit: '', kind: 'list'},
+  age: {title: 'Age', unit: '', kind: 'ramp', ramp: 'ember'},
+  rgb: {title: 'Colour', unit: '', kind: 'rgb'},
+};
+
+// Stops, evenly spaced. Lightness rises or stays in the middle, so that each end can be read on dark and on light.
+const RAMPS = {
+  spectrum: ['#3b4cc0', '#2f7fe0', '#1fb2c9', '#35c98b', '#8fd14f', '#e0c93f', '#f39a35', '#e4572e', '#b5213f'],
+  steel: ['#31364a', '#46618c', '#5b8db0', '#86b4bf', '#bfd2c8', '#f2ead2'],
+  ember: ['#2f3b66', '#5b3f86', '#92428b', '#c84c76', '#ef6b52', '#fb9a3f', '#ffd166'],
+};
+const ECHOES = [['only echo', '#5aa9e6'], ['first of several', '#f4a259'], ['between', '#b07bd6'], ['last of several', '#5fbf77']];
+
+const parse = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
+
+export function rampAt(name, f) {
+  const stops = RAMPS[name];
+  const at = Math.min(Math.max(f, 0), 1) * (stops.length - 1);
+  const i = Math.min(Math.floor(at), stops.length - 2);
+  const a = parse(stops[i]), b = parse(stops[i + 1]);
+  return a.map((v, c) => v + (at - i) * (b[c] - v));
+}
+
+// Hues a golden angle apart, with lightness in four steps: neighbours in number differ most.
+function listColour(k) {
+  const hue = (k * 137.508 + 210) % 360, light = [0.58, 0.48, 0.68, 0.54][k & 3], sat = [0.62, 0.7, 0.55, 0.42][(k >> 2) & 3];
+  return [0, 8, 4].map((n) => { // the usual HSL to RGB, by its closed form
+    const h = (n + hue / 30) % 12;
+    return 255 * (light - sat * Math.min(light, 1 - light) * Math.max(-1, Math.min(h - 3, 9 - h, 1)));
+  });
+}
+
+// 256 colours, four bytes each.
+export function tableOf(mode) {
+  const table = new Uint8Array(4 * 256);
+  const {kind, ramp} = MODES[mode];
+  for (let i = 0; i < 256; i++) {
+    const c = kind === 'ramp' ? rampAt(ramp, i / 255) : mode === 'echo' ? parse((ECHOES[i] ?? ECHOES[0])[1]) : listColour(i);
+    table.set([...c.map(Math.round), 255], 4 * i);
+  }
+  return table;
+}
+
+// Which of ECHOES.
+const echoClass = (packed) => {
+  const echo = packed & 15, echoes = packed >> 4;
+  return echoes <= 1 ? 0 : echo === 1 ? 1 : echo === echoes ? 3 : 2;
+};
+
+// The numbers of points from..to of a block; for rgb four bytes a point in the same buffer.
+export function valuesOf(block, mode, from, to, base = 0) {
+  const n = to - from;
+  const out = new Float32Array(n);
+  const numbers = {range: block.range, reflectance: block.reflectance, amplitude: block.amplitude}[mode];
+  if (mode === 'rgb') {
+    const bytes = new Uint8Array(out.buffer);
+    for (let i = 0; i < n; i++) {
+      const c = block.rgb ? block.rgb.subarray(3 * (from + i), 3 * (from + i) + 3) : GREY;
+      bytes[4 * i] = c[0];
+      bytes[4 * i + 1] = c[1];
+      bytes[4 * i + 2] = c[2];
+      bytes[4 * i + 3] = 255;
+    }
+  } else if (mode === 'height') for (let i = 0; i < n; i++) out[i] = block.position[3 * (from + i) + 2];
+  else if (mode === 'label') for (let i = 0; i < n; i++) out[i] = block.label[from + i] === 0xffff ? NONE : block.label[from + i];
+  else if (mode === 'echo') for (let i = 0; i < n; i++) out[i] = echoClass(block.echo[from + i]);
+  else if (mode === 'station') out.fill(block.station);
+  else if (mode === 'age') for (let i = 0; i < n; i++) out[i] = block.first - base + (block.order ? block.order[from + i] : from + i);
+  else if (numbers) for (let i = 0; i < n; i++) out[i] = Number.isNaN(numbers[from + i]) ? NONE : numbers[from + i];
+  else out.fill(NONE);
+  return out;
+}
+
+// A few numbers of each block, spread evenly; of those that are known.
+export function sampleOf(cloud, mode, most = 20000) {
+  const each = Math.max(16, Math.floor(most / Math.max(1, cloud.blocks.length)));
+  const all = [];
+  for (const block of cloud.blocks) {
+    const n = Math.min(block.n, each);
+    if (block.closed) all.push(...valuesOf(block, mode, 0, n));
+    else for (let i = 0; i < n; i++) {
+      const at = Math.floor(i * block.n / n);
+      all.push(valuesOf(block, mode, at, at + 1)[0]);
+    }
+  }
+  return all.filter((v) => v !== NONE && v === v);
+}
+
+// From the 1st to the 99th percentile, a little wider, so that single far points don't take all colours, and at least so far apart; null of
+// none.
+export function robustLimits(values, least = 0) {
+  if (values.length === 0) return null;
+  const sorted = Float64Array.from(values).sort();
+  const at = (f) => sorted[Math.round(f * (sorted.length - 1))];
+  const lo = at(0.01), hi = at(0.99);
+  const margin = Math.max(0.02 * (hi - lo) || Math.max(1e-6, Math.abs(lo) * 1e-6), 0.5 * (least - (hi - lo)));
+  return [lo - margin, hi + margin];
+}
+
+// The limits after more points: the same, unless they miss more than a tenth of what is there; then wider.
+export function widened(old, fresh) {
+  if (old === null || fresh === null) return fresh ?? old;
+  const slack = 0.1 * (old[1] - old[0]);
+  return [fresh[0] < old[0] - slack ? fresh[0] : old[0], fresh[1] > old[1] + slack ? fresh[1] : old[1]];
+}
+
+// Steps of 1, 2 or 5 times a power of ten within the limits, at most `most`.
+export function ticks([lo, hi], most = 6) {
+  const raw = (hi - lo) / most;
+  const power = 10 ** Math.floor(Math.log10(raw));
+  const step = [1, 2, 5, 10].map((k) => k * power).find((s) => s >= raw * (1 - 1e-9));
+  const places = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+  const out = [];
+  for (let k = Math.ceil(lo / step - 1e-9); k * step <= hi + 1e-9 * step; k++) out.push({value: k * step, text: (k * step).toFixed(places)});
+  return out;
+}
+
+// What panels show of it: {mode, title, unit, none} and, of a ramp, {stops: colours, from, to, ticks: [{at, text}]}, of a
+// list, {items: [{label, name, colour}]}, the most frequent first; name undefined: what the page calls it. A colour is
+// [r, g, b] of 255. Of rgb null: there is nothing to explain, unless the points have no colours of their own.
+export function legendOf(mode, {limits, offset = 0, sample = [], hasColours = true}) {
+  const {title, unit, kind, ramp} = MODES[mode];
+  const legend = {mode, title, unit, none: GREY};
+  const unknown = {stops: [GREY, GREY], from: 'not known', to: '', ticks: []};
+  if (kind === 'rgb') return hasColours ? null : {...legend, ...unknown};
+  if (kind === 'list' && sample.length === 0) return {...legend, ...unknown};
+  if (kind === 'list') return {...legend, items: itemsOf(mode, sample)};
+  legend.stops = Array.from({length: 17}, (_, i) => rampAt(ramp, i / 16).map(Math.round));
+  if (mode === 'age') return {...legend, from: 'oldest', to: 'newest', ticks: []};
+  if (limits === null) return {...legend, ...unknown};
+  const [from, to] = limits.map((v) => v + offset);
+  return {...legend, from, to, ticks: ticks([from, to]).map((t) => ({...t, at: (t.value - from) / (to - from)}))};
+}
+
+function itemsOf(mode, sample) {
+  const counts = new Map();
+  for (const v of sample) counts.set(v, (counts.get(v) ?? 0) + 1);
+  return [...counts].sort((a, b) => b[1] - a[1] || a[0] - b[0]).map(([label]) => (mode === 'echo' ?
+    {label, name: ECHOES[label][0], colour: parse(ECHOES[label][1])} : {label, colour: listColour(label & 255).map(Math.round)}));
+}

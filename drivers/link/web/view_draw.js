@@ -1,0 +1,169 @@
+// What is drawn, piece by piece, into a picture that is kept: a prefix of each part while the view moves, the rest of
+// each once it rests, and only what is new as points come.
+//
+// A part: {n, drawn, weight, skip, draw(from, to)}. `drawn` of its elements are in the picture being worked on. The
+// amount per step follows from the time that the last steps took on the GPU (by fences), so that a step takes STEP_MS.
+
+import {Target} from './view_gl.js';
+
+const STEP_MS = 40; // a step while the view rests
+const MOVE_MS = 55; // a frame while it moves
+const LEAST = 25_000;
+const MOST = 20_000_000;
+
+const EVENLY = 400_000; // of a resting view, before the rest comes part by part: each call to draw costs as 1000 points
+
+export class Budget {
+  constructor(goal_ms, points) {
+    this.goal_ms = goal_ms;
+    this.points = points;
+  }
+
+  // A step of so many points took so long. Where it was cut short by lack of points, it says nothing of more.
+  took(ms, points) {
+    const factor = Math.min(1.6, Math.max(0.4, this.goal_ms / Math.max(1, ms)));
+    if (factor < 1 || points > 0.7 * this.points) this.points = Math.min(MOST, Math.max(LEAST, this.points * factor));
+  }
+}
+
+// How many elements of each part shall be drawn, for `more` in all: the same share of each. Pure.
+export function shares(parts, more) {
+  let all = 0, done = 0;
+  for (const part of parts) {
+    if (part.skip) continue;
+    all += part.n * part.weight;
+    done += part.drawn * part.weight;
+  }
+  const f = all === 0 ? 1 : Math.min(1, (done + more) / all);
+  return parts.map((part) => (part.skip ? part.drawn : Math.max(part.drawn, f === 1 ? part.n : Math.ceil(f * part.n))));
+}
+
+// The same of a view that rests: first a share of each, then one part after the other. A part that is `whole` comes at
+// once: what of it a share leaves out is not known later.
+export function restShares(parts, more) {
+  if (progress(parts).drawn < EVENLY) {
+    return shares(parts, more).map((upTo, i) => (parts[i].whole && !parts[i].skip && more > 0 ? parts[i].n : upTo));
+  }
+  let left = more;
+  return parts.map((part) => {
+    if (part.skip || left <= 0) return part.drawn;
+    const k = part.whole ? part.n - part.drawn : Math.min(part.n - part.drawn, Math.ceil(left / part.weight));
+    left -= k * part.weight;
+    return part.drawn + k;
+  });
+}
+
+// The targets: one that is shown, one that is drawn into (the same, or one that takes its place once it has enough), and
+// one of what goes onto the page. All of a moving view are smaller. A page's frame is made aside, and put onto the canvas
+// only once the GPU has it: a browser that composes in software waits for the canvas, and the page with it.
+export class Painter {
+  moving = new Budget(MOVE_MS, 150_000);
+  resting = new Budget(STEP_MS, 150_000);
+  #gl;
+  #width = 0;
+  #height = 0;
+  #shown = null;
+  #work = null;
+  #spare = [];
+  #enough = 0;
+  #fence = null;
+  #began = 0;
+  #then = null;
+
+  constructor(gl) { this.#gl = gl; }
+
+  get shown() { return this.#shown; }
+  get scale() { return this.#work.scale; } // of what is drawn into
+  get swapped() { return this.#work === this.#shown; } // is what is drawn into also what is shown?
+
+  resize(width, height) {
+    for (const target of new Set([this.#shown, this.#work, ...this.#spare])) target?.free();
+    this.#spare = [];
+    [this.#width, this.#height] = [width, height];
+    this.#shown = this.#work = this.#take(1);
+    this.#work.bind();
+    this.#work.clear();
+  }
+
+  #take(scale) {
+    const at = this.#spare.findIndex((target) => target.scale === scale);
+    if (at >= 0) return this.#spare.splice(at, 1)[0];
+    return new Target(this.#gl, Math.max(1, Math.round(this.#width * scale)), Math.max(1, Math.round(this.#height * scale)), scale);
+  }
+
+  // A target for what goes onto the page, of the same scale as what is shown.
+  pageTarget() {
+    const target = this.#take(this.#shown.scale);
+    this.#spare.push(target); // nobody else takes one before it is on the page
+    return target;
+  }
+
+  // Anew, from nothing. `enough`: the old picture stays on the page until the new one has so many points.
+  begin(parts, enough = 0, scale = 1) {
+    if (this.#work !== this.#shown) this.#spare.push(this.#work);
+    this.#work = this.#shown;
+    if (enough > 0 || this.#shown.scale !== scale) this.#work = this.#take(scale);
+    if (enough === 0 && this.#work !== this.#shown) this.#swap();
+    this.#enough = enough;
+    this.#work.bind();
+    this.#work.clear();
+    for (const part of parts) part.drawn = 0;
+  }
+
+  #swap() {
+    this.#spare.push(this.#shown);
+    this.#shown = this.#work;
+  }
+
+  // Draws up to so many points more; how many it drew. of: shares or restShares.
+  draw(parts, points, of = restShares) {
+    const upTo = of(parts, points);
+    let did = 0;
+    this.#work.bind();
+    parts.forEach((part, i) => {
+      if (upTo[i] <= part.drawn) return;
+      part.draw(part.drawn, upTo[i]);
+      did += (upTo[i] - part.drawn) * part.weight;
+      part.drawn = upTo[i];
+    });
+    if (!this.swapped) {
+      const {drawn, left} = progress(parts);
+      if (drawn >= this.#enough || left === 0) this.#swap();
+    }
+    return did;
+  }
+
+  // After a step's last command; then(ms) once the GPU has done it.
+  fence(then) {
+    const gl = this.#gl;
+    this.#fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush();
+    this.#began = performance.now();
+    this.#then = then;
+  }
+
+  // Is the GPU still at the last step? To be asked between tasks of the page.
+  busy() {
+    const gl = this.#gl;
+    if (this.#fence === null) return false;
+    if (!gl.isContextLost() && gl.getSyncParameter(this.#fence, gl.SYNC_STATUS) !== gl.SIGNALED) return true;
+    gl.deleteSync(this.#fence);
+    this.#fence = null;
+    this.#then?.(performance.now() - this.#began);
+    return false;
+  }
+
+  forget() { // the context is gone
+    this.#shown = this.#work = this.#fence = this.#then = null;
+    this.#spare = [];
+  }
+}
+
+export function progress(parts) {
+  let drawn = 0, left = 0;
+  for (const part of parts) {
+    drawn += part.drawn * part.weight;
+    if (!part.skip) left += (part.n - part.drawn) * part.weight;
+  }
+  return {drawn, left};
+}

@@ -1,0 +1,215 @@
+// Shaders, programs and targets of the picture: WebGL 2, and nothing of what they are used for.
+//
+// All positions are relative to an origin of their own; the eye relative to it comes as the sum of two floats. Depth is
+// logarithmic (view_camera.js), and stands in the target's texture, where shading and hiding read it.
+
+import {FAR_M, NEAR_M} from './view_camera.js';
+
+const OCTAVES = Math.log2(FAR_M / NEAR_M);
+
+const PLACE = `
+uniform vec3 u_eye_hi, u_eye_lo;
+uniform mat3 u_axes; // columns: right, up, forward
+uniform vec2 u_lens; // clip units per slope
+const float NEAR = ${NEAR_M};
+const float OCTAVES = ${OCTAVES};
+vec3 seen(vec3 p) { return ((p - u_eye_hi) - u_eye_lo) * u_axes; }
+float depth_of(float w) { return log2(max(w, NEAR) / NEAR) / OCTAVES; }
+vec4 placed(vec3 s) {
+  return s.z <= NEAR ? vec4(0.0, 0.0, 2.0, 1.0) : vec4(s.xy * u_lens, (2.0 * depth_of(s.z) - 1.0) * s.z, s.z);
+}
+`;
+
+const HEAD = `#version 300 es
+precision highp float;
+precision highp int;
+`;
+
+const POINTS = {
+  vertex: `${HEAD}${PLACE}
+layout(location = 0) in vec3 a_position;
+layout(location = 1) in float a_value;
+layout(location = 2) in vec4 a_rgb;
+uniform int u_kind; // 0 ramp, 1 list, 2 rgb
+uniform vec2 u_limits; // lowest, 1 / (highest - lowest)
+uniform vec3 u_grey;
+uniform float u_size, u_near_w, u_size_most;
+uniform sampler2D u_table;
+flat out vec3 v_colour;
+void main() {
+  vec3 s = seen(a_position);
+  gl_Position = placed(s);
+  gl_PointSize = clamp(u_size * sqrt(u_near_w / max(s.z, NEAR)), u_size, u_size_most);
+  if (u_kind == 2) v_colour = a_rgb.rgb;
+  else if (a_value < -1e29) v_colour = u_grey;
+  else if (u_kind == 1) v_colour = texelFetch(u_table, ivec2(int(a_value + 0.5) & 255, 0), 0).rgb;
+  else v_colour = texelFetch(u_table, ivec2(int(clamp((a_value - u_limits.x) * u_limits.y, 0.0, 1.0) * 255.0 + 0.5), 0), 0).rgb;
+}`,
+  fragment: `${HEAD}
+flat in vec3 v_colour;
+out vec4 colour;
+void main() { colour = vec4(v_colour, 1.0); }`,
+};
+
+// Triangles and lines. Hidden ones are left out, or faint, by the depth texture of what was drawn before (u_behind).
+const MESH = {
+  vertex: `${HEAD}${PLACE}
+layout(location = 0) in vec3 a_position;
+uniform vec3 u_shift;
+uniform vec2 u_turn; // cos, sin of the heading
+out vec3 v_seen;
+void main() {
+  vec3 p = vec3(u_turn.x * a_position.x + u_turn.y * a_position.y, u_turn.x * a_position.y - u_turn.y * a_position.x, a_position.z);
+  v_seen = seen(p + u_shift);
+  gl_Position = vec4(v_seen.xy * u_lens, v_seen.z - 2.0 * NEAR, v_seen.z); // depth is the fragment's
+}`,
+  fragment: `${HEAD}
+const float NEAR = ${NEAR_M};
+const float OCTAVES = ${OCTAVES};
+in vec3 v_seen;
+uniform vec4 u_colour;
+uniform float u_edge;   // more alpha where seen at a grazing angle
+uniform float u_push;   // > 1: a little behind, so that points on it stay visible
+uniform float u_faint;  // alpha's factor where hidden
+uniform bool u_flat, u_tests;
+uniform sampler2D u_behind;
+out vec4 colour;
+void main() {
+  float depth = log2(max(v_seen.z * u_push, NEAR) / NEAR) / OCTAVES;
+  gl_FragDepth = depth;
+  float light = 1.0, alpha = u_colour.a;
+  if (!u_flat) {
+    vec3 n = normalize(cross(dFdx(v_seen), dFdy(v_seen)));
+    float facing = abs(dot(n, normalize(v_seen)));
+    light = 0.45 + 0.42 * facing + 0.13 * abs(n.y);
+    alpha = min(1.0, alpha + u_edge * pow(1.0 - facing, 3.0));
+  }
+  if (u_tests && depth > texelFetch(u_behind, ivec2(gl_FragCoord.xy), 0).r + 1e-6) alpha *= u_faint;
+  if (alpha <= 0.0) discard;
+  colour = vec4(u_colour.rgb * light, alpha);
+}`,
+};
+
+// What was drawn, onto the page: the ground where nothing is, and darker beside what is nearer (Boucheny 2009, eye-dome
+// lighting): with logarithmic depth the same at all scales.
+const SHADE = {
+  vertex: `${HEAD}
+void main() { gl_Position = vec4(vec2(gl_VertexID & 1, gl_VertexID >> 1) * 4.0 - 1.0, 0.0, 1.0); }`,
+  fragment: `${HEAD}
+uniform sampler2D u_picture, u_depth;
+uniform vec3 u_ground;
+uniform float u_strength;
+uniform int u_step;
+out vec4 colour;
+void main() {
+  ivec2 at = ivec2(gl_FragCoord.xy);
+  float d = texelFetch(u_depth, at, 0).r;
+  vec3 c = d >= 1.0 ? u_ground : texelFetch(u_picture, at, 0).rgb;
+  if (u_strength > 0.0) {
+    ivec2 last = textureSize(u_depth, 0) - 1;
+    vec4 n = vec4(texelFetch(u_depth, clamp(at + ivec2(u_step, 0), ivec2(0), last), 0).r,
+                  texelFetch(u_depth, clamp(at - ivec2(u_step, 0), ivec2(0), last), 0).r,
+                  texelFetch(u_depth, clamp(at + ivec2(0, u_step), ivec2(0), last), 0).r,
+                  texelFetch(u_depth, clamp(at - ivec2(0, u_step), ivec2(0), last), 0).r);
+    if (d < 1.0) {
+      vec4 over = clamp(d - n - 2e-5, 0.0, 0.01);
+      c *= max(0.35, exp(-u_strength * dot(over, vec4(1.0))));
+    }
+  }
+  colour = vec4(c, 1.0);
+}`,
+};
+
+function compile(gl, type, text) {
+  const shader = gl.createShader(type);
+  gl.shaderSource(shader, text);
+  gl.compileShader(shader);
+  return shader;
+}
+
+// {program, <uniform's name>: location}
+function link(gl, {vertex, fragment}) {
+  const program = gl.createProgram();
+  const shaders = [compile(gl, gl.VERTEX_SHADER, vertex), compile(gl, gl.FRAGMENT_SHADER, fragment)];
+  for (const shader of shaders) gl.attachShader(program, shader);
+  gl.linkProgram(program);
+  if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
+    throw new Error(`shader: ${gl.getProgramInfoLog(program)} ${shaders.map((s) => gl.getShaderInfoLog(s)).join(' ')}`);
+  }
+  const out = {program};
+  const n = gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS) ?? 0;
+  for (let i = 0; i < n; i++) {
+    const {name} = gl.getActiveUniform(program, i);
+    out[name] = gl.getUniformLocation(program, name);
+  }
+  return out;
+}
+
+export const programsOf = (gl) => ({points: link(gl, POINTS), mesh: link(gl, MESH), shade: link(gl, SHADE)});
+
+function texture(gl, internal, format, type, width, height, data = null) {
+  const t = gl.createTexture();
+  gl.bindTexture(gl.TEXTURE_2D, t);
+  gl.texImage2D(gl.TEXTURE_2D, 0, internal, width, height, 0, format, type, data);
+  for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, name, gl.NEAREST);
+  for (const name of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, name, gl.CLAMP_TO_EDGE);
+  return t;
+}
+
+export const tableTexture = (gl, table) => texture(gl, gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, 256, 1, table);
+
+// A picture that is kept between frames, so that points can be added to it. scale: its pixels to those of the page.
+export class Target {
+  constructor(gl, width, height, scale = 1) {
+    this.gl = gl;
+    this.scale = scale;
+    this.width = width;
+    this.height = height;
+    this.colour = texture(gl, gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, width, height);
+    this.depth = texture(gl, gl.DEPTH_COMPONENT24, gl.DEPTH_COMPONENT, gl.UNSIGNED_INT, width, height);
+    this.buffer = gl.createFramebuffer();
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.buffer);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, this.colour, 0);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.TEXTURE_2D, this.depth, 0);
+  }
+
+  bind() {
+    const {gl} = this;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.buffer);
+    gl.viewport(0, 0, this.width, this.height);
+    gl.disable(gl.BLEND);
+    gl.enable(gl.DEPTH_TEST);
+    gl.depthFunc(gl.LESS);
+  }
+
+  clear() {
+    const {gl} = this;
+    gl.clearColor(0, 0, 0, 0);
+    gl.clearDepth(1);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+  }
+
+  // Onto the canvas, which has so many pixels.
+  toPage(width, height) {
+    const {gl} = this;
+    gl.bindFramebuffer(gl.READ_FRAMEBUFFER, this.buffer);
+    gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, null);
+    gl.blitFramebuffer(0, 0, this.width, this.height, 0, 0, width, height, gl.COLOR_BUFFER_BIT, this.scale === 1 ? gl.NEAREST : gl.LINEAR);
+    gl.bindFramebuffer(gl.READ_FRAMEBUFFER, null);
+  }
+
+  free() {
+    this.gl.deleteFramebuffer(this.buffer);
+    this.gl.deleteTexture(this.colour);
+    this.gl.deleteTexture(this.depth);
+  }
+}
+
+// Sets what all programs that place things need. `eye` relative to the thing's origin, split.
+export function setPlace(gl, program, camera, eye) {
+  const [right, up, forward] = camera.rotation;
+  gl.uniform3fv(program.u_eye_hi, eye.hi);
+  gl.uniform3fv(program.u_eye_lo, eye.lo);
+  gl.uniformMatrix3fv(program.u_axes, false, [...right, ...up, ...forward]);
+  gl.uniform2f(program.u_lens, 2 * camera.focal / camera.width, 2 * camera.focal / camera.height);
+}

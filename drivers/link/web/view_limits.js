@@ -1,0 +1,88 @@
+// Limits of the colours and of the view, from what the cloud has. They change rarely, so that nothing flickers: each time
+// the cloud has twice the points, and then only where they miss much.
+
+import {MODES, legendOf, robustLimits, sampleOf, widened} from './view_colours.js';
+
+const AGED = 1.15; // the mode age: its limits follow sooner
+
+export class Scale {
+  mode = 'height';
+  limits = null; // heights: relative to the cloud's origin
+  #cloud;
+  #fixed = null; // what the user set, in the scene frame
+  #at = 0; // total when they were found
+  #sample = [];
+  #legend = null;
+
+  constructor(cloud) { this.#cloud = cloud; }
+
+  forget() {
+    this.limits = this.#legend = null;
+    this.#at = 0;
+    this.#sample = [];
+  }
+
+  colour(mode) {
+    this.mode = mode;
+    this.#fixed = null;
+    this.forget();
+  }
+
+  fix(lo, hi) {
+    if (lo !== undefined && !(lo < hi)) throw new RangeError(`limits ${lo} to ${hi}: the first has to be less`);
+    this.#fixed = lo === undefined ? null : [lo, hi];
+    this.forget();
+  }
+
+  get #offset() { return this.mode === 'height' && this.#cloud.origin ? this.#cloud.origin[2] : 0; }
+
+  legend() {
+    this.#legend ??= legendOf(this.mode, {limits: this.limits, offset: this.#offset, sample: this.#sample,
+      hasColours: this.#cloud.blocks.some((block) => block.rgb !== null)});
+    return this.#legend;
+  }
+
+  // {first, changed}: there are limits for the first time; others than before.
+  follow() {
+    const {total, gone} = this.#cloud;
+    const due = total > this.#at && (total >= 2 * this.#at || (this.mode === 'age' && total > AGED * this.#at));
+    if (!due) return {first: false, changed: false};
+    const before = this.limits;
+    this.#at = total;
+    this.#legend = null;
+    this.#sample = sampleOf(this.#cloud, this.mode);
+    if (MODES[this.mode].kind !== 'ramp') return {first: false, changed: false};
+    if (this.mode === 'age') this.limits = [gone, total];
+    else this.limits = this.#fixed?.map((v) => v - this.#offset) ?? widened(before, robustLimits(this.#sample, MODES[this.mode].least));
+    const changed = this.limits !== null && (before === null || before.some((v, i) => v !== this.limits[i]));
+    return {first: before === null && changed, changed};
+  }
+}
+
+// Without the far ends of the points. {min, max} in the scene frame, or null.
+function robustBox({blocks, origin}) {
+  const axes = [[], [], []];
+  for (const block of blocks) {
+    const n = Math.min(block.n, 1000), step = block.closed ? 1 : Math.max(1, Math.floor(block.n / n));
+    for (let i = 0; i < n; i++) axes.forEach((v, a) => v.push(block.position[3 * step * i + a]));
+  }
+  const limits = axes.map((v) => robustLimits(v.filter((c) => c === c)) ?? [0, 0]);
+  return {min: limits.map((l, a) => l[0] + origin[a]), max: limits.map((l, a) => l[1] + origin[a])};
+}
+
+// What a view of all shows: the points, or before there are any the scene; and the stations. sceneFirst: the scene, also
+// where there are points.
+export function boxOf(cloud, stations, solids, sceneFirst = false) {
+  const scene = sceneFirst || cloud.count <= 500 ? solids.bounds() : null;
+  const box = scene ?? (cloud.count > 500 ? robustBox(cloud) : cloud.bounds);
+  const places = stations.map((s) => [s.x_m, s.y_m, s.z_m]);
+  if (box === null && places.length === 0) return null;
+  const min = box?.min ?? places[0].map((c) => c - 5), max = box?.max ?? places[0].map((c) => c + 5);
+  for (const p of places) {
+    p.forEach((c, a) => {
+      min[a] = Math.min(min[a], c);
+      max[a] = Math.max(max[a], c);
+    });
+  }
+  return {min, max};
+}

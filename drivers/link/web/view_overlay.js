@@ -1,0 +1,184 @@
+// What stands over the points: scale bar, axes with north, stations' names and handles, the point under the pointer.
+// On a 2D canvas over the picture, so that lines and letters are sharp; each with an edge in the ground's colour.
+
+import {roundBelow} from './view_camera.js';
+
+const FONT = '12px system-ui, "Segoe UI", Roboto, "Noto Sans", "DejaVu Sans", sans-serif';
+const AXES = [['x', [1, 0, 0], '#e0524d'], ['N', [0, 1, 0], '#4aa651'], ['z', [0, 0, 1], '#4a83e0']];
+
+// "20 mm", "5 m", "2 km"
+function lengthText(m) {
+  const round = (v) => String(Number(v.toPrecision(6)));
+  return m >= 1000 ? `${round(m / 1000)} km` : m >= 1 ? `${round(m)} m` : m >= 0.01 ? `${round(m * 100)} cm` : `${round(m * 1000)} mm`;
+}
+
+// The bar at the target's distance: {px, m}, at most `most` pixels.
+function scaleBar(camera, most = 150) {
+  const m = roundBelow(most * camera.distance / camera.focal);
+  return {m, px: m * camera.focal / camera.distance};
+}
+
+export class Overlay {
+  constructor(canvas) {
+    const parent = canvas.parentElement;
+    if (getComputedStyle(parent).position === 'static') parent.style.position = 'relative';
+    this.canvas = document.createElement('canvas');
+    this.canvas.setAttribute('aria-hidden', 'true');
+    this.canvas.style.cssText = 'position:absolute;pointer-events:none';
+    canvas.after(this.canvas);
+    this.over = canvas;
+    this.context = this.canvas.getContext('2d');
+  }
+
+  resize(width, height, ratio) {
+    const {over, canvas} = this;
+    canvas.style.left = `${over.offsetLeft}px`;
+    canvas.style.top = `${over.offsetTop}px`;
+    canvas.style.width = `${width}px`;
+    canvas.style.height = `${height}px`;
+    canvas.width = Math.round(width * ratio);
+    canvas.height = Math.round(height * ratio);
+    this.ratio = ratio;
+  }
+
+  // all: {camera, colours: {ground, ink, soft, accent, panel}, stations (or null), marked: point or null}
+  draw({camera, colours, stations, marked}) {
+    const c = this.context;
+    c.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
+    c.clearRect(0, 0, camera.width, camera.height);
+    c.font = FONT;
+    c.lineJoin = c.lineCap = 'round';
+    this.colours = colours;
+    if (stations) this.#stations(camera, stations);
+    if (marked) this.#mark(camera, marked);
+    if (camera.inside) this.#looking(camera);
+    else this.#scale(camera);
+    this.#axes(camera);
+  }
+
+  #line(points, width, colour, dash = []) {
+    const c = this.context;
+    c.beginPath();
+    points.forEach(([x, y], i) => (i === 0 ? c.moveTo(x, y) : c.lineTo(x, y)));
+    for (const [w, s, d] of [[width + 2.5, this.colours.ground, []], [width, colour, dash]]) {
+      c.lineWidth = w;
+      c.strokeStyle = s;
+      c.globalAlpha = s === colour ? 1 : 0.6;
+      c.setLineDash(d);
+      c.stroke();
+    }
+    c.setLineDash([]);
+    c.globalAlpha = 1;
+  }
+
+  #text(text, x, y, {align = 'center', colour = this.colours.ink, bold = false, inside = 0} = {}) {
+    const c = this.context;
+    c.font = bold ? `600 ${FONT}` : FONT;
+    c.textAlign = align;
+    c.textBaseline = 'middle';
+    c.lineWidth = 3.5;
+    c.strokeStyle = this.colours.ground;
+    if (inside) { // of the picture: a name at its edge is moved, not cut
+      const half = 0.5 * c.measureText(text).width + 4;
+      if (x > -half && x < inside + half) x = Math.max(half, Math.min(inside - half, x));
+    }
+    c.strokeText(text, x, y);
+    c.fillStyle = colour;
+    c.fillText(text, x, y);
+  }
+
+  #scale(camera) {
+    const {m, px} = scaleBar(camera, Math.min(150, 0.3 * camera.width));
+    const x = 16, y = camera.height - 18;
+    this.#line([[x, y - 5], [x, y], [x + px, y], [x + px, y - 5]], 1.5, this.colours.ink);
+    this.#text(lengthText(m), x + px / 2, y - 10);
+  }
+
+  #looking(camera) {
+    const deg = (rad) => (rad * 180 / Math.PI);
+    const heading = ((deg(camera.azimuth) % 360) + 360) % 360;
+    this.#text(`${heading.toFixed(0)}° · ${deg(camera.elevation).toFixed(0).replace('-', '−')}° · field ${deg(camera.fov).toFixed(0)}°`, 16,
+      camera.height - 18, {align: 'left'});
+  }
+
+  #axes(camera) {
+    const x = camera.width - 44, y = camera.height - 44, r = 27;
+    const axes = camera.rotation;
+    const ends = AXES.map(([name, v, colour]) => {
+      const [right, up, forward] = axes.map((a) => a[0] * v[0] + a[1] * v[1] + a[2] * v[2]);
+      return {name, colour, right, up, forward};
+    }).sort((a, b) => b.forward - a.forward);
+    for (const {name, colour, right, up} of ends) {
+      this.#line([[x, y], [x + r * right, y - r * up]], 2, colour);
+      const away = Math.hypot(right, up) < 0.25 ? 0 : 11 / Math.hypot(right, up);
+      this.#text(name, x + r * right + away * right, y - r * up - away * up, {colour, bold: true});
+    }
+  }
+
+  #stations(camera, stations) {
+    for (const station of stations.list) {
+      const ring = stations.ring(camera, station);
+      if (ring === null) continue;
+      const head = camera.project(ring.at);
+      const selected = station.number === stations.selected;
+      if (selected) this.#ring(camera, ring);
+      const {x, y} = head;
+      const high = Math.max(12, 0.35 * camera.focal / head.w + 9);
+      this.#text(station.name || `Station ${station.number}`, x, y - high, {bold: true, inside: camera.width,
+        colour: selected ? this.colours.accent : this.colours.ink});
+      if (4 > 0.16 * camera.focal / head.w) this.#dot(x, y, 4, selected ? this.colours.accent : this.colours.ink);
+      const {moved} = stations;
+      if (moved?.number === station.number) this.#moving(camera, station, moved, head, stations.pending);
+    }
+  }
+
+  #ring(camera, ring) {
+    const points = [];
+    for (let k = 0; k <= 72; k++) {
+      const p = camera.project(ring.place(k * Math.PI / 36));
+      if (p.w <= 0.01) return;
+      points.push([p.x, p.y]);
+    }
+    this.#line(points, 1.5, this.colours.accent);
+    const from = camera.project(ring.at), to = camera.project(ring.handle);
+    this.#line([[from.x, from.y], [to.x, to.y]], 1.5, this.colours.accent);
+    this.#dot(to.x, to.y, 7, this.colours.accent);
+  }
+
+  #dot(x, y, r, colour) {
+    const c = this.context;
+    c.beginPath();
+    c.arc(x, y, r, 0, 2 * Math.PI);
+    c.fillStyle = colour;
+    c.fill();
+    c.lineWidth = 2;
+    c.strokeStyle = this.colours.ground;
+    c.stroke();
+  }
+
+  // From where to where, and how far.
+  #moving(camera, station, moved, head, pending) {
+    const from = camera.project([station.x_m, station.y_m, station.z_m]);
+    const d = [moved.x - station.x_m, moved.y - station.y_m, moved.z - station.z_m];
+    if (from.w > 0 && Math.hypot(...d) > 1e-3) this.#line([[from.x, from.y], [head.x, head.y]], 1.5, this.colours.accent, [5, 5]);
+    const show = (v) => v.toFixed(2).replace('-', '−');
+    const turned = ((moved.heading_deg - station.heading_deg + 540) % 360) - 180;
+    const lines = [`x ${show(moved.x)}  y ${show(moved.y)}  z ${show(moved.z)} m`, `${Math.hypot(...d).toFixed(2)} m from where it was`];
+    if (Math.abs(turned) > 0.005) lines[1] = `heading ${moved.heading_deg.toFixed(1)}° (${turned > 0 ? '+' : '−'}${Math.abs(turned).toFixed(1)}°)`;
+    if (pending) lines[1] = 'asking the head …';
+    lines.forEach((text, i) => this.#text(text, head.x, head.y + 22 + 16 * i));
+  }
+
+  #mark(camera, point) {
+    const p = camera.project([point.x, point.y, point.z]);
+    if (p.w <= 0) return;
+    const c = this.context;
+    for (const [width, colour] of [[4, this.colours.ground], [1.75, this.colours.accent]]) {
+      c.beginPath();
+      c.arc(p.x, p.y, 7, 0, 2 * Math.PI);
+      c.lineWidth = width;
+      c.strokeStyle = colour;
+      c.stroke();
+    }
+  }
+}

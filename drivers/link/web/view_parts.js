@@ -1,0 +1,256 @@
+// The parts that are drawn into the kept picture (view_draw.js): blocks of points with their buffers on the GPU, and
+// meshes.
+
+import {MODES, GREY, tableOf, valuesOf} from './view_colours.js';
+import {setPlace, tableTexture} from './view_gl.js';
+import {split, sub} from './view_camera.js';
+
+const STRIDE_MOST = 21; // 255 bytes of 12
+
+// One block of a cloud: positions, and one number a point for the colour mode.
+class BlockPart {
+  weight = 1;
+  drawn = 0;
+  skip = false;
+  #held = 0; // positions on the GPU
+  #valued = 0; // numbers on the GPU, of
+  #mode = null;
+  #closed = false;
+  #capacity = 0;
+
+  constructor(points, block) {
+    this.points = points;
+    this.block = block;
+    const {gl} = points;
+    this.vertices = gl.createVertexArray();
+    this.position = gl.createBuffer();
+    this.value = gl.createBuffer();
+  }
+
+  get n() { return this.block.n; }
+  get whole() { return !this.block.closed; }
+
+  #layout(stride) {
+    const {gl} = this.points;
+    gl.bindVertexArray(this.vertices);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.position);
+    gl.enableVertexAttribArray(0);
+    gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 12 * stride, 0);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.value);
+    gl.enableVertexAttribArray(1);
+    gl.vertexAttribPointer(1, 1, gl.FLOAT, false, 4 * stride, 0);
+    gl.enableVertexAttribArray(2);
+    gl.vertexAttribPointer(2, 4, gl.UNSIGNED_BYTE, true, 4 * stride, 0);
+  }
+
+  #upload() {
+    const {gl, mode, base} = this.points;
+    const {block} = this;
+    if (block.closed && !this.#closed) { // in another order now
+      this.#closed = true;
+      this.#capacity = this.#held = this.#valued = 0;
+    }
+    if (this.#mode !== mode) this.#valued = 0;
+    this.#mode = mode;
+    if (this.#capacity === 0) {
+      this.#capacity = block.closed ? block.n : block.position.length / 3;
+      for (const [buffer, size] of [[this.position, 12], [this.value, 4]]) {
+        gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+        gl.bufferData(gl.ARRAY_BUFFER, size * this.#capacity, gl.STATIC_DRAW);
+      }
+      this.#layout(1);
+    }
+    if (this.#held < block.n) {
+      gl.bindBuffer(gl.ARRAY_BUFFER, this.position);
+      gl.bufferSubData(gl.ARRAY_BUFFER, 12 * this.#held, block.position, 3 * this.#held, 3 * (block.n - this.#held));
+      this.#held = block.n;
+    }
+    if (this.#valued < block.n) {
+      gl.bindBuffer(gl.ARRAY_BUFFER, this.value);
+      gl.bufferSubData(gl.ARRAY_BUFFER, 4 * this.#valued, valuesOf(block, mode, this.#valued, block.n, base));
+      this.#valued = block.n;
+    }
+  }
+
+  draw(from, to) {
+    const {gl} = this.points;
+    this.points.use();
+    this.#upload();
+    // The block that is still filled is in the order of the scan: every k-th point of it.
+    const k = !this.block.closed && from === 0 ? Math.min(STRIDE_MOST, Math.floor(this.n / to)) : 1;
+    if (k > 1) {
+      this.#layout(k);
+      gl.drawArrays(gl.POINTS, 0, Math.floor(this.n / k));
+      this.#layout(1);
+      this.thinned = true;
+    } else {
+      gl.bindVertexArray(this.vertices);
+      gl.drawArrays(gl.POINTS, from, to - from);
+    }
+  }
+
+  // Once it is closed, or after every k-th point, `drawn` says nothing of which points are there.
+  settle() {
+    if (this.thinned || (this.block.closed && !this.#closed && this.drawn > 0 && this.drawn < this.n)) this.drawn = 0;
+    this.thinned = false;
+  }
+
+  free() {
+    const {gl} = this.points;
+    gl.deleteVertexArray(this.vertices);
+    gl.deleteBuffer(this.position);
+    gl.deleteBuffer(this.value);
+  }
+}
+
+// The cloud's blocks as parts.
+export class Points {
+  parts = [];
+  mode = 'height';
+  limits = [0, 1];
+  base = 0; // number of the point that counts as 0 in the mode age
+  size = 2; // pixels
+  scale = 1; // pixels of the target to those of the page
+  #using = false;
+  #table = null;
+  #known = new Map();
+
+  constructor(gl, programs, cloud) {
+    Object.assign(this, {gl, program: programs.points, cloud});
+  }
+
+  setMode(mode) {
+    this.mode = mode;
+    if (this.#table) this.gl.deleteTexture(this.#table);
+    this.#table = tableTexture(this.gl, tableOf(mode));
+  }
+
+  // Takes over what the cloud has. True: blocks are gone that were drawn.
+  follow() {
+    let gone = false;
+    const {blocks} = this.cloud;
+    if (this.parts.length > 0 && this.parts[0].block !== blocks[0]) {
+      const held = new Set(blocks);
+      for (const [block, part] of this.#known) {
+        if (held.has(block)) continue;
+        gone ||= part.drawn > 0;
+        part.free();
+        this.#known.delete(block);
+      }
+      this.parts = this.parts.filter((part) => held.has(part.block));
+    }
+    for (let i = this.parts.length; i < blocks.length; i++) {
+      const part = new BlockPart(this, blocks[i]);
+      this.#known.set(blocks[i], part);
+      this.parts.push(part);
+    }
+    for (const part of this.parts) part.settle();
+    return gone;
+  }
+
+  // Before each step: the camera; parts out of sight are left out.
+  aim(camera) {
+    this.camera = camera;
+    this.#using = false;
+    for (const part of this.parts) part.skip = !camera.sees(part.block.lo, part.block.hi, this.cloud.origin);
+  }
+
+  use() {
+    const {gl, program, camera} = this;
+    if (this.#using && gl.getParameter(gl.CURRENT_PROGRAM) === program.program) return;
+    this.#using = true;
+    gl.useProgram(program.program);
+    setPlace(gl, program, camera, split(sub(camera.eye, this.cloud.origin)));
+    gl.uniform1i(program.u_kind, ['ramp', 'list', 'rgb'].indexOf(MODES[this.mode].kind));
+    gl.uniform2f(program.u_limits, this.limits[0], 1 / Math.max(1e-30, this.limits[1] - this.limits[0]));
+    gl.uniform3fv(program.u_grey, GREY.map((c) => c / 255));
+    const size = Math.max(1, this.size * this.scale);
+    gl.uniform1f(program.u_size, size);
+    gl.uniform1f(program.u_size_most, 2.5 * size + 1);
+    gl.uniform1f(program.u_near_w, 0.35 * camera.distance);
+    gl.activeTexture(gl.TEXTURE0);
+    gl.bindTexture(gl.TEXTURE_2D, this.#table);
+    gl.uniform1i(program.u_table, 0);
+  }
+}
+
+// Uniforms of the mesh program that have a usual value.
+export function useMesh(gl, program, camera, origin, {colour, edge = 0, push = 1, faint = 1, flat = false, behind = null,
+  shift = [0, 0, 0], heading = 0}) {
+  gl.useProgram(program.program);
+  setPlace(gl, program, camera, split(sub(camera.eye, origin)));
+  gl.uniform3fv(program.u_shift, shift);
+  gl.uniform2f(program.u_turn, Math.cos(heading), Math.sin(heading));
+  gl.uniform4fv(program.u_colour, colour);
+  gl.uniform1f(program.u_edge, edge);
+  gl.uniform1f(program.u_push, push);
+  gl.uniform1f(program.u_faint, faint);
+  gl.uniform1i(program.u_flat, flat ? 1 : 0);
+  gl.uniform1i(program.u_tests, behind ? 1 : 0);
+  gl.activeTexture(gl.TEXTURE1);
+  gl.bindTexture(gl.TEXTURE_2D, behind);
+  gl.uniform1i(program.u_behind, 1);
+  gl.activeTexture(gl.TEXTURE0);
+}
+
+// A mesh on the GPU. {origin (scene frame), positions Float32 relative to it, triangles Uint32, lines Uint32 or none}
+export class Mesh {
+  weight = 2;
+  drawn = 0;
+  skip = false;
+  n = 0; // triangles to draw, from the first on
+
+  constructor(gl, program, {origin, positions, triangles, lines = null, drawTriangles = null}) {
+    Object.assign(this, {gl, program, origin});
+    this.all = Math.floor(triangles.length / 3);
+    this.n = Math.min(this.all, drawTriangles ?? this.all);
+    this.buffers = [];
+    this.faces = this.#array(positions, triangles);
+    this.edges = lines && this.#array(null, lines);
+    this.nLines = lines?.length ?? 0;
+  }
+
+  #array(positions, indices) {
+    const {gl} = this;
+    const array = gl.createVertexArray();
+    gl.bindVertexArray(array);
+    if (positions) {
+      this.vertices = gl.createBuffer();
+      this.buffers.push(this.vertices);
+      gl.bindBuffer(gl.ARRAY_BUFFER, this.vertices);
+      gl.bufferData(gl.ARRAY_BUFFER, positions, gl.STATIC_DRAW);
+    } else gl.bindBuffer(gl.ARRAY_BUFFER, this.vertices);
+    gl.enableVertexAttribArray(0);
+    gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 12, 0);
+    const elements = gl.createBuffer();
+    this.buffers.push(elements);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, elements);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indices, gl.STATIC_DRAW);
+    gl.bindVertexArray(null);
+    return array;
+  }
+
+  // As a part of the kept picture; `look` and `camera` are set before.
+  draw(from, to) {
+    useMesh(this.gl, this.program, this.camera, this.origin, this.look);
+    this.triangles(from, to);
+  }
+
+  triangles(from = 0, to = this.n) {
+    this.gl.bindVertexArray(this.faces);
+    this.gl.drawElements(this.gl.TRIANGLES, 3 * (to - from), this.gl.UNSIGNED_INT, 12 * from);
+  }
+
+  // At most so many, from the first on.
+  lines(most = Infinity) {
+    if (this.nLines === 0) return;
+    this.gl.bindVertexArray(this.edges);
+    this.gl.drawElements(this.gl.LINES, Math.min(this.nLines, 2 * most), this.gl.UNSIGNED_INT, 0);
+  }
+
+  free() {
+    for (const buffer of this.buffers) this.gl.deleteBuffer(buffer);
+    this.gl.deleteVertexArray(this.faces);
+    if (this.edges) this.gl.deleteVertexArray(this.edges);
+  }
+}

@@ -1,0 +1,96 @@
+// What lies under the pointer: the nearest point on the screen, nearer ones before those behind them. Pure.
+//
+// Only blocks whose box meets the cone around the ray are looked through, 10 ns a point.
+
+import {dot, sub} from './view_camera.js';
+
+// Four pixels beside the pointer count as much as lying a tenth further away.
+const PIXELS_PER_DEPTH = 4 / Math.log(1.1);
+
+// Can a box have a place at most `slope` from the ray, per length along it? By the sphere around it: never false where
+// it has. centre, half: relative to the eye.
+function meets(block, eye, forward, slope) {
+  const c = [0, 1, 2].map((a) => 0.5 * (block.lo[a] + block.hi[a]) - eye[a]);
+  const r = 0.5 * Math.hypot(...[0, 1, 2].map((a) => block.hi[a] - block.lo[a]));
+  const along = dot(c, forward);
+  if (along < -r) return false;
+  const square = dot(c, c);
+  const across = Math.sqrt(Math.max(0, square - along * along));
+  return across <= r * Math.hypot(1, slope) + Math.max(0, along) * slope;
+}
+
+// Steps through blocks; each next() looks through one of them. The last value is {block, i, w, px} or null.
+// limit: points of each block that are looked at.
+export function* search(cloud, camera, x, y, radius_px, limit = Infinity) {
+  if (cloud.origin === null) return null;
+  const eye = sub(camera.eye, cloud.origin);
+  const ray = camera.ray(x, y);
+  const length = Math.hypot(...ray);
+  const f = ray.map((c) => c / length);
+  const k = camera.focal * length; // pixels per slope, near the ray
+  const slope = radius_px / k;
+  const slope2 = slope * slope;
+  let best = null;
+  let least = Infinity;
+  for (const block of [...cloud.blocks]) {
+    if (!meets(block, eye, f, slope)) continue;
+    const p = block.position;
+    const n = Math.min(block.n, limit);
+    for (let i = 0, at = 0; i < n; i++, at += 3) {
+      const dx = p[at] - eye[0], dy = p[at + 1] - eye[1], dz = p[at + 2] - eye[2];
+      const w = dx * f[0] + dy * f[1] + dz * f[2];
+      if (w <= 1e-3) continue;
+      const off2 = dx * dx + dy * dy + dz * dz - w * w;
+      if (off2 > slope2 * w * w) continue;
+      const px = Math.sqrt(Math.max(0, off2)) / w * k;
+      const score = px + PIXELS_PER_DEPTH * Math.log(w);
+      if (score < least) {
+        least = score;
+        best = {block, i, w: w / length, px};
+      }
+    }
+    yield;
+  }
+  return best;
+}
+
+export function nearest(cloud, camera, x, y, radius_px, limit) {
+  const steps = search(cloud, camera, x, y, radius_px, limit);
+  for (;;) {
+    const {done, value} = steps.next();
+    if (done) return value;
+  }
+}
+
+// The place that a gesture at (x, y) holds on to: of a sample of the points, else at the target's distance.
+export function grip(cloud, camera, x, y) {
+  const found = nearest(cloud, camera, x, y, 14, 4096);
+  return camera.at(x, y, found ? found.w : camera.distance);
+}
+
+// The same, slices of a few milliseconds at a time, so that the page goes on. The callback gets the result; the
+// function returned stops it.
+export function searchSlowly(cloud, camera, x, y, radius_px, then, slice_ms = 6) {
+  const steps = search(cloud, camera, x, y, radius_px);
+  let timer = 0;
+  const slice = () => {
+    const end = performance.now() + slice_ms;
+    do {
+      const {done, value} = steps.next();
+      if (done) {
+        then(value);
+        return;
+      }
+    } while (performance.now() < end);
+    timer = setTimeout(slice, 0);
+  };
+  slice();
+  return () => clearTimeout(timer);
+}
+
+// Distance from a place of the screen to a line between two, pixels.
+export function toSegment(x, y, a, b) {
+  const dx = b.x - a.x, dy = b.y - a.y;
+  const t = Math.min(1, Math.max(0, ((x - a.x) * dx + (y - a.y) * dy) / (dx * dx + dy * dy || 1)));
+  return Math.hypot(a.x + t * dx - x, a.y + t * dy - y);
+}

@@ -1,0 +1,127 @@
+// What is drawn besides points: the coarse scene, a recording's mesh, the stations. Owns their buffers on the GPU.
+
+import {Mesh, useMesh} from './view_parts.js';
+import {featureEdges, legsMesh, parseScene, stationMesh} from './view_mesh.js';
+import {radians} from './view_camera.js';
+
+// Lines cost 1 us each where there is no GPU, as much as a point.
+const EDGES = 16_000, EDGES_MOVING = 3_000;
+
+export class Solids {
+  scene = null; // {origin, positions, triangles, lines}: kept, so that a lost context can be made again
+  mesh = null;
+  sceneMode = 'glass'; // 'off', 'glass', 'solid'
+  meshOn = true;
+  stationsOn = true;
+  #shapes = new Map(); // the body, and legs by the tripod's measures
+
+  attach(gl, programs) {
+    this.gl = gl;
+    this.program = programs.mesh;
+    this.#shapes.clear();
+    this.sceneMesh = this.scene && new Mesh(gl, this.program, this.scene);
+    this.meshPart = this.mesh && new Mesh(gl, this.program, this.mesh);
+  }
+
+  // bytes of /scene; null: none.
+  setScene(bytes) {
+    this.scene = bytes === null || bytes === undefined ? null : parseScene(bytes);
+    if (this.scene) this.scene.lines = featureEdges(this.scene.positions, this.scene.triangles);
+    this.sceneMesh?.free();
+    this.sceneMesh = this.scene && new Mesh(this.gl, this.program, this.scene);
+  }
+
+  // {origin, positions, triangles, drawTriangles}; the same arrays again with another drawTriangles cost nothing.
+  setMesh(mesh) {
+    const same = mesh && this.mesh && mesh.triangles === this.mesh.triangles && mesh.positions === this.mesh.positions;
+    this.mesh = mesh;
+    if (same) this.meshPart.n = Math.min(this.meshPart.all, mesh.drawTriangles ?? this.meshPart.all);
+    else {
+      this.meshPart?.free();
+      this.meshPart = mesh && new Mesh(this.gl, this.program, mesh);
+    }
+  }
+
+  bounds() {
+    for (const mesh of [this.scene, this.mesh]) {
+      if (!mesh || mesh.positions.length === 0) continue;
+      const min = [Infinity, Infinity, Infinity], max = [-Infinity, -Infinity, -Infinity];
+      mesh.positions.forEach((v, i) => {
+        const a = i % 3;
+        min[a] = Math.min(min[a], v + mesh.origin[a]);
+        max[a] = Math.max(max[a], v + mesh.origin[a]);
+      });
+      return {min, max};
+    }
+    return null;
+  }
+
+  // Those of the kept picture, under the points.
+  parts(camera, colours) {
+    const parts = [];
+    if (this.sceneMesh && this.sceneMode === 'solid') {
+      parts.push(Object.assign(this.sceneMesh, {camera, look: {colour: [...colours.solid, 1], push: 1.0015}}));
+    }
+    if (this.meshPart && this.meshOn) parts.push(Object.assign(this.meshPart, {camera, look: {colour: [...colours.mesh, 1], push: 1.0005}}));
+    return parts;
+  }
+
+  // Those over it, each time it is shown. behind: the kept picture's depth; plain: of the scene its longest edges alone.
+  overlay(camera, colours, stations, behind, plain) {
+    const {gl} = this;
+    gl.enable(gl.DEPTH_TEST);
+    gl.depthFunc(gl.LEQUAL);
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
+    if (this.sceneMesh && this.sceneMode === 'glass') this.#glass(camera, colours, behind, plain);
+    if (this.stationsOn) for (const station of stations.list) this.#station(camera, colours, stations, station, behind);
+    gl.bindVertexArray(null);
+    gl.activeTexture(gl.TEXTURE1);
+    gl.bindTexture(gl.TEXTURE_2D, null);
+    gl.activeTexture(gl.TEXTURE0);
+    gl.disable(gl.BLEND);
+  }
+
+  // Only the nearest of its faces, then its edges.
+  #glass(camera, colours, behind, plain) {
+    const {gl, sceneMesh: mesh} = this;
+    const face = {colour: [...colours.scene, 0.07], edge: 0.25, push: 1.002, faint: 0, behind};
+    if (!plain) {
+      useMesh(gl, this.program, camera, mesh.origin, face);
+      gl.colorMask(false, false, false, false);
+      mesh.triangles();
+      gl.colorMask(true, true, true, true);
+      mesh.triangles();
+    }
+    useMesh(gl, this.program, camera, mesh.origin, {...face, colour: [...colours.scene, 0.4], flat: true, push: 0.9995, faint: 0.3});
+    mesh.lines(plain ? EDGES_MOVING : EDGES);
+  }
+
+  #shape(tripod) {
+    const key = tripod ? [tripod.leg_m, tripod.foot_radius_m, tripod.head_above_m].join() : '';
+    if (!this.#shapes.has(key)) {
+      const mesh = tripod ? legsMesh(tripod) : stationMesh();
+      this.#shapes.set(key, new Mesh(this.gl, this.program, {origin: [0, 0, 0], ...mesh}));
+    }
+    return this.#shapes.get(key);
+  }
+
+  #station(camera, colours, stations, station, behind) {
+    const {gl} = this;
+    const {tripod} = station;
+    const {at, heading_deg, ghost} = stations.placeOf(station);
+    const eye = camera.eye;
+    if (Math.hypot(...at.map((c, a) => c - eye[a])) < 0.4) return; // looked from
+    const colour = station.number === stations.selected || ghost ? colours.accent : colours.ink;
+    const drawOne = (shape, place, heading, alpha) => {
+      useMesh(gl, this.program, camera, place, {colour: [...colour, alpha], faint: 0.22, behind, heading: radians(heading)});
+      shape.triangles();
+    };
+    const draw = (place, heading, alpha) => { // a tripod doesn't turn with its head
+      drawOne(this.#shape(null), place, heading, alpha);
+      if (tripod) drawOne(this.#shape(tripod), place, tripod.legs_heading_deg, alpha);
+    };
+    draw(at, heading_deg, station.served === false ? 0.65 : 1);
+    if (ghost) draw([station.x_m, station.y_m, station.z_m], station.heading_deg, 0.3);
+  }
+}

@@ -1,0 +1,193 @@
+// The stations in the picture: tripods, which one is selected, and moving it: dragged along the plane at its height,
+// turned by its handle, or by keys. While it is moved, a ghost stays where it was.
+
+import {arrowStep, degrees, headingTo, onPlane, radians} from './view_camera.js';
+import {feetBelow} from './view_mesh.js';
+import {toSegment} from './view_pick.js';
+
+const GRAB_PX = 18;
+const KEYS_END_MS = 700; // keys at rest for so long: it is let go
+
+export class Stations {
+  list = [];
+  selected = null; // number
+  moved = null; // {number, x, y, z, heading_deg, what}: where it is being moved to
+  pending = false; // let go, and not yet confirmed by setStations()
+  #changed;
+  #tell;
+  #timer = 0;
+  #hold = null; // of a drag: {what, dx, dy, dHeading}
+
+  // changed(): to be drawn anew; tell(move): let go.
+  constructor(changed, tell) {
+    this.#changed = changed;
+    this.#tell = tell;
+  }
+
+  set(list) {
+    this.list = list ?? [];
+    if (!this.list.some((s) => s.number === this.selected)) this.selected = null;
+    if (this.#hold === null) this.#forget();
+    this.#changed();
+  }
+
+  #forget() {
+    clearTimeout(this.#timer);
+    this.moved = null;
+    this.pending = false;
+  }
+
+  get(number) { return this.list.find((s) => s.number === number); }
+
+  select(number) {
+    if (number !== null && !this.get(number)) return;
+    if (this.selected !== number && this.moved && !this.pending) this.letGo();
+    this.selected = number;
+    this.#changed();
+  }
+
+  next(step) {
+    if (this.list.length === 0) return;
+    const at = this.list.findIndex((s) => s.number === this.selected);
+    this.select(this.list[at < 0 ? 0 : (at + step + this.list.length) % this.list.length].number);
+  }
+
+  // Where it is drawn, moved or not.
+  placeOf(station) {
+    const m = this.moved?.number === station.number ? this.moved : null;
+    return m ? {at: [m.x, m.y, m.z], heading_deg: m.heading_deg, ghost: true} :
+      {at: [station.x_m, station.y_m, station.z_m], heading_deg: station.heading_deg, ghost: false};
+  }
+
+  // The ring around a station: its radius in metres is at least 46 px on the screen; null: out of sight.
+  ring(camera, station) {
+    const {at, heading_deg} = this.placeOf(station);
+    const {w} = camera.project(at);
+    if (w < 0.05) return null;
+    const radius = Math.max(0.75, 46 * w / camera.focal);
+    const heading = radians(heading_deg);
+    const place = (angle, r = radius) => [at[0] + r * Math.sin(angle), at[1] + r * Math.cos(angle), at[2]];
+    return {at, radius, heading, place, handle: place(heading)};
+  }
+
+  // {number, what: 'move' or 'turn'} under a place of the screen, or null.
+  hit(camera, x, y) {
+    let best = null, least = GRAB_PX;
+    for (const station of this.list) {
+      const ring = this.ring(camera, station);
+      if (ring === null) continue;
+      const head = camera.project(ring.at);
+      if (station.number === this.selected) {
+        const knob = camera.project(ring.handle);
+        const d = Math.hypot(knob.x - x, knob.y - y) - 4;
+        if (knob.w > 0 && d < least && Math.hypot(knob.x - head.x, knob.y - head.y) > 14) { // not one behind the other
+          least = d;
+          best = {number: station.number, what: 'turn'};
+        }
+      }
+      const foot = camera.project([ring.at[0], ring.at[1], ring.at[2] - feetBelow(station.tripod)]);
+      const d = foot.w > 0 ? toSegment(x, y, head, foot) : Math.hypot(head.x - x, head.y - y);
+      if (d < least) {
+        least = d;
+        best = {number: station.number, what: 'move'};
+      }
+    }
+    return best;
+  }
+
+  #begin(number) {
+    const station = this.get(number);
+    if (this.moved?.number !== number) {
+      const {at, heading_deg} = this.placeOf(station);
+      this.moved = {number, x: at[0], y: at[1], z: at[2], heading_deg};
+    }
+    this.pending = false;
+  }
+
+  grab(camera, {number, what}, x, y) {
+    this.select(number);
+    this.#hold = {number, what, x, y, began: false};
+  }
+
+  drag(camera, x, y) {
+    const hold = this.#hold;
+    if (hold === null || !this.get(hold.number)) return;
+    if (!hold.began) {
+      if (Math.hypot(x - hold.x, y - hold.y) < 4) return; // a click
+      this.#begin(hold.number);
+      hold.began = true;
+      const at = [this.moved.x, this.moved.y, this.moved.z];
+      hold.reach = 20 * Math.hypot(...at.map((c, a) => c - camera.eye[a])) + 10;
+      const on = onPlane(camera, hold.x, hold.y, at[2], hold.reach);
+      hold.off = [at[0] - on[0], at[1] - on[1]];
+      hold.turn = this.moved.heading_deg - headingTo(at, on);
+      // Looked at from the side, places on its plane are too close together to be told apart: a vertical one then.
+      hold.steep = Math.abs(camera.ray(hold.x, hold.y)[2]) > 0.04;
+    }
+    const m = this.moved;
+    const on = onPlane(camera, x, y, m.z, hold.reach);
+    if (hold.what === 'turn') m.heading_deg = degrees(radians(headingTo([m.x, m.y], on) + hold.turn));
+    else if (hold.steep) {
+      m.x = on[0] + hold.off[0];
+      m.y = on[1] + hold.off[1];
+    } else {
+      const {w} = camera.project([m.x, m.y, m.z]);
+      const side = (x - hold.x) * w / camera.focal;
+      m.x += side * camera.right[0];
+      m.y += side * camera.right[1];
+      hold.x = x;
+    }
+    this.#changed();
+  }
+
+  drop(cancelled = false) {
+    const began = this.#hold?.began;
+    this.#hold = null;
+    if (!began) return;
+    if (cancelled) this.cancel();
+    else this.letGo();
+  }
+
+  get dragging() { return this.#hold !== null; }
+
+  // True: the key was for the selected station.
+  key(camera, key, shift) {
+    if (this.selected === null) return false;
+    const step = shift ? 1 : 0.1;
+    const moves = {PageUp: step, PageDown: -step};
+    const turns = {'[': -5, ']': 5, '{': -45, '}': 45};
+    const arrow = key.startsWith('Arrow');
+    if (key === 'Escape') {
+      if (this.moved) this.cancel();
+      else this.select(null);
+      return true;
+    }
+    if (!arrow && !(key in moves) && !(key in turns)) return false;
+    this.#begin(this.selected);
+    const m = this.moved;
+    if (arrow) {
+      const [dx, dy] = arrowStep(camera, key, step);
+      m.x += dx;
+      m.y += dy;
+    } else if (key in moves) m.z += moves[key];
+    else m.heading_deg = (m.heading_deg + turns[key] + 360) % 360;
+    clearTimeout(this.#timer);
+    this.#timer = setTimeout(() => this.letGo(), KEYS_END_MS);
+    this.#changed();
+    return true;
+  }
+
+  letGo() {
+    clearTimeout(this.#timer);
+    if (!this.moved || this.pending) return;
+    const {number, x, y, z, heading_deg} = this.moved;
+    this.pending = true;
+    this.#tell({station: number, x, y, z, heading_deg});
+    this.#changed();
+  }
+
+  cancel() {
+    this.#forget();
+    this.#changed();
+  }
+}

@@ -1,0 +1,26 @@
+// The picture's colours, from the page's: its ground, ink and accent (CSS variables), as the shaders and the overlay want
+// them. The page's scheme decides which of the two sets of the rest is taken.
+
+let probe = null;
+
+// [r, g, b] of 1, of any CSS colour.
+function parts(css) {
+  probe ??= Object.assign(document.createElement('canvas'), {width: 1, height: 1}).getContext('2d', {willReadFrequently: true});
+  probe.fillStyle = '#000';
+  probe.fillStyle = css;
+  probe.fillRect(0, 0, 1, 1);
+  return [...probe.getImageData(0, 0, 1, 1).data].slice(0, 3).map((c) => c / 255);
+}
+
+export function readTheme(element) {
+  const style = getComputedStyle(element);
+  const darkByDefault = matchMedia('(prefers-color-scheme: dark)').matches;
+  const read = (name, light, dark) => style.getPropertyValue(name).trim() || (darkByDefault ? dark : light);
+  const css = {ground: read('--ground', '#e9ecef', '#0c1014'), ink: read('--ink', '#14191e', '#e2e7eb'),
+    accent: read('--accent', '#0a58a6', '#6cb0ff')};
+  const ground = parts(css.ground);
+  const dark = ground[0] + ground[1] + ground[2] < 1.5;
+  return {css, dark, ground, ink: parts(css.ink), accent: parts(css.accent),
+    scene: dark ? [0.62, 0.72, 0.82] : [0.25, 0.33, 0.42], solid: dark ? [0.36, 0.4, 0.44] : [0.74, 0.77, 0.8],
+    mesh: dark ? [0.62, 0.65, 0.68] : [0.8, 0.81, 0.82]};
+}

@@ -1,0 +1,258 @@
+// One connection with a head, decoded: what runs in the page's worker (wire_worker.js), or in the page itself where it
+// has no workers. It hands on what came in messages of many things, and reads no further while its owner has not
+// taken them (`ack`).
+//
+// Two ways to read. A WebSocketStream is read when there is room: what isn't read stays with the head, which leaves
+// out whole frames for this reader and says how many, or waits, as its link is set. A plain WebSocket can't be told to
+// wait: the bytes would pile up in the browser. So it is always decoded at once, and batches that have no room are
+// dropped here, and counted (dropped_points, dropped_shots).
+import {Decoder, Parser} from './native.js';
+
+const SUBPROTOCOL = 'scanhead-native-1';
+const MAX_UNTAKEN = 3; // messages that the owner has not acknowledged
+const MESSAGE_POINTS = 65536, MESSAGE_THINGS = 4096; // a message goes out when it has so many,
+const MESSAGE_MS = 30; // or after so long
+const ANSWER_S = 10; // how long a head may take to answer
+const OPENING_MS = 100; // how long a link may take to refuse a connection that it has taken up
+const MAX_POINTS = 1 << 20; // that wait for a message, where the reading can't stop
+
+export class Wire {
+  #post;
+  #socket = null;
+  #things = []; // [name, value], in the order in which they came
+  #points = 0;
+  #transfer = [];
+  #timer = 0;
+  #untaken = 0;
+  #room = null; // resolves when the owner has taken enough
+  #opening = 0; // a timer, as
+  #limit = 0;
+  #number = 0; // of the connection: what comes late from an older one is nothing
+
+  /** post(message, transfer): {connection, things, figures} to the owner. */
+  constructor(post) {
+    this.#post = post;
+    this.#fresh();
+  }
+
+  /** From the owner: {connect: url}, {send: line}, {close: true}, {ack: true}. */
+  take(message) {
+    if (message.connect !== undefined) this.#connect(message.connect);
+    if (message.send !== undefined) this.#socket?.send(message.send);
+    if (message.close) this.#close();
+    if (message.ack) this.#taken();
+  }
+
+  // ---- connecting
+
+  #fresh() {
+    const hand = (name) => (value) => this.#add(name, value);
+    // With `shots`: pulses received so far.
+    const handCounted = (name) => (value) => this.#add(name, Object.assign(value, {shots: this.decoder.stats.shots}));
+    this.decoder = new Decoder({points: (batch) => this.#addPoints(batch), descriptor: handCounted('descriptor'),
+      anchor: hand('anchor'), emitter: hand('emitter'), names: hand('names'), lineEnd: hand('line-end'),
+      telemetry: handCounted('telemetry'), event: handCounted('event'), poses: hand('poses'),
+      refused: hand('refused')});
+    this.parser = new Parser({frame: (frame) => this.decoder.take(frame), text: hand('text')});
+    this.busy_ms = 0;
+    this.dropped = {dropped_points: 0, dropped_shots: 0, dropped_things: 0};
+  }
+
+  #connect(url) {
+    this.#close();
+    this.#fresh();
+    this.#number++;
+    const number = this.#number;
+    const mine = (act) => (...values) => number === this.#number && act(...values);
+    const on = {
+      open: mine(() => {
+        clearTimeout(this.#limit);
+        this.#opening = setTimeout(() => this.#open(), OPENING_MS);
+      }),
+      bytes: mine((bytes) => this.#bytes(bytes)),
+      text: mine((text) => this.#text(text)),
+      close: mine((code, reason) => this.#ended(code, reason)),
+      room: () => this.#hasRoom(),
+    };
+    this.#limit = setTimeout(mine(() => {
+      this.#close();
+      this.#ended(1006, `no answer within ${ANSWER_S} s`);
+    }), 1000 * ANSWER_S);
+    this.#socket = typeof WebSocketStream === 'function' ? readStream(url, on) : readSocket(url, on);
+  }
+
+  // Open is what isn't refused: a link whose places are taken says so after the connection is there, and what would be
+  // sent to it before that would cost its words.
+  #open() {
+    if (this.#opening === 0) return;
+    clearTimeout(this.#opening);
+    this.#opening = 0;
+    this.#addNow('open', null);
+  }
+
+  #close() {
+    this.#stopTimers();
+    this.#socket?.close();
+    this.#socket = null;
+  }
+
+  #stopTimers() {
+    clearTimeout(this.#limit);
+    clearTimeout(this.#opening);
+    this.#opening = 0;
+  }
+
+  #ended(code, reason) {
+    this.#stopTimers();
+    this.#socket = null;
+    this.parser.end();
+    this.decoder.flush(true);
+    this.#addNow('close', {code, reason});
+    this.#number++;
+  }
+
+  // ---- what comes
+
+  #bytes(bytes) {
+    this.#open();
+    const from_ms = performance.now();
+    this.parser.push(bytes);
+    this.busy_ms += performance.now() - from_ms;
+    const held = this.decoder.columns.n;
+    if (this.#points + held >= MESSAGE_POINTS || this.#things.length >= MESSAGE_THINGS) this.#send();
+    else if (held > 0 || this.decoder.shots > 0) this.#later();
+  }
+
+  // Reply lines, with or without CR LF, one or more.
+  #text(text) {
+    this.#open();
+    for (const line of text.split(/\r?\n/)) if (line !== '') this.#add('text', line);
+    this.#send();
+  }
+
+  // After the points that came before it.
+  #add(name, value) {
+    this.decoder.flush();
+    if (this.#things.length >= 4 * MESSAGE_THINGS && name !== 'text' && name !== 'close') this.dropped.dropped_things++;
+    else this.#things.push([name, value]);
+    this.#later();
+  }
+
+  #addNow(name, value) {
+    this.#add(name, value);
+    this.#send();
+  }
+
+  #addPoints(batch) {
+    if (this.#points + batch.n > MAX_POINTS) {
+      this.dropped.dropped_points += batch.n;
+      this.dropped.dropped_shots += batch.shots;
+      return;
+    }
+    this.#things.push(['points', batch]);
+    this.#points += batch.n;
+    this.#transfer.push(batch.x.buffer);
+  }
+
+  // ---- handing on
+
+  #later() {
+    if (this.#timer === 0) this.#timer = setTimeout(() => this.#send(), MESSAGE_MS);
+  }
+
+  #send() {
+    clearTimeout(this.#timer);
+    this.#timer = 0;
+    if (this.#untaken >= MAX_UNTAKEN) return; // #taken sends
+    const from_ms = performance.now();
+    this.decoder.flush();
+    this.busy_ms += performance.now() - from_ms;
+    const message = {connection: this.#number, things: this.#things, figures: this.figures()};
+    const transfer = this.#transfer;
+    this.#things = [];
+    this.#transfer = [];
+    this.#points = 0;
+    this.#untaken++;
+    this.#post(message, transfer);
+  }
+
+  #taken() {
+    this.#untaken--;
+    if (this.#things.length > 0 || this.decoder.columns.n > 0) this.#send();
+    if (this.#untaken < MAX_UNTAKEN && this.#room !== null) {
+      this.#room();
+      this.#room = null;
+    }
+  }
+
+  // Resolves at once unless the owner is behind.
+  #hasRoom() {
+    if (this.#untaken < MAX_UNTAKEN) return null;
+    return new Promise((resolve) => {
+      this.#room = resolve;
+    });
+  }
+
+  figures() {
+    const {stats: p} = this.parser, {stats: d} = this.decoder;
+    return {...p, ...d, ...this.dropped, point_hash: this.decoder.pointHash, waiting_points: this.#points,
+      decode_ms: this.busy_ms, decode_ns_per_point: d.points > 0 ? (1e6 * this.busy_ms) / d.points : 0};
+  }
+}
+
+// ---- the two ways to read; on: {open(), bytes(Uint8Array), text(string), close(code, reason), room()}
+
+function readStream(url, on) {
+  let writer = null, done = false;
+  const stream = new WebSocketStream(url, {protocols: [SUBPROTOCOL]});
+  const finish = (code, reason) => {
+    if (!done) on.close(code, reason);
+    done = true;
+  };
+  const read = async () => {
+    const {readable, writable} = await stream.opened;
+    writer = writable.getWriter();
+    on.open();
+    const reader = readable.getReader();
+    for (;;) {
+      const wait = on.room();
+      if (wait !== null) await wait;
+      const {value, done: isOver} = await reader.read();
+      if (isOver) return;
+      if (typeof value === 'string') on.text(value);
+      else on.bytes(value instanceof ArrayBuffer ? new Uint8Array(value) : value);
+    }
+  };
+  const failed = (error) => finish(error?.closeCode ?? 1006, error?.reason ?? '');
+  const ended = () => stream.closed.then((info) => finish(info.closeCode ?? 1005, info.reason ?? ''), failed);
+  read().catch(() => {}).finally(ended);
+  return {
+    send: (line) => writer?.write(line).catch(() => {}),
+    close() {
+      done = true;
+      stream.close?.({closeCode: 1000});
+    },
+  };
+}
+
+function readSocket(url, on) {
+  const socket = new WebSocket(url, [SUBPROTOCOL]);
+  let done = false;
+  const finish = (code, reason) => {
+    if (!done) on.close(code, reason);
+    done = true;
+  };
+  socket.binaryType = 'arraybuffer';
+  socket.onopen = () => on.open();
+  socket.onmessage = ({data}) => (typeof data === 'string' ? on.text(data) : on.bytes(new Uint8Array(data)));
+  socket.onclose = ({code, reason}) => finish(code, reason);
+  socket.onerror = () => setTimeout(() => finish(1006, ''), 100); // node 20 has no close event where nobody listens
+  return {
+    send: (line) => socket.readyState === 1 && socket.send(line),
+    close() {
+      done = true;
+      socket.onopen = socket.onmessage = null;
+      socket.close(1000);
+    },
+  };
+}

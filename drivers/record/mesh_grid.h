@@ -1,0 +1,42 @@
+/* The grid of a scan (of one sweep of the pan, of all rings of a sphere) that is being recorded: which point lies in
+ * which line and row, and where the head was. In: points, as the track gives them. Out: a struct scan_grid. */
+#ifndef DRIVERS_RECORD_MESH_GRID_H
+#define DRIVERS_RECORD_MESH_GRID_H
+
+#include "core/scan_mesh.h"
+#include "drivers/record/track.h"
+
+struct mesh_grid {
+    uint32_t first;        /* of its points among all of the recording */
+    uint32_t n;            /* points */
+    uint32_t *row, *line;  /* [n] */
+    float (*to_head_m)[3]; /* [n] of a moving head */
+    struct scan_column *column;
+    uint32_t n_columns;
+    uint32_t line_min, line_max, row_min, row_max; /* of all points; only with points */
+    uint32_t sweep, station, scan;
+    int kind; /* enum scanhead_emitter_kind */
+    uint32_t rings, rows_per_turn;
+    double first_ring_deg, ring_step_deg;
+    double lines_per_turn; /* 0: lines of a pan that does not turn */
+    double head_m[3];
+    int moving;
+    size_t room_row, room_line, room_head, room_column; /* inner state */
+};
+
+/* SH_EFORMAT where a scan of this track has no grid, or the place of its head in the recording's frame is not known. */
+int mesh_grid_check(const struct track *track, struct sh_err *err);
+
+/* Empties it, for the scan and the sweep of the track's present batch; `first` is the number of points so far. */
+void mesh_grid_begin(struct mesh_grid *grid, const struct track *track, uint32_t first);
+/* Whether point i of the batch has a place: 0 where its line or row went back, or another sweep began. */
+int mesh_grid_takes(const struct mesh_grid *grid, const struct track *track, int i);
+/* 1: taken, at xyz_m in the recording's frame. 0: the head's pose there is not known. SH_ENOMEM. */
+int mesh_grid_add(struct mesh_grid *grid, struct track *track, int i, const double xyz_m[3], struct sh_err *err);
+/* xyz_m: of all points of the recording. */
+struct scan_grid mesh_grid_of(const struct mesh_grid *grid, const double (*xyz_m)[3], double long_edge);
+/* 1: all shots of this line go one way. */
+int mesh_grid_is_pole(const struct mesh_grid *grid, uint32_t line);
+void mesh_grid_free(struct mesh_grid *grid);
+
+#endif

@@ -1,0 +1,157 @@
+#include "firmware_sim/app/batch/beside.h"
+
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "core/infile.h"
+#include "firmware_sim/app/app.h"
+
+enum { NAME_MAX_LEN = 255, DEEPEST = 1 }; /* a mesh names a .mtl, which names images */
+
+struct search {
+    int (*take)(void *ctx, const char *name, const char *path);
+    void *ctx;
+    char folder[PATH_MAX];
+    char **seen;
+    size_t n_seen;
+    struct sh_err *err;
+};
+
+/* The ending at a dot; 0: none of those. */
+static size_t ending_at(const char *p, const char *end)
+{
+    static const char *const endings[] = {".mtl", ".bin", ".png", ".jpg", ".jpeg", ".tga", ".bmp"};
+    for (size_t i = 0; i < sizeof endings / sizeof endings[0]; i++) {
+        const size_t n = strlen(endings[i]);
+        if ((size_t)(end - p) >= n && strncasecmp(p, endings[i], n) == 0) return n;
+    }
+    return 0;
+}
+
+static int hex_value(char c)
+{
+    const char *digits = "0123456789abcdef", *at = c != '\0' ? strchr(digits, c | 0x20) : NULL;
+    return at != NULL ? (int)(at - digits) : -1;
+}
+
+/* Backslashes become slashes, %20 a blank. */
+static void decode(const char *name, char *out)
+{
+    for (; *name != '\0'; name++, out++) {
+        *out = *name == '\\' ? '/' : *name;
+        if (*name != '%' || hex_value(name[1]) < 0 || hex_value(name[2]) < 0) continue;
+        *out = (char)(16 * hex_value(name[1]) + hex_value(name[2]));
+        name += 2;
+    }
+    *out = '\0';
+}
+
+static int is_file(const struct search *s, const char *name, char path[PATH_MAX])
+{
+    struct stat st;
+    const int n =
+        name[0] == '/' ? snprintf(path, PATH_MAX, "%s", name) : snprintf(path, PATH_MAX, "%s%s", s->folder, name);
+    return n < PATH_MAX && stat(path, &st) == 0 && S_ISREG(st.st_mode);
+}
+
+/* As it stands; then by its last part, which is how files of other machines are found. */
+static int find(const struct search *s, const char *name, char path[PATH_MAX])
+{
+    char decoded[NAME_MAX_LEN + 1];
+    decode(name, decoded);
+    const char *slash = strrchr(decoded, '/');
+    return is_file(s, name, path) || is_file(s, decoded, path) || (slash != NULL && is_file(s, slash + 1, path));
+}
+
+static int is_seen(struct search *s, const char *path)
+{
+    for (size_t i = 0; i < s->n_seen; i++)
+        if (strcmp(s->seen[i], path) == 0) return 1;
+    return 0;
+}
+
+static int search(struct search *s, const char *file, int depth);
+
+static int found(struct search *s, const char *name, const char *path, int depth)
+{
+    char **more = realloc(s->seen, (s->n_seen + 1) * sizeof *more);
+    if (more != NULL) s->seen = more;
+    if (more == NULL || (s->seen[s->n_seen] = strdup(path)) == NULL) return sh_fail(s->err, SH_ENOMEM, "no memory");
+    s->n_seen++;
+    int rc = s->take(s->ctx, name, path);
+    return rc == SH_OK && depth < DEEPEST && app_ends_in(path, ".mtl") ? search(s, path, depth + 1) : rc;
+}
+
+/* The text up to `end` that began at or after `first`: all of it may be the name, or what follows a blank. */
+static int try_names(struct search *s, const char *first, const char *end, int depth)
+{
+    char name[NAME_MAX_LEN + 1], path[PATH_MAX];
+    snprintf(name, sizeof name, "%.*s", (int)(end - first), first);
+    for (const char *p = name; p != NULL; p = strchr(p, ' ')) {
+        while (*p == ' ')
+            p++;
+        if (!find(s, p, path)) continue;
+        return is_seen(s, path) ? SH_OK : found(s, p, path, depth);
+    }
+    return SH_OK;
+}
+
+/* Names end at quotes, angles, tabs and control characters. */
+static int is_inside(char c)
+{
+    return (unsigned char)c >= 0x20 && c != 0x7f && strchr("\"'<>|*?", c) == NULL;
+}
+
+static int search_bytes(struct search *s, const char *bytes, size_t len, int depth)
+{
+    const char *end = bytes + len;
+    int rc = SH_OK;
+    for (const char *p = bytes; rc == SH_OK && (p = memchr(p, '.', (size_t)(end - p))) != NULL; p++) {
+        const size_t n = ending_at(p, end);
+        const char *first = p;
+        if (n == 0) continue;
+        while (first > bytes && (size_t)(p + n - first) < NAME_MAX_LEN && is_inside(first[-1]))
+            first--;
+        rc = try_names(s, first, p + n, depth);
+    }
+    return rc;
+}
+
+static int search(struct search *s, const char *file, int depth)
+{
+    const char *why;
+    struct stat st;
+    FILE *in = infile_open(file, &why);
+    if (in == NULL) return sh_fail(s->err, SH_EINPUT, "%s: cannot be read: %s", file, why);
+    int rc = SH_OK;
+    if (fstat(fileno(in), &st) == 0 && st.st_size > 0) {
+        void *bytes = mmap(NULL, (size_t)st.st_size, PROT_READ, MAP_PRIVATE, fileno(in), 0);
+        if (bytes == MAP_FAILED) rc = sh_fail(s->err, SH_EIO, "%s: cannot be read", file);
+        if (rc == SH_OK) {
+            rc = search_bytes(s, bytes, (size_t)st.st_size, depth);
+            munmap(bytes, (size_t)st.st_size);
+        }
+    }
+    fclose(in);
+    return rc;
+}
+
+int batch_beside(const char *mesh, int (*take)(void *ctx, const char *name, const char *path), void *ctx,
+                 struct sh_err *err)
+{
+    struct search s = {.take = take, .ctx = ctx, .err = err};
+    const char *slash = strrchr(mesh, '/');
+    if (app_ends_in(mesh, ".ply") || app_ends_in(mesh, ".stl")) return SH_OK;
+    snprintf(s.folder, sizeof s.folder, "%.*s", slash != NULL ? (int)(slash + 1 - mesh) : 0, mesh);
+    int rc = search(&s, mesh, 0);
+    for (size_t i = 0; i < s.n_seen; i++)
+        free(s.seen[i]);
+    free(s.seen);
+    return rc;
+}

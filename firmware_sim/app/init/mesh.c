@@ -1,0 +1,114 @@
+#include "firmware_sim/app/init/mesh.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <unistd.h>
+
+#include "firmware_sim/app/app.h"
+
+/* Larger than this in metres, a mesh without a unit is taken to be in millimetres. */
+static const double LARGEST_M = 2000.0;
+
+double init_largest_m(const struct scene *scene)
+{
+    double size = 0.0;
+    for (int i = 0; i < 3; i++)
+        size = fmax(size, scene->max_m[i] - scene->min_m[i]);
+    return size;
+}
+
+static const char *said_by(const char *file)
+{
+    const char *dot = strrchr(file, '.');
+    return dot != NULL && strcasecmp(dot, ".fbx") == 0 ? "as the file says" : "as the format defines it";
+}
+
+static void choose_up(const struct init_wish *wish, const char *name, const struct scene *scene, struct init_mesh *as)
+{
+    const int says = scene->says.up;
+    const char *from = "given by --up";
+    int y_up = says == 2 || says == -2;
+    if (wish->up != NULL)
+        y_up = strcmp(wish->up, "y") == 0;
+    else if (says == 2 || says == 3)
+        from = said_by(wish->file);
+    else
+        from = says == 0 ? "assumed: the file doesn't say; y is up in many a file" : "assumed";
+    as->up = y_up ? SCENE_UP_Y : SCENE_UP_Z;
+    snprintf(as->up_from, sizeof as->up_from, "%s", from);
+    if (wish->up != NULL || says == 2 || says == 3) return;
+    if (says == 0)
+        sh_warn(&app_report_stderr,
+                "%s: which axis points up is not in the file: z is assumed; if the mesh lies on "
+                "its side, --up y",
+                name);
+    else
+        sh_warn(&app_report_stderr, "%s: its %s%c axis points up, which no key can say: %c is assumed (--up y, --up z)",
+                name, says < 0 ? "-" : "", "xyz"[abs(says) - 1], y_up ? 'y' : 'z');
+}
+
+static void choose_scale(const struct init_wish *wish, const char *name, const struct scene *scene,
+                         struct init_mesh *as)
+{
+    const double size = init_largest_m(scene);
+    as->scale = wish->scale;
+    snprintf(as->scale_from, sizeof as->scale_from, "given by --scale");
+    if (wish->scale > 0.0) return;
+    if (scene->says.unit_m > 0.0) {
+        as->scale = scene->says.unit_m;
+        snprintf(as->scale_from, sizeof as->scale_from, "%s", said_by(wish->file));
+        return;
+    }
+    as->scale = size > LARGEST_M ? 0.001 : 1.0;
+    snprintf(as->scale_from, sizeof as->scale_from, "assumed: the file doesn't say");
+    sh_warn(&app_report_stderr,
+            "%s: its unit is not in the file: %s is assumed, which makes the mesh %.4g m large; "
+            "--scale sets another one",
+            name, as->scale == 1.0 ? "a metre" : "a millimetre", as->scale * size);
+}
+
+/* To metres, z up: what the configuration will do. */
+static void turn(struct scene *scene, const struct init_mesh *as, double scale)
+{
+    const int y_up = as->up == SCENE_UP_Y;
+    const double low[3] = {scene->min_m[0], scene->min_m[1], scene->min_m[2]}, *high = scene->max_m;
+    const double min[3] = {low[0], y_up ? -high[2] : low[1], y_up ? low[1] : low[2]};
+    const double max[3] = {high[0], y_up ? -low[2] : high[1], y_up ? high[1] : high[2]};
+    for (uint32_t i = 0; i < scene->n_vertices; i++) {
+        double *v = scene->vertex_m[i], turned[3] = {v[0], y_up ? -v[2] : v[1], y_up ? v[1] : v[2]};
+        for (int k = 0; k < 3; k++)
+            v[k] = turned[k] * scale;
+    }
+    for (int k = 0; k < 3; k++) {
+        scene->min_m[k] = min[k] * scale;
+        scene->max_m[k] = max[k] * scale;
+    }
+}
+
+static int fail(const struct sh_err *why, int code, struct sh_err *err)
+{
+    if (code != SH_EINPUT) return sh_fail(err, code, "%s", why->text);
+    return sh_fail(err, code, "%.380s; a mesh of triangles is needed: export it again, for instance as .obj or .ply",
+                   why->text);
+}
+
+/* Without tolerance and warnings: both come when the configuration is checked. */
+int init_load_mesh(const struct init_wish *wish, const char *name, struct scene **scene, struct init_mesh *mesh,
+                   struct sh_err *err)
+{
+    const struct sh_report *all = &app_report_stderr;
+    const struct sh_report quiet = {.ctx = all->ctx, .progress = all->progress, .stop = all->stop};
+    const struct scene_mesh_spec spec = {
+        .file = wish->file, .up = SCENE_UP_Z, .scale = wish->scale > 0.0 ? wish->scale : 1.0};
+    struct sh_err why = {0};
+    if (access(wish->file, R_OK) != 0) return sh_fail(err, SH_EINPUT, "%s: %s", wish->file, strerror(errno));
+    int rc = scene_load(&spec, 1, INFINITY, &quiet, scene, &why);
+    if (rc != SH_OK) return fail(&why, rc, err);
+    choose_up(wish, name, *scene, mesh);
+    choose_scale(wish, name, *scene, mesh);
+    turn(*scene, mesh, mesh->scale / spec.scale);
+    return SH_OK;
+}

@@ -1,0 +1,22 @@
+/* The command line of `record`, read. `batch` makes such a line for each of its jobs, so that it has the options of
+ * `record` as they are. In: argv. Out: one recording (job.h), with the settings of keys. */
+#ifndef FIRMWARE_SIM_APP_RECORD_LINE_H
+#define FIRMWARE_SIM_APP_RECORD_LINE_H
+
+#include "firmware_sim/app/app.h"
+#include "firmware_sim/app/record/job.h"
+
+struct record_line {
+    struct app_input in;
+    struct record_job job;
+    int quiet;
+    double long_edge; /* negative: not given */
+    long sparse_seed; /* likewise */
+    int has_rgb, limited; /* --colour-rgb, --colour-limits */
+};
+
+/* APP_GO_ON, or the exit status with the reason printed. The strings are argv's own, or lie in `line`, which must
+ * stay where it is. */
+int record_line_read(struct record_line *line, int argc, char **argv);
+
+#endif

@@ -1,0 +1,72 @@
+#include "firmware_sim/app/sites.h"
+
+#include <stdlib.h>
+
+#include "firmware_sim/base/clock.h"
+
+static void warn(void *ctx, const char *text)
+{
+    const struct scanner_report *r = ctx;
+    sh_warn(r->to, "scanner of station %u: %s", r->station, text);
+}
+
+static void progress(void *ctx, const char *what, double fraction)
+{
+    const struct scanner_report *r = ctx;
+    sh_progress(r->to, what, fraction);
+}
+
+static int stop(void *ctx)
+{
+    const struct scanner_report *r = ctx;
+    return sh_stopped(r->to);
+}
+
+void scanner_report_set_up(struct scanner_report *report, const struct sh_report *to, uint32_t station)
+{
+    *report = (struct scanner_report){{report, warn, progress, stop}, to, station};
+}
+
+static int add(const struct config *cfg, uint32_t station, const struct sh_report *report, struct sites *sites,
+               struct sh_err *err)
+{
+    struct sites_one *one = &sites->other[sites->n++];
+    one->scanner = cfg->station[station].scanner;
+    one->cfg = calloc(1, sizeof *one->cfg);
+    if (one->cfg == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the scanner of station %u", station + 1);
+    int rc = config_load_scanner(cfg, station + 1, one->cfg, err);
+    scanner_report_set_up(&one->report, report, station + 1);
+    return rc == SH_OK ? site_load_beside(one->cfg, sites->first, &one->report.report, &one->site, err) : rc;
+}
+
+int sites_load(const struct config *cfg, const struct sh_report *report, struct sites *sites, struct sh_err *err)
+{
+    int rc = site_load(cfg, report, &sites->first, err);
+    int64_t said_ns = clock_now_ns();
+    for (uint32_t i = 0; i < cfg->n_stations && rc == SH_OK; i++) {
+        if (config_serves(cfg, i) || cfg->station[i].scanner != i + 1) continue;
+        rc = add(cfg, i, report, sites, err);
+        if (clock_now_ns() - said_ns < 1000000000) continue;
+        said_ns = clock_now_ns();
+        sh_progress(report, "setting up scanners", (1.0 + i) / cfg->n_stations);
+    }
+    return rc;
+}
+
+struct site *sites_of(const struct sites *sites, uint32_t station)
+{
+    const struct config *cfg = sites->first->cfg;
+    if (sites->n == 0 || config_serves(cfg, station)) return sites->first; /* stops have one scanner, and may be many */
+    for (uint32_t k = 0; k < sites->n; k++)
+        if (sites->other[k].scanner == cfg->station[station % cfg->n_stations].scanner) return sites->other[k].site;
+    return sites->first;
+}
+
+void sites_free(struct sites *sites)
+{
+    for (uint32_t k = 0; k < sites->n; k++) {
+        site_free(sites->other[k].site);
+        free(sites->other[k].cfg);
+    }
+    site_free(sites->first);
+}

@@ -1,0 +1,34 @@
+/* The sites of all scanners of a configuration, in one scene (site_load_beside). For commands that ask each station
+ * what its own scanner sees from there. */
+#ifndef FIRMWARE_SIM_APP_SITES_H
+#define FIRMWARE_SIM_APP_SITES_H
+
+#include "firmware_sim/site/site.h"
+
+/* A report that says of warnings which scanner they are of. It must not move. */
+struct scanner_report {
+    struct sh_report report;
+    const struct sh_report *to;
+    uint32_t station; /* from 1: the first that has the scanner */
+};
+void scanner_report_set_up(struct scanner_report *report, const struct sh_report *to, uint32_t station);
+
+struct sites {
+    struct site *first; /* of the configuration itself: the scanner of head.station */
+    /* inner state */
+    struct sites_one {
+        struct config *cfg;
+        struct site *site;
+        uint32_t scanner;
+        struct scanner_report report;
+    } other[CONFIG_MAX_STATIONS];
+    uint32_t n;
+};
+
+/* sites begins as zeros, and is to be freed, also after an error. cfg must live on, with its sets. */
+int sites_load(const struct config *cfg, const struct sh_report *report, struct sites *sites, struct sh_err *err);
+/* That of the scanner at a station, from 0. */
+struct site *sites_of(const struct sites *sites, uint32_t station);
+void sites_free(struct sites *sites);
+
+#endif

@@ -1,0 +1,165 @@
+/* SITE:POSE: where a station stands, and that it is to stand elsewhere. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+#include "firmware_sim/command/command_inside.h"
+
+const struct command_unit command_unit_place = {"m, deg", 0, "M, DEG", {{NULL, 0}}};
+
+/* As the keys of a station allow (stations[] in firmware_sim/config/keys.c). */
+static const struct {
+    const char *name, *unit;
+    double most; /* of its absolute value */
+} parts[6] = {{"x", "M", 1e9},           {"y", "M", 1e9},      {"z", "M", 1e9},
+              {"heading", "DEG", 360.0}, {"pitch", "DEG", 90}, {"roll", "DEG", 180.0}};
+
+enum { PARTS = 6, MAX_FIELDS = 1 + PARTS, FIELD_LEN = 64 };
+
+/* The next field of a list, without blanks around it. Returns what follows its comma, or NULL at the end. */
+static const char *take_field(const char *text, char field[FIELD_LEN], size_t *len)
+{
+    const char *begin = text + strspn(text, " \t");
+    const size_t all = strcspn(begin, ",");
+    *len = all;
+    while (*len > 0 && (begin[*len - 1] == ' ' || begin[*len - 1] == '\t'))
+        --*len;
+    snprintf(field, FIELD_LEN, "%.*s", (int)(*len < FIELD_LEN ? *len : FIELD_LEN - 1), begin);
+    return begin[all] == ',' ? begin + all + 1 : NULL;
+}
+
+static int fail_number(struct command_call *call, const char *name, const char *field)
+{
+    char clip[COMMAND_CLIP_LEN];
+    command_clip(clip, field, strlen(field));
+    return command_fail(call, CMD_E_DATA_TYPE, "%s: %s is not a number: '%s'", call->row->header, name, clip);
+}
+
+/* 63 characters have room for 17 digits, a sign, a point, an exponent and a unit. */
+static int take_number(struct command_call *call, int i, const char *field, size_t len, double *value)
+{
+    struct command_decimal decimal;
+    if (len >= FIELD_LEN)
+        return command_fail(call, CMD_E_RANGE, "%s: %s has %zu characters, allowed up to %d", call->row->header,
+                            parts[i].name, len, FIELD_LEN - 1);
+    const char *unit = command_parse_decimal(field, &decimal);
+    if (unit == NULL) return fail_number(call, parts[i].name, field);
+    if (*unit != '\0' && strcasecmp(unit, parts[i].unit) != 0) {
+        char clip[COMMAND_CLIP_LEN];
+        if (strchr("+-.0123456789", *unit) != NULL) return fail_number(call, parts[i].name, field);
+        command_clip(clip, unit, strlen(unit));
+        return command_fail(call, CMD_E_SUFFIX, "'%s'; %s of %s takes %s", clip, parts[i].name, call->row->header,
+                            parts[i].unit);
+    }
+    *value = strtod(field, NULL) + 0.0; /* without -0 */
+    if (fabs(*value) <= parts[i].most) return 0;
+    return command_fail(call, CMD_E_RANGE, "%s: %s %.9g, allowed %.10g to %.10g %s", call->row->header, parts[i].name,
+                        *value, -parts[i].most, parts[i].most, parts[i].unit[0] == 'M' ? "m" : "deg");
+}
+
+static int take_station(struct command_call *call, const char *field, size_t len, uint32_t *station)
+{
+    struct command_decimal decimal;
+    int64_t value;
+    const uint32_t n = call->dev->limits.n_stations;
+    const char *end = len < FIELD_LEN ? command_parse_decimal(field, &decimal) : NULL;
+    if (end == NULL || *end != '\0') return fail_number(call, "station", field);
+    const int whole = command_decimal_to_int(&decimal, 0, &value) == COMMAND_FIT_EXACT;
+    *station = (uint32_t)value;
+    if (whole && value >= 1 && value <= n) return 0;
+    return command_fail(call, CMD_E_RANGE, "%s: station %.20s, allowed %s1 to %u", call->row->header, field,
+                        whole ? "" : "whole numbers ", n);
+}
+
+/* So few digits as say a number exactly. */
+static size_t print_number(char *text, size_t room, double value)
+{
+    int digits = 15;
+    do
+        snprintf(text, room, "%.*g", digits, value);
+    while (strtod(text, NULL) != value && digits++ < 17);
+    return strlen(text);
+}
+
+static int reply_place(struct command_call *call, const double v[PARTS])
+{
+    char text[PARTS * 32];
+    size_t len = 0;
+    for (int i = 0; i < PARTS; i++) {
+        if (i > 0) text[len++] = ',';
+        len += print_number(text + len, sizeof text - len, v[i]);
+    }
+    return command_reply(call, "%s", text);
+}
+
+int command_place_query(struct command_call *call)
+{
+    char field[FIELD_LEN], which[FIELD_LEN];
+    double limit[PARTS];
+    size_t len, n;
+    uint32_t station;
+    enum command_value_kind kind = COMMAND_VALUE_NUMBER;
+    const char *rest = take_field(call->param, field, &len);
+    if (len == 0) return command_fail(call, CMD_E_MISSING, "%s? takes a station", call->row->header);
+    int fits = 1;
+    if (rest != NULL) {
+        rest = take_field(rest, which, &n);
+        fits = rest == NULL && command_parse_special(which, &kind);
+    }
+    if (!fits)
+        return command_fail(call, CMD_E_NOT_ALLOWED, "%s? takes a station, and MIN, MAX or DEF", call->row->header);
+    if (take_station(call, field, len, &station) != 0) return -1;
+    if (kind == COMMAND_VALUE_NUMBER) return reply_place(call, call->dev->place[station - 1].v);
+    if (kind == COMMAND_VALUE_DEF) return reply_place(call, call->dev->first_place[station - 1].v);
+    for (int i = 0; i < PARTS; i++)
+        limit[i] = kind == COMMAND_VALUE_MIN ? -parts[i].most : parts[i].most;
+    return reply_place(call, limit);
+}
+
+/* Station and place into call->out; -1 when it failed. */
+static int take_parameters(struct command_call *call)
+{
+    struct command_result *out = call->out;
+    enum command_value_kind kind;
+    char field[FIELD_LEN];
+    size_t len;
+    const char *rest = take_field(call->param, field, &len);
+    if (take_station(call, field, len, &out->station) != 0) return -1;
+    for (int i = 0; i < PARTS; i++) {
+        if (rest == NULL)
+            return command_fail(call, CMD_E_MISSING, "%s takes station, x, y, z, heading, pitch, roll; %s is missing",
+                                call->row->header, parts[i].name);
+        rest = take_field(rest, field, &len);
+        if (i == 0 && command_parse_special(field, &kind)) {
+            if (kind != COMMAND_VALUE_DEF)
+                return command_fail(call, CMD_E_DATA_TYPE, "%s: a place is six numbers or DEF, not '%.10s'",
+                                    call->row->header, field);
+            out->to_first = 1;
+            break;
+        }
+        if (take_number(call, i, field, len, &out->place.v[i]) != 0) return -1;
+    }
+    if (rest == NULL) return 0;
+    return command_fail(call, CMD_E_NOT_ALLOWED, "%s takes station, x, y, z, heading, pitch, roll, or station, DEF",
+                        call->row->header);
+}
+
+int command_place_change(struct command_call *call)
+{
+    const struct command_device *dev = call->dev;
+    const char *header = call->row->header;
+    if (take_parameters(call) != 0) return -1;
+    const uint32_t station = call->out->station;
+    if (dev->fixed != NULL) return command_fail(call, CMD_E_SETTINGS, "%s: %.90s", header, dev->fixed);
+    if (head_is_elsewhere(&dev->limits, station))
+        return command_fail(call, CMD_E_SETTINGS, "%s: station %u has another scanner", header, station);
+    if (dev->state != HEAD_IDLE)
+        return command_fail(call, CMD_E_SETTINGS, "%s is not possible in state %s", header,
+                            head_state_name(dev->state));
+    if (dev->moving != 0)
+        return command_fail(call, CMD_E_SETTINGS, "%s: station %u is being moved", header, dev->moving);
+    call->out->effect = COMMAND_MOVE;
+    return command_reply(call, "OK");
+}

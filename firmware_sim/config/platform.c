@@ -1,0 +1,86 @@
+/* Checks across the keys of what the head stands on: which part of a trajectory, and where and when it stops. How long
+ * a trajectory is, its file says (firmware_sim/site/platform.c). */
+#include "firmware_sim/config/table.h"
+
+static int has_trajectory(const struct config_platform *p)
+{
+    return p->file[0] != '\0' || p->waypoints[0] != '\0';
+}
+
+/* Frames become seconds. */
+static void take_frames(struct cfg_reader *rd, struct config_platform *p)
+{
+    static const char *const seconds[] = {"platform.start_s", "platform.end_s", "platform.step_s"};
+    static const char *const frames[] = {"platform.first_frame", "platform.last_frame", "platform.frame_step"};
+    if (!cfg_is_given(rd, "platform.frames_per_s", 0) || !(p->frames_per_s > 0.0)) {
+        for (int i = 0; i < 3; i++)
+            if (cfg_is_given(rd, frames[i], 0))
+                cfg_fail_key(rd, frames[i], 0, "frames need platform.frames_per_s; allowed above 0, up to 1e6");
+        return;
+    }
+    for (int i = 0; i < 3; i++)
+        if (cfg_is_given(rd, seconds[i], 0))
+            cfg_fail_key(rd, seconds[i], 0, "with platform.frames_per_s the stops are given in frames; allowed is %s",
+                         frames[i]);
+    p->has_end = cfg_is_given(rd, "platform.last_frame", 0);
+    if (p->has_end && p->last_frame < p->first_frame)
+        cfg_fail_key(rd, "platform.last_frame", 0, "%.9g, and platform.first_frame is %.9g; allowed at least %.9g",
+                     p->last_frame, p->first_frame, p->first_frame);
+    p->start_s = p->first_frame / p->frames_per_s;
+    p->end_s = p->last_frame / p->frames_per_s;
+    p->step_s = p->frame_step / p->frames_per_s;
+}
+
+static void check_stops(struct cfg_reader *rd, const struct config *cfg)
+{
+    static const char *const mount[] = {"platform.mount_m", "platform.mount_heading_deg", "platform.mount_pitch_deg",
+                                        "platform.mount_roll_deg"};
+    const struct config_platform *p = &cfg->platform;
+    if (!(p->step_s > 0.0) && CFG_SOUND(rd, 0, "platform.step_s"))
+        cfg_fail_key(rd, cfg_is_given(rd, "platform.step_s", 0) ? "platform.step_s" : "platform.kind", 0,
+                     "stops need the time from each to the next, platform.step_s; allowed above 0, up to 1e9 s");
+    if (has_trajectory(p)) {
+        if (cfg->n_stations > 1)
+            cfg_fail_key(
+                rd, "stations", 0,
+                "%u of them, but platform.kind is stops, which are the stations; allowed one, which says where "
+                "on the Earth the scene lies",
+                cfg->n_stations);
+        return;
+    }
+    if (!p->has_end && CFG_SOUND(rd, 0, "platform.end_s", "platform.last_frame"))
+        cfg_fail_key(
+            rd, "platform.kind", 0,
+            "stops without a trajectory, at the stations, need an end; allowed is platform.end_s (or last_frame "
+            "with frames_per_s), or a trajectory: platform.file or platform.waypoints");
+    for (int i = 0; i < 4; i++)
+        if (cfg_is_given(rd, mount[i], 0))
+            cfg_fail_key(rd, mount[i], 0, "without a trajectory the head is at its station; allowed is stations[]");
+}
+
+static void check_part(struct cfg_reader *rd, struct config *cfg)
+{
+    struct config_platform *p = &cfg->platform;
+    int stops = p->kind == PLATFORM_STOPS;
+    p->has_end = cfg_is_given(rd, "platform.end_s", 0);
+    if (p->has_end && (stops ? p->end_s < p->start_s : p->end_s <= p->start_s) && CFG_SOUND(rd, 0, "platform.start_s"))
+        cfg_fail_key(rd, "platform.end_s", 0, "%.9g s, and platform.start_s is %.9g; allowed %s %.9g s", p->end_s,
+                     p->start_s, stops ? "at least" : "more than", p->start_s);
+    if (!stops) return;
+    take_frames(rd, p);
+    check_stops(rd, cfg);
+}
+
+void cfg_check_platform(struct cfg_reader *rd, struct config *cfg)
+{
+    const struct config_platform *p = &cfg->platform;
+    if (!CFG_SOUND(rd, 0, "platform.kind") || !cfg_check_platform_keys(rd, p)) return;
+    if (p->kind == PLATFORM_LIVE && cfg->loop.pace == PACE_FAST)
+        cfg_fail_key(rd, "loop.pace", 0, "the poses of a live platform come in real time; allowed realtime, step");
+    if (p->kind != PLATFORM_TRAJECTORY && p->kind != PLATFORM_STOPS) return;
+    const int both = p->file[0] != '\0' && p->waypoints[0] != '\0', none = !has_trajectory(p);
+    if ((both || (none && p->kind == PLATFORM_TRAJECTORY)) && CFG_SOUND(rd, 0, "platform.file", "platform.waypoints"))
+        cfg_fail_key(rd, both ? "platform.waypoints" : "platform.kind", 0,
+                     "a trajectory comes from one file; allowed either platform.file or platform.waypoints");
+    check_part(rd, cfg);
+}

@@ -1,0 +1,223 @@
+/* Several scanners in one file: stations with a section `scanner`, whose keys stand in for the file's own. In: the
+ * file, once for each scanner. Out: which stations have which, and faults of any of them. */
+#include "firmware_sim/config/table.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+const char cfg_sections_of_scanner[] =
+    "sections head (without station, start), beam, cast, plan, noise, signal, surfaces, optics, instrument";
+
+static int is_in(const char *path, const char *section)
+{
+    const size_t len = strlen(section);
+    return strncmp(path, section, len) == 0 && (path[len] == '\0' || path[len] == '.' || path[len] == '[');
+}
+
+int cfg_is_of_scanner(const char *path)
+{
+    static const char *const sections[] = {"head",   "beam",     "cast",   "plan",      "noise",
+                                           "signal", "surfaces", "optics", "instrument"};
+    static const char *const not_these[] = {"head.station", "head.start", "cast.sight_mib"};
+    for (size_t i = 0; i < CFG_LEN(not_these); i++)
+        if (strcmp(path, not_these[i]) == 0) return 0;
+    for (size_t i = 0; i < CFG_LEN(sections); i++)
+        if (is_in(path, sections[i])) return 1;
+    return 0;
+}
+
+static void forget_row(struct cfg_reader *rd, const struct cfg_key *key)
+{
+    const size_t row = cfg_row(rd, key);
+    memset(rd->line[row], 0, sizeof rd->line[row]);
+    memset(rd->bad[row], 0, sizeof rd->bad[row]);
+}
+
+void cfg_forget_list(struct cfg_reader *rd, const char *path)
+{
+    const struct cfg_key *list = cfg_find(&rd->table, path);
+    for (size_t i = 0; i < rd->table.n; i++)
+        if (is_in(rd->table.keys[i].path, path)) forget_row(rd, &rd->table.keys[i]);
+    memset(cfg_address(rd, list, 0), 0, list->size * (size_t)list->max);
+    *cfg_list_count(rd, list) = 0;
+}
+
+void cfg_take_over(struct cfg_reader *rd, const struct cfg_key *key)
+{
+    const size_t row = cfg_row(rd, key);
+    if (rd->own[row]) return; /* given twice there, or a further element of a list */
+    if (key->type == CFG_LIST) {
+        cfg_forget_list(rd, key->path);
+        for (size_t i = 0; i < rd->table.n; i++)
+            if (is_in(rd->table.keys[i].path, key->path)) rd->own[i] = 1;
+    }
+    rd->own[row] = 1;
+    forget_row(rd, key);
+}
+
+/* The file's settings are those of another head, and so are the errors of its instrument. */
+void cfg_end_scanner(struct cfg_reader *rd)
+{
+    if (!rd->own[cfg_row(rd, cfg_find(&rd->table, "head.profile"))]) return;
+    for (size_t i = 0; i < rd->table.n; i++) {
+        const struct cfg_key *key = &rd->table.keys[i];
+        if (rd->own[i] || key->type == CFG_MAP || !cfg_is_of_scanner(key->path)) continue;
+        if (!is_in(key->path, "head") && !is_in(key->path, "instrument")) continue;
+        forget_row(rd, key);
+        memset(cfg_address(rd, key, 0), 0, key->size);
+    }
+}
+
+/* ---- who has which */
+
+int config_serves(const struct config *cfg, uint32_t i)
+{
+    const uint32_t n = cfg->n_stations;
+    uint32_t here = cfg->head.settings.station;
+    if (n < 2 || here == 0) return 1;
+    if (cfg->platform.kind == PLATFORM_STOPS) here = (here - 1) % n + 1; /* all stations, stop after stop */
+    if (here > n) return 1;
+    return cfg->station[i % n].scanner == cfg->station[here - 1].scanner;
+}
+
+int config_is_alone(const struct config *cfg)
+{
+    for (uint32_t i = 0; i < cfg->n_stations; i++)
+        if (!config_serves(cfg, i)) return 0;
+    return 1;
+}
+
+#define IS_SAME(a, b, member) (memcmp(&(a)->member, &(b)->member, sizeof(a)->member) == 0)
+
+/* All that a section `scanner` may change. */
+static int is_same_scanner(const struct config *a, const struct config *b)
+{
+    struct config_head head[2] = {a->head, b->head};
+    head[0].settings.station = head[1].settings.station = 0;
+    return memcmp(&head[0], &head[1], sizeof head[0]) == 0 && IS_SAME(a, b, profile_file) && IS_SAME(a, b, profile) &&
+           IS_SAME(a, b, beam) && IS_SAME(a, b, cast) && IS_SAME(a, b, plan) && IS_SAME(a, b, noise) &&
+           IS_SAME(a, b, signal) && IS_SAME(a, b, surface) && a->n_surfaces == b->n_surfaces && IS_SAME(a, b, optics) &&
+           IS_SAME(a, b, instrument);
+}
+
+static int passes_glass(const struct config *cfg)
+{
+    int passes = 0;
+    for (uint32_t i = 0; i < cfg->n_surfaces; i++)
+        passes |= cfg->surface[i].surface.glass > 0.0 || cfg->surface[i].surface.mirror > 0.0;
+    return passes && cfg->optics.depth > 0;
+}
+
+static void add_need(struct config_shared *all, const struct config *cfg)
+{
+    const struct config_instrument *k = &cfg->instrument;
+    all->textures |= cfg->signal.on;
+    all->passes_glass |= passes_glass(cfg);
+    all->range_max_m = fmax(all->range_max_m, config_range_most_m(cfg));
+    all->beside_m =
+        fmax(all->beside_m, hypot(k->transit_offset_m, k->mirror_offset_m) + 0.5 * cfg->profile.beam_exit_m);
+}
+
+static int copy_text_of(char *text, size_t len, const char *fault)
+{
+    static const char mark[] = ", for stations[";
+    const char *at = strstr(fault, mark), *end = at != NULL ? strchr(at + 1, ':') : NULL;
+    if (end == NULL)
+        snprintf(text, len, "%s", fault);
+    else
+        snprintf(text, len, "%.*s%s", (int)(at - fault), fault, end);
+    return end != NULL;
+}
+
+/* What was wrong in the file's own sections was told before. */
+static int is_told(const struct config_faults *faults, const char *fault)
+{
+    char text[sizeof faults->fault[0].text], told[sizeof text];
+    copy_text_of(text, sizeof text, fault);
+    for (uint32_t i = 0; i < faults->n && i < CONFIG_MAX_FAULTS; i++) {
+        copy_text_of(told, sizeof told, faults->fault[i].text);
+        if (strcmp(told, text) == 0) return 1;
+    }
+    return 0;
+}
+
+static void add_faults(struct config_faults *faults, const struct config_faults *more)
+{
+    for (uint32_t i = 0; i < more->n && i < CONFIG_MAX_FAULTS; i++)
+        if (!is_told(faults, more->fault[i].text))
+            cfg_add_fault(faults, more->place[i], more->fault[i].code, more->fault[i].text);
+}
+
+/* Stations without a scanner of their own have the file's: the same as the first of them. */
+static uint32_t loaded_as(const struct config *cfg, uint32_t i)
+{
+    uint32_t k = 0;
+    if (cfg->station[i].has_scanner) return i;
+    while (cfg->station[k].has_scanner)
+        k++;
+    return k;
+}
+
+static void find_same(struct config *cfg, const struct config *const *loaded, uint32_t i)
+{
+    uint32_t k = 0;
+    while (k < i && !is_same_scanner(loaded[k], loaded[i]))
+        k++;
+    cfg->station[i].scanner = k + 1;
+}
+
+static void check_all(struct config *cfg, struct config **own, struct config_faults *faults)
+{
+    const uint32_t here = cfg->head.settings.station - 1;
+    const struct config *loaded[CONFIG_MAX_STATIONS];
+    for (uint32_t i = 0; i < cfg->n_stations; i++) {
+        const uint32_t as = loaded_as(cfg, i);
+        struct config_faults more = {0};
+        loaded[i] = as == loaded_as(cfg, here) ? cfg : as < i ? loaded[as] : own[as];
+        if (as != i || loaded[i] == cfg) continue;
+        own[as] = calloc(1, sizeof *own[as]);
+        if (own[as] == NULL) {
+            cfg_add_fault(faults, 0, SH_ENOMEM, "no memory for the scanners of stations");
+            return;
+        }
+        cfg_load_for(cfg->file, cfg->sets, cfg->n_sets, i + 1, own[as], &more);
+        add_faults(faults, &more);
+        loaded[i] = own[as];
+    }
+    if (faults->n != 0) return;
+    for (uint32_t i = 0; i < cfg->n_stations; i++)
+        find_same(cfg, loaded, i);
+    if (config_is_alone(cfg)) return;
+    for (uint32_t i = 0; i < cfg->n_stations; i++)
+        add_need(&cfg->scene.shared, loaded[i]);
+}
+
+void cfg_check_scanners(struct config *cfg, struct config_faults *faults)
+{
+    struct config *own[CONFIG_MAX_STATIONS] = {NULL};
+    const uint32_t here = cfg->head.settings.station;
+    int any = 0;
+    for (uint32_t i = 0; i < cfg->n_stations; i++)
+        any |= cfg->station[i].has_scanner;
+    if (!any || cfg->n_stations < 2 || here == 0 || here > cfg->n_stations) return;
+    check_all(cfg, own, faults);
+    for (uint32_t i = 0; i < cfg->n_stations; i++)
+        free(own[i]);
+}
+
+int config_load_scanner(const struct config *cfg, uint32_t station, struct config *out, struct sh_err *err)
+{
+    struct config_faults faults = {0};
+    const int rc = cfg_load_for(cfg->file, cfg->sets, cfg->n_sets, station, out, &faults);
+    if (rc != SH_OK) return sh_fail(err, rc, "%s", faults.fault[0].text);
+    for (uint32_t i = 0; i < cfg->n_stations && i < out->n_stations; i++)
+        out->station[i].scanner = cfg->station[i].scanner;
+    out->scene.shared = cfg->scene.shared;
+    const double tolerance_m = out->output.tolerance_m; /* by plan */
+    out->output = cfg->output;
+    out->output.tolerance_m = tolerance_m;
+    out->loop = cfg->loop;
+    return SH_OK;
+}

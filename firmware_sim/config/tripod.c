@@ -1,0 +1,36 @@
+/* Tripods of stations: that a leg is there, and what stands on them. */
+#include "firmware_sim/config/table.h"
+
+static const char *const keys[] = {
+    "stations[].tripod",
+    "stations[].tripod.leg_m",
+    "stations[].tripod.opening_min_deg",
+    "stations[].tripod.head_above_m",
+    "stations[].tripod.cone",
+    "stations[].tripod.legs",
+    "stations[].tripod.leg_diameter_m",
+    "stations[].tripod.legs_heading_deg",
+};
+
+static void check_tripod(struct cfg_reader *rd, const struct config *cfg, struct config_tripod *t, uint32_t i)
+{
+    for (size_t k = 0; k < CFG_LEN(keys); k++)
+        t->given |= cfg_is_given(rd, keys[k], i);
+    if (!t->given || !CFG_SOUND(rd, i, "stations[].tripod")) return;
+    if (!cfg_is_given(rd, "stations[].tripod.leg_m", i))
+        cfg_fail_missing(rd, cfg_find(&rd->table, "stations[].tripod.leg_m"), i);
+    else if (t->legs && t->leg_diameter_m >= 0.5 * t->leg_m)
+        cfg_fail_key(rd, "stations[].tripod.leg_diameter_m", i,
+                     "%.10g m, and a leg is %.10g m long; allowed below half of that, %.10g m", t->leg_diameter_m,
+                     t->leg_m, 0.5 * t->leg_m);
+    if (config_head_moves(&cfg->platform) && CFG_SOUND(rd, 0, "platform.kind"))
+        cfg_fail_key(rd, "stations[].tripod", i,
+                     "a tripod stands, and platform.kind is %s; allowed with static and stops",
+                     cfg_word(rd, "platform.kind", (int)cfg->platform.kind));
+}
+
+void cfg_check_tripods(struct cfg_reader *rd, struct config *cfg)
+{
+    for (uint32_t i = 0; i < cfg->n_stations; i++)
+        check_tripod(rd, cfg, &cfg->station[i].tripod, i);
+}

@@ -1,0 +1,149 @@
+/* The sites of now and of before: who uses one holds it, and what nobody uses is freed. And where the stations are now. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "firmware_sim/device/device_state.h"
+
+struct device_version *device_make_version(const struct site *site, struct site *own)
+{
+    struct device_version *version = calloc(1, sizeof *version);
+    if (version == NULL) return NULL;
+    version->site = site;
+    version->own = own;
+    return version;
+}
+
+void device_free_version(struct device_version *version)
+{
+    if (version == NULL) return;
+    site_free(version->own);
+    free(version);
+}
+
+void device_free_versions(struct device_version **list)
+{
+    while (*list != NULL) {
+        struct device_version *version = *list;
+        *list = version->next;
+        device_free_version(version);
+    }
+}
+
+/* Those before that nobody uses. The first site is its owner's; its maps are not needed any more. */
+void device_free_unused_sites(struct device_moves *moves)
+{
+    struct device_version **at = &moves->old;
+    while (*at != NULL) {
+        struct device_version *version = *at;
+        if (atomic_load(&version->users) != 0) {
+            at = &version->next;
+            continue;
+        }
+        *at = version->next;
+        if (version->own == NULL) site_retire(version->site);
+        device_free_version(version);
+    }
+    site_drop_unused_bvhs(moves->current->site);
+}
+
+void device_use_site(struct device *device, struct device_work *work)
+{
+    struct device_version *version = device->moves.current;
+    atomic_fetch_add(&version->users, 1);
+    work->version = version;
+}
+
+void device_done(struct device_work *work)
+{
+    if (work->variant != NULL) atomic_fetch_sub(&work->variant->users, 1);
+    device_give_back(work->version);
+    work->variant = NULL;
+    work->version = NULL;
+}
+
+const struct site *device_hold_site(struct device *device, struct device_version **version)
+{
+    pthread_mutex_lock(&device->lock);
+    *version = device->moves.current;
+    atomic_fetch_add(&(*version)->users, 1);
+    pthread_mutex_unlock(&device->lock);
+    return (*version)->site;
+}
+
+void device_give_back(struct device_version *version)
+{
+    if (version != NULL) atomic_fetch_sub(&version->users, 1);
+}
+
+const struct site *device_site_of(const struct device_version *version)
+{
+    return version->site;
+}
+
+/* ---- places */
+
+static void fill_place(const struct site *site, uint32_t station, struct command_place *out)
+{
+    struct site_place at;
+    site_get_place(site, station, &at);
+    *out = (struct command_place){
+        {at.position_m[0], at.position_m[1], at.position_m[2], at.heading_deg, at.pitch_deg, at.roll_deg}};
+}
+
+void device_set_places(const struct site *site, struct command_place *place)
+{
+    for (uint32_t i = 0; i < site->n_stations; i++)
+        fill_place(site, i, &place[i]);
+}
+
+int device_open_moves(struct device *device, struct sh_err *err)
+{
+    struct device_moves *moves = &device->moves;
+    moves->first = device->site;
+    moves->current = device_make_version(device->site, NULL);
+    moves->place = calloc(device->site->n_stations, sizeof *moves->place);
+    moves->first_place = calloc(device->site->n_stations, sizeof *moves->first_place);
+    if (moves->current == NULL || moves->place == NULL || moves->first_place == NULL)
+        return sh_fail(err, SH_ENOMEM, "no memory for the stations' places");
+    device_set_places(device->site, moves->place);
+    device_set_places(device->site, moves->first_place);
+    return SH_OK;
+}
+
+void device_close_moves(struct device *device)
+{
+    struct device_moves *moves = &device->moves;
+    device_free_versions(&moves->old);
+    device_free_versions(&moves->ahead);
+    device_free_version(moves->made);
+    device_free_version(moves->current);
+    free(moves->place);
+    free(moves->first_place);
+}
+
+uint32_t device_n_stations(const struct device *device)
+{
+    return device->moves.first->n_stations;
+}
+
+void device_get_station(struct device *device, uint32_t station, struct device_station *out)
+{
+    struct device_version *version;
+    const struct site *site = device_hold_site(device, &version);
+    const struct site_tripod *t = &site->station[station].tripod;
+    memset(out, 0, sizeof *out);
+    memcpy(out->name, site->station[station].station->name, sizeof out->name);
+    site_get_place(site, station, &out->place);
+    out->served = config_serves(site->cfg, station);
+    out->has_tripod = t->from != NULL && out->served;
+    if (out->has_tripod) {
+        out->leg_m = t->from->leg_m;
+        out->height_m = isnan(t->head_m) ? (double)NAN : t->height_m;
+        out->opening_rad = t->opening_rad;
+        out->head_above_m = t->from->head_above_m;
+        out->legs_heading_deg = t->from->legs_heading_deg;
+        out->foot_radius_m = t->from->leg_m * sin(t->opening_rad);
+    }
+    device_give_back(version);
+}

@@ -1,0 +1,89 @@
+#include "firmware_sim/loop/mover.h"
+
+#include <stdio.h>
+#include <sys/eventfd.h>
+
+void mover_create(struct mover *mover, struct device *device, struct stream *stream)
+{
+    mover->device = device;
+    mover->stream = stream;
+    pthread_mutex_init(&mover->lock, NULL);
+    pthread_cond_init(&mover->rings, NULL);
+}
+
+/* A session that has gone meanwhile, and maybe come again, waits for another ticket or for none. */
+static void deliver(struct mover *mover, const struct move_job *job, const struct command_result *result)
+{
+    pthread_mutex_lock(&mover->lock);
+    if (job->box->ticket == job->ticket) {
+        snprintf(job->box->reply, sizeof job->box->reply, "%s", result->reply);
+        job->box->done = 1;
+    }
+    pthread_mutex_unlock(&mover->lock);
+    eventfd_write(job->wake_fd, 1);
+    stream_poke(mover->stream); /* in the paces that wait the event has to go out */
+}
+
+static void carry_out(struct mover *mover, const struct move_job *job)
+{
+    struct command_result result;
+    device_plan_move(mover->device);
+    device_finish_move(mover->device, stream_released(mover->stream), &result);
+    deliver(mover, job, &result);
+}
+
+static void *mover_main(void *arg)
+{
+    struct mover *mover = arg;
+    pthread_mutex_lock(&mover->lock);
+    for (;;) {
+        while (!mover->asked && !mover->ending)
+            pthread_cond_wait(&mover->rings, &mover->lock);
+        if (!mover->asked) break;
+        const struct move_job job = mover->job;
+        mover->asked = 0;
+        pthread_mutex_unlock(&mover->lock);
+        carry_out(mover, &job);
+        pthread_mutex_lock(&mover->lock);
+    }
+    pthread_mutex_unlock(&mover->lock);
+    return NULL;
+}
+
+void mover_ask(struct mover *mover, struct move_box *box, int wake_fd)
+{
+    pthread_mutex_lock(&mover->lock);
+    const struct move_job job = {++mover->ticket, box, wake_fd};
+    box->ticket = job.ticket;
+    box->done = 0;
+    if (!mover->running) mover->running = pthread_create(&mover->thread, NULL, mover_main, mover) == 0;
+    mover->job = job;
+    mover->asked = mover->running;
+    pthread_cond_signal(&mover->rings);
+    pthread_mutex_unlock(&mover->lock);
+    if (!mover->running) carry_out(mover, &job);
+}
+
+int mover_take(struct mover *mover, struct move_box *box, char reply[COMMAND_MAX_REPLY])
+{
+    pthread_mutex_lock(&mover->lock);
+    const int done = box->done;
+    if (done) snprintf(reply, COMMAND_MAX_REPLY, "%s", box->reply);
+    if (done) box->ticket = 0;
+    box->done = 0;
+    pthread_mutex_unlock(&mover->lock);
+    return done;
+}
+
+void mover_join(struct mover *mover)
+{
+    pthread_mutex_lock(&mover->lock);
+    mover->ending = 1;
+    const int running = mover->running;
+    pthread_cond_signal(&mover->rings);
+    pthread_mutex_unlock(&mover->lock);
+    if (!running) return;
+    device_end(mover->device); /* ends the planning, too */
+    pthread_join(mover->thread, NULL);
+    mover->running = 0;
+}

@@ -1,0 +1,44 @@
+/* The thread that plans a station's new place (SITE:POSE), so that no link stands still meanwhile.
+ *
+ * In: a move that the device has begun (COMMAND_MOVE). Out: its reply, in the box of the session that commanded it, and a
+ * word to the session's link. The device lets no two moves be under way. */
+#ifndef FIRMWARE_SIM_LOOP_MOVER_H
+#define FIRMWARE_SIM_LOOP_MOVER_H
+
+#include <pthread.h>
+
+#include "firmware_sim/loop/stream.h"
+
+/* Where a session finds the reply. All zero: it waits for none. Under the mover's lock. */
+struct move_box {
+    uint64_t ticket; /* of the move it waits for */
+    int done;
+    char reply[COMMAND_MAX_REPLY];
+};
+
+struct mover {
+    struct device *device;
+    struct stream *stream;
+    pthread_mutex_t lock;
+    pthread_cond_t rings;
+    pthread_t thread;
+    int running, ending;
+    uint64_t ticket; /* of the last move */
+    int asked;       /* and this is it: */
+    struct move_job {
+        uint64_t ticket;
+        struct move_box *box;
+        int wake_fd;
+    } job;
+};
+
+void mover_create(struct mover *mover, struct device *device, struct stream *stream);
+/* Plans the move that the device has begun. The box must stay until mover_join; wake_fd, an eventfd, is written once the
+ * reply is there. Where there is no thread to be had, the caller waits. */
+void mover_ask(struct mover *mover, struct move_box *box, int wake_fd);
+/* 1: the reply is there, and taken. */
+int mover_take(struct mover *mover, struct move_box *box, char reply[COMMAND_MAX_REPLY]);
+/* Ends a move that is under way: it is refused. Once the casters are joined. */
+void mover_join(struct mover *mover);
+
+#endif

@@ -1,0 +1,247 @@
+/* Tripods: how far their legs are open, from the head's height above the ground; what they hide; their legs as a mesh.
+ *
+ * The ground is the first surface straight below the head's origin, of what stands still; the vertical is the plumb
+ * line there (placement.c), however the head is tilted. A leg of length L reaches from the top, at height h above that
+ * ground, down to its level: cos(opening) = h / L. */
+#include "firmware_sim/site/site_inside.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/angle.h"
+#include "core/mat3.h"
+#include "core/vec3.h"
+
+/* A prism of SIDES faces a leg, and its two ends. */
+enum { LEGS = 3, SIDES = 6, LEG_VERTICES = 2 * SIDES, LEG_TRIANGLES = 2 * SIDES + 2 * (SIDES - 2) };
+
+static const struct config_tripod *given(const struct site *site, uint32_t i)
+{
+    const struct config_tripod *t =
+        site->stop != NULL ? &site->cfg->station[i % site->cfg->n_stations].tripod : &site->station[i].station->tripod;
+    return t->given ? t : NULL;
+}
+
+int site_name_legs(struct site *site, struct sh_err *err)
+{
+    const struct config *cfg = site->cfg;
+    int legs = 0;
+    for (uint32_t i = 0; i < cfg->n_stations; i++)
+        legs |= cfg->station[i].tripod.given && cfg->station[i].tripod.legs;
+    if (!legs) return SH_OK;
+    if (site->n_surfaces == SCENE_MAX_SURFACES)
+        return sh_fail(err, SH_EINPUT, "%s: too many surfaces for one more, of tripods' legs; at most %d", cfg->file,
+                       SCENE_MAX_SURFACES);
+    site->legs = calloc(1, sizeof *site->legs);
+    if (site->legs == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the legs of tripods");
+    *site->legs = (struct scene_surface){"tripod", "leg", {0.5f, 0.5f, 0.5f}, 1, 0, 0, 0.0f};
+    site->legs_label = site->n_surfaces++;
+    return SH_OK;
+}
+
+/* Columns: right, forward, up at a station, scene frame. */
+static int level_at(const struct site *site, const double at_m[3], double level[9], struct sh_err *err)
+{
+    memcpy(level, mat3_unit, 9 * sizeof *level);
+    return site->anchor.known ? geoframe_level(&site->anchor.frame, at_m, level, err) : SH_OK;
+}
+
+/* ---- height and opening */
+
+/* A station of another scanner has no BVH here. */
+static int find_ground(const struct site *site, struct site_station *s, struct bvh_work *work, struct sh_err *err)
+{
+    const double *down = s->tripod.cast.down;
+    double *range_m = &s->tripod.head_m;
+    if (s->bvh == NULL) return cast_floor(site->scene, s->at.position_m, down, range_m, err);
+    uint32_t triangle;
+    const double *p = s->at.position_m;
+    const struct bvh_rays ray = {.n = 1,
+                                 .from.at_m = {p[0], p[1], p[2]},
+                                 .dir = {&down[0], &down[1], &down[2]},
+                                 .range_max_m = 1e9,
+                                 .scattered = 1,
+                                 .range_m = range_m,
+                                 .triangle = &triangle};
+    bvh_hits(work, s->bvh, &ray);
+    return SH_OK;
+}
+
+static int open_legs(const struct site *site, struct site_station *s, uint32_t i, struct sh_err *err)
+{
+    struct site_tripod *t = &s->tripod;
+    const double least_rad = angle_rad(t->from->opening_min_deg);
+    t->height_m = t->head_m - t->from->head_above_m;
+    t->opening_rad = least_rad;
+    if (isnan(t->head_m)) return SH_OK;
+    if (!(t->height_m > 0.0))
+        return sh_fail(err, SH_EINPUT,
+                       "%s: stations[%u] (%s): tripod.head_above_m: %.6g m, and the head is %.6g m above the ground; "
+                       "allowed below that",
+                       site->cfg->file, i, s->station->name, t->from->head_above_m, t->head_m);
+    t->gap_m = t->height_m - t->from->leg_m * cos(least_rad);
+    if (t->gap_m > 0.0) return SH_OK;
+    t->gap_m = 0.0;
+    t->opening_rad = acos(t->height_m / t->from->leg_m);
+    return SH_OK;
+}
+
+static void warn(const struct site_station *s, uint32_t i, const struct sh_report *report)
+{
+    const struct site_tripod *t = &s->tripod;
+    if (isnan(t->head_m))
+        sh_warn(report, "station %u %s: tripod: no ground below it; its legs have their smallest opening, %g deg",
+                i + 1, s->station->name, t->from->opening_min_deg);
+    else if (t->gap_m > 0.0)
+        sh_warn(
+            report,
+            "station %u %s: tripod: it hovers: its top is %.6g m above the ground, and legs of %g m reach down %.6g m "
+            "at their smallest opening, %g deg: %.6g m are missing",
+            i + 1, s->station->name, t->height_m, t->from->leg_m, t->height_m - t->gap_m, t->from->opening_min_deg,
+            t->gap_m);
+}
+
+void site_describe_tripod(const struct site_station *s, char *text, size_t len)
+{
+    const struct site_tripod *t = &s->tripod;
+    const int cone = t->cast.cos_opening < 1.0;
+    char height[80] = "no ground below", hole[80] = "";
+    if (!isnan(t->head_m))
+        snprintf(height, sizeof height, "top %.6g m above the ground%s", t->height_m,
+                 t->gap_m > 0.0 ? ", hovering" : "");
+    if (cone && !isnan(t->head_m))
+        snprintf(hole, sizeof hole, ", which hides %.6g m around on level ground", t->head_m * tan(t->opening_rad));
+    snprintf(text, len, "legs of %g m%s, %s; opening %.6g deg%s%s", t->from->leg_m, t->cast.has_legs ? " in view" : "",
+             height, angle_deg(t->opening_rad), cone ? hole : "; no cone",
+             cone && t->cast.has_legs ? ", besides the legs" : "");
+}
+
+/* ---- legs */
+
+/* A leg begins this part of its length below the top: a head at the top itself would else look into all of them. */
+static const double LEG_BEGINS = 0.1;
+
+/* A prism along the leg, from there to the ground. */
+static void fill_leg(const struct site_tripod *t, const double top_m[3], const double level[9], int leg,
+                     double (*vertex_m)[3])
+{
+    const double azimuth = angle_rad(t->from->legs_heading_deg + 360.0 / LEGS * leg);
+    const double s = sin(t->opening_rad), c = cos(t->opening_rad), radius_m = 0.5 * t->from->leg_diameter_m;
+    double axis[3], across[3], outward[3];
+    for (int k = 0; k < 3; k++) {
+        const double *row = level + 3 * k;
+        const double away = sin(azimuth) * row[0] + cos(azimuth) * row[1];
+        axis[k] = s * away - c * row[2];
+        outward[k] = c * away + s * row[2];
+        across[k] = cos(azimuth) * row[0] - sin(azimuth) * row[1];
+    }
+    for (int i = 0; i < LEG_VERTICES; i++) {
+        const double turn = 2.0 * M_PI * (i % SIDES) / SIDES;
+        const double along_m = t->from->leg_m * (i < SIDES ? LEG_BEGINS : 1.0);
+        for (int k = 0; k < 3; k++)
+            vertex_m[i][k] = top_m[k] + along_m * axis[k] + radius_m * (cos(turn) * across[k] + sin(turn) * outward[k]);
+    }
+}
+
+static void fill_triangles(uint32_t first, uint32_t (*triangle)[3])
+{
+    int n = 0;
+    for (uint32_t i = 0; i < SIDES; i++) {
+        const uint32_t a = first + i, b = first + (i + 1) % SIDES;
+        memcpy(triangle[n++], (const uint32_t[3]){a, b, b + SIDES}, sizeof *triangle);
+        memcpy(triangle[n++], (const uint32_t[3]){a, b + SIDES, a + SIDES}, sizeof *triangle);
+    }
+    for (uint32_t i = 1; i + 1 < SIDES; i++) {
+        memcpy(triangle[n++], (const uint32_t[3]){first, first + i + 1, first + i}, sizeof *triangle);
+        memcpy(triangle[n++], (const uint32_t[3]){first + SIDES, first + SIDES + i, first + SIDES + i + 1},
+               sizeof *triangle);
+    }
+}
+
+/* The sphere around the legs, as cast_mover has it. */
+static void enclose(const struct scene *scene, struct cast_mover *legs)
+{
+    double half2 = 0.0;
+    for (int i = 0; i < 3; i++) {
+        const double half = 0.5 * (scene->max_m[i] - scene->min_m[i]);
+        legs->centre_m[i] = scene->min_m[i] + half;
+        half2 += half * half;
+    }
+    legs->radius_m = sqrt(half2) * (1.0 + 1e-9) + 1e-6;
+    memcpy(legs->rotation, mat3_unit, sizeof legs->rotation);
+}
+
+static int make_legs(const struct site *site, struct site_station *s, const double level[9],
+                     const struct sh_report *report, struct sh_err *err)
+{
+    struct site_tripod *t = &s->tripod;
+    double vertex_m[LEGS * LEG_VERTICES][3], top_m[3];
+    uint32_t triangle[LEGS * LEG_TRIANGLES][3];
+    for (int k = 0; k < 3; k++)
+        top_m[k] = s->at.position_m[k] - t->from->head_above_m * level[3 * k + 2];
+    for (int leg = 0; leg < LEGS; leg++) {
+        fill_leg(t, top_m, level, leg, vertex_m + leg * LEG_VERTICES);
+        fill_triangles((uint32_t)(leg * LEG_VERTICES), triangle + leg * LEG_TRIANGLES);
+    }
+    const struct scene_arrays arrays = {(const double(*)[3])vertex_m,
+                                        LEGS * LEG_VERTICES,
+                                        (const uint32_t(*)[3])triangle,
+                                        LEGS * LEG_TRIANGLES,
+                                        NULL,
+                                        site->legs,
+                                        1};
+    int rc = scene_from_arrays(&arrays, &t->legs, err);
+    if (rc != SH_OK) return rc;
+    for (uint32_t i = 0; i < t->legs->n_triangles; i++)
+        t->legs->label[i] = (uint16_t)site->legs_label;
+    t->legs->label0 = site->legs_label;
+    t->cast.has_legs = 1;
+    if (s->bvh == NULL) return SH_OK;
+    const struct site_sphere from = {s->at.position_m, site_ray_reach_m(site, s->at.position_m)};
+    rc = site_build_body_bvh(site, t->legs, &from, report, &t->bvh, err);
+    if (rc != SH_OK) return rc;
+    enclose(t->legs, &t->cast.legs);
+    t->cast.legs.bvh = t->bvh;
+    return SH_OK;
+}
+
+static int set_up(const struct site *site, struct site_station *s, uint32_t i, struct bvh_work *work,
+                  const struct sh_report *report, struct sh_err *err)
+{
+    struct site_tripod *t = &s->tripod;
+    double level[9];
+    int rc = level_at(site, s->at.position_m, level, err);
+    if (rc != SH_OK) return rc;
+    for (int k = 0; k < 3; k++)
+        t->cast.down[k] = -level[3 * k + 2];
+    rc = find_ground(site, s, work, err);
+    if (rc == SH_OK) rc = open_legs(site, s, i, err);
+    if (rc != SH_OK) return rc;
+    const int cone = t->from->cone == CHOICE_ON || (t->from->cone == CHOICE_AUTO && !t->from->legs);
+    t->cast.cos_opening = cone ? cos(t->opening_rad) : 2.0;
+    if (s->bvh != NULL) warn(s, i, report);
+    return t->from->legs ? make_legs(site, s, level, report, err) : SH_OK;
+}
+
+int site_set_up_tripods(struct site *site, const struct sh_report *report, struct sh_err *err)
+{
+    struct bvh_work *work = NULL;
+    int rc = SH_OK;
+    for (uint32_t i = 0; i < site->n_stations && rc == SH_OK; i++) {
+        struct site_station *s = &site->station[i];
+        s->tripod.from = given(site, i);
+        if (s->tripod.from == NULL || !config_serves(site->cfg, i)) continue;
+        if (work == NULL) rc = bvh_work_create(&work, err);
+        if (rc == SH_OK) rc = set_up(site, s, i, work, report, err);
+        if (rc == SH_OK) rc = sh_check_stop(report, err);
+    }
+    bvh_work_free(work);
+    return rc;
+}
+
+void site_free_tripod(struct site_tripod *t)
+{
+    bvh_free(t->bvh);
+    scene_free(t->legs);
+}

@@ -1,0 +1,354 @@
+/* A whole panorama of 0.1 degrees to a binary PLY file, beside Embree alone on the same rays.
+ *
+ *   build/tests/bench/panorama [options]
+ *
+ * In each round, in turns: Embree alone casts all rays, robust, with ready packets at its best width, on one thread; the
+ * head scans the same panorama off line, as `scanhead record` does, into files. Loading and building the BVH come before.
+ * Figures are processor time of all threads, kernel included, so they are those of one core. */
+#include <errno.h>
+#include <getopt.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "drivers/protocol/bytes.h"
+#include "firmware_sim/app/offline.h"
+#include "firmware_sim/app/record/files.h"
+#include "firmware_sim/app/record/recording.h"
+#include "tests/bench/options.h"
+#include "tests/bench/sight.h"
+
+enum { MAX_ROUNDS = 99, PATH_ROOM = 96, STEPS = 3600, RINGS = 1801, RAYS = STEPS * (RINGS - 2) + 2 };
+
+static const char HELP[] =
+    "panorama [options]: a panorama of 0.1 degrees to binary PLY, beside Embree alone on the same rays\n\n"
+    "  --scene NAME    1M (default), another number of triangles, house or garden\n"
+    "  --rounds N      default 7, at most 99\n"
+    "  --folder DIR    where the files go, default /tmp\n"
+    "  --ending END    .ply (default) or another that `scanhead record` knows; none: no file\n"
+    "  --columns LIST  of .ply, as --ply-columns of `scanhead record`\n"
+    "  --set KEY=VALUE another value of a configuration key; may be repeated\n";
+
+struct options {
+    const char *scene, *folder, *ending;
+    uint32_t rounds;
+    unsigned columns;
+    const char *set[16];
+    int n_sets;
+};
+
+static char folder[PATH_ROOM], config_path[PATH_ROOM + 32], head_path[PATH_ROOM + 32], mesh_path[PATH_ROOM + 32],
+    cloud_path[PATH_ROOM + 32];
+
+static const double RAD = M_PI / 180.0;
+
+/* ---- what is scanned */
+
+static int write_mesh(const struct scene *s, struct sh_err *err)
+{
+    uint8_t row[24];
+    FILE *f = fopen(mesh_path, "w");
+    if (f == NULL) return sh_fail(err, SH_EIO, "%s: %s", mesh_path, strerror(errno));
+    fprintf(f,
+            "ply\nformat binary_little_endian 1.0\nelement vertex %u\nproperty double x\nproperty double y\n"
+            "property double z\nelement face %u\nproperty list uchar int vertex_indices\nend_header\n",
+            s->n_vertices, s->n_triangles);
+    for (uint32_t i = 0; i < s->n_vertices; i++) {
+        for (int k = 0; k < 3; k++)
+            le_put_double(row + 8 * k, s->vertex_m[i][k]);
+        fwrite(row, 1, 24, f);
+    }
+    for (uint32_t i = 0; i < s->n_triangles; i++) {
+        row[0] = 3;
+        for (int k = 0; k < 3; k++)
+            le_put32(row + 1 + 4 * k, s->triangle[i][k]);
+        fwrite(row, 1, 13, f);
+    }
+    return fclose(f) == 0 ? SH_OK : sh_fail(err, SH_EIO, "%s: %s", mesh_path, strerror(errno));
+}
+
+static int write_head(struct sh_err *err)
+{
+    static const char *const FIGURES[] = {"step_deg",
+                                          "0.1",
+                                          "lines_min_hz",
+                                          "1",
+                                          "lines_max_hz",
+                                          "1000",
+                                          "range_min_m",
+                                          "0.1",
+                                          "range_max_m",
+                                          "9000",
+                                          "range_sigma_m",
+                                          "0",
+                                          "range_sigma_ppm",
+                                          "0",
+                                          "mirror_sigma_deg",
+                                          "0",
+                                          "pan_sigma_deg",
+                                          "0",
+                                          "mirror_counts",
+                                          "0",
+                                          "pan_counts",
+                                          "0",
+                                          "beam_exit_m",
+                                          "0",
+                                          "beam_divergence_rad",
+                                          "0",
+                                          "pulse_width_ns",
+                                          "4",
+                                          "max_echoes",
+                                          "1",
+                                          "overlap_m",
+                                          "1",
+                                          "wavelength_nm",
+                                          "1550",
+                                          "boot_s",
+                                          "0.2",
+                                          "spin_up_s",
+                                          "0.03",
+                                          "spin_down_s",
+                                          "0.2"};
+    FILE *f = fopen(head_path, "w");
+    if (f == NULL) return sh_fail(err, SH_EIO, "%s: %s", head_path, strerror(errno));
+    fprintf(f, "maker: scanhead\nmodel: panorama\nemitter: sphere\n");
+    for (size_t i = 0; i < sizeof FIGURES / sizeof *FIGURES; i += 2)
+        fprintf(f, "%s: {value: %s, from: assumed}\n", FIGURES[i], FIGURES[i + 1]);
+    fprintf(f, "reaches: [{reflectance: 0.9, range_m: 9000, from: assumed}]\n");
+    return fclose(f) == 0 ? SH_OK : sh_fail(err, SH_EIO, "%s: %s", head_path, strerror(errno));
+}
+
+static int write_config(const struct bench_target *t, struct sh_err *err)
+{
+    FILE *f = fopen(config_path, "w");
+    if (f == NULL) return sh_fail(err, SH_EIO, "%s: %s", config_path, strerror(errno));
+    fprintf(f,
+            "head: {profile: head.yaml, lines_hz: 1000}\nscene:\n  meshes:\n    - {file: %s, up: %s, scale: 1}\n"
+            "stations:\n  - {name: middle, position_m: [%.9g, %.9g, %.9g]}\n",
+            bench_is_house(t->name) ? BENCH_HOUSE_FILE : mesh_path, bench_is_house(t->name) ? "y" : "z",
+            t->station_m[0], t->station_m[1], t->station_m[2]);
+    return fclose(f) == 0 ? SH_OK : sh_fail(err, SH_EIO, "%s: %s", config_path, strerror(errno));
+}
+
+static int prepare_files(const struct options *o, const struct bench_target *t, struct sh_err *err)
+{
+    snprintf(folder, sizeof folder, "%.60s/scanhead-panorama-XXXXXX", o->folder);
+    if (mkdtemp(folder) == NULL) return sh_fail(err, SH_EIO, "%s: %s", folder, strerror(errno));
+    snprintf(config_path, sizeof config_path, "%s/scan.yaml", folder);
+    snprintf(head_path, sizeof head_path, "%s/head.yaml", folder);
+    snprintf(mesh_path, sizeof mesh_path, "%s/mesh.ply", folder);
+    snprintf(cloud_path, sizeof cloud_path, "%s/scan%s", folder, o->ending);
+    int rc = write_head(err);
+    if (rc == SH_OK && !bench_is_house(t->name)) rc = write_mesh(t->scene, err);
+    return rc == SH_OK ? write_config(t, err) : rc;
+}
+
+static void remove_files(void)
+{
+    unlink(config_path);
+    unlink(head_path);
+    unlink(mesh_path);
+    unlink(cloud_path);
+    if (folder[0] != '\0') rmdir(folder);
+}
+
+/* ---- Embree alone */
+
+struct alone {
+    struct embree_alone e;
+    struct bench_block *block;
+    float *d[3]; /* [n], RAYS and then the last one again: whole blocks */
+    uint32_t n, width;
+    enum embree_feed feed;
+};
+
+static void aim(struct alone *a)
+{
+    uint32_t i = 0;
+    for (uint32_t ring = 0; ring < RINGS; ring++) {
+        const double up = (-90.0 + 0.1 * ring) * RAD;
+        const uint32_t steps = ring == 0 || ring == RINGS - 1 ? 1 : STEPS;
+        for (uint32_t k = 0; k < steps; k++, i++) {
+            const double round = 0.1 * k * RAD;
+            a->d[0][i] = (float)(sin(round) * cos(up));
+            a->d[1][i] = (float)(cos(round) * cos(up));
+            a->d[2][i] = (float)sin(up);
+        }
+    }
+    for (; i < a->n; i++)
+        for (int k = 0; k < 3; k++)
+            a->d[k][i] = a->d[k][i - 1];
+}
+
+/* Seconds for n rays. Those of a block lie in the cache when their time begins. */
+static double alone_pass(struct alone *a, uint32_t n)
+{
+    double spent_s = 0.0;
+    for (uint32_t at = 0; at < n; at += BENCH_BLOCK) {
+        memcpy(a->block->fx, a->d[0] + at, sizeof a->block->fx);
+        memcpy(a->block->fy, a->d[1] + at, sizeof a->block->fy);
+        memcpy(a->block->fz, a->d[2] + at, sizeof a->block->fz);
+        if (a->feed == EMBREE_PREPARED) embree_alone_refill(&a->e);
+        const double start_s = bench_thread_s();
+        embree_alone_pass(&a->e, a->width, a->feed, 0, BENCH_BLOCK);
+        spent_s += bench_thread_s() - start_s;
+    }
+    return spent_s;
+}
+
+/* The fastest of packets of 4, 8 and 16, ready or filled from arrays. */
+static int choose(struct alone *a, struct sh_err *err)
+{
+    double best_s = INFINITY;
+    uint32_t width = 16;
+    enum embree_feed feed = EMBREE_LOADED;
+    int rc = SH_OK;
+    for (uint32_t w = 4; w <= 16 && rc == SH_OK; w *= 2)
+        for (int f = 0; f < 2 && rc == SH_OK; f++) {
+            a->width = w;
+            a->feed = f == 0 ? EMBREE_PREPARED : EMBREE_LOADED;
+            rc = embree_alone_prepare(&a->e, w, a->feed, err);
+            const double s = rc == SH_OK ? alone_pass(a, a->n) : INFINITY;
+            if (s >= best_s) continue;
+            best_s = s;
+            width = w;
+            feed = a->feed;
+        }
+    a->width = width;
+    a->feed = feed;
+    return rc == SH_OK ? embree_alone_prepare(&a->e, width, feed, err) : rc;
+}
+
+static int alone_create(const struct bench_target *t, struct alone *a, struct sh_err *err)
+{
+    memset(a, 0, sizeof *a);
+    int rc = bench_embree(t->scene, t->station_m, 1, &a->e, err);
+    a->n = (RAYS + BENCH_BLOCK - 1) / BENCH_BLOCK * BENCH_BLOCK;
+    a->block = aligned_alloc(64, (sizeof *a->block + 63) / 64 * 64);
+    for (int k = 0; k < 3; k++)
+        a->d[k] = malloc(a->n * sizeof *a->d[k]);
+    if (a->d[0] == NULL || a->d[1] == NULL || a->d[2] == NULL || a->block == NULL)
+        return rc != SH_OK ? rc : sh_fail(err, SH_ENOMEM, "no memory for the rays");
+    aim(a);
+    if (rc == SH_OK) rc = embree_alone_rays(&a->e, a->block->fx, a->block->fy, a->block->fz, BENCH_BLOCK, err);
+    return rc == SH_OK ? choose(a, err) : rc;
+}
+
+static void alone_free(struct alone *a)
+{
+    embree_alone_free(&a->e);
+    for (int k = 0; k < 3; k++)
+        free(a->d[k]);
+    free(a->block);
+}
+
+/* ---- the head */
+
+static int write_frame(void *ctx, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
+{
+    return record_files_frame(ctx, sh, frame, err);
+}
+
+/* Seconds for a scan, files included. */
+static int scan_once(const struct options *o, struct offline *off, double *spent_s, uint64_t *pulses,
+                     struct sh_err *err)
+{
+    struct record_files files = {.recorder = {.may_wait = 1, .columns = o->columns}};
+    struct recording_result result;
+    const struct recording_options options = {
+        .frames = -1, .first_station = 1, .last_station = 1, .head_ends = 1, .frame = write_frame, .ctx = &files};
+    const double start_s = bench_process_s();
+    int rc = o->ending[0] == '.' ? record_files_add(&files, cloud_path, err) : SH_OK;
+    if (rc == SH_OK) rc = record_files_open(&files, err);
+    if (rc == SH_OK) rc = recording_run(off->sh, &options, &result, err);
+    if (rc == SH_OK) rc = record_files_close(&files, 1, err);
+    *spent_s = bench_process_s() - start_s;
+    *pulses = rc == SH_OK ? result.counts.pulses : 0;
+    if (rc == SH_OK && *pulses != RAYS)
+        return sh_fail(err, SH_ESTATE, "%llu pulses came; %d were to", (unsigned long long)*pulses, RAYS);
+    return rc;
+}
+
+struct figures {
+    double alone_ns[MAX_ROUNDS], ours_ns[MAX_ROUNDS], ratio[MAX_ROUNDS];
+};
+
+static int measure(const struct options *o, struct alone *a, struct offline *off, struct sh_err *err)
+{
+    static struct figures f;
+    uint64_t pulses = 0;
+    int rc = SH_OK;
+    for (uint32_t round = 0; round < o->rounds && rc == SH_OK; round++) {
+        double spent_s;
+        f.alone_ns[round] = 1e9 * alone_pass(a, a->n) / a->n;
+        rc = scan_once(o, off, &spent_s, &pulses, err);
+        f.ours_ns[round] = 1e9 * spent_s / RAYS;
+        f.ratio[round] = f.alone_ns[round] / f.ours_ns[round];
+    }
+    if (rc != SH_OK) return rc;
+    printf("%s, %d rays, %u rounds, file %s\n", o->scene, RAYS, o->rounds, o->ending);
+    printf("Embree alone  %7.2f ns a ray (packets of %u, %s)\n", bench_median(f.alone_ns, o->rounds), a->width,
+           a->feed == EMBREE_PREPARED ? "ready" : "filled from arrays");
+    printf("panorama      %7.2f ns a ray\n", bench_median(f.ours_ns, o->rounds));
+    printf("ratio         %7.3f\n", bench_median(f.ratio, o->rounds));
+    return SH_OK;
+}
+
+static int run(const struct options *o, struct bench_target *t, struct alone *a, struct offline *off,
+               struct config *cfg, struct sh_err *err)
+{
+    int rc = bench_target_load(o->scene, BENCH_HOUSE_FILE, NULL, t, err);
+    if (rc == SH_OK) rc = prepare_files(o, t, err);
+    if (rc == SH_OK) rc = alone_create(t, a, err);
+    if (rc == SH_OK) rc = config_load(config_path, o->set, o->n_sets, cfg, err);
+    if (rc == SH_OK) rc = offline_open(cfg, 0.0, NULL, off, err);
+    if (rc == SH_OK) rc = offline_prepare(off, 1, NULL, err);
+    return rc == SH_OK ? measure(o, a, off, err) : rc;
+}
+
+static int parse(struct options *o, int argc, char **argv)
+{
+    static const struct option table[] = {
+        {"scene", required_argument, NULL, 's'},   {"rounds", required_argument, NULL, 'r'},
+        {"folder", required_argument, NULL, 'f'},  {"ending", required_argument, NULL, 'e'},
+        {"columns", required_argument, NULL, 'c'}, {"set", required_argument, NULL, 'k'},
+        {"help", no_argument, NULL, 'h'},          {NULL, 0, NULL, 0}};
+    *o = (struct options){.scene = "1M", .folder = "/tmp", .ending = ".ply", .rounds = 7};
+    for (int c; (c = getopt_long(argc, argv, "", table, NULL)) >= 0;) {
+        if (c == 's') o->scene = optarg;
+        if (c == 'f') o->folder = optarg;
+        if (c == 'e') o->ending = optarg;
+        if (c == 'r') o->rounds = (uint32_t)strtoul(optarg, NULL, 10);
+        if (c == 'k' && o->n_sets < 16) o->set[o->n_sets++] = optarg;
+        if (c == 'c' && !ply_columns_read(optarg, &o->columns)) c = '?';
+        if (c == 'h') fputs(HELP, stdout);
+        if (c == 'h' || c == '?') return c == 'h' ? BENCH_OK : BENCH_USAGE;
+    }
+    if (optind == argc && o->rounds >= 1 && o->rounds <= MAX_ROUNDS &&
+        (bench_is_house(o->scene) || bench_count(o->scene) != 0))
+        return -1;
+    fprintf(stderr, "panorama: allowed are 1 to %d rounds, and a scene of that name; see --help\n", MAX_ROUNDS);
+    return BENCH_USAGE;
+}
+
+int main(int argc, char **argv)
+{
+    struct options o;
+    struct bench_target target = {0};
+    struct alone alone = {.n = 0};
+    struct offline off = {0};
+    struct sh_err err = {0};
+    int status = parse(&o, argc, argv);
+    if (status >= 0) return status;
+    struct config *cfg = calloc(1, sizeof *cfg);
+    int rc = cfg != NULL ? run(&o, &target, &alone, &off, cfg, &err) : sh_fail(&err, SH_ENOMEM, "no memory");
+    if (rc != SH_OK) fprintf(stderr, "panorama: %s\n", err.text);
+    offline_close(&off);
+    alone_free(&alone);
+    bench_target_free(&target);
+    free(cfg);
+    remove_files();
+    return rc == SH_OK ? BENCH_OK : BENCH_FAILED;
+}

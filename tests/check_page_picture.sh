@@ -1,0 +1,6 @@
+#!/bin/bash
+# The pure parts of the page's picture in node; tests/unit/page_picture.mjs says which.
+set -eu
+cd "$(dirname "$0")/.."
+command -v node >/dev/null || { echo "1..0 # SKIP node is missing"; exit 0; }
+exec node tests/unit/page_picture.mjs

@@ -1,0 +1,85 @@
+// make page-pictures: the page of a scan in progress, of that scan done, and of its recording, in three widths and both
+// themes, to be looked at.   node tests/page/pictures.mjs [--out FOLDER] [--only WORD] [--best FILE]
+// --best: the picture of the first page alone: config/demo.yaml from its three stations, 1280 x 900.
+import {mkdirSync, readFileSync, writeFileSync} from 'node:fs';
+import {parseArgs} from 'node:util';
+import {Browser} from './browser.mjs';
+import {end, endpoint, run, start} from './head.mjs';
+import {inFewColours} from './png8.mjs';
+import {folder} from './work.mjs';
+
+const SIZES = [[360, 740], [1280, 900], [2560, 1440]];
+const {values} = parseArgs({options: {out: {type: 'string', default: 'build/pictures'}, only: {type: 'string', default: ''},
+  best: {type: 'string'}}});
+const links = ['--set', `links.0.path=${folder}/pty`];
+if (values.best === undefined) mkdirSync(values.out, {recursive: true});
+const browser = new Browser();
+
+// Pace step: the scan stands where it is, for as long as the pictures take. The page grants the time, as it has control.
+const head = await start(['run', 'config/demo.yaml', '--quiet', '--pace', 'step', '--view', ...links]);
+
+async function shots(name) {
+  for (const size of SIZES) {
+    for (const dark of [false, true]) {
+      const file = `${values.out}/${name}_${size[0]}_${dark ? 'dark' : 'light'}.png`;
+      if (!file.includes(values.only)) continue;
+      await page.resize(...size);
+      await page.dark(dark);
+      await settled();
+      await page.shot(file);
+      console.log(file);
+    }
+  }
+}
+
+// All points are drawn, and what the page asks for once a second has come.
+async function settled() {
+  await page.eval('new Promise((done) => setTimeout(done, 1500))');
+  await page.eval('scanhead.view.screenshotReady()');
+  await page.eval('new Promise((done) => setTimeout(done, 300))');
+}
+
+let page = await browser.open(endpoint(head, 'web'));
+const grant = async (s) => {
+  for (let k = 0; k < 5 * s; k++) await page.eval("scanhead.head.command('TIME:STEP 200 MS')");
+};
+await page.until('scanhead.head.isOpen && !document.querySelector("#control").disabled');
+await page.click('#control');
+await page.until('scanhead.head.mine');
+await grant(1);
+await page.until('!document.querySelector("#start").disabled');
+await page.click('#start');
+await grant(3);
+if (values.best === undefined) await shots('progress');
+await grant(4);
+await page.until('scanhead.head.state === "idle"');
+if (values.best === undefined) await shots('done');
+else {
+  for (const station of [2, 3]) {
+    await page.eval(`scanhead.head.command('HEAD:STATION ${station}')`);
+    await page.click('#start');
+    await grant(7);
+    await page.until('scanhead.head.state === "idle"');
+  }
+  await page.eval('scrollTo(0, 0)');
+  await page.resize(1280, 900);
+  await page.dark(false);
+  await page.eval('scanhead.view.screenshotReady()');
+  await page.eval('scanhead.view.camera.distance *= 0.84, scanhead.view.camera.target[2] -= 0.5, scanhead.view.cameraMoved()');
+  await settled();
+  await page.shot(values.best);
+  writeFileSync(values.best, inFewColours(readFileSync(values.best)));
+}
+await end(head);
+
+if (values.best === undefined) {
+  const file = `${folder}/demo.shs`;
+  run('record', 'config/demo.yaml', '--quiet', '-o', file, '--set', 'head.prr_hz=300000');
+  const view = await start(['view', file]);
+  page = await browser.open(view.ready.endpoints[0].endpoint);
+  const {recording: {points}} = await page.eval("fetch('/head').then((answer) => answer.json())");
+  await page.until(`scanhead.cloud.total === ${points}`);
+  await shots('recording');
+  await end(view);
+}
+process.exit(0);

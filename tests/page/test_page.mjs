@@ -1,0 +1,160 @@
+// The page of a head, of a recording, and of a head that goes: in one browser. What is expected is computed by others:
+// `record`, the Python client, and a client by TCP.
+import {createServer} from 'node:http';
+import {connect} from 'node:net';
+import {readFileSync} from 'node:fs';
+import {Browser} from './browser.mjs';
+import {Client, end, endpoint, start} from './head.mjs';
+import {both, CONFIG, recorded} from './rig.mjs';
+import {equal, finish, folder, giveUpAfter, is, near, test} from './work.mjs';
+
+const SIZE = [600, 480], SMALL = [360, 300]; // drawing in software takes most of the time
+giveUpAfter(120);
+
+// A head, its page, and somebody else who asks it.
+async function open(browser, ...more) {
+  const head = await start(['run', CONFIG, '--quiet', '--pace', 'fast', ...more]);
+  const page = await browser.open(endpoint(head, 'web'), {size: SIZE});
+  await page.until('scanhead.head.isOpen && scanhead.head.state === "idle" && document.querySelector("#knob-head-lines")?.value');
+  return {head, page, other: new Client(endpoint(head, 'tcp'))};
+}
+
+// Presses Start, and waits until the page has all of the scan: its end comes after its points.
+async function scan(page) {
+  const before = await page.eval('scanhead.head.figures().pulses');
+  await page.until('!document.querySelector("#start").disabled');
+  await page.click('#start');
+  await page.until(`scanhead.head.state === "idle" && scanhead.head.figures().pulses > ${before}`);
+}
+
+const counts = (page) => page.eval(`(() => {
+  const {points, empty, pulses, point_hash: hash, lost_frames, dropped_points} = scanhead.head.figures();
+  return {echoes: points - empty, pulses, hash, lost: lost_frames + dropped_points, total: scanhead.cloud.total,
+    bounds: scanhead.cloud.bounds};
+})()`);
+
+// Positions are held as floats relative to the first point: half a unit in the last place of the room's diagonal.
+function sameBounds(bounds, {min, max}) {
+  const tolerance = Math.hypot(...max.map((v, k) => v - min[k])) * 2 ** -24;
+  min.forEach((v, k) => near(bounds.min[k], v, tolerance, `lower bound ${k}`));
+  max.forEach((v, k) => near(bounds.max[k], v, tolerance, `upper bound ${k}`));
+}
+
+const browser = new Browser({size: SIZE});
+const {head, page, other} = await open(browser, '--journal', `${folder}/journal`);
+
+await test('without control nothing that the user does reaches the head', async () => {
+  for (const at of ['#start', '#stop', '#knob-head-lines', '#reset']) {
+    is(await page.eval(`document.querySelector("${at}").disabled`), `${at} is disabled`);
+    await page.click(at);
+  }
+  await page.fill('#knob-head-lines', 60);
+  equal(await other.ask('HEAD:LIN?'), '100', 'lines a second');
+  equal(await other.ask('SYST:CONT?'), '0', 'the session in control');
+  equal(await other.ask('SYST:ERR:COUN?'), '0', 'refused commands');
+});
+
+const wanted = recorded('first', ['head.lines_hz=60']);
+
+await test('its user takes control by a button, and a knob changes the setting of the head', async () => {
+  await page.click('#control');
+  await page.until('scanhead.head.mine');
+  is(await other.ask('SYST:CONT?') !== '0', 'another client sees that a session has control');
+  await page.fill('#knob-head-lines', 60);
+  equal(await other.until('HEAD:LIN?', (reply) => reply !== '100'), '60', 'lines a second');
+  is((await other.ask('HEAD:LIN 70')).startsWith('ERR -203'), 'another client is refused');
+});
+
+await test('a scan: points, bounds and hash are those of the recording', async () => {
+  await scan(page);
+  const has = await counts(page);
+  equal(has.lost, 0, 'lost frames and dropped points');
+  equal(has.pulses, wanted.shots, 'pulses');
+  equal(has.echoes, wanted.points, 'echoes');
+  equal(has.total, wanted.points, 'points of the cloud');
+  equal(has.hash, wanted.hash, 'hash over all records');
+  sameBounds(has.bounds, wanted);
+  await page.eval('scanhead.view.show({points: false})'); // from here on counts are enough
+});
+
+await test('a station dragged in the picture is where the next scan is made', async () => {
+  await page.click('#fit');
+  await page.where('#picture');
+  const [from, to] = await page.eval(`(() => {
+    const {left, top} = document.querySelector('#picture').getBoundingClientRect();
+    const at = (x, y) => { const p = scanhead.view.camera.project([x, y, 1.6]); return [left + p.x, top + p.y]; };
+    return [at(0, 0), at(1.5, 2)];
+  })()`);
+  await page.drag(from, to);
+  const pose = (await other.until('SITE:POSE? 1', (reply) => /^[^E]*[1-9]/.test(reply.split(',').slice(0, 2).join()))).split(',').map(Number);
+  is(Math.hypot(pose[0] - 1.5, pose[1] - 2) < 0.05, `the station is where it was let go: ${pose}`);
+  equal(pose[2], 1.6, 'its height');
+  const moved = recorded('moved', ['head.lines_hz=60', `stations.0.position_m=[${pose.slice(0, 3)}]`]);
+  is(moved.hash !== wanted.hash, 'another place gives another scan');
+  await scan(page);
+  const has = await counts(page);
+  equal(has.echoes, wanted.points + moved.points, 'echoes of both scans');
+  equal(has.hash, both(wanted.hash, moved.hash), 'hash of both scans');
+});
+
+await test('control is given back by the button, and then anybody may have it', async () => {
+  await page.click('#control');
+  await other.until('SYST:CONT?', (reply) => reply === '0');
+  equal(await other.ask('HEAD:LIN 70'), 'OK', 'a setting of another client');
+  await page.until('document.querySelector("#control").disabled');
+});
+
+await test('another site gets no byte of it', async () => {
+  const site = createServer((_, answer) => answer.setHeader('content-type', 'text/html').end('<title>other</title>'));
+  await new Promise((done) => site.listen(0, '127.0.0.1', done));
+  const foreign = await browser.open(`http://127.0.0.1:${site.address().port}/`, {size: [300, 200]});
+  const url = endpoint(head, 'web'), {host} = new URL(url);
+  const refused = (init) => foreign.eval(`fetch("${url}head", ${JSON.stringify(init)}).then(() => false, () => true)`);
+  is(await refused({}), 'fetch fails');
+  is(await refused({mode: 'cors', headers: {'x-any': '1'}}), 'fetch with a field of its own fails');
+  is(await foreign.eval(`new Promise((done) => {
+    const socket = new WebSocket("ws://${host}/ws");
+    socket.onopen = () => done(false);
+    socket.onerror = () => done(true);
+  })`), 'its WebSocket does not open');
+  await foreign.close();
+  site.close();
+  const bytes = await new Promise((done) => {
+    let n = 0;
+    connect(Number(host.split(':')[1]), '127.0.0.1', function () {
+      this.write(`GET /head HTTP/1.1\r\nHost: ${host}\r\nOrigin: http://127.0.0.1:9\r\n\r\n`);
+    }).on('data', (more) => (n += more.length)).on('close', () => done(n)).on('error', () => {});
+  });
+  equal(bytes, 0, 'bytes that came for such a request');
+});
+
+await test('when the head goes, the page says so; it finds the next one at that place', async () => {
+  const port = new URL(endpoint(head, 'web')).port;
+  await end(head);
+  const words = await page.until('!document.querySelector("#banner").hidden && document.querySelector("#banner").textContent');
+  is(/Not connected .*(the head has ended|the head is gone)/.test(words), `the banner says so: ${words}`);
+  equal(await page.eval('scanhead.cloud.total > 0'), true, 'what came stays');
+  const next = await start(['run', CONFIG, '--quiet', '--pace', 'fast', '--set', `links.0.port=${port}`]);
+  await page.until('scanhead.head.state === "idle" && document.querySelector("#banner").hidden');
+  await end(next);
+  equal(page.faults.join('\n'), '', 'errors of its scripts');
+});
+
+await test('nothing but what was done by hand had an effect on the head', () => {
+  const commands = readFileSync(`${folder}/journal`, 'latin1').split('\n').filter((line) => /^\d/.test(line))
+    .map((line) => line.split(' ').slice(3).join(' ').toUpperCase().replace(/(SITE:POSE 1),.*/, '$1'));
+  const wanted = ['HEAD:LINES 60', 'SCAN:START', 'SITE:POSE 1', 'SCAN:START', 'HEAD:LIN 70', 'END'];
+  equal(commands.join('; '), wanted.join('; '), 'the journal');
+});
+
+await test('a recording: its page has as many points', async () => {
+  const view = await start(['view', wanted.file]);
+  const page = await browser.open(view.ready.endpoints[0].endpoint, {size: SMALL});
+  await page.until(`scanhead.cloud.total === ${wanted.points}`);
+  sameBounds(await page.eval('scanhead.cloud.bounds'), wanted);
+  equal(page.faults.join('\n'), '', 'errors of its scripts');
+  await end(view);
+});
+
+await browser.end();
+finish();

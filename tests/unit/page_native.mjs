@@ -1,0 +1,357 @@
+// The page's decoder (drivers/link/web/native.js): samples of SAMPLES.md value by value, damage, and recordings beside
+// the client in Python. TAP on standard output.
+//
+//     node page_native.mjs FOLDER    FOLDER: with polar.shs, utm.shs, ... and the points that Python makes of each
+import fs from 'node:fs';
+import {crc32c, Decoder, Parser, LOCAL, REPEAT, TYPES} from '../../drivers/link/web/native.js';
+import {Losses} from '../../drivers/link/web/losses.js';
+import {CommandError, Replies} from '../../drivers/link/web/replies.js';
+import {fitCubic, geodeticToEcef, gridOf, toScene} from '../../drivers/link/web/native_earth.js';
+import {runTests, test} from './page_tap.mjs';
+
+const page = fs.readFileSync(new URL('../../drivers/protocol/SAMPLES.md', import.meta.url), 'utf8');
+const samples = [...page.matchAll(/```text\n(d5 [0-9a-f \n]*)```\n\n```text\n([^`]*)```/g)].map(([, hex, words]) =>
+  ({bytes: Buffer.from(hex.replace(/\s/g, ''), 'hex'), words: words.replace(/\s+/g, ' ').trim()}));
+const stream = Buffer.concat(samples.map(({bytes}) => bytes));
+
+function equal(ours, theirs, what) {
+  if (!Object.is(ours, theirs)) throw new Error(`${what}: ${ours}, and not ${theirs}`);
+}
+
+function near(ours, theirs, tolerance, what) {
+  const same = Number.isNaN(theirs) ? Number.isNaN(ours) : Math.abs(ours - theirs) <= tolerance;
+  if (!same) throw new Error(`${what}: ${ours}, and not ${theirs}, by more than ${tolerance}`);
+}
+
+// All that comes out of these pieces, in order.
+function readAll(pieces, last = true) {
+  const out = {frames: [], texts: [], values: [], batches: [], refused: []};
+  const hand = (value) => out.values.push(value);
+  const decoder = new Decoder({points: (b) => out.batches.push(b), descriptor: hand, anchor: hand, emitter: hand, names: hand,
+    lineEnd: hand, telemetry: hand, event: hand, poses: hand, refused: (why) => out.refused.push(why)});
+  const parser = new Parser({text: (t) => out.texts.push(t), frame(f) {
+    out.frames.push({type: f.type, flags: f.flags, seq: f.seq, t_ns: f.t_ns, payload: f.payload.slice()});
+    decoder.take(f);
+  }});
+  for (const piece of pieces) parser.push(piece);
+  if (last) parser.end();
+  decoder.flush(true);
+  return {...out, decoder, parser, stats: parser.stats};
+}
+
+const bytesOf = (frames) => frames.map((f) => Buffer.from(f.payload).toString('hex')).join();
+
+// ---- samples
+
+// `name value value`: the numbers as they stand; a text, or an array, or one value.
+function sameField(value, name, words) {
+  if (typeof value === 'string') return equal(value, words, name);
+  const theirs = words.split(' '), ours = Array.isArray(value) ? value : [value];
+  equal(ours.length, theirs.length, name);
+  return ours.forEach((v, i) => equal(typeof v === 'bigint' ? v : v + 0, typeof v === 'bigint' ? BigInt(theirs[i]) : Number(theirs[i]), name));
+}
+
+// The entries that are records, by their pattern; r: what came out, k: which record.
+const records = [
+  [/^echo (\d+) of (\d+), label (\d+), (\S+) dB, t_ns (\d+), head's frame (.*), scene (.*)$/, ({batches: [b]}, k, m) => {
+    if (m[1] === '0') return equal(b.n, k, 'a shot without echo is no point');
+    equal(b.echo[k], Number(m[1]), 'echo');
+    equal(b.echoes[k], Number(m[2]), 'echoes');
+    equal(b.label[k], Number(m[3]), 'label');
+    equal(b.reflectance[k], Math.fround(Number(m[4])), 'reflectance');
+    equal(b.t[k], Math.fround(Number(m[5]) * 1e-9), 't');
+    near(b.range[k], Math.hypot(...m[6].split(' ')), 1e-4, 'range'); // the page has four decimals
+    return m[7].split(' ').forEach((v, i) => near([b.x, b.y, b.z][i][k], Number(v), 0.51e-4, 'scene'));
+  }],
+  [/^amplitude (\S+) dB, width/, ({batches: [b]}, k, m) => k < b.n && equal(b.amplitude[k], Math.fround(Number(m[1])), 'amplitude')],
+  [/^rgb (\d+) (\d+) (\d+)$/, ({batches: [b]}, k, m) => k < b.n &&
+    [0, 1, 2].forEach((i) => equal(b.rgb[3 * k + i], Number(m[1 + i]), 'rgb'))],
+  [/^label (\d+): (.*) of (.*)$/, ({value}, k, m) => {
+    equal(value[k].label, Number(m[1]), 'label');
+    equal(value[k].object, m[2], 'object');
+    equal(value[k].material, m[3], 'material');
+  }],
+  [/^beam elevation (\S+) deg, azimuth (\S+) deg, (\d+) ns$/, ({value}, k, m) => {
+    near(value.beams[k].elevation_udeg, 1e6 * Number(m[1]), 1e-3, 'elevation');
+    near(value.beams[k].azimuth_udeg, 1e6 * Number(m[2]), 1e-3, 'azimuth');
+    equal(value.beams[k].offset_ns, Number(m[3]), 'offset');
+  }],
+];
+
+function sameAsSaid({words}, frame, value, batches) {
+  const flags = (frame.flags & REPEAT ? ' REPEAT' : '') + (frame.flags & LOCAL ? ' LOCAL' : '');
+  const [title, seq, t_ns, ...entries] = words.split('; ');
+  equal(TYPES[frame.type] + flags, title, 'type');
+  sameField(frame.seq, 'seq', seq.replace('seq ', ''));
+  sameField(frame.t_ns, 't_ns', t_ns.replace('t_ns ', ''));
+  const counts = new Map();
+  let pose = -1;
+  for (const entry of entries) {
+    const record = records.find(([pattern]) => pattern.test(entry));
+    const [, name, rest] = /^(\w+) ?(.*)$/.exec(entry);
+    if (record) {
+      const k = counts.get(record) ?? 0;
+      counts.set(record, k + 1);
+      record[1]({batches, value}, k, record[0].exec(entry));
+    } else if (name === 'pose') {
+      sameField(value[++pose].t_ns, 't_ns', rest.replace('t_ns ', ''));
+    } else if (name === 'flags') { // of a pose between these two
+      equal(value[0].flags | value[1].flags, Number(rest), name);
+    } else if (pose >= 0) {
+      sameField(value[pose][name], name, rest);
+    } else if (['points', 'attributes', 'colours'].includes(title)) {
+      const [at, big] = {frame: [0], line: [title === 'points' ? 4 : 8], pulse0: [title === 'points' ? 8 : 0, 1], t0_ns: [16, 1],
+        line_t0_ns: [24, 1], n_pulses: [32], n_points: [title === 'points' ? 36 : 12]}[name];
+      const p = Buffer.from(frame.payload);
+      equal(big ? Number(p.readBigInt64LE(at)) : p.readUInt32LE(at), Number(rest), name);
+    } else {
+      sameField(value[name], name, rest);
+    }
+  }
+  return entries.length;
+}
+
+test('crc32c: the check value of RFC 3720, of nothing, and byte by byte', () => {
+  const of = (bytes) => crc32c(new DataView(bytes.buffer, bytes.byteOffset, bytes.length), 0, bytes.length);
+  equal(of(new TextEncoder().encode('123456789')), 0xe3069283, 'check');
+  equal(of(new Uint8Array(0)), 0, 'nothing');
+  equal(of(new Uint8Array(32)), 0x8a9136aa, '32 zeros (RFC 3720, B.4)');
+});
+
+test('every value of every sample', () => {
+  equal(samples.length, 12, 'samples');
+  const all = readAll([stream]), values = [...all.values];
+  equal(all.frames.length, 12, 'frames');
+  equal(all.batches.length, 1, 'batches');
+  equal(all.batches[0].shots, 3, 'shots');
+  equal([...all.batches[0].pulse].join(), '0,0,1', 'pulse numbers');
+  const without = ['points', 'attributes', 'colours'];
+  let n = 0;
+  samples.forEach((sample, i) => {
+    const value = without.includes(TYPES[all.frames[i].type]) ? null : values.shift();
+    n += sameAsSaid(sample, all.frames[i], value, all.batches);
+  });
+  if (n < 120) throw new Error(`only ${n} values were compared`);
+});
+
+test('an event says what a, b and c mean', () => {
+  const {values} = readAll([stream]), [start, lost] = [values[0], values.at(-1)];
+  equal(start.name, 'SCAN_START', 'name');
+  equal(start.scan, 1, 'scan');
+  equal(start.at_ns, 2500000000n, 'at_ns');
+  equal(`${lost.name} ${lost.frames} ${lost.pulses} ${lost.local}`, 'READER_LOST 12 0 true', 'lost');
+});
+
+// ---- damage
+
+test('byte by byte', () => {
+  const whole = readAll([stream]), single = readAll([...stream].map((byte) => Uint8Array.of(byte)));
+  equal(bytesOf(single.frames), bytesOf(whole.frames), 'frames');
+  equal(single.stats.bad_bytes, 0, 'bad bytes');
+  equal(single.decoder.pointHash, whole.decoder.pointHash, 'hash');
+});
+
+test('reply lines between frames; after garbage text is ignored until the next frame', () => {
+  const text = (words) => Buffer.from(words, 'latin1'), [a, b] = samples.map(({bytes}) => bytes);
+  const {texts, stats} = readAll([text('OK\r\n'), a, text('1\r'), text('\n2\r\n'), b, text('\xd5\0\0OK\r\n'), a, text('4\r\n')]);
+  equal(texts.join(), 'OK,1,2,4', 'texts');
+  equal(stats.bad_bytes, 7, 'bad bytes');
+  equal(readAll([a, text('\0'), text('OK\r\n'), b, text('1\r\n')]).texts.join(), '1', 'texts after garbage');
+  equal(readAll([text('x'.repeat(511) + '\r\n')]).texts.length, 0, 'a line of 513 bytes');
+  equal(readAll([text('x'.repeat(510) + '\r\n')]).texts.length, 1, 'a line of 512 bytes');
+});
+
+test('garbage between frames, wrong checksums, bytes cut out: every whole frame comes', () => {
+  for (let i = 0; i < samples.length; i++) {
+    for (const damage of [
+      (b) => Buffer.concat([Buffer.from([0xd5, 7, 0xd5, 0xd5]), b]), // garbage before
+      (b) => b.subarray(0, b.length - 5), // cut short
+      (b) => Buffer.concat([b.subarray(0, 40), b.subarray(41)]), // a byte lost
+      (b) => Buffer.from(b.map((v, at) => (at === 33 ? v ^ 1 : v))), // a bit turned in the payload
+      (b) => Buffer.from(b.map((v, at) => (at === 20 ? v ^ 1 : v))), // and in the header
+    ]) {
+      const pieces = samples.map(({bytes}, k) => (k === i ? damage(bytes) : bytes)), keeps = pieces[i].length > samples[i].bytes.length;
+      const all = readAll([Buffer.concat(pieces)]), rest = samples.filter((_, k) => k !== i || keeps);
+      equal(bytesOf(all.frames), rest.map(({bytes}) => bytes.subarray(28).toString('hex')).join(), `frames without ${i}`);
+      const lost = keeps || i === 0 || i === 11 ? 0 : i === 10 ? 0 : 1; // of the last in the sequence nobody knows
+      equal(all.stats.lost_frames, lost, `lost frames, ${i}`);
+      const taken = all.frames.reduce((sum, f) => sum + 28 + f.payload.length, 0);
+      equal(all.stats.bad_bytes, all.stats.bytes - taken, 'bad bytes');
+    }
+  }
+});
+
+test('truncated anywhere: what came whole comes', () => {
+  for (let n = 0; n < stream.length; n += 7) {
+    let whole = 0;
+    for (let end = 0; whole < 12 && (end += samples[whole].bytes.length) <= n; whole++);
+    equal(readAll([stream.subarray(0, n)]).frames.length, whole, `frames of ${n} bytes`);
+  }
+});
+
+let seed = 1;
+function random(n) { // Numerical Recipes' generator, its upper bits
+  seed = (Math.imul(seed, 1664525) + 1013904223) >>> 0;
+  return Math.floor((seed / 2 ** 32) * n);
+}
+
+// Payload and header get good checksums again.
+function signed(frame) {
+  const view = new DataView(frame.buffer, frame.byteOffset, frame.length);
+  view.setUint32(12, crc32c(view, 28, frame.length), true);
+  view.setUint32(24, crc32c(view, 0, 24), true);
+  return frame;
+}
+
+test('1,000 mutations, half of them with good checksums: nothing is thrown', () => {
+  let refused = 0;
+  const decoder = new Decoder({refused: () => refused++});
+  for (let i = 0; i < 1000; i++) {
+    const frames = samples.map(({bytes}) => Buffer.from(bytes));
+    for (let k = 0; k < 1 + random(4); k++) {
+      const frame = frames[random(12)], at = i % 2 ? 28 + random(frame.length - 28) : random(frame.length);
+      frame[at] = random(3) ? random(256) : 255;
+      if (i % 2) signed(frame);
+    }
+    const parser = new Parser({frame: (f) => decoder.take(f)}), all = Buffer.concat(frames);
+    for (let at = 0; at < all.length;) at += parser.push(all.subarray(at, at + 1 + i)) ?? 1 + i;
+    parser.end();
+    decoder.flush(i % 3 === 0);
+    if (i % 2) equal(parser.stats.frames, 12, `frames of mutation ${i}`);
+  }
+  if (refused < 50) throw new Error(`only ${refused} frames were refused`);
+});
+
+test('payloads shorter than their tables, and longer', () => {
+  for (const {bytes} of samples) {
+    const resized = (n) => {
+      const frame = Buffer.concat([bytes.subarray(0, Math.min(28 + n, bytes.length)), Buffer.alloc(Math.max(0, 28 + n - bytes.length))]);
+      frame.writeUInt32LE(n, 4);
+      return signed(frame);
+    };
+    const longer = readAll([stream, resized(bytes.length - 28 + 9)]);
+    equal(longer.refused.length, 0, `type ${bytes[1]}, longer`);
+    for (const n of [0, 7]) equal(readAll([resized(n)]).refused.length, 1, `type ${bytes[1]} of ${n} bytes`);
+  }
+});
+
+test('points before their anchor are counted and not placed', () => {
+  const {decoder, batches} = readAll([Buffer.concat(samples.filter((_, i) => i !== 2).map(({bytes}) => bytes))]);
+  equal(batches.length, 0, 'batches');
+  equal(decoder.stats.unplaced_shots, 3, 'unplaced');
+});
+
+// ---- replies
+
+test('replies in order; an ERR; out of step after one that did not come', async () => {
+  const sent = [], replies = new Replies((line) => sent.push(line));
+  const failing = (promise) => promise.then(() => 'no', (e) => (e instanceof CommandError ? `${e.number} ${e.text}` : e));
+  equal(await failing(replies.ask('A?', 1)), '0 the head is not connected', 'closed');
+  replies.open();
+  const [a, b] = [replies.ask('A?', 1), failing(replies.ask('B 7', 1))];
+  replies.take('1');
+  replies.take('ERR -222,"Data out of range; B 7, allowed 0 to 5"');
+  equal(await a, '1', 'A');
+  equal(await b, '-222 Data out of range; B 7, allowed 0 to 5', 'B');
+  equal(await failing(replies.ask('A\n', 1)), '0 a command is one line of 1 to 256 printable ASCII characters', 'two lines');
+  equal(await failing(replies.ask('A?', 0)), '0 no reply within 0 s', 'late');
+  const c = replies.ask('C?', 1);
+  equal(sent.join(), 'A?,B 7,A?,*IDN?', 'sent');
+  for (const line of ['late', 'a,b,c,d', '3']) replies.take(line);
+  equal(await c, '3', 'C');
+  const d = failing(replies.ask('D?', 1));
+  replies.close('gone');
+  equal(await d, '0 gone', 'D');
+});
+
+// ---- losses
+
+// What Losses says of these; shots: 100 come with the points.
+function lossesOf(...things) {
+  const said = [], losses = new Losses((name, d) => said.push(name === 'scan'
+    ? `scan ${d.scan} ${d.fired} ${d.cast} ${d.lost} ${d.received} ${d.missing}` : `${d.by} ${d.frames} ${d.pulses}`));
+  let shots = 0;
+  for (const [name, value, lost_frames] of things) {
+    losses[name]({...value, shots}, lost_frames);
+    if (name === 'points') shots += 100;
+  }
+  return said.join('; ');
+}
+
+test('where a scan ends, with SCAN_END and without, and what is missing of it', () => {
+  const event = (name, values) => ['event', {name, ...values}], points = ['points', {scan: 1}];
+  const telemetry = (state, scan, lost = 0) => ['telemetry', {state, scan, scan_fired: 130, scan_cast: 120, scan_lost: 7}, lost];
+  const start = event('SCAN_START', {scan: 1}), end = event('SCAN_END', {scan: 1, fired: 130, lost: 7});
+  const state = event('STATE', {state: 5, before: 4}), d = (scan) => ['descriptor', {scan}];
+  const whole = 'scan 1 130 120 7 100 13';
+  equal(lossesOf(d(0), telemetry(2, 0), start, d(1), points, telemetry(4, 1), telemetry(5, 1), end, state, telemetry(2, 1)), whole, 'whole');
+  equal(lossesOf(start, d(1), points, telemetry(5, 1), state, telemetry(2, 1)), whole, 'STATE');
+  equal(lossesOf(start, d(1), points, state, telemetry(2, 1)), whole, 'telemetry');
+  equal(lossesOf(start, d(1), points, end), 'scan 1 130 null 7 100 null', 'telemetry lost');
+  equal(lossesOf(d(1), points, telemetry(4, 2)), 'scan 1 null null null 100 null', 'telemetry of another scan');
+  equal(lossesOf(d(1), points, d(2)), 'scan 1 null null null 100 null', 'descriptor of another scan');
+  equal(lossesOf(d(1), telemetry(2, 1), d(1)), '', 'at rest');
+  equal(lossesOf(d(1), points, event('SCAN_START', {scan: 2}), ['points', {scan: 2}], event('SCAN_END', {scan: 2, fired: 9, lost: 0})),
+    'scan 1 null null null 100 null; scan 2 9 null 0 100 null', 'the next scan');
+  const counted = new Losses(() => {});
+  counted.event({...end[1], shots: 0});
+  equal(counted.byHead, 7, 'by SCAN_END, of a scan that was not seen');
+  for (const [name, value] of [start, d(1), state, telemetry(2, 1)]) counted[name]({...value, shots: 0});
+  equal(counted.byHead, 14, 'by telemetry, where SCAN_END and OVERRUN were lost');
+  const left = event('READER_LOST', {frames: 3, pulses: 50});
+  equal(lossesOf(telemetry(2, 1, 5), left, telemetry(2, 1, 5), telemetry(2, 1, 5)), 'link 3 50; wire 2 0', 'five frames are missing');
+  equal(lossesOf(telemetry(2, 1, 3), left, telemetry(2, 1, 3)), 'link 3 50', 'READER_LOST after the jump');
+  equal(lossesOf(event('OVERRUN', {lost: 4}), event('OVERRUN', {lost: 0})), 'head 0 4', 'by the head');
+});
+
+// ---- places on the Earth
+
+test('grids: there and back; the cubic is as good as 1 um at 2 km', () => {
+  for (const [epsg, lat, lon] of [[32633, 52.5, 13.4], [32733, -33, 17.9], [32661, 88, -70], [32761, -86, 120], [32601, 10, -179]]) {
+    const grid = gridOf(epsg), [e, n] = grid.forward(lat, lon), back = grid.inverse(e, n);
+    near(back[0], lat, 1e-9, 'latitude'); // 0.1 mm; the series' errors cancel but for 0.1 um
+    near(back[1], lon, 1e-9, 'longitude');
+    const anchor = {crs: 2, epsg, moving: 0, heights: 0, anchor: [e, n, 100], lat_deg: lat, lon_deg: lon, height_m: 100,
+      station_m: [0, 0, 0], axes: [1, 0, 0, 0, 1, 0, 0, 0, 1]};
+    const {at} = toScene(anchor), k = fitCubic((u, v, w) => at([e + 2000 * u, n + 2000 * v, 100 + 2000 * w]));
+    const powers = (u, v, w) => [1, w, w * w, w ** 3, v, v * w, v * w * w, v * v, v * v * w, v ** 3, u, u * w, u * w * w, u * v,
+      u * v * w, u * v * v, u * u, u * u * w, u * u * v, u ** 3];
+    for (const [u, v, w] of [[0.3, 0.4, 0.1], [-0.7, 0.6, -0.2], [0.6, -0.75, 0.2]]) {
+      const exact = at([e + 2000 * u, n + 2000 * v, 100 + 2000 * w]);
+      exact.forEach((x, i) => near(powers(u, v, w).reduce((sum, p, j) => sum + p * k[20 * i + j], 0), x, 1e-6, 'cubic'));
+    }
+  }
+  near(geodeticToEcef(0, 90, 0)[1], 6378137, 1e-6, 'equator');
+});
+
+// ---- recordings beside the client in Python
+
+// Relative to the length of the place. Polar: the same operations, sine and cosine from another library. The Earth: the
+// rounding of 6e6 m, and the series' 0.1 um, beside some metres.
+const TOLERANCES = {polar: 1e-13, moving: 1e-13, beams: 1e-13, ecef: 1e-8, utm: 1e-8, geodetic: 1e-8};
+const folder = process.argv[2];
+for (const name of Object.keys(TOLERANCES)) {
+  test(`the recording ${name} as in Python`, () => {
+    const {decoder, batches, stats, refused} = readAll([fs.readFileSync(`${folder}/${name}.shs`)]);
+    const raw = fs.readFileSync(`${folder}/${name}.points`), said = fs.readFileSync(`${folder}/${name}.said`, 'utf8').trim().split(' ');
+    const rows = new Float64Array(raw.buffer, raw.byteOffset, raw.length / 8);
+    equal(`${stats.bad_bytes} ${stats.lost_frames} ${refused.length}`, '0 0 0', 'the stream');
+    equal(`${decoder.pointHash}`, said[0], 'hash');
+    equal(decoder.stats.shots, Number(said[1]), 'shots');
+    equal(batches.reduce((sum, b) => sum + b.shots, 0), decoder.stats.shots, 'shots of batches');
+    let at = 0;
+    for (const b of batches) {
+      for (let i = 0; i < b.n; i++, at += 11) {
+        const size = Math.max(1, Math.hypot(rows[at], rows[at + 1], rows[at + 2]));
+        ['x', 'y', 'z'].forEach((axis, k) => near(b[axis][i], rows[at + k], TOLERANCES[name] * size, `${name} ${axis}`));
+        ['t', 'range', 'reflectance', 'amplitude'].forEach((key, k) =>
+          near(b[key][i], Math.fround(rows[at + 3 + k]), 1e-6 * Math.abs(rows[at + 3 + k]), `${name} ${key}`)); // Float32
+        ['label', 'echo', 'echoes', 'pulse'].forEach((key, k) => equal(b[key][i], rows[at + 7 + k], `${name} ${key}`));
+      }
+    }
+    equal(at, rows.length, 'points');
+    if (at < 11 * 400) throw new Error(`only ${at / 11} points`);
+  });
+}
+
+await runTests();

@@ -1,0 +1,163 @@
+// The page's panels without a browser: contrast of its colours, what a head says of its settings, events in words, the
+// files of a recording. Expected values are by hand.
+import {readFileSync} from 'node:fs';
+import {duration, metres, grouped, short} from '../../drivers/link/web/page.js';
+import {describeSettings, splitReply} from '../../drivers/link/web/describe.js';
+import {limit} from '../../drivers/link/web/knobs.js';
+import {eventWords} from '../../drivers/link/web/log.js';
+import {batchesOf, countWithin, fetchCloud, readMesh} from '../../drivers/link/web/recording_files.js';
+import {runTests, test} from './page_tap.mjs';
+
+const web = new URL('../../drivers/link/web/', import.meta.url);
+const page = readFileSync(new URL('index.html', web), 'utf8'), css = readFileSync(new URL('style.css', web), 'utf8');
+
+const equal = (got, want, what = '') => {
+  if (JSON.stringify(got) !== JSON.stringify(want)) throw new Error(`${what}: ${JSON.stringify(got)}, expected ${JSON.stringify(want)}`);
+};
+
+// WCAG 2.1, relative luminance and contrast ratio.
+const channel = (v) => (v <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
+const luminance = (hex) => [0.2126, 0.7152, 0.0722].reduce((sum, weight, i) =>
+  sum + weight * channel(parseInt(hex.slice(1 + 2 * i, 3 + 2 * i), 16) / 255), 0);
+const contrast = (a, b) => {
+  const [lo, hi] = [luminance(a), luminance(b)].sort((x, y) => x - y);
+  return (hi + 0.05) / (lo + 0.05);
+};
+
+const themes = Object.fromEntries([['light', ':root {'], ['dark', ":root[data-theme='dark'] {"]].map(([name, head]) => {
+  const block = css.slice(css.indexOf(head), css.indexOf('}', css.indexOf(head)));
+  return [name, Object.fromEntries([...block.matchAll(/--([\w-]+): (#[0-9a-f]{6});/g)].map(([, key, value]) => [key, value]))];
+}));
+const grounds = ['panel', 'field', 'ground'];
+const texts = grounds.flatMap((ground) => ['ink', 'soft', 'accent', 'good', 'warn', 'bad'].map((ink) => [ink, ground]))
+  .concat([['on-accent', 'accent'], ['bad', 'bad-ground']]);
+
+test('contrast: black on white is 21', () => equal(contrast('#000000', '#ffffff'), 21));
+for (const [name, colours] of Object.entries(themes)) {
+  test(`contrast of ${name}: text 4.5, edges of controls 3`, () => {
+    for (const [ink, ground] of texts) {
+      const ratio = contrast(colours[ink], colours[ground]);
+      if (!(ratio >= 4.5)) throw new Error(`--${ink} on --${ground}: ${ratio.toFixed(2)}`);
+    }
+    for (const ground of ['panel', 'field']) {
+      const ratio = contrast(colours.edge, colours[ground]);
+      if (!(ratio >= 3)) throw new Error(`--edge on --${ground}: ${ratio.toFixed(2)}`);
+    }
+  });
+}
+
+test('nothing inline, nothing from elsewhere', () => {
+  equal(/\sstyle=|\son\w+=|<style|https?:\/\//.test(page), false, 'index.html');
+  equal(/<script(?![^>]*\ssrc="main\.js")/.test(page), false, 'scripts');
+  equal(/url\(|@import|https?:/.test(css), false, 'style.css');
+});
+
+test('each button, field and picture of the page has a name', () => {
+  for (const [all] of page.matchAll(/<(?:button|input|select|canvas)\b[^>]*>[^<]*/g)) {
+    const named = /aria-label="[^"]+"/.test(all) || />[^<]*\S/.test(all) || /id="theme"/.test(all); // session.js names it
+    if (!named) throw new Error(all);
+  }
+});
+
+test('figures in words', () => {
+  equal([grouped(1234567), grouped(-0.4), grouped(-1234.5, 1), grouped(NaN), grouped(12n)],
+    ['1\u2009234\u2009567', '0', '−1\u2009234.5', '–', '12']);
+  equal([short(999), short(1000), short(1234567, 'B'), short(0.1234)], ['999', '1.00\u00a0k', '1.23\u00a0MB', '0.12']);
+  equal([metres(0), metres(-0.0000031), metres(0.00483), metres(12.5)], ['0 mm', '−3\u00a0µm', '4.83\u00a0mm', '12.5\u00a0m']);
+  equal([metres(3e-7), metres(-1e-9)], ['0.30\u00a0µm', '<\u20090.01\u00a0µm']);
+  equal([duration(1.44), duration(0.427), duration(8.42e-7), duration(0), duration(600)],
+    ['1.44\u00a0s', '427\u00a0ms', '842\u00a0ns', '0\u00a0s', '10\u00a0min']);
+});
+
+test('limits that can be read, none beyond what the head allows', () => {
+  const of = (text, step, isUpper) => limit(text, step, isUpper).replaceAll(/\s/g, ' ');
+  equal([of('59.999999', '0.000001', true), of('-39.999999', '0.000001'), of('249.999999999', '0.000000001', true)],
+    ['< 60', '> −40', '< 250']);
+  equal([of('0.001333333', '0.000000001'), of('0.333333333', '0.000000001', true), of('-0.333333333', '0.000000001')],
+    ['0.001334', '0.3333', '−0.3333']);
+  equal([of('1200000', '0.000001', true), of('0.096', '0.000001', true), of('360', '', true), of('7', '1')],
+    ['1.2 M', '0.096', '360', '7']);
+});
+
+test('a reply of fields, with commas in quotes', () => {
+  equal(splitReply('number,"Hz",1000,,3,0.000001,"idle fault",""'), ['number', 'Hz', '1000', '', '3', '0.000001', 'idle fault', '']);
+  equal(splitReply('word,"a,b",'), ['word', 'a,b', '']);
+});
+
+const fakeHead = (replies) => ({command: async (line) => {
+  if (!(line in replies)) throw new Error(`asked ${line}`);
+  return replies[line];
+}});
+
+test('a head that describes its settings', async () => {
+  const got = await describeSettings(fakeHead({
+    'HELP?': '*IDN? HELP? HELP:SETtings?', 'HELP:SETtings?': 'HEAD:PRR SCAN:ECHoes',
+    'HELP? HEAD:PRR': 'number,"Hz",1000,1200000,300000,0.000001,"all","300000 600000"',
+    'HELP? SCAN:ECHoes': 'word,"",,,ALL,,"idle","ALL FIRSt"'}));
+  equal(got, [
+    {header: 'HEAD:PRR', kind: 'number', unit: 'Hz', min: '1000', max: '1200000', preset: '300000', step: '0.000001', states: 'all', values: ['300000', '600000']},
+    {header: 'SCAN:ECHoes', kind: 'word', unit: '', min: '', max: '', preset: 'ALL', step: '', states: 'idle', values: ['ALL', 'FIRSt']}]);
+});
+
+test('an older head is asked for MIN, MAX and DEF', async () => {
+  const got = await describeSettings(fakeHead({'HELP?': '*IDN? HEAD:LINes HEAD:STATe?',
+    'HEAD:LINes? MIN': '3', 'HEAD:LINes? MAX': '240', 'HEAD:LINes? DEF': '120'}));
+  equal(got.map(({header, min, max, preset}) => [header, min, max, preset]), [['HEAD:LINes', '3', '240', '120']]);
+});
+
+test('events in words', () => {
+  equal(eventWords({name: 'SCAN_END', scan: 2, fired: 1000, lost: 0}), ['Scan 2 ends: 1\u2009000 pulses fired', '']);
+  equal(eventWords({name: 'ERROR', number: -222, session: 9, held_back: 0, text: 'Data out of range'}), ['Session 9: -222 Data out of range', 'bad']);
+  equal(eventWords({name: 'ERROR', number: 102, session: 0, held_back: 0, text: 'session 17, fd:3'}), ['Reader too slow (102): session 17, fd:3', 'bad']);
+  equal(eventWords({name: 'PPS'}), null);
+  equal(eventWords({name: '', code: 99, text: 'new'}), ['Event 99: new', '']);
+});
+
+test('the long-edge filter is a beginning of the sorted ratios', () => {
+  const ratio = Float32Array.of(0.5, 1, 1, 2.2, 7);
+  equal([0, 0.4, 1, 2.2, 6, 100].map((factor) => countWithin(ratio, factor)), [5, 0, 3, 4, 4, 5]);
+});
+
+function cloudBytes(first, total) {
+  const bytes = new ArrayBuffer(56 + 64 + 12 + 4), view = new DataView(bytes);
+  [0x4c434853, 1, 1, 2, first, 1, total].forEach((v, i) => view.setUint32(4 * i, v, true));
+  [100, 200, 300].forEach((v, i) => view.setFloat64(32 + 8 * i, v, true));
+  [['xyz', 4, 3, 120], ['station', 2, 1, 132]].forEach(([name, ...numbers], k) => {
+    [...name].forEach((c, i) => view.setUint8(56 + 32 * k + i, c.charCodeAt(0)));
+    numbers.forEach((v, i) => view.setUint32(56 + 32 * k + 20 + 4 * i, v, true));
+  });
+  [0.5, 1.5, -2].forEach((v, i) => view.setFloat32(120 + 4 * i, v, true));
+  view.setUint16(132, 1 + first, true);
+  return bytes;
+}
+
+test('a cloud in pieces, as batches of one station each', async () => {
+  const asked = [];
+  globalThis.fetch = async (path) => {
+    asked.push(path);
+    return {ok: true, arrayBuffer: async () => cloudBytes(asked.length - 1, 2)};
+  };
+  const batches = [];
+  await fetchCloud('/cloud?every=1&', {take: (piece) => batches.push(...batchesOf(piece))});
+  equal(asked, ['/cloud?every=1&first=0&count=200000', '/cloud?every=1&first=1&count=1']);
+  equal(batches.map(({n, station, x, y, z, pulse, label}) => [n, station, x[0], y[0], z[0], pulse[0], label[0]]),
+    [[1, 1, 100.5, 201.5, 298, 0, 65535], [1, 2, 100.5, 201.5, 298, 1, 65535]]);
+});
+
+test('a refusal of the link is an error with its words', async () => {
+  globalThis.fetch = async () => ({ok: false, status: 400, text: async () => 'per_m2: allowed 1 to 2\n'});
+  const words = await fetchCloud('/sparse?', {take() {}}).catch((error) => error.message);
+  equal(words, 'per_m2: allowed 1 to 2');
+});
+
+test('what is no mesh is refused', () => {
+  let words = '';
+  try {
+    readMesh(new ArrayBuffer(48));
+  } catch (error) {
+    words = error.message;
+  }
+  equal(words, 'not a mesh of version 1');
+});
+
+await runTests();

@@ -1,0 +1,296 @@
+// The pure parts of the page's picture (drivers/link/web): the points that are held and their order, the camera, colours
+// and limits, picking, dragging, levels of detail, the scene's bytes. TAP on standard output.
+import {Cloud, BLOCK, evenOrder, pointOf} from '../../drivers/link/web/cloud.js';
+import {Camera, FAR_M, NEAR_M, arrowStep, depthOf, headingTo, onPlane, radians, roundBelow, split} from '../../drivers/link/web/view_camera.js';
+import {NONE, legendOf, rampAt, robustLimits, sampleOf, ticks, valuesOf, widened} from '../../drivers/link/web/view_colours.js';
+import {nearest} from '../../drivers/link/web/view_pick.js';
+import {Budget, restShares, shares} from '../../drivers/link/web/view_draw.js';
+import {Stations} from '../../drivers/link/web/view_stations.js';
+import {featureEdges, legsMesh, parseScene} from '../../drivers/link/web/view_mesh.js';
+import {runTests, test} from './page_tap.mjs';
+
+
+function near(ours, theirs, tolerance, what) {
+  if (!(Math.abs(ours - theirs) <= tolerance)) throw new Error(`${what}: ${ours}, and not ${theirs}, by more than ${tolerance}`);
+}
+const same = (ours, theirs, what) => {
+  const [a, b] = [ours, theirs].map((v) => JSON.stringify(v));
+  if (a !== b) throw new Error(`${what}: ${a}, and not ${b}`);
+};
+
+function throws(run, words) {
+  try {
+    run();
+  } catch (error) {
+    if (!error.message.includes(words)) throw new Error(`"${error.message}" has no "${words}"`);
+    return;
+  }
+  throw new Error(`no error: ${words}`);
+}
+
+// n points; place(i) gives x, y, z.
+function batch(n, place, {scan = 1, station = 1, pulse0 = 0} = {}) {
+  const f64 = () => new Float64Array(n), f32 = () => new Float32Array(n);
+  const b = {n, shots: n, scan, station, frame: 0, line: 0, pulse0, x: f64(), y: f64(), z: f64(), pulse: f64(), t: f32(), range: f32(),
+    reflectance: f32().fill(NaN), amplitude: f32().fill(NaN), label: new Uint16Array(n), echo: new Uint8Array(n).fill(1),
+    echoes: new Uint8Array(n).fill(1), rgb: null};
+  for (let i = 0; i < n; i++) {
+    [b.x[i], b.y[i], b.z[i]] = place(i);
+    b.pulse[i] = pulse0 + i;
+    b.range[i] = i;
+  }
+  return b;
+}
+
+function camera(change = {}) {
+  return Object.assign(new Camera(), {width: 800, height: 600, target: [0, 0, 0], distance: 10, azimuth: 0, elevation: 0}, change);
+}
+
+test('the oldest points go, whole blocks, and not below the capacity', () => {
+  const cloud = new Cloud({capacity: 100_000});
+  for (let k = 0; k < 5; k++) cloud.add(batch(50_000, (i) => [k, i, 0], {pulse0: 50_000 * k}));
+  same(cloud.total, 250_000, 'total');
+  same([cloud.gone, cloud.count], [131_072, 118_928], 'gone and count'); // blocks of 65,536: 250,000 - 2 * 65,536
+  same(cloud.boundsOfAll.min[0], 0, 'bounds of all');
+  same(cloud.bounds.min[0], 2, 'bounds of those held'); // the 131,073rd point is of the third batch
+  cloud.clear();
+  same([cloud.total, cloud.count, cloud.bounds, cloud.origin], [0, 0, null, null], 'cleared');
+});
+
+test('a point keeps its figures through closing, in blocks of their own by station and scan', () => {
+  const cloud = new Cloud();
+  const b = batch(BLOCK + 10, (i) => [500_000 + i / 4096, 5_600_000 - i / 4096, 110], {pulse0: 2 ** 40});
+  b.reflectance[7] = -3.5;
+  cloud.add(b);
+  cloud.add(batch(5, () => [1, 2, 3], {station: 2}));
+  same(cloud.blocks.map((x) => [x.n, x.station, x.closed]), [[BLOCK, 1, true], [10, 1, true], [5, 2, false]], 'blocks');
+  const [first] = cloud.blocks;
+  same([...first.order].sort((p, q) => p - q).every((v, i) => v === i), true, 'a permutation');
+  const at = first.order.indexOf(7);
+  const p = pointOf(cloud, first, at);
+  same([p.x, p.y, p.z, p.pulse, p.range, p.reflectance, p.echo, p.echoes],
+    [500_000 + 7 / 4096, 5_600_000 - 7 / 4096, 110, 2 ** 40 + 7, 7, -3.5, 1, 1], 'point 7');
+  same([pointOf(cloud, first, at).amplitude, first.amplitude], [NaN, null], 'not modelled: no array');
+});
+
+test('pulses further apart than 32 bits begin a block', () => {
+  const cloud = new Cloud();
+  cloud.add(batch(1, () => [0, 0, 0], {pulse0: 0}));
+  cloud.add(batch(1, () => [0, 0, 0], {pulse0: 2 ** 33}));
+  same(cloud.blocks.map((b) => b.pulse0), [0, 2 ** 33], 'blocks');
+});
+
+test('a prefix of a block is spread evenly: one point of each stretch', () => {
+  for (const k of [64, 512, 4096]) {
+    const stretches = new Set(evenOrder(BLOCK).slice(0, k));
+    const met = new Set([...stretches].map((i) => Math.floor(i * k / BLOCK)));
+    same(met.size, k, `stretches of ${BLOCK / k}`);
+  }
+  // Every 512th point of lines with 512 points is one column. Here the places within lines are as if thrown: of 128 points
+  // in 512 places, 512 (1 - (1 - 1/512)^128) = 113.3 differ, sigma 3.4 (occupancy): above 95 by five sigma.
+  const columns = new Set([...evenOrder(BLOCK).slice(0, 128)].map((i) => i % 512));
+  same(columns.size > 95, true, `${columns.size} columns`);
+  same(new Set(evenOrder(1000)).size, 1000, 'a part of a block');
+});
+
+test('far from the origin: floats of coordinates jump, the cloud\'s do not', () => {
+  const at = [500_000, 5_600_000, 110], step = 0.001;
+  const cloud = new Cloud();
+  cloud.add(batch(1000, (i) => [at[0] + 300, at[1] + 200 + step * i, at[2]]));
+  let ours = 0, naive = 0;
+  for (let i = 0; i < 1000; i++) {
+    const y = at[1] + 200 + step * i;
+    ours = Math.max(ours, Math.abs(cloud.blocks[0].position[3 * i + 1] + cloud.origin[1] - y));
+    naive = Math.max(naive, Math.abs(Math.fround(y) - y));
+  }
+  near(ours, 0, 2 ** -24, 'ours'); // half an ulp of a float below 1 m
+  same(naive > 0.2, true, `naive: ${naive}`); // half an ulp of 5.6e6 is 0.25 m
+});
+
+test('the eye in two floats: what it sees moves as it does', () => {
+  // The eye 5 cm before a point, 900 m from the origin, goes 1,000 times by 1 um. Float's ulp there is 61 um.
+  const p = Math.fround(900.05);
+  let ours = 0, naive = 0;
+  for (let i = 0; i < 1000; i++) {
+    const eye = 900 + 1e-6 * i;
+    const {hi, lo} = split([eye, 0, 0]);
+    ours = Math.max(ours, Math.abs(Math.fround(Math.fround(p - hi[0]) - lo[0]) - (p - eye)));
+    naive = Math.max(naive, Math.abs(Math.fround(p - Math.fround(eye)) - (p - eye)));
+  }
+  near(ours, 0, 4e-9, 'ours'); // an ulp of 0.05 m is 3.7e-9
+  same(naive > 2e-5, true, `naive: ${naive}`); // up to half of 61 um
+});
+
+test('depth: a millimetre and a kilometre in one picture', () => {
+  const step = 2 ** -24; // of the depth buffer
+  same([depthOf(NEAR_M), depthOf(FAR_M)], [0, 1], 'ends');
+  for (const [w, apart] of [[0.002, 2e-8], [1, 2e-6], [1000, 2e-3]]) {
+    same(depthOf(w + apart) - depthOf(w) > step, true, `${apart} m at ${w} m`);
+  }
+  // The usual depth, f (w - n) / (w (f - n)), with the same ends does not tell 1 km from 10 km.
+  const usual = (w) => FAR_M * (w - NEAR_M) / (w * (FAR_M - NEAR_M));
+  same(usual(10_000) - usual(1000) < 16 * step, true, 'the usual one');
+});
+
+test('projecting and back, at UTM coordinates', () => {
+  const c = camera({target: [500_000, 5_600_000, 110], azimuth: 2.2, elevation: -0.7, distance: 35});
+  for (const [x, y, w] of [[0, 0, 3], [800, 10, 50], [411, 333, 35]]) {
+    const p = c.project(c.at(x, y, w));
+    near(p.x, x, 1e-4, 'x'); // 1e-9 m (an ulp at 5.6e6) at 3 m is 2e-7 px
+    near(p.y, y, 1e-4, 'y');
+    near(p.w, w, 1e-6, 'w');
+  }
+  const right = camera().project([1, 0, 0]), up = camera().project([0, 0, 1]);
+  same([right.x > 400, Math.abs(right.y - 300) < 1e-9, up.y < 300], [true, true, true], 'looking north: east is right, z up');
+});
+
+test('what a gesture holds stays under the pointer', () => {
+  const c = camera({azimuth: 0.5, elevation: -0.4});
+  const held = c.at(200, 150, 7);
+  const stays = (x, y, what) => {
+    const p = c.project(held);
+    near(p.x, x, 1e-6, `${what}, x`);
+    near(p.y, y, 1e-6, `${what}, y`);
+  };
+  c.zoom(0.6, held);
+  stays(200, 150, 'zoom');
+  c.orbit(held, 0.4, -0.2);
+  stays(200, 150, 'orbit');
+  c.pan(30, -20, c.project(held).w);
+  stays(230, 130, 'pan');
+  const {eye} = c;
+  c.lookFrom(eye, 1);
+  c.turn(0.7, 0.1);
+  c.zoom(0.5);
+  c.eye.forEach((v, a) => near(v, eye[a], 1e-9, 'looking round: the eye'));
+});
+
+test('a box is left out only where nothing of it is in sight', () => {
+  const c = camera(); // at y = -10, looking north
+  const sees = (lo, hi) => c.sees(lo, hi, [0, 0, 0]);
+  same([sees([-1, -1, -1], [1, 1, 1]), sees([-1, -30, -1], [1, -20, 1]), sees([50, -1, -1], [60, 1, 1]), sees([-99, -99, -99], [99, 99, 99])],
+    [true, false, false, true], 'before, behind, beside, around');
+});
+
+test('picking: the nearer of two under the pointer, and none beside them', () => {
+  const cloud = new Cloud();
+  cloud.add(batch(3, (i) => [[0, 20, 0], [0.01, 0, 0], [3, 0, 0]][i])); // 30 m, 10 m and 10 m away
+  const c = camera();
+  same(nearest(cloud, c, 400, 300, 8).i, 1, 'the front one'); // 0.6 px beside the pointer
+  const third = c.project([3, 0, 0]);
+  same(nearest(cloud, c, third.x + 2, third.y, 8).i, 2, 'at the side');
+  same(nearest(cloud, c, third.x, third.y + 40, 8), null, 'nothing');
+  same(nearest(new Cloud(), c, 1, 1, 8), null, 'an empty cloud');
+});
+
+test('limits: robust, and the same while points come unless they miss much', () => {
+  const values = Array.from({length: 1001}, (_, i) => i / 100).concat([1e6, -1e6]);
+  const [lo, hi] = robustLimits(values); // percentiles 0.1 and 9.9, and 2 % of their difference
+  near(lo, 0.1 - 0.196, 0.03, 'lo');
+  near(hi, 9.9 + 0.196, 0.03, 'hi');
+  same(robustLimits([]), null, 'of none');
+  const [low, high] = robustLimits([2 - 5e-7, 2, 2 + 5e-7], 0.01);
+  near(low, 1.995, 1e-6, 'rounding is not shown: limits are apart as far as wanted'); // 2 -+ half of 0.01
+  near(high, 2.005, 1e-6, 'its other end');
+  same(widened([0, 10], [-0.5, 10.9]), [0, 10], 'within a tenth');
+  same(widened([0, 10], [3, 15]), [0, 15], 'more');
+});
+
+test('colours: ends of a ramp, NaN, ticks, legend', () => {
+  same([rampAt('ember', -1), rampAt('ember', 9)], [[47, 59, 102], [255, 209, 102]], 'ends'); // #2f3b66, #ffd166
+  const cloud = new Cloud();
+  const b = batch(2, () => [0, 0, 0]);
+  b.amplitude[1] = 12;
+  cloud.add(b);
+  same([...valuesOf(cloud.blocks[0], 'amplitude', 0, 2)], [Math.fround(NONE), 12], 'NaN has a number of its own');
+  same([...valuesOf(cloud.blocks[0], 'reflectance', 0, 2)], [NONE, NONE].map(Math.fround), 'not modelled at all');
+  same(ticks([-0.13, 3.31]).map((t) => t.text), ['0', '1', '2', '3'], 'ticks');
+  const legend = legendOf('height', {limits: [-1, 1], offset: 110});
+  same([legend.from, legend.to, legend.unit, legend.stops.length], [109, 111, 'm', 17], 'height');
+  same(legendOf('label', {limits: null, sample: [3, 5, 5]}).items.map((i) => i.label), [5, 3], 'the most frequent first');
+  same(sampleOf(cloud, 'reflectance'), [], 'what is not modelled is no number');
+  for (const mode of ['reflectance', 'label']) same(legendOf(mode, {limits: null}).from, 'not known', mode);
+  same([legendOf('rgb', {limits: null}), legendOf('rgb', {limits: null, hasColours: false}).from], [null, 'not known'], 'rgb');
+});
+
+test('dragging: places on a plane, also where the ray misses it; headings; keys', () => {
+  const c = camera({target: [0, 0, 0], elevation: -0.6});
+  const p = c.project([1.5, 2, 1]);
+  onPlane(c, p.x, p.y, 1, 1000).forEach((v, a) => near(v, [1.5, 2, 1][a], 1e-9, 'on the plane'));
+  const sky = onPlane(c, 400, -2000, 1, 50);
+  near(Math.hypot(sky[0] - c.eye[0], sky[1] - c.eye[1]), 50, 1e-9, 'above the horizon: the reach');
+  near(headingTo([0, 0], [1, 1]), 45, 1e-12, 'north-east');
+  near(headingTo([0, 0], [-1, 0]), 270, 1e-12, 'west');
+  same([arrowStep(camera(), 'ArrowUp', 0.1), arrowStep(camera({azimuth: radians(100)}), 'ArrowUp', 1)], [[0, 0.1], [1, 0]], 'away from the eye');
+  same([1, 0.3, 7, 50].map(roundBelow), [1, 0.2, 5, 50], 'round lengths');
+});
+
+test('a station that is dragged tells where it is, once it is let go', () => {
+  const told = [];
+  const stations = new Stations(() => {}, (m) => told.push(m));
+  stations.set([{number: 4, name: 'a', x_m: 0, y_m: 0, z_m: 0, heading_deg: 10, tripod: null}]);
+  const c = camera({elevation: -0.6});
+  const from = c.project([0, 0, 0]), to = c.project([1, 0.5, 0]);
+  const hit = stations.hit(c, from.x + 3, from.y);
+  same(hit, {number: 4, what: 'move'}, 'hit');
+  stations.grab(c, hit, from.x, from.y);
+  stations.drag(c, from.x + 9, from.y);
+  stations.drag(c, to.x, to.y);
+  same(told.length, 0, 'not before');
+  stations.drop();
+  near(told[0].x, 1, 1e-9, 'x');
+  near(told[0].y, 0.5, 1e-9, 'y');
+  same([told[0].station, told[0].z, told[0].heading_deg, stations.pending], [4, 0, 10, true], 'the rest');
+  stations.set(stations.list); // refused: as before
+  same(stations.placeOf(stations.list[0]).at, [0, 0, 0], 'back');
+});
+
+test('levels of detail: equal shares; the budget follows the time', () => {
+  const parts = [{n: 1000, drawn: 0, weight: 1}, {n: 100, drawn: 0, weight: 1}, {n: 500, drawn: 0, weight: 1, skip: true}];
+  same(shares(parts, 110), [100, 10, 0], 'a tenth of each in sight');
+  same(shares(parts, 1e9), [1000, 100, 0], 'all');
+  parts[1].whole = true;
+  same(restShares(parts, 110), [100, 100, 0], 'at rest: an open block comes at once');
+  same(restShares([{n: 500_000, drawn: 450_000, weight: 1}, {n: 9, drawn: 0, weight: 1}], 50_004), [500_000, 4], 'then in turn');
+  const budget = new Budget(50, 100_000);
+  budget.took(100, 100_000);
+  same(budget.points, 50_000, 'twice too slow');
+  budget.took(10, 1000);
+  same(budget.points, 50_000, 'too few points to say');
+});
+
+test('a tripod: its feet stand on the ground, the first towards north', () => {
+  // The head 1.6 m above the ground, 0.2 m of it above the tripod's top: legs of 1.8 m reach out sqrt(1.8^2 - 1.4^2).
+  const {positions: p} = legsMesh({leg_m: 1.8, foot_radius_m: Math.sqrt(1.8 ** 2 - 1.4 ** 2), height_m: 1.4, head_above_m: 0.2});
+  const of = (axis) => Array.from({length: p.length / 3}, (_, i) => p[3 * i + axis]);
+  near(Math.min(...of(2)), -1.6, 0.014, 'feet'); // half a leg's thickness at its end
+  near(Math.max(...of(2)), -0.2, 0.024, 'top');
+  near(Math.max(...of(1)), Math.sqrt(1.8 ** 2 - 1.4 ** 2), 0.014, 'the first foot');
+});
+
+test('the scene\'s bytes, good and bad; its edges', () => {
+  const positions = [0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 0, 0, 1];
+  const triangles = [0, 1, 2, 0, 2, 3, 0, 1, 4]; // a square of two, and one that stands on its side
+  const make = (n = 40 + 60 + 36) => {
+    const bytes = new ArrayBuffer(n), v = new DataView(bytes);
+    [0x43534853, 1, 5, 3].forEach((u, i) => v.setUint32(4 * i, u, true));
+    [5e5, 5.6e6, 9].forEach((d, i) => v.setFloat64(16 + 8 * i, d, true));
+    new Float32Array(bytes, 40, 15).set(positions);
+    new Uint32Array(bytes, 100, 9).set(triangles);
+    return v;
+  };
+  const scene = parseScene(make().buffer);
+  same([scene.origin, [...scene.positions], [...scene.triangles]], [[5e5, 5.6e6, 9], positions, triangles], 'scene');
+  throws(() => parseScene(new ArrayBuffer(3)), '3 bytes');
+  throws(() => parseScene(make(140)), '136 expected');
+  const bad = make();
+  bad.setUint32(100, 5, true);
+  throws(() => parseScene(bad), 'beyond its 5 vertices');
+  bad.setUint32(0, 1, true);
+  throws(() => parseScene(bad), 'SHSC');
+  const edges = featureEdges(scene.positions, scene.triangles);
+  const names = new Set(Array.from({length: edges.length / 2}, (_, k) => [edges[2 * k], edges[2 * k + 1]].sort().join('')));
+  same([names.has('02'), names.has('01'), names.has('23')], [false, true, true], 'the diagonal is none; a corner and a border are');
+});
+
+await runTests();

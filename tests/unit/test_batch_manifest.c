@@ -1,0 +1,245 @@
+/* Lines of a campaign's manifest: what is written is read, what isn't whole is none; files that a mesh names. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <cmocka.h>
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "firmware_sim/app/batch/beside.h"
+#include "firmware_sim/app/batch/manifest.h"
+
+static char dir[64];
+
+static int make_dir(void **state)
+{
+    (void)state;
+    strcpy(dir, "/tmp/scanhead-batch-XXXXXX");
+    return mkdtemp(dir) == NULL;
+}
+
+static int remove_dir(void **state)
+{
+    char command[128];
+    (void)state;
+    snprintf(command, sizeof command, "rm -r '%s'", dir);
+    return system(command);
+}
+
+static const char *path_of(const char *name)
+{
+    static char path[4][128];
+    static int turn;
+    turn = (turn + 1) % 4;
+    snprintf(path[turn], sizeof path[turn], "%s/%s", dir, name);
+    return path[turn];
+}
+
+static void write_file(const char *name, const char *mode, const char *text)
+{
+    FILE *f = fopen(path_of(name), mode);
+    assert_non_null(f);
+    assert_true(fputs(text, f) >= 0);
+    assert_int_equal(fclose(f), 0);
+}
+
+static struct batch_entry an_entry(uint32_t job, struct batch_file file[2])
+{
+    static const char sha[] = "0123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef";
+    struct batch_entry entry = {
+        .job = job, .pulses = 18446744073709551615u, .points = 17, .seconds = 1.25, .n_files = 2};
+    file[0] = (struct batch_file){.name = "0001_a.ply", .bytes = 1234};
+    file[1] = (struct batch_file){.name = "0001_a.las", .bytes = 0};
+    strcpy(file[0].sha, sha);
+    strcpy(file[1].sha, sha);
+    strcpy(entry.stream_sha, sha);
+    strcpy(entry.made.program, "1.0");
+    strcpy(entry.made.engine, "Embree 3, packets of 8, AVX2");
+    strcpy(entry.made.configuration, sha);
+    strcpy(entry.made.inputs, sha);
+    strcpy(entry.made.job, sha);
+    entry.file = file;
+    return entry;
+}
+
+struct seen {
+    uint32_t job[8];
+    int n;
+};
+
+static int note(void *ctx, struct batch_entry *entry, struct sh_err *err)
+{
+    struct seen *seen = ctx;
+    struct batch_file file[2];
+    const struct batch_entry want = an_entry(entry->job, file);
+    (void)err;
+    seen->job[seen->n++] = entry->job;
+    assert_null(batch_made_differs(&want.made, &entry->made));
+    assert_true(entry->pulses == want.pulses && entry->points == 17 && entry->n_files == 2);
+    assert_string_equal(entry->file[1].name, "0001_a.las");
+    assert_true(entry->file[0].bytes == 1234);
+    assert_string_equal(entry->file[0].sha, file[0].sha);
+    batch_entry_free(entry);
+    return SH_OK;
+}
+
+static int warnings;
+static void count_warning(void *ctx, const char *text)
+{
+    (void)ctx;
+    (void)text;
+    warnings++;
+}
+static const struct sh_report REPORT = {NULL, count_warning, NULL, NULL};
+
+static struct seen read_all(void)
+{
+    struct seen seen = {.n = 0};
+    struct sh_err err;
+    warnings = 0;
+    assert_int_equal(batch_manifest_read(dir, note, &seen, &REPORT, &err), SH_OK);
+    return seen;
+}
+
+static void add(uint32_t shard, uint32_t job)
+{
+    struct batch_file file[2];
+    const struct batch_entry entry = an_entry(job, file);
+    struct sh_err err;
+    int fd;
+    assert_int_equal(batch_manifest_open(dir, shard, 2, &fd, &err), SH_OK);
+    assert_int_equal(batch_manifest_add(fd, &entry, &err), SH_OK);
+    close(fd);
+}
+
+/* Whatever part of a line is there, the next one begins on a line of its own, and only whole lines count. */
+static void test_torn(void **state)
+{
+    const char *path = path_of("manifest-1-of-2.jsonl");
+    char copy[128];
+    struct stat st;
+    (void)state;
+    snprintf(copy, sizeof copy, "%s", path);
+    add(1, 1);
+    assert_int_equal(stat(copy, &st), 0);
+    const off_t line = st.st_size;
+    for (off_t left = line - 1; left >= 0; left -= left > 40 ? 37 : 1) {
+        assert_int_equal(truncate(copy, left), 0);
+        assert_int_equal(read_all().n, 0);
+        add(1, 2);
+        const struct seen seen = read_all();
+        assert_int_equal(seen.n, 1);
+        assert_int_equal(seen.job[0], 2);
+        assert_int_equal(warnings, 0);
+        assert_int_equal(stat(copy, &st), 0);
+        assert_int_equal(st.st_size, line);
+    }
+}
+
+static void test_folder(void **state)
+{
+    struct sh_err err;
+    int fd, second;
+    (void)state;
+    assert_int_equal(read_all().n, 0);
+    add(1, 5);
+    add(2, 3);
+    add(1, 5);
+    write_file("manifest-1-of-2.jsonl", "a", "{\"job\":4}\n");
+    write_file("manifest-1-of-2.jsonl.part", "w", "{\"job\":4}\n");
+    write_file("manifest-x-of-2.jsonl", "w", "nothing\n");
+    add(1, 6);
+    const struct seen seen = read_all();
+    assert_int_equal(seen.n, 4);
+    assert_true(seen.job[0] == 5 && seen.job[1] == 5 && seen.job[2] == 6 && seen.job[3] == 3);
+    assert_int_equal(warnings, 1); /* of the line in the middle */
+    assert_int_equal(batch_manifest_open(dir, 1, 2, &fd, &err), SH_OK);
+    assert_int_equal(batch_manifest_open(dir, 1, 2, &second, &err), SH_ESTATE);
+    assert_non_null(strstr(err.text, "shard 1/2"));
+    close(fd);
+}
+
+static void test_other_lines(void **state)
+{
+    static const char *const bad[] = {"", "{}", "[]", "{\"job\":1}", "null"};
+    struct batch_entry entry;
+    struct batch_file file[2];
+    char *line = NULL;
+    size_t len;
+    (void)state;
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
+        assert_int_equal(batch_entry_read(bad[i], &entry), 0);
+    /* a file elsewhere is no file of a campaign */
+    const struct batch_entry good = an_entry(1, file);
+    struct sh_err err;
+    int fd;
+    strcpy(file[1].name, "../passwd");
+    assert_int_equal(batch_manifest_open(dir, 1, 2, &fd, &err), SH_OK);
+    assert_int_equal(batch_manifest_add(fd, &good, &err), SH_OK);
+    close(fd);
+    FILE *f = fopen(path_of("manifest-1-of-2.jsonl"), "r");
+    assert_non_null(f);
+    assert_true(getline(&line, &len, f) > 0);
+    line[strlen(line) - 1] = '\0';
+    assert_int_equal(batch_entry_read(line, &entry), 0);
+    char *name = strstr(line, "../passwd");
+    memcpy(name, "...passwd", 9);
+    assert_int_equal(batch_entry_read(line, &entry), 1);
+    batch_entry_free(&entry);
+    free(line);
+    fclose(f);
+}
+
+/* ---- what a mesh names */
+
+static int list_name(void *ctx, const char *name, const char *path)
+{
+    char *all = ctx;
+    (void)name;
+    snprintf(all + strlen(all), 512 - strlen(all), "%s;", path + strlen(dir));
+    return SH_OK;
+}
+
+static void expect_beside(const char *mesh, const char *want)
+{
+    char all[512] = "";
+    struct sh_err err;
+    assert_int_equal(batch_beside(path_of(mesh), list_name, all, &err), SH_OK);
+    assert_string_equal(all, want);
+}
+
+static void test_beside(void **state)
+{
+    (void)state;
+    assert_int_equal(mkdir(path_of("tex"), 0700), 0);
+    for (const char *const *name = (const char *const[]){"a.png", "b c.JPG", "tex/d.png", "e.bin", "other.png", NULL};
+         *name != NULL; name++)
+        write_file(*name, "w", "x");
+    write_file("m.obj", "w", "mtllib first.mtl none.mtl\nv 0.1 0.2 0.png\nusemtl a.png\n");
+    write_file("first.mtl", "w",
+               "newmtl one\nmap_Kd -s 1 1 1 b c.JPG\r\nmap_d tex/d.png\nmap_bump C:\\work\\tex\\a.png\nmap_Ka a.png\n");
+    expect_beside("m.obj", "/first.mtl;/b c.JPG;/tex/d.png;/a.png;");
+    write_file("m.gltf", "w",
+               "{\"buffers\":[{\"uri\":\"e.bin\"}],\"images\":[{\"uri\":\"b%20c.JPG\"},{\"uri\":\"tex/d.png\"}]}");
+    expect_beside("m.gltf", "/e.bin;/b c.JPG;/tex/d.png;");
+    write_file("m.ply", "w", "ply\ncomment TextureFile a.png\n");
+    expect_beside("m.ply", "");
+    write_file("empty.obj", "w", "");
+    expect_beside("empty.obj", "");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_torn, make_dir, remove_dir),
+        cmocka_unit_test_setup_teardown(test_folder, make_dir, remove_dir),
+        cmocka_unit_test_setup_teardown(test_other_lines, make_dir, remove_dir),
+        cmocka_unit_test_setup_teardown(test_beside, make_dir, remove_dir),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,288 @@
+/* Ranges, noise and angular steps as settings, and settings that describe themselves. Expected values by hand. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "firmware_sim/command/command_inside.h"
+#include "tests/unit/command_device.h"
+
+static struct command_result result;
+
+static void expect(struct command_device *dev, const char *line, const char *reply)
+{
+    command_execute(dev, 1, line, &result);
+    if (strcmp(result.reply, reply) != 0) fail_msg("'%s' gives '%s', not '%s'", line, result.reply, reply);
+}
+
+/* Refused with this number and these words, and nothing has changed. */
+static void refuse(struct command_device *dev, const char *line, int number, const char *words)
+{
+    const struct head_settings before = dev->settings;
+    command_execute(dev, 1, line, &result);
+    if (result.error != number || strstr(result.reply, words) == NULL)
+        fail_msg("'%s' gives '%s', not %d with '%s'", line, result.reply, number, words);
+    assert_memory_equal(&before, &dev->settings, sizeof before);
+}
+
+static void ranges_keep_apart(void **ctx)
+{
+    (void)ctx;
+    struct command_device dev = command_test_device();
+    expect(&dev, "HEAD:RANG:MIN 2500 MM", "OK");
+    assert_true(dev.settings.range_min_nm == 2500 * MICRO);
+    expect(&dev, "HEAD:RANG:MAX 0.1 KM", "OK");
+    expect(&dev, "HEAD:RANG:MAX?", "100");
+    expect(&dev, "HEAD:RANG:MIN? MAX", "99.999999999");
+    expect(&dev, "HEAD:RANG:MAX? MIN", "2.500000001");
+    expect(&dev, "HEAD:RANG:MAX? MAX", "800");
+    refuse(&dev, "HEAD:RANG:MIN 100", CMD_E_SETTINGS, "allowed 0.5 to 99.999999999 as HEAD:RANGe:MAX is 100");
+    refuse(&dev, "HEAD:RANG:MIN 0.4", CMD_E_RANGE, "HEAD:RANGe:MIN 0.4 m, allowed 0.5 to 250");
+    refuse(&dev, "HEAD:RANG:MAX 1.5", CMD_E_RANGE, "allowed 2 to 800"); /* nothing would be left of a program */
+    refuse(&dev, "HEAD:RANG:MAX 900", CMD_E_RANGE, "allowed 2 to 800");
+    refuse(&dev, "HEAD:RANG:MAX 5 DEG", CMD_E_SUFFIX, "takes M, MM or KM");
+    expect(&dev, "*RST", "OK");
+    expect(&dev, "HEAD:RANG:MAX?", "400");
+    expect(&dev, "HEAD:RANG:MIN?", "1");
+}
+
+static void noise_has_kinds_and_sizes(void **ctx)
+{
+    (void)ctx;
+    struct command_device dev = command_test_device();
+    expect(&dev, "HEAD:NOIS?", "OFF");
+    expect(&dev, "HEAD:NOISE on", "OK");
+    expect(&dev, "HEAD:NOIS? DEF", "OFF");
+    expect(&dev, "HEAD:NOIS?", "ON");
+    refuse(&dev, "HEAD:NOIS SIGN", CMD_E_SETTINGS, "HEAD:NOISe SIGNal needs signal.model: on");
+    expect(&dev, "HEAD:NOIS:ANGL ON", "OK");
+    dev.limits.angle_most = 0;
+    expect(&dev, "HELP? HEAD:NOIS:ANGL", "word,\"\",,,OFF,,\"off boot idle spin-down fault\",\"OFF\"");
+    refuse(&dev, "HEAD:NOIS:ANGL ON", CMD_E_SETTINGS, "needs mirror_sigma_deg or pan_sigma_deg of the head profile");
+    refuse(&dev, "HEAD:NOIS LOUD", CMD_E_DATA_TYPE, "HEAD:NOISe takes OFF, ON, SIGNal, DEF, not 'LOUD'");
+    dev.limits.noise_most = 2;
+    dev.limits.sigma_min_nm = 3 * MICRO;
+    expect(&dev, "HEAD:NOIS SIGNAL", "OK");
+    refuse(&dev, "HEAD:NOIS:SIGM 0.0029", CMD_E_RANGE, "HEAD:NOISe:SIGMa 0.0029 m, allowed 0.003 to 10");
+    expect(&dev, "HEAD:NOIS:SIGM MIN", "OK");
+    expect(&dev, "HEAD:NOIS:SIGM?", "0.003");
+    expect(&dev, "HEAD:NOIS:BALL 0.000000001", "OK");
+    refuse(&dev, "HEAD:NOIS:BALL 0.0000000001", CMD_E_RANGE, "allowed multiples of 0.000000001 m");
+    refuse(&dev, "HEAD:NOIS:BALL 100.5", CMD_E_RANGE, "allowed 0 to 100");
+}
+
+static void what_is_planned_rests_in_a_scan(void **ctx)
+{
+    (void)ctx;
+    static const char *const lines[] = {"HEAD:RANG:MIN 3",    "HEAD:RANG:MAX 30",   "HEAD:NOIS ON",
+                                        "HEAD:NOIS:SIGM 0.1", "HEAD:NOIS:BALL 0.1", "HEAD:NOIS:ANGL ON"};
+    struct command_device dev = command_test_device();
+    for (int state = 0; state < HEAD_N_STATES; state++)
+        for (size_t i = 0; i < sizeof lines / sizeof *lines; i++) {
+            dev = command_test_device();
+            dev.state = (enum head_state)state;
+            if (state == HEAD_SPIN_UP || state == HEAD_SCANNING)
+                refuse(&dev, lines[i], CMD_E_SETTINGS, "can't change in state");
+            else
+                expect(&dev, lines[i], "OK");
+        }
+    expect(&dev, "HEAD:PRR 200000", "OK"); /* rates may */
+}
+
+/* By hand, with 300 kHz, 100 lines/s, 18 deg/s and a sweep of 360 deg: 0.12 deg in the line, 0.18 between lines. */
+static void a_line_heads_step_sets_its_rates(void **ctx)
+{
+    (void)ctx;
+    struct command_device dev = command_test_device();
+    expect(&dev, "SCAN:STEP:LINE?", "0.12");
+    expect(&dev, "SCAN:STEP:PAN?", "0.18");
+    expect(&dev, "SCAN:STEP?", "0.18");
+    expect(&dev, "SCAN:STEP 0.15", "0.15"); /* 0.15 * 300000 / 360 = 125; 0.15 * 125 = 18.75 */
+    assert_true(dev.settings.lines_uhz == 125 * MICRO && dev.settings.pan_udeg_s == 18750000);
+    assert_true(dev.settings.prr_uhz == 300000 * MICRO && result.changes);
+    /* 33.3333... lines/s and 1.3333... deg/s, each to its nearest 1e-6: 360 * 33.333333 / 300000 = 0.0399999996, and
+     * 1.333333 / 33.333333 = 0.0399999904 */
+    expect(&dev, "SCAN:STEP 40e-3 DEG", "0.04");
+    assert_true(dev.settings.lines_uhz == 33333333 && dev.settings.pan_udeg_s == 1333333);
+    expect(&dev, "SCAN:STEP:PAN?", "0.03999999");
+    expect(&dev, "SCAN:STEP:LINE 0.06", "0.06"); /* alone: the pan stays as fast */
+    assert_true(dev.settings.lines_uhz == 50 * MICRO && dev.settings.pan_udeg_s == 1333333);
+    expect(&dev, "SCAN:STEP:PAN 0.3", "0.3");
+    assert_true(dev.settings.lines_uhz == 50 * MICRO && dev.settings.pan_udeg_s == 15 * MICRO);
+    expect(&dev, "SCAN:STEP DEF", "0.18");
+    assert_true(dev.settings.lines_uhz == 100 * MICRO && dev.settings.pan_udeg_s == 18 * MICRO);
+}
+
+/* 1 to 2000 lines/s at 300 kHz: 0.0012 to 2.4 deg. The pan's 60 deg/s: 0.6 deg at 100 lines/s; of both steps the root
+ * of 60 * 360 / 300000, as lines rise with the step: 0.2683281573. At 0.268328157 it would be 223.6067975 lines/s, which
+ * is 223.606798, and 60.00000000001 deg/s. */
+static void steps_stay_within_the_rates(void **ctx)
+{
+    (void)ctx;
+    struct command_device dev = command_test_device();
+    expect(&dev, "SCAN:STEP:LINE? MIN", "0.0012");
+    expect(&dev, "SCAN:STEP:LINE? MAX", "2.4");
+    expect(&dev, "SCAN:STEP:PAN? MAX", "0.6");
+    expect(&dev, "SCAN:STEP? MIN", "0.0012");
+    expect(&dev, "SCAN:STEP? MAX", "0.268328156");
+    refuse(&dev, "SCAN:STEP 0.27", CMD_E_SETTINGS, "allowed 0.0012 to 0.268328156 as HEAD:PRR is 300000");
+    refuse(&dev, "SCAN:STEP:LINE 2.41", CMD_E_SETTINGS, "allowed 0.0012 to 2.4 as HEAD:PRR is 300000");
+    refuse(&dev, "SCAN:STEP:PAN 0.61", CMD_E_SETTINGS, "allowed 0 to 0.6 as HEAD:LINes is 100");
+    refuse(&dev, "SCAN:STEP 0", CMD_E_RANGE, "allowed 0.000000001 to 360");
+    refuse(&dev, "SCAN:STEP 361", CMD_E_RANGE, "allowed 0.000000001 to 360");
+    command_execute(&dev, 1, "SCAN:STEP MAX", &result);
+    assert_true(result.error == 0 && dev.settings.pan_udeg_s == 60 * MICRO);
+    expect(&dev, "SCAN:STEP:LINE MAX", "2.4");
+    assert_true(dev.settings.lines_uhz == 2000 * MICRO);
+    dev.limits.pan_max_udeg_s = dev.settings.pan_udeg_s = 0;
+    refuse(&dev, "SCAN:STEP 0.1", CMD_E_SETTINGS, "the head has no pan; SCAN:STEP:LINE is its step");
+    expect(&dev, "SCAN:STEP:LINE 0.1", "0.1");
+}
+
+/* 360 kHz at 1 deg and 1000 rings/s. */
+static struct command_device sphere(void)
+{
+    struct command_device dev = command_test_device();
+    dev.limits.emitter = EMITTER_SPHERE;
+    dev.limits.round = 1;
+    dev.limits.line_pulses = 360;
+    dev.limits.prr_max_uhz = 360000 * MICRO;
+    dev.settings.step_udeg = 1 * MICRO;
+    dev.settings.lines_uhz = 100 * MICRO;
+    dev.settings.prr_uhz = 36000 * MICRO;
+    dev.defaults = dev.settings;
+    return dev;
+}
+
+static void a_spheres_step_divides_half_a_turn(void **ctx)
+{
+    (void)ctx;
+    struct command_device dev = sphere();
+    expect(&dev, "SCAN:STEP?", "1");
+    expect(&dev, "SCAN:STEP? MIN", "0.1"); /* 3600 a ring, 100 rings/s */
+    expect(&dev, "SCAN:STEP? MAX", "90");
+    expect(&dev, "SCAN:STEP 0.36", "0.36");
+    expect(&dev, "HEAD:PRR?", "100000"); /* 1000 a ring */
+    expect(&dev, "HEAD:LIN? MAX", "360");
+    refuse(&dev, "HEAD:LIN 361", CMD_E_SETTINGS, "allowed 1 to 360 with this SCAN:STEP");
+    refuse(&dev, "SCAN:STEP 0.37", CMD_E_RANGE, "the nearest are 0.36 and 0.375 deg"); /* 500 and 480 to 180 deg */
+    refuse(&dev, "SCAN:STEP 0.05", CMD_E_SETTINGS, "allowed 0.1 to 90 as HEAD:LINes is 100");
+    refuse(&dev, "SCAN:STEP:LINE 1", CMD_E_SETTINGS, "allowed 0.36: SCAN:STEP sets both");
+    dev.state = HEAD_SCANNING;
+    refuse(&dev, "SCAN:STEP 1", CMD_E_SETTINGS, "can't change in state scanning");
+    dev.state = HEAD_IDLE;
+    expect(&dev, "SCAN:STEP DEF", "1");
+    expect(&dev, "HEAD:PRR?", "36000");
+    dev.limits.step_fixed = 1;
+    refuse(&dev, "SCAN:STEP 2", CMD_E_SETTINGS, "allowed 1: the platform moves");
+}
+
+static void steps_of_fixed_patterns_are_readings(void **ctx)
+{
+    (void)ctx;
+    struct command_device dev = command_test_device();
+    dev.limits.emitter = EMITTER_PLANAR;
+    dev.limits.line_pulses = 1440;
+    expect(&dev, "SCAN:STEP?", "0.25");
+    refuse(&dev, "SCAN:STEP 0.5", CMD_E_SETTINGS, "allowed 0.25: its steps are fixed");
+    refuse(&dev, "SCAN:STEP:PAN?", CMD_E_SETTINGS, "the head has no pan");
+    dev = command_test_device();
+    dev.limits.emitter = EMITTER_BEAMS;
+    dev.limits.sequence_ps = 55296000;
+    dev.settings.lines_uhz = 20 * MICRO;
+    expect(&dev, "SCAN:STEP:LINE?", "0.3981312"); /* 360 * 20 * 55.296e-6 */
+    refuse(&dev, "SCAN:STEP 0.4", CMD_E_SETTINGS, "allowed 0.3981312 as HEAD:LINes is 20");
+    dev.limits.emitter = EMITTER_DIRECTIONS;
+    refuse(&dev, "SCAN:STEP?", CMD_E_SETTINGS, "the head has a list of directions, and no step");
+}
+
+static int too_far(void *owner, const struct head_settings *settings, char *why, size_t len)
+{
+    if (settings->range_max_nm <= *(const int64_t *)owner) return 0;
+    snprintf(why, len, "it does not fit");
+    return -1;
+}
+
+static void what_can_not_be_planned_is_refused(void **ctx)
+{
+    (void)ctx;
+    int64_t most_nm = 50 * NANO;
+    struct command_device dev = command_test_device();
+    dev.can_plan = too_far;
+    dev.owner = &most_nm;
+    refuse(&dev, "HEAD:RANG:MAX 51", CMD_E_SETTINGS, "HEAD:RANGe:MAX: it does not fit");
+    expect(&dev, "HEAD:RANG:MAX 50", "OK");
+}
+
+static void settings_describe_themselves(void **ctx)
+{
+    (void)ctx;
+    struct command_device dev = command_test_device();
+    expect(&dev, "HELP? HEAD:PRR", "number,\"Hz\",1000,1200000,300000,0.000001,\"all\",\"\"");
+    expect(&dev, "HELP? :head:rang:min?", "number,\"m\",0.5,250,1,0.000000001,\"off boot idle spin-down fault\",\"\"");
+    expect(&dev, "HELP? HEAD:NOISE", "word,\"\",,,OFF,,\"off boot idle spin-down fault\",\"OFF ON\"");
+    expect(&dev, "HELP? SCAN:ECHOES", "word,\"\",,,ALL,,\"all\",\"ALL FIRSt LAST STRongest\"");
+    expect(&dev, "HELP? SCAN:STEP", "number,\"deg\",0.0012,0.268328156,0.18,0.000000001,\"all\",\"\"");
+    expect(&dev, "HELP? SCAN:STAR", "action,\"\",,,,,\"idle\",\"\"");
+    expect(&dev, "HELP? TIME?", "query,\"\",,,,,\"all\",\"\"");
+    dev.limits.n_rates = 2;
+    dev.limits.rate_uhz[0] = 100000 * MICRO;
+    dev.limits.rate_uhz[1] = 300000 * MICRO;
+    expect(&dev, "HELP? HEAD:PRR", "number,\"Hz\",100000,300000,300000,0.000001,\"all\",\"100000 300000\"");
+    dev.limits.pan_max_udeg_s = 0;
+    expect(&dev, "HELP? SCAN:STEP", "number,\"deg\",,,,,\"\",\"\"");
+    refuse(&dev, "HELP? HEAD", CMD_E_DATA_TYPE, "HELP? takes a header, not 'HEAD'");
+}
+
+/* What HELP? says is what MIN, MAX and DEF answer, and none of them is refused. */
+static void limits_are_those_that_hold(void **ctx)
+{
+    (void)ctx;
+    struct command_device dev = command_test_device();
+    char names[COMMAND_MAX_REPLY], line[COMMAND_MAX_REPLY + 80], kind[16], field[3][40], *save = NULL;
+    int n = 0;
+    command_execute(&dev, 1, "HELP:SET?", &result);
+    memcpy(names, result.reply, sizeof names);
+    for (char *name = strtok_r(names, " ", &save); name != NULL; name = strtok_r(NULL, " ", &save), n++) {
+        static const char *const special[] = {"MIN", "MAX", "DEF"};
+        snprintf(line, sizeof line, "HELP? %s", name);
+        command_execute(&dev, 1, line, &result);
+        const int got =
+            sscanf(result.reply, "%15[a-z],\"%*[^,],%39[^,],%39[^,],%39[^,],", kind, field[0], field[1], field[2]);
+        if (strcmp(kind, "number") != 0) continue;
+        assert_int_equal(got, 4);
+        for (int i = 0; i < 3; i++) {
+            struct command_device other = dev;
+            snprintf(line, sizeof line, "%s? %s", name, special[i]);
+            expect(&other, line, field[i]);
+            snprintf(line, sizeof line, "%s %s", name, field[i]);
+            command_execute(&other, 1, line, &result);
+            if (result.error != 0) fail_msg("'%s' gives '%s'", line, result.reply);
+        }
+    }
+    int settings = 0;
+    for (const struct command_row *row = command_rows; row->header != NULL; row++)
+        settings += row->setting != NULL; /* SITE:POSE has six values */
+    assert_int_equal(n, settings);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(ranges_keep_apart),
+        cmocka_unit_test(noise_has_kinds_and_sizes),
+        cmocka_unit_test(what_is_planned_rests_in_a_scan),
+        cmocka_unit_test(a_line_heads_step_sets_its_rates),
+        cmocka_unit_test(steps_stay_within_the_rates),
+        cmocka_unit_test(a_spheres_step_divides_half_a_turn),
+        cmocka_unit_test(steps_of_fixed_patterns_are_readings),
+        cmocka_unit_test(what_can_not_be_planned_is_refused),
+        cmocka_unit_test(settings_describe_themselves),
+        cmocka_unit_test(limits_are_those_that_hold),
+    };
+    return cmocka_run_group_tests_name("command knobs", tests, NULL, NULL);
+}

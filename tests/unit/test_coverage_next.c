@@ -1,0 +1,267 @@
+/* The next station: places where a tripod can stand, and what would be gained there. */
+#include "tests/unit/coverage_rig.h"
+
+#include "core/standpoint.h"
+
+static const double RIGHT[3] = {5.0, 1.0, 1.2};
+static const double HEIGHT_M = 1.2;
+
+/* ---- places */
+
+/* Not on the roof. */
+static uint32_t find_places(const struct cover *c, double step_m, double height_m, struct standpoint_place **place)
+{
+    const struct standpoint_grid grid = {
+        step_m, height_m, {0.0, 0.0, -INFINITY}, {c->scene->max_m[0], c->scene->max_m[1], 1.5}};
+    uint32_t n;
+    struct sh_err err;
+    if (standpoint_places(c->bvh, &grid, NULL, place, &n, &err) != 0) fail_msg("%s", err.text);
+    return n;
+}
+
+/* The L on a grid of 0.5 m: x, y = 0.25, 0.75, ... Those 0.25 m from a wall are too near. Of the right leg remain 10 by 2
+ * of x from 0.75 to 5.25 and y = 0.75, 1.25; in the row y = 1.75 the three with x < 2; of the upper leg 2 by 5 of x =
+ * 0.75, 1.25 and y from 2.25 to 4.25. */
+static void test_places(void **state)
+{
+    (void)state;
+    struct cover *c = cover_open(cover_l_room(), 0.5, 1);
+    struct standpoint_place *place;
+    const uint32_t n = find_places(c, 0.5, HEIGHT_M, &place);
+    assert_int_equal(n, 20 + 3 + 10);
+    for (uint32_t i = 0; i < n; i++) {
+        const double *p = place[i].position_m;
+        assert_true(p[2] == HEIGHT_M && place[i].floor_m == 0.0);
+        assert_true(p[0] > 0.3 && p[1] > 0.3 && p[0] < 5.7 && p[1] < 4.7 && !(p[0] > 1.7 && p[1] > 1.75));
+        if (i > 0) assert_true(p[0] > p[-4] || (p[0] == p[-4] && p[1] > p[-3])); /* in order; a place is 4 doubles */
+    }
+    free(place);
+    /* 0.2 m of room above the head, and the room is 2.4 m high */
+    assert_int_equal(find_places(c, 0.5, 2.19, &place), 33);
+    free(place);
+    assert_int_equal(find_places(c, 0.5, 2.21, &place), 0);
+    free(place);
+    cover_close(c);
+}
+
+/* A table of 1 m by 0.1 m is no floor: of the 8 spots around most lie beside it. A plate of 3 m is, and under it there is
+ * not room enough. */
+static void test_no_floors(void **state)
+{
+    (void)state;
+    static const struct {
+        double half_m[2], z_m;
+        uint32_t n; /* on a grid of 1 m over 10 m by 10 m */
+        uint32_t high;
+    } cases[] = {{{0.5, 0.05}, 1.0, 100 - 1, 0}, {{1.5, 1.5}, 1.0, 100, 9}};
+    for (size_t i = 0; i < 2; i++) {
+        const double x = cases[i].half_m[0], y = cases[i].half_m[1], z = cases[i].z_m;
+        const double vertex[8][3] = {{0, 0, 0},
+                                     {10, 0, 0},
+                                     {10, 10, 0},
+                                     {0, 10, 0},
+                                     {4.5 - x, 4.5 - y, z},
+                                     {4.5 + x, 4.5 - y, z},
+                                     {4.5 + x, 4.5 + y, z},
+                                     {4.5 - x, 4.5 + y, z}};
+        static const uint32_t triangle[4][3] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
+        struct scene *scene;
+        struct standpoint_place *place;
+        struct sh_err err;
+        uint32_t high = 0;
+        assert_int_equal(scene_from_arrays(&(struct scene_arrays){vertex, 8, triangle, 4, NULL, NULL, 0}, &scene, &err),
+                         0);
+        struct cover *c = cover_open(scene, 1.0, 1);
+        const uint32_t n = find_places(c, 1.0, 1.6, &place);
+        for (uint32_t k = 0; k < n; k++)
+            high += place[k].floor_m == z;
+        if (n != cases[i].n || high != cases[i].high) fail_msg("case %zu: %u places, %u of them high", i, n, high);
+        free(place);
+        cover_close(c);
+    }
+}
+
+static void test_too_many(void **state)
+{
+    (void)state;
+    struct cover *c = cover_open(cover_l_room(), 0.5, 1);
+    const struct standpoint_grid grid = {1e-3, 1.6, {0, 0, 0}, {6, 5, 1}};
+    struct standpoint_place *place;
+    uint32_t n;
+    struct sh_err err;
+    assert_int_equal(standpoint_places(c->bvh, &grid, NULL, &place, &n, &err), SH_EINPUT);
+    assert_non_null(strstr(err.text, "6000 by 5000"));
+    assert_null(place);
+    cover_close(c);
+}
+
+/* ---- gains */
+
+/* Directions of a whole sphere, rings of n_rings. */
+struct rays {
+    uint32_t n;
+    double dir[20000][3], sr[20000];
+};
+
+static struct rays *make_rays(uint32_t n_rings, int whole)
+{
+    struct rays *r = calloc(1, sizeof *r);
+    assert_non_null(r);
+    for (uint32_t i = 0; i < n_rings; i++) {
+        const double low = -M_PI_2 + M_PI * i / n_rings, high = low + M_PI / n_rings;
+        const double z = 0.5 * (sin(low) + sin(high));
+        const uint32_t n = (uint32_t)fmax(3.0, 2.0 * n_rings * sqrt(1.0 - z * z));
+        for (uint32_t k = 0; k < n; k++, r->n++) {
+            const double turn = 2.0 * M_PI * (k + 0.37) / n;
+            assert_true(r->n < 20000);
+            r->dir[r->n][0] = sqrt(1.0 - z * z) * sin(turn);
+            r->dir[r->n][1] = sqrt(1.0 - z * z) * cos(turn);
+            r->dir[r->n][2] = z;
+            r->sr[r->n] = whole ? INFINITY : 2.0 * M_PI * (sin(high) - sin(low)) / n;
+        }
+    }
+    return r;
+}
+
+static void gains_of(const struct cover *c, const struct rays *rays, const double (*place_m)[3], uint32_t n,
+                     struct coverage_gain *gain)
+{
+    const struct coverage_directions d = {rays->n, rays->dir, rays->sr, 0.0, 1000.0};
+    struct sh_err err;
+    if (coverage_gains(c->coverage, c->bvh, &d, place_m, n, NULL, gain, &err) != 0) fail_msg("%s", err.text);
+}
+
+/* Which cells rays meet, the long way: each piece is asked whether the ray passes through it. */
+struct search {
+    const double *from, *dir;
+    double range_m;
+    uint32_t cell;
+};
+
+static void try_piece(void *ctx, uint32_t cell, int n, const double corner[4][3])
+{
+    struct search *s = ctx;
+    double a[3], b[3], normal[3], to[3], p[3];
+    vec3_sub(corner[1], corner[0], a);
+    vec3_sub(corner[2], corner[0], b);
+    vec3_cross(a, b, normal);
+    vec3_sub(corner[0], s->from, to);
+    const double along = vec3_dot(normal, s->dir), range_m = vec3_dot(normal, to) / along;
+    if (!(range_m > 0.0) || !(range_m < s->range_m)) return;
+    for (int i = 0; i < 3; i++)
+        p[i] = s->from[i] + range_m * s->dir[i];
+    for (int i = 0; i < n; i++) {
+        vec3_sub(corner[(i + 1) % n], corner[i], a);
+        vec3_sub(p, corner[i], b);
+        vec3_cross(a, b, to);
+        if (vec3_dot(to, normal) < 0.0) return;
+    }
+    s->range_m = range_m;
+    s->cell = cell;
+}
+
+/* With whole cells the gain is the sum of the cells that are met and that nobody has seen. */
+static void test_brute_force(void **state)
+{
+    (void)state;
+    static const double places_m[][3] = {{1.0, 4.0, 1.2}, {1.3, 2.6, 0.7}, {3.1, 0.6, 2.0}};
+    struct cover *c = cover_open(cover_l_room(), 0.5, 3);
+    const struct cover_sweep coarse = {2.0, -90.0, 90.0, 0.0, 360.0, 1000.0};
+    struct rays *rays = make_rays(24, 1);
+    struct coverage_pulses pulses;
+    struct coverage_gain gain[3];
+    char *met = malloc(coverage_cells(c->coverage));
+    assert_non_null(met);
+    cover_look(c, RIGHT, &coarse, &pulses);
+    gains_of(c, rays, places_m, 3, gain);
+    for (int k = 0; k < 3; k++) {
+        double want_m2 = 0.0;
+        memset(met, 0, coverage_cells(c->coverage));
+        for (uint32_t i = 0; i < rays->n; i++) {
+            struct search s = {places_m[k], rays->dir[i], INFINITY, 0};
+            coverage_pieces(c->coverage, try_piece, &s);
+            assert_true(isfinite(s.range_m));
+            struct coverage_cell cell;
+            coverage_get(c->coverage, s.cell, &cell);
+            if (!met[s.cell] && cell.stations == 0) want_m2 += cell.area_m2;
+            met[s.cell] = 1;
+        }
+        if (!(fabs(gain[k].gain_m2 - want_m2) <= 1e-9))
+            fail_msg("place %d: %.9f m2, %.9f the long way", k, gain[k].gain_m2, want_m2);
+        assert_true(gain[k].front == 1.0 && want_m2 > 1.0);
+    }
+    free(met);
+    free(rays);
+    cover_close(c);
+}
+
+/* Cells much smaller than a ray: the gain is the sum of what the rays stand for, and that is the area. Lines of rays end
+ * within a ray's width of the edges, 12 edges of a box; by chance half of that, in either direction. */
+static void test_coarse_rays(void **state)
+{
+    (void)state;
+    static const double lo[3] = {-1.9, -1.4, -1.1}, hi[3] = {2.2, 1.7, 1.3}, at[1][3] = {{0.1, 0.2, 0.05}};
+    struct cover *c = cover_open(cover_box(lo, hi), 0.05, 1);
+    struct rays *rays = make_rays(45, 0); /* 4 degrees: 0.08 m at the nearest wall */
+    struct coverage_gain gain;
+    const double area_m2 = cover_area(c->scene), edges_m = 4.0 * (4.1 + 3.1 + 2.4);
+    gains_of(c, rays, at, 1, &gain);
+    print_message("%.3f m2 of %.3f m2\n", gain.gain_m2, area_m2);
+    if (!(fabs(gain.gain_m2 - area_m2) <= 0.5 * edges_m * 0.08)) fail_msg("%.6f m2 of %.6f m2", gain.gain_m2, area_m2);
+    free(rays);
+    cover_close(c);
+}
+
+/* The best place of the L after a station in its right leg lies in the upper one, which reaches down to y = 0; what rays say of it agrees with whole
+ * scans within the cells that outlines cut. */
+static void test_the_other_leg(void **state)
+{
+    (void)state;
+    struct cover *c = cover_open(cover_l_room(), 0.5, 3);
+    const struct cover_sweep sweep = {0.5, -90.0, 90.0, 0.0, 360.0, 1000.0};
+    struct standpoint_place *place;
+    struct coverage_pulses pulses;
+    struct coverage_gain gain[33];
+    struct coverage_scan scan;
+    struct sh_err err;
+    double at[33][3], seen_m2, gain_m2;
+    struct rays *rays = make_rays(90, 0);
+    uint32_t best = 0;
+    cover_look(c, RIGHT, &sweep, &pulses);
+    assert_int_equal(find_places(c, 0.5, HEIGHT_M, &place), 33);
+    for (int i = 0; i < 33; i++)
+        memcpy(at[i], place[i].position_m, sizeof at[i]);
+    gains_of(c, rays, (const double(*)[3])at, 33, gain);
+    for (uint32_t i = 0; i < 33; i++)
+        if (gain[i].gain_m2 > gain[best].gain_m2) best = i;
+    assert_true(at[best][0] < 2.0);
+    /* All that was hidden is seen from there: 2 (6 - 2/3) of floor and ceiling, 22/3 m of walls; less the cells that the
+     * station's shadow line cuts, which are seen already: within 2.5 cells of 0.5 m along 6.6 m. */
+    const double hidden_m2 = 2.0 * (6.0 - 2.0 / 3.0) + 22.0 / 3.0 * L_HEIGHT_M;
+    assert_true(gain[best].gain_m2 <= hidden_m2 + 1e-9 && gain[best].gain_m2 >= hidden_m2 - 6.6 * 2.5 * 0.5);
+    for (uint32_t i = 0; i < 33; i += 8) {
+        cover_scan(c, at[i], &sweep, &scan);
+        assert_int_equal(coverage_look(c->coverage, &scan, "scan", NULL, &pulses, &err), 0);
+        coverage_waiting(c->coverage, &seen_m2, &gain_m2);
+        /* An outline of what is gained is at most the shadow's line of either, some 7 m; each cell there counts or not. */
+        print_message("%.2f %.2f: %.3f m2 by rays, %.3f m2 by a scan\n", at[i][0], at[i][1], gain[i].gain_m2, gain_m2);
+        assert_true(fabs(gain[i].gain_m2 - gain_m2) <= 7.0 * 0.5);
+        assert_true(seen_m2 >= gain_m2);
+    }
+    coverage_drop(c->coverage);
+    free(place);
+    free(rays);
+    cover_close(c);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_places),      cmocka_unit_test(test_no_floors),     cmocka_unit_test(test_too_many),
+#ifndef SH_SANITIZE /* millions of polygons, and of pulses */
+        cmocka_unit_test(test_brute_force), cmocka_unit_test(test_the_other_leg),
+#endif
+        cmocka_unit_test(test_coarse_rays),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

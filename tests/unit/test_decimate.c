@@ -1,0 +1,224 @@
+/* Coarse meshes by vertex clustering: counts by hand, bounds, what is refused. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <cmocka.h>
+
+#include "core/decimate.h"
+#include "core/rng.h"
+
+static const double CUBE[8][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0},
+                                  {0, 0, 1}, {1, 0, 1}, {0, 1, 1}, {1, 1, 1}};
+static const uint32_t CUBE_FACE[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                                          {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+
+/* n x n quads on the square from x, y = 0 to size, at z(x, y); two triangles each. */
+struct sheet {
+    double (*vertex_m)[3];
+    uint32_t (*triangle)[3];
+    struct decimate_mesh mesh;
+};
+
+static void make_sheet(struct sheet *s, uint32_t n, double size_m, double rough_m)
+{
+    uint32_t t = 0;
+    s->vertex_m = calloc((size_t)(n + 1) * (n + 1), sizeof *s->vertex_m);
+    s->triangle = calloc(2 * (size_t)n * n, sizeof *s->triangle);
+    assert_true(s->vertex_m != NULL && s->triangle != NULL);
+    for (uint32_t i = 0; i <= n; i++)
+        for (uint32_t k = 0; k <= n; k++) {
+            double *v = s->vertex_m[i * (n + 1) + k];
+            v[0] = size_m * i / n;
+            v[1] = size_m * k / n;
+            v[2] = rough_m * (double)(rng_mix(i * 7919 + k) >> 11) * 0x1p-53;
+        }
+    for (uint32_t i = 0; i < n; i++)
+        for (uint32_t k = 0; k < n; k++) {
+            const uint32_t a = i * (n + 1) + k, b = a + n + 1;
+            const uint32_t two[2][3] = {{a, b, a + 1}, {a + 1, b, b + 1}};
+            for (int j = 0; j < 2; j++, t++)
+                for (int c = 0; c < 3; c++)
+                    s->triangle[t][c] = two[j][c];
+        }
+    s->mesh = (struct decimate_mesh){(const double(*)[3])s->vertex_m, (n + 1) * (n + 1),
+                                     (const uint32_t(*)[3])s->triangle, t};
+}
+
+static void free_sheet(struct sheet *s)
+{
+    free(s->vertex_m);
+    free(s->triangle);
+}
+
+static void bounds_of(const struct decimated *m, double low[3], double high[3])
+{
+    for (int i = 0; i < 3; i++) {
+        low[i] = INFINITY;
+        high[i] = -INFINITY;
+        for (uint32_t v = 0; v < m->n_vertices; v++) {
+            low[i] = fmin(low[i], m->vertex_m[v][i]);
+            high[i] = fmax(high[i], m->vertex_m[v][i]);
+        }
+    }
+}
+
+/* No triangle twice, none without three corners, no vertex that nobody uses. */
+static void check_whole(const struct decimated *m)
+{
+    uint8_t *used = calloc(m->n_vertices + 1, 1);
+    assert_non_null(used);
+    for (uint32_t t = 0; t < m->n_triangles; t++) {
+        const uint32_t *c = m->triangle[t];
+        assert_true(c[0] != c[1] && c[1] != c[2] && c[2] != c[0]);
+        for (int k = 0; k < 3; k++) {
+            assert_true(c[k] < m->n_vertices);
+            used[c[k]] = 1;
+        }
+    }
+    for (uint32_t v = 0; v < m->n_vertices; v++)
+        assert_int_equal(used[v], 1);
+    free(used);
+}
+
+/* The cells of a cube with cells of its edge are at its corners: nothing changes. With the limit above its 12 triangles
+ * it isn't touched at all. */
+static void cube_stays(void **state)
+{
+    (void)state;
+    const struct decimate_mesh cube = {CUBE, 8, CUBE_FACE, 12};
+    struct decimated m;
+    struct sh_err err;
+    assert_int_equal(decimate_by_cell(&cube, 1.0, NULL, &m, &err), SH_OK);
+    assert_true(m.n_vertices == 8 && m.n_triangles == 12 && m.cell_m == 1.0);
+    for (uint32_t t = 0; t < 12; t++)
+        for (int k = 0; k < 3; k++)
+            assert_memory_equal(m.vertex_m[m.triangle[t][k]], CUBE[CUBE_FACE[t][k]], sizeof CUBE[0]);
+    decimated_free(&m);
+    assert_int_equal(decimate(&cube, DECIMATE_LEAST, NULL, &m, &err), SH_OK);
+    assert_true(m.n_vertices == 8 && m.n_triangles == 12 && m.cell_m == 0.0);
+    assert_memory_equal(m.triangle, CUBE_FACE, sizeof CUBE_FACE);
+    decimated_free(&m);
+}
+
+/* 64 x 64 quads on 1 m, cells of 1/4 m centred on 0, 1/4 ... 1: 5 x 5 cells. Cell j along an axis has the vertices i with
+ * floor(4 i / 64 + 1/2) = j: 0..7, 8..23, 24..39, 40..55, 56..64, with the means 3.5, 15.5, 31.5, 47.5 and 60 of 64.
+ * Triangles that cross no border vanish; those at the crossing of two borders give each of the 4 x 4 squares between
+ * clusters its two. One vertex at a crossing has its diagonal the one way, as all quads do: no others come. */
+static void plane_has_counts_by_hand(void **state)
+{
+    (void)state;
+    static const double mean[5] = {3.5 / 64, 15.5 / 64, 31.5 / 64, 47.5 / 64, 60.0 / 64};
+    struct sheet s;
+    struct decimated m;
+    struct sh_err err;
+    double low[3], high[3];
+    make_sheet(&s, 64, 1.0, 0.0);
+    assert_int_equal(decimate_by_cell(&s.mesh, 0.25, NULL, &m, &err), SH_OK);
+    assert_int_equal(m.n_vertices, 25);
+    assert_int_equal(m.n_triangles, 32);
+    check_whole(&m);
+    int seen[5][5] = {{0}};
+    for (uint32_t v = 0; v < 25; v++) {
+        const int i = (int)floor(4.0 * m.vertex_m[v][0] + 0.5), k = (int)floor(4.0 * m.vertex_m[v][1] + 0.5);
+        seen[i][k]++;
+        /* sums of up to 289 multiples of 1/64 are exact */
+        assert_true(m.vertex_m[v][0] == mean[i] && m.vertex_m[v][1] == mean[k] && m.vertex_m[v][2] == 0.0);
+    }
+    for (int i = 0; i < 25; i++)
+        assert_int_equal(seen[i / 5][i % 5], 1);
+    bounds_of(&m, low, high);
+    for (int i = 0; i < 2; i++)
+        assert_true(low[i] >= 0.0 && low[i] <= 0.125 && high[i] <= 1.0 && high[i] >= 0.875);
+    decimated_free(&m);
+    free_sheet(&s);
+}
+
+/* A rough one far from the origin, as in UTM: no more triangles than asked for, not far fewer, bounds within half a cell
+ * along each axis, all heights within the bounds. */
+static void limit_holds(void **state)
+{
+    (void)state;
+    struct sheet s;
+    struct decimated m;
+    struct sh_err err;
+    double low[3], high[3], was_low = INFINITY, was_high = -INFINITY;
+    make_sheet(&s, 100, 50.0, 0.3);
+    for (uint32_t v = 0; v < s.mesh.n_vertices; v++) {
+        was_low = fmin(was_low, s.vertex_m[v][2]);
+        was_high = fmax(was_high, s.vertex_m[v][2]);
+        s.vertex_m[v][0] += 500000.0;
+        s.vertex_m[v][1] += 5400000.0;
+    }
+    assert_int_equal(decimate(&s.mesh, 2000, NULL, &m, &err), SH_OK);
+    assert_true(m.n_triangles <= 2000 && m.n_triangles >= 500);
+    check_whole(&m);
+    const double was[3][2] = {{500000.0, 500050.0}, {5400000.0, 5400050.0}, {was_low, was_high}};
+    bounds_of(&m, low, high);
+    for (int i = 0; i < 3; i++)
+        assert_true(low[i] >= was[i][0] && low[i] <= was[i][0] + 0.5 * m.cell_m && high[i] <= was[i][1] &&
+                    high[i] >= was[i][1] - 0.5 * m.cell_m);
+    decimated_free(&m);
+    free_sheet(&s);
+}
+
+/* Two sheets nearer than a cell become one: of triangles between the same cells one is left, whichever way they face. */
+static void doubles_become_one(void **state)
+{
+    (void)state;
+    static const double vertex[6][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 0.01}, {1, 0, 0.01}, {0, 1, 0.01}};
+    static const uint32_t face[4][3] = {{0, 1, 2}, {3, 5, 4}, {0, 3, 1}, {1, 3, 4}};
+    const struct decimate_mesh thin = {vertex, 6, face, 4};
+    struct decimated m;
+    struct sh_err err;
+    assert_int_equal(decimate_by_cell(&thin, 0.5, NULL, &m, &err), SH_OK);
+    /* z has ceil(0.01 / 0.5) = 1 step, so two layers of cells: nothing is lost. Shorter than half a cell it would be. */
+    assert_int_equal(m.n_triangles, 4);
+    decimated_free(&m);
+    static const double tall[7][3] = {{0, 0, 0},    {1, 0, 0},    {0, 1, 0}, {0, 0, 0.01},
+                                      {1, 0, 0.01}, {0, 1, 0.01}, {0, 0, 1}};
+    static const uint32_t more[5][3] = {{0, 1, 2}, {3, 5, 4}, {0, 3, 1}, {1, 3, 4}, {0, 1, 6}};
+    const struct decimate_mesh both = {tall, 7, more, 5};
+    assert_int_equal(decimate_by_cell(&both, 0.5, NULL, &m, &err), SH_OK);
+    assert_int_equal(m.n_triangles, 2); /* the sheet, and the triangle up to z = 1 */
+    assert_int_equal(m.n_vertices, 4);
+    decimated_free(&m);
+}
+
+static int stop_now(void *ctx)
+{
+    (void)ctx;
+    return 1;
+}
+
+static void refuses(void **state)
+{
+    (void)state;
+    const struct decimate_mesh cube = {CUBE, 8, CUBE_FACE, 12}, none = {CUBE, 0, CUBE_FACE, 0};
+    const struct sh_report stops = {.stop = stop_now};
+    struct decimated m;
+    struct sh_err err;
+    assert_int_equal(decimate(&cube, DECIMATE_LEAST - 1, NULL, &m, &err), SH_EINPUT);
+    assert_int_equal(decimate_by_cell(&cube, 0.0, NULL, &m, &err), SH_EINPUT);
+    assert_int_equal(decimate_by_cell(&cube, (double)NAN, NULL, &m, &err), SH_EINPUT);
+    assert_int_equal(decimate_by_cell(&cube, 1.0, &stops, &m, &err), SH_ESTOPPED);
+    assert_true(m.n_triangles == 0 && m.vertex_m == NULL);
+    assert_int_equal(decimate(&none, DECIMATE_LEAST, NULL, &m, &err), SH_OK);
+    assert_int_equal(m.n_triangles, 0);
+    decimated_free(&m);
+    assert_int_equal(decimate_by_cell(&none, 1.0, NULL, &m, &err), SH_OK);
+    assert_int_equal(m.n_triangles, 0);
+    decimated_free(&m);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(cube_stays),  cmocka_unit_test(plane_has_counts_by_hand),
+        cmocka_unit_test(limit_holds), cmocka_unit_test(doubles_become_one),
+        cmocka_unit_test(refuses),
+    };
+    return cmocka_run_group_tests_name("decimate", tests, NULL, NULL);
+}

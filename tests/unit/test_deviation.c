@@ -1,0 +1,188 @@
+/* Deviations along beams, and what is expected of them, by hand. */
+#include <math.h>
+
+#include "core/deviation.h"
+#include "tests/unit/scene_files.h"
+
+static const double UNIT[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+
+static void near_to(double value, double expected)
+{
+    if (!(fabs(value - expected) <= 1e-9 * fabs(expected) + 1e-15)) fail_msg("%.12g, not %.12g", value, expected);
+}
+
+static struct deviation_head ideal_head(void)
+{
+    struct deviation_head head = {0};
+    head.setup.mirror_counts = head.setup.pan_counts = 4294967296.0;
+    head.setup.layout = LINE_GEO;
+    memcpy(head.setup.rotation, UNIT, sizeof UNIT);
+    return head;
+}
+
+/* A beam level ahead, and a face that leans back by 60 degrees, or is turned by as much. */
+static const struct deviation_hit HEAD_ON = {100.0, {0, 1, 0}, {0, -1, 0}, -1};
+static const struct deviation_hit LEANING = {100.0, {0, 1, 0}, {0, -0.5, 0.86602540378443865}, -1};
+static const struct deviation_hit TURNED = {100.0, {0, 1, 0}, {0.86602540378443865, -0.5, 0}, -1};
+
+static double sigma(const struct deviation_head *head, const struct deviation_hit *hit)
+{
+    double counts_m;
+    return deviation_sigma_m(head, hit, &counts_m);
+}
+
+static void sigma_of_ranges(void **state)
+{
+    (void)state;
+    struct deviation_head head = ideal_head();
+    assert_true(sigma(&head, &HEAD_ON) == 0.0);
+    head.setup.noise_on = 1;
+    head.setup.range_sigma_m = 0.003;
+    head.setup.range_sigma_ppm = 10.0;
+    near_to(sigma(&head, &HEAD_ON), 0.004); /* 10 ppm of 100 m is 1 mm */
+    near_to(sigma(&head, &LEANING), 0.004); /* along the beam, whatever the incidence */
+    head.has_instrument_errors = 1;
+    assert_true(isnan(sigma(&head, &HEAD_ON)));
+}
+
+/* tan 60 degrees = sqrt 3. At an elevation of 60 degrees the pan moves the beam half as far. */
+static void sigma_of_angles(void **state)
+{
+    (void)state;
+    struct deviation_head head = ideal_head();
+    const struct deviation_hit high = {100.0, {0, 0.5, 0.86602540378443865}, {1, 0, 0}, -1};
+    const struct deviation_hit high_turned = {
+        100.0, {0, 0.5, 0.86602540378443865}, {M_SQRT1_2, -0.5 * M_SQRT1_2, -0.86602540378443865 * M_SQRT1_2}, -1};
+    head.angle_sigma_rad[0] = 1e-5;
+    head.angle_sigma_rad[1] = 3e-5;
+    near_to(sigma(&head, &HEAD_ON), 0.0);
+    near_to(sigma(&head, &LEANING), 100.0 * 1e-5 * sqrt(3.0));
+    near_to(sigma(&head, &TURNED), 100.0 * 3e-5 * sqrt(3.0));
+    near_to(sigma(&head, &high_turned), 100.0 * 3e-5 * 0.5); /* tan 45 degrees = 1 */
+    assert_true(isinf(sigma(&head, &high)));                 /* the beam never meets that face */
+    /* Of a head that is upside down the same holds. */
+    const double over[9] = {-1, 0, 0, 0, 1, 0, 0, 0, -1};
+    memcpy(head.setup.rotation, over, sizeof over);
+    near_to(sigma(&head, &LEANING), 100.0 * 1e-5 * sqrt(3.0));
+}
+
+/* A uniform ball has a variance of r^2 / 5 along any line. */
+static void sigma_of_a_ball(void **state)
+{
+    (void)state;
+    struct deviation_head head = ideal_head();
+    struct detect_ball ball = {.radius_m = 0.01, .factor = {1, 1, 1}, .per_distance_1_m = 0.01};
+    const struct cast_detect detect = {.ball = &ball};
+    head.setup.detect = &detect;
+    near_to(sigma(&head, &HEAD_ON), 0.02 / sqrt(5.0)); /* twice as large at 100 m */
+    near_to(sigma(&head, &LEANING), 0.04 / sqrt(5.0));
+    near_to(deviation_bound_m(&head, 100.0), 0.02);
+    ball.factor[1] = 3.0; /* of the scene: y */
+    near_to(sigma(&head, &HEAD_ON), 0.06 / sqrt(5.0));
+    ball.local = 1; /* along the beam, right, up: now right */
+    near_to(sigma(&head, &HEAD_ON), 0.02 / sqrt(5.0));
+    near_to(sigma(&head, &TURNED), 0.04 / sqrt(5.0) * sqrt(0.25 + 0.75 * 9.0));
+    near_to(deviation_bound_m(&head, 100.0), 0.06);
+}
+
+static void counts_and_bounds(void **state)
+{
+    (void)state;
+    struct deviation_head head = ideal_head();
+    double counts_m;
+    head.cast_error_m = 1e-6;
+    head.georef_error_m = 2e-6;
+    head.count_m = 1e-3;
+    deviation_sigma_m(&head, &LEANING, &counts_m);
+    near_to(counts_m, 2e-3 / sqrt(12.0));
+    near_to(deviation_bound_m(&head, 100.0), 3e-6 + 0.5 * sqrt(3.0) * 1e-3);
+    head.count_m = head.georef_error_m = 0.0;
+    head.setup.layout = LINE_POLAR;
+    head.setup.range_scale_m = 1e-3;
+    head.setup.mirror_counts = head.setup.pan_counts = 2.0 * M_PI * 1e5; /* 1e-5 rad: 1 mm at 100 m */
+    near_to(deviation_bound_m(&head, 100.0), 1e-6 + 0.5e-3 * sqrt(3.0));
+    deviation_sigma_m(&head, &TURNED, &counts_m); /* the pan's counts show, times tan 60 degrees; the mirror's don't */
+    near_to(counts_m, sqrt((1.0 + 3.0) / 12.0) * 1e-3);
+    head.setup.layout = LINE_GEO; /* encoders are read there, too */
+    near_to(deviation_bound_m(&head, 100.0), 1e-6 + 0.5e-3 * sqrt(2.0));
+    head.setup.noise_on = 1;
+    assert_true(isinf(deviation_bound_m(&head, 100.0)));
+    head.setup.noise_on = 0;
+    head.angle_sigma_rad[1] = 1e-9;
+    assert_true(isinf(deviation_bound_m(&head, 100.0)));
+}
+
+/* A wall 10 m ahead, a pane before its right half, 8 m ahead. Points on beams to places of the wall (y = 10) or of the
+ * pane (y = 8), that much further than there. */
+static const struct {
+    double at[3], further_m, along_m;
+} POINT[] = {
+    {{-3, 10, 1}, 0.003, 0.003},   {{-3, 10, 1}, -0.002, -0.002},
+    {{3, 8, 1}, 0.001, 0.001},     {{5, 10, -1}, 0.004, 0.004}, /* seen through the pane: the nearest surface counts */
+    {{-0.0001, 10, 0}, -1.5, NAN}, /* a mixed point: its beam meets the wall, and the pane's edge at x = 0 is nearer */
+    {{-3, 10, 1}, 40.0, NAN},      /* nothing is that near */
+    {{NAN, NAN, NAN}, 0.0, NAN},
+};
+enum { N = sizeof POINT / sizeof POINT[0] };
+
+static void deviations_along_the_beam(void **state)
+{
+    (void)state;
+    struct scene *scene = load_text("walls.obj", "v -50 10 -50\nv 50 10 -50\nv 50 10 50\nv -50 10 50\n"
+                                                 "v 0 8 -50\nv 50 8 -50\nv 50 8 50\nv 0 8 50\nf 1 2 3 4\nf 5 6 7 8\n");
+    const double origin[3] = {0, 0, 0};
+    double xyz[N][3], distance_m[N];
+    uint32_t triangle[N];
+    struct deviation_points out;
+    struct distance *index;
+    struct bvh *bvh;
+    struct sh_err err;
+    for (int i = 0; i < N; i++) {
+        const double *p = POINT[i].at, range_m = sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
+        for (int k = 0; k < 3; k++)
+            xyz[i][k] = p[k] * (1.0 + POINT[i].further_m / range_m);
+    }
+    assert_int_equal(distance_create(scene, &index, &err), SH_OK);
+    assert_int_equal(bvh_create(scene, origin, 1.0, 1, NULL, &bvh, &err), SH_OK);
+    assert_int_equal(deviation_points_create(N, &out, &err), SH_OK);
+    struct deviation_head head = ideal_head();
+    head.setup.bvh = bvh;
+    head.setup.noise_on = 1;
+    head.setup.range_sigma_m = 0.005;
+    const struct cloud cloud = {.n = N, .xyz_m = xyz};
+    const struct cloud_site site = {.index = index, .n_stations = 1, .max_m = 10, .threads = 2};
+    assert_int_equal(cloud_compare(&cloud, &site, NULL, distance_m, triangle, &err), SH_OK);
+    assert_int_equal(deviation_along(&cloud, &site, &head, distance_m, triangle, NULL, &out, &err), SH_OK);
+    for (int i = 0; i < N; i++) {
+        const double along_m = (double)out.along_m[i];
+        if (isnan(along_m) != isnan(POINT[i].along_m) || fabs(along_m - POINT[i].along_m) > 1e-6)
+            fail_msg("point %d: %g, not %g", i, along_m, POINT[i].along_m);
+        if (i < 4 && fabs((double)out.sigma_m[i] - 0.005) > 1e-9)
+            fail_msg("point %d: sigma %g", i, (double)out.sigma_m[i]);
+    }
+    assert_true(fabs((double)out.cosine[0] - 10.0 / sqrt(110.0)) < 1e-6);
+    assert_true(fabs((double)out.range_m[0] - (sqrt(110.0) + 0.003)) < 1e-5);
+    /* 8 sigma of 0.2 m reach from pane to wall: neither is alone. */
+    head.setup.range_sigma_m = 0.2;
+    assert_int_equal(deviation_along(&cloud, &site, &head, distance_m, triangle, NULL, &out, &err), SH_OK);
+    assert_true(isnan(out.sigma_m[3]) && isnan(out.sigma_m[2]) && !isnan(out.along_m[3]));
+    head.setup.range_sigma_m = 0.1; /* 0.8 m before and behind the wall there is nothing */
+    assert_int_equal(deviation_along(&cloud, &site, &head, distance_m, triangle, NULL, &out, &err), SH_OK);
+    assert_true(fabs((double)out.sigma_m[0] - 0.1) < 1e-6);
+    deviation_points_free(&out);
+    bvh_free(bvh);
+    distance_free(index);
+    scene_free(scene);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(sigma_of_ranges),
+        cmocka_unit_test(sigma_of_angles),
+        cmocka_unit_test(sigma_of_a_ball),
+        cmocka_unit_test(counts_and_bounds),
+        cmocka_unit_test_setup_teardown(deviations_along_the_beam, make_folder, remove_folder),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

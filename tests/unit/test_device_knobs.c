@@ -1,0 +1,166 @@
+/* Commands that change what a scan is planned for: the scan is that of a head with the same keys, byte by byte; the one
+ * before and the one after are not touched. */
+#include "tests/unit/device_rig.h"
+
+#include "drivers/protocol/crc32c.h"
+
+enum { BOOTED = 300, LONGEST = 2000, EACH = 1000 }; /* ticks; a scan takes at most 600 */
+
+struct scan {
+    uint32_t crc;
+    uint64_t bytes;
+    struct native_descriptor descriptor;
+};
+
+/* Sends the commands and scans; its ticks, from SCAN_START to SCAN_END. */
+static struct scan scan(struct rig *rig, const char *const *lines)
+{
+    struct scan scan = {0};
+    int in_scan = 0;
+    rig_go_to(rig, (rig->next / EACH + 1) * EACH); /* at rest, and at the same time whatever was scanned before */
+    for (; *lines != NULL; lines++)
+        rig_tell(rig, *lines, rig->next - 1);
+    rig_tell(rig, "SCAN:START", rig->next - 1);
+    for (int i = 0; i < LONGEST && rig_claim(rig); i++) {
+        const struct ring_tick *tick = rig_fill(rig);
+        if (rig->work.scanning) {
+            if (!in_scan) scan.descriptor = rig->work.descriptor;
+            in_scan = 1;
+            scan.crc = crc32c(scan.crc, tick->bytes, tick->len);
+            scan.bytes += tick->len;
+        }
+        device_done(&rig->work);
+        if (in_scan && rig_event(rig, NATIVE_EV_SCAN_END) != NULL) return scan;
+    }
+    fail_msg("no end of the scan");
+    return scan;
+}
+
+static void expect_same(const struct scan *a, const struct scan *b)
+{
+    assert_true(a->bytes > 10000 && a->bytes == b->bytes && a->crc == b->crc);
+    assert_true(a->descriptor.range_min_m == b->descriptor.range_min_m);
+    assert_true(a->descriptor.range_max_m == b->descriptor.range_max_m);
+}
+
+#define LINES(...) ((const char *const[]){__VA_ARGS__, NULL})
+#define SETS(...)  ((const char *const[]){__VA_ARGS__})
+
+static const char *const as_it_was[] = {"*RST", NULL};
+
+/* A scan after commands: the first of a rig, or the second, after one without commands. */
+static struct scan told(int number, const char *const *sets, int n_sets, const char *const *lines)
+{
+    struct rig *rig = rig_open(NULL, sets, n_sets);
+    rig_go_to(rig, BOOTED);
+    if (number > 1) scan(rig, as_it_was);
+    struct scan got = scan(rig, lines);
+    rig_close(rig);
+    return got;
+}
+
+static void commands_are_keys(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *command[3], *key[3];
+    } cases[] = {
+        {{"HEAD:RANG:MAX 4.5", "HEAD:RANG:MIN 3.123456789"}, {"head.range_max_m=4.5", "head.range_min_m=3.123456789"}},
+        {{"HEAD:NOIS ON", "HEAD:NOIS:SIGM 0.0123"}, {"noise.range=on", "noise.sigma_m=0.0123"}},
+        {{"HEAD:NOIS:BALL 0.1", "HEAD:RANG:MAX 6"}, {"noise.ball.radius_m=0.1", "head.range_max_m=6"}},
+        {{"SCAN:STEP 0.12", "SCAN:PAN:STOP 10"}, {"head.lines_hz=150", "head.pan_deg_s=18"}},
+    };
+    static const char *const layouts[] = {"output.layout=polar", "output.layout=geo"};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
+        for (int k = 0; k < 2; k++) {
+            const char *const *c = cases[i].command, *const *key = cases[i].key;
+            const char *stop = i == 3 ? "head.pan_stop_deg=10" : "head.frames=1";
+            /* rates change what a first scan counts, which telemetry says */
+            const int number = i == 3 ? 1 : 2;
+            const struct scan by_commands = told(number, SETS("output.crs=local", layouts[k]), 2, LINES(c[0], c[1]));
+            const struct scan by_keys =
+                told(number, SETS("output.crs=local", layouts[k], key[0], key[1], stop), 5, as_it_was);
+            expect_same(&by_commands, &by_keys);
+        }
+}
+
+/* Scan by scan in one run, to and fro; each is that of its own settings, and the descriptor says the ranges. */
+static void each_scan_has_its_own(void **state)
+{
+    (void)state;
+    struct rig *rig = rig_open(NULL, NULL, 0);
+    rig_go_to(rig, BOOTED);
+    const struct scan plain = scan(rig, as_it_was), near = scan(rig, LINES("HEAD:RANG:MAX 4.5"));
+    const struct scan again = scan(rig, LINES("HEAD:RANG:MAX 5.5")), back = scan(rig, LINES("HEAD:RANG:MAX 4.5"));
+    const struct scan reset = scan(rig, as_it_was);
+    rig_close(rig);
+    assert_true(plain.descriptor.range_max_m == 100.0 && near.descriptor.range_max_m == 4.5);
+    assert_true(again.descriptor.range_max_m == 5.5 && reset.descriptor.range_max_m == 100.0);
+    assert_true(near.descriptor.range_min_m == 0.5 && back.bytes == near.bytes);
+}
+
+/* A limit of the configuration can be taken back, up to that of the profile. */
+static void ranges_widen_up_to_the_profile(void **state)
+{
+    (void)state;
+    const struct scan wide = told(2, SETS("head.range_max_m=4"), 1, LINES("HEAD:RANG:MAX MAX"));
+    const struct scan plain = told(2, NULL, 0, as_it_was);
+    expect_same(&wide, &plain);
+}
+
+/* The descriptor between scans is that of the last one, whatever was set since. */
+static void the_last_scan_is_described_as_it_was(void **state)
+{
+    (void)state;
+    struct device_work work;
+    struct rig *rig = rig_open(NULL, NULL, 0);
+    rig_go_to(rig, BOOTED);
+    scan(rig, LINES("HEAD:RANG:MAX 4.5"));
+    rig_go_to(rig, rig->next + 100);
+    rig_tell(rig, "HEAD:RANG:MAX 5.5", rig->next - 1);
+    rig_tell(rig, "HEAD:RANG:MAX 6.5", rig->next - 1);
+    device_describe_now(rig->device, &work);
+    assert_true(work.descriptor.range_max_m == 4.5);
+    rig_close(rig);
+}
+
+/* In a scan they are refused, and leave it alone; a scale that ranges would not fit into is -221, too. */
+static void what_can_not_be_is_refused(void **state)
+{
+    (void)state;
+    struct command_result result;
+    struct rig *rig = rig_open(NULL, SETS("head.range_max_m=4", "output.scale_m=1e-6", "noise.range=on"), 3);
+    rig_go_to(rig, BOOTED);
+    device_command(rig->device, 1, "HEAD:NOIS:SIGM 10", rig->next - 1, &result); /* ten sigma: 104 m, which fit */
+    assert_int_equal(result.error, 0);
+    device_command(rig->device, 1, "HEAD:NOIS:BALL 100", rig->next - 1, &result); /* 204 m fit into 4294 m */
+    assert_int_equal(result.error, 0);
+    rig_tell(rig, "SCAN:START", rig->next - 1);
+    rig_wait(rig, NATIVE_EV_SCAN_START, 100);
+    device_command(rig->device, 1, "HEAD:RANG:MAX 3", rig->next - 1, &result);
+    assert_int_equal(result.error, CMD_E_SETTINGS);
+    assert_non_null(strstr(result.reply, "can't change in state scanning"));
+    rig_close(rig);
+    rig = rig_open(NULL, SETS("head.range_max_m=4", "noise.ball.distance_1_m=1", "output.scale_m=1e-6"), 3);
+    rig_go_to(rig, BOOTED);
+    /* 100 (1 + 1 x 100) m of ball at 100 m: more than the 4294.97 m of 32 bits */
+    device_command(rig->device, 1, "HEAD:NOIS:BALL 100", rig->next - 1, &result);
+    assert_int_equal(result.error, 0); /* at 4 m it is 500 m */
+    device_command(rig->device, 1, "HEAD:RANG:MAX 100", rig->next - 1, &result);
+    assert_int_equal(result.error, CMD_E_SETTINGS);
+    assert_non_null(strstr(result.reply, "output.scale_m"));
+    assert_string_equal(rig_tell(rig, "HEAD:RANG:MAX?", rig->next - 1), "4");
+    rig_close(rig);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(commands_are_keys),
+        cmocka_unit_test(each_scan_has_its_own),
+        cmocka_unit_test(ranges_widen_up_to_the_profile),
+        cmocka_unit_test(the_last_scan_is_described_as_it_was),
+        cmocka_unit_test(what_can_not_be_is_refused),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}

@@ -1,0 +1,202 @@
+/* Figures of clouds, by hand. */
+#include <math.h>
+
+#include "core/figures.h"
+#include "core/rng.h"
+#include "tests/unit/scene_files.h"
+
+static uint32_t group_of(void *ctx, size_t i)
+{
+    return ((const uint32_t *)ctx)[i];
+}
+
+static void near_to(double value, double expected)
+{
+    if (!(fabs(value - expected) <= 1e-6 * fabs(expected) + 1e-15)) fail_msg("%.9g, not %.9g", value, expected);
+}
+
+/* Two groups, a point that is far, one without echo, one of no group. Floats hold 7 digits. */
+static void groups_have_their_own_figures(void **state)
+{
+    (void)state;
+    const double distance_m[] = {0.001, 0.003, INFINITY, NAN, 0.002, 9.0, 0.010};
+    float along_m[] = {0.001f, -0.003f, NAN, NAN, 0.004f, 9.0f, 0.02f};
+    float sigma_m[] = {0.001f, 0.001f, NAN, NAN, NAN, 1.0f, 0.01f},
+          counts_m[] = {0.0f, 0.001f, NAN, NAN, NAN, 0.0f, 0.0f};
+    float cosine[] = {1.0f, 0.5f, NAN, NAN, 1.0f, 1.0f, 0.1f}, range_m[] = {1, 2, 3, NAN, 5, 6, 7};
+    uint32_t group[] = {0, 0, 0, 0, 1, FIGURES_NO_GROUP, 1};
+    const struct deviation_points points = {along_m, sigma_m, counts_m, cosine, range_m, NULL};
+    const struct figures_in in = {7, distance_m, &points};
+    struct figures f[3];
+    struct sh_err err;
+    assert_int_equal(figures_by(&in, 3, group_of, group, f, &err), SH_OK);
+    assert_true(f[0].points == 3 && f[0].far == 1 && f[0].along == 2 && f[0].judged == 2 && f[0].noisy == 2);
+    near_to(f[0].mean_m, 0.002);
+    near_to(f[0].rms_m, sqrt(5e-6));
+    near_to(f[0].p95_m, 0.003);
+    near_to(f[0].max_m, 0.003);
+    near_to(f[0].along_mean_m, -0.001);
+    near_to(f[0].along_rms_m, sqrt(5e-6));
+    near_to(f[0].along_max_m, 0.003);
+    near_to(f[0].judged_mean_m, -0.001);
+    near_to(f[0].expected_rms_m, sqrt(1.5e-6)); /* (1, 1) and (1, 0) mm */
+    near_to(f[0].z_mean, -1.0);
+    near_to(f[0].z_rms, sqrt(5.0));
+    near_to(f[0].z_counts, sqrt(0.5));
+    /* The second one: at an incidence of 84 degrees there is no deviation along the beam; one sigma is not known. */
+    assert_true(f[1].points == 2 && f[1].along == 1 && f[1].judged == 0);
+    near_to(f[1].max_m, 0.010);
+    near_to(f[1].along_mean_m, 0.004);
+    assert_true(isnan(f[1].z_rms) && isnan(f[1].expected_rms_m));
+    assert_true(f[2].points == 0 && isnan(f[2].mean_m) && isnan(f[2].p95_m) && isnan(f[2].max_m));
+}
+
+static int ascending(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Against a sorted copy: rank ceil(0.95 n); with many that are equal, too. */
+static void percentiles_are_the_nearest_rank(void **state)
+{
+    (void)state;
+    enum { MOST = 300 };
+    static uint32_t all[MOST];
+    for (size_t n = 1; n <= MOST; n++) {
+        double v[MOST], sorted[MOST];
+        for (size_t i = 0; i < n; i++)
+            v[i] = sorted[i] = (double)(rng_u64(n, i) % (n % 3 == 0 ? 4 : 1000));
+        qsort(sorted, n, sizeof *sorted, ascending);
+        const struct figures_in in = {n, v, NULL};
+        struct figures f;
+        struct sh_err err;
+        assert_int_equal(figures_by(&in, 1, group_of, all, &f, &err), SH_OK);
+        const size_t rank = (95 * n + 99) / 100;
+        if (f.p95_m != sorted[rank - 1]) fail_msg("of %zu: %g, not %g", n, f.p95_m, sorted[rank - 1]);
+    }
+}
+
+static void nice_numbers_are_1_2_5(void **state)
+{
+    (void)state;
+    const double row[][2] = {{1.0, 1.0}, {1.1, 2.0},   {2.0, 2.0},   {3.0, 5.0},     {5.1, 10.0},
+                             {70, 100},  {0.03, 0.05}, {1e-6, 1e-6}, {1.2e-5, 2e-5}, {0.001, 0.001}};
+    for (size_t i = 0; i < sizeof row / sizeof row[0]; i++)
+        near_to(figures_nice(row[i][0]), row[i][1]);
+}
+
+static void histograms_count_each_value_once(void **state)
+{
+    (void)state;
+    double value[1003];
+    float both[1003];
+    for (int i = 0; i < 1000; i++) {
+        value[i] = 1e-3 * i / 1000.0; /* even up to 1 mm */
+        both[i] = (float)(value[i] * (i % 2 == 0 ? 1.0 : -1.0));
+    }
+    value[1000] = (double)NAN;
+    value[1001] = (double)INFINITY;
+    value[1002] = 1.0; /* beyond the axis */
+    for (int i = 1000; i < 1003; i++)
+        both[i] = (float)value[i];
+    struct figures_histogram h;
+    figures_histogram_of(value, 1003, 0.99, &h);
+    uint64_t sum = h.below + h.above;
+    for (uint32_t k = 0; k < h.bins; k++)
+        sum += h.count[k];
+    assert_true(sum == 1001 && h.below == 0 && h.above >= 1 && h.above <= 11 && h.from == 0.0);
+    near_to((double)h.count[0], 1000.0 * h.width / 1e-3);
+    figures_histogram_of_signed(both, 1003, 0.99, &h);
+    near_to(h.from, -(double)h.bins / 2.0 * h.width);
+    for (sum = h.below + h.above; h.bins > 0; h.bins--)
+        sum += h.count[h.bins - 1];
+    assert_int_equal(sum, 1001);
+    figures_histogram_of(value + 1000, 1, 0.99, &h);
+    assert_int_equal(h.bins, 0);
+    const double zero = 0.0;
+    figures_histogram_of(&zero, 1, 0.99, &h);
+    assert_true(h.bins > 0 && h.count[0] == 1);
+}
+
+/* A square of 2 m at 45 degrees: its cells of 1 m are 1.414 m2 large. 4 columns of points with 9, 9, 1, 1. */
+static void density_is_points_by_area(void **state)
+{
+    (void)state;
+    struct scene *scene = load_text("plane.obj", "v 0 0 0\nv 2 0 2\nv 2 2 2\nv 0 2 0\nf 1 2 3 4\n");
+    double xyz[20][3];
+    float range_m[20];
+    uint32_t triangle[20];
+    double distance_m[20];
+    size_t n = 0;
+    for (int cell = 0; cell < 4; cell++)
+        for (int k = 0; k < (cell < 2 ? 9 : 1); k++, n++) {
+            xyz[n][0] = (cell & 1) + 0.1 + 0.09 * k;
+            xyz[n][1] = (cell >> 1) + 0.5;
+            xyz[n][2] = xyz[n][0];
+            range_m[n] = cell < 2 ? 3.0f : 5.0f;
+            distance_m[n] = 0.0;
+            triangle[n] = xyz[n][1] > xyz[n][0]; /* the two triangles are of one plane */
+        }
+    const struct cloud cloud = {.n = n, .xyz_m = xyz};
+    const struct cloud_site site = {.n_stations = 1, .max_m = 10, .threads = 1};
+    const struct deviation_points points = {.range_m = range_m};
+    const struct figures_in in = {n, distance_m, &points};
+    struct figures_density d;
+    struct figures_density_row row;
+    struct sh_err err;
+    assert_int_equal(figures_density_of(&cloud, &site, scene, &in, triangle, 1.0, NULL, &d, &err), SH_OK);
+    assert_int_equal(d.n, 4);
+    figures_density_within(&d, 0, 0.0, (double)INFINITY, &row);
+    assert_true(row.cells == 4 && row.points == 20);
+    near_to(row.p5, 1.0 / M_SQRT2); /* one point of 20 is 5 % */
+    near_to(row.p50, 9.0 / M_SQRT2);
+    near_to(row.p95, 9.0 / M_SQRT2);
+    figures_density_within(&d, 1, 4.0, 6.0, &row);
+    assert_true(row.cells == 2 && row.points == 2);
+    near_to(row.p95, 1.0 / M_SQRT2);
+    figures_density_within(&d, 2, 0.0, (double)INFINITY, &row);
+    assert_true(row.cells == 0 && isnan(row.p50));
+    figures_density_free(&d);
+    scene_free(scene);
+}
+
+static void times_go_by_station_and_scan(void **state)
+{
+    (void)state;
+    double time_s[] = {0.0, 0.1, 0.2, 5.0, 0.9, 1.0, 0.5, 0.7, NAN};
+    uint16_t station[] = {1, 1, 1, 2, 1, 1, 1, 1, 1};
+    const struct cloud cloud = {.n = 9, .station = station, .time_s = time_s};
+    struct figures_times t[2];
+    figures_times_of(&cloud, 2, (const double[]){0.15, 0.15}, t);
+    assert_true(t[0].points == 7 && t[0].scans == 2 && t[0].gaps == 2); /* 0.2..0.9; 0.5..0.7 of the second scan */
+    near_to(t[0].span_s, 1.2);
+    near_to(t[0].longest_s, 0.7);
+    near_to(t[0].longest_at_s, 0.2);
+    near_to(t[0].last_s, 0.7);
+    assert_true(t[1].points == 1 && t[1].scans == 1 && t[1].span_s == 0.0 && t[1].gaps == 0);
+}
+
+static void shots_count_by_their_first_echo(void **state)
+{
+    (void)state;
+    uint8_t echo[] = {1, 1, 2, 0, 1, 2, 3}, count[] = {1, 2, 2, 0, 3, 3, 3};
+    uint64_t shots[FIGURES_MAX_ECHOES + 1];
+    const struct cloud cloud = {.n = 7, .echo = echo, .echo_count = count};
+    figures_echoes_of(&cloud, shots);
+    assert_true(shots[0] == 1 && shots[1] == 1 && shots[2] == 1 && shots[3] == 1 && shots[4] == 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(groups_have_their_own_figures),
+        cmocka_unit_test(percentiles_are_the_nearest_rank),
+        cmocka_unit_test(nice_numbers_are_1_2_5),
+        cmocka_unit_test(histograms_count_each_value_once),
+        cmocka_unit_test_setup_teardown(density_is_points_by_area, make_folder, remove_folder),
+        cmocka_unit_test(times_go_by_station_and_scan),
+        cmocka_unit_test(shots_count_by_their_first_echo),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

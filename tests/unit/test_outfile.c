@@ -1,0 +1,174 @@
+/* drivers/record/outfile.h: beyond OUTFILE_DIRECT_FROM a file is written past the system's cache, in whole blocks. Its bytes
+ * are those that were given, whatever their pieces, and whether the file system can do that or not. Files begin with a hole
+ * up to there, so that the tests cost little. */
+#include <errno.h>
+#include <fcntl.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+#include "drivers/record/outfile.h"
+
+enum { DATA_LEN = 5 << 20 };
+
+static char dir[] = "/tmp/test_outfile_XXXXXX", path[64];
+static uint8_t data[DATA_LEN], back[DATA_LEN];
+static struct sh_err err;
+
+/* ---- in place of libc's: what is written direct is whole blocks, of memory that is aligned */
+
+static enum { AS_IT_IS, NOT_DIRECT, HALF_OF_IT, FULL } disk;
+static int n_direct;
+
+ssize_t pwrite(int fd, const void *from, size_t len, off_t at)
+{
+    if (fcntl(fd, F_GETFL) & O_DIRECT) {
+        n_direct++;
+        if (disk == NOT_DIRECT || len % OUTFILE_BLOCK != 0 || at % OUTFILE_BLOCK != 0 ||
+            (uintptr_t)from % OUTFILE_BLOCK != 0) {
+            assert_true(disk == NOT_DIRECT || disk == HALF_OF_IT);
+            errno = EINVAL;
+            return -1;
+        }
+    }
+    if (disk == FULL) {
+        errno = ENOSPC;
+        return -1;
+    }
+    if (disk == HALF_OF_IT && len > 1000) len = len / 2 - 100; /* not a whole block any more */
+    return syscall(SYS_pwrite64, fd, from, len, at);
+}
+
+/* ---- helpers */
+
+static void begin(struct outfile *file, uint64_t at)
+{
+    n_direct = 0;
+    assert_int_equal(outfile_open(file, path, &err), 0);
+    file->may_be_direct = 1;
+    file->written = at;
+}
+
+static void expect_data(uint64_t at, size_t len)
+{
+    struct stat st;
+    int fd = open(path, O_RDONLY);
+    assert_true(fd >= 0);
+    assert_int_equal(fstat(fd, &st), 0);
+    assert_int_equal(st.st_size, at + len);
+    assert_int_equal(pread(fd, back, len, (off_t)at), len);
+    assert_memory_equal(back, data, len);
+    close(fd);
+}
+
+/* Pieces of all kinds of lengths, from byte `from` of data on. */
+static size_t write_pieces(struct outfile *file, size_t from)
+{
+    static const size_t piece[] = {1, 4096, 70001, 123, OUTFILE_BUFFER - 1, 512, 8191, OUTFILE_BUFFER + 1, 65536, 3};
+    for (size_t i = 0;; i++) {
+        const size_t n = piece[i % (sizeof piece / sizeof piece[0])];
+        if (from + n > DATA_LEN) return from;
+        assert_int_equal(outfile_write(file, data + from, n, &err), 0);
+        from += n;
+    }
+}
+
+/* ---- tests */
+
+/* On the border, one byte before it, one after it. */
+static void test_pieces(void **state)
+{
+    (void)state;
+    for (int mode = AS_IT_IS; mode < FULL; mode++)
+        for (int shift = -1; shift <= 1; shift++) {
+            struct outfile file;
+            const uint64_t at = (uint64_t)(OUTFILE_DIRECT_FROM + shift);
+            disk = mode;
+            begin(&file, at);
+            const size_t n = write_pieces(&file, 0);
+            assert_int_equal(outfile_patch(&file, at + 7, data + 7, 5000, &err), 0);
+            assert_int_equal(outfile_close(&file, 1, &err), 0);
+            expect_data(at, n);
+        }
+    disk = AS_IT_IS;
+}
+
+/* A whole buffer may be asked for, while it holds less than the block that the file's end is in. */
+static void test_whole_buffer(void **state)
+{
+    struct outfile file;
+    (void)state;
+    begin(&file, OUTFILE_DIRECT_FROM + 5);
+    assert_int_equal(outfile_write(&file, data, 10, &err), 0);
+    uint8_t *to = outfile_room(&file, OUTFILE_BUFFER, &err);
+    assert_non_null(to);
+    memcpy(to, data + 10, OUTFILE_BUFFER);
+    outfile_used(&file, OUTFILE_BUFFER);
+    assert_int_equal(outfile_close(&file, 1, &err), 0);
+    expect_data(OUTFILE_DIRECT_FROM + 5, 10 + OUTFILE_BUFFER);
+}
+
+/* A file that ends where direct writing begins is none of it. */
+static void test_border(void **state)
+{
+    struct outfile file;
+    (void)state;
+    begin(&file, OUTFILE_DIRECT_FROM - OUTFILE_BUFFER);
+    assert_int_equal(outfile_write(&file, data, OUTFILE_BUFFER, &err), 0);
+    assert_int_equal(outfile_close(&file, 1, &err), 0);
+    assert_int_equal(n_direct, 0);
+    expect_data(OUTFILE_DIRECT_FROM - OUTFILE_BUFFER, OUTFILE_BUFFER);
+}
+
+static void test_full(void **state)
+{
+    struct outfile file;
+    (void)state;
+    begin(&file, OUTFILE_DIRECT_FROM);
+    assert_int_equal(outfile_write(&file, data, OUTFILE_BUFFER, &err), 0);
+    disk = FULL;
+    assert_int_equal(outfile_write(&file, data, OUTFILE_BUFFER, &err), SH_EIO);
+    assert_non_null(strstr(err.text, "No space left on device"));
+    assert_int_equal(outfile_close(&file, 1, &err), SH_EIO);
+    disk = AS_IT_IS;
+    unlink(path);
+    assert_int_equal(rmdir(dir), 0); /* no part is left */
+    assert_int_equal(mkdir(dir, 0700), 0);
+}
+
+static int setup(void **state)
+{
+    uint32_t v = 1;
+    (void)state;
+    for (size_t i = 0; i < DATA_LEN; i++)
+        data[i] = (uint8_t)((v = v * 1664525u + 1013904223u) >> 24);
+    if (mkdtemp(dir) == NULL) return -1;
+    snprintf(path, sizeof path, "%s/file", dir);
+    return 0;
+}
+
+static int teardown(void **state)
+{
+    (void)state;
+    unlink(path);
+    return rmdir(dir);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_pieces),
+        cmocka_unit_test(test_whole_buffer),
+        cmocka_unit_test(test_border),
+        cmocka_unit_test(test_full),
+    };
+    return cmocka_run_group_tests(tests, setup, teardown);
+}

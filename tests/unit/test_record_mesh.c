@@ -1,0 +1,399 @@
+/* Meshes of recorded grids, and points spread over them: streams whose triangles are counted by hand. */
+#include "core/scene.h"
+#include "tests/unit/recorder_rig.h"
+
+/* Stations stand at this place of the scene; polar and geo points are in millimetres from it. */
+static const double HEAD[3] = {10, 20, 30};
+static struct sh_err err;
+
+enum { PULSES = 1000, FULL = 10 }; /* of a line; lines of a full turn */
+
+/* 1 line a second of 1000 pulses, of which a tenth is cast; the pan turns by 36 degrees a second: ten lines a turn. */
+static struct native_descriptor descriptor(uint32_t scan)
+{
+    return (struct native_descriptor){.idn = "Maker,Model,SN1,1.0",
+                                      .profile = "model",
+                                      .scan = scan,
+                                      .layout = NATIVE_GEO,
+                                      .prr_uhz = 1000000000,
+                                      .lines_uhz = 1000000,
+                                      .pan_udeg_s = 36000000,
+                                      .pan_stop_udeg = 360000000,
+                                      .sweep_udeg = 360000000,
+                                      .line_stop_udeg = 36000000,
+                                      .range_max_m = 100,
+                                      .frames = 1,
+                                      .mirror_counts_per_turn = 3600,
+                                      .pan_counts_per_turn = 3600,
+                                      .range_scale_m = 1e-3};
+}
+
+static void put_descriptor(const struct native_descriptor *d)
+{
+    static uint8_t out[1024];
+    rig_put(out, native_encode_descriptor(out, sizeof out, d, 0, 0));
+}
+
+/* The scene's own frame: the station is the anchor. */
+static struct native_anchor anchor_of(uint32_t station)
+{
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, station);
+    memcpy(a.anchor, HEAD, sizeof HEAD);
+    memcpy(a.axes, (const double[9]){1, 0, 0, 0, 1, 0, 0, 0, 1}, sizeof a.axes);
+    for (int k = 0; k < 3; k++)
+        a.scale[k] = 1e-3;
+    return a;
+}
+
+static void begin_scan(uint32_t scan, uint32_t station)
+{
+    const struct native_descriptor d = descriptor(scan);
+    const struct native_anchor a = anchor_of(station);
+    put_descriptor(&d);
+    rig_anchor(&a);
+}
+
+static uint64_t first_pulse; /* of line 0 */
+
+static void put_line(uint32_t line, uint32_t row, const struct rig_point *p, uint32_t n)
+{
+    const uint64_t pulse = first_pulse + (uint64_t)line * PULSES;
+    rig_points(line, pulse, pulse + row, p, n);
+}
+
+/* A shot that met something at x y z metres from the head. */
+static struct rig_point hit(double x, double y, double z, uint16_t label)
+{
+    return (struct rig_point){
+        (int32_t)lrint(1000 * x), (int32_t)lrint(1000 * y), (int32_t)lrint(1000 * z), -500, label, 1, 1};
+}
+
+/* The wall with a step of tests/unit/test_scan_mesh.c: 4 lines of 3 shots, 12 triangles, mean edge 1.18972 m. With a
+ * factor of 1.2 the four triangles of the step go, and 4 m2 are left. */
+static void put_step(uint32_t first_line)
+{
+    for (uint32_t line = 0; line < 4; line++) {
+        struct rig_point p[3];
+        for (uint32_t row = 0; row < 3; row++)
+            p[row] = hit(line, line < 2 ? 10 : 11, row, (uint16_t)(line / 2));
+        put_line(first_line + line, 20, p, 3);
+    }
+}
+
+static void record_ok(const char *name, struct recorder_options options)
+{
+    if (rig_record(rig_path(name), options, RIG_KEEP, &err) != SH_OK) fail_msg("%s", err.text);
+}
+
+static char *text_of(const char *name)
+{
+    size_t len;
+    char *text = (char *)rig_read(rig_path(name), &len);
+    assert_int_equal(unlink(rig_path(name)), 0);
+    return text;
+}
+
+static void has(const char *text, const char *expected)
+{
+    if (strstr(text, expected) == NULL) fail_msg("no '%s' in:\n%s", expected, text);
+}
+
+static unsigned count_of(const char *text, const char *what)
+{
+    unsigned n = 0;
+    for (const char *p = text; (p = strstr(p, what)) != NULL; p += strlen(what))
+        n++;
+    return n;
+}
+
+static void remove_file(const char *name)
+{
+    assert_int_equal(unlink(rig_path(name)), 0);
+}
+
+/* ---- .ply */
+
+static void a_step_as_ply(void **state)
+{
+    (void)state;
+    rig_begin();
+    begin_scan(1, 3);
+    put_step(5);
+    record_ok("a.ply", (struct recorder_options){.ascii = 1, .mesh = 1, .long_edge = 1.2});
+    char *text = text_of("a.ply");
+    has(text, "comment crs scene frame, metres\n");
+    has(text, "comment mean_edge_m 1.18972");
+    has(text, "comment long_edge 1.2 left_out 4\n");
+    has(text, "element vertex 12\n");
+    has(text, "property double z\nproperty float nx\nproperty float ny\nproperty float nz\nproperty double range\n"
+              "property float reflectance\nproperty ushort label\nproperty ushort station\nelement face 8\n");
+    /* the first point: 10 m away, a reflectance of -5 dB; its normal points to the head */
+    has(text, "end_header\n10 30 30 0 -1 0 10 -5 0 3\n");
+    has(text, "\n13 31 32 0 -1 0 "); /* the last one */
+    assert_int_equal(count_of(text, "\n3 "), 8);
+    has(rig_notes, "4 triangles left out, with an edge over 1.2 times their scan's mean edge, 1.19 m (--long-edge)");
+    assert_int_equal(count_of(rig_notes, "\n"), 1);
+    free(text);
+    rig_begin();
+    begin_scan(1, 3);
+    put_step(5);
+    record_ok("a.ply", (struct recorder_options){.ascii = 1, .mesh = 1, .columns = PLY_LABEL | PLY_COLOUR});
+    text = text_of("a.ply");
+    has(text, "property float nz\nproperty ushort label\nelement face 12\n"); /* there are no colours */
+    free(text);
+    rig_begin();
+    begin_scan(1, 3);
+    put_step(5);
+    record_ok("a.ply", (struct recorder_options){.ascii = 1, .mesh = 1, .long_edge = 1, .scalar_names = 1});
+    text = text_of("a.ply");
+    has(text, "comment points_without_triangle 12\n");
+    has(text, "property double scalar_range\n");
+    has(text, "element vertex 0\n");
+    has(text, "element face 0\n");
+    has(rig_notes, "there is no triangle in it");
+    has(rig_notes, "12 points left out that are in no triangle");
+    free(text);
+}
+
+/* 4 m2: 400 points at 100 a square metre. They lie on the walls, labelled as these are. */
+static void points_spread_over_the_step(void **state)
+{
+    (void)state;
+    char *text[3];
+    for (int i = 0; i < 3; i++) {
+        rig_begin();
+        begin_scan(1, 3);
+        put_step(0);
+        record_ok("a.ply", (struct recorder_options){
+                               .ascii = 1, .sparse_per_m2 = 100, .sparse_seed = i < 2 ? 7 : 8, .long_edge = 1.2});
+        text[i] = text_of("a.ply");
+    }
+    has(text[0], "comment sparse 100 points per m2, seed 7: 400 points on 4 m2\n");
+    has(text[0], "element vertex 400\n");
+    assert_null(strstr(text[0], "element face"));
+    assert_string_equal(text[0], text[1]);
+    assert_string_not_equal(strstr(text[0], "end_header"), strstr(text[2], "end_header"));
+    const char *p = strstr(text[0], "end_header\n") + 11;
+    for (int i = 0; i < 400; i++) {
+        double x, y, z, range, reflectance;
+        unsigned label, station;
+        int used;
+        assert_int_equal(
+            sscanf(p, "%lf %lf %lf %lf %lf %u %u%n", &x, &y, &z, &range, &reflectance, &label, &station, &used), 7);
+        p += used;
+        const int is_far = label == 1;
+        assert_true(fabs(y - (is_far ? 31 : 30)) < 1e-9 && x >= 10 + 2 * is_far && x <= 11 + 2 * is_far);
+        assert_true(z >= 30 && z <= 32 && station == 3 && reflectance == -5);
+        /* between the ranges of corners, which are at most 0.2 m apart, and above the true one: the mean of a convex
+         * function's values is more than its value at the mean */
+        const double there = sqrt((x - 10) * (x - 10) + (y - 20) * (y - 20) + (z - 30) * (z - 30));
+        assert_true(range >= there - 1e-6 && range < there + 0.1);
+    }
+    for (int i = 0; i < 3; i++)
+        free(text[i]);
+}
+
+/* ---- meshes with a material */
+
+/* Ten lines of four shots on a tube of 5 m radius, rows 0.5 m apart: closed, 10 * 3 cells of two. */
+static void put_tube(uint32_t lines)
+{
+    for (uint32_t line = 0; line < lines; line++) {
+        struct rig_point p[4];
+        const double angle = 2 * 3.14159265358979323846 * line / FULL;
+        for (uint32_t row = 0; row < 4; row++)
+            p[row] = hit(5 * sin(angle), 5 * cos(angle), 0.5 * row, (uint16_t)line);
+        put_line(line, 20, p, 4);
+    }
+}
+
+/* The texture has ten columns and four rows; texels' middles are at 0.05, 0.15, ... The seam's far side is at 1.05. */
+static void a_full_turn_and_its_texture(void **state)
+{
+    (void)state;
+    struct scene *scene;
+    for (uint32_t lines = 8; lines <= FULL; lines++) {
+        rig_begin();
+        begin_scan(1, 1);
+        put_tube(lines);
+        record_ok("a.obj", (struct recorder_options){.long_edge = 0});
+        const struct scene_mesh_spec spec = {.file = rig_path("a.obj"), .scale = 1, .textures = 1};
+        if (scene_load(&spec, 1, 1e-3, NULL, &scene, &err) != SH_OK) fail_msg("%s", err.text);
+        /* 10 lines: 1 step from the last to the first; 9: 2 steps, which is too far */
+        const uint32_t cells = 3 * (lines == FULL ? FULL : lines - 1);
+        assert_int_equal(scene->n_triangles, 2 * cells);
+        float most = 0;
+        for (uint32_t i = 0; i < scene->n_triangles; i++)
+            for (int k = 0; k < 3; k++)
+                if (scene->uv[i][k][0] > most) most = scene->uv[i][k][0];
+        const double last = (lines == FULL ? lines + 0.5 : lines - 0.5) / lines;
+        assert_true(fabs((double)most - last) < 1e-6);
+        assert_int_equal(scene->n_textures, 1);
+        has(scene->texture[0].file, "a.png");
+        struct texture_image image;
+        assert_int_equal(scene_read_texture(&scene->texture[0], 0, &image, &err), SH_OK);
+        assert_int_equal(image.width, lines);
+        assert_int_equal(image.height, 4);
+        assert_memory_not_equal(image.rgba, image.rgba + 4, 3); /* a hue for each label */
+        texture_image_free(&image);
+        scene_free(scene);
+        remove_file("a.obj");
+        remove_file("a.mtl");
+        remove_file("a.png");
+    }
+}
+
+static void two_stations_are_two_objects(void **state)
+{
+    (void)state;
+    rig_begin();
+    begin_scan(1, 1);
+    put_step(0);
+    begin_scan(2, 2);
+    put_step(3);
+    record_ok("b.obj", (struct recorder_options){.long_edge = 1.2});
+    char *text = text_of("b.obj"), *materials = text_of("b.mtl");
+    has(text, "mtllib b.mtl\no station 1\nv 10 30 30\nvt 0.125 0.166666672\nvn 0 -1 0\n");
+    has(text, "usemtl station 1\nf ");
+    has(text, "o station 2\nv 10 30 30\n");
+    assert_int_equal(count_of(text, "\nf "), 16);
+    has(text, "\nf 13/13/13 "); /* the second object has vertices of its own */
+    has(materials, "newmtl station 2\n");
+    has(materials, "map_Kd b.2.png\n");
+    free(text);
+    free(materials);
+    remove_file("b.1.png");
+    remove_file("b.2.png");
+    rig_begin();
+    begin_scan(1, 1);
+    put_step(0);
+    record_ok("c.obj", (struct recorder_options){.colour = {.given = 1}}); /* --colour none */
+    text = text_of("c.obj");
+    assert_null(strstr(text, "mtl"));
+    assert_null(strstr(text, "vt "));
+    free(text);
+}
+
+/* ---- what there is beside */
+
+static void later_echoes_and_lines_that_go_back(void **state)
+{
+    (void)state;
+    rig_begin();
+    begin_scan(1, 1);
+    for (uint32_t line = 0; line < 2; line++) {
+        const struct rig_point p[5] = {{1000 * (int32_t)line, 10000, 0, 0, 0, 1, 2},
+                                       {1000 * (int32_t)line, 12000, 0, 0, 0, 2, 2},
+                                       hit(line, 10, 1, 0),
+                                       {0, 0, 0, 0, 0xffff, 0, 0},
+                                       hit(line, 10, 3, 0)};
+        put_line(line, 0, p, 5);
+    }
+    first_pulse = 2 * PULSES;
+    put_step(0); /* line 0 again: a mesh of its own */
+    first_pulse = 0;
+    record_ok("a.ply", (struct recorder_options){.ascii = 1, .mesh = 1, .long_edge = 0});
+    char *text = text_of("a.ply");
+    has(text, "element face 14\n"); /* a cell, and the step */
+    has(rig_notes, "2 echoes left out; a mesh has the first of a shot\n");
+    has(rig_notes, "1 meshes begun within a scan, since its lines went back\n");
+    has(rig_notes, "2 points left out that are in no triangle\n"); /* behind the empty shots */
+    free(text);
+}
+
+static void refused(const char *name, struct recorder_options options, int code, const char *expected)
+{
+    assert_int_equal(rig_record(rig_path(name), options, RIG_KEEP, &err), code);
+    if (strstr(err.text, expected) == NULL || strchr(err.text, '\n') != NULL) fail_msg("%s", err.text);
+    assert_int_equal(access(rig_path(name), F_OK), -1);
+}
+
+static void what_can_be_no_mesh(void **state)
+{
+    (void)state;
+    const struct recorder_options mesh = {.mesh = 1};
+    struct native_descriptor d = descriptor(1);
+    struct native_anchor a = anchor_of(1);
+    d.pan_udeg_s = 0;
+    rig_begin();
+    put_descriptor(&d);
+    rig_anchor(&a);
+    put_step(0);
+    refused("a.ply", mesh, SH_EFORMAT, "it neither pans nor moves");
+
+    a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1);
+    d = descriptor(1);
+    rig_begin();
+    put_descriptor(&d);
+    rig_anchor(&a);
+    put_step(0);
+    refused("a.glb", mesh, SH_EINPUT, ".glb holds coordinates as float, which moves those of 5000100 m by up to 0.3 m");
+
+    d.frames = 10000000; /* 10^7 turns of 11 lines of a tenth of 1001 pulses */
+    a = anchor_of(1);
+    rig_begin();
+    put_descriptor(&d);
+    rig_anchor(&a);
+    put_step(0);
+    refused("a.ply", mesh, SH_EINPUT, "up to 11011000000 points; a mesh holds 2147483647");
+
+    d.frames = 100000;
+    d.prr_uhz = 10000000000;
+    rig_begin();
+    put_descriptor(&d);
+    rig_anchor(&a);
+    put_step(0);
+    if (sysconf(_SC_PHYS_PAGES) * (sysconf(_SC_PAGESIZE) >> 20) < 170000)
+        refused("a.ply", mesh, SH_EINPUT, "takes 174.2 GiB of memory, and there are");
+    else
+        rig_record(rig_path("a.ply"), mesh, 0, &err);
+
+    rig_begin();
+    begin_scan(1, 1);
+    put_step(0);
+    refused("a.ply", (struct recorder_options){.sparse_per_m2 = 1e9, .sparse_seed = 1}, SH_EINPUT,
+            "6.828 m2 of mesh would get 6.828e+09 points; a file holds 2147483647: give at most 3.14e+08");
+    if (sysconf(_SC_PHYS_PAGES) * (sysconf(_SC_PAGESIZE) >> 20) < 200000) {
+        rig_begin();
+        begin_scan(1, 1);
+        put_step(0);
+        refused("a.ply", (struct recorder_options){.sparse_per_m2 = 3e8, .sparse_seed = 1}, SH_EINPUT,
+                "6.828 m2 of mesh would get 2.049e+09 points; there is memory for ");
+    }
+
+    a = anchor_of(1); /* of a broken stream: coordinates are numbers, and areas are none */
+    a.scale[0] = a.scale[1] = a.scale[2] = 1e200;
+    d = descriptor(1);
+    rig_begin();
+    put_descriptor(&d);
+    rig_anchor(&a);
+    put_step(0);
+    refused("a.ply", (struct recorder_options){.sparse_per_m2 = 1, .sparse_seed = 1}, SH_EINPUT,
+            "--sparse 1: the mesh has an area of ");
+
+    assert_int_equal(symlink("nowhere", rig_path("a.mtl")), 0); /* said before the scan, not after it */
+    rig_begin();
+    refused("a.obj", mesh, SH_EINPUT, "a.mtl: is a symbolic link");
+    remove_file("a.mtl");
+
+    refused("a#b.gltf", mesh, SH_EINPUT, "as URIs, where # means something else");
+    refused("a%b.glb", mesh, SH_EINPUT, "as URIs, where % means something else");
+
+    rig_begin();
+    begin_scan(1, 1);
+    put_step(0);
+    refused("a.fbx", (struct recorder_options){.long_edge = 1}, SH_EINPUT, "there is no triangle in this scan");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_step_as_ply),
+        cmocka_unit_test(points_spread_over_the_step),
+        cmocka_unit_test(a_full_turn_and_its_texture),
+        cmocka_unit_test(two_stations_are_two_objects),
+        cmocka_unit_test(later_echoes_and_lines_that_go_back),
+        cmocka_unit_test(what_can_be_no_mesh),
+    };
+    return cmocka_run_group_tests(tests, rig_set_up, rig_tear_down);
+}

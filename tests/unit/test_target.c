@@ -1,0 +1,176 @@
+/* What of a scene is scanned: surfaces that are left out of it, and surfaces that give no echo. */
+#include "firmware_sim/site/site.h"
+#include "tests/unit/cast_rig.h"
+#include "tests/unit/config_rig.h"
+
+/* Two triangles of each of three surfaces, side by side along x; they share vertices 4 and 5. */
+static struct scene *strip(void)
+{
+    static const double v[8][3] = {{0, 0, 0}, {0, 1, 0}, {1, 0, 0}, {1, 1, 0},
+                                   {2, 0, 0}, {2, 1, 0}, {3, 0, 7}, {3, 1, 7}};
+    static const uint32_t t[6][3] = {{0, 2, 1}, {2, 3, 1}, {2, 4, 3}, {4, 5, 3}, {4, 6, 5}, {6, 7, 5}};
+    static const uint16_t label[6] = {0, 0, 1, 1, 2, 2};
+    static const struct scene_surface surface[3] = {{.object = "a"}, {.object = "b"}, {.object = "c"}};
+    struct scene *scene;
+    if (scene_from_arrays(&(struct scene_arrays){v, 8, t, 6, label, surface, 3}, &scene, &err) != SH_OK)
+        fail_msg("%s", err.text);
+    return scene;
+}
+
+static void what_is_left_has_its_own_numbers(void **state)
+{
+    (void)state;
+    struct scene *scene = strip();
+    assert_int_equal(scene_keep(scene, (const uint8_t[]){0, 1, 1}, &err), SH_OK);
+    assert_true(scene->n_triangles == 4 && scene->n_surfaces == 2 && scene->n_vertices == 6);
+    assert_string_equal(scene->surface[0].object, "b");
+    assert_string_equal(scene->surface[1].object, "c");
+    static const uint16_t label[4] = {0, 0, 1, 1};
+    static const uint32_t t[4][3] = {{0, 2, 1}, {2, 3, 1}, {2, 4, 3}, {4, 5, 3}}; /* two vertices less before each */
+    assert_memory_equal(scene->label, label, sizeof label);
+    assert_memory_equal(scene->triangle, t, sizeof t);
+    assert_true(scene->vertex_m[0][0] == 1 && scene->vertex_m[5][2] == 7);
+    assert_true(scene->min_m[0] == 1 && scene->max_m[0] == 3 && scene->max_m[2] == 7);
+    assert_int_equal(scene_keep(scene, (const uint8_t[]){1, 0}, &err), SH_OK);
+    assert_true(scene->n_triangles == 2 && scene->max_m[0] == 2 && scene->max_m[2] == 0);
+    assert_int_equal(scene_keep(scene, (const uint8_t[]){0}, &err), SH_OK);
+    assert_true(scene->n_triangles == 0 && scene->n_surfaces == 0 && scene->n_vertices == 0);
+    scene_free(scene);
+}
+
+/* A line in a box: pulses that meet a silent wall are shots without echo, and counted; all others are as before. */
+static void silent_surfaces_give_no_echo(void **state)
+{
+    (void)state;
+    static const double lo[3] = {-4, -5, -2}, hi[3] = {6, 5, 3}, station[3] = {0.5, 0.25, 0.125};
+    enum { CEILING = 5 };
+    uint8_t silent[6] = {[CEILING] = 1};
+    struct cast_rig *rig = cast_rig_open(box_scene(lo, hi), station);
+    struct schedule_line line;
+    struct cast_counters counters;
+    const uint32_t all = cast_line(rig, 7, &line), n = rig->block.n_points;
+    uint8_t echo[RIG_LINE];
+    uint16_t label[RIG_LINE];
+    uint32_t range[RIG_LINE], hidden = 0;
+    memcpy(echo, rig->block.echo, n);
+    memcpy(label, rig->block.label, n * sizeof *label);
+    memcpy(range, rig->block.a, n * sizeof *range);
+    rig->setup.silent = silent;
+    const uint32_t rest = cast_line(rig, 7, &line);
+    assert_int_equal(rig->block.n_points, n);
+    for (uint32_t i = 0; i < n; i++) {
+        long double d[3], mirror, pan;
+        int wall;
+        true_angles(&rig->spec, line.cast0 + i, &mirror, &pan);
+        true_direction(mirror, pan, 0.0L, d);
+        box_range(lo, hi, station, d, &wall);
+        hidden += wall == CEILING;
+        assert_int_equal(rig->block.echo[i] != 0, wall != CEILING);
+        if (wall == CEILING) continue;
+        assert_true(rig->block.echo[i] == echo[i] && rig->block.label[i] == label[i]);
+        assert_true((uint32_t)rig->block.a[i] == range[i]);
+    }
+    assert_true(hidden > n / 20 && hidden < n);
+    assert_int_equal(rest, all - hidden);
+    caster_get_counters(rig->caster, &counters);
+    assert_int_equal(counters.faint, hidden);
+    cast_rig_close(rig);
+}
+
+/* ---- a site with things that move */
+
+static int load_moving(const char *target, struct site **site)
+{
+    static const char quad[] = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\n";
+    char text[1024];
+    FILE *f;
+    const char *const object[2][2] = {{"house", "tree"}, {"car", "flag"}};
+    for (int i = 0; i < 2; i++) {
+        snprintf(text, sizeof text, "%s/%s", dir, i == 0 ? "still.obj" : "moving.obj");
+        f = fopen(text, "w");
+        assert_non_null(f);
+        for (int k = 0; k < 2; k++)
+            fprintf(f, "o %s\n%s", object[i][k], quad);
+        assert_int_equal(fclose(f), 0);
+    }
+    snprintf(text, sizeof text,
+             "head: {profile: any-rate}\nscene:\n  target: %s\n  meshes:\n    - {file: still.obj, up: z, scale: 1}\n"
+             "    - {file: cube.obj, up: z, scale: 1, move_m_s: [1, 0, 0]}\n"
+             "    - {file: moving.obj, up: z, scale: 1, move_m_s: [1, 0, 0]}\nstations: [{position_m: [0, 0, 2]}]\n",
+             target);
+    int rc = load_text(text);
+    if (rc == SH_OK) rc = site_load(cfg, NULL, site, &err);
+    snprintf(text, sizeof text, "%s/still.obj", dir);
+    unlink(text);
+    snprintf(text, sizeof text, "%s/moving.obj", dir);
+    unlink(text);
+    return rc;
+}
+
+static void targets_are_chosen_in_all_meshes(void **state)
+{
+    (void)state;
+    struct site *site;
+    assert_loads(load_moving("{objects: [tree, flag]}", &site));
+    assert_true(site->n_movers == 1 && site->scene->n_triangles == 1 && site->n_surfaces == 2 && site->silent == NULL);
+    assert_string_equal(site_surface(site, 0)->object, "tree");
+    assert_string_equal(site_surface(site, 1)->object, "flag");
+    assert_string_equal(strrchr(site->mover[0].mesh->file, '/'), "/moving.obj");
+    assert_int_equal(site->mover[0].scene->label[0], 1);
+    const struct site_target *t = &site->world->target;
+    assert_true(t->triangles == 2 && t->all_triangles == 5 && t->surfaces == 2 && t->all_surfaces == 5);
+    struct site *beside;
+    assert_int_equal(site_load_beside(cfg, site, NULL, &beside, &err), SH_OK);
+    assert_string_equal(strrchr(beside->mover[0].mesh->file, '/'), "/moving.obj");
+    assert_int_equal(beside->world->n_loads, 1);
+    site_free(site);
+    site_free(beside);
+    assert_loads(load_moving("{objects: [tree, \"c?r\"], others: hide}", &site));
+    assert_true(site->n_movers == 2 && site->n_surfaces == 5);
+    for (uint32_t i = 0; i < 5; i++) {
+        const char *object = site_surface(site, i)->object;
+        assert_int_equal(site->silent[i], strcmp(object, "tree") != 0 && strcmp(object, "car") != 0);
+    }
+    site_free(site);
+    assert_loads(load_moving("{objects: [\"*\"], others: hide}", &site));
+    assert_null(site->silent); /* all of them: nothing is spent on it */
+    site_free(site);
+}
+
+static void wrong_targets_are_refused(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *target, *says;
+    } wrong[] = {
+        {"{objects: [tre]}",
+         "scene.target.objects[0]: no object fits \"tre\"; allowed names of the scene's 5 objects, near "
+         "ones are \"tree\""},
+        {"{objects: [tree, \"xyzzy*\"]}", "scene.target.objects[1]: no object fits \"xyzzy*\""},
+        {"{objects: [flag]}", "nothing that stands still is among them; allowed with one that does, or others: hide"},
+        {"{others: hide}", "scene.target.others: but there are no scene.target.objects"},
+        {"{objects: tree}", "scene.target.objects: here stands a single value; allowed a list of 0 to 64"},
+        {"{objects: [{a: b}]}", "scene.target.objects[0]: here stands a section with keys"},
+        {"{objects: [\"\"]}", "scene.target.objects[0]"},
+        {"{objects: [tree], others: keep}",
+         "scene.target.others: \"keep\" is not known; allowed left_out, hide"},
+        {"7", "scene.target: here stands a single value"},
+    };
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+        struct site *site = NULL;
+        assert_int_equal(load_moving(wrong[i].target, &site), SH_EINPUT);
+        assert_null(site);
+        assert_says(wrong[i].says);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_is_left_has_its_own_numbers),
+        cmocka_unit_test(silent_surfaces_give_no_echo),
+        cmocka_unit_test(targets_are_chosen_in_all_meshes),
+        cmocka_unit_test(wrong_targets_are_refused),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

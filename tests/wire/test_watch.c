@@ -1,0 +1,297 @@
+/* What a page is told of a scan while it is on: a noise-free scan that the observer sees all of has the figures that
+ * `scanhead report` and `scanhead coverage` have of the same one; with noise it is judged by it; stations follow the head;
+ * the coarse scene is the scene. The answers come by HTTP, as a browser gets them. */
+#include <math.h>
+#include <poll.h>
+
+#include "tests/wire/wire.h"
+
+/* A floor of 8 x 8 m and two walls, 3 m high: half of all shots go into the open. */
+static const char SCENE[] = "v -4 -4 0\nv 4 -4 0\nv 4 4 0\nv -4 4 0\nv 4 -4 3\nv 4 4 3\nv -4 4 3\n"
+                            "o floor\nf 1 2 3 4\no east\nf 2 5 6 3\no north\nf 3 6 7 4\n";
+
+static const char CONFIG[] =
+    "head: {profile: full-sweep, prr_hz: 10000, lines_hz: 100, pan_deg_s: 240, frames: 1}\n"
+    "scene:\n  meshes: [{file: corner.obj, up: z, scale: 1}]\n"
+    "  anchor: {source: explicit, origin_m: [0, 0, 0], lat_deg: 52, lon_deg: 13, height_m: 100}\n"
+    "stations:\n  - {name: first, position_m: [0.31, -0.42, 1.7], heading_deg: 30}\n"
+    "  - {name: second, position_m: [-2.2, 1.3, 1.5], heading_deg: 200}\n"
+    "beam: {mode: single}\n"
+    "coverage: {cell_m: 0.25}\n"
+    "output: {layout: geo, crs: utm}\n"
+    "loop: {pace: fast}\n"
+    "links: [{type: tcp}, {type: web, waits: 'yes'}]\n";
+
+static void prepare(struct wire *wire, char config[256])
+{
+    wire_write_text(wire, "corner.obj", SCENE);
+    snprintf(config, 256, "%s", wire_write_text(wire, "config.yaml", CONFIG));
+}
+
+/* ---- answers */
+
+/* The body; free it. */
+static char *get(const struct head *head, const char *path, size_t *len)
+{
+    char request[256], *answer = NULL;
+    size_t n = 0, room = 0;
+    ssize_t got;
+    const int fd = raw_connect(head_endpoint(head, "web"));
+    const int port = endpoint_port(head_endpoint(head, "web"));
+    snprintf(request, sizeof request, "GET %s HTTP/1.1\r\nHost: 127.0.0.1:%d\r\nConnection: close\r\n\r\n", path, port);
+    raw_write(fd, request, strlen(request));
+    do {
+        if (n + 65536 > room) answer = realloc(answer, room = 2 * room + 65536 + 1);
+        assert_non_null(answer);
+        got = read(fd, answer + n, room - n - 1);
+        assert_true(got >= 0);
+        n += (size_t)got;
+        answer[n] = '\0';
+    } while (got > 0);
+    close(fd);
+    char *body = strstr(answer, "\r\n\r\n");
+    if (strncmp(answer, "HTTP/1.1 200", 12) != 0 || body == NULL) fail_msg("%s: %.60s", path, answer);
+    body += 4;
+    *len = n - (size_t)(body - answer);
+    memmove(answer, body, *len + 1);
+    return answer;
+}
+
+/* The number behind the first `key` after the first `after`; NaN: null. */
+static double number(const char *json, const char *after, const char *key)
+{
+    char quoted[64];
+    const char *at = strstr(json, after);
+    snprintf(quoted, sizeof quoted, "\"%s\":", key);
+    if (at == NULL || (at = strstr(at, quoted)) == NULL) fail_msg("no %s after %s in %.400s", key, after, json);
+    at += strlen(quoted);
+    return strncmp(at, "null", 4) == 0 ? (double)NAN : atof(at);
+}
+
+/* The quality once a scan is over. The head works it out twice a second at most, so asking faster would only cost. */
+static char *quality_of(const struct head *head, unsigned station, unsigned scan)
+{
+    char begin[64];
+    size_t len;
+    snprintf(begin, sizeof begin, "{\"scan\":%u,\"station\":%u,\"over\":true,", scan, station);
+    for (const int64_t until = wire_now_ms() + DEADLINE_MS; wire_now_ms() < until;) {
+        char *json = get(head, "/quality", &len);
+        if (strncmp(json, begin, strlen(begin)) == 0) return json;
+        free(json);
+        poll(NULL, 0, 50);
+    }
+    fail_msg("scan %u does not end", scan);
+    return NULL;
+}
+
+/* A scan from a station, as any client asks for it. */
+static char *scan_from(const struct head *head, struct scanhead *sh, unsigned station, unsigned scan)
+{
+    char line[32];
+    struct scanhead_frame frame;
+    snprintf(line, sizeof line, "HEAD:STATION %u", station);
+    client_wait_state(sh, "idle");
+    client_tell(sh, line);
+    client_tell(sh, "SCAN:STAR");
+    client_until(sh, SCANHEAD_EV_SCAN_END, &frame);
+    return quality_of(head, station, scan);
+}
+
+/* ---- the same scan off line */
+
+static char *command(struct wire *wire, const char *const *first, const char *set, const char *out)
+{
+    const char *args[WIRE_MAX_ARGS];
+    size_t n = 0;
+    while (*first != NULL)
+        args[n++] = *first++;
+    if (set != NULL) {
+        args[n++] = "--set";
+        args[n++] = set;
+    }
+    args[n] = NULL;
+    if (wire_wait(wire, wire_spawn(wire, args, out, "err", -1)) != 0) {
+        wire_show(wire, "err");
+        fail_msg("%s", args[0]);
+    }
+    return wire_read(wire_path(wire, out), NULL);
+}
+
+static char *report_of(struct wire *wire, const char *config, const char *set)
+{
+    char cloud[256];
+    snprintf(cloud, sizeof cloud, "%s", wire_path(wire, "scan.ply"));
+    const char *const record[] = {"record", config, "-o", cloud, "--station", "1", "--empty-shots", "--quiet", NULL};
+    const char *const report[] = {"report", config, cloud, "--json", "--tolerance-m", "1", NULL};
+    free(command(wire, record, set, "out"));
+    return command(wire, report, set, "report.json");
+}
+
+static void same(const char *what, double value, double expected, double tolerance)
+{
+    if (!(fabs(value - expected) <= tolerance)) fail_msg("%s: %.12g, not %.12g", what, value, expected);
+}
+
+/* The file holds the points as a client decodes them, so distances are the same but for the way back from UTM, whose
+ * anchor is made twice: some units in the last place of 5.8e6 m, 1e-9 m each. Densities are of whole points in the same
+ * cells: to a float's digits. */
+static void check_figures(const char *quality, const char *report)
+{
+    static const char *const key[4][2] = {{"mean", "mean_m"}, {"rms", "rms_m"}, {"p95", "p95_m"}, {"max", "max_m"}};
+    same("every", number(quality, "{", "every"), 1, 0);
+    same("points", number(quality, "{", "points"), number(report, "{", "points"), 0);
+    same("sampled", number(quality, "{", "sampled_points"), number(report, "{", "points"), 0);
+    const double shots = number(quality, "{", "shots");
+    same("empty", number(quality, "{", "empty_share") * shots, number(report, "{", "empty"), 1e-6);
+    for (int k = 0; k < 4; k++)
+        same(key[k][0], number(quality, "deviation_m", key[k][0]), number(report, "{", key[k][1]), 4e-9);
+    same("bound", number(quality, "deviation_m", "bound"), number(report, "\"verdict\"", "bound_m"), 1e-12);
+    same("p50", number(quality, "density", "p50"), number(report, "density", "p50_m2"),
+         1e-6 * number(report, "density", "p50_m2"));
+    same("cell", number(quality, "density", "cell_m"), number(report, "\"all\"", "density_cell_m"), 0);
+    /* Within the report's bound, which is what the plan promises and half a count an axis. */
+    assert_true(number(quality, "deviation_m", "rms") <= number(report, "\"verdict\"", "bound_m"));
+    assert_true(number(quality, "deviation_m", "max") <= number(report, "\"verdict\"", "bound_m"));
+    assert_non_null(strstr(quality, "\"judgement\":\"within\""));
+    same("lost", number(quality, "{", "lost_frames"), 0, 0);
+}
+
+/* A point is half a count from where its pulse met the surface, so it may lie in the next cell: where no other pulse
+ * meets one of the two. That is one cell more or less, a rare one; its area is at most (2.5 cells)^2. */
+static void check_coverage(struct wire *wire, const char *config, const char *quality)
+{
+    const char *const args[] = {"coverage", config, "--json", "--quiet", NULL};
+    char *coverage = command(wire, args, NULL, "coverage.json");
+    const double area_m2 = number(coverage, "{", "area_m2"), seen_m2 = area_m2 - number(coverage, "{", "none_m2");
+    same("cells", number(quality, "\"coverage\"", "cells"), number(coverage, "{", "cells"), 0);
+    same("cell_m", number(quality, "\"coverage\"", "cell_m"), 0.25, 0);
+    same("share", number(quality, "\"coverage\"", "share") * area_m2, seen_m2, 6.25 * 0.25 * 0.25);
+    assert_true(seen_m2 < 0.999 * area_m2 && seen_m2 > 0.5 * area_m2);
+    free(coverage);
+}
+
+/* A station that was moved and turned: its points still lie on the scene, which they would not from where it was. */
+static void check_move(const struct head *head, struct scanhead *sh)
+{
+    size_t len;
+    client_tell(sh, "SITE:POSE 1, 1.5, 0.75, 1.4, 77, 4, -3");
+    char *json = get(head, "/head", &len);
+    same("x", number(json, "\"name\":\"first\"", "x_m"), 1.5, 0);
+    same("roll", number(json, "\"name\":\"first\"", "roll_deg"), -3, 0);
+    free(json);
+    json = scan_from(head, sh, 1, 3);
+    assert_non_null(strstr(json, "\"judgement\":\"within\""));
+    same("sampled", number(json, "{", "sampled_points"), number(json, "{", "points"), 0);
+    assert_true(number(json, "{", "points") > 2500);
+    assert_true(number(json, "deviation_m", "max") <= number(json, "deviation_m", "bound"));
+    assert_true(number(json, "along_beam", "points") > 0.9 * number(json, "{", "points"));
+    free(json);
+}
+
+static void figures_are_those_of_the_report(void **state)
+{
+    struct wire *wire = *state;
+    char config[256];
+    prepare(wire, config);
+    char *report = report_of(wire, config, NULL);
+    struct head head = head_start(wire, config, NULL);
+    struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
+    char *quality = scan_from(&head, sh, 1, 1);
+    check_figures(quality, report);
+    free(quality);
+    /* The second station's scan starts anew, and coverage goes on. */
+    quality = scan_from(&head, sh, 2, 2);
+    same("station", number(quality, "{", "station"), 2, 0);
+    same("points of the first", number(quality, "\"name\":\"first\"", "points"), number(report, "{", "points"), 0);
+    check_coverage(wire, config, quality);
+    free(quality);
+    check_move(&head, sh);
+    scanhead_close(sh);
+    head_end(&head, SIGTERM);
+    free(report);
+}
+
+/* One sigma of 3 mm: judged by the noise, as a command has set it; in the histogram the middle is highest. */
+static void noise_is_expected(void **state)
+{
+    struct wire *wire = *state;
+    char config[256];
+    prepare(wire, config);
+    struct head head = head_start(wire, config, (const char *const[]){"--set", "output.layout=polar", NULL});
+    struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
+    client_wait_state(sh, "idle");
+    client_tell(sh, "HEAD:NOIS ON");
+    client_tell(sh, "HEAD:NOIS:SIGM 3 MM");
+    char *quality = scan_from(&head, sh, 1, 1);
+    const double n = number(quality, "along_beam", "judged"), rms_m = number(quality, "along_beam", "judged_rms");
+    /* The RMS of n normal deviations has a standard error of sigma / sqrt(2 n); six of them, and 1 % as sigma is of first
+     * order and smooth faces are told by the noisy points themselves. */
+    assert_true(n > 1000);
+    same("sigma", number(quality, "deviation_m", "sigma_expected"), 0.003, 3e-6);
+    same("rms", rms_m, 0.003, 0.003 * (6.0 / sqrt(2.0 * n) + 0.01));
+    assert_true(isnan(number(quality, "deviation_m", "bound")));
+    assert_non_null(strstr(quality, "\"judgement\":\"within\""));
+    assert_non_null(strstr(quality, "\"of\":\"along_beam\""));
+    free(quality);
+    scanhead_close(sh);
+    head_end(&head, SIGTERM);
+}
+
+static uint32_t u32_at(const char *bytes)
+{
+    uint32_t v;
+    memcpy(&v, bytes, sizeof v);
+    return v;
+}
+
+/* 7 corners, 6 triangles, as they are in the file; relative to the middle of the bounds. */
+static void scene_is_the_scene(void **state)
+{
+    struct wire *wire = *state;
+    static const double corner[7][3] = {{-4, -4, 0}, {4, -4, 0}, {4, 4, 0}, {-4, 4, 0},
+                                        {4, -4, 3},  {4, 4, 3},  {-4, 4, 3}};
+    char config[256];
+    size_t len;
+    prepare(wire, config);
+    struct head head = head_start(wire, config, NULL);
+    char *scene = get(&head, "/scene", &len);
+    double origin_m[3];
+    assert_memory_equal(scene, "SHSC", 4);
+    assert_true(u32_at(scene + 4) == 1 && u32_at(scene + 8) == 7 && u32_at(scene + 12) == 6);
+    assert_int_equal(len, 40 + 7 * 12 + 6 * 12);
+    memcpy(origin_m, scene + 16, sizeof origin_m);
+    assert_true(origin_m[0] == 0.0 && origin_m[1] == 0.0 && origin_m[2] == 1.5);
+    for (int v = 0; v < 7; v++)
+        for (int i = 0; i < 3; i++) {
+            float f;
+            memcpy(&f, scene + 40 + 12 * v + 4 * i, sizeof f);
+            same("corner", (double)f + origin_m[i], corner[v][i], 0);
+        }
+    for (int i = 0; i < 18; i++)
+        assert_true(u32_at(scene + 40 + 84 + 4 * i) < 7);
+    free(scene);
+    char *json = get(&head, "/head", &len);
+    same("x", number(json, "\"name\":\"second\"", "x_m"), -2.2, 0);
+    same("heading", number(json, "\"name\":\"second\"", "heading_deg"), 200, 1e-9);
+    assert_non_null(strstr(json, "{\"label\":1,\"object\":\"east\""));
+    assert_non_null(strstr(json, "\"bounds\":{\"min\":[-4,-4,0],\"max\":[4,4,3]}"));
+    free(json);
+    json = get(&head, "/plan", &len);
+    assert_memory_equal(json, "{\"text\":\"", 9);
+    free(json);
+    json = get(&head, "/quality", &len);
+    assert_true(isnan(number(json, "{", "scan")) && isnan(number(json, "{", "deviation_m")));
+    same("share", number(json, "\"coverage\"", "share"), 0, 0);
+    free(json);
+    head_end(&head, SIGTERM);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(figures_are_those_of_the_report, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(noise_is_expected, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(scene_is_the_scene, wire_setup, wire_teardown),
+    };
+    return cmocka_run_group_tests_name("watch", tests, NULL, NULL);
+}
