@@ -20,6 +20,7 @@ enum rng_purpose {
     RNG_PAN = 6,
     RNG_BALL = 7, /* ball-shaped noise: direction */
     RNG_BALL_RADIUS = 8,
+    RNG_FAULT = 9, /* faults on request */
     RNG_SPARSE = 16, /* points spread over a mesh */
     RNG_PLAN = 20, /* which pulses the plan looks at */
 };

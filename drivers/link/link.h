@@ -62,9 +62,24 @@ struct link_event {
     char peer[200]; /* of LINK_OPENED, LINK_CLOSED, LINK_REFUSED: the other side's name, for the log */
 };
 
+/* Faults on request: what a link can be told to do wrong. */
+enum link_fault {
+    LINK_FAULT_DISCONNECT,        /* ends the session at once; what was not taken by the other side is lost */
+    LINK_FAULT_UNPLUG,            /* ends all sessions, and the endpoint is not there until LINK_FAULT_PLUG */
+    LINK_FAULT_BUS_RESET,         /* usb */
+    LINK_FAULT_ENDPOINT_STALL,    /* usb: the endpoint of the stream is halted until the host clears it */
+    LINK_FAULT_SHORT_PACKETS,     /* usb: each of the next n transfers ends early */
+    LINK_FAULT_REFUSE,            /* ends the session before a byte went out: to be told at LINK_OPENED */
+    LINK_FAULT_SLOW_ENUMERATION,  /* usb: until told again, each control request takes for_ms */
+    LINK_FAULT_DESCRIPTOR_LENGTH, /* usb: until told again, the configuration says that it is n bytes longer */
+    LINK_FAULT_PLUG,              /* ends LINK_FAULT_UNPLUG */
+};
+
 struct link_ops {
     const char *name;
     int messages; /* 1: each write goes out as one message; the owner puts text or frames into it, not both */
+
+    uint32_t faults; /* what fault() can do: bit per enum link_fault */
 
     /* Opens as spec says. When it fails, nothing of it stays. The text of err names the endpoint. */
     int (*open)(const struct link_spec *spec, void **link, struct sh_err *err);
@@ -93,6 +108,10 @@ struct link_ops {
     /* Ends a session from this side: what was written goes out, and a LINK_CLOSED follows from poll. NULL: sessions of
      * this link can't be ended. */
     void (*end)(void *link, int session);
+
+    /* Does something wrong, as enum link_fault says. Returns 0, or SH_ESTATE: it can't be done now. NULL where `faults`
+     * is 0. */
+    int (*fault)(void *link, enum link_fault what, int session, uint32_t n, double for_ms);
 
     /* Closes everything, removes what open made (symlink). link is void afterwards. */
     void (*close)(void *link);

@@ -26,6 +26,12 @@ size_t native_seal(uint8_t *frame, uint32_t seq)
     return native_frame_len(frame);
 }
 
+void native_reseal(uint8_t *frame, size_t len)
+{
+    le_put32(frame + 12, crc32c(0, frame + NATIVE_HEADER_LEN, len - NATIVE_HEADER_LEN));
+    le_put32(frame + 24, crc32c(0, frame, 24));
+}
+
 static size_t encode_fixed(uint8_t *dst, size_t cap, const struct field_table *table, const void *from, int64_t t_ns,
                            int flags)
 {

@@ -43,6 +43,9 @@ size_t native_encode_surfaces(uint8_t *dst, size_t cap, size_t max_payload, stru
  * length. */
 size_t native_seal(uint8_t *frame, uint32_t seq);
 
+/* Makes both checksums of a frame of len bytes right, whatever is in it. */
+void native_reseal(uint8_t *frame, size_t len);
+
 /* The most bytes that native_encode_points can need for n_points, and the most that their attributes and their
  * colours add. */
 size_t native_points_bound(uint32_t n_points);

@@ -100,6 +100,9 @@ struct protocol_ops {
     uint32_t emitters; /* bit per enum native_emitter_kind of the heads that it can speak for; 0: all */
     uint32_t n_beams;  /* that a head of beams must have; 0: any number */
     uint32_t max_unit; /* bytes; no unit is longer */
+    /* Makes the checksums of a unit right, after bytes of it were changed: a fault on request that no reader can see by
+     * them. Of native frames that of the payload and that of the header. NULL: units have none. Pure. */
+    void (*reseal)(uint8_t *unit, size_t len);
     int passes_native; /* 1: the native protocol, which its owner speaks; no member below is set */
 
     /* When it fails, nothing of it stays. */

@@ -81,7 +81,8 @@ int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, 
         sh_fail(&err, SH_ENOMEM, "no memory");
         return app_fail(&err);
     }
-    if (config_load_all(in->operand[0], in->sets.set, in->sets.n, cfg, &faults) != SH_OK) {
+    if (config_load_all(in->operand[0], in->sets.set, in->sets.n, cfg, &faults) != SH_OK ||
+        (in->scenario != NULL && config_add_scenario(cfg, in->scenario, &faults) != SH_OK)) {
         free(cfg);
         return fail_config(&faults);
     }

@@ -82,6 +82,7 @@ struct app_words {
 struct app_input {
     const char *operand[APP_MAX_OPERANDS];
     struct app_sets sets;
+    const char *scenario; /* a file whose faults are added to those of the configuration; NULL: none */
 };
 
 /* APP_GO_ON with `in` and `values` filled, or the exit status: of a printed help, or of an error with its one

@@ -138,7 +138,8 @@ static int do_act(struct command_call *call)
         return command_fail(call, CMD_E_NOT_ALLOWED, "%s takes no parameter", row->header);
     if (row->unit != NULL && call->param[0] == '\0')
         return command_fail(call, CMD_E_MISSING, "%s takes a %s", row->header,
-                            row->own                                              ? "station and its place"
+                            row->unit == &command_unit_fault                      ? "fault or its number"
+                            : row->own                                            ? "station and its place"
                             : row->setting != NULL && row->setting->words != NULL ? "word"
                                                                                   : "number");
     if (row->unit != NULL && !row->own && parse_value(call) != 0) return -1;

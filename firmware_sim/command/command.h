@@ -9,6 +9,7 @@
  *             SCAN:LINE:STARt  SCAN:LINE:STOP  SCAN:PAN:STARt  SCAN:PAN:STOP
  *             SCAN:STEP  SCAN:STEP:LINE  SCAN:STEP:PAN
  *   site      SITE:POSE
+ *   fault     FAULt:ADD  FAULt:CLEar  FAULt:LIST?  FAULt:INJected?
  *   time      TIME?  TIME:UTC?  TIME:GPS?  TIME:STEP
  *
  * Headers have a short form (the capitals) and a long one, in any case. HEAD:STATION has no short one: STAT
@@ -33,6 +34,10 @@
  *
  * Steps. With a live platform a step may carry the pose at its end: `TIME:STEP 10 MS, x, y, z, roll, pitch,
  * heading`, in metres of the scene frame and degrees (core/pose.h).
+ *
+ * Faults. `FAULt:ADD {kind: drop, every: 10}` adds a fault as the configuration's list `faults` has them; it counts from
+ * then on, and its number is the reply. `FAULt:CLEar 3` or `ALL` takes faults out. `FAULt:INJected?` has how often they
+ * struck, with a number that of one; `FAULt:LIST?` has those that there are.
  *
  * Replies. The value, or "OK", or `ERR -222,"Data out of range; HEAD:PRR 5000000 Hz, allowed 1000 to
  * 1200000"`. A value outside of the profile is -222. One that another setting or the state forbids is -221.
@@ -94,6 +99,15 @@ struct command_place {
     double v[6];
 };
 
+/* Faults on request, as their owner has them. */
+struct command_faults {
+    /* "{kind: drop, every: 10}". Returns 0 and its number, or -1 and why not. */
+    int (*add)(void *owner, const char *text, uint32_t *number, char *why, size_t len);
+    uint32_t (*remove)(void *owner, uint32_t number);   /* 0: all. Returns how many */
+    uint64_t (*injected)(void *owner, uint32_t number); /* so far; 0: all together */
+    void (*list)(void *owner, char *text, size_t len);  /* "1 drop, 2 flip"; empty: none */
+};
+
 /* The device as the command set sees it. The loop keeps it up to date. */
 struct command_device {
     const char *idn;
@@ -103,6 +117,7 @@ struct command_device {
      * not. NULL: any can. */
     int (*can_plan)(void *owner, const struct head_settings *settings, char *why, size_t len);
     void *owner;
+    const struct command_faults *faults; /* NULL: it has none */
     struct head_settings settings; /* as they are now; a refused command leaves them */
     struct head_settings defaults; /* what *RST restores */
     enum head_state state;
@@ -129,6 +144,7 @@ enum command_effect {
     COMMAND_STEP,    /* let step_ns of device time pass, then send the reply */
     COMMAND_MOVE,    /* move a station; the reply is that of success */
     COMMAND_TAKE,    /* control, and nothing else */
+    COMMAND_FAULTS,  /* faults were added or taken out */
     COMMAND_RELEASE, /* control was given back */
 };
 

@@ -159,6 +159,13 @@ extern const struct command_unit command_unit_place;
 int command_place_query(struct command_call *call);
 int command_place_change(struct command_call *call);
 
+/* fault_commands.c */
+extern const struct command_unit command_unit_fault;
+int command_fault_add(struct command_call *call);
+int command_fault_clear(struct command_call *call);
+int command_fault_injected(struct command_call *call);
+int command_fault_list(struct command_call *call);
+
 /* Queues the error and makes it the reply. Returns -1. */
 int command_fail(struct command_call *call, int number, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
 

@@ -28,6 +28,7 @@
 #include "drivers/link/link.h"
 #include "drivers/protocol/protocol.h"
 #include "firmware_sim/command/head.h"
+#include "firmware_sim/fault/fault.h"
 
 enum {
     CONFIG_MAX_MESHES = 64,
@@ -351,6 +352,7 @@ struct config {
     struct config_loop loop;
     struct config_time time;
     struct config_gnss gnss;
+    struct fault_list faults;
 };
 
 /* What is wrong with a configuration, fault by fault, in the order of the file; then of --set and of the head
@@ -370,6 +372,14 @@ int config_load(const char *path, const char *const *sets, int n_sets, struct co
 /* The same, with all faults. Returns SH_OK or the code of the first. */
 int config_load_all(const char *path, const char *const *sets, int n_sets, struct config *cfg,
                     struct config_faults *faults);
+
+/* Adds the faults of a scenario, a file that has nothing but a list `faults`. What is wrong with it goes to `faults`;
+ * then nothing is added, and the code of the first is returned. */
+int config_add_scenario(struct config *cfg, const char *path, struct config_faults *faults);
+/* A fault as one line of YAML, "{kind: drop, every: 10}", for a head with this configuration. Takes 200 KiB of stack. */
+int config_read_fault(const struct config *cfg, const char *text, struct fault *out, struct sh_err *err);
+/* Whether faults of the kind can strike on the link. */
+int config_link_has_fault(const struct link_spec *link, enum fault_kind kind);
 
 /* A configuration is loaded for the scanner of head.station. Whether station i, from 0, has this scanner, and
  * whether all have. The stops of a platform have that of the one station. */

@@ -265,5 +265,7 @@ void cfg_check(struct cfg_reader *rd, struct config *cfg)
     check_loop(rd, cfg);
     check_time(rd, cfg);
     cfg_check_signal(rd, cfg);
+    cfg_check_faults(rd, &cfg->faults);
+    cfg_check_fault_links(rd, cfg, &cfg->faults);
     cfg_take_scan_settings(cfg);
 }

@@ -31,6 +31,7 @@
 #define WITHIN(low, high) .min = -9e12, .max = 9e12, .min_key = low, .max_key = high
 
 /* clang-format off */
+#define FAULT_LIST_AT(member) offsetof(struct config, faults.member)
 static const struct cfg_key config_keys[] = {
     {"head", .type = CFG_MAP, .help = "The head and its settings at power-up."},
     {"head.profile", IN_CONFIG(profile_file), CFG_TEXT, .example = "riegl-vz400i",
@@ -509,12 +510,15 @@ static const struct cfg_key config_keys[] = {
      .help = "The antenna from the head's origin, in the head's frame: right, forward, up."},
     {KEY(gnss.geoid_separation_m), CFG_REAL, "m", "0", -120, 120,
      .help = "Height of the geoid above the ellipsoid: altitude in GGA is the ellipsoidal height less this."},
+
+#include "firmware_sim/config/fault_rows.h"
 };
 /* clang-format on */
 
 _Static_assert(CFG_LEN(config_keys) <= CFG_MAX_ROWS, "room for every row");
 _Static_assert((int)CONFIG_MAX_MESHES <= (int)CFG_MAX_ITEMS && (int)CONFIG_MAX_STATIONS <= (int)CFG_MAX_ITEMS &&
-                   (int)CONFIG_MAX_LINKS <= (int)CFG_MAX_ITEMS && (int)CONFIG_MAX_SURFACES <= (int)CFG_MAX_ITEMS,
+                   (int)CONFIG_MAX_LINKS <= (int)CFG_MAX_ITEMS && (int)CONFIG_MAX_SURFACES <= (int)CFG_MAX_ITEMS &&
+                   (int)FAULT_MAX <= (int)CFG_MAX_ITEMS,
                "room for every element");
 
 const struct cfg_table cfg_config_table = {config_keys, CFG_LEN(config_keys)};

@@ -165,6 +165,8 @@ int cfg_read_file(struct cfg_reader *rd);
 /* The same; the document stays open for the scanner. NULL after an error. */
 struct cfg_document;
 int cfg_open_file(struct cfg_reader *rd, struct cfg_document **doc);
+/* The same from a text in memory. */
+int cfg_open_text(struct cfg_reader *rd, const unsigned char *bytes, size_t len, struct cfg_document **doc);
 void cfg_close_file(struct cfg_document *doc);
 /* The section `scanner` of rd->scanner, over what was read. */
 void cfg_read_scanner(struct cfg_reader *rd, struct cfg_document *doc);
@@ -241,6 +243,9 @@ void cfg_set_usb_look(struct cfg_reader *rd, struct link_spec *link, uint32_t it
 int cfg_check_platform_keys(struct cfg_reader *rd, const struct config_platform *platform);
 /* platform.c: the platform's keys with each other. Sets seconds from frames. */
 void cfg_check_platform(struct cfg_reader *rd, struct config *cfg);
+/* faults.c: faults on request, with each other; and with the links of cfg. */
+void cfg_check_faults(struct cfg_reader *rd, struct fault_list *list);
+void cfg_check_fault_links(struct cfg_reader *rd, const struct config *cfg, const struct fault_list *list);
 /* link_protocol.c: what the protocols of links need. */
 void cfg_check_link_protocols(struct cfg_reader *rd, struct config *cfg);
 /* Whether the protocol has words for a head of this emitter. */

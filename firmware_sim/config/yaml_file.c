@@ -119,23 +119,29 @@ static int read_documents(struct cfg_reader *rd, yaml_parser_t *parser, const un
     return code;
 }
 
+int cfg_open_text(struct cfg_reader *rd, const unsigned char *bytes, size_t len, struct cfg_document **doc)
+{
+    yaml_parser_t parser;
+    *doc = NULL;
+    int code = check_depth(rd, bytes, len);
+    if (code == SH_OK) code = start_parser(rd, &parser, bytes, len);
+    if (code != SH_OK) return code;
+    code = read_documents(rd, &parser, bytes, len, doc);
+    yaml_parser_delete(&parser);
+    if (code == SH_OK) return code;
+    cfg_close_file(*doc);
+    *doc = NULL;
+    return code;
+}
+
 int cfg_open_file(struct cfg_reader *rd, struct cfg_document **doc)
 {
     unsigned char *bytes = NULL;
     size_t len = 0;
-    yaml_parser_t parser;
     *doc = NULL;
     int code = read_bytes(rd, &bytes, &len);
-    if (code == SH_OK) code = check_depth(rd, bytes, len);
-    if (code == SH_OK) code = start_parser(rd, &parser, bytes, len);
-    if (code != SH_OK) goto free_bytes;
-    code = read_documents(rd, &parser, bytes, len, doc);
-    yaml_parser_delete(&parser);
-free_bytes:
+    if (code == SH_OK) code = cfg_open_text(rd, bytes, len, doc);
     free(bytes);
-    if (code == SH_OK) return code;
-    cfg_close_file(*doc);
-    *doc = NULL;
     return code;
 }
 

@@ -42,6 +42,7 @@ static void carry_out(struct device *device, enum command_effect effect, uint64_
         device_push_event(device, NATIVE_EV_CONTROL, 0, 0, 0, "released");
         break;
     case COMMAND_STEP:
+    case COMMAND_FAULTS:
     case COMMAND_NONE:
     case COMMAND_TAKE:
         break;

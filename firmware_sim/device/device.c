@@ -169,6 +169,7 @@ int device_create(const struct site *site, const struct device_options *options,
     if (rc == SH_OK) rc = head_clock_create(site->cfg, &device->clock, err);
     gnss_init(&device->gnss, site, &device->clock);
     if (rc == SH_OK) rc = open_journals(device, err);
+    if (rc == SH_OK) rc = device_open_faults(device, err);
     if (rc != SH_OK) {
         device_free(device);
         return rc;
@@ -192,13 +193,16 @@ int device_close_journal(struct device *device, struct sh_err *err)
         journal_end(device->journal.out, tick, (int64_t)tick * device->tick_ns);
     int rc = journal_close(device->journal.out, err);
     device->journal.out = NULL;
-    return rc;
+    struct sh_err why;
+    const int truth_rc = fault_board_close(device->faults, &why);
+    return rc != SH_OK || truth_rc == SH_OK ? rc : sh_fail(err, truth_rc, "%s", why.text);
 }
 
 void device_free(struct device *device)
 {
     if (device == NULL) return;
     journal_close(device->journal.out, NULL);
+    fault_board_free(device->faults);
     device_free_variants(device);
     free(device->journal.replay);
     free(device->station_scans);

@@ -20,6 +20,7 @@
 #include "firmware_sim/command/command.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/device/journal.h"
+#include "firmware_sim/fault/board.h"
 #include "firmware_sim/site/site.h"
 
 enum { DEVICE_MAX_EVENTS = 24, DEVICE_MAX_POSES = 256, DEVICE_POSE_AHEAD_S = 3600 };
@@ -84,6 +85,7 @@ struct device_options {
     double scan_s;  /* > 0: end each scan after this time, to the pulse */
     const char *journal;            /* NULL: none */
     const char *replay;             /* NULL: none */
+    const char *truth;              /* file for the faults that are injected; NULL: none */
     const struct sh_report *report; /* warnings of a station's new place, from the thread that plans it; NULL: none */
 };
 
@@ -95,6 +97,9 @@ void device_free(struct device *device);
 int device_replay_ends(const struct device *device);
 /* Ends and closes the journal, if there is one. Returns the first error in writing it. After the loop is joined. */
 int device_close_journal(struct device *device, struct sh_err *err);
+
+/* The faults on request of the configuration and of commands; the device's. */
+struct fault_board *device_faults(const struct device *device);
 
 struct device_counters *device_counters(struct device *device);
 

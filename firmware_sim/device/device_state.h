@@ -150,6 +150,7 @@ struct device {
     struct device_overrun overrun;
     struct device_live live;
     struct device_journal journal;
+    struct fault_board *faults;
     struct device_variant *variants;
 };
 
@@ -234,6 +235,9 @@ int64_t device_path_end_ns(const struct device *device);
 int device_head_pose(struct device *device, int64_t t_ns, struct pose *head);
 /* Poses of a live head for the pulses that the work holds. */
 void device_take_poses(struct device *device, struct device_work *work);
+
+/* device_faults.c */
+int device_open_faults(struct device *device, struct sh_err *err);
 
 /* time_of_day.c: the head's clock and the receiver. */
 /* GPS time, ns, of a device time by the head's clock; 0: unknown. */

@@ -19,7 +19,7 @@ static const char end_line[] = "END"; /* no command has this name */
 struct journal {
     FILE *file;
     const char *path; /* the caller's */
-    int error;        /* errno of the first failure */
+    _Atomic int error; /* errno of the first failure; notes come from several threads */
 };
 
 /* Prints text and flushes it; fails once something went wrong. */

@@ -18,6 +18,8 @@ int pump_open(struct links *links, uint32_t index, const struct link_spec *spec,
     if (pump == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     pump->links = links;
     pump->stream = links->stream;
+    pump->number = index + 1;
+    pump->board = device_faults(links->device);
     pump->ops = link_ops_get(spec->type);
     pump->protocol = protocol_ops_get((enum protocol_id)spec->protocol);
     pump->out_cap = links->stream->tick_bytes + BATCH_BYTES + REPLY_ROOM;
@@ -55,6 +57,7 @@ void pump_close(struct pump *pump)
     if (pump->wake_fd >= 0) close(pump->wake_fd);
     for (uint32_t i = 0; i < LINK_MAX_SESSIONS; i++) {
         free(pump->session[i].out);
+        session_close_wire(&pump->session[i]);
         unit_queue_free(&pump->session[i].units);
     }
     free(pump->tick);
@@ -146,7 +149,7 @@ static int has_more(struct pump *pump)
     for (int i = 0; i < LINK_MAX_SESSIONS; i++) {
         struct session *s = &pump->session[i];
         int pending = s->open && (s->out_pos < s->out_len || s->cursor < released || s->commands.reply_len != 0 ||
-                                  s->commands.moving || s->units.n != 0);
+                                  s->commands.moving || s->units.n != 0 || session_wire_waits(s));
         if (pending && clock_now_ns() - s->moved_ns < DRAIN_NS) return 1;
     }
     return 0;
@@ -168,6 +171,16 @@ static int set_wake(struct pump *pump)
     return stream_wake_at(pump->stream, pump->listener, sessions, tick);
 }
 
+/* How long to wait for something to happen. */
+static int timeout_ms(const struct pump *pump, int over)
+{
+    const int most_ms = over ? 50 : -1;
+    const int64_t next_ns = pump_next_ns(pump);
+    if (next_ns == INT64_MAX) return most_ms;
+    const int64_t ms = (next_ns - clock_now_ns()) / 1000000 + 1;
+    return ms < 0 ? 0 : over && ms > most_ms ? most_ms : ms > 60000 ? 60000 : (int)ms;
+}
+
 static void *pump_main(void *arg)
 {
     struct pump *pump = arg;
@@ -176,11 +189,12 @@ static void *pump_main(void *arg)
     for (;;) {
         int over = atomic_load(&pump->stream->over);
         if (over && !has_more(pump)) break;
-        if (take_events(pump, want_write, at_once ? 0 : over ? 50 : -1) < 0) {
+        if (take_events(pump, want_write, at_once ? 0 : timeout_ms(pump, over)) < 0) {
             sh_warn(pump->links->report, "link %s: poll failed; the link is given up", pump->ops->name);
             break;
         }
         want_write = 0;
+        pump_plug(pump);
         for (int i = 0; i < LINK_MAX_SESSIONS; i++)
             if (pump->session[i].open && session_write(pump, &pump->session[i], i)) want_write |= 1U << i;
         stream_rest_reader(pump->stream);

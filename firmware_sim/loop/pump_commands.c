@@ -95,6 +95,7 @@ void pump_read(struct pump *pump, struct session *s, int index)
     c->in_pos = 0;
     ssize_t n =
         c->in_len < READ_BYTES ? pump->ops->read(pump->link, index, c->in + c->in_len, READ_BYTES - c->in_len) : 0;
+    if (n > 0) session_heard(s, c->in + c->in_len, (size_t)n);
     if (n > 0) c->in_len += (uint32_t)n;
 }
 

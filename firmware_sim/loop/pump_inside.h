@@ -4,6 +4,7 @@
 
 #include <pthread.h>
 
+#include "firmware_sim/fault/wire.h"
 #include "firmware_sim/loop/pump.h"
 #include "firmware_sim/loop/unit_queue.h"
 
@@ -54,6 +55,7 @@ struct session {
     struct unit_queue units;
     int answering; /* input() is being called */
     int hang_up;   /* the session ends once its units are out */
+    struct wire *wire; /* NULL: no fault so far */
     char peer[64];
     int64_t moved_ns; /* clock_now_ns() when a byte last went out */
 };
@@ -70,6 +72,11 @@ struct pump {
     struct stream_listener *listener;
     uint32_t out_cap; /* of each session */
     int holds;        /* its readers hold back the paces fast and step */
+    uint32_t number;  /* of the link, from 1 */
+    struct fault_board *board;
+    uint64_t connections;    /* so far, refused ones too */
+    int64_t plug_ns;         /* clock: when an unplugged link is there again; 0: it is */
+    int64_t refuse_until_ns; /* clock: until then clients are turned away */
     struct session session[LINK_MAX_SESSIONS];
     pthread_t thread;
     int running;
@@ -82,6 +89,27 @@ void session_close(struct pump *pump, struct session *s);
 /* Takes what there is and writes until the link is full (1) or there is nothing left (0). index: of the session on its
  * link. */
 int session_write(struct pump *pump, struct session *s, int index);
+
+/* The next ticks and replies into the buffer, which was written out. */
+void session_fill(struct pump *pump, struct session *s);
+
+/* pump_faults.c */
+/* Whether the session's bytes go through a wire, since there is a fault, or was. */
+int session_has_wire(struct pump *pump, struct session *s);
+void session_close_wire(struct session *s);
+int session_wire_waits(const struct session *s);
+/* As session_write, by its wire. */
+int session_write_faulty(struct pump *pump, struct session *s, int index);
+/* Writes what lies in the wire: 1: the link is full; 0: nothing may go out now; -1: the session is closed. */
+int session_write_wire(struct pump *pump, struct session *s, int index);
+/* A unit of a protocol into the wire. */
+void session_put_unit(struct pump *pump, struct session *s, const uint8_t *unit, size_t len, int is_reply);
+/* What the client sent. */
+void session_heard(struct session *s, const void *bytes, size_t len);
+/* When a wire, or the link, next has something to do by the clock; INT64_MAX: nothing. */
+int64_t pump_next_ns(const struct pump *pump);
+/* A link that was unplugged comes back when its time is over. */
+void pump_plug(struct pump *pump);
 
 /* lost_frames.c: the one place that counts what a reader got and what it lost. */
 /* Compares the number of a tick's first frame with the one expected, and counts a gap; a native reader is told, in a

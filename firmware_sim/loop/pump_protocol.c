@@ -32,7 +32,7 @@ static int host_send(void *ctx, const void *unit, size_t len)
     struct session *s = ctx;
     if (len == 0 || s->hang_up) return s->hang_up;
     if ((s->answering || !is_stale(s->pump, s)) &&
-        unit_queue_put(&s->units, unit, len, stream_released(s->pump->stream)) == 0)
+        unit_queue_put(&s->units, unit, len, stream_released(s->pump->stream), s->answering) == 0)
         return 0;
     session_count_units(s->pump, s, 1);
     return 1;
@@ -194,9 +194,23 @@ static int take_input(struct pump *pump, struct session *s)
     return c->in_pos != from;
 }
 
+/* The same, where the units go through the session's wire. */
+static int flush_faulty(struct pump *pump, struct session *s, int index)
+{
+    for (;;) {
+        const int full = session_write_wire(pump, s, index);
+        size_t len;
+        const uint8_t *unit = unit_queue_next(&s->units, &len);
+        if (full != 0 || unit == NULL || wire_bytes(s->wire) >= pump->out_cap) return full;
+        session_put_unit(pump, s, unit, len, unit_queue_is_reply(&s->units));
+        if (unit_queue_written(&s->units, len)) pump->counts.sent_units++;
+    }
+}
+
 /* Writes until the link is full (1) or there is nothing left (0). Negative: the session is gone. */
 static int flush(struct pump *pump, struct session *s, int index)
 {
+    if (session_has_wire(pump, s)) return flush_faulty(pump, s, index);
     for (;;) {
         size_t len;
         const uint8_t *unit = unit_queue_next(&s->units, &len);
@@ -222,7 +236,7 @@ int session_write_protocol(struct pump *pump, struct session *s, int index)
         more |= take_input(pump, s);
         full = flush(pump, s, index);
         if (full < 0) {
-            session_close(pump, s);
+            session_close(pump, s); /* if it is not closed already */
             return 0;
         }
     }
@@ -230,7 +244,7 @@ int session_write_protocol(struct pump *pump, struct session *s, int index)
         continue;
     stream_move_reader(pump->stream, s->reader, s->cursor);
     if (s->units.n == 0) s->lost.lagging = 0;
-    if (!full && s->hang_up) pump->ops->end(pump->link, index);
+    if (!full && s->hang_up && !session_wire_waits(s)) pump->ops->end(pump->link, index);
     return full;
 }
 

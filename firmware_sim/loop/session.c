@@ -41,6 +41,7 @@ void session_close(struct pump *pump, struct session *s)
     if (!s->open) return;
     s->open = 0;
     session_gone(pump, s);
+    session_close_wire(s);
     stream_set_reader(pump->stream, s->reader, s->cursor, 0);
     if (!pump->protocol->passes_native) { /* it never keeps control */
         session_close_protocol(pump, s);
@@ -82,7 +83,7 @@ static void take_replies(struct pump *pump, struct session *s)
     c->reply_len = 0;
 }
 
-static void fill(struct pump *pump, struct session *s)
+void session_fill(struct pump *pump, struct session *s)
 {
     struct session_commands *c = &s->commands;
     s->out_len = s->out_pos = 0;
@@ -113,8 +114,9 @@ static uint32_t write_to(const struct pump *pump, const struct session *s)
 int session_write(struct pump *pump, struct session *s, int index)
 {
     if (!pump->protocol->passes_native) return session_write_protocol(pump, s, index);
+    if (session_has_wire(pump, s)) return session_write_faulty(pump, s, index);
     for (;;) {
-        if (s->out_pos == s->out_len) fill(pump, s);
+        if (s->out_pos == s->out_len) session_fill(pump, s);
         if (s->out_pos == s->out_len) return 0;
         ssize_t n = pump->ops->write(pump->link, index, s->out + s->out_pos, write_to(pump, s) - s->out_pos);
         if (n == 0) return 1;

@@ -1,0 +1,72 @@
+/* FAULt: faults on request. What a fault is, its owner knows; here are the lines. */
+#include <stdio.h>
+#include <string.h>
+
+#include "firmware_sim/command/command_inside.h"
+
+const struct command_unit command_unit_fault = {"fault", 0, "no unit", {{NULL, 0}}};
+
+static int none(struct command_call *call)
+{
+    return command_fail(call, CMD_E_SETTINGS, "%s: this head has no faults", call->row->header);
+}
+
+int command_fault_add(struct command_call *call)
+{
+    struct command_device *dev = call->dev;
+    char why[COMMAND_TEXT_LEN];
+    uint32_t number;
+    if (dev->faults == NULL) return none(call);
+    if (call->param[0] != '{')
+        return command_fail(call, CMD_E_DATA_TYPE, "%s takes a fault as {kind: drop, every: 10}", call->row->header);
+    if (dev->faults->add(dev->owner, call->param, &number, why, sizeof why) != 0)
+        return command_fail(call, CMD_E_RANGE, "%s", why);
+    call->out->effect = COMMAND_FAULTS;
+    return command_reply(call, "%u", number);
+}
+
+/* A fault's number, or ALL (0). Returns -1 when it failed. */
+static int take_number(struct command_call *call, int64_t *number)
+{
+    struct command_decimal decimal;
+    char clip[COMMAND_CLIP_LEN];
+    *number = 0;
+    if (call->param[0] == '\0' || command_word_matches("ALL", call->param)) return 0;
+    const char *rest = command_parse_decimal(call->param, &decimal);
+    if (rest != NULL && *rest == '\0' && command_decimal_to_int(&decimal, 0, number) == COMMAND_FIT_EXACT &&
+        *number >= 1 && *number <= UINT32_MAX)
+        return 0;
+    command_clip(clip, call->param, strlen(call->param));
+    return command_fail(call, CMD_E_DATA_TYPE, "%s takes the number of a fault or ALL, not '%s'", call->row->header,
+                        clip);
+}
+
+int command_fault_clear(struct command_call *call)
+{
+    struct command_device *dev = call->dev;
+    int64_t number;
+    if (dev->faults == NULL) return none(call);
+    if (take_number(call, &number) != 0) return -1;
+    if (dev->faults->remove(dev->owner, (uint32_t)number) == 0 && number != 0)
+        return command_fail(call, CMD_E_RANGE, "there is no fault %u", (uint32_t)number);
+    call->out->effect = COMMAND_FAULTS;
+    return command_reply(call, "OK");
+}
+
+int command_fault_injected(struct command_call *call)
+{
+    struct command_device *dev = call->dev;
+    int64_t number;
+    if (dev->faults == NULL) return none(call);
+    if (take_number(call, &number) != 0) return -1;
+    return command_reply(call, "%llu", (unsigned long long)dev->faults->injected(dev->owner, (uint32_t)number));
+}
+
+int command_fault_list(struct command_call *call)
+{
+    struct command_device *dev = call->dev;
+    char text[COMMAND_MAX_REPLY];
+    if (dev->faults == NULL) return none(call);
+    dev->faults->list(dev->owner, text, sizeof text);
+    return command_reply(call, "%s", text[0] != '\0' ? text : "none");
+}

@@ -1,0 +1,204 @@
+/* Faults on request: their keys with each other, with the links and with the head; scenarios, and faults that commands
+ * add. (What is wrong with a configuration is in fault.c.) */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "firmware_sim/config/table.h"
+
+/* clang-format off */
+#define FAULT_LIST_AT(member) offsetof(struct fault_list, member)
+static const struct cfg_key fault_keys[] = {
+#include "firmware_sim/config/fault_rows.h"
+};
+/* clang-format on */
+static const struct cfg_table fault_table = {fault_keys, CFG_LEN(fault_keys)};
+
+enum {
+    WHEN_FRAME = 1 << FAULT_AT_FRAME,
+    WHEN_REPLY = 1 << FAULT_AT_REPLY,
+    WHEN_CONNECTION = 1 << FAULT_AT_CONNECTION,
+    WHEN_MOMENT = 1 << FAULT_AT_MOMENT,
+    WHEN_COUNTED = WHEN_FRAME | WHEN_REPLY | WHEN_CONNECTION,
+};
+
+/* Keys that say when, and who has them. */
+static const struct {
+    const char *path;
+    unsigned places;
+} when[] = {
+    {"faults[].link", WHEN_COUNTED},
+    {"faults[].of", WHEN_FRAME},
+    {"faults[].at", WHEN_COUNTED},
+    {"faults[].from", WHEN_COUNTED},
+    {"faults[].until", WHEN_COUNTED},
+    {"faults[].every", WHEN_COUNTED},
+    {"faults[].probability", WHEN_COUNTED},
+    {"faults[].count", WHEN_COUNTED},
+    {"faults[].seed", WHEN_COUNTED},
+    {"faults[].from_pulse", WHEN_FRAME | WHEN_MOMENT},
+    {"faults[].until_pulse", WHEN_FRAME | WHEN_MOMENT},
+};
+
+/* Keys that say what. */
+static const char *const what[] = {"n",      "byte", "reseal", "for_ms",  "factor",
+                                   "deg",    "hz",   "loss_db", "jump_s", "ppm"};
+
+/* Those that a kind has, and up to what n goes. needs_ms: for_ms above 0 must be given. */
+static const struct {
+    const char *keys;
+    double n_max;
+    int needs_ms;
+} kinds[FAULT_N_KINDS] = {
+    [FAULT_DUPLICATE] = {"n", 100, 0},
+    [FAULT_REORDER] = {"n", 10000, 0},
+    [FAULT_DELAY] = {"for_ms", 0, 1},
+    [FAULT_JITTER] = {"for_ms", 0, 1},
+    [FAULT_TRUNCATE] = {"n", 1e6, 0},
+    [FAULT_FLIP] = {"n, byte, reseal", 1000, 0},
+    [FAULT_STALL] = {"for_ms", 0, 1},
+    [FAULT_SPLIT] = {"n", 64, 0},
+    [FAULT_MERGE] = {"n", 64, 0},
+    [FAULT_GARBAGE] = {"n", 1024, 0},
+    [FAULT_LATE_REPLY] = {"for_ms", 0, 1},
+    [FAULT_DISCONNECT] = {"for_ms", 0, 0},
+    [FAULT_UNPLUG] = {"for_ms", 0, 1},
+    [FAULT_SHORT_PACKETS] = {"n", 1e6, 0},
+    [FAULT_SLOW_ENUMERATION] = {"for_ms", 0, 1},
+    [FAULT_DESCRIPTOR_LENGTH] = {"n", 1000, 0},
+    [FAULT_SLOW_BOOT] = {"for_ms", 0, 1},
+    [FAULT_POWER_CYCLE] = {"for_ms", 0, 1},
+    [FAULT_MIRROR_SLOW] = {"factor", 0, 0},
+    [FAULT_MIRROR_WOBBLE] = {"deg, hz", 0, 0},
+    [FAULT_PAN_SLIP] = {"deg", 0, 0},
+    [FAULT_WINDOW_SOILED] = {"loss_db", 0, 0},
+    [FAULT_CLOCK_JUMP] = {"jump_s", 0, 0},
+    [FAULT_CLOCK_DRIFT] = {"ppm", 0, 0},
+    [FAULT_COUNTERS_HIGH] = {"n", 1e9, 0},
+};
+
+/* Whether a list of words has the word. */
+static int has_word(const char *list, const char *word)
+{
+    const size_t len = strlen(word);
+    for (const char *at = list; at != NULL && (at = strstr(at, word)) != NULL; at += len)
+        if ((at == list || at[-1] == ' ') && (at[len] == '\0' || at[len] == ',')) return 1;
+    return 0;
+}
+
+static void check_keys(struct cfg_reader *rd, const struct fault *f, uint32_t i)
+{
+    const enum fault_place place = fault_place_of(f->kind);
+    const char *keys = kinds[f->kind].keys, *name = fault_names[f->kind];
+    for (size_t k = 0; k < CFG_LEN(when); k++)
+        if (cfg_is_given(rd, when[k].path, i) && (when[k].places & 1U << place) == 0)
+            cfg_fail_key(rd, when[k].path, i, "%s has no such key; allowed %s", name,
+                         place == FAULT_AT_MOMENT ? "from_s, until_s, from_pulse, until_pulse"
+                                                  : "link, at, from, until, every, probability, count, seed, from_s, until_s");
+    for (size_t k = 0; k < CFG_LEN(what); k++) {
+        char path[CFG_PATH_MAX];
+        snprintf(path, sizeof path, "faults[].%s", what[k]);
+        if (cfg_is_given(rd, path, i) && !has_word(keys, what[k]))
+            cfg_fail_key(rd, path, i, "%s has no such key; allowed %s", name, keys != NULL ? keys : "when and where alone");
+    }
+}
+
+static void check_values(struct cfg_reader *rd, const struct fault *f, uint32_t i)
+{
+    const char *name = fault_names[f->kind];
+    if (kinds[f->kind].n_max > 0.0 && (double)f->n > kinds[f->kind].n_max)
+        cfg_fail_key(rd, "faults[].n", i, "%u is too many for %s; allowed up to %.0f", f->n, name, kinds[f->kind].n_max);
+    if (kinds[f->kind].needs_ms && f->for_ms <= 0.0 && CFG_SOUND(rd, i, "faults[].for_ms"))
+        cfg_fail_key(rd, cfg_is_given(rd, "faults[].for_ms", i) ? "faults[].for_ms" : "faults[].kind", i,
+                     "%s needs for_ms; allowed above 0 to 1e8 ms", name);
+    if (f->at != 0 && (cfg_is_given(rd, "faults[].from", i) || cfg_is_given(rd, "faults[].until", i) ||
+                       cfg_is_given(rd, "faults[].every", i)))
+        cfg_fail_key(rd, "faults[].at", i, "is one number alone; allowed without from, until and every");
+    if (f->until != 0 && f->until < f->from)
+        cfg_fail_key(rd, "faults[].until", i, "is before from, which is %llu; allowed that or more",
+                     (unsigned long long)f->from);
+    if (f->until_s > 0.0 && f->until_s <= f->from_s)
+        cfg_fail_key(rd, "faults[].until_s", i, "is not after from_s, which is %.10g s; allowed more", f->from_s);
+    if (f->until_pulse < f->from_pulse)
+        cfg_fail_key(rd, "faults[].until_pulse", i, "is before from_pulse, which is %llu; allowed that or more",
+                     (unsigned long long)f->from_pulse);
+}
+
+void cfg_check_faults(struct cfg_reader *rd, struct fault_list *list)
+{
+    for (uint32_t i = 0; i < list->n; i++) {
+        struct fault *f = &list->fault[i];
+        if (!cfg_is_given(rd, "faults[].until_pulse", i)) f->until_pulse = UINT64_MAX;
+        if (!cfg_is_given(rd, "faults[].byte", i)) f->byte = -1;
+        if (!CFG_SOUND(rd, i, "faults[].kind")) continue;
+        check_keys(rd, f, i);
+        check_values(rd, f, i);
+    }
+}
+
+void cfg_check_fault_links(struct cfg_reader *rd, const struct config *cfg, const struct fault_list *list)
+{
+    for (uint32_t i = 0; i < list->n; i++) {
+        const struct fault *f = &list->fault[i];
+        if (!CFG_SOUND(rd, i, "faults[].kind", "faults[].link")) continue;
+        if (f->link > cfg->n_links)
+            cfg_fail_key(rd, "faults[].link", i, "there is no link %u; allowed 0 to %u", f->link, cfg->n_links);
+        else if (f->link != 0 && fault_place_of(f->kind) != FAULT_AT_MOMENT &&
+                 !config_link_has_fault(&cfg->link[f->link - 1], f->kind))
+            cfg_fail_key(rd, "faults[].link", i, "link %u can't have %s; allowed 0, or a link that can", f->link,
+                         fault_names[f->kind]);
+    }
+}
+
+int config_link_has_fault(const struct link_spec *link, enum fault_kind kind)
+{
+    const struct link_ops *ops = link_ops_get(link->type);
+    const int is_of_link = kind >= FAULT_DISCONNECT && kind <= FAULT_DESCRIPTOR_LENGTH;
+    return !is_of_link || (ops != NULL && (ops->faults & UINT32_C(1) << (kind - FAULT_DISCONNECT)) != 0);
+}
+
+static int read_list(struct cfg_reader *rd, const struct config *cfg, struct fault_list *list)
+{
+    cfg_fill_defaults(rd, NULL);
+    cfg_check_faults(rd, list);
+    cfg_check_fault_links(rd, cfg, list);
+    return rd->faults->n == 0 ? SH_OK : rd->faults->fault[0].code;
+}
+
+int config_add_scenario(struct config *cfg, const char *path, struct config_faults *faults)
+{
+    struct cfg_reader rd;
+    struct fault_list *list = calloc(1, sizeof *list);
+    memset(faults, 0, sizeof *faults);
+    cfg_reader_init(&rd, path, &fault_table, list, faults);
+    int code = list == NULL ? cfg_fail_file(&rd, SH_ENOMEM, 0, "no memory") : cfg_read_file(&rd);
+    if (code == SH_OK) code = read_list(&rd, cfg, list);
+    if (code == SH_OK && list->n == 0) code = cfg_fail_file(&rd, SH_EINPUT, 0, "no faults; a scenario is a list of them");
+    if (code == SH_OK && cfg->faults.n + list->n > FAULT_MAX)
+        code = cfg_fail_file(&rd, SH_EINPUT, 0, "%u faults, and the configuration has %u; allowed %d together", list->n,
+                             cfg->faults.n, FAULT_MAX);
+    for (uint32_t i = 0; code == SH_OK && i < list->n; i++)
+        cfg->faults.fault[cfg->faults.n++] = list->fault[i];
+    free(list);
+    return code;
+}
+
+int config_read_fault(const struct config *cfg, const char *text, struct fault *out, struct sh_err *err)
+{
+    enum { TEXT_MAX = 1024 };
+    struct cfg_reader rd;
+    struct cfg_document *doc;
+    struct config_faults faults = {0};
+    struct fault_list list = {0};
+    char yaml[TEXT_MAX];
+    const int len = snprintf(yaml, sizeof yaml, "faults: [ %s ]\n", text);
+    if (len >= (int)sizeof yaml) return sh_fail(err, SH_EINPUT, "longer than %d characters", TEXT_MAX - 16);
+    cfg_reader_init(&rd, "fault", &fault_table, &list, &faults);
+    int code = cfg_open_text(&rd, (const unsigned char *)yaml, (size_t)len, &doc);
+    if (code == SH_OK) cfg_close_file(doc);
+    if (code == SH_OK) code = read_list(&rd, cfg, &list);
+    if (code != SH_OK) return sh_fail(err, code, "%s", faults.fault[0].text);
+    if (list.n != 1) return sh_fail(err, SH_EINPUT, "%u faults; allowed one, as {kind: drop, every: 10}", list.n);
+    *out = list.fault[0];
+    return SH_OK;
+}

@@ -1,0 +1,64 @@
+/* Faults on request: the board of the run, and the commands that change it. */
+#include <stdio.h>
+#include <string.h>
+
+#include "firmware_sim/device/device_state.h"
+
+static void write_note(void *ctx, const struct fault_note *note)
+{
+    const struct device *device = ctx;
+    char text[TRUTH_TEXT_LEN];
+    truth_text(note, text);
+    if (device->journal.out != NULL) journal_note(device->journal.out, text);
+}
+
+static int add_fault(void *owner, const char *text, uint32_t *number, char *why, size_t len)
+{
+    struct device *device = owner;
+    struct fault fault;
+    struct sh_err err;
+    int rc = config_read_fault(device->site->cfg, text, &fault, &err);
+    if (rc == SH_OK)
+        rc = fault_board_add(device->faults, &fault, (int64_t)device->next_tick * device->tick_ns, number, &err);
+    if (rc == SH_OK) return 0;
+    snprintf(why, len, "%s", err.text);
+    return -1;
+}
+
+static uint32_t remove_fault(void *owner, uint32_t number)
+{
+    return fault_board_remove(((struct device *)owner)->faults, number);
+}
+
+static uint64_t count_injected(void *owner, uint32_t number)
+{
+    return fault_board_injected(((struct device *)owner)->faults, number);
+}
+
+static void list_faults(void *owner, char *text, size_t len)
+{
+    struct fault_entry entry[FAULT_MAX];
+    uint32_t n;
+    size_t used = 0;
+    text[0] = '\0';
+    fault_board_copy(((struct device *)owner)->faults, entry, &n);
+    for (uint32_t i = 0; i < n && used < len; i++)
+        used += (size_t)snprintf(text + used, len - used, "%s%u %s", i > 0 ? ", " : "", entry[i].number,
+                                 fault_names[entry[i].fault.kind]);
+}
+
+static const struct command_faults COMMANDS = {add_fault, remove_fault, count_injected, list_faults};
+
+int device_open_faults(struct device *device, struct sh_err *err)
+{
+    const int rc = fault_board_create(&device->site->cfg->faults, device->options.truth, &device->faults, err);
+    if (rc != SH_OK) return rc;
+    fault_board_listen(device->faults, write_note, device);
+    device->cmd.faults = &COMMANDS;
+    return SH_OK;
+}
+
+struct fault_board *device_faults(const struct device *device)
+{
+    return device->faults;
+}

@@ -1,0 +1,124 @@
+#include "firmware_sim/fault/board.h"
+
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+
+enum { MAX_LISTENERS = 4, MAX_COUNTED = 1024 };
+
+struct fault_board {
+    pthread_mutex_t lock;
+    _Atomic uint32_t version;
+    struct fault_entry entry[FAULT_MAX];
+    uint32_t n, last_number;
+    struct truth *truth;
+    _Atomic uint64_t injected[MAX_COUNTED]; /* by number; 0: all, and those beyond the last */
+    struct {
+        void (*heard)(void *ctx, const struct fault_note *note);
+        void *ctx;
+    } listener[MAX_LISTENERS];
+    uint32_t n_listeners;
+};
+
+int fault_board_create(const struct fault_list *list, const char *truth_path, struct fault_board **out,
+                       struct sh_err *err)
+{
+    struct fault_board *board = calloc(1, sizeof *board);
+    *out = NULL;
+    if (board == NULL) return sh_fail(err, SH_ENOMEM, "faults: no memory");
+    const int rc = truth_open(truth_path, &board->truth, err);
+    if (rc != SH_OK) {
+        free(board);
+        return rc;
+    }
+    pthread_mutex_init(&board->lock, NULL);
+    for (uint32_t i = 0; i < list->n; i++)
+        board->entry[board->n++] = (struct fault_entry){.number = i + 1, .from_start = 1, .fault = list->fault[i]};
+    board->last_number = board->n;
+    atomic_store(&board->version, board->n != 0);
+    *out = board;
+    return SH_OK;
+}
+
+int fault_board_close(struct fault_board *board, struct sh_err *err)
+{
+    if (board == NULL) return SH_OK;
+    const int rc = truth_close(board->truth, err);
+    board->truth = NULL;
+    return rc;
+}
+
+void fault_board_free(struct fault_board *board)
+{
+    if (board == NULL) return;
+    truth_close(board->truth, NULL);
+    pthread_mutex_destroy(&board->lock);
+    free(board);
+}
+
+uint32_t fault_board_version(const struct fault_board *board)
+{
+    return atomic_load_explicit(&board->version, memory_order_acquire);
+}
+
+uint32_t fault_board_copy(struct fault_board *board, struct fault_entry entries[FAULT_MAX], uint32_t *n)
+{
+    pthread_mutex_lock(&board->lock);
+    for (uint32_t i = 0; i < board->n; i++)
+        entries[i] = board->entry[i];
+    *n = board->n;
+    const uint32_t version = atomic_load(&board->version);
+    pthread_mutex_unlock(&board->lock);
+    return version;
+}
+
+int fault_board_add(struct fault_board *board, const struct fault *fault, int64_t t_ns, uint32_t *number,
+                    struct sh_err *err)
+{
+    int rc = SH_OK;
+    pthread_mutex_lock(&board->lock);
+    if (board->n == FAULT_MAX) {
+        rc = sh_fail(err, SH_EINPUT, "there are %d faults already; allowed %d", FAULT_MAX, FAULT_MAX);
+    } else {
+        *number = ++board->last_number;
+        board->entry[board->n++] = (struct fault_entry){.number = *number, .since_ns = t_ns, .fault = *fault};
+        atomic_fetch_add(&board->version, 1);
+    }
+    pthread_mutex_unlock(&board->lock);
+    return rc;
+}
+
+uint32_t fault_board_remove(struct fault_board *board, uint32_t number)
+{
+    uint32_t kept = 0;
+    pthread_mutex_lock(&board->lock);
+    const uint32_t before = board->n;
+    for (uint32_t i = 0; i < before; i++)
+        if (number != 0 && board->entry[i].number != number) board->entry[kept++] = board->entry[i];
+    board->n = kept;
+    if (kept != before) atomic_fetch_add(&board->version, 1);
+    pthread_mutex_unlock(&board->lock);
+    return before - kept;
+}
+
+void fault_board_note(struct fault_board *board, const struct fault_note *note)
+{
+    if (!note->ended) {
+        atomic_fetch_add(&board->injected[0], 1);
+        if (note->fault < MAX_COUNTED) atomic_fetch_add(&board->injected[note->fault], 1);
+    }
+    truth_write(board->truth, note);
+    for (uint32_t i = 0; i < board->n_listeners; i++)
+        board->listener[i].heard(board->listener[i].ctx, note);
+}
+
+uint64_t fault_board_injected(struct fault_board *board, uint32_t number)
+{
+    return number < MAX_COUNTED ? atomic_load(&board->injected[number]) : 0;
+}
+
+void fault_board_listen(struct fault_board *board, void (*heard)(void *ctx, const struct fault_note *note), void *ctx)
+{
+    board->listener[board->n_listeners].heard = heard;
+    board->listener[board->n_listeners++].ctx = ctx;
+}

@@ -1,0 +1,45 @@
+/* The faults of a run: the list, which commands may change, and what was injected so far.
+ *
+ * In: faults, with the device time from which they count; notes of what was injected. Out: a copy of the list for each
+ * who injects; counts; the truth (truth.h), and lines for the journal. Thread: any. Without faults a look at the
+ * version, which is one atomic load, is all that it costs. */
+#ifndef FIRMWARE_SIM_FAULT_BOARD_H
+#define FIRMWARE_SIM_FAULT_BOARD_H
+
+#include "firmware_sim/fault/truth.h"
+
+struct fault_entry {
+    uint32_t number; /* from 1, in the order in which they were added; never used again */
+    int64_t since_ns; /* device time from which it counts: 0, or when it was added */
+    int from_start;   /* it was there at power-up: it counts a session's frames from the first */
+    struct fault fault;
+};
+
+struct fault_board;
+
+/* truth_path NULL: no file. list may be empty. */
+int fault_board_create(const struct fault_list *list, const char *truth_path, struct fault_board **out,
+                       struct sh_err *err);
+/* Closes the file of the truth; the first error in writing it. Nothing is injected any more. board may be NULL. */
+int fault_board_close(struct fault_board *board, struct sh_err *err);
+void fault_board_free(struct fault_board *board);
+
+/* Changes with the list; 0: it has always been empty. Real-time safe. */
+uint32_t fault_board_version(const struct fault_board *board);
+/* A copy of the list, of the version that it returns. */
+uint32_t fault_board_copy(struct fault_board *board, struct fault_entry entries[FAULT_MAX], uint32_t *n);
+
+/* Adds a fault that counts from t_ns. SH_EINPUT: there are FAULT_MAX. */
+int fault_board_add(struct fault_board *board, const struct fault *fault, int64_t t_ns, uint32_t *number,
+                    struct sh_err *err);
+/* Takes out the fault of that number; 0: all. Returns how many went. */
+uint32_t fault_board_remove(struct fault_board *board, uint32_t number);
+
+/* It was injected: counted, written to the truth, and given to the listener. */
+void fault_board_note(struct fault_board *board, const struct fault_note *note);
+/* How often the fault of that number was injected; 0: all together. Those that were taken out count, too. */
+uint64_t fault_board_injected(struct fault_board *board, uint32_t number);
+/* Who hears of each note, in the thread that injected it: journal and soak. Before the run; up to 4. */
+void fault_board_listen(struct fault_board *board, void (*heard)(void *ctx, const struct fault_note *note), void *ctx);
+
+#endif

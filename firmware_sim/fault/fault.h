@@ -1,0 +1,118 @@
+/* A fault on request, as data: what goes wrong, where, and when.
+ *
+ * In: a fault of the list, and a place where it may strike (a frame, a reply, a connection, a moment of the head).
+ * Out: whether it strikes there, and random numbers that belong to that place. Pure; any thread.
+ *
+ * All numbers count from 1. Times are device time in seconds from power-up, or from the command that added the
+ * fault. */
+#ifndef FIRMWARE_SIM_FAULT_FAULT_H
+#define FIRMWARE_SIM_FAULT_FAULT_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+enum { FAULT_MAX = 32 };
+
+enum fault_kind {
+    /* on the wire: of a frame of the native protocol, or a unit of another (a datagram, a packet, a telegram) */
+    FAULT_DROP,
+    FAULT_DUPLICATE, /* n copies more */
+    FAULT_REORDER,   /* comes behind up to n later ones */
+    FAULT_DELAY,     /* it and all after it come for_ms later */
+    FAULT_JITTER,    /* the same, by a random time of up to for_ms */
+    FAULT_TRUNCATE,  /* its last n bytes are missing; n = 0: a random number */
+    FAULT_FLIP,      /* n bits change, at `byte` or anywhere; reseal: its checksums are made right again */
+    FAULT_STALL,     /* nothing is written for for_ms before it */
+    FAULT_SPLIT,     /* it goes out in n writes */
+    FAULT_MERGE,     /* it and the next n - 1 go out in one write */
+    FAULT_GARBAGE,   /* n random bytes before it */
+    /* on the wire: of a reply to a client */
+    FAULT_NO_REPLY,
+    FAULT_LATE_REPLY,  /* by for_ms; frames overtake it */
+    FAULT_WRONG_REPLY, /* the reply before it comes instead */
+    FAULT_ECHO,        /* what the client sent comes back before it */
+    /* of the link, at a frame: for all its sessions where not said otherwise */
+    FAULT_DISCONNECT,     /* the session at hand ends before the frame */
+    FAULT_UNPLUG,         /* the link is not there for for_ms */
+    FAULT_USB_RESET,      /* the bus is reset */
+    FAULT_ENDPOINT_STALL, /* the endpoint of the stream is halted, until the host clears it */
+    FAULT_SHORT_PACKETS,  /* of the next n transfers each ends early, and goes on in the next */
+    /* of the link, at a connection (USB: at an enumeration) */
+    FAULT_REFUSE,            /* a client is turned away */
+    FAULT_SLOW_ENUMERATION,  /* each control request takes for_ms */
+    FAULT_DESCRIPTOR_LENGTH, /* the configuration says that it is n bytes longer than it is */
+    /* in the head: what is measured changes, and so does the hash */
+    FAULT_SLOW_BOOT,    /* takes for_ms longer */
+    FAULT_POWER_CYCLE,  /* everything is off for for_ms, and boots again */
+    FAULT_SELF_TEST,    /* fails at the end of boot */
+    FAULT_MIRROR_SLOW,  /* turns at `factor` of its speed */
+    FAULT_MIRROR_STUCK, /* stands where it is */
+    FAULT_MIRROR_WOBBLE,/* runs ahead and behind by deg, hz times a second; the encoder shows it */
+    FAULT_PAN_SLIP,     /* the head looks deg farther than the pan's encoder says */
+    FAULT_LASER_OFF,
+    FAULT_WINDOW_SOILED, /* loss_db on the way there and back; noise grows as the signal fades */
+    FAULT_CLOCK_JUMP,    /* the time of day, by jump_s */
+    FAULT_CLOCK_DRIFT,   /* gains ppm */
+    FAULT_CLOCK_STOP,
+    FAULT_PPS_LOST,
+    FAULT_LEAP_SECOND,   /* at the end of the minute at hand; no table has it */
+    FAULT_COUNTERS_HIGH, /* counters begin n below their wrap at power-up */
+    FAULT_N_KINDS
+};
+
+/* Where a kind strikes. */
+enum fault_place {
+    FAULT_AT_FRAME,      /* at frames, or units */
+    FAULT_AT_REPLY,      /* at replies */
+    FAULT_AT_CONNECTION, /* at connections */
+    FAULT_AT_MOMENT      /* in the head, in device time */
+};
+
+/* Which frames are counted, and may be hit. */
+enum fault_of { FAULT_OF_STREAM, FAULT_OF_NOTICES, FAULT_OF_REPLIES, FAULT_N_OF };
+
+struct fault {
+    enum fault_kind kind;
+    uint32_t link; /* from 1; 0: all that can have it */
+    int of;        /* enum fault_of, without replies */
+    /* when: all of these together */
+    uint64_t at;          /* one number alone; 0: not so */
+    uint64_t from, until; /* numbers; until 0: no end */
+    uint64_t every;       /* from `from` on */
+    double probability;
+    uint64_t count; /* at most so many times (in a session, where it strikes in sessions); 0: no limit */
+    uint64_t from_pulse, until_pulse; /* of a scan, from 0; until UINT64_MAX: no end. Other frames have no pulses */
+    double from_s, until_s;           /* until 0: no end */
+    uint64_t seed;
+    /* what: as the kinds say */
+    uint32_t n;    /* 0: the kind's own */
+    int64_t byte;  /* from 0; -1: any */
+    int reseal;
+    double for_ms;
+    double factor, deg, hz, loss_db, jump_s, ppm;
+};
+
+struct fault_list {
+    struct fault fault[FAULT_MAX];
+    uint32_t n;
+};
+
+/* A place where faults may strike. */
+struct fault_spot {
+    uint64_t number; /* of the frame, reply or connection; 0: it has none */
+    int64_t t_ns;    /* device time */
+    int has_pulses;
+    uint64_t pulse0, n_pulses; /* of the frame */
+};
+
+extern const char *const fault_names[]; /* by kind, NULL at the end */
+enum fault_place fault_place_of(enum fault_kind kind);
+/* n, or what the kind takes without it. */
+uint32_t fault_n(const struct fault *fault);
+
+/* Whether it strikes there, but for its count. index: in the list; link: that the spot is on. */
+int fault_strikes(const struct fault *fault, uint32_t index, uint32_t link, const struct fault_spot *spot);
+/* A random number that belongs to fault and place; `draw` tells the draws of one place apart, from 1. */
+uint64_t fault_random(const struct fault *fault, uint32_t index, uint32_t link, uint64_t number, uint32_t draw);
+
+#endif

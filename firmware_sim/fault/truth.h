@@ -1,0 +1,42 @@
+/* The truth about injected faults: what was done, where, and when.
+ *
+ * In: a note of one fault. Out: a line of JSON in a file, and a line of text for the journal. Thread: a writer may be
+ * called by any number of threads. */
+#ifndef FIRMWARE_SIM_FAULT_TRUTH_H
+#define FIRMWARE_SIM_FAULT_TRUTH_H
+
+#include "core/err.h"
+#include "firmware_sim/fault/fault.h"
+
+/* What was injected. Members that don't concern the kind are 0, or as said. */
+struct fault_note {
+    uint32_t fault; /* number of the entry, from 1 */
+    enum fault_kind kind;
+    int64_t t_ns; /* device time */
+    uint32_t link, session; /* from 1; 0: in the head */
+    int of;                 /* enum fault_of */
+    uint64_t number;        /* of the frame, reply or connection, as faults count them */
+    int has_seq;            /* a frame of the native protocol, with its sequence number and type: */
+    uint32_t seq, type;
+    int has_pulse;
+    uint64_t pulse; /* first of the frame, or the one that a fault of the head begins with */
+    int64_t byte;   /* offset in the frame; -1: none */
+    uint64_t n;     /* bytes, bits, copies, frames: as the kind has it */
+    double for_ms;
+    int ended; /* a fault of the head is over */
+    char text[64]; /* anything more, plain ASCII without quotes; empty: nothing */
+};
+
+struct truth;
+/* Writes to a new file. NULL path: nothing is written, *out is NULL. */
+int truth_open(const char *path, struct truth **out, struct sh_err *err);
+/* truth may be NULL. */
+void truth_write(struct truth *truth, const struct fault_note *note);
+/* The first error in writing it. truth may be NULL. */
+int truth_close(struct truth *truth, struct sh_err *err);
+
+/* "fault 1 drop: t_ns 1, link 1, ...": at most 256 characters of printable ASCII. */
+enum { TRUTH_TEXT_LEN = 256 };
+void truth_text(const struct fault_note *note, char text[TRUTH_TEXT_LEN]);
+
+#endif
