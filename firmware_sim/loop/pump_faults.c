@@ -13,7 +13,7 @@ static const int64_t NO_TIME = INT64_MAX;
 int session_has_wire(struct pump *pump, struct session *s)
 {
     if (s->wire != NULL) return 1;
-    if (fault_board_version(pump->board) == 0) return 0;
+    if (pump->board == NULL || fault_board_version(pump->board) == 0) return 0;
     const int native = pump->protocol->passes_native;
     const struct wire_spec spec = {
         .board = pump->board,

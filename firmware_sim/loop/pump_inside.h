@@ -73,7 +73,7 @@ struct pump {
     uint32_t out_cap; /* of each session */
     int holds;        /* its readers hold back the paces fast and step */
     uint32_t number;  /* of the link, from 1 */
-    struct fault_board *board;
+    struct fault_board *board; /* NULL: no faults strike here */
     uint64_t connections;    /* so far, refused ones too */
     int64_t plug_ns;         /* clock: when an unplugged link is there again; 0: it is */
     int64_t refuse_until_ns; /* clock: until then clients are turned away */
