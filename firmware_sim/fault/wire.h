@@ -9,7 +9,7 @@
 #ifndef FIRMWARE_SIM_FAULT_WIRE_H
 #define FIRMWARE_SIM_FAULT_WIRE_H
 
-#include "firmware_sim/fault/board.h"
+#include "firmware_sim/fault/tally.h"
 #include "firmware_sim/fault/wire_queue.h"
 
 struct wire;
@@ -23,6 +23,7 @@ struct wire_spec {
     /* Makes the checksums of a frame or unit right; NULL: it has none. */
     void (*reseal)(uint8_t *unit, size_t len);
     uint32_t acts; /* what the link can do: bit 0 is FAULT_DISCONNECT, and so on; others don't strike */
+    struct fault_tally *tally; /* of its acts, over all sessions of the link; outlives the wire. NULL: by session */
 };
 
 /* NULL: no memory. */
