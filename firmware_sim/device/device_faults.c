@@ -62,6 +62,7 @@ int device_open_faults(struct device *device, struct sh_err *err)
     const int rc = fault_board_create(&device->site->cfg->faults, device->options.truth, &device->faults, err);
     if (rc != SH_OK) return rc;
     fault_board_listen(device->faults, write_note, device);
+    head_faults_init(&device->head_faults, device->faults, device->tick_ns);
     device->cmd.faults = &COMMANDS;
     return SH_OK;
 }

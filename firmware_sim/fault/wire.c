@@ -38,6 +38,7 @@ void wire_renew(struct wire *wire, uint64_t ahead)
     const uint32_t n_before = wire->n_faults;
     memcpy(before, wire->fault, sizeof before);
     wire->version = fault_board_copy(wire->spec.board, entry, &wire->n_faults);
+    if (wire->spec.tally != NULL) fault_tally_renew(wire->spec.tally, entry, wire->n_faults);
     for (uint32_t i = 0; i < wire->n_faults; i++) {
         struct wire_fault *fault = &wire->fault[i];
         *fault = (struct wire_fault){.entry = entry[i]};
@@ -63,6 +64,7 @@ static int rank_of(const struct fault *f)
     switch (f->kind) {
     case FAULT_DISCONNECT:
     case FAULT_UNPLUG:
+    case FAULT_USB_RESET:
         return 0;
     case FAULT_DROP:
     case FAULT_NO_REPLY:
@@ -76,12 +78,20 @@ static int rank_of(const struct fault *f)
     }
 }
 
-static int concerns(const struct wire *wire, const struct wire_fault *fault, int of)
+/* How often it has struck: what the link does counts for all its sessions. */
+static uint64_t *hits_of(struct wire *wire, struct wire_fault *fault)
+{
+    return is_act(fault->entry.fault.kind) && wire->spec.tally != NULL
+               ? fault_tally_hits(wire->spec.tally, fault->entry.number)
+               : &fault->hits;
+}
+
+static int concerns(struct wire *wire, struct wire_fault *fault, int of)
 {
     const struct fault *f = &fault->entry.fault;
     if (is_act(f->kind) && (wire->spec.acts & UINT32_C(1) << (f->kind - FAULT_DISCONNECT)) == 0) return 0;
     if (f->kind == FAULT_FLIP && f->reseal && wire->spec.reseal == NULL) return 0;
-    if (f->count != 0 && fault->hits >= f->count) return 0;
+    if (f->count != 0 && *hits_of(wire, fault) >= f->count) return 0;
     return fault_place_of(f->kind) == FAULT_AT_REPLY  ? of == FAULT_OF_REPLIES
            : fault_place_of(f->kind) == FAULT_AT_FRAME ? of == f->of
                                                        : 0;
@@ -107,7 +117,7 @@ static int change(struct wire *wire, struct wire_fault *fault, struct wire_makin
     if (spot.t_ns < 0) spot.t_ns = 0; /* it is counted from the command on, which is before the head's next tick */
     if (!fault_strikes(&fault->entry.fault, fault->entry.number, wire->spec.link, &spot)) return SH_OK;
     const int done = wire_change(wire, fault, spot.number, making);
-    if (done > 0) fault->hits++;
+    if (done > 0) ++*hits_of(wire, fault);
     return done < 0 ? done : SH_OK;
 }
 
@@ -248,6 +258,11 @@ int wire_put(struct wire *wire, const struct wire_item *given, int64_t now_ns)
     if (!making.is_dropped) rc = emit_all(wire, &making);
     const int end = finish(wire, &making);
     return rc != SH_OK ? rc : end;
+}
+
+void wire_go_on(struct wire *wire)
+{
+    wire->is_over = 0;
 }
 
 int wire_put_rest(struct wire *wire, const uint8_t *bytes, size_t len)

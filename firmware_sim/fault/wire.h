@@ -13,7 +13,7 @@
 #ifndef FIRMWARE_SIM_FAULT_WIRE_H
 #define FIRMWARE_SIM_FAULT_WIRE_H
 
-#include "firmware_sim/fault/board.h"
+#include "firmware_sim/fault/tally.h"
 #include "firmware_sim/fault/wire_queue.h"
 
 enum {
@@ -32,6 +32,7 @@ struct wire_spec {
     /* Makes the checksums of a frame or unit right; NULL: it has none. */
     void (*reseal)(uint8_t *unit, size_t len);
     uint32_t acts; /* what the link can do: bit 0 is FAULT_DISCONNECT, and so on; others don't strike */
+    struct fault_tally *tally; /* of its acts, over all sessions of the link; outlives the wire. NULL: by session */
 };
 
 /* NULL: no memory. */
@@ -49,6 +50,8 @@ struct wire_item {
 int wire_put(struct wire *wire, const struct wire_item *item, int64_t now_ns);
 /* The rest of a frame, unit or reply that was begun without the wire: goes out as it is, and is not counted. */
 int wire_put_rest(struct wire *wire, const uint8_t *bytes, size_t len);
+/* The act that should have ended the session could not be carried out: what was put since then is lost. */
+void wire_go_on(struct wire *wire);
 /* A command of this session changed the list: its new faults count from here, after `ahead` replies, those to lines
  * up to that one, which are still to be put. Otherwise they count from the next item. */
 void wire_renew(struct wire *wire, uint64_t ahead);

@@ -196,7 +196,7 @@ static int act(struct change *c)
     piece->for_ms = f->for_ms;
     c->note.for_ms = f->for_ms;
     if (f->kind == FAULT_SHORT_PACKETS) c->note.n = piece->n;
-    if ((f->kind == FAULT_DISCONNECT || f->kind == FAULT_UNPLUG) && end_session(c) != SH_OK) {
+    if (f->kind <= FAULT_USB_RESET && end_session(c) != SH_OK) { /* disconnect, unplug, usb_reset */
         wire_piece_free(piece);
         return SH_ENOMEM;
     }
