@@ -163,7 +163,7 @@ static void test_replies_in_order(void **state)
     expect_reply(sh, "NOSUCH", "ERR -113,\"Undefined header\"");
     end(&head, sh, slave);
     assert_true(head.identities >= 1); /* on a slow machine it asks again */
-    assert_true(head.errors >= 2);     /* the half line, and NOSUCH */
+    assert_true(head.errors >= 2); /* the half line, and NOSUCH */
 }
 
 /* What came before raw mode was changed on its way, CR to LF and so on: none of it comes out as frames, and what comes
@@ -263,8 +263,11 @@ static void test_slow_head(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_replies_in_order), cmocka_unit_test(test_slow_head), cmocka_unit_test(test_half_a_frame),
-        cmocka_unit_test(test_frames_after),     cmocka_unit_test(test_late_head),
+        cmocka_unit_test(test_replies_in_order),
+        cmocka_unit_test(test_slow_head),
+        cmocka_unit_test(test_half_a_frame),
+        cmocka_unit_test(test_frames_after),
+        cmocka_unit_test(test_late_head),
     };
     return cmocka_run_group_tests_name("host_tty", tests, NULL, NULL);
 }
