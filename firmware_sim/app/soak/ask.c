@@ -130,6 +130,8 @@ void soak_ask_next(struct soak_link *link)
 void soak_ask_scan(struct soak_link *link)
 {
     char reply[REPLY_LEN];
-    if (put(link, "HEAD:STATe?", is_state, reply) && strcmp(reply, "idle") == 0)
-        put(link, "SCAN:STARt", is_start, reply);
+    if (!put(link, "HEAD:STATe?", is_state, reply)) return;
+    soak_saw_state(link, reply);
+    if (strcmp(reply, "idle") == 0) put(link, "SCAN:STARt", is_start, reply);
+    if (strcmp(reply, "fault") == 0) put(link, "*RST", is_start, reply);
 }
