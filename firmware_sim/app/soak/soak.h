@@ -149,7 +149,7 @@ struct soak_link {
     uint64_t frames, bytes, refused_frames, sessions, closings, refused;
     uint64_t lost_plain;   /* without a fault ... */
     uint64_t reader_lost;  /* ... and those that the head said it left out, as the client was too slow */
-    uint64_t wrong_plain;  /* differ from the clean frame without a fault */
+    uint64_t wrong_plain;  /* differ from the clean frame without a fault, or came twice */
     uint64_t unknown;      /* the clean reader did not get them */
     uint64_t odd_closings; /* the connection was closed without a fault */
     uint64_t away;         /* frames that came while there was no session */
