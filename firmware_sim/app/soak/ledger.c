@@ -172,6 +172,18 @@ static void begin(struct soak_link *link, soak_seq seq)
     link->begun = link->in_session = 1;
 }
 
+/* The library has their numbers, and gives no gap: they came, and it refused them for what they hold. */
+static void mark_refused(struct soak_link *link, soak_seq to)
+{
+    for (soak_seq seq = link->last + 1; seq < to && link->refused_now > 0; seq++) {
+        struct soak_fact *fact = touch(link, seq);
+        if (fact == NULL || fact->gap || fact->got != 0) continue;
+        fact->gap = 1;
+        link->refused_now--;
+    }
+    link->refused_now = 0;
+}
+
 static double lateness_ms(struct soak_link *link, int64_t t_ns, int64_t now_ns)
 {
     const int64_t after_ns = now_ns - t_ns;
@@ -186,6 +198,7 @@ void soak_saw_frame(struct soak_link *link, const struct scanhead_frame *frame, 
     pthread_mutex_lock(&link->lock);
     const soak_seq seq = soak_seq_of(link->soak, frame->seq);
     if (!link->in_session) begin(link, seq);
+    if (link->refused_now != 0) mark_refused(link, seq);
     struct soak_fact *fact = touch(link, seq);
     link->frames++;
     link->bytes += frame->raw_len;
@@ -284,9 +297,17 @@ static void end_by_refusal(struct soak_link *link)
     memmove(link->refusal, link->refusal + 1, --link->n_refusals * sizeof *link->refusal);
 }
 
-void soak_saw_end(struct soak_link *link, int was_refused)
+void soak_saw_no_open(struct soak_link *link)
 {
     pthread_mutex_lock(&link->lock);
+    if (link->n_refusals != 0) end_by_refusal(link);
+    pthread_mutex_unlock(&link->lock);
+}
+
+void soak_saw_end(struct soak_link *link)
+{
+    pthread_mutex_lock(&link->lock);
+    const int was_refused = !link->in_session;
     link->in_session = 0;
     link->closings++;
     const int64_t act_ns = link->n_acts != 0 ? link->act[0].t_ns : INT64_MAX;
