@@ -153,6 +153,7 @@ struct soak_link {
     uint64_t wrong_plain;  /* differ from the clean frame without a fault, or came twice */
     uint64_t unknown;      /* the clean reader did not get them */
     uint64_t odd_closings; /* the connection was closed without a fault */
+    int64_t odd_ns, no_open_ns; /* when that last was, and when there was no connection; 0: never */
     uint64_t away;         /* frames that came while there was no session */
     /* Bytes that belong to no frame: noticed, and by the faults. Beside them a reply may be hurt, too. */
     uint64_t bad_bytes, expected_bad_min, expected_bad_max;
