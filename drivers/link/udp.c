@@ -222,6 +222,7 @@ static void udp_close(void *link)
 
 const struct link_ops link_udp = {
     .name = "udp",
+    .datagrams = 1,
     .open = udp_open,
     .endpoint = udp_endpoint,
     .poll = udp_poll,
