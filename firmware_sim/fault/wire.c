@@ -12,8 +12,9 @@ struct wire *wire_create(const struct wire_spec *spec)
     if (wire == NULL) return NULL;
     wire->spec = *spec;
     wire->unit = malloc(spec->max_unit);
+    wire->mask = malloc(spec->max_unit);
     wire->last_reply = malloc(spec->max_unit);
-    if (wire->unit != NULL && wire->last_reply != NULL) return wire;
+    if (wire->unit != NULL && wire->mask != NULL && wire->last_reply != NULL) return wire;
     wire_free(wire);
     return NULL;
 }
@@ -23,6 +24,7 @@ void wire_free(struct wire *wire)
     if (wire == NULL) return;
     wire_queue_clear(&wire->queue);
     free(wire->unit);
+    free(wire->mask);
     free(wire->last_reply);
     free(wire);
 }
@@ -62,7 +64,6 @@ static int concerns(struct wire *wire, struct wire_fault *fault, int of)
 {
     const struct fault *f = &fault->entry.fault;
     if (is_act(f->kind) && (wire->spec.acts & UINT32_C(1) << (f->kind - FAULT_DISCONNECT)) == 0) return 0;
-    if (f->kind == FAULT_FLIP && f->reseal && wire->spec.reseal == NULL) return 0;
     if (f->count != 0 && *hits_of(wire, fault) >= f->count) return 0;
     return fault_place_of(f->kind) == FAULT_AT_REPLY  ? of == FAULT_OF_REPLIES
            : fault_place_of(f->kind) == FAULT_AT_FRAME ? of == f->of

@@ -54,26 +54,56 @@ static void truncate_unit(struct change *c)
     c->note.byte = (int64_t)m->len;
 }
 
-/* Bits at places of their own. With reseal those of a native frame are in its payload: what its header says of length
- * and numbers stays true. */
+/* Into the wire's mask: the bits that may change. Returns how many. */
+static uint64_t mark_bits(const struct change *c)
+{
+    const struct fault *f = &c->fault->entry.fault;
+    const struct wire *wire = c->wire;
+    const size_t len = c->making->len;
+    const int all = !f->reseal || wire->spec.content == NULL;
+    uint64_t n = 0;
+    memset(wire->mask, all ? 0xff : 0, len);
+    if (!all) wire->spec.content(wire->unit, len, wire->mask);
+    for (size_t i = 0; i < len; i++) {
+        if (f->byte >= 0 && (uint64_t)f->byte != i) wire->mask[i] = 0;
+        n += (uint64_t)__builtin_popcount(wire->mask[i]);
+    }
+    return n;
+}
+
+/* Bit k of those that may change; there are more. */
+static uint64_t find_bit(const uint8_t *mask, uint64_t k)
+{
+    uint64_t at = 0;
+    for (; k >= (uint64_t)__builtin_popcount(mask[at / 8]); at += 8)
+        k -= (uint64_t)__builtin_popcount(mask[at / 8]);
+    for (;; at++) {
+        const int may = mask[at / 8] >> at % 8 & 1;
+        if (may && k == 0) return at;
+        k -= (uint64_t)may;
+    }
+}
+
+/* Of n bits the first is anywhere, the others follow it. A datagram that is damaged on its way is dropped by the system
+ * of its reader; with reseal it was wrong before it was sent. */
 static void flip(struct change *c)
 {
     const struct fault *f = &c->fault->entry.fault;
-    struct wire_making *m = c->making;
-    const size_t from = f->reseal && c->wire->spec.native ? NATIVE_HEADER_LEN : 0;
-    uint64_t n_bits = 8 * (m->len - from), n = fault_n(f), done = 0;
-    if (f->byte >= 0) n_bits = (uint64_t)f->byte < m->len ? 8 : 0;
-    if (n > n_bits) n = n_bits;
-    uint64_t at = 8 * (f->byte >= 0 ? (uint64_t)f->byte : from) + (n_bits != 0 ? draw_below(c, DRAW_BYTES, n_bits) : 0);
-    const uint64_t begin = 8 * (f->byte >= 0 ? (uint64_t)f->byte : from);
-    c->note.byte = n != 0 ? (int64_t)(at / 8) : -1;
-    for (; done < n; done++) { /* the first is anywhere, the others follow it */
-        c->wire->unit[at / 8] ^= (uint8_t)(1U << at % 8);
-        if (++at == begin + n_bits) at = begin;
-    }
-    if (f->reseal && n != 0) c->wire->spec.reseal(c->wire->unit, m->len);
-    c->note.n = n;
+    const uint64_t n_bits = mark_bits(c), n = n_bits < fault_n(f) ? n_bits : fault_n(f);
     if (f->reseal) strcpy(c->note.text, "resealed");
+    if (!f->reseal && c->wire->spec.datagrams) {
+        c->making->dropped = 1;
+        strcpy(c->note.text, "not sent: its UDP checksum would be wrong");
+    }
+    if (n == 0) return;
+    uint64_t k = draw_below(c, DRAW_BYTES, n_bits);
+    c->note.byte = (int64_t)(find_bit(c->wire->mask, k) / 8);
+    c->note.n = n;
+    for (uint64_t done = 0; done < n; done++, k = (k + 1) % n_bits) {
+        const uint64_t at = find_bit(c->wire->mask, k);
+        c->wire->unit[at / 8] ^= (uint8_t)(1U << at % 8);
+    }
+    if (f->reseal && c->wire->spec.reseal != NULL) c->wire->spec.reseal(c->wire->unit, c->making->len);
 }
 
 static int garbage(struct change *c)

@@ -22,6 +22,7 @@ struct wire {
     struct wire_queue queue;
     int64_t last_due_ns; /* delays keep the order */
     uint8_t *unit;       /* the one at hand, and the copy that faults change */
+    uint8_t *mask;       /* its bits that a flip may change */
     uint8_t *last_reply; /* the reply before */
     size_t last_reply_len;
     uint8_t heard[WIRE_HEARD_LEN]; /* since the last reply; what is beyond is not echoed */

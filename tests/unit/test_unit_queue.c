@@ -28,12 +28,13 @@ static void units_come_out_as_they_went_in(void **state)
         memset(unit, (int)(put & 255), len);
         unit[0] = (uint8_t)len;
         const uint32_t room = unit_queue_room(&queue);
-        const int lost = unit_queue_put(&queue, unit, len, put);
+        const int lost = unit_queue_put(&queue, unit, len, put, put % 3 == 0);
         assert_int_equal(lost, room < len + HEAD); /* whole, or not at all */
         put += !lost;
         if (!lost && (random & 3) != 0) continue;
         /* the oldest, in pieces */
         assert_int_equal(unit_queue_tick(&queue), got);
+        assert_int_equal(unit_queue_is_reply(&queue), got % 3 == 0);
         size_t n = 0;
         for (int last = 0; !last;) {
             const uint8_t *rest = unit_queue_next(&queue, &left);
