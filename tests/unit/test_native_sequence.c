@@ -66,6 +66,27 @@ static void test_story(void **state)
         tell_story(0 - back);
 }
 
+/* What is known of a sequence ends with it. */
+static void test_forgets(void **state)
+{
+    (void)state;
+    for (int again = 0; again < 2; again++) {
+        memset(&sequence, 0, sizeof sequence);
+        expect(10, NATIVE_NO_NOTICE, 10, 1);
+        expect(15, NATIVE_GAP, 11, 4);
+        for (uint32_t seq = 16; seq < 40; seq++)
+            expect(seq, NATIVE_NO_NOTICE, seq, 1);
+        assert_int_equal(take(20, 1), NATIVE_RESTARTED);
+        expect(again ? 15 : 12, NATIVE_RESTARTED, again ? 15 : 12, 1); /* came, was missing: before */
+    }
+    /* a late frame fills its place: another one of its number is of another sequence */
+    memset(&sequence, 0, sizeof sequence);
+    expect(10, NATIVE_NO_NOTICE, 10, 1);
+    expect(15, NATIVE_GAP, 11, 4);
+    expect(12, NATIVE_LATE, 12, 1);
+    assert_int_equal(take(12, 1), NATIVE_RESTARTED);
+}
+
 static void test_memory(void **state)
 {
     (void)state;
@@ -124,6 +145,10 @@ static void test_resumed(void **state)
         expect(seq, NATIVE_NO_NOTICE, seq, 1);
     native_sequence_resume(&sequence);
     expect(7, NATIVE_RESTARTED, 7, 1);
+    /* nor is it late, though its number was missing */
+    expect(9, NATIVE_GAP, 8, 1);
+    native_sequence_resume(&sequence);
+    expect(8, NATIVE_RESTARTED, 8, 1);
 }
 
 static void test_local(void **state)
@@ -165,8 +190,9 @@ static void test_same_number(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_story),   cmocka_unit_test(test_memory), cmocka_unit_test(test_long_gaps),
-        cmocka_unit_test(test_resumed), cmocka_unit_test(test_local),  cmocka_unit_test(test_same_number),
+        cmocka_unit_test(test_forgets),     cmocka_unit_test(test_story),   cmocka_unit_test(test_memory),
+        cmocka_unit_test(test_long_gaps),   cmocka_unit_test(test_resumed), cmocka_unit_test(test_local),
+        cmocka_unit_test(test_same_number),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
