@@ -28,6 +28,7 @@ void rig_open(const struct fault *fault, uint32_t n, int native)
     struct sh_err err;
     memset(&rig, 0, sizeof rig);
     rig.list.n = n;
+    rig.native = native;
     rig.now_ns = 1000 * MS;
     rig.seq = UINT32_MAX - 5; /* and soon over its end */
     if (n != 0) memcpy(rig.list.fault, fault, n * sizeof *fault);
@@ -211,7 +212,7 @@ static int dropped, damaged;
 
 static void apply(struct chunk *c, const struct rig_item *item, const struct fault_note *note)
 {
-    const int resealed = strcmp(note->text, "resealed") == 0, native = item->bytes[0] == NATIVE_SYNC;
+    const int resealed = strcmp(note->text, "resealed") == 0, native = rig.native;
     switch (note->kind) {
     case FAULT_DROP:
         dropped = 1;
@@ -252,7 +253,7 @@ static uint32_t add_item(uint32_t i)
     for (uint32_t k = item->notes_from; k < to; k++) {
         const struct fault_note *note = &rig.note[k];
         assert_true(note->of == item->of && note->number == item->number && note->link == 1 && note->session == 1);
-        if (item->bytes[0] == NATIVE_SYNC && note->has_seq) assert_int_equal(note->seq, le_get32(item->bytes + 8));
+        if (note->has_seq) assert_int_equal(note->seq, le_get32(item->bytes + 8));
         if (note->kind == FAULT_GARBAGE) {
             struct chunk *c = add_chunk(i, 0);
             c->is_garbage = 1;

@@ -39,6 +39,7 @@ struct rig_write {
 
 struct rig {
     struct fault_list list;
+    int native;
     struct fault_board *board;
     struct wire *wire;
     int64_t now_ns;
