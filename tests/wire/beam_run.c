@@ -98,11 +98,17 @@ const struct beam_run *beam_read(const struct wire *wire, int slot, const char *
 
 const struct beam_run *beam_record(struct wire *wire, int slot, const char *faults, const char *const *sets)
 {
+    return beam_record_room(wire, slot, &BEAM_ROOM, faults, sets);
+}
+
+const struct beam_run *beam_record_room(struct wire *wire, int slot, const struct room_config *of, const char *faults,
+                                        const char *const *sets)
+{
     const char *args[WIRE_MAX_ARGS] = {"record"};
     char config[352], stream[352], truth[352], more[2048];
-    struct room_config room = BEAM_ROOM;
+    struct room_config room = *of;
     int n = 1;
-    snprintf(more, sizeof more, "%s%s%s", BEAM_ROOM.more, faults != NULL ? "faults:\n" : "", faults != NULL ? faults : "");
+    snprintf(more, sizeof more, "%s%s%s", of->more, faults != NULL ? "faults:\n" : "", faults != NULL ? faults : "");
     room.more = more;
     room_write(wire);
     snprintf(config, sizeof config, "%s", room_config_write(wire, &room));

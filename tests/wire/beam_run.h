@@ -5,7 +5,7 @@
 
 #include "tests/wire/room.h"
 
-enum { BEAM_MAX_PULSES = 20000, BEAM_MAX_LINES = 200, BEAM_MAX_NOTES = 32 };
+enum { BEAM_MAX_PULSES = 100000, BEAM_MAX_LINES = 200, BEAM_MAX_NOTES = 32 };
 
 struct beam_shot {
     int is_there, is_empty;
@@ -37,6 +37,9 @@ extern const struct room_config BEAM_ROOM;
 /* Records the room with these faults (YAML of the list's items; NULL: none) and settings (KEY=VALUE, ends with NULL; or
  * NULL). The run is the callee's, one for each `slot` of 0 and 1, until the next call. */
 const struct beam_run *beam_record(struct wire *wire, int slot, const char *faults, const char *const *sets);
+/* Of another room. */
+const struct beam_run *beam_record_room(struct wire *wire, int slot, const struct room_config *room, const char *faults,
+                                        const char *const *sets);
 /* The same of a stream and a truth that are there already. */
 const struct beam_run *beam_read(const struct wire *wire, int slot, const char *stream, const char *truth);
 /* The n-th note of a kind, from 0, that begins or ends it; it must be there. */
