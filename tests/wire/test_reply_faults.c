@@ -6,9 +6,9 @@
 /* Late by more than a busy machine needs for two requests that it has read at once. */
 static const char FAULTS[] = "faults:\n"
                              "  - {kind: drop}\n"
-                             "  - {kind: no_reply, at: 1}\n"
+                             "  - {kind: echo, at: 1}\n"
                              "  - {kind: wrong_reply, at: 3}\n"
-                             "  - {kind: echo, at: 4}\n"
+                             "  - {kind: no_reply, at: 4}\n"
                              "  - {kind: late_reply, at: 5, for_ms: 400}\n";
 
 static struct head start(struct wire *wire, const char *profile, const char *protocol)
@@ -50,7 +50,7 @@ static void play(int fd, const struct step *step)
 
 static void check_truth(struct wire *wire)
 {
-    static const char *const kinds[] = {"no_reply", "wrong_reply", "echo", "late_reply"};
+    static const char *const kinds[] = {"echo", "wrong_reply", "no_reply", "late_reply"};
     static const uint64_t numbers[] = {1, 3, 4, 5};
     uint32_t n, k = 0, n_dropped = 0;
     struct truth_note *note = truth_read(wire_path(wire, "truth.json"), 1, &n);
@@ -98,10 +98,10 @@ static void check(struct wire *wire, const char *profile, const char *protocol, 
 static void test_scip(void **state)
 {
     static const struct step steps[] = {
-        {"QT;1\nQT;2\n", "QT;2\n00P\n\n"},
+        {"QT;1\n", "QT;1\nQT;1\n00P\n\n"},
+        {"QT;2\n", "QT;2\n00P\n\n"},
         {"QT;3\n", "QT;2\n00P\n\n"},
-        {"QT;4\n", "QT;4\nQT;4\n00P\n\n"},
-        {"QT;5\nQT;6\n", "QT;6\n00P\n\nQT;5\n00P\n\n"},
+        {"QT;4\nQT;5\nQT;6\n", "QT;6\n00P\n\nQT;5\n00P\n\n"},
         {"BM;7\n", "BM;7\n00P\n\n"},
         {"GD0000010001\nTM2;8\n", "TM2;8\n03S\n\n"},
         {NULL, NULL},
@@ -114,10 +114,10 @@ static void test_scip(void **state)
 static void test_cola(void **state)
 {
     static const struct step steps[] = {
-        {"\2sRN ODpwrc\3\2sRN LCMstate\3", "\2sRA LCMstate 0\3"},
-        {"\2sRN EIHstCola\3", "\2sRA LCMstate 0\3"},
         {"\2sRN ODpwrc\3", "\2sRN ODpwrc\3\2sRA ODpwrc 1\3"},
-        {"\2sRN EIHstCola\3\2sRN LCMstate\3", "\2sRA LCMstate 0\3\2sRA EIHstCola 0\3"},
+        {"\2sRN LCMstate\3", "\2sRA LCMstate 0\3"},
+        {"\2sRN EIHstCola\3", "\2sRA LCMstate 0\3"},
+        {"\2sRN ODpwrc\3\2sRN EIHstCola\3\2sRN LCMstate\3", "\2sRA LCMstate 0\3\2sRA EIHstCola 0\3"},
         {"\2sEN LMDscandata 1\3", "\2sEA LMDscandata 1\3"},
         {NULL, NULL},
     };
