@@ -24,7 +24,9 @@
     {FAULT(until), CFG_COUNT, NULL, "0", 0, 1e15, .help = "Up to this one, included; 0: without end."},
     {FAULT(every), CFG_COUNT, NULL, "1", 1, 1e15, .help = "At every n-th, beginning with `from`."},
     {FAULT(probability), CFG_REAL, NULL, "1", 0, 1, .help = "By chance, of those that the other keys leave."},
-    {FAULT(count), CFG_COUNT, NULL, "0", 0, 1e15, .help = "At most so many times in a session (connections: on the link); 0: no limit."},
+    {FAULT(count), CFG_COUNT, NULL, "0", 0, 1e15,
+     .help = "At most so many times in a session (disconnect, unplug, usb_reset, endpoint_stall, short_packets, and at "
+             "connections: on the link); 0: no limit."},
     {FAULT(from_pulse), CFG_COUNT, NULL, "0", 0, 1e17,
      .help = "From this pulse of a scan on, counted from 0. Then only frames of points are hit."},
     {FAULT(until_pulse), CFG_COUNT, NULL, "", 0, 1e17, .example = "1000000", .help = "Up to this pulse."},

@@ -152,9 +152,8 @@ void cfg_check_fault_links(struct cfg_reader *rd, const struct config *cfg, cons
 
 int config_link_has_fault(const struct link_spec *link, enum fault_kind kind)
 {
-    const struct link_ops *ops = link_ops_get(link->type);
     const int is_of_link = kind >= FAULT_DISCONNECT && kind <= FAULT_DESCRIPTOR_LENGTH;
-    return !is_of_link || (ops != NULL && (ops->faults & UINT32_C(1) << (kind - FAULT_DISCONNECT)) != 0);
+    return !is_of_link || (link_faults(link) & LINK_FAULT_BIT(kind - FAULT_DISCONNECT)) != 0;
 }
 
 static int read_list(struct cfg_reader *rd, const struct config *cfg, struct fault_list *list)

@@ -8,6 +8,7 @@
 #include "firmware_sim/device/device.h"
 #include "firmware_sim/device/gnss.h"
 #include "firmware_sim/device/head_clock.h"
+#include "firmware_sim/device/head_faults.h"
 
 /* Poses of a live platform. Each tick begins with a pose of the head, made once from the poses that had
  * come. */
@@ -151,6 +152,7 @@ struct device {
     struct device_live live;
     struct device_journal journal;
     struct fault_board *faults;
+    struct head_faults head_faults; /* those of the board that are in the head */
     struct device_variant *variants;
 };
 

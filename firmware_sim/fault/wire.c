@@ -37,6 +37,7 @@ static void renew(struct wire *wire)
     const uint32_t n_before = wire->n_faults;
     memcpy(before, wire->fault, sizeof before);
     wire->version = fault_board_copy(wire->spec.board, entry, &wire->n_faults);
+    if (wire->spec.tally != NULL) fault_tally_renew(wire->spec.tally, entry, wire->n_faults);
     for (uint32_t i = 0; i < wire->n_faults; i++) {
         struct wire_fault *fault = &wire->fault[i];
         *fault = (struct wire_fault){.entry = entry[i]};
@@ -51,11 +52,19 @@ static int is_act(enum fault_kind kind)
     return kind >= FAULT_DISCONNECT && kind <= FAULT_SHORT_PACKETS;
 }
 
-static int concerns(const struct wire *wire, const struct wire_fault *fault, int of)
+/* How often it has struck: what the link does counts for all its sessions. */
+static uint64_t *hits_of(struct wire *wire, struct wire_fault *fault)
+{
+    return is_act(fault->entry.fault.kind) && wire->spec.tally != NULL
+               ? fault_tally_hits(wire->spec.tally, fault->entry.number)
+               : &fault->hits;
+}
+
+static int concerns(struct wire *wire, struct wire_fault *fault, int of)
 {
     const struct fault *f = &fault->entry.fault;
     if (is_act(f->kind) && (wire->spec.acts & UINT32_C(1) << (f->kind - FAULT_DISCONNECT)) == 0) return 0;
-    if (fault->entry.fault.count != 0 && fault->hits >= f->count) return 0;
+    if (f->count != 0 && *hits_of(wire, fault) >= f->count) return 0;
     return fault_place_of(f->kind) == FAULT_AT_REPLY  ? of == FAULT_OF_REPLIES
            : fault_place_of(f->kind) == FAULT_AT_FRAME ? of == f->of
                                                        : 0;
@@ -71,7 +80,7 @@ static int change_all(struct wire *wire, struct wire_making *making)
         spot.number -= fault->base[of];
         spot.t_ns -= fault->entry.since_ns;
         if (!fault_strikes(&fault->entry.fault, fault->entry.number, wire->spec.link, &spot)) continue;
-        fault->hits++;
+        ++*hits_of(wire, fault);
         if (wire_change(wire, fault, spot.number, making) != SH_OK) return SH_ENOMEM;
     }
     return SH_OK;

@@ -9,7 +9,7 @@
 #ifndef FIRMWARE_SIM_FAULT_WIRE_H
 #define FIRMWARE_SIM_FAULT_WIRE_H
 
-#include "firmware_sim/fault/board.h"
+#include "firmware_sim/fault/tally.h"
 #include "firmware_sim/fault/wire_queue.h"
 
 struct wire;
@@ -25,6 +25,7 @@ struct wire_spec {
     void (*content)(const uint8_t *unit, size_t len, uint8_t *mask);
     void (*reseal)(uint8_t *unit, size_t len);
     uint32_t acts; /* what the link can do: bit 0 is FAULT_DISCONNECT, and so on; others don't strike */
+    struct fault_tally *tally; /* of its acts, over all sessions of the link; outlives the wire. NULL: by session */
 };
 
 /* NULL: no memory. */

@@ -6,9 +6,11 @@
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/loop/pump_inside.h"
 
+#include <stdio.h>
 #include <string.h>
 
 static const int64_t NO_TIME = INT64_MAX;
+static const int64_t AGAIN_NS = 100000000; /* between attempts to be there again */
 
 int session_has_wire(struct pump *pump, struct session *s)
 {
@@ -25,7 +27,8 @@ int session_has_wire(struct pump *pump, struct session *s)
         .datagrams = pump->ops->datagrams,
         .content = pump->protocol->content,
         .reseal = pump->protocol->reseal,
-        .acts = pump->ops->faults,
+        .acts = pump->can,
+        .tally = &pump->tally,
     };
     s->wire = wire_create(&spec);
     if (s->wire == NULL) device_report(pump->links->device, CMD_E_REFUSED, "no memory for the faults of a session");
@@ -87,18 +90,38 @@ void session_heard(struct session *s, const void *bytes, size_t len)
     if (s->wire != NULL) wire_heard(s->wire, bytes, len);
 }
 
+static int64_t in_ms(double ms)
+{
+    return clock_now_ns() + (int64_t)(ms * 1e6);
+}
+
+/* What ends by it: the session at hand, or all of the link. */
+static void end_sessions(struct pump *pump, struct session *s, enum link_fault what)
+{
+    if (what == LINK_FAULT_DISCONNECT) session_close(pump, s);
+    if (what != LINK_FAULT_UNPLUG && what != LINK_FAULT_BUS_RESET) return;
+    for (int i = 0; i < LINK_MAX_SESSIONS; i++)
+        session_close(pump, &pump->session[i]);
+}
+
 /* The act that is the first of the wire. Returns 1 when the session is over by it. */
 static int carry_out(struct pump *pump, struct session *s, int index, const struct wire_piece *act)
 {
-    const enum link_fault what = (enum link_fault)(act->act - FAULT_DISCONNECT);
-    pump->ops->fault(pump->link, what, index, act->n, act->for_ms);
-    if (what == LINK_FAULT_UNPLUG) pump->plug_ns = clock_now_ns() + (int64_t)(act->for_ms * 1e6);
-    if (what == LINK_FAULT_DISCONNECT && act->for_ms > 0.0)
-        pump->refuse_until_ns = clock_now_ns() + (int64_t)(act->for_ms * 1e6);
-    const int ends = what == LINK_FAULT_DISCONNECT || what == LINK_FAULT_UNPLUG;
+    const enum fault_kind kind = (enum fault_kind)act->act;
+    const enum link_fault what = pump_link_fault(kind);
+    const double for_ms = act->for_ms;
+    const int rc = pump->ops->fault(pump->link, what, index, act->n, for_ms);
     wire_pop(s->wire);
-    if (ends) session_close(pump, s);
-    return ends;
+    if (rc != SH_OK) {
+        char text[96];
+        snprintf(text, sizeof text, "the fault %s could not be carried out now", fault_names[kind]);
+        pump_say(pump, text);
+        return 0;
+    }
+    if (what == LINK_FAULT_UNPLUG) pump->plug_ns = in_ms(for_ms);
+    if (what == LINK_FAULT_DISCONNECT && for_ms > 0.0) pump->refuse_until_ns = in_ms(for_ms);
+    end_sessions(pump, s, what);
+    return !s->open;
 }
 
 int session_write_wire(struct pump *pump, struct session *s, int index)
@@ -152,6 +175,13 @@ int64_t pump_next_ns(const struct pump *pump)
 void pump_plug(struct pump *pump)
 {
     if (pump->plug_ns == 0 || clock_now_ns() < pump->plug_ns) return;
-    pump->plug_ns = 0;
-    pump->ops->fault(pump->link, LINK_FAULT_PLUG, 0, 0, 0.0);
+    if (pump->ops->fault(pump->link, LINK_FAULT_PLUG, 0, 0, 0.0) == SH_OK) {
+        if (pump->plug_failed) pump_say(pump, "is there again");
+        pump->plug_ns = pump->plug_failed = 0;
+        return;
+    }
+    if (!pump->plug_failed)
+        pump_say(pump, "was unplugged on request, and somebody else has its endpoint now; tries until it is free");
+    pump->plug_failed = 1;
+    pump->plug_ns = clock_now_ns() + AGAIN_NS;
 }

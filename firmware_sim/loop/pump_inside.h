@@ -60,6 +60,15 @@ struct session {
     int64_t moved_ns; /* clock_now_ns() when a byte last went out */
 };
 
+/* Faults at connections (USB: at enumerations); pump_connections.c */
+struct pump_connections {
+    uint64_t n;       /* so far, refused ones too */
+    uint32_t version; /* of the list */
+    struct fault_entry entry[FAULT_MAX];
+    uint64_t base[FAULT_MAX]; /* connections before it was there */
+    uint32_t n_entries;
+};
+
 struct pump {
     struct link_counts counts; /* of all its sessions so far */
     struct links *links;
@@ -74,8 +83,11 @@ struct pump {
     int holds;        /* its readers hold back the paces fast and step */
     uint32_t number;  /* of the link, from 1 */
     struct fault_board *board; /* NULL: no faults strike here */
-    uint64_t connections;    /* so far, refused ones too */
+    uint32_t can;              /* link_faults() */
+    struct fault_tally tally;  /* of what the link does */
+    struct pump_connections connections;
     int64_t plug_ns;         /* clock: when an unplugged link is there again; 0: it is */
+    int plug_failed;         /* so far, and that was said */
     int64_t refuse_until_ns; /* clock: until then clients are turned away */
     struct session session[LINK_MAX_SESSIONS];
     pthread_t thread;
@@ -110,6 +122,17 @@ void session_heard(struct session *s, const void *bytes, size_t len);
 int64_t pump_next_ns(const struct pump *pump);
 /* A link that was unplugged comes back when its time is over. */
 void pump_plug(struct pump *pump);
+
+/* pump_connections.c */
+/* A client has come. 1: it is turned away, on request. index: of the session. */
+int pump_turns_away(struct pump *pump, int index);
+/* A host has got the USB device. */
+void pump_plugged(struct pump *pump);
+/* The fault of a link that is asked for by a kind. */
+enum link_fault pump_link_fault(enum fault_kind kind);
+
+/* pump.c: to whoever runs the head. */
+void pump_say(struct pump *pump, const char *text);
 
 /* lost_frames.c: the one place that counts what a reader got and what it lost. */
 /* Compares the number of a tick's first frame with the one expected, and counts a gap; a native reader is told, in a

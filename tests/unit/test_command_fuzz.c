@@ -167,6 +167,10 @@ static const char *const valid[] = {
     "TIME?",
     "TIME:STEP 1000000",
     "TIME:STEP 1 S",
+    "FAUL:ADD {kind: drop}",
+    "FAUL:CLE 1",
+    "FAUL:INJ? 2",
+    "FAUL:LIST?",
 };
 
 /* line becomes its first `at` bytes, middle and end, as much as fits. */

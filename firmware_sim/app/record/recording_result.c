@@ -1,5 +1,6 @@
 #include "firmware_sim/app/record/recording.h"
 
+#include <stdio.h>
 #include <string.h>
 
 #include "firmware_sim/base/clock.h"
@@ -46,6 +47,9 @@ void recording_put(struct json *json, const void *ctx)
     json_uint(json, "bad_payload", s->bad_payload);
     json_uint(json, "bad_bytes", s->bad_bytes);
     json_uint(json, "seq_lost", s->seq_lost);
+    json_uint(json, "repeated", s->repeated);
+    json_uint(json, "late", s->late);
+    json_uint(json, "restarts", s->restarts);
     json_uint(json, "dropped", s->dropped);
     json_uint(json, "reader_lost_frames", s->reader_lost);
     json_uint(json, "crowded_echoes", result->crowded);
@@ -65,6 +69,17 @@ void recording_put(struct json *json, const void *ctx)
 static uint64_t count_lost(const struct scanhead_stats *s)
 {
     return (s->seq_lost > s->bad_payload ? s->seq_lost : s->bad_payload) + s->dropped;
+}
+
+int recording_describe_order(const struct recording_result *result, char *text, size_t len)
+{
+    const struct scanhead_stats *s = &result->stream;
+    if (s->repeated + s->late + s->restarts == 0) return 0;
+    snprintf(text, len,
+             "the stream was not in order: %llu frames came twice, %llu came after newer ones and count as lost, "
+             "the sequence began anew %llu times",
+             (unsigned long long)s->repeated, (unsigned long long)s->late, (unsigned long long)s->restarts);
+    return 1;
 }
 
 int recording_check_complete(const struct recording_result *result, struct sh_err *err)
