@@ -51,7 +51,7 @@ static const struct {
     int needs_ms;
 } kinds[FAULT_N_KINDS] = {
     [FAULT_DUPLICATE] = {"n", 100, 0},
-    [FAULT_REORDER] = {"n", 10000, 0},
+    [FAULT_REORDER] = {"n", 1000, 0},
     [FAULT_DELAY] = {"for_ms", 0, 1},
     [FAULT_JITTER] = {"for_ms", 0, 1},
     [FAULT_TRUNCATE] = {"n", 1e6, 0},

@@ -112,10 +112,15 @@ void session_close_wire(struct session *s);
 int session_wire_waits(const struct session *s);
 /* As session_write, by its wire. */
 int session_write_faulty(struct pump *pump, struct session *s, int index);
-/* Writes what lies in the wire: 1: the link is full; 0: nothing may go out now; -1: the session is closed. */
-int session_write_wire(struct pump *pump, struct session *s, int index);
-/* A unit of a protocol into the wire. */
-void session_put_unit(struct pump *pump, struct session *s, const uint8_t *unit, size_t len, int is_reply);
+/* Writes what lies in the wire: 1: the link is full; 0: nothing may go out now; -1: the session is closed. last: nothing
+ * comes after it. */
+int session_write_wire(struct pump *pump, struct session *s, int index, int last);
+/* Whether as much lies in it as it keeps. */
+int session_wire_is_full(const struct pump *pump, const struct session *s);
+/* The oldest unit of a protocol, or the rest of it, into the wire. */
+void session_put_unit(struct pump *pump, struct session *s);
+/* A line of this session, to which the reply is still to come, has changed the faults. */
+void session_faults_changed(struct pump *pump, struct session *s);
 /* What the client sent. */
 void session_heard(struct session *s, const void *bytes, size_t len);
 /* When a wire, or the link, next has something to do by the clock; INT64_MAX: nothing. */

@@ -3,13 +3,12 @@
 #include "tests/wire/room.h"
 #include "tests/wire/unit_faults.h"
 
-/* Late by more than a busy machine needs for two requests that it has read at once. */
 static const char FAULTS[] = "faults:\n"
                              "  - {kind: drop}\n"
                              "  - {kind: echo, at: 1}\n"
                              "  - {kind: wrong_reply, at: 3}\n"
                              "  - {kind: no_reply, at: 4}\n"
-                             "  - {kind: late_reply, at: 5, for_ms: 400}\n";
+                             "  - {kind: late_reply, at: 5, for_ms: 300}\n";
 
 static struct head start(struct wire *wire, const char *profile, const char *protocol)
 {
@@ -29,12 +28,14 @@ static struct head start(struct wire *wire, const char *profile, const char *pro
 /* What is sent at once, and exactly what comes for it. */
 struct step {
     const char *request, *answer;
+    int late_ms; /* not before */
 };
 
 static void play(int fd, const struct step *step)
 {
     char got[512];
     for (; step->request != NULL; step++) {
+        const int64_t sent_ms = wire_now_ms();
         raw_write(fd, step->request, strlen(step->request));
         const size_t len = strlen(step->answer);
         for (size_t n = 0; n < len;) {
@@ -45,6 +46,7 @@ static void play(int fd, const struct step *step)
             n += (size_t)more;
         }
         if (memcmp(got, step->answer, len) != 0) fail_msg("\"%.*s\" for \"%s\"", (int)len, got, step->request);
+        assert_true(wire_now_ms() - sent_ms >= step->late_ms);
     }
 }
 
@@ -94,19 +96,19 @@ static void check(struct wire *wire, const char *profile, const char *protocol, 
 }
 
 /* A scan that was asked for comes after its turn, or 0A after 2 s: it is a unit of the stream, and dropped here. The head
- * has booted before the late answer came. */
+ * has booted before the late answer came. Answers keep their order. (299: milliseconds are rounded down twice.) */
 static void test_scip(void **state)
 {
     static const struct step steps[] = {
-        {"QT;1\n", "QT;1\nQT;1\n00P\n\n"},
-        {"QT;2\n", "QT;2\n00P\n\n"},
-        {"QT;3\n", "QT;2\n00P\n\n"},
-        {"QT;4\nQT;5\nQT;6\n", "QT;6\n00P\n\nQT;5\n00P\n\n"},
-        {"BM;7\n", "BM;7\n00P\n\n"},
-        {"GD0000010001\nTM2;8\n", "TM2;8\n03S\n\n"},
-        {NULL, NULL},
+        {"QT;1\n", "QT;1\nQT;1\n00P\n\n", 0},
+        {"QT;2\n", "QT;2\n00P\n\n", 0},
+        {"QT;3\n", "QT;2\n00P\n\n", 0},
+        {"QT;4\nQT;5\nQT;6\n", "QT;5\n00P\n\nQT;6\n00P\n\n", 299},
+        {"BM;7\n", "BM;7\n00P\n\n", 0},
+        {"GD0000010001\nTM2;8\n", "TM2;8\n03S\n\n", 0},
+        {NULL, NULL, 0},
     };
-    static const struct step question[] = {{"TM2;9\n", "TM2;9\n03S\n\n"}, {NULL, NULL}};
+    static const struct step question[] = {{"TM2;9\n", "TM2;9\n03S\n\n", 0}, {NULL, NULL, 0}};
     check(*state, "hokuyo-utm-30lx", "scip", steps, question);
 }
 
@@ -114,14 +116,14 @@ static void test_scip(void **state)
 static void test_cola(void **state)
 {
     static const struct step steps[] = {
-        {"\2sRN ODpwrc\3", "\2sRN ODpwrc\3\2sRA ODpwrc 1\3"},
-        {"\2sRN LCMstate\3", "\2sRA LCMstate 0\3"},
-        {"\2sRN EIHstCola\3", "\2sRA LCMstate 0\3"},
-        {"\2sRN ODpwrc\3\2sRN EIHstCola\3\2sRN LCMstate\3", "\2sRA LCMstate 0\3\2sRA EIHstCola 0\3"},
-        {"\2sEN LMDscandata 1\3", "\2sEA LMDscandata 1\3"},
-        {NULL, NULL},
+        {"\2sRN ODpwrc\3", "\2sRN ODpwrc\3\2sRA ODpwrc 1\3", 0},
+        {"\2sRN LCMstate\3", "\2sRA LCMstate 0\3", 0},
+        {"\2sRN EIHstCola\3", "\2sRA LCMstate 0\3", 0},
+        {"\2sRN ODpwrc\3\2sRN EIHstCola\3\2sRN LCMstate\3", "\2sRA EIHstCola 0\3\2sRA LCMstate 0\3", 299},
+        {"\2sEN LMDscandata 1\3", "\2sEA LMDscandata 1\3", 0},
+        {NULL, NULL, 0},
     };
-    static const struct step question[] = {{"\2sRN ODpwrc\3", "\2sRA ODpwrc 1\3"}, {NULL, NULL}};
+    static const struct step question[] = {{"\2sRN ODpwrc\3", "\2sRA ODpwrc 1\3", 0}, {NULL, NULL, 0}};
     check(*state, "sick-tim571", "cola", steps, question);
 }
 

@@ -134,12 +134,15 @@ struct piece {
     size_t len, whole_len;
     uint64_t n_bits;
     int64_t byte;
-    uint64_t split, joins, behind;
+    uint64_t split;
+    uint64_t after;  /* 0, or the unit behind which it comes */
+    int is_joined;   /* in the write of the piece before it */
 };
 
 struct pieces {
     struct piece *piece;
     uint32_t n;
+    uint64_t merge_until; /* up to this unit, what comes is in one write; 0: no merge */
 };
 
 static void append(struct pieces *pieces, const struct piece *piece)
@@ -148,6 +151,7 @@ static void append(struct pieces *pieces, const struct piece *piece)
     assert_non_null(pieces->piece);
     struct piece *copy = &pieces->piece[pieces->n++];
     *copy = *piece;
+    copy->is_joined = pieces->merge_until != 0;
     copy->bytes = malloc(piece->len + 1);
     assert_non_null(copy->bytes);
     memcpy(copy->bytes, piece->bytes, piece->len);
@@ -160,16 +164,16 @@ static void pieces_free(struct pieces *pieces)
     free(pieces->piece);
 }
 
-/* One fault on the unit. Returns 0 when it does not come at all. */
-static int apply(const struct truth_note *note, struct piece *unit, uint32_t *copies, struct pieces *out)
+/* One fault on the unit. Returns 0 when it does not come at all. *merge: units in a write that begins with it. */
+static int apply(const struct truth_note *note, struct piece *unit, uint32_t *copies, uint64_t *merge, struct pieces *out)
 {
     static uint8_t random[1024];
     const char *k = note->kind;
     if (strcmp(k, "drop") == 0 || strncmp(note->text, "not sent", 8) == 0) return 0;
     if (strcmp(k, "duplicate") == 0) *copies += (uint32_t)note->n;
-    if (strcmp(k, "reorder") == 0) unit->behind = note->n;
+    if (strcmp(k, "reorder") == 0) unit->after = note->number + note->n;
     if (strcmp(k, "split") == 0) unit->split = note->n;
-    if (strcmp(k, "merge") == 0) unit->joins = note->n - 1;
+    if (strcmp(k, "merge") == 0) *merge = note->n;
     if (strcmp(k, "truncate") == 0) {
         assert_true(note->n > 0 && note->n < unit->len && (size_t)note->byte == unit->len - note->n);
         unit->len = (size_t)note->byte;
@@ -187,11 +191,11 @@ static int apply(const struct truth_note *note, struct piece *unit, uint32_t *co
     return 1;
 }
 
-/* Those that waited for one more to overtake them come now. */
-static void overtake(struct pieces *held, struct pieces *out)
+/* Those that waited for this unit come now. */
+static void let_go(const struct pieces *held, uint64_t number, struct pieces *out)
 {
     for (uint32_t i = 0; i < held->n; i++)
-        if (held->piece[i].behind != 0 && --held->piece[i].behind == 0) append(out, &held->piece[i]);
+        if (held->piece[i].after == number) append(out, &held->piece[i]);
 }
 
 /* Units of the session from the clean one `first` on. */
@@ -203,17 +207,21 @@ static struct pieces predict(const struct unit_kind *kind, const struct unit_lis
         size_t len;
         const uint8_t *bytes = units_get(clean, i, &len);
         struct piece unit = {.bytes = malloc(len), .len = len};
+        const uint64_t number = i - first + 1;
+        uint64_t merge = 0;
         uint32_t copies = 1;
         int comes = 1;
         assert_non_null(unit.bytes);
         memcpy(unit.bytes, bytes, len);
-        if (kind->adapt != NULL) kind->adapt(unit.bytes, len, i - first + 1);
-        for (uint32_t k = 0; k < n_notes && comes; k++)
-            if (note[k].number == i - first + 1 && strcmp(note[k].of, "stream") == 0)
-                comes = apply(&note[k], &unit, &copies, &out);
+        if (kind->adapt != NULL) kind->adapt(unit.bytes, len, number);
+        for (uint32_t k = 0; k < n_notes; k++)
+            if (note[k].number == number && strcmp(note[k].of, "stream") == 0)
+                comes &= apply(&note[k], &unit, &copies, &merge, &out);
         for (; comes && copies > 0; copies--)
-            append(unit.behind != 0 ? &held : &out, &unit);
-        if (comes && unit.behind == 0) overtake(&held, &out);
+            append(unit.after != 0 ? &held : &out, &unit);
+        let_go(&held, number, &out);
+        if (merge != 0) out.merge_until = number + merge - 1;
+        if (number >= out.merge_until) out.merge_until = 0;
         free(unit.bytes);
     }
     pieces_free(&held);
@@ -274,21 +282,21 @@ static void check_datagrams(const struct unit_kind *kind, const struct pieces *w
 {
     uint32_t g = 0;
     size_t at = 0; /* in datagram g */
-    uint64_t joins = 0;
     for (uint32_t i = 0; i < want->n; i++) {
         const struct piece *p = &want->piece[i];
         const uint64_t n = p->split > 1 ? p->split : 1;
-        joins = joins != 0 ? joins - 1 : p->joins;
         for (uint64_t part = 0; part < n; part++) {
             const size_t from = p->len * part / n, to = p->len * (part + 1) / n;
             size_t len;
             if (g == got->n) fail_msg("datagram %u did not come", g);
             const uint8_t *bytes = units_get(got, g, &len);
             if (at + to - from > len) fail_msg("datagram %u has %zu bytes", g, len);
-            if (n > 1) assert_memory_equal(bytes + at, p->bytes + from, to - from);
-            else check_piece(kind, p, i, bytes + at, p->len);
+            if (n > 1)
+                assert_memory_equal(bytes + at, p->bytes + from, to - from);
+            else
+                check_piece(kind, p, i, bytes + at, p->len);
             at += to - from;
-            if (joins != 0) continue;
+            if (part + 1 == n && i + 1 < want->n && want->piece[i + 1].is_joined) continue;
             if (at != len) fail_msg("datagram %u has %zu bytes instead of %zu", g, len, at);
             g++;
             at = 0;
