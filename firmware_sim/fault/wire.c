@@ -60,7 +60,7 @@ static int is_act(enum fault_kind kind)
 enum { LAST_RANK = 4 };
 
 /* When it has its turn at a frame. */
-static int rank_of(const struct fault *f)
+static int rank_of(const struct wire *wire, const struct fault *f)
 {
     switch (f->kind) {
     case FAULT_DISCONNECT:
@@ -73,7 +73,7 @@ static int rank_of(const struct fault *f)
     case FAULT_TRUNCATE:
         return 2;
     case FAULT_FLIP:
-        return f->reseal ? 3 : LAST_RANK;
+        return f->reseal ? 3 : wire->spec.datagrams ? 1 : LAST_RANK; /* that datagram is not sent */
     default:
         return LAST_RANK;
     }
@@ -127,7 +127,7 @@ static int change_all(struct wire *wire, struct wire_making *making)
     pass_over_old(wire, making);
     for (int rank = 0; rank <= LAST_RANK; rank++)
         for (uint32_t i = 0; i < wire->n_faults && rc == SH_OK && !wire->is_over; i++)
-            if (rank_of(&wire->fault[i].entry.fault) == rank) rc = change(wire, &wire->fault[i], making);
+            if (rank_of(wire, &wire->fault[i].entry.fault) == rank) rc = change(wire, &wire->fault[i], making);
     return rc;
 }
 
