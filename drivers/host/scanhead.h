@@ -168,7 +168,7 @@ enum scanhead_notice_kind {
      * again. A LOCAL frame has no number; it is compared with the frame before it alone. */
     SCANHEAD_NOTICE_REPEATED = 2,
     /* A frame that was missing came after newer ones. It is not handed out, and stays counted as lost. The last 64 gaps
-     * are remembered, but for those of more than 65536 frames. */
+     * are remembered, but for those of more than 65536 frames. 256 such frames in a row are a restart. */
     SCANHEAD_NOTICE_LATE = 3,
     /* The sequence jumps back, and it is neither of the two: a head that started again, or another recording. seq: the
      * first number of the new sequence. The frame is handed out. How many are missing is not known. */

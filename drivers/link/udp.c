@@ -246,6 +246,7 @@ static void udp_close(void *link)
 const struct link_ops link_udp = {
     .name = "udp",
     .faults = LINK_FAULT_BIT(LINK_FAULT_UNPLUG),
+    .datagrams = 1,
     .open = udp_open,
     .endpoint = udp_endpoint,
     .poll = udp_poll,

@@ -76,6 +76,13 @@ void cola_power_up(struct cola *self);
 /* Writes an LMDscandata telegram of the last scan (there is one) behind its head. */
 void cola_put_scan(const struct cola *self, struct cola_out *out);
 
+/* cola_seal.c: for protocol_ops of the same names */
+
+/* Distances and signals of LMDscandata. */
+void cola_content(const uint8_t *unit, size_t len, uint8_t *mask);
+/* The check byte of CoLa-B. */
+void cola_reseal(uint8_t *unit, size_t len);
+
 /* cola_settings.c: what is set and asked for the measurement. */
 
 void cola_settings_reset(struct cola *self);

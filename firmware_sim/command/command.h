@@ -70,6 +70,7 @@ enum command_error {
     CMD_E_PROTECTED = -203, /* another session has control */
     CMD_E_SETTINGS = -221,  /* conflicts with the state or another setting */
     CMD_E_RANGE = -222,
+    CMD_E_SELF_TEST = -330,
     CMD_E_QUEUE = -350,
     CMD_E_OVERRUN = -363,
     /* the device's own, positive (SCPI-99 21.8.2) */
@@ -123,6 +124,7 @@ struct command_device {
     struct head_settings settings; /* as they are now; a refused command leaves them */
     struct head_settings defaults; /* what *RST restores */
     enum head_state state;
+    const char *why_fault; /* why the state is fault, and what ends it; NULL: not known */
     struct command_queue queue;
     uint32_t control;      /* session that may change things; 0: none, the next one that does takes it */
     uint64_t frames_done;  /* of the scan at hand or the last one */

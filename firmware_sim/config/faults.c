@@ -136,11 +136,20 @@ void cfg_check_faults(struct cfg_reader *rd, struct fault_list *list)
     }
 }
 
+static int needs_time(enum fault_kind kind)
+{
+    return kind == FAULT_CLOCK_JUMP || kind == FAULT_CLOCK_DRIFT || kind == FAULT_CLOCK_STOP ||
+           kind == FAULT_PPS_LOST || kind == FAULT_LEAP_SECOND;
+}
+
 void cfg_check_fault_links(struct cfg_reader *rd, const struct config *cfg, const struct fault_list *list)
 {
     for (uint32_t i = 0; i < list->n; i++) {
         const struct fault *f = &list->fault[i];
         if (!CFG_SOUND(rd, i, "faults[].kind", "faults[].link")) continue;
+        if (needs_time(f->kind) && (cfg->time.epoch[0] == '\0' || strcmp(cfg->time.epoch, "none") == 0))
+            cfg_fail_key(rd, "faults[].kind", i, "%s needs a time of day; allowed where time.epoch is not none",
+                         fault_names[f->kind]);
         if (f->link > cfg->n_links)
             cfg_fail_key(rd, "faults[].link", i, "there is no link %u; allowed 0 to %u", f->link, cfg->n_links);
         else if (f->link != 0 && fault_place_of(f->kind) != FAULT_AT_MOMENT &&

@@ -67,6 +67,18 @@ int device_open_faults(struct device *device, struct sh_err *err)
     return SH_OK;
 }
 
+void device_run_faults(struct device *device, uint64_t tick, struct device_work *work)
+{
+    const struct head_faults_tick at = {.t_ns = (int64_t)tick * device->tick_ns,
+                                        .has_pulses = device->scan.on,
+                                        .pulse0 = device->scan.pulse_next,
+                                        .n_pulses =
+                                            1}; /* from the tick on that begins with the fault's pulse or later */
+    if (head_faults_step(&device->head_faults, HEAD_FAULTS_CLOCK | HEAD_FAULT(FAULT_POWER_CYCLE), &at))
+        device_run_clock_faults(device, tick);
+    device_run_power(device, tick, work);
+}
+
 struct fault_board *device_faults(const struct device *device)
 {
     return device->faults;

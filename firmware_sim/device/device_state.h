@@ -82,6 +82,13 @@ struct device_errors {
 };
 enum { DEVICE_ERRORS_A_SECOND = 10, DEVICE_MAX_SESSIONS = (CONFIG_MAX_LINKS + 1) * LINK_MAX_SESSIONS };
 
+/* When power went last, and when it came, or will. */
+struct device_power {
+    uint64_t off_tick, on_tick; /* 0: it has always been on */
+    int boot_begins;            /* in the tick at hand */
+    uint32_t near_wrap;         /* counters begin so many below their wrap */
+};
+
 /* What the head could not compute in time, as far as events have said so. */
 struct device_overrun {
     uint64_t ticks_said, pulses_said;
@@ -143,6 +150,7 @@ struct device {
     uint64_t end_tick;  /* of the run; UINT64_MAX: none */
     int ending, over;
     struct device_machine machine;
+    struct device_power power;
     struct device_scan scan;
     uint32_t *station_scans; /* [n_stations] since power-up */
     struct device_events events;
@@ -240,6 +248,22 @@ void device_take_poses(struct device *device, struct device_work *work);
 
 /* device_faults.c */
 int device_open_faults(struct device *device, struct sh_err *err);
+/* Faults of the tick, but those of the beam: what of them begins and ends, and does so at once. */
+void device_run_faults(struct device *device, uint64_t tick, struct device_work *work);
+
+/* power.c */
+void device_first_power(struct device *device);
+/* Power that goes or comes with the tick, and boots that begin with it. */
+void device_run_power(struct device *device, uint64_t tick, struct device_work *work);
+/* The end of a boot is due. 1: the self-test failed, and that is done. */
+int device_end_boot(struct device *device, uint64_t tick);
+/* For who asks as of `released`: power has gone since, or will go before an answer could come, and is not back. */
+int device_is_dead(const struct device *device, uint64_t released);
+
+/* clock_faults.c */
+void device_run_clock_faults(struct device *device, uint64_t tick);
+/* The PPS event of a full second is not to be. */
+int device_loses_pps(struct device *device, int64_t edge_ns);
 
 /* time_of_day.c: the head's clock and the receiver. */
 /* GPS time, ns, of a device time by the head's clock; 0: unknown. */

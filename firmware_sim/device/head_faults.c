@@ -55,14 +55,13 @@ static const struct head_fault *find(const struct head_fault *list, uint32_t n, 
     return NULL;
 }
 
-/* Takes over the list as it is now. Those that were taken out while they were active are over. */
-static int renew(struct head_faults *faults, const struct head_faults_tick *tick)
+/* Takes over the list as it is now. Those that were taken out while they were active stay for a step more, and end. */
+static void renew(struct head_faults *faults)
 {
     struct fault_entry entry[FAULT_MAX];
-    struct head_fault was[FAULT_MAX];
+    struct head_fault was[2 * FAULT_MAX];
     const uint32_t n_was = faults->n;
     uint32_t n;
-    int ends = 0;
     memcpy(was, faults->fault, n_was * sizeof was[0]);
     faults->version = fault_board_copy(faults->board, entry, &n);
     faults->n = 0;
@@ -73,16 +72,20 @@ static int renew(struct head_faults *faults, const struct head_faults_tick *tick
         *f = old != NULL ? *old : (struct head_fault){.fault = entry[i].fault, .number = entry[i].number};
         if (old == NULL) set_window(faults, &entry[i], f);
     }
+    const uint32_t n_there = faults->n;
     for (uint32_t i = 0; i < n_was; i++) {
-        if (!was[i].active || find(faults->fault, faults->n, was[i].number) != NULL) continue;
-        note(faults, &was[i], tick, 1, "cleared");
-        ends = 1;
+        if (!was[i].active || find(faults->fault, n_there, was[i].number) != NULL) continue;
+        if (faults->n == 2 * FAULT_MAX) break; /* can't be: what was taken out before has ended since */
+        faults->fault[faults->n] = was[i];
+        faults->fault[faults->n++].cleared = 1;
     }
-    return ends;
 }
 
 static int is_active(const struct head_faults *faults, const struct head_fault *f, const struct head_faults_tick *tick)
 {
+    if (f->cleared) return 0;
+    if (f->times != 0 && (HEAD_FAULT(f->fault.kind) & HEAD_FAULTS_ONCE) != 0)
+        return f->active && tick->t_ns < round_up(faults, f->begin_ns + llround(1e6 * f->fault.for_ms));
     if (f->from_ns >= tick->t_ns + faults->tick_ns || f->until_ns <= tick->t_ns) return 0;
     if (f->fault.from_pulse == 0 && f->fault.until_pulse == UINT64_MAX) return 1;
     return tick->has_pulses && tick->pulse0 <= f->fault.until_pulse &&
@@ -93,7 +96,23 @@ static int is_active(const struct head_faults *faults, const struct head_fault *
 static int64_t at_ns(const struct head_faults_tick *tick, const struct head_fault *f)
 {
     if (f->begins) return f->from_ns > tick->t_ns ? f->from_ns : tick->t_ns;
-    return f->until_ns < tick->t_ns ? f->until_ns : tick->t_ns;
+    const int by_time = !f->cleared && (HEAD_FAULT(f->fault.kind) & HEAD_FAULTS_ONCE) == 0;
+    return by_time && f->until_ns < tick->t_ns ? f->until_ns : tick->t_ns;
+}
+
+/* Notes that it begins, or ends. Jumps and leap seconds have no end. */
+static void say(struct head_faults *faults, struct head_fault *f, const struct head_faults_tick *tick)
+{
+    struct head_faults_tick at = *tick;
+    at.t_ns = at_ns(tick, f);
+    if (f->begins) {
+        f->begin_ns = at.t_ns;
+        f->times++;
+        f->n = 0;
+        f->undone = 0;
+    }
+    if (f->ends && (f->fault.kind == FAULT_CLOCK_JUMP || f->fault.kind == FAULT_LEAP_SECOND)) return;
+    note(faults, f, &at, f->ends, f->cleared ? "cleared" : NULL);
 }
 
 int head_faults_step(struct head_faults *faults, uint64_t kinds, const struct head_faults_tick *tick)
@@ -101,7 +120,7 @@ int head_faults_step(struct head_faults *faults, uint64_t kinds, const struct he
     const uint32_t version = fault_board_version(faults->board);
     int any = 0;
     if (version == 0) return 0;
-    if (version != faults->version) any = renew(faults, tick);
+    if (version != faults->version) renew(faults);
     for (uint32_t i = 0; i < faults->n; i++) {
         struct head_fault *f = &faults->fault[i];
         if ((HEAD_FAULT(f->fault.kind) & kinds) == 0) continue;
@@ -110,20 +129,15 @@ int head_faults_step(struct head_faults *faults, uint64_t kinds, const struct he
         f->ends = !active && f->active;
         f->active = active;
         any |= active || f->ends;
-        if (!f->begins && !f->ends) continue;
-        struct head_faults_tick at = *tick;
-        at.t_ns = at_ns(tick, f);
-        if (f->begins) f->begin_ns = at.t_ns;
-        if (f->begins) f->n = 0;
-        note(faults, f, &at, f->ends, NULL);
+        if (f->begins || f->ends) say(faults, f, tick);
     }
     return any;
 }
 
-const struct head_fault *head_faults_next(const struct head_faults *faults, enum fault_kind kind,
-                                          const struct head_fault *before)
+struct head_fault *head_faults_next(struct head_faults *faults, enum fault_kind kind, const struct head_fault *before)
 {
-    for (const struct head_fault *f = before != NULL ? before + 1 : faults->fault; f < faults->fault + faults->n; f++)
+    struct head_fault *f = before != NULL ? &faults->fault[before - faults->fault + 1] : faults->fault;
+    for (; f < faults->fault + faults->n; f++)
         if (f->fault.kind == kind && f->active) return f;
     return NULL;
 }
@@ -133,6 +147,6 @@ struct head_fault *head_faults_at(struct head_faults *faults, enum fault_kind ki
 {
     struct head_fault *f = before != NULL ? &faults->fault[before - faults->fault + 1] : faults->fault;
     for (; f < faults->fault + faults->n; f++)
-        if (f->fault.kind == kind && f->from_ns <= t_ns && t_ns < f->until_ns) return f;
+        if (f->fault.kind == kind && !f->cleared && f->from_ns <= t_ns && t_ns < f->until_ns) return f;
     return NULL;
 }

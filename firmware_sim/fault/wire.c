@@ -15,7 +15,9 @@ struct wire *wire_create(const struct wire_spec *spec)
     if (wire == NULL) return NULL;
     wire->spec = *spec;
     wire->heard.has_lines = spec->native;
-    if (grow(&wire->unit, &wire->unit_room, spec->max_unit, 1)) return wire;
+    if (grow(&wire->unit, &wire->unit_room, spec->max_unit, 1) &&
+        grow(&wire->mask, &wire->mask_room, spec->max_unit, 1))
+        return wire;
     wire_free(wire);
     return NULL;
 }
@@ -26,6 +28,7 @@ void wire_free(struct wire *wire)
     wire_queue_clear(&wire->queue);
     wire_heard_free(&wire->heard);
     free(wire->unit);
+    free(wire->mask);
     free(wire->last_reply);
     free(wire);
 }
@@ -58,8 +61,8 @@ static int is_act(enum fault_kind kind)
 
 enum { LAST_RANK = 4 };
 
-/* When it has its turn at a frame. */
-static int rank_of(const struct fault *f)
+/* When it has its turn at a frame. A datagram that is damaged on its way is dropped by its reader's system. */
+static int rank_of(const struct wire *wire, const struct fault *f)
 {
     switch (f->kind) {
     case FAULT_DISCONNECT:
@@ -72,7 +75,7 @@ static int rank_of(const struct fault *f)
     case FAULT_TRUNCATE:
         return 2;
     case FAULT_FLIP:
-        return f->reseal ? 3 : LAST_RANK;
+        return f->reseal ? 3 : wire->spec.datagrams ? 1 : LAST_RANK;
     default:
         return LAST_RANK;
     }
@@ -90,7 +93,6 @@ static int concerns(struct wire *wire, struct wire_fault *fault, int of)
 {
     const struct fault *f = &fault->entry.fault;
     if (is_act(f->kind) && (wire->spec.acts & UINT32_C(1) << (f->kind - FAULT_DISCONNECT)) == 0) return 0;
-    if (f->kind == FAULT_FLIP && f->reseal && wire->spec.reseal == NULL) return 0;
     if (f->count != 0 && *hits_of(wire, fault) >= f->count) return 0;
     return fault_place_of(f->kind) == FAULT_AT_REPLY  ? of == FAULT_OF_REPLIES
            : fault_place_of(f->kind) == FAULT_AT_FRAME ? of == f->of
@@ -127,7 +129,7 @@ static int change_all(struct wire *wire, struct wire_making *making)
     pass_over_old(wire, making);
     for (int rank = 0; rank <= LAST_RANK; rank++)
         for (uint32_t i = 0; i < wire->n_faults && rc == SH_OK && !wire->is_over; i++)
-            if (rank_of(&wire->fault[i].entry.fault) == rank) rc = change(wire, &wire->fault[i], making);
+            if (rank_of(wire, &wire->fault[i].entry.fault) == rank) rc = change(wire, &wire->fault[i], making);
     return rc;
 }
 
@@ -248,7 +250,8 @@ int wire_put(struct wire *wire, const struct wire_item *given, int64_t now_ns)
     if (wire->version != fault_board_version(wire->spec.board)) wire_renew(wire, 0);
     look_at(wire, &item, &making);
     int rc = item.of != FAULT_OF_REPLIES && !wire->is_over ? wire_time(wire, making.spot.t_ns) : SH_OK;
-    if (!grow(&wire->unit, &wire->unit_room, item.len, 1)) rc = SH_ENOMEM;
+    if (!grow(&wire->unit, &wire->unit_room, item.len, 1) || !grow(&wire->mask, &wire->mask_room, item.len, 1))
+        rc = SH_ENOMEM;
     if (rc == SH_OK) memcpy(wire->unit, item.bytes, item.len);
     if (rc == SH_OK && !wire->is_over) rc = change_all(wire, &making);
     if (rc != SH_OK || wire->is_over) {

@@ -111,38 +111,60 @@ static int cut(struct change *c)
     return 1;
 }
 
-/* n bits of those from `begin` on: the first is anywhere, the others follow it, round and round. A bit that another
- * fault has changed already is passed over, since it would be right again. Returns how many. */
-static uint64_t flip_bits(struct change *c, uint64_t begin, uint64_t n_bits, uint64_t n)
+/* Into the wire's mask: the bits that may change. Those that another fault has changed already are not among them: they
+ * would be right again. Returns how many. */
+static uint64_t mark_bits(const struct change *c)
 {
-    uint8_t *bytes = c->wire->unit;
-    const uint8_t *before = c->making->item->bytes;
-    const uint64_t first = draw_below(c, DRAW_BYTES, n_bits);
-    uint64_t done = 0;
-    for (uint64_t i = 0; i < n_bits && done < n; i++) {
-        const uint64_t at = begin + (first + i) % n_bits;
-        const uint8_t bit = (uint8_t)(1U << at % 8);
-        if (((bytes[at / 8] ^ before[at / 8]) & bit) != 0) continue;
-        bytes[at / 8] ^= bit;
-        if (done++ != 0) continue;
-        c->note.byte = (int64_t)(at / 8);
-        c->note.bit = (uint32_t)(at % 8);
+    const struct fault *f = &c->fault->entry.fault;
+    const struct wire *wire = c->wire;
+    const size_t len = c->making->len;
+    const int all = !f->reseal || wire->spec.content == NULL;
+    uint64_t n = 0;
+    memset(wire->mask, all ? 0xff : 0, len);
+    if (!all) wire->spec.content(wire->unit, len, wire->mask);
+    for (size_t i = 0; i < len; i++) {
+        wire->mask[i] &= (uint8_t)~(wire->unit[i] ^ c->making->item->bytes[i]);
+        if (f->byte >= 0 && (uint64_t)f->byte != i) wire->mask[i] = 0;
+        n += (uint64_t)__builtin_popcount(wire->mask[i]);
     }
-    return done;
+    return n;
 }
 
-/* With reseal the bits of a native frame are in its payload: what its header says of length and numbers stays true. */
+/* Bit k of those that may change; there are more. */
+static uint64_t find_bit(const uint8_t *mask, uint64_t k)
+{
+    uint64_t at = 0;
+    for (; k >= (uint64_t)__builtin_popcount(mask[at / 8]); at += 8)
+        k -= (uint64_t)__builtin_popcount(mask[at / 8]);
+    for (;; at++) {
+        const int may = mask[at / 8] >> at % 8 & 1;
+        if (may && k == 0) return at;
+        k -= (uint64_t)may;
+    }
+}
+
+/* Of n bits the first is anywhere, the others follow it, round and round. A datagram that is damaged on its way is
+ * dropped by the system of its reader; with reseal it was wrong before it was sent. */
 static int flip(struct change *c)
 {
     const struct fault *f = &c->fault->entry.fault;
-    const size_t len = c->making->len, from = f->reseal && c->wire->spec.native ? NATIVE_HEADER_LEN : 0;
     if (f->reseal && c->making->is_cut) return 0; /* nothing makes it right */
-    if (f->byte >= 0 ? (uint64_t)f->byte < from || (uint64_t)f->byte >= len : len <= from) return 0;
-    const uint64_t begin = 8 * (f->byte >= 0 ? (uint64_t)f->byte : from), n_bits = f->byte >= 0 ? 8 : 8 * (len - from);
-    c->note.n = flip_bits(c, begin, n_bits, fault_n(f));
-    if (c->note.n == 0) return 0;
-    if (f->reseal) c->wire->spec.reseal(c->wire->unit, len);
+    const uint64_t n_bits = mark_bits(c), n = n_bits < fault_n(f) ? n_bits : fault_n(f);
+    if (n == 0) return 0;
+    uint64_t k = draw_below(c, DRAW_BYTES, n_bits);
+    const uint64_t first = find_bit(c->wire->mask, k);
+    c->note.byte = (int64_t)(first / 8);
+    c->note.bit = (uint32_t)(first % 8);
+    c->note.n = n;
+    for (uint64_t done = 0; done < n; done++, k = (k + 1) % n_bits) {
+        const uint64_t at = find_bit(c->wire->mask, k);
+        c->wire->unit[at / 8] ^= (uint8_t)(1U << at % 8);
+    }
+    if (f->reseal && c->wire->spec.reseal != NULL) c->wire->spec.reseal(c->wire->unit, c->making->len);
     if (f->reseal) strcpy(c->note.text, "resealed");
+    if (f->reseal || !c->wire->spec.datagrams) return 1;
+    c->making->is_dropped = 1;
+    strcpy(c->note.text, "not sent: its UDP checksum would be wrong");
     return 1;
 }
 

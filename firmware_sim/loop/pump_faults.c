@@ -46,6 +46,8 @@ int session_has_wire(struct pump *pump, struct session *s)
         .max_unit = native ? NATIVE_MAX_FRAME : pump->protocol->max_unit,
         .units = !native,
         .native = native,
+        .datagrams = pump->ops->datagrams,
+        .content = pump->protocol->content,
         .reseal = pump->protocol->reseal,
         .acts = pump->can,
         .tally = &pump->tally,

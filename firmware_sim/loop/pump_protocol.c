@@ -109,13 +109,14 @@ static void greet(struct pump *pump, struct session *s)
     give_frames(pump->protocol, s, frames, len);
 }
 
-int session_open_protocol(struct pump *pump, struct session *s)
+static int create(struct pump *pump, struct session *s)
 {
     struct protocol_spec spec = {
         .identity = &pump->links->identity,
         .host = {s, host_send, host_command, host_utc_ns, host_fix, host_count, host_hang_up, host_next_fix_ns},
         .session = s->id,
         .fixes_hz = pump->links->fixes_hz,
+        .near_wrap = device_near_wrap(pump->links->device),
         .waits = pump->stream->waits,
         .port = pump->links->data_port,
     };
@@ -125,8 +126,21 @@ int session_open_protocol(struct pump *pump, struct session *s)
     s->hang_up = 0;
     if (s->units.bytes == NULL && unit_queue_create(&s->units, pump->out_cap) != SH_OK) return SH_ENOMEM;
     unit_queue_clear(&s->units);
-    int rc = pump->protocol->create(&spec, &s->protocol, &err);
+    return pump->protocol->create(&spec, &s->protocol, &err);
+}
+
+int session_open_protocol(struct pump *pump, struct session *s)
+{
+    const int rc = create(pump, s);
     if (rc == SH_OK) greet(pump, s);
+    return rc;
+}
+
+int session_restart_protocol(struct pump *pump, struct session *s)
+{
+    session_close_protocol(pump, s);
+    const int rc = create(pump, s);
+    if (rc == SH_OK) pump->protocol->open(s->protocol, time_of(pump, s->cursor));
     return rc;
 }
 
@@ -149,11 +163,14 @@ static int take_tick(struct pump *pump, struct session *s)
     struct ring *ring = &pump->stream->ring;
     const struct protocol_ops *ops = pump->protocol;
     struct ring_copy tick = {.buf = pump->tick, .cap = pump->stream->tick_bytes};
+    const uint64_t off_tick = session_off_tick(pump, s);
+    if (s->cursor >= off_tick) return 0;
     enum ring_read got = ring_read(ring, s->reader, s->cursor, &tick);
     if (got == RING_NONE || (got == RING_READ && tick.len > tick.cap)) return 0;
     uint64_t released = stream_released(pump->stream);
     if (got == RING_LOST && s->cursor + ring->queue_ticks < released) {
         s->cursor = released - ring->queue_ticks / 2; /* what was lost, the next tick's number says */
+        if (s->cursor > off_tick) s->cursor = off_tick;
         return 1;
     }
     if (got == RING_LOST && ops->gap != NULL) ops->gap(s->protocol, 1); /* the head could not compute it */

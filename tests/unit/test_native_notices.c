@@ -200,6 +200,16 @@ static void check_cut_later(void)
     assert_int_equal(parser.stats.bad_payload, 2);
 }
 
+static void check_hidden(void)
+{
+    assert_int_equal(n_noticed, 2);
+    expect(0, NATIVE_BAD_PAYLOAD, at[1], 6, 40);
+    expect(1, NATIVE_GAP, at[2], 6, 1);
+    assert_int_equal(n_got, 2);
+    assert_int_equal(parser.stats.bad_payload, 1);
+    assert_int_equal(parser.stats.cuts, 0);
+}
+
 static void check_garbage_at_end(void)
 {
     assert_int_equal(n_noticed, 1);
@@ -231,6 +241,15 @@ static void test_end(void **state)
     at[4] = put(9, 0);
     n_bytes = at[4] + 10;
     in_all_pieces(check_cut_later);
+    /* a frame whose length reaches beyond the end, and a whole one within it */
+    n_bytes = 0;
+    put(5, 0);
+    at[1] = put(6, 0);
+    at[2] = n_bytes = at[1] + 40;
+    memset(bytes + at[2], 0, NATIVE_HEADER_LEN);
+    memcpy(bytes + at[2], (uint8_t[]){NATIVE_SYNC, 200, NATIVE_VERSION}, 3);
+    n_bytes += native_seal(bytes + at[2], 7);
+    in_all_pieces(check_hidden);
     n_bytes = 0;
     put(5, 0);
     at[1] = put_text("\x01\x02\xd5\x01");
