@@ -1,5 +1,7 @@
 #include "tests/unit/wire_rig.h"
 
+#include "drivers/protocol/protocol.h"
+
 struct rig rig;
 
 struct fault fault_of_kind(enum fault_kind kind)
@@ -40,6 +42,7 @@ void rig_open(const struct fault *fault, uint32_t n, int native)
                                    .max_unit = 64,
                                    .units = !native,
                                    .native = native,
+                                   .content = native ? protocol_ops_get(PROTOCOL_NATIVE)->content : NULL,
                                    .reseal = native ? native_reseal : reseal_sum,
                                    .acts = UINT32_MAX};
     rig.wire = wire_create(&spec);
