@@ -51,7 +51,7 @@ static const struct {
     int needs_ms;
 } kinds[FAULT_N_KINDS] = {
     [FAULT_DUPLICATE] = {"n", 100, 0},
-    [FAULT_REORDER] = {"n", 10000, 0},
+    [FAULT_REORDER] = {"n", 1000, 0},
     [FAULT_DELAY] = {"for_ms", 0, 1},
     [FAULT_JITTER] = {"for_ms", 0, 1},
     [FAULT_TRUNCATE] = {"n", 1e6, 0},
@@ -161,9 +161,8 @@ void cfg_check_fault_links(struct cfg_reader *rd, const struct config *cfg, cons
 
 int config_link_has_fault(const struct link_spec *link, enum fault_kind kind)
 {
-    const struct link_ops *ops = link_ops_get(link->type);
     const int is_of_link = kind >= FAULT_DISCONNECT && kind <= FAULT_DESCRIPTOR_LENGTH;
-    return !is_of_link || (ops != NULL && (ops->faults & UINT32_C(1) << (kind - FAULT_DISCONNECT)) != 0);
+    return !is_of_link || (link_faults(link) & LINK_FAULT_BIT(kind - FAULT_DISCONNECT)) != 0;
 }
 
 static int read_list(struct cfg_reader *rd, const struct config *cfg, struct fault_list *list)
@@ -171,6 +170,7 @@ static int read_list(struct cfg_reader *rd, const struct config *cfg, struct fau
     cfg_fill_defaults(rd, NULL);
     cfg_check_faults(rd, list);
     cfg_check_fault_links(rd, cfg, list);
+    cfg_check_fault_beams(rd, cfg, list);
     return rd->faults->n == 0 ? SH_OK : rd->faults->fault[0].code;
 }
 

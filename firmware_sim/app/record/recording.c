@@ -85,7 +85,7 @@ static int has_lost_frames(const struct recording *r)
 {
     struct scanhead_stats stats;
     scanhead_get_stats(r->sh, &stats);
-    return stats.seq_lost + stats.reader_lost + stats.dropped != 0;
+    return stats.seq_lost + stats.reader_lost + stats.dropped + stats.restarts != 0;
 }
 
 static void count_pulses(struct recording *r, const struct scanhead_frame *frame)
