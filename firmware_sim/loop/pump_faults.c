@@ -110,6 +110,7 @@ static int carry_out(struct pump *pump, struct session *s, int index, const stru
     const double for_ms = act->for_ms;
     const int rc = pump->ops->fault(pump->link, what, index, act->n, for_ms);
     wire_pop(s->wire);
+    if (what == LINK_FAULT_BUS_RESET) pump->plug_ns = in_ms(0.0); /* where it takes unplugging, and plugging in fails */
     if (rc != SH_OK) {
         char text[96];
         snprintf(text, sizeof text, "the fault %s could not be carried out now", fault_names[kind]);
