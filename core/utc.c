@@ -66,6 +66,20 @@ int utc_table_parse(const char *text, struct utc_table *out, struct sh_err *err)
     return SH_OK;
 }
 
+int utc_table_add(struct utc_table *table, int64_t posix_s)
+{
+    uint32_t i = table->n;
+    if (table->n == UTC_MAX_LEAPS) return 0;
+    while (i > 1 && table->leap[i - 1].posix_s > posix_s)
+        i--;
+    if (table->leap[i - 1].posix_s == posix_s) return 0;
+    memmove(&table->leap[i + 1], &table->leap[i], (table->n++ - i) * sizeof table->leap[0]);
+    table->leap[i] = (struct utc_leap){posix_s, table->leap[i - 1].tai_minus_utc + 1};
+    while (++i < table->n)
+        table->leap[i].tai_minus_utc++;
+    return 1;
+}
+
 /* ---- dates of the Gregorian calendar */
 
 static int64_t days_since_1970(int year, int month, int day)

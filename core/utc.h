@@ -46,6 +46,8 @@ const struct utc_table *utc_table_builtin(void);
 /* The text of a leap-seconds.list (IERS, NIST, tzdata): NTP seconds and TAI-UTC, `#@` the expiry. On failure
  * out is unspecified; the error names the line. */
 int utc_table_parse(const char *text, struct utc_table *out, struct sh_err *err);
+/* Adds a leap second before this POSIX second, the full minute or not. 0: there is one already, or the table is full. */
+int utc_table_add(struct utc_table *table, int64_t posix_s);
 
 void utc_from_tai(const struct utc_table *table, int64_t tai_ns, struct utc_time *out);
 /* SH_EINPUT for a date outside 1972..2199, a date or time of day that does not exist, or a second 60 where

@@ -70,6 +70,7 @@ enum command_error {
     CMD_E_PROTECTED = -203, /* another session has control */
     CMD_E_SETTINGS = -221,  /* conflicts with the state or another setting */
     CMD_E_RANGE = -222,
+    CMD_E_SELF_TEST = -330,
     CMD_E_QUEUE = -350,
     CMD_E_OVERRUN = -363,
     /* the device's own, positive (SCPI-99 21.8.2) */
@@ -104,8 +105,10 @@ struct command_faults {
     /* "{kind: drop, every: 10}". Returns 0 and its number, or -1 and why not. */
     int (*add)(void *owner, const char *text, uint32_t *number, char *why, size_t len);
     uint32_t (*remove)(void *owner, uint32_t number);   /* 0: all. Returns how many */
-    uint64_t (*injected)(void *owner, uint32_t number); /* so far; 0: all together */
-    void (*list)(void *owner, char *text, size_t len);  /* "1 drop, 2 flip"; empty: none */
+    /* How often so far; 0: all together. Returns 0, or -1: there never was one of that number. */
+    int (*injected)(void *owner, uint32_t number, uint64_t *n);
+    /* "1 drop, 2 flip"; empty: none. What has no room is counted at the end: ", and 3 more". */
+    void (*list)(void *owner, char *text, size_t len);
 };
 
 /* The device as the command set sees it. The loop keeps it up to date. */
@@ -121,6 +124,7 @@ struct command_device {
     struct head_settings settings; /* as they are now; a refused command leaves them */
     struct head_settings defaults; /* what *RST restores */
     enum head_state state;
+    const char *why_fault; /* why the state is fault, and what ends it; NULL: not known */
     struct command_queue queue;
     uint32_t control;      /* session that may change things; 0: none, the next one that does takes it */
     uint64_t frames_done;  /* of the scan at hand or the last one */

@@ -169,9 +169,10 @@ static int act_release(struct command_call *call)
 static int act_event(struct command_call *call, enum command_effect effect)
 {
     const enum head_event event = (enum head_event)(call->row->event - 1);
+    const char *why = call->dev->state == HEAD_FAULT ? call->dev->why_fault : NULL;
     if (head_next_state(call->dev->state, event) < 0)
-        return command_fail(call, CMD_E_SETTINGS, "%s is not possible in state %s", call->row->header,
-                            head_state_name(call->dev->state));
+        return command_fail(call, CMD_E_SETTINGS, "%s is not possible in state %s%s%s", call->row->header,
+                            head_state_name(call->dev->state), why != NULL ? ": " : "", why != NULL ? why : "");
     call->out->effect = effect;
     return command_reply(call, "OK");
 }

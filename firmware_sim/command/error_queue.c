@@ -17,6 +17,7 @@ static const struct {
     {CMD_E_PROTECTED, "Command protected"},
     {CMD_E_SETTINGS, "Settings conflict"},
     {CMD_E_RANGE, "Data out of range"},
+    {CMD_E_SELF_TEST, "Self-test failed"},
     {CMD_E_QUEUE, "Queue overflow"},
     {CMD_E_OVERRUN, "Input buffer overrun"},
     {CMD_E_CLIENT_LOST, "Client lost"},

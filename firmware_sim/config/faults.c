@@ -51,7 +51,7 @@ static const struct {
     int needs_ms;
 } kinds[FAULT_N_KINDS] = {
     [FAULT_DUPLICATE] = {"n", 100, 0},
-    [FAULT_REORDER] = {"n", 10000, 0},
+    [FAULT_REORDER] = {"n", 1000, 0},
     [FAULT_DELAY] = {"for_ms", 0, 1},
     [FAULT_JITTER] = {"for_ms", 0, 1},
     [FAULT_TRUNCATE] = {"n", 1e6, 0},
@@ -136,11 +136,20 @@ void cfg_check_faults(struct cfg_reader *rd, struct fault_list *list)
     }
 }
 
+static int needs_time(enum fault_kind kind)
+{
+    return kind == FAULT_CLOCK_JUMP || kind == FAULT_CLOCK_DRIFT || kind == FAULT_CLOCK_STOP ||
+           kind == FAULT_PPS_LOST || kind == FAULT_LEAP_SECOND;
+}
+
 void cfg_check_fault_links(struct cfg_reader *rd, const struct config *cfg, const struct fault_list *list)
 {
     for (uint32_t i = 0; i < list->n; i++) {
         const struct fault *f = &list->fault[i];
         if (!CFG_SOUND(rd, i, "faults[].kind", "faults[].link")) continue;
+        if (needs_time(f->kind) && (cfg->time.epoch[0] == '\0' || strcmp(cfg->time.epoch, "none") == 0))
+            cfg_fail_key(rd, "faults[].kind", i, "%s needs a time of day; allowed where time.epoch is not none",
+                         fault_names[f->kind]);
         if (f->link > cfg->n_links)
             cfg_fail_key(rd, "faults[].link", i, "there is no link %u; allowed 0 to %u", f->link, cfg->n_links);
         else if (f->link != 0 && fault_place_of(f->kind) != FAULT_AT_MOMENT &&
@@ -161,16 +170,21 @@ static int read_list(struct cfg_reader *rd, const struct config *cfg, struct fau
     cfg_fill_defaults(rd, NULL);
     cfg_check_faults(rd, list);
     cfg_check_fault_links(rd, cfg, list);
+    cfg_check_fault_beams(rd, cfg, list);
     return rd->faults->n == 0 ? SH_OK : rd->faults->fault[0].code;
 }
 
-int config_add_scenario(struct config *cfg, const char *path, struct config_faults *faults)
+int config_add_scenario(struct config *cfg, const char *name, struct config_faults *faults)
 {
     struct cfg_reader rd;
+    char path[CONFIG_PATH_LEN], known[512];
     struct fault_list *list = calloc(1, sizeof *list);
     memset(faults, 0, sizeof *faults);
-    cfg_reader_init(&rd, path, &fault_table, list, faults);
-    int code = list == NULL ? cfg_fail_file(&rd, SH_ENOMEM, 0, "no memory") : cfg_read_file(&rd);
+    const int is_there = cfg_find_scenario(name, path);
+    cfg_reader_init(&rd, is_there ? path : name, &fault_table, list, faults);
+    config_name_scenarios(known, sizeof known);
+    int code = !is_there    ? cfg_fail_file(&rd, SH_EINPUT, 0, "no such scenario; allowed a file, as a path, or %s", known)
+               : list == NULL ? cfg_fail_file(&rd, SH_ENOMEM, 0, "no memory") : cfg_read_file(&rd);
     if (code == SH_OK) code = read_list(&rd, cfg, list);
     if (code == SH_OK && list->n == 0) code = cfg_fail_file(&rd, SH_EINPUT, 0, "no faults; a scenario is a list of them");
     if (code == SH_OK && cfg->faults.n + list->n > FAULT_MAX)

@@ -198,6 +198,9 @@ void cfg_fill_defaults(struct cfg_reader *rd, const struct config_profile *profi
 int cfg_shared_path(int i, const char *name, char *buf);
 /* The first of these places that has it; 0: none. */
 int cfg_find_shared(const char *name, char *buf);
+/* The file of a scenario: a path (with a slash, or an ending), or the name of one that comes with the program. buf holds
+ * CONFIG_PATH_LEN. 0: there is none of that name. */
+int cfg_find_scenario(const char *name, char *buf);
 /* A figure of a profile that is written in 1e-6 units. */
 int64_t cfg_figure(const struct config_profile *profile, const char *path);
 double cfg_real_figure(const struct config_profile *profile, const char *path);
@@ -246,6 +249,8 @@ void cfg_check_platform(struct cfg_reader *rd, struct config *cfg);
 /* faults.c: faults on request, with each other; and with the links of cfg. */
 void cfg_check_faults(struct cfg_reader *rd, struct fault_list *list);
 void cfg_check_fault_links(struct cfg_reader *rd, const struct config *cfg, const struct fault_list *list);
+/* fault_beam.c: the faults with the head, its noise and its signal. */
+void cfg_check_fault_beams(struct cfg_reader *rd, const struct config *cfg, const struct fault_list *list);
 /* link_protocol.c: what the protocols of links need. */
 void cfg_check_link_protocols(struct cfg_reader *rd, struct config *cfg);
 /* Whether the protocol has words for a head of this emitter. */

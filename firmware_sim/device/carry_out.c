@@ -1,5 +1,6 @@
 /* Commands: carried out, written to the journal, and replayed from one. */
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "firmware_sim/device/device_state.h"
@@ -8,7 +9,7 @@ static void change_settings(struct device *device)
 {
     if (!device->scan.on) return;
     struct schedule_spec spec;
-    site_fill_spec(device->scan.site, &device->cmd.settings, &spec);
+    device_fill_spec(device, device->scan.site, &spec);
     schedule_change(&device->scan.segment, &device->scan.segment, &spec, device->scan.pulse_next);
     device->scan.describe = 1;
     device_push_event(device, NATIVE_EV_SETTINGS, device->scan.pulse_next, 0, 0, "");
@@ -56,6 +57,23 @@ static const char *why_fixed(const struct device *device, uint32_t session)
     return session != 0 && replays ? "a journal is being replayed" : site_why_fixed(device->site);
 }
 
+/* What a session says while power is gone. The old sessions are cut off when that is released, and get no answer more.
+ * New ones, as the pace step has them, may ask, and let time pass. */
+static void do_dead(struct device *device, uint32_t session, const char *line, uint64_t released,
+                    struct command_result *out)
+{
+    memset(out, 0, sizeof *out);
+    if (released < device->power.off_tick) return;
+    struct command_device *cmd = malloc(sizeof *cmd);
+    if (cmd == NULL) return;
+    *cmd = device->cmd;
+    cmd->faults = NULL; /* they are the device's own, and would change */
+    command_execute(cmd, session, line, out);
+    if (out->changes && out->effect != COMMAND_STEP) command_refuse(cmd, CMD_E_SETTINGS, "the head has no power", out);
+    out->took_control = 0;
+    free(cmd);
+}
+
 /* once: the session does not keep control. */
 static void do_command(struct device *device, uint32_t session, const char *line, uint64_t released, int once,
                        struct command_result *out)
@@ -65,6 +83,10 @@ static void do_command(struct device *device, uint32_t session, const char *line
     cmd->t_ns = (int64_t)released * device->tick_ns;
     cmd->fixed = why_fixed(device, session);
     device_set_time_texts(device);
+    if (session != 0 && device_is_dead(device, released)) {
+        do_dead(device, session, line, released, out);
+        return;
+    }
     command_execute(cmd, session, line, out);
     if (out->took_control && once)
         cmd->control = 0;

@@ -176,7 +176,7 @@ int device_create(const struct site *site, const struct device_options *options,
     }
     if (site->cfg->loop.pace == PACE_REALTIME && options->replay != NULL) device_plan_ahead(device);
     device_before_scans(device);
-    device_transition(device, HEAD_EV_POWER_ON, 0);
+    device_first_power(device);
     *out = device;
     return SH_OK;
 }
@@ -251,11 +251,15 @@ int device_claim(struct device *device, struct device_work *work)
     work->tick = tick;
     work->t_ns = (int64_t)tick * device->tick_ns;
     replay(device, tick);
+    device_run_faults(device, tick, work);
     device_use_site(device, work);
     device_run_timers(device, tick);
-    device_say_overrun(device, tick);
-    device_say_held(device, tick);
-    device_say_pps(device, tick);
+    const int off = device->machine.state == HEAD_OFF;
+    if (!off) {
+        device_say_overrun(device, tick);
+        device_say_held(device, tick);
+        device_say_pps(device, tick);
+    }
     const int repeated = device_is_repeated(device, tick);
     if (repeated) device_say_time(device, tick); /* who joins now knows it before the first point */
     device_take_events(device, work);
@@ -264,7 +268,7 @@ int device_claim(struct device *device, struct device_work *work)
         device_claim_scan(device, tick, work);
     else if (repeated)
         device_describe(device, work);
-    work->telemetry = tick % device->tick_hz == 0;
+    work->telemetry = tick % device->tick_hz == 0 && !off;
     if (work->telemetry || ends_scan(work)) device_fill_telemetry(device, tick, &work->telemetry_frame);
     int told = device->ending || tick >= device->end_tick; /* to end; else the one scan was over in this tick */
     if (!was_over && (told || device->over)) device->journal.end_tick = told ? tick : tick + 1;

@@ -38,6 +38,17 @@ struct device_counters {
     _Atomic uint64_t late_poses, bad_poses;
 };
 
+/* What becomes of the power in a tick. */
+enum device_power_change { DEVICE_POWER_STAYS, DEVICE_POWER_GOES, DEVICE_POWER_COMES };
+
+/* What faults do to the beam in a tick. */
+struct device_upset {
+    int on;            /* 0: nothing, and the rest is not set */
+    int stuck;         /* the mirror, or the rotor, stands at stuck_turn */
+    double stuck_turn; /* turns */
+    struct cast_upset cast;
+};
+
 /* What one tick consists of. All members are copies, so that no thread waits for another. Frames leave in the
  * order of the members. */
 struct device_work {
@@ -60,6 +71,8 @@ struct device_work {
     struct device_variant *variant; /* NULL: that of the version */
     int64_t scan_t0_ns;             /* device time of the scan's start */
     struct schedule_segment segment;
+    int64_t prr_uhz; /* as it is set */
+    struct device_upset upset; /* of all its pulses */
     uint32_t scan;              /* its number */
     uint64_t pulse0, pulse_end; /* pulses of this tick */
     uint64_t n_cast, cast0;     /* of these, how many are cast, and the first of them; UINT64_MAX: none */
@@ -70,6 +83,7 @@ struct device_work {
     uint32_t echoes;       /* enum beam_select */
     uint32_t n_poses;      /* live: the head's poses of this tick; 0: the head stands still or follows a trajectory */
     struct pose_knot pose[DEVICE_MAX_POSES];
+    enum device_power_change power; /* with the tick's start. While it is off the head says nothing but that it is */
     int telemetry; /* due at the tick's end; it goes before each SCAN_END, too */
     struct native_telemetry telemetry_frame;
 };
@@ -176,11 +190,14 @@ void device_report(struct device *device, int number, const char *text);
 int device_power_up(struct device *device, int64_t now_ns, const char **warning, struct sh_err *err);
 
 /* UTC by the head's clock at a device time, ns since 1970; INT64_MIN: not known. */
-int64_t device_utc_ns(const struct device *device, int64_t t_ns);
+int64_t device_utc_ns(struct device *device, int64_t t_ns);
 /* The GNSS receiver (gnss.h): device time of its first fix at or after t_ns, INT64_MAX where it has none; and its last
  * fix at or before t_ns, where the head is. 0: there is none. */
 int64_t device_next_fix_ns(const struct device *device, int64_t t_ns);
 int device_fix(struct device *device, int64_t t_ns, struct nmea_fix *fix);
+
+/* Counters begin so many below their wrap, since the last power-up; 0: at 0. */
+uint32_t device_near_wrap(struct device *device);
 
 /* Scans begun so far. */
 uint64_t device_scans(struct device *device);

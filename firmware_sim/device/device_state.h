@@ -8,6 +8,7 @@
 #include "firmware_sim/device/device.h"
 #include "firmware_sim/device/gnss.h"
 #include "firmware_sim/device/head_clock.h"
+#include "firmware_sim/device/head_faults.h"
 
 /* Poses of a live platform. Each tick begins with a pose of the head, made once from the poses that had
  * come. */
@@ -58,6 +59,7 @@ struct device_scan {
     uint64_t pulse_next;            /* next pulse to be claimed */
     uint64_t cast;                  /* of the pulses before, those that are cast */
     struct schedule_segment segment;
+    int64_t prr_uhz, lines_uhz; /* as they are set; a mirror that turns slowly has others in the segment */
     uint32_t station;      /* from 0 */
     uint32_t station_scan; /* which of its scans */
     size_t stretch;        /* of a trajectory: the one of the last pulse that is claimed */
@@ -81,11 +83,32 @@ struct device_errors {
 };
 enum { DEVICE_ERRORS_A_SECOND = 10, DEVICE_MAX_SESSIONS = (CONFIG_MAX_LINKS + 1) * LINK_MAX_SESSIONS };
 
+/* When power went last, and when it came, or will. */
+struct device_power {
+    uint64_t off_tick, on_tick; /* 0: it has always been on */
+    int boot_begins;            /* in the tick at hand */
+    uint32_t near_wrap;         /* counters begin so many below their wrap */
+};
+
 /* What the head could not compute in time, as far as events have said so. */
 struct device_overrun {
     uint64_t ticks_said, pulses_said;
     uint64_t first; /* first lost pulse that no event has named; UINT64_MAX: none */
     uint64_t tick;  /* of the last event */
+};
+
+/* Faults that change what is measured (beam_faults.c). They strike at pulses of the scan that is on. */
+struct device_beam {
+    uint32_t version; /* of the board, that the list is of */
+    uint32_t n;
+    struct device_beam_fault {
+        struct fault_entry entry;
+        int strikes;      /* at the scan's next pulse */
+        int64_t begin_ns; /* its first pulse, since the scan's start */
+        double turn;      /* mirror_stuck: where the mirror, or the rotor, stands */
+    } fault[FAULT_MAX];
+    uint64_t edge;           /* the next pulse at which one begins or ends; UINT64_MAX: none */
+    struct device_upset now; /* what all that strike do together */
 };
 
 /* The journal that is written, and the one that is replayed. */
@@ -142,6 +165,7 @@ struct device {
     uint64_t end_tick;  /* of the run; UINT64_MAX: none */
     int ending, over;
     struct device_machine machine;
+    struct device_power power;
     struct device_scan scan;
     uint32_t *station_scans; /* [n_stations] since power-up */
     struct device_events events;
@@ -151,6 +175,8 @@ struct device {
     struct device_live live;
     struct device_journal journal;
     struct fault_board *faults;
+    struct head_faults head_faults; /* those of the board that are in the head */
+    struct device_beam beam;
     struct device_variant *variants;
 };
 
@@ -236,8 +262,33 @@ int device_head_pose(struct device *device, int64_t t_ns, struct pose *head);
 /* Poses of a live head for the pulses that the work holds. */
 void device_take_poses(struct device *device, struct device_work *work);
 
+/* beam_faults.c */
+/* The schedule of a site's head as it is set, with the rates of its scan; and with what slows its mirror. */
+void device_fill_spec(struct device *device, const struct site *site, struct schedule_spec *spec);
+/* Faults that begin or end at the scan's next pulse do so, where it fires before until_ns of the scan: the segment has
+ * the rates from there on, and the board has notes of it. Sets the next edge. */
+void device_turn_beam(struct device *device, int64_t until_ns);
+/* A scan begins, or is over at a time since its start: none strikes any more. */
+void device_end_beam(struct device *device, int64_t t_ns);
+
 /* device_faults.c */
 int device_open_faults(struct device *device, struct sh_err *err);
+/* Faults of the tick, but those of the beam: what of them begins and ends, and does so at once. */
+void device_run_faults(struct device *device, uint64_t tick, struct device_work *work);
+
+/* power.c */
+void device_first_power(struct device *device);
+/* Power that goes or comes with the tick, and boots that begin with it. */
+void device_run_power(struct device *device, uint64_t tick, struct device_work *work);
+/* The end of a boot is due. 1: the self-test failed, and that is done. */
+int device_end_boot(struct device *device, uint64_t tick);
+/* For who asks as of `released`: power has gone since, or will go before an answer could come, and is not back. */
+int device_is_dead(const struct device *device, uint64_t released);
+
+/* clock_faults.c */
+void device_run_clock_faults(struct device *device, uint64_t tick);
+/* The PPS event of a full second is not to be. */
+int device_loses_pps(struct device *device, int64_t edge_ns);
 
 /* time_of_day.c: the head's clock and the receiver. */
 /* GPS time, ns, of a device time by the head's clock; 0: unknown. */

@@ -41,15 +41,52 @@ static void warn_expired(struct head_clock *clock)
              day);
 }
 
+/* What the pieces from the i-th on are, by their changes. */
+static void renew_pieces(struct head_clock *clock, uint32_t i)
+{
+    for (; i < clock->n; i++) {
+        struct head_clock_piece *p = &clock->piece[i];
+        static const struct head_clock_piece none = {0};
+        const struct head_clock_piece *before = i > 0 ? p - 1 : &none;
+        p->shift_ns = before->shift_ns + p->change.jump_ns;
+        p->gain_ppt = before->gain_ppt + p->change.gain_ppt;
+        p->stands = before->stands + p->change.stands;
+        p->rate_ppt = p->stands > 0 || p->gain_ppt < -PPT ? -PPT : p->gain_ppt;
+        p->gained = before->gained + (head_clock_wide)(p->from_ns - before->from_ns) * before->rate_ppt;
+    }
+}
+
+/* The two oldest pieces become one. */
+static void forget_oldest(struct head_clock *clock)
+{
+    struct head_clock_piece *first = &clock->piece[1];
+    first->change = (struct head_clock_change){first->shift_ns, first->gain_ppt, first->stands};
+    memmove(clock->piece, first, (clock->n - 1) * sizeof *first);
+    clock->n--;
+}
+
+void head_clock_change(struct head_clock *clock, int64_t t_ns, const struct head_clock_change *change)
+{
+    if (clock->n == HEAD_CLOCK_CHANGES) forget_oldest(clock);
+    uint32_t i = clock->n;
+    while (i > 1 && clock->piece[i - 1].from_ns > t_ns)
+        i--;
+    memmove(&clock->piece[i + 1], &clock->piece[i], (clock->n - i) * sizeof clock->piece[0]);
+    clock->piece[i] = (struct head_clock_piece){.from_ns = t_ns, .change = *change};
+    clock->n++;
+    renew_pieces(clock, i);
+}
+
 int head_clock_create(const struct config *cfg, struct head_clock *clock, struct sh_err *err)
 {
+    const struct head_clock_change from_start = {.jump_ns = llround(cfg->time.offset_s * 1e9),
+                                                 .gain_ppt = llround(cfg->time.drift_ppm * 1e6)};
+    const struct head_clock_change later = {.jump_ns = llround(cfg->time.jump_s * 1e9)};
     memset(clock, 0, sizeof *clock);
     choose_table(clock);
     int rc = epoch_parse(cfg->time.epoch, &clock->table, &clock->source, &clock->tai0_ns, err);
-    clock->offset_ns = llround(cfg->time.offset_s * 1e9);
-    clock->drift_ppt = llround(cfg->time.drift_ppm * 1e6);
-    clock->jump_ns = llround(cfg->time.jump_s * 1e9);
-    clock->jump_at_ns = llround(cfg->time.jump_at_s * 1e9);
+    head_clock_change(clock, 0, &from_start);
+    if (later.jump_ns != 0) head_clock_change(clock, llround(cfg->time.jump_at_s * 1e9), &later);
     return rc == SH_OK ? head_clock_power_up(clock, clock_now_ns(), err) : rc;
 }
 
@@ -69,31 +106,51 @@ int64_t head_clock_true_ns(const struct head_clock *clock, int64_t t_ns)
     return clock->tai0_ns + t_ns;
 }
 
-/* Without or with the jump. Rounded down. */
-static int64_t piece_ns(const struct head_clock *clock, int64_t t_ns, int after)
+/* Rounded down. */
+static int64_t piece_ns(const struct head_clock *clock, const struct head_clock_piece *piece, int64_t t_ns)
 {
-    __int128 drift = (__int128)t_ns * clock->drift_ppt;
-    int64_t drift_ns = (int64_t)(drift / PPT) - (drift % PPT < 0);
-    return clock->tai0_ns + t_ns + clock->offset_ns + drift_ns + (after ? clock->jump_ns : 0);
+    const head_clock_wide gained = piece->gained + (head_clock_wide)(t_ns - piece->from_ns) * piece->rate_ppt;
+    const int64_t gained_ns = (int64_t)(gained / PPT) - (gained % PPT < 0);
+    return clock->tai0_ns + t_ns + piece->shift_ns + gained_ns;
 }
 
 int64_t head_clock_ns(const struct head_clock *clock, int64_t t_ns)
 {
-    return piece_ns(clock, t_ns, t_ns >= clock->jump_at_ns);
+    uint32_t i = clock->n - 1;
+    while (i > 0 && t_ns < clock->piece[i].from_ns)
+        i--;
+    return piece_ns(clock, &clock->piece[i], t_ns);
 }
 
-/* The same within one piece. Its clock runs on steadily, so the edge is the first nanosecond that has reached
- * the second, and is found by halving. */
-static int find_edge(const struct head_clock *clock, int64_t from_ns, int64_t to_ns, int after, int64_t *edge_ns,
-                     int64_t *tai_s)
+int head_clock_add_leap(struct head_clock *clock, int64_t t_ns, int64_t *posix_s)
+{
+    const int64_t now_s = utc_posix_from_tai(&clock->table, head_clock_ns(clock, t_ns)) / UTC_SECOND_NS;
+    *posix_s = now_s - now_s % 60 + 60;
+    for (uint32_t i = 0; i < clock->table.n; i++)
+        if (clock->table.leap[i].posix_s == *posix_s) *posix_s += 60;
+    return utc_table_add(&clock->table, *posix_s);
+}
+
+/* What the clock shows a nanosecond before, for an edge at t_ns. A jump is none: there the piece counts as if it had run
+ * before. */
+static int64_t before_ns(const struct head_clock *clock, const struct head_clock_piece *piece, int64_t t_ns)
+{
+    const int begins = t_ns == piece->from_ns && piece != clock->piece && piece->change.jump_ns == 0;
+    return piece_ns(clock, begins ? piece - 1 : piece, t_ns - 1);
+}
+
+/* The same within one piece. Its clock never runs backwards, so the edge is the first nanosecond that has reached the
+ * second, and is found by halving. */
+static int find_edge(const struct head_clock *clock, const struct head_clock_piece *piece, int64_t from_ns,
+                     int64_t to_ns, int64_t *edge_ns, int64_t *tai_s)
 {
     if (from_ns >= to_ns) return 0;
-    int64_t s = piece_ns(clock, to_ns - 1, after) / UTC_SECOND_NS, target_ns = s * UTC_SECOND_NS;
-    if (piece_ns(clock, from_ns - 1, after) >= target_ns) return 0;
+    int64_t s = piece_ns(clock, piece, to_ns - 1) / UTC_SECOND_NS, target_ns = s * UTC_SECOND_NS;
+    if (before_ns(clock, piece, from_ns) >= target_ns) return 0;
     int64_t low_ns = from_ns - 1, high_ns = to_ns - 1; /* before it, and not before it */
     while (high_ns - low_ns > 1) {
         int64_t mid_ns = low_ns + (high_ns - low_ns) / 2;
-        if (piece_ns(clock, mid_ns, after) < target_ns)
+        if (piece_ns(clock, piece, mid_ns) < target_ns)
             low_ns = mid_ns;
         else
             high_ns = mid_ns;
@@ -105,8 +162,12 @@ static int find_edge(const struct head_clock *clock, int64_t from_ns, int64_t to
 
 int head_clock_edge(const struct head_clock *clock, int64_t from_ns, int64_t to_ns, int64_t *edge_ns, int64_t *tai_s)
 {
-    int64_t jump_ns = clock->jump_at_ns;
-    if (jump_ns < from_ns) jump_ns = from_ns;
-    if (jump_ns > to_ns) jump_ns = to_ns;
-    return find_edge(clock, jump_ns, to_ns, 1, edge_ns, tai_s) || find_edge(clock, from_ns, jump_ns, 0, edge_ns, tai_s);
+    int64_t end_ns = to_ns;
+    for (uint32_t i = clock->n; i-- > 0;) {
+        const struct head_clock_piece *piece = &clock->piece[i];
+        const int64_t begin_ns = i > 0 && piece->from_ns > from_ns ? piece->from_ns : from_ns;
+        if (find_edge(clock, piece, begin_ns, end_ns, edge_ns, tai_s)) return 1;
+        if (begin_ns < end_ns) end_ns = begin_ns;
+    }
+    return 0;
 }

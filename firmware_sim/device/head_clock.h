@@ -5,7 +5,9 @@
  * Device time is exact: it is the simulation's own. Pulses, poses, moving things and the GNSS receiver go by
  * it. The key time.epoch says what the true time of day is at power-up. The head's clock is what the head
  * believes. It is the sum of the true time, time.offset_s, time.drift_ppm of the time since power-up, and,
- * from time.jump_at_s on, time.jump_s. While all of them are 0, the head's clock shows the true time.
+ * from time.jump_at_s on, time.jump_s. While all of them are 0, the head's clock shows the true time. Faults on
+ * request add jumps, gains and times in which it stands. All of these are changes of one kind, and between two of them
+ * the clock runs evenly.
  *
  *   by the head's clock  PPS events, the GPS time of SCAN_START (and with them scanhead_gps_time), UTC in telemetry,
  *                        TIME:UTC?, TIME:GPS?
@@ -13,8 +15,12 @@
  *   neither              device times and pulse times on the wire: they count from power-up and from the scan's start
  *
  * The system's clock (utc, tai) is read once, at power-up. Device time then runs with CLOCK_MONOTONIC. That
- * clock follows what PTP or NTP do to the rate of the system's clocks, but not their steps. Constant after
- * head_clock_power_up; then any thread. */
+ * clock follows what PTP or NTP do to the rate of the system's clocks, but not their steps.
+ *
+ * A leap second on request is one of the table: UTC has a second 60 and is a second less from then on, TAI and GPS time
+ * go on. The receiver has the same table, as the head has its leap seconds from there.
+ *
+ * Thread: any for the true time, after head_clock_power_up; else whoever has the device's lock. */
 #ifndef FIRMWARE_SIM_DEVICE_HEAD_CLOCK_H
 #define FIRMWARE_SIM_DEVICE_HEAD_CLOCK_H
 
@@ -22,10 +28,34 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/epoch.h"
 
+enum { HEAD_CLOCK_CHANGES = 64 }; /* the last ones are kept; the time before the first of these is not asked for */
+
+/* What happens to the clock at a device time. */
+struct head_clock_change {
+    int64_t jump_ns;  /* it is set on by so much */
+    int64_t gain_ppt; /* it gains so much more than before, 1e-12 */
+    int stands;       /* 1: it stands from now on; -1: no more for this reason */
+};
+
+__extension__ typedef __int128 head_clock_wide;
+
+/* The clock from a change to the next. */
+struct head_clock_piece {
+    int64_t from_ns; /* device time. The first piece has the time before, too */
+    struct head_clock_change change;
+    /* which gives, with the pieces before: */
+    int64_t shift_ns;       /* all jumps */
+    int64_t rate_ppt;       /* what it gains; -1e12: it stands */
+    head_clock_wide gained; /* at from_ns, in 1e-12 ns */
+    int64_t gain_ppt;       /* what it would gain if it didn't stand */
+    int stands;             /* for so many reasons */
+};
+
 struct head_clock {
     enum epoch_source source; /* EPOCH_NONE: the head does not know the time */
     int64_t tai0_ns;          /* true TAI at power-up */
-    int64_t offset_ns, drift_ppt, jump_ns, jump_at_ns;
+    uint32_t n;
+    struct head_clock_piece piece[HEAD_CLOCK_CHANGES];
     struct utc_table table;
     char warning[160]; /* something the user should know; empty: nothing */
 };
@@ -41,9 +71,16 @@ int head_clock_power_up(struct head_clock *clock, int64_t now_ns, struct sh_err 
 int64_t head_clock_true_ns(const struct head_clock *clock, int64_t t_ns);
 int64_t head_clock_ns(const struct head_clock *clock, int64_t t_ns);
 
+/* Changes the clock from a device time on. No clock runs backwards: one that would loses all, and stands. */
+void head_clock_change(struct head_clock *clock, int64_t t_ns, const struct head_clock_change *change);
+
+/* A leap second that no table has, at the end of the UTC minute at hand at a device time, by the head's clock. Where one
+ * is there already, at the end of the next. *posix_s: the second after it, since 1970. 0: the table is full. */
+int head_clock_add_leap(struct head_clock *clock, int64_t t_ns, int64_t *posix_s);
+
 /* The full second of the head's clock that begins at a device time in [from_ns, to_ns), at most a second
- * apart: 1, the first nanosecond of it and the TAI second, or 0. A jump is no edge; of two edges in the
- * interval, which only a jump can make, the later is given. */
+ * apart: 1, the first nanosecond of it and the TAI second, or 0. A jump is no edge, nor is the time in which the clock
+ * stands; of two edges in the interval, the later is given. */
 int head_clock_edge(const struct head_clock *clock, int64_t from_ns, int64_t to_ns, int64_t *edge_ns, int64_t *tai_s);
 
 #endif

@@ -24,6 +24,7 @@ void device_transition(struct device *device, enum head_event event, uint64_t ti
     int next = head_next_state(device->machine.state, event);
     if (next < 0 || (enum head_state)next == device->machine.state) return;
     enum head_state before = device->machine.state;
+    if (next != HEAD_FAULT) device->cmd.why_fault = NULL;
     device->machine.state = (enum head_state)next;
     device->machine.change[device->machine.n_changes++ % DEVICE_MAX_CHANGES] =
         (struct device_state_change){tick, device->machine.state};
@@ -32,6 +33,7 @@ void device_transition(struct device *device, enum head_event event, uint64_t ti
     uint64_t from = tick > device->next_tick ? tick : device->next_tick;
     switch (device->machine.state) {
     case HEAD_BOOT:
+        device->power.boot_begins = 1;
         device->machine.due_tick = tick + device_ticks_of(device, profile->boot_s);
         break;
     case HEAD_SPIN_UP: /* counted from the command, but never before the first tick that is still open */
@@ -51,6 +53,7 @@ void device_run_timers(struct device *device, uint64_t tick)
     while (device->machine.due_tick <= tick) {
         device->machine.due_tick = UINT64_MAX;
         if (device->machine.state == HEAD_BOOT) {
+            if (device_end_boot(device, tick)) continue;
             device_transition(device, HEAD_EV_BOOTED, tick);
             if (device->options.start) device_transition(device, HEAD_EV_START, tick);
         } else if (device->machine.state == HEAD_SPIN_UP) {

@@ -22,6 +22,7 @@ void device_say_pps(struct device *device, uint64_t tick)
     const struct head_clock *clock = &device->clock;
     int64_t t_ns = (int64_t)tick * device->tick_ns, edge_ns, tai_s;
     if (clock->source == EPOCH_NONE || !head_clock_edge(clock, t_ns, t_ns + device->tick_ns, &edge_ns, &tai_s)) return;
+    if (device_loses_pps(device, edge_ns)) return;
     int64_t tai_ns = tai_s * UTC_SECOND_NS;
     char text[UTC_TEXT_LEN];
     struct utc_time utc;
@@ -53,10 +54,14 @@ void device_set_time_texts(struct device *device)
              (long long)(gps.ns % UTC_SECOND_NS));
 }
 
-int64_t device_utc_ns(const struct device *device, int64_t t_ns)
+int64_t device_utc_ns(struct device *device, int64_t t_ns)
 {
     const struct head_clock *clock = &device->clock;
-    return clock->source != EPOCH_NONE ? utc_posix_from_tai(&clock->table, head_clock_ns(clock, t_ns)) : INT64_MIN;
+    if (clock->source == EPOCH_NONE) return INT64_MIN;
+    pthread_mutex_lock(&device->lock); /* faults change it */
+    const int64_t utc_ns = utc_posix_from_tai(&clock->table, head_clock_ns(clock, t_ns));
+    pthread_mutex_unlock(&device->lock);
+    return utc_ns;
 }
 
 int64_t device_next_fix_ns(const struct device *device, int64_t t_ns)
@@ -73,8 +78,11 @@ int device_fix(struct device *device, int64_t t_ns, struct nmea_fix *fix)
     const int64_t at_ns = gnss_time_ns(&device->gnss, n - 1);
     struct device_version *version;
     struct gnss gnss = device->gnss;
-    gnss.site = device_hold_site(device, &version); /* stations may move meanwhile */
+    struct head_clock clock;
+    gnss.site = device_hold_site(device, &version); /* stations may move meanwhile, */
+    gnss.clock = &clock;
     pthread_mutex_lock(&device->lock);
+    clock = device->clock; /* and its table of leap seconds may change */
     uint32_t station = device->cmd.settings.station - 1;
     int moves = device_head_pose(device, at_ns, &track.at);
     if (moves) {

@@ -37,6 +37,8 @@ uint32_t fault_board_remove(struct fault_board *board, uint32_t number);
 
 /* It was injected: counted, written to the truth, and given to the listener. */
 void fault_board_note(struct fault_board *board, const struct fault_note *note);
+/* The number of the fault that was added last; 0: there never was one. */
+uint32_t fault_board_last(struct fault_board *board);
 /* How often the fault of that number was injected; 0: all together. Those that were taken out count, too. */
 uint64_t fault_board_injected(struct fault_board *board, uint32_t number);
 /* Who hears of each note, in the thread that injected it: journal and soak. Before the run; up to 4. */

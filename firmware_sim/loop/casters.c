@@ -35,6 +35,7 @@ static int claim(struct loop *loop, struct device_work *work, struct ring_slot *
             }
         } else {
             atomic_fetch_add(&casters->n_computing, 1);
+            if (work->power != DEVICE_POWER_STAYS) stream_power(&loop->stream, work->tick);
             *slot = ring_claim(&loop->stream.ring, work->tick);
             casters->next_tick = work->tick + 1;
             got = 1;

@@ -23,6 +23,8 @@ static int create_stream(struct loop *loop, struct sh_err *err)
     loop->casters.ahead_ticks = size.ahead_ticks;
     loop->stream.tick_bytes = worker_tick_bytes(loop->site);
     loop->stream.waits = cfg->loop.pace != PACE_REALTIME;
+    loop->stream.steps = cfg->loop.pace == PACE_STEP;
+    loop->stream.seq = UINT32_C(0) - device_near_wrap(loop->device);
     loop->stream.counters = device_counters(loop->device);
     return stream_create(&loop->stream, &size, tick_ns, err);
 }

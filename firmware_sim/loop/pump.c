@@ -108,7 +108,10 @@ static void handle(struct pump *pump, const struct link_event *event)
     struct session *s = &pump->session[event->session];
     switch (event->kind) {
     case LINK_OPENED:
-        if (!pump_turns_away(pump, event->session)) session_open(pump, s, event->peer);
+        if (pump->is_off && pump->ops->end != NULL) /* nobody is there to take it */
+            pump->ops->end(pump->link, event->session);
+        else if (!pump_turns_away(pump, event->session))
+            session_open(pump, s, event->peer);
         break;
     case LINK_PLUGGED:
         pump_plugged(pump);
@@ -203,6 +206,7 @@ static void *pump_main(void *arg)
             if (pump->session[i].open && session_write(pump, &pump->session[i], i)) want_write |= 1U << i;
         stream_rest_reader(pump->stream);
         at_once = pump_rest(pump);
+        at_once |= pump_power(pump, want_write);
         at_once |= set_wake(pump);
     }
     for (int i = 0; i < LINK_MAX_SESSIONS; i++)

@@ -1,8 +1,9 @@
 /* Faults on the wire: what a session would write goes through its wire (firmware_sim/fault/wire.h), and what comes out
  * of that is written. A session has a wire from the first fault on. Without one nothing of this is called.
  *
- * A wire that is held back keeps as much as a session's buffer. Then the session takes no more, and its reader is as any
- * reader that is too slow. What lies in the wire when the client goes away counts as written. */
+ * A wire that stalls keeps as much as a session's buffer, one that delays WIRE_DELAY_BYTES. Then the session takes no
+ * more, and its reader is as any reader that is too slow. What lies in the wire when the client goes away, or at the end
+ * of the run, counts as not written; what a fault dropped or changed counts as written. */
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/loop/pump_inside.h"
 
@@ -11,6 +12,27 @@
 
 static const int64_t NO_TIME = INT64_MAX;
 static const int64_t AGAIN_NS = 100000000; /* between attempts to be there again */
+
+/* Reply lines that are not in the wire yet. */
+static uint32_t count_replies(const struct session *s)
+{
+    const struct session_commands *c = &s->commands;
+    uint32_t n = (uint32_t)(c->stepping + c->moving);
+    for (uint32_t i = 0; i < c->reply_len; i++)
+        n += c->reply[i] == '\n';
+    for (uint32_t i = s->out_pos; i < s->out_len; i++)
+        n += s->out[i] == '\n' && (i < s->frames_from || i >= s->frames_to);
+    return n;
+}
+
+/* What was read and not answered yet, it did not hear. */
+static void hear_again(struct session *s)
+{
+    const struct session_commands *c = &s->commands;
+    wire_skip_heard(s->wire, count_replies(s));
+    wire_heard(s->wire, c->lines.buf, c->lines.len);
+    wire_heard(s->wire, c->in + c->in_pos, c->in_len - c->in_pos);
+}
 
 int session_has_wire(struct pump *pump, struct session *s)
 {
@@ -24,13 +46,24 @@ int session_has_wire(struct pump *pump, struct session *s)
         .max_unit = native ? NATIVE_MAX_FRAME : pump->protocol->max_unit,
         .units = !native,
         .native = native,
+        .datagrams = pump->ops->datagrams,
+        .content = pump->protocol->content,
         .reseal = pump->protocol->reseal,
         .acts = pump->can,
         .tally = &pump->tally,
     };
     s->wire = wire_create(&spec);
     if (s->wire == NULL) device_report(pump->links->device, CMD_E_REFUSED, "no memory for the faults of a session");
+    if (s->wire != NULL && native) hear_again(s);
     return s->wire != NULL;
+}
+
+void session_faults_changed(struct pump *pump, struct session *s)
+{
+    const int had = s->wire != NULL;
+    if (!session_has_wire(pump, s)) return;
+    if (!had) wire_skip_heard(s->wire, 1); /* the line itself */
+    wire_renew(s->wire, count_replies(s) + 1);
 }
 
 void session_close_wire(struct session *s)
@@ -44,43 +77,61 @@ int session_wire_waits(const struct session *s)
     return s->wire != NULL && !wire_is_empty(s->wire);
 }
 
-static void put(struct pump *pump, struct session *s, int of, const uint8_t *bytes, size_t len)
+static void put(struct pump *pump, struct session *s, int of, const uint8_t *bytes, size_t len, uint64_t tick)
 {
-    const struct wire_item item = {.of = of,
-                                   .bytes = bytes,
-                                   .len = len,
-                                   .t_ns = (int64_t)stream_released(pump->stream) * pump->stream->tick_ns};
+    const struct wire_item item = {
+        .of = of, .bytes = bytes, .len = len, .t_ns = (int64_t)tick * pump->stream->tick_ns};
     if (wire_put(s->wire, &item, clock_now_ns()) != SH_OK)
         device_report(pump->links->device, CMD_E_READER, "no memory for the faults of a session: a frame is lost");
 }
 
-/* Reply lines, each with its end. */
-static void put_replies(struct pump *pump, struct session *s, const uint8_t *from, const uint8_t *to)
+static void put_rest(struct pump *pump, struct session *s, const uint8_t *bytes, size_t len)
 {
-    while (from < to) {
-        const uint8_t *end = memchr(from, '\n', (size_t)(to - from));
-        const size_t len = end != NULL ? (size_t)(end + 1 - from) : (size_t)(to - from);
-        put(pump, s, FAULT_OF_REPLIES, from, len);
-        from += len;
+    if (wire_put_rest(s->wire, bytes, len) != SH_OK)
+        device_report(pump->links->device, CMD_E_READER, "no memory for the faults of a session: a frame is lost");
+}
+
+/* A frame or a reply of the session's buffer. What was written of it before there was a wire is not written again. */
+static void take_item(struct pump *pump, struct session *s, int of, uint32_t at, uint32_t end)
+{
+    if (at >= s->out_pos)
+        put(pump, s, of, s->out + at, end - at, stream_released(pump->stream));
+    else if (end > s->out_pos)
+        put_rest(pump, s, s->out + s->out_pos, end - s->out_pos);
+}
+
+/* Reply lines, each with its end. */
+static void take_replies(struct pump *pump, struct session *s, uint32_t at, uint32_t to)
+{
+    while (at < to) {
+        const uint8_t *line = memchr(s->out + at, '\n', to - at);
+        const uint32_t end = line != NULL ? (uint32_t)(line + 1 - s->out) : to;
+        take_item(pump, s, FAULT_OF_REPLIES, at, end);
+        at = end;
     }
 }
 
 /* What lies in the session's buffer goes into its wire. */
 static void take_over(struct pump *pump, struct session *s)
 {
-    put_replies(pump, s, s->out + s->out_pos, s->out + s->frames_from);
-    for (uint32_t at = s->frames_from; at < s->frames_to;) {
-        const size_t len = native_frame_len(s->out + at);
-        put(pump, s, FAULT_OF_STREAM, s->out + at, len);
-        at += (uint32_t)len;
+    take_replies(pump, s, 0, s->frames_from);
+    for (uint32_t at = s->frames_from, end; at < s->frames_to; at = end) {
+        end = at + (uint32_t)native_frame_len(s->out + at);
+        take_item(pump, s, FAULT_OF_STREAM, at, end);
     }
-    put_replies(pump, s, s->out + s->frames_to, s->out + s->out_len);
+    take_replies(pump, s, s->frames_to, s->out_len);
     s->out_pos = s->out_len;
 }
 
-void session_put_unit(struct pump *pump, struct session *s, const uint8_t *unit, size_t len, int is_reply)
+void session_put_unit(struct pump *pump, struct session *s)
 {
-    put(pump, s, is_reply ? FAULT_OF_REPLIES : FAULT_OF_STREAM, unit, len);
+    size_t len;
+    const struct unit_kind kind = unit_queue_kind(&s->units);
+    const uint8_t *unit = unit_queue_next(&s->units, &len);
+    if (s->units.out != 0)
+        put_rest(pump, s, unit, len);
+    else
+        put(pump, s, kind.is_reply ? FAULT_OF_REPLIES : FAULT_OF_STREAM, unit, len, kind.made_tick);
 }
 
 void session_heard(struct session *s, const void *bytes, size_t len)
@@ -112,6 +163,7 @@ static int carry_out(struct pump *pump, struct session *s, int index, const stru
     wire_pop(s->wire);
     if (what == LINK_FAULT_BUS_RESET) pump->plug_ns = in_ms(0.0); /* where it takes unplugging, and plugging in fails */
     if (rc != SH_OK) {
+        wire_go_on(s->wire);
         char text[96];
         snprintf(text, sizeof text, "the fault %s could not be carried out now", fault_names[kind]);
         pump_say(pump, text);
@@ -123,10 +175,10 @@ static int carry_out(struct pump *pump, struct session *s, int index, const stru
     return !s->open;
 }
 
-int session_write_wire(struct pump *pump, struct session *s, int index)
+int session_write_wire(struct pump *pump, struct session *s, int index, int last)
 {
     for (;;) {
-        struct wire_piece *piece = wire_due(s->wire, clock_now_ns(), atomic_load(&pump->stream->over));
+        struct wire_piece *piece = wire_due(s->wire, clock_now_ns(), last);
         if (piece == NULL) return 0;
         if (piece->kind == WIRE_ACT) {
             if (carry_out(pump, s, index, piece)) return -1;
@@ -145,17 +197,27 @@ int session_write_wire(struct pump *pump, struct session *s, int index)
     }
 }
 
+int session_wire_is_full(const struct pump *pump, const struct session *s)
+{
+    return wire_is_full(s->wire, pump->out_cap, clock_now_ns());
+}
+
 int session_write_faulty(struct pump *pump, struct session *s, int index)
 {
     if (s->out_pos < s->out_len) take_over(pump, s);
-    for (;;) {
-        int full = session_write_wire(pump, s, index);
+    for (int last = 0;;) {
+        const int full = session_write_wire(pump, s, index, last);
         if (full < 0) return 0;
-        if (full || wire_bytes(s->wire) >= pump->out_cap) return full;
+        if (full || last || session_wire_is_full(pump, s)) return full;
+        const int over = atomic_load(&pump->stream->over);
         session_fill(pump, s);
-        if (s->out_pos == s->out_len) return 0;
-        take_over(pump, s);
+        last = over && s->out_pos == s->out_len; /* nothing more comes: nothing is held for it */
+        if (s->out_pos < s->out_len) take_over(pump, s);
+        else if (!last) break;
+        wire_time(s->wire, (int64_t)s->cursor * pump->stream->tick_ns);
     }
+    wire_time(s->wire, (int64_t)s->cursor * pump->stream->tick_ns);
+    return 0;
 }
 
 int64_t pump_next_ns(const struct pump *pump)

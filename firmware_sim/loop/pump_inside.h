@@ -38,6 +38,7 @@ struct session {
     uint32_t id;     /* from 1, over all links */
     int reader;      /* of the stream */
     uint64_t cursor; /* next tick to take */
+    uint64_t power_from; /* power that goes with a tick before this one does not end it */
     struct {
         int have_seq; /* next_seq is known, and so is: */
         uint32_t next_seq;
@@ -89,6 +90,8 @@ struct pump {
     int64_t plug_ns;         /* clock: when an unplugged link is there again; 0: it is */
     int plug_failed;         /* so far, and that was said */
     int64_t refuse_until_ns; /* clock: until then clients are turned away */
+    uint32_t power_seen;     /* changes of power that were done here */
+    int is_off;              /* the head has no power */
     struct session session[LINK_MAX_SESSIONS];
     pthread_t thread;
     int running;
@@ -98,6 +101,12 @@ struct pump {
 /* session.c */
 void session_open(struct pump *pump, struct session *s, const char *peer);
 void session_close(struct pump *pump, struct session *s);
+/* The same for power that goes: the device knows already. */
+void session_cut(struct pump *pump, struct session *s);
+/* The tick that the session does not take any more, since power goes with it; UINT64_MAX: none. */
+uint64_t session_off_tick(const struct pump *pump, const struct session *s);
+/* A session that nobody can end, as that of a file, begins anew with a tick. */
+void session_restart(struct pump *pump, struct session *s, uint64_t tick);
 /* Takes what there is and writes until the link is full (1) or there is nothing left (0). index: of the session on its
  * link. */
 int session_write(struct pump *pump, struct session *s, int index);
@@ -112,10 +121,15 @@ void session_close_wire(struct session *s);
 int session_wire_waits(const struct session *s);
 /* As session_write, by its wire. */
 int session_write_faulty(struct pump *pump, struct session *s, int index);
-/* Writes what lies in the wire: 1: the link is full; 0: nothing may go out now; -1: the session is closed. */
-int session_write_wire(struct pump *pump, struct session *s, int index);
-/* A unit of a protocol into the wire. */
-void session_put_unit(struct pump *pump, struct session *s, const uint8_t *unit, size_t len, int is_reply);
+/* Writes what lies in the wire: 1: the link is full; 0: nothing may go out now; -1: the session is closed. last: nothing
+ * comes after it. */
+int session_write_wire(struct pump *pump, struct session *s, int index, int last);
+/* Whether as much lies in it as it keeps. */
+int session_wire_is_full(const struct pump *pump, const struct session *s);
+/* The oldest unit of a protocol, or the rest of it, into the wire. */
+void session_put_unit(struct pump *pump, struct session *s);
+/* A line of this session, to which the reply is still to come, has changed the faults. */
+void session_faults_changed(struct pump *pump, struct session *s);
 /* What the client sent. */
 void session_heard(struct session *s, const void *bytes, size_t len);
 /* When a wire, or the link, next has something to do by the clock; INT64_MAX: nothing. */
@@ -133,6 +147,10 @@ enum link_fault pump_link_fault(enum fault_kind kind);
 
 /* pump.c: to whoever runs the head. */
 void pump_say(struct pump *pump, const char *text);
+
+/* pump_power.c: the links of a head that loses power, and has it again. */
+/* What is due of that. full: bit per session whose link takes no more. 1: there is more to do at once. */
+int pump_power(struct pump *pump, uint32_t full);
 
 /* lost_frames.c: the one place that counts what a reader got and what it lost. */
 /* Compares the number of a tick's first frame with the one expected, and counts a gap; a native reader is told, in a
@@ -167,6 +185,8 @@ void pump_read_commands(struct pump *pump, struct session *s, int index);
 /* Returns 0 or a negative SH_E. */
 int session_open_protocol(struct pump *pump, struct session *s);
 void session_close_protocol(struct pump *pump, struct session *s);
+/* Closed and opened again, where the cursor is. */
+int session_restart_protocol(struct pump *pump, struct session *s);
 /* As session_write. */
 int session_write_protocol(struct pump *pump, struct session *s, int index);
 /* The first tick, from the cursor on, that the protocol must be woken for though it has no frames. */

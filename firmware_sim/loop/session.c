@@ -26,6 +26,7 @@ void session_open(struct pump *pump, struct session *s, const char *peer)
     clear(s);
     s->moved_ns = clock_now_ns();
     s->cursor = stream_released(pump->stream);
+    s->power_from = 0;
     snprintf(s->peer, sizeof s->peer, "%.63s", peer); /* an address: shorter */
     if (native && s->out == NULL) s->out = malloc(pump->out_cap);
     if (native ? s->out == NULL : session_open_protocol(pump, s) != SH_OK) {
@@ -36,17 +37,37 @@ void session_open(struct pump *pump, struct session *s, const char *peer)
     stream_set_reader(pump->stream, s->reader, s->cursor, pump->holds);
 }
 
-void session_close(struct pump *pump, struct session *s)
+void session_cut(struct pump *pump, struct session *s)
 {
-    if (!s->open) return;
     s->open = 0;
     session_gone(pump, s);
     session_close_wire(s);
     stream_set_reader(pump->stream, s->reader, s->cursor, 0);
-    if (!pump->protocol->passes_native) { /* it never keeps control */
-        session_close_protocol(pump, s);
-        return;
-    }
+    if (!pump->protocol->passes_native) session_close_protocol(pump, s);
+}
+
+void session_restart(struct pump *pump, struct session *s, uint64_t tick)
+{
+    s->power_from = tick + 1;
+    if (pump->protocol->passes_native) return;
+    clear(s);
+    session_close_wire(s);
+    if (session_restart_protocol(pump, s) == SH_OK) return;
+    device_report(pump->links->device, CMD_E_REFUSED, "no memory for a session");
+    session_cut(pump, s);
+}
+
+uint64_t session_off_tick(const struct pump *pump, const struct session *s)
+{
+    if (pump->board == NULL) return UINT64_MAX;
+    return stream_off_tick(pump->stream, s->cursor > s->power_from ? s->cursor : s->power_from);
+}
+
+void session_close(struct pump *pump, struct session *s)
+{
+    if (!s->open) return;
+    session_cut(pump, s);
+    if (!pump->protocol->passes_native) return; /* it never keeps control */
     const struct command_lines *lines = &s->commands.lines;
     device_session_closed(pump->links->device, s->id, s->peer, lines->len != 0 || lines->overrun);
     stream_poke(pump->stream);
@@ -60,10 +81,13 @@ static int take_tick(struct pump *pump, struct session *s)
     if (end >= pump->out_cap) return 0;
     struct ring_copy tick = {.buf = s->out + s->out_len, .cap = pump->out_cap - end};
     enum ring_read got = ring_read(ring, s->reader, s->cursor, &tick);
+    const uint64_t off_tick = session_off_tick(pump, s); /* known before the tick was released */
+    if (s->cursor >= off_tick) return 0;
     if (got == RING_NONE || (got == RING_READ && tick.len > tick.cap)) return 0;
     uint64_t released = stream_released(pump->stream);
     if (got == RING_LOST && s->cursor + ring->queue_ticks < released) {
         s->cursor = released - ring->queue_ticks / 2; /* half a queue of room to recover */
+        if (s->cursor > off_tick) s->cursor = off_tick;
         return 1;
     }
     s->cursor++;

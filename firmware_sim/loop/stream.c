@@ -33,12 +33,14 @@ static void wake_readers(struct stream *stream, uint64_t tick, int frames)
     for (uint32_t i = 0; i < stream->n_listeners; i++) {
         struct stream_listener *listener = &stream->listener[i];
         listener->pending |=
-            (frames && atomic_load(&listener->wants_frames)) || atomic_load(&listener->wake_tick) <= tick;
+            (frames && atomic_load(&listener->wants_frames)) || atomic_load(&listener->wake_tick) <= tick ||
+            stream->wakes_all;
         if (!listener->pending || tick < listener->quiet_until) continue;
         listener->pending = 0;
         listener->quiet_until = tick + listener->every;
         eventfd_write(listener->fd, 1); /* a full counter is a wake-up, too */
     }
+    stream->wakes_all = 0;
 }
 
 static void wake_casters(struct stream *stream)
@@ -52,7 +54,9 @@ static void say_released(struct stream *stream)
 {
     if (stream->unsaid == 0) return;
     for (uint32_t i = 0; i < stream->n_listeners; i++)
-        if (atomic_load(&stream->listener[i].wants_frames)) eventfd_write(stream->listener[i].fd, 1);
+        if (atomic_load(&stream->listener[i].wants_frames) || stream->wakes_all)
+            eventfd_write(stream->listener[i].fd, 1);
+    stream->wakes_all = 0;
     wake_casters(stream);
 }
 
@@ -139,9 +143,21 @@ static void count(struct stream *stream, const struct ring_tick *tick, int64_t n
     atomic_store(&stream->last_pulse_ns, now_ns);
 }
 
+/* Power that goes leaves a line without its end. */
+static void pass_power(struct stream *stream, uint64_t tick)
+{
+    while (stream_power_tick(stream, stream->power_passed) <= tick) {
+        stream->power_passed++;
+        stream->wakes_all = 1;
+        stream->line = (struct ring_hits){0};
+        stream->line_broken = 0;
+    }
+}
+
 void stream_release(struct stream *stream, struct ring_slot *slot, uint64_t tick, int64_t now_ns)
 {
     struct ring_tick *made = &slot->tick;
+    pass_power(stream, tick);
     finish_lines(stream, made);
     slot->first_seq = stream->seq;
     slot->pulses_before = atomic_load(&stream->counters->pulses);
@@ -161,6 +177,7 @@ void stream_release(struct stream *stream, struct ring_slot *slot, uint64_t tick
 int stream_lose(struct stream *stream, uint64_t tick)
 {
     if (!ring_lose(&stream->ring, tick)) return 0;
+    pass_power(stream, tick);
     stream->line_broken = 1;
     wake(stream, tick, 0);
     return 1;
@@ -256,6 +273,26 @@ void stream_say_ready(struct stream *stream)
 uint64_t stream_released(const struct stream *stream)
 {
     return atomic_load(&stream->ring.released);
+}
+
+void stream_power(struct stream *stream, uint64_t tick)
+{
+    const uint32_t n = atomic_load(&stream->n_power);
+    atomic_store(&stream->power_tick[n % STREAM_POWER_TICKS], tick);
+    atomic_store(&stream->n_power, n + 1);
+}
+
+uint64_t stream_power_tick(const struct stream *stream, uint32_t i)
+{
+    return i < atomic_load(&stream->n_power) ? atomic_load(&stream->power_tick[i % STREAM_POWER_TICKS]) : UINT64_MAX;
+}
+
+uint64_t stream_off_tick(const struct stream *stream, uint64_t cursor)
+{
+    const uint32_t n = atomic_load(&stream->n_power);
+    for (uint32_t i = n > STREAM_POWER_TICKS ? (n - STREAM_POWER_TICKS + 1) & ~1U : 0; i < n; i += 2)
+        if (stream_power_tick(stream, i) >= cursor) return stream_power_tick(stream, i);
+    return UINT64_MAX;
 }
 
 uint64_t stream_grant(struct stream *stream, uint64_t ns)

@@ -29,7 +29,8 @@ enum {
     STREAM_MAX_LINKS = CONFIG_MAX_LINKS + 1,
     STREAM_HASH_READER = STREAM_MAX_LINKS * LINK_MAX_SESSIONS, /* below it: sessions */
     STREAM_MAX_LISTENERS = STREAM_MAX_LINKS + 1,
-    STREAM_SCANS = 8
+    STREAM_SCANS = 8,
+    STREAM_POWER_TICKS = 64
 };
 _Static_assert((int)STREAM_HASH_READER < (int)RING_MAX_READERS, "each session is a reader, and so is the hash");
 
@@ -55,6 +56,7 @@ struct stream {
     int64_t tick_ns;
     uint32_t tick_bytes; /* no tick is longer */
     int waits;           /* paces fast and step: release waits for casters and readers, and nothing is lost */
+    int steps;           /* pace step: clients let time pass, also while the head has no power */
     struct device_counters *counters;
     struct stream_reader reader[RING_MAX_READERS];
 
@@ -67,6 +69,14 @@ struct stream {
         uint64_t delivered; /* pulses */
     } scan[STREAM_SCANS];   /* the last ones, at number % STREAM_SCANS: an end may be said when the next one is on */
     _Atomic int64_t first_pulse_ns, last_pulse_ns; /* when released; 0: not yet */
+
+    /* A power cycle on request (device_work.power): ticks with which power goes and comes, in turn. Number i is at i %
+     * STREAM_POWER_TICKS. */
+    _Atomic uint64_t power_tick[STREAM_POWER_TICKS];
+    _Atomic uint32_t n_power;
+    /* of the pacing thread alone */
+    uint32_t power_passed; /* of these, so many were released */
+    int wakes_all;         /* one was since the last wake-up: links without clients are to know, too */
 
     _Atomic uint64_t granted;    /* step: ticks that may pass */
     _Atomic uint64_t granted_ns; /* step: the sum of all grants */
@@ -123,11 +133,17 @@ void stream_rest_reader(struct stream *stream);
 /* ---- casters */
 /* Waits until a tick may be claimed. */
 void stream_wait_for_work(struct stream *stream);
+/* Power goes, or comes, with this tick, which is being claimed. */
+void stream_power(struct stream *stream, uint64_t tick);
 /* Some ticks are ready: the pacing thread looks again. Not needed in real time. */
 void stream_say_ready(struct stream *stream);
 
 /* ---- any thread */
 uint64_t stream_released(const struct stream *stream);
+/* The first tick from `cursor` on with which power goes; UINT64_MAX: none so far. */
+uint64_t stream_off_tick(const struct stream *stream, uint64_t cursor);
+/* The tick of change number i, from 0; UINT64_MAX: there is none so far. */
+uint64_t stream_power_tick(const struct stream *stream, uint32_t i);
 /* A peer grants time. Returns the sum of all grants, ns. */
 uint64_t stream_grant(struct stream *stream, uint64_t ns);
 /* Lets device time pass up to that sum. Returns the tick before which all may pass. */

@@ -1,0 +1,142 @@
+/* Power and boots: what a power cycle ends and begins anew, and what goes wrong in a boot on request.
+ *
+ * Device time, scan numbers and the stations' places go on over a power cycle, and so does the time of day, which has a
+ * battery. All else is as at power-up. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "firmware_sim/device/device_state.h"
+
+static int64_t time_of(const struct device *device, uint64_t tick)
+{
+    return (int64_t)tick * device->tick_ns;
+}
+
+static void end_slow_boots(struct device *device, uint64_t tick)
+{
+    struct head_fault *f = NULL;
+    while ((f = head_faults_next(&device->head_faults, FAULT_SLOW_BOOT, f)) != NULL) {
+        f->active = 0;
+        head_faults_note(&device->head_faults, f, time_of(device, tick), 1, NULL);
+    }
+}
+
+/* No end of the scan is said: who reads it finds that it stops. */
+static void turn_off(struct device *device, uint64_t tick, double for_ms)
+{
+    struct device_scan *scan = &device->scan;
+    if (scan->on) device_end_beam(device, time_of(device, tick - scan->tick0));
+    if (scan->on) scan->end_tick = tick;
+    scan->on = scan->stop_requested = scan->describe = scan->anchor_lost = 0;
+    end_slow_boots(device, tick);
+    device->events.n = device->events.dropped = 0;
+    device->held = 0;
+    memset(device->errors, 0, sizeof device->errors);
+    device_transition(device, HEAD_EV_POWER_OFF, tick);
+    device->power.off_tick = tick;
+    device->machine.due_tick = device->power.on_tick = tick + device_ticks_of(device, 1e-3 * for_ms);
+}
+
+static void set_near_wrap(struct device *device, uint64_t tick)
+{
+    const struct head_fault *f = NULL;
+    device->power.near_wrap = 0;
+    while ((f = head_faults_at(&device->head_faults, FAULT_COUNTERS_HIGH, time_of(device, tick), f)) != NULL)
+        device->power.near_wrap = fault_n(&f->fault);
+}
+
+void device_first_power(struct device *device)
+{
+    static const struct head_faults_tick first = {0};
+    head_faults_step(&device->head_faults, 0, &first); /* takes over the list */
+    set_near_wrap(device, 0);
+    device_transition(device, HEAD_EV_POWER_ON, 0);
+}
+
+static void turn_on(struct device *device, uint64_t tick)
+{
+    struct command_device *cmd = &device->cmd;
+    cmd->settings = cmd->defaults;
+    cmd->control = 0;
+    cmd->frames_done = 0;
+    memset(&cmd->queue, 0, sizeof cmd->queue);
+    set_near_wrap(device, tick);
+    device->scan.variant = NULL;
+    device_before_scans(device);
+    device_transition(device, HEAD_EV_POWER_ON, tick);
+}
+
+/* In the first tick of a boot. */
+static void begin_boot(struct device *device, uint64_t tick)
+{
+    struct head_faults *faults = &device->head_faults;
+    const int64_t t_ns = time_of(device, tick);
+    struct head_fault *f = NULL;
+    device->power.boot_begins = 0;
+    if (fault_board_version(device->faults) == 0) return;
+    while ((f = head_faults_at(faults, FAULT_SLOW_BOOT, t_ns, f)) != NULL) {
+        device->machine.due_tick += device_ticks_of(device, 1e-3 * f->fault.for_ms);
+        f->active = 1;
+        head_faults_note(faults, f, t_ns, 0, NULL);
+    }
+    while ((f = head_faults_at(faults, FAULT_COUNTERS_HIGH, t_ns, f)) != NULL)
+        head_faults_note(faults, f, t_ns, 0, NULL);
+}
+
+int device_end_boot(struct device *device, uint64_t tick)
+{
+    struct head_faults *faults = &device->head_faults;
+    const int64_t t_ns = time_of(device, tick);
+    struct head_fault *f = NULL;
+    int failed = 0;
+    if (fault_board_version(device->faults) == 0) return 0;
+    end_slow_boots(device, tick);
+    while ((f = head_faults_at(faults, FAULT_SELF_TEST, t_ns, f)) != NULL) {
+        head_faults_note(faults, f, t_ns, 0, NULL);
+        failed = 1;
+    }
+    if (!failed) return 0;
+    command_queue_push(&device->cmd.queue, CMD_E_SELF_TEST, "at the end of boot; *RST goes on without it");
+    device_push_error(device, 0, CMD_E_SELF_TEST, command_error_text(CMD_E_SELF_TEST));
+    device_transition(device, HEAD_EV_FAIL, tick);
+    device->cmd.why_fault = "the self-test failed; *RST goes on without it";
+    if (device->options.start && device->options.one_scan) device->over = 1; /* nobody waits for another one */
+    return 1;
+}
+
+void device_run_power(struct device *device, uint64_t tick, struct device_work *work)
+{
+    const struct head_fault *f = NULL;
+    work->power = DEVICE_POWER_STAYS;
+    if (device->machine.state == HEAD_OFF && device->machine.due_tick <= tick) {
+        turn_on(device, tick);
+        work->power = DEVICE_POWER_COMES;
+    }
+    if (device->power.boot_begins) begin_boot(device, tick);
+    if (fault_board_version(device->faults) == 0) return;
+    while ((f = head_faults_next(&device->head_faults, FAULT_POWER_CYCLE, f)) != NULL) {
+        if (!f->begins) continue;
+        const uint64_t until_tick = tick + device_ticks_of(device, 1e-3 * f->fault.for_ms);
+        if (device->machine.state != HEAD_OFF) {
+            turn_off(device, tick, f->fault.for_ms);
+            work->power = DEVICE_POWER_GOES;
+        } else if (until_tick > device->power.on_tick) { /* two of them at once: as long as the longer */
+            device->machine.due_tick = device->power.on_tick = until_tick;
+        }
+    }
+}
+
+int device_is_dead(const struct device *device, uint64_t released)
+{
+    const struct device_power *power = &device->power;
+    return power->on_tick != 0 && device->next_tick > power->off_tick && released < power->on_tick;
+}
+
+uint32_t device_near_wrap(struct device *device)
+{
+    pthread_mutex_lock(&device->lock);
+    uint32_t n = device->power.near_wrap;
+    pthread_mutex_unlock(&device->lock);
+    return n;
+}

@@ -1,0 +1,67 @@
+/* A power cycle on request, as the clients of a link see it: their sessions end abruptly, and nobody answers until power
+ * is there again (device_work.power).
+ *
+ * A session has everything before the tick with which power goes, if its client reads fast enough; in the paces that
+ * wait for readers, in any case. A link that nobody can end, as a file or UDP, goes on where it was. In the pace step
+ * links come back at once, since it is their clients that let time pass. */
+#include "firmware_sim/base/clock.h"
+#include "firmware_sim/loop/pump_inside.h"
+
+/* What was released before `tick` is written, or its client does not take it. */
+static int is_drained(const struct pump *pump, const struct session *s, int is_full, uint64_t tick)
+{
+    const int taken = s->cursor >= tick,
+              written = s->out_pos == s->out_len && s->units.n == 0 && !session_wire_waits(s);
+    if (pump->stream->waits) return taken && written;
+    return taken || is_full || session_wire_waits(s);
+}
+
+static int can_unplug(const struct pump *pump)
+{
+    return (pump->can & LINK_FAULT_BIT(LINK_FAULT_UNPLUG)) != 0;
+}
+
+static void plug(struct pump *pump)
+{
+    if (pump->is_off && can_unplug(pump)) {
+        pump->plug_ns = clock_now_ns(); /* now, or once its endpoint is free */
+        pump_plug(pump);
+    }
+    pump->is_off = 0;
+}
+
+static void unplug(struct pump *pump, uint64_t tick)
+{
+    for (int i = 0; i < LINK_MAX_SESSIONS; i++) {
+        struct session *s = &pump->session[i];
+        if (!s->open) continue;
+        if (!can_unplug(pump) && pump->ops->end == NULL) {
+            session_restart(pump, s, tick);
+            continue;
+        }
+        session_cut(pump, s);
+        if (!can_unplug(pump)) pump->ops->end(pump->link, i);
+    }
+    if (can_unplug(pump)) pump->ops->fault(pump->link, LINK_FAULT_UNPLUG, 0, 0, 0.0);
+    pump->plug_ns = pump->refuse_until_ns = 0; /* of faults before */
+    pump->is_off = 1;
+    if (pump->stream->steps) plug(pump);
+}
+
+int pump_power(struct pump *pump, uint32_t full)
+{
+    uint64_t tick;
+    while (pump->board != NULL && (tick = stream_power_tick(pump->stream, pump->power_seen)) != UINT64_MAX) {
+        const int goes = pump->power_seen % 2 == 0;
+        if (stream_released(pump->stream) <= tick) return 0;
+        for (int i = 0; i < LINK_MAX_SESSIONS && goes; i++)
+            if (pump->session[i].open && !is_drained(pump, &pump->session[i], (int)(full >> i & 1), tick))
+                return !pump->stream->waits;
+        if (goes)
+            unplug(pump, tick);
+        else
+            plug(pump);
+        pump->power_seen++;
+    }
+    return 0;
+}
