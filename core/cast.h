@@ -25,7 +25,7 @@
 #include "core/schedule.h"
 #include "core/sight.h"
 
-enum { CAST_MAX_MOVERS = 16 };
+enum { CAST_MAX_MOVERS = 16, CAST_MAX_WOBBLES = 32 };
 
 /* A rigid body that moves, with a BVH of its own, built at rest: p_prcs = rotation * p_rest + shift_m. The
  * pose holds for the runs that are cast with it; rays that pass by the sphere around the body cost one test a
@@ -92,6 +92,25 @@ struct cast_colour {
     const struct surface_colours *surfaces; /* texture; must outlive the scan */
 };
 
+/* What has gone wrong with a head, for the runs that are cast with it. Its encoders read wobbles; of the rest it knows
+ * nothing. All 0, with a share of 1: nothing. */
+struct cast_upset {
+    int dark;         /* the laser does not fire: every shot is empty */
+    double slip_turn; /* the beam goes so much farther in pan than its encoder reads */
+    /* Of the power that a clean window lets through, both ways together. With a signal model each return is so much
+     * weaker. Without one the fixed part of the range noise grows by 1 / share instead: as jitter does in detect.h, by
+     * the amplitude. */
+    double share;
+    uint32_t n_wobbles; /* the axes run ahead and behind: turn * sin(2 pi hz (t - begin)), t since the scan's start */
+    struct cast_wobble {
+        double mirror_turn, pan_turn, hz;
+        int64_t begin_ns;
+    } wobble[CAST_MAX_WOBBLES];
+};
+
+/* Adds the wobbles at t_ns to scheduled angles. */
+void cast_wobble(const struct cast_upset *upset, int64_t t_ns, double *mirror_turn, double *pan_turn);
+
 /* What stays the same for all pulses of a scan (the movers' poses: of a run). */
 struct cast_setup {
     const struct bvh *bvh;
@@ -132,6 +151,7 @@ struct cast_setup {
     const uint8_t *silent; /* by label: surfaces that hide what is behind them and give no echo; NULL: none */
     const struct cast_detect *detect;
     const struct cast_colour *colour; /* for blocks with room for colours; NULL: none, and nothing is spent on them */
+    const struct cast_upset *upset;   /* NULL: nothing has gone wrong. Not for caster_meet */
 };
 
 /* What became of pulses, counted. */

@@ -113,6 +113,11 @@ uint64_t schedule_cut(const struct schedule_segment *seg, uint64_t k);
 void schedule_get_run(const struct schedule_segment *seg, const struct schedule_line *line, uint64_t k, uint32_t n,
                       struct schedule_run *run);
 
+/* Angle at pulse k of what sweeps a line, in turns: the mirror of a line head, the rotor of one with beams. */
+double schedule_sweep_turn(const struct schedule_segment *seg, uint64_t k);
+/* The run while that stands still at sweep_turn, and lines go on by time: of a line head, or of one with beams. */
+void schedule_hold_run(const struct schedule_segment *seg, double sweep_turn, struct schedule_run *run);
+
 /* So many pulses, at least one, fire within max_ns. */
 uint64_t schedule_longest_run(const struct schedule_segment *seg, int64_t max_ns);
 

@@ -39,16 +39,28 @@ static void move(const struct cast_setup *s, int64_t t0_ns, const uint32_t *dt_n
     }
 }
 
+/* Where beams go, but not what the encoders read, where the pan has slipped. */
+static const double *slipped_rotation(const struct cast_setup *s, const double rotation[9], double out[9])
+{
+    double slip[9];
+    if (s->upset == NULL || s->upset->slip_turn == 0.0) return rotation;
+    caster_slip(s->upset, slip);
+    mat3_multiply(rotation, slip, out);
+    return out;
+}
+
 /* An ideal head: its beams go where its encoders say, but for the encoders' steps. */
 static void aim_ideal(struct caster *c, struct chunk *k, const struct kernel_turns *turns)
 {
     const struct cast_setup *s = k->s;
     const int geo = s->layout == LINE_GEO, moves = s->n_knots != 0;
-    const double *rotation = moves ? mat3_unit : s->rotation;
+    const int wobbles = s->upset != NULL && s->upset->n_wobbles != 0;
+    double slipped[9];
+    const double *rotation = slipped_rotation(s, moves ? mat3_unit : s->rotation, slipped);
     const struct vec3_out d = moves ? VEC3_OUT(c->socs, 0) : VEC3_OUT(c->d, 0);
     const struct vec3_out read = moves ? VEC3_OUT(c->read, 0) : VEC3_OUT(c->list.e, 0);
     const struct kernel_sweep sweep = {k->run, k->first, *turns};
-    const int even = kernel_sweep_steps(&c->steps, k->run);
+    const int even = !wobbles && kernel_sweep_steps(&c->steps, k->run);
     double to_crs[9];
     if (geo) k->linear = !moves && reading_rotation(s, to_crs);
     const double *q = moves ? mat3_unit : to_crs;
@@ -66,6 +78,17 @@ static void aim_ideal(struct caster *c, struct chunk *k, const struct kernel_tur
     move(s, k->run->t0_ns, k->dt_ns, k->n, &m);
 }
 
+/* The same of directions and origins in socs. */
+static void slip_bent(struct caster *c, const struct chunk *k, int offset)
+{
+    double slip[9], back[9];
+    if (k->s->upset == NULL || k->s->upset->slip_turn == 0.0) return;
+    caster_slip(k->s->upset, slip);
+    mat3_transpose(slip, back);
+    kernel_turn_back(&VEC3_IN(c->socs, 0), back, k->n, &VEC3_OUT(c->socs, 0));
+    if (offset) kernel_turn_back(&VEC3_IN(c->read, 0), back, k->n, &VEC3_OUT(c->read, 0));
+}
+
 /* A head whose mechanics and encoders are not: the turns become what the encoders say. */
 static void aim_bent(struct caster *c, struct chunk *k, const struct instrument *instrument)
 {
@@ -77,6 +100,7 @@ static void aim_bent(struct caster *c, struct chunk *k, const struct instrument 
     const struct instrument_turns turns = {k->pulse0, k->n, l->mirror_turn, l->pan_turn, k->s->scan_key};
     double back[9];
     instrument_aim(instrument, &turns, &VEC3_OUT(c->socs, 0), &origin);
+    slip_bent(c, k, offset);
     instrument_read(instrument, k->n, l->mirror_turn, l->pan_turn);
     if (moves) {
         const struct move m = {VEC3_IN(c->socs, 0), around, VEC3_OUT(c->d, 0), VEC3_OUT(c->origin, 0),
@@ -106,6 +130,7 @@ void caster_aim(struct caster *c, struct chunk *k)
         kernel_angles_table(k->run, k->first, k->n, l->mirror_turn, l->pan_turn);
     else
         kernel_angles(k->run, k->first, k->n, l->mirror_turn, l->pan_turn);
+    if (s->upset != NULL && s->upset->n_wobbles != 0) caster_wobble(c, k);
     k->from = (struct bvh_origins){.at_m = {s->station_m[0], s->station_m[1], s->station_m[2]}};
     if (s->n_knots != 0) k->from.own = VEC3_IN(l->p, 0);
     k->linear = 0;

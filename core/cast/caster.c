@@ -7,6 +7,8 @@
  *     optics     optics.c         where that is glass or a mirror: what is seen there (caster_follow)
  *     sub-rays   sub_rays.c       pulses with a footprint: which of them need more rays, and their echoes;
  *                sub_ray_plan.c   where in a footprint those rays lie
+ *     upset      upset.c          where the head has a fault: wobbles and a slipped pan within aim, a dark laser after
+ *                                 it, a soiled window within echoes
  *     echoes     echoes.c         which returns are echoes, how they merge, their noise, which of them are sent
  *     points     points.c         positions, and entries of the block
  *
@@ -110,6 +112,10 @@ static uint32_t cast_chunk(struct caster *c, struct chunk *k)
     if (c->profile != NULL) c->profile->last = c->profile->now();
     caster_aim(c, k);
     begin_echoes(&c->list, k);
+    if (s->upset != NULL && s->upset->dark) {
+        caster_darken(c, k);
+        return caster_points(c, k);
+    }
     const struct met met = centres(c, k);
     if (central) caster_nearest(c, s, &met);
     if (s->tripod != NULL && s->beam == NULL) caster_hide(c, k);

@@ -128,6 +128,16 @@ void caster_aim(struct caster *c, struct chunk *k);
 /* What the encoders read has changed: e of the list anew. */
 void caster_aim_read(struct caster *c, struct chunk *k);
 
+/* ---- upset.c: what has gone wrong with the head; each only where the setup has it. */
+/* The angles of a chunk with their wobbles. */
+void caster_wobble(struct caster *c, const struct chunk *k);
+/* socs -> socs: directions as the encoders read them become those of a beam whose pan has slipped. */
+void caster_slip(const struct cast_upset *upset, double slip[9]);
+/* Shots of a laser that does not fire. */
+void caster_darken(struct caster *c, const struct chunk *k);
+/* What comes back through a window that is soiled. */
+void caster_weaken(const struct cast_upset *upset, uint32_t n, double *rho);
+
 /* ---- nearest.c */
 void caster_nearest(struct caster *c, const struct cast_setup *s, const struct met *met);
 /* Number of the tripod's legs among the bodies, as in struct met. */

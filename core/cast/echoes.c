@@ -143,6 +143,7 @@ static void detect(struct caster *c, const struct chunk *k)
                                          .scan_key = k->s->scan_key};
     uint32_t before = count_echoes(l);
     if (d->signal != NULL) {
+        if (k->s->upset != NULL) caster_weaken(k->s->upset, l->n, l->rho);
         detect_by_signal(d->signal, &echoes);
         if (k->attributes) detect_amplitudes(d->signal, &echoes, l->amplitude_cdb);
     }
@@ -150,6 +151,13 @@ static void detect(struct caster *c, const struct chunk *k)
         detect_zones(d->ambiguity, 1e-9 * ((double)run->ns_quot + (double)run->ns_rem / (double)run->ns_den), d->zones,
                      k->s->range_min_m, l->n, l->range_m);
     c->counters.faint += before - count_echoes(l);
+}
+
+/* Where signals are modelled, noise that does not depend on them was asked for. */
+static double fixed_sigma_m(const struct cast_setup *s)
+{
+    const int is_modelled = s->detect != NULL && s->detect->signal != NULL;
+    return s->upset != NULL && !is_modelled ? s->range_sigma_m / s->upset->share : s->range_sigma_m;
 }
 
 /* Keyed by scan, pulse and echo, whether others are sent or not. */
@@ -162,7 +170,7 @@ static void add_noise(struct caster *c, const struct cast_setup *s)
     if (d != NULL && d->noise_by_signal)
         detect_range_noise(d->signal, &echoes);
     else if (s->noise_on)
-        detect_fixed_noise(s->range_sigma_m, 1e-6 * s->range_sigma_ppm, s->noise_key ^ s->scan_key, l->n, l->key,
+        detect_fixed_noise(fixed_sigma_m(s), 1e-6 * s->range_sigma_ppm, s->noise_key ^ s->scan_key, l->n, l->key,
                            l->range_m);
     if (d != NULL && d->instrument != NULL) instrument_range(d->instrument, l->n, l->range_m);
 }

@@ -133,3 +133,22 @@ double schedule_mirror_turn(const struct schedule_segment *seg, uint64_t k)
     return (double)seg->spec.fov_min_udeg / (double)TURN_UDEG +
            (double)r * ((double)seg->spec.sweep_udeg / (double)TURN_UDEG / (double)seg->den);
 }
+
+double schedule_sweep_turn(const struct schedule_segment *seg, uint64_t k)
+{
+    if (kind_of(seg) != EMITTER_BEAMS) return schedule_mirror_turn(seg, k);
+    const uint64_t r = place_in_sweep(seg, k, schedule_line_of(seg, k));
+    return (double)r * (seg->spec.emitter->turn / (double)seg->den);
+}
+
+void schedule_hold_run(const struct schedule_segment *seg, double sweep_turn, struct schedule_run *run)
+{
+    run->num = 0;
+    if (kind_of(seg) == EMITTER_BEAMS) {
+        run->r = 1;
+        run->pan_turn_per_r = sweep_turn;
+    } else {
+        run->r = 0;
+        run->mirror0_turn = sweep_turn;
+    }
+}

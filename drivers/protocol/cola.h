@@ -45,6 +45,7 @@ struct cola {
     int wants_scan; /* measurement was asked for, and no scan has come yet; next look at the head at try_ns */
     int64_t try_ns;
     int64_t now_ns;
+    uint32_t near_wrap;         /* counters begin so many below their wrap */
     int streams;                /* sEN LMDscandata 1 */
     enum cola_form stream_form; /* of telegrams without a request */
     int pending;                /* a scan is done and not yet looked at */
@@ -70,6 +71,9 @@ void cola_deliver(struct cola *self);
 cola_handler cola_read_scan;
 /* As at power-up; the settings, too. */
 void cola_power_up(struct cola *self);
+
+/* Device time as the scanner counts it: us, 32 bits. */
+uint32_t cola_time_us(const struct cola *self, int64_t t_ns);
 
 /* cola_lmd.c */
 

@@ -32,7 +32,7 @@ static int power_up(struct offline *off, double scan_s, const struct sh_report *
     if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, fd) != 0)
         return sh_fail(err, SH_EIO, "socket pair: %s", strerror(errno));
     struct link_spec spec = {.type = LINK_FD, .fd = fd[0]};
-    struct device_options device = {.scan_s = scan_s};
+    struct device_options device = {.scan_s = scan_s, .truth = off->truth};
     struct loop_options options = {.extra = &spec, .report = report};
     int rc = device_create(off->site, &device, &off->device, err);
     if (rc == SH_OK) rc = loop_create(off->site, off->device, &options, &off->loop, err);
@@ -74,7 +74,7 @@ int offline_prepare(struct offline *off, uint32_t station, const struct sh_repor
     return site_open_sights(off->site, station - 1, 1, report, err);
 }
 
-static void end(struct offline *off)
+static void end_loop(struct offline *off)
 {
     struct loop_stats stats;
     if (off->loop != NULL) {
@@ -82,11 +82,23 @@ static void end(struct offline *off)
         loop_join(off->loop, &stats);
     }
     loop_free(off->loop);
+    off->loop = NULL;
+}
+
+static void end(struct offline *off)
+{
+    end_loop(off);
     device_free(off->device);
     if (!off->shares_site) site_free(off->site);
-    off->loop = NULL;
     off->device = NULL;
     off->site = NULL;
+}
+
+int offline_finish(struct offline *off, struct sh_err *err)
+{
+    if (off->sh != NULL) shutdown(off->fd, SHUT_RDWR); /* as below */
+    end_loop(off);
+    return off->device != NULL ? device_close_journal(off->device, err) : SH_OK;
 }
 
 void offline_stop(struct offline *off)

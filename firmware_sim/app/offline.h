@@ -9,6 +9,7 @@
 #include "firmware_sim/site/site.h"
 
 struct offline {
+    const char *truth;   /* the caller's: file for the faults that are injected; NULL: none */
     struct scanhead *sh; /* the client's handle */
     struct site *site;
     /* inner state */
@@ -20,7 +21,7 @@ struct offline {
 
 /* Loads the scene and starts the head. Its own links stay closed. scan_s > 0: it ends each scan after this device
  * time, to the pulse. cfg is changed (pace, links) and must live
- * on. `offline` begins as zeros and is to be closed, also after an error. */
+ * on. `offline` begins as zeros but for truth, and is to be closed, also after an error. */
 int offline_open(struct config *cfg, double scan_s, const struct sh_report *report, struct offline *offline,
                  struct sh_err *err);
 /* The same in parts, for heads that are powered up one after the other at a loaded site: offline_load changes cfg and
@@ -35,6 +36,8 @@ int offline_open_beside(struct config *cfg, const struct offline *other, double 
                         struct offline *offline, struct sh_err *err);
 /* The head ends, its scene and threads are given back. What the client's handle was told stays. */
 void offline_stop(struct offline *offline);
+/* The head ends, and the file of the truth is whole: the first error in writing it. Site and handle stay. */
+int offline_finish(struct offline *offline, struct sh_err *err);
 /* Makes ready for a scan from a station, from 1; 0: where the head stands at power-up. While none is on. */
 int offline_prepare(struct offline *offline, uint32_t station, const struct sh_report *report, struct sh_err *err);
 void offline_close(struct offline *offline);

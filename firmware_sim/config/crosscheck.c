@@ -267,5 +267,6 @@ void cfg_check(struct cfg_reader *rd, struct config *cfg)
     cfg_check_signal(rd, cfg);
     cfg_check_faults(rd, &cfg->faults);
     cfg_check_fault_links(rd, cfg, &cfg->faults);
+    cfg_check_fault_beams(rd, cfg, &cfg->faults);
     cfg_take_scan_settings(cfg);
 }

@@ -170,6 +170,7 @@ static int read_list(struct cfg_reader *rd, const struct config *cfg, struct fau
     cfg_fill_defaults(rd, NULL);
     cfg_check_faults(rd, list);
     cfg_check_fault_links(rd, cfg, list);
+    cfg_check_fault_beams(rd, cfg, list);
     return rd->faults->n == 0 ? SH_OK : rd->faults->fault[0].code;
 }
 

@@ -246,6 +246,8 @@ void cfg_check_platform(struct cfg_reader *rd, struct config *cfg);
 /* faults.c: faults on request, with each other; and with the links of cfg. */
 void cfg_check_faults(struct cfg_reader *rd, struct fault_list *list);
 void cfg_check_fault_links(struct cfg_reader *rd, const struct config *cfg, const struct fault_list *list);
+/* fault_beam.c: the faults with the head, its noise and its signal. */
+void cfg_check_fault_beams(struct cfg_reader *rd, const struct config *cfg, const struct fault_list *list);
 /* link_protocol.c: what the protocols of links need. */
 void cfg_check_link_protocols(struct cfg_reader *rd, struct config *cfg);
 /* Whether the protocol has words for a head of this emitter. */

@@ -9,7 +9,7 @@ static void change_settings(struct device *device)
 {
     if (!device->scan.on) return;
     struct schedule_spec spec;
-    site_fill_spec(device->scan.site, &device->cmd.settings, &spec);
+    device_fill_spec(device, device->scan.site, &spec);
     schedule_change(&device->scan.segment, &device->scan.segment, &spec, device->scan.pulse_next);
     device->scan.describe = 1;
     device_push_event(device, NATIVE_EV_SETTINGS, device->scan.pulse_next, 0, 0, "");

@@ -41,6 +41,14 @@ struct device_counters {
 /* What becomes of the power in a tick. */
 enum device_power_change { DEVICE_POWER_STAYS, DEVICE_POWER_GOES, DEVICE_POWER_COMES };
 
+/* What faults do to the beam in a tick. */
+struct device_upset {
+    int on;            /* 0: nothing, and the rest is not set */
+    int stuck;         /* the mirror, or the rotor, stands at stuck_turn */
+    double stuck_turn; /* turns */
+    struct cast_upset cast;
+};
+
 /* What one tick consists of. All members are copies, so that no thread waits for another. Frames leave in the
  * order of the members. */
 struct device_work {
@@ -63,6 +71,8 @@ struct device_work {
     struct device_variant *variant; /* NULL: that of the version */
     int64_t scan_t0_ns;             /* device time of the scan's start */
     struct schedule_segment segment;
+    int64_t prr_uhz; /* as it is set */
+    struct device_upset upset; /* of all its pulses */
     uint32_t scan;              /* its number */
     uint64_t pulse0, pulse_end; /* pulses of this tick */
     uint64_t n_cast, cast0;     /* of these, how many are cast, and the first of them; UINT64_MAX: none */

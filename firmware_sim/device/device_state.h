@@ -59,6 +59,7 @@ struct device_scan {
     uint64_t pulse_next;            /* next pulse to be claimed */
     uint64_t cast;                  /* of the pulses before, those that are cast */
     struct schedule_segment segment;
+    int64_t prr_uhz, lines_uhz; /* as they are set; a mirror that turns slowly has others in the segment */
     uint32_t station;      /* from 0 */
     uint32_t station_scan; /* which of its scans */
     size_t stretch;        /* of a trajectory: the one of the last pulse that is claimed */
@@ -94,6 +95,20 @@ struct device_overrun {
     uint64_t ticks_said, pulses_said;
     uint64_t first; /* first lost pulse that no event has named; UINT64_MAX: none */
     uint64_t tick;  /* of the last event */
+};
+
+/* Faults that change what is measured (beam_faults.c). They strike at pulses of the scan that is on. */
+struct device_beam {
+    uint32_t version; /* of the board, that the list is of */
+    uint32_t n;
+    struct device_beam_fault {
+        struct fault_entry entry;
+        int strikes;      /* at the scan's next pulse */
+        int64_t begin_ns; /* its first pulse, since the scan's start */
+        double turn;      /* mirror_stuck: where the mirror, or the rotor, stands */
+    } fault[FAULT_MAX];
+    uint64_t edge;           /* the next pulse at which one begins or ends; UINT64_MAX: none */
+    struct device_upset now; /* what all that strike do together */
 };
 
 /* The journal that is written, and the one that is replayed. */
@@ -161,6 +176,7 @@ struct device {
     struct device_journal journal;
     struct fault_board *faults;
     struct head_faults head_faults; /* those of the board that are in the head */
+    struct device_beam beam;
     struct device_variant *variants;
 };
 
@@ -245,6 +261,15 @@ int64_t device_path_end_ns(const struct device *device);
 int device_head_pose(struct device *device, int64_t t_ns, struct pose *head);
 /* Poses of a live head for the pulses that the work holds. */
 void device_take_poses(struct device *device, struct device_work *work);
+
+/* beam_faults.c */
+/* The schedule of a site's head as it is set, with the rates of its scan; and with what slows its mirror. */
+void device_fill_spec(struct device *device, const struct site *site, struct schedule_spec *spec);
+/* Faults that begin or end at the scan's next pulse do so, where it fires before until_ns of the scan: the segment has
+ * the rates from there on, and the board has notes of it. Sets the next edge. */
+void device_turn_beam(struct device *device, int64_t until_ns);
+/* A scan begins, or is over at a time since its start: none strikes any more. */
+void device_end_beam(struct device *device, int64_t t_ns);
 
 /* device_faults.c */
 int device_open_faults(struct device *device, struct sh_err *err);

@@ -12,15 +12,15 @@ void device_fill_descriptor(const struct device *device, struct native_descripto
     struct cast_setup setup;
     struct bvh_info info;
     site_cast_setup(site, device->scan.station, &setup);
-    site_set_program(site, spec->prr_uhz, &setup);
+    site_set_program(site, device->scan.prr_uhz, &setup);
     bvh_get_info(setup.bvh, &info);
     memset(d, 0, sizeof *d);
     memcpy(d->idn, device->idn, sizeof d->idn);
     memcpy(d->profile, cfg->profile.name, sizeof d->profile);
     d->layout = cfg->output.layout == LINE_GEO ? NATIVE_GEO : NATIVE_POLAR;
     d->isa = info.packet;
-    d->prr_uhz = (uint64_t)spec->prr_uhz;
-    d->lines_uhz = (uint64_t)spec->lines_uhz;
+    d->prr_uhz = (uint64_t)device->scan.prr_uhz;
+    d->lines_uhz = (uint64_t)device->scan.lines_uhz;
     d->pan_udeg_s = (uint64_t)spec->pan_udeg_s;
     d->fov_min_udeg = spec->fov_min_udeg;
     d->sweep_udeg = spec->sweep_udeg;
@@ -52,6 +52,17 @@ static const uint32_t echoes_sent[] = {[BEAM_ALL] = NATIVE_ECHOES_ALL,
                                        [BEAM_LAST] = NATIVE_ECHOES_LAST,
                                        [BEAM_STRONGEST] = NATIVE_ECHOES_STRONGEST};
 
+/* As it is set: a mirror that turns slowly has other rates in the segment. */
+static void set_sequence(const struct device *device, struct native_emitter *e)
+{
+    struct schedule_spec spec = device->scan.segment.spec;
+    struct schedule_segment seg;
+    spec.prr_uhz = device->scan.prr_uhz;
+    spec.lines_uhz = device->scan.lines_uhz;
+    schedule_start(&seg, &spec);
+    schedule_sequence_ns(&seg, &e->sequence_ns_num, &e->sequence_ns_den);
+}
+
 void device_fill_emitter(const struct device *device, struct native_emitter *e, struct native_beam *beam)
 {
     const struct emitter *from = device->scan.segment.spec.emitter;
@@ -66,7 +77,7 @@ void device_fill_emitter(const struct device *device, struct native_emitter *e, 
                                  .turn = from->turn,
                                  .rings = from->rings,
                                  .echoes = echoes_sent[device->cmd.settings.echoes]};
-    schedule_sequence_ns(&device->scan.segment, &e->sequence_ns_num, &e->sequence_ns_den);
+    set_sequence(device, e);
     if (from->kind == EMITTER_SPHERE) {
         e->first_ring_udeg = llround(360e6 * emitter_ring_turn(from, 0));
         e->gaps = from->rings != from->gaps + 1 ? from->gaps : 0;

@@ -22,7 +22,6 @@ void device_begin_scan(struct device *device, uint64_t tick)
     struct device_variant *variant;
     if (!plan_scan(device, &variant, tick)) return;
     const struct site *site = variant != NULL ? variant->site : device->site;
-    site_fill_spec(site, &device->cmd.settings, &spec);
     device->scan = (struct device_scan){.on = 1,
                                         .site = site,
                                         .variant = variant,
@@ -32,6 +31,7 @@ void device_begin_scan(struct device *device, uint64_t tick)
                                         .station_scan = ++device->station_scans[device->cmd.settings.station - 1],
                                         .stretch = site_stretch_at(device->site, 0),
                                         .describe = 1};
+    device_fill_spec(device, site, &spec);
     schedule_start(&device->scan.segment, &spec);
     device->cmd.frames_done = 0;
     device->live.next = 0;
@@ -111,7 +111,6 @@ static int claim_pulses(struct device *device, uint64_t tick, struct device_work
     work->variant = device->scan.variant;
     if (work->variant != NULL) atomic_fetch_add(&work->variant->users, 1);
     work->scan_t0_ns = (int64_t)device->scan.tick0 * device->tick_ns;
-    work->segment = *seg;
     work->station = device->scan.station;
     work->station_scan = device->scan.station_scan;
     work->stretch = device->scan.stretch;
@@ -121,13 +120,19 @@ static int claim_pulses(struct device *device, uint64_t tick, struct device_work
      * tick. */
     int64_t end_ns = scan_end_ns(device), until_ns = stop ? since : since + device->tick_ns;
     int ends = end_ns <= until_ns; /* within this tick */
-    uint64_t due = schedule_pulse_at(seg, ends ? end_ns : until_ns);
-    uint64_t room_end = tick_room_end(device);
-    if (due > room_end) {
-        due = room_end;
+    if (ends) until_ns = end_ns;
+    device_turn_beam(device, until_ns);
+    work->segment = *seg;
+    work->prr_uhz = device->scan.prr_uhz;
+    work->upset.on = device->beam.now.on;
+    if (work->upset.on) work->upset = device->beam.now;
+    uint64_t due = schedule_pulse_at(seg, until_ns);
+    const uint64_t edge = device->beam.edge, room_end = tick_room_end(device), most = edge < room_end ? edge : room_end;
+    if (due > most) {
+        due = most;
         ends = 0;
     }
-    uint64_t end = stop || ends ? due : schedule_cut(seg, due);
+    uint64_t end = stop || ends || due == edge ? due : schedule_cut(seg, due);
     int done = due >= seg->end_pulse && !stop;
     if (done || end > seg->end_pulse) end = seg->end_pulse;
     if (end < work->pulse0) end = work->pulse0;
@@ -153,7 +158,8 @@ int device_is_repeated(const struct device *device, uint64_t tick)
 void device_before_scans(struct device *device)
 {
     struct schedule_spec spec;
-    site_fill_spec(device->site, &device->cmd.settings, &spec);
+    device_end_beam(device, 0);
+    device_fill_spec(device, device->site, &spec);
     schedule_start(&device->scan.segment, &spec);
     device->scan.site = device->site;
     device->scan.station = device->cmd.settings.station - 1;
@@ -204,6 +210,7 @@ static void describe(struct device *device, uint64_t tick, struct device_work *w
 static void end_scan(struct device *device, uint64_t tick)
 {
     int stopped = device->scan.stop_requested;
+    device_end_beam(device, (int64_t)(tick - device->scan.tick0) * device->tick_ns);
     device->scan.on = 0;
     device->scan.end_tick = tick;
     device->scan.stop_requested = 0;

@@ -5,8 +5,8 @@
  * carries out on its link (to hang up, to unplug, and so on) when they are the first. Each fault that strikes is noted
  * on the board. Without faults a session has no wire.
  *
- * At a frame faults strike in this order: what ends the session; drop; truncate; flips that are resealed; all others,
- * as they stand in the list. A fault that finds nothing to do there (a flip of a byte that a short frame has not,
+ * At a frame faults strike in this order: what ends the session; drop (and flips on datagrams, but for those that are
+ * resealed); truncate; flips that are resealed; all others, as they stand in the list. A fault that finds nothing to do there (a flip of a byte that a short frame has not,
  * anything but what stands before the frame when it is dropped) does not strike: it is not noted, nor counted.
  *
  * Thread: one, but for the board. Allocates. */

@@ -258,11 +258,28 @@ static void cast_run(struct worker *worker, const struct device_work *work, cons
         uint64_t stop = enter_stretch(worker, work, k, end);
         uint64_t n = stop - k < longest ? stop - k : longest;
         schedule_get_run(&work->segment, &part->line, k, (uint32_t)n, &run);
+        if (work->upset.on && work->upset.stuck) schedule_hold_run(&work->segment, work->upset.stuck_turn, &run);
         count_hits(worker, caster_cast(worker->caster, &worker->setup, &run, &worker->block));
         added(worker, native_encode_points(end_of(worker), room_of(worker), &worker->block, work->scan_t0_ns));
         worker->tick.n_cast += n;
         k += n;
     }
+}
+
+/* Of the axes at a pulse. */
+static void find_angles(const struct device_work *work, uint64_t k, double *mirror_turn, double *pan_turn)
+{
+    const struct schedule_segment *seg = &work->segment;
+    const struct device_upset *upset = &work->upset;
+    *mirror_turn = schedule_mirror_turn(seg, k);
+    *pan_turn = schedule_pan_turn(seg, k);
+    if (!upset->on) return;
+    cast_wobble(&upset->cast, schedule_time_ns(seg, k), mirror_turn, pan_turn);
+    if (!upset->stuck) return;
+    if (seg->spec.emitter != NULL) /* beams */
+        *pan_turn = upset->stuck_turn + seg->spec.emitter->firing[k % seg->spec.emitter->n_beams].pan_turn;
+    else
+        *mirror_turn = upset->stuck_turn;
 }
 
 /* Writes the line-end frame. Its number of echoes is filled in at release: blocks may come from several
@@ -276,7 +293,8 @@ static void end_line(struct worker *worker, const struct device_work *work, cons
     uint64_t cast_end = line->cast_end < end ? line->cast_end : end;
     uint64_t cast_here = cast_end > line->cast0 ? cast_end - line->cast0 : 0;
     uint64_t last = end > seg->k0 ? end - 1 : end; /* stopped right after a change of settings: no pulse is nearer */
-    double mirror_turn = schedule_mirror_turn(seg, last), pan_turn = schedule_pan_turn(seg, last);
+    double mirror_turn, pan_turn;
+    find_angles(work, last, &mirror_turn, &pan_turn);
     if (setup->detect != NULL && setup->detect->instrument != NULL)
         instrument_read(setup->detect->instrument, 1, &mirror_turn, &pan_turn);
     struct ring_tick *tick = &worker->tick;
@@ -312,7 +330,8 @@ static void fill_pulses(struct worker *worker, const struct device_work *work)
     worker->anchored = work->stretch;
     worker->setup.sight = worker->site->station[work->station].sight; /* made anew since the station's last scan */
     worker->setup.echoes = (enum beam_select)work->echoes;
-    site_set_program(work->site, work->segment.spec.prr_uhz, &worker->setup);
+    site_set_program(work->site, work->prr_uhz, &worker->setup);
+    worker->setup.upset = work->upset.on ? &work->upset.cast : NULL;
     worker->setup.scan_key = rng_scan(work->station + 1, work->station_scan);
     if (worker->site->n_movers != 0)
         site_move(worker->site,

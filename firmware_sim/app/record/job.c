@@ -250,6 +250,9 @@ static int record_heads(struct record_job *r, struct config *cfg, struct heads *
     if (all) r->recording.first_station = 1;
     int rc = heads_load(cfg, heads, err);
     if (rc == SH_OK) rc = check_heads(r, heads, all ? cfg->n_stations : r->recording.last_station, err);
+    if (rc == SH_OK && r->truth != NULL && heads->n > 1)
+        rc = sh_fail(err, SH_EINPUT, "%s: --truth: the stations have %u scanners; allowed with one", cfg->file, heads->n);
+    heads->one[0].offline.truth = r->truth;
     if (rc == SH_OK) rc = heads_open(heads, r->site, r->recording.duration_s, &app_report_stderr, err);
     r->recording.head_ends = 1;
     r->files.recorder.may_wait = 1; /* pace fast */
@@ -258,7 +261,10 @@ static int record_heads(struct record_job *r, struct config *cfg, struct heads *
     if (rc == SH_OK && all) r->recording.last_station = heads->first->site->n_stations;
     if (rc == SH_OK) rc = record(r, heads->first->sh, err);
     r->heads = NULL;
-    return rc;
+    if (r->truth == NULL || heads->first == NULL) return rc;
+    struct sh_err why;
+    const int truth_rc = offline_finish(heads->first, &why);
+    return rc != SH_OK || truth_rc == SH_OK ? rc : sh_fail(err, truth_rc, "%s", why.text);
 }
 
 int record_job_off_line(struct record_job *r, struct config *cfg, struct sh_err *err)

@@ -12,6 +12,7 @@ struct site;
 
 struct record_job {
     const char *source; /* of record_job_stream, as libscanhead opens it */
+    const char *truth;  /* of record_job_off_line: file for the faults that are injected; NULL: none */
     const char *stats;  /* where to write what was received, as JSON; NULL: nowhere */
     struct record_files files;
     int each;                     /* files of each scan, too, as files.split makes them */

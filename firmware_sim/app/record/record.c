@@ -215,6 +215,8 @@ static int run(int argc, char **argv)
                          "SOURCE %s: allowed usb, usb:VID:PID:SERIAL, tty:PATH, tcp:HOST:PORT, FILE.shs, CONFIG.yaml",
                          r.job.source);
     if (r.in.sets.n != 0) return app_usage(&app_record, "--set, --crs and --threads need a CONFIG as SOURCE");
+    if (r.in.scenario != NULL || r.job.truth != NULL)
+        return app_usage(&app_record, "--scenario and --truth need a CONFIG as SOURCE");
     return record_job_stream(&r.job, &err) == SH_OK ? APP_OK : app_fail(&err);
 }
 
@@ -266,6 +268,10 @@ static const struct app_option OPTIONS[] = {
      .help = "of .las; 1.2 is for older readers and holds no labels, five returns of a pulse (default 1.4)"},
     {APP_FLAG, "empty-shots", NULL, .at = AT(job.files.recorder.empty_shots),
      .help = "keep shots without echo: .ply with NaN coordinates, .e57 with its invalid state"},
+    {APP_TEXT, "scenario", "FILE", .at = AT(in.scenario),
+     .help = "of a CONFIG: with the faults of this file (config/faults) beside its own"},
+    {APP_TEXT, "truth", "FILE", .at = AT(job.truth),
+     .help = "of a CONFIG: write each fault that is injected as a line of JSON"},
     {APP_TEXT, "stats", "FILE", .at = AT(job.stats), .help = "write what was received as JSON; - is standard output"},
     OPTION_NO_HASH(AT(job.no_hash)),
     OPTION_SET,
@@ -281,7 +287,7 @@ static const char HELP_NOTES[] =
     "SOURCE is one of\n"
     "\n"
     "  CONFIG               a configuration: the head runs off line in this process, as fast as it computes.\n"
-    "                       Only with it: --set, --crs, --threads\n"
+    "                       Only with it: --set, --crs, --threads, --scenario, --truth\n"
     "  usb                  a head on USB, as scanhead list shows it; more exactly usb:vid:pid or\n"
     "                       usb:vid:pid:serial\n"
     "  tty:/dev/...         a serial port\n"

@@ -1,0 +1,47 @@
+/* What has gone wrong with the head, and changes what it measures. */
+#include <math.h>
+
+#include "core/cast/caster_private.h"
+#include "core/vecmath.h"
+
+void cast_wobble(const struct cast_upset *upset, int64_t t_ns, double *mirror_turn, double *pan_turn)
+{
+    for (uint32_t i = 0; i < upset->n_wobbles; i++) {
+        const struct cast_wobble *w = &upset->wobble[i];
+        double sine, cosine;
+        vec_sincos_turn(1e-9 * (double)(t_ns - w->begin_ns) * w->hz, &sine, &cosine);
+        *mirror_turn += w->mirror_turn * sine;
+        *pan_turn += w->pan_turn * sine;
+    }
+}
+
+void caster_wobble(struct caster *c, const struct chunk *k)
+{
+    struct echo_list *l = &c->list;
+    for (uint32_t i = 0; i < k->n; i++)
+        cast_wobble(k->s->upset, k->run->t0_ns + (int64_t)k->dt_ns[i], &l->mirror_turn[i], &l->pan_turn[i]);
+}
+
+/* The pan turns clockwise, from y to x. */
+void caster_slip(const struct cast_upset *upset, double slip[9])
+{
+    double s, c;
+    vec_sincos_turn(upset->slip_turn, &s, &c);
+    const double m[9] = {c, s, 0.0, -s, c, 0.0, 0.0, 0.0, 1.0};
+    for (int i = 0; i < 9; i++)
+        slip[i] = m[i];
+}
+
+void caster_darken(struct caster *c, const struct chunk *k)
+{
+    for (uint32_t i = 0; i < k->n; i++) {
+        c->list.range_m[i] = (double)NAN;
+        c->list.label[i] = 0;
+    }
+}
+
+void caster_weaken(const struct cast_upset *upset, uint32_t n, double *rho)
+{
+    for (uint32_t i = 0; i < n; i++)
+        rho[i] *= upset->share;
+}
