@@ -15,9 +15,7 @@ struct wire *wire_create(const struct wire_spec *spec)
     if (wire == NULL) return NULL;
     wire->spec = *spec;
     wire->heard.has_lines = spec->native;
-    if (grow(&wire->unit, &wire->unit_room, spec->max_unit, 1) &&
-        grow(&wire->mask, &wire->mask_room, spec->max_unit, 1))
-        return wire;
+    if (grow(&wire->unit, &wire->unit_room, spec->max_unit, 1)) return wire;
     wire_free(wire);
     return NULL;
 }
@@ -61,7 +59,7 @@ static int is_act(enum fault_kind kind)
 
 enum { LAST_RANK = 4 };
 
-/* When it has its turn at a frame. A datagram that is damaged on its way is dropped by its reader's system. */
+/* When it has its turn at a frame. */
 static int rank_of(const struct wire *wire, const struct fault *f)
 {
     switch (f->kind) {
@@ -75,7 +73,7 @@ static int rank_of(const struct wire *wire, const struct fault *f)
     case FAULT_TRUNCATE:
         return 2;
     case FAULT_FLIP:
-        return f->reseal ? 3 : wire->spec.datagrams ? 1 : LAST_RANK;
+        return f->reseal ? 3 : wire->spec.datagrams ? 1 : LAST_RANK; /* that datagram is not sent */
     default:
         return LAST_RANK;
     }
@@ -250,8 +248,7 @@ int wire_put(struct wire *wire, const struct wire_item *given, int64_t now_ns)
     if (wire->version != fault_board_version(wire->spec.board)) wire_renew(wire, 0);
     look_at(wire, &item, &making);
     int rc = item.of != FAULT_OF_REPLIES && !wire->is_over ? wire_time(wire, making.spot.t_ns) : SH_OK;
-    if (!grow(&wire->unit, &wire->unit_room, item.len, 1) || !grow(&wire->mask, &wire->mask_room, item.len, 1))
-        rc = SH_ENOMEM;
+    if (!grow(&wire->unit, &wire->unit_room, item.len, 1)) rc = SH_ENOMEM;
     if (rc == SH_OK) memcpy(wire->unit, item.bytes, item.len);
     if (rc == SH_OK && !wire->is_over) rc = change_all(wire, &making);
     if (rc != SH_OK || wire->is_over) {
