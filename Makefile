@@ -206,11 +206,11 @@ demo: deps-build
 	@sh config/demo.sh $(BUILD)/scanhead $(BUILD)/demo
 
 # ---- tests. Warnings are errors. Three builds: all with gcc; what is in the head once more with clang, for its warnings
-# alone; the unit tests and what they need with sanitizers, without optimiser (and so without the warnings that it makes).
-# -g1, the lines alone, is an eighth less to compile.
+# alone; the unit tests and what they need with sanitizers, and without warnings. -Og there takes a seventh more to compile
+# than -O0, and the tests run in half to two thirds of the time. -g1, the lines alone, is an eighth less to compile.
 JOBS ?= $(shell getconf _NPROCESSORS_ONLN)
 STRICT = WERROR=-Werror CFLAGS="-g1 $(CFLAGS)" CXXFLAGS="-g1 $(CXXFLAGS)"
-ASAN = WERROR=-Werror BUILD=$(BUILD)/asan OPT=-O0 CFLAGS=-w CPPFLAGS=-DSH_SANITIZE SAN="-g1 -fsanitize=address,undefined -fno-sanitize-recover=all"
+ASAN = WERROR=-Werror BUILD=$(BUILD)/asan OPT=-Og CFLAGS=-w CPPFLAGS=-DSH_SANITIZE SAN="-g1 -fsanitize=address,undefined -fno-sanitize-recover=all"
 CLANG = WERROR=-Werror BUILD=$(BUILD)/clang CC=clang CXX=clang++ OPT=-O0 CFLAGS=-g0 CXXFLAGS=-g0
 SUBMAKE = @$(MAKE) --no-print-directory -j$(JOBS)
 RUN = SCANHEAD=$(BUILD)/test/scanhead READERS=$(READERS)

@@ -79,6 +79,7 @@ enum link_fault {
 
 struct link_ops {
     const char *name;
+    int datagrams; /* 1: each write goes out with a checksum of the system's, and one that is damaged never arrives */
     int messages; /* 1: each write goes out as one message; the owner puts text or frames into it, not both */
 
     uint32_t faults; /* what fault() can do: LINK_FAULT_BIT of each */

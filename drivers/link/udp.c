@@ -245,6 +245,7 @@ static void udp_close(void *link)
 
 const struct link_ops link_udp = {
     .name = "udp",
+    .datagrams = 1,
     .faults = LINK_FAULT_BIT(LINK_FAULT_UNPLUG),
     .open = udp_open,
     .endpoint = udp_endpoint,

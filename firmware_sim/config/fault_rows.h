@@ -40,8 +40,9 @@
              "descriptor_length: bytes; counters_high: counts. 0: 1; split and merge 2, garbage 16."},
     {FAULT(byte), CFG_COUNT, NULL, "", 0, 1e9, .example = "30", .help = "flip: bits of this byte, from 0; when not given, any."},
     {FAULT(reseal), CFG_BOOL, .def = "off",
-     .help = "flip: the checksums are made right again, so that no reader can see it by them. Of native frames the "
-             "payload alone is then hit."},
+     .help = "flip: the checksums are made right again, so that no reader can see it by them. What is measured is hit "
+             "then, of native frames the payload. Without it a datagram (udp) is not sent: its reader's system would "
+             "drop it."},
     {FAULT(for_ms), CFG_REAL, "ms", "0", 0, 1e8,
      .help = "How long; jitter: at most. Of the clock on the wire, of device time in the head."},
     {FAULT(factor), CFG_REAL, NULL, "0.5", 0.01, 2, .help = "mirror_slow: its speed, as a share of the right one."},

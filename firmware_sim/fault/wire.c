@@ -26,6 +26,7 @@ void wire_free(struct wire *wire)
     wire_queue_clear(&wire->queue);
     wire_heard_free(&wire->heard);
     free(wire->unit);
+    free(wire->mask);
     free(wire->last_reply);
     free(wire);
 }
@@ -59,7 +60,7 @@ static int is_act(enum fault_kind kind)
 enum { LAST_RANK = 4 };
 
 /* When it has its turn at a frame. */
-static int rank_of(const struct fault *f)
+static int rank_of(const struct wire *wire, const struct fault *f)
 {
     switch (f->kind) {
     case FAULT_DISCONNECT:
@@ -72,7 +73,7 @@ static int rank_of(const struct fault *f)
     case FAULT_TRUNCATE:
         return 2;
     case FAULT_FLIP:
-        return f->reseal ? 3 : LAST_RANK;
+        return f->reseal ? 3 : wire->spec.datagrams ? 1 : LAST_RANK; /* that datagram is not sent */
     default:
         return LAST_RANK;
     }
@@ -90,7 +91,6 @@ static int concerns(struct wire *wire, struct wire_fault *fault, int of)
 {
     const struct fault *f = &fault->entry.fault;
     if (is_act(f->kind) && (wire->spec.acts & UINT32_C(1) << (f->kind - FAULT_DISCONNECT)) == 0) return 0;
-    if (f->kind == FAULT_FLIP && f->reseal && wire->spec.reseal == NULL) return 0;
     if (f->count != 0 && *hits_of(wire, fault) >= f->count) return 0;
     return fault_place_of(f->kind) == FAULT_AT_REPLY  ? of == FAULT_OF_REPLIES
            : fault_place_of(f->kind) == FAULT_AT_FRAME ? of == f->of
@@ -127,7 +127,7 @@ static int change_all(struct wire *wire, struct wire_making *making)
     pass_over_old(wire, making);
     for (int rank = 0; rank <= LAST_RANK; rank++)
         for (uint32_t i = 0; i < wire->n_faults && rc == SH_OK && !wire->is_over; i++)
-            if (rank_of(&wire->fault[i].entry.fault) == rank) rc = change(wire, &wire->fault[i], making);
+            if (rank_of(wire, &wire->fault[i].entry.fault) == rank) rc = change(wire, &wire->fault[i], making);
     return rc;
 }
 

@@ -5,8 +5,8 @@
  * carries out on its link (to hang up, to unplug, and so on) when they are the first. Each fault that strikes is noted
  * on the board. Without faults a session has no wire.
  *
- * At a frame faults strike in this order: what ends the session; drop; truncate; flips that are resealed; all others,
- * as they stand in the list. A fault that finds nothing to do there (a flip of a byte that a short frame has not,
+ * At a frame faults strike in this order: what ends the session; drop (and flips on datagrams, but for those that are
+ * resealed); truncate; flips that are resealed; all others, as they stand in the list. A fault that finds nothing to do there (a flip of a byte that a short frame has not,
  * anything but what stands before the frame when it is dropped) does not strike: it is not noted, nor counted.
  *
  * Thread: one, but for the board. Allocates. */
@@ -29,7 +29,9 @@ struct wire_spec {
     uint32_t max_unit;      /* the longest frame or unit, as a rule: room for it is there at once */
     int units;              /* 1: each unit is a write of its own */
     int native;             /* frames of the native protocol */
-    /* Makes the checksums of a frame or unit right; NULL: it has none. */
+    int datagrams;          /* 1: units with a checksum of the system's, which drops those that are damaged on their way */
+    /* Of the protocol (protocol.h). */
+    void (*content)(const uint8_t *unit, size_t len, uint8_t *mask);
     void (*reseal)(uint8_t *unit, size_t len);
     uint32_t acts; /* what the link can do: bit 0 is FAULT_DISCONNECT, and so on; others don't strike */
     struct fault_tally *tally; /* of its acts, over all sessions of the link; outlives the wire. NULL: by session */

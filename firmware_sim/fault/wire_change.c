@@ -111,16 +111,53 @@ static int cut(struct change *c)
     return 1;
 }
 
-/* n bits of those from `begin` on: the first is anywhere, the others follow it, round and round. A bit that another
- * fault has changed already is passed over, since it would be right again. Returns how many. */
-static uint64_t flip_bits(struct change *c, uint64_t begin, uint64_t n_bits, uint64_t n)
+/* Into the wire's mask: the bits that may change. Returns how many. */
+static uint64_t mark_bits(const struct change *c)
+{
+    const struct fault *f = &c->fault->entry.fault;
+    const struct wire *wire = c->wire;
+    const size_t len = c->making->len;
+    const int all = !f->reseal || wire->spec.content == NULL;
+    uint64_t n = 0;
+    memset(wire->mask, all ? 0xff : 0, len);
+    if (!all) wire->spec.content(wire->unit, len, wire->mask);
+    for (size_t i = 0; i < len; i++) {
+        if (f->byte >= 0 && (uint64_t)f->byte != i) wire->mask[i] = 0;
+        n += (uint64_t)__builtin_popcount(wire->mask[i]);
+    }
+    return n;
+}
+
+/* Bit k of the mask; it has more. */
+static uint64_t find_bit(const uint8_t *mask, uint64_t k)
+{
+    size_t i = 0;
+    for (; k >= (uint64_t)__builtin_popcount(mask[i]); i++)
+        k -= (uint64_t)__builtin_popcount(mask[i]);
+    unsigned left = mask[i];
+    for (; k > 0; k--)
+        left &= left - 1;
+    return 8 * i + (uint64_t)__builtin_ctz(left);
+}
+
+/* The first bit of the mask that comes after this one, round and round. */
+static uint64_t next_bit(const uint8_t *mask, size_t len, uint64_t at)
+{
+    for (at++;; at = (at / 8 + 1) * 8) {
+        if (at / 8 == len) at = 0;
+        const unsigned left = mask[at / 8] >> at % 8;
+        if (left != 0) return at + (uint64_t)__builtin_ctz(left);
+    }
+}
+
+/* n of the marked bits: the first is anywhere, the others follow it. A bit that another fault has changed already is
+ * passed over, since it would be right again. Returns how many. */
+static uint64_t flip_bits(struct change *c, uint64_t n_bits, uint64_t n)
 {
     uint8_t *bytes = c->wire->unit;
-    const uint8_t *before = c->making->item->bytes;
-    const uint64_t first = draw_below(c, DRAW_BYTES, n_bits);
-    uint64_t done = 0;
-    for (uint64_t i = 0; i < n_bits && done < n; i++) {
-        const uint64_t at = begin + (first + i) % n_bits;
+    const uint8_t *before = c->making->item->bytes, *mask = c->wire->mask;
+    uint64_t at = find_bit(mask, draw_below(c, DRAW_BYTES, n_bits)), done = 0;
+    for (uint64_t i = 0; i < n_bits && done < n; i++, at = next_bit(mask, c->making->len, at)) {
         const uint8_t bit = (uint8_t)(1U << at % 8);
         if (((bytes[at / 8] ^ before[at / 8]) & bit) != 0) continue;
         bytes[at / 8] ^= bit;
@@ -131,18 +168,22 @@ static uint64_t flip_bits(struct change *c, uint64_t begin, uint64_t n_bits, uin
     return done;
 }
 
-/* With reseal the bits of a native frame are in its payload: what its header says of length and numbers stays true. */
+/* A datagram that is damaged on its way is dropped by the system of its reader; with reseal it was wrong before it was
+ * sent. */
 static int flip(struct change *c)
 {
     const struct fault *f = &c->fault->entry.fault;
-    const size_t len = c->making->len, from = f->reseal && c->wire->spec.native ? NATIVE_HEADER_LEN : 0;
+    struct wire *wire = c->wire;
     if (f->reseal && c->making->is_cut) return 0; /* nothing makes it right */
-    if (f->byte >= 0 ? (uint64_t)f->byte < from || (uint64_t)f->byte >= len : len <= from) return 0;
-    const uint64_t begin = 8 * (f->byte >= 0 ? (uint64_t)f->byte : from), n_bits = f->byte >= 0 ? 8 : 8 * (len - from);
-    c->note.n = flip_bits(c, begin, n_bits, fault_n(f));
+    if (!grow(&wire->mask, &wire->mask_room, c->making->len, 1)) return SH_ENOMEM;
+    const uint64_t n_bits = mark_bits(c);
+    if (n_bits != 0) c->note.n = flip_bits(c, n_bits, fault_n(f));
     if (c->note.n == 0) return 0;
-    if (f->reseal) c->wire->spec.reseal(c->wire->unit, len);
+    if (f->reseal && wire->spec.reseal != NULL) wire->spec.reseal(wire->unit, c->making->len);
     if (f->reseal) strcpy(c->note.text, "resealed");
+    if (f->reseal || !wire->spec.datagrams) return 1;
+    c->making->is_dropped = 1;
+    strcpy(c->note.text, "not sent: its UDP checksum would be wrong");
     return 1;
 }
 

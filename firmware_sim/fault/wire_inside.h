@@ -25,7 +25,8 @@ struct wire {
     int is_over;          /* an act that ends the session waits: what comes after it goes nowhere */
     uint64_t void_frames, void_pulses; /* so much */
     uint8_t *unit; /* the copy of the one at hand that faults change */
-    size_t unit_room;
+    uint8_t *mask; /* its bits that a flip may change */
+    size_t unit_room, mask_room;
     uint8_t *last_reply; /* the reply before */
     size_t last_reply_len, last_reply_room;
     struct wire_heard heard;
