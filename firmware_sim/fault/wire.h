@@ -3,7 +3,7 @@
  * In: frames of the native protocol, units of another one, reply lines, in the order in which the session would write
  * them; the clock. Out: pieces to be written, with the time before which they must not go out, and acts that the owner
  * carries out on its link (to hang up, to unplug, and so on) when they are the first. Each fault that strikes is noted
- * on the board. Without faults a session has no wire.
+ * on the board; what the link does, by the owner, once it has been done. Without faults a session has no wire.
  *
  * At a frame faults strike in this order: what ends the session; drop (and flips on datagrams, but for those that are
  * resealed); truncate; flips that are resealed; all others, as they stand in the list. A fault that finds nothing to do there (a flip of a byte that a short frame has not,

@@ -220,6 +220,39 @@ static void test_fast(void **state)
     assert_int_equal(truth_lines(wire), 1);
 }
 
+/* In lock-step a client is cut off and comes back while device time stands; then the rest is granted. */
+static void test_step(void **state)
+{
+    struct wire *wire = *state;
+    struct head head = start(wire, "type: tcp, port: 0", "kind: unplug, at: 60, count: 1, for_ms: 100",
+                             (const char *const[]){"--pace", "step", NULL});
+    struct scanhead *hit = client_open(head_link(&head, 0)), *clean = client_open(head_link(&head, 1));
+    struct scanhead_frame frame;
+    char seen[65], said[65];
+    int64_t t_ns = 0;
+    client_ask(hit, "*IDN?");
+    scanhead_hash_start(clean);
+    while (strcmp(client_ask(clean, "HEAD:STAT?"), "idle") != 0)
+        client_tell(clean, "TIME:STEP 50 MS");
+    client_tell(clean, "SCAN:START");
+    client_tell(clean, "TIME:STEP 200 MS");
+    read_to_cut(hit, &t_ns);
+    assert_int_equal(scanhead_reattach(hit, DEADLINE_MS), SCANHEAD_OK);
+    const int64_t now_ns = atoll(client_ask(hit, "TIME?"));
+    client_tell(clean, "TIME:STEP 1000 MS");
+    do
+        client_next(hit, &frame);
+    while (frame.t_ns < now_ns);
+    client_until(hit, SCANHEAD_EV_SCAN_END, &frame);
+    read_clean(clean, seen);
+    scanhead_close(hit);
+    scanhead_close(clean);
+    head_end(&head, SIGTERM);
+    stats_hash(wire, said);
+    assert_string_equal(seen, said);
+    assert_int_equal(truth_lines(wire), 1);
+}
+
 /* 1: the head answers on it; 0: it is over without a byte. */
 static int is_answered(int fd)
 {
@@ -342,6 +375,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_each_session, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_two_clients, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_fast, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_step, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_refuse, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_record, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_wrong_link, wire_setup, wire_teardown),
