@@ -168,7 +168,7 @@ enum scanhead_notice_kind {
      * again. A LOCAL frame has no number; it is compared with the frame before it alone. */
     SCANHEAD_NOTICE_REPEATED = 2,
     /* A frame that was missing came after newer ones. It is not handed out, and stays counted as lost. The last 64 gaps
-     * are remembered, but for those of more than 65536 frames. */
+     * are remembered, but for those of more than 65536 frames. 256 such frames in a row are a restart. */
     SCANHEAD_NOTICE_LATE = 3,
     /* The sequence jumps back, and it is neither of the two: a head that started again, or another recording. seq: the
      * first number of the new sequence. The frame is handed out. How many are missing is not known. */
@@ -378,6 +378,9 @@ struct scanhead_stats {
     uint64_t pulses_lost; /* pulses the head says it could not compute */
     /* How often each notice came. seq_gaps above counts restarts, too. frames counts neither repeated nor late ones. */
     uint64_t repeated, late, restarts, cuts, echoes, late_replies, unasked, closed, reattached;
+    /* Of bad_payload, what no gap shows: before the first frame, before a restart, and after the last frame. So
+     * seq_lost + bad_unseen frames are known to be lost on the way. */
+    uint64_t bad_unseen;
 };
 void scanhead_get_stats(const struct scanhead *sh, struct scanhead_stats *stats);
 

@@ -59,6 +59,14 @@ static void forget(struct native_sequence *s)
         s->gap[i].n = 0;
 }
 
+/* Of a late frame. A head that started again while many frames were lost may have numbers that are all missing. */
+static int is_run(struct native_sequence *s, uint32_t seq)
+{
+    s->late_run = s->late_run > 0 && seq == s->last_late + 1 ? s->late_run + 1 : 1;
+    s->last_late = seq;
+    return s->late_run == NATIVE_LATE_RUN;
+}
+
 /* Of a frame that is not the next one. */
 static enum native_notice_kind look_at_jump(struct native_sequence *s, const struct native_seen *frame, int fresh,
                                             uint32_t *first, uint32_t *n)
@@ -71,7 +79,7 @@ static enum native_notice_kind look_at_jump(struct native_sequence *s, const str
         return NATIVE_GAP;
     }
     if (has_come(s, frame, fresh ? 1 : NATIVE_SEEN)) return NATIVE_REPEATED;
-    if (!fresh && fills_gap(s, frame->seq)) return NATIVE_LATE;
+    if (!fresh && fills_gap(s, frame->seq) && !is_run(s, frame->seq)) return NATIVE_LATE;
     forget(s);
     return NATIVE_RESTARTED;
 }
@@ -99,6 +107,7 @@ enum native_notice_kind native_sequence_take(struct native_sequence *s, const st
     if (kind == NATIVE_REPEATED) return kind;
     remember(s, &frame);
     if (kind == NATIVE_LATE) return kind;
+    s->late_run = 0;
     s->next = frame.seq + 1;
     s->have = 1;
     return kind;

@@ -26,6 +26,7 @@ enum {
     NATIVE_SEEN = 256,       /* frames that a repeated one is compared with */
     NATIVE_GAPS = 64,        /* ranges of missing frames that a late one may be of */
     NATIVE_GAP_MOST = 65536, /* frames in such a range: where more are missing, none of them is waited for */
+    NATIVE_LATE_RUN = 256,   /* late frames in a row, one after the other: so many are another sequence */
 };
 
 struct native_seen {
@@ -38,7 +39,8 @@ struct native_sequence {
     int have;  /* a counted frame has come: */
     int fresh; /* another connection has begun, and none has come on it yet */
     uint32_t next;
-    uint32_t n_seen, n_gaps; /* since the start; the last NATIVE_SEEN and NATIVE_GAPS of them are kept */
+    uint32_t last_late, late_run; /* the last late frame, and how many came in a row up to it */
+    uint32_t n_seen, n_gaps;      /* since the start; the last NATIVE_SEEN and NATIVE_GAPS of them are kept */
     struct native_seen seen[NATIVE_SEEN];
     struct {
         uint32_t first, n;

@@ -26,6 +26,7 @@ static void end_slow_boots(struct device *device, uint64_t tick)
 static void turn_off(struct device *device, uint64_t tick, double for_ms)
 {
     struct device_scan *scan = &device->scan;
+    if (scan->on) device_end_beam(device, time_of(device, tick - scan->tick0));
     if (scan->on) scan->end_tick = tick;
     scan->on = scan->stop_requested = scan->describe = scan->anchor_lost = 0;
     end_slow_boots(device, tick);

@@ -46,10 +46,15 @@ def stream(rng):
     return b"".join(parts)[:-rng.randrange(1, 200)]
 
 
+def late_run(rng):
+    """A head that started again, and whose numbers were all missing."""
+    return b"".join(framed(rng, seq, seq) for seq in [*range(6), *range(1000, 1011), *range(2, 900)])
+
+
 def main(name):
     rng, kinds = random.Random(5), set()
     for k in range(STREAMS):
-        data, said = stream(rng), []
+        data, said = stream(rng) if k else late_run(rng), []
         parser = scanhead.Parser(lambda n: said.append(n[:4] + (-1 if n.t_ns is None else n.t_ns,)))
         parser.feed(data)
         while True:

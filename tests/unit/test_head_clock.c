@@ -110,6 +110,140 @@ static void jumps(void **state)
     assert_true(e.at_ns[5] == 5250000000 && e.tai_s[5] == TAI0_S + 6);
 }
 
+/* What the clock is to show, in exact integers and in one sum: each gain counts for the time that it overlaps with, less
+ * that in which the clock stands. Windows in ns; gains in 1e-12. */
+static const struct {
+    int64_t from_ns, until_ns, ppt;
+} GAIN[] = {{0, INT64_MAX, -3000000}, {1234567891, 7777777777, 123456789}, {2000000000, 9100000001, -31000000000}};
+static const int64_t STANDS[][2] = {{3000000000, 3900000000}, {3500000000, 4200000007}, {6700000000, 6700000001}};
+static const int64_t JUMP[][2] = {{2500000000, 1900000000}, {3600000000, 77}, {5000000000, -2400000000}};
+
+static int64_t overlap_ns(int64_t from_ns, int64_t until_ns, int64_t from2_ns, int64_t until2_ns)
+{
+    const int64_t from = from_ns > from2_ns ? from_ns : from2_ns, until = until_ns < until2_ns ? until_ns : until2_ns;
+    return until > from ? until - from : 0;
+}
+
+static int64_t expected_ns(int64_t t_ns)
+{
+    static const int64_t stood[2][2] = {{3000000000, 4200000007}, {6700000000, 6700000001}}; /* STANDS, joined */
+    const i128 ppt = 1000000000000;
+    i128 sum = 0;
+    int64_t shown_ns = TAI0_S * UTC_SECOND_NS + 300000000 + t_ns;
+    for (int s = 0; s < 2; s++)
+        sum -= ppt * overlap_ns(stood[s][0], stood[s][1], 0, t_ns);
+    for (int g = 0; g < 3; g++) {
+        int64_t for_ns = overlap_ns(GAIN[g].from_ns, GAIN[g].until_ns, 0, t_ns);
+        for (int s = 0; s < 2; s++)
+            for_ns -= overlap_ns(stood[s][0], stood[s][1], GAIN[g].from_ns,
+                                 t_ns < GAIN[g].until_ns ? t_ns : GAIN[g].until_ns);
+        sum += (i128)for_ns * GAIN[g].ppt;
+    }
+    for (int j = 0; j < 3; j++)
+        if (t_ns >= JUMP[j][0]) shown_ns += JUMP[j][1];
+    /* The floor, by adding whole hours. */
+    return shown_ns + (int64_t)((sum + ppt * INT64_C(3600000000000)) / ppt - INT64_C(3600000000000));
+}
+
+static struct head_clock changed_clock(void)
+{
+    struct head_clock clock = make_clock(0, -3, 0, 0); /* GAIN[0] */
+    for (int g = 2; g > 0; g--) {                      /* in no order */
+        head_clock_change(&clock, GAIN[g].until_ns, &(struct head_clock_change){.gain_ppt = -GAIN[g].ppt});
+        head_clock_change(&clock, GAIN[g].from_ns, &(struct head_clock_change){.gain_ppt = GAIN[g].ppt});
+    }
+    for (int i = 0; i < 3; i++) {
+        head_clock_change(&clock, STANDS[i][1], &(struct head_clock_change){.stands = -1});
+        head_clock_change(&clock, STANDS[i][0], &(struct head_clock_change){.stands = 1});
+        head_clock_change(&clock, JUMP[i][0], &(struct head_clock_change){.jump_ns = JUMP[i][1]});
+    }
+    return clock;
+}
+
+/* Gains, jumps and standstills one over the other: each nanosecond that is looked at, and each full second. */
+static void changes(void **state)
+{
+    (void)state;
+    const struct head_clock clock = changed_clock();
+    for (int64_t t_ns = 0; t_ns < INT64_C(11000000000); t_ns += 999331)
+        assert_true(head_clock_ns(&clock, t_ns) == expected_ns(t_ns));
+    for (uint32_t i = 0; i < clock.n; i++)
+        for (int64_t d = -2; d < 3 && clock.piece[i].from_ns + d >= 0; d++)
+            assert_true(head_clock_ns(&clock, clock.piece[i].from_ns + d) == expected_ns(clock.piece[i].from_ns + d));
+    struct edges e = find_edges(&clock, 1000000, INT64_C(11000000000));
+    int n = 0;
+    for (int64_t t_ns = 1; t_ns < INT64_C(11000000000);
+         t_ns += 1000000) { /* ends of ticks: all jumps are at their starts */
+        int64_t low_ns = t_ns - 1, high_ns = t_ns + 999998;
+        const int64_t s = expected_ns(high_ns) / UTC_SECOND_NS;
+        int jumps = 0;
+        for (int j = 0; j < 3; j++)
+            jumps |= JUMP[j][0] == low_ns;
+        if (!jumps && low_ns > 0) low_ns--; /* the edge may be the tick's first nanosecond */
+        if (expected_ns(low_ns) / UTC_SECOND_NS == s) continue;
+        while (high_ns - low_ns > 1) {
+            const int64_t mid_ns = low_ns + (high_ns - low_ns) / 2;
+            *(expected_ns(mid_ns) / UTC_SECOND_NS < s ? &low_ns : &high_ns) = mid_ns;
+        }
+        assert_true(n < e.n && e.at_ns[n] == high_ns && e.tai_s[n] == s);
+        n++;
+    }
+    assert_true(n == e.n && n > 6);
+}
+
+/* A clock that reaches a full second as it begins to stand, and one that would run backwards. */
+static void stands_on_a_second(void **state)
+{
+    (void)state;
+    struct head_clock clock = make_clock(0, 0, 0, 0);
+    head_clock_change(&clock, 1700000000, &(struct head_clock_change){.stands = 1});
+    head_clock_change(&clock, 2900000000, &(struct head_clock_change){.stands = -1});
+    head_clock_change(&clock, 4000000000, &(struct head_clock_change){.gain_ppt = -1500000000000});
+    struct edges e = find_edges(&clock, 1000000, 6000000000);
+    assert_int_equal(e.n, 3);
+    assert_true(e.at_ns[1] == 1700000000 && e.at_ns[2] == 3900000000 && e.tai_s[2] == TAI0_S + 3);
+    assert_true(head_clock_ns(&clock, 4000000000) == head_clock_ns(&clock, 99000000000));
+}
+
+/* More changes than are kept: the time since the first of those kept is right. */
+static void forgets_the_oldest(void **state)
+{
+    (void)state;
+    struct head_clock clock = make_clock(0, 0, 0, 0);
+    enum { N = 3 * HEAD_CLOCK_CHANGES };
+    for (int64_t i = 1; i <= N; i++)
+        head_clock_change(&clock, i * 1000000, &(struct head_clock_change){.jump_ns = 1, .gain_ppt = 1000000});
+    /* Gains i ppm in its i-th millisecond, i ns each: N (N - 1) / 2 up to change N; and N jumps of 1 ns. */
+    assert_true(head_clock_ns(&clock, N * 1000000) ==
+                head_clock_true_ns(&clock, N * 1000000) + (int64_t)N * (N - 1) / 2 + N);
+}
+
+static void leap_seconds(void **state)
+{
+    (void)state;
+    struct head_clock clock = make_clock(0, 0, 0, 0);
+    struct utc_time utc;
+    int64_t posix_s;
+    assert_true(head_clock_add_leap(&clock, 0, &posix_s) && posix_s == 1767225660);
+    assert_true(head_clock_add_leap(&clock, 0, &posix_s) && posix_s == 1767225720);
+    utc_from_tai(&clock.table, head_clock_ns(&clock, 59700000000), &utc);
+    assert_true(utc.minute == 0 && utc.second == 60);
+    utc_from_tai(&clock.table, head_clock_ns(&clock, 60700000000), &utc);
+    assert_true(utc.minute == 1 && utc.second == 0);
+    utc_from_tai(&clock.table, head_clock_ns(&clock, 120700000000), &utc);
+    assert_true(utc.minute == 1 && utc.second == 60);
+    const uint32_t n = clock.table.n;
+    for (uint32_t i = n; i < UTC_MAX_LEAPS; i++)
+        assert_true(head_clock_add_leap(&clock, 0, &posix_s));
+    assert_false(head_clock_add_leap(&clock, 0, &posix_s));
+    /* Before leap seconds that are known: those after it are one more. */
+    struct utc_table table = *utc_table_builtin();
+    const int32_t last = table.leap[table.n - 1].tai_minus_utc;
+    assert_true(utc_table_add(&table, 1451606460) && !utc_table_add(&table, 1451606460)); /* 2016-01-01 00:01 */
+    assert_true(table.leap[table.n - 1].tai_minus_utc == last + 1);
+    assert_true(table.leap[table.n - 2].posix_s == 1451606460 && table.leap[table.n - 2].tai_minus_utc == last);
+}
+
 static void epochs(void **state)
 {
     (void)state;
@@ -121,8 +255,7 @@ static void epochs(void **state)
     assert_true(epoch_parse("utc", table, &source, NULL, &err) == SH_OK && source == EPOCH_UTC);
     assert_true(epoch_parse("tai", table, &source, NULL, &err) == SH_OK && source == EPOCH_TAI);
     assert_int_equal(epoch_parse("2016-12-31T23:59:60.5Z", table, &source, &tai_ns, &err), SH_OK);
-    assert_true(source == EPOCH_DATE &&
-                tai_ns == INT64_C(1483228836500000000)); /* 2017-01-01 less 0.5 s, and 37 */
+    assert_true(source == EPOCH_DATE && tai_ns == INT64_C(1483228836500000000)); /* 2017-01-01 less 0.5 s, and 37 */
     assert_int_equal(epoch_parse("now", table, &source, NULL, &err), SH_EINPUT);
     assert_true(epoch_parse("", table, &source, NULL, &err) == SH_OK && source == EPOCH_NONE);
 }
@@ -233,6 +366,10 @@ int main(void)
         cmocka_unit_test(the_first_nanosecond),
         cmocka_unit_test(drift),
         cmocka_unit_test(jumps),
+        cmocka_unit_test(changes),
+        cmocka_unit_test(stands_on_a_second),
+        cmocka_unit_test(forgets_the_oldest),
+        cmocka_unit_test(leap_seconds),
         cmocka_unit_test(epochs),
         cmocka_unit_test(the_systems_clock),
         cmocka_unit_test(the_systems_tai),

@@ -66,6 +66,27 @@ static void test_story(void **state)
         tell_story(0 - back);
 }
 
+/* What is known of a sequence ends with it. */
+static void test_forgets(void **state)
+{
+    (void)state;
+    for (int again = 0; again < 2; again++) {
+        memset(&sequence, 0, sizeof sequence);
+        expect(10, NATIVE_NO_NOTICE, 10, 1);
+        expect(15, NATIVE_GAP, 11, 4);
+        for (uint32_t seq = 16; seq < 40; seq++)
+            expect(seq, NATIVE_NO_NOTICE, seq, 1);
+        assert_int_equal(take(20, 1), NATIVE_RESTARTED);
+        expect(again ? 15 : 12, NATIVE_RESTARTED, again ? 15 : 12, 1); /* came, was missing: before */
+    }
+    /* a late frame fills its place: another one of its number is of another sequence */
+    memset(&sequence, 0, sizeof sequence);
+    expect(10, NATIVE_NO_NOTICE, 10, 1);
+    expect(15, NATIVE_GAP, 11, 4);
+    expect(12, NATIVE_LATE, 12, 1);
+    assert_int_equal(take(12, 1), NATIVE_RESTARTED);
+}
+
 static void test_memory(void **state)
 {
     (void)state;
@@ -102,6 +123,28 @@ static void test_long_gaps(void **state)
     expect(1, NATIVE_RESTARTED, 1, 1);
 }
 
+/* A head that started again, and whose numbers were all missing: it is dropped no longer than for a while. */
+static void test_late_run(void **state)
+{
+    (void)state;
+    memset(&sequence, 0, sizeof sequence);
+    expect(0u - 10u, NATIVE_NO_NOTICE, 0u - 10u, 1);
+    expect(5000, NATIVE_GAP, 0u - 9u, 5009);
+    for (uint32_t i = 1; i < NATIVE_LATE_RUN; i++)
+        expect(i - 3, NATIVE_LATE, i - 3, 1);
+    expect(NATIVE_LATE_RUN - 3, NATIVE_RESTARTED, NATIVE_LATE_RUN - 3, 1);
+    expect(NATIVE_LATE_RUN - 2, NATIVE_NO_NOTICE, NATIVE_LATE_RUN - 2, 1);
+    /* late ones with another frame between, or with a hole */
+    memset(&sequence, 0, sizeof sequence);
+    expect(0, NATIVE_NO_NOTICE, 0, 1);
+    expect(5000, NATIVE_GAP, 1, 4999);
+    for (uint32_t i = 1; i < 2000; i++) {
+        expect(i < 1000 ? i : i + 1, NATIVE_LATE, i < 1000 ? i : i + 1, 1);
+        if (i % 200 == 0 && i != 1000)
+            expect(5000 + i / 200 - (i > 1000), NATIVE_NO_NOTICE, 5000 + i / 200 - (i > 1000), 1);
+    }
+}
+
 static void test_resumed(void **state)
 {
     (void)state;
@@ -124,6 +167,10 @@ static void test_resumed(void **state)
         expect(seq, NATIVE_NO_NOTICE, seq, 1);
     native_sequence_resume(&sequence);
     expect(7, NATIVE_RESTARTED, 7, 1);
+    /* nor is it late, though its number was missing */
+    expect(9, NATIVE_GAP, 8, 1);
+    native_sequence_resume(&sequence);
+    expect(8, NATIVE_RESTARTED, 8, 1);
 }
 
 static void test_local(void **state)
@@ -165,8 +212,9 @@ static void test_same_number(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_story),   cmocka_unit_test(test_memory), cmocka_unit_test(test_long_gaps),
-        cmocka_unit_test(test_resumed), cmocka_unit_test(test_local),  cmocka_unit_test(test_same_number),
+        cmocka_unit_test(test_late_run), cmocka_unit_test(test_forgets),     cmocka_unit_test(test_story),
+        cmocka_unit_test(test_memory),   cmocka_unit_test(test_long_gaps),   cmocka_unit_test(test_resumed),
+        cmocka_unit_test(test_local),    cmocka_unit_test(test_same_number),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -48,7 +48,7 @@ NO_LABEL = 0xFFFF
 _HASHED = (DESCRIPTOR, ANCHOR, POINTS, LINE_END, POSES, ATTRIBUTES, EMITTER, COLOURS)
 _HEADER_LEN, _MAX_PAYLOAD, _MAX_TEXT = 28, 65536, 512
 _QUEUE_BYTES, _KEEP_POSES, _CHUNK = 64 << 20, 8192, 1 << 16
-_SEEN, _GAPS, _GAP_MOST = 256, 64, 65536  # how far back a jump is looked into, as libscanhead does
+_SEEN, _GAPS, _GAP_MOST, _LATE_RUN = 256, 64, 65536, 256  # how far back a jump is looked into, as libscanhead does
 _FRAME_BYTES = 512  # what a kept frame takes beside its payload
 _POLL_MS = 2**31 - 1  # the longest that poll() waits
 _ANSWERS_S = 0.2  # how long further answers to questions that were given up may take
@@ -285,6 +285,7 @@ class _Sequence:
         self._seen = collections.deque(maxlen=_SEEN)
         self._gaps = collections.deque(maxlen=_GAPS)  # [first number, how many]
         self._local = None  # type: Optional[Tuple]
+        self._last_late, self._late_run = 0, 0  # the last late frame; how many came in a row up to it
 
     def take(self, frame: Tuple) -> Tuple[str, int, int]:
         """frame: its number, flags and all that makes it another one. What is noticed of it ("": nothing), and
@@ -299,7 +300,7 @@ class _Sequence:
         if kind != "repeated":
             self._seen.append(frame)
         if kind not in ("repeated", "late"):
-            self._next = (seq + 1) % 2**32
+            self._next, self._late_run = (seq + 1) % 2**32, 0
         return kind, first, n
 
     def _jump(self, frame: Tuple) -> Tuple[str, int, int]:
@@ -310,15 +311,26 @@ class _Sequence:
             return "gap", expected, missing
         if frame in self._seen:
             return "repeated", seq, 1
+        if self._fills_gap(seq) and not self._is_run(seq):
+            return "late", seq, 1
+        self._seen.clear()
+        self._gaps.clear()
+        return "restarted", seq, 1
+
+    def _fills_gap(self, seq: int) -> bool:
         for gap in self._gaps:
             before = (seq - gap[0]) % 2**32
             if before < gap[1]:
                 rest, gap[1] = gap[1] - before - 1, before
                 self._add_gap((seq + 1) % 2**32, rest)
-                return "late", seq, 1
-        self._seen.clear()
-        self._gaps.clear()
-        return "restarted", seq, 1
+                return True
+        return False
+
+    def _is_run(self, seq: int) -> bool:
+        """Of a late frame: so many in a row are another sequence, whose numbers were all missing."""
+        follows = self._late_run > 0 and seq == (self._last_late + 1) % 2**32
+        self._late_run, self._last_late = self._late_run + 1 if follows else 1, seq
+        return self._late_run == _LATE_RUN
 
     def _add_gap(self, first: int, n: int) -> None:
         if 0 < n <= _GAP_MOST:

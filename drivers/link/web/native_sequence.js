@@ -1,5 +1,5 @@
 // The sequence numbers of frames, as PROTOCOL.md has them (*Sequence numbers*): what is missing, came already, or too late.
-const SEEN = 256, GAPS = 64, GAP_MOST = 65536; // how far back a jump is looked into, as libscanhead does
+const SEEN = 256, GAPS = 64, GAP_MOST = 65536, LATE_RUN = 256; // how far back a jump is looked into, as libscanhead does
 const LOCAL = 2;
 
 /** Takes the headers of whole frames, one after the other. */
@@ -13,6 +13,8 @@ export class Sequence {
   #t_ns = new BigInt64Array(SEEN);
   #gaps = []; // {first, n}
   #local = null; // the frame before, if it was LOCAL
+  #lastLate = 0;
+  #lateRun = 0; // late frames in a row, up to that one
   first = 0;
   n = 1;
 
@@ -27,7 +29,9 @@ export class Sequence {
     const notice = this.#next < 0 || seq === this.#next ? '' : this.#jump(frame);
     if (notice === 'repeated') return notice;
     this.#remember(frame);
-    if (notice !== 'late') this.#next = (seq + 1) >>> 0;
+    if (notice === 'late') return notice;
+    this.#next = (seq + 1) >>> 0;
+    this.#lateRun = 0;
     return notice;
   }
 
@@ -47,17 +51,29 @@ export class Sequence {
       return 'gap';
     }
     if (this.#hasCome(frame)) return 'repeated';
+    if (this.#fillsGap(seq) && !this.#isRun(seq)) return 'late';
+    this.#n = 0;
+    this.#gaps = [];
+    return 'restarted';
+  }
+
+  #fillsGap(seq) {
     for (const gap of this.#gaps) {
       const before = (seq - gap.first) >>> 0;
       if (before >= gap.n) continue;
       const rest = gap.n - before - 1;
       gap.n = before;
       this.#addGap((seq + 1) >>> 0, rest);
-      return 'late';
+      return true;
     }
-    this.#n = 0;
-    this.#gaps = [];
-    return 'restarted';
+    return false;
+  }
+
+  // Of a late frame: so many in a row are another sequence, whose numbers were all missing.
+  #isRun(seq) {
+    this.#lateRun = this.#lateRun > 0 && seq === (this.#lastLate + 1) >>> 0 ? this.#lateRun + 1 : 1;
+    this.#lastLate = seq;
+    return this.#lateRun === LATE_RUN;
   }
 
   #addGap(first, n) {

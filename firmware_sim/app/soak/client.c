@@ -72,14 +72,15 @@ static int is_over(const struct soak_link *link)
     return phase == SOAK_ENDS || (phase == SOAK_DRAINS && atomic_load(&link->done));
 }
 
-/* Nothing but the end is waited for once it has all frames up to the last fault. */
-static void see_whether_done(struct soak_link *link)
+/* Nothing but the end is waited for once it has all frames up to the last fault, and the head scans. */
+static void see_whether_done(struct recorder *r)
 {
+    struct soak_link *link = r->link;
     if (atomic_load(&link->soak->phase) != SOAK_DRAINS || atomic_load(&link->done)) return;
     pthread_mutex_lock(&link->lock);
     const int is_done = link->in_session && link->last >= atomic_load(&link->soak->until);
     pthread_mutex_unlock(&link->lock);
-    if (is_done) atomic_store(&link->done, 1);
+    if (is_done && clock_now_ns() - r->points_ns < POINTS_WITHIN_NS) atomic_store(&link->done, 1);
 }
 
 static void give_up(struct recorder *r, const char *why)
@@ -138,6 +139,7 @@ static void take_frame(struct recorder *r, const struct scanhead_frame *frame)
 {
     const int64_t now_ns = clock_now_ns();
     soak_saw_frame(r->link, frame, now_ns);
+    soak_saw_inside(r->link, frame);
     if (frame->type == SCANHEAD_POINTS) r->points_ns = now_ns;
 }
 
@@ -190,7 +192,7 @@ static void *record(void *arg)
     began(&r);
     while (!r.ended) {
         step(&r);
-        see_whether_done(link);
+        see_whether_done(&r);
         if (!r.ended && !is_over(link)) ask(&r);
     }
     atomic_store(&link->done, 1);

@@ -6,6 +6,9 @@
 
 #include "firmware_sim/app/soak/soak.h"
 
+/* Blocks are computed so far ahead, at most. */
+static const int64_t AHEAD_NS = 500000000;
+
 void soak_hide(struct soak_row *row, uint64_t n, const char *why)
 {
     row->hidden += n;
@@ -72,7 +75,7 @@ static void hit_frame(struct soak_link *link, const struct fault_note *note)
     struct soak_row *row = &link->row[row_of(note)];
     if (note->kind >= FAULT_DISCONNECT) {
         if (link->n_acts < SOAK_MAX_ACTS)
-            link->act[link->n_acts++] = (struct soak_act){note->kind};
+            link->act[link->n_acts++] = (struct soak_act){note->kind, note->t_ns};
         else
             soak_hide(row, 1, "too many at a time");
         return;
@@ -110,7 +113,7 @@ static void hit_reply(struct soak_link *link, const struct fault_note *note)
 static void hit_connection(struct soak_link *link, const struct fault_note *note)
 {
     if (note->kind == FAULT_REFUSE && link->n_refusals < SOAK_MAX_ACTS)
-        link->refusal[link->n_refusals++] = (struct soak_act){note->kind};
+        link->refusal[link->n_refusals++] = (struct soak_act){note->kind, note->t_ns};
     else
         soak_hide(&link->row[note->kind], 1, "only the USB of this machine sees it");
 }
@@ -135,12 +138,12 @@ static void hit_link(struct soak_link *link, const struct fault_note *note)
 void soak_heard(void *ctx, const struct fault_note *note)
 {
     struct soak *soak = ctx;
-    if (note->link == 0 || note->link > soak->n_links) {
-        pthread_mutex_lock(&soak->lock);
-        if (!note->ended) soak->head_row[note->kind].injected++;
-        pthread_mutex_unlock(&soak->lock);
-        return;
+    for (uint32_t i = 0; i < soak->n_links && note->link == 0; i++) {
+        pthread_mutex_lock(&soak->link[i].lock);
+        soak_heard_head(&soak->link[i], note);
+        pthread_mutex_unlock(&soak->link[i].lock);
     }
+    if (note->link == 0 || note->link > soak->n_links) return;
     struct soak_link *link = &soak->link[note->link - 1];
     pthread_mutex_lock(&link->lock);
     if (!note->ended) hit_link(link, note);
@@ -187,9 +190,9 @@ void soak_saw_frame(struct soak_link *link, const struct scanhead_frame *frame, 
     link->frames++;
     link->bytes += frame->raw_len;
     link->last = seq;
+    link->last_t_ns = frame->t_ns;
     if (fact != NULL) {
-        fact->got++;
-        fact->digest = soak_digest(frame);
+        if (fact->got++ == 0) fact->digest = soak_digest(frame);
         fact->late_ms = lateness_ms(link, frame->t_ns, now_ns);
     }
     pthread_mutex_unlock(&link->lock);
@@ -257,14 +260,20 @@ void soak_saw_open(struct soak_link *link)
     pthread_mutex_unlock(&link->lock);
 }
 
-/* The oldest act is why it ended. What was to be done to the session after that, was not. */
+/* What was to be done to the session after its end, was not. */
+static void forget_acts(struct soak_link *link, uint32_t from)
+{
+    for (uint32_t i = from; i < link->n_acts; i++)
+        soak_hide(&link->row[link->act[i].kind], 1, "the session was over before it");
+    link->n_acts = 0;
+}
+
+/* The oldest act is why it ended. */
 static void end_by_act(struct soak_link *link)
 {
     link->row[link->act[0].kind].noticed++;
-    for (uint32_t i = 1; i < link->n_acts; i++)
-        soak_hide(&link->row[link->act[i].kind], 1, "the session was over before it");
+    forget_acts(link, 1);
     link->was_cut = 1;
-    link->n_acts = 0;
 }
 
 static void end_by_refusal(struct soak_link *link)
@@ -280,12 +289,15 @@ void soak_saw_end(struct soak_link *link, int was_refused)
     pthread_mutex_lock(&link->lock);
     link->in_session = 0;
     link->closings++;
-    if (link->n_acts != 0)
+    const int64_t act_ns = link->n_acts != 0 ? link->act[0].t_ns : INT64_MAX;
+    /* It is said some ticks before power goes, and all frames up to then come. */
+    if (soak_saw_power_go(link, act_ns != INT64_MAX ? act_ns : link->last_t_ns + AHEAD_NS)) {
+        forget_acts(link, 0);
+        link->was_cut = 1;
+    } else if (link->n_acts != 0)
         end_by_act(link);
     else if (was_refused && (link->n_refusals != 0 || link->was_cut))
         end_by_refusal(link);
-    else if (link->head_cycles != 0)
-        link->head_cycles--;
     else
         link->odd_closings++;
     pthread_mutex_unlock(&link->lock);

@@ -23,11 +23,9 @@ static void add(struct soak_row *sum, const struct soak_row *row)
 static struct soak_row sum_of(const struct soak *soak)
 {
     struct soak_row sum = {0};
-    for (int row = 0; row < SOAK_N_ROWS; row++) {
-        add(&sum, &soak->head_row[row]);
+    for (int row = 0; row < SOAK_N_ROWS; row++)
         for (uint32_t i = 0; i < soak->n_links; i++)
             add(&sum, &soak->link[i].row[row]);
-    }
     return sum;
 }
 
@@ -35,6 +33,8 @@ static struct soak_row sum_of(const struct soak *soak)
 
 static void fail(struct soak *soak, int is_wrong, const char *why)
 {
+    for (uint32_t i = 0; i < soak->n_failures; i++)
+        if (strcmp(soak->failures[i], why) == 0) return;
     if (is_wrong && soak->n_failures < sizeof soak->failures / sizeof *soak->failures)
         soak->failures[soak->n_failures++] = why;
 }
@@ -75,7 +75,6 @@ void soak_conclude(struct soak *soak)
     const char *state = soak->clean.state;
     for (uint32_t i = 0; i < soak->n_links; i++)
         conclude_link(soak, &soak->link[i]);
-    fail(soak, has_open_rows(soak->head_row), "a fault of the head was neither noticed nor known to be hidden");
     soak->healthy = soak->clean.idn[0] != '\0' && strcmp(state, "scanning") == 0;
     soak->hash_is_same = soak->stats.have_hash && strcmp(soak->stats.sha256, soak->clean.sha256) == 0;
     fail(soak, soak->clean.failed[0] != '\0', "the clean reader ended before the head did");
@@ -127,8 +126,6 @@ void soak_print(const struct soak *soak, FILE *out)
 {
     const struct soak_row sum = sum_of(soak);
     fprintf(out, "%-22s %-16s %8s %8s %8s %8s\n", "link", "fault", "injected", "noticed", "lost", "accepted");
-    for (int row = 0; row < SOAK_N_ROWS; row++)
-        print_row(out, "head", row, &soak->head_row[row]);
     for (uint32_t i = 0; i < soak->n_links; i++)
         print_link(&soak->link[i], out);
     fprintf(out, "%-22s %-16s %8" PRIu64 " %8" PRIu64 " %8" PRIu64 " %8" PRIu64 "  %" PRIu64 " not to be noticed, %" PRIu64
@@ -210,7 +207,6 @@ void soak_put(struct json *json, const void *ctx)
         put_link(json, &soak->link[i]);
     json_close_array(json);
     json_open_object(json, "head");
-    put_rows(json, soak->head_row);
     json_uint(json, "clean_frames", soak->clean.frames);
     json_uint(json, "clean_reader_lost_frames", soak->clean.reader_lost);
     json_uint(json, "lost_pulses", soak->stats.counters.lost_pulses);

@@ -7,7 +7,7 @@
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/base/clock.h"
 
-enum { WAIT_MS = 20, READY_MS = 30000, DRAIN_MS = 5000, HEALTH_MS = 6000 };
+enum { WAIT_MS = 20, READY_MS = 30000, HEAD_SEEN_MS = 2500, DRAIN_MS = 5000, HEALTH_MS = 6000 };
 
 struct soak_options {
     struct app_input in;
@@ -56,6 +56,13 @@ static int all_done(struct soak *soak)
     return 1;
 }
 
+static int is_head_seen(struct soak *soak)
+{
+    for (uint32_t i = 0; i < soak->n_links; i++)
+        if (!soak_is_head_seen(&soak->link[i])) return 0;
+    return 1;
+}
+
 /* ---- the run */
 
 /* Of the clock, in real time; else of the head. */
@@ -87,6 +94,7 @@ static void soak_on(const struct soak_options *o, struct soak *soak)
 static void drain(struct soak *soak)
 {
     fault_board_remove(soak->board, 0);
+    wait_until(soak, is_head_seen, HEAD_SEEN_MS);
     atomic_store(&soak->until, soak_clean_top(soak) + 1);
     atomic_store(&soak->phase, SOAK_DRAINS);
     wait_until(soak, all_done, DRAIN_MS);
@@ -119,8 +127,10 @@ static int serve(const struct soak_options *o, struct soak *soak, struct soak_he
     soak_clients_join(soak);
     soak_clean_join(soak);
     if (rc == SH_OK) rc = device_close_journal(head->device, err);
-    for (uint32_t i = 0; i < soak->n_links; i++)
+    for (uint32_t i = 0; i < soak->n_links; i++) {
         soak_judge(&soak->link[i], 1);
+        soak_judge_head(&soak->link[i]);
+    }
     return rc;
 }
 
@@ -165,7 +175,7 @@ static int soak_head(struct config *cfg, void *ctx, struct sh_err *err)
     if (soak == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     soak->cfg = cfg;
     soak->realtime = cfg->loop.pace == PACE_REALTIME;
-    pthread_mutex_init(&soak->lock, NULL);
+    soak->faults = cfg->faults;
     int rc = open_head(o, cfg, soak, &head, err);
     if (rc == SH_OK) rc = serve(o, soak, &head, err);
     if (rc == SH_OK) rc = say_result(o, soak, err);

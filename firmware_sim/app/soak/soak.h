@@ -6,6 +6,7 @@
  *   ask.c      its questions and their answers
  *   ledger.c   of each link and frame: what was done to it, and what the client saw of it
  *   judge.c    compares the two, frame by frame
+ *   head.c     faults in the head, and what the client saw of them
  *   sheet.c    what came of it, as text and as JSON */
 #ifndef FIRMWARE_SIM_APP_SOAK_SOAK_H
 #define FIRMWARE_SIM_APP_SOAK_SOAK_H
@@ -24,7 +25,8 @@
 enum { SOAK_RESEALED = FAULT_N_KINDS, SOAK_N_ROWS };
 
 /* Frames that are remembered, clean and by link: a power of two. Half of them at most wait to be judged. */
-enum { SOAK_RING = 1 << 16, SOAK_MAX_RUNS = 1024, SOAK_MAX_ACTS = 64, SOAK_MAX_REPLY_NOTES = 16 };
+enum { SOAK_RING = 1 << 16, SOAK_MAX_RUNS = 1024, SOAK_MAX_ACTS = 64, SOAK_MAX_REPLY_NOTES = 16, SOAK_MAX_MOMENTS = 64,
+       SOAK_REPLY_LEN = 600 };
 
 struct soak_row {
     uint64_t injected;
@@ -96,6 +98,24 @@ struct soak_run {
 
 struct soak_act {
     enum fault_kind kind;
+    int64_t t_ns; /* device time */
+};
+
+/* A fault in the head that the client has not noticed yet. */
+struct soak_moment {
+    enum fault_kind kind;
+    uint32_t fault;       /* its number */
+    struct fault what;    /* as configured */
+    int64_t from_ns, to_ns; /* device time; INT64_MAX: it is at work */
+    double for_ms;
+};
+
+/* The head's clock, as it last said. */
+struct soak_times {
+    int have;
+    int64_t at_ns, gps_ns; /* device time, GPS time */
+    int have_pps;
+    int64_t pps_ns, leap_s; /* device time of the last PPS; GPS time less UTC then */
 };
 
 struct soak_ask {
@@ -106,6 +126,7 @@ struct soak_ask {
     uint32_t echoes;      /* noticed since then, and: */
     uint64_t bad_bytes;
     uint64_t others;      /* faults of any other kind since then */
+    char before[SOAK_REPLY_LEN]; /* the last reply that came */
     uint64_t asked, answered, timeouts, wrong, hurt, odd;
     uint32_t next;
 };
@@ -128,7 +149,7 @@ struct soak_link {
     uint64_t frames, bytes, refused_frames, sessions, closings, refused;
     uint64_t lost_plain;   /* without a fault ... */
     uint64_t reader_lost;  /* ... and those that the head said it left out, as the client was too slow */
-    uint64_t wrong_plain;  /* differ from the clean frame without a fault */
+    uint64_t wrong_plain;  /* differ from the clean frame without a fault, or came twice */
     uint64_t unknown;      /* the clean reader did not get them */
     uint64_t odd_closings; /* the connection was closed without a fault */
     uint64_t away;         /* frames that came while there was no session */
@@ -139,7 +160,13 @@ struct soak_link {
     struct soak_act act[SOAK_MAX_ACTS], refusal[SOAK_MAX_ACTS];
     uint32_t n_acts, n_refusals;
     int was_cut; /* an act that keeps clients out for a while may still do so */
-    uint64_t head_cycles; /* power cycles that this link has not been closed by yet */
+    struct soak_moment moment[SOAK_MAX_MOMENTS];
+    uint32_t n_moments;
+    struct soak_times times;
+    int have_pulse;
+    uint64_t pulse0;      /* of the last points frame */
+    double usual_rate;    /* of the mirror, rad/s; 0: not known */
+    int64_t last_t_ns;    /* device time of the last frame */
     int64_t offset_ns;   /* the smallest time from a frame's own to its arrival */
     int have_offset;
     struct soak_ask ask;
@@ -163,8 +190,7 @@ struct soak {
     atomic_int phase;         /* enum soak_phase */
     _Atomic uint64_t until;   /* SOAK_DRAINS: clients go on up to this frame */
     _Atomic uint64_t base;    /* of soak_seq; 0: nothing came so far */
-    pthread_mutex_t lock;     /* of: */
-    struct soak_row head_row[SOAK_N_ROWS]; /* of faults in the head */
+    struct fault_list faults; /* as configured */
     struct loop_stats stats;
     double wall_s;
     int healthy, hash_is_same;
@@ -208,6 +234,16 @@ void soak_saw_open(struct soak_link *link);
 void soak_saw_end(struct soak_link *link, int was_refused);
 struct soak_fact *soak_fact_at(struct soak_link *link, soak_seq seq); /* NULL: not known */
 void soak_hide(struct soak_row *row, uint64_t n, const char *why);
+
+/* ---- head.c: the caller of the first two has the link's lock */
+void soak_heard_head(struct soak_link *link, const struct fault_note *note);
+/* A power cycle that began before that device time, and was not noticed, is. 0: there is none. */
+int soak_saw_power_go(struct soak_link *link, int64_t before_ns);
+void soak_saw_inside(struct soak_link *link, const struct scanhead_frame *frame);
+void soak_saw_state(struct soak_link *link, const char *state);
+int soak_is_head_seen(struct soak_link *link);
+/* At the end. */
+void soak_judge_head(struct soak_link *link);
 
 /* ---- judge.c */
 /* Frames that nothing more will come of. With `all` those up to the end, too. The caller has the link's lock. */

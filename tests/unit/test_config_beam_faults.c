@@ -1,0 +1,58 @@
+/* Faults that change what is measured: heads that can't have them are told why. */
+#include "tests/unit/config_rig.h"
+
+
+/* Of a line head without noise and signal (base), with a list of faults, and of other heads. */
+static void assert_refused(const char *profile, const char *rest, const char *item, const char *says)
+{
+    char with[512];
+    char *text;
+    snprintf(with, sizeof with, "%sfaults: [%s]\noutput:", rest, item);
+    text = edited("output:", with);
+    if (profile != NULL) {
+        char own[160], *was = strstr(text, "  prr_hz"), *end = strstr(was, "scene:");
+        char *whole = calloc(1, strlen(text) + sizeof own);
+        assert_non_null(whole);
+        snprintf(own, sizeof own, "head:\n  profile: %s\n", profile);
+        snprintf(whole, strlen(text) + sizeof own, "%s%s", own, end);
+        free(text);
+        text = whole;
+    }
+    load_text(text);
+    free(text);
+    if (says == NULL ? err.code != SH_OK : err.code != SH_EINPUT || strstr(err.text, says) == NULL)
+        fail_msg("%s, %s: \"%s\", expected \"%s\"", profile != NULL ? profile : "any-rate", item, err.text,
+                 says != NULL ? says : "nothing");
+}
+
+static void a_head_has_faults_of_what_it_has(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *profile, *rest, *item, *says; /* says NULL: it is taken */
+    } cases[] = {
+        {NULL, "", "{kind: mirror_slow, factor: 0.1}", NULL},
+        {NULL, "", "{kind: mirror_stuck}, {kind: mirror_wobble}, {kind: pan_slip}, {kind: laser_off}", NULL},
+        {"hokuyo-utm-30lx", "", "{kind: mirror_slow, factor: 2}", "2 times 40 lines per second are more than "},
+        {NULL, "", "{kind: window_soiled}", "faults[0].kind: window_soiled would change nothing: "},
+        {NULL, "noise: {range: on, sigma_m: 0}\n", "{kind: window_soiled}", "window_soiled would change nothing: "},
+        {NULL, "noise: {range: on}\n", "{kind: window_soiled}", NULL},
+        {NULL, "signal: {model: on}\n", "{kind: window_soiled}", NULL},
+        {"hokuyo-utm-30lx", "", "{kind: mirror_slow}, {kind: pan_slip}, {kind: laser_off}", NULL},
+        {"hokuyo-utm-30lx", "", "{kind: mirror_stuck}", "(planar) fires at steps of its mirror; allowed with "},
+        {"hokuyo-utm-30lx", "", "{kind: mirror_wobble}", "(planar) fires at steps of its mirror; allowed with "},
+        {"hokuyo-utm-30lx", "platform: {kind: live}\n", "{kind: mirror_slow}", "is on a live platform; allowed with "},
+        {"velodyne-vlp16", "", "{kind: mirror_slow}, {kind: mirror_stuck}, {kind: mirror_wobble}", NULL},
+        {"sphere", "", "{kind: mirror_slow}", "(sphere) has no mirror; allowed with line, planar, beams"},
+        {"sphere", "", "{kind: mirror_stuck}", "(sphere) has no mirror; allowed with line, beams"},
+        {"sphere", "", "{kind: laser_off}, {kind: pan_slip}", NULL},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++)
+        assert_refused(cases[i].profile, cases[i].rest, cases[i].item, cases[i].says);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(a_head_has_faults_of_what_it_has)};
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

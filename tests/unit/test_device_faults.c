@@ -1,0 +1,291 @@
+/* Faults of the head's states, power, time and counters, as the device carries them out: tick by tick. */
+#include "tests/unit/device_rig.h"
+
+enum { TICK_NS = 1000000, BOOT_TICKS = 200 };
+
+/* A device with these faults in its configuration, one a line. */
+static struct rig *open_with(const char *faults, const struct device_options *options, const char *const *sets,
+                             int n_sets)
+{
+    char path[96];
+    snprintf(path, sizeof path, "%s/run.yaml", folder);
+    FILE *f = fopen(path, "r+");
+    assert_non_null(f);
+    assert_int_equal(fseek(f, 0, SEEK_END), 0);
+    const long len = ftell(f);
+    fprintf(f, "faults:\n%s", faults);
+    assert_int_equal(fclose(f), 0);
+    struct rig *rig = rig_open(options, sets, n_sets);
+    assert_int_equal(truncate(path, len), 0);
+    return rig;
+}
+
+/* Claims on to the next STATE event; its tick. */
+static uint64_t next_state(struct rig *rig, const char *name)
+{
+    const struct native_event *event = rig_wait(rig, NATIVE_EV_STATE, 5000);
+    assert_string_equal(event->text, name);
+    return rig->work.tick;
+}
+
+static void tell_refused(struct rig *rig, const char *line, const char *why)
+{
+    struct command_result result;
+    device_command(rig->device, 1, line, rig->next, &result);
+    assert_int_equal(result.error, CMD_E_SETTINGS);
+    if (strstr(result.reply, why) == NULL) fail_msg("%s: %s", line, result.reply);
+}
+
+/* Two at once add up; one whose window is over does nothing. */
+static void boots_slowly(void **state)
+{
+    (void)state;
+    struct rig *rig = open_with("  - {kind: slow_boot, for_ms: 300}\n  - {kind: slow_boot, for_ms: 50.5}\n"
+                                "  - {kind: slow_boot, for_ms: 1000, from_s: 0.1}\n",
+                                NULL, NULL, 0);
+    assert_int_equal(next_state(rig, "boot"), 0);
+    assert_int_equal(next_state(rig, "idle"), BOOT_TICKS + 300 + 51);
+    assert_string_equal(rig_tell(rig, "FAULt:INJected?", rig->next), "2");
+    rig_close(rig);
+}
+
+static void fails_the_self_test(void **state)
+{
+    (void)state;
+    struct rig *rig = open_with("  - {kind: self_test, from_s: 0.2, until_s: 0.201}\n", NULL, NULL, 0);
+    assert_int_equal(next_state(rig, "boot"), 0);
+    assert_int_equal(next_state(rig, "fault"), BOOT_TICKS);
+    const struct native_event *error = rig_event(rig, NATIVE_EV_ERROR);
+    assert_non_null(error);
+    assert_true((int64_t)error->a == CMD_E_SELF_TEST);
+    assert_true(device_is_idle(rig->device));
+    assert_string_equal(rig_tell(rig, "SYST:ERR?", rig->next),
+                        "-330,\"Self-test failed; at the end of boot; *RST goes on without it\"");
+    tell_refused(rig, "SCAN:START", "self-test");
+    rig_tell(rig, "*RST", rig->next);
+    assert_string_equal(rig_state(rig, rig->next), "idle");
+    rig_tell(rig, "SCAN:START", rig->next);
+    assert_int_equal(next_state(rig, "idle"), BOOT_TICKS + 1); /* of *RST */
+    rig_close(rig);
+    /* A window that no boot ends in. */
+    rig = open_with("  - {kind: self_test, from_s: 0.201}\n  - {kind: self_test, until_s: 0.2}\n", NULL, NULL, 0);
+    next_state(rig, "boot");
+    assert_int_equal(next_state(rig, "idle"), BOOT_TICKS);
+    rig_close(rig);
+}
+
+/* Nobody could start the one scan: the run is over. */
+static void ends_a_run_that_cannot_scan(void **state)
+{
+    (void)state;
+    static const struct device_options options = {.start = 1, .one_scan = 1};
+    struct rig *rig = open_with("  - {kind: self_test}\n", &options, NULL, 0);
+    for (int i = 0; i < 1000 && rig_claim(rig); i++)
+        continue;
+    assert_true(rig->over);
+    rig_close(rig);
+}
+
+/* What the head says in a tick: nothing. */
+static void assert_silent(struct rig *rig)
+{
+    const struct device_work *w = &rig->work;
+    assert_true(w->n_events == 0 && !w->telemetry && !w->describe && !w->scanning && w->surfaces_n == 0);
+}
+
+/* Power goes at 1 s within a scan and is back 0.5 s later; all is as at power-up. */
+static void loses_power(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"time.epoch=2026-01-01T00:00:00.25Z", "head.frames=0"};
+    struct rig *rig = open_with("  - {kind: power_cycle, from_s: 0.9996, for_ms: 499.7}\n", NULL, sets, 2);
+    struct command_result result;
+    rig_go_to(rig, 300);
+    rig_tell(rig, "HEAD:PRR 100000", 300);
+    rig_tell(rig, "SCAN:START", 300);
+    device_report(rig->device, CMD_E_PULSES, "for the test");
+    while (rig->next < 1000) {
+        assert_true(rig_claim(rig));
+        assert_true(rig->work.power == DEVICE_POWER_STAYS);
+    }
+    assert_true(rig->work.scanning && !rig->work.cut_short);
+    assert_true(rig_claim(rig));
+    assert_true(rig->work.power == DEVICE_POWER_GOES && !rig->work.scanning && !rig->work.telemetry);
+    assert_int_equal(rig->work.n_events, 1); /* no SCAN_END */
+    assert_string_equal(rig_event(rig, NATIVE_EV_STATE)->text, "off");
+    assert_false(device_is_idle(rig->device));
+    /* Who speaks before that is released gets no answer, and changes nothing. */
+    device_command(rig->device, 1, "HEAD:PRR 200000", 950, &result);
+    assert_true(result.reply[0] == '\0' && result.error == 0 && result.effect == COMMAND_NONE);
+    device_command(rig->device, 1, "FAULt:ADD {kind: laser_off}", 1001, &result);
+    assert_true(result.error != 0 && strcmp(rig_state(rig, 1001), "off") == 0);
+    while (rig->next < 1500) {
+        assert_true(rig_claim(rig));
+        assert_silent(rig);
+    }
+    assert_true(rig_claim(rig));
+    assert_true(rig->work.power == DEVICE_POWER_COMES && rig->work.t_ns == INT64_C(1500) * TICK_NS);
+    assert_string_equal(rig_event(rig, NATIVE_EV_STATE)->text, "boot");
+    assert_int_equal(next_state(rig, "idle"), 1500 + BOOT_TICKS);
+    assert_string_equal(rig_tell(rig, "HEAD:PRR?", rig->next), "300000");
+    assert_string_equal(rig_tell(rig, "SYST:CONT?", rig->next), "0");
+    assert_string_equal(rig_tell(rig, "SYST:ERR:COUN?", rig->next), "0");
+    assert_string_equal(rig_tell(rig, "FAULt:INJected? 1", rig->next), "1");
+    rig_tell(rig, "SCAN:START", rig->next);
+    assert_int_equal(rig_wait(rig, NATIVE_EV_SCAN_START, 100)->a, 2);
+    assert_true(rig->work.pulse0 == 0 && rig->work.segment.spec.prr_uhz == 300000000000);
+    /* The time of day went on. */
+    const struct native_event *pps = rig_wait(rig, NATIVE_EV_PPS, 1000);
+    assert_true(pps->a == 1767225602 && pps->b == 1750000000);
+    rig_close(rig);
+}
+
+/* At a pulse, once: the scan that --start begins again is not cut. A slow boot that power cuts short is over. */
+static void loses_power_at_a_pulse(void **state)
+{
+    (void)state;
+    static const struct device_options options = {.start = 1};
+    struct rig *rig = open_with("  - {kind: power_cycle, from_pulse: 12345, for_ms: 10}\n"
+                                "  - {kind: power_cycle, from_s: 1, for_ms: 10}\n"
+                                "  - {kind: slow_boot, for_ms: 1000, from_s: 0.1}\n",
+                                &options, NULL, 0);
+    rig_wait(rig, NATIVE_EV_SCAN_START, 1000);
+    uint64_t fired = 0;
+    while (rig->work.power == DEVICE_POWER_STAYS) {
+        fired = rig->work.scanning ? rig->work.pulse_end : fired;
+        assert_true(rig_claim(rig));
+    }
+    /* At the first tick that begins with the pulse or later; a tick has 300 of them, cut at packets of 16. */
+    assert_true(fired >= 12345 && fired < 12345 + 300 + 16);
+    next_state(rig, "boot");
+    assert_int_equal(next_state(rig, "off"), 1000);
+    assert_int_equal(next_state(rig, "boot"), 1010);
+    assert_int_equal(next_state(rig, "idle"), 1010 + BOOT_TICKS + 1000);
+    assert_int_equal(rig_wait(rig, NATIVE_EV_SCAN_START, 1000)->a, 2);
+    for (int i = 0; i < 200; i++) {
+        assert_true(rig_claim(rig));
+        assert_true(rig->work.power == DEVICE_POWER_STAYS);
+    }
+    assert_true(rig->work.scanning && rig->work.pulse0 > 12345 + 600);
+    rig_close(rig);
+}
+
+/* Full seconds begin at .7 s. PPS at 1.7 and 2.7 are lost; at 3.2 the clock jumps on by 0.3 s; from 5.1 to 6.35 it stands,
+ * at x.7; a minute ends at 5 s and has a second 60. */
+static void tells_a_wrong_time(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"time.epoch=2026-06-30T11:59:55.3Z"};
+    static const struct {
+        int64_t at_ns;
+        const char *utc;
+    } want[] = {{700000000, "2026-06-30T11:59:56Z"},
+                {3200000000 + 200000000, "2026-06-30T11:59:59Z"},
+                {4400000000, "2026-06-30T11:59:60Z"},
+                {6350000000 + 300000000, "2026-06-30T12:00:00Z"},
+                {7650000000, "2026-06-30T12:00:01Z"}};
+    struct rig *rig = open_with("  - {kind: pps_lost, from_s: 1.7, until_s: 2.700000001}\n"
+                                "  - {kind: clock_jump, from_s: 3.2, jump_s: 0.3}\n"
+                                "  - {kind: clock_stop, from_s: 5.1, until_s: 6.35}\n"
+                                "  - {kind: leap_second, from_s: 0.5}\n",
+                                NULL, sets, 1);
+    int n = 0;
+    while (rig->next < 7700) {
+        assert_true(rig_claim(rig));
+        const struct native_event *pps = rig_event(rig, NATIVE_EV_PPS);
+        if (pps == NULL) continue;
+        assert_true(n < 5);
+        assert_string_equal(pps->text, want[n].utc);
+        assert_true((int64_t)pps->b == want[n].at_ns && rig->work.tick == (uint64_t)want[n].at_ns / TICK_NS);
+        n++;
+    }
+    assert_int_equal(n, 5);
+    assert_string_equal(rig_tell(rig, "TIME:UTC?", 6000), "2026-06-30T11:59:60.700000000Z");
+    assert_true(device_utc_ns(rig->device, 5200000000) == device_utc_ns(rig->device, 6349999999));
+    rig_close(rig);
+}
+
+/* A drift that a command takes out is over; the head is ahead from then on by what it gained. */
+static void drifts_until_it_is_cleared(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"time.epoch=2026-01-01T00:00:00Z"};
+    struct rig *rig = rig_open(NULL, sets, 1);
+    rig_go_to(rig, 1000);
+    assert_string_equal(rig_tell(rig, "FAULt:ADD {kind: clock_drift, from_s: 0.5, ppm: 1000}", 1000), "1");
+    rig_go_to(rig, 2500);
+    rig_tell(rig, "FAULt:CLEar 1", 2500);
+    rig_go_to(rig, 4000);
+    assert_string_equal(rig_tell(rig, "TIME:UTC?", 1500), "2026-01-01T00:00:01.500000000Z");
+    assert_string_equal(rig_tell(rig, "TIME:UTC?", 2000), "2026-01-01T00:00:02.000500000Z");
+    assert_string_equal(rig_tell(rig, "TIME:UTC?", 3500), "2026-01-01T00:00:03.501000000Z");
+    rig_close(rig);
+}
+
+/* A journal has the command, and replaying it does the same at the same tick. */
+static void is_replayed(void **state)
+{
+    (void)state;
+    uint64_t off_tick = 0;
+    for (int replays = 0; replays < 2; replays++) {
+        struct device_options options = {.journal = replays ? NULL : journal_path,
+                                         .replay = replays ? journal_path : NULL};
+        struct rig *rig = rig_open(&options, NULL, 0);
+        rig_go_to(rig, 777);
+        if (!replays) rig_tell(rig, "FAULt:ADD {kind: power_cycle, from_s: 0.2, for_ms: 3}", 770);
+        while (rig->work.power != DEVICE_POWER_GOES)
+            assert_true(rig_claim(rig));
+        if (!replays) off_tick = rig->work.tick;
+        assert_int_equal(off_tick, 977);
+        assert_int_equal(rig->work.tick, off_tick);
+        rig_close(rig);
+    }
+}
+
+static void counts_from_near_the_wrap(void **state)
+{
+    (void)state;
+    struct rig *rig =
+        open_with("  - {kind: counters_high, n: 40, until_s: 0.5}\n  - {kind: power_cycle, from_s: 1, for_ms: 5}\n",
+                  NULL, NULL, 0);
+    assert_int_equal(device_near_wrap(rig->device), 40);
+    rig_go_to(rig, 1000);
+    assert_int_equal(device_near_wrap(rig->device), 40);
+    rig_go_to(rig, 1010);
+    assert_int_equal(device_near_wrap(rig->device), 0);
+    assert_string_equal(rig_tell(rig, "FAULt:INJected? 1", rig->next), "1");
+    rig_close(rig);
+}
+
+static void needs_a_time_of_day(void **state)
+{
+    (void)state;
+    struct rig *rig = rig_open(NULL, NULL, 0);
+    static const char *const kinds[] = {"clock_jump", "clock_drift", "clock_stop", "pps_lost", "leap_second"};
+    for (int i = 0; i < 5; i++) {
+        char line[64];
+        struct command_result result;
+        snprintf(line, sizeof line, "FAULt:ADD {kind: %s}", kinds[i]);
+        device_command(rig->device, 1, line, 0, &result);
+        assert_true(result.error != 0);
+        assert_non_null(strstr(result.reply, "time.epoch"));
+    }
+    rig_close(rig);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(boots_slowly),
+        cmocka_unit_test(fails_the_self_test),
+        cmocka_unit_test(ends_a_run_that_cannot_scan),
+        cmocka_unit_test(loses_power),
+        cmocka_unit_test(loses_power_at_a_pulse),
+        cmocka_unit_test(tells_a_wrong_time),
+        cmocka_unit_test(drifts_until_it_is_cleared),
+        cmocka_unit_test(is_replayed),
+        cmocka_unit_test(counts_from_near_the_wrap),
+        cmocka_unit_test(needs_a_time_of_day),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}
