@@ -328,6 +328,7 @@ static int web_cut(struct web_link *web, int session)
 static int web_unplug(struct web_link *web)
 {
     if (web->listening == NULL) return SH_ESTATE;
+    web_break(web->listening); /* first: who is cut off finds nobody there */
     for (int s = 0; s < web->n_sessions; s++)
         web_cut(web, s);
     lws_callback_all_protocol_vhost_args(web->vhost, NULL, LWS_CALLBACK_USER, NULL, 0);

@@ -25,8 +25,8 @@ struct usb_backend_spec {
     int retry_ms;     /* with attach: time between attempts to come back after the host has let go; 0: 1000 */
 };
 
-/* What fault() of a back end does: the endpoint is not there until USB_FAULT_PLUG; sessions end as by a reset of the
- * bus; an IN endpoint of the kernel's is halted. */
+/* What fault() of a back end does. UNPLUG: the device and its endpoint are not there until PLUG. RESET: sessions end as
+ * by a reset of the bus, or as near to that as the back end's host can be brought. */
 enum usb_fault { USB_FAULT_UNPLUG, USB_FAULT_PLUG, USB_FAULT_RESET };
 
 /* Of the faults that concern transfers and requests. Unplugging and resets all back ends can. */
@@ -63,8 +63,8 @@ struct usb_backend_ops {
      * never. */
     int64_t (*due_ns)(const void *backend);
 
-    /* Faults on request; what is not listed here the device core does. `faults`: USB_CAN_… of what this back end
-     * and its host make possible. fault() returns 0, or SH_ESTATE: it can't be done now. */
+    /* Faults on request; the others are the device core's. `faults`: USB_CAN_… of those that reach the host through
+     * this back end. fault() returns 0, or SH_ESTATE: it can't be done now. */
     uint32_t faults;
     int (*fault)(void *backend, enum usb_fault what);
 

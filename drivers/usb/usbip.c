@@ -211,10 +211,10 @@ static int unplug(struct usbip *self)
 {
     if (self->unplugged) return SH_ESTATE;
     self->unplugged = 1;
+    if (self->listener >= 0) close(self->listener); /* first: who is cut off finds nobody there */
+    self->listener = -1;
     for (int i = 0; i < MAX_CONNS; i++)
         usbip_conn_end(&self->conn[i]);
-    if (self->listener >= 0) close(self->listener);
-    self->listener = -1;
     return SH_OK;
 }
 

@@ -161,6 +161,7 @@ static int carry_out(struct pump *pump, struct session *s, int index, const stru
     const double for_ms = act->for_ms;
     const int rc = pump->ops->fault(pump->link, what, index, act->n, for_ms);
     wire_pop(s->wire);
+    if (what == LINK_FAULT_BUS_RESET) pump->plug_ns = in_ms(0.0); /* where it takes unplugging, and plugging in fails */
     if (rc != SH_OK) {
         wire_go_on(s->wire);
         char text[96];

@@ -163,9 +163,9 @@ static int take_tick(struct pump *pump, struct session *s)
     struct ring *ring = &pump->stream->ring;
     const struct protocol_ops *ops = pump->protocol;
     struct ring_copy tick = {.buf = pump->tick, .cap = pump->stream->tick_bytes};
-    const uint64_t off_tick = session_off_tick(pump, s);
-    if (s->cursor >= off_tick) return 0;
     enum ring_read got = ring_read(ring, s->reader, s->cursor, &tick);
+    const uint64_t off_tick = session_off_tick(pump, s); /* known before the tick was released */
+    if (s->cursor >= off_tick) return 0;
     if (got == RING_NONE || (got == RING_READ && tick.len > tick.cap)) return 0;
     uint64_t released = stream_released(pump->stream);
     if (got == RING_LOST && s->cursor + ring->queue_ticks < released) {

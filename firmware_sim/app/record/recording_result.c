@@ -64,22 +64,28 @@ void recording_put(struct json *json, const void *ctx)
     json_close_object(json);
 }
 
-/* Frames that never came leave gaps in the sequence. Frames with a wrong checksum leave gaps, too, but not at
- * the very end of the stream. */
+/* Frames that never came leave gaps in the sequence. Frames with a wrong checksum leave gaps, too, but not before the
+ * first frame and after the last. */
 static uint64_t count_lost(const struct scanhead_stats *s)
 {
-    return (s->seq_lost > s->bad_payload ? s->seq_lost : s->bad_payload) + s->dropped;
+    return s->seq_lost + s->bad_unseen + s->dropped;
+}
+
+/* Adds ", N what" where there were any. */
+static void add_count(char *text, size_t len, uint64_t n, const char *what)
+{
+    const size_t at = strlen(text);
+    if (n != 0) snprintf(text + at, len - at, "%s%llu %s", at > 0 ? ", " : "", (unsigned long long)n, what);
 }
 
 int recording_describe_order(const struct recording_result *result, char *text, size_t len)
 {
     const struct scanhead_stats *s = &result->stream;
-    if (s->repeated + s->late + s->restarts == 0) return 0;
-    snprintf(text, len,
-             "the stream was not in order: %llu frames came twice, %llu came after newer ones and count as lost, "
-             "the sequence began anew %llu times",
-             (unsigned long long)s->repeated, (unsigned long long)s->late, (unsigned long long)s->restarts);
-    return 1;
+    text[0] = '\0';
+    add_count(text, len, s->repeated, "frames came twice (taken once)");
+    add_count(text, len, s->late, "frames came after newer ones (lost)");
+    add_count(text, len, s->restarts, "restarts of the sequence");
+    return text[0] != '\0';
 }
 
 int recording_check_complete(const struct recording_result *result, struct sh_err *err)

@@ -192,8 +192,7 @@ void soak_saw_frame(struct soak_link *link, const struct scanhead_frame *frame, 
     link->last = seq;
     link->last_t_ns = frame->t_ns;
     if (fact != NULL) {
-        fact->got++;
-        fact->digest = soak_digest(frame);
+        if (fact->got++ == 0) fact->digest = soak_digest(frame);
         fact->late_ms = lateness_ms(link, frame->t_ns, now_ns);
     }
     pthread_mutex_unlock(&link->lock);

@@ -25,7 +25,8 @@
 enum { SOAK_RESEALED = FAULT_N_KINDS, SOAK_N_ROWS };
 
 /* Frames that are remembered, clean and by link: a power of two. Half of them at most wait to be judged. */
-enum { SOAK_RING = 1 << 16, SOAK_MAX_RUNS = 1024, SOAK_MAX_ACTS = 64, SOAK_MAX_REPLY_NOTES = 16, SOAK_MAX_MOMENTS = 64 };
+enum { SOAK_RING = 1 << 16, SOAK_MAX_RUNS = 1024, SOAK_MAX_ACTS = 64, SOAK_MAX_REPLY_NOTES = 16, SOAK_MAX_MOMENTS = 64,
+       SOAK_REPLY_LEN = 600 };
 
 struct soak_row {
     uint64_t injected;
@@ -125,6 +126,7 @@ struct soak_ask {
     uint32_t echoes;      /* noticed since then, and: */
     uint64_t bad_bytes;
     uint64_t others;      /* faults of any other kind since then */
+    char before[SOAK_REPLY_LEN]; /* the last reply that came */
     uint64_t asked, answered, timeouts, wrong, hurt, odd;
     uint32_t next;
 };
@@ -147,7 +149,7 @@ struct soak_link {
     uint64_t frames, bytes, refused_frames, sessions, closings, refused;
     uint64_t lost_plain;   /* without a fault ... */
     uint64_t reader_lost;  /* ... and those that the head said it left out, as the client was too slow */
-    uint64_t wrong_plain;  /* differ from the clean frame without a fault */
+    uint64_t wrong_plain;  /* differ from the clean frame without a fault, or came twice */
     uint64_t unknown;      /* the clean reader did not get them */
     uint64_t odd_closings; /* the connection was closed without a fault */
     uint64_t away;         /* frames that came while there was no session */
