@@ -15,9 +15,7 @@ struct wire *wire_create(const struct wire_spec *spec)
     if (wire == NULL) return NULL;
     wire->spec = *spec;
     wire->heard.has_lines = spec->native;
-    if (grow(&wire->unit, &wire->unit_room, spec->max_unit, 1) &&
-        grow(&wire->mask, &wire->mask_room, spec->max_unit, 1))
-        return wire;
+    if (grow(&wire->unit, &wire->unit_room, spec->max_unit, 1)) return wire;
     wire_free(wire);
     return NULL;
 }
@@ -36,11 +34,11 @@ void wire_free(struct wire *wire)
 /* Those that were there keep what they know; new ones count from here. */
 void wire_renew(struct wire *wire, uint64_t ahead)
 {
-    struct fault_entry entry[FAULT_MAX];
-    struct wire_fault before[FAULT_MAX];
+    struct fault_entry entry[FAULT_KEPT];
+    struct wire_fault before[FAULT_KEPT];
     const uint32_t n_before = wire->n_faults;
     memcpy(before, wire->fault, sizeof before);
-    wire->version = fault_board_copy(wire->spec.board, entry, &wire->n_faults);
+    wire->version = fault_board_copy_all(wire->spec.board, entry, &wire->n_faults);
     if (wire->spec.tally != NULL) fault_tally_renew(wire->spec.tally, entry, wire->n_faults);
     for (uint32_t i = 0; i < wire->n_faults; i++) {
         struct wire_fault *fault = &wire->fault[i];
@@ -49,6 +47,7 @@ void wire_renew(struct wire *wire, uint64_t ahead)
         if (!entry[i].from_start) fault->base[FAULT_OF_REPLIES] += ahead;
         for (uint32_t k = 0; k < n_before; k++)
             if (before[k].entry.number == entry[i].number) *fault = before[k];
+        fault->entry.until_ns = entry[i].until_ns;
     }
 }
 
@@ -61,7 +60,7 @@ static int is_act(enum fault_kind kind)
 
 enum { LAST_RANK = 4 };
 
-/* When it has its turn at a frame. A datagram that is damaged on its way is dropped by its reader's system. */
+/* When it has its turn at a frame. */
 static int rank_of(const struct wire *wire, const struct fault *f)
 {
     switch (f->kind) {
@@ -75,7 +74,7 @@ static int rank_of(const struct wire *wire, const struct fault *f)
     case FAULT_TRUNCATE:
         return 2;
     case FAULT_FLIP:
-        return f->reseal ? 3 : wire->spec.datagrams ? 1 : LAST_RANK;
+        return f->reseal ? 3 : wire->spec.datagrams ? 1 : LAST_RANK; /* that datagram is not sent */
     default:
         return LAST_RANK;
     }
@@ -113,6 +112,7 @@ static int change(struct wire *wire, struct wire_fault *fault, struct wire_makin
     const int of = making->item->of;
     struct fault_spot spot = making->spot;
     if (!concerns(wire, fault, of) || spot.number <= fault->base[of]) return SH_OK;
+    if (fault->entry.until_ns != INT64_MAX && (of == FAULT_OF_REPLIES || spot.t_ns >= fault->entry.until_ns)) return SH_OK;
     spot.number -= fault->base[of];
     spot.t_ns -= fault->entry.since_ns;
     if (spot.t_ns < 0 && of != FAULT_OF_REPLIES) return SH_OK;
@@ -250,8 +250,7 @@ int wire_put(struct wire *wire, const struct wire_item *given, int64_t now_ns)
     if (wire->version != fault_board_version(wire->spec.board)) wire_renew(wire, 0);
     look_at(wire, &item, &making);
     int rc = item.of != FAULT_OF_REPLIES && !wire->is_over ? wire_time(wire, making.spot.t_ns) : SH_OK;
-    if (!grow(&wire->unit, &wire->unit_room, item.len, 1) || !grow(&wire->mask, &wire->mask_room, item.len, 1))
-        rc = SH_ENOMEM;
+    if (!grow(&wire->unit, &wire->unit_room, item.len, 1)) rc = SH_ENOMEM;
     if (rc == SH_OK) memcpy(wire->unit, item.bytes, item.len);
     if (rc == SH_OK && !wire->is_over) rc = change_all(wire, &making);
     if (rc != SH_OK || wire->is_over) {

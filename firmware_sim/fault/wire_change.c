@@ -111,8 +111,7 @@ static int cut(struct change *c)
     return 1;
 }
 
-/* Into the wire's mask: the bits that may change. Those that another fault has changed already are not among them: they
- * would be right again. Returns how many. */
+/* Into the wire's mask: the bits that may change. Returns how many. */
 static uint64_t mark_bits(const struct change *c)
 {
     const struct fault *f = &c->fault->entry.fault;
@@ -123,46 +122,66 @@ static uint64_t mark_bits(const struct change *c)
     memset(wire->mask, all ? 0xff : 0, len);
     if (!all) wire->spec.content(wire->unit, len, wire->mask);
     for (size_t i = 0; i < len; i++) {
-        wire->mask[i] &= (uint8_t)~(wire->unit[i] ^ c->making->item->bytes[i]);
         if (f->byte >= 0 && (uint64_t)f->byte != i) wire->mask[i] = 0;
         n += (uint64_t)__builtin_popcount(wire->mask[i]);
     }
     return n;
 }
 
-/* Bit k of those that may change; there are more. */
+/* Bit k of the mask; it has more. */
 static uint64_t find_bit(const uint8_t *mask, uint64_t k)
 {
-    uint64_t at = 0;
-    for (; k >= (uint64_t)__builtin_popcount(mask[at / 8]); at += 8)
-        k -= (uint64_t)__builtin_popcount(mask[at / 8]);
-    for (;; at++) {
-        const int may = mask[at / 8] >> at % 8 & 1;
-        if (may && k == 0) return at;
-        k -= (uint64_t)may;
+    size_t i = 0;
+    for (; k >= (uint64_t)__builtin_popcount(mask[i]); i++)
+        k -= (uint64_t)__builtin_popcount(mask[i]);
+    unsigned left = mask[i];
+    for (; k > 0; k--)
+        left &= left - 1;
+    return 8 * i + (uint64_t)__builtin_ctz(left);
+}
+
+/* The first bit of the mask that comes after this one, round and round. */
+static uint64_t next_bit(const uint8_t *mask, size_t len, uint64_t at)
+{
+    for (at++;; at = (at / 8 + 1) * 8) {
+        if (at / 8 == len) at = 0;
+        const unsigned left = mask[at / 8] >> at % 8;
+        if (left != 0) return at + (uint64_t)__builtin_ctz(left);
     }
 }
 
-/* Of n bits the first is anywhere, the others follow it, round and round. A datagram that is damaged on its way is
- * dropped by the system of its reader; with reseal it was wrong before it was sent. */
+/* n of the marked bits: the first is anywhere, the others follow it. A bit that another fault has changed already is
+ * passed over, since it would be right again. Returns how many. */
+static uint64_t flip_bits(struct change *c, uint64_t n_bits, uint64_t n)
+{
+    uint8_t *bytes = c->wire->unit;
+    const uint8_t *before = c->making->item->bytes, *mask = c->wire->mask;
+    uint64_t at = find_bit(mask, draw_below(c, DRAW_BYTES, n_bits)), done = 0;
+    for (uint64_t i = 0; i < n_bits && done < n; i++, at = next_bit(mask, c->making->len, at)) {
+        const uint8_t bit = (uint8_t)(1U << at % 8);
+        if (((bytes[at / 8] ^ before[at / 8]) & bit) != 0) continue;
+        bytes[at / 8] ^= bit;
+        if (done++ != 0) continue;
+        c->note.byte = (int64_t)(at / 8);
+        c->note.bit = (uint32_t)(at % 8);
+    }
+    return done;
+}
+
+/* A datagram that is damaged on its way is dropped by the system of its reader; with reseal it was wrong before it was
+ * sent. */
 static int flip(struct change *c)
 {
     const struct fault *f = &c->fault->entry.fault;
+    struct wire *wire = c->wire;
     if (f->reseal && c->making->is_cut) return 0; /* nothing makes it right */
-    const uint64_t n_bits = mark_bits(c), n = n_bits < fault_n(f) ? n_bits : fault_n(f);
-    if (n == 0) return 0;
-    uint64_t k = draw_below(c, DRAW_BYTES, n_bits);
-    const uint64_t first = find_bit(c->wire->mask, k);
-    c->note.byte = (int64_t)(first / 8);
-    c->note.bit = (uint32_t)(first % 8);
-    c->note.n = n;
-    for (uint64_t done = 0; done < n; done++, k = (k + 1) % n_bits) {
-        const uint64_t at = find_bit(c->wire->mask, k);
-        c->wire->unit[at / 8] ^= (uint8_t)(1U << at % 8);
-    }
-    if (f->reseal && c->wire->spec.reseal != NULL) c->wire->spec.reseal(c->wire->unit, c->making->len);
+    if (!grow(&wire->mask, &wire->mask_room, c->making->len, 1)) return SH_ENOMEM;
+    const uint64_t n_bits = mark_bits(c);
+    if (n_bits != 0) c->note.n = flip_bits(c, n_bits, fault_n(f));
+    if (c->note.n == 0) return 0;
+    if (f->reseal && wire->spec.reseal != NULL) wire->spec.reseal(wire->unit, c->making->len);
     if (f->reseal) strcpy(c->note.text, "resealed");
-    if (f->reseal || !c->wire->spec.datagrams) return 1;
+    if (f->reseal || !wire->spec.datagrams) return 1;
     c->making->is_dropped = 1;
     strcpy(c->note.text, "not sent: its UDP checksum would be wrong");
     return 1;

@@ -15,7 +15,7 @@ struct wire_fault {
 struct wire {
     struct wire_spec spec;
     uint32_t version; /* of the list */
-    struct wire_fault fault[FAULT_MAX];
+    struct wire_fault fault[FAULT_KEPT];
     uint32_t n_faults;
     uint64_t count[FAULT_N_OF];
     uint64_t merge_until[FAULT_N_OF]; /* up to this one, frames are in a write that a merge began */
@@ -25,9 +25,8 @@ struct wire {
     int is_over;          /* an act that ends the session waits: what comes after it goes nowhere */
     uint64_t void_frames, void_pulses; /* so much */
     uint8_t *unit; /* the copy of the one at hand that faults change */
-    size_t unit_room;
     uint8_t *mask; /* its bits that a flip may change */
-    size_t mask_room;
+    size_t unit_room, mask_room;
     uint8_t *last_reply; /* the reply before */
     size_t last_reply_len, last_reply_room;
     struct wire_heard heard;

@@ -3,9 +3,6 @@
 #include "tests/wire/room.h"
 
 #define SECOND_NS INT64_C(1000000000)
-/* A frame of points has the time of its first pulse: the last before power goes begins a tick before, and up to 15 pulses
- * more, as ticks are cut at packets of 16. At 20 kHz. */
-#define LAST_NS (INT64_C(1000000) + 15 * 50000)
 
 static struct room_config config_of(const char *more)
 {
@@ -14,7 +11,7 @@ static struct room_config config_of(const char *more)
                                 .pan_deg_s = 60,
                                 .pan_stop_deg = 120,
                                 .frames = 1,
-                                .links = LINK_YAML_TCP,
+                                .links = LINK_YAML_BOTH,
                                 .more = more};
 }
 
@@ -264,7 +261,7 @@ static void test_power_cycle_in_steps(void **state)
         continue;
     assert_int_not_equal(scanhead_command(sh, "TIME:STEP 1200 MS", reply, sizeof reply, DEADLINE_MS), SCANHEAD_OK);
     const int64_t last_ns = until_hung_up(sh, &pulse_end, &ends);
-    assert_true(ends == 0 && last_ns < 2000000000 && last_ns >= 2000000000 - LAST_NS);
+    assert_true(ends == 0 && last_ns < 2000000000);
     assert_int_equal(scanhead_reattach(sh, DEADLINE_MS), SCANHEAD_OK);
     while (atoll(client_ask(sh, "TIME?")) < 2500000000) /* what was granted passes */
         continue;
@@ -276,7 +273,10 @@ static void test_power_cycle_in_steps(void **state)
     assert_int_equal(state_at(sh, "idle"), 3700000000);
     assert_int_equal(truth_of(wire, "power_cycle", 0, "t_ns"), 2000000000);
     assert_int_equal(truth_of(wire, "power_cycle", 1, "t_ns"), 3500000000);
-    assert_int_equal(truth_of(wire, "power_cycle", 0, "pulse"), pulse_end); /* all that was fired came */
+    /* The scan began at 330 ms: 50,100 pulses at 30 kHz, 600 a line, which are cut at packets of 16 from each line's start.
+     * What was on its way is lost with the connection. */
+    const uint64_t pulse = (uint64_t)truth_of(wire, "power_cycle", 0, "pulse");
+    assert_true(pulse == 83 * 600 + 300 / 16 * 16 && pulse_end <= pulse);
     assert_string_equal(client_ask(sh, "HEAD:PRR?"), "20000");
     assert_string_equal(client_ask(sh, "SYST:ERR:COUN?"), "0");
     client_tell(sh, "SCAN:START");
@@ -287,13 +287,13 @@ static void test_power_cycle_in_steps(void **state)
 }
 
 /* By the clock, and as fast as it goes: the client is hung up, comes back, and finds the head idle with an empty queue. */
-static void power_cycle_at(struct wire *wire, const char *pace)
+static void power_cycle_at(struct wire *wire, const char *pace, const char *link)
 {
     struct head head = start(wire,
                              "loop: {queue_ms: 5000, late_ms: 10000}\n"
                              "faults: [{kind: power_cycle, from_pulse: 8000, for_ms: 300}]\n",
                              pace);
-    struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
+    struct scanhead *sh = client_open(head_endpoint(&head, link));
     uint64_t pulse_end = 0;
     int ends = 0;
     client_wait_state(sh, "idle");
@@ -305,12 +305,12 @@ static void power_cycle_at(struct wire *wire, const char *pace)
     while (scanhead_reattach(sh, DEADLINE_MS) != SCANHEAD_OK)
         continue;
     const int64_t off_ns = truth_of(wire, "power_cycle", 0, "t_ns");
-    assert_true(last_ns < off_ns && last_ns >= off_ns - LAST_NS);
+    assert_true(last_ns < off_ns);
     const int64_t pulse = truth_of(wire, "power_cycle", 0, "pulse");
-    assert_true(pulse >= 8000 && pulse < 8000 + 20 + 16 && pulse_end == (uint64_t)pulse);
+    assert_true(pulse >= 8000 && pulse < 8000 + 20 + 16 && pulse_end <= (uint64_t)pulse);
     scanhead_close(sh);
     /* Who comes while power is off is turned away: until somebody is there. */
-    for (char why[256]; scanhead_open(head_endpoint(&head, "tcp"), &sh, why, sizeof why) == SCANHEAD_OK;) {
+    for (char why[256]; scanhead_open(head_endpoint(&head, link), &sh, why, sizeof why) == SCANHEAD_OK;) {
         char reply[600];
         if (scanhead_command(sh, "HEAD:STATE?", reply, sizeof reply, DEADLINE_MS) == SCANHEAD_OK) break;
         scanhead_close(sh);
@@ -327,8 +327,9 @@ static void power_cycle_at(struct wire *wire, const char *pace)
 
 static void test_power_cycle(void **state)
 {
-    power_cycle_at(*state, "fast");
-    power_cycle_at(*state, "realtime");
+    power_cycle_at(*state, "fast", "tcp");
+    power_cycle_at(*state, "realtime", "tcp");
+    power_cycle_at(*state, "realtime", "pty");
 }
 
 /* The same faults: the same stream, at any pace, with any number of threads, off line and on. */
