@@ -298,6 +298,11 @@ void wire_skip_heard(struct wire *wire, uint32_t n)
 
 /* ---- out */
 
+const struct fault_note *wire_act_note(const struct wire_piece *act)
+{
+    return (const struct fault_note *)(const void *)act->bytes;
+}
+
 struct wire_piece *wire_due(struct wire *wire, int64_t now_ns, int last)
 {
     if (last && !wire->is_over) {

@@ -282,11 +282,12 @@ static void a_session_that_ends_takes_nothing_more(void **state)
     for (int i = 0; i < 8; i++)
         rig_frame(RIG_POINTS);
     rig_reply("OK");
-    assert_int_equal(rig.n_notes, 2);
-    assert_true(rig.note[1].kind == FAULT_DISCONNECT && rig.note[1].number == 5);
+    assert_int_equal(rig.n_notes, 1); /* the end is not there yet */
     wire_count_unwritten(rig.wire, &frames, &pulses);
     assert_true(frames == 8 && pulses == 800);
     assert_int_equal(rig_take(0), 5);
+    assert_int_equal(rig.n_notes, 2);
+    assert_true(rig.note[1].kind == FAULT_DISCONNECT && rig.note[1].number == 5);
     rig_expect((const int[]){0, 2, 3, 1, -1}); /* what was held comes before the end */
     assert_true(rig.write[4].kind == WIRE_ACT && rig.write[4].act == FAULT_DISCONNECT);
     wire_count_unwritten(rig.wire, &frames, &pulses);

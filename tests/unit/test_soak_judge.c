@@ -251,7 +251,7 @@ static void test_connections(void **state)
     (void)state;
     struct soak *soak = make();
     struct soak_row *row = inject(soak, FAULT_DISCONNECT, 0, 0, "");
-    soak_saw_end(&soak->link[0], 0);
+    soak_saw_end(&soak->link[0]);
     soak_saw_open(&soak->link[0]);
     assert_int_equal(finish(soak), 0); /* HIT came while there was no session */
     assert_int_equal(row->noticed, 1);
@@ -268,7 +268,7 @@ static void test_connections(void **state)
     soak = make(); /* nobody asked for that */
     send_clean(soak);
     see_others(soak, FIRST, HIT);
-    soak_saw_end(&soak->link[0], 0);
+    soak_saw_end(&soak->link[0]);
     soak_saw_open(&soak->link[0]);
     assert_true(finish(soak) != 0);
     end(soak);

@@ -11,7 +11,7 @@ static struct room_config config_of(const char *more)
                                 .pan_deg_s = 60,
                                 .pan_stop_deg = 120,
                                 .frames = 1,
-                                .links = LINK_YAML_TCP,
+                                .links = LINK_YAML_BOTH,
                                 .more = more};
 }
 
@@ -287,13 +287,13 @@ static void test_power_cycle_in_steps(void **state)
 }
 
 /* By the clock, and as fast as it goes: the client is hung up, comes back, and finds the head idle with an empty queue. */
-static void power_cycle_at(struct wire *wire, const char *pace)
+static void power_cycle_at(struct wire *wire, const char *pace, const char *link)
 {
     struct head head = start(wire,
                              "loop: {queue_ms: 5000, late_ms: 10000}\n"
                              "faults: [{kind: power_cycle, from_pulse: 8000, for_ms: 300}]\n",
                              pace);
-    struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
+    struct scanhead *sh = client_open(head_endpoint(&head, link));
     uint64_t pulse_end = 0;
     int ends = 0;
     client_wait_state(sh, "idle");
@@ -310,7 +310,7 @@ static void power_cycle_at(struct wire *wire, const char *pace)
     assert_true(pulse >= 8000 && pulse < 8000 + 20 + 16 && pulse_end <= (uint64_t)pulse);
     scanhead_close(sh);
     /* Who comes while power is off is turned away: until somebody is there. */
-    for (char why[256]; scanhead_open(head_endpoint(&head, "tcp"), &sh, why, sizeof why) == SCANHEAD_OK;) {
+    for (char why[256]; scanhead_open(head_endpoint(&head, link), &sh, why, sizeof why) == SCANHEAD_OK;) {
         char reply[600];
         if (scanhead_command(sh, "HEAD:STATE?", reply, sizeof reply, DEADLINE_MS) == SCANHEAD_OK) break;
         scanhead_close(sh);
@@ -327,8 +327,9 @@ static void power_cycle_at(struct wire *wire, const char *pace)
 
 static void test_power_cycle(void **state)
 {
-    power_cycle_at(*state, "fast");
-    power_cycle_at(*state, "realtime");
+    power_cycle_at(*state, "fast", "tcp");
+    power_cycle_at(*state, "realtime", "tcp");
+    power_cycle_at(*state, "realtime", "pty");
 }
 
 /* The same faults: the same stream, at any pace, with any number of threads, off line and on. */
