@@ -448,6 +448,7 @@ static void test_a_journal_brings_faults_back(void **state)
     client_tell(sh, "SCAN:STAR");
     client_until(sh, SCANHEAD_EV_SCAN_END, &frame);
     client_tell(sh, "FAUL:CLE 1");
+    client_wait_state(sh, "idle");
     client_tell(sh, "SCAN:STAR");
     client_until(sh, SCANHEAD_EV_SCAN_END, &frame);
     scanhead_close(sh);
