@@ -38,7 +38,7 @@ uint32_t fault_board_copy_all(struct fault_board *board, struct fault_entry entr
 /* Adds a fault that counts from t_ns. SH_EINPUT: there are FAULT_MAX. */
 int fault_board_add(struct fault_board *board, const struct fault *fault, int64_t t_ns, uint32_t *number,
                     struct sh_err *err);
-/* Takes out the fault of that number; 0: all. Frames from before device time t_ns, which are on their way, are still hit.
+/* Takes out the fault of that number; 0: all. Frames from before device time t_ns are on their way, and are still hit.
  * Returns how many went. */
 uint32_t fault_board_end(struct fault_board *board, uint32_t number, int64_t t_ns);
 /* The same, at once. */

@@ -112,7 +112,8 @@ static int change(struct wire *wire, struct wire_fault *fault, struct wire_makin
     const int of = making->item->of;
     struct fault_spot spot = making->spot;
     if (!concerns(wire, fault, of) || spot.number <= fault->base[of]) return SH_OK;
-    if (fault->entry.until_ns != INT64_MAX && (of == FAULT_OF_REPLIES || spot.t_ns >= fault->entry.until_ns)) return SH_OK;
+    const int is_gone = fault->entry.until_ns != INT64_MAX;
+    if (is_gone && (of == FAULT_OF_REPLIES || spot.t_ns >= fault->entry.until_ns)) return SH_OK;
     spot.number -= fault->base[of];
     spot.t_ns -= fault->entry.since_ns;
     if (spot.t_ns < 0 && of != FAULT_OF_REPLIES) return SH_OK;

@@ -50,8 +50,8 @@ struct wire_making {
     int64_t now_ns;
 };
 
-/* What the fault does to it; notes it. `number` is the frame's, as this fault counts. Returns 1; 0: there is nothing for
- * it to do; or SH_ENOMEM. */
+/* What the fault does to it; notes it. `number` is the frame's, as this fault counts. Returns 1; 0: there is nothing
+ * for it to do; or SH_ENOMEM. */
 int wire_change(struct wire *wire, const struct wire_fault *fault, uint64_t number, struct wire_making *making);
 
 #endif

@@ -2,8 +2,8 @@
  * of that is written. A session has a wire from the first fault on. Without one nothing of this is called.
  *
  * A wire that stalls keeps as much as a session's buffer, one that delays WIRE_DELAY_BYTES. Then the session takes no
- * more, and its reader is as any reader that is too slow. What lies in the wire when the client goes away, or at the end
- * of the run, counts as not written; what a fault dropped or changed counts as written. */
+ * more, and its reader is as any reader that is too slow. What lies in the wire when the client goes away, or at the
+ * end of the run, counts as not written; what a fault dropped or changed counts as written. */
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/loop/pump_inside.h"
 

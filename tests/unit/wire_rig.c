@@ -159,8 +159,8 @@ void rig_expect(const int *items)
     assert_int_equal(at, rig.n_out);
 }
 
-/* ---- what should have come out, by the notes: each item has its place in the input, and what was held has the place of
- * the frame that it comes after. Sorted by that, it is the output. */
+/* ---- what should have come out, by the notes: each item has its place in the input, and what was held has the place
+ * of the frame that it comes after. Sorted by that, it is the output. */
 
 struct chunk {
     uint64_t place; /* of an item, from 0; after the last ones: those in the order of their countings */

@@ -238,7 +238,8 @@ static const char APART[] = "faults:\n"
 static void expect_broken(const struct scanhead_notice *got, const struct truth *truth, int i)
 {
     const long seq = truth->note[i].seq, byte = truth->note[i].byte;
-    const int is_garbage = strcmp(truth->note[i].kind, "garbage") == 0, cut = strcmp(truth->note[i].kind, "truncate") == 0;
+    const char *kind = truth->note[i].kind;
+    const int is_garbage = strcmp(kind, "garbage") == 0, cut = strcmp(kind, "truncate") == 0;
     /* What hits the header leaves no frame; else its number is known. */
     const int no_header = is_garbage || byte < NATIVE_HEADER_LEN;
     if (got->kind != (no_header ? SCANHEAD_NOTICE_BAD_BYTES : SCANHEAD_NOTICE_BAD_PAYLOAD))
@@ -283,7 +284,8 @@ static void test_a_client_reports_what_was_injected(void **state)
     memset(&clean, 0, sizeof clean);
     const char *const more[] = {"--pace", "fast", NULL};
     struct head head = start(wire, &SMALL, APART, more);
-    struct scanhead *faulty = client_open(head_endpoint(&head, "tcp")), *other = client_open(head_endpoint(&head, "pty"));
+    struct scanhead *faulty = client_open(head_endpoint(&head, "tcp"));
+    struct scanhead *other = client_open(head_endpoint(&head, "pty"));
     scanhead_on_notice(faulty, see, &seen);
     scanhead_on_notice(other, see, &clean);
     scanhead_hash_start(faulty);
@@ -408,7 +410,8 @@ static void test_the_end_waits_for_what_is_on_its_way(void **state)
         c.links = "links: [{type: file, path: out.bin}]\n";
         struct head head = start(wire, &c, cases[i].faults, more);
         head_end(&head, 0);
-        const uint64_t received = stats_link_uint(wire, "received_pulses"), left = stats_link_uint(wire, "left_out_pulses");
+        const uint64_t received = stats_link_uint(wire, "received_pulses");
+        const uint64_t left = stats_link_uint(wire, "left_out_pulses");
         assert_int_equal(received + left, stats_uint(wire, "pulses"));
         assert_int_equal(left == 0, cases[i].all);
         struct scanhead *sh = client_open(wire_path(wire, "out.bin"));
@@ -420,7 +423,7 @@ static void test_the_end_waits_for_what_is_on_its_way(void **state)
         scanhead_get_stats(sh, &stats);
         assert_int_equal(stats.bad_bytes + stats.bad_payload, 0);
         if (!cases[i].all) assert_int_equal(pulses, received);
-        if (cases[i].all) assert_true(stats.late > 0 && stats.late == stats.seq_lost); /* all are there, in some order */
+        if (cases[i].all) assert_true(stats.late > 0 && stats.late == stats.seq_lost); /* all there, in some order */
         scanhead_close(sh);
     }
 }
@@ -445,6 +448,7 @@ static void test_a_journal_brings_faults_back(void **state)
     client_tell(sh, "SCAN:STAR");
     client_until(sh, SCANHEAD_EV_SCAN_END, &frame);
     client_tell(sh, "FAUL:CLE 1");
+    client_wait_state(sh, "idle");
     client_tell(sh, "SCAN:STAR");
     client_until(sh, SCANHEAD_EV_SCAN_END, &frame);
     scanhead_close(sh);
