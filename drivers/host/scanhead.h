@@ -378,6 +378,9 @@ struct scanhead_stats {
     uint64_t pulses_lost; /* pulses the head says it could not compute */
     /* How often each notice came. seq_gaps above counts restarts, too. frames counts neither repeated nor late ones. */
     uint64_t repeated, late, restarts, cuts, echoes, late_replies, unasked, closed, reattached;
+    /* Of bad_payload, what no gap shows: before the first frame, before a restart, and after the last frame. So
+     * seq_lost + bad_unseen frames are known to be lost on the way. */
+    uint64_t bad_unseen;
 };
 void scanhead_get_stats(const struct scanhead *sh, struct scanhead_stats *stats);
 

@@ -306,6 +306,7 @@ void scanhead_get_stats(const struct scanhead *sh, struct scanhead_stats *stats)
         .late = s->late,
         .restarts = s->restarts,
         .cuts = s->cuts,
+        .bad_unseen = s->bad_unseen,
         .echoes = sh->notices.echoes,
         .late_replies = sh->notices.late_replies,
         .unasked = sh->notices.unasked,

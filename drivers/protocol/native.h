@@ -292,6 +292,7 @@ struct native_stats {
     uint64_t seq_gaps, seq_lost;     /* jumps in seq, both ways; frames missing by those forward */
     uint64_t repeated, late;         /* frames dropped, since they came already, or after newer ones */
     uint64_t restarts, cuts;         /* jumps back to another sequence; connections that ended within an item */
+    uint64_t bad_unseen; /* of bad_payload, what no gap shows: before a sequence's first frame, after the last */
 };
 
 /* Something wrong in the stream; scanhead.h says what n and at_byte are of each kind. */
@@ -307,6 +308,7 @@ struct native_notice {
 struct native_bad {
     enum native_notice_kind kind; /* NATIVE_NO_NOTICE: none */
     int has_header;               /* they begin with a header that is right: */
+    int is_local;
     uint32_t seq;
     int64_t t_ns;
     uint64_t at_byte, n, most; /* n: so far; most: what belongs to that frame at most */
@@ -318,7 +320,8 @@ struct native_parser {
     int in_step, finished;
     struct native_sequence sequence;
     struct native_bad bad;
-    int64_t last_t_ns; /* of the last whole frame */
+    uint64_t bad_before; /* bad_unseen up to the sequence's first frame */
+    int64_t last_t_ns;   /* of the last whole frame */
     struct native_stats stats;
     /* Called from within native_parser_next and native_parser_resume, in the order of the stream: a notice comes before
      * the item that follows it. NULL (after native_parser_init): nobody listens. */

@@ -51,6 +51,13 @@ static void give_notice(const struct native_parser *parser, const struct native_
 
 /* ---- bytes that belong to no item */
 
+/* Of the frame that `bad` begins with. Nobody misses a LOCAL one. */
+static void count_bad_payload(struct native_parser *parser)
+{
+    parser->stats.bad_payload++;
+    parser->stats.bad_unseen += (uint64_t)!parser->bad.is_local;
+}
+
 /* An item follows, or at_end: nothing does. A frame that seemed to be cut by the end is a broken one if others stood
  * within its length. */
 static void end_bad(struct native_parser *parser, int at_end)
@@ -59,7 +66,7 @@ static void end_bad(struct native_parser *parser, int at_end)
     if (bad->kind == NATIVE_NO_NOTICE) return;
     if (bad->kind == NATIVE_CUT && !at_end) {
         bad->kind = bad->has_header ? NATIVE_BAD_PAYLOAD : NATIVE_BAD_BYTES;
-        parser->stats.bad_payload += (uint64_t)bad->has_header;
+        if (bad->has_header) count_bad_payload(parser);
     }
     parser->stats.cuts += bad->kind == NATIVE_CUT;
     const struct native_notice notice = {bad->kind, bad->seq, bad->at_byte, bad->n, bad->t_ns};
@@ -79,6 +86,7 @@ static void begin_bad_frame(struct native_parser *parser, enum native_notice_kin
 {
     begin_bad(parser, kind, at_byte(parser));
     parser->bad.has_header = 1;
+    parser->bad.is_local = (header->flags & NATIVE_LOCAL) != 0;
     parser->bad.seq = header->seq;
     parser->bad.t_ns = header->t_ns;
     parser->bad.most = NATIVE_HEADER_LEN + (uint64_t)header->length;
@@ -139,8 +147,8 @@ static enum look look_frame(struct native_parser *parser)
     if (header.length > NATIVE_MAX_PAYLOAD) return LOOK_BAD;
     if (have - NATIVE_HEADER_LEN < header.length) return LOOK_WAIT;
     if (crc32c(0, frame + NATIVE_HEADER_LEN, header.length) != header.payload_crc) {
-        parser->stats.bad_payload++;
         begin_bad_frame(parser, NATIVE_BAD_PAYLOAD, &header);
+        count_bad_payload(parser);
         return LOOK_BAD;
     }
     parser->header = header;
@@ -158,11 +166,21 @@ static void count_notice(struct native_stats *stats, const struct native_notice 
     stats->restarts += notice->kind == NATIVE_RESTARTED;
 }
 
+/* A frame in order, or after a gap, shows which were missing before it; a sequence's first one doesn't. */
+static void see_bad(struct native_parser *parser, int is_first)
+{
+    if (is_first)
+        parser->bad_before = parser->stats.bad_unseen;
+    else
+        parser->stats.bad_unseen = parser->bad_before;
+}
+
 /* 1: the frame is to be given; 0: it is dropped. */
 static int take_frame(struct native_parser *parser)
 {
     end_bad(parser, 0);
     uint32_t first, n;
+    const int has_begun = parser->sequence.have;
     const enum native_notice_kind kind = native_sequence_take(&parser->sequence, &parser->header, &first, &n);
     const struct native_notice notice = {kind, first, at_byte(parser), n, parser->header.t_ns};
     parser->start += native_frame_len(parser->frame);
@@ -173,6 +191,7 @@ static int take_frame(struct native_parser *parser)
         give_notice(parser, &notice);
     }
     if (kind == NATIVE_REPEATED || kind == NATIVE_LATE) return 0;
+    if ((parser->header.flags & NATIVE_LOCAL) == 0) see_bad(parser, !has_begun || kind == NATIVE_RESTARTED);
     parser->stats.frames++;
     return 1;
 }

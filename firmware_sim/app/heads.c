@@ -101,6 +101,7 @@ static void add_stream(struct scanhead_stats *sum, const struct scanhead_stats *
     sum->late += more->late;
     sum->restarts += more->restarts;
     sum->cuts += more->cuts;
+    sum->bad_unseen += more->bad_unseen;
     sum->echoes += more->echoes;
     sum->late_replies += more->late_replies;
     sum->unasked += more->unasked;

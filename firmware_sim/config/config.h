@@ -305,9 +305,11 @@ int config_load(const char *path, const char *const *sets, int n_sets, struct co
 int config_load_all(const char *path, const char *const *sets, int n_sets, struct config *cfg,
                     struct config_faults *faults);
 
-/* Adds the faults of a scenario, a file that has nothing but a list `faults`. What is wrong with it goes to `faults`;
- * then nothing is added, and the code of the first is returned. */
-int config_add_scenario(struct config *cfg, const char *path, struct config_faults *faults);
+/* Adds the faults of a scenario, a file that has nothing but a list `faults`: a path, or the name of one that comes with
+ * the program. What is wrong with it goes to `faults`; then nothing is added, and the code of the first is returned. */
+int config_add_scenario(struct config *cfg, const char *name, struct config_faults *faults);
+/* "a, b, c": those that come with the program, as far as buf reaches. */
+void config_name_scenarios(char *buf, size_t len);
 /* A fault as one line of YAML, "{kind: drop, every: 10}", for a head with this configuration. Takes 200 KiB of stack. */
 int config_read_fault(const struct config *cfg, const char *text, struct fault *out, struct sh_err *err);
 /* Whether faults of the kind can strike on the link. */

@@ -64,6 +64,9 @@ void wire_heard(struct wire *wire, const void *bytes, size_t len);
 /* So many replies are still to be put to lines that it did not hear. */
 void wire_skip_heard(struct wire *wire, uint32_t n);
 
+/* What its owner notes of an act on the board, once it is carried out. Valid as the act is. */
+const struct fault_note *wire_act_note(const struct wire_piece *act);
+
 /* The first piece, or act, if it may go out now; NULL: none may. Its bytes from `out` on are to be written, which the
  * owner moves on. last: no more items come, nothing is held for them. */
 struct wire_piece *wire_due(struct wire *wire, int64_t now_ns, int last);

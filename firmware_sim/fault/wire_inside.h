@@ -15,7 +15,7 @@ struct wire_fault {
 struct wire {
     struct wire_spec spec;
     uint32_t version; /* of the list */
-    struct wire_fault fault[FAULT_MAX];
+    struct wire_fault fault[FAULT_KEPT];
     uint32_t n_faults;
     uint64_t count[FAULT_N_OF];
     uint64_t merge_until[FAULT_N_OF]; /* up to this one, frames are in a write that a merge began */

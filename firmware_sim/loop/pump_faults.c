@@ -159,8 +159,10 @@ static int carry_out(struct pump *pump, struct session *s, int index, const stru
     const enum fault_kind kind = (enum fault_kind)act->act;
     const enum link_fault what = pump_link_fault(kind);
     const double for_ms = act->for_ms;
+    const struct fault_note note = *wire_act_note(act);
     const int rc = pump->ops->fault(pump->link, what, index, act->n, for_ms);
     wire_pop(s->wire);
+    if (what == LINK_FAULT_BUS_RESET) pump->plug_ns = in_ms(0.0); /* where it takes unplugging, and plugging in fails */
     if (rc != SH_OK) {
         wire_go_on(s->wire);
         char text[96];
@@ -168,6 +170,7 @@ static int carry_out(struct pump *pump, struct session *s, int index, const stru
         pump_say(pump, text);
         return 0;
     }
+    fault_board_note(pump->board, &note);
     if (what == LINK_FAULT_UNPLUG) pump->plug_ns = in_ms(for_ms);
     if (what == LINK_FAULT_DISCONNECT && for_ms > 0.0) pump->refuse_until_ns = in_ms(for_ms);
     end_sessions(pump, s, what);

@@ -256,6 +256,40 @@ static void test_end(void **state)
     in_all_pieces(check_garbage_at_end);
 }
 
+/* Broken frames that no gap shows: at both ends, and before a restart. */
+static void test_bad_unseen(void **state)
+{
+    (void)state;
+    static const struct {
+        uint32_t seq;
+        int flags, hurt;
+        uint64_t unseen;
+    } frames[] = {
+        {4, 0, 1, 1},
+        {5, 0, 0, 1},
+        {6, 0, 1, 2},
+        {6, 0, 0, 1},
+        {7, 0, 1, 2},
+        {7, NATIVE_LOCAL, 0, 2},
+        {8, 0, 0, 1},
+        {9, 0, 1, 2},
+        {8, 0, 0, 2},
+        {0x90000000u, 0, 0, 2},
+        {0, NATIVE_LOCAL, 1, 2},
+        {0x90000001u, 0, 1, 3},
+    };
+    listen_again();
+    for (size_t i = 0; i < sizeof frames / sizeof frames[0]; i++) {
+        n_bytes = 0;
+        put(frames[i].seq, frames[i].flags);
+        if (frames[i].hurt) bytes[100] ^= 1;
+        feed(bytes, n_bytes, n_bytes);
+        assert_int_equal(parser.stats.bad_unseen, frames[i].unseen);
+    }
+    assert_int_equal(parser.stats.seq_lost, 1);
+    assert_int_equal(parser.stats.bad_payload, 6);
+}
+
 static void test_resume(void **state)
 {
     (void)state;
@@ -303,8 +337,8 @@ static void test_nobody_listens(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_sequence), cmocka_unit_test(test_bytes),          cmocka_unit_test(test_end),
-        cmocka_unit_test(test_resume),   cmocka_unit_test(test_nobody_listens),
+        cmocka_unit_test(test_sequence),   cmocka_unit_test(test_bytes),  cmocka_unit_test(test_end),
+        cmocka_unit_test(test_bad_unseen), cmocka_unit_test(test_resume), cmocka_unit_test(test_nobody_listens),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

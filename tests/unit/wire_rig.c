@@ -1,5 +1,7 @@
 #include "tests/unit/wire_rig.h"
 
+#include "drivers/protocol/protocol.h"
+
 struct rig rig;
 
 struct fault fault_of_kind(enum fault_kind kind)
@@ -40,6 +42,7 @@ void rig_open(const struct fault *fault, uint32_t n, int native)
                                    .max_unit = 64,
                                    .units = !native,
                                    .native = native,
+                                   .content = native ? protocol_ops_get(PROTOCOL_NATIVE)->content : NULL,
                                    .reseal = native ? native_reseal : reseal_sum,
                                    .acts = UINT32_MAX};
     rig.wire = wire_create(&spec);
@@ -121,7 +124,8 @@ uint32_t rig_take(int last)
 {
     uint32_t n = 0;
     for (struct wire_piece *piece; (piece = wire_due(rig.wire, rig.now_ns, last)) != NULL; n++) {
-        const size_t len = piece->len - piece->out;
+        const size_t len = piece->kind != WIRE_ACT ? piece->len - piece->out : 0;
+        if (piece->kind == WIRE_ACT) fault_board_note(rig.board, wire_act_note(piece)); /* it is carried out */
         assert_true(rig.n_writes < RIG_WRITES && rig.n_out + len <= RIG_OUT);
         rig.write[rig.n_writes++] = (struct rig_write){rig.now_ns, piece->kind, piece->act, rig.n_out, len};
         if (len != 0) memcpy(rig.out + rig.n_out, piece->bytes + piece->out, len);

@@ -338,3 +338,16 @@ uint32_t units_check(const struct unit_kind *kind, const struct unit_list *clean
     pieces_free(&want);
     return n;
 }
+
+void units_expect(const struct unit_list *clean, const struct truth_note *note, uint32_t n_notes, struct unit_list *out)
+{
+    static const struct unit_kind as_it_is = {0};
+    struct pieces want = predict(&as_it_is, clean, 0, note, n_notes);
+    for (uint32_t i = 0; i < want.n; i++) {
+        const struct piece *p = &want.piece[i];
+        assert_true(p->how == EXACT && p->split < 2 && !p->is_joined);
+        units_add(out, p->bytes, p->len);
+        units_end(out);
+    }
+    pieces_free(&want);
+}

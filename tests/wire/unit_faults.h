@@ -48,6 +48,10 @@ uint32_t truth_count(const struct truth_note *note, uint32_t n, const char *kind
 uint32_t units_check(const struct unit_kind *kind, const struct unit_list *clean, const struct unit_list *got,
                      const struct truth_note *note, uint32_t n_notes, uint32_t least);
 
+/* The units that the truth makes of the clean ones, for a session that began with these. Faults that make unknown bytes
+ * of them, or other units than there are, are none of them: flip, garbage, split, merge. */
+void units_expect(const struct unit_list *clean, const struct truth_note *note, uint32_t n_notes, struct unit_list *out);
+
 /* Reads both sockets until each has so many bytes: in pace fast each holds the head back. fd1 -1, list1 NULL: one. */
 void units_read_both(int fd0, struct unit_list *list0, int fd1, struct unit_list *list1, size_t least);
 

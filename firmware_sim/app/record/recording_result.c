@@ -64,11 +64,11 @@ void recording_put(struct json *json, const void *ctx)
     json_close_object(json);
 }
 
-/* Frames that never came leave gaps in the sequence. Frames with a wrong checksum leave gaps, too, but not at
- * the very end of the stream. */
+/* Frames that never came leave gaps in the sequence. Frames with a wrong checksum leave gaps, too, but not before the
+ * first frame and after the last. */
 static uint64_t count_lost(const struct scanhead_stats *s)
 {
-    return (s->seq_lost > s->bad_payload ? s->seq_lost : s->bad_payload) + s->dropped;
+    return s->seq_lost + s->bad_unseen + s->dropped;
 }
 
 /* Adds ", N what" where there were any. */

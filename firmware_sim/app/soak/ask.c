@@ -4,7 +4,7 @@
 #include "firmware_sim/app/soak/soak.h"
 #include "firmware_sim/base/clock.h"
 
-enum { REPLY_MS = 1000, REPLY_LEN = 600 };
+enum { REPLY_MS = 1000, REPLY_LEN = SOAK_REPLY_LEN };
 static const double MARGIN_MS = 5.0;
 /* The library comes into step with questions of its own; one that has no answer it asks again after a second. */
 static const double ASKED_AGAIN_MS = 900.0;
@@ -44,6 +44,7 @@ static int is_version(const char *text)
 
 struct answer {
     int rc, is_right;
+    int is_same; /* as the reply before */
     double ms;
 };
 
@@ -69,6 +70,8 @@ static void judge_note(struct soak_link *link, const struct fault_note *note, co
         row->noticed++;
     else if (a->rc != SCANHEAD_OK && a->rc != SCANHEAD_ETIMEOUT)
         soak_hide(row, 1, "the session was over before it");
+    else if (note->kind == FAULT_WRONG_REPLY && a->is_same)
+        soak_hide(row, 1, "the reply before was the same");
     else if (ask->settling)
         soak_hide(row, 1, "it hit a question of the library itself, which comes into step");
     else
@@ -105,6 +108,8 @@ static int put(struct soak_link *link, const char *command, int (*is_right)(cons
     a.rc = scanhead_command(link->sh, command, reply, REPLY_LEN, REPLY_MS);
     a.ms = 1e-6 * (double)(clock_now_ns() - from_ns);
     a.is_right = a.rc == SCANHEAD_OK && is_right(reply);
+    a.is_same = a.rc == SCANHEAD_OK && strcmp(reply, ask->before) == 0;
+    if (a.rc == SCANHEAD_OK) memcpy(ask->before, reply, sizeof ask->before);
     pthread_mutex_lock(&link->lock);
     judge(link, &a);
     ask->active = 0;
@@ -122,14 +127,14 @@ void soak_ask_next(struct soak_link *link)
         int (*is_right)(const char *text);
     } questions[] = {{"*IDN?", is_identity}, {"SYST:ERR:COUN?", is_count}, {"SYST:VERS?", is_version}};
     const uint32_t which = link->ask.next++ % (sizeof questions / sizeof *questions);
-    char reply[REPLY_LEN];
+    char reply[REPLY_LEN] = "";
     const int is_right = put(link, questions[which].command, questions[which].is_right, reply);
     if (which == 0 && is_right) snprintf(link->idn, sizeof link->idn, "%.255s", reply);
 }
 
 void soak_ask_scan(struct soak_link *link)
 {
-    char reply[REPLY_LEN];
+    char reply[REPLY_LEN] = "";
     if (!put(link, "HEAD:STATe?", is_state, reply)) return;
     soak_saw_state(link, reply);
     if (strcmp(reply, "idle") == 0) put(link, "SCAN:STARt", is_start, reply);

@@ -7,13 +7,12 @@
 #include "firmware_sim/app/soak/soak.h"
 #include "firmware_sim/base/clock.h"
 
-enum { NEXT_MS = 50, OPEN_MS = 200, FIRST_OPEN_MS = 10000 };
-static const int64_t ASK_EVERY_NS = 200000000, POINTS_WITHIN_NS = 500000000;
+enum { NEXT_MS = 50 };
+static const int64_t OPEN_EVERY_NS = 20000000, ASK_EVERY_NS = 200000000, POINTS_WITHIN_NS = 500000000;
 
 struct recorder {
     struct soak_link *link;
     int64_t asked_ns, points_ns;
-    uint64_t bytes_before; /* of the connections before */
     int ended;
 };
 
@@ -27,6 +26,8 @@ static const char *why_not(const struct link_place *place)
         if (strcmp(place->type, "web") == 0) return "libscanhead does not speak WebSocket";
         return "nothing answers there";
     }
+    if (strncmp(place->endpoint, "tty:/dev/pts/", 13) == 0)
+        return "a terminal that goes and comes needs a path, links[].path, to be found again";
     if (place->protocol != NULL && strcmp(place->protocol, "native") != 0)
         return "libscanhead speaks the native protocol alone";
     return NULL;
@@ -91,10 +92,7 @@ static void give_up(struct recorder *r, const char *why)
 
 static void began(struct recorder *r)
 {
-    struct scanhead_stats stats;
     struct soak_link *link = r->link;
-    scanhead_get_stats(link->sh, &stats);
-    r->bytes_before = stats.bytes;
     r->points_ns = r->asked_ns = clock_now_ns() - ASK_EVERY_NS;
     soak_saw_open(link);
     pthread_mutex_lock(&link->lock);
@@ -102,23 +100,35 @@ static void began(struct recorder *r)
     pthread_mutex_unlock(&link->lock);
 }
 
-/* The connection is over: opens the head again. */
+/* Each try is one of its own, so that a refusal is seen. Until the head is there, or the soak ends. */
+static void open_head(struct recorder *r)
+{
+    struct soak_link *link = r->link;
+    char why[256];
+    while (atomic_load(&link->soak->phase) != SOAK_ENDS) {
+        const int rc = link->sh == NULL ? scanhead_open(link->endpoint, &link->sh, why, sizeof why)
+                                        : scanhead_reattach(link->sh, 0);
+        if (rc == SCANHEAD_OK) {
+            scanhead_on_notice(link->sh, soak_saw_notice, link);
+            began(r);
+            return;
+        }
+        soak_saw_no_open(link);
+        clock_sleep_until_ns(clock_now_ns() + OPEN_EVERY_NS);
+    }
+    r->ended = 1;
+}
+
+/* The connection is over. */
 static void reattach(struct recorder *r)
 {
     struct soak_link *link = r->link;
-    struct scanhead_stats stats;
     if (atomic_load(&link->soak->phase) == SOAK_ENDS) {
         r->ended = 1;
         return;
     }
-    scanhead_get_stats(link->sh, &stats);
-    soak_saw_end(link, stats.bytes == r->bytes_before);
-    while (atomic_load(&link->soak->phase) != SOAK_ENDS)
-        if (scanhead_reattach(link->sh, OPEN_MS) == SCANHEAD_OK) {
-            began(r);
-            return;
-        }
-    r->ended = 1;
+    soak_saw_end(link);
+    open_head(r);
 }
 
 /* A frame whose content the library refuses, or a stream without frames, which is over. */
@@ -132,6 +142,7 @@ static void refuse_frame(struct recorder *r)
     }
     pthread_mutex_lock(&r->link->lock);
     r->link->refused_frames++;
+    r->link->refused_now++;
     pthread_mutex_unlock(&r->link->lock);
 }
 
@@ -182,14 +193,7 @@ static void *record(void *arg)
 {
     struct recorder r = {.link = arg};
     struct soak_link *link = arg;
-    char why[256];
-    if (scanhead_open_within(link->endpoint, FIRST_OPEN_MS, &link->sh, why, sizeof why) != SCANHEAD_OK) {
-        give_up(&r, why);
-        atomic_store(&link->done, 1);
-        return NULL;
-    }
-    scanhead_on_notice(link->sh, soak_saw_notice, link);
-    began(&r);
+    open_head(&r);
     while (!r.ended) {
         step(&r);
         see_whether_done(&r);

@@ -185,7 +185,7 @@ static void judge_frame(struct soak_link *link, const struct soak_fact *f)
     judge_late(link, f);
     judge_garbage(link, f);
     judge_same_bytes(link, f);
-    if (is_wrong && f->resealed == 0) link->wrong_plain++;
+    if ((is_wrong && f->resealed == 0) || f->got > 1) link->wrong_plain++; /* once is enough */
 }
 
 void soak_judge(struct soak_link *link, int all)

@@ -5,9 +5,10 @@
 #include <string.h>
 
 #include "firmware_sim/app/soak/soak.h"
+#include "firmware_sim/base/clock.h"
 
 /* Blocks are computed so far ahead, at most. */
-static const int64_t AHEAD_NS = 500000000;
+static const int64_t AHEAD_NS = 500000000, JUST_NS = 500000000;
 
 void soak_hide(struct soak_row *row, uint64_t n, const char *why)
 {
@@ -70,10 +71,25 @@ static int row_of(const struct fault_note *note)
     return note->kind == FAULT_FLIP && strcmp(note->text, "resealed") == 0 ? SOAK_RESEALED : (int)note->kind;
 }
 
+/* What the link does itself is noted once it is done. So the client may have seen it already. */
+static int was_just_seen(struct soak_link *link, enum fault_kind kind)
+{
+    const int64_t now_ns = clock_now_ns();
+    if (link->odd_closings != 0 && now_ns - link->odd_ns < JUST_NS)
+        link->odd_closings--;
+    else if (kind == FAULT_REFUSE && link->no_open_ns != 0 && now_ns - link->no_open_ns < JUST_NS)
+        link->no_open_ns = 0;
+    else
+        return 0;
+    link->row[kind].noticed++;
+    return 1;
+}
+
 static void hit_frame(struct soak_link *link, const struct fault_note *note)
 {
     struct soak_row *row = &link->row[row_of(note)];
     if (note->kind >= FAULT_DISCONNECT) {
+        if (was_just_seen(link, note->kind)) return;
         if (link->n_acts < SOAK_MAX_ACTS)
             link->act[link->n_acts++] = (struct soak_act){note->kind, note->t_ns};
         else
@@ -112,6 +128,7 @@ static void hit_reply(struct soak_link *link, const struct fault_note *note)
 
 static void hit_connection(struct soak_link *link, const struct fault_note *note)
 {
+    if (note->kind == FAULT_REFUSE && was_just_seen(link, note->kind)) return;
     if (note->kind == FAULT_REFUSE && link->n_refusals < SOAK_MAX_ACTS)
         link->refusal[link->n_refusals++] = (struct soak_act){note->kind, note->t_ns};
     else
@@ -172,6 +189,18 @@ static void begin(struct soak_link *link, soak_seq seq)
     link->begun = link->in_session = 1;
 }
 
+/* The library has their numbers, and gives no gap: they came, and it refused them for what they hold. */
+static void mark_refused(struct soak_link *link, soak_seq to)
+{
+    for (soak_seq seq = link->last + 1; seq < to && link->refused_now > 0; seq++) {
+        struct soak_fact *fact = touch(link, seq);
+        if (fact == NULL || fact->gap || fact->got != 0) continue;
+        fact->gap = 1;
+        link->refused_now--;
+    }
+    link->refused_now = 0;
+}
+
 static double lateness_ms(struct soak_link *link, int64_t t_ns, int64_t now_ns)
 {
     const int64_t after_ns = now_ns - t_ns;
@@ -186,14 +215,14 @@ void soak_saw_frame(struct soak_link *link, const struct scanhead_frame *frame, 
     pthread_mutex_lock(&link->lock);
     const soak_seq seq = soak_seq_of(link->soak, frame->seq);
     if (!link->in_session) begin(link, seq);
+    if (link->refused_now != 0) mark_refused(link, seq);
     struct soak_fact *fact = touch(link, seq);
     link->frames++;
     link->bytes += frame->raw_len;
     link->last = seq;
     link->last_t_ns = frame->t_ns;
     if (fact != NULL) {
-        fact->got++;
-        fact->digest = soak_digest(frame);
+        if (fact->got++ == 0) fact->digest = soak_digest(frame);
         fact->late_ms = lateness_ms(link, frame->t_ns, now_ns);
     }
     pthread_mutex_unlock(&link->lock);
@@ -285,9 +314,20 @@ static void end_by_refusal(struct soak_link *link)
     memmove(link->refusal, link->refusal + 1, --link->n_refusals * sizeof *link->refusal);
 }
 
-void soak_saw_end(struct soak_link *link, int was_refused)
+void soak_saw_no_open(struct soak_link *link)
 {
     pthread_mutex_lock(&link->lock);
+    if (link->n_refusals != 0)
+        end_by_refusal(link);
+    else
+        link->no_open_ns = clock_now_ns();
+    pthread_mutex_unlock(&link->lock);
+}
+
+void soak_saw_end(struct soak_link *link)
+{
+    pthread_mutex_lock(&link->lock);
+    const int was_refused = !link->in_session;
     link->in_session = 0;
     link->closings++;
     const int64_t act_ns = link->n_acts != 0 ? link->act[0].t_ns : INT64_MAX;
@@ -295,11 +335,13 @@ void soak_saw_end(struct soak_link *link, int was_refused)
     if (soak_saw_power_go(link, act_ns != INT64_MAX ? act_ns : link->last_t_ns + AHEAD_NS)) {
         forget_acts(link, 0);
         link->was_cut = 1;
-    } else if (link->n_acts != 0)
+    } else if (link->n_acts != 0) {
         end_by_act(link);
-    else if (was_refused && (link->n_refusals != 0 || link->was_cut))
+    } else if (was_refused && (link->n_refusals != 0 || link->was_cut)) {
         end_by_refusal(link);
-    else
+    } else {
         link->odd_closings++;
+        link->odd_ns = clock_now_ns();
+    }
     pthread_mutex_unlock(&link->lock);
 }

@@ -25,7 +25,8 @@
 enum { SOAK_RESEALED = FAULT_N_KINDS, SOAK_N_ROWS };
 
 /* Frames that are remembered, clean and by link: a power of two. Half of them at most wait to be judged. */
-enum { SOAK_RING = 1 << 16, SOAK_MAX_RUNS = 1024, SOAK_MAX_ACTS = 64, SOAK_MAX_REPLY_NOTES = 16, SOAK_MAX_MOMENTS = 64 };
+enum { SOAK_RING = 1 << 16, SOAK_MAX_RUNS = 1024, SOAK_MAX_ACTS = 64, SOAK_MAX_REPLY_NOTES = 16, SOAK_MAX_MOMENTS = 64,
+       SOAK_REPLY_LEN = 600 };
 
 struct soak_row {
     uint64_t injected;
@@ -125,6 +126,7 @@ struct soak_ask {
     uint32_t echoes;      /* noticed since then, and: */
     uint64_t bad_bytes;
     uint64_t others;      /* faults of any other kind since then */
+    char before[SOAK_REPLY_LEN]; /* the last reply that came */
     uint64_t asked, answered, timeouts, wrong, hurt, odd;
     uint32_t next;
 };
@@ -145,11 +147,13 @@ struct soak_link {
     int begun, in_session;
     soak_seq judged, first, last, top; /* the next to be judged; of the frames received; known of at all */
     uint64_t frames, bytes, refused_frames, sessions, closings, refused;
+    uint64_t refused_now;  /* frames since the last one that was taken */
     uint64_t lost_plain;   /* without a fault ... */
     uint64_t reader_lost;  /* ... and those that the head said it left out, as the client was too slow */
-    uint64_t wrong_plain;  /* differ from the clean frame without a fault */
+    uint64_t wrong_plain;  /* differ from the clean frame without a fault, or came twice */
     uint64_t unknown;      /* the clean reader did not get them */
     uint64_t odd_closings; /* the connection was closed without a fault */
+    int64_t odd_ns, no_open_ns; /* when that last was, and when there was no connection; 0: never */
     uint64_t away;         /* frames that came while there was no session */
     /* Bytes that belong to no frame: noticed, and by the faults. Beside them a reply may be hurt, too. */
     uint64_t bad_bytes, expected_bad_min, expected_bad_max;
@@ -227,9 +231,10 @@ void soak_ask_scan(struct soak_link *link);
 void soak_heard(void *soak, const struct fault_note *note);
 void soak_saw_frame(struct soak_link *link, const struct scanhead_frame *frame, int64_t now_ns);
 void soak_saw_notice(void *link, const struct scanhead_notice *notice);
-/* A connection came about; it ended, or did not even begin. */
+/* A connection came about; it ended; it did not even begin. */
 void soak_saw_open(struct soak_link *link);
-void soak_saw_end(struct soak_link *link, int was_refused);
+void soak_saw_end(struct soak_link *link);
+void soak_saw_no_open(struct soak_link *link);
 struct soak_fact *soak_fact_at(struct soak_link *link, soak_seq seq); /* NULL: not known */
 void soak_hide(struct soak_row *row, uint64_t n, const char *why);
 
