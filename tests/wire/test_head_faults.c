@@ -308,15 +308,6 @@ static void power_cycle_at(struct wire *wire, const char *pace, const char *link
     assert_true(last_ns < off_ns);
     const int64_t pulse = truth_of(wire, "power_cycle", 0, "pulse");
     assert_true(pulse >= 8000 && pulse < 8000 + 20 + 16 && pulse_end <= (uint64_t)pulse);
-    scanhead_close(sh);
-    /* Who comes while power is off is turned away: until somebody is there. */
-    for (char why[256]; scanhead_open(head_endpoint(&head, link), &sh, why, sizeof why) == SCANHEAD_OK;) {
-        char reply[600];
-        if (scanhead_command(sh, "HEAD:STATE?", reply, sizeof reply, DEADLINE_MS) == SCANHEAD_OK) break;
-        scanhead_close(sh);
-        sh = NULL;
-    }
-    assert_non_null(sh);
     client_wait_state(sh, "idle");
     assert_string_equal(client_ask(sh, "SYST:ERR:COUN?"), "0");
     client_tell(sh, "SCAN:START");
