@@ -9,7 +9,7 @@
 /* The only list of commands. */
 static const struct app_command *const COMMANDS[] = {
     &app_run,      &app_record, &app_batch, &app_plan, &app_map, &app_report,
-    &app_coverage, &app_check,  &app_list,  &app_init, &app_view, NULL,
+    &app_coverage, &app_check,  &app_list,  &app_init, &app_view, &app_soak, NULL,
 };
 
 static void print_help(FILE *out)

@@ -48,4 +48,5 @@ record beams beams
 # shellcheck disable=SC2086
 for crs in ecef utm geodetic; do record $crs still output.layout=geo output.crs=$crs $earth; done
 python3 tests/unit/page_points.py "$work"/{polar,moving,beams,ecef,utm,geodetic}
+python3 tests/unit/page_hurt.py "$work/hurt"
 node tests/unit/page_native.mjs "$work"

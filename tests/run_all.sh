@@ -14,7 +14,7 @@ part=${2:-}
 waiting="three_heads slow_reader pty grabber_hokuyo grabber_velodyne signals same_stream clients join"
 alone="bench_cli latency overrun ring_threads"
 beside="grabber_sick gpsd" # other people's clients that take their time
-longest="beside leaks meshes beam_reference range beam plan coordinates georef_default attributes moving travel ticks"
+longest="beside leaks meshes beam_reference range sight_cast coordinates plan beam georef_default attributes moving travel ticks"
 
 wanted() {
     [ -z "$part" ] || [ "$part" = "$1" ]

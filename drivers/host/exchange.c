@@ -20,14 +20,61 @@ static int take_items(struct scanhead *sh)
     }
 }
 
+/* Whether a line is the answer to *IDN?: four fields (IEEE 488.2). No other answer has three commas without
+ * quotes. */
+static int is_identity(const char *text)
+{
+    int commas = 0;
+    for (const char *p = text; *p != 0; p++)
+        commas += *p == ',';
+    return commas == 3 && strchr(text, '"') == NULL;
+}
+
+static int asks_identity(const char *command)
+{
+    return strncasecmp(command + strspn(command, " :"), "*IDN?", 5) == 0;
+}
+
+/* A question of settle() that was given up may be answered yet. That is as it should be, and no notice. */
+void host_stray_line(struct scanhead *sh)
+{
+    if (sh->source.asked > 0 && is_identity(sh->parser.text)) {
+        sh->source.asked--;
+        if (sh->notices.identities == 0) return;
+        sh->notices.identities--;
+    }
+    host_note_line(sh, 0);
+}
+
+/* 1: the line at hand is what was just sent, come back. */
+static int is_echo(struct scanhead *sh, const char *command)
+{
+    if (strcmp(sh->parser.text, command) != 0) return 0;
+    host_note_line(sh, 1);
+    return 1;
+}
+
+/* Takes all that is in the parser. */
+static int take_all(struct scanhead *sh)
+{
+    int rc;
+    while ((rc = take_items(sh)) == 1)
+        host_stray_line(sh);
+    return rc;
+}
+
+int host_keep_rest(struct scanhead *sh)
+{
+    native_parser_finish(&sh->parser);
+    return take_all(sh);
+}
+
 /* Skips lines that came before the command: they answer commands that were given up. Frames may arrive
  * without end, so this looks at a few buffers only. */
 static int discard_stale(struct scanhead *sh)
 {
     for (int i = 0; i < STALE_READS; i++) {
-        int rc;
-        while ((rc = take_items(sh)) == 1) {
-        }
+        int rc = take_all(sh);
         if (rc != 0 || sh->ended) return rc;
         rc = host_fill(sh, 0);
         if (rc == SH_ETIMEOUT) return 0;
@@ -43,9 +90,8 @@ static int wait_writable(struct scanhead *sh, int64_t deadline_ns)
     int rc = host_wait(sh, POLLIN | POLLOUT, deadline_ns, &revents);
     if (rc != 0 || (revents & POLLIN) == 0) return rc;
     rc = host_fill(sh, deadline_ns);
-    while (rc == 0 && (rc = take_items(sh)) == 1)
-        rc = 0;
-    return rc == 0 && sh->ended ? host_gone(sh) : rc;
+    if (rc == 0) rc = take_all(sh);
+    return rc == 0 && sh->ended ? host_over(sh) : rc;
 }
 
 /* What had come can still be read. */
@@ -104,20 +150,7 @@ static int copy_reply(struct scanhead *sh, char *reply, size_t reply_len)
     return SCANHEAD_OK;
 }
 
-/* Whether a line is the answer to *IDN?: four fields (IEEE 488.2). No other answer has three commas without
- * quotes. */
-static int is_identity(const char *text)
-{
-    int commas = 0;
-    for (const char *p = text; *p != 0; p++)
-        commas += *p == ',';
-    return commas == 3 && strchr(text, '"') == NULL;
-}
-
-static int asks_identity(const char *command)
-{
-    return strncasecmp(command + strspn(command, " :"), "*IDN?", 5) == 0;
-}
+static const char identity_query[] = "*IDN?";
 
 /* Skips lines until every question has its answer. A question that was given up may be lost. So once one
  * answer is there, the others have ANSWERS_MS to come. */
@@ -126,12 +159,12 @@ static int pass_over(struct scanhead *sh, int64_t deadline_ns)
     int answered = 0;
     while (sh->source.asked > 0) {
         int rc = take_items(sh);
-        if (rc == 1 && is_identity(sh->parser.text)) {
-            sh->source.asked--;
-            if (!answered++) deadline_ns = host_deadline_ns(ANSWERS_MS);
+        if (rc == 1 && !is_echo(sh, identity_query)) {
+            if (is_identity(sh->parser.text) && !answered++) deadline_ns = host_deadline_ns(ANSWERS_MS);
+            host_stray_line(sh);
         }
         if (rc == 1) continue;
-        if (rc == 0 && sh->ended) return host_gone(sh);
+        if (rc == 0 && sh->ended) return host_over(sh);
         if (rc == 0) rc = deadline_ns < host_deadline_ns(0) ? SH_ETIMEOUT : host_fill(sh, deadline_ns);
         if (rc == SH_ETIMEOUT && answered) break; /* is_late knows the others, should they come yet */
         if (rc != 0) return rc;
@@ -144,7 +177,7 @@ static int pass_over(struct scanhead *sh, int64_t deadline_ns)
 static int is_late(struct scanhead *sh, const char *command)
 {
     if (sh->source.asked == 0 || asks_identity(command) || !is_identity(sh->parser.text)) return 0;
-    sh->source.asked--;
+    host_stray_line(sh);
     return 1;
 }
 
@@ -167,10 +200,13 @@ static int settle(struct scanhead *sh, int64_t deadline_ns)
 }
 
 /* The reply may come yet, and is not that of the next command: come into step before that. */
-static void give_up(struct host_source *source, const char *command)
+static void give_up(struct scanhead *sh, const char *command)
 {
-    source->unsettled = 1;
-    source->asked += asks_identity(command);
+    const int asks = asks_identity(command);
+    sh->source.unsettled = 1;
+    sh->source.asked += asks;
+    sh->notices.given_up++;
+    sh->notices.identities += (uint64_t)asks;
 }
 
 int scanhead_command(struct scanhead *sh, const char *command, char *reply, size_t reply_len, int timeout_ms)
@@ -188,17 +224,17 @@ int scanhead_command(struct scanhead *sh, const char *command, char *reply, size
     if (rc == 0) rc = sh->ended ? host_gone(sh) : send_all(sh, line, len + 1, deadline_ns);
     while (rc == 0) {
         rc = take_items(sh);
-        if (rc == 1 && is_late(sh, command)) {
+        if (rc == 1 && (is_echo(sh, command) || is_late(sh, command))) {
             rc = 0;
             continue;
         }
         if (rc == 1) return copy_reply(sh, reply, reply_len);
         if (rc != 0) break;
-        if (sh->ended) return host_gone(sh);
+        if (sh->ended) return host_over(sh);
         rc = deadline_ns < host_deadline_ns(0) ? SH_ETIMEOUT : host_fill(sh, deadline_ns);
     }
     if (rc == SH_ETIMEOUT) {
-        give_up(&sh->source, command);
+        give_up(sh, command);
         return sh_fail(&sh->err, SCANHEAD_ETIMEOUT, "%s: no reply to '%s' within %d ms", sh->source.name, command,
                        timeout_ms);
     }

@@ -51,6 +51,7 @@ int scanhead_open_within(const char *source, int timeout_ms, struct scanhead **o
         free(sh);
     } else {
         native_parser_init(&sh->parser);
+        host_listen(sh);
         host_turn_table(sh);
         *out = sh;
     }
@@ -71,11 +72,15 @@ int scanhead_reattach(struct scanhead *sh, int timeout_ms)
     if (sh->source.ops != NULL) sh->source.ops->close(&sh->source);
     sh->source.ops = NULL;
     sh->ended = 1;
+    int rc = host_keep_rest(sh);
+    if (rc != SH_OK) return rc;
+    host_note_closed(sh);
     snprintf(name, sizeof name, "%s", sh->source.name);
-    int rc = open_in_time(name, 1, host_deadline_ns(timeout_ms), &sh->source, &sh->err);
+    rc = open_in_time(name, 1, host_deadline_ns(timeout_ms), &sh->source, &sh->err);
     if (rc != SH_OK) return rc;
     sh->ended = sh->lost = sh->reset = sh->stuck = 0;
     native_parser_resume(&sh->parser);
+    host_note_reattached(sh);
     return SCANHEAD_OK;
 }
 
@@ -243,9 +248,16 @@ int host_gone(struct scanhead *sh)
                    sh->source.name);
 }
 
+int host_over(struct scanhead *sh)
+{
+    host_note_closed(sh);
+    return host_gone(sh);
+}
+
 static int closed(struct scanhead *sh)
 {
     const struct native_stats *s = &sh->parser.stats;
+    host_note_closed(sh);
     if (s->bytes > 0 && s->frames == 0 && s->texts == 0)
         return sh_fail(&sh->err, SCANHEAD_EFORMAT, "%s: not one frame in %llu bytes: not a scan head's stream",
                        sh->source.name, (unsigned long long)s->bytes);
@@ -265,9 +277,8 @@ int scanhead_next(struct scanhead *sh, struct scanhead_frame *frame, int timeout
     int64_t deadline_ns = 0; /* asked for only when there is something to wait for */
     for (;;) {
         enum native_item item;
-        while ((item = native_parser_next(&sh->parser)) == NATIVE_TEXT) {
-            /* the reply to a command that was given up: nobody waits for it any more */
-        }
+        while ((item = native_parser_next(&sh->parser)) == NATIVE_TEXT)
+            host_stray_line(sh);
         if (item == NATIVE_FRAME) return hand_out(sh, sh->parser.frame, frame);
         if (sh->ended) return closed(sh);
         if (deadline_ns == 0)

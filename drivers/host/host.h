@@ -57,6 +57,16 @@ struct host_times {
     int64_t gps_at_ns, gps_ns; /* a device time, and the GPS time that the head's clock had then */
 };
 
+/* Notices of what is not in the bytes themselves: lines that came unasked, connections. */
+struct host_notices {
+    void (*fn)(void *ctx, const struct scanhead_notice *notice); /* NULL: nobody listens */
+    void *ctx;
+    uint64_t given_up;   /* commands whose reply has not come, so far */
+    uint64_t identities; /* of these, how many asked who the head is */
+    int close_told;      /* CLOSED was given for this connection */
+    uint64_t echoes, late_replies, unasked, closed, reattached;
+};
+
 struct scanhead {
     struct host_source source;
     int ended; /* no more bytes will come */
@@ -64,6 +74,7 @@ struct scanhead {
     int reset; /* because the bus was reset, with the device still on it */
     int stuck; /* half a command went out: nothing sensible can follow */
     struct native_parser parser;
+    struct host_notices notices;
     struct host_kept kept;
     const uint8_t *payload; /* of the frame that scanhead_next returned last */
     int have_points;        /* a points frame has been handed out: */
@@ -112,6 +123,21 @@ int host_is_hang_up(const struct scanhead *sh, int error);
 void host_note_loss(struct scanhead *sh, int error);
 /* Sets and returns the error for when nothing more will come. */
 int host_gone(struct scanhead *sh);
+/* The same, where all that had come was taken: it is noticed, too. */
+int host_over(struct scanhead *sh);
+
+/* notices.c: hands on what the parser notices. Called once, after native_parser_init. */
+void host_listen(struct scanhead *sh);
+/* The parser is at a line that answers nothing that is waited for; or at the echo of what was just sent. */
+void host_note_line(struct scanhead *sh, int is_echo);
+/* The connection is over, and the parser has given all of it. Once for each connection. */
+void host_note_closed(struct scanhead *sh);
+void host_note_reattached(struct scanhead *sh);
+
+/* exchange.c: the parser is at a line that nobody waits for. */
+void host_stray_line(struct scanhead *sh);
+/* Nothing more will come: keeps the frames that are in the parser. The rest of it is garbage. */
+int host_keep_rest(struct scanhead *sh);
 
 /* Takes a frame into the state: descriptor, anchor, names, counters, hash. Called once per frame, in stream
  * order. */

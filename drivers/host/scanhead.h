@@ -150,9 +150,69 @@ struct scanhead_frame {
     char event_text[96];
 };
 
-/* The next frame, in order. timeout_ms < 0 waits for ever. Frames with a wrong CRC never come out; they are
- * counted. */
+/* The next frame, in order. timeout_ms < 0 waits for ever. Frames with a wrong CRC never come out, nor do frames that
+ * came already, or after newer ones. All of them are counted, see scanhead_on_notice. */
 int scanhead_next(struct scanhead *sh, struct scanhead_frame *frame, int timeout_ms);
+
+/* What may be wrong with a stream. Each event gives one notice. Two ways of looking stay apart:
+ *   The numbers of frames: GAP, REPEATED, LATE, RESTARTED. A frame that did not come in order is in one GAP, whatever
+ *   became of it, but for those that a restart hides. So the n of all gaps are stats.seq_lost.
+ *   The bytes: BAD_PAYLOAD, BAD_BYTES, CUT. Each byte that belongs to no frame and no reply is in one of them. So their
+ *   n are stats.bad_bytes.
+ * A frame that was hurt is in both: its bytes first, then its number, once the next frame shows that it is missing. */
+enum scanhead_notice_kind {
+    /* Frames are missing: n of them, from seq on. at_byte: of the frame that came instead. Where the head says that the
+     * reader was too slow (SCANHEAD_EV_READER_LOST), it has left them out. */
+    SCANHEAD_NOTICE_GAP = 1,
+    /* A frame came once more: number, time, type and checksum are those of one of the last 256. It is not handed out
+     * again. A LOCAL frame has no number; it is compared with the frame before it alone. */
+    SCANHEAD_NOTICE_REPEATED = 2,
+    /* A frame that was missing came after newer ones. It is not handed out, and stays counted as lost. The last 64 gaps
+     * are remembered, but for those of more than 65536 frames. 256 such frames in a row are a restart. */
+    SCANHEAD_NOTICE_LATE = 3,
+    /* The sequence jumps back, and it is neither of the two: a head that started again, or another recording. seq: the
+     * first number of the new sequence. The frame is handed out. How many are missing is not known. */
+    SCANHEAD_NOTICE_RESTARTED = 4,
+    /* A frame whose header is right, and whose payload is not: seq is its number, t_ns its time. n: bytes of it, up to
+     * the next frame that is right: fewer than its length says where bytes were lost. */
+    SCANHEAD_NOTICE_BAD_PAYLOAD = 5,
+    /* n bytes that belong to nothing: garbage, a frame with a broken header, a broken reply, replies after these up to
+     * the next frame. A whole run of them is one notice, before the next frame or reply. */
+    SCANHEAD_NOTICE_BAD_BYTES = 6,
+    /* The connection or the recording ended within a frame or a reply: n bytes of it had come. seq: of the frame, where
+     * its header had come. */
+    SCANHEAD_NOTICE_CUT = 7,
+    /* The line that was just sent came back before its reply; it was passed over. n: its length. */
+    SCANHEAD_NOTICE_ECHO = 8,
+    /* A reply came that nobody waits for, after a command that was given up. n: its length. */
+    SCANHEAD_NOTICE_LATE_REPLY = 9,
+    /* The same, and no command was given up: a reply that came twice, or lines that a terminal kept. */
+    SCANHEAD_NOTICE_UNASKED = 10,
+    /* The connection is over, and all that had come was taken. n: -SCANHEAD_ECLOSED, -SCANHEAD_ELOST or
+     * -SCANHEAD_ERESET. Not of a recording. */
+    SCANHEAD_NOTICE_CLOSED = 11,
+    /* scanhead_reattach has found the head again. */
+    SCANHEAD_NOTICE_REATTACHED = 12,
+};
+
+#define SCANHEAD_NO_TIME INT64_MIN
+
+struct scanhead_notice {
+    enum scanhead_notice_kind kind;
+    uint32_t seq;     /* 0 where no number is named above */
+    uint64_t at_byte; /* where it begins, in all bytes that this handle has received, over all its connections */
+    uint64_t n;       /* as above; 1 for one frame */
+    int64_t t_ns; /* device time of the frame that it is about; of bytes, lines and connections that of the last whole
+                   * frame before, or SCANHEAD_NO_TIME */
+};
+
+/* fn gets each notice, from within scanhead_next, scanhead_command and scanhead_reattach, and in the order of the
+ * stream: at_byte never falls. A notice comes before the frame that follows it in the stream. While a command waits for
+ * its reply, frames that came earlier may still be kept for scanhead_next. fn may call scanhead_get_stats, which counts
+ * the notice already; nothing else on this handle. NULL: nobody listens, as at first. Counters go on either way. */
+void scanhead_on_notice(struct scanhead *sh, void (*fn)(void *ctx, const struct scanhead_notice *notice), void *ctx);
+/* The kind in lower case, such as "bad payload"; "?" for another number. */
+const char *scanhead_notice_name(int kind);
 
 enum { SCANHEAD_NO_LABEL = 0xffff };
 
@@ -316,6 +376,11 @@ struct scanhead_stats {
     uint64_t dropped;     /* frames dropped here while waiting for a reply */
     uint64_t reader_lost; /* frames the head says it could not give us */
     uint64_t pulses_lost; /* pulses the head says it could not compute */
+    /* How often each notice came. seq_gaps above counts restarts, too. frames counts neither repeated nor late ones. */
+    uint64_t repeated, late, restarts, cuts, echoes, late_replies, unasked, closed, reattached;
+    /* Of bad_payload, what no gap shows: before the first frame, before a restart, and after the last frame. So
+     * seq_lost + bad_unseen frames are known to be lost on the way. */
+    uint64_t bad_unseen;
 };
 void scanhead_get_stats(const struct scanhead *sh, struct scanhead_stats *stats);
 

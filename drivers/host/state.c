@@ -302,6 +302,16 @@ void scanhead_get_stats(const struct scanhead *sh, struct scanhead_stats *stats)
         .reader_lost = sh->reader_lost,
         /* both count the same; of either, some may not have come */
         .pulses_lost = sh->pulses_lost_told > sh->pulses_lost_ended ? sh->pulses_lost_told : sh->pulses_lost_ended,
+        .repeated = s->repeated,
+        .late = s->late,
+        .restarts = s->restarts,
+        .cuts = s->cuts,
+        .bad_unseen = s->bad_unseen,
+        .echoes = sh->notices.echoes,
+        .late_replies = sh->notices.late_replies,
+        .unasked = sh->notices.unasked,
+        .closed = sh->notices.closed,
+        .reattached = sh->notices.reattached,
     };
 }
 

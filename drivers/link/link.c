@@ -14,3 +14,10 @@ const struct link_ops *link_ops_get(enum link_type type)
 {
     return (unsigned)type < N_LINKS ? links[type] : NULL;
 }
+
+uint32_t link_faults(const struct link_spec *spec)
+{
+    const struct link_ops *ops = link_ops_get(spec->type);
+    if (ops == NULL) return 0;
+    return ops->can != NULL ? ops->faults & ops->can(spec) : ops->faults;
+}

@@ -54,6 +54,7 @@ enum link_event_kind {
     LINK_WOKEN,    /* wake_fd was signalled; poll has drained it (eventfd) */
     LINK_REFUSED,  /* somebody was turned away: all sessions taken */
     LINK_NOTICE,   /* something that whoever runs the head should know: the text is in peer */
+    LINK_PLUGGED,  /* usb: a host has got the device, and will enumerate it once poll() is called again */
 };
 
 struct link_event {
@@ -67,19 +68,22 @@ enum link_fault {
     LINK_FAULT_DISCONNECT,        /* ends the session at once; what was not taken by the other side is lost */
     LINK_FAULT_UNPLUG,            /* ends all sessions, and the endpoint is not there until LINK_FAULT_PLUG */
     LINK_FAULT_BUS_RESET,         /* usb */
-    LINK_FAULT_ENDPOINT_STALL,    /* usb: the endpoint of the stream is halted until the host clears it */
-    LINK_FAULT_SHORT_PACKETS,     /* usb: each of the next n transfers ends early */
+    LINK_FAULT_ENDPOINT_STALL,    /* usb: the session's endpoint to the host is halted until the host clears it */
+    LINK_FAULT_SHORT_PACKETS,     /* usb: each of the session's next n transfers ends early, in a short packet */
     LINK_FAULT_REFUSE,            /* ends the session before a byte went out: to be told at LINK_OPENED */
-    LINK_FAULT_SLOW_ENUMERATION,  /* usb: until told again, each control request takes for_ms */
-    LINK_FAULT_DESCRIPTOR_LENGTH, /* usb: until told again, the configuration says that it is n bytes longer */
+    LINK_FAULT_SLOW_ENUMERATION,  /* usb: until told again, each control request takes for_ms: at LINK_PLUGGED */
+    LINK_FAULT_DESCRIPTOR_LENGTH, /* usb: until told again, the configuration says that it is n bytes longer: likewise */
     LINK_FAULT_PLUG,              /* ends LINK_FAULT_UNPLUG */
 };
+#define LINK_FAULT_BIT(fault) (UINT32_C(1) << (fault))
 
 struct link_ops {
     const char *name;
+    int datagrams; /* 1: each write goes out with a checksum of the system's, and one that is damaged never arrives */
     int messages; /* 1: each write goes out as one message; the owner puts text or frames into it, not both */
 
-    uint32_t faults; /* what fault() can do: bit per enum link_fault */
+    uint32_t faults; /* what fault() can do: LINK_FAULT_BIT of each */
+    uint32_t (*can)(const struct link_spec *spec); /* of these, what a link of this spec can do; NULL: all */
 
     /* Opens as spec says. When it fails, nothing of it stays. The text of err names the endpoint. */
     int (*open)(const struct link_spec *spec, void **link, struct sh_err *err);
@@ -109,8 +113,8 @@ struct link_ops {
      * this link can't be ended. */
     void (*end)(void *link, int session);
 
-    /* Does something wrong, as enum link_fault says. Returns 0, or SH_ESTATE: it can't be done now. NULL where `faults`
-     * is 0. */
+    /* Does something wrong, as enum link_fault says. A LINK_CLOSED follows for each session that ends by it. Returns 0,
+     * or SH_ESTATE: it can't be done now; PLUG: somebody else has the endpoint. NULL where `faults` is 0. */
     int (*fault)(void *link, enum link_fault what, int session, uint32_t n, double for_ms);
 
     /* Closes everything, removes what open made (symlink). link is void afterwards. */
@@ -119,5 +123,7 @@ struct link_ops {
 
 /* From the one list of links, in link.c. NULL for an unknown type. */
 const struct link_ops *link_ops_get(enum link_type type);
+/* What a link of this spec can be told to do wrong: LINK_FAULT_BIT of each, without LINK_FAULT_PLUG. */
+uint32_t link_faults(const struct link_spec *spec);
 
 #endif

@@ -35,6 +35,7 @@
 
 struct pty_link {
     struct pty_device device;
+    int unplugged; /* there is no pair, and no symlink */
     int inotify, watch;
     int open;                   /* a session is on, as the caller knows or is about to learn */
     unsigned count;             /* clients of the session; 0 with open set: the last seems to be gone */
@@ -125,6 +126,19 @@ static short pty_now(const struct pty_link *pty)
     return poll(&slot, 1, 0) >= 0 ? slot.revents : (short)0;
 }
 
+/* Sets up the watch. A client that came before it is found by what the master says. */
+static int pty_wait_for_client(struct pty_link *pty)
+{
+    if (pty_watch(pty) != SH_OK) return SH_EIO;
+    short now = pty_now(pty);
+    if ((now & POLLHUP) == 0 || (now & POLLIN) != 0) {
+        pty_read_inotify(pty, 0); /* one client is counted by what the master says */
+        pty_begin(pty, 1);
+        pty->open_event_due = 1;
+    }
+    return SH_OK;
+}
+
 /* All clients are gone and what they wrote is read. Clients that come meanwhile are found at the end. */
 static int pty_end(struct pty_link *pty)
 {
@@ -134,15 +148,7 @@ static int pty_end(struct pty_link *pty)
     inotify_rm_watch(pty->inotify, pty->watch);
     pty_read_inotify(pty, 0);
     int rc = pty_device_rest(&pty->device);
-    if (rc == SH_OK) rc = pty_watch(pty);
-    if (rc != SH_OK) return rc;
-    short now = pty_now(pty);
-    if ((now & POLLHUP) == 0 || (now & POLLIN) != 0) {
-        pty_read_inotify(pty, 0); /* one client is counted by what the master says */
-        pty_begin(pty, 1);
-        pty->open_event_due = 1;
-    }
-    return SH_OK;
+    return rc == SH_OK ? pty_wait_for_client(pty) : rc;
 }
 
 /* Returns 1 when nothing is left to report. */
@@ -210,20 +216,79 @@ static ssize_t pty_write(void *link, int session, const void *buf, size_t len)
     return errno == EAGAIN || errno == EINTR ? 0 : SH_ECLOSED;
 }
 
+/* ---- faults on request */
+
+/* The session is over, and nobody hears of the terminal any more. */
+static void pty_let_go(struct pty_link *pty)
+{
+    pty->due_closed = pty->due_closed || (pty->open && !pty->due_opened);
+    pty->open = pty->due_opened = pty->open_event_due = 0;
+    pty->count = 0;
+    inotify_rm_watch(pty->inotify, pty->watch);
+    pty_read_inotify(pty, 0);
+}
+
+static int pty_cut(struct pty_link *pty)
+{
+    if (!pty->open) return SH_ESTATE;
+    pty_let_go(pty);
+    const int renewed = pty_device_renew(&pty->device) == SH_OK;
+    return pty_wait_for_client(pty) == SH_OK && renewed ? SH_OK : SH_ESTATE;
+}
+
+static int pty_unplug(struct pty_link *pty)
+{
+    if (pty->unplugged) return SH_ESTATE;
+    pty_let_go(pty);
+    pty_device_close(&pty->device);
+    pty->unplugged = 1;
+    return SH_OK;
+}
+
+static int pty_plug(struct pty_link *pty)
+{
+    struct pty_device fresh;
+    struct sh_err err;
+    if (!pty->unplugged) return SH_OK;
+    if (pty_device_open(&fresh, pty->device.path, &err) != SH_OK) return SH_ESTATE;
+    pty->device = fresh;
+    pty->unplugged = 0;
+    return pty_wait_for_client(pty) == SH_OK ? SH_OK : SH_ESTATE;
+}
+
+static int pty_fault(void *link, enum link_fault what, int session, uint32_t n, double for_ms)
+{
+    (void)n, (void)for_ms;
+    switch (what) {
+    case LINK_FAULT_DISCONNECT:
+    case LINK_FAULT_REFUSE:
+        return session == 0 ? pty_cut(link) : SH_ESTATE;
+    case LINK_FAULT_UNPLUG:
+        return pty_unplug(link);
+    case LINK_FAULT_PLUG:
+        return pty_plug(link);
+    default:
+        return SH_ESTATE;
+    }
+}
+
 static void pty_close(void *link)
 {
     struct pty_link *pty = link;
     close(pty->inotify);
-    pty_device_close(&pty->device);
+    if (!pty->unplugged) pty_device_close(&pty->device);
     free(pty);
 }
 
 const struct link_ops link_pty = {
     .name = "pty",
+    .faults = LINK_FAULT_BIT(LINK_FAULT_DISCONNECT) | LINK_FAULT_BIT(LINK_FAULT_REFUSE) |
+              LINK_FAULT_BIT(LINK_FAULT_UNPLUG),
     .open = pty_open,
     .endpoint = pty_endpoint,
     .poll = pty_poll,
     .read = pty_read,
     .write = pty_write,
+    .fault = pty_fault,
     .close = pty_close,
 };

@@ -142,9 +142,8 @@ int pty_device_open(struct pty_device *device, const char *path, struct sh_err *
     return SH_OK;
 }
 
-int pty_device_rest(struct pty_device *device)
+int pty_device_renew(struct pty_device *device)
 {
-    if (slave_rest(device) == 0) return SH_OK;
     struct pty_device fresh = *device;
     if (pair_open(&fresh.master, fresh.slave, sizeof fresh.slave) != 0) return SH_EIO;
     int ours = device->path[0] != '\0' && link_is_ours(device);
@@ -156,6 +155,11 @@ int pty_device_rest(struct pty_device *device)
     close(device->master);
     *device = fresh;
     return SH_OK;
+}
+
+int pty_device_rest(struct pty_device *device)
+{
+    return slave_rest(device) == 0 ? SH_OK : pty_device_renew(device);
 }
 
 void pty_device_close(struct pty_device *device)

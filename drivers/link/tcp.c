@@ -25,9 +25,11 @@ struct tcp_session {
 };
 
 struct tcp_link {
-    int listener;
+    int listener; /* -1: unplugged */
     int reserve_fd; /* given up for a moment to turn a client away when descriptors run out */
     int n_sessions;
+    int port;      /* that it listens on */
+    char host[64]; /* as the user named it */
     char name[80];
     struct tcp_session session[LINK_MAX_SESSIONS];
 };
@@ -50,6 +52,8 @@ static int tcp_open(const struct link_spec *spec, void **link, struct sh_err *er
         return rc;
     }
     snprintf(tcp->name, sizeof tcp->name, "tcp:%s", at);
+    snprintf(tcp->host, sizeof tcp->host, "%s", host);
+    tcp->port = atoi(strrchr(at, ':') + 1);
     tcp->n_sessions = spec->max_sessions;
     tcp->reserve_fd = open("/dev/null", O_RDONLY | O_CLOEXEC);
     *link = tcp;
@@ -200,23 +204,72 @@ static void tcp_end(void *link, int session)
     self->state = TCP_ENDED;
 }
 
+/* ---- faults on request */
+
+static int tcp_cut(struct tcp_link *tcp, int session)
+{
+    struct tcp_session *self = tcp_session(tcp, session);
+    if (self == NULL) return SH_ESTATE;
+    socket_break(self->fd);
+    self->state = TCP_ENDED;
+    return SH_OK;
+}
+
+static int tcp_unplug(struct tcp_link *tcp)
+{
+    if (tcp->listener < 0) return SH_ESTATE;
+    close(tcp->listener); /* who waits there is turned away by the system */
+    tcp->listener = -1;
+    for (int s = 0; s < tcp->n_sessions; s++)
+        tcp_cut(tcp, s);
+    return SH_OK;
+}
+
+static int tcp_plug(struct tcp_link *tcp)
+{
+    const struct socket_place place = {.what = "link tcp", .host = tcp->host, .port = tcp->port};
+    char at[72];
+    struct sh_err err;
+    if (tcp->listener >= 0) return SH_OK;
+    return socket_open(&place, &tcp->listener, at, sizeof at, &err) == SH_OK ? SH_OK : SH_ESTATE;
+}
+
+static int tcp_fault(void *link, enum link_fault what, int session, uint32_t n, double for_ms)
+{
+    (void)n, (void)for_ms;
+    switch (what) {
+    case LINK_FAULT_DISCONNECT:
+    case LINK_FAULT_REFUSE:
+        return tcp_cut(link, session);
+    case LINK_FAULT_UNPLUG:
+        return tcp_unplug(link);
+    case LINK_FAULT_PLUG:
+        return tcp_plug(link);
+    default:
+        return SH_ESTATE;
+    }
+}
+
 static void tcp_close(void *link)
 {
     struct tcp_link *tcp = link;
     for (int s = 0; s < tcp->n_sessions; s++)
         if (tcp->session[s].state != TCP_FREE) close(tcp->session[s].fd);
     if (tcp->reserve_fd >= 0) close(tcp->reserve_fd);
-    close(tcp->listener);
+    if (tcp->listener >= 0) close(tcp->listener);
     free(tcp);
 }
 
 const struct link_ops link_tcp = {
     .name = "tcp",
+    .faults = LINK_FAULT_BIT(LINK_FAULT_DISCONNECT) | LINK_FAULT_BIT(LINK_FAULT_REFUSE) |
+              LINK_FAULT_BIT(LINK_FAULT_UNPLUG),
     .open = tcp_open,
     .endpoint = tcp_endpoint,
     .poll = tcp_poll,
     .read = tcp_read,
     .write = tcp_write,
     .end = tcp_end,
+    .fault = tcp_fault,
     .close = tcp_close,
 };

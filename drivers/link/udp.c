@@ -27,6 +27,8 @@ enum { SEND_BUFFER_BYTES = 1 << 20 };
 struct udp_link {
     int fd;
     int reported_opened;
+    int unplugged;
+    int closing; /* LINK_CLOSED is to be reported */
     uint64_t refused;
     char name[80];
 };
@@ -168,8 +170,11 @@ static int udp_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
 {
     struct udp_link *udp = link;
     struct link_events events = {event, 0, max};
-    if (!udp->reported_opened) udp->reported_opened = link_events_push(&events, LINK_OPENED, 0, udp->name);
-    struct pollfd fds[2] = {{.fd = wake_fd, .events = POLLIN}, {.fd = udp->fd, .events = POLLIN}};
+    if (udp->closing && link_events_push(&events, LINK_CLOSED, 0, udp->name)) udp->reported_opened = udp->closing = 0;
+    if (!udp->reported_opened && !udp->unplugged)
+        udp->reported_opened = link_events_push(&events, LINK_OPENED, 0, udp->name);
+    struct pollfd fds[2] = {{.fd = wake_fd, .events = POLLIN},
+                            {.fd = udp->unplugged ? -1 : udp->fd, .events = POLLIN}};
     if ((want_write & 1u) != 0) fds[1].events = POLLIN | POLLOUT;
     int rc = link_wait(fds, 2, events.n > 0 ? 0 : timeout_ms);
     if (rc != SH_OK) return rc;
@@ -187,7 +192,7 @@ static int udp_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
 static ssize_t udp_read(void *link, int session, void *buf, size_t len)
 {
     struct udp_link *udp = link;
-    if (session != 0) return SH_ECLOSED;
+    if (session != 0 || udp->unplugged || udp->closing) return SH_ECLOSED;
     ssize_t n = recv(udp->fd, buf, len, MSG_DONTWAIT);
     return n > 0 ? n : 0;
 }
@@ -196,7 +201,7 @@ static ssize_t udp_read(void *link, int session, void *buf, size_t len)
 static ssize_t udp_write(void *link, int session, const void *buf, size_t len)
 {
     struct udp_link *udp = link;
-    if (session != 0) return SH_ECLOSED;
+    if (session != 0 || udp->unplugged || udp->closing) return SH_ECLOSED;
     for (int tries = 0; tries < 2; tries++) {
         if (send(udp->fd, buf, len, MSG_DONTWAIT | MSG_NOSIGNAL) >= 0) return (ssize_t)len;
         if (errno == EAGAIN || errno == EWOULDBLOCK) return 0;
@@ -205,6 +210,24 @@ static ssize_t udp_write(void *link, int session, const void *buf, size_t len)
     }
     udp->refused++;
     return (ssize_t)len; /* no route, no memory: gone as on any way */
+}
+
+/* The socket stays, so that the source of the datagrams does. What came meanwhile is not for the head. */
+static int udp_fault(void *link, enum link_fault what, int session, uint32_t n, double for_ms)
+{
+    struct udp_link *udp = link;
+    char nothing[2048];
+    (void)session, (void)n, (void)for_ms;
+    if (what == LINK_FAULT_UNPLUG && !udp->unplugged) {
+        udp->unplugged = 1;
+        udp->closing = udp->reported_opened;
+        return SH_OK;
+    }
+    if (what != LINK_FAULT_PLUG) return SH_ESTATE;
+    while (udp->unplugged && recv(udp->fd, nothing, sizeof nothing, MSG_DONTWAIT) >= 0)
+        continue;
+    udp->unplugged = 0;
+    return SH_OK;
 }
 
 static uint64_t udp_refused(const void *link)
@@ -222,11 +245,14 @@ static void udp_close(void *link)
 
 const struct link_ops link_udp = {
     .name = "udp",
+    .datagrams = 1,
+    .faults = LINK_FAULT_BIT(LINK_FAULT_UNPLUG),
     .open = udp_open,
     .endpoint = udp_endpoint,
     .poll = udp_poll,
     .read = udp_read,
     .write = udp_write,
     .refused = udp_refused,
+    .fault = udp_fault,
     .close = udp_close,
 };

@@ -20,6 +20,7 @@ struct usb_link {
     void *backend;
     int n;                          /* sessions of the head's look */
     int reported[USB_MAX_SESSIONS]; /* the caller takes it to be open */
+    uint32_t plugged;               /* attaches that the caller knows of */
     const char *news;               /* the back end's, until reported */
     struct usb_claims claims;       /* of the head's own identity */
 };
@@ -112,10 +113,17 @@ static int has_to_report(const struct usb_link *self, int i)
     return self->reported[i] != self->head.session[i].open;
 }
 
+/* A host has got the device, and has learnt nothing of it so far. */
+static int is_plugged_anew(const struct usb_link *self)
+{
+    return self->plugged != usb_device_attaches(self->head.device);
+}
+
 static int go_on(void *ctx)
 {
     struct usb_link *self = ctx;
     scanhead_usb_update(&self->head);
+    if (is_plugged_anew(self)) return 0;
     for (int i = 0; i < self->n; i++)
         if (has_to_report(self, i)) return 0;
     return 1;
@@ -143,10 +151,21 @@ static void take_news(struct usb_link *self)
 
 static int has_news(const struct usb_link *self, uint32_t want_write)
 {
-    int news = (self->ops->more != NULL && self->ops->more(self->backend)) || self->news != NULL || self->head.cut_due;
+    int news = is_plugged_anew(self);
+    news |= (self->ops->more != NULL && self->ops->more(self->backend)) || self->news != NULL || self->head.cut_due;
     for (int i = 0; i < self->n; i++)
         news |= has_to_report(self, i) || is_readable(self, i) || ((want_write >> i & 1u) != 0 && is_writable(self, i));
     return news;
+}
+
+/* The wait, no longer than until the back end has something to do. */
+static int wait_ms(const struct usb_link *self, int timeout_ms)
+{
+    const int64_t due_ns = self->ops->due_ns != NULL ? self->ops->due_ns(self->backend) : INT64_MAX;
+    if (due_ns == INT64_MAX) return timeout_ms;
+    const int64_t ms = (due_ns - usb_now_ns()) / 1000000 + 1;
+    if (ms <= 0) return 0;
+    return timeout_ms >= 0 && timeout_ms < ms ? timeout_ms : ms > 60000 ? 60000 : (int)ms;
 }
 
 static int usb_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *event, int max)
@@ -155,13 +174,15 @@ static int usb_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
     struct link_events events = {event, 0, max};
     struct pollfd fds[1 + USB_BACKEND_MAX_FDS] = {{.fd = wake_fd, .events = POLLIN}};
     int n = self->ops->prepare(self->backend, fds + 1);
-    int rc = link_wait(fds, (nfds_t)(1 + n), has_news(self, want_write) ? 0 : timeout_ms);
+    int rc = link_wait(fds, (nfds_t)(1 + n), has_news(self, want_write) ? 0 : wait_ms(self, timeout_ms));
     if (rc != SH_OK) return rc;
     link_take_wake(&fds[0], &events);
     rc = self->ops->handle(self->backend, fds + 1, n, go_on, self);
     if (rc != SH_OK) return rc;
     scanhead_usb_update(&self->head);
     self->ops->flush(self->backend);
+    if (is_plugged_anew(self) && link_events_push(&events, LINK_PLUGGED, 0, NULL))
+        self->plugged = usb_device_attaches(self->head.device);
     for (int i = 0; i < self->n; i++)
         report(self, i, want_write, &events);
     take_news(self);
@@ -195,6 +216,61 @@ static ssize_t usb_write(void *link, int session, const void *buf, size_t len)
     return SH_ECLOSED;
 }
 
+/* ---- faults on request */
+
+enum {
+    USB_FAULTS = LINK_FAULT_BIT(LINK_FAULT_UNPLUG) | LINK_FAULT_BIT(LINK_FAULT_BUS_RESET),
+    STALLS = LINK_FAULT_BIT(LINK_FAULT_ENDPOINT_STALL),
+    SHORTENS = LINK_FAULT_BIT(LINK_FAULT_SHORT_PACKETS),
+    ENUMERATES = LINK_FAULT_BIT(LINK_FAULT_SLOW_ENUMERATION) | LINK_FAULT_BIT(LINK_FAULT_DESCRIPTOR_LENGTH),
+};
+
+static uint32_t usb_can(const struct link_spec *spec)
+{
+    const struct usb_backend_ops *ops = usb_backend_ops_get((enum usb_backend_type)spec->backend);
+    if (ops == NULL || ops->fault == NULL) return 0;
+    return USB_FAULTS | ((ops->faults & USB_CAN_STALL) != 0 ? STALLS : 0) |
+           ((ops->faults & USB_CAN_SHORTEN) != 0 ? SHORTENS : 0) |
+           ((ops->faults & USB_CAN_ENUMERATE_WRONG) != 0 ? ENUMERATES : 0);
+}
+
+/* Of the endpoint that a session writes to. */
+static int fault_endpoint(struct usb_link *self, enum link_fault what, int session, uint32_t n)
+{
+    if (session < 0 || session >= self->n || !self->head.session[session].open) return SH_ESTATE;
+    const uint8_t in = row_of(self, session)->in;
+    if (what == LINK_FAULT_SHORT_PACKETS)
+        usb_device_shorten(self->head.device, in, n);
+    else if (!usb_device_halt(self->head.device, in))
+        return SH_ESTATE;
+    self->ops->flush(self->backend);
+    return SH_OK;
+}
+
+static int usb_fault(void *link, enum link_fault what, int session, uint32_t n, double for_ms)
+{
+    struct usb_link *self = link;
+    switch (what) {
+    case LINK_FAULT_UNPLUG:
+        return self->ops->fault(self->backend, USB_FAULT_UNPLUG);
+    case LINK_FAULT_PLUG:
+        return self->ops->fault(self->backend, USB_FAULT_PLUG);
+    case LINK_FAULT_BUS_RESET:
+        return self->ops->fault(self->backend, USB_FAULT_RESET);
+    case LINK_FAULT_ENDPOINT_STALL:
+    case LINK_FAULT_SHORT_PACKETS:
+        return fault_endpoint(self, what, session, n);
+    case LINK_FAULT_SLOW_ENUMERATION:
+        usb_device_set_slow(self->head.device, for_ms);
+        return SH_OK;
+    case LINK_FAULT_DESCRIPTOR_LENGTH:
+        usb_device_lengthen(self->head.device, n);
+        return SH_OK;
+    default:
+        return SH_ESTATE;
+    }
+}
+
 static void usb_close(void *link)
 {
     struct usb_link *self = link;
@@ -206,9 +282,12 @@ const struct link_ops link_usb = {
     .name = "usb",
     .open = usb_open,
     .endpoint = usb_endpoint,
+    .faults = USB_FAULTS | STALLS | SHORTENS | ENUMERATES,
+    .can = usb_can,
     .capacity = usb_capacity,
     .poll = usb_poll,
     .read = usb_read,
     .write = usb_write,
+    .fault = usb_fault,
     .close = usb_close,
 };

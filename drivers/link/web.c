@@ -211,6 +211,9 @@ static int web_callback(struct lws *wsi, enum lws_callback_reasons reason, void 
     case LWS_CALLBACK_CLOSED:
         if (conn != NULL && conn->session != NULL) session_gone(conn->session);
         return 0;
+    case LWS_CALLBACK_USER:
+        web_break(wsi);
+        return 0;
     default:
         return 0;
     }
@@ -299,6 +302,67 @@ static ssize_t web_write(void *link, int session, const void *buf, size_t len)
     return (ssize_t)len;
 }
 
+/* ---- faults on request */
+
+void web_break(struct lws *wsi)
+{
+    const int fd = lws_get_socket_fd(wsi);
+    if (wsi == web_link_of(wsi)->listening)
+        shutdown(fd, SHUT_RDWR); /* nobody is accepted any more, and who waits is turned away */
+    else
+        socket_break(fd);
+}
+
+/* Without a word: no close frame, and nothing of what waits. */
+static int web_cut(struct web_link *web, int session)
+{
+    struct web_session *s = web_session(web, session);
+    if (s == NULL) return SH_ESTATE;
+    struct web_conn *conn = lws_wsi_user(s->wsi);
+    conn->session = NULL;
+    web_break(s->wsi);
+    session_gone(s);
+    return SH_OK;
+}
+
+static int web_unplug(struct web_link *web)
+{
+    if (web->listening == NULL) return SH_ESTATE;
+    web_break(web->listening); /* first: who is cut off finds nobody there */
+    for (int s = 0; s < web->n_sessions; s++)
+        web_cut(web, s);
+    lws_callback_all_protocol_vhost_args(web->vhost, NULL, LWS_CALLBACK_USER, NULL, 0);
+    web->listening = NULL;
+    return SH_OK;
+}
+
+static int web_plug(struct web_link *web)
+{
+    const struct socket_place place = {.what = "link web", .host = web->host, .port = web->port};
+    char at[72];
+    struct sh_err err;
+    if (web->listening != NULL) return SH_OK;
+    if (socket_open(&place, &web->listener, at, sizeof at, &err) != SH_OK) return SH_ESTATE;
+    web->listening = web_wait_for(web, web->listener);
+    return web->listening != NULL ? SH_OK : SH_ESTATE;
+}
+
+static int web_fault(void *link, enum link_fault what, int session, uint32_t n, double for_ms)
+{
+    (void)n, (void)for_ms;
+    switch (what) {
+    case LINK_FAULT_DISCONNECT:
+    case LINK_FAULT_REFUSE:
+        return web_cut(link, session);
+    case LINK_FAULT_UNPLUG:
+        return web_unplug(link);
+    case LINK_FAULT_PLUG:
+        return web_plug(link);
+    default:
+        return SH_ESTATE;
+    }
+}
+
 static int any_session(const struct web_link *web)
 {
     for (int s = 0; s < web->n_sessions; s++)
@@ -336,10 +400,13 @@ static void web_close(void *link)
 const struct link_ops link_web = {
     .name = "web",
     .messages = 1,
+    .faults = LINK_FAULT_BIT(LINK_FAULT_DISCONNECT) | LINK_FAULT_BIT(LINK_FAULT_REFUSE) |
+              LINK_FAULT_BIT(LINK_FAULT_UNPLUG),
     .open = web_open,
     .endpoint = web_endpoint,
     .poll = web_poll,
     .read = web_read,
     .write = web_write,
+    .fault = web_fault,
     .close = web_close,
 };

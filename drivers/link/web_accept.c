@@ -99,6 +99,7 @@ int web_bare_callback(struct lws *wsi, enum lws_callback_reasons reason, void *u
     (void)user, (void)in, (void)len;
     if (reason == LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION) return -1; /* a WebSocket that asks for it by its name */
     if (reason == LWS_CALLBACK_TIMER) return -1;
+    if (reason == LWS_CALLBACK_USER && wsi != web->wake) web_break(wsi);
     if (reason != LWS_CALLBACK_RAW_RX_FILE) return 0;
     if (wsi == web->listening)
         accept_all(web);

@@ -48,7 +48,7 @@ struct web_conn {
 struct web_link {
     struct lws_context *context;
     struct lws_vhost *vhost;
-    struct lws *listening, *wake;
+    struct lws *listening, *wake; /* listening NULL: unplugged */
     lws_sorted_usec_list_t timer;
     int listener, wake_fd, woken;
     int reserve_fd; /* given up when there are no more, to turn a connection away; -1: none */
@@ -72,6 +72,9 @@ static inline struct web_link *web_link_of(struct lws *wsi)
 int web_bare_callback(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t len);
 /* Gives a descriptor to lws_service to wait for. It is closed with the context, or at once where NULL comes back. */
 struct lws *web_wait_for(struct web_link *web, int fd);
+
+/* web.c: breaks the connection, or the listening socket, at once; libwebsockets closes it when it finds out. */
+void web_break(struct lws *wsi);
 
 /* web_http.c. As libwebsockets' callbacks: 0, or -1 to close the connection. */
 int web_http_begin(struct web_link *web, struct web_conn *conn, struct lws *wsi, const char *path);

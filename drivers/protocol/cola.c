@@ -12,7 +12,12 @@ void cola_power_up(struct cola *self)
     self->measures = 1;
     self->streams = self->wants_scan = self->reboots = 0;
     self->n_waiting = self->since_sent = 0;
-    self->telegrams = 0;
+    self->telegrams = (uint16_t)(0U - self->near_wrap);
+}
+
+uint32_t cola_time_us(const struct cola *self, int64_t t_ns)
+{
+    return (uint32_t)((uint64_t)t_ns / 1000U) - self->near_wrap;
 }
 
 static int create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
@@ -21,6 +26,7 @@ static int create(const struct protocol_spec *spec, void **protocol, struct sh_e
     if (self == NULL) return sh_fail(err, SH_ENOMEM, "protocol cola: no memory for %zu bytes", sizeof *self);
     self->host = spec->host;
     self->identity = spec->identity;
+    self->near_wrap = spec->near_wrap;
     self->model = cola_model_find(spec->identity->model);
     planar_scan_init(&self->scan);
     cola_power_up(self);
@@ -138,6 +144,8 @@ const struct protocol_ops protocol_cola = {
     .needs = PROTOCOL_NEEDS_POLAR,
     .emitters = 1u << NATIVE_EMIT_PLANAR,
     .max_unit = COLA_MAX_UNIT,
+    .content = cola_content,
+    .reseal = cola_reseal,
     .create = create,
     .destroy = free,
     .open = open_at,

@@ -45,6 +45,7 @@ struct cola {
     int wants_scan; /* measurement was asked for, and no scan has come yet; next look at the head at try_ns */
     int64_t try_ns;
     int64_t now_ns;
+    uint32_t near_wrap;         /* counters begin so many below their wrap */
     int streams;                /* sEN LMDscandata 1 */
     enum cola_form stream_form; /* of telegrams without a request */
     int pending;                /* a scan is done and not yet looked at */
@@ -71,10 +72,20 @@ cola_handler cola_read_scan;
 /* As at power-up; the settings, too. */
 void cola_power_up(struct cola *self);
 
+/* Device time as the scanner counts it: us, 32 bits. */
+uint32_t cola_time_us(const struct cola *self, int64_t t_ns);
+
 /* cola_lmd.c */
 
 /* Writes an LMDscandata telegram of the last scan (there is one) behind its head. */
 void cola_put_scan(const struct cola *self, struct cola_out *out);
+
+/* cola_seal.c: for protocol_ops of the same names */
+
+/* Distances and signals of LMDscandata. */
+void cola_content(const uint8_t *unit, size_t len, uint8_t *mask);
+/* The check byte of CoLa-B. */
+void cola_reseal(uint8_t *unit, size_t len);
 
 /* cola_settings.c: what is set and asked for the measurement. */
 

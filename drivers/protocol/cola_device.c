@@ -119,16 +119,11 @@ enum cola_error cola_read_power_ons(struct cola *self, struct cola_args *args, s
 
 /* ---- inputs, outputs, fields: there are none that are active */
 
-static uint32_t system_count_us(const struct cola *self)
-{
-    return (uint32_t)((uint64_t)self->now_ns / 1000u);
-}
-
 /* u16 version, u32 time, 4 x u8 input, u16 no time of day */
 enum cola_error cola_read_inputs(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
     cola_put_u(out, 2, 0);
-    cola_put_u(out, 4, system_count_us(self));
+    cola_put_u(out, 4, cola_time_us(self, self->now_ns));
     for (int i = 0; i < 4; i++)
         cola_put_u(out, 1, 0);
     cola_put_u(out, 2, 0);
@@ -139,7 +134,7 @@ enum cola_error cola_read_inputs(struct cola *self, struct cola_args *args, stru
 enum cola_error cola_read_outputs(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
     cola_put_u(out, 2, 0);
-    cola_put_u(out, 4, system_count_us(self));
+    cola_put_u(out, 4, cola_time_us(self, self->now_ns));
     for (int i = 0; i < N_OUTPUTS; i++) {
         cola_put_u(out, 1, 0);
         cola_put_u(out, 4, 0);

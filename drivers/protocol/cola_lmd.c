@@ -7,12 +7,6 @@
 
 enum { VERSION = 1, DEVICE = 1 };
 
-/* Device time in us, as 32 bits count it. */
-static uint32_t ticks_us(int64_t t_ns)
-{
-    return (uint32_t)((uint64_t)t_ns / 1000u);
-}
-
 static uint32_t serial_number(const char *text)
 {
     uint32_t v = 0;
@@ -31,9 +25,9 @@ static void put_head(const struct cola *self, struct cola_out *out)
     cola_put_u(out, 1, 0); /* device status: no error */
     cola_put_u(out, 1, 0);
     cola_put_u(out, 2, self->telegrams);
-    cola_put_u(out, 2, (uint16_t)turn->number);
-    cola_put_u(out, 4, ticks_us(turn->t0_ns));
-    cola_put_u(out, 4, ticks_us(self->now_ns));
+    cola_put_u(out, 2, (uint16_t)(turn->number - self->near_wrap));
+    cola_put_u(out, 4, cola_time_us(self, turn->t0_ns));
+    cola_put_u(out, 4, cola_time_us(self, self->now_ns));
     for (int i = 0; i < 4; i++)
         cola_put_u(out, 1, 0); /* two bytes of inputs, two of outputs */
     cola_put_i(out, 2, 0);     /* layer angle */

@@ -12,6 +12,7 @@
 
 #include "core/line.h"
 #include "drivers/protocol/bytes.h"
+#include "drivers/protocol/native_sequence.h"
 
 enum {
     NATIVE_SYNC = 0xd5,
@@ -281,26 +282,57 @@ int native_decode_surfaces(const uint8_t *payload, size_t len,
  * came. native_parser_next() then gives items until it returns NATIVE_MORE.
  * Resynchronisation: a sync byte counts only with a correct header CRC. A frame whose payload CRC is wrong is
  * not skipped; the search goes on at its second byte. So lost bytes cost only the frames that they belonged
- * to. Text is taken only in step: after garbage, reply lines are ignored until the next good frame. */
+ * to. Text is taken only in step: after garbage, reply lines are ignored until the next good frame.
+ * Frames that came already, or too late, are dropped: native_parser_next() passes over them. */
 enum native_item { NATIVE_MORE = 0, NATIVE_FRAME = 1, NATIVE_TEXT = 2 };
 
 struct native_stats {
-    uint64_t frames, bytes, texts;
-    uint64_t bad_payload, bad_bytes; /* frames with a wrong payload CRC; bytes skipped in search of a frame */
-    uint64_t seq_gaps, seq_lost;     /* jumps in seq, and frames missing by them */
+    uint64_t frames, bytes, texts;   /* items given, and all bytes */
+    uint64_t bad_payload, bad_bytes; /* frames with a wrong payload CRC; bytes that belong to no item */
+    uint64_t seq_gaps, seq_lost;     /* jumps in seq, both ways; frames missing by those forward */
+    uint64_t repeated, late;         /* frames dropped, since they came already, or after newer ones */
+    uint64_t restarts, cuts;         /* jumps back to another sequence; connections that ended within an item */
+    uint64_t bad_unseen; /* of bad_payload, what no gap shows: before a sequence's first frame, after the last */
+};
+
+/* Something wrong in the stream; scanhead.h says what n and at_byte are of each kind. */
+struct native_notice {
+    enum native_notice_kind kind;
+    uint32_t seq;
+    uint64_t at_byte, n;
+    int64_t t_ns; /* NATIVE_NO_TIME: no frame has come yet */
+};
+#define NATIVE_NO_TIME INT64_MIN
+
+/* Bytes that belong to no item, one after the other, and for which there is no notice yet. */
+struct native_bad {
+    enum native_notice_kind kind; /* NATIVE_NO_NOTICE: none */
+    int has_header;               /* they begin with a header that is right: */
+    int is_local;
+    uint32_t seq;
+    int64_t t_ns;
+    uint64_t at_byte, n, most; /* n: so far; most: what belongs to that frame at most */
 };
 
 struct native_parser {
     uint8_t buf[2 * NATIVE_MAX_FRAME];
     size_t start, end;
-    int in_step, have_seq, finished;
-    uint32_t next_seq;
+    int in_step, finished;
+    struct native_sequence sequence;
+    struct native_bad bad;
+    uint64_t bad_before; /* bad_unseen up to the sequence's first frame */
+    int64_t last_t_ns;   /* of the last whole frame */
     struct native_stats stats;
+    /* Called from within native_parser_next and native_parser_resume, in the order of the stream: a notice comes before
+     * the item that follows it. NULL (after native_parser_init): nobody listens. */
+    void (*notice)(void *ctx, const struct native_notice *notice);
+    void *notice_ctx;
     /* the item found last: valid until the next call of any parser function */
     struct native_header header;
     const uint8_t *frame; /* header and payload as on the wire */
     const uint8_t *payload;
     char text[NATIVE_MAX_TEXT]; /* without CR LF */
+    uint64_t text_at;           /* where it begins in all bytes */
 };
 
 void native_parser_init(struct native_parser *parser);
@@ -311,7 +343,7 @@ enum native_item native_parser_next(struct native_parser *parser);
  * after a cut one come out at the end of a recording too. */
 void native_parser_finish(struct native_parser *parser);
 /* After native_parser_finish() and all its items: bytes of another connection to the same head will follow.
- * Counters and sequence go on. */
+ * Counters and sequence go on; native_sequence_resume(). Items that were not taken are bad bytes. */
 void native_parser_resume(struct native_parser *parser);
 
 /* 1 if a frame with this header belongs to stream_sha256: the hash runs over u8 type, u32 length (LE) and the

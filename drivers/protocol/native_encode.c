@@ -28,6 +28,7 @@ size_t native_seal(uint8_t *frame, uint32_t seq)
 
 void native_reseal(uint8_t *frame, size_t len)
 {
+    if (len < NATIVE_HEADER_LEN) return;
     le_put32(frame + 12, crc32c(0, frame + NATIVE_HEADER_LEN, len - NATIVE_HEADER_LEN));
     le_put32(frame + 24, crc32c(0, frame, 24));
 }

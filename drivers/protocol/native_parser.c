@@ -10,6 +10,7 @@ void native_parser_init(struct native_parser *parser)
 {
     memset(parser, 0, sizeof *parser);
     parser->in_step = 1;
+    parser->last_t_ns = NATIVE_NO_TIME;
 }
 
 uint8_t *native_parser_room(struct native_parser *parser, size_t *room)
@@ -37,13 +38,103 @@ void native_parser_finish(struct native_parser *parser)
     parser->finished = 1;
 }
 
+/* Where buf[start] stands in the stream. */
+static uint64_t at_byte(const struct native_parser *parser)
+{
+    return parser->stats.bytes - (parser->end - parser->start);
+}
+
+static void give_notice(const struct native_parser *parser, const struct native_notice *notice)
+{
+    if (parser->notice != NULL) parser->notice(parser->notice_ctx, notice);
+}
+
+/* ---- bytes that belong to no item */
+
+/* Of the frame that `bad` begins with. Nobody misses a LOCAL one. */
+static void count_bad_payload(struct native_parser *parser)
+{
+    parser->stats.bad_payload++;
+    parser->stats.bad_unseen += (uint64_t)!parser->bad.is_local;
+}
+
+/* An item follows, or at_end: nothing does. A frame that seemed to be cut by the end is a broken one if others stood
+ * within its length. */
+static void end_bad(struct native_parser *parser, int at_end)
+{
+    struct native_bad *bad = &parser->bad;
+    if (bad->kind == NATIVE_NO_NOTICE) return;
+    if (bad->kind == NATIVE_CUT && !at_end) {
+        bad->kind = bad->has_header ? NATIVE_BAD_PAYLOAD : NATIVE_BAD_BYTES;
+        if (bad->has_header) count_bad_payload(parser);
+    }
+    parser->stats.cuts += bad->kind == NATIVE_CUT;
+    const struct native_notice notice = {bad->kind, bad->seq, bad->at_byte, bad->n, bad->t_ns};
+    bad->kind = NATIVE_NO_NOTICE;
+    give_notice(parser, &notice);
+}
+
+static void begin_bad(struct native_parser *parser, enum native_notice_kind kind, uint64_t at)
+{
+    end_bad(parser, 0);
+    parser->bad = (struct native_bad){.kind = kind, .t_ns = parser->last_t_ns, .at_byte = at, .most = UINT64_MAX};
+}
+
+/* The header at hand is right, and what follows it is not its payload. */
+static void begin_bad_frame(struct native_parser *parser, enum native_notice_kind kind,
+                            const struct native_header *header)
+{
+    begin_bad(parser, kind, at_byte(parser));
+    parser->bad.has_header = 1;
+    parser->bad.is_local = (header->flags & NATIVE_LOCAL) != 0;
+    parser->bad.seq = header->seq;
+    parser->bad.t_ns = header->t_ns;
+    parser->bad.most = NATIVE_HEADER_LEN + (uint64_t)header->length;
+}
+
+/* n bytes from the one at hand on. What goes beyond a broken frame is another thing. */
+static void add_bad(struct native_parser *parser, uint64_t n)
+{
+    struct native_bad *bad = &parser->bad;
+    uint64_t at = at_byte(parser);
+    parser->stats.bad_bytes += n;
+    if (bad->kind != NATIVE_NO_NOTICE && n > bad->most - bad->n) {
+        const uint64_t rest = bad->most - bad->n;
+        bad->n = bad->most;
+        at += rest;
+        n -= rest;
+        begin_bad(parser, NATIVE_BAD_BYTES, at);
+    }
+    if (bad->kind == NATIVE_NO_NOTICE) begin_bad(parser, NATIVE_BAD_BYTES, at);
+    bad->n += n;
+}
+
+/* No more bytes will come, and the item at hand is not complete. */
+static void begin_cut(struct native_parser *parser)
+{
+    const uint8_t *at = parser->buf + parser->start;
+    if (at[0] == NATIVE_SYNC && parser->end - parser->start >= NATIVE_HEADER_LEN) {
+        struct native_header header;
+        native_read_header(at, &header);
+        begin_bad_frame(parser, NATIVE_CUT, &header);
+    } else if (parser->bad.kind == NATIVE_NO_NOTICE || parser->bad.n == parser->bad.most) {
+        begin_bad(parser, NATIVE_CUT, at_byte(parser));
+    } /* else it is part of the garbage before it */
+}
+
 void native_parser_resume(struct native_parser *parser)
 {
-    parser->stats.bad_bytes += parser->end - parser->start;
+    const size_t rest = parser->end - parser->start;
+    if (rest > 0 && parser->bad.kind == NATIVE_NO_NOTICE) begin_bad(parser, NATIVE_CUT, at_byte(parser));
+    if (rest > 0) add_bad(parser, rest);
+    end_bad(parser, 1);
+    native_sequence_resume(&parser->sequence);
     parser->start = parser->end = 0;
     parser->finished = 0;
     parser->in_step = 1;
 }
+
+/* ---- frames */
 
 static enum look look_frame(struct native_parser *parser)
 {
@@ -56,7 +147,8 @@ static enum look look_frame(struct native_parser *parser)
     if (header.length > NATIVE_MAX_PAYLOAD) return LOOK_BAD;
     if (have - NATIVE_HEADER_LEN < header.length) return LOOK_WAIT;
     if (crc32c(0, frame + NATIVE_HEADER_LEN, header.length) != header.payload_crc) {
-        parser->stats.bad_payload++;
+        begin_bad_frame(parser, NATIVE_BAD_PAYLOAD, &header);
+        count_bad_payload(parser);
         return LOOK_BAD;
     }
     parser->header = header;
@@ -65,26 +157,43 @@ static enum look look_frame(struct native_parser *parser)
     return LOOK_GOOD;
 }
 
-static void count_seq(struct native_parser *parser)
+static void count_notice(struct native_stats *stats, const struct native_notice *notice)
 {
-    if ((parser->header.flags & NATIVE_LOCAL) != 0) return;
-    uint32_t missing = parser->header.seq - parser->next_seq;
-    if (parser->have_seq && missing != 0) {
-        parser->stats.seq_gaps++;
-        /* A jump back is a head that has started again. How many frames are missing is not known. */
-        if (missing < UINT32_C(0x80000000)) parser->stats.seq_lost += missing;
-    }
-    parser->next_seq = parser->header.seq + 1;
-    parser->have_seq = 1;
+    stats->seq_gaps += notice->kind == NATIVE_GAP || notice->kind == NATIVE_RESTARTED;
+    if (notice->kind == NATIVE_GAP) stats->seq_lost += notice->n;
+    stats->repeated += notice->kind == NATIVE_REPEATED;
+    stats->late += notice->kind == NATIVE_LATE;
+    stats->restarts += notice->kind == NATIVE_RESTARTED;
 }
 
-static enum native_item take_frame(struct native_parser *parser)
+/* A frame in order, or after a gap, shows which were missing before it; a sequence's first one doesn't. */
+static void see_bad(struct native_parser *parser, int is_first)
 {
+    if (is_first)
+        parser->bad_before = parser->stats.bad_unseen;
+    else
+        parser->stats.bad_unseen = parser->bad_before;
+}
+
+/* 1: the frame is to be given; 0: it is dropped. */
+static int take_frame(struct native_parser *parser)
+{
+    end_bad(parser, 0);
+    uint32_t first, n;
+    const int has_begun = parser->sequence.have;
+    const enum native_notice_kind kind = native_sequence_take(&parser->sequence, &parser->header, &first, &n);
+    const struct native_notice notice = {kind, first, at_byte(parser), n, parser->header.t_ns};
     parser->start += native_frame_len(parser->frame);
     parser->in_step = 1;
+    parser->last_t_ns = parser->header.t_ns;
+    if (kind != NATIVE_NO_NOTICE) {
+        count_notice(&parser->stats, &notice);
+        give_notice(parser, &notice);
+    }
+    if (kind == NATIVE_REPEATED || kind == NATIVE_LATE) return 0;
+    if ((parser->header.flags & NATIVE_LOCAL) == 0) see_bad(parser, !has_begun || kind == NATIVE_RESTARTED);
     parser->stats.frames++;
-    count_seq(parser);
-    return NATIVE_FRAME;
+    return 1;
 }
 
 static int is_printable(uint8_t byte)
@@ -106,8 +215,10 @@ static enum look look_text(const struct native_parser *parser, size_t *len)
 
 static enum native_item take_text(struct native_parser *parser, size_t len)
 {
+    end_bad(parser, 0);
     memcpy(parser->text, parser->buf + parser->start, len);
     parser->text[len] = 0;
+    parser->text_at = at_byte(parser);
     parser->start += len + 2;
     parser->stats.texts++;
     return NATIVE_TEXT;
@@ -119,8 +230,8 @@ static void skip(struct native_parser *parser)
     const uint8_t *from = parser->buf + parser->start, *to = parser->buf + parser->end;
     const uint8_t *sync = memchr(from + 1, NATIVE_SYNC, (size_t)(to - from) - 1);
     size_t n = (size_t)((sync != NULL ? sync : to) - from);
+    add_bad(parser, n);
     parser->start += n;
-    parser->stats.bad_bytes += n;
     parser->in_step = 0;
 }
 
@@ -132,13 +243,16 @@ enum native_item native_parser_next(struct native_parser *parser)
         size_t text_len = 0;
         if (first == NATIVE_SYNC) {
             look = look_frame(parser);
-            if (look == LOOK_GOOD) return take_frame(parser);
+            if (look == LOOK_GOOD && take_frame(parser)) return NATIVE_FRAME;
+            if (look == LOOK_GOOD) continue;
         } else if (parser->in_step && is_printable(first)) {
             look = look_text(parser, &text_len);
             if (look == LOOK_GOOD) return take_text(parser, text_len);
         }
         if (look == LOOK_WAIT && !parser->finished) return NATIVE_MORE;
+        if (look == LOOK_WAIT) begin_cut(parser);
         skip(parser);
     }
+    if (parser->finished) end_bad(parser, 1);
     return NATIVE_MORE;
 }

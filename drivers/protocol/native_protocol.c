@@ -4,11 +4,22 @@
  * and looks into none. And it carries the lines out itself: the reply to TIME:STEP comes after the frames of the time
  * that it lets pass, lines wait for it, and a client keeps control between its lines (firmware_sim/loop/session.c,
  * pump_commands.c). */
+#include <string.h>
+
+#include "drivers/protocol/native.h"
 #include "drivers/protocol/native_encode.h"
 #include "drivers/protocol/protocol.h"
 
+/* The payload: what the header says of length and numbers stays true. */
+static void mark_payload(const uint8_t *frame, size_t len, uint8_t *mask)
+{
+    (void)frame;
+    if (len > NATIVE_HEADER_LEN) memset(mask + NATIVE_HEADER_LEN, 0xff, len - NATIVE_HEADER_LEN);
+}
+
 const struct protocol_ops protocol_native = {
     .name = "native",
+    .content = mark_payload,
     .reseal = native_reseal,
     .passes_native = 1,
 };

@@ -101,8 +101,12 @@ struct protocol_ops {
     uint32_t emitters; /* bit per enum native_emitter_kind of the heads that it can speak for; 0: all */
     uint32_t n_beams;  /* that a head of beams must have; 0: any number */
     uint32_t max_unit; /* bytes; no unit is longer */
-    /* Makes the checksums of a unit right, after bytes of it were changed: a fault on request that no reader can see by
-     * them. Of native frames that of the payload and that of the header. NULL: units have none. Pure. */
+    /* Of faults on request, for one that no reader can see by checksums: bits of a unit are changed, and its checksums
+     * are made right again. Both are pure, and good for any bytes.
+     * content: sets the bits of mask (len bytes, all 0 before) that may be changed: what is measured. Marks, lengths,
+     * names and checksums are left out, so that the unit stays one. NULL: all bits may be changed.
+     * reseal: makes the checksums right. NULL: units have none. */
+    void (*content)(const uint8_t *unit, size_t len, uint8_t *mask);
     void (*reseal)(uint8_t *unit, size_t len);
     int passes_native; /* 1: the native protocol, which its owner speaks; no member below is set */
 

@@ -12,6 +12,7 @@ static int create(const struct protocol_spec *spec, void **protocol, struct sh_e
     s->host = spec->host;
     s->identity = spec->identity;
     s->model = scip_model_find(spec->identity->model);
+    s->epoch_ns = s->wrap_ns = (int64_t)spec->near_wrap * 1000000;
     planar_scan_init(&s->scan);
     scip_power_up(s);
     *protocol = s;
@@ -113,7 +114,7 @@ static void time_is(void *protocol, int64_t t_ns)
     scip_measure_time(s);
     if (s->reboot_ns == INT64_MIN || t_ns < s->reboot_ns) return;
     scip_power_up(s);
-    s->epoch_ns = t_ns;
+    s->epoch_ns = t_ns + s->wrap_ns;
     s->host.hang_up(s->host.ctx);
 }
 
@@ -132,6 +133,8 @@ const struct protocol_ops protocol_scip = {
     .needs = PROTOCOL_NEEDS_POLAR,
     .emitters = 1u << NATIVE_EMIT_PLANAR,
     .max_unit = SCIP_MAX_UNIT,
+    .content = scip_content,
+    .reseal = scip_reseal,
     .create = create,
     .destroy = destroy,
     .open = open_session,

@@ -40,6 +40,10 @@ void scip_reply_mark(struct scip_reply *r, char mark);
 /* The last block, and the empty line. */
 void scip_reply_end(struct scip_reply *r);
 
+/* For protocol_ops of the same names: ranges and intensities of scans; sums of all replies. */
+void scip_content(const uint8_t *unit, size_t len, uint8_t *mask);
+void scip_reseal(uint8_t *unit, size_t len);
+
 /* Four characters of the low 24 bits. */
 void scip_encode4(char dst[4], uint32_t value);
 

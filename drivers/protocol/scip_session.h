@@ -34,7 +34,8 @@ struct scip {
     struct protocol_host host;
     const struct protocol_identity *identity;
     const struct scip_model *model;
-    int64_t now_ns, epoch_ns; /* epoch: when the time stamp was 0 */
+    int64_t now_ns, epoch_ns; /* epoch: when the time stamp is 0 */
+    int64_t wrap_ns;          /* after power-up, the first time; 0: it begins with 0 */
     int64_t laser_ns;         /* since when the laser is on */
     int64_t try_ns;           /* a request that no scan has come for: when to look at the head again */
     int laser, time_mode, speed_changed;

@@ -290,12 +290,21 @@ static int64_t never(const void *protocol)
     return INT64_MAX;
 }
 
+/* Ranges and reflectivities. */
+static void mark_entries(const uint8_t *packet, size_t len, uint8_t *mask)
+{
+    (void)packet;
+    for (size_t block = 0; block < VELODYNE_BLOCKS && (block + 1) * VELODYNE_BLOCK_LEN <= len; block++)
+        memset(mask + block * VELODYNE_BLOCK_LEN + 4, 0xff, VELODYNE_BLOCK_LEN - 4);
+}
+
 const struct protocol_ops protocol_velodyne = {
     .name = "velodyne",
     .needs = PROTOCOL_NEEDS_POLAR | PROTOCOL_NEEDS_LAST,
     .emitters = 1u << NATIVE_EMIT_BEAMS,
     .n_beams = VELODYNE_BEAMS,
     .max_unit = VELODYNE_DATA_LEN,
+    .content = mark_entries,
     .create = create,
     .destroy = destroy,
     .open = nothing_at,

@@ -16,6 +16,7 @@ enum {
     NAMES_MAX = 600,     /* any label line; a name has 255 bytes at most */
     COUNT_ROOM = 8 * 20, /* figures that may still grow to 20 digits */
     TIME_ROOM = 80,      /* the line of the GPS time, where it comes late */
+    ORDER_ROOM = 120,    /* the line of frames that were not in order, where there are any */
     WEEK_S = 604800,
 };
 
@@ -112,6 +113,9 @@ static void put_comments(FILE *out, const struct ply_facts *facts)
     fprintf(out,
             "comment frames_lost %" PRIu64 " reader_lost %" PRIu64 " dropped %" PRIu64 " bad_payload %" PRIu64 "\n",
             s->seq_lost, s->reader_lost, s->dropped, s->bad_payload);
+    if (s->repeated + s->late + s->restarts != 0)
+        fprintf(out, "comment frames_repeated %" PRIu64 " frames_late %" PRIu64 " restarts %" PRIu64 "\n", s->repeated,
+                s->late, s->restarts);
     fprintf(out, "comment pulses_lost %" PRIu64 " points_before_descriptor %" PRIu64 "\n", s->pulses_lost,
             facts->n_unplaced);
     ply_put_names(out, "comment ", t->named != NULL ? t->named : t->sh);
@@ -229,5 +233,5 @@ size_t ply_header_reserve(const struct ply_facts *facts, uint32_t n_surfaces)
     if (facts->track->has_attributes) len += 20;
     for (uint32_t label = 0; label < n_surfaces; label++)
         if (!scanhead_surface(facts->track->sh, label, &object, &material)) len += NAME_ROOM;
-    return len + COUNT_ROOM + TIME_ROOM + PAD_MIN;
+    return len + COUNT_ROOM + TIME_ROOM + ORDER_ROOM + PAD_MIN;
 }

@@ -118,6 +118,13 @@ ssize_t socket_write(int fd, const void *buf, size_t len)
     return SH_ECLOSED;
 }
 
+/* Linux: without an address to connect to, a connection is reset. */
+void socket_break(int fd)
+{
+    const struct sockaddr none = {.sa_family = AF_UNSPEC};
+    connect(fd, &none, sizeof none);
+}
+
 int socket_ended(int fd, short revents)
 {
     if ((revents & (POLLIN | POLLHUP | POLLERR | POLLNVAL)) == 0) return 0;

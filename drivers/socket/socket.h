@@ -43,6 +43,8 @@ void socket_tune_impatient(int fd);
  * stream, reset or any other failure. */
 ssize_t socket_read(int fd, void *buf, size_t len);
 ssize_t socket_write(int fd, const void *buf, size_t len);
+/* Breaks a connected TCP socket: its peer sees a reset, and what it has not taken is lost. The descriptor stays. */
+void socket_break(int fd);
 /* After poll(2): 1 when the peer is gone and nothing is left to read. */
 int socket_ended(int fd, short revents);
 

@@ -25,6 +25,13 @@ struct usb_backend_spec {
     int retry_ms;     /* with attach: time between attempts to come back after the host has let go; 0: 1000 */
 };
 
+/* What fault() of a back end does. UNPLUG: the device and its endpoint are not there until PLUG. RESET: sessions end as
+ * by a reset of the bus, or as near to that as the back end's host can be brought. */
+enum usb_fault { USB_FAULT_UNPLUG, USB_FAULT_PLUG, USB_FAULT_RESET };
+
+/* Of the faults that concern transfers and requests. Unplugging and resets all back ends can. */
+enum { USB_CAN_STALL = 1, USB_CAN_SHORTEN = 2, USB_CAN_ENUMERATE_WRONG = 4 };
+
 struct usb_backend_ops {
     const char *name;
 
@@ -52,9 +59,21 @@ struct usb_backend_ops {
      * usb_device_read. */
     void (*flush)(void *backend);
 
+    /* When handle() has something to do though no descriptor is ready, ns of usb_now_ns(); INT64_MAX: never. NULL:
+     * never. */
+    int64_t (*due_ns)(const void *backend);
+
+    /* Faults on request; the others are the device core's. `faults`: USB_CAN_… of those that reach the host through
+     * this back end. fault() returns 0, or SH_ESTATE: it can't be done now. */
+    uint32_t faults;
+    int (*fault)(void *backend, enum usb_fault what);
+
     /* Unplugs. */
     void (*close)(void *backend);
 };
+
+/* CLOCK_MONOTONIC. backend.c */
+int64_t usb_now_ns(void);
 
 /* NULL for an unknown type. */
 const struct usb_backend_ops *usb_backend_ops_get(enum usb_backend_type type);

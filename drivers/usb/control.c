@@ -64,6 +64,13 @@ static int set_address(struct usb_device *device, const struct setup *s, uint8_t
     return 0;
 }
 
+/* wTotalLength, as it was asked for (usb_device_lengthen). */
+static size_t lengthen(const struct usb_device *device, uint8_t *out, size_t room, size_t len)
+{
+    if (device->lengthen != 0 && len != 0 && room >= 4) le_put16(out + 2, (uint16_t)(len + device->lengthen));
+    return len;
+}
+
 static size_t describe(const struct usb_device *device, const struct setup *s, uint8_t *out)
 {
     const struct usb_model *model = device->model;
@@ -78,7 +85,7 @@ static size_t describe(const struct usb_device *device, const struct setup *s, u
         return usb_describe_device(model, id, device->rate, out, room);
     case USB_DT_CONFIG:
     case USB_DT_OTHER_SPEED_CONFIG:
-        return usb_describe_config(model, id, device->rate, type, out, room);
+        return lengthen(device, out, room, usb_describe_config(model, id, device->rate, type, out, room));
     case USB_DT_DEVICE_QUALIFIER:
         return usb_describe_qualifier(model, id, device->rate, out, room);
     case USB_DT_BOS:

@@ -250,6 +250,35 @@ static int functionfs_more(const void *backend)
     return self->backlog;
 }
 
+/* ---- faults on request */
+
+static int unplug(struct functionfs *self)
+{
+    if (self->unplugged[0] != '\0') return SH_ESTATE;
+    snprintf(self->unplugged, sizeof self->unplugged, "%s", self->gadget.udc);
+    gadget_unbind(&self->gadget);
+    disable(self, 1);
+    return SH_OK;
+}
+
+static int plug(struct functionfs *self)
+{
+    struct sh_err err;
+    if (self->unplugged[0] == '\0') return SH_OK;
+    if (gadget_bind(&self->gadget, self->unplugged, &err) != SH_OK) return SH_ESTATE;
+    self->unplugged[0] = '\0';
+    return SH_OK;
+}
+
+/* A gadget has no word of a reset: it leaves its controller, and is back at once. */
+static int functionfs_fault(void *backend, enum usb_fault what)
+{
+    struct functionfs *self = backend;
+    if (what == USB_FAULT_PLUG) return plug(self);
+    const int rc = unplug(self);
+    return what == USB_FAULT_UNPLUG || rc != SH_OK ? rc : plug(self);
+}
+
 static void functionfs_close(void *backend)
 {
     struct functionfs *self = backend;
@@ -266,5 +295,7 @@ const struct usb_backend_ops usb_backend_functionfs = {
     .more = functionfs_more,
     .news = functionfs_news,
     .flush = functionfs_flush,
+    .faults = USB_CAN_SHORTEN,
+    .fault = functionfs_fault,
     .close = functionfs_close,
 };

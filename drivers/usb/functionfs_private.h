@@ -103,6 +103,7 @@ struct functionfs {
     int ep0;         /* -1: nothing of the device is FunctionFS's */
     char moved[200]; /* of endpoints that are not where the device has them; to be told once */
     int moved_due;
+    char unplugged[256]; /* on request, from this controller; empty: it is not */
     int backlog; /* stopped before everything was looked at */
     struct ffs_pipes pipes;
     struct ffs_console console;

@@ -203,6 +203,24 @@ int usb_device_configuration(const struct usb_device *device);
 /* The present alternate setting's row; NULL when not configured. */
 const struct usb_interface_row *usb_device_row(const struct usb_device *device, unsigned interface);
 
+/* How often it was attached. */
+uint32_t usb_device_attaches(const struct usb_device *device);
+
+/* ---- faults on request */
+
+/* As a host's reset of the bus, after which it has configured the device again. */
+void usb_device_restart(struct usb_device *device);
+/* Halts the endpoint, until the host clears it. 0: there is none now. */
+int usb_device_halt(struct usb_device *device, uint8_t endpoint);
+/* IN: each of the next n transfers that carry more than a byte ends in a short packet, about half way; the rest goes
+ * into the one after it. Until the interface ends. */
+void usb_device_shorten(struct usb_device *device, uint8_t endpoint, uint32_t n);
+/* How long each control request takes. The back end sees to it. 0: it is answered at once. */
+void usb_device_set_slow(struct usb_device *device, double ms);
+double usb_device_slow_ms(const struct usb_device *device);
+/* The configuration says that it is so many bytes longer than it is. For back ends that ask the core for it. */
+void usb_device_lengthen(struct usb_device *device, uint32_t n);
+
 /* ---- for functions. An endpoint that is not there, is halted or suspended has no room and nothing to read. */
 
 /* Bytes taken by waiting IN transfers, maybe 0. */

@@ -51,6 +51,7 @@ static void stop_pipe(struct usb_device *device, struct usb_pipe *pipe)
 {
     pipe->row = NULL;
     pipe->halted = pipe->zero_due = 0;
+    pipe->shorten = 0;
     pipe->epoch++;
     flush(device, pipe, USB_GONE);
 }
@@ -107,6 +108,7 @@ void usb_device_attach(struct usb_device *device, enum usb_rate rate, usb_comple
     device->rate = rate;
     device->suspended = 0;
     device->state = USB_DEFAULT;
+    device->attaches++;
 }
 
 void usb_device_detach(struct usb_device *device)
@@ -186,14 +188,23 @@ int usb_device_cancel(struct usb_device *device, uint64_t id)
     return 0;
 }
 
+/* About half of it, such that its last packet is a short one. */
+static uint32_t half_of(uint32_t n, uint32_t packet)
+{
+    return n / 2 % packet != 0 ? n / 2 : n / 2 - 1;
+}
+
 /* As many whole packets as fit; a packet that does not is not taken. */
-static uint32_t fill_transfer(const struct usb_pipe *pipe, uint32_t packet, const uint8_t *data, size_t len,
+static uint32_t fill_transfer(struct usb_pipe *pipe, uint32_t packet, const uint8_t *data, size_t len,
                               enum usb_status *status)
 {
     struct usb_transfer *transfer = pipe->first;
     uint32_t n = len < transfer->length ? (uint32_t)len : transfer->length;
     *status = USB_OK;
-    if (len > transfer->length && n % packet != 0) {
+    if (pipe->shorten != 0 && n > 1) {
+        pipe->shorten--;
+        n = half_of(n, packet);
+    } else if (len > transfer->length && n % packet != 0) {
         *status = USB_OVERFLOW;
         n -= n % packet;
     }
@@ -341,6 +352,11 @@ const struct usb_model *usb_device_model(const struct usb_device *device)
 const struct usb_identity *usb_device_identity(const struct usb_device *device)
 {
     return &device->id;
+}
+
+uint32_t usb_device_attaches(const struct usb_device *device)
+{
+    return device->attaches;
 }
 
 enum usb_rate usb_device_rate(const struct usb_device *device)

@@ -13,6 +13,7 @@ struct usb_pipe {
     uint32_t epoch;
     struct usb_transfer *first, *last;
     uint32_t used; /* OUT: bytes of the first one already read */
+    uint32_t shorten; /* IN: so many transfers are to end early */
 };
 
 struct usb_device {
@@ -27,6 +28,9 @@ struct usb_device {
     enum usb_end end; /* why interfaces ended last */
     int suspended;
     int u1_enabled, u2_enabled;
+    uint32_t attaches;
+    double slow_ms;     /* that a control request takes */
+    uint32_t lengthen;  /* bytes that the configuration says it has, and hasn't */
     uint8_t alt[USB_MAX_INTERFACES];
     struct usb_pipe pipe[32]; /* 0..15 OUT, 16..31 IN; the two of endpoint 0 stay empty */
 };

@@ -23,7 +23,10 @@ enum { MAX_CONNS = 4, SEND_BUFFER_BYTES = 1 << 20, CLOSE_WAIT_MS = 500 };
 
 struct usbip {
     struct usb_device *device;
-    int listener;           /* -1: attached here, nobody else may come */
+    int here;               /* attached to this machine: nobody else may come */
+    int unplugged;          /* on request */
+    int listener;           /* -1: none */
+    struct usb_backend_spec served; /* where it listens; once open with the port that it has */
     struct usb_retry retry; /* of what is attached here */
     int taken;
     uint64_t n_welcomed;
@@ -64,8 +67,11 @@ static int listen_here(struct usbip *self, const struct usb_backend_spec *spec, 
 {
     char at[USB_BACKEND_NAME_MAX - 8] = "";
     int rc = usb_backend_socket(spec, "usbip", &self->listener, at, sizeof at, err);
-    if (rc == SH_OK) snprintf(self->name, sizeof self->name, "usbip:%s", at);
-    return rc;
+    if (rc != SH_OK) return rc;
+    snprintf(self->name, sizeof self->name, "usbip:%s", at);
+    self->served = *spec;
+    if (spec->path[0] == '\0') self->served.port = atoi(strrchr(at, ':') + 1);
+    return SH_OK;
 }
 
 static int usbip_open(const struct usb_backend_spec *spec, struct usb_device *device, void **backend,
@@ -78,6 +84,7 @@ static int usbip_open(const struct usb_backend_spec *spec, struct usb_device *de
     for (int i = 0; i < MAX_CONNS; i++)
         self->conn[i].fd = -1;
     struct usb_backend_spec served = *spec;
+    self->here = spec->attach;
     served.attach = 0;
     int rc = spec->attach ? start_here(self, spec, err) : listen_here(self, &served, err);
     if (rc != SH_OK) {
@@ -146,7 +153,7 @@ static int sweep(struct usbip *self)
     for (int i = 0; i < MAX_CONNS; i++) {
         if (self->conn[i].fd < 0 || !self->conn[i].broken) continue;
         usbip_conn_end(&self->conn[i]);
-        if (self->listener < 0) rc = usb_retry_start(&self->retry);
+        if (self->here && !self->unplugged) rc = usb_retry_start(&self->retry);
     }
     return rc;
 }
@@ -172,9 +179,12 @@ static int usbip_handle(void *backend, const struct pollfd *fds, int n, int (*go
     if (n != N_FDS) return SH_OK;
     for (int i = 0; i < MAX_CONNS; i++)
         if (self->conn[i].fd >= 0 && (fds[i].revents & ~POLLOUT) != 0) usbip_conn_read(&self->conn[i], go_on, ctx);
+    for (int i = 0; i < MAX_CONNS; i++)
+        if (self->conn[i].fd >= 0) usbip_conn_answer_slow(&self->conn[i], go_on, ctx);
     if (fds[AT_LISTENER].fd >= 0 && fds[AT_LISTENER].revents != 0) welcome(self);
     int rc = SH_OK;
-    if (fds[AT_RETRY].fd >= 0 && usb_retry_is_due(&self->retry, fds[AT_RETRY].revents)) rc = attach_again(self);
+    if (fds[AT_RETRY].fd >= 0 && usb_retry_is_due(&self->retry, fds[AT_RETRY].revents) && !self->unplugged)
+        rc = attach_again(self);
     usbip_flush(self);
     return rc == SH_OK ? sweep(self) : rc;
 }
@@ -183,6 +193,50 @@ static const char *usbip_news(void *backend)
 {
     struct usbip *self = backend;
     return usb_retry_news(&self->retry);
+}
+
+static int64_t usbip_due_ns(const void *backend)
+{
+    const struct usbip *self = backend;
+    int64_t due_ns = INT64_MAX;
+    for (int i = 0; i < MAX_CONNS; i++)
+        if (self->conn[i].fd >= 0 && usbip_conn_due_ns(&self->conn[i]) < due_ns)
+            due_ns = usbip_conn_due_ns(&self->conn[i]);
+    return due_ns;
+}
+
+/* ---- faults on request */
+
+static int unplug(struct usbip *self)
+{
+    if (self->unplugged) return SH_ESTATE;
+    self->unplugged = 1;
+    if (self->listener >= 0) close(self->listener); /* first: who is cut off finds nobody there */
+    self->listener = -1;
+    for (int i = 0; i < MAX_CONNS; i++)
+        usbip_conn_end(&self->conn[i]);
+    return SH_OK;
+}
+
+static int plug(struct usbip *self)
+{
+    struct sh_err err;
+    if (!self->unplugged) return SH_OK;
+    const int rc = self->here ? attach_here(self, &err) : listen_here(self, &self->served, &err);
+    if (rc != SH_OK) return SH_ESTATE;
+    self->unplugged = 0;
+    return SH_OK;
+}
+
+static int usbip_fault(void *backend, enum usb_fault what)
+{
+    struct usbip *self = backend;
+    if (what == USB_FAULT_UNPLUG) return unplug(self);
+    if (what == USB_FAULT_PLUG) return plug(self);
+    if (!self->taken) return SH_ESTATE;
+    usb_device_restart(self->device);
+    usbip_flush(self);
+    return SH_OK;
 }
 
 static void usbip_close(void *backend)
@@ -205,5 +259,8 @@ const struct usb_backend_ops usb_backend_usbip = {
     .handle = usbip_handle,
     .news = usbip_news,
     .flush = usbip_flush,
+    .due_ns = usbip_due_ns,
+    .faults = USB_CAN_STALL | USB_CAN_SHORTEN | USB_CAN_ENUMERATE_WRONG,
+    .fault = usbip_fault,
     .close = usbip_close,
 };

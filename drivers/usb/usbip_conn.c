@@ -60,10 +60,10 @@ void usbip_conn_import(struct usbip_conn *conn)
 
 /* ---- URBs */
 
-static void run_control(struct usbip_conn *conn, struct usbip_urb *urb, const uint8_t *setup_bytes)
+static void run_control(struct usbip_conn *conn, struct usbip_urb *urb)
 {
     struct usb_ctrlrequest setup;
-    memcpy(&setup, setup_bytes, sizeof setup);
+    memcpy(&setup, urb->setup, sizeof setup);
     const uint32_t length = le_get16(&setup.wLength);
     const int in = length != 0 && (setup.bRequestType & USB_DIR_IN) != 0;
     int n = USB_STALL;
@@ -76,12 +76,62 @@ static void run_control(struct usbip_conn *conn, struct usbip_urb *urb, const ui
         return_urb(conn, urb, 0, urb->in ? (uint32_t)n : urb->room);
 }
 
+/* One after the other: each takes its time. */
+static void hold_control(struct usbip_conn *conn, struct usbip_urb *urb)
+{
+    const int64_t now_ns = usb_now_ns();
+    const int64_t from_ns = conn->slow_last != NULL && conn->slow_last->due_ns > now_ns ? conn->slow_last->due_ns : now_ns;
+    urb->due_ns = from_ns + (int64_t)(usb_device_slow_ms(conn->device) * 1e6);
+    urb->next = NULL;
+    if (conn->slow_last != NULL)
+        conn->slow_last->next = urb;
+    else
+        conn->slow_first = urb;
+    conn->slow_last = urb;
+}
+
+/* Takes a control request out of those that are held; before: the one before it, NULL for the first. */
+static struct usbip_urb *let_go(struct usbip_conn *conn, struct usbip_urb *before)
+{
+    struct usbip_urb *urb = before != NULL ? before->next : conn->slow_first;
+    *(before != NULL ? &before->next : &conn->slow_first) = urb->next;
+    if (conn->slow_last == urb) conn->slow_last = before;
+    return urb;
+}
+
+int64_t usbip_conn_due_ns(const struct usbip_conn *conn)
+{
+    return conn->slow_first != NULL ? conn->slow_first->due_ns : INT64_MAX;
+}
+
+void usbip_conn_answer_slow(struct usbip_conn *conn, int (*go_on)(void *ctx), void *ctx)
+{
+    while (conn->slow_first != NULL && !conn->broken && conn->slow_first->due_ns <= usb_now_ns() && go_on(ctx))
+        run_control(conn, let_go(conn, NULL));
+}
+
+/* 1: it was held, and is gone. */
+static int forget_control(struct usbip_conn *conn, uint32_t seqnum)
+{
+    struct usbip_urb *before = NULL;
+    for (struct usbip_urb *urb = conn->slow_first; urb != NULL; before = urb, urb = urb->next) {
+        if (urb->seqnum != seqnum) continue;
+        usbip_urb_free(conn, let_go(conn, before));
+        return 1;
+    }
+    return 0;
+}
+
 /* All bytes of it are here. */
 static void run_submit(struct usbip_conn *conn, struct usbip_urb *urb)
 {
     const unsigned number = get_be32(conn->head + 16);
     if (number == 0) {
-        run_control(conn, urb, conn->head + 40);
+        memcpy(urb->setup, conn->head + 40, sizeof urb->setup);
+        if (usb_device_slow_ms(conn->device) > 0.0 || conn->slow_first != NULL)
+            hold_control(conn, urb);
+        else
+            run_control(conn, urb);
         return;
     }
     urb->transfer.id = urb->seqnum;
@@ -116,8 +166,8 @@ static void take_submit(struct usbip_conn *conn)
 
 static void take_unlink(struct usbip_conn *conn)
 {
-    const uint32_t seqnum = get_be32(conn->head + 4);
-    const int was_pending = usb_device_cancel(conn->device, get_be32(conn->head + 20));
+    const uint32_t seqnum = get_be32(conn->head + 4), victim = get_be32(conn->head + 20);
+    const int was_pending = forget_control(conn, victim) || usb_device_cancel(conn->device, victim);
     uint8_t *out = usbip_queue_plain(conn, URB_HEADER);
     if (out == NULL) return;
     put_be32(out, RET_UNLINK);
@@ -208,6 +258,8 @@ void usbip_conn_end(struct usbip_conn *conn)
         *conn->taken = 0;
     }
     if (conn->incoming != NULL) usbip_urb_free(conn, conn->incoming);
+    while (conn->slow_first != NULL)
+        usbip_urb_free(conn, let_go(conn, NULL));
     usbip_queue_clear(conn);
     close(conn->fd);
     *conn = (struct usbip_conn){.fd = -1};

@@ -23,6 +23,7 @@ struct usbip_conn {
     uint32_t incoming_len;
     struct usbip_urb *out_first, *out_last; /* replies to send */
     uint32_t out_pos;
+    struct usbip_urb *slow_first, *slow_last; /* control requests that take their time */
     uint32_t n_pending, n_unsent; /* URBs: of the first kind the device has not answered yet */
     uint64_t pending_bytes, unsent_bytes;
 };
@@ -37,6 +38,10 @@ void usbip_conn_read(struct usbip_conn *conn, int (*go_on)(void *ctx), void *ctx
 /* Too many replies wait for the host to read them: nothing more is read before. */
 int usbip_conn_is_full(const struct usbip_conn *conn);
 void usbip_conn_write(struct usbip_conn *conn);
+/* Answers control requests whose time has come, until go_on says 0. */
+void usbip_conn_answer_slow(struct usbip_conn *conn, int (*go_on)(void *ctx), void *ctx);
+/* When the next one's has; INT64_MAX: there is none. */
+int64_t usbip_conn_due_ns(const struct usbip_conn *conn);
 /* Sends what is queued and waits until the peer has taken it and hung up, timeout_ms at most for each step:
  * closing with requests of the peer unread would throw away replies on their way. */
 void usbip_conn_drain(struct usbip_conn *conn, int timeout_ms);

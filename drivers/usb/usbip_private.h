@@ -18,6 +18,8 @@ struct usbip_urb {
     struct usb_transfer transfer;
     struct usbip_urb *next;
     uint32_t seqnum;
+    uint8_t setup[8]; /* of a control request */
+    int64_t due_ns;   /* of one that is held */
     int in;
     int short_is_error;
     uint32_t send_len; /* of wire, once it is a reply */

@@ -99,6 +99,7 @@ static void stop(struct usbredir *self)
 {
     if (self->parser != NULL) {
         usb_device_detach(self->device);
+        usbredir_forget_slow(self);
         usbredirparser_destroy(self->parser);
     }
     if (self->fd >= 0) close(self->fd);
@@ -224,6 +225,7 @@ static int usbredir_handle(void *backend, const struct pollfd *fds, int n, int (
     if (!self->greeted && fds[AT_LISTENER].fd >= 0 && fds[AT_LISTENER].revents != 0) welcome(self);
     if (rc == SH_OK && fds[AT_RETRY].fd >= 0 && usb_retry_is_due(&self->retry, fds[AT_RETRY].revents))
         rc = connect_again(self);
+    usbredir_answer_slow(self);
     usbredir_flush(self);
     if (!self->broken) return rc;
     stop(self);
@@ -236,13 +238,53 @@ static const char *usbredir_news(void *backend)
     return usb_retry_news(&self->retry);
 }
 
+static int64_t usbredir_due_ns(const void *backend)
+{
+    return usbredir_slow_due_ns(backend);
+}
+
+/* ---- faults on request. The channel to the virtual machine stays: the device alone is unplugged from it. */
+
+static int unplug(struct usbredir *self)
+{
+    if (self->unplugged) return SH_ESTATE;
+    self->unplugged = 1;
+    if (!self->greeted || self->broken) return SH_OK;
+    usb_device_detach(self->device);
+    usbredir_forget_slow(self);
+    usbredirparser_send_device_disconnect(self->parser);
+    usbredir_flush(self);
+    return SH_OK;
+}
+
+static int plug(struct usbredir *self)
+{
+    if (!self->unplugged) return SH_OK;
+    self->unplugged = 0;
+    if (!self->greeted || self->broken) return SH_OK;
+    usbredir_plug(self);
+    usbredir_flush(self);
+    return SH_OK;
+}
+
+/* There is no word of a reset from this end: the device is unplugged, and plugged in at once. */
+static int usbredir_fault(void *backend, enum usb_fault what)
+{
+    struct usbredir *self = backend;
+    if (what == USB_FAULT_UNPLUG) return unplug(self);
+    if (what == USB_FAULT_PLUG) return plug(self);
+    if (!self->greeted || self->unplugged) return SH_ESTATE;
+    unplug(self);
+    return plug(self);
+}
+
 static void usbredir_close(void *backend)
 {
     struct usbredir *self = backend;
     if (self->parser != NULL && !self->broken) {
         struct pollfd slot = {.fd = self->fd, .events = POLLOUT};
         usb_device_detach(self->device);
-        usbredirparser_send_device_disconnect(self->parser);
+        if (!self->unplugged) usbredirparser_send_device_disconnect(self->parser);
         usbredir_flush(self);
         while (!self->broken && usbredirparser_has_data_to_write(self->parser) > 0 && poll(&slot, 1, CLOSE_WAIT_MS) > 0)
             usbredir_flush(self);
@@ -263,6 +305,9 @@ const struct usb_backend_ops usb_backend_usbredir = {
     .handle = usbredir_handle,
     .news = usbredir_news,
     .flush = usbredir_flush,
+    .due_ns = usbredir_due_ns,
+    .faults = USB_CAN_STALL | USB_CAN_SHORTEN | USB_CAN_ENUMERATE_WRONG,
+    .fault = usbredir_fault,
     .close = usbredir_close,
 };
 

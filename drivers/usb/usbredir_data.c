@@ -191,7 +191,7 @@ static void on_stop_interrupt(void *priv, uint64_t id, struct usb_redir_stop_int
 static void on_cancel(void *priv, uint64_t id)
 {
     struct usbredir *self = priv;
-    usb_device_cancel(self->device, id);
+    if (!usbredir_cancel_slow(self, id)) usb_device_cancel(self->device, id);
 }
 
 /* Requests that no correct guest makes: this device has no isochronous endpoints, streams or filters. */

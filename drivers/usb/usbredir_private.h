@@ -9,6 +9,7 @@
 #include "drivers/usb/retry.h"
 
 struct redir_transfer;
+struct redir_request;
 
 struct usbredir {
     struct usb_device *device;
@@ -16,6 +17,9 @@ struct usbredir {
     struct usbredirparser *parser; /* NULL: no connection (yet) */
     int broken;
     int greeted; /* its hello has come */
+    int unplugged; /* on request */
+    struct redir_request *slow_first, *slow_last; /* requests that take their time */
+    uint32_t n_slow;
     int (*go_on)(void *ctx);
     void *go_on_ctx;
     int n_reads; /* within one call of handle */
@@ -35,6 +39,16 @@ struct usbredir {
 void usbredir_take_requests(struct usbredirparser *parser);
 /* The library passes on packets from before the hello, too: 1, and the connection is broken. */
 int usbredir_is_early(struct usbredir *self);
+
+/* The guest, which has said hello, gets the device. */
+void usbredir_plug(struct usbredir *self);
+/* Answers requests whose time has come, until go_on says 0. */
+void usbredir_answer_slow(struct usbredir *self);
+/* When the next one's has; INT64_MAX: there is none. */
+int64_t usbredir_slow_due_ns(const struct usbredir *self);
+/* 1: the request was held, and is answered as cancelled. */
+int usbredir_cancel_slow(struct usbredir *self, uint64_t id);
+void usbredir_forget_slow(struct usbredir *self);
 
 /* usbredir_data.c */
 void usbredir_take_data(struct usbredirparser *parser);

@@ -15,7 +15,7 @@
 
 /* main.c lists them. */
 extern const struct app_command app_run, app_record, app_plan, app_map, app_report, app_check, app_list, app_init,
-    app_batch, app_coverage, app_view;
+    app_batch, app_coverage, app_view, app_soak;
 
 /* Prints "scanhead: TEXT" and gives the exit status for the error. */
 int app_fail(const struct sh_err *err);

@@ -97,6 +97,16 @@ static void add_stream(struct scanhead_stats *sum, const struct scanhead_stats *
     sum->dropped += more->dropped;
     sum->reader_lost += more->reader_lost;
     sum->pulses_lost += more->pulses_lost;
+    sum->repeated += more->repeated;
+    sum->late += more->late;
+    sum->restarts += more->restarts;
+    sum->cuts += more->cuts;
+    sum->bad_unseen += more->bad_unseen;
+    sum->echoes += more->echoes;
+    sum->late_replies += more->late_replies;
+    sum->unasked += more->unasked;
+    sum->closed += more->closed;
+    sum->reattached += more->reattached;
 }
 
 /* Of several streams: the hash of their hashes, as text, in the order of their heads. */

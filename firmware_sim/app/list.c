@@ -1,4 +1,4 @@
-/* scanhead list: head profiles, kinds of links, and the heads that USB shows. */
+/* scanhead list: head profiles, kinds of links, scenarios of faults, and the heads that USB shows. */
 #include <stdio.h>
 #include <string.h>
 
@@ -33,6 +33,7 @@ static int run(int argc, char **argv)
 {
     struct app_input in;
     struct sh_err err = {0};
+    char scenarios[512];
     int status = app_parse(&app_list, argc, argv, &in, NULL);
     if (status != APP_GO_ON) return status;
     if (config_list_profiles(NULL, stdout, &err) < 0) return app_fail(&err);
@@ -41,6 +42,8 @@ static int run(int argc, char **argv)
     for (int id = 0; id < PROTOCOL_N; id++)
         printf("%s %s", id > 0 ? "," : "", protocol_ops_get((enum protocol_id)id)->name);
     puts("");
+    config_name_scenarios(scenarios, sizeof scenarios);
+    printf("scenarios: %s\n", scenarios);
     list_usb();
     return APP_OK;
 }
@@ -49,7 +52,7 @@ static const struct app_option OPTIONS[] = {OPTION_END};
 
 const struct app_command app_list = {
     .name = "list",
-    .summary = "head profiles, kinds of links, and the heads that USB shows",
+    .summary = "head profiles, kinds of links, scenarios, and the heads that USB shows",
     .options = OPTIONS,
     .notes =
         "Profiles are looked for in the folder $SCANHEAD_HEADS, else in the installed one, else in config/heads.\n"

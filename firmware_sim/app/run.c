@@ -300,7 +300,7 @@ static const struct app_option OPTIONS[] = {
     {APP_TEXT, "journal", "FILE", .at = AT(device.journal),
      .help = "write every command that had an effect, with its device time, and the end"},
     {APP_TEXT, "scenario", "FILE", .at = AT(in.scenario),
-     .help = "with the faults of this file (config/faults) beside those of the configuration"},
+     .help = "with the faults of this file beside those of the configuration; a bare name is one of config/faults"},
     {APP_TEXT, "truth", "FILE", .at = AT(device.truth), .help = "write each fault that is injected as a line of JSON"},
     {APP_TEXT, "replay-journal", "FILE", .at = AT(device.replay),
      .help = "carry out the commands of a journal at their times, and end where its run ended"},

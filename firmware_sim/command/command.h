@@ -105,8 +105,10 @@ struct command_faults {
     /* "{kind: drop, every: 10}". Returns 0 and its number, or -1 and why not. */
     int (*add)(void *owner, const char *text, uint32_t *number, char *why, size_t len);
     uint32_t (*remove)(void *owner, uint32_t number);   /* 0: all. Returns how many */
-    uint64_t (*injected)(void *owner, uint32_t number); /* so far; 0: all together */
-    void (*list)(void *owner, char *text, size_t len);  /* "1 drop, 2 flip"; empty: none */
+    /* How often so far; 0: all together. Returns 0, or -1: there never was one of that number. */
+    int (*injected)(void *owner, uint32_t number, uint64_t *n);
+    /* "1 drop, 2 flip"; empty: none. What has no room is counted at the end: ", and 3 more". */
+    void (*list)(void *owner, char *text, size_t len);
 };
 
 /* The device as the command set sees it. The loop keeps it up to date. */

@@ -4,7 +4,7 @@
 
 #include "firmware_sim/command/command_inside.h"
 
-const struct command_unit command_unit_fault = {"fault", 0, "no unit", {{NULL, 0}}};
+const struct command_unit command_unit_fault = {"", 0, "no unit", {{NULL, 0}}};
 
 static int none(struct command_call *call)
 {
@@ -41,6 +41,12 @@ static int take_number(struct command_call *call, int64_t *number)
                         clip);
 }
 
+static int no_such(struct command_call *call, int64_t number)
+{
+    return command_fail(call, CMD_E_RANGE, "%s: there is no fault %u; FAULt:LIST? has those that there are",
+                        call->row->header, (uint32_t)number);
+}
+
 int command_fault_clear(struct command_call *call)
 {
     struct command_device *dev = call->dev;
@@ -48,7 +54,7 @@ int command_fault_clear(struct command_call *call)
     if (dev->faults == NULL) return none(call);
     if (take_number(call, &number) != 0) return -1;
     if (dev->faults->remove(dev->owner, (uint32_t)number) == 0 && number != 0)
-        return command_fail(call, CMD_E_RANGE, "there is no fault %u", (uint32_t)number);
+        return no_such(call, number);
     call->out->effect = COMMAND_FAULTS;
     return command_reply(call, "OK");
 }
@@ -57,9 +63,11 @@ int command_fault_injected(struct command_call *call)
 {
     struct command_device *dev = call->dev;
     int64_t number;
+    uint64_t n;
     if (dev->faults == NULL) return none(call);
     if (take_number(call, &number) != 0) return -1;
-    return command_reply(call, "%llu", (unsigned long long)dev->faults->injected(dev->owner, (uint32_t)number));
+    if (dev->faults->injected(dev->owner, (uint32_t)number, &n) != 0) return no_such(call, number);
+    return command_reply(call, "%llu", (unsigned long long)n);
 }
 
 int command_fault_list(struct command_call *call)

@@ -24,7 +24,9 @@
     {FAULT(until), CFG_COUNT, NULL, "0", 0, 1e15, .help = "Up to this one, included; 0: without end."},
     {FAULT(every), CFG_COUNT, NULL, "1", 1, 1e15, .help = "At every n-th, beginning with `from`."},
     {FAULT(probability), CFG_REAL, NULL, "1", 0, 1, .help = "By chance, of those that the other keys leave."},
-    {FAULT(count), CFG_COUNT, NULL, "0", 0, 1e15, .help = "At most so many times in a session (connections: on the link); 0: no limit."},
+    {FAULT(count), CFG_COUNT, NULL, "0", 0, 1e15,
+     .help = "At most so many times in a session (disconnect, unplug, usb_reset, endpoint_stall, short_packets, and at "
+             "connections: on the link); 0: no limit."},
     {FAULT(from_pulse), CFG_COUNT, NULL, "0", 0, 1e17,
      .help = "From this pulse of a scan on, counted from 0. Then only frames of points are hit."},
     {FAULT(until_pulse), CFG_COUNT, NULL, "", 0, 1e17, .example = "1000000", .help = "Up to this pulse."},
@@ -38,8 +40,9 @@
              "descriptor_length: bytes; counters_high: counts. 0: 1; split and merge 2, garbage 16."},
     {FAULT(byte), CFG_COUNT, NULL, "", 0, 1e9, .example = "30", .help = "flip: bits of this byte, from 0; when not given, any."},
     {FAULT(reseal), CFG_BOOL, .def = "off",
-     .help = "flip: the checksums are made right again, so that no reader can see it by them. Of native frames the "
-             "payload alone is then hit."},
+     .help = "flip: the checksums are made right again, so that no reader can see it by them. What is measured is hit "
+             "then, of native frames the payload. Without it a datagram (udp) is not sent: its reader's system would "
+             "drop it."},
     {FAULT(for_ms), CFG_REAL, "ms", "0", 0, 1e8,
      .help = "How long; jitter: at most. Of the clock on the wire, of device time in the head."},
     {FAULT(factor), CFG_REAL, NULL, "0.5", 0.01, 2, .help = "mirror_slow: its speed, as a share of the right one."},

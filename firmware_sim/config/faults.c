@@ -51,7 +51,7 @@ static const struct {
     int needs_ms;
 } kinds[FAULT_N_KINDS] = {
     [FAULT_DUPLICATE] = {"n", 100, 0},
-    [FAULT_REORDER] = {"n", 10000, 0},
+    [FAULT_REORDER] = {"n", 1000, 0},
     [FAULT_DELAY] = {"for_ms", 0, 1},
     [FAULT_JITTER] = {"for_ms", 0, 1},
     [FAULT_TRUNCATE] = {"n", 1e6, 0},
@@ -161,9 +161,8 @@ void cfg_check_fault_links(struct cfg_reader *rd, const struct config *cfg, cons
 
 int config_link_has_fault(const struct link_spec *link, enum fault_kind kind)
 {
-    const struct link_ops *ops = link_ops_get(link->type);
     const int is_of_link = kind >= FAULT_DISCONNECT && kind <= FAULT_DESCRIPTOR_LENGTH;
-    return !is_of_link || (ops != NULL && (ops->faults & UINT32_C(1) << (kind - FAULT_DISCONNECT)) != 0);
+    return !is_of_link || (link_faults(link) & LINK_FAULT_BIT(kind - FAULT_DISCONNECT)) != 0;
 }
 
 static int read_list(struct cfg_reader *rd, const struct config *cfg, struct fault_list *list)
@@ -175,13 +174,17 @@ static int read_list(struct cfg_reader *rd, const struct config *cfg, struct fau
     return rd->faults->n == 0 ? SH_OK : rd->faults->fault[0].code;
 }
 
-int config_add_scenario(struct config *cfg, const char *path, struct config_faults *faults)
+int config_add_scenario(struct config *cfg, const char *name, struct config_faults *faults)
 {
     struct cfg_reader rd;
+    char path[CONFIG_PATH_LEN], known[512];
     struct fault_list *list = calloc(1, sizeof *list);
     memset(faults, 0, sizeof *faults);
-    cfg_reader_init(&rd, path, &fault_table, list, faults);
-    int code = list == NULL ? cfg_fail_file(&rd, SH_ENOMEM, 0, "no memory") : cfg_read_file(&rd);
+    const int is_there = cfg_find_scenario(name, path);
+    cfg_reader_init(&rd, is_there ? path : name, &fault_table, list, faults);
+    config_name_scenarios(known, sizeof known);
+    int code = !is_there    ? cfg_fail_file(&rd, SH_EINPUT, 0, "no such scenario; allowed a file, as a path, or %s", known)
+               : list == NULL ? cfg_fail_file(&rd, SH_ENOMEM, 0, "no memory") : cfg_read_file(&rd);
     if (code == SH_OK) code = read_list(&rd, cfg, list);
     if (code == SH_OK && list->n == 0) code = cfg_fail_file(&rd, SH_EINPUT, 0, "no faults; a scenario is a list of them");
     if (code == SH_OK && cfg->faults.n + list->n > FAULT_MAX)

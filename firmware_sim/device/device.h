@@ -38,6 +38,9 @@ struct device_counters {
     _Atomic uint64_t late_poses, bad_poses;
 };
 
+/* What becomes of the power in a tick. */
+enum device_power_change { DEVICE_POWER_STAYS, DEVICE_POWER_GOES, DEVICE_POWER_COMES };
+
 /* What faults do to the beam in a tick. */
 struct device_upset {
     int on;            /* 0: nothing, and the rest is not set */
@@ -45,9 +48,6 @@ struct device_upset {
     double stuck_turn; /* turns */
     struct cast_upset cast;
 };
-
-/* What becomes of the power in a tick. */
-enum device_power_change { DEVICE_POWER_STAYS, DEVICE_POWER_GOES, DEVICE_POWER_COMES };
 
 /* What one tick consists of. All members are copies, so that no thread waits for another. Frames leave in the
  * order of the members. */

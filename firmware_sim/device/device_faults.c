@@ -27,24 +27,33 @@ static int add_fault(void *owner, const char *text, uint32_t *number, char *why,
 
 static uint32_t remove_fault(void *owner, uint32_t number)
 {
-    return fault_board_remove(((struct device *)owner)->faults, number);
+    const struct device *device = owner;
+    return fault_board_end(device->faults, number, (int64_t)device->next_tick * device->tick_ns);
 }
 
-static uint64_t count_injected(void *owner, uint32_t number)
+static int count_injected(void *owner, uint32_t number, uint64_t *n)
 {
-    return fault_board_injected(((struct device *)owner)->faults, number);
+    struct fault_board *board = ((struct device *)owner)->faults;
+    *n = fault_board_injected(board, number);
+    return number <= fault_board_last(board) ? 0 : -1;
 }
 
 static void list_faults(void *owner, char *text, size_t len)
 {
     struct fault_entry entry[FAULT_MAX];
-    uint32_t n;
+    uint32_t n, i = 0;
     size_t used = 0;
     text[0] = '\0';
     fault_board_copy(((struct device *)owner)->faults, entry, &n);
-    for (uint32_t i = 0; i < n && used < len; i++)
-        used += (size_t)snprintf(text + used, len - used, "%s%u %s", i > 0 ? ", " : "", entry[i].number,
-                                 fault_names[entry[i].fault.kind]);
+    for (; i < n; i++) {
+        char one[64];
+        const size_t size = (size_t)snprintf(one, sizeof one, "%s%u %s", i > 0 ? ", " : "", entry[i].number,
+                                             fault_names[entry[i].fault.kind]);
+        if (used + size + sizeof ", and 32 more" > len) break;
+        memcpy(text + used, one, size + 1);
+        used += size;
+    }
+    if (i < n) snprintf(text + used, len - used, ", and %u more", n - i);
 }
 
 static const struct command_faults COMMANDS = {add_fault, remove_fault, count_injected, list_faults};

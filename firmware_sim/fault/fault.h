@@ -80,7 +80,7 @@ struct fault {
     uint64_t from, until; /* numbers; until 0: no end */
     uint64_t every;       /* from `from` on */
     double probability;
-    uint64_t count; /* at most so many times (in a session, where it strikes in sessions); 0: no limit */
+    uint64_t count; /* at most so many times (frames, replies: in a session; what the link does: on it); 0: no limit */
     uint64_t from_pulse, until_pulse; /* of a scan, from 0; until UINT64_MAX: no end. Other frames have no pulses */
     double from_s, until_s;           /* until 0: no end */
     uint64_t seed;

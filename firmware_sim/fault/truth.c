@@ -55,6 +55,7 @@ static void put_place(struct json *json, const struct fault_note *note)
     if (note->has_seq) json_uint(json, "type", note->type);
     if (note->has_pulse) json_uint(json, "pulse", note->pulse);
     if (note->byte >= 0) json_int(json, "byte", note->byte);
+    if (note->byte >= 0 && note->kind == FAULT_FLIP) json_uint(json, "bit", note->bit);
 }
 
 void truth_write(struct truth *truth, const struct fault_note *note)

@@ -15,12 +15,13 @@ struct fault_note {
     int64_t t_ns; /* device time */
     uint32_t link, session; /* from 1; 0: in the head */
     int of;                 /* enum fault_of */
-    uint64_t number;        /* of the frame, reply or connection, as faults count them */
+    uint64_t number;        /* of the frame, reply or connection, as this fault counts them */
     int has_seq;            /* a frame of the native protocol, with its sequence number and type: */
     uint32_t seq, type;
     int has_pulse;
     uint64_t pulse; /* first of the frame, or the one that a fault of the head begins with */
     int64_t byte;   /* offset in the frame; -1: none */
+    uint32_t bit;   /* of that byte, the first that a flip changed; 0 is the one of value 1 */
     uint64_t n;     /* bytes, bits, copies, frames: as the kind has it */
     double for_ms;
     int ended; /* a fault of the head is over */

@@ -1,8 +1,10 @@
-/* What each kind of fault does to one frame, unit or reply. */
+/* What each kind of fault does to one frame, unit or reply. Each returns 1; 0: there is nothing for it to do; or
+ * SH_ENOMEM. */
 #include <math.h>
 #include <string.h>
 
 #include "core/err.h"
+#include "core/grow.h"
 #include "drivers/protocol/native.h"
 #include "firmware_sim/fault/wire_inside.h"
 
@@ -28,150 +30,295 @@ static uint64_t draw_below(const struct change *c, uint32_t which, uint64_t n)
     return (uint64_t)(((unsigned __int128)draw(c, which) * n) >> 64);
 }
 
-static void reorder(struct change *c)
+/* ---- the frame, and where it goes */
+
+static int drop(struct change *c)
 {
-    c->note.n = 1 + draw_below(c, DRAW_N, fault_n(&c->fault->entry.fault));
-    c->making->behind = (uint32_t)c->note.n;
+    if (c->making->is_dropped) return 0;
+    c->making->is_dropped = 1;
+    return 1;
 }
 
-static void delay(struct change *c, double ms)
+static int duplicate(struct change *c)
+{
+    c->note.n = fault_n(&c->fault->entry.fault);
+    c->making->copies += (uint32_t)c->note.n;
+    return 1;
+}
+
+static int reorder(struct change *c)
+{
+    if (c->making->opens || c->making->behind != 0) return 0;
+    c->note.n = 1 + draw_below(c, DRAW_N, fault_n(&c->fault->entry.fault));
+    c->making->behind = (uint32_t)c->note.n;
+    return 1;
+}
+
+static int delay(struct change *c, double ms)
 {
     const int64_t due_ns = c->making->now_ns + llround(ms * 1e6);
     if (due_ns > c->making->not_before_ns) c->making->not_before_ns = due_ns;
     c->note.for_ms = ms;
+    return 1;
 }
 
+static int late_reply(struct change *c)
+{
+    const double ms = c->fault->entry.fault.for_ms;
+    const int64_t due_ns = c->making->now_ns + llround(ms * 1e6);
+    if (due_ns > c->making->hold_ns) c->making->hold_ns = due_ns;
+    c->note.for_ms = ms;
+    return 1;
+}
+
+static int split(struct change *c)
+{
+    struct wire_making *m = c->making;
+    const uint32_t n = fault_n(&c->fault->entry.fault);
+    if (m->len < 2 || n < 2 || m->split > 1) return 0;
+    m->split = n <= m->len ? n : (uint32_t)m->len;
+    c->note.n = m->split;
+    return 1;
+}
+
+/* Not within a write that a merge began, so that merges follow each other at places that only numbers decide. */
+static int merge(struct change *c)
+{
+    const int of = c->making->item->of;
+    uint64_t *until = &c->wire->merge_until[of];
+    const uint32_t n = fault_n(&c->fault->entry.fault);
+    if (n < 2 || c->making->behind != 0 || c->making->spot.number <= *until) return 0;
+    *until = c->making->spot.number + n - 1;
+    c->making->opens = 1;
+    c->note.n = n;
+    return 1;
+}
+
+/* ---- its bytes */
+
 /* At least one byte is left, and one is missing. */
-static void truncate_unit(struct change *c)
+static int cut(struct change *c)
 {
     struct wire_making *m = c->making;
     uint64_t n = fault_n(&c->fault->entry.fault);
-    if (m->len < 2) n = 0;
-    else if (n == 0) n = 1 + draw_below(c, DRAW_N, m->len - 1);
-    else if (n > m->len - 1) n = m->len - 1;
+    if (m->len < 2) return 0;
+    if (n == 0) n = 1 + draw_below(c, DRAW_N, m->len - 1);
+    if (n > m->len - 1) n = m->len - 1;
     m->len -= n;
+    m->is_cut = 1;
     c->note.n = n;
     c->note.byte = (int64_t)m->len;
+    return 1;
 }
 
-/* Bits at places of their own. With reseal those of a native frame are in its payload: what its header says of length
- * and numbers stays true. */
-static void flip(struct change *c)
+/* Into the wire's mask: the bits that may change. Returns how many. */
+static uint64_t mark_bits(const struct change *c)
 {
     const struct fault *f = &c->fault->entry.fault;
-    struct wire_making *m = c->making;
-    const size_t from = f->reseal && c->wire->spec.native ? NATIVE_HEADER_LEN : 0;
-    uint64_t n_bits = 8 * (m->len - from), n = fault_n(f), done = 0;
-    if (f->byte >= 0) n_bits = (uint64_t)f->byte < m->len ? 8 : 0;
-    if (n > n_bits) n = n_bits;
-    uint64_t at = 8 * (f->byte >= 0 ? (uint64_t)f->byte : from) + (n_bits != 0 ? draw_below(c, DRAW_BYTES, n_bits) : 0);
-    const uint64_t begin = 8 * (f->byte >= 0 ? (uint64_t)f->byte : from);
-    c->note.byte = n != 0 ? (int64_t)(at / 8) : -1;
-    for (; done < n; done++) { /* the first is anywhere, the others follow it */
-        c->wire->unit[at / 8] ^= (uint8_t)(1U << at % 8);
-        if (++at == begin + n_bits) at = begin;
+    const struct wire *wire = c->wire;
+    const size_t len = c->making->len;
+    const int all = !f->reseal || wire->spec.content == NULL;
+    uint64_t n = 0;
+    memset(wire->mask, all ? 0xff : 0, len);
+    if (!all) wire->spec.content(wire->unit, len, wire->mask);
+    for (size_t i = 0; i < len; i++) {
+        if (f->byte >= 0 && (uint64_t)f->byte != i) wire->mask[i] = 0;
+        n += (uint64_t)__builtin_popcount(wire->mask[i]);
     }
-    if (f->reseal && n != 0) c->wire->spec.reseal(c->wire->unit, m->len);
-    c->note.n = n;
-    if (f->reseal) strcpy(c->note.text, "resealed");
+    return n;
 }
 
+/* Bit k of the mask; it has more. */
+static uint64_t find_bit(const uint8_t *mask, uint64_t k)
+{
+    size_t i = 0;
+    for (; k >= (uint64_t)__builtin_popcount(mask[i]); i++)
+        k -= (uint64_t)__builtin_popcount(mask[i]);
+    unsigned left = mask[i];
+    for (; k > 0; k--)
+        left &= left - 1;
+    return 8 * i + (uint64_t)__builtin_ctz(left);
+}
+
+/* The first bit of the mask that comes after this one, round and round. */
+static uint64_t next_bit(const uint8_t *mask, size_t len, uint64_t at)
+{
+    for (at++;; at = (at / 8 + 1) * 8) {
+        if (at / 8 == len) at = 0;
+        const unsigned left = mask[at / 8] >> at % 8;
+        if (left != 0) return at + (uint64_t)__builtin_ctz(left);
+    }
+}
+
+/* n of the marked bits: the first is anywhere, the others follow it. A bit that another fault has changed already is
+ * passed over, since it would be right again. Returns how many. */
+static uint64_t flip_bits(struct change *c, uint64_t n_bits, uint64_t n)
+{
+    uint8_t *bytes = c->wire->unit;
+    const uint8_t *before = c->making->item->bytes, *mask = c->wire->mask;
+    uint64_t at = find_bit(mask, draw_below(c, DRAW_BYTES, n_bits)), done = 0;
+    for (uint64_t i = 0; i < n_bits && done < n; i++, at = next_bit(mask, c->making->len, at)) {
+        const uint8_t bit = (uint8_t)(1U << at % 8);
+        if (((bytes[at / 8] ^ before[at / 8]) & bit) != 0) continue;
+        bytes[at / 8] ^= bit;
+        if (done++ != 0) continue;
+        c->note.byte = (int64_t)(at / 8);
+        c->note.bit = (uint32_t)(at % 8);
+    }
+    return done;
+}
+
+/* A datagram that is damaged on its way is dropped by the system of its reader; with reseal it was wrong before it was
+ * sent. */
+static int flip(struct change *c)
+{
+    const struct fault *f = &c->fault->entry.fault;
+    struct wire *wire = c->wire;
+    if (f->reseal && c->making->is_cut) return 0; /* nothing makes it right */
+    if (!grow(&wire->mask, &wire->mask_room, c->making->len, 1)) return SH_ENOMEM;
+    const uint64_t n_bits = mark_bits(c);
+    if (n_bits != 0) c->note.n = flip_bits(c, n_bits, fault_n(f));
+    if (c->note.n == 0) return 0;
+    if (f->reseal && wire->spec.reseal != NULL) wire->spec.reseal(wire->unit, c->making->len);
+    if (f->reseal) strcpy(c->note.text, "resealed");
+    if (f->reseal || !wire->spec.datagrams) return 1;
+    c->making->is_dropped = 1;
+    strcpy(c->note.text, "not sent: its UDP checksum would be wrong");
+    return 1;
+}
+
+/* ---- what stands before it */
+
+static int put_before(struct change *c, struct wire_piece *piece)
+{
+    if (piece == NULL) return SH_ENOMEM;
+    piece->not_before_ns = c->making->not_before_ns;
+    return wire_queue_put(&c->wire->queue, piece) == SH_OK ? 1 : SH_ENOMEM;
+}
+
+/* No carriage return is in it, without which nothing is a reply line. */
 static int garbage(struct change *c)
 {
-    const uint32_t n = fault_n(&c->fault->entry.fault);
-    const enum wire_piece_kind kind = c->making->kind == WIRE_TEXT ? WIRE_FRAMES : c->making->kind;
-    struct wire_piece *piece = wire_piece_new(kind, NULL, 0, n);
-    if (piece == NULL) return SH_ENOMEM;
-    for (uint32_t i = 0; i < n; i++)
-        piece->bytes[i] = (uint8_t)(draw(c, DRAW_BYTES + i / 8) >> 8 * (i % 8));
-    piece->len = n;
-    piece->not_before_ns = c->making->not_before_ns;
-    wire_queue_put(&c->wire->queue, piece);
+    enum { GARBAGE_MAX = 1024, CARRIAGE_RETURN = 0x0d };
+    uint8_t bytes[GARBAGE_MAX];
+    const uint32_t wanted = fault_n(&c->fault->entry.fault), n = wanted < GARBAGE_MAX ? wanted : GARBAGE_MAX;
+    for (uint32_t i = 0; i < n; i++) {
+        bytes[i] = (uint8_t)(draw(c, DRAW_BYTES + i / 8) >> 8 * (i % 8));
+        if (bytes[i] == CARRIAGE_RETURN) bytes[i]++;
+    }
     c->note.n = n;
-    return SH_OK;
+    return put_before(c, wire_piece_new(c->making->kind, bytes, n));
+}
+
+static int stall(struct change *c)
+{
+    struct wire_piece *piece = wire_piece_new(WIRE_PAUSE, NULL, 0);
+    c->note.for_ms = c->fault->entry.fault.for_ms;
+    if (piece != NULL) piece->for_ms = c->note.for_ms;
+    return put_before(c, piece);
+}
+
+/* Nothing is reordered beyond the end of a session. */
+static int end_session(struct change *c)
+{
+    c->wire->is_over = 1;
+    const int stream = wire_queue_pass(&c->wire->queue, FAULT_OF_STREAM, UINT64_MAX, 0);
+    const int notices = wire_queue_pass(&c->wire->queue, FAULT_OF_NOTICES, UINT64_MAX, 0);
+    return stream != SH_OK ? stream : notices;
 }
 
 static int act(struct change *c)
 {
     const struct fault *f = &c->fault->entry.fault;
-    struct wire_piece *piece = wire_piece_new(WIRE_ACT, NULL, 0, 0);
+    c->note.for_ms = f->for_ms;
+    if (f->kind == FAULT_SHORT_PACKETS) c->note.n = fault_n(f);
+    struct wire_piece *piece = wire_piece_new(WIRE_ACT, &c->note, sizeof c->note);
     if (piece == NULL) return SH_ENOMEM;
     piece->act = f->kind;
     piece->n = fault_n(f);
     piece->for_ms = f->for_ms;
-    piece->not_before_ns = c->making->not_before_ns;
-    wire_queue_put(&c->wire->queue, piece);
-    c->note.for_ms = f->for_ms;
-    if (f->kind == FAULT_SHORT_PACKETS) c->note.n = piece->n;
-    return SH_OK;
+    if (f->kind <= FAULT_USB_RESET && end_session(c) != SH_OK) { /* disconnect, unplug, usb_reset */
+        wire_piece_free(piece);
+        return SH_ENOMEM;
+    }
+    return put_before(c, piece);
 }
 
+/* As a terminal does it: a line has CR LF at its end. */
+static int echo(struct change *c)
+{
+    size_t len;
+    const uint8_t *heard = wire_heard_first(&c->wire->heard, &len);
+    if (heard == NULL) return 0;
+    struct wire_piece *piece = wire_piece_new(c->making->kind, heard, len);
+    if (piece != NULL && c->wire->spec.native) {
+        if (!grow(&piece->bytes, &piece->room, len + 2, 1)) {
+            wire_piece_free(piece);
+            return SH_ENOMEM;
+        }
+        memcpy(piece->bytes + len, "\r\n", 2);
+        piece->len += 2;
+    }
+    c->note.n = piece != NULL ? piece->len : 0;
+    return put_before(c, piece);
+}
+
+/* The reply before. Where there is none, or it is the same, another that no query of a number or of words has. */
 static int wrong_reply(struct change *c)
 {
     struct wire *wire = c->wire;
-    static const char none[] = "OK\r\n"; /* there was no reply before */
-    const size_t len = wire->last_reply_len;
-    c->making->len = len != 0 ? len : sizeof none - 1;
-    memcpy(wire->unit, len != 0 ? wire->last_reply : (const uint8_t *)none, c->making->len);
-    return SH_OK;
+    static const char *const others[] = {"OK\r\n", "0\r\n"};
+    const struct wire_item *item = c->making->item;
+    const uint8_t *wrong = wire->last_reply;
+    size_t len = wire->last_reply_len;
+    for (int i = 0; i < 2 && (len == 0 || (len == item->len && memcmp(wrong, item->bytes, len) == 0)); i++) {
+        if (!wire->spec.native) return 0;
+        wrong = (const uint8_t *)others[i];
+        len = strlen(others[i]);
+    }
+    if (!grow(&wire->unit, &wire->unit_room, len, 1)) return SH_ENOMEM;
+    memcpy(wire->unit, wrong, len);
+    c->making->len = len;
+    return 1;
 }
 
-static int echo(struct change *c)
+/* ---- one fault */
+
+/* It needs no frame: it stands before it. */
+static int is_before(enum fault_kind kind)
 {
-    const struct wire *wire = c->wire;
-    struct wire_piece *piece = wire_piece_new(c->making->kind, wire->heard, wire->heard_len, 0);
-    if (piece == NULL) return SH_ENOMEM;
-    wire_queue_put(&c->wire->queue, piece);
-    c->note.n = wire->heard_len;
-    return SH_OK;
+    return kind == FAULT_GARBAGE || kind == FAULT_STALL || kind == FAULT_ECHO || kind >= FAULT_DISCONNECT;
 }
 
-static int change_frame(struct change *c)
+static int change_item(struct change *c)
 {
     const struct fault *f = &c->fault->entry.fault;
-    struct wire_making *m = c->making;
     switch (f->kind) {
     case FAULT_DROP:
     case FAULT_NO_REPLY:
-        m->dropped = 1;
-        return SH_OK;
+        return drop(c);
     case FAULT_DUPLICATE:
-        m->copies += fault_n(f);
-        c->note.n = fault_n(f);
-        return SH_OK;
+        return duplicate(c);
     case FAULT_REORDER:
-        reorder(c);
-        return SH_OK;
+        return reorder(c);
     case FAULT_DELAY:
-        delay(c, f->for_ms);
-        return SH_OK;
+        return delay(c, f->for_ms);
     case FAULT_JITTER:
-        delay(c, f->for_ms * 0x1p-64 * (double)draw(c, DRAW_MS));
-        return SH_OK;
-    case FAULT_LATE_REPLY:
-        delay(c, f->for_ms);
-        m->holds_alone = 1;
-        return SH_OK;
+        return delay(c, f->for_ms * 0x1p-64 * (double)draw(c, DRAW_MS));
     case FAULT_TRUNCATE:
-        truncate_unit(c);
-        return SH_OK;
+        return cut(c);
     case FAULT_FLIP:
-        flip(c);
-        return SH_OK;
+        return flip(c);
     case FAULT_STALL:
-        m->quiet_ms += f->for_ms;
-        c->note.for_ms = f->for_ms;
-        return SH_OK;
+        return stall(c);
     case FAULT_SPLIT:
-        m->split = fault_n(f);
-        c->note.n = m->split;
-        return SH_OK;
+        return split(c);
     case FAULT_MERGE:
-        m->joins = fault_n(f) - 1;
-        c->note.n = fault_n(f);
-        return SH_OK;
+        return merge(c);
     case FAULT_GARBAGE:
         return garbage(c);
+    case FAULT_LATE_REPLY:
+        return late_reply(c);
     case FAULT_WRONG_REPLY:
         return wrong_reply(c);
     case FAULT_ECHO:
@@ -191,7 +338,7 @@ static void describe(struct change *c)
                                 .link = c->wire->spec.link,
                                 .session = c->wire->spec.session,
                                 .of = m->item->of,
-                                .number = m->spot.number,
+                                .number = c->number,
                                 .has_pulse = m->spot.has_pulses,
                                 .pulse = m->spot.pulse0,
                                 .byte = -1};
@@ -206,8 +353,10 @@ static void describe(struct change *c)
 int wire_change(struct wire *wire, const struct wire_fault *fault, uint64_t number, struct wire_making *making)
 {
     struct change c = {.wire = wire, .fault = fault, .number = number, .making = making};
+    if (making->is_dropped && !is_before(fault->entry.fault.kind)) return 0;
     describe(&c);
-    const int rc = change_frame(&c);
-    if (rc == SH_OK) fault_board_note(wire->spec.board, &c.note);
-    return rc;
+    const int done = change_item(&c);
+    const int is_act = fault->entry.fault.kind >= FAULT_DISCONNECT && fault->entry.fault.kind <= FAULT_SHORT_PACKETS;
+    if (done > 0 && !is_act) fault_board_note(wire->spec.board, &c.note);
+    return done;
 }

@@ -3,29 +3,33 @@
 #define FIRMWARE_SIM_FAULT_WIRE_INSIDE_H
 
 #include "firmware_sim/fault/wire.h"
-
-enum { WIRE_HEARD_LEN = 1024 };
+#include "firmware_sim/fault/wire_heard.h"
 
 /* A fault of the list, as far as this session goes. */
 struct wire_fault {
     struct fault_entry entry;
-    uint64_t base[FAULT_N_OF]; /* of each counting, what came before it was there */
+    uint64_t base[FAULT_N_OF]; /* so many of each counting were before it */
     uint64_t hits;
 };
 
 struct wire {
     struct wire_spec spec;
     uint32_t version; /* of the list */
-    struct wire_fault fault[FAULT_MAX];
+    struct wire_fault fault[FAULT_KEPT];
     uint32_t n_faults;
     uint64_t count[FAULT_N_OF];
+    uint64_t merge_until[FAULT_N_OF]; /* up to this one, frames are in a write that a merge began */
     struct wire_queue queue;
-    int64_t last_due_ns; /* delays keep the order */
-    uint8_t *unit;       /* the one at hand, and the copy that faults change */
+    int64_t last_due_ns;  /* delays keep the order */
+    int64_t reply_due_ns; /* and late replies that of replies */
+    int is_over;          /* an act that ends the session waits: what comes after it goes nowhere */
+    uint64_t void_frames, void_pulses; /* so much */
+    uint8_t *unit; /* the copy of the one at hand that faults change */
+    uint8_t *mask; /* its bits that a flip may change */
+    size_t unit_room, mask_room;
     uint8_t *last_reply; /* the reply before */
-    size_t last_reply_len;
-    uint8_t heard[WIRE_HEARD_LEN]; /* since the last reply; what is beyond is not echoed */
-    size_t heard_len;
+    size_t last_reply_len, last_reply_room;
+    struct wire_heard heard;
 };
 
 /* The frame, unit or reply at hand, and what becomes of it. */
@@ -33,19 +37,21 @@ struct wire_making {
     const struct wire_item *item;
     struct fault_spot spot; /* its number is that of the session, from 1 */
     enum wire_piece_kind kind;
+    uint32_t frames; /* as wire_count_unwritten counts them */
+    uint64_t pulses;
     size_t len; /* of wire->unit */
-    int dropped;
+    int is_dropped, is_cut;
     uint32_t copies;
-    uint32_t behind;
+    uint32_t behind; /* so many frames overtake it */
     int64_t not_before_ns;
-    int holds_alone; /* not_before_ns holds back this one alone */
-    double quiet_ms;
-    uint32_t split; /* writes that it goes out in */
-    uint32_t joins; /* frames after it that go out with it */
+    int64_t hold_ns; /* a reply: kept back alone until then */
+    uint32_t split;  /* writes that it goes out in; 1: no split */
+    int opens;       /* frames after it go out with it */
     int64_t now_ns;
 };
 
-/* What the fault does to it; notes it. `number` is the frame's, as this fault counts. Returns 0 or SH_ENOMEM. */
+/* What the fault does to it; notes it. `number` is the frame's, as this fault counts. Returns 1; 0: there is nothing for
+ * it to do; or SH_ENOMEM. */
 int wire_change(struct wire *wire, const struct wire_fault *fault, uint64_t number, struct wire_making *making);
 
 #endif

@@ -1,46 +1,64 @@
 #include "firmware_sim/fault/wire_queue.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { JOINED_BYTES = 65536 }; /* pieces are joined up to this */
+#include "core/err.h"
+#include "core/grow.h"
 
-struct wire_piece *wire_piece_new(enum wire_piece_kind kind, const void *bytes, size_t len, size_t more)
+struct wire_piece *wire_piece_new(enum wire_piece_kind kind, const void *bytes, size_t len)
 {
-    const size_t room = kind == WIRE_FRAMES && len + more < JOINED_BYTES ? JOINED_BYTES : len + more;
-    struct wire_piece *piece = malloc(sizeof *piece + room);
-    if (piece == NULL) return NULL;
-    *piece = (struct wire_piece){.kind = kind, .len = len, .room = room};
-    if (len != 0) memcpy(piece->bytes, bytes, len);
+    struct wire_piece *piece = malloc(sizeof *piece);
+    uint8_t *copy = len != 0 ? malloc(len) : NULL;
+    if (piece == NULL || (len != 0 && copy == NULL)) {
+        free(piece);
+        free(copy);
+        return NULL;
+    }
+    *piece = (struct wire_piece){.kind = kind, .len = len, .room = len, .bytes = copy};
+    if (len != 0) memcpy(copy, bytes, len);
     return piece;
 }
 
-/* Whether it may be written together with the last one. */
-static int joins(const struct wire_queue *queue, const struct wire_piece *piece)
+void wire_piece_free(struct wire_piece *piece)
 {
-    const struct wire_piece *last = queue->last;
-    if (last == NULL || last->kind != piece->kind || piece->kind == WIRE_ACT) return 0;
-    if (last->joins != 0) return piece->len <= last->room - last->len;
-    return piece->kind != WIRE_UNIT && piece->joins == 0 && !last->alone && !piece->alone && piece->not_before_ns == last->not_before_ns && piece->quiet_ms <= 0.0 &&
-           piece->len <= last->room - last->len;
+    free(piece->bytes);
+    free(piece);
 }
 
-void wire_queue_put(struct wire_queue *queue, struct wire_piece *piece)
+static size_t cost_of(const struct wire_piece *piece)
+{
+    return sizeof *piece + piece->len;
+}
+
+/* Into the write of the last one. */
+static int join(struct wire_queue *queue, struct wire_piece *piece)
 {
     struct wire_piece *last = queue->last;
-    queue->n_bytes += piece->len;
-    piece->next = NULL;
-    if (joins(queue, piece)) {
+    const int done = grow(&last->bytes, &last->room, last->len + piece->len, 1);
+    if (done) {
         memcpy(last->bytes + last->len, piece->bytes, piece->len);
         last->len += piece->len;
-        if (last->joins != 0 && --last->joins == 0) last->alone = 1;
-        free(piece);
-        return;
+        last->frames += piece->frames;
+        last->pulses += piece->pulses;
+        queue->n_bytes += piece->len;
+        if (piece->not_before_ns > last->not_before_ns) last->not_before_ns = piece->not_before_ns;
     }
-    /* What waits in front of it, it waits for as well. */
-    if (last != NULL && piece->not_before_ns < last->not_before_ns) piece->not_before_ns = last->not_before_ns;
+    wire_piece_free(piece);
+    return done ? SH_OK : SH_ENOMEM;
+}
+
+int wire_queue_put(struct wire_queue *queue, struct wire_piece *piece)
+{
+    struct wire_piece *last = queue->last;
+    if (last != NULL && last->open && last->kind == piece->kind && !piece->alone) return join(queue, piece);
+    if (last != NULL) last->open = 0;
+    queue->n_bytes += cost_of(piece);
+    piece->next = NULL;
     *(last != NULL ? &last->next : &queue->first) = piece;
     queue->last = piece;
+    return SH_OK;
 }
 
 void wire_queue_hold(struct wire_queue *queue, struct wire_piece *piece)
@@ -50,73 +68,93 @@ void wire_queue_hold(struct wire_queue *queue, struct wire_piece *piece)
         at = &(*at)->next;
     piece->next = NULL;
     *at = piece;
-    queue->n_bytes += piece->len;
+    if (piece->after == 0) queue->n_bytes += cost_of(piece);
 }
 
-/* Held pieces for which it is time go to the end. */
-static void release(struct wire_queue *queue, int64_t now_ns, int all)
+void wire_queue_close(struct wire_queue *queue)
 {
+    if (queue->last != NULL) queue->last->open = 0;
+}
+
+/* From the held ones to the end. */
+static int release(struct wire_queue *queue, struct wire_piece **at)
+{
+    struct wire_piece *piece = *at;
+    *at = piece->next;
+    if (piece->after == 0) queue->n_bytes -= cost_of(piece);
+    return wire_queue_put(queue, piece);
+}
+
+int wire_queue_pass(struct wire_queue *queue, int of, uint64_t number, int64_t t_ns)
+{
+    int rc = SH_OK;
+    for (;;) { /* those first that wait for the least number, and of these the one that came first */
+        struct wire_piece **next = NULL;
+        for (struct wire_piece **at = &queue->held; *at != NULL; at = &(*at)->next) {
+            const struct wire_piece *piece = *at;
+            if (piece->after == 0 || piece->of != of || (piece->after > number && piece->t_ns >= t_ns)) continue;
+            if (next == NULL || piece->after < (*next)->after) next = at;
+        }
+        if (next == NULL) return rc;
+        if (release(queue, next) != SH_OK) rc = SH_ENOMEM;
+    }
+}
+
+int wire_queue_let_go(struct wire_queue *queue, int64_t now_ns)
+{
+    int rc = SH_OK;
     for (struct wire_piece **at = &queue->held; *at != NULL;) {
-        struct wire_piece *piece = *at;
-        if (piece->behind != 0 ? !all : piece->not_before_ns > now_ns) {
-            at = &piece->next;
+        if ((*at)->after != 0 || (*at)->not_before_ns > now_ns) {
+            at = &(*at)->next;
             continue;
         }
-        *at = piece->next;
-        queue->n_bytes -= piece->len;
-        piece->behind = 0;
-        piece->not_before_ns = 0;
-        wire_queue_put(queue, piece);
+        (*at)->not_before_ns = 0;
+        if (release(queue, at) != SH_OK) rc = SH_ENOMEM;
     }
+    return rc;
 }
 
-void wire_queue_overtake(struct wire_queue *queue)
+struct wire_piece *wire_queue_due(struct wire_queue *queue, int64_t now_ns)
 {
-    for (struct wire_piece **at = &queue->held; *at != NULL;) {
-        struct wire_piece *piece = *at;
-        if (piece->behind == 0 || --piece->behind != 0) {
-            at = &piece->next;
-            continue;
+    for (;;) {
+        struct wire_piece *first = queue->first;
+        if (first == NULL || first->open) return NULL;
+        if (first->kind == WIRE_PAUSE && !first->started) {
+            const int64_t until_ns = now_ns + llround(first->for_ms * 1e6);
+            if (until_ns > first->not_before_ns) first->not_before_ns = until_ns;
+            first->started = 1;
         }
-        *at = piece->next;
-        queue->n_bytes -= piece->len;
-        wire_queue_put(queue, piece);
+        if (first->not_before_ns > now_ns) return NULL;
+        if (first->kind != WIRE_PAUSE) return first;
+        wire_queue_pop(queue);
     }
-}
-
-void wire_queue_let_go(struct wire_queue *queue, int64_t now_ns, int all)
-{
-    if (queue->held != NULL) release(queue, now_ns, all);
-}
-
-struct wire_piece *wire_queue_due(struct wire_queue *queue, int64_t now_ns, int all)
-{
-    struct wire_piece *first = queue->first;
-    if (first == NULL || (first->joins != 0 && !all)) return NULL;
-    if (first->quiet_ms > 0.0) {
-        const int64_t until_ns = now_ns + (int64_t)(first->quiet_ms * 1e6);
-        if (until_ns > first->not_before_ns) first->not_before_ns = until_ns;
-        first->quiet_ms = 0.0;
-    }
-    return first->not_before_ns <= now_ns ? first : NULL;
 }
 
 int64_t wire_queue_next_ns(const struct wire_queue *queue)
 {
     const struct wire_piece *first = queue->first;
-    int64_t next_ns = first != NULL && first->joins == 0 ? first->not_before_ns : INT64_MAX;
+    int64_t next_ns = first != NULL && !first->open ? first->not_before_ns : INT64_MAX;
     for (const struct wire_piece *held = queue->held; held != NULL; held = held->next)
-        if (held->behind == 0 && held->not_before_ns < next_ns) next_ns = held->not_before_ns;
+        if (held->after == 0 && held->not_before_ns < next_ns) next_ns = held->not_before_ns;
     return next_ns;
 }
 
 void wire_queue_pop(struct wire_queue *queue)
 {
     struct wire_piece *first = queue->first;
-    queue->n_bytes -= first->len;
+    queue->n_bytes -= cost_of(first);
     queue->first = first->next;
     if (queue->first == NULL) queue->last = NULL;
-    free(first);
+    wire_piece_free(first);
+}
+
+void wire_queue_count(const struct wire_queue *queue, uint64_t *frames, uint64_t *pulses)
+{
+    for (int i = 0; i < 2; i++)
+        for (const struct wire_piece *piece = i == 0 ? queue->first : queue->held; piece != NULL; piece = piece->next) {
+            *frames += piece->frames;
+            *pulses += piece->pulses;
+        }
 }
 
 void wire_queue_clear(struct wire_queue *queue)
@@ -126,7 +164,7 @@ void wire_queue_clear(struct wire_queue *queue)
     while (queue->held != NULL) {
         struct wire_piece *held = queue->held;
         queue->held = held->next;
-        free(held);
+        wire_piece_free(held);
     }
     queue->n_bytes = 0;
 }

@@ -81,6 +81,7 @@ int hasher_start(struct stream *stream, struct hasher **out, struct sh_err *err)
     struct hasher *h = calloc(1, sizeof *h);
     if (h == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     h->stream = stream;
+    h->next_seq = stream->seq;
     h->wake_fd = eventfd(0, EFD_CLOEXEC);
     sha256_init(&h->sha);
     int failed = h->wake_fd < 0 ? errno : 0;

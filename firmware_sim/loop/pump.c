@@ -21,6 +21,7 @@ int pump_open(struct links *links, uint32_t index, const struct link_spec *spec,
     pump->number = index + 1;
     if (spec->type != LINK_FD) pump->board = device_faults(links->device); /* readers of this process get the clean stream */
     pump->ops = link_ops_get(spec->type);
+    pump->can = link_faults(spec);
     pump->protocol = protocol_ops_get((enum protocol_id)spec->protocol);
     pump->out_cap = links->stream->tick_bytes + BATCH_BYTES + REPLY_ROOM;
     struct link_spec with = *spec;
@@ -95,7 +96,7 @@ static void fail_link(struct pump *pump, const char *why)
         sh_fail(&links->error, SH_EIO, "link %s: %s; it is cut short", place.endpoint, why);
 }
 
-static void say_notice(struct pump *pump, const char *text)
+void pump_say(struct pump *pump, const char *text)
 {
     struct link_place place;
     pump_get_place(pump, &place);
@@ -109,8 +110,11 @@ static void handle(struct pump *pump, const struct link_event *event)
     case LINK_OPENED:
         if (pump->is_off && pump->ops->end != NULL) /* nobody is there to take it */
             pump->ops->end(pump->link, event->session);
-        else
+        else if (!pump_turns_away(pump, event->session))
             session_open(pump, s, event->peer);
+        break;
+    case LINK_PLUGGED:
+        pump_plugged(pump);
         break;
     case LINK_CLOSED:
         if (pump->failed) fail_link(pump, event->peer);
@@ -127,7 +131,7 @@ static void handle(struct pump *pump, const struct link_event *event)
         stream_poke(pump->stream);
         break;
     case LINK_NOTICE:
-        say_notice(pump, event->peer);
+        pump_say(pump, event->peer);
         break;
     case LINK_WRITABLE:
     case LINK_WOKEN:

@@ -38,6 +38,7 @@ static void do_line(struct pump *pump, struct session *s, enum command_line_kind
     else
         device_command(device, s->id, s->commands.lines.buf, stream_released(pump->stream), &result);
     s->commands.wrong += result.error != 0;
+    if (result.effect == COMMAND_FAULTS) session_faults_changed(pump, s);
     if (result.effect == COMMAND_STEP) {
         start_step(pump, s, &result);
     } else if (result.effect == COMMAND_MOVE) {

@@ -61,6 +61,15 @@ struct session {
     int64_t moved_ns; /* clock_now_ns() when a byte last went out */
 };
 
+/* Faults at connections (USB: at enumerations); pump_connections.c */
+struct pump_connections {
+    uint64_t n;       /* so far, refused ones too */
+    uint32_t version; /* of the list */
+    struct fault_entry entry[FAULT_MAX];
+    uint64_t base[FAULT_MAX]; /* connections before it was there */
+    uint32_t n_entries;
+};
+
 struct pump {
     struct link_counts counts; /* of all its sessions so far */
     struct links *links;
@@ -75,8 +84,11 @@ struct pump {
     int holds;        /* its readers hold back the paces fast and step */
     uint32_t number;  /* of the link, from 1 */
     struct fault_board *board; /* NULL: no faults strike here */
-    uint64_t connections;    /* so far, refused ones too */
+    uint32_t can;              /* link_faults() */
+    struct fault_tally tally;  /* of what the link does */
+    struct pump_connections connections;
     int64_t plug_ns;         /* clock: when an unplugged link is there again; 0: it is */
+    int plug_failed;         /* so far, and that was said */
     int64_t refuse_until_ns; /* clock: until then clients are turned away */
     uint32_t power_seen;     /* changes of power that were done here */
     int is_off;              /* the head has no power */
@@ -109,16 +121,32 @@ void session_close_wire(struct session *s);
 int session_wire_waits(const struct session *s);
 /* As session_write, by its wire. */
 int session_write_faulty(struct pump *pump, struct session *s, int index);
-/* Writes what lies in the wire: 1: the link is full; 0: nothing may go out now; -1: the session is closed. */
-int session_write_wire(struct pump *pump, struct session *s, int index);
-/* A unit of a protocol into the wire. */
-void session_put_unit(struct pump *pump, struct session *s, const uint8_t *unit, size_t len, int is_reply);
+/* Writes what lies in the wire: 1: the link is full; 0: nothing may go out now; -1: the session is closed. last: nothing
+ * comes after it. */
+int session_write_wire(struct pump *pump, struct session *s, int index, int last);
+/* Whether as much lies in it as it keeps. */
+int session_wire_is_full(const struct pump *pump, const struct session *s);
+/* The oldest unit of a protocol, or the rest of it, into the wire. */
+void session_put_unit(struct pump *pump, struct session *s);
+/* A line of this session, to which the reply is still to come, has changed the faults. */
+void session_faults_changed(struct pump *pump, struct session *s);
 /* What the client sent. */
 void session_heard(struct session *s, const void *bytes, size_t len);
 /* When a wire, or the link, next has something to do by the clock; INT64_MAX: nothing. */
 int64_t pump_next_ns(const struct pump *pump);
 /* A link that was unplugged comes back when its time is over. */
 void pump_plug(struct pump *pump);
+
+/* pump_connections.c */
+/* A client has come. 1: it is turned away, on request. index: of the session. */
+int pump_turns_away(struct pump *pump, int index);
+/* A host has got the USB device. */
+void pump_plugged(struct pump *pump);
+/* The fault of a link that is asked for by a kind. */
+enum link_fault pump_link_fault(enum fault_kind kind);
+
+/* pump.c: to whoever runs the head. */
+void pump_say(struct pump *pump, const char *text);
 
 /* pump_power.c: the links of a head that loses power, and has it again. */
 /* What is due of that. full: bit per session whose link takes no more. 1: there is more to do at once. */

@@ -1,9 +1,11 @@
 /* A power cycle on request, as the clients of a link see it: their sessions end abruptly, and nobody answers until power
  * is there again (device_work.power).
  *
- * A session has everything before the tick with which power goes, if its client reads fast enough; in the paces that
- * wait for readers, in any case. A link that nobody can end, as a file or UDP, goes on where it was. In the pace step
- * links come back at once, since it is their clients that let time pass. */
+ * All before the tick with which power goes is written, if the client reads fast enough; in the paces that wait for
+ * readers, in any case. What its system has not taken by then may be lost with the connection. A link that nobody can end,
+ * as a file or UDP, goes on where it was. In the pace step links come back at once, since it is their clients that let
+ * time pass. */
+#include "firmware_sim/base/clock.h"
 #include "firmware_sim/loop/pump_inside.h"
 
 /* What was released before `tick` is written, or its client does not take it. */
@@ -17,12 +19,15 @@ static int is_drained(const struct pump *pump, const struct session *s, int is_f
 
 static int can_unplug(const struct pump *pump)
 {
-    return (pump->ops->faults & 1U << LINK_FAULT_UNPLUG) != 0;
+    return (pump->can & LINK_FAULT_BIT(LINK_FAULT_UNPLUG)) != 0;
 }
 
 static void plug(struct pump *pump)
 {
-    if (pump->is_off && can_unplug(pump)) pump->ops->fault(pump->link, LINK_FAULT_PLUG, 0, 0, 0.0);
+    if (pump->is_off && can_unplug(pump)) {
+        pump->plug_ns = clock_now_ns(); /* now, or once its endpoint is free */
+        pump_plug(pump);
+    }
     pump->is_off = 0;
 }
 

@@ -24,16 +24,15 @@ static int is_stale(const struct pump *pump, const struct session *s)
 {
     const struct stream *stream = pump->stream;
     return !stream->waits && s->units.n != 0 &&
-           unit_queue_tick(&s->units) + stream->ring.queue_ticks < stream_released(stream);
+           unit_queue_kind(&s->units).tick + stream->ring.queue_ticks < stream_released(stream);
 }
 
 static int host_send(void *ctx, const void *unit, size_t len)
 {
     struct session *s = ctx;
+    const struct unit_kind kind = {stream_released(s->pump->stream), s->cursor, s->answering};
     if (len == 0 || s->hang_up) return s->hang_up;
-    if ((s->answering || !is_stale(s->pump, s)) &&
-        unit_queue_put(&s->units, unit, len, stream_released(s->pump->stream), s->answering) == 0)
-        return 0;
+    if ((s->answering || !is_stale(s->pump, s)) && unit_queue_put(&s->units, unit, len, &kind) == 0) return 0;
     session_count_units(s->pump, s, 1);
     return 1;
 }
@@ -164,9 +163,9 @@ static int take_tick(struct pump *pump, struct session *s)
     struct ring *ring = &pump->stream->ring;
     const struct protocol_ops *ops = pump->protocol;
     struct ring_copy tick = {.buf = pump->tick, .cap = pump->stream->tick_bytes};
-    const uint64_t off_tick = session_off_tick(pump, s);
-    if (s->cursor >= off_tick) return 0;
     enum ring_read got = ring_read(ring, s->reader, s->cursor, &tick);
+    const uint64_t off_tick = session_off_tick(pump, s); /* known before the tick was released */
+    if (s->cursor >= off_tick) return 0;
     if (got == RING_NONE || (got == RING_READ && tick.len > tick.cap)) return 0;
     uint64_t released = stream_released(pump->stream);
     if (got == RING_LOST && s->cursor + ring->queue_ticks < released) {
@@ -211,20 +210,24 @@ static int take_input(struct pump *pump, struct session *s)
     return c->in_pos != from;
 }
 
+enum { HELD_BACK = 2 }; /* flush: the link is not full, but a fault keeps back as much as may be */
+
 /* The same, where the units go through the session's wire. */
 static int flush_faulty(struct pump *pump, struct session *s, int index)
 {
+    const int over = atomic_load(&pump->stream->over) && s->cursor >= stream_released(pump->stream);
     for (;;) {
-        const int full = session_write_wire(pump, s, index);
         size_t len;
-        const uint8_t *unit = unit_queue_next(&s->units, &len);
-        if (full != 0 || unit == NULL || wire_bytes(s->wire) >= pump->out_cap) return full;
-        session_put_unit(pump, s, unit, len, unit_queue_is_reply(&s->units));
+        const int none = unit_queue_next(&s->units, &len) == NULL;
+        const int full = session_write_wire(pump, s, index, over && none);
+        if (full != 0 || none) return full;
+        if (session_wire_is_full(pump, s)) return HELD_BACK;
+        session_put_unit(pump, s);
         if (unit_queue_written(&s->units, len)) pump->counts.sent_units++;
     }
 }
 
-/* Writes until the link is full (1) or there is nothing left (0). Negative: the session is gone. */
+/* Writes until the link is full (1), or HELD_BACK, or there is nothing left (0). Negative: the session is gone. */
 static int flush(struct pump *pump, struct session *s, int index)
 {
     if (session_has_wire(pump, s)) return flush_faulty(pump, s, index);
@@ -261,8 +264,9 @@ int session_write_protocol(struct pump *pump, struct session *s, int index)
         continue;
     stream_move_reader(pump->stream, s->reader, s->cursor);
     if (s->units.n == 0) s->lost.lagging = 0;
+    if (s->wire != NULL) wire_time(s->wire, time_of(pump, s->cursor));
     if (!full && s->hang_up && !session_wire_waits(s)) pump->ops->end(pump->link, index);
-    return full;
+    return full == 1;
 }
 
 uint64_t session_wake_tick(const struct pump *pump, const struct session *s)

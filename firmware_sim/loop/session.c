@@ -78,10 +78,11 @@ static int take_tick(struct pump *pump, struct session *s)
 {
     struct ring *ring = &pump->stream->ring;
     uint32_t end = s->out_len + REPLY_ROOM / 8; /* leaves room for a frame that says what was lost */
-    const uint64_t off_tick = session_off_tick(pump, s);
-    if (end >= pump->out_cap || s->cursor >= off_tick) return 0;
+    if (end >= pump->out_cap) return 0;
     struct ring_copy tick = {.buf = s->out + s->out_len, .cap = pump->out_cap - end};
     enum ring_read got = ring_read(ring, s->reader, s->cursor, &tick);
+    const uint64_t off_tick = session_off_tick(pump, s); /* known before the tick was released */
+    if (s->cursor >= off_tick) return 0;
     if (got == RING_NONE || (got == RING_READ && tick.len > tick.cap)) return 0;
     uint64_t released = stream_released(pump->stream);
     if (got == RING_LOST && s->cursor + ring->queue_ticks < released) {

@@ -7,9 +7,8 @@
 
 /* What stands before each unit. */
 struct unit_head {
-    uint64_t tick;
+    struct unit_kind kind;
     uint32_t len;
-    int is_reply;
 };
 
 int unit_queue_create(struct unit_queue *queue, uint32_t cap)
@@ -34,9 +33,9 @@ uint32_t unit_queue_room(const struct unit_queue *queue)
     return queue->cap - (queue->end - queue->begin);
 }
 
-int unit_queue_put(struct unit_queue *queue, const void *unit, size_t len, uint64_t tick, int is_reply)
+int unit_queue_put(struct unit_queue *queue, const void *unit, size_t len, const struct unit_kind *kind)
 {
-    const struct unit_head head = {.tick = tick, .len = (uint32_t)len, .is_reply = is_reply};
+    const struct unit_head head = {.kind = *kind, .len = (uint32_t)len};
     if (len + sizeof head > unit_queue_room(queue)) return 1;
     if (len + sizeof head > queue->cap - queue->end) {
         memmove(queue->bytes, queue->bytes + queue->begin, queue->end - queue->begin);
@@ -57,14 +56,9 @@ static struct unit_head oldest(const struct unit_queue *queue)
     return head;
 }
 
-uint64_t unit_queue_tick(const struct unit_queue *queue)
+struct unit_kind unit_queue_kind(const struct unit_queue *queue)
 {
-    return oldest(queue).tick;
-}
-
-int unit_queue_is_reply(const struct unit_queue *queue)
-{
-    return oldest(queue).is_reply;
+    return oldest(queue).kind;
 }
 
 const uint8_t *unit_queue_next(const struct unit_queue *queue, size_t *len)

@@ -23,11 +23,16 @@ void unit_queue_clear(struct unit_queue *queue);
 
 /* Bytes that further units may have, less a few for each. */
 uint32_t unit_queue_room(const struct unit_queue *queue);
-/* is_reply: it answers the client. Returns 0, or 1: it has no room. */
-int unit_queue_put(struct unit_queue *queue, const void *unit, size_t len, uint64_t tick, int is_reply);
-/* The tick of the oldest unit. There is one. */
-uint64_t unit_queue_tick(const struct unit_queue *queue);
-int unit_queue_is_reply(const struct unit_queue *queue);
+struct unit_kind {
+    uint64_t tick;      /* when it was made */
+    uint64_t made_tick; /* of the stream, up to which it was made: the same at any pace */
+    int is_reply;       /* it answers the client */
+};
+
+/* Returns 0, or 1: it has no room. */
+int unit_queue_put(struct unit_queue *queue, const void *unit, size_t len, const struct unit_kind *kind);
+/* Of the oldest unit. There is one. */
+struct unit_kind unit_queue_kind(const struct unit_queue *queue);
 /* What is left of the oldest unit; NULL: there is none. */
 const uint8_t *unit_queue_next(const struct unit_queue *queue, size_t *len);
 /* So many bytes of it were written. Returns 1 when they were its last. */

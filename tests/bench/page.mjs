@@ -111,13 +111,13 @@ async function drawing() {
   const rows = [['points', 'pictures/s, moving', 'points in each', 'all drawn after, s', 'a picture of all, s']];
   for (const n of [2e6, 5e6, 10e6]) {
     await page.eval(fill(n));
-    await page.until(`${still} && scanhead.view.state.drawn >= ${n}`, 29000);
+    await page.until(`${still} && scanhead.view.state.drawn >= ${n}`);
     const [x, y] = await page.where('#picture'), before = await page.eval('scanhead.n'), from = Date.now();
     await page.mouse('mousePressed', [x, y], 1);
     for (let k = 0; Date.now() - from < 5000; k++) await page.mouse('mouseMoved', [x + 80 * Math.sin(k / 20), y + 20 * Math.cos(k / 20)], 1);
     const {count, points} = await page.eval('({count: scanhead.n, points: scanhead.view.state.drawn})'), took = (Date.now() - from) / 1000, rest = Date.now();
     await page.mouse('mouseReleased', [x, y]);
-    await page.until(`${still} && scanhead.view.state.drawn >= ${n}`, 29000);
+    await page.until(`${still} && scanhead.view.state.drawn >= ${n}`);
     const all = (Date.now() - rest) / 1000, again = Date.now();
     await page.eval('scanhead.view.pointSize(3), scanhead.view.screenshotReady().then(() => 0)');
     rows.push([grouped(n), ((count - before) / took).toFixed(1), grouped(points), all.toFixed(1), ((Date.now() - again) / 1000).toFixed(1)]);

@@ -179,3 +179,43 @@ check_chapter9() {
     tap "$1" test_chapter9
     tap "$1" test_chapter9_transfers
 }
+
+# What the kernel and the recorder make of faults on request. check_faults PREFIX YAML: of the link. Needs plug.sh.
+check_faults() {
+    cat >/tmp/faults.yaml <<'END'
+faults:
+  - {kind: slow_enumeration, at: 1, for_ms: 20}
+  - {kind: descriptor_length, at: 1, n: 9}
+  - {kind: short_packets, at: 20, n: 10}
+  - {kind: endpoint_stall, at: 60}
+END
+    head_start "$2" --pace fast --scenario /tmp/faults.yaml --truth /tmp/truth.json
+    dmesg -c >/dev/null
+    sh plug.sh
+    check "$1: enumerated, slowly and by a wrong descriptor" wait_for 20 is_plugged
+    check "$1: the kernel says that the descriptor is too short" sh -c "dmesg | grep 'descriptor too short'"
+    record_again "$1, stalled and in short packets" # the recorder clears the halt; no byte is lost
+    for kind in slow_enumeration descriptor_length short_packets endpoint_stall; do
+        check "$1: $kind was injected once" test "$(grep -c "\"kind\":\"$kind\"" /tmp/truth.json)" = 1
+    done
+    head_stop
+    wait_for 10 is_unplugged
+    cat >/tmp/faults.yaml <<'END'
+faults:
+  - {kind: usb_reset, at: 100, count: 1}
+  - {kind: unplug, at: 200, count: 1, for_ms: 200}
+END
+    head_start "$2" --set head.prr_hz=4000 --set loop.tick_hz=100 --scenario /tmp/faults.yaml --truth /tmp/truth.json
+    sh plug.sh
+    scanhead record usb --wait 10 --frames 100 --replug 20 -o faults.ply --stats faults.json 2>faults.err &
+    client=$!
+    check "$1: the recorder goes on after a reset on request" wait_for 20 grep 'is back' faults.err
+    check "$1: unplugged on request" wait_for 20 grep 'unplugged' faults.err
+    wait_for 5 is_unplugged
+    check "$1: plugged in again" wait_for 10 sh plug.sh
+    check "$1: and the recorder goes on" wait_for 20 sh -c "test \$(grep -c 'is back' faults.err) = 2"
+    kill -INT $client
+    wait $client
+    check "$1: with both counts" sh -c "grep '\"bus_resets\": 1,' faults.json && grep '\"replugs\": 1,' faults.json"
+    head_stop
+}

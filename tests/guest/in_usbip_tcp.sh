@@ -18,6 +18,8 @@ note "cut at $(uptime_s) s"
 REPLUGS=20 UNPLUG="sh unplug.sh" PLUG="sh plug.sh" tap "TCP" test_stream
 note "replugged at $(uptime_s) s"
 head_stop
+check_faults "TCP" "{type: usb}"
+note "faults at $(uptime_s) s"
 check "TCP: gone with the head" wait_for 10 is_unplugged
 head_start "{type: usb, speed: full}" --pace fast
 sh plug.sh

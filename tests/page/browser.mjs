@@ -5,7 +5,7 @@ import {accessSync, constants, mkdirSync, writeFileSync} from 'node:fs';
 import {folder, forget, remember} from './work.mjs';
 
 const NAMES = ['chromium', 'chromium-browser', 'google-chrome'];
-const DEADLINE_MS = 30000;
+const DEADLINE_MS = 90000; // for what hangs; a busy machine is many times slower than a quiet one
 
 /** The program's path, or null. $CHROMIUM names another. */
 export function findBrowser() {
@@ -33,7 +33,8 @@ export class Browser {
     const flags = ['--headless=new', '--remote-debugging-pipe', `--user-data-dir=${folder}/profile`, '--use-angle=swiftshader',
       '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist', `--window-size=${size}`, '--no-first-run', '--no-default-browser-check',
       '--disable-background-networking', '--disable-component-update', '--disable-default-apps', '--disable-extensions',
-      '--disable-sync', '--disable-dev-shm-usage', '--mute-audio', '--hide-scrollbars', '--disable-gpu-compositing', '--enable-precise-memory-info',
+      '--disable-sync', '--disable-background-timer-throttling', '--disable-renderer-backgrounding',
+      '--disable-backgrounding-occluded-windows', '--disable-dev-shm-usage', '--mute-audio', '--hide-scrollbars', '--disable-gpu-compositing', '--enable-precise-memory-info',
       '--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1'];
     if (process.getuid() === 0) flags.push('--no-sandbox');
     this.child = spawn('nice', ['-n', String(nice), 'setpriv', '--pdeathsig', 'KILL', findBrowser(), ...flags, 'about:blank'],
@@ -149,31 +150,33 @@ class Page {
   }
 
   /** Waits until the expression is true, which the page itself looks after every 20 ms. The value it then has. */
-  async until(expression, limit_ms = DEADLINE_MS - 1000) {
+  async until(expression, what = expression) {
+    const limit_ms = DEADLINE_MS - 5000; // the page answers before send() gives up
     const answer = await this.send('Runtime.evaluate', {awaitPromise: true, returnByValue: true, expression: `new Promise((done, fail) => {
       const end = performance.now() + ${limit_ms}, ask = () => {
         let value;
         try { value = (${expression}); } catch (error) { value = null; }
         if (value) done(value);
-        else if (performance.now() > end) fail('not within ${limit_ms} ms');
+        else if (performance.now() > end) fail();
         else setTimeout(ask, 20);
       };
       ask();
     })`});
-    if (answer.exceptionDetails) throw new Error(`${expression}: not within ${limit_ms} ms`);
+    if (answer.exceptionDetails) throw new Error(`${what}: not within ${limit_ms} ms`);
     return answer.result.value;
   }
 
-  /** Middle of the first element that a selector finds, scrolled into view. */
+  /** Middle of the first element that a selector finds, scrolled into view: once it rests, and nothing else lies there. */
   where(selector) {
-    return this.eval(`(() => {
+    return this.until(`(() => {
       const e = document.querySelector(${JSON.stringify(selector)});
-      if (!e) throw new Error('nothing is ' + ${JSON.stringify(selector)});
       for (let up = e; (up = up.parentElement); ) if (up.tagName === 'DETAILS') up.open = true;
       e.scrollIntoView({block: 'center', behavior: 'instant'});
-      const {x, y, width, height} = e.getBoundingClientRect();
-      return [x + width / 2, y + height / 2];
-    })()`);
+      const {x, y, width, height} = e.getBoundingClientRect(), at = [x + width / 2, y + height / 2];
+      const rests = window.restsAt === String(at);
+      window.restsAt = String(at);
+      return rests && e.contains(document.elementFromPoint(...at)) && at;
+    })()`, `${selector} can't be pointed at`);
   }
 
   mouse(type, [x, y], buttons = 0, more = {}) {
@@ -187,8 +190,23 @@ class Page {
     await this.mouse('mouseReleased', at);
   }
 
+  /** Presses what a selector finds. What comes meanwhile may have moved it: where nothing was pressed instead, once more. */
   async click(selector) {
-    await this.clickAt(await this.where(selector));
+    for (let tries = 1; ; tries++) {
+      const at = await this.where(selector);
+      await this.eval(`void addEventListener('pointerdown', ({target}) => (window.pressed = target), {capture: true, once: true})`);
+      await this.clickAt(at);
+      const [hit, isControl, what] = await this.eval(`[document.querySelector(${JSON.stringify(selector)}).contains(pressed),
+        pressed.closest('button, input, select, summary, a, canvas') !== null, pressed.outerHTML.slice(0, 80)]`);
+      if (hit) return;
+      if (isControl || tries === 5) throw new Error(`a click meant for ${selector} went to ${what}`);
+    }
+  }
+
+  /** The same, once it may be pressed. */
+  async press(selector) {
+    await this.until(`!document.querySelector(${JSON.stringify(selector)}).disabled`, `${selector} stays disabled`);
+    await this.click(selector);
   }
 
   /** From one place to another in steps, as a hand does. */
@@ -225,6 +243,19 @@ class Page {
   async shot(file) {
     const {data} = await this.send('Page.captureScreenshot', {format: 'png'});
     writeFileSync(file, Buffer.from(data, 'base64'));
+  }
+
+  /** What the page knows of its head, the newest events first, and what went wrong in it: for a test that failed. */
+  async knows() {
+    const words = await this.eval(`(() => {
+      const {head, cloud} = window.scanhead ?? {}, all = head?.figures();
+      const {pulses, points, lost_frames, dropped_points, bad_bytes, waiting_points} = all ?? {};
+      const log = [...document.querySelectorAll('.log li')].slice(0, 8).map((e) => [...e.children].map((part) => part.textContent).join(' '));
+      return [JSON.stringify({open: head?.isOpen, state: head?.state, session: head?.session, control: head?.controller, pulses, points,
+        lost_frames, dropped_points, bad_bytes, waiting_points, cloud: cloud?.total}),
+        'banner: ' + document.querySelector('#banner')?.textContent, ...log].join('\\n');
+    })()`);
+    return [words, ...this.faults, ...this.failed.map(({url, why}) => `${url}: ${why}`)].join('\n');
   }
 
   close() {

@@ -4,7 +4,7 @@ import {createConnection} from 'node:net';
 import {forget, remember} from './work.mjs';
 
 export const PROGRAM = process.env.SCANHEAD || 'build/scanhead';
-const DEADLINE_MS = 30000;
+const DEADLINE_MS = 90000; // for what hangs
 
 /** Starts the program (`run`, `view`) and waits for its ready line. It dies with this program. */
 export async function start(args, {nice = 0} = {}) {
@@ -56,10 +56,11 @@ export class Client {
     this.socket = createConnection(Number(port), host);
     this.socket.on('data', (bytes) => this.#read(bytes)).on('error', () => {});
     this.closed = new Promise((done) => this.socket.once('close', done));
-    this.closed.then(() => this.#waiting.forEach((done) => done('the head is gone')));
+    this.closed.then(() => this.#waiting.splice(0).forEach((done) => done('the head is gone')));
   }
 
   ask(line) {
+    if (this.socket.closed) return Promise.resolve('the head is gone');
     return new Promise((done, fail) => {
       const timer = setTimeout(() => fail(new Error(`${line}: no reply`)), DEADLINE_MS);
       this.#waiting.push((reply) => (clearTimeout(timer), done(reply)));

@@ -6,24 +6,24 @@ import {readFileSync} from 'node:fs';
 import {Browser} from './browser.mjs';
 import {Client, end, endpoint, start} from './head.mjs';
 import {both, CONFIG, recorded} from './rig.mjs';
-import {equal, finish, folder, giveUpAfter, is, near, test} from './work.mjs';
+import {equal, finish, folder, giveUpAfter, is, near, test, whenFailed} from './work.mjs';
 
 const SIZE = [600, 480], SMALL = [360, 300]; // drawing in software takes most of the time
-giveUpAfter(120);
+giveUpAfter(280); // before run_tap.sh does
 
 // A head, its page, and somebody else who asks it.
 async function open(browser, ...more) {
   const head = await start(['run', CONFIG, '--quiet', '--pace', 'fast', ...more]);
   const page = await browser.open(endpoint(head, 'web'), {size: SIZE});
   await page.until('scanhead.head.isOpen && scanhead.head.state === "idle" && document.querySelector("#knob-head-lines")?.value');
+  await page.until('document.querySelector("#model").textContent && document.querySelector("#station-2-x_m")?.value'); // all is in its place
   return {head, page, other: new Client(endpoint(head, 'tcp'))};
 }
 
 // Presses Start, and waits until the page has all of the scan: its end comes after its points.
 async function scan(page) {
   const before = await page.eval('scanhead.head.figures().pulses');
-  await page.until('!document.querySelector("#start").disabled');
-  await page.click('#start');
+  await page.press('#start');
   await page.until(`scanhead.head.state === "idle" && scanhead.head.figures().pulses > ${before}`);
 }
 
@@ -42,6 +42,7 @@ function sameBounds(bounds, {min, max}) {
 
 const browser = new Browser({size: SIZE});
 const {head, page, other} = await open(browser, '--journal', `${folder}/journal`);
+whenFailed(async () => `head: ${await other.ask('HEAD:STATE?')}, ${await other.ask('TIME?')} ns\n${await page.knows()}`);
 
 await test('without control nothing that the user does reaches the head', async () => {
   for (const at of ['#start', '#stop', '#knob-head-lines', '#reset']) {
@@ -57,8 +58,8 @@ await test('without control nothing that the user does reaches the head', async 
 const wanted = recorded('first', ['head.lines_hz=60']);
 
 await test('its user takes control by a button, and a knob changes the setting of the head', async () => {
-  await page.click('#control');
-  await page.until('scanhead.head.mine');
+  await page.press('#control');
+  await page.until('scanhead.head.mine && !document.querySelector("#knob-head-lines").disabled');
   is(await other.ask('SYST:CONT?') !== '0', 'another client sees that a session has control');
   await page.fill('#knob-head-lines', 60);
   equal(await other.until('HEAD:LIN?', (reply) => reply !== '100'), '60', 'lines a second');
@@ -79,6 +80,7 @@ await test('a scan: points, bounds and hash are those of the recording', async (
 
 await test('a station dragged in the picture is where the next scan is made', async () => {
   await page.click('#fit');
+  await page.until('scanhead.view.movable');
   await page.where('#picture');
   const [from, to] = await page.eval(`(() => {
     const {left, top} = document.querySelector('#picture').getBoundingClientRect();
@@ -98,10 +100,10 @@ await test('a station dragged in the picture is where the next scan is made', as
 });
 
 await test('control is given back by the button, and then anybody may have it', async () => {
-  await page.click('#control');
+  await page.press('#control');
   await other.until('SYST:CONT?', (reply) => reply === '0');
   equal(await other.ask('HEAD:LIN 70'), 'OK', 'a setting of another client');
-  await page.until('document.querySelector("#control").disabled');
+  await page.until('scanhead.head.controller !== 0 && document.querySelector("#control").disabled');
 });
 
 await test('another site gets no byte of it', async () => {

@@ -34,6 +34,13 @@ export function write(name, text) {
 let results = 0, failures = 0;
 const comment = (text) => String(text).split('\n').slice(0, 20).forEach((line) => console.log(`# ${line}`));
 
+let explain = async () => '';
+
+/** After a test that failed this is asked, and its text shown. */
+export function whenFailed(ask) {
+  explain = ask;
+}
+
 /** Runs one test; it fails by throwing. One that fails does not end the others. */
 export async function test(name, body) {
   results++;
@@ -44,6 +51,7 @@ export async function test(name, body) {
     failures++;
     console.log(`not ok ${results} - ${name}`);
     comment(error.stack ?? error);
+    comment(await explain().catch((why) => why));
   }
 }
 

@@ -1,8 +1,42 @@
 #include "tests/unit/command_device.h"
 
+#include <stdio.h>
+#include <string.h>
+
 static const struct command_place first_places[3] = {{{1, 2, 3, 0, 0, 0}}, {{4, 5, 6, 0, 0, 0}}, {{7, 8, 9, 0, 0, 0}}};
 static const struct command_place places[3] = {
     {{1, 2, 3, 0, 0, 0}}, {{-0.1, 5e-7, 1e9, 359.5, -90, 1.0 / 3.0}}, {{7, 8, 9, 0, 0, 0}}};
+
+/* Faults as a head has them that was given two, of which it has one yet. */
+static int add_fault(void *owner, const char *text, uint32_t *number, char *why, size_t len)
+{
+    (void)owner;
+    *number = 3;
+    if (strcmp(text, "{kind: drop}") == 0) return 0;
+    snprintf(why, len, "fault:1: faults[0]: unknown");
+    return -1;
+}
+
+static uint32_t remove_fault(void *owner, uint32_t number)
+{
+    (void)owner;
+    return number <= 1;
+}
+
+static int count_injected(void *owner, uint32_t number, uint64_t *n)
+{
+    (void)owner;
+    *n = 40 + number;
+    return number <= 2 ? 0 : -1;
+}
+
+static void list_faults(void *owner, char *text, size_t len)
+{
+    (void)owner;
+    snprintf(text, len, "1 drop");
+}
+
+static const struct command_faults faults = {add_fault, remove_fault, count_injected, list_faults};
 
 struct command_device command_test_device(void)
 {
@@ -47,5 +81,6 @@ struct command_device command_test_device(void)
     dev.place = places;
     dev.first_place = first_places;
     dev.defaults = dev.settings;
+    dev.faults = &faults;
     return dev;
 }

@@ -74,28 +74,42 @@ void put_all(int fd, const void *data, size_t len)
     }
 }
 
+static uint32_t rig_seq;
+
+uint32_t rig_next_seq(void)
+{
+    return rig_seq++;
+}
+
+/* The frame in `out`, with the next number. */
+static void put_frame(int fd, size_t len)
+{
+    native_seal(out, (out[3] & NATIVE_LOCAL) != 0 ? 0 : rig_next_seq());
+    put_all(fd, out, len);
+}
+
 void put_descriptor(int fd, int geo, uint32_t scan, int flags)
 {
     struct native_descriptor d = make_descriptor(geo, scan);
-    put_all(fd, out, native_encode_descriptor(out, sizeof out, &d, 1, flags));
+    put_frame(fd, native_encode_descriptor(out, sizeof out, &d, 1, flags));
 }
 
 void put_anchor(int fd, int flags)
 {
     struct native_anchor anchor = make_anchor();
-    put_all(fd, out, native_encode_anchor(out, sizeof out, &anchor, 1, flags));
+    put_frame(fd, native_encode_anchor(out, sizeof out, &anchor, 1, flags));
 }
 
 void put_points(int fd, uint32_t n, uint64_t pulse0)
 {
     struct line_block block = make_block(n, pulse0);
-    put_all(fd, out, native_encode_points(out, sizeof out, &block, 500));
+    put_frame(fd, native_encode_points(out, sizeof out, &block, 500));
 }
 
 void put_event(int fd, uint32_t code, uint64_t va, uint64_t vb, uint64_t vc, int flags)
 {
     struct native_event e = {.code = code, .a = va, .b = vb, .c = vc, .text = "why"};
-    put_all(fd, out, native_encode_event(out, sizeof out, &e, 1, flags));
+    put_frame(fd, native_encode_event(out, sizeof out, &e, 1, flags));
 }
 
 static struct scanhead *open_fd(int fd)
@@ -110,6 +124,7 @@ static struct scanhead *open_fd(int fd)
 struct scanhead *open_pair(int *head)
 {
     int fd[2];
+    rig_seq = 0;
     assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM, 0, fd), 0);
     *head = fd[0];
     return open_fd(fd[1]);

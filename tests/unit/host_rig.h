@@ -32,6 +32,9 @@ struct line_block make_block(uint32_t n, uint64_t pulse0);
 
 void put_all(int fd, const void *data, size_t len);
 
+/* The number of the next frame: from 0 on after open_pair. Those of put_... below have it, LOCAL ones 0. */
+uint32_t rig_next_seq(void);
+
 void put_descriptor(int fd, int geo, uint32_t scan, int flags);
 
 void put_anchor(int fd, int flags);

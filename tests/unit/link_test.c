@@ -25,7 +25,15 @@ int bench_poll(struct bench *bench, uint32_t want_write, int timeout_ms)
     int room = (int)(sizeof bench->queue / sizeof bench->queue[0]) - bench->n_queue;
     int n = bench->ops->poll(bench->link, bench->wake, want_write, timeout_ms, bench->queue + bench->n_queue, room);
     assert_true(n >= 0 && n <= room);
-    bench->n_queue += n;
+    int kept = bench->n_queue;
+    for (int i = bench->n_queue; i < bench->n_queue + n; i++) {
+        if (bench->queue[i].kind == LINK_PLUGGED)
+            bench->n_plugged++;
+        else
+            bench->queue[kept++] = bench->queue[i];
+    }
+    n = kept - bench->n_queue;
+    bench->n_queue = kept;
     return n;
 }
 

@@ -25,6 +25,7 @@ struct bench {
     int wake;
     struct link_event queue[64];
     int n_queue;
+    int n_plugged; /* LINK_PLUGGED so far, which are not in the queue */
 };
 
 int64_t now_ms(void);

@@ -189,6 +189,53 @@ test('truncated anywhere: what came whole comes', () => {
   }
 });
 
+// The header is 28 bytes; the payload says which frame it is.
+function numbered(seq, payload = Buffer.from(`frame ${seq}`)) {
+  const frame = Buffer.alloc(28 + payload.length);
+  frame.set([0xd5, 6, 1, 0]);
+  frame.writeUInt32LE(payload.length, 4);
+  frame.writeUInt32LE(seq, 8);
+  frame.writeBigInt64LE(BigInt(seq % 100), 16);
+  payload.copy(frame, 28);
+  return signed(frame);
+}
+
+test('a frame that came twice, or after newer ones, is dropped; each fault gives one notice at its byte', () => {
+  const [a, b, c, d, e] = [2 ** 32 - 2, 2 ** 32 - 1, 0, 1, 2].map((seq) => numbered(seq)), restarted = numbered(2 ** 31 + 9);
+  const bad = Buffer.from(d.map((v, at) => (at === d.length - 1 ? v ^ 1 : v)));
+  const pieces = [a, c, Buffer.from([0, 0xd5, 0]), c, b, bad, e, restarted, a.subarray(0, 30)];
+  const at = pieces.map((_, i) => pieces.slice(0, i).reduce((n, piece) => n + piece.length, 0)), all = Buffer.concat(pieces);
+  for (let size = 1; size <= all.length; size++) {
+    const notices = [], seqs = [];
+    const parser = new Parser({notice: (n) => notices.push(Object.values(n).join()), frame: (f) => seqs.push(f.seq)});
+    for (let i = 0; i < all.length; i += size) parser.push(all.subarray(i, i + size));
+    parser.end();
+    equal(seqs.join(), [2 ** 32 - 2, 0, 2, 2 ** 31 + 9].join(), 'frames');
+    equal(notices.join(' '), [`gap,${at[1]},${2 ** 32 - 1},1,0`, `bad bytes,${at[2]},0,3,0`, `repeated,${at[3]},0,1,0`,
+      `late,${at[4]},${2 ** 32 - 1},1,95`, `bad payload,${at[5]},1,${bad.length},1`, `gap,${at[6]},1,1,2`,
+      `restarted,${at[7]},${2 ** 31 + 9},1,57`, `cut,${at[8]},${2 ** 32 - 2},30,94`].join(' '), `notices, in pieces of ${size}`);
+    const {repeated_frames: r, late_frames: l, lost_frames: n, jumps_back: j, cuts, bad_payloads: p} = parser.stats;
+    equal(`${r} ${l} ${n} ${j} ${cuts} ${p}`, '1 1 2 1 1 1', 'counts');
+  }
+});
+
+test('random faults: what is noticed and taken is what the client in Python notices and takes', () => {
+  const folder = process.argv[2];
+  for (let k = 0; k < 12; k++) {
+    const bytes = fs.readFileSync(`${folder}/hurt-${k}.shs`), said = fs.readFileSync(`${folder}/hurt-${k}.notices`, 'utf8');
+    const ours = [];
+    const parser = new Parser({frame: ({seq, t_ns}) => ours.push(`frame,${seq},${t_ns}\n`), text: () => ours.push('text\n'),
+      notice: ({kind, at_byte, seq, n, t_ns}) => ours.push(`${kind},${at_byte},${seq},${n},${t_ns ?? -1}\n`)});
+    for (let at = 0, n; at < bytes.length; at += n) {
+      n = 1 + random(k === 0 ? bytes.length : 300);
+      parser.push(bytes.subarray(at, at + n));
+    }
+    parser.end();
+    said.split(/(?<=\n)/).forEach((line, i) => equal(ours[i], line, `stream ${k}, line ${i}`));
+    equal(ours.join(''), said, `stream ${k}`);
+  }
+});
+
 let seed = 1;
 function random(n) { // Numerical Recipes' generator, its upper bits
   seed = (Math.imul(seed, 1664525) + 1013904223) >>> 0;
@@ -262,6 +309,35 @@ test('replies in order; an ERR; out of step after one that did not come', async 
   const d = failing(replies.ask('D?', 1));
   replies.close('gone');
   equal(await d, '0 gone', 'D');
+});
+
+// The timers are the test's own: what would run out first is seen without waiting for it.
+test('the time of a command counts once it is the next to be answered', async () => {
+  const real = {setTimeout, clearTimeout}, timers = [];
+  globalThis.setTimeout = (run, ms) => timers.push({run, ms});
+  globalThis.clearTimeout = (id) => { if (id) timers[id - 1] = null; };
+  const left = () => timers.filter((t) => t).map(({ms}) => ms).join(), runOut = () => timers.findLast((t) => t).run();
+  try {
+    const sent = [], replies = new Replies((line) => sent.push(line));
+    const outcome = (promise) => promise.then((text) => text, ({number, text}) => `${number} ${text}`);
+    replies.open();
+    const plan = outcome(replies.ask('SITE:POSE 1', 60)), [a, b] = ['A?', 'B?'].map((line) => outcome(replies.ask(line, 5)));
+    equal(left(), '60000', 'while the plan is made');
+    replies.take('OK');
+    equal(await plan, 'OK', 'SITE:POSE');
+    equal(left(), '5000', 'A is next');
+    runOut();
+    equal(await a, '0 no reply within 5 s', 'A');
+    equal(await b, '0 given up, as A? had no reply', 'B');
+    const [c, d] = [replies.ask('C?', 7), replies.ask('D?', 8)]; // the head has not come into step yet
+    equal(left(), '7000,8000', 'they wait to be sent');
+    for (const line of ['late', 'a,b,c,d']) replies.take(line);
+    equal(left(), '7000', 'sent: C is next');
+    for (const line of ['3', '4']) replies.take(line);
+    equal([await c, await d, left(), sent.join()].join(), '3,4,,SITE:POSE 1,A?,B?,*IDN?,C?,D?', 'in step again');
+  } finally {
+    Object.assign(globalThis, real);
+  }
 });
 
 // ---- losses

@@ -28,6 +28,7 @@ extern int16_t refl[N];
 extern uint16_t label[N];
 extern uint8_t echo[N];
 
+/* The frame in `out`, with the next number where it has none. */
 void put(size_t len);
 
 void put_descriptor(int geo, uint32_t scan, uint32_t n_surfaces);

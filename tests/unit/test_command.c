@@ -96,6 +96,10 @@ static const struct {
     {"TIME:UTC", "TIME:UTC", 1, 0, ""},
     {"TIME:GPS", "TIME:GPS", 1, 0, ""},
     {"TIME:STEP", "TIME:STEP", 0, 1, " 5"},
+    {"FAULT:ADD", "FAUL:ADD", 0, 1, " {kind: drop}"},
+    {"FAULT:CLEAR", "FAUL:CLE", 0, 1, " ALL"},
+    {"FAULT:LIST", "FAUL:LIST", 1, 0, ""},
+    {"FAULT:INJECTED", "FAUL:INJ", 1, 0, ""},
 };
 
 static struct command_device device_for(const char *header)
@@ -416,6 +420,57 @@ static void a_place_is_read_and_said(void **ctx)
     expect(&dev, "SITE:POSE? 1", "1,2,3,0,0,0");
 }
 
+/* What a fault is its owner knows (test_fault_config.c); here are the lines, as command_device.c answers them. */
+static void faults_are_added_listed_counted_and_cleared(void **ctx)
+{
+    (void)ctx;
+    static const struct {
+        const char *line;
+        int number;
+    } wrong[] = {
+        {"FAUL:ADD", CMD_E_MISSING},
+        {"FAUL:ADD drop", CMD_E_DATA_TYPE},
+        {"FAUL:ADD 3", CMD_E_DATA_TYPE},
+        {"FAUL:ADD {kind: dorp}", CMD_E_RANGE},
+        {"FAUL:ADD? {kind: drop}", CMD_E_HEADER},
+        {"FAUL:CLE", CMD_E_MISSING},
+        {"FAUL:CLE 2", CMD_E_RANGE},
+        {"FAUL:CLE 0", CMD_E_DATA_TYPE},
+        {"FAUL:CLE -1", CMD_E_DATA_TYPE},
+        {"FAUL:CLE 1.5", CMD_E_DATA_TYPE},
+        {"FAUL:CLE 4294967296", CMD_E_DATA_TYPE},
+        {"FAUL:CLE 1 HZ", CMD_E_DATA_TYPE},
+        {"FAUL:CLE 1,2", CMD_E_DATA_TYPE},
+        {"FAUL:CLE NONE", CMD_E_DATA_TYPE},
+        {"FAUL:INJ 1", CMD_E_HEADER},
+        {"FAUL:INJ? 3", CMD_E_RANGE},
+        {"FAUL:INJ? drop", CMD_E_DATA_TYPE},
+        {"FAUL:LIST? 1", CMD_E_NOT_ALLOWED},
+        {"FAUL:LIST", CMD_E_HEADER},
+    };
+    struct command_device dev = command_test_device();
+    for (size_t i = 0; i < N_OF(wrong); i++)
+        expect_error(&dev, 1, wrong[i].line, wrong[i].number);
+    dev.control = 0;
+    expect(&dev, "FAUL:ADD   {kind: drop}  ", "3");
+    assert_true(result.changes && result.took_control && result.effect == COMMAND_FAULTS);
+    expect(&dev, "FAUL:LIST?", "1 drop");
+    assert_false(result.changes);
+    expect(&dev, "FAUL:INJ?", "40");
+    expect(&dev, "FAUL:INJ? ALL", "40");
+    expect(&dev, "FAUL:INJ? 2", "42"); /* one that was taken out */
+    expect(&dev, "FAUL:CLE 1", "OK");
+    assert_true(result.changes && result.effect == COMMAND_FAULTS);
+    expect(&dev, "FAUL:CLE all", "OK");
+    expect_error(&dev, 2, "FAUL:ADD {kind: drop}", CMD_E_PROTECTED); /* session 1 has control */
+    expect_error(&dev, 2, "FAUL:CLE ALL", CMD_E_PROTECTED);
+    dev.faults = NULL;
+    expect_error(&dev, 1, "FAUL:ADD {kind: drop}", CMD_E_SETTINGS);
+    expect_error(&dev, 1, "FAUL:LIST?", CMD_E_SETTINGS);
+    expect_error(&dev, 1, "FAUL:INJ?", CMD_E_SETTINGS);
+    expect_error(&dev, 1, "FAUL:CLE 1", CMD_E_SETTINGS);
+}
+
 static void help_lists_every_header_in_two_lines(void **ctx)
 {
     (void)ctx;
@@ -435,6 +490,7 @@ int main(void)
         cmocka_unit_test(a_line_too_long_is_dropped_whole),
         cmocka_unit_test(a_head_without_the_time_says_so),
         cmocka_unit_test(a_place_is_read_and_said),
+        cmocka_unit_test(faults_are_added_listed_counted_and_cleared),
         cmocka_unit_test(help_lists_every_header_in_two_lines),
     };
     return cmocka_run_group_tests_name("command", tests, NULL, NULL);

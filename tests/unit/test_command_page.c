@@ -87,12 +87,18 @@ static void add_range(char text[256], const struct command_row *row)
     if (far != COMMAND_UNBOUND) add(text, ", by %lld at most", (long long)llabs(far) / 1000000);
 }
 
+static int is_of_faults(const struct command_row *row)
+{
+    return strncmp(row->header, "FAULt", 5) == 0;
+}
+
 /* A line of the row that is right in itself. */
 static void fill_line(char line[256], const struct command_row *row, int query)
 {
     size_t len = strcspn(row->header, "[");
     snprintf(line, 256, "%.*s%s", (int)len, row->header,
              query          ? "?"
+             : is_of_faults(row) ? (strstr(row->header, "ADD") != NULL ? " {kind: drop}" : " ALL")
              : row->own     ? " 1, DEF"
              : row->setting ? " DEF"
              : row->unit    ? " 1"
@@ -134,7 +140,7 @@ static void columns(char text[256], const struct command_row *row)
     if (row->unit != NULL && row->unit->name[0] != 0) add(text, "%s (%s)", row->unit->name, row->unit->suffixes);
     add(text, " | ");
     if (row->own) {
-        add(text, "see *Moving a station*");
+        add(text, is_of_faults(row) ? "see *Faults on request*" : "see *Moving a station*");
     } else if (row->setting != NULL) {
         add_range(text, row);
     } else if (row->unit != NULL) {

@@ -38,6 +38,7 @@ static void *play(void *arg)
         if (i == s->frames_before) s->ok &= write(s->fd, s->reply, strlen(s->reply)) > 0;
         struct line_block block = make_block(s->big ? MAX_POINTS : 1, (uint64_t)i);
         size_t len = native_encode_points(frame, sizeof frame, &block, 0), at = 0;
+        native_seal(frame, rig_next_seq());
         while (at < len) {
             ssize_t w = write(s->fd, frame + at, len - at);
             if (w <= 0) return NULL;

@@ -88,6 +88,7 @@ static void test_hash(void **state)
         if (part == 2) len = native_encode_points(out, sizeof out, &block, 5);
         if (part == 3) len = native_encode_line_end(out, sizeof out, &end, 5);
         hash_frame(&ctx, out, len);
+        native_seal(out, rig_next_seq());
         put_all(head, out, len);
         put_event(head, 1, 2, 3, 4, 0);            /* outside */
         put_descriptor(head, 1, 1, NATIVE_REPEAT); /* outside */

@@ -285,12 +285,18 @@ static void test_losses_are_told(void **state)
     put_anchor(NATIVE_CRS_UTM, 32632, 2);
     put_points(0);
     size_t len = native_encode_event(out, sizeof out, &e, 0, 0);
-    native_seal(out, 6);
+    native_seal(out, 8); /* after 2 */
     put(len);
+    put(len); /* once more */
+    native_seal(out, 4);
+    put(len); /* too late */
+    native_seal(out, 0x90000000u);
+    put(len); /* started again */
     assert_int_equal(record(out_path, (struct recorder_options){0}, 1, &err), 0);
     read_ply(out_path, 0);
     expect_comment("comment frames_lost 5 reader_lost 0 dropped 0 bad_payload 0");
-    expect_comment("comment pulses_lost 77 points_before_descriptor 0");
+    expect_comment("comment frames_repeated 1 frames_late 1 restarts 1");
+    expect_comment("comment pulses_lost 154 points_before_descriptor 0");
 }
 
 static void test_crs_change_refused(void **state)

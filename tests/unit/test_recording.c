@@ -275,6 +275,29 @@ static void test_times_far_apart(void **state)
     assert_int_equal(result.counts.pulses, 1);
 }
 
+static void test_order_is_said(void **state)
+{
+    struct recording_result result = {.stream = {.frames = 9, .seq_lost = 4}};
+    char text[256] = "";
+    (void)state;
+    assert_int_equal(recording_describe_order(&result, text, sizeof text), 0);
+    assert_string_equal(text, "");
+    result.stream.repeated = 3;
+    result.stream.late = 2;
+    assert_int_equal(recording_describe_order(&result, text, sizeof text), 1);
+    assert_string_equal(text, "3 frames came twice (taken once), 2 frames came after newer ones (lost)");
+    struct sh_err err = {0};
+    /* a broken frame whose copy came is not lost; those at the ends of a stream are */
+    result.stream = (struct scanhead_stats){.bad_payload = 5};
+    assert_int_equal(recording_check_complete(&result, &err), SH_OK);
+    result.stream = (struct scanhead_stats){.bad_payload = 5, .bad_unseen = 2, .seq_lost = 3, .dropped = 4};
+    assert_int_equal(recording_check_complete(&result, &err), SH_EIO);
+    assert_non_null(strstr(err.text, ": 9 frames lost to this reader"));
+    result.stream = (struct scanhead_stats){.restarts = 1};
+    assert_int_equal(recording_describe_order(&result, text, sizeof text), 1);
+    assert_string_equal(text, "1 restarts of the sequence");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -285,6 +308,7 @@ int main(void)
         cmocka_unit_test(test_an_end_after_telemetry),
         cmocka_unit_test(test_broken_once_more_after_a_lost_end),
         cmocka_unit_test(test_times_far_apart),
+        cmocka_unit_test(test_order_is_said),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

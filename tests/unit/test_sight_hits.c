@@ -9,7 +9,7 @@
 #include "tests/common/cases.h"
 
 #ifdef SH_SANITIZE /* sanitizers are for the code, not for the count */
-#define SCENES 6
+#define SCENES 2
 #endif
 #ifndef SCENES
 #define SCENES 24 /* of each kind */

@@ -12,7 +12,7 @@
 #include "firmware_sim/loop/kept.h"
 #include "firmware_sim/loop/unit_queue.h"
 
-enum { CAP = 1000, HEAD = 16 }; /* what a unit costs beside its bytes: a tick and a length, aligned */
+enum { CAP = 1000, HEAD = 32 }; /* what a unit costs beside its bytes: two ticks, a kind and a length, aligned */
 
 static void units_come_out_as_they_went_in(void **state)
 {
@@ -28,12 +28,14 @@ static void units_come_out_as_they_went_in(void **state)
         memset(unit, (int)(put & 255), len);
         unit[0] = (uint8_t)len;
         const uint32_t room = unit_queue_room(&queue);
-        const int lost = unit_queue_put(&queue, unit, len, put);
+        const struct unit_kind kind = {put, 2 * put, (int)(put & 1)};
+        const int lost = unit_queue_put(&queue, unit, len, &kind);
         assert_int_equal(lost, room < len + HEAD); /* whole, or not at all */
         put += !lost;
         if (!lost && (random & 3) != 0) continue;
         /* the oldest, in pieces */
-        assert_int_equal(unit_queue_tick(&queue), got);
+        const struct unit_kind oldest = unit_queue_kind(&queue);
+        assert_true(oldest.tick == got && oldest.made_tick == 2 * got && oldest.is_reply == (int)(got & 1));
         size_t n = 0;
         for (int last = 0; !last;) {
             const uint8_t *rest = unit_queue_next(&queue, &left);

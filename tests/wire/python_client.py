@@ -13,6 +13,7 @@
         ends FILE           where scan_over is true, with SCAN_END and without; what says that pulses were lost
         misuse FILE         wrong sources and calls: only ScanheadError comes; a late reply answers nothing else
 """
+import hashlib
 import math
 import random
 import re
@@ -129,11 +130,14 @@ def crs(polar, geo):
 
 
 def count(path):
-    head = scanhead.open(path)
+    """Counters, then a hash of all notices, a line each."""
+    head, said = scanhead.open(path), hashlib.sha256()
+    head.on_notice = lambda n: said.update(f"{n.kind} {n.at_byte} {n.seq} {n.n} {n.t_ns or 0}\n".encode())
     frames = sum(1 for _ in head.frames())
     p = head.parser
     assert frames == p.frames
-    print(p.bytes, p.frames, p.bad_payload, p.bad_bytes, p.seq_gaps, p.seq_lost)
+    print(p.bytes, p.frames, p.bad_payload, p.bad_bytes, p.seq_gaps, p.seq_lost, p.repeated, p.late, p.restarts,
+          p.cuts, said.hexdigest())
 
 
 def hostile(path, seed):
@@ -178,13 +182,13 @@ def hostile(path, seed):
     assert head.parser.frames == 700
     print(taken, refused)
     bombs(path)
-    chatter(framed(200, scanhead.LOCAL, 0, b""))
+    chatter(framed(200, scanhead.LOCAL, 0, b"") + framed(201, scanhead.LOCAL, 0, b""))
     chatter(b"OK\r\n")
     chatter(b"\x80")
 
 
-def framed(kind, flags, length, payload):
-    head = struct.pack("<BBBBIIIq", 0xD5, kind, 1, flags, length, 0, scanhead.crc32c(payload), 0)
+def framed(kind, flags, length, payload, seq=0):
+    head = struct.pack("<BBBBIIIq", 0xD5, kind, 1, flags, length, seq, scanhead.crc32c(payload), 0)
     return head + struct.pack("<I", scanhead.crc32c(head)) + payload
 
 
@@ -213,7 +217,7 @@ def telemetry(state, scan):
 def ends_of(path, *frames):
     """The places where scan_over is true."""
     with open(path, "wb") as file:
-        file.write(b"".join(frames))
+        file.writelines(framed(f[1], 0, len(f) - 28, f[28:], i) for i, f in enumerate(frames))
     head = scanhead.open(path)
     return [i for i, _ in enumerate(head.frames()) if head.scan_over], head.pulses_lost
 
@@ -280,12 +284,57 @@ def late_replies(lines):
     assert [head.query("HEAD:LINes?") for _ in range(3)] == ["2", "2", "2"]
 
 
+def notices():
+    """Of a live head: what was wrong, once each, at its byte, before the frame that follows it."""
+    said = []
+    head, theirs = pair()
+    head.on_notice = lambda n: said.append(tuple(n)[:4])
+    frames = [framed(scanhead.EVENT, 0, 128, struct.pack("<Q120x", i), (2**32 - 2 + i) % 2**32) for i in range(9)]
+    hurt = frames[5][:99] + b"?" + frames[5][100:]
+    theirs.sendall(frames[0] + frames[2] + frames[2] + b"\0\1" + frames[1] + hurt + frames[6] +
+                   framed(200, 0, 0, b"", 2**31 + 6))
+    assert [head.next_frame(5).seq for _ in range(4)] == [2**32 - 2, 0, 4, 2**31 + 6]
+    size = len(hurt)
+    assert said == [("gap", size, 2**32 - 1, 1), ("repeated", 2 * size, 0, 1), ("bad bytes", 3 * size, 0, 2),
+                    ("late", 3 * size + 2, 2**32 - 1, 1), ("bad payload", 4 * size + 2, 3, size),
+                    ("gap", 5 * size + 2, 1, 3), ("restarted", 6 * size + 2, 2**31 + 6, 1)], said
+    at_byte, said[:] = 6 * size + 2 + 28, []
+    theirs.sendall(b"9\r\n")
+    refused(head.next_frame, 0.0)
+    assert said == [("unasked", at_byte, 0, 1)]
+    refused(head.query, "TIME?", 0.0)
+    theirs.sendall(b"77\r\n")
+    refused(head.next_frame, 0.0)
+    assert said[1:] == [("late reply", at_byte + 3, 0, 2)] and head.late_replies == 1
+
+    def answer():
+        for line in theirs.makefile():
+            if line.strip() == "*IDN?":
+                theirs.sendall(b"*IDN?\r\na,b,c,d\r\n")
+            if line.strip() == "HEAD:PRR?":
+                theirs.sendall(b"HEAD:PRR?\r\n5\r\n" + frames[7][:40])
+                break
+
+    thread = threading.Thread(target=answer)
+    thread.start()
+    assert head.query("HEAD:PRR?") == "5"
+    thread.join()
+    theirs.shutdown(socket.SHUT_WR)
+    for _ in range(2):
+        refused(head.next_frame, 5)
+    assert said[2:] == [("echo", at_byte + 7, 0, 5), ("echo", at_byte + 23, 0, 9), ("cut", at_byte + 37, 5, 40),
+                        ("closed", at_byte + 77, 0, 1)], said[2:]
+    assert (head.parser.cuts, head.echoes, head.unasked, head.parser.repeated) == (1, 2, 1, 1)
+    print("noticed")
+
+
 def bombs(path):
     """Good headers that promise 64 KiB, small good frames between: if each payload were summed anew this were
     200 MB, a minute; it must take less than 10 s of processor time."""
     resource.setrlimit(resource.RLIMIT_CPU, (10, 10))
     with open(path + ".bombs", "wb") as out:
-        out.write((framed(3, 0, 65536, b"") + framed(200, scanhead.LOCAL, 0, b"")) * 3000)
+        out.write((framed(3, 0, 65536, b"") + framed(200, scanhead.LOCAL, 0, b"") +
+                   framed(3, 0, 65536, b"") + framed(201, scanhead.LOCAL, 0, b"")) * 1500)
     head = scanhead.open(path + ".bombs")
     assert sum(1 for _ in head.frames()) == 3000 and head.parser.bad_bytes == 3000 * 28
 

@@ -1,8 +1,10 @@
 /* rawlog-grabber reads the ready configuration of a VLP-16, which needs no other key: each packet of some turns comes,
- * at its time and azimuth, with the ranges of the house, and the receiver's time dates the turns. The grabber takes
- * two fixed ports of this machine. */
+ * at its time and azimuth, with the ranges of the house, and the receiver's time dates the turns. Then a head that loses
+ * packets on request. The grabber takes two fixed ports of this machine. */
 #include "tests/wire/grabber.h"
 #include "tests/wire/house.h"
+#include "tests/wire/room.h"
+#include "tests/wire/unit_faults.h"
 
 enum { TURNS = 25, BLOCKS = 12, SHOTS = 32, PACKET = RAWLOG_PACKET_LEN };
 
@@ -185,8 +187,141 @@ static void test_turns(void **state)
     house_free(house);
 }
 
+/* ---- config/faults/lossy-udp.yaml on the link of the data packets; the clean ones go to a file */
+
+static const char LOSSY_CONFIG[] =
+    "head: {profile: velodyne-vlp16, start: on, frames: 0}\n"
+    "scene: {meshes: [{file: room.obj, up: z, scale: 1}]}\n"
+    "stations: [{position_m: [0.31, -0.42, 0.17]}]\n"
+    "beam: {echoes: strongest}\n"
+    "links: [{type: udp, protocol: velodyne, port: 2368}, {type: file, protocol: velodyne, path: clean}]\n"
+    "loop: {late_ms: 10000, queue_ms: 3000}\n";
+
+/* The scenario with each fault on link 1. */
+static const char *lossy_scenario(const struct wire *wire)
+{
+    char *text = wire_read("config/faults/lossy-udp.yaml", NULL);
+    FILE *f = fopen(wire_path(wire, "lossy.yaml"), "w");
+    assert_non_null(f);
+    for (char *at = text, *next; at != NULL; at = next) {
+        next = strstr(at + 1, "{kind:");
+        fprintf(f, "%.*s%s", next != NULL ? (int)(next - at) : (int)strlen(at), at, next != NULL ? "{link: 1, " : "");
+        if (next != NULL) next++;
+    }
+    assert_int_equal(fclose(f), 0);
+    free(text);
+    return wire_path(wire, "lossy.yaml");
+}
+
+static size_t packet_whole(const uint8_t *bytes, size_t len)
+{
+    (void)bytes;
+    return len >= PACKET ? PACKET : 0;
+}
+
+static struct head start_lossy(struct wire *wire)
+{
+    static char scenario[352], truth[352];
+    room_write(wire);
+    snprintf(scenario, sizeof scenario, "%s", lossy_scenario(wire));
+    snprintf(truth, sizeof truth, "%s", wire_path(wire, "truth.json"));
+    const char *const args[] = {"--scenario", scenario, "--truth", truth, NULL};
+    return head_start(wire, wire_write_text(wire, "config.yaml", LOSSY_CONFIG), args);
+}
+
+/* What the truth makes of the clean packets. */
+static void read_truth(struct wire *wire, struct unit_list *sent)
+{
+    static const char *const kinds[] = {"drop", "duplicate", "reorder", "jitter"};
+    struct unit_list clean = {0};
+    size_t len;
+    uint32_t n;
+    char *bytes = wire_read(wire_path(wire, "clean"), &len);
+    units_add(&clean, bytes, len);
+    free(bytes);
+    units_cut(&clean, packet_whole);
+    struct truth_note *note = truth_read(wire_path(wire, "truth.json"), 1, &n);
+    for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)
+        assert_true(truth_count(note, n, kinds[i]) > 0);
+    units_expect(&clean, note, n, sent);
+    free(note);
+    units_free(&clean);
+}
+
+/* The packets of the log from that one of those that were sent on. Shorter ones are left out by the client, and so many
+ * may be missing that it did not read. Returns how many packets fit. */
+static uint32_t follow(const struct packets *all, const struct unit_list *sent, uint32_t from, uint32_t dropped)
+{
+    uint32_t n = 0, missing = 0;
+    for (uint32_t i = from; n < all->n && i < sent->n; i++) {
+        size_t len;
+        const uint8_t *packet = units_get(sent, i, &len);
+        if (len != PACKET) continue;
+        if (memcmp(packet, all->packet[n].bytes, PACKET) == 0)
+            n++;
+        else if (missing++ == dropped)
+            break;
+    }
+    return n;
+}
+
+/* Each whole packet that was sent is read, in the order in which it came, twice where it came twice. */
+static void check_lossy(const struct packets *all, const struct unit_list *sent, uint32_t dropped)
+{
+    uint32_t best = 0;
+    for (uint32_t i = 0; i < sent->n && best < all->n; i++) {
+        size_t len;
+        const uint8_t *packet = units_get(sent, i, &len);
+        if (len != PACKET || memcmp(packet, all->packet[0].bytes, PACKET) != 0) continue;
+        const uint32_t n = follow(all, sent, i, dropped);
+        if (n > best) best = n;
+    }
+    if (best < all->n) fail_msg("%u of %u packets fit; %u were not read", best, all->n, dropped);
+}
+
+/* The client ends a turn where the azimuth falls: with each turn of the head, and at each packet that comes too late. */
+static void check_cuts(const struct rawlog *log)
+{
+    int before = -1;
+    for (uint32_t i = 0; i < log->n_items; i++) {
+        const struct rawlog_item *turn = &log->item[i];
+        for (uint32_t k = 0; turn->kind == RAWLOG_TURN && k < turn->n; k++) {
+            const int azimuth = (int)get16(turn->packets + (size_t)PACKET * k + 2);
+            if (before >= 0 && (azimuth < before) != (k == 0))
+                fail_msg("turn %u, packet %u: azimuth %d after %d", i, k, azimuth, before);
+            before = azimuth;
+        }
+    }
+}
+
+static void test_lossy(void **state)
+{
+    struct wire *wire = *state;
+    static struct grabber grabber;
+    struct rawlog log;
+    struct packets all;
+    struct unit_list sent = {0};
+    grabber_or_skip();
+    ports_or_skip();
+    grabber_start(wire, "LOSSY", "driver = CVelodyneScanner\nmodel = VLP16\n", &grabber);
+    struct head head = start_lossy(wire);
+    if (!grabber_wait(&grabber, TURNS)) fail_msg("rawlog-grabber complains:\n%s", grabber.said);
+    head_end(&head, SIGTERM);
+    const uint32_t dropped = dropped_at(2368);
+    grabber_end(&grabber);
+    rawlog_read(&grabber, &log);
+    collect(&log, &all);
+    read_truth(wire, &sent);
+    check_lossy(&all, &sent, dropped);
+    check_cuts(&log);
+    free(all.packet);
+    rawlog_free(&log);
+    units_free(&sent);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test_setup_teardown(test_turns, wire_setup, wire_teardown)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test_setup_teardown(test_turns, wire_setup, wire_teardown),
+                                       cmocka_unit_test_setup_teardown(test_lossy, wire_setup, wire_teardown)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

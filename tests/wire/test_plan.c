@@ -133,10 +133,20 @@ struct want {
     const char *stage, *method, *left_out, *why_left_out;
 };
 
+/* The room with glass as its file has it: planned once for all who look at it. */
+static const char *plan_of_glass(struct wire *wire)
+{
+    static char *json;
+    const char *const args[] = {"plan", "config/glass.yaml", "--json", NULL};
+    if (json == NULL) json = plan(wire, args, 0);
+    return json;
+}
+
 static void expect_plan(struct wire *wire, const char *config, const struct want *want, size_t n)
 {
     const char *const args[] = {"plan", config, "--json", NULL};
-    char *json = plan(wire, args, 0);
+    const int is_glass = strcmp(config, "config/glass.yaml") == 0;
+    char *json = is_glass ? strdup(plan_of_glass(wire)) : plan(wire, args, 0);
     for (size_t i = 0; i < n; i++) {
         char method[64], *text = row(json, want[i].stage, 0);
         if (text == NULL) fail_msg("%s: no row of %s in %s", config, want[i].stage, json);
@@ -330,8 +340,8 @@ static void test_forced_as_chosen(void **state)
         else
             free(json);
     }
-    const char *const args[] = {"plan", "config/glass.yaml", "--json", NULL};
-    char *again = plan(wire, args, 0);
+    char *again = strdup(plan_of_glass(wire));
+    assert_non_null(again);
     *strstr(chosen, "\"total\"") = *strstr(again, "\"total\"") = '\0'; /* which is measured */
     assert_string_equal(chosen, again);                                /* the same configuration, the same plan */
     free(chosen);

@@ -1,7 +1,9 @@
 /* The client in Python beside libscanhead: every number of every point is the same, with numpy and without. */
 #include "tests/wire/room.h"
 
-#include "drivers/protocol/native.h"
+#include <nettle/sha2.h>
+
+#include "drivers/protocol/native_encode.h"
 
 static const char python[] = "/usr/bin/python3"; /* Debian's, for which its numpy is made */
 
@@ -313,6 +315,8 @@ static void test_live(void **state)
 
 /* ---- streams that were damaged, and hostile ones */
 
+enum { ROUNDS = 6 };
+
 static uint32_t dice;
 static uint32_t roll(uint32_t n)
 {
@@ -321,7 +325,7 @@ static uint32_t roll(uint32_t n)
 }
 
 /* Bytes lost, changed and put in, headers that promise 64 KiB, line ends. */
-static size_t damage(uint8_t *to, const char *from, size_t len)
+static size_t damage(uint8_t *to, const uint8_t *from, size_t len)
 {
     size_t n = 0;
     for (size_t i = 0; i < len; i++) {
@@ -329,9 +333,75 @@ static size_t damage(uint8_t *to, const char *from, size_t len)
         if (fate < 2) i += roll(700);
         if (fate == 2) to[n++] = 0xd5;
         if (fate == 3) n += (size_t)sprintf((char *)to + n, "OK\r\n");
-        if (i < len) to[n++] = fate == 4 ? (uint8_t)roll(256) : (uint8_t)from[i];
+        if (i < len) to[n++] = fate == 4 ? (uint8_t)roll(256) : from[i];
     }
     return n;
+}
+
+/* The stream some times over, as one whose numbers run over 2^32. */
+static size_t prolong(uint8_t *to, const char *from, size_t len)
+{
+    uint32_t seq = 0u - 100u;
+    for (int i = 0; i < ROUNDS; i++)
+        memcpy(to + (size_t)i * len, from, len);
+    for (size_t at = 0; at < ROUNDS * len; at += native_frame_len(to + at))
+        native_seal(to + at, seq++);
+    return ROUNDS * len;
+}
+
+/* Some frames come twice, some after others. */
+static size_t shuffle(uint8_t *to, const uint8_t *from, size_t len)
+{
+    struct late {
+        size_t at, len;
+        uint32_t left;
+    } late[64] = {{0, 0, 0}};
+    size_t n = 0;
+    for (size_t at = 0, frame; at < len; at += frame) {
+        frame = native_frame_len(from + at);
+        const uint32_t fate = roll(20), slot = roll(64);
+        for (int i = 0; i < 64; i++) {
+            if (late[i].len == 0 || late[i].left-- > 0) continue;
+            memcpy(to + n, from + late[i].at, late[i].len);
+            n += late[i].len;
+            late[i].len = 0;
+        }
+        if (fate < 2 && late[slot].len == 0) late[slot] = (struct late){at, frame, roll(30)};
+        if (fate == 0 && late[slot].at == at && late[slot].len > 0) continue; /* it comes later */
+        memcpy(to + n, from + at, frame);
+        n += frame;
+    }
+    return n;
+}
+
+struct said {
+    struct sha256_ctx sha256;
+    uint32_t n;
+};
+
+static void on_notice(void *ctx, const struct scanhead_notice *notice)
+{
+    struct said *said = ctx;
+    char line[128];
+    const int n = snprintf(line, sizeof line, "%s %llu %u %llu %lld\n", scanhead_notice_name(notice->kind),
+                           (unsigned long long)notice->at_byte, notice->seq, (unsigned long long)notice->n,
+                           notice->t_ns == SCANHEAD_NO_TIME ? 0LL : (long long)notice->t_ns);
+    sha256_update(&said->sha256, (size_t)n, (const uint8_t *)line);
+    said->n++;
+}
+
+static void put_counts(char *text, size_t room, const struct scanhead_stats *s, struct said *said)
+{
+    uint8_t digest[SHA256_DIGEST_SIZE];
+    sha256_digest(&said->sha256, sizeof digest, digest);
+    int n =
+        snprintf(text, room, "%llu %llu %llu %llu %llu %llu %llu %llu %llu %llu ", (unsigned long long)s->bytes,
+                 (unsigned long long)s->frames, (unsigned long long)s->bad_payload, (unsigned long long)s->bad_bytes,
+                 (unsigned long long)s->seq_gaps, (unsigned long long)s->seq_lost, (unsigned long long)s->repeated,
+                 (unsigned long long)s->late, (unsigned long long)s->restarts, (unsigned long long)s->cuts);
+    for (size_t i = 0; i < sizeof digest; i++)
+        n += snprintf(text + n, room - (size_t)n, "%02x", digest[i]);
+    snprintf(text + n, room - (size_t)n, "\n");
 }
 
 static void test_damaged(void **state)
@@ -341,29 +411,39 @@ static void test_damaged(void **state)
     room_write(wire);
     size_t len;
     char *bytes = wire_read(record(wire, &SMALL, "a.shs", ""), &len);
-    uint8_t *out = malloc(2 * len + 16);
+    uint8_t *longer = malloc(ROUNDS * len), *shuffled = malloc(2 * ROUNDS * len), *out = malloc(4 * ROUNDS * len + 16);
+    const size_t longer_len = prolong(longer, bytes, len);
     for (dice = 1; dice < 3; dice++) {
         const uint32_t seed = dice;
-        const char *path = wire_write(wire, "b.shs", out, damage(out, bytes, len));
+        const size_t n = shuffle(shuffled, longer, longer_len);
+        const char *path = wire_write(wire, "b.shs", out, damage(out, shuffled, n));
+        struct said said = {.n = 0};
+        sha256_init(&said.sha256);
         struct scanhead_stats stats;
         struct scanhead_frame frame;
         struct scanhead *sh = client_open(path);
+        scanhead_on_notice(sh, on_notice, &said);
         while (scanhead_next(sh, &frame, 0) == SCANHEAD_OK)
             continue;
         scanhead_get_stats(sh, &stats);
-        char want[256], file[352];
-        snprintf(want, sizeof want, "%llu %llu %llu %llu %llu %llu\n", (unsigned long long)stats.bytes,
-                 (unsigned long long)stats.frames, (unsigned long long)stats.bad_payload,
-                 (unsigned long long)stats.bad_bytes, (unsigned long long)stats.seq_gaps,
-                 (unsigned long long)stats.seq_lost);
+        char want[384], file[352];
+        put_counts(want, sizeof want, &stats, &said);
         scanhead_close(sh);
         snprintf(file, sizeof file, "%s", wire_path(wire, "b.shs"));
         assert_string_equal(ask_python(wire, "plain", "count", file, NULL), want);
-        assert_true(stats.seq_gaps > 10);
+        assert_true(stats.seq_gaps > 10 && stats.repeated > 1 && stats.late > 1 && said.n > 50);
         dice = seed;
     }
     free(out);
+    free(shuffled);
+    free(longer);
     free(bytes);
+}
+
+static void test_notices(void **state)
+{
+    need_python();
+    assert_string_equal(ask_python(*state, "plain", "notices", NULL, NULL), "noticed\n");
 }
 
 static void test_hostile(void **state)
@@ -427,6 +507,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_both_layouts, setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_live, setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_damaged, setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_notices, setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_hostile, setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_older, setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_ends, setup, wire_teardown),

@@ -10,10 +10,10 @@ struct recipe {
     const char *sets[5]; /* short scans, of which a map shows all */
 };
 
-/* foliage: single rays, and the beam that its plan takes, without the seconds of planning it. Where the pan of a
+/* demo and foliage: single rays, and beams, without the seconds of planning which. Where the pan of a
  * recipe stands still, one that moves as well. */
 static const struct recipe RECIPES[] = {
-    {"demo", 1, {"head.station=3", "head.pan_stop_deg=30"}},
+    {"demo", 1, {"head.station=3", "head.pan_stop_deg=30", "beam.mode=single"}},
     {"demo", 1, {"head.station=1", "head.pan_stop_deg=20", "output.layout=polar", "beam.mode=adaptive"}},
     {"foliage", 0, {"beam.mode=single", "head.pan_start_deg=20", "head.pan_stop_deg=30"}},
     {"foliage", 0, {"beam.mode=adaptive", "head.pan_start_deg=28", "head.pan_stop_deg=30"}},

@@ -1,8 +1,10 @@
 /* What a page is told of a scan while it is on: a noise-free scan that the observer sees all of has the figures that
  * `scanhead report` and `scanhead coverage` have of the same one; with noise it is judged by it; stations follow the head;
  * the coarse scene is the scene. The answers come by HTTP, as a browser gets them. */
+#include <dirent.h>
 #include <math.h>
 #include <poll.h>
+#include <sys/resource.h>
 
 #include "tests/wire/wire.h"
 
@@ -95,6 +97,21 @@ static char *scan_from(const struct head *head, struct scanhead *sh, unsigned st
     client_tell(sh, "SCAN:STAR");
     client_until(sh, SCANHEAD_EV_SCAN_END, &frame);
     return quality_of(head, station, scan);
+}
+
+/* How many of a head's threads have a lower priority than its first one. */
+static int threads_below(const struct head *head)
+{
+    char path[64];
+    int n = 0;
+    snprintf(path, sizeof path, "/proc/%d/task", (int)head->pid);
+    DIR *tasks = opendir(path);
+    assert_non_null(tasks);
+    const int nice = getpriority(PRIO_PROCESS, (id_t)head->pid);
+    for (const struct dirent *task; (task = readdir(tasks)) != NULL;)
+        n += atoi(task->d_name) > 0 && getpriority(PRIO_PROCESS, (id_t)atoi(task->d_name)) > nice;
+    closedir(tasks);
+    return n;
 }
 
 /* ---- the same scan off line */
@@ -237,6 +254,24 @@ static void noise_is_expected(void **state)
     head_end(&head, SIGTERM);
 }
 
+/* An observer that the head waits for is not the last to get a processor: with others at work the head would stand still.
+ * In real time the head does not wait, and it is the last. Its priority is set before it has seen a scan. */
+static void who_is_waited_for_is_not_last(void **state)
+{
+    struct wire *wire = *state;
+    char config[256];
+    prepare(wire, config);
+    for (int waited = 0; waited < 2; waited++) {
+        struct head head =
+            head_start(wire, config, (const char *const[]){"--pace", waited ? "fast" : "realtime", NULL});
+        struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
+        free(scan_from(&head, sh, 1, 1));
+        assert_int_equal(threads_below(&head), !waited);
+        scanhead_close(sh);
+        head_end(&head, SIGTERM);
+    }
+}
+
 static uint32_t u32_at(const char *bytes)
 {
     uint32_t v;
@@ -291,6 +326,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(figures_are_those_of_the_report, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(noise_is_expected, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(who_is_waited_for_is_not_last, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(scene_is_the_scene, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests_name("watch", tests, NULL, NULL);

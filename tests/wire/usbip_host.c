@@ -27,6 +27,21 @@ static uint32_t get_be32(const uint8_t *at)
     return ntohl(v);
 }
 
+struct usbip_host usbip_host_open_within(const struct head *head, int timeout_ms)
+{
+    const struct sockaddr_in at = {.sin_family = AF_INET,
+                                   .sin_addr.s_addr = htonl(INADDR_LOOPBACK),
+                                   .sin_port = htons((uint16_t)endpoint_port(head_endpoint(head, "usb")))};
+    for (const int64_t end_ms = wire_now_ms() + timeout_ms; wire_now_ms() < end_ms;) {
+        int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+        const int there = connect(fd, (const struct sockaddr *)&at, sizeof at) == 0;
+        close(fd);
+        if (there) return usbip_host_open(head);
+    }
+    fail_msg("nobody listens");
+    return (struct usbip_host){.fd = -1};
+}
+
 struct usbip_host usbip_host_open(const struct head *head)
 {
     static const uint8_t list[8] = {0x01, 0x11, 0x80, 0x05};
@@ -54,10 +69,9 @@ void usbip_host_close(struct usbip_host *host)
     close(host->fd);
 }
 
-/* Submits and waits for the reply; the bytes that came, or the negative status. */
-static int transfer(struct usbip_host *host, unsigned endpoint, int in, const uint8_t *setup, void *data, uint32_t len)
+static void start_transfer(struct usbip_host *host, unsigned endpoint, int in, const uint8_t *setup, uint32_t len)
 {
-    uint8_t submit[HEADER] = {[3] = 1}, reply[HEADER];
+    uint8_t submit[HEADER] = {[3] = 1};
     put_be32(submit + 4, ++host->seqnum);
     memcpy(submit + 8, (const uint8_t[]){host->device[290], host->device[291], host->device[294], host->device[295]},
            4); /* bus and device */
@@ -66,6 +80,18 @@ static int transfer(struct usbip_host *host, unsigned endpoint, int in, const ui
     put_be32(submit + 24, len);
     if (setup != NULL) memcpy(submit + 40, setup, 8);
     raw_write(host->fd, submit, sizeof submit);
+}
+
+void usbip_host_ask(struct usbip_host *host, unsigned endpoint, uint32_t len)
+{
+    start_transfer(host, endpoint, 1, NULL, len);
+}
+
+/* Submits and waits for the reply; the bytes that came, or the negative status. */
+static int transfer(struct usbip_host *host, unsigned endpoint, int in, const uint8_t *setup, void *data, uint32_t len)
+{
+    uint8_t reply[HEADER];
+    start_transfer(host, endpoint, in, setup, len);
     if (!in && len > 0) raw_write(host->fd, data, len);
     read_all(host->fd, reply, sizeof reply);
     assert_int_equal(get_be32(reply), 3);

@@ -17,6 +17,9 @@ struct usbip_host {
 /* Imports the one device of the head's usb link. */
 struct usbip_host usbip_host_open(const struct head *head);
 
+/* The same, once somebody listens there. */
+struct usbip_host usbip_host_open_within(const struct head *head, int timeout_ms);
+
 void usbip_host_close(struct usbip_host *host);
 
 /* A control transfer that reads up to len bytes; how many, or the negative status. */
@@ -27,6 +30,9 @@ int usbip_host_control(struct usbip_host *host, unsigned type, unsigned request,
 void usbip_host_string(struct usbip_host *host, unsigned index, char *text, size_t len);
 
 void usbip_host_send(struct usbip_host *host, unsigned endpoint, const void *data, uint32_t len);
+
+/* Submits such a transfer, and does not wait for it. */
+void usbip_host_ask(struct usbip_host *host, unsigned endpoint, uint32_t len);
 
 /* One transfer of at most len bytes, waited for; how many. */
 uint32_t usbip_host_receive(struct usbip_host *host, unsigned endpoint, void *data, uint32_t len);

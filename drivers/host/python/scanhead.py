@@ -28,7 +28,7 @@ import socket
 import struct
 import sys
 import time
-from typing import Dict, Iterator, List, NamedTuple, Optional, Tuple, Union
+from typing import Callable, Dict, Iterator, List, NamedTuple, Optional, Tuple, Union
 
 try:
     import numpy as np
@@ -48,6 +48,7 @@ NO_LABEL = 0xFFFF
 _HASHED = (DESCRIPTOR, ANCHOR, POINTS, LINE_END, POSES, ATTRIBUTES, EMITTER, COLOURS)
 _HEADER_LEN, _MAX_PAYLOAD, _MAX_TEXT = 28, 65536, 512
 _QUEUE_BYTES, _KEEP_POSES, _CHUNK = 64 << 20, 8192, 1 << 16
+_SEEN, _GAPS, _GAP_MOST, _LATE_RUN = 256, 64, 65536, 256  # how far back a jump is looked into, as libscanhead does
 _FRAME_BYTES = 512  # what a kept frame takes beside its payload
 _POLL_MS = 2**31 - 1  # the longest that poll() waits
 _ANSWERS_S = 0.2  # how long further answers to questions that were given up may take
@@ -254,17 +255,111 @@ class Frame(NamedTuple):
         return self.type == EVENT and self.fields.get("code") == code
 
 
-# ---- bytes into frames and reply lines ("Resynchronisation")
+# ---- bytes into frames and reply lines ("Sequence numbers", "Resynchronisation")
 
-class Parser:
-    """Takes bytes as they come and gives frames and reply lines. It holds one frame of bytes at most."""
+class Notice(NamedTuple):
+    """Something wrong in the stream; each thing gives one. kind is one of
+        gap          n frames are missing, from seq on
+        repeated     a frame came once more; late: it was missing, and comes after newer ones. Neither is given
+        restarted    another sequence begins with seq: the head started again
+        bad payload  a frame whose header is right, and whose payload is not; n bytes of it
+        bad bytes    n bytes that belong to nothing
+        cut          the stream ended within a frame or a line; n bytes of it
+        echo         the command that was sent came back before its reply
+        late reply   a reply to a command that was given up; unasked: one to none
+        closed       the connection is over
+    at_byte: where it begins in all bytes that came; of a gap, the frame that came instead. t_ns: device time of
+    the frame that it is about, or else of the last whole frame before; None: none came yet."""
+    kind: str
+    at_byte: int
+    seq: int
+    n: int
+    t_ns: Optional[int]
+
+
+class _Sequence:
+    """The numbers of frames: what is missing, came already, or too late."""
 
     def __init__(self) -> None:
+        self._next = None  # type: Optional[int]
+        self._seen = collections.deque(maxlen=_SEEN)
+        self._gaps = collections.deque(maxlen=_GAPS)  # [first number, how many]
+        self._local = None  # type: Optional[Tuple]
+        self._last_late, self._late_run = 0, 0  # the last late frame; how many came in a row up to it
+
+    def take(self, frame: Tuple) -> Tuple[str, int, int]:
+        """frame: its number, flags and all that makes it another one. What is noticed of it ("": nothing), and
+        from which number on how many frames."""
+        seq, flags = frame[:2]
+        if flags & LOCAL:
+            kind = "repeated" if frame == self._local else ""
+            self._local = frame
+            return kind, seq, 1
+        self._local = None
+        kind, first, n = ("", seq, 1) if seq == self._next or self._next is None else self._jump(frame)
+        if kind != "repeated":
+            self._seen.append(frame)
+        if kind not in ("repeated", "late"):
+            self._next, self._late_run = (seq + 1) % 2**32, 0
+        return kind, first, n
+
+    def _jump(self, frame: Tuple) -> Tuple[str, int, int]:
+        seq, expected = frame[0], self._next or 0
+        missing = (seq - expected) % 2**32
+        if missing < 2**31:
+            self._add_gap(expected, missing)
+            return "gap", expected, missing
+        if frame in self._seen:
+            return "repeated", seq, 1
+        if self._fills_gap(seq) and not self._is_run(seq):
+            return "late", seq, 1
+        self._seen.clear()
+        self._gaps.clear()
+        return "restarted", seq, 1
+
+    def _fills_gap(self, seq: int) -> bool:
+        for gap in self._gaps:
+            before = (seq - gap[0]) % 2**32
+            if before < gap[1]:
+                rest, gap[1] = gap[1] - before - 1, before
+                self._add_gap((seq + 1) % 2**32, rest)
+                return True
+        return False
+
+    def _is_run(self, seq: int) -> bool:
+        """Of a late frame: so many in a row are another sequence, whose numbers were all missing."""
+        follows = self._late_run > 0 and seq == (self._last_late + 1) % 2**32
+        self._late_run, self._last_late = self._late_run + 1 if follows else 1, seq
+        return self._late_run == _LATE_RUN
+
+    def _add_gap(self, first: int, n: int) -> None:
+        if 0 < n <= _GAP_MOST:
+            self._gaps.append([first, n])
+
+
+class _Bad:
+    """Bytes that belong to nothing, one after the other. most: what a broken frame may have at most."""
+
+    def __init__(self, kind: str, at_byte: int, t_ns: Optional[int], seq: Optional[int] = None,
+                 most: float = math.inf) -> None:
+        self.kind, self.at_byte, self.t_ns, self.seq, self.most, self.n = kind, at_byte, t_ns, seq, most, 0
+
+
+class Parser:
+    """Takes bytes as they come and gives frames and reply lines. It holds one frame of bytes at most. on_notice
+    gets a Notice of each thing that is wrong, before the item that follows it."""
+
+    def __init__(self, on_notice: Optional[Callable[[Notice], None]] = None) -> None:
         self._bytes, self._at = bytearray(), 0
-        self._in_step, self._next_seq = True, None  # type: bool, Optional[int]
+        self._in_step, self._sequence = True, _Sequence()
+        self._bad = None  # type: Optional[_Bad]
         self._running = None  # type: Optional[_RunningCrc]
+        self.on_notice = on_notice
+        self.last_t_ns = None  # type: Optional[int]  # of the last whole frame
+        self.text_at = 0  # of the line given last, in all bytes
         self.bytes = self.frames = self.bad_payload = self.bad_bytes = 0
         self.seq_gaps = self.seq_lost = 0  # jumps of the sequence; frames missing by jumps forward
+        self.repeated = self.late = self.restarts = self.cuts = 0  # notices of these kinds
 
     def feed(self, data: bytes) -> None:
         del self._bytes[:self._at]
@@ -282,20 +377,71 @@ class Parser:
                 item, wait = self._frame()
             elif self._in_step and 0x20 <= first <= 0x7E:
                 item, wait = self._line()
+            if isinstance(item, _Dropped):
+                continue
             if item is not None:
                 return item
             if wait and not last:
                 return None
+            if wait:
+                self._begin_cut()
             self._skip()
+        if last:
+            self._end_bad(at_end=True)
         return None
+
+    # -- bytes that belong to nothing
+
+    def _at_byte(self) -> int:
+        return self.bytes - len(self._bytes) + self._at
+
+    def _notice(self, *fields) -> None:
+        if self.on_notice is not None:
+            self.on_notice(Notice(*fields))
+
+    def _end_bad(self, at_end: bool = False) -> None:
+        """What follows is good, or at_end nothing. A frame that seemed to be cut by the end is a broken one if
+        others stood within its length."""
+        bad, self._bad = self._bad, None
+        if bad is None:
+            return
+        if bad.kind == "cut" and not at_end:
+            bad.kind = "bad bytes" if bad.seq is None else "bad payload"
+            self.bad_payload += bad.seq is not None
+        self.cuts += bad.kind == "cut"
+        self._notice(bad.kind, bad.at_byte, bad.seq or 0, bad.n, bad.t_ns)
+
+    def _begin_bad(self, bad: _Bad) -> None:
+        self._end_bad()
+        self._bad = bad
+
+    def _begin_cut(self) -> None:
+        """No more bytes will come, and what is at hand is not whole."""
+        header = self._bytes[self._at:self._at + _HEADER_LEN]
+        if header[0] == 0xD5 and len(header) == _HEADER_LEN:
+            length, seq, t_ns = struct.unpack("<4xII4xq4x", header)
+            self._begin_bad(_Bad("cut", self._at_byte(), t_ns, seq, _HEADER_LEN + length))
+        elif self._bad is None or self._bad.n == self._bad.most:
+            self._begin_bad(_Bad("cut", self._at_byte(), self.last_t_ns))
 
     def _skip(self) -> None:
         sync = self._bytes.find(0xD5, self._at + 1)
         end = sync if sync >= 0 else len(self._bytes)
-        self.bad_bytes += end - self._at
+        at_byte, n = self._at_byte(), end - self._at
+        self.bad_bytes += n
+        if self._bad is not None and self._bad.n + n > self._bad.most:  # what is beyond is another thing
+            own = int(self._bad.most) - self._bad.n
+            self._bad.n += own
+            at_byte, n = at_byte + own, n - own
+            self._begin_bad(_Bad("bad bytes", at_byte, self.last_t_ns))
+        if self._bad is None:
+            self._begin_bad(_Bad("bad bytes", at_byte, self.last_t_ns))
+        self._bad.n += n
         self._at, self._in_step = end, False
 
-    def _frame(self) -> Tuple[Optional[Frame], bool]:
+    # -- frames
+
+    def _frame(self) -> Tuple[Union[Frame, "_Dropped", None], bool]:
         header = bytes(self._bytes[self._at:self._at + _HEADER_LEN])
         if len(header) < _HEADER_LEN:
             return None, True
@@ -309,23 +455,31 @@ class Parser:
         running = self._running
         if (crc32c(payload) if running is None else running.crc(self._bytes, begin, begin + length)) != crc:
             self.bad_payload += 1
+            self._begin_bad(_Bad("bad payload", self._at_byte(), t_ns, seq, _HEADER_LEN + length))
             self._running = running or _RunningCrc()
             self._running.until = max(self._running.until, begin + length)
             return None, False
-        self._at, self._in_step = begin + length, True
+        self._end_bad()
+        drop = self._is_dropped((seq, flags, kind, t_ns, length, crc))
+        self._at, self._in_step, self.last_t_ns = begin + length, True, t_ns
         if running is not None and running.until <= self._at:
             self._running = None
+        if drop:
+            return _DROPPED, False
         self.frames += 1
-        if not flags & LOCAL:
-            self._count(seq)
         return Frame(kind, version, flags, seq, t_ns, payload, {}), False
 
-    def _count(self, seq: int) -> None:
-        missing = (seq - self._next_seq) % 2**32 if self._next_seq is not None else 0
-        if missing:
-            self.seq_gaps += 1
-            self.seq_lost += missing if missing < 2**31 else 0
-        self._next_seq = (seq + 1) % 2**32
+    def _is_dropped(self, frame: Tuple) -> bool:
+        kind, first, n = self._sequence.take(frame)
+        if not kind:
+            return False
+        self.seq_gaps += kind in ("gap", "restarted")
+        self.seq_lost += n if kind == "gap" else 0
+        self.restarts += kind == "restarted"
+        self.repeated += kind == "repeated"
+        self.late += kind == "late"
+        self._notice(kind, self._at_byte(), first, n, frame[3])
+        return kind in ("repeated", "late")
 
     def _line(self) -> Tuple[Optional[str], bool]:
         text = bytes(self._bytes[self._at:self._at + _MAX_TEXT])
@@ -337,8 +491,17 @@ class Parser:
             return None, False
         if end < 0:
             return None, len(text) < _MAX_TEXT
+        self._end_bad()
+        self.text_at = self._at_byte()
         self._at += end + 2
         return line.decode("ascii"), False
+
+
+class _Dropped:
+    """In place of a frame that is repeated or late."""
+
+
+_DROPPED = _Dropped()
 
 
 # ---- points as columns
@@ -861,12 +1024,20 @@ def _is_identity_query(line: str) -> bool:
     return line.strip().lstrip(":").upper() == "*IDN?"
 
 
+def _is_identity(reply: str) -> bool:
+    return reply.count(",") == 3 and '"' not in reply
+
+
 class Head:
     """A head or a recording. State (descriptor, anchor, names, poses, clock, hash) is that of the frame that
     frames() gave last; points(), to_scene() and to_crs() belong to that frame."""
 
     def __init__(self, source: _Source) -> None:
-        self._source, self.parser = source, Parser()
+        self._source, self.parser = source, Parser(self._hand_on)
+        self.on_notice = None  # type: Optional[Callable[[Notice], None]]  # gets each Notice as it is found
+        self.echoes = self.late_replies = self.unasked = 0  # notices of these kinds
+        self._given_up = self._given_up_identities = 0  # commands whose reply may come yet; those that asked *IDN?
+        self._closed_told = False
         self._queue, self._queued = collections.deque(), 0
         self._unsettled, self._asked = source.is_tty, 0  # _asked: answers to *IDN? that may come yet
         self._ended = self._stuck = False
@@ -895,6 +1066,36 @@ class Head:
     def pulses_lost(self) -> int:
         """Pulses that the head says it lost. Two kinds of events count the same; of either, some may be lost."""
         return max(self._lost_told, self._lost_ended)
+
+    # -- notices
+
+    def _hand_on(self, notice: Notice) -> None:
+        if self.on_notice is not None:
+            self.on_notice(notice)
+
+    def _note_line(self, text: str, is_echo: bool = False) -> None:
+        kind = "echo" if is_echo else "late reply" if self._given_up else "unasked"
+        self.echoes += is_echo
+        self.late_replies += kind == "late reply"
+        self.unasked += kind == "unasked"
+        self._given_up -= kind == "late reply"
+        self._hand_on(Notice(kind, self.parser.text_at, 0, len(text), self.parser.last_t_ns))
+
+    def _stray(self, text: str) -> None:
+        """A line that nobody waits for. An answer to a question of _settle is as it should be."""
+        if self._asked and _is_identity(text):
+            self._asked -= 1
+            if not self._given_up_identities:
+                return
+            self._given_up_identities -= 1
+        self._note_line(text)
+
+    def _gone(self) -> Closed:
+        """To be raised when all that had come was taken."""
+        if not self._closed_told:
+            self._closed_told = True
+            self._hand_on(Notice("closed", self.parser.bytes, 0, 1, self.parser.last_t_ns))
+        return Closed(f"{self._source.name}: the head is gone")
 
     # -- bytes
 
@@ -952,10 +1153,12 @@ class Head:
         self._discard_stale()
         try:
             self._send(line + "\n", deadline_s)
-            return self._reply(deadline_s)
+            return self._reply(deadline_s, line)
         except Timeout:  # its reply may come yet, and is not that of the next line
             self._unsettled = True
             self._asked += _is_identity_query(line)
+            self._given_up += 1
+            self._given_up_identities += _is_identity_query(line)
             raise
 
     def command(self, line: str, timeout_s: float = 5.0) -> str:
@@ -975,16 +1178,15 @@ class Head:
         answered = False
         while self._asked:
             try:
-                reply = self._reply(deadline_s)
+                reply = self._reply(deadline_s, "*IDN?")
             except Timeout:
                 if not answered:
                     raise
                 self._asked = 0
                 break
-            if reply.count(",") == 3 and '"' not in reply:
-                self._asked -= 1
-                if not answered:
-                    answered, deadline_s = True, time.monotonic() + _ANSWERS_S
+            if _is_identity(reply) and not answered:
+                answered, deadline_s = True, time.monotonic() + _ANSWERS_S
+            self._stray(reply)
         self._unsettled = False
 
     def _discard_stale(self) -> None:
@@ -1022,27 +1224,33 @@ class Head:
     def _wait_writable(self, deadline_s: float) -> None:
         self._check(deadline_s)
         self._fill(deadline_s, write=True)
-        if self._ended:
-            raise Closed(f"{self._source.name}: the head is gone")
         self._keep_frames()
+        if self._ended:
+            raise self._gone()
 
-    def _reply(self, deadline_s: float) -> str:
+    def _reply(self, deadline_s: float, line: str) -> str:
+        """The next line but for those that are what was sent, come back."""
         while True:
             item = self._next_item(deadline_s)
-            if isinstance(item, str):
-                return item
             if item is None:
-                raise Closed(f"{self._source.name}: the head is gone")
-            self._keep(item)
+                raise self._gone()
+            if isinstance(item, Frame):
+                self._keep(item)
+            elif item == line:
+                self._note_line(item, is_echo=True)
+            else:
+                return item
             self._check(deadline_s)
 
     def _keep_frames(self) -> None:
         """What has come: frames are kept, lines answer what nobody waits for any more."""
-        item = self.parser.next()
+        item = self.parser.next(self._ended)
         while item is not None:
             if isinstance(item, Frame):
                 self._keep(item)
-            item = self.parser.next()
+            else:
+                self._stray(item)
+            item = self.parser.next(self._ended)
 
     def _keep(self, frame: Frame) -> None:
         self._queue.append(frame)
@@ -1067,7 +1275,7 @@ class Head:
             yield frame
 
     def next_frame(self, timeout_s: Optional[float] = None) -> Optional[Frame]:
-        """The next frame; None at a recording's end. Reply lines are skipped: nobody waits for them."""
+        """The next frame; None at a recording's end. Reply lines are noticed: nobody waits for them."""
         deadline_s = None if timeout_s is None else time.monotonic() + timeout_s
         frame = None  # type: Union[Frame, str, None]
         if self._queue:
@@ -1077,8 +1285,9 @@ class Head:
             if frame is None:
                 if self._source.is_file:
                     return None
-                raise Closed(f"{self._source.name}: the head is gone")
+                raise self._gone()
             if not isinstance(frame, Frame):
+                self._stray(frame)
                 self._check(deadline_s)
         return self._absorb(frame)
 
@@ -1328,7 +1537,10 @@ def _summary(head: Head) -> None:
     names = ("", "descriptors", "anchors", "points frames", "line ends", "telemetry", "events", "names",
              "poses", "attributes", "emitters", "colours")
     print(*(f"{kinds[k]} {names[k]}" for k in sorted(kinds) if k < len(names)), sep=", ")
-    print(f"{echoes} echoes; frames lost: {head.parser.seq_lost}, bytes skipped: {head.parser.bad_bytes}")
+    p = head.parser
+    print(f"{echoes} echoes; frames lost: {p.seq_lost}, bytes skipped: {p.bad_bytes}")
+    if p.repeated or p.late or p.restarts:
+        print(f"frames that came twice: {p.repeated}, after newer ones: {p.late}; restarts: {p.restarts}")
     print(f"stream_sha256 {head.stream_sha256()}")
 
 

@@ -101,8 +101,9 @@ export class Head extends EventTarget {
    * shots without echo among them), pulses (received), empty; lost_frames: missing in the sequence, of which
    * left_out_frames with left_out_pulses because this page was too slow; lost_pulses: lost by the head; missing_pulses:
    * of all scans that ended here, delivered and not received; dropped_points, dropped_pulses: decoded, and dropped by
-   * the page itself; unplaced_points, unplaced_pulses: came before their anchor or their pose; bad_bytes, bad_payloads,
-   * refused; decode_ns_per_point; point_hash.
+   * the page itself; unplaced_points, unplaced_pulses: came before their anchor or their pose; repeated_frames,
+   * late_frames: came twice, or after newer ones, and were dropped; bad_bytes, bad_payloads, refused;
+   * decode_ns_per_point; point_hash.
    */
   figures() {
     const f = this.#figures, l = this.#losses;

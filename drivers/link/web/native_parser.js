@@ -1,5 +1,6 @@
 // Bytes into frames and reply lines, as PROTOCOL.md has it (*Frames*, *Resynchronisation*). Pure: no page, no network.
 import {crc32c} from './crc32c.js';
+import {Sequence} from './native_sequence.js';
 
 const SYNC = 0xd5, HEADER = 28, MAX_PAYLOAD = 65536, MAX_TEXT = 512;
 export const REPEAT = 1, LOCAL = 2;
@@ -16,7 +17,9 @@ class Frame {
     this.type = view.getUint8(at + 1);
     this.version = view.getUint8(at + 2);
     this.flags = view.getUint8(at + 3);
+    this.length = length;
     this.seq = view.getUint32(at + 8, true);
+    this.payload_crc = view.getUint32(at + 12, true);
     this.payload = new Uint8Array(view.buffer, view.byteOffset + at + HEADER, length);
   }
   get t_ns() {
@@ -28,17 +31,21 @@ const isPrintable = (byte) => byte >= 0x20 && byte <= 0x7e;
 
 /** Takes bytes as they come. It keeps what it has not understood yet: less than a frame, 64 KiB. */
 export class Parser {
-  /** frame(frame), text(line without its end), bad(n): n bytes that belong to nothing. Each may be left out. */
-  constructor({frame, text, bad} = {}) {
+  /** frame(frame), text(line without its end), notice({kind, at_byte, seq, n, t_ns}): something wrong, once each and
+   * before the item that follows it. kind is gap, repeated, late, restarted, bad payload, bad bytes or cut, and the rest
+   * as drivers/host/scanhead.h has it; t_ns is a BigInt, or null before the first frame. Each may be left out. */
+  constructor({frame, text, notice} = {}) {
     this.onFrame = frame ?? (() => {});
     this.onText = text ?? (() => {});
-    this.onBad = bad ?? (() => {});
+    this.onNotice = notice ?? (() => {});
     this.stats = {bytes: 0, frames: 0, texts: 0, bad_bytes: 0, bad_payloads: 0, jumps: 0, jumps_back: 0,
-      lost_frames: 0};
+      lost_frames: 0, repeated_frames: 0, late_frames: 0, cuts: 0};
     this.kept = new Uint8Array(0); // room
     this.n = 0; // bytes kept in it
     this.inStep = true;
-    this.expected = -1; // sequence number; -1: none came yet
+    this.sequence = new Sequence();
+    this.bad = null; // bytes that belong to nothing, and for which there is no notice yet
+    this.last_t_ns = null; // of the last whole frame
   }
 
   /** Takes a Uint8Array (or Buffer), of any size. It is read only within this call. */
@@ -59,6 +66,7 @@ export class Parser {
     const n = this.n;
     this.n = 0;
     this.#parse(this.kept, n, true);
+    this.#endBad(true);
     this.inStep = true;
   }
 
@@ -83,6 +91,7 @@ export class Parser {
   // How many of the n bytes are done with.
   #parse(bytes, n, last) {
     const view = new DataView(bytes.buffer, bytes.byteOffset, n);
+    this.from = this.stats.bytes - n; // where the first of them stands in all bytes
     let at = 0;
     while (at < n) {
       let look = BAD, length = 0;
@@ -95,6 +104,7 @@ export class Parser {
         if (look === GOOD) this.#takeText(bytes, at, length - 2);
       }
       if (look === WAIT && !last) return at;
+      if (look === WAIT) this.#beginCut(view, at, n);
       at = look === GOOD ? at + length : this.#skip(bytes, at, n);
     }
     return n;
@@ -107,25 +117,74 @@ export class Parser {
     if (n - begin < length) return WAIT;
     if (crc32c(view, begin, begin + length) === view.getUint32(at + 12, true)) return GOOD;
     this.stats.bad_payloads++;
+    this.#beginBadFrame('bad payload', view, at);
     return BAD;
   }
 
   #takeFrame(view, at, length) {
     const frame = new Frame(view, at, length - HEADER);
+    this.#endBad(false);
     this.inStep = true;
+    this.last_t_ns = frame.t_ns;
+    const kind = this.sequence.take(frame);
+    if (kind !== '') this.#noticeNumber(kind, at);
+    if (kind === 'repeated' || kind === 'late') return;
     this.stats.frames++;
-    if (!(frame.flags & LOCAL)) this.#count(frame.seq);
     this.onFrame(frame);
   }
 
-  #count(seq) {
-    const jump = this.expected < 0 ? 0 : (seq - this.expected) >>> 0;
-    if (jump !== 0) {
-      this.stats.jumps++;
-      if (jump < 2 ** 31) this.stats.lost_frames += jump;
-      else this.stats.jumps_back++; // the head has started again: how much is missing isn't known
+  #noticeNumber(kind, at) {
+    const {first: seq, n} = this.sequence, s = this.stats;
+    s.jumps += kind === 'gap' || kind === 'restarted' ? 1 : 0;
+    s.jumps_back += kind === 'restarted' ? 1 : 0; // the head has started again: how much is missing isn't known
+    s.lost_frames += kind === 'gap' ? n : 0;
+    s.repeated_frames += kind === 'repeated' ? 1 : 0;
+    s.late_frames += kind === 'late' ? 1 : 0;
+    this.onNotice({kind, at_byte: this.from + at, seq, n, t_ns: this.last_t_ns});
+  }
+
+  // ---- bytes that belong to nothing
+
+  #beginBad(kind, at_byte, t_ns = this.last_t_ns, seq = -1, most = Infinity) {
+    this.#endBad(false);
+    this.bad = {kind, at_byte, t_ns, seq, most, n: 0};
+  }
+
+  // The header at hand is right, and what follows it is not its payload.
+  #beginBadFrame(kind, view, at) {
+    this.#beginBad(kind, this.from + at, view.getBigInt64(at + 16, true), view.getUint32(at + 8, true),
+      HEADER + view.getUint32(at + 4, true));
+  }
+
+  // No more bytes will come, and what is at hand is not whole.
+  #beginCut(view, at, n) {
+    if (view.getUint8(at) === SYNC && n - at >= HEADER) this.#beginBadFrame('cut', view, at);
+    else if (!this.bad || this.bad.n === this.bad.most) this.#beginBad('cut', this.from + at);
+  }
+
+  // What is beyond a broken frame is another thing.
+  #addBad(at_byte, n) {
+    this.stats.bad_bytes += n;
+    const own = this.bad ? Math.min(n, this.bad.most - this.bad.n) : 0;
+    if (own > 0) this.bad.n += own;
+    if (own === n) return;
+    this.#beginBad('bad bytes', at_byte + own);
+    this.bad.n = n - own;
+  }
+
+  // An item follows, or atEnd nothing. A frame that seemed to be cut by the end is a broken one if others stood within
+  // its length.
+  #endBad(atEnd) {
+    if (!this.bad) return;
+    const {at_byte, n, seq, t_ns} = this.bad;
+    let {kind} = this.bad;
+    this.bad = null;
+    if (kind === 'cut' && !atEnd) {
+      kind = seq < 0 ? 'bad bytes' : 'bad payload';
+      this.stats.bad_payloads += seq < 0 ? 0 : 1;
     }
-    this.expected = (seq + 1) >>> 0;
+    this.stats.cuts += kind === 'cut' ? 1 : 0;
+    this.onNotice({kind, at_byte, seq: Math.max(0, seq), n, t_ns});
   }
 
   #lookText(bytes, at, n) {
@@ -137,6 +196,7 @@ export class Parser {
   }
 
   #takeText(bytes, at, length) {
+    this.#endBad(false);
     this.stats.texts++;
     this.onText(String.fromCharCode(...bytes.subarray(at, at + length)));
   }
@@ -146,8 +206,7 @@ export class Parser {
     const sync = bytes.indexOf(SYNC, at + 1);
     const to = sync < 0 || sync > n ? n : sync;
     this.inStep = false;
-    this.stats.bad_bytes += to - at;
-    this.onBad(to - at);
+    this.#addBad(this.from + at, to - at);
     return to;
   }
 }

@@ -89,6 +89,7 @@ int colour_spool_drain(struct colour_spool *spool,
                        void *ctx, const struct sh_report *report, struct sh_err *err)
 {
     struct scanhead_frame frame;
+    struct scanhead_stats stats = {0};
     uint64_t done = 0;
     int rc = open_again(spool, err), got = SCANHEAD_OK;
     for (uint32_t n = 1; rc == SH_OK && (got = scanhead_next(spool->sh, &frame, -1)) == SCANHEAD_OK; n++) {
@@ -100,7 +101,9 @@ int colour_spool_drain(struct colour_spool *spool,
             rc = sh_fail(err, SH_ESTOPPED, "%s: interrupted while it was completed; it is not written",
                          spool->track.path);
     }
-    if (rc == SH_OK && (got != SCANHEAD_ECLOSED || done != spool->bytes))
+    /* Bytes, not frames: after a replug a frame may equal one before, which is then taken for that one. */
+    if (rc == SH_OK) scanhead_get_stats(spool->sh, &stats);
+    if (rc == SH_OK && (got != SCANHEAD_ECLOSED || stats.bytes != spool->bytes || stats.bad_bytes != 0))
         rc = sh_fail(err, SH_EIO, "%s: the frames that were kept can't be read back: %s", spool->track.path,
                      scanhead_error(spool->sh));
     return rc;

@@ -66,6 +66,12 @@ static int gives_up(const struct scanhead_frame *frame)
            frame->event_value[0] != HEAD_SCANNING;
 }
 
+/* The head lost power. Who reads it from within its own process hears of that; others lose the connection. */
+static int goes_off(const struct scanhead_frame *frame)
+{
+    return frame->type == SCANHEAD_EVENT && frame->event == SCANHEAD_EV_STATE && frame->event_value[0] == HEAD_OFF;
+}
+
 static void count_line(struct recording *r, const struct scanhead_frame *frame)
 {
     struct scanhead_line_end end;
@@ -79,7 +85,7 @@ static int has_lost_frames(const struct recording *r)
 {
     struct scanhead_stats stats;
     scanhead_get_stats(r->sh, &stats);
-    return stats.seq_lost + stats.reader_lost + stats.dropped != 0;
+    return stats.seq_lost + stats.reader_lost + stats.dropped + stats.restarts != 0;
 }
 
 static void count_pulses(struct recording *r, const struct scanhead_frame *frame)
@@ -208,6 +214,8 @@ static int step(struct recording *r, int timeout_ms, struct sh_err *err)
     if (r->scan_t0_ns >= 0) r->into_s = 1e-9 * (double)ns_since(frame.t_ns, r->scan_t0_ns);
     if (is_long_enough(r, &frame)) r->stopping = 1;
     rc = r->o->frame(r->o->ctx, r->sh, &frame, err);
+    if (rc == SH_OK && goes_off(&frame) && !r->o->listen)
+        return sh_fail(err, SH_ELOST, "the head lost power, and the scan has no end");
     return rc == SH_OK ? 1 : rc;
 }
 

@@ -56,6 +56,9 @@ int recording_run(struct scanhead *sh, const struct recording_options *options, 
 void recording_add(struct recording_result *sum, const struct recording_result *more);
 /* Writes the result as one JSON object; ctx is the struct recording_result. */
 void recording_put(struct json *json, const void *ctx);
+/* 1: frames came twice or too late, or the head started again; the text says how often. 0: none of it. What came twice
+ * or too late is in no file. */
+int recording_describe_order(const struct recording_result *result, char *text, size_t len);
 /* SH_OK, or what is missing: frames, pulses, parts of scans. Echoes that the head left out do not count. */
 int recording_check_complete(const struct recording_result *result, struct sh_err *err);
 

@@ -1,5 +1,6 @@
 #include "firmware_sim/app/record/recording.h"
 
+#include <stdio.h>
 #include <string.h>
 
 #include "firmware_sim/base/clock.h"
@@ -46,6 +47,9 @@ void recording_put(struct json *json, const void *ctx)
     json_uint(json, "bad_payload", s->bad_payload);
     json_uint(json, "bad_bytes", s->bad_bytes);
     json_uint(json, "seq_lost", s->seq_lost);
+    json_uint(json, "repeated", s->repeated);
+    json_uint(json, "late", s->late);
+    json_uint(json, "restarts", s->restarts);
     json_uint(json, "dropped", s->dropped);
     json_uint(json, "reader_lost_frames", s->reader_lost);
     json_uint(json, "crowded_echoes", result->crowded);
@@ -60,11 +64,28 @@ void recording_put(struct json *json, const void *ctx)
     json_close_object(json);
 }
 
-/* Frames that never came leave gaps in the sequence. Frames with a wrong checksum leave gaps, too, but not at
- * the very end of the stream. */
+/* Frames that never came leave gaps in the sequence. Frames with a wrong checksum leave gaps, too, but not before the
+ * first frame and after the last. */
 static uint64_t count_lost(const struct scanhead_stats *s)
 {
-    return (s->seq_lost > s->bad_payload ? s->seq_lost : s->bad_payload) + s->dropped;
+    return s->seq_lost + s->bad_unseen + s->dropped;
+}
+
+/* Adds ", N what" where there were any. */
+static void add_count(char *text, size_t len, uint64_t n, const char *what)
+{
+    const size_t at = strlen(text);
+    if (n != 0) snprintf(text + at, len - at, "%s%llu %s", at > 0 ? ", " : "", (unsigned long long)n, what);
+}
+
+int recording_describe_order(const struct recording_result *result, char *text, size_t len)
+{
+    const struct scanhead_stats *s = &result->stream;
+    text[0] = '\0';
+    add_count(text, len, s->repeated, "frames came twice (taken once)");
+    add_count(text, len, s->late, "frames came after newer ones (lost)");
+    add_count(text, len, s->restarts, "restarts of the sequence");
+    return text[0] != '\0';
 }
 
 int recording_check_complete(const struct recording_result *result, struct sh_err *err)

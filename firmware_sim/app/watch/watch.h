@@ -3,7 +3,8 @@
  *
  * In: configuration and site. Out: a link for the loop (a client like any other, whose other end the observer reads), and
  * a source for web links. The observer is a thread at the lowest priority that looks at some of the points; a loop never
- * waits for it, unless asked to. Where nobody opens a watch, nothing of this costs anything.
+ * waits for it, unless asked to. Then it has the priority of the loop's threads. Where nobody opens a watch, nothing of
+ * this costs anything.
  *
  *     watch_open(cfg, site, &options, &watch, err)      before the loop is made
  *     loop_options.extra = watch_link(watch), loop_options.web = watch_source(watch); loop_create(...)
@@ -23,7 +24,7 @@
 struct watch;
 
 struct watch_options {
-    double cpu_share;         /* of one processor, that looking at points may take; 0: no limit */
+    double cpu_share;         /* of one processor, that looking at points may take; 0: no limit, and no low priority */
     int waits;                /* 1: the observer holds back the paces fast and step, and so sees everything */
     struct device *device;    /* whose scans they are; is to be closed after the watch */
     uint32_t scene_triangles; /* of /scene, at most, without what moves */

@@ -1,0 +1,102 @@
+// The sequence numbers of frames, as PROTOCOL.md has them (*Sequence numbers*): what is missing, came already, or too late.
+const SEEN = 256, GAPS = 64, GAP_MOST = 65536, LATE_RUN = 256; // how far back a jump is looked into, as libscanhead does
+const LOCAL = 2;
+
+/** Takes the headers of whole frames, one after the other. */
+export class Sequence {
+  #next = -1; // -1: none came yet
+  #n = 0; // frames seen
+  #seq = new Uint32Array(SEEN);
+  #crc = new Uint32Array(SEEN);
+  #length = new Uint32Array(SEEN);
+  #kind = new Uint32Array(SEEN); // type and flags
+  #t_ns = new BigInt64Array(SEEN);
+  #gaps = []; // {first, n}
+  #local = null; // the frame before, if it was LOCAL
+  #lastLate = 0;
+  #lateRun = 0; // late frames in a row, up to that one
+  first = 0;
+  n = 1;
+
+  /** '', or what is noticed of the frame: 'gap': `n` frames are missing from number `first` on; 'restarted': another
+   * sequence begins; 'repeated', 'late': it is to be dropped. `first` is its own number but for a gap. */
+  take(frame) {
+    const {seq} = frame;
+    this.first = seq;
+    this.n = 1;
+    if (frame.flags & LOCAL) return this.#takeLocal(frame);
+    this.#local = null;
+    const notice = this.#next < 0 || seq === this.#next ? '' : this.#jump(frame);
+    if (notice === 'repeated') return notice;
+    this.#remember(frame);
+    if (notice === 'late') return notice;
+    this.#next = (seq + 1) >>> 0;
+    this.#lateRun = 0;
+    return notice;
+  }
+
+  #takeLocal({type, flags, length, payload_crc, t_ns}) {
+    const l = this.#local;
+    const same = l && l.type === type && l.flags === flags && l.length === length && l.payload_crc === payload_crc && l.t_ns === t_ns;
+    this.#local = {type, flags, length, payload_crc, t_ns};
+    return same ? 'repeated' : '';
+  }
+
+  #jump(frame) {
+    const {seq} = frame, missing = (seq - this.#next) >>> 0;
+    if (missing < 2 ** 31) {
+      this.first = this.#next;
+      this.n = missing;
+      this.#addGap(this.#next, missing);
+      return 'gap';
+    }
+    if (this.#hasCome(frame)) return 'repeated';
+    if (this.#fillsGap(seq) && !this.#isRun(seq)) return 'late';
+    this.#n = 0;
+    this.#gaps = [];
+    return 'restarted';
+  }
+
+  #fillsGap(seq) {
+    for (const gap of this.#gaps) {
+      const before = (seq - gap.first) >>> 0;
+      if (before >= gap.n) continue;
+      const rest = gap.n - before - 1;
+      gap.n = before;
+      this.#addGap((seq + 1) >>> 0, rest);
+      return true;
+    }
+    return false;
+  }
+
+  // Of a late frame: so many in a row are another sequence, whose numbers were all missing.
+  #isRun(seq) {
+    this.#lateRun = this.#lateRun > 0 && seq === (this.#lastLate + 1) >>> 0 ? this.#lateRun + 1 : 1;
+    this.#lastLate = seq;
+    return this.#lateRun === LATE_RUN;
+  }
+
+  #addGap(first, n) {
+    if (n === 0 || n > GAP_MOST) return;
+    if (this.#gaps.length === GAPS) this.#gaps.shift();
+    this.#gaps.push({first, n});
+  }
+
+  #remember(frame) {
+    const i = this.#n++ % SEEN;
+    this.#seq[i] = frame.seq;
+    this.#crc[i] = frame.payload_crc;
+    this.#length[i] = frame.length;
+    this.#kind[i] = frame.type | frame.flags << 8;
+    this.#t_ns[i] = frame.t_ns;
+  }
+
+  #hasCome(frame) {
+    const kind = frame.type | frame.flags << 8;
+    for (let i = 0; i < Math.min(this.#n, SEEN); i++) {
+      if (this.#seq[i] === frame.seq && this.#crc[i] === frame.payload_crc && this.#kind[i] === kind &&
+          this.#length[i] === frame.length && this.#t_ns[i] === frame.t_ns) return true;
+    }
+    return false;
+  }
+}

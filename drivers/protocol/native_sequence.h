@@ -1,0 +1,63 @@
+/* The sequence numbers of frames: which frame comes in order, which came already, which comes too late, and which are
+ * missing. PROTOCOL.md, *Sequence numbers*, has the rules.
+ *
+ * Headers of whole frames go in, one after the other. For each comes out what is to be noticed about it. Numbers are
+ * modulo 2^32 throughout. A frame in order costs one store; only a jump is looked into. */
+#ifndef DRIVERS_PROTOCOL_NATIVE_SEQUENCE_H
+#define DRIVERS_PROTOCOL_NATIVE_SEQUENCE_H
+
+#include <stdint.h>
+
+struct native_header;
+
+/* What is noticed of a stream. The values are those of enum scanhead_notice_kind, which says what each means. */
+enum native_notice_kind {
+    NATIVE_NO_NOTICE = 0,
+    NATIVE_GAP = 1,
+    NATIVE_REPEATED = 2,
+    NATIVE_LATE = 3,
+    NATIVE_RESTARTED = 4,
+    NATIVE_BAD_PAYLOAD = 5,
+    NATIVE_BAD_BYTES = 6,
+    NATIVE_CUT = 7,
+};
+
+enum {
+    NATIVE_SEEN = 256,       /* frames that a repeated one is compared with */
+    NATIVE_GAPS = 64,        /* ranges of missing frames that a late one may be of */
+    NATIVE_GAP_MOST = 65536, /* frames in such a range: where more are missing, none of them is waited for */
+    NATIVE_LATE_RUN = 256,   /* late frames in a row, one after the other: so many are another sequence */
+};
+
+struct native_seen {
+    int64_t t_ns;
+    uint32_t seq, payload_crc, length;
+    uint8_t type, flags;
+};
+
+struct native_sequence {
+    int have;  /* a counted frame has come: */
+    int fresh; /* another connection has begun, and none has come on it yet */
+    uint32_t next;
+    uint32_t last_late, late_run; /* the last late frame, and how many came in a row up to it */
+    uint32_t n_seen, n_gaps;      /* since the start; the last NATIVE_SEEN and NATIVE_GAPS of them are kept */
+    struct native_seen seen[NATIVE_SEEN];
+    struct {
+        uint32_t first, n;
+    } gap[NATIVE_GAPS];
+    struct native_seen local; /* the frame before, if it was LOCAL; else type 0 */
+};
+
+/* All zero: nothing has come yet. */
+
+/* Takes the next whole frame. NATIVE_NO_NOTICE: in order, or LOCAL. NATIVE_GAP: *n frames from *first on are missing
+ * before it. NATIVE_RESTARTED: the sequence begins anew with it. NATIVE_REPEATED, NATIVE_LATE: it is to be dropped.
+ * *first is its own number but for a gap. *n is 1 but for a gap. */
+enum native_notice_kind native_sequence_take(struct native_sequence *sequence, const struct native_header *header,
+                                             uint32_t *first, uint32_t *n);
+
+/* What follows comes on another connection. The first frame there is REPEATED only if it is the one that came last, and
+ * never LATE: the head may have started again. */
+void native_sequence_resume(struct native_sequence *sequence);
+
+#endif

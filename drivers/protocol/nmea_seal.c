@@ -1,0 +1,49 @@
+/* Sentences whose numbers are changed, and whose checksums are made right again. */
+#include <string.h>
+
+#include "drivers/protocol/nmea.h"
+
+enum { TAIL_LEN = 3 }; /* "*hh" */
+
+/* The next sentence from *at on: from its "$" to its "*", which has two digits after it. Returns 0: there is none. */
+static int next_sentence(const uint8_t *bytes, size_t len, size_t *at, size_t *star)
+{
+    while (*at < len) {
+        const uint8_t *begin = memchr(bytes + *at, '$', len - *at);
+        if (begin == NULL) return 0;
+        *at = (size_t)(begin - bytes);
+        *star = *at + 1;
+        while (*star < len && bytes[*star] >= ' ' && bytes[*star] <= '~' && bytes[*star] != '*' && bytes[*star] != '$')
+            ++*star;
+        if (*star + TAIL_LEN <= len && bytes[*star] == '*') return 1;
+        *at = *star;
+    }
+    return 0;
+}
+
+/* Bits that turn a digit into another one, whichever of them change. */
+static uint8_t digit_bits(uint8_t c)
+{
+    return c >= '0' && c <= '7' ? 7 : c == '8' || c == '9' ? 1 : 0;
+}
+
+void nmea_content(const uint8_t *bytes, size_t len, uint8_t *mask)
+{
+    for (size_t at = 0, star; next_sentence(bytes, len, &at, &star); at = star) {
+        int is_decimal = 0;
+        for (size_t i = at; i < star; i++) {
+            is_decimal = bytes[i] == '.' || (is_decimal && bytes[i] >= '0' && bytes[i] <= '9');
+            if (is_decimal) mask[i] = digit_bits(bytes[i]);
+        }
+    }
+}
+
+void nmea_reseal(uint8_t *bytes, size_t len)
+{
+    static const char hex[] = "0123456789ABCDEF";
+    for (size_t at = 0, star; next_sentence(bytes, len, &at, &star); at = star) {
+        const uint8_t sum = nmea_checksum((const char *)bytes + at + 1, star - at - 1);
+        bytes[star + 1] = (uint8_t)hex[sum >> 4];
+        bytes[star + 2] = (uint8_t)hex[sum & 15];
+    }
+}

@@ -1,0 +1,57 @@
+/* Replies whose data are changed, and whose sums are made right again. */
+#include <string.h>
+
+#include "drivers/protocol/scip_reply.h"
+
+/* Lines of a reply, by number. */
+enum { ECHO, STATUS, TIME, DATA };
+
+struct line {
+    size_t at, len; /* len: without LF; its last character is the sum */
+    size_t number;
+};
+
+/* The next line that has its end. Returns 0: there is none. */
+static int next_line(const uint8_t *unit, size_t len, struct line *line)
+{
+    const size_t at = line->number == SIZE_MAX ? 0 : line->at + line->len + 1;
+    const uint8_t *end = at < len ? memchr(unit + at, '\n', len - at) : NULL;
+    if (end == NULL) return 0;
+    *line = (struct line){at, (size_t)(end - unit) - at, line->number + 1};
+    return 1;
+}
+
+/* Whether the reply is a scan: G, H, M, N. */
+static int is_scan(const uint8_t *unit)
+{
+    return strchr("GHMN", unit[0]) != NULL && unit[0] != 0;
+}
+
+/* A character of data is six bits above 0x30. Its lower four may change, whichever they are. */
+void scip_content(const uint8_t *unit, size_t len, uint8_t *mask)
+{
+    struct line line = {.number = SIZE_MAX};
+    while (next_line(unit, len, &line) && is_scan(unit))
+        for (size_t i = line.at; line.number >= DATA && i + 1 < line.at + line.len; i++)
+            if (unit[i] >= 0x30 && unit[i] <= 0x6f) mask[i] = 0x0f;
+}
+
+static uint8_t sum_of(const uint8_t *bytes, size_t len)
+{
+    uint32_t sum = 0;
+    for (size_t i = 0; i < len; i++)
+        sum += bytes[i];
+    return (uint8_t)((sum & 0x3f) + 0x30);
+}
+
+/* The sum of a key line leaves out the ';' before it. Data may have such a character, too. */
+void scip_reseal(uint8_t *unit, size_t len)
+{
+    struct line line = {.number = SIZE_MAX};
+    while (next_line(unit, len, &line)) {
+        uint8_t *bytes = unit + line.at;
+        if (line.number == ECHO || line.len < 2) continue;
+        const int is_key = line.number > STATUS && !is_scan(unit) && bytes[line.len - 2] == ';';
+        bytes[line.len - 1] = sum_of(bytes, line.len - (is_key ? 2 : 1));
+    }
+}

@@ -1,0 +1,41 @@
+/* What a device does wrong on request. How a transfer is shortened is in usb_core.c, what a configuration says of its
+ * length in control.c. */
+#include "drivers/usb/usb_core.h"
+
+void usb_device_restart(struct usb_device *device)
+{
+    const int configured = device->state == USB_CONFIGURED;
+    if (device->state == USB_DETACHED) return;
+    usb_device_reset(device, device->rate);
+    usb_device_assume_address(device);
+    if (configured) usb_enter(device, USB_CONFIGURED, USB_END_RESET);
+}
+
+int usb_device_halt(struct usb_device *device, uint8_t endpoint)
+{
+    struct usb_pipe *pipe = usb_pipe(device, endpoint);
+    if (pipe->row == NULL) return 0;
+    usb_set_halt(device, pipe, 1);
+    return 1;
+}
+
+void usb_device_shorten(struct usb_device *device, uint8_t endpoint, uint32_t n)
+{
+    struct usb_pipe *pipe = usb_pipe(device, endpoint);
+    if (pipe->row != NULL) pipe->shorten += n;
+}
+
+void usb_device_set_slow(struct usb_device *device, double ms)
+{
+    device->slow_ms = ms;
+}
+
+double usb_device_slow_ms(const struct usb_device *device)
+{
+    return device->slow_ms;
+}
+
+void usb_device_lengthen(struct usb_device *device, uint32_t n)
+{
+    device->lengthen = n;
+}

@@ -1,0 +1,77 @@
+#include "firmware_sim/fault/wire_heard.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/grow.h"
+
+enum { HEARD_MAX = 65536, LINE_MAX_LEN = 256 /* longer ones are answered, too; so much of them is kept */ };
+
+static void keep(struct wire_heard *heard, const uint8_t *bytes, size_t len)
+{
+    if (heard->len + len > HEARD_MAX) heard->len = heard->begin = 0; /* too much without an answer */
+    if (!grow(&heard->bytes, &heard->room, heard->len + len, 1)) return;
+    memcpy(heard->bytes + heard->len, bytes, len);
+    heard->len += len;
+}
+
+/* Lines of blanks have no answer (command_lines_feed), unless they are too long. */
+static void end_line(struct wire_heard *heard)
+{
+    if (heard->line_len == 0 || (heard->is_blank && heard->line_len <= LINE_MAX_LEN))
+        heard->len = heard->begin;
+    else
+        keep(heard, (const uint8_t *)"\n", 1);
+    heard->begin = heard->len;
+    heard->line_len = 0;
+}
+
+static void add_byte(struct wire_heard *heard, uint8_t byte)
+{
+    const int ends = byte == '\r' || (byte == '\n' && !heard->last_cr), skips = byte == '\n' && heard->last_cr;
+    heard->last_cr = byte == '\r';
+    if (skips) return;
+    if (ends) {
+        end_line(heard);
+        return;
+    }
+    if (heard->line_len == 0) heard->is_blank = 1;
+    heard->is_blank &= byte == ' ' || byte == '\t';
+    if (heard->line_len++ < LINE_MAX_LEN) keep(heard, &byte, 1);
+}
+
+void wire_heard_add(struct wire_heard *heard, const void *bytes, size_t len)
+{
+    const uint8_t *from = bytes;
+    if (!heard->has_lines && len <= HEARD_MAX) keep(heard, bytes, len);
+    for (size_t i = 0; heard->has_lines && i < len; i++)
+        add_byte(heard, from[i]);
+}
+
+const uint8_t *wire_heard_first(const struct wire_heard *heard, size_t *len)
+{
+    *len = heard->has_lines ? heard->begin : heard->len;
+    if (heard->unheard != 0 || *len == 0) return NULL;
+    if (heard->has_lines) *len = (size_t)((const uint8_t *)memchr(heard->bytes, '\n', *len) - heard->bytes);
+    return heard->bytes;
+}
+
+void wire_heard_answered(struct wire_heard *heard)
+{
+    size_t n;
+    if (heard->unheard != 0) {
+        heard->unheard--;
+    } else if (!heard->has_lines) {
+        heard->len = 0;
+    } else if (wire_heard_first(heard, &n) != NULL) {
+        memmove(heard->bytes, heard->bytes + n + 1, heard->len - n - 1);
+        heard->len -= n + 1;
+        heard->begin -= n + 1;
+    }
+}
+
+void wire_heard_free(struct wire_heard *heard)
+{
+    free(heard->bytes);
+    *heard = (struct wire_heard){.has_lines = heard->has_lines};
+}

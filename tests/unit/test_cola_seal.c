@@ -1,0 +1,102 @@
+/* CoLa: LMDscandata whose values are changed on request, with a check byte that is right. Read by the public layout
+ * alone (cola_rig). */
+#include "tests/unit/cola_rig.h"
+#include "tests/unit/seal_rig.h"
+
+static struct protocol_rig_shot shots[40];
+
+/* Length and check byte of CoLa-B, which cola_read_lmd doesn't look at. */
+static void check_frame(const uint8_t *unit, size_t len)
+{
+    uint8_t check = 0;
+    if (unit[1] != 2) return;
+    assert_int_equal((uint32_t)unit[4] << 24 | (uint32_t)unit[5] << 16 | (uint32_t)unit[6] << 8 | unit[7], len - 9);
+    for (size_t i = 8; i < len; i++)
+        check ^= unit[i];
+    assert_int_equal(check, 0);
+}
+
+static const void *read_scan(const uint8_t *unit, size_t len, size_t *size)
+{
+    static struct cola_lmd lmd;
+    check_frame(unit, len);
+    memcpy(cola.bytes, unit, len);
+    cola.n_units = 1;
+    cola.end[0] = len;
+    cola_read_lmd(0, &lmd);
+    *size = sizeof lmd;
+    return &lmd;
+}
+
+/* Twelve beams of a head with 48 steps; settings as LMDscandatacfg has them in CoLa-A. Returns the telegram. */
+static size_t telegram(const char *cfg, int is_b, uint8_t *unit)
+{
+    protocol_rig_open(&cola, PROTOCOL_COLA, "SICK", "LMS111");
+    protocol_rig_planar(&cola, 48, 0, 11, 6, -1, 10);
+    cola.scan_t0_ns = INT64_C(1000000000);
+    cola.utc0_ns = INT64_C(1767323040000000000);
+    protocol_rig_describe(&cola, 0);
+    for (int i = 0; i < 12; i++)
+        shots[i] = (struct protocol_rig_shot){i % 3 == 0 ? 2 : 1, {0.7 * i + 0.6, 17.0}, {(int16_t)(-100 * i), -700}, {0}};
+    cola_authorise();
+    cola_expect(cfg, "sWA LMDscandatacfg");
+    cola_stream(is_b);
+    protocol_rig_clear(&cola);
+    protocol_rig_turn(&cola, 0, shots, 5);
+    assert_int_equal(cola.n_units, 1);
+    memcpy(unit, cola.bytes, cola.len);
+    return cola.len;
+}
+
+static void check(const char *cfg, int is_b, uint32_t n_bits)
+{
+    static uint8_t unit[4096];
+    const size_t len = telegram(cfg, is_b, unit);
+    if (n_bits != 0) assert_int_equal(seal_count(cola.ops, unit, len), n_bits);
+    assert_true(seal_count(cola.ops, unit, len) > 12);
+    seal_check(cola.ops, unit, len, read_scan);
+    seal_check_broken(cola.ops, unit, len);
+    cola_close();
+}
+
+/* Channels, RSSI, 16 bit, unit, encoder, position, name, comment, time, every. */
+static void values_of_all_kinds(void **state)
+{
+    (void)state;
+    static const char *const cfg[] = {"sWN LMDscandatacfg 1 0 0 0 0 0 0 0 0 0 0 1",
+                                      "sWN LMDscandatacfg 3 0 1 0 0 1 0 0 0 0 1 1",
+                                      "sWN LMDscandatacfg 3 0 1 1 0 0 0 0 1 0 1 1"};
+    static const uint32_t n_bits[] = {12 * 16, 2 * 12 * (16 + 8), 2 * 12 * (16 + 16)};
+    for (int i = 0; i < 3; i++) {
+        check(cfg[i], 1, n_bits[i]);
+        check(cfg[i], 0, 0); /* as many as the digits have */
+    }
+}
+
+/* Other telegrams have nothing that is measured. Their check byte is made right, too. */
+static void answers_keep_their_check_byte(void **state)
+{
+    (void)state;
+    static const char answer[] = "sRA SCdevicestate \1";
+    uint8_t right[64], wrong[64];
+    const size_t len = cola_frame_b(right, answer, sizeof answer - 1);
+    cola_open_lms();
+    assert_int_equal(seal_count(cola.ops, right, len), 0);
+    memcpy(wrong, right, len);
+    wrong[len - 1] ^= 0x55;
+    cola.ops->reseal(wrong, len);
+    assert_memory_equal(wrong, right, len);
+    static const uint8_t in_a[] = "\2sRA SCdevicestate 1\3";
+    assert_int_equal(seal_count(cola.ops, in_a, sizeof in_a - 1), 0);
+    seal_check_broken(cola.ops, right, len);
+    cola_close();
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(values_of_all_kinds),
+        cmocka_unit_test(answers_keep_their_check_byte),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

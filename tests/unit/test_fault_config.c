@@ -1,0 +1,211 @@
+/* Faults on request as the configuration, scenarios and FAULt:ADD read them: which keys a kind has, their limits, and
+ * what they are when not given. */
+#include "firmware_sim/command/command.h"
+#include "tests/unit/config_rig.h"
+
+/* Kinds with the keys that say what; and whether for_ms must be given. By hand, from fault/README.md. */
+static const struct {
+    const char *kind, *keys;
+    int needs_ms;
+} kinds[] = {
+    {"drop", "", 0},
+    {"duplicate", "n", 0},
+    {"reorder", "n", 0},
+    {"delay", "for_ms", 1},
+    {"jitter", "for_ms", 1},
+    {"truncate", "n", 0},
+    {"flip", "n byte reseal", 0},
+    {"stall", "for_ms", 1},
+    {"split", "n", 0},
+    {"merge", "n", 0},
+    {"garbage", "n", 0},
+    {"no_reply", "", 0},
+    {"late_reply", "for_ms", 1},
+    {"wrong_reply", "", 0},
+    {"echo", "", 0},
+};
+enum { N_KINDS = sizeof kinds / sizeof kinds[0] };
+
+static const struct {
+    const char *key, *value;
+} what[] = {{"n", "5"},     {"byte", "30"}, {"reseal", "on"}, {"for_ms", "3"}, {"factor", "0.5"},
+            {"deg", "1"},   {"hz", "2"},    {"loss_db", "3"}, {"jump_s", "1"}, {"ppm", "5"}};
+enum { N_WHAT = sizeof what / sizeof what[0] };
+
+static struct fault fault;
+
+static int read_fault(const char *text)
+{
+    memset(&err, 0, sizeof err);
+    return config_read_fault(cfg, text, &fault, &err);
+}
+
+static void load_base(void)
+{
+    assert_int_equal(load_text(base), SH_OK);
+}
+
+static int has(const char *keys, const char *key)
+{
+    const size_t len = strlen(key);
+    const char *at = strstr(keys, key);
+    return at != NULL && (at == keys || at[-1] == ' ') && (at[len] == ' ' || at[len] == '\0');
+}
+
+static void a_kind_has_its_keys_and_no_others(void **state)
+{
+    (void)state;
+    load_base();
+    for (size_t i = 0; i < N_KINDS; i++)
+        for (size_t k = 0; k < N_WHAT; k++) {
+            char text[200], want[120];
+            const int is_ms = strcmp(what[k].key, "for_ms") == 0, allowed = has(kinds[i].keys, what[k].key);
+            snprintf(text, sizeof text, "{kind: %s, %s: %s%s}", kinds[i].kind, what[k].key, what[k].value,
+                     kinds[i].needs_ms && !is_ms ? ", for_ms: 3" : "");
+            const int code = read_fault(text);
+            if ((code == SH_OK) != allowed) fail_msg("%s: %s", text, err.text);
+            snprintf(want, sizeof want, "faults[0].%s: %s has no such key", what[k].key, kinds[i].kind);
+            if (!allowed) assert_says(want);
+        }
+}
+
+static void what_is_not_given_is_as_said(void **state)
+{
+    (void)state;
+    load_base();
+    for (size_t i = 0; i < N_KINDS; i++) {
+        char text[200];
+        snprintf(text, sizeof text, "{kind: %s%s}", kinds[i].kind, kinds[i].needs_ms ? ", for_ms: 2.5" : "");
+        assert_int_equal(read_fault(text), SH_OK);
+        assert_string_equal(fault_names[fault.kind], kinds[i].kind);
+        assert_true(fault.link == 0 && fault.of == FAULT_OF_STREAM && fault.at == 0 && fault.from == 1 &&
+                    fault.until == 0 && fault.every == 1 && fault.probability == 1.0 && fault.count == 0);
+        assert_true(fault.from_pulse == 0 && fault.until_pulse == UINT64_MAX && fault.from_s == 0.0 &&
+                    fault.until_s == 0.0 && fault.seed == 1 && fault.n == 0 && fault.byte == -1 && !fault.reseal);
+        assert_true(fault.for_ms == (kinds[i].needs_ms ? 2.5 : 0.0));
+    }
+    read_fault("{kind: split}");
+    assert_int_equal(fault_n(&fault), 2);
+    read_fault("{kind: garbage}");
+    assert_int_equal(fault_n(&fault), 16);
+    read_fault("{kind: truncate}");
+    assert_int_equal(fault_n(&fault), 0);
+    read_fault("{kind: flip}");
+    assert_int_equal(fault_n(&fault), 1);
+}
+
+static void wrong_ones_are_refused_with_what_is_allowed(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *text, *says;
+    } wrong[] = {
+        {"{}", "faults[0].kind"},
+        {"{every: 10}", "faults[0].kind"},
+        {"{kind: dorp}", "faults[0].kind: "},
+        {"{kind: drop, evry: 10}", "faults[0].evry: unknown key, did you mean faults[0].every?"},
+        {"{kind: drop, every: 0}", "faults[0].every: \"0\" is out of range; allowed a whole number, 1 to"},
+        {"{kind: drop, every: -1}", "faults[0].every: "},
+        {"{kind: drop, from: 0}", "faults[0].from: \"0\" is out of range"},
+        {"{kind: drop, at: 1.5}", "faults[0].at: "},
+        {"{kind: drop, probability: 1.1}", "faults[0].probability: \"1.1\" is out of range; allowed 0 to 1"},
+        {"{kind: drop, probability: .nan}", "faults[0].probability: "},
+        {"{kind: drop, of: points}", "faults[0].of: "},
+        {"{kind: drop, link: 2}", "faults[0].link: there is no link 2; allowed 0 to 1"},
+        {"{kind: drop, link: 9}", "faults[0].link: "},
+        {"{kind: drop, at: 3, every: 2}", "faults[0].at: is one number alone; allowed without from, until and every"},
+        {"{kind: drop, at: 3, from: 2}", "faults[0].at: is one number alone"},
+        {"{kind: drop, from: 5, until: 4}", "faults[0].until: is before from, which is 5"},
+        {"{kind: drop, from_s: 2, until_s: 2}", "faults[0].until_s: is not after from_s, which is 2 s"},
+        {"{kind: drop, from_pulse: 7, until_pulse: 6}", "faults[0].until_pulse: is before from_pulse, which is 7"},
+        {"{kind: no_reply, of: notices}", "faults[0].of: no_reply has no such key"},
+        {"{kind: no_reply, from_pulse: 1}", "faults[0].from_pulse: no_reply has no such key"},
+        {"{kind: delay}", "faults[0].kind: delay needs for_ms; allowed above 0 to 1e8 ms"},
+        {"{kind: delay, for_ms: 0}", "faults[0].for_ms: delay needs for_ms"},
+        {"{kind: delay, for_ms: 2e8}", "faults[0].for_ms: "},
+        {"{kind: duplicate, n: 101}", "faults[0].n: 101 is too many for duplicate; allowed up to 100"},
+        {"{kind: reorder, n: 1001}", "allowed up to 1000"},
+        {"{kind: split, n: 65}", "allowed up to 64"},
+        {"{kind: merge, n: 65}", "allowed up to 64"},
+        {"{kind: garbage, n: 1025}", "allowed up to 1024"},
+        {"{kind: flip, n: 1001}", "allowed up to 1000"},
+        {"{kind: flip, byte: -1}", "faults[0].byte: "},
+        {"{kind: endpoint_stall, link: 1}", "link 1 can't have endpoint_stall; allowed 0, or a link that can"},
+        {"drop", "faults[0]"},
+        {"{kind: drop}, {kind: flip}", "2 faults; allowed one"},
+        {"{kind: drop", "not YAML"},
+        {"{kind: drop}} #", "not YAML"},
+        {"", "0 faults; allowed one"},
+    };
+    load_base();
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        if (read_fault(wrong[i].text) == SH_OK) fail_msg("'%s' is taken", wrong[i].text);
+        if (strstr(err.text, wrong[i].says) == NULL) fail_msg("'%s': %s", wrong[i].text, err.text);
+    }
+}
+
+/* A command line is long enough for many keys, and no longer text is cut. */
+static void the_longest_fault_fits_a_command_line(void **state)
+{
+    (void)state;
+    static const char text[] =
+        "{kind: flip, link: 1, of: stream, from: 10, until: 900000000000000, every: 7, probability: 0.123456, count: 10, "
+        "from_pulse: 1000000, until_pulse: 20000000, from_s: 1.5, until_s: 123456, seed: 1234567, n: 9, byte: 50, "
+        "reseal: on}";
+    load_base();
+    assert_true(strlen("FAUL:ADD ") + strlen(text) <= COMMAND_MAX_LINE);
+    assert_int_equal(read_fault(text), SH_OK);
+    assert_true(fault.until == 900000000000000 && fault.probability == 0.123456 && fault.until_s == 123456.0 &&
+                fault.seed == 1234567 && fault.byte == 50 && fault.reseal == 1);
+    char overlong[2000];
+    memset(overlong, ' ', sizeof overlong);
+    memcpy(overlong, "{kind: drop", 11);
+    strcpy(overlong + 1990, "}");
+    assert_int_equal(read_fault(overlong), SH_EINPUT);
+    assert_says("longer than");
+}
+
+static void faults_stand_in_the_configuration_and_in_scenarios(void **state)
+{
+    (void)state;
+    char path[256];
+    struct config_faults wrong;
+    assert_int_equal(load_edited("output:", "faults:\n  - {kind: drop, every: 7}\n  - {kind: echo}\noutput:"), SH_OK);
+    assert_int_equal(cfg->faults.n, 2);
+    assert_true(cfg->faults.fault[0].every == 7 && cfg->faults.fault[1].kind == FAULT_ECHO);
+    write_in("scenario.yaml", "faults:\n  - {kind: flip, n: 2}\n");
+    snprintf(path, sizeof path, "%s/scenario.yaml", dir);
+    assert_int_equal(config_add_scenario(cfg, path, &wrong), SH_OK);
+    assert_true(cfg->faults.n == 3 && cfg->faults.fault[2].n == 2 && cfg->faults.fault[2].until_pulse == UINT64_MAX);
+    write_in("scenario.yaml", "faults:\n  - {kind: flip, m: 2}\n");
+    assert_int_equal(config_add_scenario(cfg, path, &wrong), SH_EINPUT);
+    assert_non_null(strstr(wrong.fault[0].text, "scenario.yaml:2: faults[0].m: unknown key"));
+    write_in("scenario.yaml", "head: {}\n");
+    assert_int_equal(config_add_scenario(cfg, path, &wrong), SH_EINPUT);
+    write_in("scenario.yaml", "faults: []\n");
+    assert_int_equal(config_add_scenario(cfg, path, &wrong), SH_EINPUT);
+    assert_non_null(strstr(wrong.fault[0].text, "a scenario is a list of them"));
+    char many[4096] = "faults:\n";
+    for (int i = 0; i < 30; i++)
+        strcat(many, "  - {kind: drop}\n");
+    write_in("scenario.yaml", many);
+    assert_int_equal(config_add_scenario(cfg, path, &wrong), SH_EINPUT);
+    assert_non_null(strstr(wrong.fault[0].text, "30 faults, and the configuration has 3; allowed 32 together"));
+    assert_int_equal(cfg->faults.n, 3); /* as it was */
+    snprintf(path, sizeof path, "%s/none.yaml", dir);
+    assert_int_equal(config_add_scenario(cfg, path, &wrong), SH_EINPUT);
+    assert_int_equal(load_edited("output:", "faults:\n  - {kind: drop, link: 2}\noutput:"), SH_EINPUT);
+    assert_says(":17: faults[0].link: there is no link 2");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_kind_has_its_keys_and_no_others),
+        cmocka_unit_test(what_is_not_given_is_as_said),
+        cmocka_unit_test(wrong_ones_are_refused_with_what_is_allowed),
+        cmocka_unit_test(the_longest_fault_fits_a_command_line),
+        cmocka_unit_test(faults_stand_in_the_configuration_and_in_scenarios),
+    };
+    return cmocka_run_group_tests_name("faults in the configuration", tests, set_up, tear_down);
+}

@@ -1,0 +1,536 @@
+/* Faults on the wire, each kind by itself: exactly the frames that it notes are changed, at exactly that byte. All others
+ * come as they were, and in order. */
+#include "drivers/protocol/native.h"
+#include "tests/unit/wire_rig.h"
+
+static struct fault f;
+
+/* One fault, and so many frames of the stream. */
+static void run_one(uint32_t n_frames)
+{
+    rig_open(&f, 1, 1);
+    for (uint32_t i = 0; i < n_frames; i++)
+        rig_frame(RIG_STREAM);
+}
+
+static void end_one(uint32_t whole)
+{
+    rig_drain();
+    assert_int_equal(rig_check_notes(), whole);
+    rig_close();
+}
+
+static int close_rig(void **state)
+{
+    (void)state;
+    rig_close();
+    return 0;
+}
+
+static void dropped_frames_are_missing(void **state)
+{
+    (void)state;
+    f = fault_of_kind(FAULT_DROP);
+    f.from = 2;
+    f.every = 3;
+    run_one(9);
+    rig_drain();
+    rig_expect((const int[]){0, 2, 3, 5, 6, 8, -1});
+    assert_int_equal(rig.n_notes, 3);
+    for (uint32_t i = 0; i < 3; i++) {
+        const struct fault_note *note = &rig.note[i];
+        assert_true(note->kind == FAULT_DROP && note->fault == 1 && note->number == 2 + 3 * i && note->byte == -1);
+        assert_true(note->has_seq && note->seq == UINT32_MAX - 5 + (uint32_t)note->number - 1);
+        assert_true(note->type == NATIVE_LINE_END && !note->has_pulse && note->of == FAULT_OF_STREAM);
+    }
+    assert_int_equal(fault_board_injected(rig.board, 1), 3);
+    assert_int_equal(fault_board_injected(rig.board, 0), 3);
+    end_one(6);
+}
+
+static void duplicates_follow_at_once(void **state)
+{
+    (void)state;
+    f = fault_of_kind(FAULT_DUPLICATE);
+    f.at = 2;
+    f.n = 3;
+    run_one(3);
+    rig_drain();
+    rig_expect((const int[]){0, 1, 1, 1, 1, 2, -1});
+    assert_true(rig.n_notes == 1 && rig.note[0].n == 3);
+    end_one(6);
+}
+
+/* It comes after the frame whose number is n higher, in its own counting. */
+static void a_reordered_frame_comes_behind_as_many_as_noted(void **state)
+{
+    (void)state;
+    int seen[4] = {0};
+    for (uint64_t seed = 1; seed <= 30; seed++) {
+        f = fault_of_kind(FAULT_REORDER);
+        f.at = 2;
+        f.n = 3;
+        f.seed = seed;
+        rig_open(&f, 1, 1);
+        for (int i = 0; i < 8; i++) {
+            rig_frame(RIG_STREAM);
+            if (i % 3 == 0) rig_frame(RIG_NOTICE);
+            rig_take(0); /* all that may go out has gone before the next comes */
+        }
+        assert_int_equal(rig.n_notes, 1);
+        assert_in_range(rig.note[0].n, 1, 3);
+        seen[rig.note[0].n]++;
+        assert_true(wire_is_empty(rig.wire));
+        end_one(11);
+    }
+    assert_true(seen[1] > 0 && seen[2] > 0 && seen[3] > 0);
+}
+
+static void frames_that_are_all_reordered_all_come(void **state)
+{
+    (void)state;
+    f = fault_of_kind(FAULT_REORDER);
+    f.n = 20;
+    run_one(300);
+    assert_true(rig_take(0) > 250); /* no one waits for ever: at most those of the last 20 */
+    end_one(300);
+    assert_int_equal(rig.n_notes, 300);
+}
+
+/* Those beyond the end come when nothing more does, or two seconds of device time later. */
+static void a_held_frame_waits_no_longer_than_said(void **state)
+{
+    (void)state;
+    f = fault_of_kind(FAULT_REORDER);
+    f.at = 1;
+    f.n = 1000;
+    rig_open(&f, 1, 1);
+    rig_frame_at(RIG_STREAM, 50, 0, 0);
+    rig_frame_at(RIG_STREAM, 50, WIRE_HOLD_MS * MS, 0);
+    assert_int_equal(rig_take(0), 1);
+    assert_true(rig.note[0].n > 3);
+    rig_frame_at(RIG_STREAM, 50, WIRE_HOLD_MS * MS + 1, 0);
+    assert_int_equal(rig_take(0), 2);
+    rig_expect((const int[]){1, 0, 2, -1});
+    rig_close();
+    rig_open(&f, 1, 1);
+    rig_frame_at(RIG_STREAM, 50, 0, 0);
+    assert_int_equal(wire_time(rig.wire, WIRE_HOLD_MS * MS), SH_OK);
+    assert_int_equal(rig_take(0), 0);
+    assert_int_equal(wire_next_ns(rig.wire), INT64_MAX); /* time alone brings nothing: nobody spins for it */
+    assert_int_equal(wire_time(rig.wire, WIRE_HOLD_MS * MS + 1), SH_OK);
+    assert_int_equal(rig_take(0), 1);
+}
+
+static void a_delayed_frame_is_not_overtaken(void **state)
+{
+    (void)state;
+    f = fault_of_kind(FAULT_DELAY);
+    f.at = 2;
+    f.for_ms = 5.0;
+    rig_open(&f, 1, 1);
+    for (int i = 0; i < 3; i++)
+        rig_frame(RIG_STREAM);
+    const int64_t due_ns = 1000 * MS + 1000 + 5 * MS; /* the second was put 1 us after the first */
+    assert_int_equal(rig_take(0), 1);
+    assert_int_equal(wire_next_ns(rig.wire), due_ns);
+    rig.now_ns = due_ns - 1;
+    assert_int_equal(rig_take(0), 0);
+    rig.now_ns = due_ns;
+    assert_int_equal(rig_take(0), 2); /* and the third with it */
+    rig_frame(RIG_STREAM);
+    assert_int_equal(rig_take(0), 1); /* later ones come at once */
+    assert_true(rig.n_notes == 1 && rig.note[0].for_ms == 5.0);
+    end_one(4);
+}
+
+static void jitter_stays_below_its_time_and_in_order(void **state)
+{
+    (void)state;
+    enum { N = 200 };
+    double sum_ms = 0.0;
+    f = fault_of_kind(FAULT_JITTER);
+    f.for_ms = 2.0;
+    rig_open(&f, 1, 1);
+    int64_t put_ns[N];
+    for (int i = 0; i < N; i++) {
+        rig_take(0);
+        put_ns[i] = rig.now_ns;
+        rig_frame(RIG_STREAM);
+        rig.now_ns += 100000;
+    }
+    rig_drain();
+    assert_int_equal(rig.n_writes, N);
+    for (int i = 0; i < N; i++) {
+        assert_true(rig.note[i].for_ms >= 0.0 && rig.note[i].for_ms < 2.0);
+        assert_true(rig.write[i].at_ns >= put_ns[i] + (int64_t)(rig.note[i].for_ms * 1e6));
+        assert_true(rig.write[i].at_ns < put_ns[i] + 2 * MS + 102000); /* the test looks each 101 us */
+        sum_ms += rig.note[i].for_ms;
+    }
+    assert_true(sum_ms > 0.7 * N && sum_ms < 1.3 * N); /* mean 1 ms; 0.3 are 7 sigma of 2 / sqrt(12 N) */
+    end_one(N);
+}
+
+static void truncated_frames_lack_their_end(void **state)
+{
+    (void)state;
+    f = fault_of_kind(FAULT_TRUNCATE);
+    f.at = 2;
+    f.n = 7;
+    run_one(3);
+    assert_true(rig.note[0].n == 7 && rig.note[0].byte == (int64_t)rig.item[1].len - 7);
+    end_one(2);
+    f.n = 1000000; /* more than there are: one byte is left */
+    run_one(3);
+    assert_true(rig.note[0].n == rig.item[1].len - 1 && rig.note[0].byte == 1);
+    end_one(2);
+    f.n = 0; /* any number */
+    f.at = 0;
+    run_one(100);
+    for (uint32_t i = 0; i < rig.n_notes; i++)
+        assert_in_range(rig.note[i].n, 1, rig.item[i].len - 1);
+    assert_int_equal(rig.n_notes, 100);
+    end_one(0);
+    rig_open(&f, 1, 0); /* of one byte nothing can be missing */
+    rig_unit(1, 0);
+    assert_int_equal(rig.n_notes, 0);
+    end_one(1);
+}
+
+/* How many bits of an item differ from what went out, which came alone. */
+static uint32_t count_bits(const struct rig_item *item)
+{
+    uint32_t n = 0;
+    assert_int_equal(rig.n_out, item->len);
+    for (size_t i = 0; i < item->len; i++)
+        n += (uint32_t)__builtin_popcount(rig.out[i] ^ item->bytes[i]);
+    return n;
+}
+
+static void so_many_bits_are_flipped_where_noted(void **state)
+{
+    (void)state;
+    static const struct {
+        uint32_t n;
+        int64_t byte;
+        uint32_t bits;
+    } cases[] = {{0, -1, 1}, {1, 30, 1}, {3, 30, 3}, {8, 0, 8}, {1000, 30, 8}, {17, -1, 17}, {1000, -1, 8 * 68}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        f = fault_of_kind(FAULT_FLIP);
+        f.n = cases[i].n;
+        f.byte = cases[i].byte;
+        f.seed = i;
+        run_one(1);
+        rig_drain();
+        assert_int_equal(rig.item[0].len, 68);
+        assert_int_equal(count_bits(&rig.item[0]), cases[i].bits);
+        assert_int_equal(rig.note[0].n, cases[i].bits);
+        if (f.byte >= 0) assert_int_equal(rig.note[0].byte, f.byte);
+        if (cases[i].bits == 1) assert_int_equal(rig.out[rig.note[0].byte] ^ rig.item[0].bytes[rig.note[0].byte],
+                                                 1 << rig.note[0].bit);
+        end_one(0);
+    }
+    f.byte = 68; /* a frame that has no such byte is not hit */
+    run_one(1);
+    assert_int_equal(rig.n_notes, 0);
+    end_one(1);
+}
+
+static void two_flips_never_make_each_other_right(void **state)
+{
+    (void)state;
+    struct fault two[4] = {fault_of_kind(FAULT_FLIP), fault_of_kind(FAULT_FLIP), fault_of_kind(FAULT_FLIP),
+                           fault_of_kind(FAULT_FLIP)};
+    for (int i = 0; i < 4; i++) {
+        two[i].byte = 40;
+        two[i].n = 3;
+    }
+    rig_open(two, 4, 1);
+    rig_frame(RIG_STREAM);
+    rig_drain();
+    assert_true(rig.n_notes == 3 && rig.note[2].n == 2); /* 3 + 3 + 2 of the byte's 8; nothing is left for the fourth */
+    assert_int_equal(count_bits(&rig.item[0]), 8);
+    end_one(0);
+}
+
+/* A resealed flip is in the payload, and no checksum sees it. */
+static void resealed_flips_are_right_by_their_checksums(void **state)
+{
+    (void)state;
+    f = fault_of_kind(FAULT_FLIP);
+    f.reseal = 1;
+    f.n = 2;
+    run_one(50);
+    rig_drain();
+    static struct native_parser parser;
+    size_t room;
+    uint32_t n = 0;
+    native_parser_init(&parser);
+    memcpy(native_parser_room(&parser, &room), rig.out, rig.n_out);
+    native_parser_added(&parser, rig.n_out);
+    while (native_parser_next(&parser) == NATIVE_FRAME) {
+        uint32_t bits = 0;
+        for (size_t i = NATIVE_HEADER_LEN; i < rig.item[n].len; i++)
+            bits += (uint32_t)__builtin_popcount(parser.frame[i] ^ rig.item[n].bytes[i]);
+        assert_int_equal(bits, 2);
+        assert_in_range(rig.note[n].byte, NATIVE_HEADER_LEN, rig.item[n].len - 1);
+        assert_string_equal(rig.note[n].text, "resealed");
+        n++;
+    }
+    assert_true(n == 50 && parser.stats.bad_bytes == 0 && parser.stats.bad_payload == 0);
+    end_one(50);
+    f.byte = NATIVE_HEADER_LEN - 1; /* not the header */
+    run_one(2);
+    assert_int_equal(rig.n_notes, 0);
+    end_one(2);
+    struct fault both[2] = {fault_of_kind(FAULT_FLIP), f}; /* what is flipped besides stays wrong, in any order */
+    both[1].byte = -1;
+    rig_open(both, 2, 1);
+    for (int i = 0; i < 20; i++)
+        rig_frame(RIG_STREAM);
+    assert_int_equal(rig.n_notes, 40);
+    end_one(0);
+    both[0] = fault_of_kind(FAULT_TRUNCATE); /* nothing makes a cut frame right */
+    rig_open(both, 2, 1);
+    for (int i = 0; i < 20; i++)
+        rig_frame(RIG_STREAM);
+    assert_int_equal(rig.n_notes, 20);
+    end_one(0);
+    both[1].byte = 5;
+    rig_open(both + 1, 1, 0); /* units are hit anywhere */
+    rig_unit(9, 0);
+    assert_int_equal(rig.note[0].byte, 5);
+    end_one(1);
+}
+
+/* The system of a datagram's reader drops what is damaged on its way, so it is not sent; but what is resealed is. */
+static void a_damaged_datagram_is_not_sent(void **state)
+{
+    (void)state;
+    struct fault list[2] = {fault_of_kind(FAULT_DUPLICATE), fault_of_kind(FAULT_FLIP)};
+    list[1].at = 2;
+    for (int reseal = 0; reseal < 2; reseal++) {
+        list[1].reseal = reseal;
+        rig_open(list, 2, 0);
+        struct wire_spec spec = {.board = rig.board, .link = 1, .session = 1, .max_unit = 64, .units = 1, .datagrams = 1};
+        wire_free(rig.wire);
+        rig.wire = wire_create(&spec);
+        assert_non_null(rig.wire);
+        for (int i = 0; i < 3; i++)
+            rig_unit(20, 0);
+        rig_drain();
+        assert_int_equal(rig.n_writes, reseal ? 6 : 4);
+        assert_int_equal(rig.n_notes, reseal ? 4 : 3);
+        assert_true(rig.note[1].kind == FAULT_FLIP && rig.note[1].number == 2 && rig.note[1].n == 1);
+        assert_string_equal(rig.note[1].text, reseal ? "resealed" : "not sent: its UDP checksum would be wrong");
+        rig_close();
+    }
+}
+
+static void a_stall_begins_when_all_before_is_out(void **state)
+{
+    (void)state;
+    struct fault two[2] = {fault_of_kind(FAULT_STALL), fault_of_kind(FAULT_STALL)};
+    two[0].at = two[1].at = 2;
+    two[0].for_ms = 10.0;
+    two[1].for_ms = 5.0;
+    rig_open(two, 2, 1);
+    for (int i = 0; i < 3; i++)
+        rig_frame(RIG_STREAM);
+    rig.now_ns += 100 * MS; /* the link was full meanwhile */
+    assert_int_equal(rig_take(0), 1);
+    const int64_t from_ns = rig.now_ns;
+    assert_int_equal(wire_next_ns(rig.wire), from_ns + 10 * MS);
+    rig_drain();
+    assert_true(rig.n_writes == 3 && rig.write[1].at_ns == from_ns + 15 * MS); /* one after the other */
+    rig_expect((const int[]){0, 1, 2, -1});
+    end_one(3);
+}
+
+static void a_split_frame_goes_out_in_so_many_writes(void **state)
+{
+    (void)state;
+    static const struct {
+        uint32_t n, writes;
+        int noted;
+    } cases[] = {{0, 2, 1}, {1, 1, 0}, {5, 5, 1}, {1000, 68, 1}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        f = fault_of_kind(FAULT_SPLIT);
+        f.n = cases[i].n;
+        f.at = 1;
+        run_one(2);
+        rig_drain();
+        assert_int_equal(rig.n_writes, cases[i].writes + 1);
+        for (uint32_t w = 0; w < cases[i].writes; w++)
+            assert_in_range(rig.write[w].len, 68 / cases[i].writes, 68 / cases[i].writes + 1);
+        assert_int_equal(rig.n_notes, cases[i].noted);
+        if (cases[i].noted) assert_int_equal(rig.note[0].n, cases[i].writes);
+        end_one(2);
+    }
+}
+
+static void merged_frames_go_out_in_one_write(void **state)
+{
+    (void)state;
+    f = fault_of_kind(FAULT_MERGE); /* at every frame, which is: at every one that is not in a write already */
+    f.n = 3;
+    rig_open(&f, 1, 1);
+    for (int i = 0; i < 8; i++) {
+        rig_frame(RIG_STREAM);
+        assert_int_equal(rig_take(0), i % 3 == 2);
+        if (i == 3) rig_frame(RIG_NOTICE); /* goes with them, and is not counted */
+    }
+    assert_int_equal(wire_next_ns(rig.wire), INT64_MAX); /* time alone brings nothing */
+    rig_drain();
+    assert_int_equal(rig.n_writes, 3);
+    assert_int_equal(rig.write[1].len, rig.item[3].len + rig.item[4].len + rig.item[5].len + rig.item[6].len);
+    assert_int_equal(rig.n_notes, 3);
+    end_one(9);
+    rig_open(&f, 1, 1); /* a reply does not wait for frames */
+    rig_frame(RIG_STREAM);
+    rig_reply("OK");
+    assert_int_equal(rig_take(0), 2);
+    rig_frame(RIG_STREAM);
+    assert_int_equal(rig_take(0), 1);
+    end_one(3);
+    rig_open(&f, 1, 1); /* nor does anything wait for frames that don't come */
+    rig_frame(RIG_STREAM);
+    wire_time(rig.wire, 10 * WIRE_HOLD_MS * MS);
+    assert_int_equal(rig_take(0), 1);
+}
+
+static void garbage_stands_before_the_frame(void **state)
+{
+    (void)state;
+    f = fault_of_kind(FAULT_GARBAGE);
+    f.at = 2;
+    f.n = 1024;
+    run_one(3);
+    rig_drain();
+    assert_int_equal(rig.n_out, rig.item[0].len + 1024 + rig.item[1].len + rig.item[2].len);
+    int counts[256] = {0};
+    for (size_t i = 0; i < 1024; i++)
+        counts[rig.out[rig.item[0].len + i]]++;
+    assert_int_equal(counts['\r'], 0); /* or it could hold a reply line */
+    for (int i = 0; i < 256; i++)
+        assert_true(counts[i] < 20); /* 4 each; 20 of one value have a chance of 1e-7 */
+    end_one(3);
+    struct fault two[2] = {fault_of_kind(FAULT_REORDER), f};
+    two[0].at = 2;
+    rig_open(two, 2, 1); /* it stays where the frame would have been */
+    for (int i = 0; i < 4; i++)
+        rig_frame(RIG_STREAM);
+    end_one(4);
+}
+
+static void a_dropped_frame_is_hit_by_nothing_else(void **state)
+{
+    (void)state;
+    struct fault all[] = {fault_of_kind(FAULT_FLIP),      fault_of_kind(FAULT_TRUNCATE), fault_of_kind(FAULT_DELAY),
+                          fault_of_kind(FAULT_DUPLICATE), fault_of_kind(FAULT_REORDER),  fault_of_kind(FAULT_MERGE),
+                          fault_of_kind(FAULT_GARBAGE),   fault_of_kind(FAULT_STALL),    fault_of_kind(FAULT_DROP),
+                          fault_of_kind(FAULT_DROP)};
+    enum { N = sizeof all / sizeof all[0] };
+    for (int i = 0; i < N; i++) {
+        all[i].at = 2;
+        all[i].for_ms = 1.0;
+    }
+    all[0].at = 0;
+    all[0].count = 2; /* one that does not strike is not counted */
+    rig_open(all, N, 1);
+    for (int i = 0; i < 4; i++)
+        rig_frame(RIG_STREAM);
+    assert_int_equal(rig.n_notes, 5);
+    static const enum fault_kind in_order[] = {FAULT_FLIP, FAULT_DROP, FAULT_GARBAGE, FAULT_STALL, FAULT_FLIP};
+    for (int i = 0; i < 5; i++)
+        assert_int_equal(rig.note[i].kind, in_order[i]);
+    assert_int_equal(rig.note[4].number, 3);
+    end_one(1);
+}
+
+/* Nothing that would have come after it is noted: nobody will see it. */
+static void a_session_that_ends_takes_nothing_more(void **state)
+{
+    (void)state;
+    struct fault list[3] = {fault_of_kind(FAULT_REORDER), fault_of_kind(FAULT_DROP), fault_of_kind(FAULT_DISCONNECT)};
+    uint64_t frames, pulses;
+    list[0].at = 2;
+    list[0].n = 100;
+    list[1].from = 5;
+    list[2].at = 5;
+    list[2].for_ms = 7.0;
+    rig_open(list, 3, 1);
+    for (int i = 0; i < 8; i++)
+        rig_frame(RIG_POINTS);
+    rig_reply("OK");
+    assert_int_equal(rig.n_notes, 1); /* the end is not there yet */
+    wire_count_unwritten(rig.wire, &frames, &pulses);
+    assert_true(frames == 8 && pulses == 800);
+    assert_int_equal(rig_take(0), 5);
+    assert_int_equal(rig.n_notes, 2);
+    assert_true(rig.note[1].kind == FAULT_DISCONNECT && rig.note[1].number == 5);
+    rig_expect((const int[]){0, 2, 3, 1, -1}); /* what was held comes before the end */
+    assert_true(rig.write[4].kind == WIRE_ACT && rig.write[4].act == FAULT_DISCONNECT);
+    wire_count_unwritten(rig.wire, &frames, &pulses);
+    assert_true(frames == 4 && pulses == 400);
+    assert_true(wire_is_empty(rig.wire));
+}
+
+/* Until all of its writes are out, a frame is not written; a copy of it is none. */
+static void what_is_not_written_is_counted(void **state)
+{
+    (void)state;
+    struct fault two[2] = {fault_of_kind(FAULT_SPLIT), fault_of_kind(FAULT_DUPLICATE)};
+    uint64_t frames, pulses;
+    rig_open(two, 2, 1);
+    rig_frame(RIG_POINTS);
+    rig_frame(RIG_LOCAL);
+    for (int i = 0; i < 4; i++) {
+        wire_count_unwritten(rig.wire, &frames, &pulses);
+        assert_true(frames == (i < 2) && pulses == (i < 2 ? 100 : 0));
+        assert_non_null(wire_due(rig.wire, rig.now_ns, 0));
+        wire_pop(rig.wire);
+    }
+}
+
+static void what_was_begun_without_the_wire_goes_first_as_it_is(void **state)
+{
+    (void)state;
+    f = fault_of_kind(FAULT_DROP);
+    f.at = 1;
+    rig_open(&f, 1, 1);
+    assert_int_equal(wire_put_rest(rig.wire, (const uint8_t *)"rest", 4), SH_OK);
+    rig_frame(RIG_STREAM);
+    rig_frame(RIG_STREAM);
+    rig_drain();
+    assert_int_equal(rig.n_out, 4 + rig.item[1].len);
+    assert_memory_equal(rig.out, "rest", 4);
+    assert_memory_equal(rig.out + 4, rig.item[1].bytes, rig.item[1].len);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_teardown(dropped_frames_are_missing, close_rig),
+        cmocka_unit_test_teardown(duplicates_follow_at_once, close_rig),
+        cmocka_unit_test_teardown(a_reordered_frame_comes_behind_as_many_as_noted, close_rig),
+        cmocka_unit_test_teardown(frames_that_are_all_reordered_all_come, close_rig),
+        cmocka_unit_test_teardown(a_held_frame_waits_no_longer_than_said, close_rig),
+        cmocka_unit_test_teardown(a_delayed_frame_is_not_overtaken, close_rig),
+        cmocka_unit_test_teardown(jitter_stays_below_its_time_and_in_order, close_rig),
+        cmocka_unit_test_teardown(truncated_frames_lack_their_end, close_rig),
+        cmocka_unit_test_teardown(so_many_bits_are_flipped_where_noted, close_rig),
+        cmocka_unit_test_teardown(two_flips_never_make_each_other_right, close_rig),
+        cmocka_unit_test_teardown(resealed_flips_are_right_by_their_checksums, close_rig),
+        cmocka_unit_test_teardown(a_damaged_datagram_is_not_sent, close_rig),
+        cmocka_unit_test_teardown(a_stall_begins_when_all_before_is_out, close_rig),
+        cmocka_unit_test_teardown(a_split_frame_goes_out_in_so_many_writes, close_rig),
+        cmocka_unit_test_teardown(merged_frames_go_out_in_one_write, close_rig),
+        cmocka_unit_test_teardown(garbage_stands_before_the_frame, close_rig),
+        cmocka_unit_test_teardown(a_dropped_frame_is_hit_by_nothing_else, close_rig),
+        cmocka_unit_test_teardown(a_session_that_ends_takes_nothing_more, close_rig),
+        cmocka_unit_test_teardown(what_is_not_written_is_counted, close_rig),
+        cmocka_unit_test_teardown(what_was_begun_without_the_wire_goes_first_as_it_is, close_rig),
+    };
+    return cmocka_run_group_tests_name("faults on the wire", tests, NULL, NULL);
+}

@@ -1,0 +1,461 @@
+/* Faults on the wire: replies, faults that are added and taken out at run time, what a wire keeps, and mixtures of all
+ * kinds by chance, whose output is what their notes say. */
+#include "drivers/protocol/native.h"
+#include "tests/unit/wire_rig.h"
+
+static struct fault f;
+
+static int close_rig(void **state)
+{
+    (void)state;
+    rig_close();
+    return 0;
+}
+
+/* What went out is this text. */
+static void expect_text(const char *text)
+{
+    if (rig.n_out != strlen(text) || memcmp(rig.out, text, rig.n_out) != 0)
+        fail_msg("'%.*s' went out, not '%s'", (int)rig.n_out, (const char *)rig.out, text);
+}
+
+static void hear(const char *text)
+{
+    wire_heard(rig.wire, text, strlen(text));
+}
+
+/* ---- replies */
+
+static void a_reply_that_is_dropped_is_missing(void **state)
+{
+    (void)state;
+    f = fault_of_kind(FAULT_NO_REPLY);
+    f.from = f.until = 2;
+    rig_open(&f, 1, 1);
+    rig_reply("1");
+    rig_reply("2");
+    rig_frame(RIG_STREAM); /* frames are not counted */
+    rig_reply("3");
+    rig_drain();
+    rig_expect((const int[]){0, 2, 3, -1});
+    assert_true(rig.n_notes == 1 && rig.note[0].number == 2 && rig.note[0].of == FAULT_OF_REPLIES);
+}
+
+static void frames_overtake_a_late_reply_and_replies_do_not(void **state)
+{
+    (void)state;
+    f = fault_of_kind(FAULT_LATE_REPLY);
+    f.at = 1;
+    f.for_ms = 4.0;
+    rig_open(&f, 1, 1);
+    const int64_t due_ns = rig.now_ns + 4 * MS;
+    rig_reply("late");
+    rig_frame(RIG_STREAM);
+    rig_reply("next");
+    assert_int_equal(rig_take(0), 1);
+    assert_int_equal(wire_next_ns(rig.wire), due_ns);
+    rig.now_ns = due_ns - 1;
+    assert_int_equal(rig_take(1), 0); /* nor at the end of the run */
+    rig.now_ns = due_ns;
+    assert_int_equal(rig_take(0), 2);
+    rig_expect((const int[]){1, 0, 2, -1});
+    rig_reply("4");
+    assert_int_equal(rig_take(0), 1);
+}
+
+/* It differs always from the right one. */
+static void a_wrong_reply_is_wrong(void **state)
+{
+    (void)state;
+    f = fault_of_kind(FAULT_WRONG_REPLY);
+    rig_open(&f, 1, 1);
+    rig_reply("42");
+    rig_reply("43");
+    rig_reply("43");
+    rig_reply("OK");
+    rig_reply("OK");
+    rig_drain();
+    expect_text("OK\r\n42\r\nOK\r\n43\r\n0\r\n");
+    assert_int_equal(rig.n_notes, 5);
+    rig_close();
+    rig_open(&f, 1, 0); /* of another protocol only one that there was */
+    rig_unit(5, 1);
+    rig_unit(6, 1);
+    rig_drain();
+    assert_true(rig.n_notes == 1 && rig.n_out == 10);
+    assert_memory_equal(rig.out + 5, rig.item[0].bytes, 5);
+}
+
+/* Of the line that it answers, however the lines came; those that have no answer are passed over. */
+static void an_echo_is_that_of_the_replys_own_line(void **state)
+{
+    (void)state;
+    char overlong[400], want[600];
+    memset(overlong, 'x', sizeof overlong - 1);
+    overlong[sizeof overlong - 1] = '\0';
+    f = fault_of_kind(FAULT_ECHO);
+    rig_open(&f, 1, 1);
+    hear("A 1\nB?\r\n\r\n  \t\nC");
+    rig_reply("a");
+    rig_reply("b");
+    hear("C\rD");
+    hear("\n");
+    hear(overlong);
+    rig_reply("c");
+    rig_reply("d");
+    hear("\n");
+    rig_reply("too long");
+    rig_reply("to nothing");
+    rig_drain();
+    snprintf(want, sizeof want, "A 1\r\na\r\nB?\r\nb\r\nCC\r\nc\r\nD\r\nd\r\n%.256s\r\ntoo long\r\nto nothing\r\n",
+             overlong);
+    expect_text(want);
+    assert_int_equal(rig.n_notes, 5);
+    assert_true(rig.note[0].n == 5 && rig.note[2].n == 4);
+    rig_close();
+    rig_open(&f, 1, 1); /* lines that it did not hear have no echo, and the next have theirs */
+    wire_skip_heard(rig.wire, 2);
+    hear("C\n");
+    rig_reply("a");
+    rig_reply("b");
+    rig_reply("c");
+    rig_drain();
+    expect_text("a\r\nb\r\nC\r\nc\r\n");
+    rig_close();
+    rig_open(&f, 1, 0); /* a protocol without lines: what came since the last answer, as it was */
+    hear("\x02s\n");
+    hear("\x03");
+    rig_unit(7, 1);
+    rig_drain();
+    assert_true(rig.n_writes == 2 && rig.n_out == 11);
+    assert_memory_equal(rig.out, "\x02s\n\x03", 4);
+}
+
+static void more_than_can_be_heard_does_no_harm(void **state)
+{
+    (void)state;
+    f = fault_of_kind(FAULT_ECHO);
+    rig_open(&f, 1, 1);
+    for (int i = 0; i < 100000; i++)
+        hear("*IDN?\n");
+    for (int i = 0; i < 300; i++)
+        rig_reply("a");
+    rig_drain();
+    assert_int_equal(rig.n_notes, 300);
+}
+
+/* ---- when */
+
+/* The numbers of the frames that were hit. */
+static void expect_hits(const uint64_t *numbers)
+{
+    uint32_t n = 0;
+    for (; numbers[n] != 0; n++)
+        if (n >= rig.n_notes || rig.note[n].number != numbers[n])
+            fail_msg("hit %u is at frame %llu, not %llu", n, (unsigned long long)rig.note[n].number,
+                     (unsigned long long)numbers[n]);
+    assert_int_equal(rig.n_notes, n);
+    rig_close();
+}
+#define HITS(...) expect_hits((const uint64_t[]){__VA_ARGS__, 0})
+
+static void run_drop(void)
+{
+    rig_open(&f, 1, 1);
+    for (int i = 0; i < 20; i++) {
+        rig_frame_at(RIG_POINTS, 40, i * 100 * MS, 100 * (uint64_t)i);
+        if (i % 2 == 0) rig_frame_at(RIG_NOTICE, 40, i * 100 * MS, 0);
+    }
+}
+
+static void each_key_says_when(void **state)
+{
+    (void)state;
+    f = fault_of_kind(FAULT_DROP);
+    f.at = 7;
+    run_drop();
+    HITS(7);
+    f = fault_of_kind(FAULT_DROP);
+    f.from = 3;
+    f.until = 11;
+    f.every = 4;
+    run_drop();
+    HITS(3, 7, 11);
+    f.count = 2;
+    run_drop();
+    HITS(3, 7);
+    f = fault_of_kind(FAULT_DROP);
+    f.from_pulse = 500; /* frame k has pulses 100 (k - 1) to 100 k - 1 */
+    f.until_pulse = 800;
+    run_drop();
+    HITS(6, 7, 8, 9);
+    f.from_pulse = 499;
+    f.until_pulse = 499;
+    run_drop();
+    HITS(5);
+    f = fault_of_kind(FAULT_DROP);
+    f.from_s = 0.3;
+    f.until_s = 0.6;
+    run_drop();
+    HITS(4, 5, 6);
+    f.of = FAULT_OF_NOTICES; /* at 0, 0.2, 0.4, ... */
+    run_drop();
+    HITS(3);
+    f = fault_of_kind(FAULT_DROP);
+    f.of = FAULT_OF_NOTICES;
+    f.from_pulse = 1; /* they have no pulses */
+    run_drop();
+    HITS(0);
+    f = fault_of_kind(FAULT_DROP);
+    f.link = 2; /* this is link 1 */
+    run_drop();
+    HITS(0);
+    f.link = 1;
+    f.at = 20;
+    run_drop();
+    HITS(20);
+}
+
+static int add(const struct fault *fault, int64_t since_ns)
+{
+    uint32_t number;
+    struct sh_err err;
+    return fault_board_add(rig.board, fault, since_ns, &number, &err) == SH_OK ? (int)number : -1;
+}
+
+static void a_fault_counts_from_when_it_was_added(void **state)
+{
+    (void)state;
+    f = fault_of_kind(FAULT_DROP);
+    rig_open(NULL, 0, 1);
+    rig_frame_at(RIG_STREAM, 40, 0, 0);
+    f.from = 2;
+    f.every = 3;
+    assert_int_equal(add(&f, 50 * MS), 1);
+    for (int i = 0; i < 14; i++) /* those from before 50 ms are on their way already; and one that is late */
+        rig_frame_at(RIG_STREAM, 40, i == 8 ? 49 * MS : 10 * i * MS, 0);
+    static const int hit[] = {7, 11, 14}; /* 5, 6, 7, 9, 10, ... count 1, 2, 3, 4, 5, ... */
+    assert_int_equal(rig.n_notes, 3);
+    for (int i = 0; i < 3; i++) {
+        assert_int_equal(rig.note[i].number, 2 + 3 * i);
+        assert_int_equal(rig.note[i].seq, le_get32(rig.item[hit[i]].bytes + 8));
+    }
+    f.from_s = 0.02; /* and seconds count from there */
+    f.from = f.every = 1;
+    f.kind = FAULT_STALL;
+    assert_int_equal(add(&f, 1000 * MS), 2);
+    assert_int_equal(fault_board_end(rig.board, 1, 1025 * MS), 1); /* up to there it still holds */
+    for (int i = 0; i < 4; i++)
+        rig_frame_at(RIG_STREAM, 40, (1000 + 10 * i) * MS, 0);
+    assert_true(rig.n_notes == 6 && rig.note[3].number == 11 && rig.note[3].fault == 1);
+    assert_true(rig.note[4].number == 3 && rig.note[5].number == 4 && rig.note[4].fault == 2);
+    assert_int_equal(fault_board_end(rig.board, 0, 1040 * MS), 1);
+    assert_int_equal(fault_board_remove(rig.board, 2), 0);
+    rig_frame_at(RIG_STREAM, 40, 2000 * MS, 0);
+    assert_int_equal(rig.n_notes, 6);
+    assert_int_equal(fault_board_injected(rig.board, 1), 4); /* what was taken out keeps its count */
+    assert_int_equal(fault_board_injected(rig.board, 0), 6);
+    assert_int_equal(add(&f, 0), 3); /* and its number */
+}
+
+/* A reply counts from the command on that added the fault, and not that command's own. */
+static void replies_count_from_after_the_command(void **state)
+{
+    (void)state;
+    f = fault_of_kind(FAULT_NO_REPLY);
+    f.at = 1;
+    f.from_s = 0.0;
+    rig_open(NULL, 0, 1);
+    rig_reply("1");
+    assert_int_equal(add(&f, 500 * MS), 1);
+    wire_renew(rig.wire, 2); /* one from before, and its own */
+    rig_reply("2");
+    rig_reply("3");
+    rig_reply("hit");
+    rig_reply("5");
+    rig_drain();
+    expect_text("1\r\n2\r\n3\r\n5\r\n");
+    assert_int_equal(rig.note[0].number, 1);
+}
+
+static void what_is_held_when_its_fault_goes_still_comes(void **state)
+{
+    (void)state;
+    f = fault_of_kind(FAULT_REORDER);
+    f.at = 1;
+    f.n = 1;
+    rig_open(&f, 1, 1);
+    rig_frame(RIG_STREAM);
+    fault_board_remove(rig.board, 0);
+    rig_frame(RIG_STREAM);
+    rig_frame(RIG_STREAM);
+    assert_int_equal(rig_take(0), 3);
+    rig_expect((const int[]){1, 0, 2, -1});
+}
+
+/* ---- how much it keeps */
+
+static void a_wire_is_full_by_what_only_time_keeps_back(void **state)
+{
+    (void)state;
+    enum { CAP = 5000 };
+    f = fault_of_kind(FAULT_STALL);
+    f.at = 1;
+    f.for_ms = 1000.0;
+    rig_open(&f, 1, 1);
+    int n = 0;
+    for (; !wire_is_full(rig.wire, CAP, rig.now_ns); n++)
+        rig_frame(RIG_STREAM);
+    assert_in_range(n, 10, 60); /* what a piece takes beside its bytes counts, too */
+    rig_close();
+    f.kind = FAULT_DELAY; /* a long way holds more */
+    rig_open(&f, 1, 1);
+    for (n = 0; n < RIG_ITEMS; n++)
+        rig_frame(RIG_STREAM);
+    assert_false(wire_is_full(rig.wire, CAP, rig.now_ns));
+    rig.now_ns += 2000 * MS; /* the way is over, and nobody has read */
+    assert_true(wire_is_full(rig.wire, CAP, rig.now_ns));
+    rig_close();
+    for (int i = 0; i < 2; i++) { /* what waits for frames must not keep them out */
+        f = fault_of_kind(i == 0 ? FAULT_REORDER : FAULT_MERGE);
+        f.n = i == 0 ? 300 : 64;
+        rig_open(&f, 1, 1);
+        for (n = 0; n < (i == 0 ? 200 : 63); n++) {
+            rig_frame(RIG_STREAM);
+            rig_take(0);
+        }
+        assert_false(wire_is_full(rig.wire, CAP, rig.now_ns));
+        rig_close();
+    }
+    struct fault two[2] = {fault_of_kind(FAULT_STALL), fault_of_kind(FAULT_DROP)}; /* pauses alone fill it */
+    two[0].for_ms = 1e8;
+    rig_open(two, 2, 1);
+    for (n = 0; !wire_is_full(rig.wire, CAP, rig.now_ns); n++)
+        rig_frame(RIG_STREAM);
+    assert_in_range(n, 10, 60);
+}
+
+static void an_item_longer_than_usual_is_taken(void **state)
+{
+    (void)state;
+    f = fault_of_kind(FAULT_DUPLICATE);
+    rig_open(&f, 1, 1); /* its wire has been told 64 bytes */
+    uint8_t *big = calloc(1, 100000);
+    const struct wire_item item = {FAULT_OF_REPLIES, big, 100000, 0};
+    assert_int_equal(wire_put(rig.wire, &item, rig.now_ns), SH_OK);
+    const struct wire_piece *piece = wire_due(rig.wire, rig.now_ns, 0);
+    assert_true(piece != NULL && piece->len == 100000);
+    free(big);
+}
+
+/* ---- all together */
+
+static uint64_t random_state;
+
+static uint32_t below(uint32_t n)
+{
+    random_state = random_state * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
+    return (uint32_t)((random_state >> 33) % n);
+}
+
+static struct fault any_fault(int native)
+{
+    static const enum fault_kind kinds[] = {FAULT_DROP, FAULT_DUPLICATE, FAULT_REORDER, FAULT_DELAY, FAULT_JITTER,
+                                            FAULT_TRUNCATE, FAULT_FLIP, FAULT_FLIP, FAULT_STALL, FAULT_SPLIT,
+                                            FAULT_MERGE, FAULT_GARBAGE};
+    struct fault any = fault_of_kind(kinds[below(sizeof kinds / sizeof kinds[0])]);
+    any.seed = below(1000);
+    any.of = native && below(4) == 0 ? FAULT_OF_NOTICES : FAULT_OF_STREAM;
+    any.n = below(3) == 0 ? 0 : 1 + below(12);
+    any.for_ms = 1 + below(40);
+    any.reseal = below(2) == 0;
+    if (below(3) == 0) any.byte = below(120);
+    if (below(3) == 0) any.count = 1 + below(5);
+    switch (below(3)) {
+    case 0:
+        any.at = 1 + below(60);
+        break;
+    case 1:
+        any.from = 1 + below(20);
+        any.every = 1 + below(10);
+        break;
+    default:
+        any.probability = 0.01 * (1 + below(40));
+    }
+    return any;
+}
+
+/* The clock and the taking go on as they like: neither changes what comes out, nor what is noted. */
+static void mix(uint64_t seed, int pace, int native)
+{
+    struct fault list[12];
+    random_state = seed;
+    const uint32_t n = 1 + below(12);
+    for (uint32_t i = 0; i < n; i++)
+        list[i] = any_fault(native);
+    rig_open(list, n, native);
+    for (uint32_t i = 0; i < 150; i++) {
+        const uint32_t which = below(5), len = 1 + below(150);
+        if (!native)
+            rig_unit(len, which == 0);
+        else if (which == 0)
+            rig_reply("42");
+        else
+            rig_frame(which == 1 ? RIG_NOTICE : which == 2 ? RIG_LOCAL : which == 3 ? RIG_POINTS : RIG_STREAM);
+        if (pace == 1) rig_take(0);
+        if (pace == 2 && i % 7 == 0) rig.now_ns += 20 * MS;
+        if (pace == 2 && i % 3 == 0) rig_take(0);
+    }
+    rig_drain();
+}
+
+static void mixtures_are_what_their_notes_say(void **state)
+{
+    (void)state;
+    static uint8_t out[RIG_OUT];
+    static struct fault_note note[RIG_NOTES];
+    uint32_t kinds[FAULT_N_KINDS] = {0}, whole = 0, in = 0;
+    for (uint64_t seed = 0; seed < 600; seed++) {
+        size_t n_out = 0;
+        uint32_t n_notes = 0;
+        for (int pace = 0; pace < 3; pace++) {
+            mix(seed, pace, seed % 3 != 0);
+            whole += rig_check_notes();
+            in += rig.n_items;
+            assert_true(pace == 0 || (rig.n_out == n_out && rig.n_notes == n_notes));
+            if (pace != 0) assert_memory_equal(rig.out, out, n_out);
+            for (uint32_t i = 0; i < n_notes; i++) {
+                const struct fault_note *a = &rig.note[i], *b = &note[i];
+                assert_true(a->kind == b->kind && a->number == b->number && a->byte == b->byte && a->n == b->n);
+            }
+            memcpy(out, rig.out, n_out = rig.n_out);
+            memcpy(note, rig.note, sizeof note);
+            n_notes = rig.n_notes;
+            for (uint32_t i = 0; i < n_notes; i++)
+                kinds[note[i].kind]++;
+            rig_close();
+        }
+    }
+    for (int kind = FAULT_DROP; kind <= FAULT_GARBAGE; kind++)
+        assert_true(kinds[kind] > 1000);
+    assert_true(whole > in / 2);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_teardown(a_reply_that_is_dropped_is_missing, close_rig),
+        cmocka_unit_test_teardown(frames_overtake_a_late_reply_and_replies_do_not, close_rig),
+        cmocka_unit_test_teardown(a_wrong_reply_is_wrong, close_rig),
+        cmocka_unit_test_teardown(an_echo_is_that_of_the_replys_own_line, close_rig),
+        cmocka_unit_test_teardown(more_than_can_be_heard_does_no_harm, close_rig),
+        cmocka_unit_test(each_key_says_when),
+        cmocka_unit_test_teardown(a_fault_counts_from_when_it_was_added, close_rig),
+        cmocka_unit_test_teardown(replies_count_from_after_the_command, close_rig),
+        cmocka_unit_test_teardown(what_is_held_when_its_fault_goes_still_comes, close_rig),
+        cmocka_unit_test_teardown(a_wire_is_full_by_what_only_time_keeps_back, close_rig),
+        cmocka_unit_test_teardown(an_item_longer_than_usual_is_taken, close_rig),
+        cmocka_unit_test_teardown(mixtures_are_what_their_notes_say, close_rig),
+    };
+    return cmocka_run_group_tests_name("faults on the wire, more", tests, NULL, NULL);
+}

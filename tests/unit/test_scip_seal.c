@@ -1,0 +1,90 @@
+/* SCIP: scans whose values are changed on request, with sums that are right. Read by a decoder written from the
+ * protocol's description alone. */
+#include "tests/unit/scip_rig.h"
+#include "tests/unit/seal_rig.h"
+
+static int n_chars, intensity;
+
+static const void *read_scan(const uint8_t *unit, size_t len, size_t *size)
+{
+    static struct scip_decoded scan;
+    static char text[1 << 16];
+    const char *at = text;
+    assert_true(len < sizeof text);
+    memcpy(text, unit, len);
+    text[len] = 0;
+    memset(&scan, 0, sizeof scan);
+    scip_decode(&scan, &at, n_chars, intensity);
+    assert_true(at == text + len);
+    assert_string_equal(scan.status, strncmp(scan.echo, "GD", 2) == 0 ? "00" : "99");
+    *size = sizeof scan;
+    return &scan;
+}
+
+/* Forty steps, some with several echoes: more than one line of data. */
+static void open_forty(void)
+{
+    scip_open_head("UTM-30LX-EW", 1440, 0, 39, 20, -1, 40);
+    protocol_rig_describe(&rig, 0);
+    for (int i = 0; i < 40; i++)
+        shot[i] = (struct protocol_rig_shot){.n = i % 3 == 2 ? 2 : 1, .range_m = {0.5 + 0.37 * i, 20.0}, .refl_cdb = {-700, -100}};
+}
+
+static void check_scans(const char *request, int chars, int with_intensity, uint32_t n_bits)
+{
+    n_chars = chars;
+    intensity = with_intensity;
+    open_forty();
+    protocol_rig_input(&rig, "BM\n");
+    protocol_rig_input(&rig, request);
+    protocol_rig_clear(&rig);
+    scip_turn(0);
+    assert_int_equal(rig.n_units, 1);
+    assert_int_equal(seal_count(rig.ops, rig.bytes, rig.len), n_bits);
+    seal_check(rig.ops, rig.bytes, rig.len, read_scan);
+    seal_check_broken(rig.ops, rig.bytes, rig.len);
+    scip_close();
+}
+
+/* Four bits a character: 40 steps, or 53 echoes, as every third step has two. */
+static void values_of_all_kinds(void **state)
+{
+    (void)state;
+    check_scans("MD0000003901001\n", 3, 0, 4 * 40 * 3);
+    check_scans("MS0000003901001\n", 2, 0, 4 * 40 * 2);
+    check_scans("ME0000003901001\n", 3, 1, 4 * 40 * 6);
+    check_scans("NE0000003901001\n", 3, 1, 4 * 53 * 6);
+    check_scans("GD0000003901\n", 3, 0, 4 * 40 * 3);
+}
+
+/* Other replies have nothing that is measured. Their sums are made right, too: of a key line without its ';'. */
+static void other_replies_keep_their_sums(void **state)
+{
+    (void)state;
+    static const char *const requests[] = {"VV\n", "PP\n", "II\n", "BM\n", "QT\n", "XX\n", "TM0\n"};
+    static uint8_t clean[4096];
+    scip_open("UTM-30LX");
+    for (size_t i = 0; i < sizeof requests / sizeof requests[0]; i++) {
+        protocol_rig_clear(&rig);
+        protocol_rig_input(&rig, requests[i]);
+        assert_true(rig.len > 4 && rig.len < sizeof clean);
+        memcpy(clean, rig.bytes, rig.len);
+        assert_int_equal(seal_count(rig.ops, clean, rig.len), 0);
+        for (size_t at = strlen(requests[i]); at + 1 < rig.len; at++)
+            if (rig.bytes[at + 1] == '\n' && rig.bytes[at] != '\n') rig.bytes[at] = '?'; /* a sum */
+        assert_memory_not_equal(rig.bytes, clean, rig.len);
+        rig.ops->reseal(rig.bytes, rig.len);
+        assert_memory_equal(rig.bytes, clean, rig.len);
+        seal_check_broken(rig.ops, clean, rig.len);
+    }
+    scip_close();
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(values_of_all_kinds),
+        cmocka_unit_test(other_replies_keep_their_sums),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,270 @@
+/* USB faults on request, in the device core and over USB/IP: what a host sees of each, and that no byte is lost. */
+#include <netinet/tcp.h>
+
+#include "tests/unit/usb_host.h"
+#include "tests/unit/usb_models.h"
+#include "tests/unit/usbip_client.h"
+
+enum { STREAM = 1, STREAM_IN = 0x83, EPIPE_WIRE = -32, ECONNRESET_WIRE = -104, ESHUTDOWN_WIRE = -108 };
+
+static struct reply r;
+
+static int fault(struct bench *bench, enum link_fault what, uint32_t n, double for_ms)
+{
+    return bench->ops->fault(bench->link, what, STREAM, n, for_ms);
+}
+
+/* ---- the core */
+
+/* A transfer that is asked to end early ends in a short packet, and its rest comes in the next one. */
+static void test_short_packets(void **state)
+{
+    (void)state;
+    static const struct {
+        uint32_t room, written, first;
+    } rows[] = {{4096, 3000, 1500}, {4096, 2048, 1023}, {4096, 1024, 511}, {4096, 3, 1}, {4096, 2, 1}, {1024, 5000, 511}};
+    uint8_t data[5000];
+    for (size_t i = 0; i < sizeof data; i++)
+        data[i] = (uint8_t)(i * 7 + i / 256);
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        struct host *host = host_new(&pair_model, USB_RATE_HIGH, USB_RATE_HIGH);
+        host_configure(host);
+        uint8_t got[5000];
+        size_t n = 0;
+        for (uint64_t id = 1; id <= 8; id++)
+            host_submit(host, id, 0x81, NULL, rows[i].room);
+        usb_device_shorten(host->device, 0x81, 1);
+        assert_int_equal(usb_device_write(host->device, 0x81, data, rows[i].written), rows[i].written);
+        assert_int_equal(host->done[0]->actual, rows[i].first);
+        assert_true(rows[i].first % 512 != 0 || rows[i].first == 0);
+        for (int k = 0; k < host->n_done; k++) {
+            memcpy(got + n, host->done[k]->data, host->done[k]->actual);
+            n += host->done[k]->actual;
+        }
+        assert_int_equal(n, rows[i].written);
+        assert_memory_equal(got, data, n);
+        while (host->n_done > 0)
+            host_expect(host, host->done[0]->id, USB_OK, host->done[0]->actual);
+        const int before = host->n_done;
+        assert_int_equal(usb_device_write(host->device, 0x81, data, 100), 100); /* only so many */
+        assert_int_equal(host->n_done, before + 1);
+        host_expect(host, host->done[0]->id, USB_OK, 100);
+        usb_device_detach(host->device);
+        while (host->n_done > 0)
+            host_expect(host, host->done[0]->id, USB_GONE, 0);
+        host_free(host);
+    }
+}
+
+static void test_halt(void **state)
+{
+    (void)state;
+    struct host *host = host_new(&pair_model, USB_RATE_HIGH, USB_RATE_HIGH);
+    assert_false(usb_device_halt(host->device, 0x81)); /* not configured */
+    host_configure(host);
+    host_submit(host, 1, 0x81, NULL, 512);
+    assert_true(usb_device_halt(host->device, 0x81));
+    host_expect(host, 1, USB_STALLED, 0);
+    host_submit(host, 2, 0x81, NULL, 512);
+    host_expect(host, 2, USB_STALLED, 0);
+    assert_int_equal(usb_device_write(host->device, 0x81, "abc", 3), 0);
+    assert_int_equal(host_control(host, 0x82, USB_REQ_GET_STATUS, 0, 0x81, 2, NULL), 2);
+    assert_int_equal(host_in[0], 1);
+    assert_int_equal(host_control(host, 0x02, USB_REQ_CLEAR_FEATURE, USB_ENDPOINT_HALT, 0x81, 0, NULL), 0);
+    host_submit(host, 3, 0x81, NULL, 512);
+    assert_int_equal(usb_device_write(host->device, 0x81, "abc", 3), 3);
+    host_expect(host, 3, USB_OK, 3);
+    host_free(host);
+}
+
+static void test_descriptor_length(void **state)
+{
+    (void)state;
+    struct host *host = host_new(&pair_model, USB_RATE_HIGH, USB_RATE_HIGH);
+    uint8_t whole[USB_MAX_CONFIG];
+    const int len = host_control(host, 0x80, USB_REQ_GET_DESCRIPTOR, USB_DT_CONFIG << 8, 0, sizeof whole, NULL);
+    memcpy(whole, host_in, (size_t)len);
+    assert_int_equal(le_get16(whole + 2), len);
+    usb_device_lengthen(host->device, 7);
+    assert_int_equal(host_control(host, 0x80, USB_REQ_GET_DESCRIPTOR, USB_DT_CONFIG << 8, 0, 9, NULL), 9);
+    assert_int_equal(le_get16(host_in + 2), len + 7);
+    assert_int_equal(host_control(host, 0x80, USB_REQ_GET_DESCRIPTOR, USB_DT_CONFIG << 8, 0, sizeof whole, NULL), len);
+    le_put16(whole + 2, (uint16_t)(len + 7));
+    assert_memory_equal(host_in, whole, (size_t)len); /* nothing else of it is wrong */
+    assert_int_equal(host_control(host, 0x80, USB_REQ_GET_DESCRIPTOR, USB_DT_CONFIG << 8, 0, 3, NULL), 3);
+    usb_device_lengthen(host->device, 0);
+    host_control(host, 0x80, USB_REQ_GET_DESCRIPTOR, USB_DT_CONFIG << 8, 0, 9, NULL);
+    assert_int_equal(le_get16(host_in + 2), len);
+    host_free(host);
+}
+
+/* ---- a head over USB/IP */
+
+static void configure(struct client *c)
+{
+    assert_int_equal(client_control(c, &r, 0x00, 9, 1, 0, 0, NULL), 0);
+}
+
+static void open_stream(struct client *c)
+{
+    assert_int_equal(client_control(c, &r, 0x41, 0x22, 1, 2, 0, NULL), 0);
+    assert_int_equal(bench_expect(c->bench, LINK_OPENED, 0).session, STREAM);
+}
+
+static void expect_urb(struct client *c, uint32_t seqnum, int status, uint32_t actual)
+{
+    assert_true(client_reply(c, &r, 1));
+    assert_int_equal(r.seqnum, seqnum);
+    assert_int_equal(r.status, status);
+    assert_int_equal(r.actual, actual);
+}
+
+/* Halted until the host clears it; what could not be written goes out then. */
+static void test_stall(void **state)
+{
+    (void)state;
+    struct bench bench = usbip_bench("N");
+    struct client c;
+    client_import(&c, &bench);
+    configure(&c);
+    assert_int_equal(fault(&bench, LINK_FAULT_ENDPOINT_STALL, 0, 0.0), SH_ESTATE); /* no session */
+    open_stream(&c);
+    const uint32_t first = client_submit(&c, 1, 3, NULL, NULL, 512), second = client_submit(&c, 1, 3, NULL, NULL, 512);
+    bench_expect(&bench, LINK_WRITABLE, 1u << STREAM);
+    assert_int_equal(fault(&bench, LINK_FAULT_ENDPOINT_STALL, 0, 0.0), SH_OK);
+    expect_urb(&c, first, EPIPE_WIRE, 0);
+    expect_urb(&c, second, EPIPE_WIRE, 0);
+    expect_urb(&c, client_submit(&c, 1, 3, NULL, NULL, 512), EPIPE_WIRE, 0);
+    assert_int_equal(bench.ops->write(bench.link, STREAM, "abc", 3), 0);
+    assert_int_equal(client_control(&c, &r, 0x02, 1, 0, STREAM_IN, 0, NULL), 0);
+    const uint32_t third = client_submit(&c, 1, 3, NULL, NULL, 512);
+    bench.n_queue = 0;
+    bench_expect(&bench, LINK_WRITABLE, 1u << STREAM);
+    assert_int_equal(bench.ops->write(bench.link, STREAM, "abc", 3), 3);
+    expect_urb(&c, third, 0, 3);
+    assert_memory_equal(r.data, "abc", 3);
+    close(c.fd);
+    bench_close(&bench);
+}
+
+/* Sessions end, and the device is configured all the same: another session can begin at once. */
+static void test_reset(void **state)
+{
+    (void)state;
+    struct bench bench = usbip_bench("N");
+    struct client c;
+    assert_int_equal(fault(&bench, LINK_FAULT_BUS_RESET, 0, 0.0), SH_ESTATE); /* no host */
+    client_import(&c, &bench);
+    configure(&c);
+    open_stream(&c);
+    const uint32_t seqnum = client_submit(&c, 1, 3, NULL, NULL, 512);
+    bench_expect(&bench, LINK_WRITABLE, 1u << STREAM);
+    assert_int_equal(fault(&bench, LINK_FAULT_BUS_RESET, 0, 0.0), SH_OK);
+    expect_urb(&c, seqnum, ESHUTDOWN_WIRE, 0);
+    assert_int_equal(bench.ops->write(bench.link, STREAM, "abc", 3), SH_ECLOSED);
+    assert_int_equal(bench_expect(&bench, LINK_CLOSED, 0).session, STREAM);
+    assert_string_equal(bench_expect(&bench, LINK_NOTICE, 0).peer,
+                        "the host reset the bus: sessions ended, the device stays plugged in");
+    assert_int_equal(client_control(&c, &r, 0x80, 0, 0, 0, 2, NULL), 0); /* by which a client tells it from unplugging */
+    open_stream(&c);
+    close(c.fd);
+    bench_close(&bench);
+}
+
+/* The device goes, and nobody can attach it; then it is at the same port again. */
+static void test_unplug(void **state)
+{
+    (void)state;
+    struct bench bench = usbip_bench("N");
+    struct client c;
+    char before[300], after[300], byte;
+    bench.ops->endpoint(bench.link, before, sizeof before);
+    for (int round = 0; round < 2; round++) {
+        client_import(&c, &bench);
+        configure(&c);
+        open_stream(&c);
+        client_submit(&c, 1, 3, NULL, NULL, 512);
+        bench_expect(&bench, LINK_WRITABLE, 1u << STREAM);
+        assert_int_equal(fault(&bench, LINK_FAULT_UNPLUG, 0, 0.0), SH_OK);
+        assert_int_equal(fault(&bench, LINK_FAULT_UNPLUG, 0, 0.0), SH_ESTATE);
+        assert_true(recv(c.fd, &byte, 1, 0) <= 0);
+        close(c.fd);
+        assert_int_equal(bench_expect(&bench, LINK_CLOSED, 0).session, STREAM);
+        struct sockaddr_in at = {.sin_family = AF_INET,
+                                 .sin_addr.s_addr = htonl(INADDR_LOOPBACK),
+                                 .sin_port = htons((uint16_t)atoi(strrchr(before, ':') + 1))};
+        int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+        assert_int_equal(connect(fd, (struct sockaddr *)&at, sizeof at), -1);
+        assert_int_equal(errno, ECONNREFUSED);
+        close(fd);
+        assert_string_equal(bench_expect(&bench, LINK_NOTICE, 0).peer, "unplugged: sessions ended");
+        assert_int_equal(fault(&bench, LINK_FAULT_PLUG, 0, 0.0), SH_OK);
+        bench.ops->endpoint(bench.link, after, sizeof after);
+        assert_string_equal(before, after);
+    }
+    fault(&bench, LINK_FAULT_UNPLUG, 0, 0.0);
+    bench_close(&bench);
+}
+
+/* The owner hears of a host before the host hears anything of the device. */
+static void expect_plugged(struct bench *bench, int times)
+{
+    for (const int64_t end_ms = now_ms() + DEADLINE_MS; bench->n_plugged < times; bench_poll(bench, 0, 1))
+        assert_true(now_ms() < end_ms);
+    assert_int_equal(bench->n_plugged, times);
+}
+
+/* Each request takes its time; one that the host gives up meanwhile is gone. */
+static void test_enumeration(void **state)
+{
+    (void)state;
+    enum { SLOW_MS = 30 };
+    struct bench bench = usbip_bench("N");
+    struct client c;
+    static const uint8_t status[8] = {0x80, 0, 0, 0, 0, 0, 2, 0};
+    const int one_by_one = 1; /* no request waits for the answer to the one before */
+    client_import(&c, &bench);
+    setsockopt(c.fd, IPPROTO_TCP, TCP_NODELAY, &one_by_one, sizeof one_by_one);
+    expect_plugged(&bench, 1);
+    assert_int_equal(fault(&bench, LINK_FAULT_SLOW_ENUMERATION, 0, SLOW_MS), SH_OK);
+    assert_int_equal(fault(&bench, LINK_FAULT_DESCRIPTOR_LENGTH, 3, 0.0), SH_OK);
+    int64_t from_ms = now_ms();
+    assert_int_equal(client_control(&c, &r, 0x80, 6, 0x0200, 0, 512, NULL), 0);
+    assert_int_equal(le_get16(r.data + 2), r.actual + 3);
+    configure(&c);
+    assert_true(now_ms() - from_ms >= 2 * SLOW_MS - 1); /* two requests, and a clock that is rounded down */
+    from_ms = now_ms();
+    const uint32_t one = client_submit(&c, 1, 0, status, NULL, 2), two = client_submit(&c, 1, 0, status, NULL, 2),
+                   three = client_submit(&c, 1, 0, status, NULL, 2), unlink = client_unlink(&c, two);
+    assert_true(client_reply(&c, &r, 0));
+    assert_int_equal(r.command, 4);
+    assert_int_equal(r.seqnum, unlink);
+    assert_int_equal(r.status, ECONNRESET_WIRE);
+    expect_urb(&c, one, 0, 2);
+    expect_urb(&c, three, 0, 2);
+    assert_true(now_ms() - from_ms >= 3 * SLOW_MS - 1); /* its turn is as it was */
+    open_stream(&c); /* bulk transfers take no time of their own */
+    client_submit(&c, 1, 0, status, NULL, 2);
+    bench_poll(&bench, 0, 0);
+    close(c.fd); /* with a request that waits */
+    bench_expect(&bench, LINK_CLOSED, 0);
+    bench_expect(&bench, LINK_NOTICE, 0);
+    client_import(&c, &bench); /* another host: the owner is asked anew */
+    expect_plugged(&bench, 2);
+    fault(&bench, LINK_FAULT_SLOW_ENUMERATION, 0, 0.0);
+    fault(&bench, LINK_FAULT_DESCRIPTOR_LENGTH, 0, 0.0);
+    assert_int_equal(client_control(&c, &r, 0x80, 6, 0x0200, 0, 512, NULL), 0);
+    assert_int_equal(le_get16(r.data + 2), r.actual);
+    close(c.fd);
+    bench_close(&bench);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_short_packets), cmocka_unit_test(test_halt),  cmocka_unit_test(test_descriptor_length),
+        cmocka_unit_test(test_stall),         cmocka_unit_test(test_reset), cmocka_unit_test(test_unplug),
+        cmocka_unit_test(test_enumeration),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

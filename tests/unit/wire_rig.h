@@ -1,0 +1,83 @@
+/* For tests of faults on the wire: frames and replies go in, with a clock of the test's own, and what comes out is kept
+ * with its times; and beside it what should have come out, by the notes of the faults alone. */
+#ifndef TESTS_UNIT_WIRE_RIG_H
+#define TESTS_UNIT_WIRE_RIG_H
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include "core/err.h"
+#include "drivers/protocol/bytes.h"
+#include "drivers/protocol/crc32c.h"
+#include "drivers/protocol/native_encode.h"
+#include "firmware_sim/fault/wire.h"
+
+#define MS INT64_C(1000000)
+
+enum { RIG_ITEMS = 400, RIG_NOTES = 4000, RIG_WRITES = 20000, RIG_UNIT = 200, RIG_OUT = 1 << 21 };
+
+struct rig_item {
+    int of;
+    uint64_t number; /* in its counting, from 1 */
+    size_t len;
+    uint8_t bytes[RIG_UNIT];
+    uint32_t notes_from; /* what was noted while it was put begins here */
+};
+
+struct rig_write {
+    int64_t at_ns;
+    enum wire_piece_kind kind;
+    uint32_t act;
+    size_t at, len; /* in rig.out */
+};
+
+struct rig {
+    struct fault_list list;
+    int native;
+    struct fault_board *board;
+    struct wire *wire;
+    int64_t now_ns;
+    struct rig_item item[RIG_ITEMS];
+    uint32_t n_items;
+    uint64_t count[FAULT_N_OF], seq;
+    struct fault_note note[RIG_NOTES];
+    uint32_t n_notes;
+    struct rig_write write[RIG_WRITES];
+    uint32_t n_writes;
+    uint8_t out[RIG_OUT];
+    size_t n_out;
+};
+extern struct rig rig;
+
+/* A fault that strikes at each frame. */
+struct fault fault_of_kind(enum fault_kind kind);
+/* A session of link 1; native, or of a protocol whose units have a byte that is their sum at the end. */
+void rig_open(const struct fault *fault, uint32_t n, int native);
+void rig_close(void);
+
+/* Puts one at now_ns; the clock goes on by 1 us. Bytes are random and different each time. */
+enum rig_frame { RIG_STREAM, RIG_POINTS, RIG_NOTICE, RIG_LOCAL };
+/* t_ns: device time in its header. pulse0: of points, which have 100 pulses. */
+struct rig_item *rig_frame_at(enum rig_frame kind, size_t payload_len, int64_t t_ns, uint64_t pulse0);
+struct rig_item *rig_frame(enum rig_frame kind);
+struct rig_item *rig_reply(const char *line); /* without CR LF */
+struct rig_item *rig_unit(size_t len, int is_reply);
+
+/* Takes what may go out now; returns how many writes. last: nothing more comes. */
+uint32_t rig_take(int last);
+/* The same, with the clock going to each time at which something may. Fails when it does not end. */
+void rig_drain(void);
+
+/* What went out as bytes is that of the items of these numbers (from 0), one after the other; ends with -1. */
+void rig_expect(const int *items);
+/* It is what the notes say, item by item; bytes of garbage are any. Returns how many frames or units came whole and
+ * right. */
+uint32_t rig_check_notes(void);
+
+#endif
