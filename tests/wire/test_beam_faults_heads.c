@@ -178,6 +178,12 @@ static void check_rotor(struct wire *wire, const char *kind, const char *keys)
         room_cast(shot->mirror_rad, shot->pan_rad, &ray);
         assert_true(fabs(shot->range_m - ray.range_m) < 1e-5);
     }
+    for (uint32_t i = 0; i < run->lines; i++) { /* a turn's end reads what its last point does */
+        const struct scanhead_line_end *line = &run->line[i];
+        const struct beam_shot *last = &run->shot[line->pulse0 + line->n_fired - 1];
+        assert_true(angle_between(last->pan_rad, 2.0 * M_PI * 0x1p-32 * line->pan_count) <= ANGLE_RAD);
+        assert_true(angle_between(last->mirror_rad, 2.0 * M_PI * 0x1p-32 * line->mirror_count) <= ANGLE_RAD);
+    }
 }
 
 static void a_rotor_may_be_slow_stuck_or_wobble(void **state)
