@@ -33,6 +33,7 @@ struct link_spec {
     int protocol;       /* what its owner speaks on it; 0: the usual. Links don't look at it */
     int units; /* 1: what is written are units. Each write has one of them, or the rest of one, up to its end */
     int waits; /* enum link_waits; its owner sees to it */
+    int clean; /* 1: no faults on request meet it; its owner sees to it */
     const struct web_source *web; /* web: what it serves beside the page; outlives the link. NULL: nothing */
     int fd;                       /* fd: a connected stream descriptor (socket pair), taken over */
     /* usb; address, port and path as struct usb_backend_spec has them, which explains these as well */

@@ -38,9 +38,10 @@ static void keep(struct soak *soak, const struct scanhead_frame *frame)
     pthread_mutex_unlock(&c->lock);
 }
 
-int soak_clean_get(struct soak *soak, soak_seq seq, struct soak_clean_frame *out)
+int soak_clean_get(struct soak_link *link, soak_seq seq, struct soak_clean_frame *out)
 {
-    struct soak_clean *c = &soak->clean;
+    struct soak_clean *c = &link->soak->clean;
+    if (link->datagrams != NULL) return soak_datagrams_get(link->datagrams, seq, out);
     pthread_mutex_lock(&c->lock);
     *out = c->ring[seq % SOAK_RING];
     pthread_mutex_unlock(&c->lock);

@@ -21,6 +21,7 @@ struct recorder {
 /* Why a link has no client here; NULL: it has one. */
 static const char *why_not(const struct link_place *place)
 {
+    if (strcmp(place->type, "udp") == 0) return "its packets go elsewhere, or their port is taken";
     if (strcmp(place->type, "pty") != 0 && strcmp(place->type, "tcp") != 0) {
         if (strcmp(place->type, "usb") == 0) return "a USB device has to be attached to a machine first";
         if (strcmp(place->type, "web") == 0) return "libscanhead does not speak WebSocket";
@@ -41,7 +42,10 @@ static int open_link(struct soak *soak, uint32_t i, const struct link_place *pla
     snprintf(link->type, sizeof link->type, "%s", place->type);
     snprintf(link->endpoint, sizeof link->endpoint, "%s", place->endpoint);
     pthread_mutex_init(&link->lock, NULL);
-    link->not_soaked = only != 0 && only != i + 1 ? "not asked for (--link)" : why_not(place);
+    link->datagrams = soak->datagrams[i];
+    link->not_soaked = only != 0 && only != i + 1 ? "not asked for (--link)"
+                       : link->datagrams != NULL  ? NULL
+                                                  : why_not(place);
     link->usable = link->not_soaked == NULL;
     if (!link->usable) return 0;
     link->fact = calloc(SOAK_RING, sizeof *link->fact);
@@ -52,7 +56,6 @@ int soak_clients_open(struct soak *soak, const struct loop *loop, uint32_t only,
 {
     struct link_place place;
     int n = 0;
-    soak->n_links = soak->cfg->n_links;
     for (uint32_t i = 0; i < soak->n_links && loop_get_place(loop, i, &place); i++) {
         const int is_open = open_link(soak, i, &place, only);
         if (is_open < 0) return sh_fail(err, SH_ENOMEM, "no memory for the clients");
@@ -189,6 +192,20 @@ static void step(struct recorder *r)
     }
 }
 
+static void *compare(void *arg)
+{
+    struct soak_link *link = arg;
+    while (atomic_load(&link->soak->phase) == SOAK_RUNS)
+        soak_datagrams_step(link);
+    const soak_seq until = soak_datagrams_top(link) + 1; /* the last one of a kind that was hit is before it */
+    while (atomic_load(&link->soak->phase) != SOAK_ENDS) {
+        soak_datagrams_step(link);
+        if (link->last >= until) atomic_store(&link->done, 1);
+    }
+    soak_datagrams_step(link);
+    return NULL;
+}
+
 static void *record(void *arg)
 {
     struct recorder r = {.link = arg};
@@ -208,7 +225,7 @@ int soak_clients_start(struct soak *soak, struct sh_err *err)
     for (uint32_t i = 0; i < soak->n_links; i++) {
         struct soak_link *link = &soak->link[i];
         if (!link->usable) continue;
-        link->running = pthread_create(&link->thread, NULL, record, link) == 0;
+        link->running = pthread_create(&link->thread, NULL, link->datagrams != NULL ? compare : record, link) == 0;
         if (!link->running) return sh_fail(err, SH_EIO, "no thread for the client of link %u", link->number);
     }
     return SH_OK;
@@ -232,5 +249,6 @@ void soak_clients_close(struct soak *soak)
     for (uint32_t i = 0; i < soak->n_links; i++) {
         scanhead_close(soak->link[i].sh);
         free(soak->link[i].fact);
+        soak_datagrams_close(soak->datagrams[i]);
     }
 }

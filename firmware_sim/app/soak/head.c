@@ -36,6 +36,7 @@ static void add_moment(struct soak_link *link, const struct fault_note *note)
     const char *why = why_hidden(link->soak, note->kind);
     row->injected++;
     link->ask.others++;
+    if (link->datagrams != NULL) why = "the packets are compared with those of the same head";
     if (!link->usable) why = "the link has no client here";
     if (why == NULL && link->n_moments == SOAK_MAX_MOMENTS) why = "too many at a time";
     if (why != NULL) {

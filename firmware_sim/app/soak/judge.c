@@ -33,8 +33,12 @@ static void decide(struct soak_row *row, uint64_t n, int was_noticed)
 /* ---- what each kind must show */
 
 /* It did not come, and its number is missing. */
-static void judge_destroyed(struct soak_link *link, const struct soak_fact *f)
+static void judge_destroyed(struct soak_link *link, const struct soak_fact *f, int is_wrong)
 {
+    if (link->datagrams != NULL && is_wrong && f->times[FAULT_FLIP] != 0) { /* a packet without a checksum */
+        link->row[FAULT_FLIP].accepted++;
+        return;
+    }
     static const enum fault_kind kinds[] = {FAULT_DROP, FAULT_TRUNCATE, FAULT_FLIP};
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++)
         decide(&link->row[kinds[i]], f->times[kinds[i]], f->got == 0 && f->gap);
@@ -97,6 +101,8 @@ static void judge_late(struct soak_link *link, const struct soak_fact *f)
             soak_hide(row, n, "out of real time no frame is late");
         else if (f->for_ms < LATE_MS)
             soak_hide(row, n, "shorter than 10 ms");
+        else if (link->datagrams != NULL)
+            soak_hide(row, n, "packets are compared by what they hold alone");
         else if (f->got == 0)
             soak_hide(row, n, "the frame did not come in its place");
         else
@@ -109,7 +115,7 @@ static int take_bytes(struct soak_link *link, const struct soak_fact *f, uint64_
 {
     struct soak_clean_frame before;
     const int64_t from_ns =
-        soak_clean_get(link->soak, f->seq - NEAR_FRAMES, &before) ? before.t_ns : f->t_ns - FAR_NS;
+        soak_clean_get(link, f->seq - NEAR_FRAMES, &before) ? before.t_ns : f->t_ns - FAR_NS;
     for (uint32_t i = 0; i < link->n_runs; i++) {
         struct soak_run *run = &link->run[i];
         if (run->t_ns < from_ns || run->t_ns > f->t_ns + NEAR_NS || run->n < n) continue;
@@ -122,6 +128,10 @@ static int take_bytes(struct soak_link *link, const struct soak_fact *f, uint64_
 static void judge_garbage(struct soak_link *link, const struct soak_fact *f)
 {
     if (f->garbage == 0) return;
+    if (link->datagrams != NULL) { /* a datagram of its own; the sum of all bytes shows it */
+        soak_hide(&link->row[FAULT_GARBAGE], f->times[FAULT_GARBAGE], "a datagram of its own, which belongs to nothing");
+        return;
+    }
     decide(&link->row[FAULT_GARBAGE], f->times[FAULT_GARBAGE], take_bytes(link, f, f->garbage));
 }
 
@@ -162,7 +172,7 @@ static void judge_loss(struct soak_link *link, const struct soak_fact *f)
 static void judge_frame(struct soak_link *link, const struct soak_fact *f)
 {
     struct soak_clean_frame clean = {0};
-    const int is_known = soak_clean_get(link->soak, f->seq, &clean);
+    const int is_known = soak_clean_get(link, f->seq, &clean);
     const uint64_t bad = bad_bytes_of(f, &clean);
     link->expected_bad_max += bad;
     if (f->away) {
@@ -178,14 +188,14 @@ static void judge_frame(struct soak_link *link, const struct soak_fact *f)
     if (!is_known) link->unknown++;
     const int is_wrong = is_known && f->got != 0 && f->digest != clean.digest;
     judge_loss(link, f);
-    judge_destroyed(link, f);
+    judge_destroyed(link, f, is_wrong);
     judge_resealed(link, f, is_known, is_wrong);
     judge_duplicate(link, f);
     judge_reorder(link, f);
     judge_late(link, f);
     judge_garbage(link, f);
     judge_same_bytes(link, f);
-    if ((is_wrong && f->resealed == 0) || f->got > 1) link->wrong_plain++; /* once is enough */
+    if ((is_wrong && f->resealed + f->times[FAULT_FLIP] == 0) || f->got > 1) link->wrong_plain++; /* once is enough */
 }
 
 void soak_judge(struct soak_link *link, int all)

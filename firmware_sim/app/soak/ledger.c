@@ -96,7 +96,7 @@ static void hit_frame(struct soak_link *link, const struct fault_note *note)
             soak_hide(row, 1, "too many at a time");
         return;
     }
-    if (!note->has_seq) {
+    if (!note->has_seq && link->datagrams == NULL) {
         soak_hide(row, 1, "a frame for one reader alone has no number");
         return;
     }
@@ -104,7 +104,8 @@ static void hit_frame(struct soak_link *link, const struct fault_note *note)
         soak_hide(row, 1, "the frame has no such byte: nothing was changed");
         return;
     }
-    struct soak_fact *fact = touch(link, soak_seq_of(link->soak, note->seq));
+    struct soak_fact *fact = touch(link, link->datagrams != NULL ? soak_unit(note->number)
+                                                                   : soak_seq_of(link->soak, note->seq));
     if (fact == NULL) {
         soak_hide(row, 1, "it was seen too late");
         return;
@@ -184,7 +185,8 @@ static void begin(struct soak_link *link, soak_seq seq)
     if (link->begun)
         mark_away(link, link->last + 1, seq);
     else if (link->judged != 0)
-        mark_away(link, link->judged, seq);
+        mark_away(link, link->judged, seq); /* none, where the first fault is of a later frame */
+    if (!link->begun && (link->judged == 0 || link->judged > seq)) link->judged = seq;
     if (!link->begun) link->first = seq;
     link->begun = link->in_session = 1;
 }
@@ -228,6 +230,29 @@ void soak_saw_frame(struct soak_link *link, const struct scanhead_frame *frame, 
     pthread_mutex_unlock(&link->lock);
 }
 
+void soak_saw_unit(struct soak_link *link, soak_seq seq, uint64_t digest, uint32_t len)
+{
+    if (!link->begun) begin(link, seq);
+    struct soak_fact *fact = touch(link, seq);
+    if (fact == NULL) return;
+    if (seq > link->last || fact->seq == link->first) {
+        for (soak_seq gap = link->last + 1; gap < seq && link->frames != 0; gap++) {
+            struct soak_fact *missing = touch(link, gap);
+            if (missing != NULL) missing->gap = 1;
+        }
+    }
+    if (fact->got != 0)
+        fact->repeated++;
+    else if (seq < link->last)
+        fact->late++;
+    if (fact->got != 0 || seq < link->last) return;
+    fact->got = 1;
+    fact->digest = digest;
+    link->last = seq;
+    link->frames++;
+    link->bytes += len;
+}
+
 static void add_run(struct soak_link *link, const struct scanhead_notice *notice)
 {
     link->bad_bytes += notice->n;
@@ -263,11 +288,11 @@ void soak_saw_notice(void *ctx, const struct scanhead_notice *notice)
     pthread_mutex_lock(&link->lock);
     switch (notice->kind) {
     case SCANHEAD_NOTICE_GAP:
-        if (link->in_session) add_gap(link, notice);
+        add_gap(link, notice); /* it may come before the first frame is handed out */
         break;
     case SCANHEAD_NOTICE_REPEATED:
     case SCANHEAD_NOTICE_LATE:
-        if (link->in_session) add_again(link, notice);
+        add_again(link, notice);
         break;
     case SCANHEAD_NOTICE_BAD_PAYLOAD:
     case SCANHEAD_NOTICE_BAD_BYTES:

@@ -145,6 +145,21 @@ static int say_result(const struct soak_options *o, struct soak *soak, struct sh
     return sh_fail(err, SH_ESTATE, "soak: %s", soak->failures[0]);
 }
 
+/* A second link beside each that sends datagrams, without faults. Where it has no room, its first is not soaked. Where
+ * nobody could start a scan, the head does so itself. */
+static void open_twins(struct config *cfg, struct soak *soak, struct soak_options *o)
+{
+    int starts = 0;
+    soak->n_links = cfg->n_links;
+    for (uint32_t i = 0; i < soak->n_links; i++) {
+        starts |= cfg->link[i].protocol == 0 && (cfg->link[i].type == LINK_TCP || cfg->link[i].type == LINK_PTY);
+        if (cfg->link[i].type != LINK_UDP || cfg->n_links == CONFIG_MAX_LINKS) continue;
+        soak->datagrams[i] = soak_datagrams_open(&cfg->link[i], &cfg->link[cfg->n_links]);
+        cfg->n_links += soak->datagrams[i] != NULL;
+    }
+    o->device.start = !starts || cfg->head.start;
+}
+
 static int open_head(struct soak_options *o, struct config *cfg, struct soak *soak, struct soak_head *head,
                      struct sh_err *err)
 {
@@ -176,6 +191,7 @@ static int soak_head(struct config *cfg, void *ctx, struct sh_err *err)
     soak->cfg = cfg;
     soak->realtime = cfg->loop.pace == PACE_REALTIME;
     soak->faults = cfg->faults;
+    open_twins(cfg, soak, o);
     int rc = open_head(o, cfg, soak, &head, err);
     if (rc == SH_OK) rc = serve(o, soak, &head, err);
     if (rc == SH_OK) rc = say_result(o, soak, err);
@@ -217,12 +233,12 @@ static const struct app_option OPTIONS[] = {
 /* clang-format on */
 
 static const char NOTES[] =
-    "The sheet has a row for each link and kind of fault: how often it was injected, how often the client noticed it at\n"
-    "its place, frames that the client lost by it, and frames that it accepted although they differ from the clean\n"
-    "ones. A fault that no client can notice has a -, and why.\n"
+    "The sheet has a row for each link and kind of fault: how often it was injected, how often the client noticed\n"
+    "it at its place, frames that the client lost by it, and frames that it accepted although they differ from the\n"
+    "clean ones. A fault that no client can notice has a -, and why.\n"
     "\n"
-    "Exit status 0: each fault that can be noticed was, nothing was lost or wrongly accepted but by faults, of which the\n"
-    "latter are resealed flips, and the head is healthy. Else 1.\n";
+    "Exit status 0: each fault that can be noticed was. Nothing was lost or wrongly accepted but by faults, of\n"
+    "which the latter are resealed flips. The head is healthy. Else 1.\n";
 
 const struct app_command app_soak = {
     .name = "soak",

@@ -3,6 +3,7 @@
  *   soak.c     the command; runs the head and all threads
  *   clean.c    a thread that reads the clean stream within this process
  *   client.c   a thread per link: a recorder, as good as one can be
+ *   datagrams.c  the same for a link that sends datagrams
  *   ask.c      its questions and their answers
  *   ledger.c   of each link and frame: what was done to it, and what the client saw of it
  *   judge.c    compares the two, frame by frame
@@ -173,6 +174,8 @@ struct soak_link {
     int have_offset;
     struct soak_ask ask;
     char failed[256]; /* why the client gave up; empty: it did not */
+    uint64_t bad_units; /* datagrams that are none of the clean ones */
+    struct soak_datagrams *datagrams; /* NULL: the link speaks the native protocol */
     /* the client's own */
     struct scanhead *sh;
     char idn[256];
@@ -187,6 +190,7 @@ struct soak {
     struct fault_board *board;
     struct soak_clean clean;
     struct soak_link link[CONFIG_MAX_LINKS];
+    struct soak_datagrams *datagrams[CONFIG_MAX_LINKS]; /* by link, before the clients are there */
     uint32_t n_links;
     int realtime;
     atomic_int phase;         /* enum soak_phase */
@@ -208,8 +212,8 @@ int soak_clean_start(struct soak *soak, struct sh_err *err);
 /* After the head has ended. */
 void soak_clean_join(struct soak *soak);
 void soak_clean_close(struct soak *soak);
-/* 0: it is not known (any more, or not yet). */
-int soak_clean_get(struct soak *soak, soak_seq seq, struct soak_clean_frame *out);
+/* Of the clean stream that the link's is compared with. 0: it is not known (any more, or not yet). */
+int soak_clean_get(struct soak_link *link, soak_seq seq, struct soak_clean_frame *out);
 soak_seq soak_clean_top(struct soak *soak);
 uint64_t soak_digest(const struct scanhead_frame *frame);
 
@@ -219,6 +223,15 @@ int soak_clients_open(struct soak *soak, const struct loop *loop, uint32_t only,
 int soak_clients_start(struct soak *soak, struct sh_err *err);
 void soak_clients_join(struct soak *soak);
 void soak_clients_close(struct soak *soak);
+
+/* ---- datagrams.c */
+/* Receives what a link sends, and what its twin will send, which is to be opened beside it. NULL: it can't. */
+struct soak_datagrams *soak_datagrams_open(const struct link_spec *spec, struct link_spec *twin);
+void soak_datagrams_close(struct soak_datagrams *datagrams);
+int soak_datagrams_get(const struct soak_datagrams *datagrams, soak_seq seq, struct soak_clean_frame *out);
+void soak_datagrams_step(struct soak_link *link);
+uint64_t soak_datagrams_top(struct soak_link *link);
+soak_seq soak_unit(uint64_t number);
 
 /* ---- ask.c */
 /* Asks the next question, and judges its answer. */
@@ -230,6 +243,8 @@ void soak_ask_scan(struct soak_link *link);
 /* The listener of the board. */
 void soak_heard(void *soak, const struct fault_note *note);
 void soak_saw_frame(struct soak_link *link, const struct scanhead_frame *frame, int64_t now_ns);
+/* A datagram; the caller has the link's lock. */
+void soak_saw_unit(struct soak_link *link, soak_seq seq, uint64_t digest, uint32_t len);
 void soak_saw_notice(void *link, const struct scanhead_notice *notice);
 /* A connection came about; it ended; it did not even begin. */
 void soak_saw_open(struct soak_link *link);
