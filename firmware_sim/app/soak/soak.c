@@ -217,12 +217,12 @@ static const struct app_option OPTIONS[] = {
 /* clang-format on */
 
 static const char NOTES[] =
-    "The sheet has a row for each link and kind of fault: how often it was injected, how often the client noticed it at\n"
-    "its place, frames that the client lost by it, and frames that it accepted although they differ from the clean\n"
-    "ones. A fault that no client can notice has a -, and why.\n"
+    "The sheet has a row for each link and kind of fault: how often it was injected, how often the client noticed\n"
+    "it at its place, frames that the client lost by it, and frames that it accepted although they differ from the\n"
+    "clean ones. A fault that no client can notice has a -, and why.\n"
     "\n"
-    "Exit status 0: each fault that can be noticed was, nothing was lost or wrongly accepted but by faults, of which the\n"
-    "latter are resealed flips, and the head is healthy. Else 1.\n";
+    "Exit status 0: each fault that can be noticed was, nothing was lost or wrongly accepted but by faults, of\n"
+    "which the latter are resealed flips, and the head is healthy. Else 1.\n";
 
 const struct app_command app_soak = {
     .name = "soak",
