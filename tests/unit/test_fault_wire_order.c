@@ -202,6 +202,14 @@ static void merged_frames_go_out_in_one_write(void **state)
     rig_frame(RIG_STREAM);
     assert_int_equal(rig_take(0), 1);
     end_one(3);
+    struct fault two[2] = {f, fault_of_kind(FAULT_SPLIT)}; /* a frame that is split is in writes of its own */
+    two[0].at = 1;
+    two[1].at = 2;
+    rig_open(two, 2, 1);
+    for (int i = 0; i < 3; i++)
+        rig_frame(RIG_STREAM);
+    assert_int_equal(rig_take(0), 4);
+    end_one(3);
     rig_open(&f, 1, 1); /* nor does anything wait for frames that don't come */
     rig_frame(RIG_STREAM);
     wire_time(rig.wire, 10 * WIRE_HOLD_MS * MS);
