@@ -356,6 +356,33 @@ static void test_same_stream(void **state)
     }
 }
 
+/* A file goes on over a power cycle that is longer than the queue, and has all of it. */
+static void test_file_goes_on(void **state)
+{
+    struct wire *wire = *state;
+    struct room_config config = config_of("loop: {queue_ms: 250, late_ms: 10000}\n"
+                                          "faults: [{kind: power_cycle, from_pulse: 2000, for_ms: 600}]\n");
+    const char *const more[] = {"--start", "--frames", "1", NULL};
+    room_write(wire);
+    config.links = "links: [{type: file, path: out.shs}]\n";
+    config.pan_stop_deg = 30;
+    struct head head = head_start(wire, room_config_write(wire, &config), more);
+    head_end(&head, 0);
+    assert_int_equal(stats_link_uint(wire, "left_out_frames"), 0);
+    struct scanhead *sh = client_open(wire_path(wire, "out.shs"));
+    struct scanhead_frame frame;
+    struct scanhead_stats stats;
+    char states[128] = "";
+    int rc;
+    while ((rc = scanhead_next(sh, &frame, DEADLINE_MS)) == SCANHEAD_OK)
+        if (is_event(&frame, SCANHEAD_EV_STATE)) strcat(strcat(states, frame.event_text), " ");
+    assert_int_equal(rc, SCANHEAD_ECLOSED);
+    scanhead_get_stats(sh, &stats);
+    scanhead_close(sh);
+    assert_int_equal(stats.seq_gaps, 0);
+    assert_string_equal(states, "boot idle spin-up scanning off boot idle spin-up scanning spin-down ");
+}
+
 /* Nothing to tell the time: refused. */
 static void test_needs_time(void **state)
 {
@@ -379,6 +406,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_power_cycle_in_steps, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_power_cycle, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_same_stream, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_file_goes_on, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_needs_time, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
