@@ -97,9 +97,10 @@ struct cast_colour {
 struct cast_upset {
     int dark;         /* the laser does not fire: every shot is empty */
     double slip_turn; /* the beam goes so much farther in pan than its encoder reads */
-    /* Of the power that a clean window lets through, both ways together. With a signal model each return is so much
-     * weaker. Without one the fixed part of the range noise grows by 1 / share instead: as jitter does in detect.h, by
-     * the amplitude. */
+    /* Of the optical power that a clean window lets through, both ways together. With a signal model each return is so
+     * much weaker, and detect.h has the rest. Without one the fixed part of the range noise grows by 1 / share. That is
+     * the jitter of detect.h: rise time over the ratio of signal and noise as voltages (Skolnik). The voltage goes with
+     * the optical power, and a receiver's thermal noise is the same without light. */
     double share;
     uint32_t n_wobbles; /* the axes run ahead and behind: turn * sin(2 pi hz (t - begin)), t since the scan's start */
     struct cast_wobble {

@@ -35,7 +35,7 @@ struct link_spec {
     int waits; /* enum link_waits; its owner sees to it */
     int clean; /* 1: no faults on request meet it; its owner sees to it */
     const struct web_source *web; /* web: what it serves beside the page; outlives the link. NULL: nothing */
-    int fd;    /* fd: a connected stream descriptor (socket pair), taken over */
+    int fd;                       /* fd: a connected stream descriptor (socket pair), taken over */
     /* usb; address, port and path as struct usb_backend_spec has them, which explains these as well */
     int backend; /* enum usb_backend_type */
     int speed;   /* enum usb_rate: the fastest the device can do */
@@ -81,9 +81,9 @@ enum link_fault {
 struct link_ops {
     const char *name;
     int datagrams; /* 1: each write goes out with a checksum of the system's, and one that is damaged never arrives */
-    int messages; /* 1: each write goes out as one message; the owner puts text or frames into it, not both */
+    int messages;  /* 1: each write goes out as one message; the owner puts text or frames into it, not both */
 
-    uint32_t faults; /* what fault() can do: LINK_FAULT_BIT of each */
+    uint32_t faults;                               /* what fault() can do: LINK_FAULT_BIT of each */
     uint32_t (*can)(const struct link_spec *spec); /* of these, what a link of this spec can do; NULL: all */
 
     /* Opens as spec says. When it fails, nothing of it stays. The text of err names the endpoint. */

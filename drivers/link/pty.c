@@ -282,8 +282,8 @@ static void pty_close(void *link)
 
 const struct link_ops link_pty = {
     .name = "pty",
-    .faults = LINK_FAULT_BIT(LINK_FAULT_DISCONNECT) | LINK_FAULT_BIT(LINK_FAULT_REFUSE) |
-              LINK_FAULT_BIT(LINK_FAULT_UNPLUG),
+    .faults =
+        LINK_FAULT_BIT(LINK_FAULT_DISCONNECT) | LINK_FAULT_BIT(LINK_FAULT_REFUSE) | LINK_FAULT_BIT(LINK_FAULT_UNPLUG),
     .open = pty_open,
     .endpoint = pty_endpoint,
     .poll = pty_poll,

@@ -25,7 +25,7 @@ struct tcp_session {
 };
 
 struct tcp_link {
-    int listener; /* -1: unplugged */
+    int listener;   /* -1: unplugged */
     int reserve_fd; /* given up for a moment to turn a client away when descriptors run out */
     int n_sessions;
     int port;      /* that it listens on */
@@ -262,8 +262,8 @@ static void tcp_close(void *link)
 
 const struct link_ops link_tcp = {
     .name = "tcp",
-    .faults = LINK_FAULT_BIT(LINK_FAULT_DISCONNECT) | LINK_FAULT_BIT(LINK_FAULT_REFUSE) |
-              LINK_FAULT_BIT(LINK_FAULT_UNPLUG),
+    .faults =
+        LINK_FAULT_BIT(LINK_FAULT_DISCONNECT) | LINK_FAULT_BIT(LINK_FAULT_REFUSE) | LINK_FAULT_BIT(LINK_FAULT_UNPLUG),
     .open = tcp_open,
     .endpoint = tcp_endpoint,
     .poll = tcp_poll,

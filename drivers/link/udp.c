@@ -173,8 +173,7 @@ static int udp_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
     if (udp->closing && link_events_push(&events, LINK_CLOSED, 0, udp->name)) udp->reported_opened = udp->closing = 0;
     if (!udp->reported_opened && !udp->unplugged)
         udp->reported_opened = link_events_push(&events, LINK_OPENED, 0, udp->name);
-    struct pollfd fds[2] = {{.fd = wake_fd, .events = POLLIN},
-                            {.fd = udp->unplugged ? -1 : udp->fd, .events = POLLIN}};
+    struct pollfd fds[2] = {{.fd = wake_fd, .events = POLLIN}, {.fd = udp->unplugged ? -1 : udp->fd, .events = POLLIN}};
     if ((want_write & 1u) != 0) fds[1].events = POLLIN | POLLOUT;
     int rc = link_wait(fds, 2, events.n > 0 ? 0 : timeout_ms);
     if (rc != SH_OK) return rc;

@@ -400,8 +400,8 @@ static void web_close(void *link)
 const struct link_ops link_web = {
     .name = "web",
     .messages = 1,
-    .faults = LINK_FAULT_BIT(LINK_FAULT_DISCONNECT) | LINK_FAULT_BIT(LINK_FAULT_REFUSE) |
-              LINK_FAULT_BIT(LINK_FAULT_UNPLUG),
+    .faults =
+        LINK_FAULT_BIT(LINK_FAULT_DISCONNECT) | LINK_FAULT_BIT(LINK_FAULT_REFUSE) | LINK_FAULT_BIT(LINK_FAULT_UNPLUG),
     .open = web_open,
     .endpoint = web_endpoint,
     .poll = web_poll,

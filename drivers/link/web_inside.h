@@ -54,9 +54,9 @@ struct web_link {
     int reserve_fd; /* given up when there are no more, to turn a connection away; -1: none */
     int port, n_sessions, n_refused;
     int n_connections; /* that libwebsockets has: listening and wake among them */
-    char refused[64]; /* who came last in vain */
-    char at[72];      /* "127.0.0.1:40123" */
-    char host[64];    /* as the user named it */
+    char refused[64];  /* who came last in vain */
+    char at[72];       /* "127.0.0.1:40123" */
+    char host[64];     /* as the user named it */
     const struct web_source *source;
     struct web_session session[LINK_MAX_SESSIONS];
 };

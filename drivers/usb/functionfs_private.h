@@ -104,7 +104,7 @@ struct functionfs {
     char moved[200]; /* of endpoints that are not where the device has them; to be told once */
     int moved_due;
     char unplugged[256]; /* on request, from this controller; empty: it is not */
-    int backlog; /* stopped before everything was looked at */
+    int backlog;         /* stopped before everything was looked at */
     struct ffs_pipes pipes;
     struct ffs_console console;
     uint8_t data[FFS_MAX_DATA_STAGE];

@@ -80,7 +80,8 @@ static void run_control(struct usbip_conn *conn, struct usbip_urb *urb)
 static void hold_control(struct usbip_conn *conn, struct usbip_urb *urb)
 {
     const int64_t now_ns = usb_now_ns();
-    const int64_t from_ns = conn->slow_last != NULL && conn->slow_last->due_ns > now_ns ? conn->slow_last->due_ns : now_ns;
+    const int64_t from_ns =
+        conn->slow_last != NULL && conn->slow_last->due_ns > now_ns ? conn->slow_last->due_ns : now_ns;
     urb->due_ns = from_ns + (int64_t)(usb_device_slow_ms(conn->device) * 1e6);
     urb->next = NULL;
     if (conn->slow_last != NULL)

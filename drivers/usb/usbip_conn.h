@@ -24,7 +24,7 @@ struct usbip_conn {
     struct usbip_urb *out_first, *out_last; /* replies to send */
     uint32_t out_pos;
     struct usbip_urb *slow_first, *slow_last; /* control requests that take their time */
-    uint32_t n_pending, n_unsent; /* URBs: of the first kind the device has not answered yet */
+    uint32_t n_pending, n_unsent;             /* URBs: of the first kind the device has not answered yet */
     uint64_t pending_bytes, unsent_bytes;
 };
 

@@ -16,8 +16,8 @@ struct usbredir {
     int listener, fd;              /* -1: none */
     struct usbredirparser *parser; /* NULL: no connection (yet) */
     int broken;
-    int greeted; /* its hello has come */
-    int unplugged; /* on request */
+    int greeted;                                  /* its hello has come */
+    int unplugged;                                /* on request */
     struct redir_request *slow_first, *slow_last; /* requests that take their time */
     uint32_t n_slow;
     int (*go_on)(void *ctx);

@@ -170,7 +170,8 @@ static void answer(struct usbredir *self, struct redir_request *r)
 static void hold(struct usbredir *self, const struct redir_request *given)
 {
     const int64_t now_ns = usb_now_ns();
-    const int64_t from_ns = self->slow_last != NULL && self->slow_last->due_ns > now_ns ? self->slow_last->due_ns : now_ns;
+    const int64_t from_ns =
+        self->slow_last != NULL && self->slow_last->due_ns > now_ns ? self->slow_last->due_ns : now_ns;
     struct redir_request *r = self->n_slow < MAX_SLOW ? malloc(sizeof *r) : NULL;
     if (r == NULL) {
         usbredirparser_free_packet_data(self->parser, given->data);

@@ -36,9 +36,10 @@ static void check_window(struct cfg_reader *rd, const struct config *cfg, uint32
 {
     const int is_noisy = cfg->noise.range == RANGE_NOISE_ON && cfg->profile.range_sigma_m > 0.0;
     if (!cfg->signal.on && !is_noisy)
-        cfg_fail_key(rd, "faults[].kind", i,
-                     "window_soiled would change nothing: no signal is modelled, and ranges have no noise; allowed with "
-                     "signal.model: on, or noise.range: on and noise.sigma_m above 0");
+        cfg_fail_key(
+            rd, "faults[].kind", i,
+            "window_soiled would change nothing: no signal is modelled, and ranges have no noise; allowed with "
+            "signal.model: on, or noise.range: on and noise.sigma_m above 0");
 }
 
 void cfg_check_fault_beams(struct cfg_reader *rd, const struct config *cfg, const struct fault_list *list)

@@ -71,8 +71,8 @@ struct device_work {
     struct device_variant *variant; /* NULL: that of the version */
     int64_t scan_t0_ns;             /* device time of the scan's start */
     struct schedule_segment segment;
-    int64_t prr_uhz; /* as it is set */
-    struct device_upset upset; /* of all its pulses */
+    int64_t prr_uhz;            /* as it is set */
+    struct device_upset upset;  /* of all its pulses */
     uint32_t scan;              /* its number */
     uint64_t pulse0, pulse_end; /* pulses of this tick */
     uint64_t n_cast, cast0;     /* of these, how many are cast, and the first of them; UINT64_MAX: none */
@@ -84,7 +84,7 @@ struct device_work {
     uint32_t n_poses;      /* live: the head's poses of this tick; 0: the head stands still or follows a trajectory */
     struct pose_knot pose[DEVICE_MAX_POSES];
     enum device_power_change power; /* with the tick's start. While it is off the head says nothing but that it is */
-    int telemetry; /* due at the tick's end; it goes before each SCAN_END, too */
+    int telemetry;                  /* due at the tick's end; it goes before each SCAN_END, too */
     struct native_telemetry telemetry_frame;
 };
 

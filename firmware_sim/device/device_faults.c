@@ -27,7 +27,8 @@ static int add_fault(void *owner, const char *text, uint32_t *number, char *why,
 
 static uint32_t remove_fault(void *owner, uint32_t number)
 {
-    return fault_board_remove(((struct device *)owner)->faults, number);
+    const struct device *device = owner;
+    return fault_board_end(device->faults, number, (int64_t)device->next_tick * device->tick_ns);
 }
 
 static int count_injected(void *owner, uint32_t number, uint64_t *n)

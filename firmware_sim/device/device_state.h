@@ -60,11 +60,11 @@ struct device_scan {
     uint64_t cast;                  /* of the pulses before, those that are cast */
     struct schedule_segment segment;
     int64_t prr_uhz, lines_uhz; /* as they are set; a mirror that turns slowly has others in the segment */
-    uint32_t station;      /* from 0 */
-    uint32_t station_scan; /* which of its scans */
-    size_t stretch;        /* of a trajectory: the one of the last pulse that is claimed */
-    int describe;          /* descriptor and anchor are due, as news */
-    int anchor_lost;       /* they are due as a repetition: a new anchor was in a tick that was lost */
+    uint32_t station;           /* from 0 */
+    uint32_t station_scan;      /* which of its scans */
+    size_t stretch;             /* of a trajectory: the one of the last pulse that is claimed */
+    int describe;               /* descriptor and anchor are due, as news */
+    int anchor_lost;            /* they are due as a repetition: a new anchor was in a tick that was lost */
     int stop_requested;
 };
 

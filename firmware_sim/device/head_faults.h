@@ -9,6 +9,8 @@
  * work in ticks of a scan that have such a pulse. A power cycle, a jump and a leap second strike once; power is off for
  * for_ms, up to a whole tick. What is taken out of the list while it is at work ends.
  *
+ * Those that change what is measured are no part of it: they are exact to the pulse (beam_faults.c).
+ *
  * Thread: whoever has the device's lock. Without faults a step is one atomic load. */
 #ifndef FIRMWARE_SIM_DEVICE_HEAD_FAULTS_H
 #define FIRMWARE_SIM_DEVICE_HEAD_FAULTS_H

@@ -12,8 +12,9 @@ enum { MAX_LISTENERS = 4 };
 struct fault_board {
     pthread_mutex_t lock;
     _Atomic uint32_t version;
-    struct fault_entry entry[FAULT_MAX];
+    struct fault_entry entry[FAULT_MAX], gone[FAULT_MAX];
     uint32_t n, last_number;
+    uint64_t n_gone; /* so many were taken out; gone has the last of them, round and round */
     struct truth *truth;
     uint64_t *injected; /* by number; 0: all together */
     size_t counted;     /* of them there is room for so many */
@@ -42,7 +43,8 @@ int fault_board_create(const struct fault_list *list, const char *truth_path, st
     memset(board->injected, 0, board->counted * sizeof *board->injected);
     pthread_mutex_init(&board->lock, NULL);
     for (uint32_t i = 0; i < list->n; i++)
-        board->entry[board->n++] = (struct fault_entry){.number = i + 1, .from_start = 1, .fault = list->fault[i]};
+        board->entry[board->n++] = (struct fault_entry){
+            .number = i + 1, .until_ns = INT64_MAX, .from_start = 1, .fault = list->fault[i]};
     board->last_number = board->n;
     atomic_store(&board->version, board->n != 0);
     *out = board;
@@ -82,6 +84,18 @@ uint32_t fault_board_copy(struct fault_board *board, struct fault_entry entries[
     return version;
 }
 
+uint32_t fault_board_copy_all(struct fault_board *board, struct fault_entry entries[FAULT_KEPT], uint32_t *n)
+{
+    pthread_mutex_lock(&board->lock);
+    *n = board->n;
+    memcpy(entries, board->entry, board->n * sizeof *entries);
+    for (uint32_t i = 0; i < FAULT_MAX && i < board->n_gone; i++)
+        entries[(*n)++] = board->gone[i];
+    const uint32_t version = atomic_load(&board->version);
+    pthread_mutex_unlock(&board->lock);
+    return version;
+}
+
 /* A number for one more, which is counted from 0 on. 0: no memory. */
 static uint32_t take_number(struct fault_board *board)
 {
@@ -101,24 +115,37 @@ int fault_board_add(struct fault_board *board, const struct fault *fault, int64_
     } else if ((*number = take_number(board)) == 0) {
         rc = sh_fail(err, SH_ENOMEM, "no memory for another fault");
     } else {
-        board->entry[board->n++] = (struct fault_entry){.number = *number, .since_ns = t_ns, .fault = *fault};
+        board->entry[board->n++] = (struct fault_entry){
+            .number = *number, .since_ns = t_ns, .until_ns = INT64_MAX, .fault = *fault};
         atomic_fetch_add(&board->version, 1);
     }
     pthread_mutex_unlock(&board->lock);
     return rc;
 }
 
-uint32_t fault_board_remove(struct fault_board *board, uint32_t number)
+uint32_t fault_board_end(struct fault_board *board, uint32_t number, int64_t t_ns)
 {
     uint32_t kept = 0;
     pthread_mutex_lock(&board->lock);
     const uint32_t before = board->n;
-    for (uint32_t i = 0; i < before; i++)
-        if (number != 0 && board->entry[i].number != number) board->entry[kept++] = board->entry[i];
+    for (uint32_t i = 0; i < before; i++) {
+        if (number != 0 && board->entry[i].number != number) {
+            board->entry[kept++] = board->entry[i];
+            continue;
+        }
+        struct fault_entry *gone = &board->gone[board->n_gone++ % FAULT_MAX];
+        *gone = board->entry[i];
+        gone->until_ns = t_ns;
+    }
     board->n = kept;
     if (kept != before) atomic_fetch_add(&board->version, 1);
     pthread_mutex_unlock(&board->lock);
     return before - kept;
+}
+
+uint32_t fault_board_remove(struct fault_board *board, uint32_t number)
+{
+    return fault_board_end(board, number, INT64_MIN);
 }
 
 void fault_board_note(struct fault_board *board, const struct fault_note *note)

@@ -8,9 +8,12 @@
 
 #include "firmware_sim/fault/truth.h"
 
+enum { FAULT_KEPT = 2 * FAULT_MAX }; /* faults that there are, and those that were taken out last */
+
 struct fault_entry {
     uint32_t number; /* from 1, in the order in which they were added; never used again */
     int64_t since_ns; /* device time from which it counts: 0, or when it was added */
+    int64_t until_ns; /* when it was taken out; INT64_MAX: it is there */
     int from_start;   /* it was there at power-up: it counts a session's frames from the first */
     struct fault fault;
 };
@@ -29,10 +32,16 @@ uint32_t fault_board_version(const struct fault_board *board);
 /* A copy of the list, of the version that it returns. */
 uint32_t fault_board_copy(struct fault_board *board, struct fault_entry entries[FAULT_MAX], uint32_t *n);
 
+/* With those that were taken out last, which still hold for frames from before that. */
+uint32_t fault_board_copy_all(struct fault_board *board, struct fault_entry entries[FAULT_KEPT], uint32_t *n);
+
 /* Adds a fault that counts from t_ns. SH_EINPUT: there are FAULT_MAX. */
 int fault_board_add(struct fault_board *board, const struct fault *fault, int64_t t_ns, uint32_t *number,
                     struct sh_err *err);
-/* Takes out the fault of that number; 0: all. Returns how many went. */
+/* Takes out the fault of that number; 0: all. Frames from before device time t_ns are on their way, and are still hit.
+ * Returns how many went. */
+uint32_t fault_board_end(struct fault_board *board, uint32_t number, int64_t t_ns);
+/* The same, at once. */
 uint32_t fault_board_remove(struct fault_board *board, uint32_t number);
 
 /* It was injected: counted, written to the truth, and given to the listener. */

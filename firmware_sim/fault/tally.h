@@ -8,8 +8,8 @@
 
 /* Set to zeroes at first. */
 struct fault_tally {
-    uint32_t number[FAULT_MAX]; /* 0: free */
-    uint64_t hits[FAULT_MAX];
+    uint32_t number[FAULT_KEPT]; /* 0: free */
+    uint64_t hits[FAULT_KEPT];
 };
 
 /* The list is another one: counts of faults that are not in it go. */

@@ -34,11 +34,11 @@ void wire_free(struct wire *wire)
 /* Those that were there keep what they know; new ones count from here. */
 void wire_renew(struct wire *wire, uint64_t ahead)
 {
-    struct fault_entry entry[FAULT_MAX];
-    struct wire_fault before[FAULT_MAX];
+    struct fault_entry entry[FAULT_KEPT];
+    struct wire_fault before[FAULT_KEPT];
     const uint32_t n_before = wire->n_faults;
     memcpy(before, wire->fault, sizeof before);
-    wire->version = fault_board_copy(wire->spec.board, entry, &wire->n_faults);
+    wire->version = fault_board_copy_all(wire->spec.board, entry, &wire->n_faults);
     if (wire->spec.tally != NULL) fault_tally_renew(wire->spec.tally, entry, wire->n_faults);
     for (uint32_t i = 0; i < wire->n_faults; i++) {
         struct wire_fault *fault = &wire->fault[i];
@@ -47,6 +47,7 @@ void wire_renew(struct wire *wire, uint64_t ahead)
         if (!entry[i].from_start) fault->base[FAULT_OF_REPLIES] += ahead;
         for (uint32_t k = 0; k < n_before; k++)
             if (before[k].entry.number == entry[i].number) *fault = before[k];
+        fault->entry.until_ns = entry[i].until_ns;
     }
 }
 
@@ -111,6 +112,8 @@ static int change(struct wire *wire, struct wire_fault *fault, struct wire_makin
     const int of = making->item->of;
     struct fault_spot spot = making->spot;
     if (!concerns(wire, fault, of) || spot.number <= fault->base[of]) return SH_OK;
+    const int is_gone = fault->entry.until_ns != INT64_MAX;
+    if (is_gone && (of == FAULT_OF_REPLIES || spot.t_ns >= fault->entry.until_ns)) return SH_OK;
     spot.number -= fault->base[of];
     spot.t_ns -= fault->entry.since_ns;
     if (spot.t_ns < 0 && of != FAULT_OF_REPLIES) return SH_OK;
@@ -294,6 +297,11 @@ void wire_skip_heard(struct wire *wire, uint32_t n)
 }
 
 /* ---- out */
+
+const struct fault_note *wire_act_note(const struct wire_piece *act)
+{
+    return (const struct fault_note *)(const void *)act->bytes;
+}
 
 struct wire_piece *wire_due(struct wire *wire, int64_t now_ns, int last)
 {

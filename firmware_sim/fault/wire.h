@@ -3,11 +3,12 @@
  * In: frames of the native protocol, units of another one, reply lines, in the order in which the session would write
  * them; the clock. Out: pieces to be written, with the time before which they must not go out, and acts that the owner
  * carries out on its link (to hang up, to unplug, and so on) when they are the first. Each fault that strikes is noted
- * on the board. Without faults a session has no wire.
+ * on the board; what the link does, by the owner, once it has been done. Without faults a session has no wire.
  *
  * At a frame faults strike in this order: what ends the session; drop (and flips on datagrams, but for those that are
- * resealed); truncate; flips that are resealed; all others, as they stand in the list. A fault that finds nothing to do there (a flip of a byte that a short frame has not,
- * anything but what stands before the frame when it is dropped) does not strike: it is not noted, nor counted.
+ * resealed); truncate; flips that are resealed; all others, as they stand in the list. A fault that finds nothing to do
+ * there does not strike: it is not noted, nor counted. Examples are a flip of a byte that a short frame has not, and
+ * anything but what stands before the frame when that is dropped.
  *
  * Thread: one, but for the board. Allocates. */
 #ifndef FIRMWARE_SIM_FAULT_WIRE_H
@@ -29,7 +30,7 @@ struct wire_spec {
     uint32_t max_unit;      /* the longest frame or unit, as a rule: room for it is there at once */
     int units;              /* 1: each unit is a write of its own */
     int native;             /* frames of the native protocol */
-    int datagrams;          /* 1: units with a checksum of the system's, which drops those that are damaged on their way */
+    int datagrams; /* 1: units with a checksum of the system's, which drops those that are damaged on their way */
     /* Of the protocol (protocol.h). */
     void (*content)(const uint8_t *unit, size_t len, uint8_t *mask);
     void (*reseal)(uint8_t *unit, size_t len);
@@ -64,6 +65,9 @@ void wire_heard(struct wire *wire, const void *bytes, size_t len);
 /* So many replies are still to be put to lines that it did not hear. */
 void wire_skip_heard(struct wire *wire, uint32_t n);
 
+/* What its owner notes of an act on the board, once it is carried out. Valid as the act is. */
+const struct fault_note *wire_act_note(const struct wire_piece *act);
+
 /* The first piece, or act, if it may go out now; NULL: none may. Its bytes from `out` on are to be written, which the
  * owner moves on. last: no more items come, nothing is held for them. */
 struct wire_piece *wire_due(struct wire *wire, int64_t now_ns, int last);
@@ -74,8 +78,8 @@ void wire_pop(struct wire *wire);
  * waits for frames to come does not count. */
 int wire_is_full(const struct wire *wire, size_t cap, int64_t now_ns);
 int wire_is_empty(const struct wire *wire);
-/* What was put and not written as a whole: frames of the stream (not made for this reader alone) or units, and pulses in
- * them. What a fault dropped counts as written; what comes after an act that ends the session does not. */
+/* What was put and not written as a whole: frames of the stream (not made for this reader alone) or units, and pulses
+ * in them. What a fault dropped counts as written; what comes after an act that ends the session does not. */
 void wire_count_unwritten(const struct wire *wire, uint64_t *frames, uint64_t *pulses);
 
 #endif

@@ -230,13 +230,13 @@ static int end_session(struct change *c)
 static int act(struct change *c)
 {
     const struct fault *f = &c->fault->entry.fault;
-    struct wire_piece *piece = wire_piece_new(WIRE_ACT, NULL, 0);
+    c->note.for_ms = f->for_ms;
+    if (f->kind == FAULT_SHORT_PACKETS) c->note.n = fault_n(f);
+    struct wire_piece *piece = wire_piece_new(WIRE_ACT, &c->note, sizeof c->note);
     if (piece == NULL) return SH_ENOMEM;
     piece->act = f->kind;
     piece->n = fault_n(f);
     piece->for_ms = f->for_ms;
-    c->note.for_ms = f->for_ms;
-    if (f->kind == FAULT_SHORT_PACKETS) c->note.n = piece->n;
     if (f->kind <= FAULT_USB_RESET && end_session(c) != SH_OK) { /* disconnect, unplug, usb_reset */
         wire_piece_free(piece);
         return SH_ENOMEM;
@@ -356,6 +356,7 @@ int wire_change(struct wire *wire, const struct wire_fault *fault, uint64_t numb
     if (making->is_dropped && !is_before(fault->entry.fault.kind)) return 0;
     describe(&c);
     const int done = change_item(&c);
-    if (done > 0) fault_board_note(wire->spec.board, &c.note);
+    const int is_act = fault->entry.fault.kind >= FAULT_DISCONNECT && fault->entry.fault.kind <= FAULT_SHORT_PACKETS;
+    if (done > 0 && !is_act) fault_board_note(wire->spec.board, &c.note);
     return done;
 }

@@ -13,7 +13,7 @@ struct wire_heard {
     int has_lines;
     uint8_t *bytes;
     size_t len, room;
-    size_t begin, line_len; /* of the line that has no end yet: where it begins, and how long it is; not all may be kept */
+    size_t begin, line_len; /* of the line that has no end yet: where it begins, how long it is; not all may be kept */
     int is_blank, last_cr;
     uint32_t unheard; /* answers to come that are to lines from before */
 };

@@ -15,7 +15,7 @@ struct wire_fault {
 struct wire {
     struct wire_spec spec;
     uint32_t version; /* of the list */
-    struct wire_fault fault[FAULT_MAX];
+    struct wire_fault fault[FAULT_KEPT];
     uint32_t n_faults;
     uint64_t count[FAULT_N_OF];
     uint64_t merge_until[FAULT_N_OF]; /* up to this one, frames are in a write that a merge began */
@@ -50,8 +50,8 @@ struct wire_making {
     int64_t now_ns;
 };
 
-/* What the fault does to it; notes it. `number` is the frame's, as this fault counts. Returns 1; 0: there is nothing for
- * it to do; or SH_ENOMEM. */
+/* What the fault does to it; notes it. `number` is the frame's, as this fault counts. Returns 1; 0: there is nothing
+ * for it to do; or SH_ENOMEM. */
 int wire_change(struct wire *wire, const struct wire_fault *fault, uint64_t number, struct wire_making *making);
 
 #endif

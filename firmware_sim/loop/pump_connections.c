@@ -24,14 +24,16 @@ enum link_fault pump_link_fault(enum fault_kind kind)
 static void look_at_list(struct pump *pump)
 {
     struct pump_connections *c = &pump->connections;
-    struct fault_entry before[FAULT_MAX];
+    struct fault_entry before[FAULT_MAX], all[FAULT_KEPT];
     uint64_t base[FAULT_MAX];
+    uint32_t n_all;
     const uint32_t n_before = c->n_entries;
     if (c->version == fault_board_version(pump->board)) return;
     memcpy(before, c->entry, sizeof before);
     memcpy(base, c->base, sizeof base);
     c->version = fault_board_copy(pump->board, c->entry, &c->n_entries);
-    fault_tally_renew(&pump->tally, c->entry, c->n_entries);
+    fault_board_copy_all(pump->board, all, &n_all); /* those that were taken out last keep their counts */
+    fault_tally_renew(&pump->tally, all, n_all);
     for (uint32_t i = 0; i < c->n_entries; i++) {
         c->base[i] = c->entry[i].from_start ? 0 : c->n;
         for (uint32_t k = 0; k < n_before; k++)

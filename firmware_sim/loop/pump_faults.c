@@ -2,8 +2,8 @@
  * of that is written. A session has a wire from the first fault on. Without one nothing of this is called.
  *
  * A wire that stalls keeps as much as a session's buffer, one that delays WIRE_DELAY_BYTES. Then the session takes no
- * more, and its reader is as any reader that is too slow. What lies in the wire when the client goes away, or at the end
- * of the run, counts as not written; what a fault dropped or changed counts as written. */
+ * more, and its reader is as any reader that is too slow. What lies in the wire when the client goes away, or at the
+ * end of the run, counts as not written; what a fault dropped or changed counts as written. */
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/loop/pump_inside.h"
 
@@ -159,6 +159,7 @@ static int carry_out(struct pump *pump, struct session *s, int index, const stru
     const enum fault_kind kind = (enum fault_kind)act->act;
     const enum link_fault what = pump_link_fault(kind);
     const double for_ms = act->for_ms;
+    const struct fault_note note = *wire_act_note(act);
     const int rc = pump->ops->fault(pump->link, what, index, act->n, for_ms);
     wire_pop(s->wire);
     if (what == LINK_FAULT_BUS_RESET) pump->plug_ns = in_ms(0.0); /* where it takes unplugging, and plugging in fails */
@@ -169,6 +170,7 @@ static int carry_out(struct pump *pump, struct session *s, int index, const stru
         pump_say(pump, text);
         return 0;
     }
+    fault_board_note(pump->board, &note);
     if (what == LINK_FAULT_UNPLUG) pump->plug_ns = in_ms(for_ms);
     if (what == LINK_FAULT_DISCONNECT && for_ms > 0.0) pump->refuse_until_ns = in_ms(for_ms);
     end_sessions(pump, s, what);

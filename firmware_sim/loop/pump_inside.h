@@ -121,8 +121,8 @@ void session_close_wire(struct session *s);
 int session_wire_waits(const struct session *s);
 /* As session_write, by its wire. */
 int session_write_faulty(struct pump *pump, struct session *s, int index);
-/* Writes what lies in the wire: 1: the link is full; 0: nothing may go out now; -1: the session is closed. last: nothing
- * comes after it. */
+/* Writes what lies in the wire: 1: the link is full; 0: nothing may go out now; -1: the session is closed. last:
+ * nothing comes after it. */
 int session_write_wire(struct pump *pump, struct session *s, int index, int last);
 /* Whether as much lies in it as it keeps. */
 int session_wire_is_full(const struct pump *pump, const struct session *s);

@@ -52,17 +52,19 @@ static void unplug(struct pump *pump, uint64_t tick)
 int pump_power(struct pump *pump, uint32_t full)
 {
     uint64_t tick;
+    int more = 0;
     while (pump->board != NULL && (tick = stream_power_tick(pump->stream, pump->power_seen)) != UINT64_MAX) {
         const int goes = pump->power_seen % 2 == 0;
-        if (stream_released(pump->stream) <= tick) return 0;
+        if (stream_released(pump->stream) <= tick) return more;
         for (int i = 0; i < LINK_MAX_SESSIONS && goes; i++)
             if (pump->session[i].open && !is_drained(pump, &pump->session[i], (int)(full >> i & 1), tick))
-                return !pump->stream->waits;
+                return more || !pump->stream->waits;
         if (goes)
             unplug(pump, tick);
         else
             plug(pump);
         pump->power_seen++;
+        more = 1; /* sessions that go on have this tick before them */
     }
-    return 0;
+    return more;
 }

@@ -38,6 +38,24 @@ head_start "{type: usb, backend: functionfs, speed: $speed}" --set head.prr_hz=4
 wait_for 10 is_plugged
 REPLUGS=$replugs UNPLUG="sh unplug.sh" PLUG="sh plug.sh" tap "$speed" test_stream
 note "streamed at $(uptime_s) s"
+head_stop
+if [ $speed = high ]; then # a reset is the same without a pause
+    printf 'faults:\n  - {kind: unplug, at: 100, count: 1, for_ms: 200}\n  - {kind: usb_reset, at: 200, count: 1}\n' >faults.yaml
+    head_start "{type: usb, backend: functionfs, speed: high}" --set head.prr_hz=4000 --set loop.tick_hz=100 \
+        --scenario faults.yaml --truth truth.json
+    wait_for 10 is_plugged
+    scanhead record usb --wait 10 --frames 100 --replug 20 -o faults.ply --stats faults.json 2>faults.err &
+    client=$!
+    check "$speed: the recorder goes on after it was unplugged twice on request" \
+        wait_for 40 sh -c "test \$(grep -c 'is back' faults.err) = 2"
+    kill -INT $client
+    wait $client
+    check "$speed: with the count" grep '"replugs": 2,' faults.json
+    check "$speed: both are in the truth" test "$(wc -l <truth.json)" = 2
+    head_stop
+fi
+head_start "{type: usb, backend: functionfs, speed: $speed}" --set head.prr_hz=4000 --set loop.tick_hz=100
+wait_for 10 is_plugged
 # Without a configuration a head has nothing to do on its bus: it rests, and is there again with the next one.
 cpu_ticks() {
     awk '{print $14 + $15}' /proc/$head_pid/stat

@@ -311,6 +311,35 @@ test('replies in order; an ERR; out of step after one that did not come', async 
   equal(await d, '0 gone', 'D');
 });
 
+// The timers are the test's own: what would run out first is seen without waiting for it.
+test('the time of a command counts once it is the next to be answered', async () => {
+  const real = {setTimeout, clearTimeout}, timers = [];
+  globalThis.setTimeout = (run, ms) => timers.push({run, ms});
+  globalThis.clearTimeout = (id) => { if (id) timers[id - 1] = null; };
+  const left = () => timers.filter((t) => t).map(({ms}) => ms).join(), runOut = () => timers.findLast((t) => t).run();
+  try {
+    const sent = [], replies = new Replies((line) => sent.push(line));
+    const outcome = (promise) => promise.then((text) => text, ({number, text}) => `${number} ${text}`);
+    replies.open();
+    const plan = outcome(replies.ask('SITE:POSE 1', 60)), [a, b] = ['A?', 'B?'].map((line) => outcome(replies.ask(line, 5)));
+    equal(left(), '60000', 'while the plan is made');
+    replies.take('OK');
+    equal(await plan, 'OK', 'SITE:POSE');
+    equal(left(), '5000', 'A is next');
+    runOut();
+    equal(await a, '0 no reply within 5 s', 'A');
+    equal(await b, '0 given up, as A? had no reply', 'B');
+    const [c, d] = [replies.ask('C?', 7), replies.ask('D?', 8)]; // the head has not come into step yet
+    equal(left(), '7000,8000', 'they wait to be sent');
+    for (const line of ['late', 'a,b,c,d']) replies.take(line);
+    equal(left(), '7000', 'sent: C is next');
+    for (const line of ['3', '4']) replies.take(line);
+    equal([await c, await d, left(), sent.join()].join(), '3,4,,SITE:POSE 1,A?,B?,*IDN?,C?,D?', 'in step again');
+  } finally {
+    Object.assign(globalThis, real);
+  }
+});
+
 // ---- losses
 
 // What Losses says of these; shots: 100 come with the points.

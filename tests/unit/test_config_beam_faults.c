@@ -1,7 +1,6 @@
 /* Faults that change what is measured: heads that can't have them are told why. */
 #include "tests/unit/config_rig.h"
 
-
 /* Of a line head without noise and signal (base), with a list of faults, and of other heads. */
 static void assert_refused(const char *profile, const char *rest, const char *item, const char *says)
 {

@@ -57,8 +57,7 @@ static void a_tick_ends_where_a_fault_does(void **state)
         assert_true(work->pulse0 == next);
         next = work->pulse_end;
         const uint64_t last = next - 1;
-        const int is_dark = work->pulse0 == 100001 && last == 100001,
-                  slips = work->pulse0 >= 100777 && last <= 200002;
+        const int is_dark = work->pulse0 == 100001 && last == 100001, slips = work->pulse0 >= 100777 && last <= 200002;
         assert_int_equal(work->upset.on, is_dark || slips);
         if (is_dark) assert_true(work->upset.cast.dark);
         if (slips) assert_true(work->upset.cast.slip_turn == 1.0 / 360.0);
@@ -149,8 +148,10 @@ static void an_added_fault_counts_from_its_command(void **state)
 static void the_mirror_has_limits(void **state)
 {
     (void)state;
-    const char *const slow[] = {"head.lines_hz=1", "head.frames=0"}, *const fast[] = {"head.lines_hz=1000", "head.frames=0"};
-    const char *const slowest[] = {"{kind: mirror_slow, factor: 0.01}"}, *const fastest[] = {"{kind: mirror_slow, factor: 2}"};
+    const char *const slow[] = {"head.lines_hz=1", "head.frames=0"}, *const fast[] = {"head.lines_hz=1000",
+                                                                                      "head.frames=0"};
+    const char *const slowest[] = {"{kind: mirror_slow, factor: 0.01}"}, *const fastest[] = {
+                                                                             "{kind: mirror_slow, factor: 2}"};
     struct rig *rig = open_scan(slow, LEN(slow), slowest, 1);
     for (int i = 0; i < 200; i++) {
         rig_fill(rig);
@@ -171,10 +172,8 @@ static void the_mirror_has_limits(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_tick_ends_where_a_fault_does),
-        cmocka_unit_test(settings_change_while_the_mirror_is_slow),
-        cmocka_unit_test(faults_end_with_their_scan),
-        cmocka_unit_test(an_added_fault_counts_from_its_command),
+        cmocka_unit_test(a_tick_ends_where_a_fault_does), cmocka_unit_test(settings_change_while_the_mirror_is_slow),
+        cmocka_unit_test(faults_end_with_their_scan),     cmocka_unit_test(an_added_fault_counts_from_its_command),
         cmocka_unit_test(the_mirror_has_limits),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

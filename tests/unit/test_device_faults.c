@@ -170,8 +170,8 @@ static void loses_power_at_a_pulse(void **state)
     rig_close(rig);
 }
 
-/* Full seconds begin at .7 s. PPS at 1.7 and 2.7 are lost; at 3.2 the clock jumps on by 0.3 s; from 5.1 to 6.35 it stands,
- * at x.7; a minute ends at 5 s and has a second 60. */
+/* Full seconds begin at .7 s. PPS at 1.7 and 2.7 are lost; at 3.2 the clock jumps on by 0.3 s; from 5.1003 to 6.3504 it
+ * stands; the minute at hand has a second 60. */
 static void tells_a_wrong_time(void **state)
 {
     (void)state;
@@ -182,11 +182,11 @@ static void tells_a_wrong_time(void **state)
     } want[] = {{700000000, "2026-06-30T11:59:56Z"},
                 {3200000000 + 200000000, "2026-06-30T11:59:59Z"},
                 {4400000000, "2026-06-30T11:59:60Z"},
-                {6350000000 + 300000000, "2026-06-30T12:00:00Z"},
-                {7650000000, "2026-06-30T12:00:01Z"}};
+                {6350400000 + 299700000, "2026-06-30T12:00:00Z"},
+                {7650100000, "2026-06-30T12:00:01Z"}};
     struct rig *rig = open_with("  - {kind: pps_lost, from_s: 1.7, until_s: 2.700000001}\n"
                                 "  - {kind: clock_jump, from_s: 3.2, jump_s: 0.3}\n"
-                                "  - {kind: clock_stop, from_s: 5.1, until_s: 6.35}\n"
+                                "  - {kind: clock_stop, from_s: 5.1003, until_s: 6.3504}\n"
                                 "  - {kind: leap_second, from_s: 0.5}\n",
                                 NULL, sets, 1);
     int n = 0;
@@ -200,8 +200,8 @@ static void tells_a_wrong_time(void **state)
         n++;
     }
     assert_int_equal(n, 5);
-    assert_string_equal(rig_tell(rig, "TIME:UTC?", 6000), "2026-06-30T11:59:60.700000000Z");
-    assert_true(device_utc_ns(rig->device, 5200000000) == device_utc_ns(rig->device, 6349999999));
+    assert_string_equal(rig_tell(rig, "TIME:UTC?", 6000), "2026-06-30T11:59:60.700300000Z");
+    assert_true(device_utc_ns(rig->device, 5100300000) == device_utc_ns(rig->device, 6350399999));
     rig_close(rig);
 }
 

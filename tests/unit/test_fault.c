@@ -35,8 +35,8 @@ static void each_kind_has_its_name_and_place(void **state)
     assert_int_equal(places[FAULT_AT_CONNECTION], 3);
 }
 
-/* Of N trials with p the hits have sigma sqrt(N p (1 - p)); beyond 5 sigma it is a false alarm in 6e-7 of all seeds. The
- * seeds are fixed, and so is the result. */
+/* Of N trials with p the hits have sigma sqrt(N p (1 - p)); beyond 5 sigma it is a false alarm in 6e-7 of all seeds.
+ * The seeds are fixed, and so is the result. */
 static void chance_is_as_likely_as_said(void **state)
 {
     (void)state;

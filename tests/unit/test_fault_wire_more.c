@@ -242,17 +242,19 @@ static void a_fault_counts_from_when_it_was_added(void **state)
     }
     f.from_s = 0.02; /* and seconds count from there */
     f.from = f.every = 1;
+    f.kind = FAULT_STALL;
     assert_int_equal(add(&f, 1000 * MS), 2);
-    assert_int_equal(fault_board_remove(rig.board, 1), 1);
+    assert_int_equal(fault_board_end(rig.board, 1, 1025 * MS), 1); /* up to there it still holds */
     for (int i = 0; i < 4; i++)
         rig_frame_at(RIG_STREAM, 40, (1000 + 10 * i) * MS, 0);
-    assert_true(rig.n_notes == 5 && rig.note[3].number == 3 && rig.note[4].number == 4 && rig.note[3].fault == 2);
-    assert_int_equal(fault_board_remove(rig.board, 0), 1);
+    assert_true(rig.n_notes == 6 && rig.note[3].number == 11 && rig.note[3].fault == 1);
+    assert_true(rig.note[4].number == 3 && rig.note[5].number == 4 && rig.note[4].fault == 2);
+    assert_int_equal(fault_board_end(rig.board, 0, 1040 * MS), 1);
     assert_int_equal(fault_board_remove(rig.board, 2), 0);
     rig_frame_at(RIG_STREAM, 40, 2000 * MS, 0);
-    assert_int_equal(rig.n_notes, 5);
-    assert_int_equal(fault_board_injected(rig.board, 1), 3); /* what was taken out keeps its count */
-    assert_int_equal(fault_board_injected(rig.board, 0), 5);
+    assert_int_equal(rig.n_notes, 6);
+    assert_int_equal(fault_board_injected(rig.board, 1), 4); /* what was taken out keeps its count */
+    assert_int_equal(fault_board_injected(rig.board, 0), 6);
     assert_int_equal(add(&f, 0), 3); /* and its number */
 }
 

@@ -23,9 +23,8 @@ static int port_of(const struct bench *bench)
 /* A client of a port of this machine; -1: it was refused. */
 static int dial(int port)
 {
-    struct sockaddr_in at = {.sin_family = AF_INET,
-                             .sin_addr.s_addr = htonl(INADDR_LOOPBACK),
-                             .sin_port = htons((uint16_t)port)};
+    struct sockaddr_in at = {
+        .sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK), .sin_port = htons((uint16_t)port)};
     int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
     if (connect(fd, (struct sockaddr *)&at, sizeof at) == 0) return fd;
     assert_int_equal(errno, ECONNREFUSED);
@@ -51,8 +50,12 @@ static void test_table(void **state)
     const struct {
         enum link_type type;
         uint32_t faults;
-    } rows[] = {{LINK_NULL, 0},           {LINK_FILE, 0},      {LINK_FD, 0},
-                {LINK_PTY, ends | unplug}, {LINK_TCP, ends | unplug}, {LINK_WEB, ends | unplug},
+    } rows[] = {{LINK_NULL, 0},
+                {LINK_FILE, 0},
+                {LINK_FD, 0},
+                {LINK_PTY, ends | unplug},
+                {LINK_TCP, ends | unplug},
+                {LINK_WEB, ends | unplug},
                 {LINK_UDP, unplug}};
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         const struct link_spec spec = {.type = rows[i].type};
@@ -317,8 +320,8 @@ static void test_udp(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_table),          cmocka_unit_test(test_tcp_disconnect), cmocka_unit_test(test_tcp_unplug),
-        cmocka_unit_test(test_web),            cmocka_unit_test(test_pty_disconnect), cmocka_unit_test(test_pty_unplug),
+        cmocka_unit_test(test_table), cmocka_unit_test(test_tcp_disconnect), cmocka_unit_test(test_tcp_unplug),
+        cmocka_unit_test(test_web),   cmocka_unit_test(test_pty_disconnect), cmocka_unit_test(test_pty_unplug),
         cmocka_unit_test(test_udp),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

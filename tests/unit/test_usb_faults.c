@@ -22,7 +22,8 @@ static void test_short_packets(void **state)
     (void)state;
     static const struct {
         uint32_t room, written, first;
-    } rows[] = {{4096, 3000, 1500}, {4096, 2048, 1023}, {4096, 1024, 511}, {4096, 3, 1}, {4096, 2, 1}, {1024, 5000, 511}};
+    } rows[] = {{4096, 3000, 1500}, {4096, 2048, 1023}, {4096, 1024, 511},
+                {4096, 3, 1},       {4096, 2, 1},       {1024, 5000, 511}};
     uint8_t data[5000];
     for (size_t i = 0; i < sizeof data; i++)
         data[i] = (uint8_t)(i * 7 + i / 256);
@@ -165,7 +166,8 @@ static void test_reset(void **state)
     assert_int_equal(bench_expect(&bench, LINK_CLOSED, 0).session, STREAM);
     assert_string_equal(bench_expect(&bench, LINK_NOTICE, 0).peer,
                         "the host reset the bus: sessions ended, the device stays plugged in");
-    assert_int_equal(client_control(&c, &r, 0x80, 0, 0, 0, 2, NULL), 0); /* by which a client tells it from unplugging */
+    assert_int_equal(client_control(&c, &r, 0x80, 0, 0, 0, 2, NULL),
+                     0); /* by which a client tells it from unplugging */
     open_stream(&c);
     close(c.fd);
     bench_close(&bench);
@@ -243,7 +245,7 @@ static void test_enumeration(void **state)
     expect_urb(&c, one, 0, 2);
     expect_urb(&c, three, 0, 2);
     assert_true(now_ms() - from_ms >= 3 * SLOW_MS - 1); /* its turn is as it was */
-    open_stream(&c); /* bulk transfers take no time of their own */
+    open_stream(&c);                                    /* bulk transfers take no time of their own */
     client_submit(&c, 1, 0, status, NULL, 2);
     bench_poll(&bench, 0, 0);
     close(c.fd); /* with a request that waits */

@@ -124,7 +124,8 @@ uint32_t rig_take(int last)
 {
     uint32_t n = 0;
     for (struct wire_piece *piece; (piece = wire_due(rig.wire, rig.now_ns, last)) != NULL; n++) {
-        const size_t len = piece->len - piece->out;
+        const size_t len = piece->kind != WIRE_ACT ? piece->len - piece->out : 0;
+        if (piece->kind == WIRE_ACT) fault_board_note(rig.board, wire_act_note(piece)); /* it is carried out */
         assert_true(rig.n_writes < RIG_WRITES && rig.n_out + len <= RIG_OUT);
         rig.write[rig.n_writes++] = (struct rig_write){rig.now_ns, piece->kind, piece->act, rig.n_out, len};
         if (len != 0) memcpy(rig.out + rig.n_out, piece->bytes + piece->out, len);
@@ -158,8 +159,8 @@ void rig_expect(const int *items)
     assert_int_equal(at, rig.n_out);
 }
 
-/* ---- what should have come out, by the notes: each item has its place in the input, and what was held has the place of
- * the frame that it comes after. Sorted by that, it is the output. */
+/* ---- what should have come out, by the notes: each item has its place in the input, and what was held has the place
+ * of the frame that it comes after. Sorted by that, it is the output. */
 
 struct chunk {
     uint64_t place; /* of an item, from 0; after the last ones: those in the order of their countings */

@@ -34,7 +34,8 @@ static void run_live(struct wire *wire, const char *config, const char *pace, co
 {
     char truth[352];
     snprintf(truth, sizeof truth, "%s", wire_path(wire, "live.json"));
-    const char *const more[] = {"--pace", pace, "--threads", threads, "--truth", truth, "--set", "noise.range=on", NULL};
+    const char *const more[] = {"--pace", pace,    "--threads",      threads, "--truth",
+                                truth,    "--set", "noise.range=on", NULL};
     struct head head = head_start(wire, config, more);
     struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
     struct scanhead_frame frame;
@@ -113,8 +114,11 @@ static void record_hash(struct wire *wire, const char *const *sets, const char *
 static void ways_to_cast_agree(void **state)
 {
     static const char *const noisy[] = {"noise.range=on", NULL};
-    static const char *const ways[][3] = {{"cast.sight=on", NULL},  {"cast.sight=off", NULL},     {"beam.mode=rings", NULL},
-                                          {"beam.mode=adaptive", NULL}, {"output.layout=geo", "output.crs=local", NULL}};
+    static const char *const ways[][3] = {{"cast.sight=on", NULL},
+                                          {"cast.sight=off", NULL},
+                                          {"beam.mode=rings", NULL},
+                                          {"beam.mode=adaptive", NULL},
+                                          {"output.layout=geo", "output.crs=local", NULL}};
     struct wire *wire = *state;
     char one[5][65], two[65];
     beam_record(wire, 0, ALL, noisy);
@@ -146,7 +150,8 @@ static double rotor_rad(const char *kind, uint64_t k)
     shot_vlp(30000, &end);
     const double per_ns = 2.0 * M_PI / 1e8, t = (double)s.t_ns, b = (double)begin.t_ns, e = (double)end.t_ns;
     const int inside = k >= 10000 && k < 30000;
-    if (strcmp(kind, "mirror_slow") == 0) return per_ns * (k < 10000 ? t : inside ? b + 0.25 * (t - b) : b + 0.25 * (e - b) + (t - e));
+    if (strcmp(kind, "mirror_slow") == 0)
+        return per_ns * (k < 10000 ? t : inside ? b + 0.25 * (t - b) : b + 0.25 * (e - b) + (t - e));
     if (!inside) return per_ns * t;
     if (strcmp(kind, "mirror_stuck") == 0) return per_ns * b;
     return per_ns * t + 1.5 * RAD * sin(2.0 * M_PI * 12.0 * 1e-9 * (t - b));
@@ -172,6 +177,12 @@ static void check_rotor(struct wire *wire, const char *kind, const char *keys)
         assert_int_equal(shot->t_ns, s.t_ns);
         room_cast(shot->mirror_rad, shot->pan_rad, &ray);
         assert_true(fabs(shot->range_m - ray.range_m) < 1e-5);
+    }
+    for (uint32_t i = 0; i < run->lines; i++) { /* a turn's end reads what its last point does */
+        const struct scanhead_line_end *line = &run->line[i];
+        const struct beam_shot *last = &run->shot[line->pulse0 + line->n_fired - 1];
+        assert_true(angle_between(last->pan_rad, 2.0 * M_PI * 0x1p-32 * line->pan_count) <= ANGLE_RAD);
+        assert_true(angle_between(last->mirror_rad, 2.0 * M_PI * 0x1p-32 * line->mirror_count) <= ANGLE_RAD);
     }
 }
 

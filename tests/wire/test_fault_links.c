@@ -104,15 +104,11 @@ static void cut_and_return(struct wire *wire, const char *link, const char *faul
     int64_t t_ns = 0;
     begin(hit, clean);
     const uint32_t last = read_to_cut(hit, &t_ns);
-    const int64_t seq = truth(wire, 0, kind, "seq");
-    assert_int_equal(truth(wire, 0, kind, "frame"), 60);
-    assert_true(last < seq); /* nothing from there on; of a terminal what was not read is gone, too */
-    if (strstr(link, "tcp") != NULL) assert_int_equal(seq - last, 1);
     assert_int_equal(scanhead_reattach(hit, DEADLINE_MS), SCANHEAD_OK);
     client_next(hit, &frame);
     while ((frame.flags & SCANHEAD_LOCAL) != 0)
         client_next(hit, &frame);
-    assert_true(frame.seq >= seq);
+    const uint32_t next = frame.seq;
     /* away for 100 ms of the clock, of which device time may be late by half */
     if (strstr(fault, "for_ms") != NULL) assert_true(frame.t_ns - t_ns > 50000000);
     if (!is_event(&frame, SCANHEAD_EV_SCAN_END)) client_until(hit, SCANHEAD_EV_SCAN_END, &frame);
@@ -123,6 +119,11 @@ static void cut_and_return(struct wire *wire, const char *link, const char *faul
     stats_hash(wire, said);
     assert_string_equal(seen, said);
     assert_int_equal(truth_lines(wire), 1);
+    const int64_t seq = truth(wire, 0, kind, "seq");
+    assert_int_equal(truth(wire, 0, kind, "frame"), 60);
+    assert_true(last < seq); /* nothing from there on; of a terminal what was not read is gone, too */
+    if (strstr(link, "tcp") != NULL) assert_int_equal(seq - last, 1);
+    assert_true(next >= seq);
 }
 
 static void test_disconnect(void **state)
@@ -152,16 +153,41 @@ static void test_each_session(void **state)
     struct head head = start(wire, "type: tcp, port: 0", "kind: disconnect, at: 60", NULL);
     struct scanhead *hit = client_open(head_link(&head, 0)), *clean = client_open(head_link(&head, 1));
     int64_t t_ns = 0;
+    uint32_t last[3];
     begin(hit, clean);
     for (int round = 0; round < 3; round++) {
-        const uint32_t last = read_to_cut(hit, &t_ns);
-        assert_true(last < truth(wire, round, "disconnect", "seq"));
-        assert_int_equal(truth(wire, round, "disconnect", "frame"), 60);
+        last[round] = read_to_cut(hit, &t_ns);
         if (round < 2) assert_int_equal(scanhead_reattach(hit, DEADLINE_MS), SCANHEAD_OK);
     }
     scanhead_close(hit);
     scanhead_close(clean);
     head_end(&head, SIGTERM);
+    assert_int_equal(truth_lines(wire), 3);
+    for (int round = 0; round < 3; round++) {
+        assert_int_equal(truth(wire, round, "disconnect", "seq") - last[round], 1);
+        assert_int_equal(truth(wire, round, "disconnect", "frame"), 60);
+    }
+}
+
+/* Two clients of the link come to the frame of an unplugging: it is carried out once, and told once. */
+static void test_two_clients(void **state)
+{
+    struct wire *wire = *state;
+    struct head head = start(wire, "type: tcp, port: 0", "kind: unplug, at: 60, until_s: 1, for_ms: 100", NULL);
+    struct scanhead *hit = client_open(head_link(&head, 0)), *too = client_open(head_link(&head, 0)),
+                    *clean = client_open(head_link(&head, 1));
+    int64_t t_ns = 0;
+    client_ask(too, "*IDN?");
+    begin(hit, clean);
+    const uint32_t last[2] = {read_to_cut(hit, &t_ns), read_to_cut(too, &t_ns)};
+    scanhead_close(hit);
+    scanhead_close(too);
+    scanhead_close(clean);
+    head_end(&head, SIGTERM);
+    assert_int_equal(truth_lines(wire), 1);
+    const int64_t seq = truth(wire, 0, "unplug", "seq");
+    assert_int_equal(seq - last[truth(wire, 0, "unplug", "session") - 1], 1);
+    assert_true(last[0] < seq && last[1] < seq);
 }
 
 /* As fast as it computes, a head waits for its readers, and for none that is gone. */
@@ -186,6 +212,39 @@ static void test_fast(void **state)
     while (rc != SCANHEAD_OK);
     assert_non_null(strstr(client_ask(hit, "SYST:ERR?"), "Client lost; session 1"));
     assert_string_equal(client_ask(hit, "SYST:ERR?"), "0,\"No error\"");
+    scanhead_close(hit);
+    scanhead_close(clean);
+    head_end(&head, SIGTERM);
+    stats_hash(wire, said);
+    assert_string_equal(seen, said);
+    assert_int_equal(truth_lines(wire), 1);
+}
+
+/* In lock-step a client is cut off and comes back while device time stands; then the rest is granted. */
+static void test_step(void **state)
+{
+    struct wire *wire = *state;
+    struct head head = start(wire, "type: tcp, port: 0", "kind: unplug, at: 60, count: 1, for_ms: 100",
+                             (const char *const[]){"--pace", "step", NULL});
+    struct scanhead *hit = client_open(head_link(&head, 0)), *clean = client_open(head_link(&head, 1));
+    struct scanhead_frame frame;
+    char seen[65], said[65];
+    int64_t t_ns = 0;
+    client_ask(hit, "*IDN?");
+    scanhead_hash_start(clean);
+    while (strcmp(client_ask(clean, "HEAD:STAT?"), "idle") != 0)
+        client_tell(clean, "TIME:STEP 50 MS");
+    client_tell(clean, "SCAN:START");
+    client_tell(clean, "TIME:STEP 200 MS");
+    read_to_cut(hit, &t_ns);
+    assert_int_equal(scanhead_reattach(hit, DEADLINE_MS), SCANHEAD_OK);
+    const int64_t now_ns = atoll(client_ask(hit, "TIME?"));
+    client_tell(clean, "TIME:STEP 1000 MS");
+    do
+        client_next(hit, &frame);
+    while (frame.t_ns < now_ns);
+    client_until(hit, SCANHEAD_EV_SCAN_END, &frame);
+    read_clean(clean, seen);
     scanhead_close(hit);
     scanhead_close(clean);
     head_end(&head, SIGTERM);
@@ -294,7 +353,6 @@ static void test_usb(void **state)
         got = read(host.fd, data, sizeof data);
     }
     usbip_host_close(&host);
-    assert_int_equal(truth(wire, 2, "unplug", "frame"), 1);
     host = usbip_host_open_within(&head, DEADLINE_MS);
     n = usbip_host_control(&host, 0x80, 6, 0x0200, 0, data, 512);
     assert_int_equal(le_get16(data + 2), n);
@@ -304,6 +362,7 @@ static void test_usb(void **state)
     assert_int_equal(truth(wire, 0, "descriptor_length", "connection"), 1);
     assert_int_equal(truth(wire, 0, "descriptor_length", "n"), 4);
     assert_int_equal(truth(wire, 1, "slow_enumeration", "connection"), 2);
+    assert_int_equal(truth(wire, 2, "unplug", "frame"), 1);
 }
 
 int main(void)
@@ -314,7 +373,9 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_unplug, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_unplug_pty, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_each_session, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_two_clients, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_fast, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_step, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_refuse, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_record, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_wrong_link, wire_setup, wire_teardown),

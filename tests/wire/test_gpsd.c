@@ -1,5 +1,6 @@
 /* The GNSS receiver read by gpsd, the client that everybody has, and gpspipe. */
 #include "tests/wire/gnss_rig.h"
+#include "tests/wire/unit_faults.h"
 
 static int in_path(const char *program)
 {
@@ -215,6 +216,78 @@ static void test_gpsd(void **state)
     check_gpsd(*state, 1, 1);
 }
 
+/* ---- sentences that go wrong on request: 2 s as a bad cable makes them, then 1 s with wrong positions whose checksums
+ * are right. 20 fixes a second. */
+
+enum { HURT_UNITS = 40, SEALED_UNITS = 20 };
+static const char HURT[] = "faults:\n"
+                           "  - {kind: drop, link: 2, until: 40, probability: 0.2, seed: 1}\n"
+                           "  - {kind: flip, link: 2, until: 40, probability: 0.4, seed: 2}\n"
+                           "  - {kind: flip, n: 20, link: 2, until: 40, probability: 0.1, seed: 3}\n"
+                           "  - {kind: truncate, link: 2, until: 40, probability: 0.2, seed: 4}\n"
+                           "  - {kind: garbage, n: 24, link: 2, until: 40, probability: 0.3, seed: 5}\n"
+                           "  - {kind: reorder, link: 2, until: 40, probability: 0.2, seed: 6}\n"
+                           "  - {kind: flip, n: 300, reseal: on, link: 2, from: 41, until: 60}\n";
+
+static int is_right(const char *line)
+{
+    double height_m = HEIGHT_M; /* a TPV of RMC alone has none */
+    json_number(line, "altHAE", &height_m);
+    return fabs(number(line, "lat") - LAT_DEG) <= ANGLE_TOLERANCE_DEG &&
+           fabs(number(line, "lon") - LON_DEG) <= ANGLE_TOLERANCE_DEG && fabs(height_m - HEIGHT_M) <= HEIGHT_TOLERANCE_M;
+}
+
+/* What gpsd says until all faults have struck and a second of right positions has followed. Returns the wrong ones. */
+static uint32_t read_through(struct wire *wire, struct gpsd *gpsd, struct truth_note **note, uint32_t *n_notes)
+{
+    uint32_t n_wrong = 0;
+    *note = NULL;
+    for (int n_right = 0; n_right < 20;) {
+        const char *line = gpsd_fix(gpsd);
+        const int right = is_right(line);
+        free(*note);
+        *note = truth_read(wire_path(wire, "truth.json"), 2, n_notes);
+        const uint32_t last = *n_notes != 0 ? (uint32_t)(*note)[*n_notes - 1].number : 0;
+        if (!right && last <= HURT_UNITS) fail_msg("after unit %u: %s", last, line);
+        n_wrong += !right;
+        n_right = right && last == HURT_UNITS + SEALED_UNITS ? n_right + 1 : 0;
+    }
+    return n_wrong;
+}
+
+/* No position comes of a sentence with a wrong checksum. One whose checksum was made right is taken. gpsd speaks after a
+ * sentence at most, and a fix has five; those of the next one end the last. */
+static void test_gpsd_hurt(void **state)
+{
+    struct wire *wire = *state;
+    if (!in_path("gpsd") || !in_path("gpspipe")) {
+        print_message("# no gpsd, gpspipe (packages gpsd, gpsd-clients)\n");
+        skip();
+    }
+    char scenario[352], truth[352];
+    snprintf(scenario, sizeof scenario, "%s", wire_write_text(wire, "hurt.yaml", HURT));
+    snprintf(truth, sizeof truth, "%s", wire_path(wire, "truth.json"));
+    const char *const more[] = {PLACE, "--set", "gnss.rate_hz=20", "--scenario", scenario, "--truth", truth, NULL};
+    struct head head = head_start(wire, write_room(wire, NMEA_PTY), more);
+    struct gpsd gpsd;
+    gpsd_start(&gpsd, wire);
+    struct truth_note *note;
+    uint32_t n;
+    const uint32_t n_wrong = read_through(wire, &gpsd, &note, &n);
+    static const char *const kinds[] = {"drop", "truncate", "garbage", "reorder"};
+    uint32_t n_sealed = 0;
+    for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)
+        assert_true(truth_count(note, n, kinds[i]) > 0);
+    for (uint32_t i = 0; i < n; i++)
+        n_sealed += strcmp(note[i].text, "resealed") == 0;
+    assert_int_equal(n_sealed, SEALED_UNITS);
+    assert_true(truth_count(note, n, "flip") > n_sealed);
+    assert_in_range(n_wrong, 1, 5 * (n_sealed + 1));
+    free(note);
+    gpsd_stop(&gpsd);
+    head_end(&head, SIGTERM);
+}
+
 /* ---- a head that moves: along a straight line at constant speed, so that half-way poses are a closed form */
 
 static const double VELOCITY_M_S[3] = {1.1, 0.7, 0.15}, DRIVE_S = 60.0;
@@ -309,6 +382,7 @@ static void test_gpsd_moves(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test_setup_teardown(test_gpsd, wire_setup, wire_teardown),
+                                       cmocka_unit_test_setup_teardown(test_gpsd_hurt, wire_setup, wire_teardown),
                                        cmocka_unit_test_setup_teardown(test_gpsd_moves, wire_setup, wire_teardown)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

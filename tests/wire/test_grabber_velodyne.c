@@ -23,8 +23,12 @@ static uint32_t get32(const uint8_t *at)
     return get16(at) | get16(at + 2) << 16;
 }
 
-/* All packets of a log, one after the other. */
+static const int64_t HOUR_US = 3600000000;
+
+/* The turns of a log, and all their packets, one after the other. */
 struct packets {
+    const struct rawlog_item **turn;
+    uint32_t n_turns;
     struct {
         const uint8_t *bytes;
         uint32_t number; /* of those that the head sent since the first, by their time */
@@ -33,16 +37,35 @@ struct packets {
     double azimuth0_deg; /* of the first packet's first firing, finer than the packets say it */
 };
 
-static void collect(const struct rawlog *log, struct packets *all)
+/* Microseconds from one packet to another, by their own time, which begins anew with each hour. */
+static int64_t later_us(const uint8_t *packet, const uint8_t *first)
+{
+    const int64_t us = (int64_t)get32(packet + 1200) - get32(first + 1200);
+    return us > HOUR_US / 2 ? us - HOUR_US : us < -HOUR_US / 2 ? us + HOUR_US : us;
+}
+
+static int by_device_time(const void *a, const void *b)
+{
+    const struct rawlog_item *const *one = a, *const *other = b;
+    const int64_t us = later_us((*one)->packets, (*other)->packets);
+    return (us > 0) - (us < 0);
+}
+
+/* The log is in the order of its own dates. Those of turns before the first fix are the host's, which is late on a busy
+ * machine: such turns stand behind younger ones. order: by_device_time, or NULL: as in the log. */
+static void collect(const struct rawlog *log, int (*order)(const void *, const void *), struct packets *all)
 {
     *all = (struct packets){0};
-    for (uint32_t i = 0; i < log->n_items; i++) {
-        const struct rawlog_item *turn = &log->item[i];
-        if (turn->kind != RAWLOG_TURN) continue;
-        all->packet = realloc(all->packet, (all->n + turn->n) * sizeof *all->packet);
+    all->turn = malloc((log->n_items + 1) * sizeof *all->turn);
+    assert_non_null(all->turn);
+    for (uint32_t i = 0; i < log->n_items; i++)
+        if (log->item[i].kind == RAWLOG_TURN) all->turn[all->n_turns++] = &log->item[i];
+    if (order != NULL) qsort(all->turn, all->n_turns, sizeof *all->turn, order);
+    for (uint32_t i = 0; i < all->n_turns; i++) {
+        all->packet = realloc(all->packet, (all->n + all->turn[i]->n) * sizeof *all->packet);
         assert_non_null(all->packet);
-        for (uint32_t k = 0; k < turn->n; k++)
-            all->packet[all->n++].bytes = turn->packets + (size_t)PACKET * k;
+        for (uint32_t k = 0; k < all->turn[i]->n; k++)
+            all->packet[all->n++].bytes = all->turn[i]->packets + (size_t)PACKET * k;
     }
     assert_true(all->n > 0);
 }
@@ -66,13 +89,12 @@ static uint32_t dropped_at(int port)
  * the client did not read. */
 static void check_times(struct packets *all, uint32_t dropped)
 {
-    const uint32_t first_us = get32(all->packet[0].bytes + 1200), hour_us = 3600000000u;
     for (uint32_t i = 0; i < all->n; i++) {
         const uint8_t *packet = all->packet[i].bytes;
-        const uint32_t us = (get32(packet + 1200) + hour_us - first_us) % hour_us;
+        const double us = (double)later_us(packet, all->packet[0].bytes);
         const uint32_t number = (uint32_t)lround(us / PACKET_US);
         /* each time is rounded down to a microsecond */
-        if (fabs(us - number * PACKET_US) >= 1.0) fail_msg("packet %u at %u us", i, us);
+        if (fabs(us - number * PACKET_US) >= 1.0) fail_msg("packet %u at %.0f us", i, us);
         if (number < i || number > i + dropped) fail_msg("packet %u is number %u; %u not read", i, number, dropped);
         all->packet[i].number = number;
         assert_int_equal(packet[1204], 0x37); /* strongest return */
@@ -123,15 +145,15 @@ static void check_ranges(const struct house *house, const struct packets *all, u
 }
 
 /* From the first fix on, turns are dated by the device: hour and day of the receiver, the rest of the packet. */
-static void check_dates(const struct rawlog *log)
+static void check_dates(const struct rawlog *log, const struct packets *all)
 {
     int fixes = 0, dated = 0;
-    for (uint32_t i = 0; i < log->n_items; i++) {
-        const struct rawlog_item *item = &log->item[i];
-        fixes += item->kind == RAWLOG_GPS;
-        if (item->kind != RAWLOG_TURN) continue;
-        const int64_t us = item->t_100ns / 10 % 3600000000LL, is = get32(item->packets + 1200);
-        /* 1: rounding of seconds in double. The first turn may have begun before the first fix. */
+    for (uint32_t i = 0; i < log->n_items; i++)
+        fixes += log->item[i].kind == RAWLOG_GPS;
+    for (uint32_t i = 0; i < all->n_turns; i++) {
+        const struct rawlog_item *turn = all->turn[i];
+        const int64_t us = turn->t_100ns / 10 % HOUR_US, is = get32(turn->packets + 1200);
+        /* 1: rounding of seconds in double. The first turns may have begun before the first fix. */
         if (llabs(us - is) <= 1)
             dated++;
         else if (dated > 0)
@@ -176,12 +198,13 @@ static void test_turns(void **state)
     const uint32_t dropped = dropped_at(2368);
     grabber_end(&grabber);
     rawlog_read(&grabber, &log);
-    collect(&log, &all);
+    collect(&log, by_device_time, &all);
     check_times(&all, dropped);
     check_azimuths(&all);
     for (uint32_t n = 80; n < 80 + 76; n++) /* more than a turn */
         check_ranges(house, &all, n);
-    check_dates(&log);
+    check_dates(&log, &all);
+    free(all.turn);
     free(all.packet);
     rawlog_free(&log);
     house_free(house);
@@ -310,10 +333,11 @@ static void test_lossy(void **state)
     const uint32_t dropped = dropped_at(2368);
     grabber_end(&grabber);
     rawlog_read(&grabber, &log);
-    collect(&log, &all);
+    collect(&log, NULL, &all);
     read_truth(wire, &sent);
     check_lossy(&all, &sent, dropped);
     check_cuts(&log);
+    free(all.turn);
     free(all.packet);
     rawlog_free(&log);
     units_free(&sent);

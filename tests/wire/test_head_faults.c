@@ -11,7 +11,7 @@ static struct room_config config_of(const char *more)
                                 .pan_deg_s = 60,
                                 .pan_stop_deg = 120,
                                 .frames = 1,
-                                .links = LINK_YAML_TCP,
+                                .links = LINK_YAML_BOTH,
                                 .more = more};
 }
 
@@ -287,13 +287,13 @@ static void test_power_cycle_in_steps(void **state)
 }
 
 /* By the clock, and as fast as it goes: the client is hung up, comes back, and finds the head idle with an empty queue. */
-static void power_cycle_at(struct wire *wire, const char *pace)
+static void power_cycle_at(struct wire *wire, const char *pace, const char *link)
 {
     struct head head = start(wire,
                              "loop: {queue_ms: 5000, late_ms: 10000}\n"
                              "faults: [{kind: power_cycle, from_pulse: 8000, for_ms: 300}]\n",
                              pace);
-    struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
+    struct scanhead *sh = client_open(head_endpoint(&head, link));
     uint64_t pulse_end = 0;
     int ends = 0;
     client_wait_state(sh, "idle");
@@ -308,15 +308,6 @@ static void power_cycle_at(struct wire *wire, const char *pace)
     assert_true(last_ns < off_ns);
     const int64_t pulse = truth_of(wire, "power_cycle", 0, "pulse");
     assert_true(pulse >= 8000 && pulse < 8000 + 20 + 16 && pulse_end <= (uint64_t)pulse);
-    scanhead_close(sh);
-    /* Who comes while power is off is turned away: until somebody is there. */
-    for (char why[256]; scanhead_open(head_endpoint(&head, "tcp"), &sh, why, sizeof why) == SCANHEAD_OK;) {
-        char reply[600];
-        if (scanhead_command(sh, "HEAD:STATE?", reply, sizeof reply, DEADLINE_MS) == SCANHEAD_OK) break;
-        scanhead_close(sh);
-        sh = NULL;
-    }
-    assert_non_null(sh);
     client_wait_state(sh, "idle");
     assert_string_equal(client_ask(sh, "SYST:ERR:COUN?"), "0");
     client_tell(sh, "SCAN:START");
@@ -327,8 +318,9 @@ static void power_cycle_at(struct wire *wire, const char *pace)
 
 static void test_power_cycle(void **state)
 {
-    power_cycle_at(*state, "fast");
-    power_cycle_at(*state, "realtime");
+    power_cycle_at(*state, "fast", "tcp");
+    power_cycle_at(*state, "realtime", "tcp");
+    power_cycle_at(*state, "realtime", "pty");
 }
 
 /* The same faults: the same stream, at any pace, with any number of threads, off line and on. */
@@ -364,6 +356,33 @@ static void test_same_stream(void **state)
     }
 }
 
+/* A file goes on over a power cycle that is longer than the queue, and has all of it. */
+static void test_file_goes_on(void **state)
+{
+    struct wire *wire = *state;
+    struct room_config config = config_of("loop: {queue_ms: 250, late_ms: 10000}\n"
+                                          "faults: [{kind: power_cycle, from_pulse: 2000, for_ms: 600}]\n");
+    const char *const more[] = {"--start", "--frames", "1", NULL};
+    room_write(wire);
+    config.links = "links: [{type: file, path: out.shs}]\n";
+    config.pan_stop_deg = 30;
+    struct head head = head_start(wire, room_config_write(wire, &config), more);
+    head_end(&head, 0);
+    assert_int_equal(stats_link_uint(wire, "left_out_frames"), 0);
+    struct scanhead *sh = client_open(wire_path(wire, "out.shs"));
+    struct scanhead_frame frame;
+    struct scanhead_stats stats;
+    char states[128] = "";
+    int rc;
+    while ((rc = scanhead_next(sh, &frame, DEADLINE_MS)) == SCANHEAD_OK)
+        if (is_event(&frame, SCANHEAD_EV_STATE)) strcat(strcat(states, frame.event_text), " ");
+    assert_int_equal(rc, SCANHEAD_ECLOSED);
+    scanhead_get_stats(sh, &stats);
+    scanhead_close(sh);
+    assert_int_equal(stats.seq_gaps, 0);
+    assert_string_equal(states, "boot idle spin-up scanning off boot idle spin-up scanning spin-down ");
+}
+
 /* Nothing to tell the time: refused. */
 static void test_needs_time(void **state)
 {
@@ -387,6 +406,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_power_cycle_in_steps, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_power_cycle, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_same_stream, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_file_goes_on, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_needs_time, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -17,8 +17,8 @@ const LATER_MS = 200; // how long further answers to *IDN? may take, where some 
 
 export class Replies {
   #send;
-  #asked = []; // {line, resolve, reject, timer}, sent
-  #waiting = []; // the same, not sent yet: the order of replies isn't known at the moment
+  #asked = []; // {line, timeout_s, resolve, reject, timer}, sent; only the timer of the first one runs
+  #waiting = []; // the same, not sent yet: the order of replies isn't known at the moment; all timers run
   #settling = null; // {left}: answers to *IDN? that are still to come
   #isOpen = false;
   #timer = 0;
@@ -42,7 +42,8 @@ export class Replies {
     for (const one of all) this.#fail(one, new CommandError(one.line, 0, words));
   }
 
-  /** A promise of the reply to one line. It throws CommandError; number 0: no reply came, or the line is none. */
+  /** A promise of the reply to one line. The head answers one line after the other, and so the time counts from when all
+   * lines before it have their replies. It throws CommandError; number 0: no reply came, or the line is none. */
   ask(line, timeout_s) {
     return new Promise((resolve, reject) => {
       if (!/^[ -~]{1,256}$/.test(line) || line.trim() === '') {
@@ -53,10 +54,12 @@ export class Replies {
         reject(new CommandError(line, 0, 'the head is not connected'));
         return;
       }
-      const one = {line, resolve, reject, timer: 0};
-      one.timer = setTimeout(() => this.#late(one, timeout_s), 1000 * timeout_s);
+      const one = {line, timeout_s, resolve, reject, timer: 0};
       if (this.#settling === null) this.#sendOne(one);
-      else this.#waiting.push(one);
+      else {
+        this.#waiting.push(one);
+        this.#startTimer(one);
+      }
     });
   }
 
@@ -69,6 +72,7 @@ export class Replies {
     const one = this.#asked.shift();
     if (one === undefined) return;
     clearTimeout(one.timer);
+    if (this.#asked.length > 0) this.#startTimer(this.#asked[0]);
     const refusal = /^ERR (-?\d+),"(.*)"$/.exec(reply);
     if (refusal) one.reject(new CommandError(one.line, Number(refusal[1]), refusal[2]));
     else one.resolve(reply);
@@ -76,7 +80,13 @@ export class Replies {
 
   #sendOne(one) {
     this.#asked.push(one);
+    if (this.#asked.length === 1) this.#startTimer(one);
     this.#send(one.line);
+  }
+
+  #startTimer(one) {
+    clearTimeout(one.timer);
+    one.timer = setTimeout(() => this.#late(one), 1000 * one.timeout_s);
   }
 
   #fail(one, error) {
@@ -85,9 +95,9 @@ export class Replies {
   }
 
   // All that were sent after it are given up with it, as their replies can no longer be told apart.
-  #late(one, timeout_s) {
+  #late(one) {
     const waits = this.#waiting.indexOf(one);
-    const words = `no reply within ${timeout_s} s`;
+    const words = `no reply within ${one.timeout_s} s`;
     if (waits >= 0) {
       this.#waiting.splice(waits, 1);
       this.#settling.left++; // the answer may have been lost, too
@@ -114,6 +124,9 @@ export class Replies {
 
   #goOn() {
     this.#settling = null;
-    for (const one of this.#waiting.splice(0)) this.#sendOne(one);
+    for (const one of this.#waiting.splice(0)) {
+      clearTimeout(one.timer);
+      this.#sendOne(one);
+    }
   }
 }

@@ -252,7 +252,8 @@ static int record_heads(struct record_job *r, struct config *cfg, struct heads *
     int rc = heads_load(cfg, heads, err);
     if (rc == SH_OK) rc = check_heads(r, heads, all ? cfg->n_stations : r->recording.last_station, err);
     if (rc == SH_OK && r->truth != NULL && heads->n > 1)
-        rc = sh_fail(err, SH_EINPUT, "%s: --truth: the stations have %u scanners; allowed with one", cfg->file, heads->n);
+        rc = sh_fail(err, SH_EINPUT, "%s: --truth: the stations have %u scanners; allowed with one", cfg->file,
+                     heads->n);
     heads->one[0].offline.truth = r->truth;
     if (rc == SH_OK) rc = heads_open(heads, r->site, r->recording.duration_s, &app_report_stderr, err);
     r->recording.head_ends = 1;
