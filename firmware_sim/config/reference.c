@@ -38,25 +38,33 @@ static void print_wrapped(const char *text, int indent, const char *mark, FILE *
     fputc('\n', out);
 }
 
+/* When it may be left out, and what it is then. */
+static void add_default(const struct cfg_key *key, char *line, size_t room)
+{
+    char emitters[64];
+    if (key->def == NULL && (key->type != CFG_LIST || key->min > 0))
+        snprintf(line, room, "; required");
+    else if (key->def != NULL && key->def[0] == '@')
+        snprintf(line, room, "; default from the head profile, its %s", key->def + 1);
+    else if (key->def != NULL && key->def[0] != '\0')
+        snprintf(line, room, "; default %s", key->def);
+    else if (cfg_needed_by_emitter(key, emitters, sizeof emitters))
+        snprintf(line, room, "; required with emitter: %s", emitters);
+    else
+        snprintf(line, room, "; optional");
+}
+
 static void print_key(const struct cfg_key *key, FILE *out)
 {
-    char allowed[CFG_ALLOWED_MAX], emitters[64];
-    fprintf(out, "%s\n    %s", key->path, type_name(key));
+    char allowed[CFG_ALLOWED_MAX], line[CFG_ALLOWED_MAX + 256];
+    int len = snprintf(line, sizeof line, "%s", type_name(key));
     if (key->type != CFG_MAP) {
-        if (key->unit != NULL) fprintf(out, ", %s", key->unit);
-        fprintf(out, "; %s", cfg_allowed(key, NULL, allowed));
-        if (key->def == NULL && (key->type != CFG_LIST || key->min > 0))
-            fputs("; required", out);
-        else if (key->def != NULL && key->def[0] == '@')
-            fprintf(out, "; default from the head profile, its %s", key->def + 1);
-        else if (key->def != NULL && key->def[0] != '\0')
-            fprintf(out, "; default %s", key->def);
-        else if (cfg_needed_by_emitter(key, emitters, sizeof emitters))
-            fprintf(out, "; required with emitter: %s", emitters);
-        else
-            fputs("; optional", out);
+        len += snprintf(line + len, sizeof line - (size_t)len, "%s%s; %s", key->unit != NULL ? ", " : "",
+                        key->unit != NULL ? key->unit : "", cfg_allowed(key, NULL, allowed));
+        add_default(key, line + len, sizeof line - (size_t)len);
     }
-    fputc('\n', out);
+    fprintf(out, "%s\n", key->path);
+    print_wrapped(line, 4, "", out);
     print_wrapped(key->help, 4, "", out);
 }
 
