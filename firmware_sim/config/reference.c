@@ -38,25 +38,34 @@ static void print_wrapped(const char *text, int indent, const char *mark, FILE *
     fputc('\n', out);
 }
 
+/* "; required", "; default 1", and so on. */
+static void say_default(const struct cfg_key *key, char *buf, size_t len)
+{
+    char emitters[64];
+    if (key->def == NULL && (key->type != CFG_LIST || key->min > 0))
+        snprintf(buf, len, "; required");
+    else if (key->def != NULL && key->def[0] == '@')
+        snprintf(buf, len, "; default from the head profile, its %s", key->def + 1);
+    else if (key->def != NULL && key->def[0] != '\0')
+        snprintf(buf, len, "; default %s", key->def);
+    else if (cfg_needed_by_emitter(key, emitters, sizeof emitters))
+        snprintf(buf, len, "; required with emitter: %s", emitters);
+    else
+        snprintf(buf, len, "; optional");
+}
+
 static void print_key(const struct cfg_key *key, FILE *out)
 {
-    char allowed[CFG_ALLOWED_MAX], emitters[64];
-    fprintf(out, "%s\n    %s", key->path, type_name(key));
-    if (key->type != CFG_MAP) {
-        if (key->unit != NULL) fprintf(out, ", %s", key->unit);
-        fprintf(out, "; %s", cfg_allowed(key, NULL, allowed));
-        if (key->def == NULL && (key->type != CFG_LIST || key->min > 0))
-            fputs("; required", out);
-        else if (key->def != NULL && key->def[0] == '@')
-            fprintf(out, "; default from the head profile, its %s", key->def + 1);
-        else if (key->def != NULL && key->def[0] != '\0')
-            fprintf(out, "; default %s", key->def);
-        else if (cfg_needed_by_emitter(key, emitters, sizeof emitters))
-            fprintf(out, "; required with emitter: %s", emitters);
-        else
-            fputs("; optional", out);
+    char allowed[CFG_ALLOWED_MAX], preset[160], line[CFG_ALLOWED_MAX + 256];
+    fprintf(out, "%s\n", key->path);
+    if (key->type == CFG_MAP) {
+        fprintf(out, "    %s\n", type_name(key));
+    } else {
+        say_default(key, preset, sizeof preset);
+        snprintf(line, sizeof line, "%s%s%s; %s%s", type_name(key), key->unit != NULL ? ", " : "",
+                 key->unit != NULL ? key->unit : "", cfg_allowed(key, NULL, allowed), preset);
+        print_wrapped(line, 4, "", out);
     }
-    fputc('\n', out);
     print_wrapped(key->help, 4, "", out);
 }
 
