@@ -93,13 +93,15 @@ static void check_keys(struct cfg_reader *rd, const struct fault *f, uint32_t i)
     for (size_t k = 0; k < CFG_LEN(when); k++)
         if (cfg_is_given(rd, when[k].path, i) && (when[k].places & 1U << place) == 0)
             cfg_fail_key(rd, when[k].path, i, "%s has no such key; allowed %s", name,
-                         place == FAULT_AT_MOMENT ? "from_s, until_s, from_pulse, until_pulse"
-                                                  : "link, at, from, until, every, probability, count, seed, from_s, until_s");
+                         place == FAULT_AT_MOMENT
+                             ? "from_s, until_s, from_pulse, until_pulse"
+                             : "link, at, from, until, every, probability, count, seed, from_s, until_s");
     for (size_t k = 0; k < CFG_LEN(what); k++) {
         char path[CFG_PATH_MAX];
         snprintf(path, sizeof path, "faults[].%s", what[k]);
         if (cfg_is_given(rd, path, i) && !has_word(keys, what[k]))
-            cfg_fail_key(rd, path, i, "%s has no such key; allowed %s", name, keys != NULL ? keys : "when and where alone");
+            cfg_fail_key(rd, path, i, "%s has no such key; allowed %s", name,
+                         keys != NULL ? keys : "only keys that say when and where");
     }
 }
 
@@ -107,7 +109,8 @@ static void check_values(struct cfg_reader *rd, const struct fault *f, uint32_t 
 {
     const char *name = fault_names[f->kind];
     if (kinds[f->kind].n_max > 0.0 && (double)f->n > kinds[f->kind].n_max)
-        cfg_fail_key(rd, "faults[].n", i, "%u is too many for %s; allowed up to %.0f", f->n, name, kinds[f->kind].n_max);
+        cfg_fail_key(rd, "faults[].n", i, "%u is too many for %s; allowed up to %.0f", f->n, name,
+                     kinds[f->kind].n_max);
     if (kinds[f->kind].needs_ms && f->for_ms <= 0.0 && CFG_SOUND(rd, i, "faults[].for_ms"))
         cfg_fail_key(rd, cfg_is_given(rd, "faults[].for_ms", i) ? "faults[].for_ms" : "faults[].kind", i,
                      "%s needs for_ms; allowed above 0 to 1e8 ms", name);
@@ -183,10 +186,16 @@ int config_add_scenario(struct config *cfg, const char *name, struct config_faul
     const int is_there = cfg_find_scenario(name, path);
     cfg_reader_init(&rd, is_there ? path : name, &fault_table, list, faults);
     config_name_scenarios(known, sizeof known);
-    int code = !is_there    ? cfg_fail_file(&rd, SH_EINPUT, 0, "no such scenario; allowed a file, as a path, or %s", known)
-               : list == NULL ? cfg_fail_file(&rd, SH_ENOMEM, 0, "no memory") : cfg_read_file(&rd);
+    int code = SH_OK;
+    if (!is_there)
+        code = cfg_fail_file(&rd, SH_EINPUT, 0, "no such scenario; allowed a file, as a path, or %s", known);
+    else if (list == NULL)
+        code = cfg_fail_file(&rd, SH_ENOMEM, 0, "no memory");
+    else
+        code = cfg_read_file(&rd);
     if (code == SH_OK) code = read_list(&rd, cfg, list);
-    if (code == SH_OK && list->n == 0) code = cfg_fail_file(&rd, SH_EINPUT, 0, "no faults; a scenario is a list of them");
+    if (code == SH_OK && list->n == 0)
+        code = cfg_fail_file(&rd, SH_EINPUT, 0, "no faults; allowed a list of 1 to %d under faults:", FAULT_MAX);
     if (code == SH_OK && cfg->faults.n + list->n > FAULT_MAX)
         code = cfg_fail_file(&rd, SH_EINPUT, 0, "%u faults, and the configuration has %u; allowed %d together", list->n,
                              cfg->faults.n, FAULT_MAX);

@@ -69,6 +69,14 @@ test('figures in words', () => {
     ['1.44\u00a0s', '427\u00a0ms', '842\u00a0ns', '0\u00a0s', '10\u00a0min']);
 });
 
+test('each figure that has a row is given a text, those of faults among them', () => {
+  const code = readFileSync(new URL('figures.js', web), 'utf8');
+  const keys = [...code.matchAll(/^  \['([\w-]+)', '/gm)].map(([, key]) => key);
+  const given = keys.filter((key) => new RegExp(`^ +'${key}':|[{ ,]'?${key}'?:|texts\\.${key} =`, 'm').test(code));
+  equal(given, keys);
+  equal(['repeated', 'late-frames', 'restarts'].filter((key) => !keys.includes(key)), []);
+});
+
 test('limits that can be read, none beyond what the head allows', () => {
   const of = (text, step, isUpper) => limit(text, step, isUpper).replaceAll(/\s/g, ' ');
   equal([of('59.999999', '0.000001', true), of('-39.999999', '0.000001'), of('249.999999999', '0.000000001', true)],

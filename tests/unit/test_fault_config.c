@@ -113,6 +113,7 @@ static void wrong_ones_are_refused_with_what_is_allowed(void **state)
         {"{}", "faults[0].kind"},
         {"{every: 10}", "faults[0].kind"},
         {"{kind: dorp}", "faults[0].kind: "},
+        {"{kind: dorp}", "leap_second, counters_high"}, /* the list is whole */
         {"{kind: drop, evry: 10}", "faults[0].evry: unknown key, did you mean faults[0].every?"},
         {"{kind: drop, every: 0}", "faults[0].every: \"0\" is out of range; allowed a whole number, 1 to"},
         {"{kind: drop, every: -1}", "faults[0].every: "},
@@ -194,7 +195,7 @@ static void faults_stand_in_the_configuration_and_in_scenarios(void **state)
     assert_int_equal(config_add_scenario(cfg, path, &wrong), SH_EINPUT);
     write_in("scenario.yaml", "faults: []\n");
     assert_int_equal(config_add_scenario(cfg, path, &wrong), SH_EINPUT);
-    assert_non_null(strstr(wrong.fault[0].text, "a scenario is a list of them"));
+    assert_non_null(strstr(wrong.fault[0].text, "allowed a list of 1 to 32 under faults:"));
     char many[4096] = "faults:\n";
     for (int i = 0; i < 30; i++)
         strcat(many, "  - {kind: drop}\n");

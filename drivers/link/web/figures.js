@@ -16,6 +16,9 @@ const PAGE = [
   ['received', 'Points a second', 'Received by this page'],
   ['bytes', 'Bytes a second'],
   ['lost-frames', 'Frames lost on the way', 'Missing in the sequence: left out because this page was too slow, or damaged'],
+  ['repeated', 'Frames repeated', 'Came a second time, and were dropped'],
+  ['late-frames', 'Frames late', 'Came after newer ones, and were dropped; frames lost on the way has them, too'],
+  ['restarts', 'Restarts', 'The sequence of frames began anew, as when the head has started again'],
   ['lost-pulses', 'Pulses left out', 'In the frames that the head left out because this page was too slow'],
   ['dropped', 'Pulses dropped here', 'By the page itself, which could not take them'],
   ['unplaced', 'Pulses without a place', 'Came before their anchor or pose, as when a page joins a scan: counted, not drawn'],
@@ -122,6 +125,9 @@ export class Figures {
     }
     Object.assign(this.#texts, {
       'lost-frames': grouped(number(f.lost_frames)),
+      'repeated': grouped(number(f.repeated_frames)),
+      'late-frames': grouped(number(f.late_frames)),
+      'restarts': grouped(number(f.jumps_back)),
       'lost-pulses': grouped(number(f.left_out_pulses)),
       'dropped': grouped(number(f.dropped_pulses)),
       'unplaced': grouped(number(f.unplaced_pulses)),
@@ -129,6 +135,9 @@ export class Figures {
       'decode': number(f.decode_ns_per_point) > 0 ? duration(number(f.decode_ns_per_point) / 1e9) : NONE,
     });
     mark('lost-frames', number(f.lost_frames) > 0);
+    mark('repeated', number(f.repeated_frames) > 0);
+    mark('late-frames', number(f.late_frames) > 0);
+    mark('restarts', number(f.jumps_back) > 0);
     mark('lost-pulses', number(f.left_out_pulses) > 0);
     mark('dropped', number(f.dropped_pulses) > 0);
     mark('unplaced', number(f.unplaced_pulses) > 0);

@@ -102,8 +102,8 @@ export class Head extends EventTarget {
    * left_out_frames with left_out_pulses because this page was too slow; lost_pulses: lost by the head; missing_pulses:
    * of all scans that ended here, delivered and not received; dropped_points, dropped_pulses: decoded, and dropped by
    * the page itself; unplaced_points, unplaced_pulses: came before their anchor or their pose; repeated_frames,
-   * late_frames: came twice, or after newer ones, and were dropped; bad_bytes, bad_payloads, refused;
-   * decode_ns_per_point; point_hash.
+   * late_frames: came twice, or after newer ones, and were dropped; jumps_back: how often the sequence of frames began
+   * anew; bad_bytes, bad_payloads, refused; decode_ns_per_point; point_hash.
    */
   figures() {
     const f = this.#figures, l = this.#losses;
