@@ -210,6 +210,7 @@ END
     scanhead record usb --wait 30 --frames 100 --replug 60 -o faults.ply --stats faults.json 2>faults.err &
     client=$!
     check "$1: the recorder goes on after a reset on request" wait_for 20 grep 'is back' faults.err
+    grep -q 'is back' faults.err || tail -n 20 faults.err truth.json /tmp/head.err | sed 's/^/#   /' >&3
     check "$1: unplugged on request" wait_for 20 grep 'unplugged' faults.err
     wait_for 5 is_unplugged
     check "$1: plugged in again" wait_for 10 sh plug.sh
