@@ -192,7 +192,7 @@ END
     head_start "$2" --pace fast --scenario /tmp/faults.yaml --truth /tmp/truth.json
     dmesg -c >/dev/null
     sh plug.sh
-    check "$1: enumerated, slowly and by a wrong descriptor" wait_for 20 is_plugged
+    check "$1: enumerated, slowly and by a wrong descriptor" wait_for 90 is_plugged
     check "$1: the kernel says that the descriptor is too short" sh -c "dmesg | grep 'descriptor too short'"
     record_again "$1, stalled and in short packets" # the recorder clears the halt; no byte is lost
     for kind in slow_enumeration descriptor_length short_packets endpoint_stall; do
@@ -209,12 +209,12 @@ END
     sh plug.sh
     scanhead record usb --wait 30 --frames 100 --replug 60 -o faults.ply --stats faults.json 2>faults.err &
     client=$!
-    check "$1: the recorder goes on after a reset on request" wait_for 20 grep 'is back' faults.err
+    check "$1: the recorder goes on after a reset on request" wait_for 90 grep 'is back' faults.err
     grep -q 'is back' faults.err || tail -n 20 faults.err truth.json /tmp/head.err | sed 's/^/#   /' >&3
-    check "$1: unplugged on request" wait_for 20 grep 'unplugged' faults.err
+    check "$1: unplugged on request" wait_for 90 grep 'unplugged' faults.err
     wait_for 5 is_unplugged
-    check "$1: plugged in again" wait_for 10 sh plug.sh
-    check "$1: and the recorder goes on" wait_for 20 sh -c "test \$(grep -c 'is back' faults.err) = 2"
+    check "$1: plugged in again" wait_for 60 sh plug.sh
+    check "$1: and the recorder goes on" wait_for 90 sh -c "test \$(grep -c 'is back' faults.err) = 2"
     kill -INT $client
     wait $client
     check "$1: with both counts" sh -c "grep '\"bus_resets\": 1,' faults.json && grep '\"replugs\": 1,' faults.json"
