@@ -36,6 +36,7 @@ static void add_moment(struct soak_link *link, const struct fault_note *note)
     const char *why = why_hidden(link->soak, note->kind);
     row->injected++;
     link->ask.others++;
+    if (note->kind == FAULT_POWER_CYCLE) soak_usb_forget(link, "power went before a client opened it");
     if (link->datagrams != NULL) why = "the packets are compared with those of the same head";
     if (!link->usable) why = "the link has no client here";
     if (why == NULL && link->n_moments == SOAK_MAX_MOMENTS) why = "too many at a time";
@@ -71,6 +72,12 @@ static void see(struct soak_link *link, struct soak_moment *m)
     *m = link->moment[--link->n_moments];
 }
 
+static void hide_moment(struct soak_link *link, uint32_t i, const char *why)
+{
+    soak_hide(&link->row[link->moment[i].kind], 1, why);
+    link->moment[i] = link->moment[--link->n_moments];
+}
+
 /* All of a kind that were at work within a time. */
 static void see_kind(struct soak_link *link, enum fault_kind kind, int64_t from_ns, int64_t to_ns)
 {
@@ -89,6 +96,20 @@ int soak_saw_power_go(struct soak_link *link, int64_t before_ns)
         return 1;
     }
     return 0;
+}
+
+/* The event that ends a boot says that it was slow. */
+static int is_before(const struct soak_moment *m, const struct scanhead_frame *frame)
+{
+    const int ends_boot = frame->type == SCANHEAD_EVENT && frame->event == SCANHEAD_EV_STATE;
+    if (m->kind == FAULT_POWER_CYCLE) return m->from_ns < frame->t_ns;
+    return m->kind == FAULT_SLOW_BOOT && !ends_boot && frame->t_ns - m->from_ns >= (int64_t)(1e6 * m->for_ms);
+}
+
+void soak_head_begins(struct soak_link *link, const struct scanhead_frame *frame)
+{
+    for (uint32_t i = link->n_moments; i-- > 0;)
+        if (is_before(&link->moment[i], frame)) hide_moment(link, i, "it was before the client had a frame");
 }
 
 void soak_saw_state(struct soak_link *link, const char *state)
@@ -197,6 +218,23 @@ static int is_seen_in(struct soak_link *link, const struct soak_moment *m, const
     }
 }
 
+static int is_of_mirror(const struct soak_moment *m)
+{
+    return m->kind == FAULT_MIRROR_SLOW || m->kind == FAULT_MIRROR_STUCK || m->kind == FAULT_MIRROR_WOBBLE;
+}
+
+/* The rate at which the mirror turns when nothing is wrong with it. With what was wrong before there is nothing to
+ * compare. */
+static void take_usual_rate(struct soak_link *link, int64_t t_ns, double rate)
+{
+    for (uint32_t i = 0; i < link->n_moments; i++)
+        if (is_of_mirror(&link->moment[i]) && link->moment[i].from_ns <= t_ns && t_ns < link->moment[i].to_ns) return;
+    for (uint32_t i = link->n_moments; i-- > 0;)
+        if (is_of_mirror(&link->moment[i]) && link->moment[i].to_ns <= t_ns)
+            hide_moment(link, i, "the client's scan began with it");
+    link->usual_rate = rate;
+}
+
 static void take_points(struct soak_link *link, const struct scanhead_frame *frame)
 {
     /* A scan that begins anew shows that power was away, even to who was not connected when it went. */
@@ -205,7 +243,7 @@ static void take_points(struct soak_link *link, const struct scanhead_frame *fra
     link->pulse0 = frame->pulse0;
     if (link->n_moments == 0 && link->usual_rate != 0.0) return;
     const double rate = turn_rate(link, frame);
-    if (link->usual_rate == 0.0 && isfinite(rate)) link->usual_rate = rate;
+    if (link->usual_rate == 0.0 && isfinite(rate)) take_usual_rate(link, frame->t_ns, rate);
     for (uint32_t i = link->n_moments; i-- > 0;) {
         struct soak_moment *m = &link->moment[i];
         if (m->from_ns <= frame->t_ns && frame->t_ns < m->to_ns && is_seen_in(link, m, frame, rate)) see(link, m);

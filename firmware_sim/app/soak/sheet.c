@@ -55,6 +55,8 @@ static void conclude_link(struct soak *soak, struct soak_link *link)
         link->row[link->act[i].kind].missed++;
     for (uint32_t i = 0; i < link->n_refusals; i++)
         link->row[link->refusal[i].kind].missed++;
+    for (uint32_t i = 0; i < link->n_plugs; i++)
+        link->row[link->plug[i].kind].missed++;
     for (int row = 0; row < SOAK_N_ROWS; row++)
         add(&sum, &link->row[row]);
     fail(soak, has_open_rows(link->row), "a fault was neither noticed nor known to be hidden");
@@ -66,6 +68,7 @@ static void conclude_link(struct soak *soak, struct soak_link *link)
     fail(soak, link->ask.odd != 0, "a reply was wrong or missing without a fault");
     fail(soak, link->odd_closings != 0, "a connection was closed without a fault");
     fail(soak, link->frames == 0, "a client got no frame");
+    fail(soak, !link->in_session, "a client had no connection at the end");
     fail(soak, bad < link->expected_bad_min || bad > link->expected_bad_max,
          "the bytes that belong to no frame are not those of the faults");
 }

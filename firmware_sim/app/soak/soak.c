@@ -145,14 +145,16 @@ static int say_result(const struct soak_options *o, struct soak *soak, struct sh
     return sh_fail(err, SH_ESTATE, "soak: %s", soak->failures[0]);
 }
 
-/* A second link beside each that sends datagrams, without faults. Where it has no room, its first is not soaked. Where
- * nobody could start a scan, the head does so itself. */
+/* A second link beside each that sends datagrams, without faults. Where it has no room, its first is not soaked. A
+ * device on USB gets a name. Where nobody could start a scan, the head does so itself. */
 static void open_twins(struct config *cfg, struct soak *soak, struct soak_options *o)
 {
     int starts = 0;
     soak->n_links = cfg->n_links;
     for (uint32_t i = 0; i < soak->n_links; i++) {
+        soak_usb_name(&cfg->link[i], i + 1);
         starts |= cfg->link[i].protocol == 0 && (cfg->link[i].type == LINK_TCP || cfg->link[i].type == LINK_PTY);
+        starts |= soak_usb_is_here(&cfg->link[i]);
         if (cfg->link[i].type != LINK_UDP || cfg->n_links == CONFIG_MAX_LINKS) continue;
         soak->datagrams[i] = soak_datagrams_open(&cfg->link[i], &cfg->link[cfg->n_links]);
         cfg->n_links += soak->datagrams[i] != NULL;
