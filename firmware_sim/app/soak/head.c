@@ -130,6 +130,17 @@ static void take_state(struct soak_link *link, const struct scanhead_frame *fram
     }
 }
 
+/* The client's first time has no other to compare with. */
+static void hide_clock(struct soak_link *link, int64_t at_ns)
+{
+    for (uint32_t i = link->n_moments; i-- > 0;) {
+        const struct soak_moment *m = &link->moment[i];
+        const int is_over = (m->kind == FAULT_CLOCK_JUMP && m->from_ns <= at_ns) ||
+                            ((m->kind == FAULT_CLOCK_STOP || m->kind == FAULT_CLOCK_DRIFT) && m->to_ns <= at_ns);
+        if (is_over) hide_moment(link, i, "it was before the client had a time");
+    }
+}
+
 /* The head's clock beside device time: since the last event that had both. */
 static void take_time(struct soak_link *link, int64_t at_ns, int64_t gps_ns)
 {
@@ -145,6 +156,7 @@ static void take_time(struct soak_link *link, int64_t at_ns, int64_t gps_ns)
                          (m->kind == FAULT_CLOCK_DRIFT && fabs(by_s) > GAIN_S && fabs(by_s) < STEP_S);
         if (seen) see(link, m);
     }
+    if (!t->have) hide_clock(link, at_ns);
     t->have = 1;
     t->at_ns = at_ns;
     t->gps_ns = gps_ns;
@@ -157,12 +169,21 @@ static void miss_pps(struct soak_link *link, int64_t at_ns)
     if (1e-9 * (double)(at_ns - last_ns) > PPS_WITHIN_S) see_kind(link, FAULT_PPS_LOST, last_ns, at_ns);
 }
 
+/* Its first PPS came soon after its first frame: those before that it can't miss. */
+static void hide_pps(struct soak_link *link, int64_t first_ns)
+{
+    for (uint32_t i = link->n_moments; i-- > 0;)
+        if (link->moment[i].kind == FAULT_PPS_LOST && link->moment[i].from_ns < first_ns)
+            hide_moment(link, i, "it was before the client had a frame");
+}
+
 static void take_pps(struct soak_link *link, const struct scanhead_frame *frame)
 {
     struct soak_times *t = &link->times;
     const int64_t at_ns = (int64_t)frame->event_value[1];
     const int64_t leap_s = (int64_t)frame->event_value[2] - (int64_t)frame->event_value[0];
     miss_pps(link, at_ns);
+    if (!t->have_pps) hide_pps(link, t->pps_ns);
     if (t->have_pps && leap_s != t->leap_s) see_kind(link, FAULT_LEAP_SECOND, INT64_MIN, at_ns);
     t->have_pps = 1;
     t->pps_ns = at_ns;
