@@ -243,7 +243,8 @@ soak-usb: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test all $(BUILD)/test/tests/wire/test_usb_soak
 	@USB_SOAK_EVENTS=1000 SCANHEAD=$(BUILD)/test/scanhead $(BUILD)/test/tests/wire/test_usb_soak
 
-# Every scenario of config/faults over TCP and a terminal, with our own client; at the end a table: some minutes.
+# Every scenario of config/faults over each kind of link, with our own client; usb in an emulated machine, where it can
+# be had. At the end a table: some ten minutes.
 SOAK_S ?= 30
 soak: deps-build
 	@$(MAKE) --no-print-directory -j2 all

@@ -1,6 +1,6 @@
 #!/bin/sh
 # Each scenario of config/faults over each kind of link, for $1 seconds: sh tests/soak.sh SECONDS BUILD. At the end a
-# table. Status 1 when a verdict is bad. Two heads run at a time.
+# table. Status 1 when a verdict is bad. Two heads run at a time. Then the same over usb, one by one, in a guest.
 set -u
 seconds=$1
 build=$2
@@ -26,6 +26,16 @@ for file in config/faults/*.yaml; do
     wait
 done
 
+# The lines "# FILE NAME TEXT" are the guest's sheets.
+echo "soak: usb, in a guest"
+SCANHEAD=$build/scanhead BUILD=$build sh tests/guest/soak.sh "$seconds" >"$out/guest.log" 2>&1
+guest=$?
+sed -n 's/^# FILE //p' "$out/guest.log" | while read -r name text; do
+    : >>"$out/${name%.*}.err" # which may be empty
+    printf '%s\n' "$text" >>"$out/$name"
+done
+skipped=$(sed -n 's/^1\.\.0 # SKIP //p' "$out/guest.log")
+
 status=0
 printf '\n%-18s %-5s %9s %9s %9s %9s  %s\n' scenario link injected noticed lost accepted verdict
 for file in "$out"/*.txt; do
@@ -49,5 +59,11 @@ for file in "$out"/*.txt; do
                        accepted[link], verdict
         }' "$file"
 done
+if [ -n "$skipped" ]; then
+    echo "usb was skipped: $skipped"
+elif [ $guest != 0 ]; then
+    status=1
+    echo "usb BAD: the guest did not get to its end; $out/guest.log"
+fi
 echo "accepted are resealed flips, which no reader can see; $out has the sheets"
 exit $status

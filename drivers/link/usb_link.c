@@ -247,6 +247,18 @@ static int fault_endpoint(struct usb_link *self, enum link_fault what, int sessi
     return SH_OK;
 }
 
+/* A reader that has no transfer pending would not learn that its session is over. */
+static int fault_reset(struct usb_link *self)
+{
+    uint32_t idle = 0;
+    for (int i = 0; i < self->n; i++)
+        if (self->head.session[i].open && !usb_device_can_write(self->head.device, row_of(self, i)->in)) idle |= 1u << i;
+    const int rc = self->ops->fault(self->backend, USB_FAULT_RESET);
+    for (int i = 0; i < self->n && rc == SH_OK; i++)
+        if ((idle >> i & 1u) != 0) usb_device_set_gone_due(self->head.device, row_of(self, i)->in, 1);
+    return rc;
+}
+
 static int usb_fault(void *link, enum link_fault what, int session, uint32_t n, double for_ms)
 {
     struct usb_link *self = link;
@@ -256,7 +268,7 @@ static int usb_fault(void *link, enum link_fault what, int session, uint32_t n, 
     case LINK_FAULT_PLUG:
         return self->ops->fault(self->backend, USB_FAULT_PLUG);
     case LINK_FAULT_BUS_RESET:
-        return self->ops->fault(self->backend, USB_FAULT_RESET);
+        return fault_reset(self);
     case LINK_FAULT_ENDPOINT_STALL:
     case LINK_FAULT_SHORT_PACKETS:
         return fault_endpoint(self, what, session, n);

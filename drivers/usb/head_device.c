@@ -71,6 +71,7 @@ static int stream_request(struct scanhead_usb *head, int index, const struct usb
     if ((setup->bRequestType & USB_DIR_IN) != 0 || setup->bRequest != SCANHEAD_USB_STREAM) return USB_STALL;
     if (value > 1 || le_get16(&setup->wLength) != 0) return USB_STALL;
     const int again = value == 1 && head->session[index].open;
+    usb_device_set_gone_due(head->device, head->look->session[index].in, 0);
     set_open(head, index, value == 1 && !again);
     head->session[index].again = again;
     return 0;

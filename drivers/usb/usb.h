@@ -210,6 +210,9 @@ uint32_t usb_device_attaches(const struct usb_device *device);
 
 /* As a host's reset of the bus, after which it has configured the device again. */
 void usb_device_restart(struct usb_device *device);
+/* After that, where the host had no transfer pending on the endpoint: its next one ends as these do, so that it learns of
+ * the reset. due 0: no more, since a new reader begins. */
+void usb_device_set_gone_due(struct usb_device *device, uint8_t endpoint, int due);
 /* Halts the endpoint, until the host clears it. 0: there is none now. */
 int usb_device_halt(struct usb_device *device, uint8_t endpoint);
 /* IN: each of the next n transfers that carry more than a byte ends in a short packet, about half way; the rest goes

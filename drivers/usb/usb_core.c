@@ -52,6 +52,7 @@ static void stop_pipe(struct usb_device *device, struct usb_pipe *pipe)
     pipe->row = NULL;
     pipe->halted = pipe->zero_due = 0;
     pipe->shorten = 0;
+    pipe->gone_due = 0;
     pipe->epoch++;
     flush(device, pipe, USB_GONE);
 }
@@ -154,8 +155,9 @@ void usb_device_submit(struct usb_device *device, struct usb_transfer *transfer)
     transfer->epoch = pipe->epoch;
     transfer->next = NULL;
     transfer->status = USB_OK;
-    if (pipe->row == NULL || pipe->halted) {
-        transfer->status = pipe->row == NULL ? USB_GONE : USB_STALLED;
+    if (pipe->row == NULL || pipe->halted || pipe->gone_due) {
+        transfer->status = pipe->row == NULL || pipe->gone_due ? USB_GONE : USB_STALLED;
+        pipe->gone_due = 0;
         device->complete(device->host_ctx, transfer);
         return;
     }

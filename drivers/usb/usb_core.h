@@ -14,6 +14,7 @@ struct usb_pipe {
     struct usb_transfer *first, *last;
     uint32_t used;    /* OUT: bytes of the first one already read */
     uint32_t shorten; /* IN: so many transfers are to end early */
+    int gone_due;     /* the next transfer ends as those that were pending at a reset */
 };
 
 struct usb_device {

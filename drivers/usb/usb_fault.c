@@ -11,6 +11,12 @@ void usb_device_restart(struct usb_device *device)
     if (configured) usb_enter(device, USB_CONFIGURED, USB_END_RESET);
 }
 
+void usb_device_set_gone_due(struct usb_device *device, uint8_t endpoint, int due)
+{
+    struct usb_pipe *pipe = usb_pipe(device, endpoint);
+    pipe->gone_due = due && pipe->row != NULL;
+}
+
 int usb_device_halt(struct usb_device *device, uint8_t endpoint)
 {
     struct usb_pipe *pipe = usb_pipe(device, endpoint);

@@ -173,6 +173,32 @@ static void test_reset(void **state)
     bench_close(&bench);
 }
 
+/* A reader that had no transfer pending learns of it by its next one, and the reader after it by none. */
+static void test_reset_of_idle(void **state)
+{
+    (void)state;
+    struct bench bench = usbip_bench("N");
+    struct client c;
+    client_import(&c, &bench);
+    configure(&c);
+    for (int is_new = 0; is_new < 2; is_new++) {
+        open_stream(&c);
+        assert_int_equal(fault(&bench, LINK_FAULT_BUS_RESET, 0, 0.0), SH_OK);
+        assert_int_equal(bench_expect(&bench, LINK_CLOSED, 0).session, STREAM);
+        bench_expect(&bench, LINK_NOTICE, 0);
+        if (!is_new) expect_urb(&c, client_submit(&c, 1, 3, NULL, NULL, 512), ESHUTDOWN_WIRE, 0);
+        open_stream(&c);
+        const uint32_t seqnum = client_submit(&c, 1, 3, NULL, NULL, 512);
+        bench_expect(&bench, LINK_WRITABLE, 1u << STREAM);
+        assert_int_equal(bench.ops->write(bench.link, STREAM, "abc", 3), 3);
+        expect_urb(&c, seqnum, 0, 3);
+        assert_int_equal(client_control(&c, &r, 0x41, 0x22, 0, 2, 0, NULL), 0);
+        assert_int_equal(bench_expect(&bench, LINK_CLOSED, 0).session, STREAM);
+    }
+    close(c.fd);
+    bench_close(&bench);
+}
+
 /* The device goes, and nobody can attach it; then it is at the same port again. */
 static void test_unplug(void **state)
 {
@@ -266,7 +292,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_short_packets), cmocka_unit_test(test_halt),  cmocka_unit_test(test_descriptor_length),
         cmocka_unit_test(test_stall),         cmocka_unit_test(test_reset), cmocka_unit_test(test_unplug),
-        cmocka_unit_test(test_enumeration),
+        cmocka_unit_test(test_enumeration),   cmocka_unit_test(test_reset_of_idle),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

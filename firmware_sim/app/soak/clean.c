@@ -48,6 +48,14 @@ int soak_clean_get(struct soak_link *link, soak_seq seq, struct soak_clean_frame
     return out->there && out->seq == seq;
 }
 
+int64_t soak_clean_t_ns(struct soak *soak)
+{
+    pthread_mutex_lock(&soak->clean.lock);
+    const int64_t t_ns = soak->clean.last_t_ns;
+    pthread_mutex_unlock(&soak->clean.lock);
+    return t_ns;
+}
+
 soak_seq soak_clean_top(struct soak *soak)
 {
     pthread_mutex_lock(&soak->clean.lock);

@@ -19,11 +19,14 @@ struct recorder {
 /* ---- which links */
 
 /* Why a link has no client here; NULL: it has one. */
-static const char *why_not(const struct link_place *place)
+static const char *why_not(const struct link_place *place, const struct link_spec *spec)
 {
+    if (strcmp(place->type, "usb") == 0)
+        return soak_usb_is_here(spec) ? NULL
+                                      : "only a head of protocol native with backend usbip and attach on is on this "
+                                        "machine";
     if (strcmp(place->type, "udp") == 0) return "its packets go elsewhere, or their port is taken";
     if (strcmp(place->type, "pty") != 0 && strcmp(place->type, "tcp") != 0) {
-        if (strcmp(place->type, "usb") == 0) return "a USB device has to be attached to a machine first";
         if (strcmp(place->type, "web") == 0) return "libscanhead does not speak WebSocket";
         return "nothing answers there";
     }
@@ -49,10 +52,12 @@ static int open_link(struct soak *soak, uint32_t i, const struct link_place *pla
     link->number = i + 1;
     snprintf(link->type, sizeof link->type, "%s", place->type);
     snprintf(link->endpoint, sizeof link->endpoint, "%s", place->endpoint);
+    snprintf(link->source, sizeof link->source, "%.191s", place->endpoint);
+    if (strcmp(place->type, "usb") == 0) soak_usb_source(&soak->cfg->link[i], link->source, sizeof link->source);
     pthread_mutex_init(&link->lock, NULL);
     link->datagrams = soak->datagrams[i];
     link->not_soaked = only != 0 && only != i + 1 ? "not asked for (--link)"
-                       : link->datagrams == NULL  ? why_not(place)
+                       : link->datagrams == NULL  ? why_not(place, &soak->cfg->link[i])
                        : begins_anew(soak)        ? "its packets begin anew with power or plug, so nothing is beside them"
                                                   : NULL;
     link->usable = link->not_soaked == NULL;
@@ -72,8 +77,8 @@ int soak_clients_open(struct soak *soak, const struct loop *loop, uint32_t only,
     }
     if (n > 0) return SH_OK;
     return sh_fail(err, SH_EINPUT,
-                   "%s: links: none that can be soaked; allowed pty and tcp with protocol native, as --set "
-                   "links.0.type=tcp",
+                   "%s: links: none that can be soaked; allowed pty, tcp and usb (attach on) with protocol "
+                   "native, as --set links.0.type=tcp",
                    soak->cfg->file);
 }
 
@@ -118,10 +123,12 @@ static void open_head(struct recorder *r)
     struct soak_link *link = r->link;
     char why[256];
     while (atomic_load(&link->soak->phase) != SOAK_ENDS) {
-        const int rc = link->sh == NULL ? scanhead_open(link->endpoint, &link->sh, why, sizeof why)
+        const int64_t from_ns = clock_now_ns();
+        const int rc = link->sh == NULL ? scanhead_open(link->source, &link->sh, why, sizeof why)
                                         : scanhead_reattach(link->sh, 0);
         if (rc == SCANHEAD_OK) {
             scanhead_on_notice(link->sh, soak_saw_notice, link);
+            soak_usb_opened(link, 1e-6 * (double)(clock_now_ns() - from_ns));
             began(r);
             return;
         }

@@ -36,6 +36,7 @@ static void add_moment(struct soak_link *link, const struct fault_note *note)
     const char *why = why_hidden(link->soak, note->kind);
     row->injected++;
     link->ask.others++;
+    if (note->kind == FAULT_POWER_CYCLE) soak_usb_forget(link, "power went before a client opened it");
     if (link->datagrams != NULL) why = "the packets are compared with those of the same head";
     if (!link->usable) why = "the link has no client here";
     if (why == NULL && link->n_moments == SOAK_MAX_MOMENTS) why = "too many at a time";
@@ -71,6 +72,12 @@ static void see(struct soak_link *link, struct soak_moment *m)
     *m = link->moment[--link->n_moments];
 }
 
+static void hide_moment(struct soak_link *link, uint32_t i, const char *why)
+{
+    soak_hide(&link->row[link->moment[i].kind], 1, why);
+    link->moment[i] = link->moment[--link->n_moments];
+}
+
 /* All of a kind that were at work within a time. */
 static void see_kind(struct soak_link *link, enum fault_kind kind, int64_t from_ns, int64_t to_ns)
 {
@@ -91,6 +98,20 @@ int soak_saw_power_go(struct soak_link *link, int64_t before_ns)
     return 0;
 }
 
+/* The event that ends a boot says that it was slow. */
+static int is_before(const struct soak_moment *m, const struct scanhead_frame *frame)
+{
+    const int ends_boot = frame->type == SCANHEAD_EVENT && frame->event == SCANHEAD_EV_STATE;
+    if (m->kind == FAULT_POWER_CYCLE) return m->from_ns < frame->t_ns;
+    return m->kind == FAULT_SLOW_BOOT && !ends_boot && frame->t_ns - m->from_ns >= (int64_t)(1e6 * m->for_ms);
+}
+
+void soak_head_begins(struct soak_link *link, const struct scanhead_frame *frame)
+{
+    for (uint32_t i = link->n_moments; i-- > 0;)
+        if (is_before(&link->moment[i], frame)) hide_moment(link, i, "it was before the client had a frame");
+}
+
 void soak_saw_state(struct soak_link *link, const char *state)
 {
     pthread_mutex_lock(&link->lock);
@@ -109,6 +130,17 @@ static void take_state(struct soak_link *link, const struct scanhead_frame *fram
     }
 }
 
+/* The client's first time has no other to compare with. */
+static void hide_clock(struct soak_link *link, int64_t at_ns)
+{
+    for (uint32_t i = link->n_moments; i-- > 0;) {
+        const struct soak_moment *m = &link->moment[i];
+        const int is_over = (m->kind == FAULT_CLOCK_JUMP && m->from_ns <= at_ns) ||
+                            ((m->kind == FAULT_CLOCK_STOP || m->kind == FAULT_CLOCK_DRIFT) && m->to_ns <= at_ns);
+        if (is_over) hide_moment(link, i, "it was before the client had a time");
+    }
+}
+
 /* The head's clock beside device time: since the last event that had both. */
 static void take_time(struct soak_link *link, int64_t at_ns, int64_t gps_ns)
 {
@@ -124,6 +156,7 @@ static void take_time(struct soak_link *link, int64_t at_ns, int64_t gps_ns)
                          (m->kind == FAULT_CLOCK_DRIFT && fabs(by_s) > GAIN_S && fabs(by_s) < STEP_S);
         if (seen) see(link, m);
     }
+    if (!t->have) hide_clock(link, at_ns);
     t->have = 1;
     t->at_ns = at_ns;
     t->gps_ns = gps_ns;
@@ -136,12 +169,21 @@ static void miss_pps(struct soak_link *link, int64_t at_ns)
     if (1e-9 * (double)(at_ns - last_ns) > PPS_WITHIN_S) see_kind(link, FAULT_PPS_LOST, last_ns, at_ns);
 }
 
+/* Its first PPS came soon after its first frame: those before that it can't miss. */
+static void hide_pps(struct soak_link *link, int64_t first_ns)
+{
+    for (uint32_t i = link->n_moments; i-- > 0;)
+        if (link->moment[i].kind == FAULT_PPS_LOST && link->moment[i].from_ns < first_ns)
+            hide_moment(link, i, "it was before the client had a frame");
+}
+
 static void take_pps(struct soak_link *link, const struct scanhead_frame *frame)
 {
     struct soak_times *t = &link->times;
     const int64_t at_ns = (int64_t)frame->event_value[1];
     const int64_t leap_s = (int64_t)frame->event_value[2] - (int64_t)frame->event_value[0];
     miss_pps(link, at_ns);
+    if (!t->have_pps) hide_pps(link, t->pps_ns);
     if (t->have_pps && leap_s != t->leap_s) see_kind(link, FAULT_LEAP_SECOND, INT64_MIN, at_ns);
     t->have_pps = 1;
     t->pps_ns = at_ns;
@@ -197,6 +239,23 @@ static int is_seen_in(struct soak_link *link, const struct soak_moment *m, const
     }
 }
 
+static int is_of_mirror(const struct soak_moment *m)
+{
+    return m->kind == FAULT_MIRROR_SLOW || m->kind == FAULT_MIRROR_STUCK || m->kind == FAULT_MIRROR_WOBBLE;
+}
+
+/* The rate at which the mirror turns when nothing is wrong with it. With what was wrong before there is nothing to
+ * compare. */
+static void take_usual_rate(struct soak_link *link, int64_t t_ns, double rate)
+{
+    for (uint32_t i = 0; i < link->n_moments; i++)
+        if (is_of_mirror(&link->moment[i]) && link->moment[i].from_ns <= t_ns && t_ns < link->moment[i].to_ns) return;
+    for (uint32_t i = link->n_moments; i-- > 0;)
+        if (is_of_mirror(&link->moment[i]) && link->moment[i].to_ns <= t_ns)
+            hide_moment(link, i, "the client's scan began with it");
+    link->usual_rate = rate;
+}
+
 static void take_points(struct soak_link *link, const struct scanhead_frame *frame)
 {
     /* A scan that begins anew shows that power was away, even to who was not connected when it went. */
@@ -205,7 +264,7 @@ static void take_points(struct soak_link *link, const struct scanhead_frame *fra
     link->pulse0 = frame->pulse0;
     if (link->n_moments == 0 && link->usual_rate != 0.0) return;
     const double rate = turn_rate(link, frame);
-    if (link->usual_rate == 0.0 && isfinite(rate)) link->usual_rate = rate;
+    if (link->usual_rate == 0.0 && isfinite(rate)) take_usual_rate(link, frame->t_ns, rate);
     for (uint32_t i = link->n_moments; i-- > 0;) {
         struct soak_moment *m = &link->moment[i];
         if (m->from_ns <= frame->t_ns && frame->t_ns < m->to_ns && is_seen_in(link, m, frame, rate)) see(link, m);

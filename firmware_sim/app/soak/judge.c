@@ -102,7 +102,7 @@ static void judge_late(struct soak_link *link, const struct soak_fact *f)
         else if (f->got == 0)
             soak_hide(row, n, "the frame did not come in its place");
         else
-            decide(row, n, f->late_ms >= f->for_ms - MARGIN_MS);
+            decide(row, n, 1e-6 * (double)(f->after_ns - link->offset_ns) >= f->for_ms - MARGIN_MS);
     }
 }
 

@@ -97,6 +97,11 @@ static int was_just_seen(struct soak_link *link, enum fault_kind kind)
 static void hit_frame(struct soak_link *link, const struct fault_note *note)
 {
     struct soak_row *row = &link->row[row_of(note)];
+    if (note->kind == FAULT_ENDPOINT_STALL || note->kind == FAULT_SHORT_PACKETS) {
+        soak_hide(row, 1, note->kind == FAULT_SHORT_PACKETS ? "the bytes are the same"
+                                                            : "the library clears the halt: the bytes are the same");
+        return;
+    }
     if (note->kind >= FAULT_DISCONNECT) {
         if (was_just_seen(link, note->kind)) return;
         if (link->n_acts < SOAK_MAX_ACTS)
@@ -142,8 +147,10 @@ static void hit_connection(struct soak_link *link, const struct fault_note *note
     if (note->kind == FAULT_REFUSE && was_just_seen(link, note->kind)) return;
     if (note->kind == FAULT_REFUSE && link->n_refusals < SOAK_MAX_ACTS)
         link->refusal[link->n_refusals++] = (struct soak_act){note->kind, note->t_ns};
+    else if (note->kind != FAULT_REFUSE)
+        soak_usb_plugged(link, note);
     else
-        soak_hide(&link->row[note->kind], 1, "only the USB of this machine sees it");
+        soak_hide(&link->row[note->kind], 1, "too many at a time");
 }
 
 static void hit_link(struct soak_link *link, const struct fault_note *note)
@@ -213,12 +220,10 @@ static void mark_refused(struct soak_link *link, soak_seq to)
     link->refused_now = 0;
 }
 
-static double lateness_ms(struct soak_link *link, int64_t t_ns, int64_t now_ns)
+static void take_offset(struct soak_link *link, int64_t after_ns)
 {
-    const int64_t after_ns = now_ns - t_ns;
     if (!link->have_offset || after_ns < link->offset_ns) link->offset_ns = after_ns;
     link->have_offset = 1;
-    return 1e-6 * (double)(after_ns - link->offset_ns);
 }
 
 void soak_saw_frame(struct soak_link *link, const struct scanhead_frame *frame, int64_t now_ns)
@@ -226,6 +231,7 @@ void soak_saw_frame(struct soak_link *link, const struct scanhead_frame *frame, 
     if ((frame->flags & SCANHEAD_LOCAL) != 0) return;
     pthread_mutex_lock(&link->lock);
     const soak_seq seq = soak_seq_of(link->soak, frame->seq);
+    if (!link->begun) soak_head_begins(link, frame);
     if (!link->in_session) begin(link, seq);
     if (link->refused_now != 0) mark_refused(link, seq);
     struct soak_fact *fact = touch(link, seq);
@@ -235,7 +241,8 @@ void soak_saw_frame(struct soak_link *link, const struct scanhead_frame *frame, 
     link->last_t_ns = frame->t_ns;
     if (fact != NULL) {
         if (fact->got++ == 0) fact->digest = soak_digest(frame);
-        fact->late_ms = lateness_ms(link, frame->t_ns, now_ns);
+        fact->after_ns = now_ns - frame->t_ns;
+        take_offset(link, fact->after_ns);
     }
     pthread_mutex_unlock(&link->lock);
 }
@@ -365,9 +372,10 @@ void soak_saw_end(struct soak_link *link)
     const int was_refused = !link->in_session;
     link->in_session = 0;
     link->closings++;
+    /* It is said some ticks before power goes. The client may be far behind then, the clean reader is not. */
     const int64_t act_ns = link->n_acts != 0 ? link->act[0].t_ns : INT64_MAX;
-    /* It is said some ticks before power goes, and all frames up to then come. */
-    if (soak_saw_power_go(link, act_ns != INT64_MAX ? act_ns : link->last_t_ns + AHEAD_NS)) {
+    const int64_t now_ns = link->begun ? soak_clean_t_ns(link->soak) : INT64_MAX - AHEAD_NS;
+    if (soak_saw_power_go(link, act_ns != INT64_MAX ? act_ns : now_ns + AHEAD_NS)) {
         forget_acts(link, 0);
         link->was_cut = 1;
     } else if (link->n_acts != 0) {

@@ -145,14 +145,16 @@ static int say_result(const struct soak_options *o, struct soak *soak, struct sh
     return sh_fail(err, SH_ESTATE, "soak: %s", soak->failures[0]);
 }
 
-/* A second link beside each that sends datagrams, without faults. Where it has no room, its first is not soaked. Where
- * nobody could start a scan, the head does so itself. */
+/* A second link beside each that sends datagrams, without faults. Where it has no room, its first is not soaked. A
+ * device on USB gets a name. Where nobody could start a scan, the head does so itself. */
 static void open_twins(struct config *cfg, struct soak *soak, struct soak_options *o)
 {
     int starts = 0;
     soak->n_links = cfg->n_links;
     for (uint32_t i = 0; i < soak->n_links; i++) {
+        soak_usb_name(&cfg->link[i], i + 1);
         starts |= cfg->link[i].protocol == 0 && (cfg->link[i].type == LINK_TCP || cfg->link[i].type == LINK_PTY);
+        starts |= soak_usb_is_here(&cfg->link[i]);
         if (cfg->link[i].type != LINK_UDP || cfg->n_links == CONFIG_MAX_LINKS) continue;
         soak->datagrams[i] = soak_datagrams_open(&cfg->link[i], &cfg->link[cfg->n_links]);
         cfg->n_links += soak->datagrams[i] != NULL;
@@ -178,6 +180,14 @@ static int open_head(struct soak_options *o, struct config *cfg, struct soak *so
     return rc;
 }
 
+/* What is compared is what went over the wire, not how fast the machine is: a busy one delivers later, and all of it. */
+static void be_patient(struct config *cfg)
+{
+    static const double PATIENCE_MS = 3000.0;
+    if (cfg->loop.queue_ms < PATIENCE_MS) cfg->loop.queue_ms = PATIENCE_MS;
+    if (cfg->loop.late_ms < PATIENCE_MS) cfg->loop.late_ms = PATIENCE_MS;
+}
+
 static int soak_head(struct config *cfg, void *ctx, struct sh_err *err)
 {
     struct soak_options *o = ctx;
@@ -188,6 +198,7 @@ static int soak_head(struct config *cfg, void *ctx, struct sh_err *err)
         return sh_fail(err, SH_EINPUT, "--link %ld: there is no such link; allowed 1 to %u", o->link, cfg->n_links);
     struct soak *soak = calloc(1, sizeof *soak);
     if (soak == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
+    be_patient(cfg);
     soak->cfg = cfg;
     soak->realtime = cfg->loop.pace == PACE_REALTIME;
     soak->faults = cfg->faults;

@@ -4,6 +4,7 @@
  *   clean.c    a thread that reads the clean stream within this process
  *   client.c   a thread per link: a recorder, as good as one can be
  *   datagrams.c  the same for a link that sends datagrams
+ *   usb.c      how a client finds the head on USB, and enumerations
  *   ask.c      its questions and their answers
  *   ledger.c   of each link and frame: what was done to it, and what the client saw of it
  *   judge.c    compares the two, frame by frame
@@ -27,7 +28,7 @@ enum { SOAK_RESEALED = FAULT_N_KINDS, SOAK_N_ROWS };
 
 /* Frames that are remembered, clean and by link: a power of two. Half of them at most wait to be judged. */
 enum { SOAK_RING = 1 << 16, SOAK_MAX_RUNS = 1024, SOAK_MAX_ACTS = 64, SOAK_MAX_REPLY_NOTES = 16, SOAK_MAX_MOMENTS = 64,
-       SOAK_REPLY_LEN = 600 };
+       SOAK_MAX_PLUGS = 8, SOAK_REPLY_LEN = 600 };
 
 struct soak_row {
     uint64_t injected;
@@ -80,7 +81,7 @@ struct soak_fact {
     /* what the client saw */
     uint64_t digest;
     uint32_t got, gap, repeated, late;
-    double late_ms; /* after the time that the frame itself says */
+    int64_t after_ns; /* from the time that the frame itself says to its arrival, by another clock: link->offset_ns */
     int away;       /* there was no session then */
     /* what was done to it */
     int64_t t_ns;
@@ -136,6 +137,7 @@ struct soak_link {
     struct soak *soak;
     uint32_t number; /* from 1 */
     char type[16], endpoint[512];
+    char source[192]; /* what the client opens */
     const char *not_soaked; /* why; NULL: it is */
     int usable;             /* 1: it has a client */
     pthread_t thread;
@@ -162,6 +164,8 @@ struct soak_link {
     uint32_t n_runs;
     struct soak_act act[SOAK_MAX_ACTS], refusal[SOAK_MAX_ACTS];
     uint32_t n_acts, n_refusals;
+    struct fault_note plug[SOAK_MAX_PLUGS]; /* of the enumeration at hand, until a client opens the device */
+    uint32_t n_plugs;
     int was_cut; /* an act that keeps clients out for a while may still do so */
     struct soak_moment moment[SOAK_MAX_MOMENTS];
     uint32_t n_moments;
@@ -215,6 +219,8 @@ void soak_clean_close(struct soak *soak);
 /* Of the clean stream that the link's is compared with. 0: it is not known (any more, or not yet). */
 int soak_clean_get(struct soak_link *link, soak_seq seq, struct soak_clean_frame *out);
 soak_seq soak_clean_top(struct soak *soak);
+/* Device time of the last frame. */
+int64_t soak_clean_t_ns(struct soak *soak);
 uint64_t soak_digest(const struct scanhead_frame *frame);
 
 /* ---- client.c */
@@ -234,6 +240,20 @@ void soak_datagrams_step(struct soak_link *link);
 void soak_datagrams_finish(struct soak_link *link);
 uint64_t soak_datagrams_top(struct soak_link *link);
 soak_seq soak_unit(uint64_t number);
+
+/* ---- usb.c */
+/* Whether the link's device is attached to this machine, and has the native stream. */
+int soak_usb_is_here(const struct link_spec *spec);
+/* Gives it a serial number where none is configured, so that its client can name it. number: of the link, from 1. */
+void soak_usb_name(struct link_spec *spec, uint32_t number);
+/* What its client opens. */
+void soak_usb_source(const struct link_spec *spec, char *source, size_t len);
+/* A fault of an enumeration, as it begins; the caller has the link's lock. */
+void soak_usb_plugged(struct soak_link *link, const struct fault_note *note);
+/* The client has opened the device, which took so long: what it noticed of the enumeration. */
+void soak_usb_opened(struct soak_link *link, double opened_ms);
+/* No client will notice them; the caller has the link's lock. */
+void soak_usb_forget(struct soak_link *link, const char *why);
 
 /* ---- ask.c */
 /* Asks the next question, and judges its answer. */
@@ -255,8 +275,10 @@ void soak_saw_no_open(struct soak_link *link);
 struct soak_fact *soak_fact_at(struct soak_link *link, soak_seq seq); /* NULL: not known */
 void soak_hide(struct soak_row *row, uint64_t n, const char *why);
 
-/* ---- head.c: the caller of the first two has the link's lock */
+/* ---- head.c: the caller of the first three has the link's lock */
 void soak_heard_head(struct soak_link *link, const struct fault_note *note);
+/* Its client's first frame. */
+void soak_head_begins(struct soak_link *link, const struct scanhead_frame *frame);
 /* A power cycle that began before that device time, and was not noticed, is. 0: there is none. */
 int soak_saw_power_go(struct soak_link *link, int64_t before_ns);
 void soak_saw_inside(struct soak_link *link, const struct scanhead_frame *frame);

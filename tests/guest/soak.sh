@@ -1,0 +1,12 @@
+#!/bin/sh
+# Each scenario of config/faults over usb, on the virtual host controller of a guest: sh tests/guest/soak.sh SECONDS
+# [SCENARIO...]. The lines "# FILE NAME TEXT" of its output are the sheets, line by line; tests/soak.sh takes them.
+. tests/guest/lib.sh
+guest_prepare
+guest_add tests/guest/room.obj
+guest_add tests/soak_usb.yaml
+seconds=$1
+shift
+echo "seconds=$seconds scenarios='$*'" >"$guest_work/root/soak_of.sh"
+# Beside the faults: boot, and for each scenario the way to its scan and back, on a processor that others use as well.
+guest_boot tests/guest/in_soak.sh $((240 + 7 * (${seconds%.*} + 90)))
