@@ -129,7 +129,8 @@ static void judge_garbage(struct soak_link *link, const struct soak_fact *f)
 {
     if (f->garbage == 0) return;
     if (link->datagrams != NULL) { /* a datagram of its own; the sum of all bytes shows it */
-        soak_hide(&link->row[FAULT_GARBAGE], f->times[FAULT_GARBAGE], "a datagram of its own, which belongs to nothing");
+        soak_hide(&link->row[FAULT_GARBAGE], f->times[FAULT_GARBAGE],
+                  "a datagram of its own, which belongs to nothing");
         return;
     }
     decide(&link->row[FAULT_GARBAGE], f->times[FAULT_GARBAGE], take_bytes(link, f, f->garbage));
