@@ -134,7 +134,7 @@ void soak_print(const struct soak *soak, FILE *out)
             " not noticed\n",
             "all", "", sum.injected, sum.noticed, sum.lost, sum.accepted, sum.hidden, sum.missed);
     if (soak->n_failures == 0)
-        fprintf(out, "verdict: good; %" PRIu64 " frames were wrongly accepted, all of them resealed flips\n",
+        fprintf(out, "verdict: good; frames wrongly accepted: %" PRIu64 ", none but resealed flips\n",
                 sum.accepted);
     for (uint32_t i = 0; i < soak->n_failures; i++)
         fprintf(out, "verdict: bad: %s\n", soak->failures[i]);
