@@ -265,7 +265,7 @@ test-sight: deps
 test-usb-million: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test test-programs
 	@SCANHEAD=$(BUILD)/test/scanhead BUILD=$(BUILD) GUEST_PAN_DEG_S=0.4 GUEST_LIMIT_S=900 \
-		bash tests/run_tap.sh -t 1800 tests/guest/guest.sh
+		bash tests/run_tap.sh -t 2700 tests/guest/guest.sh
 
 # ---- figures: speed and leaks; speed against accuracy, each method
 DEPS_CHART = gnuplot-nox

@@ -19,7 +19,7 @@
 # First the script is tried on planted documents: what it can't find there, it can't find here.
 set -u
 
-limit_s=${RECIPE_LIMIT_S:-60}
+limit_s=${RECIPE_LIMIT_S:-180}
 root=$(cd "$(dirname "$0")/.." && pwd)
 program=$(realpath "${SCANHEAD:-$root/build/scanhead}")
 work=$(mktemp -d) || exit 1
@@ -161,7 +161,7 @@ expect 1 'C that does not compile' '```c as build/a.c' 'int main(void) { return 
 expect 1 'a configuration that is wrong' '```yaml as build/a.yaml' 'head: {profile: none}' '```'
 expect 1 'a link to a file that is not there' 'See [here](nothing.md).'
 expect 1 'a file outside of build' '```c as ../a.c' 'int a;' '```'
-limit_s=${RECIPE_LIMIT_S:-60}
+limit_s=${RECIPE_LIMIT_S:-180}
 
 if [ $# -eq 0 ]; then
     while read -r document; do set -- "$@" "$document"; done < <(cd "$root" &&

@@ -3,15 +3,15 @@
 # them, and the unit tests once more with the sanitizers in. Ends with one line of counts.
 #
 # As many at a time as there are processors, those that take longest first in each folder:
-#   1. accuracy, stability, unit: they compute; the recipes beside them, which mostly wait
-#   2. wire, which mostly waits; beside it the guests, which take longest and so begin before the unit tests, and
-#      two that wait for other people's clients
+#   1. accuracy, stability, unit: they compute; beside them the guests, which take longest and so begin first, and the
+#      recipes, which mostly wait
+#   2. wire, which mostly waits; beside it two that wait for other people's clients
 #   3. those that need a head in real time, but mostly wait: beside each other
 #   4. those that drive a head at its limits, or that spin: each has the machine to itself
 set -eu
 build=$1
 part=${2:-}
-waiting="three_heads slow_reader pty grabber_hokuyo grabber_velodyne signals same_stream clients join"
+waiting="three_heads slow_reader pty grabber_hokuyo grabber_velodyne signals same_stream clients join soak"
 alone="bench_cli latency overrun ring_threads"
 beside="grabber_sick gpsd" # other people's clients that take their time
 longest="beside leaks meshes beam_reference range sight_cast coordinates plan beam georef_default attributes moving travel ticks"
@@ -31,13 +31,13 @@ programs() {
 seen=
 
 set --
-if wanted unit; then set -- "$@" +tests/check_recipes.sh; fi
-if wanted accuracy; then set -- "$@" $(programs accuracy); fi
-if wanted stability; then set -- "$@" $(programs stability); fi
 if wanted guest; then
     export BUILD="$build"
     set -- "$@" +tests/guest/guest.sh # it takes the programs of tests/guest with it
 fi
+if wanted unit; then set -- "$@" +tests/check_recipes.sh; fi
+if wanted accuracy; then set -- "$@" $(programs accuracy); fi
+if wanted stability; then set -- "$@" $(programs stability); fi
 if wanted unit; then set -- "$@" tests/check_includes.sh tests/check_make.sh $(ls tests/check_page_*.sh) $(programs unit); fi
 if [ -z "$part" ]; then set -- "$@" $(programs unit "$build/asan"); fi
 if wanted wire; then for name in $beside; do set -- "$@" "+$build/test/tests/wire/test_$name"; done; fi
@@ -53,4 +53,4 @@ apart() {
     done
 }
 set -- "$@" --5 $(apart $waiting) -- $(apart $alone)
-exec bash tests/run_tap.sh -t 600 -j "$(getconf _NPROCESSORS_ONLN)" "$@"
+exec bash tests/run_tap.sh -t 1200 -j "$(getconf _NPROCESSORS_ONLN)" "$@"

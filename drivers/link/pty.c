@@ -130,11 +130,13 @@ static short pty_now(const struct pty_link *pty)
 static int pty_wait_for_client(struct pty_link *pty)
 {
     if (pty_watch(pty) != SH_OK) return SH_EIO;
+    pty_read_inotify(pty, 0); /* before we look: whoever comes and goes afterwards is noted */
     short now = pty_now(pty);
-    if ((now & POLLHUP) == 0 || (now & POLLIN) != 0) {
-        pty_read_inotify(pty, 0); /* one client is counted by what the master says */
+    if ((now & POLLHUP) == 0) {
         pty_begin(pty, 1);
         pty->open_event_due = 1;
+    } else if ((now & POLLIN) != 0) {
+        pty_begin(pty, 0); /* it has written and left: the next open event is another client's */
     }
     return SH_OK;
 }
@@ -142,7 +144,7 @@ static int pty_wait_for_client(struct pty_link *pty)
 /* All clients are gone and what they wrote is read. Clients that come meanwhile are found at the end. */
 static int pty_end(struct pty_link *pty)
 {
-    pty->open = 0;
+    pty->open = pty->open_event_due = 0; /* else the next client would be taken for one that is counted */
     pty->count = 0;
     pty->due_closed = 1;
     inotify_rm_watch(pty->inotify, pty->watch);

@@ -38,34 +38,33 @@ static void print_wrapped(const char *text, int indent, const char *mark, FILE *
     fputc('\n', out);
 }
 
-/* "; required", "; default 1", and so on. */
-static void say_default(const struct cfg_key *key, char *buf, size_t len)
+/* When it may be left out, and what it is then. */
+static void add_default(const struct cfg_key *key, char *line, size_t room)
 {
     char emitters[64];
     if (key->def == NULL && (key->type != CFG_LIST || key->min > 0))
-        snprintf(buf, len, "; required");
+        snprintf(line, room, "; required");
     else if (key->def != NULL && key->def[0] == '@')
-        snprintf(buf, len, "; default from the head profile, its %s", key->def + 1);
+        snprintf(line, room, "; default from the head profile, its %s", key->def + 1);
     else if (key->def != NULL && key->def[0] != '\0')
-        snprintf(buf, len, "; default %s", key->def);
+        snprintf(line, room, "; default %s", key->def);
     else if (cfg_needed_by_emitter(key, emitters, sizeof emitters))
-        snprintf(buf, len, "; required with emitter: %s", emitters);
+        snprintf(line, room, "; required with emitter: %s", emitters);
     else
-        snprintf(buf, len, "; optional");
+        snprintf(line, room, "; optional");
 }
 
 static void print_key(const struct cfg_key *key, FILE *out)
 {
-    char allowed[CFG_ALLOWED_MAX], preset[160], line[CFG_ALLOWED_MAX + 256];
-    fprintf(out, "%s\n", key->path);
-    if (key->type == CFG_MAP) {
-        fprintf(out, "    %s\n", type_name(key));
-    } else {
-        say_default(key, preset, sizeof preset);
-        snprintf(line, sizeof line, "%s%s%s; %s%s", type_name(key), key->unit != NULL ? ", " : "",
-                 key->unit != NULL ? key->unit : "", cfg_allowed(key, NULL, allowed), preset);
-        print_wrapped(line, 4, "", out);
+    char allowed[CFG_ALLOWED_MAX], line[CFG_ALLOWED_MAX + 256];
+    int len = snprintf(line, sizeof line, "%s", type_name(key));
+    if (key->type != CFG_MAP) {
+        len += snprintf(line + len, sizeof line - (size_t)len, "%s%s; %s", key->unit != NULL ? ", " : "",
+                        key->unit != NULL ? key->unit : "", cfg_allowed(key, NULL, allowed));
+        add_default(key, line + len, sizeof line - (size_t)len);
     }
+    fprintf(out, "%s\n", key->path);
+    print_wrapped(line, 4, "", out);
     print_wrapped(key->help, 4, "", out);
 }
 

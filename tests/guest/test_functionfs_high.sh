@@ -4,4 +4,4 @@
 guest_prepare
 guest_add_head
 echo "speed=high" >"$guest_work/root/speed.sh"
-guest_boot tests/guest/in_functionfs.sh 480
+guest_boot tests/guest/in_functionfs.sh 600

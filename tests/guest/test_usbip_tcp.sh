@@ -4,4 +4,4 @@
 guest_prepare
 guest_add_head
 guest_add tests/guest/in_usbip.sh
-guest_boot tests/guest/in_usbip_tcp.sh 480
+guest_boot tests/guest/in_usbip_tcp.sh 600

@@ -64,5 +64,5 @@ reconnect=reconnect=1
 version=$(qemu-system-x86_64 --version | sed -n 's/.* version \([0-9]*\)\.\([0-9]*\).*/\1 \2/p')
 version=${version:-0 0}
 [ $((${version% *} * 100 + ${version#* })) -lt 902 ] || reconnect=reconnect-ms=1000
-guest_boot tests/guest/in_usbredir.sh 480 -device qemu-xhci,id=x -chardev "socket,id=usb,path=$guest_work/usb,$reconnect" \
+guest_boot tests/guest/in_usbredir.sh 600 -device qemu-xhci,id=x -chardev "socket,id=usb,path=$guest_work/usb,$reconnect" \
     -device usb-redir,chardev=usb,bus=x.0

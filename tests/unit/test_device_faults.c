@@ -170,6 +170,27 @@ static void loses_power_at_a_pulse(void **state)
     rig_close(rig);
 }
 
+/* Lost ticks and errors of a head without power are said when power is back; the end of the run does not wait for it. */
+static void ends_without_power(void **state)
+{
+    (void)state;
+    for (int ends = 0; ends < 2; ends++) {
+        struct rig *rig = open_with("  - {kind: power_cycle, from_s: 0.3, for_ms: 100}\n", NULL, NULL, 0);
+        rig_go_to(rig, 350);
+        device_lost(rig->device, &rig->work);
+        for (int i = 0; i < 20; i++) /* more than are said in a second */
+            device_report(rig->device, CMD_E_PULSES, "for the test");
+        if (ends) device_end(rig->device);
+        int more = 4; /* ticks */
+        while (more > 0 && rig_claim(rig))
+            more--;
+        if (ends) assert_true(more > 0);
+        if (!ends) assert_int_equal(rig_wait(rig, NATIVE_EV_OVERRUN, 100)->c, 1);
+        if (!ends) assert_true(rig->work.tick == 400);
+        rig_close(rig);
+    }
+}
+
 /* Full seconds begin at .7 s. PPS at 1.7 and 2.7 are lost; at 3.2 the clock jumps on by 0.3 s; from 5.1003 to 6.3504 it
  * stands; the minute at hand has a second 60. */
 static void tells_a_wrong_time(void **state)
@@ -280,6 +301,7 @@ int main(void)
         cmocka_unit_test(fails_the_self_test),
         cmocka_unit_test(ends_a_run_that_cannot_scan),
         cmocka_unit_test(loses_power),
+        cmocka_unit_test(ends_without_power),
         cmocka_unit_test(loses_power_at_a_pulse),
         cmocka_unit_test(tells_a_wrong_time),
         cmocka_unit_test(drifts_until_it_is_cleared),

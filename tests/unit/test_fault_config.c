@@ -52,6 +52,16 @@ static int has(const char *keys, const char *key)
     return at != NULL && (at == keys || at[-1] == ' ') && (at[len] == ' ' || at[len] == '\0');
 }
 
+/* None of them is cut off. */
+static void an_unknown_kind_is_told_all_kinds(void **state)
+{
+    (void)state;
+    load_base();
+    assert_int_equal(read_fault("{kind: no_such}"), SH_EINPUT);
+    for (int k = 0; k < FAULT_N_KINDS; k++)
+        if (strstr(err.text, fault_names[k]) == NULL) fail_msg("%s is not in: %s", fault_names[k], err.text);
+}
+
 static void a_kind_has_its_keys_and_no_others(void **state)
 {
     (void)state;
@@ -202,6 +212,7 @@ static void faults_stand_in_the_configuration_and_in_scenarios(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(an_unknown_kind_is_told_all_kinds),
         cmocka_unit_test(a_kind_has_its_keys_and_no_others),
         cmocka_unit_test(what_is_not_given_is_as_said),
         cmocka_unit_test(wrong_ones_are_refused_with_what_is_allowed),

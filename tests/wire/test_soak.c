@@ -169,6 +169,43 @@ static void test_the_pace_fast(void **state)
     free(text);
 }
 
+/* Packets of a VLP-16, beside those of a second link without faults. */
+static void test_datagrams(void **state)
+{
+    struct wire *wire = *state;
+    char config[352], json[352], truth[352], links[128];
+    struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
+    socklen_t len = sizeof at;
+    const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0); /* a port that is free */
+    assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at), 0);
+    assert_int_equal(getsockname(fd, (struct sockaddr *)&at, &len), 0);
+    close(fd);
+    snprintf(links, sizeof links, "links: [{type: udp, protocol: velodyne, address: 127.0.0.1, port: %d}]\n",
+             ntohs(at.sin_port));
+    room_write(wire);
+    snprintf(config, sizeof config, "%s", wire_path(wire, "beams.yaml"));
+    FILE *f = fopen(config, "w");
+    assert_non_null(f);
+    fprintf(f, "head: {profile: velodyne-vlp16, lines_hz: 10, frames: 0}\n"
+               "scene: {meshes: [{file: room.obj, up: z, scale: 1}]}\nstations: [{position_m: [0, 0, 0.2]}]\n"
+               "loop: {late_ms: 900, queue_ms: 2000}\nbeam: {mode: single, echoes: strongest}\n%s",
+            links);
+    assert_int_equal(fclose(f), 0);
+    snprintf(json, sizeof json, "%s", wire_path(wire, "udp.json"));
+    snprintf(truth, sizeof truth, "%s", wire_path(wire, "udp.truth"));
+    const char *const args[] = {"soak", config,    "--scenario", "config/faults/hostile-wire.yaml", "--duration", "2", "--json",
+                                json,   "--truth", truth,        "--quiet", NULL};
+    const int status = wire_wait(wire, wire_spawn(wire, args, "out", "err", -1));
+    if (status != 0) wire_show(wire, "out");
+    assert_int_equal(status, 0);
+    char *text = wire_read(json, NULL), *said = wire_read(truth, NULL);
+    assert_int_equal(total(text, "injected"), count_lines(said, "\"link\":1", "", "?"));
+    assert_int_equal(total(text, "wrongly_accepted"), count_lines(said, "resealed", "", "?"));
+    assert_true(total(text, "noticed") > 10);
+    free(text);
+    free(said);
+}
+
 static void expect_usage(struct wire *wire, const char *const *args, const char *says)
 {
     assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 2);
@@ -198,6 +235,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_each_scenario_over_tcp, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_a_terminal, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_the_pace_fast, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_datagrams, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_wrong_usage, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -34,6 +34,14 @@ static const char *why_not(const struct link_place *place)
     return NULL;
 }
 
+/* Its packets begin anew then, and those of the link beside it don't. */
+static int begins_anew(const struct soak *soak)
+{
+    for (uint32_t i = 0; i < soak->faults.n; i++)
+        if (soak->faults.fault[i].kind == FAULT_POWER_CYCLE || soak->faults.fault[i].kind == FAULT_UNPLUG) return 1;
+    return 0;
+}
+
 static int open_link(struct soak *soak, uint32_t i, const struct link_place *place, uint32_t only)
 {
     struct soak_link *link = &soak->link[i];
@@ -44,8 +52,9 @@ static int open_link(struct soak *soak, uint32_t i, const struct link_place *pla
     pthread_mutex_init(&link->lock, NULL);
     link->datagrams = soak->datagrams[i];
     link->not_soaked = only != 0 && only != i + 1 ? "not asked for (--link)"
-                       : link->datagrams != NULL  ? NULL
-                                                  : why_not(place);
+                       : link->datagrams == NULL  ? why_not(place)
+                       : begins_anew(soak)        ? "its packets begin anew with power or plug, so nothing is beside them"
+                                                  : NULL;
     link->usable = link->not_soaked == NULL;
     if (!link->usable) return 0;
     link->fact = calloc(SOAK_RING, sizeof *link->fact);
@@ -202,7 +211,7 @@ static void *compare(void *arg)
         soak_datagrams_step(link);
         if (link->last >= until) atomic_store(&link->done, 1);
     }
-    soak_datagrams_step(link);
+    soak_datagrams_finish(link);
     return NULL;
 }
 

@@ -160,13 +160,20 @@ void soak_datagrams_step(struct soak_link *link)
     pthread_mutex_lock(&link->lock);
     take_clean(d);
     take_others(d);
-    const int64_t until_ns = clock_now_ns() - (atomic_load(&link->soak->phase) == SOAK_ENDS ? 0 : WAIT_NS);
+    const int64_t until_ns = clock_now_ns() - WAIT_NS;
     while (d->n != 0 && d->wait[d->first].at_ns <= until_ns) {
         take_one(link, &d->wait[d->first]);
         d->first = (d->first + 1) % WAITING;
         d->n--;
     }
     pthread_mutex_unlock(&link->lock);
+}
+
+void soak_datagrams_finish(struct soak_link *link)
+{
+    const int64_t end_ns = clock_now_ns() + 2 * WAIT_NS;
+    while (clock_now_ns() < end_ns)
+        soak_datagrams_step(link);
 }
 
 uint64_t soak_datagrams_top(struct soak_link *link)

@@ -33,12 +33,8 @@ static void decide(struct soak_row *row, uint64_t n, int was_noticed)
 /* ---- what each kind must show */
 
 /* It did not come, and its number is missing. */
-static void judge_destroyed(struct soak_link *link, const struct soak_fact *f, int is_wrong)
+static void judge_destroyed(struct soak_link *link, const struct soak_fact *f)
 {
-    if (link->datagrams != NULL && is_wrong && f->times[FAULT_FLIP] != 0) { /* a packet without a checksum */
-        link->row[FAULT_FLIP].accepted++;
-        return;
-    }
     static const enum fault_kind kinds[] = {FAULT_DROP, FAULT_TRUNCATE, FAULT_FLIP};
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++)
         decide(&link->row[kinds[i]], f->times[kinds[i]], f->got == 0 && f->gap);
@@ -128,9 +124,10 @@ static int take_bytes(struct soak_link *link, const struct soak_fact *f, uint64_
 static void judge_garbage(struct soak_link *link, const struct soak_fact *f)
 {
     if (f->garbage == 0) return;
-    if (link->datagrams != NULL) { /* a datagram of its own; the sum of all bytes shows it */
-        soak_hide(&link->row[FAULT_GARBAGE], f->times[FAULT_GARBAGE],
-                  "a datagram of its own, which belongs to nothing");
+    if (link->datagrams != NULL) { /* a datagram of its own; the sum of all bytes shows whether it is this one */
+        const int is_there = link->bad_units >= f->times[FAULT_GARBAGE];
+        if (is_there) link->bad_units -= f->times[FAULT_GARBAGE];
+        decide(&link->row[FAULT_GARBAGE], f->times[FAULT_GARBAGE], is_there);
         return;
     }
     decide(&link->row[FAULT_GARBAGE], f->times[FAULT_GARBAGE], take_bytes(link, f, f->garbage));
@@ -138,16 +135,27 @@ static void judge_garbage(struct soak_link *link, const struct soak_fact *f)
 
 static void judge_same_bytes(struct soak_link *link, const struct soak_fact *f)
 {
-    soak_hide(&link->row[FAULT_SPLIT], f->times[FAULT_SPLIT], "the bytes are the same");
-    soak_hide(&link->row[FAULT_MERGE], f->times[FAULT_MERGE], "the bytes are the same");
+    static const enum fault_kind kinds[] = {FAULT_SPLIT, FAULT_MERGE};
+    for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
+        if (link->datagrams == NULL)
+            soak_hide(&link->row[kinds[i]], f->times[kinds[i]], "the bytes are the same");
+        else if (is_destroyed(f))
+            soak_hide(&link->row[kinds[i]], f->times[kinds[i]], "the frame was destroyed besides");
+        else /* its datagrams have the wrong length */
+            decide(&link->row[kinds[i]], f->times[kinds[i]], f->got == 0 && f->gap);
+    }
 }
 
 /* ---- a frame */
 
 /* Bytes that no reader can take for a frame or a reply. */
-static uint64_t bad_bytes_of(const struct soak_fact *f, const struct soak_clean_frame *clean)
+static uint64_t bad_bytes_of(const struct soak_link *link, const struct soak_fact *f,
+                             const struct soak_clean_frame *clean)
 {
     uint64_t n = f->garbage;
+    /* A datagram whose bits changed does not arrive: its checksum is wrong. */
+    if (link->datagrams != NULL && f->times[FAULT_FLIP] != 0) return n;
+    if (link->datagrams != NULL && (f->merged || f->times[FAULT_SPLIT] != 0)) return n + clean->len;
     if (is_destroyed(f) && f->times[FAULT_DROP] == 0)
         n += (uint64_t)(f->cut_to != 0 ? f->cut_to : clean->len) * (1 + f->copies);
     return n;
@@ -164,6 +172,8 @@ static void judge_loss(struct soak_link *link, const struct soak_fact *f)
     }
     if (f->times[FAULT_REORDER] != 0 && f->late != 0)
         link->row[FAULT_REORDER].lost++;
+    else if (link->datagrams != NULL && (f->merged || f->times[FAULT_SPLIT] != 0))
+        link->row[f->merged ? FAULT_MERGE : FAULT_SPLIT].lost++;
     else if (f->resealed != 0)
         link->row[SOAK_RESEALED].lost++;
     else
@@ -174,7 +184,7 @@ static void judge_frame(struct soak_link *link, const struct soak_fact *f)
 {
     struct soak_clean_frame clean = {0};
     const int is_known = soak_clean_get(link, f->seq, &clean);
-    const uint64_t bad = bad_bytes_of(f, &clean);
+    const uint64_t bad = bad_bytes_of(link, f, &clean);
     link->expected_bad_max += bad;
     if (f->away) {
         link->away++;
@@ -189,14 +199,14 @@ static void judge_frame(struct soak_link *link, const struct soak_fact *f)
     if (!is_known) link->unknown++;
     const int is_wrong = is_known && f->got != 0 && f->digest != clean.digest;
     judge_loss(link, f);
-    judge_destroyed(link, f, is_wrong);
+    judge_destroyed(link, f);
     judge_resealed(link, f, is_known, is_wrong);
     judge_duplicate(link, f);
     judge_reorder(link, f);
     judge_late(link, f);
     judge_garbage(link, f);
     judge_same_bytes(link, f);
-    if ((is_wrong && f->resealed + f->times[FAULT_FLIP] == 0) || f->got > 1) link->wrong_plain++; /* once is enough */
+    if ((is_wrong && f->resealed == 0) || f->got > 1) link->wrong_plain++; /* once is enough */
 }
 
 void soak_judge(struct soak_link *link, int all)

@@ -66,6 +66,15 @@ static void take_kind(struct soak_fact *fact, const struct fault_note *note)
     }
 }
 
+/* Those that went into one datagram. */
+static void mark_merged(struct soak_link *link, const struct fault_note *note)
+{
+    for (uint64_t i = 0; i < note->n; i++) {
+        struct soak_fact *fact = touch(link, soak_unit(note->number + i));
+        if (fact != NULL) fact->merged = 1;
+    }
+}
+
 static int row_of(const struct fault_note *note)
 {
     return note->kind == FAULT_FLIP && strcmp(note->text, "resealed") == 0 ? SOAK_RESEALED : (int)note->kind;
@@ -116,6 +125,7 @@ static void hit_frame(struct soak_link *link, const struct fault_note *note)
     else
         fact->times[note->kind]++;
     take_kind(fact, note);
+    if (note->kind == FAULT_MERGE && link->datagrams != NULL) mark_merged(link, note);
 }
 
 static void hit_reply(struct soak_link *link, const struct fault_note *note)

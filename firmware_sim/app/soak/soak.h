@@ -85,7 +85,7 @@ struct soak_fact {
     /* what was done to it */
     int64_t t_ns;
     uint8_t times[FAULT_REFUSE]; /* by kind */
-    uint8_t resealed;
+    uint8_t resealed, merged; /* merged: it went into one datagram with others */
     uint32_t copies, behind, garbage;
     uint32_t cut_to; /* bytes that truncation left; 0: all */
     double for_ms;   /* delay, jitter and stall: the longest */
@@ -230,6 +230,8 @@ struct soak_datagrams *soak_datagrams_open(const struct link_spec *spec, struct 
 void soak_datagrams_close(struct soak_datagrams *datagrams);
 int soak_datagrams_get(const struct soak_datagrams *datagrams, soak_seq seq, struct soak_clean_frame *out);
 void soak_datagrams_step(struct soak_link *link);
+/* Takes what is on its way still. */
+void soak_datagrams_finish(struct soak_link *link);
 uint64_t soak_datagrams_top(struct soak_link *link);
 soak_seq soak_unit(uint64_t number);
 

@@ -1,0 +1,138 @@
+/* The pty link: clients that come and go at the moments when nobody watches the terminal. The link's own calls of the
+ * kernel go through here, so that a client can act within them. */
+#include <poll.h>
+#include <sys/inotify.h>
+#include <sys/syscall.h>
+
+#include "tests/unit/pty_rig.h"
+
+static struct bench bench;
+static int visitor = -1;              /* a client's descriptor */
+static void (*when_unwatched)(void);  /* called once, after the watch is taken away */
+static void (*between_looks)(void);   /* called once, after poll has looked at all descriptors but the last */
+
+static void call_once(void (**what)(void))
+{
+    void (*now)(void) = *what;
+    *what = NULL;
+    if (now != NULL) now();
+}
+
+int inotify_rm_watch(int fd, int watch)
+{
+    int rc = (int)syscall(SYS_inotify_rm_watch, fd, watch);
+    call_once(&when_unwatched);
+    return rc;
+}
+
+/* The kernel looks at one descriptor after the other. */
+int poll(struct pollfd *fds, nfds_t n, int timeout_ms)
+{
+    const struct timespec wait = {timeout_ms / 1000, timeout_ms % 1000 * 1000000L}, none = {0, 0};
+    if (n < 3 || between_looks == NULL) return ppoll(fds, n, timeout_ms < 0 ? NULL : &wait, NULL);
+    int before = ppoll(fds, n - 1, &none, NULL);
+    call_once(&between_looks);
+    int last = ppoll(fds + n - 1, 1, &none, NULL);
+    return before < 0 || last < 0 ? -1 : before + last;
+}
+
+static void come(void)
+{
+    visitor = client_open(&bench);
+}
+
+static void leave(void)
+{
+    close(visitor);
+}
+
+static void write_and_leave(void)
+{
+    come();
+    assert_int_equal(write(visitor, "*RST\n", 5), 5);
+    leave();
+}
+
+static void begin(void)
+{
+    bench = bench_open(&plain);
+    come();
+    bench_expect(&bench, LINK_OPENED, 0);
+}
+
+/* A client has its session, and is heard and answered. */
+static void expect_served(int fd)
+{
+    char text[8];
+    bench_expect(&bench, LINK_OPENED, 0);
+    assert_int_equal(write(fd, "ask", 3), 3);
+    bench_read_all(&bench, 0, text, 3);
+    assert_memory_equal(text, "ask", 3);
+    bench_write_all(&bench, 0, "answer", 6);
+    fd_read_all(fd, text, 6);
+    assert_memory_equal(text, "answer", 6);
+    close(fd);
+    bench_expect(&bench, LINK_CLOSED, 0);
+    assert_true(is_calm(&bench, 1));
+}
+
+/* A client that wrote and left meanwhile is heard, and the one after it is not taken for it. */
+static void test_written_and_gone_unwatched(void **state)
+{
+    (void)state;
+    begin();
+    leave();
+    when_unwatched = write_and_leave;
+    bench_expect(&bench, LINK_CLOSED, 0);
+    bench_expect(&bench, LINK_OPENED, 0);
+    assert_int_equal(read_to_end(&bench), 5);
+    bench.n_queue = 0;
+    expect_served(client_open(&bench));
+    bench_close(&bench);
+}
+
+/* The same, where the next client comes before the link has read what is there: it has a session of its own. */
+static void test_next_after_written_and_gone(void **state)
+{
+    (void)state;
+    begin();
+    leave();
+    when_unwatched = write_and_leave;
+    bench_expect(&bench, LINK_CLOSED, 0);
+    bench_expect(&bench, LINK_OPENED, 0);
+    int fd = client_open(&bench);
+    char text[8];
+    bench_expect(&bench, LINK_CLOSED, 0);
+    bench_expect(&bench, LINK_OPENED, 0);
+    bench_read_all(&bench, 0, text, 5);
+    close(fd);
+    bench_expect(&bench, LINK_CLOSED, 0);
+    expect_served(client_open(&bench));
+    bench_close(&bench);
+}
+
+/* A client comes unwatched. Its hang-up is seen, and its close event not yet. */
+static void test_came_unwatched_left_between_looks(void **state)
+{
+    (void)state;
+    begin();
+    leave();
+    when_unwatched = come;
+    bench_expect(&bench, LINK_CLOSED, 0);
+    bench_expect(&bench, LINK_OPENED, 0);
+    between_looks = leave;
+    bench_expect(&bench, LINK_CLOSED, 0);
+    assert_null(between_looks);
+    expect_served(client_open(&bench));
+    bench_close(&bench);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_written_and_gone_unwatched),
+        cmocka_unit_test(test_next_after_written_and_gone),
+        cmocka_unit_test(test_came_unwatched_left_between_looks),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
