@@ -164,7 +164,7 @@ void cfg_check_fault_links(struct cfg_reader *rd, const struct config *cfg, cons
 
 int config_link_has_fault(const struct link_spec *link, enum fault_kind kind)
 {
-    const int is_of_link = kind >= FAULT_DISCONNECT && kind <= FAULT_DESCRIPTOR_LENGTH;
+    const int is_of_link = fault_is_act(kind) || fault_place_of(kind) == FAULT_AT_CONNECTION;
     return !is_of_link || (link_faults(link) & LINK_FAULT_BIT(kind - FAULT_DISCONNECT)) != 0;
 }
 

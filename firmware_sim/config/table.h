@@ -198,8 +198,8 @@ void cfg_fill_defaults(struct cfg_reader *rd, const struct config_profile *profi
 int cfg_shared_path(int i, const char *name, char *buf);
 /* The first of these places that has it; 0: none. */
 int cfg_find_shared(const char *name, char *buf);
-/* The file of a scenario: a path (with a slash, or an ending), or the name of one that comes with the program. buf holds
- * CONFIG_PATH_LEN. 0: there is none of that name. */
+/* The file of a scenario: a path (with a slash, or an ending), or the name of one that comes with the program. buf
+ * holds CONFIG_PATH_LEN. 0: there is none of that name. */
 int cfg_find_scenario(const char *name, char *buf);
 /* A figure of a profile that is written in 1e-6 units. */
 int64_t cfg_figure(const struct config_profile *profile, const char *path);

@@ -1,8 +1,8 @@
 /* Faults that change what is measured: from which pulse of a scan to which they strike, and what they do together.
  *
  * A fault strikes at the pulses of a scan between from_pulse and until_pulse that fire at from_s or later, and before
- * until_s. That is exact, whatever ticks are: a tick ends where a fault begins or ends (claim_pulses), and what it leaves
- * comes with the next ones. So all pulses of a tick have the same faults. */
+ * until_s. That is exact, whatever ticks are: a tick ends where a fault begins or ends (claim_pulses), and what it
+ * leaves comes with the next ones. So all pulses of a tick have the same faults. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

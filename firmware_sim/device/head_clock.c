@@ -131,8 +131,8 @@ int head_clock_add_leap(struct head_clock *clock, int64_t t_ns, int64_t *posix_s
     return utc_table_add(&clock->table, *posix_s);
 }
 
-/* What the clock shows a nanosecond before, for an edge at t_ns. A jump is none: there the piece counts as if it had run
- * before. */
+/* What the clock shows a nanosecond before, for an edge at t_ns. A jump is none: there the piece counts as if it had
+ * run before. */
 static int64_t before_ns(const struct head_clock *clock, const struct head_clock_piece *piece, int64_t t_ns)
 {
     const int begins = t_ns == piece->from_ns && piece != clock->piece && piece->change.jump_ns == 0;

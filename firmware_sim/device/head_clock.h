@@ -74,8 +74,8 @@ int64_t head_clock_ns(const struct head_clock *clock, int64_t t_ns);
 /* Changes the clock from a device time on. No clock runs backwards: one that would loses all, and stands. */
 void head_clock_change(struct head_clock *clock, int64_t t_ns, const struct head_clock_change *change);
 
-/* A leap second that no table has, at the end of the UTC minute at hand at a device time, by the head's clock. Where one
- * is there already, at the end of the next. *posix_s: the second after it, since 1970. 0: the table is full. */
+/* A leap second that no table has, at the end of the UTC minute at hand at a device time, by the head's clock. Where
+ * one is there already, at the end of the next. *posix_s: the second after it, since 1970. 0: the table is full. */
 int head_clock_add_leap(struct head_clock *clock, int64_t t_ns, int64_t *posix_s);
 
 /* The full second of the head's clock that begins at a device time in [from_ns, to_ns), at most a second

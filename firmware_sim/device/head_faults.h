@@ -5,9 +5,9 @@
  * ended, when it is over. All goes by device time, so it is the same at any pace and with any number of threads.
  *
  * A fault begins with the first tick that starts at from_s or later, and ends with the first that starts at until_s or
- * later, as commands do. The clock's faults are exact to the nanosecond instead. With from_pulse or until_pulse it is at
- * work in ticks of a scan that have such a pulse. A power cycle, a jump and a leap second strike once; power is off for
- * for_ms, up to a whole tick. What is taken out of the list while it is at work ends.
+ * later, as commands do. The clock's faults are exact to the nanosecond instead. With from_pulse or until_pulse it is
+ * at work in ticks of a scan that have such a pulse. A power cycle, a jump and a leap second strike once; power is off
+ * for for_ms, up to a whole tick. What is taken out of the list while it is at work ends.
  *
  * Those that change what is measured are no part of it: they are exact to the pulse (beam_faults.c).
  *
@@ -66,8 +66,8 @@ int head_faults_step(struct head_faults *faults, uint64_t kinds, const struct he
 /* The faults of a kind that are active, one after the other; from NULL to NULL. */
 struct head_fault *head_faults_next(struct head_faults *faults, enum fault_kind kind, const struct head_fault *before);
 
-/* The faults of a kind that strikes at something, as a boot, whose window has this moment. In the same way, after a step
- * of this tick. They are in no step themselves: who makes them strike notes them. */
+/* The faults of a kind that strikes at something, as a boot, whose window has this moment. In the same way, after a
+ * step of this tick. They are in no step themselves: who makes them strike notes them. */
 struct head_fault *head_faults_at(struct head_faults *faults, enum fault_kind kind, int64_t t_ns,
                                   const struct head_fault *before);
 /* A note: text may be NULL; without a pulse. */

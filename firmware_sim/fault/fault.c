@@ -52,6 +52,11 @@ enum fault_place fault_place_of(enum fault_kind kind)
     return FAULT_AT_FRAME;
 }
 
+int fault_is_act(enum fault_kind kind)
+{
+    return kind >= FAULT_DISCONNECT && kind <= FAULT_SHORT_PACKETS;
+}
+
 uint32_t fault_n(const struct fault *fault)
 {
     if (fault->n != 0) return fault->n;

@@ -107,6 +107,8 @@ struct fault_spot {
 
 extern const char *const fault_names[]; /* by kind, NULL at the end */
 enum fault_place fault_place_of(enum fault_kind kind);
+/* Whether the link does it, at a frame: disconnect to short_packets. */
+int fault_is_act(enum fault_kind kind);
 /* n, or what the kind takes without it. */
 uint32_t fault_n(const struct fault *fault);
 

@@ -53,11 +53,6 @@ void wire_renew(struct wire *wire, uint64_t ahead)
 
 /* ---- which faults strike */
 
-static int is_act(enum fault_kind kind)
-{
-    return kind >= FAULT_DISCONNECT && kind <= FAULT_SHORT_PACKETS;
-}
-
 enum { LAST_RANK = 4 };
 
 /* When it has its turn at a frame. */
@@ -83,7 +78,7 @@ static int rank_of(const struct wire *wire, const struct fault *f)
 /* How often it has struck: what the link does counts for all its sessions. */
 static uint64_t *hits_of(struct wire *wire, struct wire_fault *fault)
 {
-    return is_act(fault->entry.fault.kind) && wire->spec.tally != NULL
+    return fault_is_act(fault->entry.fault.kind) && wire->spec.tally != NULL
                ? fault_tally_hits(wire->spec.tally, fault->entry.number)
                : &fault->hits;
 }
@@ -91,7 +86,7 @@ static uint64_t *hits_of(struct wire *wire, struct wire_fault *fault)
 static int concerns(struct wire *wire, struct wire_fault *fault, int of)
 {
     const struct fault *f = &fault->entry.fault;
-    if (is_act(f->kind) && (wire->spec.acts & UINT32_C(1) << (f->kind - FAULT_DISCONNECT)) == 0) return 0;
+    if (fault_is_act(f->kind) && (wire->spec.acts & UINT32_C(1) << (f->kind - FAULT_DISCONNECT)) == 0) return 0;
     if (f->count != 0 && *hits_of(wire, fault) >= f->count) return 0;
     return fault_place_of(f->kind) == FAULT_AT_REPLY  ? of == FAULT_OF_REPLIES
            : fault_place_of(f->kind) == FAULT_AT_FRAME ? of == f->of

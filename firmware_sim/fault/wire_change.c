@@ -356,7 +356,6 @@ int wire_change(struct wire *wire, const struct wire_fault *fault, uint64_t numb
     if (making->is_dropped && !is_before(fault->entry.fault.kind)) return 0;
     describe(&c);
     const int done = change_item(&c);
-    const int is_act = fault->entry.fault.kind >= FAULT_DISCONNECT && fault->entry.fault.kind <= FAULT_SHORT_PACKETS;
-    if (done > 0 && !is_act) fault_board_note(wire->spec.board, &c.note);
+    if (done > 0 && !fault_is_act(fault->entry.fault.kind)) fault_board_note(wire->spec.board, &c.note);
     return done;
 }

@@ -1,10 +1,10 @@
-/* A power cycle on request, as the clients of a link see it: their sessions end abruptly, and nobody answers until power
- * is there again (device_work.power).
+/* A power cycle on request, as the clients of a link see it: their sessions end abruptly, and nobody answers until
+ * power is there again (device_work.power).
  *
  * All before the tick with which power goes is written, if the client reads fast enough; in the paces that wait for
- * readers, in any case. What its system has not taken by then may be lost with the connection. A link that nobody can end,
- * as a file or UDP, goes on where it was. In the pace step links come back at once, since it is their clients that let
- * time pass. */
+ * readers, in any case. What its system has not taken by then may be lost with the connection. A link that nobody can
+ * end, as a file or UDP, goes on where it was. In the pace step links come back at once, since it is their clients that
+ * let time pass. */
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/loop/pump_inside.h"
 

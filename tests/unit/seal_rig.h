@@ -22,8 +22,8 @@ uint64_t seal_count(const struct protocol_ops *ops, const uint8_t *unit, size_t 
 /* Each of these bits alone, and random sets of them: the reader accepts the unit, and it says something else. */
 void seal_check(const struct protocol_ops *ops, const uint8_t *unit, size_t len, seal_reader *read);
 
-/* Its beginnings, each in memory of just its length, and the unit with single bytes that are anything: nothing beside it
- * is read or written (sanitizers see that), and what may change lies within it. */
+/* Its beginnings, each in memory of just its length, and the unit with single bytes that are anything: nothing beside
+ * it is read or written (sanitizers see that), and what may change lies within it. */
 void seal_check_broken(const struct protocol_ops *ops, const uint8_t *unit, size_t len);
 
 #endif

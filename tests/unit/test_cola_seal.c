@@ -37,7 +37,8 @@ static size_t telegram(const char *cfg, int is_b, uint8_t *unit)
     cola.utc0_ns = INT64_C(1767323040000000000);
     protocol_rig_describe(&cola, 0);
     for (int i = 0; i < 12; i++)
-        shots[i] = (struct protocol_rig_shot){i % 3 == 0 ? 2 : 1, {0.7 * i + 0.6, 17.0}, {(int16_t)(-100 * i), -700}, {0}};
+        shots[i] =
+            (struct protocol_rig_shot){i % 3 == 0 ? 2 : 1, {0.7 * i + 0.6, 17.0}, {(int16_t)(-100 * i), -700}, {0}};
     cola_authorise();
     cola_expect(cfg, "sWA LMDscandatacfg");
     cola_stream(is_b);

@@ -5,35 +5,13 @@
 
 static struct fault f;
 
-/* One fault, and so many frames of the stream. */
-static void run_one(uint32_t n_frames)
-{
-    rig_open(&f, 1, 1);
-    for (uint32_t i = 0; i < n_frames; i++)
-        rig_frame(RIG_STREAM);
-}
-
-static void end_one(uint32_t whole)
-{
-    rig_drain();
-    assert_int_equal(rig_check_notes(), whole);
-    rig_close();
-}
-
-static int close_rig(void **state)
-{
-    (void)state;
-    rig_close();
-    return 0;
-}
-
 static void dropped_frames_are_missing(void **state)
 {
     (void)state;
     f = fault_of_kind(FAULT_DROP);
     f.from = 2;
     f.every = 3;
-    run_one(9);
+    rig_run(&f, 9);
     rig_drain();
     rig_expect((const int[]){0, 2, 3, 5, 6, 8, -1});
     assert_int_equal(rig.n_notes, 3);
@@ -45,7 +23,7 @@ static void dropped_frames_are_missing(void **state)
     }
     assert_int_equal(fault_board_injected(rig.board, 1), 3);
     assert_int_equal(fault_board_injected(rig.board, 0), 3);
-    end_one(6);
+    rig_end(6);
 }
 
 static void duplicates_follow_at_once(void **state)
@@ -54,11 +32,11 @@ static void duplicates_follow_at_once(void **state)
     f = fault_of_kind(FAULT_DUPLICATE);
     f.at = 2;
     f.n = 3;
-    run_one(3);
+    rig_run(&f, 3);
     rig_drain();
     rig_expect((const int[]){0, 1, 1, 1, 1, 2, -1});
     assert_true(rig.n_notes == 1 && rig.note[0].n == 3);
-    end_one(6);
+    rig_end(6);
 }
 
 static void truncated_frames_lack_their_end(void **state)
@@ -67,24 +45,24 @@ static void truncated_frames_lack_their_end(void **state)
     f = fault_of_kind(FAULT_TRUNCATE);
     f.at = 2;
     f.n = 7;
-    run_one(3);
+    rig_run(&f, 3);
     assert_true(rig.note[0].n == 7 && rig.note[0].byte == (int64_t)rig.item[1].len - 7);
-    end_one(2);
+    rig_end(2);
     f.n = 1000000; /* more than there are: one byte is left */
-    run_one(3);
+    rig_run(&f, 3);
     assert_true(rig.note[0].n == rig.item[1].len - 1 && rig.note[0].byte == 1);
-    end_one(2);
+    rig_end(2);
     f.n = 0; /* any number */
     f.at = 0;
-    run_one(100);
+    rig_run(&f, 100);
     for (uint32_t i = 0; i < rig.n_notes; i++)
         assert_in_range(rig.note[i].n, 1, rig.item[i].len - 1);
     assert_int_equal(rig.n_notes, 100);
-    end_one(0);
+    rig_end(0);
     rig_open(&f, 1, 0); /* of one byte nothing can be missing */
     rig_unit(1, 0);
     assert_int_equal(rig.n_notes, 0);
-    end_one(1);
+    rig_end(1);
 }
 
 /* How many bits of an item differ from what went out, which came alone. */
@@ -110,7 +88,7 @@ static void so_many_bits_are_flipped_where_noted(void **state)
         f.n = cases[i].n;
         f.byte = cases[i].byte;
         f.seed = i;
-        run_one(1);
+        rig_run(&f, 1);
         rig_drain();
         assert_int_equal(rig.item[0].len, 68);
         assert_int_equal(count_bits(&rig.item[0]), cases[i].bits);
@@ -118,12 +96,12 @@ static void so_many_bits_are_flipped_where_noted(void **state)
         if (f.byte >= 0) assert_int_equal(rig.note[0].byte, f.byte);
         if (cases[i].bits == 1) assert_int_equal(rig.out[rig.note[0].byte] ^ rig.item[0].bytes[rig.note[0].byte],
                                                  1 << rig.note[0].bit);
-        end_one(0);
+        rig_end(0);
     }
     f.byte = 68; /* a frame that has no such byte is not hit */
-    run_one(1);
+    rig_run(&f, 1);
     assert_int_equal(rig.n_notes, 0);
-    end_one(1);
+    rig_end(1);
 }
 
 static void two_flips_never_make_each_other_right(void **state)
@@ -140,7 +118,7 @@ static void two_flips_never_make_each_other_right(void **state)
     rig_drain();
     assert_true(rig.n_notes == 3 && rig.note[2].n == 2); /* 3 + 3 + 2 of the byte's 8; nothing is left for the fourth */
     assert_int_equal(count_bits(&rig.item[0]), 8);
-    end_one(0);
+    rig_end(0);
 }
 
 /* A resealed flip is in the payload, and no checksum sees it. */
@@ -150,7 +128,7 @@ static void resealed_flips_are_right_by_their_checksums(void **state)
     f = fault_of_kind(FAULT_FLIP);
     f.reseal = 1;
     f.n = 2;
-    run_one(50);
+    rig_run(&f, 50);
     rig_drain();
     static struct native_parser parser;
     size_t room;
@@ -168,29 +146,29 @@ static void resealed_flips_are_right_by_their_checksums(void **state)
         n++;
     }
     assert_true(n == 50 && parser.stats.bad_bytes == 0 && parser.stats.bad_payload == 0);
-    end_one(50);
+    rig_end(50);
     f.byte = NATIVE_HEADER_LEN - 1; /* not the header */
-    run_one(2);
+    rig_run(&f, 2);
     assert_int_equal(rig.n_notes, 0);
-    end_one(2);
+    rig_end(2);
     struct fault both[2] = {fault_of_kind(FAULT_FLIP), f}; /* what is flipped besides stays wrong, in any order */
     both[1].byte = -1;
     rig_open(both, 2, 1);
     for (int i = 0; i < 20; i++)
         rig_frame(RIG_STREAM);
     assert_int_equal(rig.n_notes, 40);
-    end_one(0);
+    rig_end(0);
     both[0] = fault_of_kind(FAULT_TRUNCATE); /* nothing makes a cut frame right */
     rig_open(both, 2, 1);
     for (int i = 0; i < 20; i++)
         rig_frame(RIG_STREAM);
     assert_int_equal(rig.n_notes, 20);
-    end_one(0);
+    rig_end(0);
     both[1].byte = 5;
     rig_open(both + 1, 1, 0); /* units are hit anywhere */
     rig_unit(9, 0);
     assert_int_equal(rig.note[0].byte, 5);
-    end_one(1);
+    rig_end(1);
 }
 
 /* The system of a datagram's reader drops what is damaged on its way, so it is not sent; but what is resealed is. */
@@ -224,7 +202,7 @@ static void garbage_stands_before_the_frame(void **state)
     f = fault_of_kind(FAULT_GARBAGE);
     f.at = 2;
     f.n = 1024;
-    run_one(3);
+    rig_run(&f, 3);
     rig_drain();
     assert_int_equal(rig.n_out, rig.item[0].len + 1024 + rig.item[1].len + rig.item[2].len);
     int counts[256] = {0};
@@ -233,13 +211,13 @@ static void garbage_stands_before_the_frame(void **state)
     assert_int_equal(counts['\r'], 0); /* or it could hold a reply line */
     for (int i = 0; i < 256; i++)
         assert_true(counts[i] < 20); /* 4 each; 20 of one value have a chance of 1e-7 */
-    end_one(3);
+    rig_end(3);
     struct fault two[2] = {fault_of_kind(FAULT_REORDER), f};
     two[0].at = 2;
     rig_open(two, 2, 1); /* it stays where the frame would have been */
     for (int i = 0; i < 4; i++)
         rig_frame(RIG_STREAM);
-    end_one(4);
+    rig_end(4);
 }
 
 static void a_dropped_frame_is_hit_by_nothing_else(void **state)
@@ -264,7 +242,7 @@ static void a_dropped_frame_is_hit_by_nothing_else(void **state)
     for (int i = 0; i < 5; i++)
         assert_int_equal(rig.note[i].kind, in_order[i]);
     assert_int_equal(rig.note[4].number, 3);
-    end_one(1);
+    rig_end(1);
 }
 
 /* Nothing that would have come after it is noted: nobody will see it. */
@@ -330,18 +308,18 @@ static void what_was_begun_without_the_wire_goes_first_as_it_is(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_teardown(dropped_frames_are_missing, close_rig),
-        cmocka_unit_test_teardown(duplicates_follow_at_once, close_rig),
-        cmocka_unit_test_teardown(truncated_frames_lack_their_end, close_rig),
-        cmocka_unit_test_teardown(so_many_bits_are_flipped_where_noted, close_rig),
-        cmocka_unit_test_teardown(two_flips_never_make_each_other_right, close_rig),
-        cmocka_unit_test_teardown(resealed_flips_are_right_by_their_checksums, close_rig),
-        cmocka_unit_test_teardown(a_damaged_datagram_is_not_sent, close_rig),
-        cmocka_unit_test_teardown(garbage_stands_before_the_frame, close_rig),
-        cmocka_unit_test_teardown(a_dropped_frame_is_hit_by_nothing_else, close_rig),
-        cmocka_unit_test_teardown(a_session_that_ends_takes_nothing_more, close_rig),
-        cmocka_unit_test_teardown(what_is_not_written_is_counted, close_rig),
-        cmocka_unit_test_teardown(what_was_begun_without_the_wire_goes_first_as_it_is, close_rig),
+        cmocka_unit_test_teardown(dropped_frames_are_missing, rig_teardown),
+        cmocka_unit_test_teardown(duplicates_follow_at_once, rig_teardown),
+        cmocka_unit_test_teardown(truncated_frames_lack_their_end, rig_teardown),
+        cmocka_unit_test_teardown(so_many_bits_are_flipped_where_noted, rig_teardown),
+        cmocka_unit_test_teardown(two_flips_never_make_each_other_right, rig_teardown),
+        cmocka_unit_test_teardown(resealed_flips_are_right_by_their_checksums, rig_teardown),
+        cmocka_unit_test_teardown(a_damaged_datagram_is_not_sent, rig_teardown),
+        cmocka_unit_test_teardown(garbage_stands_before_the_frame, rig_teardown),
+        cmocka_unit_test_teardown(a_dropped_frame_is_hit_by_nothing_else, rig_teardown),
+        cmocka_unit_test_teardown(a_session_that_ends_takes_nothing_more, rig_teardown),
+        cmocka_unit_test_teardown(what_is_not_written_is_counted, rig_teardown),
+        cmocka_unit_test_teardown(what_was_begun_without_the_wire_goes_first_as_it_is, rig_teardown),
     };
     return cmocka_run_group_tests_name("faults on the wire", tests, NULL, NULL);
 }

@@ -5,13 +5,6 @@
 
 static struct fault f;
 
-static int close_rig(void **state)
-{
-    (void)state;
-    rig_close();
-    return 0;
-}
-
 /* What went out is this text. */
 static void expect_text(const char *text)
 {
@@ -444,18 +437,18 @@ static void mixtures_are_what_their_notes_say(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_teardown(a_reply_that_is_dropped_is_missing, close_rig),
-        cmocka_unit_test_teardown(frames_overtake_a_late_reply_and_replies_do_not, close_rig),
-        cmocka_unit_test_teardown(a_wrong_reply_is_wrong, close_rig),
-        cmocka_unit_test_teardown(an_echo_is_that_of_the_replys_own_line, close_rig),
-        cmocka_unit_test_teardown(more_than_can_be_heard_does_no_harm, close_rig),
+        cmocka_unit_test_teardown(a_reply_that_is_dropped_is_missing, rig_teardown),
+        cmocka_unit_test_teardown(frames_overtake_a_late_reply_and_replies_do_not, rig_teardown),
+        cmocka_unit_test_teardown(a_wrong_reply_is_wrong, rig_teardown),
+        cmocka_unit_test_teardown(an_echo_is_that_of_the_replys_own_line, rig_teardown),
+        cmocka_unit_test_teardown(more_than_can_be_heard_does_no_harm, rig_teardown),
         cmocka_unit_test(each_key_says_when),
-        cmocka_unit_test_teardown(a_fault_counts_from_when_it_was_added, close_rig),
-        cmocka_unit_test_teardown(replies_count_from_after_the_command, close_rig),
-        cmocka_unit_test_teardown(what_is_held_when_its_fault_goes_still_comes, close_rig),
-        cmocka_unit_test_teardown(a_wire_is_full_by_what_only_time_keeps_back, close_rig),
-        cmocka_unit_test_teardown(an_item_longer_than_usual_is_taken, close_rig),
-        cmocka_unit_test_teardown(mixtures_are_what_their_notes_say, close_rig),
+        cmocka_unit_test_teardown(a_fault_counts_from_when_it_was_added, rig_teardown),
+        cmocka_unit_test_teardown(replies_count_from_after_the_command, rig_teardown),
+        cmocka_unit_test_teardown(what_is_held_when_its_fault_goes_still_comes, rig_teardown),
+        cmocka_unit_test_teardown(a_wire_is_full_by_what_only_time_keeps_back, rig_teardown),
+        cmocka_unit_test_teardown(an_item_longer_than_usual_is_taken, rig_teardown),
+        cmocka_unit_test_teardown(mixtures_are_what_their_notes_say, rig_teardown),
     };
     return cmocka_run_group_tests_name("faults on the wire, more", tests, NULL, NULL);
 }

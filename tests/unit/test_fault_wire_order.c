@@ -4,28 +4,6 @@
 
 static struct fault f;
 
-/* One fault, and so many frames of the stream. */
-static void run_one(uint32_t n_frames)
-{
-    rig_open(&f, 1, 1);
-    for (uint32_t i = 0; i < n_frames; i++)
-        rig_frame(RIG_STREAM);
-}
-
-static void end_one(uint32_t whole)
-{
-    rig_drain();
-    assert_int_equal(rig_check_notes(), whole);
-    rig_close();
-}
-
-static int close_rig(void **state)
-{
-    (void)state;
-    rig_close();
-    return 0;
-}
-
 /* It comes after the frame whose number is n higher, in its own counting. */
 static void a_reordered_frame_comes_behind_as_many_as_noted(void **state)
 {
@@ -46,7 +24,7 @@ static void a_reordered_frame_comes_behind_as_many_as_noted(void **state)
         assert_in_range(rig.note[0].n, 1, 3);
         seen[rig.note[0].n]++;
         assert_true(wire_is_empty(rig.wire));
-        end_one(11);
+        rig_end(11);
     }
     assert_true(seen[1] > 0 && seen[2] > 0 && seen[3] > 0);
 }
@@ -56,9 +34,9 @@ static void frames_that_are_all_reordered_all_come(void **state)
     (void)state;
     f = fault_of_kind(FAULT_REORDER);
     f.n = 20;
-    run_one(300);
+    rig_run(&f, 300);
     assert_true(rig_take(0) > 250); /* no one waits for ever: at most those of the last 20 */
-    end_one(300);
+    rig_end(300);
     assert_int_equal(rig.n_notes, 300);
 }
 
@@ -106,7 +84,7 @@ static void a_delayed_frame_is_not_overtaken(void **state)
     rig_frame(RIG_STREAM);
     assert_int_equal(rig_take(0), 1); /* later ones come at once */
     assert_true(rig.n_notes == 1 && rig.note[0].for_ms == 5.0);
-    end_one(4);
+    rig_end(4);
 }
 
 static void jitter_stays_below_its_time_and_in_order(void **state)
@@ -133,7 +111,7 @@ static void jitter_stays_below_its_time_and_in_order(void **state)
         sum_ms += rig.note[i].for_ms;
     }
     assert_true(sum_ms > 0.7 * N && sum_ms < 1.3 * N); /* mean 1 ms; 0.3 are 7 sigma of 2 / sqrt(12 N) */
-    end_one(N);
+    rig_end(N);
 }
 
 static void a_stall_begins_when_all_before_is_out(void **state)
@@ -153,7 +131,7 @@ static void a_stall_begins_when_all_before_is_out(void **state)
     rig_drain();
     assert_true(rig.n_writes == 3 && rig.write[1].at_ns == from_ns + 15 * MS); /* one after the other */
     rig_expect((const int[]){0, 1, 2, -1});
-    end_one(3);
+    rig_end(3);
 }
 
 static void a_split_frame_goes_out_in_so_many_writes(void **state)
@@ -167,14 +145,14 @@ static void a_split_frame_goes_out_in_so_many_writes(void **state)
         f = fault_of_kind(FAULT_SPLIT);
         f.n = cases[i].n;
         f.at = 1;
-        run_one(2);
+        rig_run(&f, 2);
         rig_drain();
         assert_int_equal(rig.n_writes, cases[i].writes + 1);
         for (uint32_t w = 0; w < cases[i].writes; w++)
             assert_in_range(rig.write[w].len, 68 / cases[i].writes, 68 / cases[i].writes + 1);
         assert_int_equal(rig.n_notes, cases[i].noted);
         if (cases[i].noted) assert_int_equal(rig.note[0].n, cases[i].writes);
-        end_one(2);
+        rig_end(2);
     }
 }
 
@@ -194,14 +172,14 @@ static void merged_frames_go_out_in_one_write(void **state)
     assert_int_equal(rig.n_writes, 3);
     assert_int_equal(rig.write[1].len, rig.item[3].len + rig.item[4].len + rig.item[5].len + rig.item[6].len);
     assert_int_equal(rig.n_notes, 3);
-    end_one(9);
+    rig_end(9);
     rig_open(&f, 1, 1); /* a reply does not wait for frames */
     rig_frame(RIG_STREAM);
     rig_reply("OK");
     assert_int_equal(rig_take(0), 2);
     rig_frame(RIG_STREAM);
     assert_int_equal(rig_take(0), 1);
-    end_one(3);
+    rig_end(3);
     struct fault two[2] = {f, fault_of_kind(FAULT_SPLIT)}; /* a frame that is split is in writes of its own */
     two[0].at = 1;
     two[1].at = 2;
@@ -209,7 +187,7 @@ static void merged_frames_go_out_in_one_write(void **state)
     for (int i = 0; i < 3; i++)
         rig_frame(RIG_STREAM);
     assert_int_equal(rig_take(0), 4);
-    end_one(3);
+    rig_end(3);
     rig_open(&f, 1, 1); /* nor does anything wait for frames that don't come */
     rig_frame(RIG_STREAM);
     wire_time(rig.wire, 10 * WIRE_HOLD_MS * MS);
@@ -219,14 +197,14 @@ static void merged_frames_go_out_in_one_write(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_teardown(a_reordered_frame_comes_behind_as_many_as_noted, close_rig),
-        cmocka_unit_test_teardown(frames_that_are_all_reordered_all_come, close_rig),
-        cmocka_unit_test_teardown(a_held_frame_waits_no_longer_than_said, close_rig),
-        cmocka_unit_test_teardown(a_delayed_frame_is_not_overtaken, close_rig),
-        cmocka_unit_test_teardown(jitter_stays_below_its_time_and_in_order, close_rig),
-        cmocka_unit_test_teardown(a_stall_begins_when_all_before_is_out, close_rig),
-        cmocka_unit_test_teardown(a_split_frame_goes_out_in_so_many_writes, close_rig),
-        cmocka_unit_test_teardown(merged_frames_go_out_in_one_write, close_rig),
+        cmocka_unit_test_teardown(a_reordered_frame_comes_behind_as_many_as_noted, rig_teardown),
+        cmocka_unit_test_teardown(frames_that_are_all_reordered_all_come, rig_teardown),
+        cmocka_unit_test_teardown(a_held_frame_waits_no_longer_than_said, rig_teardown),
+        cmocka_unit_test_teardown(a_delayed_frame_is_not_overtaken, rig_teardown),
+        cmocka_unit_test_teardown(jitter_stays_below_its_time_and_in_order, rig_teardown),
+        cmocka_unit_test_teardown(a_stall_begins_when_all_before_is_out, rig_teardown),
+        cmocka_unit_test_teardown(a_split_frame_goes_out_in_so_many_writes, rig_teardown),
+        cmocka_unit_test_teardown(merged_frames_go_out_in_one_write, rig_teardown),
     };
     return cmocka_run_group_tests_name("faults on the wire, order", tests, NULL, NULL);
 }

@@ -110,8 +110,8 @@ static void jumps(void **state)
     assert_true(e.at_ns[5] == 5250000000 && e.tai_s[5] == TAI0_S + 6);
 }
 
-/* What the clock is to show, in exact integers and in one sum: each gain counts for the time that it overlaps with, less
- * that in which the clock stands. Windows in ns; gains in 1e-12. */
+/* What the clock is to show, in exact integers and in one sum: each gain counts for the time that it overlaps with,
+ * less that in which the clock stands. Windows in ns; gains in 1e-12. */
 static const struct {
     int64_t from_ns, until_ns, ppt;
 } GAIN[] = {{0, INT64_MAX, -3000000}, {1234567891, 7777777777, 123456789}, {2000000000, 9100000001, -31000000000}};

@@ -55,7 +55,8 @@ static void cola_times_pass_the_wrap(void **state)
     for (uint32_t line = 0; line < 6; line++) {
         cola_turn(line, 1.0);
         cola_read_lmd(line, &lmd);
-        const int64_t start_us = 1800000 + (int64_t)line * 1000000 / 15, end_us = 1800000 + (int64_t)(line + 1) * 1000000 / 15;
+        const int64_t start_us = 1800000 + (int64_t)line * 1000000 / 15,
+                      end_us = 1800000 + (int64_t)(line + 1) * 1000000 / 15;
         assert_int_equal(lmd.scan_us, (start_us - 2000000 + INT64_C(4294967296)) % INT64_C(4294967296));
         assert_int_equal(lmd.send_us, (end_us - 2000000 + INT64_C(4294967296)) % INT64_C(4294967296));
     }

@@ -27,7 +27,8 @@ static void open_forty(void)
     scip_open_head("UTM-30LX-EW", 1440, 0, 39, 20, -1, 40);
     protocol_rig_describe(&rig, 0);
     for (int i = 0; i < 40; i++)
-        shot[i] = (struct protocol_rig_shot){.n = i % 3 == 2 ? 2 : 1, .range_m = {0.5 + 0.37 * i, 20.0}, .refl_cdb = {-700, -100}};
+        shot[i] = (struct protocol_rig_shot){
+            .n = i % 3 == 2 ? 2 : 1, .range_m = {0.5 + 0.37 * i, 20.0}, .refl_cdb = {-700, -100}};
 }
 
 static void check_scans(const char *request, int chars, int with_intensity, uint32_t n_bits)

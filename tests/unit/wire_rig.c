@@ -292,3 +292,24 @@ uint32_t rig_check_notes(void)
     chunk = NULL;
     return whole;
 }
+
+int rig_teardown(void **state)
+{
+    (void)state;
+    rig_close();
+    return 0;
+}
+
+void rig_run(const struct fault *fault, uint32_t n_frames)
+{
+    rig_open(fault, 1, 1);
+    for (uint32_t i = 0; i < n_frames; i++)
+        rig_frame(RIG_STREAM);
+}
+
+void rig_end(uint32_t whole)
+{
+    rig_drain();
+    assert_int_equal(rig_check_notes(), whole);
+    rig_close();
+}

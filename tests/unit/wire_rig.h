@@ -60,6 +60,11 @@ struct fault fault_of_kind(enum fault_kind kind);
 /* A session of link 1; native, or of a protocol whose units have a byte that is their sum at the end. */
 void rig_open(const struct fault *fault, uint32_t n, int native);
 void rig_close(void);
+/* The same, for a test that failed before it did. */
+int rig_teardown(void **state);
+/* A session with one fault, and so many frames of the stream; and its end: `whole` of them came whole and right. */
+void rig_run(const struct fault *fault, uint32_t n_frames);
+void rig_end(uint32_t whole);
 
 /* Puts one at now_ns; the clock goes on by 1 us. Bytes are random and different each time. */
 enum rig_frame { RIG_STREAM, RIG_POINTS, RIG_NOTICE, RIG_LOCAL };

@@ -4,8 +4,8 @@
 static const double RAD = M_PI / 180.0;
 /* Encoders have 2^20 counts a turn. */
 static const double HALF_COUNT_RAD = M_PI / 1048576.0;
-/* Ranges by what the encoders read: half a count of each of two axes, 3e-6 rad, seen 7 m away at 65 deg at most: 0.1 mm;
- * and half a step of 0.1 mm of the range on the wire. */
+/* Ranges by what the encoders read: half a count of each of two axes, 3e-6 rad, seen 7 m away at 65 deg at most: 0.1
+ * mm; and half a step of 0.1 mm of the range on the wire. */
 static const double RANGE_M = 1.5e-4;
 
 static int is_within(double got, double want, double tolerance)

@@ -234,7 +234,8 @@ static int is_right(const char *line)
     double height_m = HEIGHT_M; /* a TPV of RMC alone has none */
     json_number(line, "altHAE", &height_m);
     return fabs(number(line, "lat") - LAT_DEG) <= ANGLE_TOLERANCE_DEG &&
-           fabs(number(line, "lon") - LON_DEG) <= ANGLE_TOLERANCE_DEG && fabs(height_m - HEIGHT_M) <= HEIGHT_TOLERANCE_M;
+           fabs(number(line, "lon") - LON_DEG) <= ANGLE_TOLERANCE_DEG &&
+           fabs(height_m - HEIGHT_M) <= HEIGHT_TOLERANCE_M;
 }
 
 /* What gpsd says until all faults have struck and a second of right positions has followed. Returns the wrong ones. */
@@ -255,8 +256,8 @@ static uint32_t read_through(struct wire *wire, struct gpsd *gpsd, struct truth_
     return n_wrong;
 }
 
-/* No position comes of a sentence with a wrong checksum. One whose checksum was made right is taken. gpsd speaks after a
- * sentence at most, and a fix has five; those of the next one end the last. */
+/* No position comes of a sentence with a wrong checksum. One whose checksum was made right is taken. gpsd speaks after
+ * a sentence at most, and a fix has five; those of the next one end the last. */
 static void test_gpsd_hurt(void **state)
 {
     struct wire *wire = *state;

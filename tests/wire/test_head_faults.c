@@ -273,8 +273,8 @@ static void test_power_cycle_in_steps(void **state)
     assert_int_equal(state_at(sh, "idle"), 3700000000);
     assert_int_equal(truth_of(wire, "power_cycle", 0, "t_ns"), 2000000000);
     assert_int_equal(truth_of(wire, "power_cycle", 1, "t_ns"), 3500000000);
-    /* The scan began at 330 ms: 50,100 pulses at 30 kHz, 600 a line, which are cut at packets of 16 from each line's start.
-     * What was on its way is lost with the connection. */
+    /* The scan began at 330 ms: 50,100 pulses at 30 kHz, 600 a line, which are cut at packets of 16 from each line's
+     * start. What was on its way is lost with the connection. */
     const uint64_t pulse = (uint64_t)truth_of(wire, "power_cycle", 0, "pulse");
     assert_true(pulse == 83 * 600 + 300 / 16 * 16 && pulse_end <= pulse);
     assert_string_equal(client_ask(sh, "HEAD:PRR?"), "20000");

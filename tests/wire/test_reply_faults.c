@@ -1,5 +1,5 @@
-/* Answers of SCIP and CoLa that go wrong on request: none, another one, a late one, an echo before it. What is counted as
- * an answer, and what as a unit of the stream. */
+/* Answers of SCIP and CoLa that go wrong on request: none, another one, a late one, an echo before it. What is counted
+ * as an answer, and what as a unit of the stream. */
 #include "tests/wire/room.h"
 #include "tests/wire/unit_faults.h"
 
@@ -95,8 +95,8 @@ static void check(struct wire *wire, const char *profile, const char *protocol, 
     check_truth(wire);
 }
 
-/* A scan that was asked for comes after its turn, or 0A after 2 s: it is a unit of the stream, and dropped here. The head
- * has booted before the late answer came. Answers keep their order. (299: milliseconds are rounded down twice.) */
+/* A scan that was asked for comes after its turn, or 0A after 2 s: it is a unit of the stream, and dropped here. The
+ * head has booted before the late answer came. Answers keep their order. (299: milliseconds are rounded down twice.) */
 static void test_scip(void **state)
 {
     static const struct step steps[] = {

@@ -82,7 +82,8 @@ static const char *take(int fd, size_t len)
 static void expect(int fd, const void *bytes, size_t len)
 {
     const char *got = take(fd, len);
-    if (memcmp(got, bytes, len) != 0) fail_msg("\"%.*s\" instead of \"%.*s\"", (int)len, got, (int)len, (const char *)bytes);
+    if (memcmp(got, bytes, len) != 0)
+        fail_msg("\"%.*s\" instead of \"%.*s\"", (int)len, got, (int)len, (const char *)bytes);
 }
 
 /* Two sessions on two links, each of which has asked for a stream. */
@@ -233,9 +234,9 @@ static void test_nmea(void **state)
     static const struct unit_kind kind = {.whole = nmea_whole, .is_sound = nmea_is_sound};
     struct wire *wire = *state;
     struct unit_list got = {0}, clean = {0};
-    struct head head = start(wire, "full-sweep",
-                             "links: [{type: tcp, protocol: nmea, port: 0}, {type: file, protocol: nmea, path: clean}]\n",
-                             FAULTS, NULL);
+    struct head head = start(
+        wire, "full-sweep",
+        "links: [{type: tcp, protocol: nmea, port: 0}, {type: file, protocol: nmea, path: clean}]\n", FAULTS, NULL);
     const int faulty = raw_connect(head_link(&head, 0));
     units_read_both(faulty, &got, -1, NULL, UNITS * 400);
     close(faulty);

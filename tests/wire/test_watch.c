@@ -254,8 +254,8 @@ static void noise_is_expected(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* An observer that the head waits for is not the last to get a processor: with others at work the head would stand still.
- * In real time the head does not wait, and it is the last. Its priority is set before it has seen a scan. */
+/* An observer that the head waits for is not the last to get a processor: with others at work the head would stand
+ * still. In real time the head does not wait, and it is the last. Its priority is set before it has seen a scan. */
 static void who_is_waited_for_is_not_last(void **state)
 {
     struct wire *wire = *state;

@@ -165,7 +165,8 @@ static void pieces_free(struct pieces *pieces)
 }
 
 /* One fault on the unit. Returns 0 when it does not come at all. *merge: units in a write that begins with it. */
-static int apply(const struct truth_note *note, struct piece *unit, uint32_t *copies, uint64_t *merge, struct pieces *out)
+static int apply(const struct truth_note *note, struct piece *unit, uint32_t *copies, uint64_t *merge,
+                 struct pieces *out)
 {
     static uint8_t random[1024];
     const char *k = note->kind;

@@ -1,5 +1,5 @@
-/* Units of a faulty session against those of a clean one: what the session's faults must have made of them, by the truth
- * that the head wrote alone, and whether that is what came. Nothing of the program's faults is used. */
+/* Units of a faulty session against those of a clean one: what the session's faults must have made of them, by the
+ * truth that the head wrote alone, and whether that is what came. Nothing of the program's faults is used. */
 #ifndef TESTS_WIRE_UNIT_FAULTS_H
 #define TESTS_WIRE_UNIT_FAULTS_H
 
@@ -42,15 +42,16 @@ struct truth_note {
 struct truth_note *truth_read(const char *path, int link, uint32_t *n);
 uint32_t truth_count(const struct truth_note *note, uint32_t n, const char *kind);
 
-/* Asserts that `got` is what the truth makes of the clean units: all of it, as far as it goes, at least `least` units. The
- * first unit of `got` has no fault; it shows which of the clean ones was the first of this session. Returns how many
- * there were. */
+/* Asserts that `got` is what the truth makes of the clean units: all of it, as far as it goes, at least `least` units.
+ * The first unit of `got` has no fault; it shows which of the clean ones was the first of this session. Returns how
+ * many there were. */
 uint32_t units_check(const struct unit_kind *kind, const struct unit_list *clean, const struct unit_list *got,
                      const struct truth_note *note, uint32_t n_notes, uint32_t least);
 
 /* The units that the truth makes of the clean ones, for a session that began with these. Faults that make unknown bytes
  * of them, or other units than there are, are none of them: flip, garbage, split, merge. */
-void units_expect(const struct unit_list *clean, const struct truth_note *note, uint32_t n_notes, struct unit_list *out);
+void units_expect(const struct unit_list *clean, const struct truth_note *note, uint32_t n_notes,
+                  struct unit_list *out);
 
 /* Reads both sockets until each has so many bytes: in pace fast each holds the head back. fd1 -1, list1 NULL: one. */
 void units_read_both(int fd0, struct unit_list *list0, int fd1, struct unit_list *list1, size_t least);

@@ -1,8 +1,9 @@
 /* A reader of a link that sends datagrams: it compares each with those of a second link, which has no faults.
  *
  * Both links speak the same protocol and begin at power-up. So datagram n of the clean one is what unit n of the other
- * was before faults met it. A reader of its own has no numbers: it notices what is missing, doubled or late by the times
- * in the packets, and what is cut by their length. Datagrams wait a moment here, so that the clean one is there first. */
+ * was before faults met it. A reader of its own has no numbers: it notices what is missing, doubled or late by the
+ * times in the packets, and what is cut by their length. Datagrams wait a moment here, so that the clean one is there
+ * first. */
 #include <errno.h>
 #include <netinet/in.h>
 #include <poll.h>
@@ -130,7 +131,8 @@ static soak_seq find(const struct soak_link *link, const struct datagram *got)
     struct soak_clean_frame clean;
     const soak_seq next = link->begun ? link->last + 1 : UNITS + 1;
     for (soak_seq i = 0; i < LOOK_BACK; i++) {
-        if (next + i <= d->top && soak_datagrams_get(d, next + i, &clean) && clean.digest == got->digest) return next + i;
+        if (next + i <= d->top && soak_datagrams_get(d, next + i, &clean) && clean.digest == got->digest)
+            return next + i;
         if (i < next - UNITS && soak_datagrams_get(d, next - i, &clean) && clean.digest == got->digest) return next - i;
     }
     return 0;

@@ -61,7 +61,8 @@ void soak_heard_head(struct soak_link *link, const struct fault_note *note)
         return;
     }
     for (uint32_t i = 0; i < link->n_moments; i++)
-        if (link->moment[i].fault == note->fault && link->moment[i].to_ns == INT64_MAX) link->moment[i].to_ns = note->t_ns;
+        if (link->moment[i].fault == note->fault && link->moment[i].to_ns == INT64_MAX)
+            link->moment[i].to_ns = note->t_ns;
 }
 
 /* ---- what the client saw */

@@ -1,7 +1,7 @@
 /* What was done to the frames of a link, as the head says, and what its client saw of them.
  *
- * The head says it in the thread of the link, before the client can see it. Frames are told apart by their numbers, which
- * are the same on all links. */
+ * The head says it in the thread of the link, before the client can see it. Frames are told apart by their numbers,
+ * which are the same on all links. */
 #include <string.h>
 
 #include "firmware_sim/app/soak/soak.h"

@@ -42,7 +42,8 @@ static void fail(struct soak *soak, int is_wrong, const char *why)
 static int has_open_rows(const struct soak_row rows[SOAK_N_ROWS])
 {
     for (int row = 0; row < SOAK_N_ROWS; row++)
-        if (rows[row].injected != rows[row].noticed + rows[row].hidden + rows[row].missed + rows[row].accepted) return 1;
+        if (rows[row].injected != rows[row].noticed + rows[row].hidden + rows[row].missed + rows[row].accepted)
+            return 1;
     return 0;
 }
 
@@ -133,11 +134,12 @@ void soak_print(const struct soak *soak, FILE *out)
     fprintf(out, "%-22s %-16s %8s %8s %8s %8s\n", "link", "fault", "injected", "noticed", "lost", "accepted");
     for (uint32_t i = 0; i < soak->n_links; i++)
         print_link(&soak->link[i], out);
-    fprintf(out, "%-22s %-16s %8" PRIu64 " %8" PRIu64 " %8" PRIu64 " %8" PRIu64 "  %" PRIu64 " not to be noticed, %" PRIu64
+    fprintf(out,
+            "%-22s %-16s %8" PRIu64 " %8" PRIu64 " %8" PRIu64 " %8" PRIu64 "  %" PRIu64 " not to be noticed, %" PRIu64
             " not noticed\n",
             "all", "", sum.injected, sum.noticed, sum.lost, sum.accepted, sum.hidden, sum.missed);
     if (soak->n_failures == 0)
-        fprintf(out, "verdict: good; %" PRIu64 " frames were wrongly accepted, all of them resealed flips\n",
+        fprintf(out, "verdict: good; frames wrongly accepted: %" PRIu64 ", none but resealed flips\n",
                 sum.accepted);
     for (uint32_t i = 0; i < soak->n_failures; i++)
         fprintf(out, "verdict: bad: %s\n", soak->failures[i]);

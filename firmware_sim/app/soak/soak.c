@@ -248,8 +248,8 @@ static const char NOTES[] =
     "it at its place, frames that the client lost by it, and frames that it accepted although they differ from the\n"
     "clean ones. A fault that no client can notice has a -, and why.\n"
     "\n"
-    "Exit status 0: each fault that can be noticed was. Nothing was lost or wrongly accepted but by faults, of\n"
-    "which the latter are resealed flips. The head is healthy. Else 1.\n";
+    "Exit status 0: each fault that can be noticed was; frames were lost by faults alone; those that were wrongly\n"
+    "accepted are resealed flips; the head is healthy. 1: one of these does not hold.\n";
 
 const struct app_command app_soak = {
     .name = "soak",

@@ -199,8 +199,8 @@ static int next_frame(const struct watch *w, struct scanhead_frame *frame)
     return scanhead_next(w->sh, frame, NEXT_MS);
 }
 
-/* For the processor: of this thread alone; where it fails it is as others are. An observer that the head waits for stays
- * as the head is: on a busy machine the whole head would be as slow as it. */
+/* For the processor: of this thread alone; where it fails it is as others are. An observer that the head waits for
+ * stays as the head is: on a busy machine the whole head would be as slow as it. */
 static void be_last(void)
 {
     setpriority(PRIO_PROCESS, (id_t)gettid(), LOWEST);
