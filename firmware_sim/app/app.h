@@ -26,6 +26,14 @@ int app_fail(const struct sh_err *err);
 int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, void *ctx, struct sh_err *err),
                     void *ctx);
 
+/* A file that a command writes, by the option that names it; path NULL: it was not given. */
+struct app_output {
+    const char *option, *path;
+};
+
+/* Before any is opened: each is another file, and none is the configuration or the scenario. */
+int app_check_outputs(const struct app_input *in, const struct app_output *out, int n, struct sh_err *err);
+
 /* Warnings and progress to standard error, each line with the program's name. Asks to stop once
  * interrupted. */
 extern const struct sh_report app_report_stderr;

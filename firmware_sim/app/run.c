@@ -232,7 +232,9 @@ static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
     o->device.report = &app_report_stderr;
     o->device.start |= cfg->head.start;
     o->device.one_scan = o->device.one_scan && o->device.start;
-    int rc = o->view ? add_view(cfg, err) : SH_OK;
+    const struct app_output out[] = {{"stats", o->stats}, {"journal", o->device.journal}, {"truth", o->device.truth}};
+    int rc = app_check_outputs(&o->in, out, (int)(sizeof out / sizeof *out), err);
+    if (rc == SH_OK && o->view) rc = add_view(cfg, err);
     if (rc != SH_OK) return rc;
     if (cfg->n_links == 0)
         return sh_fail(err, SH_EINPUT,

@@ -118,6 +118,7 @@ void device_plan_ahead(struct device *device)
     struct command_device scratch = device->cmd; /* for reading lines */
     scratch.state = HEAD_IDLE;
     scratch.can_plan = NULL;
+    scratch.faults = NULL; /* they are added at their times */
     int n = 0;
     for (size_t i = 0; i < journal->n_replay && n < MAX_AHEAD; i++) {
         struct command_result result;

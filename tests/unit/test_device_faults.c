@@ -243,15 +243,17 @@ static void drifts_until_it_is_cleared(void **state)
     rig_close(rig);
 }
 
-/* A journal has the command, and replaying it does the same at the same tick. */
+/* A journal has the command, and replaying it does the same at the same tick. In real time a journal is looked through
+ * before it is replayed. */
 static void is_replayed(void **state)
 {
     (void)state;
+    static const char *const realtime[] = {"loop.pace=realtime"};
     uint64_t off_tick = 0;
-    for (int replays = 0; replays < 2; replays++) {
+    for (int replays = 0; replays < 3; replays++) {
         struct device_options options = {.journal = replays ? NULL : journal_path,
                                          .replay = replays ? journal_path : NULL};
-        struct rig *rig = rig_open(&options, NULL, 0);
+        struct rig *rig = rig_open(&options, realtime, replays == 2);
         rig_go_to(rig, 777);
         if (!replays) rig_tell(rig, "FAULt:ADD {kind: power_cycle, from_s: 0.2, for_ms: 3}", 770);
         while (rig->work.power != DEVICE_POWER_GOES)
@@ -259,6 +261,7 @@ static void is_replayed(void **state)
         if (!replays) off_tick = rig->work.tick;
         assert_int_equal(off_tick, 977);
         assert_int_equal(rig->work.tick, off_tick);
+        assert_int_equal(fault_board_injected(device_faults(rig->device), 0), 1);
         rig_close(rig);
     }
 }

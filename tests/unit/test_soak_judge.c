@@ -274,6 +274,28 @@ static void test_connections(void **state)
     end(soak);
 }
 
+/* A boot that nobody saw is a miss in real time alone: else it may be over before a client is there. */
+static void test_boots(void **state)
+{
+    (void)state;
+    const struct fault_note note = {.kind = FAULT_SLOW_BOOT, .fault = 1, .for_ms = 700.0};
+    for (int realtime = 0; realtime < 2; realtime++)
+        for (int seen = 0; seen < 2; seen++) {
+            struct soak *soak = make();
+            struct soak_link *link = &soak->link[0];
+            soak->realtime = realtime;
+            soak_heard_head(link, &note);
+            if (seen) soak_saw_state(link, "boot");
+            soak_judge_head(link);
+            const struct soak_row *row = &link->row[FAULT_SLOW_BOOT];
+            assert_int_equal(row->injected, 1);
+            assert_int_equal(row->noticed, seen);
+            assert_int_equal(row->missed, !seen && realtime);
+            assert_int_equal(row->hidden, !seen && !realtime);
+            end(soak);
+        }
+}
+
 /* The numbers on the wire wrap; those of the ledger go on. */
 static void test_numbers_wrap(void **state)
 {
@@ -291,6 +313,7 @@ int main(void)
         cmocka_unit_test(test_a_clean_stream_is_good), cmocka_unit_test(test_a_drop),
         cmocka_unit_test(test_a_resealed_flip),        cmocka_unit_test(test_duplicates_and_late_frames),
         cmocka_unit_test(test_bytes),                  cmocka_unit_test(test_connections),
+        cmocka_unit_test(test_boots),
         cmocka_unit_test(test_numbers_wrap),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

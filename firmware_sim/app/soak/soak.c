@@ -196,6 +196,9 @@ static int soak_head(struct config *cfg, void *ctx, struct sh_err *err)
         return sh_fail(err, SH_EINPUT, "loop.pace: step, where nobody grants time; allowed realtime and fast");
     if (o->link > (long)cfg->n_links)
         return sh_fail(err, SH_EINPUT, "--link %ld: there is no such link; allowed 1 to %u", o->link, cfg->n_links);
+    const struct app_output out[] = {{"json", o->json}, {"truth", o->device.truth}};
+    int rc = app_check_outputs(&o->in, out, (int)(sizeof out / sizeof *out), err);
+    if (rc != SH_OK) return rc;
     struct soak *soak = calloc(1, sizeof *soak);
     if (soak == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     be_patient(cfg);
@@ -203,7 +206,7 @@ static int soak_head(struct config *cfg, void *ctx, struct sh_err *err)
     soak->realtime = cfg->loop.pace == PACE_REALTIME;
     soak->faults = cfg->faults;
     open_twins(cfg, soak, o);
-    int rc = open_head(o, cfg, soak, &head, err);
+    rc = open_head(o, cfg, soak, &head, err);
     if (rc == SH_OK) rc = serve(o, soak, &head, err);
     if (rc == SH_OK) rc = say_result(o, soak, err);
     loop_free(head.loop);
