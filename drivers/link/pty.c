@@ -24,6 +24,7 @@
  *     the next hang-up sets it right.
  *   - Nothing is written while an open event is unread: it would be of the old session, for the new client. */
 #include <errno.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -34,6 +35,7 @@
 #include "drivers/link/pty_device.h"
 
 struct pty_link {
+    pthread_mutex_t naming;   /* for a new device: pty_endpoint is called from other threads */
     struct pty_device device;
     int unplugged; /* there is no pair, and no symlink */
     int inotify, watch;
@@ -70,6 +72,7 @@ static int pty_open(const struct link_spec *spec, void **link, struct sh_err *er
         free(pty);
         return rc;
     }
+    pthread_mutex_init(&pty->naming, NULL);
     *link = pty;
     return SH_OK;
 }
@@ -77,7 +80,17 @@ static int pty_open(const struct link_spec *spec, void **link, struct sh_err *er
 static void pty_endpoint(const void *link, char *buf, size_t len)
 {
     const struct pty_link *pty = link;
+    pthread_mutex_t *naming = (pthread_mutex_t *)&pty->naming;
+    pthread_mutex_lock(naming);
     snprintf(buf, len, "tty:%s", pty->device.path[0] != '\0' ? pty->device.path : pty->device.slave);
+    pthread_mutex_unlock(naming);
+}
+
+static void pty_set_device(struct pty_link *pty, const struct pty_device *fresh)
+{
+    pthread_mutex_lock(&pty->naming);
+    pty->device = *fresh;
+    pthread_mutex_unlock(&pty->naming);
 }
 
 static void pty_begin(struct pty_link *pty, unsigned count)
@@ -149,7 +162,9 @@ static int pty_end(struct pty_link *pty)
     pty->due_closed = 1;
     inotify_rm_watch(pty->inotify, pty->watch);
     pty_read_inotify(pty, 0);
-    int rc = pty_device_rest(&pty->device);
+    struct pty_device device = pty->device;
+    int rc = pty_device_rest(&device);
+    pty_set_device(pty, &device);
     return rc == SH_OK ? pty_wait_for_client(pty) : rc;
 }
 
@@ -234,7 +249,9 @@ static int pty_cut(struct pty_link *pty)
 {
     if (!pty->open) return SH_ESTATE;
     pty_let_go(pty);
-    const int renewed = pty_device_renew(&pty->device) == SH_OK;
+    struct pty_device device = pty->device;
+    const int renewed = pty_device_renew(&device) == SH_OK;
+    pty_set_device(pty, &device);
     return pty_wait_for_client(pty) == SH_OK && renewed ? SH_OK : SH_ESTATE;
 }
 
@@ -253,7 +270,7 @@ static int pty_plug(struct pty_link *pty)
     struct sh_err err;
     if (!pty->unplugged) return SH_OK;
     if (pty_device_open(&fresh, pty->device.path, &err) != SH_OK) return SH_ESTATE;
-    pty->device = fresh;
+    pty_set_device(pty, &fresh);
     pty->unplugged = 0;
     return pty_wait_for_client(pty) == SH_OK ? SH_OK : SH_ESTATE;
 }
@@ -279,6 +296,7 @@ static void pty_close(void *link)
     struct pty_link *pty = link;
     close(pty->inotify);
     if (!pty->unplugged) pty_device_close(&pty->device);
+    pthread_mutex_destroy(&pty->naming);
     free(pty);
 }
 

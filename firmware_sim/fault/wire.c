@@ -332,6 +332,12 @@ int wire_is_empty(const struct wire *wire)
     return wire->queue.first == NULL && wire->queue.held == NULL;
 }
 
+int wire_stalls(const struct wire *wire)
+{
+    const struct wire_piece *first = wire->queue.first;
+    return first != NULL && first->kind == WIRE_PAUSE;
+}
+
 void wire_count_unwritten(const struct wire *wire, uint64_t *frames, uint64_t *pulses)
 {
     *frames = wire->void_frames;

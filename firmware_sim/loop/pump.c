@@ -9,7 +9,8 @@
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/loop/pump_inside.h"
 
-static const int64_t DRAIN_NS = 2000000000; /* at the end a reader may take this long between two bytes */
+/* At the end a reader may take this long between two bytes, and all stalls on request together. */
+static const int64_t DRAIN_NS = 2000000000;
 
 int pump_open(struct links *links, uint32_t index, const struct link_spec *spec, struct pump **out, struct sh_err *err)
 {
@@ -154,11 +155,14 @@ static int take_events(struct pump *pump, uint32_t want_write, int timeout_ms)
 static int has_more(struct pump *pump)
 {
     uint64_t released = stream_released(pump->stream);
+    const int64_t now_ns = clock_now_ns();
+    if (pump->over_ns == 0) pump->over_ns = now_ns;
     for (int i = 0; i < LINK_MAX_SESSIONS; i++) {
         struct session *s = &pump->session[i];
         int pending = s->open && (s->out_pos < s->out_len || s->cursor < released || s->commands.reply_len != 0 ||
                                   s->commands.moving || s->units.n != 0 || session_wire_waits(s));
-        if (pending && clock_now_ns() - s->moved_ns < DRAIN_NS) return 1;
+        const int in_time = now_ns - pump->over_ns < DRAIN_NS || !session_wire_stalls(s);
+        if (pending && in_time && now_ns - s->moved_ns < DRAIN_NS) return 1;
     }
     return 0;
 }

@@ -77,6 +77,11 @@ int session_wire_waits(const struct session *s)
     return s->wire != NULL && !wire_is_empty(s->wire);
 }
 
+int session_wire_stalls(const struct session *s)
+{
+    return s->wire != NULL && wire_stalls(s->wire);
+}
+
 static void put(struct pump *pump, struct session *s, int of, const uint8_t *bytes, size_t len, uint64_t tick)
 {
     const struct wire_item item = {

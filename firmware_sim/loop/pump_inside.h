@@ -95,6 +95,7 @@ struct pump {
     struct session session[LINK_MAX_SESSIONS];
     pthread_t thread;
     int running;
+    int64_t over_ns; /* clock: when it was first seen that the run is over; 0: it is not */
     int failed; /* a write failed; the reason is still to come */
 };
 
@@ -119,6 +120,7 @@ void session_fill(struct pump *pump, struct session *s);
 int session_has_wire(struct pump *pump, struct session *s);
 void session_close_wire(struct session *s);
 int session_wire_waits(const struct session *s);
+int session_wire_stalls(const struct session *s);
 /* As session_write, by its wire. */
 int session_write_faulty(struct pump *pump, struct session *s, int index);
 /* Writes what lies in the wire: 1: the link is full; 0: nothing may go out now; -1: the session is closed. last:

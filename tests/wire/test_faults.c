@@ -394,7 +394,8 @@ static void test_a_stall_makes_a_slow_reader(void **state)
     assert_int_equal(stats_uint(wire, "pulses"), pulses + told);
 }
 
-/* What would come within two seconds is not cut; what would come later is, and counts as left out. */
+/* What would come within two seconds is not cut; what would come later is, and counts as left out: also where one
+ * stall after the other ends in time. */
 static void test_the_end_waits_for_what_is_on_its_way(void **state)
 {
     static const struct {
@@ -402,9 +403,10 @@ static void test_the_end_waits_for_what_is_on_its_way(void **state)
         int all;
     } cases[] = {{"faults: [{kind: delay, from: 50, for_ms: 400}, {kind: reorder, from: 100, every: 20, n: 1000}, "
                   "{kind: merge, from: 150, n: 64}]\n", 1},
-                 {"faults: [{kind: stall, at: 100, for_ms: 1e8}]\n", 0}};
+                 {"faults: [{kind: stall, at: 100, for_ms: 1e8}]\n", 0},
+                 {"faults: [{kind: stall, from: 100, for_ms: 700}]\n", 0}};
     struct wire *wire = *state;
-    for (int i = 0; i < 2; i++) {
+    for (int i = 0; i < 3; i++) {
         const char *const more[] = {"--start", "--duration", "0.3", NULL};
         struct room_config c = SMALL;
         c.links = "links: [{type: file, path: out.bin}]\n";
