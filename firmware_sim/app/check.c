@@ -122,8 +122,8 @@ static int check(struct config *cfg, void *ctx, struct sh_err *err)
 
 static int run(int argc, char **argv)
 {
-    struct app_input in;
-    int status = app_parse(&app_check, argc, argv, &in, NULL);
+    struct app_input in = {0};
+    int status = app_parse(&app_check, argc, argv, &in, &in);
     return status == APP_GO_ON ? app_with_config(&in, check, NULL) : status;
 }
 
@@ -144,6 +144,8 @@ static int print_section(const char *section)
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
     OPTION_SET,
+    {APP_TEXT, "scenario", "FILE", .at = offsetof(struct app_input, scenario),
+     .help = "with the faults of this file; a bare name is one of config/faults"},
     {APP_PRINT, "example", NULL, .apply = print_example,
      .help = "print a configuration with all keys, each with its help and its default, that passes this check"},
     OPTION_END
