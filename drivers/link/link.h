@@ -3,7 +3,7 @@
  * A kind of link is one file of this folder with one `const struct link_ops`, whose members are the contract;
  * null.c is the skeleton for a new one, link.c has the list. A link has sessions: readers and commanders that
  * come and go. A pty or a file has one, TCP several, USB two (console and stream) or one. One thread owns a link and
- * makes all calls on it. Only poll() waits; write() of `file` may wait for the disk. */
+ * makes all calls on it but endpoint(). Only poll() waits; write() of `file` may wait for the disk. */
 #ifndef DRIVERS_LINK_LINK_H
 #define DRIVERS_LINK_LINK_H
 
@@ -89,7 +89,8 @@ struct link_ops {
     /* Opens as spec says. When it fails, nothing of it stays. The text of err names the endpoint. */
     int (*open)(const struct link_spec *spec, void **link, struct sh_err *err);
 
-    /* The endpoint as a client would name it: "tty:/dev/pts/3", "tcp:127.0.0.1:40123", "file:/x/y". */
+    /* The endpoint as a client would name it: "tty:/dev/pts/3", "tcp:127.0.0.1:40123", "file:/x/y". From any thread,
+     * while the link's own makes other calls. */
     void (*endpoint)(const void *link, char *buf, size_t len);
 
     /* Largest number of bytes per second this link can carry. NULL where there is no fixed limit. */

@@ -332,10 +332,11 @@ int wire_is_empty(const struct wire *wire)
     return wire->queue.first == NULL && wire->queue.held == NULL;
 }
 
-int wire_stalls(const struct wire *wire)
+int wire_keeps_back(const struct wire *wire, int64_t now_ns)
 {
     const struct wire_piece *first = wire->queue.first;
-    return first != NULL && first->kind == WIRE_PAUSE;
+    const int stalls = first != NULL && first->kind == WIRE_PAUSE;
+    return stalls || (!wire_is_empty(wire) && wire_next_ns(wire) > now_ns);
 }
 
 void wire_count_unwritten(const struct wire *wire, uint64_t *frames, uint64_t *pulses)

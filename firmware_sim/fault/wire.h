@@ -78,8 +78,8 @@ void wire_pop(struct wire *wire);
  * waits for frames to come does not count. */
 int wire_is_full(const struct wire *wire, size_t cap, int64_t now_ns);
 int wire_is_empty(const struct wire *wire);
-/* Whether a stall is on, or is the next. */
-int wire_stalls(const struct wire *wire);
+/* Whether a fault keeps the next piece back: a stall that is on or begins now, or a time that is still to come. */
+int wire_keeps_back(const struct wire *wire, int64_t now_ns);
 /* What was put and not written as a whole: frames of the stream (not made for this reader alone) or units, and pulses
  * in them. What a fault dropped counts as written; what comes after an act that ends the session does not. */
 void wire_count_unwritten(const struct wire *wire, uint64_t *frames, uint64_t *pulses);

@@ -9,7 +9,7 @@
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/loop/pump_inside.h"
 
-/* At the end a reader may take this long between two bytes, and all stalls on request together. */
+/* At the end a reader may take this long between two bytes, and what faults keep back may take this long in all. */
 static const int64_t DRAIN_NS = 2000000000;
 
 int pump_open(struct links *links, uint32_t index, const struct link_spec *spec, struct pump **out, struct sh_err *err)
@@ -161,7 +161,7 @@ static int has_more(struct pump *pump)
         struct session *s = &pump->session[i];
         int pending = s->open && (s->out_pos < s->out_len || s->cursor < released || s->commands.reply_len != 0 ||
                                   s->commands.moving || s->units.n != 0 || session_wire_waits(s));
-        const int in_time = now_ns - pump->over_ns < DRAIN_NS || !session_wire_stalls(s);
+        const int in_time = now_ns - pump->over_ns < DRAIN_NS || !session_wire_keeps_back(s, now_ns);
         if (pending && in_time && now_ns - s->moved_ns < DRAIN_NS) return 1;
     }
     return 0;

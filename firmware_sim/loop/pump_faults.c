@@ -77,9 +77,9 @@ int session_wire_waits(const struct session *s)
     return s->wire != NULL && !wire_is_empty(s->wire);
 }
 
-int session_wire_stalls(const struct session *s)
+int session_wire_keeps_back(const struct session *s, int64_t now_ns)
 {
-    return s->wire != NULL && wire_stalls(s->wire);
+    return s->wire != NULL && wire_keeps_back(s->wire, now_ns);
 }
 
 static void put(struct pump *pump, struct session *s, int of, const uint8_t *bytes, size_t len, uint64_t tick)

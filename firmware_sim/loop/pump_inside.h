@@ -120,7 +120,8 @@ void session_fill(struct pump *pump, struct session *s);
 int session_has_wire(struct pump *pump, struct session *s);
 void session_close_wire(struct session *s);
 int session_wire_waits(const struct session *s);
-int session_wire_stalls(const struct session *s);
+/* Whether a fault keeps back what lies in it. */
+int session_wire_keeps_back(const struct session *s, int64_t now_ns);
 /* As session_write, by its wire. */
 int session_write_faulty(struct pump *pump, struct session *s, int index);
 /* Writes what lies in the wire: 1: the link is full; 0: nothing may go out now; -1: the session is closed. last:

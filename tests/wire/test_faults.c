@@ -430,6 +430,31 @@ static void test_the_end_waits_for_what_is_on_its_way(void **state)
     }
 }
 
+/* Of a client that goes on asking, whose replies are late, there is always one on its way. */
+static void test_late_replies_do_not_keep_a_head(void **state)
+{
+    struct wire *wire = *state;
+    struct room_config c = SMALL;
+    c.links = LINK_YAML_TCP;
+    struct head head = start(wire, &c, "faults: [{kind: late_reply, for_ms: 300}]\n", NULL);
+    int fd = raw_connect(head_endpoint(&head, "tcp")), told[2];
+    assert_int_equal(pipe2(told, O_CLOEXEC), 0);
+    pid_t pid = wire_fork(wire);
+    if (pid == 0) {
+        char sink[4096];
+        struct pollfd slot = {.fd = fd, .events = POLLIN};
+        while (write(fd, "*OPC?\n", 6) == 6)
+            if (poll(&slot, 1, 50) > 0 && read(fd, sink, sizeof sink) > 0 && write(told[1], "r", 1) != 1) break;
+        _exit(0);
+    }
+    close(fd);
+    close(told[1]);
+    char byte;
+    assert_int_equal(read(told[0], &byte, 1), 1);
+    head_end(&head, SIGTERM);
+    close(told[0]);
+}
+
 /* ---- a journal */
 
 static void test_a_journal_brings_faults_back(void **state)
@@ -473,6 +498,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_the_same_truth, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_a_client_reports_what_was_injected, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_replies_that_go_wrong, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_late_replies_do_not_keep_a_head, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_a_stall_makes_a_slow_reader, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_the_end_waits_for_what_is_on_its_way, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_a_journal_brings_faults_back, wire_setup, wire_teardown),
