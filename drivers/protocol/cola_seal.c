@@ -4,6 +4,8 @@
 #include "drivers/protocol/cola.h"
 
 enum { B_HEAD = 8, CHANNEL_NAME = 5 };
+static const char SCAN[] = "LMDscandata ";
+enum { SCAN_LEN = sizeof SCAN - 1 };
 
 /* ---- CoLa-B: places of the values, by the widths of what stands before them */
 
@@ -30,7 +32,7 @@ static size_t mark_channels(const uint8_t *unit, size_t len, size_t at, size_t w
 
 static void mark_b(const uint8_t *unit, size_t len, uint8_t *mask)
 {
-    if (len < AT_ENCODERS || memcmp(unit + AT_NAME, "LMDscandata ", 12) != 0) return;
+    if (len < AT_ENCODERS || memcmp(unit + AT_NAME, SCAN, SCAN_LEN) != 0) return;
     size_t at = AT_ENCODERS + 2 + ENCODER_LEN * get16(unit, len, AT_ENCODERS);
     at = mark_channels(unit, len, at, 2, mask);
     mark_channels(unit, len, at, 1, mask);
@@ -75,8 +77,9 @@ static int is_channel(const uint8_t *text)
 
 static void mark_a(const uint8_t *unit, size_t len, uint8_t *mask)
 {
+    enum { NAME_AT = 5 }; /* after STX, "sSN" or "sRA", and a blank */
     struct word word = {.at = 0};
-    if (len < 16 || memcmp(unit + 5, "LMDscandata ", 12) != 0) return;
+    if (len < NAME_AT + SCAN_LEN || memcmp(unit + NAME_AT, SCAN, SCAN_LEN) != 0) return;
     while (next_word(unit, len, &word)) {
         if (word.len != CHANNEL_NAME || !is_channel(unit + word.at)) continue;
         for (int i = 0; i < WORDS_TO_COUNT && next_word(unit, len, &word); i++)
