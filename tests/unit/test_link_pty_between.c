@@ -76,15 +76,21 @@ static void expect_served(int fd)
     assert_true(is_calm(&bench, 1));
 }
 
+/* A client leaves; while nobody watches the terminal, another one does that. */
+static void begin_with(void (*next)(void))
+{
+    begin();
+    leave();
+    when_unwatched = next;
+    bench_expect(&bench, LINK_CLOSED, 0);
+    bench_expect(&bench, LINK_OPENED, 0);
+}
+
 /* A client that wrote and left meanwhile is heard, and the one after it is not taken for it. */
 static void test_written_and_gone_unwatched(void **state)
 {
     (void)state;
-    begin();
-    leave();
-    when_unwatched = write_and_leave;
-    bench_expect(&bench, LINK_CLOSED, 0);
-    bench_expect(&bench, LINK_OPENED, 0);
+    begin_with(write_and_leave);
     assert_int_equal(read_to_end(&bench), 5);
     bench.n_queue = 0;
     expect_served(client_open(&bench));
@@ -95,11 +101,7 @@ static void test_written_and_gone_unwatched(void **state)
 static void test_next_after_written_and_gone(void **state)
 {
     (void)state;
-    begin();
-    leave();
-    when_unwatched = write_and_leave;
-    bench_expect(&bench, LINK_CLOSED, 0);
-    bench_expect(&bench, LINK_OPENED, 0);
+    begin_with(write_and_leave);
     int fd = client_open(&bench);
     char text[8];
     bench_expect(&bench, LINK_CLOSED, 0);
@@ -115,11 +117,7 @@ static void test_next_after_written_and_gone(void **state)
 static void test_came_unwatched_left_between_looks(void **state)
 {
     (void)state;
-    begin();
-    leave();
-    when_unwatched = come;
-    bench_expect(&bench, LINK_CLOSED, 0);
-    bench_expect(&bench, LINK_OPENED, 0);
+    begin_with(come);
     between_looks = leave;
     bench_expect(&bench, LINK_CLOSED, 0);
     assert_null(between_looks);

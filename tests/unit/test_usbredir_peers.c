@@ -294,19 +294,6 @@ int main(void)
 
 #else
 
-#include "tests/unit/link_test.h"
-
-static void test_missing(void **state)
-{
-    (void)state;
-    print_message("# needs libusbredirparser-dev\n");
-    skip();
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_missing)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+#include "tests/unit/usbredir_missing.h"
 
 #endif
