@@ -6,6 +6,7 @@
 
 enum { REPLY_MS = 1000, REPLY_LEN = SOAK_REPLY_LEN };
 static const double MARGIN_MS = 5.0;
+static const int64_t AFTER_END_NS = 1000000000;
 /* The library comes into step with questions of its own; one that has no answer it asks again after a second. */
 static const double ASKED_AGAIN_MS = 900.0;
 
@@ -45,6 +46,7 @@ static int is_version(const char *text)
 struct answer {
     int rc, is_right;
     int is_same; /* as the reply before */
+    int is_after_end; /* it was asked just after a session ended */
     double ms;
 };
 
@@ -78,7 +80,8 @@ static void judge_note(struct soak_link *link, const struct fault_note *note, co
         row->missed++;
 }
 
-/* What is odd has no fault that would explain it. A reply that comes next to hurt bytes is lost with them. */
+/* What is odd has no fault that would explain it. A reply that comes next to hurt bytes is lost with them, and one to a
+ * question that goes out while the connection is being made again may be lost with the one before. */
 static void judge(struct soak_link *link, const struct answer *a)
 {
     struct soak_ask *ask = &link->ask;
@@ -89,8 +92,9 @@ static void judge(struct soak_link *link, const struct answer *a)
         judge_note(link, &ask->note[i], a);
     if (ask->bad_bytes != 0) link->expected_bad_max += REPLY_LEN;
     if (ask->n == 0 && (a->rc == SCANHEAD_ETIMEOUT || (a->rc == SCANHEAD_OK && !a->is_right))) {
-        ask->hurt += ask->others != 0;
-        ask->odd += ask->others == 0;
+        const int is_hurt = ask->others != 0 || a->is_after_end;
+        ask->hurt += (uint64_t)is_hurt;
+        ask->odd += (uint64_t)!is_hurt;
     }
 }
 
@@ -103,8 +107,9 @@ static int put(struct soak_link *link, const char *command, int (*is_right)(cons
     ask->n = ask->echoes = 0;
     ask->others = ask->bad_bytes = 0;
     ask->asked++;
-    pthread_mutex_unlock(&link->lock);
     const int64_t from_ns = clock_now_ns();
+    a.is_after_end = ask->ended_ns != 0 && from_ns - ask->ended_ns < AFTER_END_NS;
+    pthread_mutex_unlock(&link->lock);
     a.rc = scanhead_command(link->sh, command, reply, REPLY_LEN, REPLY_MS);
     a.ms = 1e-6 * (double)(clock_now_ns() - from_ns);
     a.is_right = a.rc == SCANHEAD_OK && is_right(reply);

@@ -359,6 +359,7 @@ static void end_by_refusal(struct soak_link *link)
 void soak_saw_no_open(struct soak_link *link)
 {
     pthread_mutex_lock(&link->lock);
+    link->ask.ended_ns = clock_now_ns();
     if (link->n_refusals != 0)
         end_by_refusal(link);
     else
@@ -371,6 +372,7 @@ void soak_saw_end(struct soak_link *link)
     pthread_mutex_lock(&link->lock);
     const int was_refused = !link->in_session;
     link->in_session = 0;
+    link->ask.ended_ns = clock_now_ns();
     link->closings++;
     /* It is said some ticks before power goes. The client may be far behind then, the clean reader is not. */
     const int64_t act_ns = link->n_acts != 0 ? link->act[0].t_ns : INT64_MAX;
