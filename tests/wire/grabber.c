@@ -81,7 +81,8 @@ void grabber_start_and_wait(struct wire *wire, const char *name, const char *sen
         snprintf(numbered, sizeof numbered, "%s%d", name, i);
         grabber_start(wire, numbered, sensor, grabber);
         if (grabber_wait(grabber, wanted)) return;
-        print_message("rawlog-grabber complains:\n%s\n", grabber->said);
+        printf("rawlog-grabber complains:\n%s\n", grabber->said); /* print_message cuts it, and its last newline */
+        fflush(stdout);
         grabber_end(grabber);
     }
     fail_msg("rawlog-grabber complains five times");

@@ -162,7 +162,7 @@ int wire_wait(struct wire *wire, pid_t pid)
 void wire_show(const struct wire *wire, const char *name)
 {
     char *text = wire_read(wire_path(wire, name), NULL);
-    print_message("# %s: %s\n", name, text);
+    printf("# %s: %s\n", name, text); /* print_message cuts long texts, and their newline */
     free(text);
 }
 
