@@ -1,4 +1,8 @@
-/* pcapng, block by block: every frame is a packet with its bytes and its device time. */
+/* pcapng, block by block: every frame is a packet with its bytes and its device time. And read back, whole, cut and
+ * damaged. */
+#include "core/rng.h"
+#include "drivers/protocol/bytes.h"
+#include "drivers/protocol/pcapng.h"
 #include "tests/unit/recorder_rig.h"
 
 static void put_event(int64_t t_ns, const char *text)
@@ -54,8 +58,127 @@ static void test_disk_full(void **state)
     rig_check_disk_full(rig_path("full.pcapng"), 3000);
 }
 
+/* A file of two interfaces and 40 packets of 0 to 39 bytes, packet i with the time i * 1,000,000,007 ns. */
+static size_t put_file(uint8_t *to)
+{
+    uint8_t data[40];
+    size_t len = pcapng_put_section(to, "test");
+    len += pcapng_put_interface(to + len, PCAPNG_ETHERNET, 100, "first", NULL);
+    len += pcapng_put_interface(to + len, PCAPNG_USER0, 100, NULL, "second");
+    for (uint32_t i = 0; i < 40; i++) {
+        memset(data, (int)i, sizeof data);
+        len += pcapng_put_packet(to + len, i % 2, i * INT64_C(1000000007), data, i);
+    }
+    return len;
+}
+
+/* Gives the bytes from `at` on to the reader, `piece` more at a time. Returns how many packets there were; *end: what was
+ * not a whole block, or no block. */
+static uint32_t read_packets(const uint8_t *bytes, size_t len, size_t piece, size_t *end, int *rc)
+{
+    struct pcapng_reader reader = {0};
+    struct pcapng_packet packet;
+    struct sh_err err = {0};
+    uint32_t n = 0;
+    size_t have = 0, used, needed;
+    for (*end = 0; (*rc = pcapng_read(&reader, bytes + *end, have - *end, &packet, &used, &needed, &err)) >= 0;) {
+        if (*rc == PCAPNG_MORE) {
+            assert_true(used == 0 && needed > have - *end);
+            if (have == len) break;
+            have = len - have < piece ? len : have + piece;
+        }
+        if (*rc == PCAPNG_PACKET) {
+            assert_int_equal(packet.link, n % 2 == 0 ? PCAPNG_ETHERNET : PCAPNG_USER0);
+            assert_true(packet.has_time && packet.t_ns == n * INT64_C(1000000007));
+            assert_true(packet.len == n && packet.original_len == n);
+            for (uint32_t i = 0; i < n; i++)
+                assert_int_equal(packet.data[i], n);
+            n++;
+        }
+        *end += used;
+        assert_int_equal(reader.at_byte, *end);
+    }
+    return n;
+}
+
+static void test_read(void **state)
+{
+    (void)state;
+    static uint8_t file[8192];
+    const size_t len = put_file(file);
+    size_t end;
+    int rc;
+    for (size_t piece = 1; piece < 200; piece += 7) {
+        assert_int_equal(read_packets(file, len, piece, &end, &rc), 40);
+        assert_true(end == len && rc == PCAPNG_MORE);
+    }
+    for (size_t cut = 0; cut < len; cut++) {
+        assert_true(read_packets(file, cut, len, &end, &rc) < 40);
+        assert_true(rc == PCAPNG_MORE && end <= cut);
+    }
+}
+
+/* Whatever the bytes are, packets lie within them. */
+static void test_damaged(void **state)
+{
+    (void)state;
+    static uint8_t file[8192], hurt[8192];
+    const size_t len = put_file(file);
+    for (uint64_t i = 0; i < 20000; i++) {
+        struct pcapng_reader reader = {0};
+        struct pcapng_packet packet = {0};
+        struct sh_err err = {0};
+        size_t at = 0, used;
+        int item;
+        memcpy(hurt, file, len);
+        for (uint64_t k = 0; k < 1 + i % 3; k++) {
+            const uint64_t r = rng_u64(7 + k, i);
+            hurt[r % (i % 2 == 0 ? 128 : len)] = (uint8_t)(r >> 32);
+        }
+        while ((item = pcapng_read(&reader, hurt + at, len - at, &packet, &used, NULL, &err)) > 0) {
+            if (item == PCAPNG_PACKET)
+                assert_true(packet.data >= hurt + at && packet.data + packet.len <= hurt + at + used);
+            at += used;
+        }
+    }
+}
+
+/* As other programs write: microseconds, an unknown block, a simple packet, cut by the interface's limit. */
+static void test_of_others(void **state)
+{
+    (void)state;
+    uint8_t file[512];
+    struct pcapng_reader reader = {0};
+    struct pcapng_packet packet;
+    struct sh_err err = {0};
+    size_t used, at = pcapng_put_section(file, NULL), len = at;
+    static const uint8_t interface[] = {1, 0, 0, 0, 20, 0, 0, 0, 1, 0, 0, 0, 4, 0, 0, 0, 20, 0, 0, 0};
+    static const uint8_t unknown[] = {5, 0, 0, 0, 16, 0, 0, 0, 9, 9, 9, 9, 16, 0, 0, 0};
+    static const uint8_t simple[] = {3, 0, 0, 0, 20, 0, 0, 0, 6, 0, 0, 0, 'a', 'b', 'c', 'd', 20, 0, 0, 0};
+    memcpy(file + len, interface, sizeof interface);
+    memcpy(file + len + sizeof interface, unknown, sizeof unknown);
+    memcpy(file + len + sizeof interface + sizeof unknown, simple, sizeof simple);
+    len += sizeof interface + sizeof unknown + sizeof simple;
+    len += pcapng_put_packet(file + len, 0, 3000007, "x", 1);
+    assert_int_equal(pcapng_read(&reader, file, len, &packet, &used, NULL, &err), PCAPNG_OTHER);
+    for (int i = 0; i < 2; i++, at += used)
+        assert_int_equal(pcapng_read(&reader, file + at, len - at, &packet, &used, NULL, &err), PCAPNG_OTHER);
+    assert_int_equal(pcapng_read(&reader, file + at, len - at, &packet, &used, NULL, &err), PCAPNG_PACKET);
+    assert_true(!packet.has_time && packet.len == 4 && packet.original_len == 6);
+    assert_memory_equal(packet.data, "abcd", 4);
+    at += used;
+    assert_int_equal(pcapng_read(&reader, file + at, len - at, &packet, &used, NULL, &err), PCAPNG_PACKET);
+    assert_int_equal(packet.t_ns, INT64_C(3000007000)); /* microseconds, as the interface says nothing else */
+    assert_int_equal(at + used, len);
+    memcpy(file + 8, "\x1a\x2b\x3c\x4d", 4);
+    assert_int_equal(pcapng_read(&(struct pcapng_reader){0}, file, len, &packet, &used, NULL, &err), SH_EFORMAT);
+    assert_non_null(strstr(err.text, "big-endian"));
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_packets), cmocka_unit_test(test_disk_full)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_packets), cmocka_unit_test(test_disk_full),
+                                       cmocka_unit_test(test_read), cmocka_unit_test(test_damaged),
+                                       cmocka_unit_test(test_of_others)};
     return cmocka_run_group_tests(tests, rig_set_up, rig_tear_down);
 }

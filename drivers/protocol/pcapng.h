@@ -1,0 +1,70 @@
+/* Captures as pcapng has them (draft-ietf-opsawg-pcapng): blocks to bytes, and bytes to packets.
+ *
+ * In and out: bytes of a file, in pieces of any size. Times are nanoseconds. Pure: no I/O, no clock, no allocation.
+ *
+ * Written are one section of little-endian blocks, interfaces with times in nanoseconds, and enhanced packets. Read is
+ * what tshark, editcap and mergecap make of that, too: simple packets, other resolutions, blocks of other kinds, which
+ * are passed over. Big-endian sections are refused. */
+#ifndef DRIVERS_PROTOCOL_PCAPNG_H
+#define DRIVERS_PROTOCOL_PCAPNG_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "core/err.h"
+
+enum pcapng_link {
+    PCAPNG_ETHERNET = 1,
+    PCAPNG_USER0 = 147, /* here: a packet is one frame of the native protocol, header and payload */
+};
+
+enum {
+    PCAPNG_FRONT_ROOM = 512,      /* that a section, or an interface, has with its texts */
+    PCAPNG_MAX_TEXT = 160,        /* longer texts are cut */
+    PCAPNG_PACKET_HEAD = 28,      /* of a packet block, before its data */
+    PCAPNG_MAX_BLOCK = 16 << 20,  /* a longer one is no block */
+    PCAPNG_MAX_INTERFACES = 64,
+};
+
+/* ---- writing; all return how many bytes they put. Texts may be NULL: none. */
+
+/* At the beginning of a file. */
+size_t pcapng_put_section(uint8_t *to, const char *application);
+/* Interfaces count from 0. snap_len: no packet of it is longer. */
+size_t pcapng_put_interface(uint8_t *to, enum pcapng_link link, uint32_t snap_len, const char *name,
+                            const char *comment);
+/* The length of a packet's block. */
+size_t pcapng_packet_len(size_t data_len);
+/* t_ns from 0 on. */
+size_t pcapng_put_packet(uint8_t *to, uint32_t interface, int64_t t_ns, const void *data, size_t data_len);
+
+/* ---- reading */
+
+struct pcapng_reader { /* begins as zeros */
+    int in_section;
+    uint64_t at_byte; /* of the blocks taken so far */
+    uint32_t n_interfaces;
+    struct pcapng_interface {
+        uint16_t link;
+        uint32_t snap_len;
+        int resolution; /* as in the option if_tsresol; 6 where there is none */
+    } interface[PCAPNG_MAX_INTERFACES];
+};
+
+struct pcapng_packet {
+    uint16_t link; /* enum pcapng_link, or another link type */
+    int has_time;
+    int64_t t_ns;
+    const uint8_t *data; /* within the bytes that were given */
+    uint32_t len, original_len; /* original_len > len: the capture cut it */
+};
+
+enum pcapng_item { PCAPNG_MORE = 0, PCAPNG_PACKET = 1, PCAPNG_OTHER = 2 };
+
+/* Takes the block that the bytes begin with. PCAPNG_MORE: they have no whole block yet; *used is 0, and *needed (NULL:
+ * not asked) how many bytes are known to be needed. PCAPNG_PACKET and PCAPNG_OTHER: *used bytes were the block.
+ * SH_EFORMAT: this is no block; err says at which byte of the file, and why. */
+int pcapng_read(struct pcapng_reader *reader, const uint8_t *bytes, size_t len, struct pcapng_packet *packet,
+                size_t *used, size_t *needed, struct sh_err *err);
+
+#endif
