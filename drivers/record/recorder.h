@@ -11,6 +11,7 @@
 #include "drivers/host/scanhead.h"
 #include "drivers/record/colour.h"
 #include "drivers/record/outfile.h"
+#include "drivers/record/repair.h"
 #include "drivers/record/track.h"
 
 /* Of the grids that are written: shots, and places filled up between them. */
@@ -79,6 +80,9 @@ struct recorder_ops {
     int (*finish)(void *rec, struct sh_err *err);
     /* Frees what the recorder's own struct holds; also after begin has failed. */
     void (*release)(void *rec);
+    /* Makes a whole file of what was left of one (repair.h). SH_EFORMAT: it is none of this format, or too little came to
+     * the disk to say what it is. NULL: the format is written in one piece at its end, and there is nothing to keep. */
+    int (*repair)(struct repair *repair, struct sh_err *err);
 };
 
 /* By the path's ending. NULL, and the list of known endings in err, where there is none. */
