@@ -58,11 +58,7 @@ static int end_scan(struct e57 *e, struct sh_err *err)
 
 static void set_start(struct e57 *e)
 {
-    double *s = &e->scan->start_gps_s;
-    e->scan->have_start = track_start_gps(&e->base.track, s);
-    /* A time that is not known is not written. It is part of the scan's guid all the same, with this
-     * value. */
-    if (!e->scan->have_start) *s += 1e9;
+    e->scan->have_start = track_start_gps(&e->base.track, &e->scan->start_gps_s);
 }
 
 /* The note, and the place of the section's header. */
