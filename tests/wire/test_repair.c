@@ -231,7 +231,8 @@ static void kill_one_format(const struct repair_row *row, const struct bytes *wh
     struct tally tally = {0};
     for (uint64_t i = 0; i < n_moments; i++) {
         const size_t piece = stream.len / n_moments;
-        struct moment m = {.fed = i * piece + random_below(piece), .kills = 1, .wait_us = (unsigned)random_below(3000)};
+        struct moment m = {.kills = 1, .wait_us = (unsigned)random_below(3000)};
+        m.fed = (i + 1) * piece - random_below(piece / 2 + 1); /* the last one is near the end, also where they are few */
         if (i % 8 == 7) m = (struct moment){.fed = stream.len, .kills = 1, .ends = 1, .wait_us = (unsigned)random_below(20000)};
         record(row, path, &m);
         check_left(row, path, whole, &tally);
@@ -295,6 +296,7 @@ static int set_up(void **state)
     const char *n = getenv("REPAIR_N");
     if (wire_setup(state) != 0) return -1;
     wire = *state;
+    *state = NULL; /* that of each test is its row */
     if (n != NULL) n_moments = strtoull(n, NULL, 10);
     signal(SIGPIPE, SIG_IGN);
     char config[128], path[128];
@@ -315,9 +317,11 @@ static int set_up(void **state)
 
 static int tear_down(void **state)
 {
+    void *folder = wire;
+    (void)state;
     if (disk[0] != '\0') umount2(disk, MNT_DETACH);
     free(stream.data);
-    return wire_teardown(state);
+    return wire_teardown(&folder);
 }
 
 int main(void)
