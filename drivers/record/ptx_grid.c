@@ -13,7 +13,7 @@ static const char MAGIC[8] = "ptxgrid1";
 
 static int fail_spool(const struct ptx_grid *grid, struct sh_err *err)
 {
-    return sh_fail(err, SH_EIO, "%s: cannot keep the grid: %s", grid->path, strerror(errno));
+    return sh_fail(err, SH_EIO, "%s: cannot write: %s", grid->path, strerror(errno));
 }
 
 /* After a failure nothing more is written, so that what is there stays in one piece. */
@@ -78,8 +78,8 @@ int ptx_grid_begin(struct ptx_grid *grid, uint64_t text_at, const struct station
 
 static int widen(struct ptx_grid *grid, uint32_t column, uint32_t row, int first)
 {
-    const int larger = first || column < grid->column_min || column > grid->column_max || row < grid->row_min ||
-                       row > grid->row_max;
+    const int larger =
+        first || column < grid->column_min || column > grid->column_max || row < grid->row_min || row > grid->row_max;
     if (first || column < grid->column_min) grid->column_min = column;
     if (first || column > grid->column_max) grid->column_max = column;
     if (first || row < grid->row_min) grid->row_min = row;
