@@ -28,10 +28,10 @@ struct pose_file {
 
 enum title { STATIONS, STOPS, MOVING };
 
-static const char *const title[] = {
-    [STATIONS] = "scan,station,epsg,x_m,y_m,z_m,qw,qx,qy,qz,lat_deg,lon_deg,height_m\n",
-    [STOPS] = "scan,station,epsg,x_m,y_m,z_m,qw,qx,qy,qz,lat_deg,lon_deg,height_m,frame\n",
-    [MOVING] = "scan,t_s,x_m,y_m,z_m,qw,qx,qy,qz,frame,flags\n"};
+static const char *const title[] = {[STATIONS] = "scan,station,epsg,x_m,y_m,z_m,qw,qx,qy,qz,lat_deg,lon_deg,height_m\n",
+                                    [STOPS] =
+                                        "scan,station,epsg,x_m,y_m,z_m,qw,qx,qy,qz,lat_deg,lon_deg,height_m,frame\n",
+                                    [MOVING] = "scan,t_s,x_m,y_m,z_m,qw,qx,qy,qz,frame,flags\n"};
 
 static int put_title(struct pose_file *file, enum title which, struct sh_err *err)
 {

@@ -32,7 +32,8 @@ int repair_read(const struct repair *r, uint64_t at, void *to, size_t len, struc
         const ssize_t n = pread(r->fd, (char *)to + done, len - done, (off_t)(at + done));
         if (n < 0 && errno == EINTR) continue;
         if (n <= 0)
-            return sh_fail(err, SH_EIO, "%s: cannot be read: %s", r->path, n < 0 ? strerror(errno) : "it became shorter");
+            return sh_fail(err, SH_EIO, "%s: cannot be read: %s", r->path,
+                           n < 0 ? strerror(errno) : "it became shorter");
         done += (size_t)n;
     }
     return SH_OK;
@@ -178,9 +179,10 @@ static int choose(const char *path, struct repaired *d, struct sh_err *err)
     }
     d->was_left = named || is_there(d->part);
     if (!named && d->was_left && is_there(d->path))
-        return sh_fail(err, SH_ESTATE,
-                       "%s: it and %s are there; name %s to repair that one, which then keeps its name, or move %s away",
-                       d->path, d->part, d->part, d->path);
+        return sh_fail(
+            err, SH_ESTATE,
+            "%s: it and %s are there; name %s to repair that one, which then keeps its name, or move %s away", d->path,
+            d->part, d->part, d->path);
     return SH_OK;
 }
 

@@ -22,14 +22,10 @@ static const struct format {
     struct recorder_options options;
     int knows_damage; /* a wrong byte within its units is noticed */
 } formats[] = {
-    {"a.shs", {0}, 0},
-    {"a.pcapng", {0}, 0},
-    {"a.ply", {0}, 0},
-    {"b.ply", {.columns = PLY_XYZ | PLY_FLOAT}, 0},
-    {"c.ply", {.ascii = 1}, 1},
-    {"d.ply", {.colour = {.given = 1, .scale.mode = COLOUR_LABEL}, .scalar_names = 1}, 0},
-    {"a.las", {0}, 0},
-    {"b.las", {.las_minor = 2, .colour = {.given = 1, .scale.mode = COLOUR_LABEL}}, 0},
+    {"a.shs", {0}, 0},          {"a.pcapng", {0}, 0},
+    {"a.ply", {0}, 0},          {"b.ply", {.columns = PLY_XYZ | PLY_FLOAT}, 0},
+    {"c.ply", {.ascii = 1}, 1}, {"d.ply", {.colour = {.given = 1, .scale.mode = COLOUR_LABEL}, .scalar_names = 1}, 0},
+    {"a.las", {0}, 0},          {"b.las", {.las_minor = 2, .colour = {.given = 1, .scale.mode = COLOUR_LABEL}}, 0},
     {"a.poses.csv", {0}, 1},
 };
 enum { N_FORMATS = sizeof formats / sizeof formats[0], N_ROWS = 12 };
@@ -56,7 +52,8 @@ static struct bytes slurp(const char *path)
 
 static void put_scan(uint32_t scan)
 {
-    static const struct rig_point p[] = {{100, 200, 300, -1000, 1, 1, 1}, {-100, 5, 6, -2000, 2, 1, 2}, {-90, 6, 7, 30, 2, 2, 2}};
+    static const struct rig_point p[] = {
+        {100, 200, 300, -1000, 1, 1, 1}, {-100, 5, 6, -2000, 2, 1, 2}, {-90, 6, 7, 30, 2, 2, 2}};
     struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, scan);
     memset(a.anchor, 0, sizeof a.anchor);
     rig_descriptor(1, scan);
@@ -251,7 +248,8 @@ static void test_damaged(void **state)
             left[i].data[n] ^= 0x80;
             const int is_whole = repair(left[i].data, left[i].len, &file, &got);
             left[i].data[n] ^= 0x80;
-            if (formats[i].knows_damage && is_whole && n >= begin && file.cut_bytes == 0) fail_msg("%s: byte %zu", path, n);
+            if (formats[i].knows_damage && is_whole && n >= begin && file.cut_bytes == 0)
+                fail_msg("%s: byte %zu", path, n);
             free(got.data);
         }
     }
@@ -323,8 +321,14 @@ static void test_huge_numbers(void **state)
         size_t at;
         uint8_t value[4];
         int len;
-    } bad[] = {{96, {255, 255, 255, 255}, 4}, {96, {0, 0, 0, 0}, 4}, {105, {0, 0}, 2},   {105, {255, 255}, 2},
-               {104, {255}, 1},               {25, {3}, 1},          {24, {2}, 1},       {58, {'x'}, 1}};
+    } bad[] = {{96, {255, 255, 255, 255}, 4},
+               {96, {0, 0, 0, 0}, 4},
+               {105, {0, 0}, 2},
+               {105, {255, 255}, 2},
+               {104, {255}, 1},
+               {25, {3}, 1},
+               {24, {2}, 1},
+               {58, {'x'}, 1}};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
         memcpy(las.data, left[6].data, las.len);
         memcpy(las.data + bad[i].at, bad[i].value, (size_t)bad[i].len);
@@ -446,9 +450,15 @@ static void test_save(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_cut),         cmocka_unit_test(test_cut_whole),   cmocka_unit_test(test_damaged),
-        cmocka_unit_test(test_zeros),       cmocka_unit_test(test_other_format), cmocka_unit_test(test_huge_numbers),
-        cmocka_unit_test(test_damage_within_text), cmocka_unit_test(test_names), cmocka_unit_test(test_stopped),
+        cmocka_unit_test(test_cut),
+        cmocka_unit_test(test_cut_whole),
+        cmocka_unit_test(test_damaged),
+        cmocka_unit_test(test_zeros),
+        cmocka_unit_test(test_other_format),
+        cmocka_unit_test(test_huge_numbers),
+        cmocka_unit_test(test_damage_within_text),
+        cmocka_unit_test(test_names),
+        cmocka_unit_test(test_stopped),
         cmocka_unit_test(test_save),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

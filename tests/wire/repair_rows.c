@@ -188,9 +188,12 @@ static int is_no_poses(const struct bytes *left)
     return end_of_lines(left, 0) == 0;
 }
 
-#define CLOUDCOMPARE \
-    {"sh", "-c", "rm -f *.asc; CloudCompare -SILENT -NO_TIMESTAMP -O -GLOBAL_SHIFT AUTO \"$F\" -C_EXPORT_FMT ASC " \
-                 "-SAVE_CLOUDS >/dev/null && cat *.asc && rm *.asc"}
+#define CLOUDCOMPARE                                                                                          \
+    {                                                                                                         \
+        "sh", "-c",                                                                                           \
+            "rm -f *.asc; CloudCompare -SILENT -NO_TIMESTAMP -O -GLOBAL_SHIFT AUTO \"$F\" -C_EXPORT_FMT ASC " \
+            "-SAVE_CLOUDS >/dev/null && cat *.asc && rm *.asc"                                                \
+    }
 
 const struct repair_row repair_rows[] = {
     {"stream", ".shs", {NULL}, {NULL}, check_shs, is_no_shs},

@@ -22,10 +22,10 @@ struct results {
 static void say(const struct repaired *f)
 {
     char scans[48] = "";
-    if (f->n_scans > 0)
-        snprintf(scans, sizeof scans, " of %" PRIu64 " scan%s", f->n_scans, f->n_scans == 1 ? "" : "s");
+    if (f->n_scans > 0) snprintf(scans, sizeof scans, " of %" PRIu64 " scan%s", f->n_scans, f->n_scans == 1 ? "" : "s");
     if (f->was_whole && !f->was_left)
-        fprintf(stderr, "scanhead: %s: whole: %" PRIu64 " %s%s, nothing to repair\n", f->path, f->n_kept, f->unit, scans);
+        fprintf(stderr, "scanhead: %s: whole: %" PRIu64 " %s%s, nothing to repair\n", f->path, f->n_kept, f->unit,
+                scans);
     else
         fprintf(stderr, "scanhead: %s: kept %" PRIu64 " %s%s; %" PRIu64 " bytes at the end cut%s\n",
                 f->is_part ? f->part : f->path, f->n_kept, f->unit, scans, f->cut_bytes,
