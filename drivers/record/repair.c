@@ -154,6 +154,13 @@ int repair_check_rest(const struct repair *r, uint64_t end, uint64_t most, struc
     return rc != SH_OK || zeros ? rc : fail_damaged(r, end, err);
 }
 
+void repair_append_note(const struct repair *r, uint64_t end, const void *note, size_t len)
+{
+    if (repair_write(r, end, note, len, NULL) == SH_OK) return;
+    sh_warn(r->report, "%s: there is no room to say in it that it may be incomplete", r->path);
+    if (ftruncate(r->fd, (off_t)end) != 0) return; /* the piece of a note is cut by the next repair */
+}
+
 int repair_fail_none(const struct repair *r, const char *format, struct sh_err *err)
 {
     return sh_fail(err, SH_EFORMAT, "%s: is no %s, or too little of it came to the disk; it is not touched", r->path,

@@ -66,6 +66,8 @@ int repair_lines(const struct repair *repair, uint64_t from, int (*fn)(void *ctx
 /* What is behind the last whole unit is the piece of one, of `most` bytes, or zeros, which a power cut leaves. Else
  * SH_EFORMAT: that is damage, and no kill and no full disk does it. */
 int repair_check_rest(const struct repair *repair, uint64_t end, uint64_t most, struct sh_err *err);
+/* Puts a note at the end that the file may be incomplete. On a full disk there may be no room for it, which is reported. */
+void repair_append_note(const struct repair *repair, uint64_t end, const void *note, size_t len);
 /* SH_EFORMAT: "PATH: is no FORMAT, or too little of it came to the disk". */
 int repair_fail_none(const struct repair *repair, const char *format, struct sh_err *err);
 
