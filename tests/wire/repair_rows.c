@@ -201,6 +201,14 @@ static int is_no_poses(const struct bytes *left)
             "-SAVE_CLOUDS >/dev/null && cat *.asc && rm *.asc"                                                \
     }
 
+/* npm's; count and bounds come first. 127: it is not installed. */
+#define LOADERS_GL                                                                                                                \
+    {                                                                                                                             \
+        "sh", "-c",                                                                                                               \
+            "[ -e \"$READERS/installed\" ] || exit 127; node --experimental-wasm-modules \"$READERS/las.mjs\" \"$F\" las.xyz && " \
+            "tail -n +3 las.xyz && rm las.xyz"                                                                                    \
+    }
+
 const struct repair_row repair_rows[] = {
     {"stream", ".shs", {NULL}, {NULL}, check_shs, is_no_shs},
     {"packets", ".pcapng", {NULL}, {"tshark", "-r", "$F"}, check_pcapng, is_no_pcapng},
@@ -208,9 +216,9 @@ const struct repair_row repair_rows[] = {
     {"few", ".ply", {"--ply-columns", "xyz"}, CLOUDCOMPARE, check_ply, is_no_ply},
     {"colours", ".ply", {"--colour", "label", "--ply-names", "cloudcompare"}, CLOUDCOMPARE, check_ply, is_no_ply},
     {"text", ".ply", {"--ascii", "--empty-shots"}, {NULL}, check_ply_text, is_no_ply},
-    {"points", ".las", {NULL}, CLOUDCOMPARE, check_las, is_no_las},
-    {"colours", ".las", {"--colour", "label"}, {NULL}, check_las, is_no_las},
-    {"old", ".las", {"--las-version", "1.2"}, CLOUDCOMPARE, check_las, is_no_las},
+    {"points", ".las", {NULL}, LOADERS_GL, check_las, is_no_las},
+    {"colours", ".las", {"--colour", "label"}, LOADERS_GL, check_las, is_no_las},
+    {"old", ".las", {"--las-version", "1.2"}, LOADERS_GL, check_las, is_no_las},
     {"stations", ".poses.csv", {NULL}, {NULL}, check_poses, is_no_poses},
 };
 const size_t n_repair_rows = sizeof repair_rows / sizeof repair_rows[0];
