@@ -85,13 +85,15 @@ int recorder_save(struct recorder *rec, struct sh_err *err)
     return rc;
 }
 
-/* After a failed write it is not completed, also where there is room again: something may be missing in the middle. */
+/* After a failed write it is not completed, also where there is room again: points would follow that are missing. */
 static int finish(struct recorder *rec, struct sh_err *err)
 {
-    if (rec->has_failed) return sh_fail(err, SH_EIO, "%s: a part of it could not be written", rec->file.path);
-    int rc = track_flush(&rec->track, err);
+    int rc = outfile_check(&rec->file, err);
+    if (rc == SH_OK && rec->has_failed)
+        rc = sh_fail(err, SH_EIO, "%s: a part of it could not be written", rec->file.path);
+    if (rc == SH_OK) rc = track_flush(&rec->track, err);
     if (rc == SH_OK && rec->ops->finish != NULL) rc = rec->ops->finish(rec, err);
-    return rc;
+    return rc == SH_OK ? outfile_check(&rec->file, err) : rc;
 }
 
 void recorder_report(const struct recorder *rec, uint64_t n, const char *what)
