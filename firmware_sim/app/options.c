@@ -258,10 +258,10 @@ static int check_dash(const struct app_command *command, const char *word)
 static const struct {
     const char *endings, *what, *verb, *rest;
 } others[] = {
-    {".shs", "a recorded stream", "record", " -o points.ply writes its points"},
+    {".shs.pcapng", "a recorded stream", "record", " -o points.ply writes its points"},
     {".obj.stl.gltf.glb.fbx.dae.ifc", "a mesh", "init", " writes a configuration that scans it"},
     {".ply", "a mesh or a point cloud", "init", " writes a configuration that scans a mesh"},
-    {".las.laz.e57.ptx.pcapng", "a recording", "report CONFIG", " compares points with the scene"},
+    {".las.laz.e57.ptx", "a recording", "report CONFIG", " compares points with the scene"},
 };
 
 static int check_ending(const struct app_command *command, const char *label, const char *file)

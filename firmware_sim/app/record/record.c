@@ -17,7 +17,8 @@ static int is_config(const char *source)
 static int is_stream(const char *source)
 {
     return strcmp(source, "usb") == 0 || strncmp(source, "usb:", 4) == 0 || strncmp(source, "tty:", 4) == 0 ||
-           strncmp(source, "tcp:", 4) == 0 || strncmp(source, "fd:", 3) == 0 || app_ends_in(source, ".shs");
+           strncmp(source, "tcp:", 4) == 0 || strncmp(source, "fd:", 3) == 0 || app_ends_in(source, ".shs") ||
+           app_ends_in(source, ".pcapng");
 }
 
 static int take_file(void *values, const char *text)
@@ -212,7 +213,7 @@ static int run(int argc, char **argv)
     if (is_config(r.job.source)) return app_with_config(&r.in, record_config, &r.job);
     if (!is_stream(r.job.source))
         return app_usage(&app_record,
-                         "SOURCE %s: allowed usb, usb:VID:PID:SERIAL, tty:PATH, tcp:HOST:PORT, FILE.shs, CONFIG.yaml",
+                         "SOURCE %s: allowed usb, usb:VID:PID:SERIAL, tty:PATH, tcp:HOST:PORT, FILE.shs, FILE.pcapng, CONFIG.yaml",
                          r.job.source);
     if (r.in.sets.n != 0) return app_usage(&app_record, "--set, --crs and --threads need a CONFIG as SOURCE");
     if (r.in.scenario != NULL || r.job.truth != NULL)
@@ -292,7 +293,7 @@ static const char HELP_NOTES[] =
     "                       usb:vid:pid:serial\n"
     "  tty:/dev/...         a serial port\n"
     "  tcp:host:port        a socket\n"
-    "  FILE.shs             a raw stream\n"
+    "  FILE.shs             a raw stream; FILE.pcapng: its frames as packets\n"
     "\n"
     "The ending of FILE says what is written:\n"
     "\n"
