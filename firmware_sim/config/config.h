@@ -305,6 +305,10 @@ int config_load(const char *path, const char *const *sets, int n_sets, struct co
 int config_load_all(const char *path, const char *const *sets, int n_sets, struct config *cfg,
                     struct config_faults *faults);
 
+/* The same of a text that has links, loop and faults alone; name: in its errors. The rest of cfg is zero. */
+int config_load_links(const char *text, const char *name, const char *const *sets, int n_sets, struct config *cfg,
+                      struct config_faults *faults);
+
 /* Adds the faults of a scenario, a file that has nothing but a list `faults`: a path, or the name of one that comes with
  * the program. What is wrong with it goes to `faults`; then nothing is added, and the code of the first is returned. */
 int config_add_scenario(struct config *cfg, const char *name, struct config_faults *faults);
