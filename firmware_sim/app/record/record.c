@@ -272,7 +272,7 @@ static const struct app_option OPTIONS[] = {
     {APP_TEXT, "scenario", "FILE", .at = AT(in.scenario),
      .help = "of a CONFIG: with the faults of this file (config/faults) beside its own"},
     {APP_TEXT, "truth", "FILE", .at = AT(job.truth),
-     .help = "of a CONFIG: write each fault that is injected as a line of JSON"},
+     .help = "of a CONFIG: write each fault that is injected as a line of JSON; - is standard output"},
     {APP_TEXT, "stats", "FILE", .at = AT(job.stats), .help = "write what was received as JSON; - is standard output"},
     OPTION_NO_HASH(AT(job.no_hash)),
     OPTION_SET,
