@@ -147,3 +147,17 @@ int outfile_close(struct outfile *file, int keep, struct sh_err *err)
     release(file);
     return rc;
 }
+
+int outfile_over(struct outfile *file, int fd, const char *path, uint64_t at, struct sh_err *err)
+{
+    *file = (struct outfile){.fd = fd, .written = at, .path = strdup(path), .part = strdup(path)};
+    file->buf = aligned_alloc(OUTFILE_BLOCK, OUTFILE_BUFFER);
+    if (file->path != NULL && file->part != NULL && file->buf != NULL) return 0;
+    release(file);
+    return sh_fail(err, SH_ENOMEM, "%s: no memory to write it", path);
+}
+
+void outfile_leave(struct outfile *file)
+{
+    release(file);
+}

@@ -42,5 +42,9 @@ void outfile_yield(struct outfile *file);
 /* keep: flush, sync, rename. Else, and when that fails, PATH.part is removed. Frees everything in any
  * case. */
 int outfile_close(struct outfile *file, int keep, struct sh_err *err);
+/* Writes over an open file from `at` on; path is for messages. SH_ENOMEM. Only outfile_leave ends it: it flushes nothing,
+ * and leaves fd open. */
+int outfile_over(struct outfile *file, int fd, const char *path, uint64_t at, struct sh_err *err);
+void outfile_leave(struct outfile *file);
 
 #endif

@@ -78,6 +78,9 @@ struct recorder_ops {
     int (*frame)(void *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
     /* All points have come: completes the file (counts in the header) and reports what it had no room for. */
     int (*finish)(void *rec, struct sh_err *err);
+    /* Now and then, about once a second of a long recording: what has come goes to the disk, so that a repair finds it
+     * there. NULL: flushing the file is enough. */
+    int (*save)(void *rec, struct sh_err *err);
     /* Frees what the recorder's own struct holds; also after begin has failed. */
     void (*release)(void *rec);
     /* Makes a whole file of what was left of one (repair.h). SH_EFORMAT: it is none of this format, or too little came to
