@@ -276,21 +276,19 @@ add_field("reply_in", ProtoField.framenum, "Reply in", base.NONE, frametype.RESP
 add_field("command_in", ProtoField.framenum, "Command in", base.NONE, frametype.REQUEST)
 add_field("reply_time", ProtoField.relative_time, "Time from command to reply")
 
-local POINT_FIELDS = {
-  add_field("point", ProtoField.none, "Point"),
-  add_field("point.pulse", ProtoField.uint64, "Pulse"),
-  add_field("point.t_s", ProtoField.relative_time, "Fired, since the scan's start"),
-  add_field("point.echo", ProtoField.uint8, "Echo"),
-  add_field("point.echo_count", ProtoField.uint8, "Echoes of the pulse"),
-  add_field("point.label", ProtoField.uint16, "Label"),
-  add_field("point.reflectance_db", real("dB"), "Reflectance"),
-  add_field("point.range_m", real("m"), "Range"),
-  add_field("point.line_deg", real("°"), "Line angle"),
-  add_field("point.pan_deg", real("°"), "Pan angle"),
-  add_field("point.x", real(), "x, or latitude"),
-  add_field("point.y", real(), "y, or longitude"),
-  add_field("point.z", real("m"), "z"),
-}
+add_field("point", ProtoField.none, "Point")
+add_field("point.pulse", ProtoField.uint64, "Pulse")
+add_field("point.t_s", ProtoField.relative_time, "Fired, since the scan's start")
+add_field("point.echo", ProtoField.uint8, "Echo")
+add_field("point.echo_count", ProtoField.uint8, "Echoes of the pulse")
+add_field("point.label", ProtoField.uint16, "Label")
+add_field("point.reflectance_db", real("dB"), "Reflectance")
+add_field("point.range_m", real("m"), "Range")
+add_field("point.line_deg", real("°"), "Line angle")
+add_field("point.pan_deg", real("°"), "Pan angle")
+add_field("point.x", real(), "x, or latitude")
+add_field("point.y", real(), "y, or longitude")
+add_field("point.z", real("m"), "z")
 local ATTRIBUTE_FIELDS = {add_field("attribute.amplitude_db", real("dB"), "Amplitude"),
                           add_field("attribute.width_ns", real("ns"), "Width of the echo")}
 local COLOUR_FIELDS = {add_field("colour.red", ProtoField.uint8, "Red"), add_field("colour.green", ProtoField.uint8, "Green"),
@@ -510,8 +508,6 @@ local function forget(flow) flow.descriptor, flow.anchor, flow.emitter = nil, ni
 -- Counting begins with a scan that is seen from its start, and goes on as long as nothing is missing.
 local function begin_scan(flow, scan) flow.scan = {number = scan, received = 0} flow.line = {pulses = 0, whole = true} end
 
-local function round_turn(x) return x - floor(x) end
-
 local ABSORB = {
   [DESCRIPTOR] = function(flow, h, bytes, at, m)
     local d = {layout = number_at(bytes, at + 128), scan = number_at(bytes, at + 260), packet = m.packet,
@@ -632,7 +628,9 @@ local function put_row(tree, row, tvb, at)
   for i = 0, row.count - 1 do
     local range, item = tvb(at + i * row.size, row.size), nil
     if row.kind == "text" then
-      item = parent:add(row.field, range, range:stringz())
+      local words = range:stringz()
+      if words == "" then return end
+      item = parent:add(row.field, range, words)
     elseif row.is_real then
       item = put_real(parent, row.field, range, row.value and row.value(range) or range:le_float())
     elseif row.value then
@@ -687,75 +685,90 @@ local function geocentric(lat_deg, lon_deg, height)
     (n * (1 - e2) + height) * s
 end
 
-local function put_geo(item, m, tvb, at, a, b, c)
+-- Of the fields of points, by what follows their dot, those that somebody looks at; a frame has thousands of points.
+local function looked_at(tree)
+  local wanted, any = {}, false
+  for _, name in ipairs({"pulse", "t_s", "echo", "echo_count", "label", "reflectance_db", "range_m", "line_deg", "pan_deg",
+                         "x", "y", "z"}) do
+    wanted[name] = (tree.visible or tree:referenced(F["point." .. name])) and F["point." .. name]
+    any = any or wanted[name]
+  end
+  return (any or tree:referenced(F["point"])) and wanted
+end
+
+local function put_geo(item, wanted, m, tvb, at, a, b, c)
   local anchor = m.anchor
   local dx, dy, dz = anchor.sx * a, anchor.sy * b, anchor.sz * c
   local x, y, z, range = anchor.x + dx, anchor.y + dy, anchor.z + dz, nil
-  if anchor.crs == 3 then
-    if y > 180 then y = y - 360 elseif y < -180 then y = y + 360 end
+  local unit = anchor.crs == 3 and "°" or "m"
+  if anchor.crs == 3 and y > 180 then y = y - 360 elseif anchor.crs == 3 and y < -180 then y = y + 360 end
+  if wanted.range_m and anchor.crs == 3 then
     local x0, y0, z0 = geocentric(anchor.x, anchor.y, anchor.z)
     local x1, y1, z1 = geocentric(x, y, z)
     range = math.sqrt((x1 - x0) ^ 2 + (y1 - y0) ^ 2 + (z1 - z0) ^ 2)
-  elseif not anchor.moving then
+  elseif wanted.range_m and not anchor.moving then
     range = math.sqrt(dx * dx + dy * dy + dz * dz)
   end
-  put_real(item, F["point.x"], tvb(at, 4), x, anchor.crs == 3 and "°" or "m")
-  put_real(item, F["point.y"], tvb(at + 4, 4), y, anchor.crs == 3 and "°" or "m")
-  put_real(item, F["point.z"], tvb(at + 8, 4), z)
-  if range then put_real(item, F["point.range_m"], tvb(at, 12), range):set_generated() end
+  if wanted.x then put_real(item, wanted.x, tvb(at, 4), x, unit) end
+  if wanted.y then put_real(item, wanted.y, tvb(at + 4, 4), y, unit) end
+  if wanted.z then put_real(item, wanted.z, tvb(at + 8, 4), z) end
+  if range then put_real(item, wanted.range_m, tvb(at, 12), range):set_generated() end
   return string.format(anchor.crs == 3 and "%.8f° %.8f° %.4f m" or "%.4f %.4f %.4f m", x, y, z)
 end
 
-local function put_polar(item, m, tvb, at, a, b, c, has_echo)
+-- The line angle is that of the turn around the middle of the line; of other heads it is an elevation.
+local function put_polar(item, wanted, m, tvb, at, a, b, c, has_echo)
   local d, words = m.descriptor, "no echo"
   local mirror, pan = b / d.mirror_counts, c / d.pan_counts
-  local lo = (m.emitter and 0 or d.middle) - 0.5
-  local line_deg, pan_deg = 360 * (mirror - floor(mirror - lo)), 360 * round_turn(pan)
+  local line_deg = 360 * (mirror - floor(mirror - (m.emitter and 0 or d.middle) + 0.5))
+  local pan_deg = 360 * (pan - floor(pan))
   if has_echo then
-    local range, mirror_rad, pan_rad = d.range_scale * a, math.rad(360 * round_turn(mirror)), math.rad(pan_deg)
-    local flat = range * math.cos(mirror_rad)
-    put_real(item, F["point.range_m"], tvb(at, 4), range)
-    put_real(item, F["point.x"], tvb(at, 12), flat * math.sin(pan_rad), "m"):set_generated()
-    put_real(item, F["point.y"], tvb(at, 12), flat * math.cos(pan_rad), "m"):set_generated()
-    put_real(item, F["point.z"], tvb(at, 12), range * math.sin(mirror_rad)):set_generated()
+    local range, pan_rad, line_rad = d.range_scale * a, math.rad(pan_deg), math.rad(line_deg)
+    local flat = range * math.cos(line_rad)
+    if wanted.range_m then put_real(item, wanted.range_m, tvb(at, 4), range) end
+    if wanted.x then put_real(item, wanted.x, tvb(at, 12), flat * math.sin(pan_rad), "m"):set_generated() end
+    if wanted.y then put_real(item, wanted.y, tvb(at, 12), flat * math.cos(pan_rad), "m"):set_generated() end
+    if wanted.z then put_real(item, wanted.z, tvb(at, 12), range * math.sin(line_rad)):set_generated() end
     words = string.format("%.4f m", range)
   end
-  put_real(item, F["point.line_deg"], tvb(at + 4, 4), line_deg)
-  put_real(item, F["point.pan_deg"], tvb(at + 8, 4), pan_deg)
+  if wanted.line_deg then put_real(item, wanted.line_deg, tvb(at + 4, 4), line_deg) end
+  if wanted.pan_deg then put_real(item, wanted.pan_deg, tvb(at + 8, 4), pan_deg) end
   return string.format("%s, line %.4f°, pan %.4f°", words, line_deg, pan_deg)
 end
 
 -- Points show where they are once descriptor and anchor have come; before that, what needs neither.
-local function put_points(tree, tvb, bytes, at, h, m)
-  local pulse0, n = number64(bytes, at + 8), number_at(bytes, at + 36)
+local function put_points(tree, tvb, bytes, at, _, m)
+  local pulse, n = number64(bytes, at + 8) - 1, number_at(bytes, at + 36)
   local can_place = m.descriptor and m.anchor
   local is_geo = can_place and m.descriptor.layout == 1
   if can_place then
     tree:add(F["descriptor_in"], m.descriptor.packet):set_generated()
     tree:add(F["anchor_in"], m.anchor.packet):set_generated()
-  elseif not m.notice or m.notice == GAP or m.notice == RESTARTED then
+  elseif m.notice ~= REPEATED and m.notice ~= LATE then
     tree:add_proto_expert_info(E.no_anchor)
   end
-  if not is_wanted(tree, POINT_FIELDS) then return end
+  local wanted, is_shown = looked_at(tree), tree.visible
+  if not wanted then return end
   local t0 = tvb(at + 16, 8):le_int64()
   local t0_s, t0_ns = (t0 / 1000000000):tonumber(), (t0 % 1000000000):tonumber()
-  local pulse = pulse0 - 1
   put_records(tree, tvb, at + 40, 20, n, "Points", function(group, from, i)
     local a, b, c, refl, label, tail = unpack_bytes(is_geo and "<i4i4i4i2I2I4" or "<I4I4I4i2I2I4", bytes, from + 1)
     local dt, echoes = tail % 16777216, floor(tail / 16777216)
     local echo, count = echoes % 16, floor(echoes / 16)
     if echo < 2 then pulse = pulse + 1 end
     local item, words = group:add(F["point"], tvb(from, 20)), count == 0 and "no echo" or ""
-    if is_geo and count > 0 then words = put_geo(item, m, tvb, from, a, b, c)
-    elseif can_place and not is_geo then words = put_polar(item, m, tvb, from, a, b, c, count > 0) end
-    if refl ~= -32768 then put_real(item, F["point.reflectance_db"], tvb(from + 12, 2), refl / 100) end
-    item:add(F["point.label"], tvb(from + 14, 2), label)
-    local ns = t0_ns + dt
-    local carry = ns >= 1000000000 and 1 or 0
-    item:add(F["point.t_s"], tvb(from + 16, 3), NSTime.new(t0_s + carry, ns - carry * 1000000000))
-    item:add(F["point.echo"], tvb(from + 19, 1), echo)
-    item:add(F["point.echo_count"], tvb(from + 19, 1), count)
-    item:add(F["point.pulse"], tvb(from, 20), UInt64.new(pulse)):set_generated()
+    if is_geo and count > 0 then words = put_geo(item, wanted, m, tvb, from, a, b, c)
+    elseif can_place and not is_geo then words = put_polar(item, wanted, m, tvb, from, a, b, c, count > 0) end
+    if refl ~= -32768 and wanted.reflectance_db then put_real(item, wanted.reflectance_db, tvb(from + 12, 2), refl / 100) end
+    if wanted.label then item:add(wanted.label, tvb(from + 14, 2), label) end
+    if wanted.t_s then
+      local carry = floor((t0_ns + dt) / 1000000000)
+      item:add(wanted.t_s, tvb(from + 16, 3), NSTime.new(t0_s + carry, t0_ns + dt - carry * 1000000000))
+    end
+    if wanted.echo then item:add(wanted.echo, tvb(from + 19, 1), echo) end
+    if wanted.echo_count then item:add(wanted.echo_count, tvb(from + 19, 1), count) end
+    if wanted.pulse then item:add(wanted.pulse, tvb(from, 20), UInt64.new(pulse)):set_generated() end
+    if not is_shown then return end
     item:set_text(string.format("Point %d: pulse %.0f, echo %d of %d: %s%s%s", i, pulse, echo, count, words,
                                 refl ~= -32768 and string.format(", %.2f dB", refl / 100) or "",
                                 label ~= 0xffff and ", label " .. label or ""))
