@@ -37,6 +37,8 @@ size_t pcapng_put_interface(uint8_t *to, enum pcapng_link link, uint32_t snap_le
 size_t pcapng_packet_len(size_t data_len);
 /* t_ns from 0 on. */
 size_t pcapng_put_packet(uint8_t *to, uint32_t interface, int64_t t_ns, const void *data, size_t data_len);
+/* What came at an interface until t_ns, and what the system had no room for; within PCAPNG_FRONT_ROOM. */
+size_t pcapng_put_statistics(uint8_t *to, uint32_t interface, int64_t t_ns, uint64_t received, uint64_t dropped);
 
 /* ---- reading */
 

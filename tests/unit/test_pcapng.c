@@ -143,6 +143,24 @@ static void test_damaged(void **state)
     }
 }
 
+/* As capinfos reads it: 64-bit options behind interface and time. */
+static void test_statistics(void **state)
+{
+    (void)state;
+    uint8_t file[PCAPNG_FRONT_ROOM];
+    struct pcapng_reader reader = {.in_section = 1};
+    struct pcapng_packet packet;
+    struct sh_err err = {0};
+    size_t used;
+    const size_t len = pcapng_put_statistics(file, 3, INT64_C(0x123456789abcd), 1000, 7);
+    assert_int_equal(pcapng_read(&reader, file, len, &packet, &used, NULL, &err), PCAPNG_OTHER);
+    assert_true(used == len && len == 20 + 12 + 12 + 4 + 4);
+    assert_true(rig_uint(file, 4) == 5 && rig_uint(file + 8, 4) == 3);
+    assert_int_equal(rig_uint(file + 12, 4) << 32 | rig_uint(file + 16, 4), INT64_C(0x123456789abcd));
+    assert_true(rig_uint(file + 20, 4) == (4 | 8 << 16) && rig_uint(file + 24, 8) == 1000);
+    assert_true(rig_uint(file + 32, 4) == (7 | 8 << 16) && rig_uint(file + 36, 8) == 7);
+}
+
 /* As other programs write: microseconds, an unknown block, a simple packet, cut by the interface's limit. */
 static void test_of_others(void **state)
 {
@@ -179,6 +197,6 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_packets), cmocka_unit_test(test_disk_full),
                                        cmocka_unit_test(test_read), cmocka_unit_test(test_damaged),
-                                       cmocka_unit_test(test_of_others)};
+                                       cmocka_unit_test(test_of_others), cmocka_unit_test(test_statistics)};
     return cmocka_run_group_tests(tests, rig_set_up, rig_tear_down);
 }

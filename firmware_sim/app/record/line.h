@@ -13,6 +13,8 @@ struct record_line {
     double long_edge; /* negative: not given */
     long sparse_seed; /* likewise */
     int has_rgb, limited; /* --colour-rgb, --colour-limits */
+    int raw;              /* raw.h takes the whole line then */
+    const char *raw_only; /* an option that needs it */
 };
 
 /* APP_GO_ON, or the exit status with the reason printed. The strings are argv's own, or lie in `line`, which must

@@ -6,6 +6,7 @@
 
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/record/line.h"
+#include "firmware_sim/app/record/raw.h"
 
 static const double LONG_EDGE = 10;
 
@@ -186,6 +187,7 @@ int record_line_read(struct record_line *r, int argc, char **argv)
     *r = (struct record_line){.job = {.recording = {.frames = -1}}, .long_edge = -1, .sparse_seed = -1};
     int status = app_parse(&app_record, argc, argv, &r->in, r);
     if (status != APP_GO_ON) return status;
+    if (r->raw_only != NULL) return app_usage(&app_record, "--send, --relay, --ready-fd: allowed with --raw");
     if (r->job.files.n == 0 && r->job.stats == NULL) return app_usage(&app_record, "-o FILE is needed");
     if (is_config(r->in.operand[0]) && (r->job.recording.listen || r->job.wait_s > 0 || r->job.recording.replug_s > 0))
         return app_usage(&app_record,
@@ -207,6 +209,7 @@ static int run(int argc, char **argv)
 {
     struct sh_err err = {0};
     struct record_line r;
+    if (raw_is_wanted(argc, argv)) return raw_record(argc, argv);
     int status = record_line_read(&r, argc, argv);
     if (status != APP_GO_ON) return status;
     app_catch_signals();
@@ -279,6 +282,12 @@ static const struct app_option OPTIONS[] = {
     {APP_KEY_GIVEN, "crs", "CRS", .key = "output.crs", .at = AT(job.crs_given),
      .help = "local, ecef, utm or geodetic: write points in it, as output.layout=geo does, too"},
     {APP_KEY, "threads", "N", .key = "loop.threads", .help = "threads that cast; 0: one per processor"},
+    {APP_FLAG, "raw", NULL, .at = AT(raw),
+     .help = "of udp:ADDRESS:PORT,... and tcp:HOST:PORT: what is on the wire, whatever its protocol is, to a .pcapng; its "
+             "options: scanhead record --raw --help"},
+    {APP_TEXT, "send", "TEXT", .at = AT(raw_only), .help = "with --raw, as --relay and --ready-fd"},
+    {APP_TEXT, "relay", "[ADDRESS:]PORT", .at = AT(raw_only), .help = "with --raw"},
+    {APP_TEXT, "ready-fd", "N", .at = AT(raw_only), .help = "with --raw"},
     {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "no progress"},
     OPTION_END
 };
