@@ -23,10 +23,10 @@ static int64_t tick_of(const struct replay *r, int64_t t_ns)
 
 static void fail(struct replay *r, const struct sh_err *err)
 {
-    sh_warn(r->options.report, "%s; the replay ends here", err->text);
+    if (!r->ends_then) sh_warn(r->options.report, "%s; nothing more is replayed of it", err->text);
     pthread_mutex_lock(&r->lock);
     if (r->failure.code == 0) r->failure = *err;
-    command_queue_push(&r->cmd.queue, CMD_E_PULSES, "the recording can't be read any further");
+    command_queue_push(&r->cmd.queue, CMD_E_PULSES, "nothing more of the recording can be replayed");
     pthread_mutex_unlock(&r->lock);
 }
 
@@ -176,7 +176,12 @@ static void begin(struct replay *r, uint64_t tick)
         return;
     }
     r->playing = look(r);
-    if (!r->playing) return;
+    if (!r->playing) {
+        if (r->failure.code != 0) return;
+        sh_fail(&err, SH_EINPUT, "%s: no frame is in it from %.10g s on", r->options.path, r->options.from_s);
+        fail(r, &err);
+        return;
+    }
     rebase(r, tick);
     r->in_range = 1;
     r->restarts = 1;

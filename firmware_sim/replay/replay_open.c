@@ -57,6 +57,9 @@ static void take_identity(struct config *cfg, const char *idn)
     snprintf(cfg->profile.maker, sizeof cfg->profile.maker, "%.31s", field[0]);
     snprintf(cfg->profile.model, sizeof cfg->profile.model, "%.63s", field[1]);
     snprintf(cfg->head.serial, sizeof cfg->head.serial, "%.31s", field[2]);
+    for (uint32_t i = 0; i < cfg->n_links; i++)
+        if (cfg->link[i].type == LINK_USB && cfg->link[i].own_serial)
+            snprintf(cfg->link[i].serial, sizeof cfg->link[i].serial, "%.31s", field[2]);
 }
 
 /* For what links are refused by: the rate of the stream. */
@@ -91,7 +94,7 @@ static int check_faults(const struct config *cfg, struct sh_err *err)
         const struct fault *fault = &cfg->faults.fault[i];
         const char *why = fault_desk_why_not(fault);
         if (why != NULL)
-            return sh_fail(err, SH_EINPUT, "%s: faults[%u].kind %s: %s", cfg->file, i, fault_names[fault->kind], why);
+            return sh_fail(err, SH_EINPUT, "fault %u, %s: %s", i + 1, fault_names[fault->kind], why);
     }
     return SH_OK;
 }
