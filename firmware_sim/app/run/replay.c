@@ -116,12 +116,6 @@ static int replay(struct config *cfg, void *ctx, struct sh_err *err)
     return rc;
 }
 
-/* --view: a web link. */
-static void add_view(struct run_options *o)
-{
-    if (o->view && o->config == NULL) run_take_link(o, "web");
-}
-
 int run_replay(struct run_options *o)
 {
     char text[sizeof o->links + 16];
@@ -132,7 +126,7 @@ int run_replay(struct run_options *o)
         in.operand[0] = o->config;
         return app_with_config(&in, replay, o);
     }
-    add_view(o);
+    if (o->view && strstr(o->links, "web") == NULL) run_take_link(o, "web");
     struct config *cfg = calloc(1, sizeof *cfg);
     if (cfg == NULL) return sh_fail(&err, SH_ENOMEM, "no memory"), app_fail(&err);
     snprintf(text, sizeof text, "links:\n%s", o->links);
