@@ -190,7 +190,25 @@ void rig_check_disk_full(const char *path, rlim_t size)
     assert_int_equal(rc, SH_EIO);
     assert_non_null(strstr(err.text, path));
     assert_int_equal(access(path, F_OK), -1);
+    rig_check_left(path);
+}
+
+void rig_check_left(const char *path)
+{
+    struct sh_err err = {0};
+    struct repaired file;
+    char part[160];
+    snprintf(part, sizeof part, "%s.part", path);
+    if (recorder_find(path, &err)->repair == NULL) {
+        assert_int_equal(access(part, F_OK), -1);
+        return;
+    }
+    assert_non_null(strstr(rig_notes, "--repair"));
+    if (repair_file(path, NULL, &file, &err) != SH_OK) fail_msg("%s", err.text);
+    assert_true(file.was_left);
+    repair_free(&file);
     assert_int_equal(access(part, F_OK), -1);
+    assert_int_equal(unlink(path), 0);
 }
 
 int rig_set_up(void **state)
