@@ -127,7 +127,9 @@ static int end_scan(struct ptx *ptx, struct sh_err *err)
     ptx->padding->n_shots += g->n_shots;
     ptx->n_columns = 0;
     int rc = put_header(ptx, err);
-    return rc != 0 ? rc : ptx_grid_drain(g, put_column, ptx, err);
+    if (rc == 0) rc = ptx_grid_drain(g, put_column, ptx, err);
+    if (rc == 0) rc = outfile_flush(&ptx->base.file, err); /* before what it was made of goes */
+    return rc == 0 ? ptx_grid_clear(g, err) : rc;
 }
 
 /* Do the n points of the present batch, which are of one line, belong into the grid as it is? */
@@ -168,36 +170,53 @@ static float intensity(struct ptx *ptx, double reflectance_db)
     return reflectance_db > 0 ? 1.0f : (float)pow(10, reflectance_db / 10);
 }
 
+/* The cell of the batch's point i. 1, or 0: a shot without echo. */
+static int make_cell(struct ptx *ptx, int i, struct ptx_cell *cell)
+{
+    struct track *t = &ptx->base.track;
+    const struct scanhead_point *p = &t->point[i];
+    *cell = (struct ptx_cell){.column = t->line, .row = t->row[i], .intensity = -1};
+    if (p->echo_count == 0) return 0;
+    double p_socs[3] = {p->x, p->y, p->z};
+    if (t->info.geo) station_pose_reverse(&t->pose, p_socs);
+    if (track_is_nowhere(t, p_socs[0], p_socs[1], p_socs[2])) return 0;
+    cell->intensity = intensity(ptx, p->reflectance_db);
+    memcpy(cell->p_socs, p_socs, sizeof p_socs);
+    if (t->has_colours) memcpy(cell->rgb, t->rgb[i], sizeof cell->rgb);
+    return 1;
+}
+
+static int take_shot(struct ptx *ptx, int i, struct sh_err *err)
+{
+    const struct track *t = &ptx->base.track;
+    struct ptx_grid *g = &ptx->grid;
+    struct ptx_cell cell;
+    if (t->point[i].echo > 1) {
+        ptx->n_left_out++;
+        return 0;
+    }
+    int rc = 0;
+    if (g->n_shots == 0)
+        rc = ptx_grid_begin(g, ptx->base.file.written + ptx->base.file.len, &ptx->pose, t->has_colours, err);
+    ptx->last_line = t->line;
+    ptx->last_row = t->row[i];
+    const int is_larger = ptx_grid_shot(g, t->line, t->row[i]);
+    const int is_kept = make_cell(ptx, i, &cell) || is_larger; /* so that the file alone says how large the grid is */
+    return rc == 0 && is_kept ? ptx_grid_cell(g, &cell, err) : rc;
+}
+
 static int ptx_points(void *rec, int n, struct sh_err *err)
 {
     struct ptx *ptx = rec;
-    struct track *t = &ptx->base.track;
     if (n > 0 && !has_room(ptx, (uint32_t)n)) {
         int rc = end_scan(ptx, err);
         if (rc != 0) return rc;
         ptx->n_split++;
     }
-    for (int i = 0; i < n; i++) {
-        const struct scanhead_point *p = &t->point[i];
-        if (p->echo > 1) {
-            ptx->n_left_out++;
-            continue;
-        }
-        ptx->last_line = t->line;
-        ptx->last_row = t->row[i];
-        ptx_grid_shot(&ptx->grid, t->line, t->row[i]);
-        if (p->echo_count == 0) continue;
-        struct ptx_cell cell = {.column = t->line,
-                                .row = t->row[i],
-                                .intensity = intensity(ptx, p->reflectance_db),
-                                .p_socs = {p->x, p->y, p->z}};
-        if (t->has_colours) memcpy(cell.rgb, t->rgb[i], sizeof cell.rgb);
-        if (t->info.geo) station_pose_reverse(&t->pose, cell.p_socs);
-        if (track_is_nowhere(t, cell.p_socs[0], cell.p_socs[1], cell.p_socs[2])) continue;
-        int rc = ptx_grid_cell(&ptx->grid, &cell, err);
-        if (rc != 0) return rc;
-    }
-    return 0;
+    int rc = 0;
+    for (int i = 0; rc == 0 && i < n; i++)
+        rc = take_shot(ptx, i, err);
+    return rc;
 }
 
 static int ptx_finish(void *rec, struct sh_err *err)
@@ -214,6 +233,12 @@ static int ptx_finish(void *rec, struct sh_err *err)
     return 0;
 }
 
+static int ptx_save(void *rec, struct sh_err *err)
+{
+    struct ptx *ptx = rec;
+    return ptx_grid_save(&ptx->grid, err); /* the text of earlier grids is on the disk */
+}
+
 static void ptx_release(void *rec)
 {
     ptx_grid_close(&((struct ptx *)rec)->grid);
@@ -225,5 +250,6 @@ const struct recorder_ops recorder_ptx = {
     .track = {.scan = ptx_scan, .points = ptx_points, .metres = 1, .grid = 1, .wants_colours = 1},
     .begin = ptx_begin,
     .finish = ptx_finish,
+    .save = ptx_save,
     .release = ptx_release,
 };
