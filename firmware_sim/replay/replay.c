@@ -222,9 +222,11 @@ static int take_wishes(struct replay *r, uint64_t tick, int *over)
     const int again = r->wants_again;
     r->wants_again = 0;
     pthread_mutex_lock(&r->lock);
-    const int starts = r->wants_start || again, stops = r->wants_stop;
-    r->wants_start = r->wants_stop = 0;
-    *over = r->ending || tick >= r->end_tick || (r->ends_then && !starts && !r->playing);
+    const int ready = r->n_clients >= (int)r->options.clients;
+    const int starts = (r->wants_start && ready) || again, stops = r->wants_stop;
+    if (starts) r->wants_start = 0;
+    r->wants_stop = 0;
+    *over = r->ending || tick >= r->end_tick || (r->ends_then && !r->wants_start && !starts && !r->playing);
     pthread_mutex_unlock(&r->lock);
     if (stops && r->playing) stop(r, tick);
     return starts && !*over;
@@ -247,8 +249,8 @@ static enum loop_source_tick next(void *self, uint64_t tick, int may_idle, int a
     const int starts = take_wishes(r, tick, &over);
     if (over && !again) return LOOP_SOURCE_OVER;
     if (starts) begin(r, tick);
-    if (!r->playing && !again && r->len == 0 && may_idle && r->end_tick == UINT64_MAX && !r->ends_then &&
-        !r->wants_again)
+    if (!r->playing && !again && r->len == 0 && may_idle && r->end_tick == UINT64_MAX &&
+        (!r->ends_then || r->wants_start) && !r->wants_again)
         return LOOP_SOURCE_IDLE;
     if (r->playing) {
         const struct ring_tick before = r->tick;
@@ -341,6 +343,7 @@ static void end(void *self)
 const struct loop_source_ops replay_source = {
     .command = replay_command,
     .overlong = replay_overlong,
+    .session_opened = replay_session_opened,
     .session_closed = replay_session_closed,
     .report = replay_report,
     .faults = faults,
@@ -369,6 +372,8 @@ int replay_open(struct config *cfg, const struct replay_options *options, struct
     r->tick_ns = llround(1e9 / cfg->loop.tick_hz);
     r->end_tick = options->duration_s > 0.0 ? (uint64_t)ceil(options->duration_s * cfg->loop.tick_hz) : UINT64_MAX;
     r->wants_start = options->start;
+    for (uint32_t i = 0; i < cfg->n_links; i++) /* each of these opens a session for itself */
+        r->n_clients -= cfg->link[i].type == LINK_FILE || cfg->link[i].type == LINK_NULL;
     r->ends_then = options->start && !options->loop;
     r->bytes = malloc(MOST_BYTES + REPLAY_FRONT * REPLAY_FRONT_ROOM);
     int rc = r->bytes != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory");

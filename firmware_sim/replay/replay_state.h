@@ -29,6 +29,7 @@ struct replay {
     pthread_mutex_t lock;
     struct command_device cmd;
     int wants_start, wants_stop, ending;
+    int n_clients; /* beside links that are readers themselves */
     int ends_then; /* the run ends when it was played */
     uint64_t end_tick; /* of the run; UINT64_MAX: none */
     uint32_t times;  /* begun so far */
@@ -73,6 +74,7 @@ void replay_open_commands(struct replay *replay);
 /* As struct loop_source_ops has them. */
 void replay_command(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out);
 void replay_overlong(void *self, uint32_t session, struct command_result *out);
+void replay_session_opened(void *self, uint32_t session);
 void replay_session_closed(void *self, uint32_t session, const char *who, int partial);
 void replay_report(void *self, int number, const char *text);
 

@@ -27,6 +27,7 @@ static int check_head(const struct run_options *o)
                          : o->replay.from_s > 0.0 ? "--from"
                          : o->replay.to_s > 0.0   ? "--to"
                          : o->replay.loop         ? "--loop"
+                         : o->clients > 0         ? "--clients"
                          : o->links[0] != '\0'    ? "--link"
                          : o->config != NULL      ? "--config"
                                                   : NULL;
@@ -47,6 +48,8 @@ int run_check_options(const struct run_options *o, int is_recording)
                          o->in.operand[0]);
     if (o->config != NULL && o->links[0] != '\0')
         return app_usage(&app_run, "--config and --link: both say where the links are; allowed one of them");
+    if (o->clients > 0 && !o->device.start)
+        return app_usage(&app_run, "--clients: without --start a client's SCAN:STARt begins it; allowed with --start");
     if (o->replay.to_s > 0.0 && o->replay.to_s <= o->replay.from_s)
         return app_usage(&app_run, "--to %.10g is not after --from, which is %.10g; allowed more", o->replay.to_s,
                          o->replay.from_s);
@@ -104,6 +107,7 @@ static int replay(struct config *cfg, void *ctx, struct sh_err *err)
     o->replay.path = o->in.operand[0];
     if (!(o->replay.speed > 0.0)) o->replay.speed = 1.0;
     o->replay.start = o->device.start;
+    o->replay.clients = (uint32_t)o->clients;
     o->replay.duration_s = o->device.duration_s;
     o->replay.truth = o->device.truth;
     o->replay.report = &app_report_stderr;
