@@ -167,16 +167,25 @@ static uint64_t due_tick(struct replay *r, uint64_t tick)
     return r->start_tick + (out < 0x1p62 ? (uint64_t)(out > 0.0 ? out : 0.0) : UINT64_C(1) << 62);
 }
 
+static void stop(struct replay *r, uint64_t tick)
+{
+    pthread_mutex_lock(&r->lock);
+    r->playing = 0;
+    replay_set_state(r, tick, HEAD_IDLE);
+    pthread_mutex_unlock(&r->lock);
+}
+
 static void begin(struct replay *r, uint64_t tick)
 {
     struct sh_err err = {0};
     r->has_frame = r->in_range = r->has_skipped = 0;
     if (recording_rewind(&r->recording, &err) != SH_OK) {
+        stop(r, tick);
         fail(r, &err);
         return;
     }
-    r->playing = look(r);
-    if (!r->playing) {
+    if (!look(r)) {
+        stop(r, tick);
         if (r->failure.code != 0) return;
         sh_fail(&err, SH_EINPUT, "%s: no frame is in it from %.10g s on", r->options.path, r->options.from_s);
         fail(r, &err);
@@ -186,18 +195,11 @@ static void begin(struct replay *r, uint64_t tick)
     r->in_range = 1;
     r->restarts = 1;
     pthread_mutex_lock(&r->lock);
+    r->playing = 1;
     r->times++;
     replay_set_state(r, tick, HEAD_SCANNING);
     pthread_mutex_unlock(&r->lock);
     if (r->has_skipped && r->frame.bytes[1] != NATIVE_DESCRIPTOR) add_front(r, tick);
-}
-
-static void stop(struct replay *r, uint64_t tick)
-{
-    r->playing = 0;
-    pthread_mutex_lock(&r->lock);
-    replay_set_state(r, tick, HEAD_IDLE);
-    pthread_mutex_unlock(&r->lock);
 }
 
 /* The frames of a tick. may_skip: time without frames passes at once. */

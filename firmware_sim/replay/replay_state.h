@@ -47,7 +47,7 @@ struct replay {
     struct recording recording;
     int64_t first_ns; /* of the recording: device time of its first frame */
     struct replay_front front;
-    int playing;
+    int playing; /* changed under the lock */
     uint64_t start_tick;   /* with which it began, or began to be counted anew: */
     int64_t base;          /* that is this tick of the recording */
     int64_t last;          /* tick of the recording of the frame sent last */
