@@ -1272,10 +1272,15 @@ local function first_header(tvb)
   return at and at + HEADER_LEN <= #bytes
 end
 
+-- A frame's header, or what *IDN? answers: both come from a head alone.
+local function is_of_head(tvb)
+  return first_header(tvb) or tvb:raw(0, tvb:len()):find("scanhead native 1\r\n", 1, true) ~= nil
+end
+
 -- Which side of a TCP connection is the head: the one that frames come from; before that the one with the known port,
 -- or with the lower one.
 local function is_from_head(tvb, pinfo, conn)
-  if not conn.head_port and first_header(tvb) then conn.head_port = pinfo.src_port end
+  if not conn.head_port and is_of_head(tvb) then conn.head_port = pinfo.src_port end
   if conn.head_port then return pinfo.src_port == conn.head_port end
   local port = scanhead.prefs.port
   if pinfo.src_port == port or pinfo.dst_port == port then return pinfo.src_port == port end
@@ -1338,7 +1343,7 @@ web.dissector = dissect_web
 
 -- Any port: a correct header, or what *IDN? answers, is enough.
 scanhead:register_heuristic("tcp", function(tvb, pinfo, tree)
-  if not first_header(tvb) and not tvb:raw(0, tvb:len()):find("scanhead native 1\r\n", 1, true) then return false end
+  if not is_of_head(tvb) then return false end
   dissect_tcp(tvb, pinfo, tree)
   pinfo.conversation = scanhead
   return true
