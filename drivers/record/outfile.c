@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "core/newfile.h"
@@ -143,7 +144,8 @@ void outfile_yield(struct outfile *file)
 /* 1: what is on the disk stays as PATH.part. */
 static int leave(struct outfile *file)
 {
-    if (file->written == 0) return 0;
+    struct stat st;
+    if (fstat(file->fd, &st) == 0 && st.st_size == 0) return 0;
     close(file->fd);
     return 1;
 }
