@@ -78,6 +78,9 @@ void replay_session_opened(void *self, uint32_t session);
 void replay_session_closed(void *self, uint32_t session, const char *who, int partial);
 void replay_report(void *self, int number, const char *text);
 
+/* replay_notes.c: a frame goes out with a tick. With the lock held; counts into r->tick. */
+void replay_note_frame(struct replay *replay, const uint8_t *frame, uint64_t tick);
+
 /* replay_open.c: reads up to the first anchor, and fills in what links need. */
 int replay_open_recording(struct replay *replay, struct sh_err *err);
 /* Keeps a frame that is one of the front's. */
