@@ -990,17 +990,33 @@ end
 
 local function new_flow() return {sequence = new_sequence(), in_step = true, started = false, lost = 0, line = {pulses = 0, whole = false}} end
 
-local memo -- what was found in a packet when it came first, by packet and by where its bytes stand
+-- What was found in a packet when it came first. Wireshark may cut the same bytes otherwise when it looks again: so the
+-- content is the key, and what is there twice is taken in turns.
+local memo
 
-local function memo_of(tvb, pinfo, flow)
+local function memo_of(pinfo)
   local packet = memo[pinfo.number]
   if not packet then
-    packet = {}
+    packet = {starts = {}, found = {}, turn = {}, joined = {}}
     memo[pinfo.number] = packet
   end
-  local key = tvb:offset() .. "/" .. tvb:len()
-  if not packet[key] then packet[key] = {in_step = flow.in_step, started = flow.started, found = {}} end
-  return packet[key]
+  return packet
+end
+
+-- The entry of `what`; a new one is given to make(entry) once.
+local function find(pinfo, what, make)
+  local packet = memo_of(pinfo)
+  local list = packet.found[what] or {}
+  packet.found[what] = list
+  if pinfo.visited then
+    if #list == 0 then return {packet = pinfo.number} end
+    packet.turn[what] = (packet.turn[what] or 0) % #list + 1
+    return list[packet.turn[what]]
+  end
+  local m = {packet = pinfo.number, time = pinfo.rel_ts}
+  list[#list + 1] = m
+  make(m)
+  return m
 end
 
 local function note_info(pinfo, words)
@@ -1016,8 +1032,10 @@ local function new_search(tvb, pinfo, tree, conn, can_wait)
   local flow = conn.down
   local self = setmetatable({tvb = tvb, pinfo = pinfo, tree = tree, conn = conn, flow = flow, can_wait = can_wait, at = 0,
                              len = tvb:len(), bytes = tvb:raw(0, tvb:len()), shown = 0}, Search)
-  self.memo = memo_of(tvb, pinfo, flow)
-  self.in_step, self.started = self.memo.in_step, self.memo.started
+  local starts, key = memo_of(pinfo).starts, self.bytes:sub(1, 64)
+  if not pinfo.visited then starts[key] = starts[key] or {in_step = flow.in_step, started = flow.started} end
+  local start = starts[key] or {in_step = true, started = true}
+  self.in_step, self.started = start.in_step, start.started
   return self
 end
 
@@ -1047,21 +1065,10 @@ function Search:skip(to)
   self.at, self.in_step = to, false
 end
 
-function Search:found(make)
-  local m = self.memo.found[self.at]
-  if m then return m end
-  m = {packet = self.pinfo.number}
-  if not self.pinfo.visited then
-    self.memo.found[self.at] = m
-    make(m)
-  end
-  return m
-end
-
 function Search:whole_frame(h)
   local tvb, at, payload = self.tvb, self.at, self.at + HEADER_LEN
   self:end_garbage(at)
-  local m = self:found(function(m) absorb(self.flow, h, self.bytes, payload, m) end)
+  local m = find(self.pinfo, h.look, function(m) absorb(self.flow, h, self.bytes, payload, m) end)
   local words = summary(h, self.bytes, payload, m)
   local item = self.tree:add(scanhead, tvb(at, HEADER_LEN + h.length), "Scan head, " .. words)
   put_header(item, tvb, at, true, true)
@@ -1078,8 +1085,12 @@ function Search:broken_frame(h, which)
   local last = math.min(at + HEADER_LEN + h.length, self.len)
   local to = next_header(self.bytes, at + 1, last) or last
   local item = self.tree:add(scanhead, tvb(at, to - at), string.format("Scan head, broken frame: %s", TYPES[h.type] or h.type))
-  put_header(item, tvb, at, true, which == "bad_payload" and false or nil)
-  if which == "cut" then item:add_proto_expert_info(E.cut) end
+  if which == "cut" then
+    put_header(item, tvb, at, true, nil)
+    item:add_proto_expert_info(E.cut)
+  else
+    put_header(item, tvb, at, true, false)
+  end
   if to > at + HEADER_LEN then item:add(F["payload"], tvb(at + HEADER_LEN, to - at - HEADER_LEN)) end
   self:say((TYPES[h.type] or h.type) .. (which == "cut" and " [cut]" or " [bad CRC]"))
   self.flow.line.whole = false
@@ -1111,10 +1122,10 @@ function Search:reply(n)
   local tvb, at, conn = self.tvb, self.at, self.conn
   self:end_garbage(at)
   local words = self.bytes:sub(at + 1, at + n)
-  local m = self:found(function(m)
+  local m = find(self.pinfo, "reply " .. words, function(m)
     m.command = conn.first <= conn.last and conn.commands[conn.first] or nil
+    m.unasked = conn.last > 0 and not m.command
     if m.command then conn.first, m.command.reply_in = conn.first + 1, self.pinfo.number end
-    m.time = self.pinfo.rel_ts
   end)
   local item = self.tree:add(scanhead, tvb(at, n + 2), "Scan head, reply: " .. words)
   item:add(F["reply"], tvb(at, n))
@@ -1124,7 +1135,7 @@ function Search:reply(n)
     item:add(F["command_in"], m.command.packet):set_generated()
     local ns = floor((m.time - m.command.time) * 1e9 + 0.5)
     item:add(F["reply_time"], NSTime.new(floor(ns / 1e9), ns % 1000000000)):set_generated()
-  elseif conn.commands_seen then
+  elseif m.unasked then
     item:add_proto_expert_info(E.unasked)
   end
   self:say("Reply " .. words)
@@ -1172,20 +1183,15 @@ end
 -- Commands of the host: lines, ended by LF, CR or CR LF. Gives the same as Search:run.
 local function run_commands(tvb, pinfo, tree, conn, can_wait)
   local bytes, at = tvb:raw(0, tvb:len()), 0
-  local found = memo_of(tvb, pinfo, conn.down).found
   while at < #bytes do
     local words, ending = bytes:match("^([^\r\n]*)(\r?\n?)", at + 1)
     if ending == "" and can_wait and #words <= MOST_COMMAND then return at end
     local n = #words + #ending
-    local m = found[at]
-    if not m then
-      m = {packet = pinfo.number, time = pinfo.rel_ts}
-      if not pinfo.visited then
-        found[at], conn.commands_seen = m, true
-        if words ~= "" then conn.last, conn.commands[conn.last + 1] = conn.last + 1, m end
-      end
-    end
     if words ~= "" then
+      local m = find(pinfo, "command " .. words, function(m)
+        conn.last = conn.last + 1
+        conn.commands[conn.last] = m
+      end)
       local is_text = #words <= MOST_COMMAND and not words:find("[^ -~]")
       local item = tree:add(scanhead, tvb(at, n), "Scan head, command: " .. (is_text and words or #words .. " bytes"))
       if is_text then item:add(F["command"], tvb(at, #words)) else item:add(F["bad_bytes"], tvb(at, #words)):add_proto_expert_info(E.bad_command) end
@@ -1207,17 +1213,19 @@ local function conn_of(key, is_stream)
   return conns[key]
 end
 
-local function existing(name)
-  local ok, field = pcall(Field.new, name)
-  return ok and field or function() return nil end
+-- What tells connections apart is taken from pinfo: fields of other dissectors are not there when Wireshark reads a
+-- capture for the first time and shows nothing yet.
+local PORT_TYPE_TCP = 2
+local function tcp_key(pinfo)
+  local one, other = tostring(pinfo.src) .. " " .. pinfo.src_port, tostring(pinfo.dst) .. " " .. pinfo.dst_port
+  return one < other and one .. " " .. other or other .. " " .. one
 end
-local function value_of(field)
-  local info = field()
-  return info and tostring(info) or "-"
+-- Of USB one end is `host`, the other one bus, device and endpoint.
+local function usb_end(pinfo)
+  local from, to = tostring(pinfo.src), tostring(pinfo.dst)
+  if to == "host" then return "usb " .. from, true end
+  if from == "host" then return "usb " .. to, false end
 end
-local tcp_stream, interface_id = existing("tcp.stream"), existing("frame.interface_id")
-local usb_bus, usb_device, usb_endpoint = existing("usb.bus_id"), existing("usb.device_address"), existing("usb.endpoint_address")
-local ws_mask = existing("websocket.mask")
 
 local function begin_packet(pinfo)
   pinfo.cols.protocol = "scanhead"
@@ -1226,10 +1234,8 @@ end
 
 -- Bytes of a carrier whose dissector puts nothing together: frames that go on in the next packet are joined here.
 local function dissect_joined(tvb, pinfo, tree, conn, side, run)
-  local key = "joined/" .. side .. tvb:offset()
-  local packet = memo[pinfo.number] or {}
-  memo[pinfo.number] = packet
-  local kept, first_time = packet[key], not pinfo.visited
+  local key, packet, first_time = side .. tvb:offset(), memo_of(pinfo).joined, not pinfo.visited
+  local kept = packet[key]
   if not kept then
     kept = {}
     packet[key] = kept
@@ -1287,15 +1293,17 @@ local function is_from_head(tvb, pinfo, conn)
   return pinfo.src_port < pinfo.dst_port
 end
 
+-- The same for ever, once a packet was seen.
+local function side_of(tvb, pinfo, conn)
+  local key = "side" .. pinfo.number
+  if memo[key] == nil then memo[key] = is_from_head(tvb, pinfo, conn) end
+  return memo[key]
+end
+
 local function dissect_tcp(tvb, pinfo, tree)
-  local conn = conn_of("tcp " .. value_of(tcp_stream), true)
-  local side = memo["side" .. pinfo.number]
-  if side == nil then
-    side = is_from_head(tvb, pinfo, conn)
-    memo["side" .. pinfo.number] = side
-  end
+  local conn = conn_of("tcp " .. tcp_key(pinfo), true)
   begin_packet(pinfo)
-  local at, more = dissect_either(tvb, pinfo, tree, conn, side, pinfo.can_desegment > 0)
+  local at, more = dissect_either(tvb, pinfo, tree, conn, side_of(tvb, pinfo, conn), pinfo.can_desegment > 0)
   if at then
     pinfo.desegment_offset = at
     pinfo.desegment_len = more or DESEGMENT_ONE_MORE_SEGMENT
@@ -1305,9 +1313,8 @@ local function dissect_tcp(tvb, pinfo, tree)
 end
 
 local function dissect_usb(tvb, pinfo, tree)
-  local endpoint = tonumber(value_of(usb_endpoint)) or 0x80
-  local conn = conn_of("usb " .. value_of(usb_bus) .. "." .. value_of(usb_device) .. "." .. endpoint % 128, true)
-  local is_down = endpoint >= 128
+  local key, is_down = usb_end(pinfo)
+  local conn = conn_of(key, true)
   begin_packet(pinfo)
   dissect_joined(tvb, pinfo, tree, conn, is_down and "in" or "out", function(all)
     return dissect_either(all, pinfo, tree, conn, is_down, true)
@@ -1316,8 +1323,8 @@ local function dissect_usb(tvb, pinfo, tree)
 end
 
 local function dissect_web(tvb, pinfo, tree)
-  local conn = conn_of("ws " .. value_of(tcp_stream), true)
-  local is_down = value_of(ws_mask):lower() ~= "true" and value_of(ws_mask) ~= "1"
+  local conn = conn_of("ws " .. tcp_key(pinfo), true)
+  local is_down = side_of(tvb, pinfo, conn)
   begin_packet(pinfo)
   dissect_joined(tvb, pinfo, tree, conn, is_down and "in" or "out", function(all)
     return dissect_either(all, pinfo, tree, conn, is_down, is_down)
@@ -1328,13 +1335,13 @@ end
 
 local function dissect_user0(tvb, pinfo, tree)
   begin_packet(pinfo)
-  dissect_either(tvb, pinfo, tree, conn_of("user0 " .. value_of(interface_id), false), true, false)
+  dissect_either(tvb, pinfo, tree, conn_of("user0", false), true, false)
   return tvb:len()
 end
 
 function scanhead.dissector(tvb, pinfo, tree)
-  if value_of(tcp_stream) ~= "-" then return dissect_tcp(tvb, pinfo, tree) end
-  if value_of(usb_device) ~= "-" then return dissect_usb(tvb, pinfo, tree) end
+  if pinfo.port_type == PORT_TYPE_TCP then return dissect_tcp(tvb, pinfo, tree) end
+  if usb_end(pinfo) then return dissect_usb(tvb, pinfo, tree) end
   return dissect_user0(tvb, pinfo, tree)
 end
 
@@ -1350,9 +1357,8 @@ scanhead:register_heuristic("tcp", function(tvb, pinfo, tree)
 end)
 
 scanhead:register_heuristic("usb.bulk", function(tvb, pinfo, tree)
-  local endpoint = tonumber(value_of(usb_endpoint)) or 0
-  local key = "usb " .. value_of(usb_bus) .. "." .. value_of(usb_device) .. "." .. endpoint % 128
-  if not conns[key] and not first_header(tvb) then return false end
+  local key = usb_end(pinfo)
+  if not key or not conns[key] and not is_of_head(tvb) then return false end
   dissect_usb(tvb, pinfo, tree)
   return true
 end)
