@@ -103,6 +103,22 @@ static void write_long(void)
     free(all);
 }
 
+/* Each stream has sequence numbers of its own, so that they can follow each other: a jump forward between two. */
+static void number_all(void)
+{
+    for (int i = 0; i < N_STREAMS; i++) {
+        size_t len;
+        char *bytes = wire_read(wire_path(wire, stream_name[i]), &len);
+        for (size_t at = 0; at < len; at += native_frame_len((uint8_t *)bytes + at)) {
+            uint8_t *frame = (uint8_t *)bytes + at;
+            if ((frame[3] & NATIVE_LOCAL) == 0) le_put32(frame + 8, le_get32(frame + 8) + 100000u * (uint32_t)i);
+            seal(frame);
+        }
+        wire_write(wire, stream_name[i], bytes, len);
+        free(bytes);
+    }
+}
+
 static int setup(void **state)
 {
     const int rc = wire_setup(state);
@@ -111,6 +127,7 @@ static int setup(void **state)
     record_all();
     write_samples();
     write_long();
+    number_all();
     return 0;
 }
 
@@ -160,13 +177,14 @@ static void write_clean(void)
     struct capture c = {0};
     capture_begin(&c);
     const uint32_t ethernet = capture_interface(&c, CAPTURE_ETHERNET), usb = capture_interface(&c, CAPTURE_USBMON);
+    const uint32_t user0 = capture_interface(&c, CAPTURE_USER0);
     for (int carrier = 0; carrier < 3; carrier++)
         for (int i = 0; i < N_STREAMS; i++) {
             size_t len;
             char *bytes = wire_read(wire_path(wire, stream_name[i]), &len);
             if (carrier == 0) put_tcp(&c, ethernet, i, (uint8_t *)bytes, len);
             if (carrier == 1) put_usb(&c, usb, i, (uint8_t *)bytes, len);
-            if (carrier == 2) put_user0(&c, capture_interface(&c, CAPTURE_USER0), (uint8_t *)bytes, len);
+            if (carrier == 2) put_user0(&c, user0, (uint8_t *)bytes, len);
             free(bytes);
         }
     wire_write(wire, "clean.pcapng", c.bytes, c.len);
@@ -179,7 +197,7 @@ static void write_clean(void)
 static const char *const all_fields[] = {
     "_ws.expert.severity", S "type", S "version", S "flags", S "flags.repeat", S "flags.local", S "length", S "seq",
     S "payload_crc", S "payload_crc.status", S "t_s", S "header_crc", S "header_crc.status", S "command", S "reply",
-    S "reply.error", S "reply_in", S "command_in", S "seq.notice", S "bad_bytes", S "unknown", S "payload",
+    S "reply.error", S "reply_in", S "command_in", S "bad_bytes", S "unknown", S "payload",
     S "descriptor.idn", S "descriptor.profile", S "descriptor.layout", S "descriptor.isa", S "descriptor.prr_hz",
     S "descriptor.lines_hz", S "descriptor.pan_deg_s", S "descriptor.fov_min_deg", S "descriptor.sweep_deg",
     S "descriptor.line_start_deg", S "descriptor.line_stop_deg", S "descriptor.pan_start_deg",
@@ -494,7 +512,7 @@ static void expect_usb_lines(void)
 }
 
 /* Nothing is malformed. Whole scans miss nothing; the line of the samples has 3 of its 400 pulses there. Warnings: the
- * LOCAL event of the samples, once on each carrier. */
+ * LOCAL event of the samples, once on each carrier; the jumps from one stream to the next in packets of their own. */
 static void expect_marks(void)
 {
     int n_lost = 0;
@@ -516,7 +534,7 @@ static void expect_marks(void)
         n_warnings += severity == EXPERT_WARN;
         assert_true(severity < EXPERT_ERROR);
     }
-    assert_int_equal(n_warnings, 3);
+    assert_int_equal(n_warnings, 3 + N_STREAMS - 1);
 }
 
 static void test_every_value(void **state)
@@ -585,41 +603,49 @@ static void put_hurt(struct capture *c, uint32_t interface)
     free(bytes[1]);
 }
 
-/* The recordings one after the other, each frame with a chance to be dropped, doubled, hurt, or to come after the next
- * one; between them sometimes garbage. The last 30 are whole: nothing waits for bytes that never come. */
+/* One frame, and what may happen to it; returns how many bytes there are. next: the frame after it, which comes first. */
+static size_t put_one(uint8_t *out, const uint8_t *frame, const uint8_t *older, int what, uint64_t *random)
+{
+    size_t to = 0;
+    if (what == 0) return 0;
+    if (what == 2) { /* an older one once more */
+        memcpy(out, older, native_frame_len(older));
+        to += native_frame_len(older);
+    }
+    for (int g = 0; what == 4 && g < 40; g++)
+        out[to++] = (uint8_t)capture_random(random, 256);
+    memcpy(out + to, frame, native_frame_len(frame));
+    return to + (what == 1 ? hurt(out + to, native_frame_len(frame), random) : native_frame_len(frame));
+}
+
+/* The recordings one after the other, four times with other device times: each frame with a chance to be dropped, hurt,
+ * to come after an older one or garbage, or after the next one. The last 30 are whole: nothing waits for bytes that never
+ * come. */
 static size_t put_damage(uint8_t *out)
 {
     uint64_t random = 4;
     size_t to = 0, len;
-    for (int i = 0; i < N_RECORDINGS; i++) {
-        char *bytes = wire_read(wire_path(wire, recording[i].name), &len);
-        size_t starts[4096], n = 0;
-        for (size_t at = 0; at < len; at += native_frame_len((uint8_t *)bytes + at))
-            starts[n++] = at;
-        for (size_t k = 0; k < n; k++) {
-            const uint8_t *frame = (uint8_t *)bytes + starts[k];
-            const size_t size = native_frame_len(frame);
-            const uint32_t what = k + 30 < n ? capture_random(&random, 24) : 24;
-            if (what == 0) continue;
-            memcpy(out + to, frame, size);
-            if (what == 1) to += hurt(out + to, size, &random);
-            if (what == 2 && k > 2) { /* an older one once more */
-                const uint8_t *older = (uint8_t *)bytes + starts[k - 1 - capture_random(&random, 2)];
-                memcpy(out + to, older, native_frame_len(older));
-                to += native_frame_len(older);
-                memcpy(out + to, frame, size);
+    for (int i = 0; i < 4 * N_RECORDINGS; i++) {
+        char *bytes = wire_read(wire_path(wire, recording[i % N_RECORDINGS].name), &len);
+        const uint8_t *older = (uint8_t *)bytes;
+        for (size_t at = 0, n; at < len; at += n) {
+            uint8_t *frame = (uint8_t *)bytes + at;
+            n = native_frame_len(frame);
+            frame[18] ^= (uint8_t)(i / N_RECORDINGS << 4); /* 0.8 ms and more */
+            seal(frame);
+            const int is_quiet = i + 1 == 4 * N_RECORDINGS && at + 4000 > len;
+            const int what = is_quiet ? 5 : (int)capture_random(&random, 24);
+            if (what == 3 && at + n < len) { /* the next one first */
+                uint8_t *next = frame + n;
+                const size_t n_next = native_frame_len(next);
+                next[18] ^= (uint8_t)(i / N_RECORDINGS << 4);
+                seal(next);
+                memcpy(out + to, next, n_next);
+                to += n_next;
+                n += n_next;
             }
-            if (what == 3) { /* the next one first */
-                const uint8_t *next = frame + size;
-                memcpy(out + to, next, native_frame_len(next));
-                to += native_frame_len(next);
-                memcpy(out + to, frame, size);
-                k++;
-            }
-            for (uint32_t g = 0; what == 4 && g < 40; g++)
-                out[to++] = (uint8_t)capture_random(&random, 256);
-            if (what == 4) memcpy(out + to, frame, size);
-            if (what != 1) to += size;
+            to += put_one(out + to, frame, older, what, &random);
+            older = frame;
         }
         free(bytes);
     }
