@@ -250,7 +250,8 @@ soak: deps-build
 	@$(MAKE) --no-print-directory -j2 all
 	@sh tests/soak.sh $(SOAK_S) $(BUILD)
 
-# Recorders that are killed, and disks that are full, at N random moments for each format (`make test`: a few).
+# Recorders that are killed, and disks that are full, at N random moments for each format (`make test`: one of
+# each): some minutes.
 N ?= 200
 repair: deps-build
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test all $(BUILD)/test/tests/wire/test_repair

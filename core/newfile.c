@@ -182,8 +182,7 @@ int newfile_part(const char *path, const char *part, int *out, struct sh_err *er
         if (rc == 0) continue;
         if (rc < 0) break;
         rc = SH_OK;
-        if (flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
-            rc = fail_locked(part, err);
+        if (flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) rc = fail_locked(part, err);
         /* a file system without locks has none to offer; then the name alone counts */
         else if (is_named(part, fd)) {
             if (ftruncate(fd, 0) != 0) rc = fail(part, "create", err);

@@ -56,9 +56,10 @@ static int parse_header(const struct repair *repair, const uint8_t *header, size
     const size_t header_len = f->minor == 2 ? LAS_HEADER_12_LEN : LAS_HEADER_LEN;
     r->len = le_get16(header + 105);
     *front_len = le_get32(header + 96);
-    const int known = f->minor == 2 ? (format == 1 && r->len == 28) || (format == 3 && r->len == 34)
-                                    : f->minor == 4 && ((format == 6 && r->len >= 30) || (format == 7 && r->len >= 36)) &&
-                                          r->len <= LAS_POINT_LEN_MAX;
+    const int known = f->minor == 2
+                          ? (format == 1 && r->len == 28) || (format == 3 && r->len == 34)
+                          : f->minor == 4 && ((format == 6 && r->len >= 30) || (format == 7 && r->len >= 36)) &&
+                                r->len <= LAS_POINT_LEN_MAX;
     if (!known || len < header_len || *front_len < header_len || *front_len > LAS_FRONT_MAX || *front_len > repair->len)
         return repair_fail_none(repair, "LAS file of scanhead", err);
     r->station_at = f->minor == 2 ? 18 : 20;
@@ -95,7 +96,8 @@ int las_repair(struct repair *repair, struct sh_err *err)
     const size_t len = repair->len < sizeof header ? (size_t)repair->len : sizeof header;
     int rc = repair_read(repair, 0, header, len, err);
     if (rc == SH_OK) rc = parse_header(repair, header, len, &r, &front_len, err);
-    if (rc == SH_OK) rc = repair_rows(repair, front_len, r.len, (repair->len - front_len) / r.len, take_record, &r, err);
+    if (rc == SH_OK)
+        rc = repair_rows(repair, front_len, r.len, (repair->len - front_len) / r.len, take_record, &r, err);
     if (rc == SH_OK) rc = make_whole(repair, header, &r, front_len, err);
     repair->unit = "points";
     repair->n_kept = r.facts.n_points;

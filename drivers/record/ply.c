@@ -48,7 +48,8 @@ static int make_header(struct ply *ply, int incomplete, char **text, size_t *len
     ply->facts.incomplete = incomplete;
     const int rc = ply_header_make(&ply->facts, ply->header_len, text, len, &n_left_out, err);
     if (rc == 0 && !incomplete)
-        recorder_report(&ply->base, n_left_out, "names of surfaces and heads left out, for which the header has no room");
+        recorder_report(&ply->base, n_left_out,
+                        "names of surfaces and heads left out, for which the header has no room");
     return rc;
 }
 

@@ -20,8 +20,8 @@ struct ply_header {
     uint64_t n_vertices;
     int has_vertices, is_ascii, is_mesh, is_incomplete;
     unsigned n_columns;
-    size_t row_len;                /* binary */
-    int station_at, time_at;       /* byte in a binary row, number of the column in text; NO_COLUMN */
+    size_t row_len;          /* binary */
+    int station_at, time_at; /* byte in a binary row, number of the column in text; NO_COLUMN */
 };
 
 /* ---- the header */
@@ -54,8 +54,8 @@ static size_t size_of_type(const char *type)
     static const struct {
         const char *name, *name_too;
         size_t size;
-    } types[] = {{"char", "int8", 1},  {"uchar", "uint8", 1},   {"short", "int16", 2},    {"ushort", "uint16", 2},
-                 {"int", "int32", 4},  {"uint", "uint32", 4},   {"float", "float32", 4},  {"double", "float64", 8}};
+    } types[] = {{"char", "int8", 1}, {"uchar", "uint8", 1}, {"short", "int16", 2},   {"ushort", "uint16", 2},
+                 {"int", "int32", 4}, {"uint", "uint32", 4}, {"float", "float32", 4}, {"double", "float64", 8}};
     for (size_t i = 0; i < sizeof types / sizeof types[0]; i++)
         if (strcmp(type, types[i].name) == 0 || strcmp(type, types[i].name_too) == 0) return types[i].size;
     return 0;
@@ -65,7 +65,8 @@ static size_t size_of_type(const char *type)
 static int take_property(struct ply_header *h, const char *line)
 {
     char type[WORD], name[WORD];
-    if (sscanf(line, "property %31s %31s", type, name) != 2 || size_of_type(type) == 0 || h->row_len > HEADER_BEGIN) return 0;
+    if (sscanf(line, "property %31s %31s", type, name) != 2 || size_of_type(type) == 0 || h->row_len > HEADER_BEGIN)
+        return 0;
     const int at = h->is_ascii ? (int)h->n_columns : (int)h->row_len;
     const char *plain = strncmp(name, "scalar_", 7) == 0 ? name + 7 : name;
     if (strcmp(plain, "station") == 0 && size_of_type(type) == 2) h->station_at = at;
@@ -109,7 +110,8 @@ static int parse_header(const struct repair *r, struct ply_header *h, struct sh_
 /* Blank comments, and pieces of comments of a header that was being written over when its recorder was killed. */
 static int is_padding(const char *line, size_t n)
 {
-    static const char *const first[] = {"ply", "format ", "comment ", "obj_info ", "element ", "property ", "end_header"};
+    static const char *const first[] = {"ply",      "format ",   "comment ",  "obj_info ",
+                                        "element ", "property ", "end_header"};
     size_t i = 0;
     while (i < sizeof first / sizeof first[0] && strncmp(line, first[i], strlen(first[i])) != 0)
         i++;
@@ -178,7 +180,8 @@ static void take_binary(void *ctx, const uint8_t *row)
     p->n++;
     p->n_zero = repair_is_zero(row, h->row_len) ? p->n_zero + 1 : 0;
     if (p->n_zero != 0 || (h->station_at < 0 && h->time_at < 0)) return;
-    take_point(p, h->station_at >= 0 ? le_get16(row + h->station_at) : 0, h->time_at >= 0 ? double_at(row + h->time_at) : 0);
+    take_point(p, h->station_at >= 0 ? le_get16(row + h->station_at) : 0,
+               h->time_at >= 0 ? double_at(row + h->time_at) : 0);
 }
 
 static int take_text(void *ctx, const char *line, size_t len)
@@ -228,7 +231,8 @@ static int make_whole(struct repair *r, const struct ply_header *h, const struct
     char *text = renew(h, p->n, 1);
     if (text == NULL) text = renew(h, p->n, 0);
     if (text == NULL)
-        return sh_fail(err, SH_EFORMAT, "%s: its header has no room for another number of points; it is not touched", r->path);
+        return sh_fail(err, SH_EFORMAT, "%s: its header has no room for another number of points; it is not touched",
+                       r->path);
     int rc = repair_cut(r, end, err);
     if (rc == SH_OK) rc = repair_write(r, 0, text, h->len, err);
     free(text);
@@ -243,8 +247,9 @@ int ply_repair(struct repair *r, struct sh_err *err)
     int rc = read_header(r, &h, err);
     if (rc == SH_OK) rc = parse_header(r, &h, err);
     if (rc == SH_OK && h.is_mesh) {
-        rc = recorder_mesh_ply.repair != NULL ? recorder_mesh_ply.repair(r, err)
-                                              : sh_fail(err, SH_EFORMAT, "%s: a mesh is written in one piece at its end", r->path);
+        rc = recorder_mesh_ply.repair != NULL
+                 ? recorder_mesh_ply.repair(r, err)
+                 : sh_fail(err, SH_EFORMAT, "%s: a mesh is written in one piece at its end", r->path);
     } else if (rc == SH_OK) {
         rc = read_points(r, &h, &p, &end, err);
         r->unit = "points";

@@ -12,7 +12,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "drivers/protocol/native.h"
 #include "drivers/record/recorder.h"
@@ -28,10 +27,10 @@ struct pose_file {
 
 enum title { STATIONS, STOPS, MOVING };
 
-static const char *const title[] = {
-    [STATIONS] = "scan,station,epsg,x_m,y_m,z_m,qw,qx,qy,qz,lat_deg,lon_deg,height_m\n",
-    [STOPS] = "scan,station,epsg,x_m,y_m,z_m,qw,qx,qy,qz,lat_deg,lon_deg,height_m,frame\n",
-    [MOVING] = "scan,t_s,x_m,y_m,z_m,qw,qx,qy,qz,frame,flags\n"};
+static const char *const title[] = {[STATIONS] = "scan,station,epsg,x_m,y_m,z_m,qw,qx,qy,qz,lat_deg,lon_deg,height_m\n",
+                                    [STOPS] =
+                                        "scan,station,epsg,x_m,y_m,z_m,qw,qx,qy,qz,lat_deg,lon_deg,height_m,frame\n",
+                                    [MOVING] = "scan,t_s,x_m,y_m,z_m,qw,qx,qy,qz,frame,flags\n"};
 
 static int put_title(struct pose_file *file, enum title which, struct sh_err *err)
 {
@@ -127,7 +126,7 @@ static int pose_file_finish(void *rec, struct sh_err *err)
 
 /* ---- repair */
 
-static const char INCOMPLETE[] = "# incomplete: the recorder ended before the recording did; what follows is missing\n";
+static const char INCOMPLETE[] = "# incomplete: the recorder came to no end; what should follow may be missing\n";
 
 struct rows {
     int titled, n_columns;
@@ -167,14 +166,6 @@ static int take_row(void *ctx, const char *line, size_t len)
     return 1;
 }
 
-/* That the file is incomplete. On a full disk there may be no room for it. */
-static void mark(struct repair *r, uint64_t end)
-{
-    if (repair_write(r, end, INCOMPLETE, sizeof INCOMPLETE - 1, NULL) == SH_OK) return;
-    sh_warn(r->report, "%s: there is no room to say in it that it is incomplete", r->path);
-    if (ftruncate(r->fd, (off_t)end) != 0) return; /* then the next repair does it */
-}
-
 static int pose_file_repair(struct repair *r, struct sh_err *err)
 {
     struct rows rows = {0};
@@ -188,7 +179,7 @@ static int pose_file_repair(struct repair *r, struct sh_err *err)
     r->n_scans = rows.n_scans;
     r->was_whole = end == r->len && (!repair_is_part(r) || rows.is_marked);
     rc = repair_cut(r, end, err);
-    if (rc == SH_OK && !r->was_whole && !rows.is_marked) mark(r, end);
+    if (rc == SH_OK && !r->was_whole && !rows.is_marked) repair_append_note(r, end, INCOMPLETE, sizeof INCOMPLETE - 1);
     return rc;
 }
 

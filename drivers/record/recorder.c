@@ -127,8 +127,8 @@ static void say_left(const struct recorder *rec, const char *path)
     char part[PATH_MAX];
     snprintf(part, sizeof part, "%s.part", path);
     if (newfile_left_len(part) > 0)
-        sh_warn(rec->options.report, "%s keeps what came to the disk: scanhead record --repair %s makes a whole file of it",
-                part, path);
+        sh_warn(rec->options.report,
+                "%s keeps what came to the disk: scanhead record --repair %s makes a whole file of it", part, path);
 }
 
 int recorder_close(struct recorder *rec, int keep, struct sh_err *err)

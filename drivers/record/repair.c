@@ -32,7 +32,8 @@ int repair_read(const struct repair *r, uint64_t at, void *to, size_t len, struc
         const ssize_t n = pread(r->fd, (char *)to + done, len - done, (off_t)(at + done));
         if (n < 0 && errno == EINTR) continue;
         if (n <= 0)
-            return sh_fail(err, SH_EIO, "%s: cannot be read: %s", r->path, n < 0 ? strerror(errno) : "it became shorter");
+            return sh_fail(err, SH_EIO, "%s: cannot be read: %s", r->path,
+                           n < 0 ? strerror(errno) : "it became shorter");
         done += (size_t)n;
     }
     return SH_OK;
@@ -153,6 +154,13 @@ int repair_check_rest(const struct repair *r, uint64_t end, uint64_t most, struc
     return rc != SH_OK || zeros ? rc : fail_damaged(r, end, err);
 }
 
+void repair_append_note(const struct repair *r, uint64_t end, const void *note, size_t len)
+{
+    if (repair_write(r, end, note, len, NULL) == SH_OK) return;
+    sh_warn(r->report, "%s: there is no room to say in it that it may be incomplete", r->path);
+    if (ftruncate(r->fd, (off_t)end) != 0) return; /* the piece of a note is cut by the next repair */
+}
+
 int repair_fail_none(const struct repair *r, const char *format, struct sh_err *err)
 {
     return sh_fail(err, SH_EFORMAT, "%s: is no %s, or too little of it came to the disk; it is not touched", r->path,
@@ -178,9 +186,10 @@ static int choose(const char *path, struct repaired *d, struct sh_err *err)
     }
     d->was_left = named || is_there(d->part);
     if (!named && d->was_left && is_there(d->path))
-        return sh_fail(err, SH_ESTATE,
-                       "%s: it and %s are there; name %s to repair that one, which then keeps its name, or move %s away",
-                       d->path, d->part, d->part, d->path);
+        return sh_fail(
+            err, SH_ESTATE,
+            "%s: it and %s are there; name %s to repair that one, which then keeps its name, or move %s away", d->path,
+            d->part, d->part, d->path);
     return SH_OK;
 }
 

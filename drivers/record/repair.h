@@ -15,26 +15,26 @@
 #include "core/err.h"
 
 struct repair {
-    int fd;           /* of the file, for reading and writing, locked */
-    const char *path; /* in messages */
-    uint64_t len;     /* its bytes as it was left */
+    int fd;                         /* of the file, for reading and writing, locked */
+    const char *path;               /* in messages */
+    uint64_t len;                   /* its bytes as it was left */
     const struct sh_report *report; /* progress; may be NULL */
 
     /* out */
-    uint64_t n_kept; /* of its units */
-    const char *unit; /* "frames", "packets", "points", "shots" */
-    uint64_t n_scans; /* that they are of, as far as the format knows; 0: it does not */
+    uint64_t n_kept;    /* of its units */
+    const char *unit;   /* "frames", "packets", "points", "shots" */
+    uint64_t n_scans;   /* that they are of, as far as the format knows; 0: it does not */
     uint64_t cut_bytes; /* that were at its end, and are in no whole unit */
-    int was_whole; /* there was nothing to repair, and nothing was changed */
+    int was_whole;      /* there was nothing to repair, and nothing was changed */
 };
 
 /* The path of a file, or of what was left of it (FILE.part), as its user names it. What was left and is whole now is renamed,
  * unless a file of that name is there: nothing is replaced. A file without anything left beside it is checked, and repaired
  * where it needs that. */
 struct repaired {
-    char *path, *part; /* of the file, and of what was left; repair_free frees them */
-    int was_left;      /* what was repaired had the name of part */
-    int is_part;       /* and has it still: another file has its name */
+    char *path, *part;                   /* of the file, and of what was left; repair_free frees them */
+    int was_left;                        /* what was repaired had the name of part */
+    int is_part;                         /* and has it still: another file has its name */
     uint64_t n_kept, n_scans, cut_bytes; /* as in struct repair */
     const char *unit;
     int was_whole;
@@ -61,11 +61,13 @@ int repair_rows(const struct repair *repair, uint64_t from, size_t row_len, uint
 int repair_is_zero(const uint8_t *row, size_t len);
 /* Lines from `from` on, each with its newline but not given with it. fn returns 1: a line of this format, 0: none. *end is
  * behind the last good one. SH_EFORMAT: good lines follow a bad one, which no kill and no full disk does. */
-int repair_lines(const struct repair *repair, uint64_t from, int (*fn)(void *ctx, const char *line, size_t len), void *ctx,
-                 uint64_t *end, struct sh_err *err);
+int repair_lines(const struct repair *repair, uint64_t from, int (*fn)(void *ctx, const char *line, size_t len),
+                 void *ctx, uint64_t *end, struct sh_err *err);
 /* What is behind the last whole unit is the piece of one, of `most` bytes, or zeros, which a power cut leaves. Else
  * SH_EFORMAT: that is damage, and no kill and no full disk does it. */
 int repair_check_rest(const struct repair *repair, uint64_t end, uint64_t most, struct sh_err *err);
+/* Puts a note at the end that the file may be incomplete. On a full disk there may be no room for it, which is reported. */
+void repair_append_note(const struct repair *repair, uint64_t end, const void *note, size_t len);
 /* SH_EFORMAT: "PATH: is no FORMAT, or too little of it came to the disk". */
 int repair_fail_none(const struct repair *repair, const char *format, struct sh_err *err);
 

@@ -14,7 +14,8 @@ struct repair_row {
     const char *name;      /* of the file, without its ending */
     const char *ending;    /* with its dot */
     const char *option[8]; /* of `record`; ends with NULL */
-    const char *reader[8]; /* a program of others that prints as many lines as the file has units; $F is the file. NULL: none */
+    const char *
+        reader[8]; /* a program of others that prints as many lines as the file has units; $F is the file. NULL: none */
     /* Of a complete recording of the same stream, of what was left and of what became of it: fails, or says how many units
      * the last one holds. All units that are whole in `left` must be in it, and it must begin as `whole` does. */
     uint64_t (*check)(const struct bytes *whole, const struct bytes *left, const struct bytes *repaired);

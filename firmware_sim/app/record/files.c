@@ -183,10 +183,11 @@ static int check_part(const char *part, const char *path, struct sh_err *err)
 {
     const long long len = newfile_left_len(part);
     if (len == 0) return SH_OK;
-    return sh_fail(err, SH_EINPUT,
-                   "%s: an earlier recording has left %lld bytes there; scanhead record --repair %s makes a file of them; "
-                   "or remove it",
-                   part, len, path);
+    return sh_fail(
+        err, SH_EINPUT,
+        "%s: an earlier recording has left %lld bytes there; scanhead record --repair %s makes a file of them; "
+        "or remove it",
+        part, len, path);
 }
 
 /* What is left of the file, or of those of single scans: a later one would stop the recording at its scan. */

@@ -22,14 +22,14 @@ struct results {
 static void say(const struct repaired *f)
 {
     char scans[48] = "";
-    if (f->n_scans > 0)
-        snprintf(scans, sizeof scans, " of %" PRIu64 " scan%s", f->n_scans, f->n_scans == 1 ? "" : "s");
+    if (f->n_scans > 0) snprintf(scans, sizeof scans, " of %" PRIu64 " scan%s", f->n_scans, f->n_scans == 1 ? "" : "s");
     if (f->was_whole && !f->was_left)
-        fprintf(stderr, "scanhead: %s: whole: %" PRIu64 " %s%s, nothing to repair\n", f->path, f->n_kept, f->unit, scans);
+        fprintf(stderr, "scanhead: %s: whole: %" PRIu64 " %s%s, nothing to repair\n", f->path, f->n_kept, f->unit,
+                scans);
     else
         fprintf(stderr, "scanhead: %s: kept %" PRIu64 " %s%s; %" PRIu64 " bytes at the end cut%s\n",
                 f->is_part ? f->part : f->path, f->n_kept, f->unit, scans, f->cut_bytes,
-                f->was_whole ? "; it was whole" : "; what should follow is missing");
+                f->was_whole ? "; nothing else had to be changed" : "; what should follow is missing");
     if (f->is_part)
         fprintf(stderr, "scanhead: %s keeps its name, as %s is there, and is not replaced\n", f->part, f->path);
 }
