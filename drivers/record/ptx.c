@@ -32,8 +32,8 @@ enum {
 struct ptx {
     struct recorder base;
     struct ptx_grid grid;
-    struct station_pose pose;          /* of the scan in the grid */
-    uint32_t last_line, last_row;      /* of the grid's last shot */
+    struct station_pose pose;     /* of the scan in the grid */
+    uint32_t last_line, last_row; /* of the grid's last shot */
     uint64_t n_left_out, n_too_bright;
     uint64_t n_padded; /* places in this file */
     uint64_t n_split;  /* grids that go on with the scan of the one before */

@@ -13,7 +13,14 @@ static const char MAGIC[8] = "ptxgrid1";
 
 static int fail_spool(const struct ptx_grid *grid, struct sh_err *err)
 {
-    return sh_fail(err, SH_EIO, "%s: cannot keep the grid: %s", grid->path, strerror(errno));
+    return sh_fail(err, SH_EIO, "%s: cannot write: %s", grid->path, strerror(errno));
+}
+
+/* After a failure nothing more is written, so that what is there stays in one piece. */
+static int put(struct ptx_grid *grid, const void *data, size_t len, struct sh_err *err)
+{
+    if (!ferror(grid->spool) && fwrite(data, len, 1, grid->spool) == 1) return 0;
+    return fail_spool(grid, err);
 }
 
 int ptx_grid_open(struct ptx_grid *grid, const char *path, struct sh_err *err)
@@ -66,13 +73,13 @@ int ptx_grid_begin(struct ptx_grid *grid, uint64_t text_at, const struct station
     memcpy(head.magic, MAGIC, sizeof MAGIC);
     head.check = check_of_head(&head);
     grid->is_empty = 0;
-    return fwrite(&head, sizeof head, 1, grid->spool) == 1 ? 0 : fail_spool(grid, err);
+    return put(grid, &head, sizeof head, err);
 }
 
 static int widen(struct ptx_grid *grid, uint32_t column, uint32_t row, int first)
 {
-    const int larger = first || column < grid->column_min || column > grid->column_max || row < grid->row_min ||
-                       row > grid->row_max;
+    const int larger =
+        first || column < grid->column_min || column > grid->column_max || row < grid->row_min || row > grid->row_max;
     if (first || column < grid->column_min) grid->column_min = column;
     if (first || column > grid->column_max) grid->column_max = column;
     if (first || row < grid->row_min) grid->row_min = row;
@@ -90,12 +97,12 @@ int ptx_grid_cell(struct ptx_grid *grid, const struct ptx_cell *cell, struct sh_
     struct ptx_cell c = *cell;
     c.check = check_of_cell(&c);
     grid->n_cells++;
-    return fwrite(&c, sizeof c, 1, grid->spool) == 1 ? 0 : fail_spool(grid, err);
+    return put(grid, &c, sizeof c, err);
 }
 
 int ptx_grid_save(struct ptx_grid *grid, struct sh_err *err)
 {
-    return fflush(grid->spool) == 0 ? 0 : fail_spool(grid, err);
+    return !ferror(grid->spool) && fflush(grid->spool) == 0 ? 0 : fail_spool(grid, err);
 }
 
 static void blank(struct ptx_cell *column, uint32_t n_rows)
@@ -124,7 +131,8 @@ int ptx_grid_drain(struct ptx_grid *grid,
     uint64_t left = grid->n_cells;
     struct ptx_cell cell, *column = malloc(n_rows * sizeof *column);
     if (column == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory for a column of %u shots", grid->path, n_rows);
-    int rc = fflush(grid->spool) == 0 && fseeko(grid->spool, sizeof(struct ptx_head), SEEK_SET) == 0 ? 0 : fail_spool(grid, err);
+    int rc = ptx_grid_save(grid, err);
+    if (rc == 0 && fseeko(grid->spool, sizeof(struct ptx_head), SEEK_SET) != 0) rc = fail_spool(grid, err);
     if (rc == 0 && left > 0 && fread(&cell, sizeof cell, 1, grid->spool) != 1) rc = fail_spool(grid, err);
     for (uint64_t at = grid->column_min; rc == 0 && at <= grid->column_max; at++) {
         blank(column, n_rows);

@@ -15,7 +15,7 @@
 
 struct ptx_cell {
     uint32_t column, row;
-    float intensity;        /* 0..1 */
+    float intensity; /* 0..1 */
     uint8_t rgb[3];
     uint8_t check; /* of the other bytes; ptx_grid_cell sets it. No gap: cells are written as they are */
     double p_socs[3];

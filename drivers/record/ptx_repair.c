@@ -18,12 +18,12 @@ static const uint64_t MOST = (uint64_t)1 << 32; /* columns, rows */
 
 /* Where the text is in its grids. */
 struct place {
-    uint64_t at, grid_at;             /* bytes: behind the last line, and before the grid */
-    uint64_t columns, rows, n_lines;  /* of the grid; lines that were there */
-    uint64_t n_points;                /* of all */
-    uint64_t n_grids;                 /* that are whole */
-    size_t columns_len;               /* of the grid's first line */
-    int header, coloured;             /* lines of the header that were there */
+    uint64_t at, grid_at;            /* bytes: behind the last line, and before the grid */
+    uint64_t columns, rows, n_lines; /* of the grid; lines that were there */
+    uint64_t n_points;               /* of all */
+    uint64_t n_grids;                /* that are whole */
+    size_t columns_len;              /* of the grid's first line */
+    int header, coloured;            /* lines of the header that were there */
 };
 
 /* Numbers in a line; 0: there is something else. Spaces may follow them. */
@@ -72,7 +72,8 @@ static int take_point(struct place *p, const char *line, size_t len)
 static int take_line(void *ctx, const char *line, size_t len)
 {
     struct place *p = ctx;
-    if (len >= LINE_MOST || !(p->header < HEADER_LINES ? take_header(p, line, len) : take_point(p, line, len))) return 0;
+    if (len >= LINE_MOST || !(p->header < HEADER_LINES ? take_header(p, line, len) : take_point(p, line, len)))
+        return 0;
     p->header += p->header < HEADER_LINES;
     p->at += len + 1;
     if (p->header == HEADER_LINES && p->n_lines == p->columns * p->rows) {
@@ -123,8 +124,8 @@ static int set_columns(const struct repair *r, const struct place *p, uint64_t c
     char text[32];
     const int len = (int)p->columns_len, n = snprintf(text, sizeof text, "%-*" PRIu64, len, columns);
     if (n != len)
-        return sh_fail(err, SH_EFORMAT, "%s: the number of columns at byte %" PRIu64 " has no place for %" PRIu64, r->path,
-                       p->grid_at, columns);
+        return sh_fail(err, SH_EFORMAT, "%s: the number of columns at byte %" PRIu64 " has no place for %" PRIu64,
+                       r->path, p->grid_at, columns);
     return repair_write(r, p->grid_at, text, (size_t)n, err);
 }
 
@@ -163,7 +164,12 @@ static int put_grid(struct repair *r, struct ptx_grid *grid, const struct ptx_he
         rc = sh_fail(err, SH_EIO, "%s: cannot be cut: %s", r->path, strerror(errno));
     p->n_points += text.n_points;
     p->n_grids++;
-    return rc == SH_OK ? sync_file(r, err) : rc;
+    if (rc == SH_OK) rc = sync_file(r, err);
+    if (rc != SH_EIO) return rc;
+    return sh_fail(err, rc,
+                   "%s: cannot be written, with the grid that is in %s: its text needs as much room again; nothing is "
+                   "lost: make room, and begin again",
+                   r->path, grid->path);
 }
 
 static int end_grid(struct repair *r, struct ptx_grid *grid, struct place *p, struct sh_err *err)
@@ -179,8 +185,9 @@ static int end_grid(struct repair *r, struct ptx_grid *grid, struct place *p, st
     rc = head.text_at <= r->len ? read_text(r, head.text_at, p, err) : SH_OK;
     if (rc != SH_OK) return rc;
     if (head.text_at > r->len || p->at != head.text_at || p->header != 0)
-        return sh_fail(err, SH_EFORMAT, "%s: goes on from byte %" PRIu64 " of a PTX file, where %s has no end of a grid",
-                       grid->path, head.text_at, r->path);
+        return sh_fail(err, SH_EFORMAT,
+                       "%s: goes on from byte %" PRIu64 " of a PTX file, where %s has no end of a grid", grid->path,
+                       head.text_at, r->path);
     if (grid->row_max - grid->row_min >= PTX_ROWS_MAX)
         return sh_fail(err, SH_EFORMAT, "%s: has rows %u to %u; a grid has up to %d", grid->path, grid->row_min,
                        grid->row_max, PTX_ROWS_MAX);

@@ -52,8 +52,7 @@ static void say_progress(struct ptx_text *t, uint32_t n_rows)
     if (t->n_unsaid_rows < ROWS_BETWEEN_STOPS) return;
     t->n_unsaid_rows = 0;
     snprintf(what, sizeof what, "completing %s", t->file->path);
-    sh_progress(t->report, what,
-                (double)t->n_columns / ((double)t->grid->column_max - t->grid->column_min + 1));
+    sh_progress(t->report, what, (double)t->n_columns / ((double)t->grid->column_max - t->grid->column_min + 1));
 }
 
 /* The length, or LINE_MAX_LEN and more. */

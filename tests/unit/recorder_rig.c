@@ -183,7 +183,7 @@ void rig_check_disk_full(const char *path, rlim_t size)
     getrlimit(RLIMIT_FSIZE, &old);
     small = (struct rlimit){size, old.rlim_max};
     assert_int_equal(setrlimit(RLIMIT_FSIZE, &small), 0);
-    int rc = rig_record(path, (struct recorder_options){0}, 1, &err);
+    int rc = rig_record(path, (struct recorder_options){0}, RIG_KEEP_ALWAYS, &err);
     setrlimit(RLIMIT_FSIZE, &old);
     signal(SIGXFSZ, was);
     snprintf(part, sizeof part, "%s.part", path);

@@ -194,12 +194,138 @@ static int is_no_poses(const struct bytes *left)
     return end_of_lines(left, 0) == 0;
 }
 
+/* ---- .e57: what is between the CRCs of its pages */
+
+static struct bytes e57_content(const struct bytes *b)
+{
+    struct bytes c = {calloc(1, b->len + 1), 0};
+    for (size_t at = 0; at + 1024 <= b->len; at += 1024, c.len += 1020)
+        memcpy(c.data + c.len, b->data + at, 1020);
+    return c;
+}
+
+/* The next scan in the XML: records, and where its section is. 0: there is none. */
+static int e57_scan(const char **xml, unsigned long long *n, size_t *section)
+{
+    unsigned long long offset;
+    *xml = strstr(*xml, "<points type=\"CompressedVector\"");
+    if (*xml == NULL) return 0;
+    assert_int_equal(
+        sscanf((*xml)++, "<points type=\"CompressedVector\" fileOffset=\"%llu\" recordCount=\"%llu\"", &offset, n), 2);
+    *section = offset / 1024 * 1020 + offset % 1024;
+    return 1;
+}
+
+static const char *e57_xml(const struct bytes *file, const struct bytes *content)
+{
+    const size_t at = le_get64(file->data + 24);
+    return (const char *)content->data + at / 1024 * 1020 + at % 1024;
+}
+
+/* Packets of the whole file that end within what was left; the same bytes are in the repaired one. */
+static uint64_t check_e57(const struct bytes *whole, const struct bytes *left, const struct bytes *repaired)
+{
+    struct bytes w = e57_content(whole), r = e57_content(repaired);
+    const char *w_xml = e57_xml(whole, &w), *r_xml = e57_xml(repaired, &r);
+    const size_t there = left->len / 1024 * 1020;
+    unsigned long long n, said;
+    size_t section, again;
+    uint64_t all = 0;
+    assert_non_null(strstr(r_xml, "; repaired: its end is missing</description>"));
+    while (e57_scan(&w_xml, &n, &section) && section + 32 <= there) {
+        unsigned long long kept = 0, before = 0;
+        size_t at = section + 32;
+        while (before < n) {
+            const size_t len = le_get16(w.data + at + 2) + (size_t)1;
+            before += le_get16(w.data + at + 6) / 4; /* the first stream has 4 bytes a record */
+            at += len;
+            if (at > there) break;
+            assert_memory_equal(r.data + at - len, w.data + at - len, len);
+            kept = before;
+        }
+        assert_true(e57_scan(&r_xml, &said, &again));
+        assert_int_equal(said, kept);
+        assert_int_equal(again, section);
+        all += kept;
+    }
+    assert_false(e57_scan(&r_xml, &said, &again));
+    free(w.data);
+    free(r.data);
+    return all;
+}
+
+/* Before its first note (288 bytes from 48 on) and header (32) are there, which is in the first page. */
+static int is_no_e57(const struct bytes *left)
+{
+    return left->len < 1024 || memcmp(left->data + 64, "scanhead e57 1", 15) != 0;
+}
+
+/* ---- .ptx, and the grid beside it: a head of 120 bytes, cells of 40 */
+
+/* The next point of a text, behind its newline; NULL: there is no other. Lines of four numbers are points and the last lines
+ * of a header, which end in 0 or 1. */
+static const char *ptx_point(const char *at, const char *end, size_t *len)
+{
+    for (const char *stop; at < end && (stop = memchr(at, '\n', (size_t)(end - at))) != NULL; at = stop + 1) {
+        int spaces = 0;
+        for (const char *c = at; c < stop; c++)
+            spaces += *c == ' ';
+        *len = (size_t)(stop - at);
+        const int is_matrix = spaces == 3 && stop[-2] == ' ';
+        if (spaces == 3 && !is_matrix && strncmp(at, "0 0 0 0.5", 9) != 0) return at;
+    }
+    return NULL;
+}
+
+static uint64_t ptx_points(const struct bytes *b, size_t len)
+{
+    const char *at = (const char *)b->data, *end = at + (len < b->len ? len : b->len);
+    uint64_t n = 0;
+    for (size_t l; (at = ptx_point(at, end, &l)) != NULL; at += l)
+        n++;
+    return n;
+}
+
+static uint64_t check_ptx(const struct bytes *whole, const struct bytes *left, const struct bytes *repaired)
+{
+    const int has_grid = repair_beside.len >= 160;
+    uint64_t n = ptx_points(left, has_grid ? le_get64(repair_beside.data + 8) : left->len);
+    for (size_t at = 120; has_grid && at + 40 <= repair_beside.len; at += 40) {
+        float shine;
+        memcpy(&shine, repair_beside.data + at + 8, sizeof shine);
+        n += shine >= 0;
+    }
+    assert_int_equal(ptx_points(repaired, repaired->len), n);
+    const char *w = (const char *)whole->data, *w_end = w + whole->len;
+    const char *r = (const char *)repaired->data, *r_end = r + repaired->len;
+    for (size_t l, k; (r = ptx_point(r, r_end, &l)) != NULL; r += l, w += k) {
+        w = ptx_point(w, w_end, &k);
+        assert_true(w != NULL && k == l && memcmp(w, r, l) == 0);
+    }
+    return n;
+}
+
+static int is_no_ptx(const struct bytes *left)
+{
+    return repair_beside.len < 160 && ptx_points(left, left->len) == 0;
+}
+
+struct bytes repair_beside;
+
+const char *repair_row_beside(const struct repair_row *row)
+{
+    return strcmp(row->ending, ".ptx") == 0 ? ".grid" : NULL;
+}
+
 #define CLOUDCOMPARE                                                                                          \
     {                                                                                                         \
         "sh", "-c",                                                                                           \
             "rm -f *.asc; CloudCompare -SILENT -NO_TIMESTAMP -O -GLOBAL_SHIFT AUTO \"$F\" -C_EXPORT_FMT ASC " \
             "-SAVE_CLOUDS >/dev/null && cat *.asc && rm *.asc"                                                \
     }
+
+/* READERS: an absolute path, which the harness sets. */
+#define WEB_E57 "node --experimental-wasm-modules \"$READERS\"/e57.mjs \"$F\" e57.xyz && cat e57.xyz && rm e57.xyz"
 
 const struct repair_row repair_rows[] = {
     {"stream", ".shs", {NULL}, {NULL}, check_shs, is_no_shs},
@@ -212,5 +338,8 @@ const struct repair_row repair_rows[] = {
     {"colours", ".las", {"--colour", "label"}, {NULL}, check_las, is_no_las},
     {"old", ".las", {"--las-version", "1.2"}, CLOUDCOMPARE, check_las, is_no_las},
     {"stations", ".poses.csv", {NULL}, {NULL}, check_poses, is_no_poses},
+    {"scans", ".e57", {NULL}, {"sh", "-c", WEB_E57}, check_e57, is_no_e57},
+    {"shots", ".e57", {"--empty-shots", "--colour", "label"}, {NULL}, check_e57, is_no_e57},
+    {"grids", ".ptx", {NULL}, CLOUDCOMPARE, check_ptx, is_no_ptx},
 };
 const size_t n_repair_rows = sizeof repair_rows / sizeof repair_rows[0];

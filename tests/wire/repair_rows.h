@@ -24,6 +24,11 @@ struct repair_row {
 };
 
 extern const struct repair_row repair_rows[];
+
+/* The ending of a file beside the recording, FILE + that, of which a repair makes the rest of it: on a full disk it needs more
+ * room. The file goes with the repair. NULL: there is none. */
+const char *repair_row_beside(const struct repair_row *row);
+extern struct bytes repair_beside; /* what was left of that file */
 extern const size_t n_repair_rows;
 
 #endif

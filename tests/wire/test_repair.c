@@ -128,6 +128,21 @@ static void check_again(const char *path, const struct bytes *repaired)
     free(again.data);
 }
 
+static void path_beside(const struct repair_row *row, const char *path, char beside[160])
+{
+    const char *ending = repair_row_beside(row);
+    snprintf(beside, 160, "%s%s", path, ending != NULL ? ending : "");
+}
+
+static void read_beside(const struct repair_row *row, const char *path)
+{
+    char beside[160];
+    path_beside(row, path, beside);
+    free(repair_beside.data);
+    repair_beside = (struct bytes){NULL, 0};
+    if (access(beside, F_OK) == 0) repair_beside = slurp(beside);
+}
+
 static void check_left(const struct repair_row *row, const char *path, const struct bytes *whole, struct tally *tally)
 {
     char part[160], out[2048];
@@ -143,6 +158,7 @@ static void check_left(const struct repair_row *row, const char *path, const str
     }
     assert_int_equal(access(path, F_OK), -1);
     struct bytes left = slurp(part);
+    if (repair_row_beside(row) != NULL) read_beside(row, path);
     const int status = repair(random_below(2) ? path : part, out);
     if (row->is_none(&left)) {
         tally->none++;
@@ -153,6 +169,11 @@ static void check_left(const struct repair_row *row, const char *path, const str
     }
     if (status != 0) fail_msg("%s: %zu bytes were left, status %d: %s", path, left.len, status, out);
     assert_int_equal(access(part, F_OK), -1);
+    if (repair_row_beside(row) != NULL) {
+        char beside[160];
+        path_beside(row, path, beside);
+        assert_int_equal(access(beside, F_OK), -1);
+    }
     struct bytes repaired = slurp(path);
     const char *kept = strstr(out, ": kept ");
     if (kept == NULL) fail_msg("%s", out);
@@ -167,10 +188,12 @@ static void check_left(const struct repair_row *row, const char *path, const str
     free(repaired.data);
 }
 
-static void remove_both(const char *path)
+static void remove_all(const struct repair_row *row, const char *path)
 {
-    char part[160];
+    char part[160], beside[160];
     snprintf(part, sizeof part, "%s.part", path);
+    path_beside(row, path, beside);
+    if (repair_row_beside(row) != NULL) unlink(beside);
     unlink(path);
     unlink(part);
 }
@@ -243,7 +266,7 @@ static void kill_one_format(const struct repair_row *row, const struct bytes *wh
         if (tally.repaired > before && n_moments >= N_WITH_READERS && tally.repaired % N_WITH_READERS == 1 &&
             row->reader[0] != NULL)
             check_reader(row, path, tally.last_kept);
-        remove_both(path);
+        remove_all(row, path);
     }
     tell(row, "killed", &tally);
     assert_true(tally.repaired > 0 || whole->len < SMALL); /* of small files nothing is on the disk within a second */
@@ -266,8 +289,9 @@ static void fill(const struct repair_row *row, const struct bytes *whole, struct
     const char *at = strstr(said, says);
     if (at == NULL || strstr(at + 1, says) != NULL || strstr(said, "scanhead record --repair ") == NULL)
         fail_msg("%s: %s", path, said);
+    if (is_real && repair_row_beside(row) != NULL) assert_int_equal(mount("none", disk, NULL, MS_REMOUNT, "size=16m"), 0);
     check_left(row, path, whole, tally);
-    remove_both(path);
+    remove_all(row, path);
     if (is_real) assert_int_equal(umount(disk), 0);
 }
 
@@ -353,6 +377,9 @@ static int set_up(void **state)
     *state = NULL; /* that of each test is its row */
     if (n != NULL) n_moments = strtoull(n, NULL, 10);
     signal(SIGPIPE, SIG_IGN);
+    char readers[PATH_MAX];
+    if (realpath(getenv("READERS") != NULL ? getenv("READERS") : "build/readers", readers) != NULL)
+        setenv("READERS", readers, 1);
     char config[128], path[128];
     wire_write_text(wire, "yard.obj", YARD);
     snprintf(config, sizeof config, "%s", wire_write_text(wire, "config.yaml", CONFIG));
@@ -376,6 +403,7 @@ static int tear_down(void **state)
     (void)state;
     if (disk[0] != '\0') umount2(disk, MNT_DETACH);
     free(stream.data);
+    free(repair_beside.data);
     return wire_teardown(&folder);
 }
 
