@@ -43,6 +43,7 @@ int recording_rewind(struct recording *r, struct sh_err *err)
     r->timing = (struct timing){0};
     r->first = r->n = 0;
     r->at_end = r->restarted = 0;
+    r->last_t_ns = r->first_t_ns;
     return open_stream(r, err);
 }
 
@@ -115,7 +116,11 @@ int recording_next(struct recording *r, struct recording_frame *frame, struct sh
     }
     if (r->n == 0) return 0;
     const struct recording_item *item = item_of(r, 0);
-    if (!item->follows) r->last_t_ns = item->t_ns;
+    if (!item->follows) {
+        r->last_t_ns = item->t_ns;
+        if (!r->has_first) r->first_t_ns = item->t_ns;
+        r->has_first = 1;
+    }
     *frame = (struct recording_frame){item->bytes, item->len, r->last_t_ns, item->restarted};
     r->first = (r->first + 1) % RECORDING_QUEUE;
     r->n--;

@@ -34,7 +34,8 @@ struct recording {
     /* frames that wait, item i at i % RECORDING_QUEUE */
     struct recording_item item[RECORDING_QUEUE];
     uint32_t first, n;
-    int64_t last_t_ns;
+    int64_t last_t_ns, first_t_ns; /* of the frame given last; of the first one that has a time, once it was given */
+    int has_first;
     int at_end, restarted;
 };
 

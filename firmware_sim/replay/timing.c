@@ -42,8 +42,8 @@ static int find_first(const struct timing *t, const struct native_points *points
         return 1;
     }
     const double period_ns = (double)t->num / (double)t->den;
-    const double before = rint((double)points->t0_ns - (double)points->line_t0_ns / period_ns);
-    if (t->n_beams > 0 || before < 0.0 || before > (double)points->pulse0) return 0;
+    const double before = rint(((double)points->t0_ns - (double)points->line_t0_ns) / period_ns);
+    if (t->n_beams > 0 || !(before >= 0.0) || before >= 0x1p63 || before > (double)points->pulse0) return 0;
     *first = points->pulse0 - (uint64_t)before;
     return 1;
 }
