@@ -8,6 +8,10 @@
 -- What depends on earlier packets (sequence, scales, anchor, replies) is worked out when a packet is seen for the first
 -- time, and kept by packet: the same packet always shows the same. Written for Lua 5.2 and later.
 
+-- It may be installed, and named on the command line, too. An unknown name is nil here, or an error.
+local is_asked, known = pcall(Dissector.get, "scanhead")
+if is_asked and known then return end
+
 local scanhead = Proto("scanhead", "Scan head")
 local HEADER_LEN, MOST_PAYLOAD, MOST_REPLY, MOST_COMMAND, SYNC = 28, 65536, 512, 256, 0xd5
 local TYPES = {"Descriptor", "Anchor", "Points", "Line end", "Telemetry", "Event", "Surfaces", "Poses", "Attributes",
@@ -1370,12 +1374,18 @@ DissectorTable.get("ws.protocol"):add("scanhead-native-1", web)
 local USER0 = wtap and wtap.USER0 or wtap_encaps and wtap_encaps.USER0 or 45
 
 local port
+local others = DissectorTable.get("wtap_encap"):get_dissector(USER0) -- what Wireshark does with it by itself
 local function register()
   local tcp, encapsulations = DissectorTable.get("tcp.port"), DissectorTable.get("wtap_encap")
   if port then tcp:remove(port, scanhead) end
   port = scanhead.prefs.port
   tcp:add(port, scanhead)
-  if scanhead.prefs.user0 then encapsulations:add(USER0, scanhead) else encapsulations:remove(USER0, scanhead) end
+  if scanhead.prefs.user0 then
+    encapsulations:add(USER0, scanhead)
+  else
+    encapsulations:remove(USER0, scanhead)
+    if others then encapsulations:add(USER0, others) end
+  end
 end
 register()
 scanhead.prefs_changed = register
