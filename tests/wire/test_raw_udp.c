@@ -127,6 +127,47 @@ static void test_velodyne(void **state)
     captured_free(&captured);
 }
 
+/* ---- a group, which a driver reads at the same time */
+
+static int driver_open(const struct sockaddr_in *at)
+{
+    const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0), one = 1;
+    const struct ip_mreqn group = {.imr_multiaddr = at->sin_addr, .imr_address.s_addr = htonl(INADDR_LOOPBACK)};
+    assert_int_equal(setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one), 0);
+    assert_int_equal(bind(fd, (const struct sockaddr *)at, sizeof *at), 0);
+    assert_int_equal(setsockopt(fd, IPPROTO_IP, IP_ADD_MEMBERSHIP, &group, sizeof group), 0);
+    return fd;
+}
+
+static void test_group(void **state)
+{
+    struct wire *wire = *state;
+    struct captured captured;
+    struct sockaddr_in to = {.sin_family = AF_INET};
+    const struct in_addr lo = {htonl(INADDR_LOOPBACK)};
+    char got[8];
+    int port, fd;
+    struct raw_recorder recorder = raw_recorder_start(wire, "udp:239.1.2.3%lo:0", NULL);
+    assert_int_equal(sscanf(recorder.endpoint, "udp:239.1.2.3:%d", &port), 1);
+    to.sin_port = htons((uint16_t)port);
+    to.sin_addr.s_addr = htonl(0xef010203);
+    const int driver = driver_open(&to);
+    sender_open(&fd);
+    assert_int_equal(setsockopt(fd, IPPROTO_IP, IP_MULTICAST_IF, &lo, sizeof lo), 0);
+    assert_int_equal(sendto(fd, "to all", 6, 0, (struct sockaddr *)&to, sizeof to), 6);
+    struct pollfd slot = {.fd = driver, .events = POLLIN};
+    assert_int_equal(poll(&slot, 1, DEADLINE_MS), 1);
+    assert_int_equal(read(driver, got, sizeof got), 6);
+    close(fd);
+    close(driver);
+    raw_recorder_end(&recorder, SIGINT, 0, NULL);
+    captured_read(wire, &captured);
+    assert_int_equal(captured.n, 1);
+    assert_true(captured.packet[0].from == 0x7f000001 && captured.packet[0].to == 0xef010203);
+    assert_memory_equal(captured.packet[0].data, "to all", 6);
+    captured_free(&captured);
+}
+
 /* ---- a recorder that stands still while more comes than the kernel takes: what is missing is counted exactly */
 
 static void test_dropped(void **state)
@@ -252,6 +293,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test_setup_teardown(test_datagrams, wire_setup, wire_teardown),
                                        cmocka_unit_test_setup_teardown(test_velodyne, wire_setup, wire_teardown),
+                                       cmocka_unit_test_setup_teardown(test_group, wire_setup, wire_teardown),
                                        cmocka_unit_test_setup_teardown(test_dropped, wire_setup, wire_teardown),
                                        cmocka_unit_test_setup_teardown(test_nothing_came, wire_setup, wire_teardown),
                                        cmocka_unit_test_setup_teardown(test_duration, wire_setup, wire_teardown),
