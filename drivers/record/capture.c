@@ -34,8 +34,7 @@ int capture_add_statistics(struct capture *capture, uint32_t interface, int64_t 
                            uint64_t dropped, struct sh_err *err)
 {
     uint8_t block[PCAPNG_FRONT_ROOM];
-    return outfile_write(&capture->file, block,
-                         pcapng_put_statistics(block, interface, t_ns, received, dropped), err);
+    return outfile_write(&capture->file, block, pcapng_put_statistics(block, interface, t_ns, received, dropped), err);
 }
 
 int capture_flush(struct capture *capture, struct sh_err *err)

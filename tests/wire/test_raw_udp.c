@@ -101,8 +101,7 @@ static void test_velodyne(void **state)
     int port[2];
     struct raw_recorder recorder = raw_recorder_start(wire, "udp:127.0.0.1:0,0", NULL);
     read_ports(&recorder, port);
-    struct head head =
-        head_start(wire, velodyne_config(wire, port), (const char *const[]){"--duration", "0.3", NULL});
+    struct head head = head_start(wire, velodyne_config(wire, port), (const char *const[]){"--duration", "0.3", NULL});
     head_end(&head, 0);
     raw_recorder_end(&recorder, SIGTERM, 0, NULL);
     captured_read(wire, &captured);
@@ -237,8 +236,16 @@ static void test_disk_full(void **state)
 }
 
 #define FILE_OF "-o", file
-#define SAYS(...) (const char *const[]){__VA_ARGS__, NULL}
-#define ARGS(...) (const char *const[]){"record", __VA_ARGS__, NULL}
+#define SAYS(...)         \
+    (const char *const[]) \
+    {                     \
+        __VA_ARGS__, NULL \
+    }
+#define ARGS(...)                   \
+    (const char *const[])           \
+    {                               \
+        "record", __VA_ARGS__, NULL \
+    }
 
 static void test_usage(void **state)
 {

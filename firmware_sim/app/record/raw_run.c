@@ -65,8 +65,8 @@ static int64_t end_of(const struct raw *r, int64_t begin_ns)
 static void describe(const struct raw *r, char *text, size_t len)
 {
     const uint64_t dropped = r->ops->dropped(r);
-    const int n = snprintf(text, len, "%llu packets, %.3f MB", (unsigned long long)r->capture.packets,
-                           1e-6 * (double)r->bytes);
+    const int n =
+        snprintf(text, len, "%llu packets, %.3f MB", (unsigned long long)r->capture.packets, 1e-6 * (double)r->bytes);
     if (dropped != 0) snprintf(text + n, len - (size_t)n, ", %llu dropped", (unsigned long long)dropped);
 }
 
@@ -77,8 +77,8 @@ static int report(struct raw *r, int64_t now_ns, int64_t *next_ns, struct sh_err
     if (now_ns < *next_ns) return SH_OK;
     *next_ns = now_ns + SECOND_NS;
     describe(r, what + strlen(what), sizeof what - strlen(what));
-    const double done = r->duration_s > 0.0 && r->first_ns != 0
-                            ? 1e-9 * (double)(now_ns - r->first_ns) / r->duration_s : -1.0;
+    const double done =
+        r->duration_s > 0.0 && r->first_ns != 0 ? 1e-9 * (double)(now_ns - r->first_ns) / r->duration_s : -1.0;
     if (!r->quiet) sh_progress(&app_report_stderr, what, done < 1.0 ? done : 1.0);
     return capture_flush(&r->capture, err);
 }
