@@ -4,6 +4,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "drivers/protocol/bytes.h"
 #include "drivers/protocol/crc32c.h"
 
 uint64_t e57_logical(const struct e57_pages *pages)
@@ -16,11 +17,23 @@ uint64_t e57_physical(uint64_t logical)
     return logical / E57_PAGE_CONTENT * E57_PAGE + logical % E57_PAGE_CONTENT;
 }
 
+static void crc_of(const uint8_t *page, uint8_t out[4])
+{
+    const uint32_t crc = crc32c(0, page, E57_PAGE_CONTENT);
+    for (int i = 0; i < 4; i++)
+        out[i] = (uint8_t)(crc >> (24 - 8 * i));
+}
+
 static void seal(uint8_t *page)
 {
-    uint32_t crc = crc32c(0, page, E57_PAGE_CONTENT);
-    for (int i = 0; i < 4; i++)
-        page[E57_PAGE_CONTENT + i] = (uint8_t)(crc >> (24 - 8 * i));
+    crc_of(page, page + E57_PAGE_CONTENT);
+}
+
+int e57_page_is_right(const uint8_t page[E57_PAGE])
+{
+    uint8_t crc[4];
+    crc_of(page, crc);
+    return memcmp(crc, page + E57_PAGE_CONTENT, sizeof crc) == 0;
 }
 
 static int put_page(struct e57_pages *pages, struct sh_err *err)
@@ -54,23 +67,65 @@ int e57_finish(struct e57_pages *pages, struct sh_err *err)
     return rc != 0 ? rc : outfile_flush(pages->file, err);
 }
 
+int e57_keep_page(struct e57_pages *pages, struct sh_err *err)
+{
+    uint8_t page[E57_PAGE] = {0};
+    int rc = outfile_flush(pages->file, err); /* before the page, so that there is never a gap */
+    if (rc != 0 || pages->used == 0) return rc;
+    memcpy(page, pages->page, pages->used);
+    seal(page);
+    return outfile_patch(pages->file, pages->n_full * E57_PAGE, page, sizeof page, err);
+}
+
+/* n bytes within one page. */
+static int patch_page(struct e57_pages *pages, uint64_t logical, const uint8_t *p, size_t n, struct sh_err *err)
+{
+    uint8_t page[E57_PAGE];
+    const uint64_t number = logical / E57_PAGE_CONTENT;
+    const size_t first = logical % E57_PAGE_CONTENT;
+    if (number == pages->n_full) {
+        memcpy(pages->page + first, p, n);
+        return 0;
+    }
+    int rc = outfile_flush(pages->file, err);
+    if (rc != 0) return rc;
+    if (pread(pages->file->fd, page, E57_PAGE, (off_t)(number * E57_PAGE)) != E57_PAGE)
+        return sh_fail(err, SH_EIO, "%s: cannot read back: %s", pages->file->part, strerror(errno));
+    memcpy(page + first, p, n);
+    seal(page);
+    return outfile_patch(pages->file, number * E57_PAGE, page, E57_PAGE, err);
+}
+
 int e57_patch(struct e57_pages *pages, uint64_t logical, const void *data, size_t len, struct sh_err *err)
 {
     const uint8_t *p = data;
-    while (len > 0) {
-        uint8_t page[E57_PAGE];
-        uint64_t at = logical / E57_PAGE_CONTENT * E57_PAGE;
-        size_t first = logical % E57_PAGE_CONTENT, n = E57_PAGE_CONTENT - first;
+    int rc = 0;
+    while (rc == 0 && len > 0) {
+        size_t n = E57_PAGE_CONTENT - logical % E57_PAGE_CONTENT;
         if (n > len) n = len;
-        if (pread(pages->file->fd, page, E57_PAGE, (off_t)at) != E57_PAGE)
-            return sh_fail(err, SH_EIO, "%s: cannot read back: %s", pages->file->part, strerror(errno));
-        memcpy(page + first, p, n);
-        seal(page);
-        int rc = outfile_patch(pages->file, at, page, E57_PAGE, err);
-        if (rc != 0) return rc;
+        rc = patch_page(pages, logical, p, n, err);
         logical += n;
         p += n;
         len -= n;
     }
-    return 0;
+    return rc;
+}
+
+void e57_file_header(uint64_t n_pages, uint64_t xml, size_t xml_len, uint8_t out[E57_FILE_HEADER_LEN])
+{
+    memset(out, 0, E57_FILE_HEADER_LEN);
+    memcpy(out, "ASTM-E57", 8);
+    le_put32(out + 8, 1);
+    le_put64(out + 16, n_pages * E57_PAGE);
+    le_put64(out + 24, e57_physical(xml));
+    le_put64(out + 32, xml_len);
+    le_put64(out + 40, E57_PAGE);
+}
+
+void e57_section_header(uint64_t section, uint64_t len, uint8_t out[E57_SECTION_HEADER_LEN])
+{
+    memset(out, 0, E57_SECTION_HEADER_LEN);
+    out[0] = 1; /* a compressed vector */
+    le_put64(out + 8, len);
+    le_put64(out + 16, e57_physical(section + E57_SECTION_HEADER_LEN));
 }

@@ -5,7 +5,12 @@
 
 #include "drivers/record/outfile.h"
 
-enum { E57_PAGE = 1024, E57_PAGE_CONTENT = 1020 };
+enum {
+    E57_PAGE = 1024,
+    E57_PAGE_CONTENT = 1020,
+    E57_FILE_HEADER_LEN = 48,    /* at the file's begin */
+    E57_SECTION_HEADER_LEN = 32, /* before the packets of a scan */
+};
 
 struct e57_pages {
     struct outfile *file;
@@ -16,11 +21,19 @@ struct e57_pages {
 
 uint64_t e57_logical(const struct e57_pages *pages); /* where the next byte will be */
 uint64_t e57_physical(uint64_t logical);
+int e57_page_is_right(const uint8_t page[E57_PAGE]); /* its CRC is */
 
 int e57_put(struct e57_pages *pages, const void *data, size_t len, struct sh_err *err);
 /* Fills the page at hand with zeros and flushes the file. */
 int e57_finish(struct e57_pages *pages, struct sh_err *err);
-/* Overwrites content that is in the file: only after e57_finish. */
+/* Flushes, and puts the page at hand into the file as it is, with zeros behind. It is written again when it is full. */
+int e57_keep_page(struct e57_pages *pages, struct sh_err *err);
+/* Overwrites content. */
 int e57_patch(struct e57_pages *pages, uint64_t logical, const void *data, size_t len, struct sh_err *err);
+
+/* The file's own header, once everything else is there. */
+void e57_file_header(uint64_t n_pages, uint64_t xml, size_t xml_len, uint8_t out[E57_FILE_HEADER_LEN]);
+/* Of packets that follow it, without an index of them. section and len are logical. */
+void e57_section_header(uint64_t section, uint64_t len, uint8_t out[E57_SECTION_HEADER_LEN]);
 
 #endif

@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "drivers/record/crs_wkt.h"
-#include "drivers/record/e57_pages.h"
+#include "drivers/record/e57_note.h"
 
 /* Names from the stream may hold anything; what XML 1.0 has no place for becomes '?'. */
 static void put_string(FILE *out, const char *tag, const char *text)
@@ -121,7 +121,7 @@ static void put_colour_limits(FILE *out)
     fputs("</colorLimits>\n", out);
 }
 
-/* In the order in which e57.c writes the streams, and of their widths. */
+/* In the order of the packets' streams (e57_packet.h), and of their widths. */
 static void put_prototype(FILE *out, const struct e57_facts *facts, const struct e57_scan *s)
 {
     static const char *const xyz[] = {"cartesianX", "cartesianY", "cartesianZ"};
@@ -137,7 +137,7 @@ static void put_prototype(FILE *out, const struct e57_facts *facts, const struct
           "offset=\"0\">0</intensity>\n"
           "<isIntensityInvalid type=\"Integer\" minimum=\"0\" maximum=\"1\">0</isIntensityInvalid>\n",
           out);
-    for (int i = 0; i < 3 && facts->track->has_colours; i++)
+    for (int i = 0; i < 3 && facts->has_colours; i++)
         fprintf(out, "<color%s type=\"Integer\" minimum=\"0\" maximum=\"255\">0</color%s>\n", colour_name[i],
                 colour_name[i]);
     fputs("<timeStamp type=\"Float\" precision=\"double\">0</timeStamp>\n"
@@ -152,17 +152,21 @@ static void put_prototype(FILE *out, const struct e57_facts *facts, const struct
 
 static void put_scan(FILE *out, const struct e57_facts *facts, const struct e57_scan *s)
 {
-    char name[64];
+    char name[64], text[sizeof s->idn + 64];
     snprintf(name, sizeof name, "scan %u, station %u", s->number, s->station);
     open_structure(out, "vectorChild");
     put_guid(out, s, sizeof *s);
     put_string(out, "name", name);
-    put_string(out, "description", s->idn);
+    snprintf(text, sizeof text, "%s%s", s->idn,
+             facts->is_incomplete && s->number == facts->n_scans ? "; repaired: its end is missing" : "");
+    put_string(out, "description", text);
     put_string(out, "sensorModel", s->profile);
     put_pose(out, &s->pose);
     if (s->have_start) put_time(out, "acquisitionStart", s->start_gps_s);
     put_bounds(out, s);
-    if (facts->track->has_colours) put_colour_limits(out);
+    if (facts->has_colours) put_colour_limits(out);
+    fprintf(out, "<sh:begin type=\"Blob\" fileOffset=\"%" PRIu64 "\" length=\"%d\"></sh:begin>\n",
+            e57_physical(s->note), E57_NOTE_LEN - E57_BLOB_HEADER_LEN);
     fprintf(out, "<points type=\"CompressedVector\" fileOffset=\"%" PRIu64 "\" recordCount=\"%" PRIu64 "\">\n",
             e57_physical(s->section), s->n_records);
     put_prototype(out, facts, s);
@@ -182,7 +186,7 @@ static void put_root(FILE *out, const struct e57_facts *facts)
     put_integer(out, "versionMinor", 0);
     put_string(out, "e57LibraryVersion", "scanhead");
     if (facts->n_scans > 0 && facts->scan[0].have_start) put_time(out, "creationDateTime", facts->scan[0].start_gps_s);
-    if (crs_wkt(facts->track->epsg, facts->track->geoid_heights, wkt) > 0) put_string(out, "coordinateMetadata", wkt);
+    if (crs_wkt(facts->epsg, facts->geoid_heights, wkt) > 0) put_string(out, "coordinateMetadata", wkt);
     fputs("<data3D type=\"Vector\" allowHeterogeneousChildren=\"1\">\n", out);
     for (uint32_t i = 0; i < facts->n_scans; i++)
         put_scan(out, facts, &facts->scan[i]);

@@ -8,11 +8,11 @@
 
 #include "core/err.h"
 #include "drivers/record/station_pose.h"
-#include "drivers/record/track.h"
 
 /* One scan: an entry of data3D. Coordinates in the head's frame. */
 struct e57_scan {
-    uint64_t section;     /* logical offset of its binary section */
+    uint64_t note;        /* logical offset of what stands before it (e57_note.h) */
+    uint64_t section;     /* of its binary section */
     uint64_t section_len; /* logical */
     uint64_t n_records, n_points;
     uint32_t number, station; /* in the file, from 1 */
@@ -30,8 +30,9 @@ struct e57_scan {
 };
 
 struct e57_facts {
-    const struct track *track; /* whose CRS is the file's */
-    int empty_shots;
+    int epsg, geoid_heights; /* of the file's CRS; epsg 0: none */
+    int empty_shots, has_colours;
+    int is_incomplete; /* the end of its last scan, and what came after it, is missing */
     struct e57_scan *scan;
     uint32_t n_scans;
 };

@@ -78,6 +78,9 @@ struct recorder_ops {
     int (*frame)(void *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
     /* All points have come: completes the file (counts in the header) and reports what it had no room for. */
     int (*finish)(void *rec, struct sh_err *err);
+    /* Now and then, about once a second of a long recording: what has come goes to the disk, so that a repair finds it
+     * there. NULL: flushing the file is enough. */
+    int (*save)(void *rec, struct sh_err *err);
     /* Frees what the recorder's own struct holds; also after begin has failed. */
     void (*release)(void *rec);
     /* Makes a whole file of what was left of one (repair.h). SH_EFORMAT: it is none of this format, or too little came to
@@ -100,7 +103,10 @@ void recorder_set_limits(struct recorder *rec, double low, double high);
 /* Each frame of the stream, in order, with the handle for information, points and surfaces. The handle must
  * live until close. Whole scans may come from different handles: heads in one scene, whose labels mean the same. */
 int recorder_frame(struct recorder *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
-/* Finishes the file, syncs and renames it; keep = 0: throws it away. rec is freed, also after a failure. */
+/* About once a second: what has come and would wait in memory goes to the disk. */
+int recorder_save(struct recorder *rec, struct sh_err *err);
+/* Finishes the file, syncs and renames it; keep = 0: throws it away. rec is freed, also after a failure. Where it fails, what
+ * came to the disk stays as PATH.part, if the format can be repaired; a note in the report says so. */
 int recorder_close(struct recorder *rec, int keep, struct sh_err *err);
 
 /* For formats: reports "PATH: n what", unless n is 0. */

@@ -1,0 +1,16 @@
+/* The end of an E57 file, for its recorder and for its repair: what makes a whole file of the points in it. */
+#ifndef DRIVERS_RECORD_E57_END_H
+#define DRIVERS_RECORD_E57_END_H
+
+#include "drivers/record/e57_pages.h"
+#include "drivers/record/e57_xml.h"
+#include "drivers/record/repair.h"
+
+/* Puts the XML section, cuts what is behind it, then writes the headers of the scans, and last, once all that is on the
+ * disk, the file's own. report: its stop gives up; may be NULL. */
+int e57_end(struct e57_pages *pages, const struct e57_facts *facts, const struct sh_report *report, struct sh_err *err);
+
+/* recorder_ops.repair: keeps all whole packets. */
+int e57_repair(struct repair *repair, struct sh_err *err);
+
+#endif

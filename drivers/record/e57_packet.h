@@ -1,0 +1,56 @@
+/* Data packets of an E57 file (ASTM E2807), as our files have them: each field of a record has a stream of its own in the
+ * packet, of as many bits per record as its range needs. All packets of a scan but its last hold a number of records that
+ * is a multiple of 8, so that no stream of bits runs across packets.
+ *
+ *   type = 1, flags = 0   2 x uint8
+ *   length of the packet less 1, number of streams   2 x uint16
+ *   length of each stream   uint16 each
+ *   streams, in the order of enum e57_stream; zeros up to a multiple of 4
+ *
+ * Records go in, bytes come out; what the XML section says of a scan is counted from these bytes, by the recorder and by
+ * the repair of what it left. Pure. */
+#ifndef DRIVERS_RECORD_E57_PACKET_H
+#define DRIVERS_RECORD_E57_PACKET_H
+
+#include "drivers/record/e57_xml.h"
+
+enum {
+    E57_PACKET_HEADER_LEN = 6,
+    E57_PACKET_RECORDS = 1920,  /* a multiple of 8; their packet is shorter than 64 KiB */
+    E57_PACKET_COLOURED = 1792, /* likewise, with colours */
+    E57_PACKET_MAX = 65536,
+};
+enum e57_stream {
+    E57_X, /* coordinates are counted from the least int32 */
+    E57_Y,
+    E57_Z,
+    E57_INVALID, /* where there are shots without echo: 2 */
+    E57_INTENSITY,
+    E57_NO_INTENSITY,
+    E57_RED, /* where there are colours */
+    E57_GREEN,
+    E57_BLUE,
+    E57_TIME,
+    E57_RETURN,
+    E57_RETURNS,
+    E57_ROW,
+    E57_COLUMN,
+    E57_LABEL,
+    E57_N_STREAMS
+};
+
+struct e57_packet {
+    unsigned n; /* records in the streams */
+    uint8_t stream[E57_N_STREAMS][E57_PACKET_RECORDS * 8];
+};
+
+/* The low `bits` of v as record i of a stream; a byte holds several, from its low end. */
+void e57_put_bits(uint8_t *stream, unsigned bits, unsigned i, unsigned v);
+/* The packet of the first n <= packet->n records; those after them, fewer than 8 where there are some, become the first
+ * ones. Its length. */
+size_t e57_packet_make(struct e57_packet *packet, const struct e57_facts *facts, unsigned n,
+                       uint8_t out[E57_PACKET_MAX]);
+/* Adds the packet to what is known of its scan. -1: it is none of this file. */
+int e57_packet_count(const uint8_t *packet, size_t len, const struct e57_facts *facts, struct e57_scan *scan);
+
+#endif

@@ -1,0 +1,27 @@
+/* E57 files by a small reader of their own: pages, sections, packets and bit streams as ASTM E2807 has them. It shares
+ * nothing with the project's writer. One file at a time. */
+#ifndef TESTS_UNIT_E57_RIG_H
+#define TESTS_UNIT_E57_RIG_H
+
+#include "tests/unit/recorder_rig.h"
+
+struct e57rig_record {
+    double x, y, z, intensity, t_s;
+    unsigned invalid, no_intensity, echo, echoes;
+    uint32_t row, column;
+    unsigned label;
+    uint8_t rgb[3]; /* where there are colours */
+};
+extern struct e57rig_record e57rig_record[8192];
+extern size_t e57rig_n_records;
+extern char *e57rig_xml; /* the XML section, as a string */
+
+/* Checks the CRCs and the file's header, and finds the XML. */
+void e57rig_read(const char *path);
+/* Scan k of the file, from 0, by what the XML says of it. */
+void e57rig_scan(int k, int empty_shots, int coloured);
+/* The value of the first such element. */
+double e57rig_number(const char *from, const char *tag);
+void e57rig_free(void);
+
+#endif

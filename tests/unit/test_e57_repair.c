@@ -1,0 +1,387 @@
+/* E57 files whose recorder was killed, or whose disk was full: what a repair makes of them, wherever they end. */
+#include "tests/unit/e57_rig.h"
+#include "tests/unit/repair_rig.h"
+
+enum { PAGE = 1024, CONTENT = 1020, MAX_PACKETS = 128, MAX_SCANS = 4 };
+
+/* Of the complete recording, by its XML and the lengths of its packets: where each scan's packets begin, and each packet
+ * ends, without the CRCs; records up to there. */
+static struct {
+    size_t end, n;
+    int scan;
+} packet[MAX_PACKETS];
+static int n_packets, n_scans;
+static const char MISSING[] = "; repaired: its end is missing";
+static size_t scan_begin[MAX_SCANS];
+static uint8_t *whole, *left; /* the complete file; that on the disk just before */
+static size_t whole_len, left_len;
+static int empty_shots, coloured;
+
+static size_t logical(size_t physical)
+{
+    return physical / PAGE * CONTENT + physical % PAGE;
+}
+
+static const uint8_t *at_logical(const uint8_t *file, size_t at)
+{
+    return file + at / CONTENT * PAGE + at % CONTENT;
+}
+
+static uint16_t word_at(const uint8_t *file, size_t at)
+{
+    return (uint16_t)(*at_logical(file, at) | *at_logical(file, at + 1) << 8);
+}
+
+static void find_packets(void)
+{
+    const char *at = e57rig_xml;
+    n_packets = n_scans = 0;
+    for (; (at = strstr(at, "<points type=\"CompressedVector\"")) != NULL; at++, n_scans++) {
+        unsigned long long offset, count;
+        size_t p, n = 0;
+        assert_int_equal(
+            sscanf(at, "<points type=\"CompressedVector\" fileOffset=\"%llu\" recordCount=\"%llu\"", &offset, &count),
+            2);
+        p = scan_begin[n_scans] = logical(offset) + 32;
+        do {
+            n += word_at(whole, p + 6) / 4u; /* the first stream has 4 bytes a record */
+            p += word_at(whole, p + 2) + (size_t)1;
+            assert_true(n_packets < MAX_PACKETS);
+            packet[n_packets].end = p;
+            packet[n_packets].n = n;
+            packet[n_packets++].scan = n_scans;
+        } while (n < count);
+        assert_int_equal(n, count);
+    }
+}
+
+static void keep_left(const char *path)
+{
+    free(left);
+    left = rig_read(path, &left_len);
+}
+
+/* Lines with a second or more between them, so that packets are short; the last point of the stream comes too late for any
+ * packet but that of the end. */
+static void record_scans(void)
+{
+    static struct rig_point p[40];
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1);
+    static const int n_lines[] = {6, 1, 9};
+    const char *path = rig_path("a.e57");
+    rig_begin();
+    for (uint32_t scan = 0; scan < 3; scan++) {
+        a.station = scan + 1;
+        a.anchor[0] += 7;
+        rig_descriptor(1, scan + 1);
+        rig_anchor(&a);
+        for (uint32_t line = 0; line < (uint32_t)n_lines[scan]; line++) {
+            for (int i = 0; i < 40; i++)
+                p[i] = i % 7 == 3 ? (struct rig_point){0, 0, 0, INT16_MIN, 0xffff, 0, 0}
+                                  : (struct rig_point){i + (int)scan, -i, (int)line, (int16_t)(10 * i - (int)line),
+                                                       (uint16_t)i,   1,  1};
+            rig_points(line, 1100 * line, 1100 * line + line % 3, p, 23 + line);
+        }
+    }
+    const struct colour_choice colour = {.given = coloured, .scale.mode = COLOUR_LABEL};
+    repair_rig_record(path, (struct recorder_options){.empty_shots = empty_shots, .colour = colour}, keep_left);
+    e57rig_read(path);
+    free(whole);
+    whole = rig_read(path, &whole_len);
+    unlink(path);
+    find_packets();
+    assert_int_equal(n_scans, 3);
+}
+
+/* What the first `len` bytes hold. */
+static void expect_of(size_t len, int *scans, int *packets)
+{
+    const size_t there = len / PAGE * CONTENT;
+    for (*scans = 0; *scans < n_scans && scan_begin[*scans] <= there;)
+        ++*scans;
+    for (*packets = 0; *packets < n_packets && packet[*packets].end <= there;)
+        ++*packets;
+}
+
+static struct e57rig_record *truth; /* of the complete file, scan by scan */
+static size_t truth_from[MAX_SCANS + 1];
+
+static void read_truth(void)
+{
+    const char *path = rig_path("a.e57");
+    free(truth);
+    truth = NULL;
+    repair_rig_write(path, whole, whole_len);
+    e57rig_read(path);
+    for (int k = 0; k < n_scans; k++) {
+        e57rig_scan(k, empty_shots, coloured);
+        truth_from[k + 1] = truth_from[k] + e57rig_n_records;
+        truth = realloc(truth, truth_from[k + 1] * sizeof *truth);
+        memcpy(truth + truth_from[k], e57rig_record, e57rig_n_records * sizeof *truth);
+    }
+    unlink(path);
+}
+
+/* The XML's bounds are those of the records. */
+static void check_bounds(const char *xml)
+{
+    double low = INFINITY, high = -INFINITY, faint = INFINITY, bright = -INFINITY;
+    uint32_t row_max = 0, column_max = 0;
+    for (size_t i = 0; i < e57rig_n_records; i++) {
+        const struct e57rig_record *r = &e57rig_record[i];
+        if (r->row > row_max) row_max = r->row;
+        if (r->column > column_max) column_max = r->column;
+        if (r->invalid != 0) continue;
+        low = fmin(low, r->x);
+        high = fmax(high, r->x);
+        if (r->no_intensity == 0) faint = fmin(faint, r->intensity);
+        if (r->no_intensity == 0) bright = fmax(bright, r->intensity);
+    }
+    if (e57rig_n_records == 0) return;
+    assert_true(fabs(e57rig_number(xml, "xMinimum") - low) < 1e-9 &&
+                fabs(e57rig_number(xml, "xMaximum") - high) < 1e-9);
+    assert_true(fabs(e57rig_number(xml, "intensityMinimum") - faint) < 1e-9 &&
+                fabs(e57rig_number(xml, "intensityMaximum") - bright) < 1e-9);
+    assert_true(e57rig_number(xml, "rowMaximum") == row_max && e57rig_number(xml, "columnMaximum") == column_max);
+}
+
+/* Exactly the first records of each scan, and as many scans. */
+static void check_file(const char *path, int scans, int packets)
+{
+    size_t n[MAX_SCANS] = {0}, at = 0;
+    for (int i = 0; i < packets; i++)
+        n[packet[i].scan] = packet[i].n;
+    e57rig_read(path);
+    const char *child = e57rig_xml;
+    for (int k = 0; k < scans; k++) {
+        child = strstr(child + 1, "<vectorChild");
+        assert_non_null(child);
+        e57rig_scan(k, empty_shots, coloured);
+        assert_int_equal(e57rig_n_records, n[k]);
+        assert_memory_equal(e57rig_record, truth + truth_from[k], n[k] * sizeof *truth);
+        check_bounds(child);
+        at++;
+    }
+    assert_null(strstr(child + 1, "<vectorChild"));
+    assert_int_equal(at, scans);
+}
+
+static int already_seen(int scans, int packets, const uint8_t *file, size_t len)
+{
+    static uint8_t *seen[MAX_SCANS + 1][MAX_PACKETS + 1];
+    static size_t seen_len[MAX_SCANS + 1][MAX_PACKETS + 1];
+    if (file == NULL) { /* forget them */
+        for (int s = 0; s <= MAX_SCANS; s++)
+            for (int p = 0; p <= MAX_PACKETS; p++) {
+                free(seen[s][p]);
+                seen[s][p] = NULL;
+            }
+        return 0;
+    }
+    if (seen[scans][packets] != NULL) {
+        assert_int_equal(len, seen_len[scans][packets]);
+        assert_memory_equal(file, seen[scans][packets], len);
+        return 1;
+    }
+    seen[scans][packets] = malloc(len);
+    memcpy(seen[scans][packets], file, len);
+    seen_len[scans][packets] = len;
+    return 0;
+}
+
+/* Wherever the same packets are left, the same file comes out; it is looked into once. */
+static void check_cut(const char *path, const uint8_t *from, size_t len)
+{
+    struct repair repair;
+    struct sh_err err;
+    int scans, packets;
+    size_t n = 0, now;
+    expect_of(len, &scans, &packets);
+    repair_rig_write(path, from, len);
+    int rc = repair_rig_repair(path, &repair, &err);
+    if (scans == 0) {
+        assert_int_equal(rc, SH_EFORMAT);
+        assert_non_null(strstr(err.text, "no scan begins in it"));
+        return;
+    }
+    if (rc != 0) fail_msg("%zu bytes: %s", len, err.text);
+    for (int i = 0; i < packets; i++)
+        n += packet[i].n - (i > 0 && packet[i - 1].scan == packet[i].scan ? packet[i - 1].n : 0);
+    assert_int_equal(repair.n_kept, n);
+    assert_int_equal(repair.n_scans, scans);
+    assert_int_equal(repair.was_whole, from == whole && len == whole_len);
+    assert_true(repair.cut_bytes <= len);
+    uint8_t *file = rig_read(path, &now);
+    assert_int_equal(memmem(file, now, MISSING, sizeof MISSING - 1) == NULL, repair.was_whole);
+    if (repair.was_whole) {
+        assert_memory_equal(file, whole, whole_len);
+        free(file);
+        return;
+    }
+    if (!already_seen(scans, packets, file, now)) {
+        check_file(path, scans, packets);
+        assert_int_equal(repair_rig_repair(path, &repair, &err), 0);
+        assert_int_equal(repair.was_whole, 1);
+        assert_int_equal(repair.n_kept, n);
+        size_t again_len;
+        uint8_t *again = rig_read(path, &again_len);
+        assert_int_equal(again_len, now);
+        assert_memory_equal(again, file, now);
+        free(again);
+    }
+    free(file);
+}
+
+/* At the edges of pages, where anything changes, and a byte before. */
+static void test_cuts(void **state)
+{
+    (void)state;
+    for (int kind = 0; kind < 3; kind++) {
+        const char *path = rig_path("cut.e57");
+        empty_shots = kind > 0;
+        coloured = kind > 1;
+        record_scans();
+        read_truth();
+        for (size_t len = 0; len <= left_len; len += len % PAGE == 0 ? PAGE - 1 : 1)
+            check_cut(path, left, len);
+        already_seen(0, 0, NULL, 0);
+        unlink(path);
+    }
+}
+
+/* Without what says that it was repaired; free() it. */
+static char *xml_of(const char *path)
+{
+    e57rig_read(path);
+    char *xml = strdup(e57rig_xml), *at = strstr(xml, MISSING);
+    if (at != NULL) memmove(at, at + sizeof MISSING - 1, strlen(at + sizeof MISSING - 1) + 1);
+    return xml;
+}
+
+/* A file that was being completed, or a whole one of which the end is missing: once all points are there, the same file comes
+ * out, and says that its end may be missing. */
+static void test_end(void **state)
+{
+    (void)state;
+    const char *path = rig_path("cut.e57");
+    struct repair repair;
+    struct sh_err err;
+    empty_shots = coloured = 0;
+    record_scans();
+    read_truth();
+    for (size_t cut = 0; cut < whole_len; cut += PAGE)
+        check_cut(path, whole, whole_len - cut);
+    already_seen(0, 0, NULL, 0);
+    repair_rig_write(path, whole, whole_len);
+    char *want = xml_of(path);
+    const size_t end = packet[n_packets - 1].end / CONTENT * PAGE; /* pages before the XML */
+    for (int header = 0; header < 2; header++) { /* the file's own header, and those of the scans, are not there yet */
+        size_t len;
+        uint8_t *part = malloc(whole_len);
+        memcpy(part, whole, whole_len);
+        memcpy(part, left, header ? PAGE : left_len / PAGE * PAGE - PAGE);
+        repair_rig_write(path, part, whole_len - (header ? 0 : 1));
+        assert_int_equal(repair_rig_repair(path, &repair, &err), 0);
+        assert_int_equal(repair.was_whole, 0);
+        assert_int_equal(repair.cut_bytes, 0);
+        free(part);
+        char *xml = xml_of(path);
+        assert_string_equal(xml, want);
+        free(xml);
+        part = rig_read(path, &len);
+        assert_memory_equal(part + PAGE, whole + PAGE, end - PAGE);
+        free(part);
+    }
+    free(want);
+    unlink(path);
+}
+
+/* What is no E57 file of ours, and what is damaged within, is refused in one line and left as it was. */
+static void test_refused(void **state)
+{
+    (void)state;
+    const char *path = rig_path("cut.e57");
+    struct repair repair;
+    struct sh_err err;
+    size_t len;
+    empty_shots = coloured = 0;
+    record_scans();
+    static const char text[3000] = "ply\nformat ascii 1.0\n";
+    repair_rig_write(path, text, sizeof text);
+    assert_int_equal(repair_rig_repair(path, &repair, &err), SH_EFORMAT);
+    repair_rig_write(path, "", 0);
+    assert_int_equal(repair_rig_repair(path, &repair, &err), SH_EFORMAT);
+    for (size_t at = 5; at < left_len - PAGE; at += 2777) {
+        left[at] ^= 0x40;
+        repair_rig_write(path, left, left_len);
+        assert_int_equal(repair_rig_repair(path, &repair, &err), SH_EFORMAT);
+        assert_non_null(strstr(err.text, "damaged"));
+        assert_null(strchr(err.text, '\n'));
+        uint8_t *now = rig_read(path, &len);
+        assert_int_equal(len, left_len);
+        assert_memory_equal(now, left, len);
+        free(now);
+        left[at] ^= 0x40;
+    }
+    unlink(path);
+}
+
+static void reseal(uint8_t *page)
+{
+    uint32_t crc = 0xffffffff;
+    for (size_t i = 0; i < 8 * CONTENT; i++)
+        crc = (crc & 1) ^ (page[i / 8] >> i % 8 & 1u) ? crc >> 1 ^ 0x82f63b78 : crc >> 1;
+    for (int i = 0; i < 4; i++)
+        page[CONTENT + i] = (uint8_t)(~crc >> (24 - 8 * i));
+}
+
+/* Any byte of notes, headers and packets may say anything, with a right CRC: nothing worse than a refusal comes of it, and a
+ * file that was repaired is whole. */
+static void test_absurd(void **state)
+{
+    (void)state;
+    const char *path = rig_path("cut.e57");
+    struct repair repair;
+    struct sh_err err;
+    uint32_t random = 12345;
+    int refused = 0;
+    empty_shots = coloured = 1;
+    record_scans();
+    for (int i = 0; i < 200; i++) {
+        uint8_t *file = malloc(left_len);
+        memcpy(file, left, left_len);
+        random = random * 1664525 + 1013904223;
+        const size_t at = i < 100 ? 40 + (size_t)i * 4 : random % left_len / PAGE * PAGE + random % 97 * 10;
+        memset(file + at, i % 2 ? 0xff : (int)(random >> 24), 1 + random % 8);
+        for (size_t p = 0; p + PAGE <= left_len; p += PAGE)
+            reseal(file + p);
+        repair_rig_write(path, file, left_len);
+        free(file);
+        int rc = repair_rig_repair(path, &repair, &err);
+        refused += rc != 0;
+        if (rc != 0) assert_int_equal(rc, SH_EFORMAT);
+        if (rc == 0) e57rig_read(path);
+    }
+    assert_true(refused > 20 && refused < 180);
+    unlink(path);
+}
+
+static int tear_down(void **state)
+{
+    e57rig_free();
+    free(whole);
+    free(left);
+    free(truth);
+    return rig_tear_down(state);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_cuts),
+        cmocka_unit_test(test_end),
+        cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_absurd),
+    };
+    return cmocka_run_group_tests(tests, rig_set_up, tear_down);
+}
