@@ -220,19 +220,38 @@ static void test_duration(void **state)
     raw_recorder_end(&recorder, 0, 0, "1 packets");
 }
 
-/* A file that may have 8 KiB: an error, and no half of a file under its name. */
+/* A file that may have 8 KiB: an error, and no half of a file under its name. What was written is repaired. */
 static void test_disk_full(void **state)
 {
     struct wire *wire = *state;
-    static uint8_t data[LARGEST];
+    uint8_t data[1000];
+    char file[352];
+    struct captured captured;
     int port, fd;
     struct raw_recorder recorder = raw_recorder_start_limited(wire, "udp:127.0.0.1:0", "16");
     assert_int_equal(sscanf(recorder.endpoint, "udp:127.0.0.1:%d", &port), 1);
     sender_open(&fd);
-    send_to(fd, port, data, sizeof data);
+    for (int i = 0; i < 20; i++) {
+        memset(data, i, sizeof data);
+        send_to(fd, port, data, sizeof data);
+    }
     close(fd);
     raw_recorder_end(&recorder, SIGINT, 1, "cap.pcapng.part: cannot write: File too large");
-    assert_int_equal(access(wire_path(wire, "cap.pcapng"), F_OK), -1);
+    snprintf(file, sizeof file, "%s", wire_path(wire, "cap.pcapng"));
+    assert_int_equal(access(file, F_OK), -1);
+    const char *const again[] = {"record", "udp:127.0.0.1:0", "--raw", "-o", file, NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, again, "out", "err", -1)), 2);
+    const char *const repair[] = {"record", "--repair", file, "--quiet", NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, repair, "out", "err", -1)), 0);
+    captured_read(wire, &captured);
+    /* 8192 bytes hold the front, of 300 bytes at most, and blocks of 28 + 1042 + 2 + 4 bytes. */
+    assert_int_equal(captured.n, 7);
+    for (uint32_t i = 0; i < captured.n; i++) {
+        memset(data, (int)i, sizeof data);
+        assert_int_equal(captured.packet[i].len, sizeof data);
+        assert_memory_equal(captured.packet[i].data, data, sizeof data);
+    }
+    captured_free(&captured);
 }
 
 #define FILE_OF "-o", file
