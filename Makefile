@@ -258,7 +258,7 @@ soak: deps-build
 N ?= 200
 repair: deps-build
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test all $(BUILD)/test/tests/wire/test_repair
-	@REPAIR_N=$(N) SCANHEAD=$(BUILD)/test/scanhead $(BUILD)/test/tests/wire/test_repair
+	@REPAIR_N=$(N) $(RUN) $(BUILD)/test/tests/wire/test_repair
 
 # 600 broken meshes, with and without sanitizers (there `make test` tries every tenth): half a minute.
 test-hostile: deps
