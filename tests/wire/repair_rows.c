@@ -324,9 +324,6 @@ const char *repair_row_beside(const struct repair_row *row)
             "-SAVE_CLOUDS >/dev/null && cat *.asc && rm *.asc"                                                \
     }
 
-/* READERS: an absolute path, which the harness sets. */
-#define WEB_E57 "node --experimental-wasm-modules \"$READERS\"/e57.mjs \"$F\" e57.xyz && cat e57.xyz && rm e57.xyz"
-
 /* npm's; count and bounds come first. 127: it is not installed. */
 #define LOADERS_GL                                                                                                                \
     {                                                                                                                             \
@@ -334,6 +331,9 @@ const char *repair_row_beside(const struct repair_row *row)
             "[ -e \"$READERS/installed\" ] || exit 127; node --experimental-wasm-modules \"$READERS/las.mjs\" \"$F\" las.xyz && " \
             "tail -n +3 las.xyz && rm las.xyz"                                                                                    \
     }
+
+/* READERS: an absolute path, which the harness sets. */
+#define WEB_E57 "[ -e \"$READERS/installed\" ] || exit 127; node --experimental-wasm-modules \"$READERS\"/e57.mjs \"$F\" e57.xyz && cat e57.xyz && rm e57.xyz"
 
 const struct repair_row repair_rows[] = {
     {"stream", ".shs", {NULL}, {NULL}, check_shs, is_no_shs},

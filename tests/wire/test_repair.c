@@ -189,14 +189,20 @@ static void check_left(const struct repair_row *row, const char *path, const str
     free(repaired.data);
 }
 
-static void remove_all(const struct repair_row *row, const char *path)
+static void remove_both(const char *path)
 {
-    char part[160], beside[160];
+    char part[160];
     snprintf(part, sizeof part, "%s.part", path);
-    path_beside(row, path, beside);
-    if (repair_row_beside(row) != NULL) unlink(beside);
     unlink(path);
     unlink(part);
+}
+
+static void remove_all(const struct repair_row *row, const char *path)
+{
+    char beside[160];
+    path_beside(row, path, beside);
+    if (repair_row_beside(row) != NULL) unlink(beside);
+    remove_both(path);
 }
 
 /* As many lines as the file has units. */
@@ -288,7 +294,10 @@ static void fill(const struct repair_row *row, const struct bytes *whole, struct
     assert_int_equal(record(row, path, &m), 1);
     const char *says = is_real ? "cannot write: No space left on device\n" : "cannot write: File too large\n";
     const char *at = strstr(said, says);
-    if (at == NULL || strstr(at + 1, says) != NULL || strstr(said, "scanhead record --repair ") == NULL)
+    char part[176];
+    snprintf(part, sizeof part, "%s.part", path);
+    const int is_left = access(part, F_OK) == 0; /* on the smallest disks nothing is */
+    if (at == NULL || strstr(at + 1, says) != NULL || (strstr(said, "scanhead record --repair ") != NULL) != is_left)
         fail_msg("%s: %s", path, said);
     if (is_real && repair_row_beside(row) != NULL) assert_int_equal(mount("none", disk, NULL, MS_REMOUNT, "size=16m"), 0);
     check_left(row, path, whole, tally);
@@ -376,9 +385,6 @@ static int set_up(void **state)
     if (wire_setup(state) != 0) return -1;
     wire = *state;
     *state = NULL; /* that of each test is its row */
-    char readers[PATH_MAX];
-    if (realpath(getenv("READERS") != NULL ? getenv("READERS") : "build/readers", readers) != NULL)
-        setenv("READERS", readers, 1);
     if (n != NULL) n_moments = strtoull(n, NULL, 10);
     signal(SIGPIPE, SIG_IGN);
     char readers[PATH_MAX];
