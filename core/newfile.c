@@ -169,6 +169,11 @@ static int is_named(const char *part, int fd)
            open_st.st_ino == named.st_ino;
 }
 
+static int fail_locked(const char *part, struct sh_err *err)
+{
+    return sh_fail(err, SH_EINPUT, "%s: is being written by another recording; allowed is a file of its own", part);
+}
+
 int newfile_part(const char *path, const char *part, int *out, struct sh_err *err)
 {
     int rc = check_target(path, err), fd;
@@ -177,9 +182,7 @@ int newfile_part(const char *path, const char *part, int *out, struct sh_err *er
         if (rc == 0) continue;
         if (rc < 0) break;
         rc = SH_OK;
-        if (flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
-            rc = sh_fail(err, SH_EINPUT, "%s: is being written by another recording; allowed is a file of its own",
-                         part);
+        if (flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) rc = fail_locked(part, err);
         /* a file system without locks has none to offer; then the name alone counts */
         else if (is_named(part, fd)) {
             if (ftruncate(fd, 0) != 0) rc = fail(part, "create", err);
@@ -191,6 +194,36 @@ int newfile_part(const char *path, const char *part, int *out, struct sh_err *er
         close(fd);
     }
     return rc != SH_OK ? rc : sh_fail(err, SH_EIO, "%s: comes and goes; other programs write it", part);
+}
+
+int newfile_left(const char *part, int *out, struct sh_err *err)
+{
+    int rc = check_target(part, err);
+    if (rc != SH_OK) return rc;
+    const int fd = open(part, O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+    if (fd < 0) return fail(part, "be opened for reading and writing", err);
+    rc = check_left(part, fd, err);
+    if (rc == SH_OK && flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+        rc = sh_fail(err, SH_ESTATE, "%s: is still being written by another process", part);
+    if (rc == SH_OK && !is_named(part, fd))
+        rc = sh_fail(err, SH_ESTATE, "%s: another process has just completed or removed it", part);
+    if (rc != SH_OK)
+        close(fd);
+    else
+        *out = fd;
+    return rc;
+}
+
+long long newfile_left_len(const char *part)
+{
+    struct stat st;
+    long long len = 0;
+    const int fd = open(part, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+    if (fd < 0) return 0;
+    if (fstat(fd, &st) == 0 && S_ISREG(st.st_mode) && (flock(fd, LOCK_SH | LOCK_NB) == 0 || errno != EWOULDBLOCK))
+        len = st.st_size;
+    close(fd);
+    return len;
 }
 
 /* So that the new name survives a power cut as well. Some file systems can't sync a directory; then they need
@@ -207,19 +240,51 @@ static void sync_folder(const char *path)
     free(copy);
 }
 
-int newfile_keep(const char *path, const char *part, int fd, struct sh_err *err)
+static int fail_rename(const char *path, const char *part, struct sh_err *err)
 {
-    int rc = check_target(path, err);
-    if (rc == SH_OK && fsync(fd) != 0) rc = fail(part, "be synced", err);
-    if (rc == SH_OK && rename(part, path) != 0)
-        rc = sh_fail(err, code_of(errno), "%s: cannot be renamed to %s: %s", part, path, strerror(errno));
-    if (rc != SH_OK) {
-        newfile_drop(part, fd);
-        return rc;
-    }
+    return sh_fail(err, code_of(errno), "%s: cannot be renamed to %s: %s", part, path, strerror(errno));
+}
+
+static int close_renamed(const char *path, int fd)
+{
     close(fd); /* and with it the lock: from here on part is free for the next one */
     sync_folder(path);
     return SH_OK;
+}
+
+int newfile_settle(const char *path, const char *part, int fd, struct sh_err *err)
+{
+    int rc = check_target(path, err);
+    if (rc == SH_OK && fsync(fd) != 0) rc = fail(part, "be synced", err);
+    if (rc == SH_OK && rename(part, path) != 0) rc = fail_rename(path, part, err);
+    return rc == SH_OK ? close_renamed(path, fd) : rc;
+}
+
+/* Some file systems can't rename without replacing; a link is never in the place of another name. */
+static int rename_free(const char *path, const char *part)
+{
+    if (renameat2(AT_FDCWD, part, AT_FDCWD, path, RENAME_NOREPLACE) == 0) return 0;
+    if (errno != EINVAL && errno != ENOSYS) return -1;
+    if (link(part, path) == 0) return unlink(part);
+    if (errno != EPERM && errno != EOPNOTSUPP) return -1;
+    if (access(path, F_OK) != 0) return rename(part, path);
+    errno = EEXIST;
+    return -1;
+}
+
+int newfile_settle_free(const char *path, const char *part, int fd, struct sh_err *err)
+{
+    if (fsync(fd) != 0) return fail(part, "be synced", err);
+    if (rename_free(path, part) == 0) return close_renamed(path, fd);
+    return errno == EEXIST ? sh_fail(err, SH_ESTATE, "%s: is there, and is not replaced by %s", path, part)
+                           : fail_rename(path, part, err);
+}
+
+int newfile_keep(const char *path, const char *part, int fd, struct sh_err *err)
+{
+    const int rc = newfile_settle(path, part, fd, err);
+    if (rc != SH_OK) newfile_drop(part, fd);
+    return rc;
 }
 
 void newfile_drop(const char *part, int fd)

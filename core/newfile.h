@@ -28,6 +28,15 @@ int newfile_append(const char *path, int *fd, struct sh_err *err);
 int newfile_part(const char *path, const char *part, int *fd, struct sh_err *err);
 /* Before long work: whether newfile_part would make `path` with `.part` behind it. It leaves nothing behind. */
 int newfile_check(const char *path, struct sh_err *err);
+/* What a writer that was killed has left as `part`, or a whole file: an existing regular file, for reading and writing, locked
+ * as newfile_part has it. SH_EINPUT: there is none. */
+int newfile_left(const char *part, int *fd, struct sh_err *err);
+/* The bytes of a part that was left and that nobody writes, or 0. */
+long long newfile_left_len(const char *part);
+/* Syncs, renames and closes. After a failure part stays, and fd is open. */
+int newfile_settle(const char *path, const char *part, int fd, struct sh_err *err);
+/* The same, but nothing at path is replaced: SH_ESTATE where something is there. */
+int newfile_settle_free(const char *path, const char *part, int fd, struct sh_err *err);
 /* Syncs, renames and closes; after a failure part is removed. Takes fd in any case. */
 int newfile_keep(const char *path, const char *part, int fd, struct sh_err *err);
 /* Removes part and closes. */

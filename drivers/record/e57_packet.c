@@ -107,7 +107,8 @@ static void count_intensity(struct e57_scan *scan, const uint8_t *const stream[E
 
 static void count_index(struct e57_scan *scan, const uint8_t *const stream[E57_N_STREAMS], unsigned i)
 {
-    const uint32_t row = le_get32(stream[E57_ROW] + 4 * (size_t)i), column = le_get32(stream[E57_COLUMN] + 4 * (size_t)i);
+    const uint32_t row = le_get32(stream[E57_ROW] + 4 * (size_t)i),
+                   column = le_get32(stream[E57_COLUMN] + 4 * (size_t)i);
     const unsigned number = get_bits(stream[E57_RETURN], 4, i);
     const int first = scan->n_records == 0;
     if (first || row < scan->row_min) scan->row_min = row;

@@ -77,8 +77,8 @@ static int get(struct left *l, uint64_t logical, void *to, size_t len, struct sh
 
 static int fail_damaged(const struct left *l, struct sh_err *err)
 {
-    return sh_fail(err, SH_EFORMAT, "%s: at byte %" PRIu64 " is no packet of points as this file has them", l->repair->path,
-                   e57_physical(l->end));
+    return sh_fail(err, SH_EFORMAT, "%s: at byte %" PRIu64 " is no packet of points as this file has them",
+                   l->repair->path, e57_physical(l->end));
 }
 
 /* ---- the way through what is there */
@@ -95,8 +95,9 @@ static int take_scan(struct left *l, struct sh_err *err)
     const int rc = get(l, scan.note, note, sizeof note, err);
     if (rc <= 0 || e57_note_get(note, &facts, &scan) != 0) return rc < 0 ? rc : 0;
     if (scan.number != l->facts.n_scans + 1 || note[E57_NOTE_LEN] != 1) return 0;
-    if (l->facts.n_scans > 0 && (facts.epsg != l->facts.epsg || facts.geoid_heights != l->facts.geoid_heights ||
-                                 facts.empty_shots != l->facts.empty_shots || facts.has_colours != l->facts.has_colours))
+    if (l->facts.n_scans > 0 &&
+        (facts.epsg != l->facts.epsg || facts.geoid_heights != l->facts.geoid_heights ||
+         facts.empty_shots != l->facts.empty_shots || facts.has_colours != l->facts.has_colours))
         return 0;
     if (!grow(&l->facts.scan, &l->room, l->facts.n_scans + 1, sizeof scan))
         return sh_fail(err, SH_ENOMEM, "%s: no memory for another scan", l->repair->path);
@@ -202,6 +203,7 @@ static int write_end(struct left *l, struct sh_err *err)
     if (rc != 0) return rc;
     rc = blank_header(&pages, err);
     if (rc == 0) rc = put_empty_packet(l, &pages, err);
+    l->facts.is_incomplete = 1;
     if (rc == 0) rc = e57_end(&pages, &l->facts, NULL, err);
     outfile_leave(&file);
     return rc;
@@ -217,8 +219,8 @@ static int repair_left(struct left *l, struct sh_err *err)
     rc = take_scans(l, err);
     if (rc < 0) return rc;
     if (l->facts.n_scans == 0 && !r->was_whole)
-        return sh_fail(err, SH_EFORMAT, "%s: is no E57 file of this program, or too little of one: no scan begins in it",
-                       r->path);
+        return sh_fail(err, SH_EFORMAT,
+                       "%s: is no E57 file of this program, or too little of one: no scan begins in it", r->path);
     for (uint32_t i = 0; i < l->facts.n_scans; i++)
         r->n_kept += l->facts.scan[i].n_records;
     r->unit = l->facts.empty_shots ? "points and empty shots" : "points";

@@ -152,19 +152,21 @@ static void put_prototype(FILE *out, const struct e57_facts *facts, const struct
 
 static void put_scan(FILE *out, const struct e57_facts *facts, const struct e57_scan *s)
 {
-    char name[64];
+    char name[64], text[sizeof s->idn + 64];
     snprintf(name, sizeof name, "scan %u, station %u", s->number, s->station);
     open_structure(out, "vectorChild");
     put_guid(out, s, sizeof *s);
     put_string(out, "name", name);
-    put_string(out, "description", s->idn);
+    snprintf(text, sizeof text, "%s%s", s->idn,
+             facts->is_incomplete && s->number == facts->n_scans ? "; repaired: its end is missing" : "");
+    put_string(out, "description", text);
     put_string(out, "sensorModel", s->profile);
     put_pose(out, &s->pose);
     if (s->have_start) put_time(out, "acquisitionStart", s->start_gps_s);
     put_bounds(out, s);
     if (facts->has_colours) put_colour_limits(out);
-    fprintf(out, "<sh:begin type=\"Blob\" fileOffset=\"%" PRIu64 "\" length=\"%d\"></sh:begin>\n", e57_physical(s->note),
-            E57_NOTE_LEN - E57_BLOB_HEADER_LEN);
+    fprintf(out, "<sh:begin type=\"Blob\" fileOffset=\"%" PRIu64 "\" length=\"%d\"></sh:begin>\n",
+            e57_physical(s->note), E57_NOTE_LEN - E57_BLOB_HEADER_LEN);
     fprintf(out, "<points type=\"CompressedVector\" fileOffset=\"%" PRIu64 "\" recordCount=\"%" PRIu64 "\">\n",
             e57_physical(s->section), s->n_records);
     put_prototype(out, facts, s);

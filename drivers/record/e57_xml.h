@@ -32,6 +32,7 @@ struct e57_scan {
 struct e57_facts {
     int epsg, geoid_heights; /* of the file's CRS; epsg 0: none */
     int empty_shots, has_colours;
+    int is_incomplete; /* the end of its last scan, and what came after it, is missing */
     struct e57_scan *scan;
     uint32_t n_scans;
 };

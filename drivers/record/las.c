@@ -13,6 +13,7 @@
 #include "drivers/protocol/bytes.h"
 #include "drivers/protocol/native.h"
 #include "drivers/record/las_header.h"
+#include "drivers/record/las_repair.h"
 #include "drivers/record/recorder.h"
 
 #define SCAN_ANGLE_COUNTS_PER_RAD (1.0 / NATIVE_RAD_PER_DEG / 0.006)
@@ -39,13 +40,22 @@ static int las_begin(void *rec, struct sh_err *err)
     return 0;
 }
 
-/* Header and records before the points, whose counts are written over at the end. */
+/* Header and records before the points, whose counts are written over at the end. Until then they say that the file is
+ * incomplete: for a repair (las_repair.c). */
 static int put_front(struct las *las, struct sh_err *err)
 {
     uint8_t front[LAS_FRONT_MAX];
     las->begun = 1;
+    las->facts.incomplete = 1;
     las->front_len = las_front(&las->facts, front);
     return outfile_write(&las->base.file, front, las->front_len, err);
+}
+
+static int write_front(struct las *las, struct sh_err *err)
+{
+    uint8_t front[LAS_FRONT_MAX];
+    const int rc = outfile_flush(&las->base.file, err);
+    return rc != 0 ? rc : outfile_patch(&las->base.file, 0, front, las_front(&las->facts, front), err);
 }
 
 /* Geodetic coordinates are longitude, latitude in LAS, as GIS software draws x and y. */
@@ -79,7 +89,10 @@ static int las_scan(void *rec, struct sh_err *err)
     struct las *las = rec;
     const struct track *t = &las->base.track;
     struct las_facts *f = &las->facts;
-    if (las->begun && strcmp(f->profile, t->info.profile) != 0) strcpy(f->profile, "MERGE"); /* as LAS calls it */
+    if (las->begun && strcmp(f->profile, t->info.profile) != 0 && strcmp(f->profile, "MERGE") != 0) {
+        strcpy(f->profile, "MERGE"); /* as LAS calls it */
+        return write_front(las, err);
+    }
     if (las->begun) return 0;
     set_counts(las);
     f->has_colour = t->has_colours;
@@ -127,10 +140,6 @@ static int set_xyz(struct las *las, int32_t n[3], const double p[3], struct sh_e
         double counts = rint(from_offset / f->scale[i]);
         if (!(fabs(counts) <= INT32_MAX)) return too_far(las, p, err);
         n[i] = (int32_t)counts;
-    }
-    for (int i = 0; i < 3; i++) {
-        if (f->n_points == 0 || n[i] < f->min[i]) f->min[i] = n[i];
-        if (f->n_points == 0 || n[i] > f->max[i]) f->max[i] = n[i];
     }
     return 0;
 }
@@ -237,9 +246,8 @@ static int las_points(void *rec, int n, struct sh_err *err)
         rc = check_count(las, err);
         if (rc == 0) rc = put_point(las, at, i, err);
         if (rc != 0) break;
+        las_count_record(&las->facts, at);
         at += las_point_len(&las->facts);
-        las->facts.n_points++;
-        if (p->echo >= 1) las->facts.n_by_return[p->echo - 1]++;
     }
     outfile_used(&las->base.file, (size_t)(at - to)); /* also before a failure: the file may be kept */
     return rc;
@@ -248,10 +256,9 @@ static int las_points(void *rec, int n, struct sh_err *err)
 static int las_finish(void *rec, struct sh_err *err)
 {
     struct las *las = rec;
-    uint8_t front[LAS_FRONT_MAX];
     int rc = las->begun ? 0 : put_front(las, err);
-    if (rc == 0) rc = outfile_flush(&las->base.file, err);
-    if (rc == 0) rc = outfile_patch(&las->base.file, 0, front, las_front(&las->facts, front), err);
+    las->facts.incomplete = 0;
+    if (rc == 0) rc = write_front(las, err);
     if (rc != 0) return rc;
     recorder_report(rec, las->n_empty, "shots without echo left out, for which LAS has no place");
     recorder_report(rec, las->n_beyond_returns, "echoes left out: the sixth and later ones, of which LAS 1.2 has none");
@@ -275,4 +282,5 @@ const struct recorder_ops recorder_las = {
     .track = {.scan = las_scan, .points = las_points, .wants_attributes = 1, .wants_colours = 1},
     .begin = las_begin,
     .finish = las_finish,
+    .repair = las_repair,
 };

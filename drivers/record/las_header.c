@@ -135,8 +135,8 @@ static uint8_t format_of(const struct las_facts *f)
     return (uint8_t)(f->minor == 2 ? (f->has_colour ? 3 : 1) : (f->has_colour ? 7 : 6));
 }
 
-/* Where counts stand differs; format 6 and 7 leave those of 32 bits 0. */
-static void put_counts(uint8_t *to, const struct las_facts *f)
+/* Where they stand differs; format 6 and 7 leave those of 32 bits 0. */
+static void put_numbers(uint8_t *to, const struct las_facts *f)
 {
     if (f->minor != 2) le_put64(to + 247, f->n_points);
     if (f->minor == 2) le_put32(to + 107, (uint32_t)f->n_points);
@@ -146,6 +146,27 @@ static void put_counts(uint8_t *to, const struct las_facts *f)
         else
             le_put64(to + 255 + 8 * i, f->n_by_return[i]);
     }
+}
+
+void las_put_counts(const struct las_facts *f, uint8_t *to)
+{
+    put_numbers(to, f);
+    for (int i = 0; i < 3 && f->n_points != 0; i++) {
+        le_put_double(to + 179 + 16 * i, f->max[i] * f->scale[i] + f->offset[i]);
+        le_put_double(to + 187 + 16 * i, f->min[i] * f->scale[i] + f->offset[i]);
+    }
+}
+
+void las_count_record(struct las_facts *f, const uint8_t *record)
+{
+    const unsigned echo = record[14] & (f->minor == 2 ? 7u : 15u);
+    for (int i = 0; i < 3; i++) {
+        const int32_t n = (int32_t)le_get32(record + 4 * i);
+        if (f->n_points == 0 || n < f->min[i]) f->min[i] = n;
+        if (f->n_points == 0 || n > f->max[i]) f->max[i] = n;
+    }
+    f->n_points++;
+    if (echo >= 1) f->n_by_return[echo - 1]++;
 }
 
 static size_t header_len(const struct las_facts *f)
@@ -161,21 +182,18 @@ static void put_header(uint8_t *to, const struct las_facts *f, size_t front_len,
     to[24] = 1;
     to[25] = (uint8_t)f->minor;
     put_text(to + 26, 32, f->profile);
-    put_text(to + 58, 32, "scanhead");
+    put_text(to + LAS_SOFTWARE_AT, 32, f->incomplete ? LAS_SOFTWARE_INCOMPLETE : LAS_SOFTWARE);
     put_date(to + 90, f);
     le_put16(to + 94, (uint16_t)header_len(f));
     le_put32(to + 96, (uint32_t)front_len);
     le_put32(to + 100, n_vlrs);
     to[104] = format_of(f);
     le_put16(to + 105, (uint16_t)las_point_len(f));
-    put_counts(to, f);
     for (int i = 0; i < 3; i++) {
         le_put_double(to + 131 + 8 * i, f->scale[i]);
         le_put_double(to + 155 + 8 * i, f->offset[i]);
-        if (f->n_points == 0) continue;
-        le_put_double(to + 179 + 16 * i, f->max[i] * f->scale[i] + f->offset[i]);
-        le_put_double(to + 187 + 16 * i, f->min[i] * f->scale[i] + f->offset[i]);
     }
+    las_put_counts(f, to);
 }
 
 size_t las_front(const struct las_facts *f, uint8_t to[LAS_FRONT_MAX])

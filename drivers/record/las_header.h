@@ -13,6 +13,7 @@
 enum {
     LAS_HEADER_LEN = 375,
     LAS_HEADER_12_LEN = 227,
+    LAS_SOFTWARE_AT = 58, /* what made the file: 32 bytes */
     LAS_VLR_HEAD_LEN = 54,
     LAS_EXTRA_LEN = 192,
     LAS_LABEL_LEN = 2,      /* extra bytes of 1.4, after the format's own */
@@ -24,10 +25,14 @@ enum {
     LAS_FRONT_MAX = LAS_HEADER_LEN + 3 * LAS_VLR_HEAD_LEN + 3 * LAS_EXTRA_LEN + CRS_WKT_MAX + LAS_NOTE_MAX,
 };
 
+#define LAS_SOFTWARE "scanhead"
+#define LAS_SOFTWARE_INCOMPLETE "scanhead, its end is missing" /* of a file that has not been completed */
+
 struct las_facts {
     int minor; /* 4, or 2 */
     int has_colour;
     const struct track *track; /* whose CRS, movement and attributes are the file's */
+    int incomplete;            /* the recording goes on: the header says so */
     int gps_time;              /* times are adjusted standard GPS time */
     char profile[32];
     double scale[3], offset[3]; /* of x, y, z; x and y are longitude and latitude in geodetic coordinates */
@@ -48,6 +53,11 @@ struct las_point {
 /* How many bytes a point takes; at most LAS_POINT_LEN_MAX. */
 size_t las_point_len(const struct las_facts *facts);
 void las_put_point(const struct las_facts *facts, const struct las_point *point, uint8_t *to);
+
+/* A point's record as it is in the file: its place and its return. Of the facts minor is needed. */
+void las_count_record(struct las_facts *facts, const uint8_t *record);
+/* The number of points, of returns, and the bounds, in a header that has the rest. */
+void las_put_counts(const struct las_facts *facts, uint8_t *header);
 
 /* Everything before the points. Returns its length, which depends on the CRS, the time's kind and attributes
  * alone, so that it can be written again when the counts are known. */

@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "core/newfile.h"
@@ -85,6 +86,13 @@ int outfile_flush(struct outfile *file, struct sh_err *err)
     return write_buffered(file, file->len, err);
 }
 
+int outfile_save(struct outfile *file, struct sh_err *err)
+{
+    const int rc = file->fd >= 0 && file->written == file->saved ? outfile_flush(file, err) : 0;
+    file->saved = file->written;
+    return rc;
+}
+
 /* Makes room in the middle of a file. Direct, only whole blocks go. */
 static int make_room(struct outfile *file, struct sh_err *err)
 {
@@ -133,19 +141,30 @@ void outfile_yield(struct outfile *file)
     file->fd = -1;
 }
 
-int outfile_close(struct outfile *file, int keep, struct sh_err *err)
+/* 1: what is on the disk stays as PATH.part. */
+static int leave(struct outfile *file)
+{
+    struct stat st;
+    if (fstat(file->fd, &st) == 0 && st.st_size == 0) return 0;
+    close(file->fd);
+    return 1;
+}
+
+int outfile_close(struct outfile *file, enum outfile_end how, struct sh_err *err)
 {
     if (file->fd < 0) {
         release(file);
         return 0;
     }
-    int rc = keep ? outfile_flush(file, err) : 0;
-    if (keep && rc == 0)
-        rc = newfile_keep(file->path, file->part, file->fd, err);
-    else
-        newfile_drop(file->part, file->fd);
+    int rc = how != OUTFILE_DROP ? outfile_flush(file, how == OUTFILE_LEAVE ? NULL : err) : 0, closed = 0;
+    const int stays = how == OUTFILE_LEAVE || how == OUTFILE_KEEP_PART;
+    if (rc == 0 && (how == OUTFILE_KEEP || how == OUTFILE_KEEP_PART)) {
+        rc = newfile_settle(file->path, file->part, file->fd, err);
+        closed = rc == 0;
+    }
+    if (!closed && !(stays && leave(file))) newfile_drop(file->part, file->fd);
     release(file);
-    return rc;
+    return how == OUTFILE_LEAVE ? 0 : rc;
 }
 
 int outfile_over(struct outfile *file, int fd, const char *path, uint64_t at, struct sh_err *err)

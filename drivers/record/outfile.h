@@ -1,4 +1,5 @@
-/* A file that appears whole or not at all (core/newfile.h). It is written as PATH.part through a buffer. */
+/* A file that appears whole or not at all (core/newfile.h). It is written as PATH.part through a buffer. What of it came to
+ * the disk before a failure may stay as PATH.part, for a repair (repair.h). */
 #ifndef DRIVERS_RECORD_OUTFILE_H
 #define DRIVERS_RECORD_OUTFILE_H
 
@@ -19,6 +20,7 @@ struct outfile {
     uint8_t *buf;
     size_t len;       /* bytes in buf */
     uint64_t written; /* bytes of the file that are before buf */
+    uint64_t saved;   /* of these, when outfile_save was called last */
     /* 1: what goes beyond OUTFILE_DIRECT_FROM is written past the system's cache (O_DIRECT), where the file system can
      * do that. It saves copying, which is most of the cost of a long recording, but each write then waits for the disk:
      * for writers that may wait. Set after opening. */
@@ -34,14 +36,19 @@ int outfile_write(struct outfile *file, const void *data, size_t len, struct sh_
 uint8_t *outfile_room(struct outfile *file, size_t n, struct sh_err *err);
 void outfile_used(struct outfile *file, size_t n);
 int outfile_flush(struct outfile *file, struct sh_err *err);
+/* To be called about once a second: flushes, unless some of it was written since the last call. So nothing waits for longer
+ * than two calls, and who writes much pays nothing. */
+int outfile_save(struct outfile *file, struct sh_err *err);
 /* Overwrites bytes that were flushed. */
 int outfile_patch(struct outfile *file, uint64_t at, const void *data, size_t len, struct sh_err *err);
 /* Gives the place up: PATH.part is removed, so that something else can be written as PATH. Only outfile_close may follow,
  * which then frees alone. */
 void outfile_yield(struct outfile *file);
-/* keep: flush, sync, rename. Else, and when that fails, PATH.part is removed. Frees everything in any
- * case. */
-int outfile_close(struct outfile *file, int keep, struct sh_err *err);
+/* OUTFILE_KEEP: flush, sync, rename; where that fails, PATH.part is removed. OUTFILE_KEEP_PART: it then stays, unless it is
+ * empty. OUTFILE_LEAVE: it stays, with all that can be flushed, and is not renamed. OUTFILE_DROP: it is removed. Frees
+ * everything in any case. */
+enum outfile_end { OUTFILE_DROP = 0, OUTFILE_KEEP = 1, OUTFILE_KEEP_PART, OUTFILE_LEAVE };
+int outfile_close(struct outfile *file, enum outfile_end how, struct sh_err *err);
 /* Writes over an open file from `at` on; path is for messages. SH_ENOMEM. Only outfile_leave ends it: it flushes nothing,
  * and leaves fd open. */
 int outfile_over(struct outfile *file, int fd, const char *path, uint64_t at, struct sh_err *err);

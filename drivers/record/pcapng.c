@@ -2,8 +2,13 @@
  * (drivers/protocol/pcapng.h). A packet's time is the frame's device time, nanoseconds since power-up. */
 #include "drivers/protocol/pcapng.h"
 
+#include <stdlib.h>
+#include <string.h>
+
+#include "drivers/protocol/bytes.h"
 #include "drivers/protocol/native.h"
 #include "drivers/record/recorder.h"
+#include "drivers/record/scan_count.h"
 
 static int pcapng_begin(void *rec, struct sh_err *err)
 {
@@ -26,9 +31,105 @@ static int pcapng_frame(void *rec, struct scanhead *sh, const struct scanhead_fr
     return 0;
 }
 
+struct packets {
+    struct pcapng_reader reader;
+    struct scan_count scans;
+    uint64_t n;
+    int is_noted; /* the last block is a note */
+    size_t held;  /* bytes in block, which begin where the reader is */
+    uint8_t block[2 * PCAPNG_MAX_BLOCK];
+};
+
+static void count_packet(struct packets *p, const struct pcapng_packet *packet)
+{
+    p->n++;
+    if (packet->link == PCAPNG_USER0 && packet->len >= NATIVE_HEADER_LEN)
+        scan_count_frame(&p->scans, packet->data[1], packet->data[3]);
+}
+
+/* A block of statistics of the first interface, without any: only with a comment. */
+enum { BLOCK_STATISTICS = 5, OPTION_COMMENT = 1, NOTE_HEAD = 20 };
+static const char NOTE[] = "incomplete: the recorder came to no end; what should follow may be missing";
+enum { NOTE_TEXT = sizeof NOTE - 1, NOTE_LEN = NOTE_HEAD + 4 + (NOTE_TEXT + 3) / 4 * 4 + 4 + 4 };
+
+static void put_note(uint8_t note[NOTE_LEN])
+{
+    memset(note, 0, NOTE_LEN);
+    le_put32(note, BLOCK_STATISTICS);
+    le_put32(note + 4, NOTE_LEN);
+    le_put16(note + NOTE_HEAD, OPTION_COMMENT);
+    le_put16(note + NOTE_HEAD + 2, NOTE_TEXT);
+    memcpy(note + NOTE_HEAD + 4, NOTE, NOTE_TEXT);
+    le_put32(note + NOTE_LEN - 4, NOTE_LEN);
+}
+
+static int is_note(const uint8_t *block, size_t len)
+{
+    uint8_t note[NOTE_LEN];
+    put_note(note);
+    return len == NOTE_LEN && memcmp(block, note, NOTE_LEN) == 0;
+}
+
+/* All whole blocks of what is held. 1: no block follows. */
+static int take_blocks(struct packets *p)
+{
+    struct pcapng_packet packet;
+    size_t at = 0, used;
+    int item;
+    while ((item = pcapng_read(&p->reader, p->block + at, p->held - at, &packet, &used, NULL, NULL)) > 0) {
+        if (item == PCAPNG_PACKET) count_packet(p, &packet);
+        p->is_noted = is_note(p->block + at, used);
+        at += used;
+    }
+    memmove(p->block, p->block + at, p->held -= at);
+    return item < 0;
+}
+
+static int read_packets(const struct repair *r, struct packets *p, struct sh_err *err)
+{
+    enum { PIECE = 1 << 20 };
+    int rc = SH_OK, over = 0;
+    for (uint64_t at = 0; at < r->len && rc == SH_OK && !over;) {
+        const size_t n = r->len - at < PIECE ? (size_t)(r->len - at) : PIECE;
+        rc = repair_read(r, at, p->block + p->held, n, err);
+        if (rc == SH_OK) rc = sh_check_stop(r->report, err);
+        p->held += n;
+        at += n;
+        over = take_blocks(p);
+    }
+    return rc;
+}
+
+/* Cut behind the last whole block; then a note. */
+static int pcapng_repair(struct repair *r, struct sh_err *err)
+{
+    struct packets *p = malloc(sizeof *p);
+    if (p == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory to read it", r->path);
+    memset(p, 0, offsetof(struct packets, block));
+    int rc = read_packets(r, p, err);
+    const uint64_t end = p->reader.at_byte;
+    if (rc == SH_OK && p->reader.n_interfaces == 0) rc = repair_fail_none(r, "capture (pcapng)", err);
+    if (rc == SH_OK) rc = repair_check_rest(r, end, OUTFILE_BUFFER, err);
+    if (rc == SH_OK) {
+        r->unit = "packets";
+        r->n_kept = p->n;
+        r->n_scans = p->scans.n_scans;
+        r->was_whole = end == r->len && (p->is_noted || !repair_is_part(r));
+        rc = repair_cut(r, end, err);
+    }
+    if (rc == SH_OK && !r->was_whole && !p->is_noted) {
+        uint8_t note[NOTE_LEN];
+        put_note(note);
+        repair_append_note(r, end, note, NOTE_LEN);
+    }
+    free(p);
+    return rc;
+}
+
 const struct recorder_ops recorder_pcapng = {
     .ending = ".pcapng",
     .size = sizeof(struct recorder),
     .begin = pcapng_begin,
     .frame = pcapng_frame,
+    .repair = pcapng_repair,
 };

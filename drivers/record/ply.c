@@ -4,18 +4,17 @@
  *
  * The header comes first in the file but is known last (count, names, losses). When the first points arrive,
  * the number of surfaces is known, so room is left for the header. So no byte of the points is written twice,
- * which matters at 100 MB/s. If the header outgrows its room after all, the points are copied once to where
- * it ends. */
-#include <errno.h>
+ * which matters at 100 MB/s. What does not fit in the room after all (names longer than heads send) is left out and
+ * reported. Until the end a header stands there that says that the file is incomplete: for a repair (ply_repair.c). */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "drivers/protocol/bytes.h"
 #include "drivers/protocol/native.h"
 #include "drivers/record/ply_columns.h"
+#include "drivers/record/ply_repair.h"
 #include "drivers/record/recorder.h"
 
 enum { ROW_MOST = 128, TEXT_LEN = 512 };
@@ -42,19 +41,42 @@ static int ply_begin(void *rec, struct sh_err *err)
     return 0;
 }
 
+/* What is known of the header by now, in the room that it has. */
+static int make_header(struct ply *ply, int incomplete, char **text, size_t *len, struct sh_err *err)
+{
+    uint64_t n_left_out;
+    ply->facts.incomplete = incomplete;
+    const int rc = ply_header_make(&ply->facts, ply->header_len, text, len, &n_left_out, err);
+    if (rc == 0 && !incomplete)
+        recorder_report(&ply->base, n_left_out,
+                        "names of surfaces and heads left out, for which the header has no room");
+    return rc;
+}
+
 /* Makes room for the header with what is known of the names. */
 static int make_room(struct ply *ply, uint32_t n_surfaces, struct sh_err *err)
 {
-    static const char blank[4096];
+    char *text;
+    size_t len;
     ply->header_len = ply_header_reserve(&ply->facts, n_surfaces);
     if (ply->header_len == 0) return sh_fail(err, SH_ENOMEM, "%s: no memory for the header", ply->base.file.path);
     ply->begun = 1;
-    int rc = 0;
-    for (size_t left = ply->header_len; left > 0 && rc == 0;) {
-        size_t n = left < sizeof blank ? left : sizeof blank;
-        rc = outfile_write(&ply->base.file, blank, n, err);
-        left -= n;
-    }
+    int rc = make_header(ply, 1, &text, &len, err);
+    if (rc != 0) return rc;
+    rc = outfile_write(&ply->base.file, text, len, err);
+    free(text);
+    return rc;
+}
+
+static int write_header(struct ply *ply, int incomplete, struct sh_err *err)
+{
+    char *text;
+    size_t len;
+    int rc = outfile_flush(&ply->base.file, err);
+    if (rc == 0) rc = make_header(ply, incomplete, &text, &len, err);
+    if (rc != 0) return rc;
+    rc = outfile_patch(&ply->base.file, 0, text, len, err);
+    free(text);
     return rc;
 }
 
@@ -167,12 +189,13 @@ static uint8_t *put_ascii(uint8_t *row, const struct vertex *v, unsigned columns
     return row + n;
 }
 
-/* The time may come late. */
-static void set_gps(struct ply *ply)
+/* The time may come late. 1: now. */
+static int set_gps(struct ply *ply)
 {
     struct ply_facts *facts = &ply->facts;
-    if (facts->have_gps || ply->base.track.n_scans != 1) return;
+    if (facts->have_gps || ply->base.track.n_scans != 1) return 0;
     facts->have_gps = track_start_gps(&ply->base.track, &facts->gps_s);
+    return facts->have_gps;
 }
 
 /* A float steps by 6e-8 of a number: enough about the origin of a scene, and metres on the Earth. */
@@ -225,9 +248,12 @@ static int ply_scan(void *rec, struct sh_err *err)
     snprintf(head.profile, sizeof head.profile, "%s", info->profile);
     const struct ply_head *last = facts->n_heads > 0 ? &facts->head[facts->n_heads - 1] : NULL;
     const int same = last != NULL && strcmp(last->idn, head.idn) == 0 && strcmp(last->profile, head.profile) == 0;
-    if (!same && facts->n_heads < PLY_MAX_HEADS) facts->head[facts->n_heads++] = head;
+    const int is_new = !same && facts->n_heads < PLY_MAX_HEADS;
+    if (is_new) facts->head[facts->n_heads++] = head;
     int rc = check_float(ply, err);
-    return rc != 0 || ply->begun ? rc : make_room(ply, info->n_surfaces, err);
+    set_gps(ply);
+    if (rc == 0 && !ply->begun) return make_room(ply, info->n_surfaces, err);
+    return rc == 0 && is_new ? write_header(ply, 1, err) : rc;
 }
 
 /* Point i of the batch, placed; 0: it is left out. */
@@ -284,10 +310,10 @@ static int ply_points(void *rec, int n, struct sh_err *err)
 {
     enum { USUAL = PLY_RANGE | PLY_REFLECTANCE | PLY_TIME | PLY_ECHO | PLY_LABEL | PLY_STATION };
     struct ply *ply = rec;
-    uint8_t *from = outfile_room(&ply->base.file, TRACK_BATCH * TEXT_LEN, err), *to = from;
-    if (from == NULL) return SH_EIO;
-    set_gps(ply);
-    int rc = check_floats_on_the_way(ply, n, err);
+    int rc = set_gps(ply) ? write_header(ply, 1, err) : 0;
+    uint8_t *from = rc == 0 ? outfile_room(&ply->base.file, TRACK_BATCH * TEXT_LEN, err) : NULL, *to = from;
+    if (from == NULL) return rc != 0 ? rc : SH_EIO;
+    rc = check_floats_on_the_way(ply, n, err);
     if (rc != 0) return rc;
     if (!ply->facts.ascii && ply->facts.columns == USUAL)
         to = put_rows(ply, n, to, USUAL);
@@ -306,43 +332,13 @@ static int ply_frame(void *rec, struct scanhead *sh, const struct scanhead_frame
     return track_frame(&ply->base.track, sh, frame, err);
 }
 
-/* The header outgrew its room: the points move to where it ends, block by block from the end. */
-static int move_points(struct ply *ply, size_t header_len, struct sh_err *err)
-{
-    enum { BLOCK = 1 << 16 };
-    struct outfile *file = &ply->base.file;
-    size_t shift = header_len - ply->header_len;
-    uint64_t end = file->written;
-    uint8_t *block = malloc(BLOCK);
-    if (block == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory to move its points", file->path);
-    int rc = 0;
-    while (rc == 0 && end > ply->header_len && (rc = recorder_check_stop(&ply->base, err)) == 0) {
-        size_t n = end - ply->header_len < BLOCK ? (size_t)(end - ply->header_len) : BLOCK;
-        end -= n;
-        if (pread(file->fd, block, n, (off_t)end) != (ssize_t)n)
-            rc = sh_fail(err, SH_EIO, "%s: cannot read back: %s", file->part, strerror(errno));
-        else
-            rc = outfile_patch(file, end + shift, block, n, err);
-    }
-    free(block);
-    return rc;
-}
-
 static int ply_finish(void *rec, struct sh_err *err)
 {
     struct ply *ply = rec;
-    int rc = outfile_flush(&ply->base.file, err);
     ply->facts.n_without_attributes = ply->base.track.missing.n_without_attributes;
     ply->facts.n_unplaced = ply->base.track.missing.n_unplaced;
     ply->facts.n_without_pose = ply->base.track.missing.n_without_pose;
-    char *header;
-    size_t len;
-    if (rc == 0) rc = ply_header_make(&ply->facts, ply->header_len, &header, &len, err);
-    if (rc != 0) return rc;
-    if (len > ply->header_len) rc = move_points(ply, len, err);
-    if (rc == 0) rc = outfile_patch(&ply->base.file, 0, header, len, err);
-    free(header);
-    return rc;
+    return write_header(ply, 0, err);
 }
 
 const struct recorder_ops recorder_ply = {
@@ -352,4 +348,5 @@ const struct recorder_ops recorder_ply = {
     .begin = ply_begin,
     .frame = ply_frame,
     .finish = ply_finish,
+    .repair = ply_repair,
 };

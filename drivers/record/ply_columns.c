@@ -11,7 +11,6 @@
 
 enum {
     PAD_LINE = 64,       /* old readers take lines of 128 bytes or little more */
-    PAD_MIN = 8,         /* "comment\n" */
     NAME_ROOM = 160,     /* a label line of two names of 63 bytes, the longest a head sends */
     NAMES_MAX = 600,     /* any label line; a name has 255 bytes at most */
     COUNT_ROOM = 8 * 20, /* figures that may still grow to 20 digits */
@@ -38,16 +37,29 @@ const char *ply_crs_text(const struct track *t)
     return t->geoid_heights && t->crs >= 2 ? on_geoid[t->crs - 2] : text[t->crs];
 }
 
-void ply_put_names(FILE *out, const char *before, const struct scanhead *sh)
+/* Those that fit in `room` bytes; how many do not. */
+static uint64_t put_names(FILE *out, const char *before, const struct scanhead *sh, size_t room)
 {
     const char *object, *material;
+    uint64_t n_left_out = 0;
     for (uint32_t label = 0; sh != NULL && label < SCANHEAD_NO_LABEL; label++) {
         char line[NAMES_MAX];
         if (!scanhead_surface(sh, label, &object, &material)) continue;
         snprintf(line, sizeof line, "label %u %s | %s", label, object, material);
         printable(line);
-        fprintf(out, "%s%s\n", before, line);
+        const size_t len = strlen(before) + strlen(line) + 1;
+        if (len <= room)
+            fprintf(out, "%s%s\n", before, line);
+        else
+            n_left_out++;
+        room -= len <= room ? len : 0;
     }
+    return n_left_out;
+}
+
+void ply_put_names(FILE *out, const char *before, const struct scanhead *sh)
+{
+    put_names(out, before, sh, SIZE_MAX);
 }
 
 static void put_head(FILE *out, const struct ply_head *head, int several)
@@ -77,10 +89,24 @@ static void put_colour_comment(FILE *out, const struct track *t)
                 scale->mode == COLOUR_LABEL ? "show the label" : "are one colour for all");
 }
 
+/* What came and what did not: known at the end. */
+static void put_losses(FILE *out, const struct ply_facts *facts)
+{
+    const struct scanhead_stats *s = &facts->stats;
+    fprintf(out,
+            "comment frames_lost %" PRIu64 " reader_lost %" PRIu64 " dropped %" PRIu64 " bad_payload %" PRIu64 "\n",
+            s->seq_lost, s->reader_lost, s->dropped, s->bad_payload);
+    if (s->repeated + s->late + s->restarts != 0)
+        fprintf(out, "comment frames_repeated %" PRIu64 " frames_late %" PRIu64 " restarts %" PRIu64 "\n", s->repeated,
+                s->late, s->restarts);
+    fprintf(out, "comment pulses_lost %" PRIu64 " points_before_descriptor %" PRIu64 "\n", s->pulses_lost,
+            facts->n_unplaced);
+}
+
 static void put_comments(FILE *out, const struct ply_facts *facts)
 {
     const struct track *t = facts->track;
-    const struct scanhead_stats *s = &facts->stats;
+    if (facts->incomplete) fputs(PLY_INCOMPLETE, out);
     fprintf(out, "comment crs %s\n", ply_crs_text(t));
     fprintf(out, "comment epsg %d\n", t->epsg);
     for (uint32_t i = 0; i < facts->n_heads || i == 0; i++) /* of a file without points all is empty */
@@ -95,38 +121,27 @@ static void put_comments(FILE *out, const struct ply_facts *facts)
     }
     if ((facts->columns & PLY_REFLECTANCE) != 0) fputs("comment reflectance in dB, nan: not modelled\n", out);
     if ((facts->columns & PLY_ATTRIBUTES) != 0)
-        fprintf(out,
-                "comment amplitude in dB above the detection threshold, width of the echo in ns at half maximum\n"
-                "comment points_without_attributes %" PRIu64 "\n",
-                facts->n_without_attributes);
+        fputs("comment amplitude in dB above the detection threshold, width of the echo in ns at half maximum\n", out);
+    if ((facts->columns & PLY_ATTRIBUTES) != 0 && !facts->incomplete)
+        fprintf(out, "comment points_without_attributes %" PRIu64 "\n", facts->n_without_attributes);
     if ((facts->columns & (PLY_ECHO | PLY_LABEL)) != 0)
         fputs("comment echo and echo_count 0: shot without echo; label 65535: none\n", out);
     if (t->moving)
-        fprintf(
-            out,
-            "comment the head moved, each point has its own pose; frame: frame scalar of the trajectory, nan: lost\n"
-            "comment points_without_pose %" PRIu64 "\n",
-            facts->n_without_pose);
+        fputs("comment the head moved, each point has its own pose; frame: frame scalar of the trajectory, nan: lost\n",
+              out);
+    if (t->moving && !facts->incomplete)
+        fprintf(out, "comment points_without_pose %" PRIu64 "\n", facts->n_without_pose);
     if (t->stops) fputs("comment the stations are stops on a trajectory; frame: its frame scalar there\n", out);
     if ((facts->columns & PLY_COLOUR) != 0) put_colour_comment(out, t);
     fprintf(out, "comment empty_shots %s\n", facts->empty_shots ? "kept" : "left out");
-    fprintf(out,
-            "comment frames_lost %" PRIu64 " reader_lost %" PRIu64 " dropped %" PRIu64 " bad_payload %" PRIu64 "\n",
-            s->seq_lost, s->reader_lost, s->dropped, s->bad_payload);
-    if (s->repeated + s->late + s->restarts != 0)
-        fprintf(out, "comment frames_repeated %" PRIu64 " frames_late %" PRIu64 " restarts %" PRIu64 "\n", s->repeated,
-                s->late, s->restarts);
-    fprintf(out, "comment pulses_lost %" PRIu64 " points_before_descriptor %" PRIu64 "\n", s->pulses_lost,
-            facts->n_unplaced);
-    ply_put_names(out, "comment ", t->named != NULL ? t->named : t->sh);
+    if (!facts->incomplete) put_losses(out, facts);
 }
 
-/* Lines of comment that take exactly n bytes; n is 0 or at least PAD_MIN. */
-static void put_padding(FILE *out, size_t n)
+void ply_put_padding(FILE *out, size_t n)
 {
     while (n > 0) {
         size_t line = n < 2 * PAD_LINE ? n : PAD_LINE; /* the last one takes the rest, so none is too short */
-        fprintf(out, "comment%*s\n", (int)(line - PAD_MIN), "");
+        fprintf(out, "comment%*s\n", (int)(line - PLY_PAD_MIN), "");
         n -= line;
     }
 }
@@ -192,34 +207,70 @@ static void put_column(FILE *out, const struct ply_facts *facts, const struct co
             c->name);
 }
 
-static void put_header(FILE *out, const struct ply_facts *facts, size_t padding)
+/* Of the rest of its lines, so much goes into the header. */
+struct filling {
+    size_t names, padding; /* bytes */
+    uint64_t n_left_out;
+};
+
+static void put_header(FILE *out, const struct ply_facts *facts, struct filling *fill)
 {
+    const struct track *t = facts->track;
     fprintf(out, "ply\nformat %s 1.0\n", facts->ascii ? "ascii" : "binary_little_endian");
     put_comments(out, facts);
-    put_padding(out, padding);
+    fill->n_left_out = put_names(out, "comment ", t->named != NULL ? t->named : t->sh, fill->names);
+    ply_put_padding(out, fill->padding);
     fprintf(out, "element vertex %" PRIu64 "\n", facts->n_vertices);
     for (size_t i = 0; i < sizeof columns / sizeof columns[0]; i++)
         if (columns[i].part == 0 || (facts->columns & columns[i].part) != 0) put_column(out, facts, &columns[i]);
     fputs("end_header\n", out);
 }
 
-int ply_header_make(const struct ply_facts *facts, size_t size, char **text, size_t *len, struct sh_err *err)
+static int make(const struct ply_facts *facts, struct filling *fill, char **text, size_t *len, struct sh_err *err)
 {
-    size_t padding = 0;
-    for (int pass = 0; pass < 2; pass++) {
-        *text = NULL;
-        FILE *out = open_memstream(text, len);
-        if (out != NULL) put_header(out, facts, padding);
-        if (out == NULL || fclose(out) != 0) {
-            free(*text);
-            return sh_fail(err, SH_ENOMEM, "no memory for the header");
-        }
-        if (pass == 1 || *len >= size) break;
-        padding = size - *len;
-        if (padding < PAD_MIN) padding += PAD_MIN;
-        free(*text);
+    *text = NULL;
+    FILE *out = open_memstream(text, len);
+    if (out != NULL) put_header(out, facts, fill);
+    if (out != NULL && fclose(out) == 0) return 0;
+    free(*text);
+    return sh_fail(err, SH_ENOMEM, "no memory for the header");
+}
+
+/* How many bytes names may take, after as many heads as fit. */
+static int fit(struct ply_facts *facts, size_t size, size_t *names, uint64_t *n_left_out, struct sh_err *err)
+{
+    char *text;
+    size_t len;
+    for (;; facts->n_heads--, ++*n_left_out) {
+        const int rc = make(facts, &(struct filling){0}, &text, &len, err);
+        if (rc != 0) return rc;
+        free(text);
+        if (len + PLY_PAD_MIN <= size) break;
+        if (facts->n_heads <= 1) return sh_fail(err, SH_EFORMAT, "no room is left for the header");
     }
+    *names = size - len - PLY_PAD_MIN;
     return 0;
+}
+
+int ply_header_make(const struct ply_facts *facts, size_t size, char **text, size_t *len, uint64_t *n_left_out,
+                    struct sh_err *err)
+{
+    struct filling fill = {.names = SIZE_MAX};
+    *n_left_out = 0;
+    if (size == 0) return make(facts, &fill, text, len, err);
+    struct ply_facts *some = malloc(sizeof *some);
+    if (some == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the header");
+    *some = *facts;
+    int rc = fit(some, size, &fill.names, n_left_out, err);
+    if (rc == 0) rc = make(some, &fill, text, len, err);
+    if (rc == 0) {
+        fill.padding = size - *len;
+        free(*text);
+        rc = make(some, &fill, text, len, err);
+    }
+    *n_left_out += fill.n_left_out;
+    free(some);
+    return rc;
 }
 
 size_t ply_header_reserve(const struct ply_facts *facts, uint32_t n_surfaces)
@@ -227,11 +278,12 @@ size_t ply_header_reserve(const struct ply_facts *facts, uint32_t n_surfaces)
     const char *object, *material;
     char *text;
     size_t len;
-    if (ply_header_make(facts, 0, &text, &len, NULL) != 0) return 0;
+    uint64_t none;
+    if (ply_header_make(facts, 0, &text, &len, &none, NULL) != 0) return 0;
     free(text);
     len += facts->more_heads * (sizeof(struct ply_head) + 48);
     if (facts->track->has_attributes) len += 20;
     for (uint32_t label = 0; label < n_surfaces; label++)
         if (!scanhead_surface(facts->track->sh, label, &object, &material)) len += NAME_ROOM;
-    return len + COUNT_ROOM + TIME_ROOM + ORDER_ROOM + PAD_MIN;
+    return len + COUNT_ROOM + TIME_ROOM + ORDER_ROOM + PLY_PAD_MIN;
 }

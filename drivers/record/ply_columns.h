@@ -11,7 +11,9 @@
 #include "drivers/host/scanhead.h"
 #include "drivers/record/track.h"
 
-enum { PLY_MAX_HEADS = 128 };
+enum { PLY_MAX_HEADS = 128, PLY_PAD_MIN = 8 /* "comment\n" */ };
+/* The line of a header that was written before the recording had its end. */
+#define PLY_INCOMPLETE "comment incomplete: its end is missing, and losses were not counted\n"
 
 struct ply_facts {
     const struct track *track; /* its kind of points, and the handle that knows the surfaces' names */
@@ -20,6 +22,7 @@ struct ply_facts {
     uint64_t n_vertices, n_unplaced; /* points before their descriptor and anchor were seen */
     uint64_t n_without_pose;         /* points of a moving head whose pose was lost */
     uint64_t n_without_attributes;   /* echoes */
+    int incomplete; /* the recording goes on: its losses are not known */
     int have_gps;
     double gps_s; /* GPS time of the first scan's start */
     /* The heads: of the first scan, then wherever another one begins. */
@@ -42,8 +45,11 @@ void ply_put_names(FILE *out, const char *before, const struct scanhead *sh);
  * not. */
 size_t ply_header_reserve(const struct ply_facts *facts, uint32_t n_surfaces);
 
-/* The header, padded by comment lines to `size` bytes. *len is what it takes, which is more than size where
- * it does not fit, or would by less than the shortest line. Free *text. */
-int ply_header_make(const struct ply_facts *facts, size_t size, char **text, size_t *len, struct sh_err *err);
+/* The header, padded by comment lines to exactly `size` bytes; 0: as long as it gets. Names, and heads after the first, that
+ * do not fit are left out; *n_left_out says how many. Free *text. */
+int ply_header_make(const struct ply_facts *facts, size_t size, char **text, size_t *len, uint64_t *n_left_out,
+                    struct sh_err *err);
+/* Lines of comment that take exactly n bytes; n is 0 or at least PLY_PAD_MIN. */
+void ply_put_padding(FILE *out, size_t n);
 
 #endif

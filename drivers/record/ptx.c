@@ -18,28 +18,22 @@
  * files of their own, are filled up by PADDING_FREE places and PADDING_PER_SHOT more for each shot. Where more
  * is missing, or lines go back, another grid begins with the same pose: no point is lost, and the grids are
  * reported. */
-#include <inttypes.h>
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
-#include "drivers/record/ptx_grid.h"
+#include "drivers/record/ptx_text.h"
 #include "drivers/record/recorder.h"
 
 enum {
-    LINE_MAX_LEN = 512,
-    ROWS_MAX = 1 << 22,     /* of a grid, whose column is held in memory: 160 MiB. Heads have up to 550,000 */
     PADDING_FREE = 1 << 24, /* 160 MiB of text; a scan of 4,500 lines of 3,700 pulses of which one line came */
     PADDING_PER_SHOT = 8,
-    ROWS_BETWEEN_STOPS = 1 << 16,
 };
 
 struct ptx {
     struct recorder base;
     struct ptx_grid grid;
-    struct station_pose pose;          /* of the scan in the grid */
-    uint32_t last_line, last_row;      /* of the grid's last shot */
-    uint64_t n_columns, n_unsaid_rows; /* of the grid, written */
+    struct station_pose pose;     /* of the scan in the grid */
+    uint32_t last_line, last_row; /* of the grid's last shot */
     uint64_t n_left_out, n_too_bright;
     uint64_t n_padded; /* places in this file */
     uint64_t n_split;  /* grids that go on with the scan of the one before */
@@ -53,70 +47,6 @@ static int ptx_begin(void *rec, struct sh_err *err)
     return ptx_grid_open(&ptx->grid, ptx->base.file.path, err);
 }
 
-static int put_vector(struct ptx *ptx, int digits, const double v[3], const char *end, struct sh_err *err)
-{
-    char text[LINE_MAX_LEN];
-    int n = snprintf(text, sizeof text, "%.*f %.*f %.*f%s\n", digits, v[0], digits, v[1], digits, v[2], end);
-    if (n >= (int)sizeof text) return recorder_fail_huge(&ptx->base, v, err);
-    return outfile_write(&ptx->base.file, text, (size_t)n, err);
-}
-
-/* Vectors are rows in PTX: what stands in the matrix is the rotation's transpose, the shift below it. */
-static int put_header(struct ptx *ptx, struct sh_err *err)
-{
-    const struct ptx_grid *g = &ptx->grid;
-    const double *r = ptx->pose.rotation, *s = ptx->pose.shift_m;
-    char size[64];
-    int n = snprintf(size, sizeof size, "%" PRIu64 "\n%" PRIu64 "\n", (uint64_t)g->column_max - g->column_min + 1,
-                     (uint64_t)g->row_max - g->row_min + 1);
-    int rc = outfile_write(&ptx->base.file, size, (size_t)n, err);
-    if (rc == 0) rc = put_vector(ptx, 9, s, "", err);
-    for (int i = 0; rc == 0 && i < 6; i++)
-        rc = put_vector(ptx, 15, (const double[]){r[i % 3], r[3 + i % 3], r[6 + i % 3]}, i < 3 ? "" : " 0", err);
-    return rc == 0 ? put_vector(ptx, 9, s, " 1", err) : rc;
-}
-
-/* A large grid takes long. */
-static void say_progress(struct ptx *ptx, uint32_t n_rows)
-{
-    char what[LINE_MAX_LEN];
-    ptx->n_columns++;
-    ptx->n_unsaid_rows += n_rows;
-    if (ptx->n_unsaid_rows < ROWS_BETWEEN_STOPS) return;
-    ptx->n_unsaid_rows = 0;
-    snprintf(what, sizeof what, "completing %s", ptx->base.file.path);
-    sh_progress(ptx->base.options.report, what,
-                (double)ptx->n_columns / ((double)ptx->grid.column_max - ptx->grid.column_min + 1));
-}
-
-/* The length, or LINE_MAX_LEN and more. */
-static int put_cell(char *to, const struct ptx_cell *c, int coloured)
-{
-    const double *p = c->p_socs;
-    if (c->intensity < 0) return snprintf(to, LINE_MAX_LEN, "0 0 0 0.5%s\n", coloured ? " 0 0 0" : "");
-    int n = snprintf(to, LINE_MAX_LEN, "%.6f %.6f %.6f %.6f", p[0], p[1], p[2], (double)c->intensity);
-    if (n >= LINE_MAX_LEN) return n;
-    const size_t room = (size_t)(LINE_MAX_LEN - n);
-    if (!coloured) return n + snprintf(to + n, room, "\n");
-    return n + snprintf(to + n, room, " %u %u %u\n", c->rgb[0], c->rgb[1], c->rgb[2]);
-}
-
-static int put_column(void *ctx, const struct ptx_cell *column, uint32_t n_rows, struct sh_err *err)
-{
-    struct ptx *ptx = ctx;
-    int rc = recorder_check_stop(&ptx->base, err);
-    say_progress(ptx, n_rows);
-    for (uint32_t i = 0; rc == 0 && i < n_rows; i++) {
-        if (i % ROWS_BETWEEN_STOPS == ROWS_BETWEEN_STOPS - 1) rc = recorder_check_stop(&ptx->base, err);
-        char *to = (char *)outfile_room(&ptx->base.file, LINE_MAX_LEN, err);
-        if (to == NULL) return SH_EIO;
-        const int n = put_cell(to, &column[i], ptx->base.track.has_colours);
-        if (n >= LINE_MAX_LEN) return recorder_fail_huge(&ptx->base, column[i].p_socs, err);
-        outfile_used(&ptx->base.file, (size_t)n);
-    }
-    return rc;
-}
-
 static int end_scan(struct ptx *ptx, struct sh_err *err)
 {
     struct ptx_grid *g = &ptx->grid;
@@ -125,9 +55,14 @@ static int end_scan(struct ptx *ptx, struct sh_err *err)
     ptx->n_padded += columns * rows - g->n_shots;
     ptx->padding->n_places += columns * rows - g->n_shots;
     ptx->padding->n_shots += g->n_shots;
-    ptx->n_columns = 0;
-    int rc = put_header(ptx, err);
-    return rc != 0 ? rc : ptx_grid_drain(g, put_column, ptx, err);
+    struct ptx_text text = {.file = &ptx->base.file,
+                            .grid = g,
+                            .pose = &ptx->pose,
+                            .coloured = ptx->base.track.has_colours,
+                            .report = ptx->base.options.report};
+    int rc = ptx_text_put(&text, err);
+    if (rc == 0) rc = outfile_flush(&ptx->base.file, err); /* before what it was made of goes */
+    return rc == 0 ? ptx_grid_clear(g, err) : rc;
 }
 
 /* Do the n points of the present batch, which are of one line, belong into the grid as it is? */
@@ -143,7 +78,7 @@ static int has_room(const struct ptx *ptx, uint32_t n)
     const uint64_t rows =
         (uint64_t)(last > g->row_max ? last : g->row_max) - (first < g->row_min ? first : g->row_min) + 1;
     const uint64_t shots = g->n_shots + n;
-    return columns <= t->max_lines && rows <= t->max_pulses && rows <= ROWS_MAX &&
+    return columns <= t->max_lines && rows <= t->max_pulses && rows <= PTX_ROWS_MAX &&
            ptx->padding->n_places + columns * rows <=
                PADDING_FREE + shots + PADDING_PER_SHOT * (ptx->padding->n_shots + shots);
 }
@@ -168,36 +103,62 @@ static float intensity(struct ptx *ptx, double reflectance_db)
     return reflectance_db > 0 ? 1.0f : (float)pow(10, reflectance_db / 10);
 }
 
+/* The cell of the batch's point i. 1, or 0: a shot without echo. */
+static int make_cell(struct ptx *ptx, int i, struct ptx_cell *cell)
+{
+    struct track *t = &ptx->base.track;
+    const struct scanhead_point *p = &t->point[i];
+    *cell = (struct ptx_cell){.column = t->line, .row = t->row[i], .intensity = -1};
+    if (p->echo_count == 0) return 0;
+    double p_socs[3] = {p->x, p->y, p->z};
+    if (t->info.geo) station_pose_reverse(&t->pose, p_socs);
+    if (track_is_nowhere(t, p_socs[0], p_socs[1], p_socs[2])) return 0;
+    cell->intensity = intensity(ptx, p->reflectance_db);
+    memcpy(cell->p_socs, p_socs, sizeof p_socs);
+    if (t->has_colours) memcpy(cell->rgb, t->rgb[i], sizeof cell->rgb);
+    return 1;
+}
+
+/* Until its text is written, an empty grid stands where that will be: so that the recording is no empty file, of which
+ * nobody would think that something was left. */
+static int begin_grid(struct ptx *ptx, struct sh_err *err)
+{
+    static const char text[] = "0\n0\n";
+    struct outfile *file = &ptx->base.file;
+    int rc = outfile_flush(file, err);
+    if (rc == 0) rc = ptx_grid_begin(&ptx->grid, file->written, &ptx->pose, ptx->base.track.has_colours, err);
+    return rc == 0 ? outfile_patch(file, file->written, text, sizeof text - 1, err) : rc;
+}
+
+static int take_shot(struct ptx *ptx, int i, struct sh_err *err)
+{
+    const struct track *t = &ptx->base.track;
+    struct ptx_grid *g = &ptx->grid;
+    struct ptx_cell cell;
+    if (t->point[i].echo > 1) {
+        ptx->n_left_out++;
+        return 0;
+    }
+    int rc = g->n_shots == 0 ? begin_grid(ptx, err) : 0;
+    ptx->last_line = t->line;
+    ptx->last_row = t->row[i];
+    const int is_larger = ptx_grid_shot(g, t->line, t->row[i]);
+    const int is_kept = make_cell(ptx, i, &cell) || is_larger; /* so that the file alone says how large the grid is */
+    return rc == 0 && is_kept ? ptx_grid_cell(g, &cell, err) : rc;
+}
+
 static int ptx_points(void *rec, int n, struct sh_err *err)
 {
     struct ptx *ptx = rec;
-    struct track *t = &ptx->base.track;
     if (n > 0 && !has_room(ptx, (uint32_t)n)) {
         int rc = end_scan(ptx, err);
         if (rc != 0) return rc;
         ptx->n_split++;
     }
-    for (int i = 0; i < n; i++) {
-        const struct scanhead_point *p = &t->point[i];
-        if (p->echo > 1) {
-            ptx->n_left_out++;
-            continue;
-        }
-        ptx->last_line = t->line;
-        ptx->last_row = t->row[i];
-        ptx_grid_shot(&ptx->grid, t->line, t->row[i]);
-        if (p->echo_count == 0) continue;
-        struct ptx_cell cell = {.column = t->line,
-                                .row = t->row[i],
-                                .intensity = intensity(ptx, p->reflectance_db),
-                                .p_socs = {p->x, p->y, p->z}};
-        if (t->has_colours) memcpy(cell.rgb, t->rgb[i], sizeof cell.rgb);
-        if (t->info.geo) station_pose_reverse(&t->pose, cell.p_socs);
-        if (track_is_nowhere(t, cell.p_socs[0], cell.p_socs[1], cell.p_socs[2])) continue;
-        int rc = ptx_grid_cell(&ptx->grid, &cell, err);
-        if (rc != 0) return rc;
-    }
-    return 0;
+    int rc = 0;
+    for (int i = 0; rc == 0 && i < n; i++)
+        rc = take_shot(ptx, i, err);
+    return rc;
 }
 
 static int ptx_finish(void *rec, struct sh_err *err)
@@ -214,6 +175,12 @@ static int ptx_finish(void *rec, struct sh_err *err)
     return 0;
 }
 
+static int ptx_save(void *rec, struct sh_err *err)
+{
+    struct ptx *ptx = rec;
+    return ptx_grid_save(&ptx->grid, err); /* the text of earlier grids is on the disk */
+}
+
 static void ptx_release(void *rec)
 {
     ptx_grid_close(&((struct ptx *)rec)->grid);
@@ -225,5 +192,7 @@ const struct recorder_ops recorder_ptx = {
     .track = {.scan = ptx_scan, .points = ptx_points, .metres = 1, .grid = 1, .wants_colours = 1},
     .begin = ptx_begin,
     .finish = ptx_finish,
+    .save = ptx_save,
+    .repair = ptx_repair,
     .release = ptx_release,
 };

@@ -1,55 +1,108 @@
 #include "drivers/record/ptx_grid.h"
 
 #include <errno.h>
+#include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
+#include "core/newfile.h"
+#include "drivers/protocol/crc32c.h"
+
+static const char MAGIC[8] = "ptxgrid1";
+
+static int fail_spool(const struct ptx_grid *grid, struct sh_err *err)
+{
+    return sh_fail(err, SH_EIO, "%s: cannot write: %s", grid->path, strerror(errno));
+}
+
+/* After a failure nothing more is written, so that what is there stays in one piece. */
+static int put(struct ptx_grid *grid, const void *data, size_t len, struct sh_err *err)
+{
+    if (!ferror(grid->spool) && fwrite(data, len, 1, grid->spool) == 1) return 0;
+    return fail_spool(grid, err);
+}
+
 int ptx_grid_open(struct ptx_grid *grid, const char *path, struct sh_err *err)
 {
     memset(grid, 0, sizeof *grid);
-    if (asprintf(&grid->path, "%s.grid-XXXXXX", path) < 0) {
-        grid->path = NULL;
-        return sh_fail(err, SH_ENOMEM, "%s: no memory to write it", path);
-    }
-    int fd = mkstemp(grid->path);
-    if (fd >= 0) {
-        unlink(grid->path); /* gone with its last user, however that ends */
+    grid->is_empty = 1;
+    if (asprintf(&grid->path, "%s.grid", path) < 0) grid->path = NULL;
+    if (asprintf(&grid->part, "%s.part", path) < 0) grid->part = NULL;
+    int fd, rc = SH_OK;
+    if (grid->path == NULL || grid->part == NULL)
+        rc = sh_fail(err, SH_ENOMEM, "%s: no memory to write it", path);
+    else
+        rc = newfile_part(path, grid->path, &fd, err);
+    if (rc == SH_OK) {
         grid->spool = fdopen(fd, "w+b");
-        if (grid->spool == NULL) close(fd);
+        if (grid->spool == NULL) newfile_drop(grid->path, fd);
+        if (grid->spool == NULL) rc = fail_spool(grid, err);
     }
-    if (grid->spool != NULL) return 0;
-    int code = errno == EACCES || errno == EPERM || errno == EROFS ? SH_EPERM : errno == ENOENT ? SH_EINPUT : SH_EIO;
-    sh_fail(err, code, "%s: cannot create: %s", grid->path, strerror(errno));
-    ptx_grid_close(grid);
-    return code;
+    if (rc != SH_OK) ptx_grid_close(grid);
+    return rc;
 }
 
 void ptx_grid_close(struct ptx_grid *grid)
 {
-    if (grid->spool != NULL) fclose(grid->spool);
+    if (grid->spool != NULL) {
+        if (grid->is_empty || access(grid->part, F_OK) != 0) unlink(grid->path); /* ours as long as it is locked */
+        fclose(grid->spool);
+    }
     free(grid->path);
+    free(grid->part);
     memset(grid, 0, sizeof *grid);
 }
 
-void ptx_grid_shot(struct ptx_grid *grid, uint32_t column, uint32_t row)
+static uint32_t check_of_head(const struct ptx_head *head)
 {
-    int first = grid->n_shots++ == 0;
+    return crc32c(0, head, offsetof(struct ptx_head, check));
+}
+
+static uint8_t check_of_cell(const struct ptx_cell *cell)
+{
+    struct ptx_cell c = *cell;
+    c.check = 0;
+    return (uint8_t)crc32c(0, &c, sizeof c);
+}
+
+int ptx_grid_begin(struct ptx_grid *grid, uint64_t text_at, const struct station_pose *pose, int coloured,
+                   struct sh_err *err)
+{
+    struct ptx_head head = {.text_at = text_at, .pose = *pose, .coloured = coloured != 0};
+    memcpy(head.magic, MAGIC, sizeof MAGIC);
+    head.check = check_of_head(&head);
+    grid->is_empty = 0;
+    return put(grid, &head, sizeof head, err);
+}
+
+static int widen(struct ptx_grid *grid, uint32_t column, uint32_t row, int first)
+{
+    const int larger =
+        first || column < grid->column_min || column > grid->column_max || row < grid->row_min || row > grid->row_max;
     if (first || column < grid->column_min) grid->column_min = column;
     if (first || column > grid->column_max) grid->column_max = column;
     if (first || row < grid->row_min) grid->row_min = row;
     if (first || row > grid->row_max) grid->row_max = row;
+    return larger;
 }
 
-static int fail_spool(const struct ptx_grid *grid, struct sh_err *err)
+int ptx_grid_shot(struct ptx_grid *grid, uint32_t column, uint32_t row)
 {
-    return sh_fail(err, SH_EIO, "%s: cannot keep the grid: %s", grid->path, strerror(errno));
+    return widen(grid, column, row, grid->n_shots++ == 0);
 }
 
 int ptx_grid_cell(struct ptx_grid *grid, const struct ptx_cell *cell, struct sh_err *err)
 {
+    struct ptx_cell c = *cell;
+    c.check = check_of_cell(&c);
     grid->n_cells++;
-    return fwrite(cell, sizeof *cell, 1, grid->spool) == 1 ? 0 : fail_spool(grid, err);
+    return put(grid, &c, sizeof c, err);
+}
+
+int ptx_grid_save(struct ptx_grid *grid, struct sh_err *err)
+{
+    return !ferror(grid->spool) && fflush(grid->spool) == 0 ? 0 : fail_spool(grid, err);
 }
 
 static void blank(struct ptx_cell *column, uint32_t n_rows)
@@ -78,7 +131,8 @@ int ptx_grid_drain(struct ptx_grid *grid,
     uint64_t left = grid->n_cells;
     struct ptx_cell cell, *column = malloc(n_rows * sizeof *column);
     if (column == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory for a column of %u shots", grid->path, n_rows);
-    int rc = fflush(grid->spool) == 0 && fseeko(grid->spool, 0, SEEK_SET) == 0 ? 0 : fail_spool(grid, err);
+    int rc = ptx_grid_save(grid, err);
+    if (rc == 0 && fseeko(grid->spool, sizeof(struct ptx_head), SEEK_SET) != 0) rc = fail_spool(grid, err);
     if (rc == 0 && left > 0 && fread(&cell, sizeof cell, 1, grid->spool) != 1) rc = fail_spool(grid, err);
     for (uint64_t at = grid->column_min; rc == 0 && at <= grid->column_max; at++) {
         blank(column, n_rows);
@@ -89,7 +143,45 @@ int ptx_grid_drain(struct ptx_grid *grid,
         rc = sh_fail(err, SH_EFORMAT, "%s: lines of a scan went back; %llu echoes have no place", grid->path,
                      (unsigned long long)left);
     free(column);
-    rewind(grid->spool);
     grid->n_shots = grid->n_cells = 0;
-    return rc == 0 && ftruncate(fileno(grid->spool), 0) != 0 ? fail_spool(grid, err) : rc;
+    return rc;
+}
+
+int ptx_grid_clear(struct ptx_grid *grid, struct sh_err *err)
+{
+    rewind(grid->spool);
+    if (ftruncate(fileno(grid->spool), 0) != 0) return fail_spool(grid, err);
+    grid->is_empty = 1;
+    return 0;
+}
+
+static int fail_damaged(const struct ptx_grid *grid, uint64_t cell, struct sh_err *err)
+{
+    return sh_fail(err, SH_EFORMAT, "%s: is damaged at byte %" PRIu64 ", in the middle; a repair can only cut its end",
+                   grid->path, sizeof(struct ptx_head) + cell * sizeof(struct ptx_cell));
+}
+
+int ptx_grid_find(struct ptx_grid *grid, struct ptx_head *head, uint64_t *cut, struct sh_err *err)
+{
+    struct ptx_cell cell;
+    uint64_t n = 0;
+    uint32_t last = 0;
+    rewind(grid->spool);
+    *cut = 0;
+    if (fread(head, sizeof *head, 1, grid->spool) != 1 || memcmp(head->magic, MAGIC, sizeof MAGIC) != 0 ||
+        head->check != check_of_head(head))
+        return ferror(grid->spool) ? fail_spool(grid, err) : 0;
+    for (; fread(&cell, sizeof cell, 1, grid->spool) == 1; n++) {
+        const int right = cell.check == check_of_cell(&cell) && (n == 0 || cell.column >= last);
+        if (right && grid->n_cells < n) return fail_damaged(grid, grid->n_cells, err);
+        if (!right) continue;
+        widen(grid, cell.column, cell.row, n == 0);
+        last = cell.column;
+        grid->n_cells++;
+    }
+    if (ferror(grid->spool)) return fail_spool(grid, err);
+    if (fseeko(grid->spool, 0, SEEK_END) != 0) return fail_spool(grid, err);
+    *cut = (uint64_t)ftello(grid->spool) - sizeof *head - grid->n_cells * sizeof cell;
+    grid->n_shots = grid->n_cells;
+    return grid->n_cells > 0;
 }

@@ -1,10 +1,13 @@
 #include "drivers/record/recorder.h"
 
 #include <inttypes.h>
+#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+
+#include "core/newfile.h"
 
 /* The one list of formats. */
 extern const struct recorder_ops recorder_ply, recorder_las, recorder_ptx, recorder_e57, recorder_poses,
@@ -73,6 +76,11 @@ int recorder_frame(struct recorder *rec, struct scanhead *sh, const struct scanh
     return track_frame(&rec->track, sh, frame, err);
 }
 
+int recorder_save(struct recorder *rec, struct sh_err *err)
+{
+    return rec->ops->save != NULL ? rec->ops->save(rec, err) : outfile_save(&rec->file, err);
+}
+
 void recorder_report(const struct recorder *rec, uint64_t n, const char *what)
 {
     if (n > 0) sh_warn(rec->options.report, "%s: %" PRIu64 " %s", rec->file.path, n, what);
@@ -105,15 +113,37 @@ static void report_losses(const struct recorder *rec)
     recorder_report(rec, t->missing.n_without_colours, "points that are grey, since their colours were lost");
 }
 
+/* After a failure what is on the disk stays, where that is of use; whoever gives up the file does not want it. */
+static enum outfile_end how_it_ends(const struct recorder *rec, int keep, int rc)
+{
+    const int can_be_repaired = rec->ops->repair != NULL;
+    if (!keep || rc == SH_ESTOPPED) return OUTFILE_DROP;
+    if (rc == SH_OK) return can_be_repaired ? OUTFILE_KEEP_PART : OUTFILE_KEEP;
+    return can_be_repaired ? OUTFILE_LEAVE : OUTFILE_DROP;
+}
+
+static void say_left(const struct recorder *rec, const char *path)
+{
+    char part[PATH_MAX];
+    snprintf(part, sizeof part, "%s.part", path);
+    if (newfile_left_len(part) > 0)
+        sh_warn(rec->options.report,
+                "%s keeps what came to the disk: scanhead record --repair %s makes a whole file of it", part, path);
+}
+
 int recorder_close(struct recorder *rec, int keep, struct sh_err *err)
 {
     const struct recorder_ops *ops = rec->ops;
+    char *path = strdup(rec->file.path);
     int rc = keep ? track_flush(&rec->track, err) : SH_OK;
     if (keep && rc == SH_OK && ops->finish != NULL) rc = ops->finish(rec, err);
     if (keep && rc == SH_OK) report_losses(rec);
-    int closed = outfile_close(&rec->file, keep && rc == SH_OK, err);
+    const enum outfile_end how = how_it_ends(rec, keep, rc);
+    const int closed = outfile_close(&rec->file, how, err);
+    if (path != NULL && (how == OUTFILE_LEAVE || (how == OUTFILE_KEEP_PART && closed != SH_OK))) say_left(rec, path);
     track_free(&rec->track);
     if (ops->release != NULL) ops->release(rec);
     free(rec);
+    free(path);
     return rc != SH_OK ? rc : closed;
 }

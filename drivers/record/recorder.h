@@ -103,7 +103,10 @@ void recorder_set_limits(struct recorder *rec, double low, double high);
 /* Each frame of the stream, in order, with the handle for information, points and surfaces. The handle must
  * live until close. Whole scans may come from different handles: heads in one scene, whose labels mean the same. */
 int recorder_frame(struct recorder *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
-/* Finishes the file, syncs and renames it; keep = 0: throws it away. rec is freed, also after a failure. */
+/* About once a second: what has come and would wait in memory goes to the disk. */
+int recorder_save(struct recorder *rec, struct sh_err *err);
+/* Finishes the file, syncs and renames it; keep = 0: throws it away. rec is freed, also after a failure. Where it fails, what
+ * came to the disk stays as PATH.part, if the format can be repaired; a note in the report says so. */
 int recorder_close(struct recorder *rec, int keep, struct sh_err *err);
 
 /* For formats: reports "PATH: n what", unless n is 0. */

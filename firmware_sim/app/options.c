@@ -297,6 +297,8 @@ static int too_many(const struct app_command *command, int needed, int n, char *
 static int take_operands(const struct app_command *command, int n, char *const *words, struct app_input *in)
 {
     int needed = 0;
+    if (in->alone && n > 0) return app_usage(command, "%s: with these options it takes no %s", words[0], command->operand[0]);
+    if (in->alone) return APP_GO_ON;
     while (needed < APP_MAX_OPERANDS && command->operand[needed] != NULL)
         needed++;
     if (n > needed) return too_many(command, needed, n, words);
@@ -322,6 +324,8 @@ static int take_option(const struct app_command *command, int opt, const char *w
     if (opt == '?' && optopt >= FIRST_VALUE) return app_usage(command, "%s: the option takes no value", word);
     if (opt == '?') return fail_unknown(command, word);
     *done = row->kind == APP_PRINT;
+    in->alone |= row->kind == APP_ALONE;
+    in->n_options++;
     return apply(command, row, optarg, in, values);
 }
 

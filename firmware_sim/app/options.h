@@ -25,6 +25,7 @@ enum app_option_kind {
     APP_SET,       /* any configuration key */
     APP_CALL,      /* calls apply */
     APP_PASS,      /* adds --NAME, and its value, to a struct app_words */
+    APP_ALONE,     /* calls apply; the command then takes no operands */
     APP_PRINT      /* calls apply, which prints what was asked for: as with --help, the command does nothing else */
 };
 
@@ -81,6 +82,8 @@ struct app_words {
 /* What a command line says, but for the command's own options. */
 struct app_input {
     const char *operand[APP_MAX_OPERANDS];
+    int n_options; /* that were given, --help aside */
+    int alone;     /* an APP_ALONE was: there are no operands */
     struct app_sets sets;
     const char *scenario; /* a file whose faults are added to those of the configuration; NULL: none */
 };

@@ -282,6 +282,18 @@ int command_setting_is_free(const struct command_device *dev, const struct comma
     return !in_scan || (!setting->not_in_scan && (setting->derived == NULL || dev->limits.emitter != EMITTER_SPHERE));
 }
 
+/* What DEF answers may be beyond MAX: rates of power-up may have steps that are not alike. As a number it does what DEF
+ * does, where that gives this step. */
+static int is_default_beyond(const struct command_call *call, int64_t value)
+{
+    struct head_settings then = call->dev->defaults;
+    int64_t min, max;
+    if (call->row->setting->derived == NULL) return 0;
+    then.prr_uhz = call->dev->settings.prr_uhz; /* it stays */
+    command_setting_range(call, &min, &max);
+    return (value < min || value > max) && value == read_value(call, &then);
+}
+
 static int take_value(struct command_call *call, int64_t *value)
 {
     const struct command_setting *setting = call->row->setting;
@@ -292,6 +304,8 @@ static int take_value(struct command_call *call, int64_t *value)
     else if (check_rate(call) != 0 ||
              command_value_in_range(call, read_bound(call, &setting->min), read_bound(call, &setting->max), value) != 0)
         return -1;
+    else if (is_default_beyond(call, *value))
+        call->value.kind = COMMAND_VALUE_DEF;
     return 0;
 }
 

@@ -35,6 +35,10 @@ void session_open(struct pump *pump, struct session *s, const char *peer)
     }
     s->open = 1;
     stream_set_reader(pump->stream, s->reader, s->cursor, pump->holds);
+    const struct loop_source *source = pump->links->source;
+    if (source->ops->session_opened == NULL) return;
+    source->ops->session_opened(source->self, s->id);
+    stream_poke(pump->stream);
 }
 
 void session_cut(struct pump *pump, struct session *s)

@@ -51,62 +51,6 @@ static int look(struct replay *r)
     return 1;
 }
 
-static void note_event(struct replay *r, const uint8_t *frame, uint64_t tick)
-{
-    struct native_event event;
-    if (native_decode_event(frame + NATIVE_HEADER_LEN, native_frame_len(frame) - NATIVE_HEADER_LEN, &event) != SH_OK)
-        return;
-    if (event.code == NATIVE_EV_STATE && event.b < HEAD_N_STATES) replay_set_state(r, tick, (enum head_state)event.b);
-    if (event.code == NATIVE_EV_SCAN_START) {
-        r->scans++;
-        r->frames_done = 0;
-    }
-}
-
-static void count_points(struct replay *r, const uint8_t *payload, size_t len)
-{
-    struct native_points points;
-    struct native_point point;
-    if (native_decode_points(payload, len, &points) != SH_OK) return;
-    r->tick.n_cast += points.n_pulses;
-    r->tick.n_fired += points.n_pulses;
-    for (uint32_t i = 0; i < points.n_points; i++) {
-        native_decode_point(payload, i, &point);
-        r->tick.hits.echoes += point.echo != 0;
-    }
-}
-
-static void count_line(struct replay *r, const uint8_t *payload, size_t len)
-{
-    struct line_end end;
-    if (native_decode_line_end(payload, len, &end) != SH_OK) return;
-    r->tick.n_lines++;
-    if (end.n_fired > end.n_cast) r->tick.n_fired += end.n_fired - end.n_cast; /* the others were counted */
-    r->tick.hits.crowded += end.n_crowded;
-    r->tick.hits.faint += end.n_faint;
-    r->tick.hits.unfit += end.n_unfit;
-    if ((end.status & LINE_LAST_OF_FRAME) != 0) r->frames_done = end.frame + (uint64_t)1;
-}
-
-/* What of it commands and statistics show. With the lock held. */
-static void note_frame(struct replay *r, const uint8_t *frame, uint64_t tick)
-{
-    const uint8_t *payload = frame + NATIVE_HEADER_LEN;
-    const size_t len = native_frame_len(frame) - NATIVE_HEADER_LEN;
-    struct native_descriptor d;
-    struct native_emitter e;
-    struct native_anchor a;
-    if (frame[1] == NATIVE_POINTS) count_points(r, payload, len);
-    if (frame[1] == NATIVE_LINE_END) count_line(r, payload, len);
-    if (frame[1] == NATIVE_EVENT) note_event(r, frame, tick);
-    if (frame[1] == NATIVE_DESCRIPTOR && native_decode_descriptor(payload, len, &d) == SH_OK)
-        replay_take_descriptor(r, &d);
-    if (frame[1] == NATIVE_EMITTER && native_decode_emitter(payload, len, &e) == SH_OK) replay_take_emitter(r, &e);
-    if (frame[1] == NATIVE_ANCHOR && native_decode_anchor(payload, len, &a) == SH_OK) replay_take_anchor(r, &a);
-    if (frame[1] == NATIVE_POINTS) r->tick.scan = (uint32_t)r->scans;
-    r->frames++;
-}
-
 /* Its number, as it is sent. Those that are for one reader have none. */
 static void renumber(struct replay *r, uint8_t *frame)
 {
@@ -126,7 +70,7 @@ static void add(struct replay *r, const uint8_t *frame, uint32_t len, uint64_t t
     renumber(r, r->bytes + r->len);
     r->len += len;
     pthread_mutex_lock(&r->lock);
-    note_frame(r, frame, tick);
+    replay_note_frame(r, frame, tick);
     pthread_mutex_unlock(&r->lock);
 }
 
@@ -167,16 +111,25 @@ static uint64_t due_tick(struct replay *r, uint64_t tick)
     return r->start_tick + (out < 0x1p62 ? (uint64_t)(out > 0.0 ? out : 0.0) : UINT64_C(1) << 62);
 }
 
+static void stop(struct replay *r, uint64_t tick)
+{
+    pthread_mutex_lock(&r->lock);
+    r->playing = 0;
+    replay_set_state(r, tick, HEAD_IDLE);
+    pthread_mutex_unlock(&r->lock);
+}
+
 static void begin(struct replay *r, uint64_t tick)
 {
     struct sh_err err = {0};
     r->has_frame = r->in_range = r->has_skipped = 0;
     if (recording_rewind(&r->recording, &err) != SH_OK) {
+        stop(r, tick);
         fail(r, &err);
         return;
     }
-    r->playing = look(r);
-    if (!r->playing) {
+    if (!look(r)) {
+        stop(r, tick);
         if (r->failure.code != 0) return;
         sh_fail(&err, SH_EINPUT, "%s: no frame is in it from %.10g s on", r->options.path, r->options.from_s);
         fail(r, &err);
@@ -186,18 +139,11 @@ static void begin(struct replay *r, uint64_t tick)
     r->in_range = 1;
     r->restarts = 1;
     pthread_mutex_lock(&r->lock);
+    r->playing = 1;
     r->times++;
     replay_set_state(r, tick, HEAD_SCANNING);
     pthread_mutex_unlock(&r->lock);
     if (r->has_skipped && r->frame.bytes[1] != NATIVE_DESCRIPTOR) add_front(r, tick);
-}
-
-static void stop(struct replay *r, uint64_t tick)
-{
-    r->playing = 0;
-    pthread_mutex_lock(&r->lock);
-    replay_set_state(r, tick, HEAD_IDLE);
-    pthread_mutex_unlock(&r->lock);
 }
 
 /* The frames of a tick. may_skip: time without frames passes at once. */
@@ -222,9 +168,11 @@ static int take_wishes(struct replay *r, uint64_t tick, int *over)
     const int again = r->wants_again;
     r->wants_again = 0;
     pthread_mutex_lock(&r->lock);
-    const int starts = r->wants_start || again, stops = r->wants_stop;
-    r->wants_start = r->wants_stop = 0;
-    *over = r->ending || tick >= r->end_tick || (r->ends_then && !starts && !r->playing);
+    const int ready = r->n_clients >= (int)r->options.clients;
+    const int starts = (r->wants_start && ready) || again, stops = r->wants_stop;
+    if (starts) r->wants_start = 0;
+    r->wants_stop = 0;
+    *over = r->ending || tick >= r->end_tick || (r->ends_then && !r->wants_start && !starts && !r->playing);
     pthread_mutex_unlock(&r->lock);
     if (stops && r->playing) stop(r, tick);
     return starts && !*over;
@@ -247,8 +195,8 @@ static enum loop_source_tick next(void *self, uint64_t tick, int may_idle, int a
     const int starts = take_wishes(r, tick, &over);
     if (over && !again) return LOOP_SOURCE_OVER;
     if (starts) begin(r, tick);
-    if (!r->playing && !again && r->len == 0 && may_idle && r->end_tick == UINT64_MAX && !r->ends_then &&
-        !r->wants_again)
+    if (!r->playing && !again && r->len == 0 && may_idle && r->end_tick == UINT64_MAX &&
+        (!r->ends_then || r->wants_start) && !r->wants_again)
         return LOOP_SOURCE_IDLE;
     if (r->playing) {
         const struct ring_tick before = r->tick;
@@ -341,6 +289,7 @@ static void end(void *self)
 const struct loop_source_ops replay_source = {
     .command = replay_command,
     .overlong = replay_overlong,
+    .session_opened = replay_session_opened,
     .session_closed = replay_session_closed,
     .report = replay_report,
     .faults = faults,
@@ -369,6 +318,8 @@ int replay_open(struct config *cfg, const struct replay_options *options, struct
     r->tick_ns = llround(1e9 / cfg->loop.tick_hz);
     r->end_tick = options->duration_s > 0.0 ? (uint64_t)ceil(options->duration_s * cfg->loop.tick_hz) : UINT64_MAX;
     r->wants_start = options->start;
+    for (uint32_t i = 0; i < cfg->n_links; i++) /* each of these opens a session for itself */
+        r->n_clients -= cfg->link[i].type == LINK_FILE || cfg->link[i].type == LINK_NULL;
     r->ends_then = options->start && !options->loop;
     r->bytes = malloc(MOST_BYTES + REPLAY_FRONT * REPLAY_FRONT_ROOM);
     int rc = r->bytes != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory");

@@ -93,7 +93,9 @@ static void carry_out(struct replay *r, enum command_effect effect)
 {
     r->wants_start |= effect == COMMAND_START;
     r->wants_stop |= effect == COMMAND_STOP || effect == COMMAND_RESET;
-    if (effect == COMMAND_START) r->wants_stop = 0;
+    if (effect != COMMAND_START) return;
+    r->wants_stop = 0;
+    r->options.clients = 0; /* who commands it does not wait for others */
 }
 
 void replay_command(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out)
@@ -128,6 +130,15 @@ void replay_overlong(void *self, uint32_t session, struct command_result *out)
     pthread_mutex_unlock(&r->lock);
 }
 
+void replay_session_opened(void *self, uint32_t session)
+{
+    struct replay *r = self;
+    (void)session;
+    pthread_mutex_lock(&r->lock);
+    r->n_clients++;
+    pthread_mutex_unlock(&r->lock);
+}
+
 void replay_session_closed(void *self, uint32_t session, const char *who, int partial)
 {
     struct replay *r = self;
@@ -135,6 +146,7 @@ void replay_session_closed(void *self, uint32_t session, const char *who, int pa
     snprintf(text, sizeof text, "session %u, %.60s", session, who);
     pthread_mutex_lock(&r->lock);
     const int in_control = r->cmd.control == session;
+    r->n_clients--;
     if (in_control) r->cmd.control = 0;
     if (partial) command_queue_push(&r->cmd.queue, CMD_E_PARTIAL, text);
     if (in_control || r->playing) command_queue_push(&r->cmd.queue, CMD_E_CLIENT_LOST, text);

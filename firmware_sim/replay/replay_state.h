@@ -29,6 +29,7 @@ struct replay {
     pthread_mutex_t lock;
     struct command_device cmd;
     int wants_start, wants_stop, ending;
+    int n_clients; /* beside links that are readers themselves */
     int ends_then; /* the run ends when it was played */
     uint64_t end_tick; /* of the run; UINT64_MAX: none */
     uint32_t times;  /* begun so far */
@@ -46,7 +47,7 @@ struct replay {
     struct recording recording;
     int64_t first_ns; /* of the recording: device time of its first frame */
     struct replay_front front;
-    int playing;
+    int playing; /* changed under the lock */
     uint64_t start_tick;   /* with which it began, or began to be counted anew: */
     int64_t base;          /* that is this tick of the recording */
     int64_t last;          /* tick of the recording of the frame sent last */
@@ -73,8 +74,12 @@ void replay_open_commands(struct replay *replay);
 /* As struct loop_source_ops has them. */
 void replay_command(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out);
 void replay_overlong(void *self, uint32_t session, struct command_result *out);
+void replay_session_opened(void *self, uint32_t session);
 void replay_session_closed(void *self, uint32_t session, const char *who, int partial);
 void replay_report(void *self, int number, const char *text);
+
+/* replay_notes.c: a frame goes out with a tick. With the lock held; counts into r->tick. */
+void replay_note_frame(struct replay *replay, const uint8_t *frame, uint64_t tick);
 
 /* replay_open.c: reads up to the first anchor, and fills in what links need. */
 int replay_open_recording(struct replay *replay, struct sh_err *err);

@@ -183,14 +183,32 @@ void rig_check_disk_full(const char *path, rlim_t size)
     getrlimit(RLIMIT_FSIZE, &old);
     small = (struct rlimit){size, old.rlim_max};
     assert_int_equal(setrlimit(RLIMIT_FSIZE, &small), 0);
-    int rc = rig_record(path, (struct recorder_options){0}, 1, &err);
+    int rc = rig_record(path, (struct recorder_options){0}, RIG_KEEP_ALWAYS, &err);
     setrlimit(RLIMIT_FSIZE, &old);
     signal(SIGXFSZ, was);
     snprintf(part, sizeof part, "%s.part", path);
     assert_int_equal(rc, SH_EIO);
     assert_non_null(strstr(err.text, path));
     assert_int_equal(access(path, F_OK), -1);
+    rig_check_left(path);
+}
+
+void rig_check_left(const char *path)
+{
+    struct sh_err err = {0};
+    struct repaired file;
+    char part[160];
+    snprintf(part, sizeof part, "%s.part", path);
+    if (recorder_find(path, &err)->repair == NULL) {
+        assert_int_equal(access(part, F_OK), -1);
+        return;
+    }
+    assert_non_null(strstr(rig_notes, "--repair"));
+    if (repair_file(path, NULL, &file, &err) != SH_OK) fail_msg("%s", err.text);
+    assert_true(file.was_left);
+    repair_free(&file);
     assert_int_equal(access(part, F_OK), -1);
+    assert_int_equal(unlink(path), 0);
 }
 
 int rig_set_up(void **state)

@@ -63,8 +63,11 @@ int32_t rig_int32(const uint8_t *p);
 
 double rig_double(const uint8_t *p);
 
-/* A stream that fails for want of space leaves nothing behind: a limit on the file's size stands for the full disk. */
+/* A stream that fails for want of space leaves what came to the disk, if the format can be repaired, else nothing: a limit on
+ * the file's size stands for the full disk. */
 void rig_check_disk_full(const char *path, rlim_t size);
+/* That of path there is PATH.part, which the recorder has said and a repair takes; or nothing. Nothing stays. */
+void rig_check_left(const char *path);
 
 int rig_set_up(void **state);
 

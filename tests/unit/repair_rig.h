@@ -11,7 +11,7 @@ void repair_rig_record(const char *path, struct recorder_options options, void (
 /* Makes path of these bytes. */
 void repair_rig_write(const char *path, const void *data, size_t len);
 
-/* Repairs the file at path in place. */
+/* Repairs the file at path in place; its format is that of the ending, before .part. */
 int repair_rig_repair(const char *path, struct repair *repair, struct sh_err *err);
 
 #endif

@@ -37,6 +37,7 @@ static void test_disk_full(void **state)
     struct sh_err err;
     struct rlimit old, small = {3000, 0};
     void (*was)(int) = signal(SIGXFSZ, SIG_IGN);
+    struct repaired file;
     char path[80], part[96];
     begin_stream();
     put_descriptor(1, 1, 3);
@@ -60,11 +61,19 @@ static void test_disk_full(void **state)
     assert_int_equal(ply, SH_EIO);
     assert_non_null(strstr(ply_text, part_path));
     assert_int_equal(access(out_path, F_OK), -1);
-    assert_int_equal(access(part_path, F_OK), -1);
     assert_int_equal(raw, SH_EIO);
     assert_non_null(strstr(err.text, part));
     assert_int_equal(access(path, F_OK), -1);
+    /* what came to the disk stays */
+    assert_int_equal(repair_file(out_path, NULL, &file, &err), 0);
+    assert_true(file.was_left && file.n_kept > 0);
+    repair_free(&file);
+    assert_int_equal(repair_file(path, NULL, &file, &err), 0);
+    assert_true(file.was_left && file.n_kept > 0);
+    repair_free(&file);
+    assert_int_equal(access(part_path, F_OK), -1);
     assert_int_equal(access(part, F_OK), -1);
+    unlink(path);
 }
 
 static void test_shs(void **state)

@@ -45,8 +45,7 @@ void grabber_start(struct wire *wire, const char *name, const char *sensor, stru
     grabber->out_fd = out[0];
 }
 
-/* Takes what it says; 0: nothing more will come. */
-static int listen_to(struct grabber *grabber)
+int grabber_listen(struct grabber *grabber)
 {
     struct pollfd slot = {.fd = grabber->out_fd, .events = POLLIN};
     if (poll(&slot, 1, DEADLINE_MS) != 1) fail_msg("rawlog-grabber says nothing more:\n%s", grabber->said);
@@ -67,7 +66,7 @@ static int n_saved(const struct grabber *grabber)
 int grabber_wait(struct grabber *grabber, int wanted)
 {
     while (n_saved(grabber) < wanted) {
-        if (!listen_to(grabber)) fail_msg("rawlog-grabber ended:\n%s", grabber->said);
+        if (!grabber_listen(grabber)) fail_msg("rawlog-grabber ended:\n%s", grabber->said);
         if (strstr(grabber->said, "|ERROR|") != NULL) return 0;
     }
     return 1;
@@ -91,12 +90,26 @@ void grabber_start_and_wait(struct wire *wire, const char *name, const char *sen
 void grabber_end(struct grabber *grabber)
 {
     raw_write(grabber->in_fd, "\n", 1);
-    while (listen_to(grabber)) {
+    while (grabber_listen(grabber)) {
     }
     close(grabber->in_fd);
     close(grabber->out_fd);
     int status = wire_wait(grabber->wire, grabber->pid);
     if (status != 0) fail_msg("rawlog-grabber: status %d\n%s", status, grabber->said);
+}
+
+uint32_t grabber_dropped_at(int port)
+{
+    char line[256];
+    unsigned local, drops, sum = 0;
+    FILE *f = fopen("/proc/net/udp", "r");
+    assert_non_null(f);
+    while (fgets(line, sizeof line, f) != NULL)
+        if (sscanf(line, "%*d: %*x:%x %*s %*s %*s %*s %*s %*s %*s %*s %*s %*s %u", &local, &drops) == 2 &&
+            (int)local == port)
+            sum += drops;
+    fclose(f);
+    return sum;
 }
 
 /* ---- rawlogs */

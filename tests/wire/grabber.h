@@ -21,6 +21,9 @@ void grabber_or_skip(void);
 /* name: of its section, its label and its files. sensor: the lines of its section, the driver's. */
 void grabber_start(struct wire *wire, const char *name, const char *sensor, struct grabber *grabber);
 
+/* Takes what it says, to `said`; 0: nothing more will come. */
+int grabber_listen(struct grabber *grabber);
+
 /* Waits until it has saved so many observations. 0: it complained before. */
 int grabber_wait(struct grabber *grabber, int n_saved);
 
@@ -28,6 +31,9 @@ int grabber_wait(struct grabber *grabber, int n_saved);
  * it, which a busy machine may not give it; so its user has five tries. */
 void grabber_start_and_wait(struct wire *wire, const char *name, const char *sensor, int n_saved,
                             struct grabber *grabber);
+
+/* Datagrams that the kernel threw away since a socket's owner did not read them in time: on a busy machine. */
+uint32_t grabber_dropped_at(int port);
 
 /* A key is pressed; it must end with status 0. */
 void grabber_end(struct grabber *grabber);

@@ -54,9 +54,14 @@ static void test_same_file(void **state)
     expect_refusal(wire, (const char *const[]){"record", config, "-o", a, "-o", a, NULL}, "given twice");
     expect_refusal(wire, (const char *const[]){"record", config, "-o", a, "-o", b, NULL},
                    "is being written by another recording");
-    /* what a recording that was killed has left is no hindrance */
+    /* what a recording that was killed has left is not overwritten: it may be all that there is of it */
     snprintf(part, sizeof part, "%s", wire_write_text(wire, "a.las.part", "left behind, longer than nothing"));
     const char *const args[] = {"record", config, "-o", a, "--quiet", NULL};
+    expect_refusal(wire, args, "a.las.part: an earlier recording has left 32 bytes there; scanhead record --repair ");
+    assert_int_equal(unlink(part), 0);
+    wire_write_text(wire, "a-1.las.part", "left behind");
+    expect_refusal(wire, (const char *const[]){"record", config, "-o", a, "--quiet", "--split", NULL}, "a-1.las.part");
+    wire_write_text(wire, "a.las.part", ""); /* nothing is lost */
     assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
     assert_int_equal(access(part, F_OK), -1);
     char *las = wire_read(a, NULL);

@@ -988,52 +988,69 @@ local function next_header(bytes, at, last)
   end
 end
 
-local function new_flow() return {sequence = new_sequence(), in_step = true, started = false, lost = 0, line = {pulses = 0, whole = false}} end
+local function new_flow() return {sequence = new_sequence(), in_step = true, started = false, lost = 0, waiting = 0, line = {pulses = 0, whole = false}} end
 
-local memo -- what was found in a packet when it came first, by packet and by where its bytes stand
+-- What was found in a packet when it came first. Wireshark may cut the same bytes otherwise when it looks again: so the
+-- content is the key, and what is there twice is taken in turns.
+local memo
 
-local function memo_of(tvb, pinfo, flow)
+local function memo_of(pinfo)
   local packet = memo[pinfo.number]
   if not packet then
-    packet = {}
+    packet = {starts = {}, found = {}, turn = {}, joined = {}}
     memo[pinfo.number] = packet
   end
-  local key = tvb:offset() .. "/" .. tvb:len()
-  if not packet[key] then packet[key] = {in_step = flow.in_step, started = flow.started, found = {}} end
-  return packet[key]
+  return packet
+end
+
+-- The entry of `what`; a new one is given to make(entry) once.
+local function find(pinfo, what, make)
+  local packet = memo_of(pinfo)
+  local list = packet.found[what] or {}
+  packet.found[what] = list
+  if pinfo.visited then
+    if #list == 0 then return {packet = pinfo.number} end
+    packet.turn[what] = (packet.turn[what] or 0) % #list + 1
+    return list[packet.turn[what]]
+  end
+  local m = {packet = pinfo.number, time = pinfo.rel_ts}
+  list[#list + 1] = m
+  make(m)
+  return m
 end
 
 local function note_info(pinfo, words)
   pinfo.cols.info:append((tostring(pinfo.cols.info) == "" and "" or "; ") .. words)
 end
 
--- Looks into one piece of the stream. can_wait: more bytes may come. Gives where it waits, and for how many bytes more
--- (nil: not known), or nothing where all is used.
+-- Looks into one piece of the stream: first it finds what is there (`items`), then it shows that, or not yet. can_wait:
+-- more bytes may come.
 local Search = {}
 Search.__index = Search
 
 local function new_search(tvb, pinfo, tree, conn, can_wait)
   local flow = conn.down
   local self = setmetatable({tvb = tvb, pinfo = pinfo, tree = tree, conn = conn, flow = flow, can_wait = can_wait, at = 0,
-                             len = tvb:len(), bytes = tvb:raw(0, tvb:len()), shown = 0}, Search)
-  self.memo = memo_of(tvb, pinfo, flow)
-  self.in_step, self.started = self.memo.in_step, self.memo.started
+                             len = tvb:len(), bytes = tvb:raw(0, tvb:len()), items = {}, said = 0}, Search)
+  local starts, key = memo_of(pinfo).starts, self.bytes:sub(1, 64)
+  if not pinfo.visited then starts[key] = starts[key] or {in_step = flow.in_step, started = flow.started} end
+  local start = starts[key] or {in_step = true, started = true}
+  self.in_step, self.started = start.in_step, start.started
   return self
 end
 
+function Search:add(show, from, ...) self.items[#self.items + 1] = {show, from, ...} end
+
 function Search:say(words)
-  self.shown = self.shown + 1
-  if self.shown <= 6 then note_info(self.pinfo, words) elseif self.shown == 7 then note_info(self.pinfo, "...") end
+  self.said = self.said + 1
+  if self.said <= 6 then note_info(self.pinfo, words) elseif self.said == 7 then note_info(self.pinfo, "...") end
 end
 
 -- Bytes up to `to` that belong to nothing. Where they look like a frame, its header is shown.
-function Search:end_garbage(to)
-  local from = self.garbage
-  if not from or from == to then return end
-  self.garbage = nil
+function Search:show_garbage(from, to, is_join)
   local tvb, n = self.tvb, to - from
   local item = self.tree:add(scanhead, tvb(from, n), string.format("Scan head, %d bytes that belong to no frame and no line", n))
-  if self.conn.is_stream and not self.started then
+  if is_join then
     item:add(F["bad_bytes"], tvb(from, n)):add_proto_expert_info(E.joined)
   else
     if byte(self.bytes, from + 1) == SYNC and n >= HEADER_LEN then put_header(item, tvb, from, false, nil) end
@@ -1042,79 +1059,80 @@ function Search:end_garbage(to)
   end
 end
 
+function Search:end_garbage()
+  local from = self.garbage
+  self.garbage = nil
+  if from and from < self.at then self:add(self.show_garbage, from, self.at, self.conn.is_stream and not self.started) end
+end
+
 function Search:skip(to)
   if not self.garbage then self.garbage = self.at end
   self.at, self.in_step = to, false
 end
 
-function Search:found(make)
-  local m = self.memo.found[self.at]
-  if m then return m end
-  m = {packet = self.pinfo.number}
-  if not self.pinfo.visited then
-    self.memo.found[self.at] = m
-    make(m)
-  end
-  return m
+function Search:take(n, show, ...)
+  self:end_garbage()
+  self:add(show, self.at, ...)
+  self.at, self.in_step, self.started = self.at + n, true, true
 end
 
-function Search:whole_frame(h)
-  local tvb, at, payload = self.tvb, self.at, self.at + HEADER_LEN
-  self:end_garbage(at)
-  local m = self:found(function(m) absorb(self.flow, h, self.bytes, payload, m) end)
+function Search:show_frame(at, h)
+  local tvb, payload = self.tvb, at + HEADER_LEN
+  local m = find(self.pinfo, h.look, function(m) absorb(self.flow, h, self.bytes, payload, m) end)
   local words = summary(h, self.bytes, payload, m)
   local item = self.tree:add(scanhead, tvb(at, HEADER_LEN + h.length), "Scan head, " .. words)
   put_header(item, tvb, at, true, true)
   put_findings(item, h, m)
   if h.version == 1 then put_payload(item, tvb, self.bytes, payload, h, m) else item:add_proto_expert_info(E.version_unknown) end
   self:say(words .. (m.notice and " [" .. NOTICES[m.notice] .. "]" or ""))
-  self.at, self.in_step, self.started = payload + h.length, true, true
+end
+
+function Search:show_broken(at, h, to, is_cut)
+  local tvb = self.tvb
+  local item = self.tree:add(scanhead, tvb(at, to - at), string.format("Scan head, broken frame: %s", TYPES[h.type] or h.type))
+  if is_cut then
+    put_header(item, tvb, at, true, nil)
+    item:add_proto_expert_info(E.cut)
+  else
+    put_header(item, tvb, at, true, false)
+  end
+  if to > at + HEADER_LEN then item:add(F["payload"], tvb(at + HEADER_LEN, to - at - HEADER_LEN)) end
+  self:say((TYPES[h.type] or h.type) .. (is_cut and " [cut]" or " [bad CRC]"))
+  if not self.pinfo.visited then self.flow.line.whole = false end
 end
 
 -- A correct header, and what follows is not its payload, or not all of it. What stands within its length is searched.
-function Search:broken_frame(h, which)
-  local tvb, at = self.tvb, self.at
-  self:end_garbage(at)
-  local last = math.min(at + HEADER_LEN + h.length, self.len)
-  local to = next_header(self.bytes, at + 1, last) or last
-  local item = self.tree:add(scanhead, tvb(at, to - at), string.format("Scan head, broken frame: %s", TYPES[h.type] or h.type))
-  put_header(item, tvb, at, true, which == "bad_payload" and false or nil)
-  if which == "cut" then item:add_proto_expert_info(E.cut) end
-  if to > at + HEADER_LEN then item:add(F["payload"], tvb(at + HEADER_LEN, to - at - HEADER_LEN)) end
-  self:say((TYPES[h.type] or h.type) .. (which == "cut" and " [cut]" or " [bad CRC]"))
-  self.flow.line.whole = false
-  self.at, self.in_step, self.started = to, false, true
+function Search:take_broken(h, is_cut)
+  local last = math.min(self.at + HEADER_LEN + h.length, self.len)
+  local to = next_header(self.bytes, self.at + 1, last) or last
+  self:take(to - self.at, self.show_broken, h, to, is_cut)
+  self.in_step = false
 end
 
--- "wait", or nil: it went on.
+-- true: it waits, for so many bytes (nil: not known); else it went on.
 function Search:look_frame()
   local have = self.len - self.at
   if have < HEADER_LEN then
-    if self.can_wait then return "wait" end
-    self:skip(next_header(self.bytes, self.at + 1, self.len) or self.len)
-    return
+    if self.can_wait then return true end
+    return self:skip(next_header(self.bytes, self.at + 1, self.len) or self.len)
   end
   local h = header_at(self.bytes, self.at)
-  if not h then
-    self:skip(self.at + 1)
-  elseif have < HEADER_LEN + h.length then
-    if self.can_wait then return "wait", HEADER_LEN + h.length - have end
-    self:broken_frame(h, "cut")
-  elseif crc32c(self.bytes, self.at + HEADER_LEN, h.length) == h.payload_crc then
-    self:whole_frame(h)
-  else
-    self:broken_frame(h, "bad_payload")
+  if not h then return self:skip(self.at + 1) end
+  if have < HEADER_LEN + h.length then
+    if self.can_wait then return true, HEADER_LEN + h.length - have end
+    return self:take_broken(h, true)
   end
+  if crc32c(self.bytes, self.at + HEADER_LEN, h.length) ~= h.payload_crc then return self:take_broken(h, false) end
+  self:take(HEADER_LEN + h.length, self.show_frame, h)
 end
 
-function Search:reply(n)
-  local tvb, at, conn = self.tvb, self.at, self.conn
-  self:end_garbage(at)
+function Search:show_reply(at, n)
+  local tvb, conn = self.tvb, self.conn
   local words = self.bytes:sub(at + 1, at + n)
-  local m = self:found(function(m)
+  local m = find(self.pinfo, "reply " .. words, function(m)
     m.command = conn.first <= conn.last and conn.commands[conn.first] or nil
+    m.unasked = conn.last > 0 and not m.command
     if m.command then conn.first, m.command.reply_in = conn.first + 1, self.pinfo.number end
-    m.time = self.pinfo.rel_ts
   end)
   local item = self.tree:add(scanhead, tvb(at, n + 2), "Scan head, reply: " .. words)
   item:add(F["reply"], tvb(at, n))
@@ -1124,68 +1142,56 @@ function Search:reply(n)
     item:add(F["command_in"], m.command.packet):set_generated()
     local ns = floor((m.time - m.command.time) * 1e9 + 0.5)
     item:add(F["reply_time"], NSTime.new(floor(ns / 1e9), ns % 1000000000)):set_generated()
-  elseif conn.commands_seen then
+  elseif m.unasked then
     item:add_proto_expert_info(E.unasked)
   end
   self:say("Reply " .. words)
-  self.at, self.in_step, self.started = at + n + 2, true, true
 end
 
 function Search:look_text()
   local n = #self.bytes:match("^[ -~]*", self.at + 1)
   local ending = self.bytes:sub(self.at + n + 1, self.at + n + 2)
-  if n > MOST_REPLY - 2 or (ending ~= "\r\n" and ending ~= "\r" and ending ~= "") then
-    self:skip(self.at + n)
-  elseif ending == "\r\n" then
-    self:reply(n)
-  elseif self.can_wait then
-    return "wait"
-  else
-    self:skip(self.len)
-  end
+  if n > MOST_REPLY - 2 or (ending ~= "\r\n" and ending ~= "\r" and ending ~= "") then return self:skip(self.at + n) end
+  if ending == "\r\n" then return self:take(n + 2, self.show_reply, n) end
+  if self.can_wait then return true end
+  self:skip(self.len)
 end
 
+-- Gives where it waits, for how many bytes more (nil: not known), and whether that is within the bytes that the search
+-- before this one has waited with; or nothing where all is used.
 function Search:run()
-  while self.at < self.len do
-    local first, wait, more = byte(self.bytes, self.at + 1), nil, nil
+  local waits, more
+  while self.at < self.len and not waits do
+    local first = byte(self.bytes, self.at + 1)
     if first == SYNC then
-      wait, more = self:look_frame()
+      waits, more = self:look_frame()
     elseif self.in_step and first >= 0x20 and first <= 0x7e then
-      wait, more = self:look_text()
+      waits, more = self:look_text()
     else
       self:skip((self.bytes:find("\xd5", self.at + 2, true) or self.len + 1) - 1)
     end
-    if wait then
-      self:end_garbage(self.at)
-      self:keep()
-      return self.at, more
-    end
   end
-  self:end_garbage(self.at)
-  self:keep()
-end
-
-function Search:keep()
-  if not self.pinfo.visited then self.flow.in_step, self.flow.started = self.in_step, self.started end
+  self:end_garbage()
+  for _, item in ipairs(self.items) do item[1](self, item[2], item[3], item[4], item[5]) end
+  local flow, is_old = self.flow, self.at > 0 and self.at <= self.flow.waiting
+  if not self.pinfo.visited then
+    flow.in_step, flow.started, flow.waiting = self.in_step, self.started, waits and self.len - self.at or 0
+  end
+  if waits then return self.at, more, is_old end
 end
 
 -- Commands of the host: lines, ended by LF, CR or CR LF. Gives the same as Search:run.
 local function run_commands(tvb, pinfo, tree, conn, can_wait)
   local bytes, at = tvb:raw(0, tvb:len()), 0
-  local found = memo_of(tvb, pinfo, conn.down).found
   while at < #bytes do
     local words, ending = bytes:match("^([^\r\n]*)(\r?\n?)", at + 1)
     if ending == "" and can_wait and #words <= MOST_COMMAND then return at end
     local n = #words + #ending
-    local m = found[at]
-    if not m then
-      m = {packet = pinfo.number, time = pinfo.rel_ts}
-      if not pinfo.visited then
-        found[at], conn.commands_seen = m, true
-        if words ~= "" then conn.last, conn.commands[conn.last + 1] = conn.last + 1, m end
-      end
-    end
     if words ~= "" then
+      local m = find(pinfo, "command " .. words, function(m)
+        conn.last = conn.last + 1
+        conn.commands[conn.last] = m
+      end)
       local is_text = #words <= MOST_COMMAND and not words:find("[^ -~]")
       local item = tree:add(scanhead, tvb(at, n), "Scan head, command: " .. (is_text and words or #words .. " bytes"))
       if is_text then item:add(F["command"], tvb(at, #words)) else item:add(F["bad_bytes"], tvb(at, #words)):add_proto_expert_info(E.bad_command) end
@@ -1207,29 +1213,31 @@ local function conn_of(key, is_stream)
   return conns[key]
 end
 
-local function existing(name)
-  local ok, field = pcall(Field.new, name)
-  return ok and field or function() return nil end
+-- What tells connections apart is taken from pinfo: fields of other dissectors are not there when Wireshark reads a
+-- capture for the first time and shows nothing yet.
+local PORT_TYPE_TCP = 2
+local function tcp_key(pinfo)
+  local one, other = tostring(pinfo.src) .. " " .. pinfo.src_port, tostring(pinfo.dst) .. " " .. pinfo.dst_port
+  return one < other and one .. " " .. other or other .. " " .. one
 end
-local function value_of(field)
-  local info = field()
-  return info and tostring(info) or "-"
+-- Of USB one end is `host`, the other one bus, device and endpoint.
+local function usb_end(pinfo)
+  local from, to = tostring(pinfo.src), tostring(pinfo.dst)
+  if to == "host" then return "usb " .. from, true end
+  if from == "host" then return "usb " .. to, false end
 end
-local tcp_stream, interface_id = existing("tcp.stream"), existing("frame.interface_id")
-local usb_bus, usb_device, usb_endpoint = existing("usb.bus_id"), existing("usb.device_address"), existing("usb.endpoint_address")
-local ws_mask = existing("websocket.mask")
 
 local function begin_packet(pinfo)
   pinfo.cols.protocol = "scanhead"
   pinfo.cols.info:clear()
 end
 
--- Bytes of a carrier whose dissector puts nothing together: frames that go on in the next packet are joined here.
-local function dissect_joined(tvb, pinfo, tree, conn, side, run)
-  local key = "joined/" .. side .. tvb:offset()
-  local packet = memo[pinfo.number] or {}
-  memo[pinfo.number] = packet
-  local kept, first_time = packet[key], not pinfo.visited
+-- Frames that go on in the next packet are joined here, unless `ask` gets TCP to do it: ask(at, more). TCP would give
+-- again what was taken already, where the place that is waited at lies within what it has joined before. There, too,
+-- it is done here.
+local function dissect_joined(tvb, pinfo, tree, conn, side, run, ask)
+  local key, packet, first_time = side .. tvb:offset(), memo_of(pinfo).joined, not pinfo.visited
+  local kept = packet[key]
   if not kept then
     kept = {}
     packet[key] = kept
@@ -1237,25 +1245,19 @@ local function dissect_joined(tvb, pinfo, tree, conn, side, run)
     if first_time and pending then
       pending.n = pending.n + tvb:len()
       pending[#pending + 1] = tvb:raw(0, tvb:len())
-      if pending.most and pending.n < pending.most then
-        kept.is_part = true
-      else
-        kept.joined, conn.pending[side] = table.concat(pending), nil
-      end
+      kept.is_part = pending.most and pending.n < pending.most
+      if not kept.is_part then kept.joined, conn.pending[side] = table.concat(pending), nil end
     end
   end
-  if kept.is_part then
-    tree:add(scanhead, tvb(), "Scan head, part of a frame"):add(F["fragment"], tvb())
-    note_info(pinfo, "[part of a frame]")
-    return
-  end
-  local all = tvb
-  if kept.joined then all = ByteArray.new(kept.joined, true):tvb("Frames over several packets") end
-  local at, more = run(all)
-  if not at then return end
-  if first_time then
+  local at, more, is_old = 0, nil, nil
+  local all = kept.joined and ByteArray.new(kept.joined, true):tvb("Frames over several packets") or tvb
+  if not kept.is_part then
+    at, more, is_old = run(all)
+    if not at then return end
+    if first_time then kept.asks = ask and not kept.joined and not is_old end
+    if kept.asks then return ask(at, more) end
     local rest = all:raw(at, all:len() - at)
-    conn.pending[side] = {rest, n = #rest, most = more and #rest + more}
+    if first_time then conn.pending[side] = {rest, n = #rest, most = more and #rest + more} end
   end
   tree:add(scanhead, all(at, all:len() - at), "Scan head, part of a frame"):add(F["fragment"], all(at, all:len() - at))
   note_info(pinfo, "[part of a frame]")
@@ -1272,37 +1274,44 @@ local function first_header(tvb)
   return at and at + HEADER_LEN <= #bytes
 end
 
+-- A frame's header, or what *IDN? answers: both come from a head alone.
+local function is_of_head(tvb)
+  return first_header(tvb) or tvb:raw(0, tvb:len()):find("scanhead native 1\r\n", 1, true) ~= nil
+end
+
 -- Which side of a TCP connection is the head: the one that frames come from; before that the one with the known port,
 -- or with the lower one.
 local function is_from_head(tvb, pinfo, conn)
-  if not conn.head_port and first_header(tvb) then conn.head_port = pinfo.src_port end
+  if not conn.head_port and is_of_head(tvb) then conn.head_port = pinfo.src_port end
   if conn.head_port then return pinfo.src_port == conn.head_port end
   local port = scanhead.prefs.port
   if pinfo.src_port == port or pinfo.dst_port == port then return pinfo.src_port == port end
   return pinfo.src_port < pinfo.dst_port
 end
 
+-- The same for ever, once a packet was seen.
+local function side_of(tvb, pinfo, conn)
+  local key = "side" .. pinfo.number
+  if memo[key] == nil then memo[key] = is_from_head(tvb, pinfo, conn) end
+  return memo[key]
+end
+
 local function dissect_tcp(tvb, pinfo, tree)
-  local conn = conn_of("tcp " .. value_of(tcp_stream), true)
-  local side = memo["side" .. pinfo.number]
-  if side == nil then
-    side = is_from_head(tvb, pinfo, conn)
-    memo["side" .. pinfo.number] = side
-  end
+  local conn = conn_of("tcp " .. tcp_key(pinfo), true)
+  local is_down = side_of(tvb, pinfo, conn)
   begin_packet(pinfo)
-  local at, more = dissect_either(tvb, pinfo, tree, conn, side, pinfo.can_desegment > 0)
-  if at then
-    pinfo.desegment_offset = at
-    pinfo.desegment_len = more or DESEGMENT_ONE_MORE_SEGMENT
-  end
+  dissect_joined(tvb, pinfo, tree, conn, is_down and "in" or "out", function(all)
+    return dissect_either(all, pinfo, tree, conn, is_down, true)
+  end, pinfo.can_desegment > 0 and function(at, more)
+    pinfo.desegment_offset, pinfo.desegment_len = at, more or DESEGMENT_ONE_MORE_SEGMENT
+  end)
   pinfo.cols.info:fence()
   return tvb:len()
 end
 
 local function dissect_usb(tvb, pinfo, tree)
-  local endpoint = tonumber(value_of(usb_endpoint)) or 0x80
-  local conn = conn_of("usb " .. value_of(usb_bus) .. "." .. value_of(usb_device) .. "." .. endpoint % 128, true)
-  local is_down = endpoint >= 128
+  local key, is_down = usb_end(pinfo)
+  local conn = conn_of(key, true)
   begin_packet(pinfo)
   dissect_joined(tvb, pinfo, tree, conn, is_down and "in" or "out", function(all)
     return dissect_either(all, pinfo, tree, conn, is_down, true)
@@ -1311,8 +1320,8 @@ local function dissect_usb(tvb, pinfo, tree)
 end
 
 local function dissect_web(tvb, pinfo, tree)
-  local conn = conn_of("ws " .. value_of(tcp_stream), true)
-  local is_down = value_of(ws_mask):lower() ~= "true" and value_of(ws_mask) ~= "1"
+  local conn = conn_of("ws " .. tcp_key(pinfo), true)
+  local is_down = side_of(tvb, pinfo, conn)
   begin_packet(pinfo)
   dissect_joined(tvb, pinfo, tree, conn, is_down and "in" or "out", function(all)
     return dissect_either(all, pinfo, tree, conn, is_down, is_down)
@@ -1323,13 +1332,13 @@ end
 
 local function dissect_user0(tvb, pinfo, tree)
   begin_packet(pinfo)
-  dissect_either(tvb, pinfo, tree, conn_of("user0 " .. value_of(interface_id), false), true, false)
+  dissect_either(tvb, pinfo, tree, conn_of("user0", false), true, false)
   return tvb:len()
 end
 
 function scanhead.dissector(tvb, pinfo, tree)
-  if value_of(tcp_stream) ~= "-" then return dissect_tcp(tvb, pinfo, tree) end
-  if value_of(usb_device) ~= "-" then return dissect_usb(tvb, pinfo, tree) end
+  if pinfo.port_type == PORT_TYPE_TCP then return dissect_tcp(tvb, pinfo, tree) end
+  if usb_end(pinfo) then return dissect_usb(tvb, pinfo, tree) end
   return dissect_user0(tvb, pinfo, tree)
 end
 
@@ -1338,16 +1347,15 @@ web.dissector = dissect_web
 
 -- Any port: a correct header, or what *IDN? answers, is enough.
 scanhead:register_heuristic("tcp", function(tvb, pinfo, tree)
-  if not first_header(tvb) and not tvb:raw(0, tvb:len()):find("scanhead native 1\r\n", 1, true) then return false end
+  if not is_of_head(tvb) then return false end
   dissect_tcp(tvb, pinfo, tree)
   pinfo.conversation = scanhead
   return true
 end)
 
 scanhead:register_heuristic("usb.bulk", function(tvb, pinfo, tree)
-  local endpoint = tonumber(value_of(usb_endpoint)) or 0
-  local key = "usb " .. value_of(usb_bus) .. "." .. value_of(usb_device) .. "." .. endpoint % 128
-  if not conns[key] and not first_header(tvb) then return false end
+  local key = usb_end(pinfo)
+  if not key or not conns[key] and not is_of_head(tvb) then return false end
   dissect_usb(tvb, pinfo, tree)
   return true
 end)

@@ -1,11 +1,14 @@
 #include "firmware_sim/app/record/files.h"
 
+#include <glob.h>
+#include <limits.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/mesh.h"
+#include "core/newfile.h"
 
 int record_files_add(struct record_files *files, const char *path, struct sh_err *err)
 {
@@ -176,9 +179,44 @@ static int open_file(const struct record_files *files, struct record_file *file,
     return file->now != NULL ? recorder_open(file->ops, file->now, &files->recorder, &file->rec, err) : SH_ENOMEM;
 }
 
+static int check_part(const char *part, const char *path, struct sh_err *err)
+{
+    const long long len = newfile_left_len(part);
+    if (len == 0) return SH_OK;
+    return sh_fail(
+        err, SH_EINPUT,
+        "%s: an earlier recording has left %lld bytes there; scanhead record --repair %s makes a file of them; "
+        "or remove it",
+        part, len, path);
+}
+
+/* What is left of the file, or of those of single scans: a later one would stop the recording at its scan. */
+static int check_left(const struct record_files *files, const struct record_file *file, struct sh_err *err)
+{
+    char *pattern;
+    glob_t found;
+    const int stem = (int)(strlen(file->path) - strlen(file->ops->ending));
+    if (files->takes_over || file->ops->repair == NULL) return SH_OK;
+    if (asprintf(&pattern, files->split ? "%.*s-*%s.part" : "%.*s%s.part", stem, file->path, file->path + stem) < 0)
+        return sh_fail(err, SH_ENOMEM, "%s: no memory for its name", file->path);
+    int rc = files->split ? SH_OK : check_part(pattern, file->path, err);
+    if (files->split && glob(pattern, 0, NULL, &found) == 0) {
+        for (size_t i = 0; i < found.gl_pathc && rc == SH_OK; i++) {
+            char *part = found.gl_pathv[i], name[PATH_MAX];
+            snprintf(name, sizeof name, "%.*s", (int)strlen(part) - 5, part);
+            if (is_name_of_scan(file, name)) rc = check_part(part, name, err);
+        }
+        globfree(&found);
+    }
+    free(pattern);
+    return rc;
+}
+
 int record_files_open(struct record_files *files, struct sh_err *err)
 {
     int rc = SH_OK;
+    for (int i = 0; i < files->n && rc == SH_OK && files->part == 0; i++)
+        rc = check_left(files, &files->file[i], err);
     files->part++;
     files->recorder.padding = &files->padding;
     files->has_points = 0;
@@ -234,6 +272,14 @@ int record_files_close(struct record_files *files, int keep, struct sh_err *err)
         free(files->file[i].now);
         files->file[i].now = NULL;
     }
+    return rc;
+}
+
+int record_files_save(struct record_files *files, struct sh_err *err)
+{
+    int rc = SH_OK;
+    for (int i = 0; i < files->n && rc == SH_OK; i++)
+        if (files->file[i].rec != NULL) rc = recorder_save(files->file[i].rec, err);
     return rc;
 }
 

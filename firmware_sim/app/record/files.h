@@ -16,6 +16,7 @@ enum { RECORD_MAX_FILES = 8 };
 struct record_files {
     int split; /* each scan to files of its own: NAME-1.ply, NAME-2.ply, ... */
     struct recorder_options recorder;
+    int takes_over; /* what an earlier recording has left as FILE.part is overwritten; else record_files_open refuses */
     int own_limits; /* the limits of recorder.colour.scale are found in the frames */
     /* inner state */
     struct recorder_padding padding; /* in all parts */
@@ -58,7 +59,10 @@ int record_files_check_surface(const struct record_files *files, struct sh_err *
 int record_files_check_emitter(const struct record_files *files, enum emitter_kind kind, struct sh_err *err);
 /* SH_EINPUT where a file is the stream of one head, and several heads would send into it. */
 int record_files_check_heads(const struct record_files *files, struct sh_err *err);
+/* SH_ESTATE: a recording that was killed has left something there, and the format can be repaired. */
 int record_files_open(struct record_files *files, struct sh_err *err);
+/* About once a second: what has come goes to the disk. */
+int record_files_save(struct record_files *files, struct sh_err *err);
 int record_files_frame(struct record_files *files, struct scanhead *sh, const struct scanhead_frame *frame,
                        struct sh_err *err);
 /* Closes all, also after a failure; keep 0: removes them. The first error, if any; err may be NULL. */

@@ -25,8 +25,16 @@ static int write_frame(void *ctx, struct scanhead *sh, const struct scanhead_fra
     return rc == SH_OK && r->each ? record_files_frame(&r->parts, sh, frame, err) : rc;
 }
 
+static int save_files(void *ctx, struct sh_err *err)
+{
+    struct record_job *r = ctx;
+    const int rc = record_files_save(&r->files, err);
+    return rc == SH_OK && r->each ? record_files_save(&r->parts, err) : rc;
+}
+
 static int open_files(struct record_job *r, struct sh_err *err)
 {
+    r->files.takes_over = r->only_whole; /* a campaign begins its jobs anew */
     r->parts = r->files;
     r->parts.split = 1;
     r->parts.recorder.n_heads = 1;
@@ -102,7 +110,7 @@ static int follow(struct record_job *r, struct scanhead *sh, struct sh_err *err)
     r->interrupted = app_interrupted();
     r->reported_ns = clock_now_ns();
     int after = close_files(r, keep, &why);
-    if (rc != SH_OK && after != SH_OK) sh_warn(&app_report_stderr, "%s", why.text);
+    if (rc != SH_OK && after != SH_OK && strcmp(why.text, err->text) != 0) sh_warn(&app_report_stderr, "%s", why.text);
     if (rc == SH_OK && after != SH_OK) rc = sh_fail(err, after, "%s", why.text);
     if (!has_figures || r->stats == NULL) return rc;
     after = app_write_json(r->stats, recording_put, result, &why);
@@ -134,6 +142,7 @@ static int record(struct record_job *r, struct scanhead *sh, struct sh_err *err)
         return rc;
     }
     r->recording.frame = write_frame;
+    r->recording.second = save_files;
     r->recording.ctx = r;
     r->recording.interrupted = app_interrupted;
     r->recording.report = &app_report_stderr;

@@ -6,6 +6,8 @@
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/record/job.h"
 
+enum { RECORD_MAX_REPAIRS = 64 };
+
 struct record_line {
     struct app_input in;
     struct record_job job;
@@ -15,6 +17,8 @@ struct record_line {
     int has_rgb, limited; /* --colour-rgb, --colour-limits */
     int raw;              /* raw.h takes the whole line then */
     const char *raw_only; /* an option that needs it */
+    const char *repair[RECORD_MAX_REPAIRS]; /* --repair; with it nothing is recorded */
+    int n_repairs;
 };
 
 /* APP_GO_ON, or the exit status with the reason printed. The strings are argv's own, or lie in `line`, which must

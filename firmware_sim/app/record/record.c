@@ -7,6 +7,7 @@
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/record/line.h"
 #include "firmware_sim/app/record/raw.h"
+#include "firmware_sim/app/record/repair.h"
 
 static const double LONG_EDGE = 10;
 
@@ -27,6 +28,15 @@ static int take_file(void *values, const char *text)
     struct record_line *r = values;
     struct sh_err err = {0};
     return record_files_add(&r->job.files, text, &err) == SH_OK ? APP_OK : app_fail(&err);
+}
+
+static int take_repair(void *values, const char *text)
+{
+    struct record_line *r = values;
+    if (r->n_repairs == RECORD_MAX_REPAIRS)
+        return app_usage(&app_record, "--repair: at most %d files", RECORD_MAX_REPAIRS);
+    r->repair[r->n_repairs++] = text;
+    return APP_OK;
 }
 
 /* The index of a word; APP_USAGE with the reason printed. */
@@ -182,12 +192,20 @@ static int record_config(struct config *cfg, void *ctx, struct sh_err *err)
     return record_job_off_line(ctx, cfg, err);
 }
 
+static int check_repair(const struct record_line *r)
+{
+    if (r->in.n_options > r->n_repairs + (r->job.stats != NULL) + r->quiet)
+        return app_usage(&app_record, "--repair: only --stats, --quiet and more of --repair are allowed with it");
+    return APP_GO_ON;
+}
+
 int record_line_read(struct record_line *r, int argc, char **argv)
 {
     *r = (struct record_line){.job = {.recording = {.frames = -1}}, .long_edge = -1, .sparse_seed = -1};
     int status = app_parse(&app_record, argc, argv, &r->in, r);
     if (status != APP_GO_ON) return status;
     if (r->raw_only != NULL) return app_usage(&app_record, "--send, --relay, --ready-fd: allowed with --raw");
+    if (r->n_repairs > 0) return check_repair(r);
     if (r->job.files.n == 0 && r->job.stats == NULL) return app_usage(&app_record, "-o FILE is needed");
     if (is_config(r->in.operand[0]) && (r->job.recording.listen || r->job.wait_s > 0 || r->job.recording.replug_s > 0))
         return app_usage(&app_record,
@@ -213,6 +231,7 @@ static int run(int argc, char **argv)
     int status = record_line_read(&r, argc, argv);
     if (status != APP_GO_ON) return status;
     app_catch_signals();
+    if (r.n_repairs > 0) return record_repair(r.repair, r.n_repairs, r.job.stats, r.quiet);
     if (is_config(r.job.source)) return app_with_config(&r.in, record_config, &r.job);
     if (!is_stream(r.job.source))
         return app_usage(&app_record,
@@ -229,6 +248,9 @@ static int run(int argc, char **argv)
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
     {APP_CALL, "output", "FILE", .letter = 'o', .apply = take_file, .help = "where to write; may be repeated"},
+    {APP_ALONE, "repair", "FILE", .apply = take_repair,
+     .help = "instead of recording: make a whole file of what a killed recorder or a full disk has left (FILE.part), in "
+             "place, and say how much that is; a whole file is checked. May be repeated; without SOURCE and -o"},
     {APP_WHOLE, "station", "N|all", .min = 1, .max = CONFIG_MAX_STOPS, .word = "all", .at = AT(job.station),
      .help = "scan from station N, or from all one after the other into the same files"},
     {APP_WHOLE, "frames", "N", .min = 0, .max = HEAD_MAX_FRAMES, .at = AT(job.recording.frames),
@@ -328,7 +350,8 @@ static const char HELP_NOTES[] =
     "  Frames or pulses were lost on the way.\n"
     "  The head was away within a scan.\n"
     "\n"
-    "FILE keeps what came.\n"
+    "FILE keeps what came. Where it can't be completed, as on a full disk, what was written stays as FILE.part, for\n"
+    "--repair. A recorder does not begin while such a FILE.part is there.\n"
     "\n"
     "Ctrl-C, or SIGTERM, ends a recording in good order. A second signal within a second counts as the same one;\n"
     "a third, or one that comes later, ends it at once.\n";

@@ -149,15 +149,18 @@ static double fraction_done(const struct recording *r)
     return (before + fmin(1.0, fmax(0.0, r->into_s / scan_s))) / n;
 }
 
-static void report(struct recording *r)
+static int report(struct recording *r, struct sh_err *err)
 {
     int64_t now_ns = clock_now_ns();
-    if (!r->o->progress || now_ns < r->next_report_ns) return;
+    if (now_ns < r->next_report_ns) return SH_OK;
     r->next_report_ns = now_ns + 1000000000;
+    const int rc = r->o->second != NULL ? r->o->second(r->o->ctx, err) : SH_OK;
+    if (rc != SH_OK || !r->o->progress) return rc;
     char text[96];
     snprintf(text, sizeof text, "recording: %.2f M points, %.2f M pulses", 1e-6 * (double)r->result->points,
              1e-6 * (double)r->result->counts.pulses);
     sh_progress(r->o->report, text, fraction_done(r));
+    return SH_OK;
 }
 
 static int is_interrupted(struct recording *r)
@@ -201,7 +204,8 @@ static int step(struct recording *r, int timeout_ms, struct sh_err *err)
 {
     struct scanhead_frame frame;
     int rc = scanhead_next(r->sh, &frame, timeout_ms);
-    report(r);
+    const int reported = report(r, err);
+    if (reported != SH_OK) return reported;
     if (rc == SCANHEAD_ETIMEOUT) return 0;
     if ((rc == SCANHEAD_ELOST || rc == SCANHEAD_ERESET || rc == SCANHEAD_ECLOSED) && r->o->replug_s > 0.0)
         return replug(r, rc == SCANHEAD_ERESET, err);

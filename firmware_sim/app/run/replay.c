@@ -27,6 +27,7 @@ static int check_head(const struct run_options *o)
                          : o->replay.from_s > 0.0 ? "--from"
                          : o->replay.to_s > 0.0   ? "--to"
                          : o->replay.loop         ? "--loop"
+                         : o->clients > 0         ? "--clients"
                          : o->links[0] != '\0'    ? "--link"
                          : o->config != NULL      ? "--config"
                                                   : NULL;
@@ -47,6 +48,8 @@ int run_check_options(const struct run_options *o, int is_recording)
                          o->in.operand[0]);
     if (o->config != NULL && o->links[0] != '\0')
         return app_usage(&app_run, "--config and --link: both say where the links are; allowed one of them");
+    if (o->clients > 0 && !o->device.start)
+        return app_usage(&app_run, "--clients: without --start a client's SCAN:STARt begins it; allowed with --start");
     if (o->replay.to_s > 0.0 && o->replay.to_s <= o->replay.from_s)
         return app_usage(&app_run, "--to %.10g is not after --from, which is %.10g; allowed more", o->replay.to_s,
                          o->replay.from_s);
@@ -104,6 +107,7 @@ static int replay(struct config *cfg, void *ctx, struct sh_err *err)
     o->replay.path = o->in.operand[0];
     if (!(o->replay.speed > 0.0)) o->replay.speed = 1.0;
     o->replay.start = o->device.start;
+    o->replay.clients = (uint32_t)o->clients;
     o->replay.duration_s = o->device.duration_s;
     o->replay.truth = o->device.truth;
     o->replay.report = &app_report_stderr;
@@ -116,12 +120,6 @@ static int replay(struct config *cfg, void *ctx, struct sh_err *err)
     return rc;
 }
 
-/* --view: a web link. */
-static void add_view(struct run_options *o)
-{
-    if (o->view && o->config == NULL) run_take_link(o, "web");
-}
-
 int run_replay(struct run_options *o)
 {
     char text[sizeof o->links + 16];
@@ -132,7 +130,7 @@ int run_replay(struct run_options *o)
         in.operand[0] = o->config;
         return app_with_config(&in, replay, o);
     }
-    add_view(o);
+    if (o->view && strstr(o->links, "web") == NULL) run_take_link(o, "web");
     struct config *cfg = calloc(1, sizeof *cfg);
     if (cfg == NULL) return sh_fail(&err, SH_ENOMEM, "no memory"), app_fail(&err);
     snprintf(text, sizeof text, "links:\n%s", o->links);

@@ -209,6 +209,8 @@ static const struct app_option OPTIONS[] = {
      .help = "of a recording: begin S seconds of device time after its first frame"},
     {APP_NUMBER, "to", "S", .min = 0.001, .max = 1e9, .at = AT(replay.to_s),
      .help = "of a recording: end S seconds after its first frame"},
+    {APP_WHOLE, "clients", "N", .min = 1, .max = 64, .at = AT(clients),
+     .help = "of a recording, with --start: begin once N clients are there"},
     {APP_FLAG, "loop", NULL, .at = AT(replay.loop), .help = "of a recording: begin anew at its end"},
     {APP_CALL, "link", "LINK", .apply = run_take_link,
      .help = "of a recording: where it is served: pty, tcp, usb, web, ..., or keys as in a configuration: 'type: tcp, "

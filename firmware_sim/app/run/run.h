@@ -11,6 +11,7 @@ struct run_options {
     struct device_options device;
     struct replay_options replay; /* speed 0: not given */
     const char *config;           /* of a recording's links; NULL: none */
+    long clients;
     char links[4096];             /* --link, as YAML; empty: none */
     const char *stats;
     long ready_fd;

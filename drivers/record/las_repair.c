@@ -1,0 +1,106 @@
+#include "drivers/record/las_repair.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "drivers/protocol/bytes.h"
+#include "drivers/record/las_header.h"
+
+struct records {
+    struct las_facts facts; /* of all but zeros at the end */
+    size_t len, time_at, station_at;
+    uint64_t n_zero; /* at the end, of zeros alone */
+    uint64_t n_scans;
+    double time_s;
+    unsigned station;
+};
+
+static double double_at(const uint8_t *at)
+{
+    const uint64_t bits = le_get64(at);
+    double v;
+    memcpy(&v, &bits, sizeof v);
+    return v;
+}
+
+/* A power cut leaves zeros; no record of ours has return 0. Another scan has another station, or its times begin anew. */
+static void take_record(void *ctx, const uint8_t *record)
+{
+    struct records *r = ctx;
+    if (repair_is_zero(record, r->len)) {
+        r->n_zero++;
+        return;
+    }
+    for (; r->n_zero > 0; r->n_zero--) {
+        static const uint8_t zero[LAS_POINT_LEN_MAX];
+        las_count_record(&r->facts, zero);
+    }
+    las_count_record(&r->facts, record);
+    const unsigned station = le_get16(record + r->station_at);
+    const double time_s = double_at(record + r->time_at);
+    r->n_scans += (uint64_t)(r->n_scans == 0 || station != r->station || time_s < r->time_s);
+    r->station = station;
+    r->time_s = time_s;
+}
+
+/* What las.c writes, and nothing else: *front_len bytes, then records of r->len. */
+static int parse_header(const struct repair *repair, const uint8_t *header, size_t len, struct records *r,
+                        uint32_t *front_len, struct sh_err *err)
+{
+    struct las_facts *f = &r->facts;
+    const int is_las = len >= LAS_HEADER_12_LEN && memcmp(header, "LASF", 4) == 0 && header[24] == 1 &&
+                       strncmp((const char *)header + LAS_SOFTWARE_AT, LAS_SOFTWARE, sizeof LAS_SOFTWARE - 1) == 0;
+    if (!is_las) return repair_fail_none(repair, "LAS file of scanhead", err);
+    const int format = header[104];
+    f->minor = header[25];
+    const size_t header_len = f->minor == 2 ? LAS_HEADER_12_LEN : LAS_HEADER_LEN;
+    r->len = le_get16(header + 105);
+    *front_len = le_get32(header + 96);
+    const int known = f->minor == 2
+                          ? (format == 1 && r->len == 28) || (format == 3 && r->len == 34)
+                          : f->minor == 4 && ((format == 6 && r->len >= 30) || (format == 7 && r->len >= 36)) &&
+                                r->len <= LAS_POINT_LEN_MAX;
+    if (!known || len < header_len || *front_len < header_len || *front_len > LAS_FRONT_MAX || *front_len > repair->len)
+        return repair_fail_none(repair, "LAS file of scanhead", err);
+    r->station_at = f->minor == 2 ? 18 : 20;
+    r->time_at = f->minor == 2 ? 20 : 22;
+    for (int i = 0; i < 3; i++) {
+        f->scale[i] = double_at(header + 131 + 8 * i);
+        f->offset[i] = double_at(header + 155 + 8 * i);
+    }
+    return SH_OK;
+}
+
+static int make_whole(struct repair *repair, uint8_t *header, struct records *r, uint32_t front_len, struct sh_err *err)
+{
+    uint8_t renewed[LAS_HEADER_LEN];
+    const size_t len = r->facts.minor == 2 ? LAS_HEADER_12_LEN : LAS_HEADER_LEN;
+    const uint64_t end = front_len + r->facts.n_points * r->len;
+    if (r->facts.minor == 2 && r->facts.n_points > UINT32_MAX)
+        return sh_fail(err, SH_EFORMAT, "%s: LAS 1.2 holds up to 4294967295 points; it is not touched", repair->path);
+    memcpy(renewed, header, len);
+    las_put_counts(&r->facts, renewed);
+    repair->was_whole = end == repair->len && memcmp(renewed, header, len) == 0;
+    if (repair->was_whole) return SH_OK;
+    memset(renewed + LAS_SOFTWARE_AT, 0, 32);
+    strcpy((char *)renewed + LAS_SOFTWARE_AT, LAS_SOFTWARE_INCOMPLETE);
+    const int rc = repair_cut(repair, end, err);
+    return rc == SH_OK ? repair_write(repair, 0, renewed, len, err) : rc;
+}
+
+int las_repair(struct repair *repair, struct sh_err *err)
+{
+    uint8_t header[LAS_HEADER_LEN];
+    struct records r = {0};
+    uint32_t front_len = 0;
+    const size_t len = repair->len < sizeof header ? (size_t)repair->len : sizeof header;
+    int rc = repair_read(repair, 0, header, len, err);
+    if (rc == SH_OK) rc = parse_header(repair, header, len, &r, &front_len, err);
+    if (rc == SH_OK)
+        rc = repair_rows(repair, front_len, r.len, (repair->len - front_len) / r.len, take_record, &r, err);
+    if (rc == SH_OK) rc = make_whole(repair, header, &r, front_len, err);
+    repair->unit = "points";
+    repair->n_kept = r.facts.n_points;
+    repair->n_scans = r.n_scans;
+    return rc;
+}

@@ -1,0 +1,262 @@
+#include "drivers/record/ply_repair.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "drivers/protocol/bytes.h"
+#include "drivers/record/ply_columns.h"
+#include "drivers/record/recorder.h"
+
+extern const struct recorder_ops recorder_mesh_ply;
+
+enum { HEADER_BEGIN = 1 << 16, HEADER_MOST = 64 << 20, WORD = 32, NO_COLUMN = -1 };
+
+/* What the header says. */
+struct ply_header {
+    char *text; /* NUL at its end */
+    size_t len;
+    uint64_t n_vertices;
+    int has_vertices, is_ascii, is_mesh, is_incomplete;
+    unsigned n_columns;
+    size_t row_len;          /* binary */
+    int station_at, time_at; /* byte in a binary row, number of the column in text; NO_COLUMN */
+};
+
+/* ---- the header */
+
+/* All up to "end_header". */
+static int read_header(const struct repair *r, struct ply_header *h, struct sh_err *err)
+{
+    static const char last[] = "\nend_header\n";
+    for (size_t n = HEADER_BEGIN;; n *= 4) {
+        if (n > r->len) n = (size_t)r->len;
+        free(h->text);
+        h->text = malloc(n + 1);
+        if (h->text == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory for its header", r->path);
+        const int rc = repair_read(r, 0, h->text, n, err);
+        if (rc != SH_OK) return rc;
+        h->text[n] = '\0';
+        const char *end = memmem(h->text, n, last, sizeof last - 1);
+        if (end != NULL) h->len = (size_t)(end - h->text) + sizeof last - 1;
+        if (end != NULL) break;
+        if (n < 4 || memcmp(h->text, "ply\n", 4) != 0 || n == r->len || n >= HEADER_MOST)
+            return repair_fail_none(r, "PLY file of points", err);
+    }
+    h->text[h->len] = '\0';
+    return strlen(h->text) == h->len ? SH_OK : repair_fail_none(r, "PLY file of points", err);
+}
+
+/* 0: no type of one number. */
+static size_t size_of_type(const char *type)
+{
+    static const struct {
+        const char *name, *name_too;
+        size_t size;
+    } types[] = {{"char", "int8", 1}, {"uchar", "uint8", 1}, {"short", "int16", 2},   {"ushort", "uint16", 2},
+                 {"int", "int32", 4}, {"uint", "uint32", 4}, {"float", "float32", 4}, {"double", "float64", 8}};
+    for (size_t i = 0; i < sizeof types / sizeof types[0]; i++)
+        if (strcmp(type, types[i].name) == 0 || strcmp(type, types[i].name_too) == 0) return types[i].size;
+    return 0;
+}
+
+/* 1, or 0: it is of no use here. */
+static int take_property(struct ply_header *h, const char *line)
+{
+    char type[WORD], name[WORD];
+    if (sscanf(line, "property %31s %31s", type, name) != 2 || size_of_type(type) == 0 || h->row_len > HEADER_BEGIN)
+        return 0;
+    const int at = h->is_ascii ? (int)h->n_columns : (int)h->row_len;
+    const char *plain = strncmp(name, "scalar_", 7) == 0 ? name + 7 : name;
+    if (strcmp(plain, "station") == 0 && size_of_type(type) == 2) h->station_at = at;
+    if (strcmp(plain, "time") == 0 && strcmp(type, "double") == 0) h->time_at = at;
+    h->n_columns++;
+    h->row_len += size_of_type(type);
+    return 1;
+}
+
+/* One line; 0: such a file is not repaired. Comments may be anything: a header that was being written over when its
+ * recorder was killed may have half a line. */
+static int take_header_line(struct ply_header *h, const char *line)
+{
+    if (strcmp(line, "format ascii 1.0") == 0) return h->is_ascii = 1;
+    if (strncmp(line, "format ", 7) == 0) return strcmp(line, "format binary_little_endian 1.0") == 0;
+    if (strncmp(line, "property ", 9) == 0) return h->is_mesh || (h->has_vertices && take_property(h, line));
+    if (strncmp(line, "element ", 8) != 0) {
+        if (strncmp(line, PLY_INCOMPLETE, sizeof PLY_INCOMPLETE - 2) == 0) h->is_incomplete = 1;
+        return 1;
+    }
+    if (strncmp(line, "element face ", 13) == 0) return h->is_mesh = 1;
+    if (h->has_vertices || sscanf(line, "element vertex %" SCNu64, &h->n_vertices) != 1) return 0;
+    return h->has_vertices = 1;
+}
+
+static int parse_header(const struct repair *r, struct ply_header *h, struct sh_err *err)
+{
+    char line[512];
+    int good = 1;
+    h->station_at = h->time_at = NO_COLUMN;
+    for (const char *at = h->text, *stop; good && (stop = strchr(at, '\n')) != NULL; at = stop + 1) {
+        const size_t n = (size_t)(stop - at) < sizeof line ? (size_t)(stop - at) : sizeof line - 1;
+        memcpy(line, at, n);
+        line[n] = '\0';
+        good = take_header_line(h, line);
+    }
+    if (good && h->has_vertices && (h->is_mesh || h->n_columns > 0)) return SH_OK;
+    return repair_fail_none(r, "PLY file of points", err);
+}
+
+/* Blank comments, and pieces of comments of a header that was being written over when its recorder was killed. */
+static int is_padding(const char *line, size_t n)
+{
+    static const char *const first[] = {"ply",      "format ",   "comment ",  "obj_info ",
+                                        "element ", "property ", "end_header"};
+    size_t i = 0;
+    while (i < sizeof first / sizeof first[0] && strncmp(line, first[i], strlen(first[i])) != 0)
+        i++;
+    if (i == sizeof first / sizeof first[0]) return 1;
+    return strncmp(line, "comment ", 8) == 0 && strspn(line + 7, " ") >= n - 7;
+}
+
+/* The same header with that count, and with the line of an incomplete one, in the same length. NULL: there is no room. */
+static char *renew(const struct ply_header *h, uint64_t n_vertices, int incomplete)
+{
+    char *text = NULL;
+    size_t len = 0;
+    FILE *out = open_memstream(&text, &len);
+    if (out == NULL) return NULL;
+    size_t left = h->len;
+    for (int pass = 0; pass < 2; pass++) {
+        for (const char *at = h->text, *stop; (stop = strchr(at, '\n')) != NULL; at = stop + 1) {
+            const size_t n = (size_t)(stop - at);
+            char counted[64];
+            const int counts = n > 15 && memcmp(at, "element vertex ", 15) == 0;
+            if (is_padding(at, n)) continue;
+            const int m = snprintf(counted, sizeof counted, "element vertex %" PRIu64, n_vertices);
+            if (pass == 1 && counts) ply_put_padding(out, left);
+            if (pass == 1) fprintf(out, "%.*s\n", counts ? m : (int)n, counts ? counted : at);
+            const int marks = incomplete && !h->is_incomplete && strncmp(at, "format ", 7) == 0;
+            if (pass == 1 && marks) fputs(PLY_INCOMPLETE, out);
+            if (pass == 0) left -= (counts ? (size_t)m : n) + 1 + (marks ? sizeof PLY_INCOMPLETE - 1 : 0);
+        }
+        if (pass == 0 && (left > h->len || (left > 0 && left < PLY_PAD_MIN))) break;
+    }
+    if (fclose(out) == 0 && len == h->len) return text;
+    free(text);
+    return NULL;
+}
+
+/* ---- the rows */
+
+struct points {
+    const struct ply_header *h;
+    uint64_t n, n_zero; /* n_zero: of zeros alone, at the end */
+    uint64_t n_scans;
+    double time_s;
+    long station;
+};
+
+/* Another scan has another station, or its times begin anew. */
+static void take_point(struct points *p, long station, double time_s)
+{
+    p->n_scans += (uint64_t)(p->n_scans == 0 || station != p->station || time_s < p->time_s);
+    p->station = station;
+    p->time_s = time_s;
+}
+
+static double double_at(const uint8_t *at)
+{
+    const uint64_t bits = le_get64(at);
+    double v;
+    memcpy(&v, &bits, sizeof v);
+    return v;
+}
+
+static void take_binary(void *ctx, const uint8_t *row)
+{
+    struct points *p = ctx;
+    const struct ply_header *h = p->h;
+    p->n++;
+    p->n_zero = repair_is_zero(row, h->row_len) ? p->n_zero + 1 : 0;
+    if (p->n_zero != 0 || (h->station_at < 0 && h->time_at < 0)) return;
+    take_point(p, h->station_at >= 0 ? le_get16(row + h->station_at) : 0,
+               h->time_at >= 0 ? double_at(row + h->time_at) : 0);
+}
+
+static int take_text(void *ctx, const char *line, size_t len)
+{
+    struct points *p = ctx;
+    const struct ply_header *h = p->h;
+    unsigned n = 0;
+    long station = 0;
+    double time_s = 0;
+    if (strlen(line) != len) return 0;
+    for (const char *at = line + strspn(line, " "); *at != '\0'; n++) {
+        const size_t word = strcspn(at, " ");
+        if (strspn(at, "0123456789+-.einfa") < word) return 0;
+        if ((int)n == h->station_at) station = strtol(at, NULL, 10);
+        if ((int)n == h->time_at) time_s = strtod(at, NULL);
+        at += word;
+        at += strspn(at, " \r");
+    }
+    if (n != h->n_columns) return 0;
+    p->n++;
+    if (h->station_at >= 0 || h->time_at >= 0) take_point(p, station, time_s);
+    return 1;
+}
+
+/* *end: behind the last whole row. */
+static int read_points(const struct repair *r, const struct ply_header *h, struct points *p, uint64_t *end,
+                       struct sh_err *err)
+{
+    if (h->is_ascii) {
+        const int rc = repair_lines(r, h->len, take_text, p, end, err);
+        return rc == SH_OK ? repair_check_rest(r, *end, HEADER_BEGIN, err) : rc;
+    }
+    const uint64_t n = (r->len - h->len) / h->row_len;
+    const int rc = repair_rows(r, h->len, h->row_len, n, take_binary, p, err);
+    if (n != h->n_vertices) p->n -= p->n_zero; /* a power cut leaves zeros, a head measures none */
+    *end = h->len + p->n * h->row_len;
+    return rc;
+}
+
+/* Cuts first: what makes the file whole, its header, is written last. A repair that ends between the two finds the same
+ * points again. */
+static int make_whole(struct repair *r, const struct ply_header *h, const struct points *p, uint64_t end,
+                      struct sh_err *err)
+{
+    r->was_whole = end == r->len && p->n == h->n_vertices;
+    if (r->was_whole) return SH_OK;
+    char *text = renew(h, p->n, 1);
+    if (text == NULL) text = renew(h, p->n, 0);
+    if (text == NULL)
+        return sh_fail(err, SH_EFORMAT, "%s: its header has no room for another number of points; it is not touched",
+                       r->path);
+    int rc = repair_cut(r, end, err);
+    if (rc == SH_OK) rc = repair_write(r, 0, text, h->len, err);
+    free(text);
+    return rc;
+}
+
+int ply_repair(struct repair *r, struct sh_err *err)
+{
+    struct ply_header h = {0};
+    struct points p = {.h = &h};
+    uint64_t end = 0;
+    int rc = read_header(r, &h, err);
+    if (rc == SH_OK) rc = parse_header(r, &h, err);
+    if (rc == SH_OK && h.is_mesh) {
+        rc = recorder_mesh_ply.repair != NULL
+                 ? recorder_mesh_ply.repair(r, err)
+                 : sh_fail(err, SH_EFORMAT, "%s: a mesh is written in one piece at its end", r->path);
+    } else if (rc == SH_OK) {
+        rc = read_points(r, &h, &p, &end, err);
+        r->unit = "points";
+        r->n_kept = p.n;
+        r->n_scans = p.n_scans;
+        if (rc == SH_OK) rc = make_whole(r, &h, &p, end, err);
+    }
+    free(h.text);
+    return rc;
+}

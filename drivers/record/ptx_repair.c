@@ -1,0 +1,230 @@
+/* Repair of PTX files. Whole grids are in FILE.part as text. The grid of the scan that was not over is in FILE.grid
+ * (ptx_grid.h): its text is made now, as its recorder would have made it, and takes the place of whatever its recorder had
+ * begun to write of it. FILE.grid goes last, so that a repair that is killed can begin again.
+ *
+ * Without a FILE.grid, for instance of a part that was copied alone, the points of the last grid are kept all the same: its
+ * last column is filled up like shots without echo, and its header gets the number of columns that are there. Spaces after
+ * that number keep its place as long as it was. */
+#include <errno.h>
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "drivers/record/ptx_text.h"
+
+enum { LINE_MOST = 512, HEADER_LINES = 10 };
+static const uint64_t MOST = (uint64_t)1 << 32; /* columns, rows */
+
+/* Where the text is in its grids. */
+struct place {
+    uint64_t at, grid_at;            /* bytes: behind the last line, and before the grid */
+    uint64_t columns, rows, n_lines; /* of the grid; lines that were there */
+    uint64_t n_points;               /* of all */
+    uint64_t n_grids;                /* that are whole */
+    size_t columns_len;              /* of the grid's first line */
+    int header, coloured;            /* lines of the header that were there */
+};
+
+/* Numbers in a line; 0: there is something else. Spaces may follow them. */
+static int count_numbers(const char *line, size_t len)
+{
+    int n = 0;
+    while (len > 0 && (line[len - 1] == ' ' || line[len - 1] == '\r'))
+        len--;
+    for (size_t i = 0; i < len; i++) {
+        if (strchr("0123456789+-.eE ", line[i]) == NULL || line[i] == 0) return 0;
+        n += line[i] != ' ' && (i == 0 || line[i - 1] == ' ');
+    }
+    return n;
+}
+
+static int take_size(const char *line, uint64_t *v)
+{
+    char *end;
+    *v = strtoull(line, &end, 10);
+    return end > line && *v > 0 && *v <= MOST;
+}
+
+static int take_header(struct place *p, const char *line, size_t len)
+{
+    const int n = count_numbers(line, len);
+    if (p->header == 0) {
+        p->grid_at = p->at;
+        p->n_lines = 0;
+        p->columns_len = len;
+        return n == 1 && take_size(line, &p->columns);
+    }
+    if (p->header == 1) return n == 1 && take_size(line, &p->rows);
+    return n == (p->header < 6 ? 3 : 4);
+}
+
+static int take_point(struct place *p, const char *line, size_t len)
+{
+    const int n = count_numbers(line, len);
+    if (n != 4 && n != 7) return 0;
+    p->coloured = n == 7;
+    p->n_points += strncmp(line, "0 0 0 ", 6) != 0;
+    p->n_lines++;
+    return 1;
+}
+
+static int take_line(void *ctx, const char *line, size_t len)
+{
+    struct place *p = ctx;
+    if (len >= LINE_MOST || !(p->header < HEADER_LINES ? take_header(p, line, len) : take_point(p, line, len)))
+        return 0;
+    p->header += p->header < HEADER_LINES;
+    p->at += len + 1;
+    if (p->header == HEADER_LINES && p->n_lines == p->columns * p->rows) {
+        p->n_grids++;
+        p->header = 0;
+    }
+    return 1;
+}
+
+/* The first `len` bytes. */
+static int read_text(const struct repair *r, uint64_t len, struct place *p, struct sh_err *err)
+{
+    struct repair front = *r;
+    uint64_t end;
+    front.len = len;
+    memset(p, 0, sizeof *p);
+    const int rc = repair_lines(&front, 0, take_line, p, &end, err);
+    return rc == SH_OK ? repair_check_rest(&front, end, LINE_MOST, err) : rc;
+}
+
+static int sync_file(const struct repair *r, struct sh_err *err)
+{
+    if (fdatasync(r->fd) == 0) return SH_OK;
+    return sh_fail(err, SH_EIO, "%s: cannot be synced: %s", r->path, strerror(errno));
+}
+
+/* ---- the last grid has no file */
+
+static int fill_column(const struct repair *r, const struct place *p, uint64_t n, struct sh_err *err)
+{
+    static const char empty[2][20] = {"0 0 0 0.5\n", "0 0 0 0.5 0 0 0\n"};
+    const char *line = empty[p->coloured];
+    struct outfile file;
+    int rc = outfile_over(&file, r->fd, r->path, p->at, err);
+    if (rc != SH_OK) return rc;
+    for (uint64_t i = 0; rc == SH_OK && i < n; i++)
+        rc = outfile_write(&file, line, strlen(line), err);
+    if (rc == SH_OK) rc = outfile_flush(&file, err);
+    const uint64_t end = file.written;
+    outfile_leave(&file);
+    if (rc == SH_OK && ftruncate(r->fd, (off_t)end) != 0)
+        rc = sh_fail(err, SH_EIO, "%s: cannot be cut: %s", r->path, strerror(errno));
+    return rc == SH_OK ? sync_file(r, err) : rc;
+}
+
+static int set_columns(const struct repair *r, const struct place *p, uint64_t columns, struct sh_err *err)
+{
+    char text[32];
+    const int len = (int)p->columns_len, n = snprintf(text, sizeof text, "%-*" PRIu64, len, columns);
+    if (n != len)
+        return sh_fail(err, SH_EFORMAT, "%s: the number of columns at byte %" PRIu64 " has no place for %" PRIu64,
+                       r->path, p->grid_at, columns);
+    return repair_write(r, p->grid_at, text, (size_t)n, err);
+}
+
+static int end_text(struct repair *r, struct place *p, struct sh_err *err)
+{
+    if (p->n_grids == 0 && p->n_lines == 0) return repair_fail_none(r, "PTX grid", err);
+    if (p->header < HEADER_LINES || p->n_lines == 0) { /* no place of this grid is there */
+        const uint64_t end = p->header > 0 ? p->grid_at : p->at;
+        r->was_whole = end == r->len;
+        return repair_cut(r, end, err);
+    }
+    const uint64_t columns = (p->n_lines + p->rows - 1) / p->rows;
+    r->cut_bytes = r->len - p->at;
+    int rc = fill_column(r, p, columns * p->rows - p->n_lines, err);
+    if (rc == SH_OK) rc = set_columns(r, p, columns, err);
+    p->n_grids++;
+    return rc;
+}
+
+/* ---- the last grid has a file */
+
+/* Its text, from head->text_at on. */
+static int put_grid(struct repair *r, struct ptx_grid *grid, const struct ptx_head *head, struct place *p,
+                    struct sh_err *err)
+{
+    struct outfile file;
+    struct ptx_text text = {
+        .file = &file, .grid = grid, .pose = &head->pose, .coloured = head->coloured != 0, .report = r->report};
+    int rc = outfile_over(&file, r->fd, r->path, head->text_at, err);
+    if (rc != SH_OK) return rc;
+    rc = ptx_text_put(&text, err);
+    if (rc == SH_OK) rc = outfile_flush(&file, err);
+    const uint64_t end = file.written;
+    outfile_leave(&file);
+    if (rc == SH_OK && ftruncate(r->fd, (off_t)end) != 0)
+        rc = sh_fail(err, SH_EIO, "%s: cannot be cut: %s", r->path, strerror(errno));
+    p->n_points += text.n_points;
+    p->n_grids++;
+    if (rc == SH_OK) rc = sync_file(r, err);
+    if (rc != SH_EIO) return rc;
+    return sh_fail(err, rc,
+                   "%s: cannot be written, with the grid that is in %s: its text needs as much room again; nothing is "
+                   "lost: make room, and begin again",
+                   r->path, grid->path);
+}
+
+static int end_grid(struct repair *r, struct ptx_grid *grid, struct place *p, struct sh_err *err)
+{
+    struct ptx_head head;
+    uint64_t cut;
+    int rc = ptx_grid_find(grid, &head, &cut, err);
+    if (rc < 0) return rc;
+    if (rc == 0) { /* it is of no grid: the text is all there is */
+        rc = read_text(r, r->len, p, err);
+        return rc == SH_OK ? end_text(r, p, err) : rc;
+    }
+    rc = head.text_at <= r->len ? read_text(r, head.text_at, p, err) : SH_OK;
+    if (rc != SH_OK) return rc;
+    if (head.text_at > r->len || p->at != head.text_at || p->header != 0)
+        return sh_fail(err, SH_EFORMAT,
+                       "%s: goes on from byte %" PRIu64 " of a PTX file, where %s has no end of a grid", grid->path,
+                       head.text_at, r->path);
+    if (grid->row_max - grid->row_min >= PTX_ROWS_MAX)
+        return sh_fail(err, SH_EFORMAT, "%s: has rows %u to %u; a grid has up to %d", grid->path, grid->row_min,
+                       grid->row_max, PTX_ROWS_MAX);
+    rc = put_grid(r, grid, &head, p, err);
+    r->cut_bytes = cut;
+    return rc;
+}
+
+/* NULL, and SH_OK: there is none. */
+static int open_grid(const struct repair *r, struct ptx_grid *grid, struct sh_err *err)
+{
+    memset(grid, 0, sizeof *grid);
+    if (!repair_is_part(r)) return SH_OK;
+    if (asprintf(&grid->path, "%.*s.grid", (int)(strlen(r->path) - strlen(".part")), r->path) < 0) {
+        grid->path = NULL;
+        return sh_fail(err, SH_ENOMEM, "%s: no memory to repair it", r->path);
+    }
+    grid->spool = fopen(grid->path, "rbe");
+    if (grid->spool != NULL || errno == ENOENT) return SH_OK;
+    return sh_fail(err, SH_EIO, "%s: cannot be read: %s", grid->path, strerror(errno));
+}
+
+int ptx_repair(struct repair *r, struct sh_err *err)
+{
+    struct ptx_grid grid;
+    struct place place = {0};
+    int rc = open_grid(r, &grid, err);
+    if (rc == SH_OK && grid.spool != NULL) rc = end_grid(r, &grid, &place, err);
+    if (rc == SH_OK && grid.spool == NULL) {
+        rc = read_text(r, r->len, &place, err);
+        if (rc == SH_OK) rc = end_text(r, &place, err);
+    }
+    if (rc == SH_OK && grid.spool != NULL) unlink(grid.path);
+    r->n_kept = place.n_points;
+    r->unit = "points";
+    r->n_scans = place.n_grids;
+    if (grid.spool != NULL) fclose(grid.spool);
+    free(grid.path);
+    return rc;
+}

@@ -1,0 +1,91 @@
+#include "drivers/record/ptx_text.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+
+enum {
+    LINE_MAX_LEN = 512,
+    ROWS_BETWEEN_STOPS = 1 << 16,
+};
+
+static int fail_huge(const struct ptx_text *t, const double p[3], struct sh_err *err)
+{
+    return sh_fail(err, SH_EFORMAT, "%s: a coordinate has more digits than this format takes: %g %g %g", t->file->path,
+                   p[0], p[1], p[2]);
+}
+
+static int check_stop(const struct ptx_text *t, struct sh_err *err)
+{
+    if (!sh_stopped(t->report)) return SH_OK;
+    return sh_fail(err, SH_ESTOPPED, "%s: interrupted while it was completed; it is not written", t->file->path);
+}
+
+static int put_vector(struct ptx_text *t, int digits, const double v[3], const char *end, struct sh_err *err)
+{
+    char text[LINE_MAX_LEN];
+    int n = snprintf(text, sizeof text, "%.*f %.*f %.*f%s\n", digits, v[0], digits, v[1], digits, v[2], end);
+    if (n >= (int)sizeof text) return fail_huge(t, v, err);
+    return outfile_write(t->file, text, (size_t)n, err);
+}
+
+/* Vectors are rows in PTX: what stands in the matrix is the rotation's transpose, the shift below it. */
+static int put_header(struct ptx_text *t, struct sh_err *err)
+{
+    const struct ptx_grid *g = t->grid;
+    const double *r = t->pose->rotation, *s = t->pose->shift_m;
+    char size[64];
+    int n = snprintf(size, sizeof size, "%" PRIu64 "\n%" PRIu64 "\n", (uint64_t)g->column_max - g->column_min + 1,
+                     (uint64_t)g->row_max - g->row_min + 1);
+    int rc = outfile_write(t->file, size, (size_t)n, err);
+    if (rc == 0) rc = put_vector(t, 9, s, "", err);
+    for (int i = 0; rc == 0 && i < 6; i++)
+        rc = put_vector(t, 15, (const double[]){r[i % 3], r[3 + i % 3], r[6 + i % 3]}, i < 3 ? "" : " 0", err);
+    return rc == 0 ? put_vector(t, 9, s, " 1", err) : rc;
+}
+
+/* A large grid takes long. */
+static void say_progress(struct ptx_text *t, uint32_t n_rows)
+{
+    char what[LINE_MAX_LEN];
+    t->n_columns++;
+    t->n_unsaid_rows += n_rows;
+    if (t->n_unsaid_rows < ROWS_BETWEEN_STOPS) return;
+    t->n_unsaid_rows = 0;
+    snprintf(what, sizeof what, "completing %s", t->file->path);
+    sh_progress(t->report, what, (double)t->n_columns / ((double)t->grid->column_max - t->grid->column_min + 1));
+}
+
+/* The length, or LINE_MAX_LEN and more. */
+static int put_cell(char *to, const struct ptx_cell *c, int coloured)
+{
+    const double *p = c->p_socs;
+    if (c->intensity < 0) return snprintf(to, LINE_MAX_LEN, "0 0 0 0.5%s\n", coloured ? " 0 0 0" : "");
+    int n = snprintf(to, LINE_MAX_LEN, "%.6f %.6f %.6f %.6f", p[0], p[1], p[2], (double)c->intensity);
+    if (n >= LINE_MAX_LEN) return n;
+    const size_t room = (size_t)(LINE_MAX_LEN - n);
+    if (!coloured) return n + snprintf(to + n, room, "\n");
+    return n + snprintf(to + n, room, " %u %u %u\n", c->rgb[0], c->rgb[1], c->rgb[2]);
+}
+
+static int put_column(void *ctx, const struct ptx_cell *column, uint32_t n_rows, struct sh_err *err)
+{
+    struct ptx_text *t = ctx;
+    int rc = check_stop(t, err);
+    say_progress(t, n_rows);
+    for (uint32_t i = 0; rc == 0 && i < n_rows; i++) {
+        if (i % ROWS_BETWEEN_STOPS == ROWS_BETWEEN_STOPS - 1) rc = check_stop(t, err);
+        char *to = (char *)outfile_room(t->file, LINE_MAX_LEN, err);
+        if (to == NULL) return SH_EIO;
+        const int n = put_cell(to, &column[i], t->coloured);
+        if (n >= LINE_MAX_LEN) return fail_huge(t, column[i].p_socs, err);
+        outfile_used(t->file, (size_t)n);
+        t->n_points += column[i].intensity >= 0;
+    }
+    return rc;
+}
+
+int ptx_text_put(struct ptx_text *t, struct sh_err *err)
+{
+    const int rc = put_header(t, err);
+    return rc != 0 ? rc : ptx_grid_drain(t->grid, put_column, t, err);
+}

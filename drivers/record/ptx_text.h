@@ -1,0 +1,30 @@
+/* A grid as the text of PTX. The cells go in (ptx_grid.h), lines come out: columns, rows, the pose, then a line a cell. For
+ * the recorder, and for the repair of what it left. */
+#ifndef DRIVERS_RECORD_PTX_TEXT_H
+#define DRIVERS_RECORD_PTX_TEXT_H
+
+#include "drivers/record/outfile.h"
+#include "drivers/record/ptx_grid.h"
+#include "drivers/record/repair.h"
+
+enum { PTX_ROWS_MAX = 1 << 22 }; /* of a grid, whose column is held in memory: 160 MiB. Heads have up to 550,000 */
+
+struct ptx_text {
+    struct outfile *file;
+    struct ptx_grid *grid;
+    const struct station_pose *pose;
+    int coloured;
+    const struct sh_report *report; /* progress, and its stop gives up; may be NULL */
+    /* out */
+    uint64_t n_points;
+    /* inner state */
+    uint64_t n_columns, n_unsaid_rows;
+};
+
+/* Puts the grid, whose shots are then gone (ptx_grid_drain). SH_EFORMAT: a coordinate is too long. */
+int ptx_text_put(struct ptx_text *text, struct sh_err *err);
+
+/* recorder_ops.repair: keeps all whole grids, and the points of the last one; the rest of its last column is filled up. */
+int ptx_repair(struct repair *repair, struct sh_err *err);
+
+#endif

@@ -1,0 +1,252 @@
+#include "drivers/record/repair.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "core/newfile.h"
+#include "drivers/record/recorder.h"
+
+enum { BLOCK = 1 << 20, LINE_MOST = 1 << 16 };
+
+/* ---- bytes of the file */
+
+static int ends_in_part(const char *path)
+{
+    const size_t n = strlen(path);
+    return n > 5 && strcmp(path + n - 5, ".part") == 0;
+}
+
+int repair_is_part(const struct repair *r)
+{
+    return ends_in_part(r->path);
+}
+
+int repair_read(const struct repair *r, uint64_t at, void *to, size_t len, struct sh_err *err)
+{
+    for (size_t done = 0; done < len;) {
+        const ssize_t n = pread(r->fd, (char *)to + done, len - done, (off_t)(at + done));
+        if (n < 0 && errno == EINTR) continue;
+        if (n <= 0)
+            return sh_fail(err, SH_EIO, "%s: cannot be read: %s", r->path,
+                           n < 0 ? strerror(errno) : "it became shorter");
+        done += (size_t)n;
+    }
+    return SH_OK;
+}
+
+int repair_write(const struct repair *r, uint64_t at, const void *from, size_t len, struct sh_err *err)
+{
+    for (size_t done = 0; done < len;) {
+        const ssize_t n = pwrite(r->fd, (const char *)from + done, len - done, (off_t)(at + done));
+        if (n < 0 && errno == EINTR) continue;
+        if (n <= 0)
+            return sh_fail(err, SH_EIO, "%s: cannot be repaired: %s", r->path, strerror(n < 0 ? errno : ENOSPC));
+        done += (size_t)n;
+    }
+    return SH_OK;
+}
+
+int repair_cut(struct repair *r, uint64_t end, struct sh_err *err)
+{
+    if (end >= r->len) return SH_OK;
+    if (ftruncate(r->fd, (off_t)end) != 0)
+        return sh_fail(err, SH_EIO, "%s: cannot be cut: %s", r->path, strerror(errno));
+    r->cut_bytes += r->len - end;
+    return SH_OK;
+}
+
+/* Between blocks. */
+static int go_on(const struct repair *r, uint64_t at, struct sh_err *err)
+{
+    sh_progress(r->report, "looking for what is whole", (double)at / (double)(r->len + 1));
+    return sh_check_stop(r->report, err);
+}
+
+int repair_rows(const struct repair *r, uint64_t from, size_t row_len, uint64_t n,
+                void (*fn)(void *ctx, const uint8_t *row), void *ctx, struct sh_err *err)
+{
+    const size_t at_once = row_len < BLOCK ? BLOCK / row_len : 1;
+    uint8_t *block = malloc(at_once * row_len);
+    int rc = block != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "%s: no memory to read it", r->path);
+    for (uint64_t i = 0; rc == SH_OK && i < n; i += at_once) {
+        const size_t k = n - i < at_once ? (size_t)(n - i) : at_once;
+        rc = go_on(r, from + i * row_len, err);
+        if (rc == SH_OK) rc = repair_read(r, from + i * row_len, block, k * row_len, err);
+        for (size_t row = 0; rc == SH_OK && row < k; row++)
+            fn(ctx, block + row * row_len);
+    }
+    free(block);
+    return rc;
+}
+
+int repair_is_zero(const uint8_t *row, size_t len)
+{
+    return row[0] == 0 && memcmp(row, row + 1, len - 1) == 0;
+}
+
+struct lines {
+    int (*fn)(void *ctx, const char *line, size_t len);
+    void *ctx;
+    uint64_t end, bad_at; /* behind the last good line; of the first bad one */
+    int has_bad;
+};
+
+static int fail_damaged(const struct repair *r, uint64_t at, struct sh_err *err)
+{
+    return sh_fail(err, SH_EFORMAT,
+                   "%s: is damaged at byte %llu, and goes on after that: no recorder has left it so; it is not touched",
+                   r->path, (unsigned long long)at);
+}
+
+static int take_line(const struct repair *r, struct lines *l, const char *line, size_t len, uint64_t at,
+                     struct sh_err *err)
+{
+    const int good = len < LINE_MOST && l->fn(l->ctx, line, len);
+    if (good && l->has_bad) return fail_damaged(r, l->bad_at, err);
+    if (good) l->end = at + len + 1;
+    if (!good && !l->has_bad) l->bad_at = at;
+    l->has_bad |= !good;
+    return SH_OK;
+}
+
+int repair_lines(const struct repair *r, uint64_t from, int (*fn)(void *ctx, const char *line, size_t len), void *ctx,
+                 uint64_t *end, struct sh_err *err)
+{
+    struct lines l = {.fn = fn, .ctx = ctx, .end = from};
+    char *block = malloc(BLOCK);
+    int rc = block != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "%s: no memory to read it", r->path);
+    for (uint64_t at = from; rc == SH_OK && at < r->len;) {
+        const size_t n = r->len - at < BLOCK ? (size_t)(r->len - at) : BLOCK;
+        size_t used = 0;
+        rc = go_on(r, at, err);
+        if (rc == SH_OK) rc = repair_read(r, at, block, n, err);
+        for (char *stop; rc == SH_OK && (stop = memchr(block + used, '\n', n - used)) != NULL;) {
+            const size_t len = (size_t)(stop - block) - used;
+            *stop = '\0';
+            rc = take_line(r, &l, block + used, len, at + used, err);
+            used += len + 1;
+        }
+        if (used == 0 && n < BLOCK) break; /* the rest is a piece of a line */
+        if (used == 0 && rc == SH_OK) rc = take_line(r, &l, block, used = n, at, err);
+        at += used;
+    }
+    free(block);
+    *end = l.end;
+    return rc;
+}
+
+static void look_for_zeros(void *ctx, const uint8_t *row)
+{
+    int *zeros = ctx;
+    *zeros = *zeros && *row == 0;
+}
+
+int repair_check_rest(const struct repair *r, uint64_t end, uint64_t most, struct sh_err *err)
+{
+    int zeros = 1;
+    if (r->len - end <= most) return SH_OK;
+    const int rc = repair_rows(r, end, 1, r->len - end, look_for_zeros, &zeros, err);
+    return rc != SH_OK || zeros ? rc : fail_damaged(r, end, err);
+}
+
+void repair_append_note(const struct repair *r, uint64_t end, const void *note, size_t len)
+{
+    if (repair_write(r, end, note, len, NULL) == SH_OK) return;
+    sh_warn(r->report, "%s: there is no room to say in it that it may be incomplete", r->path);
+    if (ftruncate(r->fd, (off_t)end) != 0) return; /* the piece of a note is cut by the next repair */
+}
+
+int repair_fail_none(const struct repair *r, const char *format, struct sh_err *err)
+{
+    return sh_fail(err, SH_EFORMAT, "%s: is no %s, or too little of it came to the disk; it is not touched", r->path,
+                   format);
+}
+
+/* ---- the file */
+
+static int is_there(const char *path)
+{
+    struct stat st;
+    return lstat(path, &st) == 0;
+}
+
+/* Which of the two is meant. */
+static int choose(const char *path, struct repaired *d, struct sh_err *err)
+{
+    const int named = ends_in_part(path);
+    if (asprintf(&d->path, "%.*s", (int)(strlen(path) - (named ? 5 : 0)), path) < 0) d->path = NULL;
+    if (d->path == NULL || asprintf(&d->part, "%s.part", d->path) < 0) {
+        d->part = NULL;
+        return sh_fail(err, SH_ENOMEM, "%s: no memory", path);
+    }
+    d->was_left = named || is_there(d->part);
+    if (!named && d->was_left && is_there(d->path))
+        return sh_fail(
+            err, SH_ESTATE,
+            "%s: it and %s are there; name %s to repair that one, which then keeps its name, or move %s away", d->path,
+            d->part, d->part, d->path);
+    return SH_OK;
+}
+
+static int repair_open(struct repair *r, const struct recorder_ops *ops, struct sh_err *err)
+{
+    struct stat st;
+    if (fstat(r->fd, &st) != 0) return sh_fail(err, SH_EIO, "%s: %s", r->path, strerror(errno));
+    r->len = (uint64_t)st.st_size;
+    if (ops->repair == NULL)
+        return sh_fail(err, SH_EFORMAT, "%s: %s is written in one piece at its end; of this one nothing can be kept",
+                       r->path, ops->ending);
+    if (r->len == 0)
+        return sh_fail(err, SH_EFORMAT,
+                       "%s: is empty: nothing had come to the disk. Files whose colours have no --colour-limits are "
+                       "written when all scans are over",
+                       r->path);
+    return ops->repair(r, err);
+}
+
+/* Gives it its name. */
+static int settle(struct repaired *d, int *fd, struct sh_err *err)
+{
+    if (d->was_left && !is_there(d->path)) {
+        const int rc = newfile_settle_free(d->path, d->part, *fd, err);
+        if (rc == SH_OK) *fd = -1;
+        return rc;
+    }
+    d->is_part = d->was_left;
+    if (!d->was_whole && fsync(*fd) != 0)
+        return sh_fail(err, SH_EIO, "%s: cannot be synced: %s", d->is_part ? d->part : d->path, strerror(errno));
+    return SH_OK;
+}
+
+int repair_file(const char *path, const struct sh_report *report, struct repaired *d, struct sh_err *err)
+{
+    *d = (struct repaired){0};
+    struct repair r = {.fd = -1, .report = report};
+    int rc = choose(path, d, err);
+    const struct recorder_ops *ops = rc == SH_OK ? recorder_find(d->path, err) : NULL;
+    if (rc == SH_OK && ops == NULL) rc = err->code;
+    r.path = d->was_left ? d->part : d->path;
+    if (rc == SH_OK) rc = newfile_left(r.path, &r.fd, err);
+    if (rc == SH_OK) rc = repair_open(&r, ops, err);
+    d->n_kept = r.n_kept;
+    d->n_scans = r.n_scans;
+    d->cut_bytes = r.cut_bytes;
+    d->unit = r.unit;
+    d->was_whole = r.was_whole;
+    if (rc == SH_OK) rc = settle(d, &r.fd, err);
+    if (r.fd >= 0) close(r.fd);
+    if (rc != SH_OK) repair_free(d);
+    return rc;
+}
+
+void repair_free(struct repaired *d)
+{
+    free(d->path);
+    free(d->part);
+    d->path = d->part = NULL;
+}
