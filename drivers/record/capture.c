@@ -45,5 +45,5 @@ int capture_flush(struct capture *capture, struct sh_err *err)
 
 int capture_close(struct capture *capture, int keep, struct sh_err *err)
 {
-    return outfile_close(&capture->file, keep, err);
+    return outfile_close(&capture->file, keep ? OUTFILE_KEEP : OUTFILE_DROP, err);
 }
