@@ -223,7 +223,7 @@ static void test_a_client_leaves(void **state)
     struct scanhead_frame frame;
     struct scanhead_stats stats;
     snprintf(file, sizeof file, "%s", replay_room(wire, "head.shs", 30));
-    static const char *const more[] = {"--link", "type: tcp, port: 0", "--speed", "5", "--quiet", NULL};
+    static const char *const more[] = {"--link", "type: tcp, port: 0", "--speed", "10", "--quiet", NULL};
     struct head head = head_start(wire, file, more);
     struct scanhead *first = client_open(head_endpoint(&head, "tcp")),
                     *second = client_open(head_endpoint(&head, "tcp"));
@@ -253,13 +253,11 @@ static void test_ended_while_it_plays(void **state)
     struct tape all = {0}, part = {0};
     snprintf(file, sizeof file, "%s", replay_room(wire, "head.shs", 30));
     snprintf(link, sizeof link, "type: file, path: '%s'", wire_path(wire, "part.shs"));
-    const char *const more[] = {"--link", "type: tcp, port: 0", "--link", link, "--speed", "0.5", "--quiet", NULL};
+    const char *const more[] = {"--link", "type: tcp, port: 0", "--link", link, "--pace", "step", "--quiet", NULL};
     struct head head = head_start(wire, file, more);
     struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
     client_tell(sh, "SCAN:STARt");
-    do
-        client_next(sh, &frame);
-    while (frame.type != SCANHEAD_POINTS);
+    client_tell(sh, "TIME:STEP 300 MS"); /* of 530 */
     head_end(&head, SIGTERM);
     while (scanhead_next(sh, &frame, DEADLINE_MS) == SCANHEAD_OK)
         ;
