@@ -30,7 +30,7 @@ DEPS_BUILD = gcc g++ make pkg-config libc6-dev libembree-dev libassimp-dev libge
 	libstb-dev nettle-dev libusb-1.0-0-dev libusbredirparser-dev libwebsockets-dev assimp-testmodels
 # and the tests, with the second compiler and its sanitizers, clients and readers of recordings that are not ours:
 DEPS_TEST = $(DEPS_BUILD) libcmocka-dev clang libclang-rt-dev gpsd gpsd-clients cloudcompare mrpt-apps proj-bin python3-numpy \
-	parallel tshark $(if $(shell command -v npm),,nodejs npm)
+	parallel tshark tcpreplay $(if $(shell command -v npm),,nodejs npm)
 # The guest tests; they are skipped where these can't be had. The kernel (linux-image-amd64) is fetched, not installed.
 DEPS_GUEST = qemu-system-x86 busybox-static cpio kmod xz-utils usbutils usbip
 # The browser that the page is tested in; these tests are skipped where it can't be had.
@@ -258,7 +258,7 @@ soak: deps-build
 N ?= 200
 repair: deps-build
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test all $(BUILD)/test/tests/wire/test_repair
-	@REPAIR_N=$(N) SCANHEAD=$(BUILD)/test/scanhead $(BUILD)/test/tests/wire/test_repair
+	@REPAIR_N=$(N) $(RUN) $(BUILD)/test/tests/wire/test_repair
 
 # An hour of device time at 10 kHz, recorded, replayed at pace fast and recorded again: half a minute, and 1.8 GB in
 # build/ meanwhile.

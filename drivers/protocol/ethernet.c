@@ -129,8 +129,8 @@ static uint16_t checksum(const uint8_t *packet, size_t len, const struct etherne
 
 /* ---- transport */
 
-size_t ethernet_put_udp(uint8_t *to, const struct ethernet_end *from, const struct ethernet_end *dest,
-                        const void *data, size_t data_len)
+size_t ethernet_put_udp(uint8_t *to, const struct ethernet_end *from, const struct ethernet_end *dest, const void *data,
+                        size_t data_len)
 {
     const size_t len = UDP_LEN + data_len;
     uint8_t *udp = put_front(to, from, dest, PROTOCOL_UDP, len);

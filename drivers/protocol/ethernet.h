@@ -31,8 +31,8 @@ struct ethernet_end {
 };
 
 /* Both of one family, data_len <= ETHERNET_MAX_DATAGRAM (IPv4: 20 less). Returns the frame's length. */
-size_t ethernet_put_udp(uint8_t *to, const struct ethernet_end *from, const struct ethernet_end *dest,
-                        const void *data, size_t data_len);
+size_t ethernet_put_udp(uint8_t *to, const struct ethernet_end *from, const struct ethernet_end *dest, const void *data,
+                        size_t data_len);
 
 enum { TCP_FIN = 1, TCP_SYN = 2, TCP_RST = 4, TCP_PSH = 8, TCP_ACK = 16 };
 
@@ -43,7 +43,7 @@ size_t ethernet_put_tcp(uint8_t *to, const struct ethernet_end *from, const stru
 
 /* ---- a connection, as segments with the numbers that each end would send */
 
-struct tcp_talk { /* begins with both ends, and zeros */
+struct tcp_talk {               /* begins with both ends, and zeros */
     struct ethernet_end end[2]; /* 0: who connects; 1: who listens */
     uint32_t next[2];           /* sequence number of the next byte of each */
     uint32_t acked[2];          /* of the other end's bytes, what each has acknowledged */

@@ -13,6 +13,7 @@ struct capture {
     uint64_t packets;
 };
 
+/* SH_EINPUT, too, where an earlier one has left PATH.part, for a repair. */
 int capture_open(struct capture *capture, const char *path, struct sh_err *err);
 /* A place that frames come from, which readers show by its name; they count from 0. */
 int capture_add_interface(struct capture *capture, const char *name, const char *comment, struct sh_err *err);
@@ -21,9 +22,9 @@ int capture_add(struct capture *capture, uint32_t interface, int64_t t_ns, const
 /* Of an interface, at the end: what came, and what the system had no room for. */
 int capture_add_statistics(struct capture *capture, uint32_t interface, int64_t t_ns, uint64_t received,
                            uint64_t dropped, struct sh_err *err);
-/* What came is in the file from then on, whatever becomes of the process. */
-int capture_flush(struct capture *capture, struct sh_err *err);
-/* As outfile_close. */
+/* To be called each second: as outfile_save. */
+int capture_save(struct capture *capture, struct sh_err *err);
+/* keep 0: there is no file. Else, where it can't be completed, what came to the disk stays as PATH.part, for a repair. */
 int capture_close(struct capture *capture, int keep, struct sh_err *err);
 
 #endif

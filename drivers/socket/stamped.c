@@ -167,8 +167,12 @@ int stamped_take(const struct stamped_socket *socket, void *buf, size_t room, st
 {
     _Alignas(struct cmsghdr) char notes[256];
     struct iovec piece = {buf, room};
-    struct msghdr m = {.msg_name = &out->from, .msg_namelen = sizeof out->from, .msg_iov = &piece, .msg_iovlen = 1,
-                       .msg_control = notes, .msg_controllen = sizeof notes};
+    struct msghdr m = {.msg_name = &out->from,
+                       .msg_namelen = sizeof out->from,
+                       .msg_iov = &piece,
+                       .msg_iovlen = 1,
+                       .msg_control = notes,
+                       .msg_controllen = sizeof notes};
     const ssize_t n = recvmsg(socket->fd, &m, MSG_DONTWAIT);
     if (n < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR || errno == ECONNREFUSED)) return 0;
     if (n < 0) return sh_fail(err, SH_EIO, "udp: %s", strerror(errno));

@@ -166,7 +166,8 @@ static void hold_talk(struct tcp_talk *talk)
     hear(&h, talk, 0, tcp_put_data(talk, 0, data, 5, frame), TCP_PSH | TCP_ACK);
     hear(&h, talk, 1, tcp_put_ack(talk, 1, frame), TCP_ACK);
     hear(&h, talk, 1, tcp_put_data(talk, 1, data, ETHERNET_MAX_SEGMENT, frame), TCP_PSH | TCP_ACK);
-    hear(&h, talk, 1, tcp_put_data(talk, 1, data + ETHERNET_MAX_SEGMENT, ETHERNET_MAX_SEGMENT, frame), TCP_PSH | TCP_ACK);
+    hear(&h, talk, 1, tcp_put_data(talk, 1, data + ETHERNET_MAX_SEGMENT, ETHERNET_MAX_SEGMENT, frame),
+         TCP_PSH | TCP_ACK);
     hear(&h, talk, 0, tcp_put_data(talk, 0, data + 5, 1, frame), TCP_PSH | TCP_ACK);
     assert_int_equal(tcp_put_ack(talk, 0, frame), 0); /* the data did */
     hear(&h, talk, 1, tcp_put_ack(talk, 1, frame), TCP_ACK);

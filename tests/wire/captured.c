@@ -177,15 +177,22 @@ int captured_check_tshark(const struct wire *wire)
     char file[352];
     snprintf(file, sizeof file, "%s", wire_path(wire, "cap.pcapng"));
     const char *const args[] = {
-        "-n", "-r", file, "-o", "ip.check_checksum:TRUE", "-o", "udp.check_checksum:TRUE", "-o",
-        "tcp.check_checksum:TRUE", "-Y",
+        "-n",
+        "-r",
+        file,
+        "-o",
+        "ip.check_checksum:TRUE",
+        "-o",
+        "udp.check_checksum:TRUE",
+        "-o",
+        "tcp.check_checksum:TRUE",
+        "-Y",
         "_ws.malformed or tcp.analysis.flags or ip.checksum.status != 1 or udp.checksum.status != 1 or "
         "tcp.checksum.status != 1 or udp.length.bad",
         NULL};
     assert_int_equal(
-        wire_wait((struct wire *)(uintptr_t)wire,
-                  wire_spawn_program((struct wire *)(uintptr_t)wire, "/usr/bin/tshark", args, "tshark.out",
-                                     "tshark.err", -1)),
+        wire_wait((struct wire *)(uintptr_t)wire, wire_spawn_program((struct wire *)(uintptr_t)wire, "/usr/bin/tshark",
+                                                                     args, "tshark.out", "tshark.err", -1)),
         0);
     char *found = wire_read(wire_path(wire, "tshark.out"), NULL);
     if (found[0] != '\0') fail_msg("tshark finds fault with:\n%.2000s", found);

@@ -202,9 +202,10 @@ static void read_file(struct wire *wire, struct read_packets *out)
 {
     static struct grabber grabber;
     char sensor[512];
-    snprintf(sensor, sizeof sensor,
-             "driver = CVelodyneScanner\nmodel = VLP16\npcap_input = %s\npcap_read_once = true\npcap_read_fast = true\n",
-             wire_path(wire, "cap.pcapng"));
+    snprintf(
+        sensor, sizeof sensor,
+        "driver = CVelodyneScanner\nmodel = VLP16\npcap_input = %s\npcap_read_once = true\npcap_read_fast = true\n",
+        wire_path(wire, "cap.pcapng"));
     grabber_start(wire, "FILE", sensor, &grabber);
     if (!grabber_wait(&grabber, OBJECTS)) fail_msg("rawlog-grabber complains:\n%s", grabber.said);
     grabber_end(&grabber);

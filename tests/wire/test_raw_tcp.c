@@ -82,8 +82,8 @@ static void test_send(void **state)
     const int device = device_open(source);
     for (size_t i = 0; i < sizeof answer; i++)
         answer[i] = (uint8_t)(i * i >> 7);
-    struct raw_recorder recorder = raw_recorder_start(
-        wire, source, (const char *const[]){"--send", "\\x02one\\x03", "--send", "two\\n\\0", NULL});
+    struct raw_recorder recorder =
+        raw_recorder_start(wire, source, (const char *const[]){"--send", "\\x02one\\x03", "--send", "two\\n\\0", NULL});
     const int fd = take_connection(device);
     struct sockaddr_in peer;
     socklen_t len = sizeof peer;
@@ -197,8 +197,8 @@ static void test_relay_of_scip(void **state)
     do
         ask(&x, "BM\n", 1);
     while (memcmp(heard + x.n - 5, "10Q", 3) == 0); /* it spins up */
-    ask(&x, "MD0000108000003\n", 4); /* an echo, and three scans */
-    shutdown(x.fd, SHUT_WR);          /* the sensor ends its side then */
+    ask(&x, "MD0000108000003\n", 4);                /* an echo, and three scans */
+    shutdown(x.fd, SHUT_WR);                        /* the sensor ends its side then */
     x.n += read_all(x.fd, heard + x.n, 0);
     close(x.fd);
     raw_recorder_end(&recorder, SIGINT, 0, NULL);
@@ -295,9 +295,10 @@ static void test_clients(void **state)
     assert_int_equal(stats_uint(wire, "connections"), 2);
     assert_int_equal(stats_uint(wire, "refused_connections"), 1);
     captured_check_talk(&captured, captured.packet[0].from_port, (uint16_t)device_port, 1);
-    captured_check_talk(&captured, captured.packet[captured.n - 1].from_port == device_port
-                                       ? captured.packet[captured.n - 1].to_port
-                                       : captured.packet[captured.n - 1].from_port,
+    captured_check_talk(&captured,
+                        captured.packet[captured.n - 1].from_port == device_port
+                            ? captured.packet[captured.n - 1].to_port
+                            : captured.packet[captured.n - 1].from_port,
                         (uint16_t)device_port, 0);
     captured_free(&captured);
 }

@@ -101,8 +101,7 @@ static void test_velodyne(void **state)
     int port[2];
     struct raw_recorder recorder = raw_recorder_start(wire, "udp:127.0.0.1:0,0", NULL);
     read_ports(&recorder, port);
-    struct head head =
-        head_start(wire, velodyne_config(wire, port), (const char *const[]){"--duration", "0.3", NULL});
+    struct head head = head_start(wire, velodyne_config(wire, port), (const char *const[]){"--duration", "0.3", NULL});
     head_end(&head, 0);
     raw_recorder_end(&recorder, SIGTERM, 0, NULL);
     captured_read(wire, &captured);
@@ -124,6 +123,47 @@ static void test_velodyne(void **state)
     /* 0.3 s have 226 packets, one in 14 beside them; the mirror spins up first. */
     assert_true(n[0] > 50 && n[1] > n[0] / 14);
     free(data);
+    captured_free(&captured);
+}
+
+/* ---- a group, which a driver reads at the same time */
+
+static int driver_open(const struct sockaddr_in *at)
+{
+    const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0), one = 1;
+    const struct ip_mreqn group = {.imr_multiaddr = at->sin_addr, .imr_address.s_addr = htonl(INADDR_LOOPBACK)};
+    assert_int_equal(setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one), 0);
+    assert_int_equal(bind(fd, (const struct sockaddr *)at, sizeof *at), 0);
+    assert_int_equal(setsockopt(fd, IPPROTO_IP, IP_ADD_MEMBERSHIP, &group, sizeof group), 0);
+    return fd;
+}
+
+static void test_group(void **state)
+{
+    struct wire *wire = *state;
+    struct captured captured;
+    struct sockaddr_in to = {.sin_family = AF_INET};
+    const struct in_addr lo = {htonl(INADDR_LOOPBACK)};
+    char got[8];
+    int port, fd;
+    struct raw_recorder recorder = raw_recorder_start(wire, "udp:239.1.2.3%lo:0", NULL);
+    assert_int_equal(sscanf(recorder.endpoint, "udp:239.1.2.3:%d", &port), 1);
+    to.sin_port = htons((uint16_t)port);
+    to.sin_addr.s_addr = htonl(0xef010203);
+    const int driver = driver_open(&to);
+    sender_open(&fd);
+    assert_int_equal(setsockopt(fd, IPPROTO_IP, IP_MULTICAST_IF, &lo, sizeof lo), 0);
+    assert_int_equal(sendto(fd, "to all", 6, 0, (struct sockaddr *)&to, sizeof to), 6);
+    struct pollfd slot = {.fd = driver, .events = POLLIN};
+    assert_int_equal(poll(&slot, 1, DEADLINE_MS), 1);
+    assert_int_equal(read(driver, got, sizeof got), 6);
+    close(fd);
+    close(driver);
+    raw_recorder_end(&recorder, SIGINT, 0, NULL);
+    captured_read(wire, &captured);
+    assert_int_equal(captured.n, 1);
+    assert_true(captured.packet[0].from == 0x7f000001 && captured.packet[0].to == 0xef010203);
+    assert_memory_equal(captured.packet[0].data, "to all", 6);
     captured_free(&captured);
 }
 
@@ -180,24 +220,51 @@ static void test_duration(void **state)
     raw_recorder_end(&recorder, 0, 0, "1 packets");
 }
 
-/* A file that may have 8 KiB: an error, and no half of a file under its name. */
+/* A file that may have 8 KiB: an error, and no half of a file under its name. What was written is repaired. */
 static void test_disk_full(void **state)
 {
     struct wire *wire = *state;
-    static uint8_t data[LARGEST];
+    uint8_t data[1000];
+    char file[352];
+    struct captured captured;
     int port, fd;
     struct raw_recorder recorder = raw_recorder_start_limited(wire, "udp:127.0.0.1:0", "16");
     assert_int_equal(sscanf(recorder.endpoint, "udp:127.0.0.1:%d", &port), 1);
     sender_open(&fd);
-    send_to(fd, port, data, sizeof data);
+    for (int i = 0; i < 20; i++) {
+        memset(data, i, sizeof data);
+        send_to(fd, port, data, sizeof data);
+    }
     close(fd);
     raw_recorder_end(&recorder, SIGINT, 1, "cap.pcapng.part: cannot write: File too large");
-    assert_int_equal(access(wire_path(wire, "cap.pcapng"), F_OK), -1);
+    snprintf(file, sizeof file, "%s", wire_path(wire, "cap.pcapng"));
+    assert_int_equal(access(file, F_OK), -1);
+    const char *const again[] = {"record", "udp:127.0.0.1:0", "--raw", "-o", file, NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, again, "out", "err", -1)), 2);
+    const char *const repair[] = {"record", "--repair", file, "--quiet", NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, repair, "out", "err", -1)), 0);
+    captured_read(wire, &captured);
+    /* 8192 bytes hold the front, of 300 bytes at most, and blocks of 28 + 1042 + 2 + 4 bytes. */
+    assert_int_equal(captured.n, 7);
+    for (uint32_t i = 0; i < captured.n; i++) {
+        memset(data, (int)i, sizeof data);
+        assert_int_equal(captured.packet[i].len, sizeof data);
+        assert_memory_equal(captured.packet[i].data, data, sizeof data);
+    }
+    captured_free(&captured);
 }
 
 #define FILE_OF "-o", file
-#define SAYS(...) (const char *const[]){__VA_ARGS__, NULL}
-#define ARGS(...) (const char *const[]){"record", __VA_ARGS__, NULL}
+#define SAYS(...)         \
+    (const char *const[]) \
+    {                     \
+        __VA_ARGS__, NULL \
+    }
+#define ARGS(...)                   \
+    (const char *const[])           \
+    {                               \
+        "record", __VA_ARGS__, NULL \
+    }
 
 static void test_usage(void **state)
 {
@@ -252,6 +319,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test_setup_teardown(test_datagrams, wire_setup, wire_teardown),
                                        cmocka_unit_test_setup_teardown(test_velodyne, wire_setup, wire_teardown),
+                                       cmocka_unit_test_setup_teardown(test_group, wire_setup, wire_teardown),
                                        cmocka_unit_test_setup_teardown(test_dropped, wire_setup, wire_teardown),
                                        cmocka_unit_test_setup_teardown(test_nothing_came, wire_setup, wire_teardown),
                                        cmocka_unit_test_setup_teardown(test_duration, wire_setup, wire_teardown),

@@ -2,6 +2,7 @@
  * says that its end is missing. The recorder reads a stream through a pipe, so that a moment is a byte of the stream, and a
  * little after it. What was left is known from FILE.part itself. REPAIR_N is how many moments each format has; from 20 on
  * programs of others read some of them, too (make repair). */
+#include <limits.h>
 #include <sched.h>
 #include <sys/inotify.h>
 #include <sys/mount.h>
@@ -375,6 +376,9 @@ static int set_up(void **state)
     if (wire_setup(state) != 0) return -1;
     wire = *state;
     *state = NULL; /* that of each test is its row */
+    char readers[PATH_MAX];
+    if (realpath(getenv("READERS") != NULL ? getenv("READERS") : "build/readers", readers) != NULL)
+        setenv("READERS", readers, 1);
     if (n != NULL) n_moments = strtoull(n, NULL, 10);
     signal(SIGPIPE, SIG_IGN);
     char readers[PATH_MAX];

@@ -15,7 +15,10 @@ int raw_is_wanted(int argc, char **argv)
 
 static int hex_of(char c)
 {
-    return c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
+    return c >= '0' && c <= '9'   ? c - '0'
+           : c >= 'a' && c <= 'f' ? c - 'a' + 10
+           : c >= 'A' && c <= 'F' ? c - 'A' + 10
+                                  : -1;
 }
 
 /* After the backslash: how many characters it takes; 0: it is none. */
@@ -104,8 +107,7 @@ static int read_source(struct raw *r)
     const char *source = r->in.operand[0];
     const int udp = strncmp(source, "udp:", 4) == 0, tcp = strncmp(source, "tcp:", 4) == 0;
     r->ops = udp ? &raw_udp : &raw_tcp;
-    if ((!udp && !tcp) || !read_place(source + 4, udp ? RAW_MAX_PORTS : 1, &r->place) ||
-        (tcp && r->place.port[0] == 0))
+    if ((!udp && !tcp) || !read_place(source + 4, udp ? RAW_MAX_PORTS : 1, &r->place) || (tcp && r->place.port[0] == 0))
         return app_usage(&command, "SOURCE %s: with --raw allowed udp:ADDRESS:PORT,PORT,... and tcp:HOST:PORT", source);
     if (udp && (r->n_sends > 0 || r->relay != NULL))
         return app_usage(&command, "%s: --send and --relay need tcp:HOST:PORT", source);

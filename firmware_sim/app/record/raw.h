@@ -60,12 +60,12 @@ struct raw {
     const struct raw_ops *ops;
     /* the recording */
     struct capture capture;
-    uint64_t bytes;      /* of payload */
-    int64_t first_ns;    /* monotonic, of the first packet; 0: none came */
-    int64_t last_t_ns;   /* of the last packet */
-    int over;            /* by itself */
-    char endpoint[160];  /* where it listens; for --ready-fd */
-    void *state;         /* of ops */
+    uint64_t bytes;     /* of payload */
+    int64_t first_ns;   /* monotonic, of the first packet; 0: none came */
+    int64_t last_t_ns;  /* of the last packet */
+    int over;           /* by itself */
+    char endpoint[160]; /* where it listens; for --ready-fd */
+    void *state;        /* of ops */
     double wall_s;
 };
 

@@ -1,8 +1,10 @@
 /* The recording of `record --raw`: from open files to closed ones, whatever the source is. */
 #include <errno.h>
-#include <string.h>
+#include <limits.h>
 #include <netinet/in.h>
+#include <string.h>
 
+#include "core/newfile.h"
 #include "firmware_sim/app/record/raw.h"
 #include "firmware_sim/base/clock.h"
 
@@ -65,8 +67,8 @@ static int64_t end_of(const struct raw *r, int64_t begin_ns)
 static void describe(const struct raw *r, char *text, size_t len)
 {
     const uint64_t dropped = r->ops->dropped(r);
-    const int n = snprintf(text, len, "%llu packets, %.3f MB", (unsigned long long)r->capture.packets,
-                           1e-6 * (double)r->bytes);
+    const int n =
+        snprintf(text, len, "%llu packets, %.3f MB", (unsigned long long)r->capture.packets, 1e-6 * (double)r->bytes);
     if (dropped != 0) snprintf(text + n, len - (size_t)n, ", %llu dropped", (unsigned long long)dropped);
 }
 
@@ -77,10 +79,10 @@ static int report(struct raw *r, int64_t now_ns, int64_t *next_ns, struct sh_err
     if (now_ns < *next_ns) return SH_OK;
     *next_ns = now_ns + SECOND_NS;
     describe(r, what + strlen(what), sizeof what - strlen(what));
-    const double done = r->duration_s > 0.0 && r->first_ns != 0
-                            ? 1e-9 * (double)(now_ns - r->first_ns) / r->duration_s : -1.0;
+    const double done =
+        r->duration_s > 0.0 && r->first_ns != 0 ? 1e-9 * (double)(now_ns - r->first_ns) / r->duration_s : -1.0;
     if (!r->quiet) sh_progress(&app_report_stderr, what, done < 1.0 ? done : 1.0);
-    return capture_flush(&r->capture, err);
+    return capture_save(&r->capture, err);
 }
 
 static int wait_until(struct raw *r, int64_t now_ns, int64_t end_ns)
@@ -124,6 +126,15 @@ static int check_any(const struct raw *r, struct sh_err *err)
     return sh_fail(err, SH_ETIMEOUT, "%s: no packet came; there is no %s", r->in.operand[0], r->path);
 }
 
+static void say_left(const struct raw *r)
+{
+    char part[PATH_MAX];
+    snprintf(part, sizeof part, "%s.part", r->path);
+    if (newfile_left_len(part) > 0)
+        sh_warn(&app_report_stderr,
+                "%s keeps what came to the disk: scanhead record --repair %s makes a whole file of it", part, r->path);
+}
+
 /* As other recordings, it keeps what came also where it ended in a failure. */
 int raw_run(struct raw *r, struct sh_err *err)
 {
@@ -137,7 +148,9 @@ int raw_run(struct raw *r, struct sh_err *err)
     const int has_figures = r->capture.packets != 0 || rc == SH_OK;
     if (rc == SH_OK) rc = check_any(r, err);
     int after = capture_close(&r->capture, r->capture.packets != 0, &why);
-    if (rc != SH_OK && after != SH_OK && r->capture.packets != 0) sh_warn(&app_report_stderr, "%s", why.text);
+    if (rc != SH_OK && after != SH_OK && strcmp(why.text, err->text) != 0)
+        sh_warn(&app_report_stderr, "%s", why.text);
+    if (after != SH_OK) say_left(r);
     if (rc == SH_OK && after != SH_OK) rc = sh_fail(err, after, "%s", why.text);
     if (rc == SH_OK) rc = r->ops->check(r, err);
     char text[96];

@@ -104,8 +104,8 @@ static void push(struct talk_end *end)
 {
     struct talk_end *to = &end->talk->end[!end->number];
     while (end->sent < end->len) {
-        const ssize_t n = to->fd < 0 || to->is_deaf ? SH_ECLOSED
-                                                    : socket_write(to->fd, end->bytes + end->sent, end->len - end->sent);
+        const ssize_t n =
+            to->fd < 0 || to->is_deaf ? SH_ECLOSED : socket_write(to->fd, end->bytes + end->sent, end->len - end->sent);
         if (n == 0) return;
         if (n < 0) {
             to->is_deaf = 1;
@@ -209,7 +209,7 @@ int talk_wait_for(const struct talk *talk, struct pollfd *fds, int *timeout_ms)
         const short events = (short)((is_free(end) ? POLLIN : 0) | (other->sent < other->len ? POLLOUT : 0));
         if (end->fd >= 0 && events != 0) fds[n++] = (struct pollfd){.fd = end->fd, .events = events};
     }
-    if (talk->end[0].fd < 0 && talk->next_send < talk->r->n_sends && *timeout_ms > LOOK_MS) *timeout_ms = LOOK_MS;
+    if (talk->end[0].fd < 0 && talk->next_send<talk->r->n_sends && * timeout_ms> LOOK_MS) *timeout_ms = LOOK_MS;
     return n;
 }
 

@@ -19,7 +19,8 @@ struct talk_end {
     int is_deaf; /* what is sent to it fails */
     enum { TALK_BYTES, TALK_END, TALK_RESET } news;
     uint64_t received;
-    uint8_t bytes[TALK_PIECE]; /* from it: a piece that is to be passed on, then the rest that the other does not take */
+    uint8_t
+        bytes[TALK_PIECE]; /* from it: a piece that is to be passed on, then the rest that the other does not take */
     size_t len, sent;
 };
 
@@ -28,9 +29,9 @@ struct talk {
     struct tcp_talk segments;
     struct talk_end end[2];
     int is_used, is_over, was_reset;
-    int next_send;               /* of r->send */
-    int64_t sent_ns, heard_ns;   /* monotonic: when it was sent, and when the device said something last */
-    char name[80];               /* of end 0, for messages */
+    int next_send;             /* of r->send */
+    int64_t sent_ns, heard_ns; /* monotonic: when it was sent, and when the device said something last */
+    char name[80];             /* of end 0, for messages */
 };
 
 /* Both descriptors are taken; fd 0: -1, for this program itself. began_ns: UTC, when the connection was asked for. It

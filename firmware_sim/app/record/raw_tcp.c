@@ -46,11 +46,12 @@ static int listen_for_clients(struct raw *r, struct tcp *tcp, struct sh_err *err
     char *end;
     const long port = strtol(text, &end, 10);
     if (end == text || *end != '\0' || port < 0 || port > 65535)
-        return sh_fail(err, SH_EINPUT, "--relay %s: allowed is PORT or ADDRESS:PORT, with a port from 0 (the system's "
-                       "choice) to 65535", r->relay);
+        return sh_fail(err, SH_EINPUT,
+                       "--relay %s: allowed is PORT or ADDRESS:PORT, with a port from 0 (the system's "
+                       "choice) to 65535",
+                       r->relay);
     const int bracket = r->relay[0] == '[' && colon > r->relay && colon[-1] == ']';
-    if (colon != NULL)
-        snprintf(host, sizeof host, "%.*s", (int)(colon - r->relay) - 2 * bracket, r->relay + bracket);
+    if (colon != NULL) snprintf(host, sizeof host, "%.*s", (int)(colon - r->relay) - 2 * bracket, r->relay + bracket);
     const struct socket_place place = {.what = "--relay", .host = host, .port = (int)port};
     const int rc = socket_open(&place, &tcp->listen_fd, name, sizeof name, err);
     if (rc != SH_OK) return rc;
@@ -69,7 +70,8 @@ static int tcp_open(struct raw *r, struct sh_err *err)
     snprintf(r->endpoint, sizeof r->endpoint, "%s", r->in.operand[0]);
     const int rc = capture_add_interface(&r->capture, r->in.operand[0],
                                          "TCP connections that scanhead had, as frames made anew; times are the "
-                                         "kernel's.", err);
+                                         "kernel's.",
+                                         err);
     if (rc != SH_OK) return rc;
     return r->relay != NULL ? listen_for_clients(r, tcp, err) : connect_first(r, tcp, err);
 }
@@ -189,8 +191,10 @@ static int tcp_check(const struct raw *r, struct sh_err *err)
         return sh_fail(err, SH_ECLOSED, "%s: %d of %d --send were not sent: the recording was over before", source,
                        r->n_sends - talk->next_send, r->n_sends);
     if (tcp->received[1] != 0) return SH_OK;
-    return sh_fail(err, SH_ETIMEOUT, "%s: the device said nothing; most speak only when asked: --send TEXT, or --relay "
-                   "PORT for their driver", source);
+    return sh_fail(err, SH_ETIMEOUT,
+                   "%s: the device said nothing; most speak only when asked: --send TEXT, or --relay "
+                   "PORT for their driver",
+                   source);
 }
 
 static void tcp_put(struct json *json, const struct raw *r)

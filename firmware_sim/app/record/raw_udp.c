@@ -55,8 +55,10 @@ static int open_port(struct raw *r, struct port *p, int number, struct sh_err *e
     socket_address_text((struct sockaddr *)&p->socket.own, p->socket.own_len, at, sizeof at);
     snprintf(p->name, sizeof p->name, "udp:%s", at);
     p->interface = r->capture.n_interfaces;
-    return capture_add_interface(&r->capture, p->name, "Datagrams that scanhead received, with headers made anew; "
-                                 "times are the kernel's.", err);
+    return capture_add_interface(&r->capture, p->name,
+                                 "Datagrams that scanhead received, with headers made anew; "
+                                 "times are the kernel's.",
+                                 err);
 }
 
 /* An own address may come late: an interface that is not up yet. */

@@ -324,6 +324,7 @@ static const char HELP_NOTES[] =
     "                       usb:vid:pid:serial\n"
     "  tty:/dev/...         a serial port\n"
     "  tcp:host:port        a socket\n"
+    "  udp:address:port     only with --raw, as tcp: datagrams or bytes of any protocol, to a .pcapng\n"
     "  FILE.shs             a raw stream; FILE.pcapng: its frames as packets\n"
     "\n"
     "The ending of FILE says what is written:\n"
