@@ -15,8 +15,8 @@ static const struct {
     {"utm.shs", "output.layout=geo output.crs=utm" AT_BERLIN, 0},
     {"geodetic.shs", "output.layout=geo output.crs=geodetic" AT_BERLIN, 0},
 };
-const char *const stream_name[N_STREAMS] = {"polar.shs",    "ride.shs",    "utm.shs",
-                                            "geodetic.shs", "samples.shs", "long.shs"};
+const char *const stream_name[N_STREAMS] = {"polar.shs",   "ride.shs",   "utm.shs", "geodetic.shs",
+                                            "samples.shs", "joined.shs", "long.shs"};
 
 /* ---- streams: recordings, the samples, and one frame of 3,000 points */
 
@@ -101,6 +101,7 @@ static void number_all(void)
 {
     for (int i = 0; i < N_STREAMS; i++) {
         size_t len;
+        if (i == JOINED) continue;
         char *bytes = wire_read(wire_path(wire, stream_name[i]), &len);
         for (size_t at = 0; at < len; at += native_frame_len((uint8_t *)bytes + at)) {
             uint8_t *frame = (uint8_t *)bytes + at;
@@ -112,6 +113,14 @@ static void number_all(void)
     }
 }
 
+static void write_joined(void)
+{
+    size_t len;
+    char *bytes = wire_read(wire_path(wire, stream_name[0]), &len);
+    wire_write(wire, stream_name[JOINED], bytes + JOINED_AT, len - JOINED_AT);
+    free(bytes);
+}
+
 int wireshark_setup(void **state)
 {
     const int rc = wire_setup(state);
@@ -121,6 +130,7 @@ int wireshark_setup(void **state)
     write_samples();
     write_long();
     number_all();
+    write_joined();
     return 0;
 }
 
@@ -132,8 +142,10 @@ void put_tcp(struct capture *c, uint32_t interface, int number, const uint8_t *b
     uint64_t random = (uint64_t)number;
     static const char early[] = "*IDN?\nHEAD:STATe?\r\n", answers[] = "scanhead,test,1,scanhead native 1\r\nidle\r\n";
     static const char late[] = "ERR -222,\"Data out of range\"\r\nid";
-    capture_segment(c, interface, &tcp, 1, answers, 10); /* what it answers to is before the capture */
-    capture_segment(c, interface, &tcp, 1, answers + 10, sizeof answers - 11);
+    if (number != JOINED) { /* what it answers to is before the capture */
+        capture_segment(c, interface, &tcp, 1, answers, 10);
+        capture_segment(c, interface, &tcp, 1, answers + 10, sizeof answers - 11);
+    }
     for (size_t at = 0, n; at < len; at += n) {
         n = 1 + capture_random(&random, 1460);
         if (n > len - at) n = len - at;
@@ -148,13 +160,13 @@ void put_tcp(struct capture *c, uint32_t interface, int number, const uint8_t *b
 void put_usb(struct capture *c, uint32_t interface, int number, const uint8_t *bytes, size_t len)
 {
     uint64_t random = (uint64_t)number;
-    const uint8_t device = (uint8_t)(3 + number);
+    const uint8_t device = (uint8_t)(3 + number), out = number % 2 == 0 ? 3 : 1, in = out | 0x80; /* stream, console */
     for (size_t at = 0, n; at < len; at += n) {
         n = 1 + capture_random(&random, 16384);
         if (at == 0) n = 512; /* the first transfer has a header, so that the stream is known */
         if (n > len - at) n = len - at;
-        capture_transfer(c, interface, device, 0x83, bytes + at, n);
+        capture_transfer(c, interface, device, in, bytes + at, n);
     }
-    capture_transfer(c, interface, device, 0x03, "TIME?\n", 6);
-    capture_transfer(c, interface, device, 0x83, "123456\r\n", 8);
+    capture_transfer(c, interface, device, out, "TIME?\n", 6);
+    capture_transfer(c, interface, device, in, "123456\r\n", 8);
 }

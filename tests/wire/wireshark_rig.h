@@ -8,8 +8,9 @@
 #define S "scanhead."
 enum { EXPERT_WARN = 6291456, EXPERT_ERROR = 8388608 }; /* values of _ws.expert.severity */
 
-/* Files in the test's folder: recordings of the program, the samples of SAMPLES.md, and a frame of 3,000 points. */
-enum { N_RECORDINGS = 4, N_STREAMS = 6, LONG_POINTS = 3000 };
+/* Files in the test's folder: recordings of the program, the samples of SAMPLES.md, the first recording from within a
+ * frame on, and a frame of 3,000 points. */
+enum { N_RECORDINGS = 4, JOINED = 5, N_STREAMS = 7, LONG_POINTS = 3000, JOINED_AT = 200 };
 extern const char *const stream_name[N_STREAMS]; /* the recordings first */
 
 /* Makes them. The sequence numbers of each are its own, so that one may follow the other by a jump forward. */
