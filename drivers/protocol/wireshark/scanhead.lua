@@ -775,7 +775,7 @@ local function put_points(tree, tvb, bytes, at, _, m)
     if not is_shown then return end
     item:set_text(string.format("Point %d: pulse %.0f, echo %d of %d: %s%s%s", i, pulse, echo, count, words,
                                 refl ~= -32768 and string.format(", %.2f dB", refl / 100) or "",
-                                label ~= 0xffff and ", label " .. label or ""))
+                                label ~= 0xffff and string.format(", label %d", label) or ""))
   end)
 end
 
