@@ -47,6 +47,44 @@ static void test_names(void **state)
     assert_int_equal(unlink(repair_part), 0);
 }
 
+/* What is not to be written to is checked, and no more. */
+static void test_not_ours(void **state)
+{
+    (void)state;
+    struct repaired file;
+    char other[180];
+    repair_name("a.las");
+    snprintf(other, sizeof other, "%s.other", repair_path);
+    repair_write_file(repair_path, repair_whole[REPAIR_LAS].data, repair_whole[REPAIR_LAS].len);
+    assert_int_equal(link(repair_path, other), 0);
+    assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), 0);
+    assert_true(file.was_whole);
+    repair_free(&file);
+    assert_int_equal(truncate(repair_path, (off_t)repair_whole[REPAIR_LAS].len - 1), 0);
+    assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), SH_EPERM);
+    assert_non_null(strstr(repair_err.text, "needs a repair, and may not be written to"));
+    assert_int_equal(unlink(other), 0);
+    assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), 0);
+    assert_true(!file.was_whole && file.n_kept == REPAIR_POINTS - 1);
+    repair_free(&file);
+    assert_int_equal(unlink(repair_path), 0);
+}
+
+/* Poses of a head that moves, with a comment where some were lost. */
+static void test_moving_poses(void **state)
+{
+    static const char poses[] = "scan,t_s,x_m,y_m,z_m,qw,qx,qy,qz,frame,flags\n1,0.000000000,1,2,3,1,0,0,0,nan,0\n"
+                                "# poses are missing here\n1,0.100000000,1,2,-3e-05,1,0,0,0,nan,1\n1,0.2000";
+    (void)state;
+    struct repaired file;
+    repair_name("m.poses.csv");
+    repair_write_file(repair_part, poses, sizeof poses - 1);
+    assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), 0);
+    assert_true(file.n_kept == 2 && file.n_scans == 1 && file.cut_bytes == 8);
+    repair_free(&file);
+    assert_int_equal(unlink(repair_path), 0);
+}
+
 static int stop(void *ctx)
 {
     (void)ctx;
@@ -97,7 +135,8 @@ static void test_save(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_names), cmocka_unit_test(test_stopped),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_names), cmocka_unit_test(test_not_ours),
+                                       cmocka_unit_test(test_moving_poses), cmocka_unit_test(test_stopped),
                                        cmocka_unit_test(test_save)};
     return cmocka_run_group_tests(tests, repair_set_up, repair_tear_down);
 }
