@@ -4,7 +4,7 @@
 
 #include "core/newfile.h"
 #include "drivers/record/outfile.h"
-#include "tests/unit/repair_kinds.h"
+#include "tests/unit/repair_rig.h"
 
 /* Which file is meant, and that none is replaced. */
 static void test_names(void **state)
