@@ -200,6 +200,16 @@ void stamped_close(struct stamped_socket *socket)
 
 /* ---- streams */
 
+/* Nobody listens, and the system chose the port that was asked for: TCP then connects a socket to itself. */
+static int is_own_end(int fd)
+{
+    struct sockaddr_storage own = {0}, peer = {0};
+    socklen_t own_len = sizeof own, peer_len = sizeof peer;
+    return getsockname(fd, (struct sockaddr *)&own, &own_len) == 0 &&
+           getpeername(fd, (struct sockaddr *)&peer, &peer_len) == 0 && own_len == peer_len &&
+           memcmp(&own, &peer, own_len) == 0;
+}
+
 static int connect_at(const struct addrinfo *at, int timeout_ms)
 {
     const struct timeval limit = {.tv_sec = timeout_ms / 1000, .tv_usec = timeout_ms % 1000 * 1000};
@@ -207,8 +217,10 @@ static int connect_at(const struct addrinfo *at, int timeout_ms)
     if (fd < 0) return -1;
     setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof limit);
     stamped_enable(fd);
-    if (connect(fd, at->ai_addr, at->ai_addrlen) == 0 && fcntl(fd, F_SETFL, O_NONBLOCK) == 0) return fd;
-    const int error = errno == EINPROGRESS ? ETIMEDOUT : errno;
+    const int is_open = connect(fd, at->ai_addr, at->ai_addrlen) == 0;
+    const int is_own = is_open && is_own_end(fd);
+    if (is_open && !is_own && fcntl(fd, F_SETFL, O_NONBLOCK) == 0) return fd;
+    const int error = is_own ? ECONNREFUSED : errno == EINPROGRESS ? ETIMEDOUT : errno;
     close(fd);
     errno = error;
     return -1;
