@@ -11,13 +11,12 @@
 enum { POLL_MS = 200 };
 static const int64_t SECOND_NS = 1000000000;
 
-int raw_write(struct raw *r, uint32_t interface, int64_t t_ns, const uint8_t *frame, size_t len, size_t payload,
-              struct sh_err *err)
+int raw_write(struct raw *r, const struct capture_frame *frame, size_t payload, struct sh_err *err)
 {
     if (r->first_ns == 0) r->first_ns = clock_now_ns();
     r->bytes += payload;
-    r->last_t_ns = t_ns;
-    return capture_add(&r->capture, interface, t_ns, frame, len, err);
+    r->last_t_ns = frame->t_ns;
+    return capture_add(&r->capture, frame, err);
 }
 
 struct ethernet_end raw_end_of(const struct sockaddr_storage *at)

@@ -19,7 +19,8 @@ static int write_frame(struct talk *talk, int64_t t_ns, const uint8_t *frame, si
     struct raw *r = talk->r;
     if (len == 0) return SH_OK;
     const int is_held = t_ns < r->last_t_ns && stamped_now_ns() >= r->last_t_ns;
-    return raw_write(r, 0, is_held ? r->last_t_ns : t_ns, frame, len, payload, err);
+    const struct capture_frame f = {.t_ns = is_held ? r->last_t_ns : t_ns, .bytes = frame, .len = len};
+    return raw_write(r, &f, payload, err);
 }
 
 static int write_bytes(struct talk *talk, int side, int64_t t_ns, const uint8_t *bytes, size_t len, struct sh_err *err)
