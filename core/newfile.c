@@ -214,6 +214,21 @@ int newfile_left(const char *part, int *out, struct sh_err *err)
     return rc;
 }
 
+int newfile_whole(const char *path, int *out, struct sh_err *err)
+{
+    const int flags = O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC;
+    int rc = check_target(path, err);
+    if (rc != SH_OK) return rc;
+    int fd = open(path, O_RDWR | flags);
+    if (fd >= 0 && check_left(path, fd, NULL) == SH_OK && flock(fd, LOCK_EX | LOCK_NB) == 0) {
+        *out = fd;
+        return SH_OK;
+    }
+    if (fd >= 0) close(fd);
+    *out = open(path, O_RDONLY | flags);
+    return *out >= 0 ? SH_OK : fail(path, "be opened", err);
+}
+
 long long newfile_left_len(const char *part)
 {
     struct stat st;

@@ -28,9 +28,12 @@ int newfile_append(const char *path, int *fd, struct sh_err *err);
 int newfile_part(const char *path, const char *part, int *fd, struct sh_err *err);
 /* Before long work: whether newfile_part would make `path` with `.part` behind it. It leaves nothing behind. */
 int newfile_check(const char *path, struct sh_err *err);
-/* What a writer that was killed has left as `part`, or a whole file: an existing regular file, for reading and writing, locked
- * as newfile_part has it. SH_EINPUT: there is none. */
+/* What a writer that was killed has left as `part`: an existing regular file, for reading and writing, locked as newfile_part
+ * has it. SH_EINPUT: there is none; SH_ESTATE: it is still being written. */
 int newfile_left(const char *part, int *fd, struct sh_err *err);
+/* A regular file that is there, for reading; for writing, too, and locked, where it may be written to: it is the user's own
+ * and has no further names. */
+int newfile_whole(const char *path, int *fd, struct sh_err *err);
 /* The bytes of a part that was left and that nobody writes, or 0. */
 long long newfile_left_len(const char *part);
 /* Syncs, renames and closes. After a failure part stays, and fd is open. */

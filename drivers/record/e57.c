@@ -4,7 +4,7 @@
  *
  * A binary section is a header and packets (e57_packet.h). The XML section, which says where everything is, comes last;
  * then headers are written over, the file's own after all others: a file with a header is whole. Until then a note before
- * each scan (e57_note.h) says what a repair needs. A packet spans no more than a second of device time, so that little is
+ * each scan (e57_note.h) says what a repair needs. A packet spans no more than 0.1 s of device time, so that little is
  * missing at any moment, and the same stream still gives the same bytes. */
 #include <math.h>
 #include <stdio.h>
@@ -17,7 +17,7 @@
 #include "drivers/record/e57_packet.h"
 #include "drivers/record/recorder.h"
 
-static const int64_t PACKET_NS = 1000000000;
+static const int64_t PACKET_NS = 100000000;
 
 struct e57 {
     struct recorder base;
@@ -71,7 +71,9 @@ static int put_begin(struct e57 *e, struct sh_err *err)
     s->note = e57_note_place(at);
     s->section = s->note + sizeof note;
     e57_note_put(&e->facts, s, note);
-    int rc = e57_put(&e->pages, blank, (size_t)(s->note - at), err);
+    int rc = outfile_reserve(&e->base.file, E57_XML_ROOM + e->facts.n_scans * (uint64_t)E57_XML_ROOM_SCAN, err);
+    e->pages.has_failed |= rc != 0;
+    if (rc == 0) rc = e57_put(&e->pages, blank, (size_t)(s->note - at), err);
     if (rc == 0) rc = e57_put(&e->pages, note, sizeof note, err);
     return rc != 0 ? rc : e57_put(&e->pages, section, sizeof section, err);
 }

@@ -44,7 +44,10 @@ int e57_end(struct e57_pages *pages, const struct e57_facts *facts, const struct
     uint8_t header[E57_FILE_HEADER_LEN];
     const uint64_t at = e57_logical(pages);
     size_t len;
-    int rc = put_xml(pages, facts, &len, err);
+    int rc = outfile_flush(pages->file, err); /* the room is for what follows the points, and a repair may want it */
+    if (rc != 0) return rc;
+    outfile_release(pages->file);
+    rc = put_xml(pages, facts, &len, err);
     if (rc == 0) rc = patch_sections(pages, facts, report, err);
     if (rc == 0) rc = cut_and_sync(pages, err);
     if (rc != 0) return rc;

@@ -6,6 +6,8 @@
 #include "drivers/record/e57_xml.h"
 #include "drivers/record/repair.h"
 
+enum { E57_XML_ROOM = 16384, E57_XML_ROOM_SCAN = 8192 }; /* bytes that suffice for the XML section, and for each scan in it */
+
 /* Puts the XML section, cuts what is behind it, then writes the headers of the scans, and last, once all that is on the
  * disk, the file's own. report: its stop gives up; may be NULL. */
 int e57_end(struct e57_pages *pages, const struct e57_facts *facts, const struct sh_report *report, struct sh_err *err);

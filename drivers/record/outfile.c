@@ -5,10 +5,14 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include "core/newfile.h"
+
+static const uint64_t OUTFILE_RESERVE_AT = (uint64_t)1 << 40; /* beyond any recording, and within what ext4 counts */
+enum { OUTFILE_RESERVE_MOST = 1 << 30 };
 
 static void release(struct outfile *file)
 {
@@ -165,6 +169,28 @@ int outfile_close(struct outfile *file, enum outfile_end how, struct sh_err *err
     if (!closed && !(stays && leave(file))) newfile_drop(file->part, file->fd);
     release(file);
     return how == OUTFILE_LEAVE ? 0 : rc;
+}
+
+/* A limit on files would end the program here: some file systems count from a file's begin. */
+static int has_limit(void)
+{
+    struct rlimit most;
+    return getrlimit(RLIMIT_FSIZE, &most) != 0 || most.rlim_cur != RLIM_INFINITY;
+}
+
+int outfile_reserve(struct outfile *file, uint64_t len, struct sh_err *err)
+{
+    if (has_limit() || fallocate(file->fd, FALLOC_FL_KEEP_SIZE, (off_t)OUTFILE_RESERVE_AT, (off_t)len) == 0) return SH_OK;
+    if (errno != ENOSPC) return SH_OK;
+    return sh_fail(err, SH_EIO, "%s: cannot write: %s", file->part, strerror(errno));
+}
+
+void outfile_release(struct outfile *file)
+{
+    struct stat st;
+    if (fstat(file->fd, &st) != 0 || (uint64_t)st.st_size > OUTFILE_RESERVE_AT) return;
+    if (fallocate(file->fd, FALLOC_FL_KEEP_SIZE | FALLOC_FL_PUNCH_HOLE, (off_t)OUTFILE_RESERVE_AT, OUTFILE_RESERVE_MOST) != 0)
+        return; /* it had none */
 }
 
 int outfile_over(struct outfile *file, int fd, const char *path, uint64_t at, struct sh_err *err)

@@ -49,6 +49,12 @@ void outfile_yield(struct outfile *file);
  * everything in any case. */
 enum outfile_end { OUTFILE_DROP = 0, OUTFILE_KEEP = 1, OUTFILE_KEEP_PART, OUTFILE_LEAVE };
 int outfile_close(struct outfile *file, enum outfile_end how, struct sh_err *err);
+/* Room on the disk for the end of a file, of len bytes in all: so that a full disk, or a repair on one, has it. It lies far
+ * behind the end, and does not count as length. Where the file system has no such room, or files have a limit, there is none.
+ * SH_EIO: the disk is full. */
+int outfile_reserve(struct outfile *file, uint64_t len, struct sh_err *err);
+/* Gives it back, for what is written next. */
+void outfile_release(struct outfile *file);
 /* Writes over an open file from `at` on; path is for messages. SH_ENOMEM. Only outfile_leave ends it: it flushes nothing,
  * and leaves fd open. */
 int outfile_over(struct outfile *file, int fd, const char *path, uint64_t at, struct sh_err *err);

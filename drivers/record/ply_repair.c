@@ -119,30 +119,55 @@ static int is_padding(const char *line, size_t n)
     return strncmp(line, "comment ", 8) == 0 && strspn(line + 7, " ") >= n - 7;
 }
 
+/* What a header is renewed with; padding: blank comments before the count; blanks: at the end of the first comment. Bytes. */
+struct renewal {
+    uint64_t n_vertices;
+    int incomplete;
+    size_t padding, blanks;
+};
+
+static void put_line(FILE *out, const struct ply_header *h, const char *line, int n, struct renewal *new)
+{
+    const int counts = strncmp(line, "element vertex ", 15) == 0;
+    if (counts) ply_put_padding(out, new->padding);
+    if (counts)
+        fprintf(out, "element vertex %" PRIu64, new->n_vertices);
+    else
+        fprintf(out, "%.*s", n, line);
+    if (strncmp(line, "comment ", 8) == 0) {
+        fprintf(out, "%*s", (int)new->blanks, "");
+        new->blanks = 0;
+    }
+    fputc('\n', out);
+    if (new->incomplete && !h->is_incomplete && strncmp(line, "format ", 7) == 0) fputs(PLY_INCOMPLETE, out);
+}
+
+/* NULL: no memory. */
+static char *put_lines(const struct ply_header *h, struct renewal new, size_t *len)
+{
+    char *text = NULL;
+    FILE *out = open_memstream(&text, len);
+    if (out == NULL) return NULL;
+    for (const char *at = h->text, *stop; (stop = strchr(at, '\n')) != NULL; at = stop + 1)
+        if (!is_padding(at, (size_t)(stop - at))) put_line(out, h, at, (int)(stop - at), &new);
+    if (fclose(out) == 0) return text;
+    free(text);
+    return NULL;
+}
+
 /* The same header with that count, and with the line of an incomplete one, in the same length. NULL: there is no room. */
 static char *renew(const struct ply_header *h, uint64_t n_vertices, int incomplete)
 {
-    char *text = NULL;
+    struct renewal new = {.n_vertices = n_vertices, .incomplete = incomplete};
     size_t len = 0;
-    FILE *out = open_memstream(&text, &len);
-    if (out == NULL) return NULL;
-    size_t left = h->len;
-    for (int pass = 0; pass < 2; pass++) {
-        for (const char *at = h->text, *stop; (stop = strchr(at, '\n')) != NULL; at = stop + 1) {
-            const size_t n = (size_t)(stop - at);
-            char counted[64];
-            const int counts = n > 15 && memcmp(at, "element vertex ", 15) == 0;
-            if (is_padding(at, n)) continue;
-            const int m = snprintf(counted, sizeof counted, "element vertex %" PRIu64, n_vertices);
-            if (pass == 1 && counts) ply_put_padding(out, left);
-            if (pass == 1) fprintf(out, "%.*s\n", counts ? m : (int)n, counts ? counted : at);
-            const int marks = incomplete && !h->is_incomplete && strncmp(at, "format ", 7) == 0;
-            if (pass == 1 && marks) fputs(PLY_INCOMPLETE, out);
-            if (pass == 0) left -= (counts ? (size_t)m : n) + 1 + (marks ? sizeof PLY_INCOMPLETE - 1 : 0);
-        }
-        if (pass == 0 && (left > h->len || (left > 0 && left < PLY_PAD_MIN))) break;
+    char *text = put_lines(h, new, &len);
+    if (text != NULL && len < h->len) {
+        const size_t left = h->len - len;
+        *(left < PLY_PAD_MIN ? &new.blanks : &new.padding) = left;
+        free(text);
+        text = put_lines(h, new, &len);
     }
-    if (fclose(out) == 0 && len == h->len) return text;
+    if (text != NULL && len == h->len) return text;
     free(text);
     return NULL;
 }

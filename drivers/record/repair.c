@@ -1,6 +1,7 @@
 #include "drivers/record/repair.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -39,8 +40,19 @@ int repair_read(const struct repair *r, uint64_t at, void *to, size_t len, struc
     return SH_OK;
 }
 
+/* A file that is not ours to change was opened for reading. */
+static int check_writable(const struct repair *r, struct sh_err *err)
+{
+    if ((fcntl(r->fd, F_GETFL) & O_ACCMODE) != O_RDONLY) return SH_OK;
+    return sh_fail(err, SH_EPERM,
+                   "%s: needs a repair, and may not be written to: allowed is a file of one's own, with one name",
+                   r->path);
+}
+
 int repair_write(const struct repair *r, uint64_t at, const void *from, size_t len, struct sh_err *err)
 {
+    const int rc = check_writable(r, err);
+    if (rc != SH_OK) return rc;
     for (size_t done = 0; done < len;) {
         const ssize_t n = pwrite(r->fd, (const char *)from + done, len - done, (off_t)(at + done));
         if (n < 0 && errno == EINTR) continue;
@@ -54,6 +66,8 @@ int repair_write(const struct repair *r, uint64_t at, const void *from, size_t l
 int repair_cut(struct repair *r, uint64_t end, struct sh_err *err)
 {
     if (end >= r->len) return SH_OK;
+    const int rc = check_writable(r, err);
+    if (rc != SH_OK) return rc;
     if (ftruncate(r->fd, (off_t)end) != 0)
         return sh_fail(err, SH_EIO, "%s: cannot be cut: %s", r->path, strerror(errno));
     r->cut_bytes += r->len - end;
@@ -231,7 +245,7 @@ int repair_file(const char *path, const struct sh_report *report, struct repaire
     const struct recorder_ops *ops = rc == SH_OK ? recorder_find(d->path, err) : NULL;
     if (rc == SH_OK && ops == NULL) rc = err->code;
     r.path = d->was_left ? d->part : d->path;
-    if (rc == SH_OK) rc = newfile_left(r.path, &r.fd, err);
+    if (rc == SH_OK) rc = d->was_left ? newfile_left(r.path, &r.fd, err) : newfile_whole(r.path, &r.fd, err);
     if (rc == SH_OK) rc = repair_open(&r, ops, err);
     d->n_kept = r.n_kept;
     d->n_scans = r.n_scans;

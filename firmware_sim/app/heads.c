@@ -166,6 +166,7 @@ static int record_some(struct heads *heads, struct heads_one *one, const struct 
     one->is_hashed = 1;
     rc = recording_run(one->offline.sh, &options, &result, err);
     recording_add(sum, &result);
+    if (rc == SH_OK && all->second != NULL) rc = all->second(all->ctx, err); /* parts may be shorter than a second */
     int again = 0;
     for (uint32_t s = last + 1; s <= all->last_station; s++)
         again |= of(heads, s) == (uint32_t)(one - heads->one);

@@ -201,7 +201,7 @@ static enum loop_source_tick next(void *self, uint64_t tick, int may_idle, int a
     if (r->playing) {
         const struct ring_tick before = r->tick;
         r->tick = (struct ring_tick){.scan = before.scan};
-        fill(r, tick, may_idle);
+        fill(r, tick, may_idle && r->end_tick == UINT64_MAX); /* --duration counts such time */
         count(r);
         r->tick.n_cast += before.n_cast;
         r->tick.n_fired += before.n_fired;

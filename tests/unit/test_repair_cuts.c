@@ -1,166 +1,35 @@
-/* Repair, in process: a small file of each format cut at every byte, damaged at every byte, of another format, and with
+/* Repair, in process: a small file of each format cut at every byte, damaged at every third, of another format, and with
  * numbers beyond all reason. What comes out holds the whole units and is whole, or it is as it was. */
-#include <sys/stat.h>
+#include "tests/unit/repair_kinds.h"
 
-#include "core/newfile.h"
-#include "drivers/protocol/pcapng.h"
-#include "drivers/record/outfile.h"
-#include "tests/unit/recorder_rig.h"
-
-/* ---- in place of libc's: thousands of small files need not reach a disk */
-
-int fsync(int fd)
-{
-    (void)fd;
-    return 0;
-}
-
-/* ---- what a killed recorder leaves */
-
-static const struct format {
-    const char *name;
-    struct recorder_options options;
-    int knows_damage; /* a wrong byte within its units is noticed */
-} formats[] = {
-    {"a.shs", {0}, 0},          {"a.pcapng", {0}, 0},
-    {"a.ply", {0}, 0},          {"b.ply", {.columns = PLY_XYZ | PLY_FLOAT}, 0},
-    {"c.ply", {.ascii = 1}, 1}, {"d.ply", {.colour = {.given = 1, .scale.mode = COLOUR_LABEL}, .scalar_names = 1}, 0},
-    {"a.las", {0}, 0},          {"b.las", {.las_minor = 2, .colour = {.given = 1, .scale.mode = COLOUR_LABEL}}, 0},
-    {"a.poses.csv", {0}, 1},
-};
-enum { N_FORMATS = sizeof formats / sizeof formats[0], N_ROWS = 12 };
-
-struct bytes {
-    uint8_t *data;
-    size_t len;
-};
-
-static struct bytes left[N_FORMATS], whole[N_FORMATS];
-static struct sh_err err;
-
-static struct bytes slurp(const char *path)
-{
-    struct stat st;
-    FILE *in = fopen(path, "rb");
-    assert_non_null(in);
-    assert_int_equal(fstat(fileno(in), &st), 0);
-    struct bytes b = {calloc(1, (size_t)st.st_size + 1), (size_t)st.st_size};
-    assert_int_equal(fread(b.data, 1, b.len, in), b.len);
-    fclose(in);
-    return b;
-}
-
-static void put_scan(uint32_t scan)
-{
-    static const struct rig_point p[] = {
-        {100, 200, 300, -1000, 1, 1, 1}, {-100, 5, 6, -2000, 2, 1, 2}, {-90, 6, 7, 30, 2, 2, 2}};
-    struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, scan);
-    memset(a.anchor, 0, sizeof a.anchor);
-    rig_descriptor(1, scan);
-    rig_anchor(&a);
-    for (uint32_t i = 0; i < N_ROWS / 6; i++)
-        rig_points(i, 2 * i, 2 * i, p, 3);
-}
-
-/* Two scans, 12 points. */
-static void put_stream(void)
-{
-    rig_begin();
-    put_scan(1);
-    put_scan(2);
-    fclose(rig_stream);
-    rig_stream = NULL;
-}
-
-/* What is on the disk when all frames have come, and nothing else. */
-static struct bytes leave(const struct format *f)
-{
-    struct scanhead *sh;
-    struct scanhead_frame frame;
-    struct recorder *rec;
-    char path[160];
-    snprintf(path, sizeof path, "%s", rig_path(f->name));
-    assert_int_equal(scanhead_open(rig_shs, &sh, NULL, 0), 0);
-    assert_int_equal(recorder_open(recorder_find(path, &err), path, &f->options, &rec, &err), 0);
-    while (scanhead_next(sh, &frame, -1) == 0)
-        if (recorder_frame(rec, sh, &frame, &err) != 0) fail_msg("%s", err.text);
-    assert_int_equal(recorder_save(rec, &err), 0);
-    snprintf(path + strlen(path), 8, ".part");
-    struct bytes b = slurp(path);
-    assert_int_equal(recorder_close(rec, 0, &err), 0);
-    scanhead_close(sh);
-    return b;
-}
-
-static int set_up(void **state)
-{
-    if (rig_set_up(state) != 0) return -1;
-    put_stream();
-    for (int i = 0; i < N_FORMATS; i++) {
-        left[i] = leave(&formats[i]);
-        const char *path = rig_path(formats[i].name);
-        assert_int_equal(rig_record(path, formats[i].options, RIG_KEEP, &err), 0);
-        whole[i] = slurp(path);
-        unlink(path);
-    }
-    return 0;
-}
-
-static int tear_down(void **state)
-{
-    for (int i = 0; i < N_FORMATS; i++) {
-        free(left[i].data);
-        free(whole[i].data);
-    }
-    return rig_tear_down(state);
-}
-
-/* ---- one repair */
-
-static char path[160], part[168];
-
-static void name(const char *file)
-{
-    snprintf(path, sizeof path, "%s", rig_path(file));
-    snprintf(part, sizeof part, "%s.part", path);
-}
-
-static void write_file(const char *to, const void *data, size_t len)
-{
-    FILE *out = fopen(to, "wb");
-    assert_non_null(out);
-    assert_int_equal(fwrite(data, 1, len, out), len);
-    fclose(out);
-}
-
-/* Repairs what is in part; 1: it is whole now, as *file says, and the bytes are in *got. 0: it was refused, and stays. */
+/* Repairs what is in repair_part; 1: it is whole now, as *file says, and the bytes are in *got. 0: it was refused, and stays. */
 static int repair(const void *data, size_t len, struct repaired *file, struct bytes *got)
 {
-    write_file(part, data, len);
-    const int rc = repair_file(path, NULL, file, &err);
-    *got = slurp(rc == 0 ? path : part);
+    repair_write_file(repair_part, data, len);
+    const int rc = repair_file(repair_path, NULL, file, &repair_err);
+    *got = repair_slurp(rc == 0 ? repair_path : repair_part);
     if (rc != 0) {
         assert_int_equal(rc, SH_EFORMAT);
-        assert_non_null(strstr(err.text, part));
-        assert_int_equal(access(path, F_OK), -1);
+        assert_non_null(strstr(repair_err.text, repair_part));
+        assert_int_equal(access(repair_path, F_OK), -1);
         assert_int_equal(got->len, len);
         assert_memory_equal(got->data, data, len);
-        unlink(part);
+        unlink(repair_part);
         return 0;
     }
     assert_true(file->was_left && !file->is_part);
-    assert_int_equal(access(part, F_OK), -1);
+    assert_int_equal(access(repair_part, F_OK), -1);
     repair_free(file);
     struct repaired again;
-    if (repair_file(path, NULL, &again, &err) != 0) fail_msg("%s", err.text);
+    if (repair_file(repair_path, NULL, &again, &repair_err) != 0) fail_msg("%s", repair_err.text);
     assert_true(again.was_whole && !again.was_left && again.cut_bytes == 0);
     assert_int_equal(again.n_kept, file->n_kept);
     repair_free(&again);
-    struct bytes twice = slurp(path);
+    struct bytes twice = repair_slurp(repair_path);
     assert_int_equal(twice.len, got->len);
     assert_memory_equal(twice.data, got->data, got->len);
     free(twice.data);
-    unlink(path);
+    unlink(repair_path);
     return 1;
 }
 
@@ -183,29 +52,44 @@ static size_t end_of(const struct bytes *b)
 
 /* ---- tests */
 
+/* All points are there: but for what says that the end is missing, the header is that of the whole file. */
+static void expect_header(const struct bytes *got, const struct bytes *all)
+{
+    const size_t begin = begin_of(all);
+    if (memcmp(got->data, "LASF", 4) == 0) {
+        assert_memory_equal(got->data, all->data, 58);
+        assert_memory_equal(got->data + 90, all->data + 90, begin - 90);
+        assert_string_equal((char *)got->data + 58, "scanhead, its end is missing");
+    } else if (memcmp(got->data, "ply\n", 4) == 0) {
+        assert_non_null(memmem(got->data, begin, "\nelement vertex 12\n", 19));
+        assert_non_null(memmem(got->data, begin, "\ncomment incomplete", 19));
+    }
+}
+
 /* What is cut at a byte has as many units as are whole before it, and these are the first of the whole file. */
 static void test_cut(void **state)
 {
     (void)state;
-    for (int i = 0; i < N_FORMATS; i++) {
+    for (int i = 0; i < REPAIR_FORMATS; i++) {
         uint64_t before = 0;
-        name(formats[i].name);
-        for (size_t n = 1; n <= left[i].len; n++) {
+        repair_name(repair_formats[i].name);
+        for (size_t n = 1; n <= repair_left[i].len; n++) {
             struct repaired file;
             struct bytes got;
-            const int is_whole = repair(left[i].data, n, &file, &got);
-            if (!is_whole && before > 0) fail_msg("%s, %zu bytes: %s", path, n, err.text);
-            const size_t begin = begin_of(&whole[i]), end = end_of(&got);
+            const int is_whole = repair(repair_left[i].data, n, &file, &got);
+            if (!is_whole && before > 0) fail_msg("%s, %zu bytes: %s", repair_path, n, repair_err.text);
+            const size_t begin = begin_of(&repair_whole[i]), end = end_of(&got);
             if (is_whole) {
                 assert_true(file.n_kept == before || file.n_kept == before + 1 || before == 0);
                 assert_int_equal(end + file.cut_bytes, n);
-                assert_true(end >= begin && end <= whole[i].len);
-                assert_memory_equal(got.data + begin, whole[i].data + begin, end - begin);
+                assert_true(end >= begin && end <= repair_whole[i].len);
+                assert_memory_equal(got.data + begin, repair_whole[i].data + begin, end - begin);
                 before = file.n_kept;
+                if (n == repair_left[i].len) expect_header(&got, &repair_whole[i]);
             }
             free(got.data);
         }
-        if (strstr(path, ".ply") || strstr(path, ".las")) assert_int_equal(before, N_ROWS);
+        if (strstr(repair_path, ".ply") || strstr(repair_path, ".las")) assert_int_equal(before, REPAIR_POINTS);
         assert_int_equal(before > 1, 1);
     }
 }
@@ -214,44 +98,44 @@ static void test_cut(void **state)
 static void test_cut_whole(void **state)
 {
     (void)state;
-    for (int i = 0; i < N_FORMATS; i++) {
+    for (int i = 0; i < REPAIR_FORMATS; i++) {
         struct repaired file;
         struct bytes got;
-        name(formats[i].name);
-        write_file(path, whole[i].data, whole[i].len);
-        assert_int_equal(repair_file(path, NULL, &file, &err), 0);
+        repair_name(repair_formats[i].name);
+        repair_write_file(repair_path, repair_whole[i].data, repair_whole[i].len);
+        assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), 0);
         assert_true(file.was_whole && !file.was_left && file.n_kept > 0);
         repair_free(&file);
-        got = slurp(path);
-        assert_int_equal(got.len, whole[i].len);
-        assert_memory_equal(got.data, whole[i].data, got.len);
+        got = repair_slurp(repair_path);
+        assert_int_equal(got.len, repair_whole[i].len);
+        assert_memory_equal(got.data, repair_whole[i].data, got.len);
         free(got.data);
-        assert_int_equal(truncate(path, (off_t)whole[i].len - 1), 0);
-        assert_int_equal(repair_file(path, NULL, &file, &err), 0);
+        assert_int_equal(truncate(repair_path, (off_t)repair_whole[i].len - 1), 0);
+        assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), 0);
         assert_true(!file.was_whole && file.cut_bytes > 0);
         repair_free(&file);
-        assert_int_equal(repair_file(path, NULL, &file, &err), 0);
+        assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), 0);
         assert_true(file.was_whole);
         repair_free(&file);
-        unlink(path);
+        unlink(repair_path);
     }
 }
 
-/* Another byte anywhere: nothing crashes, and what is not refused is whole. Where damage can be seen, it is refused. */
+/* Another byte here and there: nothing crashes, and what is not refused is whole. Where damage can be seen, it is refused. */
 static void test_damaged(void **state)
 {
     (void)state;
-    for (int i = 0; i < N_FORMATS; i++) {
-        name(formats[i].name);
-        const size_t begin = begin_of(&left[i]);
-        for (size_t n = 0; n < left[i].len; n++) {
+    for (int i = 0; i < REPAIR_FORMATS; i++) {
+        repair_name(repair_formats[i].name);
+        const size_t begin = begin_of(&repair_left[i]);
+        for (size_t n = (size_t)i % 3; n < repair_left[i].len; n += 3) {
             struct repaired file;
             struct bytes got;
-            left[i].data[n] ^= 0x80;
-            const int is_whole = repair(left[i].data, left[i].len, &file, &got);
-            left[i].data[n] ^= 0x80;
-            if (formats[i].knows_damage && is_whole && n >= begin && file.cut_bytes == 0)
-                fail_msg("%s: byte %zu", path, n);
+            repair_left[i].data[n] ^= 0x80;
+            const int is_whole = repair(repair_left[i].data, repair_left[i].len, &file, &got);
+            repair_left[i].data[n] ^= 0x80;
+            if (repair_formats[i].knows_damage && is_whole && n >= begin && file.cut_bytes == 0)
+                fail_msg("%s: byte %zu", repair_path, n);
             free(got.data);
         }
     }
@@ -261,12 +145,12 @@ static void test_damaged(void **state)
 static void test_zeros(void **state)
 {
     (void)state;
-    for (int i = 0; i < N_FORMATS; i++) {
+    for (int i = 0; i < REPAIR_FORMATS; i++) {
         struct repaired file;
-        struct bytes got, longer = {calloc(1, left[i].len + 300000), left[i].len + 300000};
-        memcpy(longer.data, left[i].data, left[i].len);
-        name(formats[i].name);
-        if (!repair(longer.data, longer.len, &file, &got)) fail_msg("%s", err.text);
+        struct bytes got, longer = {calloc(1, repair_left[i].len + 300000), repair_left[i].len + 300000};
+        memcpy(longer.data, repair_left[i].data, repair_left[i].len);
+        repair_name(repair_formats[i].name);
+        if (!repair(longer.data, longer.len, &file, &got)) fail_msg("%s", repair_err.text);
         assert_int_equal(file.cut_bytes, 300000);
         assert_true(file.n_kept > 1);
         free(got.data);
@@ -278,15 +162,17 @@ static void test_zeros(void **state)
 static void test_other_format(void **state)
 {
     (void)state;
-    for (int i = 0; i < N_FORMATS; i++)
-        for (int k = 0; k < N_FORMATS; k++) {
+    for (int i = 0; i < REPAIR_FORMATS; i++)
+        for (int k = 0; k < REPAIR_FORMATS; k++) {
             struct repaired file;
             struct bytes got;
-            if (strcmp(strchr(formats[i].name, '.'), strchr(formats[k].name, '.')) == 0) continue;
-            name(formats[i].name);
+            if (strcmp(strchr(repair_formats[i].name, '.'), strchr(repair_formats[k].name, '.')) == 0) continue;
+            repair_name(repair_formats[i].name);
             /* a capture holds whole frames, which a stream's reader finds */
-            const int finds = strcmp(formats[i].name, "a.shs") == 0 && strcmp(formats[k].name, "a.pcapng") == 0;
-            if (!finds && repair(left[k].data, left[k].len, &file, &got)) fail_msg("%s as %s", formats[k].name, path);
+            const int finds =
+                strcmp(repair_formats[i].name, "a.shs") == 0 && strcmp(repair_formats[k].name, "a.pcapng") == 0;
+            if (!finds && repair(repair_left[k].data, repair_left[k].len, &file, &got))
+                fail_msg("%s as %s", repair_formats[k].name, repair_path);
             if (!finds) free(got.data);
         }
 }
@@ -295,8 +181,8 @@ static void expect_refused(const char *file_name, const void *data, size_t len)
 {
     struct repaired file;
     struct bytes got;
-    name(file_name);
-    if (repair(data, len, &file, &got)) fail_msg("%s of %zu bytes was taken", path, len);
+    repair_name(file_name);
+    if (repair(data, len, &file, &got)) fail_msg("%s of %zu bytes was taken", repair_path, len);
     free(got.data);
 }
 
@@ -314,10 +200,17 @@ static void test_huge_numbers(void **state)
     for (size_t i = 1; i < sizeof ply / sizeof ply[0]; i++)
         expect_refused("h.ply", ply[i], strlen(ply[i]));
     struct repaired file;
-    struct bytes got, las = {malloc(left[6].len), left[6].len};
-    name("h.ply");
+    struct bytes got, las = {malloc(repair_left[REPAIR_LAS].len), repair_left[REPAIR_LAS].len};
+    repair_name("h.ply");
     assert_int_equal(repair(ply[0], strlen(ply[0]), &file, &got), 1);
     assert_int_equal(file.n_kept, 1);
+    free(got.data);
+    /* a digit less: a blank more */
+    static const char digit[] =
+        "ply\nformat ascii 1.0\ncomment x\nelement vertex 10\nproperty double x\nend_header\n1\n2\n";
+    assert_int_equal(repair(digit, sizeof digit - 1, &file, &got), 1);
+    assert_int_equal(file.n_kept, 2);
+    assert_memory_equal(got.data, "ply\nformat ascii 1.0\ncomment x \nelement vertex 2\n", 49);
     free(got.data);
     static const struct {
         size_t at;
@@ -332,7 +225,7 @@ static void test_huge_numbers(void **state)
                {24, {2}, 1},
                {58, {'x'}, 1}};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
-        memcpy(las.data, left[6].data, las.len);
+        memcpy(las.data, repair_left[REPAIR_LAS].data, las.len);
         memcpy(las.data + bad[i].at, bad[i].value, (size_t)bad[i].len);
         expect_refused("h.las", las.data, las.len);
     }
@@ -351,102 +244,13 @@ static void test_damage_within_text(void **state)
     (void)state;
     struct repaired file;
     struct bytes got;
-    const size_t begin = begin_of(&left[4]);
-    name(formats[4].name);
-    left[4].data[begin + 3] = 'x';
-    assert_int_equal(repair(left[4].data, left[4].len, &file, &got), 0);
-    assert_non_null(strstr(err.text, "is damaged at byte"));
+    const size_t begin = begin_of(&repair_left[REPAIR_ASCII]);
+    repair_name(repair_formats[REPAIR_ASCII].name);
+    repair_left[REPAIR_ASCII].data[begin + 3] = 'x';
+    assert_int_equal(repair(repair_left[REPAIR_ASCII].data, repair_left[REPAIR_ASCII].len, &file, &got), 0);
+    assert_non_null(strstr(repair_err.text, "is damaged at byte"));
     free(got.data);
-    left[4].data[begin + 3] = whole[4].data[begin + 3];
-}
-
-/* Which file is meant, and that none is replaced. */
-static void test_names(void **state)
-{
-    (void)state;
-    struct repaired file;
-    struct outfile writer;
-    struct bytes got;
-    name("a.las");
-    assert_int_equal(repair_file(path, NULL, &file, &err), SH_EINPUT);
-    assert_int_equal(repair_file("/nonexistent/a.xyz", NULL, &file, &err), SH_EINPUT);
-    write_file(path, "old", 3);
-    write_file(part, left[6].data, left[6].len - 1);
-    assert_int_equal(repair_file(path, NULL, &file, &err), SH_ESTATE);
-    assert_non_null(strstr(err.text, part));
-    assert_int_equal(repair_file(part, NULL, &file, &err), 0);
-    assert_true(file.is_part && file.was_left && file.n_kept == N_ROWS - 1);
-    repair_free(&file);
-    got = slurp(path);
-    assert_string_equal((char *)got.data, "old");
-    free(got.data);
-    assert_int_equal(unlink(path), 0);
-    assert_int_equal(repair_file(part, NULL, &file, &err), 0); /* now it gets its name */
-    assert_true(!file.is_part && file.was_left && file.was_whole);
-    repair_free(&file);
-    assert_int_equal(access(part, F_OK), -1);
-    assert_int_equal(unlink(path), 0);
-    assert_int_equal(symlink("/dev/null", part), 0);
-    assert_int_equal(repair_file(path, NULL, &file, &err), SH_EINPUT);
-    assert_int_equal(unlink(part), 0);
-    /* one that is still being written */
-    assert_int_equal(outfile_open(&writer, path, &err), 0);
-    assert_int_equal(outfile_write(&writer, left[6].data, left[6].len, &err), 0);
-    assert_int_equal(outfile_flush(&writer, &err), 0);
-    assert_int_equal(newfile_left_len(part), 0);
-    assert_int_equal(repair_file(path, NULL, &file, &err), SH_ESTATE);
-    assert_non_null(strstr(err.text, "still being written"));
-    assert_int_equal(outfile_close(&writer, OUTFILE_LEAVE, &err), 0);
-    assert_int_equal(newfile_left_len(part), left[6].len);
-    assert_int_equal(unlink(part), 0);
-}
-
-static int stop(void *ctx)
-{
-    (void)ctx;
-    return 1;
-}
-
-/* Who gives it up finds it as it was. */
-static void test_stopped(void **state)
-{
-    (void)state;
-    const struct sh_report report = {.stop = stop};
-    for (int i = 0; i < N_FORMATS; i++) {
-        struct repaired file;
-        name(formats[i].name);
-        write_file(part, left[i].data, left[i].len - 1);
-        assert_int_equal(repair_file(path, &report, &file, &err), SH_ESTOPPED);
-        struct bytes got = slurp(part);
-        assert_int_equal(got.len, left[i].len - 1);
-        assert_memory_equal(got.data, left[i].data, got.len);
-        free(got.data);
-        unlink(part);
-    }
-}
-
-/* Nothing waits for longer than two calls, and a file that is written anyway is left alone. */
-static void test_save(void **state)
-{
-    (void)state;
-    struct outfile file;
-    struct stat st;
-    name("a.shs");
-    assert_int_equal(outfile_open(&file, path, &err), 0);
-    assert_int_equal(outfile_write(&file, "12345", 5, &err), 0);
-    assert_int_equal(outfile_save(&file, &err), 0);
-    assert_true(fstat(file.fd, &st) == 0 && st.st_size == 5);
-    assert_int_equal(outfile_write(&file, "67", 2, &err), 0);
-    assert_int_equal(outfile_flush(&file, &err), 0);
-    assert_int_equal(outfile_write(&file, "8", 1, &err), 0);
-    assert_int_equal(outfile_save(&file, &err), 0); /* 2 bytes went since the last call */
-    assert_true(fstat(file.fd, &st) == 0 && st.st_size == 7);
-    assert_int_equal(outfile_save(&file, &err), 0);
-    assert_true(fstat(file.fd, &st) == 0 && st.st_size == 8);
-    assert_int_equal(outfile_close(&file, OUTFILE_DROP, &err), 0);
-    assert_int_equal(outfile_open(&file, path, &err), 0);
-    assert_int_equal(outfile_close(&file, OUTFILE_LEAVE, &err), 0); /* an empty one is of no use */
-    assert_int_equal(access(part, F_OK), -1);
+    repair_left[REPAIR_ASCII].data[begin + 3] = repair_whole[REPAIR_ASCII].data[begin + 3];
 }
 
 int main(void)
@@ -459,9 +263,6 @@ int main(void)
         cmocka_unit_test(test_other_format),
         cmocka_unit_test(test_huge_numbers),
         cmocka_unit_test(test_damage_within_text),
-        cmocka_unit_test(test_names),
-        cmocka_unit_test(test_stopped),
-        cmocka_unit_test(test_save),
     };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
+    return cmocka_run_group_tests(tests, repair_set_up, repair_tear_down);
 }

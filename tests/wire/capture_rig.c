@@ -82,7 +82,7 @@ void capture_transfer(struct capture *c, uint32_t interface, uint8_t device, uin
     packet[10] = endpoint;
     packet[11] = device;
     le_put16(packet + 12, 1);
-    packet[14] = '-'; /* no set-up packet; the data is there */
+    packet[14] = '-';                                            /* no set-up packet; the data is there */
     le_put32(packet + 28, endpoint & 0x80 ? 0 : (uint32_t)-115); /* EINPROGRESS */
     le_put32(packet + 32, (uint32_t)len);
     le_put32(packet + 36, (uint32_t)len);

@@ -70,6 +70,7 @@ void dissect(const char *file, int passes, const char *const *fields)
         argv[n++] = *fields;
     }
     /* Whatever is installed or preferred here: neither another copy of the script nor a port. */
+    setenv("HOME", wire->dir, 1);
     setenv("WIRESHARK_CONFIG_DIR", wire->dir, 1);
     run_well(argv);
     text = wire_read(wire_path(wire, "tool.out"), NULL);

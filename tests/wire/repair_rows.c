@@ -324,8 +324,16 @@ const char *repair_row_beside(const struct repair_row *row)
             "-SAVE_CLOUDS >/dev/null && cat *.asc && rm *.asc"                                                \
     }
 
+/* npm's; count and bounds come first. 127: it is not installed. */
+#define LOADERS_GL                                                                                                                \
+    {                                                                                                                             \
+        "sh", "-c",                                                                                                               \
+            "[ -e \"$READERS/installed\" ] || exit 127; node --experimental-wasm-modules \"$READERS/las.mjs\" \"$F\" las.xyz && " \
+            "tail -n +3 las.xyz && rm las.xyz"                                                                                    \
+    }
+
 /* READERS: an absolute path, which the harness sets. */
-#define WEB_E57 "node --experimental-wasm-modules \"$READERS\"/e57.mjs \"$F\" e57.xyz && cat e57.xyz && rm e57.xyz"
+#define WEB_E57 "[ -e \"$READERS/installed\" ] || exit 127; node --experimental-wasm-modules \"$READERS\"/e57.mjs \"$F\" e57.xyz && cat e57.xyz && rm e57.xyz"
 
 const struct repair_row repair_rows[] = {
     {"stream", ".shs", {NULL}, {NULL}, check_shs, is_no_shs},
@@ -334,9 +342,9 @@ const struct repair_row repair_rows[] = {
     {"few", ".ply", {"--ply-columns", "xyz"}, CLOUDCOMPARE, check_ply, is_no_ply},
     {"colours", ".ply", {"--colour", "label", "--ply-names", "cloudcompare"}, CLOUDCOMPARE, check_ply, is_no_ply},
     {"text", ".ply", {"--ascii", "--empty-shots"}, {NULL}, check_ply_text, is_no_ply},
-    {"points", ".las", {NULL}, CLOUDCOMPARE, check_las, is_no_las},
-    {"colours", ".las", {"--colour", "label"}, {NULL}, check_las, is_no_las},
-    {"old", ".las", {"--las-version", "1.2"}, CLOUDCOMPARE, check_las, is_no_las},
+    {"points", ".las", {NULL}, LOADERS_GL, check_las, is_no_las},
+    {"colours", ".las", {"--colour", "label"}, LOADERS_GL, check_las, is_no_las},
+    {"old", ".las", {"--las-version", "1.2"}, LOADERS_GL, check_las, is_no_las},
     {"stations", ".poses.csv", {NULL}, {NULL}, check_poses, is_no_poses},
     {"scans", ".e57", {NULL}, {"sh", "-c", WEB_E57}, check_e57, is_no_e57},
     {"shots", ".e57", {"--empty-shots", "--colour", "label"}, {NULL}, check_e57, is_no_e57},

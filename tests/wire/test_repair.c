@@ -2,6 +2,7 @@
  * says that its end is missing. The recorder reads a stream through a pipe, so that a moment is a byte of the stream, and a
  * little after it. What was left is known from FILE.part itself. REPAIR_N is how many moments each format has; from 20 on
  * programs of others read some of them, too (make repair). */
+#include <limits.h>
 #include <sched.h>
 #include <sys/inotify.h>
 #include <sys/mount.h>
@@ -188,14 +189,20 @@ static void check_left(const struct repair_row *row, const char *path, const str
     free(repaired.data);
 }
 
-static void remove_all(const struct repair_row *row, const char *path)
+static void remove_both(const char *path)
 {
-    char part[160], beside[160];
+    char part[160];
     snprintf(part, sizeof part, "%s.part", path);
-    path_beside(row, path, beside);
-    if (repair_row_beside(row) != NULL) unlink(beside);
     unlink(path);
     unlink(part);
+}
+
+static void remove_all(const struct repair_row *row, const char *path)
+{
+    char beside[160];
+    path_beside(row, path, beside);
+    if (repair_row_beside(row) != NULL) unlink(beside);
+    remove_both(path);
 }
 
 /* As many lines as the file has units. */
@@ -287,7 +294,10 @@ static void fill(const struct repair_row *row, const struct bytes *whole, struct
     assert_int_equal(record(row, path, &m), 1);
     const char *says = is_real ? "cannot write: No space left on device\n" : "cannot write: File too large\n";
     const char *at = strstr(said, says);
-    if (at == NULL || strstr(at + 1, says) != NULL || strstr(said, "scanhead record --repair ") == NULL)
+    char part[176];
+    snprintf(part, sizeof part, "%s.part", path);
+    const int is_left = access(part, F_OK) == 0; /* on the smallest disks nothing is */
+    if (at == NULL || strstr(at + 1, says) != NULL || (strstr(said, "scanhead record --repair ") != NULL) != is_left)
         fail_msg("%s: %s", path, said);
     if (is_real && repair_row_beside(row) != NULL) assert_int_equal(mount("none", disk, NULL, MS_REMOUNT, "size=16m"), 0);
     check_left(row, path, whole, tally);
@@ -337,7 +347,7 @@ static void test_slow_head(void **state)
     static const char *const name[N] = {"slow.shs", "slow.pcapng", "slow.ply", "slow.las"};
     static char path[N][128], out[2048];
     const char *paths[N];
-    const struct repair_row row = {.option = {"-o", path[1], "-o", path[2], "-o", path[3]}};
+    const struct repair_row row = {.ending = "", .option = {"-o", path[1], "-o", path[2], "-o", path[3]}};
     (void)state;
     for (int i = 0; i < N; i++) {
         snprintf(path[i], sizeof path[i], "%s", wire_path(wire, name[i]));
@@ -363,7 +373,7 @@ static void test_slow_head(void **state)
     for (int i = 0; i < N; i++) {
         assert_int_equal(repair(path[i], out), 0);
         if (strstr(out, ": kept ") == NULL || strstr(out, ": kept 0 ") != NULL) fail_msg("%s", out);
-        remove_both(path[i]);
+        remove_all(&row, path[i]);
     }
 }
 

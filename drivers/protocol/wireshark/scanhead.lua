@@ -8,6 +8,10 @@
 -- What depends on earlier packets (sequence, scales, anchor, replies) is worked out when a packet is seen for the first
 -- time, and kept by packet: the same packet always shows the same. Written for Lua 5.2 and later.
 
+-- It may be installed, and named on the command line, too. An unknown name is nil here, or an error.
+local is_asked, known = pcall(Dissector.get, "scanhead")
+if is_asked and known then return end
+
 local scanhead = Proto("scanhead", "Scan head")
 local HEADER_LEN, MOST_PAYLOAD, MOST_REPLY, MOST_COMMAND, SYNC = 28, 65536, 512, 256, 0xd5
 local TYPES = {"Descriptor", "Anchor", "Points", "Line end", "Telemetry", "Event", "Surfaces", "Poses", "Attributes",
@@ -771,7 +775,7 @@ local function put_points(tree, tvb, bytes, at, _, m)
     if not is_shown then return end
     item:set_text(string.format("Point %d: pulse %.0f, echo %d of %d: %s%s%s", i, pulse, echo, count, words,
                                 refl ~= -32768 and string.format(", %.2f dB", refl / 100) or "",
-                                label ~= 0xffff and ", label " .. label or ""))
+                                label ~= 0xffff and string.format(", label %d", label) or ""))
   end)
 end
 
@@ -1031,7 +1035,7 @@ Search.__index = Search
 local function new_search(tvb, pinfo, tree, conn, can_wait)
   local flow = conn.down
   local self = setmetatable({tvb = tvb, pinfo = pinfo, tree = tree, conn = conn, flow = flow, can_wait = can_wait, at = 0,
-                             len = tvb:len(), bytes = tvb:raw(0, tvb:len()), items = {}, said = 0}, Search)
+                             len = tvb:len(), bytes = tvb:raw(0, tvb:len()), items = {}, said = 0, reach = 0}, Search)
   local starts, key = memo_of(pinfo).starts, self.bytes:sub(1, 64)
   if not pinfo.visited then starts[key] = starts[key] or {in_step = flow.in_step, started = flow.started} end
   local start = starts[key] or {in_step = true, started = true}
@@ -1065,8 +1069,10 @@ function Search:end_garbage()
   if from and from < self.at then self:add(self.show_garbage, from, self.at, self.conn.is_stream and not self.started) end
 end
 
-function Search:skip(to)
+-- reach: up to where it took bytes to see that.
+function Search:skip(to, reach)
   if not self.garbage then self.garbage = self.at end
+  self.reach = math.max(self.reach, reach or to)
   self.at, self.in_step = to, false
 end
 
@@ -1105,6 +1111,7 @@ end
 function Search:take_broken(h, is_cut)
   local last = math.min(self.at + HEADER_LEN + h.length, self.len)
   local to = next_header(self.bytes, self.at + 1, last) or last
+  self.reach = math.max(self.reach, last)
   self:take(to - self.at, self.show_broken, h, to, is_cut)
   self.in_step = false
 end
@@ -1117,7 +1124,7 @@ function Search:look_frame()
     return self:skip(next_header(self.bytes, self.at + 1, self.len) or self.len)
   end
   local h = header_at(self.bytes, self.at)
-  if not h then return self:skip(self.at + 1) end
+  if not h then return self:skip(self.at + 1, self.at + HEADER_LEN) end
   if have < HEADER_LEN + h.length then
     if self.can_wait then return true, HEADER_LEN + h.length - have end
     return self:take_broken(h, true)
@@ -1151,14 +1158,15 @@ end
 function Search:look_text()
   local n = #self.bytes:match("^[ -~]*", self.at + 1)
   local ending = self.bytes:sub(self.at + n + 1, self.at + n + 2)
-  if n > MOST_REPLY - 2 or (ending ~= "\r\n" and ending ~= "\r" and ending ~= "") then return self:skip(self.at + n) end
+  if n > MOST_REPLY - 2 or (ending ~= "\r\n" and ending ~= "\r" and ending ~= "") then return self:skip(self.at + n, self.at + n + 2) end
   if ending == "\r\n" then return self:take(n + 2, self.show_reply, n) end
   if self.can_wait then return true end
   self:skip(self.len)
 end
 
--- Gives where it waits, for how many bytes more (nil: not known), and whether that is within the bytes that the search
--- before this one has waited with; or nothing where all is used.
+-- Gives where it waits, for how many bytes more (nil: not known), and whether TCP must not join them: what stands before
+-- that place was found with bytes from beyond it, or the place is within the bytes that the last search has waited with.
+-- Or nothing, where all is used.
 function Search:run()
   local waits, more
   while self.at < self.len and not waits do
@@ -1173,7 +1181,7 @@ function Search:run()
   end
   self:end_garbage()
   for _, item in ipairs(self.items) do item[1](self, item[2], item[3], item[4], item[5]) end
-  local flow, is_old = self.flow, self.at > 0 and self.at <= self.flow.waiting
+  local flow, is_old = self.flow, self.at > 0 and (self.at <= self.flow.waiting or self.at < self.reach)
   if not self.pinfo.visited then
     flow.in_step, flow.started, flow.waiting = self.in_step, self.started, waits and self.len - self.at or 0
   end
@@ -1232,9 +1240,8 @@ local function begin_packet(pinfo)
   pinfo.cols.info:clear()
 end
 
--- Frames that go on in the next packet are joined here, unless `ask` gets TCP to do it: ask(at, more). TCP would give
--- again what was taken already, where the place that is waited at lies within what it has joined before. There, too,
--- it is done here.
+-- Frames that go on in the next packet are joined here, unless `ask` gets TCP to do it: ask(at, more). At some places
+-- TCP would give again what was taken already, or cut it otherwise at the next look. There, too, it is done here.
 local function dissect_joined(tvb, pinfo, tree, conn, side, run, ask)
   local key, packet, first_time = side .. tvb:offset(), memo_of(pinfo).joined, not pinfo.visited
   local kept = packet[key]
@@ -1367,12 +1374,18 @@ DissectorTable.get("ws.protocol"):add("scanhead-native-1", web)
 local USER0 = wtap and wtap.USER0 or wtap_encaps and wtap_encaps.USER0 or 45
 
 local port
+local others = DissectorTable.get("wtap_encap"):get_dissector(USER0) -- what Wireshark does with it by itself
 local function register()
   local tcp, encapsulations = DissectorTable.get("tcp.port"), DissectorTable.get("wtap_encap")
   if port then tcp:remove(port, scanhead) end
   port = scanhead.prefs.port
   tcp:add(port, scanhead)
-  if scanhead.prefs.user0 then encapsulations:add(USER0, scanhead) else encapsulations:remove(USER0, scanhead) end
+  if scanhead.prefs.user0 then
+    encapsulations:add(USER0, scanhead)
+  else
+    encapsulations:remove(USER0, scanhead)
+    if others then encapsulations:add(USER0, others) end
+  end
 end
 register()
 scanhead.prefs_changed = register

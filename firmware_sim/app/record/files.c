@@ -1,6 +1,6 @@
 #include "firmware_sim/app/record/files.h"
 
-#include <glob.h>
+#include <dirent.h>
 #include <limits.h>
 #include <math.h>
 #include <stdio.h>
@@ -190,26 +190,34 @@ static int check_part(const char *part, const char *path, struct sh_err *err)
         part, len, path);
 }
 
-/* What is left of the file, or of those of single scans: a later one would stop the recording at its scan. */
+/* What is left of the files of single scans: a later one would stop the recording at its scan. */
+static int check_parts_of_scans(const struct record_file *file, struct sh_err *err)
+{
+    const char *slash = strrchr(file->path, '/');
+    const int folder = slash != NULL ? (int)(slash - file->path) + 1 : 0;
+    char *name = folder > 0 ? strndup(file->path, (size_t)folder) : strdup(".");
+    DIR *dir = name != NULL ? opendir(name) : NULL;
+    int rc = SH_OK;
+    free(name);
+    for (const struct dirent *entry; dir != NULL && rc == SH_OK && (entry = readdir(dir)) != NULL;) {
+        const int n = (int)strlen(entry->d_name) - 5; /* without ".part" */
+        char path[PATH_MAX], part[PATH_MAX + 8];
+        if (n <= 0 || strcmp(entry->d_name + n, ".part") != 0) continue;
+        snprintf(path, sizeof path, "%.*s%.*s", folder, file->path, n, entry->d_name);
+        snprintf(part, sizeof part, "%s.part", path);
+        if (is_name_of_scan(file, path)) rc = check_part(part, path, err);
+    }
+    if (dir != NULL) closedir(dir); /* without it, the file can't be opened either */
+    return rc;
+}
+
 static int check_left(const struct record_files *files, const struct record_file *file, struct sh_err *err)
 {
-    char *pattern;
-    glob_t found;
-    const int stem = (int)(strlen(file->path) - strlen(file->ops->ending));
+    char part[PATH_MAX + 8];
     if (files->takes_over || file->ops->repair == NULL) return SH_OK;
-    if (asprintf(&pattern, files->split ? "%.*s-*%s.part" : "%.*s%s.part", stem, file->path, file->path + stem) < 0)
-        return sh_fail(err, SH_ENOMEM, "%s: no memory for its name", file->path);
-    int rc = files->split ? SH_OK : check_part(pattern, file->path, err);
-    if (files->split && glob(pattern, 0, NULL, &found) == 0) {
-        for (size_t i = 0; i < found.gl_pathc && rc == SH_OK; i++) {
-            char *part = found.gl_pathv[i], name[PATH_MAX];
-            snprintf(name, sizeof name, "%.*s", (int)strlen(part) - 5, part);
-            if (is_name_of_scan(file, name)) rc = check_part(part, name, err);
-        }
-        globfree(&found);
-    }
-    free(pattern);
-    return rc;
+    if (files->split) return check_parts_of_scans(file, err);
+    snprintf(part, sizeof part, "%s.part", file->path);
+    return check_part(part, file->path, err);
 }
 
 int record_files_open(struct record_files *files, struct sh_err *err)

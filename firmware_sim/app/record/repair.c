@@ -27,8 +27,8 @@ static void say(const struct repaired *f)
         fprintf(stderr, "scanhead: %s: whole: %" PRIu64 " %s%s, nothing to repair\n", f->path, f->n_kept, f->unit,
                 scans);
     else
-        fprintf(stderr, "scanhead: %s: kept %" PRIu64 " %s%s; %" PRIu64 " bytes at the end cut%s\n",
-                f->is_part ? f->part : f->path, f->n_kept, f->unit, scans, f->cut_bytes,
+        fprintf(stderr, "scanhead: %s: kept %" PRIu64 " %s%s; %" PRIu64 " byte%s at the end cut%s\n",
+                f->is_part ? f->part : f->path, f->n_kept, f->unit, scans, f->cut_bytes, f->cut_bytes == 1 ? "" : "s",
                 f->was_whole ? "; nothing else had to be changed" : "; what should follow is missing");
     if (f->is_part)
         fprintf(stderr, "scanhead: %s keeps its name, as %s is there, and is not replaced\n", f->part, f->path);

@@ -1,0 +1,142 @@
+/* Repair, in process: which file is meant, that none is replaced, that who gives up finds it as it was; and when a recorder
+ * writes what it has. */
+#include <sys/stat.h>
+
+#include "core/newfile.h"
+#include "drivers/record/outfile.h"
+#include "tests/unit/repair_kinds.h"
+
+/* Which file is meant, and that none is replaced. */
+static void test_names(void **state)
+{
+    (void)state;
+    struct repaired file;
+    struct outfile writer;
+    struct bytes got;
+    repair_name("a.las");
+    assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), SH_EINPUT);
+    assert_int_equal(repair_file("/nonexistent/a.xyz", NULL, &file, &repair_err), SH_EINPUT);
+    repair_write_file(repair_path, "old", 3);
+    repair_write_file(repair_part, repair_left[REPAIR_LAS].data, repair_left[REPAIR_LAS].len - 1);
+    assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), SH_ESTATE);
+    assert_non_null(strstr(repair_err.text, repair_part));
+    assert_int_equal(repair_file(repair_part, NULL, &file, &repair_err), 0);
+    assert_true(file.is_part && file.was_left && file.n_kept == REPAIR_POINTS - 1);
+    repair_free(&file);
+    got = repair_slurp(repair_path);
+    assert_string_equal((char *)got.data, "old");
+    free(got.data);
+    assert_int_equal(unlink(repair_path), 0);
+    assert_int_equal(repair_file(repair_part, NULL, &file, &repair_err), 0); /* now it gets its name */
+    assert_true(!file.is_part && file.was_left && file.was_whole);
+    repair_free(&file);
+    assert_int_equal(access(repair_part, F_OK), -1);
+    assert_int_equal(unlink(repair_path), 0);
+    assert_int_equal(symlink("/dev/null", repair_part), 0);
+    assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), SH_EINPUT);
+    assert_int_equal(unlink(repair_part), 0);
+    /* one that is still being written */
+    assert_int_equal(outfile_open(&writer, repair_path, &repair_err), 0);
+    assert_int_equal(outfile_write(&writer, repair_left[REPAIR_LAS].data, repair_left[REPAIR_LAS].len, &repair_err), 0);
+    assert_int_equal(outfile_flush(&writer, &repair_err), 0);
+    assert_int_equal(newfile_left_len(repair_part), 0);
+    assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), SH_ESTATE);
+    assert_non_null(strstr(repair_err.text, "still being written"));
+    assert_int_equal(outfile_close(&writer, OUTFILE_LEAVE, &repair_err), 0);
+    assert_int_equal(newfile_left_len(repair_part), repair_left[REPAIR_LAS].len);
+    assert_int_equal(unlink(repair_part), 0);
+}
+
+/* What is not to be written to is checked, and no more. */
+static void test_not_ours(void **state)
+{
+    (void)state;
+    struct repaired file;
+    char other[180];
+    repair_name("a.las");
+    snprintf(other, sizeof other, "%s.other", repair_path);
+    repair_write_file(repair_path, repair_whole[REPAIR_LAS].data, repair_whole[REPAIR_LAS].len);
+    assert_int_equal(link(repair_path, other), 0);
+    assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), 0);
+    assert_true(file.was_whole);
+    repair_free(&file);
+    assert_int_equal(truncate(repair_path, (off_t)repair_whole[REPAIR_LAS].len - 1), 0);
+    assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), SH_EPERM);
+    assert_non_null(strstr(repair_err.text, "needs a repair, and may not be written to"));
+    assert_int_equal(unlink(other), 0);
+    assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), 0);
+    assert_true(!file.was_whole && file.n_kept == REPAIR_POINTS - 1);
+    repair_free(&file);
+    assert_int_equal(unlink(repair_path), 0);
+}
+
+/* Poses of a head that moves, with a comment where some were lost. */
+static void test_moving_poses(void **state)
+{
+    static const char poses[] = "scan,t_s,x_m,y_m,z_m,qw,qx,qy,qz,frame,flags\n1,0.000000000,1,2,3,1,0,0,0,nan,0\n"
+                                "# poses are missing here\n1,0.100000000,1,2,-3e-05,1,0,0,0,nan,1\n1,0.2000";
+    (void)state;
+    struct repaired file;
+    repair_name("m.poses.csv");
+    repair_write_file(repair_part, poses, sizeof poses - 1);
+    assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), 0);
+    assert_true(file.n_kept == 2 && file.n_scans == 1 && file.cut_bytes == 8);
+    repair_free(&file);
+    assert_int_equal(unlink(repair_path), 0);
+}
+
+static int stop(void *ctx)
+{
+    (void)ctx;
+    return 1;
+}
+
+/* Who gives it up finds it as it was. */
+static void test_stopped(void **state)
+{
+    (void)state;
+    const struct sh_report report = {.stop = stop};
+    for (int i = 0; i < REPAIR_FORMATS; i++) {
+        struct repaired file;
+        repair_name(repair_formats[i].name);
+        repair_write_file(repair_part, repair_left[i].data, repair_left[i].len - 1);
+        assert_int_equal(repair_file(repair_path, &report, &file, &repair_err), SH_ESTOPPED);
+        struct bytes got = repair_slurp(repair_part);
+        assert_int_equal(got.len, repair_left[i].len - 1);
+        assert_memory_equal(got.data, repair_left[i].data, got.len);
+        free(got.data);
+        unlink(repair_part);
+    }
+}
+
+/* Nothing waits for longer than two calls, and a file that is written anyway is left alone. */
+static void test_save(void **state)
+{
+    (void)state;
+    struct outfile file;
+    struct stat st;
+    repair_name("a.shs");
+    assert_int_equal(outfile_open(&file, repair_path, &repair_err), 0);
+    assert_int_equal(outfile_write(&file, "12345", 5, &repair_err), 0);
+    assert_int_equal(outfile_save(&file, &repair_err), 0);
+    assert_true(fstat(file.fd, &st) == 0 && st.st_size == 5);
+    assert_int_equal(outfile_write(&file, "67", 2, &repair_err), 0);
+    assert_int_equal(outfile_flush(&file, &repair_err), 0);
+    assert_int_equal(outfile_write(&file, "8", 1, &repair_err), 0);
+    assert_int_equal(outfile_save(&file, &repair_err), 0); /* 2 bytes went since the last call */
+    assert_true(fstat(file.fd, &st) == 0 && st.st_size == 7);
+    assert_int_equal(outfile_save(&file, &repair_err), 0);
+    assert_true(fstat(file.fd, &st) == 0 && st.st_size == 8);
+    assert_int_equal(outfile_close(&file, OUTFILE_DROP, &repair_err), 0);
+    assert_int_equal(outfile_open(&file, repair_path, &repair_err), 0);
+    assert_int_equal(outfile_close(&file, OUTFILE_LEAVE, &repair_err), 0); /* an empty one is of no use */
+    assert_int_equal(access(repair_part, F_OK), -1);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_names), cmocka_unit_test(test_not_ours),
+                                       cmocka_unit_test(test_moving_poses), cmocka_unit_test(test_stopped),
+                                       cmocka_unit_test(test_save)};
+    return cmocka_run_group_tests(tests, repair_set_up, repair_tear_down);
+}
