@@ -39,12 +39,13 @@ int capture_add_interface(struct capture *capture, const char *name, const char 
                          err);
 }
 
-int capture_add(struct capture *capture, uint32_t interface, int64_t t_ns, const uint8_t *frame, size_t len,
-                struct sh_err *err)
+int capture_add(struct capture *capture, const struct capture_frame *f, struct sh_err *err)
 {
-    uint8_t *to = outfile_room(&capture->file, pcapng_packet_len(len), err);
+    uint8_t *to = outfile_room(&capture->file, pcapng_packet_len(f->len) + PCAPNG_LOST, err);
     if (to == NULL) return SH_EIO;
-    outfile_used(&capture->file, pcapng_put_packet(to, interface, t_ns, frame, len));
+    outfile_used(&capture->file,
+                 f->lost == 0 ? pcapng_put_packet(to, f->interface, f->t_ns, f->bytes, f->len)
+                              : pcapng_put_packet_after_loss(to, f->interface, f->t_ns, f->bytes, f->len, f->lost));
     capture->packets++;
     return SH_OK;
 }

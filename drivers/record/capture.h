@@ -17,8 +17,14 @@ struct capture {
 int capture_open(struct capture *capture, const char *path, struct sh_err *err);
 /* A place that frames come from, which readers show by its name; they count from 0. */
 int capture_add_interface(struct capture *capture, const char *name, const char *comment, struct sh_err *err);
-int capture_add(struct capture *capture, uint32_t interface, int64_t t_ns, const uint8_t *frame, size_t len,
-                struct sh_err *err);
+struct capture_frame {
+    uint32_t interface;
+    int64_t t_ns;
+    const uint8_t *bytes;
+    size_t len;
+    uint64_t lost; /* how many of its interface the system threw away since the one before */
+};
+int capture_add(struct capture *capture, const struct capture_frame *frame, struct sh_err *err);
 /* Of an interface, at the end: what came, and what the system had no room for. */
 int capture_add_statistics(struct capture *capture, uint32_t interface, int64_t t_ns, uint64_t received,
                            uint64_t dropped, struct sh_err *err);

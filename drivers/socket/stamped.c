@@ -95,6 +95,7 @@ static int start(int fd, struct sockaddr_storage *at, socklen_t len, unsigned in
     if (setsockopt(fd, SOL_SOCKET, SO_RCVBUFFORCE, &size, sizeof size) != 0) /* needs CAP_NET_ADMIN */
         setsockopt(fd, SOL_SOCKET, SO_RCVBUF, &size, sizeof size);           /* up to net.core.rmem_max */
     stamped_enable(fd);
+    setsockopt(fd, SOL_SOCKET, SO_RXQ_OVFL, &one, sizeof one);
     if (is_group(at) || is_broadcast(at)) setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one);
     if (at->ss_family == AF_INET6) {
         setsockopt(fd, IPPROTO_IPV6, IPV6_V6ONLY, &one, sizeof one);
@@ -144,13 +145,15 @@ int stamped_open(const char *host, int port, struct stamped_socket *out, struct 
     return rc;
 }
 
-/* Where the datagram went to, and when it came. */
+/* Where the datagram went to, when it came, and what was thrown away before. */
 static void read_notes(struct msghdr *m, struct stamped_datagram *out)
 {
     for (struct cmsghdr *c = CMSG_FIRSTHDR(m); c != NULL; c = CMSG_NXTHDR(m, c)) {
         struct in_pktinfo to;
         struct in6_pktinfo to6;
         if (is_time(c)) out->t_ns = time_of(c);
+        if (c->cmsg_level == SOL_SOCKET && c->cmsg_type == SO_RXQ_OVFL)
+            memcpy(&out->dropped, CMSG_DATA(c), sizeof out->dropped);
         if (c->cmsg_level == IPPROTO_IP && c->cmsg_type == IP_PKTINFO) {
             memcpy(&to, CMSG_DATA(c), sizeof to);
             v4(&out->to)->sin_addr = to.ipi_addr;
@@ -176,7 +179,7 @@ int stamped_take(const struct stamped_socket *socket, void *buf, size_t room, st
     const ssize_t n = recvmsg(socket->fd, &m, MSG_DONTWAIT);
     if (n < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR || errno == ECONNREFUSED)) return 0;
     if (n < 0) return sh_fail(err, SH_EIO, "udp: %s", strerror(errno));
-    out->t_ns = 0;
+    out->t_ns = out->dropped = 0;
     out->to = socket->own;
     out->len = (size_t)n;
     read_notes(&m, out);
@@ -200,6 +203,16 @@ void stamped_close(struct stamped_socket *socket)
 
 /* ---- streams */
 
+/* Nobody listens, and the system chose the port that was asked for: TCP then connects a socket to itself. */
+static int is_own_end(int fd)
+{
+    struct sockaddr_storage own = {0}, peer = {0};
+    socklen_t own_len = sizeof own, peer_len = sizeof peer;
+    return getsockname(fd, (struct sockaddr *)&own, &own_len) == 0 &&
+           getpeername(fd, (struct sockaddr *)&peer, &peer_len) == 0 && own_len == peer_len &&
+           memcmp(&own, &peer, own_len) == 0;
+}
+
 static int connect_at(const struct addrinfo *at, int timeout_ms)
 {
     const struct timeval limit = {.tv_sec = timeout_ms / 1000, .tv_usec = timeout_ms % 1000 * 1000};
@@ -207,8 +220,10 @@ static int connect_at(const struct addrinfo *at, int timeout_ms)
     if (fd < 0) return -1;
     setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof limit);
     stamped_enable(fd);
-    if (connect(fd, at->ai_addr, at->ai_addrlen) == 0 && fcntl(fd, F_SETFL, O_NONBLOCK) == 0) return fd;
-    const int error = errno == EINPROGRESS ? ETIMEDOUT : errno;
+    const int is_open = connect(fd, at->ai_addr, at->ai_addrlen) == 0;
+    const int is_own = is_open && is_own_end(fd);
+    if (is_open && !is_own && fcntl(fd, F_SETFL, O_NONBLOCK) == 0) return fd;
+    const int error = is_own ? ECONNREFUSED : errno == EINPROGRESS ? ETIMEDOUT : errno;
     close(fd);
     errno = error;
     return -1;

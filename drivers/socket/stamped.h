@@ -28,6 +28,7 @@ struct stamped_datagram {
     int64_t t_ns;
     struct sockaddr_storage from, to; /* to: as the datagram has it; the port is the socket's */
     size_t len;
+    uint32_t dropped; /* how many the kernel had thrown away before it, modulo 2^32 */
 };
 
 /* 1: one was taken; 0: none is there. SH_EIO. room: 65535 hold any. */

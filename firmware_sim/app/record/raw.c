@@ -160,8 +160,8 @@ static const struct app_option OPTIONS[] = {
 static const char HELP_NOTES[] =
     "SOURCE is one of\n"
     "\n"
-    "  udp:ADDRESS:PORT,...     datagrams that come to an address of this machine, 0.0.0.0 (all of them), a broadcast\n"
-    "                           or a group (GROUP%INTERFACE)\n"
+    "  udp:ADDRESS:PORT,...     datagrams that come to an address of this machine, 0.0.0.0 (all of them), a\n"
+    "                           broadcast or a group (GROUP%INTERFACE)\n"
     "  tcp:HOST:PORT            a connection to it, or those of clients (--relay)\n"
     "\n"
     "Each packet is an Ethernet frame with the kernel's time. Headers are made anew: addresses, ports, lengths,\n"

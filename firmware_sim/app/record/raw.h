@@ -79,9 +79,8 @@ int raw_record(int argc, char **argv);
 
 /* From open files to closed ones. SH_ELOST: something is missing, the file keeps the rest. */
 int raw_run(struct raw *r, struct sh_err *err);
-/* A frame of the interface to the file. payload: how many bytes of it count. */
-int raw_write(struct raw *r, uint32_t interface, int64_t t_ns, const uint8_t *frame, size_t len, size_t payload,
-              struct sh_err *err);
+/* A frame to the file. payload: how many bytes of it count. */
+int raw_write(struct raw *r, const struct capture_frame *frame, size_t payload, struct sh_err *err);
 struct ethernet_end raw_end_of(const struct sockaddr_storage *at);
 /* The text with its escapes as bytes; in out, which has room for as many as the text has. NULL: *len bytes; else what is
  * wrong with it. */

@@ -8,16 +8,15 @@
 #include "firmware_sim/app/record/raw.h"
 #include "firmware_sim/base/clock.h"
 
-enum { POLL_MS = 200, MAX_LAST_PASSES = 1 << 18 };
+enum { POLL_MS = 200 };
 static const int64_t SECOND_NS = 1000000000;
 
-int raw_write(struct raw *r, uint32_t interface, int64_t t_ns, const uint8_t *frame, size_t len, size_t payload,
-              struct sh_err *err)
+int raw_write(struct raw *r, const struct capture_frame *frame, size_t payload, struct sh_err *err)
 {
     if (r->first_ns == 0) r->first_ns = clock_now_ns();
     r->bytes += payload;
-    if (t_ns > r->last_t_ns) r->last_t_ns = t_ns;
-    return capture_add(&r->capture, interface, t_ns, frame, len, err);
+    r->last_t_ns = frame->t_ns;
+    return capture_add(&r->capture, frame, err);
 }
 
 struct ethernet_end raw_end_of(const struct sockaddr_storage *at)
@@ -106,9 +105,9 @@ static int follow(struct raw *r, struct sh_err *err)
         if (rc >= 0) rc = report(r, clock_now_ns(), &next_ns, err);
         if (rc < 0) return rc;
     }
-    /* What the system holds came before the end. */
-    for (int n = 0; rc >= 0 && !r->over && n < MAX_LAST_PASSES && (rc = r->ops->work(r, err)) > 0; n += rc)
-        continue;
+    /* What the system holds came before the end. More may come all the time. */
+    for (const int64_t stop_ns = clock_now_ns() + SECOND_NS; rc >= 0 && !r->over && clock_now_ns() < stop_ns;)
+        if ((rc = r->ops->work(r, err)) == 0) break;
     r->wall_s = 1e-9 * (double)(clock_now_ns() - (r->first_ns != 0 ? r->first_ns : begin_ns));
     return rc < 0 ? rc : r->ops->finish(r, err);
 }
@@ -148,8 +147,7 @@ int raw_run(struct raw *r, struct sh_err *err)
     const int has_figures = r->capture.packets != 0 || rc == SH_OK;
     if (rc == SH_OK) rc = check_any(r, err);
     int after = capture_close(&r->capture, r->capture.packets != 0, &why);
-    if (rc != SH_OK && after != SH_OK && strcmp(why.text, err->text) != 0)
-        sh_warn(&app_report_stderr, "%s", why.text);
+    if (rc != SH_OK && after != SH_OK && strcmp(why.text, err->text) != 0) sh_warn(&app_report_stderr, "%s", why.text);
     if (after != SH_OK) say_left(r);
     if (rc == SH_OK && after != SH_OK) rc = sh_fail(err, after, "%s", why.text);
     if (rc == SH_OK) rc = r->ops->check(r, err);

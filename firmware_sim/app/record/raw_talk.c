@@ -11,13 +11,16 @@ enum { SILENT_MS = 50, ANSWER_MS = 1000, LOOK_MS = 10 };
 
 /* ---- frames */
 
-/* Bytes that the system held back may have come before the last frame; a connection is written in order. */
+/* Bytes that a slow reader held back may have come before the last frame; a connection is written in order. Where the
+ * clock itself was set back, times go back with it. */
 static int write_frame(struct talk *talk, int64_t t_ns, const uint8_t *frame, size_t len, size_t payload,
                        struct sh_err *err)
 {
     struct raw *r = talk->r;
     if (len == 0) return SH_OK;
-    return raw_write(r, 0, t_ns > r->last_t_ns ? t_ns : r->last_t_ns, frame, len, payload, err);
+    const int is_held = t_ns < r->last_t_ns && stamped_now_ns() >= r->last_t_ns;
+    const struct capture_frame f = {.t_ns = is_held ? r->last_t_ns : t_ns, .bytes = frame, .len = len};
+    return raw_write(r, &f, payload, err);
 }
 
 static int write_bytes(struct talk *talk, int side, int64_t t_ns, const uint8_t *bytes, size_t len, struct sh_err *err)

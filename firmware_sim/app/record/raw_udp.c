@@ -15,6 +15,7 @@ struct port {
     struct stamped_socket socket;
     struct stamped_datagram datagram;
     uint64_t packets, bytes;
+    uint32_t dropped; /* before the last packet */
     uint32_t interface;
     char name[160];
     uint8_t data[65536];
@@ -42,7 +43,13 @@ static int pass(struct raw_input *input, struct sh_err *err)
     const size_t len = ethernet_put_udp(udp->frame, &from, &to, p->data, p->datagram.len);
     p->packets++;
     p->bytes += p->datagram.len;
-    return raw_write(p->r, p->interface, input->t_ns, udp->frame, len, p->datagram.len, err);
+    const struct capture_frame frame = {.interface = p->interface,
+                                        .t_ns = input->t_ns,
+                                        .bytes = udp->frame,
+                                        .len = len,
+                                        .lost = p->datagram.dropped - p->dropped};
+    p->dropped = p->datagram.dropped;
+    return raw_write(p->r, &frame, p->datagram.len, err);
 }
 
 static int open_port(struct raw *r, struct port *p, int number, struct sh_err *err)
