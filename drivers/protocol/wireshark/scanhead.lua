@@ -599,7 +599,7 @@ local function absorb(flow, h, bytes, at, m)
     flow.line.whole = false
   end
   if m.notice == RESTARTED then flow.scan, flow.line = nil, {pulses = 0, whole = false} end
-  m.lost_so_far = flow.lost
+  if m.notice then m.lost_so_far = flow.lost end
   if h.version ~= 1 then return end
   m.wrong = wrong_payload(h, bytes, at)
   if m.wrong or m.notice == REPEATED or m.notice == LATE then return end
@@ -995,13 +995,13 @@ end
 local function new_flow() return {sequence = new_sequence(), in_step = true, started = false, lost = 0, waiting = 0, line = {pulses = 0, whole = false}} end
 
 -- What was found in a packet when it came first. Wireshark may cut the same bytes otherwise when it looks again: so the
--- content is the key, and what is there twice is taken in turns.
+-- content is the key, and what is there twice is a list that is taken in turns.
 local memo
 
 local function memo_of(pinfo)
   local packet = memo[pinfo.number]
   if not packet then
-    packet = {starts = {}, found = {}, turn = {}, joined = {}}
+    packet = {}
     memo[pinfo.number] = packet
   end
   return packet
@@ -1010,15 +1010,22 @@ end
 -- The entry of `what`; a new one is given to make(entry) once.
 local function find(pinfo, what, make)
   local packet = memo_of(pinfo)
-  local list = packet.found[what] or {}
-  packet.found[what] = list
+  local entry = packet[what]
   if pinfo.visited then
-    if #list == 0 then return {packet = pinfo.number} end
-    packet.turn[what] = (packet.turn[what] or 0) % #list + 1
-    return list[packet.turn[what]]
+    if entry and entry.turns then
+      entry.turn = (entry.turn or 0) % #entry.turns + 1
+      return entry.turns[entry.turn]
+    end
+    return entry or {packet = pinfo.number}
   end
-  local m = {packet = pinfo.number, time = pinfo.rel_ts}
-  list[#list + 1] = m
+  local m = {packet = pinfo.number}
+  if not entry then
+    packet[what] = m
+  elseif entry.turns then
+    entry.turns[#entry.turns + 1] = m
+  else
+    packet[what] = {turns = {entry, m}}
+  end
   make(m)
   return m
 end
@@ -1036,10 +1043,14 @@ local function new_search(tvb, pinfo, tree, conn, can_wait)
   local flow = conn.down
   local self = setmetatable({tvb = tvb, pinfo = pinfo, tree = tree, conn = conn, flow = flow, can_wait = can_wait, at = 0,
                              len = tvb:len(), bytes = tvb:raw(0, tvb:len()), items = {}, said = 0, reach = 0}, Search)
-  local starts, key = memo_of(pinfo).starts, self.bytes:sub(1, 64)
-  if not pinfo.visited then starts[key] = starts[key] or {in_step = flow.in_step, started = flow.started} end
-  local start = starts[key] or {in_step = true, started = true}
-  self.in_step, self.started = start.in_step, start.started
+  if conn.is_stream then
+    local packet, key = memo_of(pinfo), "starts with " .. self.bytes:sub(1, 28)
+    if not packet[key] and not pinfo.visited then packet[key] = {in_step = flow.in_step, started = flow.started} end
+    local start = packet[key] or {in_step = true, started = true}
+    self.in_step, self.started = start.in_step, start.started
+  else
+    self.in_step, self.started = true, true
+  end
   return self
 end
 
@@ -1138,7 +1149,7 @@ function Search:show_reply(at, n)
   local words = self.bytes:sub(at + 1, at + n)
   local m = find(self.pinfo, "reply " .. words, function(m)
     m.command = conn.first <= conn.last and conn.commands[conn.first] or nil
-    m.unasked = conn.last > 0 and not m.command
+    m.unasked, m.time = conn.last > 0 and not m.command, self.pinfo.rel_ts
     if m.command then conn.first, m.command.reply_in = conn.first + 1, self.pinfo.number end
   end)
   local item = self.tree:add(scanhead, tvb(at, n + 2), "Scan head, reply: " .. words)
@@ -1197,7 +1208,7 @@ local function run_commands(tvb, pinfo, tree, conn, can_wait)
     local n = #words + #ending
     if words ~= "" then
       local m = find(pinfo, "command " .. words, function(m)
-        conn.last = conn.last + 1
+        conn.last, m.time = conn.last + 1, pinfo.rel_ts
         conn.commands[conn.last] = m
       end)
       local is_text = #words <= MOST_COMMAND and not words:find("[^ -~]")
@@ -1243,7 +1254,7 @@ end
 -- Frames that go on in the next packet are joined here, unless `ask` gets TCP to do it: ask(at, more). At some places
 -- TCP would give again what was taken already, or cut it otherwise at the next look. There, too, it is done here.
 local function dissect_joined(tvb, pinfo, tree, conn, side, run, ask)
-  local key, packet, first_time = side .. tvb:offset(), memo_of(pinfo).joined, not pinfo.visited
+  local key, packet, first_time = side .. tvb:offset(), memo_of(pinfo), not pinfo.visited
   local kept = packet[key]
   if not kept then
     kept = {}
@@ -1298,9 +1309,9 @@ end
 
 -- The same for ever, once a packet was seen.
 local function side_of(tvb, pinfo, conn)
-  local key = "side" .. pinfo.number
-  if memo[key] == nil then memo[key] = is_from_head(tvb, pinfo, conn) end
-  return memo[key]
+  local packet = memo_of(pinfo)
+  if packet.side == nil then packet.side = is_from_head(tvb, pinfo, conn) end
+  return packet.side
 end
 
 local function dissect_tcp(tvb, pinfo, tree)
@@ -1345,7 +1356,6 @@ end
 
 function scanhead.dissector(tvb, pinfo, tree)
   if pinfo.port_type == PORT_TYPE_TCP then return dissect_tcp(tvb, pinfo, tree) end
-  if usb_end(pinfo) then return dissect_usb(tvb, pinfo, tree) end
   return dissect_user0(tvb, pinfo, tree)
 end
 
@@ -1367,9 +1377,6 @@ scanhead:register_heuristic("usb.bulk", function(tvb, pinfo, tree)
   return true
 end)
 
-local PRODUCT = 0x1209 * 65536 + 0x0001
-DissectorTable.get("usb.product"):add(PRODUCT, scanhead)
-DissectorTable.get("usb.device"):add_for_decode_as(scanhead)
 DissectorTable.get("ws.protocol"):add("scanhead-native-1", web)
 local USER0 = wtap and wtap.USER0 or wtap_encaps and wtap_encaps.USER0 or 45
 
