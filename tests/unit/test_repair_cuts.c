@@ -235,7 +235,7 @@ static void test_huge_numbers(void **state)
     const uint32_t block[] = {0x0a0d0d0a, 0xfffffffc, 0x1a2b3c4d, 1, 0, 0, 0, 0};
     expect_refused("h.pcapng", block, sizeof block);
     expect_refused("h.pcapng", "", 0);
-    expect_refused("h.obj", "v 0 0 0\n", 8);
+    expect_refused("h.glb", "v 0 0 0\n", 8);
 }
 
 /* A meshless gap: where good lines follow a bad one, no recorder has left it so. */
