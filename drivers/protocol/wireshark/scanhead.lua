@@ -696,7 +696,8 @@ local function put_records(tree, tvb, at, len, n, what, put)
     put(group, at + i * len, i)
   end
   if shown == n then return end
-  tree:add(tvb(at + shown * len, (n - shown) * len), string.format("%d more (preference: most points shown)", n - shown))
+  tree:add(tvb(at + shown * len, (n - shown) * len),
+           string.format("%d more (preference: most points shown)", n - shown))
 end
 
 -- WGS 84, NIMA TR8350.2: geodetic to geocentric.
