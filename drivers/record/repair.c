@@ -217,8 +217,8 @@ static int repair_open(struct repair *r, const struct recorder_ops *ops, struct 
                        r->path, ops->ending);
     if (r->len == 0)
         return sh_fail(err, SH_EFORMAT,
-                       "%s: is empty: nothing had come to the disk. Files whose colours have no --colour-limits are "
-                       "written when all scans are over",
+                       "%s: is empty: nothing had come to the disk. Meshes, and files whose colours have no "
+                       "--colour-limits, are written when all scans are over",
                        r->path);
     return ops->repair(r, err);
 }
