@@ -311,6 +311,7 @@ static void test_usage(void **state)
         {ARGS("udp:127.0.0.1:0", "--raw"), 2, SAYS("-o FILE.pcapng is needed")},
         {ARGS("udp:127.0.0.1:0", "--raw", "-o", "x.ply"), 2, SAYS("x.ply", "NAME.pcapng")},
         {ARGS("udp:127.0.0.1:0", "--raw", FILE_OF, FILE_OF), 2, SAYS("one file")},
+        {ARGS("udp:127.0.0.1:0", "--raw", FILE_OF, "--stats", file), 2, SAYS("--stats", "is the file of --output")},
         {ARGS("usb", "--raw", FILE_OF), 2, SAYS("SOURCE usb", "udp:ADDRESS:PORT", "tcp:HOST:PORT")},
         {ARGS("udp:127.0.0.1", "--raw", FILE_OF), 2, SAYS("SOURCE udp:127.0.0.1", "PORT")},
         {ARGS("udp:127.0.0.1:65536", "--raw", FILE_OF), 2, SAYS("udp:127.0.0.1:65536")},
