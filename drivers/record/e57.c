@@ -72,7 +72,6 @@ static int put_begin(struct e57 *e, struct sh_err *err)
     s->section = s->note + sizeof note;
     e57_note_put(&e->facts, s, note);
     int rc = outfile_reserve(&e->base.file, E57_XML_ROOM + e->facts.n_scans * (uint64_t)E57_XML_ROOM_SCAN, err);
-    e->pages.has_failed |= rc != 0;
     if (rc == 0) rc = e57_put(&e->pages, blank, (size_t)(s->note - at), err);
     if (rc == 0) rc = e57_put(&e->pages, note, sizeof note, err);
     return rc != 0 ? rc : e57_put(&e->pages, section, sizeof section, err);

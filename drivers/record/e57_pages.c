@@ -38,13 +38,10 @@ int e57_page_is_right(const uint8_t page[E57_PAGE])
 
 static int put_page(struct e57_pages *pages, struct sh_err *err)
 {
-    if (pages->has_failed) return sh_fail(err, SH_EIO, "%s: a part of it could not be written", pages->file->part);
     seal(pages->page);
     pages->used = 0;
     pages->n_full++;
-    const int rc = outfile_write(pages->file, pages->page, E57_PAGE, err);
-    pages->has_failed = rc != 0;
-    return rc;
+    return outfile_write(pages->file, pages->page, E57_PAGE, err);
 }
 
 int e57_put(struct e57_pages *pages, const void *data, size_t len, struct sh_err *err)

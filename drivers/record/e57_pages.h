@@ -16,7 +16,6 @@ struct e57_pages {
     struct outfile *file;
     uint64_t n_full; /* pages that went to the file */
     size_t used;     /* of the page at hand */
-    int has_failed;  /* a page could not be written: no later one may take its place */
     uint8_t page[E57_PAGE];
 };
 

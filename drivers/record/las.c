@@ -256,7 +256,8 @@ static int las_points(void *rec, int n, struct sh_err *err)
 static int las_finish(void *rec, struct sh_err *err)
 {
     struct las *las = rec;
-    int rc = las->begun ? 0 : put_front(las, err);
+    int rc = outfile_check(&las->base.file, err); /* then the header goes on saying that the file is incomplete */
+    if (rc == 0 && !las->begun) rc = put_front(las, err);
     las->facts.incomplete = 0;
     if (rc == 0) rc = write_front(las, err);
     if (rc != 0) return rc;

@@ -19,6 +19,7 @@
 #include "drivers/protocol/native.h"
 #include "drivers/record/mesh_recorder.h"
 #include "drivers/record/mesh_texture.h"
+#include "drivers/record/obj_repair.h"
 
 static const double GIB = 1073741824.0;
 /* Points, grid, triangles, and what is grown at once; what the exporter takes besides (measured with 6.5 million). */
@@ -311,13 +312,14 @@ static void mesh_release(void *rec)
     mesh_grid_free(&m->grid);
 }
 
-#define MESH_OPS(ENDING)                                                                                      \
+/* What a kill leaves of the others, which are written in one piece at the end, is no mesh. */
+#define MESH_OPS(ENDING, REPAIR)                                                                              \
     {                                                                                                         \
         .ending = ENDING, .is_mesh = 1, .size = sizeof(struct mesh_recorder),                                 \
         .track = {.scan = mesh_scan, .points = mesh_take_points, .metres = 1, .grid = 1, .wants_colours = 1}, \
-        .begin = mesh_begin, .finish = mesh_finish, .release = mesh_release                                   \
+        .begin = mesh_begin, .finish = mesh_finish, .release = mesh_release, .repair = REPAIR                 \
     }
 
-const struct recorder_ops recorder_mesh_ply = MESH_OPS(".ply"), recorder_obj = MESH_OPS(".obj"),
-                          recorder_gltf = MESH_OPS(".gltf"), recorder_glb = MESH_OPS(".glb"),
-                          recorder_fbx = MESH_OPS(".fbx");
+const struct recorder_ops recorder_mesh_ply = MESH_OPS(".ply", NULL), recorder_obj = MESH_OPS(".obj", obj_repair),
+                          recorder_gltf = MESH_OPS(".gltf", NULL), recorder_glb = MESH_OPS(".glb", NULL),
+                          recorder_fbx = MESH_OPS(".fbx", NULL);

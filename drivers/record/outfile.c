@@ -53,6 +53,18 @@ static void set_direct(struct outfile *file, int on)
         file->may_be_direct = 0;
 }
 
+static int fail_write(struct outfile *file, int error, struct sh_err *err)
+{
+    if (file->error == 0) file->error = error;
+    return sh_fail(err, SH_EIO, "%s: cannot write: %s", file->part, strerror(error));
+}
+
+int outfile_check(const struct outfile *file, struct sh_err *err)
+{
+    if (file->error == 0) return 0;
+    return sh_fail(err, SH_EIO, "%s: cannot write: %s", file->part, strerror(file->error));
+}
+
 /* *at is moved on by what was written, also before a failure. */
 static int write_at(struct outfile *file, uint64_t *at, const uint8_t *data, size_t len, struct sh_err *err)
 {
@@ -65,7 +77,7 @@ static int write_at(struct outfile *file, uint64_t *at, const uint8_t *data, siz
             if (!file->is_direct) continue;
             errno = EINVAL;
         }
-        if (n <= 0) return sh_fail(err, SH_EIO, "%s: cannot write: %s", file->part, strerror(n < 0 ? errno : ENOSPC));
+        if (n <= 0) return fail_write(file, n < 0 ? errno : ENOSPC, err);
         data += n;
         len -= (size_t)n;
         *at += (uint64_t)n;

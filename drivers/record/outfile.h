@@ -20,6 +20,7 @@ struct outfile {
     uint8_t *buf;
     size_t len;       /* bytes in buf */
     uint64_t written; /* bytes of the file that are before buf */
+    int error;        /* errno of the first write that failed: something of the file may be missing; 0: none */
     uint64_t saved;   /* of these, when outfile_save was called last */
     /* 1: what goes beyond OUTFILE_DIRECT_FROM is written past the system's cache (O_DIRECT), where the file system can
      * do that. It saves copying, which is most of the cost of a long recording, but each write then waits for the disk:
@@ -36,6 +37,8 @@ int outfile_write(struct outfile *file, const void *data, size_t len, struct sh_
 uint8_t *outfile_room(struct outfile *file, size_t n, struct sh_err *err);
 void outfile_used(struct outfile *file, size_t n);
 int outfile_flush(struct outfile *file, struct sh_err *err);
+/* SH_EIO where a write has failed before, whatever is on the disk now; it says the same as that. */
+int outfile_check(const struct outfile *file, struct sh_err *err);
 /* To be called about once a second: flushes, unless some of it was written since the last call. So nothing waits for longer
  * than two calls, and who writes much pays nothing. */
 int outfile_save(struct outfile *file, struct sh_err *err);

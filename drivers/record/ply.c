@@ -338,7 +338,8 @@ static int ply_finish(void *rec, struct sh_err *err)
     ply->facts.n_without_attributes = ply->base.track.missing.n_without_attributes;
     ply->facts.n_unplaced = ply->base.track.missing.n_unplaced;
     ply->facts.n_without_pose = ply->base.track.missing.n_without_pose;
-    return write_header(ply, 0, err);
+    const int rc = outfile_check(&ply->base.file, err); /* then the header goes on saying that the file is incomplete */
+    return rc != 0 ? rc : write_header(ply, 0, err);
 }
 
 const struct recorder_ops recorder_ply = {

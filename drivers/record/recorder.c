@@ -135,8 +135,10 @@ int recorder_close(struct recorder *rec, int keep, struct sh_err *err)
 {
     const struct recorder_ops *ops = rec->ops;
     char *path = strdup(rec->file.path);
-    int rc = keep ? track_flush(&rec->track, err) : SH_OK;
+    const int is_written = outfile_check(&rec->file, NULL) == SH_OK; /* else points would follow that are missing */
+    int rc = keep && is_written ? track_flush(&rec->track, err) : SH_OK;
     if (keep && rc == SH_OK && ops->finish != NULL) rc = ops->finish(rec, err);
+    if (keep && rc == SH_OK) rc = outfile_check(&rec->file, err);
     if (keep && rc == SH_OK) report_losses(rec);
     const enum outfile_end how = how_it_ends(rec, keep, rc);
     const int closed = outfile_close(&rec->file, how, err);

@@ -1,17 +1,35 @@
-/* For tests of repair: what is on the disk while a recording goes on, and a file that is repaired in place. */
+/* For tests of repair: what killed recorders leave, beside the whole files of the same small stream. */
 #ifndef TESTS_UNIT_REPAIR_RIG_H
 #define TESTS_UNIT_REPAIR_RIG_H
 
 #include "tests/unit/recorder_rig.h"
 
-/* Records the rig's stream. After each frame, once the recorder has saved what it has, `seen` is called; then the file is
- * completed as path. */
-void repair_rig_record(const char *path, struct recorder_options options, void (*seen)(const char *path));
+enum { REPAIR_FORMATS = 9, REPAIR_ASCII = 4, REPAIR_LAS = 6, REPAIR_POINTS = 12 };
 
-/* Makes path of these bytes. */
-void repair_rig_write(const char *path, const void *data, size_t len);
+struct bytes {
+    uint8_t *data;
+    size_t len;
+};
 
-/* Repairs the file at path in place; its format is that of the ending, before .part. */
-int repair_rig_repair(const char *path, struct repair *repair, struct sh_err *err);
+struct repair_format {
+    const char *name;
+    struct recorder_options options;
+    int knows_damage; /* a wrong byte within its units is noticed */
+};
+
+extern const struct repair_format repair_formats[REPAIR_FORMATS];
+/* Of each: FILE.part when all frames had come, and FILE. */
+extern struct bytes repair_left[REPAIR_FORMATS], repair_whole[REPAIR_FORMATS];
+extern struct sh_err repair_err;
+
+int repair_set_up(void **state);
+int repair_tear_down(void **state);
+
+/* The file that the test is about; its folder is the rig's. */
+extern char repair_path[160], repair_part[168];
+void repair_name(const char *file);
+
+struct bytes repair_slurp(const char *path);
+void repair_write_file(const char *path, const void *data, size_t len);
 
 #endif

@@ -1,6 +1,6 @@
 /* E57 files whose recorder was killed, or whose disk was full: what a repair makes of them, wherever they end. */
 #include "tests/unit/e57_rig.h"
-#include "tests/unit/repair_rig.h"
+#include "tests/unit/killed_rig.h"
 
 enum { PAGE = 1024, CONTENT = 1020, MAX_PACKETS = 128, MAX_SCANS = 4 };
 
@@ -84,7 +84,7 @@ static void record_scans(void)
         }
     }
     const struct colour_choice colour = {.given = coloured, .scale.mode = COLOUR_LABEL};
-    repair_rig_record(path, (struct recorder_options){.empty_shots = empty_shots, .colour = colour}, keep_left);
+    killed_rig_record(path, (struct recorder_options){.empty_shots = empty_shots, .colour = colour}, keep_left);
     e57rig_read(path);
     free(whole);
     whole = rig_read(path, &whole_len);
@@ -111,7 +111,7 @@ static void read_truth(void)
     const char *path = rig_path("a.e57");
     free(truth);
     truth = NULL;
-    repair_rig_write(path, whole, whole_len);
+    killed_rig_write(path, whole, whole_len);
     e57rig_read(path);
     for (int k = 0; k < n_scans; k++) {
         e57rig_scan(k, empty_shots, coloured);
@@ -197,8 +197,8 @@ static void check_cut(const char *path, const uint8_t *from, size_t len)
     int scans, packets;
     size_t n = 0, now;
     expect_of(len, &scans, &packets);
-    repair_rig_write(path, from, len);
-    int rc = repair_rig_repair(path, &repair, &err);
+    killed_rig_write(path, from, len);
+    int rc = killed_rig_repair(path, &repair, &err);
     if (scans == 0) {
         assert_int_equal(rc, SH_EFORMAT);
         assert_non_null(strstr(err.text, "no scan begins in it"));
@@ -220,7 +220,7 @@ static void check_cut(const char *path, const uint8_t *from, size_t len)
     }
     if (!already_seen(scans, packets, file, now)) {
         check_file(path, scans, packets);
-        assert_int_equal(repair_rig_repair(path, &repair, &err), 0);
+        assert_int_equal(killed_rig_repair(path, &repair, &err), 0);
         assert_int_equal(repair.was_whole, 1);
         assert_int_equal(repair.n_kept, n);
         size_t again_len;
@@ -272,7 +272,7 @@ static void test_end(void **state)
     for (size_t cut = 0; cut < whole_len; cut += PAGE)
         check_cut(path, whole, whole_len - cut);
     already_seen(0, 0, NULL, 0);
-    repair_rig_write(path, whole, whole_len);
+    killed_rig_write(path, whole, whole_len);
     char *want = xml_of(path);
     const size_t end = packet[n_packets - 1].end / CONTENT * PAGE; /* pages before the XML */
     for (int header = 0; header < 2; header++) { /* the file's own header, and those of the scans, are not there yet */
@@ -280,8 +280,8 @@ static void test_end(void **state)
         uint8_t *part = malloc(whole_len);
         memcpy(part, whole, whole_len);
         memcpy(part, left, header ? PAGE : left_len / PAGE * PAGE - PAGE);
-        repair_rig_write(path, part, whole_len - (header ? 0 : 1));
-        assert_int_equal(repair_rig_repair(path, &repair, &err), 0);
+        killed_rig_write(path, part, whole_len - (header ? 0 : 1));
+        assert_int_equal(killed_rig_repair(path, &repair, &err), 0);
         assert_int_equal(repair.was_whole, 0);
         assert_int_equal(repair.cut_bytes, 0);
         free(part);
@@ -307,14 +307,14 @@ static void test_refused(void **state)
     empty_shots = coloured = 0;
     record_scans();
     static const char text[3000] = "ply\nformat ascii 1.0\n";
-    repair_rig_write(path, text, sizeof text);
-    assert_int_equal(repair_rig_repair(path, &repair, &err), SH_EFORMAT);
-    repair_rig_write(path, "", 0);
-    assert_int_equal(repair_rig_repair(path, &repair, &err), SH_EFORMAT);
+    killed_rig_write(path, text, sizeof text);
+    assert_int_equal(killed_rig_repair(path, &repair, &err), SH_EFORMAT);
+    killed_rig_write(path, "", 0);
+    assert_int_equal(killed_rig_repair(path, &repair, &err), SH_EFORMAT);
     for (size_t at = 5; at < left_len - PAGE; at += 2777) {
         left[at] ^= 0x40;
-        repair_rig_write(path, left, left_len);
-        assert_int_equal(repair_rig_repair(path, &repair, &err), SH_EFORMAT);
+        killed_rig_write(path, left, left_len);
+        assert_int_equal(killed_rig_repair(path, &repair, &err), SH_EFORMAT);
         assert_non_null(strstr(err.text, "damaged"));
         assert_null(strchr(err.text, '\n'));
         uint8_t *now = rig_read(path, &len);
@@ -355,9 +355,9 @@ static void test_absurd(void **state)
         memset(file + at, i % 2 ? 0xff : (int)(random >> 24), 1 + random % 8);
         for (size_t p = 0; p + PAGE <= left_len; p += PAGE)
             reseal(file + p);
-        repair_rig_write(path, file, left_len);
+        killed_rig_write(path, file, left_len);
         free(file);
-        int rc = repair_rig_repair(path, &repair, &err);
+        int rc = killed_rig_repair(path, &repair, &err);
         refused += rc != 0;
         if (rc != 0) assert_int_equal(rc, SH_EFORMAT);
         if (rc == 0) e57rig_read(path);

@@ -1,6 +1,6 @@
 /* PTX files whose recorder was killed, or whose disk was full: what a repair makes of them and of the grid beside them,
  * wherever these end. */
-#include "tests/unit/repair_rig.h"
+#include "tests/unit/killed_rig.h"
 
 enum { HEAD_LEN = 120, CELL_LEN = 40, MAX_SHOTS = 512, MAX_STATES = 64 };
 
@@ -73,7 +73,7 @@ static void record_scans(void)
             put_line(scan, (uint32_t)(line + line / 3), line % 2 ? 4 : 6, 9 + line % 4);
     }
     const struct colour_choice colour = {.given = coloured, .scale.mode = COLOUR_LABEL};
-    repair_rig_record(path, (struct recorder_options){.colour = colour}, keep_state);
+    killed_rig_record(path, (struct recorder_options){.colour = colour}, keep_state);
     whole = rig_read(path, &whole_len);
     unlink(path);
 }
@@ -161,8 +161,8 @@ static const char *const part = "cut.ptx.part";
 
 static void write_state(const void *text, size_t text_len, const void *grid, size_t grid_len)
 {
-    repair_rig_write(rig_path(part), text, text_len);
-    if (grid != NULL) repair_rig_write(rig_path("cut.ptx.grid"), grid, grid_len);
+    killed_rig_write(rig_path(part), text, text_len);
+    if (grid != NULL) killed_rig_write(rig_path("cut.ptx.grid"), grid, grid_len);
 }
 
 static void remove_state(void)
@@ -177,13 +177,13 @@ static uint8_t *repair_well(uint64_t want, size_t *len)
     struct repair r;
     struct sh_err err;
     uint64_t n_grids;
-    if (repair_rig_repair(rig_path(part), &r, &err) != 0) fail_msg("%s", err.text);
+    if (killed_rig_repair(rig_path(part), &r, &err) != 0) fail_msg("%s", err.text);
     uint8_t *text = rig_read(rig_path(part), len), *again;
     assert_int_equal(check_text(text, &n_grids), want);
     assert_int_equal(r.n_kept, want);
     assert_int_equal(r.n_scans, n_grids);
     assert_int_equal(access(rig_path("cut.ptx.grid"), F_OK), -1);
-    assert_int_equal(repair_rig_repair(rig_path(part), &r, &err), 0);
+    assert_int_equal(killed_rig_repair(rig_path(part), &r, &err), 0);
     assert_int_equal(r.was_whole, 1);
     assert_int_equal(r.n_kept, want);
     size_t again_len;
@@ -224,7 +224,7 @@ static void test_killed(void **state)
             for (size_t cut = from; cut <= s->grid_len; cut += 17) {
                 write_state(s->text, s->text_len, s->grid, cut);
                 if (s->grid_len == 0) { /* no scan has begun */
-                    assert_int_equal(repair_rig_repair(rig_path(part), &r, &err), SH_EFORMAT);
+                    assert_int_equal(killed_rig_repair(rig_path(part), &r, &err), SH_EFORMAT);
                     continue;
                 }
                 const int want = echoes_before(scan) + echoes_in(scan, (cut - HEAD_LEN) / CELL_LEN);
@@ -292,7 +292,7 @@ static void test_text_alone(void **state)
             if (any)
                 free(repair_well(want, &len));
             else
-                assert_int_equal(repair_rig_repair(rig_path(part), &r, &err), SH_EFORMAT);
+                assert_int_equal(killed_rig_repair(rig_path(part), &r, &err), SH_EFORMAT);
         }
     }
     coloured = 0;
@@ -305,7 +305,7 @@ static void check_refused(const char *text, const void *grid, size_t grid_len, c
     struct sh_err err;
     size_t len;
     write_state(text, strlen(text), grid, grid_len);
-    assert_int_equal(repair_rig_repair(rig_path(part), &r, &err), SH_EFORMAT);
+    assert_int_equal(killed_rig_repair(rig_path(part), &r, &err), SH_EFORMAT);
     if (strstr(err.text, why) == NULL) fail_msg("%s", err.text);
     assert_null(strchr(err.text, '\n'));
     uint8_t *now = rig_read(rig_path(part), &len);

@@ -1,6 +1,6 @@
 /* Repair, in process: a small file of each format cut at every byte, damaged at every third, of another format, and with
  * numbers beyond all reason. What comes out holds the whole units and is whole, or it is as it was. */
-#include "tests/unit/repair_kinds.h"
+#include "tests/unit/repair_rig.h"
 
 /* Repairs what is in repair_part; 1: it is whole now, as *file says, and the bytes are in *got. 0: it was refused, and stays. */
 static int repair(const void *data, size_t len, struct repaired *file, struct bytes *got)
@@ -235,7 +235,7 @@ static void test_huge_numbers(void **state)
     const uint32_t block[] = {0x0a0d0d0a, 0xfffffffc, 0x1a2b3c4d, 1, 0, 0, 0, 0};
     expect_refused("h.pcapng", block, sizeof block);
     expect_refused("h.pcapng", "", 0);
-    expect_refused("h.obj", "v 0 0 0\n", 8);
+    expect_refused("h.glb", "v 0 0 0\n", 8);
 }
 
 /* A meshless gap: where good lines follow a bad one, no recorder has left it so. */

@@ -4,7 +4,7 @@
 
 #include "core/newfile.h"
 #include "drivers/record/outfile.h"
-#include "tests/unit/repair_kinds.h"
+#include "tests/unit/repair_rig.h"
 
 /* Which file is meant, and that none is replaced. */
 static void test_names(void **state)
@@ -85,6 +85,41 @@ static void test_moving_poses(void **state)
     assert_int_equal(unlink(repair_path), 0);
 }
 
+/* The disk was full for a while, and points were lost: what is written later makes no whole file of it. */
+static void test_full_for_a_while(void **state)
+{
+    (void)state;
+    for (int i = 0; i < REPAIR_FORMATS; i++) {
+        struct scanhead *sh;
+        struct scanhead_frame frame;
+        struct recorder *rec;
+        struct repaired file;
+        repair_name(repair_formats[i].name);
+        assert_int_equal(scanhead_open(rig_shs, &sh, NULL, 0), 0);
+        assert_int_equal(recorder_open(recorder_find(repair_path, &repair_err), repair_path, &repair_formats[i].options,
+                                       &rec, &repair_err),
+                         0);
+        while (scanhead_next(sh, &frame, -1) == 0)
+            assert_int_equal(recorder_frame(rec, sh, &frame, &repair_err), 0);
+        struct rlimit old, small;
+        void (*was)(int) = signal(SIGXFSZ, SIG_IGN);
+        getrlimit(RLIMIT_FSIZE, &old);
+        small = (struct rlimit){repair_left[i].len - 2, old.rlim_max};
+        assert_int_equal(setrlimit(RLIMIT_FSIZE, &small), 0);
+        assert_int_equal(recorder_save(rec, &repair_err), SH_EIO);
+        setrlimit(RLIMIT_FSIZE, &old);
+        signal(SIGXFSZ, was);
+        assert_int_equal(recorder_close(rec, 1, &repair_err), SH_EIO);
+        assert_non_null(strstr(repair_err.text, "File too large"));
+        scanhead_close(sh);
+        assert_int_equal(access(repair_path, F_OK), -1);
+        assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), 0);
+        assert_true(file.was_left && file.n_kept > 0);
+        repair_free(&file);
+        assert_int_equal(unlink(repair_path), 0);
+    }
+}
+
 static int stop(void *ctx)
 {
     (void)ctx;
@@ -135,8 +170,8 @@ static void test_save(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_names), cmocka_unit_test(test_not_ours),
-                                       cmocka_unit_test(test_moving_poses), cmocka_unit_test(test_stopped),
-                                       cmocka_unit_test(test_save)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_names),        cmocka_unit_test(test_not_ours),
+                                       cmocka_unit_test(test_moving_poses), cmocka_unit_test(test_full_for_a_while),
+                                       cmocka_unit_test(test_stopped),      cmocka_unit_test(test_save)};
     return cmocka_run_group_tests(tests, repair_set_up, repair_tear_down);
 }

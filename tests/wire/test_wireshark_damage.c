@@ -168,24 +168,74 @@ static void expect_damaged(const char *name)
     assert_true(n_bad > 3);
 }
 
+/* Frames with good checksums and wrong or unknown contents: the sample of a type, with one number changed or its length. */
+static const struct {
+    uint8_t type;
+    uint32_t at, value; /* in the payload; at 0xffff: nothing is changed */
+    int longer;         /* by so many bytes */
+    const char *says;
+} wrong[] = {
+    {1, 128, 2, 0, "layout 2, allowed 0 to 1"},
+    {1, 252, 65536, 0, "n_surfaces 65536, allowed 0 to 65535"},
+    {1, 0xffff, 0, -200, "80 bytes, allowed 272 and more"},
+    {1, 272, 8, 0, "Reserved bits are set"},
+    {2, 0, 4, 0, "crs 4, allowed 0 to 3"},
+    {2, 20, 0x7ff80000, 0, "x: not a finite number"},
+    {3, 36, 5, 0, "5 points, and room for 4"},
+    {3, 32, 2, 0, "3 pulses begin, and n_pulses is 2"},
+    {5, 0xffff, 0, -30, "66 bytes, allowed 96 and more"},
+    {6, 0, 13, 0, "An event that version 1 does not have yet"},
+    {6, 0xffff, 0, 4, "Longer than version 1 has it"},
+    {7, 4, 3, 0, "shorter than its names"},
+    {8, 0, 1, 0, "1 poses, allowed 2 to 2"},
+    {8, 44, 0x40000000, 0, "a quaternion that is not of length one"},
+    {9, 12, 5, 0, "5 points, and room for 4"},
+    {10, 24, 0, 0, "turn 0, allowed 1 and -1"},
+    {10, 4, 4, 0, "4 beams, and room for 3"},
+    {11, 12, 5, 0, "5 points, and room for 4"},
+};
+enum { N_WRONG = sizeof wrong / sizeof wrong[0] };
+
+static void put_wrong(struct capture *c, uint32_t interface)
+{
+    size_t len;
+    char *bytes = wire_read(wire_path(wire, "samples.shs"), &len);
+    for (int i = 0; i < N_WRONG; i++) {
+        uint8_t copy[NATIVE_HEADER_LEN + 512] = {0}, *frame = (uint8_t *)bytes;
+        while (frame[1] != wrong[i].type)
+            frame += native_frame_len(frame);
+        memcpy(copy, frame, native_frame_len(frame));
+        le_put32(copy + 4, le_get32(copy + 4) + (uint32_t)wrong[i].longer);
+        if (wrong[i].at != 0xffff) le_put32(copy + NATIVE_HEADER_LEN + wrong[i].at, wrong[i].value);
+        seal_frame(copy);
+        capture_packet(c, interface, copy, native_frame_len(copy));
+    }
+    free(bytes);
+}
+
 static void test_hurt(void **state)
 {
     (void)state;
-    static const char *const marks[] = {"_ws.expert.severity", NULL};
+    static const char *const marks[] = {"_ws.expert.severity", "_ws.expert.message", NULL};
     struct capture c = {0};
     int n_packets = 0, n_marked = 0;
     char error[16];
     capture_begin(&c);
-    put_hurt(&c, capture_interface(&c, CAPTURE_USER0));
+    const uint32_t interface = capture_interface(&c, CAPTURE_USER0);
+    put_hurt(&c, interface);
+    put_wrong(&c, interface);
     wire_write(wire, "hurt.pcapng", c.bytes, c.len);
     free(c.bytes);
     dissect("hurt.pcapng", 1, marks);
     snprintf(error, sizeof error, "%d", EXPERT_ERROR);
     char *all = strdup(dissected_text()), *rest = all;
     for (char *line; (line = strsep(&rest, "\n")) != NULL && rest != NULL; n_packets++)
-        n_marked += strstr(line, error) != NULL;
+        if (n_packets < N_HURT)
+            n_marked += strstr(line, error) != NULL;
+        else if (strstr(line, wrong[n_packets - N_HURT].says) == NULL)
+            fail_msg("%s: not said in %s", wrong[n_packets - N_HURT].says, line);
     free(all);
-    assert_int_equal(n_packets, N_HURT);
+    assert_int_equal(n_packets, N_HURT + N_WRONG);
     assert_int_equal(n_marked, N_HURT);
 }
 

@@ -171,10 +171,13 @@ local ROWS = {
     {"scan", "u32", "Scan"}, {"seed", "u64", "Seed of random numbers"}}),
   content = rows_of("descriptor.", {{"content", "hex", "Content", 4}, {"reserved", "zero", "Reserved"}}),
   [ANCHOR] = rows_of("anchor.", {
-    {"crs", "u32", "CRS", {[0] = "local (scene frame)", "ECEF", "UTM or UPS", "geodetic"}}, {"epsg", "u32", "EPSG code"},
+    {"crs", "u32", "CRS", {[0] = "local (scene frame)", "ECEF", "UTM or UPS", "geodetic"}},
+    {"epsg", "u32", "EPSG code"},
     {"station", "u32", "Station"}, {"moving", "hex", "Moving", 4},
-    {"x", "f64", "Anchor x, m, or latitude, °"}, {"y", "f64", "Anchor y, m, or longitude, °"}, {"z", "f64", "Anchor z", "m"},
-    {"scale_m", "f64", "A count is at most", "m"}, {"lat_deg", "f64", "Latitude", "°"}, {"lon_deg", "f64", "Longitude", "°"},
+    {"x", "f64", "Anchor x, m, or latitude, °"}, {"y", "f64", "Anchor y, m, or longitude, °"},
+    {"z", "f64", "Anchor z", "m"},
+    {"scale_m", "f64", "A count is at most", "m"}, {"lat_deg", "f64", "Latitude", "°"},
+    {"lon_deg", "f64", "Longitude", "°"},
     {"height_m", "f64", "Ellipsoidal height", "m"}, {"station_x_m", "f64", "Station x in the scene", "m"},
     {"station_y_m", "f64", "Station y in the scene", "m"}, {"station_z_m", "f64", "Station z in the scene", "m"},
     {"rotation", "f64", "Rotation, head to scene, row by row", nil, 9},
@@ -204,46 +207,54 @@ local ROWS = {
     {"scan_fired", "u64", "Fired in the scan", "pulses"}, {"scan_cast", "u64", "Cast in the scan", "pulses"},
     {"scan_lost", "u64", "Lost by the head in the scan", "pulses"}}),
   [EVENT] = rows_of("event.", {
-    {"code", "u32", "Event", {"STATE", "SCAN_START", "SCAN_END", "OVERRUN", "READER_LOST", "CONTROL", "ERROR", "SETTINGS",
-                              "POSE_LATE", "PPS", "TIME", "SITE"}},
+    {"code", "u32", "Event", {"STATE", "SCAN_START", "SCAN_END", "OVERRUN", "READER_LOST", "CONTROL", "ERROR",
+                              "SETTINGS", "POSE_LATE", "PPS", "TIME", "SITE"}},
     {"reserved", "zero", "Reserved"}, {"a", "u64", "a"}, {"b", "u64", "b"}, {"c", "u64", "c"},
     {"text", "text", "Text", 96}}),
   [SURFACES] = rows_of("surfaces.", {{"first", "u32", "First label"}, {"count", "u32", "Surfaces"}}),
   [POSES] = rows_of("poses.", {{"n", "u32", "Poses"}, {"reserved", "zero", "Reserved"}}),
   pose = rows_of("pose.", {
-    {"t_s", "s", "Time since the scan's start"}, {"x_m", "f64", "x", "m"}, {"y_m", "f64", "y", "m"}, {"z_m", "f64", "z", "m"},
+    {"t_s", "s", "Time since the scan's start"}, {"x_m", "f64", "x", "m"}, {"y_m", "f64", "y", "m"},
+    {"z_m", "f64", "z", "m"},
     {"qw", "f64", "Quaternion w"}, {"qx", "f64", "Quaternion x"}, {"qy", "f64", "Quaternion y"},
     {"qz", "f64", "Quaternion z"}, {"frame", "f64", "Frame scalar"}, {"flags", "hex", "Flags", 8},
     {"reserved", "zero", "Reserved"}}),
-  [ATTRIBUTES] = rows_of("attributes.", {{"pulse0", "u64", "First pulse"}, {"line", "u32", "Line"}, {"n_points", "u32", "Points"}}),
+  [ATTRIBUTES] = rows_of("attributes.", {
+    {"pulse0", "u64", "First pulse"}, {"line", "u32", "Line"}, {"n_points", "u32", "Points"}}),
   [EMITTER] = rows_of("emitter.", {
     {"kind", "u32", "Kind", {[0] = "line", "planar", "beams", "sphere", "directions"}}, {"n_beams", "u32", "Beams"},
     {"steps", "u32", "Steps of a line"}, {"first_step", "i32", "First step that is cast"},
     {"last_step", "i32", "Last step that is cast"}, {"front_step", "i32", "Step that looks along y"},
     {"turn", "i32", "Turn", {[1] = "clockwise", [-1] = "counter-clockwise"}}, {"rings", "u32", "Rings of a frame"},
-    {"sequence_num", "u64", "Firing sequence, numerator", "ns"}, {"sequence_den", "u64", "Firing sequence, denominator"},
+    {"sequence_num", "u64", "Firing sequence, numerator", "ns"},
+    {"sequence_den", "u64", "Firing sequence, denominator"},
     {"first_ring_deg", "deg", "Elevation of ring 0"},
     {"echoes", "u32", "Echoes sent of a pulse", {[0] = "all", "the first", "the last", "the strongest"}},
     {"gaps", "u32", "Gaps from pole to pole"}}),
   beam = rows_of("beam.", {{"elevation_deg", "deg32", "Elevation"}, {"azimuth_deg", "deg32", "Azimuth"},
                            {"offset_ns", "u32", "Fires after the sequence's first", "ns"}}),
-  [COLOURS] = rows_of("colours.", {{"pulse0", "u64", "First pulse"}, {"line", "u32", "Line"}, {"n_points", "u32", "Points"}}),
+  [COLOURS] = rows_of("colours.", {
+    {"pulse0", "u64", "First pulse"}, {"line", "u32", "Line"}, {"n_points", "u32", "Points"}}),
 }
--- Bits of a field, as further rows under it.
-local function bits(of, list)
+-- Bits of a field, as further rows under it: {name, title, mask}.
+local function bits(of, prefix, name, list)
   for _, row in ipairs(of) do
-    if row.name == list.of then
+    if row.name == name then
       row.bits = {}
-      for _, b in ipairs(list) do
-        row.bits[#row.bits + 1] = add_field(list.prefix .. list.of .. "." .. b[1], ProtoField.bool, b[2], 32, YES_NO, b[3])
+      for i, bit in ipairs(list) do
+        row.bits[i] = add_field(prefix .. name .. "." .. bit[1], ProtoField.bool, bit[2], 32, YES_NO, bit[3])
       end
     end
   end
 end
-bits(ROWS.content, {of = "content", prefix = "descriptor.", {"attributes", "Attributes follow points", 1}, {"colours", "Colours follow points", 2}})
-bits(ROWS[ANCHOR], {of = "moving", prefix = "anchor.", {"moves", "The head moves", 1}, {"stop", "It stands at a stop of a trajectory", 2}})
-bits(ROWS[LINE_END], {of = "status", prefix = "line_end.", {"last", "Last line of the frame", 1}, {"stopped", "The scan was stopped within the line", 2}})
-bits(ROWS.pose, {of = "flags", prefix = "pose.", {"extrapolated", "Extrapolated", 1}, {"late", "Late: taken to stand", 2}, {"none", "None had come yet", 4}})
+bits(ROWS.content, "descriptor.", "content",
+     {{"attributes", "Attributes follow points", 1}, {"colours", "Colours follow points", 2}})
+bits(ROWS[ANCHOR], "anchor.", "moving",
+     {{"moves", "The head moves", 1}, {"stop", "It stands at a stop of a trajectory", 2}})
+bits(ROWS[LINE_END], "line_end.", "status",
+     {{"last", "Last line of the frame", 1}, {"stopped", "The scan was stopped within the line", 2}})
+bits(ROWS.pose, "pose.", "flags",
+     {{"extrapolated", "Extrapolated", 1}, {"late", "Late: taken to stand", 2}, {"none", "None had come yet", 4}})
 
 local GOOD_BAD = {[0] = "Bad", "Good"}
 add_field("type", ProtoField.uint8, "Type", base.DEC, TYPES)
@@ -295,7 +306,8 @@ add_field("point.y", real(), "y, or longitude")
 add_field("point.z", real("m"), "z")
 local ATTRIBUTE_FIELDS = {add_field("attribute.amplitude_db", real("dB"), "Amplitude"),
                           add_field("attribute.width_ns", real("ns"), "Width of the echo")}
-local COLOUR_FIELDS = {add_field("colour.red", ProtoField.uint8, "Red"), add_field("colour.green", ProtoField.uint8, "Green"),
+local COLOUR_FIELDS = {add_field("colour.red", ProtoField.uint8, "Red"),
+                       add_field("colour.green", ProtoField.uint8, "Green"),
                        add_field("colour.blue", ProtoField.uint8, "Blue")}
 local SURFACE_FIELDS = {add_field("surface.label", ProtoField.uint16, "Label"),
                         add_field("surface.object", ProtoField.string, "Object"),
@@ -334,7 +346,8 @@ add_expert("bad_command", "No command line", "MALFORMED", "ERROR")
 scanhead.experts = expert_list
 
 scanhead.prefs.port = Pref.uint("TCP port of heads", 5025, "Other ports are found by the first frame on them")
-scanhead.prefs.user0 = Pref.bool("Link type 147 (USER0) has frames", true, "As `scanhead record -o FILE.pcapng` writes them")
+scanhead.prefs.user0 = Pref.bool("Link type 147 (USER0) has frames", true,
+                                 "As `scanhead record -o FILE.pcapng` writes them")
 scanhead.prefs.most = Pref.uint("Most points shown of a frame", 4000, "Fewer open faster")
 
 -- ---- sequence numbers: PROTOCOL.md, *Sequence numbers*; the same as native_sequence.c
@@ -451,7 +464,8 @@ end
 
 local function wrong_poses(bytes, at, len)
   local n, before = number_at(bytes, at), nil
-  if n < 2 or n > floor((len - 8) / 80) then return string.format("%d poses, allowed 2 to %d", n, floor((len - 8) / 80)) end
+  local most = floor((len - 8) / 80)
+  if n < 2 or n > most then return string.format("%d poses, allowed 2 to %d", n, most) end
   for i = 0, n - 1 do
     local from = at + 8 + 80 * i
     local problem = wrong_row(ROWS.pose, bytes, from)
@@ -510,7 +524,9 @@ end
 local function forget(flow) flow.descriptor, flow.anchor, flow.emitter = nil, nil, nil end
 
 -- Counting begins with a scan that is seen from its start, and goes on as long as nothing is missing.
-local function begin_scan(flow, scan) flow.scan = {number = scan, received = 0} flow.line = {pulses = 0, whole = true} end
+local function begin_scan(flow, scan)
+  flow.scan, flow.line = {number = scan, received = 0}, {pulses = 0, whole = true}
+end
 
 local ABSORB = {
   [DESCRIPTOR] = function(flow, h, bytes, at, m)
@@ -538,7 +554,8 @@ local ABSORB = {
   [EMITTER] = function(flow, _, bytes, at) flow.emitter = number_at(bytes, at) ~= 0 end,
   [POINTS] = function(flow, h, bytes, at, m)
     local _, line = unpack_bytes("<I4I4", bytes, at + 1)
-    local pulse0, t0_ns, n_pulses, n = number64(bytes, at + 8), signed64(bytes, at + 16), unpack_bytes("<I4I4", bytes, at + 33)
+    local pulse0, t0_ns = number64(bytes, at + 8), signed64(bytes, at + 16)
+    local n_pulses, n = unpack_bytes("<I4I4", bytes, at + 33)
     if flow.last_pulse0 and pulse0 < flow.last_pulse0 then forget(flow) end
     if flow.anchor and flow.anchor.until_ns ~= 0 and t0_ns >= flow.anchor.until_ns then flow.anchor = nil end
     flow.last_pulse0 = pulse0
@@ -568,15 +585,16 @@ local ABSORB = {
                   lost = number64(bytes, at + 88)}
   end,
   [EVENT] = function(flow, _, bytes, at, m)
-    local code, a, b, c = number_at(bytes, at), number64(bytes, at + 8), number64(bytes, at + 16), number64(bytes, at + 24)
+    local code, a = number_at(bytes, at), number64(bytes, at + 8)
+    local b, c = number64(bytes, at + 16), number64(bytes, at + 24)
     if code == 2 then
       if flow.descriptor and flow.descriptor.scan ~= a then forget(flow) end
       begin_scan(flow, a)
     elseif code == 3 and flow.final and flow.final.scan == a then
       local f = flow.final
       if f.fired ~= b or f.lost ~= c or f.cast > f.fired or f.lost > f.cast then
-        m.counts = string.format("telemetry: %.0f fired, %.0f cast, %.0f lost; SCAN_END: %.0f fired, %.0f lost", f.fired,
-                                 f.cast, f.lost, b, c)
+        m.counts = string.format("telemetry: %.0f fired, %.0f cast, %.0f lost; SCAN_END: %.0f fired, %.0f lost",
+                                 f.fired, f.cast, f.lost, b, c)
       end
       if flow.scan and flow.scan.number == a then m.missing = f.cast - f.lost - flow.scan.received end
       flow.scan = nil
@@ -599,9 +617,9 @@ local function absorb(flow, h, bytes, at, m)
     flow.line.whole = false
   end
   if m.notice == RESTARTED then flow.scan, flow.line = nil, {pulses = 0, whole = false} end
-  m.lost_so_far = flow.lost
+  if m.notice then m.lost_so_far = flow.lost end
   if h.version ~= 1 then return end
-  m.wrong = wrong_payload(h, bytes, at)
+  m.wrong = wrong_payload(h, bytes, at) or false
   if m.wrong or m.notice == REPEATED or m.notice == LATE then return end
   if ABSORB[h.type] then ABSORB[h.type](flow, h, bytes, at, m) end
   if h.type == POINTS then
@@ -677,7 +695,9 @@ local function put_records(tree, tvb, at, len, n, what, put)
     end
     put(group, at + i * len, i)
   end
-  if shown < n then tree:add(tvb(at + shown * len, (n - shown) * len), string.format("%d more (preference: most points shown)", n - shown)) end
+  if shown == n then return end
+  tree:add(tvb(at + shown * len, (n - shown) * len),
+           string.format("%d more (preference: most points shown)", n - shown))
 end
 
 -- WGS 84, NIMA TR8350.2: geodetic to geocentric.
@@ -692,8 +712,8 @@ end
 -- Of the fields of points, by what follows their dot, those that somebody looks at; a frame has thousands of points.
 local function looked_at(tree)
   local wanted, any = {}, false
-  for _, name in ipairs({"pulse", "t_s", "echo", "echo_count", "label", "reflectance_db", "range_m", "line_deg", "pan_deg",
-                         "x", "y", "z"}) do
+  for _, name in ipairs({"pulse", "t_s", "echo", "echo_count", "label", "reflectance_db", "range_m", "line_deg",
+                         "pan_deg", "x", "y", "z"}) do
     wanted[name] = (tree.visible or tree:referenced(F["point." .. name])) and F["point." .. name]
     any = any or wanted[name]
   end
@@ -763,7 +783,10 @@ local function put_points(tree, tvb, bytes, at, _, m)
     local item, words = group:add(F["point"], tvb(from, 20)), count == 0 and "no echo" or ""
     if is_geo and count > 0 then words = put_geo(item, wanted, m, tvb, from, a, b, c)
     elseif can_place and not is_geo then words = put_polar(item, wanted, m, tvb, from, a, b, c, count > 0) end
-    if refl ~= -32768 and wanted.reflectance_db then put_real(item, wanted.reflectance_db, tvb(from + 12, 2), refl / 100) end
+    local has_reflectance = refl ~= -32768
+    if has_reflectance and wanted.reflectance_db then
+      put_real(item, wanted.reflectance_db, tvb(from + 12, 2), refl / 100)
+    end
     if wanted.label then item:add(wanted.label, tvb(from + 14, 2), label) end
     if wanted.t_s then
       local carry = floor((t0_ns + dt) / 1000000000)
@@ -774,7 +797,7 @@ local function put_points(tree, tvb, bytes, at, _, m)
     if wanted.pulse then item:add(wanted.pulse, tvb(from, 20), UInt64.new(pulse)):set_generated() end
     if not is_shown then return end
     item:set_text(string.format("Point %d: pulse %.0f, echo %d of %d: %s%s%s", i, pulse, echo, count, words,
-                                refl ~= -32768 and string.format(", %.2f dB", refl / 100) or "",
+                                has_reflectance and string.format(", %.2f dB", refl / 100) or "",
                                 label ~= 0xffff and string.format(", label %d", label) or ""))
   end)
 end
@@ -837,8 +860,8 @@ local function put_beams(tree, tvb, bytes, at)
   end)
 end
 
-local RECORDS = {[POINTS] = put_points, [ATTRIBUTES] = put_attributes, [COLOURS] = put_colours, [SURFACES] = put_surfaces,
-                 [POSES] = put_poses, [EMITTER] = put_beams}
+local RECORDS = {[POINTS] = put_points, [ATTRIBUTES] = put_attributes, [COLOURS] = put_colours,
+                 [SURFACES] = put_surfaces, [POSES] = put_poses, [EMITTER] = put_beams}
 -- Bytes of a payload with its records, for what may stand after them.
 local function known_len(h, bytes, at)
   if h.type == POINTS then return 40 + 20 * number_at(bytes, at + 36) end
@@ -854,27 +877,32 @@ end
 -- What a, b and c of an event are; {name, "s"} is nanoseconds, {name, STATES} a state.
 local SECONDS = "s"
 local EVENTS = {
-  {"new state", "state before"}, {"scan", "device time of pulse 0", "its GPS time"}, {"scan", "pulses fired", "pulses lost by the head"},
+  {"new state", "state before"}, {"scan", "device time of pulse 0", "its GPS time"},
+  {"scan", "pulses fired", "pulses lost by the head"},
   {"first lost pulse", "pulses lost", "ticks lost"}, {"frames lost now", "pulses in them", "frames lost in all"},
   {"session with control"}, {"SCPI number", "session", "errors held back"}, {"first pulse with the new settings"},
   {"poses made up so far", nil, "since the last one"}, {"UTC, s since 1970", "device time of the edge", "GPS time, s"},
   {nil, "device time", "its GPS time"}, {"station", "warnings of its place"},
 }
-local IN_SECONDS = {[2] = {false, true, true}, [9] = {false, false, true}, [10] = {false, true, false}, [11] = {false, true, true}}
-local TROUBLE = {[4] = "event_warning", [5] = "event_warning", [9] = "event_warning", [7] = "event_note", [2] = "event_chat",
-                 [3] = "event_chat"}
+local IN_SECONDS = {[2] = {false, true, true}, [9] = {false, false, true}, [10] = {false, true, false},
+                    [11] = {false, true, true}}
+local TROUBLE = {[4] = "event_warning", [5] = "event_warning", [9] = "event_warning", [7] = "event_note",
+                 [2] = "event_chat", [3] = "event_chat"}
 
 local function event_words(code, i, value, range)
   local meaning = EVENTS[code] and EVENTS[code][i]
   if not meaning then return "" end
   if code == 1 then return string.format(" (%s: %s)", meaning, STATES[value] or "?") end
   if code == 7 and i == 1 then return string.format(" (%s: %s)", meaning, tostring(range:le_int64())) end
-  if IN_SECONDS[code] and IN_SECONDS[code][i] then return string.format(" (%s: %s s)", meaning, tostring(time_of(range:le_int64()))) end
+  if IN_SECONDS[code] and IN_SECONDS[code][i] then
+    return string.format(" (%s: %s s)", meaning, tostring(time_of(range:le_int64())))
+  end
   return " (" .. meaning .. ")"
 end
 
 local function put_event(tree, tvb, bytes, at)
-  local code, values = number_at(bytes, at), {number64(bytes, at + 8), number64(bytes, at + 16), number64(bytes, at + 24)}
+  local code = number_at(bytes, at)
+  local values = {number64(bytes, at + 8), number64(bytes, at + 16), number64(bytes, at + 24)}
   for i = 1, 3 do ROWS[EVENT][i + 2].item:append_text(event_words(code, i, values[i], tvb(at + 8 * i, 8))) end
   local name = ROWS[EVENT][1][4][code]
   local text = tvb(at + 32, 96):stringz()
@@ -890,6 +918,7 @@ local function put_payload(tree, tvb, bytes, at, h, m)
     tree:add_proto_expert_info(E.type_unknown)
     return
   end
+  if m.wrong == nil then m.wrong = wrong_payload(h, bytes, at) end -- it was not there at the first look
   put_rows(tree, rows, tvb, at, h.length)
   if h.type == DESCRIPTOR and h.length >= 280 then put_rows(tree, ROWS.content, tvb, at + 272, 8) end
   if m.wrong then
@@ -911,7 +940,8 @@ local function put_findings(tree, h, m)
     if m.notice == GAP then
       tree:add(F["seq.first_lost"], m.first_lost):set_generated()
       tree:add(F["seq.lost"], m.lost):set_generated()
-      tree:add_proto_expert_info(E.gap, string.format("%.0f frames are missing before this one, from %.0f on", m.lost, m.first_lost))
+      tree:add_proto_expert_info(E.gap, string.format("%.0f frames are missing before this one, from %.0f on", m.lost,
+                                                      m.first_lost))
     else
       tree:add_proto_expert_info(E[NOTICES[m.notice]])
     end
@@ -923,8 +953,11 @@ local function put_findings(tree, h, m)
   if m.line_lost then tree:add(F["line_end.lost_pulses"], Int64.new(m.line_lost)):set_generated() end
   if m.missing then
     tree:add(F["missing_pulses"], Int64.new(m.missing)):set_generated()
-    if m.missing > 0 then tree:add_proto_expert_info(E.missing, string.format("%.0f pulses of the scan are not in this capture", m.missing)) end
-    if m.missing < 0 then tree:add_proto_expert_info(E.counts, string.format("%.0f pulses more than the head has delivered", -m.missing)) end
+    if m.missing > 0 then
+      tree:add_proto_expert_info(E.missing, string.format("%.0f pulses of the scan are not in this capture", m.missing))
+    elseif m.missing < 0 then
+      tree:add_proto_expert_info(E.counts, string.format("%.0f pulses more than the head has delivered", -m.missing))
+    end
   end
 end
 
@@ -939,7 +972,9 @@ local function put_header(tree, tvb, at, header_ok, payload_ok)
   put("length", 4, 4)
   put("seq", 8, 4)
   local crc = put("payload_crc", 12, 4)
-  if payload_ok ~= nil then tree:add(F["payload_crc.status"], tvb(at + 12, 4), payload_ok and 1 or 0):set_generated() end
+  if payload_ok ~= nil then
+    tree:add(F["payload_crc.status"], tvb(at + 12, 4), payload_ok and 1 or 0):set_generated()
+  end
   if payload_ok == false then crc:add_proto_expert_info(E.bad_payload) end
   tree:add(F["t_s"], tvb(at + 16, 8), time_of(tvb(at + 16, 8):le_int64()))
   crc = put("header_crc", 24, 4)
@@ -949,7 +984,7 @@ end
 
 -- What the packet list says of a frame.
 local function summary(h, bytes, at, m)
-  local name = TYPES[h.type] or "Type " .. h.type
+  local name = TYPES[h.type] or string.format("Type %d", h.type)
   if m.wrong or h.version ~= 1 then return name .. " [wrong]" end
   if h.type == POINTS then
     local line, n = number_at(bytes, at + 4), number_at(bytes, at + 36)
@@ -981,7 +1016,8 @@ local function header_at(bytes, at)
           is_repeat = flags % 2 == 1, is_local = floor(flags / 2) % 2 == 1, look = bytes:sub(at + 2, at + 24)}
 end
 
--- Where the next correct header begins, from `at` on and before `last`: or a sync byte with too few bytes after it to know.
+-- Where the next correct header begins, from `at` on and before `last`; or a sync byte with too few bytes after it to
+-- know.
 local function next_header(bytes, at, last)
   while true do
     local found = bytes:find("\xd5", at + 1, true)
@@ -992,16 +1028,19 @@ local function next_header(bytes, at, last)
   end
 end
 
-local function new_flow() return {sequence = new_sequence(), in_step = true, started = false, lost = 0, waiting = 0, line = {pulses = 0, whole = false}} end
+local function new_flow()
+  return {sequence = new_sequence(), in_step = true, started = false, lost = 0, waiting = 0,
+          line = {pulses = 0, whole = false}}
+end
 
 -- What was found in a packet when it came first. Wireshark may cut the same bytes otherwise when it looks again: so the
--- content is the key, and what is there twice is taken in turns.
+-- content is the key, and what is there twice is a list that is taken in turns.
 local memo
 
 local function memo_of(pinfo)
   local packet = memo[pinfo.number]
   if not packet then
-    packet = {starts = {}, found = {}, turn = {}, joined = {}}
+    packet = {}
     memo[pinfo.number] = packet
   end
   return packet
@@ -1010,15 +1049,22 @@ end
 -- The entry of `what`; a new one is given to make(entry) once.
 local function find(pinfo, what, make)
   local packet = memo_of(pinfo)
-  local list = packet.found[what] or {}
-  packet.found[what] = list
+  local entry = packet[what]
   if pinfo.visited then
-    if #list == 0 then return {packet = pinfo.number} end
-    packet.turn[what] = (packet.turn[what] or 0) % #list + 1
-    return list[packet.turn[what]]
+    if entry and entry.turns then
+      entry.turn = (entry.turn or 0) % #entry.turns + 1
+      return entry.turns[entry.turn]
+    end
+    return entry or {packet = pinfo.number}
   end
-  local m = {packet = pinfo.number, time = pinfo.rel_ts}
-  list[#list + 1] = m
+  local m = {packet = pinfo.number}
+  if not entry then
+    packet[what] = m
+  elseif entry.turns then
+    entry.turns[#entry.turns + 1] = m
+  else
+    packet[what] = {turns = {entry, m}}
+  end
   make(m)
   return m
 end
@@ -1034,12 +1080,17 @@ Search.__index = Search
 
 local function new_search(tvb, pinfo, tree, conn, can_wait)
   local flow = conn.down
-  local self = setmetatable({tvb = tvb, pinfo = pinfo, tree = tree, conn = conn, flow = flow, can_wait = can_wait, at = 0,
-                             len = tvb:len(), bytes = tvb:raw(0, tvb:len()), items = {}, said = 0, reach = 0}, Search)
-  local starts, key = memo_of(pinfo).starts, self.bytes:sub(1, 64)
-  if not pinfo.visited then starts[key] = starts[key] or {in_step = flow.in_step, started = flow.started} end
-  local start = starts[key] or {in_step = true, started = true}
-  self.in_step, self.started = start.in_step, start.started
+  local self = setmetatable({tvb = tvb, pinfo = pinfo, tree = tree, conn = conn, flow = flow, can_wait = can_wait,
+                             at = 0, len = tvb:len(), bytes = tvb:raw(0, tvb:len()), items = {}, said = 0, reach = 0},
+                            Search)
+  if conn.is_stream then
+    local packet, key = memo_of(pinfo), "starts with " .. self.bytes:sub(1, 28)
+    if not packet[key] and not pinfo.visited then packet[key] = {in_step = flow.in_step, started = flow.started} end
+    local start = packet[key] or {in_step = true, started = true}
+    self.in_step, self.started = start.in_step, start.started
+  else
+    self.in_step, self.started = true, true
+  end
   return self
 end
 
@@ -1053,7 +1104,8 @@ end
 -- Bytes up to `to` that belong to nothing. Where they look like a frame, its header is shown.
 function Search:show_garbage(from, to, is_join)
   local tvb, n = self.tvb, to - from
-  local item = self.tree:add(scanhead, tvb(from, n), string.format("Scan head, %d bytes that belong to no frame and no line", n))
+  local item = self.tree:add(scanhead, tvb(from, n),
+                             string.format("Scan head, %d bytes that belong to no frame and no line", n))
   if is_join then
     item:add(F["bad_bytes"], tvb(from, n)):add_proto_expert_info(E.joined)
   else
@@ -1066,7 +1118,8 @@ end
 function Search:end_garbage()
   local from = self.garbage
   self.garbage = nil
-  if from and from < self.at then self:add(self.show_garbage, from, self.at, self.conn.is_stream and not self.started) end
+  if not from or from == self.at then return end
+  self:add(self.show_garbage, from, self.at, self.conn.is_stream and not self.started)
 end
 
 -- reach: up to where it took bytes to see that.
@@ -1089,13 +1142,18 @@ function Search:show_frame(at, h)
   local item = self.tree:add(scanhead, tvb(at, HEADER_LEN + h.length), "Scan head, " .. words)
   put_header(item, tvb, at, true, true)
   put_findings(item, h, m)
-  if h.version == 1 then put_payload(item, tvb, self.bytes, payload, h, m) else item:add_proto_expert_info(E.version_unknown) end
+  if h.version == 1 then
+    put_payload(item, tvb, self.bytes, payload, h, m)
+  else
+    item:add_proto_expert_info(E.version_unknown)
+  end
   self:say(words .. (m.notice and " [" .. NOTICES[m.notice] .. "]" or ""))
 end
 
 function Search:show_broken(at, h, to, is_cut)
   local tvb = self.tvb
-  local item = self.tree:add(scanhead, tvb(at, to - at), string.format("Scan head, broken frame: %s", TYPES[h.type] or h.type))
+  local name = TYPES[h.type] or string.format("Type %d", h.type)
+  local item = self.tree:add(scanhead, tvb(at, to - at), "Scan head, broken frame: " .. name)
   if is_cut then
     put_header(item, tvb, at, true, nil)
     item:add_proto_expert_info(E.cut)
@@ -1103,7 +1161,7 @@ function Search:show_broken(at, h, to, is_cut)
     put_header(item, tvb, at, true, false)
   end
   if to > at + HEADER_LEN then item:add(F["payload"], tvb(at + HEADER_LEN, to - at - HEADER_LEN)) end
-  self:say((TYPES[h.type] or h.type) .. (is_cut and " [cut]" or " [bad CRC]"))
+  self:say(name .. (is_cut and " [cut]" or " [bad CRC]"))
   if not self.pinfo.visited then self.flow.line.whole = false end
 end
 
@@ -1138,7 +1196,7 @@ function Search:show_reply(at, n)
   local words = self.bytes:sub(at + 1, at + n)
   local m = find(self.pinfo, "reply " .. words, function(m)
     m.command = conn.first <= conn.last and conn.commands[conn.first] or nil
-    m.unasked = conn.last > 0 and not m.command
+    m.unasked, m.time = conn.last > 0 and not m.command, self.pinfo.rel_ts
     if m.command then conn.first, m.command.reply_in = conn.first + 1, self.pinfo.number end
   end)
   local item = self.tree:add(scanhead, tvb(at, n + 2), "Scan head, reply: " .. words)
@@ -1158,15 +1216,16 @@ end
 function Search:look_text()
   local n = #self.bytes:match("^[ -~]*", self.at + 1)
   local ending = self.bytes:sub(self.at + n + 1, self.at + n + 2)
-  if n > MOST_REPLY - 2 or (ending ~= "\r\n" and ending ~= "\r" and ending ~= "") then return self:skip(self.at + n, self.at + n + 2) end
+  local may_end = ending == "\r\n" or ending == "\r" or ending == ""
+  if n > MOST_REPLY - 2 or not may_end then return self:skip(self.at + n, self.at + n + 2) end
   if ending == "\r\n" then return self:take(n + 2, self.show_reply, n) end
   if self.can_wait then return true end
   self:skip(self.len)
 end
 
--- Gives where it waits, for how many bytes more (nil: not known), and whether TCP must not join them: what stands before
--- that place was found with bytes from beyond it, or the place is within the bytes that the last search has waited with.
--- Or nothing, where all is used.
+-- Gives where it waits, for how many bytes more (nil: not known), and whether TCP must not join them: what stands
+-- before that place was found with bytes from beyond it, or the place is within the bytes that the last search has
+-- waited with. Or nothing, where all is used.
 function Search:run()
   local waits, more
   while self.at < self.len and not waits do
@@ -1197,12 +1256,16 @@ local function run_commands(tvb, pinfo, tree, conn, can_wait)
     local n = #words + #ending
     if words ~= "" then
       local m = find(pinfo, "command " .. words, function(m)
-        conn.last = conn.last + 1
+        conn.last, m.time = conn.last + 1, pinfo.rel_ts
         conn.commands[conn.last] = m
       end)
       local is_text = #words <= MOST_COMMAND and not words:find("[^ -~]")
       local item = tree:add(scanhead, tvb(at, n), "Scan head, command: " .. (is_text and words or #words .. " bytes"))
-      if is_text then item:add(F["command"], tvb(at, #words)) else item:add(F["bad_bytes"], tvb(at, #words)):add_proto_expert_info(E.bad_command) end
+      if is_text then
+        item:add(F["command"], tvb(at, #words))
+      else
+        item:add(F["bad_bytes"], tvb(at, #words)):add_proto_expert_info(E.bad_command)
+      end
       if m.reply_in then item:add(F["reply_in"], m.reply_in):set_generated() end
       note_info(pinfo, "Command " .. (is_text and words or "[bad bytes]"))
     end
@@ -1243,7 +1306,7 @@ end
 -- Frames that go on in the next packet are joined here, unless `ask` gets TCP to do it: ask(at, more). At some places
 -- TCP would give again what was taken already, or cut it otherwise at the next look. There, too, it is done here.
 local function dissect_joined(tvb, pinfo, tree, conn, side, run, ask)
-  local key, packet, first_time = side .. tvb:offset(), memo_of(pinfo).joined, not pinfo.visited
+  local key, packet, first_time = side .. tvb:offset(), memo_of(pinfo), not pinfo.visited
   local kept = packet[key]
   if not kept then
     kept = {}
@@ -1298,9 +1361,9 @@ end
 
 -- The same for ever, once a packet was seen.
 local function side_of(tvb, pinfo, conn)
-  local key = "side" .. pinfo.number
-  if memo[key] == nil then memo[key] = is_from_head(tvb, pinfo, conn) end
-  return memo[key]
+  local packet = memo_of(pinfo)
+  if packet.side == nil then packet.side = is_from_head(tvb, pinfo, conn) end
+  return packet.side
 end
 
 local function dissect_tcp(tvb, pinfo, tree)
@@ -1345,7 +1408,6 @@ end
 
 function scanhead.dissector(tvb, pinfo, tree)
   if pinfo.port_type == PORT_TYPE_TCP then return dissect_tcp(tvb, pinfo, tree) end
-  if usb_end(pinfo) then return dissect_usb(tvb, pinfo, tree) end
   return dissect_user0(tvb, pinfo, tree)
 end
 
@@ -1367,9 +1429,6 @@ scanhead:register_heuristic("usb.bulk", function(tvb, pinfo, tree)
   return true
 end)
 
-local PRODUCT = 0x1209 * 65536 + 0x0001
-DissectorTable.get("usb.product"):add(PRODUCT, scanhead)
-DissectorTable.get("usb.device"):add_for_decode_as(scanhead)
 DissectorTable.get("ws.protocol"):add("scanhead-native-1", web)
 local USER0 = wtap and wtap.USER0 or wtap_encaps and wtap_encaps.USER0 or 45
 

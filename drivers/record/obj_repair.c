@@ -1,0 +1,73 @@
+/* Repair of .obj. A mesh is held in memory until all scans are over, so only a recorder that was killed while it wrote the file
+ * has left something: lines of text, in which a triangle follows the vertices that it names. All whole lines are kept. The
+ * file of materials, which is written after them, is missing then. */
+#include "drivers/record/obj_repair.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { LINE_MOST = 512 };
+static const char INCOMPLETE[] = "# incomplete: the recorder came to no end; what should follow may be missing\n";
+
+struct obj_lines {
+    uint64_t n_vertices, n_objects;
+    int is_marked; /* the last line says that the file is incomplete */
+};
+
+static int are_numbers(const char *text)
+{
+    return *text != '\0' && strspn(text, "0123456789+-.eE ") == strlen(text);
+}
+
+/* Each corner is a vertex that is there; texture coordinate and normal have its number. */
+static int is_face(const struct obj_lines *o, const char *text)
+{
+    if (*text == '\0' || strspn(text, "0123456789/ ") != strlen(text)) return 0;
+    while (*text != '\0') {
+        char *end;
+        const unsigned long long v = strtoull(text, &end, 10);
+        if (end == text || v == 0 || v > o->n_vertices) return 0;
+        text = end + strcspn(end, " ");
+        text += strspn(text, " ");
+    }
+    return 1;
+}
+
+static int begins(const char *line, const char *key)
+{
+    return strncmp(line, key, strlen(key)) == 0;
+}
+
+static int take_line(void *ctx, const char *line, size_t len)
+{
+    struct obj_lines *o = ctx;
+    if (strlen(line) != len || len >= LINE_MOST) return 0;
+    o->is_marked = len == sizeof INCOMPLETE - 2 && memcmp(line, INCOMPLETE, len) == 0;
+    if (begins(line, "v ")) {
+        if (!are_numbers(line + 2)) return 0;
+        o->n_vertices++;
+        return 1;
+    }
+    if (begins(line, "vn ") || begins(line, "vt ")) return are_numbers(line + 3);
+    if (begins(line, "f ") || begins(line, "p ")) return is_face(o, line + 2);
+    o->n_objects += (uint64_t)begins(line, "o ");
+    return begins(line, "o ") || begins(line, "#") || begins(line, "usemtl ") || begins(line, "mtllib ");
+}
+
+int obj_repair(struct repair *r, struct sh_err *err)
+{
+    struct obj_lines o = {0};
+    uint64_t end;
+    int rc = repair_lines(r, 0, take_line, &o, &end, err);
+    if (rc == SH_OK && o.n_vertices == 0) rc = repair_fail_none(r, "mesh of the OBJ format", err);
+    if (rc == SH_OK) rc = repair_check_rest(r, end, LINE_MOST, err);
+    if (rc != SH_OK) return rc;
+    r->unit = "points";
+    r->n_kept = o.n_vertices;
+    r->n_scans = o.n_objects;
+    r->was_whole = end == r->len && (!repair_is_part(r) || o.is_marked);
+    rc = repair_cut(r, end, err);
+    if (rc == SH_OK && !r->was_whole && !o.is_marked) repair_append_note(r, end, INCOMPLETE, sizeof INCOMPLETE - 1);
+    return rc;
+}
