@@ -15,16 +15,22 @@ static int port_of(int fd)
     return ntohs(at.sin_port);
 }
 
-/* A listening device of the test's own; source: the recorder's SOURCE. */
-static int device_open(char source[64])
+/* A listening device of the test's own. port 0: the system chooses. source: the recorder's SOURCE. */
+static int device_open_at(int port, char source[64])
 {
-    struct sockaddr_in at = {.sin_family = AF_INET};
+    struct sockaddr_in at = {.sin_family = AF_INET, .sin_port = htons((uint16_t)port)};
     at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    const int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    const int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0), one = 1;
+    setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one);
     assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at), 0);
     assert_int_equal(listen(fd, 8), 0);
     snprintf(source, 64, "tcp:127.0.0.1:%d", port_of(fd));
     return fd;
+}
+
+static int device_open(char source[64])
+{
+    return device_open_at(0, source);
 }
 
 static int take_connection(int fd)
@@ -313,7 +319,7 @@ static void test_clients(void **state)
     char source[64];
     uint8_t byte;
     int device = device_open(source);
-    const int device_port = port_of(device), one = 1;
+    const int device_port = port_of(device);
     struct raw_recorder recorder = raw_recorder_start(wire, source, (const char *const[]){"--relay", "0", NULL});
     int client = raw_connect(recorder.endpoint), fd = take_connection(device);
     raw_write(client, "a", 1);
@@ -326,12 +332,7 @@ static void test_clients(void **state)
     client = raw_connect(recorder.endpoint);
     assert_int_equal(read_all(client, &byte, 0), 0);
     close(client);
-    struct sockaddr_in at = {.sin_family = AF_INET, .sin_port = htons((uint16_t)device_port)};
-    at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    device = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    setsockopt(device, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one);
-    assert_int_equal(bind(device, (struct sockaddr *)&at, sizeof at), 0);
-    assert_int_equal(listen(device, 1), 0);
+    device = device_open_at(device_port, source);
     client = raw_connect(recorder.endpoint);
     fd = take_connection(device);
     raw_write(client, "b", 1);
