@@ -370,6 +370,34 @@ static void test_duration(void **state)
     assert_in_range(pulses_of(wire_path(wire, "out.shs"), &first_ns, &last_ns, 3), 3 * 3000 + 1000, 4 * 3000);
 }
 
+/* A descriptor whose numbers are of no head, with checksums that are right: it is served all the same, at once. */
+static void test_absurd_numbers(void **state)
+{
+    struct wire *wire = *state;
+    static const char *const fast[] = {NULL};
+    struct native_descriptor d;
+    struct tape tape = {0};
+    uint32_t i = 0;
+    record(wire, "head.shs");
+    tape_read(file, &tape);
+    while (tape.frame[i].type != SCANHEAD_DESCRIPTOR)
+        i++;
+    uint8_t *frame = tape.bytes + tape.frame[i].at;
+    assert_int_equal(native_decode_descriptor(frame + NATIVE_HEADER_LEN, tape.frame[i].len - NATIVE_HEADER_LEN, &d), 0);
+    static const uint64_t any[] = {0, 1, UINT64_MAX, INT64_MAX, UINT64_C(1) << 63};
+    for (size_t k = 0; k < sizeof any / sizeof *any; k++) {
+        d.prr_uhz = d.lines_uhz = d.pan_udeg_s = any[k];
+        d.sweep_udeg = (int64_t)any[k];
+        assert_int_equal(native_encode_descriptor(frame, tape.frame[i].len, &d, tape.frame[i].t_ns, 0), tape.frame[i].len);
+        native_seal(frame, tape.frame[i].seq);
+        tape_write(wire, "absurd.shs", &tape);
+        snprintf(file, sizeof file, "%s", wire_path(wire, "absurd.shs"));
+        replay_to_file(wire, file, fast, "out.shs");
+        same_as(wire, "out.shs", "absurd.shs");
+    }
+    tape_free(&tape);
+}
+
 static void test_wrong_options(void **state)
 {
     struct wire *wire = *state;
@@ -392,6 +420,7 @@ static void test_wrong_options(void **state)
         {"--link", "tcp", "--config", "x.yaml"},
         {"--set", "head.prr_hz=1"},
         {"--scenario", "none"},
+        {"--scenario", "config/faults/brown-out.yaml"}, /* of the head */
     };
     record(wire, "head.shs");
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
@@ -426,6 +455,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_cut_and_bad_bytes, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_no_recordings, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_duration, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_absurd_numbers, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_wrong_options, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
