@@ -187,8 +187,8 @@ static void test_too_slow(void **state)
     uint32_t first = 0;
     snprintf(file, sizeof file, "%s", record_much(wire));
     tape_read(file, &all);
-    static const char *const more[] = {"--link", "type: tcp, port: 0", "--speed", "2",
-                                       "--set",  "loop.queue_ms=50",   "--quiet", NULL};
+    static const char *const more[] = {"--link", "type: tcp, port: 0", "--speed", "2", "--set", "loop.queue_ms=50",
+                                       "--set",  "loop.late_ms=10000", "--quiet", NULL};
     struct head head = head_start(wire, file, more);
     struct scanhead *slow = client_from_fd(connect_small(head_endpoint(&head, "tcp")));
     struct scanhead *fast = client_open(head_endpoint(&head, "tcp"));

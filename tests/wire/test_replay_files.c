@@ -293,6 +293,38 @@ static void test_duration(void **state)
     assert_in_range(pulses_of(wire_path(wire, "out.shs"), &first_ns, &last_ns, 3), 3 * 3000 + 1000, 4 * 3000);
 }
 
+/* It begins with the second client, for both from the first frame on, and ends by itself. */
+static void test_waits_for_clients(void **state)
+{
+    static const char *const more[] = {
+        "--link", "type: tcp, port: 0", "--start", "--clients", "2", "--pace", "fast", "--quiet", NULL};
+    struct scanhead *sh[2];
+    struct scanhead_frame frame;
+    struct tape all = {0};
+    int rc;
+    record(*state, "head.shs");
+    tape_read(file, &all);
+    struct head head = head_start(*state, file, more);
+    sh[0] = client_open(head_endpoint(&head, "tcp"));
+    assert_string_equal(client_ask(sh[0], "HEAD:STATe?"), "idle");
+    while ((rc = scanhead_next(sh[0], &frame, 50)) == SCANHEAD_OK)
+        assert_true((frame.flags & SCANHEAD_LOCAL) != 0); /* what those who join are told */
+    assert_int_equal(rc, SCANHEAD_ETIMEOUT);
+    sh[1] = client_open(head_endpoint(&head, "tcp"));
+    for (int i = 0; i < 2; i++) {
+        struct tape heard = {0};
+        while ((rc = scanhead_next(sh[i], &frame, DEADLINE_MS)) == SCANHEAD_OK)
+            tape_add(&heard, &frame, 0);
+        assert_int_equal(rc, SCANHEAD_ECLOSED);
+        tape_keep_common(&heard);
+        tape_same_bytes(&heard, &all);
+        tape_free(&heard);
+        scanhead_close(sh[i]);
+    }
+    head_end(&head, 0);
+    tape_free(&all);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -303,6 +335,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_several_scans, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_several_stations, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_concatenated, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_waits_for_clients, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_duration, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
