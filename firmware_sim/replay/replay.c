@@ -9,7 +9,7 @@
 #include "drivers/protocol/native_encode.h"
 #include "firmware_sim/replay/replay_state.h"
 
-enum { MOST_BYTES = 1 << 20, NATIVE_RATE_BYTES = 2 * NATIVE_POINT_LEN };
+enum { MOST_BYTES = 1 << 20, USUAL_MOST_BYTES = 1 << 17, NATIVE_RATE_BYTES = 2 * NATIVE_POINT_LEN };
 static const uint32_t SEQ_BACK = UINT32_C(1) << 30; /* a reader takes that for another sequence (PROTOCOL.md) */
 static const int64_t BACK_NS = 1000000000; /* what comes so much earlier than the frame before is of another head */
 
@@ -236,7 +236,7 @@ static uint32_t usual_bytes(const void *self)
     const struct replay *r = self;
     const double pulses = 1e-6 * (double)r->cfg->head.settings.prr_uhz * 1e-9 * (double)r->tick_ns;
     const double bytes = 4096.0 + NATIVE_RATE_BYTES * pulses;
-    return bytes < MOST_BYTES ? (uint32_t)bytes : MOST_BYTES;
+    return bytes < USUAL_MOST_BYTES ? (uint32_t)bytes : USUAL_MOST_BYTES;
 }
 
 static struct fault_board *faults(const void *self)

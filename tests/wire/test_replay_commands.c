@@ -4,12 +4,8 @@
 static const char *const LINK[] = {"--link", "type: tcp, port: 0", "--pace", "step", "--quiet", NULL};
 
 /* The same head as replay_room has. */
-static const struct room_config ROOM = {.prr_hz = 10000,
-                                        .lines_hz = 100,
-                                        .pan_deg_s = 10,
-                                        .pan_stop_deg = 3,
-                                        .frames = 1,
-                                        .links = LINK_YAML_TCP};
+static const struct room_config ROOM = {
+    .prr_hz = 10000, .lines_hz = 100, .pan_deg_s = 10, .pan_stop_deg = 3, .frames = 1, .links = LINK_YAML_TCP};
 static const struct room_config BEAMS = {
     .profile = "velodyne-vlp16", .prr_hz = 289351.851852, .lines_hz = 10, .frames = 1, .links = LINK_YAML_TCP};
 
@@ -28,12 +24,12 @@ static void grant(struct scanhead *sh, int ms)
 }
 
 /* Of a whole run of a head in the pace step: what it answers when it is idle, and its recording. */
-static const char *const QUERIES[] = {"*IDN?",           "HEAD:PRR?",        "HEAD:LINes?",       "HEAD:PAN?",
-                                      "HEAD:STATE?",     "HEAD:STATION?",    "HEAD:RANGe:MIN?",   "HEAD:RANGe:MAX?",
-                                      "SCAN:STEP:LINE?", "SCAN:LINE:STARt?", "SCAN:LINE:STOP?",   "SCAN:PAN:STARt?",
-                                      "SCAN:PAN:STOP?",  "SCAN:FRAMes?",     "SYSTem:ERRor:COUNt?", "SYST:ERR?",
-                                      "*OPC?",           "*STB?",            "SYST:VERS?",        "HELP?",
-                                      "HELP:SET?",       "TIME?",            "SYST:CONT?",        "FAULT:LIST?"};
+static const char *const QUERIES[] = {
+    "*IDN?",           "HEAD:PRR?",       "HEAD:LINes?",     "HEAD:PAN?",       "HEAD:STATE?",
+    "HEAD:STATION?",   "HEAD:RANGe:MIN?", "HEAD:RANGe:MAX?", "SCAN:STEP:LINE?", "SCAN:LINE:STARt?",
+    "SCAN:LINE:STOP?", "SCAN:PAN:STARt?", "SCAN:PAN:STOP?",  "SCAN:FRAMes?",    "SYSTem:ERRor:COUNt?",
+    "SYST:ERR?",       "*OPC?",           "*STB?",           "SYST:VERS?",      "HELP?",
+    "HELP:SET?",       "TIME?",           "SYST:CONT?",      "FAULT:LIST?"};
 enum { N_QUERIES = sizeof QUERIES / sizeof *QUERIES };
 
 static void same_answers(struct wire *wire, const struct room_config *config, int scan_ms)
@@ -100,8 +96,8 @@ static void test_settings_are_refused(void **state)
         {"SCAN:FRAMes 0", "SCAN:FRAMes", "it is 1"},
         {"SITE:POSE 1,0,0,0,0,0,0", "SITE:POSE", "stations are where they were"},
     };
-    static const char *const same[] = {"HEAD:PRR 10000",  "HEAD:PRR 10 KHZ",      "HEAD:PRR MAX",     "HEAD:PRR MIN",
-                                       "HEAD:LINes 100",  "HEAD:PAN 10",          "HEAD:STATION 1",   "SCAN:LINE:STOP 60",
+    static const char *const same[] = {"HEAD:PRR 10000",  "HEAD:PRR 10 KHZ",     "HEAD:PRR MAX",   "HEAD:PRR MIN",
+                                       "HEAD:LINes 100",  "HEAD:PAN 10",         "HEAD:STATION 1", "SCAN:LINE:STOP 60",
                                        "SCAN:PAN:STOP 3", "SCAN:LINE:STARt -40", "SCAN:FRAMes 1"};
     static const char *const unknown[] = {"HEAD:NOISe", "HEAD:NOISe:ANGLe", "HEAD:NOISe:SIGMa", "HEAD:NOISe:BALL",
                                           "SCAN:ECHoes"};
@@ -192,7 +188,8 @@ static void test_how_it_is_played(void **state)
     assert_true(take_all(sh, &first_ns, &last_ns) > 200);
     assert_string_equal(client_ask(sh, "HEAD:STATe?"), "idle");
     assert_string_equal(client_ask(sh, "SCAN:COUNt?"), "1");
-    assert_string_equal(client_ask(sh, "SYST:ERR?"), "-221,\"Settings conflict; SCAN:STOP is not possible in state idle\"");
+    assert_string_equal(client_ask(sh, "SYST:ERR?"),
+                        "-221,\"Settings conflict; SCAN:STOP is not possible in state idle\"");
     scanhead_get_stats(sh, &stats);
     assert_int_equal(stats.restarts, 3);
     assert_int_equal(stats.seq_lost + stats.repeated + stats.late + stats.bad_bytes, 0);
