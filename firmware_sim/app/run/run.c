@@ -226,8 +226,8 @@ static const char NOTES[] =
     "Ctrl-C, or SIGTERM, ends the head in good order. A second signal within a second counts as the same one; a\n"
     "third, or one that comes later, ends it at once.\n"
     "\n"
-    "A recording, FILE.shs or FILE.pcapng, stands for CONFIG: its frames are served as they are, with the timing that\n"
-    "they had, when a client commands SCAN:STARt, and anew each time; with --start at once, and the run ends with it.\n"
+    "A recording, FILE.shs or FILE.pcapng, stands for CONFIG: its frames are served as they are, with the timing\n"
+    "that they had, each time that a client commands SCAN:STARt; with --start at once, and the run ends with it.\n"
     "Queries are answered from its descriptor; settings can't change. Faults on the wire and of links apply.\n";
 
 const struct app_command app_run = {
