@@ -30,7 +30,7 @@ DEPS_BUILD = gcc g++ make pkg-config libc6-dev libembree-dev libassimp-dev libge
 	libstb-dev nettle-dev libusb-1.0-0-dev libusbredirparser-dev libwebsockets-dev assimp-testmodels
 # and the tests, with the second compiler and its sanitizers, clients and readers of recordings that are not ours:
 DEPS_TEST = $(DEPS_BUILD) libcmocka-dev clang libclang-rt-dev gpsd gpsd-clients cloudcompare mrpt-apps proj-bin python3-numpy \
-	parallel $(if $(shell command -v npm),,nodejs npm)
+	parallel tshark tcpreplay $(if $(shell command -v npm),,nodejs npm)
 # The guest tests; they are skipped where these can't be had. The kernel (linux-image-amd64) is fetched, not installed.
 DEPS_GUEST = qemu-system-x86 busybox-static cpio kmod xz-utils usbutils usbip
 # The browser that the page is tested in; these tests are skipped where it can't be had.
@@ -64,6 +64,7 @@ FAULTS_DIR = $(PREFIX)/share/scanhead/faults
 CAMPAIGN_DIR = $(PREFIX)/share/scanhead/campaign
 UDEV_DIR = $(PREFIX)/lib/udev/rules.d
 PC_DIR = $(PREFIX)/lib/pkgconfig
+WIRESHARK_DIR = $(PREFIX)/share/scanhead/wireshark
 ALL_CPPFLAGS = -I. -D_GNU_SOURCE -DSH_EMBREE=$(EMBREE_VERSION) $(if $(USBREDIR),-DHAVE_USBREDIR) -MMD -MP $(CPPFLAGS)
 ALL_CFLAGS = -std=c11 $(OPT) -g $(FP) $(CWARN) $(WERROR) -fPIC -pthread $(SAN) $(PKG_CFLAGS) $(CFLAGS)
 ALL_CXXFLAGS = -std=c++17 $(OPT) -g $(FP) $(WARN) $(WERROR) -fPIC -pthread $(SAN) $(CXXFLAGS)
@@ -157,10 +158,12 @@ $(BUILD)/bench $(FIGURES): $(BUILD)/benches.a $(BUILD)/common.a $(BUILD)/modules
 $(BUILD)/tests/common/chart.c.o: private override SAN =
 # What computes little itself is built in half the time.
 $(BUILD)/tests/unit/% $(BUILD)/tests/wire/% $(BUILD)/tests/guest/%: private OPT += -O1
+# Some 500 programs are linked; gold takes two thirds of the time.
+FAST_LD := $(if $(CROSS_COMPILE),,$(if $(shell command -v ld.gold),-fuse-ld=gold))
 .SECONDEXPANSION:
 $(BUILD)/tests/%: $(BUILD)/tests/%.c.o $$(call RIGS,tests/$$*) $(BUILD)/common.a $(BUILD)/modules.a
 	@echo "  TEST  $@"
-	$(Q)$(CC) $(SAN) -o $@ $^ -lcmocka $(LDLIBS)
+	$(Q)$(CC) $(SAN) $(FAST_LD) -o $@ $^ -lcmocka $(LDLIBS)
 # What runs in the guest has the client library alone, with its inside: it starts faster there.
 $(BUILD)/tests/guest/%: $(BUILD)/tests/guest/%.c.o $$(call RIGS,tests/guest/$$*) $(BUILD)/client.a
 	@echo "  TEST  $@"
@@ -257,6 +260,13 @@ repair: deps-build
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test all $(BUILD)/test/tests/wire/test_repair
 	@REPAIR_N=$(N) $(RUN) $(BUILD)/test/tests/wire/test_repair
 
+# An hour of device time at 10 kHz, recorded, replayed at pace fast and recorded again: half a minute, and 1.8 GB in
+# build/ meanwhile.
+REPLAY_S ?= 3600
+replay-hour: deps-build
+	@$(MAKE) --no-print-directory -j2 all
+	@sh tests/replay_hour.sh $(REPLAY_S) $(BUILD)
+
 # 600 broken meshes, with and without sanitizers (there `make test` tries every tenth): half a minute.
 test-hostile: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test $(BUILD)/test/tests/unit/test_hostile_files
@@ -339,13 +349,15 @@ test-programs: all $(BUILD)/bench $(TESTS) $(FIGURES)
 
 install: all
 	install -d "$(DESTDIR)$(PREFIX)/bin" "$(DESTDIR)$(PREFIX)/lib" "$(DESTDIR)$(PREFIX)/include" "$(DESTDIR)$(HEADS_DIR)" \
-		"$(DESTDIR)$(SCENES_DIR)" "$(DESTDIR)$(FAULTS_DIR)" "$(DESTDIR)$(CAMPAIGN_DIR)" "$(DESTDIR)$(UDEV_DIR)" "$(DESTDIR)$(PC_DIR)" "$(DESTDIR)$(PREFIX)/share/scanhead/python"
+		"$(DESTDIR)$(SCENES_DIR)" "$(DESTDIR)$(FAULTS_DIR)" "$(DESTDIR)$(CAMPAIGN_DIR)" "$(DESTDIR)$(UDEV_DIR)" "$(DESTDIR)$(PC_DIR)" "$(DESTDIR)$(PREFIX)/share/scanhead/python" \
+		"$(DESTDIR)$(WIRESHARK_DIR)"
 	install $(BUILD)/scanhead "$(DESTDIR)$(PREFIX)/bin/"
 	install -m 644 $(BUILD)/libscanhead.a "$(DESTDIR)$(PREFIX)/lib/"
 	install $(BUILD)/libscanhead.so "$(DESTDIR)$(PREFIX)/lib/libscanhead.so.1"
 	ln -sf libscanhead.so.1 "$(DESTDIR)$(PREFIX)/lib/libscanhead.so"
 	install -m 644 drivers/host/scanhead.h "$(DESTDIR)$(PREFIX)/include/"
 	install -m 644 drivers/host/python/scanhead.py "$(DESTDIR)$(PREFIX)/share/scanhead/python/"
+	install -m 644 drivers/protocol/wireshark/scanhead.lua "$(DESTDIR)$(WIRESHARK_DIR)/"
 	install -m 644 config/heads/*.yaml "$(DESTDIR)$(HEADS_DIR)/"
 	install -m 644 config/scenes/glass_room.obj "$(DESTDIR)$(SCENES_DIR)/"
 	install -m 644 config/faults/*.yaml "$(DESTDIR)$(FAULTS_DIR)/"
@@ -357,7 +369,7 @@ format:
 	clang-format -i $$(git ls-files '*.c' '*.h' '*.cpp')
 clean:
 	rm -rf $(BUILD)
-.PHONY: ALWAYS all deps deps-test deps-build deps-guest deps-browser demo test test-unit test-wire test-accuracy test-stability test-guest soak soak-usb repair \
+.PHONY: ALWAYS all deps deps-test deps-build deps-guest deps-browser demo test test-unit test-wire test-accuracy test-stability test-guest soak soak-usb repair replay-hour \
 	test-usb-million test-hostile test-sight objects test-unit-programs test-programs bench bench-beam bench-plain bench-velodyne bench-page page-pictures bench-loop bench-kernels bench-panorama chart install format clean
 .SECONDARY:
 -include $(shell find $(BUILD) -type f -name '*.d' 2>/dev/null)

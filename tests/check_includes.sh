@@ -9,7 +9,7 @@
 # In core and in firmware_sim a room may use itself and the rooms before it in this list. Files that lie in core itself are
 # the first room, `core`: errors, lines, vectors, angles, random numbers.
 core_order='core mesh picture texture scene schedule georef pose surface instrument detect bvh sight footprint cast plan analysis standpoint coverage'
-firmware_order='base command fault config site device loop app'
+firmware_order='base command fault config site device loop replay app'
 # Headers in core/ that belong to a room with another name, as HEADER:ROOM.
 core_headers='scan_mesh:mesh decimate:mesh cloud:analysis cloud_picture:analysis deviation:analysis figures:analysis distance:analysis map:analysis view:analysis geoframe:georef locate:georef ifc_site:scene embree:bvh'
 # Everything in firmware_sim may use core and drivers. core uses nothing else. In drivers:

@@ -72,6 +72,8 @@ sed -n '/^```c /,/^```$/p' README.md | sed "/^\`\`\`/d" >"$work/client.c"
 check "make install" install_it "$work/root" "$prefix"
 check "make install into folders with blanks in their names" blanks_stay
 check "the udev rule is where udev looks below a prefix" test -s "$work/root$prefix/lib/udev/rules.d/70-scanhead.rules"
+check "the dissector for Wireshark is where its README says" cmp drivers/protocol/wireshark/scanhead.lua \
+    "$work/root$prefix/share/scanhead/wireshark/scanhead.lua"
 # A profile and a mesh come with the program.
 example_passes() {
     "$work/root$prefix/bin/scanhead" check --example >"$work/example.yaml" && grep "file: $work/root" "$work/example.yaml" &&

@@ -11,7 +11,8 @@
 set -eu
 build=$1
 part=${2:-}
-waiting="three_heads slow_reader pty grabber_hokuyo grabber_velodyne signals same_stream clients join soak"
+waiting="three_heads head_faults fault_times slow_reader pty gnss fault_links sessions grabber_hokuyo grabber_velodyne raw_replay signals same_stream"
+waiting="$waiting clients join soak"
 alone="bench_cli latency overrun ring_threads"
 beside="grabber_sick gpsd" # other people's clients that take their time
 longest="beside leaks meshes beam_reference range sight_cast coordinates plan beam georef_default attributes moving travel ticks"

@@ -38,6 +38,7 @@ struct host_source {
     const struct host_source_ops *ops;
     int fd;
     struct host_usb *usb;
+    struct host_capture *capture; /* of a .pcapng; else NULL */
     int is_file, is_socket;
     int unsettled;  /* lines may come that answer nothing of ours: on a new terminal, after a time-out */
     int asked;      /* questions that went out to settle that, and have no answer yet */
@@ -108,6 +109,8 @@ int host_source_is_usb(const char *source);
 /* usb_transfers.c: the same for "usb..."; out is zero but for its name. */
 int host_usb_open(const char *source, struct host_source *out, struct sh_err *err);
 extern const struct host_source_ops host_fd_ops;
+/* capture.c: source is an open file of that kind. Where it fails, the descriptor is still the caller's. */
+int host_capture_open(struct host_source *source, struct sh_err *err);
 
 /* usb_watch.c: waits between two tries to open a source. NULL where a source is not on USB, or where the
  * system does not report devices that come: then the waits are short. Devices that come after this call are

@@ -62,7 +62,7 @@ struct scanhead;
  *   "tty:/dev/ttyACM0"                           a serial port or pty
  *   "tcp:host:port"
  *   "fd:N"                                       an open descriptor; the handle closes it
- *   PATH                                         a raw stream (.shs)
+ *   PATH                                         a raw stream (.shs), or its frames as packets (.pcapng)
  * On failure *out is NULL, and err (may be NULL) gets the reason. */
 int scanhead_open(const char *source, struct scanhead **out, char *err, size_t err_len);
 /* The same, but tries again for up to timeout_ms while the source isn't there: a head that is not plugged in,

@@ -1,4 +1,4 @@
-/* Sources by name: usb..., tty:PATH, tcp:HOST:PORT, fd:N, or the path of a recorded stream. */
+/* Sources by name: usb..., tty:PATH, tcp:HOST:PORT, fd:N, or the path of a recorded stream (.shs, .pcapng). */
 #include <errno.h>
 #include <fcntl.h>
 #include <netdb.h>
@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <termios.h>
@@ -20,7 +21,7 @@ enum { CONNECT_TIMEOUT_MS = 10000, RECEIVE_BUFFER = 4 << 20 };
 static int fail_open(struct sh_err *err, int code, const char *name)
 {
     return sh_fail(err, code,
-                   "%s: cannot open: %s (a source is usb, tty:PATH, tcp:HOST:PORT, fd:N or the path of a .shs file)",
+                   "%s: cannot open: %s (a source is usb, tty:PATH, tcp:HOST:PORT, fd:N or the path of a .shs or .pcapng file)",
                    name, strerror(errno));
 }
 
@@ -165,7 +166,8 @@ static int open_file(const char *path, struct host_source *out, struct sh_err *e
                                               : "device",
                        S_ISFIFO(st.st_mode) ? "; fd:N reads one that is open" : "");
     out->is_file = 1;
-    return 0;
+    const char *ending = strrchr(path, '.');
+    return ending != NULL && strcasecmp(ending, ".pcapng") == 0 ? host_capture_open(out, err) : 0;
 }
 
 int host_source_is_usb(const char *source)

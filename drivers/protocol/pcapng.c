@@ -8,6 +8,7 @@ enum {
     BLOCK_SECTION = 0x0a0d0d0a,
     BLOCK_INTERFACE = 1,
     BLOCK_SIMPLE_PACKET = 3,
+    BLOCK_STATISTICS = 5,
     BLOCK_PACKET = 6,
     BYTE_ORDER_MAGIC = 0x1a2b3c4d,
     OPTION_END = 0,
@@ -15,6 +16,9 @@ enum {
     OPTION_NAME = 2,
     OPTION_APPLICATION = 4,
     OPTION_TIME_RESOLUTION = 9,
+    OPTION_LOST = 4,     /* of a packet */
+    OPTION_RECEIVED = 4, /* of statistics */
+    OPTION_DROPPED_BY_SYSTEM = 7,
     MICROSECONDS = 6, /* where an interface says nothing else */
     LEAST_BLOCK = 12,
     SECTION_LEN = 28, /* without options */
@@ -82,18 +86,49 @@ size_t pcapng_packet_len(size_t data_len)
     return PCAPNG_PACKET_HEAD + (data_len + 3) / 4 * 4 + 4;
 }
 
-size_t pcapng_put_packet(uint8_t *to, uint32_t interface, int64_t t_ns, const void *data, size_t data_len)
+static uint8_t *put_number_option(uint8_t *to, uint16_t code, uint64_t number)
 {
-    const size_t len = pcapng_packet_len(data_len);
+    uint8_t bytes[8];
+    le_put64(bytes, number);
+    return put_option(to, code, bytes, sizeof bytes);
+}
+
+/* All but the block's length, which ends it. Returns where that goes. */
+static uint8_t *put_packet_body(uint8_t *to, uint32_t interface, int64_t t_ns, const void *data, size_t data_len)
+{
     le_put32(to, BLOCK_PACKET);
-    le_put32(to + 4, (uint32_t)len);
     le_put32(to + 8, interface);
     le_put32(to + 12, (uint32_t)((uint64_t)t_ns >> 32));
     le_put32(to + 16, (uint32_t)t_ns);
     le_put32(to + 20, (uint32_t)data_len);
     le_put32(to + 24, (uint32_t)data_len);
-    le_put32(put_padded(to + PCAPNG_PACKET_HEAD, data, data_len), (uint32_t)len);
+    return put_padded(to + PCAPNG_PACKET_HEAD, data, data_len);
+}
+
+size_t pcapng_put_packet(uint8_t *to, uint32_t interface, int64_t t_ns, const void *data, size_t data_len)
+{
+    const size_t len = pcapng_packet_len(data_len);
+    uint8_t *end = put_packet_body(to, interface, t_ns, data, data_len);
+    le_put32(to + 4, (uint32_t)len);
+    le_put32(end, (uint32_t)len);
     return len;
+}
+
+size_t pcapng_put_packet_after_loss(uint8_t *to, uint32_t interface, int64_t t_ns, const void *data, size_t data_len,
+                                    uint64_t lost)
+{
+    uint8_t *options = put_packet_body(to, interface, t_ns, data, data_len);
+    return end_block(to, put_number_option(options, OPTION_LOST, lost));
+}
+
+size_t pcapng_put_statistics(uint8_t *to, uint32_t interface, int64_t t_ns, uint64_t received, uint64_t dropped)
+{
+    le_put32(to, BLOCK_STATISTICS);
+    le_put32(to + 8, interface);
+    le_put32(to + 12, (uint32_t)((uint64_t)t_ns >> 32));
+    le_put32(to + 16, (uint32_t)t_ns);
+    uint8_t *at = put_number_option(to + 20, OPTION_RECEIVED, received);
+    return end_block(to, put_number_option(at, OPTION_DROPPED_BY_SYSTEM, dropped));
 }
 
 /* ---- reading */

@@ -24,6 +24,7 @@ enum {
     PCAPNG_PACKET_HEAD = 28,      /* of a packet block, before its data */
     PCAPNG_MAX_BLOCK = 16 << 20,  /* a longer one is no block */
     PCAPNG_MAX_INTERFACES = 64,
+    PCAPNG_LOST = 16,
 };
 
 /* ---- writing; all return how many bytes they put. Texts may be NULL: none. */
@@ -37,6 +38,12 @@ size_t pcapng_put_interface(uint8_t *to, enum pcapng_link link, uint32_t snap_le
 size_t pcapng_packet_len(size_t data_len);
 /* t_ns from 0 on. */
 size_t pcapng_put_packet(uint8_t *to, uint32_t interface, int64_t t_ns, const void *data, size_t data_len);
+/* The same, where packets of this interface were lost since the one before; PCAPNG_LOST bytes more than
+ * pcapng_packet_len. */
+size_t pcapng_put_packet_after_loss(uint8_t *to, uint32_t interface, int64_t t_ns, const void *data, size_t data_len,
+                                    uint64_t lost);
+/* What came at an interface until t_ns, and what the system had no room for; within PCAPNG_FRONT_ROOM. */
+size_t pcapng_put_statistics(uint8_t *to, uint32_t interface, int64_t t_ns, uint64_t received, uint64_t dropped);
 
 /* ---- reading */
 

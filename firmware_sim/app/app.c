@@ -61,8 +61,7 @@ int app_fail(const struct sh_err *err)
     return err->code == SH_EINPUT ? APP_USAGE : APP_FAILED;
 }
 
-/* Every fault in its line. */
-static int fail_config(const struct config_faults *faults)
+int app_fail_config(const struct config_faults *faults)
 {
     int status = APP_USAGE;
     for (uint32_t i = 0; i < faults->n && i < CONFIG_MAX_FAULTS; i++)
@@ -84,7 +83,7 @@ int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, 
     if (config_load_all(in->operand[0], in->sets.set, in->sets.n, cfg, &faults) != SH_OK ||
         (in->scenario != NULL && config_add_scenario(cfg, in->scenario, &faults) != SH_OK)) {
         free(cfg);
-        return fail_config(&faults);
+        return app_fail_config(&faults);
     }
     const int rc = work(cfg, ctx, &err);
     free(cfg);

@@ -19,6 +19,8 @@ extern const struct app_command app_run, app_record, app_plan, app_map, app_repo
 
 /* Prints "scanhead: TEXT" and gives the exit status for the error. */
 int app_fail(const struct sh_err *err);
+/* The same for each fault of a configuration. */
+int app_fail_config(const struct config_faults *faults);
 
 /* Loads the configuration that the first operand names, with the settings, and gives it to `work`. `work` may
  * change it; it is freed afterwards. Returns the exit status, with the reason of a failure printed: of a

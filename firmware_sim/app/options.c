@@ -258,25 +258,26 @@ static int check_dash(const struct app_command *command, const char *word)
 static const struct {
     const char *endings, *what, *verb, *rest;
 } others[] = {
-    {".shs", "a recorded stream", "record", " -o points.ply writes its points"},
+    {".shs.pcapng", "a recorded stream", "record", " -o points.ply writes its points"},
     {".obj.stl.gltf.glb.fbx.dae.ifc", "a mesh", "init", " writes a configuration that scans it"},
     {".ply", "a mesh or a point cloud", "init", " writes a configuration that scans a mesh"},
-    {".las.laz.e57.ptx.pcapng", "a recording", "report CONFIG", " compares points with the scene"},
+    {".las.laz.e57.ptx", "a recording", "report CONFIG", " compares points with the scene"},
 };
 
 static int check_ending(const struct app_command *command, const char *label, const char *file)
 {
     const char *dot = strrchr(file, '.');
     char ending[16] = "";
-    const int is_source = strcmp(label, "SOURCE") == 0;
-    if (!is_source && strcmp(label, "CONFIG") != 0) return APP_OK;
+    const int is_source = strcmp(label, "SOURCE") == 0, takes_streams = is_source || strstr(label, ".shs") != NULL;
+    if (!takes_streams && strcmp(label, "CONFIG") != 0) return APP_OK;
     for (size_t i = 0; dot != NULL && dot[i] != '\0' && i < sizeof ending - 1; i++)
         ending[i] = (char)tolower((unsigned char)dot[i]);
-    for (size_t i = is_source ? 1 : 0; i < sizeof others / sizeof others[0] && strlen(ending) > 1; i++) {
+    for (size_t i = takes_streams ? 1 : 0; i < sizeof others / sizeof others[0] && strlen(ending) > 1; i++) {
         const char *at = strstr(others[i].endings, ending);
         const char after = at != NULL ? at[strlen(ending)] : 'x';
         if (after != '.' && after != '\0') continue;
-        return app_usage(command, "%s is %s, and %s is %s: scanhead %s %s%s", file, others[i].what, label,
+        return app_usage(command, "%s is %s, and %s is %s: scanhead %s %s%s", file, others[i].what,
+                         is_source ? label : "CONFIG",
                          is_source ? "a head, a recorded stream or a configuration" : "a configuration, a YAML file",
                          others[i].verb, file, others[i].rest);
     }

@@ -111,6 +111,10 @@ struct command_faults {
     void (*list)(void *owner, char *text, size_t len);
 };
 
+/* Settings that a recording does not say. */
+#define COMMAND_NOT_RECORDED     INT64_MIN
+#define COMMAND_NOT_RECORDED_U32 UINT32_MAX
+
 /* The device as the command set sees it. The loop keeps it up to date. */
 struct command_device {
     const char *idn;
@@ -121,6 +125,7 @@ struct command_device {
     int (*can_plan)(void *owner, const struct head_settings *settings, char *why, size_t len);
     void *owner;
     const struct command_faults *faults; /* NULL: it has none */
+    void *faults_owner;
     struct head_settings settings; /* as they are now; a refused command leaves them */
     struct head_settings defaults; /* what *RST restores */
     enum head_state state;
@@ -133,8 +138,9 @@ struct command_device {
     int step_allowed;      /* 1 when the pace is `step` */
     int pose_allowed;      /* 1 when the platform is live: a step may carry a pose */
     double pose_centre_m[3], pose_reach_m;   /* how far from where the pose may be; scene frame */
-    const struct command_place *place;       /* [limits.n_stations] as they are now */
+    const struct command_place *place;       /* [limits.n_stations] as they are now; NULL: not known */
     const struct command_place *first_place; /* at power-up */
+    const char *recorded;                    /* a recording is replayed: why no setting changes; NULL: none is */
     const char *fixed;                       /* why no station can be moved; NULL: they can */
     uint32_t moving;                         /* the station that is being moved; 0: none. Until then no scan starts */
 };

@@ -182,7 +182,9 @@ static int act_start(struct command_call *call)
     if (call->dev->moving != 0)
         return command_fail(call, CMD_E_SETTINGS, "%s waits for SITE:POSE: station %u is being moved",
                             call->row->header, call->dev->moving);
-    return act_event(call, COMMAND_START);
+    if (call->dev->recorded == NULL) return act_event(call, COMMAND_START);
+    call->out->effect = COMMAND_START; /* it begins anew */
+    return command_reply(call, "OK");
 }
 
 static int act_stop(struct command_call *call)

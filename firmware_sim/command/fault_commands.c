@@ -19,7 +19,7 @@ int command_fault_add(struct command_call *call)
     if (dev->faults == NULL) return none(call);
     if (call->param[0] != '{')
         return command_fail(call, CMD_E_DATA_TYPE, "%s takes a fault as {kind: drop, every: 10}", call->row->header);
-    if (dev->faults->add(dev->owner, call->param, &number, why, sizeof why) != 0)
+    if (dev->faults->add(dev->faults_owner, call->param, &number, why, sizeof why) != 0)
         return command_fail(call, CMD_E_RANGE, "%s", why);
     call->out->effect = COMMAND_FAULTS;
     return command_reply(call, "%u", number);
@@ -53,7 +53,7 @@ int command_fault_clear(struct command_call *call)
     int64_t number;
     if (dev->faults == NULL) return none(call);
     if (take_number(call, &number) != 0) return -1;
-    if (dev->faults->remove(dev->owner, (uint32_t)number) == 0 && number != 0)
+    if (dev->faults->remove(dev->faults_owner, (uint32_t)number) == 0 && number != 0)
         return no_such(call, number);
     call->out->effect = COMMAND_FAULTS;
     return command_reply(call, "OK");
@@ -66,7 +66,7 @@ int command_fault_injected(struct command_call *call)
     uint64_t n;
     if (dev->faults == NULL) return none(call);
     if (take_number(call, &number) != 0) return -1;
-    if (dev->faults->injected(dev->owner, (uint32_t)number, &n) != 0) return no_such(call, number);
+    if (dev->faults->injected(dev->faults_owner, (uint32_t)number, &n) != 0) return no_such(call, number);
     return command_reply(call, "%llu", (unsigned long long)n);
 }
 
@@ -75,6 +75,6 @@ int command_fault_list(struct command_call *call)
     struct command_device *dev = call->dev;
     char text[COMMAND_MAX_REPLY];
     if (dev->faults == NULL) return none(call);
-    dev->faults->list(dev->owner, text, sizeof text);
+    dev->faults->list(dev->faults_owner, text, sizeof text);
     return command_reply(call, "%s", text[0] != '\0' ? text : "none");
 }

@@ -160,10 +160,21 @@ static int check_has(struct command_call *call)
     return why == NULL ? 0 : command_fail(call, CMD_E_SETTINGS, "%s: %s", call->row->header, why);
 }
 
+/* -221 where a recording is replayed that does not say it. */
+static int check_known(struct command_call *call)
+{
+    const struct command_setting *setting = call->row->setting;
+    if (call->dev->recorded == NULL || setting->derived != NULL) return 0;
+    if (read_value(call, &call->dev->settings) !=
+        (setting->is_u32 ? (int64_t)COMMAND_NOT_RECORDED_U32 : COMMAND_NOT_RECORDED))
+        return 0;
+    return command_fail(call, CMD_E_SETTINGS, "%s: the recording does not say it", call->row->header);
+}
+
 int command_setting_query(struct command_call *call)
 {
     const struct command_setting *setting = call->row->setting;
-    if (check_has(call) != 0) return -1;
+    if (check_has(call) != 0 || check_known(call) != 0) return -1;
     const int64_t value =
         call->value.kind == COMMAND_VALUE_NUMBER ? read_value(call, &call->dev->settings) : special_value(call);
     if (setting->words != NULL) return command_reply(call, "%s", setting->words[value]);
@@ -271,6 +282,18 @@ int command_setting_is_free(const struct command_device *dev, const struct comma
     return !in_scan || (!setting->not_in_scan && (setting->derived == NULL || dev->limits.emitter != EMITTER_SPHERE));
 }
 
+/* What DEF answers may be beyond MAX: rates of power-up may have steps that are not alike. As a number it does what DEF
+ * does, where that gives this step. */
+static int is_default_beyond(const struct command_call *call, int64_t value)
+{
+    struct head_settings then = call->dev->defaults;
+    int64_t min, max;
+    if (call->row->setting->derived == NULL) return 0;
+    then.prr_uhz = call->dev->settings.prr_uhz; /* it stays */
+    command_setting_range(call, &min, &max);
+    return (value < min || value > max) && value == read_value(call, &then);
+}
+
 static int take_value(struct command_call *call, int64_t *value)
 {
     const struct command_setting *setting = call->row->setting;
@@ -281,6 +304,8 @@ static int take_value(struct command_call *call, int64_t *value)
     else if (check_rate(call) != 0 ||
              command_value_in_range(call, read_bound(call, &setting->min), read_bound(call, &setting->max), value) != 0)
         return -1;
+    else if (is_default_beyond(call, *value))
+        call->value.kind = COMMAND_VALUE_DEF;
     return 0;
 }
 
@@ -314,9 +339,27 @@ static int write_value(struct command_call *call, int64_t value)
     return 0;
 }
 
+/* Of a recording: what is already so may be set. */
+static int keep_recorded(struct command_call *call)
+{
+    struct command_device *dev = call->dev;
+    if (check_known(call) != 0) return -1;
+    const int64_t is = read_value(call, &dev->settings);
+    int64_t wanted = is; /* MIN, MAX and DEF */
+    int exact = 1;
+    if (call->value.kind == COMMAND_VALUE_WORD) wanted = call->value.word;
+    if (call->value.kind == COMMAND_VALUE_NUMBER)
+        exact = command_decimal_to_int(&call->value.decimal, call->value.shift + call->row->unit->decimals, &wanted) ==
+                COMMAND_FIT_EXACT;
+    if (exact && wanted == is) return command_reply(call, "OK");
+    return command_fail(call, CMD_E_SETTINGS, "%s: %s; it is %s", call->row->header, dev->recorded,
+                        call->row->setting->words != NULL ? call->row->setting->words[is] : in_unit(call, is).text);
+}
+
 int command_setting_change(struct command_call *call)
 {
     struct command_device *dev = call->dev;
+    if (dev->recorded != NULL) return check_has(call) != 0 ? -1 : keep_recorded(call);
     const struct head_settings before = dev->settings;
     char why[COMMAND_TEXT_LEN];
     int64_t value;

@@ -55,7 +55,8 @@ static void find_scanner(struct cfg_reader *rd, struct config *cfg, uint32_t sta
     cfg->head.settings.station = station;
     rd->line[row][0] = rd->root_line;
     rd->bad[row][0] = 0;
-    cfg_forget_list(rd, "links"); /* they are those of head.station's scanner */
+    cfg_forget_list(rd, "links");
+    cfg->links_are_not_here = 1;
 }
 
 static void read_scanner(struct cfg_reader *rd, struct cfg_document *doc, const char *const *sets, int n_sets)

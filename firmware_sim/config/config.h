@@ -261,6 +261,8 @@ struct config {
     char file[CONFIG_PATH_LEN];
     const char *const *sets; /* that it was loaded with; not copied */
     int n_sets;
+    char scenario_file[CONFIG_PATH_LEN]; /* that was added; empty: none */
+    int links_are_not_here;              /* they are those of head.station's scanner, and this is another */
     char profile_file[CONFIG_PATH_LEN];
     struct config_profile profile;
     struct config_head head;
@@ -305,8 +307,13 @@ int config_load(const char *path, const char *const *sets, int n_sets, struct co
 int config_load_all(const char *path, const char *const *sets, int n_sets, struct config *cfg,
                     struct config_faults *faults);
 
+/* The same of a text that has links, loop and faults alone; name: in its errors. The rest of cfg is zero. */
+int config_load_links(const char *text, const char *name, const char *const *sets, int n_sets, struct config *cfg,
+                      struct config_faults *faults);
+
 /* Adds the faults of a scenario, a file that has nothing but a list `faults`: a path, or the name of one that comes with
- * the program. What is wrong with it goes to `faults`; then nothing is added, and the code of the first is returned. */
+ * the program. Once. What is wrong with it goes to `faults`; then nothing is added, and the code of the first is
+ * returned. */
 int config_add_scenario(struct config *cfg, const char *name, struct config_faults *faults);
 /* "a, b, c": those that come with the program, as far as buf reaches. */
 void config_name_scenarios(char *buf, size_t len);
@@ -320,7 +327,7 @@ int config_link_has_fault(const struct link_spec *link, enum fault_kind kind);
 int config_serves(const struct config *cfg, uint32_t i);
 int config_is_alone(const struct config *cfg);
 /* The configuration of the scanner at a station, from 1, with that one as its head.station. It has no links, but
- * output and loop as cfg has them by now. The sets that cfg was loaded with must still be there. */
+ * output and loop as cfg has them by now, and its scenario. The sets that cfg was loaded with must still be there. */
 int config_load_scanner(const struct config *cfg, uint32_t station, struct config *out, struct sh_err *err);
 
 /* The program of a pulse rate, as an index; 0 for a head without programs. */

@@ -202,7 +202,7 @@ static void check_beam(struct cfg_reader *rd, const struct config *cfg)
                      p->name, p->pulse_width_ns, LEAST_PULSE_NS);
 }
 
-static void check_loop(struct cfg_reader *rd, const struct config *cfg)
+void cfg_check_loop(struct cfg_reader *rd, const struct config *cfg)
 {
     if (fmod(1e9, cfg->loop.tick_hz) == 0.0 && floor(cfg->loop.tick_hz) == cfg->loop.tick_hz) return;
     cfg_fail_key(rd, "loop.tick_hz", 0,
@@ -262,7 +262,7 @@ void cfg_check(struct cfg_reader *rd, struct config *cfg)
     cfg_check_link_protocols(rd, cfg);
     check_beam(rd, cfg);
     check_sight(rd, cfg);
-    check_loop(rd, cfg);
+    cfg_check_loop(rd, cfg);
     check_time(rd, cfg);
     cfg_check_signal(rd, cfg);
     cfg_check_faults(rd, &cfg->faults);

@@ -153,6 +153,7 @@ void cfg_check_fault_links(struct cfg_reader *rd, const struct config *cfg, cons
         if (needs_time(f->kind) && (cfg->time.epoch[0] == '\0' || strcmp(cfg->time.epoch, "none") == 0))
             cfg_fail_key(rd, "faults[].kind", i, "%s needs a time of day; allowed where time.epoch is not none",
                          fault_names[f->kind]);
+        if (cfg->links_are_not_here) continue; /* they were checked where they are */
         if (f->link > cfg->n_links)
             cfg_fail_key(rd, "faults[].link", i, "there is no link %u; allowed 0 to %u", f->link, cfg->n_links);
         else if (f->link != 0 && fault_place_of(f->kind) != FAULT_AT_MOMENT &&
@@ -201,6 +202,7 @@ int config_add_scenario(struct config *cfg, const char *name, struct config_faul
                              cfg->faults.n, FAULT_MAX);
     for (uint32_t i = 0; code == SH_OK && i < list->n; i++)
         cfg->faults.fault[cfg->faults.n++] = list->fault[i];
+    if (code == SH_OK) snprintf(cfg->scenario_file, sizeof cfg->scenario_file, "%s", path);
     free(list);
     return code;
 }

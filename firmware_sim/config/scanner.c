@@ -210,7 +210,8 @@ void cfg_check_scanners(struct config *cfg, struct config_faults *faults)
 int config_load_scanner(const struct config *cfg, uint32_t station, struct config *out, struct sh_err *err)
 {
     struct config_faults faults = {0};
-    const int rc = cfg_load_for(cfg->file, cfg->sets, cfg->n_sets, station, out, &faults);
+    int rc = cfg_load_for(cfg->file, cfg->sets, cfg->n_sets, station, out, &faults);
+    if (rc == SH_OK && cfg->scenario_file[0] != '\0') rc = config_add_scenario(out, cfg->scenario_file, &faults);
     if (rc != SH_OK) return sh_fail(err, rc, "%s", faults.fault[0].text);
     for (uint32_t i = 0; i < cfg->n_stations && i < out->n_stations; i++)
         out->station[i].scanner = cfg->station[i].scanner;

@@ -237,6 +237,8 @@ void cfg_limit_range(struct cfg_reader *rd, struct config *cfg);
 void cfg_take_scan_settings(struct config *cfg);
 /* The settings of a head whose pulse rate follows from its lines. */
 void cfg_check_emitter_settings(struct cfg_reader *rd, struct config *cfg);
+/* crosscheck.c: the loop. */
+void cfg_check_loop(struct cfg_reader *rd, const struct config *cfg);
 /* owned.c: keys that only some kinds of link have, and what a link needs. */
 void cfg_check_links(struct cfg_reader *rd, struct config *cfg);
 /* usb_look.c: the look of a usb link, by its protocol, and the ids and the serial number that are not given. */

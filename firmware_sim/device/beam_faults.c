@@ -64,16 +64,11 @@ static void renew(struct device *device, uint64_t pulse, int64_t t_ns)
     beam->n = 0;
     for (uint32_t i = 0; i < n; i++) {
         if (!is_of_beam(entry[i].fault.kind)) continue;
-        struct device_beam_fault *f = &beam->fault[beam->n++];
-        *f = (struct device_beam_fault){.entry = entry[i]};
-        for (uint32_t k = 0; k < n_was; k++) {
-            if (was[k].entry.number != entry[i].number) continue;
-            *f = was[k];
-            was[k].strikes = 0;
-        }
+        const struct device_beam_fault *old = fault_find(was, n_was, sizeof *was, entry[i].number);
+        beam->fault[beam->n++] = old != NULL ? *old : (struct device_beam_fault){.entry = entry[i]};
     }
     for (uint32_t k = 0; k < n_was; k++) {
-        if (!was[k].strikes) continue;
+        if (!was[k].strikes || fault_find(beam->fault, beam->n, sizeof *was, was[k].entry.number) != NULL) continue;
         was[k].strikes = 0;
         note(device, &was[k], pulse, t_ns);
     }

@@ -81,6 +81,7 @@ static void do_command(struct device *device, uint32_t session, const char *line
     struct command_device *cmd = &device->cmd;
     cmd->state = device_visible_state(device, released);
     cmd->t_ns = (int64_t)released * device->tick_ns;
+    device->desk.now_ns = (int64_t)device->next_tick * device->tick_ns;
     cmd->fixed = why_fixed(device, session);
     device_set_time_texts(device);
     if (session != 0 && device_is_dead(device, released)) {

@@ -6,6 +6,7 @@
 
 #include "drivers/link/link.h"
 #include "firmware_sim/device/device.h"
+#include "firmware_sim/device/fault_desk.h"
 #include "firmware_sim/device/gnss.h"
 #include "firmware_sim/device/head_clock.h"
 #include "firmware_sim/device/head_faults.h"
@@ -175,6 +176,7 @@ struct device {
     struct device_live live;
     struct device_journal journal;
     struct fault_board *faults;
+    struct fault_desk desk;
     struct head_faults head_faults; /* those of the board that are in the head */
     struct device_beam beam;
     struct device_variant *variants;

@@ -48,13 +48,6 @@ static void set_window(const struct head_faults *faults, const struct fault_entr
     if (f->until_ns != INT64_MAX) f->until_ns = round_up(faults, f->until_ns);
 }
 
-static const struct head_fault *find(const struct head_fault *list, uint32_t n, uint32_t number)
-{
-    for (uint32_t i = 0; i < n; i++)
-        if (list[i].number == number) return &list[i];
-    return NULL;
-}
-
 /* Takes over the list as it is now. Those that were taken out while they were active stay for a step more, and end. */
 static void renew(struct head_faults *faults)
 {
@@ -68,13 +61,13 @@ static void renew(struct head_faults *faults)
     for (uint32_t i = 0; i < n; i++) {
         if (fault_place_of(entry[i].fault.kind) != FAULT_AT_MOMENT) continue;
         struct head_fault *f = &faults->fault[faults->n++];
-        const struct head_fault *old = find(was, n_was, entry[i].number);
+        const struct head_fault *old = fault_find(was, n_was, sizeof *was, entry[i].number);
         *f = old != NULL ? *old : (struct head_fault){.fault = entry[i].fault, .number = entry[i].number};
         if (old == NULL) set_window(faults, &entry[i], f);
     }
     const uint32_t n_there = faults->n;
     for (uint32_t i = 0; i < n_was; i++) {
-        if (!was[i].active || find(faults->fault, n_there, was[i].number) != NULL) continue;
+        if (!was[i].active || fault_find(faults->fault, n_there, sizeof *was, was[i].number) != NULL) continue;
         if (faults->n == 2 * FAULT_MAX) break; /* can't be: what was taken out before has ended since */
         faults->fault[faults->n] = was[i];
         faults->fault[faults->n++].cleared = 1;

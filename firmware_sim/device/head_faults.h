@@ -29,8 +29,8 @@
 _Static_assert(FAULT_N_KINDS <= 64, "a set of kinds has a bit for each");
 
 struct head_fault {
+    uint32_t number; /* on the board; first, for fault_find */
     struct fault fault;
-    uint32_t number;           /* on the board */
     int64_t from_ns, until_ns; /* device time; INT64_MAX: no end */
     int active;                /* in the tick of the last step */
     int begins, ends;          /* with the last step */

@@ -96,6 +96,14 @@ uint32_t fault_board_copy_all(struct fault_board *board, struct fault_entry entr
     return version;
 }
 
+const void *fault_find(const void *items, uint32_t n, size_t size, uint32_t number)
+{
+    const char *item = items;
+    for (uint32_t i = 0; i < n; i++, item += size)
+        if (*(const uint32_t *)(const void *)item == number) return item;
+    return NULL;
+}
+
 /* A number for one more, which is counted from 0 on. 0: no memory. */
 static uint32_t take_number(struct fault_board *board)
 {

@@ -11,7 +11,7 @@
 enum { FAULT_KEPT = 2 * FAULT_MAX }; /* faults that there are, and those that were taken out last */
 
 struct fault_entry {
-    uint32_t number; /* from 1, in the order in which they were added; never used again */
+    uint32_t number; /* first, for fault_find. From 1, in the order in which they were added; never used again */
     int64_t since_ns; /* device time from which it counts: 0, or when it was added */
     int64_t until_ns; /* when it was taken out; INT64_MAX: it is there */
     int from_start;   /* it was there at power-up: it counts a session's frames from the first */
@@ -34,6 +34,10 @@ uint32_t fault_board_copy(struct fault_board *board, struct fault_entry entries[
 
 /* With those that were taken out last, which still hold for frames from before that. */
 uint32_t fault_board_copy_all(struct fault_board *board, struct fault_entry entries[FAULT_KEPT], uint32_t *n);
+
+/* For one who keeps something of each fault, and takes over a list that has changed: what was kept of the fault of that
+ * number, among n items of `size` bytes that begin with their numbers. NULL: nothing. */
+const void *fault_find(const void *items, uint32_t n, size_t size, uint32_t number);
 
 /* Adds a fault that counts from t_ns. SH_EINPUT: there are FAULT_MAX. */
 int fault_board_add(struct fault_board *board, const struct fault *fault, int64_t t_ns, uint32_t *number,

@@ -17,9 +17,16 @@ static const char *const of_names[] = {"stream", "notices", "replies"};
 struct truth {
     pthread_mutex_t lock;
     FILE *file;
-    const char *path; /* the caller's */
+    const char *path; /* the caller's, or what to call it */
     int error;        /* errno of the first failure */
 };
+
+/* Of standard output a descriptor of its own: nobody else's lines are in its buffer. */
+static int open_stdout(int *fd, struct sh_err *err)
+{
+    *fd = dup(STDOUT_FILENO);
+    return *fd >= 0 ? SH_OK : sh_fail(err, SH_EIO, "standard output: %s", strerror(errno));
+}
 
 int truth_open(const char *path, struct truth **out, struct sh_err *err)
 {
@@ -27,8 +34,10 @@ int truth_open(const char *path, struct truth **out, struct sh_err *err)
     *out = NULL;
     if (path == NULL) return SH_OK;
     struct sh_err why = {0};
-    int rc = newfile_open(path, &fd, &why);
+    const int to_stdout = strcmp(path, "-") == 0;
+    int rc = to_stdout ? open_stdout(&fd, &why) : newfile_open(path, &fd, &why);
     if (rc != SH_OK) return sh_fail(err, rc, "truth: %s", why.text);
+    if (to_stdout) path = "standard output";
     struct truth *truth = calloc(1, sizeof *truth);
     FILE *file = truth != NULL ? fdopen(fd, "w") : NULL;
     if (file == NULL) {

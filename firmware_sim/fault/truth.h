@@ -29,7 +29,7 @@ struct fault_note {
 };
 
 struct truth;
-/* Writes to a new file. NULL path: nothing is written, *out is NULL. */
+/* Writes to a new file; path "-" is standard output. NULL path: nothing is written, *out is NULL. */
 int truth_open(const char *path, struct truth **out, struct sh_err *err);
 /* truth may be NULL. */
 void truth_write(struct truth *truth, const struct fault_note *note);

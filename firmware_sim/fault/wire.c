@@ -41,13 +41,13 @@ void wire_renew(struct wire *wire, uint64_t ahead)
     wire->version = fault_board_copy_all(wire->spec.board, entry, &wire->n_faults);
     if (wire->spec.tally != NULL) fault_tally_renew(wire->spec.tally, entry, wire->n_faults);
     for (uint32_t i = 0; i < wire->n_faults; i++) {
+        const struct wire_fault *old = fault_find(before, n_before, sizeof *before, entry[i].number);
         struct wire_fault *fault = &wire->fault[i];
-        *fault = (struct wire_fault){.entry = entry[i]};
-        if (!entry[i].from_start) memcpy(fault->base, wire->count, sizeof fault->base);
-        if (!entry[i].from_start) fault->base[FAULT_OF_REPLIES] += ahead;
-        for (uint32_t k = 0; k < n_before; k++)
-            if (before[k].entry.number == entry[i].number) *fault = before[k];
-        fault->entry.until_ns = entry[i].until_ns;
+        *fault = old != NULL ? *old : (struct wire_fault){0};
+        fault->entry = entry[i]; /* it may have been taken out since */
+        if (old != NULL || entry[i].from_start) continue;
+        memcpy(fault->base, wire->count, sizeof fault->base);
+        fault->base[FAULT_OF_REPLIES] += ahead;
     }
 }
 

@@ -7,6 +7,7 @@
 
 #include "drivers/protocol/protocol.h"
 #include "firmware_sim/loop/mover.h"
+#include "firmware_sim/loop/source.h"
 #include "firmware_sim/loop/stream.h"
 
 struct pump;
@@ -32,7 +33,7 @@ struct link_counts {
 struct links {
     /* set by the caller */
     struct stream *stream;
-    struct device *device;
+    const struct loop_source *source;
     struct mover mover;
     const struct sh_report *report; /* NULL: none */
     const struct web_source *web;   /* of links of type web; NULL: none */

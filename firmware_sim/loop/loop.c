@@ -14,18 +14,22 @@ static const double SPARE_MS = 250.0; /* that a reader may be interrupted for wi
 static int create_stream(struct loop *loop, struct sh_err *err)
 {
     const struct config *cfg = loop->cfg;
-    const int64_t tick_ns = device_tick_ns(loop->device);
+    const struct loop_source *source = &loop->source;
+    const int64_t tick_ns = source->ops->tick_ns(source->self);
+    const int makes = source->ops->next != NULL;
     const double ticks_per_ms = 1e6 / (double)tick_ns;
     struct ring_size size = {.ahead_ticks = (uint64_t)(cfg->loop.ahead_ms * ticks_per_ms) + 1,
                              .queue_ticks = (uint64_t)(cfg->loop.queue_ms * ticks_per_ms) + 1,
-                             .usual_bytes = worker_usual_bytes(loop->site)};
+                             .usual_bytes = makes ? source->ops->usual_bytes(source->self)
+                                                  : worker_usual_bytes(loop->site)};
     size.spare_ticks = (uint64_t)(fmin(SPARE_MS, cfg->loop.queue_ms) * ticks_per_ms);
     loop->casters.ahead_ticks = size.ahead_ticks;
-    loop->stream.tick_bytes = worker_tick_bytes(loop->site);
+    loop->stream.tick_bytes = makes ? source->ops->most_bytes(source->self) : worker_tick_bytes(loop->site);
+    loop->stream.as_they_are = makes;
     loop->stream.waits = cfg->loop.pace != PACE_REALTIME;
     loop->stream.steps = cfg->loop.pace == PACE_STEP;
-    loop->stream.seq = UINT32_C(0) - device_near_wrap(loop->device);
-    loop->stream.counters = device_counters(loop->device);
+    loop->stream.seq = makes ? 0 : UINT32_C(0) - device_near_wrap(loop->device);
+    loop->stream.counters = source->ops->counters(source->self);
     return stream_create(&loop->stream, &size, tick_ns, err);
 }
 
@@ -33,41 +37,74 @@ static int create_stream(struct loop *loop, struct sh_err *err)
 static void keep_description(struct loop *loop)
 {
     struct device_work work;
-    device_describe_now(loop->device, &work);
-    const struct ring_tick *tick = worker_fill(loop->casters.caster[0].worker, &work);
+    struct ring_tick made;
+    const struct ring_tick *tick = &made;
+    if (loop->device == NULL) {
+        loop->source.ops->describe(loop->source.self, &made);
+    } else {
+        device_describe_now(loop->device, &work);
+        tick = worker_fill(loop->casters.caster[0].worker, &work);
+    }
     for (uint32_t at = 0; at < tick->len; at += (uint32_t)native_frame_len(tick->bytes + at))
         kept_put(&loop->stream.kept, tick->bytes + at);
 }
 
-int loop_create(const struct site *site, struct device *device, const struct loop_options *options, struct loop **out,
-                struct sh_err *err)
+/* A new loop, with nothing open. */
+static struct loop *begin(const struct config *cfg, const struct loop_source *source,
+                          const struct loop_options *options)
 {
-    *out = NULL;
     struct loop *loop = calloc(1, sizeof *loop);
-    if (loop == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
-    const struct config *cfg = site->cfg;
-    loop->site = site;
+    if (loop == NULL) return NULL;
     loop->cfg = cfg;
-    loop->device = device;
+    loop->source = *source;
     loop->options = *options;
     loop->links.stream = &loop->stream;
-    loop->links.device = device;
+    loop->links.source = &loop->source;
     loop->links.report = options->report;
-    mover_create(&loop->links.mover, device, &loop->stream);
-    loop->links.web = options->web;
+    return loop;
+}
+
+static int open_all(struct loop *loop, struct loop **out, struct sh_err *err)
+{
+    const struct config *cfg = loop->cfg;
+    const int computes = loop->device != NULL;
+    mover_create(&loop->links.mover, loop->device, &loop->stream);
+    loop->links.web = loop->options.web;
     atomic_store(&loop->final_tick, UINT64_MAX);
     int rc = create_stream(loop, err);
-    if (rc == SH_OK) rc = casters_create(loop, config_threads(cfg), err);
+    if (rc == SH_OK) rc = casters_create(loop, computes ? config_threads(cfg) : 0, err);
+    if (!computes) loop->stream.n_casters = 1; /* the player */
     if (rc == SH_OK) keep_description(loop);
-    if (rc == SH_OK) rc = links_open(&loop->links, cfg, options->extra, err);
-    if (rc == SH_OK && cfg->platform.kind == PLATFORM_LIVE && cfg->loop.pace == PACE_REALTIME)
-        rc = pose_feed_open(device, cfg, &loop->feed, err);
+    if (rc == SH_OK) rc = links_open(&loop->links, cfg, loop->options.extra, err);
+    if (rc == SH_OK && computes && cfg->platform.kind == PLATFORM_LIVE && cfg->loop.pace == PACE_REALTIME)
+        rc = pose_feed_open(loop->device, cfg, &loop->feed, err);
     if (rc != SH_OK) {
         loop_free(loop);
         return rc;
     }
     *out = loop;
     return SH_OK;
+}
+
+int loop_create(const struct site *site, struct device *device, const struct loop_options *options, struct loop **out,
+                struct sh_err *err)
+{
+    const struct loop_source source = {&loop_device_source, device};
+    struct loop *loop = begin(site->cfg, &source, options);
+    *out = NULL;
+    if (loop == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
+    loop->site = site;
+    loop->device = device;
+    return open_all(loop, out, err);
+}
+
+int loop_create_of(const struct config *cfg, const struct loop_source *source, const struct loop_options *options,
+                   struct loop **out, struct sh_err *err)
+{
+    struct loop *loop = begin(cfg, source, options);
+    *out = NULL;
+    if (loop == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
+    return open_all(loop, out, err);
 }
 
 void loop_free(struct loop *loop)
@@ -150,7 +187,7 @@ int loop_start(struct loop *loop, struct sh_err *err)
     if (rc == SH_OK && loop->feed != NULL) rc = pose_feed_start(loop->feed, err);
     if (rc == SH_OK) rc = links_start(&loop->links, err);
     if (rc == SH_OK) rc = pacer_start(loop, err);
-    if (rc == SH_OK) rc = casters_start(loop, err);
+    if (rc == SH_OK) rc = loop->device != NULL ? casters_start(loop, err) : player_start(loop, err);
     return rc;
 }
 
@@ -161,7 +198,7 @@ int loop_is_over(const struct loop *loop)
 
 void loop_end(struct loop *loop)
 {
-    device_end(loop->device);
+    loop->source.ops->end(loop->source.self);
     atomic_store(&loop->stream.ending, 1);
     if (loop->cfg->loop.pace == PACE_STEP) atomic_store(&loop->stream.granted, UINT64_MAX);
     stream_poke(&loop->stream);
@@ -178,12 +215,14 @@ void loop_join(struct loop *loop, struct loop_stats *stats)
 {
     struct stream *stream = &loop->stream;
     memset(stats, 0, sizeof *stats);
-    if (loop->casters.n_running < loop->casters.n || !loop->pacer.running) { /* a start that failed half-way */
+    const int made = loop->device != NULL ? loop->casters.n_running == loop->casters.n : loop->player.running;
+    if (!made || !loop->pacer.running) { /* a start that failed half-way */
         atomic_store(&loop->stopping, 1);
         if (!loop->pacer.running) stream_end(stream);
         stream_poke(stream);
     }
     casters_join(loop);
+    player_join(loop);
     pacer_join(loop);
     mover_join(&loop->links.mover);
     links_join(&loop->links);
@@ -192,7 +231,7 @@ void loop_join(struct loop *loop, struct loop_stats *stats)
     if (loop->hasher != NULL) stats->have_hash = hasher_join(loop->hasher, stats->sha256);
     loop->hasher = NULL;
     stats->counters = *stream->counters;
-    stats->scans = device_scans(loop->device);
+    stats->scans = loop->source.ops->scans(loop->source.self);
     stats->wall_s = 1e-9 * (double)(atomic_load(&stream->last_pulse_ns) - atomic_load(&stream->first_pulse_ns));
     stats->late_p50_us = pacer_late_us(loop, 0.5);
     stats->late_p999_us = pacer_late_us(loop, 0.999);

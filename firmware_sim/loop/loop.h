@@ -18,6 +18,7 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/device/device.h"
 #include "firmware_sim/loop/links.h"
+#include "firmware_sim/loop/source.h"
 
 struct loop;
 
@@ -40,6 +41,10 @@ struct loop_stats {
 /* Opens all links; nothing runs yet. On failure everything opened is closed again. */
 int loop_create(const struct site *site, struct device *device, const struct loop_options *options, struct loop **out,
                 struct sh_err *err);
+
+/* The same for what makes its ticks itself; of the configuration only links, loop and the head's identity count. */
+int loop_create_of(const struct config *cfg, const struct loop_source *source, const struct loop_options *options,
+                   struct loop **out, struct sh_err *err);
 
 /* {"endpoints": [...]}: type and endpoint of each link, and of the socket for poses. */
 void loop_put_endpoints(const struct loop *loop, struct json *json);

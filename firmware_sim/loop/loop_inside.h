@@ -7,6 +7,7 @@
 
 #include "firmware_sim/loop/hash.h"
 #include "firmware_sim/loop/loop.h"
+#include "firmware_sim/loop/player.h"
 #include "firmware_sim/loop/pose_feed.h"
 #include "firmware_sim/loop/stream.h"
 #include "firmware_sim/loop/work.h"
@@ -44,12 +45,15 @@ struct pacer {
 };
 
 struct loop {
-    const struct site *site;
     const struct config *cfg;
+    struct loop_source source;
+    /* of a head that computes; else NULL */
+    const struct site *site;
     struct device *device;
     struct loop_options options;
     struct stream stream;
-    struct casters casters;
+    struct casters casters; /* none where the source makes its ticks itself */
+    struct player player;
     struct pacer pacer;
     struct links links;
     struct hasher *hasher;       /* NULL: none is wanted */

@@ -21,7 +21,7 @@ static void report(struct pump *pump, struct session *s)
     if (!s->lost.lagging) {
         char text[96];
         snprintf(text, sizeof text, "session %u, %.50s", s->id, s->peer);
-        device_report(pump->links->device, CMD_E_READER, text);
+        source_report(pump->links->source, CMD_E_READER, text);
     }
     s->lost.lagging = 1;
 }

@@ -115,7 +115,7 @@ int pacer_start(struct loop *loop, struct sh_err *err)
     struct pacer *pacer = &loop->pacer;
     const char *warning;
     pacer->epoch_ns = clock_now_ns();
-    int rc = device_power_up(loop->device, pacer->epoch_ns, &warning, err);
+    int rc = loop->source.ops->power_up(loop->source.self, pacer->epoch_ns, &warning, err);
     if (rc != SH_OK) return rc;
     if (warning != NULL) sh_warn(loop->options.report, "%s", warning);
     int failed = loop->stream.waits ? EPERM : create_realtime(pacer, loop);

@@ -21,7 +21,7 @@ int pump_open(struct links *links, uint32_t index, const struct link_spec *spec,
     pump->stream = links->stream;
     pump->number = index + 1;
     if (spec->type != LINK_FD && !spec->clean)
-        pump->board = device_faults(links->device); /* readers of this process get the clean stream */
+        pump->board = links->source->ops->faults(links->source->self); /* readers of this process get the clean stream */
     pump->ops = link_ops_get(spec->type);
     pump->can = link_faults(spec);
     pump->protocol = protocol_ops_get((enum protocol_id)spec->protocol);
@@ -129,7 +129,7 @@ static void handle(struct pump *pump, const struct link_event *event)
             pump_read_commands(pump, s, event->session);
         break;
     case LINK_REFUSED:
-        device_report(pump->links->device, CMD_E_REFUSED, event->peer);
+        source_report(pump->links->source, CMD_E_REFUSED, event->peer);
         stream_poke(pump->stream);
         break;
     case LINK_NOTICE:

@@ -23,7 +23,7 @@ static void start_step(struct pump *pump, struct session *s, const struct comman
     struct session_commands *c = &s->commands;
     uint64_t total_ns = stream_grant(pump->stream, (uint64_t)result->step_ns);
     if (result->have_pose) /* before time passes */
-        device_pose(pump->links->device, (int64_t)total_ns, result->pose);
+        device_pose(pump->links->mover.device, (int64_t)total_ns, result->pose);
     c->step_tick = stream_pass(pump->stream, total_ns);
     c->stepping = 1;
     memcpy(c->step_reply, result->reply, sizeof c->step_reply);
@@ -32,11 +32,11 @@ static void start_step(struct pump *pump, struct session *s, const struct comman
 static void do_line(struct pump *pump, struct session *s, enum command_line_kind kind)
 {
     struct command_result result;
-    struct device *device = pump->links->device;
+    const struct loop_source *source = pump->links->source;
     if (kind == COMMAND_LINE_OVERRUN)
-        device_overlong(device, s->id, &result);
+        source->ops->overlong(source->self, s->id, &result);
     else
-        device_command(device, s->id, s->commands.lines.buf, stream_released(pump->stream), &result);
+        source->ops->command(source->self, s->id, s->commands.lines.buf, stream_released(pump->stream), &result);
     s->commands.wrong += result.error != 0;
     if (result.effect == COMMAND_FAULTS) session_faults_changed(pump, s);
     if (result.effect == COMMAND_STEP) {
@@ -106,7 +106,7 @@ void pump_read_commands(struct pump *pump, struct session *s, int index)
     pump_read(pump, s, index);
     pump_take_lines(pump, s);
     if (c->replies_dropped != 0) {
-        device_report(pump->links->device, CMD_E_OVERRUN,
+        source_report(pump->links->source, CMD_E_OVERRUN,
                       "a client sends without reading its replies; some were dropped");
         c->replies_dropped = 0;
     }

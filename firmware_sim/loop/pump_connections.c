@@ -24,20 +24,19 @@ enum link_fault pump_link_fault(enum fault_kind kind)
 static void look_at_list(struct pump *pump)
 {
     struct pump_connections *c = &pump->connections;
-    struct fault_entry before[FAULT_MAX], all[FAULT_KEPT];
-    uint64_t base[FAULT_MAX];
-    uint32_t n_all;
-    const uint32_t n_before = c->n_entries;
+    struct pump_fault before[FAULT_MAX];
+    struct fault_entry entry[FAULT_KEPT];
+    uint32_t n;
+    const uint32_t n_before = c->n_faults;
     if (c->version == fault_board_version(pump->board)) return;
-    memcpy(before, c->entry, sizeof before);
-    memcpy(base, c->base, sizeof base);
-    c->version = fault_board_copy(pump->board, c->entry, &c->n_entries);
-    fault_board_copy_all(pump->board, all, &n_all); /* those that were taken out last keep their counts */
-    fault_tally_renew(&pump->tally, all, n_all);
-    for (uint32_t i = 0; i < c->n_entries; i++) {
-        c->base[i] = c->entry[i].from_start ? 0 : c->n;
-        for (uint32_t k = 0; k < n_before; k++)
-            if (before[k].number == c->entry[i].number) c->base[i] = base[k];
+    memcpy(before, c->fault, sizeof before);
+    c->version = fault_board_copy_all(pump->board, entry, &n);
+    fault_tally_renew(&pump->tally, entry, n); /* those that were taken out last keep their counts */
+    c->n_faults = 0;
+    for (uint32_t i = 0; i < n; i++) {
+        if (entry[i].until_ns != INT64_MAX) continue;
+        const struct pump_fault *old = fault_find(before, n_before, sizeof *before, entry[i].number);
+        c->fault[c->n_faults++] = old != NULL ? *old : (struct pump_fault){entry[i], entry[i].from_start ? 0 : c->n};
     }
 }
 
@@ -45,9 +44,9 @@ static void look_at_list(struct pump *pump)
 static int strikes(struct pump *pump, uint32_t i, int64_t t_ns)
 {
     const struct pump_connections *c = &pump->connections;
-    const struct fault_entry *entry = &c->entry[i];
+    const struct fault_entry *entry = &c->fault[i].entry;
     const struct fault *f = &entry->fault;
-    const struct fault_spot spot = {.number = c->n - c->base[i], .t_ns = t_ns - entry->since_ns};
+    const struct fault_spot spot = {.number = c->n - c->fault[i].base, .t_ns = t_ns - entry->since_ns};
     if (fault_place_of(f->kind) != FAULT_AT_CONNECTION) return 0;
     if ((pump->can & LINK_FAULT_BIT(pump_link_fault(f->kind))) == 0) return 0;
     if (f->count != 0 && *fault_tally_hits(&pump->tally, entry->number) >= f->count) return 0;
@@ -57,7 +56,7 @@ static int strikes(struct pump *pump, uint32_t i, int64_t t_ns)
 /* Carries it out, and notes it. index: of the session, or -1. */
 static int inject(struct pump *pump, uint32_t i, int index, int64_t t_ns)
 {
-    const struct fault_entry *entry = &pump->connections.entry[i];
+    const struct fault_entry *entry = &pump->connections.fault[i].entry;
     const struct fault *f = &entry->fault;
     const struct fault_note note = {
         .fault = entry->number,
@@ -83,9 +82,9 @@ static int connect_next(struct pump *pump, int index)
     int refused = 0;
     look_at_list(pump);
     pump->connections.n++;
-    for (uint32_t i = 0; i < pump->connections.n_entries && !refused; i++)
+    for (uint32_t i = 0; i < pump->connections.n_faults && !refused; i++)
         if (strikes(pump, i, t_ns) && inject(pump, i, index, t_ns))
-            refused = pump->connections.entry[i].fault.kind == FAULT_REFUSE;
+            refused = pump->connections.fault[i].entry.fault.kind == FAULT_REFUSE;
     return refused;
 }
 

@@ -53,7 +53,7 @@ int session_has_wire(struct pump *pump, struct session *s)
         .tally = &pump->tally,
     };
     s->wire = wire_create(&spec);
-    if (s->wire == NULL) device_report(pump->links->device, CMD_E_REFUSED, "no memory for the faults of a session");
+    if (s->wire == NULL) source_report(pump->links->source, CMD_E_REFUSED, "no memory for the faults of a session");
     if (s->wire != NULL && native) hear_again(s);
     return s->wire != NULL;
 }
@@ -87,13 +87,13 @@ static void put(struct pump *pump, struct session *s, int of, const uint8_t *byt
     const struct wire_item item = {
         .of = of, .bytes = bytes, .len = len, .t_ns = (int64_t)tick * pump->stream->tick_ns};
     if (wire_put(s->wire, &item, clock_now_ns()) != SH_OK)
-        device_report(pump->links->device, CMD_E_READER, "no memory for the faults of a session: a frame is lost");
+        source_report(pump->links->source, CMD_E_READER, "no memory for the faults of a session: a frame is lost");
 }
 
 static void put_rest(struct pump *pump, struct session *s, const uint8_t *bytes, size_t len)
 {
     if (wire_put_rest(s->wire, bytes, len) != SH_OK)
-        device_report(pump->links->device, CMD_E_READER, "no memory for the faults of a session: a frame is lost");
+        source_report(pump->links->source, CMD_E_READER, "no memory for the faults of a session: a frame is lost");
 }
 
 /* A frame or a reply of the session's buffer. What was written of it before there was a wire is not written again. */

@@ -65,9 +65,11 @@ struct session {
 struct pump_connections {
     uint64_t n;       /* so far, refused ones too */
     uint32_t version; /* of the list */
-    struct fault_entry entry[FAULT_MAX];
-    uint64_t base[FAULT_MAX]; /* connections before it was there */
-    uint32_t n_entries;
+    struct pump_fault {
+        struct fault_entry entry;
+        uint64_t base; /* connections before it was there */
+    } fault[FAULT_MAX];
+    uint32_t n_faults;
 };
 
 struct pump {

@@ -42,7 +42,8 @@ static int host_command(void *ctx, const char *line, char *reply, size_t cap)
     struct session *s = ctx;
     struct stream *stream = s->pump->stream;
     struct command_result result;
-    device_command_once(s->pump->links->device, s->id, line, stream_released(stream), &result);
+    const struct loop_source *source = s->pump->links->source;
+    source->ops->command_once(source->self, s->id, line, stream_released(stream), &result);
     if (stream->waits) stream_poke(stream);
     snprintf(reply, cap, "%s", result.reply);
     return result.error;
@@ -51,19 +52,19 @@ static int host_command(void *ctx, const char *line, char *reply, size_t cap)
 static int64_t host_utc_ns(void *ctx, int64_t t_ns)
 {
     const struct session *s = ctx;
-    return device_utc_ns(s->pump->links->device, t_ns);
+    return s->pump->links->source->ops->utc_ns(s->pump->links->source->self, t_ns);
 }
 
 static int host_fix(void *ctx, int64_t t_ns, struct nmea_fix *fix)
 {
     const struct session *s = ctx;
-    return device_fix(s->pump->links->device, t_ns, fix);
+    return s->pump->links->source->ops->fix(s->pump->links->source->self, t_ns, fix);
 }
 
 static int64_t host_next_fix_ns(void *ctx, int64_t t_ns)
 {
     const struct session *s = ctx;
-    return device_next_fix_ns(s->pump->links->device, t_ns);
+    return s->pump->links->source->ops->next_fix_ns(s->pump->links->source->self, t_ns);
 }
 
 static void host_count(void *ctx, enum protocol_count what, uint64_t n)
@@ -116,7 +117,7 @@ static int create(struct pump *pump, struct session *s)
         .host = {s, host_send, host_command, host_utc_ns, host_fix, host_count, host_hang_up, host_next_fix_ns},
         .session = s->id,
         .fixes_hz = pump->links->fixes_hz,
-        .near_wrap = device_near_wrap(pump->links->device),
+        .near_wrap = pump->links->source->ops->near_wrap(pump->links->source->self),
         .waits = pump->stream->waits,
         .port = pump->links->data_port,
     };

@@ -30,11 +30,15 @@ void session_open(struct pump *pump, struct session *s, const char *peer)
     snprintf(s->peer, sizeof s->peer, "%.63s", peer); /* an address: shorter */
     if (native && s->out == NULL) s->out = malloc(pump->out_cap);
     if (native ? s->out == NULL : session_open_protocol(pump, s) != SH_OK) {
-        device_report(pump->links->device, CMD_E_REFUSED, "no memory for a session");
+        source_report(pump->links->source, CMD_E_REFUSED, "no memory for a session");
         return;
     }
     s->open = 1;
     stream_set_reader(pump->stream, s->reader, s->cursor, pump->holds);
+    const struct loop_source *source = pump->links->source;
+    if (source->ops->session_opened == NULL) return;
+    source->ops->session_opened(source->self, s->id);
+    stream_poke(pump->stream);
 }
 
 void session_cut(struct pump *pump, struct session *s)
@@ -53,7 +57,7 @@ void session_restart(struct pump *pump, struct session *s, uint64_t tick)
     clear(s);
     session_close_wire(s);
     if (session_restart_protocol(pump, s) == SH_OK) return;
-    device_report(pump->links->device, CMD_E_REFUSED, "no memory for a session");
+    source_report(pump->links->source, CMD_E_REFUSED, "no memory for a session");
     session_cut(pump, s);
 }
 
@@ -69,7 +73,8 @@ void session_close(struct pump *pump, struct session *s)
     session_cut(pump, s);
     if (!pump->protocol->passes_native) return; /* it never keeps control */
     const struct command_lines *lines = &s->commands.lines;
-    device_session_closed(pump->links->device, s->id, s->peer, lines->len != 0 || lines->overrun);
+    const struct loop_source *source = pump->links->source;
+    source->ops->session_closed(source->self, s->id, s->peer, lines->len != 0 || lines->overrun);
     stream_poke(pump->stream);
 }
 

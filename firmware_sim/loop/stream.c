@@ -164,8 +164,13 @@ void stream_release(struct stream *stream, struct ring_slot *slot, uint64_t tick
     count(stream, made, now_ns);
     for (uint32_t at = 0; at < made->len;) {
         uint8_t *frame = made->bytes + at;
-        complete_counts(stream, frame);
-        at += (uint32_t)native_seal(frame, stream->seq++);
+        if (stream->as_they_are) {
+            at += (uint32_t)native_frame_len(frame);
+            stream->seq += (frame[3] & NATIVE_LOCAL) == 0;
+        } else {
+            complete_counts(stream, frame);
+            at += (uint32_t)native_seal(frame, stream->seq++);
+        }
         kept_put(&stream->kept, frame);
     }
     slot->n_frames = stream->seq - slot->first_seq;

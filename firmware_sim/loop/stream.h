@@ -56,6 +56,7 @@ struct stream {
     int64_t tick_ns;
     uint32_t tick_bytes; /* no tick is longer */
     int waits;           /* paces fast and step: release waits for casters and readers, and nothing is lost */
+    int as_they_are;     /* frames have their numbers, and nothing in them is completed */
     int steps;           /* pace step: clients let time pass, also while the head has no power */
     struct device_counters *counters;
     struct stream_reader reader[RING_MAX_READERS];

@@ -95,8 +95,6 @@ function sameAsSaid({words}, frame, value, batches) {
       record[1]({batches, value}, k, record[0].exec(entry));
     } else if (name === 'pose') {
       sameField(value[++pose].t_ns, 't_ns', rest.replace('t_ns ', ''));
-    } else if (name === 'flags') { // of a pose between these two
-      equal(value[0].flags | value[1].flags, Number(rest), name);
     } else if (pose >= 0) {
       sameField(value[pose][name], name, rest);
     } else if (['points', 'attributes', 'colours'].includes(title)) {

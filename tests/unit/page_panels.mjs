@@ -5,6 +5,7 @@ import {duration, metres, grouped, short} from '../../drivers/link/web/page.js';
 import {describeSettings, splitReply} from '../../drivers/link/web/describe.js';
 import {limit} from '../../drivers/link/web/knobs.js';
 import {eventWords} from '../../drivers/link/web/log.js';
+import {Session, stateWord} from '../../drivers/link/web/session.js';
 import {batchesOf, countWithin, fetchCloud, readMesh} from '../../drivers/link/web/recording_files.js';
 import {runTests, test} from './page_tap.mjs';
 
@@ -119,6 +120,19 @@ test('events in words', () => {
   equal(eventWords({name: 'ERROR', number: 102, session: 0, held_back: 0, text: 'session 17, fd:3'}), ['Reader too slow (102): session 17, fd:3', 'bad']);
   equal(eventWords({name: 'PPS'}), null);
   equal(eventWords({name: '', code: 99, text: 'new'}), ['Event 99: new', '']);
+});
+
+test('a head that no time was granted says what it waits for', () => {
+  const session = new Session(new EventTarget());
+  session.head.dispatchEvent(new CustomEvent('state', {detail: {state: 'boot'}}));
+  const words = () => stateWord(session.state, session.pace);
+  equal(words(), 'Self test');
+  let heard = 0;
+  session.addEventListener('change', () => heard++);
+  session.paced('step');
+  equal([words(), heard], ['Waits for time steps', 1]);
+  session.head.dispatchEvent(new CustomEvent('state', {detail: {state: 'idle'}}));
+  equal(words(), 'Idle');
 });
 
 test('the long-edge filter is a beginning of the sorted ratios', () => {

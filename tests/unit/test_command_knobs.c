@@ -143,6 +143,25 @@ static void steps_stay_within_the_rates(void **ctx)
     expect(&dev, "SCAN:STEP:LINE 0.1", "0.1");
 }
 
+/* 60 deg/s at 100 lines/s are 0.6 deg, and of both steps 0.268328156 is the most. A number sets both steps, but this one
+ * is what DEF answers. */
+static void what_def_answers_can_be_set(void **ctx)
+{
+    (void)ctx;
+    struct command_device dev = command_test_device();
+    dev.defaults.pan_udeg_s = 60 * MICRO;
+    expect(&dev, "SCAN:STEP? DEF", "0.6");
+    expect(&dev, "SCAN:STEP 0.6", "0.6");
+    assert_true(dev.settings.lines_uhz == 100 * MICRO && dev.settings.pan_udeg_s == 60 * MICRO);
+    expect(&dev, "SCAN:STEP 0.12", "0.12");
+    assert_true(dev.settings.pan_udeg_s == 12 * MICRO);
+    refuse(&dev, "SCAN:STEP 0.59", CMD_E_SETTINGS, "allowed 0.0012 to 0.268328156 as HEAD:PRR is 300000");
+    /* Not where the lines of power-up give another step: 360 * 100 / 1000 deg. */
+    expect(&dev, "HEAD:PRR 1000", "OK");
+    expect(&dev, "SCAN:STEP:LINE? DEF", "0.12");
+    refuse(&dev, "SCAN:STEP:LINE 0.12", CMD_E_SETTINGS, "allowed 0.36 to 360 as HEAD:PRR is 1000");
+}
+
 /* 360 kHz at 1 deg and 1000 rings/s. */
 static struct command_device sphere(void)
 {
@@ -278,6 +297,7 @@ int main(void)
         cmocka_unit_test(what_is_planned_rests_in_a_scan),
         cmocka_unit_test(a_line_heads_step_sets_its_rates),
         cmocka_unit_test(steps_stay_within_the_rates),
+        cmocka_unit_test(what_def_answers_can_be_set),
         cmocka_unit_test(a_spheres_step_divides_half_a_turn),
         cmocka_unit_test(steps_of_fixed_patterns_are_readings),
         cmocka_unit_test(what_can_not_be_planned_is_refused),

@@ -144,6 +144,28 @@ static void an_added_fault_counts_from_its_command(void **state)
     rig_close(rig);
 }
 
+/* The list changes while one strikes: it goes on, and its mirror stands where it stood. */
+static void another_fault_leaves_it_as_it_is(void **state)
+{
+    (void)state;
+    const char *const sets[] = {"head.frames=0"}, *const faults[] = {"{kind: mirror_stuck, from_pulse: 999}"};
+    struct rig *rig = open_scan(sets, LEN(sets), faults, LEN(faults));
+    rig_go_to(rig, rig->next + 20);
+    const double turn = rig->work.upset.stuck_turn;
+    rig_tell(rig, "FAUL:ADD {kind: laser_off}", rig->next - 1);
+    rig_go_to(rig, rig->next + 20);
+    assert_true(rig->work.upset.cast.dark && rig->work.upset.stuck && rig->work.upset.stuck_turn == turn);
+    assert_int_equal(n_notes, 2);
+    assert_note(0, 1, 0, 999);
+    assert_int_equal(notes[1].fault, 2);
+    rig_tell(rig, "FAUL:CLE 2", rig->next - 1);
+    rig_go_to(rig, rig->next + 20);
+    assert_true(!rig->work.upset.cast.dark && rig->work.upset.stuck_turn == turn);
+    assert_int_equal(n_notes, 3);
+    assert_int_equal(notes[2].fault, 2);
+    rig_close(rig);
+}
+
 /* Lines of 100 s, and no more than the profile's lines per second. */
 static void the_mirror_has_limits(void **state)
 {
@@ -172,9 +194,9 @@ static void the_mirror_has_limits(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_tick_ends_where_a_fault_does), cmocka_unit_test(settings_change_while_the_mirror_is_slow),
-        cmocka_unit_test(faults_end_with_their_scan),     cmocka_unit_test(an_added_fault_counts_from_its_command),
-        cmocka_unit_test(the_mirror_has_limits),
+        cmocka_unit_test(a_tick_ends_where_a_fault_does),   cmocka_unit_test(settings_change_while_the_mirror_is_slow),
+        cmocka_unit_test(faults_end_with_their_scan),       cmocka_unit_test(an_added_fault_counts_from_its_command),
+        cmocka_unit_test(another_fault_leaves_it_as_it_is), cmocka_unit_test(the_mirror_has_limits),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -10,6 +10,7 @@
 #include <unistd.h>
 #include <cmocka.h>
 
+#include <fcntl.h>
 #include "core/err.h"
 #include "firmware_sim/fault/board.h"
 
@@ -216,6 +217,32 @@ static void the_truth_is_written_line_by_line(void **state)
     assert_string_equal(got, want);
 }
 
+static void a_dash_is_standard_output(void **state)
+{
+    (void)state;
+    char got[512] = "";
+    struct truth *truth;
+    struct sh_err err;
+    FILE *file = tmpfile();
+    assert_non_null(file);
+    fflush(stdout);
+    const int was = dup(STDOUT_FILENO);
+    assert_true(dup2(fileno(file), STDOUT_FILENO) >= 0);
+    const int opened = truth_open("-", &truth, &err);
+    if (opened == SH_OK) truth_write(truth, &notes[0].note);
+    const ssize_t n = pread(fileno(file), got, sizeof got - 1, 0); /* each line at once */
+    const int closed = opened == SH_OK ? truth_close(truth, &err) : SH_OK;
+    const int is_open = fcntl(STDOUT_FILENO, F_GETFD) >= 0;
+    dup2(was, STDOUT_FILENO);
+    close(was);
+    fclose(file);
+    assert_int_equal(opened, SH_OK);
+    assert_int_equal(closed, SH_OK);
+    assert_true(is_open && n > 0);
+    assert_string_equal(got, notes[0].json);
+    assert_int_not_equal(access("-", F_OK), 0);
+}
+
 /* The longest note still is a command line of the journal, which has them as remarks. */
 static void the_longest_note_is_not_cut(void **state)
 {
@@ -258,6 +285,7 @@ int main(void)
         cmocka_unit_test(numbers_are_at_their_ends_as_said),
         cmocka_unit_test(the_list_changes_and_counts_stay),
         cmocka_unit_test(the_truth_is_written_line_by_line),
+        cmocka_unit_test(a_dash_is_standard_output),
         cmocka_unit_test(the_longest_note_is_not_cut),
         cmocka_unit_test(what_cannot_be_written_is_said),
     };

@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "firmware_sim/app/app.h"
@@ -29,6 +30,16 @@ static void files_are_apart(void **state)
     assert_int_equal(chdir(folder), 0);
     assert_int_equal(check("lossy-udp", "a", "a", &err), SH_EINPUT); /* not there yet */
     assert_string_equal(err.text, "--truth a: is the file of --stats, too; allowed another file");
+    assert_int_equal(check("lossy-udp", "a", "./a", &err), SH_EINPUT); /* two names of what is not there yet */
+    assert_string_equal(err.text, "--truth ./a: is the file of --stats, too; allowed another file");
+    char whole[sizeof folder + 8];
+    snprintf(whole, sizeof whole, "%s/a", folder);
+    assert_int_equal(check("lossy-udp", "sub/../a", whole, &err), SH_OK); /* no such folder: can't be made */
+    assert_int_equal(mkdir("sub", 0700), 0);
+    assert_int_equal(check("lossy-udp", "sub/../a", whole, &err), SH_EINPUT);
+    assert_int_equal(check("lossy-udp", "sub/a", "a", &err), SH_OK);
+    assert_int_equal(rmdir("sub"), 0);
+    assert_int_equal(check("lossy-udp", "-", "-", &err), SH_OK); /* standard output */
     fclose(fopen("a", "w"));
     fclose(fopen("run.yaml", "w"));
     assert_int_equal(check(NULL, "a", "./a", &err), SH_EINPUT);

@@ -143,6 +143,43 @@ static void test_damaged(void **state)
     }
 }
 
+/* As capinfos reads it: 64-bit options behind interface and time. */
+static void test_statistics(void **state)
+{
+    (void)state;
+    uint8_t file[PCAPNG_FRONT_ROOM];
+    struct pcapng_reader reader = {.in_section = 1};
+    struct pcapng_packet packet;
+    struct sh_err err = {0};
+    size_t used;
+    const size_t len = pcapng_put_statistics(file, 3, INT64_C(0x123456789abcd), 1000, 7);
+    assert_int_equal(pcapng_read(&reader, file, len, &packet, &used, NULL, &err), PCAPNG_OTHER);
+    assert_true(used == len && len == 20 + 12 + 12 + 4 + 4);
+    assert_true(rig_uint(file, 4) == 5 && rig_uint(file + 8, 4) == 3);
+    assert_int_equal(rig_uint(file + 12, 4) << 32 | rig_uint(file + 16, 4), INT64_C(0x123456789abcd));
+    assert_true(rig_uint(file + 20, 4) == (4 | 8 << 16) && rig_uint(file + 24, 8) == 1000);
+    assert_true(rig_uint(file + 32, 4) == (7 | 8 << 16) && rig_uint(file + 36, 8) == 7);
+}
+
+/* The count of lost packets stands behind the padded data. */
+static void test_loss(void **state)
+{
+    (void)state;
+    uint8_t file[256], with[256];
+    struct pcapng_reader reader = {.in_section = 1, .n_interfaces = 1, .interface[0].resolution = 9};
+    struct pcapng_packet packet;
+    struct sh_err err = {0};
+    size_t used;
+    const size_t plain = pcapng_put_packet(file, 0, 7, "abcde", 5);
+    const size_t len = pcapng_put_packet_after_loss(with, 0, 7, "abcde", 5, 300);
+    assert_true(plain == pcapng_packet_len(5) && len == plain + PCAPNG_LOST);
+    assert_int_equal(pcapng_read(&reader, with, len, &packet, &used, NULL, &err), PCAPNG_PACKET);
+    assert_true(used == len && packet.t_ns == 7 && packet.len == 5 && memcmp(packet.data, "abcde", 5) == 0);
+    assert_memory_equal(with + 8, file + 8, plain - 12);
+    assert_true(rig_uint(with + 36, 4) == (4 | 8 << 16) && rig_uint(with + 40, 8) == 300);
+    assert_int_equal(rig_uint(with + 48, 4), 0);
+}
+
 /* As other programs write: microseconds, an unknown block, a simple packet, cut by the interface's limit. */
 static void test_of_others(void **state)
 {
@@ -179,6 +216,6 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_packets), cmocka_unit_test(test_disk_full),
                                        cmocka_unit_test(test_read), cmocka_unit_test(test_damaged),
-                                       cmocka_unit_test(test_of_others)};
+                                       cmocka_unit_test(test_of_others), cmocka_unit_test(test_statistics), cmocka_unit_test(test_loss)};
     return cmocka_run_group_tests(tests, rig_set_up, rig_tear_down);
 }

@@ -194,6 +194,32 @@ static struct site *load_site(const struct config *of, const struct site *other)
 }
 
 /* By counts: one load of the scene and one BVH serve all, whatever the second scanner needs of them. */
+/* Faults are those of all scanners, of the file and of a scenario. The links that they name are not. */
+static void each_has_the_faults(void **state)
+{
+    (void)state;
+    char scenario[sizeof dir + 16];
+    snprintf(scenario, sizeof scenario, "%s/faults.yaml", dir);
+    write_in("faults.yaml", "faults:\n  - {kind: drop, link: 1}\n  - {kind: mirror_slow, factor: 0.5}\n");
+    const char *whole =
+        with_scene(HEAD REST STATIONS "    scanner: {head: {lines_hz: 20}}" THIRD "links: [{type: tcp}]\n"
+                                      "faults: [{kind: stall, link: 1, for_ms: 5}]\n");
+    assert_loads(load_text(whole));
+    assert_int_equal(config_add_scenario(cfg, scenario, &faults), SH_OK);
+    for (uint32_t station = 1; station <= 3; station++) {
+        load_own(station);
+        assert_int_equal(own.faults.n, 3);
+        assert_int_equal(own.faults.fault[0].kind, FAULT_STALL);
+        assert_int_equal(own.faults.fault[2].kind, FAULT_MIRROR_SLOW);
+    }
+    /* What one of them can't have is said when it is loaded. */
+    assert_loads(load_second("{head: {profile: sphere}}", NULL, 0));
+    assert_int_equal(config_add_scenario(cfg, scenario, &faults), SH_OK);
+    assert_int_equal(config_load_scanner(cfg, 2, &own, &err), SH_EINPUT);
+    assert_non_null(strstr(err.text, "mirror_slow, but head profile sphere (sphere) has no mirror"));
+    unlink(scenario);
+}
+
 static void sites_share_scene_and_bvh(void **state)
 {
     (void)state;
@@ -285,6 +311,7 @@ int main(void)
         cmocka_unit_test(the_same_settings_are_one_scanner),
         cmocka_unit_test(wrong_ones_are_refused),
         cmocka_unit_test(faults_of_all_are_told_once),
+        cmocka_unit_test(each_has_the_faults),
         cmocka_unit_test(sites_share_scene_and_bvh),
         cmocka_unit_test(another_order_is_another_bvh),
         cmocka_unit_test(another_scene_is_not_shared),

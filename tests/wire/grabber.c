@@ -99,6 +99,20 @@ void grabber_end(struct grabber *grabber)
     if (status != 0) fail_msg("rawlog-grabber: status %d\n%s", status, grabber->said);
 }
 
+uint32_t grabber_dropped_at(int port)
+{
+    char line[256];
+    unsigned local, drops, sum = 0;
+    FILE *f = fopen("/proc/net/udp", "r");
+    assert_non_null(f);
+    while (fgets(line, sizeof line, f) != NULL)
+        if (sscanf(line, "%*d: %*x:%x %*s %*s %*s %*s %*s %*s %*s %*s %*s %*s %u", &local, &drops) == 2 &&
+            (int)local == port)
+            sum += drops;
+    fclose(f);
+    return sum;
+}
+
 /* ---- rawlogs */
 
 static const uint8_t *skip_text(const uint8_t *at)

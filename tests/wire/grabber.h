@@ -29,6 +29,9 @@ int grabber_wait(struct grabber *grabber, int n_saved);
 void grabber_start_and_wait(struct wire *wire, const char *name, const char *sensor, int n_saved,
                             struct grabber *grabber);
 
+/* Datagrams that the kernel threw away since a socket's owner did not read them in time: on a busy machine. */
+uint32_t grabber_dropped_at(int port);
+
 /* A key is pressed; it must end with status 0. */
 void grabber_end(struct grabber *grabber);
 

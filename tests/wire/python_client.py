@@ -368,8 +368,9 @@ def said_of(head, frame):
     if frame.type == scanhead.SURFACES:
         text += [f"label {label}: {names[0]} of {names[1]}" for label, names in head.surfaces.items()]
     if frame.type == scanhead.POSES:
-        for t_ns in struct.unpack_from("<q72xq", frame.payload, 8):
-            text += ["pose " + "; ".join(f"{n} {words(v)}" for n, v in head.pose(t_ns)._asdict().items())]
+        for t_ns, flags in struct.iter_unpack("<q64xI4x", frame.payload[8:]):
+            pose = head.pose(t_ns)._replace(flags=flags)  # the client has the flags of both ends of a leg
+            text += ["pose " + "; ".join(f"{n} {words(v)}" for n, v in pose._asdict().items())]
     return "; ".join(text)
 
 

@@ -455,6 +455,44 @@ static void test_images(void **state)
     free(err);
 }
 
+static int points_of(struct wire *wire, const char *name)
+{
+    int n = -1;
+    char *text = wire_read(in_dir(wire, "dark", name), NULL);
+    const char *at = strstr(text, "element vertex ");
+    assert_non_null(at);
+    assert_int_equal(sscanf(at, "element vertex %d", &n), 1);
+    free(text);
+    return n;
+}
+
+/* The faults of a scenario are in each job, whatever scanner its station has; what is in the file counts, not its name. */
+static void test_scenario(void **state)
+{
+    struct wire *wire = *state;
+    char config[352], dir[352], scenario[352], other[352];
+    const char *job[] = {"batch", config, "-o", dir, "--format", "ply", "--quiet", "--scenario", scenario, NULL};
+    const char **last = &job[sizeof job / sizeof job[0] - 2];
+    snprintf(config, sizeof config, "%s", wire_path(wire, "config.yaml"));
+    snprintf(dir, sizeof dir, "%s", wire_path(wire, "dark"));
+    snprintf(scenario, sizeof scenario, "%s", wire_path(wire, "dark.yaml"));
+    snprintf(other, sizeof other, "%s", wire_path(wire, "other.yaml"));
+    change(config, "heading_deg: 30,", "heading_deg: 30, scanner: {noise: {seed: 7}},");
+    wire_write_text(wire, "dark.yaml", "faults: [{kind: laser_off, from_pulse: 3000}]\n");
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, job, "out", "err", -1)), 0);
+    /* The others are blind: all 10,000 pulses of a job have 3,900 points where none is dark. */
+    assert_in_range(points_of(wire, "0001_station-1.ply"), 1000, 3000);
+    assert_in_range(points_of(wire, "0002_station-2.ply"), 1000, 3000);
+    wire_write_text(wire, "other.yaml", "faults: [{kind: laser_off, from_pulse: 3000}]\n");
+    *last = other;
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, job, "out", "err", -1)), 0);
+    change(other, "3000", "4000");
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, job, "out", "err", -1)), 1);
+    char *err = wire_read(wire_path(wire, "err"), NULL);
+    assert_non_null(strstr(err, "scenario"));
+    free(err);
+}
+
 /* ---- engines */
 
 static void by_script(struct wire *wire, const char *shell, const char *script, const char *dir)
@@ -522,6 +560,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_locked, setup, teardown),
         cmocka_unit_test_setup_teardown(test_failing, setup, teardown),
         cmocka_unit_test_setup_teardown(test_images, setup, teardown),
+        cmocka_unit_test_setup_teardown(test_scenario, setup, teardown),
         cmocka_unit_test_setup_teardown(test_slurm, setup_with_ref, teardown),
         cmocka_unit_test_setup_teardown(test_parallel, setup_with_ref, teardown),
     };

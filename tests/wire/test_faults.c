@@ -1,18 +1,8 @@
 /* Faults on request, in the program as its users meet it: the same seed gives the same truth at any pace, with any
  * number of threads, over any link and however the client reads; a link without faults has the clean stream; a client
- * reports what was injected, by number and length; a stall makes a slow reader; a journal brings faults back. */
+ * reports what was injected, by number and length; a journal brings faults back. */
 #include "drivers/protocol/native.h"
-#include "tests/wire/room.h"
-
-/* 30 lines of 1,000 pulses, cut by ticks: some 200 frames of the stream. */
-static const struct room_config SMALL = {.profile = "any-rate",
-                                         .prr_hz = 100000,
-                                         .lines_hz = 100,
-                                         .pan_deg_s = 100,
-                                         .pan_stop_deg = 30,
-                                         .frames = 1,
-                                         .links = LINK_YAML_BOTH,
-                                         .more = "loop: {queue_ms: 5000, late_ms: 10000}\n"};
+#include "tests/wire/fault_head.h"
 
 /* ---- the truth, as far as it is the same in each run; seq apart: notices have numbers of the same counting */
 
@@ -80,23 +70,6 @@ static void expect_same(const struct truth *a, const struct truth *b, const char
 
 /* ---- the head */
 
-static struct head start(struct wire *wire, const struct room_config *c, const char *faults, const char *const *more)
-{
-    static char scenario[352], truth[352], config[352];
-    const char *args[24] = {"--scenario", scenario, "--truth", truth};
-    int n = faults != NULL ? 4 : 2;
-    room_write(wire);
-    snprintf(config, sizeof config, "%s", room_config_write(wire, c));
-    if (faults != NULL) snprintf(scenario, sizeof scenario, "%s", wire_write_text(wire, "faults.yaml", faults));
-    unlink(wire_path(wire, "truth.json"));
-    snprintf(truth, sizeof truth, "%s", wire_path(wire, "truth.json"));
-    if (faults == NULL) memcpy(args, args + 2, 2 * sizeof args[0]);
-    while (more != NULL && *more != NULL)
-        args[n++] = *more++;
-    args[n] = NULL;
-    return head_start(wire, config, args);
-}
-
 /* Reads by pieces of so many bytes, up to the end of the scan. */
 static void scan_raw(const struct head *head, size_t piece)
 {
@@ -163,10 +136,10 @@ static void test_the_same_truth(void **state)
     struct wire *wire = *state;
     for (size_t i = 0; i < sizeof runs / sizeof runs[0]; i++) {
         const char *const more[] = {"--pace", runs[i].pace, "--threads", runs[i].threads, NULL};
-        struct room_config c = SMALL;
+        struct room_config c = FAULT_ROOM;
         char who[64];
         c.links = strcmp(runs[i].link, "tcp") == 0 ? LINK_YAML_TCP : LINK_YAML_PTY;
-        struct head head = start(wire, &c, ALL_KINDS, more);
+        struct head head = fault_head_start(wire, &c, ALL_KINDS, more);
         if (runs[i].piece != 0)
             scan_raw(&head, runs[i].piece);
         else
@@ -283,7 +256,7 @@ static void test_a_client_reports_what_was_injected(void **state)
     memset(&seen, 0, sizeof seen);
     memset(&clean, 0, sizeof clean);
     const char *const more[] = {"--pace", "fast", NULL};
-    struct head head = start(wire, &SMALL, APART, more);
+    struct head head = fault_head_start(wire, &FAULT_ROOM, APART, more);
     struct scanhead *faulty = client_open(head_endpoint(&head, "tcp"));
     struct scanhead *other = client_open(head_endpoint(&head, "pty"));
     scanhead_on_notice(faulty, see, &seen);
@@ -315,146 +288,6 @@ static void test_a_client_reports_what_was_injected(void **state)
     assert_string_equal(clean_hash, hash);
 }
 
-/* ---- replies */
-
-static void add_fault(struct scanhead *sh, const char *fault, const char *number)
-{
-    char line[256];
-    snprintf(line, sizeof line, "FAUL:ADD %s", fault);
-    assert_string_equal(client_ask(sh, line), number);
-}
-
-static void expect_no_reply(struct scanhead *sh, const char *command)
-{
-    char reply[600];
-    assert_int_equal(scanhead_command(sh, command, reply, sizeof reply, 100), SCANHEAD_ETIMEOUT);
-}
-
-static void test_replies_that_go_wrong(void **state)
-{
-    static struct seen seen;
-    struct wire *wire = *state;
-    memset(&seen, 0, sizeof seen);
-    struct head head = start(wire, &SMALL, NULL, NULL);
-    struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
-    scanhead_on_notice(sh, see, &seen);
-    client_wait_state(sh, "idle");
-    assert_string_equal(client_ask(sh, "FAUL:LIST?"), "none");
-    add_fault(sh, "{kind: no_reply, at: 1}", "1");
-    expect_no_reply(sh, "SYST:VERS?");
-    assert_string_equal(client_ask(sh, "HEAD:STAT?"), "idle");
-    add_fault(sh, "{kind: late_reply, at: 1, for_ms: 300}", "2");
-    expect_no_reply(sh, "SYST:VERS?");
-    assert_string_equal(client_ask(sh, "HEAD:STAT?"), "idle"); /* not what came late */
-    assert_int_equal(seen.n[SCANHEAD_NOTICE_LATE_REPLY], 1);
-    add_fault(sh, "{kind: echo, at: 1}", "3");
-    assert_string_equal(client_ask(sh, "SYST:VERS?"), "1999.0");
-    assert_int_equal(seen.n[SCANHEAD_NOTICE_ECHO], 1);
-    add_fault(sh, "{kind: wrong_reply, at: 1}", "4");
-    assert_string_equal(client_ask(sh, "SYST:VERS?"), "4"); /* the one before: nobody can know */
-    assert_string_equal(client_ask(sh, "SYST:VERS?"), "1999.0");
-    assert_string_equal(client_ask(sh, "FAUL:LIST?"), "1 no_reply, 2 late_reply, 3 echo, 4 wrong_reply");
-    assert_string_equal(client_ask(sh, "FAUL:INJ?"), "4");
-    assert_string_equal(client_ask(sh, "FAUL:INJ? 3"), "1");
-    client_tell(sh, "FAUL:CLE 3");
-    client_tell(sh, "FAUL:CLE ALL");
-    assert_string_equal(client_ask(sh, "FAUL:LIST?"), "none");
-    assert_string_equal(client_ask(sh, "FAUL:INJ? 3"), "1");
-    assert_int_equal(seen.n[SCANHEAD_NOTICE_BAD_BYTES] + seen.n[SCANHEAD_NOTICE_UNASKED], 0);
-    scanhead_close(sh);
-    head_end(&head, SIGTERM);
-}
-
-/* ---- stalls, and the end of the run */
-
-/* The wire keeps about 140 kB, the queue 50 ms of 2 MB/s: a stall of 300 ms is too long. */
-static void test_a_stall_makes_a_slow_reader(void **state)
-{
-    struct wire *wire = *state;
-    struct room_config c = SMALL;
-    struct scanhead_frame frame;
-    uint64_t pulses = 0, told = 0;
-    c.links = LINK_YAML_TCP;
-    c.pan_stop_deg = 60;
-    c.more = "loop: {queue_ms: 50, late_ms: 10000}\n";
-    struct head head = start(wire, &c, "faults: [{kind: stall, at: 100, for_ms: 300}]\n", NULL);
-    struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
-    client_wait_state(sh, "idle");
-    client_tell(sh, "SCAN:STAR");
-    do {
-        client_next(sh, &frame);
-        if (frame.type == SCANHEAD_POINTS) pulses += frame.n_pulses;
-        if (is_event(&frame, SCANHEAD_EV_READER_LOST)) told += frame.event_value[1];
-    } while (!is_event(&frame, SCANHEAD_EV_SCAN_END));
-    scanhead_close(sh);
-    head_end(&head, SIGTERM);
-    assert_true(told > 0 && stats_link_uint(wire, "left_out_frames") > 0);
-    assert_int_equal(stats_link_uint(wire, "left_out_pulses"), told);
-    assert_int_equal(stats_link_uint(wire, "received_pulses"), pulses);
-    assert_int_equal(stats_uint(wire, "pulses"), pulses + told);
-}
-
-/* What would come within two seconds is not cut; what would come later is, and counts as left out: also where one
- * stall after the other ends in time. */
-static void test_the_end_waits_for_what_is_on_its_way(void **state)
-{
-    static const struct {
-        const char *faults;
-        int all;
-    } cases[] = {{"faults: [{kind: delay, from: 50, for_ms: 400}, {kind: reorder, from: 100, every: 20, n: 1000}, "
-                  "{kind: merge, from: 150, n: 64}]\n", 1},
-                 {"faults: [{kind: stall, at: 100, for_ms: 1e8}]\n", 0},
-                 {"faults: [{kind: stall, from: 100, for_ms: 700}]\n", 0}};
-    struct wire *wire = *state;
-    for (int i = 0; i < 3; i++) {
-        const char *const more[] = {"--start", "--duration", "0.3", NULL};
-        struct room_config c = SMALL;
-        c.links = "links: [{type: file, path: out.bin}]\n";
-        struct head head = start(wire, &c, cases[i].faults, more);
-        head_end(&head, 0);
-        const uint64_t received = stats_link_uint(wire, "received_pulses");
-        const uint64_t left = stats_link_uint(wire, "left_out_pulses");
-        assert_int_equal(received + left, stats_uint(wire, "pulses"));
-        assert_int_equal(left == 0, cases[i].all);
-        struct scanhead *sh = client_open(wire_path(wire, "out.bin"));
-        struct scanhead_frame frame;
-        uint64_t pulses = 0;
-        while (scanhead_next(sh, &frame, 0) == SCANHEAD_OK)
-            if (frame.type == SCANHEAD_POINTS) pulses += frame.n_pulses;
-        struct scanhead_stats stats;
-        scanhead_get_stats(sh, &stats);
-        assert_int_equal(stats.bad_bytes + stats.bad_payload, 0);
-        if (!cases[i].all) assert_int_equal(pulses, received);
-        if (cases[i].all) assert_true(stats.late > 0 && stats.late == stats.seq_lost); /* all there, in some order */
-        scanhead_close(sh);
-    }
-}
-
-/* Of a client that goes on asking, whose replies are late, there is always one on its way. */
-static void test_late_replies_do_not_keep_a_head(void **state)
-{
-    struct wire *wire = *state;
-    struct room_config c = SMALL;
-    c.links = LINK_YAML_TCP;
-    struct head head = start(wire, &c, "faults: [{kind: late_reply, for_ms: 300}]\n", NULL);
-    int fd = raw_connect(head_endpoint(&head, "tcp")), told[2];
-    assert_int_equal(pipe2(told, O_CLOEXEC), 0);
-    pid_t pid = wire_fork(wire);
-    if (pid == 0) {
-        char sink[4096];
-        struct pollfd slot = {.fd = fd, .events = POLLIN};
-        while (write(fd, "*OPC?\n", 6) == 6)
-            if (poll(&slot, 1, 50) > 0 && read(fd, sink, sizeof sink) > 0 && write(told[1], "r", 1) != 1) break;
-        _exit(0);
-    }
-    close(fd);
-    close(told[1]);
-    char byte;
-    assert_int_equal(read(told[0], &byte, 1), 1);
-    head_end(&head, SIGTERM);
-    close(told[0]);
-}
-
 /* ---- a journal */
 
 static void test_a_journal_brings_faults_back(void **state)
@@ -462,16 +295,16 @@ static void test_a_journal_brings_faults_back(void **state)
     static struct truth first, again;
     static char journal[352];
     struct wire *wire = *state;
-    struct room_config c = SMALL;
+    struct room_config c = FAULT_ROOM;
     c.links = "links: [{type: file, path: out.bin}, {type: tcp, port: 0}]\n";
     snprintf(journal, sizeof journal, "%s", wire_path(wire, "session.txt"));
     const char *const play[] = {"--pace", "fast", "--journal", journal, NULL};
-    struct head head = start(wire, &c, NULL, play);
+    struct head head = fault_head_start(wire, &c, NULL, play);
     struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
     client_wait_state(sh, "idle");
     struct scanhead_frame frame;
-    add_fault(sh, "{kind: drop, link: 1, every: 7}", "1");
-    add_fault(sh, "{kind: flip, link: 1, probability: 0.2, from_s: 0.05, seed: 9}", "2");
+    fault_head_add(sh, "{kind: drop, link: 1, every: 7}", "1");
+    fault_head_add(sh, "{kind: flip, link: 1, probability: 0.2, from_s: 0.05, seed: 9}", "2");
     client_tell(sh, "SCAN:STAR");
     client_until(sh, SCANHEAD_EV_SCAN_END, &frame);
     client_tell(sh, "FAUL:CLE 1");
@@ -485,7 +318,7 @@ static void test_a_journal_brings_faults_back(void **state)
     assert_non_null(strstr(text, "\n# fault 1 drop: t_ns "));
     free(text);
     const char *const replay[] = {"--pace", "fast", "--replay-journal", journal, NULL};
-    head = start(wire, &c, NULL, replay);
+    head = fault_head_start(wire, &c, NULL, replay);
     head_end(&head, 0);
     read_truth(wire, &again);
     assert_true(count_kind(&first, "drop") > 20 && count_kind(&first, "flip") > 50);
@@ -497,10 +330,6 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_the_same_truth, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_a_client_reports_what_was_injected, wire_setup, wire_teardown),
-        cmocka_unit_test_setup_teardown(test_replies_that_go_wrong, wire_setup, wire_teardown),
-        cmocka_unit_test_setup_teardown(test_late_replies_do_not_keep_a_head, wire_setup, wire_teardown),
-        cmocka_unit_test_setup_teardown(test_a_stall_makes_a_slow_reader, wire_setup, wire_teardown),
-        cmocka_unit_test_setup_teardown(test_the_end_waits_for_what_is_on_its_way, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_a_journal_brings_faults_back, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests_name("faults on request", tests, NULL, NULL);

@@ -70,21 +70,6 @@ static void collect(const struct rawlog *log, int (*order)(const void *, const v
     assert_true(all->n > 0);
 }
 
-/* Datagrams that the kernel threw away since a socket's owner did not read them in time: on a busy machine. */
-static uint32_t dropped_at(int port)
-{
-    char line[256];
-    unsigned local, drops, sum = 0;
-    FILE *f = fopen("/proc/net/udp", "r");
-    assert_non_null(f);
-    while (fgets(line, sizeof line, f) != NULL)
-        if (sscanf(line, "%*d: %*x:%x %*s %*s %*s %*s %*s %*s %*s %*s %*s %*s %u", &local, &drops) == 2 &&
-            (int)local == port)
-            sum += drops;
-    fclose(f);
-    return sum;
-}
-
 /* At the device's rate: packet n comes n * 1327.104 us after the first, by its own time. None is missing but those that
  * the client did not read. */
 static void check_times(struct packets *all, uint32_t dropped)
@@ -195,7 +180,7 @@ static void test_turns(void **state)
     assert_true(house_is_mark(house, mark, 0.0) && !house_is_mark(house, -mark, 0.0));
     if (!grabber_wait(&grabber, TURNS + 2)) fail_msg("rawlog-grabber complains:\n%s", grabber.said);
     head_end(&head, SIGTERM);
-    const uint32_t dropped = dropped_at(2368);
+    const uint32_t dropped = grabber_dropped_at(2368);
     grabber_end(&grabber);
     rawlog_read(&grabber, &log);
     collect(&log, by_device_time, &all);
@@ -330,7 +315,7 @@ static void test_lossy(void **state)
     struct head head = start_lossy(wire);
     if (!grabber_wait(&grabber, TURNS)) fail_msg("rawlog-grabber complains:\n%s", grabber.said);
     head_end(&head, SIGTERM);
-    const uint32_t dropped = dropped_at(2368);
+    const uint32_t dropped = grabber_dropped_at(2368);
     grabber_end(&grabber);
     rawlog_read(&grabber, &log);
     collect(&log, NULL, &all);

@@ -359,7 +359,7 @@ static void test_slow_head(void **state)
     static const char *const name[N] = {"slow.shs", "slow.pcapng", "slow.ply", "slow.las"};
     static char path[N][128], out[2048];
     const char *paths[N];
-    const struct repair_row row = {.option = {"-o", path[1], "-o", path[2], "-o", path[3]}};
+    const struct repair_row row = {.ending = "", .option = {"-o", path[1], "-o", path[2], "-o", path[3]}};
     (void)state;
     for (int i = 0; i < N; i++) {
         snprintf(path[i], sizeof path[i], "%s", wire_path(wire, name[i]));
@@ -385,7 +385,7 @@ static void test_slow_head(void **state)
     for (int i = 0; i < N; i++) {
         assert_int_equal(repair(path[i], out), 0);
         if (strstr(out, ": kept ") == NULL || strstr(out, ": kept 0 ") != NULL) fail_msg("%s", out);
-        remove_both(path[i]);
+        remove_all(&row, path[i]);
     }
 }
 

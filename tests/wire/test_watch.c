@@ -308,6 +308,7 @@ static void scene_is_the_scene(void **state)
     char *json = get(&head, "/head", &len);
     same("x", number(json, "\"name\":\"second\"", "x_m"), -2.2, 0);
     same("heading", number(json, "\"name\":\"second\"", "heading_deg"), 200, 1e-9);
+    assert_non_null(strstr(json, "\"pace\":\"fast\""));
     assert_non_null(strstr(json, "{\"label\":1,\"object\":\"east\""));
     assert_non_null(strstr(json, "\"bounds\":{\"min\":[-4,-4,0],\"max\":[4,4,3]}"));
     free(json);

@@ -75,12 +75,12 @@ export class Bar {
   }
 
   show() {
-    const {link, state, mine, owner, scan, since} = this.#session;
+    const {link, state, pace, mine, owner, scan, since} = this.#session;
     const open = link === 'open';
     document.body.dataset.link = link;
     document.body.dataset.owner = mine ? 'page' : owner ? 'other' : 'nobody';
     document.body.dataset.state = open ? state ?? '' : '';
-    say(byId('state-word'), open ? stateWord(state ?? '…') : link === 'closed' ? 'Not connected' : 'Connecting');
+    say(byId('state-word'), open ? stateWord(state ?? '…', pace) : link === 'closed' ? 'Not connected' : 'Connecting');
     say(byId('progress'), this.#progressText(scan));
     say(byId('owner'), !open ? '' : mine ? 'You have control' : owner ? `Session ${owner} has control` : 'Nobody has control');
     say(byId('control'), mine ? 'Give back control' : 'Take control');

@@ -103,6 +103,7 @@ function startHead(cloud, view, names) {
     before = now;
     names.add(info.surfaces ?? []);
     bar.name(info);
+    session.paced(info.pace);
     stations.reload(info.stations ?? []).catch(() => {}); // gone again
     showPlan();
     display.setScene(await fetchScene());

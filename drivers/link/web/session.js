@@ -10,7 +10,8 @@ const WORDS = {
 
 // The number of a state as its word; words stay.
 export const stateName = (state) => STATES[Number(state)] ?? String(state);
-export const stateWord = (state) => WORDS[state] ?? state;
+// In the pace step a head that was granted no time yet stays in its self test.
+export const stateWord = (state, pace) => (pace === 'step' && state === 'boot' ? 'Waits for time steps' : WORDS[state] ?? state);
 
 // A promise's ERR as a sentence: the words after the semicolon are what exactly was wrong.
 export function why(error) {
@@ -22,6 +23,7 @@ export class Session extends EventTarget {
   link = 'opening'; // or 'open', 'closed'
   state = null;     // a word of the protocol
   scan = 0;
+  pace = '';        // as the configuration has it; '': not known
   owner = 0;        // the session in control, 0: nobody
   mine = false;     // it is this page that has control
   since = null;     // when the connection ended, and why
@@ -59,6 +61,12 @@ export class Session extends EventTarget {
 
   command(line, options) {
     return this.head.command(line, options);
+  }
+
+  paced(pace = '') {
+    if (pace === this.pace) return;
+    this.pace = pace;
+    this.#changed();
   }
 
   take() {

@@ -109,6 +109,9 @@ static struct app_option OPTIONS[APP_MAX_OPTIONS + 1] = {
     {APP_FLAG, "force", NULL, .at = AT(force),
      .help = "do jobs again that were made with another configuration, release, ..."},
     OPTION_SET,
+    {APP_TEXT, "scenario", "FILE", .at = AT(in.scenario),
+     .help = "in each job, with the faults of this file beside those of the configuration; a bare name is one of "
+             "config/faults. A job that loses frames by them fails"},
     {APP_TEXT, "threads", "N", .at = AT(threads), .help = "threads that cast; 0: one per processor. No byte depends on it"},
     {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "no progress"},
     OPTION_END

@@ -18,7 +18,7 @@ struct batch_job {
 
 struct batch {
     /* as given */
-    struct app_input in; /* CONFIG and --set */
+    struct app_input in; /* CONFIG, --set and --scenario */
     const char *dir, *shard_text, *stations_text, *format, *threads;
     int list, json, merge, force, quiet;
     struct batch_sweeps sweeps;

@@ -15,7 +15,7 @@ const char *batch_made_differs(const struct batch_made *a, const struct batch_ma
     if (strcmp(a->program, b->program) != 0) return "another release of the program";
     if (strcmp(a->configuration, b->configuration) != 0) return "another text of the configuration";
     if (strcmp(a->inputs, b->inputs) != 0)
-        return "another head profile, mesh, texture, trajectory or list of directions";
+        return "another head profile, mesh, texture, trajectory, scenario or list of directions";
     if (strcmp(a->job, b->job) != 0) return "another station, other values of keys or other options";
     return strcmp(a->engine, b->engine) != 0 ? "a processor or an Embree of another kind" : NULL;
 }
@@ -196,6 +196,7 @@ int batch_made_of(const struct config *cfg, struct batch_cache *cache, struct ba
         take_mesh(&in, cfg->scene.mesh[i].file);
     take_file(&in, "trajectory", cfg->platform.file);
     take_file(&in, "waypoints", cfg->platform.waypoints);
+    take_file(&in, "scenario", cfg->scenario_file);
     take_hex(&in.ctx, made->inputs);
     return in.rc;
 }

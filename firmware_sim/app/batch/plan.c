@@ -40,6 +40,7 @@ int batch_line_make(const struct batch *b, uint32_t combination, uint32_t statio
         add(line, "--set=%s", set[i]);
     for (int i = 0; i < b->options.n; i++)
         add(line, "%s", b->options.word[i]);
+    if (b->in.scenario != NULL) add(line, "--scenario=%s", b->in.scenario);
     if (b->threads != NULL) add(line, "--threads=%s", b->threads);
     const int status = record_line_read(&line->line, line->n, line->word);
     line->line.job.only_whole = line->line.job.hash = line->line.job.brief = 1;

@@ -15,6 +15,8 @@ struct record_line {
     double long_edge; /* negative: not given */
     long sparse_seed; /* likewise */
     int has_rgb, limited; /* --colour-rgb, --colour-limits */
+    int raw;              /* raw.h takes the whole line then */
+    const char *raw_only; /* an option that needs it */
     const char *repair[RECORD_MAX_REPAIRS]; /* --repair; with it nothing is recorded */
     int n_repairs;
 };

@@ -6,6 +6,7 @@
 
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/record/line.h"
+#include "firmware_sim/app/record/raw.h"
 #include "firmware_sim/app/record/repair.h"
 
 static const double LONG_EDGE = 10;
@@ -18,7 +19,8 @@ static int is_config(const char *source)
 static int is_stream(const char *source)
 {
     return strcmp(source, "usb") == 0 || strncmp(source, "usb:", 4) == 0 || strncmp(source, "tty:", 4) == 0 ||
-           strncmp(source, "tcp:", 4) == 0 || strncmp(source, "fd:", 3) == 0 || app_ends_in(source, ".shs");
+           strncmp(source, "tcp:", 4) == 0 || strncmp(source, "fd:", 3) == 0 || app_ends_in(source, ".shs") ||
+           app_ends_in(source, ".pcapng");
 }
 
 static int take_file(void *values, const char *text)
@@ -202,6 +204,7 @@ int record_line_read(struct record_line *r, int argc, char **argv)
     *r = (struct record_line){.job = {.recording = {.frames = -1}}, .long_edge = -1, .sparse_seed = -1};
     int status = app_parse(&app_record, argc, argv, &r->in, r);
     if (status != APP_GO_ON) return status;
+    if (r->raw_only != NULL) return app_usage(&app_record, "--send, --relay, --ready-fd: allowed with --raw");
     if (r->n_repairs > 0) return check_repair(r);
     if (r->job.files.n == 0 && r->job.stats == NULL) return app_usage(&app_record, "-o FILE is needed");
     if (is_config(r->in.operand[0]) && (r->job.recording.listen || r->job.wait_s > 0 || r->job.recording.replug_s > 0))
@@ -224,6 +227,7 @@ static int run(int argc, char **argv)
 {
     struct sh_err err = {0};
     struct record_line r;
+    if (raw_is_wanted(argc, argv)) return raw_record(argc, argv);
     int status = record_line_read(&r, argc, argv);
     if (status != APP_GO_ON) return status;
     app_catch_signals();
@@ -231,7 +235,7 @@ static int run(int argc, char **argv)
     if (is_config(r.job.source)) return app_with_config(&r.in, record_config, &r.job);
     if (!is_stream(r.job.source))
         return app_usage(&app_record,
-                         "SOURCE %s: allowed usb, usb:VID:PID:SERIAL, tty:PATH, tcp:HOST:PORT, FILE.shs, CONFIG.yaml",
+                         "SOURCE %s: allowed usb, usb:VID:PID:SERIAL, tty:PATH, tcp:HOST:PORT, FILE.shs, FILE.pcapng, CONFIG.yaml",
                          r.job.source);
     if (r.in.sets.n != 0) return app_usage(&app_record, "--set, --crs and --threads need a CONFIG as SOURCE");
     if (r.in.scenario != NULL || r.job.truth != NULL)
@@ -293,13 +297,19 @@ static const struct app_option OPTIONS[] = {
     {APP_TEXT, "scenario", "FILE", .at = AT(in.scenario),
      .help = "of a CONFIG: with the faults of this file (config/faults) beside its own"},
     {APP_TEXT, "truth", "FILE", .at = AT(job.truth),
-     .help = "of a CONFIG: write each fault that is injected as a line of JSON"},
+     .help = "of a CONFIG: write each fault that is injected as a line of JSON; - is standard output"},
     {APP_TEXT, "stats", "FILE", .at = AT(job.stats), .help = "write what was received as JSON; - is standard output"},
     OPTION_NO_HASH(AT(job.no_hash)),
     OPTION_SET,
     {APP_KEY_GIVEN, "crs", "CRS", .key = "output.crs", .at = AT(job.crs_given),
      .help = "local, ecef, utm or geodetic: write points in it, as output.layout=geo does, too"},
     {APP_KEY, "threads", "N", .key = "loop.threads", .help = "threads that cast; 0: one per processor"},
+    {APP_FLAG, "raw", NULL, .at = AT(raw),
+     .help = "of udp:ADDRESS:PORT,... and tcp:HOST:PORT: what is on the wire, whatever its protocol is, to a .pcapng; its "
+             "options: scanhead record --raw --help"},
+    {APP_TEXT, "send", "TEXT", .at = AT(raw_only), .help = "with --raw, as --relay and --ready-fd"},
+    {APP_TEXT, "relay", "[ADDRESS:]PORT", .at = AT(raw_only), .help = "with --raw"},
+    {APP_TEXT, "ready-fd", "N", .at = AT(raw_only), .help = "with --raw"},
     {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "no progress"},
     OPTION_END
 };
@@ -314,7 +324,8 @@ static const char HELP_NOTES[] =
     "                       usb:vid:pid:serial\n"
     "  tty:/dev/...         a serial port\n"
     "  tcp:host:port        a socket\n"
-    "  FILE.shs             a raw stream\n"
+    "  udp:address:port     only with --raw, as tcp: datagrams or bytes of any protocol, to a .pcapng\n"
+    "  FILE.shs             a raw stream; FILE.pcapng: its frames as packets\n"
     "\n"
     "The ending of FILE says what is written:\n"
     "\n"

@@ -172,6 +172,7 @@ static const char *base_of(const char *path)
 
 static void put_head(struct json *json, const void *ctx)
 {
+    static const char *const paces[] = {[PACE_REALTIME] = "realtime", [PACE_FAST] = "fast", [PACE_STEP] = "step"};
     const struct watch *w = ctx;
     const struct config *cfg = w->cfg;
     json_open_object(json, NULL);
@@ -180,6 +181,7 @@ static void put_head(struct json *json, const void *ctx)
     json_string(json, "profile", cfg->profile.name);
     json_string(json, "serial", cfg->head.serial);
     json_string(json, "config", base_of(cfg->file));
+    json_string(json, "pace", paces[cfg->loop.pace]);
     json_open_array(json, "stations");
     for (uint32_t i = 0; i < w->site->n_stations; i++)
         put_station(json, w, i);

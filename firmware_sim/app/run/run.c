@@ -1,27 +1,14 @@
 /* scanhead run: serves the head on its links. */
-#include <errno.h>
-#include <poll.h>
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/resource.h>
-#include <unistd.h>
 
-#include "firmware_sim/app/app.h"
+#include "firmware_sim/app/run/run.h"
 #include "firmware_sim/app/watch/watch.h"
-#include "firmware_sim/base/clock.h"
-#include "firmware_sim/loop/loop.h"
 #include "firmware_sim/site/plan_rows.h"
 #include "firmware_sim/site/rate.h"
 
 enum { VIEW_SESSIONS = 4 };
-
-struct run_options {
-    struct app_input in;
-    struct device_options device;
-    const char *stats;
-    long ready_fd;
-    int quiet, no_hash, frames_given, view;
-};
 
 static void say_sights(const struct site *site)
 {
@@ -54,96 +41,9 @@ static void say_what_runs(const struct config *cfg, const struct site *site, con
                 site_n_served(site), site->n_stations);
     say_sights(site);
     char plan[512];
-    struct link_place place;
     site_plan_text(site, plan, sizeof plan);
     fprintf(stderr, "scanhead: plan: %s\n", plan);
-    for (uint32_t i = 0; loop_get_place(loop, i, &place); i++)
-        if (strcmp(place.type, "fd") != 0) /* within this process */
-            fprintf(stderr, "scanhead: link %s%s%s\n", place.endpoint, place.protocol != NULL ? ", " : "",
-                    place.protocol != NULL ? place.protocol : "");
-}
-
-static void put_endpoints(struct json *json, const void *loop)
-{
-    loop_put_endpoints(loop, json);
-}
-
-static int say_view(const struct loop *loop, struct sh_err *err)
-{
-    struct link_place place;
-    for (uint32_t i = 0; loop_get_place(loop, i, &place); i++)
-        if (strcmp(place.type, "web") == 0) printf("%s\n", place.endpoint);
-    return fflush(stdout) == 0 ? SH_OK : sh_fail(err, SH_EIO, "standard output: %s", strerror(errno));
-}
-
-static void wait_for_end(struct loop *loop)
-{
-    int ending = 0;
-    while (!loop_is_over(loop)) {
-        if (app_interrupted() && !ending) {
-            ending = 1;
-            loop_end(loop);
-        }
-        poll(NULL, 0, 20); /* ends early on a signal */
-    }
-}
-
-struct run_stats {
-    const struct loop *loop;
-    struct loop_stats stats;
-};
-
-static void put_pulses(struct json *json, const struct device_counters *c)
-{
-    json_uint(json, "pulses", c->pulses);
-    json_uint(json, "fired_pulses", c->fired);
-    json_uint(json, "blind_pulses", c->fired - c->cast);
-    json_uint(json, "cast_pulses", c->cast);
-    json_uint(json, "lost_pulses", c->lost_pulses);
-    json_uint(json, "lost_ticks", c->lost_ticks);
-}
-
-static void put_stats(struct json *json, const void *ctx)
-{
-    const struct run_stats *run = ctx;
-    const struct loop_stats *s = &run->stats;
-    const struct device_counters *c = &s->counters;
-    struct rusage usage;
-    getrusage(RUSAGE_SELF, &usage);
-    json_open_object(json, NULL);
-    put_pulses(json, c);
-    json_uint(json, "echoes", c->echoes);
-    json_uint(json, "lines", c->lines);
-    json_uint(json, "scans", s->scans);
-    json_double(json, "wall_s", s->wall_s);
-    json_double(json, "cpu_s", clock_cpu_s());
-    json_double(json, "pulses_per_s", s->wall_s > 0.0 ? (double)c->pulses / s->wall_s : 0.0);
-    json_uint(json, "crowded_echoes", c->crowded);
-    json_uint(json, "faint_hits", c->faint);
-    json_uint(json, "unfit_echoes", c->unfit);
-    json_uint(json, "reader_lost_frames", c->reader_lost_frames);
-    json_uint(json, "reader_lost_pulses", c->reader_lost_pulses);
-    json_uint(json, "late_blocks", c->late_blocks);
-    json_uint(json, "late_poses", c->late_poses);
-    json_uint(json, "bad_poses", c->bad_poses);
-    json_double(json, "late_p50_us", s->late_p50_us);
-    json_double(json, "late_p999_us", s->late_p999_us);
-    json_double(json, "late_max_us", 1e-3 * (double)c->late_max_ns);
-    json_int(json, "rss_peak_kib", usage.ru_maxrss);
-    json_string(json, "stream_sha256", s->have_hash ? s->sha256 : NULL);
-    loop_put_links(run->loop, json);
-    json_close_object(json);
-}
-
-static void warn_of_losses(const struct device_counters *c)
-{
-    if (c->lost_pulses != 0)
-        sh_warn(&app_report_stderr, "%llu pulses could not be computed in time", (unsigned long long)c->lost_pulses);
-    app_warn_left_out(c->crowded, c->unfit);
-    app_warn_empty(c->pulses, c->echoes, c->faint);
-    if (c->reader_lost_frames != 0)
-        sh_warn(&app_report_stderr, "readers lost %llu frames with %llu pulses",
-                (unsigned long long)c->reader_lost_frames, (unsigned long long)c->reader_lost_pulses);
+    run_say_links(loop);
 }
 
 /* --start --duration, and a scan that was over before. */
@@ -159,21 +59,12 @@ static void say_short_scan(const struct run_options *o, struct device *device)
 
 static int serve(const struct run_options *o, struct loop *loop, struct device *device, struct sh_err *err)
 {
-    struct run_stats run = {.loop = loop};
-    struct loop_stats *stats = &run.stats;
-    int rc = loop_start(loop, err);
-    if (rc == SH_OK) rc = app_say_ready(o->ready_fd, put_endpoints, loop, err);
-    if (rc == SH_OK && o->view) rc = say_view(loop, err);
-    if (rc == SH_OK)
-        wait_for_end(loop);
-    else
-        loop_end(loop);
-    loop_join(loop, stats);
-    if (rc == SH_OK && o->stats != NULL) rc = app_write_json(o->stats, put_stats, &run, err);
+    struct loop_stats stats;
+    int rc = run_serve(o, loop, &stats, err);
     if (rc == SH_OK) rc = device_close_journal(device, err);
     if (rc == SH_OK) rc = loop_check_links(loop, err);
     say_short_scan(o, device);
-    warn_of_losses(&stats->counters);
+    run_warn_losses(&stats.counters);
     return rc;
 }
 
@@ -276,8 +167,11 @@ static int run(int argc, char **argv)
     int status = app_parse(&app_run, argc, argv, &o.in, &o);
     if (status != APP_GO_ON) return status;
     o.frames_given = gives_frames(&o.in.sets);
+    const int is_recording = app_ends_in(o.in.operand[0], ".shs") || app_ends_in(o.in.operand[0], ".pcapng");
+    status = run_check_options(&o, is_recording);
+    if (status != APP_GO_ON) return status;
     app_catch_signals();
-    return app_with_config(&o.in, run_head, &o);
+    return is_recording ? run_replay(&o) : app_with_config(&o.in, run_head, &o);
 }
 
 #define AT(member) offsetof(struct run_options, member)
@@ -303,11 +197,26 @@ static const struct app_option OPTIONS[] = {
      .help = "write every command that had an effect, with its device time, and the end"},
     {APP_TEXT, "scenario", "FILE", .at = AT(in.scenario),
      .help = "with the faults of this file beside those of the configuration; a bare name is one of config/faults"},
-    {APP_TEXT, "truth", "FILE", .at = AT(device.truth), .help = "write each fault that is injected as a line of JSON"},
+    {APP_TEXT, "truth", "FILE", .at = AT(device.truth),
+     .help = "write each fault that is injected as a line of JSON; - is standard output"},
     {APP_TEXT, "replay-journal", "FILE", .at = AT(device.replay),
      .help = "carry out the commands of a journal at their times, and end where its run ended"},
     {APP_WHOLE, "ready-fd", "N", .min = 1, .max = 65535, .at = AT(ready_fd),
      .help = "write one JSON line with the endpoints to descriptor N once all links are open"},
+    {APP_NUMBER, "speed", "F", .min = 0.001, .max = 1000, .at = AT(replay.speed),
+     .help = "of a recording: F times as fast, in the pace realtime (default 1)"},
+    {APP_NUMBER, "from", "S", .min = 0.0, .max = 1e9, .at = AT(replay.from_s),
+     .help = "of a recording: begin S seconds of device time after its first frame"},
+    {APP_NUMBER, "to", "S", .min = 0.001, .max = 1e9, .at = AT(replay.to_s),
+     .help = "of a recording: end S seconds after its first frame"},
+    {APP_WHOLE, "clients", "N", .min = 1, .max = 64, .at = AT(clients),
+     .help = "of a recording, with --start: begin once N clients are there"},
+    {APP_FLAG, "loop", NULL, .at = AT(replay.loop), .help = "of a recording: begin anew at its end"},
+    {APP_CALL, "link", "LINK", .apply = run_take_link,
+     .help = "of a recording: where it is served: pty, tcp, usb, web, ..., or keys as in a configuration: 'type: tcp, "
+             "port: 5025'; may be repeated (default: pty and tcp)"},
+    {APP_TEXT, "config", "CONFIG", .at = AT(config),
+     .help = "of a recording: links, loop and faults of a configuration; its scene is not loaded"},
     {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "no messages but errors and warnings"},
     OPTION_END
 };
@@ -315,12 +224,16 @@ static const struct app_option OPTIONS[] = {
 
 static const char NOTES[] =
     "Ctrl-C, or SIGTERM, ends the head in good order. A second signal within a second counts as the same one; a\n"
-    "third, or one that comes later, ends it at once.\n";
+    "third, or one that comes later, ends it at once.\n"
+    "\n"
+    "A recording, FILE.shs or FILE.pcapng, stands for CONFIG: its frames are served as they are, with the timing\n"
+    "that they had, each time that a client commands SCAN:STARt; with --start at once, and the run ends with it.\n"
+    "Queries are answered from its descriptor; settings can't change. Faults on the wire and of links apply.\n";
 
 const struct app_command app_run = {
     .name = "run",
-    .operand = {"CONFIG"},
-    .summary = "serve the head on its links until stopped",
+    .operand = {"CONFIG|FILE.shs"},
+    .summary = "serve the head, or a recording of one, on links until stopped",
     .options = OPTIONS,
     .notes = NOTES,
     .run = run,

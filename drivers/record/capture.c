@@ -1,0 +1,68 @@
+#include "drivers/record/capture.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "core/newfile.h"
+#include "drivers/protocol/pcapng.h"
+
+enum { SNAP_LEN = 262144 }; /* as other programs write it; no frame is longer */
+
+static int check_left(const char *path, struct sh_err *err)
+{
+    char *part;
+    if (asprintf(&part, "%s.part", path) < 0) return sh_fail(err, SH_ENOMEM, "%s: no memory for its name", path);
+    const long long len = newfile_left_len(part);
+    const int rc = len == 0 ? SH_OK
+                            : sh_fail(err, SH_EINPUT,
+                                      "%s: an earlier recording has left %lld bytes there; scanhead record --repair %s "
+                                      "makes a file of them; or remove it",
+                                      part, len, path);
+    free(part);
+    return rc;
+}
+
+int capture_open(struct capture *capture, const char *path, struct sh_err *err)
+{
+    *capture = (struct capture){.file.fd = -1};
+    uint8_t section[PCAPNG_FRONT_ROOM];
+    int rc = check_left(path, err);
+    if (rc == SH_OK) rc = outfile_open(&capture->file, path, err);
+    return rc == SH_OK ? outfile_write(&capture->file, section, pcapng_put_section(section, "scanhead"), err) : rc;
+}
+
+int capture_add_interface(struct capture *capture, const char *name, const char *comment, struct sh_err *err)
+{
+    uint8_t block[PCAPNG_FRONT_ROOM];
+    capture->n_interfaces++;
+    return outfile_write(&capture->file, block, pcapng_put_interface(block, PCAPNG_ETHERNET, SNAP_LEN, name, comment),
+                         err);
+}
+
+int capture_add(struct capture *capture, const struct capture_frame *f, struct sh_err *err)
+{
+    uint8_t *to = outfile_room(&capture->file, pcapng_packet_len(f->len) + PCAPNG_LOST, err);
+    if (to == NULL) return SH_EIO;
+    outfile_used(&capture->file,
+                 f->lost == 0 ? pcapng_put_packet(to, f->interface, f->t_ns, f->bytes, f->len)
+                              : pcapng_put_packet_after_loss(to, f->interface, f->t_ns, f->bytes, f->len, f->lost));
+    capture->packets++;
+    return SH_OK;
+}
+
+int capture_add_statistics(struct capture *capture, uint32_t interface, int64_t t_ns, uint64_t received,
+                           uint64_t dropped, struct sh_err *err)
+{
+    uint8_t block[PCAPNG_FRONT_ROOM];
+    return outfile_write(&capture->file, block, pcapng_put_statistics(block, interface, t_ns, received, dropped), err);
+}
+
+int capture_save(struct capture *capture, struct sh_err *err)
+{
+    return outfile_save(&capture->file, err);
+}
+
+int capture_close(struct capture *capture, int keep, struct sh_err *err)
+{
+    return outfile_close(&capture->file, keep ? OUTFILE_KEEP_PART : OUTFILE_DROP, err);
+}

@@ -1,0 +1,55 @@
+/* Sockets that say when bytes came: datagrams and TCP streams with the time at which the kernel received them.
+ *
+ * Times are UTC, in ns since 1970. Nothing waits but stamped_connect. Errors: SH_E, as socket.h has them. Any thread. */
+#ifndef DRIVERS_SOCKET_STAMPED_H
+#define DRIVERS_SOCKET_STAMPED_H
+
+#include <stddef.h>
+#include <stdint.h>
+#include <sys/socket.h>
+#include <sys/types.h>
+
+#include "core/err.h"
+
+/* ---- datagrams */
+
+struct stamped_socket {
+    int fd;
+    struct sockaddr_storage own; /* with the port that it has */
+    socklen_t own_len;
+};
+
+/* host: an address of this machine, 0.0.0.0 or :: for all of them, a broadcast, or a group, with %INTERFACE where
+ * the route to it is not the way. Groups and 255.255.255.255 may be read by others at the same time. port 0: the system
+ * chooses. SH_EINPUT (the address, the port is taken), SH_EPERM, SH_EIO. */
+int stamped_open(const char *host, int port, struct stamped_socket *out, struct sh_err *err);
+
+struct stamped_datagram {
+    int64_t t_ns;
+    struct sockaddr_storage from, to; /* to: as the datagram has it; the port is the socket's */
+    size_t len;
+    uint32_t dropped; /* how many the kernel had thrown away before it, modulo 2^32 */
+};
+
+/* 1: one was taken; 0: none is there. SH_EIO. room: 65535 hold any. */
+int stamped_take(const struct stamped_socket *socket, void *buf, size_t room, struct stamped_datagram *out,
+                 struct sh_err *err);
+/* How many the kernel threw away so far: it had no room, or their checksum was wrong. */
+uint64_t stamped_dropped(const struct stamped_socket *socket);
+void stamped_close(struct stamped_socket *socket);
+
+/* ---- streams */
+
+/* Connects, and waits for that at most so long (0: as long as the system does), or until a signal comes. *fd does not
+ * block from then on. */
+int stamped_connect(const char *host, int port, int timeout_ms, int *fd, struct sh_err *err);
+/* Times of what comes on a socket of socket.h, from now on. */
+void stamped_enable(int fd);
+/* Bytes; *t_ns: when the last of them came. 0: none now. SH_ECLOSED: the end of the stream. SH_ERESET: the connection
+ * broke. */
+ssize_t stamped_read(int fd, void *buf, size_t room, int64_t *t_ns);
+
+/* UTC now. */
+int64_t stamped_now_ns(void);
+
+#endif

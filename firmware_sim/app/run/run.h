@@ -1,0 +1,34 @@
+/* `scanhead run`: its options, and what its files share. */
+#ifndef FIRMWARE_SIM_APP_RUN_RUN_H
+#define FIRMWARE_SIM_APP_RUN_RUN_H
+
+#include "firmware_sim/app/app.h"
+#include "firmware_sim/loop/loop.h"
+#include "firmware_sim/replay/replay.h"
+
+struct run_options {
+    struct app_input in;
+    struct device_options device;
+    struct replay_options replay; /* speed 0: not given */
+    const char *config;           /* of a recording's links; NULL: none */
+    long clients;
+    char links[4096];             /* --link, as YAML; empty: none */
+    const char *stats;
+    long ready_fd;
+    int quiet, no_hash, frames_given, view;
+};
+
+/* serve.c: from the start of the loop to its end; writes the statistics. stats is filled in any case. */
+int run_serve(const struct run_options *o, struct loop *loop, struct loop_stats *stats, struct sh_err *err);
+void run_say_links(const struct loop *loop);
+void run_warn_losses(const struct device_counters *c);
+
+/* replay.c */
+/* --link: adds one to the options. */
+int run_take_link(void *values, const char *text);
+/* Options that a recording has not, or that nothing else has: APP_GO_ON, or APP_USAGE with the reason printed. */
+int run_check_options(const struct run_options *o, int is_recording);
+/* Serves a recording. Returns the exit status. */
+int run_replay(struct run_options *o);
+
+#endif

@@ -1,0 +1,117 @@
+/* What `run` does with a head and with a recording alike: serving until the end, statistics. */
+#include <errno.h>
+#include <poll.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/resource.h>
+
+#include "firmware_sim/app/run/run.h"
+#include "firmware_sim/base/clock.h"
+
+void run_say_links(const struct loop *loop)
+{
+    struct link_place place;
+    for (uint32_t i = 0; loop_get_place(loop, i, &place); i++)
+        if (strcmp(place.type, "fd") != 0) /* within this process */
+            fprintf(stderr, "scanhead: link %s%s%s\n", place.endpoint, place.protocol != NULL ? ", " : "",
+                    place.protocol != NULL ? place.protocol : "");
+}
+
+static void put_endpoints(struct json *json, const void *loop)
+{
+    loop_put_endpoints(loop, json);
+}
+
+static int say_view(const struct loop *loop, struct sh_err *err)
+{
+    struct link_place place;
+    for (uint32_t i = 0; loop_get_place(loop, i, &place); i++)
+        if (strcmp(place.type, "web") == 0) printf("%s\n", place.endpoint);
+    return fflush(stdout) == 0 ? SH_OK : sh_fail(err, SH_EIO, "standard output: %s", strerror(errno));
+}
+
+static void wait_for_end(struct loop *loop)
+{
+    int ending = 0;
+    while (!loop_is_over(loop)) {
+        if (app_interrupted() && !ending) {
+            ending = 1;
+            loop_end(loop);
+        }
+        poll(NULL, 0, 20); /* ends early on a signal */
+    }
+}
+
+struct run_stats {
+    const struct loop *loop;
+    struct loop_stats stats;
+};
+
+static void put_pulses(struct json *json, const struct device_counters *c)
+{
+    json_uint(json, "pulses", c->pulses);
+    json_uint(json, "fired_pulses", c->fired);
+    json_uint(json, "blind_pulses", c->fired - c->cast);
+    json_uint(json, "cast_pulses", c->cast);
+    json_uint(json, "lost_pulses", c->lost_pulses);
+    json_uint(json, "lost_ticks", c->lost_ticks);
+}
+
+static void put_stats(struct json *json, const void *ctx)
+{
+    const struct run_stats *run = ctx;
+    const struct loop_stats *s = &run->stats;
+    const struct device_counters *c = &s->counters;
+    struct rusage usage;
+    getrusage(RUSAGE_SELF, &usage);
+    json_open_object(json, NULL);
+    put_pulses(json, c);
+    json_uint(json, "echoes", c->echoes);
+    json_uint(json, "lines", c->lines);
+    json_uint(json, "scans", s->scans);
+    json_double(json, "wall_s", s->wall_s);
+    json_double(json, "cpu_s", clock_cpu_s());
+    json_double(json, "pulses_per_s", s->wall_s > 0.0 ? (double)c->pulses / s->wall_s : 0.0);
+    json_uint(json, "crowded_echoes", c->crowded);
+    json_uint(json, "faint_hits", c->faint);
+    json_uint(json, "unfit_echoes", c->unfit);
+    json_uint(json, "reader_lost_frames", c->reader_lost_frames);
+    json_uint(json, "reader_lost_pulses", c->reader_lost_pulses);
+    json_uint(json, "late_blocks", c->late_blocks);
+    json_uint(json, "late_poses", c->late_poses);
+    json_uint(json, "bad_poses", c->bad_poses);
+    json_double(json, "late_p50_us", s->late_p50_us);
+    json_double(json, "late_p999_us", s->late_p999_us);
+    json_double(json, "late_max_us", 1e-3 * (double)c->late_max_ns);
+    json_int(json, "rss_peak_kib", usage.ru_maxrss);
+    json_string(json, "stream_sha256", s->have_hash ? s->sha256 : NULL);
+    loop_put_links(run->loop, json);
+    json_close_object(json);
+}
+
+void run_warn_losses(const struct device_counters *c)
+{
+    if (c->lost_pulses != 0)
+        sh_warn(&app_report_stderr, "%llu pulses could not be computed in time", (unsigned long long)c->lost_pulses);
+    app_warn_left_out(c->crowded, c->unfit);
+    app_warn_empty(c->pulses, c->echoes, c->faint);
+    if (c->reader_lost_frames != 0)
+        sh_warn(&app_report_stderr, "readers lost %llu frames with %llu pulses",
+                (unsigned long long)c->reader_lost_frames, (unsigned long long)c->reader_lost_pulses);
+}
+
+int run_serve(const struct run_options *o, struct loop *loop, struct loop_stats *stats, struct sh_err *err)
+{
+    struct run_stats run = {.loop = loop};
+    int rc = loop_start(loop, err);
+    if (rc == SH_OK) rc = app_say_ready(o->ready_fd, put_endpoints, loop, err);
+    if (rc == SH_OK && o->view) rc = say_view(loop, err);
+    if (rc == SH_OK)
+        wait_for_end(loop);
+    else
+        loop_end(loop);
+    loop_join(loop, stats);
+    run.stats = *stats;
+    if (rc == SH_OK && o->stats != NULL) rc = app_write_json(o->stats, put_stats, &run, err);
+    return rc;
+}

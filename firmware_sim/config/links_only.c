@@ -1,0 +1,41 @@
+/* A configuration of links, loop and faults alone, for what has no head and no scene: a recording that is replayed. */
+#include <stdio.h>
+#include <string.h>
+
+#include "firmware_sim/config/table.h"
+
+static const char *const sections[] = {"links", "loop", "faults"};
+
+static int is_one(const char *path)
+{
+    for (size_t i = 0; i < CFG_LEN(sections); i++) {
+        const size_t n = strlen(sections[i]);
+        if (strncmp(path, sections[i], n) == 0 && (path[n] == '\0' || path[n] == '.' || path[n] == '[')) return 1;
+    }
+    return 0;
+}
+
+int config_load_links(const char *text, const char *name, const char *const *sets, int n_sets, struct config *cfg,
+                      struct config_faults *faults)
+{
+    struct cfg_key keys[CFG_MAX_ROWS];
+    struct cfg_table table = {keys, 0};
+    struct cfg_reader rd;
+    struct cfg_document *doc;
+    memset(cfg, 0, sizeof *cfg);
+    memset(faults, 0, sizeof *faults);
+    snprintf(cfg->file, sizeof cfg->file, "%s", name);
+    for (size_t i = 0; i < cfg_config_table.n; i++)
+        if (is_one(cfg_config_table.keys[i].path)) keys[table.n++] = cfg_config_table.keys[i];
+    cfg_reader_init(&rd, cfg->file, &table, cfg, faults);
+    if (cfg_open_text(&rd, (const unsigned char *)text, strlen(text), &doc) != SH_OK) return faults->fault[0].code;
+    cfg_close_file(doc);
+    for (int i = 0; i < n_sets; i++)
+        cfg_apply_set(&rd, sets[i]);
+    cfg_fill_defaults(&rd, NULL);
+    cfg_check_links(&rd, cfg);
+    cfg_check_loop(&rd, cfg);
+    cfg_check_faults(&rd, &cfg->faults);
+    cfg_check_fault_links(&rd, cfg, &cfg->faults);
+    return faults->n == 0 ? SH_OK : faults->fault[0].code;
+}

@@ -1,0 +1,95 @@
+/* The head that computes, as what the loop serves. */
+#include "firmware_sim/loop/source.h"
+
+static void command(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out)
+{
+    device_command(self, session, line, released, out);
+}
+
+static void overlong(void *self, uint32_t session, struct command_result *out)
+{
+    device_overlong(self, session, out);
+}
+
+static void session_closed(void *self, uint32_t session, const char *who, int partial)
+{
+    device_session_closed(self, session, who, partial);
+}
+
+static void report(void *self, int number, const char *text)
+{
+    device_report(self, number, text);
+}
+
+static struct fault_board *faults(const void *self)
+{
+    return device_faults(self);
+}
+
+static void command_once(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out)
+{
+    device_command_once(self, session, line, released, out);
+}
+
+static int64_t utc_ns(void *self, int64_t t_ns)
+{
+    return device_utc_ns(self, t_ns);
+}
+
+static int64_t next_fix_ns(const void *self, int64_t t_ns)
+{
+    return device_next_fix_ns(self, t_ns);
+}
+
+static int fix(void *self, int64_t t_ns, struct nmea_fix *fix)
+{
+    return device_fix(self, t_ns, fix);
+}
+
+static uint32_t near_wrap(void *self)
+{
+    return device_near_wrap(self);
+}
+
+static int64_t tick_ns(const void *self)
+{
+    return device_tick_ns(self);
+}
+
+static struct device_counters *counters(void *self)
+{
+    return device_counters(self);
+}
+
+static uint64_t scans(void *self)
+{
+    return device_scans(self);
+}
+
+static int power_up(void *self, int64_t now_ns, const char **warning, struct sh_err *err)
+{
+    return device_power_up(self, now_ns, warning, err);
+}
+
+static void end(void *self)
+{
+    device_end(self);
+}
+
+const struct loop_source_ops loop_device_source = {
+    .command = command,
+    .overlong = overlong,
+    .session_closed = session_closed,
+    .report = report,
+    .faults = faults,
+    .command_once = command_once,
+    .utc_ns = utc_ns,
+    .next_fix_ns = next_fix_ns,
+    .fix = fix,
+    .near_wrap = near_wrap,
+    .tick_ns = tick_ns,
+    .counters = counters,
+    .scans = scans,
+    .power_up = power_up,
+    .end = end,
+};

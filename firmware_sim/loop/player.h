@@ -1,0 +1,25 @@
+/* The thread that puts the ticks of a source into the stream, where the source makes them itself (source.h): what
+ * casters are for a head that computes.
+ *
+ * It is ahead of the release by loop.ahead_ms at most. A tick that came too late is not lost, as those of a head are:
+ * its frames go out with the next one, and the tick counts as late. */
+#ifndef FIRMWARE_SIM_LOOP_PLAYER_H
+#define FIRMWARE_SIM_LOOP_PLAYER_H
+
+#include <pthread.h>
+#include <stdint.h>
+
+#include "core/err.h"
+
+struct loop;
+
+struct player {
+    pthread_t thread;
+    int running;
+    uint64_t next_tick;
+};
+
+int player_start(struct loop *loop, struct sh_err *err);
+void player_join(struct loop *loop);
+
+#endif

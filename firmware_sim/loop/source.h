@@ -1,0 +1,63 @@
+/* What the loop serves: a head that computes, or a recording that is replayed.
+ *
+ * In: command lines of sessions. Out: their replies; and, where it makes its ticks itself, the frames of each. The head
+ * is device_source.c: casters compute its ticks. A recording is firmware_sim/replay: one thread takes its ticks as they
+ * are (player.h), with their numbers, and the stream leaves them so. */
+#ifndef FIRMWARE_SIM_LOOP_SOURCE_H
+#define FIRMWARE_SIM_LOOP_SOURCE_H
+
+#include "firmware_sim/device/device.h"
+#include "firmware_sim/loop/ring.h"
+
+enum loop_source_tick { LOOP_SOURCE_OVER = -1, LOOP_SOURCE_IDLE, LOOP_SOURCE_TICK };
+
+/* self is the source's own. Any thread, where nothing else is said. What the functions do that have the name of one of
+ * the device's, device.h says. */
+struct loop_source_ops {
+    /* ---- sessions */
+    void (*command)(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out);
+    void (*overlong)(void *self, uint32_t session, struct command_result *out);
+    void (*session_opened)(void *self, uint32_t session); /* NULL: it need not know */
+    void (*session_closed)(void *self, uint32_t session, const char *who, int partial);
+    void (*report)(void *self, int number, const char *text);
+    struct fault_board *(*faults)(const void *self);
+    /* ---- sessions of other protocols than the native one. NULL: there are none. */
+    void (*command_once)(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out);
+    int64_t (*utc_ns)(void *self, int64_t t_ns);
+    int64_t (*next_fix_ns)(const void *self, int64_t t_ns);
+    int (*fix)(void *self, int64_t t_ns, struct nmea_fix *fix);
+    uint32_t (*near_wrap)(void *self);
+
+    /* ---- the run */
+    int64_t (*tick_ns)(const void *self);
+    struct device_counters *(*counters)(void *self);
+    uint64_t (*scans)(void *self);
+    /* The run begins, with the thread that paces it. */
+    int (*power_up)(void *self, int64_t now_ns, const char **warning, struct sh_err *err);
+    void (*end)(void *self);
+
+    /* ---- where the source makes its ticks itself; else NULL. One thread, the player's. */
+    /* No tick has more bytes. */
+    uint32_t (*most_bytes)(const void *self);
+    uint32_t (*usual_bytes)(const void *self);
+    /* What clients that join before the first tick need: descriptor, emitter, anchor. */
+    void (*describe)(void *self, struct ring_tick *tick);
+    /* The next tick, number `tick`. Its bytes stay until the next call. OVER: the run ends before it. IDLE: nothing
+     * happens without a command; only where `may_idle`. again: the frames of the tick before could not be sent; they
+     * go before those of this one. */
+    enum loop_source_tick (*next)(void *self, uint64_t tick, int may_idle, int again, struct ring_tick *out);
+};
+
+struct loop_source {
+    const struct loop_source_ops *ops;
+    void *self;
+};
+
+extern const struct loop_source_ops loop_device_source; /* self: the struct device */
+
+static inline void source_report(const struct loop_source *source, int number, const char *text)
+{
+    source->ops->report(source->self, number, text);
+}
+
+#endif

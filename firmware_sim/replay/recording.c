@@ -1,0 +1,128 @@
+#include "firmware_sim/replay/recording.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/err.h"
+
+static struct recording_item *item_of(struct recording *r, uint32_t i)
+{
+    return &r->item[(r->first + i) % RECORDING_QUEUE];
+}
+
+static void note(void *ctx, const struct scanhead_notice *notice)
+{
+    struct recording *r = ctx;
+    if (notice->kind == SCANHEAD_NOTICE_RESTARTED) r->restarted = 1;
+}
+
+/* A path such as tcp:1.shs is a file here. */
+static int open_stream(struct recording *r, struct sh_err *err)
+{
+    char name[sizeof r->path + 2], why[512];
+    snprintf(name, sizeof name, "%s%s", strchr(r->path, ':') != NULL && r->path[0] != '/' ? "./" : "", r->path);
+    const int rc = scanhead_open(name, &r->stream, why, sizeof why);
+    if (rc != SCANHEAD_OK) return sh_fail(err, rc, "%s", why);
+    scanhead_on_notice(r->stream, note, r);
+    return SH_OK;
+}
+
+int recording_open(struct recording *r, const char *path, struct sh_err *err)
+{
+    if (strlen(path) >= sizeof r->path)
+        return sh_fail(err, SH_EINPUT, "%.100s...: path too long; allowed up to %zu bytes", path, sizeof r->path - 1);
+    snprintf(r->path, sizeof r->path, "%s", path);
+    return open_stream(r, err);
+}
+
+int recording_rewind(struct recording *r, struct sh_err *err)
+{
+    scanhead_close(r->stream);
+    r->stream = NULL;
+    r->timing = (struct timing){0};
+    r->first = r->n = 0;
+    r->at_end = r->restarted = 0;
+    r->last_t_ns = r->first_t_ns;
+    return open_stream(r, err);
+}
+
+void recording_close(struct recording *r)
+{
+    scanhead_close(r->stream);
+    for (int i = 0; i < RECORDING_QUEUE; i++)
+        free(r->item[i].bytes);
+    memset(r, 0, sizeof *r);
+}
+
+void recording_stats(const struct recording *r, struct scanhead_stats *stats)
+{
+    scanhead_get_stats(r->stream, stats);
+}
+
+/* A frame that has a time of its own says when those before it went out: not later. Where a scan was stopped, the event
+ * that follows its last line went out with it. */
+static void settle(struct recording *r, const struct timing_moment *by, int is_event)
+{
+    for (uint32_t i = 0; i < r->n; i++) {
+        struct recording_item *item = item_of(r, i);
+        if (item->is_known) continue;
+        if (item->kind == TIMING_STOPS ? is_event : by->t_ns < item->t_ns) item->t_ns = by->t_ns;
+        item->is_known = 1;
+    }
+}
+
+static int put(struct recording *r, const struct scanhead_frame *frame, struct sh_err *err)
+{
+    struct native_header header;
+    native_read_header(frame->raw, &header);
+    const struct timing_moment moment = timing_take(&r->timing, &header, frame->payload);
+    if (moment.kind != TIMING_FOLLOWS && moment.kind != TIMING_STOPS)
+        settle(r, &moment, header.type == NATIVE_EVENT || header.type == NATIVE_TELEMETRY);
+    struct recording_item *item = item_of(r, r->n);
+    if (item->room < frame->raw_len) {
+        uint8_t *bytes = realloc(item->bytes, frame->raw_len);
+        if (bytes == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory for a frame", r->path);
+        item->bytes = bytes;
+        item->room = frame->raw_len;
+    }
+    memcpy(item->bytes, frame->raw, frame->raw_len);
+    item->len = (uint32_t)frame->raw_len;
+    item->kind = moment.kind;
+    item->t_ns = moment.t_ns;
+    item->follows = moment.kind == TIMING_FOLLOWS;
+    item->is_known = moment.kind != TIMING_AT_MOST && moment.kind != TIMING_STOPS;
+    item->restarted = r->restarted;
+    r->restarted = 0;
+    r->n++;
+    return SH_OK;
+}
+
+static int read_one(struct recording *r, struct sh_err *err)
+{
+    struct scanhead_frame frame;
+    const int rc = scanhead_next(r->stream, &frame, -1);
+    if (rc == SCANHEAD_OK) return put(r, &frame, err);
+    if (rc != SCANHEAD_ECLOSED) return sh_fail(err, rc, "%s", scanhead_error(r->stream));
+    r->at_end = 1;
+    return SH_OK;
+}
+
+int recording_next(struct recording *r, struct recording_frame *frame, struct sh_err *err)
+{
+    while (!r->at_end && (r->n == 0 || (!item_of(r, 0)->is_known && r->n < RECORDING_QUEUE))) {
+        const int rc = read_one(r, err);
+        if (rc != SH_OK) return rc;
+    }
+    if (r->n == 0) return 0;
+    const struct recording_item *item = item_of(r, 0);
+    if (!item->follows) {
+        r->last_t_ns = item->t_ns;
+        if (!r->has_first) r->first_t_ns = item->t_ns;
+        r->has_first = 1;
+    }
+    *frame = (struct recording_frame){item->bytes, item->len, r->last_t_ns, item->restarted};
+    r->first = (r->first + 1) % RECORDING_QUEUE;
+    r->n--;
+    return 1;
+}

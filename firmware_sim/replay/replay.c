@@ -1,0 +1,368 @@
+/* Ticks of a recording: which frames go out with which. */
+#include "firmware_sim/replay/replay.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "drivers/protocol/native_encode.h"
+#include "firmware_sim/replay/replay_state.h"
+
+enum { MOST_BYTES = 1 << 20, USUAL_MOST_BYTES = 1 << 17, NATIVE_RATE_BYTES = 2 * NATIVE_POINT_LEN };
+static const uint32_t SEQ_BACK = UINT32_C(1) << 30; /* a reader takes that for another sequence (PROTOCOL.md) */
+static const int64_t BACK_NS = 1000000000; /* what comes so much earlier than the frame before is of another head */
+
+/* ---- the frames */
+
+static int64_t tick_of(const struct replay *r, int64_t t_ns)
+{
+    const int64_t n = t_ns / r->tick_ns;
+    return t_ns % r->tick_ns < 0 ? n - 1 : n;
+}
+
+static void fail(struct replay *r, const struct sh_err *err)
+{
+    if (!r->ends_then) sh_warn(r->options.report, "%s; nothing more is replayed of it", err->text);
+    pthread_mutex_lock(&r->lock);
+    if (r->failure.code == 0) r->failure = *err;
+    command_queue_push(&r->cmd.queue, CMD_E_PULSES, "nothing more of the recording can be replayed");
+    pthread_mutex_unlock(&r->lock);
+}
+
+/* The next frame of the range into r->frame. 0: there is none. */
+static int look(struct replay *r)
+{
+    struct sh_err err = {0};
+    const double to_ns = r->options.to_s > 0.0 ? r->options.to_s * 1e9 : INFINITY;
+    while (!r->has_frame) {
+        const int got = recording_next(&r->recording, &r->frame, &err);
+        if (got < 0) fail(r, &err);
+        if (got <= 0) return 0;
+        const double since_ns = (double)r->frame.t_ns - (double)r->first_ns;
+        if (!r->in_range && since_ns < r->options.from_s * 1e9) {
+            replay_keep_front(&r->front, r->frame.bytes);
+            r->has_skipped = 1;
+            continue;
+        }
+        if (since_ns > to_ns) return 0;
+        r->has_frame = 1;
+    }
+    return 1;
+}
+
+/* Its number, as it is sent. Those that are for one reader have none. */
+static void renumber(struct replay *r, uint8_t *frame)
+{
+    struct native_header header;
+    native_read_header(frame, &header);
+    if ((header.flags & NATIVE_LOCAL) != 0) return;
+    if (r->restarts && r->has_seq) r->seq_shift = r->last_seq + 1 - SEQ_BACK - header.seq;
+    r->restarts = 0;
+    r->last_seq = header.seq + r->seq_shift;
+    r->has_seq = 1;
+    if (r->seq_shift != 0) native_seal(frame, r->last_seq);
+}
+
+static void add(struct replay *r, const uint8_t *frame, uint32_t len, uint64_t tick)
+{
+    memcpy(r->bytes + r->len, frame, len);
+    renumber(r, r->bytes + r->len);
+    r->len += len;
+    pthread_mutex_lock(&r->lock);
+    replay_note_frame(r, frame, tick);
+    pthread_mutex_unlock(&r->lock);
+}
+
+/* Who listens knows nothing of what was passed over: it is told what the head was there, as a reader that joins is. */
+static void add_front(struct replay *r, uint64_t tick)
+{
+    uint8_t frame[REPLAY_FRONT_ROOM];
+    for (int i = 0; i < REPLAY_FRONT; i++) {
+        if (r->front.len[i] == 0) continue;
+        memcpy(frame, r->front.bytes[i], r->front.len[i]);
+        frame[3] |= NATIVE_REPEAT | NATIVE_LOCAL;
+        native_seal(frame, 0);
+        add(r, frame, r->front.len[i], tick);
+    }
+}
+
+/* ---- time */
+
+/* Frames are counted anew from this tick on: the first of a time, or of another head within the recording. */
+static void rebase(struct replay *r, uint64_t tick)
+{
+    r->start_tick = tick;
+    r->base = r->last = tick_of(r, r->frame.t_ns);
+}
+
+/* The tick with which the next frame goes out. */
+static uint64_t due_tick(struct replay *r, uint64_t tick)
+{
+    const int64_t at = tick_of(r, r->frame.t_ns);
+    if (r->frame.restarted || at < r->last - BACK_NS / r->tick_ns) {
+        rebase(r, tick + 1);
+        r->frame.restarted = 0;
+    } else if (at > r->last) {
+        r->last = at;
+    }
+    const double n = (double)(r->last - r->base) + 1.0;
+    const double out = ceil(n / r->options.speed - 1e-9) - 1.0;
+    return r->start_tick + (out < 0x1p62 ? (uint64_t)(out > 0.0 ? out : 0.0) : UINT64_C(1) << 62);
+}
+
+static void stop(struct replay *r, uint64_t tick)
+{
+    pthread_mutex_lock(&r->lock);
+    r->playing = 0;
+    replay_set_state(r, tick, HEAD_IDLE);
+    pthread_mutex_unlock(&r->lock);
+}
+
+static void begin(struct replay *r, uint64_t tick)
+{
+    struct sh_err err = {0};
+    r->has_frame = r->in_range = r->has_skipped = 0;
+    if (recording_rewind(&r->recording, &err) != SH_OK) {
+        stop(r, tick);
+        fail(r, &err);
+        return;
+    }
+    if (!look(r)) {
+        stop(r, tick);
+        if (r->failure.code != 0) return;
+        sh_fail(&err, SH_EINPUT, "%s: no frame is in it from %.10g s on", r->options.path, r->options.from_s);
+        fail(r, &err);
+        return;
+    }
+    rebase(r, tick);
+    r->in_range = 1;
+    r->restarts = 1;
+    pthread_mutex_lock(&r->lock);
+    r->playing = 1;
+    r->times++;
+    replay_set_state(r, tick, HEAD_SCANNING);
+    pthread_mutex_unlock(&r->lock);
+    if (r->has_skipped && r->frame.bytes[1] != NATIVE_DESCRIPTOR) add_front(r, tick);
+}
+
+/* The frames of a tick. may_skip: time without frames passes at once. */
+static void fill(struct replay *r, uint64_t tick, int may_skip)
+{
+    while (look(r)) {
+        const uint64_t due = due_tick(r, tick);
+        if (due > tick && !(may_skip && r->len == 0)) return;
+        if (due > tick) r->start_tick -= due - tick; /* modulo 2^64, as the sum in due_tick() is */
+        if (r->len + r->frame.len > MOST_BYTES) return; /* the rest comes with the next tick */
+        add(r, r->frame.bytes, r->frame.len, tick);
+        r->has_frame = 0;
+    }
+    stop(r, tick);
+    r->wants_again = r->options.loop;
+}
+
+/* ---- the source */
+
+static int take_wishes(struct replay *r, uint64_t tick, int *over)
+{
+    const int again = r->wants_again;
+    r->wants_again = 0;
+    pthread_mutex_lock(&r->lock);
+    const int ready = r->n_clients >= (int)r->options.clients;
+    const int starts = (r->wants_start && ready) || again, stops = r->wants_stop;
+    if (starts) r->wants_start = 0;
+    r->wants_stop = 0;
+    *over = r->ending || tick >= r->end_tick || (r->ends_then && !r->wants_start && !starts && !r->playing);
+    pthread_mutex_unlock(&r->lock);
+    if (stops && r->playing) stop(r, tick);
+    return starts && !*over;
+}
+
+static void count(struct replay *r)
+{
+    atomic_fetch_add(&r->counters.fired, r->tick.n_fired);
+    atomic_fetch_add(&r->counters.cast, r->tick.n_cast);
+}
+
+static enum loop_source_tick next(void *self, uint64_t tick, int may_idle, int again, struct ring_tick *out)
+{
+    struct replay *r = self;
+    int over;
+    if (!again) {
+        r->len = 0;
+        r->tick = (struct ring_tick){.scan = r->tick.scan};
+    }
+    const int starts = take_wishes(r, tick, &over);
+    if (over && !again) return LOOP_SOURCE_OVER;
+    if (starts) begin(r, tick);
+    if (!r->playing && !again && r->len == 0 && may_idle && r->end_tick == UINT64_MAX &&
+        (!r->ends_then || r->wants_start) && !r->wants_again)
+        return LOOP_SOURCE_IDLE;
+    if (r->playing) {
+        const struct ring_tick before = r->tick;
+        r->tick = (struct ring_tick){.scan = before.scan};
+        fill(r, tick, may_idle && r->end_tick == UINT64_MAX); /* --duration counts such time */
+        count(r);
+        r->tick.n_cast += before.n_cast;
+        r->tick.n_fired += before.n_fired;
+        r->tick.n_lines += before.n_lines;
+        ring_hits_add(&r->tick.hits, &before.hits);
+    }
+    *out = r->tick;
+    out->bytes = r->bytes;
+    out->len = r->len;
+    return LOOP_SOURCE_TICK;
+}
+
+static void describe(void *self, struct ring_tick *tick)
+{
+    struct replay *r = self;
+    uint32_t len = 0;
+    for (int i = 0; i < REPLAY_FRONT; i++) {
+        memcpy(r->bytes + len, r->front.bytes[i], r->front.len[i]);
+        len += r->front.len[i];
+    }
+    *tick = (struct ring_tick){.bytes = r->bytes, .len = len};
+}
+
+static uint32_t most_bytes(const void *self)
+{
+    (void)self;
+    return MOST_BYTES + REPLAY_FRONT * REPLAY_FRONT_ROOM;
+}
+
+static uint32_t usual_bytes(const void *self)
+{
+    const struct replay *r = self;
+    const double pulses = 1e-6 * (double)r->cfg->head.settings.prr_uhz * 1e-9 * (double)r->tick_ns;
+    const double bytes = 4096.0 + NATIVE_RATE_BYTES * pulses;
+    return bytes < USUAL_MOST_BYTES ? (uint32_t)bytes : USUAL_MOST_BYTES;
+}
+
+static struct fault_board *faults(const void *self)
+{
+    return ((const struct replay *)self)->faults;
+}
+
+static uint32_t near_wrap(void *self)
+{
+    (void)self;
+    return 0;
+}
+
+static int64_t tick_ns(const void *self)
+{
+    return ((const struct replay *)self)->tick_ns;
+}
+
+static struct device_counters *counters(void *self)
+{
+    return &((struct replay *)self)->counters;
+}
+
+static uint64_t scans(void *self)
+{
+    struct replay *r = self;
+    pthread_mutex_lock(&r->lock);
+    const uint64_t n = r->scans;
+    pthread_mutex_unlock(&r->lock);
+    return n;
+}
+
+static int power_up(void *self, int64_t now_ns, const char **warning, struct sh_err *err)
+{
+    (void)self;
+    (void)now_ns;
+    (void)err;
+    *warning = NULL;
+    return SH_OK;
+}
+
+static void end(void *self)
+{
+    struct replay *r = self;
+    pthread_mutex_lock(&r->lock);
+    r->ending = 1;
+    pthread_mutex_unlock(&r->lock);
+}
+
+const struct loop_source_ops replay_source = {
+    .command = replay_command,
+    .overlong = replay_overlong,
+    .session_opened = replay_session_opened,
+    .session_closed = replay_session_closed,
+    .report = replay_report,
+    .faults = faults,
+    .near_wrap = near_wrap,
+    .tick_ns = tick_ns,
+    .counters = counters,
+    .scans = scans,
+    .power_up = power_up,
+    .end = end,
+    .most_bytes = most_bytes,
+    .usual_bytes = usual_bytes,
+    .describe = describe,
+    .next = next,
+};
+
+/* ---- open and close */
+
+int replay_open(struct config *cfg, const struct replay_options *options, struct replay **out, struct sh_err *err)
+{
+    *out = NULL;
+    struct replay *r = calloc(1, sizeof *r);
+    if (r == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
+    pthread_mutex_init(&r->lock, NULL);
+    r->cfg = cfg;
+    r->options = *options;
+    r->tick_ns = llround(1e9 / cfg->loop.tick_hz);
+    r->end_tick = options->duration_s > 0.0 ? (uint64_t)ceil(options->duration_s * cfg->loop.tick_hz) : UINT64_MAX;
+    r->wants_start = options->start;
+    for (uint32_t i = 0; i < cfg->n_links; i++) /* each of these opens a session for itself */
+        r->n_clients -= cfg->link[i].type == LINK_FILE || cfg->link[i].type == LINK_NULL;
+    r->ends_then = options->start && !options->loop;
+    r->bytes = malloc(MOST_BYTES + REPLAY_FRONT * REPLAY_FRONT_ROOM);
+    int rc = r->bytes != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory");
+    if (rc == SH_OK) rc = replay_open_recording(r, err);
+    if (rc == SH_OK) rc = fault_board_create(&cfg->faults, options->truth, &r->faults, err);
+    r->desk = (struct fault_desk){.cfg = cfg, .board = r->faults, .no_head = 1};
+    if (rc != SH_OK) {
+        replay_free(r);
+        return rc;
+    }
+    *out = r;
+    return SH_OK;
+}
+
+void replay_free(struct replay *r)
+{
+    if (r == NULL) return;
+    recording_close(&r->recording);
+    fault_board_free(r->faults);
+    pthread_mutex_destroy(&r->lock);
+    free(r->bytes);
+    free(r);
+}
+
+void replay_get_summary(struct replay *r, struct replay_summary *summary)
+{
+    struct scanhead_stats stats = {0};
+    if (r->recording.stream != NULL) recording_stats(&r->recording, &stats);
+    pthread_mutex_lock(&r->lock);
+    *summary = (struct replay_summary){.times = r->times,
+                                       .frames = r->frames,
+                                       .bad_bytes = stats.bad_bytes,
+                                       .repeated = stats.repeated,
+                                       .late = stats.late,
+                                       .cut = stats.cuts != 0};
+    snprintf(summary->idn, sizeof summary->idn, "%s", r->idn);
+    pthread_mutex_unlock(&r->lock);
+}
+
+int replay_check(struct replay *r, struct sh_err *err)
+{
+    struct sh_err why;
+    const int rc = fault_board_close(r->faults, &why);
+    if (r->failure.code != 0) return sh_fail(err, r->failure.code, "%s", r->failure.text);
+    return rc == SH_OK ? SH_OK : sh_fail(err, rc, "%s", why.text);
+}

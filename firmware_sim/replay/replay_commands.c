@@ -1,0 +1,154 @@
+/* Commands to a recording: queries are answered by its descriptor. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "firmware_sim/replay/replay_state.h"
+
+static const char RECORDED[] = "a recording is replayed, and its settings are as they were";
+static const char FIXED[] = "a recording is replayed, and its stations are where they were";
+
+void replay_set_state(struct replay *r, uint64_t tick, enum head_state state)
+{
+    r->change[r->n_changes++ % REPLAY_CHANGES] = (struct replay_change){tick, state};
+}
+
+/* As of the last released tick. */
+static enum head_state visible_state(const struct replay *r, uint64_t released)
+{
+    for (uint32_t i = r->n_changes; i > 0 && i + REPLAY_CHANGES > r->n_changes; i--)
+        if (r->change[(i - 1) % REPLAY_CHANGES].tick < released) return r->change[(i - 1) % REPLAY_CHANGES].state;
+    return HEAD_IDLE;
+}
+
+static int64_t to_nm(double m)
+{
+    return isfinite(m) && fabs(m) < 1e9 ? llround(1e9 * m) : 0;
+}
+
+void replay_take_descriptor(struct replay *r, const struct native_descriptor *d)
+{
+    struct head_settings *s = &r->cmd.settings;
+    struct head_limits *l = &r->cmd.limits;
+    s->prr_uhz = l->prr_min_uhz = l->prr_max_uhz = (int64_t)d->prr_uhz;
+    s->lines_uhz = l->lines_min_uhz = l->lines_max_uhz = (int64_t)d->lines_uhz;
+    s->pan_udeg_s = l->pan_max_udeg_s = (int64_t)d->pan_udeg_s;
+    s->line_start_udeg = l->fov_min_udeg = d->line_start_udeg;
+    s->line_stop_udeg = l->fov_max_udeg = d->line_stop_udeg;
+    s->pan_start_udeg = l->pan_min_udeg = d->pan_start_udeg;
+    s->pan_stop_udeg = l->pan_max_udeg = d->pan_stop_udeg;
+    s->frames = d->frames;
+    s->range_min_nm = l->range_min_nm = l->near_most_nm = to_nm(d->range_min_m);
+    s->range_max_nm = l->range_max_nm = l->far_least_nm = to_nm(d->range_max_m);
+    l->sweep_udeg = d->sweep_udeg;
+    l->emitter = EMITTER_LINE;
+    l->line_pulses = 0;
+    r->cmd.defaults = *s;
+}
+
+void replay_take_emitter(struct replay *r, const struct native_emitter *e)
+{
+    static const enum emitter_kind kinds[] = {[NATIVE_EMIT_LINE] = EMITTER_LINE,
+                                              [NATIVE_EMIT_PLANAR] = EMITTER_PLANAR,
+                                              [NATIVE_EMIT_BEAMS] = EMITTER_BEAMS,
+                                              [NATIVE_EMIT_SPHERE] = EMITTER_SPHERE,
+                                              [NATIVE_EMIT_DIRECTIONS] = EMITTER_DIRECTIONS};
+    struct command_device *cmd = &r->cmd;
+    if (e->kind < sizeof kinds / sizeof *kinds) cmd->limits.emitter = kinds[e->kind];
+    cmd->limits.line_pulses = e->steps;
+    cmd->limits.step_fixed = 1;
+    cmd->settings.echoes = e->echoes;
+    if (e->kind == NATIVE_EMIT_SPHERE && e->steps > 0) cmd->settings.step_udeg = llround(360e6 / e->steps);
+    if (e->sequence_ns_den > 0)
+        cmd->limits.sequence_ps = llround(1e3 * (double)e->sequence_ns_num / (double)e->sequence_ns_den);
+    cmd->defaults = cmd->settings;
+}
+
+void replay_take_anchor(struct replay *r, const struct native_anchor *anchor)
+{
+    r->cmd.settings.station = r->cmd.defaults.station = anchor->station;
+    r->cmd.limits.n_stations = anchor->station;
+}
+
+void replay_open_commands(struct replay *r)
+{
+    struct command_device *cmd = &r->cmd;
+    cmd->recorded = RECORDED;
+    cmd->fixed = FIXED;
+    cmd->plan = "none: a recording is replayed";
+    cmd->state = HEAD_IDLE;
+    cmd->faults = &fault_desk_commands;
+    cmd->faults_owner = &r->desk;
+    cmd->step_allowed = r->cfg->loop.pace == PACE_STEP;
+    cmd->settings = (struct head_settings){.station = 1,
+                                           .echoes = COMMAND_NOT_RECORDED_U32,
+                                           .noise = COMMAND_NOT_RECORDED_U32,
+                                           .angle_noise = COMMAND_NOT_RECORDED_U32,
+                                           .sigma_nm = COMMAND_NOT_RECORDED,
+                                           .ball_nm = COMMAND_NOT_RECORDED};
+    cmd->limits.n_stations = 1;
+}
+
+static void carry_out(struct replay *r, enum command_effect effect)
+{
+    r->wants_start |= effect == COMMAND_START;
+    r->wants_stop |= effect == COMMAND_STOP || effect == COMMAND_RESET;
+    if (effect != COMMAND_START) return;
+    r->wants_stop = 0;
+    r->options.clients = 0; /* who commands it does not wait for others */
+}
+
+void replay_command(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out)
+{
+    struct replay *r = self;
+    pthread_mutex_lock(&r->lock);
+    r->cmd.state = visible_state(r, released);
+    r->cmd.t_ns = (int64_t)released * r->tick_ns;
+    r->cmd.frames_done = r->frames_done;
+    r->desk.now_ns = r->cmd.t_ns;
+    command_execute(&r->cmd, session, line, out);
+    if (out->error == 0) carry_out(r, out->effect);
+    pthread_mutex_unlock(&r->lock);
+}
+
+void replay_report(void *self, int number, const char *text)
+{
+    struct replay *r = self;
+    pthread_mutex_lock(&r->lock);
+    command_queue_push(&r->cmd.queue, number, text);
+    pthread_mutex_unlock(&r->lock);
+}
+
+void replay_overlong(void *self, uint32_t session, struct command_result *out)
+{
+    struct replay *r = self;
+    char text[96];
+    snprintf(text, sizeof text, "session %u, longest line %d bytes", session, COMMAND_MAX_LINE);
+    memset(out, 0, sizeof *out);
+    pthread_mutex_lock(&r->lock);
+    command_refuse(&r->cmd, CMD_E_OVERRUN, text, out);
+    pthread_mutex_unlock(&r->lock);
+}
+
+void replay_session_opened(void *self, uint32_t session)
+{
+    struct replay *r = self;
+    (void)session;
+    pthread_mutex_lock(&r->lock);
+    r->n_clients++;
+    pthread_mutex_unlock(&r->lock);
+}
+
+void replay_session_closed(void *self, uint32_t session, const char *who, int partial)
+{
+    struct replay *r = self;
+    char text[96];
+    snprintf(text, sizeof text, "session %u, %.60s", session, who);
+    pthread_mutex_lock(&r->lock);
+    const int in_control = r->cmd.control == session;
+    r->n_clients--;
+    if (in_control) r->cmd.control = 0;
+    if (partial) command_queue_push(&r->cmd.queue, CMD_E_PARTIAL, text);
+    if (in_control || r->playing) command_queue_push(&r->cmd.queue, CMD_E_CLIENT_LOST, text);
+    pthread_mutex_unlock(&r->lock);
+}

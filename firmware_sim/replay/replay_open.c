@@ -1,0 +1,129 @@
+/* Opening: what the recording says of its head, before anything is played. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "drivers/protocol/native_encode.h"
+#include "drivers/protocol/protocol.h"
+#include "firmware_sim/replay/replay_state.h"
+
+static int front_place(uint8_t type)
+{
+    return type == NATIVE_DESCRIPTOR ? 0 : type == NATIVE_EMITTER ? 1 : type == NATIVE_ANCHOR ? 2 : -1;
+}
+
+void replay_keep_front(struct replay_front *front, const uint8_t *frame)
+{
+    const int place = front_place(frame[1]);
+    const size_t len = native_frame_len(frame);
+    if (place < 0 || len > REPLAY_FRONT_ROOM) return;
+    if (place == 0) front->len[1] = 0; /* another head has another emitter, or none */
+    memcpy(front->bytes[place], frame, len);
+    front->len[place] = (uint32_t)len;
+}
+
+/* Up to the first anchor that follows a descriptor, or to the end: the recording may begin anywhere. */
+static int read_front(struct replay *r, struct sh_err *err)
+{
+    struct recording_frame frame;
+    int got, is_first = 1;
+    while ((got = recording_next(&r->recording, &frame, err)) == 1) {
+        if (is_first && (frame.bytes[3] & NATIVE_LOCAL) == 0) {
+            r->first_ns = frame.t_ns;
+            is_first = 0;
+        }
+        replay_keep_front(&r->front, frame.bytes);
+        if (!is_first && r->front.len[0] != 0 && r->front.len[2] != 0) break;
+    }
+    if (got < 0) return got;
+    if (r->front.len[0] == 0)
+        return sh_fail(err, SH_EFORMAT, "%s: no descriptor is in it: it is no recording of a head's stream",
+                       r->options.path);
+    return recording_rewind(&r->recording, err);
+}
+
+/* "MAKER,MODEL,SERIAL,REST" into the fields of the configuration that links show to hosts. */
+static void take_identity(struct config *cfg, const char *idn)
+{
+    char text[96];
+    char *field[3] = {text, "", ""};
+    snprintf(text, sizeof text, "%s", idn);
+    for (int i = 0; i < 3; i++) {
+        char *comma = strchr(field[i], ',');
+        if (comma == NULL) break;
+        *comma = '\0';
+        if (i < 2) field[i + 1] = comma + 1;
+    }
+    snprintf(cfg->profile.maker, sizeof cfg->profile.maker, "%.31s", field[0]);
+    snprintf(cfg->profile.model, sizeof cfg->profile.model, "%.63s", field[1]);
+    snprintf(cfg->head.serial, sizeof cfg->head.serial, "%.31s", field[2]);
+    for (uint32_t i = 0; i < cfg->n_links; i++)
+        if (cfg->link[i].type == LINK_USB && cfg->link[i].own_serial)
+            snprintf(cfg->link[i].serial, sizeof cfg->link[i].serial, "%.31s", field[2]);
+}
+
+static const double MOST_UHZ = 1e15; /* 1 GHz: what a recording says may be any number */
+
+/* For what links are refused by: the rate of the stream. */
+static void fill_config(struct replay *r, const struct native_descriptor *d)
+{
+    struct config *cfg = r->cfg;
+    take_identity(cfg, d->idn);
+    snprintf(cfg->profile.name, sizeof cfg->profile.name, "%s", d->profile);
+    cfg->profile.facets = 1;
+    cfg->profile.optical_gain = d->sweep_udeg > 0 ? (double)d->sweep_udeg * 1e-6 / 360.0 : 1.0;
+    cfg->head.settings = r->cmd.settings;
+    cfg->head.settings.prr_uhz = llround(fmin((double)d->prr_uhz * r->options.speed, MOST_UHZ));
+    cfg->output.attributes = (d->content & NATIVE_HAS_ATTRIBUTES) != 0;
+    cfg->output.colour = (d->content & NATIVE_HAS_COLOURS) != 0 ? COLOUR_SOLID : COLOUR_NONE;
+}
+
+static int check_links(const struct config *cfg, struct sh_err *err)
+{
+    for (uint32_t i = 0; i < cfg->n_links; i++) {
+        const struct protocol_ops *protocol = protocol_ops_get((enum protocol_id)cfg->link[i].protocol);
+        if (protocol == NULL || protocol->passes_native) continue;
+        return sh_fail(err, SH_EINPUT,
+                       "%s: links[%u].protocol %s: a recording is of the native protocol; allowed is native alone",
+                       cfg->file, i, protocol->name);
+    }
+    return SH_OK;
+}
+
+static int check_faults(const struct config *cfg, struct sh_err *err)
+{
+    for (uint32_t i = 0; i < cfg->faults.n; i++) {
+        const struct fault *fault = &cfg->faults.fault[i];
+        const char *why = fault_desk_why_not(fault);
+        if (why != NULL)
+            return sh_fail(err, SH_EINPUT, "fault %u, %s: %s", i + 1, fault_names[fault->kind], why);
+    }
+    return SH_OK;
+}
+
+int replay_open_recording(struct replay *r, struct sh_err *err)
+{
+    struct native_descriptor d;
+    struct native_emitter e;
+    struct native_anchor a;
+    int rc = check_links(r->cfg, err);
+    if (rc == SH_OK) rc = check_faults(r->cfg, err);
+    if (rc == SH_OK) rc = recording_open(&r->recording, r->options.path, err);
+    if (rc == SH_OK) rc = read_front(r, err);
+    if (rc != SH_OK) return rc;
+    const struct replay_front *front = &r->front;
+    if (native_decode_descriptor(front->bytes[0] + NATIVE_HEADER_LEN, front->len[0] - NATIVE_HEADER_LEN, &d) != SH_OK)
+        return sh_fail(err, SH_EFORMAT, "%s: its descriptor can't be read", r->options.path);
+    replay_open_commands(r);
+    replay_take_descriptor(r, &d);
+    if (front->len[1] != 0 &&
+        native_decode_emitter(front->bytes[1] + NATIVE_HEADER_LEN, front->len[1] - NATIVE_HEADER_LEN, &e) == SH_OK)
+        replay_take_emitter(r, &e);
+    if (front->len[2] != 0 &&
+        native_decode_anchor(front->bytes[2] + NATIVE_HEADER_LEN, front->len[2] - NATIVE_HEADER_LEN, &a) == SH_OK)
+        replay_take_anchor(r, &a);
+    fill_config(r, &d);
+    snprintf(r->idn, sizeof r->idn, "%s", d.idn);
+    r->cmd.idn = r->idn;
+    return SH_OK;
+}

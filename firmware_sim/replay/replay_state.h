@@ -1,0 +1,89 @@
+/* Private to the files of this folder. */
+#ifndef FIRMWARE_SIM_REPLAY_REPLAY_STATE_H
+#define FIRMWARE_SIM_REPLAY_REPLAY_STATE_H
+
+#include <pthread.h>
+
+#include "firmware_sim/device/fault_desk.h"
+#include "firmware_sim/replay/recording.h"
+#include "firmware_sim/replay/replay.h"
+
+enum { REPLAY_CHANGES = 32, REPLAY_FRONT = 3, REPLAY_FRONT_ROOM = 2048 };
+
+/* Descriptor, emitter and anchor, as the stream has said them last. */
+struct replay_front {
+    uint8_t bytes[REPLAY_FRONT][REPLAY_FRONT_ROOM];
+    uint32_t len[REPLAY_FRONT]; /* 0: none */
+};
+
+struct replay {
+    struct config *cfg;
+    struct replay_options options;
+    int64_t tick_ns;
+    char idn[96];
+    struct device_counters counters;
+    struct fault_board *faults;
+    struct fault_desk desk;
+
+    /* under the lock */
+    pthread_mutex_t lock;
+    struct command_device cmd;
+    int wants_start, wants_stop, ending;
+    int n_clients; /* beside links that are readers themselves */
+    int ends_then; /* the run ends when it was played */
+    uint64_t end_tick; /* of the run; UINT64_MAX: none */
+    uint32_t times;  /* begun so far */
+    uint64_t frames; /* sent */
+    uint64_t scans, frames_done;
+    /* The state of the head that was recorded, by the ticks with which it goes out. Number i is at i % REPLAY_CHANGES. */
+    struct replay_change {
+        uint64_t tick;
+        enum head_state state;
+    } change[REPLAY_CHANGES];
+    uint32_t n_changes;
+    struct sh_err failure; /* code 0: none */
+
+    /* of the player's thread; until it begins, of whoever opens */
+    struct recording recording;
+    int64_t first_ns; /* of the recording: device time of its first frame */
+    struct replay_front front;
+    int playing; /* changed under the lock */
+    uint64_t start_tick;   /* with which it began, or began to be counted anew: */
+    int64_t base;          /* that is this tick of the recording */
+    int64_t last;          /* tick of the recording of the frame sent last */
+    uint32_t seq_shift;    /* added to numbers */
+    int has_seq;           /* a frame was sent since power-up; its number, as it was sent, is */
+    uint32_t last_seq;
+    int restarts;          /* the next frame begins another sequence */
+    int in_range, has_skipped; /* of this time: frames are sent; some were passed over before */
+    int has_frame;
+    int wants_again; /* it is to begin anew by itself */
+    struct recording_frame frame; /* the next one */
+    uint8_t *bytes;               /* of a tick */
+    uint32_t len;
+    struct ring_tick tick; /* counts */
+};
+
+/* replay_commands.c. With the lock held: the state now. */
+void replay_set_state(struct replay *replay, uint64_t tick, enum head_state state);
+/* What the stream says of the head's settings; with the lock held. */
+void replay_take_descriptor(struct replay *replay, const struct native_descriptor *descriptor);
+void replay_take_emitter(struct replay *replay, const struct native_emitter *emitter);
+void replay_take_anchor(struct replay *replay, const struct native_anchor *anchor);
+void replay_open_commands(struct replay *replay);
+/* As struct loop_source_ops has them. */
+void replay_command(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out);
+void replay_overlong(void *self, uint32_t session, struct command_result *out);
+void replay_session_opened(void *self, uint32_t session);
+void replay_session_closed(void *self, uint32_t session, const char *who, int partial);
+void replay_report(void *self, int number, const char *text);
+
+/* replay_notes.c: a frame goes out with a tick. With the lock held; counts into r->tick. */
+void replay_note_frame(struct replay *replay, const uint8_t *frame, uint64_t tick);
+
+/* replay_open.c: reads up to the first anchor, and fills in what links need. */
+int replay_open_recording(struct replay *replay, struct sh_err *err);
+/* Keeps a frame that is one of the front's. */
+void replay_keep_front(struct replay_front *front, const uint8_t *frame);
+
+#endif

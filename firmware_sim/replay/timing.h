@@ -1,0 +1,42 @@
+/* When a head released the frames of a recording.
+ *
+ * In: frames of the native protocol, in the order of the stream. Out: for each a device time in the tick at whose end the
+ * head released it. Most frames have that in their header. Points have it in their pulses: a head releases whole packets of
+ * SCHEDULE_PACKET pulses, counted from the line's first, once the last of the packet has fired. Where a line, or the scan,
+ * ends within a packet, a later frame says when.
+ *
+ * Exact as far as the stream says exactly when pulses fire: from the scan's start on until the rates change; after that,
+ * and where frames are missing, to a nanosecond. One frame in a million then may be taken for one of the tick beside it.
+ * Pure; no allocation. */
+#ifndef FIRMWARE_SIM_REPLAY_TIMING_H
+#define FIRMWARE_SIM_REPLAY_TIMING_H
+
+#include "drivers/protocol/native.h"
+
+enum timing_kind {
+    TIMING_KNOWN,   /* t_ns is it; frames before it went out by then */
+    TIMING_FOLLOWS, /* as the frame before */
+    TIMING_AT_MOST, /* t_ns, or the time of a later frame that went out earlier */
+    TIMING_STOPS,   /* the last line of a scan that was stopped: the time of the next event or telemetry; else t_ns */
+};
+
+struct timing {
+    int has_rate;
+    uint64_t num, den; /* a firing sequence, or a pulse, lasts num / den ns */
+    uint32_t n_beams;  /* 0: a sequence is a pulse */
+    uint32_t offset_ns[NATIVE_MAX_BEAMS];
+    int knows_line; /* the next line's number, and its first pulse */
+    uint32_t next_line;
+    uint64_t next_first;
+    uint64_t changed_at; /* first pulse with the rates of now */
+};
+
+struct timing_moment {
+    enum timing_kind kind;
+    int64_t t_ns; /* device time */
+};
+
+/* timing begins as zeros. */
+struct timing_moment timing_take(struct timing *timing, const struct native_header *header, const uint8_t *payload);
+
+#endif

@@ -1,0 +1,169 @@
+/* Faults on the wire: replies that are missing, late or wrong, echoes, and from which reply on a fault counts. */
+#include "tests/unit/wire_rig.h"
+
+static struct fault f;
+
+/* What went out is this text. */
+static void expect_text(const char *text)
+{
+    if (rig.n_out != strlen(text) || memcmp(rig.out, text, rig.n_out) != 0)
+        fail_msg("'%.*s' went out, not '%s'", (int)rig.n_out, (const char *)rig.out, text);
+}
+
+static void hear(const char *text)
+{
+    wire_heard(rig.wire, text, strlen(text));
+}
+
+static void a_reply_that_is_dropped_is_missing(void **state)
+{
+    (void)state;
+    f = fault_of_kind(FAULT_NO_REPLY);
+    f.from = f.until = 2;
+    rig_open(&f, 1, 1);
+    rig_reply("1");
+    rig_reply("2");
+    rig_frame(RIG_STREAM); /* frames are not counted */
+    rig_reply("3");
+    rig_drain();
+    rig_expect((const int[]){0, 2, 3, -1});
+    assert_true(rig.n_notes == 1 && rig.note[0].number == 2 && rig.note[0].of == FAULT_OF_REPLIES);
+}
+
+static void frames_overtake_a_late_reply_and_replies_do_not(void **state)
+{
+    (void)state;
+    f = fault_of_kind(FAULT_LATE_REPLY);
+    f.at = 1;
+    f.for_ms = 4.0;
+    rig_open(&f, 1, 1);
+    const int64_t due_ns = rig.now_ns + 4 * MS;
+    rig_reply("late");
+    rig_frame(RIG_STREAM);
+    rig_reply("next");
+    assert_int_equal(rig_take(0), 1);
+    assert_int_equal(wire_next_ns(rig.wire), due_ns);
+    rig.now_ns = due_ns - 1;
+    assert_int_equal(rig_take(1), 0); /* nor at the end of the run */
+    rig.now_ns = due_ns;
+    assert_int_equal(rig_take(0), 2);
+    rig_expect((const int[]){1, 0, 2, -1});
+    rig_reply("4");
+    assert_int_equal(rig_take(0), 1);
+}
+
+/* It differs always from the right one. */
+static void a_wrong_reply_is_wrong(void **state)
+{
+    (void)state;
+    f = fault_of_kind(FAULT_WRONG_REPLY);
+    rig_open(&f, 1, 1);
+    rig_reply("42");
+    rig_reply("43");
+    rig_reply("43");
+    rig_reply("OK");
+    rig_reply("OK");
+    rig_drain();
+    expect_text("OK\r\n42\r\nOK\r\n43\r\n0\r\n");
+    assert_int_equal(rig.n_notes, 5);
+    rig_close();
+    rig_open(&f, 1, 0); /* of another protocol only one that there was */
+    rig_unit(5, 1);
+    rig_unit(6, 1);
+    rig_drain();
+    assert_true(rig.n_notes == 1 && rig.n_out == 10);
+    assert_memory_equal(rig.out + 5, rig.item[0].bytes, 5);
+}
+
+/* Of the line that it answers, however the lines came; those that have no answer are passed over. */
+static void an_echo_is_that_of_the_replys_own_line(void **state)
+{
+    (void)state;
+    char overlong[400], want[600];
+    memset(overlong, 'x', sizeof overlong - 1);
+    overlong[sizeof overlong - 1] = '\0';
+    f = fault_of_kind(FAULT_ECHO);
+    rig_open(&f, 1, 1);
+    hear("A 1\nB?\r\n\r\n  \t\nC");
+    rig_reply("a");
+    rig_reply("b");
+    hear("C\rD");
+    hear("\n");
+    hear(overlong);
+    rig_reply("c");
+    rig_reply("d");
+    hear("\n");
+    rig_reply("too long");
+    rig_reply("to nothing");
+    rig_drain();
+    snprintf(want, sizeof want, "A 1\r\na\r\nB?\r\nb\r\nCC\r\nc\r\nD\r\nd\r\n%.256s\r\ntoo long\r\nto nothing\r\n",
+             overlong);
+    expect_text(want);
+    assert_int_equal(rig.n_notes, 5);
+    assert_true(rig.note[0].n == 5 && rig.note[2].n == 4);
+    rig_close();
+    rig_open(&f, 1, 1); /* lines that it did not hear have no echo, and the next have theirs */
+    wire_skip_heard(rig.wire, 2);
+    hear("C\n");
+    rig_reply("a");
+    rig_reply("b");
+    rig_reply("c");
+    rig_drain();
+    expect_text("a\r\nb\r\nC\r\nc\r\n");
+    rig_close();
+    rig_open(&f, 1, 0); /* a protocol without lines: what came since the last answer, as it was */
+    hear("\x02s\n");
+    hear("\x03");
+    rig_unit(7, 1);
+    rig_drain();
+    assert_true(rig.n_writes == 2 && rig.n_out == 11);
+    assert_memory_equal(rig.out, "\x02s\n\x03", 4);
+}
+
+static void more_than_can_be_heard_does_no_harm(void **state)
+{
+    (void)state;
+    f = fault_of_kind(FAULT_ECHO);
+    rig_open(&f, 1, 1);
+    for (int i = 0; i < 100000; i++)
+        hear("*IDN?\n");
+    for (int i = 0; i < 300; i++)
+        rig_reply("a");
+    rig_drain();
+    assert_int_equal(rig.n_notes, 300);
+}
+
+/* A reply counts from the command on that added the fault, and not that command's own. */
+static void replies_count_from_after_the_command(void **state)
+{
+    (void)state;
+    uint32_t number;
+    struct sh_err err;
+    f = fault_of_kind(FAULT_NO_REPLY);
+    f.at = 1;
+    f.from_s = 0.0;
+    rig_open(NULL, 0, 1);
+    rig_reply("1");
+    assert_int_equal(fault_board_add(rig.board, &f, 500 * MS, &number, &err), SH_OK);
+    wire_renew(rig.wire, 2); /* one from before, and its own */
+    rig_reply("2");
+    rig_reply("3");
+    rig_reply("hit");
+    rig_reply("5");
+    rig_drain();
+    expect_text("1\r\n2\r\n3\r\n5\r\n");
+    assert_int_equal(rig.note[0].number, 1);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_teardown(a_reply_that_is_dropped_is_missing, rig_teardown),
+        cmocka_unit_test_teardown(frames_overtake_a_late_reply_and_replies_do_not, rig_teardown),
+        cmocka_unit_test_teardown(a_wrong_reply_is_wrong, rig_teardown),
+        cmocka_unit_test_teardown(an_echo_is_that_of_the_replys_own_line, rig_teardown),
+        cmocka_unit_test_teardown(more_than_can_be_heard_does_no_harm, rig_teardown),
+        cmocka_unit_test_teardown(replies_count_from_after_the_command, rig_teardown),
+    };
+    return cmocka_run_group_tests_name("faults on the wire, replies", tests, NULL, NULL);
+}

@@ -1,0 +1,269 @@
+/* The dissector in Wireshark and damage: frames that were hurt are marked, and a stream with damage is read as libscanhead
+ * reads it, in one pass and in two. */
+#include "tests/wire/wireshark_rig.h"
+
+#include "drivers/protocol/native.h"
+
+enum { N_HURT = 1000, N_ROUNDS = 3 };
+
+/* Each kind of damage to one frame, so that it differs from any whole frame; the new length. */
+static size_t hurt(uint8_t *frame, size_t len, uint64_t *random)
+{
+    const uint32_t kind = capture_random(random, 5), at = capture_random(random, (uint32_t)len);
+    const uint32_t n = 1 + capture_random(random, 20);
+    if (kind == 0) frame[at] ^= (uint8_t)(1u << capture_random(random, 8));
+    if (kind == 1)
+        for (uint32_t i = at; i < at + n && i < len; i++)
+            frame[i] ^= (uint8_t)(1 + capture_random(random, 255));
+    if (kind == 2) return 1 + capture_random(random, (uint32_t)len - 1); /* the rest is missing */
+    if (kind == 3 && n < len) {                                          /* a part is missing */
+        const size_t from = capture_random(random, (uint32_t)(len - n));
+        memmove(frame + from, frame + from + n, len - n - from);
+        return len - n;
+    }
+    if (kind < 3) return len;
+    memmove(frame + at + n, frame + at, len - at); /* bytes have come in, also where n did not fit */
+    for (uint32_t i = at; i < at + n; i++)
+        frame[i] = (uint8_t)capture_random(random, 256);
+    return len + n;
+}
+
+/* 1,000 frames of all types, each hurt, in packets of their own. */
+static void put_hurt(struct capture *c, uint32_t interface)
+{
+    static uint8_t copy[NATIVE_MAX_FRAME + 32];
+    uint64_t random = 19;
+    char *bytes[2];
+    size_t len[2], at[2] = {0, 0};
+    for (int i = 0; i < 2; i++)
+        bytes[i] = wire_read(wire_path(wire, i == 0 ? "polar.shs" : "samples.shs"), &len[i]);
+    for (int i = 0; i < N_HURT; i++) {
+        const int of = i % 2;
+        const uint8_t *frame = (uint8_t *)bytes[of] + at[of];
+        const size_t n = native_frame_len(frame);
+        memcpy(copy, frame, n);
+        at[of] += n;
+        if (at[of] == len[of]) at[of] = 0;
+        size_t hurt_len = hurt(copy, n, &random);
+        if (hurt_len == n && memcmp(copy, frame, n) == 0) copy[0] ^= 1; /* it was the same by chance */
+        capture_packet(c, interface, copy, hurt_len);
+    }
+    free(bytes[0]);
+    free(bytes[1]);
+}
+
+/* One frame, and what may happen to it; returns how many bytes there are. next: the frame after it, which comes first. */
+static size_t put_one(uint8_t *out, const uint8_t *frame, const uint8_t *older, int what, uint64_t *random)
+{
+    size_t to = 0;
+    if (what == 0) return 0;
+    if (what == 2) { /* an older one once more */
+        memcpy(out, older, native_frame_len(older));
+        to += native_frame_len(older);
+    }
+    for (int g = 0; what == 4 && g < 40; g++)
+        out[to++] = (uint8_t)capture_random(random, 256);
+    memcpy(out + to, frame, native_frame_len(frame));
+    return to + (what == 1 ? hurt(out + to, native_frame_len(frame), random) : native_frame_len(frame));
+}
+
+/* The recordings one after the other, N_ROUNDS times with other device times: each frame with a chance to be dropped, hurt,
+ * to come after an older one or garbage, or after the next one. The last 30 are whole: nothing waits for bytes that never
+ * come. */
+static size_t put_damage(uint8_t *out)
+{
+    uint64_t random = 4;
+    size_t to = 0, len;
+    for (int i = 0; i < N_ROUNDS * N_RECORDINGS; i++) {
+        char *bytes = wire_read(wire_path(wire, stream_name[i % N_RECORDINGS]), &len);
+        const uint8_t *older = (uint8_t *)bytes;
+        for (size_t at = 0, n; at < len; at += n) {
+            uint8_t *frame = (uint8_t *)bytes + at;
+            n = native_frame_len(frame);
+            frame[18] ^= (uint8_t)(i / N_RECORDINGS << 4); /* 0.8 ms and more */
+            seal_frame(frame);
+            const int is_quiet = i + 1 == N_ROUNDS * N_RECORDINGS && at + 4000 > len;
+            const int what = is_quiet ? 5 : (int)capture_random(&random, 24);
+            if (what == 3 && at + n < len) { /* the next one first */
+                uint8_t *next = frame + n;
+                const size_t n_next = native_frame_len(next);
+                next[18] ^= (uint8_t)(i / N_RECORDINGS << 4);
+                seal_frame(next);
+                memcpy(out + to, next, n_next);
+                to += n_next;
+                n += n_next;
+            }
+            to += put_one(out + to, frame, older, what, &random);
+            older = frame;
+        }
+        free(bytes);
+    }
+    return to;
+}
+
+static struct {
+    size_t n[16], frames_missing;
+} noticed;
+
+static void keep_notice(void *ctx, const struct scanhead_notice *notice)
+{
+    (void)ctx;
+    noticed.n[notice->kind]++;
+    if (notice->kind == SCANHEAD_NOTICE_GAP) noticed.frames_missing += notice->n;
+}
+
+/* The next header with a good checksum; 1: its payload is good, too. The others have no payload status. */
+static int take_good_header(size_t *n_bad_payloads)
+{
+    while (dissected_left(S "header_crc.status") > 0) {
+        const int is_header = atoi(take_text(S "header_crc.status"));
+        const int is_good = is_header && atoi(take_text(S "payload_crc.status"));
+        if (is_good) return 1;
+        *n_bad_payloads += (size_t)is_header;
+        take_text(S "seq");
+        take_text(S "type");
+    }
+    return 0;
+}
+
+/* Frames of a damaged stream are libscanhead's, in order. */
+static void expect_frames(const char *name, size_t *n_bad)
+{
+    struct scanhead_frame frame;
+    struct scanhead *sh = client_open(wire_path(wire, name));
+    size_t n_dropped = 0, n = 0;
+    memset(&noticed, 0, sizeof noticed);
+    scanhead_on_notice(sh, keep_notice, NULL);
+    for (; scanhead_next(sh, &frame, 0) == 0; n++) {
+        const size_t dropped = noticed.n[SCANHEAD_NOTICE_REPEATED] + noticed.n[SCANHEAD_NOTICE_LATE];
+        for (; n_dropped < dropped; n_dropped++) {
+            assert_true(take_good_header(n_bad));
+            take_text(S "seq");
+            take_text(S "type");
+        }
+        assert_true(take_good_header(n_bad));
+        expect_uint(S "seq", frame.seq);
+        expect_int(S "type", frame.type);
+    }
+    scanhead_close(sh);
+    assert_true(n > 100);
+}
+
+/* And so are the notices. The stream is there twice, on two carriers. */
+static void expect_damaged(const char *name)
+{
+    size_t n_bad = 0, kinds[5] = {0}, missing = 0;
+    expect_frames(name, &n_bad);
+    expect_frames(name, &n_bad);
+    while (dissected_left(S "seq.notice") > 0)
+        kinds[atoi(take_text(S "seq.notice"))]++;
+    while (dissected_left(S "seq.lost") > 0)
+        missing += strtoull(take_text(S "seq.lost"), NULL, 10);
+    for (int kind = SCANHEAD_NOTICE_GAP; kind <= SCANHEAD_NOTICE_RESTARTED; kind++) {
+        assert_int_equal(kinds[kind], 2 * noticed.n[kind]);
+        assert_true(kinds[kind] > 0);
+    }
+    assert_int_equal(missing, 2 * noticed.frames_missing);
+    assert_int_equal(n_bad, 2 * noticed.n[SCANHEAD_NOTICE_BAD_PAYLOAD]);
+    assert_true(n_bad > 3);
+}
+
+/* Frames with good checksums and wrong or unknown contents: the sample of a type, with one number changed or its length. */
+static const struct {
+    uint8_t type;
+    uint32_t at, value; /* in the payload; at 0xffff: nothing is changed */
+    int longer;         /* by so many bytes */
+    const char *says;
+} wrong[] = {
+    {1, 128, 2, 0, "layout 2, allowed 0 to 1"},
+    {1, 252, 65536, 0, "n_surfaces 65536, allowed 0 to 65535"},
+    {1, 0xffff, 0, -200, "80 bytes, allowed 272 and more"},
+    {1, 272, 8, 0, "Reserved bits are set"},
+    {2, 0, 4, 0, "crs 4, allowed 0 to 3"},
+    {2, 20, 0x7ff80000, 0, "x: not a finite number"},
+    {3, 36, 5, 0, "5 points, and room for 4"},
+    {3, 32, 2, 0, "3 pulses begin, and n_pulses is 2"},
+    {5, 0xffff, 0, -30, "66 bytes, allowed 96 and more"},
+    {6, 0, 13, 0, "An event that version 1 does not have yet"},
+    {6, 0xffff, 0, 4, "Longer than version 1 has it"},
+    {7, 4, 3, 0, "shorter than its names"},
+    {8, 0, 1, 0, "1 poses, allowed 2 to 2"},
+    {8, 44, 0x40000000, 0, "a quaternion that is not of length one"},
+    {9, 12, 5, 0, "5 points, and room for 4"},
+    {10, 24, 0, 0, "turn 0, allowed 1 and -1"},
+    {10, 4, 4, 0, "4 beams, and room for 3"},
+    {11, 12, 5, 0, "5 points, and room for 4"},
+};
+enum { N_WRONG = sizeof wrong / sizeof wrong[0] };
+
+static void put_wrong(struct capture *c, uint32_t interface)
+{
+    size_t len;
+    char *bytes = wire_read(wire_path(wire, "samples.shs"), &len);
+    for (int i = 0; i < N_WRONG; i++) {
+        uint8_t copy[NATIVE_HEADER_LEN + 512] = {0}, *frame = (uint8_t *)bytes;
+        while (frame[1] != wrong[i].type)
+            frame += native_frame_len(frame);
+        memcpy(copy, frame, native_frame_len(frame));
+        le_put32(copy + 4, le_get32(copy + 4) + (uint32_t)wrong[i].longer);
+        if (wrong[i].at != 0xffff) le_put32(copy + NATIVE_HEADER_LEN + wrong[i].at, wrong[i].value);
+        seal_frame(copy);
+        capture_packet(c, interface, copy, native_frame_len(copy));
+    }
+    free(bytes);
+}
+
+static void test_hurt(void **state)
+{
+    (void)state;
+    static const char *const marks[] = {"_ws.expert.severity", "_ws.expert.message", NULL};
+    struct capture c = {0};
+    int n_packets = 0, n_marked = 0;
+    char error[16];
+    capture_begin(&c);
+    const uint32_t interface = capture_interface(&c, CAPTURE_USER0);
+    put_hurt(&c, interface);
+    put_wrong(&c, interface);
+    wire_write(wire, "hurt.pcapng", c.bytes, c.len);
+    free(c.bytes);
+    dissect("hurt.pcapng", 1, marks);
+    snprintf(error, sizeof error, "%d", EXPERT_ERROR);
+    char *all = strdup(dissected_text()), *rest = all;
+    for (char *line; (line = strsep(&rest, "\n")) != NULL && rest != NULL; n_packets++)
+        if (n_packets < N_HURT)
+            n_marked += strstr(line, error) != NULL;
+        else if (strstr(line, wrong[n_packets - N_HURT].says) == NULL)
+            fail_msg("%s: not said in %s", wrong[n_packets - N_HURT].says, line);
+    free(all);
+    assert_int_equal(n_packets, N_HURT + N_WRONG);
+    assert_int_equal(n_marked, N_HURT);
+}
+
+static void test_damage(void **state)
+{
+    (void)state;
+    static const char *const fields[] = {
+        S "header_crc.status", S "payload_crc.status", S "seq",           S "type", S "seq.notice",
+        S "seq.lost",          "_ws.expert.message",   S "point.range_m", NULL};
+    static uint8_t damaged[1 << 20];
+    struct capture c = {0};
+    const size_t len = put_damage(damaged);
+    wire_write(wire, "damaged.shs", damaged, len);
+    capture_begin(&c);
+    put_tcp(&c, capture_interface(&c, CAPTURE_ETHERNET), 0, damaged, len);
+    put_usb(&c, capture_interface(&c, CAPTURE_USBMON), 1, damaged, len);
+    wire_write(wire, "damaged.pcapng", c.bytes, c.len);
+    free(c.bytes);
+    dissect("damaged.pcapng", 1, fields);
+    char *all = strdup(dissected_text());
+    dissect("damaged.pcapng", 2, fields);
+    assert_string_equal(dissected_text(), all);
+    free(all);
+    expect_damaged("damaged.shs");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_hurt), cmocka_unit_test(test_damage)};
+    return cmocka_run_group_tests(tests, wireshark_setup, wire_teardown);
+}
