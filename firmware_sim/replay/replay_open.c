@@ -71,7 +71,7 @@ static void fill_config(struct replay *r, const struct native_descriptor *d)
     cfg->profile.facets = 1;
     cfg->profile.optical_gain = d->sweep_udeg > 0 ? (double)d->sweep_udeg * 1e-6 / 360.0 : 1.0;
     cfg->head.settings = r->cmd.settings;
-    cfg->head.settings.prr_uhz = llround((double)d->prr_uhz * r->options.speed);
+    cfg->head.settings.prr_uhz = llround(fmin((double)d->prr_uhz * r->options.speed, 1e18));
     cfg->output.attributes = (d->content & NATIVE_HAS_ATTRIBUTES) != 0;
     cfg->output.colour = (d->content & NATIVE_HAS_COLOURS) != 0 ? COLOUR_SOLID : COLOUR_NONE;
 }

@@ -370,49 +370,6 @@ static void test_duration(void **state)
     assert_in_range(pulses_of(wire_path(wire, "out.shs"), &first_ns, &last_ns, 3), 3 * 3000 + 1000, 4 * 3000);
 }
 
-static void test_wrong_options(void **state)
-{
-    struct wire *wire = *state;
-    static const char *const wrong[][6] = {
-        {"--journal", "x"},
-        {"--replay-journal", "x"},
-        {"--frames", "3"},
-        {"--from", "2", "--to", "1"},
-        {"--from", "2", "--to", "2"},
-        {"--from", "-1"},
-        {"--from", "nan"},
-        {"--to", "inf"},
-        {"--speed", "0"},
-        {"--speed", "1e9"},
-        {"--speed", "2", "--pace", "fast"},
-        {"--speed", "2", "--pace", "step"},
-        {"--link", "foo"},
-        {"--link", ""},
-        {"--link", "type: udp, protocol: velodyne"},
-        {"--link", "tcp", "--config", "x.yaml"},
-        {"--set", "head.prr_hz=1"},
-        {"--scenario", "none"},
-    };
-    record(wire, "head.shs");
-    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
-        const char *args[12] = {"run", file, "--start", "--quiet"};
-        for (int k = 0; k < 6 && wrong[i][k] != NULL; k++)
-            args[4 + k] = wrong[i][k];
-        const int status = replay_call(wire, args);
-        char *text = wire_read(wire_path(wire, "err"), NULL);
-        if (status != 2 || strchr(text, '\n') == NULL || strchr(text, '\n')[1] != '\0')
-            fail_msg("%s %s: status %d, %s", wrong[i][0], wrong[i][1], status, text);
-        free(text);
-    }
-    static const char *const heads[][2] = {{"--speed", "2"}, {"--from", "1"}, {"--to", "1"},
-                                           {"--link", "tcp"}, {"--config", "x"}, {"--loop", NULL}};
-    for (size_t i = 0; i < sizeof heads / sizeof *heads; i++) {
-        const char *const args[] = {"run", "x.yaml", heads[i][0], heads[i][1], NULL};
-        assert_int_equal(replay_call(wire, args), 2);
-        replay_said(wire, "is for a recording");
-    }
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -426,7 +383,6 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_cut_and_bad_bytes, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_no_recordings, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_duration, wire_setup, wire_teardown),
-        cmocka_unit_test_setup_teardown(test_wrong_options, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
