@@ -190,7 +190,7 @@ static void test_huge_numbers(void **state)
 {
     (void)state;
     static const char *const ply[] = {
-        "ply\nformat binary_little_endian 1.0\nelement vertex 18446744073709551615\nproperty double x\nend_header\n12345678",
+        "ply\nformat binary_little_endian 1.0\ncomment crs x\nelement vertex 18446744073709551615\nproperty double x\nend_header\n12345678",
         "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty list uchar int x\nend_header\n12345678",
         "ply\nformat binary_big_endian 1.0\nelement vertex 3\nproperty double x\nend_header\n12345678",
         "ply\nformat binary_little_endian 1.0\nelement vertex 3\nend_header\n12345678",
@@ -207,10 +207,10 @@ static void test_huge_numbers(void **state)
     free(got.data);
     /* a digit less: a blank more */
     static const char digit[] =
-        "ply\nformat ascii 1.0\ncomment x\nelement vertex 10\nproperty double x\nend_header\n1\n2\n";
+        "ply\nformat ascii 1.0\ncomment crs x\nelement vertex 10\nproperty double x\nend_header\n1\n2\n";
     assert_int_equal(repair(digit, sizeof digit - 1, &file, &got), 1);
     assert_int_equal(file.n_kept, 2);
-    assert_memory_equal(got.data, "ply\nformat ascii 1.0\ncomment x \nelement vertex 2\n", 49);
+    assert_memory_equal(got.data, "ply\nformat ascii 1.0\ncomment crs x \nelement vertex 2\n", 53);
     free(got.data);
     static const struct {
         size_t at;
