@@ -169,6 +169,11 @@ int app_ends_in(const char *path, const char *ending)
     return n > m && strcasecmp(path + n - m, ending) == 0;
 }
 
+int app_is_recording(const char *path)
+{
+    return app_ends_in(path, ".shs") || app_ends_in(path, ".pcapng");
+}
+
 void app_warn_empty(uint64_t pulses, uint64_t with_echo, uint64_t faint)
 {
     if (pulses == 0 || with_echo >= pulses / 20) return;

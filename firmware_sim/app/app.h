@@ -62,6 +62,9 @@ void app_warn_left_out(uint64_t crowded, uint64_t unfit);
 /* Whether a path ends in that, with something before it; case doesn't count. */
 int app_ends_in(const char *path, const char *ending);
 
+/* Whether its ending is that of a recorded stream: .shs or .pcapng. */
+int app_is_recording(const char *path);
+
 /* Prints a warning where fewer than one pulse in twenty has an echo. */
 void app_warn_empty(uint64_t pulses, uint64_t with_echo, uint64_t faint);
 

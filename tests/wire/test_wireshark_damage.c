@@ -168,31 +168,32 @@ static void expect_damaged(const char *name)
     assert_true(n_bad > 3);
 }
 
-/* Frames with good checksums and wrong or unknown contents: the sample of a type, with one number changed or its length. */
+/* Frames with good checksums and wrong or unknown contents: the sample of a type, with one value changed or its length. */
 static const struct {
     uint8_t type;
-    uint32_t at, value; /* in the payload; at 0xffff: nothing is changed */
-    int longer;         /* by so many bytes */
+    uint32_t at, n, value; /* in the payload n bytes: 0: none, 4: a number, else each of them is `value` */
+    int longer;            /* by so many bytes */
     const char *says;
 } wrong[] = {
-    {1, 128, 2, 0, "layout 2, allowed 0 to 1"},
-    {1, 252, 65536, 0, "n_surfaces 65536, allowed 0 to 65535"},
-    {1, 0xffff, 0, -200, "80 bytes, allowed 272 and more"},
-    {1, 272, 8, 0, "Reserved bits are set"},
-    {2, 0, 4, 0, "crs 4, allowed 0 to 3"},
-    {2, 20, 0x7ff80000, 0, "x: not a finite number"},
-    {3, 36, 5, 0, "5 points, and room for 4"},
-    {3, 32, 2, 0, "3 pulses begin, and n_pulses is 2"},
-    {5, 0xffff, 0, -30, "66 bytes, allowed 96 and more"},
-    {6, 0, 13, 0, "An event that version 1 does not have yet"},
-    {6, 0xffff, 0, 4, "Longer than version 1 has it"},
-    {7, 4, 3, 0, "shorter than its names"},
-    {8, 0, 1, 0, "1 poses, allowed 2 to 2"},
-    {8, 44, 0x40000000, 0, "a quaternion that is not of length one"},
-    {9, 12, 5, 0, "5 points, and room for 4"},
-    {10, 24, 0, 0, "turn 0, allowed 1 and -1"},
-    {10, 4, 4, 0, "4 beams, and room for 3"},
-    {11, 12, 5, 0, "5 points, and room for 4"},
+    {1, 128, 4, 2, 0, "layout 2, allowed 0 to 1"},
+    {1, 252, 4, 65536, 0, "n_surfaces 65536, allowed 0 to 65535"},
+    {1, 0, 0, 0, -200, "80 bytes, allowed 272 and more"},
+    {1, 272, 4, 8, 0, "Reserved bits are set"},
+    {2, 0, 4, 4, 0, "crs 4, allowed 0 to 3"},
+    {2, 20, 4, 0x7ff80000, 0, "x: not a finite number"},
+    {3, 36, 4, 5, 0, "5 points, and room for 4"},
+    {3, 32, 4, 2, 0, "3 pulses begin, and n_pulses is 2"},
+    {5, 0, 0, 0, -30, "66 bytes, allowed 96 and more"},
+    {6, 0, 4, 13, 0, "An event that version 1 does not have yet"},
+    {6, 32, 96, 'A', 0, "text: a text without NUL"}, /* up to the packet's end */
+    {6, 0, 0, 0, 4, "Longer than version 1 has it"},
+    {7, 4, 4, 3, 0, "shorter than its names"},
+    {8, 0, 4, 1, 0, "1 poses, allowed 2 to 2"},
+    {8, 44, 4, 0x40000000, 0, "a quaternion that is not of length one"},
+    {9, 12, 4, 5, 0, "5 points, and room for 4"},
+    {10, 24, 4, 0, 0, "turn 0, allowed 1 and -1"},
+    {10, 4, 4, 4, 0, "4 beams, and room for 3"},
+    {11, 12, 4, 5, 0, "5 points, and room for 4"},
 };
 enum { N_WRONG = sizeof wrong / sizeof wrong[0] };
 
@@ -206,7 +207,10 @@ static void put_wrong(struct capture *c, uint32_t interface)
             frame += native_frame_len(frame);
         memcpy(copy, frame, native_frame_len(frame));
         le_put32(copy + 4, le_get32(copy + 4) + (uint32_t)wrong[i].longer);
-        if (wrong[i].at != 0xffff) le_put32(copy + NATIVE_HEADER_LEN + wrong[i].at, wrong[i].value);
+        if (wrong[i].n == 4)
+            le_put32(copy + NATIVE_HEADER_LEN + wrong[i].at, wrong[i].value);
+        else
+            memset(copy + NATIVE_HEADER_LEN + wrong[i].at, (int)wrong[i].value, wrong[i].n);
         seal_frame(copy);
         capture_packet(c, interface, copy, native_frame_len(copy));
     }

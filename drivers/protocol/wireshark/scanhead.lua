@@ -640,6 +640,13 @@ local function is_wanted(tree, fields)
   return false
 end
 
+-- Up to its NUL; all of it where there is none, which is an error of its own.
+local function text_of(range)
+  local n = range:bytes():raw():find("\0", 1, true)
+  n = n and n - 1 or range:len()
+  return n > 0 and range(0, n):string(ENC_UTF_8) or ""
+end
+
 local function put_row(tree, row, tvb, at)
   local parent = tree
   if row.count > 1 then
@@ -650,7 +657,7 @@ local function put_row(tree, row, tvb, at)
   for i = 0, row.count - 1 do
     local range, item = tvb(at + i * row.size, row.size), nil
     if row.kind == "text" then
-      local words = range:stringz()
+      local words = text_of(range)
       if words == "" then return end
       item = parent:add(row.field, range, words)
     elseif row.is_real then
@@ -905,7 +912,7 @@ local function put_event(tree, tvb, bytes, at)
   local values = {number64(bytes, at + 8), number64(bytes, at + 16), number64(bytes, at + 24)}
   for i = 1, 3 do ROWS[EVENT][i + 2].item:append_text(event_words(code, i, values[i], tvb(at + 8 * i, 8))) end
   local name = ROWS[EVENT][1][4][code]
-  local text = tvb(at + 32, 96):stringz()
+  local text = text_of(tvb(at + 32, 96))
   local which = code == 1 and values[1] == 6 and "event_warning" or TROUBLE[code]
   if which then tree:add_proto_expert_info(E[which], name .. (text ~= "" and ": " .. text or "")) end
   if not name then tree:add_proto_expert_info(E.type_unknown, "An event that version 1 does not have yet") end

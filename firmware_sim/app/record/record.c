@@ -19,8 +19,7 @@ static int is_config(const char *source)
 static int is_stream(const char *source)
 {
     return strcmp(source, "usb") == 0 || strncmp(source, "usb:", 4) == 0 || strncmp(source, "tty:", 4) == 0 ||
-           strncmp(source, "tcp:", 4) == 0 || strncmp(source, "fd:", 3) == 0 || app_ends_in(source, ".shs") ||
-           app_ends_in(source, ".pcapng");
+           strncmp(source, "tcp:", 4) == 0 || strncmp(source, "fd:", 3) == 0 || app_is_recording(source);
 }
 
 static int take_file(void *values, const char *text)

@@ -153,7 +153,7 @@ static int run(int argc, char **argv)
     int status = app_parse(&app_run, argc, argv, &o.in, &o);
     if (status != APP_GO_ON) return status;
     o.frames_given = gives_frames(&o.in.sets);
-    const int is_recording = app_ends_in(o.in.operand[0], ".shs") || app_ends_in(o.in.operand[0], ".pcapng");
+    const int is_recording = app_is_recording(o.in.operand[0]);
     status = run_check_options(&o, is_recording);
     if (status != APP_GO_ON) return status;
     app_catch_signals();

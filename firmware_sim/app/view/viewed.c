@@ -16,17 +16,12 @@
 
 enum { EPSG_ECEF = 4978, EPSG_GEODETIC = 4979 };
 
-static int is_stream(const char *path)
-{
-    return app_ends_in(path, ".shs") || app_ends_in(path, ".pcapng");
-}
-
 int viewed_check_ending(const char *path, struct sh_err *err)
 {
     static const char allowed[] = "allowed FILE.shs, FILE.pcapng, FILE.ply, FILE.las";
     if (strcmp(path, "-") == 0)
         return sh_fail(err, SH_EINPUT, "-: a recording is shown from a file, not from standard input; %s", allowed);
-    if (is_stream(path) || app_ends_in(path, ".ply") || app_ends_in(path, ".las")) return SH_OK;
+    if (app_is_recording(path) || app_ends_in(path, ".ply") || app_ends_in(path, ".las")) return SH_OK;
     if (app_ends_in(path, ".e57") || app_ends_in(path, ".ptx"))
         return sh_fail(err, SH_EINPUT,
                        "%s: this format is written, not read; %s: `scanhead record` writes a scan as several files at "
@@ -61,7 +56,7 @@ int viewed_load(struct viewed *v, const char *path, const struct sh_report *repo
     int rc = viewed_check_ending(path, err);
     if (rc == SH_OK) rc = look_at(path, head, err);
     if (rc != SH_OK) return rc;
-    v->format = is_stream(path) ? "shs" : memcmp(head, "LASF", 4) == 0 ? "las" : "ply";
+    v->format = app_is_recording(path) ? "shs" : memcmp(head, "LASF", 4) == 0 ? "las" : "ply";
     rc = strcmp(v->format, "shs") == 0 ? viewed_load_stream(v, report, err) : viewed_load_cloud(v, report, err);
     if (rc != SH_OK) return rc;
     if (v->points.n == 0)
