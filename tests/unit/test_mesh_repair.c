@@ -2,6 +2,12 @@
 #include "core/mesh.h"
 #include "tests/unit/killed_rig.h"
 
+#ifdef SH_SANITIZE /* sanitizers are for the code, not for the count: each eleventh byte there */
+enum { EACH = 11 };
+#else
+enum { EACH = 1 };
+#endif
+
 static char *whole;
 static size_t whole_len;
 
@@ -53,7 +59,7 @@ static void test_cuts(void **state)
     struct repair r;
     struct sh_err err;
     size_t len, again_len;
-    for (size_t cut = 0; cut <= whole_len; cut++) {
+    for (size_t cut = 0; cut <= whole_len; cut += EACH) {
         const char *path = rig_path("cut.obj.part");
         size_t end = cut;
         while (end > 0 && whole[end - 1] != '\n')
@@ -117,7 +123,7 @@ static void test_ply(void **state)
     for (int ascii = 0; ascii < 2; ascii++) {
         const char *path = rig_path("cut.ply.part");
         char *mesh = write_mesh(rig_path("a.ply"), ascii, &len);
-        for (size_t cut = 1; cut <= len; cut++) {
+        for (size_t cut = 1 + (len - 1) % EACH; cut <= len; cut += EACH) {
             killed_rig_write(path, mesh, cut);
             const int rc = killed_rig_repair(path, &r, &err);
             assert_int_equal(rc, cut == len ? 0 : SH_EFORMAT);
