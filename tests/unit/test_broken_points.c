@@ -69,6 +69,8 @@ static void test_long_pose(void **state)
         a.rotation[i] = -1e300;
     assert_int_equal(record("a.ptx", &a, &err), SH_EFORMAT);
     assert_non_null(strstr(err.text, "more digits"));
+    unlink(rig_path("a.ptx.part")); /* what came is kept */
+    unlink(rig_path("a.ptx.grid"));
 }
 
 /* The angle comes from the pose taken back; where that is beyond any number, there is none. */
@@ -106,6 +108,7 @@ static void test_far_rows(void **state)
         rig_points(1, i == 0 ? 1 : (uint64_t)(INT64_MIN / 1000000), i == 0 ? UINT64_MAX : 9000000000000, points, 3);
         assert_int_equal(rig_record(rig_path("a.e57"), (struct recorder_options){0}, RIG_KEEP, &err), SH_EFORMAT);
         assert_non_null(strstr(err.text, "more than 2^32 pulses"));
+        unlink(rig_path("a.e57.part"));
     }
 }
 
