@@ -127,7 +127,9 @@ static int query_time(struct command_call *call)
 static int reply_time_of_day(struct command_call *call, const char *text)
 {
     if (text[0] == '\0')
-        return command_fail(call, CMD_E_SETTINGS, "%s? needs time.epoch in the configuration", call->row->header);
+        return command_fail(call, CMD_E_SETTINGS, "%s? %s", call->row->header,
+                            call->dev->recorded != NULL ? "is not possible: the recording does not say it"
+                                                        : "needs time.epoch in the configuration");
     return command_reply(call, "%s", text);
 }
 

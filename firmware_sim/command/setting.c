@@ -345,10 +345,13 @@ static int keep_recorded(struct command_call *call)
     struct command_device *dev = call->dev;
     if (check_known(call) != 0) return -1;
     const int64_t is = read_value(call, &dev->settings);
-    int64_t wanted = is; /* MIN, MAX and DEF */
+    int64_t wanted = is;
     int exact = 1;
-    if (call->value.kind == COMMAND_VALUE_WORD) wanted = call->value.word;
-    if (call->value.kind == COMMAND_VALUE_NUMBER)
+    if (call->value.kind == COMMAND_VALUE_WORD)
+        wanted = call->value.word;
+    else if (call->value.kind != COMMAND_VALUE_NUMBER)
+        wanted = special_value(call);
+    else
         exact = command_decimal_to_int(&call->value.decimal, call->value.shift + call->row->unit->decimals, &wanted) ==
                 COMMAND_FIT_EXACT;
     if (exact && wanted == is) return command_reply(call, "OK");

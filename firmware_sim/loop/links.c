@@ -24,13 +24,19 @@ static double stream_rate(const struct config *cfg)
 /* Other protocols have rates of their own, which follow from what their clients ask for. What a link of theirs can't
  * carry is lost in whole units, and counted. */
 /* A link that can't carry the stream is refused before it loses any of it. */
-static int check_capacity(const struct config *cfg, const struct pump *pump, struct sh_err *err)
+static int check_capacity(const struct links *links, const struct config *cfg, const struct pump *pump,
+                          struct sh_err *err)
 {
     struct link_place place;
     pump_get_place(pump, &place);
     if (strcmp(place.protocol, "native") != 0) return SH_OK;
     double capacity = place.bytes_s, rate = stream_rate(cfg);
     if (capacity <= 0.0 || capacity >= rate) return SH_OK;
+    if (links->source->ops->next != NULL) /* a recording */
+        return sh_fail(err, SH_EINPUT,
+                       "link %s: the stream has %.2f MB/s, the link carries %.2f MB/s; allowed is %.2g times this speed, "
+                       "or another link",
+                       place.endpoint, 1e-6 * rate, 1e-6 * capacity, floor(100.0 * capacity / rate) / 100.0);
     return sh_fail(err, SH_EINPUT,
                    "link %s: the stream has %.2f MB/s, the link carries %.2f MB/s; lower head.prr_hz to %.0f%s",
                    place.endpoint, 1e-6 * rate, 1e-6 * capacity,
@@ -66,7 +72,7 @@ int links_open(struct links *links, const struct config *cfg, const struct link_
         rc = pump_open(links, i, i < cfg->n_links ? &cfg->link[i] : extra, &links->pump[i], err);
         if (rc != SH_OK) break;
         links->n++;
-        rc = check_capacity(cfg, links->pump[i], err);
+        rc = check_capacity(links, cfg, links->pump[i], err);
     }
     return rc;
 }

@@ -123,6 +123,7 @@ static void stop(struct replay *r, uint64_t tick, int wants_again)
 static void begin(struct replay *r, uint64_t tick)
 {
     struct sh_err err = {0};
+    if (r->end_tick == UINT64_MAX && r->options.duration_s > 0.0) r->end_tick = tick + r->n_ticks;
     r->has_frame = r->in_range = r->has_skipped = 0;
     if (recording_rewind(&r->recording, &err) != SH_OK) {
         stop(r, tick, 0);
@@ -321,7 +322,8 @@ int replay_open(struct config *cfg, const struct replay_options *options, struct
     r->cfg = cfg;
     r->options = *options;
     r->tick_ns = llround(1e9 / cfg->loop.tick_hz);
-    r->end_tick = options->duration_s > 0.0 ? (uint64_t)ceil(options->duration_s * cfg->loop.tick_hz) : UINT64_MAX;
+    r->n_ticks = (uint64_t)ceil(options->duration_s * cfg->loop.tick_hz);
+    r->end_tick = options->duration_s > 0.0 && !options->start ? r->n_ticks : UINT64_MAX;
     r->wants_start = options->start;
     for (uint32_t i = 0; i < cfg->n_links; i++) /* each of these opens a session for itself */
         r->n_clients -= cfg->link[i].type == LINK_FILE || cfg->link[i].type == LINK_NULL;

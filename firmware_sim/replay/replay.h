@@ -23,7 +23,7 @@ struct replay_options {
     int loop;              /* at its end it begins anew */
     int start;             /* play at once; and end the run at the end, unless loop */
     uint32_t clients;      /* with start: once so many clients are there; 0: at once */
-    double duration_s;     /* > 0: end the run after that time */
+    double duration_s;     /* > 0: end the run after that time; with start: from when it begins to be played */
     const char *truth;     /* file for the faults that are injected; NULL: none */
     const struct sh_report *report; /* warnings while it is played, from the player's thread */
 };

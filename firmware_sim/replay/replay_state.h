@@ -32,7 +32,6 @@ struct replay {
     int wants_again; /* it is to begin anew by itself */
     int n_clients; /* beside links that are readers themselves */
     int ends_then; /* the run ends when it was played */
-    uint64_t end_tick; /* of the run; UINT64_MAX: none */
     uint32_t times;  /* begun so far */
     uint64_t frames; /* sent */
     uint64_t scans, frames_done;
@@ -45,6 +44,7 @@ struct replay {
     struct sh_err failure; /* code 0: none */
 
     /* of the player's thread; until it begins, of whoever opens */
+    uint64_t n_ticks, end_tick; /* that the run lasts; with which it ends: UINT64_MAX: none, or not known yet */
     struct recording recording;
     int64_t first_ns; /* of the recording: device time of its first frame */
     struct replay_front front;

@@ -94,6 +94,8 @@ static void test_settings_are_refused(void **state)
         {"SCAN:LINE:STOP 0", "SCAN:LINE:STOP", "it is 60"},
         {"SCAN:PAN:STARt 1", "SCAN:PAN:STARt", "it is 0"},
         {"SCAN:PAN:STOP 1", "SCAN:PAN:STOP", "it is 3"},
+        {"SCAN:PAN:STOP MIN", "SCAN:PAN:STOP", "it is 3"},
+        {"SCAN:FRAMes MAX", "SCAN:FRAMes", "it is 1"},
         {"SCAN:FRAMes 0", "SCAN:FRAMes", "it is 1"},
         {"SITE:POSE 1,0,0,0,0,0,0", "SITE:POSE", "stations are where they were"},
     };
