@@ -215,10 +215,11 @@ static int check_ours(struct left *l, struct sh_err *err)
     uint8_t header[E57_FILE_HEADER_LEN];
     const int rc = get(l, 0, header, sizeof header, err);
     if (rc < 0 || (rc > 0 && le_get64(header + 24) == e57_physical(l->end))) return rc < 0 ? rc : SH_OK;
-    return sh_fail(err, SH_EFORMAT,
-                   "%s: is no E57 file of this program, or of an older release; its pages are right, its points are not "
-                   "counted, and it is not touched",
-                   l->repair->path);
+    return sh_fail(
+        err, SH_EFORMAT,
+        "%s: is no E57 file of this program, or of an older release; its pages are right, its points are not "
+        "counted, and it is not touched",
+        l->repair->path);
 }
 
 static int repair_left(struct left *l, struct sh_err *err)
