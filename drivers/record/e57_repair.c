@@ -209,6 +209,19 @@ static int write_end(struct left *l, struct sh_err *err)
     return rc;
 }
 
+/* In a whole file of this program the XML section follows the last packet. What else is between is not counted here. */
+static int check_ours(struct left *l, struct sh_err *err)
+{
+    uint8_t header[E57_FILE_HEADER_LEN];
+    const int rc = get(l, 0, header, sizeof header, err);
+    if (rc < 0 || (rc > 0 && le_get64(header + 24) == e57_physical(l->end))) return rc < 0 ? rc : SH_OK;
+    return sh_fail(
+        err, SH_EFORMAT,
+        "%s: is no E57 file of this program, or of an older release; its pages are right, its points are not "
+        "counted, and it is not touched",
+        l->repair->path);
+}
+
 static int repair_left(struct left *l, struct sh_err *err)
 {
     struct repair *r = l->repair;
@@ -225,7 +238,7 @@ static int repair_left(struct left *l, struct sh_err *err)
         r->n_kept += l->facts.scan[i].n_records;
     r->unit = l->facts.empty_shots ? "points and empty shots" : "points";
     r->n_scans = l->facts.n_scans;
-    if (r->was_whole) return SH_OK;
+    if (r->was_whole) return check_ours(l, err);
     rc = look_behind(l, err);
     return rc == SH_OK ? write_end(l, err) : rc;
 }

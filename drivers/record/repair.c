@@ -154,18 +154,23 @@ int repair_lines(const struct repair *r, uint64_t from, int (*fn)(void *ctx, con
     return rc;
 }
 
-static void look_for_zeros(void *ctx, const uint8_t *row)
+struct rest {
+    uint64_t n, n_piece; /* bytes; up to the last that is not zero */
+};
+
+static void count_piece(void *ctx, const uint8_t *byte)
 {
-    int *zeros = ctx;
-    *zeros = *zeros && *row == 0;
+    struct rest *rest = ctx;
+    rest->n++;
+    if (*byte != 0) rest->n_piece = rest->n;
 }
 
 int repair_check_rest(const struct repair *r, uint64_t end, uint64_t most, struct sh_err *err)
 {
-    int zeros = 1;
+    struct rest rest = {0};
     if (r->len - end <= most) return SH_OK;
-    const int rc = repair_rows(r, end, 1, r->len - end, look_for_zeros, &zeros, err);
-    return rc != SH_OK || zeros ? rc : repair_fail_damaged(r, end, err);
+    const int rc = repair_rows(r, end, 1, r->len - end, count_piece, &rest, err);
+    return rc != SH_OK || rest.n_piece <= most ? rc : repair_fail_damaged(r, end, err);
 }
 
 void repair_append_note(const struct repair *r, uint64_t end, const void *note, size_t len)

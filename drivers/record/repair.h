@@ -63,7 +63,7 @@ int repair_is_zero(const uint8_t *row, size_t len);
  * behind the last good one. SH_EFORMAT: good lines follow a bad one, which no kill and no full disk does. */
 int repair_lines(const struct repair *repair, uint64_t from, int (*fn)(void *ctx, const char *line, size_t len),
                  void *ctx, uint64_t *end, struct sh_err *err);
-/* What is behind the last whole unit is the piece of one, of `most` bytes, or zeros, which a power cut leaves. Else
+/* What is behind the last whole unit is the piece of one, of `most` bytes, and then zeros, which a power cut leaves. Else
  * SH_EFORMAT: that is damage, and no kill and no full disk does it. */
 int repair_check_rest(const struct repair *repair, uint64_t end, uint64_t most, struct sh_err *err);
 /* Puts a note at the end that the file may be incomplete. On a full disk there may be no room for it, which is reported. */

@@ -335,6 +335,28 @@ static void reseal(uint8_t *page)
         page[CONTENT + i] = (uint8_t)(~crc >> (24 - 8 * i));
 }
 
+/* What is between the last packet of ours and the XML section is another program's: no number of points is claimed. */
+static void test_elsewhere(void **state)
+{
+    (void)state;
+    const char *path = rig_path("cut.e57");
+    struct repair repair;
+    struct sh_err err;
+    empty_shots = coloured = 0;
+    record_scans();
+    whole[24] ^= 4;
+    reseal(whole);
+    killed_rig_write(path, whole, whole_len);
+    assert_int_equal(killed_rig_repair(path, &repair, &err), SH_EFORMAT);
+    assert_non_null(strstr(err.text, "is no E57 file of this program"));
+    size_t len;
+    uint8_t *now = rig_read(path, &len);
+    assert_int_equal(len, whole_len);
+    assert_memory_equal(now, whole, len);
+    free(now);
+    unlink(path);
+}
+
 /* Any byte of notes, headers and packets may say anything, with a right CRC: nothing worse than a refusal comes of it, and a
  * file that was repaired is whole. */
 static void test_absurd(void **state)
@@ -381,6 +403,7 @@ int main(void)
         cmocka_unit_test(test_cuts),
         cmocka_unit_test(test_end),
         cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_elsewhere),
         cmocka_unit_test(test_absurd),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);

@@ -9,16 +9,15 @@
 #include "drivers/record/repair.h"
 #include "tests/unit/repair_rig.h"
 
-#define PLY_HEAD(n)                                                                                                    \
-    "ply\nformat ascii 1.0\ncomment made elsewhere, with    blanks\nelement vertex " n                                 \
+#define PLY_HEAD(n)                                                                    \
+    "ply\nformat ascii 1.0\ncomment made elsewhere, with    blanks\nelement vertex " n \
     "\nproperty float x\nproperty float y\nend_header\n"
 #define PTX_HEAD(rows) "1\n" rows "\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"
 
-#define PCAPNG_SECTION                                                                                                 \
-    "\x0a\x0d\x0d\x0a\x1c\0\0\0\x4d\x3c\x2b\x1a\x01\0\0\0\xff\xff\xff\xff\xff\xff\xff\xff\x1c\0\0\0"
+#define PCAPNG_SECTION   "\x0a\x0d\x0d\x0a\x1c\0\0\0\x4d\x3c\x2b\x1a\x01\0\0\0\xff\xff\xff\xff\xff\xff\xff\xff\x1c\0\0\0"
 #define PCAPNG_INTERFACE "\x01\0\0\0\x14\0\0\0\x01\0\0\0\0\0\0\0\x14\0\0\0"
 
-/* Puts it there as FILE, and as FILE.part where named so. SH_OK, or what the repair said; the bytes are the same in any case. */
+/* SH_OK, or what the repair said; the bytes are the same in any case. */
 static int repair_untouched(const char *name, const void *data, size_t len)
 {
     struct repaired file = {0};
@@ -60,7 +59,8 @@ static void test_whole_elsewhere(void **state)
         const int rc = repair_untouched(rows[i].name, rows[i].text, strlen(rows[i].text));
         if (rc != rows[i].rc) fail_msg("row %zu: %d: %s", i, rc, repair_err.text);
     }
-    static const char capture[] = PCAPNG_SECTION PCAPNG_INTERFACE, more[] = PCAPNG_SECTION PCAPNG_INTERFACE "\x06\0\0\0";
+    static const char capture[] = PCAPNG_SECTION PCAPNG_INTERFACE,
+                      more[] = PCAPNG_SECTION PCAPNG_INTERFACE "\x06\0\0\0";
     assert_int_equal(repair_untouched("f.pcapng", capture, sizeof capture - 1), SH_OK);
     assert_int_equal(repair_untouched("f.pcapng", more, sizeof more - 1), SH_EFORMAT);
     assert_non_null(strstr(repair_err.text, "another program has written it"));
