@@ -5,7 +5,7 @@ set -eu
 scanhead=$1
 out=$2
 mkdir -p "$out"
-rm -f "$out/ready" "$out/scan.ply" "$out/map.png" "$out/stats.json"
+rm -f "$out/ready" "$out/scan.ply" "$out/scan.ply.part" "$out/map.png" "$out/stats.json"
 mkfifo "$out/ready"
 link=$(cd "$out" && pwd)/scanhead0
 

@@ -17,6 +17,7 @@
 #include "core/mesh.h"
 #include "core/newfile.h"
 #include "drivers/protocol/native.h"
+#include "drivers/record/mesh_ply_repair.h"
 #include "drivers/record/mesh_recorder.h"
 #include "drivers/record/mesh_texture.h"
 #include "drivers/record/obj_repair.h"
@@ -312,7 +313,7 @@ static void mesh_release(void *rec)
     mesh_grid_free(&m->grid);
 }
 
-/* What a kill leaves of the others, which are written in one piece at the end, is no mesh. */
+/* The others are written by an exporter in one piece at the end: what a kill leaves is no mesh. */
 #define MESH_OPS(ENDING, REPAIR)                                                                              \
     {                                                                                                         \
         .ending = ENDING, .is_mesh = 1, .size = sizeof(struct mesh_recorder),                                 \
@@ -320,6 +321,6 @@ static void mesh_release(void *rec)
         .begin = mesh_begin, .finish = mesh_finish, .release = mesh_release, .repair = REPAIR                 \
     }
 
-const struct recorder_ops recorder_mesh_ply = MESH_OPS(".ply", NULL), recorder_obj = MESH_OPS(".obj", obj_repair),
+const struct recorder_ops recorder_mesh_ply = MESH_OPS(".ply", mesh_ply_repair), recorder_obj = MESH_OPS(".obj", obj_repair),
                           recorder_gltf = MESH_OPS(".gltf", NULL), recorder_glb = MESH_OPS(".glb", NULL),
                           recorder_fbx = MESH_OPS(".fbx", NULL);

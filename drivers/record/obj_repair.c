@@ -13,6 +13,7 @@ static const char INCOMPLETE[] = "# incomplete: the recorder came to no end; wha
 struct obj_lines {
     uint64_t n_vertices, n_objects;
     int is_marked; /* the last line says that the file is incomplete */
+    int is_ours;   /* the first comment of this program is there */
 };
 
 static int are_numbers(const char *text)
@@ -51,6 +52,7 @@ static int take_line(void *ctx, const char *line, size_t len)
     }
     if (begins(line, "vn ") || begins(line, "vt ")) return are_numbers(line + 3);
     if (begins(line, "f ") || begins(line, "p ")) return is_face(o, line + 2);
+    o->is_ours |= begins(line, "# crs ");
     o->n_objects += (uint64_t)begins(line, "o ");
     return begins(line, "o ") || begins(line, "#") || begins(line, "usemtl ") || begins(line, "mtllib ");
 }
@@ -67,6 +69,7 @@ int obj_repair(struct repair *r, struct sh_err *err)
     r->n_kept = o.n_vertices;
     r->n_scans = o.n_objects;
     r->was_whole = end == r->len && (!repair_is_part(r) || o.is_marked);
+    if (!r->was_whole && !o.is_ours) return repair_fail_foreign(r, err);
     rc = repair_cut(r, end, err);
     if (rc == SH_OK && !r->was_whole && !o.is_marked) repair_append_note(r, end, INCOMPLETE, sizeof INCOMPLETE - 1);
     return rc;

@@ -36,6 +36,7 @@ struct packets {
     struct scan_count scans;
     uint64_t n;
     int is_noted; /* the last block is a note */
+    int is_ours;  /* the first one is that of this program's captures */
     size_t held;  /* bytes in block, which begin where the reader is */
     uint8_t block[2 * PCAPNG_MAX_BLOCK];
 };
@@ -70,6 +71,12 @@ static int is_note(const uint8_t *block, size_t len)
     return len == NOTE_LEN && memcmp(block, note, NOTE_LEN) == 0;
 }
 
+static int is_own_section(const uint8_t *block, size_t len)
+{
+    uint8_t own[PCAPNG_FRONT_ROOM];
+    return len == pcapng_put_section(own, "scanhead") && memcmp(block, own, len) == 0;
+}
+
 /* All whole blocks of what is held. 1: no block follows. */
 static int take_blocks(struct packets *p)
 {
@@ -79,6 +86,7 @@ static int take_blocks(struct packets *p)
     while ((item = pcapng_read(&p->reader, p->block + at, p->held - at, &packet, &used, NULL, NULL)) > 0) {
         if (item == PCAPNG_PACKET) count_packet(p, &packet);
         p->is_noted = is_note(p->block + at, used);
+        if (p->reader.at_byte == used) p->is_ours = is_own_section(p->block, used);
         at += used;
     }
     memmove(p->block, p->block + at, p->held -= at);
@@ -100,6 +108,31 @@ static int read_packets(const struct repair *r, struct packets *p, struct sh_err
     return rc;
 }
 
+/* A file that ends with a whole block was not cut: 1, 0 or SH_E. */
+static int ends_with_block(const struct repair *r, uint64_t from, struct sh_err *err)
+{
+    enum { LEAST = 12 };
+    uint8_t last[4], first[4];
+    if (r->len - from < LEAST) return 0;
+    int rc = repair_read(r, r->len - sizeof last, last, sizeof last, err);
+    const uint32_t n = le_get32(last);
+    if (rc != SH_OK || n < LEAST || n % 4 != 0 || n > r->len - from) return rc;
+    rc = repair_read(r, r->len - n + 4, first, sizeof first, err);
+    return rc != SH_OK ? rc : le_get32(first) == n;
+}
+
+/* What follows the last whole block may be the piece of another one, and then zeros. */
+static int check_behind(const struct repair *r, const struct packets *p, struct sh_err *err)
+{
+    enum { HEAD = 12 };
+    const uint64_t end = p->reader.at_byte;
+    const uint32_t said = p->held >= HEAD ? le_get32(p->block + 4) : HEAD;
+    const uint32_t piece = said >= HEAD && said <= OUTFILE_BUFFER ? said : HEAD;
+    int rc = ends_with_block(r, end, err);
+    if (rc == 0 && r->len - end > piece) rc = repair_check_rest(r, end + piece, 0, err);
+    return rc > 0 || rc == SH_EFORMAT ? repair_fail_damaged(r, end, err) : rc;
+}
+
 /* Cut behind the last whole block; then a note. */
 static int pcapng_repair(struct repair *r, struct sh_err *err)
 {
@@ -109,13 +142,13 @@ static int pcapng_repair(struct repair *r, struct sh_err *err)
     int rc = read_packets(r, p, err);
     const uint64_t end = p->reader.at_byte;
     if (rc == SH_OK && p->reader.n_interfaces == 0) rc = repair_fail_none(r, "capture (pcapng)", err);
-    if (rc == SH_OK) rc = repair_check_rest(r, end, OUTFILE_BUFFER, err);
+    if (rc == SH_OK) rc = check_behind(r, p, err);
     if (rc == SH_OK) {
         r->unit = "packets";
         r->n_kept = p->n;
         r->n_scans = p->scans.n_scans;
         r->was_whole = end == r->len && (p->is_noted || !repair_is_part(r));
-        rc = repair_cut(r, end, err);
+        rc = r->was_whole || p->is_ours ? repair_cut(r, end, err) : repair_fail_foreign(r, err);
     }
     if (rc == SH_OK && !r->was_whole && !p->is_noted) {
         uint8_t note[NOTE_LEN];

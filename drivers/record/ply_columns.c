@@ -107,7 +107,7 @@ static void put_comments(FILE *out, const struct ply_facts *facts)
 {
     const struct track *t = facts->track;
     if (facts->incomplete) fputs(PLY_INCOMPLETE, out);
-    fprintf(out, "comment crs %s\n", ply_crs_text(t));
+    fprintf(out, PLY_CRS "%s\n", ply_crs_text(t));
     fprintf(out, "comment epsg %d\n", t->epsg);
     for (uint32_t i = 0; i < facts->n_heads || i == 0; i++) /* of a file without points all is empty */
         put_head(out, &facts->head[i], facts->n_heads > 1);

@@ -13,6 +13,7 @@
 
 enum { PLY_MAX_HEADS = 128, PLY_PAD_MIN = 8 /* "comment\n" */ };
 /* The line of a header that was written before the recording had its end. */
+#define PLY_CRS "comment crs " /* the first line of comment, which tells that this program has written a file */
 #define PLY_INCOMPLETE "comment incomplete: its end is missing, and losses were not counted\n"
 
 struct ply_facts {

@@ -18,7 +18,7 @@ struct ply_header {
     char *text; /* NUL at its end */
     size_t len;
     uint64_t n_vertices;
-    int has_vertices, is_ascii, is_mesh, is_incomplete;
+    int has_vertices, is_ascii, is_mesh, is_incomplete, is_ours;
     unsigned n_columns;
     size_t row_len;          /* binary */
     int station_at, time_at; /* byte in a binary row, number of the column in text; NO_COLUMN */
@@ -85,6 +85,7 @@ static int take_header_line(struct ply_header *h, const char *line)
     if (strncmp(line, "property ", 9) == 0) return h->is_mesh || (h->has_vertices && take_property(h, line));
     if (strncmp(line, "element ", 8) != 0) {
         if (strncmp(line, PLY_INCOMPLETE, sizeof PLY_INCOMPLETE - 2) == 0) h->is_incomplete = 1;
+        if (strncmp(line, PLY_CRS, sizeof PLY_CRS - 1) == 0) h->is_ours = 1;
         return 1;
     }
     if (strncmp(line, "element face ", 13) == 0) return h->is_mesh = 1;
@@ -253,6 +254,7 @@ static int make_whole(struct repair *r, const struct ply_header *h, const struct
 {
     r->was_whole = end == r->len && p->n == h->n_vertices;
     if (r->was_whole) return SH_OK;
+    if (!h->is_ours) return repair_fail_foreign(r, err);
     char *text = renew(h, p->n, 1);
     if (text == NULL) text = renew(h, p->n, 0);
     if (text == NULL)

@@ -4,7 +4,10 @@
  *
  * Without a FILE.grid, for instance of a part that was copied alone, the points of the last grid are kept all the same: its
  * last column is filled up like shots without echo, and its header gets the number of columns that are there. Spaces after
- * that number keep its place as long as it was. */
+ * that number keep its place as long as it was.
+ *
+ * The format has no place for the mark of a program. So a file that has not the name of a part is checked, and never
+ * changed: it may be another program's. */
 #include <errno.h>
 #include <inttypes.h>
 #include <stdlib.h>
@@ -14,7 +17,7 @@
 #include "drivers/record/ptx_text.h"
 
 enum { LINE_MOST = 512, HEADER_LINES = 10 };
-static const uint64_t MOST = (uint64_t)1 << 32; /* columns, rows */
+static const uint64_t MOST = UINT32_MAX; /* columns, rows */
 
 /* Where the text is in its grids. */
 struct place {
@@ -129,9 +132,26 @@ static int set_columns(const struct repair *r, const struct place *p, uint64_t c
     return repair_write(r, p->grid_at, text, (size_t)n, err);
 }
 
+/* What is to be changed. */
+static int check_ours(const struct repair *r, const struct place *p, struct sh_err *err)
+{
+    if (!repair_is_part(r))
+        return sh_fail(err, SH_EFORMAT,
+                       "%s: is not whole, or has more than its grids, and nothing in it tells that scanhead wrote it; "
+                       "only a part that a recorder left is changed: call it %s.part if it is one",
+                       r->path, r->path);
+    if (p->header < HEADER_LINES || p->rows <= PTX_ROWS_MAX) return SH_OK;
+    return sh_fail(err, SH_EFORMAT, "%s: the grid at byte %" PRIu64 " has %" PRIu64 " rows; a recorder writes up to %d",
+                   r->path, p->grid_at, p->rows, PTX_ROWS_MAX);
+}
+
 static int end_text(struct repair *r, struct place *p, struct sh_err *err)
 {
     if (p->n_grids == 0 && p->n_lines == 0) return repair_fail_none(r, "PTX grid", err);
+    if (r->len > p->at || p->header > 0) {
+        const int rc = check_ours(r, p, err);
+        if (rc != SH_OK) return rc;
+    }
     if (p->header < HEADER_LINES || p->n_lines == 0) { /* no place of this grid is there */
         const uint64_t end = p->header > 0 ? p->grid_at : p->at;
         r->was_whole = end == r->len;

@@ -72,13 +72,28 @@ void recorder_set_limits(struct recorder *rec, double low, double high)
 
 int recorder_frame(struct recorder *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
 {
-    if (rec->ops->frame != NULL) return rec->ops->frame(rec, sh, frame, err);
-    return track_frame(&rec->track, sh, frame, err);
+    const int rc =
+        rec->ops->frame != NULL ? rec->ops->frame(rec, sh, frame, err) : track_frame(&rec->track, sh, frame, err);
+    rec->has_failed |= rc == SH_EIO;
+    return rc;
 }
 
 int recorder_save(struct recorder *rec, struct sh_err *err)
 {
-    return rec->ops->save != NULL ? rec->ops->save(rec, err) : outfile_save(&rec->file, err);
+    const int rc = rec->ops->save != NULL ? rec->ops->save(rec, err) : outfile_save(&rec->file, err);
+    rec->has_failed |= rc == SH_EIO;
+    return rc;
+}
+
+/* After a failed write it is not completed, also where there is room again: points would follow that are missing. */
+static int finish(struct recorder *rec, struct sh_err *err)
+{
+    int rc = outfile_check(&rec->file, err);
+    if (rc == SH_OK && rec->has_failed)
+        rc = sh_fail(err, SH_EIO, "%s: a part of it could not be written", rec->file.path);
+    if (rc == SH_OK) rc = track_flush(&rec->track, err);
+    if (rc == SH_OK && rec->ops->finish != NULL) rc = rec->ops->finish(rec, err);
+    return rc == SH_OK ? outfile_check(&rec->file, err) : rc;
 }
 
 void recorder_report(const struct recorder *rec, uint64_t n, const char *what)
@@ -135,10 +150,7 @@ int recorder_close(struct recorder *rec, int keep, struct sh_err *err)
 {
     const struct recorder_ops *ops = rec->ops;
     char *path = strdup(rec->file.path);
-    const int is_written = outfile_check(&rec->file, NULL) == SH_OK; /* else points would follow that are missing */
-    int rc = keep && is_written ? track_flush(&rec->track, err) : SH_OK;
-    if (keep && rc == SH_OK && ops->finish != NULL) rc = ops->finish(rec, err);
-    if (keep && rc == SH_OK) rc = outfile_check(&rec->file, err);
+    const int rc = keep ? finish(rec, err) : SH_OK;
     if (keep && rc == SH_OK) report_losses(rec);
     const enum outfile_end how = how_it_ends(rec, keep, rc);
     const int closed = outfile_close(&rec->file, how, err);

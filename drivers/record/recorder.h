@@ -63,6 +63,7 @@ struct recorder {
     struct recorder_options options;
     struct outfile file;
     struct track track; /* file.path is its path in messages */
+    int has_failed; /* something could not be written: it is not completed */
 };
 
 /* What a format is. Each function gets the recorder's own struct as rec; each may be NULL. Errors: SH_E, text

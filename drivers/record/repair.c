@@ -110,7 +110,7 @@ struct lines {
     int has_bad;
 };
 
-static int fail_damaged(const struct repair *r, uint64_t at, struct sh_err *err)
+int repair_fail_damaged(const struct repair *r, uint64_t at, struct sh_err *err)
 {
     return sh_fail(err, SH_EFORMAT,
                    "%s: is damaged at byte %llu, and goes on after that: no recorder has left it so; it is not touched",
@@ -121,7 +121,7 @@ static int take_line(const struct repair *r, struct lines *l, const char *line, 
                      struct sh_err *err)
 {
     const int good = len < LINE_MOST && l->fn(l->ctx, line, len);
-    if (good && l->has_bad) return fail_damaged(r, l->bad_at, err);
+    if (good && l->has_bad) return repair_fail_damaged(r, l->bad_at, err);
     if (good) l->end = at + len + 1;
     if (!good && !l->has_bad) l->bad_at = at;
     l->has_bad |= !good;
@@ -165,7 +165,7 @@ int repair_check_rest(const struct repair *r, uint64_t end, uint64_t most, struc
     int zeros = 1;
     if (r->len - end <= most) return SH_OK;
     const int rc = repair_rows(r, end, 1, r->len - end, look_for_zeros, &zeros, err);
-    return rc != SH_OK || zeros ? rc : fail_damaged(r, end, err);
+    return rc != SH_OK || zeros ? rc : repair_fail_damaged(r, end, err);
 }
 
 void repair_append_note(const struct repair *r, uint64_t end, const void *note, size_t len)
@@ -173,6 +173,14 @@ void repair_append_note(const struct repair *r, uint64_t end, const void *note, 
     if (repair_write(r, end, note, len, NULL) == SH_OK) return;
     sh_warn(r->report, "%s: there is no room to say in it that it may be incomplete", r->path);
     if (ftruncate(r->fd, (off_t)end) != 0) return; /* the piece of a note is cut by the next repair */
+}
+
+int repair_fail_foreign(const struct repair *r, struct sh_err *err)
+{
+    return sh_fail(err, SH_EFORMAT,
+                   "%s: is not whole, or has more than is known here, and another program has written it; only what "
+                   "scanhead wrote is changed; it is not touched",
+                   r->path);
 }
 
 int repair_fail_none(const struct repair *r, const char *format, struct sh_err *err)
@@ -217,8 +225,8 @@ static int repair_open(struct repair *r, const struct recorder_ops *ops, struct 
                        r->path, ops->ending);
     if (r->len == 0)
         return sh_fail(err, SH_EFORMAT,
-                       "%s: is empty: nothing had come to the disk. Files whose colours have no --colour-limits are "
-                       "written when all scans are over",
+                       "%s: is empty: nothing had come to the disk. Meshes, and files whose colours have no "
+                       "--colour-limits, are written when all scans are over",
                        r->path);
     return ops->repair(r, err);
 }

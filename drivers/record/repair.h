@@ -68,6 +68,11 @@ int repair_lines(const struct repair *repair, uint64_t from, int (*fn)(void *ctx
 int repair_check_rest(const struct repair *repair, uint64_t end, uint64_t most, struct sh_err *err);
 /* Puts a note at the end that the file may be incomplete. On a full disk there may be no room for it, which is reported. */
 void repair_append_note(const struct repair *repair, uint64_t end, const void *note, size_t len);
+/* SH_EFORMAT: damage at that byte, which no recorder leaves. */
+int repair_fail_damaged(const struct repair *repair, uint64_t at, struct sh_err *err);
+/* SH_EFORMAT: it is not whole, and another program has written it. Such files are checked, and never changed: what is damage
+ * here may be a kind of line or of block that only that program knows. */
+int repair_fail_foreign(const struct repair *repair, struct sh_err *err);
 /* SH_EFORMAT: "PATH: is no FORMAT, or too little of it came to the disk". */
 int repair_fail_none(const struct repair *repair, const char *format, struct sh_err *err);
 

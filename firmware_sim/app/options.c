@@ -269,7 +269,7 @@ static int check_ending(const struct app_command *command, const char *label, co
     const char *dot = strrchr(file, '.');
     char ending[16] = "";
     const int is_source = strcmp(label, "SOURCE") == 0, takes_streams = is_source || strstr(label, ".shs") != NULL;
-    if (!is_source && strncmp(label, "CONFIG", 6) != 0) return APP_OK;
+    if (!takes_streams && strcmp(label, "CONFIG") != 0) return APP_OK;
     for (size_t i = 0; dot != NULL && dot[i] != '\0' && i < sizeof ending - 1; i++)
         ending[i] = (char)tolower((unsigned char)dot[i]);
     for (size_t i = takes_streams ? 1 : 0; i < sizeof others / sizeof others[0] && strlen(ending) > 1; i++) {

@@ -141,6 +141,7 @@ struct command_device {
     const struct command_place *place;       /* [limits.n_stations] as they are now; NULL: not known */
     const struct command_place *first_place; /* at power-up */
     const char *recorded;                    /* a recording is replayed: why no setting changes; NULL: none is */
+    int is_played;                           /* it is, whatever state its head was in: SCAN:STOP ends it */
     const char *fixed;                       /* why no station can be moved; NULL: they can */
     uint32_t moving;                         /* the station that is being moved; 0: none. Until then no scan starts */
 };

@@ -189,6 +189,10 @@ static int act_start(struct command_call *call)
 
 static int act_stop(struct command_call *call)
 {
+    if (call->dev->is_played) {
+        call->out->effect = COMMAND_STOP;
+        return command_reply(call, "OK");
+    }
     return act_event(call, COMMAND_STOP);
 }
 

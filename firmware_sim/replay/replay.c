@@ -9,7 +9,7 @@
 #include "drivers/protocol/native_encode.h"
 #include "firmware_sim/replay/replay_state.h"
 
-enum { MOST_BYTES = 1 << 20, NATIVE_RATE_BYTES = 2 * NATIVE_POINT_LEN };
+enum { MOST_BYTES = 1 << 20, USUAL_MOST_BYTES = 1 << 17, NATIVE_RATE_BYTES = 2 * NATIVE_POINT_LEN };
 static const uint32_t SEQ_BACK = UINT32_C(1) << 30; /* a reader takes that for another sequence (PROTOCOL.md) */
 static const int64_t BACK_NS = 1000000000; /* what comes so much earlier than the frame before is of another head */
 
@@ -30,15 +30,15 @@ static void fail(struct replay *r, const struct sh_err *err)
     pthread_mutex_unlock(&r->lock);
 }
 
-/* The next frame of the range into r->frame. 0: there is none. */
+/* The next frame of the range into r->frame: 1. 0: there is none; -1: it can't be read, which is said. */
 static int look(struct replay *r)
 {
     struct sh_err err = {0};
     const double to_ns = r->options.to_s > 0.0 ? r->options.to_s * 1e9 : INFINITY;
     while (!r->has_frame) {
         const int got = recording_next(&r->recording, &r->frame, &err);
-        if (got < 0) fail(r, &err);
-        if (got <= 0) return 0;
+        if (got < 0) return fail(r, &err), -1;
+        if (got == 0) return 0;
         const double since_ns = (double)r->frame.t_ns - (double)r->first_ns;
         if (!r->in_range && since_ns < r->options.from_s * 1e9) {
             replay_keep_front(&r->front, r->frame.bytes);
@@ -111,10 +111,11 @@ static uint64_t due_tick(struct replay *r, uint64_t tick)
     return r->start_tick + (out < 0x1p62 ? (uint64_t)(out > 0.0 ? out : 0.0) : UINT64_C(1) << 62);
 }
 
-static void stop(struct replay *r, uint64_t tick)
+static void stop(struct replay *r, uint64_t tick, int wants_again)
 {
     pthread_mutex_lock(&r->lock);
     r->playing = 0;
+    r->wants_again = wants_again;
     replay_set_state(r, tick, HEAD_IDLE);
     pthread_mutex_unlock(&r->lock);
 }
@@ -124,15 +125,15 @@ static void begin(struct replay *r, uint64_t tick)
     struct sh_err err = {0};
     r->has_frame = r->in_range = r->has_skipped = 0;
     if (recording_rewind(&r->recording, &err) != SH_OK) {
-        stop(r, tick);
+        stop(r, tick, 0);
         fail(r, &err);
         return;
     }
-    if (!look(r)) {
-        stop(r, tick);
-        if (r->failure.code != 0) return;
+    const int found = look(r);
+    if (found <= 0) {
+        stop(r, tick, 0);
         sh_fail(&err, SH_EINPUT, "%s: no frame is in it from %.10g s on", r->options.path, r->options.from_s);
-        fail(r, &err);
+        if (found == 0) fail(r, &err);
         return;
     }
     rebase(r, tick);
@@ -149,7 +150,8 @@ static void begin(struct replay *r, uint64_t tick)
 /* The frames of a tick. may_skip: time without frames passes at once. */
 static void fill(struct replay *r, uint64_t tick, int may_skip)
 {
-    while (look(r)) {
+    int found;
+    while ((found = look(r)) == 1) {
         const uint64_t due = due_tick(r, tick);
         if (due > tick && !(may_skip && r->len == 0)) return;
         if (due > tick) r->start_tick -= due - tick; /* modulo 2^64, as the sum in due_tick() is */
@@ -157,25 +159,31 @@ static void fill(struct replay *r, uint64_t tick, int may_skip)
         add(r, r->frame.bytes, r->frame.len, tick);
         r->has_frame = 0;
     }
-    stop(r, tick);
-    r->wants_again = r->options.loop;
+    stop(r, tick, found == 0 && r->options.loop);
 }
 
 /* ---- the source */
 
-static int take_wishes(struct replay *r, uint64_t tick, int *over)
+struct wishes {
+    int over, starts, idle; /* idle: nothing is played, and nothing is to be said of it */
+};
+
+/* A time that begins waits for frames that are late already. */
+static struct wishes take_wishes(struct replay *r, uint64_t tick, int is_late)
 {
-    const int again = r->wants_again;
-    r->wants_again = 0;
+    struct wishes wishes;
     pthread_mutex_lock(&r->lock);
-    const int ready = r->n_clients >= (int)r->options.clients;
-    const int starts = (r->wants_start && ready) || again, stops = r->wants_stop;
-    if (starts) r->wants_start = 0;
+    const int stops = r->wants_stop && r->playing, ready = r->n_clients >= (int)r->options.clients;
+    if (r->wants_stop) r->wants_again = 0;
     r->wants_stop = 0;
-    *over = r->ending || tick >= r->end_tick || (r->ends_then && !r->wants_start && !starts && !r->playing);
+    wishes.starts = !is_late && ((r->wants_start && ready) || r->wants_again);
+    if (wishes.starts) r->wants_start = r->wants_again = 0;
+    const int waits = !r->ends_then || r->wants_start, plays = r->playing || wishes.starts;
+    wishes.over = !is_late && (r->ending || tick >= r->end_tick || (!waits && !plays));
+    wishes.idle = !is_late && waits && !plays && r->end_tick == UINT64_MAX;
     pthread_mutex_unlock(&r->lock);
-    if (stops && r->playing) stop(r, tick);
-    return starts && !*over;
+    if (stops) stop(r, tick, 0);
+    return wishes;
 }
 
 static void count(struct replay *r)
@@ -187,17 +195,14 @@ static void count(struct replay *r)
 static enum loop_source_tick next(void *self, uint64_t tick, int may_idle, int again, struct ring_tick *out)
 {
     struct replay *r = self;
-    int over;
     if (!again) {
         r->len = 0;
         r->tick = (struct ring_tick){.scan = r->tick.scan};
     }
-    const int starts = take_wishes(r, tick, &over);
-    if (over && !again) return LOOP_SOURCE_OVER;
-    if (starts) begin(r, tick);
-    if (!r->playing && !again && r->len == 0 && may_idle && r->end_tick == UINT64_MAX &&
-        (!r->ends_then || r->wants_start) && !r->wants_again)
-        return LOOP_SOURCE_IDLE;
+    const struct wishes wishes = take_wishes(r, tick, again);
+    if (wishes.over) return LOOP_SOURCE_OVER;
+    if (wishes.idle && may_idle) return LOOP_SOURCE_IDLE;
+    if (wishes.starts) begin(r, tick);
     if (r->playing) {
         const struct ring_tick before = r->tick;
         r->tick = (struct ring_tick){.scan = before.scan};
@@ -236,7 +241,7 @@ static uint32_t usual_bytes(const void *self)
     const struct replay *r = self;
     const double pulses = 1e-6 * (double)r->cfg->head.settings.prr_uhz * 1e-9 * (double)r->tick_ns;
     const double bytes = 4096.0 + NATIVE_RATE_BYTES * pulses;
-    return bytes < MOST_BYTES ? (uint32_t)bytes : MOST_BYTES;
+    return bytes < USUAL_MOST_BYTES ? (uint32_t)bytes : USUAL_MOST_BYTES;
 }
 
 static struct fault_board *faults(const void *self)

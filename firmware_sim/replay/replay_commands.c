@@ -57,7 +57,7 @@ void replay_take_emitter(struct replay *r, const struct native_emitter *e)
     if (e->kind < sizeof kinds / sizeof *kinds) cmd->limits.emitter = kinds[e->kind];
     cmd->limits.line_pulses = e->steps;
     cmd->limits.step_fixed = 1;
-    cmd->settings.echoes = e->echoes;
+    cmd->settings.echoes = e->echoes <= NATIVE_ECHOES_STRONGEST ? e->echoes : COMMAND_NOT_RECORDED_U32;
     if (e->kind == NATIVE_EMIT_SPHERE && e->steps > 0) cmd->settings.step_udeg = llround(360e6 / e->steps);
     if (e->sequence_ns_den > 0)
         cmd->limits.sequence_ps = llround(1e3 * (double)e->sequence_ns_num / (double)e->sequence_ns_den);
@@ -91,11 +91,10 @@ void replay_open_commands(struct replay *r)
 
 static void carry_out(struct replay *r, enum command_effect effect)
 {
-    r->wants_start |= effect == COMMAND_START;
-    r->wants_stop |= effect == COMMAND_STOP || effect == COMMAND_RESET;
-    if (effect != COMMAND_START) return;
-    r->wants_stop = 0;
-    r->options.clients = 0; /* who commands it does not wait for others */
+    if (effect != COMMAND_START && effect != COMMAND_STOP && effect != COMMAND_RESET) return;
+    r->wants_start = effect == COMMAND_START;
+    r->wants_stop = !r->wants_start;
+    if (r->wants_start) r->options.clients = 0; /* who commands it does not wait for others */
 }
 
 void replay_command(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out)
@@ -105,6 +104,7 @@ void replay_command(void *self, uint32_t session, const char *line, uint64_t rel
     r->cmd.state = visible_state(r, released);
     r->cmd.t_ns = (int64_t)released * r->tick_ns;
     r->cmd.frames_done = r->frames_done;
+    r->cmd.is_played = r->playing || r->wants_start || r->wants_again;
     r->desk.now_ns = r->cmd.t_ns;
     command_execute(&r->cmd, session, line, out);
     if (out->error == 0) carry_out(r, out->effect);

@@ -62,6 +62,8 @@ static void take_identity(struct config *cfg, const char *idn)
             snprintf(cfg->link[i].serial, sizeof cfg->link[i].serial, "%.31s", field[2]);
 }
 
+static const double MOST_UHZ = 1e15; /* 1 GHz: what a recording says may be any number */
+
 /* For what links are refused by: the rate of the stream. */
 static void fill_config(struct replay *r, const struct native_descriptor *d)
 {
@@ -71,7 +73,7 @@ static void fill_config(struct replay *r, const struct native_descriptor *d)
     cfg->profile.facets = 1;
     cfg->profile.optical_gain = d->sweep_udeg > 0 ? (double)d->sweep_udeg * 1e-6 / 360.0 : 1.0;
     cfg->head.settings = r->cmd.settings;
-    cfg->head.settings.prr_uhz = llround((double)d->prr_uhz * r->options.speed);
+    cfg->head.settings.prr_uhz = llround(fmin((double)d->prr_uhz * r->options.speed, MOST_UHZ));
     cfg->output.attributes = (d->content & NATIVE_HAS_ATTRIBUTES) != 0;
     cfg->output.colour = (d->content & NATIVE_HAS_COLOURS) != 0 ? COLOUR_SOLID : COLOUR_NONE;
 }

@@ -29,6 +29,7 @@ struct replay {
     pthread_mutex_t lock;
     struct command_device cmd;
     int wants_start, wants_stop, ending;
+    int wants_again; /* it is to begin anew by itself */
     int n_clients; /* beside links that are readers themselves */
     int ends_then; /* the run ends when it was played */
     uint64_t end_tick; /* of the run; UINT64_MAX: none */
@@ -57,7 +58,6 @@ struct replay {
     int restarts;          /* the next frame begins another sequence */
     int in_range, has_skipped; /* of this time: frames are sent; some were passed over before */
     int has_frame;
-    int wants_again; /* it is to begin anew by itself */
     struct recording_frame frame; /* the next one */
     uint8_t *bytes;               /* of a tick */
     uint32_t len;

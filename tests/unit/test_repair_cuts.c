@@ -2,6 +2,12 @@
  * numbers beyond all reason. What comes out holds the whole units and is whole, or it is as it was. */
 #include "tests/unit/repair_rig.h"
 
+#ifdef SH_SANITIZE /* sanitizers are for the code, not for the count: each eleventh byte there */
+enum { EACH = 11 };
+#else
+enum { EACH = 1 };
+#endif
+
 /* Repairs what is in repair_part; 1: it is whole now, as *file says, and the bytes are in *got. 0: it was refused, and stays. */
 static int repair(const void *data, size_t len, struct repaired *file, struct bytes *got)
 {
@@ -73,14 +79,14 @@ static void test_cut(void **state)
     for (int i = 0; i < REPAIR_FORMATS; i++) {
         uint64_t before = 0;
         repair_name(repair_formats[i].name);
-        for (size_t n = 1; n <= repair_left[i].len; n++) {
+        for (size_t n = 1 + (repair_left[i].len - 1) % EACH; n <= repair_left[i].len; n += EACH) {
             struct repaired file;
             struct bytes got;
             const int is_whole = repair(repair_left[i].data, n, &file, &got);
             if (!is_whole && before > 0) fail_msg("%s, %zu bytes: %s", repair_path, n, repair_err.text);
             const size_t begin = begin_of(&repair_whole[i]), end = end_of(&got);
             if (is_whole) {
-                assert_true(file.n_kept == before || file.n_kept == before + 1 || before == 0);
+                assert_true((file.n_kept >= before && file.n_kept <= before + EACH) || before == 0);
                 assert_int_equal(end + file.cut_bytes, n);
                 assert_true(end >= begin && end <= repair_whole[i].len);
                 assert_memory_equal(got.data + begin, repair_whole[i].data + begin, end - begin);
@@ -128,7 +134,7 @@ static void test_damaged(void **state)
     for (int i = 0; i < REPAIR_FORMATS; i++) {
         repair_name(repair_formats[i].name);
         const size_t begin = begin_of(&repair_left[i]);
-        for (size_t n = (size_t)i % 3; n < repair_left[i].len; n += 3) {
+        for (size_t n = (size_t)i % 3; n < repair_left[i].len; n += 3 * EACH) {
             struct repaired file;
             struct bytes got;
             repair_left[i].data[n] ^= 0x80;
@@ -190,7 +196,7 @@ static void test_huge_numbers(void **state)
 {
     (void)state;
     static const char *const ply[] = {
-        "ply\nformat binary_little_endian 1.0\nelement vertex 18446744073709551615\nproperty double x\nend_header\n12345678",
+        "ply\nformat binary_little_endian 1.0\ncomment crs x\nelement vertex 18446744073709551615\nproperty double x\nend_header\n12345678",
         "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty list uchar int x\nend_header\n12345678",
         "ply\nformat binary_big_endian 1.0\nelement vertex 3\nproperty double x\nend_header\n12345678",
         "ply\nformat binary_little_endian 1.0\nelement vertex 3\nend_header\n12345678",
@@ -207,10 +213,10 @@ static void test_huge_numbers(void **state)
     free(got.data);
     /* a digit less: a blank more */
     static const char digit[] =
-        "ply\nformat ascii 1.0\ncomment x\nelement vertex 10\nproperty double x\nend_header\n1\n2\n";
+        "ply\nformat ascii 1.0\ncomment crs x\nelement vertex 10\nproperty double x\nend_header\n1\n2\n";
     assert_int_equal(repair(digit, sizeof digit - 1, &file, &got), 1);
     assert_int_equal(file.n_kept, 2);
-    assert_memory_equal(got.data, "ply\nformat ascii 1.0\ncomment x \nelement vertex 2\n", 49);
+    assert_memory_equal(got.data, "ply\nformat ascii 1.0\ncomment crs x \nelement vertex 2\n", 53);
     free(got.data);
     static const struct {
         size_t at;

@@ -81,7 +81,8 @@ static int64_t fired(uint64_t k)
 /* Pulses from..to of a line that begins with pulse `first`. */
 static struct timing_moment shot(uint32_t line, uint64_t first, uint64_t from, uint64_t to)
 {
-    return points(line, from, (uint32_t)(to - from + 1), fired(from), fired(first), (uint32_t)(fired(to) - fired(from)));
+    return points(line, from, (uint32_t)(to - from + 1), fired(from), fired(first),
+                  (uint32_t)(fired(to) - fired(from)));
 }
 
 static void begin(void)
@@ -222,7 +223,7 @@ static void steps(void **state)
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
         const struct native_emitter e = {
             .kind = kinds[i], .steps = 36, .rings = 2, .turn = -1, .sequence_ns_num = 12500000, .sequence_ns_den = 9};
-#define STEP(k) ((int64_t)(k) * 12500000 / 9)
+#define STEP(k) ((int64_t)(k)*12500000 / 9)
         begin();
         emitter(&e, NULL);
         is(points(0, 0, 32, 0, 0, (uint32_t)STEP(1)), TIMING_KNOWN, T0_NS + STEP(1));
@@ -237,8 +238,17 @@ static void steps(void **state)
 static void hostile_numbers(void **state)
 {
     (void)state;
-    static const uint64_t any[] = {0,         1,          15,       16,        UINT32_MAX, UINT64_C(1) << 52, INT64_MAX,
-                                   INT64_MAX - 1, UINT64_C(1) << 63, UINT64_MAX, UINT64_MAX - 16};
+    static const uint64_t any[] = {0,
+                                   1,
+                                   15,
+                                   16,
+                                   UINT32_MAX,
+                                   UINT64_C(1) << 52,
+                                   INT64_MAX,
+                                   INT64_MAX - 1,
+                                   UINT64_C(1) << 63,
+                                   UINT64_MAX,
+                                   UINT64_MAX - 16};
     enum { N = sizeof any / sizeof *any };
     uint64_t random = 88172645463325252u;
     memset(&timing, 0, sizeof timing);
@@ -271,12 +281,21 @@ static void hostile_numbers(void **state)
         const int64_t t_ns = (int64_t)v[5];
         size_t len = 0;
         switch (random >> 32 & 7) {
-        case 0: len = native_encode_event(frame, sizeof frame, &e, t_ns, 0); break;
-        case 1: len = native_encode_descriptor(frame, sizeof frame, &d, t_ns, 0); break;
-        case 2: len = native_encode_emitter(frame, sizeof frame, &m, beam, t_ns, 0); break;
+        case 0:
+            len = native_encode_event(frame, sizeof frame, &e, t_ns, 0);
+            break;
+        case 1:
+            len = native_encode_descriptor(frame, sizeof frame, &d, t_ns, 0);
+            break;
+        case 2:
+            len = native_encode_emitter(frame, sizeof frame, &m, beam, t_ns, 0);
+            break;
         case 3:
-        case 4: len = native_encode_line_end(frame, sizeof frame, &end, 0); break;
-        default: len = native_encode_points(frame, sizeof frame, &block, 0);
+        case 4:
+            len = native_encode_line_end(frame, sizeof frame, &end, 0);
+            break;
+        default:
+            len = native_encode_points(frame, sizeof frame, &block, 0);
         }
         if (len > 0) {
             for (int b = 0; b < 8; b++) /* the header's time */

@@ -59,6 +59,21 @@ void raw_recorder_end(struct raw_recorder *recorder, int signal_number, int stat
     free(said);
 }
 
+void raw_recorder_stop(const struct raw_recorder *recorder)
+{
+    siginfo_t stopped;
+    assert_int_equal(kill(recorder->pid, SIGSTOP), 0);
+    assert_int_equal(waitid(P_PID, (id_t)recorder->pid, &stopped, WSTOPPED | WNOWAIT), 0);
+}
+
+int64_t raw_recorder_go_on(const struct raw_recorder *recorder)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_REALTIME, &t);
+    assert_int_equal(kill(recorder->pid, SIGCONT), 0);
+    return t.tv_sec * INT64_C(1000000000) + t.tv_nsec;
+}
+
 /* ---- packets */
 
 static uint32_t be(const uint8_t *at, int n)

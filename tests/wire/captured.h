@@ -20,6 +20,10 @@ struct raw_recorder raw_recorder_start_limited(struct wire *wire, const char *so
  * (NULL: any). */
 void raw_recorder_end(struct raw_recorder *recorder, int signal_number, int status, const char *says);
 
+/* The recorder stands still until raw_recorder_go_on, which returns the time of UTC at which it was still standing. */
+void raw_recorder_stop(const struct raw_recorder *recorder);
+int64_t raw_recorder_go_on(const struct raw_recorder *recorder);
+
 struct captured_packet {
     int64_t t_ns;
     int is_udp;

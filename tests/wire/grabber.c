@@ -45,7 +45,8 @@ void grabber_start(struct wire *wire, const char *name, const char *sensor, stru
     grabber->out_fd = out[0];
 }
 
-int grabber_listen(struct grabber *grabber)
+/* Takes what it says; 0: nothing more will come. */
+static int listen_to(struct grabber *grabber)
 {
     struct pollfd slot = {.fd = grabber->out_fd, .events = POLLIN};
     if (poll(&slot, 1, DEADLINE_MS) != 1) fail_msg("rawlog-grabber says nothing more:\n%s", grabber->said);
@@ -66,7 +67,7 @@ static int n_saved(const struct grabber *grabber)
 int grabber_wait(struct grabber *grabber, int wanted)
 {
     while (n_saved(grabber) < wanted) {
-        if (!grabber_listen(grabber)) fail_msg("rawlog-grabber ended:\n%s", grabber->said);
+        if (!listen_to(grabber)) fail_msg("rawlog-grabber ended:\n%s", grabber->said);
         if (strstr(grabber->said, "|ERROR|") != NULL) return 0;
     }
     return 1;
@@ -90,7 +91,7 @@ void grabber_start_and_wait(struct wire *wire, const char *name, const char *sen
 void grabber_end(struct grabber *grabber)
 {
     raw_write(grabber->in_fd, "\n", 1);
-    while (grabber_listen(grabber)) {
+    while (listen_to(grabber)) {
     }
     close(grabber->in_fd);
     close(grabber->out_fd);

@@ -21,9 +21,6 @@ void grabber_or_skip(void);
 /* name: of its section, its label and its files. sensor: the lines of its section, the driver's. */
 void grabber_start(struct wire *wire, const char *name, const char *sensor, struct grabber *grabber);
 
-/* Takes what it says, to `said`; 0: nothing more will come. */
-int grabber_listen(struct grabber *grabber);
-
 /* Waits until it has saved so many observations. 0: it complained before. */
 int grabber_wait(struct grabber *grabber, int n_saved);
 

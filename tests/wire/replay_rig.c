@@ -48,7 +48,7 @@ void tape_keep_common(struct tape *tape)
     tape->len = tape->n = 0;
     for (uint32_t i = 0; i < n; i++) {
         const struct tape_frame frame = tape->frame[i]; /* what was kept lies before it */
-        if ((frame.flags & TAPE_LOCAL) == 0) take(tape, tape->bytes + frame.at, &frame);
+        if ((frame.flags & SCANHEAD_LOCAL) == 0) take(tape, tape->bytes + frame.at, &frame);
     }
 }
 
@@ -123,13 +123,24 @@ void replay_to_file(struct wire *wire, const char *file, const char *const *more
     char link[400], stats[352];
     snprintf(link, sizeof link, "type: file, path: '%s'", wire_path(wire, out));
     snprintf(stats, sizeof stats, "%s", wire_path(wire, "stats.json"));
-    const char *args[WIRE_MAX_ARGS] = {"run",   file,   "--start", "--pace", "fast",
+    const char *args[WIRE_MAX_ARGS] = {"run",    file, "--start", "--pace", "fast",
                                        "--link", link, "--stats", stats,    "--quiet"};
     for (int i = 10; more != NULL && *more != NULL; i++)
         args[i] = *more++;
     const int status = replay_call(wire, args);
     if (status != 0) wire_show(wire, "err");
     assert_int_equal(status, 0);
+}
+
+void replay_same_file(const struct wire *wire, const char *out, const char *of)
+{
+    struct tape got = {0}, want = {0};
+    tape_read(wire_path(wire, of), &want);
+    tape_read(wire_path(wire, out), &got);
+    assert_true(want.n > 100);
+    tape_same_bytes(&got, &want);
+    tape_free(&got);
+    tape_free(&want);
 }
 
 const char *replay_room(struct wire *wire, const char *name, unsigned lines)
@@ -140,8 +151,12 @@ const char *replay_room(struct wire *wire, const char *name, unsigned lines)
     config.links = links;
     config.pan_stop_deg = 0.1 * lines;
     room_write(wire);
-    const char *const args[] = {"run",     room_config_write(wire, &config), "--start",   "--frames", "1", "--pace",
-                                "fast", "--quiet",                        "--threads", "1",        NULL};
+    const char *const args[] = {"run",       room_config_write(wire, &config),
+                                "--start",   "--frames",
+                                "1",         "--pace",
+                                "fast",      "--quiet",
+                                "--threads", "1",
+                                NULL};
     const int status = replay_call(wire, args);
     if (status != 0) wire_show(wire, "err");
     assert_int_equal(status, 0);

@@ -4,8 +4,6 @@
 
 #include "tests/wire/room.h"
 
-enum { TAPE_LOCAL = SCANHEAD_LOCAL };
-
 struct tape_frame {
     size_t at;
     uint32_t len, seq;
@@ -50,8 +48,11 @@ void tape_same_bytes(const struct tape *tape, const struct tape *want);
 int replay_call(struct wire *wire, const char *const *args);
 /* The text is in what the last call printed as its messages. */
 void replay_said(const struct wire *wire, const char *text);
-/* `scanhead run FILE --start --pace fast` into a file link; the frames that were replayed. more may be NULL. */
+/* `scanhead run FILE --start --pace fast` into a file link. more may be NULL. */
 void replay_to_file(struct wire *wire, const char *file, const char *const *more, const char *out);
+
+/* Two files of the folder have the same frames, more than 100. */
+void replay_same_file(const struct wire *wire, const char *out, const char *of);
 
 /* A recording of a scan of `lines` lines of 10 ms in the room, of 10 kHz: name.shs, from the head's power-up to its
  * being idle again. */

@@ -1,15 +1,12 @@
 /* What a recording answers to commands: queries as the head did, settings not at all; and how it is played. */
+#include "drivers/protocol/native_encode.h"
 #include "tests/wire/replay_rig.h"
 
 static const char *const LINK[] = {"--link", "type: tcp, port: 0", "--pace", "step", "--quiet", NULL};
 
 /* The same head as replay_room has. */
-static const struct room_config ROOM = {.prr_hz = 10000,
-                                        .lines_hz = 100,
-                                        .pan_deg_s = 10,
-                                        .pan_stop_deg = 3,
-                                        .frames = 1,
-                                        .links = LINK_YAML_TCP};
+static const struct room_config ROOM = {
+    .prr_hz = 10000, .lines_hz = 100, .pan_deg_s = 10, .pan_stop_deg = 3, .frames = 1, .links = LINK_YAML_TCP};
 static const struct room_config BEAMS = {
     .profile = "velodyne-vlp16", .prr_hz = 289351.851852, .lines_hz = 10, .frames = 1, .links = LINK_YAML_TCP};
 
@@ -28,12 +25,12 @@ static void grant(struct scanhead *sh, int ms)
 }
 
 /* Of a whole run of a head in the pace step: what it answers when it is idle, and its recording. */
-static const char *const QUERIES[] = {"*IDN?",           "HEAD:PRR?",        "HEAD:LINes?",       "HEAD:PAN?",
-                                      "HEAD:STATE?",     "HEAD:STATION?",    "HEAD:RANGe:MIN?",   "HEAD:RANGe:MAX?",
-                                      "SCAN:STEP:LINE?", "SCAN:LINE:STARt?", "SCAN:LINE:STOP?",   "SCAN:PAN:STARt?",
-                                      "SCAN:PAN:STOP?",  "SCAN:FRAMes?",     "SYSTem:ERRor:COUNt?", "SYST:ERR?",
-                                      "*OPC?",           "*STB?",            "SYST:VERS?",        "HELP?",
-                                      "HELP:SET?",       "TIME?",            "SYST:CONT?",        "FAULT:LIST?"};
+static const char *const QUERIES[] = {
+    "*IDN?",           "HEAD:PRR?",       "HEAD:LINes?",     "HEAD:PAN?",       "HEAD:STATE?",
+    "HEAD:STATION?",   "HEAD:RANGe:MIN?", "HEAD:RANGe:MAX?", "SCAN:STEP:LINE?", "SCAN:LINE:STARt?",
+    "SCAN:LINE:STOP?", "SCAN:PAN:STARt?", "SCAN:PAN:STOP?",  "SCAN:FRAMes?",    "SYSTem:ERRor:COUNt?",
+    "SYST:ERR?",       "*OPC?",           "*STB?",           "SYST:VERS?",      "HELP?",
+    "HELP:SET?",       "TIME?",           "SYST:CONT?",      "FAULT:LIST?"};
 enum { N_QUERIES = sizeof QUERIES / sizeof *QUERIES };
 
 static void same_answers(struct wire *wire, const struct room_config *config, int scan_ms)
@@ -100,8 +97,8 @@ static void test_settings_are_refused(void **state)
         {"SCAN:FRAMes 0", "SCAN:FRAMes", "it is 1"},
         {"SITE:POSE 1,0,0,0,0,0,0", "SITE:POSE", "stations are where they were"},
     };
-    static const char *const same[] = {"HEAD:PRR 10000",  "HEAD:PRR 10 KHZ",      "HEAD:PRR MAX",     "HEAD:PRR MIN",
-                                       "HEAD:LINes 100",  "HEAD:PAN 10",          "HEAD:STATION 1",   "SCAN:LINE:STOP 60",
+    static const char *const same[] = {"HEAD:PRR 10000",  "HEAD:PRR 10 KHZ",     "HEAD:PRR MAX",   "HEAD:PRR MIN",
+                                       "HEAD:LINes 100",  "HEAD:PAN 10",         "HEAD:STATION 1", "SCAN:LINE:STOP 60",
                                        "SCAN:PAN:STOP 3", "SCAN:LINE:STARt -40", "SCAN:FRAMes 1"};
     static const char *const unknown[] = {"HEAD:NOISe", "HEAD:NOISe:ANGLe", "HEAD:NOISe:SIGMa", "HEAD:NOISe:BALL",
                                           "SCAN:ECHoes"};
@@ -158,7 +155,16 @@ static void test_how_it_is_played(void **state)
     grant(sh, 1);
     /* The head as it was: boot, idle, and so on; a reader that asks sees what its frames say. */
     assert_string_equal(client_ask(sh, "HEAD:STATe?"), "boot");
-    grant(sh, 249);
+    /* What is played can be stopped, whatever the head was then; and what is to be played. */
+    client_tell(sh, "SCAN:STOP");
+    client_tell(sh, "SCAN:STARt");
+    client_tell(sh, "SCAN:STOP");
+    take_all(sh, &first_ns, &last_ns);
+    grant(sh, 300);
+    assert_int_equal(take_all(sh, &first_ns, &last_ns), 0);
+    assert_string_equal(client_ask(sh, "HEAD:STATe?"), "idle");
+    client_tell(sh, "SCAN:STARt");
+    grant(sh, 250);
     assert_string_equal(client_ask(sh, "HEAD:STATe?"), "scanning");
     assert_string_equal(client_ask(sh, "SCAN:COUNt?"), "0"); /* frames that are done */
     assert_true(take_all(sh, &first_ns, &last_ns) > 10);
@@ -192,10 +198,64 @@ static void test_how_it_is_played(void **state)
     assert_true(take_all(sh, &first_ns, &last_ns) > 200);
     assert_string_equal(client_ask(sh, "HEAD:STATe?"), "idle");
     assert_string_equal(client_ask(sh, "SCAN:COUNt?"), "1");
-    assert_string_equal(client_ask(sh, "SYST:ERR?"), "-221,\"Settings conflict; SCAN:STOP is not possible in state idle\"");
+    assert_string_equal(client_ask(sh, "SYST:ERR?"),
+                        "-221,\"Settings conflict; SCAN:STOP is not possible in state idle\"");
     scanhead_get_stats(sh, &stats);
-    assert_int_equal(stats.restarts, 3);
+    assert_int_equal(stats.restarts, 4);
     assert_int_equal(stats.seq_lost + stats.repeated + stats.late + stats.bad_bytes, 0);
+    scanhead_close(sh);
+    head_end(&head, SIGTERM);
+}
+
+/* A descriptor and, where e is not NULL, an emitter of the same moment. */
+static const char *write_moment(struct wire *wire, const struct native_emitter *e)
+{
+    struct tape tape = {0};
+    uint8_t bytes[4096];
+    uint32_t i = 0;
+    tape_read(replay_room(wire, "head.shs", 3), &tape);
+    while (tape.frame[i].type != NATIVE_DESCRIPTOR)
+        i++;
+    size_t len = tape.frame[i].len;
+    memcpy(bytes, tape.bytes + tape.frame[i].at, len);
+    if (e != NULL) {
+        const size_t n = native_encode_emitter(bytes + len, sizeof bytes - len, e, NULL, tape.frame[i].t_ns, 0);
+        assert_true(n > 0);
+        native_seal(bytes + len, tape.frame[i].seq + 1);
+        len += n;
+    }
+    tape_free(&tape);
+    return wire_write(wire, "moment.shs", bytes, len);
+}
+
+/* One that is over in a tick is never seen to be played, and yet it can be stopped. */
+static void test_a_loop_is_stopped(void **state)
+{
+    const char *const args[] = {"--link", "type: tcp, port: 0", "--loop", "--pace", "step", "--quiet", NULL};
+    uint64_t first_ns, last_ns;
+    struct head head = head_start(*state, write_moment(*state, NULL), args);
+    struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
+    client_tell(sh, "SCAN:STARt");
+    grant(sh, 10);
+    assert_in_range(take_all(sh, &first_ns, &last_ns), 9, 10);
+    client_tell(sh, "SCAN:STOP");
+    grant(sh, 1);
+    take_all(sh, &first_ns, &last_ns);
+    grant(sh, 10);
+    assert_int_equal(take_all(sh, &first_ns, &last_ns), 0);
+    scanhead_close(sh);
+    head_end(&head, SIGTERM);
+}
+
+/* A word that is none: as if the recording did not say it. */
+static void test_unknown_echoes(void **state)
+{
+    const struct native_emitter e = {
+        .kind = NATIVE_EMIT_PLANAR, .steps = 360, .turn = 1, .sequence_ns_den = 1, .echoes = 4000000000};
+    struct head head = head_start(*state, write_moment(*state, &e), LINK);
+    struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
+    starts_with(sh, "SCAN:ECHoes?", "ERR -221", "does not say");
+    starts_with(sh, "SCAN:ECHoes ALL", "ERR -221", "does not say");
     scanhead_close(sh);
     head_end(&head, SIGTERM);
 }
@@ -254,6 +314,8 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_same_answers, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_settings_are_refused, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_how_it_is_played, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_a_loop_is_stopped, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_unknown_echoes, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_control_and_steps, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_faults_by_command, wire_setup, wire_teardown),
     };

@@ -77,8 +77,12 @@ static void test_a_client_notices_what_the_truth_says(void **state)
     snprintf(file, sizeof file, "%s", replay_room(wire, "head.shs", 30));
     snprintf(scenario, sizeof scenario, "%s", wire_write_text(wire, "faults.yaml", SCENARIO));
     snprintf(told, sizeof told, "%s", wire_path(wire, "truth.json"));
-    const char *const more[] = {"--link", "type: tcp, port: 0", "--link", "type: tcp, port: 0", "--pace", "fast",
-                                "--scenario", scenario, "--truth", told, "--quiet", NULL};
+    const char *const more[] = {"--link",     "type: tcp, port: 0",
+                                "--link",     "type: tcp, port: 0",
+                                "--pace",     "fast",
+                                "--scenario", scenario,
+                                "--truth",    told,
+                                "--quiet",    NULL};
     struct head head = head_start(wire, file, more);
     struct scanhead *hit = client_open(head_link(&head, 0)), *other = client_open(head_link(&head, 1));
     memset(&seen, 0, sizeof seen);
@@ -128,8 +132,8 @@ static void test_hit_as_the_head_was(void **state)
     snprintf(scenario, sizeof scenario, "%s", wire_write_text(wire, "faults.yaml", faults));
     snprintf(truth, sizeof truth, "%s", wire_path(wire, "truth.json"));
     snprintf(text, sizeof text, "links.0.path=%s", wire_path(wire, "hurt.shs"));
-    const char *const run[] = {"run",    config,     "--start", "--frames",   "1",      "--pace", "fast", "--set", text,
-                               "--quiet", "--scenario", scenario,  "--truth", truth, NULL};
+    const char *const run[] = {"run", config,    "--start",    "--frames", "1",       "--pace", "fast", "--set",
+                               text,  "--quiet", "--scenario", scenario,   "--truth", truth,    NULL};
     assert_int_equal(replay_call(wire, run), 0);
     hurt[0] = wire_read(wire_path(wire, "hurt.shs"), &n[0]);
     told[0] = wire_read(truth, &m[0]);
@@ -155,8 +159,8 @@ static const char *record_much(struct wire *wire)
     ground_write(wire);
     snprintf(links, sizeof links, "links: [{type: file, path: '%s'}]\n", wire_path(wire, "much.shs"));
     config.links = links;
-    const char *const args[] = {"run", room_config_write(wire, &config), "--start", "--frames", "1", "--pace", "fast",
-                                "--quiet", NULL};
+    const char *const args[] = {
+        "run", room_config_write(wire, &config), "--start", "--frames", "1", "--pace", "fast", "--quiet", NULL};
     assert_int_equal(replay_call(wire, args), 0);
     return wire_path(wire, "much.shs");
 }
@@ -183,8 +187,8 @@ static void test_too_slow(void **state)
     uint32_t first = 0;
     snprintf(file, sizeof file, "%s", record_much(wire));
     tape_read(file, &all);
-    static const char *const more[] = {"--link", "type: tcp, port: 0",   "--speed", "2",
-                                       "--set",  "loop.queue_ms=50", "--quiet", NULL};
+    static const char *const more[] = {"--link", "type: tcp, port: 0", "--speed", "2", "--set", "loop.queue_ms=50",
+                                       "--set",  "loop.late_ms=10000", "--quiet", NULL};
     struct head head = head_start(wire, file, more);
     struct scanhead *slow = client_from_fd(connect_small(head_endpoint(&head, "tcp")));
     struct scanhead *fast = client_open(head_endpoint(&head, "tcp"));
@@ -204,7 +208,7 @@ static void test_too_slow(void **state)
     assert_true(told > 0);
     assert_int_equal(first, 0);
     assert_int_equal(frames + told, all.n);
-    assert_in_range(stats.seq_lost, 1, told); /* no gap shows what is missing at the end */
+    assert_in_range(stats.seq_lost, 1, told);                 /* no gap shows what is missing at the end */
     assert_int_equal(stats.bad_payload + stats.bad_bytes, 0); /* whole frames */
     assert_int_equal(pulses, 500000);
     scanhead_close(slow);

@@ -1,4 +1,4 @@
-/* Recordings of all kinds that are replayed, and what is no recording: parts of one, several in one file, hurt ones. */
+/* Parts of recordings, several in one file, and the same one again and again. */
 #include "tests/wire/replay_rig.h"
 
 #include "drivers/protocol/native_encode.h"
@@ -11,17 +11,6 @@ static char file[352];
 static void record(struct wire *wire, const char *name)
 {
     snprintf(file, sizeof file, "%s", replay_room(wire, name, LINES));
-}
-
-static void same_as(const struct wire *wire, const char *out, const char *of)
-{
-    struct tape got = {0}, want = {0};
-    tape_read(wire_path(wire, of), &want);
-    tape_read(wire_path(wire, out), &got);
-    assert_true(want.n > 100);
-    tape_same_bytes(&got, &want);
-    tape_free(&got);
-    tape_free(&want);
 }
 
 /* Pulses of a file, and the device times of the first and the last one. Nothing may be wrong with it. */
@@ -205,8 +194,8 @@ static void test_several_scans(void **state)
                                               .pan_stop_deg = 15,
                                               .frames = 1,
                                               .links = LINK_YAML_TCP};
-    static const struct tape_line lines[] = {{300, "SCAN:STARt"},      {700, "HEAD:PRR 200000"}, {701, "SCAN:STARt"},
-                                             {1100, "SCAN:STARt"}, {0, NULL}};
+    static const struct tape_line lines[] = {
+        {300, "SCAN:STARt"}, {700, "HEAD:PRR 200000"}, {701, "SCAN:STARt"}, {1100, "SCAN:STARt"}, {0, NULL}};
     struct tape tape = {0};
     room_write(wire);
     tape_step(wire, room_config_write(wire, &config), NULL, lines, 1500, &tape);
@@ -214,7 +203,7 @@ static void test_several_scans(void **state)
     snprintf(file, sizeof file, "%s", tape_write(wire, "scans.shs", &tape));
     tape_free(&tape);
     replay_to_file(wire, file, NULL, "out.shs");
-    same_as(wire, "out.shs", "scans.shs");
+    replay_same_file(wire, "out.shs", "scans.shs");
     assert_int_equal(stats_uint(wire, "scans"), 3);
 }
 
@@ -222,12 +211,8 @@ static void test_several_scans(void **state)
 static void test_several_stations(void **state)
 {
     struct wire *wire = *state;
-    static const struct room_config config = {.prr_hz = 10000,
-                                              .lines_hz = 100,
-                                              .pan_deg_s = 10,
-                                              .pan_stop_deg = 1,
-                                              .frames = 1,
-                                              .links = "links: []\n"};
+    static const struct room_config config = {
+        .prr_hz = 10000, .lines_hz = 100, .pan_deg_s = 10, .pan_stop_deg = 1, .frames = 1, .links = "links: []\n"};
     room_write(wire);
     char path[352];
     snprintf(path, sizeof path, "%s", room_config_write(wire, &config));
@@ -241,7 +226,7 @@ static void test_several_stations(void **state)
     const char *const args[] = {"record", path, "-o", file, "--station", "all", "--quiet", NULL};
     assert_int_equal(replay_call(wire, args), 0);
     replay_to_file(wire, file, NULL, "out.shs");
-    same_as(wire, "out.shs", "stations.shs");
+    replay_same_file(wire, "out.shs", "stations.shs");
     /* What commands are told follows the stream. */
     static const char *const more[] = {"--link", "type: tcp, port: 0", "--pace", "fast", "--quiet", NULL};
     struct head head = head_start(wire, file, more);
@@ -277,7 +262,7 @@ static void test_concatenated(void **state)
     snprintf(file, sizeof file, "%s", wire_write(wire, "both.shs", bytes, a.len + b.len - at));
     free(bytes);
     replay_to_file(wire, file, NULL, "out.shs");
-    same_as(wire, "out.shs", "both.shs");
+    replay_same_file(wire, "out.shs", "both.shs");
     tape_step(wire, file, link, start, 900, &both);
     tape_keep_common(&both);
     assert_int_equal(both.n, a.n + b.n - from);
@@ -289,68 +274,6 @@ static void test_concatenated(void **state)
     tape_free(&a);
     tape_free(&b);
     tape_free(&both);
-}
-
-/* ---- hurt ones */
-
-static void test_cut_and_bad_bytes(void **state)
-{
-    struct wire *wire = *state;
-    static const char *const quiet[] = {NULL};
-    size_t n;
-    record(wire, "head.shs");
-    char *bytes = wire_read(file, &n);
-    snprintf(file, sizeof file, "%s", wire_write(wire, "cut.shs", bytes, n - 20));
-    replay_to_file(wire, file, quiet, "out.shs");
-    replay_said(wire, "bytes are in no whole frame, and were left out; it is cut at its end");
-    same_as(wire, "out.shs", "cut.shs");
-    bytes[n / 2] ^= 1;
-    memset(bytes + n / 3, 0x55, 400);
-    snprintf(file, sizeof file, "%s", wire_write(wire, "bad.shs", bytes, n));
-    free(bytes);
-    replay_to_file(wire, file, quiet, "out.shs");
-    replay_said(wire, "bytes are in no whole frame, and were left out");
-    same_as(wire, "out.shs", "bad.shs");
-}
-
-/* One line, and the exit status of a file that is none, or of one that can't be had. */
-static void refused(struct wire *wire, const char *path, int status, const char *why)
-{
-    char link[400];
-    snprintf(link, sizeof link, "type: file, path: '%s'", wire_path(wire, "out.shs"));
-    const char *const args[] = {"run", path, "--start", "--pace", "fast", "--link", link, NULL};
-    assert_int_equal(replay_call(wire, args), status);
-    replay_said(wire, why);
-    char *text = wire_read(wire_path(wire, "err"), NULL);
-    if (strchr(text, '\n') == NULL || strchr(text, '\n')[1] != '\0') fail_msg("more than a line: %s", text);
-    free(text);
-}
-
-static void test_no_recordings(void **state)
-{
-    struct wire *wire = *state;
-    struct tape tape = {0};
-    uint8_t pcapng[28 + 20 + 96] = {0x0a, 0x0d, 0x0d, 0x0a, 28,   0,    0, 0, 0x4d, 0x3c, 0x2b, 0x1a, 1, 0, 0, 0,
-                                    0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 28};
-    static const uint8_t interface[20] = {1, 0, 0, 0, 20, 0, 0, 0, 1, 0, 0, 0, 0xff, 0xff, 0, 0, 20};
-    static const uint8_t packet[28] = {6, 0, 0, 0, 96, [20] = 64, [24] = 64};
-    memcpy(pcapng + 28, interface, sizeof interface);
-    memcpy(pcapng + 48, packet, sizeof packet);
-    pcapng[140] = 96;
-    refused(wire, wire_write(wire, "empty.shs", "", 0), 1, "no descriptor is in it");
-    refused(wire, wire_write_text(wire, "text.shs", "head: {profile: any-rate}\nlinks: []\n"), 1, "not");
-    refused(wire, wire_write(wire, "ethernet.pcapng", pcapng, sizeof pcapng), 1, "link type 1");
-    refused(wire, wire_path(wire, "none.shs"), 2, "cannot open");
-    mkdir(wire_path(wire, "folder.shs"), 0700);
-    refused(wire, wire_path(wire, "folder.shs"), 2, "is a directory");
-    record(wire, "head.shs");
-    tape_read(file, &tape);
-    uint32_t i = 0;
-    while (tape.frame[i].type != SCANHEAD_DESCRIPTOR)
-        i++;
-    const size_t at = tape.frame[i + 1].at;
-    refused(wire, wire_write(wire, "late.shs", tape.bytes + at, tape.len - at), 1, "no descriptor is in it");
-    tape_free(&tape);
 }
 
 /* ---- how long it lasts */
@@ -370,47 +293,36 @@ static void test_duration(void **state)
     assert_in_range(pulses_of(wire_path(wire, "out.shs"), &first_ns, &last_ns, 3), 3 * 3000 + 1000, 4 * 3000);
 }
 
-static void test_wrong_options(void **state)
+/* It begins with the second client, for both from the first frame on, and ends by itself. */
+static void test_waits_for_clients(void **state)
 {
-    struct wire *wire = *state;
-    static const char *const wrong[][6] = {
-        {"--journal", "x"},
-        {"--replay-journal", "x"},
-        {"--frames", "3"},
-        {"--from", "2", "--to", "1"},
-        {"--from", "2", "--to", "2"},
-        {"--from", "-1"},
-        {"--from", "nan"},
-        {"--to", "inf"},
-        {"--speed", "0"},
-        {"--speed", "1e9"},
-        {"--speed", "2", "--pace", "fast"},
-        {"--speed", "2", "--pace", "step"},
-        {"--link", "foo"},
-        {"--link", ""},
-        {"--link", "type: udp, protocol: velodyne"},
-        {"--link", "tcp", "--config", "x.yaml"},
-        {"--set", "head.prr_hz=1"},
-        {"--scenario", "none"},
-    };
-    record(wire, "head.shs");
-    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
-        const char *args[12] = {"run", file, "--start", "--quiet"};
-        for (int k = 0; k < 6 && wrong[i][k] != NULL; k++)
-            args[4 + k] = wrong[i][k];
-        const int status = replay_call(wire, args);
-        char *text = wire_read(wire_path(wire, "err"), NULL);
-        if (status != 2 || strchr(text, '\n') == NULL || strchr(text, '\n')[1] != '\0')
-            fail_msg("%s %s: status %d, %s", wrong[i][0], wrong[i][1], status, text);
-        free(text);
+    static const char *const more[] = {
+        "--link", "type: tcp, port: 0", "--start", "--clients", "2", "--pace", "fast", "--quiet", NULL};
+    struct scanhead *sh[2];
+    struct scanhead_frame frame;
+    struct tape all = {0};
+    int rc;
+    record(*state, "head.shs");
+    tape_read(file, &all);
+    struct head head = head_start(*state, file, more);
+    sh[0] = client_open(head_endpoint(&head, "tcp"));
+    assert_string_equal(client_ask(sh[0], "HEAD:STATe?"), "idle");
+    while ((rc = scanhead_next(sh[0], &frame, 50)) == SCANHEAD_OK)
+        assert_true((frame.flags & SCANHEAD_LOCAL) != 0); /* what those who join are told */
+    assert_int_equal(rc, SCANHEAD_ETIMEOUT);
+    sh[1] = client_open(head_endpoint(&head, "tcp"));
+    for (int i = 0; i < 2; i++) {
+        struct tape heard = {0};
+        while ((rc = scanhead_next(sh[i], &frame, DEADLINE_MS)) == SCANHEAD_OK)
+            tape_add(&heard, &frame, 0);
+        assert_int_equal(rc, SCANHEAD_ECLOSED);
+        tape_keep_common(&heard);
+        tape_same_bytes(&heard, &all);
+        tape_free(&heard);
+        scanhead_close(sh[i]);
     }
-    static const char *const heads[][2] = {{"--speed", "2"}, {"--from", "1"}, {"--to", "1"},
-                                           {"--link", "tcp"}, {"--config", "x"}, {"--loop", NULL}};
-    for (size_t i = 0; i < sizeof heads / sizeof *heads; i++) {
-        const char *const args[] = {"run", "x.yaml", heads[i][0], heads[i][1], NULL};
-        assert_int_equal(replay_call(wire, args), 2);
-        replay_said(wire, "is for a recording");
-    }
+    head_end(&head, 0);
+    tape_free(&all);
 }
 
 int main(void)
@@ -423,10 +335,8 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_several_scans, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_several_stations, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_concatenated, wire_setup, wire_teardown),
-        cmocka_unit_test_setup_teardown(test_cut_and_bad_bytes, wire_setup, wire_teardown),
-        cmocka_unit_test_setup_teardown(test_no_recordings, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_waits_for_clients, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_duration, wire_setup, wire_teardown),
-        cmocka_unit_test_setup_teardown(test_wrong_options, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -58,11 +58,11 @@ static void test_changes_and_a_stop(void **state)
 {
     static const struct room_config config = {
         .prr_hz = 10000, .lines_hz = 13.7, .pan_deg_s = 50, .pan_stop_deg = 50, .frames = 0};
-    static const struct tape_line lines[] = {{330, "SCAN:STARt"},    {433, "HEAD:PRR 12345.678"},
+    static const struct tape_line lines[] = {{330, "SCAN:STARt"},      {433, "HEAD:PRR 12345.678"},
                                              {479, "HEAD:LINes 33.3"}, {555, "SCAN:LINE:STOP 31.25"},
-                                             {601, "HEAD:PRR 77777"}, {602, "HEAD:PRR 7777"},
-                                             {711, "SCAN:STOP"},     {1200, "SCAN:STARt"},
-                                             {1261, "SCAN:STOP"},    {0, NULL}};
+                                             {601, "HEAD:PRR 77777"},  {602, "HEAD:PRR 7777"},
+                                             {711, "SCAN:STOP"},       {1200, "SCAN:STARt"},
+                                             {1261, "SCAN:STOP"},      {0, NULL}};
     same_ticks(*state, &config, lines, 1500);
 }
 
@@ -76,8 +76,7 @@ static void test_beams(void **state)
 
 static void test_one_plane(void **state)
 {
-    static const struct room_config config = {
-        .profile = "sick-tim571", .prr_hz = 16200, .lines_hz = 15, .frames = 4};
+    static const struct room_config config = {.profile = "sick-tim571", .prr_hz = 16200, .lines_hz = 15, .frames = 4};
     static const struct tape_line lines[] = {{330, "SCAN:STARt"}, {0, NULL}};
     same_ticks(*state, &config, lines, 700);
 }
@@ -103,8 +102,9 @@ static void test_a_head_that_moves(void **state)
         .frames = 1,
         .more = "platform: {kind: trajectory, file: ride.csv}\noutput: {layout: geo, crs: local, scale_m: 1e-6}\n"};
     static const struct tape_line lines[] = {{330, "SCAN:STARt"}, {0, NULL}};
-    wire_write_text(*state, "ride.csv",
-                    "t_s,x_m,y_m,z_m,roll_deg,pitch_deg,heading_deg\n0,0,0,0,0,0,0\n0.07,0.1,0,0,0,1,20\n0.31,1,0,0.1,0,0,90\n");
+    wire_write_text(
+        *state, "ride.csv",
+        "t_s,x_m,y_m,z_m,roll_deg,pitch_deg,heading_deg\n0,0,0,0,0,0,0\n0.07,0.1,0,0,0,1,20\n0.31,1,0,0.1,0,0,90\n");
     same_ticks(*state, &config, lines, 800);
 }
 

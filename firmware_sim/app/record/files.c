@@ -273,6 +273,7 @@ int record_files_close(struct record_files *files, int keep, struct sh_err *err)
         const int is_whole = is_coloured || !files->file[i].ops->track.wants_colours;
         int e = recorder_close(files->file[i].rec, keep && is_whole, &why);
         files->file[i].rec = NULL;
+        if (e != SH_OK && rc != SH_OK) sh_warn(files->recorder.report, "%s", why.text); /* each is named */
         if (e != SH_OK && rc == SH_OK) rc = sh_fail(err, e, "%s", why.text);
     }
     close_spools(files);

@@ -125,8 +125,11 @@ int raw_record(int argc, char **argv)
     if (status == APP_GO_ON && r->path == NULL) status = app_usage(&command, "-o FILE.pcapng is needed");
     if (status == APP_GO_ON) status = read_source(r);
     if (status == APP_GO_ON) {
+        const struct app_output out[] = {{"output", r->path}, {"stats", r->stats}};
         app_catch_signals();
-        status = raw_run(r, &err) == SH_OK ? APP_OK : app_fail(&err);
+        int rc = app_check_outputs(&r->in, out, 2, &err);
+        if (rc == SH_OK) rc = raw_run(r, &err);
+        status = rc == SH_OK ? APP_OK : app_fail(&err);
     }
     for (int i = 0; i < r->n_sends; i++)
         free(r->send[i].bytes);

@@ -352,7 +352,7 @@ static const char HELP_NOTES[] =
     "  The head was away within a scan.\n"
     "\n"
     "FILE keeps what came. Where it can't be completed, as on a full disk, what was written stays as FILE.part, for\n"
-    "--repair. A recorder does not begin while such a FILE.part is there.\n"
+    "--repair, with FILE.grid beside a .ptx. A recorder does not begin while such a FILE.part is there.\n"
     "\n"
     "Ctrl-C, or SIGTERM, ends a recording in good order. A second signal within a second counts as the same one;\n"
     "a third, or one that comes later, ends it at once.\n";

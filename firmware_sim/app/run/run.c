@@ -8,8 +8,6 @@
 #include "firmware_sim/site/plan_rows.h"
 #include "firmware_sim/site/rate.h"
 
-enum { VIEW_SESSIONS = 4 };
-
 static void say_sights(const struct site *site)
 {
     double build_s = 0.0, mib = 0.0;
@@ -77,18 +75,6 @@ static void warn_of_replay(const struct run_options *o, const struct device *dev
             o->device.replay);
 }
 
-/* --view: a web link, where the configuration has none. */
-static int add_view(struct config *cfg, struct sh_err *err)
-{
-    for (uint32_t i = 0; i < cfg->n_links; i++)
-        if (cfg->link[i].type == LINK_WEB) return SH_OK;
-    if (cfg->n_links == CONFIG_MAX_LINKS)
-        return sh_fail(err, SH_EINPUT, "%s: links: --view would be one more than the %d that are allowed", cfg->file,
-                       (int)CONFIG_MAX_LINKS);
-    cfg->link[cfg->n_links++] = (struct link_spec){.type = LINK_WEB, .max_sessions = VIEW_SESSIONS};
-    return SH_OK;
-}
-
 /* What a page is told beside the stream; where there is no web link there is nothing to tell. Where its readers hold
  * back the head, the observer does, too, and sees all of it. */
 static int open_watch(const struct config *cfg, const struct site *site, struct device *device,
@@ -125,7 +111,7 @@ static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
     o->device.one_scan = o->device.one_scan && o->device.start;
     const struct app_output out[] = {{"stats", o->stats}, {"journal", o->device.journal}, {"truth", o->device.truth}};
     int rc = app_check_outputs(&o->in, out, (int)(sizeof out / sizeof *out), err);
-    if (rc == SH_OK && o->view) rc = add_view(cfg, err);
+    if (rc == SH_OK && o->view) rc = run_add_view(cfg, err);
     if (rc != SH_OK) return rc;
     if (cfg->n_links == 0)
         return sh_fail(err, SH_EINPUT,

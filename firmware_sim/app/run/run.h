@@ -20,6 +20,8 @@ struct run_options {
 
 /* serve.c: from the start of the loop to its end; writes the statistics. stats is filled in any case. */
 int run_serve(const struct run_options *o, struct loop *loop, struct loop_stats *stats, struct sh_err *err);
+/* --view: a web link, where the configuration has none. */
+int run_add_view(struct config *cfg, struct sh_err *err);
 void run_say_links(const struct loop *loop);
 void run_warn_losses(const struct device_counters *c);
 

@@ -8,6 +8,19 @@
 #include "firmware_sim/app/run/run.h"
 #include "firmware_sim/base/clock.h"
 
+enum { VIEW_SESSIONS = 4 };
+
+int run_add_view(struct config *cfg, struct sh_err *err)
+{
+    for (uint32_t i = 0; i < cfg->n_links; i++)
+        if (cfg->link[i].type == LINK_WEB) return SH_OK;
+    if (cfg->n_links == CONFIG_MAX_LINKS)
+        return sh_fail(err, SH_EINPUT, "%s: links: --view would be one more than the %d that are allowed", cfg->file,
+                       (int)CONFIG_MAX_LINKS);
+    cfg->link[cfg->n_links++] = (struct link_spec){.type = LINK_WEB, .max_sessions = VIEW_SESSIONS};
+    return SH_OK;
+}
+
 void run_say_links(const struct loop *loop)
 {
     struct link_place place;

@@ -118,8 +118,8 @@ static const struct app_option OPTIONS[] = {
 /* clang-format on */
 
 static const char NOTES[] =
-    "FILE is a recording: .shs or .pcapng (points, and the mesh of each scan's grid), .ply or .las (points). The address of\n"
-    "its page is printed to standard output once the file is read. Open it in a browser.\n"
+    "FILE is a recording: .shs or .pcapng (points, and the mesh of each scan's grid), .ply or .las (points). The\n"
+    "address of its page is printed to standard output once the file is read. Open it in a browser.\n"
     "\n"
     "Ctrl-C, or SIGTERM, ends it; exit status 0.\n";
 

@@ -1,0 +1,117 @@
+/* Repair and the files of other programs: these may end or go on in ways that no recorder knows. So they are checked, and
+ * never changed. */
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "core/newfile.h"
+#include "drivers/protocol/bytes.h"
+#include "drivers/record/repair.h"
+#include "tests/unit/repair_rig.h"
+
+#define PLY_HEAD(n)                                                                                                    \
+    "ply\nformat ascii 1.0\ncomment made elsewhere, with    blanks\nelement vertex " n                                 \
+    "\nproperty float x\nproperty float y\nend_header\n"
+#define PTX_HEAD(rows) "1\n" rows "\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"
+
+#define PCAPNG_SECTION                                                                                                 \
+    "\x0a\x0d\x0d\x0a\x1c\0\0\0\x4d\x3c\x2b\x1a\x01\0\0\0\xff\xff\xff\xff\xff\xff\xff\xff\x1c\0\0\0"
+#define PCAPNG_INTERFACE "\x01\0\0\0\x14\0\0\0\x01\0\0\0\0\0\0\0\x14\0\0\0"
+
+/* Puts it there as FILE, and as FILE.part where named so. SH_OK, or what the repair said; the bytes are the same in any case. */
+static int repair_untouched(const char *name, const void *data, size_t len)
+{
+    struct repaired file = {0};
+    repair_name(name);
+    repair_write_file(repair_path, data, len);
+    const int rc = repair_file(repair_path, NULL, &file, &repair_err);
+    struct bytes got = repair_slurp(repair_path);
+    if (got.len != len || memcmp(got.data, data, len) != 0) fail_msg("%s of %zu bytes was changed", name, len);
+    if (rc == SH_OK) assert_int_equal(file.was_whole, 1);
+    repair_free(&file);
+    free(got.data);
+    unlink(repair_path);
+    return rc;
+}
+
+/* Whole for their programs: without a last newline, with tabs, an empty line, kinds of lines that are not ours. */
+static void test_whole_elsewhere(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *name, *text;
+        int rc;
+    } rows[] = {
+        {"f.ply", PLY_HEAD("2") "1 2\n3 4\n", SH_OK},
+        {"f.ply", PLY_HEAD("2") "1 2\n3 4", SH_EFORMAT},
+        {"f.ply", PLY_HEAD("2") "1 2\n3 4\n\n", SH_EFORMAT},
+        {"f.ply", PLY_HEAD("2") "1\t2\n3\t4\n", SH_EFORMAT},
+        {"f.ply", PLY_HEAD("9") "1 2\n3 4\n", SH_EFORMAT},
+        {"f.obj", "v 1 2 3\nv 1 2 3\nv 1 2 4\nf 1 2 3\n", SH_OK},
+        {"f.obj", "v 1 2 3\nv 1 2 3\nv 1 2 4\nf 1 2 3", SH_EFORMAT},
+        {"f.obj", "v 1 2 3\nv 1 2 3\nv 1 2 4\nf -1 -2 -3\n", SH_EFORMAT},
+        {"f.obj", "v 1 2 3\nv 1 2 3\nv 1 2 4\nf 1 2 3\ng x\n", SH_EFORMAT},
+        {"f.ptx", PTX_HEAD("2") "1 2 3 0.5\n1 2 3 0.5\n", SH_OK},
+        {"f.ptx", PTX_HEAD("2") "1 2 3 0.5\n1 2 3 0.5", SH_EFORMAT},
+        {"f.ptx", PTX_HEAD("2") "1 2 3 0.5\n1 2 3 0.5\n\n", SH_EFORMAT},
+        {"f.ptx", PTX_HEAD("4294967295") "1 2 3 0.5\n", SH_EFORMAT},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        const int rc = repair_untouched(rows[i].name, rows[i].text, strlen(rows[i].text));
+        if (rc != rows[i].rc) fail_msg("row %zu: %d: %s", i, rc, repair_err.text);
+    }
+    static const char capture[] = PCAPNG_SECTION PCAPNG_INTERFACE, more[] = PCAPNG_SECTION PCAPNG_INTERFACE "\x06\0\0\0";
+    assert_int_equal(repair_untouched("f.pcapng", capture, sizeof capture - 1), SH_OK);
+    assert_int_equal(repair_untouched("f.pcapng", more, sizeof more - 1), SH_EFORMAT);
+    assert_non_null(strstr(repair_err.text, "another program has written it"));
+}
+
+/* A grid of absurd size is not filled up. */
+static void test_absurd_grid(void **state)
+{
+    (void)state;
+    static const char *const text[] = {PTX_HEAD("4294967295") "1 2 3 0.5\n", PTX_HEAD("4194305") "1 2 3 0.5\n"};
+    for (size_t i = 0; i < 2; i++) {
+        struct repaired file;
+        repair_name("f.ptx");
+        repair_write_file(repair_part, text[i], strlen(text[i]));
+        assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), SH_EFORMAT);
+        struct bytes got = repair_slurp(repair_part);
+        assert_int_equal(got.len, strlen(text[i]));
+        free(got.data);
+        unlink(repair_part);
+    }
+}
+
+/* The capture of a short recording is no longer than what a full disk may have cut off: damage is told from a cut by what
+ * follows it. */
+static void test_damaged_capture(void **state)
+{
+    (void)state;
+    int i = 0;
+    while (strstr(repair_formats[i].name, ".pcapng") == NULL)
+        assert_true(++i < REPAIR_FORMATS);
+    struct bytes *of = &repair_whole[i];
+    size_t at = 0;
+    for (int block = 0; block < 3; block++)
+        at += le_get32(of->data + at + 4);
+    assert_true(at < of->len);
+    static const uint8_t length[] = {0xff, 3, 0};
+    for (size_t k = 0; k < sizeof length; k++) {
+        uint8_t *byte = of->data + at + (k == 2 ? 4 : 6), was = *byte;
+        *byte = length[k];
+        assert_int_equal(repair_untouched("f.pcapng", of->data, of->len), was == length[k] ? SH_OK : SH_EFORMAT);
+        if (was != length[k]) assert_non_null(strstr(repair_err.text, "is damaged at byte"));
+        *byte = was;
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_whole_elsewhere),
+        cmocka_unit_test(test_absurd_grid),
+        cmocka_unit_test(test_damaged_capture),
+    };
+    return cmocka_run_group_tests(tests, repair_set_up, repair_tear_down);
+}

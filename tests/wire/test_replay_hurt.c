@@ -1,0 +1,155 @@
+/* What is hurt, what is no recording, and options that are wrong. */
+#include "tests/wire/replay_rig.h"
+
+#include "drivers/protocol/native_encode.h"
+
+static char file[352];
+
+static void record(struct wire *wire, const char *name)
+{
+    snprintf(file, sizeof file, "%s", replay_room(wire, name, 30));
+}
+
+static void test_cut_and_bad_bytes(void **state)
+{
+    struct wire *wire = *state;
+    static const char *const quiet[] = {NULL};
+    size_t n;
+    record(wire, "head.shs");
+    char *bytes = wire_read(file, &n);
+    snprintf(file, sizeof file, "%s", wire_write(wire, "cut.shs", bytes, n - 20));
+    replay_to_file(wire, file, quiet, "out.shs");
+    replay_said(wire, "bytes are in no whole frame, and were left out; it is cut at its end");
+    replay_same_file(wire, "out.shs", "cut.shs");
+    bytes[n / 2] ^= 1;
+    memset(bytes + n / 3, 0x55, 400);
+    snprintf(file, sizeof file, "%s", wire_write(wire, "bad.shs", bytes, n));
+    free(bytes);
+    replay_to_file(wire, file, quiet, "out.shs");
+    replay_said(wire, "bytes are in no whole frame, and were left out");
+    replay_same_file(wire, "out.shs", "bad.shs");
+}
+
+/* One line, and the exit status of a file that is none, or of one that can't be had. */
+static void refused(struct wire *wire, const char *path, int status, const char *why)
+{
+    char link[400];
+    snprintf(link, sizeof link, "type: file, path: '%s'", wire_path(wire, "out.shs"));
+    const char *const args[] = {"run", path, "--start", "--pace", "fast", "--link", link, NULL};
+    assert_int_equal(replay_call(wire, args), status);
+    replay_said(wire, why);
+    char *text = wire_read(wire_path(wire, "err"), NULL);
+    if (strchr(text, '\n') == NULL || strchr(text, '\n')[1] != '\0') fail_msg("more than a line: %s", text);
+    free(text);
+}
+
+static void test_no_recordings(void **state)
+{
+    struct wire *wire = *state;
+    struct tape tape = {0};
+    uint8_t pcapng[28 + 20 + 96] = {0x0a, 0x0d, 0x0d, 0x0a, 28,   0,    0,    0,    0x4d, 0x3c, 0x2b, 0x1a, 1,
+                                    0,    0,    0,    0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 28};
+    static const uint8_t interface[20] = {1, 0, 0, 0, 20, 0, 0, 0, 1, 0, 0, 0, 0xff, 0xff, 0, 0, 20};
+    static const uint8_t packet[28] = {6, 0, 0, 0, 96, [20] = 64, [24] = 64};
+    memcpy(pcapng + 28, interface, sizeof interface);
+    memcpy(pcapng + 48, packet, sizeof packet);
+    pcapng[140] = 96;
+    refused(wire, wire_write(wire, "empty.shs", "", 0), 1, "no descriptor is in it");
+    refused(wire, wire_write_text(wire, "text.shs", "head: {profile: any-rate}\nlinks: []\n"), 1, "not");
+    refused(wire, wire_write(wire, "ethernet.pcapng", pcapng, sizeof pcapng), 1, "link type 1");
+    refused(wire, wire_path(wire, "none.shs"), 2, "cannot open");
+    mkdir(wire_path(wire, "folder.shs"), 0700);
+    refused(wire, wire_path(wire, "folder.shs"), 2, "is a directory");
+    record(wire, "head.shs");
+    tape_read(file, &tape);
+    uint32_t i = 0;
+    while (tape.frame[i].type != SCANHEAD_DESCRIPTOR)
+        i++;
+    const size_t at = tape.frame[i + 1].at;
+    refused(wire, wire_write(wire, "late.shs", tape.bytes + at, tape.len - at), 1, "no descriptor is in it");
+    tape_free(&tape);
+}
+
+/* A descriptor whose numbers are of no head, with checksums that are right: it is served all the same, at once. */
+static void test_absurd_numbers(void **state)
+{
+    struct wire *wire = *state;
+    static const char *const fast[] = {NULL};
+    struct native_descriptor d;
+    struct tape tape = {0};
+    uint32_t i = 0;
+    record(wire, "head.shs");
+    tape_read(file, &tape);
+    while (tape.frame[i].type != SCANHEAD_DESCRIPTOR)
+        i++;
+    uint8_t *frame = tape.bytes + tape.frame[i].at;
+    assert_int_equal(native_decode_descriptor(frame + NATIVE_HEADER_LEN, tape.frame[i].len - NATIVE_HEADER_LEN, &d), 0);
+    static const uint64_t any[] = {0, 1, UINT64_MAX, INT64_MAX, UINT64_C(1) << 63};
+    for (size_t k = 0; k < sizeof any / sizeof *any; k++) {
+        d.prr_uhz = d.lines_uhz = d.pan_udeg_s = any[k];
+        d.sweep_udeg = (int64_t)any[k];
+        assert_int_equal(native_encode_descriptor(frame, tape.frame[i].len, &d, tape.frame[i].t_ns, 0),
+                         tape.frame[i].len);
+        native_seal(frame, tape.frame[i].seq);
+        tape_write(wire, "absurd.shs", &tape);
+        snprintf(file, sizeof file, "%s", wire_path(wire, "absurd.shs"));
+        replay_to_file(wire, file, fast, "out.shs");
+        replay_same_file(wire, "out.shs", "absurd.shs");
+    }
+    tape_free(&tape);
+}
+
+static void test_wrong_options(void **state)
+{
+    struct wire *wire = *state;
+    static const char *const wrong[][6] = {
+        {"--journal", "x"},
+        {"--replay-journal", "x"},
+        {"--frames", "3"},
+        {"--from", "2", "--to", "1"},
+        {"--from", "2", "--to", "2"},
+        {"--from", "-1"},
+        {"--from", "nan"},
+        {"--to", "inf"},
+        {"--speed", "0"},
+        {"--speed", "1e9"},
+        {"--speed", "2", "--pace", "fast"},
+        {"--speed", "2", "--pace", "step"},
+        {"--link", "foo"},
+        {"--link", ""},
+        {"--link", "type: udp, protocol: velodyne"},
+        {"--link", "tcp", "--config", "x.yaml"},
+        {"--set", "head.prr_hz=1"},
+        {"--scenario", "none"},
+        {"--scenario", "config/faults/brown-out.yaml"}, /* of the head */
+    };
+    record(wire, "head.shs");
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+        const char *args[12] = {"run", file, "--start", "--quiet"};
+        for (int k = 0; k < 6 && wrong[i][k] != NULL; k++)
+            args[4 + k] = wrong[i][k];
+        const int status = replay_call(wire, args);
+        char *text = wire_read(wire_path(wire, "err"), NULL);
+        if (status != 2 || strchr(text, '\n') == NULL || strchr(text, '\n')[1] != '\0')
+            fail_msg("%s %s: status %d, %s", wrong[i][0], wrong[i][1], status, text);
+        free(text);
+    }
+    static const char *const heads[][2] = {{"--speed", "2"},  {"--from", "1"},   {"--to", "1"},
+                                           {"--link", "tcp"}, {"--config", "x"}, {"--loop", NULL}};
+    for (size_t i = 0; i < sizeof heads / sizeof *heads; i++) {
+        const char *const args[] = {"run", "x.yaml", heads[i][0], heads[i][1], NULL};
+        assert_int_equal(replay_call(wire, args), 2);
+        replay_said(wire, "is for a recording");
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_cut_and_bad_bytes, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_no_recordings, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_absurd_numbers, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_wrong_options, wire_setup, wire_teardown),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

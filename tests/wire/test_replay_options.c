@@ -1,0 +1,98 @@
+/* Options of a replay: which are refused, and what they must not do. */
+#include "tests/wire/replay_rig.h"
+
+static char file[352];
+
+static void record(struct wire *wire)
+{
+    snprintf(file, sizeof file, "%s", replay_room(wire, "head.shs", 3));
+}
+
+static void test_wrong_options(void **state)
+{
+    struct wire *wire = *state;
+    static const char *const wrong[][6] = {
+        {"--journal", "x"},
+        {"--replay-journal", "x"},
+        {"--frames", "3"},
+        {"--from", "2", "--to", "1"},
+        {"--from", "2", "--to", "2"},
+        {"--from", "-1"},
+        {"--from", "nan"},
+        {"--to", "inf"},
+        {"--speed", "0"},
+        {"--speed", "1e9"},
+        {"--speed", "2", "--pace", "fast"},
+        {"--speed", "2", "--pace", "step"},
+        {"--link", "foo"},
+        {"--link", ""},
+        {"--link", "type: udp, protocol: velodyne"},
+        {"--link", "tcp", "--config", "x.yaml"},
+        {"--set", "head.prr_hz=1"},
+        {"--scenario", "none"},
+    };
+    record(wire);
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+        const char *args[12] = {"run", file, "--start", "--quiet"};
+        for (int k = 0; k < 6 && wrong[i][k] != NULL; k++)
+            args[4 + k] = wrong[i][k];
+        const int status = replay_call(wire, args);
+        char *text = wire_read(wire_path(wire, "err"), NULL);
+        if (status != 2 || strchr(text, '\n') == NULL || strchr(text, '\n')[1] != '\0')
+            fail_msg("%s %s: status %d, %s", wrong[i][0], wrong[i][1], status, text);
+        free(text);
+    }
+    static const char *const heads[][2] = {{"--speed", "2"}, {"--from", "1"}, {"--to", "1"},
+                                           {"--link", "tcp"}, {"--config", "x"}, {"--loop", NULL}};
+    for (size_t i = 0; i < sizeof heads / sizeof *heads; i++) {
+        const char *const args[] = {"run", "x.yaml", heads[i][0], heads[i][1], NULL};
+        assert_int_equal(replay_call(wire, args), 2);
+        replay_said(wire, "is for a recording");
+    }
+}
+
+/* A link does not write over what is replayed. */
+static void test_recording_stays(void **state)
+{
+    struct wire *wire = *state;
+    struct tape tape = {0};
+    char link[400];
+    record(wire);
+    snprintf(link, sizeof link, "type: file, path: '%s'", file);
+    const char *const args[] = {"run", file, "--start", "--pace", "fast", "--link", link, NULL};
+    assert_int_equal(replay_call(wire, args), 2);
+    replay_said(wire, "would be overwritten");
+    tape_read(file, &tape);
+    assert_true(tape.n > 10);
+    tape_free(&tape);
+}
+
+/* The page's link comes beside the others, wherever they are from and whatever they are called. */
+static void test_view(void **state)
+{
+    struct wire *wire = *state;
+    struct room_config config = {.prr_hz = 10000, .lines_hz = 100, .links = LINK_YAML_TCP};
+    char link[400], yaml[352];
+    record(wire);
+    snprintf(yaml, sizeof yaml, "%s", room_config_write(wire, &config));
+    snprintf(link, sizeof link, "type: pty, path: '%s'", wire_path(wire, "web0"));
+    const char *const more[][3] = {{NULL}, {"--link", link}, {"--config", yaml}};
+    static const char *const beside[] = {"link tcp:", "link tty:", "link tcp:"};
+    for (size_t i = 0; i < sizeof more / sizeof *more; i++) {
+        const char *const args[] = {"run",  file,     "--start",  "--pace",   "fast",
+                                    "--view", more[i][0], more[i][1], NULL};
+        assert_int_equal(replay_call(wire, args), 0);
+        replay_said(wire, "link http://");
+        replay_said(wire, beside[i]);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_wrong_options, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_recording_stays, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_view, wire_setup, wire_teardown),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
