@@ -216,6 +216,25 @@ static void test_lines_far_apart(void **state)
     free(err);
 }
 
+/* A stream that ends within its scan, as that of a recorder that was killed: its statistics are there all the same. */
+static void test_end_within_scan(void **state)
+{
+    struct wire *wire = *state;
+    char stream[352], ply[352], stats[352];
+    static uint8_t event[1024];
+    const struct native_event end = {.code = NATIVE_EV_SCAN_END, .b = 2};
+    const size_t len = write_two_lines(wire, "a.shs", 1),
+                 end_len = native_encode_event(event, sizeof event, &end, 0, 0);
+    snprintf(stream, sizeof stream, "%s", wire_path(wire, "a.shs"));
+    snprintf(ply, sizeof ply, "%s", wire_path(wire, "a.ply"));
+    snprintf(stats, sizeof stats, "%s", wire_path(wire, "stats.json"));
+    assert_int_equal(truncate(stream, (off_t)(len - end_len)), 0);
+    const char *const args[] = {"record", stream, "-o", ply, "--stats", stats, "--quiet", NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 1);
+    assert_int_equal(stats_uint(wire, "points"), 2);
+    assert_int_equal(stats_uint(wire, "scans"), 0);
+}
+
 static int has_bytes(const struct wire *wire, const char *name)
 {
     struct stat st = {0};
@@ -299,6 +318,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_duration_of_each, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_percent, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_lines_far_apart, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_end_within_scan, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_signal_while_completing, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests_name("record files", tests, NULL, NULL);

@@ -104,7 +104,8 @@ static int follow(struct record_job *r, struct scanhead *sh, struct sh_err *err)
     struct sh_err why = {0};
     int rc = r->heads != NULL ? heads_record(r->heads, &r->recording, result, err)
                               : recording_run(sh, &r->recording, result, err);
-    const int has_figures = rc == SH_OK || rc == SH_ELOST || rc == SH_ERESET; /* the bus has cut the recording */
+    const int is_cut = rc == SH_ERESET || rc == SH_ECLOSED; /* by the bus; the stream ended within a scan */
+    const int has_figures = rc == SH_OK || rc == SH_ELOST || is_cut;
     const int whole = rc == SH_OK && recording_check_complete(result, NULL) == SH_OK;
     const int keep = r->only_whole ? whole : result->points != 0 || (rc == SH_OK && result->missing[0] == '\0');
     r->interrupted = app_interrupted();

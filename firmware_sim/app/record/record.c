@@ -304,11 +304,12 @@ static const struct app_option OPTIONS[] = {
      .help = "local, ecef, utm or geodetic: write points in it, as output.layout=geo does, too"},
     {APP_KEY, "threads", "N", .key = "loop.threads", .help = "threads that cast; 0: one per processor"},
     {APP_FLAG, "raw", NULL, .at = AT(raw),
-     .help = "of udp:ADDRESS:PORT,... and tcp:HOST:PORT: what is on the wire, whatever its protocol is, to a .pcapng; its "
-             "options: scanhead record --raw --help"},
-    {APP_TEXT, "send", "TEXT", .at = AT(raw_only), .help = "with --raw, as --relay and --ready-fd"},
-    {APP_TEXT, "relay", "[ADDRESS:]PORT", .at = AT(raw_only), .help = "with --raw"},
-    {APP_TEXT, "ready-fd", "N", .at = AT(raw_only), .help = "with --raw"},
+     .help = "of udp:ADDRESS:PORT,... and tcp:HOST:PORT: write what is on the wire, whatever its protocol is, to a "
+             ".pcapng; its options: scanhead record --raw --help"},
+    {APP_TEXT, "send", "TEXT", .at = AT(raw_only), .help = "only with --raw: what to send when connected"},
+    {APP_TEXT, "relay", "[ADDRESS:]PORT", .at = AT(raw_only),
+     .help = "only with --raw: listen there, and record the connections of others"},
+    {APP_TEXT, "ready-fd", "N", .at = AT(raw_only), .help = "only with --raw: where to say that it listens"},
     {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "no progress"},
     OPTION_END
 };
@@ -323,7 +324,7 @@ static const char HELP_NOTES[] =
     "                       usb:vid:pid:serial\n"
     "  tty:/dev/...         a serial port\n"
     "  tcp:host:port        a socket\n"
-    "  udp:address:port     only with --raw, as tcp: datagrams or bytes of any protocol, to a .pcapng\n"
+    "  udp:address:port     only with --raw: datagrams of any protocol, to a .pcapng\n"
     "  FILE.shs             a raw stream; FILE.pcapng: its frames as packets\n"
     "\n"
     "The ending of FILE says what is written:\n"

@@ -190,7 +190,7 @@ static const struct app_option OPTIONS[] = {
     {APP_WHOLE, "ready-fd", "N", .min = 1, .max = 65535, .at = AT(ready_fd),
      .help = "write one JSON line with the endpoints to descriptor N once all links are open"},
     {APP_NUMBER, "speed", "F", .min = 0.001, .max = 1000, .at = AT(replay.speed),
-     .help = "of a recording: F times as fast, in the pace realtime (default 1)"},
+     .help = "of a recording, in the pace realtime: F times as fast (default 1)"},
     {APP_NUMBER, "from", "S", .min = 0.0, .max = 1e9, .at = AT(replay.from_s),
      .help = "of a recording: begin S seconds of device time after its first frame"},
     {APP_NUMBER, "to", "S", .min = 0.001, .max = 1e9, .at = AT(replay.to_s),
@@ -199,8 +199,8 @@ static const struct app_option OPTIONS[] = {
      .help = "of a recording, with --start: begin once N clients are there"},
     {APP_FLAG, "loop", NULL, .at = AT(replay.loop), .help = "of a recording: begin anew at its end"},
     {APP_CALL, "link", "LINK", .apply = run_take_link,
-     .help = "of a recording: where it is served: pty, tcp, usb, web, ..., or keys as in a configuration: 'type: tcp, "
-             "port: 5025'; may be repeated (default: pty and tcp)"},
+     .help = "of a recording: serve it there: pty, tcp, usb, web, file or null; or keys as in a configuration, such as "
+             "'type: tcp, port: 5025'; may be repeated (default: pty and tcp)"},
     {APP_TEXT, "config", "CONFIG", .at = AT(config),
      .help = "of a recording: links, loop and faults of a configuration; its scene is not loaded"},
     {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "no messages but errors and warnings"},
@@ -212,9 +212,10 @@ static const char NOTES[] =
     "Ctrl-C, or SIGTERM, ends the head in good order. A second signal within a second counts as the same one; a\n"
     "third, or one that comes later, ends it at once.\n"
     "\n"
-    "A recording, FILE.shs or FILE.pcapng, stands for CONFIG: its frames are served as they are, with the timing\n"
-    "that they had, each time that a client commands SCAN:STARt; with --start at once, and the run ends with it.\n"
-    "Queries are answered from its descriptor; settings can't change. Faults on the wire and of links apply.\n";
+    "A recording, FILE.shs or FILE.pcapng, may stand for CONFIG. Its frames are served as they are, with the timing\n"
+    "that they had, from the first one on each time that a client commands SCAN:STARt. With --start they are served\n"
+    "at once, and the run ends with them. Queries are answered from the recording's descriptor; settings can't\n"
+    "change. Faults on the wire and of links apply.\n";
 
 const struct app_command app_run = {
     .name = "run",
