@@ -34,8 +34,8 @@ static int check_capacity(const struct links *links, const struct config *cfg, c
     if (capacity <= 0.0 || capacity >= rate) return SH_OK;
     if (links->source->ops->next != NULL) /* a recording */
         return sh_fail(err, SH_EINPUT,
-                       "link %s: the stream has %.2f MB/s, the link carries %.2f MB/s; allowed is %.2g times this speed, "
-                       "or another link",
+                       "link %s: the stream has %.2f MB/s, the link carries %.2f MB/s; allowed is %.2g times this "
+                       "speed, or another link",
                        place.endpoint, 1e-6 * rate, 1e-6 * capacity, floor(100.0 * capacity / rate) / 100.0);
     return sh_fail(err, SH_EINPUT,
                    "link %s: the stream has %.2f MB/s, the link carries %.2f MB/s; lower head.prr_hz to %.0f%s",

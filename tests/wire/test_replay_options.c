@@ -87,10 +87,40 @@ static void test_view(void **state)
     }
 }
 
+static uint32_t grant(struct scanhead *sh, const char *step, uint64_t *last_ns)
+{
+    struct scanhead_frame frame;
+    uint32_t n = 0;
+    client_tell(sh, step);
+    for (; scanhead_next(sh, &frame, 0) == SCANHEAD_OK; n++)
+        *last_ns = (uint64_t)frame.t_ns;
+    return n;
+}
+
+/* It begins once both are there, and lasts its time from then on: waiting, of any length, does not count. */
+static void test_clients_and_duration(void **state)
+{
+    static const char *const args[] = {"--start", "--clients", "2",      "--duration", "0.1",     "--pace",
+                                       "step",    "--link",    "type: tcp, port: 0", "--quiet", NULL};
+    uint64_t last_ns = 0;
+    record(*state);
+    struct head head = head_start(*state, file, args);
+    struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
+    assert_int_equal(grant(sh, "TIME:STEP 500 MS", &last_ns), 0);
+    struct scanhead *other = client_open(head_endpoint(&head, "tcp"));
+    client_ask(other, "*IDN?");
+    assert_true(grant(sh, "TIME:STEP 500 MS", &last_ns) > 0);
+    assert_in_range(last_ns, 0, 100000000);
+    head_end(&head, 0);
+    scanhead_close(sh);
+    scanhead_close(other);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_wrong_options, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_clients_and_duration, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_recording_stays, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_view, wire_setup, wire_teardown),
     };
