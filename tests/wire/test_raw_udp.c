@@ -314,6 +314,7 @@ static void test_usage(void **state)
         {ARGS("udp:127.0.0.1:0", "--raw", FILE_OF, "--stats", file), 2, SAYS("--stats", "is the file of --output")},
         {ARGS("usb", "--raw", FILE_OF), 2, SAYS("SOURCE usb", "udp:ADDRESS:PORT", "tcp:HOST:PORT")},
         {ARGS("udp:127.0.0.1", "--raw", FILE_OF), 2, SAYS("SOURCE udp:127.0.0.1", "PORT")},
+        {ARGS("udp:127.0.0.1:5,6,5", "--raw", FILE_OF), 2, SAYS("port 5 is there twice")},
         {ARGS("udp:127.0.0.1:65536", "--raw", FILE_OF), 2, SAYS("udp:127.0.0.1:65536")},
         {ARGS("tcp:127.0.0.1:1,2", "--raw", FILE_OF), 2, SAYS("tcp:127.0.0.1:1,2")},
         {ARGS("udp:192.0.2.1:0", "--raw", FILE_OF), 2, SAYS("udp:192.0.2.1:0", "this machine's addresses")},

@@ -102,6 +102,15 @@ static int read_place(const char *text, int max_ports, struct raw_place *place)
     }
 }
 
+/* 0: none; 0 itself is any free one. */
+static int port_twice(const struct raw_place *place)
+{
+    for (int i = 0; i < place->n_ports; i++)
+        for (int k = 0; k < i; k++)
+            if (place->port[i] == place->port[k] && place->port[i] != 0) return place->port[i];
+    return 0;
+}
+
 static int read_source(struct raw *r)
 {
     const char *source = r->in.operand[0];
@@ -109,6 +118,8 @@ static int read_source(struct raw *r)
     r->ops = udp ? &raw_udp : &raw_tcp;
     if ((!udp && !tcp) || !read_place(source + 4, udp ? RAW_MAX_PORTS : 1, &r->place) || (tcp && r->place.port[0] == 0))
         return app_usage(&command, "SOURCE %s: with --raw allowed udp:ADDRESS:PORT,PORT,... and tcp:HOST:PORT", source);
+    if (port_twice(&r->place) != 0)
+        return app_usage(&command, "%s: port %d is there twice", source, port_twice(&r->place));
     if (udp && (r->n_sends > 0 || r->relay != NULL))
         return app_usage(&command, "%s: --send and --relay need tcp:HOST:PORT", source);
     if (r->n_sends > 0 && r->relay != NULL)
