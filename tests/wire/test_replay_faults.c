@@ -208,7 +208,7 @@ static void test_too_slow(void **state)
     assert_true(told > 0);
     assert_int_equal(first, 0);
     assert_int_equal(frames + told, all.n);
-    assert_in_range(stats.seq_lost, 1, told);                 /* no gap shows what is missing at the end */
+    assert_true(stats.seq_lost <= told);                      /* no gap shows what is missing at the end */
     assert_int_equal(stats.bad_payload + stats.bad_bytes, 0); /* whole frames */
     assert_int_equal(pulses, 500000);
     scanhead_close(slow);
