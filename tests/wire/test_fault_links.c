@@ -73,6 +73,15 @@ static uint32_t read_to_cut(struct scanhead *sh, int64_t *t_ns)
     }
 }
 
+/* Until the scan is over. A client that comes back late may miss its end, and hears of it by telemetry. */
+static void read_to_end(struct scanhead *sh, struct scanhead_frame *frame)
+{
+    enum { IDLE = 2 };
+    while (!is_event(frame, SCANHEAD_EV_SCAN_END) &&
+           !(frame->type == SCANHEAD_TELEMETRY && le_get32(frame->payload) == IDLE))
+        client_next(sh, frame);
+}
+
 /* The clean link's reader: the whole scan, and its hash, which is that of the head. */
 static void read_clean(struct scanhead *sh, char hash[65])
 {
@@ -110,7 +119,7 @@ static void cut_and_return(struct wire *wire, const char *link, const char *faul
         client_next(hit, &frame);
     const uint32_t next = frame.seq;
     assert_true(frame.t_ns > t_ns); /* how much later, the load of the machine decides */
-    if (!is_event(&frame, SCANHEAD_EV_SCAN_END)) client_until(hit, SCANHEAD_EV_SCAN_END, &frame);
+    read_to_end(hit, &frame);
     read_clean(clean, seen);
     scanhead_close(hit);
     scanhead_close(clean);
