@@ -68,4 +68,12 @@ static inline uint64_t le_get64(const void *src)
     return LE64(v);
 }
 
+static inline double le_get_double(const void *src)
+{
+    const uint64_t v = le_get64(src);
+    double d;
+    memcpy(&d, &v, sizeof d);
+    return d;
+}
+
 #endif

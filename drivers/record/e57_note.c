@@ -8,14 +8,6 @@
 enum { HAS_GEOID = 1, HAS_EMPTY = 2, HAS_COLOURS = 4, HAS_START = 8, ALL_BITS = 15 };
 static const char MAGIC[16] = "scanhead e57 1";
 
-static double le_get_double(const uint8_t *from)
-{
-    const uint64_t v = le_get64(from);
-    double d;
-    memcpy(&d, &v, sizeof d);
-    return d;
-}
-
 void e57_note_put(const struct e57_facts *facts, const struct e57_scan *scan, uint8_t out[E57_NOTE_LEN])
 {
     memset(out, 0, E57_NOTE_LEN);

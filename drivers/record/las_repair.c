@@ -5,25 +5,16 @@
 
 #include "drivers/protocol/bytes.h"
 #include "drivers/record/las_header.h"
+#include "drivers/record/scan_count.h"
 
 struct records {
     struct las_facts facts; /* of all but zeros at the end */
     size_t len, time_at, station_at;
     uint64_t n_zero; /* at the end, of zeros alone */
-    uint64_t n_scans;
-    double time_s;
-    unsigned station;
+    struct point_scans scans;
 };
 
-static double double_at(const uint8_t *at)
-{
-    const uint64_t bits = le_get64(at);
-    double v;
-    memcpy(&v, &bits, sizeof v);
-    return v;
-}
-
-/* A power cut leaves zeros; no record of ours has return 0. Another scan has another station, or its times begin anew. */
+/* A power cut leaves zeros; no record of ours has return 0. */
 static void take_record(void *ctx, const uint8_t *record)
 {
     struct records *r = ctx;
@@ -36,11 +27,7 @@ static void take_record(void *ctx, const uint8_t *record)
         las_count_record(&r->facts, zero);
     }
     las_count_record(&r->facts, record);
-    const unsigned station = le_get16(record + r->station_at);
-    const double time_s = double_at(record + r->time_at);
-    r->n_scans += (uint64_t)(r->n_scans == 0 || station != r->station || time_s < r->time_s);
-    r->station = station;
-    r->time_s = time_s;
+    point_scans_take(&r->scans, le_get16(record + r->station_at), le_get_double(record + r->time_at));
 }
 
 /* What las.c writes, and nothing else: *front_len bytes, then records of r->len. */
@@ -65,8 +52,8 @@ static int parse_header(const struct repair *repair, const uint8_t *header, size
     r->station_at = f->minor == 2 ? 18 : 20;
     r->time_at = f->minor == 2 ? 20 : 22;
     for (int i = 0; i < 3; i++) {
-        f->scale[i] = double_at(header + 131 + 8 * i);
-        f->offset[i] = double_at(header + 155 + 8 * i);
+        f->scale[i] = le_get_double(header + 131 + 8 * i);
+        f->offset[i] = le_get_double(header + 155 + 8 * i);
     }
     return SH_OK;
 }
@@ -101,6 +88,6 @@ int las_repair(struct repair *repair, struct sh_err *err)
     if (rc == SH_OK) rc = make_whole(repair, header, &r, front_len, err);
     repair->unit = "points";
     repair->n_kept = r.facts.n_points;
-    repair->n_scans = r.n_scans;
+    repair->n_scans = r.scans.n;
     return rc;
 }

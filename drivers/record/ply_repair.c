@@ -8,6 +8,7 @@
 #include "drivers/protocol/bytes.h"
 #include "drivers/record/ply_columns.h"
 #include "drivers/record/recorder.h"
+#include "drivers/record/scan_count.h"
 
 extern const struct recorder_ops recorder_mesh_ply;
 
@@ -178,26 +179,8 @@ static char *renew(const struct ply_header *h, uint64_t n_vertices, int incomple
 struct points {
     const struct ply_header *h;
     uint64_t n, n_zero; /* n_zero: of zeros alone, at the end */
-    uint64_t n_scans;
-    double time_s;
-    long station;
+    struct point_scans scans;
 };
-
-/* Another scan has another station, or its times begin anew. */
-static void take_point(struct points *p, long station, double time_s)
-{
-    p->n_scans += (uint64_t)(p->n_scans == 0 || station != p->station || time_s < p->time_s);
-    p->station = station;
-    p->time_s = time_s;
-}
-
-static double double_at(const uint8_t *at)
-{
-    const uint64_t bits = le_get64(at);
-    double v;
-    memcpy(&v, &bits, sizeof v);
-    return v;
-}
 
 static void take_binary(void *ctx, const uint8_t *row)
 {
@@ -206,8 +189,8 @@ static void take_binary(void *ctx, const uint8_t *row)
     p->n++;
     p->n_zero = repair_is_zero(row, h->row_len) ? p->n_zero + 1 : 0;
     if (p->n_zero != 0 || (h->station_at < 0 && h->time_at < 0)) return;
-    take_point(p, h->station_at >= 0 ? le_get16(row + h->station_at) : 0,
-               h->time_at >= 0 ? double_at(row + h->time_at) : 0);
+    point_scans_take(&p->scans, h->station_at >= 0 ? le_get16(row + h->station_at) : 0,
+                     h->time_at >= 0 ? le_get_double(row + h->time_at) : 0);
 }
 
 static int take_text(void *ctx, const char *line, size_t len)
@@ -228,7 +211,7 @@ static int take_text(void *ctx, const char *line, size_t len)
     }
     if (n != h->n_columns) return 0;
     p->n++;
-    if (h->station_at >= 0 || h->time_at >= 0) take_point(p, station, time_s);
+    if (h->station_at >= 0 || h->time_at >= 0) point_scans_take(&p->scans, station, time_s);
     return 1;
 }
 
@@ -281,7 +264,7 @@ int ply_repair(struct repair *r, struct sh_err *err)
         rc = read_points(r, &h, &p, &end, err);
         r->unit = "points";
         r->n_kept = p.n;
-        r->n_scans = p.n_scans;
+        r->n_scans = p.scans.n;
         if (rc == SH_OK) rc = make_whole(r, &h, &p, end, err);
     }
     free(h.text);

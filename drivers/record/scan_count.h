@@ -1,4 +1,4 @@
-/* What a native stream holds, for the repair of .shs and .pcapng: the scans that its frames are of. Pure. */
+/* For repairs: how many scans frames, or points, are of. Pure. */
 #ifndef DRIVERS_RECORD_SCAN_COUNT_H
 #define DRIVERS_RECORD_SCAN_COUNT_H
 
@@ -9,13 +9,27 @@ struct scan_count { /* begins as zeros */
     int within; /* points of a scan have come, or its descriptor */
 };
 
-/* Each frame, in order. A scan begins with a descriptor that is no repetition, or with points before any. */
+/* Of .shs and .pcapng: each frame, in order. A scan begins with a descriptor that is no repetition, or with points before any. */
 static inline void scan_count_frame(struct scan_count *count, uint8_t type, uint8_t flags)
 {
     const int begins = type == NATIVE_DESCRIPTOR && (flags & NATIVE_REPEAT) == 0;
     if (!begins && (type != NATIVE_POINTS || count->within)) return;
     count->n_scans++;
     count->within = 1;
+}
+
+struct point_scans { /* begins as zeros */
+    uint64_t n;
+    long station; /* of the last point */
+    double time_s;
+};
+
+/* Of .las and .ply: each point, in order. Another scan has another station, or its times begin anew. */
+static inline void point_scans_take(struct point_scans *scans, long station, double time_s)
+{
+    scans->n += (uint64_t)(scans->n == 0 || station != scans->station || time_s < scans->time_s);
+    scans->station = station;
+    scans->time_s = time_s;
 }
 
 #endif

@@ -90,7 +90,6 @@ static int put(struct recording *r, const struct scanhead_frame *frame, struct s
     item->len = (uint32_t)frame->raw_len;
     item->kind = moment.kind;
     item->t_ns = moment.t_ns;
-    item->follows = moment.kind == TIMING_FOLLOWS;
     item->is_known = moment.kind != TIMING_AT_MOST && moment.kind != TIMING_STOPS;
     item->restarted = r->restarted;
     r->restarted = 0;
@@ -116,7 +115,7 @@ int recording_next(struct recording *r, struct recording_frame *frame, struct sh
     }
     if (r->n == 0) return 0;
     const struct recording_item *item = item_of(r, 0);
-    if (!item->follows) {
+    if (item->kind != TIMING_FOLLOWS) {
         r->last_t_ns = item->t_ns;
         if (!r->has_first) r->first_t_ns = item->t_ns;
         r->has_first = 1;

@@ -23,7 +23,7 @@ struct recording_item {
     size_t room;
     uint32_t len;
     int64_t t_ns;
-    int is_known, follows, restarted;
+    int is_known, restarted;
     enum timing_kind kind;
 };
 
