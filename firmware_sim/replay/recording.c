@@ -17,15 +17,19 @@ static void note(void *ctx, const struct scanhead_notice *notice)
     if (notice->kind == SCANHEAD_NOTICE_RESTARTED) r->restarted = 1;
 }
 
-/* A path such as tcp:1.shs is a file here. */
+int recording_open_file(const char *path, struct scanhead **stream, struct sh_err *err)
+{
+    char name[4096 + 3], why[512];
+    snprintf(name, sizeof name, "%s%s", strchr(path, ':') != NULL && path[0] != '/' ? "./" : "", path);
+    const int rc = scanhead_open(name, stream, why, sizeof why);
+    return rc == SCANHEAD_OK ? SH_OK : sh_fail(err, rc, "%s", why);
+}
+
 static int open_stream(struct recording *r, struct sh_err *err)
 {
-    char name[sizeof r->path + 2], why[512];
-    snprintf(name, sizeof name, "%s%s", strchr(r->path, ':') != NULL && r->path[0] != '/' ? "./" : "", r->path);
-    const int rc = scanhead_open(name, &r->stream, why, sizeof why);
-    if (rc != SCANHEAD_OK) return sh_fail(err, rc, "%s", why);
-    scanhead_on_notice(r->stream, note, r);
-    return SH_OK;
+    const int rc = recording_open_file(r->path, &r->stream, err);
+    if (rc == SH_OK) scanhead_on_notice(r->stream, note, r);
+    return rc;
 }
 
 int recording_open(struct recording *r, const char *path, struct sh_err *err)

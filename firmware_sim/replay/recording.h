@@ -39,6 +39,8 @@ struct recording {
     int at_end, restarted;
 };
 
+/* Opens the file as a stream of the client library. A path such as tcp:1.shs is a file here. */
+int recording_open_file(const char *path, struct scanhead **stream, struct sh_err *err);
 /* recording: zeros. SH_EINPUT, SH_EFORMAT, SH_EIO with the path. recording_close is needed after a failure, too. */
 int recording_open(struct recording *recording, const char *path, struct sh_err *err);
 /* From the beginning again. */

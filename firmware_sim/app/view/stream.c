@@ -12,6 +12,7 @@
 #include "core/pose.h"
 #include "drivers/host/scanhead.h"
 #include "drivers/protocol/native.h"
+#include "firmware_sim/replay/recording.h"
 
 /* ---- a scan begins */
 
@@ -197,16 +198,11 @@ static int take_names(struct viewed_stream *s, struct sh_err *err)
     return rc;
 }
 
-/* A name such as tcp:1.shs is a file here. */
 static int open_stream(struct viewed_stream *s, struct scanhead **sh, struct sh_err *err)
 {
-    char name[4096 + 3], why[512];
     struct stat st;
     if (stat(s->v->path, &st) == 0) s->file_bytes = (double)st.st_size;
-    snprintf(name, sizeof name, "%s%s", strchr(s->v->path, ':') != NULL && s->v->path[0] != '/' ? "./" : "",
-             s->v->path);
-    int rc = scanhead_open(name, sh, why, sizeof why);
-    return rc == SCANHEAD_OK ? SH_OK : sh_fail(err, rc, "%s", why);
+    return recording_open_file(s->v->path, sh, err);
 }
 
 int viewed_load_stream(struct viewed *v, const struct sh_report *report, struct sh_err *err)
