@@ -347,6 +347,9 @@ objects: $(EVERYTHING)
 test-unit-programs: $(UNIT)
 test-programs: all $(BUILD)/bench $(TESTS) $(FIGURES)
 
+# What takes long and proves much is described where it stands.
+include $(wildcard tests/*/*.mk config/*/*.mk)
+
 install: all
 	install -d "$(DESTDIR)$(PREFIX)/bin" "$(DESTDIR)$(PREFIX)/lib" "$(DESTDIR)$(PREFIX)/include" "$(DESTDIR)$(HEADS_DIR)" \
 		"$(DESTDIR)$(SCENES_DIR)" "$(DESTDIR)$(FAULTS_DIR)" "$(DESTDIR)$(CAMPAIGN_DIR)" "$(DESTDIR)$(UDEV_DIR)" "$(DESTDIR)$(PC_DIR)" "$(DESTDIR)$(PREFIX)/share/scanhead/python" \
