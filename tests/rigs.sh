@@ -23,7 +23,7 @@ cd "$(dirname "$0")/.." || exit 1
     }
     END {
         for (file in source) {
-            if (file !~ /\/test_[^\/]*$/) continue
+            if (file !~ /\/(test|fuzz)_[^\/]*$/) continue
             program = file
             sub(/\.c$/, "", program)
             split("", seen)

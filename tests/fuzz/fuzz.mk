@@ -1,0 +1,35 @@
+# Fuzzing: a libFuzzer program for each input of the head. They need clang; tests/fuzz/README.md says the rest.
+#   make fuzz S=600           each for so many seconds, JOBS at a time; then a table
+#   make fuzz N=1000000       each for so many executions; with S as well: what comes first
+#   make fuzz F=config        that one alone
+#   make fuzz-programs        builds them
+#   make fuzz-short           what `make test` runs of them
+S ?=
+F ?=
+FUZZ_CC ?= clang
+FUZZ_CXX ?= clang++
+FUZZ_BUILD ?= $(BUILD)/fuzz
+# Coverage as libFuzzer wants it: a counter an edge, and comparisons.
+FUZZ_COVER ?= -fsanitize=fuzzer-no-link
+# Without vptr: that check needs clang++ to link, for one file.
+FUZZ_SAN ?= -fsanitize=address,undefined -fno-sanitize=vptr -fno-sanitize-recover=all $(FUZZ_COVER)
+# gold warns of each symbol that clang exports for the sanitizer; lld is as fast, where it is.
+FUZZ_LD = $(if $(shell command -v ld.lld),-fuse-ld=lld)
+FUZZ_MAKE = $(MAKE) --no-print-directory -j$(JOBS) BUILD=$(FUZZ_BUILD) CC="$(FUZZ_CC)" CXX="$(FUZZ_CXX)" OPT=-O1 WERROR= \
+	CPPFLAGS=-DSH_SANITIZE CFLAGS="-w -g1" CXXFLAGS="-w -g1" SAN="$(FUZZ_SAN)"
+FUZZ_NAMES = $(patsubst tests/fuzz/fuzz_%.c,%,$(wildcard tests/fuzz/fuzz_*.c))
+FUZZ_PROGRAMS = $(patsubst %,$(BUILD)/tests/fuzz/fuzz_%,$(or $(F),$(FUZZ_NAMES)))
+FUZZ_RUN = FUZZ_BUILD=$(FUZZ_BUILD) JOBS=$(JOBS)
+
+$(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $$(call RIGS,tests/fuzz/$$*) $(BUILD)/common.a $(BUILD)/modules.a
+	@echo "  FUZZ  $@"
+	$(Q)$(CC) $(SAN) -fsanitize=fuzzer $(FUZZ_LD) -o $@ $^ -lcmocka $(LDLIBS)
+fuzz-objects: $(FUZZ_PROGRAMS)
+fuzz-programs: deps-test
+	@command -v $(lastword $(FUZZ_CC)) >/dev/null || { echo "make fuzz: $(FUZZ_CC) is not here; fuzzing needs clang" >&2; exit 2; }
+	@$(FUZZ_MAKE) fuzz-objects F="$(F)"
+fuzz: fuzz-programs
+	@$(FUZZ_RUN) S='$(S)' N='$(if $(filter file,$(origin N)),,$(N))' bash tests/fuzz/fuzz_run.sh $(or $(F),$(FUZZ_NAMES))
+fuzz-short: fuzz-programs
+	@$(FUZZ_RUN) bash tests/fuzz/fuzz_short.sh $(or $(F),$(FUZZ_NAMES))
+.PHONY: fuzz-objects fuzz-programs fuzz fuzz-short

@@ -1,0 +1,73 @@
+/* Configurations: a YAML file, with the settings of --set as its comments `#set KEY=VALUE`. What is refused is refused in
+ * lines; what is taken has values within the limits that later stages count on. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "firmware_sim/config/config.h"
+#include "tests/fuzz/rig.h"
+
+enum { MAX_SETS = 8, SET_LEN = 256, MAX_INPUT = 1 << 14 };
+
+static struct {
+    char text[MAX_SETS][SET_LEN];
+    const char *of[MAX_SETS];
+    int n;
+} sets;
+
+/* The lines that begin with `#set `. */
+static void find_sets(const char *text)
+{
+    sets.n = 0;
+    for (const char *p = text; sets.n < MAX_SETS && (p = strstr(p, "#set ")) != NULL;) {
+        p += 5;
+        size_t len = strcspn(p, "\n");
+        if (len >= SET_LEN) len = SET_LEN - 1;
+        memcpy(sets.text[sets.n], p, len);
+        sets.text[sets.n][len] = '\0';
+        sets.of[sets.n] = sets.text[sets.n];
+        sets.n++;
+    }
+}
+
+static void check_taken(const struct config *cfg)
+{
+    const struct head_settings *s = &cfg->head.settings;
+    fuzz_must(cfg->n_stations >= 1 && cfg->n_stations <= CONFIG_MAX_STATIONS, "stations within their number");
+    fuzz_must(cfg->scene.n_meshes <= CONFIG_MAX_MESHES && cfg->n_links <= CONFIG_MAX_LINKS, "lists within their room");
+    fuzz_must(s->station >= 1 && s->station <= cfg->n_stations, "head.station is one of the stations");
+    fuzz_must(s->prr_uhz > 0 && s->lines_uhz > 0 && s->frames <= HEAD_MAX_FRAMES, "rates above 0");
+    fuzz_must(cfg->head.range_min_m < cfg->head.range_max_m, "the nearest range below the farthest");
+    fuzz_must(cfg->loop.tick_hz >= 100 && cfg->loop.tick_hz <= 10000, "tick_hz within its limits");
+    for (uint32_t i = 0; i < cfg->n_stations; i++)
+        for (int c = 0; c < 3; c++)
+            fuzz_must(isfinite(cfg->station[i].position_m[c]), "positions are finite");
+}
+
+static void check_refused(int code, const struct config_faults *faults)
+{
+    fuzz_must(faults->n > 0 && faults->fault[0].code == code, "the first fault says why");
+    for (uint32_t i = 0; i < faults->n && i < CONFIG_MAX_FAULTS; i++)
+        fuzz_must_be_line(&faults->fault[i]);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    static struct config *cfg;
+    static struct config_faults faults;
+    char text[MAX_INPUT + 1];
+    if (size > MAX_INPUT) return 0;
+    if (cfg == NULL) cfg = malloc(sizeof *cfg);
+    setenv("SCANHEAD_HEADS", "config/heads", 0);
+    memcpy(text, data, size);
+    text[size] = '\0';
+    find_sets(text);
+    const int code = config_load_all(fuzz_file(".yaml", data, size), sets.of, sets.n, cfg, &faults);
+    if (code == SH_OK)
+        check_taken(cfg);
+    else
+        check_refused(code, &faults);
+    const int links = config_load_links(text, "links", sets.of, sets.n, cfg, &faults);
+    if (links != SH_OK) check_refused(links, &faults);
+    return 0;
+}

@@ -1,0 +1,69 @@
+/* Journals, and the manifests of campaigns. Input: the file. A journal that is read is sorted by tick, and written anew gives the
+ * same commands. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "firmware_sim/app/batch/manifest.h"
+#include "firmware_sim/device/journal.h"
+#include "tests/fuzz/rig.h"
+
+static void check_again(const struct journal_entry *entry, size_t n)
+{
+    struct sh_err err = {0};
+    struct journal_entry *again = NULL;
+    size_t m = 0;
+    char path[600];
+    snprintf(path, sizeof path, "%s/again.journal", fuzz_folder());
+    struct journal *journal = journal_open(path, &err);
+    fuzz_must(journal != NULL, "a journal can be written");
+    for (size_t i = 0; i < n; i++)
+        if (!journal_is_end(&entry[i]))
+            fuzz_must(journal_write(journal, entry[i].tick, entry[i].t_ns, entry[i].session, entry[i].line) == SH_OK,
+                      "what was read can be written");
+    fuzz_must(journal_close(journal, &err) == SH_OK, "and closed");
+    fuzz_must(journal_read(path, &again, &m, &err) == SH_OK, "what was written can be read");
+    for (size_t i = 0, k = 0; i < n; i++) {
+        if (journal_is_end(&entry[i])) continue;
+        fuzz_must(k < m && again[k].tick == entry[i].tick && strcmp(again[k].line, entry[i].line) == 0,
+                  "and has the same commands");
+        k++;
+    }
+    free(again);
+    unlink(path);
+}
+
+static void read_entry(const uint8_t *data, size_t size)
+{
+    struct batch_entry entry;
+    char *line = malloc(size + 1);
+    memcpy(line, data, size);
+    line[size] = '\0';
+    line[strcspn(line, "\n")] = '\0';
+    if (batch_entry_read(line, &entry)) {
+        for (uint32_t i = 0; i < entry.n_files; i++)
+            fuzz_must(strchr(entry.file[i].name, '/') == NULL, "files lie in the campaign's folder");
+        batch_entry_free(&entry);
+    }
+    free(line);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    struct sh_err err = {0};
+    struct journal_entry *entry = NULL;
+    size_t n = 0;
+    if (size > 8192) return 0;
+    read_entry(data, size);
+    if (journal_read(fuzz_file(".journal", data, size), &entry, &n, &err) != SH_OK) {
+        fuzz_must_be_line(&err);
+        fuzz_must(entry == NULL, "there are no entries after a failure");
+        return 0;
+    }
+    for (size_t i = 1; i < n; i++)
+        fuzz_must(entry[i - 1].tick <= entry[i].tick, "entries are sorted by tick");
+    if (n > 0) check_again(entry, n);
+    free(entry);
+    return 0;
+}

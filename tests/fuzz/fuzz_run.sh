@@ -1,0 +1,89 @@
+#!/bin/bash
+# Runs fuzz targets for long, and prints a table of them. `make fuzz` calls it.
+#
+#   S=600 N=0 JOBS=2 FUZZ_BUILD=build/fuzz bash tests/fuzz/fuzz_run.sh NAME...
+#
+# S: seconds a target; N: executions a target, counted over all runs; with both, what comes first. JOBS targets run at a time.
+# What is found on the way stays in $FUZZ_BUILD/runs/NAME/corpus, and the next run goes on from there. An input that fails is
+# copied to tests/fuzz/found/NAME, and named; then the exit status is 1.
+set -u
+build=${FUZZ_BUILD:-build/fuzz}
+jobs=${JOBS:-$(getconf _NPROCESSORS_ONLN)}
+S=${S:-} N=${N:-}
+[ -n "$S$N" ] || S=60
+case "$S$N" in *[!0-9]*) echo "S=$S N=$N: whole numbers are needed, of seconds and of executions" >&2; exit 2 ;; esac
+. tests/fuzz/fuzz_one.sh
+declare -A running=()
+trap '[ ${#running[@]} -gt 0 ] && kill "${!running[@]}" 2>/dev/null' EXIT
+trap 'exit 130' INT TERM
+
+# Rounds go on until S or N is reached: libFuzzer holds all that it has found in memory, and a restart gives that back.
+run_target() {
+    local to=$build/runs/$1 end=$((SECONDS + ${S:-100000000})) left done_now
+    mkdir -p "$to"
+    [ -f "$to/executions" ] || echo 0 >"$to/executions"
+    while :; do
+        left=$((end - SECONDS))
+        [ $left -gt 0 ] || break
+        set -- "$1" "$to" -max_total_time=$((left < 3600 ? left : 3600))
+        if [ -n "$N" ]; then
+            done_now=$((N - $(cat "$to/executions")))
+            [ $done_now -gt 0 ] || break
+            set -- "$@" -runs="$done_now"
+        fi
+        fuzz_one "$@"
+        done_now=$(fuzz_stat "$to" number_of_executed_units)
+        echo $(($(cat "$to/executions") + ${done_now:-0})) >"$to/executions"
+        [ "$(cat "$to/status")" = 0 ] || break
+    done
+}
+
+# edges FOLDER NAME: edges and functions that the corpus covers, of all in the files that it reaches. Each check of the undefined
+# behaviour sanitizer is an edge, too, which sound code never takes.
+edges() {
+    local dirs="$1/corpus" d
+    for d in tests/fuzz/seeds/$2 tests/fuzz/found/$2; do [ ! -d "$d" ] || dirs="$dirs $d"; done
+    TMPDIR=$1 "$build/tests/fuzz/fuzz_$2" -runs=0 -print_coverage=1 $dirs 2>&1 | LC_ALL=C awk '
+        $1 == "COVERED_FUNC:" || $1 == "UNCOVERED_FUNC:" {
+            file = $NF; sub(/:[0-9]+$/, "", file)
+            if (file ~ /\/tests\//) next
+            for (i = 2; i < NF; i++) if ($i == "edges:") split($(i + 1), n, "/")
+            covered[file] += n[1]; all[file] += n[2]; functions[file]++
+            if ($1 == "COVERED_FUNC:") hit[file]++
+        }
+        END {
+            for (f in hit) { c += covered[f]; a += all[f]; h += hit[f]; n_f += functions[f] }
+            printf "%d/%d %d/%d", c, a, h, n_f
+        }'
+}
+
+for name; do
+    while [ ${#running[@]} -ge "$jobs" ]; do
+        wait -n -p ended "${!running[@]}"
+        unset "running[$ended]"
+    done
+    run_target "$name" &
+    running[$!]=$name
+done
+wait
+running=()
+
+status=0
+printf '%-12s %14s %9s %13s %11s  %s\n' target executions exec/s edges functions found
+for name; do
+    to=$build/runs/$name found=none
+    if [ -f "$to/status" ] && [ "$(cat "$to/status")" != 0 ]; then
+        status=1
+        mkdir -p "tests/fuzz/found/$name"
+        found=
+        for input in "$to"/crash/*; do
+            [ ! -f "$input" ] || { mv "$input" "tests/fuzz/found/$name/" && found="$found tests/fuzz/found/$name/${input##*/}"; }
+        done
+        found=${found:-see $to/log}
+    fi
+    read -r covered functions < <(edges "$to" "$name")
+    printf '%-12s %14s %9s %13s %11s  %s\n' "$name" "$(cat "$to/executions")" \
+        "$(fuzz_stat "$to" average_exec_per_sec)" "${covered:-?}" "${functions:-?}" "$found"
+    [ "$found" = none ] || fuzz_say "$to" | sed 's/^/    /'
+done
+exit $status
