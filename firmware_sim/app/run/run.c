@@ -177,7 +177,7 @@ static const struct app_option OPTIONS[] = {
      .help = "frames per scan; with --start, end after the first scan, even before --duration"},
     {APP_KEY, "threads", "N", .key = "loop.threads", .help = "threads that cast; 0: one per processor"},
     OPTION_SET,
-    {APP_TEXT, "stats", "FILE", .at = AT(stats), .help = "write statistics as JSON at the end; - is standard output"},
+    {APP_TEXT, "stats", "FILE", .at = AT(stats), .help = "write statistics as JSON at the end, with percentiles and a histogram of lateness; - is standard output"},
     OPTION_NO_HASH(AT(no_hash)),
     {APP_TEXT, "journal", "FILE", .at = AT(device.journal),
      .help = "write every command that had an effect, with its device time, and the end"},
