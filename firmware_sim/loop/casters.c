@@ -87,10 +87,13 @@ static int compute(struct loop_caster *caster, const struct device_work *work, s
 
 /* A tick is ready. The pacing thread is told of a batch at once: of all that were made when this caster goes to
  * sleep, and else before the ticks ahead are used up. */
-static void note_ready(struct loop_caster *caster)
+static void note_ready(struct loop_caster *caster, uint64_t tick)
 {
     struct loop *loop = caster->loop;
-    if (!loop->stream.waits) return;
+    if (!loop->stream.waits) {
+        stream_say_late(&loop->stream, tick);
+        return;
+    }
     const int64_t now_ns = clock_now_ns();
     caster->unsaid++;
     if (caster->unsaid * loop->casters.n < loop->casters.ahead_ticks / 2 && now_ns - caster->said_ns < SAY_NS) return;
@@ -122,7 +125,7 @@ static void *caster_main(void *arg)
         if (!compute(caster, &work, slot)) device_lost(loop->device, &work);
         device_done(&work);
         atomic_fetch_sub(&loop->casters.n_computing, 1);
-        note_ready(caster);
+        note_ready(caster, work.tick);
     }
     stream_poke(&loop->stream); /* the others learn of the end, too */
     return NULL;

@@ -20,8 +20,8 @@ static int create_stream(struct loop *loop, struct sh_err *err)
     const double ticks_per_ms = 1e6 / (double)tick_ns;
     struct ring_size size = {.ahead_ticks = (uint64_t)(cfg->loop.ahead_ms * ticks_per_ms) + 1,
                              .queue_ticks = (uint64_t)(cfg->loop.queue_ms * ticks_per_ms) + 1,
-                             .usual_bytes = makes ? source->ops->usual_bytes(source->self)
-                                                  : worker_usual_bytes(loop->site)};
+                             .usual_bytes =
+                                 makes ? source->ops->usual_bytes(source->self) : worker_usual_bytes(loop->site)};
     size.spare_ticks = (uint64_t)(fmin(SPARE_MS, cfg->loop.queue_ms) * ticks_per_ms);
     loop->casters.ahead_ticks = size.ahead_ticks;
     loop->stream.tick_bytes = makes ? source->ops->most_bytes(source->self) : worker_tick_bytes(loop->site);
@@ -233,6 +233,6 @@ void loop_join(struct loop *loop, struct loop_stats *stats)
     stats->counters = *stream->counters;
     stats->scans = loop->source.ops->scans(loop->source.self);
     stats->wall_s = 1e-9 * (double)(atomic_load(&stream->last_pulse_ns) - atomic_load(&stream->first_pulse_ns));
-    stats->late_p50_us = pacer_late_us(loop, 0.5);
-    stats->late_p999_us = pacer_late_us(loop, 0.999);
+    stats->late = &loop->pacer.pace.late;
+    stats->wake = &loop->pacer.pace.wake;
 }

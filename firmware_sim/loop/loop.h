@@ -17,6 +17,7 @@
 #include "firmware_sim/base/json.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/device/device.h"
+#include "firmware_sim/loop/lateness.h"
 #include "firmware_sim/loop/links.h"
 #include "firmware_sim/loop/source.h"
 
@@ -32,8 +33,9 @@ struct loop_options {
 struct loop_stats {
     struct device_counters counters;
     uint64_t scans;
-    double wall_s; /* from the release of the first pulse to that of the last */
-    double late_p50_us, late_p999_us;
+    double wall_s;               /* from the release of the first pulse to that of the last */
+    const struct lateness *late; /* of releases in real time; until loop_free */
+    const struct lateness *wake; /* of the pacing thread's wake-ups; likewise */
     int have_hash;
     char sha256[65];
 };

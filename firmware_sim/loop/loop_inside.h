@@ -7,12 +7,11 @@
 
 #include "firmware_sim/loop/hash.h"
 #include "firmware_sim/loop/loop.h"
+#include "firmware_sim/loop/pace.h"
 #include "firmware_sim/loop/player.h"
 #include "firmware_sim/loop/pose_feed.h"
 #include "firmware_sim/loop/stream.h"
 #include "firmware_sim/loop/work.h"
-
-enum { LATE_BUCKETS = 64 * 8 };
 
 struct loop_caster {
     struct loop *loop;
@@ -39,9 +38,7 @@ struct casters {
 struct pacer {
     pthread_t thread;
     int running;
-    int64_t epoch_ns; /* clock_now_ns() of device time 0 */
-    /* How many ticks were released so late: bucket i < 8 is i ns; above, each octave has eight buckets. */
-    _Atomic uint64_t late[LATE_BUCKETS];
+    struct pace pace; /* in real time; its epoch is device time 0 */
 };
 
 struct loop {
@@ -70,7 +67,5 @@ void casters_free(struct loop *loop);
 /* Device time begins. Real-time priority where it is permitted; a warning where it is not. */
 int pacer_start(struct loop *loop, struct sh_err *err);
 void pacer_join(struct loop *loop);
-/* Microseconds that the share q of all releases was late at most; buckets are an eighth of an octave wide. */
-double pacer_late_us(const struct loop *loop, double q);
 
 #endif

@@ -1,5 +1,5 @@
 /* The pacing thread: releases each tick when its time has come. It takes no lock, allocates and logs nothing,
- * and calls the system for the clock and for wake-ups alone. */
+ * and calls the system for the clock, for wake-ups and for the bell of a tick that is late. */
 #include <errno.h>
 #include <sched.h>
 #include <string.h>
@@ -9,62 +9,31 @@
 
 enum { PACER_PRIORITY = 80 };
 
-static uint32_t late_bucket(uint64_t ns)
-{
-    if (ns < 8) return (uint32_t)ns;
-    uint32_t top = 63U - (uint32_t)__builtin_clzll(ns);
-    return (top - 2) * 8 + (uint32_t)(ns >> (top - 3) & 7);
-}
-
-double pacer_late_us(const struct loop *loop, double q)
-{
-    const struct pacer *pacer = &loop->pacer;
-    uint64_t total = 0, seen = 0;
-    for (uint32_t i = 0; i < LATE_BUCKETS; i++)
-        total += atomic_load(&pacer->late[i]);
-    for (uint32_t i = 0; i < LATE_BUCKETS && total != 0; i++) {
-        seen += atomic_load(&pacer->late[i]);
-        if ((double)seen < q * (double)total) continue;
-        double upper_ns = i < 8 ? (double)(i + 1) : (double)((uint64_t)(8 + i % 8 + 1) << (i / 8 - 1));
-        return upper_ns * 1e-3;
-    }
-    return 0.0;
-}
-
-static void note_late(struct loop *loop, int64_t late_ns)
-{
-    struct device_counters *counters = loop->stream.counters;
-    uint64_t ns = late_ns > 0 ? (uint64_t)late_ns : 0;
-    atomic_fetch_add(&loop->pacer.late[late_bucket(ns)], 1);
-    if (late_ns > loop->stream.tick_ns) atomic_fetch_add(&counters->late_blocks, 1);
-    if (ns > atomic_load(&counters->late_max_ns)) atomic_store(&counters->late_max_ns, ns);
-}
-
-/* A tick that is not ready late_ms after its time is given up, even one that will never be: when casters come
- * late to find that the run is over, the pacing thread may be beyond its end. What the pacing thread itself
- * overslept is added to late_ms (credit) until it has caught up. */
 static void pace_realtime(struct loop *loop)
 {
     struct stream *stream = &loop->stream;
-    const int64_t tick_ns = stream->tick_ns, late_ns = (int64_t)(loop->cfg->loop.late_ms * 1e6);
-    int64_t epoch_ns = loop->pacer.epoch_ns, credit_ns = 0;
-    for (uint64_t tick = 0; !atomic_load(&loop->stopping) && tick < atomic_load(&loop->final_tick);) {
-        int64_t due_ns = epoch_ns + (int64_t)(tick + 1) * tick_ns;
-        int64_t now_ns = clock_now_ns();
-        /* Not ready in time: look again on the next beat of the clock. */
-        int64_t wake_ns = due_ns > now_ns ? due_ns : now_ns + tick_ns - (now_ns - epoch_ns) % tick_ns;
-        if (due_ns > now_ns || ring_peek(&stream->ring, tick) == NULL) {
-            clock_sleep_until_ns(wake_ns);
-            now_ns = clock_now_ns();
-            if (now_ns - wake_ns > credit_ns) credit_ns = now_ns - wake_ns;
-        }
+    struct pace *pace = &loop->pacer.pace;
+    int64_t now_ns = clock_now_ns(), until_ns;
+    pace_begin(pace, now_ns);
+    for (uint64_t tick = 0; !atomic_load(&loop->stopping) && tick < atomic_load(&loop->final_tick);
+         now_ns = clock_now_ns()) {
         struct ring_slot *slot = ring_peek(&stream->ring, tick);
-        if (slot != NULL) {
-            note_late(loop, now_ns - due_ns);
-            if (now_ns - due_ns <= tick_ns) credit_ns = 0;
-            stream_release(stream, slot, tick++, now_ns);
-        } else if (now_ns - due_ns > late_ns + credit_ns && stream_lose(stream, tick)) {
-            tick++;
+        switch (pace_look(pace, tick, slot != NULL, now_ns, &until_ns)) {
+        case PACE_SLEEP:
+            clock_sleep_until_ns(until_ns);
+            break;
+        case PACE_AWAIT:
+            stream_await(stream, tick, until_ns);
+            break;
+        case PACE_RELEASE:
+            stream_release(stream, slot, tick, now_ns);
+            pace_released(pace, tick++, clock_now_ns());
+            break;
+        /* Even one that will never be: when casters come late to find that the run is over, the pacing thread may be
+         * beyond its end. */
+        case PACE_GIVE_UP:
+            tick += stream_lose(stream, tick) != 0;
+            break;
         }
     }
 }
@@ -114,8 +83,11 @@ int pacer_start(struct loop *loop, struct sh_err *err)
 {
     struct pacer *pacer = &loop->pacer;
     const char *warning;
-    pacer->epoch_ns = clock_now_ns();
-    int rc = loop->source.ops->power_up(loop->source.self, pacer->epoch_ns, &warning, err);
+    pacer->pace.tick_ns = loop->stream.tick_ns;
+    pacer->pace.late_ns = (int64_t)(loop->cfg->loop.late_ms * 1e6);
+    pacer->pace.counters = loop->stream.counters;
+    pacer->pace.epoch_ns = clock_now_ns();
+    int rc = loop->source.ops->power_up(loop->source.self, pacer->pace.epoch_ns, &warning, err);
     if (rc != SH_OK) return rc;
     if (warning != NULL) sh_warn(loop->options.report, "%s", warning);
     int failed = loop->stream.waits ? EPERM : create_realtime(pacer, loop);

@@ -50,7 +50,9 @@ static void *player_main(void *arg)
             stream_wait_for_work(&loop->stream);
             continue;
         }
-        again = !put(loop, &tick, player->next_tick++);
+        again = !put(loop, &tick, player->next_tick);
+        if (!loop->stream.waits) stream_say_late(&loop->stream, player->next_tick);
+        player->next_tick++;
         if (again) atomic_fetch_add(&loop->stream.counters->late_blocks, 1);
         unsaid++;
         say_made(loop, &unsaid, loop->casters.ahead_ticks / 2 + 1);

@@ -72,6 +72,8 @@ struct ring_slot *ring_claim(struct ring *ring, uint64_t tick)
     while (atomic_load(&slot->busy) || (tick >= ring->n_slots && is_being_read(ring, tick - ring->n_slots)))
         sched_yield();
     uint64_t seen = atomic_load(&slot->state);
+    /* Where casters are behind by more than the whole ring, the slot says that a later tick is lost. */
+    if (tick < atomic_load(&ring->released)) return NULL;
     if (seen == state_of(tick, LOST) || !atomic_compare_exchange_strong(&slot->state, &seen, state_of(tick, COMPUTING)))
         return NULL; /* only the pacing thread can have changed it: lost */
     atomic_store(&slot->busy, 1);

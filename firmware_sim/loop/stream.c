@@ -15,6 +15,7 @@ int stream_create(struct stream *stream, const struct ring_size *size, int64_t t
     stream->say_ticks = 1 + (stream->waits ? size->queue_ticks / 4 : size->ahead_ticks / 8);
     stream->lazy_ticks = 1 + size->queue_ticks / 8;
     atomic_store(&stream->wanted, UINT64_MAX);
+    atomic_store(&stream->awaited, UINT64_MAX);
     bell_create(&stream->work);
     bell_create(&stream->pace);
     return ring_create(&stream->ring, size, err);
@@ -32,9 +33,8 @@ static void wake_readers(struct stream *stream, uint64_t tick, int frames)
 {
     for (uint32_t i = 0; i < stream->n_listeners; i++) {
         struct stream_listener *listener = &stream->listener[i];
-        listener->pending |=
-            (frames && atomic_load(&listener->wants_frames)) || atomic_load(&listener->wake_tick) <= tick ||
-            stream->wakes_all;
+        listener->pending |= (frames && atomic_load(&listener->wants_frames)) ||
+                             atomic_load(&listener->wake_tick) <= tick || stream->wakes_all;
         if (!listener->pending || tick < listener->quiet_until) continue;
         listener->pending = 0;
         listener->quiet_until = tick + listener->every;
@@ -188,6 +188,14 @@ int stream_lose(struct stream *stream, uint64_t tick)
     return 1;
 }
 
+/* Either this thread sees that the tick became ready, or who made it sees that it is awaited. */
+void stream_await(struct stream *stream, uint64_t tick, int64_t until_ns)
+{
+    atomic_store(&stream->awaited, tick);
+    if (ring_peek(&stream->ring, tick) == NULL) bell_sleep_until(&stream->pace, until_ns);
+    atomic_store(&stream->awaited, UINT64_MAX);
+}
+
 static int holds_back(const struct stream *stream, int reader, uint64_t tick)
 {
     const struct stream_reader *r = &stream->reader[reader];
@@ -273,6 +281,11 @@ void stream_wait_for_work(struct stream *stream)
 void stream_say_ready(struct stream *stream)
 {
     bell_ring(&stream->pace, 1);
+}
+
+void stream_say_late(struct stream *stream, uint64_t tick)
+{
+    if (atomic_load(&stream->awaited) == tick) bell_ring(&stream->pace, 1);
 }
 
 uint64_t stream_released(const struct stream *stream)

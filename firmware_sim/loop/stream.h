@@ -84,8 +84,9 @@ struct stream {
     _Atomic int ending;          /* the run is to end: readers that stand still are not waited for any longer */
     _Atomic int over;            /* nothing will be released any more */
 
-    struct bell work;        /* for casters: a tick may be claimed */
-    struct bell pace;        /* for the pacing thread, in the paces that wait: a tick is ready, or a reader went on */
+    struct bell work;         /* for casters: a tick may be claimed */
+    struct bell pace;         /* for the pacing thread: a tick it waits for is ready, or a reader went on */
+    _Atomic uint64_t awaited; /* real time: the pacing thread waits for this late tick; UINT64_MAX: for none */
     _Atomic uint64_t wanted; /* the pacing thread sleeps until a reader has come to this tick; UINT64_MAX: it doesn't */
     /* of the pacing thread alone */
     uint64_t unsaid;     /* ticks released since casters were last woken; in the paces that wait: since anybody was */
@@ -107,6 +108,8 @@ void stream_free(struct stream *stream);
 void stream_release(struct stream *stream, struct ring_slot *slot, uint64_t tick, int64_t now_ns);
 /* Gives a tick up. 0 when it became ready in the same moment. */
 int stream_lose(struct stream *stream, uint64_t tick);
+/* Real time: waits until a tick that is late is ready, up to a time at most. May return before. */
+void stream_await(struct stream *stream, uint64_t tick, int64_t until_ns);
 /* True when every active reader has gone on so far that this tick may be released. */
 int stream_has_room(const struct stream *stream, uint64_t tick);
 /* Waits until a tick may be ready. */
@@ -138,6 +141,8 @@ void stream_wait_for_work(struct stream *stream);
 void stream_power(struct stream *stream, uint64_t tick);
 /* Some ticks are ready: the pacing thread looks again. Not needed in real time. */
 void stream_say_ready(struct stream *stream);
+/* Real time: this tick is ready. The pacing thread is woken if that one is late, and it waits for it. */
+void stream_say_late(struct stream *stream, uint64_t tick);
 
 /* ---- any thread */
 uint64_t stream_released(const struct stream *stream);

@@ -3,6 +3,8 @@
 #include "tests/common/cases.h"
 #include "tests/unit/device_rig.h"
 
+#include <math.h>
+
 #include "core/schedule.h"
 
 #define HZ INT64_C(1000000)
@@ -118,6 +120,52 @@ static void a_stop_ends_the_line_at_hand_as_partial(void **state)
             uint64_t lines = (pulses - 1) * 100 / prr_hz[i] + 1, whole = (lines * prr_hz[i] + 99) / 100;
             assert_true(tally.lines == lines && tally.partial == (pulses != whole));
         }
+    rig_close(rig);
+}
+
+/* The last line end of the tick just claimed; 0: it has none. */
+static int last_line_end(struct rig *rig, struct line_end *end)
+{
+    const struct ring_tick *tick = rig_fill(rig);
+    int found = 0;
+    for (uint32_t at = 0, len; at < tick->len; at += len) {
+        const uint8_t *frame = tick->bytes + at;
+        len = (uint32_t)native_frame_len(frame);
+        if (frame[1] != NATIVE_LINE_END) continue;
+        assert_int_equal(native_decode_line_end(frame + NATIVE_HEADER_LEN, len - NATIVE_HEADER_LEN, end), 0);
+        found = 1;
+    }
+    return found;
+}
+
+/* The encoders then say where the axes are, though no pulse was fired at the new rate: 1.6 MHz is 100 whole packets a tick,
+ * so none was left over. Three facets and a gain of two: 240 degrees a line of 10 ms, from -40 on; the pan turns 180 degrees
+ * a second. They may be read at the last pulse or at the next one: 0.015 degrees of the mirror. */
+static void a_stop_right_after_a_change_has_its_angles(void **state)
+{
+    (void)state;
+    static const char *const change[] = {"HEAD:PRR MIN", "HEAD:PRR MAX", "HEAD:LINES 37", "HEAD:PAN 7"};
+    const double counts = 1048576.0 / 360.0;
+    struct rig *rig = rig_open(NULL, NULL, 0);
+    struct line_end end;
+    rig_go_to(rig, 300);
+    for (uint64_t ticks = 1; ticks < 10 * 4; ticks++) {
+        if (ticks % 10 == 0) continue; /* no line is at hand */
+        rig_tell(rig, "*RST", rig->next);
+        rig_tell(rig, "HEAD:PRR 1600000", rig->next);
+        rig_tell(rig, "SCAN:START", rig->next);
+        rig_wait(rig, NATIVE_EV_SCAN_START, 100);
+        rig_go_to(rig, rig->next + ticks - 1);
+        rig_tell(rig, change[ticks % 4], rig->next);
+        rig_tell(rig, "SCAN:STOP", rig->next);
+        assert_true(rig_claim(rig) && rig->work.pulse_end == rig->work.segment.k0 && rig->work.cut_short);
+        assert_true(last_line_end(rig, &end) && (end.status & LINE_PARTIAL) != 0);
+        const double mirror_deg = -40.0 + 24.0 * (double)(ticks % 10), pan_deg = 0.18 * (double)ticks;
+        const double mirror = counts * (mirror_deg < 0 ? mirror_deg + 360.0 : mirror_deg);
+        assert_true(fabs((double)end.mirror_count - mirror) <= 0.015 * counts + 1.0);
+        assert_true(fabs((double)end.pan_count - counts * pan_deg) <= 180.0 / 1600000.0 * counts + 1.0);
+        rig_go_to(rig, rig->next + 100);
+    }
     rig_close(rig);
 }
 
@@ -342,6 +390,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_whole_scan_adds_up),
         cmocka_unit_test(a_stop_ends_the_line_at_hand_as_partial),
+        cmocka_unit_test(a_stop_right_after_a_change_has_its_angles),
         cmocka_unit_test(settings_change_in_mid_scan),
         cmocka_unit_test(a_usual_tick_is_what_a_slot_has_room_for),
         cmocka_unit_test(a_jump_of_the_rates_fits_into_a_tick),

@@ -1,145 +1,273 @@
-/* The pacing thread allocates nothing, takes no lock and writes nothing but wake-ups, with readers, a hash, slots that
- * grow and ticks that come too late. The functions it must not call are replaced here by ones that count. */
-#include "tests/unit/device_rig.h"
+/* The pacing thread allocates nothing, takes no lock and calls the system for nothing but the clock, the semaphores of
+ * threads that sleep, and wake-ups. It is watched (pacing_rig.h) while a head with several links, clients, faults and a hash
+ * starts and stops scans, changes its rate so that slots grow, comes too late and catches up again. */
+#include "tests/unit/pacing_rig.h"
 
-#include <dlfcn.h>
+#ifndef SH_SANITIZE
+
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <linux/futex.h>
+#include <netinet/in.h>
 #include <poll.h>
 #include <pthread.h>
-#include <stdatomic.h>
-#include <time.h>
+#include <sched.h>
+#include <signal.h>
+#include <sys/socket.h>
+#include <sys/syscall.h>
 
 #include "firmware_sim/base/clock.h"
-#include "firmware_sim/loop/loop.h"
 
-#ifndef SH_SANITIZE /* which has an allocator and locks of its own */
+static const char LINKS[] = "links: [{type: tcp, port: 0, max_sessions: 2}, {type: pty}, {type: web, port: 0}]\n"
+                            "faults: [{kind: drop, every: 20}, {kind: flip, every: 17}, {kind: stall, for_ms: 20, "
+                            "every: 50}, {kind: split, n: 7, every: 13}, {kind: disconnect, every: 300}]\n";
 
-static _Thread_local int is_pacer; /* it alone sleeps until a time */
-static _Atomic int sleeps, forbidden;
+/* ---- the run */
 
-static void note(void)
+struct run {
+    struct rig *rig;
+    struct loop *loop;
+    struct loop_stats stats;
+};
+
+static void start(struct run *run, const char *const *sets, int n_sets, double duration_s)
 {
-    if (is_pacer) atomic_fetch_add(&forbidden, 1);
+    static const struct link_spec null_link = {.type = LINK_NULL};
+    const struct loop_options options = {.hash = 1, .extra = &null_link};
+    struct sh_err err;
+    *run = (struct run){.rig = rig_open(&(struct device_options){.start = 1, .duration_s = duration_s}, sets, n_sets)};
+    need(loop_create(run->rig->site, run->rig->device, &options, &run->loop, &err), &err);
+    need(loop_start(run->loop, &err), &err);
 }
 
-extern void *__libc_malloc(size_t n);
-extern void *__libc_calloc(size_t n, size_t size);
-extern void *__libc_realloc(void *p, size_t n);
-extern void __libc_free(void *p);
-
-/* The function that was replaced. */
-static void *next_of(const char *name)
+/* Between two beats: what clients of the run do, every 5 ms at most. It gives up after 30 s. */
+static void finish(struct run *run, void (*beat)(struct run *run, int turn))
 {
-    void *f = dlsym(RTLD_NEXT, name);
-    if (f == NULL) abort();
-    return f;
+    const int64_t until_ns = clock_now_ns() + 30000000000;
+    for (int turn = 0; !loop_is_over(run->loop) && clock_now_ns() < until_ns; turn++) {
+        poll(NULL, 0, 5);
+        if (beat != NULL) beat(run, turn);
+    }
+    assert_true(loop_is_over(run->loop));
+    loop_join(run->loop, &run->stats);
+    loop_free(run->loop);
+    rig_close(run->rig);
 }
 
-void *malloc(size_t n)
+/* ---- what it must not do is found */
+
+static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
+static int pipe_fd[2];
+static void *volatile block;
+
+static void plant_all(int sleep)
 {
-    note();
-    return __libc_malloc(n);
+    char text[8];
+    uint32_t word = 1;
+    switch (sleep) {
+    case 5:
+        block = malloc(1);
+        break;
+    case 6:
+        free(block);
+        break;
+    case 7:
+        pthread_mutex_lock(&lock);
+        break;
+    case 8:
+        pthread_mutex_unlock(&lock);
+        break;
+    case 9:
+        block = strcpy(text, snprintf(text, sizeof text, "%d", sleep) == 1 ? "x" : "y");
+        break;
+    case 10:
+        syscall(SYS_write, pipe_fd[1], "12345678", 8);
+        break; /* as long as a wake-up */
+    case 11:
+        sched_yield();
+        break;
+    case 12:
+        syscall(SYS_futex, &word, FUTEX_WAIT_PRIVATE, 0, NULL);
+        break; /* as of a mutex that is taken */
+    case 13:
+        syscall(SYS_getpid);
+        break;
+    default:
+        break;
+    }
 }
 
-void *calloc(size_t n, size_t size)
-{
-    note();
-    return __libc_calloc(n, size);
-}
-
-void *realloc(void *p, size_t n)
-{
-    note();
-    return __libc_realloc(p, n);
-}
-
-void free(void *p)
-{
-    if (p != NULL) note(); /* the end of a thread frees nothing */
-    __libc_free(p);
-}
-
-int pthread_mutex_lock(pthread_mutex_t *mutex)
-{
-    note();
-    int (*next)(pthread_mutex_t *);
-    *(void **)&next = next_of("pthread_mutex_lock");
-    return next(mutex);
-}
-
-ssize_t write(int fd, const void *data, size_t n)
-{
-    if (n != sizeof(uint64_t)) note(); /* else to an eventfd */
-    ssize_t (*next)(int, const void *, size_t);
-    *(void **)&next = next_of("write");
-    return next(fd, data, n);
-}
-
-int clock_nanosleep(clockid_t id, int flags, const struct timespec *t, struct timespec *left)
-{
-    is_pacer = 1;
-    atomic_fetch_add(&sleeps, 1);
-    int (*next)(clockid_t, int, const struct timespec *, struct timespec *);
-    *(void **)&next = next_of("clock_nanosleep");
-    return next(id, flags, t, left);
-}
-
-/* The counting counts. */
-static void *bad_pacer(void *arg)
-{
-    pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
-    clock_sleep_until_ns(clock_now_ns());
-    *(void *volatile *)arg = malloc(1);
-    pthread_mutex_lock(&lock);
-    pthread_mutex_unlock(&lock);
-    return NULL;
-}
-
-static void a_bad_pacer_is_found(void **state)
+static void what_is_planted_is_found(void **state)
 {
     (void)state;
-    pthread_t thread;
-    void *p = NULL;
-    assert_int_equal(pthread_create(&thread, NULL, bad_pacer, &p), 0);
-    pthread_join(thread, NULL);
-    free(p);
-    assert_true(atomic_exchange(&forbidden, 0) >= 2);
-    assert_true(atomic_exchange(&sleeps, 0) == 1);
+    static const char *const sets[] = {"head.prr_hz=1000", "head.frames=0", "loop.threads=1"};
+    static const struct {
+        const char *name;
+        int nr;
+    } planted[] = {{"malloc", -1},    {"free", -1},      {"pthread_mutex_lock", -1},
+                   {"snprintf", -1},  {NULL, SYS_write}, {NULL, SYS_sched_yield},
+                   {NULL, SYS_futex}, {NULL, SYS_getpid}};
+    struct run run;
+    if (!pacing_filter_works()) skip();
+    assert_int_equal(pipe2(pipe_fd, O_CLOEXEC), 0);
+    pacing_watch(plant_all);
+    start(&run, sets, 3, 0.05);
+    finish(&run, NULL);
+    const int n = pacing_found();
+    for (size_t i = 0; i < sizeof planted / sizeof *planted; i++) {
+        char call[40];
+        snprintf(call, sizeof call, "system call %d", planted[i].nr);
+        const char *name = planted[i].name != NULL ? planted[i].name : call;
+        if (!pacing_has(name)) fail_msg("%s was not found", name);
+    }
+    assert_int_equal(n, sizeof planted / sizeof *planted + 1); /* snprintf calls vsnprintf, which is one more */
+    close(pipe_fd[0]);
+    close(pipe_fd[1]);
+}
+
+/* ---- a busy head */
+
+enum { CLIENTS = 4 };
+static int client[CLIENTS];
+
+static int open_socket(const char *endpoint)
+{
+    const char *port = strrchr(endpoint, ':');
+    struct sockaddr_in at = {.sin_family = AF_INET, .sin_port = htons((uint16_t)atoi(port + 1))};
+    at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    const int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    assert_int_equal(connect(fd, (struct sockaddr *)&at, sizeof at), 0);
+    fcntl(fd, F_SETFL, O_NONBLOCK);
+    return fd;
+}
+
+static const struct timespec STILL_60_MS = {.tv_nsec = 60000000}, STILL_200_MS = {.tv_nsec = 200000000};
+
+static void open_clients(const struct run *run)
+{
+    static const char upgrade[] = "GET /ws HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: "
+                                  "Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Protocol: "
+                                  "scanhead-native-1\r\nSec-WebSocket-Version: 13\r\n\r\n";
+    struct link_place place;
+    int n = 0;
+    for (uint32_t i = 0; loop_get_place(run->loop, i, &place); i++) {
+        if (strcmp(place.type, "tcp") == 0)
+            for (int k = 0; k < 2; k++)
+                client[n++] = open_socket(place.endpoint);
+        if (strcmp(place.type, "pty") == 0)
+            client[n++] = open(place.endpoint + strlen("tty:"), O_RDWR | O_NOCTTY | O_CLOEXEC | O_NONBLOCK);
+        if (strcmp(place.type, "web") == 0) {
+            client[n] = open_socket(place.endpoint);
+            assert_int_equal(write(client[n++], upgrade, sizeof upgrade - 1), sizeof upgrade - 1);
+        }
+    }
+    assert_int_equal(n, CLIENTS);
+}
+
+/* Sends a line. Who was cut off comes back first. */
+static void say(struct run *run, const char *line)
+{
+    struct link_place place;
+    if (write(client[0], line, strlen(line)) > 0) return;
+    close(client[0]);
+    loop_get_place(run->loop, 0, &place);
+    client[0] = open_socket(place.endpoint);
+    (void)!write(client[0], line, strlen(line));
+}
+
+/* The head has booted after 0.2 s: 40 turns. */
+static void use(struct run *run, int turn)
+{
+    static const char *const said[] = {"HEAD:PRR MAX\n",   "SCAN:STOP\n", "HEAD:STATE?\n", "SCAN:START\n",
+                                       "HEAD:LINES 300\n", "SCAN:STOP\n", "nonsense\n",    "*RST\n",
+                                       "HEAD:STATION 2\n", "SCAN:START\n"};
+    static char bytes[65536];
+    if (turn == 0) open_clients(run);
+    if (turn == 88) pacing_slow_locks(10000000); /* casters are so slow that the ring comes round before them */
+    if (turn == 108) pacing_slow_locks(0);
+    for (int i = 0; i < CLIENTS; i++) {
+        if (i == 1 && turn < 100) continue; /* it does not read, and loses frames */
+        for (ssize_t n = 1; n > 0;)
+            n = read(client[i], bytes, sizeof bytes);
+    }
+    if (turn >= 50 && turn % 10 == 0) say(run, said[(turn / 10 - 5) % 10]);
+    if (turn % 10 == 3) say(run, "*IDN?\n");
+    if (turn % 10 == 6) (void)!write(client[2], "HEAD:PRR?\n", 10);
+}
+
+/* It comes too late, and catches up. */
+static void stand_still(int sleep)
+{
+    if (sleep == 300) syscall(SYS_clock_nanosleep, CLOCK_MONOTONIC, 0, &STILL_60_MS, NULL);
 }
 
 static void the_pacing_thread_does_nothing_else(void **state)
 {
     (void)state;
-    static const char *const sets[] = {"head.prr_hz=1000", "head.frames=0", "loop.queue_ms=20", "loop.threads=1"};
-    const struct link_spec null_link = {.type = LINK_NULL};
-    const struct loop_options options = {.hash = 1, .extra = &null_link};
-    struct sh_err err;
-    struct loop *loop;
-    struct loop_stats stats;
-    struct command_result result;
-    struct rig *rig = rig_open(&(struct device_options){.start = 1, .duration_s = 0.5}, sets, 4);
-    need(loop_create(rig->site, rig->device, &options, &loop, &err), &err);
-    need(loop_start(loop, &err), &err);
-    for (int ms = 0; !loop_is_over(loop) && ms < 30000; ms += 10) {
-        poll(NULL, 0, 10);
-        if (ms == 400) device_command(rig->device, 1, "HEAD:PRR MAX", 0, &result); /* slots grow */
-    }
-    assert_true(loop_is_over(loop));
-    loop_join(loop, &stats);
-    loop_free(loop);
-    rig_close(rig);
-    print_message("# %d sleeps, %u pulses, %u ticks lost\n", atomic_load(&sleeps), (unsigned)stats.counters.fired,
-                  (unsigned)stats.counters.lost_ticks);
-    assert_true(atomic_load(&sleeps) > 100 && stats.counters.fired > 10000);
-    assert_int_equal(atomic_load(&forbidden), 0);
+    static const char *const sets[] = {"head.prr_hz=1000", "head.frames=0",  "loop.queue_ms=20",
+                                       "loop.threads=1",   "loop.late_ms=1", "loop.ahead_ms=4"};
+    struct run run;
+    if (!pacing_filter_works()) skip();
+    pacing_watch(stand_still);
+    start(&run, sets, 6, 0.8);
+    finish(&run, use);
+    const int n = pacing_found();
+    for (int i = 0; i < CLIENTS; i++)
+        close(client[i]);
+    print_message("# %d sleeps, %u pulses, %u scans, %u ticks lost, %u frames lost by readers\n", pacing_sleeps(),
+                  (unsigned)run.stats.counters.fired, (unsigned)run.stats.scans,
+                  (unsigned)run.stats.counters.lost_ticks, (unsigned)run.stats.counters.reader_lost_frames);
+    assert_true(pacing_sleeps() > 100 && run.stats.counters.fired > 10000 && run.stats.scans > 1);
+    assert_true(run.stats.counters.lost_ticks > 54); /* so many slots there are */
+    assert_int_equal(run.stats.counters.cast, run.stats.counters.pulses + run.stats.counters.lost_pulses);
+    assert_int_equal(n, 0);
+}
+
+/* ---- a stall in the real loop */
+
+static void stand_still_for_200_ms(int sleep)
+{
+    if (sleep == 25) syscall(SYS_clock_nanosleep, CLOCK_MONOTONIC, 0, &STILL_200_MS, NULL);
+}
+
+/* With one tick of 10 ms ahead, 20 ticks are late, and those that follow until it has caught up. Waiting for a beat for
+ * each, it would be late for the rest of the run: 58 ticks. Half of the others is room for a machine with other work. */
+static void it_catches_up(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"head.prr_hz=1000", "head.frames=0",  "loop.tick_hz=100",
+                                       "loop.ahead_ms=2",  "loop.threads=1", "loop.late_ms=10000"};
+    struct run run;
+    if (!pacing_filter_works()) skip();
+    pacing_watch(stand_still_for_200_ms);
+    start(&run, sets, 6, 0.6);
+    finish(&run, NULL);
+    assert_int_equal(pacing_found(), 0);
+    print_message("# %u of %u ticks late\n", (unsigned)run.stats.counters.late_blocks,
+                  (unsigned)lateness_count(run.stats.late));
+    assert_true(run.stats.counters.late_blocks >= 19 && run.stats.counters.late_max_ns >= 190000000);
+    assert_true(run.stats.counters.late_blocks < 20 + 19);
+    assert_int_equal(run.stats.counters.lost_ticks, 0);
+}
+
+static int make_busy_folder(void **state)
+{
+    char path[96];
+    if (make_folder(state) != 0) return -1;
+    snprintf(path, sizeof path, "%s/run.yaml", folder);
+    FILE *f = fopen(path, "a");
+    return f != NULL && fputs(LINKS, f) >= 0 && fclose(f) == 0 ? 0 : -1;
 }
 
 int main(void)
 {
+    signal(SIGPIPE, SIG_IGN);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_bad_pacer_is_found),
+        cmocka_unit_test(what_is_planted_is_found),
         cmocka_unit_test(the_pacing_thread_does_nothing_else),
+        cmocka_unit_test(it_catches_up),
     };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return cmocka_run_group_tests(tests, make_busy_folder, remove_folder);
 }
 
 #else

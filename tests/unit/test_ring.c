@@ -127,6 +127,34 @@ static void a_tick_lost_while_it_is_filled_is_not_read(void **state)
     assert_int_equal(read_tick(ring.n_slots, "text"), RING_READ);
 }
 
+/* Casters are so late that the ring has come round before them: the slot of their tick says that a later one is lost. What
+ * they then made for it would be neither released nor lost. */
+static void a_tick_lost_a_round_ago_is_not_filled(void **state)
+{
+    (void)state;
+    const uint64_t late = 2 * ring.n_slots + 3;
+    for (uint64_t tick = 0; tick < late; tick++)
+        assert_true(ring_lose(&ring, tick));
+    for (uint64_t tick = 0; tick < late; tick++)
+        assert_null(ring_claim(&ring, tick));
+    publish(late, "text"); /* and the next one is whole */
+    assert_int_equal(read_tick(late, NULL), RING_READ);
+}
+
+/* The same for a tick that a caster has in hand. */
+static void a_tick_lost_a_round_ago_is_not_ready(void **state)
+{
+    (void)state;
+    struct ring_slot *slot = ring_claim(&ring, 0);
+    assert_non_null(slot);
+    for (uint64_t tick = 0; tick <= ring.n_slots; tick++)
+        assert_true(ring_lose(&ring, tick));
+    put(slot, "late");
+    assert_false(ring_ready(slot, 0));
+    assert_null(ring_peek(&ring, 0));
+    assert_null(ring_claim(&ring, ring.n_slots));
+}
+
 static void a_tick_that_is_ready_is_not_lost(void **state)
 {
     (void)state;
@@ -296,6 +324,8 @@ int main(void)
         WITH_RING(only_the_last_ticks_are_kept),
         WITH_RING(a_tick_lost_before_its_claim_is_not_filled),
         WITH_RING(a_tick_lost_while_it_is_filled_is_not_read),
+        WITH_RING(a_tick_lost_a_round_ago_is_not_filled),
+        WITH_RING(a_tick_lost_a_round_ago_is_not_ready),
         WITH_RING(a_tick_that_is_ready_is_not_lost),
         WITH_RING(what_does_not_fit_is_not_copied),
         WITH_RING(a_claimed_slot_is_empty),

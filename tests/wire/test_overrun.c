@@ -266,6 +266,22 @@ static void test_stall(void **state)
     check_balance(&a, wire);
 }
 
+/* The rows of the histogram, summed up from a lateness on. A row counts those of the octave below its number. */
+static uint64_t late_ticks(const struct wire *wire, uint64_t from_ns)
+{
+    static const char key[] = "\"late_below_ns\": {";
+    char *text = wire_read(wire_path(wire, "stats.json"), NULL), *at = strstr(text, key);
+    unsigned long long below_ns, count;
+    uint64_t n = 0;
+    assert_non_null(at);
+    at += strlen(key);
+    for (int used = 0; sscanf(at, " \"%llu\": %llu%n", &below_ns, &count, &used) == 2; at += used + (at[used] == ','))
+        if (below_ns / 2 >= from_ns) n += count;
+    assert_int_equal(at[strspn(at, " \n")], '}');
+    free(text);
+    return n;
+}
+
 /* A stall alone costs nothing with the lateness that a head has by default: what was due is sent when it goes
  * on. */
 static void test_stall_with_patience(void **state)
@@ -295,6 +311,10 @@ static void test_stall_with_patience(void **state)
     head_end(&head, SIGTERM);
     check_balance(&a, wire);
     assert_true(stats_uint(wire, "late_max_us") >= 300000); /* and it is no secret */
+    /* 400 ms without a tick: more than 100 of the 400 are late by 2^28 ns or more, which is 268 ms */
+    assert_in_range(late_ticks(wire, UINT64_C(1) << 28), 100, late_ticks(wire, 0) - 1);
+    assert_true(stats_uint(wire, "late_p50_us") <= stats_uint(wire, "late_p99_us") &&
+                stats_uint(wire, "late_p99_us") <= stats_uint(wire, "late_p999_us"));
 }
 
 /* A run that ends with its scan still says that the scan ended, however late it is. */

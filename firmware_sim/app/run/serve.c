@@ -70,6 +70,29 @@ static void put_pulses(struct json *json, const struct device_counters *c)
     json_uint(json, "lost_ticks", c->lost_ticks);
 }
 
+/* Percentiles, and a member for each octave that is not empty: below so many ns, so many of them. */
+static void put_lateness(struct json *json, const char *name, const struct lateness *lateness)
+{
+    static const struct {
+        const char *name;
+        double q;
+    } percentile[] = {{"p50", 0.5}, {"p99", 0.99}, {"p999", 0.999}, {"max", 1.0}};
+    uint64_t below_ns, count;
+    char key[32];
+    for (size_t i = 0; i < sizeof percentile / sizeof *percentile; i++) {
+        snprintf(key, sizeof key, "%s_%s_us", name, percentile[i].name);
+        json_double(json, key, lateness_us(lateness, percentile[i].q));
+    }
+    snprintf(key, sizeof key, "%s_below_ns", name);
+    json_open_object(json, key);
+    for (uint32_t i = 0; lateness_row(lateness, i, &below_ns, &count); i++) {
+        if (count == 0) continue;
+        snprintf(key, sizeof key, "%llu", (unsigned long long)below_ns);
+        json_uint(json, key, count);
+    }
+    json_close_object(json);
+}
+
 static void put_stats(struct json *json, const void *ctx)
 {
     const struct run_stats *run = ctx;
@@ -93,9 +116,8 @@ static void put_stats(struct json *json, const void *ctx)
     json_uint(json, "late_blocks", c->late_blocks);
     json_uint(json, "late_poses", c->late_poses);
     json_uint(json, "bad_poses", c->bad_poses);
-    json_double(json, "late_p50_us", s->late_p50_us);
-    json_double(json, "late_p999_us", s->late_p999_us);
-    json_double(json, "late_max_us", 1e-3 * (double)c->late_max_ns);
+    put_lateness(json, "late", s->late);
+    put_lateness(json, "wake", s->wake);
     json_int(json, "rss_peak_kib", usage.ru_maxrss);
     json_string(json, "stream_sha256", s->have_hash ? s->sha256 : NULL);
     loop_put_links(run->loop, json);
