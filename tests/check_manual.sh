@@ -94,6 +94,7 @@ completions() {
         completes "scanhead run --set loop.pace" = realtime fast step &&
         completes "scanhead run --set = loop.pace =" f fast && completes "scanhead batch --sweep" loop.p loop.pace= &&
         completes "scanhead run --set links[3].type =" p pty && completes "scanhead run --set" "links[3].prot" "links[3].protocol=" &&
+        completes "scanhead run --set links.3.type =" p pty && completes "scanhead run --set" links.3.prot links.3.protocol= &&
         completes "scanhead run" a "a b.yaml" && completes "scanhead run --stats" c c.yaml &&
         completes "scanhead batch -o" "" "sub folder" && completes "scanhead run --duration" "" &&
         completes "scanhead help" vi view && completes "scanhead check --help" output output &&

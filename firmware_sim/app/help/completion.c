@@ -14,9 +14,9 @@ static const char FUNCTION[] =
     "    case $kind in\n"
     "    words) COMPREPLY=($(compgen -W \"${1#words}\" -- \"$2\")) ;;\n"
     "    keys)\n"
-    "        # the number of an element that was typed stands for [0]\n"
+    "        # the number of an element that was typed, [3] or .3, stands for [0]\n"
     "        key=$_scanhead_keys\n"
-    "        [[ $2 =~ ^[a-z_.]*(\\[[0-9]+\\]) ]] && key=${key//'[0]'/${BASH_REMATCH[1]}}\n"
+    "        [[ $2 =~ ^[a-z_.]*[a-z_](\\[[0-9]+\\]|\\.[0-9]+) ]] && key=${key//'[0]'/${BASH_REMATCH[1]}}\n"
     "        COMPREPLY=($(compgen -S = -W \"$key\" -- \"$2\"))\n"
     "        compopt -o nospace 2>/dev/null ;;\n"
     "    files) mapfile -t COMPREPLY < <(compgen -f -- \"$2\"); compopt -o filenames 2>/dev/null ;;\n"
@@ -84,7 +84,7 @@ static void put_keys(void)
     fputs("_scanhead_keys='", stdout);
     for (size_t i = 0; config_describe_key(CONFIG_KEYS, i, &key); i++)
         if (key.has_value) put_path(key.path), putchar(' ');
-    puts("'\n\n_scanhead_key()\n{\n    local key=$1\n    [[ $key =~ (\\[[0-9]+\\]) ]] && key=${key/\"${BASH_REMATCH[1]}\"/'[0]'}"
+    puts("'\n\n_scanhead_key()\n{\n    local key=$1\n    [[ $key =~ (\\[[0-9]+\\]|\\.[0-9]+) ]] && key=${key/\"${BASH_REMATCH[1]}\"/'[0]'}"
          "\n    case $key in");
     for (size_t i = 0; config_describe_key(CONFIG_KEYS, i, &key); i++) {
         if (key.words == NULL) continue;
