@@ -62,8 +62,15 @@ HEADS_DIR = $(PREFIX)/share/scanhead/heads
 SCENES_DIR = $(PREFIX)/share/scanhead/scenes
 FAULTS_DIR = $(PREFIX)/share/scanhead/faults
 CAMPAIGN_DIR = $(PREFIX)/share/scanhead/campaign
+# Where libraries are, below PREFIX; a distribution may have another folder for each machine.
+LIB = lib
 UDEV_DIR = $(PREFIX)/lib/udev/rules.d
-PC_DIR = $(PREFIX)/lib/pkgconfig
+UNIT_DIR = $(PREFIX)/lib/systemd/system
+PC_DIR = $(PREFIX)/$(LIB)/pkgconfig
+MAN_DIR = $(PREFIX)/share/man
+COMPLETION_DIR = $(PREFIX)/share/bash-completion/completions
+# Prints manual pages and the completion: for another machine a program that runs here.
+PRINTER = $(BUILD)/scanhead
 WIRESHARK_DIR = $(PREFIX)/share/scanhead/wireshark
 ALL_CPPFLAGS = -I. -D_GNU_SOURCE -DSH_EMBREE=$(EMBREE_VERSION) $(if $(USBREDIR),-DHAVE_USBREDIR) -MMD -MP $(CPPFLAGS)
 ALL_CFLAGS = -std=c11 $(OPT) -g $(FP) $(CWARN) $(WERROR) -fPIC -pthread $(SAN) $(PKG_CFLAGS) $(CFLAGS)
@@ -126,11 +133,11 @@ $(BUILD)/libscanhead.a $(BUILD)/client.a:
 	$(Q)$(AR) rcs $@ $^
 $(BUILD)/libscanhead.so: $(LIBOBJ) drivers/host/libscanhead.map
 	@echo "  LD    $@"
-	$(Q)$(CC) -shared $(SAN) -Wl,--version-script=drivers/host/libscanhead.map -Wl,-soname,libscanhead.so.1 \
+	$(Q)$(CC) -shared $(SAN) $(LDFLAGS) -Wl,--version-script=drivers/host/libscanhead.map -Wl,-soname,libscanhead.so.1 \
 		-o $@ $(LIBOBJ) -lnettle -lusb-1.0 -lm
 $(BUILD)/scanhead: $(BUILD)/firmware_sim/main.c.o $(BUILD)/modules.a
 	@echo "  LD    $@"
-	$(Q)$(CC) $(SAN) -o $@ $^ $(LDLIBS)
+	$(Q)$(CC) $(SAN) $(LDFLAGS) -o $@ $^ $(LDLIBS)
 
 # ---- test programs. A program of tests/ is linked with
 #   common.a    tests/common: scenes, references, clients                   all of them
@@ -351,13 +358,14 @@ test-programs: all $(BUILD)/bench $(TESTS) $(FIGURES)
 include $(wildcard tests/*/*.mk config/*/*.mk)
 
 install: all
-	install -d "$(DESTDIR)$(PREFIX)/bin" "$(DESTDIR)$(PREFIX)/lib" "$(DESTDIR)$(PREFIX)/include" "$(DESTDIR)$(HEADS_DIR)" \
+	install -d "$(DESTDIR)$(PREFIX)/bin" "$(DESTDIR)$(PREFIX)/$(LIB)" "$(DESTDIR)$(PREFIX)/include" "$(DESTDIR)$(HEADS_DIR)" \
 		"$(DESTDIR)$(SCENES_DIR)" "$(DESTDIR)$(FAULTS_DIR)" "$(DESTDIR)$(CAMPAIGN_DIR)" "$(DESTDIR)$(UDEV_DIR)" "$(DESTDIR)$(PC_DIR)" "$(DESTDIR)$(PREFIX)/share/scanhead/python" \
-		"$(DESTDIR)$(WIRESHARK_DIR)"
+		"$(DESTDIR)$(WIRESHARK_DIR)" "$(DESTDIR)$(UNIT_DIR)" "$(DESTDIR)$(COMPLETION_DIR)" \
+		"$(DESTDIR)$(MAN_DIR)/man1" "$(DESTDIR)$(MAN_DIR)/man3" "$(DESTDIR)$(MAN_DIR)/man5"
 	install $(BUILD)/scanhead "$(DESTDIR)$(PREFIX)/bin/"
-	install -m 644 $(BUILD)/libscanhead.a "$(DESTDIR)$(PREFIX)/lib/"
-	install $(BUILD)/libscanhead.so "$(DESTDIR)$(PREFIX)/lib/libscanhead.so.1"
-	ln -sf libscanhead.so.1 "$(DESTDIR)$(PREFIX)/lib/libscanhead.so"
+	install -m 644 $(BUILD)/libscanhead.a "$(DESTDIR)$(PREFIX)/$(LIB)/"
+	install $(BUILD)/libscanhead.so "$(DESTDIR)$(PREFIX)/$(LIB)/libscanhead.so.1"
+	ln -sf libscanhead.so.1 "$(DESTDIR)$(PREFIX)/$(LIB)/libscanhead.so"
 	install -m 644 drivers/host/scanhead.h "$(DESTDIR)$(PREFIX)/include/"
 	install -m 644 drivers/host/python/scanhead.py "$(DESTDIR)$(PREFIX)/share/scanhead/python/"
 	install -m 644 drivers/protocol/wireshark/scanhead.lua "$(DESTDIR)$(WIRESHARK_DIR)/"
@@ -366,7 +374,12 @@ install: all
 	install -m 644 config/faults/*.yaml "$(DESTDIR)$(FAULTS_DIR)/"
 	install config/campaign/*.sh "$(DESTDIR)$(CAMPAIGN_DIR)/"
 	install -m 644 drivers/host/70-scanhead.rules "$(DESTDIR)$(UDEV_DIR)/"
-	sed "s|@PREFIX@|$(PREFIX)|; s|@VERSION@|$$(sed -n 's/^#define SCANHEAD_VERSION  *"\(.*\)"$$/\1/p' \
+	sed "s|@PREFIX@|$(PREFIX)|" config/packaging/scanhead@.service.in > "$(DESTDIR)$(UNIT_DIR)/scanhead@.service"
+	pages=$$($(PRINTER) help --man list) && for p in $$pages; do \
+		$(PRINTER) help --man $$p > "$(DESTDIR)$(MAN_DIR)/man$${p##*.}/$$p" || exit; done
+	awk -f drivers/host/libscanhead.3.awk drivers/host/scanhead.h > "$(DESTDIR)$(MAN_DIR)/man3/libscanhead.3"
+	$(PRINTER) help --completion bash > "$(DESTDIR)$(COMPLETION_DIR)/scanhead"
+	sed "s|@PREFIX@|$(PREFIX)|; s|@LIB@|$(LIB)|; s|@VERSION@|$$(sed -n 's/^#define SCANHEAD_VERSION  *"\(.*\)"$$/\1/p' \
 		drivers/host/scanhead.h)|" drivers/host/libscanhead.pc.in > "$(DESTDIR)$(PC_DIR)/libscanhead.pc"
 format:
 	clang-format -i $$(git ls-files '*.c' '*.h' '*.cpp')

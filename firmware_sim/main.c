@@ -5,25 +5,13 @@
 
 #include "drivers/host/scanhead.h"
 #include "firmware_sim/app/app.h"
+#include "firmware_sim/app/help/help.h"
 
 /* The only list of commands. */
 static const struct app_command *const COMMANDS[] = {
     &app_run,      &app_record, &app_batch, &app_plan, &app_map, &app_report,
     &app_coverage, &app_check,  &app_list,  &app_init, &app_view, &app_soak, NULL,
 };
-
-static void print_help(FILE *out)
-{
-    char arguments[128];
-    fprintf(out, "scanhead: a terrestrial laser scanner head in software, real on the wire\n\n");
-    for (const struct app_command *const *c = COMMANDS; *c != NULL; c++) {
-        app_arguments(*c, arguments, sizeof arguments);
-        fprintf(out, "  scanhead %s%-*s %s\n", (*c)->name, 38 - (int)strlen((*c)->name), arguments, (*c)->summary);
-    }
-    fprintf(out, "\nEach command has --help. `scanhead check --help` lists all configuration keys.\n"
-                 "scanhead --version says which release this is.\n"
-                 "Exit status: 0 done, 1 failed, 2 wrong usage, configuration or input.\n");
-}
 
 static int fail_unknown(const char *word)
 {
@@ -40,13 +28,14 @@ static int fail_unknown(const char *word)
 static int run(int argc, char **argv)
 {
     if (argc < 2) {
-        print_help(stderr);
+        help_print(COMMANDS, stderr);
         return APP_USAGE;
     }
-    if (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0 || strcmp(argv[1], "help") == 0) {
-        print_help(stdout);
+    if (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0) {
+        help_print(COMMANDS, stdout);
         return APP_OK;
     }
+    if (strcmp(argv[1], "help") == 0) return help_run(COMMANDS, argc - 1, argv + 1);
     if (strcmp(argv[1], "--version") == 0) {
         printf("scanhead %s\n", scanhead_version());
         return APP_OK;

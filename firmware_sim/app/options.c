@@ -75,14 +75,16 @@ static int pass(const struct app_command *command, const struct app_option *row,
 void app_pass_options(struct app_option *rows, const struct app_command *other, const char *const *names, size_t at)
 {
     int n = 0;
-    while (rows[n].kind != APP_LAST)
-        n++;
+    for (; rows[n].kind != APP_LAST; n++)
+        if (rows[n].kind == APP_PASS) return; /* they are there */
     for (const struct app_option *row = other->options; row->kind != APP_LAST && n < APP_MAX_OPTIONS; row++) {
         const char *const *name = names;
         while (*name != NULL && strcmp(*name, row->name) != 0)
             name++;
         if (*name != NULL)
-            rows[n++] = (struct app_option){APP_PASS, row->name, row->argument, .at = at, .help = row->help};
+            rows[n++] = (struct app_option){APP_PASS,         row->name,       row->argument,
+                                            .at = at,         .key = row->key, .choices = row->choices,
+                                            .n_choices = row->n_choices, .help = row->help};
     }
     rows[n] = (struct app_option)OPTION_END;
 }
@@ -311,6 +313,13 @@ static int take_operands(const struct app_command *command, int n, char *const *
     return APP_GO_ON;
 }
 
+static void (*help_printer)(const struct app_command *command) = print_help;
+
+void app_set_help(void (*print)(const struct app_command *command))
+{
+    help_printer = print != NULL ? print : print_help;
+}
+
 /* ---- parsing */
 
 /* One option as getopt gave it, from `word`. APP_OK, or the exit status of an error. *done: the command line
@@ -332,7 +341,7 @@ static int take_option(const struct app_command *command, int opt, const char *w
 static int help(const struct app_command *command, const char *part)
 {
     if (part != NULL && command->print_part != NULL) return command->print_part(part);
-    print_help(command);
+    help_printer(command);
     return APP_OK;
 }
 

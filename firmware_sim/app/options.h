@@ -39,6 +39,8 @@ struct app_option {
     double min, max;
     const char *word;     /* WHOLE: a word that is allowed, too, and gives APP_WORD; NULL: none */
     const char *key;
+    const char *const *choices; /* words that it takes, which a shell completes; NULL: others, or those of the key */
+    size_t n_choices;
     int (*apply)(void *values, const char *text); /* APP_OK, or APP_USAGE with the reason printed */
     const char *help;
 };
@@ -48,6 +50,7 @@ struct app_option {
 #define OPTION_NO_HASH(offset) \
     {APP_FLAG, "no-hash", NULL, .at = offset, \
      .help = "leave stream_sha256 out of --stats (null); it takes 10 to 20 ns of processor time a pulse"}
+#define OPTION_CHOICES(words) .choices = words, .n_choices = sizeof(words) / sizeof((words)[0])
 #define OPTION_END {.kind = APP_LAST}
 /* clang-format on */
 
@@ -92,11 +95,14 @@ struct app_input {
  * line. The strings are argv's own, or lie in `in`, which must stay where it is. */
 int app_parse(const struct app_command *command, int argc, char **argv, struct app_input *in, void *values);
 
+/* From now on --help of a command is what `print` makes of its table; NULL: the text. The parts of a help stay text. */
+void app_set_help(void (*print)(const struct app_command *command));
+
 /* Adds KEY=VALUE, which must live on. APP_OK, or APP_USAGE with the reason printed. */
 int app_add_set(struct app_sets *sets, const char *set);
 
 /* Adds to `rows`, which ends with OPTION_END and has room for APP_MAX_OPTIONS + 1, those options of another command that
- * `names` has (ends with NULL), as APP_PASS to the struct app_words at `at`. Once. */
+ * `names` has (ends with NULL), as APP_PASS to the struct app_words at `at`. A table that has such rows stays as it is. */
 void app_pass_options(struct app_option *rows, const struct app_command *other, const char *const *names, size_t at);
 
 /* Prints a usage error: one line that ends with where the help is. Returns APP_USAGE. */

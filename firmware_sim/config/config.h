@@ -380,6 +380,20 @@ const char *config_beam_moves(const struct config *cfg);
 /* Why rays do not all begin at the head's station, as a sight needs it (core/sight.h); NULL: they do. */
 const char *config_rays_move(const struct config *cfg);
 
+/* What the tables say of a key. Strings are constant, but for `what`. */
+struct config_key_text {
+    const char *path, *help;
+    const char *const *words; /* the values that it takes, NULL at the end; NULL: others */
+    int has_value;            /* 0: a section, or a list */
+    char what[1024];          /* type, unit, allowed values, default; may be left out or not */
+};
+/* Of a configuration's keys, or of a head profile's. */
+enum config_keys { CONFIG_KEYS, CONFIG_PROFILE_KEYS };
+/* What stands above them in the reference. */
+const char *config_keys_intro(enum config_keys keys);
+/* Key i, in the order of the reference; 0 after the last one. */
+int config_describe_key(enum config_keys keys, size_t i, struct config_key_text *out);
+
 /* The reference: every key with type, unit, default, range and help. */
 void config_print_reference(FILE *out);
 

@@ -54,18 +54,34 @@ static void add_default(const struct cfg_key *key, char *line, size_t room)
         snprintf(line, room, "; optional");
 }
 
+static void describe(const struct cfg_key *key, struct config_key_text *out)
+{
+    static const char *const switches[] = {"off", "on", NULL};
+    char allowed[CFG_ALLOWED_MAX];
+    *out = (struct config_key_text){key->path, key->help, key->type == CFG_BOOL ? switches : key->names,
+                                    .has_value = key->type != CFG_MAP && key->type != CFG_LIST};
+    int len = snprintf(out->what, sizeof out->what, "%s", type_name(key));
+    if (key->type == CFG_MAP) return;
+    len += snprintf(out->what + len, sizeof out->what - (size_t)len, "%s%s; %s", key->unit != NULL ? ", " : "",
+                    key->unit != NULL ? key->unit : "", cfg_allowed(key, NULL, allowed));
+    add_default(key, out->what + len, sizeof out->what - (size_t)len);
+}
+
+int config_describe_key(enum config_keys keys, size_t i, struct config_key_text *out)
+{
+    const struct cfg_table *table = keys == CONFIG_KEYS ? &cfg_config_table : &cfg_profile_table;
+    if (i >= table->n) return 0;
+    describe(&table->keys[i], out);
+    return 1;
+}
+
 static void print_key(const struct cfg_key *key, FILE *out)
 {
-    char allowed[CFG_ALLOWED_MAX], line[CFG_ALLOWED_MAX + 256];
-    int len = snprintf(line, sizeof line, "%s", type_name(key));
-    if (key->type != CFG_MAP) {
-        len += snprintf(line + len, sizeof line - (size_t)len, "%s%s; %s", key->unit != NULL ? ", " : "",
-                        key->unit != NULL ? key->unit : "", cfg_allowed(key, NULL, allowed));
-        add_default(key, line + len, sizeof line - (size_t)len);
-    }
-    fprintf(out, "%s\n", key->path);
-    print_wrapped(line, 4, "", out);
-    print_wrapped(key->help, 4, "", out);
+    struct config_key_text text;
+    describe(key, &text);
+    fprintf(out, "%s\n", text.path);
+    print_wrapped(text.what, 4, "", out);
+    print_wrapped(text.help, 4, "", out);
 }
 
 static void print_keys(const struct cfg_table *table, FILE *out)
@@ -74,24 +90,26 @@ static void print_keys(const struct cfg_table *table, FILE *out)
         print_key(&table->keys[i], out);
 }
 
+const char *config_keys_intro(enum config_keys keys)
+{
+    if (keys == CONFIG_KEYS)
+        return "Configuration, YAML. Any key can be set with --set KEY=VALUE (elements as in stations[0].name=gate; the\n"
+               "index after the last one appends). Numbers are decimal, as in 300000, 0.5 or 1.2e6, without a unit.\n"
+               "Relative paths start at the file they stand in; in --set, at the working directory.\n";
+    return "Head profile, heads/NAME.yaml. maker and model are texts; each figure is written { value: V, from: GRADE }.\n"
+           "GRADE is data sheet (a source names it, or two sources agree), quoted (a source says so without naming\n"
+           "it), or assumed. source: TEXT and note: TEXT may follow, for who reads the file.\n";
+}
+
 static void print_profile_keys(FILE *out)
 {
-    fputs(
-        "Head profile, heads/NAME.yaml. maker and model are texts; each figure is written { value: V, from: GRADE }.\n"
-        "GRADE is data sheet (a source names it, or two sources agree), quoted (a source says so without naming\n"
-        "it), or assumed. source: TEXT and note: TEXT may follow, for who reads the file.\n\n",
-        out);
+    fprintf(out, "%s\n", config_keys_intro(CONFIG_PROFILE_KEYS));
     print_keys(&cfg_profile_table, out);
 }
 
 void config_print_reference(FILE *out)
 {
-    /* clang-format off */
-    fputs("Configuration, YAML. Any key can be set with --set KEY=VALUE (elements as in stations[0].name=gate; the\n"
-          "index after the last one appends). Numbers are decimal, as in 300000, 0.5 or 1.2e6, without a unit.\n"
-          "Relative paths start at the file they stand in; in --set, at the working directory.\n\n",
-          out);
-    /* clang-format on */
+    fprintf(out, "%s\n", config_keys_intro(CONFIG_KEYS));
     print_keys(&cfg_config_table, out);
     fputc('\n', out);
     print_profile_keys(out);

@@ -257,7 +257,7 @@ static const struct app_option OPTIONS[] = {
      .help = "a picture as seen from a place, shaded by depth; the options below go with it"},
     {APP_TEXT, "cloud", "FILE", .at = AT(view.cloud),
      .help = "show this recording (.ply, .las) in place of a scan; CONFIG brings it to the scene, with its stations"},
-    {APP_TEXT, "from", "DIRECTION", .at = AT(view.from),
+    {APP_TEXT, "from", "DIRECTION", .at = AT(view.from), OPTION_CHOICES(map_view_winds),
      .help = "where to look from: north, north-east ..., or degrees clockwise from north (default south-west); so far that "
  "all is seen"},
     {APP_NUMBER, "elevation-deg", "DEG", .min = -89, .max = 89, .at = AT(view.elevation_deg),
@@ -268,7 +268,7 @@ static const struct app_option OPTIONS[] = {
     {APP_NUMBER, "fov-deg", "DEG", .min = 1, .max = 160, .at = AT(view.fov_deg),
      .help = "field of view, across the width (default 40)"},
     {APP_TEXT, "size", "WxH", .at = AT(view.size), .help = "of the picture, in pixels, up to 4096x4096 (default 1200x800)"},
-    {APP_TEXT, "colour", "WHAT", .at = AT(view.colour),
+    {APP_TEXT, "colour", "WHAT", .at = AT(view.colour), OPTION_CHOICES(map_view_colours),
      .help = "height (default), range, reflectance, label, station, rgb (of a recording, or output.colour)"},
     {APP_TEXT, "limits", "LOW,HIGH", .at = AT(view.limits),
      .help = "between which the colours of height or range spread (default: what is seen, but for 1 %)"},

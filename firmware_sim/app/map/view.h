@@ -17,6 +17,9 @@ enum map_view_colour {
     MAP_VIEW_RGB,
 };
 
+/* The words of --colour, and of --from: clockwise from north, 45 degrees apart. */
+extern const char *const map_view_colours[6], *const map_view_winds[8];
+
 /* As the command line says it. */
 struct map_view_options {
     const char *cloud, *from, *eye, *look_at, *size, *colour, *limits;

@@ -15,11 +15,10 @@ const struct map_view_options map_view_default = {.elevation_deg = 40,
                                                   .above_m = -INFINITY,
                                                   .shade = 1};
 
-static const char *const colours[] = {"height", "range", "reflectance", "label", "station", "rgb"};
+const char *const map_view_colours[6] = {"height", "range", "reflectance", "label", "station", "rgb"};
 
-/* Clockwise from north, 45 degrees apart. */
-static const char *const winds[] = {"north", "north-east", "east", "south-east",
-                                    "south", "south-west", "west", "north-west"};
+const char *const map_view_winds[8] = {"north", "north-east", "east", "south-east",
+                                       "south", "south-west", "west", "north-west"};
 
 static int find_word(const char *option, const char *word, const char *const *words, size_t n, struct sh_err *err)
 {
@@ -49,7 +48,7 @@ static int read_direction(const char *text, double *azimuth_rad, struct sh_err *
     double azimuth_deg;
     if (text == NULL) text = "south-west";
     if (!read_numbers(text, ',', &azimuth_deg, 1) || fabs(azimuth_deg) > 360) {
-        const int wind = find_word("from", text, winds, 8, err);
+        const int wind = find_word("from", text, map_view_winds, 8, err);
         if (wind < 0)
             return sh_fail(err, SH_EINPUT, "%s, and degrees clockwise from north, -360 to 360", strdupa(err->text));
         azimuth_deg = 45.0 * wind;
@@ -90,14 +89,14 @@ static int read_limits(const struct map_view_options *o, struct map_view_plan *p
     if (!read_numbers(o->limits, ',', plan->limit, 2) || !(plan->limit[1] > plan->limit[0]))
         return sh_fail(err, SH_EINPUT, "--limits %s: limits are LOW,HIGH, the second larger than the first", o->limits);
     if (plan->colour > MAP_VIEW_RANGE)
-        return sh_fail(err, SH_EINPUT, "--limits goes with --colour height and range, not %s", colours[plan->colour]);
+        return sh_fail(err, SH_EINPUT, "--limits goes with --colour height and range, not %s", map_view_colours[plan->colour]);
     return SH_OK;
 }
 
 int map_view_read(const struct map_view_options *o, struct map_view_plan *plan, struct sh_err *err)
 {
     memset(plan, 0, sizeof *plan);
-    int colour = find_word("colour", o->colour != NULL ? o->colour : "height", colours, 6, err);
+    int colour = find_word("colour", o->colour != NULL ? o->colour : "height", map_view_colours, 6, err);
     if (colour < 0) return colour;
     plan->colour = (enum map_view_colour)colour;
     plan->elevation_rad = angle_rad(o->elevation_deg);

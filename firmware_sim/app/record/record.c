@@ -105,10 +105,11 @@ static int take_colour_limits(void *values, const char *text)
     return APP_OK;
 }
 
+static const char *const ply_names[] = {"scanhead", "cloudcompare"};
+
 static int take_ply_names(void *values, const char *text)
 {
-    static const char *const words[] = {"scanhead", "cloudcompare"};
-    return take_word("ply-names", words, 2, text, &((struct record_line *)values)->job.files.recorder.scalar_names);
+    return take_word("ply-names", ply_names, 2, text, &((struct record_line *)values)->job.files.recorder.scalar_names);
 }
 
 static int take_ply_columns(void *values, const char *text)
@@ -267,12 +268,12 @@ static const struct app_option OPTIONS[] = {
     {APP_NUMBER, "replug", "S", .min = 0.0, .max = 1e8, .at = AT(job.recording.replug_s),
      .help = "when the head is unplugged, wait up to S seconds for it and go on in the same files"},
     {APP_FLAG, "ascii", NULL, .at = AT(job.files.recorder.ascii), .help = "PLY as text"},
-    {APP_CALL, "ply-names", "WHOSE", .apply = take_ply_names,
+    {APP_CALL, "ply-names", "WHOSE", .apply = take_ply_names, OPTION_CHOICES(ply_names),
      .help = "scanhead: range, time, ... (the default), or cloudcompare: scalar_range, scalar_time, ..., which it shows"},
     {APP_CALL, "ply-columns", "LIST", .apply = take_ply_columns,
      .help = "of .ply beside x, y, z: some of range,reflectance,time,echo,label,station,frame,attributes,colour; xyz: none "
              "of them; float: lengths as float, within 1 km of the origin (default: all, in double)"},
-    {APP_CALL, "colour", "BY", .apply = take_colour,
+    {APP_CALL, "colour", "BY", .apply = take_colour, OPTION_CHOICES(colour_words),
      .help = "red, green, blue in .ply, .las, .ptx, .e57, and the texture of meshes, show the range, height, "
              "reflectance (grey, -30 to 0 dB), label (a hue per surface), frame (of a trajectory), texture (of a "
              "CONFIG); or solid; none. Default: as the head sends them, if it does (output.colour)"},

@@ -5,8 +5,10 @@
 #include <string.h>
 #include <sys/resource.h>
 
+#include "core/text.h"
 #include "firmware_sim/app/run/run.h"
 #include "firmware_sim/base/clock.h"
+#include "firmware_sim/base/notify.h"
 
 enum { VIEW_SESSIONS = 4 };
 
@@ -43,16 +45,42 @@ static int say_view(const struct loop *loop, struct sh_err *err)
     return fflush(stdout) == 0 ? SH_OK : sh_fail(err, SH_EIO, "standard output: %s", strerror(errno));
 }
 
+/* To the service manager, once the links are open: until then whoever depends on this head waits. */
+static int notify_ready(const struct loop *loop, struct sh_err *err)
+{
+    struct link_place place;
+    char text[2048] = "READY=1\nSTATUS=links open:";
+    size_t n = strlen(text);
+    if (!notify_is_wanted()) return SH_OK;
+    for (uint32_t i = 0; loop_get_place(loop, i, &place); i++) {
+        if (strcmp(place.type, "fd") == 0) continue; /* within this process */
+        text_keep_line(place.endpoint);
+        const int len = snprintf(text + n, sizeof text - n, " %s", place.endpoint);
+        if ((size_t)len >= sizeof text - n) break;
+        n += (size_t)len;
+    }
+    return notify_send(text, err);
+}
+
+/* The end has begun: links bring out what their readers still take. */
+static void notify_stopping(void)
+{
+    struct sh_err err;
+    if (notify_send("STOPPING=1\nSTATUS=ending", &err) != SH_OK) sh_warn(&app_report_stderr, "%s", err.text);
+}
+
 static void wait_for_end(struct loop *loop)
 {
     int ending = 0;
     while (!loop_is_over(loop)) {
         if (app_interrupted() && !ending) {
             ending = 1;
+            notify_stopping();
             loop_end(loop);
         }
         poll(NULL, 0, 20); /* ends early on a signal */
     }
+    if (!ending) notify_stopping();
 }
 
 struct run_stats {
@@ -141,6 +169,7 @@ int run_serve(const struct run_options *o, struct loop *loop, struct loop_stats 
     int rc = loop_start(loop, err);
     if (rc == SH_OK) rc = app_say_ready(o->ready_fd, put_endpoints, loop, err);
     if (rc == SH_OK && o->view) rc = say_view(loop, err);
+    if (rc == SH_OK) rc = notify_ready(loop, err);
     if (rc == SH_OK)
         wait_for_end(loop);
     else

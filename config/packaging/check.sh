@@ -1,0 +1,203 @@
+#!/bin/bash
+# The packages in a new root of Debian 12: installed by apt, tried, removed, purged; nothing may be left. Run by make
+# deb-check. Prints TAP, lintian's output, and what of systemd can be looked at without booting.
+#
+#   check.sh DEB_DIR VERSION      DEB_DIR: where the packages are; the root is made in it
+#
+# MIRROR: where Debian is taken from; SUITE: which one.
+set -u
+debs=$1 version=$2
+suite=${SUITE:-bookworm} mirror=${MIRROR:-http://deb.debian.org/debian}
+here=$(cd "$(dirname "$0")" && pwd)
+project=$(cd "$here/../.." && pwd)
+[ "$(id -u)" = 0 ] || { echo "deb-check: a root of Debian is made and entered: that needs root; sudo make deb-check" >&2; exit 1; }
+command -v mmdebstrap >/dev/null || { echo "deb-check: no mmdebstrap; apt-get install mmdebstrap" >&2; exit 1; }
+debs=$(cd "$debs" && pwd) || exit 1
+root=$debs/root
+work=$debs/check
+rm -rf "$work" && mkdir -p "$work" || exit 1
+. "$project/tests/tap.sh"
+# What is mounted below the root belongs to this mount namespace, and goes with it.
+[ -n "${DEB_CHECK_APART:-}" ] || exec env DEB_CHECK_APART=1 unshare --mount --propagation private bash "$0" "$@"
+
+packages="scanhead libscanhead1 libscanhead-dev python3-scanhead"
+inside() {
+    chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8 DEBIAN_FRONTEND=noninteractive "$@"
+}
+# As a user who has no rights, and no file of his own but in /tmp.
+as_nobody() {
+    inside setpriv --reuid=65534 --regid=65534 --clear-groups --no-new-privs --bounding-set=-all "$@"
+}
+# The head has real time beside that: by the limits of the service where they can be set here, else by two rights.
+as_head() {
+    if [ "$limits" = yes ]; then
+        as_nobody "$@"
+    else
+        inside setpriv --reuid=65534 --regid=65534 --clear-groups --no-new-privs --bounding-set=-all,+sys_nice,+ipc_lock \
+            --inh-caps=+sys_nice,+ipc_lock --ambient-caps=+sys_nice,+ipc_lock "$@"
+    fi
+}
+
+lintian_finds_no_errors() {
+    lintian --tag-display-limit 0 --show-overrides "$debs"/*.changes >"$work/lintian" 2>&1
+    ! grep '^E: ' "$work/lintian"
+}
+
+make_root() {
+    rm -rf --one-file-system "$root"
+    mmdebstrap --quiet --variant=minbase "$suite" "$root" "$mirror" &&
+        mount -t proc proc "$root/proc" && mount -t devpts -o newinstance,ptmxmode=0666,mode=0620 devpts "$root/dev/pts" &&
+        mkdir "$root/packages" && cp "$debs"/*.deb "$root/packages/" && cp /etc/resolv.conf "$root/etc/" &&
+        printf '#!/bin/sh\nexit 101\n' >"$root/usr/sbin/policy-rc.d" && chmod +x "$root/usr/sbin/policy-rc.d"
+}
+
+# All packages of Debian that ours ask for, and a compiler: so that what comes next is by ours alone.
+install_others() {
+    inside apt-get update -qq && inside apt-get install -qq --no-install-recommends gcc libc6-dev pkg-config man-db \
+        groff-base bash-completion systemd >/dev/null &&
+        inside sh -c 'apt-get install -s --no-install-recommends /packages/*.deb' |
+        awk '$1 == "Inst" && $2 !~ /scanhead/ { print $2 }' >"$work/others" &&
+        inside apt-get install -qq --no-install-recommends $(cat "$work/others") >/dev/null
+}
+
+# Every file with its kind, rights and owner, in /etc and /var/lib/systemd with what is in it; users and groups; but what
+# apt and dpkg write about themselves, and caches.
+picture() {
+    (cd "$root" && find . -xdev \( -path ./proc -o -path ./sys -o -path ./packages -o -path ./tmp -o -path ./var/cache \
+        -o -path ./var/log -o -path ./var/lib/apt -o -path ./var/lib/dpkg/info/format -o -path './var/lib/dpkg/*-old' \) \
+        -prune -o -printf '%y %m %U %G %p %l\n' | sort
+    find etc -type f ! -name ld.so.cache -exec sha256sum {} + | sort -k2
+    cat etc/passwd etc/group
+    inside dpkg-query -W -f='${Package} ${Status}\n')
+}
+
+install_ours() {
+    inside sh -c 'apt-get install -qq --no-install-recommends /packages/*.deb' || return
+    for package in $packages; do
+        inside dpkg-query -W -f='${Status} ${Version}\n' "$package" | grep -qx "install ok installed $version-1" || return
+    done
+    inside apt-get check && [ -z "$(inside dpkg --audit)" ] && [ -z "$(inside dpkg --verify $packages)" ]
+}
+
+versions_agree() {
+    test "$(inside scanhead --version)" = "scanhead $version" && test "$(inside pkg-config --modversion libscanhead)" = "$version" &&
+        grep -q "\"$version\"" "$root/usr/include/scanhead.h"
+}
+
+# The service's example, for a head and a recording.
+records() {
+    as_nobody scanhead check /etc/scanhead/example.yaml --set 'links[0].port=0' &&
+        as_nobody scanhead record /etc/scanhead/example.yaml --set head.pan_stop_deg=40 -o /tmp/scan.ply -o /tmp/scan.las --quiet &&
+        as_nobody scanhead report /etc/scanhead/example.yaml /tmp/scan.ply --set head.pan_stop_deg=40 &&
+        as_nobody scanhead list | grep -q riegl-vz400i
+}
+
+# A head; its port is in $port.
+start_head() {
+    rm -f "$root/tmp/ready" && mkfifo -m 666 "$root/tmp/ready" || return
+    as_head sh -c 'exec scanhead run /etc/scanhead/example.yaml --set "links[0].port=0" \
+        --set head.pan_stop_deg=40 --ready-fd 3 3>/tmp/ready' 2>"$work/head.err" &
+    head=$!
+    read -r ready <"$root/tmp/ready" || { cat "$work/head.err"; return 1; }
+    port=$(echo "$ready" | sed 's/.*tcp:[^"]*:\([0-9]*\)".*/\1/')
+    echo "$ready"
+}
+no_right_was_missing() {
+    ! grep -e SCHED_FIFO -e 'not locked' "$work/head.err"
+}
+
+client_in_python() {
+    cat >"$root/tmp/client.py" <<'END'
+import sys, scanhead
+n = 0
+with scanhead.open(sys.argv[1]) as head:
+    print(head.command("*IDN?"))
+    while head.command("HEAD:STATe?") != "idle":
+        head.next_frame(timeout_s=5)
+    head.command("SCAN:STARt")
+    for frame in head.frames(timeout_s=20):
+        if frame.type == scanhead.POINTS:
+            n += sum(1 for echo in head.points(frame).echo if echo > 0)
+        if head.scan_over:
+            break
+print(n, "echoes,", head.parser.seq_lost, "frames lost, module", scanhead.__file__)
+assert n > 1000 and head.parser.seq_lost == 0 and scanhead.__file__.startswith("/usr/lib/python3/dist-packages/")
+END
+    as_nobody python3 /tmp/client.py "tcp:127.0.0.1:$port"
+}
+
+# The README's client, by pkg-config, with the library of the package: shared, then as an archive.
+client_in_c() {
+    sed -n '/^```c /,/^```$/p' "$project/README.md" | sed '/^```/d' >"$root/tmp/client.c"
+    inside sh -c 'cd /tmp && cc -Wall -Werror client.c $(pkg-config --cflags --libs libscanhead) -o client &&
+        cc client.c -o client-static -Wl,-Bstatic -lscanhead -Wl,-Bdynamic -lnettle -lusb-1.0 -lm && ldd client' | grep -q libscanhead.so.1 || return
+    ! inside ldd /tmp/client-static | grep libscanhead || return
+    for client in client client-static; do
+        as_nobody "/tmp/$client" "tcp:127.0.0.1:$port" >"$work/points" || return
+        [ "$(wc -l <"$work/points")" -gt 1000 ] || { head -n 3 "$work/points"; return 1; }
+    done
+}
+
+stops() {
+    pid=$(pgrep -P "$head" -x scanhead || echo "$head")
+    kill -TERM $pid && wait "$head"
+}
+
+pages_are_read() {
+    for page in scanhead scanhead-run scanhead.yaml libscanhead; do
+        inside man "$page" >"$work/page" 2>&1 && [ "$(wc -l <"$work/page")" -gt 20 ] || { echo "$page"; tail -n 3 "$work/page"; return 1; }
+    done
+    inside bash -c '. /usr/share/bash-completion/bash_completion; _completion_loader scanhead; complete -p scanhead' | grep -q _scanhead
+}
+
+unit_is_sound() {
+    inside systemd-analyze verify --man=no scanhead@example.service 2>&1 | tee "$work/verify"
+    ! grep -i scanhead "$work/verify"
+}
+
+# Linked to be started, as the administrator did; used, as the manager did.
+use_like_a_service() {
+    mkdir -p "$root/etc/systemd/system/multi-user.target.wants" "$root/var/lib/private/scanhead/example"
+    ln -s private/scanhead "$root/var/lib/scanhead" &&
+        inside systemctl enable scanhead@example.service &&
+        [ -L "$root/etc/systemd/system/multi-user.target.wants/scanhead@example.service" ]
+}
+
+# A changed conffile stays on removal, and goes with purge.
+remove_ours() {
+    echo '# changed' >>"$root/etc/scanhead/example.yaml" && inside apt-get remove -qq $packages &&
+        [ -e "$root/etc/scanhead/example.yaml" ] && [ ! -e "$root/usr/bin/scanhead" ] && inside apt-get purge -qq $packages &&
+        [ ! -e "$root/etc/scanhead" ]
+}
+nothing_is_left() {
+    picture >"$work/after"
+    diff "$work/before" "$work/after" && ! grep -i scanhead "$work/after"
+}
+
+check "lintian has no error" lintian_finds_no_errors
+check "a new root: $suite, minbase" make_root
+check "what the packages depend on comes from Debian" install_others
+picture >"$work/before"
+check "apt installs the packages" install_ours
+check "one version: program, library, header" versions_agree
+check "check, record, report, list" records
+# The service's manager sets these before it gives up its own rights. From here on the script has them.
+limits=yes
+{ ulimit -r 80 && ulimit -l unlimited; } 2>/dev/null || limits=no
+[ $limits = yes ] || echo "# no CAP_SYS_RESOURCE here: CAP_SYS_NICE and CAP_IPC_LOCK stand in for the two limits"
+check "a head, as nobody, with no more than real time takes" start_head
+check "a client in Python" client_in_python
+check "a client in C, by pkg-config, shared and static" client_in_c
+check "the head ends in good order" stops
+check "it had what it needs for real time" no_right_was_missing
+check "man reads the pages, bash loads the completion" pages_are_read
+check "systemd-analyze verify" unit_is_sound
+check "a head is enabled as a service" use_like_a_service
+check "remove keeps a changed configuration, purge does not" remove_ours
+check "no file, user, unit or package is left" nothing_is_left
+echo "1..$tests"
+echo "== lintian: errors, warnings, notes"
+cat "$work/lintian"
+echo "== systemd-analyze security"
+sed 's|@PREFIX@|/usr|' "$here/scanhead@.service.in" >"$work/scanhead@.service"
+systemd-analyze security --offline=yes "$work/scanhead@.service" 2>/dev/null | tail -n 1

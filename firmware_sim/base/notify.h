@@ -1,0 +1,17 @@
+/* The service manager's notification socket: sd_notify(3) of systemd.
+ *
+ * In: lines such as READY=1. Out: one datagram to the socket that $NOTIFY_SOCKET names, a path or @NAME of the abstract
+ * names. The protocol is this datagram alone, and systemd keeps it stable for programs that do not use its library. */
+#ifndef FIRMWARE_SIM_BASE_NOTIFY_H
+#define FIRMWARE_SIM_BASE_NOTIFY_H
+
+#include "core/err.h"
+
+/* Whether somebody is to be told. */
+int notify_is_wanted(void);
+
+/* Sends lines with '\n' between them; SH_OK also where nobody is to be told. Waits a second at most. SH_EINPUT: a name
+ * that is none; SH_EIO: nobody is there, or takes it. */
+int notify_send(const char *lines, struct sh_err *err);
+
+#endif
