@@ -221,7 +221,7 @@ void view_frame(const double min_m[3], const double max_m[3], double azimuth_rad
             fit[k].low = fmin(fit[k].low, across[k] + fit[k].tangent * deep);
             fit[k].high = fmax(fit[k].high, across[k] - fit[k].tangent * deep);
         }
-        nearest_m = fmin(nearest_m, deep);
+        if (deep < nearest_m) nearest_m = deep; /* gcc 12 for ARM has an internal error on fmin here */
         size_m = fmax(size_m, sqrt(vec3_dot(p, p)));
     }
     if (!(size_m > 0)) size_m = 1;

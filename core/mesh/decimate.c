@@ -9,7 +9,8 @@
 #include "core/rng.h"
 #include "core/vec3.h"
 
-enum { NONE = 0xffffffff, AXIS_BITS = 20, FIRST_BITS = 12, MOST_PASSES = 40, STOP_EVERY = 1 << 16 };
+static const uint32_t NONE = UINT32_MAX;
+enum { AXIS_BITS = 20, FIRST_BITS = 12, MOST_PASSES = 40, STOP_EVERY = 1 << 16 };
 
 /* Numbers by key, in a hash table of open addressing. A triangle's key takes 96 bits. */
 struct slot {

@@ -42,7 +42,7 @@ static float linear_of(uint8_t value)
 static void set_string(struct aiString *to, const char *text)
 {
     size_t n = strlen(text);
-    if (n > MAXLEN - 1) n = MAXLEN - 1;
+    if (n > sizeof to->data - 1) n = sizeof to->data - 1;
     memcpy(to->data, text, n);
     to->data[n] = '\0';
     to->length = (ai_uint32)n;

@@ -256,6 +256,16 @@ static const struct aiScene *import_file(struct scene_build *b, struct import_lo
     return in;
 }
 
+/* The tree's root. An FBX file has none itself: Assimp adds it, and from 5.4 on it turns the file's axes to y up there.
+ * The file's axes stay, as with older ones. */
+static struct aiNode root_of(const struct aiScene *in, const char *file)
+{
+    struct aiNode root = *in->mRootNode;
+    const char *dot = strrchr(file, '.');
+    if (dot != NULL && strcasecmp(dot, ".fbx") == 0) aiIdentityMatrix4(&root.mTransformation);
+    return root;
+}
+
 int import_assimp(struct scene_build *b, struct sh_err *err)
 {
     struct import im = {.b = b};
@@ -269,7 +279,8 @@ int import_assimp(struct scene_build *b, struct sh_err *err)
     if (im.in == NULL) return SH_EINPUT;
     b->scene->says = import_says(im.in, b->spec->file);
     im.n_faces = count_faces(im.in, im.in->mRootNode);
-    rc = add_node(&im, im.in->mRootNode, 0, err);
+    const struct aiNode root = root_of(im.in, b->spec->file);
+    rc = add_node(&im, &root, 0, err);
     if (rc == SH_OK) rc = build_single(b, im.largest, im.error, true, err);
     if (rc == SH_OK && log.n > 0)
         sh_warn(b->report, "%s: %u warnings while read, the first: %s", b->name, log.n, log.first);

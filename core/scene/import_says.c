@@ -1,5 +1,5 @@
 /* Which formats define unit and axes: core/scene.h has the list. FBX says them in its global settings, which
- * Assimp (5.2) hands on as metadata without applying them. */
+ * Assimp hands on as metadata; what newer ones apply of them is taken back (import_assimp.c). */
 #include "core/scene/import_says.h"
 
 #include <math.h>

@@ -11,6 +11,8 @@
 #include <sys/syscall.h>
 #include <sys/wait.h>
 
+#include <assimp/version.h>
+
 #include "core/scene/import.h"
 #include "tests/unit/scene_files.h"
 
@@ -306,7 +308,8 @@ static void crash_is_one_line(void **state)
     char *record = memmem(text, n, was, sizeof was - 1);
     assert_non_null(record);
     memcpy(record, is, sizeof is - 1);
-    refuse("x.ifc", text, n, "x.ifc: Assimp crashed on it (SIGSEGV)");
+    const int crashes = aiGetVersionMajor() == 5 && aiGetVersionMinor() < 4; /* later ones refuse it themselves */
+    refuse("x.ifc", text, n, crashes ? "x.ifc: Assimp crashed on it (SIGSEGV)" : "x.ifc: Obj type is nullptr");
     no_child_is_left();
 }
 
