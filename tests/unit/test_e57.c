@@ -18,7 +18,7 @@ static const struct rig_point points[] = {
     {3000, -4000, 12000, -1234, 7, 1, 2},
     {3001, -4001, 12001, INT16_MIN, 8, 2, 2},
     {0, 0, 0, INT16_MIN, 0xffff, 0, 0},
-    {0, 0, -5000, 32767, 9, 1, 1},
+    {0, 0, -5000, 32767, 40009, 1, 1},
     {5, 0, 0, 0, 1, 1, 1},
 };
 
@@ -98,6 +98,7 @@ static void test_xml(void **state)
     assert_true(e57rig_number(e57rig_xml, "rowMinimum") == 6 && e57rig_number(e57rig_xml, "rowMaximum") == 9);
     assert_true(e57rig_number(e57rig_xml, "columnMinimum") == 3 && e57rig_number(e57rig_xml, "columnMaximum") == 3);
     assert_true(e57rig_number(e57rig_xml, "returnMaximum") == 1);
+    assert_non_null(strstr(e57rig_xml, "<sh:label type=\"Integer\" minimum=\"0\" maximum=\"65535\">"));
     assert_null(strstr(e57rig_xml, "creationDateTime")); /* no clock in this stream */
 }
 
