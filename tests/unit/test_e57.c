@@ -102,6 +102,26 @@ static void test_xml(void **state)
     assert_null(strstr(e57rig_xml, "creationDateTime")); /* no clock in this stream */
 }
 
+/* Shots whose reflectance is not modelled are no part of the limits; where there is nothing else, there are none. */
+static void test_intensity_limits(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 2);
+    const struct rig_point faint = {1, 1, 1, -1234, 7, 1, 1}, fainter = {1, 1, 1, -2345, 7, 1, 1},
+                           none = {1, 1, 1, INT16_MIN, 7, 1, 1};
+    rig_begin();
+    rig_descriptor(1, 1);
+    rig_anchor(&a);
+    rig_points(0, 0, 0, (struct rig_point[]){none, faint, fainter, faint, none}, 5);
+    rig_descriptor(1, 2);
+    rig_anchor(&a);
+    rig_points(0, 0, 0, &none, 1);
+    record_e57(0);
+    assert_true(e57rig_number(e57rig_xml, "intensityMinimum") == -23.45 &&
+                e57rig_number(e57rig_xml, "intensityMaximum") == -12.34);
+    assert_null(strstr(strstr(e57rig_xml, "scan 2, station 2"), "intensityLimits"));
+}
+
 /* More records than a packet holds, with streams of one, two and four bits across its edge. */
 static void test_packets(void **state)
 {
@@ -225,7 +245,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_scans),     cmocka_unit_test(test_xml),        cmocka_unit_test(test_packets),
         cmocka_unit_test(test_no_points), cmocka_unit_test(test_same_bytes), cmocka_unit_test(test_disk_full),
-        cmocka_unit_test(test_colours),
+        cmocka_unit_test(test_colours),   cmocka_unit_test(test_intensity_limits),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }

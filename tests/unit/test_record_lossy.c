@@ -80,6 +80,20 @@ static void test_same_station(void **state)
     }
 }
 
+/* A head that started again counts its scans from 1 again: its pulses alone go back. The first frame is lost for want of
+ * a descriptor. */
+static void test_same_number(void **state)
+{
+    (void)state;
+    begin();
+    rig_points(0, 0, 20, &one, 1);
+    put_descriptor_again(1);
+    put_anchor(1);
+    rig_points(1, 10, 30, &one, 1);
+    expect_scans(2);
+    assert_non_null(strstr(rig_notes, "1 points left out that came before the descriptor"));
+}
+
 /* The end of a line says where the next one begins: not in another scan. Row 2 by the times. */
 static void test_rows_of_another_scan(void **state)
 {
@@ -165,6 +179,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_another_station),       cmocka_unit_test(test_same_station),
+        cmocka_unit_test(test_same_number),
         cmocka_unit_test(test_rows_of_another_scan),  cmocka_unit_test(test_poses_of_another_scan),
         cmocka_unit_test(test_anchor_of_another_stretch),
     };
