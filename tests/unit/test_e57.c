@@ -122,6 +122,20 @@ static void test_intensity_limits(void **state)
     assert_null(strstr(strstr(e57rig_xml, "scan 2, station 2"), "intensityLimits"));
 }
 
+/* A shot without echo stands at 0 0 0, which is no place within the bounds. */
+static void test_bounds_of_empty_shots(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 2);
+    const struct rig_point far = {3000, -4000, 12000, 0, 7, 1, 1}, empty = {0, 0, 0, INT16_MIN, 0xffff, 0, 0};
+    rig_begin();
+    rig_descriptor(1, 1);
+    rig_anchor(&a);
+    rig_points(0, 0, 0, (struct rig_point[]){empty, far, empty}, 3);
+    record_e57(1);
+    assert_true(fabs(e57rig_number(e57rig_xml, "xMinimum") - 4) < 1e-9 && fabs(e57rig_number(e57rig_xml, "zMinimum") - 12) < 1e-9);
+}
+
 /* More records than a packet holds, with streams of one, two and four bits across its edge. */
 static void test_packets(void **state)
 {
@@ -246,6 +260,7 @@ int main(void)
         cmocka_unit_test(test_scans),     cmocka_unit_test(test_xml),        cmocka_unit_test(test_packets),
         cmocka_unit_test(test_no_points), cmocka_unit_test(test_same_bytes), cmocka_unit_test(test_disk_full),
         cmocka_unit_test(test_colours),   cmocka_unit_test(test_intensity_limits),
+        cmocka_unit_test(test_bounds_of_empty_shots),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }
