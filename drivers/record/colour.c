@@ -43,7 +43,7 @@ static void from_anchor(const struct track *t, const double p[3], double d[3])
     }
     const int is_own = memcmp(info->station_m, a, sizeof info->station_m) == 0; /* the scene lies in the grid itself */
     if ((info->crs == NATIVE_CRS_UTM && !is_own) || info->crs == NATIVE_CRS_GEODETIC)
-        d[2] += (d[0] * d[0] + d[1] * d[1]) / (2 * EARTH_M);
+        d[2] -= (d[0] * d[0] + d[1] * d[1]) / (2 * EARTH_M); /* the surface falls away below the level */
 }
 
 static double height_of(const struct track *t, const struct scanhead_point *point)

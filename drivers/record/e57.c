@@ -86,6 +86,8 @@ static int begin_scan(void *rec, struct sh_err *err)
     if (!(info->scale_m > 0))
         return sh_fail(err, SH_EFORMAT, "%s: the stream's scale is %g m; an E57 file needs one above 0",
                        e->base.file.path, info->scale_m);
+    rc = station_pose_check(&e->base.track.pose, e->base.file.path, err);
+    if (rc != 0) return rc;
     struct e57_scan *more = realloc(e->facts.scan, (e->facts.n_scans + 1) * sizeof *more);
     if (more == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory for another scan", e->base.file.path);
     e->facts.scan = more;

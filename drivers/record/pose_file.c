@@ -46,6 +46,8 @@ static int put_station(void *rec, struct sh_err *err)
     double q[4], p[3];
     char row[LINE];
     if (t->info.moving) return SH_OK;
+    int rc = station_pose_check(&t->pose, file->base.file.path, err);
+    if (rc != SH_OK) return rc;
     memcpy(p, t->pose.shift_m, sizeof p);
     if (t->crs == NATIVE_CRS_GEODETIC) p[0] = p[1] = p[2] = NAN;
     station_pose_quaternion(&t->pose, q);
@@ -54,7 +56,7 @@ static int put_station(void *rec, struct sh_err *err)
                      t->info.lon_deg, t->info.height_m);
     if (t->info.stop) n += snprintf(row + n, sizeof row - (size_t)n, ",%.9g", t->info.frame);
     row[n++] = '\n';
-    int rc = put_title(file, t->info.stop ? STOPS : STATIONS, err);
+    rc = put_title(file, t->info.stop ? STOPS : STATIONS, err);
     return rc != SH_OK ? rc : outfile_write(&file->base.file, row, (size_t)n, err);
 }
 

@@ -38,3 +38,14 @@ void station_pose_quaternion(const struct station_pose *pose, double q[4])
     for (int i = 0; i < 4; i++)
         q[i] = row[k][i] / norm;
 }
+
+int station_pose_check(const struct station_pose *pose, const char *path, struct sh_err *err)
+{
+    const double *s = pose->shift_m;
+    double q[4];
+    station_pose_quaternion(pose, q);
+    if (isfinite(s[0]) && isfinite(s[1]) && isfinite(s[2]) && isfinite(q[0] + q[1] + q[2] + q[3])) return SH_OK;
+    return sh_fail(err, SH_EFORMAT,
+                   "%s: the stream is broken: the pose of a scan, at (%g %g %g) and turned by (%g %g %g %g), is none", path,
+                   s[0], s[1], s[2], q[0], q[1], q[2], q[3]);
+}

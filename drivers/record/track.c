@@ -71,11 +71,11 @@ static void set_pose(struct track *t)
         station_pose_of(&t->info, &t->pose);
 }
 
-/* A descriptor that is no repetition, pulses that go back, another station: whichever of them reached us. */
+/* A descriptor that is no repetition, pulses that go back, another station or scan: whichever of them reached us. */
 static int begins_scan(const struct track *t, const struct scanhead_frame *frame)
 {
     return t->n_scans == 0 || t->state.new_scan || frame->pulse0 < t->state.last_pulse0 ||
-           t->info.station != t->state.last_station;
+           t->info.station != t->state.last_station || t->info.scan != t->state.last_scan;
 }
 
 /* The nearest whole number; UINT32_MAX for what is larger, also for what is no number. */
@@ -262,6 +262,7 @@ static int take_points(struct track *t, const struct scanhead_frame *frame, stru
     if (rc == 0 && begins) rc = begin_scan(t, err);
     t->state.last_pulse0 = frame->pulse0;
     t->state.last_station = t->info.station;
+    t->state.last_scan = t->info.scan;
     if (rc == 0) rc = track_begin_waiting(t, err);
     uint64_t row = first_row(t, frame);
     if (rc == 0 && row > UINT32_MAX - frame->n_points)

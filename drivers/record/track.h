@@ -48,7 +48,7 @@ struct track_missing {
 /* Where in its scan the stream is; of track.c alone. */
 struct track_state {
     int new_scan, have_next_line;
-    uint32_t next_line, last_station;
+    uint32_t next_line, last_station, last_scan;
     uint64_t next_line_pulse0, last_pulse0;
 };
 

@@ -14,7 +14,7 @@ uint32_t a[N], b[N], c[N], dt[N] = {0, 1000, 2000, 3000, 0xffffff};
 
 int16_t refl[N] = {-1234, INT16_MIN, 0, 5, 32767};
 
-uint16_t label[N] = {0, 1, 2, 0xffff, 1};
+uint16_t label[N] = {0, 1, 40000, 0xffff, 1};
 
 uint8_t echo[N] = {0x11, 0x21, 0x22, 0x00, 0xff};
 

@@ -11,6 +11,8 @@ int (*rig_stop)(void *ctx);
 
 static uint32_t rig_seq;
 
+int64_t rig_scan_t0_ns;
+
 /* A frame without a number gets the next one. */
 void rig_put(const uint8_t *frame, size_t len)
 {
@@ -25,6 +27,7 @@ void rig_put(const uint8_t *frame, size_t len)
 void rig_begin(void)
 {
     rig_seq = 0;
+    rig_scan_t0_ns = 0;
     rig_stream = fopen(rig_shs, "wb");
     assert_non_null(rig_stream);
 }
@@ -97,7 +100,7 @@ void rig_points(uint32_t line, uint64_t line_pulse0, uint64_t pulse0, const stru
                                .refl_cdb = refl,
                                .echo = echo,
                                .label = label};
-    rig_put(out, native_encode_points(out, sizeof out, &block, 0));
+    rig_put(out, native_encode_points(out, sizeof out, &block, rig_scan_t0_ns));
 }
 
 static void rig_warn(void *ctx, const char *text)

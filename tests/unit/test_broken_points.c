@@ -138,6 +138,63 @@ static void test_poses_far_apart(void **state)
     unlink(rig_path("a.ply"));
 }
 
+/* ---- every figure of an anchor as large as can be: what a file says is a number, or there is no file */
+
+static void expect_numbers(const char *name, const uint8_t *file, size_t len)
+{
+    if (strstr(name, ".las") != NULL) {
+        for (size_t at = 131; at < 227; at += 8)
+            if (!isfinite(rig_double(file + at))) fail_msg("%s: %g at %zu", name, rig_double(file + at), at);
+        return;
+    }
+    static const char *const absent[] = {"inf", "nan"};
+    const char *text = (const char *)file;
+    const size_t xml_at = strstr(name, ".e57") != NULL ? rig_uint(file + 24, 8) : 0;
+    for (int k = 0; k < 2; k++)
+        for (size_t at = xml_at; at + 3 < len; at++)
+            if (memcmp(text + at, absent[k], 3) == 0 && strchr("->,; \n", text[at - 1]) != NULL &&
+                memcmp(text + at, "nan: ", 5) != 0)
+                fail_msg("%s: %.60s", name, text + at - 20);
+}
+
+static void test_extremes(void **state)
+{
+    (void)state;
+    static const char *const name[] = {"a.las", "a.e57", "a.ptx", "a.ply", "a.poses.csv"};
+    static const double most[] = {1.7e308, -1.7e308, 5e-324};
+    static const struct rig_point point = {4000000, 900, 1700, 0, 0, 1, 1};
+    for (int i = 0; i < 5 * 2 * 3 * 6; i++) {
+        const int format = i % 5, geo = i / 5 % 2, field = i / 30;
+        const double v = most[i / 10 % 3];
+        struct native_anchor a = geo ? rig_anchor_of(NATIVE_CRS_UTM, 32632, 1) : local_anchor();
+        struct sh_err err = {0};
+        size_t len;
+        double *const to[] = {a.anchor, a.station_m, a.rotation, a.axes, a.scale, &a.scale_m};
+        static const int n[] = {3, 3, 9, 9, 3, 1};
+        for (int k = 0; k < n[field]; k++)
+            to[field][k] = v;
+        rig_begin();
+        rig_descriptor(geo, 1);
+        rig_anchor(&a);
+        rig_points(0, 0, 0, &point, 1);
+        const char *path = rig_path(name[format]);
+        const int rc = rig_record(path, (struct recorder_options){.ascii = 1}, RIG_KEEP, &err);
+        if (rc != SH_OK) {
+            assert_true(rc == SH_EFORMAT && strstr(err.text, "a.") != NULL);
+            char left[160];
+            snprintf(left, sizeof left, "%s.part", path);
+            unlink(left);
+            snprintf(left, sizeof left, "%s.grid", path);
+            unlink(left);
+            continue;
+        }
+        uint8_t *file = rig_read(path, &len);
+        expect_numbers(name[format], file, len);
+        free(file);
+        unlink(path);
+    }
+}
+
 /* So few counts that a turn has less than one. */
 static void test_no_counts(void **state)
 {
@@ -167,7 +224,7 @@ int main(void)
         cmocka_unit_test(test_infinite),        cmocka_unit_test(test_infinite_by_pose),
         cmocka_unit_test(test_long_pose),       cmocka_unit_test(test_no_scan_angle),
         cmocka_unit_test(test_far_rows),        cmocka_unit_test(test_no_counts),
-        cmocka_unit_test(test_poses_far_apart),
+        cmocka_unit_test(test_poses_far_apart), cmocka_unit_test(test_extremes),
     };
     return cmocka_run_group_tests(tests, rig_set_up, rig_tear_down);
 }

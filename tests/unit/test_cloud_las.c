@@ -3,7 +3,7 @@
 #include "tests/unit/recorder_rig.h"
 
 static const struct rig_point points[] = {
-    {3000, -4000, 12000, -1234, 7, 1, 2}, {3001, -4001, 12001, INT16_MIN, 8, 2, 2}, {0, 0, 0, INT16_MIN, 0xffff, 0, 0}};
+    {3000, -4000, 12000, -1234, 7, 1, 2}, {3001, -4001, 12001, INT16_MIN, 40008, 2, 2}, {0, 0, 0, INT16_MIN, 0xffff, 0, 0}};
 
 static void write_las(uint32_t crs, uint32_t epsg, int geo)
 {
@@ -34,7 +34,7 @@ static void test_read(void **state)
         if (cloud_read(rig_path("a.las"), NULL, &cloud, &err) != 0) fail_msg("%s", err.text);
         assert_int_equal(cloud.epsg, codes[i][2]);
         assert_int_equal(cloud.n, 3);
-        static const unsigned want[3][3] = {{1, 1, 7}, {1, 2, 8}, {2, 1, 7}};
+        static const unsigned want[3][3] = {{1, 1, 7}, {1, 2, 40008}, {2, 1, 7}};
         for (int k = 0; k < 3; k++) {
             assert_int_equal(cloud.station[k], want[k][0]);
             assert_int_equal(cloud.echo[k], want[k][1]);
@@ -122,9 +122,36 @@ static void test_broken(void **state)
     }
 }
 
+/* Longitude first in the file, latitude first in the cloud; beyond the antimeridian it is back within 180. */
+static void test_geodetic(void **state)
+{
+    (void)state;
+    struct cloud cloud;
+    struct sh_err err = {0};
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_GEODETIC, 4979, 1);
+    const double anchor[3] = {10, 179.9999, 100};
+    static const struct rig_point across = {1000, 200000, 5000, 0, 1, 1, 1};
+    memcpy(a.anchor, anchor, sizeof anchor);
+    a.scale[0] = a.scale[1] = 1e-9;
+    a.scale[2] = 1e-3;
+    rig_begin();
+    rig_descriptor(1, 1);
+    rig_anchor(&a);
+    rig_points(0, 0, 0, &across, 1);
+    if (rig_record(rig_path("a.las"), (struct recorder_options){0}, 1, &err) != 0) fail_msg("%s", err.text);
+    if (cloud_read(rig_path("a.las"), NULL, &cloud, &err) != 0) fail_msg("%s", err.text);
+    assert_int_equal(cloud.epsg, 4979);
+    assert_true(fabs(cloud.xyz_m[0][0] - 10.000001) < 1e-12); /* doubles step by 2e-15 and 3e-14 there */
+    assert_true(fabs(cloud.xyz_m[0][1] - -179.9999) < 1e-12);
+    assert_true(fabs(cloud.xyz_m[0][2] - 105) < 1e-9);
+    assert_true(fabs(cloud.count_m - 1e-3) < 1e-9); /* heights are the coarsest: a degree's count is 0.1 mm */
+    cloud_free(&cloud);
+    unlink(rig_path("a.las"));
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_read), cmocka_unit_test(test_degrees),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_read), cmocka_unit_test(test_geodetic), cmocka_unit_test(test_degrees),
                                        cmocka_unit_test(test_broken)};
     return cmocka_run_group_tests(tests, rig_set_up, rig_tear_down);
 }

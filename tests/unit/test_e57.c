@@ -18,7 +18,7 @@ static const struct rig_point points[] = {
     {3000, -4000, 12000, -1234, 7, 1, 2},
     {3001, -4001, 12001, INT16_MIN, 8, 2, 2},
     {0, 0, 0, INT16_MIN, 0xffff, 0, 0},
-    {0, 0, -5000, 32767, 9, 1, 1},
+    {0, 0, -5000, 32767, 40009, 1, 1},
     {5, 0, 0, 0, 1, 1, 1},
 };
 
@@ -98,7 +98,42 @@ static void test_xml(void **state)
     assert_true(e57rig_number(e57rig_xml, "rowMinimum") == 6 && e57rig_number(e57rig_xml, "rowMaximum") == 9);
     assert_true(e57rig_number(e57rig_xml, "columnMinimum") == 3 && e57rig_number(e57rig_xml, "columnMaximum") == 3);
     assert_true(e57rig_number(e57rig_xml, "returnMaximum") == 1);
+    assert_non_null(strstr(e57rig_xml, "<sh:label type=\"Integer\" minimum=\"0\" maximum=\"65535\">"));
     assert_null(strstr(e57rig_xml, "creationDateTime")); /* no clock in this stream */
+}
+
+/* Shots whose reflectance is not modelled are no part of the limits; where there is nothing else, there are none. */
+static void test_intensity_limits(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 2);
+    const struct rig_point faint = {1, 1, 1, -1234, 7, 1, 1}, fainter = {1, 1, 1, -2345, 7, 1, 1},
+                           none = {1, 1, 1, INT16_MIN, 7, 1, 1};
+    rig_begin();
+    rig_descriptor(1, 1);
+    rig_anchor(&a);
+    rig_points(0, 0, 0, (struct rig_point[]){none, faint, fainter, faint, none}, 5);
+    rig_descriptor(1, 2);
+    rig_anchor(&a);
+    rig_points(0, 0, 0, &none, 1);
+    record_e57(0);
+    assert_true(e57rig_number(e57rig_xml, "intensityMinimum") == -23.45 &&
+                e57rig_number(e57rig_xml, "intensityMaximum") == -12.34);
+    assert_null(strstr(strstr(e57rig_xml, "scan 2, station 2"), "intensityLimits"));
+}
+
+/* A shot without echo stands at 0 0 0, which is no place within the bounds. */
+static void test_bounds_of_empty_shots(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 2);
+    const struct rig_point far = {3000, -4000, 12000, 0, 7, 1, 1}, empty = {0, 0, 0, INT16_MIN, 0xffff, 0, 0};
+    rig_begin();
+    rig_descriptor(1, 1);
+    rig_anchor(&a);
+    rig_points(0, 0, 0, (struct rig_point[]){empty, far, empty}, 3);
+    record_e57(1);
+    assert_true(fabs(e57rig_number(e57rig_xml, "xMinimum") - 4) < 1e-9 && fabs(e57rig_number(e57rig_xml, "zMinimum") - 12) < 1e-9);
 }
 
 /* More records than a packet holds, with streams of one, two and four bits across its edge. */
@@ -224,7 +259,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_scans),     cmocka_unit_test(test_xml),        cmocka_unit_test(test_packets),
         cmocka_unit_test(test_no_points), cmocka_unit_test(test_same_bytes), cmocka_unit_test(test_disk_full),
-        cmocka_unit_test(test_colours),
+        cmocka_unit_test(test_colours),   cmocka_unit_test(test_intensity_limits),
+        cmocka_unit_test(test_bounds_of_empty_shots),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }

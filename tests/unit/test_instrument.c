@@ -121,6 +121,9 @@ static void encoders_read_by_their_errors(void **state)
         assert_memory_equal(shot.s, ideal.s, sizeof ideal.s); /* the beam knows nothing of it */
     }
     double range_m[2] = {10.0, (double)NAN};
+    assert_true(instrument_is_ideal(&(struct instrument){0}));
+    assert_false(instrument_is_ideal(&(struct instrument){.range_scale = 1e-6})); /* alone */
+    assert_false(instrument_is_ideal(&(struct instrument){.range_offset_m = 1e-3}));
     instrument_range(&(struct instrument){.range_offset_m = 0.02, .range_scale = 1e-4}, 2, range_m);
     assert_true(fabs(range_m[0] - 10.021) < 1e-12 && isnan(range_m[1]));
 }

@@ -7,7 +7,7 @@ static const struct rig_point points[] = {
     {3000, -4000, 12000, -1234, 7, 1, 2},
     {3001, -4001, 12001, INT16_MIN, 8, 2, 2},
     {0, 0, 0, INT16_MIN, 0xffff, 0, 0},
-    {0, 0, -5000, 32767, 9, 1, 1},
+    {0, 0, -5000, 32767, 40009, 1, 1},
     {5, 0, 0, 0, 1, 1, 1},
 };
 enum { N = sizeof points / sizeof points[0] };

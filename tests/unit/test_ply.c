@@ -176,6 +176,7 @@ static void test_ascii(void **state)
     for (int i = 0; i < N; i++) {
         const struct vertex *v = &vertex[i];
         assert_int_equal(v->station, 65535);
+        assert_int_equal(v->label, label[i]);
         assert_true(v->time == (double)(5000000001 + dt[i]) / 1e9); /* nanoseconds are printed in full */
         if (i == 3) {
             assert_true(isnan(v->x) && isnan(v->y) && isnan(v->z) && isnan(v->range));

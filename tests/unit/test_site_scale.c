@@ -47,7 +47,7 @@ static void write_profile(double range_max_m)
 }
 
 /* Metres per count; 0: refused. */
-static double scale_of(double range_max_m, const char *output, const char *noise)
+static double scale_of(double range_max_m, const char *output, const char *noise, double range_scale_ppm)
 {
     char path[128];
     struct site *site = NULL;
@@ -55,8 +55,8 @@ static double scale_of(double range_max_m, const char *output, const char *noise
     FILE *f = open_in("test.yaml", "w");
     fprintf(f,
             "head: {profile: head.yaml}\nscene:\n  meshes: [{file: floor.obj, up: z, scale: 1}]\n"
-            "stations: [{position_m: [0, 0, 1.7]}]\noutput: {%s}\nnoise: {%s}\n",
-            output, noise);
+            "stations: [{position_m: [0, 0, 1.7]}]\noutput: {%s}\nnoise: {%s}\ninstrument: {range_scale_ppm: %g}\n",
+            output, noise, range_scale_ppm);
     assert_int_equal(fclose(f), 0);
     snprintf(path, sizeof path, "%s/test.yaml", dir);
     warned[0] = err.text[0] = '\0';
@@ -92,7 +92,7 @@ static void test_counts(void **state)
         {4294.9, "layout: polar, scale_m: 1e-6", "ball: {radius_m: 100}", 0, NULL},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        const double scale_m = scale_of(cases[i].range_max_m, cases[i].output, cases[i].noise);
+        const double scale_m = scale_of(cases[i].range_max_m, cases[i].output, cases[i].noise, 0);
         if (!(scale_m >= 0.999 * cases[i].scale_m && scale_m <= 1.001 * cases[i].scale_m))
             fail_msg("%g m, %s: %g m instead of %g; %s", cases[i].range_max_m, cases[i].output, scale_m,
                      cases[i].scale_m, err.text);
@@ -101,6 +101,18 @@ static void test_counts(void **state)
     }
     assert_non_null(strstr(err.text, "output.scale_m: 1e-06: ranges up to 4394.9 m do not fit into 32 bits"));
     assert_non_null(strstr(err.text, "from 1.02e-06 m on"));
+}
+
+/* An instrument that reads ranges 100 ppm longer: 0.2 m of 2147.4 m, 0.4 m of 4294.9 m. Nothing else is set. */
+static void test_range_scale(void **state)
+{
+    (void)state;
+    const double geo = scale_of(2147.4, "layout: geo", "range: off", 100);
+    assert_true(geo >= 0.999e-5 && geo <= 1.001e-5);
+    assert_non_null(strstr(warned, "coordinates up to 2147.6"));
+    const double polar = scale_of(4294.9, "layout: polar", "range: off", 100);
+    assert_true(polar >= 0.999e-5 && polar <= 1.001e-5);
+    assert_non_null(strstr(warned, "ranges up to 4295.3"));
 }
 
 static int set_up(void **state)
@@ -129,6 +141,6 @@ static int tear_down(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test_setup_teardown(test_counts, set_up, tear_down)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_counts), cmocka_unit_test(test_range_scale)};
+    return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -1,0 +1,67 @@
+/* Bounds of georeferencing where the scene's frame does not lie level: what is far there may be far up here. */
+#include "core/angle.h"
+#include "tests/unit/georef_rig.h"
+
+enum { POINTS = 48 };
+static const double RADIUS_M = 2000, HEIGHT_M = 20;
+
+/* The scene's x axis goes up by so much from the east, y stays north. */
+static struct georef *make_tilted(enum georef_crs crs, double lat_deg, double tilt_deg)
+{
+    const double s = sin(angle_rad(tilt_deg)), c = cos(angle_rad(tilt_deg));
+    struct georef_spec spec = {
+        .crs = crs, .lat_deg = lat_deg, .lon_deg = 9, .height_m = 100, .rotation = {c, 0, -s, 0, 1, 0, s, 0, c}};
+    struct georef *georef = NULL;
+    struct sh_err err = {0, ""};
+    if (georef_create(&spec, &georef, &err) != SH_OK) fail_msg("%s", err.text);
+    return georef;
+}
+
+/* On the edges of the cylinder; degrees by the ellipsoid's least radius, so that errors are not said too large. */
+static double largest_error_m(struct georef *georef, enum georef_method method, double lat_deg)
+{
+    const double degree_m = angle_rad(6335000.0);
+    double largest_m = 0;
+    for (int i = 0; i < POINTS; i++) {
+        const double turn = 2 * PI * i / POINTS;
+        const double d[3] = {RADIUS_M * cos(turn), RADIUS_M * sin(turn), i % 2 ? HEIGHT_M : -HEIGHT_M};
+        double exact[3], got[3];
+        assert_int_equal(georef_set_method(georef, GEOREF_EXACT, NULL), SH_OK);
+        forward_one(georef, d, exact);
+        assert_int_equal(georef_set_method(georef, method, NULL), SH_OK);
+        forward_one(georef, d, got);
+        double e[3] = {got[0] - exact[0], got[1] - exact[1], got[2] - exact[2]};
+        if (georef_crs(georef) == GEOREF_GEODETIC) {
+            e[0] *= degree_m;
+            e[1] *= degree_m * cos(angle_rad(lat_deg));
+        }
+        largest_m = fmax(largest_m, sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2]));
+    }
+    return largest_m;
+}
+
+static void test_tilted(void **state)
+{
+    (void)state;
+    static const double lat_deg[] = {0, 47, -70}, tilt_deg[] = {0, 30, 90};
+    for (int i = 0; i < 3 * 3 * 2; i++) {
+        const enum georef_crs crs = i % 2 ? GEOREF_GEODETIC : GEOREF_UTM;
+        const double lat = lat_deg[i / 2 % 3], tilt = tilt_deg[i / 6];
+        struct georef *georef = make_tilted(crs, lat, tilt);
+        for (enum georef_method m = GEOREF_ORDER1; m <= GEOREF_ORDER3; m++) {
+            const double error_m = largest_error_m(georef, m, lat), bound_m = georef_bound_m(georef, m, RADIUS_M, HEIGHT_M);
+            if (!(error_m <= bound_m))
+                fail_msg("latitude %g, tilted by %g, EPSG %d, order %d: off by %.3g m, bound %.3g m", lat, tilt,
+                         georef_epsg(georef), 1 + (int)m - (int)GEOREF_ORDER1, error_m, bound_m);
+            /* not idle, either: a turned cylinder is taken for a ball, and orders add up their terms */
+            assert_true(m != GEOREF_ORDER1 || bound_m < 10 * error_m);
+        }
+        georef_free(georef);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_tilted)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

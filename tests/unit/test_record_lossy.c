@@ -1,0 +1,187 @@
+/* Streams that lost frames between scans: no point goes to another station, row or pose than its own. */
+#include "tests/unit/e57_rig.h"
+
+static const struct rig_point one = {3000, -4000, 12000, -1234, 7, 1, 1};
+static uint8_t out[4096];
+
+static void put_descriptor_again(uint32_t scan)
+{
+    const struct native_descriptor d = {
+        .idn = "a,b,c,d", .profile = "model", .scan = scan, .layout = NATIVE_GEO, .prr_uhz = 1000000000};
+    rig_put(out, native_encode_descriptor(out, sizeof out, &d, 0, NATIVE_REPEAT));
+}
+
+static void put_line_end(uint32_t line, uint64_t pulse0, uint32_t n_fired)
+{
+    const struct line_end end = {.line = line, .pulse0 = pulse0, .n_fired = n_fired};
+    rig_put(out, native_encode_line_end(out, sizeof out, &end, 0));
+}
+
+static void put_anchor(uint32_t station)
+{
+    const struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, station);
+    rig_anchor(&a);
+}
+
+static int count(const char *text, const char *what)
+{
+    int n = 0;
+    for (; (text = strstr(text, what)) != NULL; text++)
+        n++;
+    return n;
+}
+
+static void expect_scans(int n)
+{
+    struct sh_err err = {0};
+    const char *path = rig_path("a.e57");
+    const int rc = rig_record(path, (struct recorder_options){0}, 1, &err);
+    if (rc != 0) fail_msg("%s", err.text);
+    e57rig_read(path);
+    unlink(path);
+    assert_int_equal(count(e57rig_xml, "<points type="), n);
+}
+
+static void begin(void)
+{
+    rig_begin();
+    rig_descriptor(1, 1);
+    put_anchor(1);
+    rig_points(0, 0, 100, &one, 1);
+}
+
+/* The descriptor of the second scan is lost, its anchor is not: the points are of another station. */
+static void test_another_station(void **state)
+{
+    (void)state;
+    begin();
+    put_anchor(2);
+    rig_points(1, 200, 201, &one, 1);
+    expect_scans(2);
+    assert_non_null(strstr(e57rig_xml, "scan 2, station 2"));
+}
+
+/* Nothing came of its beginning. Pulses go back, or the number of the scan is another. */
+static void test_same_station(void **state)
+{
+    (void)state;
+    static const uint64_t pulse[] = {20, 300};
+    for (int i = 0; i < 2; i++) {
+        begin();
+        put_descriptor_again(2);
+        put_anchor(1);
+        rig_points(1, 10, pulse[i], &one, 1);
+        expect_scans(2);
+        begin(); /* a repetition alone begins nothing */
+        put_descriptor_again(1);
+        put_anchor(1);
+        rig_points(1, 200, 201, &one, 1);
+        expect_scans(1);
+    }
+}
+
+/* A head that started again counts its scans from 1 again: its pulses alone go back. The first frame is lost for want of
+ * a descriptor. */
+static void test_same_number(void **state)
+{
+    (void)state;
+    begin();
+    rig_points(0, 0, 20, &one, 1);
+    put_descriptor_again(1);
+    put_anchor(1);
+    rig_points(1, 10, 30, &one, 1);
+    expect_scans(2);
+    assert_non_null(strstr(rig_notes, "1 points left out that came before the descriptor"));
+}
+
+/* The end of a line says where the next one begins: not in another scan. Row 2 by the times. */
+static void test_rows_of_another_scan(void **state)
+{
+    (void)state;
+    begin();
+    put_line_end(3, 30, 10); /* line 4 begins at 40 */
+    rig_descriptor(1, 2);
+    put_anchor(1);
+    rig_points(4, 48, 50, &one, 1);
+    expect_scans(2);
+    e57rig_scan(1, 0, 0);
+    assert_int_equal(e57rig_record[0].row, 2);
+    assert_int_equal(e57rig_record[0].column, 4);
+}
+
+static void put_poses(int64_t from_ms, int64_t to_ms, double y_m)
+{
+    const struct native_pose pose[2] = {
+        {.t_ns = from_ms * 1000000, .position_m = {0, y_m, 0}, .quat = {1, 0, 0, 0}},
+        {.t_ns = to_ms * 1000000, .position_m = {0, y_m, 0}, .quat = {1, 0, 0, 0}}};
+    rig_put(out, native_encode_poses(out, sizeof out, pose, 2, 0, 0));
+}
+
+/* A moving head's second scan loses its first poses: those of the first scan are of the same times, and not its own. */
+static void test_poses_of_another_scan(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 1);
+    static const struct rig_point ahead = {5000, 0, 0, INT16_MIN, 3, 1, 1};
+    struct sh_err err = {0};
+    double x, y, z;
+    size_t len;
+    const char *path = rig_path("a.ply");
+    a.moving = NATIVE_MOVING;
+    rig_begin();
+    for (uint32_t scan = 1; scan <= 2; scan++) {
+        rig_descriptor(0, scan);
+        rig_anchor(&a);
+        if (scan == 1) put_poses(0, 100, 1000);
+        rig_points(0, 0, 50, &ahead, 1);
+    }
+    put_poses(100, 200, 2000);
+    rig_points(1, 100, 150, &ahead, 1);
+    const int rc = rig_record(path, (struct recorder_options){.ascii = 1}, 1, &err);
+    if (rc != 0) fail_msg("%s", err.text);
+    assert_non_null(strstr(rig_notes, "1 points left out whose pose was lost"));
+    char *text = (char *)rig_read(path, &len), *at = strstr(text, "end_header\n") + strlen("end_header\n");
+    unlink(path);
+    assert_int_equal(sscanf(at, "%lf %lf %lf", &x, &y, &z), 3);
+    assert_true(fabs(y - 1005) < 1e-6);
+    at = strchr(at, '\n') + 1;
+    assert_int_equal(sscanf(at, "%lf %lf %lf", &x, &y, &z), 3);
+    assert_true(fabs(y - 2005) < 1e-6);
+    assert_int_equal(strchr(at, '\n')[1], 0);
+    free(text);
+}
+
+/* An anchor that holds up to 100 ms; the next one is lost: its points have no place. */
+static void test_anchor_of_another_stretch(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1);
+    a.moving = NATIVE_MOVING;
+    a.until_ms = 100;
+    rig_begin();
+    rig_descriptor(1, 1);
+    rig_anchor(&a);
+    rig_points(0, 0, 99, &one, 1);
+    rig_points(1, 100, 100, &one, 1);
+    expect_scans(1);
+    e57rig_scan(0, 0, 0);
+    assert_int_equal(e57rig_n_records, 1);
+    assert_non_null(strstr(rig_notes, "1 points left out that came before the descriptor"));
+}
+
+static int tear_down(void **state)
+{
+    e57rig_free();
+    return rig_tear_down(state);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_another_station),       cmocka_unit_test(test_same_station),
+        cmocka_unit_test(test_same_number),
+        cmocka_unit_test(test_rows_of_another_scan),  cmocka_unit_test(test_poses_of_another_scan),
+        cmocka_unit_test(test_anchor_of_another_stretch),
+    };
+    return cmocka_run_group_tests(tests, rig_set_up, tear_down);
+}

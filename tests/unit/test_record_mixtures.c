@@ -1,0 +1,255 @@
+/* Streams that change: what one file can hold of it, and what it says; rows and grids of heads that are no line heads; parts
+ * of meshes. */
+#include "drivers/record/mesh_grid.h"
+#include "drivers/record/mesh_sparse.h"
+#include "tests/unit/e57_rig.h"
+
+static const struct rig_point one = {3000, -4000, 12000, -1234, 7, 1, 1};
+static uint8_t out[8192];
+
+static struct native_descriptor descriptor(const char *idn, const char *profile, uint32_t scan)
+{
+    struct native_descriptor d = {.scan = scan,
+                                  .layout = NATIVE_GEO,
+                                  .frames = 1,
+                                  .prr_uhz = 1000000000,
+                                  .lines_uhz = 100000000,
+                                  .line_stop_udeg = 90000000,
+                                  .sweep_udeg = 90000000};
+    snprintf(d.idn, sizeof d.idn, "%s", idn);
+    snprintf(d.profile, sizeof d.profile, "%s", profile);
+    return d;
+}
+
+static void put_scan(const char *idn, const char *profile, uint32_t scan, const struct native_anchor *a)
+{
+    const struct native_descriptor d = descriptor(idn, profile, scan);
+    rig_put(out, native_encode_descriptor(out, sizeof out, &d, 0, 0));
+    rig_anchor(a);
+    rig_points(0, 0, 0, &one, 1);
+}
+
+static int record(const char *name, struct recorder_options options, struct sh_err *err)
+{
+    return rig_record(rig_path(name), options, 1, err);
+}
+
+static char *read_of(const char *name)
+{
+    size_t len;
+    char *text = (char *)rig_read(rig_path(name), &len);
+    unlink(rig_path(name));
+    return text;
+}
+
+/* Two heads of one model: their names are kept apart. Two models: LAS calls them MERGE. */
+static void test_several_heads(void **state)
+{
+    (void)state;
+    struct sh_err err = {0};
+    const struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1), b = rig_anchor_of(NATIVE_CRS_UTM, 32632, 2);
+    rig_begin();
+    put_scan("Maker,Model,SN1,1", "model", 1, &a);
+    put_scan("Maker,Model,SN2,1", "model", 1, &b);
+    assert_int_equal(record("a.ply", (struct recorder_options){.ascii = 1, .n_heads = 2}, &err), 0);
+    char *text = read_of("a.ply");
+    assert_non_null(strstr(text, "comment station 1 idn Maker,Model,SN1,1\n"));
+    assert_non_null(strstr(text, "comment station 2 idn Maker,Model,SN2,1\n"));
+    free(text);
+    for (int other = 0; other < 2; other++) {
+        rig_begin();
+        put_scan("Maker,Model,SN1,1", "model", 1, &a);
+        put_scan("Maker,Model,SN2,1", other ? "other" : "model", 1, &b);
+        assert_int_equal(record("a.las", (struct recorder_options){0}, &err), 0);
+        text = read_of("a.las");
+        assert_string_equal(text + 26, other ? "MERGE" : "model");
+        free(text);
+    }
+}
+
+static void expect_refused(const struct native_anchor *a, const struct native_anchor *b, const char *why)
+{
+    static const char *const name[] = {"a.ply", "a.las", "a.e57"};
+    for (int i = 0; i < 3; i++) {
+        struct sh_err err = {0};
+        char part[160];
+        rig_begin();
+        put_scan("a,b,c,d", "model", 1, a);
+        put_scan("a,b,c,d", "model", 2, b);
+        assert_int_equal(record(name[i], (struct recorder_options){0}, &err), SH_EFORMAT);
+        if (strstr(err.text, why) == NULL) fail_msg("%s", err.text);
+        snprintf(part, sizeof part, "%s.part", rig_path(name[i]));
+        unlink(part);
+    }
+}
+
+static void test_other_kinds(void **state)
+{
+    (void)state;
+    const struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1);
+    struct native_anchor b = a;
+    b.heights = NATIVE_HEIGHTS_GEOID;
+    expect_refused(&a, &b, "the stream went to other heights (geoid)");
+    b = a;
+    b.moving = NATIVE_MOVING;
+    expect_refused(&a, &b, "a head that moves");
+    expect_refused(&b, &a, "a head that stands still");
+    b.moving = NATIVE_STOP;
+    expect_refused(&a, &b, "stops on a trajectory");
+}
+
+/* What PLY says of its coordinates; as float degrees would be wrong by metres. */
+static void test_ply_says(void **state)
+{
+    (void)state;
+    struct sh_err err = {0};
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_GEODETIC, 4979, 1);
+    a.anchor[0] = 45;
+    a.anchor[1] = 9;
+    a.scale[0] = a.scale[1] = 1e-9;
+    for (int geoid = 0; geoid < 2; geoid++) {
+        a.heights = geoid ? NATIVE_HEIGHTS_GEOID : NATIVE_HEIGHTS_ELLIPSOID;
+        rig_begin();
+        put_scan("a,b,c,d", "model", 1, &a);
+        assert_int_equal(record("a.ply", (struct recorder_options){.ascii = 1}, &err), 0);
+        char *text = read_of("a.ply");
+        assert_non_null(strstr(text, geoid ? "in degrees, height above the geoid in metres\n"
+                                           : "in degrees, ellipsoidal height in metres\n"));
+        assert_non_null(strstr(text, "comment x latitude, y longitude in degrees, z range in metres, time"));
+        free(text);
+    }
+    rig_begin();
+    put_scan("a,b,c,d", "model", 1, &a);
+    assert_int_equal(record("a.ply", (struct recorder_options){.columns = PLY_XYZ | PLY_FLOAT}, &err), SH_EINPUT);
+    assert_non_null(strstr(err.text, "degrees as float"));
+    unlink(rig_path("a.ply.part"));
+}
+
+static void put_emitter(const struct native_emitter *e, const struct native_beam *beam)
+{
+    rig_put(out, native_encode_emitter(out, sizeof out, e, beam, 0, 0));
+}
+
+/* Four beams a microsecond apart, every 10 us. A turn that begins at 12 us begins with the third beam of the second
+ * sequence, firing 6; the frame begins with firing 8, row 2 of its line. The line's end was lost. */
+static void test_rows_of_beams(void **state)
+{
+    (void)state;
+    struct sh_err err = {0};
+    const struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1);
+    const struct native_emitter e = {
+        .kind = NATIVE_EMIT_BEAMS, .n_beams = 4, .turn = 1, .sequence_ns_num = 10000, .sequence_ns_den = 1};
+    const struct native_beam beam[4] = {{0, 0, 0}, {1, 0, 1000}, {2, 0, 2000}, {3, 0, 3000}};
+    const struct native_descriptor d = descriptor("a,b,c,d", "model", 1);
+    uint32_t zero = 0, x = 100;
+    int16_t refl = 0;
+    uint16_t label = 0;
+    uint8_t echo = 0x11;
+    const struct line_block block = {.line = 1,
+                                     .pulse0 = 8,
+                                     .n_pulses = 1,
+                                     .t0_ns = 20000,
+                                     .line_t0_ns = 12000,
+                                     .n_points = 1,
+                                     .dt_ns = &zero,
+                                     .a = &x,
+                                     .b = &x,
+                                     .c = &x,
+                                     .refl_cdb = &refl,
+                                     .echo = &echo,
+                                     .label = &label};
+    rig_begin();
+    rig_put(out, native_encode_descriptor(out, sizeof out, &d, 0, 0));
+    put_emitter(&e, beam);
+    rig_anchor(&a);
+    rig_put(out, native_encode_points(out, sizeof out, &block, 0));
+    assert_int_equal(record("a.e57", (struct recorder_options){0}, &err), 0);
+    e57rig_read(rig_path("a.e57"));
+    unlink(rig_path("a.e57"));
+    e57rig_scan(0, 0, 0);
+    assert_int_equal(e57rig_record[0].row, 2);
+}
+
+/* A sphere of ten rings has ten lines: the first and the last one are of one grid. */
+static void test_lines_of_rings(void **state)
+{
+    (void)state;
+    struct sh_err err = {0};
+    const struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1);
+    const struct native_emitter e = {.kind = NATIVE_EMIT_SPHERE,
+                                     .steps = 10,
+                                     .rings = 10,
+                                     .turn = 1,
+                                     .sequence_ns_den = 1,
+                                     .first_ring_udeg = -90000000};
+    const struct native_descriptor d = descriptor("a,b,c,d", "model", 1);
+    rig_begin();
+    rig_put(out, native_encode_descriptor(out, sizeof out, &d, 0, 0));
+    put_emitter(&e, NULL);
+    rig_anchor(&a);
+    rig_points(0, 0, 0, &one, 1);
+    rig_points(9, 90, 90, &one, 1);
+    assert_int_equal(record("a.ptx", (struct recorder_options){0}, &err), 0);
+    char *text = read_of("a.ptx");
+    assert_memory_equal(text, "10\n1\n", 5);
+    assert_null(strstr(rig_notes, "grids begun"));
+    free(text);
+}
+
+/* Elevations are rounded to 1e-6 degrees: what is a degree from the pole is a ring. */
+static void test_poles(void **state)
+{
+    (void)state;
+    struct mesh_grid g = {.kind = SCANHEAD_EMIT_SPHERE, .rings = 181, .first_ring_deg = -90, .ring_step_deg = 1};
+    assert_true(mesh_grid_is_pole(&g, 0) && mesh_grid_is_pole(&g, 180) && mesh_grid_is_pole(&g, 181));
+    assert_false(mesh_grid_is_pole(&g, 1) || mesh_grid_is_pole(&g, 179) || mesh_grid_is_pole(&g, 90));
+    g = (struct mesh_grid){.kind = SCANHEAD_EMIT_SPHERE, .rings = 3, .first_ring_deg = -89.99, .ring_step_deg = 0.5};
+    assert_false(mesh_grid_is_pole(&g, 0));
+}
+
+/* Points spread over a triangle have the label of the nearest corner by weight: here, as its corners are where weights are
+ * x, y and the rest. */
+static void test_sparse_labels(void **state)
+{
+    (void)state;
+    static const double corner[3][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    static const uint32_t face[1][3] = {{0, 1, 2}};
+    struct mesh_points from = {0}, to = {0};
+    const struct mesh_sparse sparse = {.per_m2 = 200, .seed = 3};
+    struct sh_err err = {0};
+    double area_m2 = 0;
+    int seen[3] = {0};
+    for (int k = 0; k < 3; k++) {
+        struct mesh_point p = {.label = (uint16_t)(10 * k), .station = 1};
+        memcpy(p.xyz_m, corner[k], sizeof p.xyz_m);
+        assert_int_equal(mesh_points_add(&from, &p, &err), 0);
+    }
+    if (mesh_sparse_add(&sparse, &from, face, 1, 1, 1, &to, &area_m2, &err) != 0) fail_msg("%s", err.text);
+    assert_true(fabs(area_m2 - 0.5) < 1e-12);
+    assert_int_equal(to.n, 100);
+    for (uint32_t i = 0; i < to.n; i++) {
+        const double x = to.xyz_m[i][0], y = to.xyz_m[i][1], rest = 1 - x - y;
+        const int nearest = x > y && x > rest ? 1 : y > rest ? 2 : 0;
+        assert_int_equal(to.label[i], 10 * nearest);
+        seen[nearest]++;
+    }
+    assert_true(seen[0] > 0 && seen[1] > 0 && seen[2] > 0);
+    mesh_points_free(&from);
+    mesh_points_free(&to);
+}
+
+static int tear_down(void **state)
+{
+    e57rig_free();
+    return rig_tear_down(state);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_several_heads), cmocka_unit_test(test_other_kinds),   cmocka_unit_test(test_ply_says),
+        cmocka_unit_test(test_rows_of_beams), cmocka_unit_test(test_lines_of_rings), cmocka_unit_test(test_poles),
+        cmocka_unit_test(test_sparse_labels),
+    };
+    return cmocka_run_group_tests(tests, rig_set_up, tear_down);
+}

@@ -1,0 +1,142 @@
+/* Files of poses: stations, stops, ways; each pose once, what is missing, and what links the scene to the Earth. */
+#include "tests/unit/recorder_rig.h"
+
+static const struct rig_point one = {3000, -4000, 12000, -1234, 7, 1, 1};
+static char *text;
+
+static const char *record(void)
+{
+    struct sh_err err = {0};
+    size_t len;
+    const char *path = rig_path("a.poses.csv");
+    const int rc = rig_record(path, (struct recorder_options){0}, 1, &err);
+    if (rc != 0) fail_msg("%s", err.text);
+    free(text);
+    text = (char *)rig_read(path, &len);
+    unlink(path);
+    return text;
+}
+
+static void put_scan(int geo, uint32_t scan, const struct native_anchor *a)
+{
+    rig_descriptor(geo, scan);
+    rig_anchor(a);
+    if (!a->moving || (a->moving & NATIVE_STOP) != 0) rig_points(0, 0, 0, &one, 1);
+}
+
+static void put_poses(int64_t from_ms, int64_t to_ms, double y_m)
+{
+    static uint8_t out[1024];
+    const struct native_pose pose[2] = {{.t_ns = from_ms * 1000000, .position_m = {0, y_m, 0}, .quat = {1, 0, 0, 0}},
+                                        {.t_ns = to_ms * 1000000, .position_m = {0, y_m + 1, 0}, .quat = {1, 0, 0, 0}}};
+    rig_put(out, native_encode_poses(out, sizeof out, pose, 2, 0, 0));
+}
+
+/* Heading 90 degrees, clockwise: a turn by -90 about z. Geodetic positions are not metres: NaN. */
+static void test_stations(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 3), g = rig_anchor_of(NATIVE_CRS_GEODETIC, 4979, 4);
+    double v[10];
+    int scan, station, epsg;
+    rig_begin();
+    put_scan(1, 1, &a);
+    const char *at = record();
+    static const char head[] = "scan,station,epsg,x_m,y_m,z_m,qw,qx,qy,qz,lat_deg,lon_deg,height_m\n";
+    assert_memory_equal(at, head, sizeof head - 1);
+    assert_int_equal(sscanf(at + sizeof head - 1, "%d,%d,%d,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf", &scan, &station, &epsg,
+                            &v[0], &v[1], &v[2], &v[3], &v[4], &v[5], &v[6], &v[7], &v[8], &v[9]),
+                     13);
+    assert_true(scan == 1 && station == 3 && epsg == 32632);
+    assert_true(v[0] == 500000.25 && v[1] == 5e6 && v[2] == 400.125);
+    assert_true(fabs(v[3] - M_SQRT1_2) < 1e-15 && v[4] == 0 && v[5] == 0 && fabs(v[6] + M_SQRT1_2) < 1e-15);
+    assert_true(v[7] == 45 && v[8] == 9 && v[9] == 400.125);
+    g.anchor[0] = 45;
+    g.anchor[1] = 9;
+    rig_begin();
+    put_scan(1, 1, &g);
+    assert_non_null(strstr(record(), "\n1,4,4979,nan,nan,nan,0.7071"));
+}
+
+static void test_stops(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 1);
+    a.moving = NATIVE_STOP;
+    a.frame = 12.5;
+    rig_begin();
+    put_scan(0, 1, &a);
+    const char *at = record();
+    assert_non_null(strstr(at, ",height_m,frame\n"));
+    assert_non_null(strstr(at, ",12.5\n"));
+}
+
+static int count(const char *in, const char *what)
+{
+    int n = 0;
+    for (; (in = strstr(in, what)) != NULL; in++)
+        n++;
+    return n;
+}
+
+/* Frames share a pose where none was lost. In the next scan times begin again. */
+static void test_moving(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 1);
+    a.moving = NATIVE_MOVING;
+    rig_begin();
+    put_scan(0, 1, &a);
+    put_poses(0, 100, 5);
+    put_poses(100, 200, 6);
+    put_poses(300, 400, 7); /* those of 200 to 300 ms are lost */
+    put_scan(0, 2, &a);
+    put_poses(0, 50, 8);
+    const char *at = record();
+    static const char want[] = "scan,t_s,x_m,y_m,z_m,qw,qx,qy,qz,frame,flags\n"
+                               "1,0.000000000,0,5,0,1,0,0,0,0,0\n"
+                               "1,0.100000000,0,6,0,1,0,0,0,0,0\n"
+                               "1,0.200000000,0,7,0,1,0,0,0,0,0\n"
+                               "# poses are missing here\n"
+                               "1,0.300000000,0,7,0,1,0,0,0,0,0\n"
+                               "1,0.400000000,0,8,0,1,0,0,0,0,0\n"
+                               "2,0.000000000,0,8,0,1,0,0,0,0,0\n"
+                               "2,0.050000000,0,9,0,1,0,0,0,0,0\n";
+    assert_string_equal(at, want);
+}
+
+static void test_link(void **state)
+{
+    (void)state;
+    static const uint32_t crs[] = {NATIVE_CRS_LOCAL, NATIVE_CRS_ECEF, NATIVE_CRS_UTM, NATIVE_CRS_GEODETIC};
+    static const char *const axes[] = {NULL, "to ECEF X Y Z,", "to easting, northing, height,", "to east, north, up,"};
+    for (int i = 0; i < 4; i++) {
+        struct native_anchor a = rig_anchor_of(crs[i], i == 0 ? 0 : 4978, 1);
+        a.moving = NATIVE_MOVING;
+        rig_begin();
+        put_scan(1, 1, &a);
+        put_poses(0, 100, 5);
+        const char *at = record();
+        assert_int_equal(count(at, "\n#"), i == 0 ? 0 : 3);
+        if (i == 0) continue;
+        assert_non_null(strstr(at, axes[i]));
+        assert_non_null(strstr(at, "ellipsoidal height_m: 10,20,30: 45,9,400.125\n"));
+    }
+}
+
+static int tear_down(void **state)
+{
+    free(text);
+    return rig_tear_down(state);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_stations),
+        cmocka_unit_test(test_stops),
+        cmocka_unit_test(test_moving),
+        cmocka_unit_test(test_link),
+    };
+    return cmocka_run_group_tests(tests, rig_set_up, tear_down);
+}
