@@ -61,5 +61,7 @@ void device_lost(struct device *device, const struct device_work *work)
     if (work->describe && work->describe_flags == 0 && device->scan.on) device->scan.describe = 1;
     if (work->scanning && work->stretch != device->scan.stretch)
         device->scan.anchor_lost = 1; /* maybe not in this tick */
+    if (work->describe && work->describe_flags != 0)
+        device->scan.anchor_lost = 1; /* it may have been the repetition of one that was lost before */
     pthread_mutex_unlock(&device->lock);
 }

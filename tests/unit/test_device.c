@@ -234,6 +234,65 @@ static void a_lost_tick_says_its_events_again(void **state)
     rig_close(rig);
 }
 
+/* North at 900 m/s: after some 2 km the head is on another stretch of its path, which has an anchor of its own. Returns
+ * the rig with the tick claimed in which the anchor changes. */
+static struct rig *open_at_next_stretch(const char *path)
+{
+    char set[128];
+    snprintf(set, sizeof set, "platform.waypoints=%s", path);
+    FILE *f = fopen(path, "w");
+    assert_non_null(f);
+    fputs("x_m,y_m,z_m,speed_m_s\n0,0,0,900\n0,2500,0,900\n", f);
+    assert_int_equal(fclose(f), 0);
+    const char *const sets[] = {"platform.kind=trajectory", set, "stations[1].name=b", "head.frames=0",
+                                "output.layout=geo"};
+    struct rig *rig = rig_open(&(struct device_options){.start = 1}, sets, 5);
+    const size_t n = rig->site->n_stretches;
+    assert_true(n > 1);
+    rig_wait(rig, NATIVE_EV_SCAN_START, 1000);
+    const int64_t until_ns = rig->site->stretch[0].until_ns;
+    while (schedule_time_ns(&rig->work.segment, rig->work.pulse_end - 1) < until_ns)
+        assert_true(rig_claim(rig) && rig->work.scanning);
+    assert_int_equal(rig->work.stretch, 0); /* it begins on the first one */
+    assert_false(rig->work.describe);
+    return rig;
+}
+
+/* An anchor is lost with its tick: the tick after it has it, as a repetition. */
+static void expect_anchor(struct rig *rig, double centre_y_m)
+{
+    assert_true(rig_claim(rig));
+    assert_true(rig->work.describe && rig->work.describe_flags == NATIVE_REPEAT && rig->work.stretch == 1);
+    assert_true(rig->work.anchor.anchor[1] > centre_y_m);
+}
+
+static void a_lost_anchor_comes_again(void **state)
+{
+    (void)state;
+    char path[96];
+    snprintf(path, sizeof path, "%s/far.csv", folder);
+    struct rig *rig = open_at_next_stretch(path);
+    struct device_work lost = rig->work;
+    device_lost(rig->device, &lost);
+    expect_anchor(rig, 1500);
+    lost = rig->work;
+    device_lost(rig->device, &lost); /* this one, too */
+    expect_anchor(rig, 1500);
+    assert_true(rig_claim(rig));
+    assert_false(rig->work.describe); /* once is enough */
+    rig_close(rig);
+    rig = open_at_next_stretch(path);
+    lost = rig->work;
+    for (int i = 0; i < 2; i++) { /* it is known only ticks later, and nothing else was lost */
+        assert_true(rig_claim(rig));
+        assert_false(rig->work.describe);
+    }
+    device_lost(rig->device, &lost);
+    expect_anchor(rig, 1500);
+    rig_close(rig);
+    unlink(path);
+}
+
 static void a_reset_ends_the_scan_and_restores_the_defaults(void **state)
 {
     (void)state;
@@ -391,6 +450,7 @@ int main(void)
         cmocka_unit_test(descriptor_and_anchor_come_first_and_every_second),
         cmocka_unit_test(all_names_are_said_round_and_round),
         cmocka_unit_test(a_lost_tick_says_its_events_again),
+        cmocka_unit_test(a_lost_anchor_comes_again),
         cmocka_unit_test(a_reset_ends_the_scan_and_restores_the_defaults),
         cmocka_unit_test(a_journal_replayed_gives_the_same_work),
         cmocka_unit_test(a_pose_far_ahead_keeps_no_other_out),
