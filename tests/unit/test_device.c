@@ -438,6 +438,38 @@ static void a_platform_stands_where_the_scan_ended(void **state)
     unlink(path);
 }
 
+/* A path of 2 s. With `hold` the scan goes on at its last pose; else it ends there, with the last pulse before. */
+static void a_path_ends_with_its_last_pose(void **state)
+{
+    (void)state;
+    char path[96], set[128];
+    struct pose pose;
+    snprintf(path, sizeof path, "%s/path.csv", folder);
+    snprintf(set, sizeof set, "platform.file=%s", path);
+    FILE *f = fopen(path, "w");
+    assert_non_null(f);
+    fputs("t_s,x_m,y_m,z_m,heading_deg\n5,0,0,0,0\n6,0,1,0,0\n7,0,2,0,90\n", f);
+    assert_int_equal(fclose(f), 0);
+    for (int holds = 0; holds < 2; holds++) {
+        const char *const sets[] = {"platform.kind=trajectory", set, "stations[1].name=b", "head.frames=0",
+                                    holds ? "platform.at_end=hold" : "platform.at_end=stop"};
+        struct rig *rig = rig_open(&(struct device_options){.start = 1}, sets, 5);
+        const int64_t t0_ns = (int64_t)rig_wait(rig, NATIVE_EV_SCAN_START, 1000)->b;
+        if (holds)
+            rig_go_to(rig, rig->next + 2500);
+        else
+            assert_int_equal(rig_wait(rig, NATIVE_EV_SCAN_END, 2010)->b, 2 * 300000);
+        static const int64_t at_ns[] = {1999000000, 2000000000, 2400000000};
+        for (int i = 0; i < 3; i++) {
+            assert_int_equal(device_head_pose(rig->device, t0_ns + at_ns[i], &pose), 1);
+            const double want_m = fmin(1e-9 * (double)at_ns[i], 2.0);
+            assert_true(fabs(pose.position_m[1] - want_m) < 1e-6); /* a straight way at a constant speed */
+        }
+        rig_close(rig);
+    }
+    unlink(path);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -455,6 +487,7 @@ int main(void)
         cmocka_unit_test(a_journal_replayed_gives_the_same_work),
         cmocka_unit_test(a_pose_far_ahead_keeps_no_other_out),
         cmocka_unit_test(a_platform_stands_where_the_scan_ended),
+        cmocka_unit_test(a_path_ends_with_its_last_pose),
     };
     return cmocka_run_group_tests_name("device", tests, make_folder, remove_folder);
 }
