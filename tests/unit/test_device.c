@@ -103,6 +103,14 @@ static void a_stop_in_spin_up_never_scans(void **state)
         assert_false(rig->work.scanning);
     assert_string_equal(rig_state(rig, 500), "idle");
     assert_true(device_scans(rig->device) == 0);
+    /* Ticks that are claimed can't be changed: as told 8 ticks ago, it turns down in 50 ms from the next one on. */
+    rig_tell(rig, "SCAN:START", 500);
+    rig_go_to(rig, 510);
+    rig_tell(rig, "SCAN:STOP", 502);
+    rig_go_to(rig, 559);
+    assert_string_equal(rig_state(rig, 559), "spin-down");
+    rig_go_to(rig, 562);
+    assert_string_equal(rig_state(rig, 561), "idle");
     rig_close(rig);
 }
 
@@ -216,14 +224,18 @@ static void a_lost_tick_says_its_events_again(void **state)
     rig_wait(rig, NATIVE_EV_SCAN_START, 100);
     assert_true(rig->work.describe && rig->work.describe_flags == 0);
     struct device_work lost = rig->work;
+    struct command_result result;
     uint64_t n_cast = lost.n_cast;
     assert_true(n_cast > 0);
+    device_command(rig->device, 1, "nonsense", rig->next, &result); /* a later event, which waits */
     device_lost(rig->device, &lost);
     assert_true(rig_claim(rig));
     assert_true(rig->work.describe && rig->work.describe_flags == 0);
     const struct native_event *again = rig_event(rig, NATIVE_EV_SCAN_START);
     assert_true(again != NULL && again->a == 1 && again->b == (uint64_t)lost.scan_t0_ns);
     assert_non_null(rig_event(rig, NATIVE_EV_STATE));
+    assert_true(rig_event(rig, NATIVE_EV_ERROR) > again); /* they stay in order */
+    rig_tell(rig, "SYST:ERR?", rig->next);
     const struct native_event *overrun = rig_event(rig, NATIVE_EV_OVERRUN);
     assert_true(overrun != NULL && overrun->b == n_cast && overrun->c == 1);
     assert_true(rig->work.pulse0 == lost.pulse_end); /* the pulses themselves are gone */
@@ -231,6 +243,29 @@ static void a_lost_tick_says_its_events_again(void **state)
     const struct native_event *end = rig_wait(rig, NATIVE_EV_SCAN_END, 600);
     assert_true(end->b == 150000 && end->c == atomic_load(&device_counters(rig->device)->cast));
     assert_true(atomic_load(&device_counters(rig->device)->lost_pulses) == n_cast);
+    rig_close(rig);
+}
+
+/* Two ticks are lost, one after the other, and with the second one the event that speaks of the first. */
+static void a_lost_overrun_is_said_with_the_next(void **state)
+{
+    (void)state;
+    struct rig *rig = rig_open(&(struct device_options){.start = 1}, NULL, 0);
+    rig_wait(rig, NATIVE_EV_SCAN_START, 1000);
+    assert_true(rig_claim(rig));
+    struct device_work lost = rig->work;
+    const uint64_t first = lost.cast0;
+    uint64_t n_cast = lost.n_cast;
+    device_lost(rig->device, &lost);
+    for (uint64_t ticks = 1; ticks <= 3; ticks++) {
+        assert_true(rig_claim(rig));
+        const struct native_event *overrun = rig_event(rig, NATIVE_EV_OVERRUN);
+        assert_non_null(overrun);
+        assert_true(overrun->a == first && overrun->b == n_cast && overrun->c == ticks);
+        lost = rig->work;
+        n_cast += lost.n_cast;
+        device_lost(rig->device, &lost);
+    }
     rig_close(rig);
 }
 
@@ -482,6 +517,7 @@ int main(void)
         cmocka_unit_test(descriptor_and_anchor_come_first_and_every_second),
         cmocka_unit_test(all_names_are_said_round_and_round),
         cmocka_unit_test(a_lost_tick_says_its_events_again),
+        cmocka_unit_test(a_lost_overrun_is_said_with_the_next),
         cmocka_unit_test(a_lost_anchor_comes_again),
         cmocka_unit_test(a_reset_ends_the_scan_and_restores_the_defaults),
         cmocka_unit_test(a_journal_replayed_gives_the_same_work),
