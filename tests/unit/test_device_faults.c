@@ -226,14 +226,14 @@ static void tells_a_wrong_time(void **state)
     rig_close(rig);
 }
 
-/* The end of the time is not part of it: the second that begins then is said. */
+/* To the nanosecond, within a tick: the second that begins with the fault is lost, and the one at its end is said. */
 static void loses_pps_up_to_the_end(void **state)
 {
     (void)state;
-    static const char *const sets[] = {"time.epoch=2026-06-30T11:59:55.3Z"};
-    struct rig *rig = open_with("  - {kind: pps_lost, from_s: 0.7, until_s: 2.7}\n", NULL, sets, 1);
+    static const char *const sets[] = {"time.epoch=2026-06-30T11:59:55.2995Z"};
+    struct rig *rig = open_with("  - {kind: pps_lost, from_s: 0.7005, until_s: 2.7005}\n", NULL, sets, 1);
     const struct native_event *pps = rig_wait(rig, NATIVE_EV_PPS, 3000);
-    assert_true(pps->b == 2700000000);
+    assert_true(pps->b == 2700500000);
     rig_close(rig);
 }
 

@@ -243,6 +243,19 @@ static void test_tcp_endings(void **state)
     bench_expect(&bench, LINK_CLOSED, 0);
     assert_int_equal(read(fd, &byte, 1), 0);
     close(fd);
+    /* and somebody else comes before that has been read: the session is not free yet, but will be */
+    fd = tcp_client(tcp_port(&bench));
+    bench_expect(&bench, LINK_OPENED, 0);
+    assert_int_equal(write(fd, "q", 1), 1);
+    close(fd);
+    fd = tcp_client(tcp_port(&bench));
+    bench_poll(&bench, 0, DEADLINE_MS);
+    bench_read_all(&bench, 0, &byte, 1);
+    bench_expect(&bench, LINK_CLOSED, 0);
+    bench_expect(&bench, LINK_OPENED, 0);
+    exchange(&bench, 0, fd);
+    close(fd);
+    bench_expect(&bench, LINK_CLOSED, 0);
     /* reset, while frames are on their way */
     fd = tcp_client(tcp_port(&bench));
     bench_expect(&bench, LINK_OPENED, 0);
