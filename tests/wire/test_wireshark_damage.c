@@ -115,7 +115,7 @@ static size_t put_damage(uint8_t *out)
             to += put_one(out + to, frame, older, what, &random);
             memcpy(out + to, frame + own, between);
             to += between;
-            older = frame;
+            if (capture_random(&random, 2) == 0) older = frame;
         }
         free(bytes);
     }
@@ -209,6 +209,7 @@ static const struct {
     {6, 32, 96, 'A', 0, "text: a text without NUL"}, /* up to the packet's end */
     {6, 0, 0, 0, 4, "Longer than version 1 has it"},
     {7, 4, 4, 3, 0, "shorter than its names"},
+    {7, 27, 1, 4, 0, "shorter than its names"}, /* the last one, of 3 bytes */
     {8, 0, 4, 1, 0, "1 poses, allowed 2 to 2"},
     {8, 44, 4, 0x40000000, 0, "a quaternion that is not of length one"},
     {9, 12, 4, 5, 0, "5 points, and room for 4"},
