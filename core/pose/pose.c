@@ -42,14 +42,16 @@ void pose_matrix(const double quat[4], double r[9])
     r[8] = 1.0 - 2.0 * (x * x + y * y);
 }
 
-/* R's middle column is (sin h cos p, cos h cos p, sin p), its last row (-cos p sin r, sin p, cos p cos r). */
+/* R's middle column is (sin h cos p, cos h cos p, sin p). Turned back by the heading, its first row is (cos r, 0, sin r).
+ * Near the pole, where the heading has a large error, roll has the opposite one then, and the attitude has neither. */
 static void matrix_to_angles(const double r[9], double *heading_rad, double *pitch_rad, double *roll_rad)
 {
     double flat = hypot(r[1], r[4]);
     *pitch_rad = atan2(r[7], flat);
     int pole = flat < 1e-9;
-    *roll_rad = pole ? 0.0 : atan2(-r[6], r[8]);
     double heading = pole ? atan2(-r[3], r[0]) : atan2(r[1], r[4]);
+    double sh = sin(heading), ch = cos(heading);
+    *roll_rad = pole ? 0.0 : atan2(ch * r[2] - sh * r[5], ch * r[0] - sh * r[3]);
     *heading_rad = heading < 0.0 ? heading + 2.0 * M_PI : heading;
 }
 

@@ -43,8 +43,9 @@ static int slave_rest(struct pty_device *device)
     cfmakeraw(&raw);
     int fd = open(device->slave, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
     if (fd < 0) {
+        const int error = errno;
         drop_output(device->master, &raw);
-        return errno == EMFILE || errno == ENFILE || errno == ENOMEM ? 0 : -1;
+        return error == EMFILE || error == ENFILE || error == ENOMEM ? 0 : -1;
     }
     ioctl(fd, TIOCNXCL);
     tcflow(fd, TCOON);

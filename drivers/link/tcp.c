@@ -4,7 +4,6 @@
  * A client that finds all sessions taken is accepted and closed at once, so that it does not wait in vain. One that
  * comes while another's session is ending gets that session: it waits until what the other sent has been read. */
 #include <errno.h>
-#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -55,7 +54,7 @@ static int tcp_open(const struct link_spec *spec, void **link, struct sh_err *er
     snprintf(tcp->host, sizeof tcp->host, "%s", host);
     tcp->port = atoi(strrchr(at, ':') + 1);
     tcp->n_sessions = spec->max_sessions;
-    tcp->reserve_fd = open("/dev/null", O_RDONLY | O_CLOEXEC);
+    tcp->reserve_fd = socket_reserve();
     *link = tcp;
     return SH_OK;
 }
@@ -64,20 +63,6 @@ static void tcp_endpoint(const void *link, char *buf, size_t len)
 {
     const struct tcp_link *tcp = link;
     snprintf(buf, len, "%s", tcp->name);
-}
-
-/* Without a free descriptor accept fails and the listener stays readable: poll would spin. */
-static int tcp_accept(struct tcp_link *tcp, struct sockaddr_storage *from, socklen_t *len, int *starved)
-{
-    struct sockaddr *at = (struct sockaddr *)from;
-    int fd = accept4(tcp->listener, at, len, SOCK_NONBLOCK | SOCK_CLOEXEC);
-    *starved = fd < 0 && (errno == EMFILE || errno == ENFILE) && tcp->reserve_fd >= 0;
-    if (!*starved) return fd;
-    close(tcp->reserve_fd);
-    fd = accept4(tcp->listener, at, len, SOCK_CLOEXEC);
-    if (fd >= 0) close(fd);
-    tcp->reserve_fd = open("/dev/null", O_RDONLY | O_CLOEXEC);
-    return fd;
 }
 
 static int free_slot(const struct tcp_link *tcp)
@@ -108,14 +93,14 @@ static void tcp_welcome(struct tcp_link *tcp, struct link_events *events)
         struct sockaddr_storage from;
         socklen_t len = sizeof from;
         char peer[64];
-        int starved;
+        int fd;
         const int slot = free_slot(tcp);
         if (slot == tcp->n_sessions && is_any_ending(tcp)) return; /* poll comes back at once */
-        int fd = tcp_accept(tcp, &from, &len, &starved);
-        if (fd < 0) return; /* none left, or one that gave up before we came */
+        if (!socket_accept(tcp->listener, &tcp->reserve_fd, &fd, &from, &len))
+            return; /* none left, or one that gave up before we came */
         socket_address_text((struct sockaddr *)&from, len, peer, sizeof peer);
-        if (starved || slot == tcp->n_sessions) {
-            if (!starved) close(fd);
+        if (fd < 0 || slot == tcp->n_sessions) {
+            if (fd >= 0) close(fd);
             link_events_push(events, LINK_REFUSED, 0, peer);
             continue;
         }

@@ -22,6 +22,7 @@ struct usb_link {
     int reported[USB_MAX_SESSIONS]; /* the caller takes it to be open */
     uint32_t plugged;               /* attaches that the caller knows of */
     const char *news;               /* the back end's, until reported */
+    const char *refused;            /* likewise */
     struct usb_claims claims;       /* of the head's own identity */
 };
 
@@ -149,10 +150,16 @@ static void take_news(struct usb_link *self)
     if (self->news == NULL) self->news = scanhead_usb_cut(&self->head);
 }
 
+static void take_refused(struct usb_link *self)
+{
+    if (self->refused == NULL && self->ops->refused != NULL) self->refused = self->ops->refused(self->backend);
+}
+
 static int has_news(const struct usb_link *self, uint32_t want_write)
 {
     int news = is_plugged_anew(self);
-    news |= (self->ops->more != NULL && self->ops->more(self->backend)) || self->news != NULL || self->head.cut_due;
+    news |= (self->ops->more != NULL && self->ops->more(self->backend)) || self->news != NULL || self->refused != NULL ||
+            self->head.cut_due;
     for (int i = 0; i < self->n; i++)
         news |= has_to_report(self, i) || is_readable(self, i) || ((want_write >> i & 1u) != 0 && is_writable(self, i));
     return news;
@@ -187,6 +194,10 @@ static int usb_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
         report(self, i, want_write, &events);
     take_news(self);
     if (self->news != NULL && link_events_push(&events, LINK_NOTICE, 0, self->news)) self->news = NULL;
+    for (take_refused(self); self->refused != NULL; take_refused(self)) {
+        if (!link_events_push(&events, LINK_REFUSED, 0, self->refused)) break;
+        self->refused = NULL;
+    }
     return events.n;
 }
 

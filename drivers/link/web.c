@@ -13,7 +13,6 @@
  * byte. Programs that aren't browsers have no Origin. */
 #include <arpa/inet.h>
 #include <errno.h>
-#include <fcntl.h>
 #include <libwebsockets.h>
 #include <stdlib.h>
 #include <string.h>
@@ -74,7 +73,7 @@ static int web_open(const struct link_spec *spec, void **link, struct sh_err *er
     web->port = atoi(strrchr(web->at, ':') + 1);
     web->n_sessions = spec->max_sessions;
     web->source = spec->web;
-    web->reserve_fd = open("/dev/null", O_RDONLY | O_CLOEXEC);
+    web->reserve_fd = socket_reserve();
     if (open_context(web) == 0) web->listening = web_wait_for(web, web->listener);
     if (web->listening == NULL) {
         if (web->vhost == NULL) close(web->listener);

@@ -2,7 +2,6 @@
  * room without a word; so the request is looked at first, without taking it out of the socket, and the connection is
  * given to libwebsockets once the request has its end. A longer one that comes later on the same connection closes it. */
 #include <errno.h>
-#include <fcntl.h>
 #include <poll.h>
 #include <stdio.h>
 #include <string.h>
@@ -20,24 +19,23 @@ struct lws *web_wait_for(struct web_link *web, int fd)
     return wsi;
 }
 
-/* Without a free descriptor the connection would stay in the queue, and wake the link again and again: it is closed by
- * means of the one in reserve. */
-static int accept_one(struct web_link *web)
+static void refuse(struct web_link *web, const struct sockaddr_storage *from, socklen_t len)
 {
-    int fd = accept4(web->listener, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
-    if (fd >= 0 || (errno != EMFILE && errno != ENFILE) || web->reserve_fd < 0) return fd;
-    close(web->reserve_fd);
-    fd = accept4(web->listener, NULL, NULL, SOCK_CLOEXEC);
-    if (fd >= 0) close(fd);
-    web->reserve_fd = open("/dev/null", O_RDONLY | O_CLOEXEC);
-    return -1;
+    socket_address_text((const struct sockaddr *)from, len, web->refused, sizeof web->refused);
+    web->n_refused++;
 }
 
 static void accept_all(struct web_link *web)
 {
     for (int i = 0; i < WEB_MAX_CONNECTIONS; i++) {
-        int fd = accept_one(web);
-        if (fd < 0) return;
+        struct sockaddr_storage from;
+        socklen_t len = sizeof from;
+        int fd;
+        if (!socket_accept(web->listener, &web->reserve_fd, &fd, &from, &len)) return;
+        if (fd < 0) { /* no descriptor is left */
+            refuse(web, &from, len);
+            continue;
+        }
         const int size = WEB_SEND_BUFFER;
         socket_tune(fd);
         setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &size, sizeof size);

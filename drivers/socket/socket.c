@@ -39,6 +39,25 @@ int socket_open_at(const struct sockaddr *at, socklen_t len, int connecting)
     return -1;
 }
 
+int socket_reserve(void)
+{
+    return open("/dev/null", O_RDONLY | O_CLOEXEC);
+}
+
+int socket_accept(int listener, int *reserve, int *fd, struct sockaddr_storage *from, socklen_t *len)
+{
+    struct sockaddr *at = (struct sockaddr *)from;
+    *fd = accept4(listener, at, len, SOCK_NONBLOCK | SOCK_CLOEXEC);
+    const int starved = *fd < 0 && (errno == EMFILE || errno == ENFILE) && *reserve >= 0;
+    if (*fd >= 0 && *reserve < 0) *reserve = socket_reserve(); /* somebody else was quicker, last time */
+    if (!starved) return *fd >= 0;
+    close(*reserve);
+    const int waste = accept4(listener, at, len, SOCK_CLOEXEC);
+    if (waste >= 0) close(waste);
+    *reserve = socket_reserve();
+    return waste >= 0;
+}
+
 void socket_address_text(const struct sockaddr *address, socklen_t len, char *text, size_t size)
 {
     char host[64], port[8];

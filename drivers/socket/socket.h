@@ -28,6 +28,13 @@ int socket_open_at(const struct sockaddr *at, socklen_t len, int connecting);
 /* SH_E for an errno of either. */
 int socket_error_code(int error);
 
+/* A descriptor to be given up for a moment when there are no more; -1: none is left. */
+int socket_reserve(void);
+/* The next client of a listener. Returns 1 with its descriptor, which does not block; or with -1 where it was turned
+ * away, as the process or the system has no descriptor for it. It would wake who waits for the listener again and again
+ * otherwise. 0: there is none. reserve: socket_reserve()'s; its owner closes it. from may be NULL. */
+int socket_accept(int listener, int *reserve, int *fd, struct sockaddr_storage *from, socklen_t *len);
+
 /* An address as "127.0.0.1:40123" or "[::1]:40123". */
 void socket_address_text(const struct sockaddr *address, socklen_t len, char *text, size_t size);
 

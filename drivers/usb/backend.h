@@ -54,6 +54,9 @@ struct usb_backend_ops {
     /* One line that whoever runs the head should know, each only once; NULL: nothing. Valid until the next
      * call. The member itself is NULL for a back end that never has any. */
     const char *(*news)(void *backend);
+    /* Who was turned away since the last call, as there was no descriptor for it; NULL: nobody. NULL as a member: nobody
+     * comes. */
+    const char *(*refused)(void *backend);
 
     /* Sends what the core has completed, as far as the wire takes it. After usb_device_write and
      * usb_device_read. */
@@ -82,6 +85,17 @@ const struct usb_backend_ops *usb_backend_ops_get(enum usb_backend_type type);
  * taken over. `what` names it in errors; name gets "127.0.0.1:3240" or the path. backend_socket.c */
 int usb_backend_socket(const struct usb_backend_spec *spec, const char *what, int *fd, char *name, size_t len,
                        struct sh_err *err);
+/* Clients of a listener that come while there is no descriptor for them. backend_socket.c */
+struct usb_door {
+    int reserve; /* socket_reserve() */
+    int n_refused;
+    char who[64]; /* of the last one */
+};
+/* The next client's descriptor, not blocking; -1: none. */
+int usb_backend_accept(int listener, struct usb_door *door);
+/* As the member `refused`. */
+const char *usb_backend_refused(struct usb_door *door);
+
 /* The address that a socket of usb_backend_socket is connected to, and connecting to it again, without
  * waiting and without looking up names. 0: *fd is connected. EINPROGRESS: it will be when poll(2) finds it
  * writable; usb_backend_connect_error then says how it went. Any other errno: *fd is -1. backend_socket.c */

@@ -97,6 +97,27 @@ int usb_backend_socket(const struct usb_backend_spec *spec, const char *what, in
     return socket_open(&place, fd, name, len, err);
 }
 
+int usb_backend_accept(int listener, struct usb_door *door)
+{
+    enum { AT_ONCE = 16 }; /* turned away; those that come without end have to wait for the next call */
+    struct sockaddr_storage from;
+    socklen_t len = sizeof from;
+    int fd = -1;
+    for (int i = 0; i < AT_ONCE && socket_accept(listener, &door->reserve, &fd, &from, &len) && fd < 0; i++) {
+        socket_address_text((const struct sockaddr *)&from, len, door->who, sizeof door->who);
+        door->n_refused++;
+        len = sizeof from;
+    }
+    return fd;
+}
+
+const char *usb_backend_refused(struct usb_door *door)
+{
+    if (door->n_refused == 0) return NULL;
+    door->n_refused--;
+    return door->who;
+}
+
 void usb_backend_hang_up(int fd, int timeout_ms)
 {
     enum { READS = 8 }; /* a peer that goes on sending is waited for no longer */

@@ -26,6 +26,7 @@ struct usbip {
     int here;                       /* attached to this machine: nobody else may come */
     int unplugged;                  /* on request */
     int listener;                   /* -1: none */
+    struct usb_door door;
     struct usb_backend_spec served; /* where it listens; once open with the port that it has */
     struct usb_retry retry;         /* of what is attached here */
     int taken;
@@ -69,6 +70,7 @@ static int listen_here(struct usbip *self, const struct usb_backend_spec *spec, 
     int rc = usb_backend_socket(spec, "usbip", &self->listener, at, sizeof at, err);
     if (rc != SH_OK) return rc;
     snprintf(self->name, sizeof self->name, "usbip:%s", at);
+    if (self->door.reserve < 0) self->door.reserve = socket_reserve();
     self->served = *spec;
     if (spec->path[0] == '\0') self->served.port = atoi(strrchr(at, ':') + 1);
     return SH_OK;
@@ -80,7 +82,7 @@ static int usbip_open(const struct usb_backend_spec *spec, struct usb_device *de
     struct usbip *self = calloc(1, sizeof *self);
     if (self == NULL) return sh_fail(err, SH_ENOMEM, "usbip: no memory");
     self->device = device;
-    self->listener = self->retry.timer = -1;
+    self->listener = self->retry.timer = self->door.reserve = -1;
     for (int i = 0; i < MAX_CONNS; i++)
         self->conn[i].fd = -1;
     struct usb_backend_spec served = *spec;
@@ -136,7 +138,7 @@ static void welcome(struct usbip *self)
 {
     const int size = SEND_BUFFER_BYTES;
     for (int i = 0; i < MAX_CONNS; i++) {
-        int fd = accept4(self->listener, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
+        int fd = usb_backend_accept(self->listener, &self->door);
         if (fd < 0) return;
         socket_tune(fd);
         socket_tune_impatient(fd); /* a kernel; and as long as it seems to be there, no other host gets the device */
@@ -195,6 +197,12 @@ static const char *usbip_news(void *backend)
     return usb_retry_news(&self->retry);
 }
 
+static const char *usbip_refused(void *backend)
+{
+    struct usbip *self = backend;
+    return usb_backend_refused(&self->door);
+}
+
 static int64_t usbip_due_ns(const void *backend)
 {
     const struct usbip *self = backend;
@@ -247,6 +255,7 @@ static void usbip_close(void *backend)
         usbip_conn_end(&self->conn[i]);
     }
     if (self->listener >= 0) close(self->listener);
+    if (self->door.reserve >= 0) close(self->door.reserve);
     usb_retry_close(&self->retry);
     free(self);
 }
@@ -258,6 +267,7 @@ const struct usb_backend_ops usb_backend_usbip = {
     .prepare = usbip_prepare,
     .handle = usbip_handle,
     .news = usbip_news,
+    .refused = usbip_refused,
     .flush = usbip_flush,
     .due_ns = usbip_due_ns,
     .faults = USB_CAN_STALL | USB_CAN_SHORTEN | USB_CAN_ENUMERATE_WRONG,

@@ -127,7 +127,7 @@ static int connect_again(struct usbredir *self)
 
 static void welcome(struct usbredir *self)
 {
-    int fd = accept4(self->listener, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
+    int fd = usb_backend_accept(self->listener, &self->door);
     if (fd < 0) return;
     stop(self); /* one that has not said hello */
     if (start(self, fd) != SH_OK) close(fd);
@@ -163,6 +163,7 @@ static int open_socket(struct usbredir *self, const struct usb_backend_spec *spe
     snprintf(self->name, sizeof self->name, "usbredir:%s", at);
     if (!spec->attach) {
         self->listener = fd;
+        self->door.reserve = socket_reserve();
         note_path(self, spec->path);
         return SH_OK;
     }
@@ -179,7 +180,7 @@ static int usbredir_open(const struct usb_backend_spec *spec, struct usb_device 
     struct usbredir *self = calloc(1, sizeof *self);
     if (self == NULL) return sh_fail(err, SH_ENOMEM, "usbredir: no memory");
     self->device = device;
-    self->listener = self->fd = self->retry.timer = -1;
+    self->listener = self->fd = self->retry.timer = self->door.reserve = -1;
     int rc = open_socket(self, spec, err);
     if (rc != SH_OK) {
         usb_retry_close(&self->retry);
@@ -238,6 +239,12 @@ static const char *usbredir_news(void *backend)
     return usb_retry_news(&self->retry);
 }
 
+static const char *usbredir_refused(void *backend)
+{
+    struct usbredir *self = backend;
+    return usb_backend_refused(&self->door);
+}
+
 static int64_t usbredir_due_ns(const void *backend)
 {
     return usbredir_slow_due_ns(backend);
@@ -293,6 +300,7 @@ static void usbredir_close(void *backend)
     stop(self);
     remove_path(self);
     if (self->listener >= 0) close(self->listener);
+    if (self->door.reserve >= 0) close(self->door.reserve);
     usb_retry_close(&self->retry);
     free(self);
 }
@@ -304,6 +312,7 @@ const struct usb_backend_ops usb_backend_usbredir = {
     .prepare = usbredir_prepare,
     .handle = usbredir_handle,
     .news = usbredir_news,
+    .refused = usbredir_refused,
     .flush = usbredir_flush,
     .due_ns = usbredir_due_ns,
     .faults = USB_CAN_STALL | USB_CAN_SHORTEN | USB_CAN_ENUMERATE_WRONG,

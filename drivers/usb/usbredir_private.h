@@ -27,6 +27,7 @@ struct usbredir {
     uint64_t n_bytes;
     struct redir_transfer *receiving[16]; /* by number of the interrupt IN endpoint */
     uint64_t next_id;                     /* of interrupt packets */
+    struct usb_door door;                 /* of the listener */
     struct usb_retry retry;               /* of a connection we make */
     struct usb_backend_address peer;      /* where to */
     char path[256];                       /* to be removed; empty: none */

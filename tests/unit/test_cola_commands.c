@@ -264,6 +264,8 @@ static void errors_have_their_numbers(void **state)
         {"sWN LMPoutputRange 1 9C4 FFF9222F 0", "sFA 5"},
         {"sWN LMPoutputRange 1 9C4 0 225511", "sFA 5"},
         {"sWN LMPoutputRange 1 9C4 +10 +20", "sFA 5"}, /* between two beams */
+        {"sWN LMPoutputRange 1 9C4 -2147483648 0", "sFA 5"}, /* the least of four bytes, and one less */
+        {"sWN LMPoutputRange 1 9C4 -2147483649 0", "sFA 10"},
         {"sWN LMPoutputRange 1 9C4 +20 +10", "sFA 5"},
         {"sWN LMDscandatacfg 100 0 1 1 0 0 0 0 0 0 1 1", "sFA 10"},
         {"sWN LMDscandatacfg -1 0 1 1 0 0 0 0 0 0 1 1", "sFA 10"},
@@ -349,6 +351,12 @@ static void the_clock_can_be_set(void **state)
     cola_expect("sMN LSPsetdatetime 7E7 2 1D 0 0 0 0", "sAN LSPsetdatetime 0"); /* 29 February 2023 */
     cola_expect("sMN LSPsetdatetime 7E8 D 1 0 0 0 0", "sAN LSPsetdatetime 0");
     cola_expect("sRN STlms", "sRA STlms 7 0 8 00:00:00 A 01.01.2000 0 0 0");
+    cola_expect("sMN LSPsetdatetime 7D0 2 1D 17 3B 3B 0", "sAN LSPsetdatetime 1"); /* a second time */
+    cola_expect("sRN STlms", "sRA STlms 7 0 8 23:59:59 A 29.02.2000 0 0 0");
+    cola_expect("sMN LSPsetdatetime 834 2 1D 0 0 0 0", "sAN LSPsetdatetime 0"); /* 2100 has no 29 February */
+    cola_expect("sMN LSPsetdatetime 834 2 1C 17 3B 3B 0", "sAN LSPsetdatetime 1");
+    cola.ops->time(cola.protocol, INT64_C(3600000000000) * 12 + INT64_C(3000000000));
+    cola_expect("sRN STlms", "sRA STlms 7 0 8 00:00:00 A 01.03.2100 0 0 0");
 }
 
 int main(void)

@@ -65,6 +65,14 @@ static void garbage_is_skipped_and_counted(void **state)
         assert_int_equal(cola.n_units, 3);
         assert_int_equal(cola.count[PROTOCOL_INPUT_LOST], cases[i].lost);
     }
+    for (size_t marks = 1; marks <= 6; marks++) { /* more marks than four: the last four count */
+        protocol_rig_clear(&cola);
+        cola.count[PROTOCOL_INPUT_LOST] = 0;
+        cola_input("\2\2\2\2\2\2", marks);
+        cola_input(good, good_len);
+        assert_int_equal(cola.n_units, 1);
+        assert_int_equal(cola.count[PROTOCOL_INPUT_LOST], marks);
+    }
     assert_int_equal(cola.count[PROTOCOL_WRONG], 0);
 }
 

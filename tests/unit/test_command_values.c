@@ -108,6 +108,11 @@ static void numbers_beyond_64_bits_are_out_of_range(void **ctx)
         snprintf(line, sizeof line, "HEAD:PRR %s", numbers[i]);
         expect_error(&dev, 1, line, CMD_E_RANGE, ", allowed 1000 to 1200000\"");
     }
+    /* The largest that 64 bits have is a number like any other, and the next one is none. */
+    dev.step_allowed = 1;
+    expect_error(&dev, 1, "TIME:STEP 9223372036854775807", CMD_E_RANGE, " 9223372036854775807 ns, allowed");
+    expect_error(&dev, 1, "TIME:STEP 9223372036854775808", CMD_E_RANGE, " 9223372036854775808, allowed");
+    dev.step_allowed = 0;
     /* Four frames more than 2^32 must not come out as four. */
     expect_error(&dev, 1, "SCAN:FRAMES 4294967300", CMD_E_RANGE, "allowed 0 to 1000000");
     expect(&dev, "SCAN:FRAMES 1000000", "OK");

@@ -124,6 +124,30 @@ static void faults_end_with_their_scan(void **state)
     rig_close(rig);
 }
 
+/* A mirror that stands does not wobble; once it turns again it does. */
+static void what_stands_does_not_wobble(void **state)
+{
+    (void)state;
+    const char *const sets[] = {"head.frames=0"};
+    const char *const faults[] = {"{kind: mirror_stuck, from_pulse: 6000, until_pulse: 12000}",
+                                  "{kind: mirror_wobble, from_pulse: 3000, deg: 0.1, hz: 10}"};
+    struct rig *rig = open_scan(sets, LEN(sets), faults, LEN(faults));
+    int n_stuck = 0, n_wobbling = 0;
+    for (int i = 0; i < 60 && rig_claim(rig); i++) {
+        const struct device_work *work = &rig->work;
+        const int stuck = work->pulse0 >= 6000 && work->pulse_end <= 12001;
+        const int wobbles = !stuck && work->pulse0 >= 3000;
+        assert_int_equal(work->upset.on, stuck || wobbles);
+        if (!work->upset.on) continue;
+        assert_int_equal(work->upset.stuck, stuck);
+        assert_int_equal(work->upset.cast.n_wobbles, wobbles);
+        n_stuck += stuck;
+        n_wobbling += wobbles;
+    }
+    assert_true(n_stuck > 10 && n_wobbling > 10);
+    rig_close(rig);
+}
+
 /* A command's fault counts its time from the command on: from the first pulse that fires then. */
 static void an_added_fault_counts_from_its_command(void **state)
 {
@@ -195,7 +219,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_tick_ends_where_a_fault_does),   cmocka_unit_test(settings_change_while_the_mirror_is_slow),
-        cmocka_unit_test(faults_end_with_their_scan),       cmocka_unit_test(an_added_fault_counts_from_its_command),
+        cmocka_unit_test(faults_end_with_their_scan),
+        cmocka_unit_test(what_stands_does_not_wobble),       cmocka_unit_test(an_added_fault_counts_from_its_command),
         cmocka_unit_test(another_fault_leaves_it_as_it_is), cmocka_unit_test(the_mirror_has_limits),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

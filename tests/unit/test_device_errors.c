@@ -35,7 +35,7 @@ static void errors_are_held_back_by_session(void **state)
     uint64_t single[3] = {0}, held[3] = {0}, events = 0;
     for (uint64_t tick = 0; tick < 3500; tick++) {
         for (uint32_t session = 1; session <= 2 && tick < 2000; session++)
-            if (session == 1 || tick % 400 == 0) device_command(rig->device, session, "nonsense", tick, &result);
+            if (session == 1 || tick % 150 == 0) device_command(rig->device, session, "nonsense", tick, &result);
         assert_true(rig_claim(rig));
         for (uint32_t i = 0; i < rig->work.n_events; i++) {
             const struct native_event *event = &rig->work.event[i];
@@ -46,9 +46,9 @@ static void errors_are_held_back_by_session(void **state)
             events++;
         }
     }
-    assert_true(single[2] == 5 && held[2] == 0); /* who errs seldom is not concerned */
+    assert_true(single[2] == 14 && held[2] == 0); /* who errs seldom is not concerned, however long */
     assert_int_equal(single[1] + held[1], 2000);
-    assert_in_range(events - 5, 2 * 11, 3 * 11);
+    assert_in_range(events - 14, 2 * 11, 3 * 11);
     rig_close(rig);
 }
 

@@ -226,6 +226,17 @@ static void tells_a_wrong_time(void **state)
     rig_close(rig);
 }
 
+/* To the nanosecond, within a tick: the second that begins with the fault is lost, and the one at its end is said. */
+static void loses_pps_up_to_the_end(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"time.epoch=2026-06-30T11:59:55.2995Z"};
+    struct rig *rig = open_with("  - {kind: pps_lost, from_s: 0.7005, until_s: 2.7005}\n", NULL, sets, 1);
+    const struct native_event *pps = rig_wait(rig, NATIVE_EV_PPS, 3000);
+    assert_true(pps->b == 2700500000);
+    rig_close(rig);
+}
+
 /* A drift that a command takes out is over; the head is ahead from then on by what it gained. */
 static void drifts_until_it_is_cleared(void **state)
 {
@@ -307,6 +318,7 @@ int main(void)
         cmocka_unit_test(ends_without_power),
         cmocka_unit_test(loses_power_at_a_pulse),
         cmocka_unit_test(tells_a_wrong_time),
+        cmocka_unit_test(loses_pps_up_to_the_end),
         cmocka_unit_test(drifts_until_it_is_cleared),
         cmocka_unit_test(is_replayed),
         cmocka_unit_test(counts_from_near_the_wrap),

@@ -13,6 +13,7 @@
 #include <fcntl.h>
 #include "core/err.h"
 #include "firmware_sim/fault/board.h"
+#include "firmware_sim/fault/tally.h"
 
 static struct fault fault_of_kind(enum fault_kind kind)
 {
@@ -276,6 +277,27 @@ static void what_cannot_be_written_is_said(void **state)
     assert_int_equal(truth_close(truth, &err), SH_OK);
 }
 
+/* A fault that is taken out is forgotten; those that stay keep their counts, wherever they stand in the list. */
+static void a_tally_keeps_what_is_in_the_list(void **state)
+{
+    (void)state;
+    struct fault_tally tally = {{0}, {0}};
+    struct fault_entry entry[3] = {{.number = 1}, {.number = 2}, {.number = 3}};
+    for (uint32_t number = 1; number <= 3; number++)
+        *fault_tally_hits(&tally, number) += 10 * number;
+    entry[0].number = 3;
+    entry[1].number = 2;
+    fault_tally_renew(&tally, entry, 2);
+    assert_int_equal(*fault_tally_hits(&tally, 2), 20);
+    assert_int_equal(*fault_tally_hits(&tally, 3), 30);
+    ++*fault_tally_hits(&tally, 4); /* in the place of 1, whose count is not its own */
+    assert_int_equal(*fault_tally_hits(&tally, 4), 1);
+    assert_int_equal(*fault_tally_hits(&tally, 3), 30);
+    fault_tally_renew(&tally, entry, 0);
+    for (uint32_t number = 1; number <= 4; number++)
+        assert_int_equal(*fault_tally_hits(&tally, number), 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -284,6 +306,7 @@ int main(void)
         cmocka_unit_test(what_belongs_to_different_places_is_independent),
         cmocka_unit_test(numbers_are_at_their_ends_as_said),
         cmocka_unit_test(the_list_changes_and_counts_stay),
+        cmocka_unit_test(a_tally_keeps_what_is_in_the_list),
         cmocka_unit_test(the_truth_is_written_line_by_line),
         cmocka_unit_test(a_dash_is_standard_output),
         cmocka_unit_test(the_longest_note_is_not_cut),

@@ -194,6 +194,36 @@ static void merged_frames_go_out_in_one_write(void **state)
     assert_int_equal(rig_take(0), 1);
 }
 
+/* Whatever way a piece takes through it, a queue that is empty has no bytes, and one that is full gets room again. */
+static void a_queue_gives_back_its_room(void **state)
+{
+    (void)state;
+    struct wire_queue queue = {0};
+    for (int way = 0; way < 4; way++) {
+        struct wire_piece *piece = wire_piece_new(WIRE_FRAMES, "abcdef", 6);
+        if (way == 1) piece->not_before_ns = 100; /* held by its time */
+        if (way == 2) piece->after = 7;           /* or until a frame has come */
+        if (way == 1 || way == 2)
+            wire_queue_hold(&queue, piece);
+        else
+            assert_int_equal(wire_queue_put(&queue, piece), 0);
+        assert_int_equal(queue.n_bytes != 0, way != 2); /* as the header has it */
+        if (way == 3) { /* into the write of one that is open */
+            piece->open = 1;
+            assert_int_equal(wire_queue_put(&queue, wire_piece_new(WIRE_FRAMES, "gh", 2)), 0);
+            assert_int_equal(piece->len, 8);
+            wire_queue_close(&queue);
+        }
+        assert_int_equal(wire_queue_let_go(&queue, 100), 0);
+        assert_int_equal(wire_queue_pass(&queue, 0, 7, 0), 0);
+        assert_ptr_equal(wire_queue_due(&queue, 100), piece);
+        wire_queue_pop(&queue);
+        assert_int_equal(queue.n_bytes, 0);
+        assert_null(queue.first);
+        assert_null(queue.held);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -205,6 +235,7 @@ int main(void)
         cmocka_unit_test_teardown(a_stall_begins_when_all_before_is_out, rig_teardown),
         cmocka_unit_test_teardown(a_split_frame_goes_out_in_so_many_writes, rig_teardown),
         cmocka_unit_test_teardown(merged_frames_go_out_in_one_write, rig_teardown),
+        cmocka_unit_test(a_queue_gives_back_its_room),
     };
     return cmocka_run_group_tests_name("faults on the wire, order", tests, NULL, NULL);
 }

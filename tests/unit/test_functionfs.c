@@ -207,6 +207,29 @@ static void test_failing_endpoint(void **state)
     rig_close(&rig);
 }
 
+/* Failures count in a row: after a transfer that went well those before it are forgotten, however many there were. */
+static void test_failures_long_past(void **state)
+{
+    (void)state;
+    struct rig rig = rig_open("/dev/zero"); /* whoever reads it gets a whole buffer */
+    struct ffs_pipe *pipe = &rig.ffs->pipes.pipe[1];
+    static uint8_t bytes[FFS_SLOT_BYTES];
+    event(&rig, FUNCTIONFS_ENABLE);
+    settle(&rig);
+    for (int i = 0; i < FFS_SLOTS * (FFS_MAX_FAILURES + 2); i++) {
+        struct ffs_slot *slot = &pipe->slot[i % FFS_SLOTS]; /* the core takes them in this order */
+        uint8_t *buffer = slot->buffer;
+        slot->buffer = (uint8_t *)16; /* the kernel can't write there */
+        if (usb_device_read(rig.host->device, EP_OUT, bytes, sizeof bytes) != sizeof bytes)
+            fail_msg("after %d transfers the endpoint rests", i);
+        slot->buffer = buffer; /* that one has failed, and the next one of this slot does not */
+        settle(&rig);
+        assert_int_equal(slot->failures, 0);
+        assert_int_equal(slot->state, FFS_AT_CORE);
+    }
+    rig_close(&rig);
+}
+
 static ssize_t endpoint_request(struct rig *rig, unsigned index, void *answer, size_t room)
 {
     struct usb_functionfs_event e = {.type = FUNCTIONFS_SETUP};
@@ -285,6 +308,7 @@ int main(void)
         cmocka_unit_test(test_deconfigured),     cmocka_unit_test(test_left_over),
         cmocka_unit_test(test_busy_endpoint),    cmocka_unit_test(test_failing_endpoint),
         cmocka_unit_test(test_endpoint_request), cmocka_unit_test(test_units),
+        cmocka_unit_test(test_failures_long_past),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

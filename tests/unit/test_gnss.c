@@ -231,6 +231,55 @@ static void noise_is_what_was_asked_for(void **state)
     close_receiver(&r);
 }
 
+/* No error says anything of a later one, on its own axis or another: of N positions the mean product of two errors is
+ * within 5 sigma^2 / sqrt(N) but once in 1.7 million. 36 of them: once in 48,000; a fixed seed. */
+static void noise_does_not_last(void **state)
+{
+    (void)state;
+    enum { N = 2000, LAGS = 4 };
+    static const char *const more[] = {"gnss.accuracy_m=0.5", NULL};
+    static double d[N][3];
+    struct receiver r = open_receiver("48", "11", more);
+    start_receiver(&r);
+    for (uint64_t k = 0; k < N; k++) {
+        struct fix fix = get_fix(&r, k, 0);
+        offset_enu(48, 11, 123.4567, &fix, d[k]);
+    }
+    for (int lag = 1; lag <= LAGS; lag++)
+        for (int axes = 0; axes < 9; axes++) {
+            double product = 0;
+            for (int k = 0; k + lag < N; k++)
+                product += d[k][axes / 3] * d[k + lag][axes % 3];
+            if (fabs(product / (N - lag)) > 5 * 0.25 / sqrt(N - lag))
+                fail_msg("axes %d and %d, %d apart: correlation %.3f", axes / 3, axes % 3, lag,
+                         product / (N - lag) / 0.25);
+        }
+    close_receiver(&r);
+}
+
+/* 3 m/s east and 4 north. Places are known to 1e-9 m each, which 10 ms make 2e-7 m/s of. */
+static void speed_and_course_are_those_of_the_way(void **state)
+{
+    (void)state;
+    struct receiver r = open_receiver("48", "11", NULL);
+    struct gnss_track track;
+    struct nmea_fix fix;
+    start_receiver(&r);
+    const double *at_m = r.site->station[0].at.position_m, v_m_s[3] = {3, 4, 0};
+    struct pose *const pose[] = {&track.before, &track.at, &track.after};
+    for (int i = 0; i < 3; i++) {
+        *pose[i] = (struct pose){.quat = {1, 0, 0, 0}};
+        for (int k = 0; k < 3; k++)
+            pose[i]->position_m[k] = at_m[k] + v_m_s[k] * 1e-9 * GNSS_STEP_NS * (i - 1);
+    }
+    gnss_fix(&r.gnss, 0, 0, &track, &fix);
+    assert_true(fabs(fix.speed_m_s - 5) < 1e-6);
+    assert_true(fabs(fix.course_deg - atan2(3, 4) * 180 / M_PI) < 1e-5);
+    gnss_fix(&r.gnss, 0, 0, NULL, &fix); /* one that stands has no course */
+    assert_true(fix.speed_m_s == 0 && isnan(fix.course_deg));
+    close_receiver(&r);
+}
+
 /* Position packets of a VLP-16 and its settings need no place: their sentence says V, and not 0 degrees north and east. */
 static void without_a_place_no_fix_is_valid(void **state)
 {
@@ -254,7 +303,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_antenna_is_where_the_arm_puts_it), cmocka_unit_test(at_the_poles),
         cmocka_unit_test(times_are_those_of_the_rate),          cmocka_unit_test(it_stands_where_the_head_stands),
-        cmocka_unit_test(noise_is_what_was_asked_for),          cmocka_unit_test(without_a_place_no_fix_is_valid),
+        cmocka_unit_test(noise_is_what_was_asked_for),          cmocka_unit_test(noise_does_not_last),
+        cmocka_unit_test(speed_and_course_are_those_of_the_way), cmocka_unit_test(without_a_place_no_fix_is_valid),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

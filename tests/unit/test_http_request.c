@@ -100,6 +100,8 @@ static void test_head_method(void **state)
     assert_int_equal(http_status(), 200);
     assert_non_null(strstr(http_answer(), "Content-Length: 88\r\n\r\nHTTP/1.1 404 Not Found"));
     assert_int_equal(strcmp(http_answer() + strlen(http_answer()) - 4, "\r\n\r\n"), 0);
+    http_send("HEAD /cgi/info.json HTTP/1.1\r\nHost: x\r\n\r\nwhat is this\r\n\r\n"); /* that is no HEAD */
+    assert_non_null(strstr(http_answer(), "\r\n\r\nthis is not a request of HTTP/1.1\n"));
 }
 
 /* A client that waits for leave to send its body. */

@@ -163,6 +163,31 @@ static void test_fd(void **state)
     bench_expect(&bench, LINK_CLOSED, 1);
     assert_int_equal(bench.ops->write(bench.link, 0, "x", 1), SH_ECLOSED); /* and no SIGPIPE */
     assert_int_equal(bench_poll(&bench, 1, 0), 0);
+    const int64_t start_ms = now_ms();
+    assert_int_equal(bench_poll(&bench, 1, 50), 0);
+    assert_true(now_ms() - start_ms >= 49); /* the other end is gone, and keeps nobody awake */
+    bench_close(&bench);
+    assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair), 0);
+    spec.fd = pair[0];
+    bench = bench_open(&spec); /* ended from this side: what was written goes out before */
+    bench_expect(&bench, LINK_OPENED, 0);
+    bench_write_all(&bench, 0, "last", 4);
+    bench.ops->end(bench.link, 0);
+    bench_expect(&bench, LINK_CLOSED, 0);
+    char last[8], byte;
+    assert_int_equal(read(pair[1], last, sizeof last), 4);
+    assert_int_equal(read(pair[1], last, sizeof last), 0);
+    close(pair[1]);
+    bench_close(&bench);
+    assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair), 0);
+    spec.fd = pair[0];
+    bench = bench_open(&spec); /* what the other end wrote before it went is read first */
+    bench_expect(&bench, LINK_OPENED, 0);
+    assert_int_equal(write(pair[1], "q", 1), 1);
+    close(pair[1]);
+    bench_expect(&bench, LINK_READABLE, 0);
+    assert_int_equal(bench.ops->read(bench.link, 0, &byte, 1), 1);
+    bench_expect(&bench, LINK_CLOSED, 0);
     bench_close(&bench);
 
     int pipes[2];
@@ -243,6 +268,19 @@ static void test_tcp_endings(void **state)
     bench_expect(&bench, LINK_CLOSED, 0);
     assert_int_equal(read(fd, &byte, 1), 0);
     close(fd);
+    /* and somebody else comes before that has been read: the session is not free yet, but will be */
+    fd = tcp_client(tcp_port(&bench));
+    bench_expect(&bench, LINK_OPENED, 0);
+    assert_int_equal(write(fd, "q", 1), 1);
+    close(fd);
+    fd = tcp_client(tcp_port(&bench));
+    bench_poll(&bench, 0, DEADLINE_MS);
+    bench_read_all(&bench, 0, &byte, 1);
+    bench_expect(&bench, LINK_CLOSED, 0);
+    bench_expect(&bench, LINK_OPENED, 0);
+    exchange(&bench, 0, fd);
+    close(fd);
+    bench_expect(&bench, LINK_CLOSED, 0);
     /* reset, while frames are on their way */
     fd = tcp_client(tcp_port(&bench));
     bench_expect(&bench, LINK_OPENED, 0);

@@ -1,4 +1,5 @@
 /* The pty link: one client after the other, and the path it is found at. */
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <termios.h>
 
@@ -84,6 +85,39 @@ static void test_fresh_for_next(void **state)
     assert_memory_equal(text, "fresh", 5);
     assert_int_equal(write(fd, "q", 1), 1);
     bench_read_all(&bench, 0, text, 1);
+    close(fd);
+    bench_expect(&bench, LINK_CLOSED, 0);
+    bench_close(&bench);
+}
+
+/* A client leaves while this process has no descriptors: the port rests all the same, and serves the next one. */
+static void test_no_descriptors(void **state)
+{
+    (void)state;
+    enum { HOGS = 64 };
+    struct bench bench = bench_open(&plain);
+    struct rlimit before, few;
+    int hog[HOGS], n = 0, fd = client_open(&bench);
+    bench_expect(&bench, LINK_OPENED, 0);
+    bench_fill(&bench, 0);
+    assert_int_equal(getrlimit(RLIMIT_NOFILE, &before), 0);
+    few = (struct rlimit){.rlim_cur = (rlim_t)fd + 8, .rlim_max = before.rlim_max};
+    assert_int_equal(setrlimit(RLIMIT_NOFILE, &few), 0);
+    close(fd);
+    while (n < HOGS && (hog[n] = dup(STDERR_FILENO)) >= 0)
+        n++;
+    assert_true(n < HOGS);
+    bench_expect(&bench, LINK_CLOSED, 0);
+    assert_true(is_calm(&bench, 0));
+    while (n > 0)
+        close(hog[--n]);
+    assert_int_equal(setrlimit(RLIMIT_NOFILE, &before), 0);
+    fd = client_open(&bench);
+    bench_expect(&bench, LINK_OPENED, 0);
+    bench_write_all(&bench, 0, "fresh", 5);
+    char text[16];
+    assert_int_equal(read(fd, text, sizeof text), 5);
+    assert_memory_equal(text, "fresh", 5);
     close(fd);
     bench_expect(&bench, LINK_CLOSED, 0);
     bench_close(&bench);
@@ -280,7 +314,7 @@ int main(void)
         cmocka_unit_test(test_raw_both_ways),  cmocka_unit_test(test_full),
         cmocka_unit_test(test_fresh_for_next), cmocka_unit_test(test_written_and_gone),
         cmocka_unit_test(test_unseen_change),  cmocka_unit_test(test_nothing_of_the_one_before),
-        cmocka_unit_test(test_symlink),
+        cmocka_unit_test(test_no_descriptors), cmocka_unit_test(test_symlink),
         cmocka_unit_test(test_left_symlink),
         cmocka_unit_test(test_exclusive),
     };

@@ -1,10 +1,12 @@
-/* What every TCP socket of a head has, whoever accepted it: a peer that vanishes without a word is noticed. The test
- * finds the link's end of a connection among this process's own descriptors. */
+/* What every TCP socket of a head has, whoever accepted it: a peer that vanishes without a word is noticed, and one that
+ * comes when there are no descriptors is turned away. The test finds the link's end of a connection among this process's
+ * own descriptors. */
 #include "tests/unit/link_test.h"
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 
 #include "drivers/usb/backend.h"
@@ -69,27 +71,77 @@ static void check(const struct link_spec *spec, int impatient)
     bench_close(&bench);
 }
 
+/* One after the other finds no descriptor: each is turned away and said, and none is left to wake the link again. */
+static void starve(const struct link_spec *spec)
+{
+    enum { CLIENTS = 5, HOGS = 64 };
+    struct bench bench = bench_open(spec);
+    struct rlimit before, few;
+    int fd[CLIENTS], hog[HOGS], n_hogs = 0;
+    bench_poll(&bench, 0, 0); /* which takes what it needs for itself */
+    for (int i = 0; i < CLIENTS; i++)
+        fd[i] = connect_to(&bench);
+    assert_int_equal(getrlimit(RLIMIT_NOFILE, &before), 0);
+    few = (struct rlimit){.rlim_cur = (rlim_t)fd[CLIENTS - 1] + 8, .rlim_max = before.rlim_max};
+    assert_int_equal(setrlimit(RLIMIT_NOFILE, &few), 0);
+    while (n_hogs < HOGS && (hog[n_hogs] = dup(fd[0])) >= 0)
+        n_hogs++;
+    int n_refused = 0;
+    for (int polls = 0; polls < 10 * CLIENTS; polls++) { /* all of them have come; a poll takes several */
+        bench.n_queue = 0;
+        bench_poll(&bench, 0, 0);
+        for (int i = 0; i < bench.n_queue; i++) {
+            assert_int_equal(bench.queue[i].kind, LINK_REFUSED);
+            assert_memory_equal(bench.queue[i].peer, "127.0.0.1:", 10);
+            n_refused++;
+        }
+    }
+    while (n_hogs > 0)
+        close(hog[--n_hogs]);
+    setrlimit(RLIMIT_NOFILE, &before);
+    assert_int_equal(n_refused, CLIENTS);
+    for (int i = 0; i < CLIENTS; i++) {
+        char byte;
+        assert_int_equal(recv(fd[i], &byte, 1, MSG_DONTWAIT), 0);
+        close(fd[i]);
+    }
+    bench_close(&bench);
+
+}
+
 static void test_tcp(void **state)
 {
     (void)state;
-    check(&(struct link_spec){.type = LINK_TCP, .max_sessions = 1}, 0);
+    const struct link_spec spec = {.type = LINK_TCP, .max_sessions = 1};
+    check(&spec, 0);
+    starve(&spec);
 }
 
 static void test_usbip(void **state)
 {
     (void)state;
-    check(&(struct link_spec){.type = LINK_USB, .backend = USB_BACKEND_USBIP, .vid = 1}, 1);
+    const struct link_spec spec = {.type = LINK_USB, .backend = USB_BACKEND_USBIP, .vid = 1};
+    check(&spec, 1);
+    starve(&spec);
 }
 
 static void test_usbredir(void **state)
 {
     (void)state;
 #ifdef HAVE_USBREDIR
-    check(&(struct link_spec){.type = LINK_USB, .backend = USB_BACKEND_USBREDIR, .vid = 1}, 0);
+    const struct link_spec spec = {.type = LINK_USB, .backend = USB_BACKEND_USBREDIR, .vid = 1};
+    check(&spec, 0);
+    starve(&spec);
 #else
     print_message("# needs libusbredirparser-dev\n");
     skip();
 #endif
+}
+
+static void test_web(void **state)
+{
+    (void)state;
+    starve(&(struct link_spec){.type = LINK_WEB, .max_sessions = 1});
 }
 
 int main(void)
@@ -98,6 +150,7 @@ int main(void)
         cmocka_unit_test(test_tcp),
         cmocka_unit_test(test_usbip),
         cmocka_unit_test(test_usbredir),
+        cmocka_unit_test(test_web),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -318,6 +318,35 @@ static void test_resume(void **state)
     assert_int_equal(parser.stats.bytes, 5 * FRAME + 50);
 }
 
+/* The client attaches again in the middle of a frame, whichever byte that is. What comes then, a frame or a reply, is
+ * whole; what was had of the frame before is lost, and is said to be. */
+static void test_resume_in_a_frame(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 4; i++) /* a reply or a frame; told of the end of the bytes, or cut off by the client itself */
+        for (size_t had = 1; had < FRAME; had++) {
+            n_bytes = 0;
+            put(5, 0);
+            put(6, 0);
+            listen_again();
+            feed(bytes, FRAME + had, FRAME + had);
+            if (i % 2 != 0) finish();
+            native_parser_resume(&parser);
+            n_bytes = 0;
+            if (i < 2)
+                put_text("OK\r\n");
+            else
+                put(7, 0);
+            feed(bytes, n_bytes, n_bytes);
+            assert_int_equal(parser.stats.texts, i < 2);
+            assert_int_equal(parser.stats.frames, i < 2 ? 1 : 2);
+            assert_int_equal(parser.stats.bad_bytes, had);
+            assert_int_equal(n_noticed, i < 2 ? 1 : 2);
+            expect(0, NATIVE_CUT, FRAME, noticed[0].seq, had);
+            if (i >= 2) expect(1, NATIVE_GAP, FRAME + had, 6, 1);
+        }
+}
+
 /* Nobody listens: the same counts. */
 static void test_nobody_listens(void **state)
 {
@@ -339,6 +368,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_sequence),   cmocka_unit_test(test_bytes),  cmocka_unit_test(test_end),
         cmocka_unit_test(test_bad_unseen), cmocka_unit_test(test_resume), cmocka_unit_test(test_nobody_listens),
+        cmocka_unit_test(test_resume_in_a_frame),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

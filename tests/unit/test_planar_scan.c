@@ -240,6 +240,22 @@ static void a_frame_is_missing(void **state)
         }
 }
 
+/* The last attributes of a turn are lost, and of the next turn's frame, with as many points, all but the attributes. */
+static void attributes_of_another_turn(void **state)
+{
+    (void)state;
+    open_head(-1, 1);
+    part(0, 0, 3);
+    part(0, 4, 7);
+    left_out = 2;
+    part(0, 8, N - 1);
+    left_out = 1;
+    part(1, 0, 3);
+    expect(1, 0, 0);
+    part(1, 4, 7);
+    expect(1, 0, 1);
+}
+
 static void turns_are_missing(void **state)
 {
     (void)state;
@@ -379,6 +395,7 @@ int main(void)
         cmocka_unit_test(many_echoes),
         cmocka_unit_test(shots_without_echo),
         cmocka_unit_test(a_frame_is_missing),
+        cmocka_unit_test(attributes_of_another_turn),
         cmocka_unit_test(turns_are_missing),
         cmocka_unit_test(what_is_no_loss),
         cmocka_unit_test(parts_of_two_turns_make_none),

@@ -53,6 +53,29 @@ static void test_convention(void **state)
     assert_true(out[2] < -0.08);
 }
 
+/* Nose straight up or down: heading and roll turn about one axis, and only their sum or difference counts. The angles that
+ * come back give the same attitude, also just beside the pole. Nearer to it than 1e-9 roll is put into the heading. */
+static void test_pole(void **state)
+{
+    (void)state;
+    static const double pitch_deg[] = {90, -90, 90 - 1e-5, -90 + 1e-5, 90 - 1e-7};
+    for (size_t i = 0; i < sizeof pitch_deg / sizeof pitch_deg[0]; i++)
+        for (int heading_deg = 0; heading_deg < 360; heading_deg += 45)
+            for (int roll_deg = -150; roll_deg <= 180; roll_deg += 30) {
+                double quat[4], again[4], matrix[9], h, p, r;
+                matrix_by_hand(heading_deg * DEG, pitch_deg[i] * DEG, roll_deg * DEG, matrix);
+                pose_from_angles(heading_deg * DEG, pitch_deg[i] * DEG, roll_deg * DEG, quat);
+                pose_to_angles(quat, &h, &p, &r);
+                assert_true(h >= 0 && h < 2 * M_PI + 1e-9 && fabs(p - pitch_deg[i] * DEG) < 1e-12);
+                pose_from_angles(h, p, r, again);
+                if (pose_angle_between(quat, again) > 2e-15) /* products of a dozen roundings */
+                    fail_msg("%d %.9g %d: off by %g", heading_deg, pitch_deg[i], roll_deg,
+                             pose_angle_between(quat, again));
+                pose_from_matrix(matrix, again);
+                assert_true(pose_angle_between(quat, again) < 2e-15);
+            }
+}
+
 static void test_between(void **state)
 {
     (void)state;
@@ -164,6 +187,34 @@ static void test_constant_turn(void **state)
     trajectory_free(tr);
 }
 
+/* A parabola is what three samples show: position and speed are exact at the first and the last one, too, whatever lies
+ * between their times. */
+static void test_ends(void **state)
+{
+    (void)state;
+    static const double times_s[] = {0, 0.1, 0.35, 0.4, 1.0};
+    struct pose_sample s[5];
+    for (int i = 0; i < 5; i++) {
+        const double t = times_s[i];
+        s[i] = (struct pose_sample){.t_s = t, .pose = {{3 + 2 * t - 5 * t * t, 4 * t, t * t}, {1, 0, 0, 0}}};
+    }
+    struct trajectory *tr = make(s, 5);
+    for (int i = 0; i <= 1000; i++) {
+        const double t = 1e-3 * i, want[3] = {3 + 2 * t - 5 * t * t, 4 * t, t * t};
+        struct pose got;
+        double frame;
+        trajectory_at(tr, t, &got, &frame);
+        assert_true(distance(got.position_m, want) < 1e-14); /* some roundings of 3 m */
+    }
+    struct pose before, after;
+    double frame;
+    trajectory_at(tr, -1, &before, &frame); /* there it stands */
+    trajectory_at(tr, 7, &after, &frame);
+    assert_memory_equal(before.position_m, s[0].pose.position_m, sizeof before.position_m);
+    assert_memory_equal(after.position_m, s[4].pose.position_m, sizeof after.position_m);
+    trajectory_free(tr);
+}
+
 /* Between its knots the head moves as pose_between says: within the stated bound of the trajectory, lever arm included.
  */
 static void test_knots(void **state)
@@ -267,7 +318,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_convention),    cmocka_unit_test(test_between), cmocka_unit_test(test_straight_line),
         cmocka_unit_test(test_constant_turn), cmocka_unit_test(test_knots),   cmocka_unit_test(test_knots_to_an_end),
-        cmocka_unit_test(test_slow_knots),
+        cmocka_unit_test(test_slow_knots),    cmocka_unit_test(test_pole),    cmocka_unit_test(test_ends),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -54,6 +54,24 @@ static void test_csv(void **state)
     trajectory_free(quats);
 }
 
+/* Nose up and nose down may be said, and are the same by quaternion. */
+static void test_csv_upright(void **state)
+{
+    (void)state;
+    struct sh_err err;
+    struct trajectory *tr;
+    struct pose p;
+    double frame, quat[4];
+    write_file("t_s,x_m,y_m,z_m,heading_deg,pitch_deg,roll_deg\n0,0,0,0,30,90,10\n1,0,0,0,30,-90,10\n");
+    if (trajectory_read_csv(path, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
+    for (int i = 0; i < 2; i++) {
+        trajectory_at(tr, i, &p, &frame);
+        pose_from_angles(30 * DEG, i == 0 ? 90 * DEG : -90 * DEG, 10 * DEG, quat);
+        assert_true(pose_angle_between(p.quat, quat) < 1e-14);
+    }
+    trajectory_free(tr);
+}
+
 #define NAMES "t_s,x_m,y_m,z_m,heading_deg\n"
 
 static void test_csv_errors(void **state)
@@ -126,6 +144,15 @@ static void test_waypoints(void **state)
         trajectory_at(tr, t, &p, &frame);
         assert_true(fabs(p.position_m[1] - 20) < 1e-12 && fabs(frame - 2) < 1e-12);
     }
+    /* It comes to rest, and sets off from it: of a leg's last or first share f it does f * (2 - f), twice f * f at most.
+     * The curve there has 3 times the mean speed at most. */
+    static const double f = 0.05;
+    trajectory_at(tr, 4.0 - 2.0 * f, &p, &frame);
+    assert_true(20 - p.position_m[1] > 0 && 20 - p.position_m[1] < 3 * 10 * 2 * f * f);
+    trajectory_at(tr, 6.0 + 5.0 * f, &p, &frame);
+    assert_true(p.position_m[1] - 20 > 0 && p.position_m[1] - 20 < 3 * 10 * 2 * f * f);
+    trajectory_at(tr, 2.0 * f, &p, &frame); /* and at the ends it is in motion */
+    assert_true(p.position_m[1] > 10 * f / 2);
     trajectory_free(tr);
     /* A pause in a bend: the car stands as it came and leaves as it stands, without a jerk of its nose. */
     write_file("x_m,y_m,z_m,speed_m_s,pause_s\n0,0,0,5,0\n0,20,0,5,1\n20,20,0,5,0\n");
@@ -234,6 +261,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_csv),
         cmocka_unit_test(test_csv_errors),
+        cmocka_unit_test(test_csv_upright),
         cmocka_unit_test(test_waypoints),
         cmocka_unit_test(test_slow_waypoints),
         cmocka_unit_test(test_level_waypoints),

@@ -235,6 +235,22 @@ static void frames_fewer_than_done_end_with_the_one_at_hand(void **state)
                 seg.end_pulse == 3000 * 3000);
 }
 
+/* In the third frame: as many as are done, that many with the one at hand, and one more. */
+static void frames_may_be_set_to_those_done(void **state)
+{
+    (void)state;
+    static const uint32_t frames[] = {2, 3, 4}, ends_after[] = {3, 3, 4};
+    for (int i = 0; i < 3; i++) {
+        struct schedule_spec spec = plain();
+        struct schedule_segment seg;
+        schedule_start(&seg, &spec);
+        spec.frames = frames[i];
+        schedule_change(&seg, &seg, &spec, 3000 * 2500 + 7);
+        if (seg.end_pulse != UINT64_C(3000) * 1000 * ends_after[i])
+            fail_msg("%u frames: ends with pulse %llu", frames[i], (unsigned long long)seg.end_pulse);
+    }
+}
+
 static void a_pan_that_stops_ends_its_frame_and_keeps_its_angle(void **state)
 {
     (void)state;
@@ -328,6 +344,7 @@ int main(void)
         cmocka_unit_test(a_change_of_nothing_changes_nothing),
         cmocka_unit_test(a_stop_that_is_behind_ends_the_frame_with_its_line),
         cmocka_unit_test(frames_fewer_than_done_end_with_the_one_at_hand),
+        cmocka_unit_test(frames_may_be_set_to_those_done),
         cmocka_unit_test(a_pan_that_stops_ends_its_frame_and_keeps_its_angle),
         cmocka_unit_test(whatever_is_allowed_is_consistent),
     };

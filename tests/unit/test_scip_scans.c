@@ -134,7 +134,6 @@ static void clusters(void **state)
                 {"0001000302", "1Dh004a"},
                 {"0000000400", "0CB1Dh0010047D`B"}};
     open_five("UTM-30LX");
-    shot[0].range_m[0] = 1.234;
     scip_ask("BM\n", "BM\n00P\n\n");
     for (uint32_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         char line[40], tail[60];
@@ -147,6 +146,12 @@ static void clusters(void **state)
         assert_string_equal((char *)rig.bytes + 22, tail);
         protocol_rig_clear(&rig);
     }
+    shot[0].range_m[0] = 30.0; /* the nearest is the last of them now */
+    shot[4].range_m[0] = 1.234;
+    scip_ask("GD0000000499\n", "");
+    scip_turn(9);
+    rig.bytes[rig.len] = 0;
+    assert_string_equal((char *)rig.bytes + 22, "\n0CBe\n\n");
     scip_close();
 }
 

@@ -72,6 +72,16 @@ static void skipped_and_broken(void **state)
     scip_decode_only(&got, 3, 0);
     assert_int_equal(got.time_ms, 25);
     scip_close();
+    scip_open("UTM-30LX"); /* one that is broken is one of three, and no more */
+    scip_ask("MD0000108000300\n", "MD0000108000300\n00P\n\n");
+    scip_part(0, 0, 500);
+    scip_line_end(0, 0);
+    scip_line_time(0);
+    for (uint32_t line = 1; line < 4; line++)
+        scip_turn(line);
+    scip_decode_only(&got, 3, 0);
+    assert_int_equal(got.time_ms, 75);
+    scip_close();
 }
 
 /* A scan goes out once its last step has come, before the turn is over. */

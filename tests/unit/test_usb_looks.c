@@ -231,6 +231,10 @@ static void test_line_coding(void **state)
         assert_int_equal(control(&rig, 0xa1, 0x21, 0, 0, 7), 7);
         assert_memory_equal(rig.in, coding, 7);
     }
+    static const uint8_t at_rest[7] = {0x00, 0xc2, 0x01, 0x00, 0, 0, 8}; /* 115200: configured anew nobody has set it */
+    assert_int_equal(control(&rig, 0x00, 9, 1, 0, 0), 0);
+    assert_int_equal(control(&rig, 0xa1, 0x21, 0, 0, 7), 7);
+    assert_memory_equal(rig.in, at_rest, 7);
     usb_device_free(rig.head.device);
 }
 

@@ -48,6 +48,44 @@ static void test_silent(void **state)
     bench_close(&bench);
 }
 
+/* 1: the link has hung up. */
+static int is_put_out(int fd)
+{
+    char byte;
+    return recv(fd, &byte, 1, MSG_DONTWAIT) == 0;
+}
+
+/* There are four places. The one that has been here longest without importing makes room, wherever its place is. */
+static void test_oldest(void **state)
+{
+    (void)state;
+    enum { PLACES = 4 };
+    struct bench bench = usbip_bench("N");
+    struct client host, client[7];
+    client_import(&host, &bench); /* the oldest of all, and in the first place */
+    for (int i = 0; i < PLACES - 1; i++)
+        client[i] = (struct client){.bench = &bench, .fd = connect_silent(&bench)};
+    close(client[1].fd); /* its place is free, and goes to one that is younger than its neighbours */
+    bench_poll(&bench, 0, DEADLINE_MS);
+    static const int out[] = {-1, 0, 2, 3}; /* who goes as 3, 4, 5 and 6 come */
+    for (int i = 3; i < 7; i++) {
+        client[i] = (struct client){.bench = &bench, .fd = connect_silent(&bench)};
+        for (int k = 0; k <= i; k++)
+            if (k != 1 && client[k].fd >= 0 && is_put_out(client[k].fd) != (k == out[i - 3]))
+                fail_msg("client %d came: client %d is %s", i, k, k == out[i - 3] ? "still there" : "put out");
+        if (i == 3) continue;
+        close(client[out[i - 3]].fd);
+        client[out[i - 3]].fd = -1;
+    }
+    for (int i = 4; i < 7; i++) {
+        list_devices(&client[i]);
+        close(client[i].fd);
+    }
+    assert_int_equal(client_control(&host, &r, 0x80, GET_STATUS, 0, 0, 2, NULL), 0);
+    close(host.fd);
+    bench_close(&bench);
+}
+
 static void put_submit(uint8_t *at, uint32_t seqnum, int in, uint32_t ep, uint32_t len, const uint8_t *setup)
 {
     memset(at, 0, HEADER);
@@ -222,8 +260,8 @@ static void test_short_not_ok(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_silent),   cmocka_unit_test(test_pipelining),   cmocka_unit_test(test_turns),
-        cmocka_unit_test(test_segments), cmocka_unit_test(test_short_not_ok),
+        cmocka_unit_test(test_silent), cmocka_unit_test(test_oldest),   cmocka_unit_test(test_pipelining),
+        cmocka_unit_test(test_turns),  cmocka_unit_test(test_segments), cmocka_unit_test(test_short_not_ok),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

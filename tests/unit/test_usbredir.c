@@ -53,8 +53,10 @@ static void test_requests(void **state)
     assert_memory_equal(s->data, coding, 7);
     assert_int_equal(guest_control(g, 0x80, 6, 0x3300, 0, 64, NULL)->status, usb_redir_stall);
     struct usb_redir_set_alt_setting_header alt = {.interface = 2, .alt = 0};
+    g->interfaces.interface_count = 0; /* it is told them again */
     usbredirparser_send_set_alt_setting(g->parser, 5, &alt);
     s = guest_await(g, g->n_seen + 1);
+    assert_int_equal(g->interfaces.interface_count, 3);
     assert_int_equal(s->type, usb_redir_alt_setting_status);
     assert_int_equal(s->status, usb_redir_success);
     alt.alt = 1;

@@ -86,6 +86,7 @@ static void test_dual_returns(void **state)
         /* 5 dB of reflectance don't make up for 6 dB of range, but three do where the range is the same
          * within a metre */
         {{3, {10.0, 20.0, 21.0}, {-1000, -700, -1000}, {0}}, 10500, 5000, 10, 10},
+        {{3, {10.0, 20.0, 21.0}, {-1000, -550, -2000}, {0}}, 10500, 5000, 1, 10}, /* nor do 4.5 dB */
         {{3, {10.0, 20.0, 21.0}, {-2000, -700, -1000}, {0}}, 10500, 10000, 10, 20},
         {{3, {10.0, 11.0, 21.0}, {-1000, -700, 0}, {0}}, 10500, 5500, 100, 20},
         /* the last is the strongest of three; then the first, of the two before it */
@@ -146,8 +147,7 @@ static void test_reflectivities(void **state)
     for (int cdb = -3200; cdb <= 0; cdb++)
         assert_int_equal(velodyne_reflectivity(cdb), (int)floor(100.0 * pow(10.0, cdb / 1000.0) + 0.5));
     for (int cdb = 1; cdb <= 32767; cdb++) {
-        assert_true(velodyne_reflectivity(cdb) > 100);
-        assert_true(velodyne_reflectivity(cdb) >= velodyne_reflectivity(cdb - 1));
+        if (cdb < 3080) assert_int_equal(velodyne_reflectivity(cdb), 101 + cdb / 20); /* 154 steps of 0.2 dB */
         assert_int_equal(velodyne_reflectivity(cdb) == 255, cdb >= 3080);
     }
     assert_int_equal(velodyne_reflectivity(INT16_MIN), 0);

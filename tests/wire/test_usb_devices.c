@@ -1,6 +1,9 @@
 /* Heads that show themselves on USB as the device whose protocol they speak: ids, strings, interfaces, and a question
  * with its answer. What is configured of the identity stays as it is. The kernel's drivers and libusb on the same
  * devices: tests/guest. */
+#include "drivers/protocol/bytes.h"
+#include "drivers/protocol/crc32c.h"
+#include "drivers/protocol/native.h"
 #include "tests/wire/room.h"
 #include "tests/wire/usbip_host.h"
 
@@ -106,12 +109,49 @@ static void test_configured(void **state)
     }
 }
 
+/* A client begins the stream again in the middle of a frame that it had half of: what comes then begins with a frame. */
+static void test_begun_again(void **state)
+{
+    struct wire *wire = *state;
+    static const struct room_config endless = {.prr_hz = 100000,
+                                               .lines_hz = 50,
+                                               .pan_deg_s = 20,
+                                               .pan_stop_deg = 360,
+                                               .links = "links: [{type: usb, port: 0}]\n"};
+    static uint8_t bytes[65536];
+    room_write(wire);
+    struct head head = head_start(wire, room_config_write(wire, &endless), (const char *const[]){"--start", NULL});
+    struct usbip_host host = usbip_host_open(&head);
+    assert_int_equal(usbip_host_control(&host, 0x00, 9, 1, 0, NULL, 0), 0);
+    for (int i = 0; i < 5; i++) {
+        assert_int_equal(usbip_host_control(&host, 0x41, 0x22, 1, 2, NULL, 0), 0);
+        uint32_t n = 0;
+        while (n < NATIVE_HEADER_LEN) /* a packet of no bytes may be the end of what was before */
+            n += usbip_host_receive(&host, 3, bytes + n, 512);
+        assert_int_equal(bytes[0], NATIVE_SYNC);
+        assert_int_equal(crc32c(0, bytes, 24), le_get32(bytes + 24));
+        int is_within = 0;
+        for (uint32_t at = 0; !is_within && at < sizeof bytes - 512;) { /* up to a packet that ends within a frame */
+            while (n < at + NATIVE_HEADER_LEN || n < at + native_frame_len(bytes + at)) {
+                is_within |= n > at;
+                n += usbip_host_receive(&host, 3, bytes + n, 512);
+                if (is_within) break;
+            }
+            if (n >= at + NATIVE_HEADER_LEN) at += (uint32_t)native_frame_len(bytes + at);
+        }
+        assert_true(is_within);
+    }
+    usbip_host_close(&host);
+    head_end(&head, SIGTERM);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_hokuyo, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_sick, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_configured, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_begun_again, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -67,9 +67,29 @@ static size_t put_one(uint8_t *out, const uint8_t *frame, const uint8_t *older, 
     return to + (what == 1 ? hurt(out + to, native_frame_len(frame), random) : native_frame_len(frame));
 }
 
+static void set_round(uint8_t *frame, int round)
+{
+    frame[18] ^= (uint8_t)(round << 4); /* 0.8 ms and more */
+    seal_frame(frame);
+}
+
+/* From a frame of n bytes on: 1 to 3 frames, but no more than up to end. The last of them goes out now, and those between
+ * lie after the n bytes, in *between. Returns how long all of them are. */
+static size_t take_ahead(uint8_t *frame, size_t n, const uint8_t *end, int round, uint64_t *random, size_t *between)
+{
+    size_t last = n;
+    for (uint32_t k = capture_random(random, 3); k > 0 && frame + last + native_frame_len(frame + last) < end; k--) {
+        set_round(frame + last, round);
+        last += native_frame_len(frame + last);
+    }
+    set_round(frame + last, round);
+    *between = last - n;
+    return last;
+}
+
 /* The recordings one after the other, N_ROUNDS times with other device times: each frame with a chance to be dropped, hurt,
- * to come after an older one or garbage, or after the next one. The last 30 are whole: nothing waits for bytes that never
- * come. */
+ * to come after an older one or garbage, or after one of the next three. The last 30 are whole: nothing waits for bytes
+ * that never come. */
 static size_t put_damage(uint8_t *out)
 {
     uint64_t random = 4;
@@ -79,22 +99,23 @@ static size_t put_damage(uint8_t *out)
         const uint8_t *older = (uint8_t *)bytes;
         for (size_t at = 0, n; at < len; at += n) {
             uint8_t *frame = (uint8_t *)bytes + at;
-            n = native_frame_len(frame);
-            frame[18] ^= (uint8_t)(i / N_RECORDINGS << 4); /* 0.8 ms and more */
-            seal_frame(frame);
+            const size_t own = native_frame_len(frame);
+            size_t between = 0;
+            n = own;
+            set_round(frame, i / N_RECORDINGS);
             const int is_quiet = i + 1 == N_ROUNDS * N_RECORDINGS && at + 4000 > len;
             const int what = is_quiet ? 5 : (int)capture_random(&random, 24);
-            if (what == 3 && at + n < len) { /* the next one first */
-                uint8_t *next = frame + n;
-                const size_t n_next = native_frame_len(next);
-                next[18] ^= (uint8_t)(i / N_RECORDINGS << 4);
-                seal_frame(next);
-                memcpy(out + to, next, n_next);
-                to += n_next;
-                n += n_next;
+            if (what == 3 && at + n < len) { /* one of the next three first */
+                n = take_ahead(frame, n, (uint8_t *)bytes + len, i / N_RECORDINGS, &random, &between);
+                const size_t n_ahead = native_frame_len(frame + n);
+                memcpy(out + to, frame + n, n_ahead);
+                to += n_ahead;
+                n += n_ahead;
             }
             to += put_one(out + to, frame, older, what, &random);
-            older = frame;
+            memcpy(out + to, frame + own, between);
+            to += between;
+            if (capture_random(&random, 2) == 0) older = frame;
         }
         free(bytes);
     }
@@ -188,6 +209,7 @@ static const struct {
     {6, 32, 96, 'A', 0, "text: a text without NUL"}, /* up to the packet's end */
     {6, 0, 0, 0, 4, "Longer than version 1 has it"},
     {7, 4, 4, 3, 0, "shorter than its names"},
+    {7, 27, 1, 4, 0, "shorter than its names"}, /* the last one, of 3 bytes */
     {8, 0, 4, 1, 0, "1 poses, allowed 2 to 2"},
     {8, 44, 4, 0x40000000, 0, "a quaternion that is not of length one"},
     {9, 12, 4, 5, 0, "5 points, and room for 4"},

@@ -1,0 +1,156 @@
+/* Where the head is: on a trajectory, after its end, and on a platform whose poses come live. */
+#include <math.h>
+
+#include "firmware_sim/device/device_state.h"
+#include "tests/unit/device_rig.h"
+
+/* A time far ahead is counted, and the right ones go on. In steps the time is granted: any. */
+static void a_pose_far_ahead_keeps_no_other_out(void **state)
+{
+    (void)state;
+    static const char *const live[] = {"platform.kind=live"}, *const steps[] = {"platform.kind=live", "loop.pace=step"};
+    const double pose[6] = {1};
+    struct rig *rig = rig_open(NULL, live, 1);
+    rig_go_to(rig, 10); /* 10 ms */
+    int64_t most_ns = (DEVICE_POSE_AHEAD_S * INT64_C(1000) + 10) * 1000000;
+    assert_int_equal(device_pose(rig->device, INT64_C(900000000000000), pose), 1);
+    assert_int_equal(device_pose(rig->device, most_ns + 1, pose), 1);
+    assert_int_equal(device_pose(rig->device, 20000000, pose), 0);
+    assert_int_equal(device_pose(rig->device, most_ns, pose), 0);
+    assert_int_equal(atomic_load(&device_counters(rig->device)->bad_poses), 2);
+    rig_close(rig);
+    rig = rig_open(NULL, steps, 2);
+    assert_int_equal(device_pose(rig->device, INT64_C(900000000000000), pose), 0);
+    rig_close(rig);
+}
+
+/* North at 1 m/s. Where a scan ends, by a stop or with its frames, the platform stands until the next one. */
+static void a_platform_stands_where_the_scan_ended(void **state)
+{
+    (void)state;
+    char path[96], set[128];
+    struct pose pose;
+    snprintf(path, sizeof path, "%s/way.csv", folder);
+    snprintf(set, sizeof set, "platform.waypoints=%s", path);
+    FILE *f = fopen(path, "w");
+    assert_non_null(f);
+    fputs("x_m,y_m,z_m,speed_m_s\n0,0,0,1\n0,2,0,1\n", f);
+    assert_int_equal(fclose(f), 0);
+    const char *const sets[] = {"platform.kind=trajectory", set, "stations[1].name=b", "head.frames=0"};
+    struct rig *rig = rig_open(NULL, sets, 4);
+    rig_go_to(rig, 210);
+    rig_tell(rig, "SCAN:STAR", 209);
+    const struct native_event *event = rig_wait(rig, NATIVE_EV_SCAN_START, 100);
+    int64_t t0_ns = (int64_t)event->b;
+    rig_go_to(rig, rig->next + 500);
+    rig_tell(rig, "SCAN:STOP", rig->next - 1);
+    rig_wait(rig, NATIVE_EV_SCAN_END, 10);
+    double end_s = 1e-3 * (double)rig->next - 1e-9 * (double)t0_ns;
+    assert_true(end_s > 0.5 && end_s < 0.52);
+    for (int i = 0; i < 5; i++) {
+        assert_int_equal(device_head_pose(rig->device, t0_ns + i * INT64_C(250000000), &pose), 1);
+        assert_true(fabs(pose.position_m[1] - fmin(0.25 * i, end_s)) < 1.001e-3); /* in the tick that ended */
+    }
+    rig_go_to(rig, rig->next + 100); /* spin-down takes 50 */
+    rig_tell(rig, "SCAN:STAR", rig->next - 1);
+    rig_wait(rig, NATIVE_EV_SCAN_START, 1000);
+    rig_go_to(rig, rig->next + 100);
+    assert_int_equal(device_head_pose(rig->device, (int64_t)rig->next * 1000000, &pose), 1);
+    assert_true(fabs(pose.position_m[1] - 0.1) < 2.001e-3);
+    rig_close(rig);
+    unlink(path);
+}
+
+/* A path of 2 s. With `hold` the scan goes on at its last pose; else it ends there, with the last pulse before. */
+static void a_path_ends_with_its_last_pose(void **state)
+{
+    (void)state;
+    char path[96], set[128];
+    struct pose pose;
+    snprintf(path, sizeof path, "%s/path.csv", folder);
+    snprintf(set, sizeof set, "platform.file=%s", path);
+    FILE *f = fopen(path, "w");
+    assert_non_null(f);
+    fputs("t_s,x_m,y_m,z_m,heading_deg\n5,0,0,0,0\n6,0,1,0,0\n7,0,2,0,90\n", f);
+    assert_int_equal(fclose(f), 0);
+    for (int holds = 0; holds < 2; holds++) {
+        const char *const sets[] = {"platform.kind=trajectory", set, "stations[1].name=b", "head.frames=0",
+                                    holds ? "platform.at_end=hold" : "platform.at_end=stop"};
+        struct rig *rig = rig_open(&(struct device_options){.start = 1}, sets, 5);
+        const int64_t t0_ns = (int64_t)rig_wait(rig, NATIVE_EV_SCAN_START, 1000)->b;
+        if (holds)
+            rig_go_to(rig, rig->next + 2500);
+        else
+            assert_int_equal(rig_wait(rig, NATIVE_EV_SCAN_END, 2010)->b, 2 * 300000);
+        static const int64_t at_ns[] = {1999000000, 2000000000, 2400000000};
+        for (int i = 0; i < 3; i++) {
+            assert_int_equal(device_head_pose(rig->device, t0_ns + at_ns[i], &pose), 1);
+            const double want_m = fmin(1e-9 * (double)at_ns[i], 2.0);
+            assert_true(fabs(pose.position_m[1] - want_m) < 1e-6); /* a straight way at a constant speed */
+        }
+        rig_close(rig);
+    }
+    unlink(path);
+}
+
+
+/* A pose each 10 ms, north at 2 m/s. Between two of them the head is where a straight way has it; after the last it goes on
+ * so for extrapolate_ms, and then it stands. */
+static void a_live_platform_goes_on_for_a_while(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"platform.kind=live", "platform.extrapolate_ms=30", "platform.reach_m=50"};
+    static const struct {
+        int64_t t_ns;
+        double y_m;
+    } rows[] = {{40000000, 0.1}, /* before the first */
+                {50000000, 0.1},   {55000000, 0.11}, {69999999, 0.139999998}, {70000000, 0.14},
+                {80000000, 0.16},  {85000000, 0.17}, {100000000, 0.2}, /* 30 ms after the last */
+                {100000001, 0.2},  {500000000, 0.2}};
+    struct rig *rig = rig_open(NULL, sets, 3);
+    struct pose pose;
+    rig_go_to(rig, 10);
+    assert_int_equal(device_head_pose(rig->device, 50000000, &pose), 0); /* none has come */
+    for (int i = 5; i <= 7; i++)
+        assert_int_equal(device_pose(rig->device, i * INT64_C(10000000), (double[]){0, 0.02 * i, 0, 0, 0, 0}), 0);
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        assert_int_equal(device_head_pose(rig->device, rows[i].t_ns, &pose), 1);
+        if (fabs(pose.position_m[1] - rows[i].y_m) > 1e-12)
+            fail_msg("%lld ns: %.9f m, not %.9f", (long long)rows[i].t_ns, pose.position_m[1], rows[i].y_m);
+    }
+    rig_close(rig);
+}
+
+/* Of one time there is one pose, and none comes before another that is known; nor from beyond the reach. */
+static void poses_come_in_order(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"platform.kind=live", "platform.reach_m=50"};
+    struct rig *rig = rig_open(NULL, sets, 2);
+    rig_go_to(rig, 10);
+    static const struct {
+        int64_t t_ns;
+        double y_m;
+        int bad;
+    } rows[] = {{50000000, 1, 0}, {50000000, 2, 1}, {49999999, 2, 1}, {50000001, 3, 0}, {60000000, 50.001, 1},
+                {60000000, 50, 0}};
+    uint64_t n_bad = 0;
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        assert_int_equal(device_pose(rig->device, rows[i].t_ns, (double[]){0, rows[i].y_m, 0, 0, 0, 0}), rows[i].bad);
+        n_bad += (uint64_t)rows[i].bad;
+        assert_int_equal(atomic_load(&device_counters(rig->device)->bad_poses), n_bad);
+    }
+    rig_close(rig);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_pose_far_ahead_keeps_no_other_out),
+        cmocka_unit_test(a_platform_stands_where_the_scan_ended),
+        cmocka_unit_test(a_path_ends_with_its_last_pose),
+        cmocka_unit_test(a_live_platform_goes_on_for_a_while),
+        cmocka_unit_test(poses_come_in_order),
+    };
+    return cmocka_run_group_tests_name("device path", tests, make_folder, remove_folder);
+}

@@ -1,0 +1,170 @@
+/* The console of a gadget, with a socket pair in place of the kernel's tty: it, too, says how much nobody has taken yet
+ * (TIOCOUTQ is SIOCOUTQ), and an eventfd in place of the timer. Clients that stop reading, and those who come after them. */
+#include "tests/unit/usb_host.h"
+
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "drivers/protocol/native.h"
+#include "drivers/usb/functionfs_private.h"
+#include "drivers/usb/head_device.h"
+
+enum { CONSOLE = 0 }; /* the session */
+
+struct port {
+    struct scanhead_usb head;
+    struct ffs_console console;
+    int host;
+};
+
+static void on_complete(void *ctx, struct usb_transfer *transfer)
+{
+    struct port *port = ctx;
+    assert_int_equal(ffs_console_complete(&port->console, transfer), 1);
+}
+
+static void control(struct port *port, unsigned type, unsigned request, unsigned value)
+{
+    struct usb_ctrlrequest setup = {.bRequestType = (uint8_t)type, .bRequest = (uint8_t)request};
+    le_put16(&setup.wValue, (uint16_t)value);
+    assert_int_equal(usb_device_control(port->head.device, &setup, NULL, 0), 0);
+}
+
+static int open_port(void **state)
+{
+    static struct port port;
+    const struct usb_identity id = {.vid = 1, .pid = 1, .highest = USB_RATE_HIGH};
+    struct sh_err err = {0, ""};
+    int pair[2];
+    memset(&port, 0, sizeof port);
+    *state = &port;
+    if (scanhead_usb_create(usb_look_get(USB_LOOK_NATIVE), &id, &port.head, &err) != SH_OK) fail_msg("%s", err.text);
+    assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, pair), 0);
+    port.console.device = port.head.device;
+    port.console.fd = pair[0];
+    port.host = pair[1];
+    port.console.timer = eventfd(0, EFD_NONBLOCK);
+    usb_device_attach(port.head.device, USB_RATE_HIGH, on_complete, &port);
+    control(&port, 0x00, USB_REQ_SET_ADDRESS, 5);
+    control(&port, 0x00, USB_REQ_SET_CONFIGURATION, 1);
+    port.console.number = -1; /* so that nothing is looked for below /dev */
+    return 0;
+}
+
+static int close_port(void **state)
+{
+    struct port *port = *state;
+    usb_device_free(port->head.device); /* gives back what waits */
+    ffs_console_close(&port->console);
+    close(port->host);
+    return 0;
+}
+
+/* A line of the client, all of which the head reads. */
+static void client_says(struct port *port, const char *text)
+{
+    char heard[64];
+    const size_t len = strlen(text);
+    assert_int_equal(write(port->host, text, len), len);
+    ffs_console_handle(&port->console, POLLIN, 0);
+    assert_int_equal(usb_device_read(port->head.device, CONSOLE_OUT, heard, sizeof heard), len);
+    assert_memory_equal(heard, text, len);
+    assert_int_equal(port->head.session[CONSOLE].open, 1);
+}
+
+static void second_passes(struct port *port)
+{
+    const uint64_t one = 1;
+    assert_int_equal(write(port->console.timer, &one, sizeof one), sizeof one);
+    ffs_console_handle(&port->console, 0, 1);
+}
+
+static size_t head_says(struct port *port, const void *text, size_t len)
+{
+    ffs_console_handle(&port->console, POLLOUT, 0); /* as poll(2) has it where there is room */
+    return usb_device_write(port->head.device, CONSOLE_IN, text, len);
+}
+
+/* Until the port takes no more, with a part of the last text still at the console. Returns all that the head wrote. */
+static size_t fill(struct port *port)
+{
+    static char old[1000];
+    size_t written = 0, n;
+    memset(old, 'o', sizeof old);
+    while ((n = head_says(port, old, sizeof old)) != 0)
+        written += n;
+    assert_true((ffs_console_events(&port->console) & POLLOUT) != 0);
+    return written;
+}
+
+static size_t client_reads(struct port *port, void *bytes, size_t room)
+{
+    size_t len = 0;
+    ssize_t n = 1;
+    while (len < room && n > 0) {
+        n = recv(port->host, (char *)bytes + len, room - len, MSG_DONTWAIT);
+        if (n > 0) len += (size_t)n;
+        ffs_console_handle(&port->console, ffs_console_events(&port->console) & POLLOUT, 0);
+    }
+    return len;
+}
+
+static char bytes[1 << 22];
+
+/* It closed its port, which nobody says: for a second and more it takes nothing. What the port holds goes to who comes
+ * next; what was still to be given to the port does not. A frame that is whole follows the one that was cut. */
+static void what_waits_at_a_close_is_void(void **state)
+{
+    struct port *port = *state;
+    client_says(port, "SCAN:STAR\n");
+    const size_t written = fill(port);
+    for (int i = 0; i < 3; i++)
+        second_passes(port);
+    assert_int_equal(port->head.session[CONSOLE].open, 0);
+    assert_int_equal(ffs_console_events(&port->console) & POLLOUT, 0);
+    const size_t held = client_reads(port, bytes, sizeof bytes);
+    assert_in_range(held, 1, written - 1);
+    for (size_t i = 0; i < held; i++)
+        assert_int_equal(bytes[i], 'o');
+    client_says(port, "*IDN?\n");
+    assert_int_equal(head_says(port, "new", 3), 3);
+    const size_t len = client_reads(port, bytes, sizeof bytes);
+    struct native_event event;
+    assert_true(len == native_frame_len((uint8_t *)bytes) + 3);
+    assert_memory_equal(bytes + len - 3, "new", 3);
+    assert_int_equal(native_decode_event((uint8_t *)bytes + NATIVE_HEADER_LEN, len - 3 - NATIVE_HEADER_LEN, &event),
+                     SH_OK);
+    assert_int_equal(event.code, NATIVE_EV_READER_LOST);
+}
+
+/* One that is slow, or has nothing to read, keeps its session. */
+static void a_slow_client_keeps_its_session(void **state)
+{
+    struct port *port = *state;
+    client_says(port, "SCAN:STAR\n");
+    const size_t written = fill(port);
+    size_t got = 0;
+    for (int i = 0; got < written; i++) {
+        got += client_reads(port, bytes, 1000);
+        second_passes(port);
+        assert_int_equal(port->head.session[CONSOLE].open, 1);
+        assert_true(i < 100);
+    }
+    assert_int_equal(got, written);
+    for (int i = 0; i < 3; i++)
+        second_passes(port);
+    assert_int_equal(port->head.session[CONSOLE].open, 1);
+    assert_int_equal(head_says(port, "new", 3), 3);
+    assert_int_equal(client_reads(port, bytes, sizeof bytes), 3); /* nothing else goes before it */
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(what_waits_at_a_close_is_void, open_port, close_port),
+        cmocka_unit_test_setup_teardown(a_slow_client_keeps_its_session, open_port, close_port),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

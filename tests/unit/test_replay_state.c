@@ -1,0 +1,187 @@
+/* A recording that is replayed, without its threads: when its frames went out, and the states it had. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+#include "drivers/protocol/native_encode.h"
+#include "firmware_sim/replay/replay_state.h"
+
+/* ---- times of frames */
+
+enum { PERIOD_NS = 1000 };
+
+static char path[] = "/tmp/scanhead-replay-XXXXXX";
+static uint32_t next_seq;
+
+static void put(FILE *f, uint8_t *frame, size_t len)
+{
+    assert_true(len > 0);
+    native_seal(frame, next_seq++);
+    assert_int_equal(fwrite(frame, 1, len, f), len);
+}
+
+static void put_descriptor(FILE *f)
+{
+    uint8_t frame[1024];
+    struct native_descriptor d = {.prr_uhz = UINT64_C(1000000000000), .range_scale_m = 1, .scan = 1};
+    d.mirror_counts_per_turn = d.pan_counts_per_turn = 1000;
+    put(f, frame, native_encode_descriptor(frame, sizeof frame, &d, 0, 0));
+}
+
+static void put_event(FILE *f, enum native_event_code code, int64_t t_ns)
+{
+    uint8_t frame[256];
+    const struct native_event event = {.code = (uint32_t)code, .a = 1};
+    put(f, frame, native_encode_event(frame, sizeof frame, &event, t_ns, 0));
+}
+
+/* The first n pulses of a scan, one each microsecond. The head computes 16 at a time. */
+static void put_points(FILE *f, uint32_t n)
+{
+    static uint32_t dt_ns[16], zero[16];
+    static int16_t refl_cdb[16];
+    static uint8_t echo[16], frame[1024];
+    static uint16_t label[16];
+    for (uint32_t i = 0; i < n; i++)
+        dt_ns[i] = i * PERIOD_NS;
+    const struct line_block block = {.n_pulses = n,
+                                     .n_points = n,
+                                     .dt_ns = dt_ns,
+                                     .a = zero,
+                                     .b = zero,
+                                     .c = zero,
+                                     .refl_cdb = refl_cdb,
+                                     .echo = echo,
+                                     .label = label};
+    put(f, frame, native_encode_points(frame, sizeof frame, &block, 0));
+}
+
+static int64_t time_of_points(struct recording *r)
+{
+    struct recording_frame frame;
+    struct sh_err err;
+    while (recording_next(r, &frame, &err) == 1)
+        if (frame.bytes[1] == NATIVE_POINTS) return frame.t_ns;
+    fail_msg("no points");
+    return 0;
+}
+
+static FILE *begin_file(void)
+{
+    FILE *f = fopen(path, "wb");
+    assert_non_null(f);
+    next_seq = 0;
+    return f;
+}
+
+/* Ten pulses of sixteen went out with the sixteenth, or with what came earlier. */
+static void points_go_out_with_what_follows(void **state)
+{
+    (void)state;
+    static const struct {
+        int64_t event_ns, want_ns;
+    } rows[] = {{12000, 12000}, {15000, 15000}, {20000, 15000}};
+    static struct recording r;
+    struct sh_err err;
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        FILE *f = begin_file();
+        put_descriptor(f);
+        put_event(f, NATIVE_EV_SCAN_START, 0);
+        put_points(f, 10);
+        put_event(f, NATIVE_EV_CONTROL, rows[i].event_ns);
+        assert_int_equal(fclose(f), 0);
+        memset(&r, 0, sizeof r);
+        if (recording_open(&r, path, &err) != SH_OK) fail_msg("%s", err.text);
+        assert_int_equal(time_of_points(&r), rows[i].want_ns);
+        recording_close(&r);
+    }
+}
+
+/* What a recording says at its end is not known when it begins anew: here the rate. */
+static void it_begins_anew_as_it_began(void **state)
+{
+    (void)state;
+    static struct recording r;
+    struct sh_err err;
+    FILE *f = begin_file();
+    put_points(f, 10);
+    put_event(f, NATIVE_EV_CONTROL, 12000);
+    put_descriptor(f);
+    assert_int_equal(fclose(f), 0);
+    memset(&r, 0, sizeof r);
+    if (recording_open(&r, path, &err) != SH_OK) fail_msg("%s", err.text);
+    for (int times = 0; times < 3; times++) {
+        struct recording_frame frame;
+        int n = 1;
+        assert_int_equal(time_of_points(&r), 9 * PERIOD_NS);
+        while (recording_next(&r, &frame, &err) == 1)
+            n++;
+        assert_int_equal(n, 3);
+        if (recording_rewind(&r, &err) != SH_OK) fail_msg("%s", err.text);
+    }
+    recording_close(&r);
+}
+
+/* ---- states */
+
+static const char *state_at(struct replay *r, uint64_t released)
+{
+    static struct command_result result;
+    replay_command(r, 1, "HEAD:STATE?", released, &result);
+    return result.reply;
+}
+
+/* A state is that of the head once the tick that says it is released: ticks 0 to n - 1 are when n are. */
+static void a_state_holds_from_its_tick_on(void **state)
+{
+    (void)state;
+    struct replay *r = calloc(1, sizeof *r);
+    struct config *cfg = calloc(1, sizeof *cfg);
+    assert_true(r != NULL && cfg != NULL);
+    r->cfg = cfg;
+    pthread_mutex_init(&r->lock, NULL);
+    replay_open_commands(r);
+    assert_string_equal(state_at(r, 100), "idle"); /* nothing was said */
+    replay_set_state(r, 5, HEAD_SPIN_UP);
+    replay_set_state(r, 8, HEAD_SCANNING);
+    assert_string_equal(state_at(r, 5), "idle");
+    assert_string_equal(state_at(r, 6), "spin-up");
+    assert_string_equal(state_at(r, 8), "spin-up");
+    assert_string_equal(state_at(r, 9), "scanning");
+    for (uint64_t i = 0; i < 3 * REPLAY_CHANGES; i++) /* the oldest are forgotten */
+        replay_set_state(r, 10 + i, i % 2 == 0 ? HEAD_SPIN_DOWN : HEAD_IDLE);
+    assert_string_equal(state_at(r, 10 + 3 * REPLAY_CHANGES - 1), "spin-down");
+    assert_string_equal(state_at(r, 10 + 3 * REPLAY_CHANGES), "idle");
+    pthread_mutex_destroy(&r->lock);
+    free(cfg);
+    free(r);
+}
+
+static int make_file(void **state)
+{
+    (void)state;
+    const int fd = mkstemp(path);
+    return fd < 0 ? -1 : close(fd);
+}
+
+static int remove_file(void **state)
+{
+    (void)state;
+    return unlink(path);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(points_go_out_with_what_follows),
+        cmocka_unit_test(it_begins_anew_as_it_began),
+        cmocka_unit_test(a_state_holds_from_its_tick_on),
+    };
+    return cmocka_run_group_tests_name("replay state", tests, make_file, remove_file);
+}
