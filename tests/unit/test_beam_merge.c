@@ -69,11 +69,36 @@ static void test_gaps(void **state)
     }
 }
 
+/* Of more echoes than are asked for the weakest is left out, wherever it comes: what comes back counts, not the energy.
+ * Of two as weak the first one goes. The others keep the numbers that they had among all. */
+static void test_crowd(void **state)
+{
+    (void)state;
+    static const double back[5] = {0.4, 0.1, 0.6, 0.1, 0.3};
+    static const uint32_t left[6][5] = {{0}, {2}, {0, 2}, {0, 2, 4}, {0, 2, 3, 4}, {0, 1, 2, 3, 4}};
+    for (uint32_t most = 1; most <= 5; most++) {
+        struct beam_return r[5];
+        struct beam_merging few = how;
+        uint64_t left_out = 0;
+        few.most = most;
+        for (uint32_t i = 0; i < 5; i++)
+            r[i] = (struct beam_return){.range_m = 10.0 + 2.0 * i, .energy = 0.1 * (5 - i), .back = back[i]};
+        n_echoes = beam_merge(&few, r, 5, echo, &left_out);
+        assert_int_equal(n_echoes, most);
+        assert_int_equal(left_out, 5 - most);
+        for (uint32_t i = 0; i < most; i++) {
+            assert_true(echo[i].range_m == 10.0 + 2.0 * left[most][i]);
+            assert_int_equal(echo[i].number, left[most][i]);
+        }
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_surface_of_many_returns),
         cmocka_unit_test(test_gaps),
+        cmocka_unit_test(test_crowd),
     };
     return cmocka_run_group_tests(tests, set_up, NULL);
 }

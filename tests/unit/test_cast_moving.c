@@ -244,6 +244,46 @@ static void test_moving_body(void **state)
     cast_rig_close(rig);
 }
 
+/* A head within the sphere around a body, whose middle lies ahead: pulses that all look back meet what of the body
+ * stands there, 0.5 m from the head. A head that stands, and one that moves. */
+static void test_inside_a_body_s_sphere(void **state)
+{
+    (void)state;
+    static const double lo[3] = {-0.5, -1.0, -1.0}, hi[3] = {0.5, 3.0, 1.0}, centre[3] = {0.0, 1.0, 0.0};
+    const struct pose still = {.position_m = {0.0, 0.0, 0.0}, .quat = {1, 0, 0, 0}};
+    const struct pose_knot knot[2] = {{.t_ns = 0, .pose = still}, {.t_ns = 100000000, .pose = still}};
+    struct cast_rig *rig = open_room((struct pose_knot[KNOTS]){{0}});
+    struct scene *body = box_scene(lo, hi);
+    struct schedule_line line;
+    struct bvh *bvh;
+    struct sh_err err;
+    if (bvh_create(body, centre, 100.0, 1, NULL, &bvh, &err) != 0) fail_msg("%s", err.text);
+    rig->setup.n_movers = 1;
+    rig->setup.mover[0] = (struct cast_mover){.bvh = bvh, .centre_m = {0.0, 1.0, 0.0}, .radius_m = 2.5};
+    pose_heading(0.0, rig->setup.mover[0].rotation);
+    rig->setup.mover[0].shift_m[1] = 0.5; /* its back is at y = -0.5 */
+    rig->setup.knot = knot;
+    rig->spec.pan_udeg_s = 0;
+    schedule_start(&rig->segment, &rig->spec);
+    schedule_get_line(&rig->segment, 0, &line);
+    const uint64_t back = line.pulse0 + (uint64_t)(line.pulse_end - line.pulse0) * 220 / 240; /* 180 deg: level */
+    for (int moves = 0; moves < 2; moves++) {
+        rig->setup.n_knots = moves ? 2 : 0;
+        assert_int_equal(cast_some(rig, &line, back - 100, 200), 200);
+        for (uint32_t i = 0; i < 200; i++) {
+            long double mirror, pan, d[3];
+            true_angles(&rig->spec, back - 100 + i, &mirror, &pan);
+            true_direction(mirror, pan, 0.0L, d);
+            assert_true(d[1] < -0.9L);
+            assert_int_equal(rig->block.label[i], 2);
+            assert_true(fabs(rig->block.a[i] * 1e-5 - (double)(-0.5L / d[1])) < 5e-6 + 1e-9);
+        }
+    }
+    bvh_free(bvh);
+    scene_free(body);
+    cast_rig_close(rig);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -251,6 +291,7 @@ int main(void)
         cmocka_unit_test(test_same_bytes),
         cmocka_unit_test(test_geo),
         cmocka_unit_test(test_moving_body),
+        cmocka_unit_test(test_inside_a_body_s_sphere),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

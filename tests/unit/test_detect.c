@@ -143,12 +143,20 @@ static void amplitude_follows_the_range_equation(void **state)
     assert_int_equal(told(&signal, (double)NAN, 1.0), LINE_REFL_NONE);
 }
 
-/* Kim's table: fog of 500 m visibility does not know colours, 3.912 / 500 m; haze of 4 km, q = 0.98; clear air of 23
+/* Kim's table: fog of 500 m visibility and less does not know colours, 3.912 / 500 m; from there to 1 km q = V - 0.5, V
+ * in km: 0.25 at 750 m, and no step at either end; haze of 4 km, q = 0.98; clear air of 23
  * km, q = 1.3. */
 static void extinction_by_visibility(void **state)
 {
     (void)state;
     assert_true(fabs(detect_extinction_1_m(500.0, 1550e-9) - 3.912 / 500.0) < 1e-15);
+    assert_true(fabs(detect_extinction_1_m(200.0, 1550e-9) - 3.912 / 200.0) < 1e-15);
+    assert_true(fabs(detect_extinction_1_m(750.0, 1550e-9) - 3.912 / 750.0 * pow(1550.0 / 550.0, -0.25)) < 1e-12);
+    assert_true(fabs(detect_extinction_1_m(500.0 * (1 + 1e-12), 1550e-9) - 3.912 / 500.0) < 1e-12);
+    assert_true(fabs(detect_extinction_1_m(1000.0, 905e-9) - detect_extinction_1_m(1000.0 * (1 + 1e-12), 905e-9)) <
+                1e-12);
+    assert_true(fabs(detect_extinction_1_m(8000.0, 905e-9) - 3.912 / 8000.0 * pow(905.0 / 550.0, -1.3)) < 1e-12);
+    assert_true(fabs(detect_extinction_1_m(60000.0, 905e-9) - 3.912 / 60000.0 * pow(905.0 / 550.0, -1.6)) < 1e-12);
     assert_true(fabs(detect_extinction_1_m(4000.0, 1550e-9) - 3.912 / 4000.0 * pow(1550.0 / 550.0, -0.98)) < 1e-12);
     assert_true(fabs(detect_extinction_1_m(23000.0, 905e-9) - 3.912 / 23000.0 * pow(905.0 / 550.0, -1.3)) < 1e-12);
 }

@@ -119,15 +119,15 @@ static void facing_mirrors_end_at_the_depth(void **state)
     close_optics(&o);
 }
 
-/* Panes at y = 2, and 2.004 m, as a box of glass has them; a wall behind. */
-static struct scene *window(void)
+/* Squares of 60 m across y, at these places. */
+static struct scene *sheets(const double y[3], const uint16_t label[3])
 {
-    static const double y[] = {2.0, 2.004, 5.0};
     double vertex[12][3];
     uint32_t triangle[6][3];
-    static const uint16_t label[6] = {0, 0, 0, 0, 1, 1};
-    static const struct scene_surface surface[2] = {{.object = "window", .material = "glass"},
-                                                    {.object = "wall", .material = "brick"}};
+    uint16_t labels[6];
+    static const struct scene_surface surface[3] = {{.object = "window", .material = "glass"},
+                                                    {.object = "wall", .material = "brick"},
+                                                    {.object = "mirror", .material = "silver"}};
     struct scene *scene;
     struct sh_err err;
     for (uint32_t p = 0; p < 3; p++) {
@@ -139,12 +139,51 @@ static struct scene *window(void)
         for (uint32_t t = 0; t < 2; t++)
             for (uint32_t v = 0; v < 3; v++)
                 triangle[2 * p + t][v] = 4 * p + (v == 0 ? 0 : v + t);
+        labels[2 * p] = labels[2 * p + 1] = label[p];
     }
     if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 12, (const uint32_t(*)[3])triangle, 6,
-                                                 label, surface, 2},
+                                                 labels, surface, 3},
                           &scene, &err) != 0)
         fail_msg("%s", err.text);
     return scene;
+}
+
+/* Panes at y = 2, and 2.004 m, as a box of glass has them; a wall behind. */
+static struct scene *window(void)
+{
+    return sheets((const double[]){2.0, 2.004, 5.0}, (const uint16_t[]){0, 0, 1});
+}
+
+/* A mirror ahead, a pane behind the head, a wall behind that: pane and wall, seen in the mirror, are both ghosts, and
+ * are met by nobody. Straight at the pane they are none. Their ranges are those of the folded way. */
+static void glass_in_a_mirror(void **state)
+{
+    (void)state;
+    static struct cast_hit hit[2 * (1 + CAST_MAX_DEPTH)];
+    struct optics o;
+    struct schedule_line line;
+    struct schedule_run run;
+    open_optics(&o, sheets((const double[]){3.0, -1.0, -2.0}, (const uint16_t[]){2, 0, 1}));
+    o.table.surface[0] = (struct surface){.reflectance = 0.05, .glass = 0.9};
+    o.table.surface[1] = (struct surface){.reflectance = 0.6};
+    o.table.surface[2] = (struct surface){.mirror = 1.0};
+    o.table.has_optics = 1;
+    o.rig->spec.pan_udeg_s = 0;
+    schedule_start(&o.rig->segment, &o.rig->spec);
+    schedule_get_line(&o.rig->segment, 0, &line);
+    for (uint32_t back = 0; back < 2; back++) { /* level, ahead; level, back */
+        const uint64_t k = line.pulse0 + (line.pulse_end - line.pulse0) * (back ? 220 : 40) / 240;
+        const double far[2] = {back ? 1.25 : 2.75 + 4.0, back ? 2.25 : 2.75 + 5.0};
+        assert_int_equal(cast_some(o.rig, &line, k, 1), 2);
+        for (uint32_t i = 0; i < 2; i++) {
+            near_range(o.rig, i, (long double)far[i]);
+            assert_int_equal(o.rig->block.echo[i], (i + 1) | 0x20);
+            assert_int_equal(o.rig->block.label[i], i + (back ? 0 : 3));
+        }
+        schedule_get_run(&o.rig->segment, &line, k, 1, &run);
+        assert_int_equal(caster_meet(o.rig->caster, &o.rig->setup, &run, hit), back ? 2 : 0);
+    }
+    close_optics(&o);
 }
 
 /* Three echoes: both sides of the pane, and the wall, whose light passes four of them. Only the middle of the line. Of
@@ -395,6 +434,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_mirror_shows_the_room_behind_it),
         cmocka_unit_test(facing_mirrors_end_at_the_depth),
+        cmocka_unit_test(glass_in_a_mirror),
         cmocka_unit_test(a_pane_and_what_is_behind_it),
         cmocka_unit_test(what_is_too_near_is_one_echo),
         cmocka_unit_test(cuts_leave_no_trace),
