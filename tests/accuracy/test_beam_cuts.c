@@ -171,7 +171,7 @@ static void a_wire_in_the_sky_behind_an_edge(void **state)
     uint32_t wires = 0, wrong = 0;
     for (int k = 0; k < 9; k++) {
         const double x = across_m[k % 3], to = x + lean_m[k / 3], w = 0.004;
-        const double vertex[8][3] = {{-9, 5, -9},     {0, 5, -9},          {0, 5, 9},        {-9, 5, 9},
+        const double vertex[8][3] = {{-9, 5, -9},    {0, 5, -9},         {0, 5, 9},          {-9, 5, 9},
                                      {x, 50, -0.05}, {x + w, 50, -0.05}, {to + w, 50, 0.05}, {to, 50, 0.05}};
         static const uint32_t triangle[4][3] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
         struct beam_rig rig;

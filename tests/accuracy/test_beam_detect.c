@@ -71,7 +71,8 @@ static void of_a_crowd_the_strongest_signal_is_sent(void **state)
                 for (int k = FRONT; k <= BACK; k++)
                     a[k] = e.back[k] / (least * e.range_m[k] * e.range_m[k]);
                 const double slack = modes[m] == BEAM_RINGS ? RINGS_OFF : PARTS_OFF; /* of the footprint's energy */
-                const double doubt[2] = {slack * l.rho[FRONT] / (least * 400.0), slack * l.rho[BACK] / (least * 3600.0)};
+                const double doubt[2] = {slack * l.rho[FRONT] / (least * 400.0),
+                                         slack * l.rho[BACK] / (least * 3600.0)};
                 if (fabs(a[FRONT] - a[BACK]) < doubt[FRONT] + doubt[BACK]) continue;
                 const int want = a[BACK] > a[FRONT];
                 if (fabs(a[want] - 1.0) < doubt[want] || fmin(e.front, 1.0 - e.front) < 0.05) continue;
@@ -273,9 +274,12 @@ static void each_echo_is_folded_by_itself(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(each_echo_has_its_own_reflectance), cmocka_unit_test(a_mixed_pixel_leans_to_what_is_bright),
-        cmocka_unit_test(an_echo_drops_out_by_itself),       cmocka_unit_test(angle_noise_moves_the_footprint),
-        cmocka_unit_test(ball_noise_moves_each_echo),        cmocka_unit_test(each_echo_is_folded_by_itself),
+        cmocka_unit_test(each_echo_has_its_own_reflectance),
+        cmocka_unit_test(a_mixed_pixel_leans_to_what_is_bright),
+        cmocka_unit_test(an_echo_drops_out_by_itself),
+        cmocka_unit_test(angle_noise_moves_the_footprint),
+        cmocka_unit_test(ball_noise_moves_each_echo),
+        cmocka_unit_test(each_echo_is_folded_by_itself),
         cmocka_unit_test(of_a_crowd_the_strongest_signal_is_sent),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -229,6 +229,99 @@ static void a_pane_and_what_is_behind_it(void **state)
     close_optics(&o);
 }
 
+/* Of a pane and a dark wall behind it a head sends the first, the last or the strongest. */
+static void one_of_a_pulse_s_echoes(void **state)
+{
+    (void)state;
+    static const enum beam_select select[] = {BEAM_FIRST, BEAM_LAST, BEAM_STRONGEST};
+    static const double y[] = {2.0, 5.0, 2.004};
+    struct optics o;
+    struct schedule_line line;
+    open_optics(&o, window());
+    o.table.surface[0] = (struct surface){.reflectance = 0.05, .glass = 0.9, .specular = 0.0};
+    o.table.surface[1] = (struct surface){.reflectance = 0.01};
+    o.table.has_optics = 1;
+    schedule_get_line(&o.rig->segment, 0, &line);
+    for (int k = 0; k < 2; k++) { /* the strongest is the pane's near side, too */
+        o.rig->setup.echoes = select[k];
+        assert_int_equal(cast_some(o.rig, &line, line.cast0 + 10, 100), 100);
+        for (uint32_t i = 0; i < 100; i++) {
+            long double d[3];
+            direction(o.rig, &line, 10 + i, d);
+            near_range(o.rig, i, ((long double)y[k] - (long double)STATION[1]) / d[1]);
+            assert_int_equal(o.rig->block.echo[i], 0x11);
+        }
+    }
+    o.rig->setup.echoes = BEAM_STRONGEST;
+    o.table.surface[1].reflectance = 0.6;
+    cast_some(o.rig, &line, line.cast0 + 10, 100);
+    for (uint32_t i = 0; i < 100; i++)
+        assert_int_equal(o.rig->block.label[i], 1);
+    close_optics(&o);
+}
+
+/* What does not fit into 31 bits of counts is no echo, and counted: of the pane's two sides and the wall the wall. The
+ * others are numbered as two. Where none fits one entry stays, without echo. */
+static void echoes_that_do_not_fit(void **state)
+{
+    (void)state;
+    static const double most_m[] = {4.0, 0.5};
+    struct optics o;
+    struct schedule_line line;
+    struct cast_counters before, after;
+    open_optics(&o, window());
+    o.table.surface[0] = (struct surface){.reflectance = 0.05, .glass = 0.9};
+    o.table.has_optics = 1;
+    o.rig->setup.layout = LINE_GEO;
+    schedule_get_line(&o.rig->segment, 0, &line);
+    const uint64_t level = line.pulse0 + (line.pulse_end - line.pulse0) * 40 / 240;
+    for (int k = 0; k < 2; k++) {
+        const uint32_t fit = k == 0 ? 2 : 0, entries = k == 0 ? 2 : 1;
+        for (int i = 0; i < 3; i++)
+            o.rig->setup.xyz_scale[i] = most_m[k] / 2147483647.0;
+        caster_get_counters(o.rig->caster, &before);
+        assert_int_equal(cast_some(o.rig, &line, level, 100), 100 * fit);
+        caster_get_counters(o.rig->caster, &after);
+        assert_int_equal(after.unfit - before.unfit, 100 * (3 - fit));
+        assert_int_equal(o.rig->block.n_points, 100 * entries);
+        for (uint32_t i = 0; i < 100 * entries; i++) {
+            assert_int_equal(o.rig->block.echo[i], fit == 0 ? 0 : (i % 2 + 1) | 0x20);
+            assert_int_equal(o.rig->block.label[i], fit == 0 ? LINE_LABEL_NONE : 0);
+        }
+    }
+    close_optics(&o);
+}
+
+/* A head that moves along x: all three echoes of a pulse lie where its own beam has gone, on the planes and at its x. */
+static void echoes_of_a_moving_head(void **state)
+{
+    (void)state;
+    static const double y[] = {2.0, 2.004, 5.0};
+    struct optics o;
+    struct schedule_line line;
+    const struct pose_knot knot[2] = {{.t_ns = 0, .pose = {.position_m = {0, 0, 0}, .quat = {1, 0, 0, 0}}},
+                                      {.t_ns = 10000000, .pose = {.position_m = {20, 0.5, 0}, .quat = {1, 0, 0, 0}}}};
+    open_optics(&o, window());
+    o.table.surface[0] = (struct surface){.reflectance = 0.05, .glass = 0.9};
+    o.table.has_optics = 1;
+    o.rig->setup.layout = LINE_GEO;
+    o.rig->setup.xyz_scale[0] = o.rig->setup.xyz_scale[1] = o.rig->setup.xyz_scale[2] = 1e-6;
+    o.rig->setup.knot = knot;
+    o.rig->setup.n_knots = 2;
+    o.rig->spec.pan_udeg_s = 0;
+    schedule_start(&o.rig->segment, &o.rig->spec);
+    schedule_get_line(&o.rig->segment, 0, &line);
+    const uint64_t level = line.pulse0 + (line.pulse_end - line.pulse0) * 40 / 240;
+    assert_int_equal(cast_some(o.rig, &line, level, 500), 1500);
+    for (uint32_t i = 0; i < 1500; i++) {
+        const double x_m = 20.0 * (double)schedule_time_ns(&o.rig->segment, level + i / 3) / 1e7;
+        /* half a count; from the station, as counts are */
+        assert_true(fabs((int32_t)o.rig->block.b[i] * 1e-6 - (y[i % 3] - STATION[1])) < 0.5e-6 + 1e-9);
+        assert_true(fabs((int32_t)o.rig->block.a[i] * 1e-6 - (x_m - STATION[0])) < 0.5e-6 + 1e-9);
+    }
+    close_optics(&o);
+}
+
 /* With a range resolution of 10 cm both sides of the pane are one echo, between them by what each sends back, and their
  * sum; the wall stays apart. Without the pane's far side in reach of the resolution (1 mm), three. */
 static void what_is_too_near_is_one_echo(void **state)
@@ -436,6 +529,9 @@ int main(void)
         cmocka_unit_test(facing_mirrors_end_at_the_depth),
         cmocka_unit_test(glass_in_a_mirror),
         cmocka_unit_test(a_pane_and_what_is_behind_it),
+        cmocka_unit_test(one_of_a_pulse_s_echoes),
+        cmocka_unit_test(echoes_that_do_not_fit),
+        cmocka_unit_test(echoes_of_a_moving_head),
         cmocka_unit_test(what_is_too_near_is_one_echo),
         cmocka_unit_test(cuts_leave_no_trace),
         cmocka_unit_test(nothing_asked_for_changes_nothing),
