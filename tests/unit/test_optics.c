@@ -522,6 +522,71 @@ static void a_mirror_that_moves(void **state)
     scene_free(body);
 }
 
+/* A plate on a body, met from its front; with the body turned by 180 degrees in its place, from its back. */
+static void which_side_of_a_body_is_met(void **state)
+{
+    (void)state;
+    static const double vertex[4][3] = {{-1, 3, -1}, {1, 3, -1}, {1, 3, 1}, {-1, 3, 1}}, centre[3] = {0, 3, 0};
+    static const uint32_t triangle[2][3] = {{0, 1, 2}, {0, 2, 3}};
+    struct optics o;
+    struct scene *body;
+    struct bvh *bvh;
+    struct sh_err err;
+    struct schedule_line line;
+    struct schedule_run run;
+    struct cast_hit hit[1 + CAST_MAX_DEPTH];
+    open_optics(&o, box_scene(LO, HI));
+    if (scene_from_arrays(&(struct scene_arrays){vertex, 4, triangle, 2, NULL, NULL, 0}, &body, &err) != 0 ||
+        bvh_create(body, centre, 100.0, 1, NULL, &bvh, &err) != 0)
+        fail_msg("%s", err.text);
+    o.rig->spec.pan_udeg_s = 0;
+    schedule_start(&o.rig->segment, &o.rig->spec);
+    schedule_get_line(&o.rig->segment, 0, &line);
+    schedule_get_run(&o.rig->segment, &line, 500, 1, &run); /* straight ahead */
+    o.rig->setup.n_movers = 1;
+    for (int turned = 0; turned < 2; turned++) {
+        struct cast_mover *m = &o.rig->setup.mover[0];
+        *m = (struct cast_mover){.bvh = bvh, .centre_m = {0, 3, 0}, .radius_m = 1.5};
+        pose_heading(turned ? 4.0 * atan(1.0) : 0.0, m->rotation);
+        m->shift_m[1] = turned ? 6.0 : 0.0;
+        assert_int_equal(caster_meet(o.rig->caster, &o.rig->setup, &run, hit), 1);
+        assert_int_equal(hit[0].body, 1);
+        assert_int_equal(hit[0].front, !turned);
+        assert_true(fabs(hit[0].range_m - 2.75) < 1e-9 && fabs(hit[0].cosine - 1.0) < 1e-9);
+    }
+    close_optics(&o);
+    bvh_free(bvh);
+    scene_free(body);
+}
+
+/* What lies below the threshold is not met, just as it has no echo: of a room whose walls are seen to 4 m. */
+static void what_is_too_faint_is_not_met(void **state)
+{
+    (void)state;
+    static struct cast_hit hit[RIG_LINE * (1 + CAST_MAX_DEPTH)];
+    const struct detect_signal_spec spec = {.n_reaches = 1, .reach = {{0.5, 4.0}}, .threshold_snr = 8.0, .sharp = 1};
+    struct detect_signal signal;
+    struct optics o;
+    struct schedule_line line;
+    struct schedule_run run;
+    struct sh_err err;
+    uint32_t at = 0;
+    assert_int_equal(detect_signal_set_up(&spec, &signal, &err), SH_OK);
+    open_optics(&o, box_scene(LO, HI));
+    o.detect.signal = &signal;
+    const uint32_t n = shoot_line(&o, 40, &line);
+    schedule_get_run(&o.rig->segment, &line, line.cast0, n, &run);
+    const uint32_t met = caster_meet(o.rig->caster, &o.rig->setup, &run, hit);
+    for (uint32_t i = 0; i < n; i++) {
+        if (o.rig->block.echo[i] == 0) continue;
+        assert_true(at < met && hit[at].pulse == i);
+        at++;
+    }
+    assert_int_equal(at, met);
+    assert_true(met > 500 && met < n - 500);
+    close_optics(&o);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -537,6 +602,8 @@ int main(void)
         cmocka_unit_test(nothing_asked_for_changes_nothing),
         cmocka_unit_test(noise_never_touches_empty_shots),
         cmocka_unit_test(a_mirror_that_moves),
+        cmocka_unit_test(which_side_of_a_body_is_met),
+        cmocka_unit_test(what_is_too_faint_is_not_met),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
