@@ -142,8 +142,8 @@ static void test_needle(void **state)
 static void test_sums(void **state)
 {
     (void)state;
-    struct cell cell[5] = {{.area_m2 = 1.0, .pulses = 10, .stations = 1, .first_station = 2, .label = 0},
-                           {.area_m2 = 8.0, .pulses = 40, .stations = 2, .first_station = 1, .label = 0},
+    struct cell cell[5] = {{.area_m2 = 8.0, .pulses = 10, .stations = 1, .first_station = 2, .label = 0},
+                           {.area_m2 = 1.0, .pulses = 40, .stations = 2, .first_station = 1, .label = 0},
                            {.area_m2 = 2.0, .pulses = 40, .stations = 1, .first_station = 1, .label = 1},
                            {.area_m2 = 4.0, .label = 1},
                            {.area_m2 = 1.0, .pulses = 5, .stations = 3, .first_station = 1, .label = 1}};
@@ -159,19 +159,19 @@ static void test_sums(void **state)
         if (cell[i].stations > 0) cell[i].cosine = coverage_bits(0.5);
     }
     assert_int_equal(coverage_sum(&c, &sums, &err), SH_OK);
-    assert_true(sums.area_m2 == 16.0 && sums.none_m2 == 4.0 && sums.one_m2 == 3.0 && sums.several_m2 == 9.0);
-    /* 12 m2 are seen: 10, 5, 20 and 5 pulses a m2 of 1, 8, 2 and 1; floats are good to 1e-7 */
+    assert_true(sums.area_m2 == 16.0 && sums.none_m2 == 4.0 && sums.one_m2 == 10.0 && sums.several_m2 == 2.0);
+    /* 12 m2 are seen: 1.25, 40, 20 and 5 pulses a m2 of 8, 1, 2 and 1; floats are good to 1e-7 */
     assert_true(fabs(sums.density_1_m2.mean - 95.0 / 12.0) < 1e-12);
-    assert_true(sums.density_1_m2.p05 == 5.0 && sums.density_1_m2.p50 == 5.0 && sums.density_1_m2.p95 == 20.0);
-    assert_true(fabs(sums.range_m.mean - 27.0 / 12.0) < 1e-6 && fabs(sums.range_m.p05 - 1.0) < 1e-6);
-    assert_true(fabs(sums.range_m.p50 - 2.0) < 1e-6 && fabs(sums.range_m.p95 - 4.0) < 1e-6);
+    assert_true(sums.density_1_m2.p05 == 1.25 && sums.density_1_m2.p50 == 1.25 && sums.density_1_m2.p95 == 40.0);
+    assert_true(fabs(sums.range_m.mean - 20.0 / 12.0) < 1e-6 && fabs(sums.range_m.p05 - 1.0) < 1e-6);
+    assert_true(fabs(sums.range_m.p50 - 1.0) < 1e-6 && fabs(sums.range_m.p95 - 4.0) < 1e-6);
     assert_true(fabs(sums.incidence_rad.p50 - acos(0.5)) < 1e-6);
     coverage_by_label(&c, label);
-    assert_true(label[0].area_m2 == 9.0 && label[0].seen_m2 == 9.0 && label[0].several_m2 == 8.0);
+    assert_true(label[0].area_m2 == 9.0 && label[0].seen_m2 == 9.0 && label[0].several_m2 == 1.0);
     assert_true(label[1].area_m2 == 7.0 && label[1].seen_m2 == 3.0 && label[1].several_m2 == 1.0);
     assert_true(label[0].pulses == 50 && label[1].pulses == 45);
     coverage_alone(&c, alone_m2);
-    assert_true(alone_m2[0] == 2.0 && alone_m2[1] == 1.0 && alone_m2[2] == 0.0);
+    assert_true(alone_m2[0] == 2.0 && alone_m2[1] == 8.0 && alone_m2[2] == 0.0);
 }
 
 int main(void)
