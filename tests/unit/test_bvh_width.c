@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/bvh/bvh_inside.h"
+#include "core/bvh/edges.h"
 #include "core/vec3.h"
 #include "tests/common/cases.h"
 
@@ -200,12 +201,71 @@ static void a_small_sheet_at_a_large_one(void **state)
     bvh_work_free(work);
 }
 
+/* A ray does not meet what it begins on, within half a micrometre, whichever way it goes; it does what is twice as far,
+ * and what stands behind. Sheets at y = 9 and 10. */
+static void what_a_ray_begins_on_is_not_met(void **state)
+{
+    (void)state;
+    static const double v[6][3] = {{-5, 9, -5}, {5, 9, -5}, {0, 9, 5}, {-5, 10, -5}, {5, 10, -5}, {0, 10, 5}};
+    static const uint32_t triangle[2][3] = {{0, 1, 2}, {3, 4, 5}};
+    static const double before_m[] = {0.0, 4e-7, -4e-7, 1e-6}, way_m[] = {1.0, 1.0, 1.0, 1e-6};
+    double p[6][3];
+    struct bvh_work *work;
+    struct sh_err err;
+    for (int i = 0; i < 6; i++)
+        vec3_add(v[i], ORIGIN, p[i]);
+    struct scene *scene = scene_of((const double(*)[3])p, 6, triangle, 2, NULL);
+    struct bvh *bvh = bvh_of(scene, 20.0);
+    assert_int_equal(bvh_work_create(&work, &err), 0);
+    for (int k = 0; k < 8; k++) {
+        const int back = k & 1;
+        const double at[3] = {ORIGIN[0] + 0.1, ORIGIN[1] + 9.0 + (back ? 1.0 : -1.0) * before_m[k / 2], ORIGIN[2]};
+        const double dir[3] = {0.0, back ? -1.0 : 1.0, 0.0};
+        double range_m;
+        uint32_t met;
+        const struct bvh_rays ray = {.n = 1,
+                                     .from.own = {&at[0], &at[1], &at[2]},
+                                     .dir = {&dir[0], &dir[1], &dir[2]},
+                                     .range_max_m = 100.0,
+                                     .scattered = 1,
+                                     .range_m = &range_m,
+                                     .triangle = &met};
+        bvh_hits(work, bvh, &ray);
+        if (back && way_m[k / 2] == 1.0)
+            assert_true(isnan(range_m) && met == BVH_NO_TRIANGLE);
+        else /* 5e-7 of the place, and 2^-52 of coordinates of 20 m */
+            assert_true(fabs(range_m - way_m[k / 2]) < 5e-7 && met == (way_m[k / 2] == 1.0));
+    }
+    bvh_work_free(work);
+    bvh_free(bvh);
+    scene_free(scene);
+}
+
+/* Two triangles of an edge name its corners in opposite orders: on which side a ray passes is the same number with the
+ * other sign, to the last bit. Rays through the edge, where rounding is all there is. */
+static void both_triangles_of_an_edge_agree(void **state)
+{
+    (void)state;
+    uint64_t random = 21;
+    for (int n = 0; n < 20000; n++) {
+        double a[3], b[3], dir[3];
+        const double part = case_unit(&random);
+        for (int i = 0; i < 3; i++) {
+            a[i] = 20.0 * (case_unit(&random) - 0.5);
+            b[i] = n % 4 == 0 && i == 0 ? a[i] : 20.0 * (case_unit(&random) - 0.5);
+            dir[i] = a[i] + part * (b[i] - a[i]);
+        }
+        const double there = edge_side(a, b, dir), back = edge_side(b, a, dir);
+        assert_true(there == -back && fabs(there) < 1e-11);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(widths_are_the_budget),
-        cmocka_unit_test(rivals_are_within_two_widths),
-        cmocka_unit_test(a_small_sheet_at_a_large_one),
+        cmocka_unit_test(widths_are_the_budget),           cmocka_unit_test(rivals_are_within_two_widths),
+        cmocka_unit_test(a_small_sheet_at_a_large_one),    cmocka_unit_test(what_a_ray_begins_on_is_not_met),
+        cmocka_unit_test(both_triangles_of_an_edge_agree),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

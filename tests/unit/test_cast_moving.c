@@ -326,10 +326,8 @@ static void test_nearer_of_wall_and_body(void **state)
             const long double z = 3.0L / d[1] * d[2];
             const int met = fabs(o[0] + 40.0) < 0.99 && fabsl(z) < 0.49L;
             if (!met && !walls) continue; /* beside it, or its top */
-            if (walls) assert_true(rig->block.echo[i] == 0x11 && rig->block.label[i] == 2);
-            if (!walls)
-                assert_true(rig->block.echo[i] == 0x11 &&
-                            fabs(rig->block.a[i] * 1e-5 - (double)(3.0L / d[1])) < 5e-6 + 1e-9);
+            assert_true(rig->block.echo[i] == 0x11 && rig->block.label[i] == 2);
+            assert_true(fabs(rig->block.a[i] * 1e-5 - (double)((walls ? 1.0L : 3.0L) / d[1])) < 5e-6 + 1e-9);
             bodies += (uint32_t)met;
         }
         assert_true(bodies > 20);
