@@ -159,12 +159,64 @@ static void within_floats_of_an_edge(void **state)
     beam_rig_close(&rig);
 }
 
+/* A plate at 5 m up to an edge, the sky, and in it a wire of 4 mm at 50 m, within 2 cm of where the edge is seen: of
+ * footprints whose centre lies on the plate a part sees past it, and the wire there, which the ray of that part mostly
+ * misses. Against 1,000 sub-rays, where these leave no doubt: each echo has 3 % of the energy, or less than 0.5 %. */
+static void a_wire_in_the_sky_behind_an_edge(void **state)
+{
+    (void)state;
+    static const double across_m[] = {0.001, 0.003, 0.006}, lean_m[] = {0.0, 0.004, 0.01};
+    const struct beam_view view = {-0.01, 0.01, -0.028, 0.002, 20, 8};
+    double d[3][8];
+    uint32_t wires = 0, wrong = 0;
+    for (int k = 0; k < 9; k++) {
+        const double x = across_m[k % 3], to = x + lean_m[k / 3], w = 0.004;
+        const double vertex[8][3] = {{-9, 5, -9},    {0, 5, -9},         {0, 5, 9},          {-9, 5, 9},
+                                     {x, 50, -0.05}, {x + w, 50, -0.05}, {to + w, 50, 0.05}, {to, 50, 0.05}};
+        static const uint32_t triangle[4][3] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
+        struct beam_rig rig;
+        struct scene *scene;
+        struct sh_err err;
+        if (scene_from_arrays(&(struct scene_arrays){vertex, 8, triangle, 4, NULL, NULL, 0}, &scene, &err) != 0)
+            fail_msg("%s", err.text);
+        if (beam_rig_open(&rig, scene, STATION, &view, &err) != 0) fail_msg("%s", err.text);
+        beam_rig_mode(&rig, BEAM_ADAPTIVE, 4);
+        for (uint32_t l = 0; l < view.lines; l++) {
+            beam_rig_directions(&rig, l, d[0], d[1], d[2]);
+            beam_rig_line(&rig, l);
+            for (uint32_t p = 0, i = 0; p < view.pulses; p++) {
+                const double dir[3] = {d[0][p], d[1][p], d[2][p]};
+                const uint32_t n = rig.block.echo[i] >> 4;
+                struct beam_ref ref;
+                uint32_t want = 0, unsure = 0, wire = 0;
+                i += n == 0 ? 1 : n;
+                if (dir[0] > -1e-5) continue; /* the centre is to be on the plate */
+                beam_ref_pulse(rig.caster, rig.bvh, &rig.beam.beam, STATION, dir, 100.0, &ref);
+                for (uint32_t e = 0; e < ref.n; e++) {
+                    want += ref.echo[e].energy > 0.03;
+                    unsure += ref.echo[e].energy > 0.005 && ref.echo[e].energy < 0.03;
+                    wire += ref.echo[e].energy > 0.03 && ref.echo[e].range_m > 20.0;
+                }
+                if (unsure > 0) continue;
+                wires += wire;
+                wrong += wire && n != want;
+            }
+        }
+        beam_rig_close(&rig);
+    }
+    print_message("# %u footprints on a plate have a wire behind its edge; %u have another number of echoes\n", wires,
+                  wrong);
+    assert_true(wires > 50);
+    assert_true(wrong * 50 <= wires); /* core/cast/README.md: adaptive gets one or two in a hundred wrong */
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_beam_alone),
         cmocka_unit_test(with_glass),
         cmocka_unit_test(within_floats_of_an_edge),
+        cmocka_unit_test(a_wire_in_the_sky_behind_an_edge),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -46,6 +46,48 @@ static void each_echo_has_its_own_reflectance(void **state)
     close_lit(&l);
 }
 
+/* A pulse that may send one echo sends that with more signal, though more of the light comes back from the other, which
+ * is three times as far. What is below the threshold takes no room: there the other one is sent. */
+static void of_a_crowd_the_strongest_signal_is_sent(void **state)
+{
+    (void)state;
+    static const enum beam_mode modes[] = {BEAM_ADAPTIVE, BEAM_RINGS};
+    const double least = 0.05 / 400.0;
+    struct lit l = {.near_m = 20.0, .far_m = 60.0, .rho = {0.2, 0.8}};
+    double d[3][16];
+    open_lit(&l, plates(l.near_m, l.far_m, 1), &ACROSS, least);
+    l.rig.setup.max_echoes = 1;
+    for (int m = 0; m < 2; m++) {
+        uint32_t sent[2] = {0}, against = 0;
+        beam_rig_mode(&l.rig, modes[m], BEAM_MAX_RINGS);
+        for (uint32_t line = 0; line < ACROSS.lines; line++) {
+            const struct line_block *b = &l.rig.block;
+            beam_rig_directions(&l.rig, line, d[0], d[1], d[2]);
+            beam_rig_line(&l.rig, line);
+            assert_int_equal(b->n_points, ACROSS.pulses);
+            for (uint32_t p = 0; p < ACROSS.pulses; p++) {
+                struct edge e = at_edge(&l, d[0][p], d[1][p]);
+                double a[2];
+                for (int k = FRONT; k <= BACK; k++)
+                    a[k] = e.back[k] / (least * e.range_m[k] * e.range_m[k]);
+                const double slack = modes[m] == BEAM_RINGS ? RINGS_OFF : PARTS_OFF; /* of the footprint's energy */
+                const double doubt[2] = {slack * l.rho[FRONT] / (least * 400.0),
+                                         slack * l.rho[BACK] / (least * 3600.0)};
+                if (fabs(a[FRONT] - a[BACK]) < doubt[FRONT] + doubt[BACK]) continue;
+                const int want = a[BACK] > a[FRONT];
+                if (fabs(a[want] - 1.0) < doubt[want] || fmin(e.front, 1.0 - e.front) < 0.05) continue;
+                assert_int_equal(b->echo[p], a[want] > 1.0 ? 0x11 : 0);
+                if (a[want] < 1.0) continue;
+                assert_int_equal(b->label[p], want);
+                sent[want]++;
+                against += want == FRONT && e.back[BACK] > e.back[FRONT];
+            }
+        }
+        assert_true(sent[FRONT] > 50 && sent[BACK] > 50 && against > 50);
+    }
+    close_lit(&l);
+}
+
 /* Two plates within the range resolution: one echo, at the mean weighted by what comes back of each, and its sum. */
 static void a_mixed_pixel_leans_to_what_is_bright(void **state)
 {
@@ -232,9 +274,13 @@ static void each_echo_is_folded_by_itself(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(each_echo_has_its_own_reflectance), cmocka_unit_test(a_mixed_pixel_leans_to_what_is_bright),
-        cmocka_unit_test(an_echo_drops_out_by_itself),       cmocka_unit_test(angle_noise_moves_the_footprint),
-        cmocka_unit_test(ball_noise_moves_each_echo),        cmocka_unit_test(each_echo_is_folded_by_itself),
+        cmocka_unit_test(each_echo_has_its_own_reflectance),
+        cmocka_unit_test(a_mixed_pixel_leans_to_what_is_bright),
+        cmocka_unit_test(an_echo_drops_out_by_itself),
+        cmocka_unit_test(angle_noise_moves_the_footprint),
+        cmocka_unit_test(ball_noise_moves_each_echo),
+        cmocka_unit_test(each_echo_is_folded_by_itself),
+        cmocka_unit_test(of_a_crowd_the_strongest_signal_is_sent),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

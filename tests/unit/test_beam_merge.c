@@ -1,4 +1,5 @@
-/* Returns of a pulse -> echoes: by the definitions of core/footprint.h, in numbers that can be done by hand. */
+/* Returns of a pulse -> echoes, and figures of a beam: by the definitions of core/footprint.h, in numbers that can be
+ * done by hand. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -6,6 +7,7 @@
 #include <cmocka.h>
 
 #include "core/footprint.h"
+#include "core/vec3.h"
 
 enum { MOST = 16 };
 
@@ -69,11 +71,82 @@ static void test_gaps(void **state)
     }
 }
 
+/* Returns just at the resolution are one echo; numbers that floats have exactly. */
+static void test_at_the_resolution(void **state)
+{
+    (void)state;
+    for (int beyond = 0; beyond < 2; beyond++) {
+        struct beam_return r[2] = {{.range_m = 30.0, .energy = 0.5},
+                                   {.range_m = beyond ? 30.50390625 : 30.5, .energy = 0.5}};
+        struct beam_merging half = how;
+        uint64_t left_out = 0;
+        half.gap_m = 0.5;
+        n_echoes = beam_merge(&half, r, 2, echo, &left_out);
+        assert_int_equal(n_echoes, beyond ? 2 : 1);
+    }
+}
+
+/* exp(-2 (r / w)^2) is 1/e at w / sqrt 2, and a half at w sqrt(ln 2 / 2); half of the angle is half of the radius. */
+static void test_definitions(void **state)
+{
+    (void)state;
+    static const double share[] = {
+        [BEAM_AT_1_E2] = 0.1353352832366127, [BEAM_AT_1_E] = 0.3678794411714423, [BEAM_AT_HALF_MAXIMUM] = 0.5};
+    for (int d = BEAM_AT_1_E2; d <= BEAM_AT_HALF_MAXIMUM; d++) {
+        const double r = 1.0 / beam_widening((enum beam_definition)d);
+        if (d != BEAM_HALF_AT_1_E2) assert_true(fabs(exp(-2.0 * r * r) - share[d]) < 1e-15);
+    }
+    assert_true(beam_widening(BEAM_HALF_AT_1_E2) == 2.0);
+}
+
+/* Axes across a beam: unit vectors, at right angles, right-handed with the beam; also just above and below level. */
+static void test_axes(void **state)
+{
+    (void)state;
+    static const double d[6][3] = {{0, 0, 1},         {0, 0, -1},         {1, 0, 0},
+                                   {0.48, 0.6, 0.64}, {0.48, 0.6, -0.64}, {-0.6, 0.8, -1e-12}};
+    for (int n = 0; n < 6; n++) {
+        double e1[3], e2[3], along[3];
+        beam_axes(d[n], e1, e2);
+        vec3_cross(e1, e2, along);
+        assert_true(fabs(vec3_length(e1) - 1.0) < 1e-15 && fabs(vec3_length(e2) - 1.0) < 1e-15);
+        assert_true(vec3_distance(along, d[n]) < 1e-15);
+    }
+}
+
+/* Of more echoes than are asked for the weakest is left out, wherever it comes: what comes back counts, not the energy.
+ * Of two as weak the first one goes. The others keep the numbers that they had among all. */
+static void test_crowd(void **state)
+{
+    (void)state;
+    static const double back[5] = {0.4, 0.1, 0.6, 0.1, 0.3};
+    static const uint32_t left[6][5] = {{0}, {2}, {0, 2}, {0, 2, 4}, {0, 2, 3, 4}, {0, 1, 2, 3, 4}};
+    for (uint32_t most = 1; most <= 5; most++) {
+        struct beam_return r[5];
+        struct beam_merging few = how;
+        uint64_t left_out = 0;
+        few.most = most;
+        for (uint32_t i = 0; i < 5; i++)
+            r[i] = (struct beam_return){.range_m = 10.0 + 2.0 * i, .energy = 0.1 * (5 - i), .back = back[i]};
+        n_echoes = beam_merge(&few, r, 5, echo, &left_out);
+        assert_int_equal(n_echoes, most);
+        assert_int_equal(left_out, 5 - most);
+        for (uint32_t i = 0; i < most; i++) {
+            assert_true(echo[i].range_m == 10.0 + 2.0 * left[most][i]);
+            assert_int_equal(echo[i].number, left[most][i]);
+        }
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_surface_of_many_returns),
         cmocka_unit_test(test_gaps),
+        cmocka_unit_test(test_crowd),
+        cmocka_unit_test(test_at_the_resolution),
+        cmocka_unit_test(test_definitions),
+        cmocka_unit_test(test_axes),
     };
     return cmocka_run_group_tests(tests, set_up, NULL);
 }

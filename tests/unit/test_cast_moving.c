@@ -244,6 +244,99 @@ static void test_moving_body(void **state)
     cast_rig_close(rig);
 }
 
+/* A head within the sphere around a body, whose middle lies ahead: pulses that all look back meet what of the body
+ * stands there, 0.5 m from the head. A head that stands, and one that moves. */
+static void test_inside_a_body_s_sphere(void **state)
+{
+    (void)state;
+    static const double lo[3] = {-0.5, -1.0, -1.0}, hi[3] = {0.5, 3.0, 1.0}, centre[3] = {0.0, 1.0, 0.0};
+    const struct pose still = {.position_m = {0.0, 0.0, 0.0}, .quat = {1, 0, 0, 0}};
+    const struct pose_knot knot[2] = {{.t_ns = 0, .pose = still}, {.t_ns = 100000000, .pose = still}};
+    struct cast_rig *rig = open_room((struct pose_knot[KNOTS]){{0}});
+    struct scene *body = box_scene(lo, hi);
+    struct schedule_line line;
+    struct bvh *bvh;
+    struct sh_err err;
+    if (bvh_create(body, centre, 100.0, 1, NULL, &bvh, &err) != 0) fail_msg("%s", err.text);
+    rig->setup.n_movers = 1;
+    rig->setup.mover[0] = (struct cast_mover){.bvh = bvh, .centre_m = {0.0, 1.0, 0.0}, .radius_m = 2.5};
+    pose_heading(0.0, rig->setup.mover[0].rotation);
+    rig->setup.mover[0].shift_m[1] = 0.5; /* its back is at y = -0.5 */
+    rig->setup.knot = knot;
+    rig->spec.pan_udeg_s = 0;
+    schedule_start(&rig->segment, &rig->spec);
+    schedule_get_line(&rig->segment, 0, &line);
+    const uint64_t back = line.pulse0 + (uint64_t)(line.pulse_end - line.pulse0) * 220 / 240; /* 180 deg: level */
+    for (int moves = 0; moves < 2; moves++) {
+        rig->setup.n_knots = moves ? 2 : 0;
+        assert_int_equal(cast_some(rig, &line, back - 100, 200), 200);
+        for (uint32_t i = 0; i < 200; i++) {
+            long double mirror, pan, d[3];
+            true_angles(&rig->spec, back - 100 + i, &mirror, &pan);
+            true_direction(mirror, pan, 0.0L, d);
+            assert_true(d[1] < -0.9L);
+            assert_int_equal(rig->block.label[i], 2);
+            assert_true(fabs(rig->block.a[i] * 1e-5 - (double)(-0.5L / d[1])) < 5e-6 + 1e-9);
+        }
+    }
+    bvh_free(bvh);
+    scene_free(body);
+    cast_rig_close(rig);
+}
+
+/* Of a wall and a body the nearer is met: a body behind the wall is not, one before the open sky is, wherever the head
+ * is by then. The head flies 40 m to the left within a chunk of pulses; the body stands beside the end of its way. */
+static void test_nearer_of_wall_and_body(void **state)
+{
+    (void)state;
+    static const double lo[3] = {-41.0, 3.0, -0.5}, hi[3] = {-39.0, 3.5, 0.5}, centre[3] = {-40.0, 3.25, 0.0};
+    static const double far_lo[3] = {-100.0, 90.0, -50.0}, far_hi[3] = {100.0, 91.0, -49.0};
+    const struct pose_knot knot[2] = {{.t_ns = 0, .pose = {.position_m = {0, 0, 0}, .quat = {1, 0, 0, 0}}},
+                                      {.t_ns = 3000000, .pose = {.position_m = {-40, 0, 0}, .quat = {1, 0, 0, 0}}}};
+    static const double wall_lo[3] = {-90.0, 1.0, -9.0}, wall_hi[3] = {90.0, 2.0, 9.0};
+    struct scene *body = box_scene(lo, hi);
+    struct bvh *bvh;
+    struct sh_err err;
+    if (bvh_create(body, centre, 100.0, 1, NULL, &bvh, &err) != 0) fail_msg("%s", err.text);
+    for (int walls = 0; walls < 2; walls++) {
+        struct cast_rig *rig = walls ? cast_rig_open(box_scene(wall_lo, wall_hi), CENTRE)
+                                     : cast_rig_open(box_scene(far_lo, far_hi), CENTRE);
+        struct schedule_line line;
+        bvh_free(rig->bvh);
+        if (bvh_create(rig->scene, CENTRE, 50.0, 1, NULL, &rig->bvh, &err) != 0) fail_msg("%s", err.text);
+        rig->setup.bvh = rig->bvh;
+        rig->setup.knot = knot;
+        rig->setup.n_knots = 2;
+        rig->setup.n_movers = 1;
+        rig->setup.mover[0] = (struct cast_mover){.bvh = bvh, .centre_m = {-40.0, 3.25, 0.0}, .radius_m = 1.2};
+        pose_heading(0.0, rig->setup.mover[0].rotation);
+        rig->spec.pan_udeg_s = 0;
+        rig->spec.sweep_udeg = 40 * DEG; /* -20 to 20 degrees in 10 ms; level and ahead after 5 ms */
+        rig->spec.fov_min_udeg = rig->spec.line_start_udeg = -11 * DEG;
+        rig->spec.line_stop_udeg = 29 * DEG;
+        schedule_start(&rig->segment, &rig->spec);
+        schedule_get_line(&rig->segment, 0, &line);
+        const uint32_t n = 1024, first = 100;
+        cast_some(rig, &line, line.cast0 + first, n);
+        uint32_t bodies = 0;
+        for (uint32_t i = 0; i < n; i++) {
+            double o[3];
+            long double d[3];
+            true_ray(rig, line.cast0 + first + i, o, d);
+            const long double z = 3.0L / d[1] * d[2];
+            const int met = fabs(o[0] + 40.0) < 0.99 && fabsl(z) < 0.49L;
+            if (!met && !walls) continue; /* beside it, or its top */
+            assert_true(rig->block.echo[i] == 0x11 && rig->block.label[i] == 2);
+            assert_true(fabs(rig->block.a[i] * 1e-5 - (double)((walls ? 1.0L : 3.0L) / d[1])) < 5e-6 + 1e-9);
+            bodies += (uint32_t)met;
+        }
+        assert_true(bodies > 20);
+        cast_rig_close(rig);
+    }
+    bvh_free(bvh);
+    scene_free(body);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -251,6 +344,8 @@ int main(void)
         cmocka_unit_test(test_same_bytes),
         cmocka_unit_test(test_geo),
         cmocka_unit_test(test_moving_body),
+        cmocka_unit_test(test_inside_a_body_s_sphere),
+        cmocka_unit_test(test_nearer_of_wall_and_body),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,4 +1,5 @@
-/* Triangles in pieces: their areas add up, none is too large, and points are found in the piece that holds them. */
+/* Triangles in pieces: their areas add up, none is too large, and points are found in the piece that holds them. And sums
+ * over cells. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -8,6 +9,7 @@
 #include <cmocka.h>
 
 #include "core/coverage/cut.h"
+#include "core/coverage/inside.h"
 #include "core/rng.h"
 #include "core/vec3.h"
 
@@ -135,13 +137,49 @@ static void test_needle(void **state)
     assert_true(cut_count(needle, 0.25) == ceil(3.0 * sqrt(5.0) / 0.25) + ceil(7.0 * sqrt(5.0) / 0.25));
 }
 
+/* Sums over cells that are put together by hand: areas by how many stations see them, by surface, by station; spreads
+ * go by area, of what is seen alone. */
+static void test_sums(void **state)
+{
+    (void)state;
+    struct cell cell[5] = {{.area_m2 = 8.0, .pulses = 10, .stations = 1, .first_station = 2, .label = 0},
+                           {.area_m2 = 1.0, .pulses = 40, .stations = 2, .first_station = 1, .label = 0},
+                           {.area_m2 = 2.0, .pulses = 40, .stations = 1, .first_station = 1, .label = 1},
+                           {.area_m2 = 4.0, .label = 1},
+                           {.area_m2 = 1.0, .pulses = 5, .stations = 3, .first_station = 1, .label = 1}};
+    static const double range_m[5] = {1.0, 2.0, 3.0, 0.0, 4.0};
+    const struct scene scene = {.n_triangles = 9, .n_surfaces = 2};
+    const struct coverage c = {.scene = &scene, .n_cells = 5, .n_stations = 3, .cell = cell};
+    struct coverage_of_label label[2];
+    struct coverage_sums sums;
+    struct sh_err err;
+    double alone_m2[3];
+    for (int i = 0; i < 5; i++) {
+        if (cell[i].stations > 0) cell[i].nearness = coverage_bits(1.0 / range_m[i]);
+        if (cell[i].stations > 0) cell[i].cosine = coverage_bits(0.5);
+    }
+    assert_int_equal(coverage_sum(&c, &sums, &err), SH_OK);
+    assert_true(sums.area_m2 == 16.0 && sums.none_m2 == 4.0 && sums.one_m2 == 10.0 && sums.several_m2 == 2.0);
+    /* 12 m2 are seen: 1.25, 40, 20 and 5 pulses a m2 of 8, 1, 2 and 1; floats are good to 1e-7 */
+    assert_true(fabs(sums.density_1_m2.mean - 95.0 / 12.0) < 1e-12);
+    assert_true(sums.density_1_m2.p05 == 1.25 && sums.density_1_m2.p50 == 1.25 && sums.density_1_m2.p95 == 40.0);
+    assert_true(fabs(sums.range_m.mean - 20.0 / 12.0) < 1e-6 && fabs(sums.range_m.p05 - 1.0) < 1e-6);
+    assert_true(fabs(sums.range_m.p50 - 1.0) < 1e-6 && fabs(sums.range_m.p95 - 4.0) < 1e-6);
+    assert_true(fabs(sums.incidence_rad.p50 - acos(0.5)) < 1e-6);
+    coverage_by_label(&c, label);
+    assert_true(label[0].area_m2 == 9.0 && label[0].seen_m2 == 9.0 && label[0].several_m2 == 1.0);
+    assert_true(label[1].area_m2 == 7.0 && label[1].seen_m2 == 3.0 && label[1].several_m2 == 1.0);
+    assert_true(label[0].pulses == 50 && label[1].pulses == 45);
+    coverage_alone(&c, alone_m2);
+    assert_true(alone_m2[0] == 2.0 && alone_m2[1] == 8.0 && alone_m2[2] == 0.0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_partition),
-        cmocka_unit_test(test_points_are_found),
-        cmocka_unit_test(test_border),
-        cmocka_unit_test(test_needle),
+        cmocka_unit_test(test_partition), cmocka_unit_test(test_points_are_found),
+        cmocka_unit_test(test_border),    cmocka_unit_test(test_needle),
+        cmocka_unit_test(test_sums),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -71,6 +71,23 @@ static void what_surfaces_send_back(void **state)
     surface_table_free(&table);
 }
 
+/* The widest lobe there is, of gloss 0, ends 90 degrees off the mirror direction, too: met at 45 degrees. */
+static void a_lobe_ends_beside_the_surface(void **state)
+{
+    (void)state;
+    static const uint32_t label[] = {0, 0, 0};
+    const double cosine[] = {cos(44.0 * TURN / 360.0), cos(46.0 * TURN / 360.0), cos(80.0 * TURN / 360.0)};
+    double rho[3];
+    struct surface_table table;
+    struct sh_err err;
+    assert_int_equal(surface_table_alloc(1, &table, &err), SH_OK);
+    table.surface[0] = (struct surface){.specular = 0.5};
+    table.has_lobes = 1;
+    surface_return(&table, 3, label, cosine, rho);
+    assert_true(fabs(rho[0] - 0.5 * cosine[0]) < 1e-12 && rho[1] == 0.0 && rho[2] == 0.0);
+    surface_table_free(&table);
+}
+
 /* Names choose the first rule that fits; what it doesn't say comes from the colour. sRGB 0.5 is 0.2140 of the light
  * (IEC 61966-2-1). */
 static void names_and_colours_choose(void **state)
@@ -143,12 +160,20 @@ static void amplitude_follows_the_range_equation(void **state)
     assert_int_equal(told(&signal, (double)NAN, 1.0), LINE_REFL_NONE);
 }
 
-/* Kim's table: fog of 500 m visibility does not know colours, 3.912 / 500 m; haze of 4 km, q = 0.98; clear air of 23
+/* Kim's table: fog of 500 m visibility and less does not know colours, 3.912 / 500 m; from there to 1 km q = V - 0.5, V
+ * in km: 0.25 at 750 m, and no step at either end; haze of 4 km, q = 0.98; clear air of 23
  * km, q = 1.3. */
 static void extinction_by_visibility(void **state)
 {
     (void)state;
     assert_true(fabs(detect_extinction_1_m(500.0, 1550e-9) - 3.912 / 500.0) < 1e-15);
+    assert_true(fabs(detect_extinction_1_m(200.0, 1550e-9) - 3.912 / 200.0) < 1e-15);
+    assert_true(fabs(detect_extinction_1_m(750.0, 1550e-9) - 3.912 / 750.0 * pow(1550.0 / 550.0, -0.25)) < 1e-12);
+    assert_true(fabs(detect_extinction_1_m(500.0 * (1 + 1e-12), 1550e-9) - 3.912 / 500.0) < 1e-12);
+    assert_true(fabs(detect_extinction_1_m(1000.0, 905e-9) - detect_extinction_1_m(1000.0 * (1 + 1e-12), 905e-9)) <
+                1e-12);
+    assert_true(fabs(detect_extinction_1_m(8000.0, 905e-9) - 3.912 / 8000.0 * pow(905.0 / 550.0, -1.3)) < 1e-12);
+    assert_true(fabs(detect_extinction_1_m(60000.0, 905e-9) - 3.912 / 60000.0 * pow(905.0 / 550.0, -1.6)) < 1e-12);
     assert_true(fabs(detect_extinction_1_m(4000.0, 1550e-9) - 3.912 / 4000.0 * pow(1550.0 / 550.0, -0.98)) < 1e-12);
     assert_true(fabs(detect_extinction_1_m(23000.0, 905e-9) - 3.912 / 23000.0 * pow(905.0 / 550.0, -1.3)) < 1e-12);
 }
@@ -276,6 +301,33 @@ static void the_ball_does_not_accumulate(void **state)
     assert_true(other_m != range_m[0]);
 }
 
+/* At the data sheet's range and reflectance the noise is the data sheet's, whatever part of it is a floor; of more
+ * signal the floor is what is left; the part per distance adds to it. The same number is drawn each time. */
+static void range_noise_has_a_floor(void **state)
+{
+    (void)state;
+    static const uint64_t key[3] = {5, 5, 5};
+    double drawn = 0.0;
+    for (int k = 0; k < 3; k++) {
+        struct detect_signal_spec spec = spec_of(0.0, 0.0);
+        struct detect_signal signal;
+        spec.sigma_floor_m = k == 0 ? 0.0 : 0.002;
+        spec.sigma_ppm = k == 2 ? 40.0 : 0.0;
+        set_up(&spec, &signal);
+        const double at_y = detect_amplitude(&signal, 100.0, 0.9);
+        double range_m[3] = {100.0, 50.0, 100.0}, amplitude[3] = {at_y, at_y, 1e6 * at_y};
+        const struct detect_echoes echoes = {.n = 3, .key = key, .range_m = range_m, .amplitude = amplitude};
+        detect_range_noise(&signal, &echoes);
+        if (k == 0) drawn = (range_m[0] - 100.0) / 0.003;
+        const double floor_m = k == 0 ? 3e-9 : 0.002, ppm = 1e-6 * spec.sigma_ppm;
+        /* 1e-14 of 100 m is lost; the floor is reached to 1e-12 of it */
+        assert_true(fabs(range_m[0] - 100.0 - (0.003 + 100.0 * ppm) * drawn) < 1e-13);
+        assert_true(fabs(range_m[1] - 50.0 - (0.003 + 50.0 * ppm) * drawn) < 1e-13);
+        assert_true(fabs(range_m[2] - 100.0 - (floor_m + 100.0 * ppm) * drawn) < 1e-13);
+    }
+    assert_true(fabs(drawn) > 0.01);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -283,7 +335,9 @@ int main(void)
         cmocka_unit_test(names_and_colours_choose),
         cmocka_unit_test(reflectance_is_the_targets),
         cmocka_unit_test(amplitude_follows_the_range_equation),
+        cmocka_unit_test(a_lobe_ends_beside_the_surface),
         cmocka_unit_test(extinction_by_visibility),
+        cmocka_unit_test(range_noise_has_a_floor),
         cmocka_unit_test(reaches_that_contradict_are_refused),
         cmocka_unit_test(zones_fold),
         cmocka_unit_test(the_ball_is_full),

@@ -52,6 +52,30 @@ static void an_ideal_instrument_is_one(void **state)
 /* Spherical triangles. Collimation c: the beam lies on a circle c off the one across the mirror's axis: tan(pan error)
  * = tan c / cos m, sin(elevation) = cos c sin m. Trunnion t: the circle itself is tilted: tan(pan error) = sin t tan m,
  * sin(elevation) = cos t sin m. To first order Muralikrishnan's c / sin V and -t / tan V, V from the zenith. */
+/* Each error alone makes a head that is not ideal; a phase without eccentricity is none. */
+static void each_error_alone_is_one(void **state)
+{
+    (void)state;
+    static const struct instrument one[] = {{.collimation_rad = 1e-6},
+                                            {.trunnion_rad = 1e-6},
+                                            {.mirror_offset_m = 1e-6},
+                                            {.transit_offset_m = 1e-6},
+                                            {.mirror = {.index_rad = 1e-6}},
+                                            {.mirror = {.scale = 1e-6}},
+                                            {.mirror = {.eccentricity_rad = 1e-6}},
+                                            {.pan = {.index_rad = 1e-6}},
+                                            {.pan = {.scale = 1e-6}},
+                                            {.pan = {.eccentricity_rad = 1e-6}},
+                                            {.range_offset_m = 1e-6},
+                                            {.range_scale = 1e-6},
+                                            {.mirror_sigma_rad = 1e-6},
+                                            {.pan_sigma_rad = 1e-6}};
+    const struct instrument none = {.pan = {.phase_rad = 1.0}};
+    for (size_t i = 0; i < sizeof one / sizeof one[0]; i++)
+        if (instrument_is_ideal(&one[i])) fail_msg("error %zu", i);
+    assert_true(instrument_is_ideal(&none));
+}
+
 static void tilts_follow_spherical_trigonometry(void **state)
 {
     (void)state;
@@ -272,13 +296,10 @@ static void the_caster_sends_beams_where_they_go(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(an_ideal_instrument_is_one),
-        cmocka_unit_test(tilts_follow_spherical_trigonometry),
-        cmocka_unit_test(tilts_add_up),
-        cmocka_unit_test(offsets_make_plane_triangles),
-        cmocka_unit_test(encoders_read_by_their_errors),
-        cmocka_unit_test(two_faces_show_what_they_should),
-        cmocka_unit_test(angle_noise_is_the_beams),
+        cmocka_unit_test(an_ideal_instrument_is_one),           cmocka_unit_test(each_error_alone_is_one),
+        cmocka_unit_test(tilts_follow_spherical_trigonometry),  cmocka_unit_test(tilts_add_up),
+        cmocka_unit_test(offsets_make_plane_triangles),         cmocka_unit_test(encoders_read_by_their_errors),
+        cmocka_unit_test(two_faces_show_what_they_should),      cmocka_unit_test(angle_noise_is_the_beams),
         cmocka_unit_test(the_caster_sends_beams_where_they_go),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

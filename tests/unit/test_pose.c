@@ -112,6 +112,102 @@ static struct trajectory *make(const struct pose_sample *samples, size_t n)
     return tr;
 }
 
+/* A quaternion and its negative are one attitude: the way between two is the short one, whatever their signs. */
+static void test_short_way(void **state)
+{
+    (void)state;
+    uint64_t random = 8;
+    for (int n = 0; n < 100; n++) {
+        struct pose a = {.position_m = {0}}, b = {.position_m = {0}}, mid, other;
+        double axis[3], r[9], want[9];
+        pose_from_angles(6.0 * case_unit(&random), case_unit(&random), case_unit(&random), a.quat);
+        pose_from_angles(6.0 * case_unit(&random), case_unit(&random), case_unit(&random), b.quat);
+        const double turn = pose_angle_between(a.quat, b.quat);
+        pose_between(&a, &b, 0.25, &mid);
+        for (int k = 0; k < 4; k++)
+            b.quat[k] = -b.quat[k];
+        pose_between(&a, &b, 0.25, &other);
+        pose_matrix(mid.quat, want);
+        pose_matrix(other.quat, r);
+        assert_true(turn <= M_PI && fabs(pose_angle_between(a.quat, b.quat) - turn) < 1e-12);
+        assert_true(fabs(pose_angle_between(a.quat, other.quat) - 0.25 * turn) < 1e-12);
+        for (int i = 0; i < 9; i++)
+            assert_true(fabs(r[i] - want[i]) < 1e-12);
+        pose_turn(a.quat, b.quat, axis, r);
+        assert_true(fabs(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2] - 1.0) < 1e-12);
+    }
+}
+
+/* Straight up and straight down heading and roll turn about one axis: their difference, or sum, is said as heading. */
+static void test_straight_up(void **state)
+{
+    (void)state;
+    for (int up = 0; up < 2; up++)
+        for (int n = 0; n < 12; n++) {
+            const double heading = (25 + 30 * n) * DEG, roll = (n % 3) * 10 * DEG, pitch = (up ? 90 : -90) * DEG;
+            double quat[4], said[3], r[9], want[9];
+            pose_from_angles(heading, pitch, roll, quat);
+            pose_matrix(quat, want);
+            pose_to_angles(quat, &said[0], &said[1], &said[2]);
+            /* the cosine of the pitch is what rounding leaves, of which the pitch is the root's error: 2e-8 */
+            assert_true(fabs(said[1] - pitch) < 5e-8 && said[2] == 0.0);
+            const double off = said[0] - (up ? heading - roll : heading + roll);
+            assert_true(fabs(remainder(off, 2.0 * M_PI)) < 1e-12);
+            pose_from_matrix(want, quat);
+            pose_matrix(quat, r);
+            for (int i = 0; i < 9; i++)
+                assert_true(fabs(r[i] - want[i]) < 5e-8);
+        }
+}
+
+static struct trajectory *along_x(const double *t_s, const double *x_m, size_t n)
+{
+    struct pose_sample sample[8] = {{0}};
+    struct trajectory *tr;
+    struct sh_err err;
+    for (size_t i = 0; i < n; i++)
+        sample[i] = (struct pose_sample){.t_s = t_s[i],
+                                         .pose = {.position_m = {x_m[i], 0.0, 0.0}, .quat = {1.0, 0.0, 0.0, 0.0}}};
+    if (trajectory_from_samples(sample, n, &tr, &err) != 0) fail_msg("%s", err.text);
+    return tr;
+}
+
+/* Velocities are those of a parabola through three samples, at the ends too: what is a parabola stays one, with samples
+ * at any distance. Rounding: 1e-15 of 30 m, some times. */
+static void test_parabola(void **state)
+{
+    (void)state;
+    static const double t_s[] = {-1.0, 0.0, 2.5, 3.0, 5.0};
+    double x_m[5];
+    for (int i = 0; i < 5; i++)
+        x_m[i] = 2.0 - 3.0 * t_s[i] + 1.5 * t_s[i] * t_s[i];
+    struct trajectory *tr = along_x(t_s, x_m, 5);
+    for (double t = -1.0; t <= 5.0; t += 0.03125) {
+        struct pose pose;
+        double frame;
+        trajectory_at(tr, t, &pose, &frame);
+        assert_true(fabs(pose.position_m[0] - (2.0 - 3.0 * t + 1.5 * t * t)) < 1e-13);
+    }
+    trajectory_free(tr);
+}
+
+/* Where two samples have one place the body stands between them, and comes to rest there. */
+static void test_pause(void **state)
+{
+    (void)state;
+    static const double t_s[] = {0.0, 1.0, 2.0, 3.0}, x_m[] = {0.0, 1.0, 1.0, 2.0};
+    struct trajectory *tr = along_x(t_s, x_m, 4);
+    struct pose pose;
+    double frame;
+    for (double t = 1.0; t <= 2.0; t += 0.0625) {
+        trajectory_at(tr, t, &pose, &frame);
+        assert_true(pose.position_m[0] == 1.0);
+    }
+    trajectory_at(tr, 1.0 - 1e-3, &pose, &frame); /* within (1 - t)^2 of it, some times: at rest */
+    assert_true(fabs(pose.position_m[0] - 1.0) < 5e-6);
+    trajectory_free(tr);
+}
+
 static void test_straight_line(void **state)
 {
     (void)state;
@@ -316,9 +412,11 @@ static void test_slow_knots(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_convention),    cmocka_unit_test(test_between), cmocka_unit_test(test_straight_line),
-        cmocka_unit_test(test_constant_turn), cmocka_unit_test(test_knots),   cmocka_unit_test(test_knots_to_an_end),
-        cmocka_unit_test(test_slow_knots),    cmocka_unit_test(test_pole),    cmocka_unit_test(test_ends),
+        cmocka_unit_test(test_short_way),       cmocka_unit_test(test_straight_up),   cmocka_unit_test(test_parabola),
+        cmocka_unit_test(test_pause),           cmocka_unit_test(test_convention),    cmocka_unit_test(test_between),
+        cmocka_unit_test(test_straight_line),   cmocka_unit_test(test_constant_turn), cmocka_unit_test(test_knots),
+        cmocka_unit_test(test_knots_to_an_end), cmocka_unit_test(test_slow_knots),
+        cmocka_unit_test(test_pole),            cmocka_unit_test(test_ends),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

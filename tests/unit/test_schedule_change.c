@@ -336,6 +336,27 @@ static void whatever_is_allowed_is_consistent(void **state)
     }
 }
 
+/* 2.2 MHz is 454.54 ns a pulse. However often settings change, and to whatever: back at one rate for m pulses, these
+ * take floor of the whole, and what was left of a nanosecond goes along. Here every seventh pulse, from 2.2 to 1.1 MHz
+ * (twice as long) and back: the time of pulse k is the floor of the sum, to the nanosecond, after 20,000 changes. */
+static void no_part_of_a_nanosecond_is_lost(void **state)
+{
+    (void)state;
+    struct schedule_spec spec = plain();
+    struct schedule_segment seg;
+    uint64_t elevenths = 0; /* of 5000 / 11 ns */
+    spec.prr_uhz = 2200000 * HZ;
+    schedule_start(&seg, &spec);
+    for (uint64_t k = 7; k < 140000; k += 7) {
+        const int slow = k / 7 % 2 == 1;
+        elevenths += slow ? 7 : 14; /* the pulses before: at the other rate */
+        assert_true(schedule_time_ns(&seg, k) == (int64_t)(elevenths * 5000 / 11));
+        spec.prr_uhz = (slow ? 1100000 : 2200000) * HZ;
+        schedule_change(&seg, &seg, &spec, k);
+        assert_true(schedule_time_ns(&seg, k) == (int64_t)(elevenths * 5000 / 11));
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -347,6 +368,7 @@ int main(void)
         cmocka_unit_test(frames_may_be_set_to_those_done),
         cmocka_unit_test(a_pan_that_stops_ends_its_frame_and_keeps_its_angle),
         cmocka_unit_test(whatever_is_allowed_is_consistent),
+        cmocka_unit_test(no_part_of_a_nanosecond_is_lost),
     };
     return cmocka_run_group_tests_name("schedule changes", tests, NULL, NULL);
 }

@@ -143,8 +143,7 @@ static struct seen compare(const struct scene *scene, const struct surface_table
     setup.beam = beam;
     if (beam != NULL && beam->mode == BEAM_ADAPTIVE) {
         const struct beam_outlines_spec wanted = {scene, at, &beam->beam, 2000.0, NULL, NULL};
-        if (cast_outlines(&wanted, bvh, &outlines, &err) != SH_OK)
-            fail_msg("%s", err.text);
+        if (cast_outlines(&wanted, bvh, &outlines, &err) != SH_OK) fail_msg("%s", err.text);
         beam->outlines = outlines;
     }
     for (uint64_t l = 0; l < 20; l++) {
@@ -194,6 +193,20 @@ static double reflectance(int srgb)
 {
     double texel = light_of(srgb / 255.0);
     return texel * (0.2126 + 0.7152 * light_of(0.8) + 0.0722 * light_of(0.5));
+}
+
+/* A texel's share of 65534 steps: none, all, half. A label without one has its surface's. */
+static void texels_in_labels(void **state)
+{
+    (void)state;
+    static const uint32_t label[] = {1U << 16, 65535U << 16, 32768U << 16, 0};
+    static const double cosine[] = {1.0, 1.0, 0.5, 1.0};
+    struct surface surface[2] = {{.reflectance = 0.3}};
+    struct surface_texture *none[2] = {NULL, NULL};
+    const struct surface_table table = {.n = 1, .surface = surface, .texture = none};
+    double rho[4];
+    surface_return(&table, 4, label, cosine, rho);
+    assert_true(rho[0] == 0.0 && rho[1] == 1.0 && fabs(rho[2] - 0.25) < 1e-12 && rho[3] == 0.3);
 }
 
 static void squares_are_where_the_image_has_them(void **state)
@@ -333,7 +346,8 @@ static void what_is_no_png_is_said(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(squares_are_where_the_image_has_them),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(texels_in_labels),
+                                       cmocka_unit_test(squares_are_where_the_image_has_them),
                                        cmocka_unit_test(squares_move_with_the_mesh),
                                        cmocka_unit_test(squares_under_a_footprint),
                                        cmocka_unit_test(squares_of_gltf),

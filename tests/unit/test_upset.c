@@ -173,12 +173,41 @@ static void a_soiled_window_is_a_weaker_signal(void **state)
     cast_rig_close(rig);
 }
 
+/* Without a model of the signal the fixed part of the noise grows by 1 / share: the same numbers are drawn, four times as
+ * large through a window that lets a quarter through. Counts of 1e-5 m are rounded five times. */
+static void a_soiled_window_makes_ranges_noisy(void **state)
+{
+    (void)state;
+    struct cast_rig *rig = cast_rig_open(box_scene(LO, HI), CENTRE);
+    const struct cast_upset upset = {.share = 0.25};
+    struct line_block exact, clean, soiled;
+    uint32_t n = 0;
+    keep(rig, &exact);
+    rig->setup.noise_on = 1;
+    rig->setup.range_sigma_m = 0.003;
+    rig->setup.noise_key = rng_key(1, RNG_RANGE);
+    keep(rig, &clean);
+    rig->setup.upset = &upset;
+    keep(rig, &soiled);
+    for (uint32_t i = 0; i < exact.n_points; i++) {
+        const double noise_m = 1e-5 * ((double)clean.a[i] - exact.a[i]);
+        assert_true(fabs(1e-5 * ((double)soiled.a[i] - exact.a[i]) - 4.0 * noise_m) <= 4.01e-5);
+        n += fabs(noise_m) > 1e-3;
+    }
+    assert_true(n > 1000);
+    line_block_free(&exact);
+    line_block_free(&clean);
+    line_block_free(&soiled);
+    cast_rig_close(rig);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_slipped_pan_of_any_head),
         cmocka_unit_test(positions_follow_the_encoders),
         cmocka_unit_test(a_soiled_window_is_a_weaker_signal),
+        cmocka_unit_test(a_soiled_window_makes_ranges_noisy),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
