@@ -38,9 +38,9 @@ trap '[ -z "$child" ] || kill "$child" 2>/dev/null; exit 130' INT TERM
 same_tree() {
     local line from to
     if [ ! -e "$tree/Makefile" ]; then
-        rm -rf "$tree"
-        mkdir -p "$tree/build" && cp -a $parts "$tree/" && rm -r "$tree/tests/mutants" || return 1
-        take_objects
+        rm -rf "$tree" "$work/new"
+        mkdir -p "$work/new/build" && cp -a $parts "$work/new/" && rm -r "$work/new/tests/mutants" && take_objects "$work/new" &&
+            mv "$work/new" "$tree"
         return
     fi
     for part in $parts; do
@@ -56,10 +56,10 @@ same_tree() {
     done <"$work/differs"
 }
 
-# What `make test` has built need not be built again; programs are linked anew.
+# take_objects TREE: what `make test` has built need not be built again; programs are linked anew.
 take_objects() {
     [ -d "$build/test" ] || return 0
-    (cd "$build" && find test -type f ! -perm -100 -print0 | tar --null -T - -cf -) | tar -xf - -C "$tree/build"
+    (cd "$build" && find test -type f ! -perm -100 -print0 | tar --null -T - -cf -) | tar -xf - -C "$1/build"
 }
 
 # take_back PATCH: with a new date, as above.
@@ -149,9 +149,10 @@ clean_test() {
     [ "$passed" -gt 0 ] || clean_why[$name]="skipped"
 }
 
+# Those of the faults of which nothing is known yet.
 clean_tests() {
-    local name n=0 names
-    names=$(for tests in "${tests_of[@]}"; do printf '%s\n' $tests; done | sort -u)
+    local name i names
+    names=$(for ((i = 0; i < ${#files[@]}; i++)); do [ -n "${states[i]}" ] || printf '%s\n' ${tests_of[i]}; done | sort -u)
     log=$work/logs/clean.log
     : >"$log"
     echo "the tree without a fault: $(echo $names | wc -w) tests"
@@ -217,24 +218,29 @@ confirm() {
     state=missed detail="$detail fail without the fault, too"
 }
 
-# one FILE TESTS ARGUED: from the last run or by trying.
+# known FILE TESTS: sets state and detail as the last run left them, where nothing has changed since.
+known() {
+    local key was whole
+    key=$(key_of "$1" $2)
+    state= detail=
+    [ -e "$work/results/$(basename "$1" .patch)" ] || return
+    read -r was whole state detail <"$work/results/$(basename "$1" .patch)"
+    [ "$was" = "${key%% *}" ] && { [ $state != missed ] || [ $all = no ] || [ "$whole" = "${everything%% *}" ]; } || state=
+}
+
+# one FILE TESTS ARGUED: by trying.
 one() {
-    local key was whole short
+    local key short
     short=$(basename "$1" .patch)
     log=$work/logs/$short.log
     key=$(key_of "$1" $2)
-    key=${key%% *}
-    if [ -e "$work/results/$short" ] && { read -r was whole state detail <"$work/results/$short"; } && [ "$was" = "$key" ] &&
-        { [ $state != missed ] || [ $all = no ] || [ "$whole" = "${everything%% *}" ]; }; then
-        again=" (known)"
-        return
-    fi
-    again=
     judge "$@"
     take_back "$1"
     [ $state != suspected ] || confirm
     case $state in
-    found | argued | missed) echo "$key $([ $all = yes ] && echo "${everything%% *}" || echo -) $state $detail" >"$work/results/$short" ;;
+    found | argued | missed)
+        echo "${key%% *} $([ $all = yes ] && echo "${everything%% *}" || echo -) $state $detail" >"$work/results/$short"
+        ;;
     esac
 }
 
@@ -280,18 +286,22 @@ read_list
 [ -e "${files[0]}" ] || { echo "no patch tests/mutants/$pattern.patch" >&2; exit 2; }
 same_tree || { echo "no copy of the tree in $tree" >&2; exit 1; }
 hash_sources
-clean_tests
-states=() details=()
+states=() details=() unknown=0
 for ((i = 0; i < ${#files[@]}; i++)); do
-    start=$(date +%s%3N)
-    if [ -n "${wrong_of[i]}" ]; then
-        state=broken detail=${wrong_of[i]} again=
-    else
-        one "${files[i]}" "${tests_of[i]}" "${argued_of[i]}"
-    fi
+    if [ -n "${wrong_of[i]}" ]; then state=broken detail=${wrong_of[i]}; else known "${files[i]}" "${tests_of[i]}"; fi
     states+=("$state") details+=("$detail")
+    [ -n "$state" ] || unknown=$((unknown + 1))
+done
+echo "${#files[@]} faults; of $((${#files[@]} - unknown)) the result is known"
+[ $unknown -eq 0 ] || clean_tests
+n=0
+for ((i = 0; i < ${#files[@]}; i++)); do
+    [ -z "${states[i]}" ] || continue
+    start=$(date +%s%3N) n=$((n + 1))
+    one "${files[i]}" "${tests_of[i]}" "${argued_of[i]}"
+    states[i]=$state details[i]=$detail
     took_ms=$(($(date +%s%3N) - start))
-    printf '[%3d/%d] %-9s %s: %s%s %d.%d s\n' $((i + 1)) ${#files[@]} "${state/missed/not found}" "$(basename "${files[i]}" .patch)" \
-        "$detail" "$again" $((took_ms / 1000)) $((took_ms % 1000 / 100))
+    printf '[%3d/%d] %-9s %s: %s, %d.%d s\n' $n $unknown "${state/missed/not found}" "$(basename "${files[i]}" .patch)" "$detail" \
+        $((took_ms / 1000)) $((took_ms % 1000 / 100))
 done
 finish
