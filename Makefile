@@ -30,7 +30,7 @@ DEPS_BUILD = gcc g++ make pkg-config libc6-dev libembree-dev libassimp-dev libge
 	libstb-dev nettle-dev libusb-1.0-0-dev libusbredirparser-dev libwebsockets-dev assimp-testmodels
 # and the tests, with the second compiler and its sanitizers, clients and readers of recordings that are not ours:
 DEPS_TEST = $(DEPS_BUILD) libcmocka-dev clang libclang-rt-dev gpsd gpsd-clients cloudcompare mrpt-apps proj-bin python3-numpy \
-	parallel tshark tcpreplay $(if $(shell command -v npm),,nodejs npm)
+	parallel patch tshark tcpreplay $(if $(shell command -v npm),,nodejs npm)
 # The guest tests; they are skipped where these can't be had. The kernel (linux-image-amd64) is fetched, not installed.
 DEPS_GUEST = qemu-system-x86 busybox-static cpio kmod xz-utils usbutils usbip
 # The browser that the page is tested in; these tests are skipped where it can't be had.

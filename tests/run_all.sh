@@ -39,7 +39,7 @@ fi
 if wanted unit; then set -- "$@" +tests/check_recipes.sh; fi
 if wanted accuracy; then set -- "$@" $(programs accuracy); fi
 if wanted stability; then set -- "$@" $(programs stability); fi
-if wanted unit; then set -- "$@" tests/check_includes.sh tests/check_make.sh $(ls tests/check_page_*.sh) $(programs unit); fi
+if wanted unit; then set -- "$@" tests/check_includes.sh tests/check_make.sh tests/check_mutants.sh $(ls tests/check_page_*.sh) $(programs unit); fi
 if [ -z "$part" ]; then set -- "$@" $(programs unit "$build/asan"); fi
 if wanted wire; then for name in $beside; do set -- "$@" "+$build/test/tests/wire/test_$name"; done; fi
 if wanted wire; then set -- "$@" +tests/page/page.sh $(programs wire) tests/check_install.sh; fi # a browser beside them

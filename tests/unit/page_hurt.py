@@ -47,8 +47,10 @@ def stream(rng):
 
 
 def late_run(rng):
-    """A head that started again, and whose numbers were all missing."""
-    return b"".join(framed(rng, seq, seq) for seq in [*range(6), *range(1000, 1011), *range(2, 900)])
+    """A head that started again: with a number that came already, in another frame; and with numbers that were all
+    missing."""
+    again = [0, 3, 1, 3, 4]  # 1 is late, of what 2 is missing yet; the second 3 is of another sequence
+    return b"".join(framed(rng, seq, seq) for seq in [*again, *range(6), *range(1000, 1011), *range(2, 900)])
 
 
 def main(name):

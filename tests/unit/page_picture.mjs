@@ -205,6 +205,9 @@ test('colours: ends of a ramp, NaN, ticks, legend', () => {
   same([...valuesOf(cloud.blocks[0], 'amplitude', 0, 2)], [Math.fround(NONE), 12], 'NaN has a number of its own');
   same([...valuesOf(cloud.blocks[0], 'reflectance', 0, 2)], [NONE, NONE].map(Math.fround), 'not modelled at all');
   same(ticks([-0.13, 3.31]).map((t) => t.text), ['0', '1', '2', '3'], 'ticks');
+  same(ticks([0, 2]).map((t) => t.text), ['0.0', '0.5', '1.0', '1.5', '2.0'], 'ticks at both limits');
+  const echoes = {n: 4, echo: Uint8Array.from([0x11, 0x31, 0x32, 0x33])}; // count and number
+  same([...valuesOf(echoes, 'echo', 0, 4)], [0, 1, 2, 3], 'only echo, first, between, last');
   const legend = legendOf('height', {limits: [-1, 1], offset: 110});
   same([legend.from, legend.to, legend.unit, legend.stops.length], [109, 111, 'm', 17], 'height');
   same(legendOf('label', {limits: null, sample: [3, 5, 5]}).items.map((i) => i.label), [5, 3], 'the most frequent first');
@@ -243,6 +246,25 @@ test('a station that is dragged tells where it is, once it is let go', () => {
   same([told[0].station, told[0].z, told[0].heading_deg, stations.pending], [4, 0, 10, true], 'the rest');
   stations.set(stations.list); // refused: as before
   same(stations.placeOf(stations.list[0]).at, [0, 0, 0], 'back');
+});
+
+test('a station that is grabbed beside its middle does not jump; keys turn it', () => {
+  const stations = new Stations(() => {}, () => {});
+  stations.set([{number: 4, name: 'a', x_m: 0, y_m: 0, z_m: 0, heading_deg: 10, tripod: null}]);
+  const c = camera({elevation: -0.6});
+  const from = c.project([0, 0, 0]), to = c.project([1, 0.5, 0]);
+  stations.grab(c, {number: 4, what: 'move'}, from.x + 6, from.y);
+  stations.drag(c, from.x + 20, from.y);
+  stations.drag(c, to.x + 6, to.y);
+  near(stations.moved.x, 1, 0.02, 'x'); // 6 pixels are 0.09 m here, and a tenth more or less half a metre on
+  near(stations.moved.y, 0.5, 0.02, 'y');
+  stations.drop(true);
+  stations.select(4);
+  for (const [key, heading] of [[']', 15], ['[', 10], ['}', 55], ['{', 10]]) {
+    stations.key(c, key, false);
+    near(stations.moved.heading_deg, heading, 1e-9, `after ${key}`);
+  }
+  stations.letGo(); // and no timer is left
 });
 
 test('levels of detail: equal shares; the budget follows the time', () => {

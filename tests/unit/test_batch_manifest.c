@@ -131,6 +131,7 @@ static void test_torn(void **state)
     for (off_t left = line - 1; left >= 0; left -= left > 40 ? 37 : 1) {
         assert_int_equal(truncate(copy, left), 0);
         assert_int_equal(read_all().n, 0);
+        assert_int_equal(warnings, 0); /* of a line that is not whole, also where only its end is missing */
         add(1, 2);
         const struct seen seen = read_all();
         assert_int_equal(seen.n, 1);
@@ -233,6 +234,55 @@ static void test_beside(void **state)
     expect_beside("empty.obj", "");
 }
 
+/* ---- what a job is */
+
+/* Where a text ends matters: a value and a name are not another value and another name. */
+static void test_job_texts(void **state)
+{
+    static const char *const a[] = {"head.prr_hz=1", "0001", "x"}, *const b[] = {"head.prr_hz=10", "001", "x"};
+    struct batch_made one, other;
+    (void)state;
+    batch_made_job(&one, a, 3);
+    batch_made_job(&other, b, 3);
+    assert_string_not_equal(one.job, other.job);
+    batch_made_job(&other, a, 2);
+    assert_string_not_equal(one.job, other.job);
+    batch_made_job(&other, a, 3);
+    assert_string_equal(one.job, other.job);
+}
+
+/* Each input counts by what is in it: the mesh, the file that it names, and what that names. */
+static void test_inputs(void **state)
+{
+    static const char *const inputs[] = {"m.obj", "first.mtl", "a.png", "faults.yaml", "head.yaml"};
+    struct config *cfg = calloc(1, sizeof *cfg);
+    struct batch_made before, after;
+    struct sh_err err;
+    (void)state;
+    assert_non_null(cfg);
+    write_file("config.yaml", "w", "x\n");
+    write_file("m.obj", "w", "mtllib first.mtl\nv 0 0 0\n");
+    write_file("first.mtl", "w", "newmtl one\nmap_Kd a.png\n");
+    write_file("a.png", "w", "x");
+    write_file("faults.yaml", "w", "x");
+    write_file("head.yaml", "w", "x");
+    snprintf(cfg->file, sizeof cfg->file, "%s", path_of("config.yaml"));
+    snprintf(cfg->scenario_file, sizeof cfg->scenario_file, "%s", path_of("faults.yaml"));
+    snprintf(cfg->profile_file, sizeof cfg->profile_file, "%s", path_of("head.yaml"));
+    snprintf(cfg->scene.mesh[0].file, sizeof cfg->scene.mesh[0].file, "%s", path_of("m.obj"));
+    cfg->scene.n_meshes = 1;
+    for (size_t i = 0; i < sizeof inputs / sizeof inputs[0]; i++) {
+        struct batch_cache cache = {0};
+        assert_int_equal(batch_made_of(cfg, &cache, &before, &REPORT, &err), SH_OK);
+        write_file(inputs[i], "a", "\n");
+        assert_int_equal(batch_made_of(cfg, &cache, &after, &REPORT, &err), SH_OK);
+        batch_cache_free(&cache);
+        if (strcmp(before.inputs, after.inputs) == 0) fail_msg("%s is no input", inputs[i]);
+        assert_string_equal(before.configuration, after.configuration);
+    }
+    free(cfg);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -240,6 +290,8 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_folder, make_dir, remove_dir),
         cmocka_unit_test_setup_teardown(test_other_lines, make_dir, remove_dir),
         cmocka_unit_test_setup_teardown(test_beside, make_dir, remove_dir),
+        cmocka_unit_test(test_job_texts),
+        cmocka_unit_test_setup_teardown(test_inputs, make_dir, remove_dir),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

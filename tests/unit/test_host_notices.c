@@ -255,22 +255,76 @@ static void test_late_identity(void **state)
     scanhead_close(sh);
 }
 
+/* A late reply that is a list of five is no answer to *IDN?, which has four fields. */
+static void test_late_list(void **state)
+{
+    (void)state;
+    int head;
+    char reply[64];
+    struct scanhead *sh = open_pair(&head);
+    listen_to(sh);
+    struct play p = {.fd = head, .turn = {{"LIST?", NULL, 0}}};
+    assert_int_equal(command(sh, &p, "LIST?", reply, 1), SCANHEAD_ETIMEOUT);
+    struct play q = {
+        .fd = head,
+        .turn = {{"", NULL, 0}, {"*IDN?", SAYS("1,2,3,4,5\r\nMaker,Model,SN1,1.0\r\n")}, {"PRR?", SAYS("7\r\n")}}};
+    assert_int_equal(command(sh, &q, "PRR?", reply, 5000), 0);
+    assert_string_equal(reply, "7");
+    assert_int_equal(n_noticed, 1);
+    expect(0, SCANHEAD_NOTICE_LATE_REPLY, 0, 0, 9);
+    close(head);
+    scanhead_close(sh);
+}
+
 /* ---- connections */
+
+/* A TCP port of this machine, and a handle that is connected to it. */
+static struct scanhead *open_tcp(int *door)
+{
+    struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
+    socklen_t size = sizeof at;
+    char source[64], err[256];
+    struct scanhead *sh;
+    *door = socket(AF_INET, SOCK_STREAM, 0);
+    assert_int_equal(bind(*door, (struct sockaddr *)&at, sizeof at), 0);
+    assert_int_equal(listen(*door, 4), 0);
+    assert_int_equal(getsockname(*door, (struct sockaddr *)&at, &size), 0);
+    snprintf(source, sizeof source, "tcp:127.0.0.1:%d", ntohs(at.sin_port));
+    assert_int_equal(scanhead_open(source, &sh, err, sizeof err), 0);
+    return sh;
+}
+
+/* A reply that was given up on one connection does not come by another: a line there was not asked for. */
+static void test_given_up_before(void **state)
+{
+    (void)state;
+    char reply[64];
+    int door;
+    struct scanhead_frame f;
+    struct scanhead *sh = open_tcp(&door);
+    int head = accept(door, NULL, NULL);
+    assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, 1), SCANHEAD_ETIMEOUT);
+    close(head);
+    assert_int_equal(scanhead_reattach(sh, 5000), 0);
+    head = accept(door, NULL, NULL);
+    listen_to(sh);
+    put_all(head, "5\r\n", 3);
+    put_numbered(head, 1);
+    expect_frame(sh, SCANHEAD_EVENT, &f);
+    assert_int_equal(n_noticed, 1);
+    expect(0, SCANHEAD_NOTICE_UNASKED, noticed[0].at_byte, 0, 1);
+    close(head);
+    close(door);
+    scanhead_close(sh);
+}
 
 static void test_reattach(void **state)
 {
     (void)state;
-    struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
-    socklen_t size = sizeof at;
-    char source[64], err[256], reply[64];
-    struct scanhead *sh;
+    char reply[64];
+    int door;
     struct scanhead_frame f;
-    int door = socket(AF_INET, SOCK_STREAM, 0);
-    assert_int_equal(bind(door, (struct sockaddr *)&at, sizeof at), 0);
-    assert_int_equal(listen(door, 4), 0);
-    assert_int_equal(getsockname(door, (struct sockaddr *)&at, &size), 0);
-    snprintf(source, sizeof source, "tcp:127.0.0.1:%d", ntohs(at.sin_port));
-    assert_int_equal(scanhead_open(source, &sh, err, sizeof err), 0);
+    struct scanhead *sh = open_tcp(&door);
     listen_to(sh);
     int head = accept(door, NULL, NULL);
     uint8_t raw[EVENT];
@@ -343,9 +397,9 @@ static void test_names(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_stream),     cmocka_unit_test(test_file),          cmocka_unit_test(test_echo),
-        cmocka_unit_test(test_late_reply), cmocka_unit_test(test_late_identity), cmocka_unit_test(test_reattach),
-        cmocka_unit_test(test_names),
+        cmocka_unit_test(test_stream),          cmocka_unit_test(test_file),          cmocka_unit_test(test_echo),
+        cmocka_unit_test(test_late_reply),      cmocka_unit_test(test_late_identity), cmocka_unit_test(test_late_list),
+        cmocka_unit_test(test_given_up_before), cmocka_unit_test(test_reattach),      cmocka_unit_test(test_names),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

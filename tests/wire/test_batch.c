@@ -368,6 +368,11 @@ static void test_nothing_is_mixed(void **state)
                         (size_t)(second - list));
     assert_memory_equal(second, "-    0002_", 10);
     free(list);
+    /* how fast it is computed is no part of a job */
+    expect(wire, "one", WITH("--set", "loop.queue_ms=100", "--list"), 0, "");
+    list = wire_read(wire_path(wire, "out"), NULL);
+    assert_memory_equal(list, "done ", 5);
+    free(list);
     change(wire_path(wire, "config.yaml"), "1.5]", "1.6]");
     expect(wire, "one", WITH("--shard", "2/3"), 1, "another text of the configuration");
     expect(wire, "one", WITH("--merge"), 1, "another text of the configuration");

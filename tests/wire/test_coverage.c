@@ -162,6 +162,9 @@ static void test_next(void **state)
     assert_true(p[0] < 2.0 && p[2] == 1.2); /* in the other leg */
     const double gain_m2 = number_of(next, "gain_m2"), left_m2 = number_of(next, "none_m2");
     assert_near("gain", gain_m2, none_m2 - left_m2, 1e-9);
+    /* Estimates are right but for the cells of 0.25 m at the outlines of what is gained: the shadow's line, some 7 m, and
+     * where the cones of 40 degrees end on floor and ceiling, 2 pi 1.2 m / tan 50 = 6.3 m each. */
+    assert_near("estimate", number_of(next, "estimate_m2"), gain_m2, 0.25 * (7.0 + 2.0 * 6.3));
     snprintf(line, sizeof line, "stations.1.position_m=[%.17g, %.17g, %.17g]", p[0], p[1], p[2]);
     const char *const with[] = {"coverage", config, "--json", "--set", line, NULL};
     char *after = run(wire, with, 0);
@@ -174,6 +177,29 @@ static void test_next(void **state)
     if (strstr(text, "{name: next-1, position_m: [1.000, 4.000, 1.200], heading_deg: 30}") == NULL)
         fail_msg("%s", text);
     free(text);
+}
+
+/* A head whose beams lie in a plane: all its 682 pulses are tried, so the estimate is the gain; but for two cells of 0.25 m,
+ * where a ray lies on the border of one. */
+static void test_next_planar(void **state)
+{
+    struct wire *wire = *state;
+    char config[256], places[256];
+    wire_write_text(wire, "room.obj", L_ROOM);
+    snprintf(config, sizeof config, "%s",
+             wire_write_text(wire, "planar.yaml",
+                             "head: {profile: hokuyo-urg-04lx}\n"
+                             "scene:\n  meshes: [{file: room.obj, up: z, scale: 1}]\n"
+                             "stations:\n  - {name: right, position_m: [5, 1, 1.2]}\n"));
+    snprintf(places, sizeof places, "%s",
+             wire_write_text(wire, "places.csv", "x_m,y_m,z_m,heading_deg\n1,4,1.2,130\n"));
+    const char *const args[] = {"coverage", config, "--json", "--candidates", places, NULL};
+    char *json = run(wire, args, 0);
+    const char *next = strstr(json, "\"next\"");
+    assert_non_null(next);
+    assert_near("estimate", number_of(next, "estimate_m2"), number_of(next, "gain_m2"), 2.0 * 0.25 * 0.25);
+    assert_true(number_of(next, "gain_m2") > 1.0);
+    free(json);
 }
 
 /* ---- what is refused, and a signal */
@@ -252,6 +278,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_figures, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_mesh, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_next, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_next_planar, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_refused, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_interrupt, wire_setup, wire_teardown),
     };

@@ -1,0 +1,145 @@
+/* Charts of the report's page: bars as high as their counts, figures of the axes where their values are. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <cmocka.h>
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "firmware_sim/app/report/page.h"
+
+/* Of charts.c, in units of the picture. Places are written with one or two decimals. */
+static const double LEFT = 70.0, RIGHT = 625.0, BOTTOM = 245.0, ROUNDED = 0.051;
+
+static const struct figures_histogram DEVIATIONS = {.from = -0.002, .width = 0.001, .bins = 4, .count = {0, 10, 5, 1}};
+
+static char *drawn(void (*draw)(FILE *out))
+{
+    char *text = NULL;
+    size_t len;
+    FILE *out = open_memstream(&text, &len);
+    assert_non_null(out);
+    draw(out);
+    assert_int_equal(fclose(out), 0);
+    return text;
+}
+
+static void draw_histogram(FILE *out)
+{
+    page_histogram(out, "deviations", &DEVIATIONS, NULL, NULL);
+}
+
+struct rect {
+    double x, y, width, height;
+};
+
+/* The next bar of a class after *at, which is moved on. */
+static int next_bar(const char **at, const char *class, struct rect *r)
+{
+    char begin[40];
+    snprintf(begin, sizeof begin, "<rect class=\"%s\"", class);
+    const char *found = strstr(*at, begin);
+    if (found == NULL) return 0;
+    assert_int_equal(sscanf(found + strlen(begin), " x=\"%lf\" y=\"%lf\" width=\"%lf\" height=\"%lf\"", &r->x, &r->y,
+                            &r->width, &r->height),
+                     4);
+    *at = found + 1;
+    return 1;
+}
+
+static void near(const char *what, double got, double want, double tolerance)
+{
+    if (!(fabs(got - want) <= tolerance)) fail_msg("%s: %g, and it should be %g", what, got, want);
+}
+
+static void test_bars_stand_on_the_axis(void **state)
+{
+    (void)state;
+    char *svg = drawn(draw_histogram);
+    const char *at = svg;
+    struct rect bar[5];
+    int n = 0;
+    while (n < 5 && next_bar(&at, "s0", &bar[n]))
+        n++;
+    assert_int_equal(n, 3); /* the first bin is empty */
+    for (int i = 0; i < 3; i++) {
+        near("foot", bar[i].y + bar[i].height, BOTTOM, ROUNDED);
+        near("place", bar[i].x, LEFT + (i + 1) * (RIGHT - LEFT) / 4.0, ROUNDED);
+        near("height", bar[i].height / bar[0].height, (double)DEVIATIONS.count[i + 1] / 10.0, 1e-3);
+    }
+    free(svg);
+}
+
+/* In mm, each in its place; the scale at the left side is of counts. */
+static void test_axis_of_bins(void **state)
+{
+    (void)state;
+    char *svg = drawn(draw_histogram);
+    int n = 0;
+    for (const char *at = svg; (at = strstr(at, "text-anchor=\"middle\">")) != NULL; n++) {
+        const double mm = atof(at + strlen("text-anchor=\"middle\">"));
+        const char *x = at;
+        while (strncmp(x, "<text", 5) != 0)
+            x--;
+        near("figure", atof(strstr(x, "x=\"") + 3), LEFT + (mm + 2.0) / 4.0 * (RIGHT - LEFT), ROUNDED);
+        at++;
+    }
+    assert_true(n >= 5);
+    assert_non_null(strstr(svg, "to the right: mm. A bar is 1 mm wide."));
+    free(svg);
+}
+
+static void draw_bars(FILE *out)
+{
+    static const char group[2][32] = {"0-10", "10-20"};
+    static const double value_m[2][PAGE_SERIES] = {{0.001, 0.002, 0.004, 0.003}, {0.002, (double)NAN, 0.004, 0.003}};
+    const struct page_bars bars = {.title = "by range",
+                                   .axis = "range (m)",
+                                   .series = {"mean", "RMS", "most", "expected"},
+                                   .n_groups = 2,
+                                   .group = group,
+                                   .value_m = value_m};
+    page_bars(out, &bars);
+}
+
+/* Side by side in the group's part of the axis; what is not known has no bar; what is expected is a line. */
+static void test_groups(void **state)
+{
+    (void)state;
+    char *svg = drawn(draw_bars);
+    const char *const class[3] = {"s0", "s1", "s2"};
+    static const int in_group[3][2] = {{1, 1}, {1, 0}, {1, 1}};
+    double height_of_mm = 0.0;
+    for (int s = 0; s < 3; s++) {
+        const char *at = svg;
+        for (int g = 0; g < 2; g++) {
+            struct rect bar;
+            if (!in_group[s][g]) continue;
+            assert_true(next_bar(&at, class[s], &bar));
+            near("foot", bar.y + bar.height, BOTTOM, 2.0 * ROUNDED);
+            assert_true(bar.x > LEFT + g * (RIGHT - LEFT) / 2.0);
+            assert_true(bar.x + bar.width < LEFT + (g + 1) * (RIGHT - LEFT) / 2.0);
+            const double mm = s == 0 ? 1.0 + g : s == 1 ? 2.0 : 4.0;
+            if (height_of_mm == 0.0) height_of_mm = bar.height / mm;
+            near("height", bar.height / mm, height_of_mm, 2.0 * ROUNDED);
+        }
+    }
+    const char *mark = strstr(svg, "<line class=\"mark\"");
+    assert_non_null(mark);
+    near("expected", BOTTOM - atof(strstr(mark, "y1=\"") + 4), 3.0 * height_of_mm, 4.0 * ROUNDED);
+    free(svg);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_bars_stand_on_the_axis),
+        cmocka_unit_test(test_axis_of_bins),
+        cmocka_unit_test(test_groups),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,92 @@
+/* scanhead map, from above: stations stand where they are and look where they look, one beside the scene among them; of
+ * a picture in perspective, what --above and --below leave out is left out. */
+#include "tests/wire/room.h"
+
+/* Pixels of a centimetre; a station east of the room, which then belongs to the area. */
+static const char CONFIG[] = "head: {profile: full-sweep, prr_hz: 5000, lines_hz: 100, pan_deg_s: 240, frames: 1}\n"
+                             "scene:\n  meshes: [{file: room.obj, up: z, scale: 1}]\n"
+                             "stations:\n  - {name: first, position_m: [0.5, -1, 1], heading_deg: 90}\n"
+                             "  - {name: second, position_m: [-1, 1.25, 1], heading_deg: 180}\n"
+                             "  - {name: beside, position_m: [20, 0, 1], heading_deg: 315}\n";
+
+static char *draw(struct wire *wire, const char *const *more, const char *out, int status)
+{
+    char config[352], path[352];
+    const char *args[WIRE_MAX_ARGS] = {"map", config, "--quiet", "-o", path};
+    room_write(wire);
+    snprintf(config, sizeof config, "%s", wire_write_text(wire, "config.yaml", CONFIG));
+    snprintf(path, sizeof path, "%s", wire_path(wire, out));
+    for (int n = 5; *more != NULL; n++)
+        args[n] = *more++;
+    const int got = wire_wait(wire, wire_spawn(wire, args, "out", "err", -1));
+    if (got != status) wire_show(wire, "err");
+    assert_int_equal(got, status);
+    return wire_read(status == 0 ? path : wire_path(wire, "err"), NULL);
+}
+
+struct mark {
+    double x, y, to_x, to_y; /* where it is, and the end of its tick; pixels to the right and down */
+};
+
+static struct mark mark_of(const char *svg, const char *name)
+{
+    struct mark m = {.x = 0.0};
+    char title[64];
+    snprintf(title, sizeof title, "<title>%s, ", name);
+    const char *at = strstr(svg, title);
+    if (at == NULL || (at = strstr(at, "<line x1=")) == NULL) fail_msg("no mark of %s", name);
+    assert_int_equal(sscanf(at, "<line x1=\"%lf\" y1=\"%lf\" x2=\"%lf\" y2=\"%lf\"", &m.x, &m.y, &m.to_x, &m.to_y), 4);
+    return m;
+}
+
+/* Places are written in hundredths of a pixel: a hundredth for each of the two that are compared. */
+static void expect(const char *what, double got, double want)
+{
+    if (!(fabs(got - want) <= 0.02)) fail_msg("%s: %g, and it should be %g", what, got, want);
+}
+
+static void test_marks(void **state)
+{
+    struct wire *wire = *state;
+    static const double heading_deg[] = {90, 180, 315};
+    char *svg = draw(wire, (const char *const[]){"--pixel-m", "0.01", NULL}, "map.svg", 0);
+    const struct mark m[] = {mark_of(svg, "first"), mark_of(svg, "second"), mark_of(svg, "beside")};
+    double width = 0.0, height = 0.0;
+    assert_int_equal(sscanf(strstr(svg, " width="), " width=\"%lf\" height=\"%lf\"", &width, &height), 2);
+    expect("second is west of the first", m[0].x - m[1].x, 150.0);
+    expect("second is north of the first", m[0].y - m[1].y, 225.0);
+    expect("the third is east of it", m[2].x - m[0].x, 1950.0);
+    for (int i = 0; i < 3; i++) {
+        const double east = m[i].to_x - m[i].x, south = m[i].to_y - m[i].y, long_px = hypot(east, south);
+        assert_true(long_px > 5.0);
+        expect("tick east", east, long_px * sin(heading_deg[i] * M_PI / 180.0));
+        expect("tick north", -south, long_px * cos(heading_deg[i] * M_PI / 180.0));
+        assert_true(m[i].x > 0.0 && m[i].x < width && m[i].y > 0.0 && m[i].y < height);
+    }
+    free(svg);
+}
+
+/* The room ends between z = ROOM_MIN[2] and ROOM_MAX[2]: above or below all of it no point is left. */
+static void test_cuts(void **state)
+{
+    struct wire *wire = *state;
+    char over[32], under[32];
+    snprintf(over, sizeof over, "%g", ROOM_MAX[2] + 0.1);
+    snprintf(under, sizeof under, "%g", ROOM_MIN[2] - 0.1);
+    const char *const *const cut[] = {(const char *const[]){"--perspective", "--above", over, NULL},
+                                      (const char *const[]){"--perspective", "--below", under, NULL}};
+    for (int i = 0; i < 2; i++) {
+        char *says = draw(wire, cut[i], "view.png", 2);
+        assert_non_null(strstr(says, "no point is in the picture"));
+        free(says);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_marks, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_cuts, wire_setup, wire_teardown),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
