@@ -1,0 +1,326 @@
+"""Clients of the long soak: those that read all, come and go, stall, or misbehave, one class a kind.
+
+Each is a thread. `visits` counts how often it came, `good` how often it got what a client should get. What must
+never happen is a line in `wrong`.
+"""
+import base64
+import os
+import random
+import re
+import select
+import socket
+import struct
+import termios
+import threading
+import time
+import tty
+
+CHUNK = 1 << 16
+PATIENCE_S = 30.0  # a loaded machine answers late; one that never answers is found all the same
+
+
+class Client(threading.Thread):
+    """Comes again and again until `stop` is set, at most every `pause_s`."""
+
+    pause_s = 0.5
+
+    def __init__(self, name, endpoint, stop, seed):
+        super().__init__(name=name, daemon=True)
+        self.endpoint, self.stop, self.rng = endpoint, stop, random.Random(seed)
+        self.visits = self.good = self.bytes = 0
+        self.wrong = []
+
+    def run(self):
+        while not self.stop.is_set():
+            self.visits += 1
+            try:
+                self.good += bool(self.visit())
+            except (OSError, ValueError, struct.error) as error:
+                self.refused(error)
+            self.stop.wait(self.pause_s * self.rng.uniform(0.2, 1.8))
+
+    def refused(self, error):
+        """A connection that a full or busy head closes is no fault; the head's end is found by its process."""
+
+    def visit(self):
+        raise NotImplementedError
+
+    # -- sockets
+
+    def connect(self, rcvbuf=None):
+        host, port = re.search(r"([\d.]+):(\d+)", self.endpoint).groups()
+        sock = socket.socket()
+        if rcvbuf:
+            sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, rcvbuf)
+        sock.settimeout(PATIENCE_S)
+        sock.connect((host, int(port)))
+        return sock
+
+    def exactly(self, sock, n):
+        data = bytearray()
+        while len(data) < n:
+            piece = sock.recv(n - len(data))
+            if not piece:
+                raise OSError("closed")
+            data += piece
+        self.bytes += n
+        return bytes(data)
+
+    def until(self, sock, end, most=1 << 20):
+        data = bytearray()
+        while end not in data and len(data) < most:
+            piece = sock.recv(4096)
+            if not piece:
+                raise OSError("closed")
+            data += piece
+        return bytes(data)
+
+    def drink(self, fd, seconds, most=1 << 30):
+        """Takes what comes for some seconds; the bytes."""
+        until_s, n = time.monotonic() + seconds, 0
+        while n < most and not self.stop.is_set():
+            left_s = until_s - time.monotonic()
+            if left_s <= 0 or not select.select([fd], [], [], left_s)[0]:
+                break
+            piece = os.read(fd, CHUNK)
+            if not piece:
+                break
+            n += len(piece)
+        self.bytes += n
+        return n
+
+    @staticmethod
+    def reset(sock):
+        """Closed by RST instead of FIN, as a process that is killed with bytes unread."""
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        sock.close()
+
+
+class ComesAndGoes(Client):
+    """A native client over TCP: asks who is there, reads for a moment, goes in good order or not."""
+
+    def visit(self):
+        with self.connect() as sock:
+            sock.sendall(b"*IDN?\n")
+            data = self.until(sock, b"scanhead,", 1 << 24)
+            self.drink(sock.fileno(), self.rng.uniform(0, 1.5))
+            if self.rng.random() < 0.5:
+                self.reset(sock)
+            return b"scanhead," in data
+
+
+class Stalls(Client):
+    """Connects, asks, and reads nothing for a minute."""
+
+    def visit(self):
+        with self.connect(rcvbuf=4096) as sock:
+            sock.sendall(b"HEAD:STATe?\n")
+            self.stop.wait(60)
+            return True
+
+
+class Misbehaves(Client):
+    """Sends what no client should: noise, lines without end, half commands, each with a close of its own."""
+
+    def visit(self):
+        with self.connect() as sock:
+            rng = self.rng
+            kind = rng.randrange(5)
+            if kind == 0:
+                sock.sendall(rng.randbytes(rng.randrange(1, 20000)))
+            elif kind == 1:
+                sock.sendall(b"HEAD:PRR " + b"9" * rng.randrange(1, 200000))
+            elif kind == 2:
+                sock.sendall(b"\n;;;:*?\n" * rng.randrange(1, 500))
+            elif kind == 3:
+                sock.sendall(b"FAULt:ADD {kind: drop, every: " + b"-" * 400 + b"\nSCAN:STO")
+            else:
+                sock.sendall(b"*RST?\n*IDN\nHELP? \x00\xff\nTIME:STEP 1e300 S\n")
+            self.drink(sock.fileno(), rng.uniform(0, 0.5))
+            if rng.random() < 0.5:
+                self.reset(sock)
+            return True
+
+
+class Terminal(Client):
+    """A native client at the terminal, sometimes one that reads nothing."""
+
+    def visit(self):
+        fd = os.open(self.endpoint.removeprefix("tty:"), os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        try:
+            tty.setraw(fd, termios.TCSANOW)
+            os.write(fd, b"HEAD:STATe?\n" if self.rng.random() < 0.8 else self.rng.randbytes(300))
+            if self.rng.random() < 0.2:
+                self.stop.wait(self.rng.uniform(1, 5))
+            return self.drink(fd, self.rng.uniform(0.1, 2)) > 0
+        finally:
+            os.close(fd)
+
+
+class Nmea(Client):
+    """Reads sentences at the GNSS receiver's terminal, each with its checksum."""
+
+    def visit(self):
+        fd = os.open(self.endpoint.removeprefix("tty:"), os.O_RDONLY | os.O_NOCTTY | os.O_NONBLOCK)
+        try:
+            tty.setraw(fd, termios.TCSANOW)
+            data, until_s = b"", time.monotonic() + 5
+            while time.monotonic() < until_s and not self.stop.is_set():
+                if select.select([fd], [], [], 0.5)[0]:
+                    data += os.read(fd, 4096)
+        finally:
+            os.close(fd)
+        lines = data.split(b"\r\n")[1:-1]  # the first may have begun before
+        for line in lines:
+            match = re.fullmatch(rb"\$([^*]*)\*([0-9A-F]{2})", line)
+            total = 0
+            for byte in match.group(1) if match else b"":
+                total ^= byte
+            if not match or total != int(match.group(2), 16):
+                self.wrong.append(f"no sentence: {line[:80]!r}")
+        return len(lines) > 0
+
+
+class Page(Client):
+    """A browser's part: the page, then messages of a WebSocket; sometimes a request that is none."""
+
+    def visit(self):
+        with self.connect() as sock:
+            kind = self.rng.randrange(4)
+            if kind == 0:
+                sock.sendall(self.rng.randbytes(500))
+                return True
+            if kind == 1:
+                sock.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n")
+                return b"200" in self.until(sock, b"\r\n")
+            key = base64.b64encode(self.rng.randbytes(16))
+            sock.sendall(b"GET /ws HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+                         b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: " + key + b"\r\n\r\n")
+            if b" 101 " not in self.until(sock, b"\r\n\r\n"):
+                raise OSError("no upgrade")
+            return self.drink(sock.fileno(), self.rng.uniform(0.2, 3)) > 0
+
+
+class UsbIp(Client):
+    """A USB/IP host: imports the head, reads its descriptors, opens the stream, takes some of it and goes."""
+
+    def submit(self, sock, endpoint, is_in, length, setup=bytes(8), data=b""):
+        self.sequence += 1
+        sock.sendall(struct.pack(">IIIIIIiiii", 1, self.sequence, self.device, int(is_in), endpoint, 0, length, 0,
+                                 -1, 0) + setup + data)
+        while True:
+            head = self.exactly(sock, 48)
+            command, sequence, _, _, _, status, actual = struct.unpack(">IIIIIii", head[:28])
+            body = self.exactly(sock, actual) if is_in and actual > 0 else b""
+            if command != 3 or sequence > self.sequence:
+                raise ValueError(f"reply {command:#x} to {sequence}")
+            if sequence == self.sequence:
+                return status, body
+
+    def refused(self, error):
+        if isinstance(error, ValueError):
+            self.wrong.append(str(error))
+
+    def visit(self):
+        with self.connect() as sock:
+            if self.rng.random() < 0.2:
+                sock.sendall(self.rng.randbytes(self.rng.randrange(1, 400)))
+                return True
+            sock.sendall(struct.pack(">HHI", 0x0111, 0x8005, 0))
+            listing = self.exactly(sock, 12)
+            if struct.unpack(">I", listing[8:])[0] < 1:
+                raise OSError("no device")
+        with self.connect() as sock:
+            sock.sendall(struct.pack(">HHI", 0x0111, 0x8003, 0) + b"1-1".ljust(32, b"\0"))
+            status = struct.unpack(">HHI", self.exactly(sock, 8))[2]
+            if status:
+                raise OSError("busy")
+            bus, device = struct.unpack(">II", self.exactly(sock, 312)[288:296])
+            self.sequence, self.device = 0, bus << 16 | device
+            status, text = self.submit(sock, 0, True, 4096, bytes.fromhex("8006000200000010"))
+            interface, number = None, None
+            while len(text) > 1 and text[0] > 1:
+                if text[1] == 4:
+                    interface = text[2] if text[5:8] == b"\xff\x53\x48" else None
+                if text[1] == 5 and interface is not None and text[2] & 0x80 and text[3] & 3 == 2:
+                    number = interface, text[2] & 15
+                text = text[text[0]:]
+            if number is None:
+                self.wrong.append("no vendor interface in the descriptors")
+                return False
+            self.submit(sock, 0, False, 0, bytes.fromhex("0009010000000000"))
+            self.submit(sock, 0, False, 0, struct.pack("<BBHHH", 0x41, 0x22, 1, number[0], 0))
+            until_s, n = time.monotonic() + self.rng.uniform(0.2, 3), 0
+            while time.monotonic() < until_s and not self.stop.is_set():
+                status, data = self.submit(sock, number[1], True, CHUNK)
+                n += len(data)
+            if self.rng.random() < 0.5:
+                self.reset(sock)
+            return n > 0
+
+
+class Redir(Client):
+    """A virtual machine's usbredir socket, whose other end says hello, or nothing that has sense."""
+
+    def visit(self):
+        with self.connect() as sock:
+            if self.rng.random() < 0.5:
+                sock.sendall(self.rng.randbytes(self.rng.randrange(1, 5000)))
+            else:
+                sock.sendall(struct.pack("<III", 0, 68, 0) + b"soak".ljust(64, b"\0") + struct.pack("<I", 0))
+            return self.drink(sock.fileno(), self.rng.uniform(0.1, 1)) > 0
+
+
+class Scip(Client):
+    """A client of a Hokuyo: scans after BM and GE, with sums; then QT."""
+
+    def visit(self):
+        with self.connect() as sock:
+            sock.sendall(b"QT\nVV\nBM\n")
+            self.until(sock, b"BM\n", 1 << 16)
+            scans = 0
+            for _ in range(self.rng.randrange(1, 40)):
+                sock.sendall(b"GD0000108001\n")
+                text = self.until(sock, b"\n\n", 1 << 16)
+                while not text.endswith(b"\n\n"):
+                    text += self.until(sock, b"\n\n", 1 << 16)
+                for line in text[text.find(b"GD"):].split(b"\n")[1:-2]:
+                    if len(line) > 1 and line[-1] != (sum(line[:-1]) & 0x3f) + 0x30:
+                        self.wrong.append(f"sum of {line[:70]!r}")
+                scans += 1
+            return scans > 0
+
+
+class Cola(Client):
+    """A client of a SICK: a telegram asked for, or one after the other."""
+
+    def visit(self):
+        with self.connect() as sock:
+            sock.sendall(b"\x02sRN DeviceIdent\x03\x02sEN LMDscandata 1\x03")
+            data, until_s = b"", time.monotonic() + self.rng.uniform(0.5, 3)
+            while time.monotonic() < until_s and not self.stop.is_set():
+                data += self.until(sock, b"\x03")
+            if self.rng.random() < 0.3:
+                sock.sendall(self.rng.randbytes(100) + b"\x02sMN x" + b"y" * 10000)
+            for telegram in data.split(b"\x03")[:-1]:
+                if not telegram.startswith(b"\x02s"):
+                    self.wrong.append(f"no telegram: {telegram[:70]!r}")
+            return b"LMDscandata" in data
+
+
+class Datagrams(Client):
+    """Takes a VLP-16's data packets; each has its size and its twelve blocks."""
+
+    def visit(self):
+        port = int(self.endpoint.rsplit(":", 1)[1])
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+            sock.bind(("127.0.0.1", port))
+            sock.settimeout(1)
+            until_s, n = time.monotonic() + 3, 0
+            while time.monotonic() < until_s and not self.stop.is_set():
+                packet = sock.recv(2048)
+                n += 1
+                if len(packet) != 1206 or any(packet[100 * i:100 * i + 2] != b"\xff\xee" for i in range(12)):
+                    self.wrong.append(f"no data packet: {packet[:40]!r}")
+            self.bytes += 1206 * n
+            return n > 0
