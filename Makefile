@@ -85,6 +85,9 @@ OBJ = $(SRC:%=$(BUILD)/%.o)
 LIBOBJ = $(patsubst %,$(BUILD)/%.o,core/err.c $(PROTO) $(HOST))
 PROGRAMS = $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/$(1)/test_*.c))
 UNIT = $(call PROGRAMS,unit)
+# Unit tests of what computes run as shipped, too, and those that do less with sanitizers; the others with sanitizers alone
+# (`make test`; tests/run_all.sh, which asks for the same), or as shipped alone (`make test-unit`).
+SHIPPED = $(patsubst tests/%.c,$(BUILD)/tests/%,$(shell sh tests/shipped.sh))
 TESTS = $(UNIT) $(call PROGRAMS,wire) $(call PROGRAMS,accuracy) $(call PROGRAMS,stability) $(call PROGRAMS,guest)
 EVERYTHING = $(OBJ) $(BUILD)/firmware_sim/main.c.o
 
@@ -240,10 +243,10 @@ T ?=
 ifeq ($(T),)
 test: deps-test
 	@$(MAKE) --no-print-directory DEPS_ARE_THERE=1 $(READERS)/installed & status=0; \
-	$(MAKE) --no-print-directory -j$(JOBS) $(STRICT) BUILD=$(BUILD)/test test-programs || status=1; wait; exit $$status
+	$(MAKE) --no-print-directory -j$(JOBS) $(STRICT) BUILD=$(BUILD)/test ALL_UNIT=no test-programs || status=1; wait; exit $$status
 	$(if $(HAS_CLANG),,@echo "no clang: its warnings are not looked at")
 	@$(MAKE) --no-print-directory $(READERS)/pcl_vlp16 & status=0; \
-	$(MAKE) --no-print-directory -j$(JOBS) $(ASAN) objects test-unit-programs || status=1; wait; exit $$status
+	$(MAKE) --no-print-directory -j$(JOBS) $(ASAN) objects test-unit-programs $(if $(HAS_CLANG),fuzz-objects) || status=1; wait; exit $$status
 	@$(RUN) sh tests/run_all.sh $(BUILD)
 else
 ONE = $(patsubst $(BUILD)/%,%,$(filter %/$(T),$(TESTS)))
@@ -362,7 +365,8 @@ chart: deps-build
 	gnuplot -e "csv='$(CHART).csv'; base='$(CHART)_more'" tests/bench/chart_more.gp
 objects: $(EVERYTHING)
 test-unit-programs: $(UNIT)
-test-programs: all $(BUILD)/bench $(TESTS) $(FIGURES)
+ALL_UNIT ?= yes
+test-programs: all $(BUILD)/bench $(filter-out $(if $(filter no,$(ALL_UNIT)),$(filter-out $(SHIPPED),$(UNIT))),$(TESTS)) $(FIGURES)
 
 # What takes long and proves much is described where it stands.
 include $(wildcard tests/*/*.mk config/*/*.mk)

@@ -1,6 +1,6 @@
 #!/bin/sh
 # Runs the tests that make has built: sh tests/run_all.sh BUILD [unit|wire|accuracy|stability|guest]. Without a part all of
-# them, and the unit tests once more with the sanitizers in. Ends with one line of counts.
+# them: the unit tests with the sanitizers in, and those that make built as shipped once more. Ends with one line of counts.
 #
 # As many at a time as there are processors, those that take longest first in each folder:
 #   1. accuracy, stability, unit: they compute; beside them the guests, which take longest and so begin first, and the
@@ -21,12 +21,20 @@ wanted() {
     [ -z "$part" ] || [ "$part" = "$1" ]
 }
 
+# Unit tests that run as shipped beside those with the sanitizers in; all of them when the unit tests run alone.
+if [ -z "$part" ]; then shipped=$(sh tests/shipped.sh | sed 's|.*/test_||; s/\.c$//' | tr '\n' ' '); else shipped=all; fi
+runs() { # FOLDER NAME [BUILD]
+    [ -e "tests/$1/test_$2.c" ] || return 1
+    [ "$1" = unit ] && [ -z "${3:-}" ] && [ "$shipped" != all ] || return 0
+    case " $shipped " in *" $2 "*) ;; *) return 1 ;; esac
+}
+
 # programs FOLDER [BUILD]: the test programs of a folder, the longest first, without those that run apart.
 programs() {
     for name in $longest $(cd "tests/$1" && ls test_*.c | sed 's/^test_//; s/\.c$//'); do
         case " $beside $waiting $alone $seen " in *" $name "*) continue ;; esac
         seen="$seen $name"
-        [ ! -e "tests/$1/test_$name.c" ] || echo "${2:-$build/test}/tests/$1/test_$name"
+        ! runs "$1" "$name" "${2:-}" || echo "${2:-$build/test}/tests/$1/test_$name"
     done
 }
 seen=
@@ -40,7 +48,10 @@ if wanted unit; then set -- "$@" +tests/check_recipes.sh; fi
 if wanted accuracy; then set -- "$@" $(programs accuracy); fi
 if wanted stability; then set -- "$@" $(programs stability); fi
 if wanted unit; then set -- "$@" tests/check_includes.sh tests/check_make.sh tests/check_mutants.sh $(ls tests/check_page_*.sh) $(programs unit); fi
-if [ -z "$part" ]; then set -- "$@" $(programs unit "$build/asan"); fi
+if [ -z "$part" ]; then
+    export FUZZ_BUILD="$build/asan" JOBS=1
+    set -- "$@" +tests/fuzz/fuzz_short.sh $(programs unit "$build/asan")
+fi
 if wanted wire; then for name in $beside; do set -- "$@" "+$build/test/tests/wire/test_$name"; done; fi
 if wanted wire; then set -- "$@" +tests/page/page.sh $(programs wire) tests/check_install.sh; fi # a browser beside them
 
@@ -48,7 +59,7 @@ if wanted wire; then set -- "$@" +tests/page/page.sh $(programs wire) tests/chec
 apart() {
     for name; do
         for folder in accuracy stability unit wire; do
-            if wanted $folder && [ -e "tests/$folder/test_$name.c" ]; then echo "$build/test/tests/$folder/test_$name"; fi
+            if wanted $folder && runs $folder "$name"; then echo "$build/test/tests/$folder/test_$name"; fi
         done
         if [ -z "$part" ] && [ -e "tests/unit/test_$name.c" ]; then echo "$build/asan/tests/unit/test_$name"; fi
     done
