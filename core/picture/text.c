@@ -142,6 +142,7 @@ static double distance2(const double from[2], const double to[2], double x, doub
 /* Strokes in pixels. Each pixel is blended once, by the nearest stroke. */
 static void draw_strokes(struct picture *picture, const struct strokes *s, double width, const uint8_t rgb[3])
 {
+    if (s->n == 0) return;
     const double reach = 0.5 * width + 1;
     double box[4] = {INFINITY, INFINITY, -INFINITY, -INFINITY};
     for (int i = 0; i < s->n; i++)
@@ -151,7 +152,7 @@ static void draw_strokes(struct picture *picture, const struct strokes *s, doubl
         }
     const long last_column = (long)fmin(box[2], (double)picture->width);
     const long last_row = (long)fmin(box[3], (double)picture->height);
-    for (long row = (long)fmax(0, box[1]); s->n > 0 && row <= last_row; row++)
+    for (long row = (long)fmax(0, box[1]); row <= last_row; row++)
         for (long column = (long)fmax(0, box[0]); column <= last_column; column++) {
             double nearest = INFINITY;
             for (int i = 0; i < s->n; i++)
