@@ -17,7 +17,7 @@ ends_soon() {
     kill $head_pid
     wait_for 5 sh -c "! kill -0 $head_pid"
 }
-packet=512 replugs=20
+packet=512 replugs=$often
 [ $speed = high ] || packet=1024 replugs=5 # the speed is no matter of plugs: only that it is there again
 if [ $speed = high ]; then
     sed "\$alinks: [{type: usb, backend: functionfs, speed: super}]" /head.yaml >fast.yaml

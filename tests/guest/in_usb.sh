@@ -1,4 +1,5 @@
 # Inside the guest: a head on the bus, and what is asked of it. Sourced by the scripts of the tests.
+. /often.sh
 
 # head_start YAML [OPTION...]: a head with these links, and TCP on 5025 beside them. head_stop ends it.
 head_start() {

@@ -14,7 +14,7 @@ head_start "{type: usb, attach: on}" --set head.prr_hz=4000 --set loop.tick_hz=1
 wait_for 10 is_plugged
 echo "echo 0 >$vhci/detach" >unplug.sh
 # Plugs itself in again.
-REPLUGS=20 UNPLUG="sh unplug.sh" PLUG=: tap "socket pair" test_stream
+REPLUGS=$often UNPLUG="sh unplug.sh" PLUG=: tap "socket pair" test_stream
 check "socket pair: says that it is back" grep 'plugged in again' /tmp/head.err
 note "replugged at $(uptime_s) s"
 head_kill

@@ -15,7 +15,7 @@ sh plug.sh
 check_reset "TCP"
 check_cut_records "TCP"
 note "cut at $(uptime_s) s"
-REPLUGS=20 UNPLUG="sh unplug.sh" PLUG="sh plug.sh" tap "TCP" test_stream
+REPLUGS=$often UNPLUG="sh unplug.sh" PLUG="sh plug.sh" tap "TCP" test_stream
 note "replugged at $(uptime_s) s"
 head_stop
 check_faults "TCP" "{type: usb}"

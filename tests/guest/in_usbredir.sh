@@ -27,5 +27,5 @@ ask_host start --set head.prr_hz=4000 --set loop.tick_hz=100 >/dev/null
 check "usbredir: plugged in again" wait_for 10 is_plugged
 echo ". /in_lib.sh; ask_host kill >/dev/null" >unplug.sh
 echo ". /in_lib.sh; ask_host start --set head.prr_hz=4000 --set loop.tick_hz=100 >/dev/null" >plug.sh
-REPLUGS=20 UNPLUG="sh unplug.sh" PLUG="sh plug.sh" tap "usbredir killed" test_stream
+REPLUGS=$often UNPLUG="sh unplug.sh" PLUG="sh plug.sh" tap "usbredir killed" test_stream
 note "killed at $(uptime_s) s"

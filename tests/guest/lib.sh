@@ -171,6 +171,7 @@ guest_add_head() {
     guest_add tests/guest/sick.yaml
     sed "s/pan_deg_s: .*/pan_deg_s: ${GUEST_PAN_DEG_S:-60}/" tests/guest/head.yaml >"$guest_work/root/head.yaml"
     [ -z "${GUEST_PAN_DEG_S:-}" ] || : >"$guest_work/root/records_only"
+    echo "often=${GUEST_REPLUGS:-20}" >"$guest_work/root/often.sh" # how often it is unplugged
 }
 
 host_request() {
