@@ -1,5 +1,6 @@
 /* What the link tests share: a link under test and waiting for its events. A wait ends with the event, or
- * fails the test after DEADLINE_MS, which no sound run comes near; nothing sleeps. */
+ * fails the test after WAIT_MS, which no sound run comes near; nothing sleeps. Once one has failed so, those of the
+ * tests after it end after a second. A link that does not come back from a call ends the program after LINK_LIMIT_S. */
 #ifndef TESTS_UNIT_LINK_TEST_H
 #define TESTS_UNIT_LINK_TEST_H
 
@@ -17,7 +18,7 @@
 
 #include "drivers/link/link.h"
 
-enum { DEADLINE_MS = 20000 };
+enum { DEADLINE_MS = 20000, WAIT_MS = 10000, LINK_LIMIT_S = 120 };
 
 struct bench {
     const struct link_ops *ops;
@@ -29,6 +30,10 @@ struct bench {
 };
 
 int64_t now_ms(void);
+
+/* When a wait that begins now is given up, by now_ms; and that. */
+int64_t give_up_ms(void);
+void give_up(const char *what);
 
 struct bench bench_open(const struct link_spec *spec);
 
@@ -43,6 +48,9 @@ struct link_event bench_expect(struct bench *bench, enum link_event_kind kind, u
 void bench_write_all(struct bench *bench, int session, const void *data, size_t len);
 
 void bench_read_all(struct bench *bench, int session, void *data, size_t len);
+
+/* What is to be read within the deadline, as read(): of the link's other end. */
+ssize_t fd_read(int fd, void *data, size_t len);
 
 void fd_read_all(int fd, void *data, size_t len);
 

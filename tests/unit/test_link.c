@@ -236,7 +236,7 @@ static void test_tcp_sessions(void **state)
     int c = tcp_client(port);
     bench_expect(&bench, LINK_REFUSED, 0);
     char byte;
-    assert_int_equal(read(c, &byte, 1), 0); /* told, not left waiting */
+    assert_int_equal(fd_read(c, &byte, 1), 0); /* told, not left waiting */
     close(c);
     exchange(&bench, 1, b);
     close(a);
@@ -266,7 +266,7 @@ static void test_tcp_endings(void **state)
     bench_read_all(&bench, 0, &byte, 1);
     assert_int_equal(byte, 'q');
     bench_expect(&bench, LINK_CLOSED, 0);
-    assert_int_equal(read(fd, &byte, 1), 0);
+    assert_int_equal(fd_read(fd, &byte, 1), 0);
     close(fd);
     /* and somebody else comes before that has been read: the session is not free yet, but will be */
     fd = tcp_client(tcp_port(&bench));
@@ -295,7 +295,7 @@ static void test_tcp_endings(void **state)
     setsockopt(fd, SOL_SOCKET, SO_LINGER, &reset, sizeof reset);
     close(fd);
     ssize_t n = 0;
-    for (const int64_t end_ms = now_ms() + DEADLINE_MS; n >= 0 && now_ms() < end_ms;)
+    for (const int64_t end_ms = give_up_ms(); n >= 0 && now_ms() < end_ms;)
         n = bench.ops->write(bench.link, 0, "x", 1);
     assert_int_equal(n, SH_ECLOSED);
     bench_expect(&bench, LINK_CLOSED, 0);
@@ -342,13 +342,14 @@ static void test_tcp_kill(void **state)
     bench_read_all(&bench, 0, data, 16);
     kill(child, SIGKILL);
     waitpid(child, NULL, 0);
+    const int64_t end_ms = give_up_ms();
     for (int closed = 0; !closed;) { /* what the child wrote comes first */
+        if (now_ms() > end_ms) give_up("the end of a client that was killed");
         while (bench.ops->read(bench.link, 0, data, sizeof data) > 0)
             ;
         bench.n_queue = 0;
-        bench_poll(&bench, 0, DEADLINE_MS);
-        assert_true(bench.n_queue > 0);
-        closed = bench.queue[0].kind == LINK_CLOSED;
+        bench_poll(&bench, 0, 1000);
+        closed = bench.n_queue > 0 && bench.queue[0].kind == LINK_CLOSED;
     }
     bench_close(&bench);
 }
@@ -372,7 +373,7 @@ static void test_tcp_descriptors(void **state)
         close(hog[--n]);
     setrlimit(RLIMIT_NOFILE, &before);
     char byte;
-    assert_int_equal(read(fd, &byte, 1), 0);
+    assert_int_equal(fd_read(fd, &byte, 1), 0);
     close(fd);
     fd = tcp_client(tcp_port(&bench));
     bench_expect(&bench, LINK_OPENED, 0);

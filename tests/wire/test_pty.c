@@ -27,10 +27,10 @@ static int port_open(const struct wire *wire)
 static void close_seen(int fd, struct scanhead *watch)
 {
     struct scanhead_frame frame;
-    int64_t end_ms = wire_now_ms() + DEADLINE_MS;
+    int64_t since_ns = 0;
     close(fd); /* with whatever is on its way */
     while (atoi(client_ask(watch, "SYST:ERR?")) != 101) {
-        if (wire_now_ms() > end_ms) fail_msg("nobody said that the client is gone");
+        wire_soon(&since_ns, client_time_ns(watch), "word that the client is gone");
         scanhead_next(watch, &frame, 1);
     }
 }
@@ -44,13 +44,13 @@ struct look {
     int n;
 };
 
-/* Reads as cat would, until `frames` frames have come. */
+/* Reads as cat would, until `frames` frames have come; fails when they are not among so many bytes. */
 static void look_at(struct look *look, int fd, int frames)
 {
     native_parser_init(&look->parser);
     look->n = 0;
     look->texts = 0;
-    while (look->n < frames) {
+    for (size_t bytes = 0; look->n < frames;) {
         size_t room;
         struct pollfd slot = {.fd = fd, .events = POLLIN};
         uint8_t *to = native_parser_room(&look->parser, &room);
@@ -58,6 +58,9 @@ static void look_at(struct look *look, int fd, int frames)
         ssize_t got = read(fd, to, room);
         assert_true(got > 0);
         native_parser_added(&look->parser, (size_t)got);
+        bytes += (size_t)got;
+        if (bytes > (size_t)(frames + 2) * NATIVE_MAX_FRAME)
+            fail_msg("%d of %d frames in %zu bytes", look->n, frames, bytes);
         for (enum native_item item; (item = native_parser_next(&look->parser)) != NATIVE_MORE;) {
             if (item == NATIVE_TEXT) {
                 look->texts++;
@@ -193,10 +196,13 @@ static void test_fast_open_and_close(void **state)
     struct scanhead_frame frame;
     client_wait_state(sh, "idle");
     client_tell(sh, "SCAN:STAR");
-    for (int n = 0; n < 50; n += frame.type == SCANHEAD_POINTS)
+    int64_t since_ns = 0;
+    for (int n = 0; n < 50; n += frame.type == SCANHEAD_POINTS) {
         client_next(sh, &frame);
+        wire_soon(&since_ns, frame.t_ns, "50 frames of points");
+    }
     client_tell(sh, "SCAN:STOP");
-    client_until(sh, SCANHEAD_EV_SCAN_END, &frame);
+    client_until_soon(sh, SCANHEAD_EV_SCAN_END, &frame);
     scanhead_close(sh);
     head_end(&head, SIGTERM);
 }
@@ -213,7 +219,7 @@ static void test_command_by_redirection(void **state)
     int fd = port_open(wire);
     raw_write(fd, "HEAD:PRR 54321\nSCAN:STAR\n", 25);
     close(fd);
-    client_until(watch, SCANHEAD_EV_SCAN_START, &frame);
+    client_until_soon(watch, SCANHEAD_EV_SCAN_START, &frame);
     assert_string_equal(client_ask(watch, "HEAD:PRR?"), "54321");
     scanhead_close(watch);
     head_end(&head, SIGTERM);

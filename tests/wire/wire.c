@@ -291,6 +291,18 @@ void client_next(struct scanhead *sh, struct scanhead_frame *frame)
     if (scanhead_next(sh, frame, DEADLINE_MS) != SCANHEAD_OK) fail_msg("%s", scanhead_error(sh));
 }
 
+void wire_soon(int64_t *since_ns, int64_t t_ns, const char *what)
+{
+    if (*since_ns == 0) *since_ns = t_ns;
+    if (t_ns - *since_ns > SOON_MS * INT64_C(1000000))
+        fail_msg("%s: not within %d ms of the head's time", what, SOON_MS);
+}
+
+int64_t client_time_ns(struct scanhead *sh)
+{
+    return atoll(client_ask(sh, "TIME?"));
+}
+
 int is_event(const struct scanhead_frame *frame, uint32_t code)
 {
     return frame->type == SCANHEAD_EVENT && frame->event == code;
@@ -301,6 +313,17 @@ void client_until(struct scanhead *sh, uint32_t code, struct scanhead_frame *fra
     do
         client_next(sh, frame);
     while (!is_event(frame, code));
+}
+
+void client_until_soon(struct scanhead *sh, uint32_t code, struct scanhead_frame *frame)
+{
+    char what[32];
+    snprintf(what, sizeof what, "event %u", (unsigned)code);
+    for (int64_t since_ns = 0;;) {
+        client_next(sh, frame);
+        if (is_event(frame, code)) return;
+        wire_soon(&since_ns, frame->t_ns, what);
+    }
 }
 
 void client_wait_state(struct scanhead *sh, const char *state)

@@ -1,7 +1,8 @@
 /* What the wire tests share: a folder of their own, the real program started in it, its endpoints, its end.
  *
  * Nothing here sleeps to let something happen: every wait is on a descriptor (ready line, frame, reply,
- * pidfd) and DEADLINE_MS is only when the test gives up. The program dies with the test (PR_SET_PDEATHSIG), a
+ * pidfd) and DEADLINE_MS is only when the test gives up. What the head does at once is waited for by its own time
+ * (wire_soon), so that its absence shows at once, too. The program dies with the test (PR_SET_PDEATHSIG), a
  * failed test included: the teardown ends what is left. */
 #ifndef TESTS_WIRE_WIRE_H
 #define TESTS_WIRE_WIRE_H
@@ -32,7 +33,7 @@
 
 #include "drivers/host/scanhead.h"
 
-enum { DEADLINE_MS = 30000, WIRE_MAX_ARGS = 48, WIRE_MAX_CHILDREN = 16 };
+enum { DEADLINE_MS = 30000, SOON_MS = 5000, WIRE_MAX_ARGS = 48, WIRE_MAX_CHILDREN = 16 };
 
 struct wire {
     char dir[64];
@@ -123,10 +124,18 @@ void client_tell(struct scanhead *sh, const char *command);
 
 void client_next(struct scanhead *sh, struct scanhead_frame *frame);
 
+/* For loops over frames or replies that go on for as long as the head runs: fails once its time is SOON_MS beyond the first
+ * one given (*since_ns, 0 at first). The head's time stands still where the machine does. */
+void wire_soon(int64_t *since_ns, int64_t t_ns, const char *what);
+/* The head's time, by asking. */
+int64_t client_time_ns(struct scanhead *sh);
+
 int is_event(const struct scanhead_frame *frame, uint32_t code);
 
 /* Takes frames until an event of this code, and gives that one. */
 void client_until(struct scanhead *sh, uint32_t code, struct scanhead_frame *frame);
+/* Likewise of one that the head says at once (wire_soon). */
+void client_until_soon(struct scanhead *sh, uint32_t code, struct scanhead_frame *frame);
 
 /* Waits for the state by asking; each answer comes from the head, so this is no busy loop. Frames are taken.
  */
