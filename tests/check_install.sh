@@ -86,8 +86,8 @@ has_pages() {
     for page in $("$work/root$prefix/bin/scanhead" help --man list); do
         "$work/root$prefix/bin/scanhead" help --man "$page" | cmp - "$share/man/man${page##*.}/$page" || return
     done
-    for name in $(sed -n 's/^[a-z].*[ *]\(scanhead_[a-z_]*\)(.*/\1/p' drivers/host/scanhead.h); do
-        grep -q "$name(" "$share/man/man3/libscanhead.3" || { echo "libscanhead.3: no $name"; return 1; }
+    for function in $(sed -n 's/^[a-z].*[ *]\(scanhead_[a-z_]*\)(.*/\1/p' drivers/host/scanhead.h); do
+        grep -q "$function(" "$share/man/man3/libscanhead.3" || { echo "libscanhead.3: no $function"; return 1; }
     done
     ! command -v groff >/dev/null || test -z "$(groff -man -Tutf8 -ww -z "$share/man/man3/libscanhead.3" 2>&1)" || return
     "$work/root$prefix/bin/scanhead" help --completion bash | cmp - "$share/bash-completion/completions/scanhead" &&
