@@ -80,6 +80,20 @@ example_passes() {
         "$work/root$prefix/bin/scanhead" check "$work/example.yaml"
 }
 check "the installed program's example passes its check" example_passes
+# A page for each command, the library's with all that its header declares, the completion, the unit of the service.
+has_pages() {
+    share=$work/root$prefix/share
+    for page in $("$work/root$prefix/bin/scanhead" help --man list); do
+        "$work/root$prefix/bin/scanhead" help --man "$page" | cmp - "$share/man/man${page##*.}/$page" || return
+    done
+    for function in $(sed -n 's/^[a-z].*[ *]\(scanhead_[a-z_]*\)(.*/\1/p' drivers/host/scanhead.h); do
+        grep -q "$function(" "$share/man/man3/libscanhead.3" || { echo "libscanhead.3: no $function"; return 1; }
+    done
+    ! command -v groff >/dev/null || test -z "$(groff -man -Tutf8 -ww -z "$share/man/man3/libscanhead.3" 2>&1)" || return
+    "$work/root$prefix/bin/scanhead" help --completion bash | cmp - "$share/bash-completion/completions/scanhead" &&
+        grep -qxF "ExecStart=\"$prefix/bin/scanhead\" run /etc/scanhead/%i.yaml" "$work/root$prefix/lib/systemd/system/scanhead@.service"
+}
+check "manual pages, a completion and a unit for the service" has_pages
 check "scripts for campaigns come with it" test -x "$work/root$prefix/share/scanhead/campaign/slurm.sh" -a \
     -x "$work/root$prefix/share/scanhead/campaign/parallel.sh"
 check "the README's client, with the archive" compile client-static "$work/root$prefix/lib/libscanhead.a" -lnettle -lusb-1.0 -lm

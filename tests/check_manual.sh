@@ -50,6 +50,8 @@ options_are_there() {
             [[ $command == *raw || " $offered " == *" $option "* ]] || { echo "completion of $command: no $option"; return 1; }
         done
     done
+    twice=$(grep ') echo' "$work/completion" | sort | uniq -d)
+    [ -z "$twice" ] || { echo "twice in the completion: $twice"; return 1; }
     [ $n -gt 150 ] || { echo "only $n options were found"; return 1; } # 203 now; the reading of the help may be wrong
 }
 
@@ -91,6 +93,7 @@ completions() {
         completes "scanhead record c.yaml --ply-names" c cloudcompare && completes "scanhead batch --crs" u utm &&
         completes "scanhead init --up" "" y z && completes "scanhead map --from" south- south-east south-west &&
         completes "scanhead run --set" loop.p loop.pace= && completes "scanhead run --set loop.pace =" f fast &&
+        completes "scanhead run --set head.start =" "" off on &&
         completes "scanhead run --set loop.pace" = realtime fast step &&
         completes "scanhead run --set = loop.pace =" f fast && completes "scanhead batch --sweep" loop.p loop.pace= &&
         completes "scanhead run --set links[3].type =" p pty && completes "scanhead run --set" "links[3].prot" "links[3].protocol=" &&

@@ -18,7 +18,7 @@ symbols_agree() {
     [ "$(printf '%s\n' "$newest" "$version" | sort -V | tail -n 1)" = "$version" ]
 }
 
-# All that is installed belongs to a package, and a package has nothing else. (make install runs in check_install.)
+# All that is installed belongs to a package, and a package has nothing else. (check_install.sh looks at make install.)
 files_agree() {
     env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -s install BUILD="$build" WERROR=-Werror DESTDIR="$work/root" PREFIX=/usr LIB=lib/triplet ||
         return

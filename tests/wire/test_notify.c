@@ -27,12 +27,17 @@ static int manager_open(const char *name)
     return fd;
 }
 
-/* The next datagram; it must come. */
-static const char *manager_next(int fd)
+/* The next datagram; it must come before the head ends. */
+static const char *manager_next(int fd, pid_t head)
 {
     static char text[4096];
-    struct pollfd slot = {.fd = fd, .events = POLLIN};
-    if (poll(&slot, 1, DEADLINE_MS) != 1) fail_msg("no datagram within %d ms", DEADLINE_MS);
+    const int end = pidfd_open(head, 0);
+    struct pollfd slot[] = {{.fd = fd, .events = POLLIN}, {.fd = end, .events = POLLIN}};
+    assert_true(end >= 0);
+    const int ready = poll(slot, 2, DEADLINE_MS);
+    close(end);
+    if (ready < 1) fail_msg("no datagram within %d ms", DEADLINE_MS);
+    if (poll(slot, 1, 0) != 1) fail_msg("the head ended without a datagram");
     ssize_t n = recv(fd, text, sizeof text - 1, 0);
     assert_true(n > 0);
     text[n] = '\0';
@@ -59,7 +64,7 @@ static void hears_both(struct wire *wire, const char *name)
     snprintf(pty, sizeof pty, "%s", wire_path(wire, "port"));
     const char *const args[] = {"run", config, NULL};
     struct head head = {.wire = wire, .pid = wire_spawn(wire, args, "out", "head.err", -1)};
-    const char *ready = manager_next(fd), *at = strstr(ready, "\nSTATUS=links open: tcp:");
+    const char *ready = manager_next(fd, head.pid), *at = strstr(ready, "\nSTATUS=links open: tcp:");
     if (strncmp(ready, "READY=1\n", 8) != 0 || at == NULL) fail_msg("not ready: %s", ready);
     snprintf(endpoint, sizeof endpoint, "%.*s", (int)strcspn(strstr(at, "tcp:"), " "), strstr(at, "tcp:"));
     assert_non_null(strstr(at, pty));
@@ -68,7 +73,7 @@ static void hears_both(struct wire *wire, const char *name)
     assert_int_equal(access(pty, R_OK | W_OK), 0);
     scanhead_close(sh);
     assert_int_equal(kill(head.pid, SIGTERM), 0);
-    assert_string_equal(manager_next(fd), "STOPPING=1\nSTATUS=ending");
+    assert_string_equal(manager_next(fd, head.pid), "STOPPING=1\nSTATUS=ending");
     head_end(&head, 0);
     manager_close(fd);
 }
@@ -98,8 +103,8 @@ static void test_end_by_itself(void **state)
     const int fd = manager_open(wire_path(wire, "notify"));
     room_write(wire);
     struct head head = head_start(wire, room_config_write(wire, &FRAME), more);
-    assert_int_equal(strncmp(manager_next(fd), "READY=1\n", 8), 0);
-    assert_string_equal(manager_next(fd), "STOPPING=1\nSTATUS=ending");
+    assert_int_equal(strncmp(manager_next(fd, head.pid), "READY=1\n", 8), 0);
+    assert_string_equal(manager_next(fd, head.pid), "STOPPING=1\nSTATUS=ending");
     head_end(&head, 0);
     manager_close(fd);
 }
