@@ -128,6 +128,63 @@ static void it_begins_anew_as_it_began(void **state)
     recording_close(&r);
 }
 
+/* ---- ticks */
+
+enum { EVENTS = 6, TICK_NS = 1000000 };
+
+/* The ticks in which the events came. */
+static void play(double speed, uint64_t first_tick, uint64_t *tick_of_event)
+{
+    struct config *cfg = calloc(1, sizeof *cfg);
+    assert_non_null(cfg);
+    cfg->loop.tick_hz = 1e9 / TICK_NS;
+    const struct replay_options options = {.path = path, .speed = speed, .start = 1};
+    struct replay *r;
+    struct ring_tick tick;
+    struct sh_err err;
+    if (replay_open(cfg, &options, &r, &err) != SH_OK) fail_msg("%s", err.text);
+    int n = 0;
+    for (uint64_t i = first_tick; replay_source.next(r, i, 0, 0, &tick) == LOOP_SOURCE_TICK; i++)
+        for (uint32_t at = 0; at < tick.len; at += (uint32_t)native_frame_len(tick.bytes + at)) {
+            if (tick.bytes[at + 1] != NATIVE_EVENT) continue;
+            assert_true(n < EVENTS);
+            tick_of_event[n++] = i;
+        }
+    assert_int_equal(n, EVENTS);
+    replay_free(r);
+    free(cfg);
+}
+
+/* Frames go out at the end of the tick that has their time; at half the speed that is one later. Time that goes back by
+ * more than a second is that of another head, whose first frame comes with the next tick. */
+static void frames_go_out_in_their_ticks(void **state)
+{
+    (void)state;
+    static const struct {
+        int64_t event_ms[EVENTS];
+        double speed;
+        uint64_t after[EVENTS]; /* ticks after the first */
+    } rows[] = {{{0, 0, 1, 2, 3, 10}, 1, {0, 0, 1, 2, 3, 10}},
+                {{0, 0, 1, 2, 3, 10}, 2, {0, 0, 0, 1, 1, 5}},
+                {{0, 0, 1, 2, 3, 10}, 0.5, {1, 1, 3, 5, 7, 21}},
+                {{0, 5000, 4500, 5001, 3000, 3002}, 1, {0, 5000, 5000, 5001, 5002, 5004}}};
+    for (size_t k = 0; k < sizeof rows / sizeof rows[0]; k++) {
+        FILE *f = begin_file();
+        put_descriptor(f);
+        for (int i = 0; i < EVENTS; i++)
+            put_event(f, NATIVE_EV_CONTROL, rows[k].event_ms[i] * TICK_NS);
+        assert_int_equal(fclose(f), 0);
+        for (uint64_t first = 0; first < 200; first += 77) {
+            uint64_t tick[EVENTS];
+            play(rows[k].speed, first, tick);
+            for (int i = 0; i < EVENTS; i++)
+                if (tick[i] != first + rows[k].after[i])
+                    fail_msg("row %zu, event %d: tick %llu after the first, not %llu", k, i,
+                             (unsigned long long)(tick[i] - first), (unsigned long long)rows[k].after[i]);
+        }
+    }
+}
+
 /* ---- states */
 
 static const char *state_at(struct replay *r, uint64_t released)
@@ -181,6 +238,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(points_go_out_with_what_follows),
         cmocka_unit_test(it_begins_anew_as_it_began),
+        cmocka_unit_test(frames_go_out_in_their_ticks),
         cmocka_unit_test(a_state_holds_from_its_tick_on),
     };
     return cmocka_run_group_tests_name("replay state", tests, make_file, remove_file);
