@@ -158,8 +158,8 @@ static void take_refused(struct usb_link *self)
 static int has_news(const struct usb_link *self, uint32_t want_write)
 {
     int news = is_plugged_anew(self);
-    news |= (self->ops->more != NULL && self->ops->more(self->backend)) || self->news != NULL || self->refused != NULL ||
-            self->head.cut_due;
+    news |= (self->ops->more != NULL && self->ops->more(self->backend)) || self->news != NULL ||
+            self->refused != NULL || self->head.cut_due;
     for (int i = 0; i < self->n; i++)
         news |= has_to_report(self, i) || is_readable(self, i) || ((want_write >> i & 1u) != 0 && is_writable(self, i));
     return news;
@@ -263,7 +263,8 @@ static int fault_reset(struct usb_link *self)
 {
     uint32_t idle = 0;
     for (int i = 0; i < self->n; i++)
-        if (self->head.session[i].open && !usb_device_can_write(self->head.device, row_of(self, i)->in)) idle |= 1u << i;
+        if (self->head.session[i].open && !usb_device_can_write(self->head.device, row_of(self, i)->in))
+            idle |= 1u << i;
     const int rc = self->ops->fault(self->backend, USB_FAULT_RESET);
     for (int i = 0; i < self->n && rc == SH_OK; i++)
         if ((idle >> i & 1u) != 0) usb_device_set_gone_due(self->head.device, row_of(self, i)->in, 1);

@@ -23,9 +23,9 @@ enum { MAX_CONNS = 4, SEND_BUFFER_BYTES = 1 << 20, CLOSE_WAIT_MS = 500 };
 
 struct usbip {
     struct usb_device *device;
-    int here;                       /* attached to this machine: nobody else may come */
-    int unplugged;                  /* on request */
-    int listener;                   /* -1: none */
+    int here;      /* attached to this machine: nobody else may come */
+    int unplugged; /* on request */
+    int listener;  /* -1: none */
     struct usb_door door;
     struct usb_backend_spec served; /* where it listens; once open with the port that it has */
     struct usb_retry retry;         /* of what is attached here */

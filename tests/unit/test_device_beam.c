@@ -218,10 +218,13 @@ static void the_mirror_has_limits(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_tick_ends_where_a_fault_does),   cmocka_unit_test(settings_change_while_the_mirror_is_slow),
+        cmocka_unit_test(a_tick_ends_where_a_fault_does),
+        cmocka_unit_test(settings_change_while_the_mirror_is_slow),
         cmocka_unit_test(faults_end_with_their_scan),
-        cmocka_unit_test(what_stands_does_not_wobble),       cmocka_unit_test(an_added_fault_counts_from_its_command),
-        cmocka_unit_test(another_fault_leaves_it_as_it_is), cmocka_unit_test(the_mirror_has_limits),
+        cmocka_unit_test(what_stands_does_not_wobble),
+        cmocka_unit_test(an_added_fault_counts_from_its_command),
+        cmocka_unit_test(another_fault_leaves_it_as_it_is),
+        cmocka_unit_test(the_mirror_has_limits),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

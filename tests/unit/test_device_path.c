@@ -93,7 +93,6 @@ static void a_path_ends_with_its_last_pose(void **state)
     unlink(path);
 }
 
-
 /* A pose each 10 ms, north at 2 m/s. Between two of them the head is where a straight way has it; after the last it goes on
  * so for extrapolate_ms, and then it stands. */
 static void a_live_platform_goes_on_for_a_while(void **state)
@@ -104,9 +103,9 @@ static void a_live_platform_goes_on_for_a_while(void **state)
         int64_t t_ns;
         double y_m;
     } rows[] = {{40000000, 0.1}, /* before the first */
-                {50000000, 0.1},   {55000000, 0.11}, {69999999, 0.139999998}, {70000000, 0.14},
-                {80000000, 0.16},  {85000000, 0.17}, {100000000, 0.2}, /* 30 ms after the last */
-                {100000001, 0.2},  {500000000, 0.2}};
+                {50000000, 0.1},  {55000000, 0.11}, {69999999, 0.139999998}, {70000000, 0.14},
+                {80000000, 0.16}, {85000000, 0.17}, {100000000, 0.2}, /* 30 ms after the last */
+                {100000001, 0.2}, {500000000, 0.2}};
     struct rig *rig = rig_open(NULL, sets, 3);
     struct pose pose;
     rig_go_to(rig, 10);
@@ -132,8 +131,8 @@ static void poses_come_in_order(void **state)
         int64_t t_ns;
         double y_m;
         int bad;
-    } rows[] = {{50000000, 1, 0}, {50000000, 2, 1}, {49999999, 2, 1}, {50000001, 3, 0}, {60000000, 50.001, 1},
-                {60000000, 50, 0}};
+    } rows[] = {{50000000, 1, 0}, {50000000, 2, 1},      {49999999, 2, 1},
+                {50000001, 3, 0}, {60000000, 50.001, 1}, {60000000, 50, 0}};
     uint64_t n_bad = 0;
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         assert_int_equal(device_pose(rig->device, rows[i].t_ns, (double[]){0, rows[i].y_m, 0, 0, 0, 0}), rows[i].bad);

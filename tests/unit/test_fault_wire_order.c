@@ -208,7 +208,7 @@ static void a_queue_gives_back_its_room(void **state)
         else
             assert_int_equal(wire_queue_put(&queue, piece), 0);
         assert_int_equal(queue.n_bytes != 0, way != 2); /* as the header has it */
-        if (way == 3) { /* into the write of one that is open */
+        if (way == 3) {                                 /* into the write of one that is open */
             piece->open = 1;
             assert_int_equal(wire_queue_put(&queue, wire_piece_new(WIRE_FRAMES, "gh", 2)), 0);
             assert_int_equal(piece->len, 8);

@@ -30,6 +30,19 @@ static void a_reply_that_is_dropped_is_missing(void **state)
     assert_true(rig.n_notes == 1 && rig.note[0].number == 2 && rig.note[0].of == FAULT_OF_REPLIES);
 }
 
+/* Its end lies in device time that is still to come, as the tick that the command took effect with. */
+static void a_fault_that_was_taken_out_changes_no_reply(void **state)
+{
+    (void)state;
+    f = fault_of_kind(FAULT_NO_REPLY);
+    rig_open(&f, 1, 1);
+    rig_reply("1");
+    assert_int_equal(fault_board_end(rig.board, 1, 1000000 * MS), 1);
+    rig_reply("2");
+    rig_drain();
+    rig_expect((const int[]){1, -1});
+}
+
 static void frames_overtake_a_late_reply_and_replies_do_not(void **state)
 {
     (void)state;
@@ -159,6 +172,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_teardown(a_reply_that_is_dropped_is_missing, rig_teardown),
+        cmocka_unit_test_teardown(a_fault_that_was_taken_out_changes_no_reply, rig_teardown),
         cmocka_unit_test_teardown(frames_overtake_a_late_reply_and_replies_do_not, rig_teardown),
         cmocka_unit_test_teardown(a_wrong_reply_is_wrong, rig_teardown),
         cmocka_unit_test_teardown(an_echo_is_that_of_the_replys_own_line, rig_teardown),

@@ -305,9 +305,9 @@ static void test_units(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_deconfigured),     cmocka_unit_test(test_left_over),
-        cmocka_unit_test(test_busy_endpoint),    cmocka_unit_test(test_failing_endpoint),
-        cmocka_unit_test(test_endpoint_request), cmocka_unit_test(test_units),
+        cmocka_unit_test(test_deconfigured),       cmocka_unit_test(test_left_over),
+        cmocka_unit_test(test_busy_endpoint),      cmocka_unit_test(test_failing_endpoint),
+        cmocka_unit_test(test_endpoint_request),   cmocka_unit_test(test_units),
         cmocka_unit_test(test_failures_long_past),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -301,9 +301,9 @@ static void without_a_place_no_fix_is_valid(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_antenna_is_where_the_arm_puts_it), cmocka_unit_test(at_the_poles),
-        cmocka_unit_test(times_are_those_of_the_rate),          cmocka_unit_test(it_stands_where_the_head_stands),
-        cmocka_unit_test(noise_is_what_was_asked_for),          cmocka_unit_test(noise_does_not_last),
+        cmocka_unit_test(the_antenna_is_where_the_arm_puts_it),  cmocka_unit_test(at_the_poles),
+        cmocka_unit_test(times_are_those_of_the_rate),           cmocka_unit_test(it_stands_where_the_head_stands),
+        cmocka_unit_test(noise_is_what_was_asked_for),           cmocka_unit_test(noise_does_not_last),
         cmocka_unit_test(speed_and_course_are_those_of_the_way), cmocka_unit_test(without_a_place_no_fix_is_valid),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

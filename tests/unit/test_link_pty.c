@@ -315,8 +315,7 @@ int main(void)
         cmocka_unit_test(test_fresh_for_next), cmocka_unit_test(test_written_and_gone),
         cmocka_unit_test(test_unseen_change),  cmocka_unit_test(test_nothing_of_the_one_before),
         cmocka_unit_test(test_no_descriptors), cmocka_unit_test(test_symlink),
-        cmocka_unit_test(test_left_symlink),
-        cmocka_unit_test(test_exclusive),
+        cmocka_unit_test(test_left_symlink),   cmocka_unit_test(test_exclusive),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -106,7 +106,6 @@ static void starve(const struct link_spec *spec)
         close(fd[i]);
     }
     bench_close(&bench);
-
 }
 
 static void test_tcp(void **state)

@@ -366,8 +366,8 @@ static void test_nobody_listens(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_sequence),   cmocka_unit_test(test_bytes),  cmocka_unit_test(test_end),
-        cmocka_unit_test(test_bad_unseen), cmocka_unit_test(test_resume), cmocka_unit_test(test_nobody_listens),
+        cmocka_unit_test(test_sequence),          cmocka_unit_test(test_bytes),  cmocka_unit_test(test_end),
+        cmocka_unit_test(test_bad_unseen),        cmocka_unit_test(test_resume), cmocka_unit_test(test_nobody_listens),
         cmocka_unit_test(test_resume_in_a_frame),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -259,12 +259,8 @@ static void test_level_waypoints(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_csv),
-        cmocka_unit_test(test_csv_errors),
-        cmocka_unit_test(test_csv_upright),
-        cmocka_unit_test(test_waypoints),
-        cmocka_unit_test(test_slow_waypoints),
-        cmocka_unit_test(test_level_waypoints),
+        cmocka_unit_test(test_csv),       cmocka_unit_test(test_csv_errors),     cmocka_unit_test(test_csv_upright),
+        cmocka_unit_test(test_waypoints), cmocka_unit_test(test_slow_waypoints), cmocka_unit_test(test_level_waypoints),
     };
     return cmocka_run_group_tests(tests, make_file, remove_file);
 }

@@ -128,6 +128,116 @@ static void it_begins_anew_as_it_began(void **state)
     recording_close(&r);
 }
 
+/* ---- ticks */
+
+enum { EVENTS = 6, TICK_NS = 1000000, MOST = 40 };
+
+static struct {
+    uint64_t tick;
+    struct native_header header;
+} played[MOST];
+
+/* What goes out, from a tick on, until the end or `most` frames; returns how many. */
+static int play(const struct replay_options *given, uint64_t first_tick, int most)
+{
+    struct config *cfg = calloc(1, sizeof *cfg);
+    assert_non_null(cfg);
+    cfg->loop.tick_hz = 1e9 / TICK_NS;
+    struct replay_options options = *given;
+    options.path = path;
+    options.start = 1;
+    struct replay *r;
+    struct ring_tick tick;
+    struct sh_err err;
+    if (replay_open(cfg, &options, &r, &err) != SH_OK) fail_msg("%s", err.text);
+    int n = 0;
+    for (uint64_t i = first_tick; n < most && replay_source.next(r, i, 0, 0, &tick) == LOOP_SOURCE_TICK; i++)
+        for (uint32_t at = 0; at < tick.len && n < most; n++) {
+            played[n].tick = i;
+            native_read_header(tick.bytes + at, &played[n].header);
+            at += (uint32_t)native_frame_len(tick.bytes + at);
+        }
+    replay_free(r);
+    free(cfg);
+    return n;
+}
+
+/* Frames go out at the end of the tick that has their time; at half the speed that is one later. Time that goes back by
+ * more than a second is that of another head, whose first frame comes with the next tick. */
+static void frames_go_out_in_their_ticks(void **state)
+{
+    (void)state;
+    static const struct {
+        int64_t event_ms[EVENTS];
+        double speed;
+        uint64_t after[EVENTS]; /* ticks after the first */
+    } rows[] = {{{0, 0, 1, 2, 3, 10}, 1, {0, 0, 1, 2, 3, 10}},
+                {{0, 0, 1, 2, 3, 10}, 2, {0, 0, 0, 1, 1, 5}},
+                {{0, 0, 1, 2, 3, 10}, 0.5, {1, 1, 3, 5, 7, 21}},
+                {{0, 5000, 4500, 5001, 3000, 3002}, 1, {0, 5000, 5000, 5001, 5002, 5004}}};
+    for (size_t k = 0; k < sizeof rows / sizeof rows[0]; k++) {
+        FILE *f = begin_file();
+        put_descriptor(f);
+        for (int i = 0; i < EVENTS; i++)
+            put_event(f, NATIVE_EV_CONTROL, rows[k].event_ms[i] * TICK_NS);
+        assert_int_equal(fclose(f), 0);
+        for (uint64_t first = 0; first < 200; first += 77) {
+            assert_int_equal(play(&(struct replay_options){.speed = rows[k].speed}, first, MOST), 1 + EVENTS);
+            for (int i = 0; i < EVENTS; i++)
+                if (played[1 + i].tick != first + rows[k].after[i])
+                    fail_msg("row %zu, event %d: tick %llu after the first, not %llu", k, i,
+                             (unsigned long long)(played[1 + i].tick - first), (unsigned long long)rows[k].after[i]);
+        }
+    }
+}
+
+/* Played again and again, each time is a sequence of its own; frames for one reader have no number. */
+static void each_time_has_its_numbers(void **state)
+{
+    (void)state;
+    uint8_t frame[256];
+    const struct native_event local = {.code = NATIVE_EV_READER_LOST};
+    FILE *f = begin_file();
+    put_descriptor(f);
+    put_event(f, NATIVE_EV_CONTROL, 0);
+    put_event(f, NATIVE_EV_CONTROL, 2 * TICK_NS);
+    const size_t len = native_encode_event(frame, sizeof frame, &local, 2 * TICK_NS, NATIVE_LOCAL);
+    assert_int_equal(fwrite(frame, 1, len, f), len);
+    assert_int_equal(fclose(f), 0);
+    assert_int_equal(play(&(struct replay_options){.speed = 1, .loop = 1}, 0, 12), 12);
+    uint32_t last = 0;
+    for (int i = 0; i < 12; i++) {
+        const struct native_header *h = &played[i].header;
+        if (i % 4 == 3) {
+            assert_true((h->flags & NATIVE_LOCAL) != 0 && h->seq == 0);
+            continue;
+        }
+        const uint32_t step = i != 0 && i % 4 == 0 ? 1 - (UINT32_C(1) << 30) : 1; /* far back: a restart */
+        assert_int_equal(h->seq, i == 0 ? 0 : last + step);
+        last = h->seq;
+    }
+}
+
+/* Of a part: from 5 ms to 12 ms, both included. Who listens is told first which head it was. */
+static void a_part_begins_with_the_head(void **state)
+{
+    (void)state;
+    FILE *f = begin_file();
+    put_descriptor(f);
+    for (int ms = 0; ms < 20; ms++)
+        put_event(f, NATIVE_EV_CONTROL, ms * TICK_NS);
+    assert_int_equal(fclose(f), 0);
+    const int n = play(&(struct replay_options){.speed = 1, .from_s = 0.005, .to_s = 0.012}, 3, MOST);
+    assert_int_equal(n, 1 + 8);
+    assert_int_equal(played[0].header.type, NATIVE_DESCRIPTOR);
+    assert_int_equal(played[0].header.flags, NATIVE_REPEAT | NATIVE_LOCAL);
+    for (int i = 0; i < n - 1; i++) {
+        assert_int_equal(played[1 + i].header.type, NATIVE_EVENT);
+        assert_int_equal(played[1 + i].header.t_ns, (5 + i) * TICK_NS);
+        assert_int_equal(played[1 + i].tick, 3 + i);
+    }
+}
+
 /* ---- states */
 
 static const char *state_at(struct replay *r, uint64_t released)
@@ -179,9 +289,9 @@ static int remove_file(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(points_go_out_with_what_follows),
-        cmocka_unit_test(it_begins_anew_as_it_began),
-        cmocka_unit_test(a_state_holds_from_its_tick_on),
+        cmocka_unit_test(points_go_out_with_what_follows), cmocka_unit_test(it_begins_anew_as_it_began),
+        cmocka_unit_test(frames_go_out_in_their_ticks),    cmocka_unit_test(each_time_has_its_numbers),
+        cmocka_unit_test(a_part_begins_with_the_head),     cmocka_unit_test(a_state_holds_from_its_tick_on),
     };
     return cmocka_run_group_tests_name("replay state", tests, make_file, remove_file);
 }
