@@ -336,6 +336,21 @@ static void a_full_turn_closes(void **state)
     }
 }
 
+/* Two columns have nothing between them but the one wall, also where the grid closes. */
+static void two_columns_do_not_close(void **state)
+{
+    (void)state;
+    begin();
+    t.grid.closes = 1;
+    for (uint32_t column = 0; column < 2; column++) {
+        add_column(column, 0);
+        for (uint32_t row = 0; row < 5; row++)
+            add_in_box(row, 2 * PI * column / 36, 0.1 * row);
+    }
+    make(0);
+    assert_int_equal(t.faces.n_faces, 4 * 2);
+}
+
 /* Points at random places of the grid: the edges are those that the faces have, whatever is missing. Faces without a
  * direction can't be among them: no point lies in the plane of two others and the head but by chance. */
 static void edges_of_a_ragged_grid(void **state)
@@ -494,6 +509,7 @@ int main(void)
         cmocka_unit_test(a_sphere_in_a_box_is_closed),
         cmocka_unit_test(the_sphere_has_the_boxs_volume),
         cmocka_unit_test(a_full_turn_closes),
+        cmocka_unit_test(two_columns_do_not_close),
         cmocka_unit_test(edges_of_a_ragged_grid),
         cmocka_unit_test(normals_are_those_of_the_walls),
         cmocka_unit_test(loose_points_are_left_out),
