@@ -392,6 +392,20 @@ static void normals_are_those_of_the_walls(void **state)
     assert_true(normal[0][0] == 0 && normal[0][1] == 0 && normal[0][2] == 0);
 }
 
+/* A point of a floor and a wall three times as large: the mean of their normals, by their areas. */
+static void normals_at_a_corner(void **state)
+{
+    (void)state;
+    static const double p[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 3}};
+    static const uint32_t face[2][3] = {{0, 1, 2}, {0, 3, 1}};
+    float n[4][3];
+    scan_normals(p, 4, face, 2, n);
+    const double length = sqrt(10.0);
+    for (uint32_t i = 0; i < 2; i++)
+        assert_true(fabs((double)n[i][1] - 3.0 / length) < 1e-6 && fabs((double)n[i][2] - 1.0 / length) < 1e-6);
+    assert_true(n[2][2] == 1 && n[3][1] == 1);
+}
+
 static void loose_points_are_left_out(void **state)
 {
     (void)state;
@@ -512,6 +526,7 @@ int main(void)
         cmocka_unit_test(two_columns_do_not_close),
         cmocka_unit_test(edges_of_a_ragged_grid),
         cmocka_unit_test(normals_are_those_of_the_walls),
+        cmocka_unit_test(normals_at_a_corner),
         cmocka_unit_test(loose_points_are_left_out),
         cmocka_unit_test(sparse_counts_by_hand),
         cmocka_unit_test(sparse_points_are_even),
