@@ -114,6 +114,48 @@ static void test_axes(void **state)
     }
 }
 
+static struct beam_line line_at(double turn_deg, double h)
+{
+    return (struct beam_line){.n = {cos(turn_deg * M_PI / 180.0), sin(turn_deg * M_PI / 180.0)}, .h = h};
+}
+
+static double cap(double h)
+{
+    double energy, moment;
+    beam_half(&beam, h, &energy, &moment);
+    return energy;
+}
+
+/* Lines that do not meet in the footprint cut caps off: one within the other, beside each other though they look alike,
+ * or on opposite sides. By the energy beyond a line. */
+static void test_two_caps(void **state)
+{
+    (void)state;
+    static const struct {
+        double turn_deg, h[2];
+        int nested;
+    } is[] = {{0.0, {0.2, 0.5}, 1},
+              {0.0, {0.5, 0.2}, 1},
+              {5.0, {0.1, 0.6}, 1},
+              {80.0, {0.85, 0.85}, 0},
+              {180.0, {0.3, 0.4}, 0}};
+    static struct beam_pattern fine;
+    beam_rings(BEAM_FINE_RINGS, &fine);
+    for (size_t i = 0; i < sizeof is / sizeof is[0]; i++) {
+        const struct beam_line line[2] = {line_at(0.0, is[i].h[0]), line_at(is[i].turn_deg, is[i].h[1])};
+        const int outer = is[i].h[0] > is[i].h[1];
+        struct beam_parts parts;
+        double want[3] = {cap(is[i].h[0]), cap(is[i].h[1]), 0.0};
+        if (is[i].nested) want[outer] -= want[1 - outer];
+        want[2] = 1.0 - want[0] - want[1];
+        assert_int_equal(beam_cut(&beam, &fine, line, 2, 0, &parts), 0);
+        assert_int_equal(parts.n, 3);
+        assert_int_equal(parts.centre, 2);
+        for (int k = 0; k < 3; k++)
+            assert_true(fabs(parts.part[k].energy - want[k]) < 1e-12);
+    }
+}
+
 /* Of more echoes than are asked for the weakest is left out, wherever it comes: what comes back counts, not the energy.
  * Of two as weak the first one goes. The others keep the numbers that they had among all. */
 static void test_crowd(void **state)
@@ -143,6 +185,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_surface_of_many_returns),
         cmocka_unit_test(test_gaps),
+        cmocka_unit_test(test_two_caps),
         cmocka_unit_test(test_crowd),
         cmocka_unit_test(test_at_the_resolution),
         cmocka_unit_test(test_definitions),

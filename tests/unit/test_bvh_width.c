@@ -341,6 +341,28 @@ static void a_sheet_along_the_ray_is_not_met(void **state)
     scene_free(scene);
 }
 
+/* Labels take 16 bits, of which the plane has room for all: 12 and 4, beside the mark of holes. */
+static void labels_of_all_sizes(void **state)
+{
+    (void)state;
+    static const uint16_t label[] = {0, 1, 4095, 4096, 4097, 8191, 12345, 32767, 61440, 65534};
+    enum { N = sizeof label / sizeof label[0] };
+    double v[3 * N][3];
+    uint32_t triangle[N][3];
+    for (uint32_t i = 0; i < 3 * N; i++) {
+        const double p[3] = {i % 3 == 1 ? 1.0 : 0.0, 9.0 + i / 3, i % 3 == 2 ? 1.0 : 0.0};
+        vec3_add(p, ORIGIN, v[i]);
+        triangle[i / 3][i % 3] = i;
+    }
+    struct scene *scene = scene_of((const double(*)[3])v, 3 * N, (const uint32_t(*)[3])triangle, N, NULL);
+    memcpy(scene->label, label, sizeof label);
+    struct bvh *bvh = bvh_of(scene, 0.0);
+    for (uint32_t i = 0; i < N; i++)
+        assert_int_equal(bvh_label(bvh_plane(bvh, i)), label[i]);
+    bvh_free(bvh);
+    scene_free(scene);
+}
+
 /* Two triangles of an edge name its corners in opposite orders: on which side a ray passes is the same number with the
  * other sign, to the last bit. Rays through the edge, where rounding is all there is. */
 static void both_triangles_of_an_edge_agree(void **state)
@@ -369,6 +391,7 @@ int main(void)
         cmocka_unit_test(what_a_ray_begins_on_is_not_met),
         cmocka_unit_test(both_triangles_of_an_edge_agree),
         cmocka_unit_test(sheets_that_cross_at_a_slant),
+        cmocka_unit_test(labels_of_all_sizes),
         cmocka_unit_test(a_sheet_along_the_ray_is_not_met),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,6 +1,8 @@
 /* --set: values changed and elements added on the command line. */
 #include "tests/unit/config_rig.h"
 
+#include <math.h>
+
 static void set_changes_values(void **state)
 {
     (void)state;
@@ -103,12 +105,34 @@ static void a_full_list_takes_no_more(void **state)
     assert_says("--set links[8].type: links has 8 elements; allowed indices 0 to 7");
 }
 
+/* Not given, the tolerance of positions is a thousandth of the plan's, at least 1e-7 m; that of meshes a tenth of it, or
+ * 1 m where the plan's is not given either. */
+static void tolerances_follow_the_plan(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *set[2];
+        int n;
+        double output_m, scene_m;
+    } is[] = {{{NULL}, 0, 1e-6, 1.0},
+              {{"plan.tolerance_m=0.02"}, 1, 2e-5, 2e-3},
+              {{"plan.tolerance_m=1e-5"}, 1, 1e-7, 1e-6},
+              {{"plan.tolerance_m=0.02", "output.tolerance_m=0.003"}, 2, 0.003, 2e-3},
+              {{"plan.tolerance_m=0.02", "scene.tolerance_m=0.004"}, 2, 2e-5, 0.004}};
+    for (size_t i = 0; i < sizeof is / sizeof is[0]; i++) {
+        assert_loads(load_sets(is[i].set, is[i].n));
+        assert_true(fabs(cfg->output.tolerance_m / is[i].output_m - 1.0) < 1e-12);
+        assert_true(fabs(cfg->scene.tolerance_m / is[i].scene_m - 1.0) < 1e-12);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(set_changes_values),
         cmocka_unit_test(set_appends_elements),
         cmocka_unit_test(set_refuses),
+        cmocka_unit_test(tolerances_follow_the_plan),
         cmocka_unit_test(a_full_list_takes_no_more),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

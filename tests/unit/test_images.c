@@ -186,6 +186,33 @@ static void a_channel_of_zeros_is_no_alpha(void **state)
     check_file(write_file("zero.tga", bytes, n), 0, 0);
 }
 
+/* What makes a hole: alpha below the share that counts as solid, just as much is none; of an opacity map the light by Rec.
+ * 601, 0.299, 0.587 and 0.114 of red, green and blue. Texels in a row, each looked at in its middle. */
+static void what_makes_a_hole(void **state)
+{
+    (void)state;
+    static uint8_t by_alpha[4][4] = {{9, 9, 9, 0}, {9, 9, 9, 50}, {9, 9, 9, 51}, {9, 9, 9, 255}};
+    static uint8_t by_light[4][4] = {{0, 0, 0, 255}, {255, 0, 0, 255}, {0, 255, 0, 255}, {0, 0, 255, 255}};
+    static const enum texture_wrap wrap[2] = {TEXTURE_REPEAT, TEXTURE_REPEAT};
+    static const struct {
+        double solid;
+        int light, hole[4];
+    } is[] = {{0.2, 0, {1, 1, 0, 0}},   {0.19, 0, {1, 0, 0, 0}},  {0.298, 1, {1, 0, 0, 1}}, {0.3, 1, {1, 1, 0, 1}},
+              {0.586, 1, {1, 1, 0, 1}}, {0.588, 1, {1, 1, 1, 1}}, {0.113, 1, {1, 0, 0, 0}}};
+    for (size_t i = 0; i < sizeof is / sizeof is[0]; i++) {
+        const struct texture_image image = {
+            .width = 4, .height = 1, .has_alpha = !is[i].light, .rgba = is[i].light ? by_light[0] : by_alpha[0]};
+        struct texture_mask *mask;
+        struct sh_err err;
+        assert_int_equal(texture_mask_create(&image, wrap, is[i].solid, is[i].light, &mask, &err), SH_OK);
+        for (int k = 0; k < 4; k++) {
+            const double uv[2] = {(k + 0.5) / 4.0, 0.5};
+            if (texture_is_hole(mask, uv) != is[i].hole[k]) fail_msg("solid %g, texel %d", is[i].solid, k);
+        }
+        free(mask);
+    }
+}
+
 static void wrap_modes_by_hand(void **state)
 {
     (void)state;
@@ -304,9 +331,12 @@ static void hostile_files_take_no_gigabytes(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(each_format_has_the_same_picture), cmocka_unit_test(unpacked_texels_have_the_same_picture),
-        cmocka_unit_test(a_channel_of_zeros_is_no_alpha),   cmocka_unit_test(wrap_modes_by_hand),
-        cmocka_unit_test(a_hole_is_what_is_below_the_half), cmocka_unit_test(hostile_files_take_no_gigabytes)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(each_format_has_the_same_picture),
+                                       cmocka_unit_test(unpacked_texels_have_the_same_picture),
+                                       cmocka_unit_test(a_channel_of_zeros_is_no_alpha),
+                                       cmocka_unit_test(wrap_modes_by_hand),
+                                       cmocka_unit_test(what_makes_a_hole),
+                                       cmocka_unit_test(a_hole_is_what_is_below_the_half),
+                                       cmocka_unit_test(hostile_files_take_no_gigabytes)};
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

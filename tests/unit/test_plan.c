@@ -8,6 +8,7 @@
 #include <cmocka.h>
 
 #include "core/plan.h"
+#include "core/plan/cost.h"
 
 static const struct plan_tolerance TOLERANCE = {1e-3, 1e-2};
 
@@ -59,6 +60,8 @@ static void test_forced(void **state)
     assert_int_equal(choose(&row, "beam", options, N, 2, "beam.mode"), 2);
     expect(&row, "c", 1, "forced by beam.mode; holds");
     expect_left(&row, 2, "d", "not asked for");
+    assert_int_equal(choose(&row, "beam", options, N, 0, "beam.mode"), 0); /* the first is one, too */
+    expect(&row, "a", 1, "forced by beam.mode; does not hold");
 }
 
 /* By how often the tolerance it is off: a by 2, b by 3, and so a, however close b's ranges come. */
@@ -150,6 +153,29 @@ static void test_sight_pays(void **state)
     choose_sight(&need, &(struct plan_sight_found){.one = 0.5, .few = 0.5}, "none", "a map saves nothing");
 }
 
+/* Rays cost what they do in packets of that width; of one that is not in the table, in those of the next smaller. Rays
+ * that meet nothing have no other costs: what a map saves differs by just that. A nanosecond in 1e9 pulses is left out. */
+static void test_sight_packets(void **state)
+{
+    (void)state;
+    static const uint32_t packet[] = {16, 8, 4, 12};
+    static const struct plan_sight_found sky = {.nothing = 1.0};
+    double saved_ns[4];
+    for (int k = 0; k < 4; k++) {
+        struct plan_sight_need need = SIGHT;
+        struct plan_sight_choice choice;
+        struct plan_row row;
+        need.packet = packet[k];
+        need.forced = 1;
+        plan_sight_choose(&need, &sky, &choice, &row);
+        saved_ns[k] = -row.cost_ns;
+        for (size_t i = 0; i < sizeof plan_ray_costs / sizeof plan_ray_costs[0]; i++)
+            if (plan_ray_costs[i].packet == packet[k] && k > 0)
+                assert_true(fabs(saved_ns[k] - saved_ns[0] - (plan_ray_costs[i].out - plan_ray_costs[0].out)) < 1e-9);
+    }
+    assert_true(saved_ns[0] < saved_ns[1] && saved_ns[1] < saved_ns[2] && saved_ns[3] == saved_ns[1]);
+}
+
 static void test_sight_forced(void **state)
 {
     (void)state;
@@ -198,6 +224,7 @@ int main(void)
         cmocka_unit_test(test_order),
         cmocka_unit_test(test_cast),
         cmocka_unit_test(test_sight_pays),
+        cmocka_unit_test(test_sight_packets),
         cmocka_unit_test(test_sight_forced),
         cmocka_unit_test(test_sight_orders),
     };

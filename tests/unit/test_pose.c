@@ -160,6 +160,17 @@ static void test_straight_up(void **state)
         }
 }
 
+/* A knot counts from its own time on; before the first it is the first. */
+static void test_find_knot(void **state)
+{
+    (void)state;
+    static const struct pose_knot knot[4] = {{.t_ns = 0}, {.t_ns = 10}, {.t_ns = 20}, {.t_ns = 35}};
+    static const int64_t t_ns[] = {-5, 0, 9, 10, 11, 20, 34, 35, 1000};
+    static const size_t want[] = {0, 0, 0, 1, 1, 2, 2, 3, 3};
+    for (size_t i = 0; i < sizeof t_ns / sizeof t_ns[0]; i++)
+        assert_int_equal(pose_find_knot(knot, 4, t_ns[i]), want[i]);
+}
+
 static struct trajectory *along_x(const double *t_s, const double *x_m, size_t n)
 {
     struct pose_sample sample[8] = {{0}};
@@ -412,11 +423,11 @@ static void test_slow_knots(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_short_way),       cmocka_unit_test(test_straight_up),   cmocka_unit_test(test_parabola),
-        cmocka_unit_test(test_pause),           cmocka_unit_test(test_convention),    cmocka_unit_test(test_between),
-        cmocka_unit_test(test_straight_line),   cmocka_unit_test(test_constant_turn), cmocka_unit_test(test_knots),
-        cmocka_unit_test(test_knots_to_an_end), cmocka_unit_test(test_slow_knots),
-        cmocka_unit_test(test_pole),            cmocka_unit_test(test_ends),
+        cmocka_unit_test(test_short_way), cmocka_unit_test(test_find_knot),       cmocka_unit_test(test_straight_up),
+        cmocka_unit_test(test_parabola),  cmocka_unit_test(test_pause),           cmocka_unit_test(test_convention),
+        cmocka_unit_test(test_between),   cmocka_unit_test(test_straight_line),   cmocka_unit_test(test_constant_turn),
+        cmocka_unit_test(test_knots),     cmocka_unit_test(test_knots_to_an_end), cmocka_unit_test(test_slow_knots),
+        cmocka_unit_test(test_pole),      cmocka_unit_test(test_ends),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -336,6 +336,21 @@ static void a_full_turn_closes(void **state)
     }
 }
 
+/* Two columns have nothing between them but the one wall, also where the grid closes. */
+static void two_columns_do_not_close(void **state)
+{
+    (void)state;
+    begin();
+    t.grid.closes = 1;
+    for (uint32_t column = 0; column < 2; column++) {
+        add_column(column, 0);
+        for (uint32_t row = 0; row < 5; row++)
+            add_in_box(row, 2 * PI * column / 36, 0.1 * row);
+    }
+    make(0);
+    assert_int_equal(t.faces.n_faces, 4 * 2);
+}
+
 /* Points at random places of the grid: the edges are those that the faces have, whatever is missing. Faces without a
  * direction can't be among them: no point lies in the plane of two others and the head but by chance. */
 static void edges_of_a_ragged_grid(void **state)
@@ -375,6 +390,20 @@ static void normals_are_those_of_the_walls(void **state)
     make(1.18);
     scan_normals(t.grid.xyz_m, t.grid.n_points, (const uint32_t(*)[3])t.faces.face, t.faces.n_faces, normal);
     assert_true(normal[0][0] == 0 && normal[0][1] == 0 && normal[0][2] == 0);
+}
+
+/* A point of a floor and a wall three times as large: the mean of their normals, by their areas. */
+static void normals_at_a_corner(void **state)
+{
+    (void)state;
+    static const double p[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 3}};
+    static const uint32_t face[2][3] = {{0, 1, 2}, {0, 3, 1}};
+    float n[4][3];
+    scan_normals(p, 4, face, 2, n);
+    const double length = sqrt(10.0);
+    for (uint32_t i = 0; i < 2; i++)
+        assert_true(fabs((double)n[i][1] - 3.0 / length) < 1e-6 && fabs((double)n[i][2] - 1.0 / length) < 1e-6);
+    assert_true(n[2][2] == 1 && n[3][1] == 1);
 }
 
 static void loose_points_are_left_out(void **state)
@@ -494,8 +523,10 @@ int main(void)
         cmocka_unit_test(a_sphere_in_a_box_is_closed),
         cmocka_unit_test(the_sphere_has_the_boxs_volume),
         cmocka_unit_test(a_full_turn_closes),
+        cmocka_unit_test(two_columns_do_not_close),
         cmocka_unit_test(edges_of_a_ragged_grid),
         cmocka_unit_test(normals_are_those_of_the_walls),
+        cmocka_unit_test(normals_at_a_corner),
         cmocka_unit_test(loose_points_are_left_out),
         cmocka_unit_test(sparse_counts_by_hand),
         cmocka_unit_test(sparse_points_are_even),

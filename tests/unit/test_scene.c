@@ -184,6 +184,22 @@ static void a_huge_list_is_refused(void **state)
     refuse("huge.ply", data, n + 24, expected);
 }
 
+/* Bounds are those of all corners in use, the first one of a triangle too; a vertex that nobody uses is none. */
+static void bounds_are_of_all_corners(void **state)
+{
+    (void)state;
+    static const double v[4][3] = {{-7, 3, 0}, {1, 8, -2}, {0, 5, 9}, {50, 50, 50}};
+    for (uint32_t first = 0; first < 3; first++) {
+        const uint32_t t[1][3] = {{first, (first + 1) % 3, (first + 2) % 3}};
+        struct scene *s;
+        struct sh_err err;
+        assert_int_equal(scene_from_arrays(&(struct scene_arrays){v, 4, t, 1, NULL, NULL, 0}, &s, &err), SH_OK);
+        assert_true(s->min_m[0] == -7 && s->min_m[1] == 3 && s->min_m[2] == -2);
+        assert_true(s->max_m[0] == 1 && s->max_m[1] == 8 && s->max_m[2] == 9);
+        scene_free(s);
+    }
+}
+
 static void arrays_become_a_scene(void **state)
 {
     (void)state;
@@ -235,10 +251,11 @@ static void arrays_become_a_scene(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(axes_scale_offset),      cmocka_unit_test(files_add_up),
-        cmocka_unit_test(zero_area_is_counted),   cmocka_unit_test(long_names_are_cut),
-        cmocka_unit_test(surfaces_have_a_limit),  cmocka_unit_test(malformed_files_are_refused),
-        cmocka_unit_test(a_huge_list_is_refused), cmocka_unit_test(arrays_become_a_scene),
+        cmocka_unit_test(axes_scale_offset),         cmocka_unit_test(files_add_up),
+        cmocka_unit_test(zero_area_is_counted),      cmocka_unit_test(long_names_are_cut),
+        cmocka_unit_test(surfaces_have_a_limit),     cmocka_unit_test(malformed_files_are_refused),
+        cmocka_unit_test(a_huge_list_is_refused),    cmocka_unit_test(arrays_become_a_scene),
+        cmocka_unit_test(bounds_are_of_all_corners),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

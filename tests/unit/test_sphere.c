@@ -192,6 +192,56 @@ static void a_change_across_zero(void **state)
     free(e);
 }
 
+/* A change in the middle of a frame leaves the frame its rings: ring n is still ring n mod their number. */
+static void a_change_keeps_the_frame(void **state)
+{
+    (void)state;
+    const struct window w = {10 * DEG, -90 * DEG, 90 * DEG, 0, 360 * DEG, 36, 18};
+    struct emitter *e = malloc(sizeof *e);
+    struct schedule_segment seg;
+    struct schedule_line line;
+    begin(&w, e, &seg);
+    const uint64_t end = seg.end_pulse;
+    for (uint64_t k = 100; k < 1300; k += 400) {
+        schedule_change(&seg, &seg, &seg.spec, k);
+        assert_int_equal(seg.end_pulse, end);
+        for (uint64_t n = k / 36; n < 38; n++) {
+            schedule_get_line(&seg, n, &line);
+            assert_int_equal(line.frame, n / 19);
+            assert_int_equal(line.last_of_frame, n % 19 == 18);
+            assert_true(deviation(schedule_mirror_turn(&seg, line.cast0), ((double)(n % 19) * 10.0 - 90.0) / 360.0) <
+                        1e-15);
+        }
+    }
+    free(e);
+}
+
+/* A planar head whose rotor turns either way: the steps of a run lie where those of its pulses do, one by one. */
+static void steps_of_a_planar_run(void **state)
+{
+    (void)state;
+    struct emitter *e = malloc(sizeof *e);
+    for (int turn = -1; turn <= 1; turn += 2) {
+        struct schedule_segment seg;
+        struct schedule_line line;
+        struct schedule_run run;
+        emitter_set_planar(e, 36, 3, 32, 18, turn);
+        const struct schedule_spec spec = {
+            .prr_uhz = 360 * DEG, .lines_uhz = 10 * DEG, .sweep_udeg = TURN, .line_stop_udeg = TURN, .emitter = e};
+        schedule_start(&seg, &spec);
+        schedule_get_line(&seg, 2, &line);
+        assert_int_equal(line.cast0, 2 * 36 + 3);
+        assert_int_equal(line.cast_end, 2 * 36 + 33);
+        schedule_get_run(&seg, &line, line.cast0, 30, &run);
+        for (uint32_t j = 0; j < 30; j++) {
+            const double pan_turn = run.pan0_turn + (run.in_line + j) * run.pan_step_turn;
+            assert_true(deviation(pan_turn, turn * ((int)j - 15) / 36.0) < 4 * 0x1p-52);
+            assert_true(deviation(schedule_pan_turn(&seg, line.cast0 + j), pan_turn) < 4 * 0x1p-52);
+        }
+    }
+    free(e);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -199,6 +249,8 @@ int main(void)
         cmocka_unit_test(circles),
         cmocka_unit_test(limits_between_rings_are_refused),
         cmocka_unit_test(a_change_across_zero),
+        cmocka_unit_test(a_change_keeps_the_frame),
+        cmocka_unit_test(steps_of_a_planar_run),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -201,13 +201,33 @@ static void a_soiled_window_makes_ranges_noisy(void **state)
     cast_rig_close(rig);
 }
 
+/* A laser that is dark: all shots are empty, and the encoders read on. */
+static void a_dark_laser_has_no_echo(void **state)
+{
+    (void)state;
+    struct cast_rig *rig = cast_rig_open(box_scene(LO, HI), CENTRE);
+    const struct cast_upset upset = {.dark = 1, .share = 1.0};
+    struct line_block clean, dark;
+    struct schedule_line line;
+    keep(rig, &clean);
+    rig->setup.upset = &upset;
+    keep(rig, &dark);
+    assert_int_equal(cast_line(rig, LINE, &line), 0);
+    for (uint32_t i = 0; i < clean.n_points; i++) {
+        assert_true(clean.a[i] > 0 && dark.a[i] == 0 && dark.b[i] == clean.b[i] && dark.c[i] == clean.c[i]);
+        assert_true(rig->block.echo[i] == 0 && rig->block.label[i] == LINE_LABEL_NONE);
+    }
+    line_block_free(&clean);
+    line_block_free(&dark);
+    cast_rig_close(rig);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_slipped_pan_of_any_head),
-        cmocka_unit_test(positions_follow_the_encoders),
-        cmocka_unit_test(a_soiled_window_is_a_weaker_signal),
-        cmocka_unit_test(a_soiled_window_makes_ranges_noisy),
+        cmocka_unit_test(a_slipped_pan_of_any_head),          cmocka_unit_test(positions_follow_the_encoders),
+        cmocka_unit_test(a_soiled_window_is_a_weaker_signal), cmocka_unit_test(a_soiled_window_makes_ranges_noisy),
+        cmocka_unit_test(a_dark_laser_has_no_echo),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
