@@ -62,10 +62,19 @@ take_objects() {
     (cd "$build" && find test -type f ! -perm -100 -print0 | tar --null -T - -cf -) | tar -xf - -C "$1/build"
 }
 
-# take_back PATCH: with a new date, as above.
-take_back() {
+# put_in PATCH: what it changes is kept beside the tree.
+put_in() {
     local file
-    for file in $(mutants_touched "$work/patches/$1"); do cp "$file" "$tree/$file" || exit 1; done
+    rm -rf "$work/before"
+    for file in $(mutants_touched "$work/patches/$1"); do
+        mkdir -p "$work/before/$(dirname "$file")" && cp "$tree/$file" "$work/before/$file" || return 1
+    done
+    (cd "$tree" && patch -p1 --fuzz=0 --no-backup-if-mismatch --force) <"$work/patches/$1" >"$log" 2>&1
+}
+
+# take_back: with a new date, as above.
+take_back() {
+    cp -r "$work/before/." "$tree/" || exit 1
 }
 
 # ---- building and running in it; what they print goes to $log
@@ -175,8 +184,7 @@ clean_tests() {
 judge() {
     local name limit_s ran=0
     state=broken
-    (cd "$tree" && patch -p1 --fuzz=0 --no-backup-if-mismatch --force) \
-        <"$work/patches/$1" >"$log" 2>&1 || { detail="it does not apply: $log" && return; }
+    put_in "$1" || { detail="it does not apply: $log" && return; }
     build_it $([ -n "$2" ] && targets_of $2 || echo all) || { detail="it does not compile: $log" && return; }
     if [ -n "$3" ]; then state=argued detail=$3 && return; fi
     for name in $2; do
@@ -242,7 +250,7 @@ one() {
     log=$work/logs/$short.log
     key=$(key_of "$work/patches/$1" $2)
     judge "$@"
-    take_back "$1"
+    take_back
     [ $state != suspected ] || confirm
     case $state in
     found | argued | missed)
