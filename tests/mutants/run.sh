@@ -62,10 +62,19 @@ take_objects() {
     (cd "$build" && find test -type f ! -perm -100 -print0 | tar --null -T - -cf -) | tar -xf - -C "$1/build"
 }
 
-# take_back PATCH: with a new date, as above.
-take_back() {
+# put_in PATCH: what it changes is kept beside the tree.
+put_in() {
     local file
-    for file in $(mutants_touched "$1"); do cp "$file" "$tree/$file" || exit 1; done
+    rm -rf "$work/before"
+    for file in $(mutants_touched "$work/patches/$1"); do
+        mkdir -p "$work/before/$(dirname "$file")" && cp "$tree/$file" "$work/before/$file" || return 1
+    done
+    (cd "$tree" && patch -p1 --fuzz=0 --no-backup-if-mismatch --force) <"$work/patches/$1" >"$log" 2>&1
+}
+
+# take_back: with a new date, as above.
+take_back() {
+    cp -r "$work/before/." "$tree/" || exit 1
 }
 
 # ---- building and running in it; what they print goes to $log
@@ -113,10 +122,10 @@ run_test() {
 
 # ---- what results depend on
 
-# A hash of each source, once.
+# A hash of each source, once. What the page's scripts use is theirs alone.
 hash_sources() {
     find $parts -type f ! -path 'tests/mutants/*' -print0 | LC_ALL=C sort -z | xargs -0 sha256sum >"$work/sources"
-    grep -v -E ' tests/([a-z]+/test_[^/]*\.c|check_[^/]*\.sh)$' "$work/sources" >"$work/shared"
+    grep -v -E ' tests/([a-z]+/test_[^/]*\.c|check_[^/]*\.sh|unit/page_.*|page/.*)$' "$work/sources" >"$work/shared"
     everything=$(sha256sum <"$work/sources")
 }
 
@@ -124,7 +133,13 @@ hash_sources() {
 key_of() {
     local file=$1 source
     shift
-    { cat "$file" "$work/shared"; for source in $(for_each_source "$@"); do grep -F "  $source" "$work/sources"; done; } | sha256sum
+    {
+        cat "$file" "$work/shared"
+        for source in $(for_each_source "$@"); do
+            grep -F "  $source" "$work/sources"
+            case $source in *.sh) grep -E ' tests/(unit/page_.*|page/.*)$' "$work/sources" ;; esac
+        done
+    } | sha256sum
 }
 
 # ---- the tests without a fault
@@ -169,7 +184,7 @@ clean_tests() {
 judge() {
     local name limit_s ran=0
     state=broken
-    (cd "$tree" && patch -p1 --fuzz=0 --no-backup-if-mismatch --force) <"$1" >"$log" 2>&1 || { detail="it does not apply: $log" && return; }
+    put_in "$1" || { detail="it does not apply: $log" && return; }
     build_it $([ -n "$2" ] && targets_of $2 || echo all) || { detail="it does not compile: $log" && return; }
     if [ -n "$3" ]; then state=argued detail=$3 && return; fi
     for name in $2; do
@@ -221,21 +236,21 @@ confirm() {
 # known FILE TESTS: sets state and detail as the last run left them, where nothing has changed since.
 known() {
     local key was whole
-    key=$(key_of "$1" $2)
+    key=$(key_of "$work/patches/$1" $2)
     state= detail=
-    [ -e "$work/results/$(basename "$1" .patch)" ] || return
-    read -r was whole state detail <"$work/results/$(basename "$1" .patch)"
+    [ -e "$work/results/${1%.patch}" ] || return
+    read -r was whole state detail <"$work/results/${1%.patch}"
     [ "$was" = "${key%% *}" ] && { [ $state != missed ] || [ $all = no ] || [ "$whole" = "${everything%% *}" ]; } || state=
 }
 
 # one FILE TESTS ARGUED: by trying.
 one() {
     local key short
-    short=$(basename "$1" .patch)
+    short=${1%.patch}
     log=$work/logs/$short.log
-    key=$(key_of "$1" $2)
+    key=$(key_of "$work/patches/$1" $2)
     judge "$@"
-    take_back "$1"
+    take_back
     [ $state != suspected ] || confirm
     case $state in
     found | argued | missed)
@@ -253,7 +268,7 @@ read_list() {
         done
         [ -z "$wrong" ] || tests=
         files+=("$file") faults+=("$fault") tests_of+=("$tests") argued_of+=("$argued") wrong_of+=("$wrong")
-    done < <(mutants_list tests/mutants/$pattern.patch)
+    done < <(cd "$work/patches" && mutants_list $pattern.patch)
 }
 
 # ---- the end
@@ -276,14 +291,17 @@ finish() {
     local status i
     for state in missed broken skipped; do
         for ((i = 0; i < ${#files[@]}; i++)); do
-            [ "${states[i]}" != $state ] || echo "${state/missed/not found}: ${files[i]}: ${faults[i]} (${details[i]})"
+            [ "${states[i]}" != $state ] || echo "${state/missed/not found}: ${files[i]%.patch}: ${faults[i]} (${details[i]})"
         done
     done
-    for ((i = 0; i < ${#files[@]}; i++)); do echo "${states[i]} $(basename "${files[i]}")"; done | awk -v least=$least_percent "$table"
+    for ((i = 0; i < ${#files[@]}; i++)); do echo "${states[i]} ${files[i]}"; done | awk -v least=$least_percent "$table"
 }
 
+# As they are now: nobody waits with changes until this ends.
+rm -rf "$work/patches"
+cp -r tests/mutants "$work/patches" || exit 1
 read_list
-[ -e "${files[0]}" ] || { echo "no patch tests/mutants/$pattern.patch" >&2; exit 2; }
+[ -e "$work/patches/${files[0]}" ] || { echo "no patch tests/mutants/$pattern.patch" >&2; exit 2; }
 same_tree || { echo "no copy of the tree in $tree" >&2; exit 1; }
 hash_sources
 states=() details=() unknown=0
@@ -301,7 +319,7 @@ for ((i = 0; i < ${#files[@]}; i++)); do
     one "${files[i]}" "${tests_of[i]}" "${argued_of[i]}"
     states[i]=$state details[i]=$detail
     took_ms=$(($(date +%s%3N) - start))
-    printf '[%3d/%d] %-9s %s: %s, %d.%d s\n' $n $unknown "${state/missed/not found}" "$(basename "${files[i]}" .patch)" "$detail" \
+    printf '[%3d/%d] %-9s %s: %s, %d.%d s\n' $n $unknown "${state/missed/not found}" "${files[i]%.patch}" "$detail" \
         $((took_ms / 1000)) $((took_ms % 1000 / 100))
 done
 finish

@@ -6,6 +6,8 @@ import fs from 'node:fs';
 import {crc32c, Decoder, Parser, LOCAL, REPEAT, TYPES} from '../../drivers/link/web/native.js';
 import {Losses} from '../../drivers/link/web/losses.js';
 import {CommandError, Replies} from '../../drivers/link/web/replies.js';
+import {PointHash} from '../../drivers/link/web/native_points.js';
+import {Poses} from '../../drivers/link/web/native_poses.js';
 import {fitCubic, geodeticToEcef, gridOf, toScene} from '../../drivers/link/web/native_earth.js';
 import {runTests, test} from './page_tap.mjs';
 
@@ -287,6 +289,28 @@ test('points before their anchor are counted and not placed', () => {
 });
 
 // ---- replies
+
+test('the hash of points: pulse numbers of more than 32 bits go on', () => {
+  const of = (n, low, high, from = 0) => {
+    const hash = new PointHash(), view = new DataView(new ArrayBuffer(40 + 40));
+    for (let i = 0; i < 2; i++) {
+      view.setUint32(40 + 20 * i, 1000 + from + i, true);
+      view.setUint32(40 + 20 * i + 16, 0x11000000, true); // echo 1 of 1: a pulse of its own
+    }
+    hash.add(view, n, low, high);
+    return [hash.a, hash.b];
+  };
+  const both = of(2, -1, 0), first = of(1, -1, 0), second = of(1, 0, 1, 1);
+  both.forEach((sum, i) => equal(sum, (first[i] + second[i]) | 0, `sum ${i}`));
+});
+
+test('poses: from the first to the last of a frame, both included', () => {
+  const poses = new Poses(), quat = [1, 0, 0, 0];
+  poses.add([{t_ns: 0n, position_m: [0, 0, 0], quat}, {t_ns: 1000n, position_m: [2, 0, 0], quat}]);
+  const c = {n: 4, x: new Float64Array(4), y: new Float64Array(4), z: new Float64Array(4)};
+  equal(poses.place(c, 0, (i) => [0, 500, 1000, 1001][i]), 1, 'points without a pose');
+  [0, 1, 2, NaN].forEach((x, i) => equal(c.x[i], x, `x of point ${i}`));
+});
 
 test('replies in order; an ERR; out of step after one that did not come', async () => {
   const sent = [], replies = new Replies((line) => sent.push(line));

@@ -6,6 +6,15 @@
 #include "drivers/record/outfile.h"
 #include "tests/unit/repair_rig.h"
 
+/* A row that never came to the disk is zeros; one of other bytes that are all alike did. */
+static void test_zeros(void **state)
+{
+    static const uint8_t none[5], some[5] = {0, 0, 0, 0, 1}, first[5] = {1}, alike[5] = {7, 7, 7, 7, 7};
+    (void)state;
+    assert_true(repair_is_zero(none, 5));
+    assert_true(!repair_is_zero(some, 5) && !repair_is_zero(first, 5) && !repair_is_zero(alike, 5));
+}
+
 /* Which file is meant, and that none is replaced. */
 static void test_names(void **state)
 {
@@ -172,6 +181,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_names),        cmocka_unit_test(test_not_ours),
                                        cmocka_unit_test(test_moving_poses), cmocka_unit_test(test_full_for_a_while),
-                                       cmocka_unit_test(test_stopped),      cmocka_unit_test(test_save)};
+                                       cmocka_unit_test(test_stopped),      cmocka_unit_test(test_save),
+                                       cmocka_unit_test(test_zeros)};
     return cmocka_run_group_tests(tests, repair_set_up, repair_tear_down);
 }

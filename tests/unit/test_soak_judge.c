@@ -214,6 +214,15 @@ static void test_duplicates_and_late_frames(void **state)
         assert_int_equal(row->noticed, right);
         end(soak);
 
+        soak = make(); /* two copies were sent: a third one is as wrong as none */
+        row = inject(soak, FAULT_DUPLICATE, 2, 0, "");
+        see(soak, HIT, 0, 0.0);
+        for (int i = 0; i < (right ? 2 : 3); i++)
+            notice(soak, SCANHEAD_NOTICE_REPEATED, HIT, 1);
+        assert_int_equal(finish(soak) == 0, right);
+        assert_int_equal(row->noticed, right);
+        end(soak);
+
         soak = make();
         row = inject(soak, FAULT_REORDER, 1, 0, "");
         notice(soak, SCANHEAD_NOTICE_GAP, HIT, 1);
@@ -242,6 +251,22 @@ static void test_bytes(void **state)
         see(soak, HIT, 0, 0.0);
         assert_int_equal(finish(soak) == 0, i == 0);
         assert_int_equal(row->noticed, i != 1);
+        end(soak);
+    }
+}
+
+/* Of a frame that was cut to 30 bytes, 30 are bad ones, and no more. */
+static void test_cut_bytes(void **state)
+{
+    (void)state;
+    static const uint64_t n[] = {30, 29, NATIVE_HEADER_LEN + PAYLOAD};
+    for (size_t i = 0; i < sizeof n / sizeof *n; i++) {
+        struct soak *soak = make();
+        struct soak_row *row = inject(soak, FAULT_TRUNCATE, 18, 0, "");
+        notice(soak, SCANHEAD_NOTICE_BAD_PAYLOAD, HIT, n[i]);
+        notice(soak, SCANHEAD_NOTICE_GAP, HIT, 1);
+        assert_int_equal(finish(soak) == 0, i == 0);
+        assert_int_equal(row->noticed, 1);
         end(soak);
     }
 }
@@ -310,9 +335,13 @@ static void test_numbers_wrap(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_a_clean_stream_is_good), cmocka_unit_test(test_a_drop),
-        cmocka_unit_test(test_a_resealed_flip),        cmocka_unit_test(test_duplicates_and_late_frames),
-        cmocka_unit_test(test_bytes),                  cmocka_unit_test(test_connections),
+        cmocka_unit_test(test_a_clean_stream_is_good),
+        cmocka_unit_test(test_a_drop),
+        cmocka_unit_test(test_a_resealed_flip),
+        cmocka_unit_test(test_duplicates_and_late_frames),
+        cmocka_unit_test(test_bytes),
+        cmocka_unit_test(test_cut_bytes),
+        cmocka_unit_test(test_connections),
         cmocka_unit_test(test_boots),
         cmocka_unit_test(test_numbers_wrap),
     };

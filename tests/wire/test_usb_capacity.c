@@ -61,8 +61,28 @@ static void test_capacity(void **state)
     }
 }
 
+/* A sphere of 0.1 deg steps, 1,000 rings a second: 3.6 MHz, of which those from 350 to 10 deg are sent: 200,000 points, 4 MB
+ * a second. */
+static void test_across_azimuth_0(void **state)
+{
+    struct wire *wire = *state;
+    char *err;
+    room_write(wire);
+    wire_write_text(wire, "config.yaml",
+                    "head: {profile: sphere, step_deg: 0.1, lines_hz: 1000, line_start_deg: 350, line_stop_deg: 10}\n"
+                    "scene:\n  meshes:\n    - {file: room.obj, up: z, scale: 1}\n"
+                    "stations:\n  - {position_m: [0, 0, 0]}\n"
+                    "links: [{type: usb, port: 0, speed: full}]\n");
+    assert_int_equal(run(wire, &err), 2);
+    if (strstr(err, "the stream has 4.00 MB/s, the link carries 1.22 MB/s") == NULL) fail_msg("%s", err);
+    free(err);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test_setup_teardown(test_capacity, wire_setup, wire_teardown)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_capacity, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_across_azimuth_0, wire_setup, wire_teardown),
+    };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -215,11 +215,18 @@ static void figures_are_those_of_the_report(void **state)
     struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
     char *quality = scan_from(&head, sh, 1, 1);
     check_figures(quality, report);
+    const double first = number(quality, "\"name\":\"first\"", "seen_share");
+    same("seen by the first", number(quality, "\"coverage\"", "share"), first, 0);
     free(quality);
     /* The second station's scan starts anew, and coverage goes on. */
     quality = scan_from(&head, sh, 2, 2);
     same("station", number(quality, "{", "station"), 2, 0);
     same("points of the first", number(quality, "\"name\":\"first\"", "points"), number(report, "{", "points"), 0);
+    /* Each sees some of it, together they see more than either, and no more than both. */
+    const double second = number(quality, "\"name\":\"second\"", "seen_share");
+    const double both = number(quality, "\"coverage\"", "share");
+    same("seen by the first, still", number(quality, "\"name\":\"first\"", "seen_share"), first, 0);
+    assert_true(first > 0.3 && second > 0.3 && both >= fmax(first, second) && both < first + second);
     check_coverage(wire, config, quality);
     free(quality);
     check_move(&head, sh);

@@ -1,0 +1,77 @@
+/* The counts of a recording: what a scan lost on its way, and scans whose end did not come. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <cmocka.h>
+
+#include "drivers/protocol/native_encode.h"
+#include "firmware_sim/app/record/recording_counts.h"
+
+static enum recording_news points(struct recording_counts *c, uint32_t n_pulses)
+{
+    const struct scanhead_frame frame = {.type = SCANHEAD_POINTS, .n_pulses = n_pulses};
+    return recording_count(c, &frame, 0);
+}
+
+static enum recording_news event(struct recording_counts *c, uint32_t code, uint64_t a, uint64_t b, uint64_t lost)
+{
+    const struct scanhead_frame frame = {.type = SCANHEAD_EVENT, .event = code, .event_value = {a, b, lost}};
+    return recording_count(c, &frame, 0);
+}
+
+static enum recording_news descriptor(struct recording_counts *c, uint32_t scan)
+{
+    static uint8_t raw[4096];
+    const struct native_descriptor d = {.idn = "a,b,c,d", .profile = "x", .layout = NATIVE_POLAR, .scan = scan};
+    const size_t len = native_encode_descriptor(raw, sizeof raw, &d, 1, 0);
+    assert_true(len > NATIVE_HEADER_LEN);
+    const struct scanhead_frame frame = {
+        .type = SCANHEAD_DESCRIPTOR, .payload = raw + NATIVE_HEADER_LEN, .payload_len = len - NATIVE_HEADER_LEN};
+    return recording_count(c, &frame, 0);
+}
+
+/* 100 pulses came, the head left out 50 for a slow reader, and lost 10 itself, of 200 that it fired. */
+static void test_left_out(void **state)
+{
+    struct recording_counts c = {0};
+    (void)state;
+    event(&c, SCANHEAD_EV_SCAN_START, 1, 0, 0);
+    points(&c, 60);
+    event(&c, SCANHEAD_EV_READER_LOST, 3, 50, 0);
+    event(&c, SCANHEAD_EV_OVERRUN, 60, 10, 0);
+    points(&c, 40);
+    assert_int_equal(event(&c, SCANHEAD_EV_SCAN_END, 1, 200, 10), RECORDING_SCAN_OVER);
+    assert_true(c.scans == 1 && c.pulses == 100 && c.fired == 200);
+    assert_true(c.cast == 160 && c.lost == 10 && c.left_out == 50 && c.missing == 50);
+    /* the next one has none of it */
+    event(&c, SCANHEAD_EV_SCAN_START, 2, 0, 0);
+    points(&c, 70);
+    event(&c, SCANHEAD_EV_SCAN_END, 2, 70, 0);
+    assert_true(c.scans == 2 && c.cast == 230 && c.missing == 50);
+}
+
+/* Frames of another scan: the end of the one before was lost, also where a head that started again counts from 1. */
+static void test_end_lost(void **state)
+{
+    static const uint32_t next[] = {2, 7, 1};
+    (void)state;
+    for (size_t i = 0; i < sizeof next / sizeof next[0]; i++) {
+        const uint32_t first = next[i] == 1 ? 5 : 1;
+        struct recording_counts c = {0};
+        assert_int_equal(descriptor(&c, first), RECORDING_NOTHING);
+        points(&c, 100);
+        assert_int_equal(descriptor(&c, first), RECORDING_NOTHING); /* said again */
+        assert_int_equal(descriptor(&c, next[i]), RECORDING_END_LOST);
+        assert_true(c.scans == 1 && c.cast == 100 && c.missing == 0);
+        points(&c, 10);
+        assert_int_equal(event(&c, SCANHEAD_EV_SCAN_END, next[i], 20, 0), RECORDING_SCAN_OVER);
+        assert_true(c.scans == 2 && c.pulses == 110 && c.fired == 20);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_left_out), cmocka_unit_test(test_end_lost)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
