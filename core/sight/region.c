@@ -362,8 +362,11 @@ int build_region(struct build_shared *b, struct build_work *w, uint32_t region)
     if (!b->seen[region]) return SH_OK;
     int rc = gather(b, w, region, d.face, &fits);
     if (rc != SH_OK) return rc;
-    struct seen seen = {
-        .list = w->stack, .n = (uint32_t)w->n, .above = w->n > 0 ? w->stack + w->n : w->stack, .cover = NO_CANDIDATE, .own_leaf = NO_LEAF};
+    struct seen seen = {.list = w->stack,
+                        .n = (uint32_t)w->n,
+                        .above = w->n > 0 ? w->stack + w->n : w->stack,
+                        .cover = NO_CANDIDATE,
+                        .own_leaf = NO_LEAF};
     seen.leaf = &seen.own_leaf;
     if (fits)
         divide(&d, &all, &seen);
