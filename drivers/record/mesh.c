@@ -123,7 +123,7 @@ static int finish_grid(struct mesh_recorder *m, struct scan_faces *faces, struct
     if (every > m->every) m->every = every;
     if (rc == SH_OK) rc = drop_loose(m, faces, err);
     if (rc == SH_OK) rc = add_faces(m, faces, err);
-    if (rc == SH_OK && is_textured(m)) {
+    if (rc == SH_OK && is_textured(m) && faces->n_faces > 0) {
         struct sh_err why = {0};
         rc = fail_with_path(m, mesh_texture_unwrap(g, &m->points, m->face + first_face, faces->n_faces, &why), &why,
                             err);
