@@ -123,7 +123,7 @@ static int finish_grid(struct mesh_recorder *m, struct scan_faces *faces, struct
     if (every > m->every) m->every = every;
     if (rc == SH_OK) rc = drop_loose(m, faces, err);
     if (rc == SH_OK) rc = add_faces(m, faces, err);
-    if (rc == SH_OK && is_textured(m)) {
+    if (rc == SH_OK && is_textured(m) && faces->n_faces > 0) {
         struct sh_err why = {0};
         rc = fail_with_path(m, mesh_texture_unwrap(g, &m->points, m->face + first_face, faces->n_faces, &why), &why,
                             err);
@@ -321,6 +321,6 @@ static void mesh_release(void *rec)
         .begin = mesh_begin, .finish = mesh_finish, .release = mesh_release, .repair = REPAIR                 \
     }
 
-const struct recorder_ops recorder_mesh_ply = MESH_OPS(".ply", mesh_ply_repair), recorder_obj = MESH_OPS(".obj", obj_repair),
-                          recorder_gltf = MESH_OPS(".gltf", NULL), recorder_glb = MESH_OPS(".glb", NULL),
-                          recorder_fbx = MESH_OPS(".fbx", NULL);
+const struct recorder_ops recorder_mesh_ply = MESH_OPS(".ply", mesh_ply_repair),
+                          recorder_obj = MESH_OPS(".obj", obj_repair), recorder_gltf = MESH_OPS(".gltf", NULL),
+                          recorder_glb = MESH_OPS(".glb", NULL), recorder_fbx = MESH_OPS(".fbx", NULL);
