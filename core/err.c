@@ -3,6 +3,13 @@
 #include <stdarg.h>
 #include <stdio.h>
 
+/* A name from a file, or a path, may have any bytes: line ends, and what a terminal takes for a command. */
+static void keep_line(char *text)
+{
+    for (char *c = text; *c != '\0'; c++)
+        if ((unsigned char)*c < ' ' || *c == 0x7f) *c = '?';
+}
+
 int sh_fail(struct sh_err *err, int code, const char *fmt, ...)
 {
     if (err == NULL) return code;
@@ -10,6 +17,7 @@ int sh_fail(struct sh_err *err, int code, const char *fmt, ...)
     va_start(ap, fmt);
     vsnprintf(err->text, sizeof err->text, fmt, ap);
     va_end(ap);
+    keep_line(err->text);
     err->code = code;
     return code;
 }
@@ -22,6 +30,7 @@ void sh_warn(const struct sh_report *report, const char *fmt, ...)
     va_start(ap, fmt);
     vsnprintf(text, sizeof text, fmt, ap);
     va_end(ap);
+    keep_line(text);
     report->warn(report->ctx, text);
 }
 

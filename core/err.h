@@ -28,7 +28,7 @@ struct sh_err {
 };
 
 /* Fills err (which may be NULL) and returns code, so that `return sh_fail(err, SH_EINPUT, ...)` reads well.
- * A text too long for the buffer is cut at its end. */
+ * A text too long for the buffer is cut at its end. Control characters become question marks, here and in sh_warn. */
 int sh_fail(struct sh_err *err, int code, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
 
 /* Where long work reports to. Each member may be NULL. Called from the thread that does the work. */

@@ -34,7 +34,7 @@ static int read_whole(struct text *t, FILE *f, text_progress *progress, void *ct
 void text_keep_line(char *message)
 {
     for (char *c = message; *c != '\0'; c++)
-        if ((unsigned char)*c < ' ') *c = '?';
+        if ((unsigned char)*c < ' ' || *c == 0x7f) *c = '?';
 }
 
 int text_fail(const struct text *t, uint64_t line, int code, struct sh_err *err, const char *fmt, ...)

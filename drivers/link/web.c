@@ -174,6 +174,14 @@ static int send_message(struct web_session *s, struct lws *wsi)
     return n < 0 ? -1 : 0;
 }
 
+/* "h2c" would be HTTP/2. The callback's own pointer to the field is of no use: libwebsockets 4.1 has answered an upgrade that
+ * it doesn't know already, has freed the fields, and calls all the same. */
+static int is_websocket(struct lws *wsi)
+{
+    char what[16];
+    return lws_hdr_copy(wsi, what, sizeof what, WSI_TOKEN_UPGRADE) > 0 && strcasecmp(what, "websocket") == 0;
+}
+
 /* HTTP and WebSocket. user: struct web_conn of the connection. */
 static int web_callback(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t len)
 {
@@ -193,8 +201,8 @@ static int web_callback(struct lws *wsi, enum lws_callback_reasons reason, void 
     case LWS_CALLBACK_CLOSED_HTTP:
         if (conn != NULL) web_http_end(conn);
         return 0;
-    case LWS_CALLBACK_HTTP_CONFIRM_UPGRADE: /* before a protocol is chosen; "h2c" would be HTTP/2 */
-        return strcasecmp(in, "websocket") == 0 && web_may_upgrade(web_link_of(wsi), wsi) ? 0 : -1;
+    case LWS_CALLBACK_HTTP_CONFIRM_UPGRADE: /* before a protocol is chosen */
+        return is_websocket(wsi) && web_may_upgrade(web_link_of(wsi), wsi) ? 0 : -1;
     case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:
         return web_may_upgrade(web_link_of(wsi), wsi) ? 0 : -1;
     case LWS_CALLBACK_ESTABLISHED:

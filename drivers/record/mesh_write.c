@@ -142,6 +142,7 @@ static int write_sparse(struct mesh_recorder *m, struct sh_err *err)
     size_t face = 0;
     for (size_t i = 0; rc == SH_OK && i < m->n_parts; i++) {
         const struct part *p = &m->part[i];
+        if (p->n_faces == 0) continue;
         rc = fail_with_path(m,
                             mesh_sparse_add(&sparse, &m->points, (const uint32_t(*)[3])m->face + face, p->n_faces,
                                             p->station, p->scan << 16 | p->sweep, &out, &m->area_m2, &why),

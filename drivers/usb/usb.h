@@ -231,7 +231,7 @@ size_t usb_device_write(struct usb_device *device, uint8_t endpoint, const void 
 int usb_device_can_write(const struct usb_device *device, uint8_t endpoint);
 /* Of one epoch at a time. */
 size_t usb_device_read(struct usb_device *device, uint8_t endpoint, void *data, size_t len);
-/* Bytes that wait; *epoch (may be NULL) is that of the oldest. */
+/* Bytes that wait of the oldest transfer; *epoch (may be NULL) is its. */
 size_t usb_device_can_read(const struct usb_device *device, uint8_t endpoint, uint32_t *epoch);
 /* What waits on an OUT endpoint and came in an epoch before `epoch` is taken and dropped; returns bytes. */
 size_t usb_device_drop(struct usb_device *device, uint8_t endpoint, uint32_t epoch);

@@ -1,6 +1,8 @@
-/* Configurations: a YAML file, with the settings of --set as its comments `#set KEY=VALUE`. What is refused is refused in
- * lines; what is taken has values within the limits that later stages count on. */
+/* Configurations: a YAML file, with the settings of --set as its comments `#set KEY=VALUE`, and faults as FAULt:ADD
+ * has them as `#fault {...}`. What is refused is refused in lines; what is taken has values within the limits that
+ * later stages count on. */
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -27,6 +29,20 @@ static void find_sets(const char *text)
         sets.text[sets.n][len] = '\0';
         sets.of[sets.n] = sets.text[sets.n];
         sets.n++;
+    }
+}
+
+/* Each line that begins with `#fault `, for a head with this configuration. */
+static void add_faults(const struct config *cfg, const char *text)
+{
+    static struct fault fault;
+    for (const char *p = text; (p = strstr(p, "#fault ")) != NULL;) {
+        char line[SET_LEN];
+        struct sh_err err = {0};
+        p += 7;
+        const size_t len = strcspn(p, "\n");
+        snprintf(line, sizeof line, "%.*s", (int)len, p);
+        if (config_read_fault(cfg, line, &fault, &err) != SH_OK) fuzz_must_be_line(&err);
     }
 }
 
@@ -63,10 +79,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     text[size] = '\0';
     find_sets(text);
     const int code = config_load_all(fuzz_file(".yaml", data, size), sets.of, sets.n, cfg, &faults);
-    if (code == SH_OK)
+    if (code == SH_OK) {
         check_taken(cfg);
-    else
+        add_faults(cfg, text);
+    } else {
         check_refused(code, &faults);
+    }
     const int links = config_load_links(text, "links", sets.of, sets.n, cfg, &faults);
     if (links != SH_OK) check_refused(links, &faults);
     return 0;

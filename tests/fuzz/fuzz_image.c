@@ -1,5 +1,5 @@
-/* Images that lie on meshes: PNG, JPEG, TGA, BMP, and texels as a mesh's file holds them. Input: four bytes, then the image. What
- * is decoded has all its texels, and a hole is asked of any coordinate. */
+/* Images that lie on meshes: PNG, JPEG, TGA, BMP, and texels as a mesh's file holds them. Input: four bytes, then
+ * the image. What is decoded has all its texels, and a hole is asked of any coordinate. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,7 +10,8 @@
 /* A bomb of some kilobytes may ask for 2^26 texels; those are honest, and slow. */
 static void ask_holes(const struct texture_image *image, unsigned how, struct sh_err *err)
 {
-    static const double uv[][2] = {{0, 0}, {0.999999, 0.5}, {-1e300, 1e300}, {1, 1}, {NAN, 0.5}, {INFINITY, 0}, {-0.0, 2.5}};
+    static const double uv[][2] = {{0, 0},     {0.999999, 0.5}, {-1e300, 1e300}, {1, 1},
+                                   {NAN, 0.5}, {INFINITY, 0},   {-0.0, 2.5}};
     const enum texture_wrap wrap[2] = {(enum texture_wrap)(how >> 2 & 3), (enum texture_wrap)(how >> 4 & 3)};
     struct texture_mask *mask = NULL;
     if (texture_mask_create(image, wrap, 0.5, (how & 1) != 0, &mask, err) != SH_OK) {

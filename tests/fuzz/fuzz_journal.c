@@ -1,5 +1,5 @@
-/* Journals, and the manifests of campaigns. Input: the file. A journal that is read is sorted by tick, and written anew gives the
- * same commands. */
+/* Journals, and the manifests of campaigns. Input: the file. A journal that is read is sorted by tick, and written
+ * anew gives the same commands. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,5 +1,5 @@
-/* The native stream's parser and decoders. Input: a byte, how it is cut into pieces, then the stream. The same bytes in other
- * pieces give the same frames, lines, notices and counts; and each byte is in one item, or counted as bad. */
+/* The native stream's parser and decoders. Input: a byte, how it is cut into pieces, then the stream. The same bytes
+ * in other pieces give the same frames, lines, notices and counts; and each byte is in one item, or counted as bad. */
 #include <string.h>
 
 #include "drivers/protocol/native.h"
@@ -25,8 +25,7 @@ static void note(void *ctx, const struct native_notice *notice)
     struct outcome *o = ctx;
     const uint64_t v[] = {(uint64_t)notice->kind, notice->seq, notice->at_byte, notice->n, (uint64_t)notice->t_ns};
     o->sum = mix(o->sum, v, sizeof v);
-    if (notice->kind == NATIVE_BAD_PAYLOAD || notice->kind == NATIVE_BAD_BYTES ||
-        notice->kind == NATIVE_CUT)
+    if (notice->kind == NATIVE_BAD_PAYLOAD || notice->kind == NATIVE_BAD_BYTES || notice->kind == NATIVE_CUT)
         o->notice_bytes += notice->n;
 }
 

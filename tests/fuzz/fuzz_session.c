@@ -1,6 +1,7 @@
-/* Sessions of the protocols that are other heads': nmea, scip, cola, velodyne with its position packets and its pages. Input: a byte
- * (which), a byte (how), then records: bytes from the client, native frames, time, frames lost, a client that reads nothing. No unit
- * is longer than the protocol says, and commands to the head are lines. */
+/* Sessions of the protocols that are other heads': nmea, scip, cola, velodyne with its position packets and its
+ * pages. Input: a byte (which), a byte (how), then records: bytes from the client, points and events of a head that
+ * spins, time, frames lost, a client that reads nothing. No unit is longer than the protocol says, and commands to
+ * the head are lines. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -28,7 +29,8 @@ static int run_command(void *ctx, const char *line, char *reply, size_t cap)
 {
     struct command_result out;
     (void)ctx;
-    fuzz_must(cap >= COMMAND_MAX_REPLY && strlen(line) <= COMMAND_MAX_LINE, "a command is a line, with room for a reply");
+    fuzz_must(cap >= COMMAND_MAX_REPLY && strlen(line) <= COMMAND_MAX_LINE,
+              "a command is a line, with room for a reply");
     command_execute(&device, 1, line, &out);
     if (out.effect == COMMAND_START) device.state = HEAD_SCANNING;
     if (out.effect == COMMAND_STOP || out.effect == COMMAND_RESET) device.state = HEAD_IDLE;
@@ -72,7 +74,8 @@ static int64_t next_fix_ns(void *ctx, int64_t t_ns)
 /* Without clearing the rig's megabytes. */
 static void open_session(enum protocol_id id, unsigned how)
 {
-    static const char *const models[] = {"UTM-30LX", "UST-20LX", "URG-04LX", "TiM571", "LMS111", "TiM561", "VLP-16", "TiM781"};
+    static const char *const models[] = {"UTM-30LX", "UST-20LX", "URG-04LX", "TiM571",
+                                         "LMS111",   "TiM561",   "VLP-16",   "TiM781"};
     struct sh_err err = {0};
     device = command_test_device();
     rig.ops = protocol_ops_get(id);
@@ -89,15 +92,14 @@ static void open_session(enum protocol_id id, unsigned how)
     snprintf(rig.identity.serial, sizeof rig.identity.serial, "17210001");
     snprintf(rig.identity.firmware, sizeof rig.identity.firmware, "1.2.3");
     snprintf(rig.identity.name, sizeof rig.identity.name, "rig");
-    rig.spec = (struct protocol_spec){
-        .identity = &rig.identity,
-        .host = {&rig, send_unit, run_command, utc_ns, fix, count, hang_up, next_fix_ns},
-        .session = 1,
-        .fixes_hz = 1,
-        .near_wrap = how & 64 ? 3 : 0,
-        .waits = how >> 7 & 1,
-        .address = "127.0.0.1",
-        .port = 2368};
+    rig.spec = (struct protocol_spec){.identity = &rig.identity,
+                                      .host = {&rig, send_unit, run_command, utc_ns, fix, count, hang_up, next_fix_ns},
+                                      .session = 1,
+                                      .fixes_hz = 1,
+                                      .near_wrap = how & 64 ? 3 : 0,
+                                      .waits = how >> 7 & 1,
+                                      .address = "127.0.0.1",
+                                      .port = 2368};
     rig.protocol = NULL;
     if (rig.ops->create(&rig.spec, &rig.protocol, &err) != SH_OK) {
         fuzz_must_be_line(&err);
@@ -111,25 +113,15 @@ static void open_session(enum protocol_id id, unsigned how)
     if (rig.ops->open != NULL) rig.ops->open(rig.protocol, 0);
 }
 
-/* Any whole frame with right checksums, as a recording may have it; of the layout that the protocol takes. */
-static void give_frame(struct fuzz_bytes *in, size_t len)
+/* An event of the head: scans begin and end, settings change, pulses are lost. */
+static void give_event(unsigned how, int64_t t_ns)
 {
-    uint8_t frame[NATIVE_HEADER_LEN + MAX_BYTES] = {NATIVE_SYNC};
-    size_t got;
-    const uint8_t *from = fuzz_take(in, len, &got);
-    if (got == 0) return;
-    frame[1] = (uint8_t)(1 + from[0] % 11);
-    frame[2] = NATIVE_VERSION;
-    memcpy(frame + 16, &rig.scan_t0_ns, 8);
-    memcpy(frame + NATIVE_HEADER_LEN, from + 1, got - 1);
-    le_put32(frame + 4, (uint32_t)(got - 1));
-    le_put32(frame + 8, rig.seq++);
-    native_reseal(frame, NATIVE_HEADER_LEN + got - 1);
-    struct native_descriptor d;
-    if (frame[1] == NATIVE_DESCRIPTOR && native_decode_descriptor(frame + NATIVE_HEADER_LEN, got - 1, &d) == SH_OK &&
-        d.layout != NATIVE_POLAR)
-        return;
-    if (rig.ops->frame != NULL) rig.ops->frame(rig.protocol, frame, NATIVE_HEADER_LEN + got - 1);
+    uint8_t frame[256];
+    const struct native_event event = {.code = 1 + how % 12, .a = how >> 4, .b = (uint64_t)t_ns, .c = how & 3};
+    const size_t len = native_encode_event(frame, sizeof frame, &event, t_ns, 0);
+    native_seal(frame, rig.seq++);
+    if (event.code == NATIVE_EV_SCAN_START) rig.scan_t0_ns = t_ns;
+    if (rig.ops->frame != NULL) rig.ops->frame(rig.protocol, frame, len);
 }
 
 /* A stretch of a turn, with echoes as the byte says. */
@@ -142,17 +134,32 @@ static void give_points(unsigned how, uint32_t *line)
     for (uint32_t i = 0; i < N; i++) {
         pan[i] = (double)i / 1440.0;
         dt_ns[i] = i * 17361;
-        shot[i] = (struct protocol_rig_shot){.n = (i + how) % 4, .range_m = {0.05 + how * 0.3, 2.0 + i, 200.0},
-                                             .refl_cdb = {-3000, 0, 2000}, .amplitude_cdb = {0, 3000, 32767}};
+        shot[i] = (struct protocol_rig_shot){.n = (i + how) % 4,
+                                             .range_m = {0.05 + how * 0.3, 2.0 + i, 200.0},
+                                             .refl_cdb = {-3000, 0, 2000},
+                                             .amplitude_cdb = {0, 3000, 32767}};
     }
-    const struct protocol_rig_run run = {.frame = *line, .line = *line, .pulse0 = *line * 1440u, .n = 1 + how % N,
-                                         .t0_ns = *line * 25000000LL, .line_t0_ns = *line * 25000000LL, .dt_ns = dt_ns,
-                                         .mirror_turn = mirror, .pan_turn = pan, .shot = shot};
+    const struct protocol_rig_run run = {.frame = *line,
+                                         .line = *line,
+                                         .pulse0 = *line * 1440u,
+                                         .n = 1 + how % N,
+                                         .t0_ns = *line * 25000000LL,
+                                         .line_t0_ns = *line * 25000000LL,
+                                         .dt_ns = dt_ns,
+                                         .mirror_turn = mirror,
+                                         .pan_turn = pan,
+                                         .shot = shot};
     if (rig.ops->frame == NULL) return;
     protocol_rig_points(&rig, &run);
     if ((how & 128) == 0) return;
-    const struct line_end end = {.frame = *line, .line = *line, .pulse0 = *line * 1440u, .n_fired = 1440, .n_cast = 1081,
-                                 .t0_ns = *line * 25000000LL, .t1_ns = (*line + 1) * 25000000LL, .status = LINE_LAST_OF_FRAME};
+    const struct line_end end = {.frame = *line,
+                                 .line = *line,
+                                 .pulse0 = *line * 1440u,
+                                 .n_fired = 1440,
+                                 .n_cast = 1081,
+                                 .t0_ns = *line * 25000000LL,
+                                 .t1_ns = (*line + 1) * 25000000LL,
+                                 .status = LINE_LAST_OF_FRAME};
     protocol_rig_line_end(&rig, &end);
     ++*line;
 }
@@ -163,20 +170,30 @@ static void act(struct fuzz_bytes *in, int64_t *t_ns, uint32_t *line)
     const size_t len = fuzz_u8(in) + ((what >> 4 & 1) << 8);
     size_t n;
     switch (what & 7) {
-    case 0: case 1: case 2: {
+    case 0:
+    case 1:
+    case 2: {
         const uint8_t *bytes = fuzz_take(in, len, &n);
         if (n > 0) rig.ops->input(rig.protocol, bytes, n);
         break;
     }
-    case 3: give_frame(in, len); break;
-    case 4: give_points((unsigned)len & 255, line); break;
+    case 3:
+        give_event((unsigned)len & 255, *t_ns);
+        break;
+    case 4:
+        give_points((unsigned)len & 255, line);
+        break;
     case 5:
         *t_ns += (int64_t)len * ((what & 128) != 0 ? 50000000 : 1000000);
         if (rig.ops->time != NULL) rig.ops->time(rig.protocol, *t_ns);
         if (rig.ops->next_ns != NULL) rig.ops->next_ns(rig.protocol);
         break;
-    case 6: if (rig.ops->gap != NULL) rig.ops->gap(rig.protocol, 1 + (uint32_t)len); break;
-    default: rig.room = (what & 8) != 0 ? 0 : SIZE_MAX; break;
+    case 6:
+        if (rig.ops->gap != NULL) rig.ops->gap(rig.protocol, 1 + (uint32_t)len);
+        break;
+    default:
+        rig.room = (what & 8) != 0 ? 0 : SIZE_MAX;
+        break;
     }
 }
 

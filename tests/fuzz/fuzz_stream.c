@@ -1,5 +1,5 @@
-/* The native stream through the client library, with recorders behind it. Input: three bytes of choices, then the stream, whose
- * checksums are made right. Whatever comes, each recorder makes a file or says in a line why it can't. */
+/* The native stream through the client library, with recorders behind it. Input: three bytes of choices, then the
+ * stream, whose checksums are made right. Whatever comes, each recorder makes a file or says in a line why it can't. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,8 +11,8 @@
 
 enum { MAX_STREAM = 1 << 15, MAX_RECORDERS = 3, SOME_POINTS = 64 };
 
-static const char *const names[] = {"out.ply", "out.las",    "out.ptx", "out.e57",  "out.poses.csv", "out.pcapng",
-                                    "out.shs", "out.obj",    "out.gltf", "out.glb", "out.fbx"};
+static const char *const names[] = {"out.ply", "out.las", "out.ptx",  "out.e57", "out.poses.csv", "out.pcapng",
+                                    "out.shs", "out.obj", "out.gltf", "out.glb", "out.fbx"};
 enum { N_NAMES = sizeof names / sizeof names[0] };
 
 struct output {

@@ -1,5 +1,5 @@
-/* Trajectories: samples and way-points as CSV. Input: a byte, then the file. What is read gives finite poses over its span, and
- * knots that rise in time. */
+/* Trajectories: samples and way-points as CSV. Input: a byte, then the file. What is read gives finite poses over
+ * its span, and knots that rise in time. */
 #include <math.h>
 #include <stdlib.h>
 

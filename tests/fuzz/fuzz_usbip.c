@@ -1,5 +1,5 @@
-/* USB/IP: what a host sends over its connection. Input: a byte (look, whether the device is imported already), then the bytes, which
- * come in pieces. What is wrong ends the connection; nothing is left of it. */
+/* USB/IP: what a host sends over its connection. Input: a byte (look, whether the device is imported already), then
+ * the bytes, which come in pieces. What is wrong ends the connection; nothing is left of it. */
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
@@ -56,12 +56,14 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     struct fuzz_bytes in = {data, size};
     const unsigned how = fuzz_u8(&in);
-    struct usb_identity id = {.vid = 0x1209, .pid = 1, .serial = "S1", .highest = (enum usb_rate)((how >> 2) % USB_N_RATES)};
+    struct usb_identity id = {
+        .vid = 0x1209, .pid = 1, .serial = "S1", .highest = (enum usb_rate)((how >> 2) % USB_N_RATES)};
     struct scanhead_usb head = {0};
     struct usbip_conn conn;
     struct sh_err err = {0};
     int pair[2], taken = 0;
-    if (scanhead_usb_create(usb_look_get((enum usb_look_id)((how & 3) % USB_N_LOOKS)), &id, &head, &err) != SH_OK) return 0;
+    if (scanhead_usb_create(usb_look_get((enum usb_look_id)((how & 3) % USB_N_LOOKS)), &id, &head, &err) != SH_OK)
+        return 0;
     if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0, pair) != 0) abort();
     usbip_conn_start(&conn, pair[0], head.device, &taken);
     if ((how & 16) != 0) usbip_conn_import(&conn);

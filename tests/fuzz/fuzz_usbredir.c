@@ -1,5 +1,5 @@
-/* usbredir: what a virtual machine sends over its channel. Input: a byte (look, how ids are written), then the bytes; the hello
- * that all channels begin with is put before them, unless the byte says no. */
+/* usbredir: what a virtual machine sends over its channel. Input: a byte (look, how ids are written), then the
+ * bytes; the hello that all channels begin with is put before them, unless the byte says no. */
 #include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -69,13 +69,15 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     struct fuzz_bytes in = {data, size};
     const unsigned how = fuzz_u8(&in);
-    struct usb_identity id = {.vid = 0x1209, .pid = 1, .serial = "S1", .highest = (enum usb_rate)((how >> 2) % USB_N_RATES)};
+    struct usb_identity id = {
+        .vid = 0x1209, .pid = 1, .serial = "S1", .highest = (enum usb_rate)((how >> 2) % USB_N_RATES)};
     const struct usb_backend_ops *ops = usb_backend_ops_get(USB_BACKEND_USBREDIR);
     struct usb_backend_spec spec = {.type = USB_BACKEND_USBREDIR};
     struct scanhead_usb head = {0};
     struct sh_err err = {0};
     void *backend;
-    if (scanhead_usb_create(usb_look_get((enum usb_look_id)((how & 3) % USB_N_LOOKS)), &id, &head, &err) != SH_OK) return 0;
+    if (scanhead_usb_create(usb_look_get((enum usb_look_id)((how & 3) % USB_N_LOOKS)), &id, &head, &err) != SH_OK)
+        return 0;
     snprintf(spec.path, sizeof spec.path, "%s/usb", fuzz_folder());
     fuzz_must(ops->open(&spec, head.device, &backend, &err) == SH_OK, "the socket opens");
     const int fd = connect_to(spec.path);

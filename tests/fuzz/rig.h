@@ -1,8 +1,8 @@
-/* What the fuzz targets share: a file in memory that has a path, a folder that goes away, bytes taken one after the other,
- * and a claim that must hold.
+/* What the fuzz targets share: a file in memory that has a path, a folder that goes away, bytes taken one after the
+ * other, and a claim that must hold.
  *
- * A target is one file fuzz_NAME.c with LLVMFuzzerTestOneInput. What comes in is any bytes; what must come out is written in
- * its first comment. One thread. */
+ * A target is one file fuzz_NAME.c with LLVMFuzzerTestOneInput. What comes in is any bytes; what must come out is
+ * written in its first comment. One thread. */
 #ifndef TESTS_FUZZ_RIG_H
 #define TESTS_FUZZ_RIG_H
 

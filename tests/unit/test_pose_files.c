@@ -256,11 +256,32 @@ static void test_level_waypoints(void **state)
     }
 }
 
+static void keep_warning(void *ctx, const char *text)
+{
+    snprintf(ctx, 64, "%s", text);
+}
+
+/* What a file holds may be a command for the terminal that shows the message. */
+static void test_messages_are_lines(void **state)
+{
+    (void)state;
+    struct sh_err err;
+    struct trajectory *tr;
+    char warning[64];
+    const struct sh_report report = {.ctx = warning, .warn = keep_warning};
+    write_file("t_s,\x1b[2J\x7f\a\n0,1\n");
+    assert_int_equal(trajectory_read_csv(path, NULL, &tr, &err), SH_EINPUT);
+    assert_non_null(strstr(err.text, "column \"?[2J??\" is unknown"));
+    sh_warn(&report, "%s", "a name\r\n\x1b[0m\x7f \xc3\xa4");
+    assert_string_equal(warning, "a name???[0m? \xc3\xa4");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_csv),       cmocka_unit_test(test_csv_errors),     cmocka_unit_test(test_csv_upright),
         cmocka_unit_test(test_waypoints), cmocka_unit_test(test_slow_waypoints), cmocka_unit_test(test_level_waypoints),
+        cmocka_unit_test(test_messages_are_lines),
     };
     return cmocka_run_group_tests(tests, make_file, remove_file);
 }

@@ -1,0 +1,79 @@
+/* Captures and recordings that are replayed: .pcapng by its reader, in pieces; then as a recording, frame by frame
+ * with its times. Input: a byte (how it is cut, which ending), then the file. All bytes are taken, or the reader
+ * says at which byte it stops. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "drivers/protocol/pcapng.h"
+#include "firmware_sim/replay/recording.h"
+#include "tests/fuzz/rig.h"
+#include "tests/fuzz/seal.h"
+
+enum { MAX_INPUT = 1 << 15 };
+
+struct sums {
+    uint64_t packets, bytes;
+    int rc;
+};
+
+/* The reader gets `piece` bytes more each time it wants some. */
+static struct sums read_all(const uint8_t *data, size_t size, size_t piece)
+{
+    struct pcapng_reader reader = {0};
+    struct sums sums = {0};
+    struct sh_err err = {0};
+    size_t at = 0, given = piece < size ? piece : size;
+    for (;;) {
+        struct pcapng_packet packet;
+        size_t used = 0, needed = 0;
+        sums.rc = pcapng_read(&reader, data + at, given - at, &packet, &used, &needed, &err);
+        if (sums.rc < 0) fuzz_must_be_line(&err);
+        if (sums.rc < 0) return sums;
+        fuzz_must(used <= given - at, "no more is taken than there is");
+        if (sums.rc == PCAPNG_PACKET) {
+            fuzz_must(packet.data >= data + at && packet.data + packet.len <= data + given,
+                      "a packet lies in the bytes");
+            sums.packets++;
+            sums.bytes += packet.len;
+        }
+        at += used;
+        if (sums.rc != PCAPNG_MORE) continue;
+        fuzz_must(used == 0 && needed > given - at, "it says how many bytes it needs");
+        if (given == size) return sums;
+        given = size - given < piece ? size : given + piece;
+    }
+}
+
+static void replay(const char *path)
+{
+    static struct recording recording;
+    struct recording_frame frame;
+    struct scanhead_stats stats;
+    struct sh_err err = {0};
+    int rc = recording_open(&recording, path, &err);
+    for (int round = 0; rc == SH_OK && round < 2; round++) {
+        while ((rc = recording_next(&recording, &frame, &err)) == 1)
+            fuzz_must(frame.len == native_frame_len(frame.bytes), "a frame is whole");
+        if (rc == SH_OK) recording_stats(&recording, &stats);
+        if (rc == SH_OK && round == 0) rc = recording_rewind(&recording, &err);
+    }
+    if (rc < 0) fuzz_must_be_line(&err);
+    recording_close(&recording);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    static uint8_t bytes[MAX_INPUT];
+    struct fuzz_bytes in = {data, size};
+    const unsigned how = fuzz_u8(&in);
+    if (in.n > sizeof bytes) return 0;
+    memcpy(bytes, in.p, in.n);
+    if ((how & 1) == 0) fuzz_seal(bytes, in.n);
+    if ((how & 2) == 0) {
+        const struct sums whole = read_all(bytes, in.n, in.n), cut = read_all(bytes, in.n, 1 + (how >> 2));
+        fuzz_must(whole.packets == cut.packets && whole.bytes == cut.bytes && whole.rc == cut.rc,
+                  "pieces change nothing");
+    }
+    replay(fuzz_file((how & 2) == 0 ? ".pcapng" : ".shs", bytes, in.n));
+    return 0;
+}
