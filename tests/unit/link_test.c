@@ -27,20 +27,20 @@ struct bench bench_open(const struct link_spec *spec)
     struct bench bench = {.ops = link_ops_get(spec->type), .wake = -1};
     struct sh_err err = {0, ""};
     if (bench.ops->open(spec, &bench.link, &err) != SH_OK) fail_msg("%s", err.text);
-    alarm(LINK_LIMIT_S);
     return bench;
 }
 
 void bench_close(struct bench *bench)
 {
     bench->ops->close(bench->link);
-    alarm(0);
 }
 
 int bench_poll(struct bench *bench, uint32_t want_write, int timeout_ms)
 {
     int room = (int)(sizeof bench->queue / sizeof bench->queue[0]) - bench->n_queue;
+    alarm((unsigned)(timeout_ms + WAIT_MS) / 1000 + 1);
     int n = bench->ops->poll(bench->link, bench->wake, want_write, timeout_ms, bench->queue + bench->n_queue, room);
+    alarm(0);
     assert_true(n >= 0 && n <= room);
     int kept = bench->n_queue;
     for (int i = bench->n_queue; i < bench->n_queue + n; i++) {

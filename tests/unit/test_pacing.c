@@ -231,7 +231,7 @@ static void stand_still_for_200_ms(int sleep)
 }
 
 /* With one tick of 10 ms ahead, 20 ticks are late, and those that follow until it has caught up. Waiting for a beat for
- * each, it would be late for the rest of the run: 58 ticks. Half of the others is room for a machine with other work. */
+ * each, it would be late for the rest of the run: some 58 ticks. Between is room for a machine with other work. */
 static void it_catches_up(void **state)
 {
     (void)state;
@@ -246,7 +246,7 @@ static void it_catches_up(void **state)
     print_message("# %u of %u ticks late\n", (unsigned)run.stats.counters.late_blocks,
                   (unsigned)lateness_count(run.stats.late));
     assert_true(run.stats.counters.late_blocks >= 19 && run.stats.counters.late_max_ns >= 190000000);
-    assert_true(run.stats.counters.late_blocks < 20 + 19);
+    assert_true(run.stats.counters.late_blocks < 50);
     assert_int_equal(run.stats.counters.lost_ticks, 0);
 }
 
