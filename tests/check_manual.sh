@@ -8,10 +8,6 @@ trap 'rm -rf "$work"' EXIT
 . tests/tap.sh
 pages=$work/pages
 
-# A page as it is read: without marks, lines that are not broken.
-read_page() {
-    LC_ALL=C.UTF-8 groff -man -Tutf8 -P-c -rLL=1000n -rHY=0 -ww "$1" 2>&1 | col -bx
-}
 
 make_pages() {
     mkdir "$pages"
@@ -22,8 +18,9 @@ make_pages() {
 
 no_warnings() {
     for page in "$pages"/*; do
-        read_page "$page" >"$page.txt"
-        said=$(groff -man -Tutf8 -ww -z "$page" 2>&1)
+        # As it is read: without marks, and lines are not broken.
+        LC_ALL=C.UTF-8 groff -man -Tutf8 -P-c -rLL=1000n -rHY=0 -ww "$page" 2>"$work/said" | col -bx >"$page.txt"
+        said=$(cat "$work/said")
         [ -z "$said" ] || { echo "$page: $said"; return 1; }
         grep -q '^NAME' "$page.txt" || { echo "$page: no NAME"; return 1; }
     done
