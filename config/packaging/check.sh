@@ -47,7 +47,8 @@ make_root() {
     rm -rf --one-file-system "$root"
     mmdebstrap --quiet --variant=minbase "$suite" "$root" "$mirror" &&
         mount -t proc proc "$root/proc" && mount -t devpts -o newinstance,ptmxmode=0666,mode=0620 devpts "$root/dev/pts" &&
-        mkdir "$root/packages" && cp "$debs"/*.deb "$root/packages/" && cp /etc/resolv.conf "$root/etc/" &&
+        mkdir "$root/packages" && for package in $packages; do cp "$debs/${package}_"*.deb "$root/packages/" || return; done &&
+        cp /etc/resolv.conf "$root/etc/" &&
         printf '#!/bin/sh\nexit 101\n' >"$root/usr/sbin/policy-rc.d" && chmod +x "$root/usr/sbin/policy-rc.d"
 }
 
@@ -63,7 +64,7 @@ install_others() {
 # Every file with its kind, rights and owner, in /etc and /var/lib/systemd with what is in it; users and groups; but what
 # apt and dpkg write about themselves, and caches.
 picture() {
-    (cd "$root" && find . -xdev \( -path ./proc -o -path ./sys -o -path ./packages -o -path ./tmp -o -path ./var/cache \
+    (cd "$root" && find . -xdev \( -path ./proc -o -path ./sys -o -path ./run -o -path ./packages -o -path ./tmp -o -path ./var/cache \
         -o -path ./var/log -o -path ./var/lib/apt -o -path ./var/lib/dpkg/info/format -o -path './var/lib/dpkg/*-old' \) \
         -prune -o -printf '%y %m %U %G %p %l\n' | sort
     find etc -type f ! -name ld.so.cache -exec sha256sum {} + | sort -k2
@@ -133,7 +134,11 @@ client_in_c() {
         cc client.c -o client-static -Wl,-Bstatic -lscanhead -Wl,-Bdynamic -lnettle -lusb-1.0 -lm && ldd client' | grep -q libscanhead.so.1 || return
     ! inside ldd /tmp/client-static | grep libscanhead || return
     for client in client client-static; do
-        as_nobody "/tmp/$client" "tcp:127.0.0.1:$port" >"$work/points" || return
+        left=500 # a head that has just scanned spins down, and refuses for a moment
+        until as_nobody "/tmp/$client" "tcp:127.0.0.1:$port" >"$work/points"; do
+            left=$((left - 1))
+            [ $left -gt 0 ] && grep -q 'in state' "$work/points" || { cat "$work/points"; return 1; }
+        done
         [ "$(wc -l <"$work/points")" -gt 1000 ] || { head -n 3 "$work/points"; return 1; }
     done
 }
@@ -166,7 +171,7 @@ use_like_a_service() {
 # A changed conffile stays on removal, and goes with purge.
 remove_ours() {
     echo '# changed' >>"$root/etc/scanhead/example.yaml" && inside apt-get remove -qq $packages &&
-        [ -e "$root/etc/scanhead/example.yaml" ] && [ ! -e "$root/usr/bin/scanhead" ] && inside apt-get purge -qq $packages &&
+        [ -e "$root/etc/scanhead/example.yaml" ] && [ ! -e "$root/usr/bin/scanhead" ] && inside dpkg --purge $packages &&
         [ ! -e "$root/etc/scanhead" ]
 }
 nothing_is_left() {

@@ -26,5 +26,6 @@ deb:
 	@ls -l $(DEB_DIR)/*.deb
 deb-check: deb
 	$(call install_missing,$(DEPS_DEB_CHECK))
-	@bash config/packaging/check.sh $(DEB_DIR) $(RELEASE)
+	@bash config/packaging/check.sh $(DEB_DIR) $(RELEASE) | tee $(DEB_DIR)/check.log
+	@grep -q '^1\.\.' $(DEB_DIR)/check.log && ! grep '^not ok' $(DEB_DIR)/check.log
 .PHONY: deb deb-check
