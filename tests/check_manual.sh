@@ -44,7 +44,8 @@ options_are_there() {
         for option in $(options_of $command); do
             n=$((n + 1))
             grep -q -e "^ *\(-., \)\{0,1\}$option\([ ,]\|$\)" "$page" || { echo "${page##*/}: no $option"; return 1; }
-            [[ $command == *raw || " $offered " == *" $option "* ]] || { echo "completion of $command: no $option"; return 1; }
+            [[ $command == *raw || " $offered " == *" $option "* ]] ||
+                { echo "completion of $command: no $option"; return 1; }
         done
     done
     twice=$(grep ') echo' "$work/completion" | sort | uniq -d)
@@ -60,13 +61,15 @@ texts_are_there() {
         tr -s ' \n' '\n\n' <"$pages/scanhead-$command.1.txt" | grep -v '^$' >"$work/page"
         missing=$(diff "$work/words" "$work/page" | sed -n 's/^< //p' | tr '\n' ' ')
         # --help's own row says another thing in the page.
-        left=$(echo "$missing" | tr ' ' '\n' | grep -vx 'this\|text\|text,\|or\|only\|that\|part\|-h,\|--help\|\[SECTION\]' | grep .)
+        left=$(echo "$missing" | tr ' ' '\n' | grep . |
+            grep -vx 'this\|text\|text,\|or\|only\|that\|part\|-h,\|--help\|\[SECTION\]')
         [ -z "$left" ] || { echo "scanhead-$command.1 lacks: $left"; return 1; }
     done
 }
 
 keys_are_there() {
-    "$program" check --help | sed -n '/^Configuration keys:/,$p' | grep '^[a-z_]*\(\[\]\)\{0,1\}\([.][a-z_]*\(\[\]\)\{0,1\}\)*$' >"$work/keys"
+    "$program" check --help | sed -n '/^Configuration keys:/,$p' |
+        grep '^[a-z_]*\(\[\]\)\{0,1\}\([.][a-z_]*\(\[\]\)\{0,1\}\)*$' >"$work/keys"
     [ "$(wc -l <"$work/keys")" -gt 200 ] || { echo "only $(wc -l <"$work/keys") keys were found"; return 1; }
     while read -r key; do
         grep -qF "       $key" "$pages/scanhead.yaml.5.txt" || { echo "scanhead.yaml.5: no $key"; return 1; }
