@@ -402,4 +402,5 @@ clean:
 .PHONY: ALWAYS all deps deps-test deps-build deps-guest deps-browser demo test test-unit test-wire test-accuracy test-stability test-guest soak soak-usb repair replay-hour \
 	test-usb-million test-hostile test-sight objects test-unit-programs test-programs bench bench-beam bench-plain bench-velodyne bench-page page-pictures bench-loop bench-kernels bench-panorama chart install format clean
 .SECONDARY:
--include $(shell find $(BUILD) -type f -name '*.d' 2>/dev/null)
+# Not those in the packages' tree and root: they speak of other files.
+-include $(shell find $(BUILD) -path $(BUILD)/deb -prune -o -type f -name '*.c*.d' -print 2>/dev/null)

@@ -8,10 +8,6 @@ trap 'rm -rf "$work"' EXIT
 . tests/tap.sh
 pages=$work/pages
 
-# A page as it is read: without marks, lines that are not broken.
-read_page() {
-    LC_ALL=C.UTF-8 groff -man -Tutf8 -P-c -rLL=1000n -rHY=0 -ww "$1" 2>&1 | col -bx
-}
 
 make_pages() {
     mkdir "$pages"
@@ -22,8 +18,9 @@ make_pages() {
 
 no_warnings() {
     for page in "$pages"/*; do
-        read_page "$page" >"$page.txt"
-        said=$(groff -man -Tutf8 -ww -z "$page" 2>&1)
+        # As it is read: without marks, and lines are not broken.
+        LC_ALL=C.UTF-8 groff -man -Tutf8 -P-c -rLL=1000n -rHY=0 -ww "$page" 2>"$work/said" | col -bx >"$page.txt"
+        said=$(cat "$work/said")
         [ -z "$said" ] || { echo "$page: $said"; return 1; }
         grep -q '^NAME' "$page.txt" || { echo "$page: no NAME"; return 1; }
     done
@@ -47,7 +44,8 @@ options_are_there() {
         for option in $(options_of $command); do
             n=$((n + 1))
             grep -q -e "^ *\(-., \)\{0,1\}$option\([ ,]\|$\)" "$page" || { echo "${page##*/}: no $option"; return 1; }
-            [[ $command == *raw || " $offered " == *" $option "* ]] || { echo "completion of $command: no $option"; return 1; }
+            [[ $command == *raw || " $offered " == *" $option "* ]] ||
+                { echo "completion of $command: no $option"; return 1; }
         done
     done
     twice=$(grep ') echo' "$work/completion" | sort | uniq -d)
@@ -63,13 +61,15 @@ texts_are_there() {
         tr -s ' \n' '\n\n' <"$pages/scanhead-$command.1.txt" | grep -v '^$' >"$work/page"
         missing=$(diff "$work/words" "$work/page" | sed -n 's/^< //p' | tr '\n' ' ')
         # --help's own row says another thing in the page.
-        left=$(echo "$missing" | tr ' ' '\n' | grep -vx 'this\|text\|text,\|or\|only\|that\|part\|-h,\|--help\|\[SECTION\]' | grep .)
+        left=$(echo "$missing" | tr ' ' '\n' | grep . |
+            grep -vx 'this\|text\|text,\|or\|only\|that\|part\|-h,\|--help\|\[SECTION\]')
         [ -z "$left" ] || { echo "scanhead-$command.1 lacks: $left"; return 1; }
     done
 }
 
 keys_are_there() {
-    "$program" check --help | sed -n '/^Configuration keys:/,$p' | grep '^[a-z_]*\(\[\]\)\{0,1\}\([.][a-z_]*\(\[\]\)\{0,1\}\)*$' >"$work/keys"
+    "$program" check --help | sed -n '/^Configuration keys:/,$p' |
+        grep '^[a-z_]*\(\[\]\)\{0,1\}\([.][a-z_]*\(\[\]\)\{0,1\}\)*$' >"$work/keys"
     [ "$(wc -l <"$work/keys")" -gt 200 ] || { echo "only $(wc -l <"$work/keys") keys were found"; return 1; }
     while read -r key; do
         grep -qF "       $key" "$pages/scanhead.yaml.5.txt" || { echo "scanhead.yaml.5: no $key"; return 1; }

@@ -20,8 +20,8 @@ symbols_agree() {
 
 # All that is installed belongs to a package, and a package has nothing else. (check_install.sh looks at make install.)
 files_agree() {
-    env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -s install BUILD="$build" WERROR=-Werror DESTDIR="$work/root" PREFIX=/usr LIB=lib/triplet ||
-        return
+    env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -s install BUILD="$build" WERROR=-Werror DESTDIR="$work/root" PREFIX=/usr \
+        LIB=lib/triplet || return
     for file in $(cd "$work/root" && find . -type f -o -type l | sed 's|^\./||'); do
         found=
         for list in $packaging/debian/*.install $packaging/debian/not-installed; do
@@ -40,8 +40,9 @@ files_agree() {
 sources_are_all() {
     listed=$(sed -n 's/^DEB_SOURCES = //p' $packaging/packaging.mk)
     for top in $listed; do [ -e "$top" ] || { echo "no $top"; return 1; }; done
-    [ "$(git ls-files 2>/dev/null | cut -d / -f 1 | grep -v '^\.' | sort -u | tr '\n' ' ')" = "$(printf '%s\n' $listed | sort | tr '\n' ' ')" ] ||
-        ! git rev-parse -q --git-dir >/dev/null 2>&1
+    git rev-parse -q --git-dir >/dev/null 2>&1 || return 0
+    git ls-files | cut -d / -f 1 | grep -v '^\.' | sort -u >"$work/tracked"
+    printf '%s\n' $listed | sort | diff "$work/tracked" -
 }
 
 # Each library that the program is linked with has a line in the README, with its licence.

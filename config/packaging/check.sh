@@ -10,8 +10,12 @@ debs=$1 version=$2
 suite=${SUITE:-bookworm} mirror=${MIRROR:-http://deb.debian.org/debian}
 here=$(cd "$(dirname "$0")" && pwd)
 project=$(cd "$here/../.." && pwd)
-[ "$(id -u)" = 0 ] || { echo "deb-check: a root of Debian is made and entered: that needs root; sudo make deb-check" >&2; exit 1; }
-command -v mmdebstrap >/dev/null || { echo "deb-check: no mmdebstrap; apt-get install mmdebstrap" >&2; exit 1; }
+stop() {
+    echo "deb-check: $1" >&2
+    exit 1
+}
+[ "$(id -u)" = 0 ] || stop "a root of Debian is made and entered: that needs root; sudo make deb-check"
+command -v mmdebstrap >/dev/null || stop "no mmdebstrap; apt-get install mmdebstrap"
 debs=$(cd "$debs" && pwd) || exit 1
 root=$debs/root
 work=$debs/check
@@ -47,7 +51,8 @@ make_root() {
     rm -rf --one-file-system "$root"
     mmdebstrap --quiet --variant=minbase "$suite" "$root" "$mirror" &&
         mount -t proc proc "$root/proc" && mount -t devpts -o newinstance,ptmxmode=0666,mode=0620 devpts "$root/dev/pts" &&
-        mkdir "$root/packages" && cp "$debs"/*.deb "$root/packages/" && cp /etc/resolv.conf "$root/etc/" &&
+        mkdir "$root/packages" && { for package in $packages; do cp "$debs/${package}_"*.deb "$root/packages/" || return; done; } &&
+        cp /etc/resolv.conf "$root/etc/" &&
         printf '#!/bin/sh\nexit 101\n' >"$root/usr/sbin/policy-rc.d" && chmod +x "$root/usr/sbin/policy-rc.d"
 }
 
@@ -63,7 +68,7 @@ install_others() {
 # Every file with its kind, rights and owner, in /etc and /var/lib/systemd with what is in it; users and groups; but what
 # apt and dpkg write about themselves, and caches.
 picture() {
-    (cd "$root" && find . -xdev \( -path ./proc -o -path ./sys -o -path ./packages -o -path ./tmp -o -path ./var/cache \
+    (cd "$root" && find . -xdev \( -path ./proc -o -path ./sys -o -path ./run -o -path ./packages -o -path ./tmp -o -path ./var/cache \
         -o -path ./var/log -o -path ./var/lib/apt -o -path ./var/lib/dpkg/info/format -o -path './var/lib/dpkg/*-old' \) \
         -prune -o -printf '%y %m %U %G %p %l\n' | sort
     find etc -type f ! -name ld.so.cache -exec sha256sum {} + | sort -k2
@@ -86,9 +91,10 @@ versions_agree() {
 
 # The service's example, for a head and a recording.
 records() {
+    few="--set head.pan_stop_deg=40"
     as_nobody scanhead check /etc/scanhead/example.yaml --set 'links[0].port=0' &&
-        as_nobody scanhead record /etc/scanhead/example.yaml --set head.pan_stop_deg=40 -o /tmp/scan.ply -o /tmp/scan.las --quiet &&
-        as_nobody scanhead report /etc/scanhead/example.yaml /tmp/scan.ply --set head.pan_stop_deg=40 &&
+        as_nobody scanhead record /etc/scanhead/example.yaml $few -o /tmp/scan.ply -o /tmp/scan.las --quiet &&
+        as_nobody scanhead report /etc/scanhead/example.yaml /tmp/scan.ply $few &&
         as_nobody scanhead list | grep -q riegl-vz400i
 }
 
@@ -130,10 +136,15 @@ END
 client_in_c() {
     sed -n '/^```c /,/^```$/p' "$project/README.md" | sed '/^```/d' >"$root/tmp/client.c"
     inside sh -c 'cd /tmp && cc -Wall -Werror client.c $(pkg-config --cflags --libs libscanhead) -o client &&
-        cc client.c -o client-static -Wl,-Bstatic -lscanhead -Wl,-Bdynamic -lnettle -lusb-1.0 -lm && ldd client' | grep -q libscanhead.so.1 || return
+        cc client.c -o client-static -Wl,-Bstatic -lscanhead -Wl,-Bdynamic -lnettle -lusb-1.0 -lm' || return
+    inside ldd /tmp/client | grep -q libscanhead.so.1 || return
     ! inside ldd /tmp/client-static | grep libscanhead || return
     for client in client client-static; do
-        as_nobody "/tmp/$client" "tcp:127.0.0.1:$port" >"$work/points" || return
+        left=500 # a head that has just scanned spins down, and refuses for a moment
+        until as_nobody "/tmp/$client" "tcp:127.0.0.1:$port" >"$work/points"; do
+            left=$((left - 1))
+            [ $left -gt 0 ] && grep -q 'in state' "$work/points" || { cat "$work/points"; return 1; }
+        done
         [ "$(wc -l <"$work/points")" -gt 1000 ] || { head -n 3 "$work/points"; return 1; }
     done
 }
@@ -145,7 +156,8 @@ stops() {
 
 pages_are_read() {
     for page in scanhead scanhead-run scanhead.yaml libscanhead; do
-        inside man "$page" >"$work/page" 2>&1 && [ "$(wc -l <"$work/page")" -gt 20 ] || { echo "$page"; tail -n 3 "$work/page"; return 1; }
+        inside man "$page" >"$work/page" 2>&1 && [ "$(wc -l <"$work/page")" -gt 20 ] ||
+            { echo "$page"; tail -n 3 "$work/page"; return 1; }
     done
     inside bash -c '. /usr/share/bash-completion/bash_completion; _completion_loader scanhead; complete -p scanhead' | grep -q _scanhead
 }
@@ -166,7 +178,7 @@ use_like_a_service() {
 # A changed conffile stays on removal, and goes with purge.
 remove_ours() {
     echo '# changed' >>"$root/etc/scanhead/example.yaml" && inside apt-get remove -qq $packages &&
-        [ -e "$root/etc/scanhead/example.yaml" ] && [ ! -e "$root/usr/bin/scanhead" ] && inside apt-get purge -qq $packages &&
+        [ -e "$root/etc/scanhead/example.yaml" ] && [ ! -e "$root/usr/bin/scanhead" ] && inside dpkg --purge $packages &&
         [ ! -e "$root/etc/scanhead" ]
 }
 nothing_is_left() {

@@ -7,11 +7,12 @@ RELEASE = $(shell sed -n 's/^\#define SCANHEAD_VERSION  *"\(.*\)"$$/\1/p' driver
 # What a release consists of: all that is at the top.
 DEB_SOURCES = Makefile README.md LICENSE config core drivers firmware_sim tests
 # The changelog's date: that of the commit, else of the header that has the version.
-DEB_DATE = $(shell date -R -u -d "@$${SOURCE_DATE_EPOCH:-$$(git log -1 --format=%ct 2>/dev/null || stat -c %Y drivers/host/scanhead.h)}")
+DEB_TIME = $${SOURCE_DATE_EPOCH:-$$(git log -1 --format=%ct 2>/dev/null || stat -c %Y drivers/host/scanhead.h)}
+DEB_DATE = $(shell date -R -u -d "@$(DEB_TIME)")
 
 deb:
 	$(call install_missing,$(DEPS_BUILD) $(DEPS_DEB))
-	@rm -rf $(DEB_DIR)
+	@rm -rf --one-file-system $(DEB_DIR)
 	@mkdir -p $(DEB_TREE)
 	@tar --exclude=__pycache__ --exclude=.git -cf - $(DEB_SOURCES) | tar -xf - -C $(DEB_TREE)
 	@cp -r config/packaging/debian $(DEB_TREE)/
@@ -26,5 +27,6 @@ deb:
 	@ls -l $(DEB_DIR)/*.deb
 deb-check: deb
 	$(call install_missing,$(DEPS_DEB_CHECK))
-	@bash config/packaging/check.sh $(DEB_DIR) $(RELEASE)
+	@bash config/packaging/check.sh $(DEB_DIR) $(RELEASE) | tee $(DEB_DIR)/check.log
+	@grep -q '^1\.\.' $(DEB_DIR)/check.log && ! grep '^not ok' $(DEB_DIR)/check.log
 .PHONY: deb deb-check

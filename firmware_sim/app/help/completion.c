@@ -84,8 +84,9 @@ static void put_keys(void)
     fputs("_scanhead_keys='", stdout);
     for (size_t i = 0; config_describe_key(CONFIG_KEYS, i, &key); i++)
         if (key.has_value) put_path(key.path), putchar(' ');
-    puts("'\n\n_scanhead_key()\n{\n    local key=$1\n    [[ $key =~ (\\[[0-9]+\\]|\\.[0-9]+) ]] && key=${key/\"${BASH_REMATCH[1]}\"/'[0]'}"
-         "\n    case $key in");
+    puts("'\n\n_scanhead_key()\n{\n    local key=$1");
+    puts("    [[ $key =~ (\\[[0-9]+\\]|\\.[0-9]+) ]] && key=${key/\"${BASH_REMATCH[1]}\"/'[0]'}");
+    puts("    case $key in");
     for (size_t i = 0; config_describe_key(CONFIG_KEYS, i, &key); i++) {
         if (key.words == NULL) continue;
         fputs("    '", stdout);

@@ -77,7 +77,8 @@ static void put_command(const struct app_command *command)
     puts(".SH OPTIONS");
     for (const struct app_option *row = command->options; row->kind != APP_LAST; row++)
         put_option(row->letter, row->name, row->argument, row->help);
-    put_option('h', "help", command->part, command->part != NULL ? "a text as this one, or only that part" : "a text as this one");
+    put_option('h', "help", command->part,
+               command->part != NULL ? "a text as this one, or only that part" : "a text as this one");
     if (command->notes != NULL) {
         puts(".SH NOTES");
         roff_notes(command->notes);
