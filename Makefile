@@ -51,7 +51,8 @@ EMBREE_VERSION = $(eval EMBREE_VERSION := $$(call find_embree))$(EMBREE_VERSION)
 OPT ?= -O3 $(VEC_WIDTH)
 # Whole vectors where there are 512 bits; gcc and clang both know the option on x86 alone.
 VEC_WIDTH = $(if $(filter x86_64-%,$(TARGET)),-mprefer-vector-width=512)
-WARN = -Wall -Wextra -Wconversion -Wshadow
+# Named whole numbers are figures, too; clang 19 would warn of that.
+WARN = -Wall -Wextra -Wconversion -Wshadow -Wno-enum-float-conversion
 CWARN = $(WARN) -Wstrict-prototypes -Wmissing-prototypes
 # `make test` turns warnings into errors; a user's newer compiler may warn in peace.
 WERROR ?=

@@ -1,0 +1,23 @@
+#!/bin/sh
+# 64-bit ARM: cross-built with the libraries of an arm64 Debian, under qemu-aarch64
+here=$(dirname "$0") build=$1 at=$2
+. "$here/lib.sh"
+need aarch64-linux-gnu-gcc gcc-aarch64-linux-gnu
+need aarch64-linux-gnu-g++ g++-aarch64-linux-gnu
+need qemu-aarch64-static qemu-user-static
+# Packages are unpacked and no more, so nothing of ARM runs while the root is made. The compilers of this machine link with
+# the libraries of the root: its Debian has to be the same.
+. /etc/os-release
+make_root "${VERSION_CODENAME:-bookworm}" --variant=extract --arch=arm64 --include=libc6-dev,libstdc++-$(aarch64-linux-gnu-gcc -dumpversion)-dev,libembree-dev,libassimp-dev,libgeographiclib-dev,libyaml-dev,libpng-dev,libstb-dev,nettle-dev,libusb-1.0-0-dev,libusbredirparser-dev,libwebsockets-dev,libcmocka-dev
+root=$(cd "$at/root" && pwd)
+pc=$root/usr/lib/aarch64-linux-gnu/pkgconfig:$root/usr/share/pkgconfig
+echo "    building for ARM"
+$nicely ${MAKE:-make} -j"${JOBS:-2}" DEPS=no BUILD="$at/build" CROSS_COMPILE=aarch64-linux-gnu- \
+    CC="${CCACHE:-} aarch64-linux-gnu-gcc --sysroot=$root" CXX="${CCACHE:-} aarch64-linux-gnu-g++ --sysroot=$root" \
+    PKG_CONFIG="env PKG_CONFIG_SYSROOT_DIR=$root PKG_CONFIG_LIBDIR=$pc pkg-config" \
+    WERROR=-Werror CFLAGS=-g1 CXXFLAGS=-g1 $(emulated_programs "$at/build") all >"$at/build.txt" 2>&1 || exit 1
+built "$(aarch64-linux-gnu-gcc -dumpversion | sed 's/^/gcc /'), Embree $(cat "$at/build/embree")" "$at/build.txt"
+emulate="qemu-aarch64-static -L $root"
+[ -e "$build/test/scanhead" ] || build_here || exit 1
+$nicely $emulate "$at/build/scanhead" $RECORD -o "$at/record.ply" 2>"$at/record.log" && compare_record "$at/record.ply"
+test_emulated "$at/build"

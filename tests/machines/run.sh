@@ -1,0 +1,53 @@
+#!/bin/sh
+# The tests on other machines: sh tests/machines/run.sh BUILD MACHINE...   (make machines)
+#
+# A machine is a script of this folder, MACHINE.sh. It is given the folder BUILD/machines/MACHINE, which is kept: its root
+# and what was built there make the next run short. It leaves there
+#   tests.txt      what tests/run_tap.sh printed
+#   record.txt     what became of the short record, beside that of this machine
+#   built.txt      one line: how it was built, and how many warnings that gave; a file that is missing: it was not built
+#   skipped.txt    one line: why nothing could be done
+# At the end a table of all. Exit status 1 when anything failed, 2 for wrong usage.
+set -u
+here=$(dirname "$0")
+build=$1
+shift
+for name; do
+    case $name in
+    lib | run | emulated | *[!a-z0-9]*) known= ;;
+    *) known=$here/$name.sh ;;
+    esac
+    [ -n "$known" ] && [ -e "$known" ] || { echo "M=$name: no such machine; allowed are trixie, avx, sse, aarch64" >&2; exit 2; }
+done
+
+# row MACHINE: its line of the table; fails when anything of it did.
+row() {
+    at=$build/machines/$1
+    if [ -e "$at/skipped.txt" ]; then
+        printf '%-9s skipped: %s\n' "$1" "$(cat "$at/skipped.txt")"
+        return 0
+    fi
+    built=$(cat "$at/built.txt" 2>/dev/null || echo "not built: see $at/build.txt")
+    counts=$(tail -n 1 "$at/tests.txt" 2>/dev/null | grep '^[0-9]* passed, [0-9]* failed, [0-9]* skipped$')
+    record=$(cat "$at/record.txt" 2>/dev/null || echo "not made")
+    printf '%-9s %s\n          tests: %s\n          record: %s\n' "$1" "$built" "${counts:-not run to the end}" "$record"
+    case "$built: $counts: $record" in
+    *" 0 warnings: "*" 0 failed, "*": as here"*) return 0 ;;
+    esac
+    return 1
+}
+
+# Nothing of the make that called this one counts in a root.
+unset MAKEFLAGS MFLAGS MAKELEVEL MAKEOVERRIDES
+for name; do
+    at=$build/machines/$name
+    mkdir -p "$at" || exit 1
+    rm -f "$at/tests.txt" "$at/record.txt" "$at/built.txt" "$at/skipped.txt"
+    echo "$name: $(sed -n '2s/^# //p' "$here/$name.sh")"
+    sh "$here/$name.sh" "$build" "$at"
+    { row "$name"; echo; grep -h '^FAIL' "$at/tests.txt"; sed -n '/^skipped:$/,$p' "$at/tests.txt"; } >"$at.txt" 2>/dev/null
+done
+status=0
+echo
+for name; do row "$name" || status=1; done
+exit $status
