@@ -141,9 +141,10 @@ static int claim_pulses(struct device *device, uint64_t tick, struct device_work
     if (end > work->pulse0) device->scan.stretch = site_stretch_at(device->site, schedule_time_ns(seg, end - 1));
     work->cut_short = (stop || ends) && end < seg->end_pulse;
     device_take_poses(device, work);
-    struct schedule_line line;
-    schedule_get_line(seg, schedule_line_of(seg, end), &line);
-    device->cmd.frames_done = end >= seg->end_pulse && seg->spec.frames != 0 ? seg->spec.frames : line.frame;
+    struct schedule_line line; /* of the next pulse, or of the last one: frames may be set to fewer than there are */
+    const int is_whole = end >= seg->end_pulse && seg->spec.frames != 0;
+    schedule_get_line(seg, schedule_line_of(seg, is_whole ? end - 1 : end), &line);
+    device->cmd.frames_done = (uint64_t)line.frame + (uint64_t)is_whole;
     return done || stop || ends;
 }
 

@@ -114,6 +114,27 @@ static void a_stop_in_spin_up_never_scans(void **state)
     rig_close(rig);
 }
 
+/* In the second frame, of 150,000 pulses each: as many as are done, that many with the one that runs, one more. */
+static void frames_are_counted_with_the_one_that_runs(void **state)
+{
+    (void)state;
+    static const uint64_t frames[] = {1, 2, 3}, then_done[] = {2, 2, 3};
+    for (int i = 0; i < 3; i++) {
+        const char *const sets[] = {"head.frames=0"};
+        struct rig *rig = rig_open(&(struct device_options){.start = 1}, sets, 1);
+        char line[32], done[32];
+        rig_wait(rig, NATIVE_EV_SCAN_START, 1000);
+        rig_go_to(rig, rig->next + 700);
+        assert_string_equal(rig_tell(rig, "SCAN:COUNT?", rig->next), "1");
+        snprintf(line, sizeof line, "SCAN:FRAMES %u", (unsigned)frames[i]);
+        rig_tell(rig, line, rig->next);
+        assert_int_equal(rig_wait(rig, NATIVE_EV_SCAN_END, 1000)->b, then_done[i] * 150000);
+        snprintf(done, sizeof done, "%u", (unsigned)then_done[i]);
+        assert_string_equal(rig_tell(rig, "SCAN:COUNT?", rig->next), done);
+        rig_close(rig);
+    }
+}
+
 /* A reader that joins a head at rest has descriptor and anchor within a second, too. They begin nothing. */
 static void a_head_at_rest_describes_itself_each_second(void **state)
 {
@@ -310,6 +331,7 @@ int main(void)
         cmocka_unit_test(a_command_reaches_the_beam_within_100_ms),
         cmocka_unit_test(no_spin_up_time_starts_with_the_next_tick),
         cmocka_unit_test(a_stop_in_spin_up_never_scans),
+        cmocka_unit_test(frames_are_counted_with_the_one_that_runs),
         cmocka_unit_test(a_head_at_rest_describes_itself_each_second),
         cmocka_unit_test(no_command_leads_to_off_or_fault),
         cmocka_unit_test(descriptor_and_anchor_come_first_and_every_second),

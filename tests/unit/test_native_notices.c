@@ -318,6 +318,23 @@ static void test_resume(void **state)
     assert_int_equal(parser.stats.bytes, 5 * FRAME + 50);
 }
 
+/* A head that was started again meanwhile sends the same frames, and they are not those of before. */
+static void test_resume_with_old_numbers(void **state)
+{
+    (void)state;
+    n_bytes = 0;
+    put(4, 0);
+    put(5, 0);
+    listen_again();
+    feed(bytes, n_bytes, n_bytes);
+    finish();
+    native_parser_resume(&parser);
+    feed(bytes, n_bytes, n_bytes);
+    assert_int_equal(n_noticed, 1);
+    expect(0, NATIVE_RESTARTED, 2 * FRAME, 4, 1);
+    assert_int_equal(parser.stats.frames, 4);
+}
+
 /* The client attaches again in the middle of a frame, whichever byte that is. What comes then, a frame or a reply, is
  * whole; what was had of the frame before is lost, and is said to be. */
 static void test_resume_in_a_frame(void **state)
@@ -366,9 +383,14 @@ static void test_nobody_listens(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_sequence),          cmocka_unit_test(test_bytes),  cmocka_unit_test(test_end),
-        cmocka_unit_test(test_bad_unseen),        cmocka_unit_test(test_resume), cmocka_unit_test(test_nobody_listens),
+        cmocka_unit_test(test_sequence),
+        cmocka_unit_test(test_bytes),
+        cmocka_unit_test(test_end),
+        cmocka_unit_test(test_bad_unseen),
+        cmocka_unit_test(test_resume),
+        cmocka_unit_test(test_nobody_listens),
         cmocka_unit_test(test_resume_in_a_frame),
+        cmocka_unit_test(test_resume_with_old_numbers),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
