@@ -126,6 +126,48 @@ static void tolerances_follow_the_plan(void **state)
     }
 }
 
+/* Settings that a client has changed, in nanometres, become the lengths that a file would have given; a pulse rate whose
+ * range is shorter keeps its own limits. */
+static void settings_become_lengths(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"head.profile=riegl-vz600i", "head.prr_hz=600000"};
+    assert_loads(load_sets(sets, 2));
+    struct head_settings settings = cfg->head.settings;
+    const double shortest_m = cfg->profile.program[cfg->profile.n_programs - 1].own_max_m;
+    const double longest_m = cfg->profile.program[0].own_max_m;
+    assert_true(cfg->profile.n_programs > 1 && shortest_m < longest_m);
+    settings.range_min_nm = 1234567891;
+    settings.range_max_nm = (int64_t)(5e8 * (shortest_m + longest_m)) + 7;
+    settings.sigma_nm = 3000001;
+    settings.ball_nm = 3;
+    assert_int_equal(config_apply_settings(cfg, &settings, &err), SH_OK);
+    assert_true(cfg->head.range_min_m == 1.234567891 && cfg->noise.sigma_m == 0.003000001);
+    assert_true(cfg->noise.ball.radius_m == 3e-9);
+    for (uint32_t i = 0; i < cfg->profile.n_programs; i++) {
+        const double own_m = cfg->profile.program[i].own_max_m, set_m = (double)settings.range_max_nm / 1e9;
+        assert_true(cfg->profile.program[i].range_max_m == (own_m < set_m ? own_m : set_m));
+    }
+}
+
+/* A station in UTM takes zone and hemisphere from an anchor in UTM, north or south. */
+static void stations_take_the_grid_of_the_anchor(void **state)
+{
+    (void)state;
+    static const char *const sets[2][3] = {
+        {"scene.anchor.source=utm", "scene.anchor.utm_zone=33", "scene.anchor.hemisphere=north"},
+        {"scene.anchor.source=utm", "scene.anchor.utm_zone=19", "scene.anchor.hemisphere=south"}};
+    char *text = edited("  - position_m: [1, 2, 3]\n", "  - easting_m: 5e5\n    northing_m: 4e6\n    height_m: 9\n");
+    write_file(config_path, text, strlen(text));
+    for (int south = 0; south < 2; south++) {
+        assert_loads(load_sets(sets[south], 3));
+        assert_int_equal(cfg->station[0].utm_zone, south ? 19 : 33);
+        assert_int_equal(cfg->station[0].north, !south);
+    }
+    free(text);
+    write_file(config_path, base, strlen(base));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -133,6 +175,8 @@ int main(void)
         cmocka_unit_test(set_appends_elements),
         cmocka_unit_test(set_refuses),
         cmocka_unit_test(tolerances_follow_the_plan),
+        cmocka_unit_test(settings_become_lengths),
+        cmocka_unit_test(stations_take_the_grid_of_the_anchor),
         cmocka_unit_test(a_full_list_takes_no_more),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

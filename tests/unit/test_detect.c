@@ -9,6 +9,7 @@
 #include "core/line.h"
 #include "core/rng.h"
 #include "core/surface.h"
+#include "core/surface/texture.h"
 
 static const double TURN = 6.283185307179586477;
 
@@ -69,6 +70,15 @@ static void what_surfaces_send_back(void **state)
         if (!(fabs(rho[i] - expected[i]) <= 1e-12 * expected[i]))
             fail_msg("case %d: %.15g, not %.15g", i, rho[i], expected[i]);
     surface_table_free(&table);
+}
+
+/* IEC 61966-2-1: straight up to 0.04045, where both pieces meet to the digits that the standard gives. */
+static void dark_colours_are_straight(void **state)
+{
+    (void)state;
+    assert_true(fabs(surface_linear(0.02) - 0.02 / 12.92) < 1e-16 && surface_linear(0.0) == 0.0);
+    assert_true(fabs(surface_linear(0.04045) - surface_linear(0.04046)) < 1e-6);
+    assert_true(fabs(surface_linear(0.5) - 0.21404114) < 1e-8 && surface_linear(1.0) == 1.0);
 }
 
 /* The widest lobe there is, of gloss 0, ends 90 degrees off the mirror direction, too: met at 45 degrees. */
@@ -336,6 +346,7 @@ int main(void)
         cmocka_unit_test(reflectance_is_the_targets),
         cmocka_unit_test(amplitude_follows_the_range_equation),
         cmocka_unit_test(a_lobe_ends_beside_the_surface),
+        cmocka_unit_test(dark_colours_are_straight),
         cmocka_unit_test(extinction_by_visibility),
         cmocka_unit_test(range_noise_has_a_floor),
         cmocka_unit_test(reaches_that_contradict_are_refused),

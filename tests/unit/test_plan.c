@@ -73,6 +73,9 @@ static void test_least_off(void **state)
     some[0].echo_share = 3e-2;
     assert_int_equal(choose(&row, "beam", some, 3, -1, ""), 1);
     expect(&row, "a", 0, "the one with the least error; does not hold");
+    /* five times the range that is allowed is worse than twice the share of other echo counts */
+    const struct plan_option two[2] = {{"f", 5e-3, 0.0, 1.0, ""}, {"g", 1e-4, 2e-2, 2.0, ""}};
+    assert_int_equal(choose(&row, "beam", two, 2, -1, ""), 1);
     /* options go from rough to exact: where all miss by as much, the last that can be had */
     struct plan_option same[4] = {{"none", 0.0, 1.0, 0.0, ""},
                                   {"1", 0.0, 1.0, 1.0, ""},

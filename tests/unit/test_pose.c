@@ -183,6 +183,22 @@ static struct trajectory *along_x(const double *t_s, const double *x_m, size_t n
     return tr;
 }
 
+/* Samples are at least POSE_MIN_STEP_US apart, to a rounding of their times; nearer ones are refused. */
+static void test_samples_too_near(void **state)
+{
+    (void)state;
+    for (int near = 0; near < 2; near++) {
+        const double step_s = 1e-6 * POSE_MIN_STEP_US * (near ? 0.99 : 1.0);
+        const struct pose_sample sample[2] = {{.t_s = 7.0, .pose = {.quat = {1.0, 0.0, 0.0, 0.0}}},
+                                              {.t_s = 7.0 + step_s, .pose = {.quat = {1.0, 0.0, 0.0, 0.0}}}};
+        struct trajectory *tr;
+        struct sh_err err;
+        assert_int_equal(trajectory_from_samples(sample, 2, &tr, &err), near ? SH_EINPUT : SH_OK);
+        if (near) assert_non_null(strstr(err.text, "sample 1: "));
+        trajectory_free(tr);
+    }
+}
+
 /* Velocities are those of a parabola through three samples, at the ends too: what is a parabola stays one, with samples
  * at any distance. Rounding: 1e-15 of 30 m, some times. */
 static void test_parabola(void **state)
@@ -423,11 +439,21 @@ static void test_slow_knots(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_short_way), cmocka_unit_test(test_find_knot),       cmocka_unit_test(test_straight_up),
-        cmocka_unit_test(test_parabola),  cmocka_unit_test(test_pause),           cmocka_unit_test(test_convention),
-        cmocka_unit_test(test_between),   cmocka_unit_test(test_straight_line),   cmocka_unit_test(test_constant_turn),
-        cmocka_unit_test(test_knots),     cmocka_unit_test(test_knots_to_an_end), cmocka_unit_test(test_slow_knots),
-        cmocka_unit_test(test_pole),      cmocka_unit_test(test_ends),
+        cmocka_unit_test(test_short_way),
+        cmocka_unit_test(test_find_knot),
+        cmocka_unit_test(test_straight_up),
+        cmocka_unit_test(test_parabola),
+        cmocka_unit_test(test_pause),
+        cmocka_unit_test(test_convention),
+        cmocka_unit_test(test_between),
+        cmocka_unit_test(test_straight_line),
+        cmocka_unit_test(test_constant_turn),
+        cmocka_unit_test(test_knots),
+        cmocka_unit_test(test_knots_to_an_end),
+        cmocka_unit_test(test_slow_knots),
+        cmocka_unit_test(test_pole),
+        cmocka_unit_test(test_ends),
+        cmocka_unit_test(test_samples_too_near),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -201,6 +201,23 @@ static void a_soiled_window_makes_ranges_noisy(void **state)
     cast_rig_close(rig);
 }
 
+/* A wobble is a sine from its begin on: 0 there, the whole after a quarter of a period, minus that after three. */
+static void a_wobble_begins_at_rest(void **state)
+{
+    (void)state;
+    const struct cast_upset upset = {.share = 1.0,
+                                     .n_wobbles = 2,
+                                     .wobble = {{.mirror_turn = 0.02, .pan_turn = 0.03, .hz = 2.0, .begin_ns = 1000},
+                                                {.mirror_turn = 0.5, .pan_turn = 0.25, .hz = 4.0, .begin_ns = 1000}}};
+    static const double wave[] = {0.0, 1.0, 0.0, -1.0, 0.0};
+    for (int k = 0; k < 5; k++) { /* the second one is back at rest at each of these */
+        double mirror_turn = 0.1, pan_turn = 0.2;
+        cast_wobble(&upset, 1000 + 125000000 * (int64_t)k, &mirror_turn, &pan_turn);
+        assert_true(fabs(mirror_turn - 0.1 - 0.02 * wave[k]) < 1e-14);
+        assert_true(fabs(pan_turn - 0.2 - 0.03 * wave[k]) < 1e-14);
+    }
+}
+
 /* A laser that is dark: all shots are empty, and the encoders read on. */
 static void a_dark_laser_has_no_echo(void **state)
 {
@@ -225,8 +242,11 @@ static void a_dark_laser_has_no_echo(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_slipped_pan_of_any_head),          cmocka_unit_test(positions_follow_the_encoders),
-        cmocka_unit_test(a_soiled_window_is_a_weaker_signal), cmocka_unit_test(a_soiled_window_makes_ranges_noisy),
+        cmocka_unit_test(a_slipped_pan_of_any_head),
+        cmocka_unit_test(positions_follow_the_encoders),
+        cmocka_unit_test(a_soiled_window_is_a_weaker_signal),
+        cmocka_unit_test(a_soiled_window_makes_ranges_noisy),
+        cmocka_unit_test(a_wobble_begins_at_rest),
         cmocka_unit_test(a_dark_laser_has_no_echo),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

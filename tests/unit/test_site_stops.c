@@ -1,0 +1,76 @@
+/* Stops of a head along a trajectory: how many, when, where, and how it is turned there by its mount. */
+#include "tests/unit/site_rig.h"
+
+#include <math.h>
+
+#include "core/angle.h"
+#include "core/pose.h"
+
+/* 2 m/s along x in 1.2 s from 5 s on, looking north. */
+static const char PATH[] = "t_s,x_m,y_m,z_m,heading_deg,pitch_deg,roll_deg\n5,0,0,2,0,0,0\n6.2,2.4,0,2,0,0,0\n";
+
+static struct site *load(const char *platform)
+{
+    char text[512];
+    struct site *site;
+    write_in("room.obj", "v -50 -50 0\nv 50 -50 0\nv 50 50 0\nv -50 50 0\nf 1 2 3 4\n");
+    write_in("path.csv", PATH);
+    snprintf(text, sizeof text,
+             "head: {profile: full-sweep}\nscene: {meshes: [{file: room.obj, up: z, scale: 1}]}\n"
+             "stations: [{position_m: [0, 0, 2]}]\nplatform: {kind: stops, file: path.csv, %s}\n",
+             platform);
+    write_in("test.yaml", text);
+    if (config_load(config_path, NULL, 0, cfg, &err) != SH_OK || site_load(cfg, &report, &site, &err) != SH_OK)
+        fail_msg("%s", err.text);
+    return site;
+}
+
+/* 0.1 s divides 1.2 s, 0.3 s and 0.9 s, but not to the last bit: the stop at the end is one. It lies at the end of the part
+ * that is asked for, not beyond it. */
+static void the_last_stop_is_at_the_end(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *platform;
+        uint32_t stops;
+        double last_x_m;
+    } is[] = {{"step_s: 0.1", 13, 2.4},
+              {"step_s: 0.3", 5, 2.4},
+              {"step_s: 0.25", 5, 2.0},
+              {"step_s: 0.1, end_s: 0.3", 4, 0.6},
+              {"step_s: 0.1, start_s: 0.2, end_s: 1.1", 10, 2.2},
+              {"step_s: 2", 1, 0.0}};
+    for (size_t i = 0; i < sizeof is / sizeof is[0]; i++) {
+        struct site *site = load(is[i].platform);
+        if (site->n_stations != is[i].stops)
+            fail_msg("%s: %u stops, not %u", is[i].platform, site->n_stations, is[i].stops);
+        const double x_m = site->station[site->n_stations - 1].at.position_m[0];
+        assert_true(x_m <= is[i].last_x_m + 1e-15 && fabs(x_m - is[i].last_x_m) < 1e-9);
+        site_free(site);
+    }
+}
+
+/* The mount turns the head on the body: heading, pitch and roll each by itself, and its arm with it. */
+static void the_mount_turns_the_head(void **state)
+{
+    (void)state;
+    struct site *site =
+        load("step_s: 2, mount_m: [0.1, 0.2, 0.3], mount_heading_deg: 40, mount_pitch_deg: -25, mount_roll_deg: 10");
+    const struct placement *at = &site->station[0].at;
+    double want[9];
+    pose_attitude(angle_rad(40.0), angle_rad(-25.0), angle_rad(10.0), want);
+    for (int i = 0; i < 9; i++)
+        assert_true(fabs(at->rotation[i] - want[i]) < 1e-12);
+    assert_true(fabs(at->position_m[0] - 0.1) < 1e-12 && fabs(at->position_m[1] - 0.2) < 1e-12 &&
+                fabs(at->position_m[2] - 2.3) < 1e-12);
+    site_free(site);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(the_last_stop_is_at_the_end, site_rig_setup, site_rig_teardown),
+        cmocka_unit_test_setup_teardown(the_mount_turns_the_head, site_rig_setup, site_rig_teardown),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
