@@ -303,7 +303,7 @@ void pacing_watch(void (*planted)(int sleep))
 /* What ends a thread, once it sleeps no more. */
 static int is_the_end(const struct found *f)
 {
-    static const int ends[] = {SYS_madvise, SYS_munmap, SYS_rt_sigprocmask, SYS_exit};
+    static const int ends[] = {SYS_madvise, SYS_munmap, SYS_rt_sigprocmask, SYS_rseq, SYS_exit};
     for (size_t i = 0; i < sizeof ends / sizeof *ends; i++)
         if (f->nr == ends[i] && f->at_sleep == atomic_load(&sleeps)) return 1;
     return 0;
