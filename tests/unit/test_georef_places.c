@@ -184,6 +184,14 @@ static void test_degrees(void **state)
     for (int i = 0; i < 9; i++)
         expect_near(axes[i], i % 4 == 0, 1e-8);
     georef_free(georef);
+    /* a scene whose x axis points north */
+    struct georef_spec spec = {.crs = GEOREF_GEODETIC, .lat_deg = 47, .lon_deg = 9, .rotation = {0, -1, 0, 1, 0, 0, 0, 0, 1}};
+    struct sh_err err = {0, ""};
+    if (georef_create(&spec, &georef, &err) != SH_OK) fail_msg("%s", err.text);
+    georef_axes(georef, axes);
+    for (int i = 0; i < 9; i++)
+        expect_near(axes[i], spec.rotation[i], 1e-8);
+    georef_free(georef);
 }
 
 /* Order 5 is for maps that leave heights as they are. */
