@@ -50,7 +50,8 @@ static void test_tilted(void **state)
         const double lat = lat_deg[i / 2 % 3], tilt = tilt_deg[i / 6];
         struct georef *georef = make_tilted(crs, lat, tilt);
         for (enum georef_method m = GEOREF_ORDER1; m <= GEOREF_ORDER3; m++) {
-            const double error_m = largest_error_m(georef, m, lat), bound_m = georef_bound_m(georef, m, RADIUS_M, HEIGHT_M);
+            const double error_m = largest_error_m(georef, m, lat),
+                         bound_m = georef_bound_m(georef, m, RADIUS_M, HEIGHT_M);
             if (!(error_m <= bound_m))
                 fail_msg("latitude %g, tilted by %g, EPSG %d, order %d: off by %.3g m, bound %.3g m", lat, tilt,
                          georef_epsg(georef), 1 + (int)m - (int)GEOREF_ORDER1, error_m, bound_m);
@@ -79,10 +80,12 @@ static void test_polar_grids(void **state)
         if (rc == SH_OK) rc = georef_create(&spec, &georef, &err);
         if (rc != SH_OK) fail_msg("%s", err.text);
         for (enum georef_method m = GEOREF_ORDER1; m <= GEOREF_ORDER3; m++) {
-            const double error_m = largest_error_m(georef, m, at.lat_deg), bound_m = georef_bound_m(georef, m, RADIUS_M, HEIGHT_M);
+            const double error_m = largest_error_m(georef, m, at.lat_deg),
+                         bound_m = georef_bound_m(georef, m, RADIUS_M, HEIGHT_M);
             assert_true(isfinite(bound_m));
             if (!(error_m <= bound_m))
-                fail_msg("latitude %g, longitude %g: off by %.3g m, bound %.3g m", at.lat_deg, at.lon_deg, error_m, bound_m);
+                fail_msg("latitude %g, longitude %g: off by %.3g m, bound %.3g m", at.lat_deg, at.lon_deg, error_m,
+                         bound_m);
         }
         georef_free(georef);
     }

@@ -18,10 +18,11 @@ static int set_up(void **state)
     snprintf(path, sizeof path, "%s/slope.pgm", folder);
     FILE *f = fopen(path, "wb");
     if (f == NULL) return -1;
-    fprintf(f, "P5\n# Geoid file in PGM format for the GeographicLib::Geoid class\n# Description a slope\n"
-               "# DateTime 2026-01-01 00:00:00\n# MaxBilinearError 0.01\n# RMSBilinearError 0.01\n# MaxCubicError 0.01\n"
-               "# RMSCubicError 0.01\n# Offset -100\n# Scale 0.01\n# Origin 90N 0E\n# AREA_OR_POINT Point\n"
-               "# Vertical_Datum WGS84\n%d %d\n65535\n",
+    fprintf(f,
+            "P5\n# Geoid file in PGM format for the GeographicLib::Geoid class\n# Description a slope\n"
+            "# DateTime 2026-01-01 00:00:00\n# MaxBilinearError 0.01\n# RMSBilinearError 0.01\n# MaxCubicError 0.01\n"
+            "# RMSCubicError 0.01\n# Offset -100\n# Scale 0.01\n# Origin 90N 0E\n# AREA_OR_POINT Point\n"
+            "# Vertical_Datum WGS84\n%d %d\n65535\n",
             WIDTH, HEIGHT);
     for (int row = 0; row < HEIGHT; row++)
         for (int column = 0; column < WIDTH; column++) {
