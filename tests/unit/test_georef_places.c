@@ -184,6 +184,10 @@ static void test_degrees(void **state)
     for (int i = 0; i < 9; i++)
         expect_near(axes[i], i % 4 == 0, 1e-8);
     georef_free(georef);
+    /* also a rotation rounds: doubles of 6.4e6 m step by 1e-9 m */
+    georef = make(GEOREF_ECEF, 47, 9, 200, 0);
+    assert_true(georef_bound_m(georef, GEOREF_EXACT, 100, 10) >= 1e-9);
+    georef_free(georef);
     /* a scene whose x axis points north */
     struct georef_spec spec = {.crs = GEOREF_GEODETIC, .lat_deg = 47, .lon_deg = 9, .rotation = {0, -1, 0, 1, 0, 0, 0, 0, 1}};
     struct sh_err err = {0, ""};
@@ -206,6 +210,7 @@ static void test_orders(void **state)
         assert_non_null(strstr(err.text, "allowed exact, order1, order2, order3"));
         assert_true(isinf(georef_bound_m(georef, GEOREF_ORDER5, 100, 10)));
         assert_int_equal(georef_set_method(georef, GEOREF_ORDER3, &err), SH_OK);
+        assert_true(isinf(georef_bound_m(georef, GEOREF_ORDER3, 21000, 10))); /* fitted within 20 km */
         georef_free(georef);
     }
 }
