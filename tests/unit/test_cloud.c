@@ -260,6 +260,24 @@ static void losses_of_the_file_are_told(void **state)
     cloud_free(&c);
 }
 
+/* Degrees as float: 179 degrees of 111,320 m, by 6e-8 of them. */
+static void test_degrees_as_float(void **state)
+{
+    (void)state;
+    static const char head[] = "ply\nformat binary_little_endian 1.0\ncomment epsg 4979\nelement vertex 1\n"
+                               "property float x\nproperty float y\nproperty float z\nend_header\n";
+    struct bytes b = {.n = 0};
+    memcpy(b.data, head, sizeof head - 1);
+    b.n = sizeof head - 1;
+    PUT(&b, float, 47);
+    PUT(&b, float, 179);
+    PUT(&b, float, 100);
+    struct cloud c = must_read("a.ply", b.data, b.n);
+    assert_non_null(strstr(warnings, "single precision, so good to 1.2 m only"));
+    assert_true(fabs(c.count_m - 2.39) < 0.01);
+    cloud_free(&c);
+}
+
 /* CloudCompare's names of scalar fields, which our recorder writes on request. */
 static void test_scalar_names(void **state)
 {
@@ -279,6 +297,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_scalar_names),
+        cmocka_unit_test(test_degrees_as_float),
         cmocka_unit_test(all_encodings_are_read),
         cmocka_unit_test(what_is_missing_is_told_apart),
         cmocka_unit_test(columns_are_read_where_asked_for),

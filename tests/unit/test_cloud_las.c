@@ -149,9 +149,56 @@ static void test_geodetic(void **state)
     unlink(rig_path("a.las"));
 }
 
+static void put(uint8_t *to, int bytes, uint64_t v)
+{
+    for (int i = 0; i < bytes; i++)
+        to[i] = (uint8_t)(v >> 8 * i);
+}
+
+/* Another program's file: a byte of its own stands before the label. */
+static void test_label_behind_others(void **state)
+{
+    (void)state;
+    enum { VLR = 375, ENTRIES = VLR + 54, POINTS = ENTRIES + 2 * 192, LEN = 33 };
+    static uint8_t file[POINTS + LEN];
+    struct cloud cloud;
+    struct sh_err err = {0};
+    const double one = 1;
+    memcpy(file, "LASF", 4);
+    file[24] = 1;
+    file[25] = 4;
+    put(file + 94, 2, VLR);
+    put(file + 96, 4, POINTS);
+    put(file + 100, 4, 1);
+    file[104] = 6;
+    put(file + 105, 2, LEN);
+    for (int k = 0; k < 3; k++)
+        memcpy(file + 131 + 8 * k, &one, 8);
+    put(file + 247, 8, 1);
+    memcpy(file + VLR + 2, "LASF_Spec", 9);
+    put(file + VLR + 18, 2, 4);
+    put(file + VLR + 20, 2, 2 * 192);
+    file[ENTRIES + 2] = 1; /* a byte */
+    memcpy(file + ENTRIES + 4, "quality", 7);
+    file[ENTRIES + 192 + 2] = 3; /* two bytes */
+    memcpy(file + ENTRIES + 192 + 4, "label", 5);
+    file[POINTS + 14] = 0x11;
+    put(file + POINTS + 20, 2, 1);
+    file[POINTS + 30] = 99;
+    put(file + POINTS + 31, 2, 40123);
+    FILE *f = fopen(rig_path("a.las"), "wb");
+    assert_non_null(f);
+    assert_int_equal(fwrite(file, 1, sizeof file, f), sizeof file);
+    assert_int_equal(fclose(f), 0);
+    if (cloud_read(rig_path("a.las"), NULL, &cloud, &err) != 0) fail_msg("%s", err.text);
+    assert_int_equal(cloud.label[0], 40123);
+    cloud_free(&cloud);
+    unlink(rig_path("a.las"));
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_read), cmocka_unit_test(test_geodetic), cmocka_unit_test(test_degrees),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_read), cmocka_unit_test(test_geodetic), cmocka_unit_test(test_label_behind_others), cmocka_unit_test(test_degrees),
                                        cmocka_unit_test(test_broken)};
     return cmocka_run_group_tests(tests, rig_set_up, rig_tear_down);
 }

@@ -54,8 +54,8 @@ static void test_heights(void **state)
         const double *d = at[i % 4];
         const double seen_m = height_seen(in[i / 8].crs, in[i / 8].native, lon_deg[i / 4 % 2], d);
         if (!(fabs(seen_m - (STATION_M[2] + d[2])) < 2e-3))
-            fail_msg("CRS %d, longitude %g, %g %g %g: height %.4f, not %.4f", in[i / 8].crs, lon_deg[i / 4 % 2], d[0], d[1],
-                     d[2], seen_m, STATION_M[2] + d[2]);
+            fail_msg("CRS %d, longitude %g, %g %g %g: height %.4f, not %.4f", in[i / 8].crs, lon_deg[i / 4 % 2], d[0],
+                     d[1], d[2], seen_m, STATION_M[2] + d[2]);
     }
 }
 

@@ -67,15 +67,35 @@ static unsigned key_of(int epsg, int geoid, unsigned key)
 static void test_keys(void **state)
 {
     (void)state;
-    enum { MODEL = 1024, GEODETIC = 2048, ANGLES = 2054, PROJECTED = 3072, VERTICAL = 4096, METRE = 9001, DEGREE = 9102 };
+    enum {
+        MODEL = 1024,
+        GEODETIC = 2048,
+        ANGLES = 2054,
+        PROJECTED = 3072,
+        VERTICAL = 4096,
+        METRE = 9001,
+        DEGREE = 9102
+    };
     static const struct {
         int epsg, geoid;
         unsigned key, value;
     } want[] = {
-        {32633, 0, MODEL, 1},      {32633, 0, PROJECTED, 32633}, {32633, 0, GEODETIC, 0}, {32661, 0, PROJECTED, 5041},
-        {32761, 0, PROJECTED, 5042}, {4979, 0, MODEL, 2},        {4979, 0, GEODETIC, 4326}, {4979, 0, ANGLES, DEGREE},
-        {4979, 0, PROJECTED, 0},   {4978, 0, MODEL, 3},          {4978, 0, GEODETIC, 4978}, {4978, 0, 2052, METRE},
-        {4978, 0, VERTICAL, 0},    {32633, 0, VERTICAL, 5030},   {32633, 1, VERTICAL, 5773}, {4979, 1, VERTICAL, 5773},
+        {32633, 0, MODEL, 1},
+        {32633, 0, PROJECTED, 32633},
+        {32633, 0, GEODETIC, 0},
+        {32661, 0, PROJECTED, 5041},
+        {32761, 0, PROJECTED, 5042},
+        {4979, 0, MODEL, 2},
+        {4979, 0, GEODETIC, 4326},
+        {4979, 0, ANGLES, DEGREE},
+        {4979, 0, PROJECTED, 0},
+        {4978, 0, MODEL, 3},
+        {4978, 0, GEODETIC, 4978},
+        {4978, 0, 2052, METRE},
+        {4978, 0, VERTICAL, 0},
+        {32633, 0, VERTICAL, 5030},
+        {32633, 1, VERTICAL, 5773},
+        {4979, 1, VERTICAL, 5773},
         {0, 0, MODEL, 0},
     };
     for (size_t i = 0; i < sizeof want / sizeof want[0]; i++) {

@@ -157,6 +157,19 @@ static void density_is_points_by_area(void **state)
     near_to(row.p95, 1.0 / M_SQRT2);
     figures_density_within(&d, 2, 0.0, (double)INFINITY, &row);
     assert_true(row.cells == 0 && isnan(row.p50));
+    figures_density_within(&d, 1, 3.0, 5.0, &row); /* from the first one on, up to before the second */
+    assert_true(row.cells == 2 && row.points == 18);
+    figures_density_free(&d);
+    /* two stations by turns: where both have points there are two cells in one place */
+    uint16_t station[20];
+    for (size_t i = 0; i < n; i++)
+        station[i] = (uint16_t)(1 + i % 2);
+    const struct cloud both = {.n = n, .xyz_m = xyz, .station = station};
+    const struct cloud_site two = {.n_stations = 2, .max_m = 10, .threads = 1};
+    assert_int_equal(figures_density_of(&both, &two, scene, &in, triangle, 1.0, NULL, &d, &err), SH_OK);
+    assert_int_equal(d.n, 6);
+    figures_density_within(&d, 2, 0.0, (double)INFINITY, &row);
+    assert_true(row.cells == 3 && row.points == 10);
     figures_density_free(&d);
     scene_free(scene);
 }

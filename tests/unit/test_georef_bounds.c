@@ -1,5 +1,6 @@
 /* Bounds of georeferencing where the scene's frame does not lie level: what is far there may be far up here. */
 #include "core/angle.h"
+#include "core/geoframe.h"
 #include "tests/unit/georef_rig.h"
 
 enum { POINTS = 48 };
@@ -49,7 +50,8 @@ static void test_tilted(void **state)
         const double lat = lat_deg[i / 2 % 3], tilt = tilt_deg[i / 6];
         struct georef *georef = make_tilted(crs, lat, tilt);
         for (enum georef_method m = GEOREF_ORDER1; m <= GEOREF_ORDER3; m++) {
-            const double error_m = largest_error_m(georef, m, lat), bound_m = georef_bound_m(georef, m, RADIUS_M, HEIGHT_M);
+            const double error_m = largest_error_m(georef, m, lat),
+                         bound_m = georef_bound_m(georef, m, RADIUS_M, HEIGHT_M);
             if (!(error_m <= bound_m))
                 fail_msg("latitude %g, tilted by %g, EPSG %d, order %d: off by %.3g m, bound %.3g m", lat, tilt,
                          georef_epsg(georef), 1 + (int)m - (int)GEOREF_ORDER1, error_m, bound_m);
@@ -60,8 +62,37 @@ static void test_tilted(void **state)
     }
 }
 
+/* Scenes in a polar grid, whose degrees come by the meridian, too: on both sides, all around. */
+static void test_polar_grids(void **state)
+{
+    (void)state;
+    static const double lon_deg[] = {0, 75, -160};
+    for (int i = 0; i < 6; i++) {
+        const struct georef_place at = {i % 2 ? 86 : -86, lon_deg[i / 2], 100};
+        struct geoframe frame;
+        struct georef_spec spec = {.crs = GEOREF_GEODETIC};
+        struct georef *georef = NULL;
+        struct sh_err err = {0, ""};
+        double p[3];
+        int rc = geoframe_set_grid(&frame, 0, i % 2, &err);
+        if (rc == SH_OK) rc = geoframe_find(&frame, &at, p, &err);
+        if (rc == SH_OK) rc = geoframe_fill(&frame, p, &spec, &err);
+        if (rc == SH_OK) rc = georef_create(&spec, &georef, &err);
+        if (rc != SH_OK) fail_msg("%s", err.text);
+        for (enum georef_method m = GEOREF_ORDER1; m <= GEOREF_ORDER3; m++) {
+            const double error_m = largest_error_m(georef, m, at.lat_deg),
+                         bound_m = georef_bound_m(georef, m, RADIUS_M, HEIGHT_M);
+            assert_true(isfinite(bound_m));
+            if (!(error_m <= bound_m))
+                fail_msg("latitude %g, longitude %g: off by %.3g m, bound %.3g m", at.lat_deg, at.lon_deg, error_m,
+                         bound_m);
+        }
+        georef_free(georef);
+    }
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_tilted)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_tilted), cmocka_unit_test(test_polar_grids)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -147,6 +147,74 @@ static void test_scale(void **state)
     georef_free(georef);
 }
 
+/* The other hemisphere's false northing, and its code; a scene in a grid of the south keeps that. */
+static void test_sides(void **state)
+{
+    (void)state;
+    struct sh_err err = {0, ""};
+    for (int side = -1; side <= 1; side += 2) {
+        struct georef_spec spec = {.crs = GEOREF_UTM, .lat_deg = -0.1 * side, .lon_deg = 9, .side = side};
+        struct georef *georef = NULL;
+        double anchor[3];
+        if (georef_create(&spec, &georef, &err) != SH_OK) fail_msg("%s", err.text);
+        georef_anchor(georef, anchor);
+        assert_int_equal(georef_epsg(georef), side > 0 ? 32632 : 32732);
+        /* 0.1 degrees of 110,574 m, by 0.9996, beyond the equator */
+        expect_near(anchor[1], side > 0 ? -11053 : 1e7 + 11053, 1);
+        georef_free(georef);
+    }
+    struct georef_spec spec = {
+        .crs = GEOREF_UTM, .station_m = {500000, 6e6, 5}, .lat_deg = -36, .lon_deg = 15, .prcs_is_grid = 1, .prcs_zone = 33};
+    struct georef *georef = NULL;
+    if (georef_create(&spec, &georef, &err) != SH_OK) fail_msg("%s", err.text);
+    assert_int_equal(georef_epsg(georef), 32733);
+    georef_free(georef);
+}
+
+/* Degrees: the difference is the short way, and the axes are east, north, up. The map bends by less than 1e-9 over the
+ * steps that its axes are taken from, but for the ellipsoid's own 100 m / 6.4e6 m, which cancels on both sides. */
+static void test_degrees(void **state)
+{
+    (void)state;
+    struct georef *georef = make(GEOREF_GEODETIC, 47, 179.999, 200, 0);
+    double d[3], axes[9];
+    georef_difference(georef, (const double[3]){47.001, -179.999, 205}, d);
+    expect_point(d, 0.001, 0.002, 5, 1e-9);
+    georef_axes(georef, axes);
+    for (int i = 0; i < 9; i++)
+        expect_near(axes[i], i % 4 == 0, 1e-8);
+    georef_free(georef);
+    /* also a rotation rounds: doubles of 6.4e6 m step by 1e-9 m */
+    georef = make(GEOREF_ECEF, 47, 9, 200, 0);
+    assert_true(georef_bound_m(georef, GEOREF_EXACT, 100, 10) >= 1e-9);
+    georef_free(georef);
+    /* a scene whose x axis points north */
+    struct georef_spec spec = {.crs = GEOREF_GEODETIC, .lat_deg = 47, .lon_deg = 9, .rotation = {0, -1, 0, 1, 0, 0, 0, 0, 1}};
+    struct sh_err err = {0, ""};
+    if (georef_create(&spec, &georef, &err) != SH_OK) fail_msg("%s", err.text);
+    georef_axes(georef, axes);
+    for (int i = 0; i < 9; i++)
+        expect_near(axes[i], spec.rotation[i], 1e-8);
+    georef_free(georef);
+}
+
+/* Order 5 is for maps that leave heights as they are. */
+static void test_orders(void **state)
+{
+    (void)state;
+    struct sh_err err = {0, ""};
+    static const enum georef_crs crs[] = {GEOREF_UTM, GEOREF_GEODETIC};
+    for (int i = 0; i < 2; i++) {
+        struct georef *georef = make(crs[i], 47, 9, 200, 0);
+        assert_int_equal(georef_set_method(georef, GEOREF_ORDER5, &err), SH_EINPUT);
+        assert_non_null(strstr(err.text, "allowed exact, order1, order2, order3"));
+        assert_true(isinf(georef_bound_m(georef, GEOREF_ORDER5, 100, 10)));
+        assert_int_equal(georef_set_method(georef, GEOREF_ORDER3, &err), SH_OK);
+        assert_true(isinf(georef_bound_m(georef, GEOREF_ORDER3, 21000, 10))); /* fitted within 20 km */
+        georef_free(georef);
+    }
+}
+
 static void test_refusals(void **state)
 {
     (void)state;
@@ -182,6 +250,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_places), cmocka_unit_test(test_convergence), cmocka_unit_test(test_recentre),
         cmocka_unit_test(test_scale),  cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_sides),  cmocka_unit_test(test_degrees),    cmocka_unit_test(test_orders),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -118,12 +118,135 @@ static void test_geo_points(void **state)
     assert_int_equal(p[0].label, SCANHEAD_NO_LABEL);
 }
 
+/* Degrees: longitudes stay within 180, and ranges are straight through space. On the meridian a degree is its radius of
+ * curvature at the middle (WGS 84); what is left of the arc and the chord is 1e-8 of 2 km. */
+static void test_geodetic_points(void **state)
+{
+    (void)state;
+    static const double lon_deg[] = {179.9999, -179.9999};
+    static const int32_t count[4][3] = {{0, 30000, 0}, {0, -30000, 0}, {1800000, 0, 0}, {0, 0, 5000}};
+    for (int k = 0; k < 2; k++) {
+        int head;
+        struct scanhead *sh = open_pair(&head);
+        struct scanhead_frame f;
+        struct scanhead_point p[4];
+        struct native_anchor anchor = make_anchor();
+        const double at[3] = {45, lon_deg[k], 100}, scale[3] = {1e-8, 1e-8, 1e-3};
+        anchor.crs = NATIVE_CRS_GEODETIC;
+        anchor.epsg = 4979;
+        memcpy(anchor.anchor, at, sizeof at);
+        memcpy(anchor.scale, scale, sizeof scale);
+        for (int i = 0; i < 4; i++) {
+            a[i] = (uint32_t)count[i][0];
+            b[i] = (uint32_t)count[i][1];
+            c[i] = (uint32_t)count[i][2];
+            echo[i] = 0x11;
+        }
+        put_descriptor(head, 1, 1, 0);
+        const size_t len = native_encode_anchor(out, sizeof out, &anchor, 0, 0);
+        native_seal(out, rig_next_seq());
+        put_all(head, out, len);
+        put_points(head, 4, 0);
+        for (int i = 0; i < 3; i++)
+            assert_int_equal(scanhead_next(sh, &f, 5000), 0);
+        assert_int_equal(scanhead_points(sh, &f, 0, p, 4), 4);
+        assert_true(fabs(p[0].y - (k == 0 ? -179.9998 : -179.9996)) < 1e-12);
+        assert_true(fabs(p[1].y - (k == 0 ? 179.9996 : 179.9998)) < 1e-12);
+        assert_true(fabs(p[2].x - 45.018) < 1e-12 && fabs(p[3].z - 105) < 1e-12);
+        const double e2 = (2 - 1 / 298.257223563) / 298.257223563, s = sin(45.009 * M_PI / 180);
+        const double meridian_m = 6378137.0 * (1 - e2) / pow(1 - e2 * s * s, 1.5) + 100;
+        assert_true(fabs(p[2].range_m - 0.018 * M_PI / 180 * meridian_m) < 1e-3);
+        assert_true(fabs(p[3].range_m - 5) < 1e-8); /* differences of 6.4e6 m */
+        close(head);
+        scanhead_close(sh);
+    }
+}
+
+/* Each axis has a scale of its own. */
+static void test_scales(void **state)
+{
+    (void)state;
+    int head;
+    struct scanhead *sh = open_pair(&head);
+    struct scanhead_frame f;
+    struct scanhead_point p;
+    struct native_anchor anchor = make_anchor();
+    const double scale[3] = {1e-5, 2e-5, 3e-5};
+    memcpy(anchor.scale, scale, sizeof scale);
+    a[0] = b[0] = c[0] = 100000;
+    echo[0] = 0x11;
+    put_descriptor(head, 1, 1, 0);
+    const size_t len = native_encode_anchor(out, sizeof out, &anchor, 0, 0);
+    native_seal(out, rig_next_seq());
+    put_all(head, out, len);
+    put_points(head, 1, 0);
+    for (int i = 0; i < 3; i++)
+        assert_int_equal(scanhead_next(sh, &f, 5000), 0);
+    assert_int_equal(scanhead_points(sh, &f, 0, &p, 1), 1);
+    assert_true(p.x == anchor.anchor[0] + scale[0] * 100000 && p.y == anchor.anchor[1] + scale[1] * 100000 &&
+                p.z == anchor.anchor[2] + scale[2] * 100000);
+    close(head);
+    scanhead_close(sh);
+}
+
+/* Between two poses the head turns the short way, whatever the signs of their quaternions: half of 0.2 rad about z. Flags
+ * are those of both. */
+static void test_poses(void **state)
+{
+    (void)state;
+    for (int sign = -1; sign <= 1; sign += 2) {
+        int head;
+        struct scanhead *sh = open_pair(&head);
+        struct scanhead_frame f;
+        struct scanhead_pose pose;
+        const struct native_pose at[2] = {{.t_ns = 0, .quat = {1, 0, 0, 0}, .flags = 0},
+                                          {.t_ns = 1000,
+                                           .position_m = {2, 0, 0},
+                                           .quat = {sign * cos(0.1), 0, 0, sign * sin(0.1)},
+                                           .frame = 4,
+                                           .flags = 2}};
+        put_descriptor(head, 0, 1, 0);
+        const size_t len = native_encode_poses(out, sizeof out, at, 2, 0, 0);
+        native_seal(out, rig_next_seq());
+        put_all(head, out, len);
+        for (int i = 0; i < 2; i++)
+            assert_int_equal(scanhead_next(sh, &f, 5000), 0);
+        assert_int_equal(scanhead_pose(sh, 500, &pose), SCANHEAD_OK);
+        assert_true(pose.position_m[0] == 1 && pose.frame == 2 && pose.flags == 2);
+        assert_true(fabs(pose.quat[0] - cos(0.05)) < 1e-15 && fabs(pose.quat[3] - sin(0.05)) < 1e-15);
+        close(head);
+        scanhead_close(sh);
+    }
+}
+
+/* Pulses lost are told as they are lost, and once more at the scan's end. */
+static void test_pulses_lost(void **state)
+{
+    (void)state;
+    int head;
+    struct scanhead *sh = open_pair(&head);
+    struct scanhead_frame f;
+    struct scanhead_stats stats;
+    put_event(head, NATIVE_EV_OVERRUN, 1, 5, 0, 0);
+    put_event(head, NATIVE_EV_SCAN_END, 1, 100, 5, 0);
+    for (int i = 0; i < 2; i++)
+        expect_frame(sh, SCANHEAD_EVENT, &f);
+    scanhead_get_stats(sh, &stats);
+    assert_int_equal(stats.pulses_lost, 5);
+    close(head);
+    scanhead_close(sh);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_polar_points),
         cmocka_unit_test(test_polar_directions),
         cmocka_unit_test(test_geo_points),
+        cmocka_unit_test(test_geodetic_points),
+        cmocka_unit_test(test_scales),
+        cmocka_unit_test(test_poses),
+        cmocka_unit_test(test_pulses_lost),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

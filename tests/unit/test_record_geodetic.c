@@ -79,7 +79,7 @@ static void test_antimeridian(void **state)
     assert_int_equal(rig_int32(p + POINT), 0);
     assert_int_equal(rig_int32(p + POINT + 4), 3);
     assert_int_equal(rig_int32(p + 2 * POINT), 10000);
-    assert_true(fabs(rig_double(las + 179) - 180.0002) < 1e-9);  /* the largest longitude */
+    assert_true(fabs(rig_double(las + 179) - 180.0002) < 1e-9); /* the largest longitude */
     assert_true(fabs(rig_double(las + 187) - 179.9999) < 1e-9); /* the least */
 }
 

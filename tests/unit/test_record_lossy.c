@@ -111,9 +111,8 @@ static void test_rows_of_another_scan(void **state)
 
 static void put_poses(int64_t from_ms, int64_t to_ms, double y_m)
 {
-    const struct native_pose pose[2] = {
-        {.t_ns = from_ms * 1000000, .position_m = {0, y_m, 0}, .quat = {1, 0, 0, 0}},
-        {.t_ns = to_ms * 1000000, .position_m = {0, y_m, 0}, .quat = {1, 0, 0, 0}}};
+    const struct native_pose pose[2] = {{.t_ns = from_ms * 1000000, .position_m = {0, y_m, 0}, .quat = {1, 0, 0, 0}},
+                                        {.t_ns = to_ms * 1000000, .position_m = {0, y_m, 0}, .quat = {1, 0, 0, 0}}};
     rig_put(out, native_encode_poses(out, sizeof out, pose, 2, 0, 0));
 }
 
@@ -179,9 +178,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_another_station),       cmocka_unit_test(test_same_station),
-        cmocka_unit_test(test_same_number),
-        cmocka_unit_test(test_rows_of_another_scan),  cmocka_unit_test(test_poses_of_another_scan),
-        cmocka_unit_test(test_anchor_of_another_stretch),
+        cmocka_unit_test(test_same_number),           cmocka_unit_test(test_rows_of_another_scan),
+        cmocka_unit_test(test_poses_of_another_scan), cmocka_unit_test(test_anchor_of_another_stretch),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }

@@ -247,7 +247,7 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_several_heads), cmocka_unit_test(test_other_kinds),   cmocka_unit_test(test_ply_says),
+        cmocka_unit_test(test_several_heads), cmocka_unit_test(test_other_kinds),    cmocka_unit_test(test_ply_says),
         cmocka_unit_test(test_rows_of_beams), cmocka_unit_test(test_lines_of_rings), cmocka_unit_test(test_poles),
         cmocka_unit_test(test_sparse_labels),
     };

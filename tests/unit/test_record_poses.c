@@ -44,8 +44,8 @@ static void test_stations(void **state)
     const char *at = record();
     static const char head[] = "scan,station,epsg,x_m,y_m,z_m,qw,qx,qy,qz,lat_deg,lon_deg,height_m\n";
     assert_memory_equal(at, head, sizeof head - 1);
-    assert_int_equal(sscanf(at + sizeof head - 1, "%d,%d,%d,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf", &scan, &station, &epsg,
-                            &v[0], &v[1], &v[2], &v[3], &v[4], &v[5], &v[6], &v[7], &v[8], &v[9]),
+    assert_int_equal(sscanf(at + sizeof head - 1, "%d,%d,%d,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf", &scan, &station,
+                            &epsg, &v[0], &v[1], &v[2], &v[3], &v[4], &v[5], &v[6], &v[7], &v[8], &v[9]),
                      13);
     assert_true(scan == 1 && station == 3 && epsg == 32632);
     assert_true(v[0] == 500000.25 && v[1] == 5e6 && v[2] == 400.125);

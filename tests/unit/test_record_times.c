@@ -159,8 +159,10 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_las),        cmocka_unit_test(test_e57),
-        cmocka_unit_test(test_ply),        cmocka_unit_test(test_late_clock),
+        cmocka_unit_test(test_las),
+        cmocka_unit_test(test_e57),
+        cmocka_unit_test(test_ply),
+        cmocka_unit_test(test_late_clock),
         cmocka_unit_test(test_clock_of_a_later_scan),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
