@@ -181,6 +181,17 @@ static void a_mesh_in_utm(void **state)
     assert_corner_agrees(corner);
 }
 
+/* At the equator a place 1 km south of it lies at 9,999 km in the southern grid, and at -1 km in the northern one that
+ * the scene is in: 500 m east of the middle that is so to the nanometre. */
+static void a_place_in_the_other_hemisphere_s_grid(void **state)
+{
+    (void)state;
+    write_floor(500500, -1000, 0);
+    ok(load("  anchor: {source: utm, utm_zone: 33, hemisphere: north}",
+            "  - {utm_zone: 33, hemisphere: south, easting_m: 500500, northing_m: 9999000, height_m: 2}", "utm"));
+    assert_position(0, 500500, -1000, 2, 1e-6);
+}
+
 /* A scene in ECEF: the floor is down the plumb line, the head upright; at (a, 0, 0) down is -X. */
 static void a_mesh_in_ecef(void **state)
 {
@@ -334,6 +345,7 @@ int main(void)
         cmocka_unit_test(instrument_height_moves_the_height_on_the_earth),
         cmocka_unit_test(a_zone_border_does_not_part_stations),
         cmocka_unit_test(a_mesh_in_utm),
+        cmocka_unit_test(a_place_in_the_other_hemisphere_s_grid),
         cmocka_unit_test(a_mesh_in_ecef),
         cmocka_unit_test(an_instrument_height_counts_from_the_floor),
         cmocka_unit_test(what_has_no_place_is_refused),

@@ -1,0 +1,16 @@
+/* For tests of the BVH alone: a few triangles, and a BVH about ORIGIN. */
+#ifndef TESTS_UNIT_BVH_RIG_H
+#define TESTS_UNIT_BVH_RIG_H
+
+#include "core/bvh/bvh_inside.h"
+#include "tests/common/cases.h"
+
+extern const double ORIGIN[3]; /* prcs, m */
+
+/* Surfaces 0 and 1; label NULL: all are of surface 0. */
+struct scene *scene_of(const double (*vertex)[3], uint32_t n_vertices, const uint32_t (*triangle)[3], uint32_t n,
+                       const uint16_t *label);
+
+struct bvh *bvh_of(const struct scene *scene, double reach_m);
+
+#endif
