@@ -48,16 +48,15 @@ static int say_view(const struct loop *loop, struct sh_err *err)
 /* To the service manager, once the links are open: until then whoever depends on this head waits. */
 static int notify_ready(const struct loop *loop, struct sh_err *err)
 {
+    enum { ROOM = 64 + (CONFIG_MAX_LINKS + 1) * (int)sizeof(struct link_place) }; /* one link is the observer's */
     struct link_place place;
-    char text[2048] = "READY=1\nSTATUS=links open:";
+    char text[ROOM] = "READY=1\nSTATUS=links open:";
     size_t n = strlen(text);
     if (!notify_is_wanted()) return SH_OK;
     for (uint32_t i = 0; loop_get_place(loop, i, &place); i++) {
         if (strcmp(place.type, "fd") == 0) continue; /* within this process */
         text_keep_line(place.endpoint);
-        const int len = snprintf(text + n, sizeof text - n, " %s", place.endpoint);
-        if ((size_t)len >= sizeof text - n) break;
-        n += (size_t)len;
+        n += (size_t)snprintf(text + n, sizeof text - n, " %s", place.endpoint);
     }
     return notify_send(text, err);
 }
