@@ -114,6 +114,26 @@ static void a_stop_in_spin_up_never_scans(void **state)
     rig_close(rig);
 }
 
+/* Time that is granted is no command of the session: a journal has the others alone. */
+static void a_journal_has_no_steps(void **state)
+{
+    (void)state;
+    const char *const sets[] = {"loop.pace=step"};
+    struct journal_entry *entry;
+    struct sh_err err;
+    size_t n;
+    struct rig *rig = rig_open(&(struct device_options){.journal = journal_path}, sets, 1);
+    rig_tell(rig, "TIME:STEP 250 MS", 0);
+    rig_go_to(rig, 250);
+    rig_tell(rig, "HEAD:LINES 50", 249);
+    rig_tell(rig, "TIME:STEP 1 MS", 250);
+    rig_close(rig);
+    need(journal_read(journal_path, &entry, &n, &err), &err);
+    assert_int_equal(n, 1);
+    assert_string_equal(entry[0].line, "HEAD:LINES 50");
+    free(entry);
+}
+
 /* In the second frame, of 150,000 pulses each: as many as are done, that many with the one that runs, one more. */
 static void frames_are_counted_with_the_one_that_runs(void **state)
 {
@@ -332,6 +352,7 @@ int main(void)
         cmocka_unit_test(no_spin_up_time_starts_with_the_next_tick),
         cmocka_unit_test(a_stop_in_spin_up_never_scans),
         cmocka_unit_test(frames_are_counted_with_the_one_that_runs),
+        cmocka_unit_test(a_journal_has_no_steps),
         cmocka_unit_test(a_head_at_rest_describes_itself_each_second),
         cmocka_unit_test(no_command_leads_to_off_or_fault),
         cmocka_unit_test(descriptor_and_anchor_come_first_and_every_second),

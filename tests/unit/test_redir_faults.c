@@ -75,6 +75,16 @@ static void test_late_guest(void **state)
     struct guest *g = guest_on(&bench, fd);
     guest_configure(g);
     guest_free(g);
+    bench_poll(&bench, 0, DEADLINE_MS); /* it has gone */
+    assert_int_equal(fault(&bench, LINK_FAULT_UNPLUG, 0, 0.0), SH_OK);
+    g = guest_begin(&bench, guest_socket()); /* one that has said hello meanwhile */
+    for (int i = 0; i < 5; i++)
+        guest_turn(g, 0);
+    assert_int_equal(g->connects, 0);
+    assert_int_equal(fault(&bench, LINK_FAULT_PLUG, 0, 0.0), SH_OK);
+    turn_until(g, &g->connects, 1);
+    guest_configure(g);
+    guest_free(g);
     bench_close(&bench);
 }
 

@@ -22,6 +22,9 @@ static void test_silent(void **state)
     int late = guest_socket(); /* who has said hello keeps the device */
     bench_poll(&bench, 0, 0);
     assert_int_equal(guest_control(g, 0x80, 6, 0x0100, 0, 18, NULL)->status, usb_redir_success);
+    const int64_t start_ms = now_ms();
+    bench_poll(&bench, 0, 50);
+    assert_true(now_ms() - start_ms >= 49); /* and the other one, who waits, keeps nobody awake */
     close(late);
     guest_free(g);
     for (int i = 0; i < 6; i++)

@@ -157,7 +157,7 @@ struct seen *guest_await(struct guest *g, int n)
     return &g->seen[n - 1];
 }
 
-struct guest *guest_on(struct bench *bench, int fd)
+struct guest *guest_begin(struct bench *bench, int fd)
 {
     static char version[] = "test";
     struct guest *g = calloc(1, sizeof *g);
@@ -188,6 +188,12 @@ struct guest *guest_on(struct bench *bench, int fd)
     usbredirparser_caps_set_cap(caps, usb_redir_cap_64bits_ids);
     usbredirparser_caps_set_cap(caps, usb_redir_cap_32bits_bulk_length);
     usbredirparser_init(p, version, caps, USB_REDIR_CAPS_SIZE, 0);
+    return g;
+}
+
+struct guest *guest_on(struct bench *bench, int fd)
+{
+    struct guest *g = guest_begin(bench, fd);
     for (const int64_t end_ms = now_ms() + DEADLINE_MS; g->connects == 0;) {
         assert_true(now_ms() < end_ms);
         guest_turn(g, 0);

@@ -49,7 +49,10 @@ void guest_turn(struct guest *g, uint32_t want_write);
 /* Until n packets have been seen. */
 struct seen *guest_await(struct guest *g, int n);
 
-/* On a connected socket, which it takes over. It has the device when it returns. */
+/* On a connected socket, which it takes over; it says hello with the next turns. */
+struct guest *guest_begin(struct bench *bench, int fd);
+
+/* The same. It has the device when it returns. */
 struct guest *guest_on(struct bench *bench, int fd);
 
 struct guest *guest_new(struct bench *bench);
