@@ -493,6 +493,36 @@ static void test_ends(void **state)
     assert_string_equal(ask_python(*state, "plain", "ends", wire_path(*state, "ends.shs"), NULL), "ends\n");
 }
 
+/* Parts of it by numbers of one's own: of two quaternions of one rotation the turn is the short one, of 30 degrees; rings
+ * from pole to pole are a degree apart; a shot without echo is nowhere. */
+static const char PARTS[] =
+    "import math, sys\n"
+    "sys.path.insert(0, 'drivers/host/python')\n"
+    "sys.modules['numpy'] = None\n"
+    "import scanhead as s\n"
+    "half = math.radians(15)\n"
+    "for sign in (-1, 1):\n"
+    "    a = s.Pose(0, (0, 0, 0), (1, 0, 0, 0), 0.0, 0)\n"
+    "    b = s.Pose(1000, (2, 0, 0), (sign * math.cos(half), 0, 0, sign * math.sin(half)), 0.0, 0)\n"
+    "    leg = s._leg(a, b)\n"
+    "    assert abs(leg.angle_rad - 2 * half) < 1e-12 and abs(leg.axis[2] - 1) < 1e-12, leg\n"
+    "rings = s._rings({'gaps': 0, 'rings': 181, 'first_ring_udeg': -90000000})\n"
+    "assert rings == {'first_ring_deg': -90.0, 'ring_step_deg': 1.0}, rings\n"
+    "raw = [0, 10000], [0, 0], [0, 0], [0, 0], [0, 0], [0, 0x11000000]\n"
+    "p = s._common(raw, 0, 0)\n"
+    "s._polar_points(p, raw, {'mirror_counts_per_turn': 100, 'pan_counts_per_turn': 100, 'range_scale_m': 1e-4,\n"
+    "                         'line_start_udeg': 0, 'line_stop_udeg': 90000000}, True)\n"
+    "assert all(math.isnan(v[0]) for v in (p.x, p.y, p.z, p.range_m)) and p.range_m[1] == 1.0, p.range_m\n";
+
+static void test_parts(void **state)
+{
+    need_python();
+    const char *const args[] = {"-c", PARTS, NULL};
+    const int status = wire_wait(*state, wire_spawn_program(*state, python, args, "out", "err", -1));
+    if (status != 0) wire_show(*state, "err");
+    assert_int_equal(status, 0);
+}
+
 static void test_misuse(void **state)
 {
     need_python();
@@ -511,6 +541,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_hostile, setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_older, setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_ends, setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_parts, setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_misuse, setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -42,6 +42,10 @@ static void test_wrong_options(void **state)
             fail_msg("%s %s: status %d, %s", wrong[i][0], wrong[i][1], status, text);
         free(text);
     }
+    /* within the recording: nothing else is wrong with it */
+    const char *const backward[] = {"run", file, "--start", "--quiet", "--from", "0.002", "--to", "0.001", NULL};
+    assert_int_equal(replay_call(wire, backward), 2);
+    replay_said(wire, "is not after --from");
     static const char *const heads[][2] = {{"--speed", "2"}, {"--from", "1"}, {"--to", "1"},
                                            {"--link", "tcp"}, {"--config", "x"}, {"--loop", NULL}};
     for (size_t i = 0; i < sizeof heads / sizeof *heads; i++) {
