@@ -59,7 +59,7 @@ static void aim_ideal(struct caster *c, struct chunk *k, const struct kernel_tur
     const double *rotation = slipped_rotation(s, moves ? mat3_unit : s->rotation, slipped);
     const struct vec3_out d = moves ? VEC3_OUT(c->socs, 0) : VEC3_OUT(c->d, 0);
     const struct vec3_out read = moves ? VEC3_OUT(c->read, 0) : VEC3_OUT(c->list.e, 0);
-    const struct kernel_sweep sweep = {k->run, k->first, *turns};
+    const struct kernel_pulses sweep = {k->run, k->first, *turns};
     const int even = !wobbles && kernel_sweep_steps(&c->steps, k->run);
     double to_crs[9];
     if (geo) k->linear = !moves && reading_rotation(s, to_crs);

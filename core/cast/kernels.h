@@ -34,16 +34,17 @@ struct kernel_steps {
 /* The steps of a run; where they are those of the run before nothing is done. 0 where the run has a table, or its
  * steps are too large. */
 int kernel_sweep_steps(struct kernel_steps *steps, const struct schedule_run *run);
-/* Up to BVH_CHUNK pulses of a run, from its pulse `first` on. */
-struct kernel_sweep {
+/* Up to BVH_CHUNK pulses of a run, from its pulse `first` on. (Clang 19 crashes on a function with clones for several
+ * instruction sets when a struct has the same name.) */
+struct kernel_pulses {
     const struct schedule_run *run;
     uint32_t first;
     struct kernel_turns turns; /* from kernel_angles */
 };
 /* As kernel_directions, and kernel_directions_read. */
-void kernel_sweep(const struct kernel_steps *steps, const struct kernel_sweep *sweep, const double rotation[9],
+void kernel_sweep(const struct kernel_steps *steps, const struct kernel_pulses *sweep, const double rotation[9],
                   const struct vec3_out *d);
-void kernel_sweep_read(const struct kernel_steps *steps, const struct kernel_sweep *sweep,
+void kernel_sweep_read(const struct kernel_steps *steps, const struct kernel_pulses *sweep,
                        const struct cast_setup *setup, const double rotation[9], const double to_crs[9],
                        const struct vec3_out *d, const struct vec3_out *e);
 

@@ -66,7 +66,7 @@ struct part {
     struct middles mirror, pan;
 };
 
-VEC_INLINE void begin(const struct kernel_sweep *sweep, struct part *p)
+VEC_INLINE void begin(const struct kernel_pulses *sweep, struct part *p)
 {
     const struct schedule_run *run = sweep->run;
     const uint32_t place = run->in_line + sweep->first, block = place / BLOCK;
@@ -86,7 +86,7 @@ VEC_INLINE void turn_on(const struct middles *m, uint32_t b, double s, double c1
 }
 
 VEC_CLONES
-void kernel_sweep(const struct kernel_steps *steps, const struct kernel_sweep *sweep, const double rotation[9],
+void kernel_sweep(const struct kernel_steps *steps, const struct kernel_pulses *sweep, const double rotation[9],
                   const struct vec3_out *out)
 {
     const struct aim_matrix m = aim_matrix(rotation);
@@ -109,7 +109,7 @@ void kernel_sweep(const struct kernel_steps *steps, const struct kernel_sweep *s
 }
 
 VEC_CLONES
-void kernel_sweep_read(const struct kernel_steps *steps, const struct kernel_sweep *sweep,
+void kernel_sweep_read(const struct kernel_steps *steps, const struct kernel_pulses *sweep,
                        const struct cast_setup *setup, const double rotation[9], const double to_crs[9],
                        const struct vec3_out *out, const struct vec3_out *read)
 {

@@ -41,7 +41,7 @@ static const struct schedule_run run = {.n = N,
                                         .ns_rem = 1,
                                         .ns_den = 3};
 static const struct kernel_turns turns = {N, m.mirror, m.pan};
-static const struct kernel_sweep sweep = {&run, 0, {N, m.mirror, m.pan}};
+static const struct kernel_pulses sweep = {&run, 0, {N, m.mirror, m.pan}};
 static const struct cast_setup setup = {
     .mirror_counts = BENCH_ENCODER, .pan_counts = BENCH_ENCODER, .range_scale_m = BENCH_SCALE_M};
 static const double rotation[9] = {0.6, 0.8, 0, -0.8, 0.6, 0, 0, 0, 1};

@@ -118,8 +118,9 @@ compare_record() {
         here[key] == range { same++; next }
         { d = here[key] - range; if (d < 0) d = -d; if (d <= bound_m) { near++; if (d > worst) worst = d } else other++ }
         END {
-            printf "%s: %d of %d shots have the same range, %d within %.1g m, %d another\n",
-                n[ARGV[1]] == n[ARGV[2]] && same > 0 && other <= most ? "as here" : "NOT as here", same, n[ARGV[1]], near, bound_m, other
+            good = n[ARGV[1]] == n[ARGV[2]] && same > 0 && other + 0 <= most
+            printf("%s: %d of %d shots have the same range, %d within %.1g m, %d another\n", good ? "as here" : "NOT as here", same,
+                n[ARGV[1]], near, bound_m, other)
         }' "$ref" "$1" >"$at/record.txt"
     cat "$at/record.txt" | sed 's/^/    record: /'
 }

@@ -10,7 +10,11 @@
 
 #include "core/distance.h"
 
+#ifdef __SIZEOF_FLOAT128__
 typedef __float128 quad;
+#else
+typedef long double quad; /* 113 bits, too, where there is no other: on ARM */
+#endif
 
 /* Corner differences, relative to the query point, round by 2^-53 of themselves on each axis; products, the
  * foot and the square root add a few more. 16 half-units in the last place of the largest difference hold all

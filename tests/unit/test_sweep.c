@@ -43,10 +43,10 @@ static struct schedule_run a_run(uint64_t *seed, double most_deg)
     return run;
 }
 
-static void angles_of(const struct schedule_run *run, struct kernel_sweep *sweep)
+static void angles_of(const struct schedule_run *run, struct kernel_pulses *sweep)
 {
     kernel_angles(run, 0, N, one.mirror, one.pan);
-    *sweep = (struct kernel_sweep){run, 0, {N, one.mirror, one.pan}};
+    *sweep = (struct kernel_pulses){run, 0, {N, one.mirror, one.pan}};
 }
 
 static void expect_direction(long double mirror_turn, long double pan_turn, long double d[3])
@@ -72,7 +72,7 @@ static void they_are_closer_to_the_schedule_than_one_by_one(void **state)
     struct kernel_steps steps = {0};
     for (int k = 0; k < RUNS; k++) {
         struct schedule_run run = a_run(&seed, k % 3 == 0 ? 0.35 : 0.05);
-        struct kernel_sweep sweep;
+        struct kernel_pulses sweep;
         angles_of(&run, &sweep);
         assert_true(kernel_sweep_steps(&steps, &run));
         kernel_sweep(&steps, &sweep, mat3_unit, &(struct vec3_out){whole.x, whole.y, whole.z});
@@ -104,7 +104,7 @@ static void encoders_read_whole_counts(void **state)
     struct kernel_steps steps = {0};
     for (int k = 0; k < RUNS / 4; k++) {
         struct schedule_run run = a_run(&seed, 0.05);
-        struct kernel_sweep sweep;
+        struct kernel_pulses sweep;
         angles_of(&run, &sweep);
         assert_true(kernel_sweep_steps(&steps, &run));
         kernel_sweep_read(&steps, &sweep, &setup, mat3_unit, mat3_unit, &(struct vec3_out){cut.x, cut.y, cut.z},
@@ -128,7 +128,7 @@ static void check_cut(const struct schedule_run *run, const struct cast_setup *s
 {
     struct kernel_steps steps = {0};
     struct schedule_run later = *run;
-    struct kernel_sweep part = {run, from, {n, one.mirror + from, one.pan + from}};
+    struct kernel_pulses part = {run, from, {n, one.mirror + from, one.pan + from}};
     if (own_run) {
         later.in_line += from;
         later.r += from * run->num;
@@ -154,7 +154,7 @@ static void cuts_change_nothing(void **state)
     uint64_t seed = 3;
     for (int k = 0; k < RUNS; k++) {
         struct schedule_run run = a_run(&seed, 0.05);
-        struct kernel_sweep sweep;
+        struct kernel_pulses sweep;
         struct kernel_steps steps = {0};
         angles_of(&run, &sweep);
         assert_true(kernel_sweep_steps(&steps, &run));
