@@ -114,13 +114,16 @@ static int has_transparent_colour(const uint8_t *bytes, size_t n)
     return bytes[0] == 0x89 && memmem(bytes, data != NULL ? (size_t)(data - bytes) : n, "tRNS", 4) != NULL;
 }
 
-/* stb_image fills in what a TGA or BMP lacks, in silence. Both say the bits of a texel; packed ones are as
- * long as they are. */
+/* stb_image fills in what a TGA or BMP lacks, in silence. Both say the bits of a texel; of packed ones only what
+ * no run can make is missed: they are as long as they are. */
 static int is_cut_off(const uint8_t *bytes, size_t n, uint64_t texels)
 {
-    if (n < 31 || bytes[0] == 0x89 || (bytes[0] == 0xff && bytes[1] == 0xd8)) return 0;
-    const int is_bmp = bytes[0] == 'B' && bytes[1] == 'M', is_packed = is_bmp ? bytes[30] == 1 : bytes[2] > 3;
+    if (n < 18 || bytes[0] == 0x89 || (bytes[0] == 0xff && bytes[1] == 0xd8)) return 0;
+    const int is_bmp = bytes[0] == 'B' && bytes[1] == 'M';
+    if (is_bmp && n < 31) return 0;
+    const int is_packed = is_bmp ? bytes[30] == 1 : bytes[2] > 3;
     const uint64_t first = is_bmp ? bytes[10] + 256U * bytes[11] : 18U + bytes[0]; /* byte of the texels */
+    if (is_packed && !is_bmp) return texels > 64 * (uint64_t)n; /* two bytes of a run are up to 128 texels */
     return !is_packed && first + texels * bytes[is_bmp ? 28 : 16] / 8 > n;
 }
 

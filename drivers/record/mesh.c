@@ -321,6 +321,6 @@ static void mesh_release(void *rec)
         .begin = mesh_begin, .finish = mesh_finish, .release = mesh_release, .repair = REPAIR                 \
     }
 
-const struct recorder_ops recorder_mesh_ply = MESH_OPS(".ply", mesh_ply_repair),
-                          recorder_obj = MESH_OPS(".obj", obj_repair), recorder_gltf = MESH_OPS(".gltf", NULL),
-                          recorder_glb = MESH_OPS(".glb", NULL), recorder_fbx = MESH_OPS(".fbx", NULL);
+const struct recorder_ops recorder_mesh_ply = MESH_OPS(".ply", mesh_ply_repair), recorder_obj = MESH_OPS(".obj", obj_repair),
+                          recorder_gltf = MESH_OPS(".gltf", NULL), recorder_glb = MESH_OPS(".glb", NULL),
+                          recorder_fbx = MESH_OPS(".fbx", NULL);

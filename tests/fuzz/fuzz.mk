@@ -9,14 +9,25 @@ F ?=
 FUZZ_CC ?= clang
 FUZZ_CXX ?= clang++
 FUZZ_BUILD ?= $(BUILD)/fuzz
-# Coverage as libFuzzer wants it: a counter an edge, and comparisons.
+# Coverage as libFuzzer wants it: a counter an edge (inline-8bit-counters,pc-table), and comparisons (trace-cmp).
+# Processor time by compiler and flags, all with the address and undefined sanitizers. Compiling: ten files of all
+# folders, median of three. Running: test_native_damage.
+#   gcc -Og                                    compiles in 2.9 s   runs in 0.97 s
+#   clang -O1                                  5.9                 0.88
+#   clang -O1, counters                        5.7                 0.73
+#   clang -O1, counters and comparisons        6.5                 2.2
+#   clang -O0                                                      3.7
+#   clang -O0, counters and comparisons        2.2
+#   (clang -O0 for warnings, no sanitizer:     1.1)
+FUZZ_OPT ?= -O1
 FUZZ_COVER ?= -fsanitize=fuzzer-no-link
 # Without vptr: that check needs clang++ to link, for one file.
 FUZZ_SAN ?= -fsanitize=address,undefined -fno-sanitize=vptr -fno-sanitize-recover=all $(FUZZ_COVER)
+FUZZ_FLAGS ?= -w -g1
 # gold warns of each symbol that clang exports for the sanitizer; lld is as fast, where it is.
 FUZZ_LD = $(if $(shell command -v ld.lld),-fuse-ld=lld)
-FUZZ_MAKE = $(MAKE) --no-print-directory -j$(JOBS) BUILD=$(FUZZ_BUILD) CC="$(FUZZ_CC)" CXX="$(FUZZ_CXX)" OPT=-O1 WERROR= \
-	CPPFLAGS=-DSH_SANITIZE CFLAGS="-w -g1" CXXFLAGS="-w -g1" SAN="$(FUZZ_SAN)"
+FUZZ_MAKE = $(MAKE) --no-print-directory -j$(JOBS) BUILD=$(FUZZ_BUILD) CC="$(FUZZ_CC)" CXX="$(FUZZ_CXX)" \
+	OPT=$(FUZZ_OPT) WERROR= CPPFLAGS=-DSH_SANITIZE CFLAGS="$(FUZZ_FLAGS)" CXXFLAGS="$(FUZZ_FLAGS)" SAN="$(FUZZ_SAN)"
 FUZZ_NAMES = $(patsubst tests/fuzz/fuzz_%.c,%,$(wildcard tests/fuzz/fuzz_*.c))
 FUZZ_PROGRAMS = $(patsubst %,$(BUILD)/tests/fuzz/fuzz_%,$(or $(F),$(FUZZ_NAMES)))
 FUZZ_RUN = FUZZ_BUILD=$(FUZZ_BUILD) JOBS=$(JOBS)

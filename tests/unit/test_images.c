@@ -313,6 +313,11 @@ static void hostile_files_take_no_gigabytes(void **state)
     fails(write_text("empty.png", ""), "it is empty");
     fails(write_file("cut.png", JPEG, 40), "no image that can be read");
     fails(write_file("cut.tga", tga, write_tga(tga, 4, 1) - 1), "it is cut off");
+    size_t n = write_packed_tga(tga);
+    put(tga + 12, 16384, 2); /* 2^26 texels of some bytes: seconds of zeros */
+    put(tga + 14, 4096, 2);
+    fails(write_file("packed.tga", tga, n), "it is cut off");
+    fails(write_file("short.tga", tga, 29), "it is cut off");
     fails(write_file("cut.bmp", tga, write_bmp(tga, 3) - 60), "it is cut off");
     memcpy(tga, JPEG, sizeof JPEG);
     uint8_t *table = memmem(tga, sizeof JPEG, "\xff\xc4", 2);
