@@ -36,6 +36,20 @@ static size_t length_of(int i)
     return i == 5 ? 0 : i == 77 ? LARGEST : (size_t)(i * 7 % 1473);
 }
 
+/* The ports by themselves, which together have all packets and bytes. */
+static void check_sources(const struct wire *wire, uint64_t bytes)
+{
+    char *text = wire_read(wire_path(wire, "stats.json"), NULL);
+    uint64_t packets = 0, sum = 0;
+    int n = 0;
+    for (const char *at = strstr(text, "\"endpoint\""); at != NULL; at = strstr(at + 1, "\"endpoint\""), n++) {
+        packets += strtoull(strstr(at, "\"packets\":") + strlen("\"packets\":"), NULL, 10);
+        sum += strtoull(strstr(at, "\"bytes\":") + strlen("\"bytes\":"), NULL, 10);
+    }
+    free(text);
+    assert_true(n == 2 && packets == MANY && sum == bytes);
+}
+
 /* From one socket to two others: the order of sending is that of the file. */
 static void test_datagrams(void **state)
 {
@@ -73,6 +87,7 @@ static void test_datagrams(void **state)
     assert_true(captured.packet[MANY - 1].t_ns <= ended.tv_sec * 1000000000 + ended.tv_nsec);
     assert_true(stats_uint(wire, "packets") == MANY && stats_uint(wire, "bytes") == bytes);
     assert_int_equal(stats_uint(wire, "dropped"), 0);
+    check_sources(wire, bytes);
     captured_check_tshark(wire);
     captured_free(&captured);
 }
