@@ -10,9 +10,14 @@ need qemu-aarch64-static qemu-user-static
 . /etc/os-release
 make_root "${VERSION_CODENAME:-bookworm}" --variant=extract --arch=arm64 --include=libc6-dev,libstdc++-$(aarch64-linux-gnu-gcc -dumpversion)-dev,libembree-dev,libassimp-dev,libgeographiclib-dev,libyaml-dev,libpng-dev,libstb-dev,nettle-dev,libusb-1.0-0-dev,libusbredirparser-dev,libwebsockets-dev,libcmocka-dev
 root=$(cd "$at/root" && pwd)
+# Links that begin at the root lead into this machine from here, and the linker would take static libraries instead.
+find "$root/usr/lib" "$root/lib" -type l -lname '/*' | while read -r link; do
+    to=$(readlink "$link")
+    case $to in "$root"/*) ;; *) ln -sfn "$root$to" "$link" ;; esac
+done
 pc=$root/usr/lib/aarch64-linux-gnu/pkgconfig:$root/usr/share/pkgconfig
 echo "    building for ARM"
-$nicely ${MAKE:-make} -j"${JOBS:-2}" DEPS=no BUILD="$at/build" CROSS_COMPILE=aarch64-linux-gnu- \
+$nicely ${MAKE:-make} -k -j"${JOBS:-2}" DEPS=no BUILD="$at/build" CROSS_COMPILE=aarch64-linux-gnu- \
     CC="${CCACHE:-} aarch64-linux-gnu-gcc --sysroot=$root" CXX="${CCACHE:-} aarch64-linux-gnu-g++ --sysroot=$root" \
     PKG_CONFIG="env PKG_CONFIG_SYSROOT_DIR=$root PKG_CONFIG_LIBDIR=$pc pkg-config" \
     WERROR=-Werror CFLAGS=-g1 CXXFLAGS=-g1 $(emulated_programs "$at/build") all >"$at/build.txt" 2>&1 || exit 1

@@ -42,14 +42,18 @@ make_root() {
     echo "$asked" >"$at/root.is"
 }
 
-# in_root COMMAND...: in the root, with its own processes and mounts, which end with it.
+# in_root COMMAND...: in the root, with its own processes and mounts, which end with it. What this machine trusts is trusted
+# there, npm included.
 in_root() {
     $nicely unshare -m -p -f --propagation private sh -c '
         root=$1
         shift
         mount -t proc proc "$root/proc" && mount --rbind /dev "$root/dev" && mount --rbind /sys "$root/sys" &&
             mount -t tmpfs tmpfs "$root/run" && cp /etc/resolv.conf "$root/etc/resolv.conf" 2>/dev/null
-        exec chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8 "$@"' sh "$at/root" "$@"
+        trusted=etc/ssl/certs/ca-certificates.crt
+        [ ! -e "/$trusted" ] || [ ! -d "$root/etc/ssl/certs" ] || cp "/$trusted" "$root/$trusted"
+        exec chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8 \
+            NODE_EXTRA_CA_CERTS="/$trusted" "$@"' sh "$at/root" "$@"
 }
 
 # The project's files into the folder $1, with their times; what was built there stays.

@@ -175,11 +175,11 @@ static size_t make_binary_ply(char *out, bool big)
         for (int16_t k = 0; k < i; k++)
             n += put(out + n, &k, 2, big);
         n += put(out + n, &utm[i][2], 8, big);
-        out[n++] = -3;
+        out[n++] = (char)-3;
     }
     static const uint16_t face[2][4] = {{0, 1, 2, 3}, {3, 2, 4}};
     for (int f = 0; f < 2; f++) {
-        out[n++] = -1;
+        out[n++] = (char)-1;
         out[n++] = (char)(4 - f);
         for (int k = 0; k < 4 - f; k++)
             n += put(out + n, &face[f][k], 2, big);

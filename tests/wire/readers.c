@@ -1,5 +1,7 @@
 #include "tests/wire/readers.h"
 
+#include <glob.h>
+
 struct wire *wire;
 double truth[MAX_POINTS][3], seen[MAX_POINTS][3];
 size_t n_truth, n_first;
@@ -9,6 +11,14 @@ void keep_truth(const struct scanhead_point *point, uint32_t station)
     assert_true(n_truth < MAX_POINTS);
     memcpy(truth[n_truth++], &point->x, sizeof truth[0]);
     if (station == 1) n_first = n_truth;
+}
+
+/* Debian 13's CloudCompare looks for its plugins, of which one reads PTX, in another folder than they are in. */
+static void say_where_plugins_are(void)
+{
+    glob_t found;
+    if (glob("/usr/lib/*/cloudcompare/plugins", 0, NULL, &found) == 0) setenv("CC_PLUGIN_PATH", found.gl_pathv[0], 0);
+    globfree(&found);
 }
 
 /* Runs argv (ends with NULL) in the test's folder; its exit status, 127 where there is no such program. */
@@ -23,6 +33,7 @@ static int run(const char *const *argv)
         dup2(o, 1);
         dup2(e, 2);
         setenv("QT_QPA_PLATFORM", "offscreen", 1);
+        say_where_plugins_are();
         if (chdir(wire->dir) == 0) execvp(argv[0], (char **)(uintptr_t)argv);
         _exit(127);
     }

@@ -132,7 +132,7 @@ static void test_moving_in_utm(void **state)
     record("52.5167", "13.4", "utm", "geo", DRIVE, ALL);
     read_truth();
     check_ply();
-    check_ptx(6.1e-5);
+    check_ptx(9.2e-5);
     check_las(0.5e-4 + 3e-9);
     check_e57(0.5e-4 * sqrt(3) + 3e-9);
 }

@@ -133,13 +133,14 @@ static void test_e57(void **state)
 }
 
 /* CloudCompare keeps coordinates as floats of what is left after its own global shift, which is a round number within a
- * kilometre: steps of 6e-5 m there, half of it lost in rounding and as much again in its transformation. */
+ * kilometre: steps of 6.1e-5 m there. Half a step is lost when it reads, when it turns and when it shifts a point: three
+ * times 3.05e-5 m. (2.11 loses two of them, 2.13 all three: 6.25e-5 m was seen.) */
 static void test_ptx(void **state)
 {
     (void)state;
     const char *const argv[] = {"CloudCompare",  "-SILENT", "-NO_TIMESTAMP", "-O", "-GLOBAL_SHIFT", "AUTO", "f.ptx",
                                 "-C_EXPORT_FMT", "ASC",     "-PREC",         "9",  "-SAVE_CLOUDS",  NULL};
-    const double tolerance_m[N_STATIONS] = {6.1e-5, 6.1e-5};
+    const double tolerance_m[N_STATIONS] = {9.2e-5, 9.2e-5};
     run_well(argv);
     char *first = wire_read(wire_path(wire, "f_0.asc"), NULL), *second = wire_read(wire_path(wire, "f_1.asc"), NULL);
     assert_int_equal(compare(first, 0, tolerance_m), n_first);
@@ -193,7 +194,7 @@ static void test_ply_cloudcompare(void **state)
     const char *const argv[] = {
         "CloudCompare",  "-SILENT", "-NO_TIMESTAMP", "-O", "-GLOBAL_SHIFT", "AUTO",         "cc.ply",
         "-C_EXPORT_FMT", "ASC",     "-PREC",         "9",  "-ADD_HEADER",   "-SAVE_CLOUDS", NULL};
-    const double tolerance_m[N_STATIONS] = {6.1e-5, 6.1e-5};
+    const double tolerance_m[N_STATIONS] = {9.2e-5, 9.2e-5};
     static const char header[] = "//X Y Z R G B range reflectance time echo echo_count label station";
     record_again("cc.ply", "--ply-names", "cloudcompare");
     run_well(argv);
