@@ -267,26 +267,12 @@ soak-usb: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test all $(BUILD)/test/tests/wire/test_usb_soak
 	@USB_SOAK_EVENTS=1000 SCANHEAD=$(BUILD)/test/scanhead $(BUILD)/test/tests/wire/test_usb_soak
 
-# Every scenario of config/faults over each kind of link, with our own client; usb in an emulated machine, where it can
-# be had. At the end a table: some ten minutes.
-SOAK_S ?= 30
-soak: deps-build
-	@$(MAKE) --no-print-directory -j2 all
-	@sh tests/soak.sh $(SOAK_S) $(BUILD)
-
 # Recorders that are killed, and disks that are full, at N random moments for each format (`make test`: one of
 # each): some minutes.
 N ?= 200
 repair: deps-build
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test all $(BUILD)/test/tests/wire/test_repair
 	@REPAIR_N=$(N) $(RUN) $(BUILD)/test/tests/wire/test_repair
-
-# An hour of device time at 10 kHz, recorded, replayed at pace fast and recorded again: half a minute, and 1.8 GB in
-# build/ meanwhile.
-REPLAY_S ?= 3600
-replay-hour: deps-build
-	@$(MAKE) --no-print-directory -j2 all
-	@sh tests/replay_hour.sh $(REPLAY_S) $(BUILD)
 
 # 600 broken meshes, with and without sanitizers (there `make test` tries every tenth): half a minute.
 test-hostile: deps
@@ -400,7 +386,7 @@ format:
 	clang-format -i $$(git ls-files '*.c' '*.h' '*.cpp')
 clean:
 	rm -rf $(BUILD)
-.PHONY: ALWAYS all deps deps-test deps-build deps-guest deps-browser demo test test-unit test-wire test-accuracy test-stability test-guest soak soak-usb repair replay-hour \
+.PHONY: ALWAYS all deps deps-test deps-build deps-guest deps-browser demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb repair \
 	test-usb-million test-hostile test-sight objects test-unit-programs test-programs bench bench-beam bench-plain bench-velodyne bench-page page-pictures bench-loop bench-kernels bench-panorama chart install format clean
 .SECONDARY:
 # Not those in the packages' tree and root: they speak of other files.

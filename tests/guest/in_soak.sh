@@ -3,10 +3,10 @@
 load vhci-hcd
 # Seven of its eight controllers only cost time: each look at the bus reads their hubs too.
 for i in 1 2 3 4 5 6 7; do echo vhci_hcd.$i >/sys/bus/platform/drivers/vhci_hcd/unbind; done
-cp /room.obj /soak_usb.yaml .
+cp /room.obj /usb.yaml .
 [ -n "$scenarios" ] || scenarios=$(ls /config/faults | sed -n 's/\.yaml$//p')
 for name in $scenarios; do
-    scanhead soak soak_usb.yaml --scenario /config/faults/$name.yaml --duration "$seconds" --quiet >soak.txt 2>soak.err
+    scanhead soak usb.yaml --scenario /config/faults/$name.yaml --duration "$seconds" --quiet >soak.txt 2>soak.err
     echo $? >soak.code
     for file in txt err code; do sed "s/^/# FILE $name-usb.$file /" soak.$file >&3; done
     check "usb: $name" test "$(cat soak.code)" = 0

@@ -19,7 +19,7 @@ check "socket pair: says that it is back" grep 'plugged in again' /tmp/head.err
 note "replugged at $(uptime_s) s"
 head_kill
 check "socket pair: gone with the killed head" wait_for 10 is_unplugged
-cp /soak_usb.yaml .
+cp /usb.yaml .
 check "socket pair: a client notices the faults of a bad cable" \
-    scanhead soak soak_usb.yaml --scenario /config/faults/flaky-usb.yaml --duration 2 --quiet
+    scanhead soak usb.yaml --scenario /config/faults/flaky-usb.yaml --duration 2 --quiet
 note "soaked at $(uptime_s) s"

@@ -1,10 +1,10 @@
 #!/bin/sh
 # Each scenario of config/faults over usb, on the virtual host controller of a guest: sh tests/guest/soak.sh SECONDS
-# [SCENARIO...]. The lines "# FILE NAME TEXT" of its output are the sheets, line by line; tests/soak.sh takes them.
+# [SCENARIO...]. The lines "# FILE NAME TEXT" of its output are the sheets, line by line; tests/soak/soak.sh takes them.
 . tests/guest/lib.sh
 guest_prepare
 guest_add tests/guest/room.obj
-guest_add tests/soak_usb.yaml
+guest_add tests/soak/usb.yaml
 seconds=$1
 shift
 echo "seconds=$seconds scenarios='$*'" >"$guest_work/root/soak_of.sh"

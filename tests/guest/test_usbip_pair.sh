@@ -4,5 +4,5 @@
 guest_prepare
 guest_add_head
 guest_add tests/guest/in_usbip.sh
-guest_add tests/soak_usb.yaml
+guest_add tests/soak/usb.yaml
 guest_boot tests/guest/in_usbip_pair.sh 600

@@ -1,5 +1,5 @@
 #!/bin/sh
-# An hour of device time at 10 kHz, recorded, replayed at pace fast over TCP, and recorded again: sh tests/replay_hour.sh
+# An hour of device time at 10 kHz, recorded, replayed at pace fast over TCP, and recorded again: sh tests/soak/replay_hour.sh
 # SECONDS BUILD. Both files must be the same bytes, with the same hash and as many pulses. Of an hour they have 880 MB each.
 set -eu
 seconds=$1
@@ -19,7 +19,7 @@ value() { # FILE KEY: of its JSON, the first one
 }
 
 begin=$(now)
-"$build/scanhead" record tests/replay_hour.yaml --duration "$seconds" -o "$out/head.shs" --stats "$out/head.json" --quiet
+"$build/scanhead" record tests/soak/replay_hour.yaml --duration "$seconds" -o "$out/head.shs" --stats "$out/head.json" --quiet
 recorded=$(now)
 mkfifo "$out/ready"
 "$build/scanhead" run "$out/head.shs" --link 'type: tcp, port: 0' --pace fast --ready-fd 3 --stats "$out/run.json" \

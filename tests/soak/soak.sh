@@ -1,5 +1,5 @@
 #!/bin/sh
-# Each scenario of config/faults over each kind of link, for $1 seconds: sh tests/soak.sh SECONDS BUILD. At the end a
+# Each scenario of config/faults over each kind of link, for $1 seconds: sh tests/soak/soak.sh SECONDS BUILD. At the end a
 # table. Status 1 when a verdict is bad. Two heads run at a time. Then the same over usb, one by one, in a guest.
 set -u
 seconds=$1
@@ -21,8 +21,8 @@ for file in config/faults/*.yaml; do
     name=$(basename "$file" .yaml)
     echo "soak: $name, $seconds s"
     # Without what a head of 16 beams, or one that nobody can command, can't go through.
-    if ! grep -q 'mirror_\|power_cycle\|unplug\|self_test' "$file"; then soak "$file" tests/soak_udp.yaml "$name-udp" & fi
-    soak "$file" tests/soak.yaml "$name" --set "links.1.path=$out/port"
+    if ! grep -q 'mirror_\|power_cycle\|unplug\|self_test' "$file"; then soak "$file" tests/soak/udp.yaml "$name-udp" & fi
+    soak "$file" tests/soak/room.yaml "$name" --set "links.1.path=$out/port"
     wait
 done
 

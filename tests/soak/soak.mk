@@ -1,0 +1,29 @@
+# Every scenario of config/faults over each kind of link, with our own client; usb in an emulated machine, where it can
+# be had. At the end a table: some ten minutes.
+SOAK_S ?= 30
+soak: soak-scenarios soak-long
+soak-scenarios: deps-build
+	@$(MAKE) --no-print-directory -j2 all
+	@sh tests/soak/soak.sh $(SOAK_S) $(BUILD)
+
+# An hour of device time at 10 kHz, recorded, replayed at pace fast and recorded again: half a minute, and 1.8 GB in
+# build/ meanwhile.
+REPLAY_S ?= 3600
+replay-hour: deps-build
+	@$(MAKE) --no-print-directory -j2 all
+	@sh tests/soak/replay_hour.sh $(REPLAY_S) $(BUILD)
+
+# Ten minutes of 2.2 million pulses a second on all links, and a head of each maker, with clients that come, go, stall and
+# misbehave, and faults: SOAK_LONG_S=3600 once for an hour. At the end it is judged.
+SOAK_LONG_S ?= 600
+soak-long: deps-build
+	$(call install_missing,python3)
+	@$(MAKE) --no-print-directory -j2 all
+	@python3 tests/soak/long.py --seconds $(SOAK_LONG_S) --scanhead $(BUILD)/scanhead --out $(BUILD)/soak-long
+
+# 10^9 rays aimed at edges and corners: none may leak. `make test` aims 10^6.
+LEAKS ?= 1e9
+leaks: deps-build
+	@$(MAKE) --no-print-directory -j2 $(BUILD)/bench
+	@$(BUILD)/bench --scenes 10k --leaks $(LEAKS) -o $(BUILD)/leaks.json
+.PHONY: soak soak-scenarios soak-long replay-hour leaks
