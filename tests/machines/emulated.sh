@@ -2,6 +2,7 @@
 # One test program under an emulator, for run_tap.sh: sh tests/machines/emulated.sh PROGRAM EMULATOR...
 # A program that isn't done within $LIMIT_S seconds of processor time, and had no failure until then, is skipped and says so.
 # What can't be had under an emulator, as PROGRAM reason:
+# not emulated: test_functionfs QEMU's user mode has none of the kernel's asynchronous I/O (io_setup)
 program=$1
 shift
 why=$(sed -n "s/^# not emulated: $(basename "$program") //p" "$0")
