@@ -9,9 +9,9 @@ why=$(sed -n "s/^# not emulated: $(basename "$program") //p" "$0")
 [ -z "$why" ] || { echo "1..0 # SKIP $why"; exit 0; }
 out=$(mktemp) || exit 1
 trap 'rm -f "$out"' EXIT
-(ulimit -t "$LIMIT_S" && exec "$@" "$program") >"$out"
+(ulimit -S -t "$LIMIT_S" && exec "$@" "$program") >"$out"
 status=$?
-# SIGXCPU; SIGKILL a second later.
+# Ended by SIGXCPU, or killed.
 if { [ $status -eq 152 ] || [ $status -eq 137 ]; } && ! grep -q '^not ok' "$out"; then
     echo "1..0 # SKIP more than $LIMIT_S s under the emulator; $(grep -c '^ok' "$out") of its tests passed until then"
     exit 0
