@@ -15,6 +15,8 @@ find "$root/usr/lib" "$root/lib" -type l -lname '/*' | while read -r link; do
     to=$(readlink "$link")
     case $to in "$root"/*) ;; *) ln -sfn "$root$to" "$link" ;; esac
 done
+# The emulator looks for every path in the root first: devices are those of this machine.
+rm -rf "$root/dev"
 pc=$root/usr/lib/aarch64-linux-gnu/pkgconfig:$root/usr/share/pkgconfig
 echo "    building for ARM"
 $nicely ${MAKE:-make} -k -j"${JOBS:-2}" DEPS=no BUILD="$at/build" CROSS_COMPILE=aarch64-linux-gnu- \

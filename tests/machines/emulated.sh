@@ -2,15 +2,16 @@
 # One test program under an emulator, for run_tap.sh: sh tests/machines/emulated.sh PROGRAM EMULATOR...
 # A program that isn't done within $LIMIT_S seconds of processor time, and had no failure until then, is skipped and says so.
 # What can't be had under an emulator, as PROGRAM reason:
+# not emulated: test_functionfs QEMU's user mode has none of the kernel's asynchronous I/O (io_setup)
 program=$1
 shift
 why=$(sed -n "s/^# not emulated: $(basename "$program") //p" "$0")
 [ -z "$why" ] || { echo "1..0 # SKIP $why"; exit 0; }
 out=$(mktemp) || exit 1
 trap 'rm -f "$out"' EXIT
-(ulimit -t "$LIMIT_S" && exec "$@" "$program") >"$out"
+(ulimit -S -t "$LIMIT_S" && exec "$@" "$program") >"$out"
 status=$?
-# SIGXCPU; SIGKILL a second later.
+# Ended by SIGXCPU, or killed.
 if { [ $status -eq 152 ] || [ $status -eq 137 ]; } && ! grep -q '^not ok' "$out"; then
     echo "1..0 # SKIP more than $LIMIT_S s under the emulator; $(grep -c '^ok' "$out") of its tests passed until then"
     exit 0
