@@ -389,5 +389,4 @@ clean:
 .PHONY: ALWAYS all deps deps-test deps-build deps-guest deps-browser demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb repair \
 	test-usb-million test-hostile test-sight objects test-unit-programs test-programs bench bench-beam bench-plain bench-velodyne bench-page page-pictures bench-loop bench-kernels bench-panorama chart install format clean
 .SECONDARY:
-# Not those in the packages' tree and root: they speak of other files.
--include $(shell find $(BUILD) -path $(BUILD)/deb -prune -o -type f -name '*.c*.d' -print 2>/dev/null)
+-include $(shell find $(patsubst %,$(BUILD)/%,core drivers firmware_sim tests) -name '*.d' 2>/dev/null)
