@@ -55,8 +55,9 @@ static double scale_of(double range_max_m, const char *output, const char *noise
     FILE *f = open_in("test.yaml", "w");
     fprintf(f,
             "head: {profile: head.yaml}\nscene:\n  meshes: [{file: floor.obj, up: z, scale: 1}]\n"
-            "stations: [{position_m: [0, 0, 1.7]}]\noutput: {%s}\nnoise: {%s}\ninstrument: {range_scale_ppm: %g}\n",
-            output, noise, range_scale_ppm);
+            "stations: [{position_m: [0, 0, 1.7]}]\noutput: {%s}\nnoise: {%s}\n",
+            output, noise);
+    if (range_scale_ppm != 0) fprintf(f, "instrument: {range_scale_ppm: %g}\n", range_scale_ppm);
     assert_int_equal(fclose(f), 0);
     snprintf(path, sizeof path, "%s/test.yaml", dir);
     warned[0] = err.text[0] = '\0';
