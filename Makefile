@@ -29,7 +29,7 @@ Q = $(Q_$(V))
 DEPS_BUILD = gcc g++ make pkg-config libc6-dev libembree-dev libassimp-dev libgeographiclib-dev libyaml-dev libpng-dev \
 	libstb-dev nettle-dev libusb-1.0-0-dev libusbredirparser-dev libwebsockets-dev assimp-testmodels
 # and the tests, with the second compiler and its sanitizers, clients and readers of recordings that are not ours:
-DEPS_TEST = $(DEPS_BUILD) libcmocka-dev clang libclang-rt-dev gpsd gpsd-clients cloudcompare mrpt-apps proj-bin python3-numpy \
+DEPS_TEST = $(DEPS_BUILD) libcmocka-dev clang libclang-rt-dev lld ccache gpsd gpsd-clients cloudcompare mrpt-apps proj-bin python3-numpy \
 	parallel patch tshark tcpreplay $(if $(shell command -v npm),,nodejs npm)
 # The guest tests; they are skipped where these can't be had. The kernel (linux-image-amd64) is fetched, not installed.
 DEPS_GUEST = qemu-system-x86 busybox-static cpio kmod xz-utils usbutils usbip
@@ -231,9 +231,13 @@ demo: deps-build
 # that it takes at -O1 (gcc with sanitizers: two thirds); core alone is worth -O1. Without clang gcc does it.
 # -g1, the lines alone, is an eighth less to compile.
 JOBS ?= $(shell getconf _NPROCESSORS_ONLN)
-STRICT = WERROR=-Werror CFLAGS="-g1 $(CFLAGS)" CXXFLAGS="-g1 $(CXXFLAGS)"
+# What was compiled before, in whatever checkout, is not compiled again.
+CACHED = $(if $(findstring ccache,$(CC)),,$(if $(shell command -v ccache),ccache ))
+export CCACHE_BASEDIR ?= $(CURDIR)
+export CCACHE_NOHASHDIR ?= 1
+STRICT = WERROR=-Werror CC="$(CACHED)$(CC)" CXX="$(CACHED)$(CXX)" CFLAGS="-g1 $(CFLAGS)" CXXFLAGS="-g1 $(CXXFLAGS)"
 HAS_CLANG := $(shell command -v clang)
-ASAN_CC = CC="$(patsubst %gcc,%clang,$(CC))" CXX="$(patsubst %g++,%clang++,$(CXX))"
+ASAN_CC = CC="$(CACHED)$(patsubst %gcc,%clang,$(CC))" CXX="$(CACHED)$(patsubst %g++,%clang++,$(CXX))"
 ASAN_FLAGS = -fsanitize=address,undefined -fno-sanitize-recover=all \
 	$(if $(HAS_CLANG),-fno-sanitize=vptr -fsanitize-coverage=inline-8bit-counters$(comma)pc-table)
 comma = ,
