@@ -6,8 +6,8 @@
 #   make fuzz-short           what `make test` runs of them
 S ?=
 F ?=
-FUZZ_CC ?= clang
-FUZZ_CXX ?= clang++
+FUZZ_CC ?= $(CACHED)clang
+FUZZ_CXX ?= $(CACHED)clang++
 FUZZ_BUILD ?= $(BUILD)/fuzz
 # Coverage as libFuzzer wants it: a counter an edge (inline-8bit-counters,pc-table), and comparisons (trace-cmp).
 # Processor time by compiler and flags, all with the address and undefined sanitizers. Compiling: ten files of all
