@@ -48,7 +48,7 @@ fi
 if wanted unit; then set -- "$@" +tests/check_recipes.sh; fi
 if wanted accuracy; then set -- "$@" $(programs accuracy); fi
 if wanted stability; then set -- "$@" $(programs stability); fi
-if wanted unit; then set -- "$@" tests/check_includes.sh tests/check_make.sh tests/check_mutants.sh tests/check_manual.sh $(ls tests/check_page_*.sh) $(programs unit); fi
+if wanted unit; then set -- "$@" tests/check_includes.sh tests/check_make.sh tests/check_mutants.sh tests/check_security.sh tests/check_manual.sh $(ls tests/check_page_*.sh) $(programs unit); fi
 if [ -z "$part" ]; then
     export FUZZ_BUILD="$build/asan" JOBS=1
     export TSAN_HEAD="$build/tsan_short/tsan_head"
