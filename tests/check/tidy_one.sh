@@ -5,7 +5,7 @@ set -u
 file=$1 cache=$2
 shift 2
 # The analyzer follows all ways through a function. The others are those that find faults, not tastes.
-checks='-*,clang-analyzer-*,-clang-analyzer-security.insecureAPI.DeprecatedOrUnsafeBufferHandling'
+checks='-*,clang-analyzer-*,-clang-analyzer-security.insecureAPI.DeprecatedOrUnsafeBufferHandling,-clang-analyzer-optin.performance.*'
 checks="$checks,bugprone-infinite-loop,bugprone-not-null-terminated-result,bugprone-posix-return,bugprone-signal-handler"
 checks="$checks,bugprone-string-literal-with-embedded-nul,bugprone-suspicious-memset-usage,bugprone-suspicious-semicolon"
 checks="$checks,bugprone-suspicious-string-compare,bugprone-terminating-continue,bugprone-too-small-loop-variable"
