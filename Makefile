@@ -254,6 +254,7 @@ test: deps-test
 	$(if $(HAS_CLANG),,@echo "no clang: its warnings are not looked at")
 	@$(MAKE) --no-print-directory $(READERS)/pcl_vlp16 & status=0; \
 	$(MAKE) --no-print-directory -j$(JOBS) $(ASAN) objects test-unit-programs $(if $(HAS_CLANG),fuzz-objects) || status=1; wait; exit $$status
+	$(if $(HAS_CLANG),@$(MAKE) --no-print-directory -j$(JOBS) $(TSAN_SHORT))
 	@$(RUN) sh tests/run_all.sh $(BUILD)
 else
 ONE = $(patsubst $(BUILD)/%,%,$(filter %/$(T),$(TESTS)))

@@ -48,10 +48,11 @@ fi
 if wanted unit; then set -- "$@" +tests/check_recipes.sh; fi
 if wanted accuracy; then set -- "$@" $(programs accuracy); fi
 if wanted stability; then set -- "$@" $(programs stability); fi
-if wanted unit; then set -- "$@" tests/check_includes.sh tests/check_make.sh tests/check_mutants.sh tests/check_manual.sh $(ls tests/check_page_*.sh) $(programs unit); fi
+if wanted unit; then set -- "$@" tests/check_includes.sh tests/check_make.sh tests/check_mutants.sh tests/check_security.sh tests/check_manual.sh $(ls tests/check_page_*.sh) $(programs unit); fi
 if [ -z "$part" ]; then
     export FUZZ_BUILD="$build/asan" JOBS=1
-    set -- "$@" +tests/fuzz/fuzz_short.sh $(programs unit "$build/asan")
+    export TSAN_HEAD="$build/tsan_short/tsan_head"
+    set -- "$@" +tests/fuzz/fuzz_short.sh $(programs unit "$build/asan") tests/check/tsan_short.sh
 fi
 if wanted wire; then for name in $beside; do set -- "$@" "+$build/test/tests/wire/test_$name"; done; fi
 if wanted wire; then set -- "$@" +tests/page/page.sh $(programs wire) tests/check_install.sh tests/check_package.sh; fi # a browser beside them

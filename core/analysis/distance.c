@@ -99,7 +99,7 @@ static bool visit_triangle(struct RTCPointQueryFunctionArguments *args)
 {
     struct search *s = args->userPtr;
     const struct scene *scene = s->index->scene;
-    double corner[3][3], nearest[3];
+    double corner[3][3], nearest[3] = {0}; /* squares of the largest numbers are infinite: no edge is nearer then */
     for (int i = 0; i < 3; i++)
         vec3_sub(scene->vertex_m[scene->triangle[args->primID][i]], s->p, corner[i]);
     double d = nearest_on_triangle(corner, nearest);

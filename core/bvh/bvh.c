@@ -99,7 +99,8 @@ int bvh_create(const struct scene *scene, const double origin_m[3], double stati
     }
     bvh->info.packet = embree_packet(bvh->device);
     bvh->info.build_s = seconds() - start;
-    bvh->info.bytes = (uint64_t)bvh->bytes + (uint64_t)scene->n_triangles * sizeof *bvh->triangle;
+    bvh->info.bytes =
+        (uint64_t)__atomic_load_n(&bvh->bytes, __ATOMIC_RELAXED) + (uint64_t)scene->n_triangles * sizeof *bvh->triangle;
     *out = bvh;
     return SH_OK;
 }

@@ -141,6 +141,7 @@ static int write_main(struct obj *o, const char *path, const char *materials, st
     rc = put_parts(o, materials != NULL, err);
     if (rc == SH_OK && materials != NULL) rc = write_materials(o, materials, err);
     int closed = mesh_file_close(&file, rc == SH_OK, err);
+    o->file = NULL;
     return rc != SH_OK ? rc : closed;
 }
 

@@ -62,7 +62,7 @@ static int read_rows(struct text *t, struct list *list, struct sh_err *err)
 {
     int rc = SH_OK;
     for (; t->p < t->end && rc == SH_OK; text_next_line(t)) {
-        double v[3];
+        double v[3] = {0};
         const int n = read_numbers(t, v, err);
         if (n != 0) rc = n < 0 ? n : add_row(t, list, v, n, err);
     }

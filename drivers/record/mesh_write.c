@@ -68,7 +68,7 @@ static const char **lines_of(char *text, uint32_t *n)
     size_t room = 0;
     const char **line = NULL;
     *n = 0;
-    for (char *p = strtok(text, "\n"); p != NULL; p = strtok(NULL, "\n")) {
+    for (char *rest, *p = strtok_r(text, "\n", &rest); p != NULL; p = strtok_r(NULL, "\n", &rest)) {
         if (!grow(&line, &room, *n + 1, sizeof *line)) break;
         line[(*n)++] = p;
     }

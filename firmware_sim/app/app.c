@@ -13,7 +13,7 @@
 #include "firmware_sim/app/progress.h"
 #include "firmware_sim/base/clock.h"
 
-static volatile sig_atomic_t interrupted;
+static atomic_int interrupted; /* lock-free, as a handler needs it; other threads ask for it, too */
 
 /* Signals that come together are one wish to end: `timeout` sends two, one to the process and one to its
  * group. From the third on, or a second after the first, they mean now. */
@@ -22,14 +22,14 @@ static const int64_t TOGETHER_NS = 1000000000;
 
 static void on_signal(int number)
 {
-    static _Atomic int64_t first_ns; /* lock-free, as a handler needs it */
+    static _Atomic int64_t first_ns;
     static atomic_int n;
     const int saved = errno;
     int64_t since_ns = 0;
     const int64_t now_ns = clock_now_ns();
     if (!atomic_compare_exchange_strong(&first_ns, &since_ns, now_ns) && now_ns - since_ns > TOGETHER_NS)
         atomic_store(&n, SIGNALS_TOGETHER);
-    interrupted = 1;
+    atomic_store(&interrupted, 1);
     if (atomic_fetch_add(&n, 1) >= SIGNALS_TOGETHER) {
         signal(number, SIG_DFL);
         raise(number); /* comes when this function returns */
@@ -39,7 +39,7 @@ static void on_signal(int number)
 
 int app_interrupted(void)
 {
-    return interrupted;
+    return atomic_load(&interrupted);
 }
 
 void app_catch_signals(void)

@@ -190,7 +190,7 @@ static void list_options(const struct app_option *row, struct option longs[APP_M
 {
     int n = 0;
     letters += sprintf(letters, "-:h");
-    for (; row[n].kind != APP_LAST && n < APP_MAX_OPTIONS; n++) {
+    for (; n < APP_MAX_OPTIONS && row[n].kind != APP_LAST; n++) {
         int has = row[n].argument != NULL ? required_argument : no_argument;
         longs[n] = (struct option){row[n].name, has, NULL, FIRST_VALUE + n};
         if (row[n].letter != '\0') letters += sprintf(letters, "%c%s", row[n].letter, has ? ":" : "");

@@ -95,6 +95,32 @@ static int status_of(struct bench *bench, const char *place, const char *line, c
     return ask(bench, place, line, host, &body, &len);
 }
 
+/* What a browser holds the page to: nothing from elsewhere, no frame around it, no type guessed, no other site's script. */
+static void test_headers(void **state)
+{
+    (void)state;
+    static const char *const fields[] = {"content-security-policy: default-src 'self'; frame-ancestors 'none'\r\n",
+                                         "cross-origin-resource-policy: same-origin\r\n",
+                                         "x-content-type-options: nosniff\r\n", "referrer-policy: no-referrer\r\n",
+                                         "cache-control: no-store\r\n"};
+    static const char *const lines[] = {"GET / HTTP/1.1", "GET /scene HTTP/1.1", "GET /nothing HTTP/1.1"};
+    char place[64], request[200], head[8192];
+    struct bench bench = open_web(place);
+    for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++) {
+        int fd = dial(place);
+        size_t n = 0, got = 1;
+        snprintf(request, sizeof request, "%s\r\nHost: %s\r\n\r\n", lines[i], place);
+        assert_int_equal(send(fd, request, strlen(request), MSG_NOSIGNAL), strlen(request));
+        for (head[0] = '\0'; got > 0 && n + 1 < sizeof head && strstr(head, "\r\n\r\n") == NULL; head[n] = '\0')
+            n += got = listen_to(&bench, fd, head + n, sizeof head - 1 - n);
+        for (size_t j = 0; j < sizeof fields / sizeof fields[0]; j++)
+            if (strstr(head, fields[j]) == NULL) fail_msg("%s: no %s in: %s", lines[i], fields[j], head);
+        assert_null(strcasestr(head, "access-control-allow-origin"));
+        close(fd);
+    }
+    bench_close(&bench);
+}
+
 static void test_requests(void **state)
 {
     (void)state;
@@ -441,11 +467,11 @@ static void test_bad_messages(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_requests),     cmocka_unit_test(test_who_asks),
-        cmocka_unit_test(test_session),      cmocka_unit_test(test_many_connections),
-        cmocka_unit_test(test_half_request), cmocka_unit_test(test_no_descriptors),
-        cmocka_unit_test(test_goodbye),      cmocka_unit_test(test_turned_down),
-        cmocka_unit_test(test_bad_messages),
+        cmocka_unit_test(test_headers),          cmocka_unit_test(test_requests),
+        cmocka_unit_test(test_who_asks),         cmocka_unit_test(test_session),
+        cmocka_unit_test(test_many_connections), cmocka_unit_test(test_half_request),
+        cmocka_unit_test(test_no_descriptors),   cmocka_unit_test(test_goodbye),
+        cmocka_unit_test(test_turned_down),      cmocka_unit_test(test_bad_messages),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -159,7 +159,8 @@ static void test_kinds(void **state)
     int fd;
     assert_int_equal(mkfifo(path, 0600), 0);
     expect_error(outfile_open(&file, path, &err), SH_EINPUT, path, "is a FIFO");
-    expect_error(newfile_open(path, &fd, &err), SH_EINPUT, path, "FIFO that nobody reads"); /* and did not wait for a reader */
+    expect_error(newfile_open(path, &fd, &err), SH_EINPUT, path,
+                 "FIFO that nobody reads"); /* and did not wait for a reader */
     assert_int_equal(kind_of(path), S_IFIFO);
     unlink(path);
     assert_int_equal(mkfifo(part, 0600), 0);
@@ -291,6 +292,30 @@ static void test_append(void **state)
     unlink(other);
 }
 
+/* The user's umask holds, and nothing that is made may be run. */
+static void test_rights(void **state)
+{
+    (void)state;
+    static const struct {
+        mode_t mask, want;
+    } rows[] = {{022, 0644}, {077, 0600}, {0, 0666}};
+    struct stat st;
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        const mode_t before = umask(rows[i].mask);
+        int fd;
+        assert_int_equal(newfile_part(path, part, &fd, &err), SH_OK);
+        assert_int_equal(fstat(fd, &st), 0);
+        assert_int_equal(st.st_mode & 07777, rows[i].want);
+        newfile_drop(part, fd);
+        assert_int_equal(newfile_open(path, &fd, &err), SH_OK);
+        umask(before);
+        assert_int_equal(fstat(fd, &st), 0);
+        assert_int_equal(st.st_mode & 07777, rows[i].want);
+        close(fd);
+        unlink(path);
+    }
+}
+
 static int set_up(void **state)
 {
     (void)state;
@@ -319,6 +344,7 @@ int main(void)
         cmocka_unit_test(test_end_between_open_and_lock),
         cmocka_unit_test(test_begin_before_rename),
         cmocka_unit_test(test_append),
+        cmocka_unit_test(test_rights),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -101,7 +101,7 @@ static void put_row(char *to, const struct view_column *c, size_t offset)
 static size_t lay_out(const struct slice *s, uint32_t n_columns, char *body)
 {
     size_t at = VIEW_CLOUD_HEAD + (size_t)n_columns * VIEW_CLOUD_COLUMN, size;
-    char *row = body == NULL ? NULL : body + VIEW_CLOUD_HEAD;
+    char *row = body != NULL ? body + VIEW_CLOUD_HEAD : NULL;
     if (body != NULL) {
         put_row(row, &POSITION, at);
         put_positions(s, body + at);
