@@ -61,7 +61,9 @@ int socket_accept(int listener, int *reserve, int *fd, struct sockaddr_storage *
 void socket_address_text(const struct sockaddr *address, socklen_t len, char *text, size_t size)
 {
     char host[64], port[8];
-    if (getnameinfo(address, len, host, sizeof host, port, sizeof port, NI_NUMERICHOST | NI_NUMERICSERV) != 0)
+    if (address->sa_family == AF_UNIX) /* a client has no name, and accept writes none */
+        snprintf(text, size, "a local client");
+    else if (getnameinfo(address, len, host, sizeof host, port, sizeof port, NI_NUMERICHOST | NI_NUMERICSERV) != 0)
         snprintf(text, size, "unknown address");
     else
         snprintf(text, size, strchr(host, ':') != NULL ? "[%s]:%s" : "%s:%s", host, port);

@@ -35,7 +35,7 @@ int socket_reserve(void);
  * otherwise. 0: there is none. reserve: socket_reserve()'s; its owner closes it. from may be NULL. */
 int socket_accept(int listener, int *reserve, int *fd, struct sockaddr_storage *from, socklen_t *len);
 
-/* An address as "127.0.0.1:40123" or "[::1]:40123". */
+/* An address as "127.0.0.1:40123" or "[::1]:40123"; that of a Unix socket's client as "a local client". */
 void socket_address_text(const struct sockaddr *address, socklen_t len, char *text, size_t size);
 
 /* For a connected TCP socket; others stay as they are. Small packets leave at once. A peer that has vanished

@@ -8,6 +8,7 @@
 #include <netinet/tcp.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
+#include <sys/un.h>
 
 #include "drivers/usb/backend.h"
 
@@ -17,6 +18,14 @@ static int connect_to(const struct bench *bench)
 {
     char name[300];
     bench->ops->endpoint(bench->link, name, sizeof name);
+    const char *path = strchr(name, '/');
+    if (path != NULL && path[1] != '/') { /* no http:// */
+        struct sockaddr_un local = {.sun_family = AF_UNIX};
+        snprintf(local.sun_path, sizeof local.sun_path, "%s", path);
+        int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+        assert_int_equal(connect(fd, (struct sockaddr *)&local, sizeof local), 0);
+        return fd;
+    }
     struct sockaddr_in at = {.sin_family = AF_INET,
                              .sin_addr.s_addr = htonl(INADDR_LOOPBACK),
                              .sin_port = htons((uint16_t)atoi(strrchr(name, ':') + 1))};
@@ -92,7 +101,8 @@ static void starve(const struct link_spec *spec)
         bench_poll(&bench, 0, 0);
         for (int i = 0; i < bench.n_queue; i++) {
             assert_int_equal(bench.queue[i].kind, LINK_REFUSED);
-            assert_memory_equal(bench.queue[i].peer, "127.0.0.1:", 10);
+            const char *who = spec->path[0] != '\0' ? "a local client" : "127.0.0.1:";
+            assert_memory_equal(bench.queue[i].peer, who, strlen(who));
             n_refused++;
         }
     }
@@ -137,6 +147,15 @@ static void test_usbredir(void **state)
 #endif
 }
 
+static void test_path(void **state)
+{
+    (void)state;
+    struct link_spec spec = {.type = LINK_USB, .backend = USB_BACKEND_USBIP, .vid = 1};
+    snprintf(spec.path, sizeof spec.path, "/tmp/scanhead-test-%d.usbip", (int)getpid());
+    starve(&spec);
+    unlink(spec.path);
+}
+
 static void test_web(void **state)
 {
     (void)state;
@@ -149,6 +168,7 @@ int main(void)
         cmocka_unit_test(test_tcp),
         cmocka_unit_test(test_usbip),
         cmocka_unit_test(test_usbredir),
+        cmocka_unit_test(test_path),
         cmocka_unit_test(test_web),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
