@@ -6,6 +6,7 @@
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <poll.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
@@ -44,12 +45,11 @@ int socket_reserve(void)
     return open("/dev/null", O_RDONLY | O_CLOEXEC);
 }
 
-int socket_accept(int listener, int *reserve, int *fd, struct sockaddr_storage *from, socklen_t *len)
+static int accept_next(int listener, int *reserve, int *fd, struct sockaddr *at, socklen_t *len)
 {
-    struct sockaddr *at = (struct sockaddr *)from;
+    if (*reserve < 0) *reserve = socket_reserve(); /* somebody else was quicker, last time */
     *fd = accept4(listener, at, len, SOCK_NONBLOCK | SOCK_CLOEXEC);
     const int starved = *fd < 0 && (errno == EMFILE || errno == ENFILE) && *reserve >= 0;
-    if (*fd >= 0 && *reserve < 0) *reserve = socket_reserve(); /* somebody else was quicker, last time */
     if (!starved) return *fd >= 0;
     close(*reserve);
     const int waste = accept4(listener, at, len, SOCK_CLOEXEC);
@@ -58,10 +58,22 @@ int socket_accept(int listener, int *reserve, int *fd, struct sockaddr_storage *
     return waste >= 0;
 }
 
+int socket_accept(int listener, int *reserve, int *fd, struct sockaddr_storage *from, socklen_t *len)
+{
+    /* One link at a time: another's client could take the descriptor that is given up, and the reserve would be lost. */
+    static pthread_mutex_t turn = PTHREAD_MUTEX_INITIALIZER;
+    pthread_mutex_lock(&turn);
+    const int came = accept_next(listener, reserve, fd, (struct sockaddr *)from, len);
+    pthread_mutex_unlock(&turn);
+    return came;
+}
+
 void socket_address_text(const struct sockaddr *address, socklen_t len, char *text, size_t size)
 {
     char host[64], port[8];
-    if (getnameinfo(address, len, host, sizeof host, port, sizeof port, NI_NUMERICHOST | NI_NUMERICSERV) != 0)
+    if (address->sa_family == AF_UNIX) /* a client has no name, and accept writes none */
+        snprintf(text, size, "a local client");
+    else if (getnameinfo(address, len, host, sizeof host, port, sizeof port, NI_NUMERICHOST | NI_NUMERICSERV) != 0)
         snprintf(text, size, "unknown address");
     else
         snprintf(text, size, strchr(host, ':') != NULL ? "[%s]:%s" : "%s:%s", host, port);

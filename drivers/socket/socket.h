@@ -32,10 +32,11 @@ int socket_error_code(int error);
 int socket_reserve(void);
 /* The next client of a listener. Returns 1 with its descriptor, which does not block; or with -1 where it was turned
  * away, as the process or the system has no descriptor for it. It would wake who waits for the listener again and again
- * otherwise. 0: there is none. reserve: socket_reserve()'s; its owner closes it. from may be NULL. */
+ * otherwise. 0: there is none. reserve: socket_reserve()'s; its owner closes it. from may be NULL.
+ * Listeners in several threads take turns. */
 int socket_accept(int listener, int *reserve, int *fd, struct sockaddr_storage *from, socklen_t *len);
 
-/* An address as "127.0.0.1:40123" or "[::1]:40123". */
+/* An address as "127.0.0.1:40123" or "[::1]:40123"; that of a Unix socket's client as "a local client". */
 void socket_address_text(const struct sockaddr *address, socklen_t len, char *text, size_t size);
 
 /* For a connected TCP socket; others stay as they are. Small packets leave at once. A peer that has vanished

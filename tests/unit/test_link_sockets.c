@@ -6,9 +6,13 @@
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
+#include <pthread.h>
+#include <stdatomic.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
+#include <sys/un.h>
 
+#include "drivers/socket/socket.h"
 #include "drivers/usb/backend.h"
 
 enum { MAX_FD = 1024, NOTICED_S = 60 };
@@ -17,6 +21,14 @@ static int connect_to(const struct bench *bench)
 {
     char name[300];
     bench->ops->endpoint(bench->link, name, sizeof name);
+    const char *path = strchr(name, '/');
+    if (path != NULL && path[1] != '/') { /* no http:// */
+        struct sockaddr_un local = {.sun_family = AF_UNIX};
+        snprintf(local.sun_path, sizeof local.sun_path, "%s", path);
+        int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+        assert_int_equal(connect(fd, (struct sockaddr *)&local, sizeof local), 0);
+        return fd;
+    }
     struct sockaddr_in at = {.sin_family = AF_INET,
                              .sin_addr.s_addr = htonl(INADDR_LOOPBACK),
                              .sin_port = htons((uint16_t)atoi(strrchr(name, ':') + 1))};
@@ -92,7 +104,8 @@ static void starve(const struct link_spec *spec)
         bench_poll(&bench, 0, 0);
         for (int i = 0; i < bench.n_queue; i++) {
             assert_int_equal(bench.queue[i].kind, LINK_REFUSED);
-            assert_memory_equal(bench.queue[i].peer, "127.0.0.1:", 10);
+            const char *who = spec->path[0] != '\0' ? "a local client" : "127.0.0.1:";
+            assert_memory_equal(bench.queue[i].peer, who, strlen(who));
             n_refused++;
         }
     }
@@ -137,6 +150,79 @@ static void test_usbredir(void **state)
 #endif
 }
 
+static void test_path(void **state)
+{
+    (void)state;
+    struct link_spec spec = {.type = LINK_USB, .backend = USB_BACKEND_USBIP, .vid = 1};
+    snprintf(spec.path, sizeof spec.path, "/tmp/scanhead-test-%d.usbip", (int)getpid());
+    starve(&spec);
+    unlink(spec.path);
+}
+
+enum { IN_VAIN = 100 };
+struct door {
+    int listener, reserve, n_turned_away;
+    atomic_int *go;
+};
+
+static void *turn_away(void *arg)
+{
+    struct door *door = arg;
+    int fd;
+    for (atomic_fetch_sub(door->go, 1); atomic_load(door->go) > 0;)
+        ;
+    while (socket_accept(door->listener, &door->reserve, &fd, NULL, NULL) && fd < 0)
+        door->n_turned_away++;
+    return NULL;
+}
+
+/* Two threads without descriptors: neither takes what the other gives up for a moment. */
+static void starve_two_doors(void)
+{
+    int client[2 * IN_VAIN], n = 0;
+    atomic_int go = 2;
+    struct door door[2];
+    struct rlimit before, few;
+    pthread_t thread[2];
+    for (int i = 0; i < 2; i++) {
+        const struct socket_place place = {.what = "test", .host = ""};
+        struct sh_err err;
+        struct sockaddr_storage at;
+        socklen_t len = sizeof at;
+        door[i] = (struct door){.reserve = socket_reserve(), .go = &go};
+        assert_int_equal(socket_open(&place, &door[i].listener, (char[64]){0}, 64, &err), SH_OK);
+        assert_int_equal(getsockname(door[i].listener, (struct sockaddr *)&at, &len), 0);
+        for (int k = 0; k < IN_VAIN; k++, n++) {
+            client[n] = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+            assert_int_equal(connect(client[n], (struct sockaddr *)&at, len), 0);
+        }
+    }
+    assert_int_equal(getrlimit(RLIMIT_NOFILE, &before), 0);
+    few = (struct rlimit){.rlim_cur = (rlim_t)client[n - 1] + 1, .rlim_max = before.rlim_max};
+    assert_int_equal(setrlimit(RLIMIT_NOFILE, &few), 0);
+    for (int i = 0; i < 2; i++)
+        assert_int_equal(pthread_create(&thread[i], NULL, turn_away, &door[i]), 0);
+    for (int i = 0; i < 2; i++)
+        pthread_join(thread[i], NULL);
+    setrlimit(RLIMIT_NOFILE, &before);
+    while (n > 0)
+        close(client[--n]);
+    for (int i = 0; i < 2; i++) {
+        assert_int_equal(door[i].n_turned_away, IN_VAIN);
+        assert_true(door[i].reserve >= 0);
+        close(door[i].reserve);
+        close(door[i].listener);
+    }
+}
+
+/* Without turns one round in three fails on an idle machine of two processors. */
+static void test_two_doors(void **state)
+{
+    (void)state;
+    for (int round = 0; round < 10; round++)
+        starve_two_doors();
+}
+
 static void test_web(void **state)
 {
     (void)state;
@@ -149,7 +235,9 @@ int main(void)
         cmocka_unit_test(test_tcp),
         cmocka_unit_test(test_usbip),
         cmocka_unit_test(test_usbredir),
+        cmocka_unit_test(test_path),
         cmocka_unit_test(test_web),
+        cmocka_unit_test(test_two_doors),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
