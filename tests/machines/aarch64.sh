@@ -2,6 +2,7 @@
 # 64-bit ARM: cross-built with the libraries of an arm64 Debian, under qemu-aarch64
 here=$(dirname "$0") build=$1 at=$2
 . "$here/lib.sh"
+case $PWD/$at in *[[:space:]]*) leave "there is a blank in the path of $at, which the compiler's options can't have" ;; esac
 need aarch64-linux-gnu-gcc gcc-aarch64-linux-gnu
 need aarch64-linux-gnu-g++ g++-aarch64-linux-gnu
 need qemu-aarch64-static qemu-user-static
@@ -25,6 +26,6 @@ $nicely ${MAKE:-make} -k -j"${JOBS:-2}" DEPS=no BUILD="$at/build" CROSS_COMPILE=
     WERROR=-Werror CFLAGS=-g1 CXXFLAGS=-g1 $(emulated_programs "$at/build") all >"$at/build.txt" 2>&1 || exit 1
 built "$(aarch64-linux-gnu-gcc -dumpversion | sed 's/^/gcc /'), Embree $(cat "$at/build/embree")" "$at/build.txt"
 emulate="qemu-aarch64-static -L $root"
-[ -e "$build/test/scanhead" ] || build_here || exit 1
+build_here all "$at/here.txt" || exit 1
 $nicely $emulate "$at/build/scanhead" $RECORD -o "$at/record.ply" 2>"$at/record.log" && compare_record "$at/record.ply"
 test_emulated "$at/build"

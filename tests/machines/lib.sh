@@ -45,11 +45,12 @@ make_root() {
 # in_root COMMAND...: in the root, with its own processes and mounts, which end with it. What this machine trusts is trusted
 # there, npm included.
 in_root() {
-    $nicely unshare -m -p -f --propagation private sh -c '
+    $nicely unshare -m -p -f --kill-child --propagation private sh -c '
         root=$1
         shift
         mount -t proc proc "$root/proc" && mount --rbind /dev "$root/dev" && mount --rbind /sys "$root/sys" &&
-            mount -t tmpfs tmpfs "$root/run" && cp /etc/resolv.conf "$root/etc/resolv.conf" 2>/dev/null
+            mount -t tmpfs tmpfs "$root/run" || exit 1
+        cp /etc/resolv.conf "$root/etc/resolv.conf" 2>/dev/null
         trusted=etc/ssl/certs/ca-certificates.crt
         [ ! -e "/$trusted" ] || [ ! -d "$root/etc/ssl/certs" ] || cp "/$trusted" "$root/$trusted"
         exec chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8 \
@@ -68,11 +69,11 @@ built() {
     echo "$1, $(grep -c 'warning:' "$2") warnings" >"$at/built.txt"
 }
 
-# The programs of this machine, with the options of `make test`.
+# build_here TARGET LOG: the programs of this machine, with the options of `make test`; what is there stays.
 build_here() {
     echo "    building for this machine"
-    $nicely ${MAKE:-make} -j"${JOBS:-2}" DEPS=no BUILD="$build/test" WERROR=-Werror CFLAGS=-g1 CXXFLAGS=-g1 test-programs \
-        >"$at/build.txt" 2>&1
+    $nicely ${MAKE:-make} -j"${JOBS:-2}" DEPS=no BUILD="$build/test" WERROR=-Werror CFLAGS=-g1 CXXFLAGS=-g1 "$1" >"$2" 2>&1 ||
+        { echo "    it does not build: $2"; return 1; }
 }
 
 # ---- tests under an emulator: $emulate is its command
@@ -86,9 +87,10 @@ emulated_programs() {
 # work these may take twenty times as long.
 test_emulated() {
     rm -rf "$at/run"
+    from=$1/tests
     set -- $(emulated_programs "$1")
     for program; do
-        script=$at/run/${program#*/tests/}
+        script=$at/run/${program#"$from"/}
         mkdir -p "$(dirname "$script")"
         printf '#!/bin/sh\nexec sh %s/emulated.sh %s %s\n' "$here" "$program" "$emulate" >"$script"
         chmod +x "$script"

@@ -10,11 +10,17 @@
 # At the end a table of all. Exit status 1 when anything failed, 2 for wrong usage.
 set -u
 here=$(dirname "$0")
+[ $# -ge 2 ] || { echo "usage: $0 BUILD MACHINE... (make machines M=...); allowed are trixie, avx, sse, aarch64" >&2; exit 2; }
 build=$1
 shift
+for number in "${LIMIT_S:-300}" "${JOBS:-2}"; do
+    case $number in
+    0* | *[!0-9]*) echo "LIMIT_S=${LIMIT_S:-} JOBS=${JOBS:-}: whole numbers from 1 on are allowed" >&2; exit 2 ;;
+    esac
+done
 for name; do
     case $name in
-    lib | run | emulated | *[!a-z0-9]*) known= ;;
+    lib | run | emulated | x86 | *[!a-z0-9]*) known= ;;
     *) known=$here/$name.sh ;;
     esac
     [ -n "$known" ] && [ -e "$known" ] || { echo "M=$name: no such machine; allowed are trixie, avx, sse, aarch64" >&2; exit 2; }

@@ -16,5 +16,5 @@ in_root sh -c "cd /scanhead && make test JOBS=${JOBS:-2}" >"$at/build.txt" 2>&1
 sed -n '/^\(ok\|FAIL\)  *[a-z]/,$p' "$at/build.txt" >"$at/tests.txt"
 [ ! -s "$at/tests.txt" ] || built "make test" "$at/build.txt"
 grep -v -E '^(ok|    )' "$at/tests.txt" | sed 's/^/    /'
-[ -e "$build/test/scanhead" ] || build_here || exit 1
+build_here all "$at/here.txt" || exit 1
 in_root sh -c "cd /scanhead && build/test/scanhead $(echo $RECORD) -o build/record.ply" && compare_record "$at/root/scanhead/build/record.ply"

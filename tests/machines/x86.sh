@@ -4,7 +4,7 @@ here=$(dirname "$0") build=$1 at=$2
 . "$here/lib.sh"
 [ "$(uname -m)" = x86_64 ] || leave "this machine is no x86_64, so its programs are others"
 need qemu-x86_64-static qemu-user-static
-build_here || exit 1
+build_here test-programs "$at/build.txt" || exit 1
 built "the same binaries" "$at/build.txt"
 emulate="qemu-x86_64-static -cpu $3"
 # Embree and the head must have chosen what this processor has.

@@ -1,7 +1,7 @@
 """Clients of the long soak: those that read all, come and go, stall, or misbehave, one class a kind.
 
-Each is a thread. `visits` counts how often it came, `good` how often it got what a client should get. What must
-never happen is a line in `wrong`.
+Each is a thread. `visits` counts how often it came, `good` how often it got what a client should get; a visit that
+sends noise alone gets nothing and is none of these. What must never happen is a line in `wrong`.
 """
 import base64
 import os
@@ -35,8 +35,10 @@ class Client(threading.Thread):
             self.visits += 1
             try:
                 self.good += bool(self.visit())
-            except (OSError, ValueError, struct.error) as error:
+            except OSError as error:
                 self.refused(error)
+            except Exception as error:  # what came has not the form that it has to have
+                self.wrong.append(f"{type(error).__name__}: {error}")
             self.stop.wait(self.pause_s * self.rng.uniform(0.2, 1.8))
 
     def refused(self, error):
@@ -67,12 +69,13 @@ class Client(threading.Thread):
         return bytes(data)
 
     def until(self, sock, end, most=1 << 20):
-        data = bytearray()
-        while end not in data and len(data) < most:
-            piece = sock.recv(4096)
+        data, new = bytearray(), 0
+        while data.find(end, max(0, new - len(end) + 1)) < 0 and len(data) < most:
+            piece, new = sock.recv(CHUNK), len(data)
             if not piece:
                 raise OSError("closed")
             data += piece
+            self.bytes += len(piece)
         return bytes(data)
 
     def drink(self, fd, seconds, most=1 << 30):
@@ -189,16 +192,22 @@ class Page(Client):
             kind = self.rng.randrange(4)
             if kind == 0:
                 sock.sendall(self.rng.randbytes(500))
-                return True
+                return False
+            host = b"Host: %s:%d\r\n" % (sock.getpeername()[0].encode(), sock.getpeername()[1])
             if kind == 1:
-                sock.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n")
-                return b"200" in self.until(sock, b"\r\n")
+                sock.sendall(b"GET / HTTP/1.1\r\n" + host + b"Connection: close\r\n\r\n")
+                self.expect(self.until(sock, b"\r\n"), b"200")
+                return False  # the messages are what it comes for
             key = base64.b64encode(self.rng.randbytes(16))
-            sock.sendall(b"GET /ws HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-                         b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: " + key + b"\r\n\r\n")
-            if b" 101 " not in self.until(sock, b"\r\n\r\n"):
-                raise OSError("no upgrade")
+            sock.sendall(b"GET /ws HTTP/1.1\r\n" + host + b"Upgrade: websocket\r\nConnection: Upgrade\r\n"
+                         b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Protocol: scanhead-native-1\r\n"
+                         b"Sec-WebSocket-Key: " + key + b"\r\n\r\n")
+            self.expect(self.until(sock, b"\r\n"), b"101")
             return self.drink(sock.fileno(), self.rng.uniform(0.2, 3)) > 0
+
+    def expect(self, answer, code):
+        if answer.split(b" ")[1] != code:
+            self.wrong.append(f"no {code.decode()}: {answer[:40]!r}")
 
 
 class UsbIp(Client):
@@ -217,24 +226,23 @@ class UsbIp(Client):
             if sequence == self.sequence:
                 return status, body
 
-    def refused(self, error):
-        if isinstance(error, ValueError):
-            self.wrong.append(str(error))
-
     def visit(self):
         with self.connect() as sock:
             if self.rng.random() < 0.2:
                 sock.sendall(self.rng.randbytes(self.rng.randrange(1, 400)))
-                return True
+                return False
             sock.sendall(struct.pack(">HHI", 0x0111, 0x8005, 0))
-            listing = self.exactly(sock, 12)
-            if struct.unpack(">I", listing[8:])[0] < 1:
-                raise OSError("no device")
+            listing = self.exactly(sock, 12 + 312)
+            if struct.unpack(">I", listing[8:12])[0] != 1:
+                raise ValueError("not one device")
+            bus_id = listing[12 + 256:12 + 288]  # its number depends on the heads beside it
         with self.connect() as sock:
-            sock.sendall(struct.pack(">HHI", 0x0111, 0x8003, 0) + b"1-1".ljust(32, b"\0"))
+            sock.sendall(struct.pack(">HHI", 0x0111, 0x8003, 0) + bus_id)
             status = struct.unpack(">HHI", self.exactly(sock, 8))[2]
+            if status == 2:
+                raise OSError("the other one has it")
             if status:
-                raise OSError("busy")
+                raise ValueError(f"import: status {status}")
             bus, device = struct.unpack(">II", self.exactly(sock, 312)[288:296])
             self.sequence, self.device = 0, bus << 16 | device
             status, text = self.submit(sock, 0, True, 4096, bytes.fromhex("8006000200000010"))
@@ -264,11 +272,12 @@ class Redir(Client):
 
     def visit(self):
         with self.connect() as sock:
-            if self.rng.random() < 0.5:
+            is_noise = self.rng.random() < 0.5
+            if is_noise:
                 sock.sendall(self.rng.randbytes(self.rng.randrange(1, 5000)))
             else:
                 sock.sendall(struct.pack("<III", 0, 68, 0) + b"soak".ljust(64, b"\0") + struct.pack("<I", 0))
-            return self.drink(sock.fileno(), self.rng.uniform(0.1, 1)) > 0
+            return self.drink(sock.fileno(), self.rng.uniform(0.1, 1)) > 0 and not is_noise
 
 
 class Scip(Client):
@@ -281,8 +290,8 @@ class Scip(Client):
             scans = 0
             for _ in range(self.rng.randrange(1, 40)):
                 sock.sendall(b"GD0000108001\n")
-                text = self.until(sock, b"\n\n", 1 << 16)
-                while not text.endswith(b"\n\n"):
+                text = b""
+                while b"GD" not in text or not text.endswith(b"\n\n"):  # replies to others may come before
                     text += self.until(sock, b"\n\n", 1 << 16)
                 for line in text[text.find(b"GD"):].split(b"\n")[1:-2]:
                     if len(line) > 1 and line[-1] != (sum(line[:-1]) & 0x3f) + 0x30:

@@ -9,6 +9,7 @@ import atexit
 import json
 import os
 import pathlib
+import shutil
 import signal
 import subprocess
 import sys
@@ -32,7 +33,9 @@ class Head:
 
     def __init__(self, name, program, config, out, options=()):
         self.name, self.samples, self.out = name, [], out
+        self.rest = None  # the last sample, when all clients have gone
         self.stats_path = out / f"{name}.json"
+        self.stats_path.unlink(missing_ok=True)
         read_fd, write_fd = os.pipe()
         with open(out / f"{name}.err", "wb") as err:
             self.process = subprocess.Popen(
@@ -47,9 +50,15 @@ class Head:
         self.endpoints = [e["endpoint"] for e in json.loads(line)["endpoints"]]
 
     def sample(self, at_s):
+        self.samples.append(self.look(at_s))
+        return self.samples[-1]
+
+    def look(self, at_s=0):
+        if self.process.poll() is not None:
+            sys.exit(f"{self.name}: ended by itself, status {self.process.returncode}: {self.out / self.name}.err")
         status = dict(line.split(":", 1) for line in open(f"/proc/{self.process.pid}/status") if ":" in line)
-        self.samples.append((at_s, int(status["VmRSS"].split()[0]), len(os.listdir(f"/proc/{self.process.pid}/fd")),
-                             int(status["Threads"])))
+        return (at_s, int(status["VmRSS"].split()[0]), len(os.listdir(f"/proc/{self.process.pid}/fd")),
+                int(status["Threads"]))
 
     def end(self):
         self.process.send_signal(signal.SIGINT)
@@ -59,8 +68,10 @@ class Head:
 
 
 class Clock:
-    """Device time beside the clock of this machine, asked while the head rests. The answer lies between the question and its
-    arrival, so that the width of this is the bound of the error. And the times of the scan's events, in device time."""
+    """Device time beside the clock of this machine, asked while the head rests. The answer is the time of the last tick. So
+    what the clock was then lies between the arrival of the answer and a tick before the question; of many answers the one
+    that is most ahead says most. The width of this is the bound of the error. And the times of the scan's events, in
+    device time."""
 
     def __init__(self, endpoint):
         self.endpoint, self.marks, self.scan_ns = endpoint, [], {}
@@ -71,14 +82,16 @@ class Clock:
             before = time.clock_gettime_ns(time.CLOCK_MONOTONIC)
             t_ns = int(head.query("TIME?", PATIENCE_S))
             after = time.clock_gettime_ns(time.CLOCK_MONOTONIC)
-            if best is None or after - before < best[1]:
-                best = (t_ns - (before + after) // 2, after - before)
-        self.marks.append(best)
+            if best is None or t_ns - after > best[0]:
+                best = (t_ns - after, after - before + TICK_NS)
+        self.marks.append((best[0] + best[1] // 2, best[1]))
 
     def command(self, line, event, is_before):
         """A client for one command, which goes once the event has come: what it does not read is counted as left out."""
         with scanhead.open(self.endpoint, PATIENCE_S) as head:
             if is_before:
+                while head.query("HEAD:STATe?", PATIENCE_S) == "boot":
+                    pass
                 self.mark(head)
             head.command(line, PATIENCE_S)
             for frame in head.frames(PATIENCE_S):
@@ -114,8 +127,8 @@ def flat(sheet, head):
     (rss0, rss1), (fd0, fd1), (threads0, threads1) = middle
     most = max(s[1] for s in kept)
     sheet.line(rss1 - rss0 <= RSS_GROWTH_KIB, f"{head.name}: memory", f"{rss0} KiB, then {rss1}; most {most}")
-    rest = head.samples[-1]  # all clients have gone by then
-    first = head.samples[0]  # before any came
+    rest = head.rest
+    first = head.samples[0]  # before any client came
     sheet.line(rest[2] <= first[2], f"{head.name}: descriptors at rest", f"{first[2]} before, {rest[2]} after; "
                f"in between {fd0}, then {fd1}")
     sheet.line(rest[3] <= first[3], f"{head.name}: threads at rest", f"{first[3]} before, {rest[3]} after; "
@@ -133,9 +146,9 @@ def sums(sheet, head):
 def wait_gone(head, first, deadline_s=60):
     """Until the head has noticed that its clients are gone."""
     until_s = time.monotonic() + deadline_s
-    while time.monotonic() < until_s:
-        head.sample(time.monotonic())
-        if head.samples[-1][2] <= first[2] and head.samples[-1][3] <= first[3]:
+    while True:
+        head.rest = head.look()
+        if head.rest[2] <= first[2] and head.rest[3] <= first[3] or time.monotonic() > until_s:
             return
         time.sleep(0.2)
 
@@ -162,12 +175,24 @@ def udp_port():
         return sock.getsockname()[1]
 
 
+def seconds_of(text):
+    seconds = float(text)
+    if not 10 <= seconds <= 1e6:
+        raise ValueError
+    return seconds
+
+
+seconds_of.__name__ = "number of seconds (allowed: 10 to 1e6)"
+
+
 def main():
     options = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    options.add_argument("--seconds", type=float, default=600)
+    options.add_argument("--seconds", type=seconds_of, default=600)
     options.add_argument("--scanhead", default="build/scanhead")
     options.add_argument("--out", type=pathlib.Path, default=pathlib.Path("build/soak-long"))
     args = options.parse_args()
+    if shutil.which(args.scanhead) is None:
+        options.error(f"--scanhead {args.scanhead}: no program; make builds it")
     args.out.mkdir(parents=True, exist_ok=True)
     sheet, stop = Sheet(), threading.Event()
 
@@ -184,19 +209,20 @@ def main():
     for head in heads:
         head.sample(0)
     first = {head.name: head.samples[0] for head in heads}
+    (args.out / "record.json").unlink(missing_ok=True)
     recorder = subprocess.Popen([args.scanhead, "record", main_head.endpoints[0], "--listen", "--quiet", "--no-hash",
                                  "--stats", str(args.out / "record.json")], stderr=open(args.out / "record.err", "wb"))
-    while main_head.samples[-1][2] <= first["head"][2]:  # until the recorder has come
+    atexit.register(lambda: recorder.poll() is None and recorder.kill())
+    while main_head.look()[2] <= first["head"][2]:  # until the recorder has come
+        if recorder.poll() is not None:
+            sys.exit(f"no recorder: {(args.out / 'record.err').read_text()}")
         time.sleep(0.1)
-        main_head.sample(0)
     clock = Clock(main_head.endpoints[0])
     began_s = time.monotonic()
     clock.command("SCAN:STARt", scanhead.EV_SCAN_START, True)
     threads = start_clients(main_head, others, stop)
     while (at_s := time.monotonic() - began_s) < args.seconds:
         for head in heads:
-            if head.process.poll() is not None:
-                sys.exit(f"{head.name}: ended by itself, status {head.process.returncode}")
             head.sample(at_s)
         if sys.stderr.isatty() or int(at_s) % 60 == 0:
             print(f"\r{at_s:6.0f} s  {main_head.samples[-1][1]} KiB, {main_head.samples[-1][2]} descriptors, "
@@ -205,6 +231,8 @@ def main():
     stop.set()
     for thread in threads:
         thread.join(90)
+        if thread.is_alive():
+            thread.wrong.append("does not end")
     clock.command("SCAN:STOP", scanhead.EV_SCAN_END, False)
     seconds = time.monotonic() - began_s
     recorder.send_signal(signal.SIGINT)
