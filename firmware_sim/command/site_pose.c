@@ -62,7 +62,7 @@ static int take_number(struct command_call *call, int i, const char *field, size
 static int take_station(struct command_call *call, const char *field, size_t len, uint32_t *station)
 {
     struct command_decimal decimal;
-    int64_t value;
+    int64_t value = 0;
     const uint32_t n = call->dev->limits.n_stations;
     const char *end = len < FIELD_LEN ? command_parse_decimal(field, &decimal) : NULL;
     if (end == NULL || *end != '\0') return fail_number(call, "station", field);

@@ -64,14 +64,36 @@ static void identify(struct links *links, const struct config *cfg)
     }
 }
 
+/* Addresses of this machine alone, as they are written. Any other name may be one that others reach. */
+static int is_loopback(const char *address)
+{
+    return address[0] == '\0' || strncmp(address, "127.", 4) == 0 || strcmp(address, "localhost") == 0 ||
+           strcmp(address, "::1") == 0;
+}
+
+/* A head has no password, and a user may not expect that. */
+static void warn_open(const struct links *links, const struct link_spec *spec, const struct pump *pump)
+{
+    struct link_place place;
+    if ((spec->type != LINK_TCP && spec->type != LINK_WEB) || spec->protocol == PROTOCOL_NMEA ||
+        is_loopback(spec->address))
+        return;
+    pump_get_place(pump, &place);
+    sh_warn(links->report,
+            "link %s: other machines may reach it, and whoever does commands the head: there is no password",
+            place.endpoint);
+}
+
 int links_open(struct links *links, const struct config *cfg, const struct link_spec *extra, struct sh_err *err)
 {
     int rc = SH_OK;
     identify(links, cfg);
     for (uint32_t i = 0; i < cfg->n_links + (extra != NULL) && rc == SH_OK; i++) {
-        rc = pump_open(links, i, i < cfg->n_links ? &cfg->link[i] : extra, &links->pump[i], err);
+        const struct link_spec *spec = i < cfg->n_links ? &cfg->link[i] : extra;
+        rc = pump_open(links, i, spec, &links->pump[i], err);
         if (rc != SH_OK) break;
         links->n++;
+        warn_open(links, spec, links->pump[i]);
         rc = check_capacity(links, cfg, links->pump[i], err);
     }
     return rc;

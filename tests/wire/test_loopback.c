@@ -68,9 +68,38 @@ static void every_service_is_for_this_machine_alone(void **state)
     head_end(&head, SIGTERM);
 }
 
+/* An address that others may reach is said with a warning, once for the link; loopback and a link that takes no commands
+ * are not. */
+static void what_others_reach_is_said(void **state)
+{
+    struct wire *wire = *state;
+    const struct room_config config = {.profile = "any-rate",
+                                       .prr_hz = 100000,
+                                       .lines_hz = 100,
+                                       .pan_deg_s = 10,
+                                       .pan_stop_deg = 90,
+                                       .links = "links:\n"
+                                                "  - {type: tcp, port: 0, address: 127.0.0.2}\n"
+                                                "  - {type: web, port: 0, address: localhost}\n"
+                                                "  - {type: tcp, port: 0, address: 0.0.0.0}\n"};
+    size_t len;
+    room_write(wire);
+    struct head head = head_start(wire, room_config_write(wire, &config), NULL);
+    const int port = endpoint_port(head_link(&head, 2));
+    assert_int_equal(try_tcp("127.0.0.2", port), 0); /* what the other test would see of such a link */
+    head_end(&head, SIGTERM);
+    char *said = wire_read(wire_path(wire, "head.err"), &len), want[64];
+    snprintf(want, sizeof want, "link tcp:0.0.0.0:%d: other machines may reach it", port);
+    const char *at = strstr(said, "other machines");
+    assert_non_null(strstr(said, want));
+    assert_null(strstr(at + 1, "other machines"));
+    free(said);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(every_service_is_for_this_machine_alone, wire_setup, wire_teardown)};
+        cmocka_unit_test_setup_teardown(every_service_is_for_this_machine_alone, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(what_others_reach_is_said, wire_setup, wire_teardown)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
