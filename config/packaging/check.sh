@@ -6,6 +6,7 @@
 #
 # MIRROR: where Debian is taken from; SUITE: which one.
 set -u
+[ $# -eq 2 ] || { echo "usage: $0 DEB_DIR VERSION (make deb-check)" >&2; exit 2; }
 debs=$1 version=$2
 suite=${SUITE:-bookworm} mirror=${MIRROR:-http://deb.debian.org/debian}
 here=$(cd "$(dirname "$0")" && pwd)
@@ -17,6 +18,7 @@ stop() {
 [ "$(id -u)" = 0 ] || stop "a root of Debian is made and entered: that needs root; sudo make deb-check"
 command -v mmdebstrap >/dev/null || stop "no mmdebstrap; apt-get install mmdebstrap"
 debs=$(cd "$debs" && pwd) || exit 1
+ls "$debs"/scanhead_"$version"-1_*.changes >/dev/null 2>&1 || stop "no packages of $version in $debs; make deb"
 root=$debs/root
 work=$debs/check
 rm -rf "$work" && mkdir -p "$work" || exit 1
@@ -43,6 +45,7 @@ as_head() {
 }
 
 lintian_finds_no_errors() {
+    command -v lintian >/dev/null || { echo "no lintian; apt-get install lintian" | tee "$work/lintian"; return 1; }
     lintian --tag-display-limit 0 --show-overrides "$debs"/*.changes >"$work/lintian" 2>&1
     ! grep '^E: ' "$work/lintian"
 }

@@ -11,10 +11,21 @@ build=${FUZZ_BUILD:-build/fuzz}
 jobs=${JOBS:-$(getconf _NPROCESSORS_ONLN)}
 S=${S:-} N=${N:-}
 [ -n "$S$N" ] || S=60
-case "$S$N" in *[!0-9]*) echo "S=$S N=$N: whole numbers are needed, of seconds and of executions" >&2; exit 2 ;; esac
+for number in "${S:-1}" "${N:-1}" "$jobs"; do
+    [[ $number =~ ^[1-9][0-9]*$ ]] || { echo "S=$S N=$N JOBS=$jobs: whole numbers from 1 on are allowed, of seconds, executions, targets" >&2; exit 2; }
+done
+[ $# -gt 0 ] || { echo "usage: S=SECONDS N=EXECUTIONS $0 NAME..." >&2; exit 2; }
+for name; do
+    [ -x "$build/tests/fuzz/fuzz_$name" ] || { echo "no $build/tests/fuzz/fuzz_$name: make fuzz F=$name builds it from tests/fuzz/fuzz_$name.c" >&2; exit 2; }
+done
 . tests/fuzz/fuzz_one.sh
 declare -A running=()
-trap '[ ${#running[@]} -gt 0 ] && kill "${!running[@]}" 2>/dev/null' EXIT
+# The round of a target, and its program.
+stop_all() {
+    local round
+    for round in "${!running[@]}"; do kill "$round" $(ps -o pid= --ppid "$round") 2>/dev/null; done
+}
+trap stop_all EXIT
 trap 'exit 130' INT TERM
 
 # Rounds go on until S or N is reached: libFuzzer holds all that it has found in memory, and a restart gives that back.
@@ -22,6 +33,7 @@ run_target() {
     local to=$build/runs/$1 end=$((SECONDS + ${S:-100000000})) left done_now
     mkdir -p "$to"
     [ -f "$to/executions" ] || echo 0 >"$to/executions"
+    rm -f "$to/status"
     while :; do
         left=$((end - SECONDS))
         [ $left -gt 0 ] || break
@@ -73,11 +85,9 @@ printf '%-12s %14s %9s %13s %11s  %s\n' target executions exec/s edges functions
 for name; do
     to=$build/runs/$name found=none
     if [ -f "$to/status" ] && [ "$(cat "$to/status")" != 0 ]; then
-        status=1
-        mkdir -p "tests/fuzz/found/$name"
-        found=
+        status=1 found=
         for input in "$to"/crash/*; do
-            [ ! -f "$input" ] || { mv "$input" "tests/fuzz/found/$name/" && found="$found tests/fuzz/found/$name/${input##*/}"; }
+            [ ! -f "$input" ] || { mkdir -p "tests/fuzz/found/$name" && mv "$input" "tests/fuzz/found/$name/" && found="$found tests/fuzz/found/$name/${input##*/}"; }
         done
         found=${found:-see $to/log}
     fi

@@ -2,8 +2,13 @@
 # An hour of device time at 10 kHz, recorded, replayed at pace fast over TCP, and recorded again: sh tests/soak/replay_hour.sh
 # SECONDS BUILD. Both files must be the same bytes, with the same hash and as many pulses. Of an hour they have 880 MB each.
 set -eu
+[ $# -eq 2 ] || { echo "usage: $0 SECONDS BUILD" >&2; exit 2; }
 seconds=$1
 build=$2
+case $seconds in
+'' | . | *[!0-9.]* | *.*.*) echo "$seconds: seconds are a number, such as 30 or 0.5" >&2; exit 2 ;;
+esac
+[ -x "$build/scanhead" ] || { echo "no $build/scanhead: make" >&2; exit 2; }
 out=$build/replay_hour
 mkdir -p "$out"
 rm -f "$out"/*

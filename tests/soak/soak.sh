@@ -2,8 +2,13 @@
 # Each scenario of config/faults over each kind of link, for $1 seconds: sh tests/soak/soak.sh SECONDS BUILD. At the end a
 # table. Status 1 when a verdict is bad. Two heads run at a time. Then the same over usb, one by one, in a guest.
 set -u
+[ $# -eq 2 ] || { echo "usage: $0 SECONDS BUILD" >&2; exit 2; }
 seconds=$1
 build=$2
+case $seconds in
+'' | . | *[!0-9.]* | *.*.*) echo "$seconds: seconds are a number, such as 30 or 0.5" >&2; exit 2 ;;
+esac
+[ -x "$build/scanhead" ] || { echo "no $build/scanhead: make" >&2; exit 2; }
 out=$build/soak
 mkdir -p "$out"
 rm -f "$out"/*

@@ -179,13 +179,16 @@ static void no_memory_is_said(void **state)
         if (f == NULL || fscanf(f, "%lu", &pages) != 1) _exit(2);
         fclose(f);
         const rlim_t bytes = pages * (rlim_t)sysconf(_SC_PAGESIZE) + MANY * 80ul + (8ul << 20);
+        struct rlimit kept;
         setrlimit(RLIMIT_AS, &(struct rlimit){bytes, bytes});
+        if (getrlimit(RLIMIT_AS, &kept) != 0 || kept.rlim_cur != bytes) _exit(4); /* QEMU's user mode has it for itself */
         int rc = bvh_create(large, STATION_M, 0.0, 1, NULL, &bvh, &err);
         if (rc != SH_ENOMEM) fprintf(stderr, "# code %d: %s\n", rc, err.text);
         _exit(rc == SH_ENOMEM && strstr(err.text, "no memory") != NULL ? 0 : 1);
     }
     assert_int_equal(waitpid(pid, &status, 0), pid);
     scene_free(large);
+    if (WIFEXITED(status) && WEXITSTATUS(status) == 4) skip();
     assert_int_equal(status, 0);
 #endif
 }
