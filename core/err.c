@@ -3,11 +3,19 @@
 #include <stdarg.h>
 #include <stdio.h>
 
-/* A name from a file, or a path, may have any bytes: line ends, and what a terminal takes for a command. */
-static void keep_line(char *text)
+/* Some terminals take U+0080 to U+009F, in UTF-8 0xc2 and a byte, for commands, too. */
+static int is_high_control(const char *c)
+{
+    return (unsigned char)c[0] == 0xc2 && (unsigned char)c[1] >= 0x80 && (unsigned char)c[1] < 0xa0;
+}
+
+void sh_keep_line(char *text)
 {
     for (char *c = text; *c != '\0'; c++)
-        if ((unsigned char)*c < ' ' || *c == 0x7f) *c = '?';
+        if (is_high_control(c))
+            c[0] = c[1] = '?';
+        else if ((unsigned char)*c < ' ' || *c == 0x7f)
+            *c = '?';
 }
 
 int sh_fail(struct sh_err *err, int code, const char *fmt, ...)
@@ -17,7 +25,7 @@ int sh_fail(struct sh_err *err, int code, const char *fmt, ...)
     va_start(ap, fmt);
     vsnprintf(err->text, sizeof err->text, fmt, ap);
     va_end(ap);
-    keep_line(err->text);
+    sh_keep_line(err->text);
     err->code = code;
     return code;
 }
@@ -30,7 +38,7 @@ void sh_warn(const struct sh_report *report, const char *fmt, ...)
     va_start(ap, fmt);
     vsnprintf(text, sizeof text, fmt, ap);
     va_end(ap);
-    keep_line(text);
+    sh_keep_line(text);
     report->warn(report->ctx, text);
 }
 

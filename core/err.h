@@ -28,8 +28,13 @@ struct sh_err {
 };
 
 /* Fills err (which may be NULL) and returns code, so that `return sh_fail(err, SH_EINPUT, ...)` reads well.
- * A text too long for the buffer is cut at its end. Control characters become question marks, here and in sh_warn. */
+ * A text too long for the buffer is cut at its end. It goes through
+ * sh_keep_line, and so does that of sh_warn. */
 int sh_fail(struct sh_err *err, int code, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
+
+/* Makes control characters question marks: a name from a file, or a path, may have any bytes, among them line ends and
+ * what a terminal takes for a command. */
+void sh_keep_line(char *text);
 
 /* Where long work reports to. Each member may be NULL. Called from the thread that does the work. */
 struct sh_report {

@@ -31,12 +31,6 @@ static int read_whole(struct text *t, FILE *f, text_progress *progress, void *ct
     return SH_OK;
 }
 
-void text_keep_line(char *message)
-{
-    for (char *c = message; *c != '\0'; c++)
-        if ((unsigned char)*c < ' ' || *c == 0x7f) *c = '?';
-}
-
 int text_fail(const struct text *t, uint64_t line, int code, struct sh_err *err, const char *fmt, ...)
 {
     enum { LONGEST = 120 };
@@ -48,7 +42,6 @@ int text_fail(const struct text *t, uint64_t line, int code, struct sh_err *err,
     va_start(ap, fmt);
     vsnprintf(what, sizeof what, fmt, ap);
     va_end(ap);
-    text_keep_line(what);
     return sh_fail(err, code, "%s%s%s: %s", cut ? "..." : "", t->path + (cut ? len - LONGEST : 0), place, what);
 }
 

@@ -40,9 +40,6 @@ void text_close(struct text *t);
 int text_fail(const struct text *t, uint64_t line, int code, struct sh_err *err, const char *fmt, ...)
     __attribute__((format(printf, 5, 6)));
 
-/* Makes control characters of a message question marks: what a broken file holds may be anything. */
-void text_keep_line(char *message);
-
 /* Blanks, and line ends that a backslash hides. */
 void text_skip_blanks(struct text *t);
 

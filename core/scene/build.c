@@ -178,7 +178,6 @@ int build_fail(struct scene_build *b, int code, struct sh_err *err, const char *
     va_start(ap, fmt);
     vsnprintf(text, sizeof text, fmt, ap);
     va_end(ap);
-    text_keep_line(text);
     return sh_fail(err, code, "%s%s: %s", b->name, place, text);
 }
 

@@ -100,7 +100,7 @@ static void take_note(struct apart *a, struct import_note *note)
 {
     const struct sh_report *report = a->task.b->report;
     note->text[sizeof note->text - 1] = '\0';
-    text_keep_line(note->text);
+    sh_keep_line(note->text);
     if (note->kind == IMPORT_WARNING && a->n_warnings++ < MAX_WARNINGS) sh_warn(report, "%s", note->text);
     if (note->kind == IMPORT_PROGRESS) sh_progress(report, note->text, note->fraction <= 1.0 ? note->fraction : -1.0);
     if (note->kind == IMPORT_ERROR)

@@ -9,7 +9,6 @@
 #include <unistd.h>
 
 #include "core/newfile.h"
-#include "core/text.h"
 #include "firmware_sim/app/progress.h"
 #include "firmware_sim/base/clock.h"
 
@@ -56,7 +55,7 @@ void app_catch_signals(void)
 int app_fail(const struct sh_err *err)
 {
     struct sh_err line = *err;
-    text_keep_line(line.text); /* a path may have any bytes */
+    sh_keep_line(line.text); /* a path may have any bytes */
     fprintf(stderr, "scanhead: %s\n", line.text);
     return err->code == SH_EINPUT ? APP_USAGE : APP_FAILED;
 }

@@ -274,6 +274,8 @@ static void test_messages_are_lines(void **state)
     assert_non_null(strstr(err.text, "column \"?[2J??\" is unknown"));
     sh_warn(&report, "%s", "a name\r\n\x1b[0m\x7f \xc3\xa4");
     assert_string_equal(warning, "a name???[0m? \xc3\xa4");
+    sh_warn(&report, "%s", "\xc2\x9b" "2J \xc2\xa7 \xc2"); /* CSI of one character; a sign; half of one */
+    assert_string_equal(warning, "??2J \xc2\xa7 \xc2");
 }
 
 int main(void)

@@ -10,7 +10,6 @@
 
 #include "core/angle.h"
 #include "core/newfile.h"
-#include "core/text.h"
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/init/mesh.h"
 #include "firmware_sim/app/init/text.h"
@@ -195,7 +194,7 @@ static int choose_output(struct init_run *run)
     const char *base = base_of(run->wish.file), *dot = strrchr(base, '.');
     int stem = dot != NULL && dot != base ? (int)(dot - base) : (int)strlen(base);
     snprintf(run->name, sizeof run->name, "%s", base);
-    text_keep_line(run->name);
+    sh_keep_line(run->name);
     if (run->output == NULL) {
         snprintf(run->default_output, sizeof run->default_output, "%.*s.yaml", stem, base);
         run->output = run->default_output;

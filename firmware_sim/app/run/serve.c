@@ -5,7 +5,6 @@
 #include <string.h>
 #include <sys/resource.h>
 
-#include "core/text.h"
 #include "firmware_sim/app/run/run.h"
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/base/notify.h"
@@ -55,7 +54,7 @@ static int notify_ready(const struct loop *loop, struct sh_err *err)
     if (!notify_is_wanted()) return SH_OK;
     for (uint32_t i = 0; loop_get_place(loop, i, &place); i++) {
         if (strcmp(place.type, "fd") == 0) continue; /* within this process */
-        text_keep_line(place.endpoint);
+        sh_keep_line(place.endpoint);
         n += (size_t)snprintf(text + n, sizeof text - n, " %s", place.endpoint);
     }
     return notify_send(text, err);
