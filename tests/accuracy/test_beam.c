@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include "tests/common/beam_reference.h"
+#include "tests/common/thorough.h"
 
 static void open_rig(struct beam_rig *rig, struct scene *scene, const struct beam_view *view)
 {
@@ -129,7 +130,7 @@ static void test_wall(void **state)
 {
     (void)state;
     static const double range_m[] = {10.0, 30.0, 100.0, 300.0, 800.0}, incidence_deg[] = {0, 20, 40, 60, 70, 80};
-    const struct beam_view view = {-0.02, 0.02, 0.0, 0.02, 4, 64};
+    const struct beam_view view = {-0.02, 0.02, 0.0, 0.02, (uint32_t)thorough(4, 1), 64};
     double worst = 0.0, plain = 0.0, d[3][64];
     for (int r = 0; r < 5; r++)
         for (int k = 0; k < 6; k++) {

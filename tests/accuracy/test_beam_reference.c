@@ -10,12 +10,13 @@
 
 #include "tests/common/generate.h"
 #include "tests/common/beam_reference.h"
+#include "tests/common/thorough.h"
 
 /* SH_SANITIZE: sanitizers are for the code, not for the count. */
 #ifdef SH_SANITIZE
-static const uint32_t SHARE = 20;
+#define SHARE 20u
 #else
-static const uint32_t SHARE = 1;
+#define SHARE ((uint32_t)thorough(1, 3))
 #endif
 
 static void open_rig(struct beam_rig *rig, struct scene *scene, const struct beam_view *view)

@@ -15,12 +15,13 @@
 #include "core/cast/kernels.h"
 #include "firmware_sim/site/plan_rows.h"
 #include "tests/common/beam_reference.h"
+#include "tests/common/thorough.h"
 
 /* SH_SANITIZE: sanitizers are for the code, not for the count. */
 #ifdef SH_SANITIZE
-enum { RUNS = 60 };
+#define RUNS 60u
 #else
-enum { RUNS = 300 };
+#define RUNS ((uint32_t)thorough(300, 100))
 #endif
 enum { RUN = 16, ROOM = RUN * (LINE_MAX_ECHOES + 1) };
 

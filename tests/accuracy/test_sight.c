@@ -18,14 +18,15 @@
 #include "tests/common/odd_scenes.h"
 #include "tests/common/reference.h"
 #include "tests/common/sight_beside.h"
+#include "tests/common/thorough.h"
 
 enum { MOST_RAYS = 1 << 16 };
 
 /* SH_SANITIZE: sanitizers are for the code, not for the count. */
 #ifdef SH_SANITIZE
-static const long SCENES = 20;
+#define SCENES 20
 #else
-static const long SCENES = 1000;
+#define SCENES thorough(1000, 400)
 #endif
 
 /* Beyond the farthest corner of any scene: 2e6 m. */

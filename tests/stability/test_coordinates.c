@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "tests/common/generate.h"
+#include "tests/common/thorough.h"
 #include "tests/stability/rig.h"
 
 static const double NOWHERE[3] = {0.0, 0.0, 0.0};
@@ -189,7 +190,7 @@ static void range_row(double radius_m, double rough)
         station_m[k] = centre[k] + 0.15 * radius_m;
     struct scene *scene = mesh_scene(&mesh);
     rig_open(&rig, scene, station_m, station_m);
-    rig_aim_at_sphere(&rig, 1000, 31);
+    rig_aim_at_sphere(&rig, (uint32_t)thorough(1000, 400), 31);
     snprintf(regime, sizeof regime, "range %g m, %s hull", radius_m, rough > 0.0 ? "rough" : "smooth");
     rig_row_of_ranges(&rig, regime, NOWHERE, RIG_MICROMETRE);
     rig_rebuild(&rig, NOWHERE, 1);
@@ -247,7 +248,8 @@ static void stand_on_slope(double range_m, double incidence_deg, double station_
 
 static void aim_along_slope(struct rig *rig, double range_m)
 {
-    for (uint64_t i = 0; i < 7000; i++) {
+    const uint64_t n = (uint64_t)thorough(7000, 2500);
+    for (uint64_t i = 0; i < n; i++) {
         double y = (0.95 + 0.05 * rig_unit(41, 2 * i)) * range_m * 0.97,
                x = (rig_unit(41, 2 * i + 1) - 0.5) * 0.1 * range_m;
         rig_aim(rig, (const double[3]){UTM_E_M + x, UTM_N_M + y, x / 8.0 + y / 4.0});

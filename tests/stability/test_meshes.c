@@ -6,14 +6,15 @@
 
 #include "core/bvh/bvh_inside.h" /* the label that a triangle counts with */
 #include "tests/common/hits.h"
+#include "tests/common/thorough.h"
 #include "tests/stability/rig.h"
 
 /* Each ray is cast by the BVH and looked up in a sight: two ways that have to agree bit by bit. So half as many rays as
  * one way had are as many chances to be wrong. */
 #ifdef SH_SANITIZE
-enum { RAYS = 20000 };
+#define RAYS 20000u
 #else
-enum { RAYS = 50000 };
+#define RAYS ((uint32_t)thorough(50000, 20000))
 #endif
 
 static const double NOWHERE[3] = {0.0, 0.0, 0.0};

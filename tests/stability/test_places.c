@@ -5,12 +5,13 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "tests/common/thorough.h"
 #include "tests/stability/rig.h"
 
 #ifdef SH_SANITIZE
-enum { RAYS = 2000 };
+#define RAYS 2000u
 #else
-enum { RAYS = 8000 }; /* each by the BVH and by a sight, which have to agree bit by bit */
+#define RAYS ((uint32_t)thorough(8000, 3000)) /* each by the BVH and by a sight, which have to agree bit by bit */
 #endif
 
 static const double NOWHERE[3] = {0.0, 0.0, 0.0};
