@@ -16,7 +16,7 @@
 #ifdef SH_SANITIZE
 #define SHARE 20u
 #else
-#define SHARE ((uint32_t)thorough(1, 3))
+#define SHARE ((uint32_t)thorough(1, 5))
 #endif
 
 static void open_rig(struct beam_rig *rig, struct scene *scene, const struct beam_view *view)

@@ -21,7 +21,7 @@
 #ifdef SH_SANITIZE
 #define RUNS 60u
 #else
-#define RUNS ((uint32_t)thorough(300, 100))
+#define RUNS ((uint32_t)thorough(300, 60))
 #endif
 enum { RUN = 16, ROOM = RUN * (LINE_MAX_ECHOES + 1) };
 
