@@ -277,10 +277,34 @@ static void requests(void **state)
     viewed_free(&v);
 }
 
+/* Latitudes beyond a pole, and coordinates of which squares are no numbers any more: left out, counted. */
+static void places_beyond_any_are_left_out(void **state)
+{
+    static const char geodetic[] = "52.5 13.4 35\n95 13.4 35\n-91 0 0\n52.5 13.4 1e300\n52.5001 13.4 35\n",
+                      ecef[] = "6378137 0 0\n1e307 1e307 1e307\n6378137 0 -2e12\n6378137 100 0\n";
+    static const struct {
+        const char *comment, *rows;
+        int n, left_out;
+    } file[] = {{"comment epsg 4979\n", geodetic, 5, 3}, {"comment epsg 4978\n", ecef, 4, 2}};
+    (void)state;
+    for (int i = 0; i < 2; i++) {
+        struct viewed v;
+        load(&v, write_ply(file[i].comment, "", file[i].n, file[i].rows));
+        assert_int_equal(v.points.n, 2);
+        assert_int_equal(v.n_left_out, file[i].left_out);
+        assert_int_equal(v.n_empty, 0);
+        for (uint32_t k = 0; k < 2; k++)
+            for (int c = 0; c < 3; c++)
+                assert_true(isfinite(v.points.xyz_m[k][c]));
+        viewed_free(&v);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_ply_with_all_columns),  cmocka_unit_test(geocentric_places_are_turned),
+        cmocka_unit_test(places_beyond_any_are_left_out),
         cmocka_unit_test(wrong_files_are_refused), cmocka_unit_test(points_as_bytes),
         cmocka_unit_test(triangles_as_bytes),      cmocka_unit_test(requests),
     };

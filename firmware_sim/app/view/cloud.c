@@ -8,13 +8,17 @@
 #include "core/infile.h"
 #include "firmware_sim/app/view/viewed.h"
 
-/* Shots without echo go; what is left keeps its order. */
+/* Shots without echo go, and points that have no place; what is left keeps its order. */
 static void leave_out_empty(struct viewed *v)
 {
     struct viewed_points *p = &v->points;
     uint32_t kept = 0;
     for (uint32_t i = 0; i < p->n; i++) {
         if (isnan(p->xyz_m[i][0])) continue;
+        if (!viewed_can_show(v->epsg, p->xyz_m[i])) {
+            v->n_left_out++;
+            continue;
+        }
         if (kept != i) {
             memcpy(p->xyz_m[kept], p->xyz_m[i], sizeof p->xyz_m[i]);
             for (int c = 0; c < VIEWED_COLUMNS; c++) {
@@ -25,7 +29,7 @@ static void leave_out_empty(struct viewed *v)
         }
         kept++;
     }
-    v->n_empty = p->n - kept;
+    v->n_empty = p->n - kept - v->n_left_out;
     p->n = kept;
 }
 

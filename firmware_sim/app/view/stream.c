@@ -131,7 +131,10 @@ static int take_points(void *ctx, int n, struct sh_err *err)
             continue;
         }
         if (!t->info.geo) station_pose_forward(&t->pose, xyz_m);
-        if (track_is_nowhere(t, xyz_m[0], xyz_m[1], xyz_m[2])) continue;
+        if (!viewed_can_show(t->epsg, xyz_m)) {
+            t->missing.n_nowhere++;
+            continue;
+        }
         rc = make_room(s, err);
         if (rc != SH_OK) return rc;
         put_point(s, i, xyz_m);
@@ -182,9 +185,6 @@ static void look_for_losses(struct viewed_stream *s, struct scanhead *sh)
                 v->path, (unsigned long long)c->lost, (unsigned long long)c->missing,
                 (unsigned long long)stats.bad_bytes,
                 c->within || c->scans == 0 ? "; it ends in the middle of a scan" : "");
-    if (v->n_left_out > 0)
-        sh_warn(s->report, "%s: %llu echoes left out, whose place is not known", v->path,
-                (unsigned long long)v->n_left_out);
 }
 
 static int take_names(struct viewed_stream *s, struct sh_err *err)

@@ -59,6 +59,8 @@ int viewed_load(struct viewed *v, const char *path, const struct sh_report *repo
     v->format = app_is_recording(path) ? "shs" : memcmp(head, "LASF", 4) == 0 ? "las" : "ply";
     rc = strcmp(v->format, "shs") == 0 ? viewed_load_stream(v, report, err) : viewed_load_cloud(v, report, err);
     if (rc != SH_OK) return rc;
+    if (v->n_left_out > 0)
+        sh_warn(report, "%s: %llu echoes left out, whose place is not known", path, (unsigned long long)v->n_left_out);
     if (v->points.n == 0)
         return sh_fail(err, SH_EINPUT, "%s: there are no points in it, and %llu shots without echo", path,
                        (unsigned long long)v->n_empty);
@@ -68,6 +70,12 @@ int viewed_load(struct viewed *v, const char *path, const struct sh_report *repo
 }
 
 /* ---- places */
+
+int viewed_can_show(int64_t epsg, const double p[3])
+{
+    static const double most = 1e12;
+    return fabs(p[0]) <= (epsg == EPSG_GEODETIC ? 90.0 : most) && fabs(p[1]) <= most && fabs(p[2]) <= most;
+}
 
 static void degrees_to_ecef(double p[3])
 {

@@ -102,6 +102,9 @@ void viewed_free(struct viewed *viewed);
 int viewed_check_ending(const char *path, struct sh_err *err);
 int viewed_load_cloud(struct viewed *viewed, const struct sh_report *report, struct sh_err *err);
 int viewed_load_stream(struct viewed *viewed, const struct sh_report *report, struct sh_err *err);
+/* Whether a point of a file in this CRS has a place that can be shown: within 10^12 m, in degrees at a latitude. Of numbers
+ * beyond that, which broken files hold, nothing finite would be left when they are turned. */
+int viewed_can_show(int64_t epsg, const double p[3]);
 /* Takes points and stations in ECEF or in degrees to metres east, north, up of the first point. */
 int viewed_turn(struct viewed *viewed, struct sh_err *err);
 /* Bounds, origin, and the columns' limits. */
