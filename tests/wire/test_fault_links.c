@@ -57,17 +57,20 @@ static int truth_lines(const struct wire *wire)
     return n;
 }
 
-/* Frames of the scan without a gap until the connection ends. The number of the last; t_ns of it. */
-static uint32_t read_to_cut(struct scanhead *sh, int64_t *t_ns)
+/* Frames of the scan without a gap until the connection ends. The number of the last; t_ns of it. most_gaps: 1 for a
+ * terminal: when it is hung up, the kernel throws away what waits to be read, and what is still on its way comes after. */
+static uint32_t read_to_cut(struct scanhead *sh, int most_gaps, int64_t *t_ns)
 {
     struct scanhead_frame frame;
     uint32_t last = 0;
-    for (int n = 0;; n++) {
+    for (int n = 0, gaps = 0;; n++) {
         const int rc = scanhead_next(sh, &frame, DEADLINE_MS);
         if (rc == SCANHEAD_ECLOSED && n > 0) return last;
         assert_int_equal(rc, SCANHEAD_OK);
         if ((frame.flags & SCANHEAD_LOCAL) != 0) continue;
-        assert_true(n == 0 || frame.seq == last + 1);
+        assert_true(n == 0 || frame.seq > last);
+        gaps += n > 0 && frame.seq != last + 1;
+        assert_true(gaps <= most_gaps);
         last = frame.seq;
         *t_ns = frame.t_ns;
     }
@@ -112,7 +115,7 @@ static void cut_and_return(struct wire *wire, const char *link, const char *faul
     char seen[65], said[65];
     int64_t t_ns = 0;
     begin(hit, clean);
-    const uint32_t last = read_to_cut(hit, &t_ns);
+    const uint32_t last = read_to_cut(hit, strstr(link, "pty") != NULL, &t_ns);
     assert_int_equal(scanhead_reattach(hit, DEADLINE_MS), SCANHEAD_OK);
     client_next(hit, &frame);
     while ((frame.flags & SCANHEAD_LOCAL) != 0)
@@ -164,7 +167,7 @@ static void test_each_session(void **state)
     uint32_t last[3];
     begin(hit, clean);
     for (int round = 0; round < 3; round++) {
-        last[round] = read_to_cut(hit, &t_ns);
+        last[round] = read_to_cut(hit, 0, &t_ns);
         if (round < 2) assert_int_equal(scanhead_reattach(hit, DEADLINE_MS), SCANHEAD_OK);
     }
     scanhead_close(hit);
@@ -187,7 +190,7 @@ static void test_two_clients(void **state)
     int64_t t_ns = 0;
     client_ask(too, "*IDN?");
     begin(hit, clean);
-    const uint32_t last[2] = {read_to_cut(hit, &t_ns), read_to_cut(too, &t_ns)};
+    const uint32_t last[2] = {read_to_cut(hit, 0, &t_ns), read_to_cut(too, 0, &t_ns)};
     scanhead_close(hit);
     scanhead_close(too);
     scanhead_close(clean);
@@ -208,7 +211,7 @@ static void test_fast(void **state)
     char seen[65], said[65];
     int64_t t_ns = 0;
     begin(hit, clean);
-    read_to_cut(hit, &t_ns);
+    read_to_cut(hit, 0, &t_ns);
     read_clean(clean, seen);
     /* turned away until its time is over, of which the head says nothing: only that a client was lost */
     int rc;
@@ -244,7 +247,7 @@ static void test_step(void **state)
         client_tell(clean, "TIME:STEP 50 MS");
     client_tell(clean, "SCAN:START");
     client_tell(clean, "TIME:STEP 200 MS");
-    read_to_cut(hit, &t_ns);
+    read_to_cut(hit, 0, &t_ns);
     assert_int_equal(scanhead_reattach(hit, DEADLINE_MS), SCANHEAD_OK);
     const int64_t now_ns = atoll(client_ask(hit, "TIME?"));
     client_tell(clean, "TIME:STEP 1000 MS");
