@@ -211,7 +211,7 @@ guest_boot() {
         status=0
         timeout -k 5 "$limit_s" qemu-system-x86_64 -accel tcg -cpu Nehalem -smp 1 -m 768 -M q35 -nodefaults -no-user-config \
             -display none -no-reboot -monitor none -kernel "$guest_kernel/vmlinux" -initrd "$guest_work/initrd" \
-            -append "console=ttyS0 quiet panic=-1 mitigations=off nokaslr no_timer_check" -chardev "file,id=console,path=$guest_work/console.log" \
+            -append "console=ttyS0 quiet panic=-1 mitigations=off nokaslr norandmaps no_timer_check" -chardev "file,id=console,path=$guest_work/console.log" \
             -serial chardev:console -chardev "pipe,id=results,path=$guest_work/results" -serial chardev:results "$@" \
             >"$guest_work/qemu.log" 2>&1 || status=$?
         echo "ENDED $status" >"$guest_work/results.out"
