@@ -4,6 +4,7 @@
 # processors, those that take longest first. All at once they only make each other late.
 . tests/guest/lib.sh
 guest_prepare
+export GUEST_KERNEL="$kernel"
 
 at_a_time=$(($(getconf _NPROCESSORS_ONLN) + 1))
 longest="usbip_tcp functionfs_high usbredir"
