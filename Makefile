@@ -296,7 +296,7 @@ test-sight: deps
 # A million pulses over each kind of USB, each with the hash that TCP gives: some minutes in an emulated machine.
 test-usb-million: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test test-programs
-	@SCANHEAD=$(BUILD)/test/scanhead BUILD=$(BUILD) GUEST_PAN_DEG_S=0.4 GUEST_LIMIT_S=900 \
+	@SCANHEAD=$(BUILD)/test/scanhead BUILD=$(BUILD) GUEST_PAN_DEG_S=0.4 GUEST_LIMIT_S=1200 \
 		bash tests/run_tap.sh -t 2700 tests/guest/guest.sh
 
 # ---- figures: speed and leaks; speed against accuracy, each method
