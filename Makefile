@@ -245,7 +245,7 @@ ASAN = WERROR=-Werror BUILD=$(BUILD)/asan $(if $(HAS_CLANG),$(ASAN_CC) OPT=-O0 C
 	TEST_WARN=-w CPPFLAGS=-DSH_SANITIZE SAN="$(ASAN_FLAGS)"
 SUBMAKE = @$(MAKE) --no-print-directory -j$(JOBS)
 RUN = SCANHEAD=$(BUILD)/test/scanhead READERS=$(READERS)
-# `make test T=test_ring` builds and runs that one alone, of whatever folder; also a script: T=check_includes, T=test_usbip_tcp.
+# `make test T=test_ring` builds and runs that one alone, of whatever folder; also a script: T=check_includes, T=test_usbip.
 T ?=
 ifeq ($(T),)
 test: deps-test
@@ -296,7 +296,7 @@ test-sight: deps
 # A million pulses over each kind of USB, each with the hash that TCP gives: some minutes in an emulated machine.
 test-usb-million: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test test-programs
-	@SCANHEAD=$(BUILD)/test/scanhead BUILD=$(BUILD) GUEST_PAN_DEG_S=0.4 GUEST_LIMIT_S=900 \
+	@SCANHEAD=$(BUILD)/test/scanhead BUILD=$(BUILD) GUEST_PAN_DEG_S=0.4 GUEST_LIMIT_S=1200 \
 		bash tests/run_tap.sh -t 2700 tests/guest/guest.sh
 
 # ---- figures: speed and leaks; speed against accuracy, each method

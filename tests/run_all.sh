@@ -42,7 +42,7 @@ seen=
 set --
 if wanted guest; then
     export BUILD="$build"
-    [ -n "$part" ] || export GUEST_REPLUGS="${GUEST_REPLUGS:-5}" # `make test-guest`: 20
+    [ -n "$part" ] || export GUEST_REPLUGS="${GUEST_REPLUGS:-3}" # `make test-guest`: 20
     set -- "$@" +tests/guest/guest.sh # it takes the programs of tests/guest with it
 fi
 if wanted unit; then set -- "$@" +tests/check_recipes.sh; fi

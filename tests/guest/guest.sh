@@ -1,12 +1,13 @@
 #!/bin/bash
-# All guest tests as one TAP program; results come one after the other. `tests/guest/guest.sh usbip_tcp` runs one of them.
+# All guest tests as one TAP program; results come one after the other. `tests/guest/guest.sh usbip` runs one of them.
 # A guest has one processor and waits for its bus half of the time: so there is one more at a time than this machine has
 # processors, those that take longest first. All at once they only make each other late.
 . tests/guest/lib.sh
 guest_prepare
+export GUEST_KERNEL="$kernel"
 
 at_a_time=$(($(getconf _NPROCESSORS_ONLN) + 1))
-longest="usbip_tcp functionfs_high usbredir"
+longest="usbip functionfs usbredir"
 if [ $# -eq 0 ]; then
     set -- $longest
     for script in tests/guest/test_*.sh; do

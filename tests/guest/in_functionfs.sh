@@ -1,8 +1,8 @@
+# Inside the guest: the kernel's gadget at high and at super speed. Sourced by init.
 . /in_usb.sh
-. /speed.sh
 export CONSOLE=/dev/ttyACM0 CHAPTER9_KERNEL=1
 is_gadget=1 # the kernel's gadgets speak Microsoft OS 1.0, not 2.0
-if [ $speed = super ]; then load dummy_hcd is_super_speed=1; else load dummy_hcd; fi # the latter as most boards have
+load dummy_hcd # at high speed, as most boards have
 load usb_f_fs
 load usb_f_acm
 load cdc-acm
@@ -17,77 +17,9 @@ ends_soon() {
     kill $head_pid
     wait_for 5 sh -c "! kill -0 $head_pid"
 }
-packet=512 replugs=$often
-[ $speed = high ] || packet=1024 replugs=5 # the speed is no matter of plugs: only that it is there again
-if [ $speed = high ]; then
-    sed "\$alinks: [{type: usb, backend: functionfs, speed: super}]" /head.yaml >fast.yaml
-    scanhead run fast.yaml --duration 0.01 2>fast.err
-    check "$speed: a controller that is too slow is refused" test $? = 2
-    check "$speed: and it says what is allowed" grep 'does not reach super speed; allowed full, high$' fast.err
-    check "$speed: nothing left of that" test -z "$(ls $gadgets)"
-fi
-head_start "{type: usb, backend: functionfs, speed: $speed}" --pace fast
-check_enumeration "$speed" $packet
-check_record "$speed"
-head_stop
-check "$speed: gone with the head" wait_for 10 is_unplugged
-check "$speed: nothing left" test -z "$(ls $gadgets)"
-note "recorded at $(uptime_s) s"
-records_only && return
-head_start "{type: usb, backend: functionfs, speed: $speed}" --set head.prr_hz=4000 --set loop.tick_hz=100
-wait_for 10 is_plugged
-REPLUGS=$replugs UNPLUG="sh unplug.sh" PLUG="sh plug.sh" tap "$speed" test_stream
-note "streamed at $(uptime_s) s"
-head_stop
-if [ $speed = high ]; then # a reset is the same without a pause
-    printf 'faults:\n  - {kind: unplug, at: 100, count: 1, for_ms: 200}\n  - {kind: usb_reset, at: 200, count: 1}\n' >faults.yaml
-    head_start "{type: usb, backend: functionfs, speed: high}" --set head.prr_hz=4000 --set loop.tick_hz=100 \
-        --scenario faults.yaml --truth truth.json
-    wait_for 10 is_plugged
-    scanhead record usb --wait 30 --frames 100 --replug 20 -o faults.ply --stats faults.json 2>faults.err &
-    client=$!
-    check "$speed: the recorder goes on after it was unplugged twice on request" \
-        wait_for 40 sh -c "test \$(grep -c 'is back' faults.err) = 2"
-    kill -INT $client
-    wait $client
-    check "$speed: with the count" grep '"replugs": 2,' faults.json
-    check "$speed: both are in the truth" test "$(wc -l <truth.json)" = 2
-    head_stop
-fi
-head_start "{type: usb, backend: functionfs, speed: $speed}" --set head.prr_hz=4000 --set loop.tick_hz=100
-wait_for 10 is_plugged
-# Without a configuration a head has nothing to do on its bus: it rests, and is there again with the next one.
-cpu_ticks() {
-    awk '{print $14 + $15}' /proc/$head_pid/stat
-}
-rests() {
-    before=$(cpu_ticks)
-    sleep 1
-    used=$(($(cpu_ticks) - before))
-    test $used -lt 50 # of 100: a loop takes all, the head's ticks without a scan below 10
-}
-device=$(dirname "$(grep -l 1209 /sys/bus/usb/devices/*/idVendor)")
-for file in bConfigurationValue authorized; do
-    echo 0 >$device/$file
-    check "$speed: $file 0: the head rests" rests
-    echo 1 >$device/$file
-    check "$speed: $file 1: records again" scanhead record usb --wait 30 --quiet --stats again.json
-done
-note "rested at $(uptime_s) s"
-check_chapter9 "$speed"
-note "chapter 9 at $(uptime_s) s"
-device=$(dirname "$(grep -l 1209 /sys/bus/usb/devices/*/idVendor)")
-echo 0 >$device/bConfigurationValue
-check "$speed: ends without a configuration" ends_soon
-[ $speed = high ] || return 0 # once is enough
-check_hokuyo "$speed" "backend: functionfs, speed: $speed"
-check_sick "$speed" "backend: functionfs, speed: $speed"
-head_start "{type: usb, backend: functionfs, speed: $speed}" --pace fast
-wait_for 10 is_plugged
-head_kill
-check "$speed: a killed head leaves its gadget" test "$(ls $gadgets | wc -l)" = 1
-mkdir $gadgets/scanhead-1-123456789-0 # of one whose number, 1, is that of another process now
-head_start "{type: usb, backend: functionfs, speed: $speed}" --pace fast
-check "$speed: the next one takes it away" test "$(ls $gadgets | wc -l)" = 1
-check "$speed: and is there" wait_for 10 is_plugged
-head_stop
+speed=high
+. /in_functionfs_at.sh
+rmmod dummy_hcd
+load dummy_hcd is_super_speed=1
+speed=super
+. /in_functionfs_at.sh

@@ -45,14 +45,15 @@ check() {
 }
 
 # wait_for SECONDS COMMAND...: until the command succeeds; 1 when it never did. A guest that shares its processor with other
-# tests has three times as long: only what hangs reaches that.
+# tests has three times as long: only what hangs reaches that. Each look starts two processes, which are dear here: so it
+# looks ten times a second, not more often.
 wait_for() {
-    left=$(($1 * 60))
+    left=$(($1 * 30))
     shift
     while ! "$@" >/dev/null 2>&1; do
         left=$((left - 1))
         [ $left -gt 0 ] || return 1
-        usleep 50000
+        usleep 100000
     done
 }
 

@@ -1,4 +1,4 @@
-# Inside the guest: the kernel's virtual host controller. Sourced by the scripts of the two usbip tests.
+# Inside the guest: the kernel's virtual host controller, without a tool and with the stock one. Sourced by init.
 . /in_usb.sh
 export CONSOLE=/dev/ttyACM0
 load vhci-hcd
@@ -10,3 +10,5 @@ head_start "" --pace fast
 record_reference
 head_stop
 note "reference at $(uptime_s) s"
+. /in_usbip_pair.sh
+. /in_usbip_tcp.sh

@@ -1,4 +1,4 @@
-. /in_usbip.sh
+# Inside the guest: a head that plugs itself in. Sourced by in_usbip.sh.
 head_start "{type: usb, attach: on}" --pace fast
 check_enumeration "socket pair" 512
 check_record "socket pair"

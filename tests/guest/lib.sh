@@ -39,11 +39,13 @@ guest_end() {
 trap guest_end EXIT
 trap 'exit 130' INT TERM
 
-# Name and version of the kernel that the stock package stands for; without lists, of the one that is here already.
+# Name and version of the kernel that the stock package stands for; without lists, of the one that is here already. apt
+# takes a second for an answer, so guest.sh asks it once for all guests.
 guest_kernel_name() {
-    name=$(apt-cache depends linux-image-amd64 2>/dev/null | sed -n 's/.*Depends: \(linux-image-[0-9].*-amd64\)$/\1/p' | head -n 1)
+    name=${GUEST_KERNEL:-$(apt-cache show --no-all-versions linux-image-amd64 2>/dev/null |
+        sed -n 's/^Depends: \(linux-image-[0-9][^ ,]*-amd64\) (= \([^ )]*\)).*/\1=\2/p')}
     if [ -n "$name" ]; then
-        echo "$name=$(apt-cache show --no-all-versions "$name" | sed -n 's/^Version: //p')"
+        echo "$name"
     else
         ls -t "$guest_cache" 2>/dev/null | sed -n 's/^\(linux-image-.*=.*\)-[0-9]*$/\1/p' | head -n 1
     fi
@@ -211,7 +213,7 @@ guest_boot() {
         status=0
         timeout -k 5 "$limit_s" qemu-system-x86_64 -accel tcg -cpu Nehalem -smp 1 -m 768 -M q35 -nodefaults -no-user-config \
             -display none -no-reboot -monitor none -kernel "$guest_kernel/vmlinux" -initrd "$guest_work/initrd" \
-            -append "console=ttyS0 quiet panic=-1 mitigations=off nokaslr no_timer_check" -chardev "file,id=console,path=$guest_work/console.log" \
+            -append "console=ttyS0 quiet panic=-1 mitigations=off nokaslr norandmaps no_timer_check cryptomgr.notests init_on_alloc=0" -chardev "file,id=console,path=$guest_work/console.log" \
             -serial chardev:console -chardev "pipe,id=results,path=$guest_work/results" -serial chardev:results "$@" \
             >"$guest_work/qemu.log" 2>&1 || status=$?
         echo "ENDED $status" >"$guest_work/results.out"

@@ -1,8 +1,0 @@
-#!/bin/sh
-# The head on this machine's virtual host controller, by socket pair and without any tool.
-. tests/guest/lib.sh
-guest_prepare
-guest_add_head
-guest_add tests/guest/in_usbip.sh
-guest_add tests/soak/usb.yaml
-guest_boot tests/guest/in_usbip_pair.sh 600
