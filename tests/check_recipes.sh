@@ -60,7 +60,7 @@ lighten() {
     replace car 'prr_hz: 300000' 'prr_hz: 100000'
     replace foliage 'pan_deg_s: 30' 'pan_deg_s: 90'
     case $1 in
-    core/plan/*) ;;
+    core/plan/*) sed -i '/^  - name: north-east$/,/heading_deg: 0$/d' "$work/tree/config/demo.yaml" ;; # a plan of one station
     *) replace demo 'mode: auto' 'mode: single' && replace glass 'mode: auto' 'mode: single' ;;
     esac
 }
