@@ -189,7 +189,7 @@ report() { # ok? name [diagnostics]
 }
 
 plant() { # file line...
-    mkdir -p "$work/tree/$(dirname "$1")"
+    mkdir -p "$work/tree/${1%/*}"
     printf '%s\n' "${@:2}" >"$work/tree/$1"
 }
 
@@ -210,12 +210,12 @@ clean_tree() {
     plant build-asan/generated.cpp 'int built;'
 }
 
-# The tree with one more file must give just this one violation.
+# The clean tree with one more file must give just this one violation.
 expect_violation() { # file line
-    clean_tree
-    plant "$@"
     local found
+    plant "$@"
     found=$(include_violations "$work/tree")
+    rm "$work/tree/$1"
     [ "$(printf '%s' "$found" | grep -c '')" = 1 ] && [[ $found == "$1:"* ]]
     report $? "finds $1${2:+ with $2}" "found: ${found:-nothing}"
 }

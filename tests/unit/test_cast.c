@@ -3,6 +3,7 @@
 
 #include "core/cast/kernels.h"
 #include "tests/common/hits.h"
+#include "tests/common/thorough.h"
 #include "tests/unit/cast_rig.h"
 
 static const double LO[3] = {-2, -1.75, -1.5}, HI[3] = {2, 2.25, 1.25}, HERE[3] = {0.25, 0.125, 0};
@@ -73,7 +74,7 @@ static void ranges_to_a_tilted_plane_are_exact_to_the_planes_tilt(void **state)
     static const uint32_t triangle[2][3] = {{0, 1, 2}, {0, 2, 3}};
     uint64_t seed = 2;
     long double worst = 0.0L;
-    for (int p = 0; p < 300; p++) {
+    for (int p = 0; p < thorough(300, 60); p++) {
         double axis[3], across[3], u[3], v[3], vertex[4][3];
         any_direction(&seed, axis);
         any_direction(&seed, across);

@@ -1,4 +1,5 @@
 /* The configuration: what it takes, what it refuses and where it says so. */
+#include "tests/common/thorough.h"
 #include "tests/unit/config_cases.h"
 
 /* ---- malformed configurations */
@@ -251,7 +252,7 @@ static void damaged_files_never_crash(void **state)
     assert_in_range(len, 500, sizeof demo - 1);
     static const char spice[] = ":-[]{}#&*!|>'\"%@`,?\n\t 09.eE~\\";
     uint32_t x = 20240229;
-    for (int round = 0; round < DAMAGED; round++) {
+    for (int round = 0; round < thorough(DAMAGED, DAMAGED / 4); round++) {
         memcpy(text, demo, len);
         size_t now = len;
         for (uint32_t k = next_random(&x) % 4 + 1; k > 0; k--) {

@@ -1,4 +1,5 @@
 /* The parser against every single damage. */
+#include "tests/common/thorough.h"
 #include "tests/unit/native_stream.h"
 
 /* SH_SANITIZE: sanitizers are for the code, not for the count. Each damage is fed in pieces of one size there. */
@@ -49,12 +50,18 @@ static void run_hurt(const uint8_t *bytes, size_t len, size_t from, size_t to)
     }
 }
 
+/* From one byte of the stream that is hurt to the next. */
+static size_t step(void)
+{
+    return (size_t)thorough(1, 3);
+}
+
 static void test_parser_every_byte_deleted(void **state)
 {
     (void)state;
     static uint8_t hurt[STREAM_MAX];
     make_stream();
-    for (size_t at = 0; at < stream_len; at++) {
+    for (size_t at = 0; at < stream_len; at += step()) {
         memcpy(hurt, stream, at);
         memcpy(hurt + at, stream + at + 1, stream_len - at - 1);
         run_hurt(hurt, stream_len - 1, at, at + 1);
@@ -80,7 +87,7 @@ static void test_parser_every_byte_added(void **state)
     static const uint8_t added[] = {NATIVE_SYNC, 'O', 0};
     static uint8_t hurt[STREAM_MAX + 1];
     make_stream();
-    for (size_t at = 0; at <= stream_len; at++) {
+    for (size_t at = 0; at <= stream_len; at += at < stream_len - 3 ? step() : 1) {
         memcpy(hurt, stream, at);
         hurt[at] = added[at % 3];
         /* a byte like a neighbour could as well stand on that neighbour's other side, outside the frame */
@@ -104,7 +111,7 @@ static void test_parser_every_late_start(void **state)
 {
     (void)state;
     make_stream();
-    for (size_t at = 0; at < stream_len; at++)
+    for (size_t at = 0; at < stream_len; at += step())
         run_hurt(stream + at, stream_len - at, 0, at);
 }
 
@@ -153,7 +160,7 @@ static void test_parser_lost_stretches(void **state)
     static uint8_t hurt[STREAM_MAX];
     make_stream();
     uint32_t x = 99;
-    for (int run = 0; run < 3000; run++) {
+    for (int run = 0; run < thorough(3000, 1000); run++) {
         x = x * 1664525u + 1013904223u;
         size_t from = (x >> 4) % stream_len;
         x = x * 1664525u + 1013904223u;

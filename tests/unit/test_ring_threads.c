@@ -14,9 +14,9 @@
  * Slots grow all the while. For one tick in seven caster and pacing thread race: 8,600 times, so that what goes wrong
  * once in 2,900 races is seen in 95 of 100 runs. */
 #ifdef SH_SANITIZE /* sanitizers are for the code, not for the count */
-enum { TICKS = 30000 };
+enum { TICKS = 20000 };
 #else
-enum { TICKS = 60000 };
+enum { TICKS = 40000 };
 #endif
 enum { CASTERS = 2, READERS = 4, SLOW = 2, LOOKING = 3, MAX_BYTES = 3 * SLOT_BYTES };
 

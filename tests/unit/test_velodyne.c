@@ -8,6 +8,7 @@
 
 #include "core/rng.h"
 #include "drivers/protocol/velodyne.h"
+#include "tests/common/thorough.h"
 #include "tests/unit/velodyne_head.h"
 
 static struct protocol_rig rig;
@@ -172,8 +173,9 @@ static void test_times_over_an_hour(void **state)
         protocol_rig_clear(&rig);
         const int64_t start_ns = rig.scan_t0_ns + (utc0_ns[u] == INT64_MIN ? 0 : utc0_ns[u]);
         uint32_t n = 0;
-        /* every 1801st packet of 65 minutes: all residues of a microsecond, which has 125 of them */
-        for (int64_t m = 0; m < INT64_C(3900000000000) / 1327104; m += 1801) {
+        /* Every 5401st packet of 65 minutes, or every 1801st: more than 500. Neither shares a factor with 125, so they have all
+         * 125 residues of a microsecond. */
+        for (int64_t m = 0; m < INT64_C(3900000000000) / 1327104; m += thorough(1801, 5401)) {
             velodyne_head_fire_alike(&rig, (uint64_t)m * 384, 384, 10.0);
             const int64_t t_ns = start_ns + m * 1327104;
             assert_int_equal(u32(packet(n++) + 1200), t_ns / 1000 % 3600000000);

@@ -1,4 +1,5 @@
 /* The client in Python beside libscanhead: every number of every point is the same, with numpy and without. */
+#include "tests/common/thorough.h"
 #include "tests/wire/room.h"
 
 #include <nettle/sha2.h>
@@ -413,7 +414,7 @@ static void test_damaged(void **state)
     char *bytes = wire_read(record(wire, &SMALL, "a.shs", ""), &len);
     uint8_t *longer = malloc(ROUNDS * len), *shuffled = malloc(2 * ROUNDS * len), *out = malloc(4 * ROUNDS * len + 16);
     const size_t longer_len = prolong(longer, bytes, len);
-    for (dice = 1; dice < 3; dice++) {
+    for (dice = 1; dice < (uint32_t)thorough(3, 2); dice++) {
         const uint32_t seed = dice;
         const size_t n = shuffle(shuffled, longer, longer_len);
         const char *path = wire_write(wire, "b.shs", out, damage(out, shuffled, n));
