@@ -118,8 +118,9 @@ static void each_is_scanned_or_refused(void **state)
         check_recording(wire, i);
         scanned++;
     }
-    printf("# %d models: %d taken, %d of these scanned; refused: %d for single precision, %d without triangles, %d broken\n",
-           n_models, n_taken, scanned, single, empty, broken);
+    printf(
+        "# %d models: %d taken, %d of these scanned; refused: %d for single precision, %d without triangles, %d broken\n",
+        n_models, n_taken, scanned, single, empty, broken);
     assert_true(scanned >= n_taken / 4); /* one in three, or all */
     assert_true(n_taken >= 100);         /* 101 of Debian 12's 140; Assimp of another version may read others */
 }

@@ -384,7 +384,7 @@ static void on_notice(void *ctx, const struct scanhead_notice *notice)
 {
     struct said *said = ctx;
     char line[128];
-    const int n = snprintf(line, sizeof line, "%s %llu %u %llu %lld\n", scanhead_notice_name(notice->kind),
+    const int n = snprintf(line, sizeof line, "%s %llu %u %llu %lld\n", scanhead_notice_name((int)notice->kind),
                            (unsigned long long)notice->at_byte, notice->seq, (unsigned long long)notice->n,
                            notice->t_ns == SCANHEAD_NO_TIME ? 0LL : (long long)notice->t_ns);
     sha256_update(&said->sha256, (size_t)n, (const uint8_t *)line);
