@@ -114,8 +114,8 @@ $(patsubst %,$(BUILD)/%.o,$(wildcard core/bvh/*.c core/analysis/distance.c tests
 WEB_FILES = $(sort $(filter-out %.md,$(wildcard drivers/link/web/*)))
 $(BUILD)/drivers/link/web_pages.inc: ALWAYS
 	@mkdir -p $(@D)
-	@n=0; for f in $(WEB_FILES); do n=$$((n + 1)); echo "WEB_PAGE($$n, \"$$f\", \"/$${f##*/}\")"; done >$@.new
-	@cmp -s $@.new $@ || cp $@.new $@; rm $@.new
+	@new=$@.$$$$; n=0; for f in $(WEB_FILES); do n=$$((n + 1)); echo "WEB_PAGE($$n, \"$$f\", \"/$${f##*/}\")"; done >$$new; \
+	cmp -s $$new $@ || cp $$new $@; rm $$new
 $(BUILD)/drivers/link/web_pages.c.o: private override ALL_CPPFLAGS += -I$(BUILD)
 $(BUILD)/drivers/link/web_pages.c.o: $(BUILD)/drivers/link/web_pages.inc $(WEB_FILES)
 ALWAYS:
