@@ -50,7 +50,7 @@ static int claim(struct loop *loop, struct device_work *work, struct ring_slot *
 static int put(struct loop *loop, struct ring_slot *slot, const struct ring_tick *tick)
 {
     _Atomic int *no_memory = &loop->casters.no_memory;
-    if (ring_put(slot, tick) == SH_OK) {
+    if (ring_put(&loop->stream.ring, slot, tick) == SH_OK) {
         if (atomic_load(no_memory)) atomic_store(no_memory, 0);
         return 1;
     }

@@ -24,15 +24,10 @@ void ring_hits_add(struct ring_hits *sum, const struct ring_hits *more)
     sum->unfit += more->unfit;
 }
 
-/* Room for so many bytes; what was in the slot is gone. */
-static int make_room(struct ring_slot *slot, size_t bytes)
+static size_t round_up(size_t bytes)
 {
-    enum { STEP = 1024 }; /* ticks differ a little: not every one that is longer needs new memory */
-    size_t room = (bytes + STEP - 1) / STEP * STEP;
-    free(slot->store);
-    slot->store = malloc(room);
-    slot->room = slot->store != NULL ? room : 0;
-    return slot->store != NULL ? SH_OK : SH_ENOMEM;
+    enum { STEP = 1024 }; /* ticks differ a little: one that is longer fits where another was */
+    return (bytes + STEP - 1) / STEP * STEP;
 }
 
 int ring_create(struct ring *ring, const struct ring_size *size, struct sh_err *err)
@@ -40,10 +35,11 @@ int ring_create(struct ring *ring, const struct ring_size *size, struct sh_err *
     memset(ring, 0, sizeof *ring);
     ring->queue_ticks = size->queue_ticks;
     ring->n_slots = size->ahead_ticks + size->queue_ticks + size->spare_ticks + 8;
+    ring->room = round_up(size->usual_bytes);
     ring->slot = calloc(ring->n_slots, sizeof *ring->slot);
     int rc = ring->slot != NULL ? SH_OK : SH_ENOMEM;
     for (uint64_t i = 0; i < ring->n_slots && rc == SH_OK; i++)
-        rc = make_room(&ring->slot[i], size->usual_bytes);
+        if ((ring->slot[i].store = malloc(ring->room)) == NULL) rc = SH_ENOMEM;
     if (rc == SH_OK) return SH_OK;
     sh_fail(err, rc, "loop: no memory for %llu slots of %u bytes; lower loop.queue_ms",
             (unsigned long long)ring->n_slots, size->usual_bytes);
@@ -53,8 +49,10 @@ int ring_create(struct ring *ring, const struct ring_size *size, struct sh_err *
 
 void ring_free(struct ring *ring)
 {
-    for (uint64_t i = 0; i < ring->n_slots && ring->slot != NULL; i++)
+    for (uint64_t i = 0; i < ring->n_slots && ring->slot != NULL; i++) {
         free(ring->slot[i].store);
+        free(ring->slot[i].longer);
+    }
     free(ring->slot);
     ring->slot = NULL;
 }
@@ -82,17 +80,21 @@ struct ring_slot *ring_claim(struct ring *ring, uint64_t tick)
     return slot;
 }
 
-int ring_put(struct ring_slot *slot, const struct ring_tick *tick)
+int ring_put(const struct ring *ring, struct ring_slot *slot, const struct ring_tick *tick)
 {
     const size_t align = _Alignof(struct ring_mark);
-    size_t marks_at = (tick->len + align - 1) / align * align, marks_len = tick->n_marks * sizeof *tick->mark;
-    if (marks_at + marks_len > slot->room && make_room(slot, marks_at + marks_len) != SH_OK) {
+    const size_t marks_at = (tick->len + align - 1) / align * align, marks_len = tick->n_marks * sizeof *tick->mark;
+    const int is_long = marks_at + marks_len > ring->room;
+    free(slot->longer);
+    slot->longer = is_long ? malloc(round_up(marks_at + marks_len)) : NULL;
+    if (is_long && slot->longer == NULL) {
         slot->tick = (struct ring_tick){.broken = 1};
         return SH_ENOMEM;
     }
+    uint8_t *store = is_long ? slot->longer : slot->store;
     slot->tick = *tick;
-    slot->tick.bytes = slot->store;
-    slot->tick.mark = (struct ring_mark *)(void *)(slot->store + marks_at);
+    slot->tick.bytes = store;
+    slot->tick.mark = (struct ring_mark *)(void *)(store + marks_at);
     if (tick->len != 0) memcpy(slot->tick.bytes, tick->bytes, tick->len);
     if (marks_len != 0) memcpy(slot->tick.mark, tick->mark, marks_len);
     return SH_OK;

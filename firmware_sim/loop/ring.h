@@ -59,16 +59,17 @@ struct ring_tick {
 struct ring_slot {
     _Atomic uint64_t state;       /* tick << 2 | phase */
     _Atomic int busy;             /* a caster has it, even if its tick is lost already */
-    struct ring_tick tick;        /* its arrays lie in store */
+    struct ring_tick tick;        /* its arrays lie in store, or in longer */
     uint32_t n_frames, first_seq; /* set at release; so is: */
     uint64_t pulses_before;       /* delivered before this tick, since power-up */
-    uint8_t *store;
-    size_t room; /* of store, in bytes */
+    uint8_t *store;  /* room for a usual tick */
+    uint8_t *longer; /* of a tick that needs more; the next one in the slot gives it back. Else NULL */
 };
 
 struct ring {
     struct ring_slot *slot;
     uint64_t n_slots, queue_ticks;
+    size_t room;                               /* of a slot's store, in bytes */
     _Atomic uint64_t released;                 /* ticks released or lost so far */
     _Atomic uint64_t hazard[RING_MAX_READERS]; /* tick + 1 being read; 0: none */
 };
@@ -85,9 +86,10 @@ void ring_free(struct ring *ring);
 
 /* The slot for `tick`, empty; or NULL when the tick is lost already. */
 struct ring_slot *ring_claim(struct ring *ring, uint64_t tick);
-/* Copies frames, marks and counts into a claimed slot, and makes room for them where they need more than it
- * has. SH_ENOMEM: there is none; the slot then holds no frame, and says that it is broken. */
-int ring_put(struct ring_slot *slot, const struct ring_tick *tick);
+/* Copies frames, marks and counts into a claimed slot. Where they need more than a usual tick, there is room for this one
+ * alone: the long ones of each second would in time make all slots as large. SH_ENOMEM: there is none; the slot then
+ * holds no frame, and says that it is broken. */
+int ring_put(const struct ring *ring, struct ring_slot *slot, const struct ring_tick *tick);
 /* The caster is done with the slot. 0 when the tick was lost meanwhile. */
 int ring_ready(struct ring_slot *slot, uint64_t tick);
 /* The caster gives the slot up. The pacing thread loses the tick when its time is over. */
