@@ -70,7 +70,7 @@ class Head:
 class Clock:
     """Device time beside the clock of this machine, asked while the head rests. The answer is the time of the last tick. So
     what the clock was then lies between the arrival of the answer and a tick before the question; of many answers the one
-    that is most ahead says most. The width of this is the bound of the error. And the times of the scan's events, in
+    that is most ahead says most: they are spread over seconds, in which a head that was held up catches up. The width of this is the bound of the error. And the times of the scan's events, in
     device time."""
 
     def __init__(self, endpoint):
@@ -78,7 +78,8 @@ class Clock:
 
     def mark(self, head):
         best = None
-        for _ in range(50):
+        for _ in range(100):
+            time.sleep(0.02)
             before = time.clock_gettime_ns(time.CLOCK_MONOTONIC)
             t_ns = int(head.query("TIME?", PATIENCE_S))
             after = time.clock_gettime_ns(time.CLOCK_MONOTONIC)
