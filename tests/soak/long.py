@@ -70,8 +70,8 @@ class Head:
 class Clock:
     """Device time beside the clock of this machine, asked while the head rests. The answer is the time of the last tick. So
     what the clock was then lies between the arrival of the answer and a tick before the question; of many answers the one
-    that is most ahead says most: they are spread over seconds, in which a head that was held up catches up. The width of this is the bound of the error. And the times of the scan's events, in
-    device time."""
+    that is most ahead says most: they are spread over seconds, in which a head that was held up catches up. The width of
+    this is the bound of the error. And the times of the scan's events, in device time."""
 
     def __init__(self, endpoint):
         self.endpoint, self.marks, self.scan_ns = endpoint, [], {}
