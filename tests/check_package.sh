@@ -40,7 +40,7 @@ files_agree() {
 sources_are_all() {
     listed=$(sed -n 's/^DEB_SOURCES = //p' $packaging/packaging.mk)
     for top in $listed; do [ -e "$top" ] || { echo "no $top"; return 1; }; done
-    git rev-parse -q --git-dir >/dev/null 2>&1 || return 0
+    [ "$(git rev-parse -q --show-toplevel 2>/dev/null)" = "$(pwd -P)" ] || return 0 # a release, or one within another tree
     git ls-files | cut -d / -f 1 | grep -v '^\.' | sort -u >"$work/tracked"
     printf '%s\n' $listed | sort | diff "$work/tracked" -
 }
