@@ -245,7 +245,7 @@ ASAN = WERROR=-Werror BUILD=$(BUILD)/asan $(if $(HAS_CLANG),$(ASAN_CC) OPT=-O0 C
 	TEST_WARN=-w CPPFLAGS=-DSH_SANITIZE SAN="$(ASAN_FLAGS)"
 SUBMAKE = @$(MAKE) --no-print-directory -j$(JOBS)
 RUN = SCANHEAD=$(BUILD)/test/scanhead READERS=$(READERS)
-# `make test T=test_ring` builds and runs that one alone, of whatever folder; also a script: T=check_includes, T=test_usbip.
+# `make test T=test_ring` builds and runs that one alone, of whatever folder; also a script: T=check_includes, T=test_kernel_usbip.
 T ?=
 ifeq ($(T),)
 test: deps-test

@@ -10,9 +10,9 @@ at_a_time=$(($(getconf _NPROCESSORS_ONLN) + 1))
 longest="usbip functionfs usbredir"
 if [ $# -eq 0 ]; then
     set -- $longest
-    for script in tests/guest/test_*.sh; do
+    for script in tests/guest/test_kernel_*.sh; do
         name=$(basename "$script" .sh)
-        case " $longest " in *" ${name#test_} "*) ;; *) set -- "$@" "${name#test_}" ;; esac
+        case " $longest " in *" ${name#test_kernel_} "*) ;; *) set -- "$@" "${name#test_kernel_}" ;; esac
     done
 fi
 declare -A running=() # process: name of its guest
@@ -27,7 +27,7 @@ wait_one() {
 
 for name; do
     [ ${#running[@]} -lt $at_a_time ] || wait_one
-    sh "tests/guest/test_$name.sh" >"$guest_cache/$name.tap" 2>"$guest_cache/$name.err" &
+    sh "tests/guest/test_kernel_$name.sh" >"$guest_cache/$name.tap" 2>"$guest_cache/$name.err" &
     running[$!]=$name
 done
 while [ ${#running[@]} -gt 0 ]; do wait_one; done
