@@ -6,7 +6,7 @@
 #include <stdatomic.h>
 
 /* 20 MB/s: while the slow reader reads nothing, the buffers on its way (1 MiB of the head, at most 6 of the
- * kernel's for a receiver that asks for none) and the queue of 50 ms fill in less than half a second. */
+ * kernel's for a receiver that asks for none) and the queue of 500 ms fill in a second. */
 static const struct room_config RATE = {
     .prr_hz = 1000000, .lines_hz = 200, .pan_deg_s = 90, .pan_stop_deg = 360, .frames = 0, .links = LINK_YAML_TCP};
 enum { HOLD_BYTES = 40 << 20 };
@@ -47,7 +47,9 @@ static void *follow(void *arg)
 {
     struct tally *t = arg;
     struct scanhead_frame frame;
+    const int64_t end_ms = wire_now_ms() + DEADLINE_MS;
     while (!t->over && t->wrong == NULL) {
+        if (wire_now_ms() > end_ms) t->wrong = "no end of the scan came";
         if (scanhead_next(t->sh, &frame, DEADLINE_MS) != SCANHEAD_OK) {
             t->wrong = scanhead_error(t->sh);
             break;
@@ -81,22 +83,22 @@ static void check_lost_nothing(const struct tally *t)
     assert_int_equal(t->last_seq - t->first_seq + 1, t->frames);
 }
 
-/* Once the scan is over, for a reader that was not there: an error for each episode, no more. */
-static void check_errors(const struct head *head, uint64_t episodes)
+/* Once the scan is over, for a reader that was not there: an error for each episode, which may lose frames more than once. */
+static void check_errors(const struct head *head, uint64_t losses)
 {
     struct scanhead *sh = client_open(head_endpoint(head, "tcp"));
     uint64_t n = 0;
     int number;
     while ((number = atoi(client_ask(sh, "SYST:ERR?"))) == 102) n++;
     assert_int_equal(number, 0);
-    assert_int_equal(n, episodes);
+    assert_in_range(n, 1, losses);
     scanhead_close(sh);
 }
 
 static void overtake(struct wire *wire, const char *more_yaml)
 {
     struct room_config config = RATE;
-    /* The fast one has the same queue of 50 ms, but a receive buffer of megabytes and a thread that does
+    /* The fast one has the same queue of 500 ms, but a receive buffer of megabytes and a thread that does
      * nothing else. */
     config.more = more_yaml;
     room_write(wire);
@@ -122,7 +124,7 @@ static void overtake(struct wire *wire, const char *more_yaml)
     atomic_store(&fast.stop, 1);
     follow(&slow);
     pthread_join(thread, NULL);
-    /* On a machine that is busy with other things for 50 ms the fast one may be slow for once: then it is told, too. */
+    /* On a machine that is busy with other things for 500 ms the fast one may be slow for once: then it is told, too. */
     check_nothing_bad(&fast);
     /* What it was told may begin before the first frame that is counted here, never end before a gap. */
     assert_true(fast.frames + fast.told_lost >= fast.last_seq - fast.first_seq + 1);
@@ -152,13 +154,13 @@ static void overtake(struct wire *wire, const char *more_yaml)
 
 static void test_realtime(void **state)
 {
-    overtake(*state, "loop: {queue_ms: 50, late_ms: 10000}\n");
+    overtake(*state, "loop: {queue_ms: 500, late_ms: 10000}\n");
 }
 
 /* Half of the frames are of attributes, and count like any other. */
 static void test_attributes(void **state)
 {
-    overtake(*state, "loop: {queue_ms: 50, late_ms: 10000}\noutput: {attributes: on}\n");
+    overtake(*state, "loop: {queue_ms: 500, late_ms: 10000}\noutput: {attributes: on}\n");
 }
 
 static void test_fast(void **state)
@@ -230,8 +232,7 @@ static void test_end_lost(void **state)
     pid_t pid = wire_spawn(wire, args, "record.out", "record.err", -1);
     client_until(sh, SCANHEAD_EV_SCAN_START, &frame);
     assert_int_equal(kill(pid, SIGSTOP), 0);
-    client_until(sh, SCANHEAD_EV_SCAN_END, &frame);
-    client_wait_state(sh, "idle");
+    client_wait_state(sh, "idle"); /* the scan's end may be lost to this one, too */
     assert_int_equal(kill(pid, SIGCONT), 0);
     assert_int_equal(wire_wait(wire, pid), 1);
     char *said = wire_read(wire_path(wire, "record.err"), NULL);

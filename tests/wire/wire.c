@@ -310,9 +310,11 @@ int is_event(const struct scanhead_frame *frame, uint32_t code)
 
 void client_until(struct scanhead *sh, uint32_t code, struct scanhead_frame *frame)
 {
-    do
+    const int64_t end_ms = wire_now_ms() + 2 * DEADLINE_MS;
+    do {
+        if (wire_now_ms() > end_ms) fail_msg("no event %u in %d ms", (unsigned)code, 2 * DEADLINE_MS);
         client_next(sh, frame);
-    while (!is_event(frame, code));
+    } while (!is_event(frame, code));
 }
 
 void client_until_soon(struct scanhead *sh, uint32_t code, struct scanhead_frame *frame)
