@@ -73,7 +73,8 @@ static int put_headers(struct lws *wsi, unsigned status, const char *type, size_
                                             {"cross-origin-resource-policy:", "same-origin"},
                                             {"x-content-type-options:", "nosniff"},
                                             {"referrer-policy:", "no-referrer"},
-                                            {"cache-control:", "no-store"}};
+                                            {"cache-control:", "no-store"},
+                                            {"connection:", "close"}};
     unsigned char buffer[LWS_PRE + HEADER_ROOM], *p = buffer + LWS_PRE, *const start = p;
     unsigned char *const end = buffer + sizeof buffer - 1;
     int failed = lws_add_http_common_headers(wsi, status, type, len, &p, end);
@@ -83,10 +84,9 @@ static int put_headers(struct lws *wsi, unsigned status, const char *type, size_
     return failed || lws_finalize_write_http_header(wsi, start, &p, end) ? -1 : 0;
 }
 
-static int done(struct lws *wsi)
-{
-    return lws_http_transaction_completed(wsi) ? -1 : 0;
-}
+/* One request, one connection: libwebsockets 4.1 never returns from a request with a body that was sent before the
+ * one ahead of it was answered. What is still to be sent goes out before it closes. */
+enum { DONE = -1 };
 
 /* Sends what conn has: begins with its header. */
 static int answer(struct web_conn *conn, struct lws *wsi, unsigned status, const char *type, int head_only)
@@ -95,7 +95,7 @@ static int answer(struct web_conn *conn, struct lws *wsi, unsigned status, const
     if (put_headers(wsi, status, type, conn->len) != 0) return -1;
     if (head_only || conn->len == 0) {
         web_http_end(conn);
-        return done(wsi);
+        return DONE;
     }
     lws_callback_on_writable(wsi);
     return 0;
@@ -179,7 +179,7 @@ int web_http_go_on(struct web_conn *conn, struct lws *wsi)
         return 0;
     }
     web_http_end(conn);
-    return done(wsi);
+    return DONE;
 }
 
 void web_http_end(struct web_conn *conn)

@@ -4,6 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "drivers/record/ply_repair.h"
+
 enum { FACE_LEN = 13 };                  /* three corners: a count of 8 bits, three indices of 32 */
 static const uint64_t MOST = UINT32_MAX; /* vertices, faces */
 
@@ -28,8 +30,8 @@ static int take_header(struct mesh_lines *m, const char *line)
     m->has_ended = strcmp(line, "end_header") == 0;
     if (strcmp(line, "format ascii 1.0") == 0) m->is_ascii = 1;
     if (strncmp(line, "element ", 8) == 0) {
-        static const char *const form[2] = {"element vertex %" SCNu64, "element face %" SCNu64};
-        return m->n_elements < 2 && sscanf(line, form[m->n_elements], &m->n[m->n_elements]) == 1 &&
+        static const char *const head[2] = {"element vertex ", "element face "};
+        return m->n_elements < 2 && ply_repair_count(line, head[m->n_elements], &m->n[m->n_elements]) &&
                m->n[m->n_elements++] <= MOST;
     }
     if (strncmp(line, "property ", 9) != 0) return 1;

@@ -77,6 +77,14 @@ static int take_property(struct ply_header *h, const char *line)
     return 1;
 }
 
+int ply_repair_count(const char *line, const char *head, uint64_t *count)
+{
+    const size_t n = strlen(head), digits = strncmp(line, head, n) == 0 ? strspn(line + n, "0123456789") : 0;
+    if (digits == 0 || digits > 19 || line[n + digits] != '\0') return 0;
+    *count = strtoull(line + n, NULL, 10);
+    return 1;
+}
+
 /* One line; 0: such a file is not repaired. Comments may be anything: a header that was being written over when its
  * recorder was killed may have half a line. */
 static int take_header_line(struct ply_header *h, const char *line)
@@ -90,7 +98,7 @@ static int take_header_line(struct ply_header *h, const char *line)
         return 1;
     }
     if (strncmp(line, "element face ", 13) == 0) return h->is_mesh = 1;
-    if (h->has_vertices || sscanf(line, "element vertex %" SCNu64, &h->n_vertices) != 1) return 0;
+    if (h->has_vertices || !ply_repair_count(line, "element vertex ", &h->n_vertices)) return 0;
     return h->has_vertices = 1;
 }
 

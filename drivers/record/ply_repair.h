@@ -7,4 +7,7 @@
 
 int ply_repair(struct repair *repair, struct sh_err *err);
 
+/* "element vertex 12": what is the head of it ("element vertex "), then the count and nothing else. 0: another line. */
+int ply_repair_count(const char *line, const char *head, uint64_t *count);
+
 #endif

@@ -210,7 +210,7 @@ static uint32_t fill_transfer(struct usb_pipe *pipe, uint32_t packet, const uint
         *status = USB_OVERFLOW;
         n -= n % packet;
     }
-    memcpy(transfer->data, data, n);
+    if (n > 0) memcpy(transfer->data, data, n); /* an empty transfer has no room at all */
     transfer->actual = n;
     transfer->zero_packet = *status == USB_OK && n % packet == 0 && n < transfer->length;
     return n;
@@ -254,7 +254,7 @@ size_t usb_device_read(struct usb_device *device, uint8_t endpoint, void *data, 
     while (pipe->first != NULL && pipe->first->epoch == epoch && left > 0) {
         struct usb_transfer *transfer = pipe->first;
         uint32_t rest = transfer->length - pipe->used, n = left < rest ? (uint32_t)left : rest;
-        memcpy(at, transfer->data + pipe->used, n);
+        if (n > 0) memcpy(at, transfer->data + pipe->used, n); /* an empty transfer has no data */
         at += n;
         left -= n;
         pipe->used += n;
