@@ -9,7 +9,7 @@
 #include "tests/fuzz/rig.h"
 #include "tests/fuzz/seal.h"
 
-enum { MAX_STREAM = 1 << 15, MAX_RECORDERS = 3, SOME_POINTS = 64, MAX_CHECKS = 32 };
+enum { MAX_STREAM = 1 << 15, MAX_RECORDERS = 3, SOME_POINTS = 64, MAX_CHECKS = 4 };
 
 static const char *const names[] = {"out.ply", "out.las", "out.ptx",  "out.e57", "out.poses.csv", "out.pcapng",
                                     "out.shs", "out.obj", "out.gltf", "out.glb", "out.fbx"};
