@@ -37,7 +37,8 @@ run_target() {
     while :; do
         left=$((end - SECONDS))
         [ $left -gt 0 ] || break
-        set -- "$1" "$to" -max_total_time=$((left < 3600 ? left : 3600))
+        # Inputs that take longer are tried less often: up to ten times as many executions.
+        set -- "$1" "$to" -entropic_scale_per_exec_time=1 -max_total_time=$((left < 3600 ? left : 3600))
         if [ -n "$N" ]; then
             done_now=$((N - $(cat "$to/executions")))
             [ $done_now -gt 0 ] || break
