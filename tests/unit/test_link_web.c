@@ -164,6 +164,32 @@ static void test_requests(void **state)
     bench_close(&bench);
 }
 
+/* A connection ends with its first answer. A request with a body that waited behind another one kept libwebsockets 4.1
+ * busy for ever. */
+static void test_one_request_each(void **state)
+{
+    (void)state;
+    static const char second[] = "GET /\r\nContent-Length: 1\r\n\r\nn: hts";
+    char place[64], request[300], answer[4096];
+    struct bench bench = open_web(place);
+    int fd = dial(place), n_answers = 0;
+    size_t n = 0, got = 1;
+    snprintf(request, sizeof request, "GET /scene HTTP/1.1\r\nHost: %s\r\n\r\n%s", place, second);
+    assert_int_equal(send(fd, request, strlen(request), MSG_NOSIGNAL), strlen(request));
+    for (; got > 0 && n + 1 < sizeof answer; n += got)
+        got = listen_to(&bench, fd, answer + n, sizeof answer - 1 - n);
+    answer[n] = '\0';
+    assert_int_equal(got, 0);
+    for (const char *at = answer; (at = strstr(at, "HTTP/1.1 ")) != NULL; at += 9)
+        n_answers++;
+    assert_int_equal(n_answers, 1);
+    assert_non_null(strstr(answer, "connection: close\r\n"));
+    assert_string_equal(answer + n - 5, "bbbbb");
+    close(fd);
+    assert_int_equal(status_of(&bench, place, "GET /scene", ""), 200);
+    bench_close(&bench);
+}
+
 /* So many that say nothing are kept; one more is closed, and there is room again once they have gone. */
 static void test_many_connections(void **state)
 {
@@ -469,9 +495,10 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_headers),          cmocka_unit_test(test_requests),
         cmocka_unit_test(test_who_asks),         cmocka_unit_test(test_session),
-        cmocka_unit_test(test_many_connections), cmocka_unit_test(test_half_request),
-        cmocka_unit_test(test_no_descriptors),   cmocka_unit_test(test_goodbye),
-        cmocka_unit_test(test_turned_down),      cmocka_unit_test(test_bad_messages),
+        cmocka_unit_test(test_one_request_each), cmocka_unit_test(test_many_connections),
+        cmocka_unit_test(test_half_request),     cmocka_unit_test(test_no_descriptors),
+        cmocka_unit_test(test_goodbye),          cmocka_unit_test(test_turned_down),
+        cmocka_unit_test(test_bad_messages),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

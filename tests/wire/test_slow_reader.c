@@ -89,7 +89,8 @@ static void check_errors(const struct head *head, uint64_t losses)
     struct scanhead *sh = client_open(head_endpoint(head, "tcp"));
     uint64_t n = 0;
     int number;
-    while ((number = atoi(client_ask(sh, "SYST:ERR?"))) == 102) n++;
+    while ((number = atoi(client_ask(sh, "SYST:ERR?"))) == 102)
+        n++;
     assert_int_equal(number, 0);
     assert_in_range(n, 1, losses);
     scanhead_close(sh);
