@@ -80,7 +80,7 @@ static int take_property(struct ply_header *h, const char *line)
 int ply_repair_count(const char *line, const char *head, uint64_t *count)
 {
     const size_t n = strlen(head), digits = strncmp(line, head, n) == 0 ? strspn(line + n, "0123456789") : 0;
-    if (digits == 0 || digits > 19 || line[n + digits] != '\0') return 0;
+    if (digits == 0 || digits > 20 || line[n + digits] != '\0') return 0;
     *count = strtoull(line + n, NULL, 10);
     return 1;
 }

@@ -204,6 +204,9 @@ static void test_huge_numbers(void **state)
         "ply\nformat binary_big_endian 1.0\nelement vertex 3\nproperty double x\nend_header\n12345678",
         "ply\nformat binary_little_endian 1.0\nelement vertex 3\nend_header\n12345678",
         "ply\nformat binary_little_endian 1.0\nproperty double x\nelement vertex 3\nend_header\n12345678",
+        "ply\nformat binary_little_endian 1.0\nelement vertex3\nproperty double x\nend_header\n12345678",
+        "ply\nformat binary_little_endian 1.0\nelement vertex -3\nproperty double x\nend_header\n12345678",
+        "ply\nformat binary_little_endian 1.0\nelement vertex 3 y\nproperty double x\nend_header\n12345678",
         "ply\nformat ascii 1.0\nelement edge 3\nproperty double x\nend_header\n1\n"};
     /* the first has eight bytes, and is made right where its header has room for that: by blanks it has */
     for (size_t i = 1; i < sizeof ply / sizeof ply[0]; i++)
