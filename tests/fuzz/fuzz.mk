@@ -2,13 +2,16 @@
 #   make fuzz S=600           each for so many seconds, JOBS at a time; then a table
 #   make fuzz N=1000000       each for so many executions; with S as well: what comes first
 #   make fuzz F=config        that one alone
+#   make fuzz QUICK=yes       without comparisons: a third of the time for each; what both find is shared
 #   make fuzz-programs        builds them
 #   make fuzz-short           what `make test` runs of them
 S ?=
 F ?=
 FUZZ_CC ?= $(CACHED)clang
 FUZZ_CXX ?= $(CACHED)clang++
-FUZZ_BUILD ?= $(BUILD)/fuzz
+QUICK ?=
+FUZZ_BUILD ?= $(BUILD)/fuzz$(if $(QUICK),-quick)
+FUZZ_RUNS ?= $(BUILD)/fuzz/runs
 # Coverage as libFuzzer wants it: a counter an edge (inline-8bit-counters,pc-table), and comparisons (trace-cmp).
 # Processor time by compiler and flags, all with the address and undefined sanitizers. Compiling: ten files of all
 # folders, median of three. Running: test_native_damage.
@@ -20,7 +23,7 @@ FUZZ_BUILD ?= $(BUILD)/fuzz
 #   clang -O0, counters and comparisons        2.2
 #   (clang -O0 for warnings, no sanitizer:     1.1)
 FUZZ_OPT ?= -O1
-FUZZ_COVER ?= -fsanitize=fuzzer-no-link
+FUZZ_COVER ?= $(if $(QUICK),-fsanitize-coverage=inline-8bit-counters$(comma)pc-table,-fsanitize=fuzzer-no-link)
 # Without vptr: that check needs clang++ to link, for one file.
 FUZZ_SAN ?= -fsanitize=address,undefined -fno-sanitize=vptr -fno-sanitize-recover=all $(FUZZ_COVER)
 FUZZ_FLAGS ?= -w -g1
@@ -30,7 +33,7 @@ FUZZ_MAKE = $(MAKE) --no-print-directory -j$(JOBS) BUILD=$(FUZZ_BUILD) CC="$(FUZ
 	OPT=$(FUZZ_OPT) WERROR= CPPFLAGS=-DSH_SANITIZE CFLAGS="$(FUZZ_FLAGS)" CXXFLAGS="$(FUZZ_FLAGS)" SAN="$(FUZZ_SAN)"
 FUZZ_NAMES = $(patsubst tests/fuzz/fuzz_%.c,%,$(wildcard tests/fuzz/fuzz_*.c))
 FUZZ_PROGRAMS = $(patsubst %,$(BUILD)/tests/fuzz/fuzz_%,$(or $(F),$(FUZZ_NAMES)))
-FUZZ_RUN = FUZZ_BUILD=$(FUZZ_BUILD) JOBS=$(JOBS)
+FUZZ_RUN = FUZZ_BUILD=$(FUZZ_BUILD) FUZZ_RUNS=$(FUZZ_RUNS) JOBS=$(JOBS)
 
 $(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $$(call RIGS,tests/fuzz/$$*) $(BUILD)/common.a $(BUILD)/modules.a
 	@echo "  FUZZ  $@"

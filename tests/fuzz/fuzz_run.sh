@@ -4,10 +4,11 @@
 #   S=600 N=0 JOBS=2 FUZZ_BUILD=build/fuzz bash tests/fuzz/fuzz_run.sh NAME...
 #
 # S: seconds a target; N: executions a target, counted over all runs; with both, what comes first. JOBS targets run at a time.
-# What is found on the way stays in $FUZZ_BUILD/runs/NAME/corpus, and the next run goes on from there. An input that fails is
+# What is found on the way stays in $FUZZ_RUNS/NAME/corpus, and the next run goes on from there. An input that fails is
 # copied to tests/fuzz/found/NAME, and named; then the exit status is 1.
 set -u
 build=${FUZZ_BUILD:-build/fuzz}
+runs=${FUZZ_RUNS:-$build/runs}
 jobs=${JOBS:-$(getconf _NPROCESSORS_ONLN)}
 S=${S:-} N=${N:-}
 [ -n "$S$N" ] || S=60
@@ -30,7 +31,7 @@ trap 'exit 130' INT TERM
 
 # Rounds go on until S or N is reached: libFuzzer holds all that it has found in memory, and a restart gives that back.
 run_target() {
-    local to=$build/runs/$1 end=$((SECONDS + ${S:-100000000})) left done_now
+    local to=$runs/$1 end=$((SECONDS + ${S:-100000000})) left done_now
     mkdir -p "$to"
     [ -f "$to/executions" ] || echo 0 >"$to/executions"
     rm -f "$to/status"
@@ -84,7 +85,7 @@ running=()
 status=0
 printf '%-12s %14s %9s %13s %11s  %s\n' target executions exec/s edges functions found
 for name; do
-    to=$build/runs/$name found=none
+    to=$runs/$name found=none
     if [ -f "$to/status" ] && [ "$(cat "$to/status")" != 0 ]; then
         status=1 found=
         for input in "$to"/crash/*; do
