@@ -223,6 +223,15 @@ int record_line_read(struct record_line *r, int argc, char **argv)
     return APP_GO_ON;
 }
 
+static int check_outputs(const struct record_line *r, struct sh_err *err)
+{
+    struct app_output out[RECORD_MAX_FILES + 2] = {{"stats", r->job.stats}, {"truth", r->job.truth}};
+    int n = 2;
+    for (int i = 0; i < r->job.files.n; i++)
+        out[n++] = (struct app_output){"output", r->job.files.file[i].path};
+    return app_check_outputs(&r->in, out, n, err);
+}
+
 static int run(int argc, char **argv)
 {
     struct sh_err err = {0};
@@ -230,6 +239,7 @@ static int run(int argc, char **argv)
     if (raw_is_wanted(argc, argv)) return raw_record(argc, argv);
     int status = record_line_read(&r, argc, argv);
     if (status != APP_GO_ON) return status;
+    if (check_outputs(&r, &err) != SH_OK) return app_fail(&err);
     app_catch_signals();
     if (r.n_repairs > 0) return record_repair(r.repair, r.n_repairs, r.job.stats, r.quiet);
     if (is_config(r.job.source)) return app_with_config(&r.in, record_config, &r.job);
