@@ -27,6 +27,18 @@ lacks() {
     for word; do ! grep -e "$word" "$file" || return 1; done
 }
 
+# ---- one name, one default: the files of make are read as one, so the second default would be the first one's
+one_default_each() {
+    twice=$(grep -hoE '^[A-Z_]+ *\?=' Makefile tests/*/*.mk config/*/*.mk | sed 's/[ ?=]*$//' | sort | uniq -d)
+    [ "$twice" = CROSS_COMPILE ] || { echo "defaults at two places:" $twice; return 1; } # its two stand in branches of an if
+}
+check "no variable of make has two defaults" one_default_each
+runs_all_of() {
+    env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -n DEPS=no BUILD="$work/build" "$1" >"$work/all" 2>&1 && says "$work/all" "$2"
+}
+check "make mutants alone tries all faults" runs_all_of mutants " '\*'\$"
+check "make machines alone runs all machines" runs_all_of machines ' trixie avx sse aarch64$'
+
 # ---- a cross compiler for ARM, its pkg-config, and both Embrees where it looks
 mkdir -p "$work/bin" "$work/include/embree3" "$work/include/embree4"
 : >"$work/include/embree3/rtcore.h"

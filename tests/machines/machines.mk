@@ -1,5 +1,7 @@
 # Debian 13, x86 without AVX2 and without AVX, and 64-bit ARM, each in a root of its own or emulated: README.md here.
-M ?= trixie avx sse aarch64
+# M is shared with `make mutants`, so it has no default of its own.
+# Under another name, so that `make -n` prints the line and does not run it.
+MACHINES_MAKE = $(MAKE) --no-print-directory
 machines:
-	@MAKE='$(MAKE) --no-print-directory' JOBS=$(JOBS) sh tests/machines/run.sh $(BUILD) $(M)
+	@MAKE='$(MACHINES_MAKE)' JOBS=$(JOBS) sh tests/machines/run.sh $(BUILD) $(or $(M),trixie avx sse aarch64)
 .PHONY: machines
