@@ -53,6 +53,7 @@ static void counted_free(void *p)
 #define STBI_MALLOC(size)     counted_alloc(size)
 #define STBI_REALLOC(p, size) counted_realloc(p, size)
 #define STBI_FREE(p)          counted_free(p)
+#define STBI_ASSERT(x)        ((void)0) /* a table of 256 short codes would end the program; the index is in range */
 #ifdef __clang__ /* stb_image adds 0 to NULL, and copies 0 bytes from there; bounds are looked at all the same */
 #pragma clang attribute push(__attribute__((no_sanitize("undefined"))), apply_to = function)
 #endif
@@ -148,6 +149,34 @@ static int has_long_table(const uint8_t *bytes, size_t n)
     return 0;
 }
 
+/* As stb_image loads a JPEG, but for the tables that a file uses and does not define: stb_image leaves them as the memory was,
+ * and goes by them past their ends. Here they are empty, so that a code of theirs is one that no table has. */
+static uint8_t *load_jpeg(stbi__context *s, int *width, int *height, int *channels)
+{
+    int no_codes[16] = {0};
+    stbi__jpeg *jpeg = counted_alloc(sizeof *jpeg);
+    if (jpeg == NULL) return stbi__errpuc("outofmem", "Out of memory");
+    memset(jpeg, 0, sizeof *jpeg);
+    for (int i = 0; i < 4; i++) {
+        stbi__build_huffman(&jpeg->huff_dc[i], no_codes);
+        stbi__build_huffman(&jpeg->huff_ac[i], no_codes);
+    }
+    jpeg->s = s;
+    stbi__setup_jpeg(jpeg);
+    uint8_t *rgba = load_jpeg_image(jpeg, width, height, channels, 4);
+    counted_free(jpeg);
+    return rgba;
+}
+
+/* Four channels, to be freed by counted_free; NULL: stbi_failure_reason(). */
+static uint8_t *load(const uint8_t *bytes, size_t n, int *width, int *height, int *channels)
+{
+    stbi__context s;
+    stbi__start_mem(&s, bytes, (int)n);
+    if (stbi__jpeg_test(&s)) return load_jpeg(&s, width, height, channels);
+    return stbi_load_from_memory(bytes, (int)n, width, height, channels, 4);
+}
+
 static int decode(const struct texture_source *source, const uint8_t *bytes, size_t n_bytes,
                   struct texture_image *image, struct sh_err *err)
 {
@@ -168,7 +197,7 @@ static int decode(const struct texture_source *source, const uint8_t *bytes, siz
     image->height = (uint32_t)height;
     image->has_alpha = channels == 2 || channels == 4 || has_transparent_colour(bytes, n_bytes);
     if (source->alpha_only && !image->has_alpha) return SH_OK;
-    image->rgba = stbi_load_from_memory(bytes, (int)n_bytes, &width, &height, &channels, 4);
+    image->rgba = load(bytes, n_bytes, &width, &height, &channels);
     if (image->rgba == NULL) return fail_read(file, stbi_failure_reason(), err);
     drop_unused_alpha(bytes, image);
     return SH_OK;

@@ -325,6 +325,11 @@ static void hostile_files_take_no_gigabytes(void **state)
     memset(table + 5, 0xff, 16); /* 16 times 255 codes: the decoder's array has 257 entries */
     fails(write_file("table.jpg", tga, sizeof JPEG), "a table of more than 256 codes");
     fails(write_file("end.jpg", tga, (size_t)(table + 9 - tga)), "a table of more than 256 codes");
+    memcpy(tga, JPEG, sizeof JPEG);
+    table = memmem(tga, sizeof JPEG, "\xff\xc4\0\x14\x10", 5);
+    assert_non_null(table);
+    table[4] = 0x12; /* the third table of its kind: the scan names the first, which the file lacks */
+    fails(write_file("lacks.jpg", tga, sizeof JPEG), "no image that can be read");
     snprintf(path, sizeof path, "%s/none.png", folder);
     fails(path, "No such file");
     snprintf(path, sizeof path, "%s/pipe.png", folder);
