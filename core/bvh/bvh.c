@@ -13,7 +13,8 @@
 #define LOOKS_THROUGH RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION
 #endif
 
-static bool count_bytes(void *user, ssize_t bytes, bool post)
+/* Its name and those of the other two that Embree's threads get to are in tests/check/tsan.supp. */
+static bool embree_counts_bytes(void *user, ssize_t bytes, bool post)
 {
     (void)post;
     struct bvh *bvh = user;
@@ -22,7 +23,7 @@ static bool count_bytes(void *user, ssize_t bytes, bool post)
 }
 
 /* From Embree's threads, often; false ends the building. */
-static bool go_on(void *report, double fraction)
+static bool embree_may_go_on(void *report, double fraction)
 {
     (void)fraction;
     return !sh_stopped(report);
@@ -43,7 +44,7 @@ int bvh_commit(struct bvh *bvh, RTCScene scene, const struct sh_report *report, 
         const void *in;
         void *out;
     } ctx = {.in = report};
-    rtcSetSceneProgressMonitorFunction(scene, go_on, ctx.out);
+    rtcSetSceneProgressMonitorFunction(scene, embree_may_go_on, ctx.out);
     rtcCommitScene(scene);
     return check_device(bvh->device, err);
 }
@@ -89,7 +90,7 @@ int bvh_create(const struct scene *scene, const double origin_m[3], double stati
         free(bvh);
         return embree_fail(rtcGetDeviceError(NULL), "bvh", err);
     }
-    rtcSetDeviceMemoryMonitorFunction(bvh->device, count_bytes, bvh);
+    rtcSetDeviceMemoryMonitorFunction(bvh->device, embree_counts_bytes, bvh);
     if (scene->n_triangles > 1000000) sh_progress(report, "building the BVH", -1.0);
     double start = seconds();
     int rc = build(bvh, report, err);

@@ -29,7 +29,7 @@ static void progress(void *ctx, const char *what, double fraction)
     sh_progress(listener->to, what, fraction);
 }
 
-static int stop(void *ctx)
+static int loading_stops(void *ctx)
 {
     const struct site_listener *listener = ctx;
     return sh_stopped(listener->to);
@@ -38,7 +38,7 @@ static int stop(void *ctx)
 void site_listen(struct site_listener *listener, const struct sh_report *to, struct site_said *said,
                  const struct site_said *before)
 {
-    *listener = (struct site_listener){{listener, warn, progress, stop}, to, said, before};
+    *listener = (struct site_listener){{listener, warn, progress, loading_stops}, to, said, before};
 }
 
 void site_free_said(struct site_said *said)

@@ -9,6 +9,7 @@
 #include <linux/filter.h>
 #include <linux/futex.h>
 #include <linux/seccomp.h>
+#include <malloc.h>
 #include <poll.h>
 #include <pthread.h>
 #include <stdatomic.h>
@@ -16,6 +17,7 @@
 #include <sys/ioctl.h>
 #include <sys/prctl.h>
 #include <sys/syscall.h>
+#include <threads.h>
 #include <time.h>
 
 #if defined __x86_64__
@@ -58,10 +60,13 @@ static void note(const char *name)
     if (is_pacer) find(name, -1);
 }
 
-/* The function that was replaced. */
+/* The function that was replaced. Of conditions there may be an older kind, which dlsym would give; asked for a version that
+ * is not there, dlvsym allocates. */
 static void *next_of(const char *name)
 {
-    void *f = dlsym(RTLD_NEXT, name);
+    const int is_condition = strncmp(name, "pthread_cond_", strlen("pthread_cond_")) == 0;
+    void *f = is_condition ? dlvsym(RTLD_NEXT, name, "GLIBC_2.3.2") : NULL;
+    if (f == NULL) f = dlsym(RTLD_NEXT, name);
     if (f == NULL) abort();
     return f;
 }
@@ -99,8 +104,17 @@ void free(void *p)
 /* Who waits for a condition has its mutex. */
 LOOKED_AT(int, posix_memalign, (void **p, size_t align, size_t n), (p, align, n))
 LOOKED_AT(void *, aligned_alloc, (size_t align, size_t n), (align, n))
+LOOKED_AT(void *, memalign, (size_t align, size_t n), (align, n))
+LOOKED_AT(void *, valloc, (size_t n), (n))
 LOOKED_AT(int, pthread_mutex_trylock, (pthread_mutex_t * m), (m))
 LOOKED_AT(int, pthread_mutex_timedlock, (pthread_mutex_t * m, const struct timespec *t), (m, t))
+LOOKED_AT(int, pthread_mutex_clocklock, (pthread_mutex_t * m, clockid_t id, const struct timespec *t), (m, id, t))
+LOOKED_AT(int, mtx_lock, (mtx_t * m), (m))
+LOOKED_AT(int, pthread_cond_signal, (pthread_cond_t * c), (c))
+LOOKED_AT(int, pthread_cond_broadcast, (pthread_cond_t * c), (c))
+LOOKED_AT(int, pthread_once, (pthread_once_t * once, void (*f)(void)), (once, f))
+LOOKED_AT(int, pthread_rwlock_tryrdlock, (pthread_rwlock_t * l), (l))
+LOOKED_AT(int, pthread_rwlock_trywrlock, (pthread_rwlock_t * l), (l))
 LOOKED_AT(int, pthread_rwlock_rdlock, (pthread_rwlock_t * l), (l))
 LOOKED_AT(int, pthread_rwlock_wrlock, (pthread_rwlock_t * l), (l))
 LOOKED_AT(int, pthread_spin_lock, (pthread_spinlock_t * l), (l))
@@ -109,6 +123,8 @@ LOOKED_AT(int, puts, (const char *text), (text))
 LOOKED_AT(int, fflush, (FILE * f), (f))
 LOOKED_AT(size_t, fwrite, (const void *p, size_t size, size_t n, FILE *f), (p, size, n, f))
 LOOKED_AT(int, vfprintf, (FILE * f, const char *format, va_list args), (f, format, args))
+LOOKED_AT(int, vprintf, (const char *format, va_list args), (format, args))
+LOOKED_AT(int, vsprintf, (char *text, const char *format, va_list args), (text, format, args))
 LOOKED_AT(int, vsnprintf, (char *text, size_t n, const char *format, va_list args), (text, n, format, args))
 LOOKED_AT(struct tm *, localtime_r, (const time_t *t, struct tm *tm), (t, tm))
 LOOKED_AT(char *, getenv, (const char *name), (name))
@@ -123,25 +139,21 @@ int pthread_mutex_lock(pthread_mutex_t *m)
     return next(m);
 }
 
-int fprintf(FILE *f, const char *format, ...)
-{
-    va_list args;
-    note("fprintf");
-    va_start(args, format);
-    const int n = vfprintf(f, format, args);
-    va_end(args);
-    return n;
-}
-
-int snprintf(char *text, size_t cap, const char *format, ...)
-{
-    va_list args;
-    note("snprintf");
-    va_start(args, format);
-    const int n = vsnprintf(text, cap, format, args);
-    va_end(args);
-    return n;
-}
+/* With arguments that are not known: they are passed on as a list. */
+#define FORMATS(name, params, list_name, args) \
+    int name params                            \
+    {                                          \
+        va_list list;                          \
+        note(#name);                           \
+        va_start(list, format);                \
+        const int written = list_name args;    \
+        va_end(list);                          \
+        return written;                        \
+    }
+FORMATS(printf, (const char *format, ...), vprintf, (format, list))
+FORMATS(fprintf, (FILE * f, const char *format, ...), vfprintf, (f, format, list))
+FORMATS(sprintf, (char *text, const char *format, ...), vsprintf, (text, format, list))
+FORMATS(snprintf, (char *text, size_t cap, const char *format, ...), vsnprintf, (text, cap, format, list))
 
 /* ---- system calls */
 

@@ -8,6 +8,7 @@
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <linux/futex.h>
+#include <malloc.h>
 #include <netinet/in.h>
 #include <poll.h>
 #include <pthread.h>
@@ -60,6 +61,15 @@ static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 static int pipe_fd[2];
 static void *volatile block;
 
+static pthread_cond_t changed = PTHREAD_COND_INITIALIZER;
+static pthread_rwlock_t shared = PTHREAD_RWLOCK_INITIALIZER;
+static pthread_once_t first_time = PTHREAD_ONCE_INIT;
+static void *aligned;
+
+static void nothing(void)
+{
+}
+
 static void plant_all(int sleep)
 {
     char text[8];
@@ -92,6 +102,21 @@ static void plant_all(int sleep)
     case 13:
         syscall(SYS_getpid);
         break;
+    case 14:
+        pthread_cond_signal(&changed);
+        break;
+    case 15:
+        aligned = memalign(64, 64);
+        break;
+    case 16:
+        pthread_rwlock_tryrdlock(&shared);
+        break;
+    case 17:
+        pthread_once(&first_time, nothing);
+        break;
+    case 18:
+        text[0] = (char)sprintf(text, "%d", sleep); /* as above, in the unbounded form */
+        break;
     default:
         break;
     }
@@ -104,9 +129,19 @@ static void what_is_planted_is_found(void **state)
     static const struct {
         const char *name;
         int nr;
-    } planted[] = {{"malloc", -1},    {"free", -1},      {"pthread_mutex_lock", -1},
-                   {"snprintf", -1},  {NULL, SYS_write}, {NULL, SYS_sched_yield},
-                   {NULL, SYS_futex}, {NULL, SYS_getpid}};
+    } planted[] = {{"malloc", -1},
+                   {"free", -1},
+                   {"pthread_mutex_lock", -1},
+                   {"snprintf", -1},
+                   {NULL, SYS_write},
+                   {NULL, SYS_sched_yield},
+                   {NULL, SYS_futex},
+                   {NULL, SYS_getpid},
+                   {"pthread_cond_signal", -1},
+                   {"memalign", -1},
+                   {"pthread_rwlock_tryrdlock", -1},
+                   {"pthread_once", -1},
+                   {"sprintf", -1}};
     struct run run;
     if (!pacing_filter_works()) skip();
     assert_int_equal(pipe2(pipe_fd, O_CLOEXEC), 0);
@@ -120,7 +155,9 @@ static void what_is_planted_is_found(void **state)
         const char *name = planted[i].name != NULL ? planted[i].name : call;
         if (!pacing_has(name)) fail_msg("%s was not found", name);
     }
-    assert_int_equal(n, sizeof planted / sizeof *planted + 1); /* snprintf calls vsnprintf, which is one more */
+    assert_int_equal(n,
+                     sizeof planted / sizeof *planted + 2); /* snprintf and sprintf each call one more, with a list */
+    free(aligned);
     close(pipe_fd[0]);
     close(pipe_fd[1]);
 }
