@@ -1,6 +1,6 @@
 # make deb: packages for Debian, in build/deb. make deb-check: installs, tries and removes them in a new root (needs root).
 DEPS_DEB = debhelper fakeroot lintian
-DEPS_DEB_CHECK = mmdebstrap
+DEPS_DEB_CHECK = mmdebstrap systemd-container
 DEB_DIR = $(BUILD)/deb
 DEB_TREE = $(DEB_DIR)/scanhead
 RELEASE = $(shell sed -n 's/^\#define SCANHEAD_VERSION  *"\(.*\)"$$/\1/p' drivers/host/scanhead.h)

@@ -10,6 +10,9 @@ out=$2
 seconds=${RT_S:-10}
 pairs=${RT_PAIRS:-5}
 most=1.5
+case $seconds:$pairs in
+*[!0-9:]* | :* | *: | 0* | *:0*) echo "RT_S=$seconds RT_PAIRS=$pairs: whole numbers from 1 on are allowed" >&2; exit 2 ;;
+esac
 mkdir -p "$out"
 rm -f "$out"/*
 

@@ -3,5 +3,5 @@
 # Under another name, so that `make -n` prints the line and does not run it.
 MACHINES_MAKE = $(MAKE) --no-print-directory
 machines:
-	@MAKE='$(MACHINES_MAKE)' JOBS=$(JOBS) sh tests/machines/run.sh $(BUILD) $(or $(M),trixie avx sse aarch64)
+	@MAKE='$(MACHINES_MAKE)' JOBS=$(JOBS) sh tests/machines/run.sh $(BUILD) $(foreach m,$(or $(M),trixie avx sse aarch64),'$(m)')
 .PHONY: machines

@@ -1,7 +1,8 @@
 """Clients of the long soak: those that read all, come and go, stall, or misbehave, one class a kind.
 
-Each is a thread. `visits` counts how often it came, `good` how often it got what a client should get; a visit that
-sends noise alone gets nothing and is none of these. What must never happen is a line in `wrong`.
+Each is a thread. `visits` counts how often it came, `good` how often it got what a client should get, `turned_away` how often
+the connection was closed before; a visit that sends noise alone gets nothing and is none of these. What must never happen is
+a line in `wrong`: a head that says nothing for half a minute, too.
 """
 import base64
 import os
@@ -27,7 +28,7 @@ class Client(threading.Thread):
     def __init__(self, name, endpoint, stop, seed):
         super().__init__(name=name, daemon=True)
         self.endpoint, self.stop, self.rng = endpoint, stop, random.Random(seed)
-        self.visits = self.good = self.bytes = 0
+        self.visits = self.good = self.turned_away = self.bytes = 0
         self.wrong = []
 
     def run(self):
@@ -35,14 +36,13 @@ class Client(threading.Thread):
             self.visits += 1
             try:
                 self.good += bool(self.visit())
-            except OSError as error:
-                self.refused(error)
+            except TimeoutError:
+                self.wrong.append(f"no answer within {PATIENCE_S:g} s")
+            except OSError:  # a full or busy head closes; the head's end is found by its process
+                self.turned_away += 1
             except Exception as error:  # what came has not the form that it has to have
                 self.wrong.append(f"{type(error).__name__}: {error}")
             self.stop.wait(self.pause_s * self.rng.uniform(0.2, 1.8))
-
-    def refused(self, error):
-        """A connection that a full or busy head closes is no fault; the head's end is found by its process."""
 
     def visit(self):
         raise NotImplementedError
@@ -105,11 +105,11 @@ class ComesAndGoes(Client):
     def visit(self):
         with self.connect() as sock:
             sock.sendall(b"*IDN?\n")
-            data = self.until(sock, b"scanhead,", 1 << 24)
+            data = self.until(sock, b",scanhead native ", 1 << 24)
             self.drink(sock.fileno(), self.rng.uniform(0, 1.5))
             if self.rng.random() < 0.5:
                 self.reset(sock)
-            return b"scanhead," in data
+            return b",scanhead native " in data
 
 
 class Stalls(Client):
@@ -320,16 +320,44 @@ class Cola(Client):
 class Datagrams(Client):
     """Takes a VLP-16's data packets; each has its size and its twelve blocks."""
 
+    size = 1206
+
+    def is_whole(self, packet):
+        return all(packet[100 * i:100 * i + 2] == b"\xff\xee" for i in range(12))
+
     def visit(self):
         port = int(self.endpoint.rsplit(":", 1)[1])
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
             sock.bind(("127.0.0.1", port))
-            sock.settimeout(1)
             until_s, n = time.monotonic() + 3, 0
             while time.monotonic() < until_s and not self.stop.is_set():
+                if not select.select([sock], [], [], 1)[0]:
+                    continue
                 packet = sock.recv(2048)
                 n += 1
-                if len(packet) != 1206 or any(packet[100 * i:100 * i + 2] != b"\xff\xee" for i in range(12)):
-                    self.wrong.append(f"no data packet: {packet[:40]!r}")
-            self.bytes += 1206 * n
+                if len(packet) != self.size or not self.is_whole(packet):
+                    self.wrong.append(f"no such packet: {packet[:40]!r}")
+            self.bytes += self.size * n
             return n > 0
+
+
+class Positions(Datagrams):
+    """Takes its position packets; each has a sentence of GPS."""
+
+    size = 512
+
+    def is_whole(self, packet):
+        return packet[206:212] == b"$GPRMC"
+
+
+class Http(Client):
+    """Asks a VLP-16 for its pages, or for what it does not have."""
+
+    def visit(self):
+        with self.connect() as sock:
+            page, code = self.rng.choice([(b"/cgi/status.json", b"200"), (b"/cgi/info.json", b"200"), (b"/nothing", b"404")])
+            sock.sendall(b"GET " + page + b" HTTP/1.1\r\nHost: soak\r\nConnection: close\r\n\r\n")
+            answer = self.until(sock, b"\r\n")
+            if answer.split(b" ")[1] != code:
+                self.wrong.append(f"{page.decode()}: {answer[:40]!r}")
+            return code in answer

@@ -46,7 +46,8 @@ class Head:
         with os.fdopen(read_fd) as ready:
             line = ready.readline()
         if not line:
-            sys.exit(f"{name}: no head: {(out / f'{name}.err').read_text()}")
+            said = (out / f"{name}.err").read_text().strip() or f"{program} ends without a word"
+            sys.exit(f"{name}: no head: {said}")
         self.endpoints = [e["endpoint"] for e in json.loads(line)["endpoints"]]
 
     def sample(self, at_s):
@@ -162,7 +163,14 @@ def start_clients(main, others, stop):
              (clients.UsbIp, "usbip", usbip), (clients.UsbIp, "usbip 2", usbip), (clients.Redir, "usbredir", redir),
              (clients.Scip, "scip", others["hokuyo"].endpoints[0]), (clients.Misbehaves, "scip hostile", others["hokuyo"].endpoints[0]),
              (clients.Cola, "cola", others["sick"].endpoints[0]), (clients.Misbehaves, "cola hostile", others["sick"].endpoints[0]),
-             (clients.Datagrams, "velodyne", others["velodyne"].endpoints[0])]
+             (clients.Datagrams, "velodyne", others["velodyne"].endpoints[0]),
+             (clients.Positions, "velodyne place", others["velodyne"].endpoints[1]),
+             (clients.Http, "velodyne http", others["velodyne"].endpoints[2])]
+    for name, native in (("hokuyo", 2), ("sick", 2), ("velodyne", 3)):
+        kinds.append((clients.ComesAndGoes, f"{name} native", others[name].endpoints[native]))
+        kinds.append((clients.Nmea, f"{name} nmea", others[name].endpoints[native + 1]))
+        if name != "velodyne":
+            kinds.append((clients.Stalls, f"{name} stalled", others[name].endpoints[0]))
     threads = [kind(name, endpoint, stop, seed) for seed, (kind, name, endpoint) in enumerate(kinds)]
     for thread in threads:
         thread.start()
@@ -194,7 +202,10 @@ def main():
     args = options.parse_args()
     if shutil.which(args.scanhead) is None:
         options.error(f"--scanhead {args.scanhead}: no program; make builds it")
-    args.out.mkdir(parents=True, exist_ok=True)
+    try:
+        args.out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        options.error(f"--out {args.out}: {error.strerror}; it is a folder that is there, or can be made")
     sheet, stop = Sheet(), threading.Event()
 
     main_head = Head("head", args.scanhead, HERE / "long.yaml", args.out, ["--scenario", str(HERE / "long_faults.yaml")])
@@ -252,7 +263,7 @@ def report(sheet, args, heads, threads, recorder, clock, seconds):
         sums(sheet, head)
     record = json.loads((args.out / "record.json").read_text())
     s = main_head.stats
-    fired, got = s["fired_pulses"] + s["lost_pulses"], record["pulses"]
+    fired, got = s["fired_pulses"], record["pulses"]  # what the head lost was fired, too
     lost, missing = record["lost_pulses"], record["missing_pulses"]
     sheet.line(got + lost + missing == fired, "recorder: got + lost by head + left out for it = due",
                f"{got} + {lost} + {missing} = {fired}")
@@ -263,7 +274,8 @@ def report(sheet, args, heads, threads, recorder, clock, seconds):
     sheet.line(abs(ppm) <= bound, "head: device time beside the machine's clock", f"{ppm:+.5f} ppm, +- {bound:.5f}")
     for thread in threads:
         sheet.line(thread.good > 0 and not thread.wrong, f"client {thread.name}", f"{thread.visits} visits, {thread.good} "
-                   f"good, {thread.bytes / 1e6:.1f} MB{', ' + thread.wrong[0] if thread.wrong else ''}")
+                   f"good, {thread.turned_away} turned away, {thread.bytes / 1e6:.1f} MB"
+                   f"{', ' + thread.wrong[0] if thread.wrong else ''}")
     print(f"{seconds:.0f} s, {fired} pulses, {sheet.bad} bad")
     return sheet.bad != 0
 
