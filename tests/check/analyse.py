@@ -34,12 +34,16 @@ def run(command):
     return done.returncode, done.stdout, [(r[4], r[1], int(r[2]), r[3]) for r in rows if r]
 
 
-def cppcheck(files, flags, out, jobs):
-    cache = out / "cppcheck"
+def is_cxx(file):
+    return file.endswith(".cpp")
+
+
+def cppcheck(files, flags, out, jobs, standard, language):
+    cache = out / f"cppcheck-{language}"
     cache.mkdir(parents=True, exist_ok=True)
     wanted = [f for f in flags if f.startswith(("-D", "-I"))]
-    status, text, rows = run(["cppcheck", "--enable=warning,performance,portability", "--inline-suppr", "--std=c11", "--language=c",
-                              "--library=posix,gnu", f"-j{jobs}", f"--cppcheck-build-dir={cache}", "--quiet", "-D__linux__",
+    status, text, rows = run(["cppcheck", "--enable=warning,performance,portability", "--inline-suppr", f"--std={standard}",
+                              f"--language={language}", "--library=posix,gnu", f"-j{jobs}", f"--cppcheck-build-dir={cache}", "--quiet", "-D__linux__",
                               "-D__x86_64__", "--template={file}:{line}: {message} [{id}]", *wanted, *files])
     if status != 0:
         sys.exit(f"cppcheck failed: {text[-2000:]}")
@@ -50,8 +54,12 @@ def tidy(files, flags, out, jobs):
     cache = out / "tidy"
     cache.mkdir(parents=True, exist_ok=True)
     rows, done = [], 0
+    def one(file):
+        own = [flag.replace("-std=c11", "-std=c++17") for flag in flags] if is_cxx(file) else flags
+        return run(["sh", str(HERE / "tidy_one.sh"), file, str(cache), *own])
+
     with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
-        for status, text, found in pool.map(lambda f: run(["sh", str(HERE / "tidy_one.sh"), f, str(cache), *flags]), files):
+        for status, text, found in pool.map(one, files):
             if status != 0 and not found:
                 sys.exit(f"clang-tidy failed: {text[-2000:]}")
             rows += found
@@ -71,8 +79,12 @@ def main():
     args, flags = options.parse_args(words[:split]), words[split + 1:]
     known = answers(HERE / "answered.txt")
 
-    print(f"cppcheck: {len(args.files)} files", flush=True)
-    rows = set(cppcheck(args.files, flags, args.out, args.jobs)) | set(tidy(args.files, flags, args.out, args.jobs))
+    print(f"{len(args.files)} files", flush=True)
+    cxx, c = [f for f in args.files if is_cxx(f)], [f for f in args.files if not is_cxx(f)]
+    rows = set(tidy(args.files, flags, args.out, args.jobs))
+    for files, standard, language in ((c, "c11", "c"), (cxx, "c++17", "c++")):
+        if files:
+            rows |= set(cppcheck(files, flags, args.out, args.jobs, standard, language))
     count = collections.Counter((check, file) for check, file, _, _ in rows)
     wrong = 0
     for check, file, line, text in sorted(rows, key=lambda row: row[1:]):

@@ -10,7 +10,7 @@ CHECK_FLAGS = -std=c11 -I. -I$(BUILD) -D_GNU_SOURCE -DSH_EMBREE=$(EMBREE_VERSION
 deps-check: deps-build
 	$(call install_missing,$(DEPS_CHECK))
 check-analysers: deps-check $(BUILD)/drivers/link/web_pages.inc
-	@python3 tests/check/analyse.py --out $(BUILD)/check --jobs $(JOBS) $(filter %.c,$(CHECK_FILES)) -- $(CHECK_FLAGS)
+	@python3 tests/check/analyse.py --out $(BUILD)/check --jobs $(JOBS) $(CHECK_FILES) -- $(CHECK_FLAGS)
 # CPPFLAGS: what is built otherwise for sanitizers. -O1: races are those of the source, and it takes a third of the time.
 TSAN = $(ASAN_CC) OPT=-O1 WERROR= CFLAGS="-g1 -w" CXXFLAGS="-g1 -w" CPPFLAGS=-DSH_SANITIZE SAN=-fsanitize=thread
 check-tsan: deps-check
