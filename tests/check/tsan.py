@@ -80,21 +80,6 @@ class Knobs(clients.Client):
             self.stop.wait(self.pause_s)
 
 
-class Http(clients.Client):
-    """The pages of a VLP-16: its settings, and one of them changed."""
-
-    pause_s = 0.1
-
-    def visit(self):
-        with self.connect() as sock:
-            if self.rng.random() < 0.5:
-                body = b"rpm=600"
-                sock.sendall(b"POST /cgi/setting HTTP/1.1\r\nHost: localhost\r\nContent-Length: %d\r\n\r\n" % len(body) + body)
-            else:
-                sock.sendall(b"GET /cgi/status.json HTTP/1.1\r\nHost: localhost\r\n\r\n")
-            return b"HTTP/1." in self.until(sock, b"\r\n")
-
-
 class Poses(threading.Thread):
     """The poses of a live platform, by UDP."""
 
@@ -213,7 +198,7 @@ def vlp16():
 
 
 def vlp16_clients(endpoints, stop):
-    return [clients.Datagrams("packets", endpoints[0], stop, 1), Http("http", endpoints[2], stop, 2), Knobs("knobs", endpoints[3], stop, 3)]
+    return [clients.Datagrams("packets", endpoints[0], stop, 1), clients.Http("http", endpoints[2], stop, 2), Knobs("knobs", endpoints[3], stop, 3)]
 
 
 def planar(profile, protocol):

@@ -351,13 +351,17 @@ class Positions(Datagrams):
 
 
 class Http(Client):
-    """Asks a VLP-16 for its pages, or for what it does not have."""
+    """Asks a VLP-16 for its pages, sets what is set already, or asks for what is not there."""
+
+    REQUESTS = [(b"GET /cgi/status.json", b"", b"200"), (b"GET /cgi/info.json", b"", b"200"), (b"GET /nothing", b"", b"404"),
+                (b"POST /cgi/setting", b"rpm=600", b"200 409")]  # 409: another client has control
 
     def visit(self):
         with self.connect() as sock:
-            page, code = self.rng.choice([(b"/cgi/status.json", b"200"), (b"/cgi/info.json", b"200"), (b"/nothing", b"404")])
-            sock.sendall(b"GET " + page + b" HTTP/1.1\r\nHost: soak\r\nConnection: close\r\n\r\n")
-            answer = self.until(sock, b"\r\n")
-            if answer.split(b" ")[1] != code:
-                self.wrong.append(f"{page.decode()}: {answer[:40]!r}")
-            return code in answer
+            request, body, codes = self.rng.choice(self.REQUESTS)
+            sock.sendall(request + b" HTTP/1.1\r\nHost: soak\r\nConnection: close\r\nContent-Length: %d\r\n\r\n" % len(body) + body)
+            answer = self.until(sock, b"\r\n").split(b" ")
+            is_right = len(answer) > 1 and answer[1] in codes.split()
+            if not is_right:
+                self.wrong.append(f"{request.decode()}: {answer!r}"[:100])
+            return is_right
