@@ -75,7 +75,7 @@ scripts_are_sound() {
     for script in $packaging/check.sh $packaging/debian/*.p*rm $packaging/debian/*.post*; do
         bash -n "$script" || return
     done
-    make -n -f $packaging/debian/rules override_dh_makeshlibs | grep -q -e '-c4'
+    sed -n '/^override_dh_makeshlibs:/,/^$/p' $packaging/debian/rules | grep -q -e '-c4'
 }
 
 example_passes() {

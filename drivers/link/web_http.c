@@ -97,8 +97,7 @@ static int answer(struct web_conn *conn, struct lws *wsi, unsigned status, const
         web_http_end(conn);
         return DONE;
     }
-    lws_callback_on_writable(wsi);
-    return 0;
+    return web_http_go_on(conn, wsi); /* at once: libwebsockets 4.3 closes at what stands behind the request */
 }
 
 static int say(struct web_conn *conn, struct lws *wsi, unsigned status, const char *words)

@@ -55,7 +55,9 @@ guest_kernel_name() {
 guest_unpack_kernel() {
     mkdir -p "$2/deb" "$2/tree"
     (cd "$2/deb" && apt-get download -q "$1" >../download.log 2>&1) || return 1
-    dpkg-deb --fsys-tarfile "$2"/deb/*.deb | tar -x -C "$2/tree" ./boot ./lib/modules || return 1
+    # Debian 13 has them in usr/lib, and packed.
+    dpkg-deb --fsys-tarfile "$2"/deb/*.deb | tar -x -C "$2/tree" --wildcards './boot/*' './*lib/modules/*' || return 1
+    [ -e "$2/tree/lib" ] || ln -s usr/lib "$2/tree/lib"
     rm -rf "$2/deb"
     release=$(ls "$2/tree/lib/modules")
     # An xz stream lies inside the image and has other things after it; the uncompressed kernel boots 3 s faster.
@@ -63,15 +65,23 @@ guest_unpack_kernel() {
         tail -c +$((at + 1)) "$2/tree/boot/vmlinuz-$release" | xz -dc --single-stream >"$2/vmlinux" 2>/dev/null || :
         [ "$(head -c 4 "$2/vmlinux" | tail -c 3)" != ELF ] || break
     done
-    [ "$(head -c 4 "$2/vmlinux" | tail -c 3)" = ELF ] || return 1
+    [ "$(head -c 4 "$2/vmlinux" 2>/dev/null | tail -c 3)" = ELF ] || cp "$2/tree/boot/vmlinuz-$release" "$2/vmlinux" || return 1
     PATH=$PATH:/sbin:/usr/sbin depmod -b "$2/tree" "$release"
     mkdir -p "$2/root/modules"
     for module in $GUEST_MODULES; do
         guest_module_order "$2/tree/lib/modules/$release" "$module" >"$2/order" || return 1
-        while read -r file; do cp "$2/tree/lib/modules/$release/$file" "$2/root/modules/" || return 1; done <"$2/order"
-        sed 's|.*/||; s|\.ko$||' "$2/order" >"$2/root/modules/$module.order"
+        while read -r file; do guest_take_module "$2/tree/lib/modules/$release/$file" "$2/root/modules" || return 1; done <"$2/order"
+        sed 's|.*/||; s|\.ko.*||' "$2/order" >"$2/root/modules/$module.order"
     done
     rm -rf "$2/tree" "$2/order"
+}
+
+# guest_take_module FILE FOLDER: unpacked, as busybox loads it.
+guest_take_module() {
+    case $1 in
+    *.xz) xz -dc "$1" >"$2/$(basename "$1" .xz)" ;;
+    *) cp "$1" "$2/" ;;
+    esac
 }
 
 # guest_module_order FOLDER MODULE: the files of the module and of those it needs, each after what it needs itself.

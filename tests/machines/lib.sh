@@ -66,7 +66,7 @@ copy_tree() {
 
 # built HOW FILE: after a build that went well, of which FILE is what make printed.
 built() {
-    echo "$1, $(grep -c 'warning:' "$2") warnings" >"$at/built.txt"
+    echo "$1, $(grep -c '^[^ ]*: warning:' "$2") warnings" >"$at/built.txt"
 }
 
 # build_here TARGET LOG: the programs of this machine, with the options of `make test`; what is there stays.

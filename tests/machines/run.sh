@@ -34,7 +34,7 @@ row() {
         return 0
     fi
     built=$(cat "$at/built.txt" 2>/dev/null || echo "not built: see $at/build.txt")
-    counts=$(tail -n 1 "$at/tests.txt" 2>/dev/null | grep '^[0-9]* passed, [0-9]* failed, [0-9]* skipped$')
+    counts=$(grep '^[0-9]* passed, [0-9]* failed, [0-9]* skipped$' "$at/tests.txt" 2>/dev/null | tail -n 1)
     record=$(cat "$at/record.txt" 2>/dev/null || echo "not made")
     printf '%-9s %s\n          tests: %s\n          record: %s\n' "$1" "$built" "${counts:-not run to the end}" "$record"
     case "$built: $counts: $record" in

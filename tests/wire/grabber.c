@@ -168,11 +168,11 @@ void rawlog_read(const struct grabber *grabber, struct rawlog *log)
 {
     static const struct {
         const char *name;
-        uint8_t version;
+        uint8_t first, last; /* versions that begin with the same fields: MRPT 2.5, 2.14 */
         void (*read)(const uint8_t *at, struct rawlog_item *item);
-    } classes[] = {{"mrpt::obs::CObservation2DRangeScan", 7, read_scan},
-                   {"mrpt::obs::CObservationVelodyneScan", 2, read_turn},
-                   {"mrpt::obs::CObservationGPS", 11, read_gps}};
+    } classes[] = {{"mrpt::obs::CObservation2DRangeScan", 7, 7, read_scan},
+                   {"mrpt::obs::CObservationVelodyneScan", 2, 2, read_turn},
+                   {"mrpt::obs::CObservationGPS", 11, 12, read_gps}};
     char path[352] = "", prefix[32];
     snprintf(prefix, sizeof prefix, "%s_", grabber->name);
     DIR *dir = opendir(grabber->wire->dir);
@@ -192,7 +192,7 @@ void rawlog_read(const struct grabber *grabber, struct rawlog *log)
         for (size_t i = 0; i < sizeof classes / sizeof classes[0]; i++) {
             const size_t len = strlen(classes[i].name);
             if ((size_t)(end - at) <= len || memcmp(at, classes[i].name, len) != 0) continue;
-            assert_int_equal(at[len], classes[i].version);
+            assert_in_range(at[len], classes[i].first, classes[i].last);
             log->item = realloc(log->item, (log->n_items + 1) * sizeof *log->item);
             assert_non_null(log->item);
             log->item[log->n_items] = (struct rawlog_item){0};
