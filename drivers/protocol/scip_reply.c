@@ -53,21 +53,24 @@ void scip_reply_key(struct scip_reply *r, const char *key, const char *fmt, ...)
     put(r, tail, sizeof tail);
 }
 
-static void encode(char *dst, uint32_t value, int n_chars)
+enum { MOST_CHARS = 4 };
+
+/* n_chars: 1 to 4; without the second limit gcc for ARM sees it write beyond them. */
+static void encode(char dst[MOST_CHARS], uint32_t value, int n_chars)
 {
-    for (int i = 0; i < n_chars; i++)
+    for (int i = 0; i < n_chars && i < MOST_CHARS; i++)
         dst[i] = (char)((value >> 6 * (n_chars - 1 - i) & 0x3f) + 0x30);
 }
 
 void scip_encode4(char dst[4], uint32_t value)
 {
-    encode(dst, value, 4);
+    encode(dst, value, MOST_CHARS);
 }
 
 void scip_reply_time(struct scip_reply *r, uint32_t ms)
 {
-    char text[4];
-    encode(text, ms, 4);
+    char text[MOST_CHARS];
+    encode(text, ms, MOST_CHARS);
     put_summed(r, text, sizeof text);
 }
 
@@ -90,7 +93,7 @@ void scip_reply_mark(struct scip_reply *r, char mark)
 void scip_reply_value(struct scip_reply *r, uint32_t value, int n_chars)
 {
     const uint32_t most = (1u << 6 * n_chars) - 1;
-    char text[4];
+    char text[MOST_CHARS];
     encode(text, value < most ? value : most, n_chars);
     for (int i = 0; i < n_chars; i++)
         scip_reply_mark(r, text[i]);
