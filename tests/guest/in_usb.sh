@@ -54,7 +54,7 @@ check_enumeration() {
         test "$(grep -c 'i\(Manufacturer\|Product\|Serial\)  *[1-9][0-9]* [A-Za-z0-9]' /tmp/lsusb.txt)" = 3
     check "$1: interface association" grep 'Interface Association' /tmp/lsusb.txt
     check "$1: CDC-ACM" grep 'CDC ACM:' /tmp/lsusb.txt
-    grep -A 2 'bInterfaceClass  *255' /tmp/lsusb.txt | sed 's/.* \([0-9][0-9]*\) *$/\1/' | tr '\n' ' ' >/tmp/vendor.txt
+    grep -A 2 'bInterfaceClass  *255' /tmp/lsusb.txt | awk '{ printf "%s ", $2 }' >/tmp/vendor.txt
     check "$1: vendor interface FF/53/48" grep '255 83 72' /tmp/vendor.txt
     check "$1: four bulk endpoints of $2 bytes" \
         test "$(grep -A 4 'Transfer Type *Bulk' /tmp/lsusb.txt | grep -c "wMaxPacketSize.* 1x $2 bytes")" = 4
