@@ -203,8 +203,18 @@ static int write_configuration(const struct gadget *gadget, const struct usb_mod
            (usb_describe_ms_os(model, NULL, 0) != 0 ? write_os_descriptors(dir, model) : 0);
 }
 
+/* The model's protocol for f_acm, which reports AT commands (1) by itself. Older kernels can't be told (Debian's 6.1), newer ones
+ * (6.12) only before the function is in a configuration. */
+static int set_console_protocol(const struct gadget *gadget, const struct usb_model *model, struct sh_err *err)
+{
+    char file[96];
+    snprintf(file, sizeof file, "functions/acm.%s/protocol", gadget->name);
+    if (sysfile_write(gadget->dir, file, "%u", model->function[0].protocol) == 0 || errno == ENOENT) return SH_OK;
+    return sh_fail(err, SH_EIO, "functionfs: %s/%s: %s", gadget->dir, file, strerror(errno));
+}
+
 /* The console first: it has the first interfaces. */
-static int make_function(struct gadget *gadget, const char *kind, struct sh_err *err)
+static int make_function(struct gadget *gadget, const char *kind, const struct usb_model *model, struct sh_err *err)
 {
     char function[80], link[96];
     snprintf(function, sizeof function, "functions/%s.%s", kind, gadget->name);
@@ -214,18 +224,10 @@ static int make_function(struct gadget *gadget, const char *kind, struct sh_err 
                    ? sh_fail(err, SH_EINPUT, "functionfs: the kernel has no such function: modprobe usb_f_%s",
                              strcmp(kind, "ffs") == 0 ? "fs" : kind)
                    : sh_fail(err, SH_EIO, "functionfs: %s/%s: %s", gadget->dir, function, strerror(errno));
-    if (sysfile_link(gadget->dir, function, link) != 0)
-        return sh_fail(err, SH_EIO, "functionfs: %s/%s: %s", gadget->dir, link, strerror(errno));
-    return SH_OK;
-}
-
-/* The model's protocol for f_acm, which reports AT commands (1) by itself. Before Linux 6.13 it can't be told. */
-static int set_console_protocol(const struct gadget *gadget, const struct usb_model *model, struct sh_err *err)
-{
-    char file[96];
-    snprintf(file, sizeof file, "functions/acm.%s/protocol", gadget->name);
-    if (sysfile_write(gadget->dir, file, "%u", model->function[0].protocol) == 0 || errno == ENOENT) return SH_OK;
-    return sh_fail(err, SH_EIO, "functionfs: %s/%s: %s", gadget->dir, file, strerror(errno));
+    int rc = strcmp(kind, "acm") == 0 ? set_console_protocol(gadget, model, err) : SH_OK;
+    if (rc == SH_OK && sysfile_link(gadget->dir, function, link) != 0)
+        rc = sh_fail(err, SH_EIO, "functionfs: %s/%s: %s", gadget->dir, link, strerror(errno));
+    return rc;
 }
 
 static int find_tty(struct gadget *gadget, struct sh_err *err)
@@ -264,10 +266,9 @@ int gadget_create(struct gadget *gadget, const struct usb_model *model, const st
     rc = make_named_dir(gadget, err);
     if (rc == SH_OK && (write_identity(gadget, model, id) != 0 || write_configuration(gadget, model) != 0))
         rc = sh_fail(err, SH_EIO, "functionfs: %s cannot be filled in: %s", gadget->dir, strerror(errno));
-    if (rc == SH_OK && gadget->tty_number >= 0) rc = make_function(gadget, "acm", err);
-    if (rc == SH_OK && gadget->tty_number >= 0) rc = set_console_protocol(gadget, model, err);
+    if (rc == SH_OK && gadget->tty_number >= 0) rc = make_function(gadget, "acm", model, err);
     if (rc == SH_OK && gadget->tty_number >= 0) rc = find_tty(gadget, err);
-    if (rc == SH_OK && gadget_has_functionfs(gadget)) rc = make_function(gadget, "ffs", err);
+    if (rc == SH_OK && gadget_has_functionfs(gadget)) rc = make_function(gadget, "ffs", model, err);
     if (rc == SH_OK && gadget_has_functionfs(gadget)) rc = mount_instance(gadget, err);
     if (rc != SH_OK) gadget_remove(gadget);
     return rc;
