@@ -55,8 +55,13 @@ static int dial(void)
     struct sockaddr_in at = {.sin_family = AF_INET, .sin_port = htons((uint16_t)web.port)};
     at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     const struct linger abort_it = {1, 0}; /* so that no address stays taken for a minute */
-    const int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    if (fd < 0 || connect(fd, (struct sockaddr *)&at, sizeof at) != 0) {
+    int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    while (fd >= 0 && connect(fd, (struct sockaddr *)&at, sizeof at) != 0) {
+        const int is_alarm = errno == EINTR; /* libFuzzer's own clock */
+        close(fd);
+        fd = is_alarm ? socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0) : -1;
+    }
+    if (fd < 0) {
         perror("connect");
         exit(1);
     }
