@@ -59,7 +59,7 @@ static int open_one(struct heads *heads, struct heads_one *one, struct sh_err *e
 {
     if (one->is_open) return SH_OK;
     one->is_open = 1;
-    scanner_report_set_up(&one->report, heads->report, one->cfg->head.settings.station);
+    scanner_report_set_up(&one->report, heads->report, one->cfg->head.settings.station, &heads->warnings);
     return offline_open_beside(one->cfg, heads->first, heads->scan_s, &one->report.report, &one->offline, err);
 }
 
@@ -175,21 +175,25 @@ static int record_some(struct heads *heads, struct heads_one *one, const struct 
 }
 
 /* Sets up the scanners that are due later once and lets them go, so that what is wrong with one of them is said before
- * the first scan. Their BVHs stay in the world, where they are found when their turn comes. */
-static int check_later(const struct heads *heads, uint32_t first, uint32_t last, struct sh_err *err)
+ * the first scan, and what several warn of is said once. Their BVHs stay in the world, where they are found when their
+ * turn comes. */
+static int check_later(struct heads *heads, uint32_t first, uint32_t last, struct sh_err *err)
 {
     uint8_t is_known[CONFIG_MAX_STATIONS] = {1};
-    const struct sh_report quiet = {.ctx = heads->report->ctx, .stop = heads->report->stop};
-    int rc = SH_OK;
+    struct scanner_report report;
+    int rc = open_one(heads, &heads->one[of(heads, first)], err);
     is_known[of(heads, first)] = 1;
     for (uint32_t s = first; s <= last && rc == SH_OK; s++) {
         const uint32_t k = of(heads, s);
         struct site *site = NULL;
         if (is_known[k]) continue;
         is_known[k] = 1;
-        rc = offline_load(heads->one[k].cfg, heads->first->site, &quiet, &site, err);
+        scanner_report_set_up(&report, heads->report, s, &heads->warnings);
+        report.report.progress = NULL;
+        rc = offline_load(heads->one[k].cfg, heads->first->site, &report.report, &site, err);
         site_free(site);
     }
+    scanner_warnings_say(&heads->warnings, heads->first->site, heads->report);
     return rc;
 }
 
@@ -222,4 +226,5 @@ void heads_close(struct heads *heads)
         offline_close(&heads->one[i].offline);
         if (i > 0) free(heads->one[i].cfg);
     }
+    scanner_warnings_free(&heads->warnings);
 }

@@ -29,6 +29,7 @@ struct heads {
     double scan_s;
     int64_t said_ns; /* when progress was reported last */
     const struct sh_report *report;
+    struct scanner_warnings warnings;
 };
 
 /* Loads the configurations of all scanners; nothing runs. heads begins as zeros, is large, and is to be closed, also

@@ -4,29 +4,6 @@
 
 #include "firmware_sim/base/clock.h"
 
-static void warn(void *ctx, const char *text)
-{
-    const struct scanner_report *r = ctx;
-    sh_warn(r->to, "scanner of station %u: %s", r->station, text);
-}
-
-static void progress(void *ctx, const char *what, double fraction)
-{
-    const struct scanner_report *r = ctx;
-    sh_progress(r->to, what, fraction);
-}
-
-static int stop(void *ctx)
-{
-    const struct scanner_report *r = ctx;
-    return sh_stopped(r->to);
-}
-
-void scanner_report_set_up(struct scanner_report *report, const struct sh_report *to, uint32_t station)
-{
-    *report = (struct scanner_report){{report, warn, progress, stop}, to, station};
-}
-
 static int add(const struct config *cfg, uint32_t station, const struct sh_report *report, struct sites *sites,
                struct sh_err *err)
 {
@@ -35,7 +12,7 @@ static int add(const struct config *cfg, uint32_t station, const struct sh_repor
     one->cfg = calloc(1, sizeof *one->cfg);
     if (one->cfg == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the scanner of station %u", station + 1);
     int rc = config_load_scanner(cfg, station + 1, one->cfg, err);
-    scanner_report_set_up(&one->report, report, station + 1);
+    scanner_report_set_up(&one->report, report, station + 1, &sites->warnings);
     return rc == SH_OK ? site_load_beside(one->cfg, sites->first, &one->report.report, &one->site, err) : rc;
 }
 
@@ -50,6 +27,7 @@ int sites_load(const struct config *cfg, const struct sh_report *report, struct 
         said_ns = clock_now_ns();
         sh_progress(report, "setting up scanners", (1.0 + i) / cfg->n_stations);
     }
+    scanner_warnings_say(&sites->warnings, sites->first, report);
     return rc;
 }
 
@@ -68,5 +46,6 @@ void sites_free(struct sites *sites)
         site_free(sites->other[k].site);
         free(sites->other[k].cfg);
     }
+    scanner_warnings_free(&sites->warnings);
     site_free(sites->first);
 }

@@ -3,15 +3,7 @@
 #ifndef FIRMWARE_SIM_APP_SITES_H
 #define FIRMWARE_SIM_APP_SITES_H
 
-#include "firmware_sim/site/site.h"
-
-/* A report that says of warnings which scanner they are of. It must not move. */
-struct scanner_report {
-    struct sh_report report;
-    const struct sh_report *to;
-    uint32_t station; /* from 1: the first that has the scanner */
-};
-void scanner_report_set_up(struct scanner_report *report, const struct sh_report *to, uint32_t station);
+#include "firmware_sim/app/scanner_report.h"
 
 struct sites {
     struct site *first; /* of the configuration itself: the scanner of head.station */
@@ -23,6 +15,7 @@ struct sites {
         struct scanner_report report;
     } other[CONFIG_MAX_STATIONS];
     uint32_t n;
+    struct scanner_warnings warnings;
 };
 
 /* sites begins as zeros, and is to be freed, also after an error. cfg must live on, with its sets. */

@@ -64,8 +64,7 @@ static void read_scanner(struct cfg_reader *rd, struct cfg_document *doc, const 
     if (rd->scanner < 0) return;
     cfg_read_scanner(rd, doc);
     rd->in_scanner = 1;
-    for (int i = 0; i < n_sets; i++)
-        cfg_apply_set(rd, sets[i]);
+    cfg_apply_sets(rd, doc, sets, n_sets);
     rd->in_scanner = 0;
     cfg_end_scanner(rd);
 }
@@ -80,8 +79,7 @@ static int load_once(const char *const *sets, int n_sets, uint32_t station, stru
     cfg_reader_init(&rd, cfg->file, &cfg_config_table, cfg, faults);
     rd.profile = known;
     if (cfg_open_file(&rd, &doc) != SH_OK) return 0;
-    for (int i = 0; i < n_sets; i++)
-        cfg_apply_set(&rd, sets[i]);
+    cfg_apply_sets(&rd, doc, sets, n_sets);
     find_scanner(&rd, cfg, station);
     read_scanner(&rd, doc, sets, n_sets);
     cfg_close_file(doc);

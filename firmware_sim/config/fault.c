@@ -23,16 +23,20 @@ int cfg_add_fault(struct config_faults *faults, uint64_t place, int code, const 
 
 static int add(struct cfg_reader *rd, int code, int line, const char *text)
 {
-    const uint64_t source = line == CFG_FROM_SET ? 1 : rd->table.keys == cfg_profile_table.keys ? 2 : 0;
+    const uint64_t source = line == CFG_FROM_SET || rd->set != NULL    ? 1
+                            : rd->table.keys == cfg_profile_table.keys ? 2
+                                                                       : 0;
     return cfg_add_fault(rd->faults, source << 32 | (uint32_t)line, code, text);
 }
 
 static int fail(struct cfg_reader *rd, int code, int line, const char *name, const char *fmt, va_list ap)
 {
-    char what[sizeof rd->faults->fault[0].text], text[sizeof what + 2 * CONFIG_PATH_LEN], place[16] = "";
+    char what[sizeof rd->faults->fault[0].text], text[sizeof what + 2 * CONFIG_PATH_LEN], place[48] = "";
     vsnprintf(what, sizeof what, fmt, ap);
-    if (line > 0) snprintf(place, sizeof place, ":%d", line);
-    if (line == CFG_FROM_SET)
+    if (line > 0) snprintf(place, sizeof place, rd->set != NULL ? "character %d of the value: " : ":%d", line);
+    if (rd->set != NULL && line != CFG_FROM_SET)
+        snprintf(text, sizeof text, "--set %s: %s%s", rd->set, place, what);
+    else if (line == CFG_FROM_SET)
         snprintf(text, sizeof text, "--set %s: %s", name, what);
     else
         snprintf(text, sizeof text, "%s%s: %s%s%s", rd->file, place, name, name[0] != '\0' ? ": " : "", what);

@@ -29,9 +29,8 @@ int config_load_links(const char *text, const char *name, const char *const *set
         if (is_one(cfg_config_table.keys[i].path)) keys[table.n++] = cfg_config_table.keys[i];
     cfg_reader_init(&rd, cfg->file, &table, cfg, faults);
     if (cfg_open_text(&rd, (const unsigned char *)text, strlen(text), &doc) != SH_OK) return faults->fault[0].code;
+    cfg_apply_sets(&rd, doc, sets, n_sets);
     cfg_close_file(doc);
-    for (int i = 0; i < n_sets; i++)
-        cfg_apply_set(&rd, sets[i]);
     cfg_fill_defaults(&rd, NULL);
     cfg_check_links(&rd, cfg);
     cfg_check_loop(&rd, cfg);

@@ -44,6 +44,28 @@ void cfg_forget_list(struct cfg_reader *rd, const char *path)
     *cfg_list_count(rd, list) = 0;
 }
 
+static void forget_value(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item)
+{
+    const size_t row = cfg_row(rd, key);
+    rd->line[row][item] = 0;
+    rd->bad[row][item] = 0;
+    if (key->type != CFG_MAP) memset(cfg_address(rd, key, item), 0, key->size);
+}
+
+void cfg_forget(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item)
+{
+    for (size_t i = 0; i < rd->table.n; i++) {
+        const struct cfg_key *row = &rd->table.keys[i];
+        if (!is_in(row->path, key->path)) continue;
+        if (row->type == CFG_LIST)
+            cfg_forget_list(rd, row->path);
+        else if (cfg_list_of(&rd->table, row) == cfg_list_of(&rd->table, key)) /* else it went with its list */
+            forget_value(rd, row, item);
+    }
+    if (strncmp(key->path, "stations[]", 10) == 0 && is_in("stations[].scanner", key->path))
+        ((struct config_station *)cfg_address(rd, cfg_find(&rd->table, "stations[].scanner"), item))->has_scanner = 0;
+}
+
 void cfg_take_over(struct cfg_reader *rd, const struct cfg_key *key)
 {
     const size_t row = cfg_row(rd, key);

@@ -1,5 +1,5 @@
-/* --set KEY=VALUE: the same rows, one value at a time. */
-#include "firmware_sim/config/table.h"
+/* --set KEY=VALUE: the same rows, one at a time: a single value, or YAML for a list or a section. */
+#include "firmware_sim/config/yaml.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -55,8 +55,10 @@ static int fail_unknown(struct cfg_reader *rd, struct set *set)
     *(dot == NULL ? parent : dot) = '\0';
     /* Below something that is no section nothing is known: then the top is listed. */
     const struct cfg_key *section = cfg_find(&rd->table, parent);
-    if (rd->in_scanner && strncmp(set->path, "surfaces.", 9) == 0)
-        return cfg_fail(rd, CFG_FROM_SET, set->name, "surfaces of a scanner are a list; allowed in the file alone");
+    if (rd->in_scanner && (strncmp(set->path, "surfaces.", 9) == 0 || strncmp(set->path, "surfaces[", 9) == 0))
+        return cfg_fail(rd, CFG_FROM_SET, set->name,
+                        "surfaces of a scanner are set as one list; allowed "
+                        "surfaces=[{...}, ...]");
     if (rd->in_scanner && (section == NULL || section->type != CFG_MAP))
         return cfg_fail_unknown(rd, CFG_FROM_SET, "", 0, set->path);
     if (rd->in_scanner) return cfg_fail_unknown(rd, CFG_FROM_SET, parent, 0, word);
@@ -120,7 +122,31 @@ static int enter_scanner(struct cfg_reader *rd, struct set *set)
     return 0;
 }
 
-void cfg_apply_set(struct cfg_reader *rd, const char *text)
+/* A value of YAML replaces the list or the section; what it doesn't name has its default. */
+static void replace(struct cfg_reader *rd, struct cfg_document *doc, const struct set *set, const struct cfg_key *key,
+                    const char *text, int n_before)
+{
+    static const char not_this[] = "is a section of a scanner; set one of its keys, or the scanner as a whole";
+    if (rd->in_scanner && key->type == CFG_MAP) {
+        cfg_fail(rd, CFG_FROM_SET, set->name, "%s", not_this);
+        return;
+    }
+    if (rd->in_scanner) cfg_take_over(rd, key);
+    cfg_forget(rd, key, set->item);
+    const int is_list = strcmp(key->path, "stations") == 0;
+    if (is_list || strcmp(key->path, "stations[]") == 0 || strcmp(key->path, SCANNER) == 0)
+        for (uint32_t i = is_list ? 0 : set->item; i <= (is_list ? CFG_MAX_ITEMS - 1 : set->item); i++) {
+            doc->scanner[i] = NULL;
+            rd->scanner_since[i] = n_before;
+        }
+    rd->line[cfg_row(rd, key)][set->item] = CFG_FROM_SET;
+    rd->set = set->name;
+    cfg_read_set_value(rd, doc, key, set->item, text);
+    rd->set = NULL;
+}
+
+/* n_before: how many --set came before it. */
+static void apply_set(struct cfg_reader *rd, struct cfg_document *doc, const char *text, int n_before)
 {
     struct set set = {.item = 0};
     const char *equals = strchr(text, '=');
@@ -134,14 +160,19 @@ void cfg_apply_set(struct cfg_reader *rd, const char *text)
         fail_unknown(rd, &set);
         return;
     }
-    if (key->type == CFG_MAP || key->type == CFG_LIST) {
-        cfg_fail(rd, CFG_FROM_SET, set.name, "is %s; set one of its keys",
-                 key->type == CFG_MAP ? "a section" : "a list");
-        return;
-    }
     const struct cfg_key *list = cfg_list_of(&rd->table, key);
     if (list != NULL && reach_item(rd, &set, list) != SH_OK) return;
+    if (key->type == CFG_MAP || key->type == CFG_LIST) {
+        replace(rd, doc, &set, key, equals + 1, n_before);
+        return;
+    }
     if (is_scanners) cfg_take_over(rd, key);
     rd->line[cfg_row(rd, key)][set.item] = CFG_FROM_SET;
     cfg_store(rd, key, set.item, CFG_FROM_SET, equals + 1, "");
+}
+
+void cfg_apply_sets(struct cfg_reader *rd, struct cfg_document *doc, const char *const *sets, int n_sets)
+{
+    for (int i = rd->in_scanner ? rd->scanner_since[rd->scanner] : 0; i < n_sets; i++)
+        apply_set(rd, doc, sets[i], i);
 }

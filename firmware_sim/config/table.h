@@ -80,10 +80,12 @@ struct cfg_reader {
     const struct config_profile *profile;            /* for the limits in errors; NULL: not known */
     unsigned char from[CFG_MAX_ROWS][CFG_MAX_ITEMS]; /* of figures: 1 + enum config_from; 0: not given */
     struct config_faults *faults;
+    const char *set; /* the key of --set whose value is being parsed as YAML; NULL: none */
     /* The scanner of a station (scanner.c): */
-    int scanner;                     /* station, from 0, whose section `scanner` counts; -1: none */
-    int in_scanner;                  /* that section is being read: paths begin there */
-    unsigned char own[CFG_MAX_ROWS]; /* 1: given there, so named so in faults */
+    int scanner;                      /* station, from 0, whose section `scanner` counts; -1: none */
+    int in_scanner;                   /* that section is being read: paths begin there */
+    unsigned char own[CFG_MAX_ROWS];  /* 1: given there, so named so in faults */
+    int scanner_since[CFG_MAX_ITEMS]; /* by station: how many --set come before the section, which one of them gave */
 };
 
 /* ---- reader.c: rows and places */
@@ -111,7 +113,8 @@ const char *cfg_word_below(const char *path, const char *parent);
 
 /* ---- fault.c: what is wrong, and with what. Each call adds a fault to the reader's list and returns its
  * code, SH_EINPUT. Reading goes on after it. */
-/* "FILE:LINE: text", without the line when it is 0. Returns code. */
+/* "FILE:LINE: text", without the line when it is 0; of a value of --set "--set KEY: character LINE of the value: text".
+ * Returns code. */
 int cfg_fail_file(struct cfg_reader *rd, int code, int line, const char *fmt, ...)
     __attribute__((format(printf, 4, 5)));
 /* "FILE:LINE: KEY: text", or "--set KEY: text" when line is CFG_FROM_SET. */
@@ -170,8 +173,12 @@ int cfg_open_text(struct cfg_reader *rd, const unsigned char *bytes, size_t len,
 void cfg_close_file(struct cfg_document *doc);
 /* The section `scanner` of rd->scanner, over what was read. */
 void cfg_read_scanner(struct cfg_reader *rd, struct cfg_document *doc);
-/* Sets of the file's own keys, with in_scanner those of the scanner; the others are passed over. */
-void cfg_apply_set(struct cfg_reader *rd, const char *set);
+/* Sets of the file's own keys, with in_scanner those of the scanner; the others are passed over. doc is that of the
+ * file, which keeps values that are YAML. */
+void cfg_apply_sets(struct cfg_reader *rd, struct cfg_document *doc, const char *const *sets, int n_sets);
+/* A list or a section as YAML, for a key that was forgotten before. */
+void cfg_read_set_value(struct cfg_reader *rd, struct cfg_document *doc, const struct cfg_key *key, uint32_t item,
+                        const char *text);
 /* scanner.c: whether a scanner may have the section, or the key in it ... */
 int cfg_is_of_scanner(const char *path);
 extern const char cfg_sections_of_scanner[];
@@ -181,6 +188,8 @@ void cfg_take_over(struct cfg_reader *rd, const struct cfg_key *key);
 void cfg_end_scanner(struct cfg_reader *rd);
 /* A list is as if nothing had been given. */
 void cfg_forget_list(struct cfg_reader *rd, const char *path);
+/* The same for a list, a section, or an element of a list. */
+void cfg_forget(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item);
 /* Loads for the scanner of a station, from 1; 0: of head.station. Faults are added to those there are. */
 int cfg_load_for(const char *path, const char *const *sets, int n_sets, uint32_t station, struct config *cfg,
                  struct config_faults *faults);

@@ -8,9 +8,16 @@
 struct walk {
     struct cfg_reader *rd;
     yaml_document_t *doc;
-    const yaml_node_t **scanner; /* as above, filled in */
+    struct cfg_document *of;   /* with doc in it */
+    struct cfg_document *main; /* its scanners are filled in */
+    int from_set;
     char base_dir[CONFIG_PATH_LEN];
 };
+
+static int line_of(const struct walk *w, const yaml_node_t *node)
+{
+    return w->from_set ? CFG_FROM_SET : cfg_line_of(w->rd, node->start_mark);
+}
 
 static const char *text_of(const yaml_node_t *node)
 {
@@ -40,7 +47,7 @@ static int has_tag(const yaml_node_t *node)
 static int wrong_kind(const struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
 {
     char allowed[CFG_ALLOWED_MAX];
-    return cfg_fail_value(w->rd, key, item, cfg_line_of(node), "here stands %s; %s", kind_of(node),
+    return cfg_fail_value(w->rd, key, item, line_of(w, node), "here stands %s; %s", kind_of(node),
                           cfg_allowed(key, w->rd->profile, allowed));
 }
 
@@ -57,14 +64,14 @@ static int check_scalar(const struct walk *w, const struct cfg_key *key, uint32_
     if (!is_text && !plain) why = "a text in quotes or of several lines";
     if (has_tag(node)) why = "a value with a tag, which is not supported";
     if (why == NULL) return SH_OK;
-    return cfg_fail_value(w->rd, key, item, cfg_line_of(node), "\"%s\" is %s; %s", cfg_show(text_of(node), shown), why,
+    return cfg_fail_value(w->rd, key, item, line_of(w, node), "\"%s\" is %s; %s", cfg_show(text_of(node), shown), why,
                           cfg_allowed(key, w->rd->profile, allowed));
 }
 
 static void read_scalar(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
 {
     if (check_scalar(w, key, item, node) == SH_OK)
-        cfg_store(w->rd, key, item, cfg_line_of(node), text_of(node), w->base_dir);
+        cfg_store(w->rd, key, item, line_of(w, node), text_of(node), w->base_dir);
 }
 
 static void read_vec3(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
@@ -76,14 +83,14 @@ static void read_vec3(struct walk *w, const struct cfg_key *key, uint32_t item, 
     }
     const yaml_node_item_t *first = node->data.sequence.items.start, *top = node->data.sequence.items.top;
     if (top - first != cfg_axes(key)) {
-        cfg_fail_value(w->rd, key, item, cfg_line_of(node), "has %td numbers instead of %d; %s", top - first,
+        cfg_fail_value(w->rd, key, item, line_of(w, node), "has %td numbers instead of %d; %s", top - first,
                        cfg_axes(key), cfg_allowed(key, w->rd->profile, allowed));
         return;
     }
     for (int axis = 0; axis < cfg_axes(key); axis++) {
         const yaml_node_t *number = yaml_document_get_node(w->doc, first[axis]);
         if (check_scalar(w, key, item, number) == SH_OK)
-            cfg_store_vec3(w->rd, key, item, cfg_line_of(number), axis, text_of(number));
+            cfg_store_vec3(w->rd, key, item, line_of(w, number), axis, text_of(number));
     }
 }
 
@@ -108,7 +115,7 @@ static void refuse_part(struct walk *w, const struct cfg_key *key, uint32_t item
     char allowed[CFG_ALLOWED_MAX] = "a text in one line";
     for (size_t i = 0, used = 0; words != NULL && words[i] != NULL && used < sizeof allowed; i++)
         used += (size_t)snprintf(allowed + used, sizeof allowed - used, "%s%s", i > 0 ? ", " : "", words[i]);
-    cfg_fail_value(w->rd, key, item, cfg_line_of(node), "\"%s\" must say %s; allowed %s", figure_parts[part],
+    cfg_fail_value(w->rd, key, item, line_of(w, node), "\"%s\" must say %s; allowed %s", figure_parts[part],
                    part == FIGURE_FROM         ? "where the figure is from"
                    : part == FIGURE_DEFINITION ? "how the width is defined"
                                                : "it in words",
@@ -152,14 +159,14 @@ static void read_figure(struct walk *w, const struct cfg_key *key, uint32_t item
     static const char form[] = "allowed { value: V, from: data sheet }, or from: quoted, from: assumed";
     int given[FIGURE_PARTS] = {0};
     if (node->type != YAML_MAPPING_NODE) {
-        cfg_fail_value(w->rd, key, item, cfg_line_of(node), "here stands %s; %s", kind_of(node), form);
+        cfg_fail_value(w->rd, key, item, line_of(w, node), "here stands %s; %s", kind_of(node), form);
         return;
     }
     for (const yaml_node_pair_t *pair = node->data.mapping.pairs.start; pair < node->data.mapping.pairs.top; pair++) {
         const yaml_node_t *word = yaml_document_get_node(w->doc, pair->key);
         const int part = word_of(word, figure_parts);
         if (part < 0 || given[part]++ || (part == FIGURE_DEFINITION && key->definitions == NULL)) {
-            cfg_fail_value(w->rd, key, item, cfg_line_of(word),
+            cfg_fail_value(w->rd, key, item, line_of(w, word),
                            "a key that is unknown or given twice; %s, then source, note%s", form,
                            key->definitions != NULL ? ", definition" : "");
             return;
@@ -167,7 +174,7 @@ static void read_figure(struct walk *w, const struct cfg_key *key, uint32_t item
         read_part(w, key, item, (enum figure_part)part, yaml_document_get_node(w->doc, pair->value));
     }
     if (!given[FIGURE_VALUE] || !given[FIGURE_FROM])
-        cfg_fail_value(w->rd, key, item, cfg_line_of(node), "\"%s\" is missing; %s", given[0] ? "from" : "value", form);
+        cfg_fail_value(w->rd, key, item, line_of(w, node), "\"%s\" is missing; %s", given[0] ? "from" : "value", form);
 }
 
 static void read_map(struct walk *w, const yaml_node_t *node, const char *path, uint32_t item);
@@ -182,7 +189,7 @@ static void read_list(struct walk *w, const struct cfg_key *key, const yaml_node
     const yaml_node_item_t *first = node->data.sequence.items.start;
     ptrdiff_t n = node->data.sequence.items.top - first;
     if ((double)n > key->max) {
-        cfg_fail_value(w->rd, key, 0, cfg_line_of(node), "%td elements are too many; %s", n,
+        cfg_fail_value(w->rd, key, 0, line_of(w, node), "%td elements are too many; %s", n,
                        cfg_allowed(key, w->rd->profile, allowed));
         return;
     }
@@ -190,7 +197,7 @@ static void read_list(struct walk *w, const struct cfg_key *key, const yaml_node
     for (uint32_t i = 0; i < (uint32_t)n; i++) {
         const yaml_node_t *child = yaml_document_get_node(w->doc, first[i]);
         *cfg_list_count(w->rd, key) = i + 1;
-        w->rd->line[cfg_row(w->rd, element)][i] = cfg_line_of(child);
+        w->rd->line[cfg_row(w->rd, element)][i] = line_of(w, child);
         if (element->type != CFG_MAP)
             read_scalar(w, element, i, child);
         else if (child->type == YAML_MAPPING_NODE)
@@ -206,13 +213,14 @@ static void keep_scanner(struct walk *w, const struct cfg_key *key, uint32_t ite
     struct config_station *station = cfg_address(w->rd, key, item);
     if (node->type != YAML_MAPPING_NODE) wrong_kind(w, key, item, node);
     station->has_scanner = node->type == YAML_MAPPING_NODE;
-    w->scanner[item] = station->has_scanner ? node : NULL;
+    w->main->scanner[item] = station->has_scanner ? node : NULL;
+    w->main->scanner_of[item] = w->of;
 }
 
 static void read_value(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
 {
     if (node->type != YAML_SCALAR_NODE && has_tag(node)) {
-        cfg_fail_value(w->rd, key, item, cfg_line_of(node), "has a tag; allowed none");
+        cfg_fail_value(w->rd, key, item, line_of(w, node), "has a tag; allowed none");
     } else if (key->flags & CFG_FIGURE) {
         read_figure(w, key, item, node);
     } else if (strcmp(key->path, "stations[].scanner") == 0) {
@@ -242,7 +250,7 @@ static const struct cfg_key *row_below(const struct walk *w, const char *path, c
 static void read_pair(struct walk *w, const yaml_node_t *word, const yaml_node_t *value, const char *path,
                       uint32_t item)
 {
-    const int line = cfg_line_of(word);
+    const int line = line_of(w, word);
     if (word->type != YAML_SCALAR_NODE) {
         cfg_fail(w->rd, line, path[0] != '\0' ? path : "configuration", "a key that is %s; allowed words only",
                  kind_of(word));
@@ -262,7 +270,9 @@ static void read_pair(struct walk *w, const yaml_node_t *word, const yaml_node_t
     if (w->rd->in_scanner) cfg_take_over(w->rd, key);
     int *given = &w->rd->line[cfg_row(w->rd, key)][item];
     if (*given != 0) {
-        cfg_fail_value(w->rd, key, item, line, "given twice, first on line %d; allowed once", *given);
+        char first[32] = "";
+        if (!w->from_set) snprintf(first, sizeof first, ", first on line %d", *given);
+        cfg_fail_value(w->rd, key, item, line, "given twice%s; allowed once", first);
         return;
     }
     *given = line;
@@ -279,10 +289,11 @@ static void read_map(struct walk *w, const yaml_node_t *node, const char *path, 
 
 /* ---- the document */
 
-static void begin_walk(struct walk *w, struct cfg_reader *rd, struct cfg_document *doc)
+/* The document `of` is that of the file, `main`, or a value of --set. */
+static void begin_walk(struct walk *w, struct cfg_reader *rd, struct cfg_document *of, struct cfg_document *main)
 {
-    *w = (struct walk){.rd = rd, .doc = &doc->doc, .scanner = doc->scanner};
-    cfg_dir_of(rd->file, w->base_dir);
+    *w = (struct walk){.rd = rd, .doc = &of->doc, .of = of, .main = main, .from_set = of != main};
+    if (!w->from_set) cfg_dir_of(rd->file, w->base_dir);
 }
 
 int cfg_read_document(struct cfg_reader *rd, struct cfg_document *doc)
@@ -290,20 +301,42 @@ int cfg_read_document(struct cfg_reader *rd, struct cfg_document *doc)
     struct walk w;
     const yaml_node_t *root = yaml_document_get_root_node(&doc->doc);
     if (root == NULL) return cfg_fail_file(rd, SH_EINPUT, 1, "empty; a section with keys is needed");
-    begin_walk(&w, rd, doc);
-    rd->root_line = cfg_line_of(root);
+    begin_walk(&w, rd, doc, doc);
+    rd->root_line = line_of(&w, root);
     if (root->type != YAML_MAPPING_NODE)
-        return cfg_fail_file(rd, SH_EINPUT, cfg_line_of(root), "here stands %s; allowed sections with keys",
+        return cfg_fail_file(rd, SH_EINPUT, line_of(&w, root), "here stands %s; allowed sections with keys",
                              kind_of(root));
     read_map(&w, root, "", 0);
     return SH_OK;
 }
 
+void cfg_read_set_value(struct cfg_reader *rd, struct cfg_document *doc, const struct cfg_key *key, uint32_t item,
+                        const char *text)
+{
+    struct walk w;
+    struct cfg_document *value;
+    char allowed[CFG_ALLOWED_MAX];
+    rd->bad[cfg_row(rd, key)][item] = 1;
+    if (cfg_parse_text(rd, (const unsigned char *)text, strlen(text), &value) != SH_OK) return;
+    value->values = doc->values;
+    doc->values = value;
+    const yaml_node_t *root = yaml_document_get_root_node(&value->doc);
+    if (root == NULL) {
+        cfg_fail_value(rd, key, item, CFG_FROM_SET, "here stands nothing; %s", cfg_allowed(key, rd->profile, allowed));
+        return;
+    }
+    rd->bad[cfg_row(rd, key)][item] = 0;
+    begin_walk(&w, rd, value, doc);
+    read_value(&w, key, item, root);
+}
+
 void cfg_read_scanner(struct cfg_reader *rd, struct cfg_document *doc)
 {
     struct walk w;
-    begin_walk(&w, rd, doc);
+    const yaml_node_t *node = doc->scanner[rd->scanner];
+    if (node == NULL) return;
+    begin_walk(&w, rd, doc->scanner_of[rd->scanner], doc);
     rd->in_scanner = 1;
-    if (doc->scanner[rd->scanner] != NULL) read_map(&w, doc->scanner[rd->scanner], "", 0);
+    read_map(&w, node, "", 0);
     rd->in_scanner = 0;
 }

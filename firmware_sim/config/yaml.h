@@ -8,16 +8,20 @@
 
 struct cfg_document {
     yaml_document_t doc;
-    const yaml_node_t *scanner[CFG_MAX_ITEMS]; /* by station; NULL: it has none */
+    const yaml_node_t *scanner[CFG_MAX_ITEMS];      /* by station; NULL: it has none */
+    struct cfg_document *scanner_of[CFG_MAX_ITEMS]; /* which document has that node: this one, or a value of --set */
+    struct cfg_document *values;                    /* of --set: they live as long as this one */
 };
 
-/* The line of a node, from 1. */
-static inline int cfg_line_of(const yaml_node_t *node)
+/* Where a mark stands: in a file its line, in a value of --set its character; both from 1. */
+static inline int cfg_line_of(const struct cfg_reader *rd, yaml_mark_t mark)
 {
-    return (int)node->start_mark.line + 1;
+    return (int)(rd->set != NULL ? mark.index : mark.line) + 1;
 }
 
 /* All of it by the rows, but the scanners of stations. SH_EINPUT where there is no section. */
 int cfg_read_document(struct cfg_reader *rd, struct cfg_document *doc);
+/* One document of this text, which is not read yet. NULL after an error. */
+int cfg_parse_text(struct cfg_reader *rd, const unsigned char *bytes, size_t len, struct cfg_document **doc);
 
 #endif

@@ -41,14 +41,15 @@ static int indented_by_tab(const unsigned char *bytes, size_t len, int line)
 /* libyaml gives a mark for what it scans and parses, and a byte offset for bytes that are not UTF-8. */
 static int fail_syntax(struct cfg_reader *rd, const yaml_parser_t *parser, const unsigned char *bytes, size_t len)
 {
-    int line = (int)parser->problem_mark.line + 1;
+    int line = cfg_line_of(rd, parser->problem_mark);
     if (parser->error == YAML_MEMORY_ERROR) return cfg_fail_file(rd, SH_ENOMEM, 0, "no memory to parse it");
     if (parser->error == YAML_READER_ERROR) {
         line = 1;
         for (size_t i = 0; i < parser->problem_offset && i < len; i++)
-            line += bytes[i] == '\n';
+            line += rd->set != NULL || bytes[i] == '\n';
     }
-    const char *hint = indented_by_tab(bytes, len, line) ? "; indent with spaces, not with tabs" : "";
+    const char *hint =
+        rd->set == NULL && indented_by_tab(bytes, len, line) ? "; indent with spaces, not with tabs" : "";
     if (parser->error == YAML_READER_ERROR) hint = "; allowed UTF-8 text without control characters";
     return cfg_fail_file(rd, SH_EINPUT, line, "not YAML: %s%s%s%s",
                          parser->problem != NULL ? parser->problem : "unknown problem",
@@ -75,7 +76,7 @@ static int check_depth(struct cfg_reader *rd, const unsigned char *bytes, size_t
     int code = start_parser(rd, &parser, bytes, len);
     if (code != SH_OK) return code;
     while (code == SH_OK && !done && yaml_parser_parse(&parser, &event)) {
-        int line = (int)event.start_mark.line + 1;
+        int line = cfg_line_of(rd, event.start_mark);
         done = event.type == YAML_STREAM_END_EVENT;
         depth += event.type == YAML_SEQUENCE_START_EVENT || event.type == YAML_MAPPING_START_EVENT;
         depth -= event.type == YAML_SEQUENCE_END_EVENT || event.type == YAML_MAPPING_END_EVENT;
@@ -94,15 +95,17 @@ static int check_depth(struct cfg_reader *rd, const unsigned char *bytes, size_t
 
 void cfg_close_file(struct cfg_document *doc)
 {
-    if (doc == NULL) return;
-    yaml_document_delete(&doc->doc);
-    free(doc);
+    while (doc != NULL) {
+        struct cfg_document *next = doc->values;
+        yaml_document_delete(&doc->doc);
+        free(doc);
+        doc = next;
+    }
 }
 
-static int read_documents(struct cfg_reader *rd, yaml_parser_t *parser, const unsigned char *bytes, size_t len,
-                          struct cfg_document **out)
+static int parse_one(struct cfg_reader *rd, yaml_parser_t *parser, const unsigned char *bytes, size_t len,
+                     struct cfg_document **out)
 {
-    yaml_document_t next;
     struct cfg_document *doc = calloc(1, sizeof *doc);
     if (doc == NULL) return cfg_fail_file(rd, SH_ENOMEM, 0, "no memory to parse it");
     if (!yaml_parser_load(parser, &doc->doc)) {
@@ -110,28 +113,48 @@ static int read_documents(struct cfg_reader *rd, yaml_parser_t *parser, const un
         return fail_syntax(rd, parser, bytes, len);
     }
     *out = doc;
-    int code = cfg_read_document(rd, doc);
-    if (code != SH_OK) return code;
+    return SH_OK;
+}
+
+static int check_end(struct cfg_reader *rd, yaml_parser_t *parser, const unsigned char *bytes, size_t len)
+{
+    yaml_document_t next;
+    int code = SH_OK;
     if (!yaml_parser_load(parser, &next)) return fail_syntax(rd, parser, bytes, len);
     const yaml_node_t *more = yaml_document_get_root_node(&next);
-    if (more != NULL) code = cfg_fail_file(rd, SH_EINPUT, cfg_line_of(more), "a second document; allowed one");
+    if (more != NULL)
+        code = cfg_fail_file(rd, SH_EINPUT, cfg_line_of(rd, more->start_mark), "a second document; allowed one");
     yaml_document_delete(&next);
     return code;
 }
 
-int cfg_open_text(struct cfg_reader *rd, const unsigned char *bytes, size_t len, struct cfg_document **doc)
+/* Faults of the document, which `read` finds, come before those of what stands after it. */
+static int open_text(struct cfg_reader *rd, const unsigned char *bytes, size_t len,
+                     int (*read)(struct cfg_reader *rd, struct cfg_document *doc), struct cfg_document **doc)
 {
     yaml_parser_t parser;
     *doc = NULL;
     int code = check_depth(rd, bytes, len);
     if (code == SH_OK) code = start_parser(rd, &parser, bytes, len);
     if (code != SH_OK) return code;
-    code = read_documents(rd, &parser, bytes, len, doc);
+    code = parse_one(rd, &parser, bytes, len, doc);
+    if (code == SH_OK && read != NULL) code = read(rd, *doc);
+    if (code == SH_OK) code = check_end(rd, &parser, bytes, len);
     yaml_parser_delete(&parser);
     if (code == SH_OK) return code;
     cfg_close_file(*doc);
     *doc = NULL;
     return code;
+}
+
+int cfg_open_text(struct cfg_reader *rd, const unsigned char *bytes, size_t len, struct cfg_document **doc)
+{
+    return open_text(rd, bytes, len, cfg_read_document, doc);
+}
+
+int cfg_parse_text(struct cfg_reader *rd, const unsigned char *bytes, size_t len, struct cfg_document **doc)
+{
+    return open_text(rd, bytes, len, NULL, doc);
 }
 
 int cfg_open_file(struct cfg_reader *rd, struct cfg_document **doc)

@@ -21,7 +21,7 @@ struct site_leg {
 
 /* A station's tripod, once its height above the ground is known (tripod.c). */
 struct site_tripod {
-    const struct config_tripod *from; /* NULL: none */
+    const struct config_tripod *from; /* NULL: none, or the station has another scanner */
     double head_m;      /* the head's origin above the ground, along the plumb line; NaN: no ground below */
     double height_m;    /* the tripod's top, likewise */
     double opening_rad; /* of a leg, from the vertical */

@@ -230,8 +230,8 @@ int site_set_up_tripods(struct site *site, const struct sh_report *report, struc
     int rc = SH_OK;
     for (uint32_t i = 0; i < site->n_stations && rc == SH_OK; i++) {
         struct site_station *s = &site->station[i];
-        s->tripod.from = given(site, i);
-        if (s->tripod.from == NULL || !config_serves(site->cfg, i)) continue;
+        if (config_serves(site->cfg, i)) s->tripod.from = given(site, i);
+        if (s->tripod.from == NULL) continue;
         if (work == NULL) rc = bvh_work_create(&work, err);
         if (rc == SH_OK) rc = set_up(site, s, i, work, report, err);
         if (rc == SH_OK) rc = sh_check_stop(report, err);

@@ -34,6 +34,8 @@ static void test_values(void **state)
     assert_string_equal(values("p=[0,0,1],[0, 1, 2.5]"), "(p=[0,0,1])(p=[0, 1, 2.5])");
     assert_string_equal(values("p={a: [1,2], b: 3},x"), "(p={a: [1,2], b: 3})(p=x)");
     assert_string_equal(values("n=\"a,b\",'c,d'"), "(n=\"a,b\")(n='c,d')");
+    assert_string_equal(values("links=[{type: tcp, port: 0}, {type: \"null\"}],[]"),
+                        "(links=[{type: tcp, port: 0}, {type: \"null\"}])(links=[])");
     assert_string_equal(values("a=b=c,d"), "(a=b=c)(a=d)");
     assert_string_equal(values("t=00:10"), "(t=00:10)"); /* no range: two numbers */
     assert_string_equal(values("t=2026-01-01T00:00:00Z"), "(t=2026-01-01T00:00:00Z)");

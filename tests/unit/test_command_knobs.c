@@ -289,9 +289,32 @@ static void limits_are_those_that_hold(void **ctx)
     assert_int_equal(n, settings);
 }
 
+/* Each member of the settings has a row, and HELP:SETtings? lists each row that has one. A step is that of SCAN:STEP. */
+static void every_setting_is_listed(void **ctx)
+{
+    (void)ctx;
+    struct command_device dev = command_test_device();
+    unsigned char has[sizeof(struct head_settings)] = {0};
+    char listed[sizeof result.reply + 2], word[64];
+    const size_t gap = offsetof(struct head_settings, angle_noise) + sizeof dev.settings.angle_noise; /* no member */
+    memset(has + gap, 1, offsetof(struct head_settings, range_min_nm) - gap);
+    memset(has + offsetof(struct head_settings, step_udeg), 1, sizeof dev.settings.step_udeg);
+    command_execute(&dev, 1, "HELP:SET?", &result);
+    snprintf(listed, sizeof listed, " %s ", result.reply);
+    for (const struct command_row *row = command_rows; row->header != NULL; row++) {
+        if (row->setting == NULL) continue;
+        snprintf(word, sizeof word, " %s ", row->header);
+        if (strstr(listed, word) == NULL) fail_msg("%s is not listed", row->header);
+        if (row->setting->derived == NULL) memset(has + row->setting->offset, 1, row->setting->is_u32 ? 4 : 8);
+    }
+    for (size_t i = 0; i < sizeof has; i++)
+        if (!has[i]) fail_msg("no command has the setting at byte %zu of struct head_settings", i);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_setting_is_listed),
         cmocka_unit_test(ranges_keep_apart),
         cmocka_unit_test(noise_has_kinds_and_sizes),
         cmocka_unit_test(what_is_planned_rests_in_a_scan),

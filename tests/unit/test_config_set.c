@@ -53,9 +53,28 @@ static void set_refuses(void **state)
         {"head.prr_hz=30 kHz", "head.prr_hz", "not a number"},
         {"head.prr_hz=", "head.prr_hz", "not a number"},
         {"head.prr_hz=5e6", "head.prr_hz", "allowed 100000 to 1200000 Hz"},
-        {"head=5", "head", "is a section"},
-        {"links=[]", "links", "is a list"},
-        {"links[0]=tcp", "links[0]", "is a section"},
+        {"head=5", "head", "here stands a single value; allowed a section with keys"},
+        {"links[0]=tcp", "links[0]", "here stands a single value; allowed a section with keys"},
+        {"links=tcp", "links", "here stands a single value; allowed a list of 0 to 8"},
+        {"links=", "links", "here stands nothing; allowed a list of 0 to 8"},
+        {"head=[1]", "head", "here stands a list"},
+        {"links=[{type: nul}]", "links[0].type", "\"nul\" is not known; allowed null, file"},
+        {"links=[{type: \"null\"}, {typ: tcp}]", "links[1].typ", "did you mean links[1].type?"},
+        {"links.1={type: tcp, type: tcp}", "links[1].type", "given twice; allowed once"},
+        {"links.2=[]", "links.2", "allowed indices 0 to 1"},
+        {"links=[{type: tcp}", "links", "character 13 of the value: not YAML: "},
+        {"links=[] []", "links", "character 4 of the value: not YAML: "},
+        {"links=--- []\n--- []", "links", "character 12 of the value: a second document; allowed one"},
+        {"links=[[[[[[[[[[[[[[[[[", "links", "character 17 of the value: nested too deep; allowed 16 levels"},
+        {"links=[\xff]", "links", "character 2 of the value: not YAML: "},
+        {"links=!x []", "links", "has a tag"},
+        {"noise={ball: {radius_m: x}}", "noise.ball.radius_m", "not a number"},
+        {"head={prr_hz: 300000}", "head.profile", "missing"},
+        {"stations=[]", "stations", "missing"},
+        {"stations[0].scanner=1", "stations[0].scanner", "here stands a single value"},
+        {"stations[0].scanner={links: []}", "stations[0].scanner.links", "the same for all scanners"},
+        {"stations[0].scanner.noise={}", "stations[0].scanner.noise", "is a section of a scanner; set one of its keys"},
+        {"stations[0].scanner.surfaces.0.gloss=1", "stations[0].scanner.surfaces.0.gloss", "are set as one list"},
         {"stations[2].heading_deg=0", "stations[2].heading_deg", "allowed indices 0 to 1, the last appends one"},
         {"links[99999999999999999999].type=tcp", "links[99999999999999999999].type", "allowed indices 0 to 1"},
         {"links[-1].type=tcp", "links[-1].type", "unknown key"},
@@ -87,6 +106,76 @@ static void set_refuses(void **state)
         assert_says(wrong[i].fragment);
         assert_says(wrong[i].key);
     }
+}
+
+/* A list or a section as YAML replaces what the file has, and what a --set before it has set; what comes after it
+ * changes it. */
+static void yaml_replaces(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {
+        "links.1.type=file",
+        "links=[{type: \"null\"}, {type: tcp, port: 0},\n {type: file, path: out.bin}]",
+        "links.1.port=7",
+        "noise.sigma_m=0.5",
+        "noise.range=on",
+        "noise={angle: off, ball: {radius_m: 0.25}}",
+        "noise.ball.radius_m=0.125",
+        "stations.0.name=gone",
+        "stations.0={position_m: [4, 5, 6], tripod: {leg_m: 1.5}}",
+        "stations.1={position_m: [7, 8, 9], name: new}",
+        "scene.target.objects=[a, 'b, c']",
+    };
+    write_file(config_path, base, strlen(base));
+    assert_loads(load_sets(sets, sizeof sets / sizeof sets[0]));
+    assert_int_equal(cfg->n_links, 3);
+    assert_int_equal(cfg->link[0].type, LINK_NULL);
+    assert_int_equal(cfg->link[1].port, 7);
+    assert_string_equal(cfg->link[2].path, "out.bin"); /* of the working directory */
+    assert_int_equal(cfg->noise.range, 0);
+    assert_true(cfg->noise.sigma_m == cfg->profile.range_sigma_m && cfg->noise.ball.radius_m == 0.125);
+    assert_int_equal(cfg->n_stations, 2);
+    assert_string_equal(cfg->station[0].name, "station-1");
+    assert_true(cfg->station[0].position_m[0] == 4 && cfg->station[0].tripod.leg_m == 1.5);
+    assert_string_equal(cfg->station[1].name, "new");
+    assert_int_equal(cfg->scene.target.n_objects, 2);
+    assert_string_equal(cfg->scene.target.object[1], "b, c");
+    assert_loads(load_set("links=[]"));
+    assert_int_equal(cfg->n_links, 0);
+}
+
+/* The sections `scanner` go with the stations that have them. */
+static void yaml_replaces_scanners(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *set[4];
+        int64_t prr_hz; /* of station 2 */
+        uint32_t n_surfaces;
+    } is[] = {
+        {{"stations.1.scanner.head.lines_hz=50"}, 200000, 1},
+        {{"stations.1.scanner.head.prr_hz=150000", "stations.1.scanner={noise: {range: on}}"}, 500000, 0},
+        {{"stations.1.scanner={noise: {range: on}}", "stations.1.scanner.head.prr_hz=150000"}, 150000, 0},
+        {{"stations.1.scanner.surfaces=[{object: b, reflectance: 0.5}, {object: c, reflectance: 0.5}]"}, 200000, 2},
+        {{"stations.1={position_m: [1, 1, 1]}"}, 500000, 0},
+        {{"stations=[{position_m: [0, 0, 1]}, {position_m: [1, 1, 1], scanner: {head: {prr_hz: 250000}}}]"}, 250000, 0},
+    };
+    char *text = edited("    heading_deg: 90\n",
+                        "    heading_deg: 90\n"
+                        "  - {position_m: [3, 2, 1], scanner: {head: {prr_hz: 200000}, surfaces: [{object: a, "
+                        "reflectance: 0.5}]}}\n");
+    write_file(config_path, text, strlen(text));
+    free(text);
+    for (size_t i = 0; i < sizeof is / sizeof is[0]; i++) {
+        const char *sets[4] = {"head.station=2"};
+        int n = 1;
+        for (int k = 0; k < 3 && is[i].set[k] != NULL; k++)
+            sets[n++] = is[i].set[k];
+        assert_loads(load_sets(sets, n));
+        if (cfg->head.settings.prr_uhz != is[i].prr_hz * 1000000) fail_msg("set %zu: another pulse rate", i);
+        if (cfg->n_surfaces != is[i].n_surfaces) fail_msg("set %zu: %u surfaces", i, cfg->n_surfaces);
+    }
+    write_file(config_path, base, strlen(base));
 }
 
 static void a_full_list_takes_no_more(void **state)
@@ -174,6 +263,8 @@ int main(void)
         cmocka_unit_test(set_changes_values),
         cmocka_unit_test(set_appends_elements),
         cmocka_unit_test(set_refuses),
+        cmocka_unit_test(yaml_replaces),
+        cmocka_unit_test(yaml_replaces_scanners),
         cmocka_unit_test(tolerances_follow_the_plan),
         cmocka_unit_test(settings_become_lengths),
         cmocka_unit_test(stations_take_the_grid_of_the_anchor),

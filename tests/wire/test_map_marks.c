@@ -66,6 +66,37 @@ static void test_marks(void **state)
     free(svg);
 }
 
+/* A tripod stands on the room's floor, whichever scanner its station has; the plan says nothing of another scanner's. */
+static void test_heights(void **state)
+{
+    struct wire *wire = *state;
+    for (int here = 1; here <= 2; here++) {
+        char station[32], title[96], config[352];
+        snprintf(station, sizeof station, "head.station=%d", here);
+        const char *const sets[] = {"--set", "stations.0.tripod.leg_m=4",
+                                    "--set", "stations.1.tripod.leg_m=4",
+                                    "--set", "stations.1.position_m=-1,1.25,0.5",
+                                    "--set", "stations.1.scanner.head.lines_hz=50",
+                                    "--set", station,
+                                    NULL};
+        char *svg = draw(wire, sets, "map.svg", 0);
+        for (int i = 0; i < 2; i++) {
+            snprintf(title, sizeof title, "<title>%s, %.2f m above the ground<", i == 0 ? "first" : "second",
+                     (i == 0 ? 1.0 : 0.5) - ROOM_MIN[2]);
+            if (strstr(svg, title) == NULL) fail_msg("head of station %d: there is no %s", here, title);
+        }
+        free(svg);
+        const char *plan[WIRE_MAX_ARGS] = {"plan", config};
+        snprintf(config, sizeof config, "%s", wire_path(wire, "config.yaml"));
+        memcpy(plan + 2, sets, sizeof sets);
+        assert_int_equal(wire_wait(wire, wire_spawn(wire, plan, "out", "err", -1)), 0);
+        char *says = wire_read(wire_path(wire, "out"), NULL);
+        snprintf(title, sizeof title, "legs of 4 m, top %g m above the ground", (here == 1 ? 1.0 : 0.5) - ROOM_MIN[2]);
+        if (strstr(says, title) == NULL || strstr(says, "top 0 m") != NULL) fail_msg("no %s: %s", title, says);
+        free(says);
+    }
+}
+
 /* The room ends between z = ROOM_MIN[2] and ROOM_MAX[2]: above or below all of it no point is left. */
 static void test_cuts(void **state)
 {
@@ -86,6 +117,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_marks, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_heights, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_cuts, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

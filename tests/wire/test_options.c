@@ -98,6 +98,8 @@ static const struct {
     {{"batch", "CONFIG", "-o", "DIR/d", "--sweep", "noise.seed=1,[2"}, {"without its other half"}},
     {{"batch", "CONFIG", "-o", "DIR/d", "--sweep", "noise.seed=1:0:1"}, {"no value from FIRST to LAST"}},
     {{"batch", "CONFIG", "-o", "DIR/d", "--sweep=noise.seed=1", "--set", "noise.seed=2"}, {"in --set and in --sweep"}},
+    {{"batch", "CONFIG", "-o", "DIR/d", "--sweep=noise={},{range: on}", "--set", "noise.seed=2"}, {"would be lost"}},
+    {{"batch", "CONFIG", "-o", "DIR/d", "--sweep=noise.seed=1,2", "--sweep=noise={}"}, {"allowed before that"}},
     {{"batch", "CONFIG", "-o", "DIR/d", "--stations", "3-1"}, {"--stations 3-1", "as in 1,3-5"}},
     {{"batch", "CONFIG", "-o", "DIR/d", "--shard", "3/2"}, {"--shard 3/2", "1/N to N/N"}},
     {{"batch", "CONFIG", "-o", "DIR/d", "--format", "ply,xyz"}, {".xyz", ".ply"}},

@@ -115,6 +115,30 @@ static void noise_free_scans_hold_the_bound(void **state)
     }
 }
 
+/* In the text, with a second station that has no points. */
+static void verdict_is_said_once(struct wire *wire, const char *name, const char *const *sets)
+{
+    static const char verdict[] = "Within the expected error";
+    char config[256], cloud[256];
+    prepare(wire, config);
+    snprintf(cloud, sizeof cloud, "%s", wire_path(wire, name));
+    const char *const args[] = {"report",
+                                config,
+                                cloud,
+                                "--tolerance-m",
+                                "1",
+                                "--set",
+                                "stations.1.position_m=0,0,0.1",
+                                "--set",
+                                "stations.1.name=empty",
+                                NULL};
+    if (run(wire, "out", args, sets) != 0) wire_show(wire, "err");
+    char *text = wire_read(wire_path(wire, "out"), NULL), *first = strstr(text, verdict);
+    assert_non_null(first);
+    assert_null(strstr(first + 1, verdict));
+    free(text);
+}
+
 /* The RMS of n normal deviations scatters by 1 / sqrt(2 n) of itself; six times that is exceeded once in 5e8 runs, and
  * the seed is fixed. full-sweep's sigma is 3 mm. */
 static void a_noisy_scan_deviates_by_its_noise(void **state)
@@ -130,7 +154,16 @@ static void a_noisy_scan_deviates_by_its_noise(void **state)
     assert_true(n > 10000.0);
     if (fabs(rms_m / 0.003 - 1.0) > 6.0 / sqrt(2.0 * n)) fail_msg("RMS %g m", rms_m);
     assert_true(fabs(number(json, "\"all\"", "expected_rms_m") / 0.003 - 1.0) < 1e-4); /* counts add 1e-5 m */
+    /* Figures stand in the text with four decimals, and the only station is judged as the whole. */
+    const double least = number(json, "\"verdict\"", "least_rms_sigmas"),
+                 most = number(json, "\"verdict\"", "most_rms_sigmas");
+    char allowed[64];
+    snprintf(allowed, sizeof allowed, "allowed %.4f to %.4f;", least, most);
+    if (strstr(json, allowed) == NULL) fail_msg("not in the text: %s", allowed);
+    assert_true(least > 0.9 && least < 1.0 && most > 1.0);
+    assert_true(number(json, "\"stations\"", "least_rms_sigmas") == least);
     free(json);
+    verdict_is_said_once(wire, "noisy.ply", on);
     /* The same cloud is not what a head without noise would record. */
     json = report(wire, "noisy.ply", off);
     must_say(json, "beyond");

@@ -313,6 +313,46 @@ static void test_wrong_at_the_end(void **state)
     assert_int_not_equal(access(ply, F_OK), 0);
 }
 
+static unsigned times_said(struct wire *wire, const char *text)
+{
+    unsigned n = 0;
+    char *err = wire_read(wire_path(wire, "err"), NULL);
+    for (const char *at = err; (at = strstr(at, text)) != NULL; at++)
+        n++;
+    free(err);
+    return n;
+}
+
+/* What several scanners warn of is one warning, with their stations; what all warn of is the first one's. A step of 7 deg
+ * divides no turn. */
+static void test_warnings_are_said_once(void **state)
+{
+    struct wire *wire = *state;
+    static const char step[] = "head.step_deg: 7 deg does not divide", fills[] = "output.attributes: on, but";
+    static const char *const sets[] = {
+        "--set",     "head={profile: sphere, step_deg: 6}",
+        "--set",     "stations.0.scanner={head: {profile: sphere, step_deg: 7}}",
+        "--set",     "stations.1.scanner={head: {profile: sphere, step_deg: 7, range_max_m: 20}}",
+        "--set",     "stations.3={position_m: [0, 0, 0.2]}",
+        "--set",     "head.station=4",
+        "--set",     "output.attributes=on",
+        "--station", "all",
+        NULL};
+    char config[352];
+    begin(wire);
+    assert_int_equal(record(wire, "all.ply", sets), 0);
+    assert_int_equal(times_said(wire, step), 1);
+    assert_int_equal(times_said(wire, "scanners of stations 1, 2: "), 1);
+    assert_int_equal(times_said(wire, fills), 1);
+    snprintf(config, sizeof config, "%s", wire_path(wire, "config.yaml"));
+    const char *words[MOST_ARGS] = {"check", config};
+    memcpy(words + 2, sets, 12 * sizeof *sets);
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, words, "out", "err", -1)), 0);
+    assert_int_equal(times_said(wire, step), 1);
+    assert_int_equal(times_said(wire, "scanners of stations 1, 2: "), 1);
+    assert_int_equal(times_said(wire, fills), 1);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -322,6 +362,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_range_limit, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_target, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_wrong_at_the_end, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_warnings_are_said_once, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

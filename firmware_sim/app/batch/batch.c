@@ -47,9 +47,10 @@ static int check_option(const struct batch *b, const char *key)
         int given = strcmp(by[i][1], "--threads") == 0 && b->threads != NULL;
         for (int k = 0; k < b->options.n_names; k++)
             given |= strcmp(b->options.name[k], by[i][1]) == 0;
-        if (given && strcmp(key, by[i][0]) == 0)
-            return app_usage(&app_batch, "%s is in --sweep, and %s sets it, too; allowed is one of them", key,
-                             by[i][1]);
+        const char *after = batch_after_key(by[i][0], key);
+        if (given && after != NULL && (*after == '\0' || *after == '.'))
+            return app_usage(&app_batch, "%s is in --sweep, and %s sets %s, too; allowed is one of them", key, by[i][1],
+                             *after == '\0' ? "it" : by[i][0]);
     }
     return APP_OK;
 }
@@ -68,6 +69,9 @@ static int check_together(const struct batch *b)
             const char *after = batch_after_key(b->in.sets.set[i], key);
             if (after != NULL && *after == '=')
                 return app_usage(&app_batch, "%s is in --set and in --sweep; allowed is one of them", key);
+            if (after != NULL && (*after == '.' || *after == '['))
+                return app_usage(&app_batch, "--set %s would be lost: --sweep %s replaces it; allowed is one of them",
+                                 b->in.sets.set[i], key);
         }
     }
     return APP_OK;

@@ -132,6 +132,10 @@ int batch_sweeps_add(struct batch_sweeps *sweeps, const char *text, struct sh_er
         if (after != NULL && *after == '\0')
             return sh_fail(err, SH_EINPUT, "--sweep %s: the key is given twice; allowed once, with all its values",
                            s->key);
+        after = batch_after_key(sweeps->sweep[i].key, s->key);
+        if (after != NULL && (*after == '.' || *after == '['))
+            return sh_fail(err, SH_EINPUT, "--sweep %s: it would replace the values of --sweep %s; allowed before that",
+                           s->key, sweeps->sweep[i].key);
     }
     return is_range(equals + 1, range) ? add_range(s, equals + 1, range, err) : add_list(s, equals + 1, err);
 }

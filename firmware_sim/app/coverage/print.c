@@ -61,9 +61,10 @@ static void print_labels(const struct coverage_result *r)
     for (uint32_t i = 0; i < n; i++) {
         const struct coverage_of_label *l = &r->label[order[i]];
         const struct scene_surface *s = &r->site->scene->surface[order[i]];
-        printf("%12.3f %12.3f %8.3f %12.4g  %s | %s\n", l->area_m2, l->area_m2 - l->seen_m2,
-               coverage_percent(l->seen_m2, l->area_m2), l->seen_m2 > 0.0 ? (double)l->pulses / l->seen_m2 : 0.0,
-               s->object, s->material);
+        char density[32] = "-";
+        if (l->seen_m2 > 0.0) snprintf(density, sizeof density, "%.4g", (double)l->pulses / l->seen_m2);
+        printf("%12.3f %12.3f %8.3f %12s  %s | %s\n", l->area_m2, l->area_m2 - l->seen_m2,
+               coverage_percent(l->seen_m2, l->area_m2), density, s->object, s->material);
     }
     free(order);
 }

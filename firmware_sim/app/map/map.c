@@ -23,6 +23,7 @@ struct map_run {
     struct map_view_plan plan;
     struct map *map;
     struct heads heads;
+    uint32_t marked; /* stations that are in the map */
     /* 1: a scene in ECEF, drawn in east, north, up of station 1. 0: drawn along the axes of the scene. */
     int turned;
     double origin_m[3], to_enu[9];
@@ -54,12 +55,6 @@ static int add_frame(void *ctx, struct scanhead *sh, const struct scanhead_frame
         first += (uint32_t)n;
     }
     return SH_OK;
-}
-
-static int prepare(void *ctx, uint32_t station, struct sh_err *err)
-{
-    struct map_run *run = ctx;
-    return heads_prepare(&run->heads, station, err);
 }
 
 static void include(struct map_spec *spec, const double p[3])
@@ -104,6 +99,16 @@ static int add_station(struct map_run *run, const struct site_station *station, 
     return map_add_station(run->map, &mark, err);
 }
 
+/* Only the site of a station's own scanner knows how high its head is. */
+static int prepare(void *ctx, uint32_t station, struct sh_err *err)
+{
+    struct map_run *run = ctx;
+    int rc = heads_prepare(&run->heads, station, err);
+    for (; rc == SH_OK && run->marked < station; run->marked++)
+        rc = add_station(run, &heads_site(&run->heads)->station[run->marked], err);
+    return rc;
+}
+
 static int create_map(struct map_run *run, const struct site *site, struct sh_err *err)
 {
     const struct scene *scene = site->scene;
@@ -128,10 +133,7 @@ static int create_map(struct map_run *run, const struct site *site, struct sh_er
         spec.min_m[i] -= 0.03 * span_m;
         spec.max_m[i] += 0.03 * span_m;
     }
-    rc = map_create(&spec, &run->map, err);
-    for (uint32_t s = 0; s < site->n_stations && rc == SH_OK; s++)
-        rc = add_station(run, &site->station[s], err);
-    return rc;
+    return map_create(&spec, &run->map, err);
 }
 
 static int write_map(struct map_run *run, uint32_t n_stations, struct sh_err *err)

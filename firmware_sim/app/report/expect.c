@@ -64,7 +64,7 @@ static void judge_all(struct report *r)
     if (n_with_points == 0)
         say(all, REPORT_NONE, "Not judged: there are no points.");
     else if (n_with_points == 1)
-        say(all, only->judgement, only->text);
+        *all = *only;
     else if (all->judgement == REPORT_WITHIN)
         snprintf(all->text, sizeof all->text, "Within the expected error, at all %u stations.", n_with_points);
     else

@@ -60,8 +60,9 @@ static void put_verdict(struct json *json, const struct report_verdict *v)
     json_uint(json, "judged", v->judged);
     json_uint(json, "beyond", v->beyond);
     json_double(json, "bound_m", v->bound_m);
-    json_double(json, "least_rms_sigmas", v->least_ratio);
-    json_double(json, "most_rms_sigmas", v->most_ratio);
+    const int by_sigma = v->most_ratio > 0.0;
+    json_double(json, "least_rms_sigmas", by_sigma ? v->least_ratio : (double)NAN);
+    json_double(json, "most_rms_sigmas", by_sigma ? v->most_ratio : (double)NAN);
     json_close_object(json);
 }
 

@@ -2,6 +2,7 @@
 #include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "firmware_sim/app/report/report.h"
 #include "firmware_sim/app/report/page.h"
@@ -87,12 +88,13 @@ void report_put_stations(FILE *out, const struct report *r)
         fputs("</tr>\n", out);
     }
     end_table(out);
-    for (uint32_t s = 0; s < r->site->n_stations && r->site->n_stations > 1; s++) {
-        if (r->f.station[s].figures.points == 0) continue;
+    for (uint32_t s = 0; s < r->site->n_stations; s++) {
+        const char *verdict = r->f.station[s].verdict.text;
+        if (r->f.station[s].figures.points == 0 || strcmp(verdict, r->f.verdict.text) == 0) continue;
         fprintf(out, "<p>Station %" PRIu32 ", ", s + 1);
         page_text(out, r->site->station[s].station->name);
         fputs(". ", out);
-        page_text(out, r->f.station[s].verdict.text);
+        page_text(out, verdict);
         fputs("</p>\n", out);
     }
 }

@@ -168,10 +168,10 @@ static void print_time(const struct report *r)
     for (uint32_t s = 0; s < r->site->n_stations && r->cloud.time_s != NULL; s++) {
         const struct figures_times *t = &r->f.station[s].times;
         if (t->points == 0) continue;
-        printf("%-10s station %" PRIu32
-               ": %.6g s, %.6g points/s; %zu pauses over %.3g s, the longest %.3g s at %.6f s\n",
-               "time", s + 1, t->span_s, t->span_s > 0.0 ? (double)t->points / t->span_s : 0.0, t->gaps,
-               r->f.station[s].gap_s, t->longest_s, t->longest_at_s);
+        char rate[32] = "-";
+        if (t->span_s > 0.0) snprintf(rate, sizeof rate, "%.6g", (double)t->points / t->span_s);
+        printf("%-10s station %" PRIu32 ": %.6g s, %s points/s; %zu pauses over %.3g s, the longest %.3g s at %.6f s\n",
+               "time", s + 1, t->span_s, rate, t->gaps, r->f.station[s].gap_s, t->longest_s, t->longest_at_s);
     }
     if (!r->f.has_echoes) return;
     printf("%-10s", "echoes");
@@ -192,8 +192,8 @@ void report_print_text(const struct report *r)
     print_time(r);
     print_tables(r);
     printf("\n%s\n", f->verdict.text);
-    for (uint32_t s = 0; s < r->site->n_stations && r->site->n_stations > 1; s++)
-        if (f->station[s].figures.points > 0)
+    for (uint32_t s = 0; s < r->site->n_stations; s++)
+        if (f->station[s].figures.points > 0 && strcmp(f->station[s].verdict.text, f->verdict.text) != 0)
             printf("station %" PRIu32 " %s: %s\n", s + 1, r->site->station[s].station->name,
                    f->station[s].verdict.text);
 }

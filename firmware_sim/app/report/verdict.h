@@ -13,7 +13,7 @@ struct report_verdict {
     enum report_judgement judgement;
     size_t judged, beyond;          /* points; of these, farther than their bound where there is one */
     double bound_m;                 /* the largest bound of its points; INFINITY: noise without a bound */
-    double least_ratio, most_ratio; /* of the RMS deviation over sigma; 0 where the bound decides */
+    double least_ratio, most_ratio; /* of the RMS deviation over sigma; 0 where something else decides */
     char text[400];                 /* one sentence or two, in plain words */
 };
 

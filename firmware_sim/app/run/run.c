@@ -172,7 +172,8 @@ static const struct app_option OPTIONS[] = {
      .help = "realtime, fast (as fast as it computes), step (a peer grants time with TIME:STEP)"},
     {APP_NUMBER, "duration", "S", .min = 0.001, .max = 1e8, .at = AT(device.duration_s),
      .help = "end after S seconds of device time; they count from power-up, with --start from the scan's start. With "
-             "--start the scan goes on until then, frame after frame, whatever the file has as head.frames"},
+             "--start the scan goes on until then, frame after frame, whatever the file has as head.frames. Without "
+             "--duration and --frames the head runs until it is stopped"},
     {APP_KEY_GIVEN, "frames", "N", .key = "head.frames", .at = AT(device.one_scan),
      .help = "frames per scan; with --start, end after the first scan, even before --duration"},
     {APP_KEY, "threads", "N", .key = "loop.threads", .help = "threads that cast; 0: one per processor"},

@@ -1,0 +1,75 @@
+#include "firmware_sim/app/scanner_report.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static void warn(void *ctx, const char *text)
+{
+    const struct scanner_report *r = ctx;
+    struct scanner_warnings *w = r->warnings;
+    uint32_t i = 0;
+    while (i < w->n && strcmp(w->one[i].text, text) != 0)
+        i++;
+    if (i < w->n && w->are_said) return;
+    if (i == w->n && (w->are_said || w->n == SITE_MAX_SAID || (w->one[i].text = strdup(text)) == NULL)) {
+        sh_warn(r->to, "scanner of station %u: %s", r->station, text);
+        return;
+    }
+    w->n += i == w->n;
+    w->one[i].is_of[r->station - 1] = 1;
+}
+
+static void progress(void *ctx, const char *what, double fraction)
+{
+    const struct scanner_report *r = ctx;
+    sh_progress(r->to, what, fraction);
+}
+
+static int stop(void *ctx)
+{
+    const struct scanner_report *r = ctx;
+    return sh_stopped(r->to);
+}
+
+void scanner_report_set_up(struct scanner_report *report, const struct sh_report *to, uint32_t station,
+                           struct scanner_warnings *warnings)
+{
+    *report = (struct scanner_report){{report, warn, progress, stop}, to, warnings, station};
+    warnings->n_scanners += !warnings->are_said;
+}
+
+static int was_said(const struct site *first, const char *text)
+{
+    for (uint32_t i = 0; first != NULL && i < first->said.n; i++)
+        if (strcmp(first->said.text[i], text) == 0) return 1;
+    return 0;
+}
+
+/* Where all scanners say it, the first one has said it for them. */
+static void say(const struct scanner_warnings *w, uint32_t i, int is_said, const struct sh_report *to)
+{
+    char stations[4 * CONFIG_MAX_STATIONS + 1] = "";
+    uint32_t n = 0;
+    size_t used = 0;
+    for (uint32_t s = 0; s < CONFIG_MAX_STATIONS; s++)
+        if (w->one[i].is_of[s])
+            used += (size_t)snprintf(stations + used, sizeof stations - used, "%s%u", n++ > 0 ? ", " : "", s + 1);
+    if (is_said && n == w->n_scanners) return;
+    sh_warn(to, "scanner%s of station%s %s%s: %s", n > 1 ? "s" : "", n > 1 ? "s" : "", stations, is_said ? ", too" : "",
+            w->one[i].text);
+}
+
+void scanner_warnings_say(struct scanner_warnings *warnings, const struct site *first, const struct sh_report *to)
+{
+    for (uint32_t i = 0; i < warnings->n && !warnings->are_said; i++)
+        say(warnings, i, was_said(first, warnings->one[i].text), to);
+    warnings->are_said = 1;
+}
+
+void scanner_warnings_free(struct scanner_warnings *warnings)
+{
+    for (uint32_t i = 0; i < warnings->n; i++)
+        free(warnings->one[i].text);
+    warnings->n = 0;
+}
