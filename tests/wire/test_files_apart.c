@@ -283,9 +283,35 @@ static void test_the_tables_are_whole(void **state)
     assert_int_equal(usage_complaints, 0);
 }
 
+/* ---- two processes */
+
+/* The second head of one file link ends before it empties the file, and names the process that has it. So does whatever
+ * else would write there. */
+static void test_two_heads_one_file(void **state)
+{
+    struct wire *wire = *state;
+    char config[352], says[128];
+    begin(wire);
+    snprintf(config, sizeof config, "%s", wire_path(wire, "f.yaml"));
+    struct head first = head_start(wire, config, (const char *const[]){"--start", "--set", "head.frames=0", NULL});
+    snprintf(says, sizeof says, "is being written by process %ld (scanhead); allowed is a file of its own",
+             (long)first.pid);
+    static const char *const lines[] = {"run @f.yaml --start --frames=1", "run @c.yaml --start --frames=1 --journal=@o",
+                                        "run @c.yaml --start --frames=1 --truth=@o", "soak @f.yaml --duration=1"};
+    struct stat st, later;
+    assert_int_equal(stat(wire_path(wire, "o"), &st), 0);
+    for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++)
+        usage_expect(wire, lines[i], words_of(wire, lines[i]), 2, (const char *const[]){says, NULL});
+    assert_int_equal(stat(wire_path(wire, "o"), &later), 0);
+    assert_true(later.st_size >= st.st_size);
+    head_end(&first, SIGINT);
+    assert_int_equal(usage_complaints, 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_two_heads_one_file, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_pairs, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_the_tables_are_whole, wire_setup, wire_teardown),
     };
