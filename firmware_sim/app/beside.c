@@ -144,7 +144,7 @@ static int search(struct search *s, const char *file, int depth)
 }
 
 int app_beside(const char *mesh, int (*take)(void *ctx, const char *name, const char *path), void *ctx,
-                 struct sh_err *err)
+               struct sh_err *err)
 {
     struct search s = {.take = take, .ctx = ctx, .err = err};
     const char *slash = strrchr(mesh, '/');
