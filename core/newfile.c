@@ -9,6 +9,7 @@
 #include <string.h>
 #include <sys/file.h>
 #include <sys/stat.h>
+#include <sys/sysmacros.h>
 #include <unistd.h>
 
 enum { TRIES = 100 }; /* each lost to another writer that ended at that moment */
@@ -85,6 +86,56 @@ static int check_target(const char *path, struct sh_err *err)
     return SH_OK;
 }
 
+/* ---- locks */
+
+/* The process that holds the lock of a file, as the kernel lists locks; 0: it isn't listed, as in another container. */
+static long holder_of(const struct stat *st)
+{
+    unsigned long ino;
+    unsigned major_no, minor_no;
+    long pid, found = 0;
+    char line[256];
+    FILE *locks = fopen("/proc/locks", "re");
+    while (locks != NULL && found == 0 && fgets(line, sizeof line, locks) != NULL)
+        if (sscanf(line, "%*d: FLOCK %*s %*s %ld %x:%x:%lu", &pid, &major_no, &minor_no, &ino) == 4 && pid > 0 &&
+            ino == st->st_ino && major_no == major(st->st_dev) && minor_no == minor(st->st_dev))
+            found = pid;
+    if (locks != NULL) fclose(locks);
+    return found;
+}
+
+static int fail_locked(const char *path, int fd, int code, struct sh_err *err)
+{
+    struct stat st;
+    char comm[64], name[64] = "";
+    const long pid = fstat(fd, &st) == 0 ? holder_of(&st) : 0;
+    snprintf(comm, sizeof comm, "/proc/%ld/comm", pid);
+    FILE *in = pid != 0 ? fopen(comm, "re") : NULL;
+    if (in != NULL && fgets(name, sizeof name, in) != NULL) name[strcspn(name, "\n")] = '\0';
+    if (in != NULL) fclose(in);
+    if (name[0] == '\0')
+        return sh_fail(err, code, "%s: is being written by another process; allowed is a file of its own", path);
+    return sh_fail(err, code, "%s: is being written by process %ld (%s); allowed is a file of its own", path, pid,
+                   name);
+}
+
+/* As long as fd is open. A file system without locks has none to offer. */
+static int lock(const char *path, int fd, int code, struct sh_err *err)
+{
+    return flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK ? fail_locked(path, fd, code, err) : SH_OK;
+}
+
+/* What is about to be replaced must not be a file that somebody writes in place: it would go on without a name. */
+static int check_unlocked(const char *path, struct sh_err *err)
+{
+    const int fd = open(path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+    if (fd < 0) return SH_OK; /* none is there, or it can't be asked */
+    const int rc =
+        flock(fd, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK ? fail_locked(path, fd, SH_EINPUT, err) : SH_OK;
+    close(fd);
+    return rc;
+}
+
 /* ---- files in place */
 
 int newfile_open(const char *path, int *out, struct sh_err *err)
@@ -105,6 +156,7 @@ int newfile_open(const char *path, int *out, struct sh_err *err)
     int rc = SH_OK;
     if (fstat(fd, &st) != 0 || fcntl(fd, F_SETFL, 0) != 0) rc = fail(path, "be opened for writing", err);
     if (rc == SH_OK && S_ISREG(st.st_mode) && st.st_nlink > 1) rc = fail_hard_link(path, &st, err);
+    if (rc == SH_OK && S_ISREG(st.st_mode)) rc = lock(path, fd, SH_EINPUT, err);
     if (rc == SH_OK && S_ISREG(st.st_mode) && ftruncate(fd, 0) != 0) rc = fail(path, "be emptied", err);
     if (rc != SH_OK)
         close(fd);
@@ -122,8 +174,7 @@ int newfile_append(const char *path, int *out, struct sh_err *err)
     if (fd < 0) return fail(path, "be opened for writing", err);
     if (fstat(fd, &st) != 0) rc = fail(path, "be opened for writing", err);
     if (rc == SH_OK && st.st_nlink > 1) rc = fail_hard_link(path, &st, err);
-    if (rc == SH_OK && flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
-        rc = sh_fail(err, SH_ESTATE, "%s: another process writes it", path);
+    if (rc == SH_OK) rc = lock(path, fd, SH_ESTATE, err);
     if (rc != SH_OK)
         close(fd);
     else
@@ -169,22 +220,16 @@ static int is_named(const char *part, int fd)
            open_st.st_ino == named.st_ino;
 }
 
-static int fail_locked(const char *part, struct sh_err *err)
-{
-    return sh_fail(err, SH_EINPUT, "%s: is being written by another recording; allowed is a file of its own", part);
-}
-
 int newfile_part(const char *path, const char *part, int *out, struct sh_err *err)
 {
     int rc = check_target(path, err), fd;
+    if (rc == SH_OK) rc = check_unlocked(path, err);
     for (int i = 0; rc == SH_OK && i < TRIES; i++) {
         rc = open_part(part, &fd, err);
         if (rc == 0) continue;
         if (rc < 0) break;
-        rc = SH_OK;
-        if (flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) rc = fail_locked(part, err);
-        /* a file system without locks has none to offer; then the name alone counts */
-        else if (is_named(part, fd)) {
+        rc = lock(part, fd, SH_EINPUT, err);
+        if (rc == SH_OK && is_named(part, fd)) {
             if (ftruncate(fd, 0) != 0) rc = fail(part, "create", err);
             if (rc == SH_OK) {
                 *out = fd;
@@ -270,6 +315,7 @@ static int close_renamed(const char *path, int fd)
 int newfile_settle(const char *path, const char *part, int fd, struct sh_err *err)
 {
     int rc = check_target(path, err);
+    if (rc == SH_OK) rc = check_unlocked(path, err);
     if (rc == SH_OK && fsync(fd) != 0) rc = fail(part, "be synced", err);
     if (rc == SH_OK && rename(part, path) != 0) rc = fail_rename(path, part, err);
     return rc == SH_OK ? close_renamed(path, fd) : rc;

@@ -13,8 +13,9 @@
 
 #include "core/err.h"
 
-/* A file that is written in place: made, or emptied. Devices are taken as they are, and pipes that have a
- * reader. *fd is for writing, and blocks. */
+/* A file that is written in place: made, or emptied. It is locked as long as *fd is open: a second writer is refused
+ * before it empties the file. Devices are taken as they are, and pipes that have a reader. *fd is for writing, and
+ * blocks. */
 int newfile_open(const char *path, int *fd, struct sh_err *err);
 
 /* A file that grows line by line: made, or as it is. It is locked as long as *fd is open, for reading and appending; SH_ESTATE
@@ -23,8 +24,8 @@ int newfile_append(const char *path, int *fd, struct sh_err *err);
 
 /* A file that appears at `path` whole or not at all. It is written as `part` in the same folder, and renamed
  * at the end. `path` is free or a regular file: nothing else is ever replaced. `part` is locked as long as it
- * has its name, so that a second writer of the same file is refused. What a writer that was killed has left
- * there is taken over. *fd is for reading and writing. */
+ * has its name, so that a second writer of the same file is refused. So is one of a file that is being written in
+ * place. What a writer that was killed has left there is taken over. *fd is for reading and writing. */
 int newfile_part(const char *path, const char *part, int *fd, struct sh_err *err);
 /* Before long work: whether newfile_part would make `path` with `.part` behind it. It leaves nothing behind. */
 int newfile_check(const char *path, struct sh_err *err);

@@ -84,7 +84,8 @@ int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, 
         free(cfg);
         return app_fail_config(&faults);
     }
-    const int rc = work(cfg, ctx, &err);
+    int rc = app_check_files(in, cfg, &err);
+    if (rc == SH_OK) rc = work(cfg, ctx, &err);
     free(cfg);
     return rc == SH_OK ? APP_OK : app_fail(&err);
 }

@@ -28,13 +28,10 @@ int app_fail_config(const struct config_faults *faults);
 int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, void *ctx, struct sh_err *err),
                     void *ctx);
 
-/* A file that a command writes, by the option that names it; path NULL: it was not given. */
-struct app_output {
-    const char *option, *path;
-};
-
-/* Before any is opened: each is another file, and none is the configuration or the scenario. */
-int app_check_outputs(const struct app_input *in, const struct app_output *out, int n, struct sh_err *err);
+/* Before any file is opened: each that the command writes is another one, and none is read. Files are those of the command
+ * line, those of cfg (NULL: there is none), with its links where the command opens them, and what meshes name.
+ * app_with_config calls it; commands without a configuration call it themselves. */
+int app_check_files(const struct app_input *in, const struct config *cfg, struct sh_err *err);
 
 /* Warnings and progress to standard error, each line with the program's name. Asks to stop once
  * interrupted. */

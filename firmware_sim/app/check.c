@@ -144,7 +144,7 @@ static int print_section(const char *section)
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
     OPTION_SET,
-    {APP_TEXT, "scenario", "FILE", .at = offsetof(struct app_input, scenario),
+    {APP_TEXT, "scenario", "FILE", .at = offsetof(struct app_input, scenario), .file = APP_READS,
      .help = "with the faults of this file; a bare name is one of config/faults"},
     {APP_PRINT, "example", NULL, .apply = print_example,
      .help = "print a configuration with all keys, each with its help and its default, that passes this check"},
@@ -157,6 +157,7 @@ const struct app_command app_check = {
     .operand = {"CONFIG"},
     .summary = "validate configuration, scene and links; nothing runs",
     .options = OPTIONS,
+    .opens_links = 1,
     .notes =
         "Prints the scanners, and where the scene and each station stand, in every frame that is known. Opens each\n"
         "link but files and closes it again, so that a taken port or a wrong path shows. Of a wrong configuration\n"

@@ -32,6 +32,16 @@ int app_add_set(struct app_sets *sets, const char *set)
     return APP_OK;
 }
 
+int app_add_file(struct app_input *in, const struct app_file *file)
+{
+    if (in->n_files == APP_MAX_FILES) {
+        fprintf(stderr, "scanhead: too many files; at most %d\n", APP_MAX_FILES);
+        return APP_USAGE;
+    }
+    in->file[in->n_files++] = *file;
+    return APP_OK;
+}
+
 static int add_key(struct app_sets *sets, const char *key, const char *value)
 {
     char *text = sets->text + sets->used;
@@ -309,6 +319,7 @@ static int take_operands(const struct app_command *command, int n, char *const *
     for (int i = 0; i < n; i++) {
         if (check_ending(command, command->operand[i], words[i]) != APP_OK) return APP_USAGE;
         in->operand[i] = words[i];
+        if (app_add_file(in, &(struct app_file){.path = words[i], .use = APP_READS}) != APP_OK) return APP_USAGE;
     }
     return APP_GO_ON;
 }
@@ -335,6 +346,9 @@ static int take_option(const struct app_command *command, int opt, const char *w
     *done = row->kind == APP_PRINT;
     in->alone |= row->kind == APP_ALONE;
     in->n_options++;
+    if (row->file != APP_NO_FILE &&
+        app_add_file(in, &(struct app_file){.option = row->name, .path = optarg, .use = row->file}) != APP_OK)
+        return APP_USAGE;
     return apply(command, row, optarg, in, values);
 }
 
@@ -352,6 +366,7 @@ int app_parse(const struct app_command *command, int argc, char **argv, struct a
     char letters[2 * APP_MAX_OPTIONS + 4], *words[APP_MAX_WORDS];
     int opt, n = 0, done = 0;
     memset(in, 0, sizeof *in);
+    in->opens_links = command->opens_links;
     list_options(command->options, longs, letters);
     opterr = 0;
     optind = 0; /* from the beginning, whatever was parsed before */

@@ -11,7 +11,7 @@
 /* The exit status of a command. APP_GO_ON is none: the command line was read, the command can begin. */
 enum { APP_GO_ON = -1, APP_OK = 0, APP_FAILED = 1, APP_USAGE = 2 };
 
-enum { APP_WORD = -1, APP_MAX_SETS = 256, APP_MAX_OPERANDS = 2, APP_MAX_OPTIONS = 64 };
+enum { APP_WORD = -1, APP_MAX_SETS = 256, APP_MAX_OPERANDS = 2, APP_MAX_OPTIONS = 64, APP_MAX_FILES = 128 };
 
 /* clang-format off */
 enum app_option_kind {
@@ -29,6 +29,9 @@ enum app_option_kind {
     APP_PRINT      /* calls apply, which prints what was asked for: as with --help, the command does nothing else */
 };
 
+/* What the file is to the command that an option or an operand names. A pipe, a device and - are never taken for a file. */
+enum app_use { APP_NO_FILE, APP_READS, APP_WRITES };
+
 /* A row begins with kind, name and argument; the rest goes by name. */
 struct app_option {
     enum app_option_kind kind;
@@ -41,6 +44,7 @@ struct app_option {
     const char *key;
     const char *const *choices; /* words that it takes, which a shell completes; NULL: others, or those of the key */
     size_t n_choices;
+    enum app_use file;          /* of each option that names a file (outputs.c) */
     int (*apply)(void *values, const char *text); /* APP_OK, or APP_USAGE with the reason printed */
     const char *help;
 };
@@ -66,6 +70,7 @@ struct app_command {
     const char *notes;                     /* printed after the options; NULL: none */
     void (*print_more)(FILE *out);         /* printed last; NULL: nothing */
     const char *part;                      /* what may follow --help; NULL: nothing */
+    int opens_links;                       /* of the configuration: their files are written */
     int (*print_part)(const char *part);   /* prints only this part of the help; returns the exit status */
     int (*run)(int argc, char **argv);     /* argv[0] is the command's name; returns the exit status */
 };
@@ -85,18 +90,36 @@ struct app_words {
     int n, n_names;
 };
 
+/* A file that the command line names. */
+struct app_file {
+    const char *option; /* without the dashes; NULL: an operand */
+    const char *path;
+    enum app_use use;
+    /* Of files that are written, as the command knows them: */
+    size_t n_ending;    /* bytes of the path's ending, as in .ply */
+    const char *ending; /* it is another file beside that: with this ending in place of its own; NULL: it is that file */
+    int each;           /* and STEM-N.ENDING for N from 1 on */
+};
+
 /* What a command line says, but for the command's own options. */
 struct app_input {
     const char *operand[APP_MAX_OPERANDS];
     int n_options; /* that were given, --help aside */
     int alone;     /* an APP_ALONE was: there are no operands */
     struct app_sets sets;
+    struct app_file file[APP_MAX_FILES];
+    int n_files;
+    int opens_links;      /* as the command says */
     const char *scenario; /* a file whose faults are added to those of the configuration; NULL: none */
 };
 
 /* APP_GO_ON with `in` and `values` filled, or the exit status: of a printed help, or of an error with its one
  * line. The strings are argv's own, or lie in `in`, which must stay where it is. */
 int app_parse(const struct app_command *command, int argc, char **argv, struct app_input *in, void *values);
+
+/* Adds a file to those of the command line: one that the command chooses itself. APP_OK, or APP_USAGE with the reason
+ * printed. */
+int app_add_file(struct app_input *in, const struct app_file *file);
 
 /* From now on --help of a command is what `print` makes of its table; NULL: the text. The parts of a help stay text. */
 void app_set_help(void (*print)(const struct app_command *command));

@@ -1,51 +1,216 @@
-/* Whether the files that a command is to write are apart, so that none destroys another. */
+/* Whether the files that a command reads and those that it is to write are apart, so that none is destroyed. */
 #include <limits.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 
+#include "core/grow.h"
 #include "firmware_sim/app/app.h"
+#include "firmware_sim/app/beside.h"
+#include "firmware_sim/config/files.h"
 
-/* Whether files that are not there yet would be made as the same one: of one name, in one folder. */
-static int is_same_new(const char *a, const char *b)
+struct named {
+    char *who, *path;
+    int is_written;
+    int is_beside;   /* it is written with another: meshes of one scan share their image */
+    size_t n_ending; /* of files of each scan: bytes of the path's ending; 0: it is one file */
+};
+
+struct files {
+    struct named *file;
+    size_t n, room;
+    const char *prefix; /* before the names of keys */
+    int keeps_written;  /* paths of keys that are written count */
+    struct sh_err *err;
+};
+
+/* ---- the same file */
+
+/* The folder of a path, and the name in it. */
+static int split(const char *path, struct stat *folder, const char **name)
 {
-    const char *names[] = {a, b};
+    const char *slash = strrchr(path, '/');
+    char dir[PATH_MAX] = ".";
+    *name = slash != NULL ? slash + 1 : path;
+    if (slash != NULL && slash + 1 - path >= PATH_MAX) return 0; /* no such file can be made */
+    if (slash != NULL) snprintf(dir, sizeof dir, "%.*s", (int)(slash + 1 - path), path);
+    return stat(dir, folder) == 0;
+}
+
+/* Whether `name` is STEM-N.ENDING of a file of scans. */
+static int is_name_of_scan(const char *file, size_t n_ending, const char *name)
+{
+    const size_t len = strlen(file), stem = len > n_ending ? len - n_ending : len;
+    if (n_ending == 0 || strncmp(name, file, stem) != 0 || name[stem] != '-') return 0;
+    const size_t digits = strspn(name + stem + 1, "0123456789");
+    return digits > 0 && strcmp(name + stem + 1 + digits, file + stem) == 0;
+}
+
+/* Whether they are one name in one folder: files that are not there yet would be made as the same one. */
+static int is_same_name(const struct named *a, const struct named *b)
+{
     struct stat folder[2];
-    for (int i = 0; i < 2; i++) {
-        const char *slash = strrchr(names[i], '/');
-        char path[PATH_MAX] = ".";
-        if (slash != NULL) {
-            const int len = (int)(slash + 1 - names[i]);
-            if (len >= PATH_MAX) return 0; /* no such file can be made */
-            snprintf(path, sizeof path, "%.*s", len, names[i]);
-            names[i] = slash + 1;
-        }
-        if (stat(path, &folder[i]) != 0) return strcmp(a, b) == 0;
-    }
-    return strcmp(names[0], names[1]) == 0 && folder[0].st_dev == folder[1].st_dev &&
-           folder[0].st_ino == folder[1].st_ino;
+    const char *name[2];
+    const int has_a = split(a->path, &folder[0], &name[0]), has_b = split(b->path, &folder[1], &name[1]);
+    if (!has_a || !has_b) return strcmp(a->path, b->path) == 0;
+    if (folder[0].st_dev != folder[1].st_dev || folder[0].st_ino != folder[1].st_ino) return 0;
+    return strcmp(name[0], name[1]) == 0 || is_name_of_scan(name[0], a->n_ending, name[1]) ||
+           is_name_of_scan(name[1], b->n_ending, name[0]);
 }
 
 /* The same file, also under two names. Devices and pipes may be given twice, and so may -, which is standard output. */
-static int is_same(const char *a, const char *b)
+static int is_same(const struct named *a, const struct named *b)
 {
     struct stat sa, sb;
-    if (a == NULL || b == NULL || strcmp(a, "-") == 0 || strcmp(b, "-") == 0) return 0;
-    const int has_a = stat(a, &sa) == 0, has_b = stat(b, &sb) == 0;
-    if (!has_a && !has_b) return is_same_new(a, b);
-    return has_a && has_b && S_ISREG(sa.st_mode) && sa.st_dev == sb.st_dev && sa.st_ino == sb.st_ino;
+    if (strcmp(a->path, "-") == 0 || strcmp(b->path, "-") == 0) return 0;
+    const int has_a = stat(a->path, &sa) == 0, has_b = stat(b->path, &sb) == 0;
+    if ((has_a && !S_ISREG(sa.st_mode)) || (has_b && !S_ISREG(sb.st_mode))) return 0;
+    if (has_a && has_b && sa.st_dev == sb.st_dev && sa.st_ino == sb.st_ino) return 1;
+    return is_same_name(a, b);
 }
 
-int app_check_outputs(const struct app_input *in, const struct app_output *out, int n, struct sh_err *err)
+/* ---- what there is */
+
+/* Takes who and path, which are NULL where there is no memory. */
+static int add(struct files *f, char *who, char *path, int is_written, size_t n_ending)
 {
-    for (int i = 0; i < n; i++) {
-        if (is_same(out[i].path, in->operand[0]) || is_same(out[i].path, in->scenario))
-            return sh_fail(err, SH_EINPUT, "--%s %s: is read, and would be overwritten; allowed another file",
-                           out[i].option, out[i].path);
-        for (int k = 0; k < i; k++)
-            if (is_same(out[i].path, out[k].path))
-                return sh_fail(err, SH_EINPUT, "--%s %s: is the file of --%s, too; allowed another file", out[i].option,
-                               out[i].path, out[k].option);
+    if (who != NULL && path != NULL && grow(&f->file, &f->room, f->n + 1, sizeof *f->file)) {
+        f->file[f->n++] = (struct named){.who = who, .path = path, .is_written = is_written, .n_ending = n_ending};
+        return SH_OK;
+    }
+    free(who);
+    free(path);
+    return sh_fail(f->err, SH_ENOMEM, "no memory for the names of files");
+}
+
+static char *join(const char *a, size_t n, const char *b, const char *c)
+{
+    char *text;
+    return asprintf(&text, "%.*s%s%s", (int)n, a, b, c) >= 0 ? text : NULL;
+}
+
+static int add_option(struct files *f, const struct app_file *file)
+{
+    const size_t len = strlen(file->path), stem = len > file->n_ending ? len - file->n_ending : 0;
+    char *who = file->option != NULL ? join("--", 2, file->option, "") : join("the operand ", 12, file->path, "");
+    char *path = file->ending != NULL ? join(file->path, stem, file->ending, "") : strdup(file->path);
+    const size_t n_ending = file->ending != NULL ? strlen(file->ending) : file->n_ending;
+    const int rc = add(f, who, path, file->use == APP_WRITES, file->each ? n_ending : 0);
+    if (rc == SH_OK) f->file[f->n - 1].is_beside = file->ending != NULL;
+    return rc;
+}
+
+static int add_key(void *ctx, const char *key, const char *path, int is_written)
+{
+    struct files *f = ctx;
+    if (is_written && !f->keeps_written) return SH_OK;
+    return add(f, join(key[0] != '-' ? f->prefix : "", INT_MAX, key, ""), strdup(path), is_written, 0);
+}
+
+static int add_of_mesh(void *ctx, const char *name, const char *path)
+{
+    struct files *f = ctx;
+    return add(f, join(name, INT_MAX, ", named in ", f->prefix), strdup(path), 0, 0);
+}
+
+/* What the files name that are read. Only what is there can be: the search takes as long as reading the files. */
+static int add_of_meshes(struct files *f)
+{
+    static const char *const endings[] = {".obj", ".gltf", ".glb", ".fbx", ".dae", ".ifc"};
+    int rc = SH_OK;
+    for (size_t i = 0, n = f->n; i < n && rc == SH_OK; i++) {
+        for (size_t k = 0; k < sizeof endings / sizeof endings[0] && rc == SH_OK; k++) {
+            struct sh_err why = {0};
+            if (f->file[i].is_written || !app_ends_in(f->file[i].path, endings[k])) continue;
+            f->prefix = f->file[i].who;
+            rc = app_beside(f->file[i].path, add_of_mesh, f, &why);
+            if (rc == SH_ENOMEM) sh_fail(f->err, rc, "no memory for the names of files");
+            if (rc != SH_ENOMEM) rc = SH_OK; /* its reader says what is wrong with it */
+        }
+    }
+    return rc;
+}
+
+/* Scanners of stations have profiles of their own. */
+static int add_of_scanners(struct files *f, const struct config *cfg)
+{
+    struct config *own = calloc(1, sizeof *own);
+    int rc = own != NULL ? SH_OK : sh_fail(f->err, SH_ENOMEM, "no memory for a scanner");
+    f->keeps_written = 0;
+    for (uint32_t i = 0; i < cfg->n_stations && rc == SH_OK; i++) {
+        char prefix[48];
+        if (config_serves(cfg, i) || cfg->station[i].scanner != i + 1) continue;
+        snprintf(prefix, sizeof prefix, "stations[%u].scanner.", i);
+        f->prefix = prefix;
+        rc = config_load_scanner(cfg, i + 1, own, f->err);
+        if (rc == SH_OK) rc = config_each_file(own, add_key, f);
+    }
+    free(own);
+    return rc;
+}
+
+/* Whether a file that is written is there: without any, nothing that is there can be destroyed. */
+static int any_is_there(const struct files *f)
+{
+    struct stat st;
+    for (size_t i = 0; i < f->n; i++)
+        if (f->file[i].is_written &&
+            (f->file[i].n_ending > 0 || (stat(f->file[i].path, &st) == 0 && S_ISREG(st.st_mode))))
+            return 1;
+    return 0;
+}
+
+static int add_all(struct files *f, const struct app_input *in, const struct config *cfg)
+{
+    int rc = SH_OK;
+    f->keeps_written = in->opens_links;
+    f->prefix = "";
+    for (int i = 0; i < in->n_files && rc == SH_OK; i++)
+        rc = add_option(f, &in->file[i]);
+    if (rc == SH_OK && cfg != NULL) rc = config_each_file(cfg, add_key, f);
+    if (rc != SH_OK || !any_is_there(f)) return rc;
+    if (cfg != NULL) rc = add_of_scanners(f, cfg);
+    return rc == SH_OK ? add_of_meshes(f) : rc;
+}
+
+/* ---- the check */
+
+/* A scenario that comes with the program has a bare name, which is no file here: only what is there is read. */
+static int is_there(const struct named *file)
+{
+    struct stat st;
+    return stat(file->path, &st) == 0;
+}
+
+static int check(const struct files *f, struct sh_err *err)
+{
+    for (size_t i = 0; i < f->n; i++) {
+        const struct named *out = &f->file[i];
+        for (size_t k = 0; k < f->n && out->is_written; k++) {
+            const struct named *other = &f->file[k];
+            if (!other->is_written && is_there(other) && is_same(out, other))
+                return sh_fail(
+                    err, SH_EINPUT,
+                    "%s %s: is the file of %s, which is read, and would be overwritten; allowed another file", out->who,
+                    out->path, other->who);
+            if (other->is_written && k < i && !(out->is_beside && other->is_beside) && is_same(out, other))
+                return sh_fail(err, SH_EINPUT, "%s %s: is the file of %s, too; allowed another file", out->who,
+                               out->path, other->who);
+        }
     }
     return SH_OK;
+}
+
+int app_check_files(const struct app_input *in, const struct config *cfg, struct sh_err *err)
+{
+    struct files f = {.err = err};
+    int rc = add_all(&f, in, cfg);
+    if (rc == SH_OK) rc = check(&f, err);
+    for (size_t i = 0; i < f.n; i++) {
+        free(f.file[i].who);
+        free(f.file[i].path);
+    }
+    free(f.file);
+    return rc;
 }

@@ -142,7 +142,7 @@ static const struct cfg_key config_keys[] = {
      .help = "native: the head's stream and commands; nmea: the GNSS receiver, NMEA 0183 out, nothing in; scip: as a "
              "Hokuyo; cola: as a SICK scanner, CoLa-A and CoLa-B; velodyne: data packets, velodyne-position: position "
              "packets, velodyne-http: settings, as a VLP-16."},
-    {LINK(path), CFG_PATH, .def = "", .example = "port",
+    {LINK(path), CFG_PATH, .def = "", .flags = CFG_WRITTEN, .example = "port",
      .help = "pty: symbolic link to the terminal (optional); file: file to write (required); usbredir: Unix socket, "
              "instead of a port."},
     {LINK(address), CFG_TEXT, .def = "", .example = "127.0.0.1",

@@ -11,7 +11,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "firmware_sim/app/batch/beside.h"
+#include "firmware_sim/app/beside.h"
 #include "firmware_sim/app/batch/manifest.h"
 
 static char dir[64];
@@ -210,7 +210,7 @@ static void expect_beside(const char *mesh, const char *want)
 {
     char all[512] = "";
     struct sh_err err;
-    assert_int_equal(batch_beside(path_of(mesh), list_name, all, &err), SH_OK);
+    assert_int_equal(app_beside(path_of(mesh), list_name, all, &err), SH_OK);
     assert_string_equal(all, want);
 }
 

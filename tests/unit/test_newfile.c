@@ -229,7 +229,7 @@ static void end_first(void)
 
 static void begin_second(void)
 {
-    expect_error(outfile_open(&second, path, &err), SH_EINPUT, part, "is being written by another recording");
+    expect_error(outfile_open(&second, path, &err), SH_EINPUT, part, "is being written by process");
 }
 
 /* The first one ends between the second one's open and its lock: what the second one has opened is the finished file
@@ -262,6 +262,45 @@ static void test_begin_before_rename(void **state)
     unlink(path);
 }
 
+/* A file that is written in place has one writer, and what the first one wrote stays. */
+static void test_one_writer_in_place(void **state)
+{
+    (void)state;
+    char pid[48];
+    int fd, again;
+    snprintf(pid, sizeof pid, "process %ld (test_newfile)", (long)getpid());
+    assert_int_equal(newfile_open(path, &fd, &err), 0);
+    assert_int_equal(write(fd, "one", 3), 3);
+    expect_error(newfile_open(path, &again, &err), SH_EINPUT, path, pid);
+    expect_error(newfile_append(path, &again, &err), SH_ESTATE, path, pid);
+    expect_error(newfile_check(path, &err), SH_EINPUT, path, pid); /* it would go on without a name */
+    expect_missing(part);
+    expect_text(path, "one");
+    close(fd);
+    assert_int_equal(newfile_open(path, &fd, &err), 0); /* free again, and empty */
+    close(fd);
+    expect_text(path, "");
+    unlink(path);
+}
+
+/* A file that is begun in place while another is on its way to that name stays, and the other stays beside it. */
+static void test_begun_in_place_meanwhile(void **state)
+{
+    (void)state;
+    int whole, fd;
+    assert_int_equal(newfile_part(path, part, &whole, &err), 0);
+    assert_int_equal(write(whole, "whole", 5), 5);
+    assert_int_equal(newfile_open(path, &fd, &err), 0);
+    assert_int_equal(write(fd, "one", 3), 3);
+    expect_error(newfile_settle(path, part, whole, &err), SH_EINPUT, path, "is being written by");
+    expect_text(path, "one");
+    expect_text(part, "whole");
+    close(fd);
+    assert_int_equal(newfile_settle(path, part, whole, &err), 0);
+    expect_text(path, "whole");
+    unlink(path);
+}
+
 /* ---- a file that grows */
 
 static void test_append(void **state)
@@ -271,7 +310,7 @@ static void test_append(void **state)
     char c;
     assert_int_equal(newfile_append(path, &fd, &err), 0);
     assert_int_equal(write(fd, "one", 3), 3);
-    expect_error(newfile_append(path, &again, &err), SH_ESTATE, path, "another process");
+    expect_error(newfile_append(path, &again, &err), SH_ESTATE, path, "is being written by process");
     close(fd);
     assert_int_equal(newfile_append(path, &fd, &err), 0); /* as it is, and free again */
     assert_int_equal(pread(fd, &c, 1, 0), 1);
@@ -343,6 +382,8 @@ int main(void)
         cmocka_unit_test(test_left_part),
         cmocka_unit_test(test_end_between_open_and_lock),
         cmocka_unit_test(test_begin_before_rename),
+        cmocka_unit_test(test_one_writer_in_place),
+        cmocka_unit_test(test_begun_in_place_meanwhile),
         cmocka_unit_test(test_append),
         cmocka_unit_test(test_rights),
     };

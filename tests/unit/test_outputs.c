@@ -13,50 +13,146 @@
 
 #include "firmware_sim/app/app.h"
 
-static int check(const char *scenario, const char *stats, const char *truth, struct sh_err *err)
+static char folder[] = "/tmp/scanhead-test-XXXXXX";
+static struct sh_err err;
+
+static void add(struct app_input *in, const char *option, const char *path, enum app_use use)
 {
-    const struct app_input in = {.operand = {"run.yaml"}, .scenario = scenario};
-    const struct app_output out[] = {{"stats", stats}, {"truth", truth}};
-    memset(err, 0, sizeof *err);
-    return app_check_outputs(&in, out, 2, err);
+    if (path != NULL)
+        assert_int_equal(app_add_file(in, &(struct app_file){.option = option, .path = path, .use = use}), APP_OK);
+}
+
+static int check(const char *scenario, const char *stats, const char *truth)
+{
+    struct app_input in = {0};
+    add(&in, NULL, "run.yaml", APP_READS);
+    add(&in, "scenario", scenario, APP_READS);
+    add(&in, "stats", stats, APP_WRITES);
+    add(&in, "truth", truth, APP_WRITES);
+    err.text[0] = '\0';
+    return app_check_files(&in, NULL, &err);
+}
+
+static void write_text(const char *name, const char *text)
+{
+    FILE *out = fopen(name, "w");
+    assert_non_null(out);
+    fputs(text, out);
+    fclose(out);
+}
+
+static int go_there(void **state)
+{
+    (void)state;
+    return mkdtemp(folder) == NULL || chdir(folder) != 0;
+}
+
+static int come_back(void **state)
+{
+    (void)state;
+    return chdir("/") != 0 || rmdir(folder) != 0;
 }
 
 static void files_are_apart(void **state)
 {
     (void)state;
-    struct sh_err err;
-    char folder[] = "/tmp/scanhead-test-XXXXXX";
-    assert_non_null(mkdtemp(folder));
-    assert_int_equal(chdir(folder), 0);
-    assert_int_equal(check("lossy-udp", "a", "a", &err), SH_EINPUT); /* not there yet */
+    assert_int_equal(check("lossy-udp", "a", "a"), SH_EINPUT); /* not there yet */
     assert_string_equal(err.text, "--truth a: is the file of --stats, too; allowed another file");
-    assert_int_equal(check("lossy-udp", "a", "./a", &err), SH_EINPUT); /* two names of what is not there yet */
+    assert_int_equal(check("lossy-udp", "a", "./a"), SH_EINPUT); /* two names of what is not there yet */
     assert_string_equal(err.text, "--truth ./a: is the file of --stats, too; allowed another file");
     char whole[sizeof folder + 8];
     snprintf(whole, sizeof whole, "%s/a", folder);
-    assert_int_equal(check("lossy-udp", "sub/../a", whole, &err), SH_OK); /* no such folder: can't be made */
+    assert_int_equal(check("lossy-udp", "sub/../a", whole), SH_OK); /* no such folder: can't be made */
     assert_int_equal(mkdir("sub", 0700), 0);
-    assert_int_equal(check("lossy-udp", "sub/../a", whole, &err), SH_EINPUT);
-    assert_int_equal(check("lossy-udp", "sub/a", "a", &err), SH_OK);
+    assert_int_equal(check("lossy-udp", "sub/../a", whole), SH_EINPUT);
+    assert_int_equal(check("lossy-udp", "sub/a", "a"), SH_OK);
     assert_int_equal(rmdir("sub"), 0);
-    assert_int_equal(check("lossy-udp", "-", "-", &err), SH_OK); /* standard output */
-    fclose(fopen("a", "w"));
-    fclose(fopen("run.yaml", "w"));
-    assert_int_equal(check(NULL, "a", "./a", &err), SH_EINPUT);
-    assert_int_equal(check(NULL, NULL, "./run.yaml", &err), SH_EINPUT);
-    assert_string_equal(err.text, "--truth ./run.yaml: is read, and would be overwritten; allowed another file");
-    assert_int_equal(check("a", "./a", NULL, &err), SH_EINPUT);
-    assert_int_equal(check("lossy-udp", "a", "b", &err), SH_OK);
-    assert_int_equal(check(NULL, "/dev/null", "/dev/null", &err), SH_OK);
-    assert_int_equal(check(NULL, NULL, NULL, &err), SH_OK);
+    assert_int_equal(check("lossy-udp", "lossy-udp", NULL), SH_OK); /* the scenario is no file here */
+    assert_int_equal(check("lossy-udp", "-", "-"), SH_OK);          /* standard output */
+    write_text("a", "");
+    write_text("run.yaml", "");
+    assert_int_equal(check(NULL, "a", "./a"), SH_EINPUT);
+    assert_int_equal(check(NULL, NULL, "./run.yaml"), SH_EINPUT);
+    assert_string_equal(err.text,
+                        "--truth ./run.yaml: is the file of the operand run.yaml, which is read, and would be "
+                        "overwritten; allowed another file");
+    assert_int_equal(check("a", "./a", NULL), SH_EINPUT);
+    assert_int_equal(link("a", "b"), 0);
+    assert_int_equal(check("a", "b", NULL), SH_EINPUT);
+    unlink("b");
+    assert_int_equal(symlink("a", "b"), 0);
+    assert_int_equal(check("b", "a", NULL), SH_EINPUT);
+    unlink("b");
+    assert_int_equal(check("lossy-udp", "a", "b"), SH_OK);
+    assert_int_equal(check(NULL, "/dev/null", "/dev/null"), SH_OK);
+    assert_int_equal(mkfifo("fifo", 0600), 0);
+    assert_int_equal(check(NULL, "fifo", "fifo"), SH_OK);
+    assert_int_equal(check(NULL, NULL, NULL), SH_OK);
+    unlink("fifo");
     unlink("a");
     unlink("run.yaml");
-    assert_int_equal(chdir("/"), 0);
-    rmdir(folder);
+}
+
+/* Files of single scans are known by the pattern of their names, and those beside a file by their endings. */
+static void files_beside_a_file(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *other;
+        int rc;
+    } cases[] = {{"x.obj", SH_EINPUT}, {"./x-12.obj", SH_EINPUT}, {"x-.obj", SH_OK},   {"x-1.ply", SH_OK},
+                 {"x.mtl", SH_EINPUT}, {"x-3.mtl", SH_EINPUT},    {"x-3a.mtl", SH_OK}, {"y-3.mtl", SH_OK}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        struct app_input in = {0};
+        struct app_file file = {.option = "output", .path = "x.obj", .use = APP_WRITES, .n_ending = 4, .each = 1};
+        assert_int_equal(app_add_file(&in, &file), APP_OK);
+        file.ending = ".mtl";
+        assert_int_equal(app_add_file(&in, &file), APP_OK);
+        add(&in, "stats", cases[i].other, APP_WRITES);
+        if (app_check_files(&in, NULL, &err) != cases[i].rc) fail_msg("%s: not %d", cases[i].other, cases[i].rc);
+    }
+}
+
+/* What a mesh names is read, too. */
+static void files_of_a_mesh(void **state)
+{
+    (void)state;
+    struct app_input in = {0};
+    write_text("m.obj", "mtllib m.mtl\nv 0.5 0 0\n");
+    write_text("m.mtl", "newmtl a\nmap_Kd m.png\n");
+    write_text("m.png", "");
+    add(&in, NULL, "m.obj", APP_READS);
+    add(&in, "output", "./m.png", APP_WRITES);
+    assert_int_equal(app_check_files(&in, NULL, &err), SH_EINPUT);
+    assert_string_equal(err.text,
+                        "--output ./m.png: is the file of m.png, named in the operand m.obj, which is read, and "
+                        "would be overwritten; allowed another file");
+    unlink("m.png");
+    assert_int_equal(app_check_files(&in, NULL, &err), SH_OK); /* it isn't there */
+    unlink("m.obj");
+    unlink("m.mtl");
+}
+
+/* Each option that names a file says whether it is read or written: otherwise nobody compares it. */
+static void options_say_what_their_files_are(void **state)
+{
+    (void)state;
+    static const struct app_command *const commands[] = {&app_run,    &app_record,   &app_plan, &app_map,
+                                                         &app_report, &app_check,    &app_list, &app_init,
+                                                         &app_batch,  &app_coverage, &app_view, &app_soak};
+    for (size_t i = 0; i < sizeof commands / sizeof commands[0]; i++)
+        for (const struct app_option *row = commands[i]->options; row->kind != APP_LAST; row++)
+            if (row->argument != NULL &&
+                (strstr(row->argument, "FILE") != NULL || strcmp(row->argument, "CONFIG") == 0) &&
+                row->file == APP_NO_FILE)
+                fail_msg("%s --%s names a file, and its row doesn't say whether it is read", commands[i]->name,
+                         row->name);
 }
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(files_are_apart)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    const struct CMUnitTest tests[] = {cmocka_unit_test(files_are_apart), cmocka_unit_test(files_beside_a_file),
+                                       cmocka_unit_test(files_of_a_mesh),
+                                       cmocka_unit_test(options_say_what_their_files_are)};
+    return cmocka_run_group_tests(tests, go_there, come_back);
 }

@@ -55,7 +55,7 @@ static void test_same_file(void **state)
     expect_refusal(wire, (const char *const[]){"record", config, "-o", a, "-o", b, NULL},
                    "is the file of --output, too");
     expect_refusal(wire, (const char *const[]){"record", config, "-o", a, "--truth", b, NULL},
-                   "is the file of --truth, too");
+                   "is the file of --output, too");
     expect_refusal(wire, (const char *const[]){"record", config, "-o", a, "--stats", config, NULL},
                    "is read, and would be");
     /* what a recording that was killed has left is not overwritten: it may be all that there is of it */

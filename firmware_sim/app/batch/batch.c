@@ -1,6 +1,7 @@
 /* scanhead batch: its options (batch.h). */
 #include "firmware_sim/app/batch/batch.h"
 
+#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -77,6 +78,21 @@ static int check_together(const struct batch *b)
     return APP_OK;
 }
 
+/* The files of jobs are checked with each of them. */
+static int check_manifest(const struct batch *b, struct sh_err *err)
+{
+    char path[PATH_MAX];
+    struct app_input in = b->in;
+    if (b->list) return SH_OK;
+    if (b->merge)
+        snprintf(path, sizeof path, "%s/manifest.json", b->dir);
+    else
+        snprintf(path, sizeof path, "%s/manifest-%u-of-%u.jsonl", b->dir, b->shard, b->n_shards);
+    const struct app_file file = {.option = "output", .path = path, .use = APP_WRITES};
+    if (app_add_file(&in, &file) != APP_OK) return sh_fail(err, SH_EINPUT, "too many files");
+    return app_check_files(&in, NULL, err);
+}
+
 static int work(struct batch *b)
 {
     struct sh_err err = {0};
@@ -86,6 +102,7 @@ static int work(struct batch *b)
     rc = batch_stations_parse(b->stations_text, &b->stations, &err);
     if (rc == SH_OK)
         rc = batch_shard_parse(b->shard_text != NULL ? b->shard_text : "1/1", &b->shard, &b->n_shards, &err);
+    if (rc == SH_OK) rc = check_manifest(b, &err);
     if (rc != SH_OK) return app_fail(&err);
     app_catch_signals();
     status = batch_plan(b);
@@ -113,7 +130,7 @@ static struct app_option OPTIONS[APP_MAX_OPTIONS + 1] = {
     {APP_FLAG, "force", NULL, .at = AT(force),
      .help = "do jobs again that were made with another configuration, release, ..."},
     OPTION_SET,
-    {APP_TEXT, "scenario", "FILE", .at = AT(in.scenario),
+    {APP_TEXT, "scenario", "FILE", .at = AT(in.scenario), .file = APP_READS,
      .help = "in each job, with the faults of this file beside those of the configuration; a bare name is one of "
              "config/faults. A job that loses frames by them fails"},
     {APP_TEXT, "threads", "N", .at = AT(threads), .help = "threads that cast; 0: one per processor. No byte depends on it"},

@@ -73,6 +73,7 @@ int batch_load(struct batch *b, uint32_t combination, struct batch_loaded *loade
     if (loaded->status != 0 && loaded->combination == combination && !loaded->is_used_up) return loaded->status;
     *loaded = (struct batch_loaded){.n_reads = before.n_reads, .combination = combination};
     loaded->status = batch_line_make(b, combination, 1, "x", &loaded->line);
+    if (loaded->status == APP_GO_ON) loaded->line->line.in.n_files = 0; /* no job has this name */
     if (loaded->status == APP_GO_ON) loaded->status = app_with_config(&loaded->line->line.in, load_site, &loading);
     if (loaded->status == APP_OK) loaded->status = APP_GO_ON;
     batch_unload(&before);

@@ -8,7 +8,7 @@
 #include "core/grow.h"
 #include "core/infile.h"
 #include "firmware_sim/app/app.h"
-#include "firmware_sim/app/batch/beside.h"
+#include "firmware_sim/app/beside.h"
 
 const char *batch_made_differs(const struct batch_made *a, const struct batch_made *b)
 {
@@ -154,7 +154,7 @@ static void take_mesh(struct inputs *in, const char *path)
     if (in->rc != SH_OK) return;
     struct batch_known *k = find(in->cache, path); /* it is there by now */
     if (!k->is_searched) {
-        in->rc = batch_beside(path, keep_beside, k, in->err);
+        in->rc = app_beside(path, keep_beside, k, in->err);
         if (in->rc == SH_ENOMEM) sh_fail(in->err, SH_ENOMEM, "no memory for the names of input files");
         if (in->rc != SH_OK) return;
         k->is_searched = 1;

@@ -184,6 +184,7 @@ static int plan_combination(struct batch *b, uint32_t combination)
     int status = batch_line_make(b, combination, 1, "x", &line);
     if (status == APP_GO_ON) {
         struct planned planned = {b, &line->line.job, combination};
+        line->line.in.n_files = 0; /* no job has this name: those that there are: run.c */
         status = app_with_config(&line->line.in, plan_config, &planned);
         if (status != APP_OK) print_values(b, combination);
     }

@@ -8,7 +8,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "firmware_sim/app/batch/beside.h"
+#include "firmware_sim/app/beside.h"
 #include "firmware_sim/app/batch/load.h"
 #include "firmware_sim/base/clock.h"
 
@@ -62,7 +62,7 @@ static int list_files(const struct batch *b, uint32_t job, const struct record_f
         const char *path = files->file[i].path;
         rc = add_file(&l, path);
         if (rc == SH_OK && (app_ends_in(path, ".obj") || app_ends_in(path, ".gltf")))
-            rc = batch_beside(path, add_beside, &l, err);
+            rc = app_beside(path, add_beside, &l, err);
     }
     return rc;
 }
@@ -135,6 +135,28 @@ static int make_folder(const struct batch *b, struct sh_err *err)
                    "-o %s: cannot be made a folder: %s", b->dir, strerror(errno == EEXIST ? ENOTDIR : errno));
 }
 
+/* The campaign is made of files that may lie in its folder: none of them has the name of a job's file. */
+static int check_inputs(const struct batch *b, struct sh_err *err)
+{
+    struct stat folder, here;
+    for (size_t i = 0; i < b->cache.n; i++) {
+        const char *path = b->cache.known[i].path, *slash = strrchr(path, '/'),
+                   *file = slash != NULL ? slash + 1 : path;
+        char dir[PATH_MAX] = ".", name[BATCH_NAME_LEN];
+        if (slash != NULL) snprintf(dir, sizeof dir, "%.*s", (int)(slash + 1 - path), path);
+        const unsigned long job = strtoul(file, NULL, 10);
+        if (job == 0 || job > b->n_jobs || stat(b->dir, &folder) != 0 || stat(dir, &here) != 0) continue;
+        if (folder.st_dev != here.st_dev || folder.st_ino != here.st_ino) continue;
+        batch_job_name(b, (uint32_t)job - 1, name);
+        if (strncmp(file, name, strlen(name)) == 0 && file[strlen(name)] == '.')
+            return sh_fail(err, SH_EINPUT,
+                           "--output %s: %s is the file of job %lu, which is read, and would be overwritten; allowed "
+                           "another folder",
+                           b->dir, file, job);
+    }
+    return SH_OK;
+}
+
 /* What isn't whole any more is done again. */
 static int check_done(struct runner *r, struct sh_err *err)
 {
@@ -200,7 +222,8 @@ int batch_run(struct batch *b)
 {
     struct runner r = {.b = b};
     struct sh_err err = {0};
-    int rc = make_folder(b, &err);
+    int rc = check_inputs(b, &err);
+    if (rc == SH_OK) rc = make_folder(b, &err);
     if (rc == SH_OK) rc = batch_find_done(b, 0, &err);
     if (rc == SH_OK) rc = batch_manifest_open(b->dir, b->shard, b->n_shards, &r.manifest, &err);
     if (rc != SH_OK) return app_fail(&err);

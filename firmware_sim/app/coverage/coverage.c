@@ -236,11 +236,20 @@ static int check_options(struct coverage_run *r)
     return status == APP_GO_ON ? check_next(r) : status;
 }
 
+/* A .gltf has its numbers beside it. */
+static int add_numbers(struct coverage_run *r)
+{
+    const struct app_file file = {"output", r->output, APP_WRITES, .n_ending = sizeof ".gltf" - 1, .ending = ".bin"};
+    if (r->output == NULL || !app_ends_in(r->output, ".gltf") || app_add_file(&r->in, &file) == APP_OK) return APP_GO_ON;
+    return APP_USAGE;
+}
+
 static int run(int argc, char **argv)
 {
     struct coverage_run r = {.o = {.height_m = 1.6, .step_deg = 1.0, .scans = 3}};
     int status = app_parse(&app_coverage, argc, argv, &r.in, &r);
     if (status == APP_GO_ON) status = check_options(&r);
+    if (status == APP_GO_ON) status = add_numbers(&r);
     return status == APP_GO_ON ? app_with_config(&r.in, cover, &r) : status;
 }
 
@@ -252,7 +261,7 @@ static const struct app_option OPTIONS[] = {
      .help = "the figures as JSON: cell_m, cells, pieces, triangles, area_m2, twin_m2, none_m2, one_m2, several_m2 and "
              "the same as percent, density_1_m2, incidence_deg and range_m (mean, p05, p50, p95), stations, labels, next"},
     {APP_TEXT, "by", "label", .at = AT(by), .help = "the figures of each label, too: object and material"},
-    {APP_TEXT, "output", "FILE", .letter = 'o', .at = AT(output),
+    {APP_TEXT, "output", "FILE", .letter = 'o', .at = AT(output), .file = APP_WRITES,
      .help = "the cells as a mesh with colours; .ply has the scalars stations, density, incidence_deg, range_m and cell"},
     {APP_TEXT, "colour", "WHAT", .at = AT(colour_name), OPTION_CHOICES(COLOURS),
      .help = "of the mesh: seen (by none red, one yellow, several green; the default), count (of stations, red to blue), "
@@ -266,7 +275,7 @@ static const struct app_option OPTIONS[] = {
      .help = "of the head's origin above the floor (default 1.6)"},
     {APP_TEXT, "at", "X0,Y0,X1,Y1", .at = AT(at),
      .help = "limits of the grid (default: those of the scene); two more numbers, Z0,Z1, limit the heights of floors"},
-    {APP_TEXT, "candidates", "FILE.csv", .at = AT(o.candidates),
+    {APP_TEXT, "candidates", "FILE.csv", .at = AT(o.candidates), .file = APP_READS,
      .help = "look at the places in a file with the columns x_m,y_m,z_m of the head's origin, and heading_deg where wanted"},
     {APP_NUMBER, "step-deg", "D", .min = 0.2, .max = 30.0, .at = AT(o.step_deg),
      .help = "angle between the rays by which places are compared (default 1)"},

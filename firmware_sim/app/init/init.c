@@ -198,6 +198,8 @@ static int choose_output(struct init_run *run)
     if (run->output == NULL) {
         snprintf(run->default_output, sizeof run->default_output, "%.*s.yaml", stem, base);
         run->output = run->default_output;
+        const struct app_file file = {.option = "output", .path = run->output, .use = APP_WRITES};
+        if (app_add_file(&run->in, &file) != APP_OK) return APP_USAGE;
     }
     if (strlen(run->output) > CONFIG_PATH_LEN - 8)
         return app_usage(&app_init, "-o: the path is too long; allowed up to %d bytes", CONFIG_PATH_LEN - 8);
@@ -210,7 +212,8 @@ static int init(struct init_run *run, struct sh_err *err)
     struct scene *scene = NULL;
     if (!run->force && faccessat(AT_FDCWD, run->output, F_OK, AT_SYMLINK_NOFOLLOW) == 0)
         return refuse_to_overwrite(run, err);
-    int rc = init_load_mesh(&run->wish, run->name, &scene, &run->as, err);
+    int rc = app_check_files(&run->in, NULL, err);
+    if (rc == SH_OK) rc = init_load_mesh(&run->wish, run->name, &scene, &run->as, err);
     if (rc == SH_OK) rc = write_config(run, scene, err);
     scene_free(scene);
     return rc;
@@ -236,7 +239,7 @@ static int run(int argc, char **argv)
 
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
-    {APP_TEXT, "output", "FILE.yaml", .letter = 'o', .at = AT(output),
+    {APP_TEXT, "output", "FILE.yaml", .letter = 'o', .at = AT(output), .file = APP_WRITES,
      .help = "where to write; default: the mesh's name, with .yaml, in the working directory"},
     {APP_FLAG, "force", NULL, .at = AT(force), .help = "replace FILE.yaml where it is there already"},
     {APP_TEXT, "up", "y|z", .at = AT(wish.up), .help = "the axis that points up, in place of what the file says"},

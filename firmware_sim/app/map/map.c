@@ -222,6 +222,7 @@ static int run_view(struct map_run *run)
         if (run->view.cloud != NULL)
             return app_usage(&app_map, "%s and --cloud %s: one cloud is shown at a time", operand, run->view.cloud);
         if (run->in.sets.n > 0) return app_usage(&app_map, "--set: %s is no configuration", operand);
+        if (app_check_files(&run->in, NULL, &err) != SH_OK) return app_fail(&err);
         const int rc = map_view_cloud(NULL, operand, &run->plan, run->output, run->quiet, &err);
         return rc == SH_OK ? APP_OK : app_fail(&err);
     }
@@ -252,12 +253,12 @@ static int run(int argc, char **argv)
 
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
-    {APP_TEXT, "output", "FILE", .letter = 'o', .at = AT(output), .help = "where to write: .png, or .svg (points as an image, all else as vectors)"},
+    {APP_TEXT, "output", "FILE", .letter = 'o', .at = AT(output), .file = APP_WRITES, .help = "where to write: .png, or .svg (points as an image, all else as vectors)"},
     {APP_NUMBER, "pixel-m", "M", .min = 1e-4, .max = 1e4, .at = AT(pixel_m),
      .help = "side of a pixel; default: 1200 pixels on the longer side"},
     {APP_FLAG, "perspective", NULL, .at = AT(perspective),
      .help = "a picture as seen from a place, shaded by depth; the options below go with it"},
-    {APP_TEXT, "cloud", "FILE", .at = AT(view.cloud),
+    {APP_TEXT, "cloud", "FILE", .at = AT(view.cloud), .file = APP_READS,
      .help = "show this recording (.ply, .las) in place of a scan; CONFIG brings it to the scene, with its stations"},
     {APP_TEXT, "from", "DIRECTION", .at = AT(view.from), OPTION_CHOICES(map_view_winds),
      .help = "where to look from: north, north-east ..., or degrees clockwise from north (default south-west); so far that "

@@ -136,9 +136,8 @@ int raw_record(int argc, char **argv)
     if (status == APP_GO_ON && r->path == NULL) status = app_usage(&command, "-o FILE.pcapng is needed");
     if (status == APP_GO_ON) status = read_source(r);
     if (status == APP_GO_ON) {
-        const struct app_output out[] = {{"output", r->path}, {"stats", r->stats}};
         app_catch_signals();
-        int rc = app_check_outputs(&r->in, out, 2, &err);
+        int rc = app_check_files(&r->in, NULL, &err);
         if (rc == SH_OK) rc = raw_run(r, &err);
         status = rc == SH_OK ? APP_OK : app_fail(&err);
     }
@@ -152,7 +151,7 @@ int raw_record(int argc, char **argv)
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
     {APP_FLAG, "raw", NULL, .at = AT(raw), .help = "what is on the wire, whatever its protocol is, to a capture"},
-    {APP_CALL, "output", "FILE", .letter = 'o', .apply = take_file, .help = "NAME.pcapng"},
+    {APP_CALL, "output", "FILE", .letter = 'o', .apply = take_file, .file = APP_WRITES, .help = "NAME.pcapng"},
     {APP_NUMBER, "duration", "S", .min = 0.001, .max = 1e8, .at = AT(duration_s),
      .help = "end S seconds after the first packet"},
     {APP_NUMBER, "wait", "S", .min = 0.0, .max = 1e8, .at = AT(wait_s),
@@ -163,7 +162,7 @@ static const struct app_option OPTIONS[] = {
     {APP_TEXT, "relay", "[ADDRESS:]PORT", .at = AT(relay),
      .help = "of tcp: listen there (default: 127.0.0.1), and join each client to SOURCE; both directions are recorded, "
              "until Ctrl-C"},
-    {APP_TEXT, "stats", "FILE", .at = AT(stats), .help = "write packets, bytes and dropped as JSON; - is standard output"},
+    {APP_TEXT, "stats", "FILE", .at = AT(stats), .file = APP_WRITES, .help = "write packets, bytes and dropped as JSON; - is standard output"},
     {APP_WHOLE, "ready-fd", "N", .min = 1, .max = 65535, .at = AT(ready_fd),
      .help = "once it listens, write a line of JSON with the endpoint to descriptor N"},
     {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "no progress"},

@@ -199,6 +199,30 @@ static int check_repair(const struct record_line *r)
     return APP_GO_ON;
 }
 
+/* What is written beside the files of -o: of each scan, and what a mesh names. */
+static int add_names(struct record_line *r)
+{
+    static const struct {
+        const char *mesh, *ending;
+    } beside[] = {{".obj", ".mtl"},  {".obj", ".png"}, {".gltf", ".bin"},
+                  {".gltf", ".png"}, {".glb", ".png"}, {".fbx", ".png"}};
+    const int n_files = r->in.n_files;
+    int file = 0, status = APP_OK;
+    for (int i = 0; i < n_files; i++) {
+        struct app_file *named = &r->in.file[i];
+        if (named->option == NULL || strcmp(named->option, "output") != 0) continue;
+        const struct recorder_ops *ops = r->job.files.file[file++].ops; /* they came in this order */
+        named->n_ending = strlen(ops->ending);
+        named->each = r->job.files.split || r->job.each;
+        for (size_t k = 0; k < sizeof beside / sizeof beside[0] && status == APP_OK; k++) {
+            struct app_file other = *named;
+            other.ending = beside[k].ending;
+            if (strcmp(ops->ending, beside[k].mesh) == 0) status = app_add_file(&r->in, &other);
+        }
+    }
+    return status;
+}
+
 int record_line_read(struct record_line *r, int argc, char **argv)
 {
     *r = (struct record_line){.job = {.recording = {.frames = -1}}, .long_edge = -1, .sparse_seed = -1};
@@ -216,20 +240,12 @@ int record_line_read(struct record_line *r, int argc, char **argv)
     struct sh_err err = {0};
     if (r->job.each && record_files_check_each(&r->job.files, &err) != SH_OK)
         return app_usage(&app_record, "%s", err.text);
-    if (check_meshes(r) != APP_OK || check_options(r) != APP_OK || check_colours(r) != APP_OK) return APP_USAGE;
+    if (check_meshes(r) != APP_OK || check_options(r) != APP_OK || check_colours(r) != APP_OK || add_names(r) != APP_OK)
+        return APP_USAGE;
     r->job.source = r->in.operand[0];
     r->job.recording.progress = !r->quiet;
     if (r->job.station > 0) r->job.recording.first_station = r->job.recording.last_station = (uint32_t)r->job.station;
     return APP_GO_ON;
-}
-
-static int check_outputs(const struct record_line *r, struct sh_err *err)
-{
-    struct app_output out[RECORD_MAX_FILES + 2] = {{"stats", r->job.stats}, {"truth", r->job.truth}};
-    int n = 2;
-    for (int i = 0; i < r->job.files.n; i++)
-        out[n++] = (struct app_output){"output", r->job.files.file[i].path};
-    return app_check_outputs(&r->in, out, n, err);
 }
 
 static int run(int argc, char **argv)
@@ -239,14 +255,15 @@ static int run(int argc, char **argv)
     if (raw_is_wanted(argc, argv)) return raw_record(argc, argv);
     int status = record_line_read(&r, argc, argv);
     if (status != APP_GO_ON) return status;
-    if (check_outputs(&r, &err) != SH_OK) return app_fail(&err);
+    if (app_check_files(&r.in, NULL, &err) != SH_OK) return app_fail(&err);
     app_catch_signals();
     if (r.n_repairs > 0) return record_repair(r.repair, r.n_repairs, r.job.stats, r.quiet);
     if (is_config(r.job.source)) return app_with_config(&r.in, record_config, &r.job);
     if (!is_stream(r.job.source))
-        return app_usage(&app_record,
-                         "SOURCE %s: allowed usb, usb:VID:PID:SERIAL, tty:PATH, tcp:HOST:PORT, FILE.shs, FILE.pcapng, CONFIG.yaml",
-                         r.job.source);
+        return app_usage(
+            &app_record,
+            "SOURCE %s: allowed usb, usb:VID:PID:SERIAL, tty:PATH, tcp:HOST:PORT, FILE.shs, FILE.pcapng, CONFIG.yaml",
+            r.job.source);
     if (r.in.sets.n != 0) return app_usage(&app_record, "--set, --crs and --threads need a CONFIG as SOURCE");
     if (r.in.scenario != NULL || r.job.truth != NULL)
         return app_usage(&app_record, "--scenario and --truth need a CONFIG as SOURCE");
@@ -257,8 +274,8 @@ static int run(int argc, char **argv)
 
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
-    {APP_CALL, "output", "FILE", .letter = 'o', .apply = take_file, .help = "where to write; may be repeated"},
-    {APP_ALONE, "repair", "FILE", .apply = take_repair,
+    {APP_CALL, "output", "FILE", .letter = 'o', .apply = take_file, .file = APP_WRITES, .help = "where to write; may be repeated"},
+    {APP_ALONE, "repair", "FILE", .apply = take_repair, .file = APP_READS,
      .help = "instead of recording: make a whole file of what a killed recorder or a full disk has left (FILE.part), in "
              "place, and say how much that is; a whole file is checked. May be repeated; without SOURCE and -o"},
     {APP_WHOLE, "station", "N|all", .min = 1, .max = CONFIG_MAX_STOPS, .word = "all", .at = AT(job.station),
@@ -304,11 +321,11 @@ static const struct app_option OPTIONS[] = {
      .help = "of .las; 1.2 is for older readers and holds no labels, five returns of a pulse (default 1.4)"},
     {APP_FLAG, "empty-shots", NULL, .at = AT(job.files.recorder.empty_shots),
      .help = "keep shots without echo: .ply with NaN coordinates, .e57 with its invalid state"},
-    {APP_TEXT, "scenario", "FILE", .at = AT(in.scenario),
+    {APP_TEXT, "scenario", "FILE", .at = AT(in.scenario), .file = APP_READS,
      .help = "of a CONFIG: with the faults of this file (config/faults) beside its own"},
-    {APP_TEXT, "truth", "FILE", .at = AT(job.truth),
+    {APP_TEXT, "truth", "FILE", .at = AT(job.truth), .file = APP_WRITES,
      .help = "of a CONFIG: write each fault that is injected as a line of JSON; - is standard output"},
-    {APP_TEXT, "stats", "FILE", .at = AT(job.stats), .help = "write what was received as JSON; - is standard output"},
+    {APP_TEXT, "stats", "FILE", .at = AT(job.stats), .file = APP_WRITES, .help = "write what was received as JSON; - is standard output"},
     OPTION_NO_HASH(AT(job.no_hash)),
     OPTION_SET,
     {APP_KEY_GIVEN, "crs", "CRS", .key = "output.crs", .at = AT(job.crs_given),

@@ -62,7 +62,7 @@ static const struct app_option OPTIONS[] = {
      .help = "the figures as JSON, in metres: points, empty, ghosts, mean_m, rms_m, p50_m, p95_m, p999_m, max_m, "
              "beyond, far, tolerance_m, surfaces_hit, surfaces, triangles_hit, triangles, worst, verdict, all, stations, "
              "by_range, by_incidence, by_surface, distances, along_beam, shots_by_echoes"},
-    {APP_TEXT, "html", "FILE.html", .at = AT(html_path),
+    {APP_TEXT, "html", "FILE.html", .at = AT(html_path), .file = APP_WRITES,
      .help = "also writes a page with tables and pictures: one file, which needs nothing else"},
     OPTION_SET,
     OPTION_END

@@ -91,28 +91,13 @@ static int serve(const struct run_options *o, struct replay *replay, struct loop
     return rc == SH_OK ? loop_check_links(loop, err) : rc;
 }
 
-/* What is written destroys neither the recording nor the configuration, also where a link writes it. */
-static int check_outputs(const struct run_options *o, const struct config *cfg, struct sh_err *err)
-{
-    struct app_output out[2 + CONFIG_MAX_LINKS] = {{"stats", o->stats}, {"truth", o->device.truth}};
-    struct app_input in = o->in;
-    int n = 2;
-    for (uint32_t i = 0; i < cfg->n_links; i++)
-        if (cfg->link[i].type == LINK_FILE)
-            out[n++] = (struct app_output){o->config != NULL ? "config" : "link", cfg->link[i].path};
-    const int rc = app_check_outputs(&in, out, n, err);
-    in.operand[0] = o->config;
-    return rc == SH_OK ? app_check_outputs(&in, out, n, err) : rc;
-}
-
 static int replay(struct config *cfg, void *ctx, struct sh_err *err)
 {
     struct run_options *o = ctx;
     struct replay *replay = NULL;
     struct loop *loop = NULL;
     const struct loop_options options = {.hash = o->stats != NULL && !o->no_hash, .report = &app_report_stderr};
-    int rc = check_outputs(o, cfg, err);
-    if (rc == SH_OK && o->view) rc = run_add_view(cfg, err);
+    int rc = o->view ? run_add_view(cfg, err) : SH_OK;
     if (rc == SH_OK && cfg->n_links == 0)
         rc = sh_fail(err, SH_EINPUT, "%s: links: none; a replay needs at least one of pty, tcp, usb, web, file, null",
                      cfg->file);
@@ -153,7 +138,8 @@ int run_replay(struct run_options *o)
         free(cfg);
         return app_fail_config(&faults);
     }
-    const int rc = replay(cfg, o, &err);
+    int rc = app_check_files(&o->in, cfg, &err);
+    if (rc == SH_OK) rc = replay(cfg, o, &err);
     free(cfg);
     return rc == SH_OK ? APP_OK : app_fail(&err);
 }

@@ -109,9 +109,7 @@ static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
     o->device.report = &app_report_stderr;
     o->device.start |= cfg->head.start;
     o->device.one_scan = o->device.one_scan && o->device.start;
-    const struct app_output out[] = {{"stats", o->stats}, {"journal", o->device.journal}, {"truth", o->device.truth}};
-    int rc = app_check_outputs(&o->in, out, (int)(sizeof out / sizeof *out), err);
-    if (rc == SH_OK && o->view) rc = run_add_view(cfg, err);
+    int rc = o->view ? run_add_view(cfg, err) : SH_OK;
     if (rc != SH_OK) return rc;
     if (cfg->n_links == 0)
         return sh_fail(err, SH_EINPUT,
@@ -178,16 +176,16 @@ static const struct app_option OPTIONS[] = {
      .help = "frames per scan; with --start, end after the first scan, even before --duration"},
     {APP_KEY, "threads", "N", .key = "loop.threads", .help = "threads that cast; 0: one per processor"},
     OPTION_SET,
-    {APP_TEXT, "stats", "FILE", .at = AT(stats),
+    {APP_TEXT, "stats", "FILE", .at = AT(stats), .file = APP_WRITES,
      .help = "write statistics as JSON at the end, lateness with percentiles and a histogram; - is standard output"},
     OPTION_NO_HASH(AT(no_hash)),
-    {APP_TEXT, "journal", "FILE", .at = AT(device.journal),
+    {APP_TEXT, "journal", "FILE", .at = AT(device.journal), .file = APP_WRITES,
      .help = "write every command that had an effect, with its device time, and the end"},
-    {APP_TEXT, "scenario", "FILE", .at = AT(in.scenario),
+    {APP_TEXT, "scenario", "FILE", .at = AT(in.scenario), .file = APP_READS,
      .help = "with the faults of this file beside those of the configuration; a bare name is one of config/faults"},
-    {APP_TEXT, "truth", "FILE", .at = AT(device.truth),
+    {APP_TEXT, "truth", "FILE", .at = AT(device.truth), .file = APP_WRITES,
      .help = "write each fault that is injected as a line of JSON; - is standard output"},
-    {APP_TEXT, "replay-journal", "FILE", .at = AT(device.replay),
+    {APP_TEXT, "replay-journal", "FILE", .at = AT(device.replay), .file = APP_READS,
      .help = "carry out the commands of a journal at their times, and end where its run ended"},
     {APP_WHOLE, "ready-fd", "N", .min = 1, .max = 65535, .at = AT(ready_fd),
      .help = "write one JSON line with the endpoints to descriptor N once all links are open"},
@@ -203,7 +201,7 @@ static const struct app_option OPTIONS[] = {
     {APP_CALL, "link", "LINK", .apply = run_take_link,
      .help = "of a recording: serve it there: pty, tcp, usb, web, file or null; or keys as in a configuration, such as "
              "'type: tcp, port: 5025'; may be repeated (default: pty and tcp)"},
-    {APP_TEXT, "config", "CONFIG", .at = AT(config),
+    {APP_TEXT, "config", "CONFIG", .at = AT(config), .file = APP_READS,
      .help = "of a recording: links, loop and faults of a configuration; its scene is not loaded"},
     {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "no messages but errors and warnings"},
     OPTION_END
@@ -227,6 +225,7 @@ const struct app_command app_run = {
     .operand = {"CONFIG|FILE.shs"},
     .summary = "serve the head, or a recording of one, on links until stopped",
     .options = OPTIONS,
+    .opens_links = 1,
     .notes = NOTES,
     .run = run,
 };

@@ -196,9 +196,6 @@ static int soak_head(struct config *cfg, void *ctx, struct sh_err *err)
         return sh_fail(err, SH_EINPUT, "loop.pace: step, where nobody grants time; allowed realtime and fast");
     if (o->link > (long)cfg->n_links)
         return sh_fail(err, SH_EINPUT, "--link %ld: there is no such link; allowed 1 to %u", o->link, cfg->n_links);
-    const struct app_output out[] = {{"json", o->json}, {"truth", o->device.truth}};
-    int rc = app_check_outputs(&o->in, out, (int)(sizeof out / sizeof *out), err);
-    if (rc != SH_OK) return rc;
     struct soak *soak = calloc(1, sizeof *soak);
     if (soak == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     be_patient(cfg);
@@ -206,7 +203,7 @@ static int soak_head(struct config *cfg, void *ctx, struct sh_err *err)
     soak->realtime = cfg->loop.pace == PACE_REALTIME;
     soak->faults = cfg->faults;
     open_twins(cfg, soak, o);
-    rc = open_head(o, cfg, soak, &head, err);
+    int rc = open_head(o, cfg, soak, &head, err);
     if (rc == SH_OK) rc = serve(o, soak, &head, err);
     if (rc == SH_OK) rc = say_result(o, soak, err);
     loop_free(head.loop);
@@ -231,14 +228,14 @@ static int run(int argc, char **argv)
 
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
-    {APP_TEXT, "scenario", "FILE", .at = AT(in.scenario),
+    {APP_TEXT, "scenario", "FILE", .at = AT(in.scenario), .file = APP_READS,
      .help = "with the faults of this file beside those of the configuration; a bare name is one of config/faults"},
     {APP_NUMBER, "duration", "S", .min = 0.1, .max = 1e8, .at = AT(duration_s),
      .help = "faults strike for S seconds from the first points on (30); of device time in the pace fast"},
     {APP_WHOLE, "link", "N", .min = 1, .max = CONFIG_MAX_LINKS, .at = AT(link),
      .help = "a client on this link of the configuration alone"},
-    {APP_TEXT, "json", "FILE", .at = AT(json), .help = "write the sheet as JSON, too; - is standard output"},
-    {APP_TEXT, "truth", "FILE", .at = AT(device.truth),
+    {APP_TEXT, "json", "FILE", .at = AT(json), .file = APP_WRITES, .help = "write the sheet as JSON, too; - is standard output"},
+    {APP_TEXT, "truth", "FILE", .at = AT(device.truth), .file = APP_WRITES,
      .help = "write each fault that is injected as a line of JSON; - is standard output"},
     {APP_KEY, "pace", "PACE", .key = "loop.pace", .help = "realtime or fast"},
     OPTION_SET,
@@ -260,6 +257,7 @@ const struct app_command app_soak = {
     .operand = {"CONFIG"},
     .summary = "the head with faults on request and our own clients; what they noticed",
     .options = OPTIONS,
+    .opens_links = 1,
     .notes = NOTES,
     .run = run,
 };

@@ -1,4 +1,4 @@
-#include "firmware_sim/app/batch/beside.h"
+#include "firmware_sim/app/beside.h"
 
 #include <limits.h>
 #include <stdio.h>
@@ -23,10 +23,11 @@ struct search {
     struct sh_err *err;
 };
 
-/* The ending at a dot; 0: none of those. */
+/* The ending at a dot; 0: none of those. A mesh has a dot in each number: most of them end at the first test. */
 static size_t ending_at(const char *p, const char *end)
 {
     static const char *const endings[] = {".mtl", ".bin", ".png", ".jpg", ".jpeg", ".tga", ".bmp"};
+    if (end - p < 2 || strchr("mbpjt", p[1] | 0x20) == NULL) return 0;
     for (size_t i = 0; i < sizeof endings / sizeof endings[0]; i++) {
         const size_t n = strlen(endings[i]);
         if ((size_t)(end - p) >= n && strncasecmp(p, endings[i], n) == 0) return n;
@@ -142,8 +143,8 @@ static int search(struct search *s, const char *file, int depth)
     return rc;
 }
 
-int batch_beside(const char *mesh, int (*take)(void *ctx, const char *name, const char *path), void *ctx,
-                 struct sh_err *err)
+int app_beside(const char *mesh, int (*take)(void *ctx, const char *name, const char *path), void *ctx,
+               struct sh_err *err)
 {
     struct search s = {.take = take, .ctx = ctx, .err = err};
     const char *slash = strrchr(mesh, '/');

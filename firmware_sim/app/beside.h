@@ -4,14 +4,14 @@
  * It doesn't read formats. A name is what ends in such an ending and leads to a file, as it stands or by its last
  * part, from the mesh's folder. So it may find more than a reader opens, but nothing less unless a name is coded
  * otherwise than with %20. */
-#ifndef FIRMWARE_SIM_APP_BATCH_BESIDE_H
-#define FIRMWARE_SIM_APP_BATCH_BESIDE_H
+#ifndef FIRMWARE_SIM_APP_BESIDE_H
+#define FIRMWARE_SIM_APP_BESIDE_H
 
 #include "core/err.h"
 
 /* `take` gets the name as it stands, and the path; what it returns, if not SH_OK, ends the search. .ply and .stl name no
  * files. */
-int batch_beside(const char *mesh, int (*take)(void *ctx, const char *name, const char *path), void *ctx,
+int app_beside(const char *mesh, int (*take)(void *ctx, const char *name, const char *path), void *ctx,
                  struct sh_err *err);
 
 #endif
