@@ -36,6 +36,12 @@ struct app_output {
 /* Before any is opened: each is another file, and none is the configuration or the scenario. */
 int app_check_outputs(const struct app_input *in, const struct app_output *out, int n, struct sh_err *err);
 
+/* From here on to app_end_messages a thread writes what the reports below say to standard error. So no thread of a head
+ * waits for whoever reads it, or doesn't. What finds no room in 64 KiB is dropped, and its number is said there. The end
+ * gives a reader that stands still 2 s. */
+int app_begin_messages(struct sh_err *err);
+void app_end_messages(void);
+
 /* Warnings and progress to standard error, each line with the program's name. Asks to stop once
  * interrupted. */
 extern const struct sh_report app_report_stderr;

@@ -59,7 +59,6 @@ static int serve(const struct run_options *o, struct loop *loop, struct device *
 {
     struct loop_stats stats;
     int rc = run_serve(o, loop, &stats, err);
-    if (rc == SH_OK) rc = device_close_journal(device, err);
     if (rc == SH_OK) rc = loop_check_links(loop, err);
     say_short_scan(o, device);
     run_warn_losses(&stats.counters);

@@ -142,12 +142,21 @@ static void put_stats(struct json *json, const void *ctx)
     json_uint(json, "late_blocks", c->late_blocks);
     json_uint(json, "late_poses", c->late_poses);
     json_uint(json, "bad_poses", c->bad_poses);
+    json_uint(json, "lost_journal_lines", c->lost_journal_lines);
+    json_uint(json, "lost_truth_lines", c->lost_truth_lines);
     put_lateness(json, "late", s->late);
     put_lateness(json, "wake", s->wake);
     json_int(json, "rss_peak_kib", usage.ru_maxrss);
     json_string(json, "stream_sha256", s->have_hash ? s->sha256 : NULL);
     loop_put_links(run->loop, json);
     json_close_object(json);
+}
+
+static void warn_lines(const char *file, uint64_t n)
+{
+    if (n != 0)
+        sh_warn(&app_report_stderr, "%s: %llu lines are missing in its file, which could not be written in time", file,
+                (unsigned long long)n);
 }
 
 void run_warn_losses(const struct device_counters *c)
@@ -159,12 +168,15 @@ void run_warn_losses(const struct device_counters *c)
     if (c->reader_lost_frames != 0)
         sh_warn(&app_report_stderr, "readers lost %llu frames with %llu pulses",
                 (unsigned long long)c->reader_lost_frames, (unsigned long long)c->reader_lost_pulses);
+    warn_lines("journal", c->lost_journal_lines);
+    warn_lines("truth", c->lost_truth_lines);
 }
 
 int run_serve(const struct run_options *o, struct loop *loop, struct loop_stats *stats, struct sh_err *err)
 {
     struct run_stats run = {.loop = loop};
-    int rc = loop_start(loop, err);
+    int rc = app_begin_messages(err);
+    if (rc == SH_OK) rc = loop_start(loop, err);
     if (rc == SH_OK) rc = app_say_ready(o->ready_fd, put_endpoints, loop, err);
     if (rc == SH_OK && o->view) rc = say_view(loop, err);
     if (rc == SH_OK) rc = notify_ready(loop, err);
@@ -173,7 +185,10 @@ int run_serve(const struct run_options *o, struct loop *loop, struct loop_stats 
     else
         loop_end(loop);
     loop_join(loop, stats);
+    app_end_messages();
+    struct sh_err why = {0};
+    const int files_rc = loop_close_files(loop, stats, &why);
     run.stats = *stats;
     if (rc == SH_OK && o->stats != NULL) rc = app_write_json(o->stats, put_stats, &run, err);
-    return rc;
+    return rc == SH_OK && files_rc != SH_OK ? sh_fail(err, files_rc, "%s", why.text) : rc;
 }
