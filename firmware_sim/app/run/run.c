@@ -68,10 +68,11 @@ static int serve(const struct run_options *o, struct loop *loop, struct device *
 static void warn_of_replay(const struct run_options *o, const struct device *device)
 {
     if (o->device.replay == NULL || device_replay_ends(device) || o->device.duration_s > 0.0) return;
-    sh_warn(&app_report_stderr,
-            "%s has no end, as its head was killed; after its last command the head runs until it is stopped, or for "
-            "--duration S",
-            o->device.replay);
+    sh_warn(
+        &app_report_stderr,
+        "%s has no end: its head was killed, or could not write it; after its last command the head runs until it is "
+        "stopped, or for --duration S",
+        o->device.replay);
 }
 
 /* What a page is told beside the stream; where there is no web link there is nothing to tell. Where its readers hold

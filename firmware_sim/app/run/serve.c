@@ -152,13 +152,6 @@ static void put_stats(struct json *json, const void *ctx)
     json_close_object(json);
 }
 
-static void warn_lines(const char *file, uint64_t n)
-{
-    if (n != 0)
-        sh_warn(&app_report_stderr, "%s: %llu lines are missing in its file, which could not be written in time", file,
-                (unsigned long long)n);
-}
-
 void run_warn_losses(const struct device_counters *c)
 {
     if (c->lost_pulses != 0)
@@ -168,8 +161,23 @@ void run_warn_losses(const struct device_counters *c)
     if (c->reader_lost_frames != 0)
         sh_warn(&app_report_stderr, "readers lost %llu frames with %llu pulses",
                 (unsigned long long)c->reader_lost_frames, (unsigned long long)c->reader_lost_pulses);
-    warn_lines("journal", c->lost_journal_lines);
-    warn_lines("truth", c->lost_truth_lines);
+}
+
+static void warn_lines(const char *file, uint64_t n)
+{
+    if (n != 0)
+        sh_warn(&app_report_stderr, "%s: %llu lines are missing in its file, which could not be written in time", file,
+                (unsigned long long)n);
+}
+
+/* The journal and the truth. What is missing in them is said once: with the reason, or in a warning. */
+static int close_files(struct loop *loop, struct loop_stats *stats, struct sh_err *err)
+{
+    const int rc = loop_close_files(loop, stats, err);
+    if (rc != SH_OK) return rc;
+    warn_lines("journal", stats->counters.lost_journal_lines);
+    warn_lines("truth", stats->counters.lost_truth_lines);
+    return SH_OK;
 }
 
 int run_serve(const struct run_options *o, struct loop *loop, struct loop_stats *stats, struct sh_err *err)
@@ -187,7 +195,7 @@ int run_serve(const struct run_options *o, struct loop *loop, struct loop_stats 
     loop_join(loop, stats);
     app_end_messages();
     struct sh_err why = {0};
-    const int files_rc = loop_close_files(loop, stats, &why);
+    const int files_rc = close_files(loop, stats, &why);
     run.stats = *stats;
     if (rc == SH_OK && o->stats != NULL) rc = app_write_json(o->stats, put_stats, &run, err);
     return rc == SH_OK && files_rc != SH_OK ? sh_fail(err, files_rc, "%s", why.text) : rc;
