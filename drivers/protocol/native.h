@@ -227,6 +227,7 @@ struct native_telemetry {
     uint64_t reader_lost_frames;               /* of the reader who gets this frame; 0 in the common stream */
     int64_t utc_ns;                            /* UTC of this frame's device time, ns since 1970, 0 when unknown */
     uint64_t scan_fired, scan_cast, scan_lost; /* pulses of that scan up to here */
+    uint64_t lost_lines; /* that the head's files lack; 0 is not sent, and is what a payload has that ends before it */
 };
 
 enum native_event_code {

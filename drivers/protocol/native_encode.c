@@ -69,7 +69,8 @@ size_t native_encode_emitter(uint8_t *dst, size_t cap, const struct native_emitt
 
 size_t native_encode_telemetry(uint8_t *dst, size_t cap, const struct native_telemetry *t, int64_t t_ns, int flags)
 {
-    return encode_fixed(dst, cap, &fields_telemetry, t, t_ns, flags);
+    const struct field_table *table = t->lost_lines != 0 ? &fields_telemetry_lines : &fields_telemetry;
+    return encode_fixed(dst, cap, table, t, t_ns, flags);
 }
 
 size_t native_encode_event(uint8_t *dst, size_t cap, const struct native_event *e, int64_t t_ns, int flags)

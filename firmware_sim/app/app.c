@@ -2,6 +2,8 @@
 
 #include <errno.h>
 #include <math.h>
+#include <pthread.h>
+#include <stdarg.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,6 +13,7 @@
 #include "core/newfile.h"
 #include "firmware_sim/app/progress.h"
 #include "firmware_sim/base/clock.h"
+#include "firmware_sim/base/line_writer.h"
 
 static atomic_int interrupted; /* lock-free, as a handler needs it; other threads ask for it, too */
 
@@ -109,13 +112,54 @@ static int is_new(const char *text)
     return 1;
 }
 
+static pthread_mutex_t messages_lock = PTHREAD_MUTEX_INITIALIZER;
+static struct line_writer *messages; /* NULL: who has a message prints it */
+
+static void say_gap(char text[LINE_GAP_BYTES], const uint64_t lost[LINE_KINDS])
+{
+    snprintf(text, LINE_GAP_BYTES, "scanhead: %llu messages are missing here: nobody read them\n",
+             (unsigned long long)lost[LINE_PLAIN]);
+}
+
+int app_begin_messages(struct sh_err *err)
+{
+    const int fd = dup(STDERR_FILENO);
+    if (fd < 0) return SH_OK; /* there is no standard error, and nothing to wait for */
+    const struct line_writer_spec spec = {
+        .fd = fd, .what = "messages", .path = "standard error", .room = 65536, .gap = say_gap};
+    return line_writer_open(&spec, &messages, err);
+}
+
+void app_end_messages(void)
+{
+    pthread_mutex_lock(&messages_lock);
+    struct line_writer *writer = messages;
+    messages = NULL;
+    pthread_mutex_unlock(&messages_lock);
+    line_writer_close(writer, NULL, NULL); /* there is nobody to tell */
+}
+
+__attribute__((format(printf, 1, 2))) static void print(const char *fmt, ...)
+{
+    char text[LINE_MOST_BYTES];
+    va_list ap;
+    va_start(ap, fmt);
+    vsnprintf(text, sizeof text, fmt, ap);
+    va_end(ap);
+    pthread_mutex_lock(&messages_lock);
+    const int is_put = messages != NULL;
+    if (is_put) line_writer_put(messages, LINE_PLAIN, text, strlen(text));
+    pthread_mutex_unlock(&messages_lock);
+    if (!is_put) fputs(text, stderr);
+}
+
 static void print_warning(void *ctx, const char *text)
 {
     (void)ctx;
     if (warned_of == NULL)
-        fprintf(stderr, "scanhead: warning: %s\n", text);
+        print("scanhead: warning: %s\n", text);
     else if (is_new(text))
-        fprintf(stderr, "scanhead: warning: %s: %s\n", warned_of, text);
+        print("scanhead: warning: %s: %s\n", warned_of, text);
 }
 
 static void print_progress(void *ctx, const char *what, double fraction)
@@ -127,9 +171,9 @@ static void print_progress(void *ctx, const char *what, double fraction)
     if (left_s >= 0.0 && left_s < 120.0) snprintf(left, sizeof left, ", %.0f s left", ceil(left_s));
     if (left_s >= 120.0) snprintf(left, sizeof left, ", %.0f min left", ceil(left_s / 60.0));
     if (fraction < 0.0)
-        fprintf(stderr, "scanhead: %s ...\n", what);
+        print("scanhead: %s ...\n", what);
     else
-        fprintf(stderr, "scanhead: %s: %.0f %%%s\n", what, 100.0 * fraction, left);
+        print("scanhead: %s: %.0f %%%s\n", what, 100.0 * fraction, left);
 }
 
 static void print_each_second(void *ctx, const char *what, double fraction)

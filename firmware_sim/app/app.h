@@ -33,6 +33,12 @@ int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, 
  * app_with_config calls it; commands without a configuration call it themselves. */
 int app_check_files(const struct app_input *in, const struct config *cfg, struct sh_err *err);
 
+/* From here on to app_end_messages a thread writes what the reports below say to standard error. So no thread of a head
+ * waits for whoever reads it, or doesn't. What finds no room in 64 KiB is dropped, and its number is said there. The end
+ * gives a reader that stands still 2 s. */
+int app_begin_messages(struct sh_err *err);
+void app_end_messages(void);
+
 /* Warnings and progress to standard error, each line with the program's name. Asks to stop once
  * interrupted. */
 extern const struct sh_report app_report_stderr;

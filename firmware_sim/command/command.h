@@ -1,7 +1,7 @@
 /* The command set: one SCPI-style line in, one reply line out, and the error queue of SCPI-99 (21.8).
  *
  *   common    *IDN?  *RST  *CLS  *OPC?  *STB?  HELP?  HELP:SETtings?
- *   system    SYSTem:ERRor[:NEXT]?  SYSTem:ERRor:COUNt?  SYSTem:VERSion?  SYSTem:PLAN?
+ *   system    SYSTem:ERRor[:NEXT]?  SYSTem:ERRor:COUNt?  SYSTem:LOST?  SYSTem:VERSion?  SYSTem:PLAN?
  *             SYSTem:CONTrol?  SYSTem:CONTrol:RELease
  *   head      HEAD:PRR  HEAD:LINes  HEAD:PAN  HEAD:STATION  HEAD:STATe?  HEAD:RANGe:MIN  HEAD:RANGe:MAX
  *             HEAD:NOISe  HEAD:NOISe:ANGLe  HEAD:NOISe:SIGMa  HEAD:NOISe:BALL
@@ -79,6 +79,7 @@ enum command_error {
     CMD_E_PULSES = 103,      /* the head could not keep up; pulses lost */
     CMD_E_REFUSED = 104,     /* a client was turned away: all sessions taken */
     CMD_E_PARTIAL = 105,     /* a client went away in the middle of a command */
+    CMD_E_LINES = 106,       /* lines of a file were dropped: it is too slow, or full */
 };
 
 struct command_queue {
@@ -133,6 +134,7 @@ struct command_device {
     struct command_queue queue;
     uint32_t control;      /* session that may change things; 0: none, the next one that does takes it */
     uint64_t frames_done;  /* of the scan at hand or the last one */
+    uint64_t lost_journal_lines, lost_truth_lines; /* that their files lack */
     int64_t t_ns;          /* device time */
     char utc[40], gps[40]; /* the same as time of day, by the clock of the head; empty: unknown */
     int step_allowed;      /* 1 when the pace is `step` */

@@ -98,6 +98,12 @@ static int query_plan(struct command_call *call)
     return command_reply(call, "%s", call->dev->plan != NULL ? call->dev->plan : "not known");
 }
 
+static int query_lost(struct command_call *call)
+{
+    return command_reply(call, "%llu,%llu", (unsigned long long)call->dev->lost_journal_lines,
+                         (unsigned long long)call->dev->lost_truth_lines);
+}
+
 static int query_version(struct command_call *call)
 {
     return command_reply(call, "1999.0");
@@ -233,6 +239,7 @@ const struct command_row command_rows[] = {
     QUERY("*STB", query_stb),
     QUERY("SYSTem:ERRor[:NEXT]", query_error),
     QUERY("SYSTem:ERRor:COUNt", query_error_count),
+    QUERY("SYSTem:LOST", query_lost),
     QUERY("SYSTem:VERSion", query_version),
     QUERY("SYSTem:CONTrol", query_control),
     QUERY("SYSTem:PLAN", query_plan),

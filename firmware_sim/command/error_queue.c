@@ -25,6 +25,7 @@ static const struct {
     {CMD_E_PULSES, "Pulses lost"},
     {CMD_E_REFUSED, "Client refused"},
     {CMD_E_PARTIAL, "Incomplete command"},
+    {CMD_E_LINES, "Lines lost"},
 };
 
 const char *command_error_text(int number)

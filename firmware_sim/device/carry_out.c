@@ -83,6 +83,8 @@ static void do_command(struct device *device, uint32_t session, const char *line
     cmd->t_ns = (int64_t)released * device->tick_ns;
     device->desk.now_ns = (int64_t)device->next_tick * device->tick_ns;
     cmd->fixed = why_fixed(device, session);
+    cmd->lost_journal_lines = atomic_load(&device->counters.lost_journal_lines);
+    cmd->lost_truth_lines = atomic_load(&device->counters.lost_truth_lines);
     device_set_time_texts(device);
     if (session != 0 && device_is_dead(device, released)) {
         do_dead(device, session, line, released, out);

@@ -139,11 +139,11 @@ static int open_journals(struct device *device, struct sh_err *err)
     int rc = journal_check_paths(device->options.journal, device->options.replay, err);
     if (rc == SH_OK && device->options.replay != NULL) rc = open_replay(device, err);
     if (rc != SH_OK || device->options.journal == NULL) return rc;
-    device->journal.out = journal_open(device->options.journal, err);
+    device->journal.out = journal_open(device->options.journal, &device->counters.lost_journal_lines, err);
     if (device->journal.out == NULL) return err->code;
     char note[16 + sizeof device->plan];
     snprintf(note, sizeof note, "plan: %s", device->plan);
-    journal_note(device->journal.out, note); /* what went wrong, journal_close says */
+    journal_note(device->journal.out, note);
     return SH_OK;
 }
 
@@ -189,13 +189,18 @@ int device_replay_ends(const struct device *device)
 int device_close_journal(struct device *device, struct sh_err *err)
 {
     const uint64_t tick = device->journal.end_tick;
-    if (device->journal.out != NULL && device->over) /* what went wrong, journal_close says */
+    if (device->journal.out != NULL && device->over)
         journal_end(device->journal.out, tick, (int64_t)tick * device->tick_ns);
     int rc = journal_close(device->journal.out, err);
     device->journal.out = NULL;
     struct sh_err why;
     const int truth_rc = fault_board_close(device->faults, &why);
     return rc != SH_OK || truth_rc == SH_OK ? rc : sh_fail(err, truth_rc, "%s", why.text);
+}
+
+int device_files_fill(const struct device *device)
+{
+    return journal_is_filling(device->journal.out) || fault_board_is_filling(device->faults);
 }
 
 void device_free(struct device *device)
@@ -264,6 +269,7 @@ int device_claim(struct device *device, struct device_work *work)
     if (!off) {
         device_say_overrun(device, tick);
         device_say_held(device, tick);
+        device_say_lost_lines(device, tick);
         device_say_pps(device, tick);
     }
     const int repeated = device_is_repeated(device, tick);

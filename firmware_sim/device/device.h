@@ -36,6 +36,7 @@ struct device_counters {
     _Atomic uint64_t reader_lost_frames, reader_lost_pulses; /* left out for readers that were too slow */
     /* live: poses that were made up because none came in time, and poses that came and could not be used */
     _Atomic uint64_t late_poses, bad_poses;
+    _Atomic uint64_t lost_journal_lines, lost_truth_lines; /* their files were too slow, or could not be written */
 };
 
 /* What becomes of the power in a tick. */
@@ -109,8 +110,11 @@ int device_create(const struct site *site, const struct device_options *options,
 void device_free(struct device *device);
 /* 1: the replayed journal ends the run. 0: it has no end, or there is none. */
 int device_replay_ends(const struct device *device);
-/* Ends and closes the journal, if there is one. Returns the first error in writing it. After the loop is joined. */
+/* Ends and closes the journal and the file of the truth, where they are. Returns the first error in writing them; what is
+ * not in them is counted. It gives files that stand still 2 s. After the loop is joined. */
 int device_close_journal(struct device *device, struct sh_err *err);
+/* One of these files is behind: time should wait where it can, so that nothing is dropped. Any thread; takes no lock. */
+int device_files_fill(const struct device *device);
 
 /* The faults on request of the configuration and of commands; the device's. */
 struct fault_board *device_faults(const struct device *device);

@@ -11,7 +11,8 @@ static void write_note(void *ctx, const struct fault_note *note)
 
 int device_open_faults(struct device *device, struct sh_err *err)
 {
-    const int rc = fault_board_create(&device->site->cfg->faults, device->options.truth, &device->faults, err);
+    const int rc = fault_board_create(&device->site->cfg->faults, device->options.truth,
+                                      &device->counters.lost_truth_lines, &device->faults, err);
     if (rc != SH_OK) return rc;
     fault_board_listen(device->faults, write_note, device);
     head_faults_init(&device->head_faults, device->faults, device->tick_ns);

@@ -112,6 +112,12 @@ struct device_beam {
     struct device_upset now; /* what all that strike do together */
 };
 
+/* Lines that files of the head lack (device_files_fill), as far as events have said so. */
+struct device_lost_lines {
+    uint64_t said;
+    uint64_t tick; /* of the last event; 0: there was none */
+};
+
 /* The journal that is written, and the one that is replayed. */
 struct device_journal {
     struct journal *out; /* NULL: none */
@@ -173,6 +179,7 @@ struct device {
     struct device_errors errors[DEVICE_MAX_SESSIONS + 1]; /* of session i; 0: the head */
     uint64_t held;                                        /* errors in all that no event has said */
     struct device_overrun overrun;
+    struct device_lost_lines lost_lines;
     struct device_live live;
     struct device_journal journal;
     struct fault_board *faults;
@@ -226,6 +233,8 @@ void device_describe(struct device *device, struct device_work *work);
 
 /* overrun.c: an event for what was lost since the last one. */
 void device_say_overrun(struct device *device, uint64_t tick);
+/* Likewise for lines, once a second at most. */
+void device_say_lost_lines(struct device *device, uint64_t tick);
 
 /* carry_out.c */
 /* Commands of the replayed journal that are due at the tick. Returns 1 when one of them moves a station: that has to be

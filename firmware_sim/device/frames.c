@@ -130,6 +130,7 @@ void device_fill_telemetry(const struct device *device, uint64_t tick, struct na
     t->late_blocks = atomic_load(&c->late_blocks);
     t->late_max_us = (uint32_t)(atomic_load(&c->late_max_ns) / 1000);
     t->errors_queued = device->cmd.queue.count;
+    t->lost_lines = atomic_load(&c->lost_journal_lines) + atomic_load(&c->lost_truth_lines);
     if (device->clock.source != EPOCH_NONE)
         t->utc_ns =
             utc_posix_from_tai(&device->clock.table, head_clock_ns(&device->clock, (int64_t)tick * device->tick_ns));

@@ -12,48 +12,58 @@
 #include "core/grow.h"
 #include "core/infile.h"
 #include "core/newfile.h"
+#include "firmware_sim/base/line_writer.h"
 
-static const char title[] = "# scanhead journal 1";
+static const char title[] = "# scanhead journal 1\n";
 static const char end_line[] = "END"; /* no command has this name */
+static const char lost_line[] = "LOST ";
+
+enum { QUEUE_BYTES = 1 << 20, LINE_ROOM = COMMAND_MAX_LINE + 64, TITLE_LEN = sizeof title - 2 };
 
 struct journal {
-    FILE *file;
-    const char *path; /* the caller's */
-    _Atomic int error; /* errno of the first failure; notes come from several threads */
+    struct line_writer *lines;
+    char last[LINE_ROOM]; /* the end of the run; empty: none is known */
 };
 
-/* Prints text and flushes it; fails once something went wrong. */
-__attribute__((format(printf, 2, 3))) static int put(struct journal *journal, const char *fmt, ...)
+/* A remark that is missing does no harm to a replay, a command does: that line is none that a reader takes. */
+static void say_gap(char text[LINE_GAP_BYTES], const uint64_t lost[LINE_KINDS])
 {
-    va_list ap;
-    if (journal->error != 0) return SH_EIO;
-    va_start(ap, fmt);
-    if (vfprintf(journal->file, fmt, ap) < 0 || fflush(journal->file) != 0) journal->error = errno;
-    va_end(ap);
-    return journal->error == 0 ? SH_OK : SH_EIO;
+    int n = 0;
+    text[0] = '\0';
+    if (lost[LINE_REMARK] != 0)
+        n = snprintf(text, LINE_GAP_BYTES, "# missing here: %" PRIu64 " remarks\n", lost[LINE_REMARK]);
+    if (lost[LINE_PLAIN] != 0)
+        snprintf(text + n, LINE_GAP_BYTES - (size_t)n, "%s%" PRIu64 "\n", lost_line, lost[LINE_PLAIN]);
 }
 
-struct journal *journal_open(const char *path, struct sh_err *err)
+/* The first line shows whether the file can be written at all, before anything runs. */
+static int write_title(int fd)
 {
-    struct journal *journal = calloc(1, sizeof *journal);
-    if (journal == NULL) {
-        sh_fail(err, SH_ENOMEM, "journal: no memory");
-        return NULL;
-    }
+    const ssize_t n = write(fd, title, sizeof title - 1);
+    if (n == (ssize_t)sizeof title - 1) return 0;
+    return n < 0 ? errno : EIO;
+}
+
+struct journal *journal_open(const char *path, _Atomic uint64_t *lost, struct sh_err *err)
+{
     struct sh_err why = {0};
     int fd, rc = newfile_open(path, &fd, &why);
     if (rc != SH_OK) {
         sh_fail(err, rc, "journal: %s", why.text);
-        free(journal);
         return NULL;
     }
-    *journal = (struct journal){.path = path, .file = fdopen(fd, "w")};
-    if (journal->file == NULL) {
-        journal->error = errno;
+    const int error = write_title(fd);
+    struct journal *journal = error == 0 ? calloc(1, sizeof *journal) : NULL;
+    if (journal == NULL) {
         close(fd);
+        sh_fail(err, error != 0 ? SH_EIO : SH_ENOMEM, "journal: %s: %s", path,
+                error != 0 ? strerror(error) : "no memory");
+        return NULL;
     }
-    if (put(journal, "%s\n", title) == SH_OK) return journal;
-    journal_close(journal, err);
+    const struct line_writer_spec spec = {
+        .fd = fd, .what = "journal", .path = path, .room = QUEUE_BYTES, .lost = lost, .gap = say_gap};
+    if (line_writer_open(&spec, &journal->lines, err) == SH_OK) return journal;
+    free(journal);
     return NULL;
 }
 
@@ -66,15 +76,24 @@ static int is_command_line(const char *line)
     return 1;
 }
 
+/* With its '\n', into a buffer of LINE_ROOM bytes. Returns its length. */
+static size_t compose(char *text, uint64_t tick, int64_t t_ns, uint32_t session, const char *line)
+{
+    return (size_t)snprintf(text, LINE_ROOM, "%" PRIu64 " %" PRId64 " %" PRIu32 " %s\n", tick, t_ns, session, line);
+}
+
 int journal_write(struct journal *journal, uint64_t tick, int64_t t_ns, uint32_t session, const char *line)
 {
+    char text[LINE_ROOM];
     if (t_ns < 0 || !is_command_line(line)) return SH_EINPUT;
-    return put(journal, "%" PRIu64 " %" PRId64 " %" PRIu32 " %s\n", tick, t_ns, session, line);
+    return line_writer_put(journal->lines, LINE_PLAIN, text, compose(text, tick, t_ns, session, line));
 }
 
 int journal_end(struct journal *journal, uint64_t tick, int64_t t_ns)
 {
-    return journal_write(journal, tick, t_ns, 0, end_line);
+    if (t_ns < 0) return SH_EINPUT;
+    compose(journal->last, tick, t_ns, 0, end_line);
+    return SH_OK;
 }
 
 int journal_is_end(const struct journal_entry *entry)
@@ -82,18 +101,22 @@ int journal_is_end(const struct journal_entry *entry)
     return entry->session == 0 && strcmp(entry->line, end_line) == 0;
 }
 
-int journal_note(struct journal *journal, const char *text)
+int journal_note(struct journal *journal, const char *note)
 {
-    if (!is_command_line(text)) return SH_EINPUT;
-    return put(journal, "# %s\n", text);
+    char text[LINE_ROOM];
+    if (!is_command_line(note)) return SH_EINPUT;
+    return line_writer_put(journal->lines, LINE_REMARK, text, (size_t)snprintf(text, sizeof text, "# %s\n", note));
+}
+
+int journal_is_filling(const struct journal *journal)
+{
+    return journal != NULL && line_writer_is_filling(journal->lines);
 }
 
 int journal_close(struct journal *journal, struct sh_err *err)
 {
     if (journal == NULL) return SH_OK;
-    int error = journal->error;
-    if (journal->file != NULL && fclose(journal->file) != 0 && error == 0) error = errno;
-    const int rc = error == 0 ? SH_OK : sh_fail(err, SH_EIO, "journal: %s: %s", journal->path, strerror(error));
+    const int rc = line_writer_close(journal->lines, journal->last, err);
     free(journal);
     return rc;
 }
@@ -174,6 +197,11 @@ static int read_line(struct reader *reader, struct sh_err *err)
 
 static int add_entry(struct reader *reader, struct sh_err *err)
 {
+    if (strncmp(reader->text, lost_line, sizeof lost_line - 1) == 0)
+        return fail_line(reader, err,
+                         "%.20s commands are missing here, which could not be written in time; a journal can be "
+                         "replayed only whole",
+                         reader->text + sizeof lost_line - 1);
     if (reader->n == MAX_ENTRIES)
         return fail_line(reader, err, "too many commands; allowed up to %d in a journal", MAX_ENTRIES);
     if (!grow(&reader->entry, &reader->capacity, reader->n + 1, sizeof *reader->entry))
@@ -188,9 +216,9 @@ static int read_all(struct reader *reader, struct sh_err *err)
 {
     int rc = read_line(reader, err);
     if (rc < 0) return rc;
-    if (rc == 0 || strcmp(reader->text, title) != 0)
-        return sh_fail(err, SH_EINPUT, "journal: %s:1: not a journal; the first line must be '%s'", reader->path,
-                       title);
+    if (rc == 0 || strlen(reader->text) != TITLE_LEN || memcmp(reader->text, title, TITLE_LEN) != 0)
+        return sh_fail(err, SH_EINPUT, "journal: %s:1: not a journal; the first line must be '%.*s'", reader->path,
+                       TITLE_LEN, title);
     while (rc >= 0 && (rc = read_line(reader, err)) > 0)
         if (reader->text[0] != '#' && reader->text[0] != '\0') rc = add_entry(reader, err);
     return rc;

@@ -6,7 +6,10 @@
  * with decimal numbers and one blank between them. The last line has the session 0 and END in place of a command:
  * the run ended at that tick. It is missing where the head was killed. Other lines that begin with '#' and empty
  * lines are notes.
- * Not real-time safe: each line is written and flushed at once, so that a crash loses none. */
+ *
+ * A thread writes the lines at once (line_writer.h), so whoever writes the journal never waits for its file. Where that is
+ * slower than commands come, some are dropped: a line `LOST <n>` stands for n of them. journal_read refuses such a file. A
+ * note stands for notes that are missing, which no replay needs. */
 #ifndef FIRMWARE_SIM_DEVICE_JOURNAL_H
 #define FIRMWARE_SIM_DEVICE_JOURNAL_H
 
@@ -18,23 +21,26 @@
 
 struct journal;
 
-/* Begins a new file; path must outlive the journal. NULL on failure, with the reason in err; journal_close
- * releases. */
-struct journal *journal_open(const char *path, struct sh_err *err);
+/* Begins a new file; path must outlive the journal. *lost counts the lines that are not in it; NULL: nobody asks. NULL on
+ * failure, with the reason in err; journal_close releases. */
+struct journal *journal_open(const char *path, _Atomic uint64_t *lost, struct sh_err *err);
 
-/* Adds a line. SH_EINPUT: t_ns is negative, or line is empty, too long or not printable ASCII; nothing is
- * written. SH_EIO: the file could not be written; this and all later calls fail, and journal_close has the
- * reason. */
+/* Adds a line; waits for nothing. SH_EINPUT: t_ns is negative, or line is empty, too long or not printable ASCII; nothing
+ * is written. SH_ELOST: the file is too slow, and the line is dropped. SH_EIO: the file can't be written; so it is with all
+ * later calls, and journal_close has the reason. */
 int journal_write(struct journal *journal, uint64_t tick, int64_t t_ns, uint32_t session, const char *line);
 
-/* The run ended at this tick. Failures as in journal_write. */
+/* The run ended at this tick; journal_close writes it. SH_EINPUT: t_ns is negative. */
 int journal_end(struct journal *journal, uint64_t tick, int64_t t_ns);
 
 /* A note, which replaying passes over: one printable line. Failures as in journal_write. */
 int journal_note(struct journal *journal, const char *text);
 
-/* Closes and releases. The first thing that went wrong in writing, with its text, or 0. NULL is nothing to
- * close. */
+/* Who can wait should, so that nothing is dropped. NULL never is. */
+int journal_is_filling(const struct journal *journal);
+
+/* Writes what is left, as long as the file takes some of it every 2 s, closes and releases. The first thing that went
+ * wrong in writing, with its text, or 0. NULL is nothing to close. */
 int journal_close(struct journal *journal, struct sh_err *err);
 
 struct journal_entry {

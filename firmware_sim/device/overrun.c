@@ -1,5 +1,6 @@
-/* Ticks and pulses that the head could not compute in time: counted here (lost_pulses, lost_ticks), and
- * announced in an event. Frames that a slow reader lost are another matter: loop/lost_frames.c. */
+/* What the head loses, announced in events. Ticks and pulses that it could not compute in time are counted here
+ * (lost_pulses, lost_ticks). Lines of its files are counted by who writes them (base/line_writer.h), frames that a slow
+ * reader lost by loop/lost_frames.c. */
 #include <stdio.h>
 #include <string.h>
 
@@ -23,6 +24,23 @@ void device_say_overrun(struct device *device, uint64_t tick)
     device->overrun.ticks_said = ticks;
     device->overrun.pulses_said = pulses;
     device->overrun.first = UINT64_MAX;
+}
+
+/* The event once a second, the error once per episode. */
+void device_say_lost_lines(struct device *device, uint64_t tick)
+{
+    struct device_lost_lines *said = &device->lost_lines;
+    const uint64_t journal = atomic_load(&device->counters.lost_journal_lines);
+    const uint64_t truth = atomic_load(&device->counters.lost_truth_lines);
+    char text[96];
+    if (journal + truth == said->said || (said->tick != 0 && tick - said->tick < device->tick_hz)) return;
+    snprintf(text, sizeof text, "so far of the journal %llu, of the truth %llu", (unsigned long long)journal,
+             (unsigned long long)truth);
+    device_push_error(device, 0, CMD_E_LINES, text);
+    if (said->tick == 0 || tick - said->tick > 2 * device->tick_hz)
+        command_queue_push(&device->cmd.queue, CMD_E_LINES, text);
+    said->tick = tick;
+    said->said = journal + truth;
 }
 
 /* Events of a lost tick go before those that came later. An overrun event is taken back instead: the next one

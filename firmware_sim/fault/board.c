@@ -25,8 +25,8 @@ struct fault_board {
     uint32_t n_listeners;
 };
 
-int fault_board_create(const struct fault_list *list, const char *truth_path, struct fault_board **out,
-                       struct sh_err *err)
+int fault_board_create(const struct fault_list *list, const char *truth_path, _Atomic uint64_t *lost,
+                       struct fault_board **out, struct sh_err *err)
 {
     struct fault_board *board = calloc(1, sizeof *board);
     *out = NULL;
@@ -34,7 +34,7 @@ int fault_board_create(const struct fault_list *list, const char *truth_path, st
     int rc = grow(&board->injected, &board->counted, FAULT_MAX + 1, sizeof *board->injected)
                  ? SH_OK
                  : sh_fail(err, SH_ENOMEM, "faults: no memory");
-    if (rc == SH_OK) rc = truth_open(truth_path, &board->truth, err);
+    if (rc == SH_OK) rc = truth_open(truth_path, lost, &board->truth, err);
     if (rc != SH_OK) {
         free(board->injected);
         free(board);
@@ -57,6 +57,11 @@ int fault_board_close(struct fault_board *board, struct sh_err *err)
     const int rc = truth_close(board->truth, err);
     board->truth = NULL;
     return rc;
+}
+
+int fault_board_is_filling(const struct fault_board *board)
+{
+    return truth_is_filling(board->truth);
 }
 
 void fault_board_free(struct fault_board *board)

@@ -20,11 +20,13 @@ struct fault_entry {
 
 struct fault_board;
 
-/* truth_path NULL: no file. list may be empty. */
-int fault_board_create(const struct fault_list *list, const char *truth_path, struct fault_board **out,
-                       struct sh_err *err);
+/* truth_path NULL: no file; else *lost counts the lines that are not in it (truth.h). list may be empty. */
+int fault_board_create(const struct fault_list *list, const char *truth_path, _Atomic uint64_t *lost,
+                       struct fault_board **out, struct sh_err *err);
 /* Closes the file of the truth; the first error in writing it. Nothing is injected any more. board may be NULL. */
 int fault_board_close(struct fault_board *board, struct sh_err *err);
+/* The truth's file is behind: who can wait should. */
+int fault_board_is_filling(const struct fault_board *board);
 void fault_board_free(struct fault_board *board);
 
 /* Changes with the list; 0: it has always been empty. Real-time safe. */

@@ -11,15 +11,23 @@
 
 #include "core/newfile.h"
 #include "firmware_sim/base/json.h"
+#include "firmware_sim/base/line_writer.h"
 
 static const char *const of_names[] = {"stream", "notices", "replies"};
 
+enum { QUEUE_BYTES = 1 << 20 };
+
 struct truth {
     pthread_mutex_t lock;
-    FILE *file;
-    const char *path; /* the caller's, or what to call it */
-    int error;        /* errno of the first failure */
+    char text[LINE_MOST_BYTES]; /* the line at hand, as `line` has written it */
+    FILE *line;
+    struct line_writer *lines;
 };
+
+static void say_gap(char text[LINE_GAP_BYTES], const uint64_t lost[LINE_KINDS])
+{
+    snprintf(text, LINE_GAP_BYTES, "{\"missing\":%" PRIu64 "}\n", lost[LINE_PLAIN]);
+}
 
 /* Of standard output a descriptor of its own: nobody else's lines are in its buffer. */
 static int open_stdout(int *fd, struct sh_err *err)
@@ -28,7 +36,7 @@ static int open_stdout(int *fd, struct sh_err *err)
     return *fd >= 0 ? SH_OK : sh_fail(err, SH_EIO, "standard output: %s", strerror(errno));
 }
 
-int truth_open(const char *path, struct truth **out, struct sh_err *err)
+int truth_open(const char *path, _Atomic uint64_t *lost, struct truth **out, struct sh_err *err)
 {
     int fd;
     *out = NULL;
@@ -39,13 +47,20 @@ int truth_open(const char *path, struct truth **out, struct sh_err *err)
     if (rc != SH_OK) return sh_fail(err, rc, "truth: %s", why.text);
     if (to_stdout) path = "standard output";
     struct truth *truth = calloc(1, sizeof *truth);
-    FILE *file = truth != NULL ? fdopen(fd, "w") : NULL;
-    if (file == NULL) {
+    if (truth != NULL) truth->line = fmemopen(truth->text, sizeof truth->text, "w");
+    if (truth == NULL || truth->line == NULL) {
         free(truth);
         close(fd);
         return sh_fail(err, SH_ENOMEM, "truth: %s: no memory", path);
     }
-    *truth = (struct truth){.file = file, .path = path};
+    const struct line_writer_spec spec = {
+        .fd = fd, .what = "truth", .path = path, .room = QUEUE_BYTES, .lost = lost, .gap = say_gap};
+    rc = line_writer_open(&spec, &truth->lines, err);
+    if (rc != SH_OK) {
+        fclose(truth->line);
+        free(truth);
+        return rc;
+    }
     pthread_mutex_init(&truth->lock, NULL);
     *out = truth;
     return SH_OK;
@@ -70,10 +85,10 @@ static void put_place(struct json *json, const struct fault_note *note)
 void truth_write(struct truth *truth, const struct fault_note *note)
 {
     struct json json;
-    struct sh_err err;
     if (truth == NULL) return;
     pthread_mutex_lock(&truth->lock);
-    json_begin_one_line(&json, truth->file);
+    rewind(truth->line);
+    json_begin_one_line(&json, truth->line);
     json_open_object(&json, NULL);
     json_uint(&json, "fault", note->fault);
     json_string(&json, "kind", fault_names[note->kind]);
@@ -84,17 +99,21 @@ void truth_write(struct truth *truth, const struct fault_note *note)
     if (note->ended) json_bool(&json, "ended", 1);
     if (note->text[0] != '\0') json_string(&json, "text", note->text);
     json_close_object(&json);
-    const int failed = json_end(&json, &err) != SH_OK || fflush(truth->file) != 0;
-    if (failed && truth->error == 0) truth->error = errno != 0 ? errno : EIO;
+    json_end(&json, NULL); /* a line has room for any note */
+    line_writer_put(truth->lines, LINE_PLAIN, truth->text, (size_t)ftell(truth->line));
     pthread_mutex_unlock(&truth->lock);
+}
+
+int truth_is_filling(const struct truth *truth)
+{
+    return truth != NULL && line_writer_is_filling(truth->lines);
 }
 
 int truth_close(struct truth *truth, struct sh_err *err)
 {
     if (truth == NULL) return SH_OK;
-    int error = truth->error;
-    if (fclose(truth->file) != 0 && error == 0) error = errno;
-    const int rc = error == 0 ? SH_OK : sh_fail(err, SH_EIO, "truth: %s: %s", truth->path, strerror(error));
+    const int rc = line_writer_close(truth->lines, NULL, err);
+    fclose(truth->line);
     pthread_mutex_destroy(&truth->lock);
     free(truth);
     return rc;

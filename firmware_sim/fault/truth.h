@@ -1,7 +1,8 @@
 /* The truth about injected faults: what was done, where, and when.
  *
  * In: a note of one fault. Out: a line of JSON in a file, and a line of text for the journal. Thread: a writer may be
- * called by any number of threads. */
+ * called by any number of threads, and waits for nothing: a thread of its own writes the file (line_writer.h). Where the
+ * file is slower than faults strike, {"missing":n} stands for n lines that were dropped. */
 #ifndef FIRMWARE_SIM_FAULT_TRUTH_H
 #define FIRMWARE_SIM_FAULT_TRUTH_H
 
@@ -29,11 +30,14 @@ struct fault_note {
 };
 
 struct truth;
-/* Writes to a new file; path "-" is standard output. NULL path: nothing is written, *out is NULL. */
-int truth_open(const char *path, struct truth **out, struct sh_err *err);
+/* Writes to a new file, which outlives it; path "-" is standard output. NULL path: nothing is written, *out is NULL. *lost
+ * counts the lines that are not in it; NULL: nobody asks. */
+int truth_open(const char *path, _Atomic uint64_t *lost, struct truth **out, struct sh_err *err);
 /* truth may be NULL. */
 void truth_write(struct truth *truth, const struct fault_note *note);
-/* The first error in writing it. truth may be NULL. */
+/* Who can wait should, so that nothing is dropped. truth may be NULL. */
+int truth_is_filling(const struct truth *truth);
+/* Writes what is left, as long as the file takes some of it every 2 s. The first error in writing it. truth may be NULL. */
 int truth_close(struct truth *truth, struct sh_err *err);
 
 /* "fault 1 drop: t_ns 1, link 1, ...": at most 256 characters of printable ASCII. */

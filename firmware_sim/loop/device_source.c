@@ -76,6 +76,16 @@ static void end(void *self)
     device_end(self);
 }
 
+static int files_fill(const void *self)
+{
+    return device_files_fill(self);
+}
+
+static int close_files(void *self, struct sh_err *err)
+{
+    return device_close_journal(self, err);
+}
+
 const struct loop_source_ops loop_device_source = {
     .command = command,
     .overlong = overlong,
@@ -92,4 +102,6 @@ const struct loop_source_ops loop_device_source = {
     .scans = scans,
     .power_up = power_up,
     .end = end,
+    .files_fill = files_fill,
+    .close_files = close_files,
 };

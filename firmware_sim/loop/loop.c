@@ -211,6 +211,13 @@ int loop_check_links(const struct loop *loop, struct sh_err *err)
     return sh_fail(err, links->error.code, "%s", links->error.text);
 }
 
+int loop_close_files(struct loop *loop, struct loop_stats *stats, struct sh_err *err)
+{
+    const int rc = loop->source.ops->close_files(loop->source.self, err);
+    stats->counters = *loop->stream.counters;
+    return rc;
+}
+
 void loop_join(struct loop *loop, struct loop_stats *stats)
 {
     struct stream *stream = &loop->stream;

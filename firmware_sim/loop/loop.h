@@ -63,6 +63,9 @@ int loop_is_over(const struct loop *loop);
 void loop_end(struct loop *loop);
 /* Waits for the end, stops the threads, closes the links, fills stats. */
 void loop_join(struct loop *loop, struct loop_stats *stats);
+/* After loop_join: the files that the source writes are whole, and stats has what is missing in them. The first error in
+ * writing them. */
+int loop_close_files(struct loop *loop, struct loop_stats *stats, struct sh_err *err);
 /* After loop_join: 0, or what kept a link from getting all it should. */
 int loop_check_links(const struct loop *loop, struct sh_err *err);
 void loop_free(struct loop *loop);

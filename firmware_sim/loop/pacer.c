@@ -45,6 +45,8 @@ static void pace_waiting(struct loop *loop)
         struct ring_slot *slot = ring_peek(&stream->ring, tick);
         if (slot == NULL)
             stream_wait_for_casters(stream);
+        else if (loop->source.ops->files_fill(loop->source.self) && !atomic_load(&stream->ending))
+            stream_wait_for_files(stream);
         else if (!stream_has_room(stream, tick))
             stream_wait_for_readers(stream, tick);
         else

@@ -82,6 +82,13 @@ int session_wire_keeps_back(const struct session *s, int64_t now_ns)
     return s->wire != NULL && wire_keeps_back(s->wire, now_ns);
 }
 
+int session_waits_for_files(const struct pump *pump, const struct session *s)
+{
+    const struct loop_source *source = pump->links->source;
+    return pump->stream->waits && s->wire != NULL && !atomic_load(&pump->stream->over) &&
+           !atomic_load(&pump->stream->ending) && source->ops->files_fill(source->self);
+}
+
 static void put(struct pump *pump, struct session *s, int of, const uint8_t *bytes, size_t len, uint64_t tick)
 {
     const struct wire_item item = {
@@ -236,6 +243,7 @@ int64_t pump_next_ns(const struct pump *pump)
         if (!s->open || s->wire == NULL) continue;
         const int64_t due_ns = wire_next_ns(s->wire); /* what is due already waits for the link */
         if (due_ns > now_ns && due_ns < next_ns) next_ns = due_ns;
+        if (session_waits_for_files(pump, s) && now_ns + STREAM_FILES_NS < next_ns) next_ns = now_ns + STREAM_FILES_NS;
     }
     return next_ns;
 }

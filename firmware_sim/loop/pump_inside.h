@@ -124,6 +124,9 @@ void session_close_wire(struct session *s);
 int session_wire_waits(const struct session *s);
 /* Whether a fault keeps back what lies in it. */
 int session_wire_keeps_back(const struct session *s, int64_t now_ns);
+/* In the paces that wait, a session whose frames faults may strike takes none while the file of the truth is behind. Its
+ * client has its replies meanwhile. */
+int session_waits_for_files(const struct pump *pump, const struct session *s);
 /* As session_write, by its wire. */
 int session_write_faulty(struct pump *pump, struct session *s, int index);
 /* Writes what lies in the wire: 1: the link is full; 0: nothing may go out now; -1: the session is closed. last:

@@ -163,6 +163,7 @@ static int take_tick(struct pump *pump, struct session *s)
 {
     struct ring *ring = &pump->stream->ring;
     const struct protocol_ops *ops = pump->protocol;
+    if (session_waits_for_files(pump, s)) return 0;
     struct ring_copy tick = {.buf = pump->tick, .cap = pump->stream->tick_bytes};
     enum ring_read got = ring_read(ring, s->reader, s->cursor, &tick);
     const uint64_t off_tick = session_off_tick(pump, s); /* known before the tick was released */

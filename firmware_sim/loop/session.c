@@ -83,7 +83,7 @@ static int take_tick(struct pump *pump, struct session *s)
 {
     struct ring *ring = &pump->stream->ring;
     uint32_t end = s->out_len + REPLY_ROOM / 8; /* leaves room for a frame that says what was lost */
-    if (end >= pump->out_cap) return 0;
+    if (end >= pump->out_cap || session_waits_for_files(pump, s)) return 0;
     struct ring_copy tick = {.buf = s->out + s->out_len, .cap = pump->out_cap - end};
     enum ring_read got = ring_read(ring, s->reader, s->cursor, &tick);
     const uint64_t off_tick = session_off_tick(pump, s); /* known before the tick was released */

@@ -35,6 +35,10 @@ struct loop_source_ops {
     /* The run begins, with the thread that paces it. */
     int (*power_up)(void *self, int64_t now_ns, const char **warning, struct sh_err *err);
     void (*end)(void *self);
+    /* In the paces that wait, time waits while this is so: files that the source writes are behind. No lock is taken. */
+    int (*files_fill)(const void *self);
+    /* After all threads have ended: writes these files to their end. */
+    int (*close_files)(void *self, struct sh_err *err);
 
     /* ---- where the source makes its ticks itself; else NULL. One thread, the player's. */
     /* No tick has more bytes. */

@@ -231,6 +231,12 @@ void stream_wait_for_readers(struct stream *stream, uint64_t tick)
     atomic_store(&stream->wanted, UINT64_MAX);
 }
 
+void stream_wait_for_files(struct stream *stream)
+{
+    say_released(stream);
+    bell_sleep_until(&stream->pace, clock_now_ns() + STREAM_FILES_NS);
+}
+
 void stream_end(struct stream *stream)
 {
     atomic_store(&stream->over, 1);

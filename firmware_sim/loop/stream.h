@@ -30,7 +30,8 @@ enum {
     STREAM_HASH_READER = STREAM_MAX_LINKS * LINK_MAX_SESSIONS, /* below it: sessions */
     STREAM_MAX_LISTENERS = STREAM_MAX_LINKS + 1,
     STREAM_SCANS = 8,
-    STREAM_POWER_TICKS = 64
+    STREAM_POWER_TICKS = 64,
+    STREAM_FILES_NS = 5000000 /* between two looks at files that are behind */
 };
 _Static_assert((int)STREAM_HASH_READER < (int)RING_MAX_READERS, "each session is a reader, and so is the hash");
 
@@ -117,6 +118,8 @@ void stream_wait_for_casters(struct stream *stream);
 /* Waits until a reader went on. Once the run is to end, readers that stand still for 2 s hold back nothing
  * any more. */
 void stream_wait_for_readers(struct stream *stream, uint64_t tick);
+/* Waits a while for files of the source that are behind. A disk rings no bell: so it is looked at again and again. */
+void stream_wait_for_files(struct stream *stream);
 /* Nothing more will be released. */
 void stream_end(struct stream *stream);
 

@@ -261,6 +261,16 @@ static int64_t tick_ns(const void *self)
     return ((const struct replay *)self)->tick_ns;
 }
 
+static int files_fill(const void *self)
+{
+    return fault_board_is_filling(((const struct replay *)self)->faults);
+}
+
+static int close_files(void *self, struct sh_err *err)
+{
+    return fault_board_close(((struct replay *)self)->faults, err);
+}
+
 static struct device_counters *counters(void *self)
 {
     return &((struct replay *)self)->counters;
@@ -305,6 +315,8 @@ const struct loop_source_ops replay_source = {
     .scans = scans,
     .power_up = power_up,
     .end = end,
+    .files_fill = files_fill,
+    .close_files = close_files,
     .most_bytes = most_bytes,
     .usual_bytes = usual_bytes,
     .describe = describe,
@@ -331,7 +343,8 @@ int replay_open(struct config *cfg, const struct replay_options *options, struct
     r->bytes = malloc(MOST_BYTES + REPLAY_FRONT * REPLAY_FRONT_ROOM);
     int rc = r->bytes != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory");
     if (rc == SH_OK) rc = replay_open_recording(r, err);
-    if (rc == SH_OK) rc = fault_board_create(&cfg->faults, options->truth, &r->faults, err);
+    if (rc == SH_OK)
+        rc = fault_board_create(&cfg->faults, options->truth, &r->counters.lost_truth_lines, &r->faults, err);
     r->desk = (struct fault_desk){.cfg = cfg, .board = r->faults, .no_head = 1};
     if (rc != SH_OK) {
         replay_free(r);
@@ -368,8 +381,5 @@ void replay_get_summary(struct replay *r, struct replay_summary *summary)
 
 int replay_check(struct replay *r, struct sh_err *err)
 {
-    struct sh_err why;
-    const int rc = fault_board_close(r->faults, &why);
-    if (r->failure.code != 0) return sh_fail(err, r->failure.code, "%s", r->failure.text);
-    return rc == SH_OK ? SH_OK : sh_fail(err, rc, "%s", why.text);
+    return r->failure.code != 0 ? sh_fail(err, r->failure.code, "%s", r->failure.text) : SH_OK;
 }

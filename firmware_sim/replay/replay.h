@@ -46,7 +46,7 @@ struct replay_summary {
     int cut;                  /* the file ends within a frame */
 };
 void replay_get_summary(struct replay *replay, struct replay_summary *summary);
-/* After the loop is joined: 0, or why it could not be read to its end, or the truth not be written. */
+/* After the loop is joined: 0, or why it could not be read to its end. */
 int replay_check(struct replay *replay, struct sh_err *err);
 
 #endif

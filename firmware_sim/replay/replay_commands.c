@@ -104,6 +104,7 @@ void replay_command(void *self, uint32_t session, const char *line, uint64_t rel
     r->cmd.state = visible_state(r, released);
     r->cmd.t_ns = (int64_t)released * r->tick_ns;
     r->cmd.frames_done = r->frames_done;
+    r->cmd.lost_truth_lines = atomic_load(&r->counters.lost_truth_lines);
     r->cmd.is_played = r->playing || r->wants_start || r->wants_again;
     r->desk.now_ns = r->cmd.t_ns;
     command_execute(&r->cmd, session, line, out);

@@ -16,7 +16,7 @@ static void check_again(const struct journal_entry *entry, size_t n)
     size_t m = 0;
     char path[600];
     snprintf(path, sizeof path, "%s/again.journal", fuzz_folder());
-    struct journal *journal = journal_open(path, &err);
+    struct journal *journal = journal_open(path, NULL, &err);
     fuzz_must(journal != NULL, "a journal can be written");
     for (size_t i = 0; i < n; i++)
         if (!journal_is_end(&entry[i]))

@@ -33,7 +33,7 @@ if [ $speed = high ]; then # a reset is the same without a pause
     kill -INT $client
     wait $client
     check "$speed: with the count" grep '"replugs": 2,' faults.json
-    check "$speed: both are in the truth" test "$(wc -l <truth.json)" = 2
+    check "$speed: both are in the truth" wait_for 10 sh -c "test \$(wc -l <truth.json) = 2"
     head_stop
 fi
 head_start "{type: usb, backend: functionfs, speed: $speed}" --set head.prr_hz=4000 --set loop.tick_hz=100

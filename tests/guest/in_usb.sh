@@ -198,7 +198,8 @@ END
     check "$1: the kernel says that the descriptor is too short" sh -c "dmesg | grep 'descriptor too short'"
     record_again "$1, stalled and in short packets" # the recorder clears the halt; no byte is lost
     for kind in slow_enumeration descriptor_length short_packets endpoint_stall; do
-        check "$1: $kind was injected once" test "$(grep -c "\"kind\":\"$kind\"" /tmp/truth.json)" = 1
+        check "$1: $kind was injected once" \
+            wait_for 10 sh -c "test \$(grep -c '\"kind\":\"$kind\"' /tmp/truth.json) = 1"
     done
     head_stop
     wait_for 10 is_unplugged

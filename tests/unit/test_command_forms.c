@@ -36,6 +36,7 @@ static const struct {
     {"*STB", "*STB", 1, 0, ""},
     {"SYSTEM:ERROR:NEXT", "SYST:ERR", 1, 0, ""},
     {"SYSTEM:ERROR:COUNT", "SYST:ERR:COUN", 1, 0, ""},
+    {"SYSTEM:LOST", "SYST:LOST", 1, 0, ""},
     {"SYSTEM:VERSION", "SYST:VERS", 1, 0, ""},
     {"SYSTEM:CONTROL", "SYST:CONT", 1, 0, ""},
     {"SYSTEM:PLAN", "SYST:PLAN", 1, 0, ""},

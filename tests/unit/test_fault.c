@@ -131,7 +131,7 @@ static void the_list_changes_and_counts_stay(void **state)
     uint32_t number, n;
     list.fault[0] = fault_of_kind(FAULT_DROP);
     list.fault[1] = fault_of_kind(FAULT_FLIP);
-    assert_int_equal(fault_board_create(&list, NULL, &board, &err), SH_OK);
+    assert_int_equal(fault_board_create(&list, NULL, NULL, &board, &err), SH_OK);
     fault_board_listen(board, hear, &n_heard);
     uint32_t version = fault_board_version(board);
     assert_true(version != 0);
@@ -165,7 +165,7 @@ static void the_list_changes_and_counts_stay(void **state)
     fault_board_free(board);
     fault_board_free(NULL);
     list.n = 0;
-    assert_int_equal(fault_board_create(&list, NULL, &board, &err), SH_OK);
+    assert_int_equal(fault_board_create(&list, NULL, NULL, &board, &err), SH_OK);
     assert_int_equal(fault_board_version(board), 0); /* there never was one */
     fault_board_free(board);
 }
@@ -201,7 +201,7 @@ static void the_truth_is_written_line_by_line(void **state)
     struct sh_err err;
     assert_true(fd >= 0);
     unlink(path);
-    assert_int_equal(truth_open(path, &truth, &err), SH_OK);
+    assert_int_equal(truth_open(path, NULL, &truth, &err), SH_OK);
     for (size_t i = 0; i < sizeof notes / sizeof notes[0]; i++) {
         truth_write(truth, &notes[i].note);
         strcat(want, notes[i].json);
@@ -229,10 +229,10 @@ static void a_dash_is_standard_output(void **state)
     fflush(stdout);
     const int was = dup(STDOUT_FILENO);
     assert_true(dup2(fileno(file), STDOUT_FILENO) >= 0);
-    const int opened = truth_open("-", &truth, &err);
+    const int opened = truth_open("-", NULL, &truth, &err);
     if (opened == SH_OK) truth_write(truth, &notes[0].note);
-    const ssize_t n = pread(fileno(file), got, sizeof got - 1, 0); /* each line at once */
     const int closed = opened == SH_OK ? truth_close(truth, &err) : SH_OK;
+    const ssize_t n = pread(fileno(file), got, sizeof got - 1, 0);
     const int is_open = fcntl(STDOUT_FILENO, F_GETFD) >= 0;
     dup2(was, STDOUT_FILENO);
     close(was);
@@ -264,15 +264,15 @@ static void what_cannot_be_written_is_said(void **state)
     (void)state;
     struct truth *truth;
     struct sh_err err;
-    assert_int_not_equal(truth_open("/nowhere/truth.json", &truth, &err), SH_OK);
+    assert_int_not_equal(truth_open("/nowhere/truth.json", NULL, &truth, &err), SH_OK);
     assert_null(truth);
     assert_non_null(strstr(err.text, "truth: "));
     assert_non_null(strstr(err.text, "/nowhere/truth.json"));
-    assert_int_equal(truth_open("/dev/full", &truth, &err), SH_OK);
+    assert_int_equal(truth_open("/dev/full", NULL, &truth, &err), SH_OK);
     truth_write(truth, &notes[0].note);
     assert_int_equal(truth_close(truth, &err), SH_EIO);
     assert_non_null(strstr(err.text, "truth: /dev/full: "));
-    assert_int_equal(truth_open(NULL, &truth, &err), SH_OK); /* none was asked for */
+    assert_int_equal(truth_open(NULL, NULL, &truth, &err), SH_OK); /* none was asked for */
     truth_write(truth, &notes[0].note);
     assert_int_equal(truth_close(truth, &err), SH_OK);
 }

@@ -27,7 +27,7 @@ static void open_rig(struct rig *rig, const struct fault_list *list)
 {
     struct sh_err err;
     memset(rig, 0, sizeof *rig);
-    assert_int_equal(fault_board_create(list, NULL, &rig->board, &err), SH_OK);
+    assert_int_equal(fault_board_create(list, NULL, NULL, &rig->board, &err), SH_OK);
     fault_board_listen(rig->board, hear, rig);
     head_faults_init(&rig->faults, rig->board, TICK_NS);
 }

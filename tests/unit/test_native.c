@@ -138,7 +138,7 @@ static void test_line_end(void **state)
 static void test_telemetry(void **state)
 {
     (void)state;
-    struct native_telemetry t = {4, 2, UINT64_MAX, 1, 2, 3, 4, 5, 6, 7, INT64_MIN, 8, 9, 10}, back;
+    struct native_telemetry t = {4, 2, UINT64_MAX, 1, 2, 3, 4, 5, 6, 7, INT64_MIN, 8, 9, 10, 0}, back;
     size_t len = native_encode_telemetry(out, sizeof out, &t, -1, 0);
     check_frame(out, len, 5, 0, 96, -1);
     const uint8_t *p = out + 28;
@@ -156,6 +156,15 @@ static void test_telemetry(void **state)
     assert_int_equal(native_decode_telemetry(p, 96, &back), 0);
     assert_memory_equal(&t, &back, sizeof t);
     assert_int_equal(native_decode_telemetry(p, 95, &back), SH_EFORMAT);
+    t.lost_lines = 11; /* nothing else makes it longer */
+    len = native_encode_telemetry(out, sizeof out, &t, -1, 0);
+    check_frame(out, len, 5, 0, 104, -1);
+    assert_int_equal(wire(p, 96, 8), 11);
+    assert_int_equal(native_decode_telemetry(p, 104, &back), 0);
+    assert_memory_equal(&t, &back, sizeof t);
+    assert_int_equal(native_decode_telemetry(p, 103, &back), 0);
+    assert_int_equal(back.lost_lines, 0);
+    assert_int_equal(back.scan_lost, 10);
 }
 
 static void test_event(void **state)

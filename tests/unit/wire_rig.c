@@ -34,7 +34,7 @@ void rig_open(const struct fault *fault, uint32_t n, int native)
     rig.now_ns = 1000 * MS;
     rig.seq = UINT32_MAX - 5; /* and soon over its end */
     if (n != 0) memcpy(rig.list.fault, fault, n * sizeof *fault);
-    assert_int_equal(fault_board_create(&rig.list, NULL, &rig.board, &err), SH_OK);
+    assert_int_equal(fault_board_create(&rig.list, NULL, NULL, &rig.board, &err), SH_OK);
     fault_board_listen(rig.board, keep_note, NULL);
     const struct wire_spec spec = {.board = rig.board,
                                    .link = 1,

@@ -238,6 +238,31 @@ static int is_right(const char *line)
            fabs(height_m - HEIGHT_M) <= HEIGHT_TOLERANCE_M;
 }
 
+/* Longer than it was. */
+static int has_grown(const char *text, const void *len)
+{
+    return strlen(text) > *(const size_t *)len && text[strlen(text) - 1] == '\n';
+}
+
+/* The number of the last note of the faulty link. */
+static uint32_t last_note(const struct wire *wire, struct truth_note **note, uint32_t *n_notes)
+{
+    free(*note);
+    *note = truth_read(wire_path(wire, "truth.json"), 2, n_notes);
+    return *n_notes != 0 ? (uint32_t)(*note)[*n_notes - 1].number : 0;
+}
+
+/* The truth is written by a thread of its own: what gpsd has may come before its note, which is then the next one. */
+static uint32_t next_note(const struct wire *wire, struct truth_note **note, uint32_t *n_notes)
+{
+    size_t len;
+    free(wire_read(wire_path(wire, "truth.json"), &len));
+    const uint32_t last = last_note(wire, note, n_notes);
+    if (last > HURT_UNITS) return last;
+    free(wire_read_with(wire_path(wire, "truth.json"), has_grown, &len));
+    return last_note(wire, note, n_notes);
+}
+
 /* What gpsd says until all faults have struck and a second of right positions has followed. Returns the wrong ones. */
 static uint32_t read_through(struct wire *wire, struct gpsd *gpsd, struct truth_note **note, uint32_t *n_notes)
 {
@@ -246,9 +271,7 @@ static uint32_t read_through(struct wire *wire, struct gpsd *gpsd, struct truth_
     for (int n_right = 0; n_right < 20;) {
         const char *line = gpsd_fix(gpsd);
         const int right = is_right(line);
-        free(*note);
-        *note = truth_read(wire_path(wire, "truth.json"), 2, n_notes);
-        const uint32_t last = *n_notes != 0 ? (uint32_t)(*note)[*n_notes - 1].number : 0;
+        const uint32_t last = right ? last_note(wire, note, n_notes) : next_note(wire, note, n_notes);
         if (!right && last <= HURT_UNITS) fail_msg("after unit %u: %s", last, line);
         n_wrong += !right;
         n_right = right && last == HURT_UNITS + SEALED_UNITS ? n_right + 1 : 0;

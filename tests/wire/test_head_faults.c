@@ -31,20 +31,39 @@ static struct head start(struct wire *wire, const char *more, const char *pace)
     return head_start(wire, write_config(wire, more), args);
 }
 
-/* The value of a key in the line of the truth about this kind; ended: in that of its end. */
-static int64_t truth_of(const struct wire *wire, const char *kind, int ended, const char *key)
+struct sought {
+    const char *kind, *key;
+    int ended;
+};
+
+/* -1: there is none. */
+static int64_t value_in(const char *text, const struct sought *sought)
 {
-    char *text = wire_read(wire_path(wire, "truth.json"), NULL), name[64], is_kind[64];
+    char name[64], is_kind[64], line[512];
     int64_t value = -1;
-    snprintf(name, sizeof name, "\"%s\":", key);
-    snprintf(is_kind, sizeof is_kind, "\"kind\":\"%s\"", kind);
-    for (char *line = strtok(text, "\n"); line != NULL; line = strtok(NULL, "\n")) {
-        if (strstr(line, is_kind) == NULL || (strstr(line, "\"ended\":true") != NULL) != ended) continue;
+    snprintf(name, sizeof name, "\"%s\":", sought->key);
+    snprintf(is_kind, sizeof is_kind, "\"kind\":\"%s\"", sought->kind);
+    for (const char *end; (end = strchr(text, '\n')) != NULL; text = end + 1) {
+        snprintf(line, sizeof line, "%.*s", (int)(end - text), text);
+        if (strstr(line, is_kind) == NULL || (strstr(line, "\"ended\":true") != NULL) != sought->ended) continue;
         const char *at = strstr(line, name);
         if (at != NULL) value = atoll(at + strlen(name));
     }
+    return value;
+}
+
+static int has_value(const char *text, const void *sought)
+{
+    return value_in(text, sought) >= 0;
+}
+
+/* The value of a key in the line of the truth about this kind; ended: in that of its end. */
+static int64_t truth_of(const struct wire *wire, const char *kind, int ended, const char *key)
+{
+    const struct sought sought = {kind, key, ended};
+    char *text = wire_read_with(wire_path(wire, "truth.json"), has_value, &sought);
+    const int64_t value = value_in(text, &sought);
     free(text);
-    if (value < 0) fail_msg("the truth has no %s of %s", key, kind);
     return value;
 }
 

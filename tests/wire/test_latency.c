@@ -39,6 +39,21 @@ static void close_session(struct session *s)
     head_end(&s->head, SIGTERM);
 }
 
+/* The line behind so many commands; NULL: it is not there yet. */
+static const char *line_behind(const char *text, int commands)
+{
+    while (text != NULL && (text[0] == '#' || commands-- > 0)) { /* notes, and the commands before */
+        text = strchr(text, '\n');
+        text += text != NULL;
+    }
+    return text != NULL && strchr(text, '\n') != NULL ? text : NULL;
+}
+
+static int has_command(const char *text, const void *commands)
+{
+    return line_behind(text, *(const int *)commands) != NULL;
+}
+
 /* Sends a command that has an effect and returns the device time of its arrival as the journal has it, which
  * must lie between what the head said before and what it says after. */
 static int64_t command(struct session *s, const char *line)
@@ -46,9 +61,8 @@ static int64_t command(struct session *s, const char *line)
     int64_t before_ns = atoll(client_ask(s->sh, "TIME?"));
     client_tell(s->sh, line);
     int64_t after_ns = atoll(client_ask(s->sh, "TIME?"));
-    char *text = wire_read(s->journal, NULL), *at = text;
-    for (int i = 0; at[0] == '#' || i++ < s->commands;) /* notes, and the commands before */
-        at = strchr(at, '\n') + 1;
+    char *text = wire_read_with(s->journal, has_command, &s->commands);
+    const char *at = line_behind(text, s->commands);
     s->commands++;
     uint64_t tick;
     int64_t t_ns;

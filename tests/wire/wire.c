@@ -96,6 +96,20 @@ char *wire_read(const char *path, size_t *len)
     return text;
 }
 
+char *wire_read_with(const char *path, int (*has)(const char *text, const void *ctx), const void *ctx)
+{
+    struct pollfd slot = {.fd = inotify_init1(IN_CLOEXEC), .events = POLLIN};
+    assert_true(slot.fd >= 0 && inotify_add_watch(slot.fd, path, IN_MODIFY) >= 0); /* before it is read */
+    char news[4096], *text;
+    while (!has(text = wire_read(path, NULL), ctx)) {
+        if (poll(&slot, 1, DEADLINE_MS) != 1) fail_msg("%s stays as it is:\n%s", path, text);
+        assert_true(read(slot.fd, news, sizeof news) > 0);
+        free(text);
+    }
+    close(slot.fd);
+    return text;
+}
+
 pid_t wire_fork(struct wire *wire)
 {
     assert_true(wire->n_children < WIRE_MAX_CHILDREN);

@@ -23,6 +23,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/inotify.h>
 #include <sys/pidfd.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
@@ -71,6 +72,9 @@ const char *wire_write_text(const struct wire *wire, const char *name, const cha
 
 /* The whole file, NUL-terminated; free() it. */
 char *wire_read(const char *path, size_t *len);
+
+/* The same of a file that a head is still writing, as soon as `has` says that what is looked for is there. */
+char *wire_read_with(const char *path, int (*has)(const char *text, const void *ctx), const void *ctx);
 
 /* ---- processes */
 

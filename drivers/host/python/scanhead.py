@@ -192,9 +192,9 @@ _LAYOUT = {
     EMITTER: ("<3I4iIQQqII", "kind n_beams steps first_step last_step front_step turn rings sequence_ns_num "
               "sequence_ns_den first_ring_udeg echoes gaps"),
 }
-_MORE = {  # what payloads may have behind that
-    DESCRIPTOR: ("<II", "content reserved"),
-    TELEMETRY: ("<3Q", "scan_fired scan_cast scan_lost"),
+_MORE = {  # what payloads may have behind that, piece by piece
+    DESCRIPTOR: [("<II", "content reserved")],
+    TELEMETRY: [("<3Q", "scan_fired scan_cast scan_lost"), ("<Q", "lost_lines")],
 }
 
 
@@ -204,7 +204,7 @@ def _unpacker(form: str, names: str) -> Tuple[struct.Struct, List[Tuple[str, int
 
 
 _UNPACK = {kind: _unpacker(*layout) for kind, layout in _LAYOUT.items()}
-_UNPACK_MORE = {kind: _unpacker(*layout) for kind, layout in _MORE.items()}
+_UNPACK_MORE = {kind: [_unpacker(*layout) for layout in layouts] for kind, layouts in _MORE.items()}
 _POSE = struct.Struct("<q3d4ddII")
 _POINT = struct.Struct("<IIIhHI")
 _BEAM = struct.Struct("<iiI")
@@ -235,9 +235,12 @@ def _decode(kind: int, payload: bytes) -> Dict[str, object]:
     if len(payload) < form.size:
         raise ScanheadError(f"a frame of type {kind} with {len(payload)} bytes; {form.size} are the least")
     fields = _take(_UNPACK[kind], payload, 0)
-    more = _UNPACK_MORE.get(kind)
-    if more is not None and len(payload) >= form.size + more[0].size:
-        fields.update(_take(more, payload, form.size))
+    at = form.size
+    for more in _UNPACK_MORE.get(kind, ()):
+        if len(payload) < at + more[0].size:
+            break
+        fields.update(_take(more, payload, at))
+        at += more[0].size
     return fields
 
 

@@ -6,7 +6,7 @@ const MOST = 200; // entries that are kept
 
 // Errors that no command made, by COMMANDS.md (*Errors*): their text says who or how many.
 const HEADS_OWN = {101: 'Client lost (101):', 102: 'Reader too slow (102):', 103: 'Pulses lost (103):', 104: 'Client refused (104):',
-  105: 'Incomplete command (105):'};
+  105: 'Incomplete command (105):', 106: 'Lines lost (106):'};
 
 const ns = (value) => Number(value);
 const seconds = (value) => `${(ns(value) / 1e9).toFixed(3)} s`;

@@ -70,6 +70,7 @@ const lineEnd = layout(`frame u32, line u32, pulse0 u64, t0_ns I64, t1_ns I64, n
 const telemetry = layout(`state u32, scan u32, pulses u64, echoes u64, lines u64, lost_pulses u64, late_blocks u64,
   late_max_us u32, errors_queued u32, reader_lost_frames u64, utc_ns I64`);
 const scanCounts = layout('scan_fired u64, scan_cast u64, scan_lost u64');
+const lostLines = layout('lost_lines u64');
 const event = layout('code u32, reserved u32, a U64, b U64, c U64, text char[96]');
 const emitter = layout(`kind u32, n_beams u32, steps u32, first_step i32, last_step i32, front_step i32, turn i32,
   rings u32, sequence_ns_num u64, sequence_ns_den u64, first_ring_udeg i64, echoes u32, gaps u32`);
@@ -104,11 +105,14 @@ export function readAnchor(view) {
 
 export const readLineEnd = (view) => whole(lineEnd, view, 'a line end');
 
-/** The last three are null in recordings of older heads, which did not have them. */
+/** The scan's counts are null in recordings of older heads, which did not have them. lost_lines is sent where it is not 0. */
 export function readTelemetry(view) {
   const t = whole(telemetry, view, 'a telemetry');
   t.scan_fired = t.scan_cast = t.scan_lost = null;
   if (view.byteLength >= telemetry.bytes + scanCounts.bytes) take(scanCounts, view, telemetry.bytes, t);
+  t.lost_lines = 0;
+  const at = telemetry.bytes + scanCounts.bytes;
+  if (view.byteLength >= at + lostLines.bytes) take(lostLines, view, at, t);
   return t;
 }
 

@@ -206,6 +206,7 @@ local ROWS = {
     {"reader_lost_frames", "u64", "Frames that this reader lost"}, {"utc", "utc", "UTC"},
     {"scan_fired", "u64", "Fired in the scan", "pulses"}, {"scan_cast", "u64", "Cast in the scan", "pulses"},
     {"scan_lost", "u64", "Lost by the head in the scan", "pulses"}}),
+  lost_lines = rows_of("telemetry.", {{"lost_lines", "u64", "Lines that the head's files lack"}}),
   [EVENT] = rows_of("event.", {
     {"code", "u32", "Event", {"STATE", "SCAN_START", "SCAN_END", "OVERRUN", "READER_LOST", "CONTROL", "ERROR",
                               "SETTINGS", "POSE_LATE", "PPS", "TIME", "SITE"}},
@@ -928,6 +929,7 @@ local function put_payload(tree, tvb, bytes, at, h, m)
   if m.wrong == nil then m.wrong = wrong_payload(h, bytes, at) end -- it was not there at the first look
   put_rows(tree, rows, tvb, at, h.length)
   if h.type == DESCRIPTOR and h.length >= 280 then put_rows(tree, ROWS.content, tvb, at + 272, 8) end
+  if h.type == TELEMETRY and h.length >= 104 then put_rows(tree, ROWS.lost_lines, tvb, at + 96, 8) end
   if m.wrong then
     tree:add_proto_expert_info(E.wrong, m.wrong)
     return

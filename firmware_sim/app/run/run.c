@@ -59,7 +59,6 @@ static int serve(const struct run_options *o, struct loop *loop, struct device *
 {
     struct loop_stats stats;
     int rc = run_serve(o, loop, &stats, err);
-    if (rc == SH_OK) rc = device_close_journal(device, err);
     if (rc == SH_OK) rc = loop_check_links(loop, err);
     say_short_scan(o, device);
     run_warn_losses(&stats.counters);
@@ -69,10 +68,11 @@ static int serve(const struct run_options *o, struct loop *loop, struct device *
 static void warn_of_replay(const struct run_options *o, const struct device *device)
 {
     if (o->device.replay == NULL || device_replay_ends(device) || o->device.duration_s > 0.0) return;
-    sh_warn(&app_report_stderr,
-            "%s has no end, as its head was killed; after its last command the head runs until it is stopped, or for "
-            "--duration S",
-            o->device.replay);
+    sh_warn(
+        &app_report_stderr,
+        "%s has no end: its head was killed, or could not write it; after its last command the head runs until it is "
+        "stopped, or for --duration S",
+        o->device.replay);
 }
 
 /* What a page is told beside the stream; where there is no web link there is nothing to tell. Where its readers hold

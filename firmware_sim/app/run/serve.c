@@ -142,6 +142,8 @@ static void put_stats(struct json *json, const void *ctx)
     json_uint(json, "late_blocks", c->late_blocks);
     json_uint(json, "late_poses", c->late_poses);
     json_uint(json, "bad_poses", c->bad_poses);
+    json_uint(json, "lost_journal_lines", c->lost_journal_lines);
+    json_uint(json, "lost_truth_lines", c->lost_truth_lines);
     put_lateness(json, "late", s->late);
     put_lateness(json, "wake", s->wake);
     json_int(json, "rss_peak_kib", usage.ru_maxrss);
@@ -161,10 +163,28 @@ void run_warn_losses(const struct device_counters *c)
                 (unsigned long long)c->reader_lost_frames, (unsigned long long)c->reader_lost_pulses);
 }
 
+static void warn_lines(const char *file, uint64_t n)
+{
+    if (n != 0)
+        sh_warn(&app_report_stderr, "%s: %llu lines are missing in its file, which could not be written in time", file,
+                (unsigned long long)n);
+}
+
+/* The journal and the truth. What is missing in them is said once: with the reason, or in a warning. */
+static int close_files(struct loop *loop, struct loop_stats *stats, struct sh_err *err)
+{
+    const int rc = loop_close_files(loop, stats, err);
+    if (rc != SH_OK) return rc;
+    warn_lines("journal", stats->counters.lost_journal_lines);
+    warn_lines("truth", stats->counters.lost_truth_lines);
+    return SH_OK;
+}
+
 int run_serve(const struct run_options *o, struct loop *loop, struct loop_stats *stats, struct sh_err *err)
 {
     struct run_stats run = {.loop = loop};
-    int rc = loop_start(loop, err);
+    int rc = app_begin_messages(err);
+    if (rc == SH_OK) rc = loop_start(loop, err);
     if (rc == SH_OK) rc = app_say_ready(o->ready_fd, put_endpoints, loop, err);
     if (rc == SH_OK && o->view) rc = say_view(loop, err);
     if (rc == SH_OK) rc = notify_ready(loop, err);
@@ -173,7 +193,10 @@ int run_serve(const struct run_options *o, struct loop *loop, struct loop_stats 
     else
         loop_end(loop);
     loop_join(loop, stats);
+    app_end_messages();
+    struct sh_err why = {0};
+    const int files_rc = close_files(loop, stats, &why);
     run.stats = *stats;
     if (rc == SH_OK && o->stats != NULL) rc = app_write_json(o->stats, put_stats, &run, err);
-    return rc;
+    return rc == SH_OK && files_rc != SH_OK ? sh_fail(err, files_rc, "%s", why.text) : rc;
 }

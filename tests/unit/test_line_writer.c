@@ -1,0 +1,233 @@
+/* Lines on their way into a file: whole, in order, and never waited for. What a file does not take is counted, in it and
+ * beside it. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <pthread.h>
+#include <sched.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "firmware_sim/base/line_writer.h"
+
+enum { ROOM = 8192, MOST_BYTES = 4 << 20 };
+
+static _Atomic uint64_t lost;
+
+static void say_gap(char text[LINE_GAP_BYTES], const uint64_t n[LINE_KINDS])
+{
+    snprintf(text, LINE_GAP_BYTES, "gap %llu %llu\n", (unsigned long long)n[LINE_PLAIN],
+             (unsigned long long)n[LINE_REMARK]);
+}
+
+static struct line_writer *open_writer(int fd)
+{
+    const struct line_writer_spec spec = {
+        .fd = fd, .what = "test", .path = "the file", .room = ROOM, .lost = &lost, .gap = say_gap};
+    struct line_writer *writer;
+    struct sh_err err = {0};
+    lost = 0;
+    assert_int_equal(line_writer_open(&spec, &writer, &err), SH_OK);
+    return writer;
+}
+
+/* "line 17 ...", of 100 bytes. */
+static int put(struct line_writer *writer, enum line_kind kind, unsigned number)
+{
+    char text[101];
+    const int n = snprintf(text, sizeof text, "line %u ", number);
+    memset(text + n, '.', sizeof text - (size_t)n);
+    text[99] = '\n';
+    return line_writer_put(writer, kind, text, 100);
+}
+
+struct found {
+    uint64_t lines, missing; /* the latter as gaps say */
+};
+
+/* Each line has the number after the one before it, and a gap that of all it stands for. */
+static struct found check_lines(const char *text)
+{
+    struct found found = {0, 0};
+    for (const char *at = text; *at != '\0'; at = strchr(at, '\n') + 1) {
+        unsigned long long plain, remarks;
+        unsigned number;
+        assert_non_null(strchr(at, '\n'));
+        if (sscanf(at, "gap %llu %llu\n", &plain, &remarks) == 2) {
+            found.missing += plain + remarks;
+            continue;
+        }
+        assert_int_equal(sscanf(at, "line %u ", &number), 1);
+        assert_int_equal(number, found.lines + found.missing);
+        assert_int_equal(strchr(at, '\n') - at, 99);
+        found.lines++;
+    }
+    return found;
+}
+
+static char *read_all(int fd)
+{
+    char *text = malloc(MOST_BYTES);
+    size_t len = 0;
+    ssize_t n;
+    assert_non_null(text);
+    while ((n = read(fd, text + len, MOST_BYTES - 1 - len)) > 0)
+        len += (size_t)n;
+    text[len] = '\0';
+    return text;
+}
+
+static void *read_thread(void *fd)
+{
+    return read_all(*(int *)fd);
+}
+
+/* Lines until neither pipe nor queue have room, from 0 on. Returns how many. */
+static unsigned fill(struct line_writer *writer, int fd)
+{
+    struct pollfd slot = {.fd = fd, .events = POLLOUT};
+    unsigned n = 0;
+    do {
+        while (put(writer, LINE_PLAIN, n++) == SH_OK)
+            continue;
+        sched_yield(); /* to the thread that writes */
+    } while (poll(&slot, 1, 0) != 0 || !line_writer_is_filling(writer));
+    return n;
+}
+
+/* Faster than any disk, through a queue that is used round and round. */
+static void all_lines_are_in_the_file_or_counted_there(void **state)
+{
+    (void)state;
+    enum { N = 20000 };
+    FILE *file = tmpfile();
+    assert_non_null(file);
+    struct line_writer *writer = open_writer(dup(fileno(file)));
+    uint64_t dropped = 0;
+    for (unsigned i = 0; i < N; i++)
+        dropped += put(writer, LINE_PLAIN, i) != SH_OK;
+    assert_int_equal(line_writer_close(writer, NULL, NULL), SH_OK);
+    rewind(file);
+    char *text = read_all(fileno(file));
+    const struct found found = check_lines(text);
+    assert_int_equal(found.lines + found.missing, N);
+    assert_int_equal(found.missing, dropped);
+    assert_int_equal(lost, dropped);
+    free(text);
+    fclose(file);
+}
+
+/* A pipe that nobody reads. Whoever puts a line comes back; once somebody reads, the file goes on. */
+static void a_file_that_stands_still_holds_up_nobody(void **state)
+{
+    (void)state;
+    int fd[2];
+    pthread_t reader;
+    void *text;
+    struct sh_err err = {0};
+    assert_int_equal(pipe(fd), 0);
+    struct line_writer *writer = open_writer(fd[1]);
+    const unsigned n = fill(writer, fd[1]);
+    const uint64_t dropped = lost;
+    assert_true(dropped > 0);
+    assert_int_equal(pthread_create(&reader, NULL, read_thread, &fd[0]), 0);
+    assert_int_equal(line_writer_close(writer, "end\n", &err), SH_OK);
+    assert_int_equal(pthread_join(reader, &text), 0);
+    char *end = strstr(text, "end\n");
+    assert_non_null(end);
+    *end = '\0';
+    const struct found found = check_lines(text);
+    assert_int_equal(found.lines + found.missing, n);
+    assert_int_equal(found.missing, dropped);
+    assert_int_equal(lost, dropped);
+    free(text);
+    close(fd[0]);
+}
+
+/* The end waits 2 s and then says what is missing. */
+static void the_end_does_not_wait_for_ever(void **state)
+{
+    (void)state;
+    int fd[2];
+    struct sh_err err = {0};
+    assert_int_equal(pipe(fd), 0);
+    struct line_writer *writer = open_writer(fd[1]);
+    const unsigned n_put = fill(writer, fd[1]);
+    assert_int_equal(line_writer_close(writer, "end\n", &err), SH_EIO);
+    char want[100];
+    snprintf(want, sizeof want, "test: the file: nothing was taken for 2 s; %llu lines are missing",
+             (unsigned long long)lost);
+    assert_string_equal(err.text, want);
+    assert_int_equal(fcntl(fd[0], F_SETFL, O_NONBLOCK), 0);
+    char text[65537]; /* what the pipe holds: its writer goes on as soon as there is room again */
+    const ssize_t n = read(fd[0], text, sizeof text - 1);
+    assert_true(n > 0);
+    text[n] = '\0';
+    const struct found found = check_lines(text);
+    assert_true(found.missing < lost);               /* those that it has no gap for came last */
+    assert_int_equal(found.lines + lost, n_put + 1); /* with the end */
+    close(fd[0]);
+}
+
+static void remarks_leave_room_for_the_others(void **state)
+{
+    (void)state;
+    int fd[2];
+    assert_int_equal(pipe(fd), 0);
+    struct line_writer *writer = open_writer(fd[1]);
+    struct pollfd slot = {.fd = fd[1], .events = POLLOUT};
+    while (put(writer, LINE_REMARK, 0) == SH_OK || poll(&slot, 1, 0) != 0)
+        sched_yield();
+    const unsigned free_lines = ROOM / 2 / (LINE_GAP_BYTES + 100 + 8);
+    for (unsigned i = 0; i < free_lines; i++)
+        assert_int_equal(put(writer, LINE_PLAIN, i), SH_OK);
+    assert_int_equal(put(writer, LINE_REMARK, 0), SH_ELOST);
+    pthread_t reader;
+    void *text;
+    assert_int_equal(pthread_create(&reader, NULL, read_thread, &fd[0]), 0);
+    assert_int_equal(line_writer_close(writer, NULL, NULL), SH_OK);
+    assert_int_equal(pthread_join(reader, &text), 0);
+    assert_non_null(strstr(text, "gap 0 "));
+    free(text);
+    close(fd[0]);
+}
+
+static void a_full_disk_is_said_once_and_counted(void **state)
+{
+    (void)state;
+    struct sh_err err = {0};
+    const int fd = open("/dev/full", O_WRONLY);
+    assert_true(fd >= 0);
+    struct line_writer *writer = open_writer(fd);
+    for (unsigned i = 0; i < 500; i++)
+        put(writer, LINE_PLAIN, i);
+    assert_int_equal(line_writer_close(writer, "end\n", &err), SH_EIO);
+    assert_string_equal(err.text, "test: the file: No space left on device; 501 lines are missing");
+    assert_int_equal(lost, 501);
+}
+
+static int ignore_pipe(void **state)
+{
+    (void)state;
+    return signal(SIGPIPE, SIG_IGN) == SIG_ERR ? -1 : 0;
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(all_lines_are_in_the_file_or_counted_there),
+        cmocka_unit_test(a_file_that_stands_still_holds_up_nobody),
+        cmocka_unit_test(the_end_does_not_wait_for_ever),
+        cmocka_unit_test(remarks_leave_room_for_the_others),
+        cmocka_unit_test(a_full_disk_is_said_once_and_counted),
+    };
+    return cmocka_run_group_tests_name("line_writer", tests, ignore_pipe, NULL);
+}
