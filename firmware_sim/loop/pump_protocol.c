@@ -265,7 +265,10 @@ int session_write_protocol(struct pump *pump, struct session *s, int index)
     while (full && !pump->stream->waits && take_tick(pump, s)) /* time goes on without the client */
         continue;
     stream_move_reader(pump->stream, s->reader, s->cursor);
-    if (s->units.n == 0) s->lost.lagging = 0;
+    if (s->units.n == 0) {
+        s->lost.lagging = 0;
+        stream_note_written(pump->stream, s->reader, s->cursor);
+    }
     if (s->wire != NULL) wire_time(s->wire, time_of(pump, s->cursor));
     if (!full && s->hang_up && !session_wire_waits(s)) pump->ops->end(pump->link, index);
     return full == 1;

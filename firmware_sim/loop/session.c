@@ -112,6 +112,14 @@ static void take_replies(struct pump *pump, struct session *s)
     c->reply_len = 0;
 }
 
+/* The frames of a step go out before its reply, on all links: whoever has the reply finds them in each client's socket. */
+static int has_stepped(const struct pump *pump, const struct session *s)
+{
+    const uint64_t tick = s->commands.step_tick;
+    if (atomic_load(&pump->stream->over)) return 1;
+    return s->cursor >= tick && stream_has_written(pump->stream, pump->listener, s->reader, tick);
+}
+
 void session_fill(struct pump *pump, struct session *s)
 {
     struct session_commands *c = &s->commands;
@@ -121,8 +129,7 @@ void session_fill(struct pump *pump, struct session *s)
     while (s->out_len < BATCH_BYTES && take_tick(pump, s))
         continue;
     s->frames_to = s->out_len;
-    /* The frames of a step go out before its reply: a client that has the reply has all of them. */
-    while (c->stepping && (s->cursor >= c->step_tick || atomic_load(&pump->stream->over))) {
+    while (c->stepping && has_stepped(pump, s)) {
         c->stepping = 0;
         pump_add_reply(s, c->step_reply);
         pump_take_lines(pump, s);
@@ -146,7 +153,10 @@ int session_write(struct pump *pump, struct session *s, int index)
     if (session_has_wire(pump, s)) return session_write_faulty(pump, s, index);
     for (;;) {
         if (s->out_pos == s->out_len) session_fill(pump, s);
-        if (s->out_pos == s->out_len) return 0;
+        if (s->out_pos == s->out_len) {
+            stream_note_written(pump->stream, s->reader, s->cursor);
+            return 0;
+        }
         ssize_t n = pump->ops->write(pump->link, index, s->out + s->out_pos, write_to(pump, s) - s->out_pos);
         if (n == 0) return 1;
         if (n < 0) {

@@ -260,11 +260,21 @@ int stream_wake_at(struct stream *stream, struct stream_listener *listener, int 
     return tick < stream_released(stream) || (frames && !wanted);
 }
 
+/* The flag is taken back, so that each wake-up is one; who still waits sets it again. */
+static void wake_steppers(struct stream *stream)
+{
+    for (uint32_t i = 0; i < stream->n_listeners; i++)
+        if (atomic_load(&stream->listener[i].wants_written) && atomic_exchange(&stream->listener[i].wants_written, 0))
+            eventfd_write(stream->listener[i].fd, 1);
+}
+
 void stream_set_reader(struct stream *stream, int reader, uint64_t cursor, int active)
 {
     atomic_store(&stream->reader[reader].active, active);
     atomic_store(&stream->reader[reader].cursor, cursor);
+    atomic_store(&stream->reader[reader].written, cursor);
     stream_rest_reader(stream);
+    wake_steppers(stream); /* one that is gone is not waited for */
 }
 
 void stream_move_reader(struct stream *stream, int reader, uint64_t cursor)
@@ -272,6 +282,24 @@ void stream_move_reader(struct stream *stream, int reader, uint64_t cursor)
     const uint64_t from = atomic_exchange(&stream->reader[reader].cursor, cursor);
     const uint64_t wanted = atomic_load(&stream->wanted);
     if (from < wanted && wanted <= cursor) bell_ring(&stream->pace, 1);
+}
+
+void stream_note_written(struct stream *stream, int reader, uint64_t cursor)
+{
+    if (!stream->steps) return;
+    const uint64_t from = atomic_exchange(&stream->reader[reader].written, cursor);
+    if (from < cursor && cursor >= atomic_load(&stream->granted)) wake_steppers(stream);
+}
+
+int stream_has_written(struct stream *stream, struct stream_listener *listener, int reader, uint64_t tick)
+{
+    /* The flag before the look: who writes meanwhile sees the flag, or is seen. */
+    atomic_store(&listener->wants_written, 1);
+    for (int i = 0; i < STREAM_HASH_READER; i++) {
+        const struct stream_reader *r = &stream->reader[i];
+        if (i != reader && atomic_load(&r->active) && atomic_load(&r->written) < tick) return 0;
+    }
+    return 1; /* the flag stays: another session of this listener may still wait */
 }
 
 void stream_rest_reader(struct stream *stream)

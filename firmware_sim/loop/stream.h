@@ -38,7 +38,8 @@ _Static_assert((int)STREAM_HASH_READER < (int)RING_MAX_READERS, "each session is
 /* A reader as the pacing thread sees it, in the paces that wait for readers. */
 struct stream_reader {
     _Atomic int active;
-    _Atomic uint64_t cursor; /* next tick it will read */
+    _Atomic uint64_t cursor;  /* next tick it will read */
+    _Atomic uint64_t written; /* its link has taken all bytes before this tick */
 };
 
 /* An eventfd that is written to when something was released: a tick with frames, and any tick from wake_tick on. */
@@ -46,6 +47,7 @@ struct stream_listener {
     int fd;
     _Atomic int wants_frames;
     _Atomic uint64_t wake_tick; /* UINT64_MAX: none */
+    _Atomic int wants_written;  /* step: a reply waits until other readers have written what was granted */
     /* of the pacing thread alone */
     uint64_t every, quiet_until; /* so many ticks lie between two writes, at least; the first that may have one */
     int pending;                 /* something that it wants was released since the last write */
@@ -135,6 +137,11 @@ int stream_wake_at(struct stream *stream, struct stream_listener *listener, int 
 void stream_set_reader(struct stream *stream, int reader, uint64_t cursor, int active);
 /* It has read everything before a tick, and goes on. */
 void stream_move_reader(struct stream *stream, int reader, uint64_t cursor);
+/* Its link has taken all bytes before a tick. Wakes those that wait for it (stream_has_written). */
+void stream_note_written(struct stream *stream, int reader, uint64_t cursor);
+/* Pace step: whether all active readers but `reader` have written everything before a tick. Where one has not, the
+ * listener is woken once one of them has written what was granted, and asks again. The hash writes nothing. */
+int stream_has_written(struct stream *stream, struct stream_listener *listener, int reader, uint64_t tick);
 /* A reader is about to sleep: what it read may let the pacing thread go on. */
 void stream_rest_reader(struct stream *stream);
 /* ---- casters */
