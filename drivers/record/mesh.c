@@ -193,8 +193,7 @@ static int check_uri(const struct mesh_recorder *m, struct sh_err *err)
 {
     const char *path = m->base.file.path, *slash = strrchr(path, '/'), *ending = m->base.ops->ending;
     const char *c = strpbrk(slash != NULL ? slash + 1 : path, "%#?:\\");
-    const int names_files = strcmp(ending, ".gltf") == 0 || (strcmp(ending, ".glb") == 0 && is_textured(m));
-    if (!names_files || c == NULL) return SH_OK;
+    if (strcmp(ending, ".gltf") != 0 || c == NULL) return SH_OK; /* .glb holds all */
     return sh_fail(err, SH_EINPUT,
                    "%s: %s names the files beside it as URIs, where %c means something else; allowed are names without "
                    "%% # ? : \\",
@@ -205,7 +204,8 @@ static int mesh_begin(void *rec, struct sh_err *err)
 {
     const struct mesh_recorder *m = rec;
     int rc = check_uri(m, err);
-    if (rc == SH_OK && is_textured(m)) rc = try_beside(m, ".png", err);
+    const int has_image = is_textured(m) && strcmp(m->base.ops->ending, ".glb") != 0;
+    if (rc == SH_OK && has_image) rc = try_beside(m, ".png", err);
     if (rc == SH_OK && is_textured(m) && strcmp(m->base.ops->ending, ".obj") == 0) rc = try_beside(m, ".mtl", err);
     return rc == SH_OK && strcmp(m->base.ops->ending, ".gltf") == 0 ? try_beside(m, ".bin", err) : rc;
 }

@@ -244,9 +244,10 @@ static int run(int argc, char **argv)
     if (r.n_repairs > 0) return record_repair(r.repair, r.n_repairs, r.job.stats, r.quiet);
     if (is_config(r.job.source)) return app_with_config(&r.in, record_config, &r.job);
     if (!is_stream(r.job.source))
-        return app_usage(&app_record,
-                         "SOURCE %s: allowed usb, usb:VID:PID:SERIAL, tty:PATH, tcp:HOST:PORT, FILE.shs, FILE.pcapng, CONFIG.yaml",
-                         r.job.source);
+        return app_usage(
+            &app_record,
+            "SOURCE %s: allowed usb, usb:VID:PID:SERIAL, tty:PATH, tcp:HOST:PORT, FILE.shs, FILE.pcapng, CONFIG.yaml",
+            r.job.source);
     if (r.in.sets.n != 0) return app_usage(&app_record, "--set, --crs and --threads need a CONFIG as SOURCE");
     if (r.in.scenario != NULL || r.job.truth != NULL)
         return app_usage(&app_record, "--scenario and --truth need a CONFIG as SOURCE");
@@ -345,7 +346,8 @@ static const char HELP_NOTES[] =
     "                       station as point source ID\n"
     "  .ptx                 a grid per scan, with the scan's pose; shots without echo are in it\n"
     "  .e57                 points of each scan, with its pose\n"
-    "  .obj .gltf .glb .fbx a mesh of each scan's grid, which faces the head; its colours are an image beside it\n"
+    "  .obj .gltf .glb .fbx a mesh of each scan's grid, which faces the head; its colours are an image beside it,\n"
+    "                       or within a .glb\n"
     "                       (--colour; the label's by itself)\n"
     "  .poses.csv           true position and orientation of each scan, or a moving head's trajectory\n"
     "  .shs                 the raw stream\n"
