@@ -6,7 +6,8 @@
  *   .obj   coordinates to the nanometre; z up (the format has neither unit nor axes). With a material (a texture, or
  *          parts): NAME.mtl beside it.
  *   .gltf, .glb  float; metres and y up, as the format demands: (x, y, z) is written as (x, z, -y). Colours are linear
- *          there, and left out where a texture is. .gltf has its numbers in NAME.bin beside it.
+ *          there, and left out where a texture is. .gltf has its numbers in NAME.bin beside it, .glb all it
+ *          needs within.
  *          Vertices nearer to each other than 10 micrometres that agree in all else may become one.
  *   .fbx   binary, float; z up and metres, and its header says so (UpAxis 2, UnitScaleFactor 100).
  * Float steps by up to 6e-8 of a coordinate. Where half a step is more than MESH_FLOAT_PART of the mesh's size (and
@@ -20,6 +21,8 @@
 #include <stdint.h>
 
 #include "core/err.h"
+
+struct picture; /* core/picture.h */
 
 #define MESH_FLOAT_PART 1e-6
 enum {
@@ -44,6 +47,8 @@ struct mesh_part {
     const char *name; /* without control characters */
     uint32_t n_vertices, n_faces;
     const char *texture; /* as mesh.texture */
+    /* That image itself: it is written beside the file under that name, or into a .glb. NULL: it is the caller's. */
+    const struct picture *image;
 };
 
 struct mesh {
@@ -78,7 +83,8 @@ int mesh_is_float(const char *path);
  * figures and what to do. For an early refusal; mesh_write asks the same. */
 int mesh_check_box(const char *path, const double low[3], const double high[3], struct sh_err *err);
 
-/* Whole or not at all (core/newfile.h): files that it names appear first. SH_EINPUT: an ending that is not known, with
+/* Whole or not at all (core/newfile.h), with the files that it names: all are written as NAME.part, and once all are whole
+ * they are renamed, the mesh last. Where one can't be written, none is left. SH_EINPUT: an ending that is not known, with
  * those that are; a number that is not finite; what the format can't hold. SH_ESTOPPED where report asks to stop; progress
  * of what lasts over a second. */
 int mesh_write(const char *path, const struct mesh *mesh, const struct sh_report *report, struct sh_err *err);

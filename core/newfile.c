@@ -312,12 +312,29 @@ static int close_renamed(const char *path, int fd)
     return SH_OK;
 }
 
-int newfile_settle(const char *path, const char *part, int fd, struct sh_err *err)
+int newfile_sync(const char *part, int fd, struct sh_err *err)
+{
+    return fsync(fd) == 0 ? SH_OK : fail(part, "be synced", err);
+}
+
+static int rename_checked(const char *path, const char *part, struct sh_err *err)
 {
     int rc = check_target(path, err);
     if (rc == SH_OK) rc = check_unlocked(path, err);
-    if (rc == SH_OK && fsync(fd) != 0) rc = fail(part, "be synced", err);
-    if (rc == SH_OK && rename(part, path) != 0) rc = fail_rename(path, part, err);
+    return rc == SH_OK && rename(part, path) != 0 ? fail_rename(path, part, err) : rc;
+}
+
+int newfile_rename(const char *path, const char *part, struct sh_err *err)
+{
+    const int rc = rename_checked(path, part, err);
+    if (rc == SH_OK) sync_folder(path);
+    return rc;
+}
+
+int newfile_settle(const char *path, const char *part, int fd, struct sh_err *err)
+{
+    int rc = newfile_sync(part, fd, err);
+    if (rc == SH_OK) rc = rename_checked(path, part, err);
     return rc == SH_OK ? close_renamed(path, fd) : rc;
 }
 

@@ -39,7 +39,10 @@ int newfile_whole(const char *path, int *fd, struct sh_err *err);
 long long newfile_left_len(const char *part);
 /* Syncs, renames and closes. After a failure part stays, and fd is open. */
 int newfile_settle(const char *path, const char *part, int fd, struct sh_err *err);
-/* The same, but nothing at path is replaced: SH_ESTATE where something is there. */
+/* The two steps of that, for files that come together: all are synced before any is renamed. fd stays open. */
+int newfile_sync(const char *part, int fd, struct sh_err *err);
+int newfile_rename(const char *path, const char *part, struct sh_err *err);
+/* newfile_settle, but nothing at path is replaced: SH_ESTATE where something is there. */
 int newfile_settle_free(const char *path, const char *part, int fd, struct sh_err *err);
 /* Syncs, renames and closes; after a failure part is removed. Takes fd in any case. */
 int newfile_keep(const char *path, const char *part, int fd, struct sh_err *err);

@@ -51,6 +51,9 @@ void picture_lab(double l, double a, double b, uint8_t rgb[3]);
  * with `what` and name the path. */
 int picture_write_png(const struct picture *picture, const char *what, const char *path, struct sh_err *err);
 
+/* Its PNG to a stream, which is flushed. Errors say why alone. */
+int picture_put_png(FILE *out, const struct picture *picture, struct sh_err *err);
+
 /* For pages that hold pictures: the image as the URI of a PNG's data, with one colour transparent (NULL: none); and a
  * text in XML or HTML, in an attribute, too. What is no character of XML becomes U+FFFD. */
 int picture_put_uri(FILE *out, const struct picture *picture, const uint8_t *clear, struct sh_err *err);

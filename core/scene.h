@@ -79,8 +79,9 @@ struct scene_counts {
 
 /* What a file, or its format by definition, says of its unit and axes. Nothing follows from it by itself. */
 struct scene_says {
-    double unit_m; /* metres per unit; 0: it doesn't say */
-    int up;        /* the axis that points up: 1 x, 2 y, 3 z; negative: down; 0: it doesn't say */
+    double unit_m;      /* metres per unit; 0: it doesn't say */
+    int up;             /* the axis that points up: 1 x, 2 y, 3 z; negative: down; 0: it doesn't say */
+    int is_left_handed; /* its axes, so that the mesh is mirrored */
 };
 
 struct scene {

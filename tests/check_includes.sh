@@ -8,7 +8,7 @@
 #
 # In core and in firmware_sim a room may use itself and the rooms before it in this list. Files that lie in core itself are
 # the first room, `core`: errors, lines, vectors, angles, random numbers.
-core_order='core mesh picture texture scene schedule georef pose surface instrument detect bvh sight footprint cast plan analysis standpoint coverage'
+core_order='core picture mesh texture scene schedule georef pose surface instrument detect bvh sight footprint cast plan analysis standpoint coverage'
 firmware_order='base command fault config site device loop replay app'
 # Headers in core/ that belong to a room with another name, as HEADER:ROOM.
 core_headers='scan_mesh:mesh decimate:mesh cloud:analysis cloud_picture:analysis deviation:analysis figures:analysis distance:analysis map:analysis view:analysis geoframe:georef locate:georef ifc_site:scene embree:bvh'
@@ -18,7 +18,7 @@ core_headers='scan_mesh:mesh decimate:mesh cloud:analysis cloud_picture:analysis
 #   usb            itself, protocol (its data), socket, core/err.h
 #   link           itself, usb, socket, core/err.h, core/newfile.h
 #   host           itself, protocol, core/err.h, core's headers without a source (vectors, matrices, arithmetic, growing arrays)
-#   record         the same, host's public header, core/newfile.h, core/colour.h, core's rooms mesh and picture
+#   record         the same, host's public header, core/newfile.h, core/infile.h, core/colour.h, core's rooms mesh and picture
 #                  core/scan_mesh.h and core/picture.h
 # The arrows that run upward, one a line as FROM TO REASON: room FROM includes header TO, or calls what that header declares.
 # At most one in core, one in firmware_sim and one in drivers.
@@ -58,7 +58,7 @@ rules='
             return b ~ /^(core|drivers)\// || (b in rank && b ~ /^firmware_sim\// && rank[b] < rank[a])
         }
         if (to == "core/err.h") return 1
-        if (to == "core/colour.h" || b == "core/mesh" || b == "core/picture") return a == "drivers/record"
+        if (to == "core/colour.h" || to == "core/infile.h" || b == "core/mesh" || b == "core/picture") return a == "drivers/record"
         if (to == "core/newfile.h") return a == "drivers/record" || a == "drivers/link"
         if (a == "drivers/host" || a == "drivers/record")
             return b == "drivers/protocol" || to ~ /^core\/(vec3|mat3|vecmath|grow)\.h$/ || \

@@ -52,10 +52,10 @@ static int open_file(struct exporter *e, const char *path)
 {
     char *raw = NULL;
     if (e->n_files == ASSIMP_FILES)
-        return sh_fail(&e->err, SH_EIO, "%s: the exporter wants more than %d files", e->path, ASSIMP_FILES);
+        return sh_fail(&e->err, SH_EIO, "%s: the exporter wants more than %d files", e->out->path, ASSIMP_FILES);
     if (e->is_raw && asprintf(&raw, "%s.raw", path) < 0)
-        return sh_fail(&e->err, SH_ENOMEM, "%s: no memory to write it", e->path);
-    int rc = mesh_file_open(&e->file[e->n_files], raw != NULL ? raw : path, &e->err);
+        return sh_fail(&e->err, SH_ENOMEM, "%s: no memory to write it", e->out->path);
+    int rc = mesh_output_open(e->out, raw != NULL ? raw : path, &e->file[e->n_files], &e->err);
     free(raw);
     return rc;
 }
@@ -68,7 +68,7 @@ struct aiFile *assimp_open(struct aiFileIO *io, const char *path, const char *mo
     if (e->rc != SH_OK) return NULL;
     struct aiFile *handle = &e->handle[e->n_files];
     *handle = (struct aiFile){on_read, on_write, on_tell, on_size, on_seek, on_flush, NULL};
-    handle->UserData = (char *)(void *)&e->file[e->n_files++];
+    handle->UserData = (char *)(void *)e->file[e->n_files++];
     return handle;
 }
 
@@ -79,37 +79,28 @@ void assimp_close(struct aiFileIO *io, struct aiFile *handle)
     fflush(file_of(handle)->file);
 }
 
-/* The file itself is kept last. */
-int assimp_close_files(struct exporter *e, int keep, struct sh_err *err)
+/* Assimp itself does not look, or says no reason. */
+int assimp_check_files(struct exporter *e, struct sh_err *err)
 {
     int rc = SH_OK;
-    for (int pass = 0; pass < 2; pass++)
-        for (int i = 0; i < e->n_files; i++) {
-            if ((strcmp(e->file[i].path != NULL ? e->file[i].path : "", e->path) == 0) != pass) continue;
-            if (e->file[i].path == NULL) continue;
-            int closed = mesh_file_close(&e->file[i], keep && rc == SH_OK, err);
-            if (rc == SH_OK) rc = closed;
-        }
+    for (int i = 0; i < e->n_files && rc == SH_OK; i++)
+        rc = mesh_file_check(e->file[i], err);
     return rc;
 }
 
 /* The file as it is to be, from what was exported. */
 int assimp_copy_raw(struct exporter *e, struct sh_err *err)
 {
-    struct mesh_file to;
+    struct mesh_file *to, *raw = e->file[0];
     struct stat st;
-    FILE *raw = e->file[0].file;
-    if (fflush(raw) != 0 || fstat(fileno(raw), &st) != 0)
-        return sh_fail(err, SH_EIO, "%s: cannot write: %s", e->file[0].part, strerror(errno));
+    if (fstat(raw->fd, &st) != 0)
+        return sh_fail(err, SH_EIO, "%s: cannot be read back: %s", raw->part, strerror(errno));
     const size_t n = (size_t)st.st_size;
-    uint8_t *data = n > 0 ? mmap(NULL, n, PROT_READ, MAP_PRIVATE, fileno(raw), 0) : MAP_FAILED;
-    if (data == MAP_FAILED) return sh_fail(err, SH_EIO, "%s: cannot be read back", e->file[0].part);
-    int rc = mesh_file_open(&to, e->path, err);
-    if (rc == SH_OK) {
-        rc = mesh_fbx_copy(data, n, &to, err);
-        int closed = mesh_file_close(&to, rc == SH_OK, err);
-        if (rc == SH_OK) rc = closed;
-    }
+    uint8_t *data = n > 0 ? mmap(NULL, n, PROT_READ, MAP_PRIVATE, raw->fd, 0) : MAP_FAILED;
+    if (data == MAP_FAILED) return sh_fail(err, SH_EIO, "%s: cannot be read back", raw->part);
+    int rc = mesh_output_open(e->out, e->out->path, &to, err);
+    if (rc == SH_OK) rc = mesh_fbx_copy(data, n, to, err);
     munmap(data, n);
+    if (rc == SH_OK) mesh_output_drop(e->out, raw);
     return rc;
 }

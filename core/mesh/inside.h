@@ -3,21 +3,41 @@
 #define CORE_MESH_INSIDE_H
 
 #include <stdio.h>
+#include <sys/types.h>
 
 #include "core/mesh.h"
+#include "core/picture.h"
 
-/* A file that appears whole or not at all, written through a buffer. */
+/* A file that is written as PATH.part through a buffer. */
 struct mesh_file {
     char *path, *part;
-    int fd;
-    FILE *file;
+    int fd;        /* -1: it is whole, and on the disk */
+    FILE *file;    /* reads, too */
+    int is_named;  /* it has its name by now */
+    off_t at, end; /* of the stream, also after a write has failed */
+    int error;     /* errno of the first write that failed; 0: none */
 };
 
-/* Errors name the path. mesh_file_close is due once it has succeeded. */
-int mesh_file_open(struct mesh_file *file, const char *path, struct sh_err *err);
+/* The files of one output, which come and go together (file.c). Begins as zeros but for path. */
+struct mesh_output {
+    const char *path; /* of the mesh: its file is renamed last */
+    struct mesh_file **file;
+    size_t n, room;
+};
+
+/* Errors name the path. mesh_output_close is due in any case; file is the output's. */
+int mesh_output_open(struct mesh_output *out, const char *path, struct mesh_file **file, struct sh_err *err);
 int mesh_file_write(struct mesh_file *file, const void *data, size_t len, struct sh_err *err);
-/* keep: flushes, syncs, renames. Else, and where that fails, nothing is left. */
-int mesh_file_close(struct mesh_file *file, int keep, struct sh_err *err);
+/* Fails where something of it could not be written, and says why. */
+int mesh_file_check(struct mesh_file *file, struct sh_err *err);
+/* It is whole: goes to the disk, and is closed. It gets its name with the others. */
+int mesh_file_finish(struct mesh_file *file, struct sh_err *err);
+/* Removes it alone. */
+void mesh_output_drop(struct mesh_output *out, struct mesh_file *file);
+/* keep: finishes and renames all. Else, and where that fails, nothing is left. */
+int mesh_output_close(struct mesh_output *out, int keep, struct sh_err *err);
+/* The images of parts, beside the mesh. */
+int mesh_output_images(struct mesh_output *out, const struct mesh *mesh, struct sh_err *err);
 
 /* Copies a binary FBX file as Assimp exports it, with what is missing in it. SH_EIO: it is not one. */
 int mesh_fbx_copy(const uint8_t *raw, size_t n_raw, struct mesh_file *to, struct sh_err *err);
@@ -43,14 +63,15 @@ struct mesh_format {
     const char *ending;
     int is_float, takes_points;
     const char *exporter; /* Assimp's name of the format */
-    int (*write)(const struct mesh_format *format, const char *path, const struct mesh *mesh, struct mesh_work *work,
-                 struct sh_err *err);
+    /* Opens and writes out->path and what belongs to it; the caller closes. */
+    int (*write)(const struct mesh_format *format, struct mesh_output *out, const struct mesh *mesh,
+                 struct mesh_work *work, struct sh_err *err);
 };
-int mesh_write_ply(const struct mesh_format *format, const char *path, const struct mesh *mesh, struct mesh_work *work,
-                   struct sh_err *err);
-int mesh_write_obj(const struct mesh_format *format, const char *path, const struct mesh *mesh, struct mesh_work *work,
-                   struct sh_err *err);
-int mesh_write_assimp(const struct mesh_format *format, const char *path, const struct mesh *mesh,
+int mesh_write_ply(const struct mesh_format *format, struct mesh_output *out, const struct mesh *mesh,
+                   struct mesh_work *work, struct sh_err *err);
+int mesh_write_obj(const struct mesh_format *format, struct mesh_output *out, const struct mesh *mesh,
+                   struct mesh_work *work, struct sh_err *err);
+int mesh_write_assimp(const struct mesh_format *format, struct mesh_output *out, const struct mesh *mesh,
                       struct mesh_work *work, struct sh_err *err);
 
 #endif

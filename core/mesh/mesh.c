@@ -140,5 +140,9 @@ int mesh_write(const char *path, const struct mesh *mesh, const struct sh_report
     const char *name = mesh_stem(path, &len);
     snprintf(work.what, sizeof work.what, "writing %s", name);
     int rc = check(path, format, mesh, err);
-    return rc == SH_OK ? format->write(format, path, mesh, &work, err) : rc;
+    if (rc != SH_OK) return rc;
+    struct mesh_output out = {.path = path};
+    rc = format->write(format, &out, mesh, &work, err);
+    const int closed = mesh_output_close(&out, rc == SH_OK, err);
+    return rc != SH_OK ? rc : closed;
 }

@@ -1,6 +1,7 @@
 /* .gltf, .glb and .fbx through Assimp's exporter: the mesh as a scene of Assimp's, one mesh and one node a part. The
- * exporter's files are ours (core/newfile.h), so that they appear whole or not at all. */
+ * exporter's files are ours (assimp_files.h), so that they appear whole or not at all. */
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -29,7 +30,8 @@ struct export_scene {
     double unit_cm;
     unsigned *index; /* of meshes, from 0 */
     struct aiMaterialProperty *property, **properties;
-    int is_fbx;
+    struct aiTexture *texture, **textures; /* of .glb, which holds its images */
+    int is_fbx, holds_images;
 };
 
 /* sRGB (IEC 61966-2-1) to linear. */
@@ -138,14 +140,43 @@ static int put_string(struct aiMaterial *to, struct aiMaterialProperty *at, cons
     return put_property(to, at, key, semantic, aiPTI_String, &string, 4 + (size_t)string.length + 1);
 }
 
-static int fill_material(const struct mesh_part *part, struct aiMaterialProperty *at, struct aiMaterial *to)
+/* A PNG within the scene; materials call it by its number. 0: no memory. */
+static int add_image(struct export_scene *s, const struct picture *image, char name[16])
+{
+    struct aiTexture *texture = &s->texture[s->scene.mNumTextures];
+    char *png = NULL;
+    size_t n = 0;
+    FILE *out = open_memstream(&png, &n);
+    int rc = out != NULL ? picture_put_png(out, image, NULL) : SH_ENOMEM;
+    /* Numbers follow, which have to begin at multiples of 4 bytes; Assimp counts that wrongly. Readers of PNG stop before. */
+    if (rc == SH_OK) fwrite("\0\0\0", 1, (4 - n % 4) % 4, out);
+    if (out != NULL && fclose(out) != 0) rc = SH_ENOMEM;
+    texture->pcData = (struct aiTexel *)(void *)png;
+    if (rc != SH_OK || n > UINT32_MAX) {
+        free(png);
+        texture->pcData = NULL;
+        return 0;
+    }
+    texture->mWidth = (unsigned)n; /* bytes, as height is 0 */
+    strcpy(texture->achFormatHint, "png");
+    snprintf(name, 16, "*%u", s->scene.mNumTextures);
+    s->textures[s->scene.mNumTextures++] = texture;
+    s->scene.mTextures = s->textures;
+    return 1;
+}
+
+static int fill_material(struct export_scene *s, const struct mesh_part *part, struct aiMaterialProperty *at,
+                         struct aiMaterial *to)
 {
     static const float white[4] = {1, 1, 1, 1}, rough = 1;
+    const int is_within = s->holds_images && part->image != NULL;
+    char name[16] = "";
+    if (is_within && !add_image(s, part->image, name)) return 0;
     return put_string(to, &at[0], "?mat.name", 0, part->name) &&
            put_property(to, &at[1], "$clr.diffuse", 0, aiPTI_Float, white, sizeof white) &&
            put_property(to, &at[2], "$mat.roughnessFactor", 0, aiPTI_Float, &rough, sizeof rough) &&
            (part->texture == NULL ||
-            put_string(to, &at[3], "$tex.file", (unsigned)aiTextureType_DIFFUSE, part->texture));
+            put_string(to, &at[3], "$tex.file", (unsigned)aiTextureType_DIFFUSE, is_within ? name : part->texture));
 }
 
 /* z up, y to the back (FrontAxis 1, sign -1: the front is -y), and a unit of 100 cm. */
@@ -177,6 +208,10 @@ static void free_scene(struct export_scene *s)
         free_mesh(&s->mesh[i]);
     for (unsigned i = 0; s->property != NULL && i < N_PROPERTIES * s->scene.mNumMaterials; i++)
         free(s->property[i].mData);
+    for (unsigned i = 0; s->texture != NULL && i < s->scene.mNumTextures; i++)
+        free(s->texture[i].pcData);
+    free(s->texture);
+    free(s->textures);
     free(s->node);
     free(s->child);
     free(s->mesh);
@@ -190,6 +225,8 @@ static void free_scene(struct export_scene *s)
 
 static int allocate(struct export_scene *s, unsigned n)
 {
+    s->texture = calloc(n, sizeof *s->texture);
+    s->textures = calloc(n, sizeof *s->textures);
     s->node = calloc(n, sizeof *s->node);
     s->child = calloc(n, sizeof *s->child);
     s->mesh = calloc(n, sizeof *s->mesh);
@@ -200,8 +237,9 @@ static int allocate(struct export_scene *s, unsigned n)
     s->property = calloc(N_PROPERTIES * n, sizeof *s->property);
     s->properties = calloc(N_PROPERTIES * n, sizeof *s->properties);
     s->scene.mNumMeshes = s->scene.mNumMaterials = s->root.mNumChildren = n;
-    return s->node != NULL && s->child != NULL && s->mesh != NULL && s->meshes != NULL && s->material != NULL &&
-           s->materials != NULL && s->index != NULL && s->property != NULL && s->properties != NULL;
+    return s->texture != NULL && s->textures != NULL && s->node != NULL && s->child != NULL && s->mesh != NULL &&
+           s->meshes != NULL && s->material != NULL && s->materials != NULL && s->index != NULL &&
+           s->property != NULL && s->properties != NULL;
 }
 
 static const struct aiMatrix4x4 identity = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
@@ -227,7 +265,7 @@ static int fill_part(struct export_scene *s, const struct mesh *m, unsigned i, c
     mesh->mMaterialIndex = i;
     return fill_vertices(s, m, part->texture != NULL, first_vertex, mesh) &&
            fill_faces(m, first_face, first_vertex, mesh) &&
-           fill_material(part, s->property + N_PROPERTIES * i, material);
+           fill_material(s, part, s->property + N_PROPERTIES * i, material);
 }
 
 /* Parts without a face have no place. */
@@ -255,24 +293,22 @@ static int make_scene(struct export_scene *s, const struct mesh *m, const struct
     return 1;
 }
 
-static int export_scene(const struct mesh_format *format, const char *path, const struct export_scene *s,
+static int export_scene(const struct mesh_format *format, struct mesh_output *out, const struct export_scene *s,
                         const struct mesh_work *work, struct sh_err *err)
 {
-    struct exporter e = {.path = path, .is_raw = s->is_fbx, .io = {assimp_open, assimp_close, NULL}};
+    const char *path = out->path;
+    struct exporter e = {.out = out, .is_raw = s->is_fbx, .io = {assimp_open, assimp_close, NULL}};
     e.io.UserData = (char *)(void *)&e;
     sh_progress(work->report, work->what, -1);
     const enum aiReturn done = aiExportSceneEx(&s->scene, format->exporter, path, &e.io, 0);
-    int rc = e.rc;
-    if (rc != SH_OK)
-        sh_fail(err, rc, "%s", e.err.text);
-    else if (done == aiReturn_OUTOFMEMORY)
-        rc = sh_fail(err, SH_ENOMEM, "%s: no memory to export it", path);
-    else if (done != aiReturn_SUCCESS || e.n_files == 0)
-        rc = sh_fail(err, SH_EIO, "%s: Assimp cannot export it: %.200s", path, aiGetErrorString());
-    if (rc == SH_OK) rc = sh_check_stop(work->report, err);
-    if (rc == SH_OK && e.is_raw) rc = assimp_copy_raw(&e, err);
-    int closed = assimp_close_files(&e, rc == SH_OK && !e.is_raw, err);
-    return rc != SH_OK ? rc : closed;
+    if (e.rc != SH_OK) return sh_fail(err, e.rc, "%s", e.err.text);
+    int rc = assimp_check_files(&e, err);
+    if (rc != SH_OK) return rc;
+    if (done == aiReturn_OUTOFMEMORY) return sh_fail(err, SH_ENOMEM, "%s: no memory to export it", path);
+    if (done != aiReturn_SUCCESS || e.n_files == 0)
+        return sh_fail(err, SH_EIO, "%s: Assimp cannot export it: %.200s", path, aiGetErrorString());
+    rc = sh_check_stop(work->report, err);
+    return rc == SH_OK && e.is_raw ? assimp_copy_raw(&e, err) : rc;
 }
 
 /* FBX: the length of an array is 32 bits, and normals and colours are doubles of each corner of each face. glTF: so is the
@@ -291,17 +327,19 @@ static int check_size(const struct mesh_format *format, const char *path, const 
                    path, m->n_faces, m->n_vertices, bytes / 1073741824, is_fbx ? " in an array" : "", format->ending);
 }
 
-int mesh_write_assimp(const struct mesh_format *format, const char *path, const struct mesh *mesh,
+int mesh_write_assimp(const struct mesh_format *format, struct mesh_output *out, const struct mesh *mesh,
                       struct mesh_work *work, struct sh_err *err)
 {
-    struct export_scene s = {.is_fbx = strcmp(format->exporter, "fbx") == 0};
+    const char *path = out->path;
+    struct export_scene s = {.is_fbx = strcmp(format->exporter, "fbx") == 0,
+                             .holds_images = strcmp(format->exporter, "glb2") == 0};
     /* not the file's name: the exporter would call the .bin of a .gltf something else then */
-    const struct mesh_part whole = {"mesh", mesh->n_vertices, mesh->n_faces, mesh->texture};
+    const struct mesh_part whole = {"mesh", mesh->n_vertices, mesh->n_faces, mesh->texture, NULL};
     int rc = check_size(format, path, mesh, s.is_fbx, err);
     if (rc != SH_OK) return rc;
     if (s.is_fbx) fill_meta(&s);
-    rc = make_scene(&s, mesh, &whole) ? export_scene(format, path, &s, work, err)
+    rc = make_scene(&s, mesh, &whole) ? export_scene(format, out, &s, work, err)
                                       : sh_fail(err, SH_ENOMEM, "%s: no memory to write it", path);
     free_scene(&s);
-    return rc;
+    return rc == SH_OK && !s.holds_images ? mesh_output_images(out, mesh, err) : rc;
 }

@@ -39,18 +39,18 @@ static void put_name(FILE *out, const char *key, const char *name)
     fputc('\n', out);
 }
 
-static int write_materials(const struct obj *o, const char *path, struct sh_err *err)
+static int write_materials(const struct obj *o, struct mesh_output *out, const char *path, struct sh_err *err)
 {
-    struct mesh_file file;
-    int rc = mesh_file_open(&file, path, err);
+    struct mesh_file *file;
+    int rc = mesh_output_open(out, path, &file, err);
     if (rc != SH_OK) return rc;
     for (uint32_t i = 0; i < n_parts(o); i++) {
         const struct mesh_part *p = part(o, i);
-        put_name(file.file, "newmtl", p->name);
-        fputs("Ka 0 0 0\nKd 1 1 1\nKs 0 0 0\nd 1\nillum 1\n", file.file);
-        if (p->texture != NULL) put_name(file.file, "map_Kd", p->texture);
+        put_name(file->file, "newmtl", p->name);
+        fputs("Ka 0 0 0\nKd 1 1 1\nKs 0 0 0\nd 1\nillum 1\n", file->file);
+        if (p->texture != NULL) put_name(file->file, "map_Kd", p->texture);
     }
-    return mesh_file_close(&file, 1, err);
+    return mesh_file_finish(file, err);
 }
 
 static int put_vertices(const struct obj *o, uint32_t first, uint32_t n, struct sh_err *err)
@@ -128,36 +128,33 @@ static int put_parts(const struct obj *o, int materials, struct sh_err *err)
     return rc;
 }
 
-static int write_main(struct obj *o, const char *path, const char *materials, struct sh_err *err)
+static int write_main(struct obj *o, struct mesh_output *out, const char *materials, struct sh_err *err)
 {
-    struct mesh_file file;
-    int rc = mesh_file_open(&file, path, err);
+    int rc = mesh_output_open(out, out->path, &o->file, err);
     if (rc != SH_OK) return rc;
-    o->file = &file;
     for (uint32_t i = 0; i < o->mesh->n_comments; i++)
-        put_name(file.file, "#", o->mesh->comment[i]);
+        put_name(o->file->file, "#", o->mesh->comment[i]);
     size_t len;
-    if (materials != NULL) put_name(file.file, "mtllib", mesh_stem(materials, &len));
+    if (materials != NULL) put_name(o->file->file, "mtllib", mesh_stem(materials, &len));
     rc = put_parts(o, materials != NULL, err);
-    if (rc == SH_OK && materials != NULL) rc = write_materials(o, materials, err);
-    int closed = mesh_file_close(&file, rc == SH_OK, err);
-    o->file = NULL;
-    return rc != SH_OK ? rc : closed;
+    if (rc == SH_OK) rc = mesh_file_check(o->file, err);
+    if (rc == SH_OK && materials != NULL) rc = write_materials(o, out, materials, err);
+    return rc == SH_OK ? mesh_output_images(out, o->mesh, err) : rc;
 }
 
-int mesh_write_obj(const struct mesh_format *format, const char *path, const struct mesh *mesh, struct mesh_work *work,
-                   struct sh_err *err)
+int mesh_write_obj(const struct mesh_format *format, struct mesh_output *out, const struct mesh *mesh,
+                   struct mesh_work *work, struct sh_err *err)
 {
     struct obj o = {.mesh = mesh, .work = work};
     size_t len;
     char *materials = NULL;
     (void)format;
-    const char *name = mesh_stem(path, &len);
+    const char *name = mesh_stem(out->path, &len);
     snprintf(o.whole_name, sizeof o.whole_name, "%.*s", (int)len, name);
-    o.whole = (struct mesh_part){o.whole_name, mesh->n_vertices, mesh->n_faces, mesh->texture};
-    if (has_textures(&o) && (materials = mesh_beside(path, ".mtl")) == NULL)
-        return sh_fail(err, SH_ENOMEM, "%s: no memory to write it", path);
-    int rc = write_main(&o, path, materials, err);
+    o.whole = (struct mesh_part){o.whole_name, mesh->n_vertices, mesh->n_faces, mesh->texture, NULL};
+    if (has_textures(&o) && (materials = mesh_beside(out->path, ".mtl")) == NULL)
+        return sh_fail(err, SH_ENOMEM, "%s: no memory to write it", out->path);
+    int rc = write_main(&o, out, materials, err);
     free(materials);
     return rc;
 }

@@ -142,19 +142,17 @@ static int put_rows(struct mesh_file *file, const struct mesh *m, uint32_t n,
     return rc;
 }
 
-int mesh_write_ply(const struct mesh_format *format, const char *path, const struct mesh *mesh, struct mesh_work *work,
-                   struct sh_err *err)
+int mesh_write_ply(const struct mesh_format *format, struct mesh_output *out, const struct mesh *mesh,
+                   struct mesh_work *work, struct sh_err *err)
 {
-    struct mesh_file file;
+    struct mesh_file *file;
     (void)format;
     if (mesh->n_scalars > MAX_SCALARS)
-        return sh_fail(err, SH_EINPUT, "%s: %u figures a vertex; allowed are up to %d", path, mesh->n_scalars,
+        return sh_fail(err, SH_EINPUT, "%s: %u figures a vertex; allowed are up to %d", out->path, mesh->n_scalars,
                        MAX_SCALARS);
-    int rc = mesh_file_open(&file, path, err);
+    int rc = mesh_output_open(out, out->path, &file, err);
     if (rc != SH_OK) return rc;
-    put_header(file.file, mesh);
-    rc = put_rows(&file, mesh, mesh->n_vertices, put_vertex, work, err);
-    if (rc == SH_OK && mesh->face != NULL) rc = put_rows(&file, mesh, mesh->n_faces, put_face, work, err);
-    int closed = mesh_file_close(&file, rc == SH_OK, err);
-    return rc != SH_OK ? rc : closed;
+    put_header(file->file, mesh);
+    rc = put_rows(file, mesh, mesh->n_vertices, put_vertex, work, err);
+    return rc == SH_OK && mesh->face != NULL ? put_rows(file, mesh, mesh->n_faces, put_face, work, err) : rc;
 }

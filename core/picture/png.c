@@ -79,6 +79,12 @@ int picture_write_file(picture_encoder *encoder, const void *source, const char 
     return rc == SH_OK ? SH_OK : sh_fail(err, rc, "%s %s", what, why.text);
 }
 
+int picture_put_png(FILE *out, const struct picture *picture, struct sh_err *err)
+{
+    const struct picture_part whole = {picture, 0, 0, picture->width, picture->height, NULL};
+    return picture_encode_png(&whole, out, err);
+}
+
 int picture_write_png(const struct picture *picture, const char *what, const char *path, struct sh_err *err)
 {
     const struct picture_part whole = {picture, 0, 0, picture->width, picture->height, NULL};

@@ -17,6 +17,7 @@
 #include "core/scene/ifc_check.h"
 #include "core/scene/import.h"
 #include "core/scene/import_material.h"
+#include "core/scene/import_open.h"
 #include "core/scene/import_says.h"
 
 enum { MAX_DEPTH = 256 };
@@ -236,12 +237,14 @@ static int check_ifc(struct scene_build *b, struct sh_err *err)
 
 static const struct aiScene *import_file(struct scene_build *b, struct import_log *log, struct sh_err *err)
 {
+    struct import_open open;
     struct aiLogStream stream = {.callback = keep_log, .user = (char *)(void *)log};
+    import_open_set_up(&open);
     aiAttachLogStream(&stream);
     struct aiPropertyStore *options = aiCreatePropertyStore();
     aiSetImportPropertyInteger(options, AI_CONFIG_IMPORT_COLLADA_USE_COLLADA_NAMES, 1);      /* not the ids */
     aiSetImportPropertyInteger(options, AI_CONFIG_IMPORT_IFC_SKIP_SPACE_REPRESENTATIONS, 1); /* air is no surface */
-    const struct aiScene *in = aiImportFileExWithProperties(b->spec->file, 0, NULL, options);
+    const struct aiScene *in = aiImportFileExWithProperties(b->spec->file, 0, &open.io, options);
     aiReleasePropertyStore(options);
     aiDetachLogStream(&stream);
     if (in == NULL || in->mRootNode == NULL) {
@@ -249,7 +252,10 @@ static const struct aiScene *import_file(struct scene_build *b, struct import_lo
         const char *hint = strstr(why, "could not open referenced file") != NULL
                                ? "; its geometry is in that file, which belongs in the same folder: copy it there"
                                : "";
-        build_fail(b, SH_EINPUT, err, "%s%s", *why != '\0' ? why : "not readable", hint);
+        if (open.refused[0] != '\0')
+            build_fail(b, SH_EINPUT, err, "%s; allowed are regular files", open.refused);
+        else
+            build_fail(b, SH_EINPUT, err, "%s%s", *why != '\0' ? why : "not readable", hint);
         if (in != NULL) aiReleaseImport(in);
         in = NULL;
     }

@@ -313,6 +313,7 @@ static int take_head(struct result *r)
     if (rc == SH_OK && !(r->head.says.unit_m >= 0.0 && r->head.says.unit_m <= BUILD_MAX_COORDINATE_M))
         rc = wrong(r, "its unit:", 0);
     if (rc == SH_OK && (r->head.says.up < -3 || r->head.says.up > 3)) rc = wrong(r, "its axes:", 0);
+    if (rc == SH_OK && (r->head.says.is_left_handed & ~1) != 0) rc = wrong(r, "the hand of its axes:", 0);
     return rc;
 }
 

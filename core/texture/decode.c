@@ -11,13 +11,15 @@
 /* A block's size stands before it. */
 enum { HEAD = 16 };
 static _Thread_local size_t memory_left;
+static _Thread_local int ran_out; /* something was refused for want of it */
 
 static void *counted_realloc(void *old, size_t size)
 {
     char *block = old != NULL ? (char *)old - HEAD : NULL;
     size_t had = 0;
     if (block != NULL) memcpy(&had, block, sizeof had);
-    if (size > TEXTURE_MAX_MEMORY || (size > had && size - had > memory_left)) return NULL;
+    ran_out = size > TEXTURE_MAX_MEMORY || (size > had && size - had > memory_left);
+    if (ran_out) return NULL;
     block = realloc(block, HEAD + size);
     if (block == NULL) return NULL;
     memory_left = memory_left + had - size;
@@ -177,6 +179,54 @@ static uint8_t *load(const uint8_t *bytes, size_t n, int *width, int *height, in
     return stbi_load_from_memory(bytes, (int)n, width, height, channels, 4);
 }
 
+static int is_png(const uint8_t *bytes, size_t n)
+{
+    return n > 24 && memcmp(bytes, "\x89PNG\r\n\x1a\n", 8) == 0;
+}
+
+static int is_jpeg(const uint8_t *bytes, size_t n)
+{
+    return n > 3 && bytes[0] == 0xff && bytes[1] == 0xd8;
+}
+
+/* The segment of a JPEG that says its size, or NULL: frames have the markers 0xc0 to 0xcf but for three. */
+static const uint8_t *find_frame(const uint8_t *bytes, size_t n)
+{
+    for (size_t at = 2; at + 9 <= n && bytes[at] == 0xff;) {
+        const uint8_t marker = bytes[at + 1];
+        if ((marker & 0xf0) == 0xc0 && marker != 0xc4 && marker != 0xc8 && marker != 0xcc) return bytes + at;
+        if (marker == 0xda || marker == 0xd9) return NULL; /* texels begin */
+        at += marker == 0xff ? 1 : 2 + 256U * bytes[at + 2] + bytes[at + 3];
+    }
+    return NULL;
+}
+
+/* stb_image refuses sizes of PNG and JPEG that are too large itself, and goes on to ask the other formats, so that its
+ * reason is another one. */
+static int check_header(const char *file, const uint8_t *bytes, size_t n, struct sh_err *err)
+{
+    const uint8_t *frame = is_jpeg(bytes, n) ? find_frame(bytes, n) : NULL;
+    if (frame != NULL) return check_size(file, 256U * frame[7] + frame[8], 256U * frame[5] + frame[6], err);
+    if (!is_png(bytes, n)) return SH_OK;
+    uint32_t side[2] = {0, 0};
+    for (int i = 0; i < 8; i++)
+        side[i / 4] = side[i / 4] << 8 | bytes[16 + i];
+    return check_size(file, side[0], side[1], err);
+}
+
+/* As stbi_info_from_memory, with the reason of the format that the file is of. A BMP's height is negative where its rows
+ * come from the top. */
+static int get_info(const uint8_t *bytes, size_t n, int *width, int *height, int *channels)
+{
+    stbi__context s;
+    stbi__start_mem(&s, bytes, (int)n);
+    if (is_png(bytes, n)) return stbi__png_info(&s, width, height, channels);
+    if (is_jpeg(bytes, n)) return stbi__jpeg_info(&s, width, height, channels);
+    if (!stbi_info_from_memory(bytes, (int)n, width, height, channels)) return 0;
+    if (*height < 0 && *height > INT_MIN) *height = -*height;
+    return 1;
+}
+
 static int decode(const struct texture_source *source, const uint8_t *bytes, size_t n_bytes,
                   struct texture_image *image, struct sh_err *err)
 {
@@ -188,9 +238,11 @@ static int decode(const struct texture_source *source, const uint8_t *bytes, siz
                        TEXTURE_MAX_FILE);
     if (n_bytes > 1 && has_long_table(bytes, n_bytes)) return fail_read(file, "a table of more than 256 codes", err);
     memory_left = TEXTURE_MAX_MEMORY;
-    if (!stbi_info_from_memory(bytes, (int)n_bytes, &width, &height, &channels))
-        return fail_read(file, stbi_failure_reason(), err);
-    int rc = check_size(file, (uint32_t)width, (uint32_t)height, err);
+    ran_out = 0;
+    int rc = check_header(file, bytes, n_bytes, err);
+    if (rc != SH_OK) return rc;
+    if (!get_info(bytes, n_bytes, &width, &height, &channels)) return fail_read(file, stbi_failure_reason(), err);
+    rc = check_size(file, (uint32_t)width, (uint32_t)height, err);
     if (rc != SH_OK) return rc;
     if (is_cut_off(bytes, n_bytes, (uint64_t)width * (uint64_t)height)) return fail_read(file, "it is cut off", err);
     image->width = (uint32_t)width;
@@ -198,6 +250,9 @@ static int decode(const struct texture_source *source, const uint8_t *bytes, siz
     image->has_alpha = channels == 2 || channels == 4 || has_transparent_colour(bytes, n_bytes);
     if (source->alpha_only && !image->has_alpha) return SH_OK;
     image->rgba = load(bytes, n_bytes, &width, &height, &channels);
+    if (image->rgba == NULL && ran_out)
+        return sh_fail(err, SH_EINPUT, "%s: decoding it takes more than %d MiB of memory, and no more is allowed", file,
+                       TEXTURE_MAX_MEMORY >> 20);
     if (image->rgba == NULL) return fail_read(file, stbi_failure_reason(), err);
     drop_unused_alpha(bytes, image);
     return SH_OK;

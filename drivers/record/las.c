@@ -104,6 +104,22 @@ static int las_scan(void *rec, struct sh_err *err)
     return put_front(las, err);
 }
 
+/* Stations whose points are all too far from the first one. Of degrees it is said when they come. */
+static int las_fits(const char *path, const struct recorder_options *options, const struct recorder_scan *first,
+                    const struct recorder_scan *scan, struct sh_err *err)
+{
+    const double most_m = 2147483647 * first->scale_m;
+    double apart_m = 0;
+    (void)options;
+    for (int i = 0; i < 3; i++)
+        apart_m = fmax(apart_m, fabs(scan->place_m[i] - first->place_m[i]));
+    if (scan->moves || scan->in_degrees || apart_m <= most_m + scan->range_max_m) return SH_OK;
+    return sh_fail(err, SH_EINPUT,
+                   "%s: it is %.0f m from station %u, and LAS holds %.0f m in steps of %g m: give the head a coarser "
+                   "output.scale_m, or each station its own file (--split)",
+                   path, apart_m, first->station, most_m, first->scale_m);
+}
+
 static int too_far(const struct las *las, const double p[3], struct sh_err *err)
 {
     return sh_fail(err, SH_EFORMAT,
@@ -281,6 +297,7 @@ const struct recorder_ops recorder_las = {
     .ending = ".las",
     .size = sizeof(struct las),
     .track = {.scan = las_scan, .points = las_points, .wants_attributes = 1, .wants_colours = 1},
+    .fits = las_fits,
     .begin = las_begin,
     .finish = las_finish,
     .repair = las_repair,

@@ -26,37 +26,50 @@ static const double GIB = 1073741824.0;
 /* Points, grid, triangles, and what is grown at once; what the exporter takes besides (measured with 6.5 million). */
 enum { BYTES_A_POINT = 170, BYTES_OF_EXPORTER = 900 };
 
+static int check_points(const char *path, double n, struct sh_err *err)
+{
+    const double each = BYTES_A_POINT + (mesh_is_float(path) ? BYTES_OF_EXPORTER : 0);
+    const double bytes = n * each, there = (double)sysconf(_SC_PHYS_PAGES) * (double)sysconf(_SC_PAGESIZE);
+    if (n > MESH_MAX_VERTICES)
+        return sh_fail(err, SH_EINPUT,
+                       "%s: up to %.0f points; a mesh holds %d: scan fewer stations, more coarsely, or with --split",
+                       path, n, MESH_MAX_VERTICES);
+    if (there > 0 && bytes > there)
+        return sh_fail(err, SH_EINPUT,
+                       "%s: a mesh of up to %.0f points takes %.1f GiB of memory, and there are %.1f GiB: scan fewer "
+                       "stations, more coarsely, or with --split",
+                       path, n, bytes / GIB, there / GIB);
+    return SH_OK;
+}
+
 /* What the descriptor says of the scan's size, before the scan is made. */
 static int check_size(const struct mesh_recorder *m, struct sh_err *err)
 {
     const struct track *t = &m->base.track;
     if (t->max_lines == UINT32_MAX || t->max_pulses == UINT32_MAX) return SH_OK;
-    const double n = m->points.n + t->cast_share * t->max_lines * (double)t->max_pulses;
-    const double each = BYTES_A_POINT + (mesh_is_float(t->path) ? BYTES_OF_EXPORTER : 0);
-    const double bytes = n * each, there = (double)sysconf(_SC_PHYS_PAGES) * (double)sysconf(_SC_PAGESIZE);
-    if (n > MESH_MAX_VERTICES)
-        return sh_fail(err, SH_EINPUT,
-                       "%s: up to %.0f points; a mesh holds %d: scan fewer stations, more coarsely, or with --split",
-                       t->path, n, MESH_MAX_VERTICES);
-    if (there > 0 && bytes > there)
-        return sh_fail(err, SH_EINPUT,
-                       "%s: a mesh of up to %.0f points takes %.1f GiB of memory, and there are %.1f GiB: scan fewer "
-                       "stations, more coarsely, or with --split",
-                       t->path, n, bytes / GIB, there / GIB);
-    return SH_OK;
+    return check_points(t->path, m->points.n + t->cast_share * t->max_lines * (double)t->max_pulses, err);
 }
 
 /* Whether the format's numbers can hold what lies within the head's range. */
-static int check_place(const struct mesh_recorder *m, struct sh_err *err)
+static int check_place(const char *path, int moves, const double place_m[3], double range_max_m, struct sh_err *err)
 {
-    const struct track *t = &m->base.track;
     double low[3], high[3];
-    if (t->info.moving) return SH_OK; /* known at the end */
+    if (moves) return SH_OK; /* known at the end */
     for (int k = 0; k < 3; k++) {
-        low[k] = t->pose.shift_m[k] - t->info.range_max_m;
-        high[k] = t->pose.shift_m[k] + t->info.range_max_m;
+        low[k] = place_m[k] - range_max_m;
+        high[k] = place_m[k] + range_max_m;
     }
-    return mesh_check_box(t->path, low, high, err);
+    return mesh_check_box(path, low, high, err);
+}
+
+/* A scan by itself. Whether it fits after those before it is known when it begins: shots without echo take no room. */
+static int mesh_fits(const char *path, const struct recorder_options *options, const struct recorder_scan *first,
+                     const struct recorder_scan *scan, struct sh_err *err)
+{
+    (void)options;
+    (void)first;
+    int rc = check_place(path, scan->moves, scan->place_m, scan->range_max_m, err);
+    return rc == SH_OK && isfinite(scan->n_shots) ? check_points(path, scan->n_shots, err) : rc;
 }
 
 /* ---- a grid is complete */
@@ -180,8 +193,7 @@ static int check_uri(const struct mesh_recorder *m, struct sh_err *err)
 {
     const char *path = m->base.file.path, *slash = strrchr(path, '/'), *ending = m->base.ops->ending;
     const char *c = strpbrk(slash != NULL ? slash + 1 : path, "%#?:\\");
-    const int names_files = strcmp(ending, ".gltf") == 0 || (strcmp(ending, ".glb") == 0 && is_textured(m));
-    if (!names_files || c == NULL) return SH_OK;
+    if (strcmp(ending, ".gltf") != 0 || c == NULL) return SH_OK; /* .glb holds all */
     return sh_fail(err, SH_EINPUT,
                    "%s: %s names the files beside it as URIs, where %c means something else; allowed are names without "
                    "%% # ? : \\",
@@ -192,7 +204,8 @@ static int mesh_begin(void *rec, struct sh_err *err)
 {
     const struct mesh_recorder *m = rec;
     int rc = check_uri(m, err);
-    if (rc == SH_OK && is_textured(m)) rc = try_beside(m, ".png", err);
+    const int has_image = is_textured(m) && strcmp(m->base.ops->ending, ".glb") != 0;
+    if (rc == SH_OK && has_image) rc = try_beside(m, ".png", err);
     if (rc == SH_OK && is_textured(m) && strcmp(m->base.ops->ending, ".obj") == 0) rc = try_beside(m, ".mtl", err);
     return rc == SH_OK && strcmp(m->base.ops->ending, ".gltf") == 0 ? try_beside(m, ".bin", err) : rc;
 }
@@ -203,7 +216,7 @@ static int mesh_scan(void *rec, struct sh_err *err)
     const struct track *t = &m->base.track;
     int rc = end_grid(m, err);
     if (rc == SH_OK) rc = mesh_grid_check(t, err);
-    if (rc == SH_OK) rc = check_place(m, err);
+    if (rc == SH_OK) rc = check_place(t->path, t->info.moving, t->pose.shift_m, t->info.range_max_m, err);
     if (rc == SH_OK) rc = check_size(m, err);
     if (rc != SH_OK) return rc;
     if (m->begun && strcmp(m->profile, t->info.profile) != 0) m->several = 1;
@@ -314,13 +327,13 @@ static void mesh_release(void *rec)
 }
 
 /* The others are written by an exporter in one piece at the end: what a kill leaves is no mesh. */
-#define MESH_OPS(ENDING, REPAIR)                                                                              \
-    {                                                                                                         \
-        .ending = ENDING, .is_mesh = 1, .size = sizeof(struct mesh_recorder),                                 \
-        .track = {.scan = mesh_scan, .points = mesh_take_points, .metres = 1, .grid = 1, .wants_colours = 1}, \
-        .begin = mesh_begin, .finish = mesh_finish, .release = mesh_release, .repair = REPAIR                 \
+#define MESH_OPS(ENDING, REPAIR)                                                                                 \
+    {                                                                                                            \
+        .ending = ENDING, .is_mesh = 1, .size = sizeof(struct mesh_recorder),                                    \
+        .track = {.scan = mesh_scan, .points = mesh_take_points, .metres = 1, .grid = 1, .wants_colours = 1},    \
+        .fits = mesh_fits, .begin = mesh_begin, .finish = mesh_finish, .release = mesh_release, .repair = REPAIR \
     }
 
-const struct recorder_ops recorder_mesh_ply = MESH_OPS(".ply", mesh_ply_repair), recorder_obj = MESH_OPS(".obj", obj_repair),
-                          recorder_gltf = MESH_OPS(".gltf", NULL), recorder_glb = MESH_OPS(".glb", NULL),
-                          recorder_fbx = MESH_OPS(".fbx", NULL);
+const struct recorder_ops recorder_mesh_ply = MESH_OPS(".ply", mesh_ply_repair),
+                          recorder_obj = MESH_OPS(".obj", obj_repair), recorder_gltf = MESH_OPS(".gltf", NULL),
+                          recorder_glb = MESH_OPS(".glb", NULL), recorder_fbx = MESH_OPS(".fbx", NULL);

@@ -25,7 +25,7 @@ int mesh_grid_check(const struct track *t, struct sh_err *err)
     if (!t->info.moving && is_flat)
         return sh_fail(
             err, SH_EFORMAT,
-            "%s: a mesh needs a surface, and all lines of this head are one: it neither pans nor moves; allowed .ply (without --mesh and --sparse) .las .ptx .e57 .shs",
+            "%s: a mesh needs a surface, and all lines of this head are one: it neither pans nor moves, nor has it several rings; allowed .ply (without --mesh and --sparse) .las .ptx .e57 .shs",
             t->path);
     if (t->info.moving && t->info.geo && t->info.crs != NATIVE_CRS_LOCAL)
         return sh_fail(err, SH_EFORMAT,

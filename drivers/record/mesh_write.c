@@ -29,20 +29,6 @@ static void name_parts(struct mesh_recorder *m)
     }
 }
 
-static int write_textures(const struct mesh_recorder *m, struct sh_err *err)
-{
-    const char *path = m->base.file.path, *slash = strrchr(path, '/');
-    int rc = SH_OK;
-    for (size_t i = 0; rc == SH_OK && i < m->n_parts && is_textured(m); i++) {
-        char *to;
-        if (asprintf(&to, "%.*s%s", slash != NULL ? (int)(slash + 1 - path) : 0, path, m->part[i].texture) < 0)
-            return sh_fail(err, SH_ENOMEM, "%s: no memory to write its texture", path);
-        rc = picture_write_png(&m->part[i].image, "texture", to, err);
-        free(to);
-    }
-    return rc;
-}
-
 /* The lines of a header. */
 static void put_facts(const struct mesh_recorder *m, uint32_t n_sparse, FILE *out)
 {
@@ -159,10 +145,10 @@ static int write_parts(struct mesh_recorder *m, struct sh_err *err)
     struct mesh_part *part = calloc(m->n_parts + 1, sizeof *part);
     if (part == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory to write it", m->base.track.path);
     for (size_t i = 0; i < m->n_parts; i++)
-        part[i] = (struct mesh_part){m->part[i].name, m->part[i].n_points, m->part[i].n_faces,
-                                     is_textured(m) ? m->part[i].texture : NULL};
-    int rc = write_textures(m, err);
-    if (rc == SH_OK) rc = write_mesh(m, &m->points, 1, part, err);
+        part[i] =
+            (struct mesh_part){m->part[i].name, m->part[i].n_points, m->part[i].n_faces,
+                               is_textured(m) ? m->part[i].texture : NULL, is_textured(m) ? &m->part[i].image : NULL};
+    const int rc = write_mesh(m, &m->points, 1, part, err);
     free(part);
     return rc;
 }

@@ -201,12 +201,12 @@ static int set_gps(struct ply *ply)
 /* A float steps by 6e-8 of a number: enough about the origin of a scene, and metres on the Earth. */
 static const double FLOAT_MOST_M = 1000, FLOAT_PART = 0x1p-24;
 
-static int fail_float(const struct ply *ply, double most, struct sh_err *err)
+static int fail_float(const char *path, double most, struct sh_err *err)
 {
     return sh_fail(err, SH_EINPUT,
                    "%s: coordinates of %.0f m as float would be wrong by up to %.2g m; allowed without float, and for "
                    "stations within %g m of the origin",
-                   ply->base.file.path, most, most * FLOAT_PART, FLOAT_MOST_M);
+                   path, most, most * FLOAT_PART, FLOAT_MOST_M);
 }
 
 static double largest(const double p[3])
@@ -214,15 +214,22 @@ static double largest(const double p[3])
     return fmax(fabs(p[0]), fmax(fabs(p[1]), fabs(p[2])));
 }
 
-static int check_float(const struct ply *ply, struct sh_err *err)
+static int check_float(const char *path, unsigned columns, int in_degrees, const double place_m[3], struct sh_err *err)
 {
-    const struct track *t = &ply->base.track;
-    if ((ply->facts.columns & PLY_FLOAT) == 0) return 0;
-    if (t->crs == NATIVE_CRS_GEODETIC)
-        return sh_fail(err, SH_EINPUT, "%s: degrees as float would be wrong by metres; allowed without float",
-                       ply->base.file.path);
-    const double most = largest(t->pose.shift_m);
-    return most <= FLOAT_MOST_M ? 0 : fail_float(ply, most, err);
+    if ((columns & PLY_FLOAT) == 0) return 0;
+    if (in_degrees)
+        return sh_fail(err, SH_EINPUT, "%s: degrees as float would be wrong by metres; allowed without float", path);
+    const double most = largest(place_m);
+    return most <= FLOAT_MOST_M ? 0 : fail_float(path, most, err);
+}
+
+static int ply_fits(const char *path, const struct recorder_options *options, const struct recorder_scan *first,
+                    const struct recorder_scan *scan, struct sh_err *err)
+{
+    static const double way[3] = {0, 0, 0}; /* of a head that moves in the scene's frame: known at the end */
+    (void)first;
+    return check_float(path, options->columns, scan->in_degrees, scan->moves && !scan->is_geo ? way : scan->place_m,
+                       err);
 }
 
 /* A head that moves comes to places that nobody knows before. Its points may be as much farther as those of a station. */
@@ -233,7 +240,7 @@ static int check_floats_on_the_way(const struct ply *ply, int n, struct sh_err *
     if ((ply->facts.columns & PLY_FLOAT) == 0 || !t->info.moving) return 0;
     for (int i = 0; i < n; i++)
         most = fmax(most, largest((const double[3]){t->point[i].x, t->point[i].y, t->point[i].z}));
-    return most <= FLOAT_MOST_M + t->info.range_max_m ? 0 : fail_float(ply, most, err);
+    return most <= FLOAT_MOST_M + t->info.range_max_m ? 0 : fail_float(ply->base.file.path, most, err);
 }
 
 /* Room for the header is made when the number of surfaces is known. */
@@ -250,7 +257,8 @@ static int ply_scan(void *rec, struct sh_err *err)
     const int same = last != NULL && strcmp(last->idn, head.idn) == 0 && strcmp(last->profile, head.profile) == 0;
     const int is_new = !same && facts->n_heads < PLY_MAX_HEADS;
     if (is_new) facts->head[facts->n_heads++] = head;
-    int rc = check_float(ply, err);
+    int rc = check_float(ply->base.file.path, facts->columns, ply->base.track.crs == NATIVE_CRS_GEODETIC,
+                         ply->base.track.pose.shift_m, err);
     set_gps(ply);
     if (rc == 0 && !ply->begun) return make_room(ply, info->n_surfaces, err);
     return rc == 0 && is_new ? write_header(ply, 1, err) : rc;
@@ -346,6 +354,7 @@ const struct recorder_ops recorder_ply = {
     .ending = ".ply",
     .size = sizeof(struct ply),
     .track = {.scan = ply_scan, .points = ply_points, .wants_attributes = 1, .wants_colours = 1},
+    .fits = ply_fits,
     .begin = ply_begin,
     .frame = ply_frame,
     .finish = ply_finish,

@@ -14,6 +14,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "core/infile.h"
 #include "drivers/record/ptx_text.h"
 
 enum { LINE_MOST = 512, HEADER_LINES = 10 };
@@ -225,9 +226,10 @@ static int open_grid(const struct repair *r, struct ptx_grid *grid, struct sh_er
         grid->path = NULL;
         return sh_fail(err, SH_ENOMEM, "%s: no memory to repair it", r->path);
     }
-    grid->spool = fopen(grid->path, "rbe");
-    if (grid->spool != NULL || errno == ENOENT) return SH_OK;
-    return sh_fail(err, SH_EIO, "%s: cannot be read: %s", grid->path, strerror(errno));
+    const char *why;
+    grid->spool = infile_open(grid->path, &why);
+    if (grid->spool != NULL || access(grid->path, F_OK) != 0) return SH_OK;
+    return sh_fail(err, SH_EIO, "%s: cannot be read: %s", grid->path, why);
 }
 
 int ptx_repair(struct repair *r, struct sh_err *err)

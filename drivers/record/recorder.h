@@ -44,7 +44,7 @@ struct recorder_options {
     struct colour_choice colour; /* of formats that hold one */
     unsigned columns;            /* of .ply: enum ply_column; 0: all, in double */
     int scalar_names;            /* PLY's columns besides coordinates and colour are called scalar_NAME */
-    uint32_t n_heads; /* that the scans are of, one after the other, in one scene; 0: one, as far as known */
+    uint32_t n_heads;            /* that the scans are of, one after the other, in one scene; 0: one, as far as known */
     int may_wait;  /* the stream waits for the recorder: large files are written past the system's cache (outfile.h) */
     int las_minor; /* LAS 1.2 or 1.4: 2 or 4; 0: 4 */
     int mesh;      /* .ply is a mesh of the scan's grid */
@@ -58,12 +58,21 @@ struct recorder_options {
     struct recorder_padding *padding;
 };
 
+/* A scan that is due, as a configuration says it. Places are those of the stream: the scene's, or its CRS's. */
+struct recorder_scan {
+    uint32_t station;
+    int moves, is_geo, in_degrees;
+    double place_m[3]; /* of the head; of one that moves, in the geo layout, the anchor */
+    double range_max_m, scale_m;
+    double n_shots; /* at most; infinity: not known */
+};
+
 struct recorder {
     const struct recorder_ops *ops;
     struct recorder_options options;
     struct outfile file;
     struct track track; /* file.path is its path in messages */
-    int has_failed; /* something could not be written: it is not completed */
+    int has_failed;     /* something could not be written: it is not completed */
 };
 
 /* What a format is. Each function gets the recorder's own struct as rec; each may be NULL. Errors: SH_E, text
@@ -73,6 +82,10 @@ struct recorder_ops {
     int is_mesh;            /* of the scan's grid, or points spread over it */
     size_t size;            /* of the recorder's own struct; after its struct recorder it begins zeroed */
     struct track_ops track; /* takes points in batches */
+    /* Before the first scan: SH_EINPUT where the format can't hold a scan, which comes into one file with `first`. NULL: it
+     * holds all. */
+    int (*fits)(const char *path, const struct recorder_options *options, const struct recorder_scan *first,
+                const struct recorder_scan *scan, struct sh_err *err);
     /* The file is open and empty. */
     int (*begin)(void *rec, struct sh_err *err);
     /* Takes each frame of the stream, in order. NULL: track_frame alone takes them. */

@@ -174,15 +174,28 @@ static int record_some(struct heads *heads, struct heads_one *one, const struct 
     return rc;
 }
 
-/* Sets up the scanners that are due later once and lets them go, so that what is wrong with one of them is said before
- * the first scan, and what several warn of is said once. Their BVHs stay in the world, where they are found when their
- * turn comes. */
-static int check_later(struct heads *heads, uint32_t first, uint32_t last, struct sh_err *err)
+/* The stations of head k. */
+static int check_fits(const struct heads *heads, uint32_t k, const struct site *site, uint32_t first, uint32_t last,
+                      struct sh_err *err)
+{
+    int rc = SH_OK;
+    for (uint32_t s = first; s <= last && rc == SH_OK && heads->fits != NULL; s++)
+        if (of(heads, s) == k) rc = heads->fits(heads->ctx, site, s, err);
+    return rc;
+}
+
+/* The first head that is due is opened. The other scanners are set up once and let go, so that what is wrong with one
+ * of them is said before the first scan, and what several warn of is said once. Their BVHs stay in the world, where
+ * they are found when their turn comes. */
+static int check_all(struct heads *heads, uint32_t first, uint32_t last, struct sh_err *err)
 {
     uint8_t is_known[CONFIG_MAX_STATIONS] = {1};
     struct scanner_report report;
-    int rc = open_one(heads, &heads->one[of(heads, first)], err);
-    is_known[of(heads, first)] = 1;
+    const uint32_t begins = of(heads, first);
+    int rc = check_fits(heads, 0, heads->first->site, first, last, err);
+    if (rc == SH_OK) rc = open_one(heads, &heads->one[begins], err);
+    if (rc == SH_OK && begins != 0) rc = check_fits(heads, begins, heads->one[begins].offline.site, first, last, err);
+    is_known[begins] = 1;
     for (uint32_t s = first; s <= last && rc == SH_OK; s++) {
         const uint32_t k = of(heads, s);
         struct site *site = NULL;
@@ -191,10 +204,27 @@ static int check_later(struct heads *heads, uint32_t first, uint32_t last, struc
         scanner_report_set_up(&report, heads->report, s, &heads->warnings);
         report.report.progress = NULL;
         rc = offline_load(heads->one[k].cfg, heads->first->site, &report.report, &site, err);
+        if (rc == SH_OK) rc = check_fits(heads, k, site, first, last, err);
         site_free(site);
     }
     scanner_warnings_say(&heads->warnings, heads->first->site, heads->report);
     return rc;
+}
+
+/* Of one head, which stands where it is set to or goes from station to station. */
+static int record_one(struct heads *heads, const struct recording_options *options, struct recording_result *result,
+                      struct sh_err *err)
+{
+    const struct site *site = heads->first->site;
+    const uint32_t own = site->cfg->head.settings.station;
+    const uint32_t first = options->first_station != 0 ? options->first_station : own;
+    const uint32_t last = options->first_station != 0 ? options->last_station : own;
+    memset(result, 0, sizeof *result);
+    for (uint32_t s = first; s <= last && s <= site->n_stations && heads->fits != NULL; s++) {
+        const int rc = heads->fits(heads->ctx, site, s, err);
+        if (rc != SH_OK) return rc;
+    }
+    return recording_run(heads->first->sh, options, result, err);
 }
 
 int heads_record(struct heads *heads, const struct recording_options *options, struct recording_result *result,
@@ -203,12 +233,12 @@ int heads_record(struct heads *heads, const struct recording_options *options, s
     const uint32_t last = options->last_station;
     const int64_t start_ns = clock_now_ns();
     int rc = SH_OK;
-    if (heads->n == 1 || options->first_station == 0) return recording_run(heads->first->sh, options, result, err);
+    if (heads->n == 1 || options->first_station == 0) return record_one(heads, options, result, err);
     if (last > heads->first->site->n_stations)
         return sh_fail(err, SH_EINPUT, "%s: there is no station %u; allowed 1 to %u", heads->one[0].cfg->file, last,
                        heads->first->site->n_stations);
     memset(result, 0, sizeof *result);
-    rc = check_later(heads, options->first_station, last, err);
+    rc = check_all(heads, options->first_station, last, err);
     for (uint32_t from = options->first_station, to; from <= last && rc == SH_OK && result->missing[0] == '\0';
          from = to + 1) {
         for (to = from; to < last && of(heads, to + 1) == of(heads, from);)

@@ -21,6 +21,9 @@ struct heads_one {
 
 struct heads {
     struct offline *first; /* of head.station; it stays until the end */
+    /* The caller's: asked for each station before the first scan, with the site of its scanner. NULL: not asked. */
+    int (*fits)(void *ctx, const struct site *site, uint32_t station, struct sh_err *err);
+    void *ctx;
     /* inner state */
     struct heads_one one[CONFIG_MAX_STATIONS]; /* one[0]: of head.station */
     uint32_t n;

@@ -299,6 +299,52 @@ static void fails(const char *file, const char *expected)
     unlink(file);
 }
 
+/* Each format says its size before any texel, so that what is too large is said to be that. */
+static void what_is_too_large_is_said_to_be(void **state)
+{
+    (void)state;
+    static const char side[] = "allowed are 1 to 16384 a side, and up to 67108864 in all";
+    static uint8_t bytes[8192];
+    char says[160];
+    const struct {
+        uint32_t width, height;
+    } png[] = {{16385, 1}, {1, 16385}, {60000, 60000}, {0x7fffffff, 5}, {0xffffffff, 5}, {0, 5}};
+    for (size_t i = 0; i < sizeof png / sizeof png[0]; i++) {
+        snprintf(says, sizeof says, "large.png: %u x %u texels; %s", png[i].width, png[i].height, side);
+        fails(write_file("large.png", bytes, png_of_size(bytes, png[i].width, png[i].height)), says);
+    }
+    memcpy(bytes, JPEG, sizeof JPEG);
+    uint8_t *frame = memmem(bytes, sizeof JPEG, "\xff\xc0", 2);
+    assert_non_null(frame);
+    memset(frame + 5, 0xea, 4);
+    snprintf(says, sizeof says, "large.jpg: 60138 x 60138 texels; %s", side);
+    fails(write_file("large.jpg", bytes, sizeof JPEG), says);
+    size_t n = write_tga(bytes, 3, 1);
+    put(bytes + 12, 60000, 2);
+    snprintf(says, sizeof says, "large.tga: 60000 x 16 texels; %s", side);
+    fails(write_file("large.tga", bytes, n), says);
+    n = write_bmp(bytes, 3);
+    put(bytes + 18, 60000, 4);
+    snprintf(says, sizeof says, "large.bmp: 60000 x 16 texels; %s", side);
+    fails(write_file("large.bmp", bytes, n), says);
+    put(bytes + 22, (uint32_t)-SIDE, 4); /* rows from the top */
+    fails(write_file("large.bmp", bytes, n), says);
+    n = png_of_size(bytes, 16, 16);
+    bytes[24] = 7; /* bits of a channel */
+    fails(write_file("depth.png", bytes, n), "1/2/4/8/16-bit only");
+}
+
+/* A height below 0 says that the rows come from the top. */
+static void a_bmp_from_the_top_is_read(void **state)
+{
+    (void)state;
+    static uint8_t bytes[8192];
+    const size_t n = write_bmp(bytes, 3);
+    put(bytes + 22, (uint32_t)-SIDE, 4);
+    pixels(bytes + 54, 3, 1);
+    check_file(write_file("top.bmp", bytes, n), 0, 0);
+}
+
 static void hostile_files_take_no_gigabytes(void **state)
 {
     (void)state;
@@ -347,6 +393,8 @@ int main(void)
                                        cmocka_unit_test(wrap_modes_by_hand),
                                        cmocka_unit_test(what_makes_a_hole),
                                        cmocka_unit_test(a_hole_is_what_is_below_the_half),
+                                       cmocka_unit_test(what_is_too_large_is_said_to_be),
+                                       cmocka_unit_test(a_bmp_from_the_top_is_read),
                                        cmocka_unit_test(hostile_files_take_no_gigabytes)};
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -1,5 +1,6 @@
 /* Import by Assimp in a process of its own: what comes back is not trusted; limits, crashes and the end of
  * either process are one line, and nothing stays behind. */
+#include <dlfcn.h>
 #include <errno.h>
 #include <math.h>
 #include <poll.h>
@@ -11,6 +12,7 @@
 #include <sys/syscall.h>
 #include <sys/wait.h>
 
+#include <assimp/cimport.h>
 #include <assimp/version.h>
 
 #include "core/scene/import.h"
@@ -183,26 +185,28 @@ static void names_have_an_end(void **state)
     build_release(&b);
 }
 
-/* ---- the process. A buffer of this glTF is a pipe that nobody writes to: it reads for ever. */
+/* ---- the process. Assimp's function stands in for itself here, and hangs for a mesh of this name. */
+
+#define ENDLESS "endless.gltf"
+
+const struct aiScene *aiImportFileExWithProperties(const char *file, unsigned flags, struct aiFileIO *io,
+                                                   const struct aiPropertyStore *options)
+{
+    const struct aiScene *(*real)(const char *, unsigned, struct aiFileIO *, const struct aiPropertyStore *);
+    while (strstr(file, ENDLESS) != NULL)
+        pause();
+    *(void **)&real = dlsym(RTLD_NEXT, "aiImportFileExWithProperties");
+    assert_non_null(real);
+    return real(file, flags, io, options);
+}
 
 static const char *endless_gltf(void)
 {
-    char pipe[96];
-    snprintf(pipe, sizeof pipe, "%s/pipe.bin", folder);
-    assert_int_equal(mkfifo(pipe, 0600), 0);
-    return write_text("endless.gltf",
-                      "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0]}],"
-                      "\"nodes\":[{\"mesh\":0}],\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}],"
-                      "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"}],"
-                      "\"bufferViews\":[{\"buffer\":0,\"byteLength\":36}],"
-                      "\"buffers\":[{\"byteLength\":36,\"uri\":\"pipe.bin\"}]}");
+    return write_text(ENDLESS, "{}");
 }
 
 static void remove_endless(void)
 {
-    char pipe[96];
-    snprintf(pipe, sizeof pipe, "%s/pipe.bin", folder);
-    unlink(pipe);
     unlink(path);
 }
 

@@ -19,7 +19,7 @@ static const float uv[N_VERTICES][2] = {{0.125f, 0.25f}, {0.5f, 0},  {1, 1}, {0,
 static const uint8_t rgb[N_VERTICES][3] = {{255, 0, 0}, {1, 2, 3}, {4, 5, 6}, {7, 8, 9},
                                            {0, 0, 255}, {9, 9, 9}, {0, 1, 0}};
 static const uint8_t face_rgb[N_FACES][3] = {{10, 20, 30}, {40, 50, 60}, {70, 80, 90}, {255, 254, 253}};
-static const struct mesh_part parts[2] = {{"station 1", 4, 2, "one.png"}, {"station 2", 3, 2, "two.png"}};
+static const struct mesh_part parts[2] = {{"station 1", 4, 2, "one.png", NULL}, {"station 2", 3, 2, "two.png", NULL}};
 
 static struct sh_err err;
 
@@ -222,8 +222,8 @@ static void what_is_refused(void **state)
     (void)state;
     static const double broken[1][3] = {{1, (double)NAN, 2}};
     static const uint32_t beyond[1][3] = {{0, 1, 7}};
-    const struct mesh_part bad[2] = {{"a", 3, 2, NULL}, {"b", 4, 2, NULL}}; /* face 2 uses vertex 3 */
-    const struct mesh_part few[1] = {{"a", 4, 2, NULL}};
+    const struct mesh_part bad[2] = {{"a", 3, 2, NULL, NULL}, {"b", 4, 2, NULL, NULL}}; /* face 2 uses vertex 3 */
+    const struct mesh_part few[1] = {{"a", 4, 2, NULL, NULL}};
     struct mesh mesh = {.n_vertices = 1, .xyz_m = broken};
     write_refused("a.stl", &mesh, "no mesh has this ending; known are .ply .obj .gltf .glb .fbx");
     write_refused("ply", &mesh, "no mesh has this ending");

@@ -21,7 +21,7 @@ static char *write_mesh(const char *path, int ascii, size_t *len)
     static const float uv[8][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}, {0, 0}, {1, 0}, {1, 1}, {0, 1}};
     static const uint8_t rgb[8][3] = {{1, 2, 3}};
     static const uint32_t face[4][3] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
-    static const struct mesh_part part[2] = {{"station 1", 4, 2, "a.png"}, {"station 2", 4, 2, "b.png"}};
+    static const struct mesh_part part[2] = {{"station 1", 4, 2, "a.png", NULL}, {"station 2", 4, 2, "b.png", NULL}};
     static const char *const comment[] = {"crs local"};
     const struct mesh mesh = {.n_vertices = 8,
                               .n_faces = 4,

@@ -377,7 +377,7 @@ static void what_can_be_no_mesh(void **state)
     remove_file("a.mtl");
 
     refused("a#b.gltf", mesh, SH_EINPUT, "as URIs, where # means something else");
-    refused("a%b.glb", mesh, SH_EINPUT, "as URIs, where % means something else");
+    refused("a%b.gltf", mesh, SH_EINPUT, "as URIs, where % means something else");
 
     rig_begin();
     begin_scan(1, 1);

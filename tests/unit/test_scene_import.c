@@ -329,6 +329,39 @@ static void nothing_is_printed(void **state)
     assert_int_equal(st.st_size, 0);
 }
 
+/* What a mesh names is opened as the mesh itself: it must be a regular file. A FIFO would be waited for; the limit of time
+ * is there for a program that does so. */
+static void a_buffer_must_be_a_file(void **state)
+{
+    (void)state;
+    static const char *const kind[] = {"a FIFO, not a file", "a directory, not a file", "a device, not a file"};
+    const struct scene_import_limits limits = {.memory_mib = 2048, .time_s = 20, .files = 64};
+    for (int i = 0; i < 3; i++) {
+        char buffer[96], says[160];
+        struct scene *s = NULL;
+        struct sh_err err = {0};
+        snprintf(buffer, sizeof buffer, "%s/buffer.bin", folder);
+        assert_int_equal(i == 0   ? mkfifo(buffer, 0600)
+                         : i == 1 ? mkdir(buffer, 0700)
+                                  : symlink("/dev/zero", buffer),
+                         0);
+        const struct scene_mesh_spec spec = {
+            .file =
+                write_text("a.gltf", "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0]}],"
+                                     "\"nodes\":[{\"mesh\":0}],\"meshes\":[{\"primitives\":[{\"attributes\":"
+                                     "{\"POSITION\":0}}]}],\"accessors\":[{\"bufferView\":0,\"componentType\":5126,"
+                                     "\"count\":3,\"type\":\"VEC3\"}],\"bufferViews\":[{\"buffer\":0,"
+                                     "\"byteLength\":36}],\"buffers\":[{\"byteLength\":36,\"uri\":\"buffer.bin\"}]}"),
+            .scale = 1,
+            .limits = &limits};
+        assert_int_equal(scene_load(&spec, 1, INFINITY, NULL, &s, &err), SH_EINPUT);
+        snprintf(says, sizeof says, "a.gltf: %s: %s", buffer, kind[i]);
+        remove(buffer);
+        if (strstr(err.text, says) == NULL) fail_msg("%s", err.text);
+    }
+    unlink(path);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -342,6 +375,7 @@ int main(void)
         cmocka_unit_test(node_trees),
         cmocka_unit_test(ifc_house),
         cmocka_unit_test(ifc_with_a_record_missing),
+        cmocka_unit_test(a_buffer_must_be_a_file),
         cmocka_unit_test(nothing_is_printed),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

@@ -92,6 +92,61 @@ static void a_mesh_becomes_a_scan(void **state)
     forget();
 }
 
+/* A model of Debian's as FBX text, with other axes: pairs of a name and a number. */
+static void write_fbx(struct wire *wire, const char *const *axes)
+{
+    char *all = wire_read("/usr/share/assimp/models/FBX/cubes_with_names.fbx", NULL), from[64];
+    for (; axes[0] != NULL; axes += 2) {
+        snprintf(from, sizeof from, "P: \"%s\", \"int\", \"Integer\", \"\",", axes[0]);
+        char *at = strstr(all, from), *next;
+        assert_non_null(at);
+        at += strlen(from);
+        assert_true(asprintf(&next, "%.*s%s%s", (int)(at - all), all, axes[1], at + strcspn(at, "\r\n")) > 0);
+        free(all);
+        all = next;
+    }
+    wire_write_text(wire, "cubes.fbx", all);
+    free(all);
+}
+
+/* With axes that up: y and up: z are not, the mesh lies on its side, stands on its head, or is mirrored. No key helps. */
+static void axes_that_no_key_can_say(void **state)
+{
+    struct wire *wire = *state;
+    static const struct {
+        const char *axes[8], *says, *up;
+    } is[] = {
+        {{"UpAxis", "1"}, NULL, "up: y # as the file says"},
+        {{"UpAxis", "2", "FrontAxis", "1", "FrontAxisSign", "-1"}, NULL, "up: z # as the file says"},
+        {{"UpAxisSign", "-1", "FrontAxisSign", "-1"},
+         "its -y axis points up, which no key can say: with up: y the mesh stands on its head; export it with y or z up",
+         "up: y # assumed"},
+        {{"UpAxis", "2", "UpAxisSign", "-1", "FrontAxis", "1"},
+         "its -z axis points up, which no key can say: with up: z the mesh stands on its head; export it with y or z up",
+         "up: z # assumed"},
+        {{"UpAxis", "0", "CoordAxis", "1", "CoordAxisSign", "-1"},
+         "its x axis points up, which no key can say: with up: z the mesh lies on its side; export it with y or z up",
+         "up: z # assumed"},
+        {{"CoordAxisSign", "-1"},
+         "its axes are left-handed, which no key can say: the mesh is mirrored; export it with right-handed axes",
+         "up: y # as the file says"},
+    };
+    if (access("/usr/share/assimp/models/FBX/cubes_with_names.fbx", R_OK) != 0) skip();
+    for (size_t i = 0; i < sizeof is / sizeof is[0]; i++) {
+        write_fbx(wire, is[i].axes);
+        unlink(wire_path(wire, "cubes.yaml"));
+        assert_int_equal(RUN(wire, "init", "cubes.fbx"), 0);
+        if (is[i].says != NULL)
+            contains(text, is[i].says);
+        else
+            assert_true(strstr(text, "axis") == NULL && strstr(text, "handed") == NULL);
+        char *yaml = wire_read(wire_path(wire, "cubes.yaml"), NULL);
+        contains(yaml, is[i].up);
+        free(yaml);
+    }
+    forget();
+}
+
 /* Millimetres, y up: as the options say, or as the size makes it likely. */
 static void unit_and_axes_can_be_given(void **state)
 {
@@ -265,6 +320,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(a_mesh_becomes_a_scan, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(unit_and_axes_can_be_given, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(axes_that_no_key_can_say, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(names_may_have_any_bytes, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(a_body_is_looked_at, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(the_path_of_the_mesh_starts_at_the_configuration, wire_setup, wire_teardown),

@@ -241,6 +241,37 @@ static void what_is_refused(void **state)
     assert_int_equal(usage_complaints, 0);
 }
 
+/* By its chunks: images lie within, and numbers begin at multiples of their size, as the format demands. */
+static void a_glb_holds_its_images(void **state)
+{
+    static const char script[] =
+        "import json, struct, sys\n"
+        "b = open(sys.argv[1], 'rb').read()\n"
+        "magic, version, length = struct.unpack('<4sII', b[:12])\n"
+        "n, kind = struct.unpack('<I4s', b[12:20])\n"
+        "m, binary = struct.unpack('<I4s', b[20 + n:28 + n])\n"
+        "assert (magic, version, length, kind, binary) == (b'glTF', 2, len(b), b'JSON', b'BIN\\0'), b[:28]\n"
+        "j, data = json.loads(b[20:20 + n]), b[28 + n:28 + n + m]\n"
+        "assert all('uri' not in x for x in j['images'] + j['buffers']) and len(j['images']) == 2, j['images']\n"
+        "for image in j['images']:\n"
+        "    v = j['bufferViews'][image['bufferView']]\n"
+        "    png = data[v.get('byteOffset', 0):][:v['byteLength']]\n"
+        "    assert image['mimeType'] == 'image/png' and png[:8] == b'\\x89PNG\\r\\n\\x1a\\n', image\n"
+        "    assert png[12:16] == b'IHDR' and png.rstrip(b'\\0')[-8:-4] == b'IEND', png[-12:]\n"
+        "for a in j['accessors']:\n"
+        "    at = a.get('byteOffset', 0) + j['bufferViews'][a['bufferView']].get('byteOffset', 0)\n"
+        "    assert at % 4 == 0, (a, at)\n"
+        "assert all('baseColorTexture' in x['pbrMetallicRoughness'] for x in j['materials'])\n";
+    struct wire *wire = *state;
+    char path[96];
+    wire_empty(wire);
+    record(wire, (const char *[]){"--station", "all", "-o", "a.glb", "--colour", "range", NULL});
+    snprintf(path, sizeof path, "%s", wire_path(wire, "a.glb"));
+    run_well(wire, "/usr/bin/python3", (const char *const[]){"-c", script, path, NULL});
+    assert_int_not_equal(access(wire_path(wire, "a.png"), F_OK), 0);
+    assert_int_not_equal(access(wire_path(wire, "a.1.png"), F_OK), 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -249,6 +280,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(each_station_by_itself, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(each_station_beside_all, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(what_is_refused, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(a_glb_holds_its_images, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

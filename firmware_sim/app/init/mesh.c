@@ -26,6 +26,21 @@ static const char *said_by(const char *file)
     return dot != NULL && strcasecmp(dot, ".fbx") == 0 ? "as the file says" : "as the format defines it";
 }
 
+/* What --up can't mend: it turns the mesh, and y or z becomes z. */
+static void warn_of_axes(const char *name, const struct scene_says *says, int y_up)
+{
+    if (says->up == 1 || says->up < 0)
+        sh_warn(&app_report_stderr,
+                "%s: its %s%c axis points up, which no key can say: with up: %c the mesh %s; export it with y or z up",
+                name, says->up < 0 ? "-" : "", "xyz"[abs(says->up) - 1], y_up ? 'y' : 'z',
+                says->up == (y_up ? -2 : -3) ? "stands on its head" : "lies on its side");
+    if (says->is_left_handed)
+        sh_warn(
+            &app_report_stderr,
+            "%s: its axes are left-handed, which no key can say: the mesh is mirrored; export it with right-handed axes",
+            name);
+}
+
 static void choose_up(const struct init_wish *wish, const char *name, const struct scene *scene, struct init_mesh *as)
 {
     const int says = scene->says.up;
@@ -39,15 +54,12 @@ static void choose_up(const struct init_wish *wish, const char *name, const stru
         from = says == 0 ? "assumed: the file doesn't say; y is up in many a file" : "assumed";
     as->up = y_up ? SCENE_UP_Y : SCENE_UP_Z;
     snprintf(as->up_from, sizeof as->up_from, "%s", from);
-    if (wish->up != NULL || says == 2 || says == 3) return;
-    if (says == 0)
+    warn_of_axes(name, &scene->says, y_up);
+    if (wish->up == NULL && says == 0)
         sh_warn(&app_report_stderr,
                 "%s: which axis points up is not in the file: z is assumed; if the mesh lies on "
                 "its side, --up y",
                 name);
-    else
-        sh_warn(&app_report_stderr, "%s: its %s%c axis points up, which no key can say: %c is assumed (--up y, --up z)",
-                name, says < 0 ? "-" : "", "xyz"[abs(says) - 1], y_up ? 'y' : 'z');
 }
 
 static void choose_scale(const struct init_wish *wish, const char *name, const struct scene *scene,

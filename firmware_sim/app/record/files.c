@@ -106,10 +106,11 @@ int record_files_check_surface(const struct record_files *files, struct sh_err *
 {
     for (int i = 0; i < files->n; i++)
         if (files->file[i].ops->is_mesh)
-            return sh_fail(err, SH_EINPUT,
-                           "record: -o %s: a mesh needs a surface, and all lines of this head are one: it neither "
-                           "pans nor moves; allowed .ply (without --mesh and --sparse) .las .ptx .e57 .shs",
-                           files->file[i].path);
+            return sh_fail(
+                err, SH_EINPUT,
+                "record: -o %s: a mesh needs a surface, and all lines of this head are one: it neither "
+                "pans nor moves, nor has it several rings; allowed .ply (without --mesh and --sparse) .las .ptx .e57 .shs",
+                files->file[i].path);
     return SH_OK;
 }
 
@@ -133,6 +134,20 @@ int record_files_check_heads(const struct record_files *files, struct sh_err *er
                            "record: -o %s: it is the stream of one head, and the stations have several scanners; "
                            "allowed with --split, or with --station N",
                            files->file[i].path);
+    return SH_OK;
+}
+
+int record_files_check_scan(const struct record_files *files, const struct recorder_scan *first,
+                            const struct recorder_scan *scan, struct sh_err *err)
+{
+    struct sh_err why = {0};
+    for (int i = 0; i < files->n; i++) {
+        const struct record_file *file = &files->file[i];
+        const int rc = file->ops->fits != NULL
+                           ? file->ops->fits(file->path, &files->recorder, files->split ? scan : first, scan, &why)
+                           : SH_OK;
+        if (rc != SH_OK) return sh_fail(err, rc, "record: station %u: -o %s", scan->station, why.text);
+    }
     return SH_OK;
 }
 

@@ -59,6 +59,9 @@ int record_files_check_surface(const struct record_files *files, struct sh_err *
 int record_files_check_emitter(const struct record_files *files, enum emitter_kind kind, struct sh_err *err);
 /* SH_EINPUT where a file is the stream of one head, and several heads would send into it. */
 int record_files_check_heads(const struct record_files *files, struct sh_err *err);
+/* SH_EINPUT, which names file and station, where a file can't hold a scan; `first` is the first one of the recording. */
+int record_files_check_scan(const struct record_files *files, const struct recorder_scan *first,
+                            const struct recorder_scan *scan, struct sh_err *err);
 /* SH_ESTATE: a recording that was killed has left something there, and the format can be repaired. */
 int record_files_open(struct record_files *files, struct sh_err *err);
 /* About once a second: what has come goes to the disk. */

@@ -1,5 +1,6 @@
 #include "firmware_sim/app/record/job.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -186,21 +187,9 @@ static int check_can_end(const struct record_job *r, const struct config *cfg, s
     return SH_OK;
 }
 
-static int check_frames(const struct record_job *r, const struct config *cfg, struct sh_err *err)
-{
-    const struct colour_choice *c = &r->files.recorder.colour;
-    if (!c->given || c->scale.mode != COLOUR_FRAME || cfg->platform.kind == PLATFORM_TRAJECTORY ||
-        cfg->platform.kind == PLATFORM_STOPS)
-        return SH_OK;
-    return sh_fail(err, SH_EINPUT,
-                   "%s: --colour frame, but there are no frames; it needs platform.kind trajectory or stops",
-                   cfg->file);
-}
-
 /* Whether the points of a recording say what its colours show: colour_check. Else they are as the head sends them. */
-static int is_known_here(const struct config *cfg)
+static int is_known_here(const struct config *cfg, enum colour_mode mode)
 {
-    const enum colour_mode mode = cfg->output.colour;
     if (!config_head_moves(&cfg->platform) || cfg->output.layout != LINE_GEO) return 1;
     return mode != COLOUR_RANGE && (mode != COLOUR_HEIGHT || cfg->output.crs != GEOREF_ECEF);
 }
@@ -211,9 +200,26 @@ static void set_colours(struct record_job *r, struct config *cfg)
     struct colour_choice *c = &r->files.recorder.colour;
     if (r->texture) cfg->output.colour = COLOUR_TEXTURE;
     if (c->given || r->texture || !colour_has_limits(cfg->output.colour) || cfg->output.colour_limited) return;
-    if (!is_known_here(cfg)) return;
+    if (!is_known_here(cfg, cfg->output.colour)) return;
     *c = (struct colour_choice){.given = 1, .scale.mode = cfg->output.colour};
     r->files.own_limits = 1;
+}
+
+static int check_colours(const struct record_job *r, const struct config *cfg, struct sh_err *err)
+{
+    const struct colour_choice *c = &r->files.recorder.colour;
+    const int has_frames = cfg->platform.kind == PLATFORM_TRAJECTORY || cfg->platform.kind == PLATFORM_STOPS;
+    if (!c->given) return SH_OK;
+    if (c->scale.mode == COLOUR_FRAME && !has_frames)
+        return sh_fail(err, SH_EINPUT,
+                       "%s: --colour frame, but there are no frames; it needs platform.kind trajectory or stops",
+                       cfg->file);
+    if (is_known_here(cfg, c->scale.mode)) return SH_OK;
+    return sh_fail(err, SH_EINPUT,
+                   "%s: --colour %s, but points of a head that moves do not say it in output.layout geo%s; allowed "
+                   "output.colour with limits, or output.layout: polar",
+                   cfg->file, c->scale.mode == COLOUR_RANGE ? "range" : "height",
+                   c->scale.mode == COLOUR_RANGE ? "" : " and ECEF");
 }
 
 /* What grids and meshes need of the head, and of the coordinates. */
@@ -222,7 +228,8 @@ static int check_meshes(const struct record_job *r, const struct config *cfg, st
     const enum emitter_kind kind = cfg->profile.emitter.kind;
     const int on_earth = cfg->output.layout == LINE_GEO && cfg->output.crs != GEOREF_LOCAL;
     const int moves = config_head_moves(&cfg->platform);
-    const int one_line = kind == EMITTER_PLANAR || (kind == EMITTER_LINE && cfg->head.settings.pan_udeg_s == 0);
+    const int one_line = kind == EMITTER_PLANAR || (kind == EMITTER_LINE && cfg->head.settings.pan_udeg_s == 0) ||
+                         (kind == EMITTER_SPHERE && cfg->profile.emitter.rings <= 1);
     int rc = on_earth ? record_files_check_floats(&r->files, err) : SH_OK;
     if (rc == SH_OK && on_earth && moves) rc = record_files_check_facing(&r->files, err);
     if (rc == SH_OK && one_line && !moves) rc = record_files_check_surface(&r->files, err);
@@ -234,7 +241,7 @@ int record_job_check(struct record_job *r, struct config *cfg, struct sh_err *er
     int rc = check_can_end(r, cfg, err);
     if (rc == SH_OK) rc = set_layout(r, cfg, err);
     if (rc == SH_OK) set_colours(r, cfg);
-    if (rc == SH_OK) rc = check_frames(r, cfg, err);
+    if (rc == SH_OK) rc = check_colours(r, cfg, err);
     if (rc == SH_OK && cfg->output.layout == LINE_GEO && cfg->output.crs == GEOREF_GEODETIC)
         rc = record_files_check_degrees(&r->files, err);
     return rc == SH_OK ? check_meshes(r, cfg, err) : rc;
@@ -254,6 +261,45 @@ static int check_heads(struct record_job *r, const struct heads *heads, uint32_t
     return rc == SH_OK && n > 1 ? record_files_check_heads(&r->files, err) : rc;
 }
 
+/* Of a line in the middle: rings at the poles of a sphere have one shot. The others differ by a pulse. */
+static double most_shots(const struct record_job *r, const struct site *site)
+{
+    struct head_settings settings = site->cfg->head.settings;
+    struct schedule_spec spec;
+    struct schedule_segment segment;
+    struct schedule_line line;
+    if (r->recording.frames >= 0) settings.frames = (uint32_t)r->recording.frames;
+    if (settings.frames == 0 || r->recording.duration_s > 0) return (double)INFINITY;
+    site_fill_spec(site, &settings, &spec);
+    schedule_start(&segment, &spec);
+    const uint64_t middle = schedule_line_of(&segment, segment.end_pulse / 2);
+    schedule_get_line(&segment, middle, &line);
+    const double fired = (double)(line.pulse_end - line.pulse0), cast = (double)line.cast_end - (double)line.cast0;
+    return fired > 0 && cast > 0 ? (double)segment.end_pulse / fired * cast : 0;
+}
+
+static int fits(void *ctx, const struct site *site, uint32_t station, struct sh_err *err)
+{
+    struct record_job *r = ctx;
+    const struct config_output *output = &site->cfg->output;
+    const double *centre_m, *scale; /* of a stretch of a way; not needed here */
+    const struct site_station *s = &site->station[station - 1];
+    struct recorder_scan scan = {.station = station,
+                                 .moves = site->moving,
+                                 .is_geo = output->layout == LINE_GEO,
+                                 .range_max_m = site->cfg->head.range_max_m,
+                                 .scale_m = site->scale_m,
+                                 .n_shots = most_shots(r, site)};
+    scan.in_degrees = scan.is_geo && output->crs == GEOREF_GEODETIC;
+    if (scan.is_geo)
+        georef_anchor(site_georef(site, station - 1, 0, &centre_m, &scale), scan.place_m);
+    else
+        memcpy(scan.place_m, s->at.position_m, sizeof scan.place_m);
+    if (r->first.station == 0) r->first = scan;
+    const int rc = record_files_check_scan(&r->files, &r->first, &scan, err);
+    return rc == SH_OK && r->each ? record_files_check_scan(&r->parts, &scan, &scan, err) : rc;
+}
+
 static int record_heads(struct record_job *r, struct config *cfg, struct heads *heads, struct sh_err *err)
 {
     const int all = r->station == APP_WORD;
@@ -265,6 +311,9 @@ static int record_heads(struct record_job *r, struct config *cfg, struct heads *
         rc = sh_fail(err, SH_EINPUT, "%s: --truth: the stations have %u scanners; allowed with one", cfg->file,
                      heads->n);
     heads->one[0].offline.truth = r->truth;
+    r->first = (struct recorder_scan){0};
+    heads->fits = fits;
+    heads->ctx = r;
     if (rc == SH_OK) rc = heads_open(heads, r->site, r->recording.duration_s, &app_report_stderr, err);
     r->recording.head_ends = 1;
     r->files.recorder.may_wait = 1; /* pace fast */

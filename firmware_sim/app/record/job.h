@@ -30,6 +30,7 @@ struct record_job {
     int64_t reported_ns;    /* when their progress was printed last */
     struct heads *heads;    /* of a configuration */
     struct record_files parts;
+    struct recorder_scan first; /* of the scans, as the configuration says it */
     int has_silent;  /* objects that give no echo (scene.target) */
     int interrupted; /* before the files were completed, which an interrupted recording does, too */
 };
