@@ -19,7 +19,7 @@
 #include "tests/guest/plan_room.h"
 
 /* Ample for an emulated machine: only a head that hangs reaches it. */
-enum { WAIT_MS = 60000, MOST = 65535, BEAMS = 811, OUT = 0x02, IN = 0x81 };
+enum { WAIT_MS = 240000, MOST = 65535, BEAMS = 811, OUT = 0x02, IN = 0x81 };
 
 static libusb_context *ctx;
 static libusb_device_handle *dev;
