@@ -94,22 +94,27 @@ EVERYTHING = $(OBJ) $(BUILD)/firmware_sim/main.c.o
 
 all: $(BUILD)/scanhead $(BUILD)/libscanhead.a $(BUILD)/libscanhead.so
 
-$(BUILD)/%.c.o: %.c
+$(BUILD)/%.c.o: %.c $(BUILD)/flags
 	@mkdir -p $(@D)
 	@echo "  CC    $<"
 	$(Q)$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) -c $< -o $@
-$(BUILD)/%.cpp.o: %.cpp
+$(BUILD)/%.cpp.o: %.cpp $(BUILD)/flags
 	@mkdir -p $(@D)
 	@echo "  CXX   $<"
 	$(Q)$(CXX) $(ALL_CPPFLAGS) $(ALL_CXXFLAGS) -c $< -o $@
-# Objects that ask for libusbredirparser or Embree are built again once that has come, gone or changed.
-$(BUILD)/usbredir: CHOICE = $(USBREDIR)
-$(BUILD)/embree: CHOICE = $(EMBREE_VERSION)
-$(BUILD)/usbredir $(BUILD)/embree: ALWAYS
+# What a build is made of, a file for each: all is built again once the tools or flags have changed, and an archive once a
+# source has come or gone. ccache and -Werror change nothing of an object.
+STAMPS = $(patsubst %,$(BUILD)/%,flags modules.members library.members common.members benches.members)
+$(BUILD)/flags: NOW = $(filter-out ccache %/ccache -Werror,$(CC) $(CXX) $(AR) $(OBJCOPY) $(ALL_CPPFLAGS) $(ALL_CFLAGS) $(ALL_CXXFLAGS) \
+	$(CORE_OPT) $(TEST_WARN) $(LDFLAGS) $(LDLIBS))
+$(BUILD)/modules.members: NOW = $(SRC)
+$(BUILD)/library.members: NOW = $(LIBOBJ)
+$(BUILD)/common.members: NOW = $(COMMON)
+$(BUILD)/benches.members: NOW = $(BENCHES)
+quoted = '$(subst ','\'',$(strip $(1)))'
+$(STAMPS): ALWAYS
 	@mkdir -p $(@D)
-	@echo '$(CHOICE)' | cmp -s - $@ || echo '$(CHOICE)' >$@
-$(filter $(BUILD)/drivers/usb/usbredir%,$(OBJ)): $(BUILD)/usbredir
-$(patsubst %,$(BUILD)/%.o,$(wildcard core/bvh/*.c core/analysis/distance.c tests/*/*.c)): $(BUILD)/embree
+	@printf '%s\n' $(call quoted,$(NOW)) | cmp -s - $@ || printf '%s\n' $(call quoted,$(NOW)) >$@
 # The page's files, built in: one line a file for web_pages.c.
 WEB_FILES = $(sort $(filter-out %.md,$(wildcard drivers/link/web/*)))
 $(BUILD)/drivers/link/web_pages.inc: ALWAYS
@@ -120,22 +125,22 @@ $(BUILD)/drivers/link/web_pages.c.o: private override ALL_CPPFLAGS += -I$(BUILD)
 $(BUILD)/drivers/link/web_pages.c.o: $(BUILD)/drivers/link/web_pages.inc $(WEB_FILES)
 ALWAYS:
 # All modules for the program and the tests, and the client library alone.
-$(BUILD)/modules.a: $(OBJ)
+$(BUILD)/modules.a: $(OBJ) $(BUILD)/modules.members
 	@rm -f $@
 	@echo "  AR    $@"
-	$(Q)$(AR) rcs $@ $^
+	$(Q)$(AR) rcs $@ $(filter %.o,$^)
 # In the archive, too, what is not the library's interface is nobody else's to meet: one object, its other names local.
-$(BUILD)/libscanhead.o: $(LIBOBJ)
+$(BUILD)/libscanhead.o: $(LIBOBJ) $(BUILD)/library.members
 	@echo "  LD    $@"
-	$(Q)$(CC) -r -nostdlib -o $@ $^
+	$(Q)$(CC) -r -nostdlib -o $@ $(LIBOBJ)
 	$(Q)$(OBJCOPY) --wildcard --keep-global-symbol='scanhead_*' $@
 $(BUILD)/libscanhead.a: $(BUILD)/libscanhead.o
-$(BUILD)/client.a: $(LIBOBJ)
+$(BUILD)/client.a: $(LIBOBJ) $(BUILD)/library.members
 $(BUILD)/libscanhead.a $(BUILD)/client.a:
 	@rm -f $@
 	@echo "  AR    $@"
-	$(Q)$(AR) rcs $@ $^
-$(BUILD)/libscanhead.so: $(LIBOBJ) drivers/host/libscanhead.map
+	$(Q)$(AR) rcs $@ $(filter %.o,$^)
+$(BUILD)/libscanhead.so: $(LIBOBJ) $(BUILD)/library.members drivers/host/libscanhead.map
 	@echo "  LD    $@"
 	$(Q)$(CC) -shared $(SAN) $(LDFLAGS) -Wl,--version-script=drivers/host/libscanhead.map -Wl,-soname,libscanhead.so.1 \
 		-o $@ $(LIBOBJ) -lnettle -lusb-1.0 -lm
@@ -150,16 +155,19 @@ $(BUILD)/scanhead: $(BUILD)/firmware_sim/main.c.o $(BUILD)/modules.a
 #   modules.a   the head, without main.c                                    all of them
 FIGURES = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_sight chart_georef chart_widths beam plain velodyne loop_cost kernels panorama)
 BENCH_MAINS = $(FIGURES:$(BUILD)/%=%.c) tests/bench/bench.c
-COMMON = $(wildcard tests/common/*.c)
+# LIMIT ends a test program that waits for ever; each is linked with it as an object, as nobody calls it.
+LIMIT = tests/common/limit.c
+LINK_LIMIT = -Wl,--wrap=_cmocka_run_group_tests
+COMMON = $(filter-out $(LIMIT),$(wildcard tests/common/*.c))
 BENCHES = $(filter-out $(BENCH_MAINS),$(wildcard tests/bench/*.c))
 PAIRS = $(eval PAIRS := $$(shell sh tests/rigs.sh))$(PAIRS)
 RIGS = $(patsubst $(1):%,$(BUILD)/%.o,$(filter $(1):%,$(PAIRS)))
-$(BUILD)/common.a: $(COMMON:%=$(BUILD)/%.o)
-$(BUILD)/benches.a: $(BENCHES:%=$(BUILD)/%.o)
+$(BUILD)/common.a: $(COMMON:%=$(BUILD)/%.o) $(BUILD)/common.members
+$(BUILD)/benches.a: $(BENCHES:%=$(BUILD)/%.o) $(BUILD)/benches.members
 $(BUILD)/common.a $(BUILD)/benches.a:
 	@rm -f $@
 	@echo "  AR    $@"
-	$(Q)$(AR) rcs $@ $^
+	$(Q)$(AR) rcs $@ $(filter %.o,$^)
 $(BUILD)/bench: $(BUILD)/tests/bench/bench.c.o
 $(FIGURES): $(BUILD)/%: $(BUILD)/%.c.o
 $(BUILD)/bench $(FIGURES): $(BUILD)/benches.a $(BUILD)/common.a $(BUILD)/modules.a
@@ -179,13 +187,13 @@ FAST_LD = $(if $(CROSS_COMPILE),,$(if $(findstring clang,$(CC)),$(LLD),$(GOLD)))
 GOLD := $(if $(shell command -v ld.gold),-fuse-ld=gold)
 LLD := $(if $(shell command -v ld.lld),-fuse-ld=lld)
 .SECONDEXPANSION:
-$(BUILD)/tests/%: $(BUILD)/tests/%.c.o $$(call RIGS,tests/$$*) $(BUILD)/common.a $(BUILD)/modules.a
+$(BUILD)/tests/%: $(BUILD)/tests/%.c.o $$(call RIGS,tests/$$*) $(BUILD)/$(LIMIT).o $(BUILD)/common.a $(BUILD)/modules.a
 	@echo "  TEST  $@"
-	$(Q)$(CC) $(SAN) $(FAST_LD) -o $@ $^ -lcmocka $(LDLIBS)
+	$(Q)$(CC) $(SAN) $(FAST_LD) $(LINK_LIMIT) -o $@ $^ -lcmocka $(LDLIBS)
 # What runs in the guest has the client library alone, with its inside: it starts faster there.
-$(BUILD)/tests/guest/%: $(BUILD)/tests/guest/%.c.o $$(call RIGS,tests/guest/$$*) $(BUILD)/client.a
+$(BUILD)/tests/guest/%: $(BUILD)/tests/guest/%.c.o $$(call RIGS,tests/guest/$$*) $(BUILD)/$(LIMIT).o $(BUILD)/client.a
 	@echo "  TEST  $@"
-	$(Q)$(CC) $(SAN) -o $@ $^ -lcmocka -lnettle -lusb-1.0 -lm -pthread
+	$(Q)$(CC) $(SAN) $(LINK_LIMIT) -o $@ $^ -lcmocka -lnettle -lusb-1.0 -lm -pthread
 
 # ---- what is missing, and only that; DEPS=no installs nothing
 DEPS ?= yes
@@ -272,26 +280,26 @@ test-unit test-wire test-accuracy test-stability test-guest: deps
 # The other end of a usbredir channel goes, comes back and resets 1,000 times (`make test`: 20).
 soak-usb: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test all $(BUILD)/test/tests/wire/test_usb_soak
-	@USB_SOAK_EVENTS=1000 SCANHEAD=$(BUILD)/test/scanhead $(BUILD)/test/tests/wire/test_usb_soak
+	@TEST_LIMIT_S=7200 USB_SOAK_EVENTS=1000 SCANHEAD=$(BUILD)/test/scanhead $(BUILD)/test/tests/wire/test_usb_soak
 
 # Recorders that are killed, and disks that are full, at N random moments for each format (`make test`: one of
 # each): some minutes.
 N ?= 200
 repair: deps-build
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test all $(BUILD)/test/tests/wire/test_repair
-	@REPAIR_N=$(N) $(RUN) $(BUILD)/test/tests/wire/test_repair
+	@TEST_LIMIT_S=7200 REPAIR_N=$(N) $(RUN) $(BUILD)/test/tests/wire/test_repair
 
 # 600 broken meshes, with and without sanitizers (there `make test` tries every tenth): half a minute.
 test-hostile: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test $(BUILD)/test/tests/unit/test_hostile_files
 	@$(MAKE) --no-print-directory -j2 $(ASAN) $(BUILD)/asan/tests/unit/test_hostile_files
-	@HOSTILE_EVERY=1 $(BUILD)/test/tests/unit/test_hostile_files
-	@HOSTILE_EVERY=1 $(BUILD)/asan/tests/unit/test_hostile_files
+	@TEST_LIMIT_S=7200 HOSTILE_EVERY=1 $(BUILD)/test/tests/unit/test_hostile_files
+	@TEST_LIMIT_S=7200 HOSTILE_EVERY=1 $(BUILD)/asan/tests/unit/test_hostile_files
 
 # What a station sees, by its map and by the BVH, in 50,000 random scenes: some minutes.
 test-sight: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test $(BUILD)/test/tests/accuracy/test_sight
-	@SIGHT_SCENES=50000 $(BUILD)/test/tests/accuracy/test_sight
+	@TEST_LIMIT_S=7200 SIGHT_SCENES=50000 $(BUILD)/test/tests/accuracy/test_sight
 
 # A million pulses over each kind of USB, each with the hash that TCP gives: some minutes in an emulated machine.
 test-usb-million: deps
@@ -365,7 +373,9 @@ test-programs: all $(BUILD)/bench $(filter-out $(if $(filter no,$(ALL_UNIT)),$(f
 # What takes long and proves much is described where it stands.
 include $(wildcard tests/*/*.mk config/*/*.mk)
 
-install: all
+# BUILT=yes installs what is there, however it was built: with `make CFLAGS=...`, or for another user than root.
+BUILT ?= no
+install: $(if $(filter yes,$(BUILT)),,all)
 	install -d "$(DESTDIR)$(PREFIX)/bin" "$(DESTDIR)$(PREFIX)/$(LIB)" "$(DESTDIR)$(PREFIX)/include" "$(DESTDIR)$(HEADS_DIR)" \
 		"$(DESTDIR)$(SCENES_DIR)" "$(DESTDIR)$(FAULTS_DIR)" "$(DESTDIR)$(CAMPAIGN_DIR)" "$(DESTDIR)$(UDEV_DIR)" "$(DESTDIR)$(PC_DIR)" "$(DESTDIR)$(PREFIX)/share/scanhead/python" \
 		"$(DESTDIR)$(WIRESHARK_DIR)" "$(DESTDIR)$(UNIT_DIR)" "$(DESTDIR)$(COMPLETION_DIR)" \

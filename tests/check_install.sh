@@ -11,7 +11,7 @@ prefix=/opt/scanhead
 
 # Without what the make above this one told it.
 install_it() {
-    env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -s install BUILD="$(dirname "$program")" WERROR=-Werror DESTDIR="$1" \
+    env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -s install BUILT=yes BUILD="$(dirname "$program")" DESTDIR="$1" \
         PREFIX="$2"
 }
 

@@ -114,10 +114,95 @@ programs_of() {
 }
 check "T=NAME makes the program where a test of that name runs it" programs_of
 
-# ---- the archive, of the objects of both compilers
+# ---- what is built again: in a small tree with the same Makefile, by compilers that only note what they are asked for
+toy=$work/toy
+mkdir -p "$toy/tools" && cp Makefile "$toy/"
+for file in core/err.c core/one.c core/sub/two.c core/georef/geographiclib_shim.cpp drivers/protocol/three.c drivers/host/four.c \
+    drivers/host/libscanhead.map firmware_sim/main.c tests/bench/bench.c tests/common/limit.c tests/common/five.c \
+    tests/unit/test_toy.c tests/wire/test_other.c; do
+    mkdir -p "$toy/${file%/*}" && : >"$toy/$file"
+done
+for file in rigs.sh shipped.sh; do cp "tests/$file" "$toy/tests/"; done
+printf '#!/bin/bash\n' >"$toy/tests/run_tap.sh"
+cat >"$toy/tools/gcc" <<'END'
+#!/bin/sh
+# Writes what it was called with to the output, and what it compiled to the log.
+case $1 in -dumpmachine) echo toy; exit ;; esac
+all=$*
+compiled= out=
+while [ $# -gt 0 ]; do
+    case $1 in -c) compiled=$2 ;; -o) out=$2 ;; esac
+    shift
+done
+[ -z "$compiled" ] || echo "$compiled" >>"$LOG"
+[ -z "$out" ] || echo "$all" >"$out"
+END
+printf '#!/bin/sh\nshift; out=$1; shift; echo "$@" >"$out"\n' >"$toy/tools/ar"
+printf '#!/bin/sh\n' >"$toy/tools/objcopy"
+printf '#!/bin/sh\n' >"$toy/tools/pkg-config"
+for name in g++ clang clang++ ccache; do cp "$toy/tools/gcc" "$toy/tools/$name"; done
+printf '#!/bin/sh\nexec "$@"\n' >"$toy/tools/ccache"
+chmod +x "$toy"/tools/*
+# toy ARGUMENT...: make in that tree. compiles N ARGUMENT...: it compiles so many sources.
+toy() {
+    : >"$work/log"
+    (cd "$toy" && env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL -u CC -u CXX -u BUILD LOG="$work/log" PATH="$toy/tools:$PATH" \
+        make DEPS=no READERS=readers "$@") >"$work/toy_out" 2>&1 || { cat "$work/toy_out"; return 1; }
+}
+compiles() {
+    n=$1
+    shift
+    toy "$@" || return
+    [ "$(wc -l <"$work/log")" = "$n" ] || { echo "make $*: compiled, and not $n:"; cat "$work/log"; return 1; }
+}
+mkdir -p "$toy/readers" && touch -d 2100-01-01 "$toy/readers/installed" "$toy/readers/pcl_vlp16"
+flags_build_again() {
+    compiles 7 && compiles 0 && compiles 7 OPT=-O0 && says "$toy/build/scanhead" ' ' && says "$toy/build/core/one.c.o" -O0 &&
+        compiles 0 OPT=-O0 && compiles 7 OPT=-O0 CFLAGS="-DX='\"it is\"'" && compiles 0 OPT=-O0 CFLAGS="-DX='\"it is\"'" && compiles 7 &&
+        compiles 0
+}
+check "OPT= and CFLAGS= build again, once" flags_build_again
+tools_build_again() {
+    for change in CXX=clang++ CPPFLAGS=-DY CXXFLAGS=-g0 LDFLAGS=-s SAN=-fsanitize=address EMBREE=4 AR=./tools/ar OBJCOPY=true \
+        PKG_CONFIG=echo CC=clang; do
+        compiles 7 $change && compiles 0 $change || return
+    done
+    compiles 7
+}
+check "so do other tools and what they find, and other flags of the linker" tools_build_again
+none_in_turns() {
+    compiles 0 all && toy build/bench && toy test T=test_other && toy test T=test_toy && compiles 0 all && compiles 0 build/bench &&
+        compiles 0 test T=test_other && compiles 0 test T=test_toy && compiles 0 all WERROR=-Werror && compiles 0 all CC="ccache gcc"
+}
+check "make, make bench and make test in turns build nothing twice" none_in_turns
+installs_as_built() {
+    toy CFLAGS=-DMINE && : >"$work/log" && (cd "$toy" && make -n DEPS=no BUILT=yes install) >"$work/toy_out" 2>&1 &&
+        lacks "$work/toy_out" ' -c ' && compiles 7
+}
+check "make install BUILT=yes installs what is there" installs_as_built
+# The archives and the library lose what has gone, with nothing compiled.
+removed_leaves() {
+    says "$toy/build/modules.a" core/sub/two && says "$toy/build/test/common.a" common/five || return
+    says "$toy/build/libscanhead.so" host/four || return
+    rm "$toy/core/sub/two.c" "$toy/tests/common/five.c" "$toy/drivers/host/four.c"
+    compiles 0 && compiles 0 test T=test_other || return
+    lacks "$toy/build/modules.a" core/sub/two && lacks "$toy/build/test/common.a" common/five &&
+        lacks "$toy/build/libscanhead.so" host/four && lacks "$toy/build/libscanhead.o" host/four
+}
+check "a source that is removed leaves the archives" removed_leaves
+# Its program stays in the folder, and is not asked for.
+removed_test() {
+    [ -e "$toy/build/test/tests/unit/test_toy" ] && rm "$toy/tests/unit/test_toy.c" && ! toy test T=test_toy >"$work/gone" &&
+        says "$work/gone" "no tests/\*/test_toy.c"
+}
+check "a test that is removed is not run" removed_test
+
+# ---- the archive, of the objects of both compilers; that of the program is there
 only_the_interface() {
     archive=$1/libscanhead.a
-    env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -s BUILD="$1" DEPS=no ${2:-} "$archive" || return
+    if [ -n "${2:-}" ]; then
+        env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -s BUILD="$1" DEPS=no $2 "$archive" || return
+    fi
     nm -g --defined-only "$archive" | awk 'NF == 3 && $3 !~ /^scanhead_/ { print; bad = 1 } NF == 3 { n++ }
         END { exit bad || n < 20 }'
 }

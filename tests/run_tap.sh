@@ -3,7 +3,9 @@
 #
 #   run_tap.sh [-t SECONDS] [-j N] PROGRAM... [--M PROGRAM...] [-- PROGRAM...]
 #
-# SECONDS per program; default $TAP_LIMIT_S, or 300. N programs at a time, default 1; one that begins with `+` runs beside
+# SECONDS per program; default $TAP_LIMIT_S, or 300; longer by the load, where more want to run than there are processors.
+# A test program ends itself then, and says where it was (tests/common/limit.c). What goes on for GRACE_S more, a script for
+# one, is killed with all that it started. N programs at a time, default 1; one that begins with `+` runs beside
 # these. Those after `--M` begin once all before have ended, M at a time. Those after `--` have the machine to themselves,
 # one after the other.
 # One line per program, in the order given, and the tables of those that have some; of one that fails, all
@@ -28,9 +30,14 @@ if [ $# -eq 0 ] || ! [[ $limit_s =~ ^[1-9][0-9]*$ && $at_a_time =~ ^[1-9][0-9]*$
 fi
 
 work=$(mktemp -d) || exit 1
+GRACE_S=10 TICK_S=5
+export TEST_LIMIT_S=$limit_s
+processors=$(getconf _NPROCESSORS_ONLN)
 declare -A running=() # process: number of its program
+declare -A overdue=() # number: its limit, which it has passed
+ticker=
 # timeout has made a process group of the program and passes the signal on to all of it.
-trap '[ ${#running[@]} -gt 0 ] && kill "${!running[@]}" 2>/dev/null; rm -rf "$work"' EXIT
+trap '[ ${#running[@]} -gt 0 ] && kill "${!running[@]}" 2>/dev/null; [ -z "$ticker" ] || kill "$ticker" 2>/dev/null; rm -rf "$work"' EXIT
 trap 'exit 130' INT TERM
 
 # Reads the TAP on standard input; prints `planned passed failed skipped`, and the skips to the file `skips`.
@@ -70,20 +77,47 @@ start() {
     */*) ;;
     *) program=./$program ;;
     esac
-    CMOCKA_MESSAGE_OUTPUT=TAP timeout -k 5 "$limit_s" "$program" >"$work/$number.out" 2>"$work/$number.err" </dev/null &
+    CMOCKA_MESSAGE_OUTPUT=TAP timeout 0 "$program" >"$work/$number.out" 2>"$work/$number.err" </dev/null &
     running[$!]=$number
+}
+
+# Kills the groups of those that are beyond their limit: first with SIGTERM, a tick later with SIGKILL.
+end_overdue() {
+    local process number now_ms hundredths limit_ms
+    now_ms=$(date +%s%3N)
+    read -r hundredths _ </proc/loadavg
+    hundredths=$((10#${hundredths/./} / processors))
+    limit_ms=$((limit_s * 10 * (hundredths > 100 ? hundredths : 100) + GRACE_S * 1000))
+    for process in "${!running[@]}"; do
+        number=${running[$process]}
+        if [ -n "${overdue[$number]:-}" ]; then
+            kill -KILL -- "-$process" 2>/dev/null
+        elif [ $((now_ms - started_ms[number])) -ge $limit_ms ]; then
+            overdue[$number]=yes
+            kill -TERM -- "-$process" 2>/dev/null
+        fi
+    done
 }
 
 # Waits until one has ended, and reports those of which all before have been reported.
 wait_one() {
     local process status number
-    wait -n -p process "${!running[@]}" 2>/dev/null
-    status=$?
+    while :; do
+        if [ -z "$ticker" ]; then
+            sleep $TICK_S &
+            ticker=$!
+        fi
+        wait -n -p process "${!running[@]}" "$ticker" 2>/dev/null
+        status=$?
+        [ "$process" = "$ticker" ] || break
+        ticker=
+        end_overdue
+    done
     number=${running[$process]}
     unset "running[$process]"
     ended_ms[number]=$(date +%s%3N)
-    # A program that ignores SIGTERM is killed, for which timeout gives 137 and not 124.
-    [ $status -eq 137 ] && [ $((ended_ms[number] - started_ms[number])) -ge $((limit_s * 1000)) ] && status=124
+    [ -z "${overdue[$number]:-}" ] || status=124
+    kill -KILL -- "-$process" 2>/dev/null # what it has left behind
     statuses[number]=$status
     while [ -n "${statuses[reported]:-}" ]; do
         report $reported

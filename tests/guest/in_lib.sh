@@ -45,10 +45,10 @@ check() {
 }
 
 # wait_for SECONDS COMMAND...: until the command succeeds; 1 when it never did. A guest that shares its processor with other
-# tests has three times as long: only what hangs reaches that. Each look starts two processes, which are dear here: so it
+# tests has ten times as long: only what hangs reaches that. Each look starts two processes, which are dear here: so it
 # looks ten times a second, not more often.
 wait_for() {
-    left=$(($1 * 30))
+    left=$(($1 * 100))
     shift
     while ! "$@" >/dev/null 2>&1; do
         left=$((left - 1))

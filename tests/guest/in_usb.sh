@@ -86,12 +86,12 @@ record_reference() {
 check_record() {
     rm -f usb.json tty.json
     check "$1: scanhead list shows it" sh -c "scanhead list | grep '^usb:1209:0001:'"
-    check "$1: scanhead record usb" scanhead record usb --wait 30 -o usb.ply --stats usb.json --quiet
+    check "$1: scanhead record usb" scanhead record usb --wait 120 -o usb.ply --stats usb.json --quiet
     check "$1: the stream is the same as over TCP" test "$(sha256_of usb.json)" = "$tcp1" -a -n "$tcp1"
     # A tty has no flow control: where an emulated processor is too slow for a head as fast as it computes, the kernel's
     # tty buffers (640 KiB) run over, and bytes are gone. Seen with a million pulses, never with a few thousand.
     if ! records_only; then
-        check "$1: scanhead record tty" scanhead record tty:/dev/ttyACM0 --wait 30 -o tty.ply --stats tty.json --quiet
+        check "$1: scanhead record tty" scanhead record tty:/dev/ttyACM0 --wait 120 -o tty.ply --stats tty.json --quiet
         check "$1: the stream of the tty is the same as over TCP" test "$(sha256_of tty.json)" = "$tcp2" -a -n "$tcp2"
     fi
     note "$1: $(sed -n 's/.*\("pulses": [0-9]*\),.*/\1/p' usb.json), $(sed -n 's/.*\("wall_s": [0-9.]*\),.*/\1/p' usb.json)"
@@ -100,7 +100,7 @@ check_record() {
 
 # Just the stream of another head's first scan.
 record_again() {
-    check "$1: scanhead record usb" scanhead record usb --wait 30 --stats again.json --quiet
+    check "$1: scanhead record usb" scanhead record usb --wait 120 --stats again.json --quiet
     check "$1: the stream is the same as over TCP" test "$(sha256_of again.json)" = "$tcp1" -a -n "$tcp1"
 }
 
@@ -112,12 +112,12 @@ has_points() {
 # A recorder when its head goes in the middle of a scan: killed itself, left alone, and told to wait for the head. Needs a
 # head in real time, plug.sh and unplug.sh.
 check_cut_records() {
-    scanhead record usb --wait 30 --frames 100 -o cut.ply 2>killed.err &
+    scanhead record usb --wait 120 --frames 100 -o cut.ply 2>killed.err &
     wait_for 20 has_points killed.err
     kill -9 $!
     wait $! 2>/dev/null
     scanhead record --repair cut.ply || rm -f cut.ply.part # within a second it may have left too little
-    scanhead record usb --wait 30 --listen -o cut.ply 2>cut.err &
+    scanhead record usb --wait 120 --listen -o cut.ply 2>cut.err &
     client=$!
     check "$1: another recorder after one was killed" wait_for 20 has_points cut.err
     sh unplug.sh
@@ -126,7 +126,7 @@ check_cut_records() {
     check "$1: and it says so" grep 'unplugged' cut.err
     check "$1: and what had come is in the file" grep -a 'element vertex [1-9]' cut.ply
     sh plug.sh
-    scanhead record usb --wait 30 --listen --replug 60 -o again.ply --stats again.json 2>again.err &
+    scanhead record usb --wait 120 --listen --replug 60 -o again.ply --stats again.json 2>again.err &
     client=$!
     wait_for 20 has_points again.err
     sh unplug.sh
@@ -142,7 +142,7 @@ check_cut_records() {
 
 # A recorder whose bus is reset by another program: not unplugged, and with --replug it goes on.
 check_reset() {
-    scanhead record usb --wait 30 --frames 100 --replug 60 -o reset.ply --stats reset.json 2>reset.err &
+    scanhead record usb --wait 120 --frames 100 --replug 60 -o reset.ply --stats reset.json 2>reset.err &
     client=$!
     wait_for 20 has_points reset.err
     check "$1: reset" usbreset 1209:0001
@@ -210,7 +210,7 @@ faults:
 END
     head_start "$2" --set head.prr_hz=4000 --set loop.tick_hz=100 --scenario /tmp/faults.yaml --truth /tmp/truth.json
     sh plug.sh
-    scanhead record usb --wait 30 --frames 100 --replug 60 -o faults.ply --stats faults.json 2>faults.err &
+    scanhead record usb --wait 120 --frames 100 --replug 60 -o faults.ply --stats faults.json 2>faults.err &
     client=$!
     check "$1: the recorder goes on after a reset on request" wait_for 90 grep 'is back' faults.err
     grep -q 'is back' faults.err || tail -n 20 faults.err truth.json /tmp/head.err | sed 's/^/#   /' >&3

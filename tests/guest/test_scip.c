@@ -23,7 +23,7 @@
 #include "tests/guest/plan_room.h"
 
 /* Ample for an emulated machine: only a head that hangs reaches it. */
-enum { WAIT_MS = 60000 };
+enum { WAIT_MS = 240000 };
 enum { FIRST = 44, LAST = 725, FRONT = 384, STEPS = 1024, DMIN = 20, DMAX = 5600, SCAN_MS = 100, SCANS = 5 };
 
 static int tty = -1;

@@ -24,7 +24,7 @@ $nicely ${MAKE:-make} -k -j"${JOBS:-2}" DEPS=no BUILD="$at/build" CROSS_COMPILE=
     CC="${CCACHE:-} aarch64-linux-gnu-gcc --sysroot=$root" CXX="${CCACHE:-} aarch64-linux-gnu-g++ --sysroot=$root" \
     PKG_CONFIG="env PKG_CONFIG_SYSROOT_DIR=$root PKG_CONFIG_LIBDIR=$pc pkg-config" \
     WERROR=-Werror CFLAGS=-g1 CXXFLAGS=-g1 $(emulated_programs "$at/build") all >"$at/build.txt" 2>&1 || exit 1
-built "$(aarch64-linux-gnu-gcc -dumpversion | sed 's/^/gcc /'), Embree $(cat "$at/build/embree")" "$at/build.txt"
+built "$(aarch64-linux-gnu-gcc -dumpversion | sed 's/^/gcc /'), Embree $(sed -n 's/.*-DSH_EMBREE=\([0-9]\).*/\1/p' "$at/build/flags")" "$at/build.txt"
 emulate="qemu-aarch64-static -L $root"
 build_here all "$at/here.txt" || exit 1
 $nicely $emulate "$at/build/scanhead" $RECORD -o "$at/record.ply" 2>"$at/record.log" && compare_record "$at/record.ply"

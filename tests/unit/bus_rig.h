@@ -7,7 +7,7 @@
 #include "drivers/host/scanhead.h"
 #include "drivers/protocol/native_encode.h"
 
-enum { TIMEOUT_MS = 5000 };
+enum { TIMEOUT_MS = 120000 };
 
 size_t make_event(uint8_t *to, size_t room, uint32_t seq);
 

@@ -132,6 +132,6 @@ struct scanhead *open_pair(int *head)
 
 void expect_frame(struct scanhead *sh, int type, struct scanhead_frame *frame)
 {
-    assert_int_equal(scanhead_next(sh, frame, 5000), 0);
+    assert_int_equal(scanhead_next(sh, frame, WAIT_MS), 0);
     assert_int_equal(frame->type, type);
 }

@@ -16,7 +16,8 @@
 #include "drivers/host/scanhead.h"
 #include "drivers/protocol/native_encode.h"
 
-enum { MAX_POINTS = NATIVE_MAX_POINTS };
+/* WAIT_MS: when a test gives up, far beyond what a busy machine takes. */
+enum { MAX_POINTS = NATIVE_MAX_POINTS, WAIT_MS = 120000 };
 
 extern uint8_t out[1 << 18];
 extern uint32_t a[MAX_POINTS], b[MAX_POINTS], c[MAX_POINTS], dt[MAX_POINTS];

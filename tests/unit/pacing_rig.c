@@ -264,7 +264,7 @@ static void *watch(void *arg)
     struct seccomp_notif call;
     struct pollfd slot = {.fd = handover, .events = POLLIN};
     (void)arg;
-    if (poll(&slot, 1, 30000) != 1 || (slot.fd = atomic_load(&listener)) < 0) return NULL;
+    if (poll(&slot, 1, 240000) != 1 || (slot.fd = atomic_load(&listener)) < 0) return NULL;
     while (poll(&slot, 1, -1) == 1 && (slot.revents & POLLIN) != 0) {
         memset(&call, 0, sizeof call);
         if (ioctl(slot.fd, SECCOMP_IOCTL_NOTIF_RECV, &call) != 0) continue;

@@ -106,7 +106,7 @@ static void test_new_scan_forgets(void **state)
     put_points(head, 1, 101);
     put_points(head, 1, 0); /* pulse numbers begin anew: another scan */
     for (int i = 0; i < 4; i++) {
-        assert_int_equal(scanhead_next(sh, &f, 5000), 0);
+        assert_int_equal(scanhead_next(sh, &f, WAIT_MS), 0);
         if (i > 1) assert_int_equal(scanhead_points(sh, &f, 0, &p, 1), 1);
     }
     expect_frame(sh, SCANHEAD_POINTS, &f);
@@ -115,7 +115,7 @@ static void test_new_scan_forgets(void **state)
     put_anchor(head, NATIVE_REPEAT);
     put_points(head, 1, 1);
     for (int i = 0; i < 3; i++)
-        assert_int_equal(scanhead_next(sh, &f, 5000), 0);
+        assert_int_equal(scanhead_next(sh, &f, WAIT_MS), 0);
     assert_int_equal(scanhead_points(sh, &f, 0, &p, 1), 1);
     put_event(head, NATIVE_EV_SCAN_START, 2, 0, 0, 0); /* the same scan: nothing new */
     expect_frame(sh, SCANHEAD_EVENT, &f);

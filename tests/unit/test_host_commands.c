@@ -1,6 +1,7 @@
 /* libscanhead: commands over a socket pair, a pty and TCP. */
 #include <arpa/inet.h>
 #include <fcntl.h>
+#include <poll.h>
 #include <pthread.h>
 
 #include "tests/unit/host_rig.h"
@@ -16,37 +17,57 @@ struct script {
     const char *identity; /* not NULL: the client asks for it first, after an empty line */
 };
 
+/* The head gives up a client that takes or sends nothing. */
+static int can(int fd, short what)
+{
+    struct pollfd slot = {.fd = fd, .events = what};
+    return poll(&slot, 1, WAIT_MS) == 1;
+}
+
 static int came(int fd, const char *expect)
 {
     char line[600];
     size_t n = 0;
-    while (n < sizeof line - 1 && read(fd, line + n, 1) == 1 && line[n] != '\n')
+    while (n < sizeof line - 1 && can(fd, POLLIN) && read(fd, line + n, 1) == 1 && line[n] != '\n')
         n++;
     line[n] = 0;
     return strcmp(line, expect) == 0;
 }
 
-static void *play(void *arg)
+/* Neither waits for ever: a client that has given up takes nothing more. */
+static int give(int fd, const void *data, size_t len)
 {
-    struct script *s = arg;
+    size_t done = 0;
+    for (ssize_t n; done < len; done += (size_t)n)
+        if (!can(fd, POLLOUT) || (n = write(fd, (const char *)data + done, len - done)) <= 0) return 0;
+    return 1;
+}
+
+static void act(struct script *s)
+{
     s->ok = 1;
     if (s->identity != NULL)
-        s->ok = came(s->fd, "") && came(s->fd, "*IDN?") && write(s->fd, s->identity, strlen(s->identity)) > 0;
+        s->ok = came(s->fd, "") && came(s->fd, "*IDN?") && give(s->fd, s->identity, strlen(s->identity));
     s->ok = came(s->fd, s->expect) && s->ok;
     static uint8_t frame[NATIVE_MAX_FRAME];
     for (int i = 0; i < s->frames_before + s->frames_after; i++) {
-        if (i == s->frames_before) s->ok &= write(s->fd, s->reply, strlen(s->reply)) > 0;
+        if (i == s->frames_before) s->ok &= give(s->fd, s->reply, strlen(s->reply));
         struct line_block block = make_block(s->big ? MAX_POINTS : 1, (uint64_t)i);
-        size_t len = native_encode_points(frame, sizeof frame, &block, 0), at = 0;
+        size_t len = native_encode_points(frame, sizeof frame, &block, 0);
         native_seal(frame, rig_next_seq());
-        while (at < len) {
-            ssize_t w = write(s->fd, frame + at, len - at);
-            if (w <= 0) return NULL;
-            at += (size_t)w;
-        }
+        if (!give(s->fd, frame, len)) return;
     }
-    if (s->frames_after == 0 && s->reply != NULL) s->ok &= write(s->fd, s->reply, strlen(s->reply)) > 0;
+    if (s->frames_after == 0 && s->reply != NULL) s->ok &= give(s->fd, s->reply, strlen(s->reply));
     if (s->reply == NULL) shutdown(s->fd, SHUT_RDWR);
+}
+
+static void *play(void *arg)
+{
+    struct script *s = arg;
+    int flags = fcntl(s->fd, F_GETFL);
+    fcntl(s->fd, F_SETFL, flags | O_NONBLOCK);
+    act(s);
+    fcntl(s->fd, F_SETFL, flags);
     return NULL;
 }
 
@@ -54,7 +75,7 @@ static int run_command(struct scanhead *sh, struct script *s, char *reply, size_
 {
     pthread_t thread;
     assert_int_equal(pthread_create(&thread, NULL, play, s), 0);
-    int rc = scanhead_command(sh, s->expect, reply, reply_len, 20000);
+    int rc = scanhead_command(sh, s->expect, reply, reply_len, WAIT_MS);
     pthread_join(thread, NULL);
     assert_true(s->ok);
     return rc;

@@ -171,7 +171,7 @@ static void test_echo(void **state)
     struct scanhead *sh = open_pair(&head);
     listen_to(sh);
     struct play p = {.fd = head, .turn = {{"TIME?", SAYS("TIME?\r\n12\r\n")}}};
-    assert_int_equal(command(sh, &p, "TIME?", reply, 5000), 0);
+    assert_int_equal(command(sh, &p, "TIME?", reply, WAIT_MS), 0);
     assert_string_equal(reply, "12");
     assert_int_equal(n_noticed, 1);
     expect(0, SCANHEAD_NOTICE_ECHO, 0, 0, 5);
@@ -181,7 +181,7 @@ static void test_echo(void **state)
     make_event(bytes + 7, 3);
     memcpy(bytes + 7 + EVENT, "13\r\n13\r\n", 8);
     p.turn[0] = (struct turn){"TIME?", bytes, 7 + EVENT + 8};
-    assert_int_equal(command(sh, &p, "TIME?", reply, 5000), 0);
+    assert_int_equal(command(sh, &p, "TIME?", reply, WAIT_MS), 0);
     assert_string_equal(reply, "13");
     struct scanhead_frame f;
     expect_frame(sh, SCANHEAD_EVENT, &f);
@@ -219,7 +219,7 @@ static void test_late_reply(void **state)
     assert_int_equal(n_noticed, 1); /* the answer to the question between was asked for */
     struct play r = {.fd = head,
                      .turn = {{"", NULL, 0}, {"*IDN?", SAYS("88\r\nMaker,Model,SN1,1.0\r\n")}, {"X?", SAYS("9\r\n")}}};
-    assert_int_equal(command(sh, &r, "X?", reply, 5000), 0);
+    assert_int_equal(command(sh, &r, "X?", reply, WAIT_MS), 0);
     assert_string_equal(reply, "9");
     assert_int_equal(n_noticed, 2);
     expect(1, SCANHEAD_NOTICE_LATE_REPLY, 4 + EVENT + IDENTITY + 2, 0, 2);
@@ -247,7 +247,7 @@ static void test_late_identity(void **state)
                      .turn = {{"", NULL, 0},
                               {"*IDN?", SAYS("Maker,Model,SN1,1.0\r\nMaker,Model,SN1,1.0\r\n")},
                               {"*IDN?", SAYS("Maker,Model,SN1,1.0\r\n")}}};
-    assert_int_equal(command(sh, &q, "*IDN?", reply, 5000), 0);
+    assert_int_equal(command(sh, &q, "*IDN?", reply, WAIT_MS), 0);
     assert_string_equal(reply, "Maker,Model,SN1,1.0");
     assert_int_equal(n_noticed, 1);
     expect(0, SCANHEAD_NOTICE_LATE_REPLY, 0, 0, IDENTITY);
@@ -268,7 +268,7 @@ static void test_late_list(void **state)
     struct play q = {
         .fd = head,
         .turn = {{"", NULL, 0}, {"*IDN?", SAYS("1,2,3,4,5\r\nMaker,Model,SN1,1.0\r\n")}, {"PRR?", SAYS("7\r\n")}}};
-    assert_int_equal(command(sh, &q, "PRR?", reply, 5000), 0);
+    assert_int_equal(command(sh, &q, "PRR?", reply, WAIT_MS), 0);
     assert_string_equal(reply, "7");
     assert_int_equal(n_noticed, 1);
     expect(0, SCANHEAD_NOTICE_LATE_REPLY, 0, 0, 9);
@@ -305,7 +305,7 @@ static void test_given_up_before(void **state)
     int head = accept(door, NULL, NULL);
     assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, 1), SCANHEAD_ETIMEOUT);
     close(head);
-    assert_int_equal(scanhead_reattach(sh, 5000), 0);
+    assert_int_equal(scanhead_reattach(sh, WAIT_MS), 0);
     head = accept(door, NULL, NULL);
     listen_to(sh);
     put_all(head, "5\r\n", 3);
@@ -332,14 +332,14 @@ static void test_reattach(void **state)
     put_all(head, raw, make_event(raw, 101) / 2);
     shutdown(head, SHUT_WR);
     /* a command finds the end; what had come is still there */
-    assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, 5000), SCANHEAD_ECLOSED);
+    assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, WAIT_MS), SCANHEAD_ECLOSED);
     expect_frame(sh, SCANHEAD_EVENT, &f);
     close(head);
-    assert_int_equal(scanhead_next(sh, &f, 5000), SCANHEAD_ECLOSED);
+    assert_int_equal(scanhead_next(sh, &f, WAIT_MS), SCANHEAD_ECLOSED);
     assert_int_equal(n_noticed, 2);
     expect(0, SCANHEAD_NOTICE_CUT, EVENT, 101, EVENT / 2);
     expect(1, SCANHEAD_NOTICE_CLOSED, EVENT + EVENT / 2, 0, -SCANHEAD_ECLOSED);
-    assert_int_equal(scanhead_reattach(sh, 5000), 0);
+    assert_int_equal(scanhead_reattach(sh, WAIT_MS), 0);
     head = accept(door, NULL, NULL);
     assert_int_equal(n_noticed, 3);
     expect(2, SCANHEAD_NOTICE_REATTACHED, EVENT + EVENT / 2, 0, 1);
@@ -350,7 +350,7 @@ static void test_reattach(void **state)
     expect(3, SCANHEAD_NOTICE_GAP, EVENT + EVENT / 2, 101, 2);
     /* it is left while frames are on their way; they come first, and the head that has started again after them */
     put_numbered(head, 104);
-    assert_int_equal(scanhead_next(sh, &f, 5000), 0);
+    assert_int_equal(scanhead_next(sh, &f, WAIT_MS), 0);
     uint8_t rest[3 * EVENT];
     size_t len = make_event(rest, 105);
     len += make_event(rest + len, 106) / 2; /* it is cut, and its length hides the next one */
@@ -358,16 +358,16 @@ static void test_reattach(void **state)
     memcpy(rest + len, (uint8_t[]){NATIVE_SYNC, 200, NATIVE_VERSION}, 3);
     len += native_seal(rest + len, 107);
     put_all(head, rest, len);
-    assert_int_equal(scanhead_next(sh, &f, 5000), 0);
-    assert_int_equal(scanhead_reattach(sh, 5000), 0);
+    assert_int_equal(scanhead_next(sh, &f, WAIT_MS), 0);
+    assert_int_equal(scanhead_reattach(sh, WAIT_MS), 0);
     close(head);
     head = accept(door, NULL, NULL);
     put_numbered(head, 100);
     close(head);
     assert_int_equal(f.seq, 105);
-    assert_int_equal(scanhead_next(sh, &f, 5000), 0);
+    assert_int_equal(scanhead_next(sh, &f, WAIT_MS), 0);
     assert_int_equal(f.seq, 107);
-    assert_int_equal(scanhead_next(sh, &f, 5000), 0);
+    assert_int_equal(scanhead_next(sh, &f, WAIT_MS), 0);
     assert_int_equal(f.seq, 100);
     const uint64_t at_106 = EVENT + EVENT / 2 + 3 * EVENT, at_107 = at_106 + EVENT / 2;
     assert_int_equal(n_noticed, 9);
@@ -376,7 +376,7 @@ static void test_reattach(void **state)
     expect(6, SCANHEAD_NOTICE_CLOSED, at_107 + NATIVE_HEADER_LEN, 0, -SCANHEAD_ECLOSED);
     expect(7, SCANHEAD_NOTICE_REATTACHED, at_107 + NATIVE_HEADER_LEN, 0, 1);
     expect(8, SCANHEAD_NOTICE_RESTARTED, at_107 + NATIVE_HEADER_LEN, 100, 1);
-    assert_int_equal(scanhead_next(sh, &f, 5000), SCANHEAD_ECLOSED);
+    assert_int_equal(scanhead_next(sh, &f, WAIT_MS), SCANHEAD_ECLOSED);
     scanhead_get_stats(sh, &stats);
     assert_true(stats.closed == 3 && stats.reattached == 2 && stats.restarts == 1 && stats.repeated == 0);
     close(door);

@@ -22,7 +22,7 @@ static void put_anchor_of(int fd, const struct native_anchor *anchor)
 static void expect_points(struct scanhead *sh, struct scanhead_frame *f, struct scanhead_point *p, int n)
 {
     do
-        assert_int_equal(scanhead_next(sh, f, 5000), 0);
+        assert_int_equal(scanhead_next(sh, f, WAIT_MS), 0);
     while (f->type != SCANHEAD_POINTS);
     assert_int_equal(scanhead_points(sh, f, 0, p, MAX_POINTS), n);
 }
@@ -74,7 +74,7 @@ static void test_until(void **state)
         put_anchor_of(head, &anchor);
         put_points(head, 1, 0); /* at 1 ms */
         for (int i = 0; i < 3; i++)
-            assert_int_equal(scanhead_next(sh, &f, 5000), 0);
+            assert_int_equal(scanhead_next(sh, &f, WAIT_MS), 0);
         assert_int_equal(scanhead_points(sh, &f, 0, p, 1), until_ms == 1 ? SCANHEAD_ESTATE : 1);
         close(head);
         scanhead_close(sh);
@@ -129,7 +129,7 @@ static void test_followers(void **state)
     put_with_attributes(head, -1);
     put_with_attributes(head, 0);
     for (int i = 0; i < 2; i++)
-        assert_int_equal(scanhead_next(sh, &f, 5000), 0);
+        assert_int_equal(scanhead_next(sh, &f, WAIT_MS), 0);
     expect_frame(sh, SCANHEAD_POINTS, &f);
     expect_both(sh, 3);
     expect_both(sh, SCANHEAD_ESTATE);
@@ -157,7 +157,7 @@ static void test_emitter(void **state)
     put_descriptor(head, 0, 1, NATIVE_REPEAT);
     put_descriptor(head, 0, 2, 0);
     for (int i = 0; i < 4; i++)
-        assert_int_equal(scanhead_next(sh, &f, 5000), 0);
+        assert_int_equal(scanhead_next(sh, &f, WAIT_MS), 0);
     assert_int_equal(scanhead_get_emitter(sh, &e), 0);
     assert_int_equal(e.kind, NATIVE_EMIT_SPHERE);
     assert_true(e.rings == 181 && e.ring_step_deg == 1.0);
@@ -189,9 +189,9 @@ static void test_clock(void **state)
         put_event(head, NATIVE_EV_SCAN_START, 1, 2000000000u, 0, 0); /* of a head without that clock */
         put_event(head, row[i].code, 1, 2000000000u, row[i].gps, 0); /* at 2 s of device time */
         for (int k = 0; k < 3; k++)
-            assert_int_equal(scanhead_next(sh, &f, 5000), 0);
+            assert_int_equal(scanhead_next(sh, &f, WAIT_MS), 0);
         assert_int_equal(scanhead_gps_time(sh, 0, &gps_s), SCANHEAD_ESTATE);
-        assert_int_equal(scanhead_next(sh, &f, 5000), 0);
+        assert_int_equal(scanhead_next(sh, &f, WAIT_MS), 0);
         assert_int_equal(scanhead_gps_time(sh, 500000000, &gps_s), 0); /* the scan began at 2 s, too */
         assert_true(fabs(gps_s - 400000000.5) < 1e-6);
         close(head);
@@ -216,7 +216,7 @@ static void test_short_turn(void **state)
         put_anchor(head, 0);
         put(head, native_encode_poses(out, sizeof out, pose, 2, 1, 0), 0);
         for (int i = 0; i < 3; i++)
-            assert_int_equal(scanhead_next(sh, &f, 5000), 0);
+            assert_int_equal(scanhead_next(sh, &f, WAIT_MS), 0);
         assert_int_equal(scanhead_pose(sh, 500, &at), 0);
         assert_true(fabs(fabs(at.quat[0]) - cos(0.5 * half)) < 1e-15); /* some roundings of numbers below 1 */
         assert_true(fabs(at.quat[3] * at.quat[0] - sin(0.5 * half) * cos(0.5 * half)) < 1e-15);

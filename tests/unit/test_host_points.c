@@ -12,7 +12,7 @@ static int decode(int geo, uint32_t n, struct scanhead_point *points)
     put_anchor(head, 0);
     put_points(head, n, 0);
     for (int i = 0; i < 3; i++)
-        assert_int_equal(scanhead_next(sh, &f, 5000), 0);
+        assert_int_equal(scanhead_next(sh, &f, WAIT_MS), 0);
     int rc = scanhead_points(sh, &f, 0, points, n);
     close(head);
     scanhead_close(sh);
@@ -148,7 +148,7 @@ static void test_geodetic_points(void **state)
         put_all(head, out, len);
         put_points(head, 4, 0);
         for (int i = 0; i < 3; i++)
-            assert_int_equal(scanhead_next(sh, &f, 5000), 0);
+            assert_int_equal(scanhead_next(sh, &f, WAIT_MS), 0);
         assert_int_equal(scanhead_points(sh, &f, 0, p, 4), 4);
         assert_true(fabs(p[0].y - (k == 0 ? -179.9998 : -179.9996)) < 1e-12);
         assert_true(fabs(p[1].y - (k == 0 ? 179.9996 : 179.9998)) < 1e-12);
@@ -181,7 +181,7 @@ static void test_scales(void **state)
     put_all(head, out, len);
     put_points(head, 1, 0);
     for (int i = 0; i < 3; i++)
-        assert_int_equal(scanhead_next(sh, &f, 5000), 0);
+        assert_int_equal(scanhead_next(sh, &f, WAIT_MS), 0);
     assert_int_equal(scanhead_points(sh, &f, 0, &p, 1), 1);
     assert_true(p.x == anchor.anchor[0] + scale[0] * 100000 && p.y == anchor.anchor[1] + scale[1] * 100000 &&
                 p.z == anchor.anchor[2] + scale[2] * 100000);
@@ -210,7 +210,7 @@ static void test_poses(void **state)
         native_seal(out, rig_next_seq());
         put_all(head, out, len);
         for (int i = 0; i < 2; i++)
-            assert_int_equal(scanhead_next(sh, &f, 5000), 0);
+            assert_int_equal(scanhead_next(sh, &f, WAIT_MS), 0);
         assert_int_equal(scanhead_pose(sh, 500, &pose), SCANHEAD_OK);
         assert_true(pose.position_m[0] == 1 && pose.frame == 2 && pose.flags == 2);
         assert_true(fabs(pose.quat[0] - cos(0.05)) < 1e-15 && fabs(pose.quat[3] - sin(0.05)) < 1e-15);
@@ -240,12 +240,9 @@ static void test_pulses_lost(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_polar_points),
-        cmocka_unit_test(test_polar_directions),
-        cmocka_unit_test(test_geo_points),
-        cmocka_unit_test(test_geodetic_points),
-        cmocka_unit_test(test_scales),
-        cmocka_unit_test(test_poses),
+        cmocka_unit_test(test_polar_points), cmocka_unit_test(test_polar_directions),
+        cmocka_unit_test(test_geo_points),   cmocka_unit_test(test_geodetic_points),
+        cmocka_unit_test(test_scales),       cmocka_unit_test(test_poses),
         cmocka_unit_test(test_pulses_lost),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

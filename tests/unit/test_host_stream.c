@@ -50,7 +50,7 @@ static void test_version_and_types(void **state)
     out[1] = 99; /* a type of later times is handed out as it is */
     native_seal(out, 1);
     put_all(head, out, len);
-    assert_int_equal(scanhead_next(sh, &f, 5000), SCANHEAD_EFORMAT);
+    assert_int_equal(scanhead_next(sh, &f, WAIT_MS), SCANHEAD_EFORMAT);
     assert_non_null(strstr(scanhead_error(sh), "version 2"));
     expect_frame(sh, 99, &f);
     close(head);
@@ -95,7 +95,7 @@ static void test_hash(void **state)
     }
     close(head);
     int n = 0;
-    while (scanhead_next(sh, &f, 5000) == 0)
+    while (scanhead_next(sh, &f, WAIT_MS) == 0)
         n++;
     assert_int_equal(n, 12);
     uint8_t digest[32];

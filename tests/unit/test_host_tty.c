@@ -18,7 +18,7 @@
 #include "drivers/host/scanhead.h"
 #include "drivers/protocol/native_encode.h"
 
-enum { FRAMES = 40, TIMEOUT_MS = 20000 };
+enum { FRAMES = 40, TIMEOUT_MS = 120000 };
 
 #define ERROR_REPLY "ERR -113,\"Undefined header\"\r\n"
 

@@ -79,7 +79,7 @@ static void expect_events(struct scanhead *sh, uint32_t from, uint32_t to)
 {
     struct scanhead_frame frame;
     for (uint32_t seq = from; seq < to; seq++) {
-        assert_int_equal(scanhead_next(sh, &frame, 5000), 0);
+        assert_int_equal(scanhead_next(sh, &frame, 120000), 0);
         assert_int_equal(frame.seq, seq);
     }
 }
@@ -100,8 +100,8 @@ static void test_reattach(void **state)
     assert_int_equal(send(fd, raw, len / 2, MSG_NOSIGNAL), len / 2);
     close(fd);
     expect_events(sh, 100, 105);
-    assert_int_equal(scanhead_next(sh, &frame, 5000), SCANHEAD_ECLOSED);
-    assert_int_equal(scanhead_reattach(sh, 1000), 0);
+    assert_int_equal(scanhead_next(sh, &frame, 120000), SCANHEAD_ECLOSED);
+    assert_int_equal(scanhead_reattach(sh, 120000), 0);
     fd = accept(door, NULL, NULL);
     send_events(fd, 110, 113); /* 105 was cut, 106 to 109 never came */
     expect_events(sh, 110, 113);
@@ -112,10 +112,10 @@ static void test_reattach(void **state)
     /* nobody there: the reason, and the handle can be asked again and closed */
     close(fd);
     close(door);
-    assert_int_equal(scanhead_next(sh, &frame, 5000), SCANHEAD_ECLOSED);
+    assert_int_equal(scanhead_next(sh, &frame, 120000), SCANHEAD_ECLOSED);
     assert_int_equal(scanhead_reattach(sh, 0), SCANHEAD_EIO);
     assert_non_null(strstr(scanhead_error(sh), source));
-    assert_int_equal(scanhead_next(sh, &frame, 5000), SCANHEAD_ECLOSED);
+    assert_int_equal(scanhead_next(sh, &frame, 120000), SCANHEAD_ECLOSED);
     assert_int_equal(scanhead_command(sh, "*IDN?", err, sizeof err, 100), SCANHEAD_ECLOSED);
     scanhead_close(sh);
 }

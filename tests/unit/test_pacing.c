@@ -41,13 +41,19 @@ static void start(struct run *run, const char *const *sets, int n_sets, double d
     need(loop_start(run->loop, &err), &err);
 }
 
-/* Between two beats: what clients of the run do, every 5 ms at most. It gives up after 30 s. */
-static void finish(struct run *run, void (*beat)(struct run *run, int turn))
+/* The run's own end is far off: its clients end it. */
+enum { ENDLESS_S = 3600 };
+
+/* Between two beats: what clients of the run do, every 5 ms at most. A beat that returns 0 ends the run. It gives up after minutes. */
+static void finish(struct run *run, int (*beat)(struct run *run, int turn))
 {
-    const int64_t until_ns = clock_now_ns() + 30000000000;
-    for (int turn = 0; !loop_is_over(run->loop) && clock_now_ns() < until_ns; turn++) {
+    const int64_t until_ns = clock_now_ns() + 240000000000;
+    int ended = 0;
+    for (int turn = 0; !loop_is_over(run->loop) && clock_now_ns() < until_ns;) {
         poll(NULL, 0, 5);
-        if (beat != NULL) beat(run, turn);
+        if (beat == NULL || beat(run, turn++) || ended) continue; /* at its end clients still take what they can */
+        loop_end(run->loop);
+        ended = 1;
     }
     assert_true(loop_is_over(run->loop));
     loop_join(run->loop, &run->stats);
@@ -122,6 +128,12 @@ static void plant_all(int sleep)
     }
 }
 
+static int until_all_are_planted(struct run *run, int turn)
+{
+    (void)run, (void)turn;
+    return pacing_sleeps() <= 18;
+}
+
 static void what_is_planted_is_found(void **state)
 {
     (void)state;
@@ -146,8 +158,8 @@ static void what_is_planted_is_found(void **state)
     if (!pacing_filter_works()) skip();
     assert_int_equal(pipe2(pipe_fd, O_CLOEXEC), 0);
     pacing_watch(plant_all);
-    start(&run, sets, 3, 0.05);
-    finish(&run, NULL);
+    start(&run, sets, 3, ENDLESS_S);
+    finish(&run, until_all_are_planted);
     const int n = pacing_found();
     for (size_t i = 0; i < sizeof planted / sizeof *planted; i++) {
         char call[40];
@@ -212,8 +224,9 @@ static void say(struct run *run, const char *line)
     (void)!write(client[0], line, strlen(line));
 }
 
-/* The head has booted after 0.2 s: 40 turns. */
-static void use(struct run *run, int turn)
+/* The head has booted after 0.2 s: 40 turns. It goes on until all has been said, two scans have begun, and the pacing thread
+ * has stood still. */
+static int use(struct run *run, int turn)
 {
     static const char *const said[] = {"HEAD:PRR MAX\n",   "SCAN:STOP\n", "HEAD:STATE?\n", "SCAN:START\n",
                                        "HEAD:LINES 300\n", "SCAN:STOP\n", "nonsense\n",    "*RST\n",
@@ -230,6 +243,7 @@ static void use(struct run *run, int turn)
     if (turn >= 50 && turn % 10 == 0) say(run, said[(turn / 10 - 5) % 10]);
     if (turn % 10 == 3) say(run, "*IDN?\n");
     if (turn % 10 == 6) (void)!write(client[2], "HEAD:PRR?\n", 10);
+    return turn < 160 || device_scans(run->rig->device) < 2 || pacing_sleeps() < 350;
 }
 
 /* It comes too late, and catches up. */
@@ -246,7 +260,7 @@ static void the_pacing_thread_does_nothing_else(void **state)
     struct run run;
     if (!pacing_filter_works()) skip();
     pacing_watch(stand_still);
-    start(&run, sets, 6, 0.8);
+    start(&run, sets, 6, ENDLESS_S);
     finish(&run, use);
     const int n = pacing_found();
     for (int i = 0; i < CLIENTS; i++)
@@ -268,23 +282,33 @@ static void stand_still_for_200_ms(int sleep)
 }
 
 /* With one tick of 10 ms ahead, 20 ticks are late, and those that follow until it has caught up. Waiting for a beat for
- * each, it would be late for the rest of the run: some 58 ticks. Between is room for a machine with other work. */
-static void it_catches_up(void **state)
+ * each, it would be late for the rest of the run: some 58 ticks. A machine with other work only adds late ones, so one of
+ * TRIES runs has to show it. */
+enum { TRIES = 20 };
+
+static int caught_up(void)
 {
-    (void)state;
     static const char *const sets[] = {"head.prr_hz=1000", "head.frames=0",  "loop.tick_hz=100",
                                        "loop.ahead_ms=2",  "loop.threads=1", "loop.late_ms=10000"};
     struct run run;
-    if (!pacing_filter_works()) skip();
     pacing_watch(stand_still_for_200_ms);
     start(&run, sets, 6, 0.6);
     finish(&run, NULL);
     assert_int_equal(pacing_found(), 0);
     print_message("# %u of %u ticks late\n", (unsigned)run.stats.counters.late_blocks,
                   (unsigned)lateness_count(run.stats.late));
-    assert_true(run.stats.counters.late_blocks >= 19 && run.stats.counters.late_max_ns >= 190000000);
-    assert_true(run.stats.counters.late_blocks < 50);
     assert_int_equal(run.stats.counters.lost_ticks, 0);
+    return run.stats.counters.late_blocks >= 19 && run.stats.counters.late_max_ns >= 190000000 &&
+           run.stats.counters.late_blocks < 50;
+}
+
+static void it_catches_up(void **state)
+{
+    int tries = 0;
+    (void)state;
+    if (!pacing_filter_works()) skip();
+    while (!caught_up())
+        assert_true(++tries < TRIES);
 }
 
 static int make_busy_folder(void **state)

@@ -13,7 +13,7 @@
 #include "firmware_sim/loop/loop.h"
 #include "tests/common/cases.h"
 
-static const int64_t DEADLINE_NS = 60000000000;
+static const int64_t DEADLINE_NS = 240000000000;
 
 /* ---- bells */
 

@@ -2,7 +2,8 @@
  * a firing sequence as fired at once; the test knows better, as it knows the laser by its elevation. */
 #include "tests/wire/house.h"
 
-enum { SWEEPS = 3 };
+/* On a busy machine the kernel drops packets that the client does not fetch in time: one of RUNS has to be whole. */
+enum { SWEEPS = 3, RUNS = 5 };
 
 /* In the order of firing, 2.304 us apart, at 3,600 degrees a second. */
 static const double ELEVATION_DEG[16] = {-15, 1, -13, 3, -11, 5, -9, 7, -7, 9, -5, 11, -3, 13, -1, 15};
@@ -62,16 +63,20 @@ static int is_right(const struct house *house, double x, double y, double z)
                         100.0);
 }
 
-static void check_sweeps(const struct house *house, const char *text)
+/* 1: the turns are whole. */
+static int check_sweeps(const struct house *house, const char *text)
 {
     char *at = strstr(text, "sweep ");
-    int checked = 0, wrong = 0;
+    int checked = 0, wrong = 0, whole = 1;
     for (int sweep = 0; sweep < SWEEPS; sweep++) {
         assert_non_null(at);
         const long n = strtol(at + strlen("sweep "), &at, 10);
         /* A turn has 0.1 s / 55.296 us = 1808.4 sequences; a sweep begins with a block, of two. All of them see
          * something. The first sweep begins anywhere. */
-        if (sweep > 0) assert_in_range(n, 16 * 1806, 16 * 1811);
+        if (sweep > 0) {
+            assert_true(n <= 16 * 1811);
+            whole &= n >= 16 * 1806;
+        }
         for (long i = 0; i < n; i++) {
             double x = strtod(at, &at), y = strtod(at, &at), z = strtod(at, &at);
             if (sweep == 0 || i % 4 != 0) continue;
@@ -82,13 +87,12 @@ static void check_sweeps(const struct house *house, const char *text)
     }
     /* Frames of windows have outlines that are closer together than the rounding of azimuths. */
     if (wrong > checked / 1000) fail_msg("%d of %d points are not on the house", wrong, checked);
+    return whole;
 }
 
-static void test_sweeps(void **state)
+static int run_whole(struct wire *wire, const char *program)
 {
-    struct wire *wire = *state;
     char data[64], position[64], port[16];
-    const char *program = build_or_skip(wire);
     snprintf(port, sizeof port, "%d", free_port());
     snprintf(data, sizeof data, "links.0.port=%s", port);
     snprintf(position, sizeof position, "links.1.port=%d", free_port());
@@ -102,9 +106,17 @@ static void test_sweeps(void **state)
     assert_int_equal(wire_wait(wire, client), 0);
     head_end(&head, SIGTERM);
     char *text = wire_read(wire_path(wire, "sweeps"), NULL);
-    check_sweeps(house, text);
+    const int whole = check_sweeps(house, text);
     free(text);
     house_free(house);
+    return whole;
+}
+
+static void test_sweeps(void **state)
+{
+    const char *program = build_or_skip(*state);
+    for (int run = 1; !run_whole(*state, program); run++)
+        if (run == RUNS) fail_msg("no run of %d had whole turns", RUNS);
 }
 
 int main(void)
