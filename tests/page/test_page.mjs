@@ -78,6 +78,24 @@ await test('a scan: points, bounds and hash are those of the recording', async (
   await page.eval('scanhead.view.show({points: false})'); // from here on counts are enough
 });
 
+await test('a page that is opened later, or again, has the same points', async () => {
+  const late = await browser.open(endpoint(head, 'web'), {size: SMALL});
+  for (const times of [1, 2]) {
+    await late.until(`scanhead.cloud.total === ${wanted.points} && scanhead.head.figures().past_pulses === ${wanted.shots}`);
+    const has = await late.eval(`(() => {
+      const {points, past_points, past_pulses, past_hash: hash, lost_frames, missing_pulses, unplaced_points} = scanhead.head.figures();
+      return {points, past_points, past_pulses, hash, amiss: lost_frames + missing_pulses + unplaced_points, bounds: scanhead.cloud.bounds};
+    })()`);
+    equal(has.points, 0, 'points by its connection');
+    equal(has.past_pulses, wanted.shots, 'pulses from before');
+    equal(has.hash, wanted.hash, 'hash of these');
+    equal(has.amiss, 0, 'lost, missing, without a place');
+    sameBounds(has.bounds, wanted);
+    if (times === 1) await late.go(endpoint(head, 'web'));
+  }
+  await late.close();
+});
+
 await test('a station dragged in the picture is where the next scan is made', async () => {
   await page.click('#fit');
   await page.until('scanhead.view.movable');
@@ -97,6 +115,7 @@ await test('a station dragged in the picture is where the next scan is made', as
   const has = await counts(page);
   equal(has.echoes, wanted.points + moved.points, 'echoes of both scans');
   equal(has.hash, both(wanted.hash, moved.hash), 'hash of both scans');
+  equal(await page.eval('scanhead.cloud.count'), moved.points, 'points held: those from its old place are gone');
 });
 
 await test('control is given back by the button, and then anybody may have it', async () => {

@@ -38,6 +38,7 @@ export class Head extends EventTarget {
   names = new Map(); // label: {object, material}
 
   #url;
+  #past;
   #wire;
   #replies;
   #connection = 0; // as the wire numbers them
@@ -48,15 +49,17 @@ export class Head extends EventTarget {
   #losses = null;
   #told = ''; // who has control, as `control` said it last
 
-  /** url: "ws://host:port/ws", or "/ws" in a page. worker: false decodes in this thread. It connects at once, and again
-   * and again until close(). */
-  constructor(url, {worker = typeof Worker === 'function'} = {}) {
+  /** url: "ws://host:port/ws", or "/ws" in a page. worker: false decodes in this thread. past: true takes the points from
+   * before, too, where the head keeps them; a batch of these has `past`. It connects at once, and again and again until
+   * close(). */
+  constructor(url, {worker = typeof Worker === 'function', past = false} = {}) {
     super();
+    this.#past = past;
     this.#url = typeof location === 'undefined' ? url : new URL(url, location.href.replace(/^http/, 'ws')).href;
     this.#replies = new Replies((line) => this.#wire.post({send: line}));
     this.#forget();
     this.#wire = worker ? this.#inWorker() : this.#inPage();
-    this.#wire.post({connect: this.#url});
+    this.#connect();
   }
 
   get mine() {
@@ -101,7 +104,9 @@ export class Head extends EventTarget {
    * shots without echo among them), pulses (received), empty; lost_frames: missing in the sequence, of which
    * left_out_frames with left_out_pulses because this page was too slow; lost_pulses: lost by the head; missing_pulses:
    * of all scans that ended here, delivered and not received; dropped_points, dropped_pulses: decoded, and dropped by
-   * the page itself; unplaced_points, unplaced_pulses: came before their anchor or their pose; repeated_frames,
+   * the page itself; unplaced_points, unplaced_pulses: came before their anchor or their pose;
+   * past_points, past_pulses, past_hash: of these, what came from before this connection, in none of the other counts;
+   * past_gone: points that the head keeps no more, past_lost_frames: frames that it could not keep; repeated_frames,
    * late_frames: came twice, or after newer ones, and were dropped; jumps_back: how often the sequence of frames began
    * anew; bad_bytes, bad_payloads, refused; decode_ns_per_point; point_hash.
    */
@@ -114,6 +119,11 @@ export class Head extends EventTarget {
 
   // ---- the wire, in a worker or here
 
+  #connect() {
+    const past = this.#past ? this.#url.replace(/^ws/, 'http').replace(/\/ws$/, '/past') : null;
+    this.#wire.post({connect: this.#url, past});
+  }
+
   #inWorker() {
     const worker = new Worker(new URL('./wire_worker.js', import.meta.url), {type: 'module'});
     worker.onmessage = ({data}) => {
@@ -124,7 +134,7 @@ export class Head extends EventTarget {
       event.preventDefault?.();
       worker.terminate();
       this.#wire = this.#inPage();
-      this.#wire.post({connect: this.#url});
+      this.#connect();
     };
     return {post: (message) => worker.postMessage(message), end: () => worker.terminate()};
   }
@@ -158,7 +168,7 @@ export class Head extends EventTarget {
       case 'names': value.forEach(({label, ...words}) => this.names.set(label, words)); break;
       case 'telemetry': this.#measured(value); break;
       case 'event': this.#happened(value); break;
-      case 'points': this.#losses.points(value); break;
+      case 'points': value.past ? this.#losses.past(value) : this.#losses.points(value); break;
       default:
     }
     this.#say(name, value);
@@ -209,7 +219,7 @@ export class Head extends EventTarget {
     this.#told = '';
     this.state = null;
     if (again_s !== null) {
-      this.#timer = setTimeout(() => this.#wire.post({connect: this.#url}), 1000 * again_s);
+      this.#timer = setTimeout(() => this.#connect(), 1000 * again_s);
       this.#delay_s = Math.min(2 * this.#delay_s, MAX_DELAY_S);
     }
     this.#say('close', {code, words, again_s, wasOpen});

@@ -50,6 +50,7 @@ export class View extends EventTarget {
   #waiting = [];
   #goneDrawn = 0;
   #lastGone = 0;
+  #replaced = 0; // scans, as the cloud counts them
   #origin = null; // of the points that are drawn
   #scale;
   #pointsOn = true;
@@ -437,6 +438,10 @@ export class View extends EventTarget {
       this.#lastGone = this.#goneDrawn = 0;
       this.#scale.forget();
       this.#fitted = 0;
+      this.#want.restart = 'now';
+    }
+    if (cloud.replaced !== this.#replaced) { // at once: the old points are elsewhere
+      this.#replaced = cloud.replaced;
       this.#want.restart = 'now';
     }
     if (this.#points.follow()) this.#goneDrawn += gone - this.#lastGone;
