@@ -56,7 +56,7 @@ export class Bar {
       await action();
     } catch (error) {
       log.add(`Refused: ${why(error)}`, 'bad');
-      this.notice(`The head refused: ${why(error)}`, 6000);
+      this.notice(`The head refused: ${why(error)}`, 6000, 'bad');
     }
     this.#busy = false;
     this.show();
@@ -64,9 +64,12 @@ export class Bar {
 
   #timer = 0;
   #notice = '';
-  notice(text, ms) {
+  #kind = '';
+  // kind: '' for what is only told, 'warn', 'bad'.
+  notice(text, ms, kind = '') {
     clearTimeout(this.#timer);
     this.#notice = text;
+    this.#kind = kind;
     this.#timer = setTimeout(() => {
       this.#notice = '';
       this.show();
@@ -110,6 +113,9 @@ export class Bar {
     const gone = link !== 'closed' ? '' : wasOpen
       ? `Not connected since ${clock(since)}: ${words}. What was received stays. The page connects again by itself.`
       : `No connection: ${words}. The page tries again by itself.`;
+    const kind = gone ? 'bad' : this.#kind;
+    byId('banner').dataset.kind = kind;
+    byId('banner').setAttribute('role', kind === 'bad' ? 'alert' : 'status');
     say(byId('banner'), gone || this.#notice);
     byId('banner').hidden = !(gone || this.#notice);
   }

@@ -99,7 +99,7 @@ function startHead(cloud, view, names, keepsPast) {
     const now = [info.config, info.maker, info.model, info.serial].join();
     if (before && now !== before && cloud.count > 0) {
       const words = 'This is another head. The points of the one before are still shown; Clear, under Display, removes them.';
-      bar.notice(words, 15000);
+      bar.notice(words, 15000, 'warn');
       log.add(words, 'warn');
     }
     if (run && info.run !== run) cloud.outdate(came);
@@ -113,7 +113,7 @@ function startHead(cloud, view, names, keepsPast) {
     display.setScene(await fetchScene());
   };
   stations.addEventListener('tell', ({detail}) => {
-    bar.notice(detail.text, 6000);
+    bar.notice(detail.text, 6000, detail.kind);
     log.add(detail.text, detail.kind);
   });
   head.addEventListener('points', ({detail}) => {
