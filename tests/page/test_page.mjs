@@ -184,6 +184,11 @@ await test('control is given back by the button, and then anybody may have it', 
   await other.until('SYST:CONT?', (reply) => reply === '0');
   equal(await other.ask('HEAD:LIN 70'), 'OK', 'a setting of another client');
   await page.until('scanhead.head.controller !== 0 && document.querySelector("#control").disabled');
+  const wanted = `${other.name} has control`; // its kind of link and its address
+  equal(await page.eval('document.querySelector("#owner").textContent'), wanted, 'who has it');
+  const late = await browser.open(endpoint(head, 'web'), {size: SMALL});
+  await late.until(`document.querySelector("#owner").textContent === ${JSON.stringify(wanted)}`);
+  await late.close();
 });
 
 await test('another site gets no byte of it', async () => {

@@ -78,18 +78,18 @@ export class Bar {
   }
 
   show() {
-    const {link, state, pace, mine, owner, scan, since} = this.#session;
+    const {link, state, pace, mine, owner, who, scan, since} = this.#session;
     const open = link === 'open';
     document.body.dataset.link = link;
     document.body.dataset.owner = mine ? 'page' : owner ? 'other' : 'nobody';
     document.body.dataset.state = open ? state ?? '' : '';
     say(byId('state-word'), open ? stateWord(state ?? '…', pace) : link === 'closed' ? 'Not connected' : 'Connecting');
     say(byId('progress'), this.#progressText(scan));
-    say(byId('owner'), !open ? '' : mine ? 'You have control' : owner ? `Session ${owner} has control` : 'Nobody has control');
+    say(byId('owner'), !open ? '' : mine ? 'You have control' : owner ? `${who} has control` : 'Nobody has control');
     say(byId('control'), mine ? 'Give back control' : 'Take control');
     byId('control').classList.toggle('main', !mine);
     byId('control').disabled = !open || this.#busy || (!mine && owner !== 0);
-    byId('control').title = !mine && owner ? `Session ${owner} has control. It has to give it back first.` : '';
+    byId('control').title = !mine && owner ? `${who} has control. It has to give it back first.` : '';
     say(byId('start'), state === 'fault' ? 'Reset' : 'Start');
     byId('start').disabled = !mine || this.#busy || !['idle', 'fault'].includes(state);
     byId('stop').disabled = !mine || this.#busy || !['spin-up', 'scanning'].includes(state);

@@ -15,10 +15,15 @@ function closeWords(code, reason, wasOpen) {
   return code === 1000 || code === 1001 ? 'the head has ended' : 'the connection broke: the head is gone';
 }
 
+const unquoted = (text) => text.replace(/^"|"$/g, '');
+
+/** Who took control, as a CONTROL event has it: kind of link and address. '': it doesn't say. */
+export const peerOf = ({session, text = ''}) => (session && text.includes(' ') ? text : '');
+
 /**
  * Events, each with its value in `detail`:
  * - `open` {connection}; `close` {code, words, again_s: when it tries again, or null, wasOpen}
- * - `state` {state, before}; `control` {session: 0 nobody, own, mine}
+ * - `state` {state, before}; `control` {session: 0 nobody, who: kind and address, or '', own, mine}
  * - `lost` {by, frames, pulses}, by 'head' (not computed in time), 'link' (this page was too slow), 'wire' (damaged) or
  *   'page' (dropped here)
  * - `scan` {scan, fired, cast, lost, received, missing} at a scan's end; null for what was lost on the way
@@ -30,6 +35,7 @@ export class Head extends EventTarget {
   state = null; // a word of STATES
   session = 0; // this page's; 0: not known
   controller = 0; // the session in control; 0: nobody
+  who = ''; // of it, the kind of link and the address; '': not known
   idn = '';
   descriptor = null; // what came last of each, of this connection
   anchor = null;
@@ -47,6 +53,7 @@ export class Head extends EventTarget {
   #isClosed = false;
   #figures = {};
   #losses = null;
+  #knowsWho = false; // the head says who has control
   #told = ''; // who has control, as `control` said it last
 
   /** url: "ws://host:port/ws", or "/ws" in a page. worker: false decodes in this thread. past: true takes the points from
@@ -183,6 +190,7 @@ export class Head extends EventTarget {
   #forget() {
     this.state = this.descriptor = this.anchor = this.emitter = this.telemetry = null;
     this.session = this.controller = 0;
+    this.who = '';
     this.names.clear();
     this.#figures = {points: 0, shots: 0, bytes: 0, frames: 0, lost_frames: 0, bad_bytes: 0, decode_ns_per_point: 0};
     this.#losses = new Losses((name, detail) => this.#say(name, detail));
@@ -206,8 +214,10 @@ export class Head extends EventTarget {
     this.#delay_s = FIRST_DELAY_S;
     this.idn = idn;
     this.#become(state);
+    this.#knowsWho = /SYSTem:CONTrol:WHO/i.test(help);
     if (/SYSTem:SESSion/i.test(help)) this.session = Number(await this.command('SYSTem:SESSion?'));
     this.#controlled(Number(controller));
+    if (this.controller && this.#knowsWho) this.#controlled(this.controller, unquoted(await this.command('SYSTem:CONTrol:WHO?')));
   }
 
   #closed({code, reason}) {
@@ -216,6 +226,7 @@ export class Head extends EventTarget {
     this.#replies.close(words);
     const again_s = this.#isClosed ? null : code === FULL ? FULL_DELAY_S : this.#delay_s;
     this.session = this.controller = 0;
+    this.who = '';
     this.#told = '';
     this.state = null;
     if (again_s !== null) {
@@ -234,12 +245,13 @@ export class Head extends EventTarget {
     this.#say('state', {state, before});
   }
 
-  #controlled(session) {
-    const now = `${session} ${this.session}`;
+  #controlled(session, who = session === this.controller ? this.who : '') {
+    const now = `${session} ${this.session} ${who}`;
     if (now === this.#told) return;
     this.#told = now;
     this.controller = session;
-    this.#say('control', {session, own: this.session, mine: this.mine});
+    this.who = who;
+    this.#say('control', {session, who, own: this.session, mine: this.mine});
   }
 
   #described(d) {
@@ -258,6 +270,6 @@ export class Head extends EventTarget {
   #happened(e) {
     this.#losses.event(e);
     if (e.name === 'STATE') this.#become(STATES[e.state]);
-    if (e.name === 'CONTROL') this.#controlled(e.session);
+    if (e.name === 'CONTROL') this.#controlled(e.session, peerOf(e));
   }
 }
