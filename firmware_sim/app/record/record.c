@@ -244,9 +244,10 @@ static int run(int argc, char **argv)
     if (r.n_repairs > 0) return record_repair(r.repair, r.n_repairs, r.job.stats, r.quiet);
     if (is_config(r.job.source)) return app_with_config(&r.in, record_config, &r.job);
     if (!is_stream(r.job.source))
-        return app_usage(&app_record,
-                         "SOURCE %s: allowed usb, usb:VID:PID:SERIAL, tty:PATH, tcp:HOST:PORT, FILE.shs, FILE.pcapng, CONFIG.yaml",
-                         r.job.source);
+        return app_usage(
+            &app_record,
+            "SOURCE %s: allowed usb, usb:VID:PID:SERIAL, tty:PATH, tcp:HOST:PORT, FILE.shs, FILE.pcapng, CONFIG.yaml",
+            r.job.source);
     if (r.in.sets.n != 0) return app_usage(&app_record, "--set, --crs and --threads need a CONFIG as SOURCE");
     if (r.in.scenario != NULL || r.job.truth != NULL)
         return app_usage(&app_record, "--scenario and --truth need a CONFIG as SOURCE");
@@ -288,7 +289,7 @@ static const struct app_option OPTIONS[] = {
              "reflectance (grey, -30 to 0 dB), label (a hue per surface), frame (of a trajectory), texture (of a "
              "CONFIG); or solid; none. Default: as the head sends them, if it does (output.colour)"},
     {APP_CALL, "colour-limits", "LOW,HIGH", .apply = take_colour_limits,
-     .help = "of range and height (m) and frame: red is LOW, blue is HIGH. Default: the smallest and the largest in the "
+     .help = "of range and height (m) and frame: blue is LOW, red is HIGH. Default: the smallest and the largest in the "
              "file, which is then written when all scans are over"},
     {APP_CALL, "colour-rgb", "R,G,B", .apply = take_colour_rgb, .help = "the colour of --colour solid, 0 to 255 each"},
     {APP_FLAG, "mesh", NULL, .at = AT(job.files.recorder.mesh),
