@@ -1,8 +1,8 @@
 /* A cloud from above, coloured by a figure. In: places (metres, x to the right, y up) and a figure each. Out: an image of
  * the pixels' means.
  *
- * A pixel shows the mean of its points' figures: colour_ramp backwards, so that 0 is blue and most, and all beyond it,
- * red. Pixels whose points have no finite figure are black; those without points are white, which the ramp has not. The
+ * A pixel shows the mean of its points' figures: by colour_ramp 0 is blue, and most and all beyond it
+ * are red. Pixels whose points have no finite figure are black; those without points are white, which the ramp has not. The
  * longer side has up to CLOUD_PICTURE_PX pixels, fewer where there are few points, so that areas are filled. */
 #ifndef CORE_CLOUD_PICTURE_H
 #define CORE_CLOUD_PICTURE_H

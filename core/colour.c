@@ -16,7 +16,7 @@ static const double BLACK_DB = -30;
 
 void colour_ramp(double part, uint8_t rgb[3])
 {
-    static const double knot[4][3] = {{255, 0, 0}, {255, 255, 0}, {0, 255, 0}, {0, 0, 255}};
+    static const double knot[4][3] = {{0, 0, 255}, {0, 255, 0}, {255, 255, 0}, {255, 0, 0}};
     if (isnan(part)) {
         memcpy(rgb, colour_unknown, 3);
         return;

@@ -118,8 +118,8 @@ void coverage_pieces(const struct coverage *coverage, coverage_piece *piece, voi
 /* ---- a picture: the cells as a mesh with colours and the scalars stations, density, incidence_deg, range_m and cell.
  * Where a figure is not there it is -1. The ending says the format (core/mesh.h); scalars are of .ply alone. */
 
-/* SEEN: seen by none red, by one yellow, by several green. COUNT: how many stations, red none to blue all. DENSITY:
- * points per area, decades, red the 5 % to blue the 95 % of the area. INCIDENCE: blue head on to red at 90 degrees.
+/* SEEN: seen by none red, by one yellow, by several green. COUNT: how many stations, blue none to red all. DENSITY:
+ * points per area, decades, blue the 5 % to red the 95 % of the area. INCIDENCE: blue head on to red at 90 degrees.
  * Where nothing is seen the last two are grey. */
 enum coverage_colour { COVERAGE_SEEN, COVERAGE_COUNT, COVERAGE_DENSITY, COVERAGE_INCIDENCE };
 int coverage_write_mesh(const struct coverage *coverage, const char *path, enum coverage_colour colour,

@@ -7,6 +7,7 @@
 #
 #   sh run                      run by `sh -eu`; it must exit 0 within the time limit
 #   sh run with PROGRAM         the same, where PROGRAM is installed; else skipped
+#   sh run until Ctrl-C         run by `bash -eu`; at its first line on standard output it is interrupted; it must exit 0
 #   sh not run: REASON          not run; REASON is for the reader: root, a board, another machine, minutes
 #   c as build/NAME.c           saved under that name, and compiled against the library's header
 #   yaml as build/NAME.yaml     saved under that name, and checked by `scanhead check`
@@ -24,7 +25,7 @@ limit_s=${RECIPE_LIMIT_S:-180}
 root=$(cd "$(dirname "$0")/.." && pwd)
 program=$(realpath "${SCANHEAD:-$root/build/scanhead}")
 work=$(mktemp -d) || exit 1
-block=
+block= by_hand=
 trap '[ -z "$block" ] || kill -- "-$block" 2>/dev/null; rm -rf "$work"' EXIT
 trap 'exit 130' INT TERM
 n=0 failed=0
@@ -86,16 +87,29 @@ checkout() { # document
 
 # within COMMAND...: in the checkout, within the limit, by itself in a group that ends with it. Output to $work/out.
 within() {
+    : >"$work/out"
     set -m
-    (cd "$work/tree" && exec timeout -k 5 "$limit_s" "$@") >"$work/out" 2>&1 </dev/null &
+    (cd "$work/tree" && exec timeout -k 5 "$limit_s" "$@") >"$work/out" 2>"$work/err" </dev/null &
     block=$!
     set +m
+    [ -z "$by_hand" ] || interrupt "$block"
     wait "$block"
     local status=$?
     kill -- "-$block" 2>/dev/null
     block=
+    cat "$work/err" >>"$work/out"
     [ $status -ne 124 ] || echo "did not end within $limit_s s" >>"$work/out"
     return $status
+}
+
+# interrupt PID: as Ctrl-C does, the whole group, once something stands on standard output. A group that ends, or says nothing
+# within the limit, isn't interrupted.
+interrupt() {
+    until [ -s "$work/out" ]; do
+        kill -0 "$1" 2>/dev/null || return 0
+        sleep 0.05
+    done
+    kill -INT -- "-$1" 2>/dev/null
 }
 
 # save FILE WHERE: where a recipe looks for it, which is in build/ and nowhere else.
@@ -112,6 +126,7 @@ do_block() {
     case $language/$mark in
     */"not run: "?*) return 0 ;;
     sh/run) within sh -eu "$1" ;;
+    sh/"run until Ctrl-C") by_hand=1 within bash -eu "$1" ;;
     sh/"run with "?*) command -v "${mark#run with }" >/dev/null && within sh -eu "$1" ;;
     c/"as build/"?*) save "$1" "${mark#as }" && within cc -Wall -Wextra -Werror -fsyntax-only -Idrivers/host "${mark#as }" ;;
     yaml/"as build/"?*) save "$1" "${mark#as }" && within build/scanhead check "${mark#as }" ;;
@@ -175,6 +190,10 @@ expect 0 'a good document' '```sh run' 'echo 1 >build/a' '```' '```sh run' 'grep
     '```c as build/a.c' 'int main(void) { return 0; }' '```' '```sh run' 'cc build/a.c -o build/a; build/a' '```' '```text' 'x' '```'
 expect 0 'a program that is there' '```sh run with true' 'true' '```'
 expect 0 'a program that is not there' '```sh run with no-such-program' 'false' '```'
+interrupted="trap 'exit 0' INT; echo here; while :; do sleep 0.1; done"
+expect 0 'a command that Ctrl-C ends' '```sh run until Ctrl-C' "$interrupted" '```'
+expect 1 'a command that Ctrl-C breaks' '```sh run until Ctrl-C' 'echo here; sleep 60' '```'
+expect 1 'a command that says nothing until Ctrl-C' '```sh run until Ctrl-C' 'sleep 60' '```'
 expect 1 'a program that is there, and a command that fails' '```sh run with true' 'false' '```'
 expect 1 'a command that fails' '```sh run' 'false' 'true' '```'
 limit_s=2 expect 1 'a command that does not end' '```sh run' 'sleep 60' '```'

@@ -77,7 +77,7 @@ static void fill(const struct cloud_picture_spec *spec, const struct cloud_pictu
 static void colour_of(const struct pixel *pixel, double most, uint8_t rgb[3])
 {
     memset(rgb, pixel->n_none > 0 ? 0 : 255, 3);
-    if (pixel->n > 0) colour_ramp(1.0 - fmin((double)pixel->sum / (double)pixel->n / most, 1.0), rgb);
+    if (pixel->n > 0) colour_ramp(fmin((double)pixel->sum / (double)pixel->n / most, 1.0), rgb);
 }
 
 int cloud_picture_make(const struct cloud_picture_spec *spec, struct cloud_picture *out, struct sh_err *err)

@@ -75,7 +75,7 @@ static void paint(const struct paint *p, const struct coverage_cell *cell, uint8
     else if (p->colour == COVERAGE_DENSITY)
         colour_ramp((log10(cell->pulses / cell->area_m2) - p->low) / (p->high - p->low), rgb);
     else
-        colour_ramp(1.0 - cell->incidence_rad / M_PI_2, rgb);
+        colour_ramp(cell->incidence_rad / M_PI_2, rgb);
 }
 
 /* ---- the mesh */

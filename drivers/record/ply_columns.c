@@ -80,7 +80,7 @@ static void put_colour_comment(FILE *out, const struct track *t)
     if (!t->colour.given)
         fputs("comment red green blue as the head sent them (output.colour)\n", out);
     else if (colour_has_limits(scale->mode))
-        fprintf(out, "comment red green blue show the %s, red is %.9g, blue %.9g%s\n", colour_words[scale->mode],
+        fprintf(out, "comment red green blue show the %s, blue is %.9g, red %.9g%s\n", colour_words[scale->mode],
                 scale->low, scale->high, scale->mode == COLOUR_FRAME ? "" : " m");
     else if (scale->mode == COLOUR_REFLECTANCE)
         fputs("comment red green blue show the reflectance, black is -30 dB, white 0 dB, blue not modelled\n", out);

@@ -129,6 +129,28 @@ static int do_query(struct command_call *call)
     return row->query(call);
 }
 
+void command_set_peer(struct command_device *dev, uint32_t session, const char *name)
+{
+    if (session > 0 && session < COMMAND_PEERS)
+        snprintf(dev->peers.name[session], sizeof dev->peers.name[session], "%s", name);
+}
+
+const char *command_peer(const struct command_device *dev, uint32_t session)
+{
+    return session < COMMAND_PEERS ? dev->peers.name[session] : "";
+}
+
+static int fail_protected(struct command_call *call)
+{
+    const uint32_t control = call->dev->control;
+    const char *peer = command_peer(call->dev, control);
+    if (peer[0] == '\0')
+        return command_fail(call, CMD_E_PROTECTED, "session %u has control, this is session %u", control,
+                            call->session);
+    return command_fail(call, CMD_E_PROTECTED, "%s has control (session %u), this is session %u", peer, control,
+                        call->session);
+}
+
 static int do_act(struct command_call *call)
 {
     const struct command_row *row = call->row;
@@ -143,9 +165,7 @@ static int do_act(struct command_call *call)
                             : row->setting != NULL && row->setting->words != NULL ? "word"
                                                                                   : "number");
     if (row->unit != NULL && !row->own && parse_value(call) != 0) return -1;
-    if (!row->open && call->session != 0 && control != 0 && control != call->session)
-        return command_fail(call, CMD_E_PROTECTED, "session %u has control, this is session %u", control,
-                            call->session);
+    if (!row->open && call->session != 0 && control != 0 && control != call->session) return fail_protected(call);
     if (row->act(call) != 0) return -1;
     struct command_result *out = call->out;
     const int takes = out->effect != COMMAND_NONE && out->effect != COMMAND_RELEASE;

@@ -105,11 +105,17 @@ struct command_place {
 struct command_faults {
     /* "{kind: drop, every: 10}". Returns 0 and its number, or -1 and why not. */
     int (*add)(void *owner, const char *text, uint32_t *number, char *why, size_t len);
-    uint32_t (*remove)(void *owner, uint32_t number);   /* 0: all. Returns how many */
+    uint32_t (*remove)(void *owner, uint32_t number); /* 0: all. Returns how many */
     /* How often so far; 0: all together. Returns 0, or -1: there never was one of that number. */
     int (*injected)(void *owner, uint32_t number, uint64_t *n);
     /* "1 drop, 2 flip"; empty: none. What has no room is counted at the end: ", and 3 more". */
     void (*list)(void *owner, char *text, size_t len);
+};
+
+/* The sessions' clients by kind of link and address, "tcp 127.0.0.1:40312"; empty: not known. [0] is nobody's. */
+enum { COMMAND_PEERS = 73, COMMAND_PEER_LEN = 80 };
+struct command_peers {
+    char name[COMMAND_PEERS][COMMAND_PEER_LEN];
 };
 
 /* Settings that a recording does not say. */
@@ -132,13 +138,14 @@ struct command_device {
     enum head_state state;
     const char *why_fault; /* why the state is fault, and what ends it; NULL: not known */
     struct command_queue queue;
-    uint32_t control;      /* session that may change things; 0: none, the next one that does takes it */
-    uint64_t frames_done;  /* of the scan at hand or the last one */
+    uint32_t control; /* session that may change things; 0: none, the next one that does takes it */
+    struct command_peers peers;
+    uint64_t frames_done;                          /* of the scan at hand or the last one */
     uint64_t lost_journal_lines, lost_truth_lines; /* that their files lack */
-    int64_t t_ns;          /* device time */
-    char utc[40], gps[40]; /* the same as time of day, by the clock of the head; empty: unknown */
-    int step_allowed;      /* 1 when the pace is `step` */
-    int pose_allowed;      /* 1 when the platform is live: a step may carry a pose */
+    int64_t t_ns;                                  /* device time */
+    char utc[40], gps[40];                   /* the same as time of day, by the clock of the head; empty: unknown */
+    int step_allowed;                        /* 1 when the pace is `step` */
+    int pose_allowed;                        /* 1 when the platform is live: a step may carry a pose */
     double pose_centre_m[3], pose_reach_m;   /* how far from where the pose may be; scene frame */
     const struct command_place *place;       /* [limits.n_stations] as they are now; NULL: not known */
     const struct command_place *first_place; /* at power-up */
@@ -180,6 +187,10 @@ struct command_result {
  * A change of settings that is refused (-222, -221) leaves them as they were. While scanning, a change of
  * station is -221. */
 void command_execute(struct command_device *dev, uint32_t session, const char *line, struct command_result *out);
+
+void command_set_peer(struct command_device *dev, uint32_t session, const char *name);
+/* Never NULL. */
+const char *command_peer(const struct command_device *dev, uint32_t session);
 
 /* What a command set in motion could not be done after all: into the queue, and as its reply. */
 void command_refuse(struct command_device *dev, int number, const char *text, struct command_result *out);

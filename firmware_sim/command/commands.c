@@ -114,6 +114,11 @@ static int query_control(struct command_call *call)
     return command_reply(call, "%u", call->dev->control);
 }
 
+static int query_control_who(struct command_call *call)
+{
+    return command_reply(call, "\"%s\"", command_peer(call->dev, call->dev->control));
+}
+
 static int query_state(struct command_call *call)
 {
     return command_reply(call, "%s", head_state_name(call->dev->state));
@@ -242,6 +247,7 @@ const struct command_row command_rows[] = {
     QUERY("SYSTem:LOST", query_lost),
     QUERY("SYSTem:VERSion", query_version),
     QUERY("SYSTem:CONTrol", query_control),
+    QUERY("SYSTem:CONTrol:WHO", query_control_who),
     QUERY("SYSTem:PLAN", query_plan),
     ACTION("SYSTem:CONTrol:TAKE", act_take, 0),
     ACTION("SYSTem:CONTrol:RELease", act_release, 0),

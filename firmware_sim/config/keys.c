@@ -14,7 +14,7 @@
 #define KEY(member)        #member, IN_CONFIG(member)
 #define MESH(member)       "scene.meshes[]." #member, CFG_MEMBER(struct config_mesh, member)
 #define STATION(member)    "stations[]." #member, IN_STATION(member)
-#define TRIPOD(member)      "stations[].tripod." #member, IN_STATION(tripod.member)
+#define TRIPOD(member)     "stations[].tripod." #member, IN_STATION(tripod.member)
 #define LINK(member)       "links[]." #member, CFG_MEMBER(struct link_spec, member)
 #define RULE(member)       "surfaces[]." #member, CFG_MEMBER(struct surface_rule, member)
 #define SURFACE(member)    "surfaces[]." #member, CFG_MEMBER(struct surface_rule, surface.member)
@@ -114,7 +114,7 @@ static const struct cfg_key config_keys[] = {
            [COLOUR_REFLECTANCE] = "reflectance", [COLOUR_LABEL] = "label", [COLOUR_FRAME] = "frame",
            [COLOUR_TEXTURE] = "texture"),
      .help = "Colours of points. Other than none: each points frame is followed by one of 3 bytes a point; recordings "
-             "have them. range, height, frame (of a trajectory): red, yellow, green, blue between two limits; "
+             "have them. range, height, frame (of a trajectory): blue, green, yellow, red between two limits; "
              "reflectance: grey, -30 to 0 dB; label: a hue for each surface; texture: the texel that is hit, where "
              "there is none the mesh's colour, or else grey."},
     {KEY(output.colour_rgb), CFG_VEC3, NULL, "[255, 255, 255]", 0, 255,

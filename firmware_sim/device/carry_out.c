@@ -74,6 +74,12 @@ static void do_dead(struct device *device, uint32_t session, const char *line, u
     free(cmd);
 }
 
+static void push_control(struct device *device, uint32_t session)
+{
+    const char *peer = command_peer(&device->cmd, session);
+    device_push_event(device, NATIVE_EV_CONTROL, session, 0, 0, peer[0] != '\0' ? peer : "taken");
+}
+
 /* once: the session does not keep control. */
 static void do_command(struct device *device, uint32_t session, const char *line, uint64_t released, int once,
                        struct command_result *out)
@@ -94,7 +100,7 @@ static void do_command(struct device *device, uint32_t session, const char *line
     if (out->took_control && once)
         cmd->control = 0;
     else if (out->took_control)
-        device_push_event(device, NATIVE_EV_CONTROL, session, 0, 0, "taken");
+        push_control(device, session);
     if (out->error != 0)
         device_push_error(device, session, out->error, command_error_text(out->error));
     else if (out->changes && device->journal.out != NULL && out->effect != COMMAND_STEP && out->effect != COMMAND_MOVE)
@@ -141,6 +147,13 @@ void device_overlong(struct device *device, uint32_t session, struct command_res
     out->error = CMD_E_OVERRUN;
     snprintf(out->reply, sizeof out->reply, "ERR %d,\"%s; %s\"", CMD_E_OVERRUN, command_error_text(CMD_E_OVERRUN),
              text);
+}
+
+void device_session_opened(struct device *device, uint32_t session, const char *who)
+{
+    pthread_mutex_lock(&device->lock);
+    command_set_peer(&device->cmd, session, who);
+    pthread_mutex_unlock(&device->lock);
 }
 
 void device_session_closed(struct device *device, uint32_t session, const char *who, int partial)

@@ -150,6 +150,8 @@ void device_command_once(struct device *device, uint32_t session, const char *li
                          struct command_result *out);
 /* A line too long for the command set ended. */
 void device_overlong(struct device *device, uint32_t session, struct command_result *out);
+/* A session has begun; who: its kind of link and address, for others to read. */
+void device_session_opened(struct device *device, uint32_t session, const char *who);
 /* A session has gone; partial: in the middle of a command. Gives control back. */
 void device_session_closed(struct device *device, uint32_t session, const char *who, int partial);
 /* Where a live platform (not the head on it) is at a device time: from TIME:STEP or the socket. v: x, y, z

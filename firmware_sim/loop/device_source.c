@@ -11,6 +11,11 @@ static void overlong(void *self, uint32_t session, struct command_result *out)
     device_overlong(self, session, out);
 }
 
+static void session_opened(void *self, uint32_t session, const char *who)
+{
+    device_session_opened(self, session, who);
+}
+
 static void session_closed(void *self, uint32_t session, const char *who, int partial)
 {
     device_session_closed(self, session, who, partial);
@@ -89,6 +94,7 @@ static int close_files(void *self, struct sh_err *err)
 const struct loop_source_ops loop_device_source = {
     .command = command,
     .overlong = overlong,
+    .session_opened = session_opened,
     .session_closed = session_closed,
     .report = report,
     .faults = faults,

@@ -36,8 +36,9 @@ void session_open(struct pump *pump, struct session *s, const char *peer)
     s->open = 1;
     stream_set_reader(pump->stream, s->reader, s->cursor, pump->holds);
     const struct loop_source *source = pump->links->source;
-    if (source->ops->session_opened == NULL) return;
-    source->ops->session_opened(source->self, s->id);
+    char who[COMMAND_PEER_LEN];
+    snprintf(who, sizeof who, "%s %s", pump->ops->name, s->peer);
+    source->ops->session_opened(source->self, s->id, who);
     stream_poke(pump->stream);
 }
 

@@ -17,7 +17,7 @@ struct loop_source_ops {
     /* ---- sessions */
     void (*command)(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out);
     void (*overlong)(void *self, uint32_t session, struct command_result *out);
-    void (*session_opened)(void *self, uint32_t session); /* NULL: it need not know */
+    void (*session_opened)(void *self, uint32_t session, const char *who);
     void (*session_closed)(void *self, uint32_t session, const char *who, int partial);
     void (*report)(void *self, int number, const char *text);
     struct fault_board *(*faults)(const void *self);

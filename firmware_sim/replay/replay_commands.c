@@ -131,11 +131,11 @@ void replay_overlong(void *self, uint32_t session, struct command_result *out)
     pthread_mutex_unlock(&r->lock);
 }
 
-void replay_session_opened(void *self, uint32_t session)
+void replay_session_opened(void *self, uint32_t session, const char *who)
 {
     struct replay *r = self;
-    (void)session;
     pthread_mutex_lock(&r->lock);
+    command_set_peer(&r->cmd, session, who);
     r->n_clients++;
     pthread_mutex_unlock(&r->lock);
 }

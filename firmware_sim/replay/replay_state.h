@@ -30,8 +30,8 @@ struct replay {
     struct command_device cmd;
     int wants_start, wants_stop, ending;
     int wants_again; /* it is to begin anew by itself */
-    int n_clients; /* beside links that are readers themselves */
-    int ends_then; /* the run ends when it was played */
+    int n_clients;   /* beside links that are readers themselves */
+    int ends_then;   /* the run ends when it was played */
     uint32_t times;  /* begun so far */
     uint64_t frames; /* sent */
     uint64_t scans, frames_done;
@@ -48,14 +48,14 @@ struct replay {
     struct recording recording;
     int64_t first_ns; /* of the recording: device time of its first frame */
     struct replay_front front;
-    int playing; /* changed under the lock */
-    uint64_t start_tick;   /* with which it began, or began to be counted anew: */
-    int64_t base;          /* that is this tick of the recording */
-    int64_t last;          /* tick of the recording of the frame sent last */
-    uint32_t seq_shift;    /* added to numbers */
-    int has_seq;           /* a frame was sent since power-up; its number, as it was sent, is */
+    int playing;         /* changed under the lock */
+    uint64_t start_tick; /* with which it began, or began to be counted anew: */
+    int64_t base;        /* that is this tick of the recording */
+    int64_t last;        /* tick of the recording of the frame sent last */
+    uint32_t seq_shift;  /* added to numbers */
+    int has_seq;         /* a frame was sent since power-up; its number, as it was sent, is */
     uint32_t last_seq;
-    int restarts;          /* the next frame begins another sequence */
+    int restarts;              /* the next frame begins another sequence */
     int in_range, has_skipped; /* of this time: frames are sent; some were passed over before */
     int has_frame;
     struct recording_frame frame; /* the next one */
@@ -74,7 +74,7 @@ void replay_open_commands(struct replay *replay);
 /* As struct loop_source_ops has them. */
 void replay_command(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out);
 void replay_overlong(void *self, uint32_t session, struct command_result *out);
-void replay_session_opened(void *self, uint32_t session);
+void replay_session_opened(void *self, uint32_t session, const char *who);
 void replay_session_closed(void *self, uint32_t session, const char *who, int partial);
 void replay_report(void *self, int number, const char *text);
 

@@ -57,14 +57,15 @@ export class Browser {
     });
   }
 
-  /** A page of its own. size: of the view, in CSS pixels. */
-  async open(url, {size = [1280, 900], dark = false} = {}) {
+  /** A page of its own. size: of the view, in CSS pixels; before: a program that runs before those of the page. */
+  async open(url, {size = [1280, 900], dark = false, before = ''} = {}) {
     const {targetId} = await this.send('Target.createTarget', {url: 'about:blank'});
     const {sessionId} = await this.send('Target.attachToTarget', {targetId, flatten: true});
     const page = new Page(this, sessionId, targetId);
     this.#pages.set(sessionId, page);
     await Promise.all([page.send('Page.enable'), page.send('Runtime.enable'), page.send('Network.enable'), page.send('Log.enable'),
       page.resize(...size), page.dark(dark)]);
+    if (before) await page.send('Page.addScriptToEvaluateOnNewDocument', {source: before});
     await page.go(url);
     return page;
   }

@@ -54,6 +54,7 @@ export class Client {
   constructor(endpoint) {
     const [, host, port] = endpoint.match(/^tcp:(.*):(\d+)$/);
     this.socket = createConnection(Number(port), host);
+    this.socket.once('connect', () => (this.name = `tcp ${host}:${this.socket.localPort}`));
     this.socket.on('data', (bytes) => this.#read(bytes)).on('error', () => {});
     this.closed = new Promise((done) => this.socket.once('close', done));
     this.closed.then(() => this.#waiting.splice(0).forEach((done) => done('the head is gone')));

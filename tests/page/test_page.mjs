@@ -40,6 +40,41 @@ function sameBounds(bounds, {min, max}) {
   max.forEach((v, k) => near(bounds.max[k], v, tolerance, `upper bound ${k}`));
 }
 
+// As the picture says it, when a station is let go.
+const dragged = ([x, y, z]) => `scanhead.view.dispatchEvent(new CustomEvent('move', {detail: {station: 1, x: ${x}, y: ${y}, z: ${z}, heading_deg: 30}}))`;
+const IS_RED = `getComputedStyle(document.querySelector('#banner')).color === (() => {
+  const probe = document.body.appendChild(document.createElement('i'));
+  probe.style.color = 'var(--bad)';
+  const {color} = getComputedStyle(probe);
+  probe.remove();
+  return color;
+})()`;
+
+// In a page, before its scripts: a pixel of each canvas of WebGL at the end of the task that made it, or changed its size;
+// the browser shows it as it is then.
+function seesBlack() {
+  window.seen = [];
+  const look = (canvas) => queueMicrotask(() => {
+    const gl = canvas.gl, pixel = new Uint8Array(4);
+    gl.bindFramebuffer(gl.READ_FRAMEBUFFER, null);
+    gl.readPixels(1, 1, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+    window.seen.push([...pixel]);
+  });
+  const {getContext} = HTMLCanvasElement.prototype;
+  HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
+    const context = getContext.call(this, kind, ...more);
+    if (kind === 'webgl2' && !this.gl) look(Object.assign(this, {gl: context}));
+    return context;
+  };
+  for (const side of ['width', 'height']) {
+    const {get, set} = Object.getOwnPropertyDescriptor(HTMLCanvasElement.prototype, side);
+    Object.defineProperty(HTMLCanvasElement.prototype, side, {get, set(value) {
+      set.call(this, value);
+      if (this.gl) look(this);
+    }});
+  }
+}
+
 const browser = new Browser({size: SIZE});
 const {head, page, other} = await open(browser, '--journal', `${folder}/journal`);
 whenFailed(async () => `head: ${await other.ask('HEAD:STATE?')}, ${await other.ask('TIME?')} ns\n${await page.knows()}`);
@@ -50,6 +85,10 @@ await test('without control nothing that the user does reaches the head', async 
     await page.click(at);
   }
   await page.fill('#knob-head-lines', 60);
+  await page.eval(dragged([1, 1, 1.6]));
+  const banner = await page.until('!document.querySelector("#banner").hidden && document.querySelector("#banner").textContent');
+  is(banner.startsWith('Station 1 stays where it is'), `the banner says so: ${banner}`);
+  is(await page.eval(IS_RED) === false, 'a notice is not shown as an error');
   equal(await other.ask('HEAD:LIN?'), '100', 'lines a second');
   equal(await other.ask('SYST:CONT?'), '0', 'the session in control');
   equal(await other.ask('SYST:ERR:COUN?'), '0', 'refused commands');
@@ -78,6 +117,24 @@ await test('a scan: points, bounds and hash are those of the recording', async (
   await page.eval('scanhead.view.show({points: false})'); // from here on counts are enough
 });
 
+await test('a page that is opened later, or again, has the same points', async () => {
+  const late = await browser.open(endpoint(head, 'web'), {size: SMALL});
+  for (const times of [1, 2]) {
+    await late.until(`scanhead.cloud.total === ${wanted.points} && scanhead.head.figures().past_pulses === ${wanted.shots}`);
+    const has = await late.eval(`(() => {
+      const {points, past_points, past_pulses, past_hash: hash, lost_frames, missing_pulses, unplaced_points} = scanhead.head.figures();
+      return {points, past_points, past_pulses, hash, amiss: lost_frames + missing_pulses + unplaced_points, bounds: scanhead.cloud.bounds};
+    })()`);
+    equal(has.points, 0, 'points by its connection');
+    equal(has.past_pulses, wanted.shots, 'pulses from before');
+    equal(has.hash, wanted.hash, 'hash of these');
+    equal(has.amiss, 0, 'lost, missing, without a place');
+    sameBounds(has.bounds, wanted);
+    if (times === 1) await late.go(endpoint(head, 'web'));
+  }
+  await late.close();
+});
+
 await test('a station dragged in the picture is where the next scan is made', async () => {
   await page.click('#fit');
   await page.until('scanhead.view.movable');
@@ -97,6 +154,29 @@ await test('a station dragged in the picture is where the next scan is made', as
   const has = await counts(page);
   equal(has.echoes, wanted.points + moved.points, 'echoes of both scans');
   equal(has.hash, both(wanted.hash, moved.hash), 'hash of both scans');
+  equal(await page.eval('scanhead.cloud.count'), moved.points, 'points held: those from its old place are gone');
+});
+
+await test('the fields have the place of a station as soon as it is let go, and the old one when the head refuses it', async () => {
+  const fields = '["x_m", "y_m"].map((key) => document.querySelector(`#station-1-${key}`).value).join()';
+  const [was, put] = await page.eval(`(() => { const was = ${fields}; ${dragged([0.25, -0.5, 1.6])}; return [was, ${fields}]; })()`);
+  equal(put, '0.25,-0.5', 'as it is let go');
+  await other.until('SITE:POSE? 1', (reply) => reply.startsWith('0.25,-0.5,'));
+  await page.until(`document.querySelector('#panel-stations .place').textContent.startsWith('0.25')`);
+  equal(await page.eval(`${dragged([2e9, 0, 1.6])}; ${fields}`), '2000000000,0', 'where no station may be');
+  await page.until('!document.querySelector("#banner").hidden');
+  equal(await page.eval(fields), '0.25,-0.5', `the place that holds; at first it was ${was}`);
+});
+
+await test('the picture is never black: not before the first one, and not when its size changes', async () => {
+  const other = await browser.open(endpoint(head, 'web'), {size: SMALL, before: `(${seesBlack})()`});
+  await other.until('scanhead.view.state.drawn > 0');
+  await other.eval('scanhead.view.screenshotReady()');
+  const sizes = await other.eval('seen.length');
+  await other.resize(300, 420);
+  await other.until(`seen.length > ${sizes}`);
+  equal(await other.eval('JSON.stringify(seen.filter((pixel) => pixel.slice(0, 3).join() === "0,0,0"))'), '[]', 'black pixels');
+  await other.close();
 });
 
 await test('control is given back by the button, and then anybody may have it', async () => {
@@ -104,6 +184,11 @@ await test('control is given back by the button, and then anybody may have it', 
   await other.until('SYST:CONT?', (reply) => reply === '0');
   equal(await other.ask('HEAD:LIN 70'), 'OK', 'a setting of another client');
   await page.until('scanhead.head.controller !== 0 && document.querySelector("#control").disabled');
+  const wanted = `${other.name} has control`; // its kind of link and its address
+  equal(await page.eval('document.querySelector("#owner").textContent'), wanted, 'who has it');
+  const late = await browser.open(endpoint(head, 'web'), {size: SMALL});
+  await late.until(`document.querySelector("#owner").textContent === ${JSON.stringify(wanted)}`);
+  await late.close();
 });
 
 await test('another site gets no byte of it', async () => {
@@ -135,6 +220,7 @@ await test('when the head goes, the page says so; it finds the next one at that 
   await end(head);
   const words = await page.until('!document.querySelector("#banner").hidden && document.querySelector("#banner").textContent');
   is(/Not connected .*(the head has ended|the head is gone)/.test(words), `the banner says so: ${words}`);
+  equal(await page.eval(IS_RED), true, 'as an error');
   equal(await page.eval('scanhead.cloud.total > 0'), true, 'what came stays');
   const next = await start(['run', CONFIG, '--quiet', '--pace', 'fast', '--set', `links.0.port=${port}`]);
   await page.until('scanhead.head.state === "idle" && document.querySelector("#banner").hidden');
@@ -145,7 +231,7 @@ await test('when the head goes, the page says so; it finds the next one at that 
 await test('nothing but what was done by hand had an effect on the head', () => {
   const commands = readFileSync(`${folder}/journal`, 'latin1').split('\n').filter((line) => /^\d/.test(line))
     .map((line) => line.split(' ').slice(3).join(' ').toUpperCase().replace(/(SITE:POSE 1),.*/, '$1'));
-  const wanted = ['HEAD:LINES 60', 'SCAN:START', 'SITE:POSE 1', 'SCAN:START', 'HEAD:LIN 70', 'END'];
+  const wanted = ['HEAD:LINES 60', 'SCAN:START', 'SITE:POSE 1', 'SCAN:START', 'SITE:POSE 1', 'HEAD:LIN 70', 'END'];
   equal(commands.join('; '), wanted.join('; '), 'the journal');
 });
 

@@ -114,6 +114,12 @@ test('an older head is asked for MIN, MAX and DEF', async () => {
   equal(got.map(({header, min, max, preset}) => [header, min, max, preset]), [['HEAD:LINes', '3', '240', '120']]);
 });
 
+test('who has control, in words', () => {
+  equal(eventWords({name: 'CONTROL', session: 17, text: 'tcp 127.0.0.1:40312'}), ['tcp 127.0.0.1:40312 has control', '']);
+  equal(eventWords({name: 'CONTROL', session: 17, text: 'taken'}), ['Session 17 has control', '']);
+  equal(eventWords({name: 'CONTROL', session: 0, text: 'released'}), ['Nobody has control', '']);
+});
+
 test('events in words', () => {
   equal(eventWords({name: 'SCAN_END', scan: 2, fired: 1000, lost: 0}), ['Scan 2 ends: 1\u2009000 pulses fired', '']);
   equal(eventWords({name: 'ERROR', number: -222, session: 9, held_back: 0, text: 'Data out of range'}), ['Session 9: -222 Data out of range', 'bad']);

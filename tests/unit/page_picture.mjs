@@ -197,6 +197,8 @@ test('limits: robust, and the same while points come unless they miss much', () 
 });
 
 test('colours: ends of a ramp, NaN, ticks, legend', () => {
+  const [low, high] = [rampAt('spectrum', 0), rampAt('spectrum', 1)]; // low is blue, high is red, as in files (core/colour.h)
+  same([low[2] > Math.max(low[0], low[1]), high[0] > Math.max(high[1], high[2])], [true, true], 'blue and red');
   same([rampAt('ember', -1), rampAt('ember', 9)], [[47, 59, 102], [255, 209, 102]], 'ends'); // #2f3b66, #ffd166
   const cloud = new Cloud();
   const b = batch(2, () => [0, 0, 0]);

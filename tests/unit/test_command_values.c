@@ -205,6 +205,11 @@ static void control_goes_to_the_first_who_changes(void **ctx)
     static const char *const changing[] = {"HEAD:PRR 6000", "*RST", "SCAN:START", "SYST:CONT:REL", "SCAN:FRAMES MAX"};
     for (size_t i = 0; i < N_OF(changing); i++)
         expect_error(&dev, 2, changing[i], CMD_E_PROTECTED, "session 3 has control, this is session 2");
+    assert_string_equal(say(&dev, 2, "SYST:CONT:WHO?"), "\"\"");
+    command_set_peer(&dev, 3, "tcp 127.0.0.1:40312");
+    expect_error(&dev, 2, changing[0], CMD_E_PROTECTED,
+                 "tcp 127.0.0.1:40312 has control (session 3), this is session 2");
+    assert_string_equal(say(&dev, 2, "SYST:CONT:WHO?"), "\"tcp 127.0.0.1:40312\"");
     expect_error(&dev, 2, "HEAD:PRR x", CMD_E_DATA_TYPE, "x"); /* what is no command is told first */
     assert_string_equal(say(&dev, 2, "HEAD:PRR?"), "5000");
     assert_string_equal(say(&dev, 2, "*CLS"), "OK");

@@ -189,7 +189,7 @@ static void test_formats(void **state)
     free(ptx);
 }
 
-/* Red, yellow, green, blue over the limits: at 1 m red, at 4 m a third is yellow, at 10 m blue; beyond them as at them. */
+/* Blue, green, yellow, red over the limits: at 1 m blue, at 4 m a third is green, at 10 m red; beyond them as at them. */
 static void test_range(void **state)
 {
     (void)state;
@@ -199,11 +199,11 @@ static void test_range(void **state)
     put_points(0, 0, 0, 0);
     struct recorder_options options = {.ascii = 1, .colour = {.given = 1, .scale = {COLOUR_RANGE, {0}, 1.5, 9.0}}};
     char *text = record("a.ply", options, &len), *at = body_of(text);
-    assert_non_null(strstr(text, "comment red green blue show the range, red is 1.5, blue 9 m\n"));
+    assert_non_null(strstr(text, "comment red green blue show the range, blue is 1.5, red 9 m\n"));
     for (int i = 0; i < SHOTS; i++) {
-        const double part = fmin(1.0, fmax(0.0, (1.0 + i - 1.5) / 7.5)), red = 2.0 - 3.0 * part,
-                     blue = 3.0 * part - 2.0;
-        const double green = part < 2.0 / 3.0 ? 3.0 * part : 3.0 - 3.0 * part;
+        const double part = fmin(1.0, fmax(0.0, (1.0 + i - 1.5) / 7.5)), blue = 1.0 - 3.0 * part,
+                     red = 3.0 * part - 1.0;
+        const double green = part < 1.0 / 3.0 ? 3.0 * part : 3.0 - 3.0 * part;
         const double want[3] = {red, green, blue};
         uint8_t rgb[3];
         for (int c = 0; c < 3; c++)
@@ -249,7 +249,7 @@ static void test_frame(void **state)
     put_points(0, 0, 0, 0);
     char *text = record("a.ply", options, &len), *at = body_of(text);
     for (int i = 0; i < SHOTS - 1; i++)
-        at = expect(at, (const uint8_t[]){255, 255, 0});
+        at = expect(at, (const uint8_t[]){0, 255, 0});
     free(text);
     rig_begin();
     put_head(1, 0, NULL);

@@ -56,7 +56,7 @@ export class Bar {
       await action();
     } catch (error) {
       log.add(`Refused: ${why(error)}`, 'bad');
-      this.notice(`The head refused: ${why(error)}`, 6000);
+      this.notice(`The head refused: ${why(error)}`, 6000, 'bad');
     }
     this.#busy = false;
     this.show();
@@ -64,9 +64,12 @@ export class Bar {
 
   #timer = 0;
   #notice = '';
-  notice(text, ms) {
+  #kind = '';
+  // kind: '' for what is only told, 'warn', 'bad'.
+  notice(text, ms, kind = '') {
     clearTimeout(this.#timer);
     this.#notice = text;
+    this.#kind = kind;
     this.#timer = setTimeout(() => {
       this.#notice = '';
       this.show();
@@ -75,18 +78,18 @@ export class Bar {
   }
 
   show() {
-    const {link, state, pace, mine, owner, scan, since} = this.#session;
+    const {link, state, pace, mine, owner, who, scan, since} = this.#session;
     const open = link === 'open';
     document.body.dataset.link = link;
     document.body.dataset.owner = mine ? 'page' : owner ? 'other' : 'nobody';
     document.body.dataset.state = open ? state ?? '' : '';
     say(byId('state-word'), open ? stateWord(state ?? '…', pace) : link === 'closed' ? 'Not connected' : 'Connecting');
     say(byId('progress'), this.#progressText(scan));
-    say(byId('owner'), !open ? '' : mine ? 'You have control' : owner ? `Session ${owner} has control` : 'Nobody has control');
+    say(byId('owner'), !open ? '' : mine ? 'You have control' : owner ? `${who} has control` : 'Nobody has control');
     say(byId('control'), mine ? 'Give back control' : 'Take control');
     byId('control').classList.toggle('main', !mine);
     byId('control').disabled = !open || this.#busy || (!mine && owner !== 0);
-    byId('control').title = !mine && owner ? `Session ${owner} has control. It has to give it back first.` : '';
+    byId('control').title = !mine && owner ? `${who} has control. It has to give it back first.` : '';
     say(byId('start'), state === 'fault' ? 'Reset' : 'Start');
     byId('start').disabled = !mine || this.#busy || !['idle', 'fault'].includes(state);
     byId('stop').disabled = !mine || this.#busy || !['spin-up', 'scanning'].includes(state);
@@ -110,6 +113,9 @@ export class Bar {
     const gone = link !== 'closed' ? '' : wasOpen
       ? `Not connected since ${clock(since)}: ${words}. What was received stays. The page connects again by itself.`
       : `No connection: ${words}. The page tries again by itself.`;
+    const kind = gone ? 'bad' : this.#kind;
+    byId('banner').dataset.kind = kind;
+    byId('banner').setAttribute('role', kind === 'bad' ? 'alert' : 'status');
     say(byId('banner'), gone || this.#notice);
     byId('banner').hidden = !(gone || this.#notice);
   }

@@ -141,9 +141,12 @@ class Block {
 export class Cloud {
   total = 0; // points that came since it was cleared
   gone = 0; // of these, no longer held
+  replaced = 0; // how often points went because their scan was made again
   origin = null;
   blocks = [];
   changed = null; // called after each change
+  #scans = new Map(); // of each station, the newest
+  #outdated = 0; // the points before this one are of another run of the head
   #gone_lo = [Infinity, Infinity, Infinity];
   #gone_hi = [-Infinity, -Infinity, -Infinity];
 
@@ -180,7 +183,11 @@ export class Cloud {
     let n = 0;
     let over = this.count - this.capacity;
     while (over > 0 && this.blocks[n].n <= over) over -= this.blocks[n++].n;
-    for (const block of this.blocks.splice(0, n)) {
+    this.#count_gone(this.blocks.splice(0, n));
+  }
+
+  #count_gone(blocks) {
+    for (const block of blocks) {
       this.gone += block.n;
       for (let a = 0; a < 3; a++) {
         this.#gone_lo[a] = Math.min(this.#gone_lo[a], block.lo[a]);
@@ -189,8 +196,44 @@ export class Cloud {
     }
   }
 
+  /** A scan takes the place of the scans that its station had before, which it may have made from another place. To be
+   * called before add(); false: the batch is of such an older scan, and comes late (`past`). */
+  replace({station, scan, past = false}) {
+    const now = this.#scans.get(station);
+    if (past && now !== undefined && scan < now) return false;
+    if (now === scan) return true;
+    this.#scans.set(station, scan);
+    this.#drop((block) => block.station === station && (block.scan !== scan || block.first < this.#outdated));
+    return true;
+  }
+
+  /** The last block takes no more; how many points came so far. */
+  cut() {
+    const last = this.blocks.at(-1);
+    if (last && !last.closed) last.close();
+    return this.total;
+  }
+
+  /** The first so many points that came are of another run of the head, which counts its scans anew: the next scan of a
+   * station takes their place, whatever its number. */
+  outdate(total) {
+    this.#outdated = total;
+    this.#scans.clear();
+  }
+
+  #drop(isOut) {
+    const out = this.blocks.filter(isOut);
+    if (out.length === 0) return;
+    this.blocks = this.blocks.filter((block) => !isOut(block));
+    this.#count_gone(out);
+    this.replaced++;
+    if (this.blocks.length === 0) this.clear();
+    else this.changed?.();
+  }
+
   clear() {
     this.blocks = [];
+    this.#outdated = 0;
     this.total = this.gone = 0;
     this.origin = null;
     this.#gone_lo = [Infinity, Infinity, Infinity];

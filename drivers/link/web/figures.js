@@ -25,7 +25,8 @@ const PAGE = [
   ['bad', 'Damaged bytes'],
   ['decode', 'To decode a point'],
   ['held', 'Points held'],
-  ['gone', 'Points gone', 'The oldest, which had no room any more'],
+  ['gone', 'Points gone', 'The oldest, which had no room any more, and those of scans that were made again'],
+  ['past', 'Points from before', 'Of the time before this page was opened: the head keeps the last ones'],
   ['drawn', 'Pictures a second', 'Drawn of late; none are drawn while nothing changes'],
 ];
 
@@ -131,6 +132,7 @@ export class Figures {
       'lost-pulses': grouped(number(f.left_out_pulses)),
       'dropped': grouped(number(f.dropped_pulses)),
       'unplaced': grouped(number(f.unplaced_pulses)),
+      'past': pastText(f),
       'bad': grouped(number(f.bad_bytes)),
       'decode': number(f.decode_ns_per_point) > 0 ? duration(number(f.decode_ns_per_point) / 1e9) : NONE,
     });
@@ -154,6 +156,13 @@ export class Figures {
 }
 
 const mark = (key, bad) => byId(`figure-${key}`)?.classList.toggle('bad', bad);
+
+// f: a head's figures.
+function pastText({past_points: points, past_gone: gone, past_lost_frames: lost}) {
+  if (!points && !gone && !lost) return NONE;
+  return [grouped(number(points)), gone > 0 && `${short(gone)} older ones are gone`,
+    lost > 0 && `${grouped(lost)} frames not kept`].filter(Boolean).join(', ');
+}
 
 function clockText(utc_ns, t_s) {
   const utc = number(utc_ns);

@@ -15,10 +15,15 @@ function closeWords(code, reason, wasOpen) {
   return code === 1000 || code === 1001 ? 'the head has ended' : 'the connection broke: the head is gone';
 }
 
+const unquoted = (text) => text.replace(/^"|"$/g, '');
+
+/** Who took control, as a CONTROL event has it: kind of link and address. '': it doesn't say. */
+export const peerOf = ({session, text = ''}) => (session && text.includes(' ') ? text : '');
+
 /**
  * Events, each with its value in `detail`:
  * - `open` {connection}; `close` {code, words, again_s: when it tries again, or null, wasOpen}
- * - `state` {state, before}; `control` {session: 0 nobody, own, mine}
+ * - `state` {state, before}; `control` {session: 0 nobody, who: kind and address, or '', own, mine}
  * - `lost` {by, frames, pulses}, by 'head' (not computed in time), 'link' (this page was too slow), 'wire' (damaged) or
  *   'page' (dropped here)
  * - `scan` {scan, fired, cast, lost, received, missing} at a scan's end; null for what was lost on the way
@@ -30,6 +35,7 @@ export class Head extends EventTarget {
   state = null; // a word of STATES
   session = 0; // this page's; 0: not known
   controller = 0; // the session in control; 0: nobody
+  who = ''; // of it, the kind of link and the address; '': not known
   idn = '';
   descriptor = null; // what came last of each, of this connection
   anchor = null;
@@ -38,6 +44,7 @@ export class Head extends EventTarget {
   names = new Map(); // label: {object, material}
 
   #url;
+  #past;
   #wire;
   #replies;
   #connection = 0; // as the wire numbers them
@@ -46,17 +53,20 @@ export class Head extends EventTarget {
   #isClosed = false;
   #figures = {};
   #losses = null;
+  #knowsWho = false; // the head says who has control
   #told = ''; // who has control, as `control` said it last
 
-  /** url: "ws://host:port/ws", or "/ws" in a page. worker: false decodes in this thread. It connects at once, and again
-   * and again until close(). */
-  constructor(url, {worker = typeof Worker === 'function'} = {}) {
+  /** url: "ws://host:port/ws", or "/ws" in a page. worker: false decodes in this thread. past: true takes the points from
+   * before, too, where the head keeps them; a batch of these has `past`. It connects at once, and again and again until
+   * close(). */
+  constructor(url, {worker = typeof Worker === 'function', past = false} = {}) {
     super();
+    this.#past = past;
     this.#url = typeof location === 'undefined' ? url : new URL(url, location.href.replace(/^http/, 'ws')).href;
     this.#replies = new Replies((line) => this.#wire.post({send: line}));
     this.#forget();
     this.#wire = worker ? this.#inWorker() : this.#inPage();
-    this.#wire.post({connect: this.#url});
+    this.#connect();
   }
 
   get mine() {
@@ -101,7 +111,9 @@ export class Head extends EventTarget {
    * shots without echo among them), pulses (received), empty; lost_frames: missing in the sequence, of which
    * left_out_frames with left_out_pulses because this page was too slow; lost_pulses: lost by the head; missing_pulses:
    * of all scans that ended here, delivered and not received; dropped_points, dropped_pulses: decoded, and dropped by
-   * the page itself; unplaced_points, unplaced_pulses: came before their anchor or their pose; repeated_frames,
+   * the page itself; unplaced_points, unplaced_pulses: came before their anchor or their pose;
+   * past_points, past_pulses, past_hash: of these, what came from before this connection, in none of the other counts;
+   * past_gone: points that the head keeps no more, past_lost_frames: frames that it could not keep; repeated_frames,
    * late_frames: came twice, or after newer ones, and were dropped; jumps_back: how often the sequence of frames began
    * anew; bad_bytes, bad_payloads, refused; decode_ns_per_point; point_hash.
    */
@@ -114,6 +126,11 @@ export class Head extends EventTarget {
 
   // ---- the wire, in a worker or here
 
+  #connect() {
+    const past = this.#past ? this.#url.replace(/^ws/, 'http').replace(/\/ws$/, '/past') : null;
+    this.#wire.post({connect: this.#url, past});
+  }
+
   #inWorker() {
     const worker = new Worker(new URL('./wire_worker.js', import.meta.url), {type: 'module'});
     worker.onmessage = ({data}) => {
@@ -124,7 +141,7 @@ export class Head extends EventTarget {
       event.preventDefault?.();
       worker.terminate();
       this.#wire = this.#inPage();
-      this.#wire.post({connect: this.#url});
+      this.#connect();
     };
     return {post: (message) => worker.postMessage(message), end: () => worker.terminate()};
   }
@@ -158,7 +175,7 @@ export class Head extends EventTarget {
       case 'names': value.forEach(({label, ...words}) => this.names.set(label, words)); break;
       case 'telemetry': this.#measured(value); break;
       case 'event': this.#happened(value); break;
-      case 'points': this.#losses.points(value); break;
+      case 'points': value.past ? this.#losses.past(value) : this.#losses.points(value); break;
       default:
     }
     this.#say(name, value);
@@ -173,6 +190,7 @@ export class Head extends EventTarget {
   #forget() {
     this.state = this.descriptor = this.anchor = this.emitter = this.telemetry = null;
     this.session = this.controller = 0;
+    this.who = '';
     this.names.clear();
     this.#figures = {points: 0, shots: 0, bytes: 0, frames: 0, lost_frames: 0, bad_bytes: 0, decode_ns_per_point: 0};
     this.#losses = new Losses((name, detail) => this.#say(name, detail));
@@ -196,8 +214,10 @@ export class Head extends EventTarget {
     this.#delay_s = FIRST_DELAY_S;
     this.idn = idn;
     this.#become(state);
+    this.#knowsWho = /SYSTem:CONTrol:WHO/i.test(help);
     if (/SYSTem:SESSion/i.test(help)) this.session = Number(await this.command('SYSTem:SESSion?'));
     this.#controlled(Number(controller));
+    if (this.controller && this.#knowsWho) this.#controlled(this.controller, unquoted(await this.command('SYSTem:CONTrol:WHO?')));
   }
 
   #closed({code, reason}) {
@@ -206,10 +226,11 @@ export class Head extends EventTarget {
     this.#replies.close(words);
     const again_s = this.#isClosed ? null : code === FULL ? FULL_DELAY_S : this.#delay_s;
     this.session = this.controller = 0;
+    this.who = '';
     this.#told = '';
     this.state = null;
     if (again_s !== null) {
-      this.#timer = setTimeout(() => this.#wire.post({connect: this.#url}), 1000 * again_s);
+      this.#timer = setTimeout(() => this.#connect(), 1000 * again_s);
       this.#delay_s = Math.min(2 * this.#delay_s, MAX_DELAY_S);
     }
     this.#say('close', {code, words, again_s, wasOpen});
@@ -224,12 +245,13 @@ export class Head extends EventTarget {
     this.#say('state', {state, before});
   }
 
-  #controlled(session) {
-    const now = `${session} ${this.session}`;
+  #controlled(session, who = session === this.controller ? this.who : '') {
+    const now = `${session} ${this.session} ${who}`;
     if (now === this.#told) return;
     this.#told = now;
     this.controller = session;
-    this.#say('control', {session, own: this.session, mine: this.mine});
+    this.who = who;
+    this.#say('control', {session, who, own: this.session, mine: this.mine});
   }
 
   #described(d) {
@@ -248,6 +270,6 @@ export class Head extends EventTarget {
   #happened(e) {
     this.#losses.event(e);
     if (e.name === 'STATE') this.#become(STATES[e.state]);
-    if (e.name === 'CONTROL') this.#controlled(e.session);
+    if (e.name === 'CONTROL') this.#controlled(e.session, peerOf(e));
   }
 }

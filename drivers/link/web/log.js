@@ -1,6 +1,7 @@
 // Events and errors in words, the newest on top; and the plan.
 import {bodyOf, byId, clock, fetchJson, grouped, make, metres, percent, say} from './page.js';
-import {stateName, stateWord} from './session.js';
+import {peerOf} from './head.js';
+import {sessionWords, stateName, stateWord} from './session.js';
 
 const MOST = 200; // entries that are kept
 
@@ -21,7 +22,7 @@ export function eventWords(e) {
     case 'OVERRUN': return [`The head could not keep up: ${grouped(ns(e.lost))} pulses lost`, 'warn'];
     case 'READER_LOST': return ns(e.frames) > 0
       ? [`This page could not follow: ${grouped(ns(e.frames))} frames with ${grouped(ns(e.pulses))} pulses lost`, 'warn'] : null;
-    case 'CONTROL': return [e.session ? `Session ${e.session} has control` : 'Nobody has control', ''];
+    case 'CONTROL': return [e.session ? `${sessionWords(e.session, peerOf(e))} has control` : 'Nobody has control', ''];
     case 'ERROR': return ns(e.held_back) > 0
       ? [`${grouped(ns(e.held_back))} more errors, the last one ${e.number}`, 'bad']
       : [`${e.session ? `Session ${e.session}: ` : ''}${HEADS_OWN[e.number] ?? e.number}${e.text ? ` ${e.text}` : ''}`, 'bad'];

@@ -15,6 +15,7 @@ export class Losses {
   #scan = null;
   #isRunning = false;
   #shots = 0; // pulses received before the scan
+  #before = {scan: null, shots: 0}; // received of a scan from before this page came
   #counts = null; // the last telemetry
   #say;
 
@@ -34,6 +35,13 @@ export class Losses {
 
   points(batch) {
     this.#isRunning ||= batch.scan === this.#scan;
+  }
+
+  /** Points that the head had kept: of a scan that this page joined late they are not missing. */
+  past({scan, shots}) {
+    if (scan !== this.#before.scan) this.#before = {scan, shots: 0};
+    this.#before.shots += shots;
+    if (scan === this.#scan) this.#shots -= shots;
   }
 
   /** lost_frames: missing in the sequence so far. */
@@ -79,7 +87,7 @@ export class Losses {
     if (this.#scan === scan) return;
     this.#end(this.#scan, null, shots);
     this.#scan = scan;
-    this.#shots = shots;
+    this.#shots = scan === this.#before.scan ? shots - this.#before.shots : shots;
   }
 
   // The telemetry directly before SCAN_END, of state spin-down, has the final counts.

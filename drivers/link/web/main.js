@@ -74,8 +74,8 @@ async function fetchScene() {
 const frameSeconds = ({pan_start_udeg: from, pan_stop_udeg: to, pan_udeg_s: rate}) =>
   (Number(rate) > 0 ? Math.abs(Number(to) - Number(from)) / Number(rate) : 0);
 
-function startHead(cloud, view, names) {
-  const head = new Head(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws`);
+function startHead(cloud, view, names, keepsPast) {
+  const head = new Head(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws`, {past: keepsPast});
   const session = new Session(head);
   const log = new Log(session);
   const bar = new Bar(session, log);
@@ -90,16 +90,20 @@ function startHead(cloud, view, names) {
 
   const countFrames = () => session.command('SCAN:COUNt?').then((done) => bar.progress({done: Number(done)}), () => {});
   let before = ''; // who the head was
+  let run = ''; // which of its runs
   const learn = async () => {
+    const came = cloud.cut();
     countFrames();
     const info = await fetchJson('/head');
     if (!info) return;
     const now = [info.config, info.maker, info.model, info.serial].join();
     if (before && now !== before && cloud.count > 0) {
       const words = 'This is another head. The points of the one before are still shown; Clear, under Display, removes them.';
-      bar.notice(words, 15000);
+      bar.notice(words, 15000, 'warn');
       log.add(words, 'warn');
     }
+    if (run && info.run !== run) cloud.outdate(came);
+    run = info.run ?? '';
     before = now;
     names.add(info.surfaces ?? []);
     bar.name(info);
@@ -109,11 +113,13 @@ function startHead(cloud, view, names) {
     display.setScene(await fetchScene());
   };
   stations.addEventListener('tell', ({detail}) => {
-    bar.notice(detail.text, 6000);
+    bar.notice(detail.text, 6000, detail.kind);
     log.add(detail.text, detail.kind);
   });
   head.addEventListener('points', ({detail}) => {
+    if (!cloud.replace(detail)) return;
     cloud.add(detail);
+    if (detail.past) return;
     bar.progress({done: detail.frame});
     if (detail.n > 0) bar.reached(detail.t[detail.n - 1]);
   });
@@ -158,7 +164,7 @@ async function start() {
   const info = await fetchJson('/head');
   window.scanhead = {head: null, cloud, view};
   if (info?.recording) window.scanhead.recording = startRecording(info, cloud, view, names);
-  else window.scanhead.head = startHead(cloud, view, names);
+  else window.scanhead.head = startHead(cloud, view, names, Boolean(info?.run));
 }
 
 start();

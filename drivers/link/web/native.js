@@ -5,8 +5,9 @@ import {readAnchor, readBeside, readDescriptor, readEmitter, readEvent, readLine
   readTelemetry, refuse, Refused} from './native_fields.js';
 import {Columns, geoPlacer, PointHash, polarPlacer} from './native_points.js';
 import {Poses} from './native_poses.js';
+import {isBefore} from './native_sequence.js';
 
-export {LOCAL, Parser, REPEAT};
+export {isBefore, LOCAL, Parser, REPEAT};
 export {crc32c} from './crc32c.js';
 const VERSION = 1;
 export const TYPES = ['', 'descriptor', 'anchor', 'points', 'line-end', 'telemetry', 'event', 'surfaces', 'poses',
@@ -14,6 +15,8 @@ export const TYPES = ['', 'descriptor', 'anchor', 'points', 'line-end', 'telemet
 export const STATES = ['off', 'boot', 'idle', 'spin-up', 'scanning', 'spin-down', 'fault'];
 const [, DESCRIPTOR, ANCHOR, POINTS, LINE_END, TELEMETRY, EVENT, SURFACES, POSES, ATTRIBUTES, EMITTER, COLOURS] =
   TYPES.keys();
+export {POINTS};
+export const BESIDE_POINTS = [POINTS, ATTRIBUTES, COLOURS]; // points, and what says more of them
 const HEAD = 40, RECORD = 20, MAX_POINTS = 3274, ROOM = 32768, NO_AMPLITUDE = -32768;
 
 /** Frames to values. What PROTOCOL.md says is void is forgotten; a frame that it says to refuse is counted, and is as

@@ -2,6 +2,9 @@
 const SEEN = 256, GAPS = 64, GAP_MOST = 65536, LATE_RUN = 256; // how far back a jump is looked into, as libscanhead does
 const LOCAL = 2;
 
+/** Whether number a comes before b, modulo 2^32. */
+export const isBefore = (a, b) => ((a - b) >>> 0) >= 2 ** 31;
+
 /** Takes the headers of whole frames, one after the other. */
 export class Sequence {
   #next = -1; // -1: none came yet

@@ -13,6 +13,9 @@ export const stateName = (state) => STATES[Number(state)] ?? String(state);
 // In the pace step a head that was granted no time yet stays in its self test.
 export const stateWord = (state, pace) => (pace === 'step' && state === 'boot' ? 'Waits for time steps' : WORDS[state] ?? state);
 
+// A session by kind of link and address, "tcp 127.0.0.1:40312", or where these are not known by its number.
+export const sessionWords = (session, who) => who || `Session ${session}`;
+
 // A promise's ERR as a sentence: the words after the semicolon are what exactly was wrong.
 export function why(error) {
   const text = String(error?.text ?? error?.message ?? error);
@@ -25,6 +28,7 @@ export class Session extends EventTarget {
   scan = 0;
   pace = '';        // as the configuration has it; '': not known
   owner = 0;        // the session in control, 0: nobody
+  who = '';         // it in words, for a sentence's beginning
   mine = false;     // it is this page that has control
   since = null;     // when the connection ended, and why
   words = '';
@@ -36,7 +40,7 @@ export class Session extends EventTarget {
     head.addEventListener('open', () => this.#opened());
     head.addEventListener('close', ({detail}) => this.#closed(detail));
     head.addEventListener('state', ({detail}) => this.#become(detail?.state ?? detail));
-    head.addEventListener('control', ({detail}) => this.#controlled(detail.session, detail.mine));
+    head.addEventListener('control', ({detail}) => this.#controlled(detail));
     head.addEventListener('event', ({detail}) => {
       if (detail.name !== 'SCAN_START') return;
       this.scan = Number(detail.scan);
@@ -54,7 +58,7 @@ export class Session extends EventTarget {
   // Why a setting can't be made now, in words; '' where it can. states: those in which it can, or 'all'.
   whyNot(states = 'all') {
     if (this.link !== 'open') return 'The head is not connected.';
-    if (!this.mine) return this.owner ? `Session ${this.owner} has control and has to give it back first.` : 'Take control first.';
+    if (!this.mine) return this.owner ? `${this.who} has control and has to give it back first.` : 'Take control first.';
     if (states === 'all' || states.split(' ').includes(this.state)) return '';
     return `Not while the head is ${stateWord(this.state ?? 'off').toLowerCase()}.`;
   }
@@ -102,8 +106,9 @@ export class Session extends EventTarget {
     this.#changed();
   }
 
-  #controlled(session, mine) {
+  #controlled({session, who, mine}) {
     this.owner = session;
+    this.who = sessionWords(session, who);
     this.mine = mine;
     this.#changed();
   }

@@ -159,10 +159,19 @@ export class Stations extends EventTarget {
     }
     const turned = ((heading_deg + 180) % 360 + 360) % 360 - 180;
     const numbers = [x, y, z, turned].map((v) => String(Math.round(v * 1e4) / 1e4));
+    const place = [...numbers, station.pitch_deg, station.roll_deg];
+    this.#items.get(number).fields.forEach(({field}, k) => {
+      field.value = shown(Number(place[k]));
+    });
     const slow = setTimeout(() => this.#tell(`Station ${number} is being moved; what depends on it is planned again.`, ''), 1000);
-    const error = await this.#send(number, [number, ...numbers, station.pitch_deg, station.roll_deg].join(', '));
+    const error = await this.#send(number, [number, ...place].join(', '));
     clearTimeout(slow);
-    if (error) this.#tell(`Station ${number} stays where it is. ${error}`);
+    if (!error) return;
+    const entry = this.#items.get(number);
+    this.#fill(this.#of(number), true);
+    entry.error = error;
+    this.#allow();
+    this.#tell(`Station ${number} stays where it is. ${error}`);
   }
 
   #tell(text, kind = 'warn') {

@@ -50,9 +50,11 @@ export class View extends EventTarget {
   #waiting = [];
   #goneDrawn = 0;
   #lastGone = 0;
+  #replaced = 0; // scans, as the cloud counts them
   #origin = null; // of the points that are drawn
   #scale;
   #pointsOn = true;
+  #size = null; // of the picture, in its pixels
   #made = null; // {target, camera} of a frame that is not on the page yet
   #grown = false; // more is drawn than on the page
   #showEvery = SHOW_MS;
@@ -111,6 +113,16 @@ export class View extends EventTarget {
     this.#points.setMode(this.#scale.mode);
     this.#solids.attach(gl, this.programs);
     this.empty = gl.createVertexArray();
+    this.#bare();
+  }
+
+  // The page's ground until there is a picture: a canvas without one is black.
+  #bare() {
+    const gl = this.#gl;
+    this.colours ??= readTheme(this.canvas);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    gl.clearColor(...this.colours.ground, 1);
+    gl.clear(gl.COLOR_BUFFER_BIT);
   }
 
   // ---- what the page asks for
@@ -270,7 +282,7 @@ export class View extends EventTarget {
     }
     const want = this.#want;
     if (want.resize) this.#resize();
-    if (this.canvas.width === 0 || this.canvas.height === 0) return;
+    if (this.#size === null) return;
     this.colours ??= readTheme(this.canvas);
     if (this.#follow()) want.restart ??= 'later';
     const parts = this.#parts();
@@ -366,7 +378,12 @@ export class View extends EventTarget {
     const {target, camera, moving} = this.#made;
     this.#made = null;
     this.#shownAt = now;
-    target.toPage(this.canvas.width, this.canvas.height);
+    const [width, height] = this.#size;
+    if (this.canvas.width !== width || this.canvas.height !== height) {
+      Object.assign(this.canvas, {width, height});
+      this.#bare(); // Chromium drops a blit that is the first thing drawn
+    }
+    target.toPage(width, height);
     this.#seen = camera;
     this.#over();
     if (moving) {
@@ -409,9 +426,8 @@ export class View extends EventTarget {
     const ratio = Math.min(2, globalThis.devicePixelRatio || 1);
     const [w, h] = [Math.round(width * ratio), Math.round(height * ratio)];
     if (w === 0 || h === 0) return;
-    if (canvas.width !== w || canvas.height !== h || !this.#painter.shown) {
-      canvas.width = w;
-      canvas.height = h;
+    if (this.#size?.[0] !== w || this.#size?.[1] !== h || !this.#painter.shown) {
+      this.#size = [w, h]; // the canvas gets it with its picture: it is black from then on
       this.#made = null;
       this.#painter.resize(w, h);
       this.#want.camera = true;
@@ -437,6 +453,10 @@ export class View extends EventTarget {
       this.#lastGone = this.#goneDrawn = 0;
       this.#scale.forget();
       this.#fitted = 0;
+      this.#want.restart = 'now';
+    }
+    if (cloud.replaced !== this.#replaced) { // at once: the old points are elsewhere
+      this.#replaced = cloud.replaced;
       this.#want.restart = 'now';
     }
     if (this.#points.follow()) this.#goneDrawn += gone - this.#lastGone;

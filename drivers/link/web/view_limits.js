@@ -44,7 +44,7 @@ export class Scale {
 
   // {first, changed}: there are limits for the first time; others than before.
   follow() {
-    const {total, gone} = this.#cloud;
+    const {total, blocks} = this.#cloud;
     const due = total > this.#at && (total >= 2 * this.#at || (this.mode === 'age' && total > AGED * this.#at));
     if (!due) return {first: false, changed: false};
     const before = this.limits;
@@ -52,7 +52,7 @@ export class Scale {
     this.#legend = null;
     this.#sample = sampleOf(this.#cloud, this.mode);
     if (MODES[this.mode].kind !== 'ramp') return {first: false, changed: false};
-    if (this.mode === 'age') this.limits = [gone, total];
+    if (this.mode === 'age') this.limits = [blocks[0]?.first ?? total, total];
     else this.limits = this.#fixed?.map((v) => v - this.#offset) ?? widened(before, robustLimits(this.#sample, MODES[this.mode].least));
     const changed = this.limits !== null && (before === null || before.some((v, i) => v !== this.limits[i]));
     return {first: before === null && changed, changed};

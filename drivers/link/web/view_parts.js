@@ -129,7 +129,7 @@ export class Points {
   follow() {
     let gone = false;
     const {blocks} = this.cloud;
-    if (this.parts.length > 0 && this.parts[0].block !== blocks[0]) {
+    if (this.parts.some((part, i) => part.block !== blocks[i])) {
       const held = new Set(blocks);
       for (const [block, part] of this.#known) {
         if (held.has(block)) continue;

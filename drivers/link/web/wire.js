@@ -7,6 +7,7 @@
 // wait: the bytes would pile up in the browser. So it is always decoded at once, and batches that have no room are
 // dropped here, and counted (dropped_points, dropped_shots).
 import {Decoder, Parser} from './native.js';
+import {Past} from './past.js';
 
 const SUBPROTOCOL = 'scanhead-native-1';
 const MAX_UNTAKEN = 3; // messages that the owner has not acknowledged
@@ -28,6 +29,8 @@ export class Wire {
   #opening = 0; // a timer, as
   #limit = 0;
   #number = 0; // of the connection: what comes late from an older one is nothing
+  #past = new Past({give: (batch) => this.#addPast(batch), hasRoom: () => this.#untaken < MAX_UNTAKEN});
+  #pastUrl = null;
 
   /** post(message, transfer): {connection, things, figures} to the owner. */
   constructor(post) {
@@ -35,9 +38,9 @@ export class Wire {
     this.#fresh();
   }
 
-  /** From the owner: {connect: url}, {send: line}, {close: true}, {ack: true}. */
+  /** From the owner: {connect: url, past: url of what was before, or null}, {send: line}, {close: true}, {ack: true}. */
   take(message) {
-    if (message.connect !== undefined) this.#connect(message.connect);
+    if (message.connect !== undefined) this.#connect(message.connect, message.past ?? null);
     if (message.send !== undefined) this.#socket?.send(message.send);
     if (message.close) this.#close();
     if (message.ack) this.#taken();
@@ -53,14 +56,17 @@ export class Wire {
       anchor: hand('anchor'), emitter: hand('emitter'), names: hand('names'), lineEnd: hand('line-end'),
       telemetry: handCounted('telemetry'), event: handCounted('event'), poses: hand('poses'),
       refused: hand('refused')});
-    this.parser = new Parser({frame: (frame) => this.decoder.take(frame), text: hand('text')});
+    this.parser = new Parser({text: hand('text'), frame: (frame) => {
+      if (this.#past.takes(frame, this.decoder.canPlace)) this.decoder.take(frame);
+    }});
     this.busy_ms = 0;
     this.dropped = {dropped_points: 0, dropped_shots: 0, dropped_things: 0};
   }
 
-  #connect(url) {
+  #connect(url, past) {
     this.#close();
     this.#fresh();
+    this.#pastUrl = past;
     this.#number++;
     const number = this.#number;
     const mine = (act) => (...values) => number === this.#number && act(...values);
@@ -88,10 +94,12 @@ export class Wire {
     clearTimeout(this.#opening);
     this.#opening = 0;
     this.#addNow('open', null);
+    if (this.#pastUrl !== null) this.#past.start(this.#pastUrl);
   }
 
   #close() {
     this.#stopTimers();
+    this.#past.stop();
     this.#socket?.close();
     this.#socket = null;
   }
@@ -104,6 +112,7 @@ export class Wire {
 
   #ended(code, reason) {
     this.#stopTimers();
+    this.#past.stop();
     this.#socket = null;
     this.parser.end();
     this.decoder.flush(true);
@@ -154,6 +163,14 @@ export class Wire {
     this.#transfer.push(batch.x.buffer);
   }
 
+  // Before live points that have not been handed on it would be in the middle of their batch.
+  #addPast(batch) {
+    this.decoder.flush();
+    this.#addPoints(batch);
+    if (this.#points >= MESSAGE_POINTS) this.#send();
+    else this.#later();
+  }
+
   // ---- handing on
 
   #later() {
@@ -195,7 +212,10 @@ export class Wire {
 
   figures() {
     const {stats: p} = this.parser, {stats: d} = this.decoder;
-    return {...p, ...d, ...this.dropped, point_hash: this.decoder.pointHash, waiting_points: this.#points,
+    const {stats: past, unplaced} = this.#past;
+    return {...p, ...d, ...this.dropped, ...past, past_hash: this.#past.pointHash,
+      unplaced_points: d.unplaced_points + unplaced.points, unplaced_shots: d.unplaced_shots + unplaced.shots,
+      point_hash: this.decoder.pointHash, waiting_points: this.#points,
       decode_ms: this.busy_ms, decode_ns_per_point: d.points > 0 ? (1e6 * this.busy_ms) / d.points : 0};
   }
 }

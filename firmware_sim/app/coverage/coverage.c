@@ -264,8 +264,8 @@ static const struct app_option OPTIONS[] = {
     {APP_TEXT, "output", "FILE", .letter = 'o', .at = AT(output), .file = APP_WRITES,
      .help = "the cells as a mesh with colours; .ply has the scalars stations, density, incidence_deg, range_m and cell"},
     {APP_TEXT, "colour", "WHAT", .at = AT(colour_name), OPTION_CHOICES(COLOURS),
-     .help = "of the mesh: seen (by none red, one yellow, several green; the default), count (of stations, red to blue), "
-             "density (red to blue, in decades), incidence (blue head on to red grazing)"},
+     .help = "of the mesh: seen (by none red, one yellow, several green; the default), count (of stations, blue to red), "
+             "density (blue to red, in decades), incidence (blue head on to red grazing)"},
     {APP_WHOLE, "next", "N", .min = 1, .max = COVERAGE_MOST_NEXT, .at = AT(o.stations),
      .help = "the N next stations, one after the other: each where most is gained of what none has seen by then (default "
              "1 with --grid or --candidates)"},

@@ -204,8 +204,7 @@ static int add_names(struct record_line *r)
 {
     static const struct {
         const char *mesh, *ending;
-    } beside[] = {{".obj", ".mtl"},  {".obj", ".png"}, {".gltf", ".bin"},
-                  {".gltf", ".png"}, {".glb", ".png"}, {".fbx", ".png"}};
+    } beside[] = {{".obj", ".mtl"}, {".obj", ".png"}, {".gltf", ".bin"}, {".gltf", ".png"}, {".fbx", ".png"}};
     const int n_files = r->in.n_files;
     int file = 0, status = APP_OK;
     for (int i = 0; i < n_files; i++) {
@@ -305,7 +304,7 @@ static const struct app_option OPTIONS[] = {
              "reflectance (grey, -30 to 0 dB), label (a hue per surface), frame (of a trajectory), texture (of a "
              "CONFIG); or solid; none. Default: as the head sends them, if it does (output.colour)"},
     {APP_CALL, "colour-limits", "LOW,HIGH", .apply = take_colour_limits,
-     .help = "of range and height (m) and frame: red is LOW, blue is HIGH. Default: the smallest and the largest in the "
+     .help = "of range and height (m) and frame: blue is LOW, red is HIGH. Default: the smallest and the largest in the "
              "file, which is then written when all scans are over"},
     {APP_CALL, "colour-rgb", "R,G,B", .apply = take_colour_rgb, .help = "the colour of --colour solid, 0 to 255 each"},
     {APP_FLAG, "mesh", NULL, .at = AT(job.files.recorder.mesh),

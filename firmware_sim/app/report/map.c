@@ -165,7 +165,7 @@ static void put_legend(FILE *out, double top, double m_per_unit, double most_m)
         top + 20.0, 20.0 + bar, top + 20.0, 28.0 + bar, top + 25.0, bar_m);
     for (int k = 0; k <= 6; k++) {
         uint8_t rgb[3];
-        colour_ramp(1.0 - k / 6.0, rgb);
+        colour_ramp(k / 6.0, rgb);
         fprintf(out, "<stop offset=\"%.4f\" stop-color=\"#%02x%02x%02x\"/>", k / 6.0, rgb[0], rgb[1], rgb[2]);
     }
     fprintf(out,

@@ -165,7 +165,8 @@ static const struct app_option OPTIONS[] = {
     {APP_FLAG, "start", NULL, .at = AT(device.start), .help = "scan at once, no command needed"},
     {APP_FLAG, "view", NULL, .at = AT(view),
      .help = "with a page for a browser, which shows the scan and sets the head; its address is printed. A web link of "
-             "the configuration is used where there is one"},
+             "the configuration is used where there is one. A page that is opened later shows what the scans had so far: "
+             "the head keeps their last 10 million points, in up to 320 MiB"},
     {APP_KEY, "pace", "PACE", .key = "loop.pace",
      .help = "realtime, fast (as fast as it computes), step (a peer grants time with TIME:STEP)"},
     {APP_NUMBER, "duration", "S", .min = 0.001, .max = 1e8, .at = AT(device.duration_s),

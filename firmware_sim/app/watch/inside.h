@@ -4,7 +4,8 @@
  *   observe.c  the thread: frames of the stream to points in the scene's frame
  *   sample.c   these points: which are kept, how far they are from the scene, the figures of all of them
  *   seen.c     which cells of the surface they are on
- *   quality.c  /quality: the last figures as JSON */
+ *   quality.c  /quality: the last figures as JSON
+ *   past.c     /past: the frames of the last points */
 #ifndef FIRMWARE_SIM_APP_WATCH_INSIDE_H
 #define FIRMWARE_SIM_APP_WATCH_INSIDE_H
 
@@ -16,6 +17,7 @@
 #include "core/figures.h"
 #include "drivers/host/scanhead.h"
 #include "firmware_sim/app/report/verdict.h"
+#include "firmware_sim/app/watch/past.h"
 #include "firmware_sim/app/watch/watch.h"
 
 /* Points kept of a scan, at most; so many are compared at a time; one of so many pulses is looked at, at the least. */
@@ -97,6 +99,8 @@ struct watch {
     int dirty;            /* something came since the last figures */
     int64_t began_ns, began_thread_ns, published_ns, publish_ns;
     uint64_t lost_frames;
+
+    struct past *past; /* the observer fills it */
 
     /* made once */
     char *scene_bytes;

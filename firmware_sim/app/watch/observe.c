@@ -166,6 +166,7 @@ static void take_telemetry(struct watch *w, const struct scanhead_frame *frame)
 static void take_frame(struct watch *w, const struct scanhead_frame *frame)
 {
     struct sh_err err;
+    past_take(w->past, frame, w->lost_frames);
     if (frame->type == SCANHEAD_POINTS && follow_scan(w)) {
         take_points(w, frame);
         if (w->sample.n - w->sample.done >= WATCH_BATCH && watch_sample_compare(w, &err) != SH_OK)

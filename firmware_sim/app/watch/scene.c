@@ -175,7 +175,10 @@ static void put_head(struct json *json, const void *ctx)
     static const char *const paces[] = {[PACE_REALTIME] = "realtime", [PACE_FAST] = "fast", [PACE_STEP] = "step"};
     const struct watch *w = ctx;
     const struct config *cfg = w->cfg;
+    char run[24];
+    snprintf(run, sizeof run, "%016llx", (unsigned long long)past_run(w->past));
     json_open_object(json, NULL);
+    json_string(json, "run", run);
     json_string(json, "maker", cfg->profile.maker);
     json_string(json, "model", cfg->profile.model);
     json_string(json, "profile", cfg->profile.name);

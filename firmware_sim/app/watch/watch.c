@@ -12,7 +12,7 @@
 static int get(void *ctx, const char *path, const char *query, struct web_body *out, struct sh_err *err)
 {
     struct watch *w = ctx;
-    (void)query;
+    if (strcmp(path, "/past") == 0) return past_get(w->past, query, out, err);
     if (strcmp(path, "/quality") == 0) return watch_get_quality(w, out, err);
     if (strcmp(path, "/scene") == 0) return watch_get_scene(w, out, err);
     if (strcmp(path, "/head") == 0) return watch_get_head(w, out, err);
@@ -42,7 +42,9 @@ static int make_room(struct watch *w, struct sh_err *err)
     w->shown_station = calloc(n, sizeof *w->shown_station);
     for (uint32_t i = 0; i < n && w->head != NULL; i++)
         if (config_serves(w->cfg, i)) report_head_of(w->site, i, &w->head[i]);
-    if (w->head != NULL && w->shown_station != NULL) return SH_OK;
+    const struct past_limits limits = {PAST_MOST_POINTS, PAST_MOST_BYTES};
+    w->past = past_create(&limits);
+    if (w->head != NULL && w->shown_station != NULL && w->past != NULL) return SH_OK;
     return sh_fail(err, SH_ENOMEM, "no memory for %u stations", n);
 }
 
@@ -104,6 +106,7 @@ void watch_close(struct watch *w)
     if (w->link.fd >= 0 && !w->link_given) close(w->link.fd);
     watch_sample_close(w);
     watch_seen_close(&w->seen);
+    past_free(w->past);
     free(w->head);
     free(w->shown_station);
     free(w->scene_bytes);

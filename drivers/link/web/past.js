@@ -1,0 +1,177 @@
+// The points that the scans had before this page came, or while it was away: the head keeps the last ones, and gives them
+// in pieces (GET /past, firmware_sim/app/watch/README.md). They are frames of the stream with the numbers that they had.
+// So each points frame is taken once, either from there or from the connection.
+//
+// A live frame that can't be placed yet is left to /past. Of /past, frames are left out that the connection brings, or that
+// an earlier connection with the same run of the head brought.
+import {BESIDE_POINTS, Decoder, isBefore, LOCAL, Parser, POINTS} from './native.js';
+
+const HEAD = 56, VERSION = 1;
+const REST_MS = 20; // between two pieces: a head that scans has other things to do
+const AGAIN_MS = 100, PATIENCE_MS = 10000; // the head's keeper reads the stream a little later than this page
+
+const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
+
+function readHead(bytes) {
+  const view = new DataView(bytes);
+  if (bytes.byteLength < HEAD || view.getUint32(0, false) !== 0x53485041 || view.getUint32(4, true) !== VERSION) return null;
+  const u64 = (at) => Number(view.getBigUint64(at, true));
+  return {run: view.getBigUint64(8, true), next: u64(16), end: u64(24), gone: u64(32), lost_frames: u64(40),
+    next_seq: view.getUint32(48, true)};
+}
+
+export class Past {
+  stats = {past_points: 0, past_pulses: 0, past_gone: 0, past_lost_frames: 0};
+  unplaced = {points: 0, shots: 0}; // of live frames, left to a /past that is not there
+  #left = {points: 0, shots: 0}; // of live frames, to /past
+  #give;
+  #hasRoom;
+  #get;
+  #url = null;
+  #connection = 0;
+  #isReading = false;
+  #run = null;
+  #at = 0; // position in /past
+  #last = null; // number of the newest points frame that was taken: of all, and
+  #seen = null; // of earlier connections
+  #first = null; // of the first live one that was taken
+  #need = null; // of the newest frame that only /past brings
+  #takesLive = true;
+  #takesPast = true;
+
+  /** give(batch): points of the past. hasRoom(): false while the owner is behind. get(url): a promise of the bytes, null
+   * where there is nothing. */
+  constructor({give, hasRoom = () => true, get = getBytes}) {
+    this.#give = give;
+    this.#hasRoom = hasRoom;
+    this.#get = get;
+    this.#fresh();
+  }
+
+  get pointHash() {
+    return this.decoder.pointHash;
+  }
+
+  #fresh() {
+    this.#at = 0;
+    this.#seen = null;
+    if (this.#first === null) this.#last = null;
+    this.decoder = new Decoder({points: (batch) => this.#give(Object.assign(batch, {past: true}))});
+    this.parser = new Parser({frame: (frame) => this.#take(frame)});
+  }
+
+  /** A connection is there; url: of its /past. */
+  start(url) {
+    this.stop();
+    this.#url = url;
+    this.#seen = this.#last;
+    this.#first = this.#need = null;
+    this.#left = {points: 0, shots: 0};
+    this.#read();
+  }
+
+  stop() {
+    this.#connection++;
+    this.#url = null;
+    this.#isReading = false;
+  }
+
+  /** Whether a live frame goes to its decoder; canPlace: what the decoder says. */
+  takes(frame, canPlace) {
+    if (this.#url === null || frame.flags & LOCAL) return true;
+    const {seq} = frame;
+    if (this.#need === null) this.#wants((seq - 1) >>> 0);
+    if (!BESIDE_POINTS.includes(frame.type)) return true;
+    if (frame.type !== POINTS) return this.#takesLive; // it is beside the points before
+    const hasCome = this.#first === null && this.#last !== null && this.#last !== this.#seen && !isBefore(this.#last, seq);
+    this.#takesLive = canPlace && !hasCome;
+    if (this.#takesLive) {
+      this.#first ??= seq;
+      this.#last = seq;
+    } else if (!hasCome) this.#leave(frame);
+    return this.#takesLive;
+  }
+
+  #leave({seq, payload}) {
+    const view = new DataView(payload.buffer, payload.byteOffset, payload.length);
+    if (payload.length >= 40) {
+      this.#left.shots += view.getUint32(32, true);
+      this.#left.points += view.getUint32(36, true);
+    }
+    this.#wants(seq);
+  }
+
+  #wants(seq) {
+    this.#need = seq;
+    this.#read();
+  }
+
+  #take(frame) {
+    if (frame.type === POINTS) {
+      const {seq} = frame;
+      const isLive = this.#first !== null && !isBefore(seq, this.#first);
+      this.#takesPast = !isLive && (this.#seen === null || isBefore(this.#seen, seq));
+      if (this.#takesPast && (this.#last === null || isBefore(this.#last, seq))) this.#last = seq;
+    }
+    if (this.#takesPast || !BESIDE_POINTS.includes(frame.type)) this.decoder.take(frame);
+  }
+
+  // Reads what there is, and what live frames were left to it.
+  async #read() {
+    if (this.#isReading || this.#url === null) return;
+    this.#isReading = true;
+    const connection = this.#connection;
+    try {
+      await this.#readAll(() => connection === this.#connection);
+    } catch {
+      // The head is gone, which the connection says.
+    }
+    if (connection === this.#connection) this.#isReading = false;
+  }
+
+  async #readAll(goesOn) {
+    let until_ms = performance.now() + PATIENCE_MS;
+    for (;;) {
+      const bytes = await this.#get(`${this.#url}?from=${this.#at}`);
+      if (!goesOn()) return;
+      const head = bytes === null ? null : readHead(bytes);
+      if (head === null) return this.#hasNone();
+      if (this.#run !== head.run) {
+        const isOther = this.#run !== null;
+        this.#run = head.run;
+        if (isOther) { // these positions and numbers are of another run
+          this.#fresh();
+          continue;
+        }
+      }
+      this.#push(bytes, head);
+      const isAtEnd = head.next === head.end, misses = this.#need !== null && !isBefore(this.#need, head.next_seq);
+      if (!isAtEnd) until_ms = performance.now() + PATIENCE_MS;
+      else if (!misses || performance.now() > until_ms) return this.decoder.flush(true);
+      await sleep(isAtEnd ? AGAIN_MS : REST_MS);
+      while (goesOn() && !this.#hasRoom()) await sleep(REST_MS);
+      if (!goesOn()) return;
+    }
+  }
+
+  #push(bytes, head) {
+    const {stats: d} = this.decoder;
+    this.parser.push(new Uint8Array(bytes, HEAD));
+    this.decoder.flush();
+    this.#at = head.next;
+    Object.assign(this.stats, {past_points: d.points, past_pulses: d.shots, past_gone: head.gone,
+      past_lost_frames: head.lost_frames});
+  }
+
+  // A head that keeps nothing, as an older one: what was left to it has no place.
+  #hasNone() {
+    this.unplaced.points += this.#left.points;
+    this.unplaced.shots += this.#left.shots;
+    this.stop();
+  }
+}
+
+async function getBytes(url) {
+  const answer = await fetch(url);
+  return answer.ok ? answer.arrayBuffer() : null;
+}

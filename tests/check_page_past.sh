@@ -1,0 +1,6 @@
+#!/bin/bash
+# The points from before a page came, in node; tests/unit/page_past.mjs says what.
+set -eu
+cd "$(dirname "$0")/.."
+command -v node >/dev/null || { echo "1..0 # SKIP node is missing"; exit 0; }
+exec node tests/unit/page_past.mjs
