@@ -16,7 +16,7 @@ core_headers='scan_mesh:mesh decimate:mesh cloud:analysis cloud_picture:analysis
 #   protocol       itself, core/line.h, core/err.h
 #   socket         itself, core/err.h
 #   usb            itself, protocol (its data), socket, core/err.h
-#   link           itself, usb, socket, core/err.h, core/newfile.h
+#   link           itself, usb, socket, protocol's lines of HTTP, core/err.h, core/newfile.h
 #   host           itself, protocol, core/err.h, core's headers without a source (vectors, matrices, arithmetic, growing arrays)
 #   record         the same, host's public header, core/newfile.h, core/infile.h, core/colour.h, core's rooms mesh and picture
 #                  core/scan_mesh.h and core/picture.h
@@ -64,7 +64,7 @@ rules='
             return b == "drivers/protocol" || to ~ /^core\/(vec3|mat3|vecmath|grow)\.h$/ || \
                 (a == "drivers/record" && to == "drivers/host/scanhead.h")
         if (a == "drivers/protocol") return to == "core/line.h"
-        if (a == "drivers/link") return b == "drivers/usb" || b == "drivers/socket"
+        if (a == "drivers/link") return b == "drivers/usb" || b == "drivers/socket" || to == "drivers/protocol/http_head.h"
         return a == "drivers/usb" && (b == "drivers/protocol" || b == "drivers/socket")
     }'
 

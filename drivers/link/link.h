@@ -32,6 +32,7 @@ struct link_spec {
     int max_sessions;   /* tcp, web: 1..LINK_MAX_SESSIONS */
     int protocol;       /* what its owner speaks on it; 0: the usual. Links don't look at it */
     int units; /* 1: what is written are units. Each write has one of them, or the rest of one, up to its end */
+    int brief; /* tcp: 1: clients come for a request. Without a place, whoever has been silent for longest makes room */
     int waits; /* enum link_waits; its owner sees to it */
     int clean; /* 1: no faults on request meet it; its owner sees to it */
     const struct web_source *web; /* web: what it serves beside the page; outlives the link. NULL: nothing */

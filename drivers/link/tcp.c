@@ -1,8 +1,9 @@
 /* The TCP link: a listener and up to max_sessions clients.
  *
  * A session is over when its peer shuts down its sending side, resets, or vanishes (keep-alive, about 25 s).
- * A client that finds all sessions taken is accepted and closed at once, so that it does not wait in vain. One that
- * comes while another's session is ending gets that session: it waits until what the other sent has been read. */
+ * A client that finds all sessions taken is accepted and closed at once, so that it does not wait in vain. Where
+ * clients come for a request alone, the session that has been silent for longest ends in its place. One that comes
+ * while another's session is ending gets that session: it waits until what the other sent has been read. */
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -20,13 +21,15 @@ enum tcp_state { TCP_FREE, TCP_OPEN, TCP_ENDED /* LINK_CLOSED is still to be rep
 struct tcp_session {
     enum tcp_state state;
     int fd;
+    uint64_t turn; /* the higher, the later it came, said or was told something */
     char peer[64];
 };
 
 struct tcp_link {
     int listener;   /* -1: unplugged */
     int reserve_fd; /* given up for a moment to turn a client away when descriptors run out */
-    int n_sessions;
+    int n_sessions, brief;
+    uint64_t turns;
     int port;      /* that it listens on */
     char host[64]; /* as the user named it */
     char name[80];
@@ -54,6 +57,7 @@ static int tcp_open(const struct link_spec *spec, void **link, struct sh_err *er
     snprintf(tcp->host, sizeof tcp->host, "%s", host);
     tcp->port = atoi(strrchr(at, ':') + 1);
     tcp->n_sessions = spec->max_sessions;
+    tcp->brief = spec->brief;
     tcp->reserve_fd = socket_reserve();
     *link = tcp;
     return SH_OK;
@@ -86,6 +90,21 @@ static int is_any_ending(const struct tcp_link *tcp)
     return ending || poll(fds, (nfds_t)tcp->n_sessions, 0) > 0;
 }
 
+/* Ends the session that has been silent for longest, if somebody waits for its place. Those whose bytes wait for the owner
+ * are not silent. */
+static void make_room(struct tcp_link *tcp)
+{
+    struct pollfd waiting = {.fd = tcp->listener, .events = POLLIN};
+    struct tcp_session *oldest = NULL;
+    if (!tcp->brief || poll(&waiting, 1, 0) <= 0) return;
+    for (int i = 0; i < tcp->n_sessions; i++) {
+        struct pollfd slot = {.fd = tcp->session[i].fd, .events = POLLIN};
+        if (poll(&slot, 1, 0) == 0 && (oldest == NULL || tcp->session[i].turn < oldest->turn))
+            oldest = &tcp->session[i];
+    }
+    if (oldest != NULL) oldest->state = TCP_ENDED;
+}
+
 static void tcp_welcome(struct tcp_link *tcp, struct link_events *events)
 {
     const int size = SEND_BUFFER_BYTES;
@@ -95,6 +114,7 @@ static void tcp_welcome(struct tcp_link *tcp, struct link_events *events)
         char peer[64];
         int fd;
         const int slot = free_slot(tcp);
+        if (slot == tcp->n_sessions && !is_any_ending(tcp)) make_room(tcp);
         if (slot == tcp->n_sessions && is_any_ending(tcp)) return; /* poll comes back at once */
         if (!socket_accept(tcp->listener, &tcp->reserve_fd, &fd, &from, &len))
             return; /* none left, or one that gave up before we came */
@@ -109,6 +129,7 @@ static void tcp_welcome(struct tcp_link *tcp, struct link_events *events)
         struct tcp_session *session = &tcp->session[slot];
         session->state = TCP_OPEN;
         session->fd = fd;
+        session->turn = ++tcp->turns;
         snprintf(session->peer, sizeof session->peer, "%s", peer);
         link_events_push(events, LINK_OPENED, slot, peer);
     }
@@ -159,22 +180,26 @@ static struct tcp_session *tcp_session(struct tcp_link *tcp, int session)
     return &tcp->session[session];
 }
 
+/* n: what a call for the session has moved. */
+static ssize_t moved(struct tcp_link *tcp, struct tcp_session *session, ssize_t n)
+{
+    if (n < 0) session->state = TCP_ENDED;
+    if (n > 0) session->turn = ++tcp->turns;
+    return n;
+}
+
 static ssize_t tcp_read(void *link, int session, void *buf, size_t len)
 {
     struct tcp_session *self = tcp_session(link, session);
     if (self == NULL) return SH_ECLOSED;
-    ssize_t n = socket_read(self->fd, buf, len);
-    if (n < 0) self->state = TCP_ENDED;
-    return n;
+    return moved(link, self, socket_read(self->fd, buf, len));
 }
 
 static ssize_t tcp_write(void *link, int session, const void *buf, size_t len)
 {
     struct tcp_session *self = tcp_session(link, session);
     if (self == NULL) return SH_ECLOSED;
-    ssize_t n = socket_write(self->fd, buf, len);
-    if (n < 0) self->state = TCP_ENDED;
-    return n;
+    return moved(link, self, socket_write(self->fd, buf, len));
 }
 
 /* What was written goes out, then the end of the stream; the client's own end is not waited for. */

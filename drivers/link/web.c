@@ -23,11 +23,17 @@
 #include "drivers/link/web_inside.h"
 #include "drivers/socket/socket.h"
 
+void web_refused(struct web_link *web, const char *peer)
+{
+    snprintf(web->refused, sizeof web->refused, "%s", peer);
+    web->n_refused++;
+}
+
 static int web_callback(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t len);
 
 static const struct lws_protocols protocols[] = {
-    {"http", web_callback, sizeof(struct web_conn), WEB_IN_ROOM / 4, 0, NULL, 0},
-    {"scanhead-native-1", web_callback, sizeof(struct web_conn), WEB_IN_ROOM / 4, 0, NULL, 0},
+    {"http", web_callback, 0, WEB_IN_ROOM / 4, 0, NULL, 0},
+    {"scanhead-native-1", web_callback, 0, WEB_IN_ROOM / 4, 0, NULL, 0},
     {WEB_BARE, web_bare_callback, 0, 0, 0, NULL, 0},
     {NULL, NULL, 0, 0, 0, NULL, 0},
 };
@@ -40,10 +46,10 @@ static int open_context(struct web_link *web)
     info.port = CONTEXT_PORT_NO_LISTEN_SERVER;
     info.protocols = protocols;
     info.user = web;
-    info.options = LWS_SERVER_OPTION_EXPLICIT_VHOSTS | LWS_SERVER_OPTION_SKIP_SERVER_CANONICAL_NAME;
-    info.fd_limit_per_thread = WEB_MAX_CONNECTIONS + 8;
-    info.max_http_header_data = 2 * WEB_MAX_REQUEST; /* web_accept.c has the limit */
-    info.max_http_header_pool = WEB_MAX_CONNECTIONS;
+    info.options = LWS_SERVER_OPTION_EXPLICIT_VHOSTS | LWS_SERVER_OPTION_SKIP_SERVER_CANONICAL_NAME |
+                   LWS_SERVER_OPTION_VALIDATE_UTF8;
+    info.max_http_header_pool = WEB_PLACES + WEB_AT_A_TIME; /* those that make room end a little later */
+    info.fd_limit_per_thread = info.max_http_header_pool + 8;
     info.timeout_secs = WEB_PATIENCE_S;
     info.keepalive_timeout = WEB_PATIENCE_S;
     info.alpn = "http/1.1";
@@ -74,7 +80,7 @@ static int web_open(const struct link_spec *spec, void **link, struct sh_err *er
     web->n_sessions = spec->max_sessions;
     web->source = spec->web;
     web->reserve_fd = socket_reserve();
-    if (open_context(web) == 0) web->listening = web_wait_for(web, web->listener);
+    if (open_context(web) == 0) web->listening = web_wait_for(web, web->listener, NULL);
     if (web->listening == NULL) {
         if (web->vhost == NULL) close(web->listener);
         if (web->context != NULL) lws_context_destroy(web->context);
@@ -95,23 +101,23 @@ static void web_endpoint(const void *link, char *buf, size_t len)
 
 /* ---- sessions */
 
-static void session_open(struct web_link *web, struct web_conn *conn, struct lws *wsi)
+static void session_open(struct web_link *web, struct web_conn *conn)
 {
-    char peer[64] = "";
     int slot = 0;
     while (slot < web->n_sessions && web->session[slot].state != WEB_FREE)
         slot++;
-    lws_get_peer_simple(wsi, peer, sizeof peer);
     if (slot == web->n_sessions) {
-        snprintf(web->refused, sizeof web->refused, "%s", peer);
-        web->n_refused++;
+        web_refused(web, conn->peer);
+        web_set_phase(conn, WEB_PARTING);
+        lws_callback_on_writable(conn->wsi);
         return;
     }
     struct web_session *s = &web->session[slot];
+    web_set_phase(conn, WEB_TALKING);
     s->state = WEB_OPENING;
-    s->wsi = wsi;
+    s->wsi = conn->wsi;
     s->in_len = s->out_len = 0;
-    snprintf(s->peer, sizeof s->peer, "%s", peer);
+    snprintf(s->peer, sizeof s->peer, "%s", conn->peer);
     conn->session = s;
 }
 
@@ -126,32 +132,49 @@ static int turn_away(struct web_link *web, struct lws *wsi)
     return -1;
 }
 
-static void session_gone(struct web_session *s)
+static void session_gone(struct web_conn *conn)
 {
+    struct web_session *s = conn->session;
+    if (s == NULL) return;
     s->wsi = NULL;
     s->state = s->state == WEB_OPENING ? WEB_FREE : WEB_ENDED; /* nobody has heard of it yet, or somebody has to */
+    conn->session = NULL;
+    web_set_phase(conn, WEB_PARTING);
+}
+
+void web_conn_end(struct web_conn *conn)
+{
+    session_gone(conn);
+    free(conn->owned);
+    conn->owned = NULL;
+    conn->wsi = NULL;
+    conn->place.phase = WEB_NOBODY;
 }
 
 /* Ends a session whose client does not keep to the rules: nothing more goes out but why. */
-static int close_for(struct web_conn *conn, struct lws *wsi, enum lws_close_status status, const char *why)
+static int close_for(struct web_conn *conn, enum lws_close_status status, const char *why)
 {
     unsigned char words[80];
-    session_gone(conn->session);
-    conn->session = NULL;
     int n = snprintf((char *)words, sizeof words, "%s", why);
-    lws_close_reason(wsi, status, words, (size_t)n);
+    session_gone(conn);
+    lws_close_reason(conn->wsi, status, words, (size_t)n);
     return -1;
+}
+
+/* A close frame is on its way or out: ours, or that of libwebsockets, which reports it seconds later. */
+static int is_closing(struct lws *wsi)
+{
+    return lws_get_close_length(wsi) > 0;
 }
 
 static int take_text(struct web_conn *conn, struct lws *wsi, const void *in, size_t len)
 {
     struct web_session *s = conn->session;
-    if (lws_frame_is_binary(wsi))
-        return close_for(conn, wsi, LWS_CLOSE_STATUS_UNACCEPTABLE_OPCODE, "commands are text");
+    if (lws_frame_is_binary(wsi)) return close_for(conn, LWS_CLOSE_STATUS_UNACCEPTABLE_OPCODE, "commands are text");
     if (lws_is_first_fragment(wsi)) s->message_len = 0;
     s->message_len += len;
-    if (s->message_len > WEB_MAX_MESSAGE || len + 1 > WEB_IN_ROOM - s->in_len)
-        return close_for(conn, wsi, LWS_CLOSE_STATUS_MESSAGE_TOO_LARGE, "a message has at most 4096 bytes");
+    if (s->message_len + lws_remaining_packet_payload(wsi) > WEB_MAX_MESSAGE || len + 1 > WEB_IN_ROOM - s->in_len)
+        return close_for(conn, LWS_CLOSE_STATUS_MESSAGE_TOO_LARGE, "a message has at most 4096 bytes");
     memcpy(s->in + s->in_len, in, len);
     s->in_len += len;
     if (lws_is_final_fragment(wsi) && s->in_len > 0 && s->in[s->in_len - 1] != '\n') s->in[s->in_len++] = '\n';
@@ -174,56 +197,45 @@ static int send_message(struct web_session *s, struct lws *wsi)
     return n < 0 ? -1 : 0;
 }
 
-/* "h2c" would be HTTP/2. The callback's own pointer to the field is of no use: libwebsockets 4.1 has answered an upgrade that
- * it doesn't know already, has freed the fields, and calls all the same. */
-static int is_websocket(struct lws *wsi)
+/* HTTP and WebSocket. The request is that of the connection's web_request. */
+static int serve_client(struct web_conn *conn, enum lws_callback_reasons reason, void *in, size_t len)
 {
-    char what[16];
-    return lws_hdr_copy(wsi, what, sizeof what, WSI_TOKEN_UPGRADE) > 0 && strcasecmp(what, "websocket") == 0;
-}
-
-/* HTTP and WebSocket. user: struct web_conn of the connection. */
-static int web_callback(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t len)
-{
-    struct web_conn *conn = user;
-    struct web_link *web;
+    struct lws *wsi = conn->wsi;
+    struct web_link *web = web_link_of(wsi);
     switch (reason) {
-    case LWS_CALLBACK_WSI_CREATE:
-        web_link_of(wsi)->n_connections++;
-        return 0;
-    case LWS_CALLBACK_WSI_DESTROY:
-        web_link_of(wsi)->n_connections--;
-        return 0;
     case LWS_CALLBACK_HTTP:
-        return web_http_begin(web_link_of(wsi), conn, wsi, in);
+        return web_http_begin(web, conn);
     case LWS_CALLBACK_HTTP_WRITEABLE:
-        return web_http_go_on(conn, wsi);
-    case LWS_CALLBACK_CLOSED_HTTP:
-        if (conn != NULL) web_http_end(conn);
-        return 0;
-    case LWS_CALLBACK_HTTP_CONFIRM_UPGRADE: /* before a protocol is chosen */
-        return is_websocket(wsi) && web_may_upgrade(web_link_of(wsi), wsi) ? 0 : -1;
-    case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:
-        return web_may_upgrade(web_link_of(wsi), wsi) ? 0 : -1;
+        return web_http_go_on(web, conn);
     case LWS_CALLBACK_ESTABLISHED:
-        web = web_link_of(wsi);
-        memset(conn, 0, sizeof *conn);
-        session_open(web, conn, wsi);
-        if (conn->session == NULL) lws_callback_on_writable(wsi);
+        session_open(web, conn);
         return 0;
     case LWS_CALLBACK_RECEIVE:
         return conn->session != NULL ? take_text(conn, wsi, in, len) : 0;
     case LWS_CALLBACK_SERVER_WRITEABLE:
-        return conn->session != NULL ? send_message(conn->session, wsi) : turn_away(web_link_of(wsi), wsi);
+        if (is_closing(wsi)) return 0; /* a close frame is the last one */
+        return conn->session != NULL ? send_message(conn->session, wsi) : turn_away(web, wsi);
     case LWS_CALLBACK_CLOSED:
-        if (conn != NULL && conn->session != NULL) session_gone(conn->session);
+        session_gone(conn);
         return 0;
-    case LWS_CALLBACK_USER:
-        web_break(wsi);
+    case LWS_CALLBACK_WSI_DESTROY:
+        web_conn_end(conn);
         return 0;
     default:
         return 0;
     }
+}
+
+static int web_callback(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t len)
+{
+    (void)user;
+    if (reason == LWS_CALLBACK_SERVER_NEW_CLIENT_INSTANTIATED) {
+        struct web_conn *entering = web_link_of(wsi)->entering;
+        lws_set_opaque_user_data(wsi, entering);
+        entering->wsi = wsi;
+    }
+    struct web_conn *conn = lws_get_opaque_user_data(wsi);
+    return conn != NULL && conn->wsi == wsi ? serve_client(conn, reason, in, len) : 0;
 }
 
 /* ---- the owner's side */
@@ -233,12 +245,13 @@ static int take_wake_fd(struct web_link *web, int wake_fd)
     if (web->wake != NULL || wake_fd < 0) return SH_OK;
     web->wake_fd = wake_fd;
     int fd = dup(wake_fd); /* the context closes it */
-    web->wake = fd >= 0 ? web_wait_for(web, fd) : NULL;
+    web->wake = fd >= 0 ? web_wait_for(web, fd, NULL) : NULL;
     return web->wake != NULL ? SH_OK : SH_EIO;
 }
 
 static void report_session(struct web_session *s, int slot, uint32_t want_write, struct link_events *events)
 {
+    if (s->wsi != NULL && is_closing(s->wsi)) session_gone(lws_get_opaque_user_data(s->wsi));
     if (s->state == WEB_ENDED && link_events_push(events, LINK_CLOSED, slot, s->peer)) s->state = WEB_FREE;
     if (s->state == WEB_OPENING && link_events_push(events, LINK_OPENED, slot, s->peer)) s->state = WEB_OPEN;
     if (s->state != WEB_OPEN) return;
@@ -325,10 +338,8 @@ static int web_cut(struct web_link *web, int session)
 {
     struct web_session *s = web_session(web, session);
     if (s == NULL) return SH_ESTATE;
-    struct web_conn *conn = lws_wsi_user(s->wsi);
-    conn->session = NULL;
     web_break(s->wsi);
-    session_gone(s);
+    session_gone(lws_get_opaque_user_data(s->wsi));
     return SH_OK;
 }
 
@@ -338,7 +349,8 @@ static int web_unplug(struct web_link *web)
     web_break(web->listening); /* first: who is cut off finds nobody there */
     for (int s = 0; s < web->n_sessions; s++)
         web_cut(web, s);
-    lws_callback_all_protocol_vhost_args(web->vhost, NULL, LWS_CALLBACK_USER, NULL, 0);
+    for (int i = 0; i < WEB_PLACES; i++)
+        if (web->conn[i].wsi != NULL) web_break(web->conn[i].wsi);
     web->listening = NULL;
     return SH_OK;
 }
@@ -350,7 +362,7 @@ static int web_plug(struct web_link *web)
     struct sh_err err;
     if (web->listening != NULL) return SH_OK;
     if (socket_open(&place, &web->listener, at, sizeof at, &err) != SH_OK) return SH_ESTATE;
-    web->listening = web_wait_for(web, web->listener);
+    web->listening = web_wait_for(web, web->listener, NULL);
     return web->listening != NULL ? SH_OK : SH_ESTATE;
 }
 

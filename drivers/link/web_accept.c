@@ -1,6 +1,7 @@
-/* Connections until their first request is whole. libwebsockets closes a connection whose request is longer than its
- * room without a word; so the request is looked at first, without taking it out of the socket, and the connection is
- * given to libwebsockets once the request has its end. A longer one that comes later on the same connection closes it. */
+/* Connections until their first request is whole. It is judged here as it comes, without taking it out of the socket: what
+ * is wrong is answered at its first wrong byte, and libwebsockets never meets it. For a right one libwebsockets gets a
+ * request that is made anew, with what it needs alone: it closes without a word where there are more fields or arguments
+ * than it has room for, and acts on fields that are none of ours (h2c). What stands behind a request is not its either. */
 #include <errno.h>
 #include <poll.h>
 #include <stdio.h>
@@ -11,43 +12,16 @@
 #include "drivers/link/web_inside.h"
 #include "drivers/socket/socket.h"
 
-struct lws *web_wait_for(struct web_link *web, int fd)
+struct lws *web_wait_for(struct web_link *web, int fd, struct web_conn *conn)
 {
-    lws_sock_file_fd_type desc = {.filefd = fd};
-    struct lws *wsi = lws_adopt_descriptor_vhost(web->vhost, LWS_ADOPT_RAW_FILE_DESC, desc, WEB_BARE, NULL);
+    const lws_adopt_desc_t info = {.vh = web->vhost,
+                                   .type = LWS_ADOPT_RAW_FILE_DESC,
+                                   .fd = {.filefd = fd},
+                                   .vh_prot_name = WEB_BARE,
+                                   .opaque = conn};
+    struct lws *wsi = lws_adopt_descriptor_vhost_via_info(&info);
     if (wsi == NULL) close(fd);
     return wsi;
-}
-
-static void refuse(struct web_link *web, const struct sockaddr_storage *from, socklen_t len)
-{
-    socket_address_text((const struct sockaddr *)from, len, web->refused, sizeof web->refused);
-    web->n_refused++;
-}
-
-static void accept_all(struct web_link *web)
-{
-    for (int i = 0; i < WEB_MAX_CONNECTIONS; i++) {
-        struct sockaddr_storage from;
-        socklen_t len = sizeof from;
-        int fd;
-        if (!socket_accept(web->listener, &web->reserve_fd, &fd, &from, &len)) return;
-        if (fd < 0) { /* no descriptor is left */
-            refuse(web, &from, len);
-            continue;
-        }
-        const int size = WEB_SEND_BUFFER;
-        socket_tune(fd);
-        setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &size, sizeof size);
-        const int own = (web->listening != NULL) + (web->wake != NULL);
-        if (web->n_connections >= WEB_MAX_CONNECTIONS + own) {
-            close(fd);
-            continue;
-        }
-        struct lws *wsi = web_wait_for(web, fd);
-        if (wsi == NULL) continue;
-        lws_set_timer_usecs(wsi, WEB_PATIENCE_S * LWS_USEC_PER_SEC);
-    }
 }
 
 /* The bytes that the socket must have before it is looked at again: one more than it has. */
@@ -57,52 +31,195 @@ static int wait_for_more(int fd, int have)
     return setsockopt(fd, SOL_SOCKET, SO_RCVLOWAT, &low, sizeof low);
 }
 
-static void refuse_long(int fd)
+/* Takes what a client goes on to send: the system would reset the connection, answer and all, otherwise. -1: it has ended. */
+static int drain(int fd)
 {
-    static const char words[] = "HTTP/1.1 413 Content Too Large\r\nconnection: close\r\ncontent-type: text/plain\r\n"
-                                "content-length: 37\r\n\r\na request has at most 8192 bytes here";
-    char rest[4096];
-    if (socket_write(fd, words, sizeof words - 1) < 0) return;
+    char rest[WEB_MAX_REQUEST];
+    ssize_t n = 1;
+    for (int i = 0; i < 16 && n > 0; i++)
+        n = socket_read(fd, rest, sizeof rest);
+    return n < 0 ? -1 : 0;
+}
+
+/* As far as the socket takes it at once: it is the first that goes out. */
+static void say(int fd, int status, const char *words, int head_only)
+{
+    char text[WEB_TEXT_ROOM];
+    drain(fd);
+    socket_write(fd, text, (size_t)web_http_words(text, sizeof text, status, words, head_only));
+}
+
+static int linger(struct web_conn *conn)
+{
+    const int fd = lws_get_socket_fd(conn->wsi);
     shutdown(fd, SHUT_WR);
-    while (socket_read(fd, rest, sizeof rest) > 0) /* else the system would reset the connection, answer and all */
-        continue;
+    wait_for_more(fd, 0);
+    web_set_phase(conn, WEB_LINGERING);
+    lws_set_timer_usecs(conn->wsi, WEB_GOODBYE_MS * LWS_US_PER_MS);
+    return drain(fd);
+}
+
+/* A wsi of its own is with the descriptor again, so that libwebsockets may close its one. */
+void web_linger(struct web_link *web, struct web_conn *conn)
+{
+    const int fd = dup(lws_get_socket_fd(conn->wsi));
+    lws_set_opaque_user_data(conn->wsi, NULL);
+    conn->wsi = fd >= 0 ? web_wait_for(web, fd, conn) : NULL;
+    if (conn->wsi == NULL)
+        web_conn_end(conn);
+    else
+        linger(conn);
+}
+
+/* ---- who comes in */
+
+/* Half a request is told why it ends; to the others there is nothing to say. Who has had an answer does not come in vain. */
+static void make_room(struct web_link *web, struct web_conn *conn)
+{
+    if (conn->place.phase == WEB_ASKING || conn->place.phase == WEB_ANSWERING) web_refused(web, conn->peer);
+    if (conn->place.phase == WEB_ASKING && conn->n_seen > 0)
+        say(lws_get_socket_fd(conn->wsi), 408, "others wait; a request comes whole, and at once", 0);
+    lws_set_opaque_user_data(conn->wsi, NULL);
+    lws_set_timeout(conn->wsi, PENDING_TIMEOUT_SHUTDOWN_FLUSH, LWS_TO_KILL_ASYNC);
+    web_conn_end(conn);
+}
+
+static void welcome(struct web_link *web, int fd, const struct sockaddr_storage *from, const char *peer)
+{
+    const int size = WEB_SEND_BUFFER;
+    unsigned char address[sizeof web->conn->place.address];
+    web_address(from, address);
+    const int at = web_places_take((struct web_places){&web->conn[0].place, sizeof web->conn[0]}, address,
+                                   lws_now_usecs() / LWS_US_PER_MS);
+    if (at < 0) {
+        say(fd, 503, "all connections of this link are taken", 0);
+        close(fd);
+        web_refused(web, peer);
+        return;
+    }
+    struct web_conn *conn = &web->conn[at];
+    if (conn->place.phase != WEB_NOBODY) make_room(web, conn);
+    socket_tune(fd);
+    setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &size, sizeof size);
+    memset(conn, 0, sizeof *conn);
+    conn->wsi = web_wait_for(web, fd, conn);
+    if (conn->wsi == NULL) return;
+    memcpy(conn->place.address, address, sizeof address);
+    snprintf(conn->peer, sizeof conn->peer, "%s", peer);
+    web_set_phase(conn, WEB_ASKING);
+    lws_set_timer_usecs(conn->wsi, WEB_PATIENCE_S * LWS_USEC_PER_SEC);
+}
+
+static void accept_some(struct web_link *web)
+{
+    for (int i = 0; i < WEB_AT_A_TIME; i++) {
+        struct sockaddr_storage from;
+        socklen_t len = sizeof from;
+        char peer[64];
+        int fd;
+        if (!socket_accept(web->listener, &web->reserve_fd, &fd, &from, &len)) return;
+        socket_address_text((const struct sockaddr *)&from, len, peer, sizeof peer);
+        if (fd >= 0)
+            welcome(web, fd, &from, peer);
+        else /* no descriptor is left */
+            web_refused(web, peer);
+    }
+}
+
+/* ---- what is asked */
+
+/* libwebsockets takes its request at once, and makes of the connection what it is from now on. */
+static int hand_over(struct web_link *web, struct web_conn *conn)
+{
+    char text[400] = "GET / HTTP/1.1\r\n\r\n";
+    const int fd = dup(lws_get_socket_fd(conn->wsi)); /* the one at hand goes with what it was waited for by */
+    if (fd < 0) return -1;
+    if (conn->request.key[0] != '\0')
+        snprintf(text, sizeof text,
+                 "GET /ws HTTP/1.1\r\nHost: %s\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+                 "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: %s\r\n%s\r\n",
+                 web->at, conn->request.key,
+                 conn->request.names_protocol ? "Sec-WebSocket-Protocol: scanhead-native-1\r\n" : "");
+    /* While it answers, libwebsockets does not read, but would wake up again and again. */
+    wait_for_more(fd, conn->request.key[0] != '\0' ? 0 : WEB_CHUNK);
+    lws_set_opaque_user_data(conn->wsi, NULL);
+    conn->wsi = NULL;
+    web_set_phase(conn, WEB_ANSWERING);
+    web->entering = conn;
+    lws_adopt_socket_vhost_readbuf(web->vhost, fd, text, strlen(text)); /* which closes it when it fails */
+    if (conn->wsi == NULL) web_conn_end(conn);
+    return -1;
+}
+
+static int judge(struct web_link *web, struct web_conn *conn, const char *request, size_t begin, int result)
+{
+    const int fd = lws_get_socket_fd(conn->wsi);
+    const char *words = result == 505 ? "HTTP/1.0 and 1.1 are spoken here" : "this is not a request of HTTP/1.1";
+    if (result == HTTP_SCAN_WHOLE) {
+        char taken[WEB_MAX_REQUEST];
+        const size_t len = begin + conn->scan.at;
+        result = web_request_read(web, request + begin, conn->scan.at, &conn->request, &words);
+        if (result == 0) return recv(fd, taken, len, 0) == (ssize_t)len ? hand_over(web, conn) : -1;
+    } else if (result == HTTP_SCAN_MORE) {
+        result = 413;
+        words = "a request has at most 8192 bytes here";
+    }
+    if (result == WEB_FOREIGN) return -1;
+    say(fd, result, words, conn->request.head_only);
+    return linger(conn);
 }
 
 /* 0: wait on; -1: this descriptor is done with. */
-static int look_at_request(struct web_link *web, int fd)
+static int look_at_request(struct web_link *web, struct web_conn *conn)
 {
     char request[WEB_MAX_REQUEST];
+    const int fd = lws_get_socket_fd(conn->wsi);
     struct pollfd peer = {.fd = fd, .events = POLLRDHUP};
     const int ended = poll(&peer, 1, 0) > 0; /* before looking: then nothing comes after what is seen */
-    ssize_t n = recv(fd, request, sizeof request, MSG_PEEK);
+    const ssize_t n = recv(fd, request, sizeof request, MSG_PEEK);
     if (n < 0 && (errno == EAGAIN || errno == EINTR)) return 0;
     if (n <= 0) return -1;
-    if (memmem(request, (size_t)n, "\r\n\r\n", 4) == NULL && memmem(request, (size_t)n, "\n\n", 2) == NULL) {
-        if (n < WEB_MAX_REQUEST && ended) return -1;
-        if (n < WEB_MAX_REQUEST) return wait_for_more(fd, (int)n);
-        refuse_long(fd);
-        return -1;
+    size_t begin = 0; /* empty lines ahead are skipped */
+    while (begin < (size_t)n && (request[begin] == '\r' || request[begin] == '\n'))
+        begin++;
+    conn->n_seen = (int)n;
+    const int result = http_scan_head(&conn->scan, request + begin, (size_t)n - begin);
+    if (result != HTTP_SCAN_MORE || n == WEB_MAX_REQUEST) return judge(web, conn, request, begin, result);
+    return ended ? -1 : wait_for_more(fd, (int)n);
+}
+
+/* Its time is over. */
+static int give_up(struct web_conn *conn)
+{
+    if (conn->place.phase != WEB_ASKING || conn->n_seen == 0) return -1;
+    say(lws_get_socket_fd(conn->wsi), 408, "a whole request comes within 20 s", 0);
+    return linger(conn);
+}
+
+static int serve_client(struct web_link *web, struct web_conn *conn, enum lws_callback_reasons reason)
+{
+    switch (reason) {
+    case LWS_CALLBACK_TIMER:
+        return give_up(conn);
+    case LWS_CALLBACK_RAW_RX_FILE:
+        return conn->place.phase == WEB_ASKING ? look_at_request(web, conn) : drain(lws_get_socket_fd(conn->wsi));
+    default:
+        return 0;
     }
-    int own = dup(fd); /* the one at hand goes with what it was waited for by */
-    if (own < 0) return -1;
-    wait_for_more(own, 0);
-    lws_adopt_socket_vhost(web->vhost, own); /* which closes it when it fails */
-    return -1;
 }
 
 int web_bare_callback(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t len)
 {
     struct web_link *web = web_link_of(wsi);
+    struct web_conn *conn = lws_get_opaque_user_data(wsi);
     uint64_t count;
     (void)user, (void)in, (void)len;
-    if (reason == LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION) return -1; /* a WebSocket that asks for it by its name */
-    if (reason == LWS_CALLBACK_TIMER) return -1;
-    if (reason == LWS_CALLBACK_USER && wsi != web->wake) web_break(wsi);
+    if (conn != NULL && conn->wsi == wsi) return serve_client(web, conn, reason);
     if (reason != LWS_CALLBACK_RAW_RX_FILE) return 0;
     if (wsi == web->listening)
-        accept_all(web);
+        accept_some(web);
     else if (wsi != web->wake)
-        return look_at_request(web, lws_get_socket_fd(wsi));
+        return -1; /* it had to make room */
     else if (read(web->wake_fd, &count, sizeof count) == sizeof count)
         web->woken = 1;
     return 0;

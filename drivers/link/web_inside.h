@@ -6,17 +6,20 @@
 
 #include "drivers/link/link.h"
 #include "drivers/link/web.h"
+#include "drivers/link/web_places.h"
+#include "drivers/protocol/http_head.h"
 
 enum {
-    WEB_MAX_CONNECTIONS = 48,  /* of browsers and whatever else; one more is closed at once */
     WEB_MAX_REQUEST = 8192,    /* a request's line and fields; one more: 413 */
     WEB_MAX_MESSAGE = 4096,    /* of commands, in one WebSocket message */
     WEB_IN_ROOM = 32768,       /* of commands that the owner has not read */
     WEB_SEND_BUFFER = 1 << 20, /* as a TCP link has */
     WEB_CHUNK = 65536,
-    WEB_PATIENCE_S = 20,
-    WEB_GOODBYE_MS = 2000, /* at the end, to take what was written */
-    WEB_TRY_LATER = 1013,  /* RFC 6455's registry of close codes */
+    WEB_TEXT_ROOM = 2048, /* an answer's head, and some words */
+    WEB_AT_A_TIME = 16,   /* accepted before the connections that are there are looked at again */
+    WEB_PATIENCE_S = 20,  /* for a whole request; for an answer, since the client last took some of it */
+    WEB_TRY_LATER = 1013, /* RFC 6455's registry of close codes */
+    WEB_FOREIGN = 1,      /* no status: another site's page asks, and gets no byte */
 };
 
 enum web_state {
@@ -37,10 +40,25 @@ struct web_session {
     char peer[64];
 };
 
-/* Of each connection: a session, or the answer that is on its way. */
+/* A request that has been judged. */
+struct web_request {
+    char path[256], query[1024];
+    int head_only, query_long; /* the latter: what follows the ? has been cut */
+    char key[32];              /* of a WebSocket; "": none is asked for */
+    int names_protocol;
+};
+
+/* One client, from its coming to its end. libwebsockets has it first as a plain descriptor (web_accept.c), then for its
+ * answer or its WebSocket, and after an answer as a descriptor again; wsi is the one of now. */
 struct web_conn {
+    struct web_place place;
+    struct lws *wsi;
+    char peer[64];
+    int n_seen; /* bytes of a request that has not come whole */
+    struct http_scan scan;
+    struct web_request request;
     struct web_session *session;
-    const char *bytes;
+    const char *bytes; /* of the answer that is on its way */
     size_t len, sent;
     char *owned; /* freed at the end; NULL: built in */
 };
@@ -53,11 +71,12 @@ struct web_link {
     int listener, wake_fd, woken;
     int reserve_fd; /* given up when there are no more, to turn a connection away; -1: none */
     int port, n_sessions, n_refused;
-    int n_connections; /* that libwebsockets has: listening and wake among them */
-    char refused[64];  /* who came last in vain */
-    char at[72];       /* "127.0.0.1:40123" */
-    char host[64];     /* as the user named it */
+    char refused[64]; /* who came last in vain */
+    char at[72];      /* "127.0.0.1:40123" */
+    char host[64];    /* as the user named it */
     const struct web_source *source;
+    struct web_conn *entering; /* whom libwebsockets is being given */
+    struct web_conn conn[WEB_PLACES];
     struct web_session session[LINK_MAX_SESSIONS];
 };
 
@@ -66,21 +85,37 @@ static inline struct web_link *web_link_of(struct lws *wsi)
     return lws_context_user(lws_get_context(wsi));
 }
 
-/* web_accept.c: the protocol of descriptors that are not HTTP yet, or never: the listening socket, the owner's wake-up,
- * connections whose request has not come whole. */
+static inline void web_set_phase(struct web_conn *conn, enum web_phase phase)
+{
+    conn->place.phase = phase;
+    conn->place.since_ms = lws_now_usecs() / 1000;
+}
+
+/* web.c */
+void web_refused(struct web_link *web, const char *peer);
+/* Forgets a connection whose wsi has ended or belongs to nobody any more. Twice does no harm. */
+void web_conn_end(struct web_conn *conn);
+/* Breaks the connection, or the listening socket, at once; libwebsockets closes it when it finds out. */
+void web_break(struct lws *wsi);
+
+/* web_accept.c: the protocol of descriptors that are not HTTP yet, no more, or never: the listening socket, the owner's
+ * wake-up, connections whose request has not come whole or whose answer is out. */
 #define WEB_BARE "bare"
 int web_bare_callback(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t len);
 /* Gives a descriptor to lws_service to wait for. It is closed with the context, or at once where NULL comes back. */
-struct lws *web_wait_for(struct web_link *web, int fd);
+struct lws *web_wait_for(struct web_link *web, int fd, struct web_conn *conn);
+/* The answer is out. Takes the connection from libwebsockets' HTTP, and lets its client end. */
+void web_linger(struct web_link *web, struct web_conn *conn);
 
-/* web.c: breaks the connection, or the listening socket, at once; libwebsockets closes it when it finds out. */
-void web_break(struct lws *wsi);
+/* web_request.c: 0; the status of a request that does not get what it asks for, and why; or WEB_FOREIGN. head: its lines,
+ * len bytes with the empty one. */
+int web_request_read(const struct web_link *web, const char *head, size_t len, struct web_request *out,
+                     const char **words);
 
 /* web_http.c. As libwebsockets' callbacks: 0, or -1 to close the connection. */
-int web_http_begin(struct web_link *web, struct web_conn *conn, struct lws *wsi, const char *path);
-int web_http_go_on(struct web_conn *conn, struct lws *wsi);
-void web_http_end(struct web_conn *conn);
-/* A WebSocket is asked for: 1 when it is at /ws and from where it may be. */
-int web_may_upgrade(const struct web_link *web, struct lws *wsi);
+int web_http_begin(struct web_link *web, struct web_conn *conn);
+int web_http_go_on(struct web_link *web, struct web_conn *conn);
+/* A whole answer in words, as snprintf. */
+int web_http_words(char *to, size_t room, int status, const char *words, int head_only);
 
 #endif

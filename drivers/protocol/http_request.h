@@ -10,6 +10,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "drivers/protocol/http_head.h"
+
 enum {
     HTTP_MAX_LINE = 512,  /* request line: 414 */
     HTTP_MAX_HEAD = 4096, /* request line and fields: 431 */
@@ -36,7 +38,7 @@ struct http_reader {
     char bytes[HTTP_MAX_HEAD + HTTP_MAX_BODY + 1];
     size_t len;      /* in bytes */
     size_t head_len; /* 0: the end of the head has not come */
-    size_t looked;   /* for it, up to here */
+    struct http_scan scan;
     int continued;
     struct http_request request;
 };

@@ -86,10 +86,10 @@ struct protocol_identity {
 struct protocol_spec {
     const struct protocol_identity *identity;
     struct protocol_host host;
-    uint32_t session;  /* from 1, over all links */
-    uint32_t fixes_hz; /* of the GNSS receiver */
+    uint32_t session;   /* from 1, over all links */
+    uint32_t fixes_hz;  /* of the GNSS receiver */
     uint32_t near_wrap; /* counters begin so many below their wrap; 0: at 0 */
-    int waits;         /* 1: paces fast and step: device time says nothing of how long a client takes */
+    int waits;          /* 1: paces fast and step: device time says nothing of how long a client takes */
     /* velodyne_http: where the settings say that data go, and so on; empty: not known */
     char address[64];
     int port;
@@ -101,6 +101,7 @@ struct protocol_ops {
     uint32_t emitters; /* bit per enum native_emitter_kind of the heads that it can speak for; 0: all */
     uint32_t n_beams;  /* that a head of beams must have; 0: any number */
     uint32_t max_unit; /* bytes; no unit is longer */
+    int brief;         /* 1: clients come for a request, and one that is silent may be ended for another */
     /* Of faults on request, for one that no reader can see by checksums: bits of a unit are changed, and its checksums
      * are made right again. Both are pure, and good for any bytes.
      * content: sets the bits of mask (len bytes, all 0 before) that may be changed: what is measured. Marks, lengths,

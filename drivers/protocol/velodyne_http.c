@@ -186,6 +186,7 @@ const struct protocol_ops protocol_velodyne_http = {
     .emitters = 1u << NATIVE_EMIT_BEAMS,
     .n_beams = VELODYNE_BEAMS,
     .max_unit = MAX_ANSWER,
+    .brief = 1,
     .create = create,
     .destroy = destroy,
     .open = open_at,

@@ -39,6 +39,7 @@ int pump_open(struct links *links, uint32_t index, const struct link_spec *spec,
         rc = sh_fail(err, SH_EINPUT, "link %s: this build does not have its protocol", pump->ops->name);
     if (rc == SH_OK && !pump->protocol->passes_native) {
         with.units = 1;
+        with.brief = pump->protocol->brief;
         pump->out_cap = QUEUE_UNITS * pump->protocol->max_unit + BATCH_BYTES;
         pump->tick = malloc(links->stream->tick_bytes);
         if (pump->tick == NULL) rc = sh_fail(err, SH_ENOMEM, "no memory");

@@ -40,6 +40,10 @@ static void test_broken_requests(void **state)
         int status, ends;
     } cases[] = {
         {"\x16\x03\x01\x02\x01\x01\r\n\r\n", 400, 1}, /* TLS */
+        {"\x16\x03\x01\x02\x01\x01", 400, 1},         /* as it comes: its end is never an empty line */
+        {"GET /\r\n", 400, 1},                        /* HTTP/0.9 */
+        {"GET / HTTP/1.1\r\nHost: x\r\nnonsense\r\n", 400, 1},
+        {"GET / HTTP/1.1\r\nHost: localhost:18080abc\r\n\r\n", 400, 1},
         {"GET\r\n\r\n", 400, 1},
         {"GET  HTTP/1.1\r\n\r\n", 400, 1},
         {"GET / HTTP/1.1 \r\n\r\n", 400, 1},
@@ -68,6 +72,7 @@ static void test_broken_requests(void **state)
         {"OPTIONS /cgi/setting HTTP/1.1\r\nHost: x\r\n\r\n", 405, 0},
         {"GET / HTTP/1.1\r\nHost: x\r\n\r\n", 404, 0},
         {"GET /cgi/info.json HTTP/1.0\r\n\r\n", 200, 1},
+        {"GET http://x/cgi/info.json HTTP/1.1\r\nHost: x\r\n\r\n", 200, 0},
         {"GET /cgi/info.json HTTP/1.0\r\nConnection: keep-alive\r\n\r\n", 200, 0},
         {"GET /cgi/info.json HTTP/1.1\r\nHost: x\r\nConnection: TE, close\r\n\r\n", 200, 1},
     };
@@ -147,6 +152,7 @@ static void test_nothing_is_reflected(void **state)
         "POST /cgi/setting HTTP/1.1\r\nHost: x\r\nContent-Length: 10\r\n\r\n<script>=1",
         "<script> / HTTP/1.1\r\nHost: x\r\n\r\n"};
     for (int i = 0; i < 4; i++) {
+        http_renew();
         http_send(texts[i]);
         assert_true(http_status() >= 400);
         assert_null(strstr(http_answer(), "script"));

@@ -229,15 +229,40 @@ static void test_web(void **state)
     starve(&(struct link_spec){.type = LINK_WEB, .max_sessions = 1});
 }
 
+/* Where clients come for a request, the one that has been silent for longest makes room; elsewhere nobody does. */
+static void test_brief(void **state)
+{
+    (void)state;
+    for (int brief = 0; brief < 2; brief++) {
+        struct bench bench = bench_open(&(struct link_spec){.type = LINK_TCP, .max_sessions = 2, .brief = brief});
+        char bytes[2];
+        int first = connect_to(&bench), fd[2] = {-1, -1};
+        bench_expect(&bench, LINK_OPENED, 0);
+        fd[0] = connect_to(&bench);
+        bench_expect(&bench, LINK_OPENED, 0);
+        assert_int_equal(send(first, "GE", 2, MSG_NOSIGNAL), 2); /* so that the other one is silent */
+        bench_read_all(&bench, 0, bytes, 2);
+        fd[1] = connect_to(&bench);
+        if (brief) {
+            assert_int_equal(bench_expect(&bench, LINK_CLOSED, 0).session, 1);
+            assert_int_equal(bench_expect(&bench, LINK_OPENED, 0).session, 1);
+        } else {
+            bench_expect(&bench, LINK_REFUSED, 0);
+        }
+        assert_int_equal(fd_read(brief ? fd[0] : fd[1], bytes, 1), 0);
+        close(first);
+        close(fd[0]);
+        close(fd[1]);
+        bench_close(&bench);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_tcp),
-        cmocka_unit_test(test_usbip),
-        cmocka_unit_test(test_usbredir),
-        cmocka_unit_test(test_path),
-        cmocka_unit_test(test_web),
-        cmocka_unit_test(test_two_doors),
+        cmocka_unit_test(test_tcp),   cmocka_unit_test(test_usbip), cmocka_unit_test(test_usbredir),
+        cmocka_unit_test(test_path),  cmocka_unit_test(test_web),   cmocka_unit_test(test_two_doors),
+        cmocka_unit_test(test_brief),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,46 @@
+/* Who holds the connections of a web link, and who makes room for one more. Private to the web link.
+ *
+ * Pure; times are of one clock, in ms. */
+#ifndef DRIVERS_LINK_WEB_PLACES_H
+#define DRIVERS_LINK_WEB_PLACES_H
+
+#include <stddef.h>
+#include <stdint.h>
+#include <sys/socket.h>
+
+enum {
+    WEB_PLACES = 48,        /* connections at a time */
+    WEB_PLACES_OF_ONE = 40, /* of one address; the others are left for the rest of the world */
+    WEB_GOODBYE_MS = 2000,  /* to take what was written, at an end; an answer that nobody takes for so long is silent */
+};
+
+enum web_phase {
+    WEB_NOBODY,
+    WEB_ASKING,    /* its request has not come whole */
+    WEB_ANSWERING, /* its answer is on its way */
+    WEB_TALKING,   /* a WebSocket */
+    WEB_PARTING,   /* a WebSocket whose session has ended */
+    WEB_LINGERING, /* all has gone out; the client has yet to end */
+};
+
+struct web_place {
+    enum web_phase phase;
+    unsigned char address[8]; /* web_address() */
+    int64_t since_ms;         /* ANSWERING: when it last took something. Else: of the phase */
+};
+
+/* What counts as one address: 4 bytes of IPv4, also within IPv6, or the network's half of IPv6. */
+void web_address(const struct sockaddr_storage *from, unsigned char address[8]);
+
+/* WEB_PLACES of them, each `stride` bytes after the one before. */
+struct web_places {
+    struct web_place *first;
+    size_t stride;
+};
+
+/* Where somebody from this address may come in: an index. The one who is there now has to go when its phase isn't NOBODY:
+ * the oldest silent one of that address when it holds as many as it may, else of the address that holds the most. -1:
+ * nobody is silent. */
+int web_places_take(struct web_places places, const unsigned char address[8], int64_t now_ms);
+
+#endif

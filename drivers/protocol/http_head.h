@@ -1,0 +1,66 @@
+/* The head of a request of HTTP/1.x: its lines, as RFC 9112 has them. For the web link and the settings of a VLP-16.
+ *
+ * In go bytes as they come from a client, out come texts within them, or the status that a broken head is answered
+ * with. A bare LF ends a line, too. Pure; allocates nothing; any thread. */
+#ifndef DRIVERS_PROTOCOL_HTTP_HEAD_H
+#define DRIVERS_PROTOCOL_HTTP_HEAD_H
+
+#include <stddef.h>
+
+/* Part of a client's bytes: no NUL ends it, and it holds as long as they do. */
+struct http_text {
+    const char *s;
+    size_t len;
+};
+
+/* Letters of either case are the same. */
+int http_text_is(struct http_text text, const char *word);
+/* Whether a comma-separated list has the word. */
+int http_list_has(struct http_text list, const char *word);
+
+enum http_scan_result { HTTP_SCAN_MORE = 0, HTTP_SCAN_WHOLE = 1 /* 400 and more: a status */ };
+
+/* How far a head has been looked at. Zeros: not at all. */
+struct http_scan {
+    size_t at; /* begin of the line that is not whole; after HTTP_SCAN_WHOLE the head's length */
+    int n_lines;
+};
+
+/* Looks at what has come since the last call. bytes: all of the head so far, from its request line on. A wrong line is
+ * found as soon as its wrong byte is there. An http_scan_result. */
+int http_scan_head(struct http_scan *scan, const char *bytes, size_t len);
+
+/* The line at *at of a whole head, without its end, and *at after it. Empty: the head's end. */
+struct http_text http_next_line(const char *head, size_t len, size_t *at);
+
+struct http_line {
+    struct http_text method, target;
+    int minor; /* of HTTP/1.x */
+};
+/* "POST /cgi/setting?x HTTP/1.1": 0, 400, or 505. */
+int http_read_line(struct http_text line, struct http_line *out);
+
+struct http_field {
+    struct http_text name, value;
+};
+/* "Host: localhost": 0 or 400. */
+int http_read_field(struct http_text line, struct http_field *out);
+
+/* Decimal digits alone; more than a million counts as a million and some. 0 or 400. */
+int http_read_length(struct http_text text, size_t *out);
+
+struct http_place {
+    struct http_text host; /* an IPv6 address has its brackets */
+    int port;              /* 80 where none is named */
+};
+/* "localhost:8080", of a Host or a URI: 0 or 400. */
+int http_read_place(struct http_text text, struct http_place *out);
+
+/* A target's parts. place.s is NULL where it has none ("/a?b", not "http://localhost/a?b"). query is what follows the
+ * first '?'. */
+struct http_target {
+    struct http_text place, path, query;
+};
+void http_split_target(struct http_text target, struct http_target *out);
+
+#endif

@@ -1,0 +1,221 @@
+/* What comes to a web link's port and is no request of a browser: each gets an answer and an end at once, and nobody
+ * keeps others out. Clients are bytes on a socket. */
+#include <sys/socket.h>
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "tests/unit/web_rig.h"
+
+enum { PLACES = 48, OF_ONE = 40 };
+
+/* text with @ as the link's place. */
+static size_t fill_in(char *to, size_t room, const char *text, size_t len, const char *place)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < len; i++) {
+        const size_t more = text[i] == '@' ? strlen(place) : 1;
+        assert_true(n + more < room);
+        memcpy(to + n, text[i] == '@' ? place : text + i, more);
+        n += more;
+    }
+    to[n] = '\0';
+    return n;
+}
+
+/* Sends it, and reads to the connection's end. The status; 0: it ended without a byte. */
+static int send_raw(struct bench *bench, const char *place, const char *text, size_t len, char *answer, size_t room)
+{
+    static char bytes[30000];
+    int fd = web_dial(place), status = 0;
+    const size_t n = fill_in(bytes, sizeof bytes, text, len, place);
+    size_t at = 0;
+    assert_int_equal(send(fd, bytes, n, MSG_NOSIGNAL), n);
+    for (size_t got = 1; got > 0 && at + 1 < room; at += got)
+        got = web_listen_to(bench, fd, answer + at, room - 1 - at);
+    answer[at] = '\0';
+    close(fd);
+    if (at > 0 && sscanf(answer, "HTTP/1.1 %d ", &status) != 1) fail_msg("%.*s: no answer: %s", (int)len, text, answer);
+    return status;
+}
+
+#define HOST "Host: @\r\n"
+#define CASE(text, status)             \
+    {                                  \
+        text, sizeof(text) - 1, status \
+    }
+
+static const struct {
+    const char *text;
+    size_t len;
+    int status;
+} requests[] = {
+    CASE("CONNECT x:1 HTTP/1.1\r\n" HOST "\r\n", 405),
+    CASE("OPTIONS * HTTP/1.1\r\n" HOST "\r\n", 405),
+    CASE("FOO / HTTP/1.1\r\n" HOST "\r\n", 405),
+    CASE("POST / HTTP/1.1\r\n" HOST "Expect: 100-continue\r\nContent-Length: 5\r\n\r\n", 405),
+    CASE("GET / HTTP/1.1\r\nHost: localhost:18080abc\r\n\r\n", 400),
+    CASE("GET / HTTP/1.1\r\nHost: localhost:99999\r\n\r\n", 400),
+    CASE("GET / HTTP/1.1\r\nHost: local host\r\n\r\n", 400),
+    CASE("GET / HTTP/1.1\r\n" HOST "nonsense\r\n", 400), /* what follows is not waited for */
+    CASE("GET / HTTP/1.1\r\n" HOST "X: a\0b", 400),
+    CASE("GET / HTTP/1.1\r\n" HOST "X: a\rb\r\n", 400),
+    CASE("GET / HTTP/1.1\r\n" HOST " folded\r\n\r\n", 400),
+    CASE("GET / HTTP/1.1\r\nHost : @\r\n\r\n", 400),
+    CASE("GET / HTTP/1.1\r\n" HOST HOST "\r\n", 400),
+    CASE("GET / HTTP/1.1\r\n\r\n", 400),
+    CASE("GET /\r\n", 400), /* HTTP/0.9 */
+    CASE("GET foo HTTP/1.1\r\n" HOST "\r\n", 400),
+    CASE("GET /%00 HTTP/1.1\r\n" HOST "\r\n", 400),
+    CASE("GET /%4 HTTP/1.1\r\n" HOST "\r\n", 400),
+    CASE("PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n", 505),
+    CASE("\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03UUUUUUUU", 400), /* TLS */
+    CASE("GET / HTTP/1.1\r\n" HOST "Transfer-Encoding: chunked\r\n\r\n0\r\n\r\n", 413),
+    CASE("GET / HTTP/1.1\r\n" HOST "Transfer-Encoding: chunked\r\nContent-Length: 5\r\n\r\n", 400),
+    CASE("GET / HTTP/1.1\r\n" HOST "Content-Length: 5\r\nExpect: 100-continue\r\n\r\n", 413),
+    CASE("GET / HTTP/1.1\r\n" HOST "Content-Length: 0\r\nContent-Length: 0\r\n\r\n", 400),
+    CASE("GET / HTTP/1.1\r\n" HOST "Content-Length: -1\r\n\r\n", 400),
+    CASE("GET /scene HTTP/1.1\r\n" HOST "Expect: tea\r\n\r\n", 417),
+    CASE("GET /scene HTTP/1.1\r\n" HOST "Expect: 100-continue\r\n\r\n", 200),
+    CASE("GET /scene HTTP/1.1\r\n" HOST "Content-Length: 0\r\n\r\n", 200),
+    CASE("GET /scene HTTP/1.1\nHost: @\n\n", 200),
+    CASE("\r\n\r\nGET /scene HTTP/1.1\r\n" HOST "\r\n", 200),
+    CASE("GET /sc%65ne HTTP/1.0\r\n" HOST "\r\n", 200),
+    CASE("GET http://@/scene HTTP/1.1\r\nHost: elsewhere.example\r\n\r\n", 200),
+    CASE("GET http://elsewhere.example/scene HTTP/1.1\r\n" HOST "\r\n", 421),
+    CASE("GET /scene HTTP/1.0\r\n\r\n", 421),
+    CASE("GET /ws HTTP/1.1\r\n" HOST "Upgrade: websocket\r\nConnection: upgrade\r\nSec-WebSocket-Version: 8\r\n\r\n",
+         426),
+    CASE("GET /ws HTTP/1.1\r\n" HOST "Upgrade: websocket\r\nConnection: upgrade\r\nSec-WebSocket-Version: 13\r\n\r\n",
+         400),
+};
+
+static void test_requests(void **state)
+{
+    (void)state;
+    static char answer[20000];
+    char place[64];
+    struct bench bench = web_open(place);
+    for (size_t i = 0; i < sizeof requests / sizeof *requests; i++) {
+        const int status = send_raw(&bench, place, requests[i].text, requests[i].len, answer, sizeof answer);
+        if (status != requests[i].status) fail_msg("%s: %d, not %d", requests[i].text, status, requests[i].status);
+        assert_non_null(strstr(answer, "connection: close"));
+        if (status == 405) assert_non_null(strstr(answer, "\r\nallow: GET, HEAD\r\n"));
+        if (status == 426) assert_non_null(strstr(answer, "\r\nsec-websocket-version: 13\r\n"));
+    }
+    bench_close(&bench);
+}
+
+/* As many arguments and fields as fit into a request. */
+static void test_many(void **state)
+{
+    (void)state;
+    static char text[9000], answer[1 << 20];
+    static const struct {
+        const char *begin, *more;
+        int n, status;
+    } cases[] = {{"GET /?a=", "&a=", 400, 200},
+                 {"GET /scene?a=", "&a=", 400, 400},
+                 {"GET /scene HTTP/1.1\r\n" HOST, "Cookie: a=b\r\n", 400, 200},
+                 {"GET /scene HTTP/1.1\r\n" HOST, "Accept: a\r\n", 400, 200}};
+    char place[64];
+    struct bench bench = web_open(place);
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        size_t n = (size_t)snprintf(text, sizeof text, "%s", cases[i].begin);
+        for (int j = 0; j < cases[i].n; j++)
+            n += (size_t)snprintf(text + n, sizeof text - n, "%s", cases[i].more);
+        n += (size_t)snprintf(text + n, sizeof text - n, "%s", i < 2 ? " HTTP/1.1\r\n" HOST "\r\n" : "\r\n");
+        assert_true(n < 8000);
+        assert_int_equal(send_raw(&bench, place, text, n, answer, sizeof answer), cases[i].status);
+    }
+    bench_close(&bench);
+}
+
+static int dial_and_say(struct bench *bench, const char *place, uint8_t last, const char *text)
+{
+    int fd = web_dial_from(place, last);
+    assert_int_equal(send(fd, text, strlen(text), MSG_NOSIGNAL), strlen(text));
+    bench_poll(bench, 0, 0);
+    return fd;
+}
+
+static int is_open(int fd)
+{
+    char byte;
+    return recv(fd, &byte, 1, MSG_PEEK | MSG_DONTWAIT) < 0 && errno == EAGAIN;
+}
+
+/* Whoever fills the places, with what he likes, and comes again: a browser is answered each time. */
+static void test_nobody_is_shut_out(void **state)
+{
+    (void)state;
+    static const char *const texts[] = {"CONNECT x:1 HTTP/1.1\r\nHost: x\r\n\r\n", "GET / HT", "", "\x16\x03",
+                                        "GET /scene?n=big HTTP/1.1\r\nHost: x\r\n\r\n"};
+    char place[64];
+    struct bench bench = web_open(place);
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
+        int fd[3 * PLACES];
+        for (int j = 0; j < 3 * PLACES; j++) {
+            fd[j] = dial_and_say(&bench, place, 1, texts[i]);
+            if (j % PLACES == PLACES - 1) assert_int_equal(web_status_of(&bench, place, "GET /scene", ""), 200);
+        }
+        for (int j = 0; j < 3 * PLACES; j++)
+            close(fd[j]);
+    }
+    bench_close(&bench);
+}
+
+/* One address has some of the places, its newest ones; the clients of another one stay. */
+static void test_one_address(void **state)
+{
+    (void)state;
+    char place[64];
+    struct bench bench = web_open(place);
+    int other = dial_and_say(&bench, place, 3, "GET / HT"), fd[2 * PLACES], open = 0;
+    for (int i = 0; i < 2 * PLACES; i++)
+        fd[i] = dial_and_say(&bench, place, 2, "GET / HT");
+    for (int i = 0; i < 3; i++)
+        bench_poll(&bench, 0, 1);
+    for (int i = 0; i < 2 * PLACES; i++) {
+        assert_int_equal(is_open(fd[i]), i >= 2 * PLACES - OF_ONE);
+        open += is_open(fd[i]);
+    }
+    assert_int_equal(open, OF_ONE);
+    assert_true(is_open(other));
+    for (int i = 0; i < 2 * PLACES; i++)
+        close(fd[i]);
+    close(other);
+    bench_close(&bench);
+}
+
+/* Half a request that has to go is told so. A client that reads is not cut off by its own crowd. */
+static void test_who_makes_room(void **state)
+{
+    (void)state;
+    char place[64], answer[1000];
+    struct bench bench = web_open(place);
+    int first = dial_and_say(&bench, place, 1, "GET / HT"), fd[OF_ONE];
+    int session = web_upgrade(&bench, place, "/ws", "");
+    bench_expect(&bench, LINK_OPENED, 0);
+    for (int i = 0; i < OF_ONE; i++)
+        fd[i] = dial_and_say(&bench, place, 1, "");
+    answer[web_listen_to(&bench, first, answer, sizeof answer - 1)] = '\0';
+    assert_int_equal(strncmp(answer, "HTTP/1.1 408 ", 13), 0);
+    bench_expect(&bench, LINK_REFUSED, 0);
+    assert_true(is_open(session));
+    for (int i = 0; i < OF_ONE; i++)
+        close(fd[i]);
+    close(first);
+    close(session);
+    bench_close(&bench);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_requests),           cmocka_unit_test(test_many),
+        cmocka_unit_test(test_nobody_is_shut_out), cmocka_unit_test(test_one_address),
+        cmocka_unit_test(test_who_makes_room),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,93 @@
+/* Who makes room at a web link. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <string.h>
+
+#include <arpa/inet.h>
+#include <cmocka.h>
+#include <netinet/in.h>
+
+#include "drivers/link/web_places.h"
+
+static struct web_place place[WEB_PLACES];
+static const struct web_places places = {place, sizeof place[0]};
+
+static void fill(int from, int to, unsigned char address, enum web_phase phase, int64_t since_ms)
+{
+    for (int i = from; i < to; i++) {
+        memset(&place[i], 0, sizeof place[i]);
+        place[i].phase = phase;
+        place[i].address[0] = address;
+        place[i].since_ms = since_ms + i;
+    }
+}
+
+static int take(unsigned char address, int64_t now_ms)
+{
+    const unsigned char all[8] = {address};
+    return web_places_take(places, all, now_ms);
+}
+
+static void test_who_goes(void **state)
+{
+    (void)state;
+    fill(0, WEB_PLACES, 0, WEB_NOBODY, 0);
+    assert_int_equal(take(1, 100), 0);
+    fill(0, WEB_PLACES_OF_ONE, 1, WEB_ASKING, 0);
+    assert_int_equal(take(2, 100), WEB_PLACES_OF_ONE); /* for others there is room */
+    assert_int_equal(take(1, 100), 0);                 /* its own oldest */
+    place[7].since_ms = -1;
+    assert_int_equal(take(1, 100), 7);
+    place[9].phase = WEB_LINGERING; /* it has had its answer */
+    assert_int_equal(take(1, 100), 9);
+    fill(WEB_PLACES_OF_ONE, WEB_PLACES, 2, WEB_ASKING, -100);
+    assert_int_equal(take(2, 100), 9); /* of the address that has the most, though others are older */
+    assert_int_equal(take(3, 100), 9);
+    fill(0, WEB_PLACES_OF_ONE, 1, WEB_TALKING, 0);
+    assert_int_equal(take(1, 100), -1); /* sessions stay */
+    assert_int_equal(take(3, 100), WEB_PLACES_OF_ONE);
+}
+
+/* An answer that is taken stays; one that nobody takes is silent. */
+static void test_answers(void **state)
+{
+    (void)state;
+    fill(0, WEB_PLACES_OF_ONE, 1, WEB_ANSWERING, 0);
+    fill(WEB_PLACES_OF_ONE, WEB_PLACES, 0, WEB_NOBODY, 0);
+    assert_int_equal(take(1, WEB_GOODBYE_MS - 1), -1);
+    assert_int_equal(take(1, WEB_GOODBYE_MS), 0);
+    assert_int_equal(take(2, WEB_GOODBYE_MS - 1), WEB_PLACES_OF_ONE);
+}
+
+static void test_addresses(void **state)
+{
+    (void)state;
+    struct sockaddr_storage from = {.ss_family = AF_INET};
+    struct sockaddr_in6 *at = (struct sockaddr_in6 *)(void *)&from;
+    unsigned char a[8], b[8];
+    ((struct sockaddr_in *)(void *)&from)->sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    web_address(&from, a);
+    memset(&from, 0, sizeof from);
+    from.ss_family = AF_INET6;
+    assert_int_equal(inet_pton(AF_INET6, "::ffff:127.0.0.1", &at->sin6_addr), 1);
+    web_address(&from, b);
+    assert_memory_equal(a, b, 8);
+    assert_int_equal(inet_pton(AF_INET6, "2001:db8:1:2::3", &at->sin6_addr), 1);
+    web_address(&from, a);
+    assert_int_equal(inet_pton(AF_INET6, "2001:db8:1:2:ffff::4", &at->sin6_addr), 1); /* one network is one client */
+    web_address(&from, b);
+    assert_memory_equal(a, b, 8);
+    assert_int_equal(inet_pton(AF_INET6, "2001:db8:1:3::3", &at->sin6_addr), 1);
+    web_address(&from, b);
+    assert_memory_not_equal(a, b, 8);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_who_goes),
+        cmocka_unit_test(test_answers),
+        cmocka_unit_test(test_addresses),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
