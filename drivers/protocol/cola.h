@@ -40,9 +40,11 @@ struct cola {
     const struct cola_model *model;
     struct cola_settings set;
     enum cola_level level;
-    int measures;   /* LMCstopmeas: 0. Output of this session alone */
-    int reboots;    /* once the answer is sent */
-    int wants_scan; /* measurement was asked for, and no scan has come yet; next look at the head at try_ns */
+    int measures;    /* LMCstopmeas: 0. Output of this session alone */
+    int reboots;     /* once the answer is sent */
+    uint32_t field;  /* number in the name of the request at hand, field012 */
+    int outputs_due; /* LIDoutputstate is sent once, behind the answer */
+    int wants_scan;  /* measurement was asked for, and no scan has come yet; next look at the head at try_ns */
     int64_t try_ns;
     int64_t now_ns;
     uint32_t near_wrap;         /* counters begin so many below their wrap */
@@ -93,17 +95,28 @@ void cola_settings_reset(struct cola *self);
 cola_handler cola_read_output_range, cola_write_output_range, cola_read_scan_data_cfg, cola_write_scan_data_cfg,
     cola_read_scan_cfg, cola_set_scan_cfg, cola_read_filter, cola_write_filter, cola_read_scale, cola_write_scale;
 
-/* cola_device.c: identity, states, log-in, clock, inputs and outputs. */
+/* cola_ports.c: fields, inputs and outputs, of which none is active. */
+
+/* 12 of "field012"; UINT32_MAX: another name. */
+uint32_t cola_field_number(const char *name);
+/* What a field is: a record, or that there is none. */
+enum cola_error cola_read_field(struct cola *self, uint32_t field, struct cola_args *args, struct cola_out *out);
+cola_handler cola_read_inputs, cola_read_outputs, cola_read_field_results;
+/* The event LIDoutputstate. */
+void cola_send_outputs(struct cola *self);
+
+/* cola_device.c: identity, states, log-in and clock. */
 
 /* Time of day of the scanner's clock at a device time, ns since 1970. */
 int64_t cola_clock_ns(const struct cola *self, int64_t t_ns);
+/* That time as telegrams have it: u16 year, 5 x u8 month to second, u32 us. */
+void cola_put_time(const struct cola *self, int64_t t_ns, struct cola_out *out);
 /* Lets the head scan if it rests. */
 int cola_start_scan(struct cola *self);
 cola_handler cola_read_ident, cola_read_serial, cola_read_firmware, cola_read_location, cola_write_location,
     cola_read_state, cola_read_lms_state, cola_read_hours, cola_read_power_ons, cola_read_contamination,
-    cola_read_inputs, cola_read_outputs, cola_read_field_results, cola_read_framing, cola_write_framing, cola_log_in,
-    cola_log_out, cola_get_level, cola_check_password, cola_set_clock, cola_start, cola_stop, cola_load_defaults,
-    cola_keep, cola_reboot;
+    cola_read_framing, cola_write_framing, cola_log_in, cola_log_out, cola_get_level, cola_check_password,
+    cola_set_clock, cola_start, cola_stop, cola_load_defaults, cola_keep, cola_reboot;
 
 /* cola_commands.c: one request, and its answer. */
 void cola_carry_out(struct cola *self, const struct cola_request *request);

@@ -1,11 +1,11 @@
-/* Identity, states, log-in, clock, inputs and outputs. */
+/* Identity, states, log-in and clock. */
 #include <stdio.h>
 #include <string.h>
 
 #include "drivers/protocol/cola.h"
 #include "drivers/protocol/cola_clock.h"
 
-enum { MAX_REPLY = 512, MOST_LOCATION = 16, N_OUTPUTS = 5 };
+enum { MAX_REPLY = 512, MOST_LOCATION = 16 };
 
 /* ---- identity */
 
@@ -117,40 +117,6 @@ enum cola_error cola_read_power_ons(struct cola *self, struct cola_args *args, s
     return cola_args_end(args);
 }
 
-/* ---- inputs, outputs, fields: there are none that are active */
-
-/* u16 version, u32 time, 4 x u8 input, u16 no time of day */
-enum cola_error cola_read_inputs(struct cola *self, struct cola_args *args, struct cola_out *out)
-{
-    cola_put_u(out, 2, 0);
-    cola_put_u(out, 4, cola_time_us(self, self->now_ns));
-    for (int i = 0; i < 4; i++)
-        cola_put_u(out, 1, 0);
-    cola_put_u(out, 2, 0);
-    return cola_args_end(args);
-}
-
-/* u16 version, u32 time, 5 x (u8 state, u32 changes), u16 no time of day */
-enum cola_error cola_read_outputs(struct cola *self, struct cola_args *args, struct cola_out *out)
-{
-    cola_put_u(out, 2, 0);
-    cola_put_u(out, 4, cola_time_us(self, self->now_ns));
-    for (int i = 0; i < N_OUTPUTS; i++) {
-        cola_put_u(out, 1, 0);
-        cola_put_u(out, 4, 0);
-    }
-    cola_put_u(out, 2, 0);
-    return cola_args_end(args);
-}
-
-/* u16 number of fields */
-enum cola_error cola_read_field_results(struct cola *self, struct cola_args *args, struct cola_out *out)
-{
-    (void)self;
-    cola_put_u(out, 2, 0);
-    return cola_args_end(args);
-}
-
 /* ---- which form streamed telegrams have */
 
 enum cola_error cola_read_framing(struct cola *self, struct cola_args *args, struct cola_out *out)
@@ -250,6 +216,18 @@ int64_t cola_clock_ns(const struct cola *self, int64_t t_ns)
 {
     const int64_t utc_ns = self->host.utc_ns(self->host.ctx, t_ns);
     return (utc_ns == INT64_MIN ? t_ns : utc_ns) + self->set.clock_ns;
+}
+
+void cola_put_time(const struct cola *self, int64_t t_ns, struct cola_out *out)
+{
+    const struct cola_date d = cola_date_of(cola_clock_ns(self, t_ns));
+    cola_put_u(out, 2, d.year);
+    cola_put_u(out, 1, d.month);
+    cola_put_u(out, 1, d.day);
+    cola_put_u(out, 1, d.hour);
+    cola_put_u(out, 1, d.minute);
+    cola_put_u(out, 1, d.second);
+    cola_put_u(out, 4, d.us);
 }
 
 /* u16 year, 5 x u8, u32 us; u8 1: set */

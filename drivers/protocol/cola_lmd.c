@@ -3,7 +3,6 @@
 #include <string.h>
 
 #include "drivers/protocol/cola.h"
-#include "drivers/protocol/cola_clock.h"
 
 enum { VERSION = 1, DEVICE = 1 };
 
@@ -128,18 +127,6 @@ static void put_channels(const struct cola *self, struct cola_out *out)
     if (n_signals != 0 && !self->set.rssi_16bit) put_all_signals(self, out);
 }
 
-static void put_time(const struct cola *self, struct cola_out *out)
-{
-    const struct cola_date d = cola_date_of(cola_clock_ns(self, self->scan.whole->t0_ns));
-    cola_put_u(out, 2, d.year);
-    cola_put_u(out, 1, d.month);
-    cola_put_u(out, 1, d.day);
-    cola_put_u(out, 1, d.hour);
-    cola_put_u(out, 1, d.minute);
-    cola_put_u(out, 1, d.second);
-    cola_put_u(out, 4, d.us);
-}
-
 static void put_tail(const struct cola *self, struct cola_out *out)
 {
     const int named = self->set.name && self->set.location[0] != 0;
@@ -148,7 +135,7 @@ static void put_tail(const struct cola *self, struct cola_out *out)
     if (named) cola_put_text(out, self->set.location);
     cola_put_u(out, 2, 0); /* comment: there is none */
     cola_put_u(out, 2, self->set.time ? 1 : 0);
-    if (self->set.time) put_time(self, out);
+    if (self->set.time) cola_put_time(self, self->scan.whole->t0_ns, out);
     cola_put_u(out, 2, 0); /* event: there is none */
 }
 
