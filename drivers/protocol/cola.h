@@ -23,11 +23,11 @@ struct cola_settings {
     /* LMDscandatacfg */
     uint8_t channels[2], rssi, rssi_16bit, unit, encoder[2], position, name, comment, time;
     uint16_t every; /* so many-th scan is sent */
-    /* LMPoutputRange, 1/10000 deg: as it was written; all 0: all beams */
+    /* LMPoutputRange, 1/10000 deg: angles of beams. Without `narrowed` all beams are sent. */
     int32_t start_e4, stop_e4;
-    uint32_t first_beam, n_beams; /* what that is; n_beams 0: all */
-    uint8_t filter;               /* FREchoFilter: enum cola_filter */
-    uint32_t scale;               /* LMDscandatascalefactor; 0: the geometry's */
+    uint8_t narrowed;
+    uint8_t filter; /* FREchoFilter: enum cola_filter */
+    uint32_t scale; /* LMDscandatascalefactor; 0: the geometry's */
     char location[COLA_MAX_NAME];
     int64_t clock_ns; /* what the scanner's clock is ahead of the head's; 0: not set */
     uint8_t framing;  /* EIHstCola, as it was written */
@@ -92,6 +92,11 @@ void cola_reseal(uint8_t *unit, size_t len);
 /* cola_settings.c: what is set and asked for the measurement. */
 
 void cola_settings_reset(struct cola *self);
+/* The beams that are sent: those of LMPoutputRange, of a head that is known. */
+struct cola_beams {
+    uint32_t first, n;
+};
+struct cola_beams cola_sent_beams(const struct cola *self);
 cola_handler cola_read_output_range, cola_write_output_range, cola_read_scan_data_cfg, cola_write_scan_data_cfg,
     cola_read_scan_cfg, cola_set_scan_cfg, cola_read_filter, cola_write_filter, cola_read_scale, cola_write_scale;
 

@@ -43,20 +43,8 @@ static void put_encoder(const struct cola *self, struct cola_out *out)
     cola_put_i(out, 2, self->encoder.speed_mm_s);
 }
 
-/* The beams that are sent. */
-struct beams {
-    uint32_t first, n;
-};
-
-static struct beams sent_beams(const struct cola *self)
-{
-    const uint32_t n = self->scan.head.n;
-    if (self->set.n_beams == 0 || self->set.first_beam + self->set.n_beams > n) return (struct beams){0, n};
-    return (struct beams){self->set.first_beam, self->set.n_beams};
-}
-
 static void put_channel_head(const struct planar_head *head, struct cola_out *out, const char *name, uint32_t scale,
-                             struct beams beams)
+                             struct cola_beams beams)
 {
     cola_put_word(out, name);
     cola_put_float(out, (float)scale);
@@ -82,7 +70,7 @@ static void put_distances(const struct cola *self, unsigned k, struct cola_out *
     const struct planar_head *head = &self->scan.head;
     const uint32_t scale = self->set.scale != 0 ? self->set.scale : cola_head_scale(head);
     const double counts = head->m_per_count * 1000.0 / scale;
-    const struct beams beams = sent_beams(self);
+    const struct cola_beams beams = cola_sent_beams(self);
     uint64_t lost = 0;
     put_channel_head(head, out, names[k], scale, beams);
     for (uint32_t i = beams.first; i < beams.first + beams.n; i++) {
@@ -99,7 +87,7 @@ static void put_signals(const struct cola *self, unsigned k, struct cola_out *ou
 {
     static const char *const names[2] = {"RSSI1", "RSSI2"};
     const unsigned bytes = self->set.rssi_16bit ? 2 : 1;
-    const struct beams beams = sent_beams(self);
+    const struct cola_beams beams = cola_sent_beams(self);
     put_channel_head(&self->scan.head, out, names[k], 1, beams);
     for (uint32_t i = beams.first; i < beams.first + beams.n; i++) {
         const struct planar_echo *echo = echo_of(self, k, i);

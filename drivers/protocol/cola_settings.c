@@ -22,39 +22,48 @@ static const struct planar_head *head_of(const struct cola *self)
 
 /* ---- LMPoutputRange: u16 1, u32 step, i32 start, i32 stop */
 
+static uint32_t clamped(int64_t beam, const struct planar_head *head)
+{
+    return beam < 0 ? 0 : beam >= head->n ? head->n - 1 : (uint32_t)beam;
+}
+
+/* Found anew for each telegram: the head's step may have become another one since the range was written. */
+struct cola_beams cola_sent_beams(const struct cola *self)
+{
+    const struct planar_head *head = head_of(self);
+    if (!self->set.narrowed) return (struct cola_beams){0, head->n};
+    const uint32_t first = clamped(cola_beam_at(head, self->set.start_e4), head);
+    return (struct cola_beams){first, clamped(cola_beam_at(head, self->set.stop_e4), head) - first + 1};
+}
+
 enum cola_error cola_read_output_range(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
     const struct planar_head *head = head_of(self);
-    const int all = self->set.n_beams == 0;
     if (!head->known) return COLA_CONDITION;
+    const struct cola_beams beams = cola_sent_beams(self);
     cola_put_u(out, 2, 1);
     cola_put_u(out, 4, cola_step_angle(head));
-    cola_put_i(out, 4, all ? cola_beam_angle(head, 0) : self->set.start_e4);
-    cola_put_i(out, 4, all ? cola_beam_angle(head, head->n - 1) : self->set.stop_e4);
+    cola_put_i(out, 4, cola_beam_angle(head, beams.first));
+    cola_put_i(out, 4, cola_beam_angle(head, beams.first + beams.n - 1));
     return cola_args_end(args);
 }
 
+/* An end between two beams becomes the nearest one, as in the real scanner. */
 enum cola_error cola_write_output_range(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
     const struct planar_head *head = head_of(self);
     const uint32_t sectors = cola_arg_u(args, 2), step = cola_arg_u(args, 4);
     const int32_t start_e4 = cola_arg_i(args, 4), stop_e4 = cola_arg_i(args, 4);
-    uint32_t first = 0, n = 0;
     (void)out;
     const enum cola_error error = cola_args_end(args);
     if (error != COLA_OK) return error;
     if (!head->known) return COLA_CONDITION;
     if (sectors != 1 || step != cola_step_angle(head) || start_e4 > stop_e4) return COLA_INVALID_DATA;
-    if (start_e4 < cola_beam_angle(head, 0) || stop_e4 > cola_beam_angle(head, head->n - 1)) return COLA_INVALID_DATA;
-    while (first < head->n && cola_beam_angle(head, first) < start_e4)
-        first++;
-    while (first + n < head->n && cola_beam_angle(head, first + n) <= stop_e4)
-        n++;
-    if (n == 0) return COLA_INVALID_DATA;
-    self->set.start_e4 = start_e4;
-    self->set.stop_e4 = stop_e4;
-    self->set.first_beam = first;
-    self->set.n_beams = n;
+    const int64_t first = cola_beam_at(head, start_e4), last = cola_beam_at(head, stop_e4);
+    if (first < 0 || last >= head->n) return COLA_INVALID_DATA;
+    self->set.start_e4 = cola_beam_angle(head, (uint32_t)first);
+    self->set.stop_e4 = cola_beam_angle(head, (uint32_t)last);
+    self->set.narrowed = 1;
     return COLA_OK;
 }
 
@@ -122,7 +131,7 @@ enum cola_error cola_set_scan_cfg(struct cola *self, struct cola_args *args, str
     if (error != COLA_OK) return error;
     if (!head->known) return COLA_CONDITION;
     const int step_fits = step == cola_step_angle(head);
-    const int area_fits = start_e4 == cola_beam_angle(head, 0) && stop_e4 == cola_beam_angle(head, head->n - 1);
+    const int area_fits = cola_beam_at(head, start_e4) == 0 && cola_beam_at(head, stop_e4) == head->n - 1;
     uint32_t status = OK;
     if (scan_chz != cola_scan_chz(head))
         status = FREQUENCY_ERROR;

@@ -238,9 +238,9 @@ static void errors_have_their_numbers(void **state)
         {"sWN LMPoutputRange 1 9C4 0", "sFA 8"},
         {"sWN LMPoutputRange 1 9C4 0 10 1", "sFA 7"},
         {"sWN LMPoutputRange 1 9C3 0 0", "sFA 5"},
-        {"sWN LMPoutputRange 1 9C4 FFF9222F 0", "sFA 5"},
-        {"sWN LMPoutputRange 1 9C4 0 225511", "sFA 5"},
-        {"sWN LMPoutputRange 1 9C4 +10 +20", "sFA 5"},       /* between two beams */
+        {"sWN LMPoutputRange 1 9C4 -451250 0", "sFA 5"}, /* half a step beyond the first beam, and the last */
+        {"sWN LMPoutputRange 1 9C4 0 +2251250", "sFA 5"},
+        {"sWN LMPoutputRange 1 9C4 +2252500 +2255000", "sFA 5"},
         {"sWN LMPoutputRange 1 9C4 -2147483648 0", "sFA 5"}, /* the least of four bytes, and one less */
         {"sWN LMPoutputRange 1 9C4 -2147483649 0", "sFA 10"},
         {"sWN LMPoutputRange 1 9C4 +20 +10", "sFA 5"},
