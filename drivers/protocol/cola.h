@@ -40,8 +40,16 @@ struct cola {
     const struct cola_model *model;
     struct cola_settings set;
     enum cola_level level;
-    int measures;    /* LMCstopmeas: 0. Output of this session alone */
-    int reboots;     /* once the answer is sent */
+    int measures;            /* LMCstopmeas: 0. Output of this session alone */
+    int started;             /* LMCstartmeas was called since */
+    int reboots;             /* once the answer is sent */
+    struct planar_head head; /* of a head with geometries, as it is set: its next scan has this one */
+    struct {
+        int is_due; /* mLMPsetscancfg is answered, and done, once the head's scan has ended */
+        enum cola_form form;
+        int64_t lines_uhz;
+        uint32_t steps;
+    } next;
     uint32_t field;  /* number in the name of the request at hand, field012 */
     int outputs_due; /* LIDoutputstate is sent once, behind the answer */
     int wants_scan;  /* measurement was asked for, and no scan has come yet; next look at the head at try_ns */
@@ -96,9 +104,19 @@ void cola_settings_reset(struct cola *self);
 struct cola_beams {
     uint32_t first, n;
 };
-struct cola_beams cola_sent_beams(const struct cola *self);
+struct cola_beams cola_sent_beams(const struct cola *self, const struct planar_head *head);
 cola_handler cola_read_output_range, cola_write_output_range, cola_read_scan_data_cfg, cola_write_scan_data_cfg,
-    cola_read_scan_cfg, cola_set_scan_cfg, cola_read_filter, cola_write_filter, cola_read_scale, cola_write_scale;
+    cola_read_filter, cola_write_filter, cola_read_scale, cola_write_scale;
+
+/* cola_geometry.c: line rate and step, which are the head's and not this session's. */
+
+/* The head as it is set. The last scan may be of another step: that is in scan.head. */
+const struct planar_head *cola_head(const struct cola *self);
+/* Asks the head how it is set. Before each request. */
+void cola_look_at_head(struct cola *self);
+/* Time has passed: answers mLMPsetscancfg once the head's scan has ended. */
+void cola_geometry_time(struct cola *self);
+cola_handler cola_read_scan_cfg, cola_set_scan_cfg;
 
 /* cola_ports.c: fields, inputs and outputs, of which none is active. */
 
@@ -116,6 +134,17 @@ void cola_send_outputs(struct cola *self);
 int64_t cola_clock_ns(const struct cola *self, int64_t t_ns);
 /* That time as telegrams have it: u16 year, 5 x u8 month to second, u32 us. */
 void cola_put_time(const struct cola *self, int64_t t_ns, struct cola_out *out);
+enum cola_head_state {
+    COLA_HEAD_UNKNOWN = -1,
+    COLA_HEAD_OFF,
+    COLA_HEAD_BOOT,
+    COLA_HEAD_IDLE,
+    COLA_HEAD_SPIN_UP,
+    COLA_HEAD_SCANNING,
+    COLA_HEAD_SPIN_DOWN,
+    COLA_HEAD_FAULT
+};
+enum cola_head_state cola_ask_state(struct cola *self);
 /* Lets the head scan if it rests. */
 int cola_start_scan(struct cola *self);
 cola_handler cola_read_ident, cola_read_serial, cola_read_firmware, cola_read_location, cola_write_location,

@@ -52,26 +52,24 @@ enum cola_error cola_write_location(struct cola *self, struct cola_args *args, s
 
 /* ---- states */
 
-enum head { UNKNOWN = -1, OFF, BOOT, IDLE, SPIN_UP, SCANNING, SPIN_DOWN, FAULT };
-
-static enum head head_state(struct cola *self)
+enum cola_head_state cola_ask_state(struct cola *self)
 {
     static const char *const names[] = {"off", "boot", "idle", "spin-up", "scanning", "spin-down", "fault"};
     char state[MAX_REPLY] = "";
-    if (self->host.command(self->host.ctx, "HEAD:STATE?", state, sizeof state) != 0) return UNKNOWN;
-    for (int i = OFF; i <= FAULT; i++)
-        if (strcmp(names[i], state) == 0) return (enum head)i;
-    return UNKNOWN;
+    if (self->host.command(self->host.ctx, "HEAD:STATE?", state, sizeof state) != 0) return COLA_HEAD_UNKNOWN;
+    for (int i = COLA_HEAD_OFF; i <= COLA_HEAD_FAULT; i++)
+        if (strcmp(names[i], state) == 0) return (enum cola_head_state)i;
+    return COLA_HEAD_UNKNOWN;
 }
 
 enum cola_error cola_read_state(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
     enum { BUSY, READY, ERROR };
-    const enum head head = head_state(self);
-    if (head == FAULT)
+    const enum cola_head_state head = cola_ask_state(self);
+    if (head == COLA_HEAD_FAULT)
         cola_put_u(out, 1, ERROR);
     else
-        cola_put_u(out, 1, head <= BOOT || !self->scan.head.known ? BUSY : READY);
+        cola_put_u(out, 1, head <= COLA_HEAD_BOOT || !self->scan.head.known ? BUSY : READY);
     return cola_args_end(args);
 }
 
@@ -81,8 +79,8 @@ enum cola_error cola_read_lms_state(struct cola *self, struct cola_args *args, s
     enum { UNDEFINED, INITIALISATION, CONFIGURATION, REST, ROTATES, PREPARATION, READY, MEASURES };
     static const uint8_t states[] = {INITIALISATION, INITIALISATION, REST, PREPARATION, MEASURES, ROTATES, UNDEFINED};
     const struct cola_date d = cola_date_of(cola_clock_ns(self, self->now_ns));
-    const enum head head = head_state(self);
-    uint32_t state = head == UNKNOWN ? (uint32_t)UNDEFINED : states[head];
+    const enum cola_head_state head = cola_ask_state(self);
+    uint32_t state = head == COLA_HEAD_UNKNOWN ? (uint32_t)UNDEFINED : states[head];
     char text[40];
     if (state == MEASURES && !self->measures) state = READY;
     cola_put_u(out, 2, state);
@@ -184,10 +182,11 @@ enum cola_error cola_log_out(struct cola *self, struct cola_args *args, struct c
 int cola_start_scan(struct cola *self)
 {
     char reply[MAX_REPLY];
-    const enum head head = head_state(self);
-    self->wants_scan = head != IDLE && head != FAULT && head != UNKNOWN; /* one that scans may be about to stop */
+    const enum cola_head_state head = cola_ask_state(self);
+    self->wants_scan = head != COLA_HEAD_IDLE && head != COLA_HEAD_FAULT &&
+                       head != COLA_HEAD_UNKNOWN; /* one that scans may be about to stop */
     if (self->wants_scan) return 0;
-    return head != IDLE || self->host.command(self->host.ctx, "SCAN:START", reply, sizeof reply) != 0;
+    return head != COLA_HEAD_IDLE || self->host.command(self->host.ctx, "SCAN:START", reply, sizeof reply) != 0;
 }
 
 /* u8 0: measures */
@@ -195,7 +194,7 @@ enum cola_error cola_start(struct cola *self, struct cola_args *args, struct col
 {
     const enum cola_error error = cola_args_end(args);
     if (error != COLA_OK) return error;
-    self->measures = 1;
+    self->measures = self->started = 1;
     cola_put_u(out, 1, (uint32_t)cola_start_scan(self));
     return COLA_OK;
 }
@@ -205,7 +204,7 @@ enum cola_error cola_stop(struct cola *self, struct cola_args *args, struct cola
 {
     const enum cola_error error = cola_args_end(args);
     if (error != COLA_OK) return error;
-    self->measures = self->wants_scan = 0;
+    self->measures = self->started = self->wants_scan = 0;
     cola_put_u(out, 1, 0);
     return COLA_OK;
 }

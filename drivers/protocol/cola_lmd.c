@@ -70,7 +70,7 @@ static void put_distances(const struct cola *self, unsigned k, struct cola_out *
     const struct planar_head *head = &self->scan.head;
     const uint32_t scale = self->set.scale != 0 ? self->set.scale : cola_head_scale(head);
     const double counts = head->m_per_count * 1000.0 / scale;
-    const struct cola_beams beams = cola_sent_beams(self);
+    const struct cola_beams beams = cola_sent_beams(self, &self->scan.head);
     uint64_t lost = 0;
     put_channel_head(head, out, names[k], scale, beams);
     for (uint32_t i = beams.first; i < beams.first + beams.n; i++) {
@@ -87,7 +87,7 @@ static void put_signals(const struct cola *self, unsigned k, struct cola_out *ou
 {
     static const char *const names[2] = {"RSSI1", "RSSI2"};
     const unsigned bytes = self->set.rssi_16bit ? 2 : 1;
-    const struct cola_beams beams = cola_sent_beams(self);
+    const struct cola_beams beams = cola_sent_beams(self, &self->scan.head);
     put_channel_head(&self->scan.head, out, names[k], 1, beams);
     for (uint32_t i = beams.first; i < beams.first + beams.n; i++) {
         const struct planar_echo *echo = echo_of(self, k, i);

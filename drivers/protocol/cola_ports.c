@@ -25,8 +25,8 @@ static void put_grid(const struct cola *self, struct cola_out *out)
 {
     cola_put_float(out, 1.0f);
     cola_put_float(out, 0.0f);
-    cola_put_u(out, 4, cola_step_angle(&self->scan.head));
-    cola_put_i(out, 4, cola_beam_angle(&self->scan.head, 0));
+    cola_put_u(out, 4, cola_step_angle(cola_head(self)));
+    cola_put_i(out, 4, cola_beam_angle(cola_head(self), 0));
 }
 
 /* grid, u8 type, u8 number, u16 segmented (and u16 points), u16 rectangular, radial, dynamic, u16 1 and text name,
@@ -39,7 +39,7 @@ enum cola_error cola_read_field(struct cola *self, uint32_t field, struct cola_a
         cola_put_u(out, 1, 0);
         return cola_args_end(args);
     }
-    if (!self->scan.head.known) return COLA_CONDITION;
+    if (!cola_head(self)->known) return COLA_CONDITION;
     put_grid(self, out);
     cola_put_u(out, 1, SEGMENTED);
     cola_put_u(out, 1, model->named ? field + 1 : 0);
@@ -57,7 +57,7 @@ enum cola_error cola_read_field(struct cola *self, uint32_t field, struct cola_a
 /* u16 fields, each: u16 version, u8 number, u32 count, grid, u8 result, 3 x u16 0, u16 1 and time of day */
 enum cola_error cola_read_field_results(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
-    if (self->model->n_results != 0 && !self->scan.head.known) return COLA_CONDITION;
+    if (self->model->n_results != 0 && !cola_head(self)->known) return COLA_CONDITION;
     cola_put_u(out, 2, self->model->n_results);
     for (uint32_t i = 1; i <= self->model->n_results; i++) {
         cola_put_u(out, 2, 1);
