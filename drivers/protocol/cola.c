@@ -10,7 +10,7 @@ void cola_power_up(struct cola *self)
     cola_settings_reset(self);
     self->level = COLA_RUN;
     self->measures = 1;
-    self->streams = self->wants_scan = self->reboots = 0;
+    self->streams = self->started = self->wants_scan = self->reboots = self->next.is_due = 0;
     self->n_waiting = self->since_sent = 0;
     self->telegrams = (uint16_t)(0U - self->near_wrap);
 }
@@ -95,16 +95,24 @@ static void pass_time(void *protocol, int64_t t_ns)
     struct cola *self = protocol;
     if (t_ns > self->now_ns) self->now_ns = t_ns;
     cola_deliver(self);
+    cola_geometry_time(self);
     if (!self->wants_scan || t_ns < self->try_ns) return;
     self->try_ns = t_ns + TRY_NS;
     cola_start_scan(self);
+}
+
+/* A scan before the head was set to another geometry is not what is asked for. */
+static int is_as_set(const struct cola *self)
+{
+    const struct planar_head *had = &self->scan.head, *set = cola_head(self);
+    return self->scan.whole != NULL && had->steps == set->steps && had->lines_uhz == set->lines_uhz;
 }
 
 enum cola_error cola_read_scan(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
     const enum cola_error error = cola_args_end(args);
     if (error != COLA_OK) return error;
-    if (self->scan.whole != NULL) {
+    if (is_as_set(self)) {
         cola_put_scan(self, out);
         self->telegrams++;
         return COLA_OK;
@@ -118,7 +126,7 @@ enum cola_error cola_read_scan(struct cola *self, struct cola_args *args, struct
 static int64_t next_time(const void *protocol)
 {
     const struct cola *self = protocol;
-    return self->pending ? self->now_ns : self->wants_scan ? self->try_ns : INT64_MAX;
+    return self->pending || self->next.is_due ? self->now_ns : self->wants_scan ? self->try_ns : INT64_MAX;
 }
 
 static void take_input(void *protocol, const uint8_t *bytes, size_t len)

@@ -74,6 +74,8 @@ struct protocol_host {
     int64_t (*next_fix_ns)(void *ctx, int64_t t_ns);
 };
 
+enum { PROTOCOL_MAX_GEOMETRIES = 8 };
+
 /* What a protocol says of the head; constant, and outlives the instance. The rest stands in the descriptor. */
 struct protocol_identity {
     char maker[32], model[64]; /* of the head profile */
@@ -81,6 +83,12 @@ struct protocol_identity {
     char firmware[32];
     char serial[32];
     char name[32]; /* of the device, as its user calls it */
+    /* Of a planar head that can be set to some line rates, with the steps of a turn at each; 0: of no other head. */
+    struct protocol_geometry {
+        int64_t lines_uhz;
+        uint32_t steps;
+    } geometry[PROTOCOL_MAX_GEOMETRIES];
+    uint32_t n_geometries;
 };
 
 struct protocol_spec {
@@ -88,6 +96,7 @@ struct protocol_spec {
     struct protocol_host host;
     uint32_t session;   /* from 1, over all links */
     uint32_t fixes_hz;  /* of the GNSS receiver */
+    int64_t power_ns;   /* device time at which power came last: what the device counts since power-up counts from it */
     uint32_t near_wrap; /* counters begin so many below their wrap; 0: at 0 */
     int waits;          /* 1: paces fast and step: device time says nothing of how long a client takes */
     /* velodyne_http: where the settings say that data go, and so on; empty: not known */

@@ -52,7 +52,7 @@ static const struct cfg_key config_keys[] = {
      WITHIN("fov_min_deg", "fov_max_deg"), .help = "Last line angle cast; above the first one, but of a sphere: 350 to 10 goes across 0."},
     {"head.step_deg", IN_CONFIG(head.step_udeg), CFG_MICRO, "deg", "", 0.01, 90, .example = "0.1",
      .help = "sphere: from pulse to pulse and from ring to ring, in place of the profile's. Rounded to whole steps of a turn "
-             "and of half a turn, which is said."},
+             "and of half a turn, which is said. planar: one of the profile's geometries."},
     {"head.ring_start_deg", IN_CONFIG(head.ring_start_udeg), CFG_MICRO, "deg", "-90", -90, 90,
      .help = "sphere: elevation of the lowest ring. Rings outside of the limits are no lines and cost no time."},
     {"head.ring_stop_deg", IN_CONFIG(head.ring_stop_udeg), CFG_MICRO, "deg", "90", -90, 90,

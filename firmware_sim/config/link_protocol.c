@@ -22,6 +22,7 @@ static const struct {
     [PROTOCOL_VELODYNE_HTTP] = {1u << LINK_TCP | 1u << LINK_FD, "tcp"},
 };
 
+_Static_assert((int)HEAD_MAX_RATES == (int)PROTOCOL_MAX_GEOMETRIES, "geometries");
 _Static_assert((int)EMITTER_PLANAR == (int)NATIVE_EMIT_PLANAR && (int)EMITTER_BEAMS == (int)NATIVE_EMIT_BEAMS &&
                    (int)EMITTER_SPHERE == (int)NATIVE_EMIT_SPHERE &&
                    (int)EMITTER_DIRECTIONS == (int)NATIVE_EMIT_DIRECTIONS,
