@@ -205,6 +205,13 @@ static int act_reset(struct command_call *call)
     return 0;
 }
 
+static int act_reboot(struct command_call *call)
+{
+    if (call->dev->recorded != NULL)
+        return command_fail(call, CMD_E_SETTINGS, "%s: %s", call->row->header, call->dev->recorded);
+    return act_event(call, COMMAND_REBOOT);
+}
+
 static int act_step(struct command_call *call)
 {
     int64_t step_ns;
@@ -243,6 +250,7 @@ const struct command_row command_rows[] = {
     VALUE("HEAD:LINes", unit_hz, LINES),
     VALUE("HEAD:PAN", unit_deg_s, PAN),
     QUERY("HEAD:STATe", query_state),
+    CHANGE("HEAD:REBoot", act_reboot, HEAD_EV_POWER_OFF),
     VALUE("HEAD:STATION", unit_count, STATION), /* no short form: STAT is STATe */
     VALUE("HEAD:RANGe:MIN", unit_m, RANGE_MIN),
     VALUE("HEAD:RANGe:MAX", unit_m, RANGE_MAX),

@@ -196,6 +196,8 @@ int64_t device_utc_ns(struct device *device, int64_t t_ns);
 int64_t device_next_fix_ns(const struct device *device, int64_t t_ns);
 int device_fix(struct device *device, int64_t t_ns, struct nmea_fix *fix);
 
+/* Device time at which power came last, or will come back where it is off; 0: it has always been on. */
+int64_t device_power_ns(struct device *device);
 /* Counters begin so many below their wrap, since the last power-up; 0: at 0. */
 uint32_t device_near_wrap(struct device *device);
 

@@ -46,6 +46,11 @@ static int fix(void *self, int64_t t_ns, struct nmea_fix *fix)
     return device_fix(self, t_ns, fix);
 }
 
+static int64_t power_ns(void *self)
+{
+    return device_power_ns(self);
+}
+
 static uint32_t near_wrap(void *self)
 {
     return device_near_wrap(self);
@@ -86,6 +91,7 @@ const struct loop_source_ops loop_device_source = {
     .utc_ns = utc_ns,
     .next_fix_ns = next_fix_ns,
     .fix = fix,
+    .power_ns = power_ns,
     .near_wrap = near_wrap,
     .tick_ns = tick_ns,
     .counters = counters,

@@ -117,6 +117,7 @@ static int create(struct pump *pump, struct session *s)
         .host = {s, host_send, host_command, host_utc_ns, host_fix, host_count, host_hang_up, host_next_fix_ns},
         .session = s->id,
         .fixes_hz = pump->links->fixes_hz,
+        .power_ns = pump->links->source->ops->power_ns(pump->links->source->self),
         .near_wrap = pump->links->source->ops->near_wrap(pump->links->source->self),
         .waits = pump->stream->waits,
         .port = pump->links->data_port,

@@ -250,6 +250,12 @@ static struct fault_board *faults(const void *self)
     return ((const struct replay *)self)->faults;
 }
 
+static int64_t power_ns(void *self)
+{
+    (void)self;
+    return 0;
+}
+
 static uint32_t near_wrap(void *self)
 {
     (void)self;
@@ -299,6 +305,7 @@ const struct loop_source_ops replay_source = {
     .session_closed = replay_session_closed,
     .report = replay_report,
     .faults = faults,
+    .power_ns = power_ns,
     .near_wrap = near_wrap,
     .tick_ns = tick_ns,
     .counters = counters,
