@@ -174,7 +174,7 @@ static size_t odd_line(uint32_t *seed, char *line)
 static void nonsense(void **state)
 {
     (void)state;
-    static const char *const models[] = {"URG-04LX", "UTM-30LX", "UST-20LX", "other"};
+    static const char *const models[] = {"URG-04LX", "UTM-30LX", "UTM-30LX-EW", "UST-20LX", "other"};
     uint32_t seed = 20261122;
     for (size_t m = 0; m < 4; m++) {
         scip_open(models[m]);
