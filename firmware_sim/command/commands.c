@@ -250,7 +250,8 @@ const struct command_row command_rows[] = {
     VALUE("HEAD:LINes", unit_hz, LINES),
     VALUE("HEAD:PAN", unit_deg_s, PAN),
     QUERY("HEAD:STATe", query_state),
-    CHANGE("HEAD:REBoot", act_reboot, HEAD_EV_POWER_OFF),
+    /* Open, as the plug of a head: clients of its maker's protocol know nothing of control. */
+    {"HEAD:REBoot", NULL, act_reboot, NULL, NULL, 1, 0, 0, 0, HEAD_EV_POWER_OFF + 1},
     VALUE("HEAD:STATION", unit_count, STATION), /* no short form: STAT is STATe */
     VALUE("HEAD:RANGe:MIN", unit_m, RANGE_MIN),
     VALUE("HEAD:RANGe:MAX", unit_m, RANGE_MAX),

@@ -306,10 +306,10 @@ static void reset_and_reboot(void **state)
     assert_false(rig.hung_up); /* the power cycle ends it */
     scip_close();
 
-    /* Another session controls the head: this one alone begins anew, and the device's time goes on. */
-    static const struct protocol_rig_reply taken[] = {{"HEAD:REBOOT", "ERR", -203}, {NULL, NULL, 0}};
+    /* There is no head to reboot: the session alone begins anew, and the device's time goes on. */
+    static const struct protocol_rig_reply recorded[] = {{"HEAD:REBOOT", "ERR", -221}, {NULL, NULL, 0}};
     scip_open("UTM-30LX");
-    rig.replies = taken;
+    rig.replies = recorded;
     scip_ask("BM\nRB\nRB\n", "BM\n00P\n\nRB\n01Q\n\nRB\n00P\n\n");
     rig.ops->time(rig.protocol, 16000000 * 1000000LL);
     assert_true(rig.hung_up);
