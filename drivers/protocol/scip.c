@@ -114,8 +114,8 @@ static void gap(void *protocol, uint32_t n_frames)
     (void)n_frames;
 }
 
-/* The second RB was a second ago. The power cycle ends this session, too. Where none can be, as of a recording, this session
- * alone begins anew. */
+/* The second RB was a second ago. The power cycle ends this session, too. Where none can be, as of a recording, this
+ * session alone begins anew. */
 static void reboot(struct scip *s)
 {
     char reply[512];

@@ -13,7 +13,8 @@
 #define SPEED_ALONE    .speed_before = "", .speed_after = "", .at_default = ""
 #define STATES_IN_WORDS .mode_booting = "BOOTING", .mode_fault = "ERROR", \
     .works = "Sensor works well.", .boots = "Sensor is booting.", .has_failed = "Self test failed."
-#define STATES_IN_NUMBERS .mode_idle = "000 Idle", .mode_single = "003 Single_scan", .mode_streaming = "004 Multi_scan", \
+#define STATES_IN_NUMBERS \
+    .mode_idle = "000 Idle", .mode_single = "003 Single_scan", .mode_streaming = "004 Multi_scan", \
     .mode_booting = "001 Booting", .mode_fault = "900 Error", \
     .works = "Stable 000 no error.", .boots = "Booting 001 not ready.", .has_failed = "Error 900 self test failed."
 
@@ -76,8 +77,8 @@ static const struct scip_model models[] = {
     UST("UST-20LX"),
     {.name = NULL,
      .protocol = "SCIP 2.2",
-     .features = LX | SCIP_MULTI_ECHO | SCIP_MOTOR_SPEED | SCIP_BIT_RATE | SCIP_SIMULATION | SCIP_TIME_HEX | SCIP_STATE |
-                 SCIP_TIME_US,
+     .features = LX | SCIP_MULTI_ECHO | SCIP_MOTOR_SPEED | SCIP_BIT_RATE | SCIP_SIMULATION | SCIP_TIME_HEX |
+                 SCIP_STATE | SCIP_TIME_US,
      .bit_rate = 115200,
      SPEED_ALONE,
      STATES_IN_NUMBERS,
