@@ -106,31 +106,36 @@ int device_end_boot(struct device *device, uint64_t tick)
     return 1;
 }
 
-void device_run_power(struct device *device, uint64_t tick, struct device_work *work)
+/* Until when power is to be off that goes in this tick; 0: none goes. */
+static uint64_t goes_until(struct device *device, uint64_t tick)
 {
     const struct head_fault *f = NULL;
-    work->power = DEVICE_POWER_STAYS;
-    if (device->machine.state == HEAD_OFF && device->machine.due_tick <= tick) {
-        turn_on(device, tick);
-        work->power = DEVICE_POWER_COMES;
+    uint64_t until_tick = device->power.reboots ? tick + 1 : 0;
+    device->power.reboots = 0;
+    if (fault_board_version(device->faults) == 0) return until_tick;
+    while ((f = head_faults_next(&device->head_faults, FAULT_POWER_CYCLE, f)) != NULL) {
+        const uint64_t tick1 = tick + device_ticks_of(device, 1e-3 * f->fault.for_ms);
+        if (f->begins && tick1 > until_tick) until_tick = tick1; /* two of them at once: as long as the longer */
     }
-    if (device->power.boot_begins) begin_boot(device, tick);
-    if (device->power.reboots && device->machine.state != HEAD_OFF && work->power == DEVICE_POWER_STAYS) {
-        turn_off(device, tick, tick + 1);
+    return until_tick;
+}
+
+/* Power that would come back with the tick with which it goes again stays away: links see it go and come in turn. */
+void device_run_power(struct device *device, uint64_t tick, struct device_work *work)
+{
+    const uint64_t until_tick = goes_until(device, tick);
+    work->power = DEVICE_POWER_STAYS;
+    if (device->machine.state == HEAD_OFF) {
+        if (until_tick > device->power.on_tick) device->machine.due_tick = device->power.on_tick = until_tick;
+        if (device->machine.due_tick <= tick) {
+            turn_on(device, tick);
+            work->power = DEVICE_POWER_COMES;
+        }
+    } else if (until_tick != 0) {
+        turn_off(device, tick, until_tick);
         work->power = DEVICE_POWER_GOES;
     }
-    device->power.reboots = 0;
-    if (fault_board_version(device->faults) == 0) return;
-    while ((f = head_faults_next(&device->head_faults, FAULT_POWER_CYCLE, f)) != NULL) {
-        if (!f->begins) continue;
-        const uint64_t until_tick = tick + device_ticks_of(device, 1e-3 * f->fault.for_ms);
-        if (device->machine.state != HEAD_OFF) {
-            turn_off(device, tick, until_tick);
-            work->power = DEVICE_POWER_GOES;
-        } else if (until_tick > device->power.on_tick) { /* two of them at once: as long as the longer */
-            device->machine.due_tick = device->power.on_tick = until_tick;
-        }
-    }
+    if (device->power.boot_begins) begin_boot(device, tick);
 }
 
 int device_is_dead(const struct device *device, uint64_t released)

@@ -34,7 +34,7 @@ static void rates_and_angles_follow(void **state)
     assert_int_equal(cfg->profile.fov_min_udeg, -135000000);
     assert_int_equal(cfg->profile.fov_max_udeg, 135000000);
     assert_int_equal(cfg->head.settings.line_start_udeg, -135000000);
-    assert_string_equal(cfg->profile.firmware, "4.0.0");
+    assert_string_equal(cfg->profile.firmware, "4.1.0b-A");
     assert_loads(load_settings("hokuyo-urg-04lx", "  lines_hz: 9.25\n"));
     assert_int_equal(cfg->head.settings.prr_uhz, INT64_C(1024) * 9250000);
     assert_int_equal(cfg->profile.fov_min_udeg, -119531250); /* (44 - 384) 360 / 1024 deg */

@@ -170,6 +170,32 @@ static void loses_power_at_a_pulse(void **state)
     rig_close(rig);
 }
 
+/* The second one begins with the tick with which power would be back: it stays away, since who follows power counts
+ * that it goes and comes in turn. */
+static void loses_power_as_it_comes(void **state)
+{
+    (void)state;
+    struct rig *rig = open_with("  - {kind: power_cycle, from_s: 0.3, for_ms: 10}\n"
+                                "  - {kind: power_cycle, from_s: 0.31, for_ms: 20}\n",
+                                NULL, NULL, 0);
+    static const struct {
+        uint64_t tick;
+        int power;
+    } rows[] = {{300, DEVICE_POWER_GOES}, {330, DEVICE_POWER_COMES}};
+    size_t n = 0;
+    while (rig->next < 600) {
+        assert_true(rig_claim(rig));
+        if (rig->work.power == DEVICE_POWER_STAYS) continue;
+        assert_in_range(n, 0, 1);
+        assert_int_equal(rig->work.tick, rows[n].tick);
+        assert_int_equal(rig->work.power, rows[n].power);
+        n++;
+    }
+    assert_int_equal(n, 2);
+    assert_string_equal(rig_tell(rig, "FAULt:INJected?", rig->next), "2");
+    rig_close(rig);
+}
+
 /* Lost ticks and errors of a head without power are said when power is back; the end of the run does not wait for it. */
 static void ends_without_power(void **state)
 {
@@ -356,6 +382,7 @@ int main(void)
         cmocka_unit_test(ends_a_run_that_cannot_scan),
         cmocka_unit_test(loses_power),
         cmocka_unit_test(ends_without_power),
+        cmocka_unit_test(loses_power_as_it_comes),
         cmocka_unit_test(loses_power_at_a_pulse),
         cmocka_unit_test(tells_a_wrong_time),
         cmocka_unit_test(loses_pps_up_to_the_end),

@@ -84,6 +84,10 @@ static void scip_times_pass_the_wrap(void **state)
     scip_ask("RS\nTM0\nTM1\nTM2\n", "RS\n00P\n\nTM0\n00P\n\nTM1\n00P\n00000\n\nTM2\n00P\n\n");
     scip_ask("RB\nRB\n", "RB\n01Q\n\nRB\n00P\n\n");
     rig.ops->time(rig.protocol, INT64_C(1150000000)); /* 1 s later */
+    assert_string_equal(rig.line[rig.n_lines - 1], "HEAD:REBOOT");
+    rig.spec.power_ns = INT64_C(1150000000);
+    open_again(&rig, 75);
+    rig.ops->time(rig.protocol, rig.spec.power_ns);
     scip_ask("TM0\nTM1\n", "TM0\n00P\n\nTM1\n00P\noonea\n\n"); /* 2^24 - 75: 63, 63, 62, 53 */
     scip_close();
 }
