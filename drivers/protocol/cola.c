@@ -17,7 +17,7 @@ void cola_power_up(struct cola *self)
 
 uint32_t cola_time_us(const struct cola *self, int64_t t_ns)
 {
-    return (uint32_t)((uint64_t)t_ns / 1000U) - self->near_wrap;
+    return (uint32_t)((uint64_t)(t_ns - self->power_ns) / 1000U) - self->near_wrap;
 }
 
 static int create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
@@ -26,6 +26,8 @@ static int create(const struct protocol_spec *spec, void **protocol, struct sh_e
     if (self == NULL) return sh_fail(err, SH_ENOMEM, "protocol cola: no memory for %zu bytes", sizeof *self);
     self->host = spec->host;
     self->identity = spec->identity;
+    self->power_ns = spec->power_ns;
+    self->power_ons = spec->power_ons;
     self->near_wrap = spec->near_wrap;
     self->model = cola_model_find(spec->identity->model);
     planar_scan_init(&self->scan);

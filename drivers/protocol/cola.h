@@ -55,6 +55,8 @@ struct cola {
     int wants_scan;  /* measurement was asked for, and no scan has come yet; next look at the head at try_ns */
     int64_t try_ns;
     int64_t now_ns;
+    int64_t power_ns; /* device time of power-up: its clock begins there */
+    uint32_t power_ons;
     uint32_t near_wrap;         /* counters begin so many below their wrap */
     int streams;                /* sEN LMDscandata 1 */
     enum cola_form stream_form; /* of telegrams without a request */

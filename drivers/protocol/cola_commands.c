@@ -176,6 +176,15 @@ static enum cola_error carry_out(struct cola *self, const struct cola_request *r
     return c->carry_out(self, &p.args, out);
 }
 
+/* The head's power cycle ends all sessions. Where there is none, as of a recording, this session alone begins anew. */
+static void reboot(struct cola *self)
+{
+    char reply[512];
+    const int refused = self->host.command(self->host.ctx, "HEAD:REBoot", reply, sizeof reply) != 0;
+    cola_power_up(self);
+    if (refused) self->host.hang_up(self->host.ctx);
+}
+
 void cola_carry_out(struct cola *self, const struct cola_request *request)
 {
     struct cola_out out = {.buf = self->unit, .cap = sizeof self->unit};
@@ -190,7 +199,5 @@ void cola_carry_out(struct cola *self, const struct cola_request *request)
     else if (self->host.send(self->host.ctx, self->unit, cola_end(&out)) != 0)
         self->telegrams = telegrams;
     if (self->outputs_due) cola_send_outputs(self);
-    if (!self->reboots) return;
-    cola_power_up(self);
-    self->host.hang_up(self->host.ctx);
+    if (self->reboots) reboot(self);
 }

@@ -104,14 +104,13 @@ enum cola_error cola_read_contamination(struct cola *self, struct cola_args *arg
 enum cola_error cola_read_hours(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
     const int64_t tenth_ns = INT64_C(360000000000);
-    cola_put_u(out, 4, (uint32_t)(self->now_ns / tenth_ns));
+    cola_put_u(out, 4, (uint32_t)((self->now_ns - self->power_ns) / tenth_ns));
     return cola_args_end(args);
 }
 
 enum cola_error cola_read_power_ons(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
-    (void)self;
-    cola_put_u(out, 4, 1);
+    cola_put_u(out, 4, self->power_ons);
     return cola_args_end(args);
 }
 
@@ -214,7 +213,7 @@ enum cola_error cola_stop(struct cola *self, struct cola_args *args, struct cola
 int64_t cola_clock_ns(const struct cola *self, int64_t t_ns)
 {
     const int64_t utc_ns = self->host.utc_ns(self->host.ctx, t_ns);
-    return (utc_ns == INT64_MIN ? t_ns : utc_ns) + self->set.clock_ns;
+    return (utc_ns == INT64_MIN ? t_ns - self->power_ns : utc_ns) + self->set.clock_ns;
 }
 
 void cola_put_time(const struct cola *self, int64_t t_ns, struct cola_out *out)

@@ -97,6 +97,7 @@ struct protocol_spec {
     uint32_t session;   /* from 1, over all links */
     uint32_t fixes_hz;  /* of the GNSS receiver */
     int64_t power_ns;   /* device time at which power came last: what the device counts since power-up counts from it */
+    uint32_t power_ons; /* how often power has come, by power cycles and reboots, with the first time */
     uint32_t near_wrap; /* counters begin so many below their wrap; 0: at 0 */
     int waits;          /* 1: paces fast and step: device time says nothing of how long a client takes */
     /* velodyne_http: where the settings say that data go, and so on; empty: not known */

@@ -204,6 +204,8 @@ int device_fix(struct device *device, int64_t t_ns, struct nmea_fix *fix);
 
 /* Device time at which power came last, or will come back where it is off; 0: it has always been on. */
 int64_t device_power_ns(struct device *device);
+/* How often power has come, with the first time. */
+uint32_t device_power_ons(struct device *device);
 /* Counters begin so many below their wrap, since the last power-up; 0: at 0. */
 uint32_t device_near_wrap(struct device *device);
 

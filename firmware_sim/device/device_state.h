@@ -89,6 +89,7 @@ struct device_power {
     uint64_t off_tick, on_tick; /* 0: it has always been on */
     int boot_begins;            /* in the tick at hand */
     int reboots;                /* a command asked for it: power goes with the next tick, for one tick */
+    uint32_t again;             /* how often power has come back */
     uint32_t near_wrap;         /* counters begin so many below their wrap */
 };
 

@@ -63,6 +63,7 @@ static void turn_on(struct device *device, uint64_t tick)
     cmd->frames_done = 0;
     memset(&cmd->queue, 0, sizeof cmd->queue);
     set_near_wrap(device, tick);
+    device->power.again++;
     device->scan.variant = NULL;
     device_before_scans(device);
     device_transition(device, HEAD_EV_POWER_ON, tick);
@@ -150,6 +151,14 @@ int64_t device_power_ns(struct device *device)
     int64_t t_ns = time_of(device, device->power.on_tick);
     pthread_mutex_unlock(&device->lock);
     return t_ns;
+}
+
+uint32_t device_power_ons(struct device *device)
+{
+    pthread_mutex_lock(&device->lock);
+    const uint32_t n = device->power.again + 1;
+    pthread_mutex_unlock(&device->lock);
+    return n;
 }
 
 uint32_t device_near_wrap(struct device *device)

@@ -56,6 +56,11 @@ static int64_t power_ns(void *self)
     return device_power_ns(self);
 }
 
+static uint32_t power_ons(void *self)
+{
+    return device_power_ons(self);
+}
+
 static uint32_t near_wrap(void *self)
 {
     return device_near_wrap(self);
@@ -108,6 +113,7 @@ const struct loop_source_ops loop_device_source = {
     .next_fix_ns = next_fix_ns,
     .fix = fix,
     .power_ns = power_ns,
+    .power_ons = power_ons,
     .near_wrap = near_wrap,
     .tick_ns = tick_ns,
     .counters = counters,

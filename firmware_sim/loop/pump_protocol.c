@@ -118,6 +118,7 @@ static int create(struct pump *pump, struct session *s)
         .session = s->id,
         .fixes_hz = pump->links->fixes_hz,
         .power_ns = pump->links->source->ops->power_ns(pump->links->source->self),
+        .power_ons = pump->links->source->ops->power_ons(pump->links->source->self),
         .near_wrap = pump->links->source->ops->near_wrap(pump->links->source->self),
         .waits = pump->stream->waits,
         .port = pump->links->data_port,

@@ -27,6 +27,7 @@ struct loop_source_ops {
     int64_t (*next_fix_ns)(const void *self, int64_t t_ns);
     int (*fix)(void *self, int64_t t_ns, struct nmea_fix *fix);
     int64_t (*power_ns)(void *self);
+    uint32_t (*power_ons)(void *self);
     uint32_t (*near_wrap)(void *self);
 
     /* ---- the run */

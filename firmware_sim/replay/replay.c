@@ -256,6 +256,12 @@ static int64_t power_ns(void *self)
     return 0;
 }
 
+static uint32_t power_ons(void *self)
+{
+    (void)self;
+    return 1;
+}
+
 static uint32_t near_wrap(void *self)
 {
     (void)self;
@@ -316,6 +322,7 @@ const struct loop_source_ops replay_source = {
     .report = replay_report,
     .faults = faults,
     .power_ns = power_ns,
+    .power_ons = power_ons,
     .near_wrap = near_wrap,
     .tick_ns = tick_ns,
     .counters = counters,

@@ -86,7 +86,8 @@ void protocol_rig_open(struct protocol_rig *rig, enum protocol_id id, const char
     rig->spec = (struct protocol_spec){.identity = &rig->identity,
                                        .host = {rig, keep_unit, answer, utc_ns, fix, count, hang_up, next_fix_ns},
                                        .session = 1,
-                                       .fixes_hz = 1};
+                                       .fixes_hz = 1,
+                                       .power_ons = 1};
     assert_int_equal(rig->ops->create(&rig->spec, &rig->protocol, &err), SH_OK);
     if (rig->ops->open != NULL) rig->ops->open(rig->protocol, 0);
 }

@@ -23,8 +23,40 @@ static void sick_tim_starts(void **state)
     cola_expect("sEN LMDscandata 0", "sEA LMDscandata 0");
     cola_expect("sMN SetAccessMode 03 F4724744", "sAN SetAccessMode 1");
     cola_expect("sMN mSCreboot", "sAN mSCreboot");
-    assert_int_equal(cola.hung_up, 1);
+    assert_string_equal(cola.line[cola.n_lines - 1], "HEAD:REBoot");
+    assert_int_equal(cola.hung_up, 0); /* the power cycle does that */
     assert_int_equal(cola.count[PROTOCOL_WRONG], 0);
+}
+
+/* As of a recording: the session alone begins anew. */
+static void a_reboot_that_is_refused_ends_the_session(void **state)
+{
+    (void)state;
+    static const struct protocol_rig_reply refuses[] = {
+        {"HEAD:STATE?", "scanning", 0}, {"HEAD:REBoot", "ERR", -221}, {NULL, NULL, 0}};
+    cola_open_lms();
+    cola.replies = refuses;
+    cola_authorise();
+    cola_expect("sMN mSCreboot", "sAN mSCreboot");
+    assert_int_equal(cola.hung_up, 1);
+}
+
+/* The clock, hours and count of power-ups are those since power came last. */
+static void clocks_begin_at_power_up(void **state)
+{
+    (void)state;
+    cola_open_lms();
+    cola.ops->destroy(cola.protocol);
+    cola.spec.power_ns = INT64_C(3600000000000);
+    cola.spec.power_ons = 3;
+    assert_int_equal(cola.ops->create(&cola.spec, &cola.protocol, NULL), 0);
+    protocol_rig_describe(&cola, 0);
+    cola.ops->time(cola.protocol, INT64_C(3600000000000) * 3 + INT64_C(5000000000));
+    cola_expect("sRN ODpwrc", "sRA ODpwrc 3");
+    cola_expect("sRN ODoprh", "sRA ODoprh 14"); /* two hours */
+    cola_expect("sRN STlms", "sRA STlms 7 0 8 02:00:05 A 01.01.1970 0 0 0");
+    assert_memory_equal(cola_ask("sRN LIDoutputstate"), "sRA LIDoutputstate 1 AD739340 ",
+                        30); /* 7205 s in us, 32 bits */
 }
 
 /* sick_tim refuses firmware from 2.50 on of a TiM3xx, by this pattern; no model of ours may look like one. */
@@ -341,6 +373,8 @@ int main(void)
 #define CASE(f) cmocka_unit_test_teardown(f, close_rig)
     const struct CMUnitTest tests[] = {
         CASE(sick_tim_starts),
+        CASE(a_reboot_that_is_refused_ends_the_session),
+        CASE(clocks_begin_at_power_up),
         CASE(no_ident_is_an_old_tim),
         CASE(sick_scan_xd_starts_in_a),
         CASE(sick_scan_xd_starts_in_b),
