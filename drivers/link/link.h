@@ -56,6 +56,7 @@ enum link_event_kind {
     LINK_REFUSED,  /* somebody was turned away: all sessions taken */
     LINK_NOTICE,   /* something that whoever runs the head should know: the text is in peer */
     LINK_PLUGGED,  /* usb: a host has got the device, and will enumerate it once poll() is called again */
+    LINK_SHUT,     /* tcp: the other side sends nothing more, and all of it was read; it may go on reading */
 };
 
 struct link_event {

@@ -22,7 +22,7 @@
 #include "drivers/link/link_poll.h"
 #include "drivers/socket/socket.h"
 
-enum { SEND_BUFFER_BYTES = 1 << 20 };
+enum { SEND_BUFFER_BYTES = 1 << 20, DRAIN_READS = 4096 };
 
 struct udp_link {
     int fd;
@@ -223,8 +223,8 @@ static int udp_fault(void *link, enum link_fault what, int session, uint32_t n, 
         return SH_OK;
     }
     if (what != LINK_FAULT_PLUG) return SH_ESTATE;
-    while (udp->unplugged && recv(udp->fd, nothing, sizeof nothing, MSG_DONTWAIT) >= 0)
-        continue;
+    for (int i = 0; i < DRAIN_READS && udp->unplugged && recv(udp->fd, nothing, sizeof nothing, MSG_DONTWAIT) >= 0; i++)
+        continue; /* who sends faster than this reads is not waited for */
     udp->unplugged = 0;
     return SH_OK;
 }

@@ -61,11 +61,9 @@ static void refuse_long(int fd)
 {
     static const char words[] = "HTTP/1.1 413 Content Too Large\r\nconnection: close\r\ncontent-type: text/plain\r\n"
                                 "content-length: 37\r\n\r\na request has at most 8192 bytes here";
-    char rest[4096];
     if (socket_write(fd, words, sizeof words - 1) < 0) return;
     shutdown(fd, SHUT_WR);
-    while (socket_read(fd, rest, sizeof rest) > 0) /* else the system would reset the connection, answer and all */
-        continue;
+    socket_drain(fd);
 }
 
 /* 0: wait on; -1: this descriptor is done with. */

@@ -86,10 +86,10 @@ struct protocol_identity {
 struct protocol_spec {
     const struct protocol_identity *identity;
     struct protocol_host host;
-    uint32_t session;  /* from 1, over all links */
-    uint32_t fixes_hz; /* of the GNSS receiver */
+    uint32_t session;   /* from 1, over all links */
+    uint32_t fixes_hz;  /* of the GNSS receiver */
     uint32_t near_wrap; /* counters begin so many below their wrap; 0: at 0 */
-    int waits;         /* 1: paces fast and step: device time says nothing of how long a client takes */
+    int waits;          /* 1: paces fast and step: device time says nothing of how long a client takes */
     /* velodyne_http: where the settings say that data go, and so on; empty: not known */
     char address[64];
     int port;
@@ -127,6 +127,9 @@ struct protocol_ops {
     void (*time)(void *protocol, int64_t t_ns);
     /* Bytes from the client, in pieces of any size. */
     void (*input)(void *protocol, const uint8_t *bytes, size_t len);
+    /* Whether units may still come for a client that sends nothing more: a stream that it asked for, or an answer that
+     * takes time. 0: its session ends. May be NULL: they come without being asked for. */
+    int (*owes)(const void *protocol);
     /* Device time that must have passed before time() has something to do, unless frames or bytes come. May be NULL:
      * each tick. It saves wake-ups, no more: time() is called for the other ticks, too. */
     int64_t (*next_ns)(const void *protocol);

@@ -118,6 +118,12 @@ static void time_is(void *protocol, int64_t t_ns)
     s->host.hang_up(s->host.ctx);
 }
 
+static int owes(const void *protocol)
+{
+    const struct scip *s = protocol;
+    return s->stream.active || s->single.active || s->reboot_ns != INT64_MIN;
+}
+
 /* Scans are looked for at each tick; without a request it is enough to keep up with the stream. */
 static int64_t next_ns(const void *protocol)
 {
@@ -142,5 +148,6 @@ const struct protocol_ops protocol_scip = {
     .gap = gap,
     .time = time_is,
     .input = input,
+    .owes = owes,
     .next_ns = next_ns,
 };
