@@ -9,7 +9,8 @@
  * A source port may be one that a receiver on this machine listens on, too. So addresses are shared (SO_REUSEADDR), and
  * the socket is connected: it gets nothing but what its receiver sends back. It never has its receiver's own address and
  * port, since it would get its own packets. On the loopback, where the receiver has the port, the source is the address
- * after the receiver's.
+ * after the receiver's. Receivers that don't share their port (MRPT, PCL) could not listen on this machine then. So
+ * the usual port of a protocol is not taken there unless the link names its source.
  *
  * A receiver that is not there is no failure: what was sent is gone, and so is what the system had no room for on its
  * way out. Both are counted. A refused datagram counts when its refusal comes; several may share one refusal. What
@@ -169,6 +170,15 @@ static int ask_source(const struct sockaddr_storage *to, socklen_t len, struct s
     return ok ? 0 : -1;
 }
 
+/* Whether a receiver is on this machine, where packets to it come from `from`. */
+static int is_own_machine(const struct sockaddr_storage *to, const struct sockaddr_storage *from)
+{
+    struct sockaddr_storage a = *to, b = *from;
+    *port_of(&a) = *port_of(&b) = 0;
+    return is_same_place(&a, &b) ||
+           (b.ss_family == AF_INET && ntohl(ipv4_of((struct sockaddr *)&b)) >> 24 == IN_LOOPBACKNET);
+}
+
 /* Where packets come from, its port included. 0: from where the system says; 1: from there; -1: errno. */
 static int find_source(const struct link_spec *spec, const struct sockaddr_storage *to, socklen_t len,
                        const struct network *net, struct sockaddr_storage *from)
@@ -188,6 +198,8 @@ static int find_source(const struct link_spec *spec, const struct sockaddr_stora
         return 0;
     } else if (ask_source(to, len, from) != 0) {
         return -1;
+    } else if (spec->usual_port && is_own_machine(to, from)) {
+        return 0;
     }
     *port_of(from) = htons((uint16_t)spec->source_port);
     if (spec->source[0] == '\0' && is_same_place(from, to) && from->ss_family == AF_INET) {

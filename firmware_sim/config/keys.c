@@ -160,8 +160,9 @@ static const struct cfg_key config_keys[] = {
              "the loopback and has the source's port."},
     {LINK(source_port), CFG_COUNT, NULL, "0", 0, 65535,
      .help = "udp: port that packets come from; 0: the system chooses. When not given: velodyne 2368, velodyne-position "
-             "8308, as the device's, or another with a warning where these can't be had. A receiver on this machine that "
-             "listens on that port at all addresses must share it (SO_REUSEADDR)."},
+             "8308, as the device's, or another with a warning where these can't be had; but without source and interface "
+             "the system chooses for a receiver on this machine. One that listens on the same port at all addresses "
+             "must share it (SO_REUSEADDR)."},
     {LINK(ttl), CFG_COUNT, NULL, "", 1, 255, .example = "4",
      .help = "udp: time to live of the packets, in networks. When not given: 1 to a multicast group, else the system's."},
     {LINK(max_sessions), CFG_COUNT, NULL, "4", 1, LINK_MAX_SESSIONS,
