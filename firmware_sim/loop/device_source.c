@@ -46,6 +46,11 @@ static int fix(void *self, int64_t t_ns, struct nmea_fix *fix)
     return device_fix(self, t_ns, fix);
 }
 
+static enum protocol_pps pps(void *self, int64_t t_ns, int *set)
+{
+    return device_pps(self, t_ns, set);
+}
+
 static uint32_t near_wrap(void *self)
 {
     return device_near_wrap(self);
@@ -86,6 +91,7 @@ const struct loop_source_ops loop_device_source = {
     .utc_ns = utc_ns,
     .next_fix_ns = next_fix_ns,
     .fix = fix,
+    .pps = pps,
     .near_wrap = near_wrap,
     .tick_ns = tick_ns,
     .counters = counters,

@@ -67,6 +67,12 @@ static int64_t host_next_fix_ns(void *ctx, int64_t t_ns)
     return s->pump->links->source->ops->next_fix_ns(s->pump->links->source->self, t_ns);
 }
 
+static enum protocol_pps host_pps(void *ctx, int64_t t_ns, int *set)
+{
+    const struct session *s = ctx;
+    return s->pump->links->source->ops->pps(s->pump->links->source->self, t_ns, set);
+}
+
 static void host_count(void *ctx, enum protocol_count what, uint64_t n)
 {
     struct session *s = ctx;
@@ -114,7 +120,8 @@ static int create(struct pump *pump, struct session *s)
 {
     struct protocol_spec spec = {
         .identity = &pump->links->identity,
-        .host = {s, host_send, host_command, host_utc_ns, host_fix, host_count, host_hang_up, host_next_fix_ns},
+        .host = {s, host_send, host_command, host_utc_ns, host_fix, host_count, host_hang_up, host_next_fix_ns,
+                 host_pps},
         .session = s->id,
         .fixes_hz = pump->links->fixes_hz,
         .near_wrap = pump->links->source->ops->near_wrap(pump->links->source->self),

@@ -26,6 +26,7 @@ struct loop_source_ops {
     int64_t (*utc_ns)(void *self, int64_t t_ns);
     int64_t (*next_fix_ns)(const void *self, int64_t t_ns);
     int (*fix)(void *self, int64_t t_ns, struct nmea_fix *fix);
+    enum protocol_pps (*pps)(void *self, int64_t t_ns, int *set);
     uint32_t (*near_wrap)(void *self);
 
     /* ---- the run */
