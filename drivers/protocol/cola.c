@@ -125,6 +125,12 @@ enum cola_error cola_read_scan(struct cola *self, struct cola_args *args, struct
     return COLA_LATER;
 }
 
+static int owes(const void *protocol)
+{
+    const struct cola *self = protocol;
+    return self->streams || self->n_waiting != 0 || self->reboots;
+}
+
 static int64_t next_time(const void *protocol)
 {
     const struct cola *self = protocol;
@@ -163,5 +169,6 @@ const struct protocol_ops protocol_cola = {
     .gap = pass_gap,
     .time = pass_time,
     .input = take_input,
+    .owes = owes,
     .next_ns = next_time,
 };

@@ -38,6 +38,14 @@ enum protocol_needs {
     PROTOCOL_NEEDS_LAST = 1 << 4,       /* beam.echoes is not first */
 };
 
+/* Pulses per second that the head's clock follows, as a VLP-16 numbers their states. */
+enum protocol_pps {
+    PROTOCOL_PPS_ABSENT,
+    PROTOCOL_PPS_SYNCHRONISING,
+    PROTOCOL_PPS_LOCKED,
+    PROTOCOL_PPS_ERROR, /* they come at other times than the clock's full seconds */
+};
+
 /* What is counted of a session beside the frames it lost. */
 enum protocol_count {
     PROTOCOL_UNITS_LOST,    /* units that were not sent: no room, or parts of them were missing */
@@ -72,6 +80,9 @@ struct protocol_host {
     void (*hang_up)(void *ctx);
     /* Device time of the receiver's first fix at or after t_ns; INT64_MAX: it knows no time. */
     int64_t (*next_fix_ns)(void *ctx, int64_t t_ns);
+    /* State of the pulses per second at a device time. *set: by then the time of day was set; else the head counts from
+     * power-up. May be NULL: locked where UTC is known. */
+    enum protocol_pps (*pps)(void *ctx, int64_t t_ns, int *set);
 };
 
 enum { PROTOCOL_MAX_GEOMETRIES = 8 };
@@ -138,6 +149,9 @@ struct protocol_ops {
     void (*time)(void *protocol, int64_t t_ns);
     /* Bytes from the client, in pieces of any size. */
     void (*input)(void *protocol, const uint8_t *bytes, size_t len);
+    /* Whether units may still come for a client that sends nothing more: a stream that it asked for, or an answer that
+     * takes time. 0: its session ends. May be NULL: they come without being asked for. */
+    int (*owes)(const void *protocol);
     /* Device time that must have passed before time() has something to do, unless frames or bytes come. May be NULL:
      * each tick. It saves wake-ups, no more: time() is called for the other ticks, too. */
     int64_t (*next_ns)(const void *protocol);

@@ -132,6 +132,12 @@ static void time_is(void *protocol, int64_t t_ns)
     if (s->reboot_ns != INT64_MIN && t_ns >= s->reboot_ns) reboot(s);
 }
 
+static int owes(const void *protocol)
+{
+    const struct scip *s = protocol;
+    return s->stream.active || s->single.active || s->reboot_ns != INT64_MIN;
+}
+
 /* Scans are looked for at each tick; without a request it is enough to keep up with the stream. */
 static int64_t next_ns(const void *protocol)
 {
@@ -156,5 +162,6 @@ const struct protocol_ops protocol_scip = {
     .gap = gap,
     .time = time_is,
     .input = input,
+    .owes = owes,
     .next_ns = next_ns,
 };

@@ -152,8 +152,19 @@ static const struct cfg_key config_keys[] = {
      .help = "tcp, usb, web: port; 0: the system chooses; usbip, when not given: 3240. udp: the receiver's (required)."},
     {LINK(interface), CFG_TEXT, .def = "", .example = "eth1",
      .help = "udp: the packets' source is this interface's address. Required where they are broadcast, to "
-             "255.255.255.255 or to its own broadcast address. Routes still say where packets to other addresses go: "
+             "255.255.255.255 or to its own broadcast address, and where they go to a multicast group. Routes still say where packets to other addresses go: "
              "to bind a socket to an interface takes a privilege."},
+    {LINK(source), CFG_TEXT, .def = "", .example = "192.168.1.201",
+     .help = "udp: numeric address of this machine that packets come from, so that receivers tell heads apart. When not "
+             "given: the interface's, or as the system chooses; but the address after the receiver's where that is on "
+             "the loopback and has the source's port."},
+    {LINK(source_port), CFG_COUNT, NULL, "0", 0, 65535,
+     .help = "udp: port that packets come from; 0: the system chooses. When not given: velodyne 2368, velodyne-position "
+             "8308, as the device's, or another with a warning where these can't be had; but without source and interface "
+             "the system chooses for a receiver on this machine. One that listens on the same port at all addresses "
+             "must share it (SO_REUSEADDR)."},
+    {LINK(ttl), CFG_COUNT, NULL, "", 1, 255, .example = "4",
+     .help = "udp: time to live of the packets, in networks. When not given: 1 to a multicast group, else the system's."},
     {LINK(max_sessions), CFG_COUNT, NULL, "4", 1, LINK_MAX_SESSIONS,
      .help = "tcp, web: clients at a time; scip, when not given: 1."},
     {LINK(waits), CFG_ENUM, .def = "by-type",

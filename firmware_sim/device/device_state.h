@@ -8,6 +8,7 @@
 #include "firmware_sim/device/device.h"
 #include "firmware_sim/device/fault_desk.h"
 #include "firmware_sim/device/gnss.h"
+#include "firmware_sim/device/pps.h"
 #include "firmware_sim/device/head_clock.h"
 #include "firmware_sim/device/head_faults.h"
 
@@ -166,6 +167,7 @@ struct device {
     struct command_device cmd;
     struct head_clock clock;
     struct gnss gnss;
+    struct pps pps;
     char plan[160]; /* site_plan_text */
     char idn[96];
     uint64_t tick_hz;
@@ -300,6 +302,8 @@ int device_is_dead(const struct device *device, uint64_t released);
 
 /* clock_faults.c */
 void device_run_clock_faults(struct device *device, uint64_t tick);
+/* Whether pulses are lost at a device time. */
+int device_has_no_pps(const struct device *device, int64_t t_ns);
 /* The PPS event of a full second is not to be. */
 int device_loses_pps(struct device *device, int64_t edge_ns);
 

@@ -61,6 +61,11 @@ static uint32_t power_ons(void *self)
     return device_power_ons(self);
 }
 
+static enum protocol_pps pps(void *self, int64_t t_ns, int *set)
+{
+    return device_pps(self, t_ns, set);
+}
+
 static uint32_t near_wrap(void *self)
 {
     return device_near_wrap(self);
@@ -114,6 +119,7 @@ const struct loop_source_ops loop_device_source = {
     .fix = fix,
     .power_ns = power_ns,
     .power_ons = power_ons,
+    .pps = pps,
     .near_wrap = near_wrap,
     .tick_ns = tick_ns,
     .counters = counters,

@@ -21,7 +21,8 @@ int pump_open(struct links *links, uint32_t index, const struct link_spec *spec,
     pump->stream = links->stream;
     pump->number = index + 1;
     if (spec->type != LINK_FD && !spec->clean)
-        pump->board = links->source->ops->faults(links->source->self); /* readers of this process get the clean stream */
+        pump->board =
+            links->source->ops->faults(links->source->self); /* readers of this process get the clean stream */
     pump->ops = link_ops_get(spec->type);
     pump->can = link_faults(spec);
     pump->protocol = protocol_ops_get((enum protocol_id)spec->protocol);
@@ -128,6 +129,9 @@ static void handle(struct pump *pump, const struct link_event *event)
             pump_read(pump, s, event->session);
         else if (s->open)
             pump_read_commands(pump, s, event->session);
+        break;
+    case LINK_SHUT:
+        session_shut(pump, s);
         break;
     case LINK_REFUSED:
         source_report(pump->links->source, CMD_E_REFUSED, event->peer);

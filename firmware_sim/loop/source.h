@@ -28,6 +28,7 @@ struct loop_source_ops {
     int (*fix)(void *self, int64_t t_ns, struct nmea_fix *fix);
     int64_t (*power_ns)(void *self);
     uint32_t (*power_ons)(void *self);
+    enum protocol_pps (*pps)(void *self, int64_t t_ns, int *set);
     uint32_t (*near_wrap)(void *self);
 
     /* ---- the run */
