@@ -163,14 +163,14 @@ static int tcp_report_closed(struct tcp_session *session, int slot, struct link_
     return 1;
 }
 
-/* What poll waits for of a session. */
+/* A session's entry for poll: the events that it waits for. */
 static struct pollfd tcp_slot(const struct tcp_session *session, int want_write)
 {
     const int events = (session->shut ? 0 : POLLIN) | (want_write ? POLLOUT : 0);
     return (struct pollfd){.fd = session->state == TCP_OPEN ? session->fd : -1, .events = (short)events};
 }
 
-/* What poll said of a session. */
+/* Turns the events of a session into those of the link. */
 static void tcp_report(struct tcp_session *session, int slot, short revents, struct link_events *events)
 {
     const enum socket_state state = socket_state(session->fd, revents);

@@ -124,7 +124,7 @@ cola_handler cola_read_scan_cfg, cola_set_scan_cfg;
 
 /* 12 of "field012"; UINT32_MAX: another name. */
 uint32_t cola_field_number(const char *name);
-/* What a field is: a record, or that there is none. */
+/* A field is a record, or there is none. */
 enum cola_error cola_read_field(struct cola *self, uint32_t field, struct cola_args *args, struct cola_out *out);
 cola_handler cola_read_inputs, cola_read_outputs, cola_read_field_results;
 /* The event LIDoutputstate. */

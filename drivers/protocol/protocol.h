@@ -94,7 +94,7 @@ struct protocol_identity {
     char firmware[32];
     char serial[32];
     char name[32]; /* of the device, as its user calls it */
-    /* Of a planar head that can be set to some line rates, with the steps of a turn at each; 0: of no other head. */
+    /* The line rates that a planar head can be set to, with the steps of a turn at each; 0: the head is no such one. */
     struct protocol_geometry {
         int64_t lines_uhz;
         uint32_t steps;

@@ -57,7 +57,7 @@ void socket_break(int fd);
  * faster than this reads is not waited for. */
 void socket_drain(int fd);
 
-/* What poll(2) said of a connected socket. */
+/* The state of a connected socket, from the events of poll(2). */
 enum socket_state {
     SOCKET_OPEN,  /* bytes may come, or are there */
     SOCKET_SHUT,  /* the peer sends nothing more, and all of it was read; it may still read. Linux can't tell one that
