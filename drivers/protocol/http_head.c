@@ -19,6 +19,7 @@ static struct http_text trimmed(struct http_text t)
 
 int http_list_has(struct http_text list, const char *word)
 {
+    if (list.len == 0) return 0; /* a field that is missing has no text at all */
     for (size_t at = 0, n; at <= list.len; at += n + 1) {
         for (n = 0; at + n < list.len && list.s[at + n] != ','; n++)
             continue;

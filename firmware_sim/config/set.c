@@ -107,6 +107,7 @@ static int enter_scanner(struct cfg_reader *rd, struct set *set)
 {
     const size_t len = strlen(SCANNER);
     const struct cfg_key *section = cfg_find(&rd->table, SCANNER), *list = cfg_find(&rd->table, "stations");
+    if (section == NULL) return 1; /* a table of links alone knows no stations */
     if (!rd->in_scanner) {
         if (reach_item(rd, set, list) != SH_OK) return 0;
         ((struct config_station *)cfg_address(rd, section, set->item))->has_scanner = 1;

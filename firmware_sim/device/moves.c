@@ -55,7 +55,7 @@ static void warn(void *ctx, const char *text)
     sh_warn(device->options.report, "%s", text);
 }
 
-static int stop(void *ctx)
+static int move_stops(void *ctx)
 {
     const struct device *device = ctx;
     return atomic_load(&device->moves.stops);
@@ -67,7 +67,7 @@ static struct device_version *make_moved(struct device *device, const struct sit
                                          struct sh_err *err)
 {
     struct device_moves *moves = &device->moves;
-    const struct sh_report report = {device, warn, NULL, stop};
+    const struct sh_report report = {device, warn, NULL, move_stops};
     struct site *site;
     int rc = site_load_moved(from, moves->first, plan->station, plan->to_first ? NULL : &plan->to, &report, &site, err);
     if (rc != SH_OK) return NULL;

@@ -40,6 +40,7 @@ static const struct {
     {"SYSTEM:VERSION", "SYST:VERS", 1, 0, ""},
     {"SYSTEM:CONTROL", "SYST:CONT", 1, 0, ""},
     {"SYSTEM:PLAN", "SYST:PLAN", 1, 0, ""},
+    {"SYSTEM:CONTROL:WHO", "SYST:CONT:WHO", 1, 0, ""},
     {"SYSTEM:CONTROL:TAKE", "SYST:CONT:TAKE", 0, 1, ""},
     {"SYSTEM:CONTROL:RELEASE", "SYST:CONT:REL", 0, 1, ""},
     {"SYSTEM:SESSION", "SYST:SESS", 1, 0, ""},

@@ -148,11 +148,13 @@ static void test_receiver_takes_no_commands(void **state)
     client_tell(sh, "SCAN:START");
     memset(&t, 0, sizeof t);
     fd = open(wire_path(wire, "gnss"), O_RDWR | O_NOCTTY | O_CLOEXEC);
-    while (t.moments < 1) /* it may be one that the kernel still held for the reader before */
-        tally_read(&t, fd);
-    t.moments = 0;
-    while (t.moments < 3)
-        tally_read(&t, fd);
+    /* The first ones may be some that the kernel still held for the reader before; a receiver that leaves some out
+     * has no three in a row. */
+    for (int tries = 0; tries == 0 || (t.last - t.first != 2 && tries < 10); tries++) {
+        t.moments = 0;
+        while (t.moments < 3)
+            tally_read(&t, fd);
+    }
     assert_int_equal(t.last - t.first, 2);
     close(fd);
     client_tell(sh, "SCAN:STOP");
