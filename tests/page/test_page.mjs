@@ -185,7 +185,7 @@ await test('control is given back by the button, and then anybody may have it', 
   equal(await other.ask('HEAD:LIN 70'), 'OK', 'a setting of another client');
   await page.until('scanhead.head.controller !== 0 && document.querySelector("#control").disabled');
   const wanted = `${other.name} has control`; // its kind of link and its address
-  equal(await page.eval('document.querySelector("#owner").textContent'), wanted, 'who has it');
+  await page.until(`document.querySelector("#owner").textContent === ${JSON.stringify(wanted)}`);
   const late = await browser.open(endpoint(head, 'web'), {size: SMALL});
   await late.until(`document.querySelector("#owner").textContent === ${JSON.stringify(wanted)}`);
   await late.close();
