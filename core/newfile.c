@@ -125,7 +125,7 @@ static int lock(const char *path, int fd, int code, struct sh_err *err)
     return flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK ? fail_locked(path, fd, code, err) : SH_OK;
 }
 
-/* What is about to be replaced must not be a file that somebody writes in place: it would go on without a name. */
+/* A file that somebody writes in place must not be replaced: it would go on without a name. */
 static int check_unlocked(const char *path, struct sh_err *err)
 {
     const int fd = open(path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);

@@ -141,7 +141,7 @@ static int is_mesh(const struct mesh_output *out, const struct mesh_file *file)
     return strcmp(file->path, out->path) == 0;
 }
 
-/* What has its name already goes again, where another can't get its own. */
+/* Where one file can't get its name, those that have theirs are removed again. */
 static int rename_all(struct mesh_output *out, struct sh_err *err)
 {
     int rc = SH_OK;

@@ -29,7 +29,7 @@ struct web_place {
     int64_t since_ms;         /* ANSWERING: when it last took something. Else: of the phase */
 };
 
-/* What counts as one address: 4 bytes of IPv4, also within IPv6, or the network's half of IPv6. */
+/* One address is: 4 bytes of IPv4, also within IPv6, or the network's half of IPv6. */
 void web_address(const struct sockaddr_storage *from, unsigned char address[8]);
 
 /* WEB_PLACES of them, each `stride` bytes after the one before. */

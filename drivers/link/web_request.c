@@ -1,4 +1,4 @@
-/* What a request asks of the web link, and whether its client may. */
+/* Reads a request of the web link, and decides whether its client may ask it. */
 #include <arpa/inet.h>
 #include <stdio.h>
 #include <string.h>
@@ -48,7 +48,7 @@ static int is_number(const char *host)
     return inet_pton(AF_INET, host, address) == 1;
 }
 
-/* What the address bar has: a number, localhost, the name that the configuration has or the machine's own. */
+/* The address bar has one of these names: a number, localhost, the name that the configuration has or the machine's own. */
 static int is_own_host(const struct web_link *web, const struct http_place *place)
 {
     char host[300], own[256] = "";

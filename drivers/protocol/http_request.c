@@ -32,7 +32,7 @@ void http_reader_drop(struct http_reader *r)
     forget(r, r->head_len + r->request.body_len);
 }
 
-/* What the fields of a head are cut into. */
+/* The parts that the fields of a head are cut into. */
 struct head {
     struct http_text host, origin, target_place; /* without one, s is NULL */
     int n_host, n_length, n_coding, expects, expects_other, close, keep_alive;

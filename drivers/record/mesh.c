@@ -42,7 +42,7 @@ static int check_points(const char *path, double n, struct sh_err *err)
     return SH_OK;
 }
 
-/* What the descriptor says of the scan's size, before the scan is made. */
+/* The scan's size as the descriptor says it, before the scan is made. */
 static int check_size(const struct mesh_recorder *m, struct sh_err *err)
 {
     const struct track *t = &m->base.track;

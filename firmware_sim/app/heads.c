@@ -211,7 +211,7 @@ static int check_all(struct heads *heads, uint32_t first, uint32_t last, struct 
     return rc;
 }
 
-/* Of one head, which stands where it is set to or goes from station to station. */
+/* Records one head, which stands where it is set to or goes from station to station. */
 static int record_one(struct heads *heads, const struct recording_options *options, struct recording_result *result,
                       struct sh_err *err)
 {

@@ -29,7 +29,7 @@ enum app_option_kind {
     APP_PRINT      /* calls apply, which prints what was asked for: as with --help, the command does nothing else */
 };
 
-/* What the file is to the command that an option or an operand names. A pipe, a device and - are never taken for a file. */
+/* How the command uses the file that an option or an operand names. A pipe, a device and - are never taken for a file. */
 enum app_use { APP_NO_FILE, APP_READS, APP_WRITES };
 
 /* A row begins with kind, name and argument; the rest goes by name. */
@@ -95,7 +95,7 @@ struct app_file {
     const char *option; /* without the dashes; NULL: an operand */
     const char *path;
     enum app_use use;
-    /* Of files that are written, as the command knows them: */
+    /* Files that are written, as the command knows them: */
     size_t n_ending;    /* bytes of the path's ending, as in .ply */
     const char *ending; /* it is another file beside that: with this ending in place of its own; NULL: it is that file */
     int each;           /* and STEM-N.ENDING for N from 1 on */

@@ -114,7 +114,8 @@ static int add_of_mesh(void *ctx, const char *name, const char *path)
     return add(f, join(name, INT_MAX, ", named in ", f->prefix), strdup(path), 0, 0);
 }
 
-/* What the files name that are read. Only what is there can be: the search takes as long as reading the files. */
+/* Adds the files that are named in files that are read. Only one that exists can be overwritten, so the search is made
+ * only then: it takes as long as reading the files. */
 static int add_of_meshes(struct files *f)
 {
     static const char *const endings[] = {".obj", ".gltf", ".glb", ".fbx", ".dae", ".ifc"};

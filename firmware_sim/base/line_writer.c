@@ -18,7 +18,7 @@ struct line_head {
     uint16_t kind;
 };
 
-/* What the writing thread has taken out of the queue. */
+/* The bytes that the writing thread has taken out of the queue. */
 struct piece {
     char text[PIECE];
     size_t len;
@@ -74,7 +74,7 @@ static int has_gap(const struct line_writer *w)
     return w->gap[LINE_PLAIN] != 0 || w->gap[LINE_REMARK] != 0;
 }
 
-/* What stands for the lines that were dropped; empty where there are none. */
+/* The line that stands for those that were dropped; empty where there are none. */
 static size_t take_gap(struct line_writer *w, char text[LINE_GAP_BYTES])
 {
     text[0] = '\0';

@@ -36,7 +36,7 @@ int journal_end(struct journal *journal, uint64_t tick, int64_t t_ns);
 /* A note, which replaying passes over: one printable line. Failures as in journal_write. */
 int journal_note(struct journal *journal, const char *text);
 
-/* Who can wait should, so that nothing is dropped. NULL never is. */
+/* 1: a caller that can wait should, so that nothing is dropped. NULL never is. */
 int journal_is_filling(const struct journal *journal);
 
 /* Writes what is left, as long as the file takes some of it every 2 s, closes and releases. The first thing that went

@@ -35,7 +35,7 @@ struct truth;
 int truth_open(const char *path, _Atomic uint64_t *lost, struct truth **out, struct sh_err *err);
 /* truth may be NULL. */
 void truth_write(struct truth *truth, const struct fault_note *note);
-/* Who can wait should, so that nothing is dropped. truth may be NULL. */
+/* 1: a caller that can wait should, so that nothing is dropped. truth may be NULL. */
 int truth_is_filling(const struct truth *truth);
 /* Writes what is left, as long as the file takes some of it every 2 s. The first error in writing it. truth may be NULL. */
 int truth_close(struct truth *truth, struct sh_err *err);

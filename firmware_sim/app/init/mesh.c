@@ -26,7 +26,7 @@ static const char *said_by(const char *file)
     return dot != NULL && strcasecmp(dot, ".fbx") == 0 ? "as the file says" : "as the format defines it";
 }
 
-/* What --up can't mend: it turns the mesh, and y or z becomes z. */
+/* --up turns the mesh so that y or z becomes z. Other axes it can't mend. */
 static void warn_of_axes(const char *name, const struct scene_says *says, int y_up)
 {
     if (says->up == 1 || says->up < 0)

@@ -261,7 +261,7 @@ static int check_heads(struct record_job *r, const struct heads *heads, uint32_t
     return rc == SH_OK && n > 1 ? record_files_check_heads(&r->files, err) : rc;
 }
 
-/* Of a line in the middle: rings at the poles of a sphere have one shot. The others differ by a pulse. */
+/* Counts the shots of a line in the middle: rings at the poles of a sphere have one shot. The others differ by a pulse. */
 static double most_shots(const struct record_job *r, const struct site *site)
 {
     struct head_settings settings = site->cfg->head.settings;

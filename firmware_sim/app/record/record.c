@@ -199,7 +199,7 @@ static int check_repair(const struct record_line *r)
     return APP_GO_ON;
 }
 
-/* What is written beside the files of -o: of each scan, and what a mesh names. */
+/* The files that are written beside those of -o: one of each scan, and those that a mesh names. */
 static int add_names(struct record_line *r)
 {
     static const struct {

@@ -1,4 +1,4 @@
-/* What the scans have had so far, for a page that is opened late, or again: the last points of the stream, as frames.
+/* The past of the scans, for a page that is opened late, or again: the last points of the stream, as frames.
  *
  * In: frames of the stream, in their order. Out: these frames in pieces, as the body of `/past` (README.md has its
  * format). A piece begins with the descriptor, the emitter and the anchor that its points need, so that a reader of the
