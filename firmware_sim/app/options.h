@@ -96,10 +96,10 @@ struct app_file {
     const char *path;
     enum app_use use;
     /* Files that are written, as the command knows them: */
-    size_t n_ending;    /* bytes of the path's ending, as in .ply */
+    size_t n_ending; /* bytes of the path's ending, as in .ply */
     /* Another file beside that, with this ending in place of its own; NULL: that file. */
     const char *ending;
-    int each;           /* and STEM-N.ENDING for N from 1 on */
+    int each; /* and STEM-N.ENDING for N from 1 on */
 };
 
 /* What a command line says, but for the command's own options. */
