@@ -204,6 +204,9 @@ int device_fix(struct device *device, int64_t t_ns, struct nmea_fix *fix);
 /* The pulses per second at a device time that was claimed (pps.h). */
 enum protocol_pps device_pps(struct device *device, int64_t t_ns, int *set);
 
+/* The tick after that which tells that the head waits for a command; UINT64_MAX: it boots, scans, or is about to. */
+uint64_t device_rests_from(struct device *device);
+
 /* Device time at which power came last, or will come back where it is off; 0: it has always been on. */
 int64_t device_power_ns(struct device *device);
 /* How often power has come, with the first time. */

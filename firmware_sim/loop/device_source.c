@@ -51,6 +51,11 @@ static int fix(void *self, int64_t t_ns, struct nmea_fix *fix)
     return device_fix(self, t_ns, fix);
 }
 
+static uint64_t rests_from(void *self)
+{
+    return device_rests_from(self);
+}
+
 static int64_t power_ns(void *self)
 {
     return device_power_ns(self);
@@ -117,6 +122,7 @@ const struct loop_source_ops loop_device_source = {
     .utc_ns = utc_ns,
     .next_fix_ns = next_fix_ns,
     .fix = fix,
+    .rests_from = rests_from,
     .power_ns = power_ns,
     .power_ons = power_ons,
     .pps = pps,

@@ -198,6 +198,15 @@ static int timeout_ms(const struct pump *pump, int over)
     return ms < 0 ? 0 : over && ms > most_ms ? most_ms : ms > 60000 ? 60000 : (int)ms;
 }
 
+/* Returns the session's bit where the link is full. */
+static uint32_t write_one(struct pump *pump, int index)
+{
+    struct session *s = &pump->session[index];
+    if (session_write(pump, s, index)) return 1U << index;
+    if (s->open && session_is_done(pump, s)) pump->ops->end(pump->link, index);
+    return 0;
+}
+
 static void *pump_main(void *arg)
 {
     struct pump *pump = arg;
@@ -213,7 +222,7 @@ static void *pump_main(void *arg)
         want_write = 0;
         pump_plug(pump);
         for (int i = 0; i < LINK_MAX_SESSIONS; i++)
-            if (pump->session[i].open && session_write(pump, &pump->session[i], i)) want_write |= 1U << i;
+            if (pump->session[i].open) want_write |= write_one(pump, i);
         stream_rest_reader(pump->stream);
         at_once = pump_rest(pump);
         at_once |= pump_power(pump, want_write);

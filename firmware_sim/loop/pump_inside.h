@@ -117,6 +117,9 @@ void session_restart(struct pump *pump, struct session *s, uint64_t tick);
 /* Takes what there is and writes until the link is full (1) or there is nothing left (0). index: of the session on its
  * link. */
 int session_write(struct pump *pump, struct session *s, int index);
+/* Whether the session, of which all was written, is over: its protocol ends it, or its client sends nothing more and
+ * nothing is due to it. */
+int session_is_done(const struct pump *pump, const struct session *s);
 
 /* The next ticks and replies into the buffer, which was written out. */
 void session_fill(struct pump *pump, struct session *s);
@@ -201,6 +204,8 @@ void session_close_protocol(struct pump *pump, struct session *s);
 int session_restart_protocol(struct pump *pump, struct session *s);
 /* As session_write. */
 int session_write_protocol(struct pump *pump, struct session *s, int index);
+/* Whether a client that sends nothing more still has something to come. */
+int session_owes_protocol(const struct pump *pump, const struct session *s);
 /* The first tick, from the cursor on, that the protocol must be woken for though it has no frames. */
 uint64_t session_wake_tick(const struct pump *pump, const struct session *s);
 

@@ -257,15 +257,10 @@ static int flush(struct pump *pump, struct session *s, int index)
     }
 }
 
-/* Whether the session is over once its link has all of it: the protocol ends it, or its client sends nothing more and
- * nothing is due to it. */
-static int is_done(const struct pump *pump, const struct session *s)
+int session_owes_protocol(const struct pump *pump, const struct session *s)
 {
     const struct protocol_ops *ops = pump->protocol;
-    if (session_wire_waits(s)) return 0;
-    if (s->hang_up) return 1;
-    return s->shut && s->commands.in_pos == s->commands.in_len && s->units.n == 0 && pump->ops->end != NULL &&
-           ops->owes != NULL && !ops->owes(s->protocol);
+    return s->commands.in_pos != s->commands.in_len || s->units.n != 0 || ops->owes == NULL || ops->owes(s->protocol);
 }
 
 int session_write_protocol(struct pump *pump, struct session *s, int index)
@@ -290,7 +285,6 @@ int session_write_protocol(struct pump *pump, struct session *s, int index)
         stream_note_written(pump->stream, s->reader, s->cursor);
     }
     if (s->wire != NULL) wire_time(s->wire, time_of(pump, s->cursor));
-    if (!full && is_done(pump, s)) pump->ops->end(pump->link, index);
     return full == 1;
 }
 

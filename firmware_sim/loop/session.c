@@ -100,6 +100,21 @@ void session_shut(struct pump *pump, struct session *s)
     if (s->open) leave_when_done(pump, s);
 }
 
+/* Its own protocol owes nothing once the head waits for a command, and the stream up to there is out. */
+static int owes(const struct pump *pump, const struct session *s)
+{
+    const struct loop_source *source = pump->links->source;
+    if (!pump->protocol->passes_native) return session_owes_protocol(pump, s);
+    return !s->left || s->commands.reply_len != 0 || s->out_pos != s->out_len ||
+           s->cursor < source->ops->rests_from(source->self);
+}
+
+int session_is_done(const struct pump *pump, const struct session *s)
+{
+    if (pump->ops->end == NULL || session_wire_waits(s)) return 0;
+    return s->hang_up || (s->shut && !owes(pump, s));
+}
+
 /* One tick into the buffer. Returns 0 when there is none or no room. */
 static int take_tick(struct pump *pump, struct session *s)
 {

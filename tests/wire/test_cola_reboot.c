@@ -1,7 +1,4 @@
 /* CoLa: mSCreboot reboots the head. All sessions end, and its clock, counters and count of power-ups begin anew. */
-#include <arpa/inet.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
 
 #include "tests/wire/room.h"
 #include "tests/wire/wire.h"
@@ -67,24 +64,11 @@ static int64_t device_ns(const struct head *head)
     return t_ns;
 }
 
-/* -1: nobody listens there now. */
-static int try_connect(const char *endpoint)
-{
-    const struct sockaddr_in at = {.sin_family = AF_INET,
-                                   .sin_port = htons((uint16_t)atoi(strrchr(endpoint, ':') + 1)),
-                                   .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
-    const int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    assert_true(fd >= 0);
-    if (connect(fd, (const struct sockaddr *)&at, sizeof at) == 0) return fd;
-    close(fd);
-    return -1;
-}
-
 /* While power is off nobody listens, or the connection ends with it. Then another one is made. */
 static void connect_again(struct client *c, const struct head *head)
 {
     for (int n = 0; n < DEADLINE_MS; n++) {
-        *c = (struct client){.fd = try_connect(head_endpoint(head, "tcp"))};
+        *c = (struct client){.fd = raw_try_connect(head_endpoint(head, "tcp"))};
         if (c->fd >= 0 && ask(c, "sRN ODpwrc") != NULL) return;
         if (c->fd >= 0) close(c->fd);
         poll(NULL, 0, 1);
