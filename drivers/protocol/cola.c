@@ -128,7 +128,7 @@ enum cola_error cola_read_scan(struct cola *self, struct cola_args *args, struct
 static int owes(const void *protocol)
 {
     const struct cola *self = protocol;
-    return self->streams || self->n_waiting != 0 || self->reboots;
+    return self->streams || self->n_waiting != 0 || self->reboots || self->next.is_due || self->outputs_due;
 }
 
 static int64_t next_time(const void *protocol)
