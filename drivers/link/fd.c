@@ -49,7 +49,8 @@ static int fd_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms,
     if (rc != SH_OK) return rc;
     link_take_wake(&fds[0], &events);
     if (self->reported_closed) return events.n;
-    if (self->ended || socket_ended(self->fd, fds[1].revents)) {
+    const enum socket_state state = socket_state(self->fd, fds[1].revents);
+    if (self->ended || state != SOCKET_OPEN) {
         self->ended = 1;
         self->reported_closed = link_events_push(&events, LINK_CLOSED, 0, self->name);
         return events.n;

@@ -28,7 +28,11 @@ struct link_spec {
     char path[256];     /* file: where to write; pty: symlink to the slave, may be empty; usb: see below */
     char address[64];   /* tcp, udp, web: numeric or name; empty: 127.0.0.1 */
     int port;           /* tcp, web: 0 lets the system choose; udp: of the receiver */
-    char interface[32]; /* udp: its name; needed for broadcasts. Empty: the system chooses */
+    char interface[32]; /* udp: its name; needed for broadcasts and multicast. Empty: the system chooses */
+    char source[64];    /* udp: numeric address of this machine that packets come from; empty: the system chooses */
+    int source_port;    /* udp: that they come from; 0: the system chooses */
+    int usual_port;     /* udp: 1: another source_port will do where this one can't be had; a notice says so */
+    int ttl;            /* udp: of the packets; 0: 1 to a multicast group, else the system's */
     int max_sessions;   /* tcp, web: 1..LINK_MAX_SESSIONS */
     int protocol;       /* what its owner speaks on it; 0: the usual. Links don't look at it */
     int units; /* 1: what is written are units. Each write has one of them, or the rest of one, up to its end */
@@ -57,6 +61,7 @@ enum link_event_kind {
     LINK_REFUSED,  /* somebody was turned away: all sessions taken */
     LINK_NOTICE,   /* something that whoever runs the head should know: the text is in peer */
     LINK_PLUGGED,  /* usb: a host has got the device, and will enumerate it once poll() is called again */
+    LINK_SHUT,     /* tcp: the other side sends nothing more, and all of it was read; it may go on reading */
 };
 
 struct link_event {

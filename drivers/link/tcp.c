@@ -1,9 +1,11 @@
 /* The TCP link: a listener and up to max_sessions clients.
  *
- * A session is over when its peer shuts down its sending side, resets, or vanishes (keep-alive, about 25 s).
+ * A session is over when its peer resets, takes no more, or vanishes (keep-alive, about 25 s). A peer that shuts down
+ * its sending side is LINK_SHUT, and goes on reading. One that has closed its socket looks the same until something is
+ * written to it.
  * A client that finds all sessions taken is accepted and closed at once, so that it does not wait in vain. Where
  * clients come for a request alone, the session that has been silent for longest ends in its place. One that comes
- * while another's session is ending gets that session: it waits until what the other sent has been read. */
+ * while another's peer sends no more gets that session: it waits until what the other sent has been read. */
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -20,6 +22,7 @@ enum tcp_state { TCP_FREE, TCP_OPEN, TCP_ENDED /* LINK_CLOSED is still to be rep
 
 struct tcp_session {
     enum tcp_state state;
+    int shut; /* LINK_SHUT was reported */
     int fd;
     uint64_t turn; /* the higher, the later it came, said or was told something */
     char peer[64];
@@ -77,7 +80,18 @@ static int free_slot(const struct tcp_link *tcp)
     return slot;
 }
 
-/* A session whose client has gone, though the owner has not heard of it yet. */
+/* The first session whose client sends no more, as the owner knows by now, ends. */
+static void give_up_one(struct tcp_link *tcp)
+{
+    for (int s = 0; s < tcp->n_sessions; s++) {
+        struct tcp_session *session = &tcp->session[s];
+        if (session->state != TCP_OPEN || !session->shut) continue;
+        session->state = TCP_ENDED;
+        return;
+    }
+}
+
+/* A session whose client has gone, or sends no more, though the owner may not have heard of it yet. */
 static int is_any_ending(const struct tcp_link *tcp)
 {
     struct pollfd fds[LINK_MAX_SESSIONS];
@@ -115,7 +129,10 @@ static void tcp_welcome(struct tcp_link *tcp, struct link_events *events)
         int fd;
         const int slot = free_slot(tcp);
         if (slot == tcp->n_sessions && !is_any_ending(tcp)) make_room(tcp);
-        if (slot == tcp->n_sessions && is_any_ending(tcp)) return; /* poll comes back at once */
+        if (slot == tcp->n_sessions && is_any_ending(tcp)) { /* poll comes back at once */
+            give_up_one(tcp);
+            return;
+        }
         if (!socket_accept(tcp->listener, &tcp->reserve_fd, &fd, &from, &len))
             return; /* none left, or one that gave up before we came */
         socket_address_text((struct sockaddr *)&from, len, peer, sizeof peer);
@@ -128,6 +145,7 @@ static void tcp_welcome(struct tcp_link *tcp, struct link_events *events)
         setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &size, sizeof size);
         struct tcp_session *session = &tcp->session[slot];
         session->state = TCP_OPEN;
+        session->shut = 0;
         session->fd = fd;
         session->turn = ++tcp->turns;
         snprintf(session->peer, sizeof session->peer, "%s", peer);
@@ -145,6 +163,28 @@ static int tcp_report_closed(struct tcp_session *session, int slot, struct link_
     return 1;
 }
 
+/* A session's entry for poll: the events that it waits for. */
+static struct pollfd tcp_slot(const struct tcp_session *session, int want_write)
+{
+    const int events = (session->shut ? 0 : POLLIN) | (want_write ? POLLOUT : 0);
+    return (struct pollfd){.fd = session->state == TCP_OPEN ? session->fd : -1, .events = (short)events};
+}
+
+/* Turns the events of a session into those of the link. */
+static void tcp_report(struct tcp_session *session, int slot, short revents, struct link_events *events)
+{
+    const enum socket_state state = socket_state(session->fd, revents);
+    if (state == SOCKET_ENDED) {
+        tcp_report_closed(session, slot, events);
+        return;
+    }
+    if (state == SOCKET_SHUT)
+        session->shut |= link_events_push(events, LINK_SHUT, slot, session->peer);
+    else if ((revents & POLLIN) != 0)
+        link_events_push(events, LINK_READABLE, slot, NULL);
+    if ((revents & POLLOUT) != 0) link_events_push(events, LINK_WRITABLE, slot, NULL);
+}
+
 static int tcp_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *event, int max)
 {
     struct tcp_link *tcp = link;
@@ -155,21 +195,13 @@ static int tcp_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
     for (int s = 0; s < tcp->n_sessions; s++) {
         struct tcp_session *session = &tcp->session[s];
         if (session->state == TCP_ENDED) tcp_report_closed(session, s, &events);
-        fds[2 + s] = (struct pollfd){.fd = session->state == TCP_OPEN ? session->fd : -1, .events = POLLIN};
-        if ((want_write >> s & 1u) != 0) fds[2 + s].events = POLLIN | POLLOUT;
+        fds[2 + s] = tcp_slot(session, (want_write >> s & 1u) != 0);
     }
     int rc = link_wait(fds, (nfds_t)(2 + tcp->n_sessions), events.n > 0 ? 0 : timeout_ms);
     if (rc != SH_OK) return rc;
     link_take_wake(&fds[0], &events);
-    for (int s = 0; s < tcp->n_sessions; s++) {
-        short revents = fds[2 + s].fd >= 0 ? fds[2 + s].revents : 0;
-        if (socket_ended(fds[2 + s].fd, revents)) {
-            tcp_report_closed(&tcp->session[s], s, &events);
-            continue;
-        }
-        if ((revents & POLLIN) != 0) link_events_push(&events, LINK_READABLE, s, NULL);
-        if ((revents & POLLOUT) != 0) link_events_push(&events, LINK_WRITABLE, s, NULL);
-    }
+    for (int s = 0; s < tcp->n_sessions; s++)
+        if (fds[2 + s].fd >= 0) tcp_report(&tcp->session[s], s, fds[2 + s].revents, &events);
     if ((fds[1].revents & POLLIN) != 0) tcp_welcome(tcp, &events);
     return events.n;
 }
@@ -192,7 +224,11 @@ static ssize_t tcp_read(void *link, int session, void *buf, size_t len)
 {
     struct tcp_session *self = tcp_session(link, session);
     if (self == NULL) return SH_ECLOSED;
-    return moved(link, self, socket_read(self->fd, buf, len));
+    const ssize_t n = socket_read(self->fd, buf, len);
+    struct pollfd now = {.fd = self->fd, .events = POLLIN};
+    if (n < 0 && poll(&now, 1, 0) > 0 && socket_state(self->fd, now.revents) == SOCKET_SHUT)
+        return 0; /* poll reports it */
+    return moved(link, self, n);
 }
 
 static ssize_t tcp_write(void *link, int session, const void *buf, size_t len)
@@ -206,11 +242,9 @@ static ssize_t tcp_write(void *link, int session, const void *buf, size_t len)
 static void tcp_end(void *link, int session)
 {
     struct tcp_session *self = tcp_session(link, session);
-    char nothing[4096];
     if (self == NULL) return;
     shutdown(self->fd, SHUT_WR);
-    while (socket_read(self->fd, nothing, sizeof nothing) > 0) /* else the system would reset the connection */
-        continue;
+    socket_drain(self->fd);
     self->state = TCP_ENDED;
 }
 

@@ -3,11 +3,19 @@
  * Unicast to any address; broadcast only from an interface that the configuration names, to that interface's own
  * broadcast address or to 255.255.255.255. The packets' source is then the interface's address. That alone makes the
  * system send 255.255.255.255 there when no route says otherwise, so that the address of the interface's own network
- * is used for it. (SO_BINDTODEVICE would do without, but takes a privilege.) Multicast is refused.
+ * is used for it. (SO_BINDTODEVICE would do without, but takes a privilege.) Multicast, too, goes out on an interface
+ * that is named, and on no other.
+ *
+ * A source port may be one that a receiver on this machine listens on, too. So addresses are shared (SO_REUSEADDR), and
+ * the socket is connected: it gets nothing but what its receiver sends back. It never has its receiver's own address and
+ * port, since it would get its own packets. On the loopback, where the receiver has the port, the source is the address
+ * after the receiver's. Receivers that don't share their port (MRPT, PCL) could not listen on this machine then. So
+ * the usual port of a protocol is not taken there unless the link names its source.
  *
  * A receiver that is not there is no failure: what was sent is gone, and so is what the system had no room for on its
  * way out. Both are counted. A refused datagram counts when its refusal comes; several may share one refusal. What
  * arrives at the socket can be read. */
+#include <arpa/inet.h>
 #include <errno.h>
 #include <ifaddrs.h>
 #include <net/if.h>
@@ -22,7 +30,7 @@
 #include "drivers/link/link_poll.h"
 #include "drivers/socket/socket.h"
 
-enum { SEND_BUFFER_BYTES = 1 << 20 };
+enum { SEND_BUFFER_BYTES = 1 << 20, DRAIN_READS = 4096 };
 
 struct udp_link {
     int fd;
@@ -31,6 +39,7 @@ struct udp_link {
     int closing; /* LINK_CLOSED is to be reported */
     uint64_t refused;
     char name[80];
+    char notice[200]; /* to be reported; empty: none */
 };
 
 static const char *host_of(const struct link_spec *spec)
@@ -103,9 +112,9 @@ static int check_receiver(const struct link_spec *spec, struct sockaddr *to, str
 {
     const char *host = host_of(spec);
     const int named = spec->interface[0] != '\0', to_all = to->sa_family == AF_INET && ipv4_of(to) == INADDR_BROADCAST;
-    if (is_multicast(to))
-        return sh_fail(err, SH_EINPUT, "link udp:%s:%d: multicast; allowed an address of one receiver, or a broadcast",
-                       host, spec->port);
+    if (is_multicast(to) && !named)
+        return sh_fail(err, SH_EINPUT, "link udp:%s:%d: multicast; required is interface, where it goes out", host,
+                       spec->port);
     int rc = find_network(named ? spec->interface : NULL, to, net, err);
     if (rc != SH_OK) return rc;
     if (named && !net->found)
@@ -122,17 +131,124 @@ static int check_receiver(const struct link_spec *spec, struct sockaddr *to, str
     return SH_OK;
 }
 
-static int connect_to(int fd, const struct link_spec *spec, const struct sockaddr *to, socklen_t len,
-                      const struct network *net, int broadcast)
+/* Where packets go out, and how far. */
+static int set_way(int fd, const struct link_spec *spec, const struct sockaddr *to)
+{
+    const int ttl = spec->ttl, is_v4 = to->sa_family == AF_INET;
+    const int level = is_v4 ? IPPROTO_IP : IPPROTO_IPV6;
+    if (!is_multicast(to))
+        return ttl == 0 ? 0 : setsockopt(fd, level, is_v4 ? IP_TTL : IPV6_UNICAST_HOPS, &ttl, sizeof ttl);
+    const int number = (int)if_nametoindex(spec->interface), hops = ttl != 0 ? ttl : 1;
+    const struct ip_mreqn out = {.imr_ifindex = number};
+    if (setsockopt(fd, level, is_v4 ? IP_MULTICAST_TTL : IPV6_MULTICAST_HOPS, &hops, sizeof hops) != 0) return -1;
+    return is_v4 ? setsockopt(fd, level, IP_MULTICAST_IF, &out, sizeof out)
+                 : setsockopt(fd, level, IPV6_MULTICAST_IF, &number, sizeof number);
+}
+
+static in_port_t *port_of(struct sockaddr_storage *at)
+{
+    return at->ss_family == AF_INET ? &((struct sockaddr_in *)(void *)at)->sin_port
+                                    : &((struct sockaddr_in6 *)(void *)at)->sin6_port;
+}
+
+static int is_same_place(const struct sockaddr_storage *a, const struct sockaddr_storage *b)
+{
+    char text[2][72];
+    socket_address_text((const struct sockaddr *)a, sizeof *a, text[0], sizeof text[0]);
+    socket_address_text((const struct sockaddr *)b, sizeof *b, text[1], sizeof text[1]);
+    return strcmp(text[0], text[1]) == 0;
+}
+
+/* The address that the system would choose. */
+static int ask_source(const struct sockaddr_storage *to, socklen_t len, struct sockaddr_storage *from)
+{
+    socklen_t from_len = sizeof *from;
+    const int fd = socket(to->ss_family, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    const int ok = fd >= 0 && connect(fd, (const struct sockaddr *)to, len) == 0 &&
+                   getsockname(fd, (struct sockaddr *)from, &from_len) == 0;
+    if (fd >= 0) close(fd);
+    return ok ? 0 : -1;
+}
+
+/* Whether a receiver is on this machine, where packets to it come from `from`. */
+static int is_own_machine(const struct sockaddr_storage *to, const struct sockaddr_storage *from)
+{
+    struct sockaddr_storage a = *to, b = *from;
+    *port_of(&a) = *port_of(&b) = 0;
+    return is_same_place(&a, &b) ||
+           (b.ss_family == AF_INET && ntohl(ipv4_of((struct sockaddr *)&b)) >> 24 == IN_LOOPBACKNET);
+}
+
+/* Where packets come from, its port included. 0: from where the system says; 1: from there; -1: errno. */
+static int find_source(const struct link_spec *spec, const struct sockaddr_storage *to, socklen_t len,
+                       const struct network *net, struct sockaddr_storage *from)
+{
+    memset(from, 0, sizeof *from);
+    from->ss_family = to->ss_family;
+    if (spec->source[0] != '\0') {
+        struct sockaddr_in *v4 = (struct sockaddr_in *)(void *)from;
+        struct sockaddr_in6 *v6 = (struct sockaddr_in6 *)(void *)from;
+        errno = EAFNOSUPPORT;
+        if (to->ss_family == AF_INET ? inet_pton(AF_INET, spec->source, &v4->sin_addr) != 1
+                                     : inet_pton(AF_INET6, spec->source, &v6->sin6_addr) != 1)
+            return -1;
+    } else if (net->found && spec->interface[0] != '\0') {
+        memcpy(from, &net->own, net->own_len);
+    } else if (spec->source_port == 0) {
+        return 0;
+    } else if (ask_source(to, len, from) != 0) {
+        return -1;
+    } else if (spec->usual_port && is_own_machine(to, from)) {
+        return 0;
+    }
+    *port_of(from) = htons((uint16_t)spec->source_port);
+    if (spec->source[0] == '\0' && is_same_place(from, to) && from->ss_family == AF_INET) {
+        struct in_addr *at = &((struct sockaddr_in *)(void *)from)->sin_addr;
+        if (ntohl(at->s_addr) >> 24 == IN_LOOPBACKNET) at->s_addr = htonl(ntohl(at->s_addr) + 1);
+    }
+    return 1;
+}
+
+/* Binds to the source. Where its port can't be had and another will do, the system chooses one. */
+static int bind_source(int fd, const struct link_spec *spec, const struct sockaddr_storage *to, socklen_t len,
+                       struct sockaddr_storage *from, char notice[200])
+{
+    const int one = 1;
+    const int own = spec->source_port != 0 && is_same_place(from, to);
+    errno = EADDRINUSE;
+    if (spec->source_port != 0) setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one);
+    if (!own && bind(fd, (struct sockaddr *)from, len) == 0) return 0;
+    if (spec->source_port == 0 || !spec->usual_port || errno != EADDRINUSE) return -1;
+    const int zero = 0;
+    *port_of(from) = 0;
+    setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &zero, sizeof zero);
+    if (bind(fd, (struct sockaddr *)from, len) != 0) return -1;
+    snprintf(notice, 200,
+             "its packets don't come from port %d: %s; a source of its own has that port, source_port: 0 is silent",
+             spec->source_port, own ? "its receiver has that address and port" : "another program has it for itself");
+    return 0;
+}
+
+static int connect_to(int fd, const struct link_spec *spec, const struct sockaddr_storage *to, socklen_t len,
+                      const struct network *net, int broadcast, char notice[200])
 {
     const int one = 1, size = SEND_BUFFER_BYTES;
+    struct sockaddr_storage from;
     setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &size, sizeof size);
     if (broadcast && setsockopt(fd, SOL_SOCKET, SO_BROADCAST, &one, sizeof one) != 0) return -1;
-    if (spec->interface[0] != '\0') {
-        struct sockaddr_storage from = net->own; /* port 0: the system chooses */
-        if (bind(fd, (const struct sockaddr *)&from, net->own_len) != 0) return -1;
-    }
-    return connect(fd, to, len);
+    if (set_way(fd, spec, (const struct sockaddr *)to) != 0) return -1;
+    const int has_source = find_source(spec, to, len, net, &from);
+    if (has_source < 0) return -1;
+    if (has_source && bind_source(fd, spec, to, len, &from, notice) != 0) return -1;
+    return connect(fd, (const struct sockaddr *)to, len);
+}
+
+/* ", from 127.0.0.2:2368" for errors. */
+static void source_text(const struct link_spec *spec, char *text, size_t size)
+{
+    text[0] = '\0';
+    if (spec->source[0] != '\0' || spec->source_port != 0)
+        snprintf(text, size, ", from %s:%d", spec->source, spec->source_port);
 }
 
 static int udp_open(const struct link_spec *spec, void **link, struct sh_err *err)
@@ -147,8 +263,18 @@ static int udp_open(const struct link_spec *spec, void **link, struct sh_err *er
     struct udp_link *udp = calloc(1, sizeof *udp);
     if (udp == NULL) return sh_fail(err, SH_ENOMEM, "link udp:%s:%d: no memory", host_of(spec), spec->port);
     udp->fd = socket(to.ss_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    if (udp->fd < 0 || connect_to(udp->fd, spec, (struct sockaddr *)&to, len, &net, broadcast) != 0) {
-        rc = sh_fail(err, socket_error_code(errno), "link udp:%s:%d: %s", host_of(spec), spec->port, strerror(errno));
+    if (udp->fd < 0 || connect_to(udp->fd, spec, &to, len, &net, broadcast, udp->notice) != 0) {
+        const int why = errno;
+        char from[96];
+        source_text(spec, from, sizeof from);
+        rc = sh_fail(err, why == EAFNOSUPPORT ? SH_EINPUT : socket_error_code(why), "link udp:%s:%d%s: %s%s",
+                     host_of(spec), spec->port, from, strerror(why),
+                     why == EADDRNOTAVAIL || why == EAFNOSUPPORT
+                         ? "; allowed is a numeric address of this machine, of the receiver's family"
+                     : why == EADDRINUSE
+                         ? "; a receiver on this machine with that port must share it (SO_REUSEADDR), and "
+                           "have another address than the source"
+                         : "");
         if (udp->fd >= 0) close(udp->fd);
         free(udp);
         return rc;
@@ -173,6 +299,7 @@ static int udp_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
     if (udp->closing && link_events_push(&events, LINK_CLOSED, 0, udp->name)) udp->reported_opened = udp->closing = 0;
     if (!udp->reported_opened && !udp->unplugged)
         udp->reported_opened = link_events_push(&events, LINK_OPENED, 0, udp->name);
+    if (udp->notice[0] != '\0' && link_events_push(&events, LINK_NOTICE, 0, udp->notice)) udp->notice[0] = '\0';
     struct pollfd fds[2] = {{.fd = wake_fd, .events = POLLIN}, {.fd = udp->unplugged ? -1 : udp->fd, .events = POLLIN}};
     if ((want_write & 1u) != 0) fds[1].events = POLLIN | POLLOUT;
     int rc = link_wait(fds, 2, events.n > 0 ? 0 : timeout_ms);
@@ -223,8 +350,8 @@ static int udp_fault(void *link, enum link_fault what, int session, uint32_t n, 
         return SH_OK;
     }
     if (what != LINK_FAULT_PLUG) return SH_ESTATE;
-    while (udp->unplugged && recv(udp->fd, nothing, sizeof nothing, MSG_DONTWAIT) >= 0)
-        continue;
+    for (int i = 0; i < DRAIN_READS && udp->unplugged && recv(udp->fd, nothing, sizeof nothing, MSG_DONTWAIT) >= 0; i++)
+        continue; /* who sends faster than this reads is not waited for */
     udp->unplugged = 0;
     return SH_OK;
 }

@@ -10,14 +10,14 @@ void cola_power_up(struct cola *self)
     cola_settings_reset(self);
     self->level = COLA_RUN;
     self->measures = 1;
-    self->streams = self->wants_scan = self->reboots = 0;
+    self->streams = self->started = self->wants_scan = self->reboots = self->next.is_due = 0;
     self->n_waiting = self->since_sent = 0;
     self->telegrams = (uint16_t)(0U - self->near_wrap);
 }
 
 uint32_t cola_time_us(const struct cola *self, int64_t t_ns)
 {
-    return (uint32_t)((uint64_t)t_ns / 1000U) - self->near_wrap;
+    return (uint32_t)((uint64_t)(t_ns - self->power_ns) / 1000U) - self->near_wrap;
 }
 
 static int create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
@@ -26,6 +26,8 @@ static int create(const struct protocol_spec *spec, void **protocol, struct sh_e
     if (self == NULL) return sh_fail(err, SH_ENOMEM, "protocol cola: no memory for %zu bytes", sizeof *self);
     self->host = spec->host;
     self->identity = spec->identity;
+    self->power_ns = spec->power_ns;
+    self->power_ons = spec->power_ons;
     self->near_wrap = spec->near_wrap;
     self->model = cola_model_find(spec->identity->model);
     planar_scan_init(&self->scan);
@@ -95,16 +97,24 @@ static void pass_time(void *protocol, int64_t t_ns)
     struct cola *self = protocol;
     if (t_ns > self->now_ns) self->now_ns = t_ns;
     cola_deliver(self);
+    cola_geometry_time(self);
     if (!self->wants_scan || t_ns < self->try_ns) return;
     self->try_ns = t_ns + TRY_NS;
     cola_start_scan(self);
+}
+
+/* A scan before the head was set to another geometry is not what is asked for. */
+static int is_as_set(const struct cola *self)
+{
+    const struct planar_head *had = &self->scan.head, *set = cola_head(self);
+    return self->scan.whole != NULL && had->steps == set->steps && had->lines_uhz == set->lines_uhz;
 }
 
 enum cola_error cola_read_scan(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
     const enum cola_error error = cola_args_end(args);
     if (error != COLA_OK) return error;
-    if (self->scan.whole != NULL) {
+    if (is_as_set(self)) {
         cola_put_scan(self, out);
         self->telegrams++;
         return COLA_OK;
@@ -115,10 +125,16 @@ enum cola_error cola_read_scan(struct cola *self, struct cola_args *args, struct
     return COLA_LATER;
 }
 
+static int owes(const void *protocol)
+{
+    const struct cola *self = protocol;
+    return self->streams || self->n_waiting != 0 || self->reboots || self->next.is_due || self->outputs_due;
+}
+
 static int64_t next_time(const void *protocol)
 {
     const struct cola *self = protocol;
-    return self->pending ? self->now_ns : self->wants_scan ? self->try_ns : INT64_MAX;
+    return self->pending || self->next.is_due ? self->now_ns : self->wants_scan ? self->try_ns : INT64_MAX;
 }
 
 static void take_input(void *protocol, const uint8_t *bytes, size_t len)
@@ -153,5 +169,6 @@ const struct protocol_ops protocol_cola = {
     .gap = pass_gap,
     .time = pass_time,
     .input = take_input,
+    .owes = owes,
     .next_ns = next_time,
 };

@@ -23,11 +23,11 @@ struct cola_settings {
     /* LMDscandatacfg */
     uint8_t channels[2], rssi, rssi_16bit, unit, encoder[2], position, name, comment, time;
     uint16_t every; /* so many-th scan is sent */
-    /* LMPoutputRange, 1/10000 deg: as it was written; all 0: all beams */
+    /* LMPoutputRange, 1/10000 deg: angles of beams. Without `narrowed` all beams are sent. */
     int32_t start_e4, stop_e4;
-    uint32_t first_beam, n_beams; /* what that is; n_beams 0: all */
-    uint8_t filter;               /* FREchoFilter: enum cola_filter */
-    uint32_t scale;               /* LMDscandatascalefactor; 0: the geometry's */
+    uint8_t narrowed;
+    uint8_t filter; /* FREchoFilter: enum cola_filter */
+    uint32_t scale; /* LMDscandatascalefactor; 0: the geometry's */
     char location[COLA_MAX_NAME];
     int64_t clock_ns; /* what the scanner's clock is ahead of the head's; 0: not set */
     uint8_t framing;  /* EIHstCola, as it was written */
@@ -40,11 +40,23 @@ struct cola {
     const struct cola_model *model;
     struct cola_settings set;
     enum cola_level level;
-    int measures;   /* LMCstopmeas: 0. Output of this session alone */
-    int reboots;    /* once the answer is sent */
-    int wants_scan; /* measurement was asked for, and no scan has come yet; next look at the head at try_ns */
+    int measures;            /* LMCstopmeas: 0. Output of this session alone */
+    int started;             /* LMCstartmeas was called since */
+    int reboots;             /* once the answer is sent */
+    struct planar_head head; /* of a head with geometries, as it is set: its next scan has this one */
+    struct {
+        int is_due; /* mLMPsetscancfg is answered, and done, once the head's scan has ended */
+        enum cola_form form;
+        int64_t lines_uhz;
+        uint32_t steps;
+    } next;
+    uint32_t field;  /* number in the name of the request at hand, field012 */
+    int outputs_due; /* LIDoutputstate is sent once, behind the answer */
+    int wants_scan;  /* measurement was asked for, and no scan has come yet; next look at the head at try_ns */
     int64_t try_ns;
     int64_t now_ns;
+    int64_t power_ns; /* device time of power-up: its clock begins there */
+    uint32_t power_ons;
     uint32_t near_wrap;         /* counters begin so many below their wrap */
     int streams;                /* sEN LMDscandata 1 */
     enum cola_form stream_form; /* of telegrams without a request */
@@ -90,20 +102,57 @@ void cola_reseal(uint8_t *unit, size_t len);
 /* cola_settings.c: what is set and asked for the measurement. */
 
 void cola_settings_reset(struct cola *self);
+/* The beams that are sent: those of LMPoutputRange, of a head that is known. */
+struct cola_beams {
+    uint32_t first, n;
+};
+struct cola_beams cola_sent_beams(const struct cola *self, const struct planar_head *head);
 cola_handler cola_read_output_range, cola_write_output_range, cola_read_scan_data_cfg, cola_write_scan_data_cfg,
-    cola_read_scan_cfg, cola_set_scan_cfg, cola_read_filter, cola_write_filter, cola_read_scale, cola_write_scale;
+    cola_read_filter, cola_write_filter, cola_read_scale, cola_write_scale;
 
-/* cola_device.c: identity, states, log-in, clock, inputs and outputs. */
+/* cola_geometry.c: line rate and step, which are the head's and not this session's. */
+
+/* The head as it is set. The last scan may be of another step: that is in scan.head. */
+const struct planar_head *cola_head(const struct cola *self);
+/* Asks the head how it is set. Before each request. */
+void cola_look_at_head(struct cola *self);
+/* Time has passed: answers mLMPsetscancfg once the head's scan has ended. */
+void cola_geometry_time(struct cola *self);
+cola_handler cola_read_scan_cfg, cola_set_scan_cfg;
+
+/* cola_ports.c: fields, inputs and outputs, of which none is active. */
+
+/* 12 of "field012"; UINT32_MAX: another name. */
+uint32_t cola_field_number(const char *name);
+/* A field is a record, or there is none. */
+enum cola_error cola_read_field(struct cola *self, uint32_t field, struct cola_args *args, struct cola_out *out);
+cola_handler cola_read_inputs, cola_read_outputs, cola_read_field_results;
+/* The event LIDoutputstate. */
+void cola_send_outputs(struct cola *self);
+
+/* cola_device.c: identity, states, log-in and clock. */
 
 /* Time of day of the scanner's clock at a device time, ns since 1970. */
 int64_t cola_clock_ns(const struct cola *self, int64_t t_ns);
+/* That time as telegrams have it: u16 year, 5 x u8 month to second, u32 us. */
+void cola_put_time(const struct cola *self, int64_t t_ns, struct cola_out *out);
+enum cola_head_state {
+    COLA_HEAD_UNKNOWN = -1,
+    COLA_HEAD_OFF,
+    COLA_HEAD_BOOT,
+    COLA_HEAD_IDLE,
+    COLA_HEAD_SPIN_UP,
+    COLA_HEAD_SCANNING,
+    COLA_HEAD_SPIN_DOWN,
+    COLA_HEAD_FAULT
+};
+enum cola_head_state cola_ask_state(struct cola *self);
 /* Lets the head scan if it rests. */
 int cola_start_scan(struct cola *self);
 cola_handler cola_read_ident, cola_read_serial, cola_read_firmware, cola_read_location, cola_write_location,
     cola_read_state, cola_read_lms_state, cola_read_hours, cola_read_power_ons, cola_read_contamination,
-    cola_read_inputs, cola_read_outputs, cola_read_field_results, cola_read_framing, cola_write_framing, cola_log_in,
-    cola_log_out, cola_get_level, cola_check_password, cola_set_clock, cola_start, cola_stop, cola_load_defaults,
-    cola_keep, cola_reboot;
+    cola_read_framing, cola_write_framing, cola_log_in, cola_log_out, cola_get_level, cola_check_password,
+    cola_set_clock, cola_start, cola_stop, cola_load_defaults, cola_keep, cola_reboot;
 
 /* cola_commands.c: one request, and its answer. */
 void cola_carry_out(struct cola *self, const struct cola_request *request);

@@ -4,7 +4,7 @@
 
 #include "drivers/protocol/cola.h"
 
-static cola_handler read_field, set_event, set_scan_event;
+static cola_handler set_event, set_outputs_event, set_scan_event;
 
 static const struct command {
     const char *name;
@@ -53,19 +53,16 @@ static const struct command {
     {"mSCreboot", 'M', COLA_CLIENT, cola_reboot},
     {"LMDscandata", 'E', COLA_RUN, set_scan_event},
     {"LIDinputstate", 'E', COLA_RUN, set_event},
-    {"LIDoutputstate", 'E', COLA_RUN, set_event},
+    {"LIDoutputstate", 'E', COLA_RUN, set_outputs_event},
     {"LFErec", 'E', COLA_RUN, set_event},
 };
 
-/* field000 .. field047: none is configured. */
-static const struct command any_field = {"field", 'R', COLA_RUN, read_field};
-
+/* field000 and on */
 static enum cola_error read_field(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
-    (void)self;
-    cola_put_u(out, 1, 0);
-    return cola_args_end(args);
+    return cola_read_field(self, self->field, args, out);
 }
+static const struct command any_field = {"field", 'R', COLA_RUN, read_field};
 
 static enum cola_error read_switch(struct cola_args *args, int *on)
 {
@@ -82,6 +79,16 @@ static enum cola_error set_event(struct cola *self, struct cola_args *args, stru
     const enum cola_error error = read_switch(args, &on);
     (void)self;
     cola_put_u(out, 1, (uint32_t)on);
+    return error;
+}
+
+/* A scanner of the LMS kind sends the state once when it is asked for, though nothing has changed. */
+static enum cola_error set_outputs_event(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    int on;
+    const enum cola_error error = read_switch(args, &on);
+    cola_put_u(out, 1, (uint32_t)on);
+    self->outputs_due = error == COLA_OK && on && self->model->ports == COLA_PORTS_LMS;
     return error;
 }
 
@@ -132,17 +139,6 @@ static struct parts cut(const struct cola_request *r)
     return p;
 }
 
-static int is_field(const struct cola *self, const char *name)
-{
-    unsigned number = 0;
-    if (strncmp(name, "field", 5) != 0 || strlen(name) != 8) return 0;
-    for (name += 5; *name != 0; name++) {
-        if (*name < '0' || *name > '9') return 0;
-        number = 10 * number + (unsigned)(*name - '0');
-    }
-    return number < self->model->n_fields;
-}
-
 /* The row; NULL and an error: there is none. */
 static const struct command *find(const struct cola *self, const struct parts *p, enum cola_error *error)
 {
@@ -152,7 +148,7 @@ static const struct command *find(const struct cola *self, const struct parts *p
         if (commands[i].verb == p->verb) return &commands[i];
         other = &commands[i];
     }
-    if (p->verb == 'R' && is_field(self, p->name)) return &any_field;
+    if (p->verb == 'R' && self->field < self->model->n_fields) return &any_field;
     const int read_only = other != NULL && other->verb == 'R' && p->verb == 'W';
     *error = p->verb == 'M'   ? COLA_METHOD_UNKNOWN
              : p->verb == 'E' ? COLA_EVENT_UNKNOWN
@@ -170,6 +166,7 @@ static enum cola_error carry_out(struct cola *self, const struct cola_request *r
 {
     struct parts p = cut(request);
     enum cola_error error = COLA_COMMAND_UNKNOWN;
+    self->field = cola_field_number(p.name);
     char head[COLA_MAX_NAME + 4];
     const struct command *c = p.verb != 0 ? find(self, &p, &error) : NULL;
     if (c == NULL) return error;
@@ -179,11 +176,21 @@ static enum cola_error carry_out(struct cola *self, const struct cola_request *r
     return c->carry_out(self, &p.args, out);
 }
 
+/* The head's power cycle ends all sessions. Where there is none, as of a recording, this session alone begins anew. */
+static void reboot(struct cola *self)
+{
+    char reply[512];
+    const int refused = self->host.command(self->host.ctx, "HEAD:REBoot", reply, sizeof reply) != 0;
+    cola_power_up(self);
+    if (refused) self->host.hang_up(self->host.ctx);
+}
+
 void cola_carry_out(struct cola *self, const struct cola_request *request)
 {
     struct cola_out out = {.buf = self->unit, .cap = sizeof self->unit};
     const uint16_t telegrams = self->telegrams;
     cola_deliver(self);
+    cola_look_at_head(self);
     self->stream_form = request->form;
     const enum cola_error error = carry_out(self, request, &out);
     if (error == COLA_LATER) return;
@@ -191,7 +198,6 @@ void cola_carry_out(struct cola *self, const struct cola_request *request)
         cola_refuse(self, request->form, error);
     else if (self->host.send(self->host.ctx, self->unit, cola_end(&out)) != 0)
         self->telegrams = telegrams;
-    if (!self->reboots) return;
-    cola_power_up(self);
-    self->host.hang_up(self->host.ctx);
+    if (self->outputs_due) cola_send_outputs(self);
+    if (self->reboots) reboot(self);
 }

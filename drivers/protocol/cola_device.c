@@ -1,11 +1,11 @@
-/* Identity, states, log-in, clock, inputs and outputs. */
+/* Identity, states, log-in and clock. */
 #include <stdio.h>
 #include <string.h>
 
 #include "drivers/protocol/cola.h"
 #include "drivers/protocol/cola_clock.h"
 
-enum { MAX_REPLY = 512, MOST_LOCATION = 16, N_OUTPUTS = 5 };
+enum { MAX_REPLY = 512, MOST_LOCATION = 16 };
 
 /* ---- identity */
 
@@ -52,26 +52,24 @@ enum cola_error cola_write_location(struct cola *self, struct cola_args *args, s
 
 /* ---- states */
 
-enum head { UNKNOWN = -1, OFF, BOOT, IDLE, SPIN_UP, SCANNING, SPIN_DOWN, FAULT };
-
-static enum head head_state(struct cola *self)
+enum cola_head_state cola_ask_state(struct cola *self)
 {
     static const char *const names[] = {"off", "boot", "idle", "spin-up", "scanning", "spin-down", "fault"};
     char state[MAX_REPLY] = "";
-    if (self->host.command(self->host.ctx, "HEAD:STATE?", state, sizeof state) != 0) return UNKNOWN;
-    for (int i = OFF; i <= FAULT; i++)
-        if (strcmp(names[i], state) == 0) return (enum head)i;
-    return UNKNOWN;
+    if (self->host.command(self->host.ctx, "HEAD:STATE?", state, sizeof state) != 0) return COLA_HEAD_UNKNOWN;
+    for (int i = COLA_HEAD_OFF; i <= COLA_HEAD_FAULT; i++)
+        if (strcmp(names[i], state) == 0) return (enum cola_head_state)i;
+    return COLA_HEAD_UNKNOWN;
 }
 
 enum cola_error cola_read_state(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
     enum { BUSY, READY, ERROR };
-    const enum head head = head_state(self);
-    if (head == FAULT)
+    const enum cola_head_state head = cola_ask_state(self);
+    if (head == COLA_HEAD_FAULT)
         cola_put_u(out, 1, ERROR);
     else
-        cola_put_u(out, 1, head <= BOOT || !self->scan.head.known ? BUSY : READY);
+        cola_put_u(out, 1, head <= COLA_HEAD_BOOT || !self->scan.head.known ? BUSY : READY);
     return cola_args_end(args);
 }
 
@@ -81,8 +79,8 @@ enum cola_error cola_read_lms_state(struct cola *self, struct cola_args *args, s
     enum { UNDEFINED, INITIALISATION, CONFIGURATION, REST, ROTATES, PREPARATION, READY, MEASURES };
     static const uint8_t states[] = {INITIALISATION, INITIALISATION, REST, PREPARATION, MEASURES, ROTATES, UNDEFINED};
     const struct cola_date d = cola_date_of(cola_clock_ns(self, self->now_ns));
-    const enum head head = head_state(self);
-    uint32_t state = head == UNKNOWN ? (uint32_t)UNDEFINED : states[head];
+    const enum cola_head_state head = cola_ask_state(self);
+    uint32_t state = head == COLA_HEAD_UNKNOWN ? (uint32_t)UNDEFINED : states[head];
     char text[40];
     if (state == MEASURES && !self->measures) state = READY;
     cola_put_u(out, 2, state);
@@ -106,48 +104,13 @@ enum cola_error cola_read_contamination(struct cola *self, struct cola_args *arg
 enum cola_error cola_read_hours(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
     const int64_t tenth_ns = INT64_C(360000000000);
-    cola_put_u(out, 4, (uint32_t)(self->now_ns / tenth_ns));
+    cola_put_u(out, 4, (uint32_t)((self->now_ns - self->power_ns) / tenth_ns));
     return cola_args_end(args);
 }
 
 enum cola_error cola_read_power_ons(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
-    (void)self;
-    cola_put_u(out, 4, 1);
-    return cola_args_end(args);
-}
-
-/* ---- inputs, outputs, fields: there are none that are active */
-
-/* u16 version, u32 time, 4 x u8 input, u16 no time of day */
-enum cola_error cola_read_inputs(struct cola *self, struct cola_args *args, struct cola_out *out)
-{
-    cola_put_u(out, 2, 0);
-    cola_put_u(out, 4, cola_time_us(self, self->now_ns));
-    for (int i = 0; i < 4; i++)
-        cola_put_u(out, 1, 0);
-    cola_put_u(out, 2, 0);
-    return cola_args_end(args);
-}
-
-/* u16 version, u32 time, 5 x (u8 state, u32 changes), u16 no time of day */
-enum cola_error cola_read_outputs(struct cola *self, struct cola_args *args, struct cola_out *out)
-{
-    cola_put_u(out, 2, 0);
-    cola_put_u(out, 4, cola_time_us(self, self->now_ns));
-    for (int i = 0; i < N_OUTPUTS; i++) {
-        cola_put_u(out, 1, 0);
-        cola_put_u(out, 4, 0);
-    }
-    cola_put_u(out, 2, 0);
-    return cola_args_end(args);
-}
-
-/* u16 number of fields */
-enum cola_error cola_read_field_results(struct cola *self, struct cola_args *args, struct cola_out *out)
-{
-    (void)self;
-    cola_put_u(out, 2, 0);
+    cola_put_u(out, 4, self->power_ons);
     return cola_args_end(args);
 }
 
@@ -218,10 +181,11 @@ enum cola_error cola_log_out(struct cola *self, struct cola_args *args, struct c
 int cola_start_scan(struct cola *self)
 {
     char reply[MAX_REPLY];
-    const enum head head = head_state(self);
-    self->wants_scan = head != IDLE && head != FAULT && head != UNKNOWN; /* one that scans may be about to stop */
+    const enum cola_head_state head = cola_ask_state(self);
+    self->wants_scan = head != COLA_HEAD_IDLE && head != COLA_HEAD_FAULT &&
+                       head != COLA_HEAD_UNKNOWN; /* one that scans may be about to stop */
     if (self->wants_scan) return 0;
-    return head != IDLE || self->host.command(self->host.ctx, "SCAN:START", reply, sizeof reply) != 0;
+    return head != COLA_HEAD_IDLE || self->host.command(self->host.ctx, "SCAN:START", reply, sizeof reply) != 0;
 }
 
 /* u8 0: measures */
@@ -229,7 +193,7 @@ enum cola_error cola_start(struct cola *self, struct cola_args *args, struct col
 {
     const enum cola_error error = cola_args_end(args);
     if (error != COLA_OK) return error;
-    self->measures = 1;
+    self->measures = self->started = 1;
     cola_put_u(out, 1, (uint32_t)cola_start_scan(self));
     return COLA_OK;
 }
@@ -239,7 +203,7 @@ enum cola_error cola_stop(struct cola *self, struct cola_args *args, struct cola
 {
     const enum cola_error error = cola_args_end(args);
     if (error != COLA_OK) return error;
-    self->measures = self->wants_scan = 0;
+    self->measures = self->started = self->wants_scan = 0;
     cola_put_u(out, 1, 0);
     return COLA_OK;
 }
@@ -249,7 +213,19 @@ enum cola_error cola_stop(struct cola *self, struct cola_args *args, struct cola
 int64_t cola_clock_ns(const struct cola *self, int64_t t_ns)
 {
     const int64_t utc_ns = self->host.utc_ns(self->host.ctx, t_ns);
-    return (utc_ns == INT64_MIN ? t_ns : utc_ns) + self->set.clock_ns;
+    return (utc_ns == INT64_MIN ? t_ns - self->power_ns : utc_ns) + self->set.clock_ns;
+}
+
+void cola_put_time(const struct cola *self, int64_t t_ns, struct cola_out *out)
+{
+    const struct cola_date d = cola_date_of(cola_clock_ns(self, t_ns));
+    cola_put_u(out, 2, d.year);
+    cola_put_u(out, 1, d.month);
+    cola_put_u(out, 1, d.day);
+    cola_put_u(out, 1, d.hour);
+    cola_put_u(out, 1, d.minute);
+    cola_put_u(out, 1, d.second);
+    cola_put_u(out, 4, d.us);
 }
 
 /* u16 year, 5 x u8, u32 us; u8 1: set */

@@ -3,7 +3,6 @@
 #include <string.h>
 
 #include "drivers/protocol/cola.h"
-#include "drivers/protocol/cola_clock.h"
 
 enum { VERSION = 1, DEVICE = 1 };
 
@@ -44,20 +43,8 @@ static void put_encoder(const struct cola *self, struct cola_out *out)
     cola_put_i(out, 2, self->encoder.speed_mm_s);
 }
 
-/* The beams that are sent. */
-struct beams {
-    uint32_t first, n;
-};
-
-static struct beams sent_beams(const struct cola *self)
-{
-    const uint32_t n = self->scan.head.n;
-    if (self->set.n_beams == 0 || self->set.first_beam + self->set.n_beams > n) return (struct beams){0, n};
-    return (struct beams){self->set.first_beam, self->set.n_beams};
-}
-
 static void put_channel_head(const struct planar_head *head, struct cola_out *out, const char *name, uint32_t scale,
-                             struct beams beams)
+                             struct cola_beams beams)
 {
     cola_put_word(out, name);
     cola_put_float(out, (float)scale);
@@ -83,7 +70,7 @@ static void put_distances(const struct cola *self, unsigned k, struct cola_out *
     const struct planar_head *head = &self->scan.head;
     const uint32_t scale = self->set.scale != 0 ? self->set.scale : cola_head_scale(head);
     const double counts = head->m_per_count * 1000.0 / scale;
-    const struct beams beams = sent_beams(self);
+    const struct cola_beams beams = cola_sent_beams(self, &self->scan.head);
     uint64_t lost = 0;
     put_channel_head(head, out, names[k], scale, beams);
     for (uint32_t i = beams.first; i < beams.first + beams.n; i++) {
@@ -100,7 +87,7 @@ static void put_signals(const struct cola *self, unsigned k, struct cola_out *ou
 {
     static const char *const names[2] = {"RSSI1", "RSSI2"};
     const unsigned bytes = self->set.rssi_16bit ? 2 : 1;
-    const struct beams beams = sent_beams(self);
+    const struct cola_beams beams = cola_sent_beams(self, &self->scan.head);
     put_channel_head(&self->scan.head, out, names[k], 1, beams);
     for (uint32_t i = beams.first; i < beams.first + beams.n; i++) {
         const struct planar_echo *echo = echo_of(self, k, i);
@@ -128,18 +115,6 @@ static void put_channels(const struct cola *self, struct cola_out *out)
     if (n_signals != 0 && !self->set.rssi_16bit) put_all_signals(self, out);
 }
 
-static void put_time(const struct cola *self, struct cola_out *out)
-{
-    const struct cola_date d = cola_date_of(cola_clock_ns(self, self->scan.whole->t0_ns));
-    cola_put_u(out, 2, d.year);
-    cola_put_u(out, 1, d.month);
-    cola_put_u(out, 1, d.day);
-    cola_put_u(out, 1, d.hour);
-    cola_put_u(out, 1, d.minute);
-    cola_put_u(out, 1, d.second);
-    cola_put_u(out, 4, d.us);
-}
-
 static void put_tail(const struct cola *self, struct cola_out *out)
 {
     const int named = self->set.name && self->set.location[0] != 0;
@@ -148,7 +123,7 @@ static void put_tail(const struct cola *self, struct cola_out *out)
     if (named) cola_put_text(out, self->set.location);
     cola_put_u(out, 2, 0); /* comment: there is none */
     cola_put_u(out, 2, self->set.time ? 1 : 0);
-    if (self->set.time) put_time(self, out);
+    if (self->set.time) cola_put_time(self, self->scan.whole->t0_ns, out);
     cola_put_u(out, 2, 0); /* event: there is none */
 }
 

@@ -4,6 +4,12 @@
 
 #include <stdint.h>
 
+/* Forms of LIDinputstate and LIDoutputstate. */
+enum cola_ports {
+    COLA_PORTS_TIM, /* version 0, no time of day; no event comes */
+    COLA_PORTS_LMS, /* version 1, ports that are not used say so, outputs have a time of day; one event when asked for */
+};
+
 struct cola_model {
     const char *model;    /* of the head profile; NULL: the row for all others, with the profile's own text */
     const char *version;  /* of DeviceIdent, where the profile has no firmware */
@@ -11,7 +17,12 @@ struct cola_model {
     uint8_t echoes;       /* DIST1, DIST2 */
     uint8_t rssi;         /* LMDscandatacfg at power-up: 1 with RSSI */
     uint8_t rssi_16bit;   /* 0: 8 bit */
-    uint8_t n_fields;     /* field000 .. */
+    uint8_t n_fields;     /* field000 and on are answered */
+    uint8_t n_records;    /* the first of them have a record, the others say that there is none */
+    uint8_t named;        /* 1: a record is numbered, named and of segments; 0: nothing of it is configured */
+    uint8_t n_results;    /* of LFErec */
+    uint8_t n_outputs;    /* of LIDoutputstate */
+    uint8_t ports;        /* enum cola_ports */
 };
 
 /* The row of that model; never NULL. */

@@ -4,9 +4,6 @@
 
 #include "drivers/protocol/cola.h"
 
-/* of mLMPsetscancfg */
-enum { OK, FREQUENCY_ERROR, RESOLUTION_ERROR, RESOLUTION_AND_AREA_ERROR, AREA_ERROR, OTHER_ERROR };
-
 void cola_settings_reset(struct cola *self)
 {
     const char *name = self->identity->name;
@@ -15,46 +12,49 @@ void cola_settings_reset(struct cola *self)
     snprintf(self->set.location, sizeof self->set.location, "%s", name[0] != 0 ? name : "not defined");
 }
 
-static const struct planar_head *head_of(const struct cola *self)
+/* ---- LMPoutputRange: u16 1, u32 step, i32 start, i32 stop */
+
+static uint32_t clamped(int64_t beam, const struct planar_head *head)
 {
-    return &self->scan.head;
+    return beam < 0 ? 0 : beam >= head->n ? head->n - 1 : (uint32_t)beam;
 }
 
-/* ---- LMPoutputRange: u16 1, u32 step, i32 start, i32 stop */
+/* Found anew for each telegram: the head's step may have become another one since the range was written. */
+struct cola_beams cola_sent_beams(const struct cola *self, const struct planar_head *head)
+{
+    if (!self->set.narrowed) return (struct cola_beams){0, head->n};
+    const uint32_t first = clamped(cola_beam_at(head, self->set.start_e4), head);
+    return (struct cola_beams){first, clamped(cola_beam_at(head, self->set.stop_e4), head) - first + 1};
+}
 
 enum cola_error cola_read_output_range(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
-    const struct planar_head *head = head_of(self);
-    const int all = self->set.n_beams == 0;
+    const struct planar_head *head = cola_head(self);
     if (!head->known) return COLA_CONDITION;
+    const struct cola_beams beams = cola_sent_beams(self, head);
     cola_put_u(out, 2, 1);
     cola_put_u(out, 4, cola_step_angle(head));
-    cola_put_i(out, 4, all ? cola_beam_angle(head, 0) : self->set.start_e4);
-    cola_put_i(out, 4, all ? cola_beam_angle(head, head->n - 1) : self->set.stop_e4);
+    cola_put_i(out, 4, cola_beam_angle(head, beams.first));
+    cola_put_i(out, 4, cola_beam_angle(head, beams.first + beams.n - 1));
     return cola_args_end(args);
 }
 
+/* An end between two beams becomes the nearest one, as in the real scanner. */
 enum cola_error cola_write_output_range(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
-    const struct planar_head *head = head_of(self);
+    const struct planar_head *head = cola_head(self);
     const uint32_t sectors = cola_arg_u(args, 2), step = cola_arg_u(args, 4);
     const int32_t start_e4 = cola_arg_i(args, 4), stop_e4 = cola_arg_i(args, 4);
-    uint32_t first = 0, n = 0;
     (void)out;
     const enum cola_error error = cola_args_end(args);
     if (error != COLA_OK) return error;
     if (!head->known) return COLA_CONDITION;
     if (sectors != 1 || step != cola_step_angle(head) || start_e4 > stop_e4) return COLA_INVALID_DATA;
-    if (start_e4 < cola_beam_angle(head, 0) || stop_e4 > cola_beam_angle(head, head->n - 1)) return COLA_INVALID_DATA;
-    while (first < head->n && cola_beam_angle(head, first) < start_e4)
-        first++;
-    while (first + n < head->n && cola_beam_angle(head, first + n) <= stop_e4)
-        n++;
-    if (n == 0) return COLA_INVALID_DATA;
-    self->set.start_e4 = start_e4;
-    self->set.stop_e4 = stop_e4;
-    self->set.first_beam = first;
-    self->set.n_beams = n;
+    const int64_t first = cola_beam_at(head, start_e4), last = cola_beam_at(head, stop_e4);
+    if (first < 0 || last >= head->n) return COLA_INVALID_DATA;
+    self->set.start_e4 = cola_beam_angle(head, (uint32_t)first);
+    self->set.stop_e4 = cola_beam_angle(head, (uint32_t)last);
+    self->set.narrowed = 1;
     return COLA_OK;
 }
 
@@ -92,51 +92,6 @@ enum cola_error cola_write_scan_data_cfg(struct cola *self, struct cola_args *ar
     return COLA_OK;
 }
 
-/* ---- LMPscancfg, mLMPsetscancfg: u32 1/100 Hz, i16 sectors, u32 step, i32 start, i32 stop */
-
-static void put_scan_cfg(const struct planar_head *head, struct cola_out *out)
-{
-    cola_put_u(out, 4, cola_scan_chz(head));
-    cola_put_i(out, 2, 1);
-    cola_put_u(out, 4, cola_step_angle(head));
-    cola_put_i(out, 4, cola_beam_angle(head, 0));
-    cola_put_i(out, 4, cola_beam_angle(head, head->n - 1));
-}
-
-enum cola_error cola_read_scan_cfg(struct cola *self, struct cola_args *args, struct cola_out *out)
-{
-    if (!head_of(self)->known) return COLA_CONDITION;
-    put_scan_cfg(head_of(self), out);
-    return cola_args_end(args);
-}
-
-/* What the head has is accepted, all else refused by its status. The answer says what it has. */
-enum cola_error cola_set_scan_cfg(struct cola *self, struct cola_args *args, struct cola_out *out)
-{
-    const struct planar_head *head = head_of(self);
-    const uint32_t scan_chz = cola_arg_u(args, 4);
-    const int32_t sectors = cola_arg_i(args, 2);
-    const uint32_t step = cola_arg_u(args, 4);
-    const int32_t start_e4 = cola_arg_i(args, 4), stop_e4 = cola_arg_i(args, 4);
-    const enum cola_error error = cola_args_end(args);
-    if (error != COLA_OK) return error;
-    if (!head->known) return COLA_CONDITION;
-    const int step_fits = step == cola_step_angle(head);
-    const int area_fits = start_e4 == cola_beam_angle(head, 0) && stop_e4 == cola_beam_angle(head, head->n - 1);
-    uint32_t status = OK;
-    if (scan_chz != cola_scan_chz(head))
-        status = FREQUENCY_ERROR;
-    else if (!step_fits)
-        status = area_fits ? RESOLUTION_ERROR : RESOLUTION_AND_AREA_ERROR;
-    else if (!area_fits)
-        status = AREA_ERROR;
-    else if (sectors != 1)
-        status = OTHER_ERROR;
-    cola_put_u(out, 1, status);
-    put_scan_cfg(head, out);
-    return COLA_OK;
-}
-
 /* ---- FREchoFilter: u8 */
 
 enum cola_error cola_read_filter(struct cola *self, struct cola_args *args, struct cola_out *out)
@@ -160,12 +115,12 @@ enum cola_error cola_write_filter(struct cola *self, struct cola_args *args, str
 
 static float scale_in_use(const struct cola *self)
 {
-    return (float)(self->set.scale != 0 ? self->set.scale : cola_head_scale(head_of(self)));
+    return (float)(self->set.scale != 0 ? self->set.scale : cola_head_scale(cola_head(self)));
 }
 
 enum cola_error cola_read_scale(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
-    if (!head_of(self)->known) return COLA_CONDITION;
+    if (!cola_head(self)->known) return COLA_CONDITION;
     cola_put_float(out, scale_in_use(self));
     return cola_args_end(args);
 }
@@ -178,9 +133,9 @@ enum cola_error cola_write_scale(struct cola *self, struct cola_args *args, stru
     (void)out;
     memcpy(&scale, &bits, sizeof scale);
     if (error != COLA_OK) return error;
-    if (!head_of(self)->known) return COLA_CONDITION;
+    if (!cola_head(self)->known) return COLA_CONDITION;
     /* 1 would cut off what the head reaches over 65.535 m */
-    if (scale != 2.0f && !(scale == 1.0f && cola_head_scale(head_of(self)) == 1)) return COLA_INVALID_DATA;
+    if (scale != 2.0f && !(scale == 1.0f && cola_head_scale(cola_head(self)) == 1)) return COLA_INVALID_DATA;
     self->set.scale = (uint32_t)scale;
     return COLA_OK;
 }

@@ -14,6 +14,11 @@ int32_t cola_beam_angle(const struct planar_head *head, uint32_t beam)
     return (int32_t)(FORWARD_E4 + nearest(from_front * TURN_E4, head->steps));
 }
 
+int64_t cola_beam_at(const struct planar_head *head, int32_t angle_e4)
+{
+    return nearest((int64_t)(angle_e4 - (int64_t)FORWARD_E4) * head->steps, TURN_E4) + head->front - head->first;
+}
+
 uint32_t cola_step_angle(const struct planar_head *head)
 {
     return (TURN_E4 + head->steps / 2) / head->steps;

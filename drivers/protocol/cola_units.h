@@ -8,6 +8,8 @@
 
 /* Rounded to 1/10000 deg. */
 int32_t cola_beam_angle(const struct planar_head *head, uint32_t beam);
+/* The beam that is nearest to an angle; below 0, or n and more: beside the beams of the head. */
+int64_t cola_beam_at(const struct planar_head *head, int32_t angle_e4);
 uint32_t cola_step_angle(const struct planar_head *head);
 uint32_t cola_scan_chz(const struct planar_head *head);    /* scans, 1/100 Hz */
 uint32_t cola_meas_100hz(const struct planar_head *head);  /* pulses, 100 Hz */

@@ -93,8 +93,8 @@ size_t nmea_encode_rmc(char *dst, size_t cap, const struct nmea_fix *fix)
     put_place(&s, fix);
     if (fix->quality == 0)
         put(&s, ",,");
-    else if (isnan(fix->course_deg))
-        put(&s, ",%.3f,", fix->speed_m_s / KNOT_M_S);
+    else if (isnan(fix->course_deg)) /* readers by sscanf read no sentence with an empty field */
+        put(&s, ",%.3f,000.0", fix->speed_m_s / KNOT_M_S);
     else /* cut, so that it never reads 360 */
         put(&s, ",%.3f,%.2f", fix->speed_m_s / KNOT_M_S, floor(fix->course_deg * 100.0) / 100.0);
     put(&s, ",%02d%02d%02d,,,%c", fix->day, fix->month, fix->year % 100,

@@ -38,6 +38,14 @@ enum protocol_needs {
     PROTOCOL_NEEDS_LAST = 1 << 4,       /* beam.echoes is not first */
 };
 
+/* Pulses per second that the head's clock follows, as a VLP-16 numbers their states. */
+enum protocol_pps {
+    PROTOCOL_PPS_ABSENT,
+    PROTOCOL_PPS_SYNCHRONISING,
+    PROTOCOL_PPS_LOCKED,
+    PROTOCOL_PPS_ERROR, /* they come at other times than the clock's full seconds */
+};
+
 /* What is counted of a session beside the frames it lost. */
 enum protocol_count {
     PROTOCOL_UNITS_LOST,    /* units that were not sent: no room, or parts of them were missing */
@@ -72,7 +80,12 @@ struct protocol_host {
     void (*hang_up)(void *ctx);
     /* Device time of the receiver's first fix at or after t_ns; INT64_MAX: it knows no time. */
     int64_t (*next_fix_ns)(void *ctx, int64_t t_ns);
+    /* State of the pulses per second at a device time. *set: by then the time of day was set; else the head counts from
+     * power-up. May be NULL: locked where UTC is known. */
+    enum protocol_pps (*pps)(void *ctx, int64_t t_ns, int *set);
 };
+
+enum { PROTOCOL_MAX_GEOMETRIES = 8 };
 
 /* What a protocol says of the head; constant, and outlives the instance. The rest stands in the descriptor. */
 struct protocol_identity {
@@ -81,6 +94,12 @@ struct protocol_identity {
     char firmware[32];
     char serial[32];
     char name[32]; /* of the device, as its user calls it */
+    /* The line rates that a planar head can be set to, with the steps of a turn at each; 0: the head is no such one. */
+    struct protocol_geometry {
+        int64_t lines_uhz;
+        uint32_t steps;
+    } geometry[PROTOCOL_MAX_GEOMETRIES];
+    uint32_t n_geometries;
 };
 
 struct protocol_spec {
@@ -88,6 +107,8 @@ struct protocol_spec {
     struct protocol_host host;
     uint32_t session;   /* from 1, over all links */
     uint32_t fixes_hz;  /* of the GNSS receiver */
+    int64_t power_ns;   /* device time at which power came last: what the device counts since power-up counts from it */
+    uint32_t power_ons; /* how often power has come, by power cycles and reboots, with the first time */
     uint32_t near_wrap; /* counters begin so many below their wrap; 0: at 0 */
     int waits;          /* 1: paces fast and step: device time says nothing of how long a client takes */
     /* velodyne_http: where the settings say that data go, and so on; empty: not known */
@@ -128,6 +149,9 @@ struct protocol_ops {
     void (*time)(void *protocol, int64_t t_ns);
     /* Bytes from the client, in pieces of any size. */
     void (*input)(void *protocol, const uint8_t *bytes, size_t len);
+    /* Whether units may still come for a client that sends nothing more: a stream that it asked for, or an answer that
+     * takes time. 0: its session ends. May be NULL: they come without being asked for. */
+    int (*owes)(const void *protocol);
     /* Device time that must have passed before time() has something to do, unless frames or bytes come. May be NULL:
      * each tick. It saves wake-ups, no more: time() is called for the other ticks, too. */
     int64_t (*next_ns)(const void *protocol);

@@ -12,7 +12,9 @@ static int create(const struct protocol_spec *spec, void **protocol, struct sh_e
     s->host = spec->host;
     s->identity = spec->identity;
     s->model = scip_model_find(spec->identity->model);
-    s->epoch_ns = s->wrap_ns = (int64_t)spec->near_wrap * 1000000;
+    s->features = scip_model_features(s->model, spec->identity->firmware);
+    s->epoch_us_ns = spec->power_ns;
+    s->epoch_ns = spec->power_ns + (int64_t)spec->near_wrap * 1000000;
     planar_scan_init(&s->scan);
     scip_power_up(s);
     *protocol = s;
@@ -26,7 +28,7 @@ static void destroy(void *protocol)
 
 void scip_power_up(struct scip *s)
 {
-    s->laser = s->time_mode = s->speed_changed = 0;
+    s->laser = s->time_mode = s->speed_changed = s->asleep = 0;
     s->bit_rate = s->model->bit_rate;
     s->rb_ns = s->reboot_ns = INT64_MIN;
     s->stream.active = s->single.active = 0;
@@ -44,6 +46,11 @@ uint32_t scip_time_ms(const struct scip *s, int64_t t_ns)
 {
     const int64_t ns = t_ns - s->epoch_ns, ms = ns / 1000000 - (ns % 1000000 < 0);
     return (uint32_t)((uint64_t)ms & 0xffffff);
+}
+
+uint64_t scip_time_us(const struct scip *s, int64_t t_ns)
+{
+    return (uint64_t)((t_ns - s->epoch_us_ns) / 1000);
 }
 
 void scip_send(struct scip *s)
@@ -107,15 +114,28 @@ static void gap(void *protocol, uint32_t n_frames)
     (void)n_frames;
 }
 
+/* The second RB was a second ago. The power cycle ends this session, too. Where none can be, as of a recording, this
+ * session alone begins anew. */
+static void reboot(struct scip *s)
+{
+    char reply[512];
+    const int refused = s->host.command(s->host.ctx, "HEAD:REBOOT", reply, sizeof reply) != 0;
+    scip_power_up(s);
+    if (refused) s->host.hang_up(s->host.ctx);
+}
+
 static void time_is(void *protocol, int64_t t_ns)
 {
     struct scip *s = protocol;
     s->now_ns = t_ns;
     scip_measure_time(s);
-    if (s->reboot_ns == INT64_MIN || t_ns < s->reboot_ns) return;
-    scip_power_up(s);
-    s->epoch_ns = t_ns + s->wrap_ns;
-    s->host.hang_up(s->host.ctx);
+    if (s->reboot_ns != INT64_MIN && t_ns >= s->reboot_ns) reboot(s);
+}
+
+static int owes(const void *protocol)
+{
+    const struct scip *s = protocol;
+    return s->stream.active || s->single.active || s->reboot_ns != INT64_MIN;
 }
 
 /* Scans are looked for at each tick; without a request it is enough to keep up with the stream. */
@@ -142,5 +162,6 @@ const struct protocol_ops protocol_scip = {
     .gap = gap,
     .time = time_is,
     .input = input,
+    .owes = owes,
     .next_ns = next_ns,
 };

@@ -33,7 +33,7 @@ static void laser(struct scip *s, const char *line, size_t len)
 static void quit(struct scip *s, const char *line, size_t len)
 {
     scip_laser_off(s);
-    s->time_mode = 0;
+    s->time_mode = s->asleep = 0;
     scip_answer(s, line, len, "00");
 }
 
@@ -42,12 +42,12 @@ static void reset(struct scip *s, const char *line, size_t len)
 {
     char reply[512];
     scip_laser_off(s);
-    s->time_mode = 0;
+    s->time_mode = s->asleep = 0;
     s->simulation = (struct scip_simulation){0};
     if (s->speed_changed) s->host.command(s->host.ctx, "HEAD:LINES DEF", reply, sizeof reply);
     s->speed_changed = 0;
     if (line[1] == 'S') {
-        s->epoch_ns = s->now_ns;
+        s->epoch_ns = s->epoch_us_ns = s->now_ns;
         s->bit_rate = s->model->bit_rate;
     }
     scip_answer(s, line, len, "00");
@@ -68,10 +68,11 @@ static void reboot(struct scip *s, const char *line, size_t len)
 
 static const char *time_mode(struct scip *s, char code)
 {
+    if (code == '0' && scip_head_state(s) == SCIP_HEAD_BOOTS) return "10";
     if (code == '0' && s->time_mode) return "02";
     if (code == '0' && (s->stream.active || s->single.active)) return "10";
     if (code == '2' && !s->time_mode) return "03";
-    if (code == '1' && !s->time_mode && (s->model->features & SCIP_TIME_ALONE) != 0) return "04";
+    if (code == '1' && !s->time_mode && (s->features & SCIP_TIME_ALONE) != 0) return "04";
     return code < '0' || code > '2' ? "01" : NULL;
 }
 
@@ -89,6 +90,18 @@ static void adjust_time(struct scip *s, const char *line, size_t len)
     scip_send(s);
 }
 
+/* %TM1 alone: the mode is switched without the %. */
+static void tell_time_us(struct scip *s, const char *line, size_t len)
+{
+    if (line[3] != '1') {
+        scip_answer(s, line, len, "01");
+        return;
+    }
+    scip_reply_begin(&s->reply, line, len, "00");
+    scip_reply_time_us(&s->reply, scip_time_us(s, s->now_ns));
+    scip_send(s);
+}
+
 static void bit_rate(struct scip *s, const char *line, size_t len)
 {
     static const int32_t rates[] = {19200, 38400, 57600, 115200, 250000, 500000, 750000};
@@ -97,7 +110,7 @@ static void bit_rate(struct scip *s, const char *line, size_t len)
     for (size_t i = 0; i < sizeof rates / sizeof *rates; i++)
         if (rate == rates[i]) status = (uint32_t)rate == s->bit_rate ? "03" : "00";
     if (rate < 0) status = "01";
-    if ((s->model->features & SCIP_BIT_RATE) == 0) status = "0F";
+    if ((s->features & SCIP_BIT_RATE) == 0) status = "0F";
     if (strcmp(status, "00") == 0) s->bit_rate = (uint32_t)rate;
     scip_answer(s, line, len, status);
 }
@@ -106,7 +119,7 @@ static void bit_rate(struct scip *s, const char *line, size_t len)
 static const char *motor_speed(struct scip *s, int32_t level)
 {
     char command[48], reply[512];
-    if ((s->model->features & SCIP_MOTOR_SPEED) == 0) return "04";
+    if ((s->features & SCIP_MOTOR_SPEED) == 0) return "04";
     if (level < 0) return "01";
     if (level > 10 && level != 99) return "02";
     const uint64_t now_uhz = scip_lines_uhz(s, "HEAD:LINES?"), normal_uhz = scip_lines_uhz(s, "HEAD:LINES? DEF");
@@ -133,6 +146,7 @@ static void sensitivity(struct scip *s, const char *line, size_t len)
 static void fall_asleep(struct scip *s, const char *line, size_t len)
 {
     scip_laser_off(s);
+    s->asleep = 1;
     scip_answer(s, line, len, "00");
 }
 
@@ -156,6 +170,8 @@ static const struct command {
     {"HS", 1, 0, sensitivity},
     {"DB", 2, 0, scip_simulate},
     {"%SL", 0, SCIP_SLEEP, fall_asleep},
+    {"%ST", 0, SCIP_STATE, scip_info_state_number},
+    {"%TM", 1, SCIP_TIME_US, tell_time_us},
     {"GD", 10, 0, scip_measure},
     {"GS", 10, 0, scip_measure},
     {"GE", 10, SCIP_INTENSITY, scip_measure},
@@ -164,6 +180,8 @@ static const struct command {
     {"MD", 13, 0, scip_measure},
     {"MS", 13, 0, scip_measure},
     {"ME", 13, SCIP_INTENSITY, scip_measure},
+    {"%MD", 13, SCIP_TIME_US, scip_measure},
+    {"%ME", 13, SCIP_TIME_US | SCIP_INTENSITY, scip_measure},
     {"ND", 13, SCIP_MULTI_ECHO, scip_measure},
     {"NE", 13, SCIP_MULTI_ECHO | SCIP_INTENSITY, scip_measure},
 };
@@ -173,7 +191,7 @@ static const struct command *find(const struct scip *s, const char *line, size_t
     for (size_t i = 0; i < sizeof commands / sizeof *commands; i++) {
         const struct command *c = &commands[i];
         const size_t n = strlen(c->name);
-        if (len >= n && memcmp(line, c->name, n) == 0 && (s->model->features & c->features) == c->features) return c;
+        if (len >= n && memcmp(line, c->name, n) == 0 && (s->features & c->features) == c->features) return c;
     }
     return NULL;
 }
@@ -193,7 +211,7 @@ static const char *check_tag(const char *tag, size_t len)
 /* NULL, or what is wrong with the line as such; n: its length without the tag and the ';' before it. */
 static const char *check_line(const struct scip *s, const struct command *c, const char *line, size_t len, size_t n)
 {
-    const int time_alone = s->time_mode && (s->model->features & SCIP_TIME_ALONE) != 0;
+    const int time_alone = s->time_mode && (s->features & SCIP_TIME_ALONE) != 0;
     if (c == NULL || (time_alone && c->run != adjust_time)) return "0E";
     const char *wrong = n < len ? check_tag(line + n + 1, len - n - 1) : NULL;
     if (wrong != NULL) return wrong;

@@ -1,9 +1,10 @@
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "drivers/protocol/scip_session.h"
 
-/* VV, PP, II: key lines. */
+/* VV, PP, II: key lines. %ST: a number. */
 
 uint64_t scip_lines_uhz(struct scip *s, const char *query)
 {
@@ -61,35 +62,87 @@ void scip_info_parameters(struct scip *s, const char *line, size_t len)
     scip_send(s);
 }
 
-static const char *mode(const struct scip *s)
+enum scip_head scip_head_state(struct scip *s)
 {
+    char reply[512];
+    if (s->host.command(s->host.ctx, "HEAD:STATE?", reply, sizeof reply) != 0) return SCIP_HEAD_WORKS;
+    if (strcmp(reply, "fault") == 0) return SCIP_HEAD_HAS_FAILED;
+    if (strcmp(reply, "boot") == 0 || strcmp(reply, "off") == 0) return SCIP_HEAD_BOOTS;
+    return strcmp(reply, "idle") == 0 ? SCIP_HEAD_IS_IDLE : SCIP_HEAD_WORKS;
+}
+
+static const char *mode(const struct scip *s, enum scip_head head)
+{
+    if (head == SCIP_HEAD_BOOTS) return s->model->mode_booting;
+    if (head == SCIP_HEAD_HAS_FAILED) return s->model->mode_fault;
     if (s->stream.active) return s->model->mode_streaming;
     return s->laser ? s->model->mode_single : s->model->mode_idle;
+}
+
+static const char *status(const struct scip *s, enum scip_head head)
+{
+    if (s->simulation.broken) return "Malfunction, played by DB";
+    if (head == SCIP_HEAD_BOOTS) return s->model->boots;
+    return head == SCIP_HEAD_HAS_FAILED ? s->model->has_failed : s->model->works;
+}
+
+static void put_speed(struct scip *s)
+{
+    const struct scip_model *m = s->model;
+    const unsigned now_rpm = rpm(scip_lines_uhz(s, "HEAD:LINES?"));
+    const unsigned normal_rpm = rpm(scip_lines_uhz(s, "HEAD:LINES? DEF"));
+    scip_reply_key(&s->reply, "SCSP", "%s%u%s%s", m->speed_before, now_rpm, m->speed_after,
+                   now_rpm == normal_rpm ? m->at_default : "");
+}
+
+static void put_time(struct scip *s)
+{
+    const uint32_t ms = scip_time_ms(s, s->now_ns);
+    char time[4];
+    scip_encode4(time, ms);
+    if ((s->features & SCIP_TIME_HEX) != 0)
+        scip_reply_key(&s->reply, "TIME", "%06X", (unsigned)ms);
+    else
+        scip_reply_key(&s->reply, "TIME", "%.4s", time);
 }
 
 void scip_info_state(struct scip *s, const char *line, size_t len)
 {
     struct scip_reply *r = &s->reply;
     const struct scip_model *m = s->model;
-    const uint32_t ms = scip_time_ms(s, s->now_ns);
-    char time[4];
-    scip_encode4(time, ms);
-    const unsigned now_rpm = rpm(scip_lines_uhz(s, "HEAD:LINES?"));
-    const unsigned normal_rpm = rpm(scip_lines_uhz(s, "HEAD:LINES? DEF"));
+    const enum scip_head head = scip_head_state(s);
     scip_reply_begin(r, line, len, "00");
     scip_reply_key(r, "MODL", "%s", or_else(m->model, s->identity->model));
     scip_reply_key(r, "LASR", "%s", s->laser ? "ON" : "OFF");
-    scip_reply_key(r, "SCSP", "%s%u%s%s", m->speed_before, now_rpm, m->speed_after,
-                   now_rpm == normal_rpm ? m->at_default : "");
-    scip_reply_key(r, "MESM", "%s", mode(s));
+    put_speed(s);
+    scip_reply_key(r, "MESM", "%s", mode(s, head));
     if (m->link != NULL)
         scip_reply_key(r, "SBPS", "%s", m->link);
     else
         scip_reply_key(r, "SBPS", "%u[bps]%s", (unsigned)s->bit_rate, s->bit_rate == m->bit_rate ? m->at_default : "");
-    if ((m->features & SCIP_TIME_HEX) != 0)
-        scip_reply_key(r, "TIME", "%06x", (unsigned)ms);
-    else
-        scip_reply_key(r, "TIME", "%.4s", time);
-    scip_reply_key(r, "STAT", "%s", s->simulation.broken ? "Malfunction, played by DB" : m->works);
+    put_time(s);
+    scip_reply_key(r, "STAT", "%s", status(s, head));
+    scip_send(s);
+}
+
+/* Numbers as in MESM of a UTM-30LX-EW. */
+void scip_info_state_number(struct scip *s, const char *line, size_t len)
+{
+    const enum scip_head head = scip_head_state(s);
+    const char *number = "000";
+    if (head == SCIP_HEAD_BOOTS)
+        number = "001";
+    else if (head == SCIP_HEAD_HAS_FAILED || s->simulation.broken)
+        number = "900";
+    else if (s->time_mode)
+        number = "002";
+    else if (s->stream.active)
+        number = "004";
+    else if (s->laser)
+        number = "003";
+    else if (s->asleep)
+        number = "005";
+    scip_reply_begin(&s->reply, line, len, "00");
+    scip_reply_line(&s->reply, number, strlen(number));
     scip_send(s);
 }

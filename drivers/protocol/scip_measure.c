@@ -4,7 +4,7 @@
 
 #include "drivers/protocol/scip_session.h"
 
-/* GD GS GE HD HE, MD MS ME ND NE: requests, and the scans that answer them. */
+/* GD GS GE HD HE, MD MS ME ND NE %MD %ME: requests, and the scans that answer them. */
 
 enum { TRY_NS = 100000000 };
 
@@ -19,14 +19,13 @@ const char *scip_laser_on(struct scip *s)
     enum { LATELY_NS = 500000000 };
     char reply[512];
     const int scans = s->scan.t0_ns != INT64_MIN && s->now_ns - s->scan.t0_ns < LATELY_NS;
-    if (!scans && s->host.command(s->host.ctx, "HEAD:STATE?", reply, sizeof reply) == 0) {
-        if (strcmp(reply, "fault") == 0) return "50";
-        if (strcmp(reply, "boot") == 0 || strcmp(reply, "off") == 0) return "10";
-        if (strcmp(reply, "idle") == 0 && s->host.command(s->host.ctx, "SCAN:START", reply, sizeof reply) != 0)
-            return "10";
-    }
+    const enum scip_head head = scans ? SCIP_HEAD_WORKS : scip_head_state(s);
+    if (head == SCIP_HEAD_HAS_FAILED) return "50";
+    if (head == SCIP_HEAD_BOOTS) return "10";
+    if (head == SCIP_HEAD_IS_IDLE && s->host.command(s->host.ctx, "SCAN:START", reply, sizeof reply) != 0) return "10";
     if (!s->laser) s->laser_ns = s->now_ns;
     s->laser = 1;
+    s->asleep = 0;
     return NULL;
 }
 
@@ -59,11 +58,18 @@ static const char *read_request(struct scip_request *q, const char *line, int st
     return NULL;
 }
 
+static int is_time_us(const char *line)
+{
+    return line[0] == '%';
+}
+
 static const char *begin(struct scip *s, struct scip_request *q, const char *line, size_t len, int streams)
 {
     memset(q, 0, sizeof *q);
     memcpy(q->echo, line, len);
     q->echo_len = len;
+    q->time_us = is_time_us(line);
+    line += q->time_us;
     q->n_chars = line[1] == 'S' ? 2 : 3;
     q->intensity = line[1] == 'E';
     q->multi_echo = line[0] == 'H' || line[0] == 'N';
@@ -81,7 +87,7 @@ void scip_measure(struct scip *s, const char *line, size_t len)
 {
     enum { WAIT_NS = 2000000000 };
     struct scip_request request;
-    const int streams = line[0] == 'M' || line[0] == 'N';
+    const int streams = is_time_us(line) || line[0] == 'M' || line[0] == 'N';
     const char *refused = scip_has_head(s) ? begin(s, &request, line, len, streams) : "0A";
     if (refused == NULL && !streams && s->single.active) refused = "0B";
     if (refused != NULL) {
@@ -191,7 +197,10 @@ static void send_scan(struct scip *s, const struct scip_request *q, const char *
                                .mm_per_count = head->m_per_count * 1e3,
                                .min_mm = scip_millimetres(head->range_min_m)};
     scip_reply_begin(&s->reply, q->echo, q->echo_len, status);
-    scip_reply_time(&s->reply, scip_time_ms(s, m.turn->t0_ns));
+    if (q->time_us)
+        scip_reply_time_us(&s->reply, scip_time_us(s, m.turn->t0_ns));
+    else
+        scip_reply_time(&s->reply, scip_time_ms(s, m.turn->t0_ns));
     for (int32_t from = q->start; from <= q->end; from += q->cluster) {
         const int32_t to = from + q->cluster - 1;
         put_step(s, q, &m, nearest(&m, from, to < q->end ? to : q->end));
@@ -202,8 +211,9 @@ static void send_scan(struct scip *s, const struct scip_request *q, const char *
 /* The last two digits of a stream's echo are the scans that are left; 00 stays where there is no end. */
 static void write_remaining(struct scip_request *q)
 {
-    q->echo[13] = (char)('0' + q->remaining / 10);
-    q->echo[14] = (char)('0' + q->remaining % 10);
+    char *digits = q->echo + 13 + q->time_us;
+    digits[0] = (char)('0' + q->remaining / 10);
+    digits[1] = (char)('0' + q->remaining % 10);
 }
 
 /* Status 50 ends the stream; the laser then is off. */

@@ -16,6 +16,8 @@ enum scip_feature {
     SCIP_SIMULATION = 1 << 6,  /* DB; else 04 */
     SCIP_TIME_ALONE = 1 << 7,  /* in the time mode nothing but TM is taken, and TM1 is taken only there */
     SCIP_TIME_HEX = 1 << 8,    /* TIME of II is six hexadecimal digits; else four characters */
+    SCIP_STATE = 1 << 9,       /* %ST */
+    SCIP_TIME_US = 1 << 10,    /* %TM %MD %ME: times in microseconds; with some firmware alone */
 };
 
 struct scip_model {
@@ -30,10 +32,14 @@ struct scip_model {
     const char *speed_before, *speed_after;               /* SCSP: around the number */
     const char *at_default;                               /* after both while they are those of power-up */
     const char *mode_idle, *mode_single, *mode_streaming; /* MESM */
-    const char *works;                                    /* STAT, begins as clients look for it */
-    uint16_t no_object, too_near, no_step;                /* instead of a range */
+    const char *mode_booting, *mode_fault;
+    const char *works;                     /* STAT, begins as clients look for it */
+    const char *boots, *has_failed;        /* STAT in a boot, and in the state fault */
+    uint16_t no_object, too_near, no_step; /* instead of a range */
 };
 
+/* enum scip_feature of a model with a firmware. */
+uint32_t scip_model_features(const struct scip_model *model, const char *firmware);
 /* Never NULL. */
 const struct scip_model *scip_model_find(const char *model);
 

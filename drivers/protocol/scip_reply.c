@@ -23,7 +23,7 @@ static uint32_t sum_of(const char *text, size_t len)
     return sum;
 }
 
-static void put_summed(struct scip_reply *r, const char *text, size_t len)
+void scip_reply_line(struct scip_reply *r, const char *text, size_t len)
 {
     const char tail[2] = {sum_char(sum_of(text, len)), '\n'};
     put(r, text, len);
@@ -36,7 +36,7 @@ void scip_reply_begin(struct scip_reply *r, const char *echo, size_t len, const 
     r->sum = 0;
     put(r, echo, len);
     put(r, "\n", 1);
-    put_summed(r, status, 2);
+    scip_reply_line(r, status, 2);
 }
 
 void scip_reply_key(struct scip_reply *r, const char *key, const char *fmt, ...)
@@ -53,25 +53,32 @@ void scip_reply_key(struct scip_reply *r, const char *key, const char *fmt, ...)
     put(r, tail, sizeof tail);
 }
 
-enum { MOST_CHARS = 4 };
+enum { MOST_CHARS = 4, TIME_US_CHARS = 11 };
 
-/* n_chars: 1 to 4; without the second limit gcc for ARM sees it write beyond them. */
-static void encode(char dst[MOST_CHARS], uint32_t value, int n_chars)
+/* most: characters of dst; without that second limit gcc for ARM sees it write beyond them. */
+static void encode(char *dst, int most, uint64_t value, int n_chars)
 {
-    for (int i = 0; i < n_chars && i < MOST_CHARS; i++)
+    for (int i = 0; i < n_chars && i < most; i++)
         dst[i] = (char)((value >> 6 * (n_chars - 1 - i) & 0x3f) + 0x30);
 }
 
 void scip_encode4(char dst[4], uint32_t value)
 {
-    encode(dst, value, MOST_CHARS);
+    encode(dst, MOST_CHARS, value, MOST_CHARS);
 }
 
 void scip_reply_time(struct scip_reply *r, uint32_t ms)
 {
     char text[MOST_CHARS];
-    encode(text, ms, MOST_CHARS);
-    put_summed(r, text, sizeof text);
+    encode(text, MOST_CHARS, ms, MOST_CHARS);
+    scip_reply_line(r, text, sizeof text);
+}
+
+void scip_reply_time_us(struct scip_reply *r, uint64_t us)
+{
+    char text[TIME_US_CHARS];
+    encode(text, TIME_US_CHARS, us, TIME_US_CHARS);
+    scip_reply_line(r, text, sizeof text);
 }
 
 static void close_block(struct scip_reply *r)
@@ -94,7 +101,7 @@ void scip_reply_value(struct scip_reply *r, uint32_t value, int n_chars)
 {
     const uint32_t most = (1u << 6 * n_chars) - 1;
     char text[MOST_CHARS];
-    encode(text, value < most ? value : most, n_chars);
+    encode(text, MOST_CHARS, value < most ? value : most, n_chars);
     for (int i = 0; i < n_chars; i++)
         scip_reply_mark(r, text[i]);
 }

@@ -21,10 +21,11 @@ static int next_line(const uint8_t *unit, size_t len, struct line *line)
     return 1;
 }
 
-/* Whether the reply is a scan: G, H, M, N. */
+/* Whether the reply is a scan: G, H, M, N, also with % before it. It has a line, so at least two bytes. */
 static int is_scan(const uint8_t *unit)
 {
-    return strchr("GHMN", unit[0]) != NULL && unit[0] != 0;
+    const uint8_t first = unit[unit[0] == '%'];
+    return strchr("GHMN", first) != NULL && first != 0;
 }
 
 /* A character of data is six bits above 0x30. Its lower four may change, whichever they are. */

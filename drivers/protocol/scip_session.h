@@ -14,6 +14,7 @@ struct scip_request {
     char echo[SCIP_MAX_LINE];
     size_t echo_len;
     int n_chars, intensity, multi_echo;
+    int time_us;        /* %MD %ME: its times are in microseconds */
     int32_t start, end; /* steps, both included */
     int32_t cluster;    /* steps that become one value, 1 and more */
     uint32_t skip;      /* scans left out before each that is sent */
@@ -34,11 +35,12 @@ struct scip {
     struct protocol_host host;
     const struct protocol_identity *identity;
     const struct scip_model *model;
-    int64_t now_ns, epoch_ns; /* epoch: when the time stamp is 0 */
-    int64_t wrap_ns;          /* after power-up, the first time; 0: it begins with 0 */
-    int64_t laser_ns;         /* since when the laser is on */
-    int64_t try_ns;           /* a request that no scan has come for: when to look at the head again */
-    int laser, time_mode, speed_changed;
+    uint32_t features; /* enum scip_feature, with its firmware */
+    int64_t now_ns;
+    int64_t epoch_ns, epoch_us_ns; /* when the time stamp is 0, and that in microseconds */
+    int64_t laser_ns;              /* since when the laser is on */
+    int64_t try_ns;                /* a request that no scan has come for: when to look at the head again */
+    int laser, time_mode, speed_changed, asleep;
     uint32_t bit_rate;
     int64_t rb_ns, reboot_ns; /* of the last RB alone, of the end that RB RB asked for; INT64_MIN: none */
     struct scip_request stream, single;
@@ -55,6 +57,7 @@ struct scip {
 /* scip.c */
 void scip_power_up(struct scip *s);
 uint32_t scip_time_ms(const struct scip *s, int64_t t_ns);
+uint64_t scip_time_us(const struct scip *s, int64_t t_ns);
 /* Sends the reply at hand, after ending it. */
 void scip_send(struct scip *s);
 /* A whole reply without data. Counts what is an error. */
@@ -65,10 +68,14 @@ void scip_command(struct scip *s, const char *line, size_t len);
 /* len decimal digits; -1: others are among them. */
 int32_t scip_number(const char *text, size_t len);
 
-/* scip_info.c: VV, PP, II. */
+/* scip_info.c: VV, PP, II, %ST. */
+enum scip_head { SCIP_HEAD_WORKS, SCIP_HEAD_IS_IDLE, SCIP_HEAD_BOOTS, SCIP_HEAD_HAS_FAILED };
+/* The head is asked for its state. */
+enum scip_head scip_head_state(struct scip *s);
 void scip_info_version(struct scip *s, const char *line, size_t len);
 void scip_info_parameters(struct scip *s, const char *line, size_t len);
 void scip_info_state(struct scip *s, const char *line, size_t len);
+void scip_info_state_number(struct scip *s, const char *line, size_t len);
 /* Lines per second of the head, 1e-6 Hz: `query` is HEAD:LINES? or that of the default. */
 uint64_t scip_lines_uhz(struct scip *s, const char *query);
 /* Rounded; 0 where there is no such range. */

@@ -15,7 +15,7 @@ enum { PHASE_SCANS = 10, LONG_STREAM = 20 };
 
 static const char *order(struct scip *s, int32_t mode)
 {
-    if ((s->model->features & SCIP_SIMULATION) == 0 || mode == 1) return "04";
+    if ((s->features & SCIP_SIMULATION) == 0 || mode == 1) return "04";
     if (mode != 10 && (mode < 2 || mode > 5)) return "01";
     if (mode == 10 && s->simulation.mode == 0) return "03";
     if (mode == s->simulation.mode) return "02";

@@ -26,8 +26,11 @@ enum {
 enum velodyne_return_mode { VELODYNE_STRONGEST = 0x37, VELODYNE_LAST = 0x38, VELODYNE_DUAL = 0x39 };
 
 /* Microseconds since the top of the hour at a device time, rounded down, 0..3599999999: of UTC, or where
- * that is not known of the time since power-up. */
+ * that is not known, or was not set by then, of the time since power-up. */
 uint32_t velodyne_hour_us(const struct protocol_host *host, int64_t t_ns);
+
+/* State of the pulses per second at a device time; absent where UTC is not known. */
+enum protocol_pps velodyne_pps(const struct protocol_host *host, int64_t t_ns);
 
 /* Calibrated reflectivity of a reflectance in 0.01 dB (struct native_point): 0..100 for 0..100 % of a white
  * Lambertian target; above it 101..255 in steps of 0.2 dB, ended by 255 from 30.8 dB on. 0 where it is not

@@ -181,6 +181,13 @@ static int64_t next_ns(const void *protocol)
     return s->over ? INT64_MAX : s->until_ns;
 }
 
+/* Each request is answered at once. */
+static int owes(const void *protocol)
+{
+    (void)protocol;
+    return 0;
+}
+
 const struct protocol_ops protocol_velodyne_http = {
     .name = "velodyne-http",
     .emitters = 1u << NATIVE_EMIT_BEAMS,
@@ -192,5 +199,6 @@ const struct protocol_ops protocol_velodyne_http = {
     .open = open_at,
     .time = at_time,
     .input = input,
+    .owes = owes,
     .next_ns = next_ns,
 };

@@ -71,8 +71,8 @@ static void put_info(struct page *p)
 
 static void put_status(struct page *p)
 {
-    const int locked = p->spec->host.utc_ns(p->spec->host.ctx, p->t_ns) != INT64_MIN;
-    put(p, "{\"gps\":{\"pps_state\":\"%s\",\"position\":", locked ? "Locked" : "Absent");
+    static const char *const words[] = {"Absent", "Synchronizing", "Locked", "Error"};
+    put(p, "{\"gps\":{\"pps_state\":\"%s\",\"position\":", words[velodyne_pps(&p->spec->host, p->t_ns)]);
     put_position(p);
     put(p, "},\"motor\":{\"state\":\"%s\",\"rpm\":%u,\"lock\":\"Off\",\"phase\":0},\"laser\":{\"state\":\"%s\"}}",
         on_off(p->state.motor_on), p->state.motor_on ? p->state.rpm : 0, on_off(p->state.laser_on));

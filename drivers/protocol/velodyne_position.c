@@ -10,7 +10,7 @@
  *
  *   0xbb u8 top board, deg C       0xbc u8 bottom board            0xbd u8 at the last ADC calibration
  *   0xbe i16 change since then     0xc0 u32 s since then           0xc4 u8 its reason   0xc5 u8 status
- *   0xc6 u32 us since the top of the hour                          0xca u8 PPS: 0 absent, 2 locked
+ *   0xc6 u32 us since the top of the hour                          0xca u8 enum protocol_pps
  *   0xcb u8 thermal status         0xcc u8 deg C at shut-down      0xcd u8 deg C at power-up
  *   0xce $GPRMC,... CR LF */
 enum {
@@ -25,7 +25,7 @@ enum {
     AT_POWER_UP = 0xcd,
     AT_NMEA = 0xce,
 };
-enum { PPS_ABSENT = 0, PPS_LOCKED = 2, REASON_POWER_ON = 1 };
+enum { REASON_POWER_ON = 1 };
 /* Warm electronics at rest. No temperature is modelled. */
 enum { TOP_DEGC = 42, BOTTOM_DEGC = 39, ADC_DEGC = 40, POWER_UP_DEGC = 25 };
 enum { MOST_AT_ONCE = 64 };
@@ -69,7 +69,6 @@ static void put_sentence(const struct position *p, char *dst, int64_t t_ns)
 static void send_packet(const struct position *p, int64_t t_ns)
 {
     uint8_t packet[VELODYNE_POSITION_LEN] = {0};
-    const int64_t utc_ns = p->host.utc_ns(p->host.ctx, t_ns);
     packet[AT_TOP] = TOP_DEGC;
     packet[AT_BOTTOM] = BOTTOM_DEGC;
     packet[AT_ADC] = ADC_DEGC;
@@ -77,7 +76,7 @@ static void send_packet(const struct position *p, int64_t t_ns)
     le_put32(packet + AT_CALIBRATED_S, (uint32_t)(t_ns / 1000000000));
     packet[AT_REASON] = REASON_POWER_ON;
     le_put32(packet + AT_TIME, velodyne_hour_us(&p->host, t_ns));
-    packet[AT_PPS] = utc_ns == INT64_MIN ? PPS_ABSENT : PPS_LOCKED;
+    packet[AT_PPS] = (uint8_t)velodyne_pps(&p->host, t_ns);
     packet[AT_POWER_UP] = POWER_UP_DEGC;
     put_sentence(p, (char *)packet + AT_NMEA, t_ns);
     p->host.send(p->host.ctx, packet, sizeof packet);

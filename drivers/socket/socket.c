@@ -11,7 +11,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { BACKLOG = 128, IDLE_S = 10, INTERVAL_S = 5, PROBES = 3 };
+enum { BACKLOG = 128, IDLE_S = 10, INTERVAL_S = 5, PROBES = 3, DRAIN_READS = 256 /* 1 MiB */ };
 
 int socket_error_code(int error)
 {
@@ -156,10 +156,18 @@ void socket_break(int fd)
     connect(fd, &none, sizeof none);
 }
 
-int socket_ended(int fd, short revents)
+void socket_drain(int fd)
 {
-    if ((revents & (POLLIN | POLLHUP | POLLERR | POLLNVAL)) == 0) return 0;
+    char nothing[4096];
+    for (int i = 0; i < DRAIN_READS && socket_read(fd, nothing, sizeof nothing) > 0; i++)
+        continue;
+}
+
+enum socket_state socket_state(int fd, short revents)
+{
+    if ((revents & (POLLIN | POLLHUP | POLLERR | POLLNVAL)) == 0) return SOCKET_OPEN;
     char byte;
     ssize_t n = recv(fd, &byte, 1, MSG_DONTWAIT | MSG_PEEK);
-    return n == 0 || (n < 0 && errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR);
+    if (n == 0) return (revents & (POLLHUP | POLLERR)) != 0 ? SOCKET_ENDED : SOCKET_SHUT;
+    return n < 0 && errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR ? SOCKET_ENDED : SOCKET_OPEN;
 }

@@ -53,7 +53,17 @@ ssize_t socket_read(int fd, void *buf, size_t len);
 ssize_t socket_write(int fd, const void *buf, size_t len);
 /* Breaks a connected TCP socket: its peer sees a reset, and what it has not taken is lost. The descriptor stays. */
 void socket_break(int fd);
-/* After poll(2): 1 when the peer is gone and nothing is left to read. */
-int socket_ended(int fd, short revents);
+/* Reads and throws away what has come, so that closing the socket does not reset the connection. A peer that sends
+ * faster than this reads is not waited for. */
+void socket_drain(int fd);
+
+/* The state of a connected socket, from the events of poll(2). */
+enum socket_state {
+    SOCKET_OPEN,  /* bytes may come, or are there */
+    SOCKET_SHUT,  /* the peer sends nothing more, and all of it was read; it may still read. Linux can't tell one that
+                   * has closed a TCP socket from it before something is written */
+    SOCKET_ENDED, /* the peer is gone and nothing is left to read */
+};
+enum socket_state socket_state(int fd, short revents);
 
 #endif

@@ -96,9 +96,10 @@ struct app_file {
     const char *path;
     enum app_use use;
     /* Files that are written, as the command knows them: */
-    size_t n_ending;    /* bytes of the path's ending, as in .ply */
-    const char *ending; /* it is another file beside that: with this ending in place of its own; NULL: it is that file */
-    int each;           /* and STEM-N.ENDING for N from 1 on */
+    size_t n_ending; /* bytes of the path's ending, as in .ply */
+    /* Another file beside that, with this ending in place of its own; NULL: that file. */
+    const char *ending;
+    int each; /* and STEM-N.ENDING for N from 1 on */
 };
 
 /* What a command line says, but for the command's own options. */

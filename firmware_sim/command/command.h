@@ -161,6 +161,7 @@ enum command_effect {
     COMMAND_START,    /* state event START was accepted by head_next_state */
     COMMAND_STOP,
     COMMAND_RESET,   /* settings are the defaults again; state event RESET accepted */
+    COMMAND_REBOOT,  /* power goes for a moment; state event POWER_OFF accepted */
     COMMAND_STEP,    /* let step_ns of device time pass, then send the reply */
     COMMAND_MOVE,    /* move a station; the reply is that of success */
     COMMAND_TAKE,    /* control, and nothing else */

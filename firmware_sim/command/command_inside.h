@@ -180,11 +180,16 @@ int command_setting_change(struct command_call *call);
 void command_setting_range(const struct command_call *call, int64_t *min, int64_t *max);
 /* The last of its words that the head takes. */
 uint32_t command_setting_last_word(const struct command_call *call);
+/* The only values that a setting takes, rising: pulse rates of programs, rates or steps of geometries. 0: any in its
+ * range. */
+uint32_t command_setting_values(const struct command_call *call, int64_t value[HEAD_MAX_RATES]);
 /* Whether it can be set in a state. */
 int command_setting_is_free(const struct command_device *dev, const struct command_setting *setting,
                             enum head_state state);
 
 /* ---- step.c: angular steps, which follow from the rates */
+/* From step to step, of so many a turn, in nano-degrees. */
+int64_t command_step_ndeg(uint32_t steps);
 extern const struct command_derived command_step_both, command_step_line, command_step_pan;
 
 /* ---- help.c */

@@ -216,6 +216,13 @@ static int act_reset(struct command_call *call)
     return 0;
 }
 
+static int act_reboot(struct command_call *call)
+{
+    if (call->dev->recorded != NULL)
+        return command_fail(call, CMD_E_SETTINGS, "%s: %s", call->row->header, call->dev->recorded);
+    return act_event(call, COMMAND_REBOOT);
+}
+
 static int act_step(struct command_call *call)
 {
     int64_t step_ns;
@@ -256,6 +263,8 @@ const struct command_row command_rows[] = {
     VALUE("HEAD:LINes", unit_hz, LINES),
     VALUE("HEAD:PAN", unit_deg_s, PAN),
     QUERY("HEAD:STATe", query_state),
+    /* Open, as the plug of a head: clients of its maker's protocol know nothing of control. */
+    {"HEAD:REBoot", NULL, act_reboot, NULL, NULL, 1, 0, 0, 0, HEAD_EV_POWER_OFF + 1},
     VALUE("HEAD:STATION", unit_count, STATION), /* no short form: STAT is STATe */
     VALUE("HEAD:RANGe:MIN", unit_m, RANGE_MIN),
     VALUE("HEAD:RANGe:MAX", unit_m, RANGE_MAX),

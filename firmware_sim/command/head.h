@@ -56,10 +56,22 @@ struct head_settings {
     uint32_t angle_noise;                    /* 0: none */
     int64_t range_min_nm, range_max_nm;      /* nothing nearer or farther is an echo */
     int64_t sigma_nm, ball_nm;               /* one sigma of that noise, its fixed part; radius of the ball noise */
-    int64_t step_udeg;                       /* of a sphere, as it was asked for; else 0 */
+    int64_t step_udeg; /* of a sphere, as it was asked for; of a planar head with geometries; else 0 */
 };
 
 enum { HEAD_MAX_RATES = 8 };
+
+/* A line rate that a planar head has, and the steps of a turn at it. */
+struct head_geometry {
+    int64_t lines_uhz;
+    uint32_t steps;
+};
+
+/* From step to step, of so many a turn. The other way round it is emitter_sphere_steps(), for up to 18000. */
+static inline int64_t head_step_udeg(uint32_t steps)
+{
+    return (360000000 + steps / 2) / steps;
+}
 
 /* What the head can do: from its profile. */
 struct head_limits {
@@ -69,14 +81,16 @@ struct head_limits {
     int64_t fov_min_udeg, fov_max_udeg;
     int64_t pan_min_udeg, pan_max_udeg;
     uint32_t n_stations;
-    uint64_t elsewhere;   /* bit i: station i + 1 has another scanner than this head; 0 beyond 64 */
-    uint32_t line_pulses; /* of each line, so that the pulse rate follows from the lines; 0: it doesn't. Of a sphere
-                           * with the step of power-up: head_line_pulses() */
+    uint64_t elsewhere;    /* bit i: station i + 1 has another scanner than this head; 0 beyond 64 */
+    uint32_t n_geometries; /* of a planar head that has only some; 0: any line rate, at one step */
+    struct head_geometry geometry[HEAD_MAX_RATES];
+    uint32_t line_pulses; /* of each line, so that the pulse rate follows from the lines; 0: it doesn't. Where the step
+                           * can be set it is that with the step of power-up: head_line_pulses() */
     int round; /* line angles are azimuths of a ring: a window may go across 0, from a start above its stop */
     enum emitter_kind emitter;
     int64_t sweep_udeg;  /* a line head: how far the beam turns in a line, with the blind part */
     int64_t sequence_ps; /* a head with beams: from firing sequence to firing sequence */
-    int step_fixed;      /* a sphere on a platform that moves keeps its step */
+    int step_fixed;      /* a head on a platform that moves keeps its step */
     int64_t range_min_nm, range_max_nm;
     int64_t near_most_nm, far_least_nm; /* so that something is left at each pulse rate: of the nearest, the farthest */
     uint32_t noise_most, angle_most;    /* of the kinds of range and angle noise, by number */
@@ -86,7 +100,7 @@ struct head_limits {
 /* Of each line; 0: as many as the rates give. */
 static inline uint32_t head_line_pulses(const struct head_limits *limits, const struct head_settings *settings)
 {
-    if (limits->emitter != EMITTER_SPHERE || settings->step_udeg <= 0) return limits->line_pulses;
+    if (settings->step_udeg <= 0) return limits->line_pulses;
     return emitter_sphere_steps(settings->step_udeg);
 }
 

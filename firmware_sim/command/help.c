@@ -75,13 +75,14 @@ static void add_numbers(struct command_call *call)
 static void add_values(struct command_call *call)
 {
     const struct command_setting *setting = call->row->setting;
-    const struct head_limits *limits = &call->dev->limits;
+    int64_t value[HEAD_MAX_RATES];
+    const uint32_t n = setting->words == NULL ? command_setting_values(call, value) : 0;
     char number[32];
     add(call, ",\"");
     for (uint32_t i = 0; setting->words != NULL && i <= command_setting_last_word(call); i++)
         add(call, "%s%s", i == 0 ? "" : " ", setting->words[i]);
-    for (uint32_t i = 0; setting->is_rate && i < limits->n_rates; i++) {
-        command_format_fixed(number, sizeof number, limits->rate_uhz[i], call->row->unit->decimals);
+    for (uint32_t i = 0; i < n; i++) {
+        command_format_fixed(number, sizeof number, value[i], call->row->unit->decimals);
         add(call, "%s%s", i == 0 ? "" : " ", number);
     }
     add(call, "\"");
@@ -129,5 +130,6 @@ int command_help(struct command_call *call)
     }
     char clip[COMMAND_CLIP_LEN];
     command_clip(clip, call->param, strlen(call->param));
-    return command_fail(call, CMD_E_DATA_TYPE, "HELP? takes a header, not '%s'; HELP? and HELP:SETtings? list them", clip);
+    return command_fail(call, CMD_E_DATA_TYPE, "HELP? takes a header, not '%s'; HELP? and HELP:SETtings? list them",
+                        clip);
 }

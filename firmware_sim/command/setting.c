@@ -49,28 +49,58 @@ static struct number in_unit(const struct command_call *call, int64_t value)
     return number;
 }
 
-/* The rates of a head that has only some, of a setting that is one of them; 0: any value in the range. */
-static uint32_t fixed_rates(const struct command_call *call, const int64_t **rate)
+static int is_setting(const struct command_call *call, size_t offset)
 {
-    *rate = call->dev->limits.rate_uhz;
-    return call->row->setting->is_rate ? call->dev->limits.n_rates : 0;
+    return call->row->setting->offset == offset;
+}
+
+/* Into a list that rises, once. */
+static uint32_t insert(int64_t *value, uint32_t n, int64_t another)
+{
+    uint32_t i = n;
+    for (uint32_t k = 0; k < n; k++)
+        if (value[k] == another) return n;
+    for (; i > 0 && value[i - 1] > another; i--)
+        value[i] = value[i - 1];
+    value[i] = another;
+    return n + 1;
+}
+
+/* The line rates at the step that is set, or the steps at the line rate that is set. */
+static uint32_t fixed_geometries(const struct command_call *call, int64_t *value)
+{
+    const struct head_limits *l = &call->dev->limits;
+    const struct head_settings *s = &call->dev->settings;
+    const int lines =
+        call->row->setting->derived == NULL && is_setting(call, offsetof(struct head_settings, lines_uhz));
+    const int step = call->row->setting->derived == &command_step_both;
+    uint32_t n = 0;
+    for (uint32_t i = 0; i < l->n_geometries; i++) {
+        if (lines && l->geometry[i].steps == head_line_pulses(l, s)) n = insert(value, n, l->geometry[i].lines_uhz);
+        if (step && l->geometry[i].lines_uhz == s->lines_uhz)
+            n = insert(value, n, command_step_ndeg(l->geometry[i].steps));
+    }
+    return n;
+}
+
+uint32_t command_setting_values(const struct command_call *call, int64_t value[HEAD_MAX_RATES])
+{
+    const struct head_limits *l = &call->dev->limits;
+    if (!call->row->setting->is_rate) return fixed_geometries(call, value);
+    memcpy(value, l->rate_uhz, sizeof l->rate_uhz);
+    return l->n_rates;
 }
 
 /* The ends of a range move inward to rates that the head has. The other setting leaves one at least. */
 static void narrow_to_rates(const struct command_call *call, int64_t *min, int64_t *max)
 {
-    const int64_t *rate;
-    const uint32_t n = fixed_rates(call, &rate);
+    int64_t rate[HEAD_MAX_RATES];
+    const uint32_t n = command_setting_values(call, rate);
     const int64_t from = *min, to = *max;
     for (uint32_t i = n; i-- > 0;)
         if (rate[i] >= from) *min = rate[i];
     for (uint32_t i = 0; i < n; i++)
         if (rate[i] <= to) *max = rate[i];
-}
-
-static int is_setting(const struct command_call *call, size_t offset)
-{
-    return call->row->setting->offset == offset;
 }
 
 /* The pulse rate of a head whose lines have a fixed number of pulses. */
@@ -115,6 +145,7 @@ void command_setting_range(const struct command_call *call, int64_t *min, int64_
     const struct command_setting *setting = call->row->setting;
     if (setting->derived != NULL) {
         setting->derived->range(call->dev, min, max);
+        narrow_to_rates(call, min, max);
         return;
     }
     *min = read_bound(call, &setting->min);
@@ -127,6 +158,7 @@ void command_setting_range(const struct command_call *call, int64_t *min, int64_
     }
     if (call->dev->limits.line_pulses != 0 && is_setting(call, offsetof(struct head_settings, lines_uhz))) {
         if (is_sphere(call) && most_lines_of_sphere(call) < *max) *max = most_lines_of_sphere(call);
+        narrow_to_rates(call, min, max);
         return;
     }
     if (call->dev->limits.round && is_line_angle(call)) return;
@@ -223,24 +255,29 @@ int command_value_in_range(struct command_call *call, int64_t min, int64_t max, 
     return refuse_number(call, CMD_E_RANGE, *value, min, max, "");
 }
 
-/* `HEADER VALUE, allowed A, B, C`: a number that is none of the head's rates. */
+static void say_because(const struct command_call *call, int no_width, char *text, size_t len);
+
+/* `HEADER VALUE, allowed A, B, C`: a number, or the one of power-up, that is none of the head's values. */
 static int check_rate(struct command_call *call)
 {
-    const int64_t *rate;
-    const uint32_t n = fixed_rates(call, &rate);
-    char clip[COMMAND_CLIP_LEN], allowed[HEAD_MAX_RATES * (NUMBER_LEN + 2)] = "";
-    int64_t value;
+    int64_t rate[HEAD_MAX_RATES], value = 0;
+    const uint32_t n = command_setting_values(call, rate);
+    char clip[COMMAND_CLIP_LEN], allowed[HEAD_MAX_RATES * (NUMBER_LEN + 2)] = "", with[NUMBER_LEN + 40] = "";
     if (n == 0) return 0;
-    const enum command_fit fit =
-        command_decimal_to_int(&call->value.decimal, call->value.shift + call->row->unit->decimals, &value);
+    enum command_fit fit = COMMAND_FIT_EXACT;
+    if (call->value.kind == COMMAND_VALUE_NUMBER)
+        fit = command_decimal_to_int(&call->value.decimal, call->value.shift + call->row->unit->decimals, &value);
+    else
+        value = special_value(call);
     for (uint32_t i = 0; i < n; i++) {
         const size_t used = strlen(allowed);
         if (fit == COMMAND_FIT_EXACT && value == rate[i]) return 0;
         snprintf(allowed + used, sizeof allowed - used, "%s%s", i > 0 ? ", " : "", in_unit(call, rate[i]).text);
     }
     command_clip(clip, call->param, strlen(call->param));
-    return command_fail(call, CMD_E_RANGE, "%s %s, allowed %s %s", call->row->header, clip, allowed,
-                        call->row->unit->name);
+    if (call->dev->limits.n_geometries > 0) say_because(call, 0, with, sizeof with);
+    return command_fail(call, CMD_E_RANGE, "%s %s, allowed %s %s%s", call->row->header, clip, allowed,
+                        call->row->unit->name, with);
 }
 
 /* What narrows the range, as the end of an error. */
@@ -251,7 +288,8 @@ static void say_because(const struct command_call *call, int no_width, char *tex
     text[0] = '\0';
     if (setting->derived != NULL)
         setting->derived->because(call->dev, text, len);
-    else if (is_sphere(call) && is_setting(call, offsetof(struct head_settings, lines_uhz)))
+    else if ((is_sphere(call) || call->dev->limits.n_geometries > 0) &&
+             is_setting(call, offsetof(struct head_settings, lines_uhz)))
         snprintf(text, len, " with this SCAN:STEP");
     else if (other != NULL)
         snprintf(text, len, "%s as %s is %s", no_width ? " but this," : "", other,
@@ -279,7 +317,8 @@ int command_setting_is_free(const struct command_device *dev, const struct comma
                             enum head_state state)
 {
     const int in_scan = state == HEAD_SPIN_UP || state == HEAD_SCANNING;
-    return !in_scan || (!setting->not_in_scan && (setting->derived == NULL || dev->limits.emitter != EMITTER_SPHERE));
+    const int can_vary = dev->limits.emitter == EMITTER_SPHERE || dev->limits.n_geometries > 0;
+    return !in_scan || (!setting->not_in_scan && (setting->derived == NULL || !can_vary));
 }
 
 /* What DEF answers may be beyond MAX: rates of power-up may have steps that are not alike. As a number it does what DEF
@@ -299,10 +338,11 @@ static int take_value(struct command_call *call, int64_t *value)
     const struct command_setting *setting = call->row->setting;
     if (call->value.kind == COMMAND_VALUE_WORD)
         *value = call->value.word;
+    else if (check_rate(call) != 0)
+        return -1;
     else if (call->value.kind != COMMAND_VALUE_NUMBER)
         *value = special_value(call);
-    else if (check_rate(call) != 0 ||
-             command_value_in_range(call, read_bound(call, &setting->min), read_bound(call, &setting->max), value) != 0)
+    else if (command_value_in_range(call, read_bound(call, &setting->min), read_bound(call, &setting->max), value) != 0)
         return -1;
     else if (is_default_beyond(call, *value))
         call->value.kind = COMMAND_VALUE_DEF;

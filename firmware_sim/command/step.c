@@ -23,6 +23,11 @@ static int64_t nearest(wide num, wide den)
 
 /* ---- what a head's settings give */
 
+int64_t command_step_ndeg(uint32_t steps)
+{
+    return nearest(TURN_NDEG, steps);
+}
+
 /* A sphere has whole numbers of steps in a turn: the step that it has. */
 static int64_t sphere_step(int64_t step_udeg)
 {
@@ -34,7 +39,7 @@ static int64_t line_step(const struct command_device *dev, const struct head_set
     const struct head_limits *l = &dev->limits;
     if (l->emitter == EMITTER_SPHERE) return sphere_step(s->step_udeg);
     if (l->emitter == EMITTER_BEAMS) return nearest((wide)s->lines_uhz * l->sequence_ps * 360, NANO);
-    if (l->emitter != EMITTER_LINE) return nearest(TURN_NDEG, l->line_pulses);
+    if (l->emitter != EMITTER_LINE) return command_step_ndeg(head_line_pulses(l, s));
     return nearest((wide)s->lines_uhz * l->sweep_udeg * NDEG_PER_UDEG, s->prr_uhz);
 }
 
@@ -169,6 +174,26 @@ static const char *pan_why_not(const struct command_device *dev)
     return has ? NULL : "the head has no pan";
 }
 
+/* One of the geometries, as the caller has checked. */
+static int write_planar(struct command_call *call, int64_t step_ndeg)
+{
+    const struct head_limits *l = &call->dev->limits;
+    for (uint32_t i = 0; i < l->n_geometries; i++)
+        if (command_step_ndeg(l->geometry[i].steps) == step_ndeg)
+            call->dev->settings.step_udeg = head_step_udeg(l->geometry[i].steps);
+    return 0;
+}
+
+/* The ends of all geometries. The caller leaves those of the line rate that is set. */
+static void planar_range(const struct command_device *dev, int64_t *min, int64_t *max)
+{
+    for (uint32_t i = 0; i < dev->limits.n_geometries; i++) {
+        const int64_t step = command_step_ndeg(dev->limits.geometry[i].steps);
+        if (step < *min) *min = step;
+        if (step > *max) *max = step;
+    }
+}
+
 static void line_range(const struct command_device *dev, int64_t *min, int64_t *max)
 {
     *min = *max = line_step(dev, &dev->settings);
@@ -191,6 +216,7 @@ static void both_range(const struct command_device *dev, int64_t *min, int64_t *
     line_range(dev, min, max);
     if (is_line_head(dev)) *max = most_of_both(dev, *max);
     if (is_sphere(dev)) sphere_range(dev, min, max);
+    planar_range(dev, min, max);
 }
 
 static const char *both_why_not(const struct command_device *dev)
@@ -230,7 +256,7 @@ static void both_because(const struct command_device *dev, char *text, size_t le
 {
     if (is_sphere(dev) && dev->limits.step_fixed)
         snprintf(text, len, ": the platform moves");
-    else if (is_sphere(dev))
+    else if (is_sphere(dev) || dev->limits.n_geometries > 0)
         say_is("HEAD:LINes", dev->settings.lines_uhz, text, len);
     else
         line_because(dev, text, len);
@@ -256,6 +282,7 @@ static int pan_write(struct command_call *call, int64_t step_ndeg)
 static int both_write(struct command_call *call, int64_t step_ndeg)
 {
     if (is_sphere(call->dev)) return write_sphere(call, step_ndeg);
+    if (!is_line_head(call->dev)) return write_planar(call, step_ndeg);
     line_write(call, step_ndeg);
     return pan_write(call, step_ndeg);
 }

@@ -343,7 +343,10 @@ void config_signal_spec(const struct config_profile *profile, const struct confi
 void config_fill_spec(const struct config_profile *profile, const struct head_settings *settings,
                       struct schedule_spec *spec);
 
-/* What the configuration would be with other ranges, noise and step of a sphere: as if its keys had them. cfg is a copy
+/* The steps of a turn of a planar head: one of its geometries. */
+void config_set_steps(struct config_profile *profile, uint32_t steps);
+
+/* What the configuration would be with other ranges, noise and step: as if its keys had them. cfg is a copy
  * of one that was loaded; the settings are allowed for it (command.h). SH_EINPUT: no ring is left. */
 int config_apply_settings(struct config *cfg, const struct head_settings *settings, struct sh_err *err);
 

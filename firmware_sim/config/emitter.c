@@ -27,7 +27,7 @@ static const struct owned_key {
     {"front_step", PLANAR, 1},  {"firing_ns", BEAMS, 1},
     {"beams", BEAMS, 1},        {"step_direction", PLANAR | BEAMS, 0},
     {"step_deg", SPHERE, 1},    {"directions", DIRECTIONS, 1},
-    {"programs", LINE, 0},
+    {"programs", LINE, 0},      {"geometries", PLANAR, 0},
 };
 
 static const double PRR_MOST_HZ = 1e7;
@@ -103,6 +103,7 @@ static void set_planar(struct cfg_reader *rd, struct config_profile *p)
         p->fov_min_udeg = emitter_step_udeg(&p->emitter, c->first_step);
         p->fov_max_udeg = emitter_step_udeg(&p->emitter, c->last_step);
         set_rates(rd, "steps_per_turn", p);
+        cfg_check_geometries(rd, p);
     }
 }
 
@@ -227,10 +228,11 @@ static void set_sphere_settings(struct cfg_reader *rd, struct config *cfg)
 
 static void refuse_sphere_settings(struct cfg_reader *rd, const struct config *cfg)
 {
-    for (size_t i = 0; i < CFG_LEN(of_sphere); i++)
+    for (size_t i = cfg->profile.arrangement.n_geometries > 0; i < CFG_LEN(of_sphere); i++)
         if (cfg_is_given(rd, of_sphere[i], 0))
-            cfg_fail_key(rd, of_sphere[i], 0, "head profile %s has emitter: %s; allowed only with emitter: sphere",
-                         cfg->profile.name, emitter_names[cfg->profile.emitter.kind]);
+            cfg_fail_key(rd, of_sphere[i], 0, "head profile %s has emitter: %s; allowed only with emitter: sphere%s",
+                         cfg->profile.name, emitter_names[cfg->profile.emitter.kind],
+                         i == 0 ? ", or a planar one with geometries" : "");
 }
 
 void cfg_check_emitter_settings(struct cfg_reader *rd, struct config *cfg)
@@ -239,6 +241,7 @@ void cfg_check_emitter_settings(struct cfg_reader *rd, struct config *cfg)
     const enum emitter_kind kind = cfg->profile.emitter.kind;
     if (rd->profile_read && kind == EMITTER_SPHERE) set_sphere_settings(rd, cfg);
     if (rd->profile_read && kind != EMITTER_SPHERE) refuse_sphere_settings(rd, cfg);
+    if (rd->profile_read && cfg->profile.arrangement.n_geometries > 0) cfg_choose_geometry(rd, cfg);
     if (!rd->profile_read || kind == EMITTER_LINE) return;
     check_instrument(rd, cfg);
     if (kind == EMITTER_BEAMS && cfg->head.ambiguity != DETECT_AMBIGUITY_NONE)

@@ -52,7 +52,7 @@ static const struct cfg_key config_keys[] = {
      WITHIN("fov_min_deg", "fov_max_deg"), .help = "Last line angle cast; above the first one, but of a sphere: 350 to 10 goes across 0."},
     {"head.step_deg", IN_CONFIG(head.step_udeg), CFG_MICRO, "deg", "", 0.01, 90, .example = "0.1",
      .help = "sphere: from pulse to pulse and from ring to ring, in place of the profile's. Rounded to whole steps of a turn "
-             "and of half a turn, which is said."},
+             "and of half a turn, which is said. planar: one of the profile's geometries."},
     {"head.ring_start_deg", IN_CONFIG(head.ring_start_udeg), CFG_MICRO, "deg", "-90", -90, 90,
      .help = "sphere: elevation of the lowest ring. Rings outside of the limits are no lines and cost no time."},
     {"head.ring_stop_deg", IN_CONFIG(head.ring_stop_udeg), CFG_MICRO, "deg", "90", -90, 90,
@@ -152,8 +152,19 @@ static const struct cfg_key config_keys[] = {
      .help = "tcp, usb, web: port; 0: the system chooses; usbip, when not given: 3240. udp: the receiver's (required)."},
     {LINK(interface), CFG_TEXT, .def = "", .example = "eth1",
      .help = "udp: the packets' source is this interface's address. Required where they are broadcast, to "
-             "255.255.255.255 or to its own broadcast address. Routes still say where packets to other addresses go: "
+             "255.255.255.255 or to its own broadcast address, and where they go to a multicast group. Routes still say where packets to other addresses go: "
              "to bind a socket to an interface takes a privilege."},
+    {LINK(source), CFG_TEXT, .def = "", .example = "192.168.1.201",
+     .help = "udp: numeric address of this machine that packets come from, so that receivers tell heads apart. When not "
+             "given: the interface's, or as the system chooses; but the address after the receiver's where that is on "
+             "the loopback and has the source's port."},
+    {LINK(source_port), CFG_COUNT, NULL, "0", 0, 65535,
+     .help = "udp: port that packets come from; 0: the system chooses. When not given: velodyne 2368, velodyne-position "
+             "8308, as the device's, or another with a warning where these can't be had; but without source and interface "
+             "the system chooses for a receiver on this machine. One that listens on the same port at all addresses "
+             "must share it (SO_REUSEADDR)."},
+    {LINK(ttl), CFG_COUNT, NULL, "", 1, 255, .example = "4",
+     .help = "udp: time to live of the packets, in networks. When not given: 1 to a multicast group, else the system's."},
     {LINK(max_sessions), CFG_COUNT, NULL, "4", 1, LINK_MAX_SESSIONS,
      .help = "tcp, web: clients at a time; scip, when not given: 1."},
     {LINK(waits), CFG_ENUM, .def = "by-type",

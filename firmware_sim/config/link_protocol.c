@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "drivers/protocol/native.h"
+#include "drivers/protocol/velodyne.h"
 #include "firmware_sim/config/table.h"
 
 /* Kinds of links that each protocol is spoken on. */
@@ -22,6 +23,7 @@ static const struct {
     [PROTOCOL_VELODYNE_HTTP] = {1u << LINK_TCP | 1u << LINK_FD, "tcp"},
 };
 
+_Static_assert((int)HEAD_MAX_RATES == (int)PROTOCOL_MAX_GEOMETRIES, "geometries");
 _Static_assert((int)EMITTER_PLANAR == (int)NATIVE_EMIT_PLANAR && (int)EMITTER_BEAMS == (int)NATIVE_EMIT_BEAMS &&
                    (int)EMITTER_SPHERE == (int)NATIVE_EMIT_SPHERE &&
                    (int)EMITTER_DIRECTIONS == (int)NATIVE_EMIT_DIRECTIONS,
@@ -111,6 +113,15 @@ static void check_head(struct cfg_reader *rd, const struct config *cfg, uint32_t
                      ops->n_beams, cfg->profile.name, where, emitter->n_beams, ops->n_beams);
 }
 
+/* As the device's packets. */
+static void set_source_port(const struct cfg_reader *rd, struct link_spec *link, uint32_t i)
+{
+    if (link->type != LINK_UDP || cfg_is_given(rd, "links[].source_port", i)) return;
+    if (link->protocol == PROTOCOL_VELODYNE) link->source_port = VELODYNE_DATA_PORT;
+    if (link->protocol == PROTOCOL_VELODYNE_POSITION) link->source_port = VELODYNE_POSITION_PORT;
+    link->usual_port = 1;
+}
+
 static void check_protocol(struct cfg_reader *rd, struct config *cfg, uint32_t i)
 {
     struct link_spec *link = &cfg->link[i];
@@ -125,6 +136,7 @@ static void check_protocol(struct cfg_reader *rd, struct config *cfg, uint32_t i
                      cfg_word(rd, "links[].type", (int)link->type), ways[link->protocol].allowed);
         return;
     }
+    set_source_port(rd, link, i);
     /* As the device: it turns a second client away. */
     if (link->protocol == PROTOCOL_SCIP && !cfg_is_given(rd, "links[].max_sessions", i)) link->max_sessions = 1;
     check_stream(rd, cfg, i, ops);

@@ -62,6 +62,9 @@ static void check_link(struct cfg_reader *rd, struct config *cfg, uint32_t i)
         {"links[].address", 1u << LINK_TCP | 1u << LINK_USB | 1u << LINK_UDP | 1u << LINK_WEB},
         {"links[].port", 1u << LINK_TCP | 1u << LINK_USB | 1u << LINK_UDP | 1u << LINK_WEB},
         {"links[].interface", 1u << LINK_UDP},
+        {"links[].source", 1u << LINK_UDP},
+        {"links[].source_port", 1u << LINK_UDP},
+        {"links[].ttl", 1u << LINK_UDP},
         {"links[].max_sessions", 1u << LINK_TCP | 1u << LINK_WEB},
         {"links[].backend", 1u << LINK_USB},
         {"links[].attach", 1u << LINK_USB},
@@ -71,15 +74,15 @@ static void check_link(struct cfg_reader *rd, struct config *cfg, uint32_t i)
         {"links[].pid", 1u << LINK_USB},
         {"links[].serial", 1u << LINK_USB},
     };
-    static const char *const has[] = {[LINK_NULL] = "type, waits, protocol",
-                                      [LINK_FILE] = "type, path, waits, protocol",
-                                      [LINK_PTY] = "type, path, waits, protocol",
-                                      [LINK_TCP] = "type, address, port, max_sessions, waits, protocol",
-                                      [LINK_USB] =
-                                          ("type, backend, address, port, path, attach, udc, speed, vid, pid, serial, "
-                                           "waits, protocol"),
-                                      [LINK_UDP] = "type, address, port, interface, waits, protocol",
-                                      [LINK_WEB] = "type, address, port, max_sessions, waits, protocol"};
+    static const char *const has[] = {
+        [LINK_NULL] = "type, waits, protocol",
+        [LINK_FILE] = "type, path, waits, protocol",
+        [LINK_PTY] = "type, path, waits, protocol",
+        [LINK_TCP] = "type, address, port, max_sessions, waits, protocol",
+        [LINK_USB] = ("type, backend, address, port, path, attach, udc, speed, vid, pid, serial, "
+                      "waits, protocol"),
+        [LINK_UDP] = "type, address, port, interface, source, source_port, ttl, waits, protocol",
+        [LINK_WEB] = "type, address, port, max_sessions, waits, protocol"};
     struct link_spec *link = &cfg->link[i];
     char owner[64];
     if (!CFG_SOUND(rd, i, "links[].type")) return;

@@ -35,7 +35,13 @@ struct config_emitter {
     enum emitter_kind kind;
     uint32_t steps_per_turn, first_step, last_step, front_step;
     enum config_turn { TURN_CLOCKWISE, TURN_COUNTER_CLOCKWISE } step_direction; /* seen from above */
-    int64_t firing_fs;                                                          /* of a whole sequence */
+    struct config_geometry { /* a line rate, and the steps that a turn has at it */
+        int64_t lines_uhz;
+        uint32_t steps_per_turn;
+        enum config_from from;
+    } geometry[HEAD_MAX_RATES]; /* the first is that of power-up */
+    uint32_t n_geometries;      /* 0: any line rate, at steps_per_turn */
+    int64_t firing_fs;          /* of a whole sequence */
     struct config_profile_beam {
         int64_t elevation_udeg, azimuth_udeg;
         uint32_t offset_ns;

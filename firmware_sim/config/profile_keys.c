@@ -7,6 +7,7 @@
 #define KEY(member)        #member, IN_PROFILE(member)
 #define EMITTER(member)    #member, IN_PROFILE(arrangement.member)
 #define BEAM(member)       CFG_MEMBER(struct config_profile_beam, member)
+#define GEOMETRY(member) CFG_MEMBER(struct config_geometry, member)
 #define REACH(member)      "reaches[]." #member, CFG_MEMBER(struct config_reach, member)
 
 #define PROGRAM(member) CFG_MEMBER(struct config_program, member)
@@ -50,6 +51,17 @@ static const struct cfg_key profile_keys[] = {
      .help = "planar: the step that looks ahead, along y. Line angles count from it, in the direction of the steps."},
     {EMITTER(step_direction), CFG_ENUM, .def = OWNED, .names = turn_names, FIGURE,
      .help = "planar, beams: how it turns, seen from above; clockwise when not given."},
+    {"geometries", .type = CFG_LIST, .min = 0, .max = HEAD_MAX_RATES,
+     .offset = offsetof(struct config_profile, arrangement.geometry), .size = sizeof(struct config_geometry),
+     .count_offset = offsetof(struct config_profile, arrangement.n_geometries),
+     .help = "planar: the line rates of a head that has only some, with the steps of a turn at each. The first is that of "
+             "power-up. Without geometries any line rate is taken, at steps_per_turn."},
+    {"geometries[]", .type = CFG_MAP, .help = "Written { lines_hz: F, steps_per_turn: N, from: GRADE }."},
+    {"geometries[].lines_hz", GEOMETRY(lines_uhz), CFG_MICRO, "Hz", NULL, 0.01, 1e6, .help = "Line rate."},
+    {"geometries[].steps_per_turn", GEOMETRY(steps_per_turn), CFG_COUNT, NULL, NULL, 4, 18000,
+     .help = "Steps of a turn at it. It divides steps_per_turn of the head, and so do first_step, last_step and front_step "
+             "by the same number."},
+    {"geometries[].from", GEOMETRY(from), CFG_ENUM, .names = cfg_from_names, .help = "Where the figures are from."},
     {"firing_ns", IN_PROFILE(arrangement.firing_fs), CFG_MICRO, "ns", OWNED, 0.001, 1e9, FIGURE,
      .help = "beams: how long a firing sequence lasts, rest and all; a multiple of 0.001 ns."},
     {"beams", .type = CFG_LIST, .min = 0, .max = EMITTER_MAX_BEAMS,

@@ -100,6 +100,8 @@ static int has_grade(const struct cfg_reader *rd, size_t row, int grade)
         if ((int)p->reach[i].from == grade) return 1;
     for (uint32_t i = 0; strcmp(path, "beams") == 0 && i < p->arrangement.n_beams; i++)
         if ((int)p->arrangement.beam[i].from == grade) return 1;
+    for (uint32_t i = 0; strcmp(path, "geometries") == 0 && i < p->arrangement.n_geometries; i++)
+        if ((int)p->arrangement.geometry[i].from == grade) return 1;
     for (size_t item = 0; item < CFG_MAX_ITEMS; item++)
         if (rd->from[row][item] == grade + 1) return 1;
     return 0;

@@ -70,7 +70,9 @@ void cfg_take_scan_settings(struct config *cfg)
     s->angle_noise = cfg->noise.angle != 0;
     s->sigma_nm = to_nm(cfg->noise.sigma_m);
     s->ball_nm = to_nm(cfg->noise.ball.radius_m);
-    s->step_udeg = cfg->profile.emitter.kind == EMITTER_SPHERE ? cfg->profile.emitter.asked_udeg : 0;
+    s->step_udeg = cfg->profile.emitter.kind == EMITTER_SPHERE ? cfg->profile.emitter.asked_udeg
+                   : cfg->profile.arrangement.n_geometries > 0 ? head_step_udeg(cfg->profile.emitter.steps)
+                                                               : 0;
 }
 
 /* A length of the settings: that of the configuration to the last bit, where it wasn't changed. Else the number that
@@ -100,6 +102,10 @@ int config_apply_settings(struct config *cfg, const struct head_settings *s, str
         p->program[i].range_max_m = fmin(p->program[i].own_max_m, head->range_max_m);
     }
     if (s->step_udeg == own.step_udeg) return SH_OK;
+    if (p->emitter.kind == EMITTER_PLANAR) {
+        config_set_steps(p, emitter_sphere_steps(s->step_udeg));
+        return SH_OK;
+    }
     emitter_set_sphere(&p->emitter, s->step_udeg);
     return emitter_set_rings(&p->emitter, head->ring_start_udeg, head->ring_stop_udeg, err);
 }

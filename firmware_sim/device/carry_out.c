@@ -39,6 +39,9 @@ static void carry_out(struct device *device, enum command_effect effect, uint64_
     case COMMAND_RESET:
         stop(device, HEAD_EV_RESET, released);
         break;
+    case COMMAND_REBOOT:
+        device->power.reboots = 1;
+        break;
     case COMMAND_RELEASE:
         device_push_event(device, NATIVE_EV_CONTROL, 0, 0, 0, "released");
         break;

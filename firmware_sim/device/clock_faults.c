@@ -52,6 +52,16 @@ void device_run_clock_faults(struct device *device, uint64_t tick)
     }
 }
 
+int device_has_no_pps(const struct device *device, int64_t t_ns)
+{
+    const struct head_faults *faults = &device->head_faults;
+    int lost = 0;
+    for (uint32_t i = 0; i < faults->n; i++)
+        lost |= faults->fault[i].fault.kind == FAULT_PPS_LOST && t_ns >= faults->fault[i].from_ns &&
+                t_ns < faults->fault[i].until_ns;
+    return lost;
+}
+
 int device_loses_pps(struct device *device, int64_t edge_ns)
 {
     struct head_fault *f = NULL;

@@ -66,6 +66,11 @@ static void set_pattern(const struct config *cfg, struct head_limits *l)
     l->line_pulses = emitter_line_pulses(&p->emitter);
     l->round = p->emitter.kind == EMITTER_SPHERE;
     l->step_fixed = config_head_moves(&cfg->platform);
+    for (uint32_t i = 0; i < p->arrangement.n_geometries; i++) {
+        const struct config_geometry *g = &p->arrangement.geometry[i];
+        if (l->step_fixed && g->steps_per_turn != p->emitter.steps) continue;
+        l->geometry[l->n_geometries++] = (struct head_geometry){g->lines_uhz, g->steps_per_turn};
+    }
     l->sweep_udeg = l->emitter == EMITTER_LINE ? llround(360e6 * p->optical_gain / p->facets) : 0;
     l->sequence_ps = p->arrangement.firing_fs / 1000;
 }

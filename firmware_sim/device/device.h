@@ -16,7 +16,7 @@
 
 #include "core/cast.h"
 #include "drivers/protocol/native.h"
-#include "drivers/protocol/nmea.h"
+#include "drivers/protocol/protocol.h"
 #include "firmware_sim/command/command.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/device/journal.h"
@@ -201,7 +201,16 @@ int64_t device_utc_ns(struct device *device, int64_t t_ns);
  * fix at or before t_ns, where the head is. 0: there is none. */
 int64_t device_next_fix_ns(const struct device *device, int64_t t_ns);
 int device_fix(struct device *device, int64_t t_ns, struct nmea_fix *fix);
+/* The pulses per second at a device time that was claimed (pps.h). */
+enum protocol_pps device_pps(struct device *device, int64_t t_ns, int *set);
 
+/* The tick after that which tells that the head waits for a command; UINT64_MAX: it boots, scans, or is about to. */
+uint64_t device_rests_from(struct device *device);
+
+/* Device time at which power came last, or will come back where it is off; 0: it has always been on. */
+int64_t device_power_ns(struct device *device);
+/* How often power has come, with the first time. */
+uint32_t device_power_ons(struct device *device);
 /* Counters begin so many below their wrap, since the last power-up; 0: at 0. */
 uint32_t device_near_wrap(struct device *device);
 

@@ -8,6 +8,7 @@
 #include "firmware_sim/device/device.h"
 #include "firmware_sim/device/fault_desk.h"
 #include "firmware_sim/device/gnss.h"
+#include "firmware_sim/device/pps.h"
 #include "firmware_sim/device/head_clock.h"
 #include "firmware_sim/device/head_faults.h"
 
@@ -88,6 +89,8 @@ enum { DEVICE_ERRORS_A_SECOND = 10, DEVICE_MAX_SESSIONS = (CONFIG_MAX_LINKS + 1)
 struct device_power {
     uint64_t off_tick, on_tick; /* 0: it has always been on */
     int boot_begins;            /* in the tick at hand */
+    int reboots;                /* a command asked for it: power goes with the next tick, for one tick */
+    uint32_t again;             /* how often power has come back */
     uint32_t near_wrap;         /* counters begin so many below their wrap */
 };
 
@@ -164,6 +167,7 @@ struct device {
     struct command_device cmd;
     struct head_clock clock;
     struct gnss gnss;
+    struct pps pps;
     char plan[160]; /* site_plan_text */
     char idn[96];
     uint64_t tick_hz;
@@ -298,6 +302,8 @@ int device_is_dead(const struct device *device, uint64_t released);
 
 /* clock_faults.c */
 void device_run_clock_faults(struct device *device, uint64_t tick);
+/* Whether pulses are lost at a device time. */
+int device_has_no_pps(const struct device *device, int64_t t_ns);
 /* The PPS event of a full second is not to be. */
 int device_loses_pps(struct device *device, int64_t edge_ns);
 

@@ -1,7 +1,8 @@
 /* Power and boots: what a power cycle ends and begins anew, and what goes wrong in a boot on request.
  *
  * Device time, scan numbers and the stations' places go on over a power cycle, and so does the time of day, which has a
- * battery. All else is as at power-up. */
+ * battery. All else is as at power-up. A reboot by command is a power cycle of one tick. Protocols whose devices count
+ * from power-up count from device_power_ns(). */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -23,7 +24,7 @@ static void end_slow_boots(struct device *device, uint64_t tick)
 }
 
 /* No end of the scan is said: who reads it finds that it stops. */
-static void turn_off(struct device *device, uint64_t tick, double for_ms)
+static void turn_off(struct device *device, uint64_t tick, uint64_t until_tick)
 {
     struct device_scan *scan = &device->scan;
     if (scan->on) device_end_beam(device, time_of(device, tick - scan->tick0));
@@ -35,7 +36,7 @@ static void turn_off(struct device *device, uint64_t tick, double for_ms)
     memset(device->errors, 0, sizeof device->errors);
     device_transition(device, HEAD_EV_POWER_OFF, tick);
     device->power.off_tick = tick;
-    device->machine.due_tick = device->power.on_tick = tick + device_ticks_of(device, 1e-3 * for_ms);
+    device->machine.due_tick = device->power.on_tick = until_tick;
 }
 
 static void set_near_wrap(struct device *device, uint64_t tick)
@@ -62,6 +63,7 @@ static void turn_on(struct device *device, uint64_t tick)
     cmd->frames_done = 0;
     memset(&cmd->queue, 0, sizeof cmd->queue);
     set_near_wrap(device, tick);
+    device->power.again++;
     device->scan.variant = NULL;
     device_before_scans(device);
     device_transition(device, HEAD_EV_POWER_ON, tick);
@@ -105,32 +107,58 @@ int device_end_boot(struct device *device, uint64_t tick)
     return 1;
 }
 
-void device_run_power(struct device *device, uint64_t tick, struct device_work *work)
+/* Until when power is to be off that goes in this tick; 0: none goes. */
+static uint64_t goes_until(struct device *device, uint64_t tick)
 {
     const struct head_fault *f = NULL;
+    uint64_t until_tick = device->power.reboots ? tick + 1 : 0;
+    device->power.reboots = 0;
+    if (fault_board_version(device->faults) == 0) return until_tick;
+    while ((f = head_faults_next(&device->head_faults, FAULT_POWER_CYCLE, f)) != NULL) {
+        const uint64_t tick1 = tick + device_ticks_of(device, 1e-3 * f->fault.for_ms);
+        if (f->begins && tick1 > until_tick) until_tick = tick1; /* two of them at once: as long as the longer */
+    }
+    return until_tick;
+}
+
+/* Power that would come back with the tick with which it goes again stays away: links see it go and come in turn. */
+void device_run_power(struct device *device, uint64_t tick, struct device_work *work)
+{
+    const uint64_t until_tick = goes_until(device, tick);
     work->power = DEVICE_POWER_STAYS;
-    if (device->machine.state == HEAD_OFF && device->machine.due_tick <= tick) {
-        turn_on(device, tick);
-        work->power = DEVICE_POWER_COMES;
+    if (device->machine.state == HEAD_OFF) {
+        if (until_tick > device->power.on_tick) device->machine.due_tick = device->power.on_tick = until_tick;
+        if (device->machine.due_tick <= tick) {
+            turn_on(device, tick);
+            work->power = DEVICE_POWER_COMES;
+        }
+    } else if (until_tick != 0) {
+        turn_off(device, tick, until_tick);
+        work->power = DEVICE_POWER_GOES;
     }
     if (device->power.boot_begins) begin_boot(device, tick);
-    if (fault_board_version(device->faults) == 0) return;
-    while ((f = head_faults_next(&device->head_faults, FAULT_POWER_CYCLE, f)) != NULL) {
-        if (!f->begins) continue;
-        const uint64_t until_tick = tick + device_ticks_of(device, 1e-3 * f->fault.for_ms);
-        if (device->machine.state != HEAD_OFF) {
-            turn_off(device, tick, f->fault.for_ms);
-            work->power = DEVICE_POWER_GOES;
-        } else if (until_tick > device->power.on_tick) { /* two of them at once: as long as the longer */
-            device->machine.due_tick = device->power.on_tick = until_tick;
-        }
-    }
 }
 
 int device_is_dead(const struct device *device, uint64_t released)
 {
     const struct device_power *power = &device->power;
     return power->on_tick != 0 && device->next_tick > power->off_tick && released < power->on_tick;
+}
+
+int64_t device_power_ns(struct device *device)
+{
+    pthread_mutex_lock(&device->lock);
+    int64_t t_ns = time_of(device, device->power.on_tick);
+    pthread_mutex_unlock(&device->lock);
+    return t_ns;
+}
+
+uint32_t device_power_ons(struct device *device)
+{
+    pthread_mutex_lock(&device->lock);
+    const uint32_t n = device->power.again + 1;
+    pthread_mutex_unlock(&device->lock);
+    return n;
 }
 
 uint32_t device_near_wrap(struct device *device)

@@ -13,6 +13,17 @@ enum head_state device_visible_state(const struct device *device, uint64_t relea
     return HEAD_OFF;
 }
 
+uint64_t device_rests_from(struct device *device)
+{
+    const struct device_machine *machine = &device->machine;
+    pthread_mutex_lock(&device->lock);
+    const int rests = machine->state == HEAD_IDLE || machine->state == HEAD_FAULT || machine->state == HEAD_OFF;
+    const uint64_t tick =
+        machine->n_changes == 0 ? 0 : machine->change[(machine->n_changes - 1) % DEVICE_MAX_CHANGES].tick + 1;
+    pthread_mutex_unlock(&device->lock);
+    return rests ? tick : UINT64_MAX;
+}
+
 uint64_t device_ticks_of(const struct device *device, double s)
 {
     return (uint64_t)ceil(s * (double)device->tick_hz - 1e-9);

@@ -21,8 +21,11 @@ void device_say_pps(struct device *device, uint64_t tick)
 {
     const struct head_clock *clock = &device->clock;
     int64_t t_ns = (int64_t)tick * device->tick_ns, edge_ns, tai_s;
+    if (device->pps.n == 0 || device->power.on_tick == tick)
+        pps_power_up(&device->pps, t_ns, device_has_no_pps(device, t_ns));
     if (clock->source == EPOCH_NONE || !head_clock_edge(clock, t_ns, t_ns + device->tick_ns, &edge_ns, &tai_s)) return;
     if (device_loses_pps(device, edge_ns)) return;
+    pps_take(&device->pps, edge_ns, tai_s);
     int64_t tai_ns = tai_s * UTC_SECOND_NS;
     char text[UTC_TEXT_LEN];
     struct utc_time utc;
@@ -62,6 +65,14 @@ int64_t device_utc_ns(struct device *device, int64_t t_ns)
     const int64_t utc_ns = utc_posix_from_tai(&clock->table, head_clock_ns(clock, t_ns));
     pthread_mutex_unlock(&device->lock);
     return utc_ns;
+}
+
+enum protocol_pps device_pps(struct device *device, int64_t t_ns, int *set)
+{
+    pthread_mutex_lock(&device->lock);
+    const enum protocol_pps state = pps_at(&device->pps, t_ns, set);
+    pthread_mutex_unlock(&device->lock);
+    return state;
 }
 
 int64_t device_next_fix_ns(const struct device *device, int64_t t_ns)

@@ -51,6 +51,26 @@ static int fix(void *self, int64_t t_ns, struct nmea_fix *fix)
     return device_fix(self, t_ns, fix);
 }
 
+static uint64_t rests_from(void *self)
+{
+    return device_rests_from(self);
+}
+
+static int64_t power_ns(void *self)
+{
+    return device_power_ns(self);
+}
+
+static uint32_t power_ons(void *self)
+{
+    return device_power_ons(self);
+}
+
+static enum protocol_pps pps(void *self, int64_t t_ns, int *set)
+{
+    return device_pps(self, t_ns, set);
+}
+
 static uint32_t near_wrap(void *self)
 {
     return device_near_wrap(self);
@@ -102,6 +122,10 @@ const struct loop_source_ops loop_device_source = {
     .utc_ns = utc_ns,
     .next_fix_ns = next_fix_ns,
     .fix = fix,
+    .rests_from = rests_from,
+    .power_ns = power_ns,
+    .power_ons = power_ons,
+    .pps = pps,
     .near_wrap = near_wrap,
     .tick_ns = tick_ns,
     .counters = counters,

@@ -56,6 +56,10 @@ static void identify(struct links *links, const struct config *cfg)
     snprintf(id->firmware, sizeof id->firmware, "%s", cfg->profile.firmware);
     snprintf(id->serial, sizeof id->serial, "%s", cfg->head.serial);
     snprintf(id->name, sizeof id->name, "%s", cfg->head.name);
+    id->n_geometries = cfg->profile.arrangement.n_geometries;
+    for (uint32_t i = 0; i < id->n_geometries; i++)
+        id->geometry[i] = (struct protocol_geometry){cfg->profile.arrangement.geometry[i].lines_uhz,
+                                                     cfg->profile.arrangement.geometry[i].steps_per_turn};
     links->fixes_hz = cfg->gnss.rate_hz;
     for (uint32_t i = cfg->n_links; i-- > 0;) {
         if (cfg->link[i].protocol != PROTOCOL_VELODYNE || cfg->link[i].type != LINK_UDP) continue;

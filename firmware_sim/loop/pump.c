@@ -21,7 +21,8 @@ int pump_open(struct links *links, uint32_t index, const struct link_spec *spec,
     pump->stream = links->stream;
     pump->number = index + 1;
     if (spec->type != LINK_FD && !spec->clean)
-        pump->board = links->source->ops->faults(links->source->self); /* readers of this process get the clean stream */
+        pump->board =
+            links->source->ops->faults(links->source->self); /* readers of this process get the clean stream */
     pump->ops = link_ops_get(spec->type);
     pump->can = link_faults(spec);
     pump->protocol = protocol_ops_get((enum protocol_id)spec->protocol);
@@ -129,6 +130,9 @@ static void handle(struct pump *pump, const struct link_event *event)
         else if (s->open)
             pump_read_commands(pump, s, event->session);
         break;
+    case LINK_SHUT:
+        session_shut(pump, s);
+        break;
     case LINK_REFUSED:
         source_report(pump->links->source, CMD_E_REFUSED, event->peer);
         stream_poke(pump->stream);
@@ -194,6 +198,15 @@ static int timeout_ms(const struct pump *pump, int over)
     return ms < 0 ? 0 : over && ms > most_ms ? most_ms : ms > 60000 ? 60000 : (int)ms;
 }
 
+/* Returns the session's bit where the link is full. */
+static uint32_t write_one(struct pump *pump, int index)
+{
+    struct session *s = &pump->session[index];
+    if (session_write(pump, s, index)) return 1U << index;
+    if (s->open && session_is_done(pump, s)) pump->ops->end(pump->link, index);
+    return 0;
+}
+
 static void *pump_main(void *arg)
 {
     struct pump *pump = arg;
@@ -209,7 +222,7 @@ static void *pump_main(void *arg)
         want_write = 0;
         pump_plug(pump);
         for (int i = 0; i < LINK_MAX_SESSIONS; i++)
-            if (pump->session[i].open && session_write(pump, &pump->session[i], i)) want_write |= 1U << i;
+            if (pump->session[i].open) want_write |= write_one(pump, i);
         stream_rest_reader(pump->stream);
         at_once = pump_rest(pump);
         at_once |= pump_power(pump, want_write);

@@ -35,9 +35,11 @@ struct session_commands {
 
 struct session {
     int open;
-    uint32_t id;     /* from 1, over all links */
-    int reader;      /* of the stream */
-    uint64_t cursor; /* next tick to take */
+    int shut;            /* its client sends nothing more */
+    int left;            /* and the source knows, so that it has no control and no half a line any more */
+    uint32_t id;         /* from 1, over all links */
+    int reader;          /* of the stream */
+    uint64_t cursor;     /* next tick to take */
     uint64_t power_from; /* power that goes with a tick before this one does not end it */
     struct {
         int have_seq; /* next_seq is known, and so is: */
@@ -54,8 +56,8 @@ struct session {
     struct pump *pump;
     void *protocol;
     struct unit_queue units;
-    int answering; /* input() is being called */
-    int hang_up;   /* the session ends once its units are out */
+    int answering;     /* input() is being called */
+    int hang_up;       /* the session ends once its units are out */
     struct wire *wire; /* NULL: no fault so far */
     char peer[64];
     int64_t moved_ns; /* clock_now_ns() when a byte last went out */
@@ -82,9 +84,9 @@ struct pump {
     uint8_t *tick; /* frames of the tick at hand, for a protocol; NULL: it is native */
     int wake_fd;
     struct stream_listener *listener;
-    uint32_t out_cap; /* of each session */
-    int holds;        /* its readers hold back the paces fast and step */
-    uint32_t number;  /* of the link, from 1 */
+    uint32_t out_cap;          /* of each session */
+    int holds;                 /* its readers hold back the paces fast and step */
+    uint32_t number;           /* of the link, from 1 */
     struct fault_board *board; /* NULL: no faults strike here */
     uint32_t can;              /* link_faults() */
     struct fault_tally tally;  /* of what the link does */
@@ -98,12 +100,14 @@ struct pump {
     pthread_t thread;
     int running;
     int64_t over_ns; /* clock: when it was first seen that the run is over; 0: it is not */
-    int failed; /* a write failed; the reason is still to come */
+    int failed;      /* a write failed; the reason is still to come */
 };
 
 /* session.c */
 void session_open(struct pump *pump, struct session *s, const char *peer);
 void session_close(struct pump *pump, struct session *s);
+/* Its client sends nothing more, and gets what is due to it: answers to what it sent, and the stream. */
+void session_shut(struct pump *pump, struct session *s);
 /* The same for power that goes: the device knows already. */
 void session_cut(struct pump *pump, struct session *s);
 /* The tick that the session does not take any more, since power goes with it; UINT64_MAX: none. */
@@ -113,6 +117,9 @@ void session_restart(struct pump *pump, struct session *s, uint64_t tick);
 /* Takes what there is and writes until the link is full (1) or there is nothing left (0). index: of the session on its
  * link. */
 int session_write(struct pump *pump, struct session *s, int index);
+/* Whether the session, of which all was written, is over: its protocol ends it, or its client sends nothing more and
+ * nothing is due to it. */
+int session_is_done(const struct pump *pump, const struct session *s);
 
 /* The next ticks and replies into the buffer, which was written out. */
 void session_fill(struct pump *pump, struct session *s);
@@ -197,6 +204,8 @@ void session_close_protocol(struct pump *pump, struct session *s);
 int session_restart_protocol(struct pump *pump, struct session *s);
 /* As session_write. */
 int session_write_protocol(struct pump *pump, struct session *s, int index);
+/* Whether a client that sends nothing more still has something to come. */
+int session_owes_protocol(const struct pump *pump, const struct session *s);
 /* The first tick, from the cursor on, that the protocol must be woken for though it has no frames. */
 uint64_t session_wake_tick(const struct pump *pump, const struct session *s);
 

@@ -67,6 +67,12 @@ static int64_t host_next_fix_ns(void *ctx, int64_t t_ns)
     return s->pump->links->source->ops->next_fix_ns(s->pump->links->source->self, t_ns);
 }
 
+static enum protocol_pps host_pps(void *ctx, int64_t t_ns, int *set)
+{
+    const struct session *s = ctx;
+    return s->pump->links->source->ops->pps(s->pump->links->source->self, t_ns, set);
+}
+
 static void host_count(void *ctx, enum protocol_count what, uint64_t n)
 {
     struct session *s = ctx;
@@ -114,9 +120,12 @@ static int create(struct pump *pump, struct session *s)
 {
     struct protocol_spec spec = {
         .identity = &pump->links->identity,
-        .host = {s, host_send, host_command, host_utc_ns, host_fix, host_count, host_hang_up, host_next_fix_ns},
+        .host = {s, host_send, host_command, host_utc_ns, host_fix, host_count, host_hang_up, host_next_fix_ns,
+                 host_pps},
         .session = s->id,
         .fixes_hz = pump->links->fixes_hz,
+        .power_ns = pump->links->source->ops->power_ns(pump->links->source->self),
+        .power_ons = pump->links->source->ops->power_ons(pump->links->source->self),
         .near_wrap = pump->links->source->ops->near_wrap(pump->links->source->self),
         .waits = pump->stream->waits,
         .port = pump->links->data_port,
@@ -248,6 +257,12 @@ static int flush(struct pump *pump, struct session *s, int index)
     }
 }
 
+int session_owes_protocol(const struct pump *pump, const struct session *s)
+{
+    const struct protocol_ops *ops = pump->protocol;
+    return s->commands.in_pos != s->commands.in_len || s->units.n != 0 || ops->owes == NULL || ops->owes(s->protocol);
+}
+
 int session_write_protocol(struct pump *pump, struct session *s, int index)
 {
     int more = 1, full = 0;
@@ -270,7 +285,6 @@ int session_write_protocol(struct pump *pump, struct session *s, int index)
         stream_note_written(pump->stream, s->reader, s->cursor);
     }
     if (s->wire != NULL) wire_time(s->wire, time_of(pump, s->cursor));
-    if (!full && s->hang_up && !session_wire_waits(s)) pump->ops->end(pump->link, index);
     return full == 1;
 }
 

@@ -27,6 +27,7 @@ void session_open(struct pump *pump, struct session *s, const char *peer)
     s->moved_ns = clock_now_ns();
     s->cursor = stream_released(pump->stream);
     s->power_from = 0;
+    s->shut = s->left = 0;
     snprintf(s->peer, sizeof s->peer, "%.63s", peer); /* an address: shorter */
     if (native && s->out == NULL) s->out = malloc(pump->out_cap);
     if (native ? s->out == NULL : session_open_protocol(pump, s) != SH_OK) {
@@ -68,15 +69,50 @@ uint64_t session_off_tick(const struct pump *pump, const struct session *s)
     return stream_off_tick(pump->stream, s->cursor > s->power_from ? s->cursor : s->power_from);
 }
 
+/* No command comes from it any more: control is given back, once. */
+static void leave(struct pump *pump, struct session *s)
+{
+    const struct command_lines *lines = &s->commands.lines;
+    const struct loop_source *source = pump->links->source;
+    if (!pump->protocol->passes_native || s->left) return; /* other protocols never keep control */
+    s->left = 1;
+    source->ops->session_closed(source->self, s->id, s->peer, lines->len != 0 || lines->overrun);
+    stream_poke(pump->stream);
+}
+
 void session_close(struct pump *pump, struct session *s)
 {
     if (!s->open) return;
     session_cut(pump, s);
-    if (!pump->protocol->passes_native) return; /* it never keeps control */
-    const struct command_lines *lines = &s->commands.lines;
+    leave(pump, s);
+}
+
+/* Lines that wait for a step, a move or room are carried out first. */
+static void leave_when_done(struct pump *pump, struct session *s)
+{
+    const struct session_commands *c = &s->commands;
+    if (s->shut && !s->left && c->in_pos == c->in_len && !c->stepping && !c->moving) leave(pump, s);
+}
+
+void session_shut(struct pump *pump, struct session *s)
+{
+    s->shut = 1;
+    if (s->open) leave_when_done(pump, s);
+}
+
+/* Its own protocol owes nothing once the head waits for a command, and the stream up to there is out. */
+static int owes(const struct pump *pump, const struct session *s)
+{
     const struct loop_source *source = pump->links->source;
-    source->ops->session_closed(source->self, s->id, s->peer, lines->len != 0 || lines->overrun);
-    stream_poke(pump->stream);
+    if (!pump->protocol->passes_native) return session_owes_protocol(pump, s);
+    return !s->left || s->commands.reply_len != 0 || s->out_pos != s->out_len ||
+           s->cursor < source->ops->rests_from(source->self);
+}
+
+int session_is_done(const struct pump *pump, const struct session *s)
+{
+    if (pump->ops->end == NULL || session_wire_waits(s)) return 0;
+    return s->hang_up || (s->shut && !owes(pump, s));
 }
 
 /* One tick into the buffer. Returns 0 when there is none or no room. */
@@ -138,6 +174,7 @@ void session_fill(struct pump *pump, struct session *s)
     pump_end_move(pump, s);
     pump_take_lines(pump, s); /* those that waited for room */
     take_replies(pump, s);
+    leave_when_done(pump, s);
     stream_move_reader(pump->stream, s->reader, s->cursor);
 }
 

@@ -178,8 +178,11 @@ static struct wishes take_wishes(struct replay *r, uint64_t tick, int is_late)
     if (r->wants_stop) r->wants_again = 0;
     r->wants_stop = 0;
     wishes.starts = !is_late && ((r->wants_start && ready) || r->wants_again);
-    if (wishes.starts) r->wants_start = r->wants_again = 0;
-    const int waits = !r->ends_then || r->wants_start, plays = r->playing || wishes.starts;
+    if (wishes.starts) {
+        r->wants_start = r->wants_again = 0;
+        r->playing = 1;
+    }
+    const int waits = !r->ends_then || r->wants_start, plays = r->playing;
     wishes.over = !is_late && (r->ending || tick >= r->end_tick || (!waits && !plays));
     wishes.idle = !is_late && waits && !plays && r->end_tick == UINT64_MAX;
     pthread_mutex_unlock(&r->lock);
@@ -250,6 +253,28 @@ static struct fault_board *faults(const void *self)
     return ((const struct replay *)self)->faults;
 }
 
+static uint64_t rests_from(void *self)
+{
+    struct replay *r = self;
+    pthread_mutex_lock(&r->lock);
+    const int plays = r->playing || r->wants_start || r->wants_again;
+    const uint64_t tick = r->n_changes == 0 ? 0 : r->change[(r->n_changes - 1) % REPLAY_CHANGES].tick + 1;
+    pthread_mutex_unlock(&r->lock);
+    return plays ? UINT64_MAX : tick;
+}
+
+static int64_t power_ns(void *self)
+{
+    (void)self;
+    return 0;
+}
+
+static uint32_t power_ons(void *self)
+{
+    (void)self;
+    return 1;
+}
+
 static uint32_t near_wrap(void *self)
 {
     (void)self;
@@ -309,6 +334,9 @@ const struct loop_source_ops replay_source = {
     .session_closed = replay_session_closed,
     .report = replay_report,
     .faults = faults,
+    .rests_from = rests_from,
+    .power_ns = power_ns,
+    .power_ons = power_ons,
     .near_wrap = near_wrap,
     .tick_ns = tick_ns,
     .counters = counters,

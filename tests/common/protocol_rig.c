@@ -70,6 +70,14 @@ static int64_t next_fix_ns(void *ctx, int64_t t_ns)
     return (t_ns + second_ns - 1) / second_ns * second_ns;
 }
 
+static enum protocol_pps pps(void *ctx, int64_t t_ns, int *set)
+{
+    const struct protocol_rig *rig = ctx;
+    (void)t_ns;
+    *set = !rig->pps_unset;
+    return rig->pps;
+}
+
 void protocol_rig_open(struct protocol_rig *rig, enum protocol_id id, const char *maker, const char *model)
 {
     struct sh_err err;
@@ -78,15 +86,17 @@ void protocol_rig_open(struct protocol_rig *rig, enum protocol_id id, const char
     assert_non_null(rig->ops);
     rig->room = SIZE_MAX;
     rig->utc0_ns = INT64_MIN;
+    rig->pps = PROTOCOL_PPS_LOCKED;
     snprintf(rig->identity.maker, sizeof rig->identity.maker, "%s", maker);
     snprintf(rig->identity.model, sizeof rig->identity.model, "%s", model);
     snprintf(rig->identity.serial, sizeof rig->identity.serial, "17210001");
     snprintf(rig->identity.firmware, sizeof rig->identity.firmware, "1.2.3");
     snprintf(rig->identity.name, sizeof rig->identity.name, "rig");
     rig->spec = (struct protocol_spec){.identity = &rig->identity,
-                                       .host = {rig, keep_unit, answer, utc_ns, fix, count, hang_up, next_fix_ns},
+                                       .host = {rig, keep_unit, answer, utc_ns, fix, count, hang_up, next_fix_ns, pps},
                                        .session = 1,
-                                       .fixes_hz = 1};
+                                       .fixes_hz = 1,
+                                       .power_ons = 1};
     assert_int_equal(rig->ops->create(&rig->spec, &rig->protocol, &err), SH_OK);
     if (rig->ops->open != NULL) rig->ops->open(rig->protocol, 0);
 }

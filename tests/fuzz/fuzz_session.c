@@ -74,7 +74,7 @@ static int64_t next_fix_ns(void *ctx, int64_t t_ns)
 /* Without clearing the rig's megabytes. */
 static void open_session(enum protocol_id id, unsigned how)
 {
-    static const char *const models[] = {"UTM-30LX", "UST-20LX", "URG-04LX", "TiM571",
+    static const char *const models[] = {"UTM-30LX-EW", "UST-20LX", "URG-04LX", "TiM571",
                                          "LMS111",   "TiM561",   "VLP-16",   "TiM781"};
     struct sh_err err = {0};
     device = command_test_device();
@@ -93,7 +93,7 @@ static void open_session(enum protocol_id id, unsigned how)
     snprintf(rig.identity.firmware, sizeof rig.identity.firmware, "1.2.3");
     snprintf(rig.identity.name, sizeof rig.identity.name, "rig");
     rig.spec = (struct protocol_spec){.identity = &rig.identity,
-                                      .host = {&rig, send_unit, run_command, utc_ns, fix, count, hang_up, next_fix_ns},
+                                      .host = {&rig, send_unit, run_command, utc_ns, fix, count, hang_up, next_fix_ns, NULL},
                                       .session = 1,
                                       .fixes_hz = 1,
                                       .near_wrap = how & 64 ? 3 : 0,

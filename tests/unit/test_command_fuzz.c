@@ -140,6 +140,7 @@ static const char *const valid[] = {
     "HEAD:LINES MIN",
     "HEAD:PAN 18 DEG/S",
     "HEAD:STAT?",
+    "HEAD:REBOOT",
     "HEAD:STATION 2",
     "HEAD:RANG:MIN 1.5",
     "HEAD:RANG:MIN MAX",

@@ -226,6 +226,46 @@ static int too_far(void *owner, const struct head_settings *settings, char *why,
     return -1;
 }
 
+static void geometries_go_together(void **ctx)
+{
+    (void)ctx;
+    struct command_device dev = command_test_device();
+    dev.limits.emitter = EMITTER_PLANAR;
+    dev.limits.line_pulses = 720;
+    dev.limits.lines_min_uhz = 25 * MICRO;
+    dev.limits.lines_max_uhz = 50 * MICRO;
+    dev.limits.n_geometries = 3;
+    dev.limits.geometry[0] = (struct head_geometry){50 * MICRO, 720};
+    dev.limits.geometry[1] = (struct head_geometry){25 * MICRO, 1440};
+    dev.limits.geometry[2] = (struct head_geometry){25 * MICRO, 720};
+    dev.settings.step_udeg = 500000;
+    dev.settings.lines_uhz = 50 * MICRO;
+    dev.settings.prr_uhz = 36000 * MICRO;
+    dev.defaults = dev.settings;
+    expect(&dev, "SCAN:STEP?", "0.5");
+    refuse(&dev, "SCAN:STEP 0.25", CMD_E_RANGE, "SCAN:STEP 0.25, allowed 0.5 deg as HEAD:LINes is 50");
+    refuse(&dev, "HEAD:LIN 30", CMD_E_RANGE, "allowed 25, 50 Hz with this SCAN:STEP");
+    expect(&dev, "HEAD:LIN 25", "OK");
+    assert_true(dev.settings.prr_uhz == 18000 * MICRO);
+    refuse(&dev, "SCAN:STEP 0.3", CMD_E_RANGE, "allowed 0.25, 0.5 deg as HEAD:LINes is 25");
+    expect(&dev, "SCAN:STEP? MIN", "0.25");
+    expect(&dev, "SCAN:STEP? MAX", "0.5");
+    expect(&dev, "HELP? SCAN:STEP",
+           "number,\"deg\",0.25,0.5,0.5,0.000000001,\"off boot idle spin-down fault\",\"0.25 0.5\"");
+    expect(&dev, "SCAN:STEP 0.25", "0.25");
+    assert_true(dev.settings.prr_uhz == 36000 * MICRO);
+    expect(&dev, "SCAN:STEP:LINE?", "0.25");
+    refuse(&dev, "HEAD:LIN DEF", CMD_E_RANGE, "HEAD:LINes DEF, allowed 25 Hz with this SCAN:STEP");
+    expect(&dev, "HEAD:LIN MAX", "OK");
+    expect(&dev, "HEAD:LIN?", "25");
+    dev.state = HEAD_SCANNING;
+    refuse(&dev, "SCAN:STEP 0.5", CMD_E_SETTINGS, "can't change in state scanning");
+    dev.state = HEAD_IDLE;
+    expect(&dev, "SCAN:STEP DEF", "0.5");
+    expect(&dev, "*RST", "OK");
+    assert_true(dev.settings.prr_uhz == 36000 * MICRO);
+}
+
 static void what_can_not_be_planned_is_refused(void **ctx)
 {
     (void)ctx;
@@ -323,6 +363,7 @@ int main(void)
         cmocka_unit_test(what_def_answers_can_be_set),
         cmocka_unit_test(a_spheres_step_divides_half_a_turn),
         cmocka_unit_test(steps_of_fixed_patterns_are_readings),
+        cmocka_unit_test(geometries_go_together),
         cmocka_unit_test(what_can_not_be_planned_is_refused),
         cmocka_unit_test(settings_describe_themselves),
         cmocka_unit_test(limits_are_those_that_hold),

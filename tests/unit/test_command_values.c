@@ -236,15 +236,15 @@ static void the_device_itself_needs_no_control(void **ctx)
     assert_int_equal(dev.control, 2);
 }
 
-/* What each state answers, from the state diagram: S start, P stop, R reset; '.' refused. */
+/* What each state answers, from the state diagram: S start, P stop, R reset, B reboot; '.' refused. */
 static void effects_follow_the_state_machine(void **ctx)
 {
     (void)ctx;
-    static const char *const accepted[HEAD_N_STATES] = {"...", "...", "S.R", ".PR", ".PR", "..R", "..R"};
-    static const char *const lines[] = {"SCAN:START", "SCAN:STOP", "*RST"};
-    static const enum command_effect effects[] = {COMMAND_START, COMMAND_STOP, COMMAND_RESET};
+    static const char *const accepted[HEAD_N_STATES] = {"...B", "...B", "S.RB", ".PRB", ".PRB", "..RB", "..RB"};
+    static const char *const lines[] = {"SCAN:START", "SCAN:STOP", "*RST", "HEAD:REBOOT"};
+    static const enum command_effect effects[] = {COMMAND_START, COMMAND_STOP, COMMAND_RESET, COMMAND_REBOOT};
     for (int state = 0; state < HEAD_N_STATES; state++)
-        for (size_t i = 0; i < 3; i++) {
+        for (size_t i = 0; i < 4; i++) {
             struct command_device dev = command_test_device();
             dev.state = (enum head_state)state;
             dev.settings.frames = 9;

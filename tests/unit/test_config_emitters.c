@@ -34,7 +34,7 @@ static void rates_and_angles_follow(void **state)
     assert_int_equal(cfg->profile.fov_min_udeg, -135000000);
     assert_int_equal(cfg->profile.fov_max_udeg, 135000000);
     assert_int_equal(cfg->head.settings.line_start_udeg, -135000000);
-    assert_string_equal(cfg->profile.firmware, "4.0.0");
+    assert_string_equal(cfg->profile.firmware, "4.1.0b-A");
     assert_loads(load_settings("hokuyo-urg-04lx", "  lines_hz: 9.25\n"));
     assert_int_equal(cfg->head.settings.prr_uhz, INT64_C(1024) * 9250000);
     assert_int_equal(cfg->profile.fov_min_udeg, -119531250); /* (44 - 384) 360 / 1024 deg */
@@ -252,6 +252,47 @@ static void the_step_of_a_sphere_is_a_setting(void **state)
     assert_int_equal(cfg->profile.emitter.rings, 83);
 }
 
+/* A line rate, and the steps of a turn at it. */
+static void expect_geometry(const char *settings, int lines_hz, uint32_t steps)
+{
+    assert_loads(load_settings("sick-lms111", settings));
+    assert_int_equal(cfg->head.settings.lines_uhz, lines_hz * INT64_C(1000000));
+    assert_int_equal(cfg->head.settings.prr_uhz, lines_hz * INT64_C(1000000) * steps);
+    assert_int_equal(cfg->head.settings.step_udeg, 360000000 / steps);
+    assert_int_equal(cfg->profile.emitter.steps, steps);
+    assert_int_equal(cfg->profile.emitter.last_step, steps * 3 / 4);
+    assert_int_equal(cfg->profile.emitter.front_step, steps * 3 / 8);
+    assert_int_equal(cfg->profile.fov_max_udeg, 135000000);
+}
+
+static void a_planar_head_has_its_geometries(void **state)
+{
+    (void)state;
+    static const char lms[] = "sick-lms111", list[] = "50 Hz at 0.5 deg, 25 Hz at 0.25 deg, 25 Hz at 0.5 deg";
+    static const struct wrong wrong[] = {
+        {lms, "lines_hz: 50,", "lines_hz: 51,", "geometries[0].lines_hz", "allowed 25 to 50 Hz"},
+        {lms, "steps_per_turn: 720,", "steps_per_turn: 700,", "geometries[0].steps_per_turn",
+         "700; allowed what divides"},
+        {lms, "steps_per_turn: 720,", "steps_per_turn: 2880,", "geometries[0].steps_per_turn", "allowed what divides"},
+        {lms, "front_step: { value: 540,", "front_step: { value: 541,", "geometries[0].steps_per_turn", "front_step"},
+        {lms, "lines_hz: 50,", "lines_hz: 25,", "geometries[2].lines_hz", "stands there before"},
+        {"velodyne-vlp16", "beams:\n", "geometries: []\nbeams:\n", "geometries", "allowed only with emitter: planar"},
+    };
+    expect_geometry("", 50, 720); /* the first one: what the device has from the factory */
+    expect_geometry("  lines_hz: 25\n", 25, 1440);
+    expect_geometry("  step_deg: 0.25\n", 25, 1440);
+    expect_geometry("  step_deg: 0.5\n", 50, 720);
+    expect_geometry("  lines_hz: 25\n  step_deg: 0.5\n", 25, 720);
+    assert_int_equal(load_settings(lms, "  lines_hz: 50\n  step_deg: 0.25\n"), SH_EINPUT);
+    assert_says(list);
+    assert_int_equal(load_settings(lms, "  lines_hz: 30\n"), SH_EINPUT);
+    assert_says(list);
+    assert_int_equal(load_settings(lms, "  ring_start_deg: 0\n"), SH_EINPUT);
+    assert_says("allowed only with emitter: sphere");
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++)
+        check_wrong(&wrong[i]);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -261,6 +302,7 @@ int main(void)
         cmocka_unit_test(lists_name_their_line),
         cmocka_unit_test(spheres_go_to_their_limits),
         cmocka_unit_test(the_step_of_a_sphere_is_a_setting),
+        cmocka_unit_test(a_planar_head_has_its_geometries),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -6,10 +6,11 @@
 static void shipped_files_load(void **state)
 {
     (void)state;
-    static const char *const heads[] = {
-        "riegl-vz400i",    "riegl-vz600i",   "leica-rtc360", "riegl-vz2000i",   "leica-p40",       "leica-blk360",
-        "faro-focus-s350", "zf-imager-5016", "any-rate",     "hokuyo-urg-04lx", "hokuyo-utm-30lx", "hokuyo-ust-20lx",
-        "sick-tim561",     "sick-tim571",    "sick-tim781",  "sick-lms111",     "velodyne-vlp16",  "full-sweep"};
+    static const char *const heads[] = {"riegl-vz400i",    "riegl-vz600i",       "leica-rtc360",    "riegl-vz2000i",
+                                        "leica-p40",       "leica-blk360",       "faro-focus-s350", "zf-imager-5016",
+                                        "any-rate",        "hokuyo-urg-04lx",    "hokuyo-utm-30lx", "hokuyo-ust-20lx",
+                                        "hokuyo-ust-10lx", "hokuyo-utm-30lx-ew", "sick-tim561",     "sick-tim571",
+                                        "sick-tim781",     "sick-lms111",        "velodyne-vlp16",  "full-sweep"};
     assert_loads(load_set("head.profile=full-sweep"));
     for (size_t i = 0; i < sizeof heads / sizeof *heads; i++) {
         static struct config_profile profile;

@@ -170,6 +170,32 @@ static void loses_power_at_a_pulse(void **state)
     rig_close(rig);
 }
 
+/* The second one begins with the tick with which power would be back: it stays away, since who follows power counts
+ * that it goes and comes in turn. */
+static void loses_power_as_it_comes(void **state)
+{
+    (void)state;
+    struct rig *rig = open_with("  - {kind: power_cycle, from_s: 0.3, for_ms: 10}\n"
+                                "  - {kind: power_cycle, from_s: 0.31, for_ms: 20}\n",
+                                NULL, NULL, 0);
+    static const struct {
+        uint64_t tick;
+        int power;
+    } rows[] = {{300, DEVICE_POWER_GOES}, {330, DEVICE_POWER_COMES}};
+    size_t n = 0;
+    while (rig->next < 600) {
+        assert_true(rig_claim(rig));
+        if (rig->work.power == DEVICE_POWER_STAYS) continue;
+        assert_in_range(n, 0, 1);
+        assert_int_equal(rig->work.tick, rows[n].tick);
+        assert_int_equal(rig->work.power, rows[n].power);
+        n++;
+    }
+    assert_int_equal(n, 2);
+    assert_string_equal(rig_tell(rig, "FAULt:INJected?", rig->next), "2");
+    rig_close(rig);
+}
+
 /* Lost ticks and errors of a head without power are said when power is back; the end of the run does not wait for it. */
 static void ends_without_power(void **state)
 {
@@ -277,6 +303,46 @@ static void is_replayed(void **state)
     }
 }
 
+/* HEAD:REBoot: power goes with the next tick and comes with the one after it, in a scan and in the state fault. The
+ * journal has it. */
+static void reboots_by_command(void **state)
+{
+    (void)state;
+    for (int replays = 0; replays < 2; replays++) {
+        const struct device_options options = {.journal = replays ? NULL : journal_path,
+                                               .replay = replays ? journal_path : NULL};
+        struct rig *rig = rig_open(&options, NULL, 0);
+        rig_go_to(rig, 300);
+        assert_int_equal(device_power_ns(rig->device), 0);
+        if (!replays) rig_tell(rig, "HEAD:PRR 100000", 300);
+        if (!replays) rig_tell(rig, "SCAN:START", 300);
+        rig_go_to(rig, 500);
+        assert_true(rig->work.scanning);
+        if (!replays) assert_string_equal(rig_tell(rig, "HEAD:REBOOT", 495), "OK");
+        assert_true(rig_claim(rig));
+        assert_true(rig->work.power == DEVICE_POWER_GOES && rig->work.tick == 500 && !rig->work.scanning);
+        assert_true(rig_claim(rig));
+        assert_true(rig->work.power == DEVICE_POWER_COMES);
+        assert_int_equal(device_power_ns(rig->device), 501 * TICK_NS);
+        assert_int_equal(next_state(rig, "idle"), 501 + BOOT_TICKS);
+        assert_string_equal(rig_tell(rig, "HEAD:PRR?", rig->next), "300000");
+        assert_string_equal(rig_tell(rig, "SYST:CONT?", rig->next), "0");
+        rig_close(rig);
+    }
+    struct rig *rig = open_with("  - {kind: self_test, until_s: 0.3}\n", NULL, NULL, 0);
+    struct command_result result;
+    next_state(rig, "boot");
+    next_state(rig, "fault");
+    device_command(rig->device, 1, "SYST:CONT:TAKE", rig->next, &result);
+    rig_go_to(rig, 250);
+    device_command(rig->device, 2, "HEAD:REBOOT", rig->next, &result);
+    assert_int_equal(result.error, 0);
+    assert_int_equal(next_state(rig, "off"), 250);
+    assert_int_equal(next_state(rig, "boot"), 251);
+    assert_int_equal(next_state(rig, "idle"), 251 + BOOT_TICKS);
+    rig_close(rig);
+}
+
 static void counts_from_near_the_wrap(void **state)
 {
     (void)state;
@@ -316,11 +382,13 @@ int main(void)
         cmocka_unit_test(ends_a_run_that_cannot_scan),
         cmocka_unit_test(loses_power),
         cmocka_unit_test(ends_without_power),
+        cmocka_unit_test(loses_power_as_it_comes),
         cmocka_unit_test(loses_power_at_a_pulse),
         cmocka_unit_test(tells_a_wrong_time),
         cmocka_unit_test(loses_pps_up_to_the_end),
         cmocka_unit_test(drifts_until_it_is_cleared),
         cmocka_unit_test(is_replayed),
+        cmocka_unit_test(reboots_by_command),
         cmocka_unit_test(counts_from_near_the_wrap),
         cmocka_unit_test(needs_a_time_of_day),
     };

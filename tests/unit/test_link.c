@@ -240,6 +240,8 @@ static void test_tcp_sessions(void **state)
     close(c);
     exchange(&bench, 1, b);
     close(a);
+    assert_int_equal(bench_expect(&bench, LINK_SHUT, 3).session, 0);
+    assert_int_equal(bench.ops->write(bench.link, 0, "x", 1), 1);
     assert_int_equal(bench_expect(&bench, LINK_CLOSED, 3).session, 0);
     assert_int_equal(bench.ops->write(bench.link, 0, "x", 1), SH_ECLOSED);
     a = tcp_client(port);
@@ -265,6 +267,13 @@ static void test_tcp_endings(void **state)
     assert_int_equal(shutdown(fd, SHUT_WR), 0);
     bench_read_all(&bench, 0, &byte, 1);
     assert_int_equal(byte, 'q');
+    bench_expect(&bench, LINK_SHUT, 0);
+    assert_int_equal(bench_poll(&bench, 0, 0), 0); /* said once */
+    assert_int_equal(bench.ops->read(bench.link, 0, &byte, 1), 0);
+    assert_int_equal(bench.ops->write(bench.link, 0, "r", 1), 1);
+    assert_int_equal(fd_read(fd, &byte, 1), 1); /* it gets what is due to it */
+    assert_int_equal(byte, 'r');
+    bench.ops->end(bench.link, 0);
     bench_expect(&bench, LINK_CLOSED, 0);
     assert_int_equal(fd_read(fd, &byte, 1), 0);
     close(fd);
@@ -276,10 +285,14 @@ static void test_tcp_endings(void **state)
     fd = tcp_client(tcp_port(&bench));
     bench_poll(&bench, 0, DEADLINE_MS);
     bench_read_all(&bench, 0, &byte, 1);
+    bench_expect(&bench, LINK_SHUT, 0);
     bench_expect(&bench, LINK_CLOSED, 0);
     bench_expect(&bench, LINK_OPENED, 0);
     exchange(&bench, 0, fd);
+    /* closed, which shows by the first byte that is written to it */
     close(fd);
+    bench_expect(&bench, LINK_SHUT, 0);
+    assert_int_equal(bench.ops->write(bench.link, 0, "x", 1), 1);
     bench_expect(&bench, LINK_CLOSED, 0);
     /* reset, while frames are on their way */
     fd = tcp_client(tcp_port(&bench));
@@ -350,6 +363,7 @@ static void test_tcp_kill(void **state)
         bench.n_queue = 0;
         bench_poll(&bench, 0, 1000);
         closed = bench.n_queue > 0 && bench.queue[0].kind == LINK_CLOSED;
+        if (bench.n_queue > 0 && bench.queue[0].kind == LINK_SHUT) bench.ops->write(bench.link, 0, data, 1);
     }
     bench_close(&bench);
 }
@@ -396,8 +410,11 @@ static void test_tcp_small_array(void **state)
         assert_int_equal(bench.ops->poll(bench.link, -1, 0, DEADLINE_MS, &event, 1), 1);
         seen[event.kind]++;
     }
-    for (int i = 0; i < 3; i++)
+    const struct linger reset = {.l_onoff = 1, .l_linger = 0};
+    for (int i = 0; i < 3; i++) {
+        setsockopt(fd[i], SOL_SOCKET, SO_LINGER, &reset, sizeof reset);
         close(fd[i]);
+    }
     for (int i = 0; i < 2; i++) {
         assert_int_equal(bench.ops->poll(bench.link, -1, 0, DEADLINE_MS, &event, 1), 1);
         seen[event.kind]++;

@@ -2,6 +2,7 @@
 #include "tests/unit/link_test.h"
 
 #include <arpa/inet.h>
+#include <net/if.h>
 #include <netinet/in.h>
 #include <poll.h>
 #include <sys/eventfd.h>
@@ -145,7 +146,7 @@ static void where_packets_may_go(void **state)
         {"127.0.0.1", "", 0, "udp:127.0.0.1:0: allowed ports are 1 to 65535"},
         {"127.0.0.1", "", 65536, "allowed ports are 1 to 65535"},
         {"300.1.1.1", "", 2368, "udp:300.1.1.1:2368: no such address"},
-        {"239.1.2.3", "", 2368, "udp:239.1.2.3:2368: multicast"},
+        {"239.1.2.3", "", 2368, "udp:239.1.2.3:2368: multicast; required is interface"},
         {"ff02::1", "", 2368, "multicast"},
         {"255.255.255.255", "", 2368, "a broadcast; required is interface"},
         {"255.255.255.255", "lo", 2368, "interface lo has no broadcast"},
@@ -168,6 +169,130 @@ static void where_packets_may_go(void **state)
     }
 }
 
+/* The next datagram, and the source's address and port, TTL where the socket asks for it. */
+static void expect_from(int fd, const char *address, int port, int ttl)
+{
+    struct sockaddr_in from;
+    char got[16], control[64];
+    struct iovec room = {got, sizeof got};
+    struct msghdr message = {&from, sizeof from, &room, 1, control, sizeof control, 0};
+    struct pollfd wait = {.fd = fd, .events = POLLIN};
+    assert_int_equal(poll(&wait, 1, DEADLINE_MS), 1);
+    assert_true(recvmsg(fd, &message, MSG_DONTWAIT) > 0);
+    assert_string_equal(inet_ntoa(from.sin_addr), address);
+    if (port != 0) assert_int_equal(ntohs(from.sin_port), port);
+    const struct cmsghdr *head = CMSG_FIRSTHDR(&message);
+    int had = 0;
+    if (ttl != 0) assert_non_null(head);
+    if (ttl != 0) memcpy(&had, CMSG_DATA(head), sizeof had);
+    assert_int_equal(had, ttl);
+}
+
+/* Two heads send from a port that their receiver has, too, on one machine: it tells them apart by address, and gets all
+ * that they send. None of it comes back to them, nor what others send. */
+static void sources_share_their_port(void **state)
+{
+    (void)state;
+    static const char *const source[3] = {"", "127.0.0.7", "127.0.0.8"}, *const from[3] = {"127.0.0.2", "127.0.0.7",
+                                                                                           "127.0.0.8"};
+    struct bench bench[3];
+    struct link_spec spec;
+    struct sockaddr_in at = {.sin_family = AF_INET};
+    const int one = 1, first = open_receiver(&spec);
+    close(first);
+    at.sin_port = htons((uint16_t)spec.port);
+    spec.source_port = spec.port;
+    for (int i = 0; i < 3; i++) { /* the heads first, then a receiver at all addresses */
+        snprintf(spec.source, sizeof spec.source, "%s", source[i]);
+        bench[i] = bench_open(&spec);
+        bench_expect(&bench[i], LINK_OPENED, 0);
+    }
+    const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    assert_int_equal(setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one), 0);
+    assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at), 0);
+    for (int i = 0; i < 3; i++) {
+        assert_int_equal(bench[i].ops->write(bench[i].link, 0, "head", 4), 4);
+        expect_from(fd, from[i], spec.port, 0);
+    }
+    const int other = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    at.sin_addr.s_addr = inet_addr("127.0.0.7"); /* where a head has its source */
+    assert_int_equal(sendto(other, "other", 5, 0, (struct sockaddr *)&at, sizeof at), 5);
+    expect_from(fd, "127.0.0.1", 0, 0);
+    for (int i = 0; i < 3; i++) {
+        assert_int_equal(bench_poll(&bench[i], 0, 0), 0);
+        bench_close(&bench[i]);
+    }
+    close(other);
+    close(fd);
+}
+
+/* Another program has the port for itself: said once where the port was not asked for, else the link is refused. Its
+ * receiver's own place is no source. */
+static void a_source_port_that_is_taken(void **state)
+{
+    (void)state;
+    struct link_spec spec, taken;
+    struct sh_err err;
+    void *link;
+    const int fd = open_receiver(&spec), owner = open_receiver(&taken);
+    spec.source_port = taken.port;
+    spec.usual_port = 1;
+    struct bench bench = bench_open(&spec); /* a receiver here, and no source: the port is left to others */
+    bench_expect(&bench, LINK_OPENED, 0);
+    assert_int_equal(bench_poll(&bench, 0, 0), 0);
+    bench_close(&bench);
+    snprintf(spec.source, sizeof spec.source, "127.0.0.1");
+    bench = bench_open(&spec);
+    bench_expect(&bench, LINK_OPENED, 0);
+    bench_expect(&bench, LINK_NOTICE, 0);
+    assert_int_equal(bench.ops->write(bench.link, 0, "a", 1), 1);
+    expect_from(fd, "127.0.0.1", 0, 0);
+    assert_int_equal(bench_poll(&bench, 0, 0), 0);
+    bench_close(&bench);
+    spec.usual_port = 0;
+    assert_int_equal(link_ops_get(LINK_UDP)->open(&spec, &link, &err), SH_EINPUT);
+    assert_non_null(
+        strstr(err.text, "Address already in use; a receiver on this machine with that port must share it"));
+    spec.source_port = spec.port;
+    snprintf(spec.source, sizeof spec.source, "127.0.0.1");
+    assert_int_equal(link_ops_get(LINK_UDP)->open(&spec, &link, &err), SH_EINPUT);
+    snprintf(spec.source, sizeof spec.source, "192.0.2.1"); /* of documents: nobody's */
+    assert_int_equal(link_ops_get(LINK_UDP)->open(&spec, &link, &err), SH_EINPUT);
+    assert_non_null(strstr(err.text, "from 192.0.2.1"));
+    snprintf(spec.source, sizeof spec.source, "localhost");
+    assert_int_equal(link_ops_get(LINK_UDP)->open(&spec, &link, &err), SH_EINPUT);
+    assert_non_null(strstr(err.text, "allowed is a numeric address of this machine"));
+    close(owner);
+    close(fd);
+}
+
+static void multicast_has_an_interface_and_a_ttl(void **state)
+{
+    (void)state;
+    static const int ttl[3][2] = {{0, 1}, {1, 1}, {9, 9}}; /* asked for, and on the wire */
+    struct link_spec spec;
+    struct sockaddr_in at = {.sin_family = AF_INET};
+    const int one = 1;
+    close(open_receiver(&spec));
+    at.sin_port = htons((uint16_t)spec.port);
+    const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    const struct ip_mreqn group = {{inet_addr("239.1.2.3")}, {0}, (int)if_nametoindex("lo")};
+    assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at), 0);
+    assert_int_equal(setsockopt(fd, IPPROTO_IP, IP_ADD_MEMBERSHIP, &group, sizeof group), 0);
+    assert_int_equal(setsockopt(fd, IPPROTO_IP, IP_RECVTTL, &one, sizeof one), 0);
+    snprintf(spec.address, sizeof spec.address, "239.1.2.3");
+    snprintf(spec.interface, sizeof spec.interface, "lo");
+    for (int i = 0; i < 3; i++) {
+        spec.ttl = ttl[i][0];
+        struct bench bench = bench_open(&spec);
+        bench_expect(&bench, LINK_OPENED, 0);
+        assert_int_equal(bench.ops->write(bench.link, 0, "all", 3), 3);
+        expect_from(fd, "127.0.0.1", 0, ttl[i][1]);
+        bench_close(&bench);
+    }
+    close(fd);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -176,6 +301,9 @@ int main(void)
         cmocka_unit_test(a_refusal_costs_no_later_datagram),
         cmocka_unit_test(what_arrives_can_be_read),
         cmocka_unit_test(where_packets_may_go),
+        cmocka_unit_test(sources_share_their_port),
+        cmocka_unit_test(a_source_port_that_is_taken),
+        cmocka_unit_test(multicast_has_an_interface_and_a_ttl),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -61,8 +61,8 @@ static void cola_times_pass_the_wrap(void **state)
         assert_int_equal(lmd.send_us, (end_us - 2000000 + INT64_C(4294967296)) % INT64_C(4294967296));
     }
     char now[64]; /* 2.2 s: 200,000 us, which are 30D40 */
-    snprintf(now, sizeof now, "sRA LIDinputstate 0 30D40 0 0 0 0 0");
-    cola_expect("sRN LIDinputstate", now);
+    snprintf(now, sizeof now, "sRA LIDoutputstate 0 30D40 ");
+    assert_int_equal(strncmp(cola_ask("sRN LIDoutputstate"), now, strlen(now)), 0);
     cola_close();
 }
 
@@ -84,6 +84,10 @@ static void scip_times_pass_the_wrap(void **state)
     scip_ask("RS\nTM0\nTM1\nTM2\n", "RS\n00P\n\nTM0\n00P\n\nTM1\n00P\n00000\n\nTM2\n00P\n\n");
     scip_ask("RB\nRB\n", "RB\n01Q\n\nRB\n00P\n\n");
     rig.ops->time(rig.protocol, INT64_C(1150000000)); /* 1 s later */
+    assert_string_equal(rig.line[rig.n_lines - 1], "HEAD:REBOOT");
+    rig.spec.power_ns = INT64_C(1150000000);
+    open_again(&rig, 75);
+    rig.ops->time(rig.protocol, rig.spec.power_ns);
     scip_ask("TM0\nTM1\n", "TM0\n00P\n\nTM1\n00P\noonea\n\n"); /* 2^24 - 75: 63, 63, 62, 53 */
     scip_close();
 }

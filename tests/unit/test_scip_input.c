@@ -155,7 +155,11 @@ static size_t odd_line(uint32_t *seed, char *line)
                                        "GE0010000301\n",
                                        "HE0000108099;tag\n",
                                        "MS0000108001900\n",
-                                       "GS0000108000\n"};
+                                       "GS0000108000\n",
+                                       "%TM1\n",
+                                       "%ST\n",
+                                       "%MD0000108001003\n",
+                                       "%ME0000108001000;tag\n"};
     strcpy(line, good[dice(seed, sizeof good / sizeof *good)]);
     size_t len = strlen(line);
     for (uint32_t k = dice(seed, 8); k > 5 && len > 1; k--) {
@@ -174,9 +178,9 @@ static size_t odd_line(uint32_t *seed, char *line)
 static void nonsense(void **state)
 {
     (void)state;
-    static const char *const models[] = {"URG-04LX", "UTM-30LX", "UST-20LX", "other"};
+    static const char *const models[] = {"URG-04LX", "UTM-30LX", "UTM-30LX-EW", "UST-20LX", "other"};
     uint32_t seed = 20261122;
-    for (size_t m = 0; m < 4; m++) {
+    for (size_t m = 0; m < sizeof models / sizeof *models; m++) {
         scip_open(models[m]);
         rig.attributes = (int)(m & 1);
         protocol_rig_describe(&rig, 0);

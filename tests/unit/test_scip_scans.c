@@ -180,7 +180,7 @@ static void echoes_and_intensity(void **state)
                 {"GE", "0CB01T001000;", 1}};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         char line[40], tail[60];
-        open_five("UTM-30LX");
+        open_five("UTM-30LX-EW");
         several_echoes();
         rig.attributes = rows[i].attributes;
         protocol_rig_describe(&rig, 0);
@@ -200,7 +200,7 @@ static void echoes_and_intensity(void **state)
 static void marks_anywhere(void **state)
 {
     (void)state;
-    scip_open("UTM-30LX");
+    scip_open("UTM-30LX-EW");
     for (int i = 0; i < 1081; i++)
         shot[i] = (struct protocol_rig_shot){.n = 1 + (uint32_t)(i % 3), .range_m = {1.0 + i * 1e-3, 10.0, 20.0}};
     scip_ask("ND0000108000001\n", "ND0000108000001\n00P\n\n");

@@ -81,11 +81,33 @@ static void other_replies_keep_their_sums(void **state)
     scip_close();
 }
 
+/* Scans with a % are scans, too. 1035 mm are "0@;": the line of data looks as a key line. */
+static void a_scan_in_microseconds(void **state)
+{
+    (void)state;
+    static uint8_t clean[256];
+    scip_open_head("UTM-30LX-EW 2", 1440, 0, 39, 20, -1, 40); /* any other; firmware 1.2.3 */
+    protocol_rig_describe(&rig, 0);
+    scip_flat(1.035);
+    scip_ask("%MD0000000001001\n", "%MD0000000001001\n00P\n\n");
+    scip_turn(0);
+    const char *unit = "%MD0000000001000\n99b\n00000000000@\n0@;[\n\n"; /* 48 + 64 + 59 = 171 = 2 * 64 + 43 */
+    assert_int_equal(rig.len, strlen(unit));
+    assert_memory_equal(rig.bytes, unit, rig.len);
+    memcpy(clean, rig.bytes, rig.len);
+    assert_int_equal(seal_count(rig.ops, clean, rig.len), 4 * 3);
+    rig.bytes[rig.len - 3] = '?';
+    rig.ops->reseal(rig.bytes, rig.len);
+    assert_memory_equal(rig.bytes, clean, rig.len);
+    scip_close();
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(values_of_all_kinds),
         cmocka_unit_test(other_replies_keep_their_sums),
+        cmocka_unit_test(a_scan_in_microseconds),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -214,6 +214,9 @@ static void test_documents(void **state)
     http_rig.fix.lon_deg = 11.999999;
     http_get("/cgi/status.json");
     assert_non_null(strstr(http_body(), "{\"pps_state\":\"Locked\",\"position\":\"48 06.00S 12 00.00E\"}"));
+    http_rig.pps = PROTOCOL_PPS_ERROR;
+    http_get("/cgi/status.json");
+    assert_non_null(strstr(http_body(), "{\"pps_state\":\"Error\","));
     http_get("/cgi/settings.json");
     assert_string_equal(http_body(),
                         "{\"laser\":\"On\",\"returns\":\"Strongest\",\"rpm\":600,\"fov\":{\"start\":0,\"end\":359},"

@@ -106,6 +106,23 @@ static void test_fields(void **state)
     assert_string_equal(text + sizeof rmc - 1, end);
 }
 
+/* The states of the pulses, and the time: UTC once it was set, before it the time since power-up. */
+static void test_pulses_per_second(void **state)
+{
+    (void)state;
+    rig.utc0_ns = INT64_C(1767323040000000000);
+    for (int k = 0; k < 4; k++) {
+        rig.pps = (enum protocol_pps)k;
+        rig.pps_unset = k == 0;
+        open_again(0);
+        rig.ops->time(rig.protocol, 1);
+        const uint8_t *p = packet(rig.n_units - 1);
+        assert_int_equal(p[0xca], k);
+        const uint32_t us = p[0xc6] | (uint32_t)p[0xc7] << 8 | (uint32_t)p[0xc8] << 16 | (uint32_t)p[0xc9] << 24;
+        assert_int_equal(us, k == 0 ? 0 : 4 * 60000000);
+    }
+}
+
 /* One for 14 data packets of a single return: 18.579456 ms, from device time 0 on, whenever the session was
  * opened. */
 static void test_rate(void **state)
@@ -198,13 +215,9 @@ static void test_after_a_long_silence(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        TEST(test_fields),
-        TEST(test_rate),
-        TEST(test_without_utc),
-        TEST(test_without_fix),
-        TEST(test_fix_of_the_packet),
-        TEST(test_longest_sentence),
-        TEST(test_after_a_long_silence),
+        TEST(test_fields),           TEST(test_pulses_per_second),    TEST(test_rate),
+        TEST(test_without_utc),      TEST(test_without_fix),          TEST(test_fix_of_the_packet),
+        TEST(test_longest_sentence), TEST(test_after_a_long_silence),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,7 +3,7 @@
 #include "tests/wire/house.h"
 #include "tests/wire/wire.h"
 
-enum { CLIENTS = 3, SCANS = 15, BEAMS = 1081, PERIOD_US = 40000, ROOM = 1 << 16 };
+enum { CLIENTS = 3, SCANS = 15, BEAMS = 541, PERIOD_US = 20000, ROOM = 1 << 16 };
 
 struct client {
     int fd, is_b;

@@ -291,6 +291,7 @@ static void test_faults_by_command(void **state)
     struct scanhead_stats stats;
     uint64_t first_ns, last_ns;
     starts_with(sh, "FAULt:ADD {kind: mirror_stop, every: 10}", "ERR ", "");
+    starts_with(sh, "HEAD:REBOOT", "ERR -221", "a recording is replayed");
     starts_with(sh, "FAULt:ADD {kind: power_cycle, for_ms: 200, from_s: 1}", "ERR ", "a recording has none");
     starts_with(sh, "FAULt:ADD {kind: none_such}", "ERR ", "");
     assert_string_equal(client_ask(sh, "FAULt:LIST?"), "none");

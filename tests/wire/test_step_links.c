@@ -5,7 +5,7 @@
  * Clock here: device time, ns. */
 #include "tests/wire/room.h"
 
-enum { STEPS = 500, MAX_CLIENTS = 6, ROOM = 1 << 20 };
+enum { STEPS = 1000, MAX_CLIENTS = 6, ROOM = 1 << 20 };
 static const int64_t TICK_NS = 1000000, MS = 1000000, US = 1000;
 
 struct client {
@@ -37,7 +37,7 @@ static size_t cola_unit(const uint8_t *bytes, size_t len, int64_t *due_ns)
 }
 
 /* SCIP: a reply ends with an empty line. The stamp of a scan, whole ms rounded down, is the time of step 0; an LMS111's
- * last step, 1080 of 1440, comes 3/4 of 40 ms later. */
+ * last step, 540 of 720, comes 3/4 of 20 ms later. */
 static size_t scip_unit(const uint8_t *bytes, size_t len, int64_t *due_ns)
 {
     const uint8_t *end = memmem(bytes, len, "\n\n", 2), *status = memchr(bytes, '\n', len);
@@ -46,7 +46,7 @@ static size_t scip_unit(const uint8_t *bytes, size_t len, int64_t *due_ns)
         int64_t stamp_ms = 0;
         for (int i = 0; i < 4; i++)
             stamp_ms = stamp_ms << 6 | (status[5 + i] - 0x30);
-        *due_ns = (stamp_ms + 1 + 30) * MS;
+        *due_ns = (stamp_ms + 1 + 15) * MS;
     }
     return (size_t)(end - bytes) + 2;
 }
@@ -199,8 +199,8 @@ static void check(struct bench *bench)
         struct client *c = &bench->client[i];
         print_message("%s: %" PRIu64 " units, %" PRIu64 " late\n", c->name, c->units, c->late);
         late |= c->late != 0;
-        /* 500 steps are 5 s: 50 turns at 10 Hz or 125 at 25 Hz, 100 fixes, thousands of packets. */
-        assert_true(c->units > 40);
+        /* 1,000 steps are 10 s: 100 turns at 10 Hz or 500 at 50 Hz, 200 fixes, thousands of packets. */
+        assert_true(c->units > 80);
     }
     assert_false(late);
 }
@@ -228,7 +228,7 @@ static void test_planar(void **state)
     bench.client[3] = (struct client){.name = "NMEA", .fd = raw_connect(head_link(&head, 3)), .unit = nmea_unit};
     bench.n = 4;
     bench.client[1].request = "\2sEN LMDscandata 1\3";
-    bench.client[2].request = "MD0000108000000\n";
+    bench.client[2].request = "MD0000054000000\n";
     run_steps(&bench, stepper);
     close_all(&bench);
     scanhead_close(stepper);

@@ -352,14 +352,22 @@ void client_wait_state(struct scanhead *sh, const char *state)
     }
 }
 
-int raw_connect(const char *endpoint)
+int raw_try_connect(const char *endpoint)
 {
     const char *port = strrchr(endpoint, ':');
     struct sockaddr_in at = {.sin_family = AF_INET, .sin_port = htons((uint16_t)atoi(port + 1))};
     at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
     assert_true(fd >= 0);
-    if (connect(fd, (struct sockaddr *)&at, sizeof at) != 0) fail_msg("connect %s: %s", endpoint, strerror(errno));
+    if (connect(fd, (struct sockaddr *)&at, sizeof at) == 0) return fd;
+    close(fd);
+    return -1;
+}
+
+int raw_connect(const char *endpoint)
+{
+    const int fd = raw_try_connect(endpoint);
+    if (fd < 0) fail_msg("connect %s: %s", endpoint, strerror(errno));
     return fd;
 }
 

@@ -147,6 +147,8 @@ void client_wait_state(struct scanhead *sh, const char *state);
 
 /* A plain socket to the "tcp:127.0.0.1:PORT" of the head. */
 int raw_connect(const char *endpoint);
+/* The same; -1: nobody listens there now. */
+int raw_try_connect(const char *endpoint);
 
 void raw_write(int fd, const void *data, size_t len);
 

@@ -33,8 +33,8 @@ struct datagram {
 struct soak_datagrams {
     int fd, clean_fd;
     struct soak_clean_frame ring[SOAK_RING];
-    soak_seq top;                    /* of the clean ones */
-    struct datagram wait[WAITING];   /* in order; from `first` on */
+    soak_seq top;                  /* of the clean ones */
+    struct datagram wait[WAITING]; /* in order; from `first` on */
     uint32_t first, n;
 };
 
@@ -77,7 +77,8 @@ struct soak_datagrams *soak_datagrams_open(const struct link_spec *spec, struct 
     *twin = *spec;
     twin->clean = 1;
     snprintf(twin->address, sizeof twin->address, "127.0.0.1");
-    twin->interface[0] = '\0';
+    twin->interface[0] = twin->source[0] = '\0';
+    twin->source_port = twin->ttl = 0;
     if (bind_to(spec->address[0] != '\0' ? spec->address : "127.0.0.1", spec->port, &d->fd) == 0 &&
         bind_to("127.0.0.1", 0, &d->clean_fd) == 0 && (twin->port = port_of(d->clean_fd)) != 0)
         return d;

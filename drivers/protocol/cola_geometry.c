@@ -1,0 +1,179 @@
+/* LMPscancfg and mLMPsetscancfg: line rate and step. They are the head's, so all its readers see another one. */
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "drivers/protocol/cola.h"
+
+/* of mLMPsetscancfg */
+enum { OK, FREQUENCY_ERROR, RESOLUTION_ERROR, RESOLUTION_AND_AREA_ERROR, AREA_ERROR, OTHER_ERROR };
+enum { REPLY_LEN = 512 };
+
+/* ---- the head as it is set */
+
+const struct planar_head *cola_head(const struct cola *self)
+{
+    return self->identity->n_geometries != 0 ? &self->head : &self->scan.head;
+}
+
+/* The same beams with other steps: one geometry divides the other evenly. */
+static void take_geometry(struct planar_head *h, int64_t lines_uhz, uint32_t steps)
+{
+    const int64_t had = h->steps;
+    h->first = (int32_t)(h->first * (int64_t)steps / had);
+    h->last = (int32_t)(h->last * (int64_t)steps / had);
+    h->front = (int32_t)(h->front * (int64_t)steps / had);
+    h->steps = steps;
+    h->n = (uint32_t)(h->last - h->first + 1);
+    h->lines_uhz = (uint64_t)lines_uhz;
+    h->prr_uhz = (uint64_t)lines_uhz * steps;
+    h->known = h->n <= PLANAR_MAX_STEPS;
+}
+
+static double ask(struct cola *self, const char *query)
+{
+    char reply[REPLY_LEN] = "";
+    return self->host.command(self->host.ctx, query, reply, sizeof reply) == 0 ? strtod(reply, NULL) : 0.0;
+}
+
+/* A head that scans says it in its stream. One that rests says nothing there when it is set. */
+void cola_look_at_head(struct cola *self)
+{
+    if (self->identity->n_geometries == 0) return;
+    self->head = self->scan.head;
+    if (!self->head.known || cola_ask_state(self) == COLA_HEAD_SCANNING) return;
+    const double lines_hz = ask(self, "HEAD:LINes?"), step_deg = ask(self, "SCAN:STEP?");
+    if (lines_hz > 0.0 && step_deg > 0.0)
+        take_geometry(&self->head, (int64_t)(lines_hz * 1e6 + 0.5), (uint32_t)(360.0 / step_deg + 0.5));
+}
+
+/* ---- LMPscancfg: u32 1/100 Hz, i16 sectors, u32 step, i32 start, i32 stop */
+
+static void put_scan_cfg(const struct planar_head *head, struct cola_out *out)
+{
+    cola_put_u(out, 4, cola_scan_chz(head));
+    cola_put_i(out, 2, 1);
+    cola_put_u(out, 4, cola_step_angle(head));
+    cola_put_i(out, 4, cola_beam_angle(head, 0));
+    cola_put_i(out, 4, cola_beam_angle(head, head->n - 1));
+}
+
+enum cola_error cola_read_scan_cfg(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    if (!cola_head(self)->known) return COLA_CONDITION;
+    put_scan_cfg(cola_head(self), out);
+    return cola_args_end(args);
+}
+
+/* ---- mLMPsetscancfg: as LMPscancfg; u8 status before it in the answer */
+
+struct scan_cfg {
+    uint32_t scan_chz, step;
+    int32_t sectors, start_e4, stop_e4;
+};
+
+/* Both ends are the nearest beams, as of LMPoutputRange. */
+static int area_fits(const struct planar_head *head, const struct scan_cfg *asked)
+{
+    return cola_beam_at(head, asked->start_e4) == 0 && cola_beam_at(head, asked->stop_e4) == head->n - 1;
+}
+
+/* Finds the geometry that is asked for. Returns the status. */
+static uint32_t find(const struct cola *self, const struct scan_cfg *asked, struct planar_head *found)
+{
+    const struct planar_head *head = cola_head(self);
+    const struct protocol_identity *id = self->identity;
+    int rate_fits = 0, fits = 0;
+    for (uint32_t i = 0; i == 0 || i < id->n_geometries; i++) {
+        struct planar_head h = *head;
+        if (id->n_geometries != 0) take_geometry(&h, id->geometry[i].lines_uhz, id->geometry[i].steps);
+        if (!h.known || cola_scan_chz(&h) != asked->scan_chz) continue;
+        rate_fits = 1;
+        if (cola_step_angle(&h) != asked->step) continue;
+        fits = 1;
+        *found = h;
+    }
+    if (!rate_fits) return FREQUENCY_ERROR;
+    if (!fits) return area_fits(head, asked) ? RESOLUTION_ERROR : RESOLUTION_AND_AREA_ERROR;
+    if (!area_fits(found, asked)) return AREA_ERROR;
+    return asked->sectors == 1 ? OK : OTHER_ERROR;
+}
+
+static int set_lines(struct cola *self)
+{
+    char line[48], reply[REPLY_LEN];
+    snprintf(line, sizeof line, "HEAD:LINes %.6f", (double)self->next.lines_uhz / 1e6);
+    return self->host.command(self->host.ctx, line, reply, sizeof reply);
+}
+
+/* Which one comes first depends on the geometry before: each must be one that the head has. */
+static enum cola_error set_head(struct cola *self)
+{
+    char line[48], reply[REPLY_LEN];
+    const int lines = set_lines(self);
+    snprintf(line, sizeof line, "SCAN:STEP %.9f", 360.0 / self->next.steps);
+    if (self->host.command(self->host.ctx, line, reply, sizeof reply) != 0) return COLA_CONDITION;
+    if (lines != 0 && set_lines(self) != 0) return COLA_CONDITION;
+    cola_look_at_head(self);
+    return COLA_OK;
+}
+
+static int is_turning(struct cola *self)
+{
+    const enum cola_head_state state = cola_ask_state(self);
+    return state == COLA_HEAD_SPIN_UP || state == COLA_HEAD_SCANNING;
+}
+
+/* A scanner that nobody has told to measure, and one that was stopped, takes another geometry. */
+static int is_measuring(const struct cola *self)
+{
+    return self->measures && (self->started || self->streams);
+}
+
+enum cola_error cola_set_scan_cfg(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    struct planar_head wanted = *cola_head(self);
+    char reply[REPLY_LEN];
+    struct scan_cfg asked;
+    asked.scan_chz = cola_arg_u(args, 4);
+    asked.sectors = cola_arg_i(args, 2);
+    asked.step = cola_arg_u(args, 4);
+    asked.start_e4 = cola_arg_i(args, 4);
+    asked.stop_e4 = cola_arg_i(args, 4);
+    enum cola_error error = cola_args_end(args);
+    if (error != COLA_OK) return error;
+    if (!cola_head(self)->known || self->next.is_due) return COLA_CONDITION;
+    uint32_t status = find(self, &asked, &wanted);
+    const int other =
+        status == OK && (wanted.steps != cola_head(self)->steps || wanted.lines_uhz != cola_head(self)->lines_uhz);
+    if (other && is_measuring(self)) status = OTHER_ERROR;
+    if (other && status == OK) {
+        self->next.lines_uhz = (int64_t)wanted.lines_uhz;
+        self->next.steps = wanted.steps;
+        self->next.form = out->form;
+        if (is_turning(self)) {
+            if (self->host.command(self->host.ctx, "SCAN:STOP", reply, sizeof reply) != 0) return COLA_CONDITION;
+            self->next.is_due = 1;
+            return COLA_LATER;
+        }
+        error = set_head(self);
+    }
+    cola_put_u(out, 1, status);
+    put_scan_cfg(cola_head(self), out);
+    return error;
+}
+
+void cola_geometry_time(struct cola *self)
+{
+    struct cola_out out = {.buf = self->unit, .cap = sizeof self->unit};
+    if (!self->next.is_due || is_turning(self)) return;
+    self->next.is_due = 0;
+    const enum cola_error error = set_head(self);
+    if (error != COLA_OK) {
+        cola_refuse(self, self->next.form, error);
+        return;
+    }
+    cola_begin(&out, self->next.form, "sAN mLMPsetscancfg");
+    cola_put_u(&out, 1, OK);
+    put_scan_cfg(cola_head(self), &out);
+    self->host.send(self->host.ctx, self->unit, cola_end(&out));
+}
