@@ -75,6 +75,7 @@ static const char *begin(struct scip *s, struct scip_request *q, const char *lin
     q->multi_echo = line[0] == 'H' || line[0] == 'N';
     const char *refused = read_request(q, line, streams, s->scan.head.last);
     if (refused != NULL) return refused;
+    if (s->features & SCIP_FIRST_AT_ONCE) q->skipped = q->skip;
     if (s->time_mode) return "10";
     if (s->simulation.broken) return "50";
     if (!streams && !s->laser) return "10";

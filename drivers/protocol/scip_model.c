@@ -49,7 +49,7 @@ static const struct scip_model models[] = {
      .product = "SOKUIKI Sensor TOP-URG UTM-30LX",
      .model = "UTM-30LX(" HOKUYO ")",
      .protocol = "SCIP 2.0",
-     .features = LX | SCIP_BIT_RATE | SCIP_SIMULATION | SCIP_TIME_HEX,
+     .features = LX | SCIP_BIT_RATE | SCIP_SIMULATION | SCIP_TIME_HEX | SCIP_FIRST_AT_ONCE,
      .bit_rate = 115200,
      .link = "USB Full Speed",
      SPEED_IN_WORDS,

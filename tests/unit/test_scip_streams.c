@@ -8,7 +8,7 @@ static struct scip_decoded got;
 static void check_turns(const char *command, const char *want)
 {
     char line[40], times[80] = "";
-    scip_open("UTM-30LX");
+    scip_open("UTM-30LX-EW");
     snprintf(line, sizeof line, "%s\n", command);
     protocol_rig_input(&rig, line);
     protocol_rig_clear(&rig);
@@ -63,7 +63,7 @@ static void asked_while_it_stops(void **state)
 static void skipped_and_broken(void **state)
 {
     (void)state;
-    scip_open("UTM-30LX");
+    scip_open("UTM-30LX-EW");
     scip_ask("MD0000108000100\n", "MD0000108000100\n00P\n\n");
     scip_part(0, 0, 500);
     scip_line_end(0, 0);
@@ -72,13 +72,31 @@ static void skipped_and_broken(void **state)
     scip_decode_only(&got, 3, 0);
     assert_int_equal(got.time_ms, 25);
     scip_close();
-    scip_open("UTM-30LX"); /* one that is broken is one of three, and no more */
+    scip_open("UTM-30LX-EW"); /* one that is broken is one of three, and no more */
     scip_ask("MD0000108000300\n", "MD0000108000300\n00P\n\n");
     scip_part(0, 0, 500);
     scip_line_end(0, 0);
     scip_line_time(0);
     for (uint32_t line = 1; line < 4; line++)
         scip_turn(line);
+    scip_decode_only(&got, 3, 0);
+    assert_int_equal(got.time_ms, 75);
+    scip_close();
+}
+
+/* A recording of a UTM-30LX has the first scan 27 ms after the answer to ME0000108001101 (SCIP.md, D). */
+static void the_first_comes_at_once(void **state)
+{
+    (void)state;
+    scip_open("UTM-30LX");
+    scip_ask("MD0000108000202\n", "MD0000108000202\n00P\n\n");
+    scip_turn(0);
+    scip_decode_only(&got, 3, 0);
+    assert_int_equal(got.time_ms, 0);
+    scip_turn(1);
+    scip_turn(2);
+    scip_expect("");
+    scip_turn(3);
     scip_decode_only(&got, 3, 0);
     assert_int_equal(got.time_ms, 75);
     scip_close();
@@ -413,6 +431,7 @@ int main(void)
         cmocka_unit_test(speed_changes_within_a_turn),
         cmocka_unit_test(asked_while_it_stops),
         cmocka_unit_test(skipped_and_broken),
+        cmocka_unit_test(the_first_comes_at_once),
         cmocka_unit_test(played_malfunctions),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
