@@ -73,10 +73,12 @@ int grabber_wait(struct grabber *grabber, int wanted)
     return 1;
 }
 
+enum { TRIES = 15 };
+
 void grabber_start_and_wait(struct wire *wire, const char *name, const char *sensor, int wanted,
                             struct grabber *grabber)
 {
-    for (int i = 1; i <= 5; i++) {
+    for (int i = 1; i <= TRIES; i++) {
         char numbered[16];
         snprintf(numbered, sizeof numbered, "%s%d", name, i);
         grabber_start(wire, numbered, sensor, grabber);
@@ -85,7 +87,7 @@ void grabber_start_and_wait(struct wire *wire, const char *name, const char *sen
         fflush(stdout);
         grabber_end(grabber);
     }
-    fail_msg("rawlog-grabber complains five times");
+    fail_msg("rawlog-grabber complains %d times", TRIES);
 }
 
 void grabber_end(struct grabber *grabber)

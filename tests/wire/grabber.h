@@ -25,7 +25,7 @@ void grabber_start(struct wire *wire, const char *name, const char *sensor, stru
 int grabber_wait(struct grabber *grabber, int n_saved);
 
 /* Both; starts it anew where it complains. This client waits 100 ms for the reply to a command and then does without
- * it, which a busy machine may not give it; so its user has five tries. */
+ * it. Beside eight busy processes it has them in one of three tries or so; so its user has fifteen. */
 void grabber_start_and_wait(struct wire *wire, const char *name, const char *sensor, int n_saved,
                             struct grabber *grabber);
 
