@@ -133,6 +133,7 @@ static void tcp_welcome(struct tcp_link *tcp, struct link_events *events)
             give_up_one(tcp);
             return;
         }
+        if (slot == tcp->n_sessions && tcp->brief) return; /* all have said something, and are answered at once */
         if (!socket_accept(tcp->listener, &tcp->reserve_fd, &fd, &from, &len))
             return; /* none left, or one that gave up before we came */
         socket_address_text((struct sockaddr *)&from, len, peer, sizeof peer);

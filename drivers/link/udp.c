@@ -179,6 +179,25 @@ static int is_own_machine(const struct sockaddr_storage *to, const struct sockad
            (b.ss_family == AF_INET && ntohl(ipv4_of((struct sockaddr *)&b)) >> 24 == IN_LOOPBACKNET);
 }
 
+/* Whether one machine can have the address: no group, no broadcast, not all addresses. */
+static int is_of_one(const struct sockaddr_storage *at)
+{
+    struct ifaddrs *list;
+    if (is_multicast((const struct sockaddr *)at)) return 0;
+    if (at->ss_family != AF_INET)
+        return !IN6_IS_ADDR_UNSPECIFIED(&((const struct sockaddr_in6 *)(const void *)at)->sin6_addr);
+    const in_addr_t own = ipv4_of((const struct sockaddr *)at);
+    int ok = own != INADDR_ANY && own != INADDR_BROADCAST;
+    if (!ok || getifaddrs(&list) != 0) return ok;
+    for (const struct ifaddrs *i = list; i != NULL; i = i->ifa_next) {
+        if (i->ifa_addr == NULL || i->ifa_netmask == NULL || i->ifa_addr->sa_family != AF_INET) continue;
+        const in_addr_t mask = ipv4_of(i->ifa_netmask), is_here = ((own ^ ipv4_of(i->ifa_addr)) & mask) == 0;
+        if (is_here && mask != INADDR_BROADCAST && (own | mask) == INADDR_BROADCAST) ok = 0;
+    }
+    freeifaddrs(list);
+    return ok;
+}
+
 /* Where packets come from, its port included. 0: from where the system says; 1: from there; -1: errno. */
 static int find_source(const struct link_spec *spec, const struct sockaddr_storage *to, socklen_t len,
                        const struct network *net, struct sockaddr_storage *from)
@@ -188,10 +207,11 @@ static int find_source(const struct link_spec *spec, const struct sockaddr_stora
     if (spec->source[0] != '\0') {
         struct sockaddr_in *v4 = (struct sockaddr_in *)(void *)from;
         struct sockaddr_in6 *v6 = (struct sockaddr_in6 *)(void *)from;
-        errno = EAFNOSUPPORT;
+        errno = EADDRNOTAVAIL;
         if (to->ss_family == AF_INET ? inet_pton(AF_INET, spec->source, &v4->sin_addr) != 1
                                      : inet_pton(AF_INET6, spec->source, &v6->sin6_addr) != 1)
             return -1;
+        if (!is_of_one(from)) return -1;
     } else if (net->found && spec->interface[0] != '\0') {
         memcpy(from, &net->own, net->own_len);
     } else if (spec->source_port == 0) {
@@ -267,14 +287,12 @@ static int udp_open(const struct link_spec *spec, void **link, struct sh_err *er
         const int why = errno;
         char from[96];
         source_text(spec, from, sizeof from);
-        rc = sh_fail(err, why == EAFNOSUPPORT ? SH_EINPUT : socket_error_code(why), "link udp:%s:%d%s: %s%s",
-                     host_of(spec), spec->port, from, strerror(why),
-                     why == EADDRNOTAVAIL || why == EAFNOSUPPORT
-                         ? "; allowed is a numeric address of this machine, of the receiver's family"
-                     : why == EADDRINUSE
-                         ? "; a receiver on this machine with that port must share it (SO_REUSEADDR), and "
-                           "have another address than the source"
-                         : "");
+        rc = sh_fail(
+            err, socket_error_code(why), "link udp:%s:%d%s: %s%s", host_of(spec), spec->port, from, strerror(why),
+            why == EADDRNOTAVAIL ? "; allowed is a numeric address of this machine, of the receiver's family"
+            : why == EADDRINUSE  ? "; a receiver on this machine with that port must share it (SO_REUSEADDR), and "
+                                   "have another address than the source"
+                                 : "");
         if (udp->fd >= 0) close(udp->fd);
         free(udp);
         return rc;

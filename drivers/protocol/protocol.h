@@ -152,6 +152,8 @@ struct protocol_ops {
     /* Whether units may still come for a client that sends nothing more: a stream that it asked for, or an answer that
      * takes time. 0: its session ends. May be NULL: they come without being asked for. */
     int (*owes)(const void *protocol);
+    /* The client has gone. It may still have asked for something that comes later, as a reboot. May be NULL. */
+    void (*gone)(void *protocol);
     /* Device time that must have passed before time() has something to do, unless frames or bytes come. May be NULL:
      * each tick. It saves wake-ups, no more: time() is called for the other ticks, too. */
     int64_t (*next_ns)(const void *protocol);

@@ -138,6 +138,13 @@ static int owes(const void *protocol)
     return s->stream.active || s->single.active || s->reboot_ns != INT64_MIN;
 }
 
+/* Who reboots a scanner closes before it does. */
+static void gone(void *protocol)
+{
+    struct scip *s = protocol;
+    if (s->reboot_ns != INT64_MIN) reboot(s);
+}
+
 /* Scans are looked for at each tick; without a request it is enough to keep up with the stream. */
 static int64_t next_ns(const void *protocol)
 {
@@ -163,5 +170,6 @@ const struct protocol_ops protocol_scip = {
     .time = time_is,
     .input = input,
     .owes = owes,
+    .gone = gone,
     .next_ns = next_ns,
 };

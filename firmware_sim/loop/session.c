@@ -83,6 +83,7 @@ static void leave(struct pump *pump, struct session *s)
 void session_close(struct pump *pump, struct session *s)
 {
     if (!s->open) return;
+    if (pump->protocol->gone != NULL) pump->protocol->gone(s->protocol);
     session_cut(pump, s);
     leave(pump, s);
 }

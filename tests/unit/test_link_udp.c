@@ -259,9 +259,13 @@ static void a_source_port_that_is_taken(void **state)
     snprintf(spec.source, sizeof spec.source, "192.0.2.1"); /* of documents: nobody's */
     assert_int_equal(link_ops_get(LINK_UDP)->open(&spec, &link, &err), SH_EINPUT);
     assert_non_null(strstr(err.text, "from 192.0.2.1"));
-    snprintf(spec.source, sizeof spec.source, "localhost");
-    assert_int_equal(link_ops_get(LINK_UDP)->open(&spec, &link, &err), SH_EINPUT);
-    assert_non_null(strstr(err.text, "allowed is a numeric address of this machine"));
+    static const char *const nobodys[] = {"localhost", "300.1.1.1",       "224.0.0.1",
+                                          "0.0.0.0",   "255.255.255.255", "127.255.255.255"};
+    for (size_t i = 0; i < sizeof nobodys / sizeof nobodys[0]; i++) {
+        snprintf(spec.source, sizeof spec.source, "%s", nobodys[i]);
+        assert_int_equal(link_ops_get(LINK_UDP)->open(&spec, &link, &err), SH_EINPUT);
+        assert_non_null(strstr(err.text, "allowed is a numeric address of this machine"));
+    }
     close(owner);
     close(fd);
 }

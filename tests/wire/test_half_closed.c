@@ -1,5 +1,5 @@
 /* Clients of tcp that shut down their sending side, as `nc -N` does: each gets what is due to it, and then its session
- * ends. Clients that never read what they get, or what the head throws away, hold up nobody. */
+ * ends. Clients that never read what they get, or what the head throws away, hold up nobody. Of many that ask at once each is answered. */
 #include <errno.h>
 
 #include "drivers/protocol/native.h"
@@ -157,12 +157,46 @@ static void nobody_waits_for_who_does_not_read(void **state)
     close(flood);
 }
 
+/* The page of settings has four places. Eight clients at a time that ask at once are all answered, whoever comes fifth. */
+static void a_crowd_that_asks(void **state)
+{
+    enum { CLIENTS = 8, ROUNDS = 20 };
+    static const char ask[] = "GET /cgi/status.json HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n";
+    struct wire *wire = *state;
+    const struct room_config config = {.profile = "velodyne-vlp16",
+                                       .prr_hz = 289351.851852,
+                                       .lines_hz = 10,
+                                       .links = "links: [{type: tcp, protocol: velodyne-http, port: 0}]\n"};
+    room_write(wire);
+    struct head head = head_start(wire, room_config_write(wire, &config), NULL);
+    for (int round = 0; round < ROUNDS; round++) {
+        int fd[CLIENTS];
+        for (int i = 0; i < CLIENTS; i++) {
+            fd[i] = raw_connect(head_link(&head, 0));
+            raw_write(fd[i], ask, sizeof ask - 1);
+        }
+        for (int i = 0; i < CLIENTS; i++) {
+            char got[4096] = "";
+            size_t n = 0;
+            for (ssize_t more = 1; more > 0 && strstr(got, "\r\n\r\n") == NULL; n += (size_t)more) {
+                more = read_some(fd[i], got + n, sizeof got - 1 - n);
+                got[n + (size_t)more] = '\0';
+            }
+            assert_memory_equal(got, "HTTP/1.1 200", 12);
+        }
+        for (int i = 0; i < CLIENTS; i++)
+            close(fd[i]);
+    }
+    head_end(&head, SIGTERM);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(a_question_and_no_more, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(a_scan_and_no_more, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(two_scans_of_scip, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(a_crowd_that_asks, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(nobody_waits_for_who_does_not_read, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

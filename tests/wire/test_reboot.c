@@ -140,6 +140,27 @@ static void reboots(void **state)
     head_end(&head, SIGTERM);
 }
 
+/* urg_library's urg_reboot() closes once it has the second answer. */
+static void reboots_though_its_client_has_gone(void **state)
+{
+    struct wire *wire = *state;
+    static struct client c;
+    char reply[64];
+    int hung_up = 0;
+    struct head head = start(wire, "hokuyo-ust-10lx", LINKS, "", "step");
+    struct scanhead *sh = client_open(head_endpoint(&head, "pty"));
+    connect_to(&c, &head);
+    step(sh, 1000);
+    assert_string_equal(ask(&c, "RB\n"), "RB\n01Q\n\n");
+    assert_string_equal(ask(&c, "RB\n"), "RB\n00P\n\n");
+    close(c.fd);
+    for (int n = 0; n < 50 && !hung_up; n++)
+        hung_up = scanhead_command(sh, "TIME:STEP 100 MS", reply, sizeof reply, DEADLINE_MS) != SCANHEAD_OK;
+    assert_true(hung_up);
+    scanhead_close(sh);
+    head_end(&head, SIGTERM);
+}
+
 /* The first boot ends within the fault's window, the second one after it. */
 static void fails_its_self_test(void **state)
 {
@@ -190,6 +211,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(reboots, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(reboots_though_its_client_has_gone, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(fails_its_self_test, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(usb_goes_and_comes, wire_setup, wire_teardown),
     };
