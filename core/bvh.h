@@ -1,14 +1,14 @@
-/* The BVH: what rays meet first in a scene, exactly.
+/* The BVH: what rays meet first in a scene, exactly, wherever they begin.
  *
  * In: a scene (vertices in double, prcs, metres), rays as points and unit directions in prcs. Out: for each
  * ray the range (m) to what it meets first, the triangle, and its label.
  *
- * Embree proposes a triangle from float rays, in packets of the machine's native width. The range comes from
- * the triangle's plane in double, kept beside the BVH. Where a ray passes so near to a triangle's border that
- * float can't be trusted, the triangle is chosen again in double. How that is proven: core/bvh/bvh_inside.h.
+ * Embree finds leaves for float rays, in packets of the machine's native width. The leaves decide in double which ray
+ * meets which triangle, and where that is not enough without any rounding. Ranges are those of the triangles' planes in
+ * double. How that is proven: core/bvh/bvh_inside.h.
  *
- * The BVH is built in a local frame, prcs minus origin_m, where float is safe. It is constant after it is
- * made, and may be used from any thread; each thread has working memory of its own. */
+ * A BVH depends on the scene alone. It is constant after it is made, and may be used from any thread; each thread has
+ * working memory of its own. */
 #ifndef CORE_BVH_H
 #define CORE_BVH_H
 
@@ -26,26 +26,20 @@ struct bvh_info {
     uint64_t bytes; /* BVH and planes */
 };
 
-/* The scene must outlive the BVH. Rays may begin up to station_reach_m from origin_m; the smaller it is, the
- * less has to be decided again. Built with `threads` threads (0: all). SH_ESTOPPED where report asks to stop,
+/* The scene must outlive the BVH. Built with `threads` threads (0: all). SH_ESTOPPED where report asks to stop,
  * SH_ENOMEM where Embree or this module gets no memory. */
-int bvh_create(const struct scene *scene, const double origin_m[3], double station_reach_m, unsigned threads,
-               const struct sh_report *report, struct bvh **out, struct sh_err *err);
+int bvh_create(const struct scene *scene, unsigned threads, const struct sh_report *report, struct bvh **out,
+               struct sh_err *err);
 void bvh_free(struct bvh *bvh);
 
-/* Orders surfaces in double where they overlap, cross, or lie one after the other within float's resolution.
- * Their labels then no longer depend on how rays are packed, and the range is that of the nearer one. Once,
- * before casting. Costs time here (about 6 us per triangle), and in casting about 20 to 50 ns for each
- * triangle that lies so near to the one that is hit: nothing in a plain scene, much in a building model whose
- * walls overlap. Without it the error of such a hit is at most the distance between the surfaces. */
-int bvh_order_exactly(struct bvh *bvh, const struct sh_report *report, struct sh_err *err);
-/* Rays per Embree call: 1, 4, 8 or 16; for measuring and tests. Another width than the native one may find
- * another triangle where a ray passes through an edge; ranges agree. */
+/* Rays per Embree call: 1, 4, 8 or 16; for measuring and tests. 1 where this machine has no such packets. The hits are
+ * the same. */
 void bvh_set_packet(struct bvh *bvh, uint32_t rays);
-/* What proposes the hits on this machine, in words: Embree's version, rays a packet, instructions. Where two machines
+/* This machine's engine, in words: Embree's version, rays a packet, instructions. Where two machines
  * say the same, the same rays meet the same triangles. */
 void bvh_engine(char *text, size_t len);
 void bvh_get_info(const struct bvh *bvh, struct bvh_info *info);
+/* The origin of the local frame: the middle of the scene. */
 void bvh_origin(const struct bvh *bvh, double origin_m[3]);
 const struct scene *bvh_scene(const struct bvh *bvh);
 
@@ -56,22 +50,13 @@ struct bvh_plane {
 } __attribute__((aligned(32))); /* half a cache line */
 const struct bvh_plane *bvh_plane(const struct bvh *bvh, uint32_t triangle);
 
-/* 1: a face of the same corners with a lower number stands for this triangle, which is never met. */
-int bvh_is_twin(const struct bvh *bvh, uint32_t triangle);
-
-/* Width of the strip along a triangle's borders, across the ray, where the BVH may miss what a ray from that station
- * really meets. 0: it misses nothing. More only where the station sees the triangle at a smaller angle than the BVH's
- * origin does. */
-double bvh_border_m(const struct bvh *bvh, uint32_t triangle, const double station_m[3]);
-
 enum {
     BVH_CHUNK = 1024, /* rays that are cast together */
     BVH_NO_TRIANGLE = 0xffffffff,
     BVH_NO_LABEL = 0xffff,
 };
 
-/* Where rays begin: all at one point (own.x NULL), or each at its own; prcs. Within station_reach_m of
- * origin_m. */
+/* Where rays begin: all at one point (own.x NULL), or each at its own; prcs. */
 struct bvh_origins {
     double at_m[3];
     struct vec3_in own;
@@ -87,7 +72,7 @@ static inline void bvh_origin_of(const struct bvh_origins *from, uint32_t i, dou
 }
 
 struct bvh_rays {
-    uint32_t n; /* up to BVH_CHUNK where each begins at its own point */
+    uint32_t n;
     struct bvh_origins from;
     struct vec3_in dir;    /* unit vectors, prcs */
     double range_max_m;    /* hits beyond it may or may not be reported */
@@ -100,17 +85,14 @@ struct bvh_rays {
     float *steep;       /* 1 / cos^2 of the incidence, of rays from one point; NULL: not asked for */
 };
 
-/* How often the exact stage had to look twice. */
 struct bvh_counters {
-    uint64_t near_border; /* proposals near a border, looked at in double */
-    uint64_t decided;     /* of these, not clearly inside the proposed triangle: all triangles around were asked */
-    uint64_t went_on;     /* of these, nothing there after all: the ray went on */
-    uint64_t undecided;   /* nearer to an edge than double precision resolves: counted as hit */
+    uint64_t leaves;  /* that packets were tested against, each for all its rays */
+    uint64_t decided; /* pairs of a ray and a triangle, so near an edge that they were looked at by themselves */
 };
 
 /* Cost by stage, for measuring: `now` counts in any unit and is read between the stages of each chunk. The
  * stages of the BVH are the first; more follow in core/cast.h. */
-enum bvh_stage { BVH_STAGE_PREPARE, BVH_STAGE_EMBREE, BVH_STAGE_REFINE, BVH_STAGE_DECIDE, BVH_STAGES };
+enum bvh_stage { BVH_STAGE_PREPARE, BVH_STAGE_EMBREE, BVH_STAGE_REFINE, BVH_STAGES };
 struct bvh_profile {
     uint64_t (*now)(void);
     uint64_t last, spent[2 * BVH_STAGES];
@@ -143,17 +125,13 @@ void bvh_hits(struct bvh_work *work, const struct bvh *bvh, const struct bvh_ray
 /* ---- for rays from one point whose triangles are known otherwise (core/sight); no scene with holes. */
 
 /* Rays from .. to - 1 meet that triangle, or nothing (BVH_NO_TRIANGLE): their ranges, labels and steepness, bit by
- * bit what bvh_hits has. Up to three more of the rays may be overwritten, so later ones are to be set after. */
+ * bit what bvh_hits has. Up to seven more of the rays may be overwritten, so later ones are to be set after. */
 void bvh_ranges_of(const struct bvh *bvh, uint32_t triangle, const struct bvh_rays *rays, uint32_t from, uint32_t to);
 /* The same where each has its own triangle[0 ..]; numbers beyond the scene's are passed over. */
 void bvh_ranges_each(const struct bvh *bvh, const uint32_t *triangle, const struct bvh_rays *rays, uint32_t from,
                      uint32_t to);
 /* The range of one plane along a ray, by the same arithmetic. */
 double bvh_range_of(const struct bvh *bvh, uint32_t triangle, const double at_m[3], const double dir[3]);
-/* bvh_hits as if bvh_order_exactly had been called: what lies near each hit is looked for in the BVH, ray by
- * ray. Some microseconds a ray. order[i] 0: ray i is only cast along with the others of its packet. */
-void bvh_hits_ordered(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays, const uint8_t *order);
-
 /* Cosine of the incidence on the triangles that were hit, 0..1; NaN where there is none. */
 void bvh_cosines(const struct bvh *bvh, const uint32_t *triangle, const struct vec3_in *dir, uint32_t n,
                  double *cosine);

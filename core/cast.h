@@ -117,8 +117,7 @@ struct cast_setup {
     const struct bvh *bvh;
     /* NULL: none. Else of the BVH and of station_m: rays that begin there are looked up in it, with the same
      * hits. The BVH has all others: beams that begin beside the station, sub-rays, what glass and mirrors show,
-     * bodies that move. Where the sight is exact, those meet surfaces in the BVH's order: bvh_order_exactly makes
-     * it the same. A head that moves has none. */
+     * bodies that move. A head that moves has none. */
     const struct sight *sight;
     const struct georef *georef; /* geo layout */
     double station_m[3];         /* the head's origin, prcs */
@@ -132,8 +131,7 @@ struct cast_setup {
     enum line_layout layout;
     double range_scale_m;
     double xyz_scale[3]; /* units of the CRS per count, see georef_scale */
-    /* NULL: pulses are single rays. Else the BVH's station_reach_m covers the exit radius, and blocks have
-     * room for beam->max_echoes entries a pulse. */
+    /* NULL: pulses are single rays. Else blocks have room for beam->max_echoes entries a pulse. */
     const struct cast_beam *beam;
     enum beam_select echoes; /* which of a pulse's */
     uint32_t max_echoes;     /* of a pulse, at most those of detect or beam; 0: as many as these say */
@@ -157,13 +155,13 @@ struct cast_setup {
 
 /* What became of pulses, counted. */
 struct cast_counters {
-    uint64_t near_border, decided, went_on, undecided; /* struct bvh_counters */
-    uint64_t few, asked;                               /* with a sight: struct sight_counters */
-    uint64_t unfit;   /* echoes whose position did not fit into the wire's integers: sent as shots without echo */
-    uint64_t faint;   /* hits below the detection threshold, in a blind time, or on a surface without echo: shots
+    uint64_t decided;    /* struct bvh_counters */
+    uint64_t few, asked; /* with a sight: struct sight_counters */
+    uint64_t unfit;      /* echoes whose position did not fit into the wire's integers: sent as shots without echo */
+    uint64_t faint;      /* hits below the detection threshold, in a blind time, or on a surface without echo: shots
                        * without echo, or echoes less */
-    uint64_t crowded; /* echoes beyond max_echoes: the weakest, left out */
-    uint64_t hidden;  /* pulses into the tripod's cone: shots without echo */
+    uint64_t crowded;    /* echoes beyond max_echoes: the weakest, left out */
+    uint64_t hidden;     /* pulses into the tripod's cone: shots without echo */
     /* with a beam */
     uint64_t outlined; /* adaptive: pulses whose footprint an outline cuts */
     uint64_t sub_rays; /* cast beyond the central ones */
@@ -205,8 +203,7 @@ uint32_t caster_meet(struct caster *caster, const struct cast_setup *setup, cons
 void caster_hits(struct caster *caster, const struct bvh *bvh, const struct bvh_rays *rays);
 
 /* The outlines of a scene that are steps as seen from the station (beam_outlines_create; kind: of
- * surface_kinds where detection models surfaces). The station lies within the BVH's station_reach_m. For
- * setting up. */
+ * surface_kinds where detection models surfaces). For setting up. */
 int cast_outlines(const struct beam_outlines_spec *spec, const struct bvh *bvh, struct beam_outlines **out,
                   struct sh_err *err);
 
@@ -215,7 +212,6 @@ enum cast_stage {
     CAST_DIRECTIONS = BVH_STAGE_PREPARE,
     CAST_EMBREE = BVH_STAGE_EMBREE,
     CAST_REFINE = BVH_STAGE_REFINE,
-    CAST_DECIDE = BVH_STAGE_DECIDE,
     CAST_DETECT = BVH_STAGES,
     CAST_NOISE,
     CAST_POSITIONS,

@@ -11,7 +11,7 @@
  *
  * A cell is seen where the centre of a pulse meets one of its pieces, from whichever side, in a way that the head can
  * report (cast_meet: within its ranges and above its threshold, both without noise; through glass, not in mirrors).
- * Triangles with the same corners are one surface: all but one are left out (bvh_is_twin). Bodies that move hide
+ * Triangles with the same corners are one surface: all but one are left out (scene_find_twins). Bodies that move hide
  * what they hide, and have no cells. What lies between bodies, as the inner faces of layers of a wall, counts as
  * surface that nobody sees.
  *

@@ -18,7 +18,9 @@
 /* The error that one of Embree's is. what: what was to be made. */
 int embree_fail(enum RTCError code, const char *what, struct sh_err *err);
 
-/* Rays a packet at which Embree is best on this machine: 4, 8 or 16. */
+/* Whether it takes packets of 4, 8 or 16 rays as they are. Others it takes apart, and a leaf gets rays of several. */
+int embree_has_packet(RTCDevice device, uint32_t rays);
+/* Rays a packet at which Embree is best on this machine: 16, 8, 4 or 1. */
 uint32_t embree_packet(RTCDevice device);
 
 #endif

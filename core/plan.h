@@ -114,14 +114,8 @@ struct plan_sight_need {
     double n_triangles;    /* of the scene */
     uint32_t packet;       /* rays per Embree call */
     uint64_t memory_bytes; /* that a map may take */
-    enum plan_sight_order {
-        PLAN_ORDER_FLOAT,   /* as the BVH has it */
-        PLAN_ORDER_FREE,    /* in double, where that costs no more than a scan without a map */
-        PLAN_ORDER_DOUBLE,  /* in double, by a BVH that is ordered in any case */
-        PLAN_ORDER_INSTEAD, /* in double; without a map the BVH would have to be ordered for that */
-    } order;
-    int forced;          /* by cast.sight, 1: a map; 0: none; -1: not */
-    const char *why_not; /* no map is possible; NULL: it is */
+    int forced;            /* by cast.sight, 1: a map; 0: none; -1: not */
+    const char *why_not;   /* no map is possible; NULL: it is */
 };
 
 /* Of the pulses, shares that go to a cell that shows one triangle, nothing, a few triangles, many. */
@@ -129,23 +123,16 @@ struct plan_sight_found {
     double one, nothing, few, ask;
 };
 
-struct plan_sight_choice {
-    int map, ordered; /* a map is made; it orders surfaces in double */
-    double order_ns;  /* per pulse, what that costs */
-};
-
-/* Chooses and fills row. Looks at some pulses of the places, where so many may pay at all. */
+/* Chooses (*map: 1: one is made) and fills row. Looks at some pulses of the places, where so many may pay at all. */
 int plan_sight(const struct plan_sight_need *need, struct plan_place *place, uint32_t n_places,
-               const struct sh_report *report, struct plan_sight_choice *choice, struct plan_row *row,
-               struct sh_err *err);
+               const struct sh_report *report, int *map, struct plan_row *row, struct sh_err *err);
 
 /* The steps of that. False where so few pulses pay for no map, whatever they meet. */
 int plan_sight_may_pay(const struct plan_sight_need *need);
 /* Casts around pulses of the head, at the corners of cells so far across. */
 void plan_sample_sight(struct plan_sample *sample, double cell_rad, struct plan_sight_found *found);
-/* found NULL: nobody has looked. */
-void plan_sight_choose(const struct plan_sight_need *need, const struct plan_sight_found *found,
-                       struct plan_sight_choice *choice, struct plan_row *row);
+/* Returns whether a map is made. found NULL: nobody has looked. */
+int plan_sight_choose(const struct plan_sight_need *need, const struct plan_sight_found *found, struct plan_row *row);
 
 /* ---- the other stages */
 
@@ -153,15 +140,12 @@ void plan_sight_choose(const struct plan_sight_need *need, const struct plan_sig
 struct plan_methods {
     enum beam_mode beam; /* BEAM_SINGLE, BEAM_RINGS, BEAM_ADAPTIVE */
     uint32_t rings;      /* of sub-rays; adaptive: for footprints with more edges than it tells apart */
-    int order_exactly;   /* surfaces are ordered in double: by bvh_order_exactly, or by a sight */
     uint32_t depth;      /* of glass and mirrors */
     int sight;           /* first hits are looked up in a map of the station's */
 };
 
 /* A beam's name, and its cost where that does not depend on the scene. Its error is not known yet. */
 void plan_beam_option(enum beam_mode mode, uint32_t rings, struct plan_option *option);
-/* Fills options, in order of cost, for surfaces in a scene that lies within far_m of the head. */
-void plan_order_options(double far_m, struct plan_option option[2]);
 
 /* The row of the mesh: what its vertices may be off by, see struct scene. */
 void plan_mesh(double error_m, struct plan_row *row);

@@ -141,6 +141,10 @@ int scene_from_arrays(const struct scene_arrays *arrays, struct scene **out, str
  * as it was. Before anyone uses it, and before label0 is set. */
 int scene_keep(struct scene *scene, const uint8_t *keep, struct sh_err *err);
 
+/* Finds triangles that have the same three corners, however they are written, and the same holes, as one with a lower
+ * number: bit i % 64 of (*twin)[i / 64], to be freed. SH_ENOMEM, SH_ESTOPPED. */
+int scene_find_twins(const struct scene *scene, const struct sh_report *report, uint64_t **twin, struct sh_err *err);
+
 void scene_free(struct scene *scene);
 
 /* The image of a texture: texture_read. */

@@ -26,9 +26,6 @@ struct sight_spec {
      * many rays pay for. */
     double rays;
     uint64_t memory_bytes; /* the sight takes no more, also while it is made; what does not fit asks the BVH */
-    /* 1: surfaces are ordered in double, as bvh_order_exactly has it; the BVH itself needs no such call.
-     * 0: hits are those of the BVH as it is. */
-    int exact;
     /* False where no ray goes within radius_rad of the unit vector dir (prcs). NULL: rays go everywhere. A ray
      * where there should be none asks the BVH. */
     int (*sees)(const void *ctx, const double dir[3], double radius_rad);

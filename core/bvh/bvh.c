@@ -1,3 +1,4 @@
+/* Makes a BVH: the leaves, Embree's tree of them, the planes. */
 #include "core/bvh/bvh_inside.h"
 
 #include <math.h>
@@ -5,13 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
-
-/* Rays may look at all that is proposed (bvh_walk_along). */
-#if RTC_VERSION_MAJOR >= 4
-#define LOOKS_THROUGH RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS
-#else
-#define LOOKS_THROUGH RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION
-#endif
 
 /* Its name and those of the other two that Embree's threads get to are in tests/check/tsan.supp. */
 static bool embree_counts_bytes(void *user, ssize_t bytes, bool post)
@@ -38,31 +32,33 @@ static int check_device(RTCDevice device, struct sh_err *err)
     return embree_fail(code, "bvh", err);
 }
 
-int bvh_commit(struct bvh *bvh, RTCScene scene, const struct sh_report *report, struct sh_err *err)
+/* Builds what Embree has, unless report asks to stop. */
+static int commit(struct bvh *bvh, const struct sh_report *report, struct sh_err *err)
 {
     union { /* Embree only passes it on */
         const void *in;
         void *out;
     } ctx = {.in = report};
-    rtcSetSceneProgressMonitorFunction(scene, embree_may_go_on, ctx.out);
-    rtcCommitScene(scene);
+    RTCGeometry geometry = rtcNewGeometry(bvh->device, RTC_GEOMETRY_TYPE_USER);
+    rtcSetGeometryUserPrimitiveCount(geometry, bvh->n_leaves);
+    rtcSetGeometryUserData(geometry, bvh);
+    rtcSetGeometryBoundsFunction(geometry, embree_asks_bounds, NULL);
+    rtcSetGeometryIntersectFunction(geometry, bvh_meet_leaf);
+    rtcCommitGeometry(geometry);
+    bvh->rtc = rtcNewScene(bvh->device);
+    rtcAttachGeometry(bvh->rtc, geometry);
+    rtcReleaseGeometry(geometry);
+    rtcSetSceneProgressMonitorFunction(bvh->rtc, embree_may_go_on, ctx.out);
+    rtcCommitScene(bvh->rtc);
     return check_device(bvh->device, err);
 }
 
+/* The planes are made once Embree has given back what it takes for building. */
 static int build(struct bvh *bvh, const struct sh_report *report, struct sh_err *err)
 {
-    RTCGeometry geometry = rtcNewGeometry(bvh->device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    int rc = bvh_fill(bvh, geometry, report, err);
-    if (rc == SH_OK) {
-        rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_HIGH);
-        rtcCommitGeometry(geometry);
-        bvh->rtc = rtcNewScene(bvh->device);
-        rtcSetSceneFlags(bvh->rtc, bvh->scene->cutout != NULL ? LOOKS_THROUGH : RTC_SCENE_FLAG_NONE);
-        rtcSetSceneBuildQuality(bvh->rtc, RTC_BUILD_QUALITY_HIGH);
-        rtcAttachGeometry(bvh->rtc, geometry);
-        rc = bvh_commit(bvh, bvh->rtc, report, err);
-    }
-    rtcReleaseGeometry(geometry);
+    int rc = bvh_make_leaves(bvh, report, err);
+    if (rc == SH_OK) rc = commit(bvh, report, err);
+    if (rc == SH_OK) rc = bvh_make_planes(bvh, report, err);
     return rc;
 }
 
@@ -73,8 +69,8 @@ static double seconds(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-int bvh_create(const struct scene *scene, const double origin_m[3], double station_reach_m, unsigned threads,
-               const struct sh_report *report, struct bvh **out, struct sh_err *err)
+int bvh_create(const struct scene *scene, unsigned threads, const struct sh_report *report, struct bvh **out,
+               struct sh_err *err)
 {
     *out = NULL;
     struct bvh *bvh = calloc(1, sizeof *bvh);
@@ -83,8 +79,6 @@ int bvh_create(const struct scene *scene, const double origin_m[3], double stati
     char config[64] = "tessellation_cache_size=1";
     if (threads != 0) snprintf(config, sizeof config, "tessellation_cache_size=1,threads=%u", threads);
     bvh->scene = scene;
-    bvh->station_reach_m = station_reach_m;
-    memcpy(bvh->origin_m, origin_m, sizeof bvh->origin_m);
     bvh->device = rtcNewDevice(config);
     if (bvh->device == NULL) {
         free(bvh);
@@ -100,8 +94,8 @@ int bvh_create(const struct scene *scene, const double origin_m[3], double stati
     }
     bvh->info.packet = embree_packet(bvh->device);
     bvh->info.build_s = seconds() - start;
-    bvh->info.bytes =
-        (uint64_t)__atomic_load_n(&bvh->bytes, __ATOMIC_RELAXED) + (uint64_t)scene->n_triangles * sizeof *bvh->triangle;
+    bvh->info.bytes = (uint64_t)__atomic_load_n(&bvh->bytes, __ATOMIC_RELAXED) +
+                      (uint64_t)scene->n_triangles * sizeof *bvh->plane + (uint64_t)bvh->n_leaves * sizeof *bvh->leaf;
     *out = bvh;
     return SH_OK;
 }
@@ -111,10 +105,8 @@ void bvh_free(struct bvh *bvh)
     if (bvh == NULL) return;
     if (bvh->rtc != NULL) rtcReleaseScene(bvh->rtc);
     rtcReleaseDevice(bvh->device);
-    free(bvh->triangle);
-    free(bvh->rival_first);
-    free(bvh->rival);
-    free(bvh->twin);
+    free(bvh->leaf);
+    free(bvh->plane);
     free(bvh);
 }
 
@@ -125,7 +117,7 @@ void bvh_get_info(const struct bvh *bvh, struct bvh_info *info)
 
 void bvh_set_packet(struct bvh *bvh, uint32_t rays)
 {
-    bvh->info.packet = rays;
+    bvh->info.packet = embree_has_packet(bvh->device, rays) ? rays : 1;
 }
 
 void bvh_origin(const struct bvh *bvh, double origin_m[3])
@@ -140,5 +132,5 @@ const struct scene *bvh_scene(const struct bvh *bvh)
 
 const struct bvh_plane *bvh_plane(const struct bvh *bvh, uint32_t triangle)
 {
-    return &bvh->triangle[triangle];
+    return &bvh->plane[triangle];
 }

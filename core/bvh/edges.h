@@ -54,15 +54,6 @@ static inline double edge_gap(const double a[3], const double b[3], const double
     return sqrt(vec3_dot(w, w));
 }
 
-/* How far the ray passes from the nearest edge, across the ray. */
-static inline double edge_distance(double v[3][3], const double side[3])
-{
-    double least = INFINITY;
-    for (int i = 0; i < 3; i++)
-        least = fmin(least, fabs(side[i]) / vec3_distance(v[i], v[(i + 1) % 3]));
-    return least;
-}
-
 static inline int is_inside(const double side[3])
 {
     return (side[0] >= 0.0 && side[1] >= 0.0 && side[2] >= 0.0) || (side[0] <= 0.0 && side[1] <= 0.0 && side[2] <= 0.0);
@@ -72,6 +63,20 @@ static inline int is_inside(const double side[3])
 static inline double blur(const double a[3], const double b[3])
 {
     return 8.0 * 0x1p-53 * sqrt(fmax(vec3_dot(a, a), vec3_dot(b, b))) * vec3_distance(a, b);
+}
+
+/* Whether a ray that passes outside of a triangle does so by no more than that: beside an edge, not beyond its ends. */
+static inline int is_near_miss(double v[3][3], const double side[3], const double dir[3])
+{
+    const double sign = side[0] + side[1] + side[2] < 0.0 ? -1.0 : 1.0; /* of n . dir */
+    int touches = 0;
+    for (int i = 0; i < 3; i++) {
+        const double *a = v[i], *b = v[(i + 1) % 3];
+        if (-sign * side[i] > blur(a, b)) return 0;
+        const double gap = edge_gap(a, b, dir, edge_range(a, b, dir));
+        touches |= gap <= 16.0 * 0x1p-53 * sqrt(fmax(vec3_dot(a, a), vec3_dot(b, b)));
+    }
+    return touches;
 }
 
 /* A ray within the plane, as far as double precision shows, does not meet the triangle; what stands on its

@@ -14,11 +14,19 @@ int embree_fail(enum RTCError code, const char *what, struct sh_err *err)
     return sh_fail(err, SH_EIO, "%s: Embree failed (RTCError %d)", what, (int)code);
 }
 
+int embree_has_packet(RTCDevice device, uint32_t rays)
+{
+    const enum RTCDeviceProperty asked = rays == 16  ? RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED
+                                         : rays == 8 ? RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED
+                                                     : RTC_DEVICE_PROPERTY_NATIVE_RAY4_SUPPORTED;
+    return rtcGetDeviceProperty(device, asked) != 0;
+}
+
 uint32_t embree_packet(RTCDevice device)
 {
-    if (rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED)) return 16;
-    if (rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED)) return 8;
-    return 4;
+    for (uint32_t rays = 16; rays >= 4; rays /= 2)
+        if (embree_has_packet(device, rays)) return rays;
+    return 1;
 }
 
 /* In the steps in which Embree chooses its kernels. */

@@ -1,4 +1,4 @@
-/* Exact hits of rays: Embree proposes, double decides; chunk by chunk. */
+/* Exact hits of rays, chunk by chunk. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -6,21 +6,17 @@
 #include "core/bvh/bvh_inside.h"
 #include "core/vecmath.h"
 
-enum {
-    DOUBTS_TOGETHER = 16,  /* passed at once where there are none */
-    ROOM = BVH_CHUNK + 48, /* arrays of a power of two would get into each other's way in a cache */
-};
+enum { ROOM = BVH_CHUNK + 48 }; /* arrays of a power of two would get into each other's way in a cache */
 
 struct bvh_work {
-    struct bvh_packets packets, placed; /* of rays from one point; each from its own */
+    struct bvh_query query;
     struct {
         float x[ROOM], y[ROOM], z[ROOM];
-    } dir, own_float; /* as Embree gets them */
+    } dir, org; /* as Embree gets them */
     struct {
         double x[ROOM], y[ROOM], z[ROOM];
     } own; /* origins, local frame */
-    uint32_t prim[ROOM], doubt[ROOM], label[ROOM];
-    float t[ROOM], u[ROOM], v[ROOM];
+    double start_m[ROOM];
     struct bvh_counters counters;
     struct bvh_profile *profile;
 };
@@ -63,62 +59,9 @@ struct bvh_profile *bvh_work_profile(const struct bvh_work *work)
     return work->profile;
 }
 
-static void set_origin(struct decide_ray *ray, const double at_m[3])
-{
-    for (int i = 0; i < 3; i++) {
-        ray->station_m[i] = at_m[i];
-        ray->o_local[i] = at_m[i] - ray->bvh->origin_m[i];
-    }
-}
-
-static void set_ray(struct decide_ray *ray, const struct bvh_rays *rays, uint32_t i)
-{
-    const double dir[3] = VEC3_AT(rays->dir, i);
-    if (rays->from.own.x != NULL) set_origin(ray, (const double[3])VEC3_AT(rays->from.own, i));
-    memcpy(ray->dir, dir, sizeof dir);
-}
-
-/* What was decided of ray i, but for its triangle. */
-static void put(const struct decide_ray *ray, const struct decide_hit *hit, const struct bvh_rays *rays, uint32_t i)
-{
-    const int none = hit->prim == RTC_INVALID_GEOMETRY_ID;
-    rays->range_m[i] = none ? (double)NAN : hit->range_m;
-    if (rays->label != NULL) rays->label[i] = none ? BVH_NO_LABEL : bvh_label(&ray->bvh->triangle[hit->prim]);
-    if (rays->steep != NULL) rays->steep[i] = bvh_steep(ray->bvh, hit->prim, ray->dir);
-}
-
-static void decide_one(struct bvh_work *w, struct decide_ray *ray, const struct bvh_rays *rays, uint32_t i)
-{
-    struct decide_hit hit = {w->prim[i], rays->range_m[i]};
-    set_ray(ray, rays, i);
-    if (w->doubt[i] & BVH_DOUBT_BORDER)
-        decide_hit(ray, w->prim[i], w->t[i], &w->counters, &hit);
-    else
-        decide_again(ray, &hit);
-    w->prim[i] = hit.prim;
-    put(ray, &hit, rays, i);
-}
-
-/* Doubts are few: whole groups without any are passed at once. Each costs a chain of cache misses, so they
- * are looked up together. */
-static void decide(struct bvh_work *w, struct decide_ray *ray, const struct bvh_rays *rays)
-{
-    uint32_t doubts = 0, in_doubt[BVH_CHUNK];
-    for (uint32_t base = 0; base < rays->n; base += DOUBTS_TOGETHER) {
-        uint32_t any = 0, end = rays->n - base < DOUBTS_TOGETHER ? rays->n : base + DOUBTS_TOGETHER;
-        for (uint32_t i = base; i < base + DOUBTS_TOGETHER; i++)
-            any |= w->doubt[i]; /* beyond n: stale, but there; a doubt too many costs a look */
-        for (uint32_t i = base; any != 0 && i < end; i++)
-            if (w->doubt[i]) in_doubt[doubts++] = i;
-    }
-    if (doubts == 0) return;
-    decide_prefetch(ray->bvh, w->prim, in_doubt, doubts);
-    for (uint32_t k = 0; k < doubts; k++)
-        decide_one(w, ray, rays, in_doubt[k]);
-}
-
+/* Origins in the local frame. Returns the square of how far the farthest is from its origin. */
 VEC_CLONES
-static void to_local(const struct vec3_in *own, const double origin_m[3], uint32_t n, const struct vec3_out *out)
+static double to_local(const struct vec3_in *own, const double origin_m[3], uint32_t n, const struct vec3_out *out)
 {
     const struct vec3_in p = *own;
     const struct vec3_out o = *out;
@@ -129,87 +72,74 @@ static void to_local(const struct vec3_in *own, const double origin_m[3], uint32
         o.y[i] = p.y[i] - y;
         o.z[i] = p.z[i] - z;
     }
+    double far2 = 0.0;
+    for (uint32_t i = 0; i < n; i++) {
+        const double here2 = o.x[i] * o.x[i] + o.y[i] * o.y[i] + o.z[i] * o.z[i];
+        far2 = here2 > far2 ? here2 : far2;
+    }
+    return far2;
 }
 
-/* One chunk: what Embree proposes and double precision makes of it. */
-static void cast_chunk(struct bvh_work *w, struct decide_ray *ray, const struct bvh_rays *rays)
+/* Rays that begin further from the scene's middle than its radius are nearer than two of them before they meet
+ * anything: the float ray begins there. */
+static void take_along(struct bvh_work *w, const struct bvh *bvh, const struct bvh_rays *rays, struct bvh_batch *batch)
 {
-    const struct bvh *bvh = ray->bvh;
-    const uint32_t n = rays->n;
-    struct bvh_batch batch = {.t_max = ray->t_max,
-                              .scattered = rays->scattered,
-                              .begins = rays->begins,
-                              .dir = bvh_work_directions(w),
-                              .prim = w->prim,
-                              .t = w->t,
-                              .u = w->u,
-                              .v = w->v};
-    struct bvh_proposals proposals = {.bvh = bvh,
-                                      .n = n,
-                                      .dir = rays->dir,
-                                      .prim = w->prim,
-                                      .u = w->u,
-                                      .v = w->v,
-                                      .range_m = rays->range_m,
-                                      .label = rays->label != NULL ? rays->label : w->label,
-                                      .steep = rays->steep,
-                                      .doubt = w->doubt};
-    for (int i = 0; i < 3; i++) {
-        batch.org[i] = (float)ray->o_local[i];
-        proposals.o[i] = ray->o_local[i];
+    for (uint32_t i = 0; i < rays->n; i++) {
+        const double dir[3] = VEC3_AT(rays->dir, i);
+        double o[3] = {batch->at_local[0], batch->at_local[1], batch->at_local[2]};
+        if (batch->local.x != NULL)
+            for (int j = 0; j < 3; j++)
+                o[j] = (j == 0 ? batch->local.x : j == 1 ? batch->local.y : batch->local.z)[i];
+        w->start_m[i] = fmax(0.0, vec3_length(o) - bvh->radius_m);
+        w->org.x[i] = (float)(o[0] + w->start_m[i] * dir[0]);
+        w->org.y[i] = (float)(o[1] + w->start_m[i] * dir[1]);
+        w->org.z[i] = (float)(o[2] + w->start_m[i] * dir[2]);
     }
-    bvh_to_float(&rays->dir, n, w->dir.x, w->dir.y, w->dir.z);
+    batch->org = (struct vec3_floats){w->org.x, w->org.y, w->org.z};
+    batch->start_m = w->start_m;
+}
+
+/* Where rays begin, as Embree and the leaves get it. */
+static void set_origins(struct bvh_work *w, const struct bvh *bvh, const struct bvh_rays *rays, struct bvh_batch *batch)
+{
+    vec3_sub(rays->from.at_m, bvh->origin_m, batch->at_local);
+    batch->far_m = vec3_length(batch->at_local);
     if (rays->from.own.x != NULL) {
-        proposals.own = VEC3_IN(w->own, 0);
-        to_local(&rays->from.own, bvh->origin_m, n, &VEC3_OUT(w->own, 0));
-        bvh_to_float(&proposals.own, n, w->own_float.x, w->own_float.y, w->own_float.z);
-        batch.own = (struct vec3_floats){w->own_float.x, w->own_float.y, w->own_float.z};
+        batch->far_m = sqrt(to_local(&rays->from.own, bvh->origin_m, rays->n, &VEC3_OUT(w->own, 0)));
+        batch->local = VEC3_IN(w->own, 0);
+        bvh_to_float(&batch->local, rays->n, w->org.x, w->org.y, w->org.z);
+        batch->org = (struct vec3_floats){w->org.x, w->org.y, w->org.z};
     }
-    bvh_stage_ends(w->profile, BVH_STAGE_PREPARE);
-    bvh_intersect(bvh, batch.own.x != NULL ? &w->placed : &w->packets, &batch, n);
-    bvh_stage_ends(w->profile, BVH_STAGE_EMBREE);
-    uint32_t doubts = bvh_refine(&proposals);
-    bvh_stage_ends(w->profile, BVH_STAGE_REFINE);
-    if (doubts != 0) decide(w, ray, rays);
-    memcpy(rays->triangle, w->prim, n * sizeof *rays->triangle);
-    bvh_stage_ends(w->profile, BVH_STAGE_DECIDE);
+    if (batch->far_m > bvh->radius_m) take_along(w, bvh, rays, batch);
 }
 
-static struct decide_ray ray_from(const struct bvh *bvh, const struct bvh_rays *rays)
+static void cast_chunk(struct bvh_work *w, const struct bvh *bvh, const struct bvh_rays *rays)
 {
-    struct decide_ray ray = {.bvh = bvh, .t_max = (float)(rays->range_max_m * 1.001)};
-    set_origin(&ray, rays->from.at_m);
-    return ray;
+    struct bvh_batch batch = {.rays = rays,
+                              .dir = bvh_work_directions(w),
+                              .t_max = (float)(rays->range_max_m * 1.001),
+                              .counters = &w->counters};
+    bvh_to_float(&rays->dir, rays->n, w->dir.x, w->dir.y, w->dir.z);
+    set_origins(w, bvh, rays, &batch);
+    bvh_stage_ends(w->profile, BVH_STAGE_PREPARE);
+    bvh_intersect(bvh, &w->query, &batch);
+    bvh_stage_ends(w->profile, BVH_STAGE_EMBREE);
+    if (rays->label != NULL || rays->steep != NULL) bvh_refine(bvh, rays);
+    bvh_stage_ends(w->profile, BVH_STAGE_REFINE);
 }
 
 void bvh_hits(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays)
 {
-    struct decide_ray ray = ray_from(bvh, rays);
     for (uint32_t at = 0; at < rays->n; at += BVH_CHUNK) {
         struct bvh_rays part = *rays;
         part.n = rays->n - at < BVH_CHUNK ? rays->n - at : BVH_CHUNK;
         part.dir = VEC3_IN(rays->dir, at);
+        if (rays->from.own.x != NULL) part.from.own = VEC3_IN(rays->from.own, at);
         part.begins = rays->begins != NULL ? rays->begins + at : NULL;
         part.range_m = rays->range_m + at;
         part.triangle = rays->triangle + at;
         part.label = rays->label != NULL ? rays->label + at : NULL;
         part.steep = rays->steep != NULL ? rays->steep + at : NULL;
-        cast_chunk(work, &ray, &part);
+        cast_chunk(work, bvh, &part);
     }
-}
-
-void bvh_hits_ordered(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays, const uint8_t *order)
-{
-    struct decide_ray ray = ray_from(bvh, rays);
-    bvh_hits(work, bvh, rays);
-    if (bvh->ordered) return;
-    for (uint32_t i = 0; i < rays->n; i++) {
-        struct decide_hit hit = {rays->triangle[i], rays->range_m[i]};
-        if (!order[i] || hit.prim == RTC_INVALID_GEOMETRY_ID) continue;
-        set_ray(&ray, rays, i);
-        decide_again(&ray, &hit);
-        rays->triangle[i] = hit.prim;
-        put(&ray, &hit, rays, i);
-    }
-    bvh_stage_ends(work->profile, BVH_STAGE_DECIDE);
 }

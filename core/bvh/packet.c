@@ -1,270 +1,190 @@
-/* Packets of 4, 8 and 16 rays into Embree: the same code by width. */
-#include <string.h>
+/* Rays into Embree, in packets of 4, 8 or 16, or one by one. */
+#include <math.h>
 
 #include "core/bvh/bvh_inside.h"
-
-#if RTC_VERSION_MAJOR >= 4
-#define PACKET_CONTEXT(name)           \
-    struct RTCIntersectArguments name; \
-    rtcInitIntersectArguments(&name);  \
-    name.flags = RTC_RAY_QUERY_FLAG_COHERENT
-#define PACKET_CALL(w, valid, scene, ctx, rays) rtcIntersect##w(valid, scene, rays, ctx)
-#define PACKET_ONE(scene, ctx, ray)             rtcIntersect1(scene, ray, ctx)
-#else
-#define PACKET_CONTEXT(name)         \
-    struct RTCIntersectContext name; \
-    rtcInitIntersectContext(&name);  \
-    name.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT
-#define PACKET_CALL(w, valid, scene, ctx, rays) rtcIntersect##w(valid, scene, ctx, rays)
-#define PACKET_ONE(scene, ctx, ray)             rtcIntersect1(scene, ctx, ray)
-#endif
+#include "core/vecmath.h"
 
 /* Of packets that were cut, those that are left with as many as this are not worth it. */
 enum { FEW = 4 };
 
-/* Numbers of 4 bytes of rays at .. at + n, whole packets of them wherever the arrays go on: what is beyond n
- * belongs to packets that come later, or to none. */
-static inline __attribute__((always_inline)) void copy(void *to, const void *from, uint32_t at, uint32_t n,
-                                                       uint32_t width)
-{
-    if (at + width <= BVH_CHUNK)
-        memcpy(to, from, 4 * width);
-    else
-        for (uint32_t i = 0; i < n; i++)
-            memcpy((char *)to + 4 * i, (const char *)from + 4 * i, 4);
-}
+struct packet {
+    struct RTCRayHit16 at; /* or, from its beginning, one of fewer rays */
+    int valid[BVH_PACKET];
+} __attribute__((aligned(64)));
 
-/* Packet p takes rays first[p] .. first[p + 1] - 1.
- * The planes of what a packet has hit are asked for when the next one has been cast: to read them at once
- * would mean to wait for what Embree has only just written. */
-#define PACKET_FUNCTION(W)                                                                                         \
-    static void set_up_##W(struct RTCRayHit##W *packet, const struct bvh_batch *rays)                              \
-    {                                                                                                              \
-        for (uint32_t p = 0; p < BVH_CHUNK / W; p++)                                                               \
-            for (uint32_t i = 0; i < W; i++) {                                                                     \
-                packet[p].ray.org_x[i] = rays->org[0];                                                             \
-                packet[p].ray.org_y[i] = rays->org[1];                                                             \
-                packet[p].ray.org_z[i] = rays->org[2];                                                             \
-                packet[p].ray.tnear[i] = rays->t_min;                                                              \
-                packet[p].ray.time[i] = 0.0f;                                                                      \
-                packet[p].ray.mask[i] = 0xffffffffU;                                                               \
-                packet[p].ray.id[i] = 0;                                                                           \
-                packet[p].ray.flags[i] = 0;                                                                        \
-                packet[p].hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;                                              \
-            }                                                                                                      \
-    }                                                                                                              \
-    static void place_##W(struct RTCRayHit##W *packet, const struct bvh_batch *rays, const uint32_t *first,        \
-                          uint32_t packets)                                                                        \
-    {                                                                                                              \
-        for (uint32_t p = 0; p < packets; p++) {                                                                   \
-            const uint32_t n = first[p + 1] - first[p];                                                            \
-            copy(packet[p].ray.org_x, rays->own.x + first[p], first[p], n, W);                                     \
-            copy(packet[p].ray.org_y, rays->own.y + first[p], first[p], n, W);                                     \
-            copy(packet[p].ray.org_z, rays->own.z + first[p], first[p], n, W);                                     \
-        }                                                                                                          \
-    }                                                                                                              \
-    static void prefetch_##W(const struct bvh *bvh, const struct RTCRayHit##W *packet)                             \
-    {                                                                                                              \
-        const uint32_t last = bvh->scene->n_triangles;                                                             \
-        for (uint32_t i = 0; i < W; i++)                                                                           \
-            __builtin_prefetch(&bvh->triangle[packet->hit.primID[i] < last ? packet->hit.primID[i] : last], 0, 2); \
-    }                                                                                                              \
-    static void one_by_one_##W(const struct bvh *bvh, struct RTCRayHit##W *packet, uint32_t n)                     \
-    {                                                                                                              \
-        for (uint32_t i = 0; i < n; i++) {                                                                         \
-            const float org[3] = {packet->ray.org_x[i], packet->ray.org_y[i], packet->ray.org_z[i]};               \
-            const float dir[3] = {packet->ray.dir_x[i], packet->ray.dir_y[i], packet->ray.dir_z[i]};               \
-            struct bvh_one one = {.t_min = packet->ray.tnear[i], .t_max = packet->ray.tfar[i]};                    \
-            bvh_intersect_one(bvh, org, dir, &one);                                                                \
-            packet->hit.primID[i] = one.prim;                                                                      \
-            packet->ray.tfar[i] = one.t;                                                                           \
-            packet->hit.u[i] = one.u;                                                                              \
-            packet->hit.v[i] = one.v;                                                                              \
-        }                                                                                                          \
-    }                                                                                                              \
-    static void intersect_##W(const struct bvh *bvh, struct RTCRayHit##W *packet, const struct bvh_batch *rays,    \
-                              const uint32_t *first, uint32_t packets)                                             \
-    {                                                                                                              \
-        PACKET_CONTEXT(context);                                                                                   \
-        int valid[W] __attribute__((aligned(64)));                                                                 \
-        for (uint32_t p = 0; p < packets; p++) {                                                                   \
-            const uint32_t n = first[p + 1] - first[p];                                                            \
-            copy(packet[p].ray.dir_x, rays->dir.x + first[p], first[p], n, W);                                     \
-            copy(packet[p].ray.dir_y, rays->dir.y + first[p], first[p], n, W);                                     \
-            copy(packet[p].ray.dir_z, rays->dir.z + first[p], first[p], n, W);                                     \
-            for (uint32_t i = 0; i < W; i++)                                                                       \
-                packet[p].ray.tfar[i] = rays->t_max;                                                               \
-            memset(packet[p].hit.geomID, 0xff, sizeof packet->hit.geomID);                                         \
-            memset(packet[p].hit.primID, 0xff, sizeof packet->hit.primID);                                         \
-        }                                                                                                          \
-        for (uint32_t i = 0; i < W; i++)                                                                           \
-            valid[i] = -1;                                                                                         \
-        for (uint32_t p = 0, was = W; p < packets; p++) {                                                          \
-            const uint32_t n = first[p + 1] - first[p];                                                            \
-            if (n != was)                                                                                          \
-                for (uint32_t i = 0; i < W; i++)                                                                   \
-                    valid[i] = i < n ? -1 : 0;                                                                     \
-            was = n;                                                                                               \
-            if (n <= FEW && rays->begins != NULL)                                                                  \
-                one_by_one_##W(bvh, &packet[p], n);                                                                \
-            else                                                                                                   \
-                PACKET_CALL(W, valid, bvh->rtc, &context, &packet[p]);                                             \
-            if (p > 0) prefetch_##W(bvh, &packet[p - 1]);                                                          \
-        }                                                                                                          \
-        prefetch_##W(bvh, &packet[packets - 1]);                                                                   \
-        for (uint32_t p = 0; p < packets; p++) {                                                                   \
-            const uint32_t n = first[p + 1] - first[p];                                                            \
-            copy(rays->prim + first[p], packet[p].hit.primID, first[p], n, W);                                     \
-            copy(rays->t + first[p], packet[p].ray.tfar, first[p], n, W);                                          \
-            copy(rays->u + first[p], packet[p].hit.u, first[p], n, W);                                             \
-            copy(rays->v + first[p], packet[p].hit.v, first[p], n, W);                                             \
-        }                                                                                                          \
-    }
-
-PACKET_FUNCTION(4)
-PACKET_FUNCTION(8)
-PACKET_FUNCTION(16)
-
-static struct RTCRayHit one_ray(const float org[3], const float dir[3], float t_min, float t_max)
-{
-    struct RTCRayHit ray = {.ray = {.org_x = org[0],
-                                    .org_y = org[1],
-                                    .org_z = org[2],
-                                    .tnear = t_min,
-                                    .dir_x = dir[0],
-                                    .dir_y = dir[1],
-                                    .dir_z = dir[2],
-                                    .tfar = t_max,
-                                    .mask = 0xffffffffU},
-                            .hit = {.geomID = RTC_INVALID_GEOMETRY_ID, .primID = RTC_INVALID_GEOMETRY_ID}};
-    ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    return ray;
-}
-
-void bvh_intersect_one(const struct bvh *bvh, const float org[3], const float dir[3], struct bvh_one *one)
-{
-    PACKET_CONTEXT(context);
-    struct RTCRayHit ray = one_ray(org, dir, one->t_min, one->t_max);
-    PACKET_ONE(bvh->rtc, &context, &ray);
-    one->prim = ray.hit.primID;
-    one->t = ray.ray.tfar;
-    one->u = ray.hit.u;
-    one->v = ray.hit.v;
-}
-
-/* A ray that looks at all that Embree proposes on its way. Embree hands its context to the filter. */
 #if RTC_VERSION_MAJOR >= 4
-struct walk {
-    struct RTCRayQueryContext context;
-    const struct bvh_walk *walk;
-};
-#else
-struct walk {
-    struct RTCIntersectContext context;
-    const struct bvh_walk *walk;
-};
-#endif
-
-static void on_proposal(const struct RTCFilterFunctionNArguments *args)
+static void begin(struct bvh_query *query)
 {
-    const struct bvh_walk *walk = ((const struct walk *)(const void *)args->context)->walk;
-    const struct RTCHit *hit = (const void *)args->hit; /* of one ray */
-    if (args->valid[0] != 0 && !walk->is_met(walk->ctx, hit->primID)) args->valid[0] = 0;
+    rtcInitRayQueryContext(&query->context);
 }
 
-void bvh_walk_along(const struct bvh *bvh, const float org[3], const float dir[3], float t_max,
-                    const struct bvh_walk *walk)
+static void call(const struct bvh *bvh, struct bvh_query *query, struct packet *packet, uint32_t width)
 {
-    struct walk own = {.walk = walk};
-    struct RTCRayHit ray = one_ray(org, dir, 0.0f, t_max);
-#if RTC_VERSION_MAJOR >= 4
     struct RTCIntersectArguments how;
-    rtcInitRayQueryContext(&own.context);
     rtcInitIntersectArguments(&how);
-    how.flags = RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER;
-    how.context = &own.context;
-    how.filter = on_proposal;
-    rtcIntersect1(bvh->rtc, &ray, &how);
-#else
-    rtcInitIntersectContext(&own.context);
-    own.context.filter = on_proposal;
-    rtcIntersect1(bvh->rtc, &own.context, &ray);
-#endif
-}
-
-static void intersect_1(const struct bvh *bvh, const struct bvh_batch *rays, uint32_t n)
-{
-    const uint32_t last = bvh->scene->n_triangles;
-    for (uint32_t i = 0; i < n; i++) {
-        const float dir[3] = {rays->dir.x[i], rays->dir.y[i], rays->dir.z[i]};
-        struct bvh_one one = {.t_min = rays->t_min, .t_max = rays->t_max};
-        const float own[3] = {rays->own.x != NULL ? rays->own.x[i] : rays->org[0],
-                              rays->own.x != NULL ? rays->own.y[i] : rays->org[1],
-                              rays->own.x != NULL ? rays->own.z[i] : rays->org[2]};
-        bvh_intersect_one(bvh, own, dir, &one);
-        rays->prim[i] = one.prim;
-        rays->t[i] = one.t;
-        __builtin_prefetch(&bvh->triangle[one.prim < last ? one.prim : last], 0, 2);
-        rays->u[i] = one.u;
-        rays->v[i] = one.v;
-    }
-}
-
-static void set_up(struct bvh_packets *packets, const struct bvh_batch *rays, uint32_t width)
-{
-    if (packets->width == width && packets->t_min == rays->t_min &&
-        memcmp(packets->org, rays->org, sizeof rays->org) == 0)
-        return;
+    how.flags = RTC_RAY_QUERY_FLAG_COHERENT;
+    how.context = &query->context;
+    void *rays = &packet->at;
     if (width == 16)
-        set_up_16(packets->at.by16, rays);
+        rtcIntersect16(packet->valid, bvh->rtc, rays, &how);
     else if (width == 8)
-        set_up_8(packets->at.by8, rays);
+        rtcIntersect8(packet->valid, bvh->rtc, rays, &how);
+    else if (width == 4)
+        rtcIntersect4(packet->valid, bvh->rtc, rays, &how);
     else
-        set_up_4(packets->at.by4, rays);
-    memcpy(packets->org, rays->org, sizeof rays->org);
-    packets->t_min = rays->t_min;
-    packets->width = width;
+        rtcIntersect1(bvh->rtc, rays, &how);
+}
+#else
+static void begin(struct bvh_query *query)
+{
+    rtcInitIntersectContext(&query->context);
+    query->context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
 }
 
-/* Cuts rays at .. n into packets, `most` at most; gives how many, and where they begin and the last one ends.
- */
-static uint32_t cut(const struct bvh_batch *rays, uint32_t width, uint32_t at, uint32_t n, uint32_t most,
-                    uint32_t *first)
+static void call(const struct bvh *bvh, struct bvh_query *query, struct packet *packet, uint32_t width)
 {
-    uint32_t packets = 0;
-    first[0] = at;
-    while (at < n && packets < most) {
-        uint32_t end = n - at < width ? n : at + width;
-        for (uint32_t i = at + 1; rays->begins != NULL && i < end; i++)
-            if (rays->begins[i]) end = i;
-        first[++packets] = at = end;
-    }
-    return packets;
+    void *rays = &packet->at;
+    if (width == 16)
+        rtcIntersect16(packet->valid, bvh->rtc, &query->context, rays);
+    else if (width == 8)
+        rtcIntersect8(packet->valid, bvh->rtc, &query->context, rays);
+    else if (width == 4)
+        rtcIntersect4(packet->valid, bvh->rtc, &query->context, rays);
+    else
+        rtcIntersect1(bvh->rtc, &query->context, rays);
+}
+#endif
+
+/* Fields that stay the same from packet to packet. Embree changes tfar alone. */
+static void begin_packet(struct packet *packet, const struct bvh_batch *batch, uint32_t width)
+{
+    float *org = bvh_field(&packet->at, width, org_x);
+    memset(&packet->at, 0, sizeof packet->at);
+    memset(bvh_field(&packet->at, width, mask), 0xff, width * sizeof(uint32_t));
+    for (uint32_t i = 0; i < 3 * width; i++)
+        org[i] = (float)batch->at_local[i / width];
 }
 
-/* Packets with origins of their own are kept apart from those with a common one (bvh_inside.h), which would
- * have to be set up again. */
-void bvh_intersect(const struct bvh *bvh, struct bvh_packets *packets, const struct bvh_batch *rays, uint32_t n)
+/* Rays `first` to first + n; lanes without a ray have that of the first, and no hit. */
+VEC_INLINE void set_floats(struct packet *packet, const struct bvh_batch *batch, uint32_t first, uint32_t n,
+                           uint32_t width)
 {
-    const uint32_t width = bvh->info.packet;
-    uint32_t first[BVH_CHUNK / 4 + 1];
-    if (n == 0) return;
-    if (width == 1 || rays->scattered) {
-        intersect_1(bvh, rays, n);
-        return;
+    const float *const org[3] = {batch->org.x, batch->org.y, batch->org.z};
+    const float *const dir[3] = {batch->dir.x, batch->dir.y, batch->dir.z};
+    float *to_org = bvh_field(&packet->at, width, org_x), *to_dir = bvh_field(&packet->at, width, dir_x),
+          *tfar = bvh_field(&packet->at, width, tfar);
+    for (uint32_t j = 0; j < 3; j++) {
+        for (uint32_t i = 0; i < width; i++)
+            to_dir[j * width + i] = dir[j][first + (i < n ? i : 0)];
+        for (uint32_t i = 0; org[j] != NULL && i < width; i++)
+            to_org[j * width + i] = org[j][first + (i < n ? i : 0)];
     }
-    set_up(packets, rays, width);
-    for (uint32_t at = 0, k; at < n; at = first[k]) {
-        k = cut(rays, width, at, n, BVH_CHUNK / width, first);
-        if (width == 16) {
-            if (rays->own.x != NULL) place_16(packets->at.by16, rays, first, k);
-            intersect_16(bvh, packets->at.by16, rays, first, k);
-        } else if (width == 8) {
-            if (rays->own.x != NULL) place_8(packets->at.by8, rays, first, k);
-            intersect_8(bvh, packets->at.by8, rays, first, k);
-        } else {
-            if (rays->own.x != NULL) place_4(packets->at.by4, rays, first, k);
-            intersect_4(bvh, packets->at.by4, rays, first, k);
+    for (uint32_t i = 0; i < width; i++)
+        tfar[i] = batch->t_max;
+    for (uint32_t i = 0; i < width; i++)
+        packet->valid[i] = i < n ? -1 : 0;
+}
+
+VEC_INLINE void set_doubles(struct bvh_query *query, const struct bvh_batch *batch, uint32_t first, uint32_t n)
+{
+    const struct bvh_rays *rays = batch->rays;
+    const double *const dir[3] = {rays->dir.x, rays->dir.y, rays->dir.z};
+    const double *const own[3] = {rays->from.own.x, rays->from.own.y, rays->from.own.z};
+    const double *const local[3] = {batch->local.x, batch->local.y, batch->local.z};
+    for (uint32_t i = 0; i < BVH_PACKET; i++) {
+        query->range_m[i] = INFINITY;
+        query->hit_m[i] = NAN;
+    }
+    for (uint32_t i = 0; i < BVH_PACKET; i++) {
+        query->triangle[i] = BVH_NO_TRIANGLE;
+        query->n_tied[i] = 0;
+    }
+    if (batch->start_m != NULL) memcpy(query->start_m, batch->start_m + first, n * sizeof(double));
+    for (int j = 0; j < 3; j++) {
+        memcpy(query->dir[j], dir[j] + first, n * sizeof(double));
+        if (!query->has_own) continue;
+        memcpy(query->org[j], own[j] + first, n * sizeof(double));
+        memcpy(query->local[j], local[j] + first, n * sizeof(double));
+    }
+}
+
+static void forget_near(struct bvh_query *query)
+{
+    for (uint32_t i = 0; i < BVH_PACKET; i++) {
+        query->near_m[i] = INFINITY;
+        query->near[i] = BVH_NO_TRIANGLE;
+    }
+}
+
+static void take_near(struct bvh_query *query, uint32_t n)
+{
+    for (uint32_t i = 0; i < n; i++) {
+        if (query->near[i] == BVH_NO_TRIANGLE || query->hit_m[i] <= query->near_m[i]) continue;
+        query->triangle[i] = query->near[i];
+        query->hit_m[i] = query->near_m[i];
+    }
+    forget_near(query);
+}
+
+VEC_INLINE void cast_one(const struct bvh *bvh, struct bvh_query *query, struct packet *packet,
+                         const struct bvh_batch *batch, uint32_t first, uint32_t n, uint32_t width)
+{
+    const uint64_t decided = query->decided;
+    set_floats(packet, batch, first, n, width);
+    set_doubles(query, batch, first, n);
+    query->width = width;
+    query->dir_float = width == BVH_PACKET ? bvh_field(&packet->at, width, dir_x) : NULL;
+    call(bvh, query, packet, width);
+    if (query->decided != decided) take_near(query, n);
+    memcpy(batch->rays->range_m + first, query->hit_m, n * sizeof *query->hit_m);
+    memcpy(batch->rays->triangle + first, query->triangle, n * sizeof *query->triangle);
+}
+
+/* Whole packets of 16 are the common case: all lengths are constants there. */
+VEC_CLONES
+static void cast(const struct bvh *bvh, struct bvh_query *query, struct packet *packet, const struct bvh_batch *batch,
+                 uint32_t first, uint32_t n, uint32_t width)
+{
+    if (n == BVH_PACKET && width == BVH_PACKET)
+        cast_one(bvh, query, packet, batch, first, BVH_PACKET, BVH_PACKET);
+    else
+        cast_one(bvh, query, packet, batch, first, n, width);
+}
+
+/* The end of the packet that begins at `at`. */
+static uint32_t cut(const struct bvh_rays *rays, uint32_t width, uint32_t at)
+{
+    const uint32_t end = rays->n - at < width ? rays->n : at + width;
+    for (uint32_t i = at + 1; rays->begins != NULL && i < end; i++)
+        if (rays->begins[i]) return i;
+    return end;
+}
+
+void bvh_intersect(const struct bvh *bvh, struct bvh_query *query, struct bvh_batch *batch)
+{
+    const struct bvh_rays *rays = batch->rays;
+    const uint32_t width = rays->scattered ? 1 : bvh->info.packet;
+    struct packet whole, single;
+    begin(query);
+    begin_packet(&whole, batch, width);
+    if (rays->begins != NULL) begin_packet(&single, batch, 1);
+    query->bvh = bvh;
+    query->has_own = rays->from.own.x != NULL;
+    query->far_m = batch->far_m;
+    query->decided = query->leaves = 0;
+    memcpy(query->at, rays->from.at_m, sizeof query->at);
+    memcpy(query->at_local, batch->at_local, sizeof query->at_local);
+    memset(query->start_m, 0, sizeof query->start_m);
+    forget_near(query);
+    for (uint32_t at = 0, end; at < rays->n; at = end) {
+        end = cut(rays, width, at);
+        if (end - at > FEW || rays->begins == NULL) {
+            cast(bvh, query, &whole, batch, at, end - at, width);
+            continue;
         }
+        for (uint32_t i = at; i < end; i++)
+            cast(bvh, query, &single, batch, i, 1, 1);
     }
+    batch->counters->decided += query->decided;
+    batch->counters->leaves += query->leaves;
 }

@@ -62,10 +62,7 @@ void caster_get_counters(const struct caster *caster, struct cast_counters *coun
     const struct bvh_counters *bvh = bvh_work_counters(caster->bvh);
     const struct sight_counters *sight = sight_work_counters(caster->sight);
     *counters = caster->counters;
-    counters->near_border = bvh->near_border;
     counters->decided = bvh->decided;
-    counters->went_on = bvh->went_on;
-    counters->undecided = bvh->undecided;
     counters->few = sight->few;
     counters->asked = sight->asked;
 }

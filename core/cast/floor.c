@@ -126,8 +126,7 @@ static int cast_down(const struct column *c, const struct scene *scene, const do
     double far_m = 1.0;
     for (int i = 0; i < 3; i++)
         far_m += fmax(fabs(scene->min_m[i] - c->from_m[i]), fabs(scene->max_m[i] - c->from_m[i]));
-    int rc = bvh_create(scene, c->from_m, 0.0, 1, NULL, &bvh, err);
-    if (rc == SH_OK) rc = bvh_order_exactly(bvh, NULL, err); /* few triangles: no need to ask whether that is wanted */
+    int rc = bvh_create(scene, 1, NULL, &bvh, err);
     if (rc == SH_OK) rc = caster_create(&caster, err);
     const struct bvh_rays ray = {.n = 1,
                                  .from.at_m = {c->from_m[0], c->from_m[1], c->from_m[2]},

@@ -86,7 +86,7 @@ static int is_silent(const struct coverage *c, uint32_t t)
 
 static int has_cells(const struct coverage *c, uint32_t t)
 {
-    return !is_silent(c, t) && !bvh_is_twin(c->spec.bvh, t);
+    return !is_silent(c, t) && (c->twin[t / 64] >> t % 64 & 1) == 0;
 }
 
 static double count_pieces(const struct coverage *c, double cell_m)
@@ -269,7 +269,8 @@ int coverage_create(const struct coverage_spec *spec, const struct sh_report *re
     if (c == NULL) return sh_fail(err, SH_ENOMEM, "no memory for coverage");
     c->spec = *spec;
     c->scene = bvh_scene(spec->bvh);
-    int rc = set_up(c, err);
+    int rc = scene_find_twins(c->scene, report, &c->twin, err);
+    if (rc == SH_OK) rc = set_up(c, err);
     if (rc == SH_OK) rc = number_pieces(c, err);
     if (rc == SH_OK) rc = build(c, report, err);
     if (rc == SH_OK) return SH_OK;
@@ -281,6 +282,7 @@ int coverage_create(const struct coverage_spec *spec, const struct sh_report *re
 void coverage_free(struct coverage *coverage)
 {
     if (coverage == NULL) return;
+    free(coverage->twin);
     free(coverage->first);
     free(coverage->column);
     free(coverage->piece);

@@ -23,8 +23,7 @@ static const struct plan_ray_cost plan_ray_costs[] = {
 
 #define PLAN_COST_SIGHT_ONE 2.0   /* looked up: one triangle or nothing there, */
 #define PLAN_COST_SIGHT_FEW 44.0  /* one of a few, */
-#define PLAN_COST_SIGHT_ASK 150.0 /* the BVH is asked after all: such rays have nothing in common; */
-#define PLAN_COST_ASK_ORDER 380.0 /* and more where surfaces are ordered in double */
+#define PLAN_COST_SIGHT_ASK 150.0 /* the BVH is asked after all: such rays have nothing in common */
 /* What is more in a scene of a million triangles, whose planes lie in no cache; by the root of their number. */
 #define PLAN_COST_MILLION 20.0
 /* To make it: in any case, by triangle, and by cell that shows more than one; such a cell's memory. */
@@ -33,8 +32,5 @@ static const struct plan_ray_cost plan_ray_costs[] = {
 #define PLAN_COST_SIGHT_CELL     140.0
 #define PLAN_SIGHT_CELL_BYTES    25.0
 #define PLAN_SIGHT_RECORD_BYTES  128.0 /* of a triangle that such cells show */
-/* bvh_order_exactly: a triangle, and a ray's first hit in a scene of few overlaps. */
-#define PLAN_COST_ORDER   6000.0
-#define PLAN_COST_ORDERED 20.0
 
 #endif

@@ -37,17 +37,8 @@ void plan_mesh(double error_m, struct plan_row *row)
 void plan_cast(uint32_t packet, struct plan_row *row)
 {
     char method[sizeof row->method];
-    snprintf(method, sizeof method, "packets of %u, decided", packet);
-    plan_say(row, "cast", method, CAST_ERROR_M, 0.0, "triangle and range in double where float can't tell");
-}
-
-/* Share of the range within which float can't tell two surfaces apart. */
-static const double FLOAT_ORDER = 5e-7;
-
-void plan_order_options(double far_m, struct plan_option option[2])
-{
-    option[0] = (struct plan_option){.method = "none", .error_m = FLOAT_ORDER * far_m};
-    option[1] = (struct plan_option){.method = "double", .cost_ns = (double)NAN};
+    snprintf(method, sizeof method, "packets of %u, in double", packet);
+    plan_say(row, "cast", method, CAST_ERROR_M, 0.0, "triangle and range in double, wherever rays begin");
 }
 
 void plan_beam_option(enum beam_mode mode, uint32_t rings, struct plan_option *option)

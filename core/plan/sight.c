@@ -40,16 +40,9 @@ static double least_build_ns(const struct plan_sight_need *need)
     return PLAN_COST_SIGHT + PLAN_COST_SIGHT_TRIANGLE * need->n_triangles;
 }
 
-/* Without a map, where surfaces are to be ordered exactly, the BVH has to be prepared for that, too. */
-static double ordering_ns(const struct plan_sight_need *need)
-{
-    const double all_ns = PLAN_COST_ORDER * need->n_triangles + PLAN_COST_ORDERED * need->pulses;
-    return need->order == PLAN_ORDER_INSTEAD ? all_ns : 0.0;
-}
-
 /* Of a scan, ns: per pulse, but build. */
 struct costs {
-    double bvh, map, order, build;
+    double bvh, map, build;
 };
 
 static void estimate(const struct plan_sight_need *need, const struct plan_sight_found *f, struct costs *c)
@@ -63,20 +56,18 @@ static void estimate(const struct plan_sight_need *need, const struct plan_sight
         f->nothing * cost->out + (1.0 - f->nothing) * (cost->met + plane_ns(need)) + (f->few + f->ask) * cost->border;
     c->map = (f->one + f->nothing) * PLAN_COST_SIGHT_ONE + f->one * plane_ns(need) + few * PLAN_COST_SIGHT_FEW +
              ask * (c->bvh + PLAN_COST_SIGHT_ASK);
-    c->order = need->order == PLAN_ORDER_FLOAT ? 0.0 : ask * PLAN_COST_ASK_ORDER;
     c->build = least_build_ns(need) + PLAN_COST_SIGHT_CELL * fits * mixed;
 }
 
-static int pays(const struct plan_sight_need *need, const struct costs *c, int ordered)
+static int pays(const struct plan_sight_need *need, const struct costs *c)
 {
-    const double map_ns = c->map + (ordered ? c->order : 0.0);
-    return (1.0 - LEAST_LEFT) * (c->bvh - map_ns) * need->pulses + ordering_ns(need) > c->build;
+    return (1.0 - LEAST_LEFT) * (c->bvh - c->map) * need->pulses > c->build;
 }
 
 int plan_sight_may_pay(const struct plan_sight_need *need)
 {
     const double saved_ns = ray_cost(need)->met + ray_cost(need)->border - PLAN_COST_SIGHT_ONE;
-    return (1.0 - LEAST_LEFT) * saved_ns * need->pulses + ordering_ns(need) > least_build_ns(need);
+    return (1.0 - LEAST_LEFT) * saved_ns * need->pulses > least_build_ns(need);
 }
 
 static void say_why(const struct plan_sight_need *need, const struct plan_sight_found *found, const struct costs *c,
@@ -101,33 +92,28 @@ static void say_why(const struct plan_sight_need *need, const struct plan_sight_
                  pulses_m, it_pays ? "pay" : "do not pay", c->bvh - c->map, 1e-9 * c->build, plain);
 }
 
-void plan_sight_choose(const struct plan_sight_need *need, const struct plan_sight_found *found,
-                       struct plan_sight_choice *choice, struct plan_row *row)
+int plan_sight_choose(const struct plan_sight_need *need, const struct plan_sight_found *found, struct plan_row *row)
 {
     static const struct plan_tolerance any = {INFINITY, 1.0};
     static const struct plan_sight_found best = {.one = 1.0};
     struct plan_option option[OPTIONS] = {[NO_MAP] = {.method = "none"}, [MAP] = {.method = "map"}};
     struct costs c;
     estimate(need, found != NULL ? found : &best, &c);
-    const int can = need->why_not == NULL, must_order = need->order >= PLAN_ORDER_DOUBLE;
-    const int ordered_pays = can && found != NULL && pays(need, &c, 1);
-    const int it_pays = ordered_pays || (can && found != NULL && !must_order && pays(need, &c, 0));
+    const int can = need->why_not == NULL, it_pays = can && found != NULL && pays(need, &c);
     if (can)
-        option[MAP].cost_ns = c.map - c.bvh + (c.build - ordering_ns(need)) / fmax(1.0, need->pulses);
+        option[MAP].cost_ns = c.map - c.bvh + c.build / fmax(1.0, need->pulses);
     else
         snprintf(option[MAP].why_not, sizeof option[MAP].why_not, "%s", need->why_not);
     if (!can) option[MAP].cost_ns = (double)NAN;
     if (!it_pays && option[MAP].cost_ns < 0.0) option[MAP].cost_ns = 0.0; /* not beyond doubt */
     const struct plan_choice ask = {"sight", option, OPTIONS, need->forced, "cast.sight", any};
-    choice->map = plan_choose(&ask, row) == MAP;
-    choice->ordered = choice->map && need->order != PLAN_ORDER_FLOAT && (ordered_pays || must_order || row->forced);
-    choice->order_ns = choice->ordered && found != NULL ? c.order : 0.0;
+    const int map = plan_choose(&ask, row) == MAP;
     say_why(need, found, &c, it_pays, row);
+    return map;
 }
 
 int plan_sight(const struct plan_sight_need *need, struct plan_place *place, uint32_t n_places,
-               const struct sh_report *report, struct plan_sight_choice *choice, struct plan_row *row,
-               struct sh_err *err)
+               const struct sh_report *report, int *map, struct plan_row *row, struct sh_err *err)
 {
     const int looks = need->why_not == NULL && need->forced != 0 && plan_sight_may_pay(need);
     struct plan_sight_found found;
@@ -140,6 +126,6 @@ int plan_sight(const struct plan_sight_need *need, struct plan_place *place, uin
         rc = sh_check_stop(report, err);
         if (rc != SH_OK) return rc;
     }
-    plan_sight_choose(need, looks ? &found : NULL, choice, row);
+    *map = plan_sight_choose(need, looks ? &found : NULL, row);
     return SH_OK;
 }

@@ -22,7 +22,7 @@ enum {
 struct build_candidate {
     double edge[3][3], edge_slope[3]; /* |f[1]| + |f[2]| */
     double plane[3], plane_slope;
-    double slack, rel, graze;
+    double slack, graze;
     double near_m; /* no point of it is nearer to the station */
     uint32_t triangle;
     uint32_t record; /* BUILD_NO_RECORD: not yet in a list */
@@ -65,7 +65,7 @@ int build_bins(struct build_shared *b, struct sh_err *err);
 void sight_corners(const struct sight *sight, uint32_t triangle, double v[3][3]);
 /* Figures of triangles in many regions, ahead. */
 void build_figures(struct build_shared *b);
-/* False where no ray meets the triangle: it has no area, another one stands for it, or a corner is at the station. */
+/* False where no ray meets the triangle: it has no area, or a corner is at the station. */
 int build_candidate(const struct build_shared *b, uint32_t face, uint32_t triangle, struct build_candidate *c);
 void build_record(const struct build_candidate *c, uint32_t face, struct sight_record *r);
 

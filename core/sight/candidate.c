@@ -33,35 +33,19 @@ static void from_face(const double f[3], uint32_t face, double out[3])
     out[(axis + 2) % 3] = f[2];
 }
 
-/* The side of edge a-b, in units of its doubt (sight_inside.h), which is border_m across the ray at least. */
-static void set_edge(const double a[3], const double b[3], double sign, double border_m, double side[3])
+/* The side of edge a-b, in units of its doubt (sight_inside.h). */
+static void set_edge(const double a[3], const double b[3], double sign, double side[3])
 {
     double e[3];
     vec3_sub(b, a, e);
     vec3_cross(a, e, side);
     const double aa = vec3_dot(a, a), bb = vec3_dot(b, b), far_m = sqrt(aa > bb ? aa : bb);
-    const double doubt_m = SIGHT_EDGE_DOUBT * far_m, least_m = doubt_m > border_m ? doubt_m : border_m;
-    const double scale = sign / (least_m * vec3_length(e));
+    const double scale = sign / (SIGHT_EDGE_DOUBT * far_m * vec3_length(e));
     for (int i = 0; i < 3; i++)
         side[i] *= scale;
 }
 
-/* How far the BVH's float distance may be wrong, as a share of the distance times the height of the station above
- * the plane (sight_inside.h). */
-static double float_doubt_m(double v[3][3], double area2, const double o_local[3])
-{
-    double longest = 0.0, far_m = 0.0, product = 1.0;
-    for (int i = 0; i < 3; i++) {
-        const double length = vec3_distance(v[(i + 1) % 3], v[i]);
-        longest = fmax(longest, length);
-        product *= length;
-        far_m = fmax(far_m, vec3_length(v[i]));
-    }
-    far_m += 2.0 * vec3_length(o_local);
-    return SIGHT_FLOAT_DOUBT * (far_m + product / (longest * area2) * (longest + 0.05 * far_m));
-}
-
-static int set_plane(const struct sight *sight, struct build_candidate *c, double v[3][3])
+static int set_plane(const struct sight *sight, struct build_candidate *c)
 {
     const struct bvh_plane *p = bvh_plane(sight->bvh, c->triangle);
     double origin_m[3], o_local[3], m[3];
@@ -73,16 +57,13 @@ static int set_plane(const struct sight *sight, struct build_candidate *c, doubl
     for (int i = 0; i < 3; i++)
         m[i] = p->n[i] / off;
     if (!(vec3_length(m) < 1e300)) { /* the station lies in the plane: to be decided wherever its edges don't say */
-        c->plane[0] = c->plane[1] = c->plane[2] = c->slack = c->rel = 0.0;
+        c->plane[0] = c->plane[1] = c->plane[2] = c->slack = 0.0;
         c->graze = 1e300;
         return 1;
     }
     memcpy(c->plane, m, sizeof m);
     c->slack = SIGHT_PLANE_DOUBT / height_m;
     c->graze = SIGHT_GRAZE / height_m;
-    const double rel = float_doubt_m(v, length, o_local) / height_m;
-    c->rel = sight->exact ? 0.0 : rel;
-    if (rel > SIGHT_MAX_REL) c->graze = 1e300; /* float may have the plane behind the station */
     return 1;
 }
 
@@ -126,22 +107,20 @@ static int is_at_corner(double v[3][3])
     return 0;
 }
 
-/* The figures in prcs. False where no ray meets the triangle: it has no area, another one stands for it, or a corner is
- * at the station. */
+/* The figures in prcs. False where no ray meets the triangle: it has no area, or a corner is at the station. */
 static int find_figures(const struct sight *sight, uint32_t triangle, struct build_candidate *c)
 {
     double v[3][3], n[3], longest2 = 0.0, near2 = INFINITY;
     c->triangle = triangle;
     c->record = BUILD_NO_RECORD;
     sight_corners(sight, triangle, v);
-    if (bvh_is_twin(sight->bvh, triangle) || is_at_corner(v) || !set_plane(sight, c, v)) return 0;
+    if (is_at_corner(v) || !set_plane(sight, c)) return 0;
     vec3_cross(v[1], v[2], n);
     const double volume = vec3_dot(v[0], n), sign = volume < 0.0 ? -1.0 : 1.0;
     double doubt = SIGHT_VOLUME_DOUBT * vec3_length(v[0]) * vec3_length(v[1]) * vec3_length(v[2]);
-    const double border_m = bvh_border_m(sight->bvh, triangle, sight->station_m);
     for (int i = 0; i < 3; i++) {
         double e[3];
-        set_edge(v[i], v[(i + 1) % 3], sign, border_m, c->edge[i]);
+        set_edge(v[i], v[(i + 1) % 3], sign, c->edge[i]);
         if (!(fabs(c->edge[i][0]) + fabs(c->edge[i][1]) + fabs(c->edge[i][2]) < INFINITY))
             return 0; /* two corners in one place: no area */
         vec3_sub(v[(i + 1) % 3], v[i], e);
@@ -209,7 +188,6 @@ void build_record(const struct build_candidate *c, uint32_t face, struct sight_r
         from_face(c->edge[i], face, r->edge[i]);
     from_face(c->plane, face, r->plane);
     r->slack = c->slack;
-    r->rel = c->rel;
     r->graze = c->graze;
     r->triangle = c->triangle;
 }

@@ -23,7 +23,7 @@ struct looks {
 VEC_INLINE void look_at(const struct sight *s, const uint32_t *list, struct looks *w)
 {
     const quad x = w->x, y = w->y, z = w->z;
-    quad first_q = {0.0, 0.0, 0.0, 0.0}, slack = first_q, rel = first_q;
+    quad first_q = {0.0, 0.0, 0.0, 0.0}, slack = first_q;
     quad_mask first = {-1, -1, -1, -1}, any = {0, 0, 0, 0}, asks = any, open = any;
     const uint32_t n = list[0];
     for (uint32_t k = 0; k < n; k++) {
@@ -36,7 +36,7 @@ VEC_INLINE void look_at(const struct sight *s, const uint32_t *list, struct look
         const quad_mask sure = (quad_mask)(q >= r->graze) & (quad_mask)(q <= SIGHT_NEAR);
         const quad_mask met = (quad_mask)(a >= 1.0) & (quad_mask)(b >= 1.0) & (quad_mask)(c >= 1.0);
         const quad_mask better = met & (quad_mask)(q > first_q);
-        const quad its_slack = {r->slack, r->slack, r->slack, r->slack}, its_rel = {r->rel, r->rel, r->rel, r->rel};
+        const quad its_slack = {r->slack, r->slack, r->slack, r->slack};
         const quad_mask number = {k, k, k, k};
         w->met[k] = met;
         w->may[k] = may;
@@ -46,13 +46,11 @@ VEC_INLINE void look_at(const struct sight *s, const uint32_t *list, struct look
         first = (number & better) | (first & ~better);
         quad_choose(&better, &q, &first_q);
         quad_choose(&better, &its_slack, &slack);
-        quad_choose(&better, &its_rel, &rel);
     }
     for (uint32_t k = 0; k < n; k++) {
         const struct sight_record *r = &s->record[list[1 + k]];
         const quad_mask number = {k, k, k, k};
-        const quad_mask behind =
-            (quad_mask)(first_q - w->q[k] > slack + r->slack + (rel + r->rel + SIGHT_SAME) * first_q);
+        const quad_mask behind = (quad_mask)(first_q - w->q[k] > slack + r->slack + SIGHT_SAME * first_q);
         open |= ~behind & w->may[k] & (quad_mask)(number != first);
     }
     w->first_q = first_q;
@@ -62,8 +60,8 @@ VEC_INLINE void look_at(const struct sight *s, const uint32_t *list, struct look
     w->open = open | asks | (any & (first >> 63));
 }
 
-/* Rays that several planes are met by at the same place, all within the borders: by the rule of core/bvh/decide.c,
- * and by its ranges. */
+/* Rays that meet several planes at the same place, all within the borders: by the rule of core/bvh, and by its
+ * ranges. */
 static uint32_t decide_tie(const struct sight *s, const struct bvh_rays *rays, const uint32_t *list,
                            const struct looks *w, int i)
 {
@@ -92,7 +90,7 @@ static uint32_t of_lane(const struct sight *s, const struct bvh_rays *rays, cons
 {
     if (!w->any[i]) return BVH_NO_TRIANGLE;
     if (!w->open[i]) return s->record[list[1 + w->first[i]]].triangle;
-    return s->exact && w->first[i] >= 0 && !w->asks[i] ? decide_tie(s, rays, list, w, i) : (uint32_t)FEW_OPEN;
+    return w->first[i] >= 0 && !w->asks[i] ? decide_tie(s, rays, list, w, i) : (uint32_t)FEW_OPEN;
 }
 
 VEC_INLINE void take(struct looks *w, const struct vec3_in *dir, uint32_t at, uint32_t n)

@@ -10,9 +10,8 @@ struct sight_work {
     struct sight_run run[HITS_ROOM];
     uint32_t triangle[HITS_ROOM]; /* of a run's rays */
     /* Rays that the BVH is asked for. */
-    uint8_t asks[HITS_ROOM];  /* 1: of the chunk's */
-    uint32_t ray[HITS_ROOM];  /* which ones are cast */
-    uint8_t order[HITS_ROOM]; /* of those that are cast: 1 where it asks itself */
+    uint8_t asks[HITS_ROOM]; /* 1: of the chunk's */
+    uint32_t ray[HITS_ROOM]; /* which ones they are */
     double x[HITS_ROOM], y[HITS_ROOM], z[HITS_ROOM], range_m[HITS_ROOM];
     uint32_t met[HITS_ROOM], label[HITS_ROOM];
     float steep[HITS_ROOM];
@@ -97,24 +96,11 @@ static uint32_t do_runs(struct sight_work *w, const struct sight *s, const struc
     return asked;
 }
 
-/* Which rays are cast for those that ask: their whole packets, as bvh_hits would have cut them from the chunk, so that
- * the BVH proposes the same. */
-static uint32_t gather(struct sight_work *w, const struct sight *s, const struct bvh_rays *rays)
+static uint32_t gather(struct sight_work *w, const struct bvh_rays *rays)
 {
-    struct bvh_info info;
     uint32_t m = 0;
-    bvh_get_info(s->bvh, &info);
-    const uint32_t packet = info.packet;
-    for (uint32_t at = 0; at < rays->n; at += packet) {
-        const uint32_t end = rays->n - at < packet ? rays->n : at + packet;
-        uint32_t any = 0;
-        for (uint32_t i = at; i < end; i++)
-            any |= w->asks[i];
-        for (uint32_t i = at; any && i < end; i++)
-            w->ray[m++] = i;
-    }
-    for (uint32_t k = 0; k < m; k++)
-        w->order[k] = w->asks[w->ray[k]];
+    for (uint32_t i = 0; i < rays->n; i++)
+        if (w->asks[i]) w->ray[m++] = i;
     for (uint32_t k = 0; k < m; k++) {
         w->x[k] = rays->dir.x[w->ray[k]];
         w->y[k] = rays->dir.y[w->ray[k]];
@@ -125,7 +111,7 @@ static uint32_t gather(struct sight_work *w, const struct sight *s, const struct
 
 static void ask_bvh(struct sight_work *w, struct bvh_work *bvh_work, const struct sight *s, const struct bvh_rays *rays)
 {
-    struct bvh_rays asked = {.n = gather(w, s, rays),
+    struct bvh_rays asked = {.n = gather(w, rays),
                              .from = rays->from,
                              .dir = VEC3_IN(*w, 0),
                              .range_max_m = rays->range_max_m,
@@ -133,13 +119,9 @@ static void ask_bvh(struct sight_work *w, struct bvh_work *bvh_work, const struc
                              .triangle = w->met,
                              .label = w->label,
                              .steep = rays->steep != NULL ? w->steep : NULL};
-    if (s->exact)
-        bvh_hits_ordered(bvh_work, s->bvh, &asked, w->order);
-    else
-        bvh_hits(bvh_work, s->bvh, &asked);
+    bvh_hits(bvh_work, s->bvh, &asked);
     for (uint32_t k = 0; k < asked.n; k++) {
         const uint32_t i = w->ray[k];
-        if (!w->asks[i]) continue;
         rays->range_m[i] = w->range_m[k];
         rays->triangle[i] = w->met[k];
         if (rays->label != NULL) rays->label[i] = w->label[k];

@@ -43,7 +43,7 @@ struct quarters {
     double half; /* of each, with the pad */
     /* The planes of what covers each; cover is NO_CANDIDATE, and first 0, where nothing does. */
     quad_mask cover;
-    quad first, plane[3], slope, slack, rel;
+    quad first, plane[3], slope, slack;
 };
 
 /* What becomes known of a candidate in the four quarters: outside, covers. */
@@ -102,7 +102,7 @@ VEC_INLINE int take_covers(const struct build_work *w, struct quarters *four)
 {
     const quad none = {0.0, 0.0, 0.0, 0.0};
     int any = 0;
-    four->plane[0] = four->plane[1] = four->plane[2] = four->slope = four->slack = four->rel = none;
+    four->plane[0] = four->plane[1] = four->plane[2] = four->slope = four->slack = none;
     for (int k = 0; k < 4; k++) {
         if ((uint32_t)four->cover[k] == NO_CANDIDATE) continue;
         const struct build_candidate *c = &w->candidate[four->cover[k]];
@@ -110,7 +110,6 @@ VEC_INLINE int take_covers(const struct build_work *w, struct quarters *four)
             four->plane[j][k] = c->plane[j];
         four->slope[k] = c->plane_slope;
         four->slack[k] = c->slack;
-        four->rel[k] = c->rel;
         any = 1;
     }
     return any;
@@ -122,7 +121,7 @@ VEC_INLINE void find_behind(const struct build_candidate *c, const struct quarte
 {
     const double half = four->half;
     const quad across = four->plane[1] - c->plane[1], up = four->plane[2] - c->plane[2], reach = four->slope * half;
-    const quad doubt = 2.0 * (c->slack + four->slack) + (c->rel + four->rel + SIGHT_SAME) * (four->first + reach);
+    const quad doubt = 2.0 * (c->slack + four->slack) + SIGHT_SAME * (four->first + reach);
     const quad_mask positive = {INT64_MAX, INT64_MAX, INT64_MAX, INT64_MAX};
     const quad spread = ((quad)((quad_mask)across & positive) + (quad)((quad_mask)up & positive)) * half;
     quad mine;

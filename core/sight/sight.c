@@ -208,7 +208,6 @@ int sight_create(const struct sight_spec *spec, unsigned threads, const struct s
     clock_gettime(CLOCK_MONOTONIC, &from);
     s->bvh = spec->bvh;
     memcpy(s->station_m, spec->station_m, sizeof s->station_m);
-    s->exact = spec->exact;
     int rc = make(s, spec, threads, report, err);
     if (rc != SH_OK) {
         sight_free(s);

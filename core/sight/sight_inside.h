@@ -13,13 +13,13 @@
  * leaves. Whoever looks a direction up may round its coordinates: each leaf holds SIGHT_PAD beyond its own
  * borders.
  *
- * Why a leaf says no more than is true. The hit of a ray, as core/bvh/decide.c has it, depends on the triangles
+ * Why a leaf says no more than is true. The hit of a ray, as core/bvh has it, depends on the triangles
  * that the ray meets or misses by less than double precision tells, and on where it meets their planes. So it
  * is enough to show that all other triangles of the scene leave the hit as it is. A triangle is left out of a
  * square only in one of three ways:
  * - Beside it (bins.c, region.c): the side of one edge is below minus its doubt at the four corners of the square,
  *   pad included. It is linear, so it is below that everywhere in the square: all rays miss the triangle, by more
- *   than decide.c calls undecided. Regions hold every triangle whose corners are not all beyond one side of the
+ *   than core/bvh takes for a near miss. Regions hold every triangle whose corners are not all beyond one side of the
  *   region's pyramid, which is wider than the region by some pads.
  * - Behind (region.c): another one covers the square (all sides above their doubts at all corners, so every ray
  *   passes inside), and its plane . d is larger at all corners by more than the doubts of both. So every ray comes
@@ -65,39 +65,32 @@ static inline enum sight_kind sight_kind(uint32_t leaf)
 
 /* A triangle of a list, as rays are decided. d is the ray's unit vector. Where q = plane . d:
  * - inside for certain: all of edge[k] . d >= 1. Outside for certain: one is <= -1. (Edges are divided by
- *   what double precision leaves in doubt, here and in core/bvh/decide.c together.)
+ *   what double precision leaves in doubt, here and in core/bvh together.)
  * - not met at all for certain, or not to be decided here: q < graze, or q > SIGHT_NEAR.
  * - of two triangles the one with the larger q comes first for certain where the q differ by more than
- *   slack + slack' + (rel + rel' + SIGHT_SAME) q. */
+ *   slack + slack' + SIGHT_SAME q. */
 struct sight_record {
     double edge[3][3];
     double plane[3];
-    double slack, rel; /* doubt of q: of its arithmetic; of the BVH's order, as a share of q (0 where exact) */
+    double slack; /* doubt of q */
     double graze;
     uint32_t triangle;
 } __attribute__((aligned(128)));
 
 /* What double precision leaves in doubt of an edge's side, against the distance of its farther end times its
- * length: 8 units of 2^-53 in core/bvh/decide.c, 10 here (the difference of the corners 1, the cross product 6,
- * the product with a direction 3), and 8 more within which decide.c takes an edge for hit. */
+ * length: 10 units of 2^-53 here (the difference of the corners 1, the cross product 6, the product with a
+ * direction 3), as many in core/bvh, and 8 more within which an edge that is missed there is nearly hit. */
 #define SIGHT_EDGE_DOUBT (32.0 * 0x1p-53)
-/* Of a . (b x c), against the product of their lengths, here and in core/bvh/decide.c together. */
+/* The doubt of a . (b x c), against the product of their lengths, here and in core/bvh together. */
 #define SIGHT_VOLUME_DOUBT (32.0 * 0x1p-53)
-/* How far the plane that core/bvh has of a triangle may lie off it, against its longest edge: it is tilted by up to
- * 2^-40. */
+/* How far the plane that core/bvh has of a triangle may lie off it, against its longest edge: far more than rounding
+ * leaves. */
 #define SIGHT_TILT_DOUBT 0x1p-38
 /* Of plane . d, against the plane's length: its components 1, the product 3; twice, here and there. */
 #define SIGHT_PLANE_DOUBT (16.0 * 0x1p-53)
-/* Sines of angles below this are not decided here: decide.c holds ranges between edges below 1e-6, and beyond
- * 1 / BVH_MAX_SLANT a BVH promises nothing. */
+/* Sines of angles below this are not decided here. Below 1e-6 core/bvh holds ranges between edges. */
 #define SIGHT_GRAZE 0x1p-15
-/* Embree's distance, as a share: this times (F + k (L + F / 20)) / h. F: the farthest corner from where Embree
- * sees it; L: the longest edge (the widened triangle is up to F / 20 larger); k: how much the normal of a sliver
- * loses, the product of its two longer edges by twice the area; h: the height of the station above the plane. */
-#define SIGHT_FLOAT_DOUBT (20.0 * 0x1p-24)
-#define SIGHT_MAX_REL     0.25
-
-/* core/bvh/decide.c takes ranges within 1e-12 of each other for the same: the lowest triangle wins. Above
+/* core/bvh takes ranges within 1e-12 of each other for the same: the lowest triangle wins. Above
  * this they are not for certain. */
 #define SIGHT_SAME 4e-12
 /* 1 / m. What a ray begins on it does not meet (BVH_AT_ORIGIN_M); nearer than twice that, the BVH decides. */
@@ -106,7 +99,6 @@ struct sight_record {
 struct sight {
     const struct bvh *bvh;
     double station_m[3];
-    int exact;
     uint32_t cells; /* power of two */
     uint32_t *tile; /* [SIGHT_FACES][cells / SIGHT_TILE][cells / SIGHT_TILE], v outside, u inside; one that asks */
     uint32_t *leaf; /* blocks */

@@ -138,7 +138,7 @@ static int owes(const void *protocol)
     return s->stream.active || s->single.active || s->reboot_ns != INT64_MIN;
 }
 
-/* Who reboots a scanner closes before it does. */
+/* A client that reboots a scanner closes before it does. */
 static void gone(void *protocol)
 {
     struct scip *s = protocol;

@@ -125,7 +125,7 @@ static const struct app_option OPTIONS[] = {
 static const char NOTES[] =
     "Of each stage the cheapest method is used whose bounds hold. The bounds are plan.tolerance_m (RMS of the\n"
     "ranges) and plan.echo_tolerance (share of the pulses with another number of echoes). beam.mode, optics.depth,\n"
-    "cast.sight, scene.order_exactly and output.georef force a method.\n"
+    "cast.sight and output.georef force a method.\n"
     "\n"
     "Beam and optics are tried on some thousands of the head's own pulses in the scene, always the same ones. They\n"
     "are compared with 1,027 sub-rays, or with the deepest way. The bounds are upper limits of what was found, from\n"

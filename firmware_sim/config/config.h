@@ -107,10 +107,10 @@ enum config_at_end { PLATFORM_STOP, PLATFORM_HOLD };
 /* What the head stands on. Attitudes as core/pose.h has them. */
 struct config_platform {
     enum config_platform_kind kind;
-    char file[CONFIG_PATH_LEN], waypoints[CONFIG_PATH_LEN]; /* trajectory, stops: one of them */
-    double start_s, end_s;                                  /* part of the trajectory, after its first sample */
-    int has_end;                                            /* 0: to its last sample */
-    double step_s;                                          /* stops: from each to the next */
+    char file[CONFIG_PATH_LEN], waypoints[CONFIG_PATH_LEN];   /* trajectory, stops: one of them */
+    double start_s, end_s;                                    /* part of the trajectory, after its first sample */
+    int has_end;                                              /* 0: to its last sample */
+    double step_s;                                            /* stops: from each to the next */
     double frames_per_s, first_frame, last_frame, frame_step; /* stops: the same in frames; 0 frames a second: not */
     enum config_at_end at_end;
     double mount_m[3], mount_heading_deg, mount_pitch_deg, mount_roll_deg; /* of the head on the platform */
@@ -192,17 +192,10 @@ struct config_scene {
     struct config_mesh mesh[CONFIG_MAX_MESHES];
     uint32_t n_meshes;
     double tolerance_m;
-    enum config_choice order_exactly; /* surfaces that overlap are ordered in double */
-    int cutouts;                      /* rays pass where a texture's alpha is below a half */
+    int cutouts; /* rays pass where a texture's alpha is below a half */
     struct scene_import_limits import;
     struct config_anchor anchor;
-    /* What all scanners of the scene together need, so that they can share it; zeros where there is only one. */
-    struct config_shared {
-        int textures;       /* one of them models the signal */
-        double range_max_m; /* of any */
-        double beside_m;    /* rays begin up to so far from the head */
-        int passes_glass;   /* one follows pulses through glass or off mirrors */
-    } shared;
+    int shared_textures; /* a scanner of the scene models the signal, so all of them have the textures */
 };
 
 struct config_output {
@@ -365,7 +358,7 @@ static inline double config_range_most_m(const struct config *cfg)
 /* Whether the scene needs texture coordinates and textures. */
 static inline int config_wants_textures(const struct config *cfg)
 {
-    return cfg->signal.on || cfg->output.colour == COLOUR_TEXTURE || cfg->scene.shared.textures;
+    return cfg->signal.on || cfg->output.colour == COLOUR_TEXTURE || cfg->scene.shared_textures;
 }
 
 static inline int config_has_footprint(const struct config *cfg)

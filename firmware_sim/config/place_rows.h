@@ -5,11 +5,6 @@
     {KEY(scene.tolerance_m), CFG_REAL, "m", "", 1e-9, 1, .example = "1e-4",
      .help = "Largest error of a vertex. Formats of single precision are refused where coordinates are too large. When "
              "not given: a tenth of plan.tolerance_m, or 1 m where that isn't given either. Above 1e-6 m is a warning."},
-    {KEY(scene.order_exactly), CFG_ENUM, .def = "auto",
-     WORDS([CHOICE_AUTO] = "auto", [CHOICE_OFF] = "off", [CHOICE_ON] = "on"),
-     .help = "Orders surfaces that overlap or cross in double. It costs loading time, and speed where surfaces "
-             "overlap. auto: on where float's resolution in the scene is coarser than plan.tolerance_m, and where a map "
-             "of what the station sees (cast.sight) gives it at no cost."},
     {KEY(scene.cutouts), CFG_BOOL, .def = "on",
      .help = "Rays pass where a texture's alpha or opacity map is below a half, as between leaves. Textures are then "
              "read when the scene is loaded; without such a texture it costs nothing more."},
@@ -152,7 +147,7 @@
      .help = "Of the head on the platform, clockwise; then pitch, then roll."},
     {KEY(platform.mount_pitch_deg), CFG_REAL, "deg", "0", -90, 90, .help = "Positive: nose up."},
     {KEY(platform.mount_roll_deg), CFG_REAL, "deg", "0", -360, 360, .help = "Positive: right side down."},
-    {KEY(platform.reach_m), CFG_REAL, "m", "100", 1, 1000, .help = "live: how far from the station the head may come."},
+    {KEY(platform.reach_m), CFG_REAL, "m", "100", 1, 1e5, .help = "live: how far from the station the head may come."},
     {KEY(platform.extrapolate_ms), CFG_REAL, "ms", "100", 0, 10000,
      .help = "live: how long the motion between the last two poses is taken to go on. Later the platform stands, and "
              "is late. Between two poses it moves evenly."},

@@ -124,24 +124,6 @@ static int is_same_scanner(const struct config *a, const struct config *b)
            IS_SAME(a, b, instrument);
 }
 
-static int passes_glass(const struct config *cfg)
-{
-    int passes = 0;
-    for (uint32_t i = 0; i < cfg->n_surfaces; i++)
-        passes |= cfg->surface[i].surface.glass > 0.0 || cfg->surface[i].surface.mirror > 0.0;
-    return passes && cfg->optics.depth > 0;
-}
-
-static void add_need(struct config_shared *all, const struct config *cfg)
-{
-    const struct config_instrument *k = &cfg->instrument;
-    all->textures |= cfg->signal.on;
-    all->passes_glass |= passes_glass(cfg);
-    all->range_max_m = fmax(all->range_max_m, config_range_most_m(cfg));
-    all->beside_m =
-        fmax(all->beside_m, hypot(k->transit_offset_m, k->mirror_offset_m) + 0.5 * cfg->profile.beam_exit_m);
-}
-
 static int copy_text_of(char *text, size_t len, const char *fault)
 {
     static const char mark[] = ", for stations[";
@@ -213,7 +195,7 @@ static void check_all(struct config *cfg, struct config **own, struct config_fau
         find_same(cfg, loaded, i);
     if (config_is_alone(cfg)) return;
     for (uint32_t i = 0; i < cfg->n_stations; i++)
-        add_need(&cfg->scene.shared, loaded[i]);
+        cfg->scene.shared_textures |= loaded[i]->signal.on;
 }
 
 void cfg_check_scanners(struct config *cfg, struct config_faults *faults)
@@ -237,7 +219,7 @@ int config_load_scanner(const struct config *cfg, uint32_t station, struct confi
     if (rc != SH_OK) return sh_fail(err, rc, "%s", faults.fault[0].text);
     for (uint32_t i = 0; i < cfg->n_stations && i < out->n_stations; i++)
         out->station[i].scanner = cfg->station[i].scanner;
-    out->scene.shared = cfg->scene.shared;
+    out->scene.shared_textures = cfg->scene.shared_textures;
     const double tolerance_m = out->output.tolerance_m; /* by plan */
     out->output = cfg->output;
     out->output.tolerance_m = tolerance_m;

@@ -245,7 +245,7 @@ int cfg_line_has_width(const struct config *cfg);
 void cfg_limit_range(struct cfg_reader *rd, struct config *cfg);
 /* Ranges, noise and step as settings of a scan, which commands may change. Once all of them are checked. */
 void cfg_take_scan_settings(struct config *cfg);
-/* Of a planar head with geometries: those of the profile, and which of them the configuration asks for. */
+/* Checks the geometries of a planar head's profile; chooses the one that the configuration asks for. */
 void cfg_check_geometries(struct cfg_reader *rd, struct config_profile *profile);
 void cfg_choose_geometry(struct cfg_reader *rd, struct config *cfg);
 /* The settings of a head whose pulse rate follows from its lines. */

@@ -44,7 +44,6 @@ void device_free_unused_sites(struct device_moves *moves)
         if (version->own == NULL) site_retire(version->site);
         device_free_version(version);
     }
-    site_drop_unused_bvhs(moves->current->site);
 }
 
 void device_use_site(struct device *device, struct device_work *work)

@@ -111,17 +111,6 @@ static int place_stations(struct site *site, const struct sh_report *report, str
     return rc == SH_OK && cfg->platform.kind == PLATFORM_STOPS ? site_load_stops(site, report, err) : rc;
 }
 
-/* A head that moves has the BVHs of its path. */
-static int build_bvhs(struct site *site, const struct sh_report *report, struct sh_err *err)
-{
-    int rc = site_build_mover_bvhs(site, report, err);
-    if (rc != SH_OK || !site->moving) return rc == SH_OK ? site_build_station_bvhs(site, report, err) : rc;
-    rc = site_load_platform(site, report, err);
-    for (uint32_t i = 0; i < site->n_stations && rc == SH_OK; i++)
-        site->station[i].bvh = site->bvh[0];
-    return rc;
-}
-
 /* A list of directions is read again: the configuration keeps no more than its length. */
 static int load_emitter(struct site *site, struct sh_err *err)
 {
@@ -149,8 +138,8 @@ static int load(struct site *site, const struct sh_report *report, struct sh_err
     if (rc == SH_OK) rc = site_set_up_detect(site, report, err);
     if (rc == SH_OK) rc = site_set_up_silent(site, err);
     if (rc == SH_OK) rc = place_stations(site, report, err);
-    if (rc == SH_OK) site_plan_order(site);
-    if (rc == SH_OK) rc = build_bvhs(site, report, err);
+    if (rc == SH_OK && site->moving) rc = site_load_platform(site, report, err);
+    if (rc == SH_OK) rc = site_build_bvhs(site, report, err);
     if (rc == SH_OK) rc = site_set_up_tripods(site, report, err);
     if (rc == SH_OK && site->cfg->output.colour != COLOUR_NONE) rc = site_set_up_colours(site, report, err);
     if (rc == SH_OK) rc = site_warn_doubts(site, report, err); /* trying beams may take long where little is seen */
@@ -169,7 +158,6 @@ int site_create(const struct config *cfg, enum site_purpose purpose, const struc
     site_listen(&heard, report, &site->said, purpose == SITE_MOVED ? &other->said : NULL);
     site->cfg = cfg;
     site->measures = purpose == SITE_FOR_PLAN;
-    site->moved = purpose == SITE_MOVED;
     site->planned_frames = cfg->head.settings.frames;
     site->moving = config_head_moves(&cfg->platform);
     int rc = site_enter_world(site, other, err);

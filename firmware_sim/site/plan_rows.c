@@ -8,36 +8,6 @@
 #include "firmware_sim/site/rate.h"
 #include "firmware_sim/site/site_inside.h"
 
-/* How far the scene goes from where the head may be. */
-static double farthest_m(const struct site *site)
-{
-    const struct config *cfg = site->cfg;
-    double far_m = 0.0;
-    if (site->moving || site->n_movers > 0) return cfg->profile.range_max_m;
-    for (uint32_t s = 0; s < site->n_stations; s++)
-        if (config_serves(cfg, s)) far_m = fmax(far_m, site_farthest_m(site, site->station[s].at.position_m));
-    return fmin(far_m, cfg->profile.range_max_m);
-}
-
-void site_plan_order(struct site *site)
-{
-    const enum config_choice asked = site->cfg->scene.order_exactly;
-    struct plan_option option[2];
-    struct plan_row *row = &site->plan.order;
-    plan_order_options(farthest_m(site), option);
-    const struct plan_choice choice = {.stage = "order",
-                                       .option = option,
-                                       .n = 2,
-                                       .forced = asked == CHOICE_AUTO ? -1 : asked == CHOICE_ON,
-                                       .key = "scene.order_exactly",
-                                       .tolerance = site->cfg->plan};
-    site->plan.methods.order_exactly = (int)plan_choose(&choice, row);
-    size_t used = strlen(row->why);
-    if (!site->plan.methods.order_exactly)
-        snprintf(row->why + used, sizeof row->why - used,
-                 "; surfaces nearer to each other than the error may be taken for one another");
-}
-
 static void name_row(struct plan_row *row, const char *whose)
 {
     char why[sizeof row->why];
@@ -173,7 +143,7 @@ int site_plan_rows(struct site *site, struct sh_err *err)
     struct plan_head head;
     struct bvh_info bvh;
     ask_head(site, &head);
-    bvh_get_info(site->bvh[0], &bvh);
+    bvh_get_info(site->bvh, &bvh);
     size_t n = plan_head(&head, of_head);
     free(plan->row);
     plan->row = calloc(n + 12 + site->n_stations, sizeof *plan->row);
@@ -186,7 +156,6 @@ int site_plan_rows(struct site *site, struct sh_err *err)
     plan_mesh(mesh_error_m(site), &plan->row[plan->n++]);
     plan_cast(bvh.packet, &plan->row[plan->n++]);
     plan->row[plan->n++] = plan->sight;
-    plan->row[plan->n++] = plan->order;
     for (size_t i = 0; i < n; i++) {
         plan->row[plan->n++] = of_head[i];
         if (i != 0) continue; /* after what moves */
@@ -204,6 +173,6 @@ void site_plan_text(const struct site *site, char *text, size_t room)
 {
     const struct site_plan *plan = &site->plan;
     int polar = site->cfg->output.layout == LINE_POLAR;
-    snprintf(text, room, "sight %s; order %s; beam %s; optics %s; georef %s", plan->sight.method, plan->order.method,
-             plan->beam.method, plan->optics.method, polar ? "none" : site->station[0].plan.method);
+    snprintf(text, room, "sight %s; beam %s; optics %s; georef %s", plan->sight.method, plan->beam.method,
+             plan->optics.method, polar ? "none" : site->station[0].plan.method);
 }

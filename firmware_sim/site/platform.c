@@ -8,7 +8,7 @@
 #include "core/vec3.h"
 
 /* Largest distance of the head's own path from the trajectory, and largest steps between its poses, in metres
- * and ns: a path is cut into them for BVHs, and a recorded trajectory has them. */
+ * and ns: a recorded trajectory has them. */
 static const double TOLERANCE_M = 1e-4, LONGEST_M = 0.01;
 static const int64_t LONGEST_NS = 10000000;
 
@@ -95,7 +95,7 @@ static size_t gather(const struct site *site, size_t first, double centre_m[3], 
             next_hi[k] = fmax(hi[k], site->knot[i].pose.position_m[k]);
             half2 += 0.25 * (next_hi[k] - next_lo[k]) * (next_hi[k] - next_lo[k]);
         }
-        if (half2 > SITE_BVH_REACH_M * SITE_BVH_REACH_M) break;
+        if (half2 > SITE_STRETCH_M * SITE_STRETCH_M) break;
         memcpy(lo, next_lo, sizeof lo);
         memcpy(hi, next_hi, sizeof hi);
         *radius_m = sqrt(half2);
@@ -106,25 +106,22 @@ static size_t gather(const struct site *site, size_t first, double centre_m[3], 
 }
 
 static int add_stretch(struct site *site, const double centre_m[3], double reach_m, int64_t until_ns,
-                       const struct sh_report *report, struct sh_err *err)
+                       struct sh_err *err)
 {
-    if (site->n_bvh == CONFIG_MAX_STATIONS)
+    if (site->n_stretches == CONFIG_MAX_STATIONS)
         return sh_fail(err, SH_EINPUT, "%s: platform: the path is too long; allowed %d stretches of %.0f m across",
-                       site->cfg->file, CONFIG_MAX_STATIONS, 2.0 * SITE_BVH_REACH_M);
+                       site->cfg->file, CONFIG_MAX_STATIONS, 2.0 * SITE_STRETCH_M);
     struct site_stretch *more = realloc(site->stretch, (site->n_stretches + 1) * sizeof *more);
     if (more == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the path");
     site->stretch = more;
-    struct bvh *bvh;
-    int rc = site_add_bvh(site, &(struct site_sphere){centre_m, reach_m}, report, &bvh, err);
-    if (rc != SH_OK) return rc;
     struct site_stretch *stretch = &site->stretch[site->n_stretches++];
-    *stretch = (struct site_stretch){.until_ns = until_ns, .bvh = bvh, .reach_m = reach_m};
+    *stretch = (struct site_stretch){.until_ns = until_ns, .reach_m = reach_m};
     memcpy(stretch->centre_m, centre_m, sizeof stretch->centre_m);
     return SH_OK;
 }
 
 /* A stretch ends between two poses. The head goes on in it for up to a millisecond; 100 ms cover that. */
-static int cover_path(struct site *site, const struct sh_report *report, struct sh_err *err)
+static int cover_path(struct site *site, struct sh_err *err)
 {
     int rc = SH_OK;
     for (size_t i = 0; i < site->n_knots && rc == SH_OK;) {
@@ -136,8 +133,7 @@ static int cover_path(struct site *site, const struct sh_report *report, struct 
             beyond_m =
                 fmax(beyond_m, vec3_distance(site->knot[k].pose.position_m, site->knot[end - 1].pose.position_m));
         if (until_ns != INT64_MAX) until_ns = (until_ns + 999999) / 1000000 * 1000000; /* as an anchor says it */
-        rc = add_stretch(site, centre_m, radius_m + beyond_m + 1e-3 + site_ray_reach_m(site, centre_m), until_ns,
-                         report, err);
+        rc = add_stretch(site, centre_m, radius_m + beyond_m + 1e-3 + site_ray_reach_m(site, centre_m), until_ns, err);
         i = end == site->n_knots || end == i + 1 ? end : end - 1; /* they share a pose */
     }
     return rc;
@@ -156,10 +152,10 @@ int site_load_platform(struct site *site, const struct sh_report *report, struct
         double head_m = p->reach_m + sqrt(vec3_dot(arm, arm));
         site->live_reach_m = head_m + reach_m;
         return add_stretch(site, site->station[0].at.position_m,
-                           head_m + site_ray_reach_m(site, site->station[0].at.position_m), INT64_MAX, report, err);
+                           head_m + site_ray_reach_m(site, site->station[0].at.position_m), INT64_MAX, err);
     }
     int rc = load_knots(site, report, err);
-    return rc == SH_OK ? cover_path(site, report, err) : rc;
+    return rc == SH_OK ? cover_path(site, err) : rc;
 }
 
 /* ---- a head that stops */

@@ -23,20 +23,6 @@ static const char *why_not(const struct site *site)
     return site->plan.methods.beam == BEAM_RINGS ? "the beam is rings, which have no ray for the centre" : NULL;
 }
 
-/* Whether all rays are pulses' first hits of what stands still, which a sight takes over. */
-static int only_first_hits(const struct site *site)
-{
-    return site->plan.methods.beam == BEAM_SINGLE && site->plan.methods.depth == 0 && site->n_movers == 0 &&
-           site->legs == NULL && site_n_served(site) <= SITE_MAX_SIGHTS;
-}
-
-int site_order_can_wait(const struct site *site)
-{
-    const int single = site->cfg->beam.mode == BEAM_SINGLE || !config_has_footprint(site->cfg);
-    return single && !site->detect.surfaces.has_optics && site->cfg->cast.sight != CHOICE_OFF &&
-           why_not(site) == NULL && only_first_hits(site);
-}
-
 /* ---- the plan */
 
 /* Pulses that a scan casts: of its frames; of an hour where it has no end. */
@@ -61,39 +47,14 @@ static uint64_t memory_bytes(const struct site *site)
     return (uint64_t)(site->cfg->cast.sight_mib * 0x1p20);
 }
 
-static enum plan_sight_order order_of(const struct site *site)
-{
-    if (site->plan.methods.order_exactly) return site_order_can_wait(site) ? PLAN_ORDER_INSTEAD : PLAN_ORDER_DOUBLE;
-    return site->cfg->scene.order_exactly == CHOICE_AUTO && only_first_hits(site) ? PLAN_ORDER_FREE : PLAN_ORDER_FLOAT;
-}
-
-/* Surfaces are ordered in double by the map. */
-static void take_order(struct site *site, const struct plan_sight_choice *choice)
-{
-    struct plan_row *row = &site->plan.order;
-    if (!site->plan.methods.order_exactly) {
-        struct plan_option none = {.error_m = row->error_m};
-        snprintf(none.method, sizeof none.method, "%s", row->method);
-        snprintf(none.why_not, sizeof none.why_not, "less exact, and it saves next to nothing");
-        plan_say(row, "order", "double", 0.0, 0.0, "with a map (sight) it is free");
-        row->left[row->n_left++] = none;
-    } else {
-        const size_t used = strlen(row->why);
-        snprintf(row->why + used, sizeof row->why - used, "; by the map (sight)");
-    }
-    row->cost_ns = choice->order_ns;
-    site->plan.methods.order_exactly = 1;
-}
-
-static int choose(struct site *site, const struct sh_report *report, struct plan_sight_choice *choice,
-                  struct sh_err *err)
+static int choose(struct site *site, const struct sh_report *report, int *map, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
     const enum config_choice asked = cfg->cast.sight;
     struct site_look look;
     struct site_view view;
     struct bvh_info bvh;
-    bvh_get_info(site->bvh[0], &bvh);
+    bvh_get_info(site->bvh, &bvh);
     site_look_open(&look, site);
     site_view_of(site, look.at[0].station, &view);
     const struct plan_sight_need need = {.pulses = pulses_of(&look.place[0], cfg->head.settings.frames),
@@ -101,25 +62,18 @@ static int choose(struct site *site, const struct sh_report *report, struct plan
                                          .n_triangles = site->scene->n_triangles,
                                          .packet = bvh.packet,
                                          .memory_bytes = memory_bytes(site),
-                                         .order = order_of(site),
                                          .forced = asked == CHOICE_AUTO ? -1 : asked == CHOICE_ON,
                                          .why_not = why_not(site)};
     site->plan.sight_rays = need.pulses / need.share;
-    return plan_sight(&need, look.place, look.n, report, choice, &site->plan.sight, err);
+    return plan_sight(&need, look.place, look.n, report, map, &site->plan.sight, err);
 }
 
 int site_plan_sight(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
-    struct plan_sight_choice choice;
     const char *why = why_not(site);
-    const int waits = site->plan.methods.order_exactly && site_order_can_wait(site);
     if (site->cfg->cast.sight == CHOICE_ON && why != NULL)
         return sh_fail(err, SH_EINPUT, "%s: cast.sight: on, but %s; allowed auto, off", site->cfg->file, why);
-    int rc = choose(site, report, &choice, err);
-    if (rc != SH_OK) return rc;
-    site->plan.methods.sight = choice.map;
-    if (choice.ordered && only_first_hits(site)) take_order(site, &choice);
-    return waits && !choice.map ? site_order_bvhs(site, report, err) : SH_OK;
+    return choose(site, report, &site->plan.methods.sight, err);
 }
 
 /* ---- making them */
@@ -135,7 +89,6 @@ static int make(struct site *site, uint32_t station, uint32_t of, const struct s
     struct sight_spec spec = {.bvh = s->bvh,
                               .rays = site->plan.sight_rays,
                               .memory_bytes = memory_bytes(site) / of,
-                              .exact = site->plan.methods.order_exactly,
                               .sees = site_view_sees,
                               .ctx = &view};
     memcpy(spec.station_m, s->at.position_m, sizeof spec.station_m);
@@ -168,8 +121,7 @@ static int still_holds(const struct site *site, const struct site *from, uint32_
     const struct site_station *a = &site->station[i], *b = &from->station[i];
     return b->sight != NULL && a->bvh == b->bvh &&
            memcmp(&a->at.position_m, &b->at.position_m, sizeof a->at.position_m) == 0 &&
-           memcmp(&a->at.rotation, &b->at.rotation, sizeof a->at.rotation) == 0 &&
-           site->plan.methods.order_exactly == from->plan.methods.order_exactly;
+           memcmp(&a->at.rotation, &b->at.rotation, sizeof a->at.rotation) == 0;
 }
 
 void site_share_sights(struct site *site, const struct site *from)

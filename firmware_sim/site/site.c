@@ -183,7 +183,6 @@ size_t site_stretch_at(const struct site *site, int64_t t_ns)
 void site_enter(const struct site *site, uint32_t station, size_t stretch, struct cast_setup *setup)
 {
     const double *centre_m, *scale;
-    setup->bvh = site->stretch[stretch].bvh;
     setup->georef = site_georef(site, station, stretch, &centre_m, &scale);
     memcpy(setup->station_m, centre_m, sizeof setup->station_m);
     memcpy(setup->xyz_scale, scale, sizeof setup->xyz_scale);

@@ -33,7 +33,7 @@ struct site_tripod {
 
 struct site_station {
     const struct config_station *station; /* of the configuration, or of stops */
-    struct bvh *bvh;                      /* shared where stations are near each other */
+    struct bvh *bvh;                      /* the world's; NULL: this scanner does not scan from here */
     struct sight *_Atomic sight;          /* what it sees; NULL: rays go to the BVH (site_open_sights) */
     _Atomic uint32_t *sight_users;        /* sites that share the map */
     struct georef *georef;
@@ -79,13 +79,13 @@ struct site_colours {
 /* What was planned. Scans take their methods from here alone. */
 struct site_plan {
     struct plan_methods methods;
-    struct plan_row sight, order, beam, optics;
+    struct plan_row sight, beam, optics;
     double sight_rays;    /* of a map: what its cells follow (sight_spec) */
     struct plan_row *row; /* `plan`: all stages in their order, then the total; else NULL */
     size_t n;
 };
 
-/* What the sites of one scene share (world.c): the meshes, and the BVHs that any of them needed. The last site that
+/* The sites of one scene share this (world.c): the meshes, and their BVHs. The last site that
  * goes frees it. Sites that share are loaded and freed by one thread; others may cast meanwhile. */
 struct site_world {
     uint32_t n_users;
@@ -98,19 +98,12 @@ struct site_world {
         uint32_t surfaces, triangles;         /* that are scanned ... */
         uint32_t all_surfaces, all_triangles; /* ... of so many in the files */
     } target;
-    struct site_bvh {
-        struct bvh *bvh;
-        double reach_m;   /* rays may begin so far from its origin */
-        int is_ordered;   /* bvh_order_exactly */
-        uint32_t n_users; /* sites */
-    } * bvh;
-    uint32_t n_bvh; /* so many were built */
+    struct bvh *bvh; /* of what stands still, for rays from anywhere */
 };
 
-/* A stretch of a moving head's path. Its BVH reaches all of it. */
+/* A stretch of a moving head's path: positions on the wire are relative to its centre. */
 struct site_stretch {
-    int64_t until_ns; /* since the scan's start: whole milliseconds; INT64_MAX: the last one */
-    struct bvh *bvh;
+    int64_t until_ns;            /* since the scan's start: whole milliseconds; INT64_MAX: the last one */
     double centre_m[3], reach_m; /* all of it lies so near to that */
 };
 
@@ -140,11 +133,9 @@ struct site {
     struct site_detect detect;
     struct site_colours colours;
     struct site_plan plan;
-    int moved;               /* by site_load_moved */
     uint32_t planned_frames; /* of a scan, as the plan counts its pulses; a run may scan on (--duration) */
-    int measures; /* for `plan`: footprints are cast to find the error of a forced beam, even of single rays */
-    struct bvh *bvh[CONFIG_MAX_STATIONS]; /* those of the world that it uses */
-    uint32_t n_bvh;
+    int measures;    /* for `plan`: footprints are cast to find the error of a forced beam, even of single rays */
+    struct bvh *bvh; /* the world's */
     struct site_station *station;
     uint32_t n_stations;
     struct config_station *stop; /* the stations where the platform stops; NULL: the configuration's are */
@@ -161,9 +152,8 @@ struct site {
     double scale_m;      /* of positions and ranges on the wire, metres per count */
 };
 
-/* Stations further than this from a BVH's origin get a BVH of their own, and so do those further than the
- * scene's size: there a float has steps of 0.06 mm. */
-#define SITE_BVH_REACH_M 1000.0
+/* A path is cut into stretches whose poses lie so near to a centre. */
+#define SITE_STRETCH_M 1000.0
 
 /* Room left beyond the head's largest range, for noise. */
 #define SITE_MARGIN 1.01
@@ -171,7 +161,7 @@ struct site {
 /* cfg must outlive the site. */
 int site_load(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err);
 /* The same beside another site, of another scanner of the same file: what is the same scene is loaded no second time,
- * and a BVH that will do is built no second time. `other` may be freed before or after. */
+ * with its BVHs. `other` may be freed before or after. */
 int site_load_beside(const struct config *cfg, const struct site *other, const struct sh_report *report,
                      struct site **out, struct sh_err *err);
 /* The same for `plan`: site->plan.row is filled, with bounds also of what is forced. */
@@ -188,10 +178,6 @@ int site_varies(const struct head_settings *a, const struct head_settings *b);
 int site_vary(const struct site *from, const struct head_settings *settings, uint32_t station, struct site **out,
               struct sh_err *err);
 void site_vary_free(struct site *site);
-/* Gives back the BVHs of its scene, also those of other sites that share it. What is loaded beside it then shares the
- * meshes alone. Nobody casts at any of these sites any more: they can only be freed. */
-void site_drop_bvhs(struct site *site);
-
 /* Where a station stands and how it is turned, as its keys in the configuration say it: the head's origin in the scene
  * frame, metres; degrees. */
 struct site_place {
@@ -202,17 +188,13 @@ void site_get_place(const struct site *site, uint32_t station, struct site_place
 const char *site_why_fixed(const struct site *site);
 /* The site beside `from` in which a station (0..) of this scanner stands at `to`; NULL: where it stood in `first`, the
  * site that was loaded from the configuration. Loaded as a configuration with that place would be, with the maps of
- * from's stations that still hold, and all others that are planned. Meshes are shared, and so is the BVH, up to
- * SITE_BVH_REACH_M. Where none reaches the place yet, one more is built, which then reaches as far as the scene is large.
+ * from's stations that still hold, and all others that are planned. Meshes and BVHs are shared.
  * from and first may be cast from meanwhile; sites of one world are loaded and freed by one thread at a time. report is
  * warned of what loading `from` had not to say; out->said counts it. SH_EINPUT: nobody can stand there. */
 int site_load_moved(const struct site *from, const struct site *first, uint32_t station, const struct site_place *to,
                     const struct sh_report *report, struct site **out, struct sh_err *err);
 /* Nobody casts from this site any more; but it is to be freed by its owner: gives back what it has alone. */
 void site_retire(const struct site *site);
-/* Gives back BVHs that no site of its world uses. */
-void site_drop_unused_bvhs(const struct site *site);
-
 /* How many stations a site of this configuration will have, before it is loaded: where the platform stops, its stops.
  * Errors as of site_load. */
 int site_count_stations(const struct config *cfg, const struct sh_report *report, uint32_t *n, struct sh_err *err);

@@ -8,7 +8,7 @@
 enum site_purpose {
     SITE_FOR_SCANS,
     SITE_FOR_PLAN, /* site_load_plan */
-    SITE_MOVED,    /* site_load_moved: a BVH that is built has room for further moves */
+    SITE_MOVED,    /* site_load_moved */
 };
 int site_create(const struct config *cfg, enum site_purpose purpose, const struct site *other,
                 const struct sh_report *report, struct site **out, struct sh_err *err);
@@ -55,15 +55,15 @@ double site_ball_m(const struct site *site);
 double site_range_noise_m(const struct site *site);
 
 /* ---- platform.c: a head that moves while it scans, or that scans where its platform stops (platform.kind: stops).
- * In: the configured trajectory and times. Out: its poses (scene frame, metres) and the BVHs that its path
- * needs; or a station for each stop, placed in the scene. */
+ * In: the configured trajectory and times. Out: its poses (scene frame, metres), or a
+ * station for each stop, placed in the scene. */
 
 /* Puts the stops in the place of the configuration's only station. That one has been placed: without an
  * anchor it says where on the Earth the scene lies, as an anchor at its position with the scene's y axis to
  * true north would. */
 int site_load_stops(struct site *site, const struct sh_report *report, struct sh_err *err);
 
-/* Reads the trajectory, and builds the BVHs that its path needs. */
+/* Reads the trajectory, and cuts the path into stretches. */
 int site_load_platform(struct site *site, const struct sh_report *report, struct sh_err *err);
 
 /* ---- world.c: what sites share. */
@@ -72,13 +72,6 @@ int site_load_platform(struct site *site, const struct sh_report *report, struct
 int site_enter_world(struct site *site, const struct site *other, struct sh_err *err);
 /* Gives back what is used of it. */
 void site_leave_world(struct site *site);
-/* What its own configuration, or that of another scanner in the scene, needs. */
-double site_world_range_max_m(const struct site *site);
-double site_world_ray_reach_m(const struct site *site, const double station_m[3]);
-/* Notes a BVH that was built. */
-int site_keep_bvh(struct site_world *world, struct bvh *bvh, double reach_m, int is_ordered, struct sh_err *err);
-/* One more site uses it. */
-void site_use_bvh(struct site *site, struct site_bvh *entry);
 
 /* ---- target.c: scene.target. */
 
@@ -88,30 +81,8 @@ int site_select_target(struct site *site, struct sh_err *err);
 /* Labels of ghosts are known: which give no echo. */
 int site_set_up_silent(struct site *site, struct sh_err *err);
 
-/* ---- bvhs.c: one BVH for each body that moves, and as many of the scene as the places of the head need. In: the
- * loaded scene, and where rays begin (prcs, metres). Out: site->bvh and the BVHs of movers; the site owns
- * them. */
-
-/* Where rays begin. */
-struct site_sphere {
-    const double *centre_m; /* [3], prcs */
-    double radius_m;
-};
-
-/* Adds a BVH of the scene to site->bvh, surfaces ordered as planned. *out stays the site's. */
-int site_add_bvh(struct site *site, const struct site_sphere *from, const struct sh_report *report, struct bvh **out,
-                 struct sh_err *err);
-
-/* Orders the surfaces of all of them in double, where that was put off (site_order_can_wait). */
-int site_order_bvhs(struct site *site, const struct sh_report *report, struct sh_err *err);
-
-/* Once the order of surfaces is planned and all stations are placed. */
-int site_build_mover_bvhs(struct site *site, const struct sh_report *report, struct sh_err *err);
-/* Of a body's scene, for rays that begin within the sphere. *out is the caller's, also after an error. */
-int site_build_body_bvh(const struct site *site, const struct scene *scene, const struct site_sphere *from,
-                        const struct sh_report *report, struct bvh **out, struct sh_err *err);
-/* For heads that stand; stations near each other share one. */
-int site_build_station_bvhs(struct site *site, const struct sh_report *report, struct sh_err *err);
+/* ---- bvhs.c: a BVH of what stands still, and one of each body that moves. */
+int site_build_bvhs(struct site *site, const struct sh_report *report, struct sh_err *err);
 
 /* ---- tripod.c: what stations' heads stand on. In: the placed stations and their BVHs. Out: each tripod's opening, what
  * it hides, and its legs where they are in view. */
@@ -180,11 +151,7 @@ double site_view_share(const struct site_view *view, double radius_rad);
 
 /* ---- sights.c: maps of what the stations see: whether one is made, and making it. */
 
-/* Before BVHs are built: whether bvh_order_exactly, if planned, waits until it is known that no sight takes its
- * place. So it is where each ray is a first hit of what stands still. */
-int site_order_can_wait(const struct site *site);
-/* Beam and optics are chosen. Sets site->plan.methods.sight and the row, and where order comes free, the row of
- * the order. Orders BVHs that have waited for that in vain. */
+/* Beam and optics are chosen. Sets site->plan.methods.sight and the row. */
 int site_plan_sight(struct site *site, const struct sh_report *report, struct sh_err *err);
 void site_close_sights(struct site *site);
 /* Maps of another site's stations that stand as they did, before site_open_sights makes the others. */

@@ -176,7 +176,8 @@ int site_set_up_silent(struct site *site, struct sh_err *err)
     if (t->is_target == NULL) return SH_OK;
     site->silent = calloc((size_t)site->n_surfaces + 1, 1);
     if (site->silent == NULL) return sh_fail(err, SH_ENOMEM, "no memory for %u surfaces", site->n_surfaces);
-    for (uint32_t i = 0; i < site->n_surfaces; i++) /* legs of tripods come after the scene's, and are no object of it */
+    for (uint32_t i = 0; i < site->n_surfaces;
+         i++) /* legs of tripods come after the scene's, and are no object of it */
         site->silent[i] = i % n_real < t->all_surfaces && !t->is_target[i % n_real];
     return SH_OK;
 }

@@ -198,8 +198,7 @@ static int make_legs(const struct site *site, struct site_station *s, const doub
     t->legs->label0 = site->legs_label;
     t->cast.has_legs = 1;
     if (s->bvh == NULL) return SH_OK;
-    const struct site_sphere from = {s->at.position_m, site_ray_reach_m(site, s->at.position_m)};
-    rc = site_build_body_bvh(site, t->legs, &from, report, &t->bvh, err);
+    rc = bvh_create(t->legs, site->cfg->loop.threads, report, &t->bvh, err);
     if (rc != SH_OK) return rc;
     enclose(t->legs, &t->cast.legs);
     t->cast.legs.bvh = t->bvh;

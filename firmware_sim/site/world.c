@@ -47,13 +47,8 @@ void site_leave_world(struct site *site)
 {
     struct site_world *world = site->world;
     if (world == NULL) return;
-    for (uint32_t i = 0; i < site->n_bvh; i++)
-        for (uint32_t k = 0; k < world->n_bvh; k++)
-            world->bvh[k].n_users -= world->bvh[k].bvh == site->bvh[i];
     if (--world->n_users > 0) return;
-    for (uint32_t i = 0; i < world->n_bvh; i++)
-        bvh_free(world->bvh[i].bvh);
-    free(world->bvh);
+    bvh_free(world->bvh);
     free(world->target.is_target);
     for (uint32_t i = 0; i < world->n_movers; i++) {
         bvh_free(world->mover[i].bvh);
@@ -61,61 +56,4 @@ void site_leave_world(struct site *site)
     }
     scene_free(world->scene);
     free(world);
-}
-
-void site_drop_bvhs(struct site *site)
-{
-    struct site_world *world = site->world;
-    site_close_sights(site);
-    for (uint32_t i = 0; i < world->n_bvh; i++)
-        bvh_free(world->bvh[i].bvh);
-    for (uint32_t i = 0; i < world->n_movers; i++) {
-        bvh_free(world->mover[i].bvh);
-        world->mover[i].bvh = site->mover[i].bvh = NULL;
-    }
-    site->n_bvh = world->n_bvh = 0;
-}
-
-double site_world_range_max_m(const struct site *site)
-{
-    return fmax(config_range_most_m(site->cfg), site->cfg->scene.shared.range_max_m);
-}
-
-double site_world_ray_reach_m(const struct site *site, const double station_m[3])
-{
-    const struct config_shared *all = &site->cfg->scene.shared;
-    const double own_m = site_ray_reach_m(site, station_m);
-    if (!all->passes_glass) return fmax(own_m, all->beside_m);
-    const double beyond_m = site->n_movers > 0 ? INFINITY : site_farthest_m(site, station_m) + 1e-3;
-    return fmax(own_m, all->beside_m + fmin(beyond_m, all->range_max_m));
-}
-
-int site_keep_bvh(struct site_world *world, struct bvh *bvh, double reach_m, int is_ordered, struct sh_err *err)
-{
-    struct site_bvh *more = realloc(world->bvh, (world->n_bvh + 1) * sizeof *more);
-    if (more == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a BVH");
-    world->bvh = more;
-    more[world->n_bvh++] = (struct site_bvh){.bvh = bvh, .reach_m = reach_m, .is_ordered = is_ordered};
-    return SH_OK;
-}
-
-void site_use_bvh(struct site *site, struct site_bvh *entry)
-{
-    for (uint32_t i = 0; i < site->n_bvh; i++)
-        if (site->bvh[i] == entry->bvh) return;
-    site->bvh[site->n_bvh++] = entry->bvh;
-    entry->n_users++;
-}
-
-void site_drop_unused_bvhs(const struct site *site)
-{
-    struct site_world *world = site->world;
-    uint32_t kept = 0;
-    for (uint32_t i = 0; i < world->n_bvh; i++) {
-        if (world->bvh[i].n_users == 0)
-            bvh_free(world->bvh[i].bvh);
-        else
-            world->bvh[kept++] = world->bvh[i];
-    }
-    world->n_bvh = kept;
 }

@@ -168,11 +168,8 @@ static void open_scene(struct seen_room *r, uint64_t seed, const double at_m[3])
     draw_box(d, at_m, body_x, body_y, body_z, ROOM_LABELS - 1);
     r->body_scene = scene_of(d);
     free(d);
-    /* What glass and mirrors show begins all over the room. */
-    must(bvh_create(r->scene, at_m, 15.0, 1, NULL, &r->bvh, &err), &err);
-    must(bvh_create(r->scene, at_m, 15.0, 1, NULL, &r->ordered, &err), &err);
-    must(bvh_order_exactly(r->ordered, NULL, &err), &err);
-    must(bvh_create(r->body_scene, at_m, 40.0, 1, NULL, &r->body, &err), &err);
+    must(bvh_create(r->scene, 1, NULL, &r->bvh, &err), &err);
+    must(bvh_create(r->body_scene, 1, NULL, &r->body, &err), &err);
 }
 
 static void open_sights(struct seen_room *r, const double at_m[3])
@@ -181,8 +178,6 @@ static void open_sights(struct seen_room *r, const double at_m[3])
     struct sight_spec spec = {.bvh = r->bvh, .rays = 5e6, .memory_bytes = UINT64_C(64) << 20};
     memcpy(spec.station_m, at_m, sizeof spec.station_m);
     must(sight_create(&spec, 2, NULL, &r->sight, &err), &err);
-    spec.exact = 1;
-    must(sight_create(&spec, 2, NULL, &r->exact, &err), &err);
 }
 
 static void open_surfaces(struct seen_room *r, const double at_m[3])
@@ -254,9 +249,7 @@ void seen_room_close(struct seen_room *r)
     beam_outlines_free(r->outlines);
     surface_table_free(&r->table);
     sight_free(r->sight);
-    sight_free(r->exact);
     bvh_free(r->bvh);
-    bvh_free(r->ordered);
     bvh_free(r->body);
     scene_free(r->scene);
     scene_free(r->body_scene);

@@ -12,9 +12,8 @@ enum { ROOM_LINES = 24, ROOM_PULSES = 1500 };
 
 struct seen_room {
     struct scene *scene, *body_scene; /* a box that moves */
-    struct bvh *bvh, *ordered;        /* of the same scene; ordered exactly */
-    struct bvh *body;
-    struct sight *sight, *exact; /* of bvh: as it is, and with exact order */
+    struct bvh *bvh, *body;
+    struct sight *sight;
     struct georef *georef;
     struct surface_table table;
     uint16_t kind[ROOM_LABELS];

@@ -45,7 +45,8 @@ static void outline_kinds(struct lit *l)
 {
     uint16_t kind[2];
     struct sh_err err;
-    const struct beam_outlines_spec spec = {l->rig.scene, STATION, &l->rig.beam.beam, l->rig.setup.range_max_m, kind, NULL};
+    const struct beam_outlines_spec spec = {l->rig.scene, STATION, &l->rig.beam.beam, l->rig.setup.range_max_m,
+                                            kind,         NULL};
     beam_outlines_free(l->rig.outlines);
     if (surface_kinds(&l->table, kind, &err) != 0 || cast_outlines(&spec, l->rig.bvh, &l->rig.outlines, &err) != 0)
         fail_msg("%s", err.text);
@@ -140,11 +141,7 @@ static void a_footprint_on_the_border_of_a_mirror(void **state)
     struct lit l = {.near_m = 20.0, .far_m = 23.0, .rho = {0.0, 0.5}};
     double d[3][16];
     uint32_t several = 0, pure = 0;
-    struct sh_err err;
     open_lit(&l, mirror_and_two_walls(), &ACROSS, 0.0);
-    bvh_free(l.rig.bvh); /* rays begin at the mirror */
-    if (bvh_create(l.rig.scene, STATION, 50.0, 1, NULL, &l.rig.bvh, &err) != 0) fail_msg("%s", err.text);
-    l.rig.setup.bvh = l.rig.bvh;
     l.table.surface[FRONT].mirror = 0.8;
     l.table.has_optics = 1;
     l.detect.depth = 2;

@@ -190,9 +190,8 @@ static void slanted_behind_glass_and_in_motion(void **state)
         l.detect.depth = moving ? 0 : 1;
         l.rig.setup.pulse_m = l.detect.separation_m = l.rig.beam.beam.resolution_m;
         if (moving) {
-            const double origin_m[3] = {0.0, 0.0, 0.0};
             struct cast_mover *m = &l.rig.setup.mover[0];
-            if (bvh_create(wall, origin_m, 3000.0, 1, NULL, &body, &err) != 0) fail_msg("%s", err.text);
+            if (bvh_create(wall, 1, NULL, &body, &err) != 0) fail_msg("%s", err.text);
             *m = (struct cast_mover){.bvh = body, .centre_m = {0.0, range_m, 0.0}, .radius_m = 20.0};
             pose_heading(0.0, m->rotation);
             l.rig.setup.n_movers = 1;

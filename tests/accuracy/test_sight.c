@@ -51,8 +51,7 @@ struct look {
     uint64_t number, random;
     struct odd_scene odd;
     struct scene *scene;
-    struct bvh *plain, *ordered; /* the second one orders surfaces exactly */
-    double reach_m;              /* of the station from their origin */
+    struct bvh *bvh;
 };
 
 /* A cap about an axis, as a head sees that doesn't turn all the way round. */
@@ -64,19 +63,6 @@ static int sees_cap(const void *ctx, const double dir[3], double radius_rad)
 {
     const struct cap *cap = ctx;
     return acos(fmax(-1.0, fmin(1.0, vec3_dot(cap->axis, dir)))) <= cap->angle_rad + radius_rad + 1e-6;
-}
-
-static void make_bvhs(struct look *look)
-{
-    struct sh_err err;
-    double origin_m[3], off_m = case_between(&look->random, 0, 3) ? 0.0 : 50.0 * case_unit(&look->random);
-    memcpy(origin_m, look->odd.station_m, sizeof origin_m);
-    origin_m[look->number % 3] += off_m;
-    const double reach_m = look->reach_m = vec3_distance(origin_m, look->odd.station_m);
-    if (bvh_create(look->scene, origin_m, reach_m, 1, NULL, &look->plain, &err) != SH_OK ||
-        bvh_create(look->scene, origin_m, reach_m, 1, NULL, &look->ordered, &err) != SH_OK ||
-        bvh_order_exactly(look->ordered, NULL, &err) != SH_OK)
-        fail_msg("%s", err.text);
 }
 
 /* What is right where they disagree. */
@@ -97,24 +83,22 @@ static void print_truth(const struct look *look, const struct sight_beside *besi
     reference_free(reference);
 }
 
-static void look_through_sight(struct look *look, int exact, uint32_t rays, struct tally *tally)
+static void look_through_sight(struct look *look, uint32_t rays, struct tally *tally)
 {
     static const uint64_t MEMORY[] = {0, 20000, 200000, 1 << 20, 64 << 20};
     struct sh_err err;
     struct sight_beside beside;
     struct cap cap = {.angle_rad = 3.0 * case_unit(&look->random)};
-    struct sight_spec spec = {.bvh = exact && look->number % 2 == 0 ? look->ordered : look->plain,
+    struct sight_spec spec = {.bvh = look->bvh,
                               .station_m = {look->odd.station_m[0], look->odd.station_m[1], look->odd.station_m[2]},
                               .rays = pow(10.0, 2.0 + 5.5 * case_unit(&look->random)),
-                              .memory_bytes = MEMORY[case_between(&look->random, 0, 4)],
-                              .exact = exact};
+                              .memory_bytes = MEMORY[case_between(&look->random, 0, 4)]};
     if (case_between(&look->random, 0, 3) == 0) {
         cap.axis[look->number % 3] = 1.0;
         spec.sees = sees_cap;
         spec.ctx = &cap;
     }
-    if (sight_beside_create(&spec, exact ? look->ordered : look->plain, &beside, &err) != SH_OK)
-        fail_msg("%s", err.text);
+    if (sight_beside_create(&spec, &beside, &err) != SH_OK) fail_msg("%s", err.text);
     struct odd_rays odd = {.scene = look->scene, .cells = beside.info.cells, .random = rng_mix(look->number + 77)};
     if (odd.cells == 0) odd.cells = 64;
     memcpy(odd.station_m, look->odd.station_m, sizeof odd.station_m);
@@ -129,10 +113,10 @@ static void look_through_sight(struct look *look, int exact, uint32_t rays, stru
     for (int i = 0; i < ODD_PARTS; i++)
         tally->differ_by_part[i] += look->odd.parts >> i & 1 ? beside.differ : 0;
     if (beside.differ != 0 && tally->wrong_scenes++ < 20) {
-        printf("# scene %llu, %u triangles, station %s, exact %d, BVH %.3g m off, for %.3g rays, %llu bytes, %u "
+        printf("# scene %llu, %u triangles, station %s, for %.3g rays, %llu bytes, %u "
                "cells%s: %llu of %u rays differ\n",
-               (unsigned long long)look->number, look->scene->n_triangles, look->odd.stands, exact, look->reach_m,
-               spec.rays, (unsigned long long)spec.memory_bytes, beside.info.cells, spec.sees != NULL ? ", a cap" : "",
+               (unsigned long long)look->number, look->scene->n_triangles, look->odd.stands, spec.rays,
+               (unsigned long long)spec.memory_bytes, beside.info.cells, spec.sees != NULL ? ", a cap" : "",
                (unsigned long long)beside.differ, rays);
         sight_beside_print(&beside);
         print_truth(look, &beside);
@@ -150,11 +134,10 @@ static void one_scene(uint64_t number, uint32_t rays, struct tally *tally)
         tally->refused++;
         return;
     }
-    make_bvhs(&look);
-    for (int exact = 0; exact < 2; exact++)
-        look_through_sight(&look, exact, rays, tally);
-    bvh_free(look.plain);
-    bvh_free(look.ordered);
+    if (bvh_create(look.scene, 1, NULL, &look.bvh, &err) != SH_OK) fail_msg("%s", err.text);
+    for (int sight = 0; sight < 2; sight++) /* of other sizes and parts of the sphere, and with other rays */
+        look_through_sight(&look, rays, tally);
+    bvh_free(look.bvh);
     scene_free(look.scene);
 }
 

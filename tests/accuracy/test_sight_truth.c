@@ -91,9 +91,9 @@ static void look_at(const struct scene *scene, const double station_m[3], const 
     assert_non_null(reference);
     look.reference = reference;
     memcpy(spec.station_m, station_m, sizeof spec.station_m);
-    assert_int_equal(bvh_create(scene, station_m, 0.0, 1, NULL, &bvh, &err), SH_OK);
+    assert_int_equal(bvh_create(scene, 1, NULL, &bvh, &err), SH_OK);
     spec.bvh = bvh;
-    assert_int_equal(sight_beside_create(&spec, bvh, &look.beside, &err), SH_OK);
+    assert_int_equal(sight_beside_create(&spec, &look.beside, &err), SH_OK);
     struct odd_rays odd = {.scene = scene, .cells = look.beside.info.cells, .random = 99};
     memcpy(odd.station_m, station_m, sizeof odd.station_m);
     for (int k = 0; k < KINDS; k++) {

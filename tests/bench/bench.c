@@ -78,7 +78,7 @@ static int measure_target(const struct bench_options *o, const struct bench_targ
     int rc = bench_rays_create(BENCH_LINES, &rays, err);
     if (rc == SH_OK) rc = bench_embree(target->scene, target->station_m, 1, &embree, err);
     if (rc == SH_OK) rc = bench_embree(target->scene, target->station_m, 0, &fast, err);
-    if (rc == SH_OK) rc = bvh_create(target->scene, target->station_m, 0.0, 0, &REPORT, &c.bvh, err);
+    if (rc == SH_OK) rc = bvh_create(target->scene, 0, &REPORT, &c.bvh, err);
     if (rc == SH_OK) {
         snprintf(out->name, sizeof out->name, "%s", target->name);
         out->triangles = target->scene->n_triangles;

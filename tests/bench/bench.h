@@ -81,9 +81,8 @@ double bench_median(double *values, uint32_t n); /* sorts them */
 enum bench_stage {
     STAGE_SCHEDULE,   /* line, run, firing times */
     STAGE_DIRECTIONS, /* angles, sines, rotation, rounding to float */
-    STAGE_EMBREE,     /* the widened triangles */
-    STAGE_REFINE,     /* the exact range, and whether the triangle is in doubt */
-    STAGE_DECIDE,     /* those in doubt */
+    STAGE_EMBREE,     /* the way to the leaves, and what they decide */
+    STAGE_REFINE,     /* labels and incidence */
     STAGE_DETECT,     /* limits, echo, label */
     STAGE_NOISE,
     STAGE_GEOREF, /* what the encoders read, its sines, position, CRS, counts */
@@ -136,7 +135,7 @@ struct bench_leaks {
     uint64_t rays, leaks, passed; /* passed: met the inside of the mesh behind the target; wrong as well */
     double ns_per_ray;            /* processor time */
     struct cast_counters counters;
-    uint64_t plain_rays, plain_leaks; /* Embree alone, robust, in packets */
+    uint64_t plain_rays, plain_leaks;               /* Embree alone, robust, in packets */
     uint64_t sight_rays, sight_differ, sight_asked; /* by sight: a bit differs from the cast; the BVH was asked */
 };
 int bench_leaks(uint64_t rays, uint64_t seed, uint32_t threads, const struct sh_report *report,

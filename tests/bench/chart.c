@@ -53,7 +53,7 @@ struct chart {
     struct bvh *bvh;
     struct caster *caster;
     struct bench_scan scan;
-    struct plan_sight_choice plan;
+    int planned; /* a map */
     struct sight *sight;
     struct sight_work *work;
     struct bvh_work *bvh_work;
@@ -69,7 +69,7 @@ struct chart {
 static void add_methods(struct chart *c)
 {
     struct method *m = c->method;
-    const int sight = c->plan.map;
+    const int sight = c->planned;
     for (int kind = FLOAT; kind <= DECIDED; kind++)
         for (int robust = kind == DECIDED; robust < 2; robust++)
             for (int w = 0; w < WIDTHS; w++, m++) {
@@ -119,7 +119,7 @@ static void refine(const double *restrict plane, uint32_t n_triangles, const uin
 static int make_sight(struct chart *c, double *cost_s, struct sh_err *err)
 {
     struct sight_spec spec;
-    bench_scan_spec(&c->scan, c->bvh, c->station_m, 0, &spec);
+    bench_scan_spec(&c->scan, c->bvh, c->station_m, &spec);
     sight_free(c->sight);
     c->sight = NULL;
     double start_s = bench_process_s();
@@ -281,12 +281,12 @@ static int set_up(struct chart *c, struct sh_err *err)
         rc = bench_embree(c->scene, c->station_m, robust, e, err);
         if (rc == SH_OK) rc = embree_alone_rays(e, c->rays.fx, c->rays.fy, c->rays.fz, c->rays.n, err);
     }
-    if (rc == SH_OK) rc = bvh_create(c->scene, c->station_m, 0.0, 0, NULL, &c->bvh, err);
+    if (rc == SH_OK) rc = bvh_create(c->scene, 0, NULL, &c->bvh, err);
     if (rc == SH_OK) rc = caster_create(&c->caster, err);
     if (rc == SH_OK) rc = bvh_work_create(&c->bvh_work, err);
     if (rc == SH_OK) rc = sight_work_create(&c->work, err);
     double cost_s;
-    if (rc == SH_OK) rc = bench_scan_plan(&c->scan, c->bvh, c->station_m, &c->plan, err);
+    if (rc == SH_OK) rc = bench_scan_plan(&c->scan, c->bvh, c->station_m, &c->planned, err);
     if (rc == SH_OK) rc = make_sight(c, &cost_s, err);
     if (rc != SH_OK) return rc;
     if (c->spec->at_edges) aim_at_edges(c);

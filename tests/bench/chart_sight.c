@@ -23,7 +23,7 @@ static void print_rows(const char *scene, double pulses, const struct bench_sigh
     static const char *const name[] = {"float", "decided", "sight"};
     for (int i = 0; i < 3; i++)
         printf("pulses,%s %.0e,%s,%.3f,,,%d,%d,,\n", name[i], pulses, scene, ns[i],
-               i == 0 ? ns[0] < exact_ns : ns[i] <= exact_ns, i != 0 && s->plan.map == (i == 2));
+               i == 0 ? ns[0] < exact_ns : ns[i] <= exact_ns, i != 0 && s->planned == (i == 2));
     fflush(stdout);
 }
 
@@ -48,7 +48,7 @@ static int draw_scene(const char *const scene[2], struct sh_err *err)
     struct bench_case c = {.target = &target, .embree = &embree};
     int rc = bench_target_load(scene[0], BENCH_HOUSE_FILE, NULL, &target, err);
     if (rc == SH_OK) rc = bench_embree(target.scene, target.station_m, 1, &embree, err);
-    if (rc == SH_OK) rc = bvh_create(target.scene, target.station_m, 0.0, 0, NULL, &c.bvh, err);
+    if (rc == SH_OK) rc = bvh_create(target.scene, 0, NULL, &c.bvh, err);
     if (rc == SH_OK) rc = measure(&c, scene[1], err);
     bvh_free(c.bvh);
     embree_alone_free(&embree);

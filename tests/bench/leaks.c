@@ -140,10 +140,7 @@ static void *job_main(void *arg)
     job->out->sight_rays += sight.rays;
     job->out->sight_differ += sight.differ;
     job->out->sight_asked += sight.asked;
-    job->out->counters.near_border += c.near_border;
     job->out->counters.decided += c.decided;
-    job->out->counters.went_on += c.went_on;
-    job->out->counters.undecided += c.undecided;
     pthread_mutex_unlock(&job->lock);
     sight_beside_free(&sight);
     caster_free(caster);
@@ -214,7 +211,7 @@ static int one_mesh(int which, uint64_t rays, uint64_t seed, uint32_t threads, c
     struct job job = {.mesh = &mesh, .n = rays, .key = rng_key(seed, RNG_SCENE) + 2 * (uint64_t)which, .out = out};
     pthread_mutex_init(&job.lock, NULL);
     int rc = bench_mesh_create(which, &mesh, err);
-    if (rc == SH_OK) rc = bvh_create(mesh.scene, mesh.station_m, 0.0, 0, report, &job.bvh, err);
+    if (rc == SH_OK) rc = bvh_create(mesh.scene, 0, report, &job.bvh, err);
     if (rc == SH_OK) {
         out->mesh = mesh.name;
         out->triangles = mesh.scene->n_triangles;
@@ -223,7 +220,7 @@ static int one_mesh(int which, uint64_t rays, uint64_t seed, uint32_t threads, c
     if (rc == SH_OK) {
         struct sight_spec spec = {.bvh = job.bvh, .rays = (double)rays, .memory_bytes = 64 << 20};
         memcpy(spec.station_m, mesh.station_m, sizeof spec.station_m);
-        rc = sight_beside_create(&spec, job.bvh, &job.sight, err);
+        rc = sight_beside_create(&spec, &job.sight, err);
     }
     if (rc == SH_OK) rc = run_job(&job, threads, report, err);
     sight_beside_free(&job.sight);

@@ -69,10 +69,7 @@ static void put_counters(struct json *json, const char *key, const struct cast_c
 {
     double per_million = rays > 0.0 ? 1e6 / rays : 0.0;
     json_open_object(json, key);
-    json_double(json, "near_border", (double)c->near_border * per_million);
     json_double(json, "decided", (double)c->decided * per_million);
-    json_double(json, "went_on", (double)c->went_on * per_million);
-    json_double(json, "undecided", (double)c->undecided * per_million);
     json_close_object(json);
 }
 

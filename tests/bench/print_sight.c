@@ -29,10 +29,6 @@ static double peak_mib(const struct bench_sight *s)
 {
     return (double)s->info.peak_bytes / 1048576.0;
 }
-static double exact_ns(const struct bench_sight *s)
-{
-    return s->exact_ns;
-}
 static double plan_ratio(const struct bench_sight *s)
 {
     return s->plan_ratio;
@@ -43,13 +39,18 @@ static double different(const struct bench_sight *s)
 }
 
 static const struct bound BOUND[] = {
-    {"house", 22.5e6, "cast_ratio", cast_ratio, 4.0, 0},  {"house", 22.5e6, "pipeline_ratio", pipeline_ratio, 1.6, 0},
-    {"house", 1e6, "cast_ratio", cast_ratio, 1.0, 0},     {"house", 0.0, "build_s", build_s, 0.1, 1},
-    {"house", 0.0, "peak_mib", peak_mib, 16.0, 1},        {"house", 22.5e6, "exact_ns", exact_ns, 50.0, 1},
-    {"garden", 22.5e6, "cast_ratio", cast_ratio, 4.0, 0}, {"garden", 22.5e6, "pipeline_ratio", pipeline_ratio, 1.1, 0},
-    {"garden", 1e6, "cast_ratio", cast_ratio, 1.0, 0},    {"garden", 0.0, "build_s", build_s, 0.1, 1},
-    {"garden", 0.0, "peak_mib", peak_mib, 16.0, 1},       {"garden", 22.5e6, "exact_ns", exact_ns, 50.0, 1},
-    {"100k", 22.5e6, "cast_ratio", cast_ratio, 2.0, 0},   {NULL, 0.0, "plan_ratio", plan_ratio, 0.98, 0},
+    {"house", 22.5e6, "cast_ratio", cast_ratio, 4.0, 0},
+    {"house", 22.5e6, "pipeline_ratio", pipeline_ratio, 1.6, 0},
+    {"house", 1e6, "cast_ratio", cast_ratio, 1.0, 0},
+    {"house", 0.0, "build_s", build_s, 0.1, 1},
+    {"house", 0.0, "peak_mib", peak_mib, 16.0, 1},
+    {"garden", 22.5e6, "cast_ratio", cast_ratio, 4.0, 0},
+    {"garden", 22.5e6, "pipeline_ratio", pipeline_ratio, 1.1, 0},
+    {"garden", 1e6, "cast_ratio", cast_ratio, 1.0, 0},
+    {"garden", 0.0, "build_s", build_s, 0.1, 1},
+    {"garden", 0.0, "peak_mib", peak_mib, 16.0, 1},
+    {"100k", 22.5e6, "cast_ratio", cast_ratio, 2.0, 0},
+    {NULL, 0.0, "plan_ratio", plan_ratio, 0.98, 0},
     {NULL, 0.0, "different", different, 0.0, 1},
 };
 enum { N_BOUNDS = sizeof BOUND / sizeof BOUND[0] };
@@ -68,7 +69,7 @@ static int reached(const struct bound *b, const struct bench_sight *s)
 
 static const char *planned(const struct bench_sight *s)
 {
-    return !s->plan.map ? "without" : s->plan.ordered ? "exact" : "sight";
+    return s->planned ? "sight" : "without";
 }
 
 static void put_bounds(struct json *json, const char *scene, const struct bench_sight *s)
@@ -131,12 +132,10 @@ static void put_sight(struct json *json, const char *scene, const struct bench_s
     json_double(json, "one", s->one_ns);
     json_double(json, "few", s->few_ns);
     json_double(json, "ask", s->ask_ns);
-    json_double(json, "exact", s->exact_ns);
     json_double(json, "pipeline_without", s->pipeline_without_ns);
     json_double(json, "pipeline", s->pipeline_ns);
     json_close_object(json);
     put_map(json, s);
-    json_double(json, "exact_build_s", s->exact_build_s);
     json_uint(json, "embree_packet", s->embree_width);
     json_string(json, "embree_feed", s->embree_feed == EMBREE_PREPARED ? "prepared" : "loaded");
     json_uint(json, "different", s->different);
@@ -171,17 +170,17 @@ static void table_ns(FILE *out, const struct bench_report *report)
 {
     fprintf(out,
             "\nns per pulse: the cast and its parts | everything; the map\n"
-            "%-8s %9s | %7s %8s %7s %7s | %6s %6s %6s %7s | %8s %8s | %8s %6s %6s %6s %6s\n",
-            "scene", "pulses", "Embree", "without", "build", "cast", "one", "few", "ask", "exact", "pipeline",
-            "without", "build ms", "MiB", "peak", "few %", "ask %");
+            "%-8s %9s | %7s %8s %7s %7s | %6s %6s %6s | %8s %8s | %8s %6s %6s %6s %6s\n",
+            "scene", "pulses", "Embree", "without", "build", "cast", "one", "few", "ask", "pipeline", "without",
+            "build ms", "MiB", "peak", "few %", "ask %");
     for (uint32_t i = 0; i < report->n_scenes; i++)
         for (uint32_t k = 0; k < report->scene[i].n_sights; k++) {
             const struct bench_sight *s = &report->scene[i].sight[k];
             fprintf(out,
-                    "%-8s %8.1fM | %7.2f %8.2f %7.2f %7.2f | %6.1f %6.1f %6.0f %7.1f | %8.2f %8.2f | %8.1f %6.2f %6.2f "
+                    "%-8s %8.1fM | %7.2f %8.2f %7.2f %7.2f | %6.1f %6.1f %6.0f | %8.2f %8.2f | %8.1f %6.2f %6.2f "
                     "%6.2f %6.3f\n",
                     report->scene[i].name, 1e-6 * (double)s->scan.pulses, s->embree_ns, s->without_ns, s->build_ns,
-                    s->sight_ns, s->one_ns, s->few_ns, s->ask_ns, s->exact_ns, s->pipeline_ns, s->pipeline_without_ns,
+                    s->sight_ns, s->one_ns, s->few_ns, s->ask_ns, s->pipeline_ns, s->pipeline_without_ns,
                     1e3 * s->build_s, (double)s->info.bytes / 1048576.0, peak_mib(s), 100.0 * s->few, 100.0 * s->asked);
         }
 }

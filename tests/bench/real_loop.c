@@ -165,8 +165,7 @@ int bench_loop(const struct bench_case *c, const struct bench_result *one, uint3
     struct site site = {.cfg = cfg,
                         .scene = c->target->scene,
                         .n_surfaces = c->target->scene->n_surfaces,
-                        .bvh = {c->bvh},
-                        .n_bvh = 1,
+                        .bvh = c->bvh,
                         .station = station,
                         .n_stations = 1,
                         .scale_m = BENCH_SCALE_M};

@@ -34,19 +34,18 @@ static double share(void) /* of the sphere */
     return (sin(BENCH_HIGHEST_DEG * RAD) - sin(BENCH_LOWEST_DEG * RAD)) / 2.0;
 }
 
-void bench_scan_spec(const struct bench_scan *scan, const struct bvh *bvh, const double station_m[3], int exact,
+void bench_scan_spec(const struct bench_scan *scan, const struct bvh *bvh, const double station_m[3],
                      struct sight_spec *out)
 {
     *out = (struct sight_spec){.bvh = bvh,
                                .rays = (double)scan->pulses / share(),
                                .memory_bytes = (uint64_t)BENCH_SIGHT_MIB << 20,
-                               .exact = exact,
                                .sees = bench_scan_sees};
     memcpy(out->station_m, station_m, sizeof out->station_m);
 }
 
-int bench_scan_plan(const struct bench_scan *scan, const struct bvh *bvh, const double station_m[3],
-                    struct plan_sight_choice *choice, struct sh_err *err)
+int bench_scan_plan(const struct bench_scan *scan, const struct bvh *bvh, const double station_m[3], int *map,
+                    struct sh_err *err)
 {
     struct schedule_spec spec;
     struct bvh_info info;
@@ -69,9 +68,8 @@ int bench_scan_plan(const struct bench_scan *scan, const struct bvh *bvh, const 
                                          .n_triangles = bvh_scene(bvh)->n_triangles,
                                          .packet = info.packet,
                                          .memory_bytes = (uint64_t)BENCH_SIGHT_MIB << 20,
-                                         .order = PLAN_ORDER_FREE,
                                          .forced = -1};
-    return plan_sight(&need, &place, 1, NULL, choice, &row, err);
+    return plan_sight(&need, &place, 1, NULL, map, &row, err);
 }
 
 double bench_process_s(void)

@@ -8,8 +8,8 @@
 #include "drivers/protocol/native_encode.h"
 #include "tests/common/hits.h"
 
-enum { EMBREE, WITHOUT, SIGHT, EXACT, PIPELINE_WITHOUT, PIPELINE, N_METHODS };
-enum { KINDS = 3 /* one or nothing, few, ask */, FEW_ROUNDS = 5, WIDTHS = 3, TRIES = 3 };
+enum { EMBREE, WITHOUT, SIGHT, PIPELINE_WITHOUT, PIPELINE, N_METHODS };
+enum { KINDS = 3 /* one or nothing, few, ask */, WIDTHS = 3, TRIES = 3 };
 
 struct sums { /* of the least squares: what a block cost by what was in it */
     double a[KINDS][KINDS], b[KINDS];
@@ -31,7 +31,7 @@ struct rows {
     size_t cap;
     double range_m[2][BENCH_BLOCK];
     uint32_t prim[2][BENCH_BLOCK];
-    double ns[N_METHODS][BENCH_SIGHT_ROUNDS], build_s[2][BENCH_SIGHT_ROUNDS], kind_ns[KINDS][BENCH_SIGHT_ROUNDS];
+    double ns[N_METHODS][BENCH_SIGHT_ROUNDS], build_s[BENCH_SIGHT_ROUNDS], kind_ns[KINDS][BENCH_SIGHT_ROUNDS];
 };
 
 static int set_up(struct rows *r, struct sh_err *err)
@@ -70,15 +70,15 @@ static void tear_down(struct rows *r)
 }
 
 /* The sight of this round, and what its building cost. */
-static int build(struct rows *r, int exact, uint32_t round, struct sh_err *err)
+static int build(struct rows *r, uint32_t round, struct sh_err *err)
 {
     struct sight_spec spec;
-    bench_scan_spec(&r->out->scan, r->c->bvh, r->c->target->station_m, exact, &spec);
+    bench_scan_spec(&r->out->scan, r->c->bvh, r->c->target->station_m, &spec);
     sight_free(r->sight);
     r->sight = NULL;
     double start_s = bench_process_s();
     int rc = sight_create(&spec, 1, NULL, &r->sight, err);
-    r->build_s[exact][round] = bench_process_s() - start_s;
+    r->build_s[round] = bench_process_s() - start_s;
     r->setup.sight = r->sight;
     return rc;
 }
@@ -231,39 +231,30 @@ static void compare(struct rows *r)
     r->out->asked = (double)(after->asked - before.asked) / (double)r->out->cast;
 }
 
-/* Ordering may cost a hundred times as much; where the plan does not take it, a few rounds say enough. */
-static uint32_t exact_rounds(const struct rows *r)
-{
-    return r->out->plan.ordered ? BENCH_SIGHT_ROUNDS : FEW_ROUNDS;
-}
-
 static int round_of(struct rows *r, uint32_t round, struct sh_err *err)
 {
     static const int turn[] = {EMBREE, WITHOUT, SIGHT, PIPELINE_WITHOUT, PIPELINE};
     const uint32_t every = r->out->scan.every;
     double of_kind[KINDS];
     struct sums sums = {0};
-    int rc = build(r, 0, round, err);
+    int rc = build(r, round, err);
     if (rc != SH_OK) return rc;
     for (size_t i = 0; i < sizeof turn / sizeof turn[0]; i++)
         r->ns[turn[i]][round] = timed_pass(r, turn[i], every, turn[i] == SIGHT ? &sums : NULL);
     solve(&sums, of_kind);
     for (int k = 0; k < KINDS; k++)
         r->kind_ns[k][round] = of_kind[k];
-    if (round >= exact_rounds(r)) return SH_OK;
-    rc = build(r, 1, round, err);
-    if (rc == SH_OK) r->ns[EXACT][round] = timed_pass(r, EXACT, every, NULL);
-    return rc;
+    return SH_OK;
 }
 
 /* One method's time by another's; a sight's building belongs to what needs it. */
 static double ratio(const struct rows *r, int base, int method)
 {
-    const int built = method == SIGHT || method == EXACT || method == PIPELINE, exact = method == EXACT;
+    const int built = method == SIGHT || method == PIPELINE;
     const double pulses = (double)r->out->scan.pulses;
     double q[BENCH_SIGHT_ROUNDS];
     for (uint32_t i = 0; i < r->out->rounds; i++)
-        q[i] = r->ns[base][i] / (r->ns[method][i] + (built ? 1e9 * r->build_s[exact][i] / pulses : 0.0));
+        q[i] = r->ns[base][i] / (r->ns[method][i] + (built ? 1e9 * r->build_s[i] / pulses : 0.0));
     return bench_median(q, r->out->rounds);
 }
 
@@ -276,8 +267,8 @@ static void summarise(struct rows *r)
     out->pipeline_ratio = ratio(r, EMBREE, PIPELINE);
     out->pipeline_ratio_without = ratio(r, EMBREE, PIPELINE_WITHOUT);
     out->gain = ratio(r, WITHOUT, SIGHT);
-    out->plan_ratio = !out->plan.map ? 1.0 : out->plan.ordered ? ratio(r, WITHOUT, EXACT) : out->gain;
-    out->build_s = bench_median(r->build_s[0], n);
+    out->plan_ratio = out->planned ? out->gain : 1.0;
+    out->build_s = bench_median(r->build_s, n);
     out->build_ns = 1e9 * out->build_s / (double)out->scan.pulses;
     out->embree_ns = bench_median(r->ns[EMBREE], n);
     out->without_ns = bench_median(r->ns[WITHOUT], n);
@@ -287,19 +278,15 @@ static void summarise(struct rows *r)
     out->one_ns = bench_median(r->kind_ns[0], n);
     out->few_ns = bench_median(r->kind_ns[1], n);
     out->ask_ns = bench_median(r->kind_ns[2], n);
-    for (uint32_t i = 0; i < exact_rounds(r); i++)
-        r->ns[EXACT][i] += 1e9 * r->build_s[1][i] / (double)out->scan.pulses;
-    out->exact_ns = bench_median(r->ns[EXACT], exact_rounds(r));
-    out->exact_build_s = bench_median(r->build_s[1], exact_rounds(r));
 }
 
 static int run(struct rows *r, struct sh_err *err)
 {
     int rc = choose_embree(r, err);
     const double start_s = bench_process_s();
-    if (rc == SH_OK) rc = bench_scan_plan(&r->out->scan, r->c->bvh, r->c->target->station_m, &r->out->plan, err);
+    if (rc == SH_OK) rc = bench_scan_plan(&r->out->scan, r->c->bvh, r->c->target->station_m, &r->out->planned, err);
     r->out->plan_s = bench_process_s() - start_s;
-    if (rc == SH_OK) rc = build(r, 0, 0, err);
+    if (rc == SH_OK) rc = build(r, 0, err);
     if (rc != SH_OK) return rc;
     sight_get_info(r->sight, &r->out->info);
     compare(r);

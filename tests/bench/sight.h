@@ -19,11 +19,11 @@ void bench_scan_of(double pulses, uint32_t every, struct bench_scan *out);
 /* False where no pulse of such a scan goes: what sight_spec asks. */
 int bench_scan_sees(const void *ctx, const double dir[3], double radius_rad);
 /* What a sight is made of for it. */
-void bench_scan_spec(const struct bench_scan *scan, const struct bvh *bvh, const double station_m[3], int exact,
+void bench_scan_spec(const struct bench_scan *scan, const struct bvh *bvh, const double station_m[3],
                      struct sight_spec *out);
-/* What the plan takes for it. Surfaces are ordered in double where that is free (scene.order_exactly: auto). */
-int bench_scan_plan(const struct bench_scan *scan, const struct bvh *bvh, const double station_m[3],
-                    struct plan_sight_choice *choice, struct sh_err *err);
+/* Whether the plan takes a map for it. */
+int bench_scan_plan(const struct bench_scan *scan, const struct bvh *bvh, const double station_m[3], int *map,
+                    struct sh_err *err);
 double bench_process_s(void); /* processor time of all threads */
 
 struct bench_sight {
@@ -36,13 +36,12 @@ struct bench_sight {
     double one_ns, few_ns, ask_ns;           /* by what the map says; NaN: there is too little of it */
     double few, asked;                       /* shares of the pulses */
     double build_s, build_ns;                /* processor time; by all pulses of the scan */
-    double exact_ns, exact_build_s;          /* surfaces ordered in double: cast and building */
     double cast_ratio, pipeline_ratio;       /* Embree's time by building and ours: medians of the rounds */
     double cast_ratio_without, pipeline_ratio_without;
-    double gain;                   /* of the cast: without by with, building included */
-    struct plan_sight_choice plan; /* for so many pulses */
-    double plan_s, plan_ratio;     /* what choosing took; without by what the plan takes */
-    uint64_t different;            /* pulses of a round that met something else than without */
+    double gain;               /* of the cast: without by with, building included */
+    int planned;               /* a map, for so many pulses */
+    double plan_s, plan_ratio; /* what choosing took; without by what the plan takes */
+    uint64_t different;        /* pulses of a round that met something else than without */
     struct sight_info info;
 };
 

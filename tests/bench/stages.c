@@ -14,8 +14,7 @@ struct bench_stages {
 /* Where a stage of the caster is told. */
 static const enum bench_stage STAGE_OF[CAST_STAGES] = {
     [CAST_DIRECTIONS] = STAGE_DIRECTIONS, [CAST_EMBREE] = STAGE_EMBREE, [CAST_REFINE] = STAGE_REFINE,
-    [CAST_DECIDE] = STAGE_DECIDE,         [CAST_DETECT] = STAGE_DETECT, [CAST_NOISE] = STAGE_NOISE,
-    [CAST_POSITIONS] = STAGE_GEOREF};
+    [CAST_DETECT] = STAGE_DETECT,         [CAST_NOISE] = STAGE_NOISE,   [CAST_POSITIONS] = STAGE_GEOREF};
 
 uint64_t bench_cycles(void)
 {

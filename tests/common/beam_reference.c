@@ -229,14 +229,14 @@ int beam_rig_open(struct beam_rig *rig, struct scene *scene, const double statio
                                      .xyz_scale = {1e-5, 1e-5, 1e-5}};
     memcpy(rig->setup.station_m, station_m, sizeof rig->setup.station_m);
     pose_heading(0.0, rig->setup.rotation);
-    int rc = bvh_create(scene, station_m, 0.01, 2, NULL, &rig->bvh, err);
+    int rc = bvh_create(scene, 2, NULL, &rig->bvh, err);
     if (rc == SH_OK) rc = georef_create(&local, &rig->georef, err);
     if (rc == SH_OK) rc = caster_create(&rig->caster, err);
     if (rc == SH_OK) rc = line_block_alloc(&rig->block, view->pulses * LINE_MAX_ECHOES, err);
     if (rc == SH_OK)
-        rc =
-            cast_outlines(&(struct beam_outlines_spec){scene, station_m, &rig->beam.beam, rig->setup.range_max_m, NULL, NULL},
-                          rig->bvh, &rig->outlines, err);
+        rc = cast_outlines(
+            &(struct beam_outlines_spec){scene, station_m, &rig->beam.beam, rig->setup.range_max_m, NULL, NULL},
+            rig->bvh, &rig->outlines, err);
     rig->setup.bvh = rig->bvh;
     rig->setup.georef = rig->georef;
     rig->beam.outlines = rig->outlines;
@@ -278,7 +278,6 @@ void beam_rig_directions(struct beam_rig *rig, uint32_t l, double *dx, double *d
     double *turn = malloc(2 * n * sizeof *turn);
     schedule_get_run(&rig->segment, &line, line.cast0, n, &run);
     kernel_angles(&run, 0, n, turn, turn + n);
-    kernel_directions(&(struct kernel_turns){n, turn, turn + n}, rig->setup.rotation,
-                      &(struct vec3_out){dx, dy, dz});
+    kernel_directions(&(struct kernel_turns){n, turn, turn + n}, rig->setup.rotation, &(struct vec3_out){dx, dy, dz});
     free(turn);
 }

@@ -14,10 +14,9 @@ static int take_works(struct sight_beside *beside, struct sh_err *err)
     return rc;
 }
 
-int sight_beside_create(const struct sight_spec *spec, const struct bvh *bvh, struct sight_beside *out,
-                        struct sh_err *err)
+int sight_beside_create(const struct sight_spec *spec, struct sight_beside *out, struct sh_err *err)
 {
-    *out = (struct sight_beside){.bvh = bvh};
+    *out = (struct sight_beside){.bvh = spec->bvh};
     memcpy(out->station_m, spec->station_m, sizeof out->station_m);
     int rc = sight_create(spec, 1, NULL, &out->sight, err);
     if (rc != SH_OK) return rc;

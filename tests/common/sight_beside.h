@@ -14,7 +14,7 @@ struct sight_difference {
 };
 
 struct sight_beside {
-    const struct bvh *bvh; /* what the sight is compared with */
+    const struct bvh *bvh;
     struct sight *sight;
     int borrowed; /* the sight is another one's */
     struct sight_info info;
@@ -26,10 +26,7 @@ struct sight_beside {
     struct bvh_work *bvh_work;
 };
 
-/* The sight of spec; its hits are compared with those of `bvh`: spec->bvh itself, or where spec->exact is set
- * one over the same scene that orders exactly. */
-int sight_beside_create(const struct sight_spec *spec, const struct bvh *bvh, struct sight_beside *out,
-                        struct sh_err *err);
+int sight_beside_create(const struct sight_spec *spec, struct sight_beside *out, struct sh_err *err);
 /* The same sight for another thread; `other` must outlive it. */
 int sight_beside_join(const struct sight_beside *other, struct sight_beside *out, struct sh_err *err);
 void sight_beside_free(struct sight_beside *beside);

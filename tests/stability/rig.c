@@ -10,35 +10,20 @@
 
 static const double RANGE_MAX_M = 1e5;
 
-static double distance_m(const double a[3], const double b[3])
-{
-    double d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-    return sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-}
-
-void rig_rebuild(struct rig *rig, const double origin_m[3], unsigned threads)
+void rig_rebuild(struct rig *rig, unsigned threads)
 {
     struct sh_err err;
     bvh_free(rig->bvh);
     rig->bvh = NULL;
-    if (bvh_create(rig->scene, origin_m, distance_m(origin_m, rig->station_m), threads, NULL, &rig->bvh, &err) != SH_OK)
-        fail_msg("%s", err.text);
-    if (rig->exact_order && bvh_order_exactly(rig->bvh, NULL, &err) != SH_OK) fail_msg("%s", err.text);
+    if (bvh_create(rig->scene, threads, NULL, &rig->bvh, &err) != SH_OK) fail_msg("%s", err.text);
 }
 
-void rig_order_exactly(struct rig *rig)
-{
-    struct sh_err err;
-    rig->exact_order = 1;
-    if (bvh_order_exactly(rig->bvh, NULL, &err) != SH_OK) fail_msg("%s", err.text);
-}
-
-void rig_open(struct rig *rig, struct scene *scene, const double station_m[3], const double origin_m[3])
+void rig_open(struct rig *rig, struct scene *scene, const double station_m[3])
 {
     struct sh_err err;
     *rig = (struct rig){.scene = scene};
     memcpy(rig->station_m, station_m, sizeof rig->station_m);
-    rig_rebuild(rig, origin_m, 1);
+    rig_rebuild(rig, 1);
     if (caster_create(&rig->caster, &err) != SH_OK) fail_msg("%s", err.text);
     rig->reference = reference_create((const double(*)[3])scene->vertex_m, (const uint32_t(*)[3])scene->triangle,
                                       scene->n_triangles);
@@ -134,10 +119,10 @@ static void check_sight(struct rig *rig)
 {
     struct sight_beside beside;
     struct sh_err err;
-    struct sight_spec spec = {.bvh = rig->bvh, .rays = 1e6, .memory_bytes = 64 << 20, .exact = rig->exact_order};
+    struct sight_spec spec = {.bvh = rig->bvh, .rays = 1e6, .memory_bytes = 64 << 20};
     const struct vec3_in dir = {rig->dx, rig->dy, rig->dz};
     memcpy(spec.station_m, rig->station_m, sizeof spec.station_m);
-    if (sight_beside_create(&spec, rig->bvh, &beside, &err) != SH_OK) fail_msg("%s", err.text);
+    if (sight_beside_create(&spec, &beside, &err) != SH_OK) fail_msg("%s", err.text);
     sight_beside_check(&beside, rig->n, &dir, RANGE_MAX_M, rig->range_m, rig->triangle);
     sight_beside_print(&beside);
     const uint64_t differ = beside.differ;

@@ -15,7 +15,6 @@
 struct rig {
     struct scene *scene;
     struct bvh *bvh;
-    int exact_order; /* overlapping surfaces are ordered in double */
     struct caster *caster;
     struct reference *reference;
     double station_m[3];
@@ -34,13 +33,11 @@ struct rig_errors {
     uint64_t undecidable; /* would be wrong, but double precision can't tell; in no figure above */
 };
 
-/* Takes the scene. The BVH's frame is about origin_m. Fails the running test where anything can't be had. */
-void rig_open(struct rig *rig, struct scene *scene, const double station_m[3], const double origin_m[3]);
+/* Takes the scene. Fails the running test where anything can't be had. */
+void rig_open(struct rig *rig, struct scene *scene, const double station_m[3]);
 void rig_close(struct rig *rig);
-/* Orders surfaces that overlap in double (bvh_order_exactly): this BVH and those that follow. */
-void rig_order_exactly(struct rig *rig);
 /* Another BVH over the same scene and rays. */
-void rig_rebuild(struct rig *rig, const double origin_m[3], unsigned threads);
+void rig_rebuild(struct rig *rig, unsigned threads);
 
 /* A ray from the station towards a point, or along a direction of any length. */
 void rig_aim(struct rig *rig, const double point_m[3]);

@@ -62,7 +62,7 @@ static uint32_t wrong_of_ours(const struct scene *scene, double away_m, double i
     struct sh_err err;
     uint32_t wrong = 0;
     rig_line_ahead(&segment, &line, &run);
-    if (bvh_create(scene, at, 2000.0, 1, NULL, &bvh, &err) != SH_OK || caster_create(&caster, &err) != SH_OK ||
+    if (bvh_create(scene, 1, NULL, &bvh, &err) != SH_OK || caster_create(&caster, &err) != SH_OK ||
         line_block_alloc(&block, PULSES * (1 + CAST_MAX_DEPTH), &err) != SH_OK ||
         surface_table_alloc(2, &table, &err) != SH_OK)
         fail_msg("%s", err.text);

@@ -4,7 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/bvh/bvh_inside.h" /* the label that a triangle counts with */
 #include "tests/common/hits.h"
 #include "tests/common/thorough.h"
 #include "tests/stability/rig.h"
@@ -110,13 +109,13 @@ static void test_needles(void **state)
     struct scene *scene = mesh_scene(&mesh);
     assert_int_equal(scene->n_triangles, before - n_flat);
     assert_int_equal(scene->counts.zero_area, n_flat);
-    rig_open(&rig, scene, NOWHERE, NOWHERE);
+    rig_open(&rig, scene, NOWHERE);
     aim_at_screen(&rig, RAYS / 50, 0, 81);
     rig_row_of_ranges(&rig, "needles 1:10^6 and triangles without area", NOWHERE, RIG_MICROMETRE);
     rig_close(&rig);
 
     add_wall(&mesh, 80.0);
-    rig_open(&rig, mesh_scene(&mesh), NOWHERE, NOWHERE);
+    rig_open(&rig, mesh_scene(&mesh), NOWHERE);
     aim_at_screen(&rig, RAYS / 10, 0, 82);
     leak_row(&rig, "through needles 1:10^6, rays anywhere");
     rig_clear(&rig);
@@ -149,7 +148,7 @@ static void test_fan(void **state)
     }
     add_wall(&mesh, 200.0);
     turn(&mesh);
-    rig_open(&rig, mesh_scene(&mesh), NOWHERE, NOWHERE);
+    rig_open(&rig, mesh_scene(&mesh), NOWHERE);
     for (uint64_t i = 0; i < RAYS / 20; i++) { /* near the middle, by powers of ten from 10 m to 1e-17 m */
         const double *tip = mesh.vertex[middle],
                      *end = mesh.vertex[middle + 1 + (uint32_t)(rig_unit(91, 2 * i) * BLADES)];
@@ -181,7 +180,7 @@ static void test_t_junctions(void **state)
                (const double[3]){0.0, 0.3, 6.0}, 64, 64, 0);
     add_wall(&mesh, 20.0);
     turn(&mesh);
-    rig_open(&rig, mesh_scene(&mesh), NOWHERE, NOWHERE);
+    rig_open(&rig, mesh_scene(&mesh), NOWHERE);
     for (uint64_t i = 0; i < RAYS; i++) { /* along the seam: at its corners and between; not at its two ends */
         uint32_t row = 1 + (uint32_t)(rig_unit(101, 2 * i) * 63.0);
         double part = i % 2 ? 0.0 : rig_unit(101, 2 * i + 1), p[3];
@@ -205,7 +204,7 @@ static void test_soup(void **state)
         mesh_sphere(&mesh, (const double[3]){0.3, 0.2, -0.1}, 5.0, 0.02, 5, 0);
         mesh_unweld(&mesh);
         mesh_sphere(&mesh, (const double[3]){0.0, 0.0, 0.0}, 8.0, 0.0, 3, 7);
-        rig_open(&rig, mesh_scene(&mesh), NOWHERE, NOWHERE);
+        rig_open(&rig, mesh_scene(&mesh), NOWHERE);
         aim_at_screen(&rig, RAYS, corner, 111);
         leak_row(&rig, corner == 1 ? "unwelded soup, rays at its edges" : "unwelded soup, rays at its corners");
         rig_close(&rig);
@@ -222,13 +221,13 @@ struct labels {
     uint32_t n;
 };
 
-static uint64_t compare_labels(const struct rig *rig, struct labels *first, int ours)
+static uint64_t compare_labels(const struct rig *rig, struct labels *first)
 {
     uint64_t differ = 0;
     for (uint32_t i = 0; i < rig->n; i++) {
         uint32_t t = rig->triangle[i];
         uint16_t label = 0xffff;
-        if (t < rig->scene->n_triangles) label = ours ? bvh_label(&rig->bvh->triangle[t]) : rig->scene->label[t];
+        if (t < rig->scene->n_triangles) label = rig->scene->label[t];
         if (first->n == 0)
             first->label[i] = label;
         else
@@ -244,7 +243,7 @@ static void cast_cut(struct rig *rig, uint32_t cut)
     for (uint32_t at = 0; at < rig->n; at += cut) {
         uint32_t n = rig->n - at < cut ? rig->n - at : cut;
         hits_from(rig->caster, rig->bvh, rig->station_m, 1e5, n, rig->dx + at, rig->dy + at, rig->dz + at,
-                    rig->range_m + at, rig->triangle + at);
+                  rig->range_m + at, rig->triangle + at);
     }
 }
 
@@ -255,22 +254,22 @@ static void label_row(struct rig *rig, const char *regime)
     uint64_t by_width = 0, by_cut = 0, by_threads = 0, naive_differ = 0;
     for (int i = 0; i < 4; i++) {
         rig_cast_naive(rig, rig->station_m, 1, width[i]);
-        naive_differ += compare_labels(rig, &naive, 0);
+        naive_differ += compare_labels(rig, &naive);
     }
     for (int i = 0; i < 4; i++) {
         bvh_set_packet(rig->bvh, width[i]);
         rig_cast(rig);
-        by_width += compare_labels(rig, &ours, 1);
+        by_width += compare_labels(rig, &ours);
     }
     bvh_set_packet(rig->bvh, width[0]);
     for (int i = 0; i < 4; i++) {
         cast_cut(rig, cut[i]);
-        by_cut += compare_labels(rig, &ours, 1);
+        by_cut += compare_labels(rig, &ours);
     }
-    rig_rebuild(rig, rig->station_m, 2);
+    rig_rebuild(rig, 2);
     bvh_set_packet(rig->bvh, width[0]);
     rig_cast(rig);
-    by_threads += compare_labels(rig, &ours, 1);
+    by_threads += compare_labels(rig, &ours);
     table_row(regime, "local frame, robust: by width", (double)naive_differ, (double)(by_width + by_cut + by_threads),
               0.0, "labels");
     table_note("of %u rays; ours differ for packets of 8, 4, 1: %llu, other cuts: %llu, 2 build threads: %llu", rig->n,
@@ -299,7 +298,7 @@ static void test_duplicates(void **state)
         struct mesh mesh = {0};
         struct rig rig;
         add_sphere_twice(&mesh, swapped);
-        rig_open(&rig, mesh_scene(&mesh), NOWHERE, NOWHERE);
+        rig_open(&rig, mesh_scene(&mesh), NOWHERE);
         rig_aim_at_sphere(&rig, RAYS / 4, 121);
         aim_at_screen(&rig, RAYS / 4, 1, 122);
         label_row(&rig, swapped ? "faces twice, turned over" : "faces twice");
@@ -317,8 +316,7 @@ static void test_coplanar(void **state)
     const double corner[3] = {-4.0, 8.0, -4.0}, u[3] = {8.0, 1.0, 0.0}, v[3] = {0.0, 2.0, 8.0};
     mesh_sheet(&mesh, corner, u, v, 12, 12, 2);
     mesh_sheet(&mesh, corner, u, v, 8, 16, 3);
-    rig_open(&rig, mesh_scene(&mesh), NOWHERE, NOWHERE);
-    rig_order_exactly(&rig);
+    rig_open(&rig, mesh_scene(&mesh), NOWHERE);
     for (uint64_t i = 0; i < RAYS / 4; i++) {
         double a = rig_unit(123, 2 * i), b = rig_unit(123, 2 * i + 1);
         rig_aim(&rig, (const double[3]){corner[0] + a * u[0], corner[1] + a * u[1] + b * v[1], corner[2] + b * v[2]});

@@ -77,9 +77,7 @@ static void drive(struct ride *ride)
     struct line_block block;
     struct sh_err err;
     mesh_sphere(&mesh, centre, 40.0, 0.02, 6, 1);
-    rig_open(&rig, mesh_scene(&mesh), middle, middle);
-    bvh_free(rig.bvh);
-    assert_int_equal(bvh_create(rig.scene, middle, 8.0, 1, NULL, &rig.bvh, &err), SH_OK);
+    rig_open(&rig, mesh_scene(&mesh), middle);
     assert_int_equal(line_block_alloc(&block, LINE_PULSES + 16, &err), SH_OK);
     for (int i = 0; i < KNOTS; i++) {
         knot[i].t_ns = 10000000 * (int64_t)i;

@@ -178,7 +178,7 @@ static void open_at_utm(struct rig *rig, struct mesh *mesh)
     double rotation[9];
     mesh_any_rotation(rotation);
     mesh_move(mesh, 0, rotation, UTM_M);
-    rig_open(rig, mesh_scene(mesh), UTM_M, UTM_M);
+    rig_open(rig, mesh_scene(mesh), UTM_M);
 }
 
 /* ---- where it breaks */
@@ -220,7 +220,7 @@ static void test_no_doubts(void **state)
     struct rig rig;
     struct wrong naive, ours;
     mesh_sphere(&mesh, (const double[3]){0.1, 0.2, -0.1}, 20.0, 0.1, 2, 0);
-    rig_open(&rig, mesh_scene(&mesh), STATION_M, STATION_M);
+    rig_open(&rig, mesh_scene(&mesh), STATION_M);
     for (uint32_t k = 0; k < RAYS; k++)
         aim_beside_edge(&rig, k % rig.scene->n_triangles, 100 + k, 0.0);
     look_both_ways(&rig, 0, &naive, &ours);
@@ -245,7 +245,7 @@ static void test_no_pad(void **state)
         const double from = -10.0 * (1.0 + BESIDE[i]);
         mesh_sheet(&mesh, (const double[3]){from, 10.0, from}, (const double[3]){20.0, 0.0, 0.0},
                    (const double[3]){0.0, 0.0, 20.0}, CELLS / 4, CELLS / 4, 0);
-        rig_open(&rig, mesh_scene(&mesh), STATION_M, STATION_M);
+        rig_open(&rig, mesh_scene(&mesh), STATION_M);
         for (uint32_t k = 0; k < RAYS; k++) {
             const double border = floor(CELLS * rig_unit(7, 3 * (uint64_t)k)) / (CELLS / 2) - 1.0;
             const double u = 0.99 * border + 5e-8 * (2.0 * rig_unit(7, 3 * (uint64_t)k + 1) - 1.0) + 0.01 * border;

@@ -51,7 +51,6 @@ struct shot {
 static void shoot(struct scene *scene, const struct surface_table *table, const struct cast_detect *asked,
                   struct shot *out, uint32_t times, void (*each)(void *ctx, const struct shot *shot), void *ctx)
 {
-    static const double at[3] = {0.0, 0.0, 0.0};
     struct schedule_segment segment;
     struct schedule_line line;
     struct schedule_run run;
@@ -60,7 +59,7 @@ static void shoot(struct scene *scene, const struct surface_table *table, const 
     struct sh_err err;
     struct cast_detect detect = *asked;
     rig_line_ahead(&segment, &line, &run);
-    if (bvh_create(scene, at, 1000.0, 1, NULL, &bvh, &err) != SH_OK || caster_create(&caster, &err) != SH_OK ||
+    if (bvh_create(scene, 1, NULL, &bvh, &err) != SH_OK || caster_create(&caster, &err) != SH_OK ||
         line_block_alloc(&out->block, RIG_LINE_PULSES * (1 + CAST_MAX_DEPTH), &err) != SH_OK)
         fail_msg("%s", err.text);
     for (uint32_t i = 0; i < RIG_LINE_PULSES; i++)

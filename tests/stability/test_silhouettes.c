@@ -53,7 +53,7 @@ static void open_turned(struct rig *rig, struct mesh *mesh, const double station
     mesh_vertex(&point, station_m[0], station_m[1], station_m[2]);
     mesh_move(&point, 0, rotation, UTM_M);
     mesh_move(mesh, 0, rotation, UTM_M);
-    rig_open(rig, mesh_scene(mesh), point.vertex[0], point.vertex[0]);
+    rig_open(rig, mesh_scene(mesh), point.vertex[0]);
     mesh_free(&point);
 }
 

@@ -13,10 +13,10 @@ struct scene *scene_of(const double (*vertex)[3], uint32_t n_vertices, const uin
     return scene;
 }
 
-struct bvh *bvh_of(const struct scene *scene, double reach_m)
+struct bvh *bvh_of(const struct scene *scene)
 {
     struct bvh *bvh;
     struct sh_err err;
-    if (bvh_create(scene, ORIGIN, reach_m, 1, NULL, &bvh, &err) != 0) fail_msg("%s", err.text);
+    if (bvh_create(scene, 1, NULL, &bvh, &err) != 0) fail_msg("%s", err.text);
     return bvh;
 }

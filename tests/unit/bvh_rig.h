@@ -1,4 +1,4 @@
-/* For tests of the BVH alone: a few triangles, and a BVH about ORIGIN. */
+/* For tests of the BVH alone: a few triangles about ORIGIN, and a BVH. */
 #ifndef TESTS_UNIT_BVH_RIG_H
 #define TESTS_UNIT_BVH_RIG_H
 
@@ -11,6 +11,6 @@ extern const double ORIGIN[3]; /* prcs, m */
 struct scene *scene_of(const double (*vertex)[3], uint32_t n_vertices, const uint32_t (*triangle)[3], uint32_t n,
                        const uint16_t *label);
 
-struct bvh *bvh_of(const struct scene *scene, double reach_m);
+struct bvh *bvh_of(const struct scene *scene);
 
 #endif

@@ -52,9 +52,8 @@ struct cast_rig *cast_rig_open(struct scene *scene, const double station_m[3])
     rig->scene = scene;
     struct georef_spec local = {.crs = GEOREF_LOCAL};
     memcpy(local.station_m, station_m, sizeof local.station_m);
-    if (bvh_create(scene, station_m, 1.0, 1, NULL, &rig->bvh, &err) != 0 ||
-        georef_create(&local, &rig->georef, &err) != 0 || caster_create(&rig->caster, &err) != 0 ||
-        line_block_alloc(&rig->block, RIG_LINE, &err) != 0)
+    if (bvh_create(scene, 1, NULL, &rig->bvh, &err) != 0 || georef_create(&local, &rig->georef, &err) != 0 ||
+        caster_create(&rig->caster, &err) != 0 || line_block_alloc(&rig->block, RIG_LINE, &err) != 0)
         fail_msg("%s", err.text);
     rig->setup = (struct cast_setup){.bvh = rig->bvh,
                                      .georef = rig->georef,

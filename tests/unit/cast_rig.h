@@ -34,7 +34,7 @@ struct scene *box_scene(const double lo[3], const double hi[3]);
 /* Range from o along d to the box's inside, and the wall met. */
 long double box_range(const double lo[3], const double hi[3], const double o[3], const long double d[3], int *wall);
 
-/* Takes the scene over. Origin of the BVH: the station. Polar layout, 10 um, ideal encoders, no noise. */
+/* Takes the scene over. Polar layout, 10 um, ideal encoders, no noise. */
 struct cast_rig *cast_rig_open(struct scene *scene, const double station_m[3]);
 
 void cast_rig_close(struct cast_rig *rig);

@@ -12,12 +12,9 @@ struct cover *cover_open(struct scene *scene, double cell_m, unsigned threads)
 {
     struct cover *c = calloc(1, sizeof *c);
     struct sh_err err;
-    double centre_m[3];
     assert_non_null(c);
     c->scene = scene;
-    for (int i = 0; i < 3; i++)
-        centre_m[i] = 0.5 * (scene->min_m[i] + scene->max_m[i]);
-    if (bvh_create(scene, centre_m, 10.0, 1, NULL, &c->bvh, &err) != 0 ||
+    if (bvh_create(scene, 1, NULL, &c->bvh, &err) != 0 ||
         coverage_create(&(struct coverage_spec){c->bvh, NULL, cell_m, 100.0, threads}, NULL, &c->coverage, &err) != 0)
         fail_msg("%s", err.text);
     return c;

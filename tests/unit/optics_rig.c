@@ -8,17 +8,13 @@ void open_optics(struct optics *o, struct scene *scene)
     struct sh_err err;
     uint32_t n = scene->n_surfaces;
     o->rig = cast_rig_open(scene, STATION);
-    bvh_free(o->rig->bvh); /* rays begin all over the room */
-    if (bvh_create(scene, STATION, 50.0, 1, NULL, &o->rig->bvh, &err) != 0 ||
-        surface_table_alloc(n, &o->table, &err) != 0)
-        fail_msg("%s", err.text);
+    if (surface_table_alloc(n, &o->table, &err) != 0) fail_msg("%s", err.text);
     line_block_free(&o->rig->block);
     assert_int_equal(line_block_alloc(&o->rig->block, RIG_LINE * (1 + CAST_MAX_DEPTH), &err), 0);
     for (uint32_t i = 0; i < n; i++)
         o->table.surface[i].reflectance = 0.5;
     o->detect =
         (struct cast_detect){.surfaces = &o->table, .depth = CAST_MAX_DEPTH, .ghost_label = n, .max_echoes = 15};
-    o->rig->setup.bvh = o->rig->bvh;
     o->rig->setup.detect = &o->detect;
 }
 

@@ -301,21 +301,43 @@ static void rounded_coordinates_cost_no_more_than_their_rounding(void **state)
     assert_true(worst > 0.0);
 }
 
-/* Stations share a BVH up to a kilometre: its float coordinates then have steps of 0.06 mm, which must not
- * reach the range. */
+/* The room, and a triangle 2 km away: the BVH's origin is the middle of that. */
+static struct scene *room_and_far_triangle(void)
+{
+    struct scene *room = box_scene(LO, HI), *both;
+    struct sh_err err;
+    double vertex[11][3];
+    uint32_t triangle[13][3];
+    uint16_t label[13] = {0};
+    assert_true(room->n_vertices == 8 && room->n_triangles == 12);
+    memcpy(vertex, room->vertex_m, 8 * sizeof vertex[0]);
+    memcpy(triangle, room->triangle, 12 * sizeof triangle[0]);
+    memcpy(label, room->label, 12 * sizeof label[0]);
+    for (uint32_t i = 0; i < 3; i++) {
+        for (uint32_t k = 0; k < 3; k++)
+            vertex[8 + i][k] = HERE[k] + (k == 0 ? -1200.0 : k == 1 ? 1400.0 : 100.0) + (i == k);
+        triangle[12][i] = 8 + i;
+    }
+    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 11, (const uint32_t(*)[3])triangle, 13,
+                                                 label, room->surface, room->n_surfaces},
+                          &both, &err) != 0)
+        fail_msg("%s", err.text);
+    scene_free(room);
+    return both;
+}
+
+/* A kilometre from its origin the float coordinates of a BVH have steps of 0.06 mm, which must not reach the range. */
 static void a_station_far_from_the_bvh_s_origin_is_as_exact(void **state)
 {
     (void)state;
     static double range[RAYS];
-    double origin[3] = {HERE[0] - 600.0, HERE[1] + 700.0, HERE[2] + 50.0};
     static uint32_t triangle[RAYS];
-    struct scene *scene = box_scene(LO, HI);
+    struct scene *scene = room_and_far_triangle();
     struct sh_err err;
     struct bvh *bvh = NULL;
     struct caster *caster = NULL;
     any_rays(3);
-    if (bvh_create(scene, origin, 1000.0, 1, NULL, &bvh, &err) != 0 || caster_create(&caster, &err) != 0)
-        fail_msg("%s", err.text);
+    if (bvh_create(scene, 1, NULL, &bvh, &err) != 0 || caster_create(&caster, &err) != 0) fail_msg("%s", err.text);
     hits_from(caster, bvh, HERE, 1000.0, RAYS, ray[0], ray[1], ray[2], range, triangle);
     for (int i = 0; i < RAYS; i++) {
         const long double d[3] = {ray[0][i], ray[1][i], ray[2][i]};

@@ -68,10 +68,6 @@ static void true_ray(const struct cast_rig *rig, uint64_t k, double o[3], long d
 static struct cast_rig *open_room(struct pose_knot knot[KNOTS])
 {
     struct cast_rig *rig = cast_rig_open(box_scene(LO, HI), CENTRE);
-    struct sh_err err;
-    bvh_free(rig->bvh);
-    if (bvh_create(rig->scene, CENTRE, 2.0, 1, NULL, &rig->bvh, &err) != 0) fail_msg("%s", err.text);
-    rig->setup.bvh = rig->bvh;
     make_knots(knot);
     rig->setup.knot = knot;
     rig->setup.n_knots = KNOTS;
@@ -199,13 +195,13 @@ static void test_geo(void **state)
 static void test_moving_body(void **state)
 {
     (void)state;
-    static const double lo[3] = {-0.5, 3.0, -1.0}, hi[3] = {0.5, 3.5, 1.0}, centre[3] = {0.0, 3.25, 0.0};
+    static const double lo[3] = {-0.5, 3.0, -1.0}, hi[3] = {0.5, 3.5, 1.0};
     struct pose_knot knot[2] = {{.t_ns = 0}, {.t_ns = 100000000}};
     struct cast_rig *rig = open_room((struct pose_knot[KNOTS]){{0}});
     struct scene *body = box_scene(lo, hi);
     struct bvh *bvh;
     struct sh_err err;
-    if (bvh_create(body, centre, 100.0, 1, NULL, &bvh, &err) != 0) fail_msg("%s", err.text);
+    if (bvh_create(body, 1, NULL, &bvh, &err) != 0) fail_msg("%s", err.text);
     for (int i = 0; i < 2; i++)
         knot[i].pose = (struct pose){.position_m = {0.0, 1.0 * i, 0.0}, .quat = {1, 0, 0, 0}};
     rig->setup.knot = knot;
@@ -249,7 +245,7 @@ static void test_moving_body(void **state)
 static void test_inside_a_body_s_sphere(void **state)
 {
     (void)state;
-    static const double lo[3] = {-0.5, -1.0, -1.0}, hi[3] = {0.5, 3.0, 1.0}, centre[3] = {0.0, 1.0, 0.0};
+    static const double lo[3] = {-0.5, -1.0, -1.0}, hi[3] = {0.5, 3.0, 1.0};
     const struct pose still = {.position_m = {0.0, 0.0, 0.0}, .quat = {1, 0, 0, 0}};
     const struct pose_knot knot[2] = {{.t_ns = 0, .pose = still}, {.t_ns = 100000000, .pose = still}};
     struct cast_rig *rig = open_room((struct pose_knot[KNOTS]){{0}});
@@ -257,7 +253,7 @@ static void test_inside_a_body_s_sphere(void **state)
     struct schedule_line line;
     struct bvh *bvh;
     struct sh_err err;
-    if (bvh_create(body, centre, 100.0, 1, NULL, &bvh, &err) != 0) fail_msg("%s", err.text);
+    if (bvh_create(body, 1, NULL, &bvh, &err) != 0) fail_msg("%s", err.text);
     rig->setup.n_movers = 1;
     rig->setup.mover[0] = (struct cast_mover){.bvh = bvh, .centre_m = {0.0, 1.0, 0.0}, .radius_m = 2.5};
     pose_heading(0.0, rig->setup.mover[0].rotation);
@@ -289,7 +285,7 @@ static void test_inside_a_body_s_sphere(void **state)
 static void test_nearer_of_wall_and_body(void **state)
 {
     (void)state;
-    static const double lo[3] = {-41.0, 3.0, -0.5}, hi[3] = {-39.0, 3.5, 0.5}, centre[3] = {-40.0, 3.25, 0.0};
+    static const double lo[3] = {-41.0, 3.0, -0.5}, hi[3] = {-39.0, 3.5, 0.5};
     static const double far_lo[3] = {-100.0, 90.0, -50.0}, far_hi[3] = {100.0, 91.0, -49.0};
     const struct pose_knot knot[2] = {{.t_ns = 0, .pose = {.position_m = {0, 0, 0}, .quat = {1, 0, 0, 0}}},
                                       {.t_ns = 3000000, .pose = {.position_m = {-40, 0, 0}, .quat = {1, 0, 0, 0}}}};
@@ -297,14 +293,11 @@ static void test_nearer_of_wall_and_body(void **state)
     struct scene *body = box_scene(lo, hi);
     struct bvh *bvh;
     struct sh_err err;
-    if (bvh_create(body, centre, 100.0, 1, NULL, &bvh, &err) != 0) fail_msg("%s", err.text);
+    if (bvh_create(body, 1, NULL, &bvh, &err) != 0) fail_msg("%s", err.text);
     for (int walls = 0; walls < 2; walls++) {
         struct cast_rig *rig = walls ? cast_rig_open(box_scene(wall_lo, wall_hi), CENTRE)
                                      : cast_rig_open(box_scene(far_lo, far_hi), CENTRE);
         struct schedule_line line;
-        bvh_free(rig->bvh);
-        if (bvh_create(rig->scene, CENTRE, 50.0, 1, NULL, &rig->bvh, &err) != 0) fail_msg("%s", err.text);
-        rig->setup.bvh = rig->bvh;
         rig->setup.knot = knot;
         rig->setup.n_knots = 2;
         rig->setup.n_movers = 1;

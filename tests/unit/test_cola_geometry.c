@@ -1,7 +1,7 @@
 /* CoLa: line rate and step of a head that has some, by mLMPsetscancfg. */
 #include "tests/unit/cola_rig.h"
 
-/* What the head answers; the first row that fits. Tests change rows. */
+/* The head answers with the first row that fits. Tests change rows. */
 enum { STATE, LINES, STEP, STOP, SET_LINES, SET_STEP, END };
 static struct protocol_rig_reply head[END + 1];
 

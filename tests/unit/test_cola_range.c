@@ -35,7 +35,8 @@ static void a_narrowed_range_is_narrower(void **state)
     assert_int_equal(lmd.channel[0].value[0], 1000 + 10 * 405);
 }
 
-/* What is read back, what the telegrams say and what they hold agree. Ends off the grid are the nearest beams. */
+/* The range that is read back, the one that telegrams say and the one that they hold agree. Ends off the grid are the
+ * nearest beams. */
 static void expect_range(uint32_t line, const char *step, int32_t start_e4, int32_t stop_e4, uint32_t first, uint32_t n)
 {
     char request[80], answer[80];

@@ -236,7 +236,7 @@ static void the_device_itself_needs_no_control(void **ctx)
     assert_int_equal(dev.control, 2);
 }
 
-/* What each state answers, from the state diagram: S start, P stop, R reset, B reboot; '.' refused. */
+/* The answer of each state, from the state diagram: S start, P stop, R reset, B reboot; '.' refused. */
 static void effects_follow_the_state_machine(void **ctx)
 {
     (void)ctx;

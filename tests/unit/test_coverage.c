@@ -303,7 +303,7 @@ static void test_too_small(void **state)
     struct bvh *bvh;
     struct sh_err err;
     double allowed_m;
-    assert_int_equal(bvh_create(scene, WITHIN, 1.0, 1, NULL, &bvh, &err), 0);
+    assert_int_equal(bvh_create(scene, 1, NULL, &bvh, &err), 0);
     struct coverage_spec spec = {bvh, NULL, 0.001, 8.0, 1};
     assert_int_equal(coverage_create(&spec, NULL, &coverage, &err), SH_EINPUT);
     assert_null(coverage);

@@ -128,14 +128,12 @@ static void aim(double slope, double reach_m)
     }
 }
 
-static void cast_all(const struct scene *scene, double reach_m, uint32_t packet, int exactly)
+static void cast_all(const struct scene *scene, uint32_t packet)
 {
-    static const double origin_m[3] = {0, 0, 0};
     struct bvh *bvh;
     struct caster *caster;
     struct sh_err err;
-    if (bvh_create(scene, origin_m, 2.0 * reach_m, 1, NULL, &bvh, &err) != SH_OK ||
-        caster_create(&caster, &err) != SH_OK || (exactly && bvh_order_exactly(bvh, NULL, &err) != SH_OK))
+    if (bvh_create(scene, 1, NULL, &bvh, &err) != SH_OK || caster_create(&caster, &err) != SH_OK)
         fail_msg("%s", err.text);
     if (packet != 0) bvh_set_packet(bvh, packet);
     for (uint32_t at = 0; at < rays.n; at += BVH_CHUNK) {
@@ -213,7 +211,7 @@ static void half_of_a_board_is_seen_through(void **state)
     assert_int_equal(n_warnings, 0);
     aim(0.19, 0.1);
     for (uint32_t packet = 0; packet <= 16; packet = packet == 0 ? 1 : 4 * packet) {
-        cast_all(scene, 0.2, packet, 0);
+        cast_all(scene, packet);
         assert_true(compare(truth, 2) > RAYS / 3);
     }
     scene_free(scene);
@@ -234,7 +232,7 @@ static void a_stack_of_any_number_is_seen_through(void **state)
     struct scene *scene = end_obj(0, 1);
     aim(0.19, 0.1);
     rays.n = RAYS / 4;
-    cast_all(scene, 0.2, 0, 1); /* float does not order surfaces that are so near */
+    cast_all(scene, 0); /* float does not order surfaces that are so near */
     uint32_t on_wall = 0;
     assert_true(compare(truth, LAYERS + 1) > rays.n / 3);
     for (uint32_t i = 0; i < rays.n; i++)
@@ -256,7 +254,7 @@ static void what_lies_in_the_same_plane_stops_the_ray(void **state)
         if (!order) quad("board", 10, 2, 0);
         struct scene *scene = end_obj(0, 1);
         aim(0.19, 0.1);
-        cast_all(scene, 0.2, 0, 0);
+        cast_all(scene, 0);
         for (uint32_t i = 0; i < rays.n; i++)
             rays.label[i] = 0; /* of two in one plane either may be named */
         compare(glued, 1);
@@ -267,7 +265,7 @@ static void what_lies_in_the_same_plane_stops_the_ray(void **state)
     quad("board", 10, 2, 0);
     quad("wall", 10, 2, 0);
     struct scene *scene = end_obj(0, 1);
-    cast_all(scene, 0.2, 0, 0);
+    cast_all(scene, 0);
     for (uint32_t i = 0; i < rays.n; i++)
         rays.label[i] = 0;
     compare(twins, 1);
@@ -294,7 +292,7 @@ static void nothing_is_lost_behind_a_card_above_the_floor(void **state)
         rays.z[i] = b / length;
         rays.px[i] = rays.py[i] = rays.pz[i] = 0.0;
     }
-    cast_all(scene, 0.0, 0, 0);
+    cast_all(scene, 0);
     uint32_t on_floor = 0;
     for (uint32_t i = 0; i < RAYS; i++) {
         double floor_m = -0.05 / rays.z[i];
@@ -323,7 +321,7 @@ static void wrap_modes_and_opacity_maps_of_obj_count(void **state)
     quad("wall", 20, 9, 0);
     struct scene *scene = end_obj(0, 1);
     aim(0.19, 0.0);
-    cast_all(scene, 0.0, 0, 0);
+    cast_all(scene, 0);
     for (uint32_t i = 0; i < rays.n; i++) { /* u is 1 to 2: the last column of squares */
         double x = 10.0 * rays.x[i] / rays.y[i], z = 10.0 * rays.z[i] / rays.y[i], v = SQUARES * (z + 2.0) / 4.0;
         if (fabs(v - round(v)) < NEAR || fabs(x) > 2.0 || fabs(z) > 2.0) continue;
@@ -335,7 +333,7 @@ static void wrap_modes_and_opacity_maps_of_obj_count(void **state)
     quad("mapped", 10, 2, 0);
     quad("wall", 20, 9, 0);
     scene = end_obj(0, 1);
-    cast_all(scene, 0.0, 0, 0);
+    cast_all(scene, 0);
     assert_true(compare(truth, 2) > RAYS / 3);
     scene_free(scene);
 }
@@ -351,7 +349,7 @@ static void scale_and_offset_of_obj_count(void **state)
     struct scene *scene = end_obj(0, 1);
     assert_int_equal(n_warnings, 0);
     aim(0.19, 0.0);
-    cast_all(scene, 0.0, 0, 0);
+    cast_all(scene, 0);
     for (uint32_t i = 0; i < rays.n; i++) {
         double x = 10.0 * rays.x[i] / rays.y[i], z = 10.0 * rays.z[i] / rays.y[i];
         double u = SQUARES * (2.0 * (x + 2.0) / 4.0 + 0.375), v = SQUARES * 0.5 * (z + 2.0) / 4.0;

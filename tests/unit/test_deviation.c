@@ -130,7 +130,6 @@ static void deviations_along_the_beam(void **state)
     (void)state;
     struct scene *scene = load_text("walls.obj", "v -50 10 -50\nv 50 10 -50\nv 50 10 50\nv -50 10 50\n"
                                                  "v 0 8 -50\nv 50 8 -50\nv 50 8 50\nv 0 8 50\nf 1 2 3 4\nf 5 6 7 8\n");
-    const double origin[3] = {0, 0, 0};
     double xyz[N][3], distance_m[N];
     uint32_t triangle[N];
     struct deviation_points out;
@@ -143,7 +142,7 @@ static void deviations_along_the_beam(void **state)
             xyz[i][k] = p[k] * (1.0 + POINT[i].further_m / range_m);
     }
     assert_int_equal(distance_create(scene, &index, &err), SH_OK);
-    assert_int_equal(bvh_create(scene, origin, 1.0, 1, NULL, &bvh, &err), SH_OK);
+    assert_int_equal(bvh_create(scene, 1, NULL, &bvh, &err), SH_OK);
     assert_int_equal(deviation_points_create(N, &out, &err), SH_OK);
     struct deviation_head head = ideal_head();
     head.setup.bvh = bvh;

@@ -281,7 +281,7 @@ static void a_mirror_that_moves(void **state)
     o.table.surface[6].mirror = 1.0;
     o.detect.ghost_label = 7;
     if (scene_from_arrays(&(struct scene_arrays){vertex, 4, triangle, 2, label, named, 7}, &body, &err) != 0 ||
-        bvh_create(body, centre, 100.0, 1, NULL, &bvh, &err) != 0)
+        bvh_create(body, 1, NULL, &bvh, &err) != 0)
         fail_msg("%s", err.text);
     struct cast_mover *m = &o.rig->setup.mover[0];
     *m = (struct cast_mover){.bvh = bvh, .centre_m = {0, 2, 0}, .radius_m = 1.5};

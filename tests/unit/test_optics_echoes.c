@@ -130,7 +130,7 @@ static void echoes_of_a_moving_head(void **state)
 static void which_side_of_a_body_is_met(void **state)
 {
     (void)state;
-    static const double vertex[4][3] = {{-1, 3, -1}, {1, 3, -1}, {1, 3, 1}, {-1, 3, 1}}, centre[3] = {0, 3, 0};
+    static const double vertex[4][3] = {{-1, 3, -1}, {1, 3, -1}, {1, 3, 1}, {-1, 3, 1}};
     static const uint32_t triangle[2][3] = {{0, 1, 2}, {0, 2, 3}};
     struct optics o;
     struct scene *body;
@@ -141,7 +141,7 @@ static void which_side_of_a_body_is_met(void **state)
     struct cast_hit hit[1 + CAST_MAX_DEPTH];
     open_optics(&o, box_scene(LO, HI));
     if (scene_from_arrays(&(struct scene_arrays){vertex, 4, triangle, 2, NULL, NULL, 0}, &body, &err) != 0 ||
-        bvh_create(body, centre, 100.0, 1, NULL, &bvh, &err) != 0)
+        bvh_create(body, 1, NULL, &bvh, &err) != 0)
         fail_msg("%s", err.text);
     o.rig->spec.pan_udeg_s = 0;
     schedule_start(&o.rig->segment, &o.rig->spec);

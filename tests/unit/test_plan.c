@@ -96,25 +96,13 @@ static void test_what_cannot_be_had(void **state)
     assert_false(plan_holds(&some[0], &TOLERANCE) || plan_holds(&some[1], &TOLERANCE));
 }
 
-/* Float tells surfaces apart to 5e-7 of their distance: at 1 mm, up to 2 km. */
-static void test_order(void **state)
-{
-    (void)state;
-    struct plan_row row;
-    struct plan_option option[2];
-    plan_order_options(1900.0, option);
-    assert_int_equal(choose(&row, "order", option, 2, -1, ""), 0);
-    plan_order_options(2100.0, option);
-    assert_int_equal(choose(&row, "order", option, 2, -1, ""), 1);
-}
-
 /* Nothing is chosen there: the row says what is always done. */
 static void test_cast(void **state)
 {
     (void)state;
     struct plan_row row;
     plan_cast(8, &row);
-    expect(&row, "packets of 8, decided", 0, "in double where float can't tell");
+    expect(&row, "packets of 8, in double", 0, "in double, wherever rays begin");
     assert_true(row.error_m == 1e-6 && row.cost_ns == 0.0 && row.n_left == 0);
 }
 
@@ -123,17 +111,14 @@ static const struct plan_sight_need SIGHT = {
     .pulses = 2e9, .share = 0.8, .n_triangles = 30000, .packet = 4, .memory_bytes = 1 << 30, .forced = -1};
 static const struct plan_sight_found PLAIN = {.one = 0.95, .few = 0.05}, MIXED = {.few = 0.1, .ask = 0.9};
 
-static struct plan_sight_choice choose_sight(const struct plan_sight_need *need, const struct plan_sight_found *found,
-                                             const char *method, const char *why)
+static void choose_sight(const struct plan_sight_need *need, const struct plan_sight_found *found, const char *method,
+                         const char *why)
 {
-    struct plan_sight_choice choice;
     struct plan_row row;
-    plan_sight_choose(need, found, &choice, &row);
+    assert_int_equal(plan_sight_choose(need, found, &row), strcmp(method, "map") == 0);
     expect(&row, method, need->forced >= 0, why);
     assert_string_equal(row.stage, "sight");
-    assert_int_equal(choice.map, strcmp(method, "map") == 0);
     assert_true(row.error_m == 0.0 && (need->forced >= 0 || row.cost_ns <= 0.0));
-    return choice;
 }
 
 /* A map is made where the pulses of a scan pay for it, whatever else is said. */
@@ -166,11 +151,10 @@ static void test_sight_packets(void **state)
     double saved_ns[4];
     for (int k = 0; k < 4; k++) {
         struct plan_sight_need need = SIGHT;
-        struct plan_sight_choice choice;
         struct plan_row row;
         need.packet = packet[k];
         need.forced = 1;
-        plan_sight_choose(&need, &sky, &choice, &row);
+        plan_sight_choose(&need, &sky, &row);
         saved_ns[k] = -row.cost_ns;
         for (size_t i = 0; i < sizeof plan_ray_costs / sizeof plan_ray_costs[0]; i++)
             if (plan_ray_costs[i].packet == packet[k] && k > 0)
@@ -193,30 +177,6 @@ static void test_sight_forced(void **state)
     choose_sight(&need, NULL, "none", "the head moves");
 }
 
-/* The order of surfaces comes with a map where few rays ask the BVH; where it has to be had, it pays for the map. */
-static void test_sight_orders(void **state)
-{
-    (void)state;
-    static const struct plan_sight_found some = {.one = 0.94, .ask = 0.06};
-    struct plan_sight_need need = SIGHT;
-    struct plan_sight_choice choice = choose_sight(&need, &PLAIN, "map", "pay");
-    assert_false(choice.ordered);
-    need.order = PLAN_ORDER_FREE;
-    choice = choose_sight(&need, &PLAIN, "map", "pay");
-    assert_true(choice.ordered && choice.order_ns == 0.0);
-    choice = choose_sight(&need, &some, "map", "pay");
-    assert_true(choice.ordered && choice.order_ns > 5.0 && choice.order_ns < 50.0);
-    need.order = PLAN_ORDER_FREE;
-    need.pulses = 0.8e6;
-    choice = choose_sight(&need, &some, "map", "pay");
-    assert_false(choice.ordered); /* with its cost a map would not pay */
-    need.pulses = 1e4;
-    need.order = PLAN_ORDER_INSTEAD;
-    assert_true(plan_sight_may_pay(&need));
-    choice = choose_sight(&need, &PLAIN, "map", "pay");
-    assert_true(choice.ordered);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -224,12 +184,10 @@ int main(void)
         cmocka_unit_test(test_forced),
         cmocka_unit_test(test_least_off),
         cmocka_unit_test(test_what_cannot_be_had),
-        cmocka_unit_test(test_order),
         cmocka_unit_test(test_cast),
         cmocka_unit_test(test_sight_pays),
         cmocka_unit_test(test_sight_packets),
         cmocka_unit_test(test_sight_forced),
-        cmocka_unit_test(test_sight_orders),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

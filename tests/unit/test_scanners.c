@@ -130,7 +130,7 @@ static void the_same_settings_are_one_scanner(void **state)
     assert_int_equal(cfg->station[3].scanner, 2);
     assert_loads(load_second("{}", NULL, 0));
     assert_true(config_is_alone(cfg));
-    assert_true(cfg->scene.shared.range_max_m == 0.0); /* nothing is made for scanners that aren't there */
+    assert_false(cfg->scene.shared_textures); /* nothing is made for scanners that aren't there */
 }
 
 static void wrong_ones_are_refused(void **state)
@@ -193,7 +193,6 @@ static struct site *load_site(const struct config *of, const struct site *other)
     return site;
 }
 
-/* By counts: one load of the scene and one BVH serve all, whatever the second scanner needs of them. */
 /* Faults are those of all scanners, of the file and of a scenario. The links that they name are not. */
 static void each_has_the_faults(void **state)
 {
@@ -220,6 +219,7 @@ static void each_has_the_faults(void **state)
     unlink(scenario);
 }
 
+/* One load of the scene and one BVH serve all, whatever the second scanner needs of them. */
 static void sites_share_scene_and_bvh(void **state)
 {
     (void)state;
@@ -237,8 +237,8 @@ static void sites_share_scene_and_bvh(void **state)
             struct site *a = load_site(cfg, NULL), *b = load_site(&own, a);
             assert_ptr_equal(a->world, b->world);
             assert_int_equal(a->world->n_loads, 1);
-            assert_int_equal(a->world->n_bvh, 1);
             assert_ptr_equal(a->scene, b->scene);
+            assert_true(a->bvh != NULL && a->bvh == b->bvh);
             assert_ptr_equal(a->station[0].bvh, b->station[1].bvh);
             assert_null(a->station[1].bvh); /* nobody scans from there with that head */
             assert_int_equal(site_n_served(a), 2);
@@ -246,20 +246,6 @@ static void sites_share_scene_and_bvh(void **state)
             site_free(first_goes_first ? a : b);
             site_free(first_goes_first ? b : a);
         }
-}
-
-/* Where surfaces are ordered in double for one of them alone, the other keeps the hits it has when it is alone. */
-static void another_order_is_another_bvh(void **state)
-{
-    (void)state;
-    const char *const sets[] = {"scene.order_exactly=on", "cast.sight=off"};
-    assert_loads(load_second("{noise: {range: off}}", sets, 2));
-    load_own(2);
-    struct site *a = load_site(cfg, NULL), *b = load_site(&own, a);
-    assert_int_equal(a->world->n_bvh, 1); /* both order */
-    assert_true(a->world->bvh[0].is_ordered && a->world->bvh[0].n_users == 2);
-    site_free(a);
-    site_free(b);
 }
 
 static void another_scene_is_not_shared(void **state)
@@ -313,7 +299,6 @@ int main(void)
         cmocka_unit_test(faults_of_all_are_told_once),
         cmocka_unit_test(each_has_the_faults),
         cmocka_unit_test(sites_share_scene_and_bvh),
-        cmocka_unit_test(another_order_is_another_bvh),
         cmocka_unit_test(another_scene_is_not_shared),
         cmocka_unit_test(the_head_stays_at_its_stations),
     };

@@ -23,7 +23,7 @@
 
 enum { TRIANGLES = 4000, MANY = 200000 };
 
-static struct scene *terrain;
+static struct scene *terrain, *large;
 static const double STATION_M[3] = {0, 0, 5};
 
 static struct scene *generate(uint32_t n)
@@ -39,6 +39,7 @@ static int make_terrain(void **state)
 {
     (void)state;
     terrain = generate(TRIANGLES);
+    large = generate(MANY);
     return 0;
 }
 
@@ -46,6 +47,7 @@ static int free_terrain(void **state)
 {
     (void)state;
     scene_free(terrain);
+    scene_free(large);
     return 0;
 }
 
@@ -64,18 +66,18 @@ static int stop(void *ctx)
 static int build_bvh(const struct sh_report *report, struct sh_err *err)
 {
     struct bvh *bvh = NULL;
-    int rc = bvh_create(terrain, STATION_M, 0.0, 2, report, &bvh, err);
+    int rc = bvh_create(terrain, 2, report, &bvh, err);
     assert_true((rc == SH_OK) == (bvh != NULL));
     bvh_free(bvh);
     return rc;
 }
 
-static int order(const struct sh_report *report, struct sh_err *err)
+static int find_twins(const struct sh_report *report, struct sh_err *err)
 {
-    struct bvh *bvh = NULL;
-    assert_int_equal(bvh_create(terrain, STATION_M, 0.0, 2, NULL, &bvh, err), SH_OK);
-    int rc = bvh_order_exactly(bvh, report, err);
-    bvh_free(bvh);
+    uint64_t *twin = NULL;
+    int rc = scene_find_twins(large, report, &twin, err);
+    assert_true((rc == SH_OK) == (twin != NULL));
+    free(twin);
     return rc;
 }
 
@@ -85,7 +87,7 @@ static int find_outlines(const struct sh_report *report, struct sh_err *err)
     static struct beam beam;
     struct beam_outlines *outlines = NULL;
     beam_init(&beam, 0.007, 0.35e-3, 3e-9);
-    assert_int_equal(bvh_create(terrain, STATION_M, 0.0, 2, NULL, &bvh, err), SH_OK);
+    assert_int_equal(bvh_create(terrain, 2, NULL, &bvh, err), SH_OK);
     const struct beam_outlines_spec spec = {terrain, STATION_M, &beam, 200.0, NULL, report};
     int rc = cast_outlines(&spec, bvh, &outlines, err);
     assert_true((rc == SH_OK) == (outlines != NULL));
@@ -130,8 +132,8 @@ static int cut_polygon(const struct sh_report *report, struct sh_err *err)
 static void work_is_ended(void **state)
 {
     (void)state;
-    static int (*const works[])(const struct sh_report *report, struct sh_err *err) = {build_bvh, order, find_outlines,
-                                                                                       follow_way, cut_polygon};
+    static int (*const works[])(const struct sh_report *report,
+                                struct sh_err *err) = {build_bvh, find_twins, find_outlines, follow_way, cut_polygon};
     for (size_t i = 0; i < sizeof works / sizeof works[0]; i++) {
         struct sh_err err;
         struct asked asked = {0};
@@ -168,7 +170,6 @@ static void no_memory_is_said(void **state)
     skip(); /* the address sanitizer takes terabytes of addresses */
 #else
     int status;
-    struct scene *large = generate(MANY);
     pid_t pid = fork();
     if (pid == 0) {
         unsigned long pages = 0;
@@ -181,13 +182,13 @@ static void no_memory_is_said(void **state)
         const rlim_t bytes = pages * (rlim_t)sysconf(_SC_PAGESIZE) + MANY * 80ul + (8ul << 20);
         struct rlimit kept;
         setrlimit(RLIMIT_AS, &(struct rlimit){bytes, bytes});
-        if (getrlimit(RLIMIT_AS, &kept) != 0 || kept.rlim_cur != bytes) _exit(4); /* QEMU's user mode has it for itself */
-        int rc = bvh_create(large, STATION_M, 0.0, 1, NULL, &bvh, &err);
+        if (getrlimit(RLIMIT_AS, &kept) != 0 || kept.rlim_cur != bytes)
+            _exit(4); /* QEMU's user mode has it for itself */
+        int rc = bvh_create(large, 1, NULL, &bvh, &err);
         if (rc != SH_ENOMEM) fprintf(stderr, "# code %d: %s\n", rc, err.text);
         _exit(rc == SH_ENOMEM && strstr(err.text, "no memory") != NULL ? 0 : 1);
     }
     assert_int_equal(waitpid(pid, &status, 0), pid);
-    scene_free(large);
     if (WIFEXITED(status) && WEXITSTATUS(status) == 4) skip();
     assert_int_equal(status, 0);
 #endif

@@ -124,7 +124,7 @@ static struct seen compare(const struct scene *scene, const struct surface_table
     const struct detect_signal_spec sheet = {
         .n_reaches = 1, .reach = {{0.9, 900.0}}, .threshold_snr = 8.0, .sharp = 1, .seed = 1};
     schedule_start(&segment, &spec);
-    if (bvh_create(scene, at, 0.01, 1, NULL, &bvh, &err) != SH_OK || caster_create(&caster, &err) != SH_OK ||
+    if (bvh_create(scene, 1, NULL, &bvh, &err) != SH_OK || caster_create(&caster, &err) != SH_OK ||
         line_block_alloc(&block, 1000, &err) != SH_OK || detect_signal_set_up(&sheet, &signal, &err) != SH_OK)
         fail_msg("%s", err.text);
     const struct cast_detect detect = {.surfaces = table, .signal = &signal, .max_echoes = 1};
@@ -233,12 +233,11 @@ static void squares_move_with_the_mesh(void **state)
     struct surface_table table;
     struct bvh *bvh;
     struct sh_err err;
-    const double centre_m[3] = {0.0, AWAY_M, 0.0};
     assert_int_equal(scene_from_arrays(&(struct scene_arrays){wall, 3, triangle, 1, NULL, NULL, 0}, &still, &err),
                      SH_OK);
     for (uint32_t i = 0; i < board->n_triangles; i++)
         board->label[i] = 1;
-    assert_int_equal(bvh_create(board, centre_m, 100.0, 1, NULL, &bvh, &err), SH_OK);
+    assert_int_equal(bvh_create(board, 1, NULL, &bvh, &err), SH_OK);
     fill_table(&table, board, &board->surface[0], 2, 1);
     const struct cast_mover mover = {.bvh = bvh,
                                      .centre_m = {0.0, AWAY_M, 0.0},

@@ -109,9 +109,8 @@ static struct seen scan(const struct view *view)
     struct sh_err err;
     const uint32_t each = view->detect != NULL ? 3 : 1;
     begin(&segment);
-    if (bvh_create(view->scene, at, view->ghosts ? 30.0 : 0.01, 1, NULL, &bvh, &err) != SH_OK ||
-        caster_create(&caster, &err) != SH_OK || line_block_alloc(&block, each * ROOM, &err) != SH_OK ||
-        line_block_alloc_colours(&block, &err) != SH_OK)
+    if (bvh_create(view->scene, 1, NULL, &bvh, &err) != SH_OK || caster_create(&caster, &err) != SH_OK ||
+        line_block_alloc(&block, each * ROOM, &err) != SH_OK || line_block_alloc_colours(&block, &err) != SH_OK)
         fail_msg("%s", err.text);
     const struct cast_colour colour = {.scale.mode = COLOUR_TEXTURE, .surfaces = view->colours};
     struct cast_setup setup = {.bvh = bvh,
@@ -272,12 +271,11 @@ static void a_mesh_takes_its_image_along(void **state)
     struct surface_colours colours;
     struct bvh *bvh;
     struct sh_err err;
-    const double centre_m[3] = {0.0, AWAY_M, 0.0};
     assert_int_equal(scene_from_arrays(&(struct scene_arrays){wall, 3, triangle, 1, NULL, NULL, 0}, &still, &err),
                      SH_OK);
     for (uint32_t i = 0; i < board->n_triangles; i++)
         board->label[i] = 1;
-    assert_int_equal(bvh_create(board, centre_m, 100.0, 1, NULL, &bvh, &err), SH_OK);
+    assert_int_equal(bvh_create(board, 1, NULL, &bvh, &err), SH_OK);
     fill(&colours, board, 2, 1);
     const struct cast_mover mover = {.bvh = bvh,
                                      .centre_m = {0.0, AWAY_M, 0.0},

@@ -65,10 +65,6 @@ static void slip_is_what_nobody_reads(struct cast_rig *rig)
 
 static void set_knots(struct cast_rig *rig, struct pose_knot knot[2])
 {
-    struct sh_err err;
-    bvh_free(rig->bvh);
-    if (bvh_create(rig->scene, CENTRE, 2.0, 1, NULL, &rig->bvh, &err) != 0) fail_msg("%s", err.text);
-    rig->setup.bvh = rig->bvh;
     for (int i = 0; i < 2; i++) {
         knot[i] = (struct pose_knot){.t_ns = 100000000 * i, .pose.position_m = {0.5 * i, -0.2, 0.1 * i}};
         pose_from_angles(0.3 + i, 0.2 * i, -0.1, knot[i].pose.quat);

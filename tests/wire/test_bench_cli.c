@@ -30,7 +30,7 @@ static double number_of(const char *from, const char *key)
 static void test_keys(void **state)
 {
     static const char *const args[] = {"--scenes", "10k", "--seconds", "0.1", "--pulses", "none", NULL};
-    static const char *const stages[] = {"schedule", "directions", "embree", "refine", "decide", "detect",
+    static const char *const stages[] = {"schedule", "directions", "embree", "refine", "detect",
                                          "noise",    "georef",     "encode", "crc",    "rest"};
     struct wire *wire = *state;
     assert_int_equal(bench(wire, args), 0);
@@ -63,7 +63,7 @@ static void test_sight(void **state)
 {
     static const char *const args[] = {"--scenes", "10k", "--only-sight", "--pulses", "50k,100k", NULL};
     static const char *const parts[] = {
-        "cast_ratio_without", "pipeline_ratio", "gain", "plan_ratio", "build", "exact", "cells", "peak_mib"};
+        "cast_ratio_without", "pipeline_ratio", "gain", "plan_ratio", "build", "cells", "peak_mib"};
     struct wire *wire = *state;
     assert_int_equal(bench(wire, args), 0);
     char *text = wire_read(wire_path(wire, "out"), NULL), *at = strstr(text, "\"sight\": [");

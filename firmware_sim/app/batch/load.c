@@ -10,22 +10,6 @@ struct loading {
     struct batch_loaded *before, *now;
 };
 
-/* All that BVHs and their order can depend on, as a whole. What is left is what the head does: rates, angles, noise,
- * output. Both began as zeros. */
-static int share_bvhs(const struct config *a, const struct config *b)
-{
-    return memcmp(&a->profile, &b->profile, sizeof a->profile) == 0 &&
-           memcmp(&a->scene, &b->scene, sizeof a->scene) == 0 && a->n_stations == b->n_stations &&
-           memcmp(a->station, b->station, sizeof a->station) == 0 &&
-           memcmp(&a->platform, &b->platform, sizeof a->platform) == 0 &&
-           memcmp(&a->beam, &b->beam, sizeof a->beam) == 0 && memcmp(&a->cast, &b->cast, sizeof a->cast) == 0 &&
-           memcmp(&a->plan, &b->plan, sizeof a->plan) == 0 && memcmp(&a->signal, &b->signal, sizeof a->signal) == 0 &&
-           a->n_surfaces == b->n_surfaces && memcmp(a->surface, b->surface, sizeof a->surface) == 0 &&
-           memcmp(&a->optics, &b->optics, sizeof a->optics) == 0 &&
-           memcmp(&a->instrument, &b->instrument, sizeof a->instrument) == 0 &&
-           a->head.settings.station == b->head.settings.station && config_is_alone(a) && config_is_alone(b);
-}
-
 /* What now->cfg can share of the site before; NULL: nothing, and it is no more: never two scenes at a time. */
 static const struct site *shared_site(struct loading *l)
 {
@@ -34,8 +18,6 @@ static const struct site *shared_site(struct loading *l)
     if (config_wants_textures(before->cfg) != config_wants_textures(l->now->cfg) ||
         memcmp(before->cfg->scene.mesh, l->now->cfg->scene.mesh, sizeof l->now->cfg->scene.mesh) != 0)
         batch_unload(before);
-    else if (before->is_used_up || !share_bvhs(before->cfg, l->now->cfg))
-        site_drop_bvhs(before->site);
     return before->site;
 }
 
@@ -62,7 +44,6 @@ static int load_site(struct config *cfg, void *ctx, struct sh_err *err)
     if (rc == SH_OK) rc = offline_load(now->cfg, shared_site(l), &app_report_stderr, &now->site, err);
     if (rc != SH_OK) return rc;
     now->n_reads += l->before->site == NULL || now->site->world != l->before->site->world;
-    now->n_bvh = now->site->world->n_bvh;
     return check_made(l, err);
 }
 
@@ -70,7 +51,7 @@ int batch_load(struct batch *b, uint32_t combination, struct batch_loaded *loade
 {
     struct batch_loaded before = *loaded;
     struct loading loading = {b, &before, loaded};
-    if (loaded->status != 0 && loaded->combination == combination && !loaded->is_used_up) return loaded->status;
+    if (loaded->status != 0 && loaded->combination == combination) return loaded->status;
     *loaded = (struct batch_loaded){.n_reads = before.n_reads, .combination = combination};
     loaded->status = batch_line_make(b, combination, 1, "x", &loaded->line);
     if (loaded->status == APP_GO_ON) loaded->line->line.in.n_files = 0; /* no job has this name */
@@ -78,12 +59,6 @@ int batch_load(struct batch *b, uint32_t combination, struct batch_loaded *loade
     if (loaded->status == APP_OK) loaded->status = APP_GO_ON;
     batch_unload(&before);
     return loaded->status;
-}
-
-/* Another scanner of the file may have had a BVH built. What comes next must not find it. */
-void batch_loaded_used(struct batch_loaded *loaded)
-{
-    if (loaded->site != NULL) loaded->is_used_up = loaded->site->world->n_bvh != loaded->n_bvh;
 }
 
 void batch_unload(struct batch_loaded *loaded)

@@ -1,8 +1,7 @@
 /* The scene that jobs of a campaign share. In: a combination of values. Out: its configuration and its site, which stay
  * loaded for further stations of it.
  *
- * The next combination takes over meshes that it has, too, and BVHs where everything is the same that they can depend on:
- * a job's bytes must not depend on what its process did before. One thread. */
+ * The next combination takes over meshes that it has, too, and their BVHs. One thread. */
 #ifndef FIRMWARE_SIM_APP_BATCH_LOAD_H
 #define FIRMWARE_SIM_APP_BATCH_LOAD_H
 
@@ -15,15 +14,12 @@ struct batch_loaded {
     uint32_t n_reads; /* how often meshes were read */
     /* inner state; all begins as zeros */
     struct batch_line *line; /* the settings that cfg was loaded with */
-    uint32_t combination, n_bvh;
-    int is_used_up; /* its BVHs are not those of a site that was just loaded */
-    int status;     /* an exit status, or APP_GO_ON: there is a site. 0: nothing was loaded */
+    uint32_t combination;
+    int status; /* an exit status, or APP_GO_ON: there is a site. 0: nothing was loaded */
 };
 
 /* APP_GO_ON, or the exit status of a failure: printed when it is new, and the same for each job of the combination. */
 int batch_load(struct batch *b, uint32_t combination, struct batch_loaded *loaded);
-/* After each job. */
-void batch_loaded_used(struct batch_loaded *loaded);
 void batch_unload(struct batch_loaded *loaded);
 
 #endif

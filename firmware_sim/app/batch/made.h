@@ -15,7 +15,7 @@ enum { BATCH_SHA_LEN = 65 };
 
 struct batch_made {
     char program[32];                  /* its version */
-    char engine[96];                   /* what proposes hits on that machine (bvh_engine) */
+    char engine[96];                   /* what finds hits on that machine (bvh_engine) */
     char configuration[BATCH_SHA_LEN]; /* the text of the file */
     char inputs[BATCH_SHA_LEN];        /* head profile, meshes and what they name, trajectory, scenario */
     char job[BATCH_SHA_LEN];           /* station, values of keys, options */

@@ -121,7 +121,6 @@ static int run_job(struct runner *r, uint32_t job)
     if (status != APP_OK && !app_interrupted()) fprintf(stderr, "scanhead: job %u failed: %s\n", job + 1, name);
     app_warn_of(NULL);
     batch_line_free(line);
-    batch_loaded_used(&r->loaded);
     return status;
 }
 

@@ -10,7 +10,6 @@
 #include "core/vec3.h"
 #include "firmware_sim/app/coverage/next.h"
 
-static const double REACH_MORE_M = 1.0; /* rays of a head may begin beside its origin */
 enum { MOST_PLACES = 100000, PULSES = 40000 };
 
 /* ---- places */
@@ -23,15 +22,9 @@ static int add_place(struct coverage_finder *f, const struct coverage_next_place
     return SH_OK;
 }
 
-static int make_bvh(struct coverage_finder *f, const double low_m[3], const double high_m[3], struct sh_err *err)
+static int make_bvh(struct coverage_finder *f, struct sh_err *err)
 {
-    double centre_m[3];
-    for (int i = 0; i < 3; i++)
-        centre_m[i] = low_m[i] + 0.5 * (high_m[i] - low_m[i]);
-    bvh_free(f->bvh);
-    f->bvh = NULL;
-    return bvh_create(f->site->scene, centre_m, vec3_distance(high_m, centre_m) + REACH_MORE_M,
-                      f->site->cfg->loop.threads, f->report, &f->bvh, err);
+    return f->bvh != NULL ? SH_OK : bvh_create(f->site->scene, f->site->cfg->loop.threads, f->report, &f->bvh, err);
 }
 
 static int check_upright(const struct coverage_finder *f, struct sh_err *err)
@@ -54,7 +47,7 @@ static int find_on_grid(struct coverage_finder *f, struct sh_err *err)
         grid.max_m[i] = isnan(f->o->area_m[1][i]) ? scene->max_m[i] : f->o->area_m[1][i];
     }
     int rc = check_upright(f, err);
-    if (rc == SH_OK) rc = make_bvh(f, scene->min_m, scene->max_m, err);
+    if (rc == SH_OK) rc = make_bvh(f, err);
     if (rc == SH_OK) rc = standpoint_places(f->bvh, &grid, f->report, &found, &n, err);
     if (rc == SH_OK && n > MOST_PLACES)
         rc = sh_fail(err, SH_EINPUT, "--grid %g: %u places to stand; allowed are %d: a wider grid, or a part by --at",
@@ -99,7 +92,6 @@ static int read_candidates(struct coverage_finder *f, struct sh_err *err)
 {
     static const char *const COLUMNS[] = {"x_m", "y_m", "z_m", "heading_deg", NULL};
     const uint32_t needed = 1u << X | 1u << Y | 1u << Z;
-    double low_m[3] = {INFINITY, INFINITY, INFINITY}, high_m[3] = {-INFINITY, -INFINITY, -INFINITY};
     struct csv csv;
     int rc = csv_open(&csv, f->o->candidates, COLUMNS, f->report, err), more = 1;
     if (rc == SH_OK && (csv.has & needed) != needed)
@@ -110,12 +102,7 @@ static int read_candidates(struct coverage_finder *f, struct sh_err *err)
     csv_close(&csv);
     if (more < 0) rc = more;
     if (rc == SH_OK && f->next->n == 0) rc = sh_fail(err, SH_EINPUT, "%s: there are no places in it", f->o->candidates);
-    for (uint32_t k = 0; k < f->next->n; k++)
-        for (int i = 0; i < 3; i++) {
-            low_m[i] = fmin(low_m[i], f->next->place[k].position_m[i]);
-            high_m[i] = fmax(high_m[i], f->next->place[k].position_m[i]);
-        }
-    return rc == SH_OK ? make_bvh(f, low_m, high_m, err) : rc;
+    return rc == SH_OK ? make_bvh(f, err) : rc;
 }
 
 static int find_places(struct coverage_finder *f, struct sh_err *err)

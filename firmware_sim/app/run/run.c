@@ -28,7 +28,7 @@ static void say_sights(const struct site *site)
 static void say_what_runs(const struct config *cfg, const struct site *site, const struct loop *loop)
 {
     struct bvh_info info;
-    bvh_get_info(site->bvh[0], &info);
+    bvh_get_info(site->bvh, &info);
     fprintf(stderr,
             "scanhead: %s %s, %s, %u triangles, %u surfaces; BVH in %.2f s, %.0f bytes per triangle, packets of %u\n",
             cfg->profile.maker, cfg->profile.model, cfg->profile.name, site->scene->n_triangles,

@@ -31,7 +31,7 @@ static int make_cells(struct watch *w, struct sh_err *err)
     const struct scene *scene = w->site->scene;
     struct watch_seen *seen = &w->seen;
     struct coverage_spec spec = {
-        .bvh = w->site->bvh[0], .silent = w->site->silent, .memory_mib = fmin(c->memory_mib, MOST_MIB), .threads = 1};
+        .bvh = w->site->bvh, .silent = w->site->silent, .memory_mib = fmin(c->memory_mib, MOST_MIB), .threads = 1};
     int rc = SH_EINPUT;
     const double least_mib = scene->n_triangles * 148.0 / 0x1p20;
     if (least_mib > spec.memory_mib)

@@ -1,10 +1,50 @@
-/* What double precision makes of Embree's proposals: ranges from the planes, and which proposals are in
- * doubt. Loops over arrays that compilers turn into vectors. */
+/* Planes of triangles in double: ranges, labels and steepness from them. Loops over arrays that compilers turn into
+ * vectors. */
 #include <math.h>
+#include <stdlib.h>
 
 #include "core/bvh/bvh_inside.h"
+#include "core/huge.h"
 #include "core/vec3.h"
 #include "core/vecmath.h"
+
+/* a b - c d, rounded about once: of a needle's normal nothing would be left otherwise (W. Kahan). */
+static double difference(double a, double b, double c, double d)
+{
+    const double ab = a * b, cd = c * d;
+    return (ab - cd) + (vec_product_rest(a, b, ab) - vec_product_rest(c, d, cd));
+}
+
+/* It passes through the triangle's centre. */
+static void set_plane(struct bvh *bvh, uint32_t triangle)
+{
+    const struct scene *scene = bvh->scene;
+    struct bvh_plane *plane = &bvh->plane[triangle];
+    const uint32_t *corner = scene->triangle[triangle];
+    double v[3], e1[3], e2[3], centre[3];
+    vec3_sub(scene->vertex_m[corner[0]], bvh->origin_m, v);
+    vec3_sub(scene->vertex_m[corner[1]], scene->vertex_m[corner[0]], e1);
+    vec3_sub(scene->vertex_m[corner[2]], scene->vertex_m[corner[0]], e2);
+    for (int i = 0; i < 3; i++) {
+        const int j = (i + 1) % 3, k = (i + 2) % 3;
+        plane->n[i] = difference(e1[j], e2[k], e1[k], e2[j]);
+        centre[i] = v[i] + (e1[i] + e2[i]) / 3.0;
+    }
+    plane->d = vec3_dot(plane->n, centre);
+}
+
+int bvh_make_planes(struct bvh *bvh, const struct sh_report *report, struct sh_err *err)
+{
+    const uint32_t n = bvh->scene->n_triangles;
+    bvh->plane = huge_alloc(((size_t)n + 1) * sizeof *bvh->plane);
+    if (bvh->plane == NULL) return sh_fail(err, SH_ENOMEM, "bvh: no memory for %u triangles", n);
+    for (uint32_t i = 0; i < n; i++) {
+        if ((i & 0xffff) == 0 && sh_check_stop(report, err) != SH_OK) return SH_ESTOPPED;
+        set_plane(bvh, i);
+    }
+    bvh->plane[n] = (struct bvh_plane){.n = {NAN, NAN, NAN}, .d = NAN};
+    return SH_OK;
+}
 
 /* Embree sorts a packet's directions by their signs, but takes what is smaller than 1e-18 for positive when
  * it divides by it: with a component of -1e-22, all rays of that packet with its signs would be lost. So
@@ -27,103 +67,37 @@ void bvh_to_float(const struct vec3_in *dir, uint32_t n, float *restrict x, floa
     }
 }
 
-VEC_INLINE uint32_t label_of(double ny, double nz)
+static uint32_t label_of(const struct bvh *bvh, uint32_t triangle)
 {
-    uint64_t low, high;
-    memcpy(&low, &ny, sizeof low);
-    memcpy(&high, &nz, sizeof high);
-    return (uint32_t)((low & ((1U << BVH_SPARE_BITS) - 1)) | (high & 15) << BVH_SPARE_BITS);
+    return triangle < bvh->scene->n_triangles ? bvh->scene->label[triangle] : BVH_NO_LABEL;
 }
 
-/* Whether a hit is so near to its triangle's border that the proposal is in doubt, or the triangle has
- * holes. slope: what the guard counts in, bvh_inside.h. */
-VEC_INLINE uint32_t in_doubt(double nx, double nz, double slope, float u, float v)
+static void find_labels(const struct bvh *bvh, const struct bvh_rays *rays)
 {
-    float w = 1.0f - u - v;
-    float least = u < v ? u : v;
-    least = w < least ? w : least;
-    uint64_t bits, high;
-    double guard;
-    memcpy(&bits, &nx, sizeof bits);
-    bits = ((bits & ((1U << BVH_SPARE_BITS) - 1)) + BVH_GUARD_BASE) << BVH_GUARD_SHIFT;
-    memcpy(&guard, &bits, sizeof guard);
-    memcpy(&high, &nz, sizeof high);
-    return ((double)least * slope < guard) | (uint32_t)((high & BVH_HOLES_BIT) != 0);
+    for (uint32_t i = 0; i < rays->n; i++)
+        rays->label[i] = label_of(bvh, rays->triangle[i]);
 }
 
-enum how { FROM_ONE, FROM_ONE_STEEP, FROM_OWN };
-
-/* A miss has the highest number there is and reads the record after the last triangle, which is all NaN.
- * judge 0: the triangles are what the rays meet, and nothing is in doubt. */
-VEC_INLINE uint32_t refine(const struct bvh_proposals *p, enum how how, int judge)
+/* A miss has the highest number there is and reads the record after the last triangle, which is all NaN. */
+VEC_CLONES
+static void find_steepness(const struct bvh *bvh, const struct bvh_rays *rays)
 {
-    const double *tri = (const double *)p->bvh->triangle, *dx = p->dir.x, *dy = p->dir.y, *dz = p->dir.z;
-    const double *px = p->own.x, *py = p->own.y, *pz = p->own.z, ox = p->o[0], oy = p->o[1], oz = p->o[2];
-    const uint32_t n_triangles = p->bvh->scene->n_triangles, n = p->n, *prim = p->prim;
-    const float *u = p->u, *v = p->v;
-    const int slanted = p->bvh->station_reach_m > 0.0;
-    double *range_m = p->range_m;
-    float *steep = p->steep;
-    uint32_t *label = p->label, *doubt = p->doubt, doubts = 0;
+    const double *tri = (const double *)bvh->plane, *dx = rays->dir.x, *dy = rays->dir.y, *dz = rays->dir.z;
+    const uint32_t n_triangles = bvh->scene->n_triangles, n = rays->n, *prim = rays->triangle;
+    float *steep = rays->steep;
     VEC_LOOP
     for (uint32_t i = 0; i < n; i++) {
-        int64_t at = (int64_t)(prim[i] < n_triangles ? prim[i] : n_triangles) * 4;
-        double nx = tri[at], ny = tri[at + 1], nz = tri[at + 2];
-        double along = nx * dx[i] + ny * dy[i] + nz * dz[i];
-        double off = how == FROM_OWN ? nx * px[i] + ny * py[i] + nz * pz[i] : nx * ox + ny * oy + nz * oz;
-        range_m[i] = (tri[at + 3] - off) / along;
-        if (how == FROM_ONE_STEEP) steep[i] = (float)(nx * nx + ny * ny + nz * nz) / (float)(along * along);
-        label[i] = label_of(ny, nz);
-        if (!judge) continue;
-        doubt[i] = (in_doubt(nx, nz, slanted ? fabs(along) : 1.0, u[i], v[i]) | (range_m[i] <= BVH_AT_ORIGIN_M)) &
-                   (prim[i] < n_triangles);
-        doubts += doubt[i];
+        const int64_t at = (int64_t)(prim[i] < n_triangles ? prim[i] : n_triangles) * 4;
+        const double nx = tri[at], ny = tri[at + 1], nz = tri[at + 2];
+        const double along = nx * dx[i] + ny * dy[i] + nz * dz[i];
+        steep[i] = (float)(nx * nx + ny * ny + nz * nz) / (float)(along * along);
     }
-    return doubts;
 }
 
-/* One function a case, so that the common one has no branch in its loop. */
-VEC_CLONES
-static uint32_t refine_from_one(const struct bvh_proposals *p)
+void bvh_refine(const struct bvh *bvh, const struct bvh_rays *rays)
 {
-    return refine(p, FROM_ONE, 1);
-}
-
-VEC_CLONES
-static uint32_t refine_steep(const struct bvh_proposals *p)
-{
-    return refine(p, FROM_ONE_STEEP, 1);
-}
-
-VEC_CLONES
-static uint32_t refine_from_own(const struct bvh_proposals *p)
-{
-    return refine(p, FROM_OWN, 1);
-}
-
-/* All hits on triangles that have rivals are in doubt, too. A hit of whose border there is no doubt stands, as it does
- * without rivals, but for these. */
-VEC_CLONES
-static uint32_t doubt_rivals(const struct bvh_proposals *p)
-{
-    const uint32_t *first = p->bvh->rival_first, n_triangles = p->bvh->scene->n_triangles, n = p->n, *prim = p->prim;
-    uint32_t *doubt = p->doubt, doubts = 0;
-    VEC_LOOP
-    for (uint32_t i = 0; i < n; i++) {
-        const int64_t at = (int64_t)(prim[i] < n_triangles ? prim[i] : n_triangles);
-        const uint32_t rivals = first[at] != first[at + 1];
-        doubts += doubt[i] | rivals;
-        doubt[i] |= rivals * BVH_DOUBT_ORDER;
-    }
-    return doubts;
-}
-
-uint32_t bvh_refine(const struct bvh_proposals *p)
-{
-    const uint32_t doubts = p->own.x != NULL   ? refine_from_own(p)
-                            : p->steep != NULL ? refine_steep(p)
-                                               : refine_from_one(p);
-    return p->bvh->rival_first != NULL ? doubt_rivals(p) : doubts;
+    if (rays->label != NULL) find_labels(bvh, rays);
+    if (rays->steep != NULL) find_steepness(bvh, rays);
 }
 
 enum { LANES = 8 };
@@ -165,7 +139,7 @@ VEC_INLINE void ranges_of_lanes(const struct one_plane *p, const struct bvh_rays
 
 double bvh_range_of(const struct bvh *bvh, uint32_t triangle, const double at_m[3], const double dir[3])
 {
-    const struct bvh_plane *tri = &bvh->triangle[triangle];
+    const struct bvh_plane *tri = &bvh->plane[triangle];
     double o[3];
     vec3_sub(at_m, bvh->origin_m, o);
     return (tri->d - vec3_dot(tri->n, o)) / vec3_dot(tri->n, dir);
@@ -184,16 +158,16 @@ static void say_nothing(const struct bvh_rays *rays, uint32_t from, uint32_t to)
         rays->steep[i] = NAN;
 }
 
-VEC_INLINE void set_plane(struct one_plane *p, const struct bvh *bvh, uint32_t triangle, const double o[3])
+VEC_INLINE void set_one(struct one_plane *p, const struct bvh *bvh, uint32_t triangle, const double o[3])
 {
-    const struct bvh_plane *tri = &bvh->triangle[triangle];
+    const struct bvh_plane *tri = &bvh->plane[triangle];
     *p = (struct one_plane){.nx = tri->n[0],
                             .ny = tri->n[1],
                             .nz = tri->n[2],
                             .nn = vec3_dot(tri->n, tri->n),
                             .above = tri->d - vec3_dot(tri->n, o),
                             .triangle = triangle,
-                            .label = label_of(tri->n[1], tri->n[2])};
+                            .label = bvh->scene->label[triangle]};
 }
 
 VEC_CLONES
@@ -206,7 +180,7 @@ void bvh_ranges_of(const struct bvh *bvh, uint32_t triangle, const struct bvh_ra
         return;
     }
     vec3_sub(rays->from.at_m, bvh->origin_m, o);
-    set_plane(&p, bvh, triangle, o);
+    set_one(&p, bvh, triangle, o);
     const struct bvh_rays r = *rays; /* what is written may not change it */
     for (; from < to && r.n - from >= LANES; from += LANES)
         ranges_of_lanes(&p, &r, from);
@@ -224,7 +198,7 @@ void bvh_ranges_each(const struct bvh *bvh, const uint32_t *triangle, const stru
         if (triangle[i - from] == BVH_NO_TRIANGLE) {
             say_nothing(rays, i, i + 1);
         } else if (triangle[i - from] < bvh->scene->n_triangles) {
-            set_plane(&p, bvh, triangle[i - from], o);
+            set_one(&p, bvh, triangle[i - from], o);
             range_of_one(&p, rays, i);
         }
     }
@@ -234,7 +208,7 @@ VEC_CLONES
 void bvh_cosines(const struct bvh *bvh, const uint32_t *restrict triangle, const struct vec3_in *dir, uint32_t n,
                  double *restrict cosine)
 {
-    const double *tri = (const double *)bvh->triangle, *dx = dir->x, *dy = dir->y, *dz = dir->z;
+    const double *tri = (const double *)bvh->plane, *dx = dir->x, *dy = dir->y, *dz = dir->z;
     const uint32_t n_triangles = bvh->scene->n_triangles;
     VEC_LOOP
     for (uint32_t i = 0; i < n; i++) {
@@ -243,12 +217,4 @@ void bvh_cosines(const struct bvh *bvh, const uint32_t *restrict triangle, const
         double c = fabs(nx * dx[i] + ny * dy[i] + nz * dz[i]) / sqrt(nx * nx + ny * ny + nz * nz);
         cosine[i] = c > 1.0 ? 1.0 : c;
     }
-}
-
-/* The same operations as in refine: it does not matter who decides a ray. */
-float bvh_steep(const struct bvh *bvh, uint32_t prim, const double dir[3])
-{
-    const uint32_t n_triangles = bvh->scene->n_triangles;
-    const double *n = bvh->triangle[prim < n_triangles ? prim : n_triangles].n, along = vec3_dot(n, dir);
-    return (float)vec3_dot(n, n) / (float)(along * along);
 }

@@ -1,10 +1,9 @@
-/* Faces that stand in a mesh twice: Embree may propose either, so the later ones are taken from it. */
-#include <math.h>
+/* Faces that stand in a mesh twice. */
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/bvh/bvh_inside.h"
 #include "core/rng.h"
+#include "core/scene.h"
 
 /* Corners in an order that does not depend on how the face is written. */
 static void sorted_corners(const struct scene *scene, uint32_t prim, const double *corner[3])
@@ -51,46 +50,35 @@ static int same_holes(const struct scene *scene, uint32_t a, uint32_t b)
     return 1;
 }
 
-/* The bitmap is only there where there are twins. */
-static int note_twin(struct bvh *bvh, uint32_t prim, struct sh_err *err)
+int scene_find_twins(const struct scene *scene, const struct sh_report *report, uint64_t **twin, struct sh_err *err)
 {
-    if (bvh->twin == NULL) bvh->twin = calloc((size_t)bvh->scene->n_triangles / 64 + 1, sizeof *bvh->twin);
-    if (bvh->twin == NULL) return sh_fail(err, SH_ENOMEM, "bvh: no memory to mark triangles that stand twice");
-    bvh->twin[prim / 64] |= 1ULL << prim % 64;
-    return SH_OK;
-}
-
-int bvh_is_twin(const struct bvh *bvh, uint32_t triangle)
-{
-    return bvh->twin != NULL && (bvh->twin[triangle / 64] >> triangle % 64 & 1) != 0;
-}
-
-int bvh_drop_twins(struct bvh *bvh, float *vertex, const struct sh_report *report, struct sh_err *err)
-{
-    const struct scene *scene = bvh->scene;
     uint64_t size = 16;
     while (size < 2 * (uint64_t)scene->n_triangles)
         size *= 2;
     uint32_t *table = malloc(size * sizeof *table);
-    if (table == NULL) return sh_fail(err, SH_ENOMEM, "cast: no memory to compare %u triangles", scene->n_triangles);
-    memset(table, 0xff, size * sizeof *table);
+    *twin = calloc((size_t)scene->n_triangles / 64 + 1, sizeof **twin);
     int rc = SH_OK;
-    for (uint32_t prim = 0; prim < scene->n_triangles && rc == SH_OK; prim++) {
-        if ((prim & 0xffff) == 0) rc = sh_check_stop(report, err);
+    if (table == NULL || *twin == NULL)
+        rc = sh_fail(err, SH_ENOMEM, "no memory to compare %u triangles", scene->n_triangles);
+    else
+        memset(table, 0xff, size * sizeof *table);
+    for (uint32_t i = 0; i < scene->n_triangles && rc == SH_OK; i++) {
+        if ((i & 0xffff) == 0) rc = sh_check_stop(report, err);
         const double *corner[3], *other[3];
-        sorted_corners(scene, prim, corner);
+        sorted_corners(scene, i, corner);
         uint64_t at = hash_corners(corner) & (size - 1);
         for (; table[at] != UINT32_MAX; at = (at + 1) & (size - 1)) {
             sorted_corners(scene, table[at], other);
             if (!same_corners(corner, other)) continue;
-            if (scene->cutout != NULL && !same_holes(scene, prim, table[at])) continue;
-            for (int i = 0; i < 9; i++)
-                vertex[9 * (size_t)prim + (size_t)i] = NAN; /* Embree leaves out what is not finite */
-            rc = note_twin(bvh, prim, err);
+            if (scene->cutout != NULL && !same_holes(scene, i, table[at])) continue;
+            (*twin)[i / 64] |= UINT64_C(1) << i % 64;
             break;
         }
-        if (table[at] == UINT32_MAX) table[at] = prim;
+        if (table[at] == UINT32_MAX) table[at] = i;
     }
     free(table);
+    if (rc == SH_OK) return SH_OK;
+    free(*twin);
+    *twin = NULL;
     return rc;
 }

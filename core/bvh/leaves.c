@@ -1,0 +1,152 @@
+/* Leaves: two triangles that share an edge go to one, where their common box is smaller than the two of their own. */
+#include <math.h>
+#include <stdlib.h>
+
+#include "core/bvh/bvh_inside.h"
+#include "core/huge.h"
+
+/* A triangle's neighbour is looked for among this many of the list, itself included. */
+enum { AHEAD = 16 };
+
+/* The corner of a triangle that is none of another's that shares an edge with it; 3: they share none. */
+static int odd_corner(const uint32_t a[3], const uint32_t b[3])
+{
+    int odd = 3, n = 0;
+    for (int i = 0; i < 3; i++)
+        if (a[i] != b[0] && a[i] != b[1] && a[i] != b[2]) {
+            odd = i;
+            n++;
+        }
+    return n == 1 ? odd : 3;
+}
+
+static float float_over(double x)
+{
+    return nextafterf((float)x, INFINITY);
+}
+
+static void fill_leaf(const struct bvh *bvh, uint32_t first, uint32_t second, struct bvh_leaf *leaf)
+{
+    const struct scene *scene = bvh->scene;
+    const uint32_t *a = scene->triangle[first], *b = second != BVH_NO_TRIANGLE ? scene->triangle[second] : a;
+    const int odd = second != BVH_NO_TRIANGLE ? odd_corner(a, b) : 0;
+    uint32_t corner[4] = {a[odd], a[(odd + 1) % 3], a[(odd + 2) % 3], a[odd]};
+    if (second != BVH_NO_TRIANGLE) corner[3] = b[odd_corner(b, a)];
+    double far2 = 0.0, edge2 = 0.0;
+    for (int i = 0; i < 4; i++) {
+        double v[3];
+        memcpy(leaf->corner_m[i], scene->vertex_m[corner[i]], sizeof leaf->corner_m[i]);
+        vec3_sub(leaf->corner_m[i], bvh->origin_m, v);
+        far2 = fmax(far2, vec3_dot(v, v));
+    }
+    for (int i = 0; i < 4; i++)
+        for (int j = 0; j < i; j++)
+            if (i != 3 || j != 0) edge2 = fmax(edge2, pow(vec3_distance(leaf->corner_m[i], leaf->corner_m[j]), 2.0));
+    leaf->far_m = float_over(sqrt(far2));
+    leaf->edge_m = float_over(sqrt(edge2));
+    leaf->triangle[0] = first;
+    leaf->triangle[1] = second;
+}
+
+/* The middle of the scene, and how far all of it lies from there. */
+static void measure(struct bvh *bvh)
+{
+    const struct scene *scene = bvh->scene;
+    double half[3];
+    if (scene->n_triangles == 0) return;
+    for (int i = 0; i < 3; i++) {
+        bvh->origin_m[i] = scene->min_m[i] + 0.5 * (scene->max_m[i] - scene->min_m[i]);
+        half[i] = fmax(scene->max_m[i] - bvh->origin_m[i], bvh->origin_m[i] - scene->min_m[i]);
+    }
+    bvh->radius_m = (double)float_over(vec3_length(half));
+}
+
+/* Half the surface of the box around two triangles; the same one twice: around it. */
+static double box_m2(const struct scene *scene, uint32_t first, uint32_t second)
+{
+    double d[3];
+    for (int j = 0; j < 3; j++) {
+        double lo = INFINITY, hi = -INFINITY;
+        for (int i = 0; i < 6; i++) {
+            const double x = scene->vertex_m[scene->triangle[i < 3 ? first : second][i % 3]][j];
+            lo = x < lo ? x : lo;
+            hi = x > hi ? x : hi;
+        }
+        d[j] = hi - lo;
+    }
+    return d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
+}
+
+static int is_taken(const uint64_t *taken, uint32_t triangle)
+{
+    return (taken[triangle / 64] >> triangle % 64 & 1) != 0;
+}
+
+/* The one of the triangles that follow it in the list that makes the smallest box with it; or BVH_NO_TRIANGLE. */
+static uint32_t partner(const struct scene *scene, uint32_t triangle, const uint64_t *taken)
+{
+    const uint32_t left = scene->n_triangles - triangle, end = triangle + (left < AHEAD ? left : AHEAD);
+    uint32_t best = BVH_NO_TRIANGLE;
+    double best_m2 = INFINITY, own_m2 = -1.0;
+    for (uint32_t i = triangle + 1; i < end; i++) {
+        if (is_taken(taken, i) || odd_corner(scene->triangle[triangle], scene->triangle[i]) == 3 ||
+            odd_corner(scene->triangle[i], scene->triangle[triangle]) == 3)
+            continue;
+        if (own_m2 < 0.0) own_m2 = box_m2(scene, triangle, triangle);
+        const double both_m2 = box_m2(scene, triangle, i);
+        if (both_m2 >= best_m2 || both_m2 > own_m2 + box_m2(scene, i, i)) continue;
+        best = i;
+        best_m2 = both_m2;
+    }
+    return best;
+}
+
+int bvh_make_leaves(struct bvh *bvh, const struct sh_report *report, struct sh_err *err)
+{
+    const struct scene *scene = bvh->scene;
+    const uint32_t n = scene->n_triangles;
+    uint32_t leaves = 0;
+    measure(bvh);
+    bvh->leaf = huge_alloc(((size_t)n + 1) * sizeof *bvh->leaf);
+    uint64_t *taken = calloc((size_t)n / 64 + 1, sizeof *taken);
+    int rc = bvh->leaf != NULL && taken != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "bvh: no memory for %u triangles", n);
+    for (uint32_t i = 0; i < n && rc == SH_OK; i++) {
+        if ((i & 0xffff) == 0) rc = sh_check_stop(report, err);
+        if (is_taken(taken, i)) continue;
+        const uint32_t second = partner(scene, i, taken);
+        if (second != BVH_NO_TRIANGLE) taken[second / 64] |= UINT64_C(1) << second % 64;
+        fill_leaf(bvh, i, second, &bvh->leaf[leaves++]);
+    }
+    free(taken);
+    bvh->n_leaves = leaves;
+    return rc;
+}
+
+static float below(double x)
+{
+    const float f = (float)x;
+    return f < x ? f : nextafterf(f, -INFINITY);
+}
+
+void embree_asks_bounds(const struct RTCBoundsFunctionArguments *args)
+{
+    const struct bvh *bvh = args->geometryUserPtr;
+    const struct bvh_leaf *leaf = &bvh->leaf[args->primID];
+    double lo[3], hi[3];
+    const double pad_m = 8.0 * 0x1p-24 * ((double)leaf->far_m + 2.0 * bvh->radius_m);
+    for (int j = 0; j < 3; j++) {
+        lo[j] = hi[j] = leaf->corner_m[0][j];
+        for (int i = 1; i < 4; i++) {
+            lo[j] = fmin(lo[j], leaf->corner_m[i][j]);
+            hi[j] = fmax(hi[j], leaf->corner_m[i][j]);
+        }
+        lo[j] = lo[j] - bvh->origin_m[j] - pad_m;
+        hi[j] = hi[j] - bvh->origin_m[j] + pad_m;
+    }
+    *args->bounds_o = (struct RTCBounds){.lower_x = below(lo[0]),
+                                         .lower_y = below(lo[1]),
+                                         .lower_z = below(lo[2]),
+                                         .upper_x = -below(-hi[0]),
+                                         .upper_y = -below(-hi[1]),
+                                         .upper_z = -below(-hi[2])};
+}

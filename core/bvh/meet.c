@@ -1,0 +1,390 @@
+/* A packet at a leaf, in double: which rays meet its triangles, and how far. bvh_inside.h says by which rules. */
+#include <math.h>
+
+#include "core/bvh/bvh_inside.h"
+#include "core/bvh/edges.h"
+#include "core/vec3.h"
+#include "core/vecmath.h"
+
+/* A leaf's edges, from one corner to another: three of triangle 0, whose second one triangle 1 has the other way. */
+enum { EDGES = 5 };
+static const uint8_t edge_from[EDGES] = {0, 1, 2, 1, 3}, edge_to[EDGES] = {1, 2, 0, 3, 2};
+/* The corners of each triangle. */
+static const uint8_t corner_of[2][3] = {{0, 1, 2}, {1, 3, 2}};
+
+/* An edge's side is (p x (q - p)) . d. Its error in double is at most 9 units of 2^-53 of |p| |q - p|: 1 for the
+ * difference, 3 for the cross product, 5 for the dot product of three terms. It is added for here and for edges.h,
+ * and so are the 8 units that edges.h takes for hit. */
+#define SIDE_DOUBT (32.0 * 0x1p-53)
+/* The same in single precision, which looks first where all rays begin at one point: the cross product is made in
+ * double and rounded, 1; the direction 1; the dot product 5. */
+#define FLOAT_DOUBT (12.0 * 0x1p-24)
+/* A plane that is seen at a sine below this one has its range from the edges. */
+#define FLAT 1e-6
+
+/* How a ray and a triangle of the leaf lie to each other: by bits, those of triangle 1 two further. */
+enum { INSIDE = 1, DOUBT = 2, SECOND = 2, EITHER = INSIDE | DOUBT };
+
+/* Lanes of a packet that Embree asks for, a byte each. */
+struct lanes {
+    uint8_t of[BVH_PACKET];
+};
+
+static int any(const struct lanes *lanes, uint8_t bits)
+{
+    uint64_t half[2];
+    memcpy(half, lanes->of, sizeof half);
+    return ((half[0] | half[1]) & UINT64_C(0x0101010101010101) * bits) != 0;
+}
+
+/* From the sides of a triangle's edges: inside where all have one sign for certain, outside where two have different
+ * ones. */
+VEC_INLINE int64_t judge(double a, double b, double c, double doubt)
+{
+    const double ab_lo = a < b ? a : b, ab_hi = a < b ? b : a, lo = ab_lo < c ? ab_lo : c, hi = ab_hi < c ? c : ab_hi;
+    const int64_t in = (int64_t)(lo > doubt) | (int64_t)(hi < -doubt),
+                  out = (int64_t)(hi > doubt) & (int64_t)(lo < -doubt);
+    return in | (1 - (in | out)) << 1;
+}
+
+VEC_INLINE int32_t judge_floats(float a, float b, float c, float doubt)
+{
+    const float ab_lo = a < b ? a : b, ab_hi = a < b ? b : a, lo = ab_lo < c ? ab_lo : c, hi = ab_hi < c ? c : ab_hi;
+    const int32_t in = (int32_t)(lo > doubt) | (int32_t)(hi < -doubt),
+                  out = (int32_t)(hi > doubt) & (int32_t)(lo < -doubt);
+    return in | (1 - (in | out)) << 1;
+}
+
+/* All rays from one point: what an edge's side is multiplied by is the same for all of them. */
+VEC_INLINE void find_moments(const struct bvh_query *query, const struct bvh_leaf *leaf, double moment[EDGES][3])
+{
+    double p[4][3], e[3];
+    for (int i = 0; i < 4; i++)
+        vec3_sub(leaf->corner_m[i], query->at, p[i]);
+    for (int k = 0; k < EDGES; k++) {
+        vec3_sub(p[edge_to[k]], p[edge_from[k]], e);
+        vec3_cross(p[edge_from[k]], e, moment[k]);
+    }
+}
+
+/* In single precision. Returns whether a ray that is valid is in doubt. */
+VEC_INLINE int judge_fast(const double moment[EDGES][3], const float *dir, float doubt, struct lanes *found)
+{
+    const float *dx = dir, *dy = dir + BVH_PACKET, *dz = dir + 2 * BVH_PACKET;
+    float m[EDGES][3];
+    int32_t wide[BVH_PACKET];
+    for (int k = 0; k < EDGES; k++)
+        for (int j = 0; j < 3; j++)
+            m[k][j] = (float)moment[k][j];
+    VEC_LOOP
+    for (uint32_t i = 0; i < BVH_PACKET; i++) {
+        const float x = dx[i], y = dy[i], z = dz[i];
+        const float s0 = m[0][0] * x + m[0][1] * y + m[0][2] * z, s1 = m[1][0] * x + m[1][1] * y + m[1][2] * z,
+                    s2 = m[2][0] * x + m[2][1] * y + m[2][2] * z, s3 = m[3][0] * x + m[3][1] * y + m[3][2] * z,
+                    s4 = m[4][0] * x + m[4][1] * y + m[4][2] * z;
+        wide[i] = judge_floats(s0, s1, s2, doubt) | judge_floats(s3, s4, -s1, doubt) << SECOND;
+    }
+    for (uint32_t i = 0; i < BVH_PACKET; i++)
+        found->of[i] &= (uint8_t)wide[i];
+    return any(found, DOUBT | DOUBT << SECOND);
+}
+
+VEC_INLINE void judge_from_one(const struct bvh_query *query, const double m[EDGES][3], double doubt, int64_t *found)
+{
+    const double *dx = query->dir[0], *dy = query->dir[1], *dz = query->dir[2];
+    VEC_LOOP
+    for (uint32_t i = 0; i < BVH_PACKET; i++) {
+        const double x = dx[i], y = dy[i], z = dz[i];
+        const double s0 = m[0][0] * x + m[0][1] * y + m[0][2] * z, s1 = m[1][0] * x + m[1][1] * y + m[1][2] * z,
+                     s2 = m[2][0] * x + m[2][1] * y + m[2][2] * z, s3 = m[3][0] * x + m[3][1] * y + m[3][2] * z,
+                     s4 = m[4][0] * x + m[4][1] * y + m[4][2] * z;
+        found[i] = judge(s0, s1, s2, doubt) | judge(s3, s4, -s1, doubt) << SECOND;
+    }
+}
+
+VEC_INLINE double side_of(double px, double py, double pz, double qx, double qy, double qz, double x, double y,
+                          double z)
+{
+    const double ex = qx - px, ey = qy - py, ez = qz - pz;
+    return (py * ez - pz * ey) * x + (pz * ex - px * ez) * y + (px * ey - py * ex) * z;
+}
+
+VEC_INLINE void judge_from_own(const struct bvh_query *query, const struct bvh_leaf *leaf, double doubt, int64_t *found)
+{
+    const double *dx = query->dir[0], *dy = query->dir[1], *dz = query->dir[2];
+    const double *px = query->org[0], *py = query->org[1], *pz = query->org[2];
+    const double(*c)[3] = leaf->corner_m;
+    VEC_LOOP
+    for (uint32_t i = 0; i < BVH_PACKET; i++) {
+        const double x = dx[i], y = dy[i], z = dz[i], ox = px[i], oy = py[i], oz = pz[i];
+        const double ax = c[0][0] - ox, ay = c[0][1] - oy, az = c[0][2] - oz, bx = c[1][0] - ox, by = c[1][1] - oy,
+                     bz = c[1][2] - oz, ex = c[2][0] - ox, ey = c[2][1] - oy, ez = c[2][2] - oz, fx = c[3][0] - ox,
+                     fy = c[3][1] - oy, fz = c[3][2] - oz;
+        const double s0 = side_of(ax, ay, az, bx, by, bz, x, y, z), s1 = side_of(bx, by, bz, ex, ey, ez, x, y, z),
+                     s2 = side_of(ex, ey, ez, ax, ay, az, x, y, z), s3 = side_of(bx, by, bz, fx, fy, fz, x, y, z),
+                     s4 = side_of(fx, fy, fz, ex, ey, ez, x, y, z);
+        found[i] = judge(s0, s1, s2, doubt) | judge(s3, s4, -s1, doubt) << SECOND;
+    }
+}
+
+/* ---- hits */
+
+/* Whether the triangle has a hole where the ray is at that range. */
+static int is_hole(const struct bvh_query *query, uint32_t lane, uint32_t triangle, double range_m)
+{
+    const struct scene *scene = query->bvh->scene;
+    if (scene->cutout == NULL || scene_cutout(scene, triangle) == NULL) return 0;
+    double v[3][3], p[3], uv[2];
+    for (int j = 0; j < 3; j++)
+        p[j] = range_m * query->dir[j][lane];
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            v[i][j] = scene->vertex_m[scene->triangle[triangle][i]][j] -
+                      (query->has_own ? query->org[j][lane] : query->at[j]);
+    const double *const corner[3] = {v[0], v[1], v[2]};
+    scene_uv_at(scene, triangle, corner, p, uv);
+    return texture_is_hole(scene_cutout(scene, triangle), uv);
+}
+
+/* As near as the nearest: all of them are kept, and the lowest number is the hit. */
+static void add_tied(struct bvh_query *query, uint32_t lane, uint32_t triangle, double range_m)
+{
+    struct bvh_tied *tied = &query->tied[lane];
+    const double most_m = query->range_m[lane] + BVH_SAME * query->range_m[lane];
+    uint32_t n = 0, last = 0, lowest = 0, before = query->n_tied[lane];
+    if (before == 0) {
+        tied->triangle[0] = query->triangle[lane];
+        tied->range_m[0] = query->hit_m[lane];
+        before = 1;
+    }
+    for (uint32_t i = 0; i < before; i++) {
+        if (tied->range_m[i] > most_m || tied->triangle[i] == triangle) continue;
+        tied->range_m[n] = tied->range_m[i];
+        tied->triangle[n] = tied->triangle[i];
+        if (tied->triangle[n] > tied->triangle[last]) last = n;
+        n++;
+    }
+    const uint32_t at = n < BVH_MOST_TIED ? n : last;
+    if (n < BVH_MOST_TIED || triangle < tied->triangle[last]) {
+        tied->triangle[at] = triangle;
+        tied->range_m[at] = range_m;
+        n += at == n;
+    }
+    query->n_tied[lane] = n;
+    for (uint32_t i = 1; i < n; i++)
+        if (tied->triangle[i] < tied->triangle[lowest]) lowest = i;
+    query->triangle[lane] = tied->triangle[lowest];
+    query->hit_m[lane] = tied->range_m[lowest];
+}
+
+/* The next float above a number that is not negative. */
+VEC_INLINE float float_above(double x)
+{
+    const float f = (float)x;
+    uint32_t bits;
+    memcpy(&bits, &f, sizeof bits);
+    bits += (double)f <= x;
+    float above;
+    memcpy(&above, &bits, sizeof above);
+    return above;
+}
+
+/* A triangle that the ray meets, at a range that is no further than the nearest and what counts as the same. */
+VEC_INLINE void note(struct bvh_query *query, float *tfar, uint32_t lane, uint32_t triangle, double range_m)
+{
+    const double nearest_m = query->range_m[lane];
+    if (query->bvh->scene->cutout != NULL && is_hole(query, lane, triangle, range_m)) return;
+    if (range_m < nearest_m) {
+        query->range_m[lane] = range_m;
+        *tfar = float_above(range_m - query->start_m[lane]);
+    }
+    if (range_m + BVH_SAME * range_m < nearest_m) {
+        query->n_tied[lane] = 0;
+        query->triangle[lane] = triangle;
+        query->hit_m[lane] = range_m;
+        return;
+    }
+    add_tied(query, lane, triangle, range_m);
+}
+
+/* Range to a triangle that the ray meets, and almost in its plane, where the plane's own range runs away: it is kept
+ * between the edges that the ray passes. NaN: it passes none. */
+static double held_range(double v[3][3], const double dir[3], double range_m)
+{
+    double lo = INFINITY, hi = -INFINITY, longest = 0.0;
+    for (int i = 0; i < 3; i++)
+        longest = fmax(longest, vec3_distance(v[i], v[(i + 1) % 3]));
+    for (int i = 0; i < 3; i++) {
+        const double *a = v[i], *b = v[(i + 1) % 3];
+        double t = edge_range(a, b, dir), blur = 0x1p-40 * vec3_distance(a, b) + 0x1p-46 * fabs(t);
+        if (edge_gap(a, b, dir, t) > blur + 1e-6 * longest) continue; /* the ray does not pass here */
+        lo = fmin(lo, t);
+        hi = fmax(hi, t);
+    }
+    if (!(lo <= hi)) return NAN;
+    return range_m < lo || isnan(range_m) ? lo : range_m > hi ? hi : range_m;
+}
+
+/* A ray from a corner begins on the surface, and meets it nowhere else. The sides of two edges are 0 there, whatever
+ * way it goes, and the plane's range is what rounding leaves. */
+static int begins_at_corner(double v[3][3])
+{
+    for (int i = 0; i < 3; i++)
+        if (v[i][0] == 0.0 && v[i][1] == 0.0 && v[i][2] == 0.0) return 1;
+    return 0;
+}
+
+/* A triangle that the ray misses by no more than double precision resolves at its edges. Of several the frontmost
+ * counts, and of those the one with the lowest number. */
+static void note_miss(struct bvh_query *query, uint32_t lane, uint32_t triangle, double range_m)
+{
+    if (!(range_m > BVH_AT_ORIGIN_M) || range_m > query->near_m[lane]) return;
+    if (range_m == query->near_m[lane] && triangle > query->near[lane]) return;
+    if (is_hole(query, lane, triangle, range_m)) return;
+    query->near_m[lane] = range_m;
+    query->near[lane] = triangle;
+}
+
+/* One ray and one triangle, of which double precision in lanes can't say whether they meet, or where. */
+static void try_one(struct bvh_query *query, float *tfar, uint32_t lane, const struct bvh_leaf *leaf, int which)
+{
+    const uint32_t triangle = leaf->triangle[which];
+    const struct bvh_plane *plane = &query->bvh->plane[triangle];
+    double v[3][3], dir[3], o[3];
+    for (int j = 0; j < 3; j++) {
+        dir[j] = query->dir[j][lane];
+        o[j] = query->has_own ? query->local[j][lane] : query->at_local[j];
+        for (int i = 0; i < 3; i++)
+            v[i][j] = leaf->corner_m[corner_of[which][i]][j] - (query->has_own ? query->org[j][lane] : query->at[j]);
+    }
+    double side[3];
+    for (int i = 0; i < 3; i++)
+        side[i] = edge_side(v[i], v[(i + 1) % 3], dir);
+    query->decided++;
+    const int met = is_inside(side);
+    if (is_edge_on(v, side) || begins_at_corner(v) || (!met && !is_near_miss(v, side, dir))) return;
+    const double along = vec3_dot(plane->n, dir);
+    double range_m = (plane->d - vec3_dot(plane->n, o)) / along;
+    if (!(along * along > FLAT * FLAT * vec3_dot(plane->n, plane->n))) range_m = held_range(v, dir, range_m);
+    const double nearest_m = query->range_m[lane];
+    if (!met)
+        note_miss(query, lane, triangle, range_m);
+    else if (range_m > BVH_AT_ORIGIN_M && range_m <= nearest_m + BVH_SAME * nearest_m)
+        note(query, tfar, lane, triangle, range_m);
+}
+
+/* The fate of a ray that is inside of a triangle for certain. */
+enum { BEHIND, NEARER, SAME, FLAT_SEEN };
+
+/* Ranges of one triangle's plane, and what becomes of the rays. */
+VEC_INLINE void find_ranges(const struct bvh_query *query, const struct bvh_plane *plane, double *range_m,
+                            int64_t *becomes)
+{
+    const double *dx = query->dir[0], *dy = query->dir[1], *dz = query->dir[2], *o = query->at_local;
+    const double *px = query->local[0], *py = query->local[1], *pz = query->local[2], *nearest_m = query->range_m;
+    const double nx = plane->n[0], ny = plane->n[1], nz = plane->n[2], d = plane->d;
+    const double least = FLAT * FLAT * vec3_dot(plane->n, plane->n), off = nx * o[0] + ny * o[1] + nz * o[2];
+    const int own = query->has_own;
+    VEC_LOOP
+    for (uint32_t i = 0; i < BVH_PACKET; i++) {
+        const double along = nx * dx[i] + ny * dy[i] + nz * dz[i];
+        const double here = own ? nx * px[i] + ny * py[i] + nz * pz[i] : off, range = (d - here) / along;
+        const double more = range + BVH_SAME * range, most = nearest_m[i] + BVH_SAME * nearest_m[i];
+        const int64_t ahead = range > BVH_AT_ORIGIN_M, nearer = more < nearest_m[i], as_near = range <= most;
+        range_m[i] = range;
+        becomes[i] = along * along > least ? (ahead & as_near) << (1 - nearer) : FLAT_SEEN;
+    }
+}
+
+/* Rays that meet the triangle before all else so far. */
+VEC_INLINE void take_nearer(struct bvh_query *query, float *tfar, uint32_t triangle, const double *range_m,
+                            const uint32_t *takes)
+{
+    float above[BVH_PACKET];
+    VEC_LOOP
+    for (uint32_t i = 0; i < BVH_PACKET; i++) {
+        const int64_t take = takes[i];
+        query->range_m[i] = take ? range_m[i] : query->range_m[i];
+        query->hit_m[i] = take ? range_m[i] : query->hit_m[i];
+        above[i] = float_above(range_m[i] - query->start_m[i]);
+    }
+    VEC_LOOP
+    for (uint32_t i = 0; i < BVH_PACKET; i++) {
+        query->triangle[i] = takes[i] ? triangle : query->triangle[i];
+        query->n_tied[i] = takes[i] ? 0 : query->n_tied[i];
+    }
+    if (query->width == BVH_PACKET)
+        for (uint32_t i = 0; i < BVH_PACKET; i++)
+            tfar[i] = takes[i] ? above[i] : tfar[i];
+    else
+        for (uint32_t i = 0; i < query->width; i++)
+            tfar[i] = takes[i] ? above[i] : tfar[i];
+}
+
+VEC_INLINE void meet_triangle(struct bvh_query *query, float *tfar, const struct bvh_leaf *leaf, int which,
+                              const struct lanes *found)
+{
+    const int shift = which * SECOND, may_pass = query->bvh->scene->cutout != NULL;
+    const uint32_t triangle = leaf->triangle[which];
+    double range_m[BVH_PACKET];
+    int64_t becomes[BVH_PACKET];
+    uint32_t takes[BVH_PACKET], others = 0;
+    if (any(found, (uint8_t)(INSIDE << shift))) {
+        find_ranges(query, &query->bvh->plane[triangle], range_m, becomes);
+        for (uint32_t i = 0; i < BVH_PACKET; i++) {
+            const uint32_t in = (uint32_t)found->of[i] >> shift & INSIDE;
+            takes[i] = in & (becomes[i] == NEARER) & !may_pass;
+            others |= in & (becomes[i] != BEHIND) & !takes[i];
+        }
+        take_nearer(query, tfar, triangle, range_m, takes);
+    }
+    if (others == 0 && !any(found, (uint8_t)(DOUBT << shift))) return;
+    for (uint32_t i = 0; i < BVH_PACKET; i++) {
+        const unsigned it = (unsigned)found->of[i] >> shift & EITHER;
+        if (it == DOUBT || (it == INSIDE && becomes[i] == FLAT_SEEN))
+            try_one(query, tfar + i, i, leaf, which);
+        else if (it == INSIDE && !takes[i] && becomes[i] != BEHIND)
+            note(query, tfar + i, i, triangle, range_m[i]);
+    }
+}
+
+/* Where all rays are beside the two triangles. found: all bits of the rays that Embree asks for. */
+VEC_INLINE void judge_all(const struct bvh_query *query, const struct bvh_leaf *leaf, struct lanes *found)
+{
+    const double size = ((double)leaf->far_m + query->far_m) * (double)leaf->edge_m;
+    const struct lanes valid = *found;
+    int64_t wide[BVH_PACKET];
+    if (query->has_own) {
+        judge_from_own(query, leaf, SIDE_DOUBT * size, wide);
+    } else {
+        double moment[EDGES][3];
+        find_moments(query, leaf, moment);
+        if (query->dir_float != NULL &&
+            !judge_fast((const double(*)[3])moment, query->dir_float, (float)(FLOAT_DOUBT * size), found))
+            return;
+        judge_from_one(query, (const double(*)[3])moment, SIDE_DOUBT * size, wide);
+    }
+    for (uint32_t i = 0; i < BVH_PACKET; i++)
+        found->of[i] = valid.of[i] & (uint8_t)wide[i];
+}
+
+VEC_CLONES
+static void meet(struct bvh_query *query, float *tfar, const struct bvh_leaf *leaf, struct lanes *found)
+{
+    const int two = leaf->triangle[1] != BVH_NO_TRIANGLE;
+    __builtin_prefetch(&query->bvh->plane[leaf->triangle[0]]);
+    if (two) __builtin_prefetch(&query->bvh->plane[leaf->triangle[1]]);
+    query->leaves++;
+    judge_all(query, leaf, found);
+    if (any(found, EITHER)) meet_triangle(query, tfar, leaf, 0, found);
+    if (two && any(found, EITHER << SECOND)) meet_triangle(query, tfar, leaf, 1, found);
+}
+
+void bvh_meet_leaf(const struct RTCIntersectFunctionNArguments *args)
+{
+    struct bvh_query *query = (struct bvh_query *)(void *)args->context;
+    struct lanes found = {{0}};
+    for (uint32_t i = 0; i < args->N; i++)
+        found.of[i] = args->valid[i] != 0 ? 0xff : 0;
+    meet(query, bvh_field(args->rayhit, args->N, tfar), &query->bvh->leaf[args->primID], &found);
+}
