@@ -84,12 +84,12 @@ static double to_local(const struct vec3_in *own, const double origin_m[3], uint
  * anything: the float ray begins there. */
 static void take_along(struct bvh_work *w, const struct bvh *bvh, const struct bvh_rays *rays, struct bvh_batch *batch)
 {
+    struct bvh_origins from = {.own = batch->local};
+    memcpy(from.at_m, batch->at_local, sizeof from.at_m);
     for (uint32_t i = 0; i < rays->n; i++) {
         const double dir[3] = VEC3_AT(rays->dir, i);
-        double o[3] = {batch->at_local[0], batch->at_local[1], batch->at_local[2]};
-        if (batch->local.x != NULL)
-            for (int j = 0; j < 3; j++)
-                o[j] = (j == 0 ? batch->local.x : j == 1 ? batch->local.y : batch->local.z)[i];
+        double o[3];
+        bvh_origin_of(&from, i, o);
         w->start_m[i] = fmax(0.0, vec3_length(o) - bvh->radius_m);
         w->org.x[i] = (float)(o[0] + w->start_m[i] * dir[0]);
         w->org.y[i] = (float)(o[1] + w->start_m[i] * dir[1]);
@@ -107,10 +107,13 @@ static void set_origins(struct bvh_work *w, const struct bvh *bvh, const struct 
     if (rays->from.own.x != NULL) {
         batch->far_m = sqrt(to_local(&rays->from.own, bvh->origin_m, rays->n, &VEC3_OUT(w->own, 0)));
         batch->local = VEC3_IN(w->own, 0);
+    }
+    if (batch->far_m > bvh->radius_m) {
+        take_along(w, bvh, rays, batch);
+    } else if (rays->from.own.x != NULL) {
         bvh_to_float(&batch->local, rays->n, w->org.x, w->org.y, w->org.z);
         batch->org = (struct vec3_floats){w->org.x, w->org.y, w->org.z};
     }
-    if (batch->far_m > bvh->radius_m) take_along(w, bvh, rays, batch);
 }
 
 static void cast_chunk(struct bvh_work *w, const struct bvh *bvh, const struct bvh_rays *rays)

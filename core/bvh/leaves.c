@@ -20,9 +20,15 @@ static int odd_corner(const uint32_t a[3], const uint32_t b[3])
     return n == 1 ? odd : 3;
 }
 
-static float float_over(double x)
+static float below(double x)
 {
-    return nextafterf((float)x, INFINITY);
+    const float f = (float)x;
+    return f < x ? f : nextafterf(f, -INFINITY);
+}
+
+static float above(double x)
+{
+    return -below(-x);
 }
 
 static void fill_leaf(const struct bvh *bvh, uint32_t first, uint32_t second, struct bvh_leaf *leaf)
@@ -32,18 +38,18 @@ static void fill_leaf(const struct bvh *bvh, uint32_t first, uint32_t second, st
     const int odd = second != BVH_NO_TRIANGLE ? odd_corner(a, b) : 0;
     uint32_t corner[4] = {a[odd], a[(odd + 1) % 3], a[(odd + 2) % 3], a[odd]};
     if (second != BVH_NO_TRIANGLE) corner[3] = b[odd_corner(b, a)];
-    double far2 = 0.0, edge2 = 0.0;
+    double far_m = 0.0, edge_m = 0.0;
     for (int i = 0; i < 4; i++) {
         double v[3];
         memcpy(leaf->corner_m[i], scene->vertex_m[corner[i]], sizeof leaf->corner_m[i]);
         vec3_sub(leaf->corner_m[i], bvh->origin_m, v);
-        far2 = fmax(far2, vec3_dot(v, v));
+        far_m = fmax(far_m, vec3_length(v));
     }
     for (int i = 0; i < 4; i++)
         for (int j = 0; j < i; j++)
-            if (i != 3 || j != 0) edge2 = fmax(edge2, pow(vec3_distance(leaf->corner_m[i], leaf->corner_m[j]), 2.0));
-    leaf->far_m = float_over(sqrt(far2));
-    leaf->edge_m = float_over(sqrt(edge2));
+            if (i != 3 || j != 0) edge_m = fmax(edge_m, vec3_distance(leaf->corner_m[i], leaf->corner_m[j]));
+    leaf->far_m = above(far_m);
+    leaf->edge_m = above(edge_m);
     leaf->triangle[0] = first;
     leaf->triangle[1] = second;
 }
@@ -58,7 +64,7 @@ static void measure(struct bvh *bvh)
         bvh->origin_m[i] = scene->min_m[i] + 0.5 * (scene->max_m[i] - scene->min_m[i]);
         half[i] = fmax(scene->max_m[i] - bvh->origin_m[i], bvh->origin_m[i] - scene->min_m[i]);
     }
-    bvh->radius_m = (double)float_over(vec3_length(half));
+    bvh->radius_m = (double)above(vec3_length(half));
 }
 
 /* Half the surface of the box around two triangles; the same one twice: around it. */
@@ -122,12 +128,6 @@ int bvh_make_leaves(struct bvh *bvh, const struct sh_report *report, struct sh_e
     return rc;
 }
 
-static float below(double x)
-{
-    const float f = (float)x;
-    return f < x ? f : nextafterf(f, -INFINITY);
-}
-
 void embree_asks_bounds(const struct RTCBoundsFunctionArguments *args)
 {
     const struct bvh *bvh = args->geometryUserPtr;
@@ -146,7 +146,7 @@ void embree_asks_bounds(const struct RTCBoundsFunctionArguments *args)
     *args->bounds_o = (struct RTCBounds){.lower_x = below(lo[0]),
                                          .lower_y = below(lo[1]),
                                          .lower_z = below(lo[2]),
-                                         .upper_x = -below(-hi[0]),
-                                         .upper_y = -below(-hi[1]),
-                                         .upper_z = -below(-hi[2])};
+                                         .upper_x = above(hi[0]),
+                                         .upper_y = above(hi[1]),
+                                         .upper_z = above(hi[2])};
 }

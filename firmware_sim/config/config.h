@@ -339,8 +339,8 @@ void config_fill_spec(const struct config_profile *profile, const struct head_se
 /* The steps of a turn of a planar head: one of its geometries. */
 void config_set_steps(struct config_profile *profile, uint32_t steps);
 
-/* What the configuration would be with other ranges, noise and step: as if its keys had them. cfg is a copy
- * of one that was loaded; the settings are allowed for it (command.h). SH_EINPUT: no ring is left. */
+/* Gives a configuration other ranges, noise and step, as if its keys had them. cfg is a copy of one that was loaded; the
+ * settings are allowed for it (command.h). SH_EINPUT: no ring is left. */
 int config_apply_settings(struct config *cfg, const struct head_settings *settings, struct sh_err *err);
 
 /* head.range_min_m or range_max_m leaves less than the profile has. */

@@ -21,8 +21,7 @@ int pump_open(struct links *links, uint32_t index, const struct link_spec *spec,
     pump->stream = links->stream;
     pump->number = index + 1;
     if (spec->type != LINK_FD && !spec->clean)
-        pump->board =
-            links->source->ops->faults(links->source->self); /* readers of this process get the clean stream */
+        pump->board = links->source->ops->faults(links->source->self); /* readers here get the clean stream */
     pump->ops = link_ops_get(spec->type);
     pump->can = link_faults(spec);
     pump->protocol = protocol_ops_get((enum protocol_id)spec->protocol);
