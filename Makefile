@@ -27,10 +27,11 @@ Q = $(Q_$(V))
 
 # What a fresh Debian 12 needs. Building and the demo:
 DEPS_BUILD = gcc g++ make pkg-config libc6-dev libembree-dev libassimp-dev libgeographiclib-dev libyaml-dev libpng-dev \
-	libstb-dev nettle-dev libusb-1.0-0-dev libusbredirparser-dev libwebsockets-dev assimp-testmodels
+	libstb-dev nettle-dev libusb-1.0-0-dev libusbredirparser-dev libwebsockets-dev assimp-testmodels \
+	$(if $(shell command -v npm),,nodejs npm)
 # and the tests, with the second compiler and its sanitizers, clients and readers of recordings that are not ours:
 DEPS_TEST = $(DEPS_BUILD) libcmocka-dev clang libclang-rt-dev lld ccache gpsd gpsd-clients cloudcompare mrpt-apps proj-bin python3-numpy \
-	parallel patch tshark tcpreplay $(if $(shell command -v npm),,nodejs npm)
+	parallel patch tshark tcpreplay
 # The guest tests; they are skipped where these can't be had. The kernel (linux-image-amd64) is fetched, not installed.
 DEPS_GUEST = qemu-system-x86 busybox-static cpio kmod xz-utils usbutils usbip
 # The browser that the page is tested in; these tests are skipped where it can't be had.
@@ -78,7 +79,7 @@ ALL_CFLAGS = -std=c11 $(OPT) -g $(FP) $(CWARN) $(WERROR) -fPIC -pthread $(SAN) $
 ALL_CXXFLAGS = -std=c++17 $(OPT) -g $(FP) $(WARN) $(WERROR) -fPIC -pthread $(SAN) $(CXXFLAGS)
 LDLIBS = -lembree$(EMBREE_VERSION) -lassimp -lGeographicLib $(PKG_LIBS) -lstdc++ -lm -pthread
 
-CORE = $(wildcard core/*.c core/*/*.c) core/georef/geographiclib_shim.cpp
+CORE = $(wildcard core/*.c core/*/*.c core/import/*/*.c) core/georef/geographiclib_shim.cpp
 PROTO = $(wildcard drivers/protocol/*.c)
 HOST = $(wildcard drivers/host/*.c)
 SRC = $(CORE) $(wildcard drivers/*/*.c firmware_sim/*/*.c firmware_sim/*/*/*.c)
@@ -92,7 +93,9 @@ SHIPPED = $(patsubst tests/%.c,$(BUILD)/tests/%,$(shell sh tests/shipped.sh))
 TESTS = $(UNIT) $(call PROGRAMS,wire) $(call PROGRAMS,accuracy) $(call PROGRAMS,stability) $(call PROGRAMS,guest)
 EVERYTHING = $(OBJ) $(BUILD)/firmware_sim/main.c.o
 
-all: $(BUILD)/scanhead $(BUILD)/libscanhead.a $(BUILD)/libscanhead.so
+IFC_READERS = $(BUILD)/ifc
+IFC_PROGRAMS = $(patsubst core/import/ifc/%,$(IFC_READERS)/%,$(wildcard core/import/ifc/*.mjs))
+all: $(BUILD)/scanhead $(BUILD)/libscanhead.a $(BUILD)/libscanhead.so $(IFC_PROGRAMS)
 
 $(BUILD)/%.c.o: %.c $(BUILD)/flags
 	@mkdir -p $(@D)
@@ -215,12 +218,25 @@ $(READERS)/installed: $(wildcard tests/readers/*) | $(if $(DEPS_ARE_THERE),,deps
 	@if [ '$(DEPS)' = no ]; then echo "DEPS=no: the readers for LAS and E57 are not installed: their tests will be skipped"; \
 	elif (cd $(@D) && npm ci --no-audit --no-fund --loglevel=error --fetch-retries=0 --fetch-timeout=30000) >$(@D)/npm.log 2>&1; then touch $@; \
 	else echo "npm could not install the readers for LAS and E57 ($(@D)/npm.log): their tests will be skipped"; fi
+# The readers of IFC bodies are npm's, in the versions of the lock file. Without npm or node Assimp reads IFC.
+ifc-readers: $(IFC_READERS)/installed $(IFC_PROGRAMS)
+$(IFC_READERS)/installed: $(addprefix core/import/ifc/,package.json package-lock.json .npmrc)
+	@mkdir -p $(@D)
+	@cp $^ $(@D)
+	@if [ '$(DEPS)' = no ]; then echo "DEPS=no: the readers of IFC are not installed: Assimp reads it"; \
+	elif (cd $(@D) && npm ci --ignore-scripts --no-audit --no-fund --loglevel=error --fetch-retries=1 --fetch-timeout=60000) \
+		>$(@D)/npm.log 2>&1; then touch $@; \
+	else echo "npm could not install the readers of IFC ($(@D)/npm.log): Assimp reads it"; fi
+$(IFC_READERS)/%.mjs: core/import/ifc/%.mjs
+	@mkdir -p $(@D)
+	@cp $< $@
 # PCL's headers take long to compile. Where PCL is not installed, the test is skipped.
 $(READERS)/pcl_vlp16: tests/readers/pcl_vlp16.in
 	@mkdir -p $(@D)
 	@! pkg-config --exists pcl_io 2>/dev/null || g++ -O0 -w -x c++ $< -o $@ $$(pkg-config --cflags --libs pcl_io)
 deps-test:
 	$(call install_missing,$(DEPS_TEST))
+	@$(MAKE) --no-print-directory ifc-readers
 	@$(MAKE) --no-print-directory deps-guest || echo "the guest tests will be skipped"
 	@$(MAKE) --no-print-directory deps-browser || echo "the tests of the page will be skipped"
 deps-guest:
@@ -229,6 +245,7 @@ deps-browser:
 	$(call install_missing,$(DEPS_BROWSER))
 deps-build:
 	$(call install_missing,$(DEPS_BUILD))
+	@$(MAKE) --no-print-directory ifc-readers
 
 demo: deps-build
 	@$(MAKE) --no-print-directory -j2 all
@@ -403,7 +420,7 @@ format:
 	clang-format -i $$(git ls-files '*.c' '*.h' '*.cpp')
 clean:
 	rm -rf $(BUILD)
-.PHONY: ALWAYS all deps deps-test deps-build deps-guest deps-browser demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb repair \
+.PHONY: ALWAYS all ifc-readers deps deps-test deps-build deps-guest deps-browser demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb repair \
 	test-usb-million test-hostile test-sight objects test-unit-programs test-programs bench bench-beam bench-plain bench-velodyne bench-page page-pictures bench-loop bench-kernels bench-panorama chart install format clean
 .SECONDARY:
 -include $(shell find $(patsubst %,$(BUILD)/%,core drivers firmware_sim tests) -name '*.d' 2>/dev/null)

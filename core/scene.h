@@ -25,15 +25,21 @@
 enum scene_up { SCENE_UP_Z, SCENE_UP_Y };
 
 enum {
-    SCENE_NAME_LEN = 64,        /* of an object or a material, with its NUL; longer names are cut, counted */
+    SCENE_NAME_LEN = 256,       /* of an object or a material, with its NUL; longer names are cut, counted */
     SCENE_MAX_SURFACES = 65534, /* labels are 16 bits on the wire; 0xffff means "none" */
 };
 
-/* What reading one file by Assimp may take. */
+/* Who reads bodies of IFC: two readers, and Assimp where they are not installed; or one alone. */
+enum scene_ifc_reader { IFC_READER_AUTO, IFC_READER_WEB, IFC_READER_LITE, IFC_READER_ASSIMP };
+
+/* What reading one file by others may take: Assimp, and each reader of IFC. */
 struct scene_import_limits {
     uint32_t memory_mib; /* on top of what the program has; the scene on its way back likewise */
     double time_s;       /* by the clock on the wall; of processor time likewise */
-    uint32_t files;      /* open at a time */
+    uint32_t files;      /* open at a time by Assimp */
+    enum scene_ifc_reader ifc_reader;
+    int ifc_strict;         /* where the readers of IFC differ is an error */
+    const char *ifc_folder; /* where they are; NULL: installed, or built, beside the program */
 };
 extern const struct scene_import_limits scene_import_defaults;
 

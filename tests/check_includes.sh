@@ -10,6 +10,7 @@
 # the first room, `core`: errors, lines, vectors, angles, random numbers.
 core_order='core picture mesh texture scene schedule georef pose surface instrument detect bvh sight footprint cast plan analysis standpoint coverage'
 firmware_order='base command fault config site device loop replay app'
+# The folders of core/import are of the room `scene`, which calls them, and whose builder they fill.
 # Headers in core/ that belong to a room with another name, as HEADER:ROOM.
 core_headers='scan_mesh:mesh decimate:mesh cloud:analysis cloud_picture:analysis deviation:analysis figures:analysis distance:analysis map:analysis view:analysis geoframe:georef locate:georef ifc_site:scene embree:bvh'
 # Everything in firmware_sim may use core and drivers. core uses nothing else. In drivers:
@@ -41,6 +42,7 @@ rules='
     # The room that a file lies in; of a header in core/ itself the room that it declares.
     function room(path,   part, n, name) {
         n = split(path, part, "/")
+        if (n > 3 && part[1] == "core" && part[2] == "import") return "core/scene"
         if (n > 2) return part[1] "/" part[2]
         name = path; sub(/\.[a-z]*$/, "", name)
         if (name in at) return at[name]

@@ -94,6 +94,12 @@ void build_announce(struct scene_build *b);
 /* The file's name without folders and ending: the object's name where a file has none. */
 struct text_span build_base_name(const struct scene_build *b);
 
+/* Limits of a reader apart: the file's, or the defaults. */
+static inline struct scene_import_limits build_limits(const struct scene_build *b)
+{
+    return b->spec->limits != NULL ? *b->spec->limits : scene_import_defaults;
+}
+
 /* ---- cutouts.c */
 /* Holes in the textures of a scene that is complete. Warns of textures that can't be read. */
 int scene_find_cutouts(struct scene *scene, const struct sh_report *report, struct sh_err *err);
@@ -107,5 +113,6 @@ int read_obj(struct scene_build *b, struct sh_err *err);
 int read_mtl(struct scene_build *b, struct text_span name, uint32_t first_surface, struct sh_err *err);
 int read_ply(struct scene_build *b, struct sh_err *err);
 int import_apart(struct scene_build *b, struct sh_err *err); /* core/scene/import.h */
+int read_ifc(struct scene_build *b, struct sh_err *err);     /* core/import/ifc/ */
 
 #endif

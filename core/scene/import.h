@@ -1,8 +1,8 @@
-/* Import by Assimp, apart. Assimp crashes, hangs or takes all memory on some broken files; so it reads in a
- * process of its own, with limits, and what it gives is checked before it is used.
+/* Import by others, apart. Assimp and the readers of IFC crash, hang or take all memory on some broken files; so each
+ * reads in a process of its own, with limits, and what it gives is checked before it is used.
  *
- *   import_apart.c     this process: starts the other one, looks after it, says how it ended
- *   import_child.c     the other process: its limits, its messages, its work
+ *   import_apart.c     this process: starts the other ones, looks after them, says how they ended
+ *   import_child.c     the other process: its limits, its messages, its work, or the program that does it
  *   import_assimp.c    the work: Assimp's nodes and meshes into a builder, as the other readers fill one
  *   import_result.c    the scene on its way back: written there, read and checked here */
 #ifndef CORE_SCENE_IMPORT_H
@@ -22,21 +22,44 @@ struct import_note {
     char text[512];
 };
 
+/* What the child gets. */
+struct import_task {
+    struct scene_build *b; /* of the parent; the child only reads it */
+    struct scene_import_limits limits;
+    const char *name;        /* of the reader, for messages */
+    const char *const *argv; /* a program that reads, NULL-terminated, found by PATH; NULL: Assimp, in a fork */
+    pid_t parent;
+    int result_fd, note_fd; /* the scene, the messages; a program finds them as 3 and 4 */
+};
+
 /* ---- import_apart.c */
 
 /* Bytes of a process, as the kernel counts them; 0: not known. */
 enum import_memory { IMPORT_ADDRESSES, IMPORT_RESIDENT };
 uint64_t import_memory_of(pid_t pid, enum import_memory which);
 
-/* ---- import_child.c */
-
-/* What the child gets. */
-struct import_task {
-    struct scene_build *b; /* of the parent; the child only reads it */
-    struct scene_import_limits limits;
-    pid_t parent;
-    int result_fd, note_fd; /* the scene, the messages */
+/* One process that reads, as this one sees it. */
+enum import_end { IMPORT_ENDED, IMPORT_STOPPED, IMPORT_TIME, IMPORT_MEMORY };
+struct import_apart {
+    struct import_task task; /* name, argv, b and limits by the caller */
+    int result_fd, note[2], pid_fd;
+    pid_t pid;
+    int64_t start_ns, end_ns; /* begin, and the latest end */
+    uint64_t most_bytes;      /* its resident memory */
+    int is_over, status;      /* as of waitpid */
+    enum import_end end;
+    int n_warnings;
+    struct sh_err said; /* its error */
 };
+/* Fails where no process can be made; nothing is open then. */
+int import_start(struct import_apart *a, struct sh_err *err);
+/* Until all n <= 2 are over. Once one has ended as it should, another gets ten times as long, or 10 s where that is more. */
+void import_watch(struct import_apart *const a[], size_t n);
+/* How it ended: 0, or the error. result_fd then has what it made. */
+int import_judge(struct import_apart *a, struct sh_err *err);
+void import_close(struct import_apart *a);
+
+/* ---- import_child.c */
 
 /* Reads the file that b is at, in a process that was just forked with all signals blocked. Exit status 0: the
  * scene is written. */

@@ -18,18 +18,7 @@ enum { LOOK_MS = 20, MAX_WARNINGS = 1000 };
 
 #define ELSE_CONVERT "export the mesh again, or convert it to .obj or .ply"
 
-enum end { ENDED, END_STOPPED, END_TIME, END_MEMORY };
-
-struct apart {
-    struct import_task task;
-    int result_fd, note[2], pid_fd;
-    pid_t pid;
-    int64_t end_ns;
-    uint64_t most_bytes; /* the child's resident memory */
-    int status;          /* as of waitpid */
-    int n_warnings;
-    struct sh_err said; /* the child's error */
-};
+#define LEAST_MORE_NS ((int64_t)10000000000) /* for a second reader, once the first has ended */
 
 static int64_t now_ns(void)
 {
@@ -55,7 +44,7 @@ uint64_t import_memory_of(pid_t pid, enum import_memory which)
 
 /* ---- start */
 
-static int open_all(struct apart *a, struct sh_err *err)
+static int open_all(struct import_apart *a, struct sh_err *err)
 {
     a->result_fd = memfd_create("scene", MFD_CLOEXEC);
     if (a->result_fd < 0 || pipe2(a->note, O_CLOEXEC) != 0)
@@ -64,15 +53,17 @@ static int open_all(struct apart *a, struct sh_err *err)
     return SH_OK;
 }
 
-static void close_all(struct apart *a)
+void import_close(struct import_apart *a)
 {
-    const int fd[] = {a->result_fd, a->note[0], a->note[1], a->pid_fd};
-    for (size_t i = 0; i < sizeof fd / sizeof fd[0]; i++)
-        if (fd[i] >= 0) close(fd[i]);
+    int *const fd[] = {&a->result_fd, &a->note[0], &a->note[1], &a->pid_fd};
+    for (size_t i = 0; i < sizeof fd / sizeof fd[0]; i++) {
+        if (*fd[i] >= 0) close(*fd[i]);
+        *fd[i] = -1;
+    }
 }
 
 /* Signals are blocked until the child has handlers of its own: this process's must not run there. */
-static int start(struct apart *a, struct sh_err *err)
+static int start_child(struct import_apart *a, struct sh_err *err)
 {
     sigset_t all, before;
     const struct scene_import_limits *limits = &a->task.limits;
@@ -80,7 +71,8 @@ static int start(struct apart *a, struct sh_err *err)
     a->task.result_fd = a->result_fd;
     a->task.note_fd = a->note[1];
     a->most_bytes = import_memory_of(a->task.parent, IMPORT_RESIDENT) + ((uint64_t)limits->memory_mib << 20);
-    a->end_ns = now_ns() + (int64_t)(1e9 * limits->time_s);
+    a->start_ns = now_ns();
+    a->end_ns = a->start_ns + (int64_t)(1e9 * limits->time_s);
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &before);
     a->pid = fork();
@@ -94,9 +86,18 @@ static int start(struct apart *a, struct sh_err *err)
     return SH_OK;
 }
 
+int import_start(struct import_apart *a, struct sh_err *err)
+{
+    a->result_fd = a->note[0] = a->note[1] = a->pid_fd = -1;
+    int rc = open_all(a, err);
+    if (rc == SH_OK) rc = start_child(a, err);
+    if (rc != SH_OK) import_close(a);
+    return rc;
+}
+
 /* ---- what it says */
 
-static void take_note(struct apart *a, struct import_note *note)
+static void take_note(struct import_apart *a, struct import_note *note)
 {
     const struct sh_report *report = a->task.b->report;
     note->text[sizeof note->text - 1] = '\0';
@@ -108,9 +109,10 @@ static void take_note(struct apart *a, struct import_note *note)
 }
 
 /* All that has come. Notes come whole. 0: the pipe is closed. */
-static int take_notes(struct apart *a)
+static int take_notes(struct import_apart *a)
 {
     struct import_note note;
+    if (a->note[0] < 0) return 0;
     for (;;) {
         ssize_t n = read(a->note[0], &note, sizeof note);
         if (n < 0 && errno == EINTR) continue;
@@ -123,7 +125,7 @@ static int take_notes(struct apart *a)
 /* ---- how it ends */
 
 /* 1: it has ended, and is gone. */
-static int reap(struct apart *a, int flags)
+static int reap(struct import_apart *a, int flags)
 {
     for (;;) {
         pid_t got = waitpid(a->pid, &a->status, flags);
@@ -135,87 +137,113 @@ static int reap(struct apart *a, int flags)
     }
 }
 
-/* Why it must end now; ENDED: it need not. */
-static enum end must_end(const struct apart *a)
+/* Why it must end now; IMPORT_ENDED: it need not. */
+static enum import_end must_end(const struct import_apart *a)
 {
-    if (sh_stopped(a->task.b->report)) return END_STOPPED;
-    if (now_ns() > a->end_ns) return END_TIME;
-    return import_memory_of(a->pid, IMPORT_RESIDENT) > a->most_bytes ? END_MEMORY : ENDED;
+    if (sh_stopped(a->task.b->report)) return IMPORT_STOPPED;
+    if (now_ns() > a->end_ns) return IMPORT_TIME;
+    return import_memory_of(a->pid, IMPORT_RESIDENT) > a->most_bytes ? IMPORT_MEMORY : IMPORT_ENDED;
 }
 
-static enum end watch(struct apart *a)
+/* Whether it is over. */
+static int look(struct import_apart *a)
 {
-    struct pollfd on[2] = {{.fd = a->pid_fd, .events = POLLIN}, {.fd = a->note[0], .events = POLLIN}};
-    for (;;) {
-        poll(on, 2, LOOK_MS);
-        if (!take_notes(a)) on[1].fd = -1;
-        if (reap(a, WNOHANG)) {
-            take_notes(a);
-            return ENDED;
+    if (!take_notes(a) && a->note[0] >= 0) {
+        close(a->note[0]);
+        a->note[0] = -1;
+    }
+    if (reap(a, WNOHANG)) {
+        take_notes(a);
+        return 1;
+    }
+    a->end = must_end(a);
+    if (a->end == IMPORT_ENDED) return 0;
+    kill(a->pid, SIGKILL);
+    reap(a, 0);
+    return 1;
+}
+
+/* One that hangs would else hold up what the other has read for minutes. */
+static void shorten(struct import_apart *a, const struct import_apart *done)
+{
+    const int64_t now = now_ns(), took = 10 * (now - done->start_ns);
+    const int64_t end_ns = now + (took > LEAST_MORE_NS ? took : LEAST_MORE_NS);
+    if (done->status == 0 && done->end == IMPORT_ENDED && end_ns < a->end_ns) a->end_ns = end_ns;
+}
+
+void import_watch(struct import_apart *const a[], size_t n)
+{
+    struct pollfd on[4];
+    for (size_t left = n; left > 0;) {
+        for (size_t i = 0; i < n; i++) {
+            on[2 * i] = (struct pollfd){.fd = a[i]->is_over ? -1 : a[i]->pid_fd, .events = POLLIN};
+            on[2 * i + 1] = (struct pollfd){.fd = a[i]->is_over ? -1 : a[i]->note[0], .events = POLLIN};
         }
-        enum end why = must_end(a);
-        if (why == ENDED) continue;
-        kill(a->pid, SIGKILL);
-        reap(a, 0);
-        return why;
+        poll(on, 2 * n, LOOK_MS);
+        for (size_t i = 0; i < n; i++) {
+            if (a[i]->is_over || !look(a[i])) continue;
+            a[i]->is_over = 1;
+            left--;
+            for (size_t k = 0; k < n; k++)
+                shorten(a[k], a[i]);
+        }
     }
 }
 
-static int fail_by_memory(const struct apart *a, struct sh_err *err)
+static int fail_by_memory(const struct import_apart *a, struct sh_err *err)
 {
     return build_fail(a->task.b, SH_EINPUT, err,
-                      "Assimp takes more than %u MiB to read it (scene.import_memory_mib): raise that where the mesh "
+                      "%s takes more than %u MiB to read it (scene.import_memory_mib): raise that where the mesh "
                       "needs it; a broken file takes any amount: " ELSE_CONVERT,
-                      a->task.limits.memory_mib);
+                      a->task.name, a->task.limits.memory_mib);
 }
 
-static int fail_by_time(const struct apart *a, struct sh_err *err)
+static int fail_by_time(const struct import_apart *a, struct sh_err *err)
 {
     return build_fail(a->task.b, SH_EINPUT, err,
-                      "Assimp has not read it within %g s (scene.import_s): raise that where the mesh needs it; with "
+                      "%s has not read it within %g s (scene.import_s): raise that where the mesh needs it; with "
                       "a broken file it may hang: " ELSE_CONVERT,
-                      a->task.limits.time_s);
+                      a->task.name, 1e-9 * (double)(a->end_ns - a->start_ns));
 }
 
-static int fail_by_signal(const struct apart *a, int number, struct sh_err *err)
+static int fail_by_signal(const struct import_apart *a, int number, struct sh_err *err)
 {
     const char *name = sigabbrev_np(number);
     if (number == SIGXCPU) return fail_by_time(a, err);
     if (number == SIGKILL)
         return build_fail(a->task.b, SH_EINPUT, err,
-                          "the process in which Assimp read it was killed (SIGKILL), as the system does where memory "
+                          "the process in which %s read it was killed (SIGKILL), as the system does where memory "
                           "is short; scene.import_memory_mib is %u: " ELSE_CONVERT,
-                          a->task.limits.memory_mib);
-    return build_fail(a->task.b, SH_EINPUT, err, "Assimp crashed on it (SIG%s): the file is broken: " ELSE_CONVERT,
-                      name != NULL ? name : "?");
+                          a->task.name, a->task.limits.memory_mib);
+    return build_fail(a->task.b, SH_EINPUT, err, "%s crashed on it (SIG%s): the file is broken: " ELSE_CONVERT,
+                      a->task.name, name != NULL ? name : "?");
 }
 
-static int judge(struct apart *a, enum end end, struct sh_err *err)
+int import_judge(struct import_apart *a, struct sh_err *err)
 {
-    if (end == END_STOPPED) return sh_fail_stopped(err);
-    if (end == END_TIME) return fail_by_time(a, err);
-    if (end == END_MEMORY) return fail_by_memory(a, err);
+    if (a->end == IMPORT_STOPPED) return sh_fail_stopped(err);
+    if (a->end == IMPORT_TIME) return fail_by_time(a, err);
+    if (a->end == IMPORT_MEMORY) return fail_by_memory(a, err);
     if (WIFSIGNALED(a->status)) return fail_by_signal(a, WTERMSIG(a->status), err);
     /* What is refused at once, as larger than all memory, never was in use. */
     if (a->said.code == SH_ENOMEM || strstr(a->said.text, "bad_alloc") != NULL) return fail_by_memory(a, err);
     if (a->said.code != 0) return sh_fail(err, a->said.code, "%s", a->said.text);
     if (WEXITSTATUS(a->status) == 0) return SH_OK;
     return build_fail(a->task.b, SH_EINPUT, err,
-                      "the process in which Assimp read it ended without a word (exit status %d): the file is "
+                      "the process in which %s read it ended without a word (exit status %d): the file is "
                       "broken: " ELSE_CONVERT,
-                      WEXITSTATUS(a->status));
+                      a->task.name, WEXITSTATUS(a->status));
 }
 
 int import_apart(struct scene_build *b, struct sh_err *err)
 {
-    struct apart a = {.task = {.b = b, .limits = b->spec->limits != NULL ? *b->spec->limits : scene_import_defaults},
-                      .result_fd = -1,
-                      .note = {-1, -1},
-                      .pid_fd = -1};
-    int rc = open_all(&a, err);
-    if (rc == SH_OK) rc = start(&a, err);
-    if (rc == SH_OK) rc = judge(&a, watch(&a), err);
+    struct import_apart a = {.task = {.b = b, .limits = build_limits(b), .name = "Assimp"}};
+    struct import_apart *const all[1] = {&a};
+    int rc = import_start(&a, err);
+    if (rc != SH_OK) return rc;
+    import_watch(all, 1);
+    rc = import_judge(&a, err);
     if (rc == SH_OK) rc = import_result_read(b, a.result_fd, err);
-    close_all(&a);
+    import_close(&a);
     return rc;
 }

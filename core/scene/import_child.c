@@ -1,6 +1,6 @@
-/* The process that reads by Assimp: limits first, then the work, then the scene into the file of the task.
+/* The process that reads: limits first, then the work, then the scene into the file of the task.
  *
- * It is a fork without exec, perhaps of a process with threads, of which only this one is left. glibc lets
+ * For Assimp it is a fork without exec, perhaps of a process with threads, of which only this one is left. glibc lets
  * such a process use malloc and stdio; nothing else of the parent's threads is touched. It ends by _exit,
  * which runs nobody's destructors. */
 #include "core/scene/import.h"
@@ -16,6 +16,7 @@
 #include <unistd.h>
 
 enum { RESULT_FD = 3, NOTE_FD, FIRST_FREE_FD };
+enum { PROGRAM_FILES = 256 }; /* node opens some 30 of its own */
 
 _Static_assert(sizeof(struct import_note) <= 4096, "PIPE_BUF on Linux: written in one piece");
 
@@ -94,15 +95,19 @@ static void offer_to_the_oom_killer(void)
 }
 
 /* The parent looks at memory in use, and at the clock. What the kernel watches is the second line: processor
- * time where the parent is stopped, and the address space. That one is twice the limit, since there is always
+ * time where the parent is stopped, and for Assimp the address space. That one is twice the limit, since there is always
  * more of it than of memory; the address sanitizer takes terabytes of it. */
-static int set_limits(const struct scene_import_limits *limits)
+static int set_limits(const struct import_task *task)
 {
+    const struct scene_import_limits *limits = &task->limits;
     const uint64_t bytes = (uint64_t)limits->memory_mib << 20;
+    const uint64_t files = task->argv != NULL ? PROGRAM_FILES : limits->files;
     int done = set_limit(RLIMIT_CORE, 0) && set_limit(RLIMIT_CPU, (uint64_t)ceil(limits->time_s) + 1) &&
-               set_limit(RLIMIT_NOFILE, FIRST_FREE_FD + limits->files) && set_limit(RLIMIT_FSIZE, bytes);
+               set_limit(RLIMIT_NOFILE, FIRST_FREE_FD + files) && set_limit(RLIMIT_FSIZE, bytes);
 #ifndef SH_SANITIZE
-    done = done && set_limit(RLIMIT_AS, import_memory_of(getpid(), IMPORT_ADDRESSES) + 2 * bytes);
+    /* node reserves many times the address space that it uses. */
+    if (task->argv == NULL)
+        done = done && set_limit(RLIMIT_AS, import_memory_of(getpid(), IMPORT_ADDRESSES) + 2 * bytes);
 #endif
     offer_to_the_oom_killer();
     return done && prctl(PR_SET_DUMPABLE, 0) == 0; /* no core by a pipe either, which asks for no limit */
@@ -114,9 +119,16 @@ static int prepare(const struct import_task *task, struct sh_err *err)
     set_signals();
     if (!set_descriptors(task))
         return sh_fail(err, SH_EIO, "the descriptors of the process that reads can't be set: %s", strerror(errno));
-    if (!set_limits(&task->limits))
+    if (!set_limits(task))
         return sh_fail(err, SH_EIO, "the limits of the process that reads can't be set: %s", strerror(errno));
     return SH_OK;
+}
+
+/* Returns only where there is no such program. */
+static int run_program(const struct import_task *task, struct sh_err *err)
+{
+    execvp(task->argv[0], (char *const *)(uintptr_t)task->argv);
+    return sh_fail(err, SH_EIO, "%s: %s", task->argv[0], strerror(errno));
 }
 
 static int read_scene(const struct import_task *task, struct sh_err *err)
@@ -138,7 +150,7 @@ _Noreturn void import_child(const struct import_task *task)
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (getppid() != task->parent) _exit(1); /* it died before that */
     int rc = prepare(task, &err);
-    if (rc == SH_OK) rc = read_scene(task, &err);
+    if (rc == SH_OK) rc = task->argv != NULL ? run_program(task, &err) : read_scene(task, &err);
     if (rc != SH_OK) send_text(IMPORT_ERROR, rc, 0.0, err.text);
     _exit(rc == SH_OK ? 0 : 1);
 }

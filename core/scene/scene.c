@@ -16,7 +16,7 @@ static const struct {
     int (*read)(struct scene_build *b, struct sh_err *err);
 } readers[] = {
     {".obj", read_obj},     {".ply", read_ply},     {".stl", import_apart}, {".gltf", import_apart},
-    {".glb", import_apart}, {".fbx", import_apart}, {".dae", import_apart}, {".ifc", import_apart},
+    {".glb", import_apart}, {".fbx", import_apart}, {".dae", import_apart}, {".ifc", read_ifc},
 };
 
 static int check_spec(struct scene_build *b, struct sh_err *err)

@@ -1,0 +1,39 @@
+/* Chooses each product's body of two readings, by rules that core/import/ifc/README.md has. */
+#ifndef CORE_IMPORT_IFC_IFC_CHOOSE_H
+#define CORE_IMPORT_IFC_IFC_CHOOSE_H
+
+#include "core/import/ifc/ifc_bodies.h"
+#include "core/import/ifc/ifc_records.h"
+
+enum ifc_source { IFC_NONE, IFC_WEB, IFC_LITE };
+
+/* Why a product is named. */
+enum ifc_finding {
+    IFC_AGREED,
+    IFC_LOST,        /* its records have a body, and no reader makes one */
+    IFC_BOX,         /* both make one, of different size or place */
+    IFC_AREA,        /* both make one, of different area or volume */
+    IFC_ONLY_WEB,    /* only that reader makes one */
+    IFC_ONLY_LITE,   /* likewise */
+    IFC_CLOSED_WEB,  /* only that one's is closed */
+    IFC_CLOSED_LITE, /* likewise */
+    IFC_OPEN,        /* both make the same, which is open */
+    IFC_FAILED,      /* the one that is taken admits a failure */
+    IFC_FINDINGS,
+};
+
+struct ifc_choice {
+    enum ifc_source source;
+    enum ifc_finding finding;
+};
+
+/* web, lite: NULL where that reader has none. is_checked: both readers gave an answer. */
+struct ifc_choice ifc_choose(const struct ifc_product *product, const struct ifc_body *web, const struct ifc_body *lite,
+                             bool is_checked);
+
+/* Words for a finding, after "N products: "; NULL: there is nothing to say. */
+const char *ifc_finding_text(enum ifc_finding finding);
+/* A finding that means the scene may be wrong. */
+bool ifc_is_doubtful(enum ifc_finding finding);
+
+#endif

@@ -1,0 +1,179 @@
+#include "core/import/ifc/ifc_read.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/scene/import.h"
+
+enum { LEAST_SEGMENTS = 24, MOST_SEGMENTS = 360 };
+#define FAR_LEVEL_SEGMENTS 48 /* from here on ifc-lite, too, is asked for finer facets */
+
+struct reading {
+    struct scene_build *b;
+    struct scene_import_limits limits;
+    struct ifc_records records;
+    struct ifc_readings readings;
+    enum ifc_finding *finding; /* [n_products] */
+    double largest_m;          /* of what was rounded to single precision */
+    struct sh_err *err;
+};
+
+/* A chord of a circle of radius r lies up to r (1 - cos(pi / n)) from its arc, for n sides. */
+static struct ifc_fineness fineness_for(const struct ifc_records *records, double tolerance_m)
+{
+    const double radius_m = records->radius_m, share = tolerance_m / radius_m;
+    double segments = radius_m > 0.0 && share < 1.0 ? ceil(M_PI / acos(1.0 - share)) + 1.0 : LEAST_SEGMENTS;
+    segments = fmin(fmax(segments, LEAST_SEGMENTS), MOST_SEGMENTS);
+    return (struct ifc_fineness){.segments = (int)segments,
+                                 .level = segments >= FAR_LEVEL_SEGMENTS ? "high" : "medium",
+                                 .deviation_m = radius_m * (1.0 - cos(M_PI / (segments - 1.0)))};
+}
+
+/* Type, name and GlobalId, as one word: no two products have the same. */
+static char *object_name(const struct ifc_product *p, const struct ifc_body *body)
+{
+    const struct text_span type = body->type.n > 0 ? body->type : p->type;
+    char *name = NULL;
+    const int n = asprintf(&name, "%.*s_%s_%s", (int)type.n, type.p, p->name[0] != '\0' ? p->name : "Unnamed", p->guid);
+    return n >= 0 ? name : NULL;
+}
+
+static int add_part(struct reading *r, const struct ifc_part *part, uint16_t label)
+{
+    struct scene_build *b = r->b;
+    b->mesh_vertex0 = b->scene->n_vertices;
+    int rc = build_reserve(b, part->n_vertices, part->n_triangles, r->err);
+    if (rc == SH_OK) rc = build_corners(b, 3, r->err);
+    for (uint32_t i = 0; i < part->n_vertices && rc == SH_OK; i++)
+        rc = build_vertex(b, part->vertex_m[i], r->err);
+    b->has_uv = false;
+    for (uint32_t i = 0; i < part->n_triangles && rc == SH_OK; i++) {
+        for (int k = 0; k < 3; k++)
+            b->corner[k] = b->mesh_vertex0 + part->triangle[i][k];
+        rc = build_polygon(b, 3, label, r->err);
+    }
+    r->largest_m = fmax(r->largest_m, part->largest_m);
+    return rc;
+}
+
+/* A pair of object and material that is there already keeps its label, so each part of one material is one surface. */
+static int label_part(struct reading *r, const struct ifc_product *p, const char *object, const struct ifc_part *part,
+                      uint16_t *label)
+{
+    const struct ifc_style *style = ifc_style_by_colour(&r->records, p, part->colour);
+    const char *material = style != NULL ? style->name : "<IFCDefault>";
+    int rc = build_label(r->b, (struct text_span){object, strlen(object)},
+                         (struct text_span){material, strlen(material)}, label, r->err);
+    if (rc != SH_OK || style == NULL) return rc;
+    struct scene_surface *surface = &r->b->scene->surface[*label];
+    memcpy(surface->colour, part->colour, sizeof surface->colour);
+    surface->has_colour = 1;
+    return SH_OK;
+}
+
+static int add_body(struct reading *r, const struct ifc_product *p, const struct ifc_bodies *of,
+                    const struct ifc_body *body)
+{
+    char *name = object_name(p, body);
+    if (name == NULL) return build_fail(r->b, SH_ENOMEM, r->err, "no memory for a name");
+    int rc = SH_OK;
+    r->b->mesh = name;
+    for (size_t i = 0; i < body->n_parts && rc == SH_OK; i++) {
+        const struct ifc_part *part = &of->part[body->first + i];
+        uint16_t label;
+        rc = label_part(r, p, name, part, &label);
+        if (rc == SH_OK) rc = add_part(r, part, label);
+    }
+    r->b->scene->n_meshes++;
+    r->b->mesh = NULL;
+    free(name);
+    return rc;
+}
+
+static const struct ifc_body *with_parts(const struct ifc_bodies *bodies, bool has, uint64_t id)
+{
+    const struct ifc_body *body = has ? ifc_bodies_find(bodies, id) : NULL;
+    return body != NULL && body->n_parts > 0 ? body : NULL;
+}
+
+static int add_products(struct reading *r)
+{
+    const struct ifc_readings *in = &r->readings;
+    int rc = SH_OK;
+    for (size_t i = 0; i < r->records.n_products && rc == SH_OK; i++) {
+        const struct ifc_product *p = &r->records.product[i];
+        if (p->is_air) continue;
+        const struct ifc_body *web = with_parts(&in->web, in->has_web, p->id),
+                              *lite = with_parts(&in->lite, in->has_lite, p->id);
+        const struct ifc_choice choice = ifc_choose(p, web, lite, in->has_web && in->has_lite);
+        r->finding[i] = choice.finding;
+        if (choice.source == IFC_WEB) rc = add_body(r, p, &in->web, web);
+        if (choice.source == IFC_LITE) rc = add_body(r, p, &in->lite, lite);
+        if (rc == SH_OK) rc = sh_check_stop(r->b->report, r->err);
+    }
+    return rc;
+}
+
+/* One that was asked and gave no answer. */
+static int say_missing(struct reading *r, const char *name, const struct sh_err *said)
+{
+    if (said->code == 0) return SH_OK;
+    if (r->limits.ifc_strict)
+        return build_fail(r->b, SH_EINPUT, r->err,
+                          "not cross-checked; allowed only with both readers "
+                          "(scene.ifc_strict): %s: %.300s",
+                          name, said->text);
+    sh_warn(r->b->report, "%s: not cross-checked: %s gave no answer: %.300s", r->b->name, name, said->text);
+    return SH_OK;
+}
+
+static int read_by_two(struct reading *r)
+{
+    const struct ifc_fineness fineness = fineness_for(&r->records, r->b->tolerance_m);
+    r->finding = calloc(r->records.n_products + 1, sizeof *r->finding);
+    if (r->finding == NULL) return build_fail(r->b, SH_ENOMEM, r->err, "no memory for its products");
+    build_announce(r->b);
+    int rc = ifc_run_readers(r->b, fineness, &r->readings, r->err);
+    if (rc == SH_OK) rc = say_missing(r, "web-ifc", &r->readings.web_said);
+    if (rc == SH_OK) rc = say_missing(r, "ifc-lite", &r->readings.lite_said);
+    if (rc == SH_OK) rc = add_products(r);
+    if (rc == SH_OK) rc = ifc_say_findings(r->b, &r->records, r->finding, r->limits.ifc_strict, r->err);
+    if (rc == SH_OK) rc = build_single(r->b, r->largest_m, BUILD_SINGLE_ROUNDING * r->largest_m, true, r->err);
+    return rc;
+}
+
+static int read_by_assimp(struct reading *r, const char *why)
+{
+    const bool asked = r->limits.ifc_reader == IFC_READER_ASSIMP;
+    if (!asked) sh_warn(r->b->report, "%s: %s: Assimp reads it", r->b->name, why);
+    const int rc = ifc_say_assimp(r->b, &r->records, !asked, why, r->err);
+    return rc == SH_OK ? import_apart(r->b, r->err) : rc;
+}
+
+static int read_records(struct reading *r)
+{
+    char why[160] = "";
+    int rc = ifc_records_open(&r->records, r->b->spec->file, r->err);
+    if (rc != SH_OK) return rc;
+    if (r->limits.ifc_reader == IFC_READER_ASSIMP) return read_by_assimp(r, why);
+    if (ifc_readers_are_there(&r->limits, why, sizeof why))
+        rc = read_by_two(r);
+    else if (r->limits.ifc_reader == IFC_READER_AUTO)
+        return read_by_assimp(r, why);
+    else
+        return build_fail(r->b, SH_EINPUT, r->err, "%s; allowed without: scene.ifc_reader: assimp", why);
+    r->b->scene->says = (struct scene_says){.unit_m = 1.0, .up = 2};
+    return rc;
+}
+
+int read_ifc(struct scene_build *b, struct sh_err *err)
+{
+    struct reading r = {.b = b, .limits = build_limits(b), .err = err};
+    const int rc = read_records(&r);
+    ifc_readings_free(&r.readings);
+    ifc_records_close(&r.records);
+    free(r.finding);
+    return rc;
+}

@@ -1,0 +1,43 @@
+/* IFC files into a scene, each body by two independent readers. README.md has the rules. */
+#ifndef CORE_IMPORT_IFC_IFC_READ_H
+#define CORE_IMPORT_IFC_IFC_READ_H
+
+#include "core/import/ifc/ifc_bodies.h"
+#include "core/import/ifc/ifc_choose.h"
+#include "core/import/ifc/ifc_records.h"
+#include "core/scene/build.h"
+
+/* ---- ifc_apart.c */
+
+/* Sides of a full circle, by web-ifc, and the level of ifc-lite that goes with it. */
+struct ifc_fineness {
+    int segments;
+    const char *level;
+    double deviation_m; /* of the largest circle's facets; 0: there is none */
+};
+
+/* What each reader has made. */
+struct ifc_readings {
+    struct ifc_bodies web, lite;
+    bool has_web, has_lite;
+    struct sh_err web_said, lite_said; /* why there is none; code 0: it was not asked */
+};
+
+/* Whether node and both readers are there; else why not: a phrase. */
+bool ifc_readers_are_there(const struct scene_import_limits *limits, char *why, size_t size);
+
+/* Runs the readers that are asked for, both at the same time. Fails where none gives an answer. */
+int ifc_run_readers(struct scene_build *b, struct ifc_fineness fineness, struct ifc_readings *out, struct sh_err *err);
+void ifc_readings_free(struct ifc_readings *r);
+
+/* ---- ifc_say.c */
+
+/* Warnings that name products, some a line, at most MAX_NAMED of them. With strict the first line of the first doubtful
+ * finding is the error instead. finding[records->n_products]. */
+int ifc_say_findings(struct scene_build *b, const struct ifc_records *records, const enum ifc_finding *finding,
+                     bool strict, struct sh_err *err);
+/* What Assimp can't be relied on for: a warning that names them, or, with refuse, an error. why: no other reader. */
+int ifc_say_assimp(struct scene_build *b, const struct ifc_records *records, bool refuse, const char *why,
+                   struct sh_err *err);
+
+#endif

@@ -1,0 +1,159 @@
+#include "core/import/ifc/ifc_records.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/grow.h"
+
+/* Attributes of an IfcProduct: GlobalId, OwnerHistory, Name, Description, ObjectType, ObjectPlacement, Representation. */
+enum { PRODUCT_GUID = 0, PRODUCT_NAME = 2, PRODUCT_SHAPE = 6, PRODUCT_ARGS = 7 };
+
+static int compare_records(const void *a, const void *b)
+{
+    const struct step_record *x = a, *y = b;
+    return (x->id > y->id) - (x->id < y->id);
+}
+
+const struct step_record *ifc_records_find(const struct ifc_records *r, uint64_t id)
+{
+    const struct step_record key = {.id = id};
+    return r->n > 0 ? bsearch(&key, r->record, r->n, sizeof key, compare_records) : NULL;
+}
+
+static int compare_products(const void *a, const void *b)
+{
+    const struct ifc_product *x = a, *y = b;
+    return (x->id > y->id) - (x->id < y->id);
+}
+
+const struct ifc_product *ifc_records_product(const struct ifc_records *r, uint64_t id)
+{
+    const struct ifc_product key = {.id = id};
+    return r->n_products > 0 ? bsearch(&key, r->product, r->n_products, sizeof key, compare_products) : NULL;
+}
+
+static int no_memory(const struct ifc_records *r, struct sh_err *err)
+{
+    return text_fail(&r->text, 0, SH_ENOMEM, err, "no memory for its records");
+}
+
+static int read_all(struct ifc_records *r, struct sh_err *err)
+{
+    struct step_record record;
+    bool sorted = true;
+    int rc;
+    while ((rc = step_next(&r->text, &record, err)) == 1) {
+        if (!grow(&r->record, &r->room, r->n + 1, sizeof *r->record)) return no_memory(r, err);
+        sorted = sorted && (r->n == 0 || r->record[r->n - 1].id < record.id);
+        r->record[r->n++] = record;
+    }
+    if (rc < 0) return rc;
+    if (!sorted) qsort(r->record, r->n, sizeof *r->record, compare_records);
+    for (size_t i = 1; i < r->n; i++)
+        if (r->record[i].id == r->record[i - 1].id)
+            return text_fail(&r->text, r->record[i].line, SH_EINPUT, err, "a second record #%llu; allowed one",
+                             (unsigned long long)r->record[i].id);
+    return SH_OK;
+}
+
+static int check_end(const struct ifc_records *r, struct sh_err *err)
+{
+    static const char last[] = "END-ISO-10303-21;";
+    const size_t tail = r->text.size < 1024 ? r->text.size : 1024;
+    if (memmem(r->text.data + r->text.size - tail, tail, last, sizeof last - 1) != NULL) return SH_OK;
+    return text_fail(&r->text, 0, SH_EINPUT, err, "cut off: it doesn't end with %s", last);
+}
+
+uint64_t ifc_next_reference(const char **p, const char *end)
+{
+    for (int quoted = 0; *p < end; (*p)++) {
+        if (**p == '\'') quoted = !quoted;
+        if (quoted || **p != '#') continue;
+        uint64_t id = 0;
+        while (*p + 1 < end && (*p)[1] >= '0' && (*p)[1] <= '9' && id < UINT64_MAX / 20)
+            id = 10 * id + (uint64_t)(*++*p - '0');
+        ++*p;
+        return id;
+    }
+    return 0;
+}
+
+static int check_references(const struct ifc_records *r, struct sh_err *err)
+{
+    for (size_t i = 0; i < r->n; i++) {
+        const struct step_record *from = &r->record[i];
+        const char *p = from->args.p, *end = p + from->args.n;
+        for (uint64_t id; (id = ifc_next_reference(&p, end)) != 0;)
+            if (ifc_records_find(r, id) == NULL)
+                return text_fail(&r->text, from->line, SH_EINPUT, err,
+                                 "%.*s #%llu refers to #%llu, but there is no such record", (int)from->type.n,
+                                 from->type.p, (unsigned long long)from->id, (unsigned long long)id);
+    }
+    return SH_OK;
+}
+
+/* No type ends in these but what is air, or is drawn. */
+static bool is_air(struct text_span type)
+{
+    static const char *const air[] = {"IFCOPENINGELEMENT", "IFCOPENINGSTANDARDCASE", "IFCVOIDINGFEATURE",
+                                      "IFCSPACE",          "IFCSPATIALZONE",         "IFCEXTERNALSPATIALELEMENT",
+                                      "IFCGRID",           "IFCANNOTATION",          "IFCVIRTUALELEMENT",
+                                      "IFCPORT",           "IFCDISTRIBUTIONPORT"};
+    for (size_t i = 0; i < sizeof air / sizeof air[0]; i++)
+        if (text_is(type, air[i])) return true;
+    return false;
+}
+
+/* Whatever its type is called: its first attribute is a GlobalId, and its seventh a shape. */
+static int add_product(struct ifc_records *r, const struct step_record *record, struct sh_err *err)
+{
+    struct text_span arg[PRODUCT_ARGS];
+    uint64_t shape;
+    if (record->args.n < 2 || record->args.p[0] != '\'' || step_split(record->args, arg, PRODUCT_ARGS) < PRODUCT_ARGS ||
+        !step_reference(arg[PRODUCT_SHAPE], &shape))
+        return SH_OK;
+    const struct step_record *to = ifc_records_find(r, shape);
+    if (to != NULL && !text_is(to->type, "IFCPRODUCTDEFINITIONSHAPE") && !text_is(to->type, "IFCPRODUCTREPRESENTATION"))
+        return SH_OK;
+    if (!grow(&r->product, &r->room_products, r->n_products + 1, sizeof *r->product)) return no_memory(r, err);
+    struct ifc_product *p = &r->product[r->n_products++];
+    *p = (struct ifc_product){.id = record->id,
+                              .type = record->type,
+                              .guid = ifc_text(arg[PRODUCT_GUID]),
+                              .name = ifc_text(arg[PRODUCT_NAME]),
+                              .shape = shape,
+                              .is_air = is_air(record->type)};
+    return p->guid != NULL && p->name != NULL ? SH_OK : no_memory(r, err);
+}
+
+int ifc_records_open(struct ifc_records *r, const char *path, struct sh_err *err)
+{
+    *r = (struct ifc_records){.unit_m = 1.0};
+    int rc = step_open(&r->text, path, err);
+    if (rc == SH_OK) rc = check_end(r, err);
+    if (rc == SH_OK) rc = read_all(r, err);
+    if (rc == SH_OK) rc = check_references(r, err);
+    if (rc != SH_OK) return rc;
+    r->unit_m = ifc_unit_m(r);
+    for (size_t i = 0; i < r->n && rc == SH_OK; i++)
+        rc = add_product(r, &r->record[i], err);
+    if (rc == SH_OK) rc = ifc_styles_collect(r, err);
+    return rc == SH_OK ? ifc_walk(r, err) : rc;
+}
+
+void ifc_records_close(struct ifc_records *r)
+{
+    for (size_t i = 0; i < r->n_products; i++) {
+        struct ifc_product *p = &r->product[i];
+        free(p->style);
+        free(p->guid);
+        free(p->name);
+    }
+    free(r->product);
+    free(r->record);
+    free(r->mark);
+    for (size_t i = 0; i < r->n_styles; i++)
+        free(r->style[i].name);
+    free(r->style);
+    text_close(&r->text);
+}

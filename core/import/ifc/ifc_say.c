@@ -1,0 +1,92 @@
+/* Findings as lines that name their products. */
+#include <stdio.h>
+#include <string.h>
+
+#include "core/import/ifc/ifc_read.h"
+
+enum { MAX_NAMED = 100, LINE_ROOM = 420 };
+
+/* Names, line by line. */
+struct lines {
+    struct scene_build *b;
+    const char *text;
+    size_t n;        /* products of the group */
+    size_t n_listed; /* on this line and before */
+    char line[512];
+    size_t len;
+};
+
+static void end_line(struct lines *l)
+{
+    if (l->len > 0) sh_warn(l->b->report, "%s", l->line);
+    l->len = 0;
+}
+
+static void add_name(struct lines *l, const struct ifc_product *p)
+{
+    char name[160];
+    const int len = snprintf(name, sizeof name, "%.*s '%.60s' %.22s", (int)(p->type.n < 48 ? p->type.n : 48), p->type.p,
+                             p->name, p->guid);
+    if (l->n_listed++ >= MAX_NAMED) return;
+    if (l->len + (size_t)len + 4 > LINE_ROOM) end_line(l);
+    if (l->len == 0)
+        l->len =
+            (size_t)snprintf(l->line, sizeof l->line, "%.100s: %zu products: %s: %s", l->b->name, l->n, l->text, name);
+    else
+        l->len += (size_t)snprintf(l->line + l->len, sizeof l->line - l->len, ", %s", name);
+}
+
+static void end_group(struct lines *l)
+{
+    if (l->n_listed > MAX_NAMED && l->len < LINE_ROOM)
+        l->len +=
+            (size_t)snprintf(l->line + l->len, sizeof l->line - l->len, ", and %zu more", l->n_listed - MAX_NAMED);
+    end_line(l);
+}
+
+int ifc_say_findings(struct scene_build *b, const struct ifc_records *records, const enum ifc_finding *finding,
+                     bool strict, struct sh_err *err)
+{
+    for (int f = IFC_AGREED + 1; f < IFC_FINDINGS; f++) {
+        struct lines l = {.b = b, .text = ifc_finding_text((enum ifc_finding)f)};
+        const struct ifc_product *first = NULL;
+        for (size_t i = records->n_products; i-- > 0;) {
+            if ((int)finding[i] != f) continue;
+            first = &records->product[i];
+            l.n++;
+        }
+        if (l.n == 0) continue;
+        if (strict && ifc_is_doubtful((enum ifc_finding)f))
+            return build_fail(b, SH_EINPUT, err,
+                              "%zu products: %s: %.*s '%.40s' %.22s%s; allowed none (scene.ifc_strict)", l.n, l.text,
+                              (int)(first->type.n < 48 ? first->type.n : 48), first->type.p, first->name, first->guid,
+                              l.n > 1 ? " and others" : "");
+        for (size_t i = 0; i < records->n_products; i++)
+            if ((int)finding[i] == f) add_name(&l, &records->product[i]);
+        end_group(&l);
+    }
+    return SH_OK;
+}
+
+int ifc_say_assimp(struct scene_build *b, const struct ifc_records *records, bool refuse, const char *why,
+                   struct sh_err *err)
+{
+    struct lines l = {.b = b, .text = "Assimp is known to get what they consist of wrong, without a word"};
+    const struct ifc_product *first = NULL;
+    for (size_t i = records->n_products; i-- > 0;) {
+        const struct ifc_product *p = &records->product[i];
+        if (p->is_air || p->assimp_wrong.n == 0) continue;
+        first = p;
+        l.n++;
+    }
+    if (first != NULL && refuse)
+        return build_fail(b, SH_EINPUT, err,
+                          "%s, and Assimp is known to get %.*s wrong, of which %zu products consist, the first "
+                          "'%.40s' %.22s; scene.ifc_reader: assimp reads it all the same",
+                          why, (int)(first->assimp_wrong.n < 48 ? first->assimp_wrong.n : 48), first->assimp_wrong.p,
+                          l.n, first->name, first->guid);
+    for (size_t i = 0; i < records->n_products; i++)
+        if (!records->product[i].is_air && records->product[i].assimp_wrong.n > 0) add_name(&l, &records->product[i]);
+    end_group(&l);
+    return SH_OK;
+}

@@ -1,0 +1,118 @@
+/* Styles of surfaces: IfcStyledItem, and what it leads to. Readers of bodies give colours; the names are only here. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/grow.h"
+#include "core/import/ifc/ifc_records.h"
+
+enum { MAX_DEPTH = 4 };
+#define SAME_COLOUR 0.004f /* a reader may have rounded to 8 bits */
+
+/* IfcSurfaceStyleShading and -Rendering: the first attribute is an IfcColourRgb(name, red, green, blue). */
+static bool read_colour(const struct ifc_records *r, const struct step_record *shading, float colour[3])
+{
+    struct text_span arg[4];
+    uint64_t id;
+    double part;
+    if (step_split(shading->args, arg, 1) < 1 || !step_reference(arg[0], &id)) return false;
+    const struct step_record *rgb = ifc_records_find(r, id);
+    if (rgb == NULL || !text_is(rgb->type, "IFCCOLOURRGB") || step_split(rgb->args, arg, 4) != 4) return false;
+    for (int k = 0; k < 3; k++) {
+        if (!step_real(&r->text, arg[1 + k], &part)) return false;
+        colour[k] = (float)fmin(fmax(part, 0.0), 1.0);
+    }
+    return true;
+}
+
+/* IfcSurfaceStyle(name, side, styles). */
+static bool add_style(struct ifc_records *r, uint64_t item, const struct step_record *surface_style)
+{
+    struct ifc_style style = {.item = item};
+    struct text_span arg[1];
+    bool has_colour = false;
+    const char *p = surface_style->args.p, *end = p + surface_style->args.n;
+    for (uint64_t id; !has_colour && (id = ifc_next_reference(&p, end)) != 0;) {
+        const struct step_record *to = ifc_records_find(r, id);
+        if (to == NULL) continue;
+        if (text_is(to->type, "IFCSURFACESTYLERENDERING") || text_is(to->type, "IFCSURFACESTYLESHADING"))
+            has_colour = read_colour(r, to, style.colour);
+    }
+    if (!has_colour || step_split(surface_style->args, arg, 1) < 1) return true;
+    if (!grow(&r->style, &r->room_styles, r->n_styles + 1, sizeof style)) return false;
+    style.name = ifc_text(arg[0]);
+    if (style.name == NULL) return false;
+    r->style[r->n_styles++] = style;
+    return true;
+}
+
+/* Down to the surface styles; from IFC4 on they may stand in the styled item itself. */
+static bool collect_from(struct ifc_records *r, uint64_t item, const struct step_record *from, int depth)
+{
+    bool done = true;
+    const char *p = from->args.p, *end = p + from->args.n;
+    for (uint64_t id; done && (id = ifc_next_reference(&p, end)) != 0;) {
+        const struct step_record *to = id != item ? ifc_records_find(r, id) : NULL;
+        if (to == NULL) continue;
+        if (text_is(to->type, "IFCSURFACESTYLE"))
+            done = add_style(r, item, to);
+        else if (text_is(to->type, "IFCPRESENTATIONSTYLEASSIGNMENT") && depth < MAX_DEPTH)
+            done = collect_from(r, item, to, depth + 1);
+    }
+    return done;
+}
+
+static int compare_styles(const void *a, const void *b)
+{
+    const struct ifc_style *x = a, *y = b;
+    return (x->item > y->item) - (x->item < y->item);
+}
+
+int ifc_styles_collect(struct ifc_records *r, struct sh_err *err)
+{
+    bool done = true;
+    for (size_t i = 0; i < r->n && done; i++) {
+        struct text_span arg[1];
+        uint64_t item = 0;
+        if (!text_is(r->record[i].type, "IFCSTYLEDITEM") || step_split(r->record[i].args, arg, 1) < 1) continue;
+        if (!step_reference(arg[0], &item)) item = 0;
+        done = collect_from(r, item, &r->record[i], 0);
+    }
+    if (!done) return text_fail(&r->text, 0, SH_ENOMEM, err, "no memory for its styles");
+    if (r->n_styles > 0) qsort(r->style, r->n_styles, sizeof *r->style, compare_styles);
+    return SH_OK;
+}
+
+size_t ifc_styles_of(const struct ifc_records *r, uint64_t item, size_t *first)
+{
+    size_t low = 0, high = r->n_styles;
+    while (low < high) {
+        const size_t middle = (low + high) / 2;
+        if (r->style[middle].item < item)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    *first = low;
+    while (high < r->n_styles && r->style[high].item == item)
+        high++;
+    return high - low;
+}
+
+static bool is_same(const struct ifc_style *style, const float colour[4])
+{
+    for (int k = 0; k < 3; k++)
+        if (fabsf(style->colour[k] - colour[k]) > SAME_COLOUR) return false;
+    return true;
+}
+
+const struct ifc_style *ifc_style_by_colour(const struct ifc_records *r, const struct ifc_product *p,
+                                            const float colour[4])
+{
+    for (size_t i = 0; i < p->n_styles; i++)
+        if (is_same(&r->style[p->style[i]], colour)) return &r->style[p->style[i]];
+    /* A material's style has no item; the product's own come first. */
+    for (size_t i = 0; i < r->n_styles && r->style[i].item == 0; i++)
+        if (is_same(&r->style[i], colour)) return &r->style[i];
+    return NULL;
+}

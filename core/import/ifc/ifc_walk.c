@@ -1,0 +1,227 @@
+/* What the geometry of each product consists of: its shape, walked through from record to record, with that of its
+ * openings. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/grow.h"
+#include "core/import/ifc/ifc_records.h"
+
+#define FAR_M 1000.0
+
+enum kind {
+    PLAIN = 0,
+    STOP = 1,        /* nothing of the geometry follows */
+    BODY = 2,        /* a solid or a surface */
+    CURVED = 4,      /* it has circles or other curves, which readers cut up */
+    ASSIMP_ERRS = 8, /* Assimp is known to get it wrong, silently */
+    POINTS = 16,     /* points, which may be far */
+    RADIUS = 32,     /* a circle or the like: its last attribute is a radius */
+};
+
+struct type_kind {
+    const char *type;
+    int kind;
+};
+
+/* By name, for bsearch. Radii: the last attribute of circles, discs and cylinders is one. */
+static const struct type_kind kinds[] = {
+    {"IFCADVANCEDBREP", BODY | CURVED | ASSIMP_ERRS},
+    {"IFCADVANCEDBREPWITHVOIDS", BODY | CURVED | ASSIMP_ERRS},
+    {"IFCARBITRARYPROFILEDEFWITHVOIDS", ASSIMP_ERRS},
+    {"IFCASYMMETRICISHAPEPROFILEDEF", ASSIMP_ERRS},
+    {"IFCBLOCK", BODY | ASSIMP_ERRS},
+    {"IFCBOOLEANCLIPPINGRESULT", BODY | ASSIMP_ERRS},
+    {"IFCBOOLEANRESULT", BODY | ASSIMP_ERRS},
+    {"IFCBSPLINECURVEWITHKNOTS", CURVED},
+    {"IFCBSPLINESURFACEWITHKNOTS", CURVED | ASSIMP_ERRS},
+    {"IFCCARTESIANPOINT", POINTS},
+    {"IFCCARTESIANPOINTLIST2D", POINTS},
+    {"IFCCARTESIANPOINTLIST3D", POINTS},
+    {"IFCCIRCLE", CURVED | RADIUS},
+    {"IFCCIRCLEHOLLOWPROFILEDEF", CURVED | ASSIMP_ERRS},
+    {"IFCCIRCLEPROFILEDEF", CURVED | RADIUS},
+    {"IFCCSGSOLID", BODY | ASSIMP_ERRS},
+    {"IFCCSHAPEPROFILEDEF", ASSIMP_ERRS},
+    {"IFCCYLINDRICALSURFACE", CURVED | RADIUS},
+    {"IFCELLIPSE", CURVED},
+    {"IFCELLIPSEPROFILEDEF", CURVED | ASSIMP_ERRS},
+    {"IFCEXTRUDEDAREASOLID", BODY},
+    {"IFCEXTRUDEDAREASOLIDTAPERED", BODY | ASSIMP_ERRS},
+    {"IFCFACEBASEDSURFACEMODEL", BODY},
+    {"IFCFACETEDBREP", BODY},
+    {"IFCFACETEDBREPWITHVOIDS", BODY | ASSIMP_ERRS},
+    {"IFCFIXEDREFERENCESWEPTAREASOLID", BODY | CURVED | ASSIMP_ERRS},
+    {"IFCGEOMETRICREPRESENTATIONCONTEXT", STOP},
+    {"IFCGEOMETRICREPRESENTATIONSUBCONTEXT", STOP},
+    {"IFCINDEXEDPOLYCURVE", CURVED | ASSIMP_ERRS},
+    {"IFCLSHAPEPROFILEDEF", ASSIMP_ERRS},
+    {"IFCOWNERHISTORY", STOP},
+    {"IFCPOLYGONALFACESET", BODY | ASSIMP_ERRS},
+    {"IFCRATIONALBSPLINECURVEWITHKNOTS", CURVED},
+    {"IFCRATIONALBSPLINESURFACEWITHKNOTS", CURVED | ASSIMP_ERRS},
+    {"IFCRECTANGLEHOLLOWPROFILEDEF", ASSIMP_ERRS},
+    {"IFCRECTANGULARPYRAMID", BODY | ASSIMP_ERRS},
+    {"IFCREVOLVEDAREASOLID", BODY | CURVED},
+    {"IFCREVOLVEDAREASOLIDTAPERED", BODY | CURVED | ASSIMP_ERRS},
+    {"IFCRIGHTCIRCULARCONE", BODY | CURVED | RADIUS | ASSIMP_ERRS},
+    {"IFCRIGHTCIRCULARCYLINDER", BODY | CURVED | RADIUS | ASSIMP_ERRS},
+    {"IFCROUNDEDRECTANGLEPROFILEDEF", CURVED | ASSIMP_ERRS},
+    {"IFCSECTIONEDSOLIDHORIZONTAL", BODY | ASSIMP_ERRS},
+    {"IFCSHELLBASEDSURFACEMODEL", BODY},
+    {"IFCSPHERE", BODY | CURVED | RADIUS | ASSIMP_ERRS},
+    {"IFCSTYLEDITEM", STOP},
+    {"IFCSURFACECURVESWEPTAREASOLID", BODY | CURVED | ASSIMP_ERRS},
+    {"IFCSURFACEOFREVOLUTION", CURVED | ASSIMP_ERRS},
+    {"IFCSWEPTDISKSOLID", BODY | CURVED | RADIUS | ASSIMP_ERRS},
+    {"IFCSWEPTDISKSOLIDPOLYGONAL", BODY | CURVED | ASSIMP_ERRS},
+    {"IFCTOROIDALSURFACE", CURVED | ASSIMP_ERRS},
+    {"IFCTRAPEZIUMPROFILEDEF", ASSIMP_ERRS},
+    {"IFCTRIANGULATEDFACESET", BODY | ASSIMP_ERRS},
+    {"IFCTRIANGULATEDIRREGULARNETWORK", BODY | ASSIMP_ERRS},
+    {"IFCTSHAPEPROFILEDEF", ASSIMP_ERRS},
+    {"IFCUSHAPEPROFILEDEF", ASSIMP_ERRS},
+    {"IFCZSHAPEPROFILEDEF", ASSIMP_ERRS},
+};
+
+struct walk {
+    struct ifc_records *r;
+    struct ifc_product *product;
+    uint32_t *stack; /* places in record */
+    size_t n, room;
+    uint64_t *voids; /* pairs: product, opening; by product */
+    size_t n_voids, room_voids;
+};
+
+static int compare_types(const void *key, const void *entry)
+{
+    const struct text_span *type = key;
+    const struct type_kind *k = entry;
+    const int order = strncmp(type->p, k->type, type->n);
+    return order != 0 ? order : -(k->type[type->n] != '\0');
+}
+
+static int kind_of(struct text_span type)
+{
+    const struct type_kind *found =
+        bsearch(&type, kinds, sizeof kinds / sizeof kinds[0], sizeof kinds[0], compare_types);
+    return found != NULL ? found->kind : PLAIN;
+}
+
+static bool push(struct walk *w, uint64_t id)
+{
+    const struct step_record *to = ifc_records_find(w->r, id);
+    const size_t at = to != NULL ? (size_t)(to - w->r->record) : 0;
+    if (to == NULL || w->r->mark[at] == w->r->stamp) return true;
+    if (!grow(&w->stack, &w->room, w->n + 1, sizeof *w->stack)) return false;
+    w->r->mark[at] = w->r->stamp;
+    w->stack[w->n++] = (uint32_t)at;
+    return true;
+}
+
+/* The largest number in a list of lists, without its sign. */
+static double largest_number(const struct text *t, struct text_span args)
+{
+    double largest = 0.0;
+    for (const char *p = args.p, *end = p + args.n; p < end;) {
+        const size_t skip = strspn(p, "(), \t\r\n$*"), n = strcspn(p + skip, "(), \t\r\n");
+        double value;
+        if (n == 0) break;
+        if (step_real(t, (struct text_span){p + skip, n}, &value)) largest = fmax(largest, fabs(value));
+        p += skip + n;
+    }
+    return largest;
+}
+
+static void keep_radius(struct ifc_records *r, const struct step_record *record)
+{
+    struct text_span arg[STEP_MAX_ARGS];
+    const size_t n = step_split(record->args, arg, STEP_MAX_ARGS);
+    double radius;
+    for (size_t i = 0; i < n && i < STEP_MAX_ARGS; i++)
+        if (step_real(&r->text, arg[i], &radius)) r->radius_m = fmax(r->radius_m, radius * r->unit_m);
+}
+
+static void look_at(struct walk *w, const struct step_record *record, int kind)
+{
+    struct ifc_product *p = w->product;
+    p->has_body |= (kind & BODY) != 0;
+    p->is_curved |= (kind & CURVED) != 0;
+    if ((kind & ASSIMP_ERRS) && p->assimp_wrong.n == 0) p->assimp_wrong = record->type;
+    if (kind & RADIUS) keep_radius(w->r, record);
+    if ((kind & POINTS) && !p->is_far) p->is_far = largest_number(&w->r->text, record->args) * w->r->unit_m > FAR_M;
+}
+
+static bool keep_styles(struct walk *w, uint64_t item)
+{
+    struct ifc_product *p = w->product;
+    size_t first;
+    const size_t n = ifc_styles_of(w->r, item, &first);
+    if (!grow(&p->style, &p->room_styles, p->n_styles + n, sizeof *p->style)) return false;
+    for (size_t i = 0; i < n; i++)
+        p->style[p->n_styles++] = (uint32_t)(first + i);
+    return true;
+}
+
+static bool walk_from(struct walk *w, uint64_t id)
+{
+    bool done = push(w, id);
+    while (done && w->n > 0) {
+        const struct step_record *record = &w->r->record[w->stack[--w->n]];
+        const int kind = kind_of(record->type);
+        if (kind & STOP) continue;
+        look_at(w, record, kind);
+        done = keep_styles(w, record->id);
+        const char *p = record->args.p, *end = p + record->args.n;
+        for (uint64_t to; done && (to = ifc_next_reference(&p, end)) != 0;)
+            done = push(w, to);
+    }
+    return done;
+}
+
+static int compare_pairs(const void *a, const void *b)
+{
+    const uint64_t *x = a, *y = b;
+    return x[0] != y[0] ? (x[0] > y[0]) - (x[0] < y[0]) : (x[1] > y[1]) - (x[1] < y[1]);
+}
+
+/* IfcRelVoidsElement(..., RelatingBuildingElement, RelatedOpeningElement). */
+static bool collect_voids(struct walk *w)
+{
+    for (size_t i = 0; i < w->r->n; i++) {
+        struct text_span arg[6];
+        uint64_t pair[2];
+        if (!text_is(w->r->record[i].type, "IFCRELVOIDSELEMENT")) continue;
+        if (step_split(w->r->record[i].args, arg, 6) != 6) continue;
+        if (!step_reference(arg[4], &pair[0]) || !step_reference(arg[5], &pair[1])) continue;
+        if (!grow(&w->voids, &w->room_voids, w->n_voids + 1, sizeof pair)) return false;
+        memcpy(&w->voids[2 * w->n_voids++], pair, sizeof pair);
+    }
+    if (w->n_voids > 0) qsort(w->voids, w->n_voids, 2 * sizeof *w->voids, compare_pairs);
+    return true;
+}
+
+static bool walk_product(struct walk *w, struct ifc_product *product)
+{
+    w->product = product;
+    w->r->stamp++;
+    bool done = walk_from(w, product->shape);
+    for (size_t i = 0; i < w->n_voids && done; i++) {
+        if (w->voids[2 * i] != product->id) continue;
+        const struct ifc_product *opening = ifc_records_product(w->r, w->voids[2 * i + 1]);
+        if (opening != NULL) done = walk_from(w, opening->shape);
+    }
+    return done;
+}
+
+int ifc_walk(struct ifc_records *r, struct sh_err *err)
+{
+    struct walk w = {.r = r};
+    r->mark = calloc(r->n + 1, sizeof *r->mark);
+    bool done = r->mark != NULL && collect_voids(&w);
+    for (size_t i = 0; i < r->n_products && done; i++)
+        if (!r->product[i].is_air) done = walk_product(&w, &r->product[i]);
+    free(w.stack);
+    free(w.voids);
+    return done ? SH_OK : text_fail(&r->text, 0, SH_ENOMEM, err, "no memory for its records");
+}
