@@ -66,6 +66,7 @@ FAULTS_DIR = $(PREFIX)/share/scanhead/faults
 CAMPAIGN_DIR = $(PREFIX)/share/scanhead/campaign
 # Where libraries are, below PREFIX; a distribution may have another folder for each machine.
 LIB = lib
+IFC_DIR = $(PREFIX)/share/scanhead/ifc
 UDEV_DIR = $(PREFIX)/lib/udev/rules.d
 UNIT_DIR = $(PREFIX)/lib/systemd/system
 PC_DIR = $(PREFIX)/$(LIB)/pkgconfig
@@ -390,6 +391,10 @@ test-programs: all $(BUILD)/bench $(filter-out $(if $(filter no,$(ALL_UNIT)),$(f
 # What takes long and proves much is described where it stands.
 include $(wildcard tests/*/*.mk config/*/*.mk)
 
+# The readers of IFC, without what only browsers need. Builds below build/ use those of build/.
+IFC_BUILT = $(patsubst %/installed,%,$(firstword $(wildcard $(IFC_READERS)/installed $(BUILD)/../ifc/installed)))
+IFC_FILES = $(addprefix node_modules/web-ifc/,package.json LICENSE.md web-ifc-api-node.js web-ifc-node.wasm) \
+	$(addprefix node_modules/@ifc-lite/wasm/,package.json LICENSE pkg/ifc-lite.js pkg/ifc-lite_bg.wasm)
 # BUILT=yes installs what is there, however it was built: with `make CFLAGS=...`, or for another user than root.
 BUILT ?= no
 install: $(if $(filter yes,$(BUILT)),,all)
@@ -408,6 +413,10 @@ install: $(if $(filter yes,$(BUILT)),,all)
 	install -m 644 config/scenes/glass_room.obj "$(DESTDIR)$(SCENES_DIR)/"
 	install -m 644 config/faults/*.yaml "$(DESTDIR)$(FAULTS_DIR)/"
 	install config/campaign/*.sh "$(DESTDIR)$(CAMPAIGN_DIR)/"
+	install -d "$(DESTDIR)$(IFC_DIR)"
+	install -m 644 core/import/ifc/*.mjs core/import/ifc/package.json core/import/ifc/package-lock.json core/import/ifc/.npmrc "$(DESTDIR)$(IFC_DIR)/"
+	if [ -n '$(IFC_BUILT)' ]; then (cd "$(IFC_BUILT)" && tar -cf - $(IFC_FILES)) | (cd "$(DESTDIR)$(IFC_DIR)" && tar --no-same-owner -xf -); \
+	else echo "without the readers of IFC, which npm did not install: Assimp reads it"; fi
 	install -m 644 drivers/host/70-scanhead.rules "$(DESTDIR)$(UDEV_DIR)/"
 	sed "s|@PREFIX@|$(PREFIX)|" config/packaging/scanhead@.service.in > "$(DESTDIR)$(UNIT_DIR)/scanhead@.service"
 	pages=$$($(PRINTER) help --man list) && for p in $$pages; do \

@@ -94,6 +94,14 @@ has_pages() {
         grep -qxF "ExecStart=\"$prefix/bin/scanhead\" run /etc/scanhead/%i.yaml" "$work/root$prefix/lib/systemd/system/scanhead@.service"
 }
 check "manual pages, a completion and a unit for the service" has_pages
+# With the modules where npm has installed them.
+has_ifc_readers() {
+    ifc=$work/root$prefix/share/scanhead/ifc
+    for file in core/import/ifc/*.mjs; do cmp "$file" "$ifc/${file##*/}" || return; done
+    ls "$(dirname "$program")/ifc/installed" "$(dirname "$program")/../ifc/installed" >"$work/ls" 2>/dev/null
+    [ ! -s "$work/ls" ] || test -s "$ifc/node_modules/web-ifc/web-ifc-node.wasm" -a -s "$ifc/node_modules/@ifc-lite/wasm/pkg/ifc-lite_bg.wasm"
+}
+check "the readers of IFC come with it" has_ifc_readers
 check "scripts for campaigns come with it" test -x "$work/root$prefix/share/scanhead/campaign/slurm.sh" -a \
     -x "$work/root$prefix/share/scanhead/campaign/parallel.sh"
 check "the README's client, with the archive" compile client-static "$work/root$prefix/lib/libscanhead.a" -lnettle -lusb-1.0 -lm

@@ -15,6 +15,8 @@ deb:
 	@rm -rf --one-file-system $(DEB_DIR)
 	@mkdir -p $(DEB_TREE)
 	@tar --exclude=__pycache__ --exclude=.git -cf - $(DEB_SOURCES) | tar -xf - -C $(DEB_TREE)
+	@$(MAKE) --no-print-directory ifc-readers
+	@[ ! -e $(IFC_READERS)/installed ] || { mkdir -p $(DEB_TREE)/build && cp -r $(IFC_READERS) $(DEB_TREE)/build/ifc; }
 	@cp -r config/packaging/debian $(DEB_TREE)/
 	@cp config/packaging/copyright $(DEB_TREE)/debian/
 	@rm $(DEB_TREE)/debian/README.md

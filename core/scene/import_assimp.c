@@ -1,4 +1,4 @@
-/* STL, glTF, FBX, Collada and IFC through Assimp's C interface, node tree and all.
+/* STL, glTF, FBX, Collada, and IFC where its readers are not installed, through Assimp's C interface, node tree and all.
  *
  * No post-processing: polygons are cut by our own triangulation, and node transforms are applied in double,
  * one level after the other, so that what single precision has rounded on the way is known. */
@@ -13,8 +13,6 @@
 #include <assimp/config.h>
 #include <assimp/scene.h>
 
-#include "core/infile.h"
-#include "core/scene/ifc_check.h"
 #include "core/scene/import.h"
 #include "core/scene/import_material.h"
 #include "core/scene/import_open.h"
@@ -217,24 +215,6 @@ static uint64_t count_faces(const struct aiScene *in, const struct aiNode *node)
     return n;
 }
 
-/* An IFC file that was cut off reads without an error, with less in it; one in which records are missing
- * crashes Assimp. */
-static int check_ifc(struct scene_build *b, struct sh_err *err)
-{
-    static const char last[] = "END-ISO-10303-21;";
-    char tail[1024] = "";
-    size_t len = strlen(b->spec->file);
-    if (strcasecmp(b->spec->file + len - 4, ".ifc") != 0) return SH_OK;
-    const char *why;
-    FILE *f = infile_open(b->spec->file, &why);
-    if (f == NULL) return build_fail(b, SH_EINPUT, err, "%s", why);
-    if (fseek(f, -(long)(sizeof tail), SEEK_END) != 0) rewind(f);
-    size_t got = fread(tail, 1, sizeof tail, f);
-    fclose(f);
-    if (memmem(tail, got, last, sizeof last - 1) != NULL) return ifc_check_references(b->spec->file, err);
-    return build_fail(b, SH_EINPUT, err, "cut off: it doesn't end with %s", last);
-}
-
 static const struct aiScene *import_file(struct scene_build *b, struct import_log *log, struct sh_err *err)
 {
     struct import_open open;
@@ -277,8 +257,6 @@ int import_assimp(struct scene_build *b, struct sh_err *err)
     struct import im = {.b = b};
     struct import_log log = {0};
     struct stat st;
-    int rc = check_ifc(b, err);
-    if (rc != SH_OK) return rc;
     /* Assimp's C interface has no progress: say once that a large file will take a while. */
     if (stat(b->spec->file, &st) == 0 && st.st_size > 8 << 20) build_announce(b);
     im.in = import_file(b, &log, err);
@@ -286,7 +264,7 @@ int import_assimp(struct scene_build *b, struct sh_err *err)
     b->scene->says = import_says(im.in, b->spec->file);
     im.n_faces = count_faces(im.in, im.in->mRootNode);
     const struct aiNode root = root_of(im.in, b->spec->file);
-    rc = add_node(&im, &root, 0, err);
+    int rc = add_node(&im, &root, 0, err);
     if (rc == SH_OK) rc = build_single(b, im.largest, im.error, true, err);
     if (rc == SH_OK && log.n > 0)
         sh_warn(b->report, "%s: %u warnings while read, the first: %s", b->name, log.n, log.first);

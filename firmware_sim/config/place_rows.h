@@ -9,12 +9,20 @@
      .help = "Rays pass where a texture's alpha or opacity map is below a half, as between leaves. Textures are then "
              "read when the scene is loaded; without such a texture it costs nothing more."},
     {"scene.import_memory_mib", IN_CONFIG(scene.import.memory_mib), CFG_COUNT, "MiB", "8192", 16, 1 << 24,
-     .help = "Memory that Assimp may take for one mesh (all formats but .obj and .ply); more is an error. Assimp reads "
-             "in a process of its own, since broken files make it crash, hang or take all memory."},
+     .help = "Memory that Assimp, or each reader of .ifc, may take for one mesh (all formats but .obj and .ply); more is an "
+             "error. They read in processes of their own, since broken files make them crash, hang or take all memory."},
     {"scene.import_s", IN_CONFIG(scene.import.time_s), CFG_REAL, "s", "300", 0.1, 1e6,
-     .help = "Time that Assimp may take for one mesh; more is an error."},
+     .help = "Time that Assimp, or each reader of .ifc, may take for one mesh; more is an error."},
     {"scene.import_files", IN_CONFIG(scene.import.files), CFG_COUNT, NULL, "64", 4, 1000,
      .help = "Files that Assimp may have open at a time: a mesh and those that it names."},
+    {"scene.ifc_reader", IN_CONFIG(scene.import.ifc_reader), CFG_ENUM, .def = "auto",
+     WORDS([IFC_READER_AUTO] = "auto", [IFC_READER_WEB] = "web-ifc", [IFC_READER_LITE] = "ifc-lite", [IFC_READER_ASSIMP] = "assimp"),
+     .help = "Who reads bodies of .ifc. auto: web-ifc and ifc-lite, compared product by product; where they are not "
+             "installed Assimp, which is an error where a product consists of what Assimp is known to get wrong. web-ifc, "
+             "ifc-lite: that one alone, not cross-checked. assimp: Assimp, and such products are named."},
+    {"scene.ifc_strict", IN_CONFIG(scene.import.ifc_strict), CFG_BOOL, .def = "off",
+     .help = "A product that the readers of .ifc make differently, or that only one of them makes, is an error. When off it "
+             "is named in a warning."},
     {"scene.meshes", .type = CFG_LIST, .min = 1, .max = CONFIG_MAX_MESHES, LIST_OF(scene.mesh, scene.n_meshes),
      .help = "Mesh files; together they are the scene."},
     {"scene.meshes[]", .type = CFG_MAP, .help = "A mesh file."},

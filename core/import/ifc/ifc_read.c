@@ -129,6 +129,22 @@ static int say_missing(struct reading *r, const char *name, const struct sh_err 
     return SH_OK;
 }
 
+/* A file's largest circle may be too large for the sides that a reader makes of it. */
+static int say_facets(struct reading *r, const struct ifc_fineness *fineness)
+{
+    if (fineness->deviation_m <= r->b->tolerance_m) return SH_OK;
+    if (r->limits.ifc_strict)
+        return build_fail(r->b, SH_EINPUT, r->err,
+                          "facets of its curves, of radii up to %.3g m, lie up to %.2g m beside them; allowed %.2g m "
+                          "(scene.tolerance_m)",
+                          r->records.radius_m, fineness->deviation_m, r->b->tolerance_m);
+    sh_warn(r->b->report,
+            "%s: facets of its curves, of radii up to %.3g m, lie up to %.2g m beside them, more than %.2g m "
+            "(scene.tolerance_m)",
+            r->b->name, r->records.radius_m, fineness->deviation_m, r->b->tolerance_m);
+    return SH_OK;
+}
+
 static int read_by_two(struct reading *r)
 {
     const struct ifc_fineness fineness = fineness_for(&r->records, r->b->tolerance_m);
@@ -139,6 +155,7 @@ static int read_by_two(struct reading *r)
     if (rc == SH_OK) rc = say_missing(r, "web-ifc", &r->readings.web_said);
     if (rc == SH_OK) rc = say_missing(r, "ifc-lite", &r->readings.lite_said);
     if (rc == SH_OK) rc = add_products(r);
+    if (rc == SH_OK) rc = say_facets(r, &fineness);
     if (rc == SH_OK) rc = ifc_say_findings(r->b, &r->records, r->finding, r->limits.ifc_strict, r->err);
     if (rc == SH_OK) rc = build_single(r->b, r->largest_m, BUILD_SINGLE_ROUNDING * r->largest_m, true, r->err);
     return rc;

@@ -24,6 +24,8 @@ struct ifc_product {
     bool is_air;           /* an opening, a space, a grid or an annotation: no surface */
     bool has_body;         /* its shape, walked through, has a solid or a surface */
     bool is_curved;
+    bool is_turned;                /* it has a solid that is turned about an axis */
+    double points_m;               /* largest coordinate of its points */
     bool is_far;                   /* it has points beyond 1 km of their own origin */
     struct text_span assimp_wrong; /* the first entity in it that Assimp is known to get wrong; n 0: none */
     uint32_t *style;               /* [n_styles] of its items, places in the records' style */

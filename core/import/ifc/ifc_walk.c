@@ -16,6 +16,7 @@ enum kind {
     CURVED = 4,      /* it has circles or other curves, which readers cut up */
     ASSIMP_ERRS = 8, /* Assimp is known to get it wrong, silently */
     POINTS = 16,     /* points, which may be far */
+    TURNED = 64,     /* a profile turned about an axis: its radius is among the points */
     RADIUS = 32,     /* a circle or the like: its last attribute is a radius */
 };
 
@@ -62,8 +63,8 @@ static const struct type_kind kinds[] = {
     {"IFCRATIONALBSPLINESURFACEWITHKNOTS", CURVED | ASSIMP_ERRS},
     {"IFCRECTANGLEHOLLOWPROFILEDEF", ASSIMP_ERRS},
     {"IFCRECTANGULARPYRAMID", BODY | ASSIMP_ERRS},
-    {"IFCREVOLVEDAREASOLID", BODY | CURVED},
-    {"IFCREVOLVEDAREASOLIDTAPERED", BODY | CURVED | ASSIMP_ERRS},
+    {"IFCREVOLVEDAREASOLID", BODY | CURVED | TURNED},
+    {"IFCREVOLVEDAREASOLIDTAPERED", BODY | CURVED | TURNED | ASSIMP_ERRS},
     {"IFCRIGHTCIRCULARCONE", BODY | CURVED | RADIUS | ASSIMP_ERRS},
     {"IFCRIGHTCIRCULARCYLINDER", BODY | CURVED | RADIUS | ASSIMP_ERRS},
     {"IFCROUNDEDRECTANGLEPROFILEDEF", CURVED | ASSIMP_ERRS},
@@ -72,7 +73,7 @@ static const struct type_kind kinds[] = {
     {"IFCSPHERE", BODY | CURVED | RADIUS | ASSIMP_ERRS},
     {"IFCSTYLEDITEM", STOP},
     {"IFCSURFACECURVESWEPTAREASOLID", BODY | CURVED | ASSIMP_ERRS},
-    {"IFCSURFACEOFREVOLUTION", CURVED | ASSIMP_ERRS},
+    {"IFCSURFACEOFREVOLUTION", CURVED | TURNED | ASSIMP_ERRS},
     {"IFCSWEPTDISKSOLID", BODY | CURVED | RADIUS | ASSIMP_ERRS},
     {"IFCSWEPTDISKSOLIDPOLYGONAL", BODY | CURVED | ASSIMP_ERRS},
     {"IFCTOROIDALSURFACE", CURVED | ASSIMP_ERRS},
@@ -138,7 +139,9 @@ static void keep_radius(struct ifc_records *r, const struct step_record *record)
     struct text_span arg[STEP_MAX_ARGS];
     const size_t n = step_split(record->args, arg, STEP_MAX_ARGS);
     double radius;
-    for (size_t i = 0; i < n && i < STEP_MAX_ARGS; i++)
+    /* A disc's later numbers are where its curve begins and ends. */
+    const size_t last = strncmp(record->type.p, "IFCSWEPTDISK", 12) == 0 ? 2 : STEP_MAX_ARGS;
+    for (size_t i = 0; i < n && i < last; i++)
         if (step_real(&r->text, arg[i], &radius)) r->radius_m = fmax(r->radius_m, radius * r->unit_m);
 }
 
@@ -149,7 +152,8 @@ static void look_at(struct walk *w, const struct step_record *record, int kind)
     p->is_curved |= (kind & CURVED) != 0;
     if ((kind & ASSIMP_ERRS) && p->assimp_wrong.n == 0) p->assimp_wrong = record->type;
     if (kind & RADIUS) keep_radius(w->r, record);
-    if ((kind & POINTS) && !p->is_far) p->is_far = largest_number(&w->r->text, record->args) * w->r->unit_m > FAR_M;
+    p->is_turned |= (kind & TURNED) != 0;
+    if (kind & POINTS) p->points_m = fmax(p->points_m, largest_number(&w->r->text, record->args) * w->r->unit_m);
 }
 
 static bool keep_styles(struct walk *w, uint64_t item)
@@ -211,6 +215,9 @@ static bool walk_product(struct walk *w, struct ifc_product *product)
         const struct ifc_product *opening = ifc_records_product(w->r, w->voids[2 * i + 1]);
         if (opening != NULL) done = walk_from(w, opening->shape);
     }
+    product->is_far = product->points_m > FAR_M;
+    /* The axis may lie as far on the other side. */
+    if (product->is_turned && !product->is_far) w->r->radius_m = fmax(w->r->radius_m, 2.0 * product->points_m);
     return done;
 }
 
