@@ -5,7 +5,7 @@
  * (x, y, z) to (x, -z, y). Units and axes are what the spec says, never guessed. Assimp (5.2) itself changes
  * some before that:
  *   Collada  comes in metres and y up, its unit and up_axis applied
- *   IFC      comes in metres and y up
+ *   IFC      comes in metres and y up, from its own readers, too
  *   FBX      keeps the file's unit (mostly centimetres: scale 0.01) and axes (mostly y up)
  *   glTF     is metres and y up by definition
  *   STL      has neither
@@ -44,7 +44,7 @@ struct scene_import_limits {
 extern const struct scene_import_limits scene_import_defaults;
 
 struct scene_mesh_spec {
-    const char *file; /* ending chooses the reader: .obj .ply in double; .stl .gltf .glb .fbx .dae .ifc by Assimp */
+    const char *file; /* ending chooses the reader: .obj .ply in double; .ifc by two readers; others by Assimp */
     enum scene_up up;
     double scale;       /* metres per unit of the file, > 0 */
     double offset_m[3]; /* added after axes and scale */

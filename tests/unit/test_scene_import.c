@@ -261,16 +261,7 @@ static void node_trees(void **state)
     check_against_flattened(MODELS "FBX/cubes_with_mirroring_and_pivot.fbx", aiProcess_Triangulate);
 }
 
-static void ifc_house(void **state)
-{
-    (void)state;
-    const char *file = MODELS "IFC/AC14-FZK-Haus.ifc";
-    SKIP_WITHOUT(file);
-    check_against_flattened(file, 0);
-    assert_non_null(strstr(warnings, "warnings while read, the first: IFC: skipping"));
-}
-
-/* The house without its site, which other records refer to: Assimp crashes on it. */
+/* The house without its site, which other records refer to: Assimp crashes on it, and others leave out what they miss. */
 static void ifc_with_a_record_missing(void **state)
 {
     (void)state;
@@ -373,7 +364,6 @@ int main(void)
         cmocka_unit_test(boxes),
         cmocka_unit_test(units),
         cmocka_unit_test(node_trees),
-        cmocka_unit_test(ifc_house),
         cmocka_unit_test(ifc_with_a_record_missing),
         cmocka_unit_test(a_buffer_must_be_a_file),
         cmocka_unit_test(nothing_is_printed),

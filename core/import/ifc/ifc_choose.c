@@ -74,7 +74,7 @@ static const struct {
     const char *text;
     bool is_doubtful;
 } findings[IFC_FINDINGS] = {
-    [IFC_LOST] = {"their records have a body, but neither reader makes one, so they are not in the scene", true},
+    [IFC_LOST] = {"its records have a body, but neither reader makes one, so it is not in the scene", true},
     [IFC_BOX] = {"the two readers make bodies of different size or place", true},
     [IFC_AREA] = {"the two readers make bodies of different area or volume", true},
     [IFC_ONLY_WEB] = {"only web-ifc makes a body, which is taken", true},

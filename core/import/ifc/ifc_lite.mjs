@@ -2,7 +2,7 @@
 //   node ifc_lite.mjs FILE LEVEL      LEVEL: lowest low medium high highest; how fine curves are cut up
 import fs from 'node:fs'
 import { createRequire } from 'node:module'
-import { begin, end, fail, placed, product } from './result.mjs'
+import { begin, end, fail, load, placed, product } from './result.mjs'
 
 for (const name of ['log', 'warn', 'error', 'info', 'debug']) console[name] = () => {}
 
@@ -20,7 +20,6 @@ function part_of(mesh) {
   const [x, y, z] = mesh.origin
   const part = { index: mesh.indices, colour: [...mesh.color],
     ...placed(mesh.positions, 3, [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, x, y, z, 1]) }
-  part.largest = Math.max(part.largest, 0)
   return part
 }
 
@@ -50,9 +49,9 @@ function run_job(api, pre, bytes, job) {
 }
 
 try {
+  const bytes = load(process.argv[2])
   const lite = await import('@ifc-lite/wasm')
   lite.initSync({ module: fs.readFileSync(createRequire(import.meta.url).resolve('@ifc-lite/wasm/ifc-lite_bg.wasm')) })
-  const bytes = new Uint8Array(fs.readFileSync(process.argv[2]))
   const api = new lite.IfcAPI()
   api.setMergeLayers(true)
   api.setTessellationQuality(process.argv[3])

@@ -31,13 +31,21 @@ static struct ifc_fineness fineness_for(const struct ifc_records *records, doubl
                                  .deviation_m = radius_m * (1.0 - cos(M_PI / (segments - 1.0)))};
 }
 
-/* Type, name and GlobalId, as one word: no two products have the same. */
-static char *object_name(const struct ifc_product *p, const struct ifc_body *body)
+/* Type, name and GlobalId, as one word: no two products have the same. A name that is too long is cut, not the GlobalId;
+ * it is counted. */
+static char *object_name(struct reading *r, const struct ifc_product *p, const struct ifc_body *body)
 {
     const struct text_span type = body->type.n > 0 ? body->type : p->type;
-    char *name = NULL;
-    const int n = asprintf(&name, "%.*s_%s_%s", (int)type.n, type.p, p->name[0] != '\0' ? p->name : "Unnamed", p->guid);
-    return n >= 0 ? name : NULL;
+    const char *name = p->name[0] != '\0' ? p->name : "Unnamed";
+    const size_t others = type.n + strlen(p->guid) + 2, room = SCENE_NAME_LEN - 1;
+    size_t n = strlen(name);
+    char *object = NULL;
+    if (others + n > room && others < room) {
+        for (n = room - others; n > 0 && ((unsigned char)name[n] & 0xc0) == 0x80;)
+            n--;
+        r->b->counts.names_cut++;
+    }
+    return asprintf(&object, "%.*s_%.*s_%s", (int)type.n, type.p, (int)n, name, p->guid) >= 0 ? object : NULL;
 }
 
 static int add_part(struct reading *r, const struct ifc_part *part, uint16_t label)
@@ -76,7 +84,7 @@ static int label_part(struct reading *r, const struct ifc_product *p, const char
 static int add_body(struct reading *r, const struct ifc_product *p, const struct ifc_bodies *of,
                     const struct ifc_body *body)
 {
-    char *name = object_name(p, body);
+    char *name = object_name(r, p, body);
     if (name == NULL) return build_fail(r->b, SH_ENOMEM, r->err, "no memory for a name");
     int rc = SH_OK;
     r->b->mesh = name;

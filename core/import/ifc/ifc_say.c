@@ -12,6 +12,7 @@ struct lines {
     const char *text;
     size_t n;        /* products of the group */
     size_t n_listed; /* on this line and before */
+    size_t n_lines;
     char line[512];
     size_t len;
 };
@@ -19,19 +20,22 @@ struct lines {
 static void end_line(struct lines *l)
 {
     if (l->len > 0) sh_warn(l->b->report, "%s", l->line);
+    l->n_lines += l->len > 0;
     l->len = 0;
 }
 
 static void add_name(struct lines *l, const struct ifc_product *p)
 {
     char name[160];
-    const int len = snprintf(name, sizeof name, "%.*s '%.60s' %.22s", (int)(p->type.n < 48 ? p->type.n : 48), p->type.p,
+    const int len = snprintf(name, sizeof name, "%.*s '%.40s' %.22s", (int)(p->type.n < 48 ? p->type.n : 48), p->type.p,
                              p->name, p->guid);
     if (l->n_listed++ >= MAX_NAMED) return;
     if (l->len + (size_t)len + 4 > LINE_ROOM) end_line(l);
-    if (l->len == 0)
-        l->len =
-            (size_t)snprintf(l->line, sizeof l->line, "%.100s: %zu products: %s: %s", l->b->name, l->n, l->text, name);
+    if (l->len == 0 && l->n_lines == 0)
+        l->len = (size_t)snprintf(l->line, sizeof l->line, "%.100s: %zu product%s: %s: %s", l->b->name, l->n,
+                                  l->n > 1 ? "s" : "", l->text, name);
+    else if (l->len == 0)
+        l->len = (size_t)snprintf(l->line, sizeof l->line, "%.100s: likewise: %s", l->b->name, name);
     else
         l->len += (size_t)snprintf(l->line + l->len, sizeof l->line - l->len, ", %s", name);
 }
@@ -58,9 +62,9 @@ int ifc_say_findings(struct scene_build *b, const struct ifc_records *records, c
         if (l.n == 0) continue;
         if (strict && ifc_is_doubtful((enum ifc_finding)f))
             return build_fail(b, SH_EINPUT, err,
-                              "%zu products: %s: %.*s '%.40s' %.22s%s; allowed none (scene.ifc_strict)", l.n, l.text,
-                              (int)(first->type.n < 48 ? first->type.n : 48), first->type.p, first->name, first->guid,
-                              l.n > 1 ? " and others" : "");
+                              "%zu product%s: %s: %.*s '%.40s' %.22s%s; allowed none (scene.ifc_strict)", l.n,
+                              l.n > 1 ? "s" : "", l.text, (int)(first->type.n < 48 ? first->type.n : 48), first->type.p,
+                              first->name, first->guid, l.n > 1 ? " and others" : "");
         for (size_t i = 0; i < records->n_products; i++)
             if ((int)finding[i] == f) add_name(&l, &records->product[i]);
         end_group(&l);

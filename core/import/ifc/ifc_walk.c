@@ -210,11 +210,13 @@ static bool walk_product(struct walk *w, struct ifc_product *product)
     w->product = product;
     w->r->stamp++;
     bool done = walk_from(w, product->shape);
+    const bool has_body = product->has_body; /* an opening's is none of its own */
     for (size_t i = 0; i < w->n_voids && done; i++) {
         if (w->voids[2 * i] != product->id) continue;
         const struct ifc_product *opening = ifc_records_product(w->r, w->voids[2 * i + 1]);
         if (opening != NULL) done = walk_from(w, opening->shape);
     }
+    product->has_body = has_body;
     product->is_far = product->points_m > FAR_M;
     /* The axis may lie as far on the other side. */
     if (product->is_turned && !product->is_far) w->r->radius_m = fmax(w->r->radius_m, 2.0 * product->points_m);

@@ -10,11 +10,21 @@
 //            f64[3] for each vertex; u32[3] for each triangle; zeros up to a multiple of 8
 //   end      a product of id 0 without parts and text: without it the result is cut off
 import fs from 'node:fs'
+import v8 from 'node:v8'
 
 const RESULT = 3, NOTE = 4, MAX_TEXT = 400
 
 function write(bytes) {
   for (let done = 0; done < bytes.length;) done += fs.writeSync(RESULT, bytes, done)
+}
+
+// The file, read whole. Of a small one the bodies are made sooner than the optimised code for them would be compiled.
+const SMALL = 6e6
+
+export function load(file) {
+  const bytes = new Uint8Array(fs.readFileSync(file))
+  if (bytes.length < SMALL) v8.setFlagsFromString('--liftoff-only')
+  return bytes
 }
 
 const bytes_of = array => new Uint8Array(array.buffer, array.byteOffset, array.byteLength)

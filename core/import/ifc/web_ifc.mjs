@@ -1,8 +1,7 @@
 // web-ifc: the bodies of an IFC file to descriptor 3, as result.mjs has them.
 //   node web_ifc.mjs FILE SEGMENTS      SEGMENTS: of a full circle
-import fs from 'node:fs'
 import { createRequire } from 'node:module'
-import { begin, end, fail, placed, product } from './result.mjs'
+import { begin, end, fail, load, placed, product } from './result.mjs'
 
 // Its log goes to the console, a line a failure, before the product that has it.
 const failures = []
@@ -31,11 +30,12 @@ function stream(api, model) {
 }
 
 try {
+  const bytes = load(process.argv[2])
   const web = createRequire(import.meta.url)('web-ifc')
   const api = new web.IfcAPI()
   await api.Init()
   api.SetLogLevel(web.LogLevel.LOG_LEVEL_ERROR)
-  const model = api.OpenModel(new Uint8Array(fs.readFileSync(process.argv[2])), {
+  const model = api.OpenModel(bytes, {
     COORDINATE_TO_ORIGIN: false,
     CIRCLE_SEGMENTS: Number(process.argv[3]),
   })

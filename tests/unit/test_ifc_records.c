@@ -1,0 +1,252 @@
+/* The records of IFC files: texts, units, products, what is not whole; and the figures and rules that choose a body. No reader
+ * of bodies is needed. */
+#include <math.h>
+
+#include "core/import/ifc/ifc_choose.h"
+#include "core/import/ifc/ifc_read.h"
+#include "tests/unit/ifc_files.h"
+#include "tests/unit/scene_files.h"
+
+static char text[IFC_TEXT_ROOM];
+static struct ifc_records records;
+static struct sh_err err;
+
+static const struct ifc_shape block[1] = {{"block", "@50", "50=IFCCSGSOLID(@51)\n51=IFCBLOCK(#12,4.,2.,1.)", 28, 8, 0}};
+
+static int open_text(void)
+{
+    const int rc = ifc_records_open(&records, write_text("a.ifc", text), &err);
+    unlink(path);
+    return rc;
+}
+
+static void decodes(const char *quoted, const char *want)
+{
+    char *got = ifc_text((struct text_span){quoted, strlen(quoted)});
+    assert_string_equal(got, want);
+    free(got);
+}
+
+/* Each way in which files of ours and of others write letters beyond ASCII. */
+static void texts_are_whole(void **state)
+{
+    (void)state;
+    decodes("'wall'", "wall");
+    decodes("'M\\X2\\00FC\\X0\\nchen'", "M\xc3\xbcnchen");
+    decodes("'\\X2\\00DF00FC\\X0\\'", "\xc3\x9f\xc3\xbc");
+    decodes("'\\X2\\D83DDE00\\X0\\'", "\xf0\x9f\x98\x80");
+    decodes("'\\X4\\0001F600\\X0\\'", "\xf0\x9f\x98\x80");
+    decodes("'M\\X\\FCnchen'", "M\xc3\xbcnchen");
+    decodes("'M\\S\\|nchen'", "M\xc3\xbcnchen");
+    decodes("'M\xc3\xbcnchen'", "M\xc3\xbcnchen");
+    decodes("'M\xfcnchen'", "M\xc3\xbcnchen"); /* Latin-1 */
+    decodes("'it''s \\\\ here'", "it's \\ here");
+    decodes("''", "");
+    decodes("$", "");
+    decodes("'\\X2\\00'", "\\X2\\00" + 4); /* cut off: what is not a character of it stays */
+}
+
+/* The unit of length scales what the records say: 4 feet are 1.2192 m. */
+static void units_are_read(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *unit;
+        double m;
+    } all[] = {{NULL, 1.0},
+               {"IFCSIUNIT(*,.LENGTHUNIT.,.MILLI.,.METRE.)", 1e-3},
+               {"IFCSIUNIT(*,.LENGTHUNIT.,.CENTI.,.METRE.)", 1e-2},
+               {"IFCCONVERSIONBASEDUNIT(#900,.LENGTHUNIT.,'FOOT',#901)", 0.3048}};
+    for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
+        ifc_write_text(
+            text, "IFC4", all[i].unit, NULL, block, 1,
+            "#900=IFCDIMENSIONALEXPONENTS(1,0,0,0,0,0,0);\n#901=IFCMEASUREWITHUNIT(IFCRATIOMEASURE(0.3048),#902);\n"
+            "#902=IFCSIUNIT(*,.LENGTHUNIT.,$,.METRE.);\n");
+        assert_int_equal(open_text(), SH_OK);
+        assert_true(fabs(records.unit_m - all[i].m) < 1e-12);
+        ifc_records_close(&records);
+    }
+}
+
+static void products_are_found(void **state)
+{
+    (void)state;
+    static const struct ifc_shape shapes[] = {
+        {"B\\X2\\00F6\\X0\\den", "@50",
+         "50=IFCEXTRUDEDAREASOLID(@51,#12,#10,1.)\n51=IFCCIRCLEPROFILEDEF(.AREA.,$,#17,0.75)", 0, 0, 0.75},
+        {"far", "@50",
+         "50=IFCBLOCK(@51,1.,1.,1.)\n51=IFCAXIS2PLACEMENT3D(@52,$,$)\n52=IFCCARTESIANPOINT((1500.,0.,0.))", 0, 0, 0}};
+    ifc_write_text(
+        text, "IFC4", NULL, NULL, shapes, 2,
+        "#5000=IFCOPENINGELEMENT('guid_of_opening_000000',#5,'hole',$,$,#1003,#2002,$,$);\n"
+        "#5001=IFCCOLOURRGB($,0.2,0.4,0.6);\n#5002=IFCSURFACESTYLERENDERING(#5001,0.7,$,$,$,$,$,$,.NOTDEFINED.);\n"
+        "#5003=IFCSURFACESTYLE('Glas',.BOTH.,(#5002));\n#5004=IFCSTYLEDITEM(#1050,(#5003),$);\n");
+    if (open_text() != SH_OK) fail_msg("%s", err.text);
+    assert_int_equal(records.n_products, 3); /* the site has no shape */
+    const struct ifc_product *floor = ifc_records_product(&records, 1000), *far = ifc_records_product(&records, 2000);
+    assert_string_equal(floor->name, "B\xc3\xb6"
+                                     "den");
+    assert_string_equal(floor->guid, "guid_of_product__00000");
+    assert_true(floor->has_body && floor->is_curved && !floor->is_far && floor->assimp_wrong.n == 0);
+    assert_true(far->has_body && !far->is_curved && far->is_far);
+    assert_true(text_is(far->assimp_wrong, "IFCBLOCK"));
+    assert_true(ifc_records_product(&records, 5000)->is_air);
+    assert_true(fabs(records.radius_m - 0.75) < 1e-12);
+    const struct ifc_style *style = ifc_style_by_colour(&records, floor, (const float[4]){0.2f, 0.4f, 0.6f, 0.3f});
+    assert_non_null(style);
+    assert_string_equal(style->name, "Glas");
+    assert_null(ifc_style_by_colour(&records, floor, (const float[4]){1, 1, 1, 1}));
+    assert_null(ifc_style_by_colour(&records, far, (const float[4]){0.2f, 0.4f, 0.6f, 0.3f}));
+    ifc_records_close(&records);
+}
+
+static void refused(const char *expected)
+{
+    assert_int_equal(open_text(), SH_EINPUT);
+    if (strstr(err.text, expected) == NULL || strchr(err.text, '\n') != NULL)
+        fail_msg("'%s', not '%s'", err.text, expected);
+    ifc_records_close(&records);
+}
+
+/* No reader of bodies says any of these: they leave out what they don't find. */
+static void what_is_not_whole_is_refused(void **state)
+{
+    (void)state;
+    ifc_write_text(text, "IFC4", NULL, NULL, block, 1, NULL);
+    const size_t n = strlen(text);
+    for (size_t at = 1; at < n; at += 37) {
+        char whole = text[n - at];
+        text[n - at] = '\0';
+        assert_int_equal(open_text(), at < 2 ? SH_OK : SH_EINPUT); /* the last byte is a line's end */
+        ifc_records_close(&records);
+        text[n - at] = whole;
+    }
+    ifc_write_text(text, "IFC4", NULL, NULL, block, 1, "#7000=IFCRELVOIDSELEMENT('g',#5,$,$,#1000,#7777);\n");
+    refused("IFCRELVOIDSELEMENT #7000 refers to #7777, but there is no such record");
+    ifc_write_text(text, "IFC4", NULL, NULL, block, 1, "#1000=IFCPERSON($,'a',$,$,$,$,$,$);\n");
+    refused("a second record #1000");
+}
+
+/* Records that refer to each other in a ring end. */
+static void ring_ends(void **state)
+{
+    (void)state;
+    static const struct ifc_shape ring[1] = {
+        {"ring", "@50", "50=IFCBOOLEANRESULT(.UNION.,@51,@51)\n51=IFCBOOLEANRESULT(.UNION.,@50,@51)", 0, 0, 0}};
+    ifc_write_text(text, "IFC4", NULL, NULL, ring, 1, NULL);
+    assert_int_equal(open_text(), SH_OK);
+    assert_true(ifc_records_product(&records, 1000)->has_body);
+    ifc_records_close(&records);
+}
+
+/* ---- figures */
+
+static const double corner[8][3] = {{0, 0, 0}, {4, 0, 0}, {4, 2, 0}, {0, 2, 0},
+                                    {0, 0, 1}, {4, 0, 1}, {4, 2, 1}, {0, 2, 1}};
+static const uint32_t side[12][3] = {{3, 2, 1}, {3, 1, 0}, {4, 5, 6}, {4, 6, 7}, {0, 1, 5}, {0, 5, 4},
+                                     {1, 2, 6}, {1, 6, 5}, {2, 3, 7}, {2, 7, 6}, {3, 0, 4}, {3, 4, 7}};
+
+static struct ifc_figures figures_of(const double (*vertex)[3], const uint32_t (*triangle)[3], uint32_t n)
+{
+    const struct ifc_part part = {.n_vertices = 64, .n_triangles = n, .vertex_m = vertex, .triangle = triangle};
+    struct ifc_figures f;
+    ifc_figures(&part, 1, &f);
+    return f;
+}
+
+static void block_is_closed_and_its_parts_are_not(void **state)
+{
+    (void)state;
+    struct ifc_figures f = figures_of(corner, side, 12);
+    assert_true(fabs(f.area_m2 - 28) < 1e-12 && fabs(f.volume_m3 - 8) < 1e-12 && ifc_is_closed(&f));
+    for (uint32_t gone = 0; gone < 12; gone++) { /* each triangle in turn */
+        uint32_t rest[11][3];
+        memcpy(rest, side, gone * sizeof side[0]);
+        memcpy(rest[gone], side[gone + 1], (11 - gone) * sizeof side[0]);
+        f = figures_of(corner, (const uint32_t(*)[3])rest, 11);
+        assert_false(ifc_is_closed(&f));
+        /* an estimate: a field may lie so that it meets little of a face */
+        assert_true(f.open_m2 > 0.05 * (28 - f.area_m2));
+    }
+    f = figures_of(corner, side + 2, 8); /* without top and bottom: vector areas cancel */
+    assert_false(ifc_is_closed(&f));
+}
+
+/* The middle of an edge is a corner of one side alone, as after a cut: edges don't pair, and the body is closed. Rounded to
+ * single precision it stays so. */
+static void corner_within_an_edge_is_closed(void **state)
+{
+    (void)state;
+    double vertex[9][3];
+    uint32_t triangle[13][3];
+    memcpy(vertex, corner, sizeof corner);
+    memcpy(triangle, side, sizeof side);
+    const double middle[3] = {1.3, 0, 0};
+    memcpy(vertex[8], middle, sizeof middle);
+    const uint32_t halves[2][3] = {{0, 8, 5}, {8, 1, 5}};
+    memcpy(triangle[4], halves, sizeof halves[0]);
+    memcpy(triangle[12], halves[1], sizeof halves[1]);
+    for (int i = 0; i < 9; i++)
+        for (int k = 0; k < 3; k++)
+            vertex[i][k] = (double)(float)(vertex[i][k] * 1.1 + 0.3);
+    const struct ifc_figures f = figures_of((const double(*)[3])vertex, (const uint32_t(*)[3])triangle, 13);
+    assert_true(ifc_is_closed(&f));
+}
+
+/* ---- rules */
+
+static struct ifc_body body_of(double area, double volume, double open, double size)
+{
+    return (struct ifc_body){.n_parts = 1, .figures = {area, volume, {0, 0, 0}, {size, size, size}, open}};
+}
+
+static void chosen(const struct ifc_product *p, const struct ifc_body *web, const struct ifc_body *lite,
+                   enum ifc_source source, enum ifc_finding finding)
+{
+    const struct ifc_choice choice = ifc_choose(p, web, lite, true);
+    assert_int_equal(choice.source, source);
+    assert_int_equal(choice.finding, finding);
+}
+
+static void rules_choose(void **state)
+{
+    (void)state;
+    const struct ifc_product plain = {.has_body = true}, curved = {.has_body = true, .is_curved = true},
+                             far = {.has_body = true, .is_far = true}, none = {0};
+    struct ifc_body a = body_of(6, 1, 0, 1), open = body_of(5, 1, 1, 1), wider = body_of(6, 1, 0, 1.02),
+                    more = body_of(6.01, 1, 0, 1), less = body_of(6, 0.98, 0, 1), failed = body_of(6.01, 1, 0, 1);
+    failed.n_failures = 1;
+    chosen(&plain, &a, &a, IFC_WEB, IFC_AGREED);
+    chosen(&plain, NULL, NULL, IFC_NONE, IFC_LOST);
+    chosen(&none, NULL, NULL, IFC_NONE, IFC_AGREED);
+    chosen(&plain, &a, NULL, IFC_WEB, IFC_ONLY_WEB);
+    chosen(&plain, NULL, &a, IFC_LITE, IFC_ONLY_LITE);
+    chosen(&plain, &open, &a, IFC_LITE, IFC_CLOSED_LITE);
+    chosen(&plain, &a, &open, IFC_WEB, IFC_CLOSED_WEB);
+    chosen(&plain, &open, &open, IFC_WEB, IFC_OPEN);
+    chosen(&plain, &a, &wider, IFC_LITE, IFC_BOX);
+    chosen(&far, &a, &wider, IFC_WEB, IFC_BOX);
+    chosen(&plain, &a, &more, IFC_LITE, IFC_AREA);
+    chosen(&plain, &a, &less, IFC_LITE, IFC_AREA);
+    chosen(&curved, &a, &more, IFC_WEB, IFC_AGREED); /* facets explain it */
+    chosen(&plain, &a, &failed, IFC_WEB, IFC_AREA);
+    chosen(&plain, &failed, &more, IFC_LITE, IFC_AGREED);
+    const struct ifc_choice alone = ifc_choose(&plain, &open, NULL, false);
+    assert_true(alone.source == IFC_WEB && alone.finding == IFC_OPEN);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(texts_are_whole),
+        cmocka_unit_test(units_are_read),
+        cmocka_unit_test(products_are_found),
+        cmocka_unit_test(what_is_not_whole_is_refused),
+        cmocka_unit_test(ring_ends),
+        cmocka_unit_test(block_is_closed_and_its_parts_are_not),
+        cmocka_unit_test(corner_within_an_edge_is_closed),
+        cmocka_unit_test(rules_choose),
+    };
+    cmocka_set_message_output(CM_OUTPUT_TAP);
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}
