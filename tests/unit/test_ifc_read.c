@@ -151,6 +151,7 @@ static void openings_and_styles(void **state)
     double area, volume;
     measure(0, &area, &volume);
     assert_true(fabs(area - 28.72) < 28.72e-6 && fabs(volume - 7.96) < 7.96e-6);
+    assert_int_equal(n_warnings, 0);
     assert_string_equal(scene->surface[0].material, "Glas");
     assert_true(scene->surface[0].has_colour && fabsf(scene->surface[0].colour[2] - 0.6f) < 0.004f);
     scene_free(scene);

@@ -83,6 +83,7 @@ static const struct {
     [IFC_CLOSED_LITE] = {"web-ifc leaves the body open: that of ifc-lite is taken, which is closed", true},
     [IFC_OPEN] = {"the body is open, with the same area by both readers", false},
     [IFC_FAILED] = {"the reader says that parts of the body failed", true},
+    [IFC_UNCUT] = {"no IfcRelVoidsElement says what it opens, so it opens nothing", true},
 };
 
 const char *ifc_finding_text(enum ifc_finding finding)

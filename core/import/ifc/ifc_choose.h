@@ -19,6 +19,7 @@ enum ifc_finding {
     IFC_CLOSED_LITE, /* likewise */
     IFC_OPEN,        /* both make the same, which is open */
     IFC_FAILED,      /* the one that is taken admits a failure */
+    IFC_UNCUT,       /* an opening, by the records, of nothing */
     IFC_FINDINGS,
 };
 

@@ -112,6 +112,7 @@ static int add_products(struct reading *r)
     int rc = SH_OK;
     for (size_t i = 0; i < r->records.n_products && rc == SH_OK; i++) {
         const struct ifc_product *p = &r->records.product[i];
+        if (p->opens_nothing) r->finding[i] = IFC_UNCUT;
         if (p->is_air) continue;
         const struct ifc_body *web = with_parts(&in->web, in->has_web, p->id),
                               *lite = with_parts(&in->lite, in->has_lite, p->id);

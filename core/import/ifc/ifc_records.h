@@ -22,6 +22,7 @@ struct ifc_product {
     char *guid, *name;     /* UTF-8, whole; may be empty */
     uint64_t shape;        /* its IfcProductDefinitionShape; 0: none */
     bool is_air;           /* an opening, a space, a grid or an annotation: no surface */
+    bool opens_nothing;    /* an opening that no IfcRelVoidsElement names */
     bool has_body;         /* its shape, walked through, has a solid or a surface */
     bool is_curved;
     bool is_turned;                /* it has a solid that is turned about an axis */

@@ -223,6 +223,16 @@ static bool walk_product(struct walk *w, struct ifc_product *product)
     return done;
 }
 
+static void mark_lost_openings(struct walk *w)
+{
+    for (size_t i = 0; i < w->r->n_products; i++) {
+        struct ifc_product *p = &w->r->product[i];
+        p->opens_nothing = text_is(p->type, "IFCOPENINGELEMENT");
+        for (size_t k = 0; k < w->n_voids && p->opens_nothing; k++)
+            p->opens_nothing = w->voids[2 * k + 1] != p->id;
+    }
+}
+
 int ifc_walk(struct ifc_records *r, struct sh_err *err)
 {
     struct walk w = {.r = r};
@@ -230,6 +240,7 @@ int ifc_walk(struct ifc_records *r, struct sh_err *err)
     bool done = r->mark != NULL && collect_voids(&w);
     for (size_t i = 0; i < r->n_products && done; i++)
         if (!r->product[i].is_air) done = walk_product(&w, &r->product[i]);
+    if (done) mark_lost_openings(&w);
     free(w.stack);
     free(w.voids);
     return done ? SH_OK : text_fail(&r->text, 0, SH_ENOMEM, err, "no memory for its records");
