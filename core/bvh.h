@@ -74,10 +74,9 @@ static inline void bvh_origin_of(const struct bvh_origins *from, uint32_t i, dou
 struct bvh_rays {
     uint32_t n;
     struct bvh_origins from;
-    struct vec3_in dir;    /* unit vectors, prcs */
-    double range_max_m;    /* hits beyond it may or may not be reported */
-    const uint8_t *begins; /* 1: a packet begins with this ray, whether the last one is full or not; NULL: none does */
-    int scattered;         /* neighbours have nothing in common: one by one */
+    struct vec3_in dir; /* unit vectors, prcs */
+    double range_max_m; /* hits beyond it may or may not be reported */
+    int scattered;      /* neighbours have nothing in common: one by one */
     /* out: */
     double *range_m;    /* along the ray; NaN: it meets nothing */
     uint32_t *triangle; /* of the scene; BVH_NO_TRIANGLE */

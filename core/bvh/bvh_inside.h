@@ -10,8 +10,8 @@
  * corner lies on another's edge up to rounding.
  *
  * How far. The range is that of the triangle's plane, in double (planes.c). Of all that a ray meets, the nearest is
- * the hit. Of up to eight within 1e-12 of its range it is the one with the lowest number, in whatever order they were
- * tried. Of more, it may be another of them.
+ * the hit. Of those within 1e-12 of its range it is the one with the lowest number, in whatever order they were tried:
+ * where the order may have mattered, the ray is cast again from the nearest range on (packet.c).
  *
  * That no leaf is left out. Embree works in float. In units of 2^-24 its ray lies off the real one by at most 2 |o| +
  * |h| where it meets something at h, both counted from the BVH's origin: the rounding of the ray's origin, and of its
@@ -31,6 +31,7 @@
 
 #include "core/bvh.h"
 #include "core/embree.h"
+#include "core/vecmath.h"
 
 _Static_assert(sizeof(struct bvh_plane) == 4 * sizeof(double), "gathered as doubles"); /* planes.c */
 
@@ -60,19 +61,13 @@ struct bvh {
 /* Ranges that differ by no more than this share of them are the same. */
 #define BVH_SAME 1e-12
 
-enum { BVH_PACKET = 16, BVH_MOST_TIED = 8 };
+enum { BVH_PACKET = 16 };
 
 #if RTC_VERSION_MAJOR >= 4
 typedef struct RTCRayQueryContext bvh_context;
 #else
 typedef struct RTCIntersectContext bvh_context;
 #endif
-
-/* Hits within BVH_SAME of the nearest. Of more than there is room for the highest numbers are left out. */
-struct bvh_tied {
-    uint32_t triangle[BVH_MOST_TIED];
-    double range_m[BVH_MOST_TIED];
-};
 
 /* A packet in double: what leaves see of it. Embree hands on its context, which is the first member. */
 struct bvh_query {
@@ -89,9 +84,8 @@ struct bvh_query {
     double range_m[BVH_PACKET];    /* out: of the nearest so far; INFINITY: none */
     uint32_t triangle[BVH_PACKET]; /* out: the hit */
     double hit_m[BVH_PACKET];      /* out: its range */
-    uint32_t n_tied[BVH_PACKET];   /* 0: the hit alone */
-    struct bvh_tied tied[BVH_PACKET];
-    double near_m[BVH_PACKET]; /* of the nearest triangle that is missed by rounding alone; INFINITY: none */
+    uint32_t unsure;               /* a bit for each ray of which another hit may have a lower number */
+    double near_m[BVH_PACKET];     /* of the nearest triangle that is missed by rounding alone; INFINITY: none */
     uint32_t near[BVH_PACKET];
     uint64_t decided, leaves; /* struct bvh_counters */
 } __attribute__((aligned(64)));
@@ -101,6 +95,24 @@ struct bvh_query {
 #define bvh_field(rays, width, name) \
     ((float *)(void *)(rays) + offsetof(struct RTCRay, name) / sizeof(float) * (size_t)(width))
 _Static_assert(offsetof(struct RTCRay16, tfar) == 16 * offsetof(struct RTCRay, tfar), "field by field");
+
+/* The next float above a number that is not negative. */
+VEC_INLINE float float_above(double x)
+{
+    const float f = (float)x;
+    uint32_t bits;
+    memcpy(&bits, &f, sizeof bits);
+    bits += (double)f <= x;
+    float above;
+    memcpy(&above, &bits, sizeof above);
+    return above;
+}
+
+/* What is as near as the nearest has to be found, too: tfar is beyond both. */
+VEC_INLINE float tfar_of(double nearest_m, double start_m)
+{
+    return float_above(nearest_m + BVH_SAME * nearest_m - start_m);
+}
 
 /* leaves.c: fills the leaves, and sets n_leaves; makes the planes. */
 int bvh_make_leaves(struct bvh *bvh, const struct sh_report *report, struct sh_err *err);

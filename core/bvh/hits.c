@@ -138,7 +138,6 @@ void bvh_hits(struct bvh_work *work, const struct bvh *bvh, const struct bvh_ray
         part.n = rays->n - at < BVH_CHUNK ? rays->n - at : BVH_CHUNK;
         part.dir = VEC3_IN(rays->dir, at);
         if (rays->from.own.x != NULL) part.from.own = VEC3_IN(rays->from.own, at);
-        part.begins = rays->begins != NULL ? rays->begins + at : NULL;
         part.range_m = rays->range_m + at;
         part.triangle = rays->triangle + at;
         part.label = rays->label != NULL ? rays->label + at : NULL;

@@ -146,47 +146,16 @@ static int is_hole(const struct bvh_query *query, uint32_t lane, uint32_t triang
     return texture_is_hole(scene_cutout(scene, triangle), uv);
 }
 
-/* As near as the nearest: all of them are kept, and the lowest number is the hit. */
+/* As near as the nearest: the lowest number is the hit. Where the hit so far turns out not to be as near, it had kept
+ * others out that may be: the ray is cast again. */
 static void add_tied(struct bvh_query *query, uint32_t lane, uint32_t triangle, double range_m)
 {
-    struct bvh_tied *tied = &query->tied[lane];
-    const double most_m = query->range_m[lane] + BVH_SAME * query->range_m[lane];
-    uint32_t n = 0, last = 0, lowest = 0, before = query->n_tied[lane];
-    if (before == 0) {
-        tied->triangle[0] = query->triangle[lane];
-        tied->range_m[0] = query->hit_m[lane];
-        before = 1;
-    }
-    for (uint32_t i = 0; i < before; i++) {
-        if (tied->range_m[i] > most_m || tied->triangle[i] == triangle) continue;
-        tied->range_m[n] = tied->range_m[i];
-        tied->triangle[n] = tied->triangle[i];
-        if (tied->triangle[n] > tied->triangle[last]) last = n;
-        n++;
-    }
-    const uint32_t at = n < BVH_MOST_TIED ? n : last;
-    if (n < BVH_MOST_TIED || triangle < tied->triangle[last]) {
-        tied->triangle[at] = triangle;
-        tied->range_m[at] = range_m;
-        n += at == n;
-    }
-    query->n_tied[lane] = n;
-    for (uint32_t i = 1; i < n; i++)
-        if (tied->triangle[i] < tied->triangle[lowest]) lowest = i;
-    query->triangle[lane] = tied->triangle[lowest];
-    query->hit_m[lane] = tied->range_m[lowest];
-}
-
-/* The next float above a number that is not negative. */
-VEC_INLINE float float_above(double x)
-{
-    const float f = (float)x;
-    uint32_t bits;
-    memcpy(&bits, &f, sizeof bits);
-    bits += (double)f <= x;
-    float above;
-    memcpy(&above, &bits, sizeof above);
-    return above;
+    const double nearest_m = query->range_m[lane];
+    const int is_past = query->hit_m[lane] > nearest_m + BVH_SAME * nearest_m;
+    query->unsure |= (uint32_t)is_past << lane;
+    if (!is_past && triangle >= query->triangle[lane]) return;
+    query->triangle[lane] = triangle;
+    query->hit_m[lane] = range_m;
 }
 
 /* A triangle that the ray meets, at a range that is no further than the nearest and what counts as the same. */
@@ -196,10 +165,9 @@ VEC_INLINE void note(struct bvh_query *query, float *tfar, uint32_t lane, uint32
     if (query->bvh->scene->cutout != NULL && is_hole(query, lane, triangle, range_m)) return;
     if (range_m < nearest_m) {
         query->range_m[lane] = range_m;
-        *tfar = float_above(range_m - query->start_m[lane]);
+        *tfar = tfar_of(range_m, query->start_m[lane]);
     }
     if (range_m + BVH_SAME * range_m < nearest_m) {
-        query->n_tied[lane] = 0;
         query->triangle[lane] = triangle;
         query->hit_m[lane] = range_m;
         return;
@@ -306,13 +274,11 @@ VEC_INLINE void take_nearer(struct bvh_query *query, float *tfar, uint32_t trian
         const int64_t take = takes[i];
         query->range_m[i] = take ? range_m[i] : query->range_m[i];
         query->hit_m[i] = take ? range_m[i] : query->hit_m[i];
-        above[i] = float_above(range_m[i] - query->start_m[i]);
+        above[i] = tfar_of(range_m[i], query->start_m[i]);
     }
     VEC_LOOP
-    for (uint32_t i = 0; i < BVH_PACKET; i++) {
+    for (uint32_t i = 0; i < BVH_PACKET; i++)
         query->triangle[i] = takes[i] ? triangle : query->triangle[i];
-        query->n_tied[i] = takes[i] ? 0 : query->n_tied[i];
-    }
     if (query->width == BVH_PACKET)
         for (uint32_t i = 0; i < BVH_PACKET; i++)
             tfar[i] = takes[i] ? above[i] : tfar[i];

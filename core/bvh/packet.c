@@ -4,9 +4,6 @@
 #include "core/bvh/bvh_inside.h"
 #include "core/vecmath.h"
 
-/* Of packets that were cut, those that are left with as many as this are not worth it. */
-enum { FEW = 4 };
-
 struct packet {
     struct RTCRayHit16 at; /* or, from its beginning, one of fewer rays */
     int valid[BVH_PACKET];
@@ -95,10 +92,9 @@ VEC_INLINE void set_doubles(struct bvh_query *query, const struct bvh_batch *bat
         query->range_m[i] = INFINITY;
         query->hit_m[i] = NAN;
     }
-    for (uint32_t i = 0; i < BVH_PACKET; i++) {
+    for (uint32_t i = 0; i < BVH_PACKET; i++)
         query->triangle[i] = BVH_NO_TRIANGLE;
-        query->n_tied[i] = 0;
-    }
+    query->unsure = 0;
     if (batch->start_m != NULL) memcpy(query->start_m, batch->start_m + first, n * sizeof(double));
     for (int j = 0; j < 3; j++) {
         memcpy(query->dir[j], dir[j] + first, n * sizeof(double));
@@ -126,6 +122,22 @@ static void take_near(struct bvh_query *query, uint32_t n)
     forget_near(query);
 }
 
+/* Casts rays again whose nearest range is known. No range is less, so the lowest number of those as near is found in any
+ * order. */
+static void settle(const struct bvh *bvh, struct bvh_query *query, struct packet *packet, uint32_t width)
+{
+    float *tfar = bvh_field(&packet->at, width, tfar);
+    for (uint32_t i = 0; i < width; i++) {
+        packet->valid[i] = (query->unsure >> i & 1) != 0 ? -1 : 0;
+        if (packet->valid[i] == 0) continue;
+        tfar[i] = tfar_of(query->range_m[i], query->start_m[i]);
+        query->triangle[i] = BVH_NO_TRIANGLE;
+        query->hit_m[i] = NAN;
+    }
+    query->unsure = 0;
+    call(bvh, query, packet, width);
+}
+
 VEC_INLINE void cast_one(const struct bvh *bvh, struct bvh_query *query, struct packet *packet,
                          const struct bvh_batch *batch, uint32_t first, uint32_t n, uint32_t width)
 {
@@ -135,6 +147,7 @@ VEC_INLINE void cast_one(const struct bvh *bvh, struct bvh_query *query, struct 
     query->width = width;
     query->dir_float = width == BVH_PACKET ? bvh_field(&packet->at, width, dir_x) : NULL;
     call(bvh, query, packet, width);
+    if (query->unsure != 0) settle(bvh, query, packet, width);
     if (query->decided != decided) take_near(query, n);
     memcpy(batch->rays->range_m + first, query->hit_m, n * sizeof *query->hit_m);
     memcpy(batch->rays->triangle + first, query->triangle, n * sizeof *query->triangle);
@@ -151,23 +164,13 @@ static void cast(const struct bvh *bvh, struct bvh_query *query, struct packet *
         cast_one(bvh, query, packet, batch, first, n, width);
 }
 
-/* The end of the packet that begins at `at`. */
-static uint32_t cut(const struct bvh_rays *rays, uint32_t width, uint32_t at)
-{
-    const uint32_t end = rays->n - at < width ? rays->n : at + width;
-    for (uint32_t i = at + 1; rays->begins != NULL && i < end; i++)
-        if (rays->begins[i]) return i;
-    return end;
-}
-
 void bvh_intersect(const struct bvh *bvh, struct bvh_query *query, struct bvh_batch *batch)
 {
     const struct bvh_rays *rays = batch->rays;
     const uint32_t width = rays->scattered ? 1 : bvh->info.packet;
-    struct packet whole, single;
+    struct packet packet;
     begin(query);
-    begin_packet(&whole, batch, width);
-    if (rays->begins != NULL) begin_packet(&single, batch, 1);
+    begin_packet(&packet, batch, width);
     query->bvh = bvh;
     query->has_own = rays->from.own.x != NULL;
     query->far_m = batch->far_m;
@@ -176,15 +179,8 @@ void bvh_intersect(const struct bvh *bvh, struct bvh_query *query, struct bvh_ba
     memcpy(query->at_local, batch->at_local, sizeof query->at_local);
     memset(query->start_m, 0, sizeof query->start_m);
     forget_near(query);
-    for (uint32_t at = 0, end; at < rays->n; at = end) {
-        end = cut(rays, width, at);
-        if (end - at > FEW || rays->begins == NULL) {
-            cast(bvh, query, &whole, batch, at, end - at, width);
-            continue;
-        }
-        for (uint32_t i = at; i < end; i++)
-            cast(bvh, query, &single, batch, i, 1, 1);
-    }
+    for (uint32_t at = 0; at < rays->n; at += width)
+        cast(bvh, query, &packet, batch, at, rays->n - at < width ? rays->n - at : width, width);
     batch->counters->decided += query->decided;
     batch->counters->leaves += query->leaves;
 }
