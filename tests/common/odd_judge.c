@@ -81,6 +81,7 @@ int odd_judge(const struct scene *scene, const struct reference *reference, cons
         return 1;
     }
     if (isnan(shot->range_m) && truth.triangle == REFERENCE_NONE) return 1;
+    if (isnan(shot->range_m) && shot->most_m > 0.0 && truth.range_m > (long double)shot->most_m - 1e-6L) return 1;
     if (error_m <= bound_m(truth.range_m)) {
         tally->largest_m = fmax(tally->largest_m, error_m);
         return 1;
