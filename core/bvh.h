@@ -121,6 +121,9 @@ void bvh_work_set_directions(struct bvh_work *work, const struct vec3_in *dir, u
  * tests/accuracy. Allocates nothing. */
 void bvh_hits(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays);
 
+/* The range of what one ray meets first; NaN: nothing. */
+double bvh_ray(struct bvh_work *work, const struct bvh *bvh, const double at_m[3], const double dir[3]);
+
 /* ---- for rays from one point whose triangles are known otherwise (core/sight); no scene with holes. */
 
 /* Rays from .. to - 1 meet that triangle, or nothing (BVH_NO_TRIANGLE): their ranges, labels and steepness, bit by

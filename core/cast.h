@@ -222,9 +222,4 @@ void caster_set_profile(struct caster *caster, struct bvh_profile *profile);
 
 void caster_get_counters(const struct caster *caster, struct cast_counters *counters);
 
-/* The first surface of the scene from from_m along the unit vector down: its distance in *range_m, NaN when
- * there is none. Exact as bvh_hits. For setting up: looks at every triangle once. */
-int cast_floor(const struct scene *scene, const double from_m[3], const double down[3], double *range_m,
-               struct sh_err *err);
-
 #endif

@@ -145,3 +145,18 @@ void bvh_hits(struct bvh_work *work, const struct bvh *bvh, const struct bvh_ray
         cast_chunk(work, bvh, &part);
     }
 }
+
+double bvh_ray(struct bvh_work *work, const struct bvh *bvh, const double at_m[3], const double dir[3])
+{
+    double range_m;
+    uint32_t triangle;
+    const struct bvh_rays ray = {.n = 1,
+                                 .from.at_m = {at_m[0], at_m[1], at_m[2]},
+                                 .dir = {&dir[0], &dir[1], &dir[2]},
+                                 .range_max_m = 1e9,
+                                 .scattered = 1,
+                                 .range_m = &range_m,
+                                 .triangle = &triangle};
+    bvh_hits(work, bvh, &ray);
+    return range_m;
+}

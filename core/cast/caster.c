@@ -13,7 +13,7 @@
  *     points     points.c         positions, and entries of the block
  *
  * A stage that a setup does not need costs nothing. kernels*.c hold the arithmetic of the stages, texels.c
- * looks up textures, colours.c has what else colours may show. For setting up: outlines.c, floor.c. */
+ * looks up textures, colours.c has what else colours may show. For setting up: outlines.c. */
 #include "core/cast.h"
 
 #include <stdlib.h>

@@ -349,12 +349,6 @@ static inline int config_limits_range(const struct config *cfg)
     return cfg->head.range_min_m > cfg->head.profile_min_m || cfg->head.range_max_m < cfg->head.profile_max_m;
 }
 
-/* The farthest that commands may set, whatever head.range_max_m says. */
-static inline double config_range_most_m(const struct config *cfg)
-{
-    return cfg->head.profile_max_m > cfg->profile.range_max_m ? cfg->head.profile_max_m : cfg->profile.range_max_m;
-}
-
 /* Whether the scene needs texture coordinates and textures. */
 static inline int config_wants_textures(const struct config *cfg)
 {

@@ -60,7 +60,7 @@ static int make_beam(const struct site *site, struct site_station *s, int adapti
     if (site->scene->n_triangles > MANY_TRIANGLES) sh_progress(report, "looking for outlines", -1.0);
     const struct beam_outlines_spec spec = {site->scene,    s->at.position_m,  &beam->beam,
                                             p->range_max_m, site->detect.kind, report};
-    int rc = cast_outlines(&spec, s->bvh, &s->outlines, err);
+    int rc = cast_outlines(&spec, site->bvh, &s->outlines, err);
     beam->outlines = s->outlines;
     return rc;
 }

@@ -139,7 +139,8 @@ struct look {
     uint32_t triangle[LOOKS];
 };
 
-static void cast(const struct site_station *s, struct bvh_work *work, struct look *look, uint32_t n)
+static void cast(const struct site *site, const struct site_station *s, struct bvh_work *work, struct look *look,
+                 uint32_t n)
 {
     const double *p = s->at.position_m;
     const struct bvh_rays rays = {.n = n,
@@ -149,7 +150,7 @@ static void cast(const struct site_station *s, struct bvh_work *work, struct loo
                                   .scattered = 1,
                                   .range_m = look->range_m,
                                   .triangle = look->triangle};
-    bvh_hits(work, s->bvh, &rays);
+    bvh_hits(work, site->bvh, &rays);
 }
 
 /* Below a floor there is a surface above the head, and none under it. */
@@ -167,7 +168,7 @@ static int doubt_floor(const struct site *site, uint32_t i, struct bvh_work *wor
         const double sign = k == 0 ? 1.0 : -1.0, dir[3] = {sign * level[2], sign * level[5], sign * level[8]};
         VEC3_SET(*look, k, dir);
     }
-    cast(s, work, look, 2);
+    cast(site, s, work, look, 2);
     if (!isnan(look->range_m[0]) && isnan(look->range_m[1]))
         sh_warn(report,
                 "station %u %s at %.10g %.10g %.10g m: no surface below it, and one %.3g m above it: is it under the "
@@ -225,7 +226,7 @@ static void doubt_view(const struct site *site, uint32_t i, struct bvh_work *wor
         fill_window(site, s, look);
     else
         fill_frame(site, s, look);
-    cast(s, work, look, LOOKS);
+    cast(site, s, work, look, LOOKS);
     for (int k = 0; k < LOOKS; k++) {
         near += look->range_m[k] < program->range_min_m;
         far += look->range_m[k] > program->range_max_m;

@@ -105,7 +105,7 @@ static int place_stations(struct site *site, const struct sh_report *report, str
     site->n_stations = cfg->n_stations;
     for (uint32_t i = 0; i < cfg->n_stations && rc == SH_OK; i++) {
         site->station[i].station = &cfg->station[i];
-        rc = placement_find(cfg, i, &site->anchor, site->scene, &site->station[i].at, err);
+        rc = placement_find(cfg, i, &site->anchor, site->bvh, &site->station[i].at, err);
         if (rc == SH_OK) rc = sh_check_stop(report, err);
     }
     return rc == SH_OK && cfg->platform.kind == PLATFORM_STOPS ? site_load_stops(site, report, err) : rc;
@@ -137,9 +137,9 @@ static int load(struct site *site, const struct sh_report *report, struct sh_err
     if (rc == SH_OK) rc = site_name_legs(site, err);
     if (rc == SH_OK) rc = site_set_up_detect(site, report, err);
     if (rc == SH_OK) rc = site_set_up_silent(site, err);
+    if (rc == SH_OK) rc = site_build_bvhs(site, report, err);
     if (rc == SH_OK) rc = place_stations(site, report, err);
     if (rc == SH_OK && site->moving) rc = site_load_platform(site, report, err);
-    if (rc == SH_OK) rc = site_build_bvhs(site, report, err);
     if (rc == SH_OK) rc = site_set_up_tripods(site, report, err);
     if (rc == SH_OK && site->cfg->output.colour != COLOUR_NONE) rc = site_set_up_colours(site, report, err);
     if (rc == SH_OK) rc = site_warn_doubts(site, report, err); /* trying beams may take long where little is seen */

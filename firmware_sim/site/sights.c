@@ -86,7 +86,7 @@ static int make(struct site *site, uint32_t station, uint32_t of, const struct s
     struct sight *sight;
     struct sh_err why;
     site_view_of(site, station, &view);
-    struct sight_spec spec = {.bvh = s->bvh,
+    struct sight_spec spec = {.bvh = site->bvh,
                               .rays = site->plan.sight_rays,
                               .memory_bytes = memory_bytes(site) / of,
                               .sees = site_view_sees,
@@ -119,7 +119,7 @@ static void close_sight(struct site_station *s)
 static int still_holds(const struct site *site, const struct site *from, uint32_t i)
 {
     const struct site_station *a = &site->station[i], *b = &from->station[i];
-    return b->sight != NULL && a->bvh == b->bvh &&
+    return b->sight != NULL && site->bvh == from->bvh &&
            memcmp(&a->at.position_m, &b->at.position_m, sizeof a->at.position_m) == 0 &&
            memcmp(&a->at.rotation, &b->at.rotation, sizeof a->at.rotation) == 0;
 }

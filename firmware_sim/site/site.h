@@ -33,7 +33,6 @@ struct site_tripod {
 
 struct site_station {
     const struct config_station *station; /* of the configuration, or of stops */
-    struct bvh *bvh;                      /* the world's; NULL: this scanner does not scan from here */
     struct sight *_Atomic sight;          /* what it sees; NULL: rays go to the BVH (site_open_sights) */
     _Atomic uint32_t *sight_users;        /* sites that share the map */
     struct georef *georef;

@@ -43,12 +43,6 @@ int site_vary_detect(struct site *site, struct sh_err *err);
 /* How many surfaces of glass or mirrors pulses are followed through, once that is known. */
 void site_set_depth(struct site *site, uint32_t depth);
 
-/* How far from the head's origin rays may begin, given where it stands: beams beside it, and ways beyond
- * glass. */
-double site_ray_reach_m(const struct site *site, const double station_m[3]);
-
-/* How far the scene goes, without what moves. */
-double site_farthest_m(const struct site *site, const double from_m[3]);
 /* How far noise may take a point, whether it is on or not; of that, the ball; a range, ten sigma of its noise. */
 double site_noise_m(const struct site *site);
 double site_ball_m(const struct site *site);

@@ -24,7 +24,7 @@ static const char CONFIG[] =
     "beam: {echoes: strongest}\n"
     "time: {epoch: 2026-05-04T03:02:01Z}\n"
     "links: [{type: udp, protocol: velodyne, port: 2368}, {type: udp, protocol: velodyne-position, port: 8308}]\n"
-    "loop: {late_ms: 10000, queue_ms: 3000}\n";
+    "loop: {late_ms: 10000, queue_ms: 10000}\n";
 
 /* ---- the namespace */
 

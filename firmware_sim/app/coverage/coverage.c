@@ -149,7 +149,7 @@ static int open_all(struct coverage_run *r, struct sh_err *err)
         rc = mesh_check_box(r->output, r->site->scene->min_m, r->site->scene->max_m, err);
     if (rc != SH_OK) return rc;
     r->result.base = r->site->stop != NULL ? 0 : r->cfg->head.settings.station - 1;
-    const struct coverage_spec spec = {.bvh = r->site->station[r->result.base].bvh,
+    const struct coverage_spec spec = {.bvh = r->site->bvh,
                                        .silent = r->site->silent,
                                        .cell_m = r->cfg->coverage.cell_m,
                                        .memory_mib = r->cfg->coverage.memory_mib,
