@@ -19,6 +19,7 @@ static const char *why_not(const struct site *site)
     if (moves != NULL) return moves;
     if (!sight_possible(site->scene))
         return site->scene->cutout != NULL ? "textures cut holes into surfaces (scene.cutouts)"
+               : site->scene->n_copies > 0 ? "meshes have copies (scene.meshes[].copies)"
                                            : "the scene has too many triangles";
     return site->plan.methods.beam == BEAM_RINGS ? "the beam is rings, which have no ray for the centre" : NULL;
 }

@@ -75,6 +75,10 @@ void site_leave_world(struct site *site);
 
 /* ---- target.c: scene.target. */
 
+/* Where the copies of a mesh stand: places->place is to be freed in any case, and NULL where it has none. */
+int site_read_copies(const struct config *cfg, uint32_t number, const struct sh_report *report,
+                     struct scene_places *places, struct sh_err *err);
+
 /* The meshes are loaded, each with labels of its own: leaves out what is no target, or notes it. SH_EINPUT where a pattern fits nothing, or nothing is
  * left. */
 int site_select_target(struct site *site, struct sh_err *err);
