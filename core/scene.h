@@ -171,8 +171,9 @@ struct scene_arrays {
 int scene_from_arrays(const struct scene_arrays *arrays, struct scene **out, struct sh_err *err);
 
 /* Leaves out all surfaces but those that are to be kept: keep[n_surfaces], by label. What is left has new labels and
- * vertices, in the old order, and bounds of its own; there may be nothing left (n_triangles 0). SH_ENOMEM: the scene is
- * as it was. Before anyone uses it, and before label0 is set. */
+ * vertices, in the old order, and bounds of its own; there may be nothing left (n_all 0). SH_EINPUT where copies of a
+ * mesh would keep different surfaces of it. After an error the scene is only to be freed. Before anyone uses it, and
+ * before label0 is set. */
 int scene_keep(struct scene *scene, const uint8_t *keep, struct sh_err *err);
 
 /* Finds triangles that have the same three corners, however they are written, and the same holes, as one with a lower

@@ -140,6 +140,37 @@ static int cast_down(const struct column *c, const struct scene *scene, const do
     return rc;
 }
 
+/* Whether a copy's bounds reach as far as the line. */
+static int may_be_below(const struct column *c, const struct scene_copy *copy)
+{
+    double off[3], half[3];
+    for (int k = 0; k < 3; k++) {
+        half[k] = 0.5 * (copy->max_m[k] - copy->min_m[k]);
+        off[k] = copy->min_m[k] + half[k] - c->from_m[k];
+    }
+    const double across2 = vec3_dot(off, c->u) * vec3_dot(off, c->u) + vec3_dot(off, c->v) * vec3_dot(off, c->v);
+    const double reach_m = vec3_length(half) + 1e-6 * vec3_length(off);
+    return across2 <= reach_m * reach_m;
+}
+
+/* The same in the frame of each copy. */
+static int look_at_copies(const struct column *c, const double down[3], double *range_m, struct sh_err *err)
+{
+    const struct scene *scene = c->scene;
+    for (uint32_t i = 0; i < scene->n_copied; i++)
+        for (uint32_t k = 0; k < scene->copied[i].n; k++) {
+            const struct scene_copy *copy = &scene->copied[i].copy[k];
+            double from_m[3], dir[3], here_m;
+            if (!may_be_below(c, copy)) continue;
+            scene_copy_put_back(copy, c->from_m, from_m);
+            scene_copy_turn_back(copy, down, dir);
+            const int rc = cast_floor(scene->copied[i].mesh, from_m, dir, &here_m, err);
+            if (rc != SH_OK) return rc;
+            if (!isnan(here_m)) *range_m = fmin(here_m * copy->scale, isnan(*range_m) ? INFINITY : *range_m);
+        }
+    return SH_OK;
+}
+
 int cast_floor(const struct scene *scene, const double from_m[3], const double down[3], double *range_m,
                struct sh_err *err)
 {
@@ -151,6 +182,7 @@ int cast_floor(const struct scene *scene, const double from_m[3], const double d
     int rc = collect(&c, err);
     if (rc == SH_OK && c.n > 0) rc = make_scene(&c, &around, err);
     if (rc == SH_OK && c.n > 0) rc = cast_down(&c, around, down, range_m, err);
+    if (rc == SH_OK) rc = look_at_copies(&c, down, range_m, err);
     scene_free(around);
     free(c.vertex);
     free(c.prim);

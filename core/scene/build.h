@@ -98,6 +98,10 @@ struct text_span build_base_name(const struct scene_build *b);
 int scene_add_copies(struct scene *scene, struct scene *mesh, const struct scene_places *places,
                      const struct sh_report *report, struct sh_err *err);
 
+/* Part of scene_keep: each copy keeps what its labels say, and goes where that is nothing. label: new ones, by old ones.
+ * SH_EINPUT where copies of a mesh would keep different surfaces. */
+int scene_keep_copies(struct scene *scene, const uint8_t *keep, const uint16_t *label, struct sh_err *err);
+
 /* ---- cutouts.c */
 /* Holes in the textures of a scene that is complete. Warns of textures that can't be read. */
 int scene_find_cutouts(struct scene *scene, const struct sh_report *report, struct sh_err *err);

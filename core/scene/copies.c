@@ -85,6 +85,13 @@ static int add_surfaces(struct scene *scene, struct scene *mesh, const struct sc
     if (surface == NULL || texture == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the scene's surfaces");
     if (scene->n_textures + mesh->n_textures > UINT16_MAX)
         return sh_fail(err, SH_EINPUT, "%s: too many textures: a scene holds up to %d", places->says, UINT16_MAX);
+    if (scene->cutout != NULL) {
+        const struct texture_mask **more =
+            realloc(scene->cutout, (scene->n_surfaces + n + 1) * sizeof(const struct texture_mask *));
+        if (more == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the scene's surfaces");
+        scene->cutout = more;
+        memset(more + scene->n_surfaces, 0, n * sizeof(const struct texture_mask *)); /* the mesh has its own */
+    }
     for (size_t i = 0; i < n; i++) {
         struct scene_surface *to = &surface[scene->n_surfaces + i];
         *to = mesh->surface[i % mesh->n_surfaces];

@@ -77,8 +77,8 @@ int scene_write_out_copies(struct scene *s, uint64_t most, const struct sh_repor
     }
     if (s->n_all > most || vertices > UINT32_MAX - 1)
         return sh_fail(err, SH_EINPUT,
-                       "scene.meshes[].copies: %u copies come to %u triangles; this needs them one by one: allowed up "
-                       "to %llu",
+                       "scene.meshes[].copies: %u copies come to %u triangles; reports, coverage and the page of `run` "
+                       "look at them one by one: allowed there are %llu",
                        s->n_copies, s->n_all, (unsigned long long)most);
     if (!make_room(s, vertices, s->n_all, uv, cutouts))
         return sh_fail(err, SH_ENOMEM, "no memory for the %u triangles of copies", s->n_all);

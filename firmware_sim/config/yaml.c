@@ -224,7 +224,7 @@ static void read_copies(struct walk *w, const struct cfg_key *key, uint32_t item
         struct cfg_reader rd;
         struct walk in = *w;
         char name[CFG_PATH_MAX];
-        snprintf(name, sizeof name, "scene.meshes[%u].copies[%td].", item, i);
+        snprintf(name, sizeof name, "scene.meshes[%u].copies[%td]", item, i);
         cfg_begin_copy(&rd, w->rd, item, name, line_of(w, child));
         in.rd = &rd;
         if (child->type == YAML_MAPPING_NODE)

@@ -19,7 +19,7 @@ struct trial {
 /* The sample is to be freed, also after an error. */
 static int open_trial(struct trial *trial, struct site *site, const struct sh_report *report, struct sh_err *err)
 {
-    if (site->scene->n_triangles > MANY_TRIANGLES) sh_progress(report, "trying methods on the scene", -1.0);
+    if (site->scene->n_all > MANY_TRIANGLES) sh_progress(report, "trying methods on the scene", -1.0);
     trial->site = site;
     site_look_open(&trial->look, site);
     return plan_sample_create(trial->look.place, trial->look.n, report, &trial->sample, err);

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/scene_copies.h"
 #include "firmware_sim/site/site_inside.h"
 #include "firmware_sim/site/plan_rows.h"
 
@@ -62,6 +63,14 @@ static void place_movers(struct site *site)
     }
 }
 
+static int write_out(struct site *site, const struct sh_report *report, struct sh_err *err)
+{
+    int rc = scene_write_out_copies(site->scene, SITE_MOST_WRITTEN_OUT, report, err);
+    for (uint32_t i = 0; i < site->n_movers && rc == SH_OK; i++)
+        rc = scene_write_out_copies(site->mover[i].scene, SITE_MOST_WRITTEN_OUT, report, err);
+    return rc;
+}
+
 /* spec: [n_meshes] */
 static int load_meshes(struct site *site, const struct scene_mesh_spec *spec, const struct sh_report *report,
                        struct sh_err *err)
@@ -79,6 +88,7 @@ static int load_meshes(struct site *site, const struct scene_mesh_spec *spec, co
     for (uint32_t i = 0; i < cfg->scene.n_meshes && rc == SH_OK; i++)
         if (config_mesh_moves(&cfg->scene.mesh[i])) rc = add_mover(site, i, &spec[i], report, err);
     if (rc == SH_OK) rc = site_select_target(site, err);
+    if (rc == SH_OK && site->world->written_out) rc = write_out(site, report, err);
     if (rc == SH_OK) place_movers(site);
     return rc;
 }
@@ -180,6 +190,7 @@ int site_create(const struct config *cfg, enum site_purpose purpose, const struc
     site->planned_frames = cfg->head.settings.frames;
     site->moving = config_head_moves(&cfg->platform);
     int rc = site_enter_world(site, other, err);
+    if (rc == SH_OK && purpose == SITE_WRITTEN_OUT) site->world->written_out = 1;
     if (rc == SH_OK) rc = load(site, &heard.report, err);
     if (rc == SH_OK && site->measures) rc = site_open_sights(site, 0, site->n_stations, report, err);
     if (rc == SH_OK && site->measures) rc = site_plan_rows(site, err);
@@ -192,6 +203,12 @@ int site_create(const struct config *cfg, enum site_purpose purpose, const struc
 int site_load(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err)
 {
     return site_create(cfg, SITE_FOR_SCANS, NULL, report, out, err);
+}
+
+int site_load_written_out(const struct config *cfg, const struct sh_report *report, struct site **out,
+                          struct sh_err *err)
+{
+    return site_create(cfg, SITE_WRITTEN_OUT, NULL, report, out, err);
 }
 
 int site_load_beside(const struct config *cfg, const struct site *other, const struct sh_report *report,

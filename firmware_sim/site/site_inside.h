@@ -9,6 +9,7 @@ enum site_purpose {
     SITE_FOR_SCANS,
     SITE_FOR_PLAN, /* site_load_plan */
     SITE_MOVED,    /* site_load_moved */
+    SITE_WRITTEN_OUT,
 };
 int site_create(const struct config *cfg, enum site_purpose purpose, const struct site *other,
                 const struct sh_report *report, struct site **out, struct sh_err *err);

@@ -41,6 +41,7 @@ int site_enter_world(struct site *site, const struct site *other, struct sh_err 
     site->world = calloc(1, sizeof *site->world);
     if (site->world == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     site->world->n_users = 1;
+    site->world->written_out = other != NULL && other->world->written_out;
     return SH_OK;
 }
 
