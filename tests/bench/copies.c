@@ -111,7 +111,7 @@ static double cast_ns(struct bvh_work *work, const struct bvh *bvh, double *hit)
     clock_gettime(CLOCK_THREAD_CPUTIME_ID, &b);
     uint32_t n = 0;
     for (int i = 0; i < RAYS; i++)
-        n += !isnan(range_m[i]);
+        n += isnan(range_m[i]) ? 0 : 1;
     *hit = (double)n / RAYS;
     return ((double)(b.tv_sec - a.tv_sec) * 1e9 + (double)(b.tv_nsec - a.tv_nsec)) / RAYS;
 }
