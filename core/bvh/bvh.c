@@ -32,6 +32,18 @@ static int check_device(RTCDevice device, struct sh_err *err)
     return embree_fail(code, "bvh", err);
 }
 
+static void attach(struct bvh *bvh, uint32_t n, RTCBoundsFunction bounds, RTCIntersectFunctionN meet)
+{
+    RTCGeometry geometry = rtcNewGeometry(bvh->device, RTC_GEOMETRY_TYPE_USER);
+    rtcSetGeometryUserPrimitiveCount(geometry, n);
+    rtcSetGeometryUserData(geometry, bvh);
+    rtcSetGeometryBoundsFunction(geometry, bounds, NULL);
+    rtcSetGeometryIntersectFunction(geometry, meet);
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometry(bvh->rtc, geometry);
+    rtcReleaseGeometry(geometry);
+}
+
 /* Builds what Embree has, unless report asks to stop. */
 static int commit(struct bvh *bvh, const struct sh_report *report, struct sh_err *err)
 {
@@ -39,24 +51,19 @@ static int commit(struct bvh *bvh, const struct sh_report *report, struct sh_err
         const void *in;
         void *out;
     } ctx = {.in = report};
-    RTCGeometry geometry = rtcNewGeometry(bvh->device, RTC_GEOMETRY_TYPE_USER);
-    rtcSetGeometryUserPrimitiveCount(geometry, bvh->n_leaves);
-    rtcSetGeometryUserData(geometry, bvh);
-    rtcSetGeometryBoundsFunction(geometry, embree_asks_bounds, NULL);
-    rtcSetGeometryIntersectFunction(geometry, bvh_meet_leaf);
-    rtcCommitGeometry(geometry);
     bvh->rtc = rtcNewScene(bvh->device);
-    rtcAttachGeometry(bvh->rtc, geometry);
-    rtcReleaseGeometry(geometry);
+    attach(bvh, bvh->n_leaves, embree_asks_bounds, bvh_meet_leaf);
+    if (bvh->scene->n_copies > 0) attach(bvh, bvh->scene->n_copies, embree_asks_copy_bounds, bvh_meet_copy);
     rtcSetSceneProgressMonitorFunction(bvh->rtc, embree_may_go_on, ctx.out);
     rtcCommitScene(bvh->rtc);
     return check_device(bvh->device, err);
 }
 
 /* The planes are made once Embree has given back what it takes for building. */
-static int build(struct bvh *bvh, const struct sh_report *report, struct sh_err *err)
+static int build(struct bvh *bvh, unsigned threads, const struct sh_report *report, struct sh_err *err)
 {
     int rc = bvh_make_leaves(bvh, report, err);
+    if (rc == SH_OK) rc = bvh_make_copies(bvh, threads, report, err);
     if (rc == SH_OK) rc = commit(bvh, report, err);
     if (rc == SH_OK) rc = bvh_make_planes(bvh, report, err);
     return rc;
@@ -87,15 +94,16 @@ int bvh_create(const struct scene *scene, unsigned threads, const struct sh_repo
     rtcSetDeviceMemoryMonitorFunction(bvh->device, embree_counts_bytes, bvh);
     if (scene->n_triangles > 1000000) sh_progress(report, "building the BVH", -1.0);
     double start = seconds();
-    int rc = build(bvh, report, err);
+    int rc = build(bvh, threads, report, err);
     if (rc != SH_OK) {
         bvh_free(bvh);
         return rc;
     }
     bvh->info.packet = embree_packet(bvh->device);
     bvh->info.build_s = seconds() - start;
-    bvh->info.bytes = (uint64_t)__atomic_load_n(&bvh->bytes, __ATOMIC_RELAXED) +
-                      (uint64_t)scene->n_triangles * sizeof *bvh->plane + (uint64_t)bvh->n_leaves * sizeof *bvh->leaf;
+    bvh->info.bytes += (uint64_t)__atomic_load_n(&bvh->bytes, __ATOMIC_RELAXED) +
+                       (uint64_t)scene->n_triangles * sizeof *bvh->plane + (uint64_t)bvh->n_leaves * sizeof *bvh->leaf +
+                       (uint64_t)scene->n_copies * sizeof *bvh->copy;
     *out = bvh;
     return SH_OK;
 }
@@ -105,6 +113,7 @@ void bvh_free(struct bvh *bvh)
     if (bvh == NULL) return;
     if (bvh->rtc != NULL) rtcReleaseScene(bvh->rtc);
     rtcReleaseDevice(bvh->device);
+    bvh_free_copies(bvh);
     free(bvh->leaf);
     free(bvh->plane);
     free(bvh);

@@ -22,6 +22,11 @@
  * At that range the real ray is at its triangle, so the float ray is in its box, and has entered it before.
  * Rays begin at most 1.5 r from the scene's middle: those from further away are taken along until they have come that
  * near (hits.c). So nothing here depends on where rays begin.
+ *
+ * Copies of a mesh. The mesh has a BVH of its own, in its own frame. Its copies are primitives of the scene's BVH, with
+ * boxes made larger in the same way. A packet that reaches one is turned into the mesh's frame in double, and cast there
+ * anew (copies.c). The rays and triangles there are those of the scene up to the rounding of that turn, so all of the
+ * above holds in each copy. Ranges come back times the copy's scale.
  */
 #ifndef CORE_BVH_BVH_INSIDE_H
 #define CORE_BVH_BVH_INSIDE_H
@@ -31,7 +36,6 @@
 
 #include "core/bvh.h"
 #include "core/embree.h"
-#include "core/vecmath.h"
 
 _Static_assert(sizeof(struct bvh_plane) == 4 * sizeof(double), "gathered as doubles"); /* planes.c */
 
@@ -42,12 +46,21 @@ struct bvh_leaf {
     uint32_t triangle[2];  /* the second may be BVH_NO_TRIANGLE */
 };
 
+/* A copy of a mesh: a primitive. */
+struct bvh_copy {
+    const struct scene_copy *at;
+    const struct bvh *mesh;
+    uint32_t first; /* its first triangle's number */
+};
+
 struct bvh {
     RTCDevice device;
     RTCScene rtc;
     const struct scene *scene;
     struct bvh_leaf *leaf;
     uint32_t n_leaves;
+    struct bvh **mesh;       /* [scene->n_copied] of those that have copies */
+    struct bvh_copy *copy;   /* [scene->n_copies] */
     struct bvh_plane *plane; /* one more than there are: the last stands for a miss, all NaN */
     double origin_m[3];      /* the middle of the scene */
     double radius_m;         /* nothing of it is further from there */
@@ -70,9 +83,12 @@ typedef struct RTCIntersectContext bvh_context;
 #endif
 
 /* A packet in double: what leaves see of it. Embree hands on its context, which is the first member. */
+struct bvh_nested;
 struct bvh_query {
     bvh_context context;
     const struct bvh *bvh;
+    struct bvh_nested *nested; /* for copies; of a query within a copy: NULL */
+    double at_origin_m;        /* no hit is nearer than this */
     uint32_t width;            /* rays of the call */
     int has_own;               /* each ray begins at its own point, org; else all at at */
     double at[3], at_local[3]; /* prcs; from the BVH's origin */
@@ -90,29 +106,18 @@ struct bvh_query {
     uint64_t decided, leaves; /* struct bvh_counters */
 } __attribute__((aligned(64)));
 
+/* A packet within a copy. */
+struct bvh_nested {
+    struct bvh_query query;
+    struct RTCRayHit16 rays; /* or fewer */
+    int valid[BVH_PACKET];
+} __attribute__((aligned(64)));
+
 /* A field of `width` rays, which has as many elements, from the names of struct RTCRayHit. Embree has accessors for C++
  * alone. */
 #define bvh_field(rays, width, name) \
     ((float *)(void *)(rays) + offsetof(struct RTCRay, name) / sizeof(float) * (size_t)(width))
 _Static_assert(offsetof(struct RTCRay16, tfar) == 16 * offsetof(struct RTCRay, tfar), "field by field");
-
-/* The next float above a number that is not negative. */
-VEC_INLINE float float_above(double x)
-{
-    const float f = (float)x;
-    uint32_t bits;
-    memcpy(&bits, &f, sizeof bits);
-    bits += (double)f <= x;
-    float above;
-    memcpy(&above, &bits, sizeof above);
-    return above;
-}
-
-/* What is as near as the nearest has to be found, too: tfar is beyond both. */
-VEC_INLINE float tfar_of(double nearest_m, double start_m)
-{
-    return float_above(nearest_m + BVH_SAME * nearest_m - start_m);
-}
 
 /* leaves.c: fills the leaves, and sets n_leaves; makes the planes. */
 int bvh_make_leaves(struct bvh *bvh, const struct sh_report *report, struct sh_err *err);
@@ -122,6 +127,18 @@ void embree_asks_bounds(const struct RTCBoundsFunctionArguments *args);
 /* meet.c: the callback. */
 void bvh_meet_leaf(const struct RTCIntersectFunctionNArguments *args);
 
+/* copies.c: BVHs of meshes that have copies; the boxes of the copies, and the callback. */
+int bvh_make_copies(struct bvh *bvh, unsigned threads, const struct sh_report *report, struct sh_err *err);
+void bvh_free_copies(struct bvh *bvh);
+void embree_asks_copy_bounds(const struct RTCBoundsFunctionArguments *args);
+void bvh_meet_copy(const struct RTCIntersectFunctionNArguments *args);
+/* leaves.c: the box around lo .. hi, from the BVH's origin, made larger for what Embree rounds. */
+void bvh_pad_box(const struct bvh *bvh, const double lo_m[3], const double hi_m[3], double far_m,
+                 struct RTCBounds *box);
+
+/* packet.c: Embree's context at its beginning; `width` rays through the BVH. */
+void bvh_begin_query(struct bvh_query *query);
+void bvh_call_embree(const struct bvh *bvh, struct bvh_query *query, const int *valid, void *rays, uint32_t width);
 /* packet.c: casts n <= BVH_CHUNK rays, whose float directions and origins are given. */
 struct bvh_batch {
     const struct bvh_rays *rays;
@@ -137,5 +154,9 @@ void bvh_intersect(const struct bvh *bvh, struct bvh_query *query, struct bvh_ba
 /* planes.c */
 /* Labels and steepness of the hits; those of what a ray does not meet. */
 void bvh_refine(const struct bvh *bvh, const struct bvh_rays *rays);
+/* copies.c: the same where there are copies. */
+void bvh_refine_copies(const struct bvh *bvh, const struct bvh_rays *rays);
+void bvh_cosines_copies(const struct bvh *bvh, const uint32_t *triangle, const struct vec3_in *dir, uint32_t n,
+                        double *cosine);
 
 #endif

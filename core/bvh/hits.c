@@ -10,6 +10,7 @@ enum { ROOM = BVH_CHUNK + 48 }; /* arrays of a power of two would get into each 
 
 struct bvh_work {
     struct bvh_query query;
+    struct bvh_nested nested; /* touched only where there are copies */
     struct {
         float x[ROOM], y[ROOM], z[ROOM];
     } dir, org; /* as Embree gets them */
@@ -26,6 +27,7 @@ int bvh_work_create(struct bvh_work **out, struct sh_err *err)
     struct bvh_work *w = *out = aligned_alloc(64, (sizeof *w + 63) / 64 * 64);
     if (w == NULL) return sh_fail(err, SH_ENOMEM, "bvh: no memory");
     memset(w, 0, sizeof *w);
+    w->query.nested = &w->nested;
     return SH_OK;
 }
 

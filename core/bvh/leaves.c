@@ -59,7 +59,7 @@ static void measure(struct bvh *bvh)
 {
     const struct scene *scene = bvh->scene;
     double half[3];
-    if (scene->n_triangles == 0) return;
+    if (scene->n_all == 0) return;
     for (int i = 0; i < 3; i++) {
         bvh->origin_m[i] = scene->min_m[i] + 0.5 * (scene->max_m[i] - scene->min_m[i]);
         half[i] = fmax(scene->max_m[i] - bvh->origin_m[i], bvh->origin_m[i] - scene->min_m[i]);
@@ -128,25 +128,30 @@ int bvh_make_leaves(struct bvh *bvh, const struct sh_report *report, struct sh_e
     return rc;
 }
 
+void bvh_pad_box(const struct bvh *bvh, const double lo_m[3], const double hi_m[3], double far_m, struct RTCBounds *box)
+{
+    const double pad_m = 8.0 * 0x1p-24 * (far_m + 2.0 * bvh->radius_m);
+    *box = (struct RTCBounds){.lower_x = below(lo_m[0] - pad_m),
+                              .lower_y = below(lo_m[1] - pad_m),
+                              .lower_z = below(lo_m[2] - pad_m),
+                              .upper_x = above(hi_m[0] + pad_m),
+                              .upper_y = above(hi_m[1] + pad_m),
+                              .upper_z = above(hi_m[2] + pad_m)};
+}
+
 void embree_asks_bounds(const struct RTCBoundsFunctionArguments *args)
 {
     const struct bvh *bvh = args->geometryUserPtr;
     const struct bvh_leaf *leaf = &bvh->leaf[args->primID];
     double lo[3], hi[3];
-    const double pad_m = 8.0 * 0x1p-24 * ((double)leaf->far_m + 2.0 * bvh->radius_m);
     for (int j = 0; j < 3; j++) {
         lo[j] = hi[j] = leaf->corner_m[0][j];
         for (int i = 1; i < 4; i++) {
             lo[j] = fmin(lo[j], leaf->corner_m[i][j]);
             hi[j] = fmax(hi[j], leaf->corner_m[i][j]);
         }
-        lo[j] = lo[j] - bvh->origin_m[j] - pad_m;
-        hi[j] = hi[j] - bvh->origin_m[j] + pad_m;
+        lo[j] -= bvh->origin_m[j];
+        hi[j] -= bvh->origin_m[j];
     }
-    *args->bounds_o = (struct RTCBounds){.lower_x = below(lo[0]),
-                                         .lower_y = below(lo[1]),
-                                         .lower_z = below(lo[2]),
-                                         .upper_x = above(hi[0]),
-                                         .upper_y = above(hi[1]),
-                                         .upper_z = above(hi[2])};
+    bvh_pad_box(bvh, lo, hi, (double)leaf->far_m, args->bounds_o);
 }

@@ -3,6 +3,7 @@
 
 #include "core/bvh/bvh_inside.h"
 #include "core/bvh/edges.h"
+#include "core/bvh/nearest.h"
 #include "core/vec3.h"
 #include "core/vecmath.h"
 
@@ -146,33 +147,11 @@ static int is_hole(const struct bvh_query *query, uint32_t lane, uint32_t triang
     return texture_is_hole(scene_cutout(scene, triangle), uv);
 }
 
-/* As near as the nearest: the lowest number is the hit. Where the hit so far turns out not to be as near, it had kept
- * others out that may be: the ray is cast again. */
-static void add_tied(struct bvh_query *query, uint32_t lane, uint32_t triangle, double range_m)
-{
-    const double nearest_m = query->range_m[lane];
-    const int is_past = query->hit_m[lane] > nearest_m + BVH_SAME * nearest_m;
-    query->unsure |= (uint32_t)is_past << lane;
-    if (!is_past && triangle >= query->triangle[lane]) return;
-    query->triangle[lane] = triangle;
-    query->hit_m[lane] = range_m;
-}
-
 /* A triangle that the ray meets, at a range that is no further than the nearest and what counts as the same. */
 VEC_INLINE void note(struct bvh_query *query, float *tfar, uint32_t lane, uint32_t triangle, double range_m)
 {
-    const double nearest_m = query->range_m[lane];
     if (query->bvh->scene->cutout != NULL && is_hole(query, lane, triangle, range_m)) return;
-    if (range_m < nearest_m) {
-        query->range_m[lane] = range_m;
-        *tfar = tfar_of(range_m, query->start_m[lane]);
-    }
-    if (range_m + BVH_SAME * range_m < nearest_m) {
-        query->triangle[lane] = triangle;
-        query->hit_m[lane] = range_m;
-        return;
-    }
-    add_tied(query, lane, triangle, range_m);
+    bvh_take_hit(query, tfar, lane, triangle, range_m, range_m);
 }
 
 /* Range to a triangle that the ray meets, and almost in its plane, where the plane's own range runs away: it is kept
@@ -206,7 +185,7 @@ static int begins_at_corner(double v[3][3])
  * counts, and of those the one with the lowest number. */
 static void note_miss(struct bvh_query *query, uint32_t lane, uint32_t triangle, double range_m)
 {
-    if (!(range_m > BVH_AT_ORIGIN_M) || range_m > query->near_m[lane]) return;
+    if (!(range_m > query->at_origin_m) || range_m > query->near_m[lane]) return;
     if (range_m == query->near_m[lane] && triangle > query->near[lane]) return;
     if (is_hole(query, lane, triangle, range_m)) return;
     query->near_m[lane] = range_m;
@@ -237,7 +216,7 @@ static void try_one(struct bvh_query *query, float *tfar, uint32_t lane, const s
     const double nearest_m = query->range_m[lane];
     if (!met)
         note_miss(query, lane, triangle, range_m);
-    else if (range_m > BVH_AT_ORIGIN_M && range_m <= nearest_m + BVH_SAME * nearest_m)
+    else if (range_m > query->at_origin_m && range_m <= nearest_m + BVH_SAME * nearest_m)
         note(query, tfar, lane, triangle, range_m);
 }
 
@@ -252,13 +231,14 @@ VEC_INLINE void find_ranges(const struct bvh_query *query, const struct bvh_plan
     const double *px = query->local[0], *py = query->local[1], *pz = query->local[2], *nearest_m = query->range_m;
     const double nx = plane->n[0], ny = plane->n[1], nz = plane->n[2], d = plane->d;
     const double least = FLAT * FLAT * vec3_dot(plane->n, plane->n), off = nx * o[0] + ny * o[1] + nz * o[2];
+    const double begin_m = query->at_origin_m;
     const int own = query->has_own;
     VEC_LOOP
     for (uint32_t i = 0; i < BVH_PACKET; i++) {
         const double along = nx * dx[i] + ny * dy[i] + nz * dz[i];
         const double here = own ? nx * px[i] + ny * py[i] + nz * pz[i] : off, range = (d - here) / along;
         const double more = range + BVH_SAME * range, most = nearest_m[i] + BVH_SAME * nearest_m[i];
-        const int64_t ahead = range > BVH_AT_ORIGIN_M, nearer = more < nearest_m[i], as_near = range <= most;
+        const int64_t ahead = range > begin_m, nearer = more < nearest_m[i], as_near = range <= most;
         range_m[i] = range;
         becomes[i] = along * along > least ? (ahead & as_near) << (1 - nearer) : FLAT_SEEN;
     }

@@ -2,6 +2,7 @@
 #include <math.h>
 
 #include "core/bvh/bvh_inside.h"
+#include "core/bvh/nearest.h"
 #include "core/vecmath.h"
 
 struct packet {
@@ -10,43 +11,41 @@ struct packet {
 } __attribute__((aligned(64)));
 
 #if RTC_VERSION_MAJOR >= 4
-static void begin(struct bvh_query *query)
+void bvh_begin_query(struct bvh_query *query)
 {
     rtcInitRayQueryContext(&query->context);
 }
 
-static void call(const struct bvh *bvh, struct bvh_query *query, struct packet *packet, uint32_t width)
+void bvh_call_embree(const struct bvh *bvh, struct bvh_query *query, const int *valid, void *rays, uint32_t width)
 {
     struct RTCIntersectArguments how;
     rtcInitIntersectArguments(&how);
     how.flags = RTC_RAY_QUERY_FLAG_COHERENT;
     how.context = &query->context;
-    void *rays = &packet->at;
     if (width == 16)
-        rtcIntersect16(packet->valid, bvh->rtc, rays, &how);
+        rtcIntersect16(valid, bvh->rtc, rays, &how);
     else if (width == 8)
-        rtcIntersect8(packet->valid, bvh->rtc, rays, &how);
+        rtcIntersect8(valid, bvh->rtc, rays, &how);
     else if (width == 4)
-        rtcIntersect4(packet->valid, bvh->rtc, rays, &how);
+        rtcIntersect4(valid, bvh->rtc, rays, &how);
     else
         rtcIntersect1(bvh->rtc, rays, &how);
 }
 #else
-static void begin(struct bvh_query *query)
+void bvh_begin_query(struct bvh_query *query)
 {
     rtcInitIntersectContext(&query->context);
     query->context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
 }
 
-static void call(const struct bvh *bvh, struct bvh_query *query, struct packet *packet, uint32_t width)
+void bvh_call_embree(const struct bvh *bvh, struct bvh_query *query, const int *valid, void *rays, uint32_t width)
 {
-    void *rays = &packet->at;
     if (width == 16)
-        rtcIntersect16(packet->valid, bvh->rtc, &query->context, rays);
+        rtcIntersect16(valid, bvh->rtc, &query->context, rays);
     else if (width == 8)
-        rtcIntersect8(packet->valid, bvh->rtc, &query->context, rays);
+        rtcIntersect8(valid, bvh->rtc, &query->context, rays);
     else if (width == 4)
-        rtcIntersect4(packet->valid, bvh->rtc, &query->context, rays);
+        rtcIntersect4(valid, bvh->rtc, &query->context, rays);
     else
         rtcIntersect1(bvh->rtc, &query->context, rays);
 }
@@ -135,7 +134,7 @@ static void settle(const struct bvh *bvh, struct bvh_query *query, struct packet
         query->hit_m[i] = NAN;
     }
     query->unsure = 0;
-    call(bvh, query, packet, width);
+    bvh_call_embree(bvh, query, packet->valid, &packet->at, width);
 }
 
 VEC_INLINE void cast_one(const struct bvh *bvh, struct bvh_query *query, struct packet *packet,
@@ -146,7 +145,7 @@ VEC_INLINE void cast_one(const struct bvh *bvh, struct bvh_query *query, struct 
     set_doubles(query, batch, first, n);
     query->width = width;
     query->dir_float = width == BVH_PACKET ? bvh_field(&packet->at, width, dir_x) : NULL;
-    call(bvh, query, packet, width);
+    bvh_call_embree(bvh, query, packet->valid, &packet->at, width);
     if (query->unsure != 0) settle(bvh, query, packet, width);
     if (query->decided != decided) take_near(query, n);
     memcpy(batch->rays->range_m + first, query->hit_m, n * sizeof *query->hit_m);
@@ -169,9 +168,10 @@ void bvh_intersect(const struct bvh *bvh, struct bvh_query *query, struct bvh_ba
     const struct bvh_rays *rays = batch->rays;
     const uint32_t width = rays->scattered ? 1 : bvh->info.packet;
     struct packet packet;
-    begin(query);
+    bvh_begin_query(query);
     begin_packet(&packet, batch, width);
     query->bvh = bvh;
+    query->at_origin_m = BVH_AT_ORIGIN_M;
     query->has_own = rays->from.own.x != NULL;
     query->far_m = batch->far_m;
     query->decided = query->leaves = 0;

@@ -24,10 +24,11 @@ struct seen {
 static int is_front(const struct cast_setup *s, const struct seen *seen, const double dir[3])
 {
     const struct cast_mover *m = seen->body != 0 ? caster_body(s, seen->body) : NULL;
-    const double *n = bvh_plane(m != NULL ? m->bvh : s->bvh, seen->triangle)->n;
+    struct bvh_plane plane;
     double along = 0.0;
+    bvh_get_plane(m != NULL ? m->bvh : s->bvh, seen->triangle, &plane);
     for (int i = 0; i < 3; i++)
-        along += dir[i] * (m == NULL ? n[i] : vec3_dot(m->rotation + 3 * i, n));
+        along += dir[i] * (m == NULL ? plane.n[i] : vec3_dot(m->rotation + 3 * i, plane.n));
     return along < 0.0;
 }
 

@@ -21,10 +21,11 @@ int caster_is_bare(const struct cast_setup *s, uint32_t label, double rho)
 static void normal_of(const struct cast_setup *s, uint8_t body, uint32_t hit, double n[3])
 {
     const struct cast_mover *m = body != 0 ? caster_body(s, body) : NULL;
-    const double *at_rest = bvh_plane(m != NULL ? m->bvh : s->bvh, hit)->n;
-    double length = sqrt(vec3_dot(at_rest, at_rest));
+    struct bvh_plane at_rest;
+    bvh_get_plane(m != NULL ? m->bvh : s->bvh, hit, &at_rest);
+    double length = vec3_length(at_rest.n);
     for (int i = 0; i < 3; i++)
-        n[i] = (m == NULL ? at_rest[i] : vec3_dot(m->rotation + 3 * i, at_rest)) / length;
+        n[i] = (m == NULL ? at_rest.n[i] : vec3_dot(m->rotation + 3 * i, at_rest.n)) / length;
 }
 
 /* A way goes on so far beyond a surface, measured across it, that the surface itself is not met again. Double precision

@@ -118,7 +118,9 @@ static float met_sigma(const struct caster *c, const struct cast_setup *s, const
     const struct beam_part part = {.xx = (double)p->xx[i], .xy = (double)p->xy[i], .yy = (double)p->yy[i]};
     if (p->triangle[i] == BVH_NO_TRIANGLE) /* of a body that moves, whole footprints, with an incidence */
         return beam_round_sigma(beam, p->range_m[i], p->cosine[i], part.xx);
-    return beam_part_sigma(beam, &job->sight, bvh_plane(s->bvh, p->triangle[i])->n, p->range_m[i], &part);
+    struct bvh_plane plane;
+    bvh_get_plane(s->bvh, p->triangle[i], &plane);
+    return beam_part_sigma(beam, &job->sight, plane.n, p->range_m[i], &part);
 }
 
 /* What sub-ray i of a job came to. */

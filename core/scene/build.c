@@ -149,10 +149,10 @@ static int find_bounds(const struct scene_build *b, struct sh_err *err)
     return rc;
 }
 
-int build_finish(struct scene_build *b, struct scene **out, struct sh_err *err)
+int build_finish(struct scene_build *b, int may_be_empty, struct scene **out, struct sh_err *err)
 {
     struct scene *s = b->scene;
-    if (s->n_triangles == 0) return sh_fail(err, SH_EINPUT, "the scene has no triangles");
+    if (s->n_triangles == 0 && !may_be_empty) return sh_fail(err, SH_EINPUT, "the scene has no triangles");
     if (b->surface_tree != NULL) tdestroy(b->surface_tree, keep_surface);
     b->surface_tree = NULL;
     if (s->n_textures == 0) {
@@ -162,6 +162,7 @@ int build_finish(struct scene_build *b, struct scene **out, struct sh_err *err)
     int rc = settle_all(b, err);
     if (rc == SH_OK) rc = find_bounds(b, err);
     if (rc != SH_OK) return rc;
+    s->n_all = s->n_triangles;
     *out = s;
     b->scene = NULL;
     return SH_OK;

@@ -38,8 +38,8 @@ int build_init(struct scene_build *b, double tolerance_m, const struct sh_report
 void build_begin_file(struct scene_build *b, const struct scene_mesh_spec *spec);
 /* Warns of what was left out; SH_EINPUT when the file gave no triangle. */
 int build_end_file(struct scene_build *b, struct sh_err *err);
-/* Hands the scene over. build_release is due in any case. */
-int build_finish(struct scene_build *b, struct scene **out, struct sh_err *err);
+/* Hands the scene over; it may be empty where something else follows. build_release is due in any case. */
+int build_finish(struct scene_build *b, int may_be_empty, struct scene **out, struct sh_err *err);
 void build_release(struct scene_build *b);
 
 /* Fails with "FILE, line N, mesh 'M': text". Returns code. */
@@ -93,6 +93,14 @@ void build_announce(struct scene_build *b);
 
 /* The file's name without folders and ending: the object's name where a file has none. */
 struct text_span build_base_name(const struct scene_build *b);
+
+/* ---- copies.c: the mesh, which the scene owns from then on, at all these places. */
+int scene_add_copies(struct scene *scene, struct scene *mesh, const struct scene_places *places,
+                     const struct sh_report *report, struct sh_err *err);
+
+/* Part of scene_keep: each copy keeps what its labels say, and goes where that is nothing. label: new ones, by old ones.
+ * SH_EINPUT where copies of a mesh would keep different surfaces. */
+int scene_keep_copies(struct scene *scene, const uint8_t *keep, const uint16_t *label, struct sh_err *err);
 
 /* ---- cutouts.c */
 /* Holes in the textures of a scene that is complete. Warns of textures that can't be read. */

@@ -1,4 +1,6 @@
 /* scanhead check: validates configuration, scene and links. Nothing runs. */
+#include <inttypes.h>
+
 #include "core/vec3.h"
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/check_heads.h"
@@ -71,16 +73,26 @@ static void print_target(const struct site *site)
            target->others == OTHERS_HIDE ? "hide what is behind them and give no points" : "are left out");
 }
 
+/* Triangles of copies are counted with the others. */
+static const char *copies_text(const struct scene *scene, char *text, size_t len)
+{
+    text[0] = '\0';
+    if (scene->n_copies > 0)
+        snprintf(text, len, "%u copies (%" PRIu64 " triangles are kept), ", scene->n_copies, scene_n_kept(scene));
+    return text;
+}
+
 static int print_summary(const struct config *cfg, const struct sites *sites, struct sh_err *err)
 {
     const struct site *site = sites->first;
     const struct scene *scene = site->scene;
+    char copies[96];
     int rc = SH_OK;
     printf("%s: ok\n", cfg->file);
     check_print_heads(sites, stdout);
-    printf("scene     %u triangles, %u surfaces, x %.3f..%.3f  y %.3f..%.3f  z %.3f..%.3f m\n", scene->n_triangles,
-           scene->n_surfaces, scene->min_m[0], scene->max_m[0], scene->min_m[1], scene->max_m[1], scene->min_m[2],
-           scene->max_m[2]);
+    printf("scene     %u triangles, %u surfaces, %sx %.3f..%.3f  y %.3f..%.3f  z %.3f..%.3f m\n", scene->n_all,
+           scene->n_surfaces, copies_text(scene, copies, sizeof copies), scene->min_m[0], scene->max_m[0],
+           scene->min_m[1], scene->max_m[1], scene->min_m[2], scene->max_m[2]);
     print_target(site);
     check_print_anchor(site, stdout);
     if (site->stop != NULL) check_print_stops(site, stdout);

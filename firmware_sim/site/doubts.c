@@ -106,15 +106,49 @@ static int has_near_vertex(const struct scene *scene, const double p[3], double 
     return 0;
 }
 
+/* The distance of a point from the bounds of a copy. */
+static double distance_from(const struct scene_copy *copy, const double p[3])
+{
+    double off[3];
+    for (int k = 0; k < 3; k++)
+        off[k] = fmax(0.0, fmax(copy->min_m[k] - p[k], p[k] - copy->max_m[k]));
+    return vec3_length(off);
+}
+
+/* Copies of one mesh. */
+static int is_copy_reached(const struct scene_copied *of, const double p[3], double reach_m, int *reached,
+                           struct sh_err *err)
+{
+    struct distance *index = NULL;
+    struct distance_hit hit;
+    double in[3], vertex_m[3];
+    int rc = SH_OK;
+    for (uint32_t k = 0; k < of->n && !*reached; k++) { /* a vertex settles most cases */
+        scene_copy_put(&of->copy[k], of->mesh->vertex_m[of->mesh->triangle[0][0]], vertex_m);
+        *reached = vec3_distance(vertex_m, p) <= reach_m;
+    }
+    for (uint32_t k = 0; k < of->n && !*reached && rc == SH_OK; k++) {
+        if (distance_from(&of->copy[k], p) > reach_m) continue;
+        if (index == NULL) rc = distance_create(of->mesh, &index, err);
+        scene_copy_put_back(&of->copy[k], p, in);
+        if (rc == SH_OK) *reached = distance_query(index, in, reach_m / of->copy[k].scale, &hit);
+    }
+    distance_free(index);
+    return rc;
+}
+
 static int is_reached(const struct scene *scene, const double p[3], double reach_m, int *reached, struct sh_err *err)
 {
     struct distance *index = NULL;
     struct distance_hit hit;
+    int rc = SH_OK;
     *reached = has_near_vertex(scene, p, reach_m);
     for (int i = 0; i < 3; i++)
         if (p[i] < scene->min_m[i] - reach_m || p[i] > scene->max_m[i] + reach_m) return SH_OK;
-    if (*reached) return SH_OK;
-    int rc = distance_create(scene, &index, err);
+    for (uint32_t i = 0; i < scene->n_copied && !*reached && rc == SH_OK; i++)
+        rc = is_copy_reached(&scene->copied[i], p, reach_m, reached, err);
+    if (*reached || scene->n_triangles == 0 || rc != SH_OK) return rc;
+    rc = distance_create(scene, &index, err);
     if (rc == SH_OK) *reached = distance_query(index, p, reach_m, &hit);
     distance_free(index);
     return rc;

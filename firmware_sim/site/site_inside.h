@@ -9,6 +9,7 @@ enum site_purpose {
     SITE_FOR_SCANS,
     SITE_FOR_PLAN, /* site_load_plan */
     SITE_MOVED,    /* site_load_moved */
+    SITE_WRITTEN_OUT,
 };
 int site_create(const struct config *cfg, enum site_purpose purpose, const struct site *other,
                 const struct sh_report *report, struct site **out, struct sh_err *err);
@@ -68,6 +69,10 @@ int site_enter_world(struct site *site, const struct site *other, struct sh_err 
 void site_leave_world(struct site *site);
 
 /* ---- target.c: scene.target. */
+
+/* Where the copies of a mesh stand: places->place is to be freed in any case, and NULL where it has none. */
+int site_read_copies(const struct config *cfg, uint32_t number, const struct sh_report *report,
+                     struct scene_places *places, struct sh_err *err);
 
 /* The meshes are loaded, each with labels of its own: leaves out what is no target, or notes it. SH_EINPUT where a pattern fits nothing, or nothing is
  * left. */
