@@ -2,6 +2,8 @@
  * a file, and what is wrong with them. */
 #include <math.h>
 
+#include <png.h>
+
 #include "core/cast.h"
 #include "firmware_sim/site/site.h"
 #include "tests/unit/config_rig.h"
@@ -16,7 +18,24 @@ static const char PLACES[] =
     "x_m,y_m,z_m,turn_deg,scale\n4,3,0,30,1\n\n-5,2,0.5,-200,1.5\n1,-7,0,0,0.7\n2.5,6,-0.1,77,2\n";
 static const char LIST[] = "[{offset_m: [4, 3, 0], turn_deg: 30}, {offset_m: [-5, 2, 0.5], turn_deg: -200, scale: 1.5},"
                            " {offset_m: [1, -7, 0], scale: 0.7}, {offset_m: [2.5, 6, -0.1], turn_deg: 77, scale: 2}]";
-static const char *const files[] = {"tree.obj", "ground.obj", "trees.csv"};
+static const char *const files[] = {"tree.obj", "ground.obj", "trees.csv", "board.obj", "board.mtl", "board.png"};
+
+/* A board whose texture gets lighter and is a hole in every other square. */
+static int write_board(void)
+{
+    static uint8_t rgba[8 * 8][4];
+    char path[256];
+    png_image image = {.version = PNG_IMAGE_VERSION, .width = 8, .height = 8, .format = PNG_FORMAT_RGBA};
+    for (int i = 0; i < 8 * 8; i++) {
+        rgba[i][0] = rgba[i][1] = rgba[i][2] = (uint8_t)(4 * i);
+        rgba[i][3] = (i % 8 + i / 8) % 2 != 0 ? 255 : 0;
+    }
+    write_in("board.mtl", "newmtl leaves\nmap_Kd board.png\n");
+    write_in("board.obj", "mtllib board.mtl\nusemtl leaves\nv -1 0 0\nv 1 0 0\nv 1 0 3\nv -1 0 3\n"
+                          "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n");
+    snprintf(path, sizeof path, "%s/board.png", dir);
+    return png_image_write_to_file(&image, path, 0, rgba, 0, NULL);
+}
 
 static int write_files(void **state)
 {
@@ -25,7 +44,7 @@ static int write_files(void **state)
     write_in("tree.obj", TREE);
     write_in("ground.obj", GROUND);
     write_in("trees.csv", PLACES);
-    return 0;
+    return write_board() ? 0 : -1;
 }
 
 static int remove_files(void **state)
@@ -107,6 +126,7 @@ static void compare(struct lines *a, struct lines *b, uint32_t least_on_trees)
             const int64_t off = (int64_t)(uint32_t)p->a[k] - (int64_t)(uint32_t)q->a[k];
             on_trees += p->echo[k] != 0 && p->label[k] != 0;
             other += p->echo[k] != q->echo[k] || p->label[k] != q->label[k] || off > 1 || off < -1;
+            other += p->refl_cdb[k] - q->refl_cdb[k] > 1 || q->refl_cdb[k] - p->refl_cdb[k] > 1;
         }
         line_block_free(&a->block[i]);
         line_block_free(&b->block[i]);
@@ -136,6 +156,30 @@ static void points_are_those_of_triangles(void **state)
     for (size_t i = 0; i < sizeof more / sizeof *more; i++) {
         compare_sites(text_of("", "copies: trees.csv", more[i]), 0.0);
         compare_sites(text_of("", "copies: trees.csv, copy_labels: on", more[i]), 0.0);
+    }
+}
+
+/* Holes of textures, and what textures reflect, are looked up in the mesh. */
+static void textures_lie_on_copies(void **state)
+{
+    (void)state;
+    static struct lines lines[2];
+    char text[1024];
+    for (int own = 0; own < 2; own++) {
+        snprintf(text, sizeof text,
+                 "head: {profile: riegl-vz400i, lines_hz: 40, pan_deg_s: 60}\nsignal: {model: on}\nscene:\n  meshes:\n"
+                 "    - {file: ground.obj, up: z, scale: 1}\n"
+                 "    - {file: board.obj, up: z, scale: 1, copies: trees.csv, copy_labels: %s}\n"
+                 "stations: [{position_m: [0.3, 0.2, 1.6]}]\n",
+                 own ? "on" : "off");
+        for (int k = 0; k < 2; k++) {
+            struct site *site = load_site(text, k);
+            const struct scene *mesh = k == 0 ? site->scene->copied[0].mesh : site->scene;
+            assert_true(mesh->cutout != NULL && mesh->uv != NULL);
+            cast_lines(site, 0.0, &lines[k]);
+            site_free(site);
+        }
+        compare(&lines[0], &lines[1], 500);
     }
 }
 
@@ -286,10 +330,11 @@ static void methods_without_copies_say_so(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(points_are_those_of_triangles), cmocka_unit_test(copies_move_as_one_body),
-        cmocka_unit_test(a_list_is_as_good_as_a_file),   cmocka_unit_test(faults_of_a_file_say_where),
-        cmocka_unit_test(too_many_surfaces_are_refused), cmocka_unit_test(targets_are_chosen_among_copies),
-        cmocka_unit_test(stations_stand_on_copies),      cmocka_unit_test(methods_without_copies_say_so),
+        cmocka_unit_test(points_are_those_of_triangles),   cmocka_unit_test(textures_lie_on_copies),
+        cmocka_unit_test(copies_move_as_one_body),         cmocka_unit_test(a_list_is_as_good_as_a_file),
+        cmocka_unit_test(faults_of_a_file_say_where),      cmocka_unit_test(too_many_surfaces_are_refused),
+        cmocka_unit_test(targets_are_chosen_among_copies), cmocka_unit_test(stations_stand_on_copies),
+        cmocka_unit_test(methods_without_copies_say_so),
     };
     return cmocka_run_group_tests_name("site copies", tests, write_files, remove_files);
 }
