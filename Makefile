@@ -153,7 +153,7 @@ $(BUILD)/scanhead: $(BUILD)/firmware_sim/main.c.o $(BUILD)/modules.a
 #   benches.a   what the programs of tests/bench share                      build/bench and the charts'
 #   its rigs    tests/unit/cast_rig.c where it includes cast_rig.h          tests of a folder; tests/rigs.sh finds which
 #   modules.a   the head, without main.c                                    all of them
-FIGURES = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_sight chart_georef chart_widths beam plain velodyne loop_cost kernels panorama copies)
+FIGURES = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_sight chart_georef chart_widths beam plain velodyne loop_cost loading kernels panorama copies)
 BENCH_MAINS = $(FIGURES:$(BUILD)/%=%.c) tests/bench/bench.c
 # LIMIT ends a test program that waits for ever; each is linked with it as an object, as nobody calls it.
 LIMIT = tests/common/limit.c
@@ -359,6 +359,10 @@ WITH ?=
 bench-loop: deps-build
 	@$(MAKE) --no-print-directory -j2 all $(BUILD)/tests/bench/loop_cost
 	@$(BUILD)/tests/bench/loop_cost $(BUILD)/scanhead '$(BUILD)/scanhead --no-hash' $(WITH)
+# `check` of meshes of 10 million triangles, beside Embree's build of them.
+bench-loading: deps-build
+	@$(MAKE) --no-print-directory -j2 all $(BUILD)/tests/bench/loading
+	@$(BUILD)/tests/bench/loading --program $(BUILD)/scanhead $(LOADING)
 chart: deps-build
 	$(call install_missing,$(DEPS_CHART))
 	@$(MAKE) --no-print-directory -j2 $(CHARTS)
@@ -409,6 +413,6 @@ format:
 clean:
 	rm -rf $(BUILD)
 .PHONY: ALWAYS all deps deps-test deps-build deps-guest deps-browser demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb repair \
-	test-usb-million test-hostile test-sight objects test-unit-programs test-programs bench bench-beam bench-plain bench-copies bench-velodyne bench-page page-pictures bench-loop bench-kernels bench-panorama chart install format clean
+	test-usb-million test-hostile test-sight objects test-unit-programs test-programs bench bench-beam bench-plain bench-copies bench-velodyne bench-page page-pictures bench-loop bench-loading bench-kernels bench-panorama chart install format clean
 .SECONDARY:
 -include $(shell find $(patsubst %,$(BUILD)/%,core drivers firmware_sim tests) -name '*.d' 2>/dev/null)

@@ -76,6 +76,14 @@ static double seconds(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
+/* Leaves at one node of Embree's tree. Four, where that is cheaper by Embree's own measure, save a seventh of the memory
+ * and cast as fast where surfaces hang together. Of foliage, which does not, a ray would try half as many more. */
+static unsigned most_together(const struct scene *scene)
+{
+    const int is_large = scene->n_triangles >= 500000, hangs_together = scene->n_vertices <= 0.6 * scene->n_triangles;
+    return is_large && hangs_together ? 4 : 1;
+}
+
 int bvh_create(const struct scene *scene, unsigned threads, const struct sh_report *report, struct bvh **out,
                struct sh_err *err)
 {
@@ -83,8 +91,9 @@ int bvh_create(const struct scene *scene, unsigned threads, const struct sh_repo
     struct bvh *bvh = calloc(1, sizeof *bvh);
     if (bvh == NULL) return sh_fail(err, SH_ENOMEM, "bvh: no memory");
     /* Embree sets 128 MB aside for subdivision surfaces, of which there are none here: 1 MB, the least. */
-    char config[64] = "tessellation_cache_size=1";
-    if (threads != 0) snprintf(config, sizeof config, "tessellation_cache_size=1,threads=%u", threads);
+    char config[96];
+    snprintf(config, sizeof config, "tessellation_cache_size=1,object_accel_max_leaf_size=%u,threads=%u",
+             most_together(scene), threads);
     bvh->scene = scene;
     bvh->device = rtcNewDevice(config);
     if (bvh->device == NULL) {

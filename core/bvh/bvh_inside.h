@@ -42,9 +42,40 @@ _Static_assert(sizeof(struct bvh_plane) == 4 * sizeof(double), "gathered as doub
 /* Triangle 0 has the corners 0, 1, 2, and triangle 1 the corners 1, 3, 2. One that stands alone has corner 0 for 3. */
 struct bvh_leaf {
     double corner_m[4][3]; /* prcs */
-    float far_m, edge_m;   /* its farthest corner from the BVH's origin, and its longest edge; at least */
-    uint32_t triangle[2];  /* the second may be BVH_NO_TRIANGLE */
+    uint32_t triangle;     /* 0 */
+    /* By bits: how far triangle 1 follows triangle 0 in the scene's list, 4, 0: there is none; and two lengths, 14 each. */
+    uint32_t rest;
 };
+_Static_assert(sizeof(struct bvh_leaf) == 104, "there are half as many as triangles");
+enum { BVH_LEAF_AHEAD = 16, BVH_LEAF_EDGE = 4, BVH_LEAF_FAR = 18 };
+
+/* Lengths lack the sign and 17 bits of a float, and are rounded up by less than 1/64. */
+enum { BVH_LENGTH_BITS = 17, BVH_LENGTH_MASK = 0x3fff };
+static inline double bvh_leaf_length(const struct bvh_leaf *leaf, int at)
+{
+    const uint32_t bits = (leaf->rest >> at & BVH_LENGTH_MASK) << BVH_LENGTH_BITS;
+    float f;
+    memcpy(&f, &bits, sizeof f);
+    return (double)f;
+}
+/* Its farthest corner from the BVH's origin, and its longest edge; at least. */
+static inline double bvh_leaf_far_m(const struct bvh_leaf *leaf)
+{
+    return bvh_leaf_length(leaf, BVH_LEAF_FAR);
+}
+static inline double bvh_leaf_edge_m(const struct bvh_leaf *leaf)
+{
+    return bvh_leaf_length(leaf, BVH_LEAF_EDGE);
+}
+static inline int bvh_leaf_has_two(const struct bvh_leaf *leaf)
+{
+    return leaf->rest % BVH_LEAF_AHEAD != 0;
+}
+/* which: 0, or 1 where there are two. */
+static inline uint32_t bvh_leaf_triangle(const struct bvh_leaf *leaf, int which)
+{
+    return leaf->triangle + (which == 0 ? 0 : leaf->rest % BVH_LEAF_AHEAD);
+}
 
 /* A copy of a mesh: a primitive. */
 struct bvh_copy {

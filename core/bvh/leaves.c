@@ -5,9 +5,6 @@
 #include "core/bvh/bvh_inside.h"
 #include "core/huge.h"
 
-/* A triangle's neighbour is looked for among this many of the list, itself included. */
-enum { AHEAD = 16 };
-
 /* The corner of a triangle that is none of another's that shares an edge with it; 3: they share none. */
 static int odd_corner(const uint32_t a[3], const uint32_t b[3])
 {
@@ -31,6 +28,15 @@ static float above(double x)
     return -below(-x);
 }
 
+/* As bvh_leaf_length reads it. */
+static uint32_t length_bits(double length_m)
+{
+    const float f = above(length_m);
+    uint32_t bits;
+    memcpy(&bits, &f, sizeof bits);
+    return (bits + (UINT32_C(1) << BVH_LENGTH_BITS) - 1) >> BVH_LENGTH_BITS;
+}
+
 static void fill_leaf(const struct bvh *bvh, uint32_t first, uint32_t second, struct bvh_leaf *leaf)
 {
     const struct scene *scene = bvh->scene;
@@ -48,10 +54,9 @@ static void fill_leaf(const struct bvh *bvh, uint32_t first, uint32_t second, st
     for (int i = 0; i < 4; i++)
         for (int j = 0; j < i; j++)
             if (i != 3 || j != 0) edge_m = fmax(edge_m, vec3_distance(leaf->corner_m[i], leaf->corner_m[j]));
-    leaf->far_m = above(far_m);
-    leaf->edge_m = above(edge_m);
-    leaf->triangle[0] = first;
-    leaf->triangle[1] = second;
+    leaf->triangle = first;
+    leaf->rest = (second != BVH_NO_TRIANGLE ? second - first : 0) | length_bits(edge_m) << BVH_LEAF_EDGE |
+                 length_bits(far_m) << BVH_LEAF_FAR;
 }
 
 /* The middle of the scene, and how far all of it lies from there. */
@@ -88,10 +93,11 @@ static int is_taken(const uint64_t *taken, uint32_t triangle)
     return (taken[triangle / 64] >> triangle % 64 & 1) != 0;
 }
 
-/* The one of the triangles that follow it in the list that makes the smallest box with it; or BVH_NO_TRIANGLE. */
+/* The one of those that follow the triangle in the list, up to what a leaf can name, that makes the smallest box with it; or BVH_NO_TRIANGLE. */
 static uint32_t partner(const struct scene *scene, uint32_t triangle, const uint64_t *taken)
 {
-    const uint32_t left = scene->n_triangles - triangle, end = triangle + (left < AHEAD ? left : AHEAD);
+    const uint32_t left = scene->n_triangles - triangle,
+                   end = triangle + (left < BVH_LEAF_AHEAD ? left : BVH_LEAF_AHEAD);
     uint32_t best = BVH_NO_TRIANGLE;
     double best_m2 = INFINITY, own_m2 = -1.0;
     for (uint32_t i = triangle + 1; i < end; i++) {
@@ -153,5 +159,5 @@ void embree_asks_bounds(const struct RTCBoundsFunctionArguments *args)
         lo[j] -= bvh->origin_m[j];
         hi[j] -= bvh->origin_m[j];
     }
-    bvh_pad_box(bvh, lo, hi, (double)leaf->far_m, args->bounds_o);
+    bvh_pad_box(bvh, lo, hi, bvh_leaf_far_m(leaf), args->bounds_o);
 }

@@ -195,7 +195,7 @@ static void note_miss(struct bvh_query *query, uint32_t lane, uint32_t triangle,
 /* One ray and one triangle, of which double precision in lanes can't say whether they meet, or where. */
 static void try_one(struct bvh_query *query, float *tfar, uint32_t lane, const struct bvh_leaf *leaf, int which)
 {
-    const uint32_t triangle = leaf->triangle[which];
+    const uint32_t triangle = bvh_leaf_triangle(leaf, which);
     const struct bvh_plane *plane = &query->bvh->plane[triangle];
     double v[3][3], dir[3], o[3];
     for (int j = 0; j < 3; j++) {
@@ -271,7 +271,7 @@ VEC_INLINE void meet_triangle(struct bvh_query *query, float *tfar, const struct
                               const struct lanes *found)
 {
     const int shift = which * SECOND, may_pass = query->bvh->scene->cutout != NULL;
-    const uint32_t triangle = leaf->triangle[which];
+    const uint32_t triangle = bvh_leaf_triangle(leaf, which);
     double range_m[BVH_PACKET];
     int64_t becomes[BVH_PACKET];
     uint32_t takes[BVH_PACKET], others = 0;
@@ -297,7 +297,7 @@ VEC_INLINE void meet_triangle(struct bvh_query *query, float *tfar, const struct
 /* Where all rays are beside the two triangles. found: all bits of the rays that Embree asks for. */
 VEC_INLINE void judge_all(const struct bvh_query *query, const struct bvh_leaf *leaf, struct lanes *found)
 {
-    const double size = ((double)leaf->far_m + query->far_m) * (double)leaf->edge_m;
+    const double size = (bvh_leaf_far_m(leaf) + query->far_m) * bvh_leaf_edge_m(leaf);
     const struct lanes valid = *found;
     int64_t wide[BVH_PACKET];
     if (query->has_own) {
@@ -317,9 +317,9 @@ VEC_INLINE void judge_all(const struct bvh_query *query, const struct bvh_leaf *
 VEC_CLONES
 static void meet(struct bvh_query *query, float *tfar, const struct bvh_leaf *leaf, struct lanes *found)
 {
-    const int two = leaf->triangle[1] != BVH_NO_TRIANGLE;
-    __builtin_prefetch(&query->bvh->plane[leaf->triangle[0]]);
-    if (two) __builtin_prefetch(&query->bvh->plane[leaf->triangle[1]]);
+    const int two = bvh_leaf_has_two(leaf);
+    __builtin_prefetch(&query->bvh->plane[leaf->triangle]);
+    if (two) __builtin_prefetch(&query->bvh->plane[bvh_leaf_triangle(leaf, 1)]);
     query->leaves++;
     judge_all(query, leaf, found);
     if (any(found, EITHER)) meet_triangle(query, tfar, leaf, 0, found);
