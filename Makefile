@@ -311,7 +311,7 @@ test-usb-million: deps
 DEPS_CHART = gnuplot-nox
 bench: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/bench
-	@$(BUILD)/bench --scenes 10k,100k,1M,10M,house,garden --leaks 1e8 -o $(BUILD)/bench.json
+	@$(BUILD)/bench --scenes 10k,100k,1M,10M,house,garden --reach --leaks 1e8 -o $(BUILD)/bench.json
 # Each program of the chart writes its panel's rows; the first one the head of the table.
 CHART = $(BUILD)/chart/speed_accuracy
 CHARTS = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_sight chart_georef chart_widths beam)

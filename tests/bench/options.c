@@ -23,6 +23,8 @@ static const char HELP[] =
     "                  1M in the house, 22.5M and 2.8M in scenes of 90,000 to 2 million triangles, none in others\n"
     "  --whole         cast all lines of these scans, not about 5 million pulses a round\n"
     "  --only-sight    measure nothing but these scans\n"
+    "  --reach         what a pulse costs a head or a body that moves, with a far station or reach, beside one that\n"
+    "                  stands; without --scenes nothing else is done\n"
     "  --threads N     casters of the run on all threads; default: one per processor\n"
     "  --leaks N       aim N rays at edges and corners of closed meshes and count those that slip through (fails\n"
     "                  when one does); without --scenes nothing else is done\n"
@@ -32,7 +34,17 @@ static const char HELP[] =
     "Ratios are medians over the rounds of Embree's time by ours. Then the same through the real loop with the null\n"
     "link.\n";
 
-enum { OPT_SCENES = 256, OPT_HOUSE, OPT_PULSES, OPT_WHOLE, OPT_ONLY_SIGHT, OPT_SECONDS, OPT_THREADS, OPT_LEAKS };
+enum {
+    OPT_SCENES = 256,
+    OPT_HOUSE,
+    OPT_PULSES,
+    OPT_WHOLE,
+    OPT_ONLY_SIGHT,
+    OPT_SECONDS,
+    OPT_THREADS,
+    OPT_LEAKS,
+    OPT_REACH
+};
 
 static const struct option OPTIONS[] = {{"scenes", required_argument, NULL, OPT_SCENES},
                                         {"house", required_argument, NULL, OPT_HOUSE},
@@ -42,6 +54,7 @@ static const struct option OPTIONS[] = {{"scenes", required_argument, NULL, OPT_
                                         {"only-sight", no_argument, NULL, OPT_ONLY_SIGHT},
                                         {"threads", required_argument, NULL, OPT_THREADS},
                                         {"leaks", required_argument, NULL, OPT_LEAKS},
+                                        {"reach", no_argument, NULL, OPT_REACH},
                                         {"help", no_argument, NULL, 'h'},
                                         {NULL, 0, NULL, 0}};
 
@@ -92,6 +105,9 @@ static int parse_option(struct bench_options *o, int opt, char **argv)
         return BENCH_OK;
     case OPT_ONLY_SIGHT:
         o->only_sight = 1;
+        return BENCH_OK;
+    case OPT_REACH:
+        o->reach = 1;
         return BENCH_OK;
     case 'o':
         o->out = optarg;
@@ -164,7 +180,7 @@ int bench_parse(struct bench_options *o, int argc, char **argv)
         if (status != BENCH_OK) return status;
     }
     if (optind != argc) return usage("%s: it takes no arguments, only options", argv[optind]);
-    if (o->scenes == NULL && o->leaks == 0.0) o->scenes = DEFAULT_SCENES;
+    if (o->scenes == NULL && o->leaks == 0.0 && !o->reach) o->scenes = DEFAULT_SCENES;
     if (o->scenes != NULL) status = check_scenes(o->scenes);
     if (status == BENCH_OK && o->pulses != NULL) status = check_pulses(o->pulses);
     return status == BENCH_OK ? -1 : status;

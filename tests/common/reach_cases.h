@@ -45,6 +45,7 @@ struct reach_run {
     double load_s;               /* reading, building, planning: processor time of all threads */
     uint64_t bytes;              /* of all BVHs */
     uint32_t packet;             /* rays of one */
+    uint32_t triangles;          /* of all that stands and moves */
 };
 /* Release with reach_close, also after an error. */
 int reach_open(const struct reach_folder *folder, const struct reach_case *of, struct reach_run *out,
