@@ -30,7 +30,7 @@ static struct scene *plates(void)
     return scene;
 }
 
-/* From the scene, and from far away. 1e-9 m: the plane's tilt is 2^-40 of 50 m, and 2^-53 of 30 km is 3e-12 m. */
+/* From the scene, and from far away. 1e-9 m: 16 x 2^-53 of 30 km is 5e-11 m (test_range). */
 static void no_number_of_plates_hides_a_wall(void **state)
 {
     (void)state;
