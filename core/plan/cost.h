@@ -7,6 +7,7 @@
 
 #include <stdint.h>
 
+#define PLAN_COST_PULSE    40.0   /* all stages but the cast's (build/bench) */
 #define PLAN_COST_SUB_RAY  70.0   /* a ray of a ring, or beyond glass */
 #define PLAN_COST_OUTLINES 8.0    /* adaptive: asking whether an outline is near, for each pulse */
 #define PLAN_COST_CUT      1000.0 /* adaptive: a pulse that one cuts */

@@ -12,19 +12,24 @@ static const double LEAST_LEFT = 0.2;
 
 enum { NO_MAP, MAP, OPTIONS };
 
-static const struct plan_ray_cost *ray_cost(const struct plan_sight_need *need)
+static const struct plan_ray_cost *ray_cost(uint32_t packet)
 {
     const struct plan_ray_cost *cost = plan_ray_costs;
     const struct plan_ray_cost *last = cost + sizeof plan_ray_costs / sizeof plan_ray_costs[0] - 1;
-    while (cost < last && cost->packet > need->packet)
+    while (cost < last && cost->packet > packet)
         cost++;
     return cost;
 }
 
 /* Of a triangle's plane, which both ways need. */
-static double plane_ns(const struct plan_sight_need *need)
+static double plane_ns(double n_triangles)
 {
-    return PLAN_COST_MILLION * fmin(1.0, sqrt(1e-6 * need->n_triangles));
+    return PLAN_COST_MILLION * fmin(1.0, sqrt(1e-6 * n_triangles));
+}
+
+double plan_pulse_ns(double n_triangles, uint32_t packet)
+{
+    return PLAN_COST_PULSE + ray_cost(packet)->met + plane_ns(n_triangles);
 }
 
 /* Cells of the whole cube, as many as its maker takes for so many pulses. */
@@ -47,15 +52,15 @@ struct costs {
 
 static void estimate(const struct plan_sight_need *need, const struct plan_sight_found *f, struct costs *c)
 {
-    const struct plan_ray_cost *cost = ray_cost(need);
+    const struct plan_ray_cost *cost = ray_cost(need->packet);
     const double mixed = (f->few + f->ask) * need->share * cells(need);
     const double bytes = PLAN_SIGHT_CELL_BYTES * (mixed + 1.0) + PLAN_SIGHT_RECORD_BYTES * need->n_triangles;
     const double fits = fmin(1.0, (double)need->memory_bytes / bytes);
     const double few = fits * f->few, ask = f->ask + f->few - few;
-    c->bvh =
-        f->nothing * cost->out + (1.0 - f->nothing) * (cost->met + plane_ns(need)) + (f->few + f->ask) * cost->border;
-    c->map = (f->one + f->nothing) * PLAN_COST_SIGHT_ONE + f->one * plane_ns(need) + few * PLAN_COST_SIGHT_FEW +
-             ask * (c->bvh + PLAN_COST_SIGHT_ASK);
+    c->bvh = f->nothing * cost->out + (1.0 - f->nothing) * (cost->met + plane_ns(need->n_triangles)) +
+             (f->few + f->ask) * cost->border;
+    c->map = (f->one + f->nothing) * PLAN_COST_SIGHT_ONE + f->one * plane_ns(need->n_triangles) +
+             few * PLAN_COST_SIGHT_FEW + ask * (c->bvh + PLAN_COST_SIGHT_ASK);
     c->build = least_build_ns(need) + PLAN_COST_SIGHT_CELL * fits * mixed;
 }
 
@@ -66,7 +71,7 @@ static int pays(const struct plan_sight_need *need, const struct costs *c)
 
 int plan_sight_may_pay(const struct plan_sight_need *need)
 {
-    const double saved_ns = ray_cost(need)->met + ray_cost(need)->border - PLAN_COST_SIGHT_ONE;
+    const double saved_ns = ray_cost(need->packet)->met + ray_cost(need->packet)->border - PLAN_COST_SIGHT_ONE;
     return (1.0 - LEAST_LEFT) * saved_ns * need->pulses > least_build_ns(need);
 }
 
