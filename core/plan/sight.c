@@ -50,18 +50,45 @@ struct costs {
     double bvh, map, build;
 };
 
-static void estimate(const struct plan_sight_need *need, const struct plan_sight_found *f, struct costs *c)
+/* Of so many cells that show more than one triangle, the part that the memory holds. */
+static double fitting(const struct plan_sight_need *need, double mixed)
+{
+    const double bytes = PLAN_SIGHT_CELL_BYTES * (mixed + 1.0) + PLAN_SIGHT_RECORD_BYTES * need->n_triangles;
+    return fmin(1.0, (double)need->memory_bytes / bytes);
+}
+
+/* Where the memory does not hold the cells, the map's maker takes some twice as wide (core/sight/sight.c). An outline goes
+ * through half as many of those, so that they are twice the share. */
+static void coarsen(const struct plan_sight_found *f, struct plan_sight_found *coarse)
+{
+    const double mixed = f->few + f->ask, all = f->one + f->nothing, wider = fmin(1.0, 2.0 * mixed);
+    *coarse = *f;
+    if (!(mixed > 0.0) || !(all > 0.0)) return;
+    coarse->few *= wider / mixed;
+    coarse->ask *= wider / mixed;
+    coarse->one *= (1.0 - wider) / all;
+    coarse->nothing *= (1.0 - wider) / all;
+}
+
+static void estimate(const struct plan_sight_need *need, const struct plan_sight_found *found, struct costs *c)
 {
     const struct plan_ray_cost *cost = ray_cost(need->packet);
-    const double mixed = (f->few + f->ask) * need->share * cells(need);
-    const double bytes = PLAN_SIGHT_CELL_BYTES * (mixed + 1.0) + PLAN_SIGHT_RECORD_BYTES * need->n_triangles;
-    const double fits = fmin(1.0, (double)need->memory_bytes / bytes);
+    const struct plan_sight_found *f = found;
+    struct plan_sight_found coarse;
+    double mixed = (f->few + f->ask) * need->share * cells(need), fits = fitting(need, mixed);
+    c->build = least_build_ns(need) + PLAN_COST_SIGHT_CELL * fits * mixed;
+    if (fits < 1.0) {
+        coarsen(f, &coarse);
+        f = &coarse;
+        mixed = (f->few + f->ask) * need->share * cells(need) / 4.0;
+        fits = fitting(need, mixed);
+        c->build += least_build_ns(need) + PLAN_COST_SIGHT_CELL * fits * mixed;
+    }
     const double few = fits * f->few, ask = f->ask + f->few - few;
-    c->bvh = f->nothing * cost->out + (1.0 - f->nothing) * (cost->met + plane_ns(need->n_triangles)) +
-             (f->few + f->ask) * cost->border;
+    c->bvh = found->nothing * cost->out + (1.0 - found->nothing) * (cost->met + plane_ns(need->n_triangles)) +
+             (found->few + found->ask) * cost->border;
     c->map = (f->one + f->nothing) * PLAN_COST_SIGHT_ONE + f->one * plane_ns(need->n_triangles) +
              few * PLAN_COST_SIGHT_FEW + ask * (c->bvh + PLAN_COST_SIGHT_ASK);
-    c->build = least_build_ns(need) + PLAN_COST_SIGHT_CELL * fits * mixed;
 }
 
 static int pays(const struct plan_sight_need *need, const struct costs *c)

@@ -16,7 +16,8 @@
 static const char HELP[] =
     "bench [options]: speed figures as JSON on standard output\n\n"
     "  --scenes LIST   names with commas between: a number of triangles (10k, 2M, 25000) is generated closed terrain,\n"
-    "                  house is the IFC model from its living room, garden from outside; default " DEFAULT_SCENES "\n"
+    "                  house is the IFC model from its living room, garden from outside; foliage, huge: README.md;\n"
+    "                  default " DEFAULT_SCENES "\n"
     "  --house FILE    the IFC model; default " BENCH_HOUSE_FILE "\n"
     "  --seconds S     measure each scene for S seconds, but at least seven rounds; default 3\n"
     "  --pulses LIST   whole scans with and without a sight, of so many pulses (22.5M, 300k), or none; default 22.5M and\n"
@@ -139,9 +140,11 @@ static int check_scenes(const char *list)
     uint32_t n = 0;
     if (*list == '\0') return usage("--scenes: a list is needed, such as %s", DEFAULT_SCENES);
     while ((list = bench_next_name(list, name, sizeof name)) != NULL)
-        if ((!bench_is_house(name) && bench_count(name) == 0) || ++n > BENCH_MAX_SCENES)
-            return usage("--scenes %s: allowed are up to %d of house, garden and numbers of triangles from 100 to 100M",
-                         name, BENCH_MAX_SCENES);
+        if ((!bench_is_house(name) && !bench_is_made(name) && bench_count(name) == 0) || ++n > BENCH_MAX_SCENES)
+            return usage(
+                "--scenes %s: allowed are up to %d of house, garden, foliage, huge and numbers of triangles from "
+                "100 to 100M",
+                name, BENCH_MAX_SCENES);
     return BENCH_OK;
 }
 
