@@ -242,8 +242,8 @@ static void write_long(struct wire *wire, const char *name, const char *gate, ch
     snprintf(config, 352, "%s", wire_write_text(wire, name, text));
 }
 
-/* 5 km at 100 m/s along a wall 12 m away, and past a gate that slides: more than one BVH reaches, by any number of
- * threads the same. */
+/* 5 km at 100 m/s along a wall 12 m away, and past a gate that slides: several stretches, by any number of threads
+ * the same. */
 static void test_long_path(void **state)
 {
     struct wire *wire = *state;
@@ -364,7 +364,8 @@ static void test_no_pose_at_all(void **state)
                                             .pan_stop_deg = 20,
                                             .frames = 1,
                                             .links = LINK_YAML_TCP,
-                                            .more = "platform: {kind: live}\nloop: {queue_ms: 10000, late_ms: 10000}\n"};
+                                            .more =
+                                                "platform: {kind: live}\nloop: {queue_ms: 10000, late_ms: 10000}\n"};
     struct wire *wire = *state;
     struct scanhead_frame frame;
     struct scanhead_pose pose;
