@@ -87,6 +87,12 @@ static unsigned most_together(const struct scene *scene)
 int bvh_create(const struct scene *scene, unsigned threads, const struct sh_report *report, struct bvh **out,
                struct sh_err *err)
 {
+    return bvh_create_whole(scene, 0, threads, report, out, err);
+}
+
+int bvh_create_whole(const struct scene *scene, int in_one, unsigned threads, const struct sh_report *report,
+                     struct bvh **out, struct sh_err *err)
+{
     *out = NULL;
     struct bvh *bvh = calloc(1, sizeof *bvh);
     if (bvh == NULL) return sh_fail(err, SH_ENOMEM, "bvh: no memory");
@@ -95,6 +101,7 @@ int bvh_create(const struct scene *scene, unsigned threads, const struct sh_repo
     snprintf(config, sizeof config, "tessellation_cache_size=1,object_accel_max_leaf_size=%u,threads=%u",
              most_together(scene), threads);
     bvh->scene = scene;
+    bvh->stretch_m = in_one ? INFINITY : BVH_STRETCH_M;
     bvh->device = rtcNewDevice(config);
     if (bvh->device == NULL) {
         free(bvh);

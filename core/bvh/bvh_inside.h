@@ -18,10 +18,12 @@
  * direction over the range, which is |o| + |h| at most. Embree's test of a box is the fast one for such geometry,
  * whatever the scene's flags say (3.13 and 4.4): with the reciprocal of a direction, its products and their
  * difference it errs by up to 7 units of the range. Together that is at most 9 |o| + 8 |h|. The boxes are larger than
- * their triangles by 8 (2 r + |h|), r being the radius of the scene. A hit makes tfar the next float above its range.
+ * their triangles by 8 (2 r + |h|), r being the radius of the scene. Where that is more than 9 R + 17 |h|, they are larger
+ * by so much, and float rays are no longer than R: |o| is |h| + R at most. A hit makes tfar the next float above its range.
  * At that range the real ray is at its triangle, so the float ray is in its box, and has entered it before.
  * Rays begin at most 1.5 r from the scene's middle: those from further away are taken along until they have come that
- * near (hits.c). So nothing here depends on where rays begin.
+ * near (hits.c). So nothing here depends on where rays begin. Nor does it matter to small things how large others are:
+ * the BVH's origin is in the middle of the scene, or of a large scene where most of its vertices are.
  *
  * Copies of a mesh. The mesh has a BVH of its own, in its own frame. Its copies are primitives of the scene's BVH, with
  * boxes made larger in the same way. A packet that reaches one is turned into the mesh's frame in double, and cast there
@@ -95,6 +97,7 @@ struct bvh {
     struct bvh_plane *plane; /* one more than there are: the last stands for a miss, all NaN */
     double origin_m[3];      /* the middle of the scene */
     double radius_m;         /* nothing of it is further from there */
+    double stretch_m;        /* float rays are no longer; INFINITY: as long as they like */
     struct bvh_info info;
     int64_t bytes; /* as Embree reports */
 };
@@ -124,6 +127,7 @@ struct bvh_query {
     int has_own;               /* each ray begins at its own point, org; else all at at */
     double at[3], at_local[3]; /* prcs; from the BVH's origin */
     double far_m;              /* no ray begins further from the BVH's origin */
+    double most_m;             /* of a float ray, as in struct bvh_batch */
     double dir[3][BVH_PACKET]; /* of lanes without a ray: any */
     const float *dir_float;    /* [3][BVH_PACKET] the same for Embree; NULL: the packet is smaller */
     double org[3][BVH_PACKET], local[3][BVH_PACKET];
@@ -150,6 +154,12 @@ struct bvh_nested {
     ((float *)(void *)(rays) + offsetof(struct RTCRay, name) / sizeof(float) * (size_t)(width))
 _Static_assert(offsetof(struct RTCRay16, tfar) == 16 * offsetof(struct RTCRay, tfar), "field by field");
 
+/* R: longer than most heads see. */
+#define BVH_STRETCH_M 8000.0
+
+/* bvh.c: as bvh_create; in_one: rays have any length (copies.c). */
+int bvh_create_whole(const struct scene *scene, int in_one, unsigned threads, const struct sh_report *report,
+                     struct bvh **out, struct sh_err *err);
 /* leaves.c: fills the leaves, and sets n_leaves; makes the planes. */
 int bvh_make_leaves(struct bvh *bvh, const struct sh_report *report, struct sh_err *err);
 int bvh_make_planes(struct bvh *bvh, const struct sh_report *report, struct sh_err *err);
@@ -178,6 +188,7 @@ struct bvh_batch {
     struct vec3_in local;        /* origins from the BVH's origin; x NULL: all at at_local */
     double at_local[3], far_m;
     float t_max;
+    double most_m;                 /* of a float ray; INFINITY: what is further than t_max may or may not be met */
     struct bvh_counters *counters; /* counted up */
 };
 void bvh_intersect(const struct bvh *bvh, struct bvh_query *query, struct bvh_batch *batch);

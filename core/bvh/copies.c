@@ -21,7 +21,7 @@ int bvh_make_copies(struct bvh *bvh, unsigned threads, const struct sh_report *r
         return sh_fail(err, SH_ENOMEM, "bvh: no memory for %u copies", scene->n_copies);
     for (uint32_t i = 0; i < scene->n_copied && rc == SH_OK; i++) {
         const struct scene_copied *of = &scene->copied[i];
-        rc = bvh_create(of->mesh, threads, report, &bvh->mesh[i], err);
+        rc = bvh_create_whole(of->mesh, 1, threads, report, &bvh->mesh[i], err);
         if (rc == SH_OK) bvh->info.bytes += bvh->mesh[i]->info.bytes;
         for (uint32_t k = 0; k < of->n && rc == SH_OK; k++)
             bvh->copy[at++] = (struct bvh_copy){

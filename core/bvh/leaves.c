@@ -59,17 +59,38 @@ static void fill_leaf(const struct bvh *bvh, uint32_t first, uint32_t second, st
                  length_bits(far_m) << BVH_LEAF_FAR;
 }
 
-/* The middle of the scene, and how far all of it lies from there. */
-static void measure(struct bvh *bvh)
+/* How far all of the scene lies from the origin. */
+static double radius_of(const struct bvh *bvh)
 {
     const struct scene *scene = bvh->scene;
     double half[3];
-    if (scene->n_all == 0) return;
-    for (int i = 0; i < 3; i++) {
-        bvh->origin_m[i] = scene->min_m[i] + 0.5 * (scene->max_m[i] - scene->min_m[i]);
+    for (int i = 0; i < 3; i++)
         half[i] = fmax(scene->max_m[i] - bvh->origin_m[i], bvh->origin_m[i] - scene->min_m[i]);
-    }
-    bvh->radius_m = (double)above(vec3_length(half));
+    return (double)above(vec3_length(half));
+}
+
+static double pad_units_m(const struct bvh *bvh, double far_m)
+{
+    const double whole_m = 8.0 * (far_m + 2.0 * bvh->radius_m);
+    return fmin(whole_m, 9.0 * bvh->stretch_m + 17.0 * far_m);
+}
+
+/* The origin: the middle of the scene. Of one that rays cross in stretches it is the mean of the vertices. */
+static void measure(struct bvh *bvh)
+{
+    const struct scene *scene = bvh->scene;
+    if (scene->n_all == 0) return;
+    for (int i = 0; i < 3; i++)
+        bvh->origin_m[i] = scene->min_m[i] + 0.5 * (scene->max_m[i] - scene->min_m[i]);
+    bvh->radius_m = radius_of(bvh);
+    if (pad_units_m(bvh, 0.0) >= 16.0 * bvh->radius_m) bvh->stretch_m = INFINITY;
+    if (bvh->stretch_m == INFINITY || scene->n_vertices == 0 || scene->n_copies > 0) return;
+    double sum[3] = {0};
+    for (uint32_t i = 0; i < scene->n_vertices; i++)
+        vec3_add(sum, scene->vertex_m[i], sum);
+    for (int i = 0; i < 3; i++)
+        bvh->origin_m[i] = sum[i] / scene->n_vertices;
+    bvh->radius_m = radius_of(bvh);
 }
 
 /* Half the surface of the box around two triangles; the same one twice: around it. */
@@ -136,7 +157,7 @@ int bvh_make_leaves(struct bvh *bvh, const struct sh_report *report, struct sh_e
 
 void bvh_pad_box(const struct bvh *bvh, const double lo_m[3], const double hi_m[3], double far_m, struct RTCBounds *box)
 {
-    const double pad_m = 8.0 * 0x1p-24 * (far_m + 2.0 * bvh->radius_m);
+    const double pad_m = 0x1p-24 * pad_units_m(bvh, far_m);
     *box = (struct RTCBounds){.lower_x = below(lo_m[0] - pad_m),
                               .lower_y = below(lo_m[1] - pad_m),
                               .lower_z = below(lo_m[2] - pad_m),

@@ -88,9 +88,12 @@ VEC_INLINE void set_doubles(struct bvh_query *query, const struct bvh_batch *bat
     const double *const own[3] = {rays->from.own.x, rays->from.own.y, rays->from.own.z};
     const double *const local[3] = {batch->local.x, batch->local.y, batch->local.z};
     for (uint32_t i = 0; i < BVH_PACKET; i++) {
-        query->range_m[i] = INFINITY;
+        query->range_m[i] = query->most_m;
         query->hit_m[i] = NAN;
     }
+    if (query->most_m != INFINITY && batch->start_m != NULL)
+        for (uint32_t i = 0; i < n; i++)
+            query->range_m[i] += batch->start_m[first + i];
     for (uint32_t i = 0; i < BVH_PACKET; i++)
         query->triangle[i] = BVH_NO_TRIANGLE;
     query->unsure = 0;
@@ -115,6 +118,7 @@ static void take_near(struct bvh_query *query, uint32_t n)
 {
     for (uint32_t i = 0; i < n; i++) {
         if (query->near[i] == BVH_NO_TRIANGLE || query->hit_m[i] <= query->near_m[i]) continue;
+        if (query->near_m[i] > query->most_m + query->start_m[i]) continue;
         query->triangle[i] = query->near[i];
         query->hit_m[i] = query->near_m[i];
     }
@@ -174,6 +178,7 @@ void bvh_intersect(const struct bvh *bvh, struct bvh_query *query, struct bvh_ba
     query->at_origin_m = BVH_AT_ORIGIN_M;
     query->has_own = rays->from.own.x != NULL;
     query->far_m = batch->far_m;
+    query->most_m = batch->most_m;
     query->decided = query->leaves = 0;
     memcpy(query->at, rays->from.at_m, sizeof query->at);
     memcpy(query->at_local, batch->at_local, sizeof query->at_local);
