@@ -20,7 +20,7 @@ struct cost {
     uint32_t hits;
 };
 
-/* A ball, on ground that goes so far; 0: without ground. */
+/* A ball, on ground that goes about so far, and further to one side; 0: without ground. */
 static struct bvh *ball_on_ground(double ground_m, struct scene **scene)
 {
     static const double centre[3] = {0.0, 0.0, 0.0};
@@ -29,8 +29,8 @@ static struct bvh *ball_on_ground(double ground_m, struct scene **scene)
     struct sh_err err;
     mesh_sphere(&mesh, centre, BALL_M, 0.0, 4, 0);
     if (ground_m > 0.0)
-        mesh_sheet(&mesh, (const double[3]){-ground_m, -ground_m, -2.0}, (const double[3]){2.0 * ground_m, 0.0, 0.0},
-                   (const double[3]){0.0, 2.0 * ground_m, 0.0}, 1, 1, 1);
+        mesh_sheet(&mesh, (const double[3]){-0.7 * ground_m, -0.7 * ground_m, -2.0},
+                   (const double[3]){2.0 * ground_m, 0.0, 0.0}, (const double[3]){0.0, 2.0 * ground_m, 0.0}, 1, 1, 1);
     *scene = mesh_scene(&mesh);
     mesh_free(&mesh);
     assert_int_equal(bvh_create(*scene, 1, NULL, &bvh, &err), SH_OK);
