@@ -50,7 +50,7 @@ struct bvh_plane {
 } __attribute__((aligned(32))); /* half a cache line */
 /* triangle: of the scene's own, as all are where it has no copies. */
 const struct bvh_plane *bvh_plane(const struct bvh *bvh, uint32_t triangle);
-/* Of any triangle. */
+/* The same plane for any triangle. */
 void bvh_get_plane(const struct bvh *bvh, uint32_t triangle, struct bvh_plane *plane);
 
 enum {

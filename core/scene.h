@@ -188,7 +188,7 @@ int scene_read_texture(const struct scene_texture *texture, int alpha_only, stru
 
 /* ---- copies. */
 
-/* What a triangle's number stands for. */
+/* A triangle's number stands for this. */
 struct scene_part {
     const struct scene *scene;     /* the mesh, or the scene itself */
     const struct scene_copy *copy; /* NULL: the scene itself */

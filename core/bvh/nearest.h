@@ -17,7 +17,7 @@ VEC_INLINE float float_above(double x)
     return above;
 }
 
-/* What is as near as the nearest has to be found, too: tfar is beyond both. */
+/* Ties have to be found, too, so tfar lies beyond the nearest and all that is as near. */
 VEC_INLINE float tfar_of(double nearest_m, double start_m)
 {
     return float_above(nearest_m + BVH_SAME * nearest_m - start_m);

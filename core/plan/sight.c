@@ -50,7 +50,7 @@ struct costs {
     double bvh, map, build;
 };
 
-/* Of so many cells that show more than one triangle, the part that the memory holds. */
+/* The memory holds this part of so many cells that show more than one triangle. */
 static double fitting(const struct plan_sight_need *need, double mixed)
 {
     const double bytes = PLAN_SIGHT_CELL_BYTES * (mixed + 1.0) + PLAN_SIGHT_RECORD_BYTES * need->n_triangles;

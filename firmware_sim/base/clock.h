@@ -18,7 +18,7 @@ void clock_sleep_until_ns(int64_t t_ns);
 /* Processor time of the whole process, seconds; of this thread, nanoseconds. */
 double clock_cpu_s(void);
 int64_t clock_thread_ns(void);
-/* Of another thread, by its clock (pthread_getcpuclockid). 0: it has ended. */
+/* Processor time of another thread, by its clock (pthread_getcpuclockid). It is 0 once the thread has ended. */
 int clock_read_of_thread(clockid_t clock, int64_t *ns);
 
 #endif

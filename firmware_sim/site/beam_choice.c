@@ -27,7 +27,7 @@ static int open_trial(struct trial *trial, struct site *site, const struct sh_re
 
 /* ---- beams */
 
-/* What textures cut out of surfaces has outlines that nobody knows, and those of copies are not made. */
+/* Nobody knows the outlines of what textures cut out, and those of copies are not made. */
 static const char *has_no_outlines(const struct site *site)
 {
     int cutouts = site->scene->cutout != NULL, copies = site->scene->n_copies > 0;

@@ -170,7 +170,7 @@ int site_plan_rows(struct site *site, struct sh_err *err)
     return site_rate_row(site, &plan->row[plan->n++], err);
 }
 
-/* Of a row that has no figure, as it depends on the scene: `most`. */
+/* A row that depends on the scene has no figure: `most` takes its place. */
 static double cost_ns(const struct plan_row *row, double most)
 {
     return isnan(row->cost_ns) ? most : row->cost_ns;

@@ -311,7 +311,7 @@ static void measure(struct world *w)
 static int set_up(struct world *w, struct sh_err *err)
 {
     static const double centre_m[2] = {0.0, 0.0};
-    /* Of the body the ground and the ceiling are its faces. */
+    /* The ground and the ceiling are faces of the body. */
     int rc = generate_terrain(100000, w->body ? 1.2 * BODY_M : 200.0, w->body ? 0.1 : 3.0, centre_m, 1, &w->scene, err);
     if (rc == SH_OK) rc = bvh_create(w->scene, 1, NULL, &w->bvh, err);
     if (rc == SH_OK) rc = bvh_work_create(&w->work, err);

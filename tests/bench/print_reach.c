@@ -1,4 +1,4 @@
-/* What bench_reach measured: JSON and a table, and beside each figure the bound that it is to hold. */
+/* Prints what bench_reach measured: JSON and a table, and beside each figure the bound that it is to hold. */
 #include <string.h>
 
 #include "tests/bench/reach.h"

@@ -217,7 +217,7 @@ static void a_list_is_as_good_as_a_file(void **state)
     assert_says("2 numbers instead of 3");
 }
 
-/* Of a file: its line, what is wrong, what is allowed. */
+/* A fault in a file is said with its line, what is wrong, and what is allowed. */
 static void faults_of_a_file_say_where(void **state)
 {
     (void)state;
