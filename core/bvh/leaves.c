@@ -114,7 +114,8 @@ static int is_taken(const uint64_t *taken, uint32_t triangle)
     return (taken[triangle / 64] >> triangle % 64 & 1) != 0;
 }
 
-/* The one of those that follow the triangle in the list, up to what a leaf can name, that makes the smallest box with it; or BVH_NO_TRIANGLE. */
+/* Returns the one that makes the smallest box with the triangle, among those that follow it in the list as far as a leaf
+ * can name; or BVH_NO_TRIANGLE. */
 static uint32_t partner(const struct scene *scene, uint32_t triangle, const uint64_t *taken)
 {
     const uint32_t left = scene->n_triangles - triangle,

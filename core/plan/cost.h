@@ -14,10 +14,10 @@
 
 /* ---- a ray's first hit, and the map of core/sight (build/bench --only-sight) */
 
-/* Costs of the BVH, by how many rays Embree takes at once: met something, met nothing, and more where a border is near, since
- * rays of a packet then go to more leaves. From `without` of house, garden and terrain, 1 to 22.5 million pulses: met and
- * out from those with few borders, border from the growth with their share. For packets of 8 and 4 by the ratios of
- * Embree's packets in the chart. */
+/* Costs of the BVH, by how many rays Embree takes at once: met something, met nothing, and more where a border is near,
+ * since rays of a packet then go to more leaves. They are from `without` of house, garden and terrain, 1 to 22.5 million
+ * pulses: met and out where borders are few, border from the growth with their share. Those for packets of 8 and 4 follow
+ * the ratios of Embree's packets in the chart. */
 struct plan_ray_cost {
     uint32_t packet;
     double met, out, border;

@@ -57,8 +57,8 @@ static double fitting(const struct plan_sight_need *need, double mixed)
     return fmin(1.0, (double)need->memory_bytes / bytes);
 }
 
-/* Where the memory does not hold the cells, the map's maker takes some twice as wide (core/sight/sight.c). An outline goes
- * through half as many of those, so that they are twice the share. */
+/* Where the memory does not hold the cells, the map's maker takes some twice as wide (core/sight/sight.c). An outline
+ * goes through half as many of those, so that they are twice the share. */
 static void coarsen(const struct plan_sight_found *f, struct plan_sight_found *coarse)
 {
     const double mixed = f->few + f->ask, all = f->one + f->nothing, wider = fmin(1.0, 2.0 * mixed);
