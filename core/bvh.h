@@ -39,7 +39,7 @@ void bvh_set_packet(struct bvh *bvh, uint32_t rays);
  * say the same, the same rays meet the same triangles. */
 void bvh_engine(char *text, size_t len);
 void bvh_get_info(const struct bvh *bvh, struct bvh_info *info);
-/* The origin of the local frame: the middle of the scene. */
+/* The origin of the local frame: the middle of the scene, or where most triangles of a large scene are. */
 void bvh_origin(const struct bvh *bvh, double origin_m[3]);
 const struct scene *bvh_scene(const struct bvh *bvh);
 

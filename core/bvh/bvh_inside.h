@@ -23,7 +23,7 @@
  * At that range the real ray is at its triangle, so the float ray is in its box, and has entered it before.
  * Rays begin at most 1.5 r from the scene's middle: those from further away are taken along until they have come that
  * near (hits.c). So nothing here depends on where rays begin. Nor does it matter to small things how large others are:
- * the BVH's origin is in the middle of the scene, or of a large scene where most of its vertices are.
+ * the BVH's origin is in the middle of the scene, or of a large scene where most of its triangles are.
  *
  * Copies of a mesh. The mesh has a BVH of its own, in its own frame. Its copies are primitives of the scene's BVH, with
  * boxes made larger in the same way. A packet that reaches one is turned into the mesh's frame in double, and cast there
@@ -95,7 +95,7 @@ struct bvh {
     struct bvh **mesh;       /* [scene->n_copied] of those that have copies */
     struct bvh_copy *copy;   /* [scene->n_copies] */
     struct bvh_plane *plane; /* one more than there are: the last stands for a miss, all NaN */
-    double origin_m[3];      /* the middle of the scene */
+    double origin_m[3];      /* the middle of the scene, or where most of its triangles are (leaves.c) */
     double radius_m;         /* nothing of it is further from there */
     double stretch_m;        /* float rays are no longer; INFINITY: as long as they like */
     struct bvh_info info;

@@ -82,8 +82,8 @@ static double to_local(const struct vec3_in *own, const double origin_m[3], uint
     return far2;
 }
 
-/* Rays that begin further from the scene's middle than its radius are nearer than two of them before they meet
- * anything: the float ray begins there. */
+/* Rays that begin further from the origin than the scene goes come within its radius before they meet anything: the float
+ * ray begins there. */
 static void take_along(struct bvh_work *w, const struct bvh *bvh, const struct bvh_rays *rays, struct bvh_batch *batch)
 {
     struct bvh_origins from = {.own = batch->local};

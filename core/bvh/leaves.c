@@ -75,7 +75,17 @@ static double pad_units_m(const struct bvh *bvh, double far_m)
     return fmin(whole_m, 9.0 * bvh->stretch_m + 17.0 * far_m);
 }
 
-/* The origin: the middle of the scene. Of one that rays cross in stretches it is the mean of the vertices. */
+/* The mean of the triangles' corners: vertices that no triangle uses may be anywhere. */
+static void mean_corner(const struct scene *scene, double mean_m[3])
+{
+    double sum[3] = {0};
+    for (size_t i = 0; i < 3 * (size_t)scene->n_triangles; i++)
+        vec3_add(sum, scene->vertex_m[scene->triangle[i / 3][i % 3]], sum);
+    for (int i = 0; i < 3; i++)
+        mean_m[i] = fmin(fmax(sum[i] / (3.0 * scene->n_triangles), scene->min_m[i]), scene->max_m[i]);
+}
+
+/* The origin is the middle of the scene. Where rays go in stretches, it is where most triangles are. */
 static void measure(struct bvh *bvh)
 {
     const struct scene *scene = bvh->scene;
@@ -84,12 +94,8 @@ static void measure(struct bvh *bvh)
         bvh->origin_m[i] = scene->min_m[i] + 0.5 * (scene->max_m[i] - scene->min_m[i]);
     bvh->radius_m = radius_of(bvh);
     if (pad_units_m(bvh, 0.0) >= 16.0 * bvh->radius_m) bvh->stretch_m = INFINITY;
-    if (bvh->stretch_m == INFINITY || scene->n_vertices == 0 || scene->n_copies > 0) return;
-    double sum[3] = {0};
-    for (uint32_t i = 0; i < scene->n_vertices; i++)
-        vec3_add(sum, scene->vertex_m[i], sum);
-    for (int i = 0; i < 3; i++)
-        bvh->origin_m[i] = sum[i] / scene->n_vertices;
+    if (bvh->stretch_m == INFINITY || scene->n_triangles == 0 || scene->n_copies > 0) return;
+    mean_corner(scene, bvh->origin_m);
     bvh->radius_m = radius_of(bvh);
 }
 

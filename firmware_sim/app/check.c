@@ -46,7 +46,7 @@ static double bytes_of(const struct scene *scene, const struct bvh *bvh)
     bvh_get_info(bvh, &info);
     const double triangle =
         sizeof *scene->triangle + sizeof *scene->label + (scene->uv != NULL ? sizeof *scene->uv : 0);
-    double bytes = (double)info.bytes; /* with the BVHs of meshes that have copies */
+    double bytes = (double)info.bytes + scene->n_copies * (double)sizeof(struct scene_copy); /* with the meshes' BVHs */
     for (uint32_t i = 0; i <= scene->n_copied; i++) {
         const struct scene *mesh = i == 0 ? scene : scene->copied[i - 1].mesh;
         bytes += mesh->n_triangles * triangle + mesh->n_vertices * (double)sizeof *mesh->vertex_m;
@@ -58,10 +58,10 @@ static double bytes_of(const struct scene *scene, const struct bvh *bvh)
 static void print_memory(const struct site *site)
 {
     struct rusage usage;
-    double bytes = bytes_of(site->scene, site->bvh), triangles = site->scene->n_all;
+    double bytes = bytes_of(site->scene, site->bvh), triangles = (double)scene_n_kept(site->scene);
     for (uint32_t i = 0; i < site->n_movers; i++) {
         bytes += bytes_of(site->mover[i].scene, site->mover[i].bvh);
-        triangles += site->mover[i].scene->n_all;
+        triangles += (double)scene_n_kept(site->mover[i].scene);
     }
     getrusage(RUSAGE_SELF, &usage);
     printf("memory    %.4g MB for meshes and BVH, %.0f bytes a triangle; %.4g MB at the peak\n", 1e-6 * bytes,
@@ -107,7 +107,8 @@ static const char *copies_text(const struct scene *scene, char *text, size_t len
 {
     text[0] = '\0';
     if (scene->n_copies > 0)
-        snprintf(text, len, "%u copies (%" PRIu64 " triangles are kept), ", scene->n_copies, scene_n_kept(scene));
+        snprintf(text, len, "%u %s (%" PRIu64 " triangles are kept), ", scene->n_copies,
+                 scene->n_copies == 1 ? "copy" : "copies", scene_n_kept(scene));
     return text;
 }
 

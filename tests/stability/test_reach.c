@@ -111,11 +111,35 @@ static void ground_around_costs_little(void **state)
     }
 }
 
+/* Ranges count from the BVH's origin: it is where triangles are, whatever vertices the file has besides. */
+static void vertices_of_nothing_do_not_move_the_origin(void **state)
+{
+    (void)state;
+    struct mesh mesh = {0};
+    struct bvh *bvh;
+    struct sh_err err;
+    double origin_m[3];
+    mesh_sphere(&mesh, (const double[3]){0.0, 0.0, 0.0}, BALL_M, 0.0, 2, 0);
+    mesh_sheet(&mesh, (const double[3]){-1e5, -1e4, -2.0}, (const double[3]){2e4, 0.0, 0.0},
+               (const double[3]){0.0, 2e4, 0.0}, 1, 1, 1);
+    for (int i = 0; i < 1000; i++)
+        mesh_vertex(&mesh, 1e9, 1e9, 1e9);
+    struct scene *scene = mesh_scene(&mesh);
+    mesh_free(&mesh);
+    assert_int_equal(bvh_create(scene, 1, NULL, &bvh, &err), SH_OK);
+    bvh_origin(bvh, origin_m);
+    for (int i = 0; i < 3; i++)
+        assert_true(fabs(origin_m[i]) < 1e3);
+    bvh_free(bvh);
+    scene_free(scene);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(far_away_costs_as_near_by),
         cmocka_unit_test(ground_around_costs_little),
+        cmocka_unit_test(vertices_of_nothing_do_not_move_the_origin),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
