@@ -6,7 +6,7 @@
  *
  * Frames: the station is a point of prcs (m), beams are directions there, turned from socs. On a
  * moving platform each pulse has its own origin and rotation, from its firing time alone; a head that stands still
- * pays nothing for that. What a pulse meets depends on nothing but the pulse: runs may be cut anywhere. */
+ * pays nothing for that. The hits of a pulse depend on that pulse alone: runs may be cut anywhere. */
 #ifndef CORE_CAST_H
 #define CORE_CAST_H
 

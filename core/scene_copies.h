@@ -2,12 +2,10 @@
 #ifndef CORE_SCENE_COPIES_H
 #define CORE_SCENE_COPIES_H
 
-#include <math.h>
-
 #include "core/scene.h"
 
-/* Makes them triangles of the scene, which keep their numbers, labels, texture coordinates and holes. SH_EINPUT where
- * that were more than `most`. The scene is to be freed after an error. Before anyone uses it. */
+/* Turns copies into triangles of the scene. These keep their numbers, labels, texture coordinates and holes. Nobody may
+ * use the scene before. SH_EINPUT where there would be more than `most`. After an error the scene is to be freed. */
 int scene_write_out_copies(struct scene *scene, uint64_t most, const struct sh_report *report, struct sh_err *err);
 
 #endif

@@ -76,8 +76,9 @@ static double seconds(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/* Leaves at one node of Embree's tree. Four, where that is cheaper by Embree's own measure, save a seventh of the memory
- * and cast as fast where surfaces hang together. Of foliage, which does not, a ray would try half as many more. */
+/* So many leaves may hang at one node of Embree's tree. Four of them, where Embree finds that cheaper, save a seventh
+ * of the memory, and rays are as fast where surfaces hang together. In foliage a ray would try half as many leaves
+ * more. */
 static unsigned most_together(const struct scene *scene)
 {
     const int is_large = scene->n_triangles >= 500000, hangs_together = scene->n_vertices <= 0.6 * scene->n_triangles;

@@ -10,25 +10,25 @@
  * corner lies on another's edge up to rounding.
  *
  * How far. The range is that of the triangle's plane, in double (planes.c). Of all that a ray meets, the nearest is
- * the hit. Of those within 1e-12 of its range it is the one with the lowest number, in whatever order they were tried:
- * where the order may have mattered, the ray is cast again from the nearest range on (packet.c).
+ * the hit. Hits within 1e-12 of its range count as equal: the one with the lowest number wins, in whatever order they
+ * were tried. Where the order may have mattered, the ray is cast again from the nearest range on (packet.c).
  *
  * That no leaf is left out. Embree works in float. In units of 2^-24 its ray lies off the real one by at most 2 |o| +
  * |h| where it meets something at h, both counted from the BVH's origin: the rounding of the ray's origin, and of its
  * direction over the range, which is |o| + |h| at most. Embree's test of a box is the fast one for such geometry,
  * whatever the scene's flags say (3.13 and 4.4): with the reciprocal of a direction, its products and their
  * difference it errs by up to 7 units of the range. Together that is at most 9 |o| + 8 |h|. The boxes are larger than
- * their triangles by 8 (2 r + |h|), r being the radius of the scene. Where that is more than 9 R + 17 |h|, they are larger
- * by so much, and float rays are no longer than R: |o| is |h| + R at most. A hit makes tfar the next float above its range.
- * At that range the real ray is at its triangle, so the float ray is in its box, and has entered it before.
+ * their triangles by 8 (2 r + |h|), r being the radius of the scene. Where that is more than 9 R + 17 |h|, boxes are
+ * larger by this, and float rays are at most R long: then |o| is at most |h| + R. A hit makes tfar the next float above
+ * its range. At that range the real ray is at its triangle, so the float ray is in its box, and has entered it before.
  * Rays begin at most 1.5 r from the scene's middle: those from further away are taken along until they have come that
- * near (hits.c). So nothing here depends on where rays begin. Nor does it matter to small things how large others are:
- * the BVH's origin is in the middle of the scene, or of a large scene where most of its triangles are.
+ * near (hits.c). So nothing here depends on where rays begin. Large things make the boxes of small ones hardly larger
+ * where those are near the BVH's origin. In a large scene it is where most triangles are, else in the middle.
  *
  * Copies of a mesh. The mesh has a BVH of its own, in its own frame. Its copies are primitives of the scene's BVH, with
- * boxes made larger in the same way. A packet that reaches one is turned into the mesh's frame in double, and cast there
- * anew (copies.c). The rays and triangles there are those of the scene up to the rounding of that turn, so all of the
- * above holds in each copy. Ranges come back times the copy's scale.
+ * boxes made larger in the same way. A packet that reaches one is turned into the mesh's frame in double, and cast
+ * there anew (copies.c). The rays and triangles there are those of the scene up to the rounding of that turn, so all of
+ * the above holds in each copy. Ranges come back times the copy's scale.
  */
 #ifndef CORE_BVH_BVH_INSIDE_H
 #define CORE_BVH_BVH_INSIDE_H
@@ -45,7 +45,8 @@ _Static_assert(sizeof(struct bvh_plane) == 4 * sizeof(double), "gathered as doub
 struct bvh_leaf {
     double corner_m[4][3]; /* prcs */
     uint32_t triangle;     /* 0 */
-    /* By bits: how far triangle 1 follows triangle 0 in the scene's list, 4, 0: there is none; and two lengths, 14 each. */
+    /* By bits: how far triangle 1 follows triangle 0 in the scene's list, 4, 0: there is none; and two lengths, 14
+     * each. */
     uint32_t rest;
 };
 _Static_assert(sizeof(struct bvh_leaf) == 104, "there are half as many as triangles");

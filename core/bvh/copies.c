@@ -117,7 +117,7 @@ VEC_INLINE void set_floats(const struct bvh_query *in, struct bvh_nested *nested
         }
 }
 
-/* Nothing beyond the nearest so far. What counts as the same as that is still found. */
+/* The rays end at the nearest hit so far. A hit that is as near is still found. */
 static int set_ends(const struct bvh_query *query, double scale, const float *tfar, const int *valid,
                     struct bvh_nested *nested, uint32_t width)
 {

@@ -35,8 +35,7 @@ static inline void add_tied(struct bvh_query *query, uint32_t lane, uint32_t tri
     query->hit_m[lane] = range_m;
 }
 
-/* A hit that is as near as something at first_m, which is no further than the nearest so far and what counts as the
- * same. */
+/* Takes a hit. It is as near as something at first_m, which is no further than the nearest so far, or as near. */
 VEC_INLINE void bvh_take_hit(struct bvh_query *query, float *tfar, uint32_t lane, uint32_t triangle, double range_m,
                              double first_m)
 {

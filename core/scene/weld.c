@@ -1,4 +1,4 @@
-/* Vertices of a file that stand in it once for each triangle: those at the same place, bit for bit, become one. */
+/* Where a file has vertices for each triangle, those at the same place, bit for bit, become one. */
 #include <stdlib.h>
 #include <string.h>
 

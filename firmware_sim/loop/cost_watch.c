@@ -21,7 +21,7 @@ struct cost_watch {
     clockid_t clock[CONFIG_MAX_THREADS]; /* of the casters; they may have ended when it is read */
 };
 
-/* A head that rests releases ticks without pulses: what they take is nobody's. Where no tick is released either, a pulse
+/* A head that rests releases ticks without pulses: their time is not counted. Where no tick is released either, a pulse
  * of those that were claimed takes all of that time. */
 double cost_add(struct cost_figures *f, const struct cost_sample *now)
 {

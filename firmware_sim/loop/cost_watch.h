@@ -2,7 +2,7 @@
  *
  * In: the casters' processor time, the pulses that they claimed and the ticks that were released, read once a second by
  * a thread of its own. So the casters and the pacing thread spend nothing on it. Out: one line, through the report of
- * the loop. Processor time, so that a busy machine is no reason. */
+ * the loop. It goes by processor time, so a busy machine gives no warning. */
 #ifndef FIRMWARE_SIM_LOOP_COST_WATCH_H
 #define FIRMWARE_SIM_LOOP_COST_WATCH_H
 
@@ -28,7 +28,8 @@ double cost_add(struct cost_figures *figures, const struct cost_sample *now);
 /* The loop's thread. */
 struct cost_watch;
 struct loop;
-/* After the casters were started. NULL: there is nobody to warn. Where no thread can be had there is no warning, either. */
+/* After the casters were started. NULL: there is nobody to warn. Where no thread can be had there is no warning,
+ * either. */
 struct cost_watch *cost_watch_start(struct loop *loop);
 void cost_watch_join(struct cost_watch *watch);
 

@@ -1,5 +1,5 @@
 /* A face that stands twice in a mesh is met as the first of the two, wherever it is met, whatever its label and however
- * large it is. Of any number of faces within 1e-12 of the nearest range the first is met. */
+ * large it is. Where any number of faces lie within 1e-12 of the nearest range, the first is met. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
