@@ -1,4 +1,5 @@
 /* Copies as triangles of the scene, for tools that need plain ones. Each triangle keeps its number. */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
