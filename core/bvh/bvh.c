@@ -76,8 +76,8 @@ static double seconds(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/* So many leaves may hang at one node of Embree's tree. Four of them, where Embree finds that cheaper, save a seventh
- * of the memory, and rays are as fast where surfaces hang together. In foliage a ray would try half as many leaves
+/* Embree may hang so many leaves at one node of its tree. Four of them, where it finds that cheaper, save a seventh of
+ * the memory, and rays are as fast where surfaces hang together. In foliage a ray would try half as many leaves
  * more. */
 static unsigned most_together(const struct scene *scene)
 {

@@ -111,8 +111,7 @@ VEC_INLINE void set_floats(const struct bvh_query *in, struct bvh_nested *nested
     for (uint32_t j = 0; j < 3; j++)
         for (uint32_t i = 0; i < width; i++) {
             const double d = in->dir[j][i], o = in->has_own ? in->local[j][i] : in->at_local[j];
-            const float f = (float)d;
-            dir[j * width + i] = f < 0.0f && f > -1e-15f ? 0.0f : f; /* as bvh_to_float has it */
+            dir[j * width + i] = embree_direction(d);
             org[j * width + i] = (float)(o + in->start_m[i] * d);
         }
 }

@@ -46,24 +46,15 @@ int bvh_make_planes(struct bvh *bvh, const struct sh_report *report, struct sh_e
     return SH_OK;
 }
 
-/* Embree sorts a packet's directions by their signs, but takes what is smaller than 1e-18 for positive when
- * it divides by it: with a component of -1e-22, all rays of that packet with its signs would be lost. So
- * there are none. */
-VEC_INLINE float direction_component(double d)
-{
-    float f = (float)d;
-    return f < 0.0f && f > -1e-15f ? 0.0f : f;
-}
-
 VEC_CLONES
 void bvh_to_float(const struct vec3_in *dir, uint32_t n, float *restrict x, float *restrict y, float *restrict z)
 {
     const struct vec3_in d = *dir;
     VEC_LOOP
     for (uint32_t i = 0; i < n; i++) {
-        x[i] = direction_component(d.x[i]);
-        y[i] = direction_component(d.y[i]);
-        z[i] = direction_component(d.z[i]);
+        x[i] = embree_direction(d.x[i]);
+        y[i] = embree_direction(d.y[i]);
+        z[i] = embree_direction(d.z[i]);
     }
 }
 
