@@ -67,10 +67,11 @@ int scene_find_hull(const struct scene *scene, struct scene_hull *out, struct sh
             used[scene->triangle[i][c]] = 1;
     for (uint32_t i = 0; used != NULL && point != NULL && i < scene->n_vertices; i++)
         if (used[i]) memcpy(point[n++], scene->vertex_m[i], sizeof *point);
+    const int is_short = point == NULL || used == NULL;
     free(used);
     if (n > 0) n = leave_out_inner(point, n);
     out->point = malloc((2 * (size_t)n + 2) * sizeof *out->point);
-    if (point == NULL || out->point == NULL || used == NULL) {
+    if (is_short || out->point == NULL) {
         free(point);
         return sh_fail(err, SH_ENOMEM, "no memory for a mesh's outline");
     }
