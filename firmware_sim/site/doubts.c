@@ -173,11 +173,10 @@ struct look {
     uint32_t triangle[LOOKS];
 };
 
-static void cast(const struct site *site, const struct site_station *s, struct bvh_work *work, struct look *look,
-                 uint32_t n)
+static void cast(const struct site *site, const struct site_station *s, struct bvh_work *work, struct look *look)
 {
     const double *p = s->at.position_m;
-    const struct bvh_rays rays = {.n = n,
+    const struct bvh_rays rays = {.n = LOOKS,
                                   .from.at_m = {p[0], p[1], p[2]},
                                   .dir = {look->x, look->y, look->z},
                                   .range_max_m = 1e9,
@@ -188,8 +187,8 @@ static void cast(const struct site *site, const struct site_station *s, struct b
 }
 
 /* Below a floor there is a surface above the head, and none under it. */
-static int doubt_floor(const struct site *site, uint32_t i, struct bvh_work *work, struct look *look,
-                       const struct sh_report *report, struct sh_err *err)
+static int doubt_floor(const struct site *site, uint32_t i, struct bvh_work *work, const struct sh_report *report,
+                       struct sh_err *err)
 {
     const struct site_station *s = &site->station[i];
     const double *p = s->at.position_m;
@@ -198,16 +197,13 @@ static int doubt_floor(const struct site *site, uint32_t i, struct bvh_work *wor
     memcpy(level, mat3_unit, sizeof level);
     if (site->anchor.known) rc = geoframe_level(&site->anchor.frame, p, level, err);
     if (rc != SH_OK) return rc;
-    for (int k = 0; k < 2; k++) {
-        const double sign = k == 0 ? 1.0 : -1.0, dir[3] = {sign * level[2], sign * level[5], sign * level[8]};
-        VEC3_SET(*look, k, dir);
-    }
-    cast(site, s, work, look, 2);
-    if (!isnan(look->range_m[0]) && isnan(look->range_m[1]))
+    const double up[3] = {level[2], level[5], level[8]}, down[3] = {-level[2], -level[5], -level[8]};
+    const double above_m = bvh_ray(work, site->bvh, p, up);
+    if (!isnan(above_m) && isnan(bvh_ray(work, site->bvh, p, down)))
         sh_warn(report,
                 "station %u %s at %.10g %.10g %.10g m: no surface below it, and one %.3g m above it: is it under the "
                 "floor?",
-                i + 1, s->station->name, p[0], p[1], p[2], look->range_m[0]);
+                i + 1, s->station->name, p[0], p[1], p[2], above_m);
     return SH_OK;
 }
 
@@ -260,7 +256,7 @@ static void doubt_view(const struct site *site, uint32_t i, struct bvh_work *wor
         fill_window(site, s, look);
     else
         fill_frame(site, s, look);
-    cast(site, s, work, look, LOOKS);
+    cast(site, s, work, look);
     for (int k = 0; k < LOOKS; k++) {
         near += look->range_m[k] < program->range_min_m;
         far += look->range_m[k] > program->range_max_m;
@@ -292,7 +288,7 @@ static int doubt_stations(const struct site *site, const struct sh_report *repor
         if (!config_serves(site->cfg, i)) continue;
         rc = doubt_reach(site, i, report, err);
         if (rc != SH_OK || site->n_movers > 0) continue;
-        rc = doubt_floor(site, i, work, look, report, err);
+        rc = doubt_floor(site, i, work, report, err);
         if (rc == SH_OK) doubt_view(site, i, work, look, report);
     }
     bvh_work_free(work);
