@@ -157,7 +157,7 @@ $(BUILD)/scanhead: $(BUILD)/firmware_sim/main.c.o $(BUILD)/modules.a
 #   benches.a   what the programs of tests/bench share                      build/bench and the charts'
 #   its rigs    tests/unit/cast_rig.c where it includes cast_rig.h          tests of a folder; tests/rigs.sh finds which
 #   modules.a   the head, without main.c                                    all of them
-FIGURES = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_sight chart_georef chart_widths beam plain velodyne loop_cost kernels panorama)
+FIGURES = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_moving chart_sight chart_georef chart_widths beam plain velodyne loop_cost loading kernels panorama copies)
 BENCH_MAINS = $(FIGURES:$(BUILD)/%=%.c) tests/bench/bench.c
 # LIMIT ends a test program that waits for ever; each is linked with it as an object, as nobody calls it.
 LIMIT = tests/common/limit.c
@@ -329,10 +329,10 @@ test-usb-million: deps
 DEPS_CHART = gnuplot-nox
 bench: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/bench
-	@$(BUILD)/bench --scenes 10k,100k,1M,10M,house,garden --leaks 1e8 -o $(BUILD)/bench.json
+	@$(BUILD)/bench --scenes 10k,100k,1M,10M,house,garden --reach --leaks 1e8 -o $(BUILD)/bench.json
 # Each program of the chart writes its panel's rows; the first one the head of the table.
 CHART = $(BUILD)/chart/speed_accuracy
-CHARTS = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_sight chart_georef chart_widths beam)
+CHARTS = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_moving chart_sight chart_georef chart_widths beam)
 # Footprints: cost, and error against 1,000 sub-rays; a few minutes.
 bench-beam: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/beam
@@ -357,6 +357,11 @@ bench-page: deps-build deps-browser
 page-pictures: deps-build deps-browser
 	@$(MAKE) --no-print-directory -j2 all
 	@SCANHEAD=$(BUILD)/scanhead node tests/page/pictures.mjs --out $(BUILD)/pictures
+# A forest of copies: its memory, and what a ray costs beside one tree.
+bench-copies: deps-build
+	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/copies
+	@$(BUILD)/tests/bench/copies
+
 bench-velodyne: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/velodyne
 	@$(BUILD)/tests/bench/velodyne
@@ -372,17 +377,23 @@ WITH ?=
 bench-loop: deps-build
 	@$(MAKE) --no-print-directory -j2 all $(BUILD)/tests/bench/loop_cost
 	@$(BUILD)/tests/bench/loop_cost $(BUILD)/scanhead '$(BUILD)/scanhead --no-hash' $(WITH)
+# `check` of meshes of 10 million triangles, beside Embree's build of them.
+bench-loading: deps-build
+	@$(MAKE) --no-print-directory -j2 all $(BUILD)/tests/bench/loading
+	@$(BUILD)/tests/bench/loading --program $(BUILD)/scanhead $(LOADING)
 chart: deps-build
 	$(call install_missing,$(DEPS_CHART))
 	@$(MAKE) --no-print-directory -j2 $(CHARTS)
 	@mkdir -p $(BUILD)/chart
 	$(BUILD)/tests/bench/chart > $(CHART).csv
+	$(BUILD)/tests/bench/chart_moving >> $(CHART).csv
 	$(BUILD)/tests/bench/chart_sight >> $(CHART).csv
 	$(BUILD)/tests/bench/chart_georef >> $(CHART).csv
 	$(BUILD)/tests/bench/chart_widths >> $(CHART).csv
 	$(BUILD)/tests/bench/beam --chart house wires foliage >> $(CHART).csv
 	gnuplot -e "csv='$(CHART).csv'; base='$(CHART)'" tests/bench/chart.gp
 	gnuplot -e "csv='$(CHART).csv'; base='$(CHART)_more'" tests/bench/chart_more.gp
+	gnuplot -e "csv='$(CHART).csv'; base='$(CHART)_moving'" tests/bench/chart_moving.gp
 objects: $(EVERYTHING)
 test-unit-programs: $(UNIT)
 ALL_UNIT ?= yes
@@ -430,6 +441,6 @@ format:
 clean:
 	rm -rf $(BUILD)
 .PHONY: ALWAYS all ifc-readers deps deps-test deps-build deps-guest deps-browser demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb repair \
-	test-usb-million test-hostile test-sight objects test-unit-programs test-programs bench bench-beam bench-plain bench-velodyne bench-page page-pictures bench-loop bench-kernels bench-panorama chart install format clean
+	test-usb-million test-hostile test-sight objects test-unit-programs test-programs bench bench-beam bench-plain bench-copies bench-velodyne bench-page page-pictures bench-loop bench-loading bench-kernels bench-panorama chart install format clean
 .SECONDARY:
 -include $(shell find $(patsubst %,$(BUILD)/%,core drivers firmware_sim tests) -name '*.d' 2>/dev/null)

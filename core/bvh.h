@@ -39,7 +39,7 @@ void bvh_set_packet(struct bvh *bvh, uint32_t rays);
  * say the same, the same rays meet the same triangles. */
 void bvh_engine(char *text, size_t len);
 void bvh_get_info(const struct bvh *bvh, struct bvh_info *info);
-/* The origin of the local frame: the middle of the scene. */
+/* The origin of the local frame: the middle of the scene, or where most triangles of a large scene are. */
 void bvh_origin(const struct bvh *bvh, double origin_m[3]);
 const struct scene *bvh_scene(const struct bvh *bvh);
 
@@ -48,7 +48,10 @@ const struct scene *bvh_scene(const struct bvh *bvh);
 struct bvh_plane {
     double n[3], d;
 } __attribute__((aligned(32))); /* half a cache line */
+/* triangle: of the scene's own, as all are where it has no copies. */
 const struct bvh_plane *bvh_plane(const struct bvh *bvh, uint32_t triangle);
+/* The same plane for any triangle. */
+void bvh_get_plane(const struct bvh *bvh, uint32_t triangle, struct bvh_plane *plane);
 
 enum {
     BVH_CHUNK = 1024, /* rays that are cast together */
@@ -74,10 +77,9 @@ static inline void bvh_origin_of(const struct bvh_origins *from, uint32_t i, dou
 struct bvh_rays {
     uint32_t n;
     struct bvh_origins from;
-    struct vec3_in dir;    /* unit vectors, prcs */
-    double range_max_m;    /* hits beyond it may or may not be reported */
-    const uint8_t *begins; /* 1: a packet begins with this ray, whether the last one is full or not; NULL: none does */
-    int scattered;         /* neighbours have nothing in common: one by one */
+    struct vec3_in dir; /* unit vectors, prcs */
+    double range_max_m; /* hits beyond it may or may not be reported */
+    int scattered;      /* neighbours have nothing in common: one by one */
     /* out: */
     double *range_m;    /* along the ray; NaN: it meets nothing */
     uint32_t *triangle; /* of the scene; BVH_NO_TRIANGLE */
@@ -121,6 +123,9 @@ void bvh_work_set_directions(struct bvh_work *work, const struct vec3_in *dir, u
 /* Exact hits. What a ray begins on, within half a micrometre, it does not meet. Range error: see
  * tests/accuracy. Allocates nothing. */
 void bvh_hits(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays);
+
+/* The range of what one ray meets first; NaN: nothing. */
+double bvh_ray(struct bvh_work *work, const struct bvh *bvh, const double at_m[3], const double dir[3]);
 
 /* ---- for rays from one point whose triangles are known otherwise (core/sight); no scene with holes. */
 

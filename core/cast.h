@@ -4,9 +4,9 @@
  * pulses). Out: a block of line.h. The stages are aim, nearest, optics, sub-rays, echoes, points;
  * core/cast/caster.c has them in that order.
  *
- * Frames: the station is a point of prcs (m), beams are directions there, turned from socs. Ray packets are
- * SCHEDULE_PACKET pulses, cut by pulse number. On a moving platform each pulse has its own origin and
- * rotation, from its firing time alone; a head that stands still pays nothing for that. */
+ * Frames: the station is a point of prcs (m), beams are directions there, turned from socs. On a
+ * moving platform each pulse has its own origin and rotation, from its firing time alone; a head that stands still
+ * pays nothing for that. The hits of a pulse depend on that pulse alone: runs may be cut anywhere. */
 #ifndef CORE_CAST_H
 #define CORE_CAST_H
 
@@ -195,7 +195,7 @@ struct cast_hit {
 /* The hits of a run's pulses that the head can report, each pulse as one ray: within its ranges and zones, and of what
  * comes back at least at the threshold, all without noise. Of a pane that is passed and what lies beyond, each is a
  * hit; what is seen in mirrors is none: nothing is there. The head stands still. hit has room for (1 + depth) run->n.
- * Packets are those of caster_cast. Returns the number of hits, in no order but that of chunks. Allocates nothing. */
+ * Returns the number of hits, in no order but that of chunks. Allocates nothing. */
 uint32_t caster_meet(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
                      struct cast_hit *hit);
 
@@ -221,10 +221,5 @@ enum cast_stage {
 void caster_set_profile(struct caster *caster, struct bvh_profile *profile);
 
 void caster_get_counters(const struct caster *caster, struct cast_counters *counters);
-
-/* The first surface of the scene from from_m along the unit vector down: its distance in *range_m, NaN when
- * there is none. Exact as bvh_hits. For setting up: looks at every triangle once. */
-int cast_floor(const struct scene *scene, const double from_m[3], const double down[3], double *range_m,
-               struct sh_err *err);
 
 #endif

@@ -14,6 +14,7 @@
 #include <stdint.h>
 
 #include "core/err.h"
+#include "core/vecmath.h"
 
 /* The error that one of Embree's is. what: what was to be made. */
 int embree_fail(enum RTCError code, const char *what, struct sh_err *err);
@@ -22,5 +23,14 @@ int embree_fail(enum RTCError code, const char *what, struct sh_err *err);
 int embree_has_packet(RTCDevice device, uint32_t rays);
 /* Rays a packet at which Embree is best on this machine: 16, 8, 4 or 1. */
 uint32_t embree_packet(RTCDevice device);
+
+/* Embree sorts a packet's directions by their signs, but takes what is smaller than 1e-18 for positive when
+ * it divides by it: with a component of -1e-22, all rays of that packet with its signs would be lost. So
+ * there are none. */
+VEC_INLINE float embree_direction(double d)
+{
+    float f = (float)d;
+    return f < 0.0f && f > -1e-15f ? 0.0f : f;
+}
 
 #endif

@@ -168,6 +168,9 @@ enum { PLAN_HEAD_ROWS = 6 };
 
 /* Stages that are left out have the method "none" and say why. Returns how many rows. */
 size_t plan_head(const struct plan_head *head, struct plan_row rows[PLAN_HEAD_ROWS]);
+/* Processor time of a pulse, ns: one ray into a scene of so many triangles, in packets of so many, and all that each
+ * pulse takes beside. Rows have what methods cost beyond that. */
+double plan_pulse_ns(double n_triangles, uint32_t packet);
 /* A row about which there is nothing to choose. */
 void plan_say(struct plan_row *row, const char *stage, const char *method, double error_m, double cost_ns,
               const char *why);

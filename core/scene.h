@@ -43,6 +43,20 @@ struct scene_import_limits {
 };
 extern const struct scene_import_limits scene_import_defaults;
 
+/* Where a copy of a mesh stands: its vertex v is at scale * (v, turned about the vertical) + at_m. */
+struct scene_place {
+    double at_m[3], turn_deg, scale; /* clockwise seen from above; scale > 0 */
+};
+
+/* Copies of a mesh. */
+struct scene_places {
+    struct scene_place *place; /* NULL: the mesh stands where its file says */
+    size_t n;
+    int own_surfaces; /* each copy has surfaces of its own: "OBJECT 1", "OBJECT 2" ... */
+    int written_out;  /* as triangles of the scene */
+    const char *says; /* what the list of them is called in errors */
+};
+
 struct scene_mesh_spec {
     const char *file; /* ending chooses the reader: .obj .ply in double; .ifc by two readers; others by Assimp */
     enum scene_up up;
@@ -51,6 +65,7 @@ struct scene_mesh_spec {
     int textures;       /* keep texture coordinates, and the names of textures: of .obj, and of what Assimp reads */
     int cutouts;        /* look for holes in textures; without `textures` only what has holes is kept */
     const struct scene_import_limits *limits; /* NULL: the defaults */
+    struct scene_places places;
 };
 
 /* One surface label: an object of the file with one material.
@@ -90,8 +105,27 @@ struct scene_says {
     int is_left_handed; /* its axes, so that the mesh is mirrored */
 };
 
+/* A copy as it stands in the scene: x = scale * turned(v) + shift_m. */
+struct scene_copy {
+    double shift_m[3], scale, cosine, sine;
+    double min_m[3], max_m[3]; /* bounds, prcs */
+    uint32_t label0;           /* what is added to the mesh's labels */
+};
+
+/* A mesh that stands in the scene any number of times, and is there once. Its frame: metres, z up, as it was loaded. */
+struct scene_copied {
+    struct scene *mesh;      /* owned; its surfaces and textures are the scene's */
+    struct scene_copy *copy; /* [n] owned */
+    uint32_t n;
+    uint32_t first; /* triangle of the first copy; those of the others follow, copy by copy */
+};
+
+/* Triangles are numbered: the scene's own first, then those of the copies. All arrays are of its own alone. */
 struct scene {
     uint32_t n_vertices, n_triangles, n_surfaces;
+    struct scene_copied *copied;   /* [n_copied] */
+    uint32_t n_copied, n_copies;   /* meshes that have copies; copies of all of them */
+    uint32_t n_all;                /* triangles, with those of the copies */
     uint32_t n_meshes;             /* placements in node trees; one for each .obj or .ply */
     double (*vertex_m)[3];         /* [n_vertices] prcs */
     uint32_t (*triangle)[3];       /* [n_triangles] indices into vertex_m */
@@ -143,8 +177,9 @@ struct scene_arrays {
 int scene_from_arrays(const struct scene_arrays *arrays, struct scene **out, struct sh_err *err);
 
 /* Leaves out all surfaces but those that are to be kept: keep[n_surfaces], by label. What is left has new labels and
- * vertices, in the old order, and bounds of its own; there may be nothing left (n_triangles 0). SH_ENOMEM: the scene is
- * as it was. Before anyone uses it, and before label0 is set. */
+ * vertices, in the old order, and bounds of its own; there may be nothing left (n_all 0). SH_EINPUT where copies of a
+ * mesh would keep different surfaces of it. After an error the scene is only to be freed. Before anyone uses it, and
+ * before label0 is set. */
 int scene_keep(struct scene *scene, const uint8_t *keep, struct sh_err *err);
 
 /* Finds triangles that have the same three corners, however they are written, and the same holes, as one with a lower
@@ -156,6 +191,56 @@ void scene_free(struct scene *scene);
 /* The image of a texture: texture_read. */
 int scene_read_texture(const struct scene_texture *texture, int alpha_only, struct texture_image *image,
                        struct sh_err *err);
+
+/* ---- copies. */
+
+/* A triangle's number stands for this. */
+struct scene_part {
+    const struct scene *scene;     /* the mesh, or the scene itself */
+    const struct scene_copy *copy; /* NULL: the scene itself */
+    uint32_t triangle;             /* in the mesh */
+    uint32_t copied;               /* number of the mesh among those that have copies */
+};
+void scene_find_part(const struct scene *scene, uint32_t triangle, struct scene_part *part);
+/* The label of any triangle below n_all. */
+uint32_t scene_label(const struct scene *scene, uint32_t triangle);
+/* Corners of any triangle, prcs. */
+void scene_corners(const struct scene *scene, uint32_t triangle, double corner[3][3]);
+/* Triangles that are kept in memory: its own, and those of each mesh that has copies. */
+uint64_t scene_n_kept(const struct scene *scene);
+
+/* A direction into the frame of the scene, and back into that of the mesh. */
+static inline void scene_copy_turn(const struct scene_copy *c, const double v[3], double out[3])
+{
+    const double x = v[0], y = v[1];
+    out[0] = c->cosine * x + c->sine * y;
+    out[1] = c->cosine * y - c->sine * x;
+    out[2] = v[2];
+}
+
+static inline void scene_copy_turn_back(const struct scene_copy *c, const double v[3], double out[3])
+{
+    const double x = v[0], y = v[1];
+    out[0] = c->cosine * x - c->sine * y;
+    out[1] = c->cosine * y + c->sine * x;
+    out[2] = v[2];
+}
+
+/* Likewise for a point. */
+static inline void scene_copy_put(const struct scene_copy *c, const double v[3], double out[3])
+{
+    scene_copy_turn(c, v, out);
+    for (int k = 0; k < 3; k++)
+        out[k] = c->scale * out[k] + c->shift_m[k];
+}
+
+static inline void scene_copy_put_back(const struct scene_copy *c, const double p[3], double out[3])
+{
+    const double v[3] = {p[0] - c->shift_m[0], p[1] - c->shift_m[1], p[2] - c->shift_m[2]};
+    scene_copy_turn_back(c, v, out);
+    for (int k = 0; k < 3; k++)
+        out[k] /= c->scale;
+}
 
 /* Texture coordinates at point p of a triangle's plane; scene->uv is there. corner and p in the same frame,
  * turned or shifted as it may be. */

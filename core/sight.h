@@ -63,7 +63,7 @@ void sight_work_free(struct sight_work *work);
 const struct sight_counters *sight_work_counters(const struct sight_work *work);
 
 /* Exact hits, as bvh_hits. The rays begin at the station (rays->from.own.x is NULL, at_m the station's, bit by
- * bit); rays->begins and scattered are not used. What lies beyond range_max_m may or may not be reported.
+ * bit); rays->scattered is not used. Hits beyond range_max_m may or may not be reported.
  * bvh_work: for what the BVH is asked; where rays->steep is given, bvh_work_directions are then those of the last
  * chunk, as after bvh_hits.
  * Allocates nothing. */

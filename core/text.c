@@ -5,8 +5,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 
+#include "core/huge.h"
 #include "core/infile.h"
 
 /* Read, not mapped: a file that shrinks while it is mapped would end the process. */
@@ -15,7 +17,7 @@ static int read_whole(struct text *t, FILE *f, text_progress *progress, void *ct
     struct stat st;
     if (fstat(fileno(f), &st) != 0) return text_fail(t, 0, SH_EINPUT, err, "%s", strerror(errno));
     t->size = (size_t)st.st_size;
-    t->data = malloc(t->size + 1);
+    t->data = huge_alloc(t->size + 1);
     if (t->data == NULL) return text_fail(t, 0, SH_ENOMEM, err, "no memory for %zu bytes", t->size);
     const size_t step = (size_t)16 << 20;
     for (size_t at = 0; at < t->size;) {
@@ -59,6 +61,16 @@ int text_open(struct text *t, const char *path, text_progress *progress, void *c
     t->c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0);
     if (t->c_locale == (locale_t)0) return text_fail(t, 0, SH_ENOMEM, err, "no memory for a locale");
     return SH_OK;
+}
+
+void text_drop_read(struct text *t)
+{
+    const size_t block = (size_t)2 << 20; /* of large pages, of which a part can't go */
+    const size_t first = (block - (uintptr_t)t->data % block) % block, read = (size_t)(t->p - t->data);
+    const size_t from = t->n_dropped > first ? t->n_dropped : first;
+    if (read < from + block) return;
+    t->n_dropped = from + (read - from) / block * block;
+    madvise(t->data + from, t->n_dropped - from, MADV_DONTNEED);
 }
 
 void text_close(struct text *t)

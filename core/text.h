@@ -27,6 +27,7 @@ struct text {
     uint64_t line;  /* of p, from 1 */
     bool continued; /* a backslash before the line's end joins the next one (OBJ) */
     locale_t c_locale;
+    size_t n_dropped; /* bytes from data on: text_drop_read */
 };
 
 /* Called every 16 MiB that are read, fraction -1: unknown. What is not 0 ends the reading, with err filled. */
@@ -35,6 +36,9 @@ typedef int text_progress(void *ctx, double fraction, struct sh_err *err);
 /* Reads the whole file; progress may be NULL. text_close is due in any case. */
 int text_open(struct text *t, const char *path, text_progress *progress, void *ctx, struct sh_err *err);
 void text_close(struct text *t);
+
+/* Gives memory before p back to the system. Nothing there may be read again. */
+void text_drop_read(struct text *t);
 
 /* Fails with "FILE, line N: text", or without the line when it is 0. Returns code. */
 int text_fail(const struct text *t, uint64_t line, int code, struct sh_err *err, const char *fmt, ...)

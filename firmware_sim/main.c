@@ -1,5 +1,6 @@
 /* scanhead: the command line. */
 #include <errno.h>
+#include <malloc.h>
 #include <string.h>
 #include <sys/resource.h>
 
@@ -9,8 +10,8 @@
 
 /* The only list of commands. */
 static const struct app_command *const COMMANDS[] = {
-    &app_run,      &app_record, &app_batch, &app_plan, &app_map, &app_report,
-    &app_coverage, &app_check,  &app_list,  &app_init, &app_view, &app_soak, NULL,
+    &app_run,   &app_record, &app_batch, &app_plan, &app_map,  &app_report, &app_coverage,
+    &app_check, &app_list,   &app_init,  &app_view, &app_soak, NULL,
 };
 
 static int fail_unknown(const char *word)
@@ -59,6 +60,8 @@ static int check_stack(void)
 /* What a command printed may still be in the buffer. A full disk or a closed pipe shows only here. */
 int main(int argc, char **argv)
 {
+    /* Memory of meshes goes back to the system at once, however large the file was that was freed before. */
+    mallopt(M_MMAP_THRESHOLD, 4 << 20);
     int status = check_stack();
     if (status == APP_OK) status = run(argc, argv);
     errno = 0;

@@ -32,6 +32,18 @@ static int check_device(RTCDevice device, struct sh_err *err)
     return embree_fail(code, "bvh", err);
 }
 
+static void attach(struct bvh *bvh, uint32_t n, RTCBoundsFunction bounds, RTCIntersectFunctionN meet)
+{
+    RTCGeometry geometry = rtcNewGeometry(bvh->device, RTC_GEOMETRY_TYPE_USER);
+    rtcSetGeometryUserPrimitiveCount(geometry, n);
+    rtcSetGeometryUserData(geometry, bvh);
+    rtcSetGeometryBoundsFunction(geometry, bounds, NULL);
+    rtcSetGeometryIntersectFunction(geometry, meet);
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometry(bvh->rtc, geometry);
+    rtcReleaseGeometry(geometry);
+}
+
 /* Builds what Embree has, unless report asks to stop. */
 static int commit(struct bvh *bvh, const struct sh_report *report, struct sh_err *err)
 {
@@ -39,24 +51,19 @@ static int commit(struct bvh *bvh, const struct sh_report *report, struct sh_err
         const void *in;
         void *out;
     } ctx = {.in = report};
-    RTCGeometry geometry = rtcNewGeometry(bvh->device, RTC_GEOMETRY_TYPE_USER);
-    rtcSetGeometryUserPrimitiveCount(geometry, bvh->n_leaves);
-    rtcSetGeometryUserData(geometry, bvh);
-    rtcSetGeometryBoundsFunction(geometry, embree_asks_bounds, NULL);
-    rtcSetGeometryIntersectFunction(geometry, bvh_meet_leaf);
-    rtcCommitGeometry(geometry);
     bvh->rtc = rtcNewScene(bvh->device);
-    rtcAttachGeometry(bvh->rtc, geometry);
-    rtcReleaseGeometry(geometry);
+    attach(bvh, bvh->n_leaves, embree_asks_bounds, bvh_meet_leaf);
+    if (bvh->scene->n_copies > 0) attach(bvh, bvh->scene->n_copies, embree_asks_copy_bounds, bvh_meet_copy);
     rtcSetSceneProgressMonitorFunction(bvh->rtc, embree_may_go_on, ctx.out);
     rtcCommitScene(bvh->rtc);
     return check_device(bvh->device, err);
 }
 
 /* The planes are made once Embree has given back what it takes for building. */
-static int build(struct bvh *bvh, const struct sh_report *report, struct sh_err *err)
+static int build(struct bvh *bvh, unsigned threads, const struct sh_report *report, struct sh_err *err)
 {
     int rc = bvh_make_leaves(bvh, report, err);
+    if (rc == SH_OK) rc = bvh_make_copies(bvh, threads, report, err);
     if (rc == SH_OK) rc = commit(bvh, report, err);
     if (rc == SH_OK) rc = bvh_make_planes(bvh, report, err);
     return rc;
@@ -69,16 +76,33 @@ static double seconds(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
+/* Embree may hang so many leaves at one node of its tree. Four of them, where it finds that cheaper, save a seventh of
+ * the memory, and rays are as fast where surfaces hang together. In foliage a ray would try half as many leaves
+ * more. */
+static unsigned most_together(const struct scene *scene)
+{
+    const int is_large = scene->n_triangles >= 500000, hangs_together = scene->n_vertices <= 0.6 * scene->n_triangles;
+    return is_large && hangs_together ? 4 : 1;
+}
+
 int bvh_create(const struct scene *scene, unsigned threads, const struct sh_report *report, struct bvh **out,
                struct sh_err *err)
+{
+    return bvh_create_whole(scene, 0, threads, report, out, err);
+}
+
+int bvh_create_whole(const struct scene *scene, int in_one, unsigned threads, const struct sh_report *report,
+                     struct bvh **out, struct sh_err *err)
 {
     *out = NULL;
     struct bvh *bvh = calloc(1, sizeof *bvh);
     if (bvh == NULL) return sh_fail(err, SH_ENOMEM, "bvh: no memory");
     /* Embree sets 128 MB aside for subdivision surfaces, of which there are none here: 1 MB, the least. */
-    char config[64] = "tessellation_cache_size=1";
-    if (threads != 0) snprintf(config, sizeof config, "tessellation_cache_size=1,threads=%u", threads);
+    char config[96];
+    snprintf(config, sizeof config, "tessellation_cache_size=1,object_accel_max_leaf_size=%u,threads=%u",
+             most_together(scene), threads);
     bvh->scene = scene;
+    bvh->stretch_m = in_one ? INFINITY : BVH_STRETCH_M;
     bvh->device = rtcNewDevice(config);
     if (bvh->device == NULL) {
         free(bvh);
@@ -87,15 +111,16 @@ int bvh_create(const struct scene *scene, unsigned threads, const struct sh_repo
     rtcSetDeviceMemoryMonitorFunction(bvh->device, embree_counts_bytes, bvh);
     if (scene->n_triangles > 1000000) sh_progress(report, "building the BVH", -1.0);
     double start = seconds();
-    int rc = build(bvh, report, err);
+    int rc = build(bvh, threads, report, err);
     if (rc != SH_OK) {
         bvh_free(bvh);
         return rc;
     }
     bvh->info.packet = embree_packet(bvh->device);
     bvh->info.build_s = seconds() - start;
-    bvh->info.bytes = (uint64_t)__atomic_load_n(&bvh->bytes, __ATOMIC_RELAXED) +
-                      (uint64_t)scene->n_triangles * sizeof *bvh->plane + (uint64_t)bvh->n_leaves * sizeof *bvh->leaf;
+    bvh->info.bytes += (uint64_t)__atomic_load_n(&bvh->bytes, __ATOMIC_RELAXED) +
+                       (uint64_t)scene->n_triangles * sizeof *bvh->plane + (uint64_t)bvh->n_leaves * sizeof *bvh->leaf +
+                       (uint64_t)scene->n_copies * sizeof *bvh->copy;
     *out = bvh;
     return SH_OK;
 }
@@ -105,6 +130,7 @@ void bvh_free(struct bvh *bvh)
     if (bvh == NULL) return;
     if (bvh->rtc != NULL) rtcReleaseScene(bvh->rtc);
     rtcReleaseDevice(bvh->device);
+    bvh_free_copies(bvh);
     free(bvh->leaf);
     free(bvh->plane);
     free(bvh);

@@ -65,16 +65,30 @@ static inline double blur(const double a[3], const double b[3])
     return 8.0 * 0x1p-53 * sqrt(fmax(vec3_dot(a, a), vec3_dot(b, b))) * vec3_distance(a, b);
 }
 
+/* Whether a ray that is as near to the line of an edge as rounding passes between the edge's ends, or past one of them
+ * by no more than rounding. How near it is to the line is not asked of the nearest points: where the ray goes almost
+ * along the edge they are uncertain by far more. */
+static inline int is_beside(const double a[3], const double b[3], const double dir[3])
+{
+    double e[3], across[3];
+    vec3_sub(b, a, e);
+    const double ee = vec3_dot(e, e), ed = vec3_dot(e, dir), dd = vec3_dot(dir, dir);
+    const double along = ed * vec3_dot(a, dir) - dd * vec3_dot(a, e); /* from a to b it goes from 0 to ... */
+    if (along >= 0.0 && along <= ee * dd - ed * ed) return 1;
+    const double *end = along < 0.0 ? a : b;
+    vec3_cross(end, dir, across);
+    return vec3_dot(across, across) <= 0x1p-98 * vec3_dot(end, end); /* 16 units of 2^-53 of its distance */
+}
+
 /* Whether a ray that passes outside of a triangle does so by no more than that: beside an edge, not beyond its ends. */
 static inline int is_near_miss(double v[3][3], const double side[3], const double dir[3])
 {
     const double sign = side[0] + side[1] + side[2] < 0.0 ? -1.0 : 1.0; /* of n . dir */
     int touches = 0;
     for (int i = 0; i < 3; i++) {
-        const double *a = v[i], *b = v[(i + 1) % 3];
-        if (-sign * side[i] > blur(a, b)) return 0;
-        const double gap = edge_gap(a, b, dir, edge_range(a, b, dir));
-        touches |= gap <= 16.0 * 0x1p-53 * sqrt(fmax(vec3_dot(a, a), vec3_dot(b, b)));
+        const double *a = v[i], *b = v[(i + 1) % 3], near = blur(a, b);
+        if (-sign * side[i] > near) return 0;
+        touches |= fabs(side[i]) <= near && is_beside(a, b, dir);
     }
     return touches;
 }

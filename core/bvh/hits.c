@@ -10,6 +10,7 @@ enum { ROOM = BVH_CHUNK + 48 }; /* arrays of a power of two would get into each 
 
 struct bvh_work {
     struct bvh_query query;
+    struct bvh_nested nested; /* touched only where there are copies */
     struct {
         float x[ROOM], y[ROOM], z[ROOM];
     } dir, org; /* as Embree gets them */
@@ -26,6 +27,7 @@ int bvh_work_create(struct bvh_work **out, struct sh_err *err)
     struct bvh_work *w = *out = aligned_alloc(64, (sizeof *w + 63) / 64 * 64);
     if (w == NULL) return sh_fail(err, SH_ENOMEM, "bvh: no memory");
     memset(w, 0, sizeof *w);
+    w->query.nested = &w->nested;
     return SH_OK;
 }
 
@@ -80,8 +82,8 @@ static double to_local(const struct vec3_in *own, const double origin_m[3], uint
     return far2;
 }
 
-/* Rays that begin further from the scene's middle than its radius are nearer than two of them before they meet
- * anything: the float ray begins there. */
+/* Rays that begin further from the origin than the scene goes come within its radius before they meet anything: the float
+ * ray begins there. */
 static void take_along(struct bvh_work *w, const struct bvh *bvh, const struct bvh_rays *rays, struct bvh_batch *batch)
 {
     struct bvh_origins from = {.own = batch->local};
@@ -116,16 +118,53 @@ static void set_origins(struct bvh_work *w, const struct bvh *bvh, const struct 
     }
 }
 
+/* Ray i of a chunk has met nothing in its first stretch: the next ones, until it has left the scene. */
+static void cast_further(struct bvh_work *w, const struct bvh *bvh, const struct bvh_batch *batch, uint32_t i)
+{
+    const struct bvh_rays *rays = batch->rays;
+    const double dir[3] = VEC3_AT(rays->dir, i);
+    struct bvh_origins from = {.own = batch->local};
+    struct bvh_rays one = {.n = 1,
+                           .from = rays->from,
+                           .dir = VEC3_IN(rays->dir, i),
+                           .scattered = 1,
+                           .range_m = rays->range_m + i,
+                           .triangle = rays->triangle + i};
+    float at[3];
+    double o[3], start_m = batch->start_m != NULL ? batch->start_m[i] : 0.0;
+    struct bvh_batch next = *batch;
+    memcpy(from.at_m, batch->at_local, sizeof from.at_m);
+    bvh_origin_of(&from, i, o);
+    if (rays->from.own.x != NULL) {
+        one.from.own = VEC3_IN(rays->from.own, i);
+        next.local = VEC3_IN(batch->local, i);
+    }
+    next.rays = &one;
+    next.dir = (struct vec3_floats){batch->dir.x + i, batch->dir.y + i, batch->dir.z + i};
+    next.org = (struct vec3_floats){&at[0], &at[1], &at[2]};
+    next.start_m = &start_m;
+    const double end_m = fmin(rays->range_max_m, vec3_length(o) + bvh->radius_m);
+    while (one.triangle[0] == BVH_NO_TRIANGLE && (start_m += bvh->stretch_m) < end_m) {
+        for (int k = 0; k < 3; k++)
+            at[k] = (float)(o[k] + start_m * dir[k]);
+        bvh_intersect(bvh, &w->query, &next);
+    }
+}
+
 static void cast_chunk(struct bvh_work *w, const struct bvh *bvh, const struct bvh_rays *rays)
 {
+    const int in_stretches = rays->range_max_m > bvh->stretch_m;
     struct bvh_batch batch = {.rays = rays,
                               .dir = bvh_work_directions(w),
-                              .t_max = (float)(rays->range_max_m * 1.001),
+                              .t_max = (float)(in_stretches ? bvh->stretch_m : rays->range_max_m * 1.001),
+                              .most_m = in_stretches ? bvh->stretch_m : INFINITY,
                               .counters = &w->counters};
     bvh_to_float(&rays->dir, rays->n, w->dir.x, w->dir.y, w->dir.z);
     set_origins(w, bvh, rays, &batch);
     bvh_stage_ends(w->profile, BVH_STAGE_PREPARE);
     bvh_intersect(bvh, &w->query, &batch);
+    for (uint32_t i = 0; in_stretches && i < rays->n; i++)
+        if (rays->triangle[i] == BVH_NO_TRIANGLE) cast_further(w, bvh, &batch, i);
     bvh_stage_ends(w->profile, BVH_STAGE_EMBREE);
     if (rays->label != NULL || rays->steep != NULL) bvh_refine(bvh, rays);
     bvh_stage_ends(w->profile, BVH_STAGE_REFINE);
@@ -138,11 +177,25 @@ void bvh_hits(struct bvh_work *work, const struct bvh *bvh, const struct bvh_ray
         part.n = rays->n - at < BVH_CHUNK ? rays->n - at : BVH_CHUNK;
         part.dir = VEC3_IN(rays->dir, at);
         if (rays->from.own.x != NULL) part.from.own = VEC3_IN(rays->from.own, at);
-        part.begins = rays->begins != NULL ? rays->begins + at : NULL;
         part.range_m = rays->range_m + at;
         part.triangle = rays->triangle + at;
         part.label = rays->label != NULL ? rays->label + at : NULL;
         part.steep = rays->steep != NULL ? rays->steep + at : NULL;
         cast_chunk(work, bvh, &part);
     }
+}
+
+double bvh_ray(struct bvh_work *work, const struct bvh *bvh, const double at_m[3], const double dir[3])
+{
+    double range_m;
+    uint32_t triangle;
+    const struct bvh_rays ray = {.n = 1,
+                                 .from.at_m = {at_m[0], at_m[1], at_m[2]},
+                                 .dir = {&dir[0], &dir[1], &dir[2]},
+                                 .range_max_m = 1e9,
+                                 .scattered = 1,
+                                 .range_m = &range_m,
+                                 .triangle = &triangle};
+    bvh_hits(work, bvh, &ray);
+    return range_m;
 }

@@ -5,9 +5,6 @@
 #include "core/bvh/bvh_inside.h"
 #include "core/huge.h"
 
-/* A triangle's neighbour is looked for among this many of the list, itself included. */
-enum { AHEAD = 16 };
-
 /* The corner of a triangle that is none of another's that shares an edge with it; 3: they share none. */
 static int odd_corner(const uint32_t a[3], const uint32_t b[3])
 {
@@ -31,6 +28,15 @@ static float above(double x)
     return -below(-x);
 }
 
+/* As bvh_leaf_length reads it. */
+static uint32_t length_bits(double length_m)
+{
+    const float f = above(length_m);
+    uint32_t bits;
+    memcpy(&bits, &f, sizeof bits);
+    return (bits + (UINT32_C(1) << BVH_LENGTH_BITS) - 1) >> BVH_LENGTH_BITS;
+}
+
 static void fill_leaf(const struct bvh *bvh, uint32_t first, uint32_t second, struct bvh_leaf *leaf)
 {
     const struct scene *scene = bvh->scene;
@@ -48,23 +54,49 @@ static void fill_leaf(const struct bvh *bvh, uint32_t first, uint32_t second, st
     for (int i = 0; i < 4; i++)
         for (int j = 0; j < i; j++)
             if (i != 3 || j != 0) edge_m = fmax(edge_m, vec3_distance(leaf->corner_m[i], leaf->corner_m[j]));
-    leaf->far_m = above(far_m);
-    leaf->edge_m = above(edge_m);
-    leaf->triangle[0] = first;
-    leaf->triangle[1] = second;
+    leaf->triangle = first;
+    leaf->rest = (second != BVH_NO_TRIANGLE ? second - first : 0) | length_bits(edge_m) << BVH_LEAF_EDGE |
+                 length_bits(far_m) << BVH_LEAF_FAR;
 }
 
-/* The middle of the scene, and how far all of it lies from there. */
-static void measure(struct bvh *bvh)
+/* How far all of the scene lies from the origin. */
+static double radius_of(const struct bvh *bvh)
 {
     const struct scene *scene = bvh->scene;
     double half[3];
-    if (scene->n_triangles == 0) return;
-    for (int i = 0; i < 3; i++) {
-        bvh->origin_m[i] = scene->min_m[i] + 0.5 * (scene->max_m[i] - scene->min_m[i]);
+    for (int i = 0; i < 3; i++)
         half[i] = fmax(scene->max_m[i] - bvh->origin_m[i], bvh->origin_m[i] - scene->min_m[i]);
-    }
-    bvh->radius_m = (double)above(vec3_length(half));
+    return (double)above(vec3_length(half));
+}
+
+static double pad_units_m(const struct bvh *bvh, double far_m)
+{
+    const double whole_m = 8.0 * (far_m + 2.0 * bvh->radius_m);
+    return fmin(whole_m, 9.0 * bvh->stretch_m + 17.0 * far_m);
+}
+
+/* The mean of the triangles' corners: vertices that no triangle uses may be anywhere. */
+static void mean_corner(const struct scene *scene, double mean_m[3])
+{
+    double sum[3] = {0};
+    for (size_t i = 0; i < 3 * (size_t)scene->n_triangles; i++)
+        vec3_add(sum, scene->vertex_m[scene->triangle[i / 3][i % 3]], sum);
+    for (int i = 0; i < 3; i++)
+        mean_m[i] = fmin(fmax(sum[i] / (3.0 * scene->n_triangles), scene->min_m[i]), scene->max_m[i]);
+}
+
+/* The origin is the middle of the scene. Where rays go in stretches, it is where most triangles are. */
+static void measure(struct bvh *bvh)
+{
+    const struct scene *scene = bvh->scene;
+    if (scene->n_all == 0) return;
+    for (int i = 0; i < 3; i++)
+        bvh->origin_m[i] = scene->min_m[i] + 0.5 * (scene->max_m[i] - scene->min_m[i]);
+    bvh->radius_m = radius_of(bvh);
+    if (pad_units_m(bvh, 0.0) >= 16.0 * bvh->radius_m) bvh->stretch_m = INFINITY;
+    if (bvh->stretch_m == INFINITY || scene->n_triangles == 0 || scene->n_copies > 0) return;
+    mean_corner(scene, bvh->origin_m);
+    bvh->radius_m = radius_of(bvh);
 }
 
 /* Half the surface of the box around two triangles; the same one twice: around it. */
@@ -88,10 +120,12 @@ static int is_taken(const uint64_t *taken, uint32_t triangle)
     return (taken[triangle / 64] >> triangle % 64 & 1) != 0;
 }
 
-/* The one of the triangles that follow it in the list that makes the smallest box with it; or BVH_NO_TRIANGLE. */
+/* Returns the one that makes the smallest box with the triangle, among those that follow it in the list as far as a leaf
+ * can name; or BVH_NO_TRIANGLE. */
 static uint32_t partner(const struct scene *scene, uint32_t triangle, const uint64_t *taken)
 {
-    const uint32_t left = scene->n_triangles - triangle, end = triangle + (left < AHEAD ? left : AHEAD);
+    const uint32_t left = scene->n_triangles - triangle,
+                   end = triangle + (left < BVH_LEAF_AHEAD ? left : BVH_LEAF_AHEAD);
     uint32_t best = BVH_NO_TRIANGLE;
     double best_m2 = INFINITY, own_m2 = -1.0;
     for (uint32_t i = triangle + 1; i < end; i++) {
@@ -128,25 +162,30 @@ int bvh_make_leaves(struct bvh *bvh, const struct sh_report *report, struct sh_e
     return rc;
 }
 
+void bvh_pad_box(const struct bvh *bvh, const double lo_m[3], const double hi_m[3], double far_m, struct RTCBounds *box)
+{
+    const double pad_m = 0x1p-24 * pad_units_m(bvh, far_m);
+    *box = (struct RTCBounds){.lower_x = below(lo_m[0] - pad_m),
+                              .lower_y = below(lo_m[1] - pad_m),
+                              .lower_z = below(lo_m[2] - pad_m),
+                              .upper_x = above(hi_m[0] + pad_m),
+                              .upper_y = above(hi_m[1] + pad_m),
+                              .upper_z = above(hi_m[2] + pad_m)};
+}
+
 void embree_asks_bounds(const struct RTCBoundsFunctionArguments *args)
 {
     const struct bvh *bvh = args->geometryUserPtr;
     const struct bvh_leaf *leaf = &bvh->leaf[args->primID];
     double lo[3], hi[3];
-    const double pad_m = 8.0 * 0x1p-24 * ((double)leaf->far_m + 2.0 * bvh->radius_m);
     for (int j = 0; j < 3; j++) {
         lo[j] = hi[j] = leaf->corner_m[0][j];
         for (int i = 1; i < 4; i++) {
             lo[j] = fmin(lo[j], leaf->corner_m[i][j]);
             hi[j] = fmax(hi[j], leaf->corner_m[i][j]);
         }
-        lo[j] = lo[j] - bvh->origin_m[j] - pad_m;
-        hi[j] = hi[j] - bvh->origin_m[j] + pad_m;
+        lo[j] -= bvh->origin_m[j];
+        hi[j] -= bvh->origin_m[j];
     }
-    *args->bounds_o = (struct RTCBounds){.lower_x = below(lo[0]),
-                                         .lower_y = below(lo[1]),
-                                         .lower_z = below(lo[2]),
-                                         .upper_x = above(hi[0]),
-                                         .upper_y = above(hi[1]),
-                                         .upper_z = above(hi[2])};
+    bvh_pad_box(bvh, lo, hi, bvh_leaf_far_m(leaf), args->bounds_o);
 }

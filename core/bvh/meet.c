@@ -3,6 +3,7 @@
 
 #include "core/bvh/bvh_inside.h"
 #include "core/bvh/edges.h"
+#include "core/bvh/nearest.h"
 #include "core/vec3.h"
 #include "core/vecmath.h"
 
@@ -146,65 +147,11 @@ static int is_hole(const struct bvh_query *query, uint32_t lane, uint32_t triang
     return texture_is_hole(scene_cutout(scene, triangle), uv);
 }
 
-/* As near as the nearest: all of them are kept, and the lowest number is the hit. */
-static void add_tied(struct bvh_query *query, uint32_t lane, uint32_t triangle, double range_m)
-{
-    struct bvh_tied *tied = &query->tied[lane];
-    const double most_m = query->range_m[lane] + BVH_SAME * query->range_m[lane];
-    uint32_t n = 0, last = 0, lowest = 0, before = query->n_tied[lane];
-    if (before == 0) {
-        tied->triangle[0] = query->triangle[lane];
-        tied->range_m[0] = query->hit_m[lane];
-        before = 1;
-    }
-    for (uint32_t i = 0; i < before; i++) {
-        if (tied->range_m[i] > most_m || tied->triangle[i] == triangle) continue;
-        tied->range_m[n] = tied->range_m[i];
-        tied->triangle[n] = tied->triangle[i];
-        if (tied->triangle[n] > tied->triangle[last]) last = n;
-        n++;
-    }
-    const uint32_t at = n < BVH_MOST_TIED ? n : last;
-    if (n < BVH_MOST_TIED || triangle < tied->triangle[last]) {
-        tied->triangle[at] = triangle;
-        tied->range_m[at] = range_m;
-        n += at == n;
-    }
-    query->n_tied[lane] = n;
-    for (uint32_t i = 1; i < n; i++)
-        if (tied->triangle[i] < tied->triangle[lowest]) lowest = i;
-    query->triangle[lane] = tied->triangle[lowest];
-    query->hit_m[lane] = tied->range_m[lowest];
-}
-
-/* The next float above a number that is not negative. */
-VEC_INLINE float float_above(double x)
-{
-    const float f = (float)x;
-    uint32_t bits;
-    memcpy(&bits, &f, sizeof bits);
-    bits += (double)f <= x;
-    float above;
-    memcpy(&above, &bits, sizeof above);
-    return above;
-}
-
 /* A triangle that the ray meets, at a range that is no further than the nearest and what counts as the same. */
 VEC_INLINE void note(struct bvh_query *query, float *tfar, uint32_t lane, uint32_t triangle, double range_m)
 {
-    const double nearest_m = query->range_m[lane];
     if (query->bvh->scene->cutout != NULL && is_hole(query, lane, triangle, range_m)) return;
-    if (range_m < nearest_m) {
-        query->range_m[lane] = range_m;
-        *tfar = float_above(range_m - query->start_m[lane]);
-    }
-    if (range_m + BVH_SAME * range_m < nearest_m) {
-        query->n_tied[lane] = 0;
-        query->triangle[lane] = triangle;
-        query->hit_m[lane] = range_m;
-        return;
-    }
-    add_tied(query, lane, triangle, range_m);
+    bvh_take_hit(query, tfar, lane, triangle, range_m, range_m);
 }
 
 /* Range to a triangle that the ray meets, and almost in its plane, where the plane's own range runs away: it is kept
@@ -238,7 +185,7 @@ static int begins_at_corner(double v[3][3])
  * counts, and of those the one with the lowest number. */
 static void note_miss(struct bvh_query *query, uint32_t lane, uint32_t triangle, double range_m)
 {
-    if (!(range_m > BVH_AT_ORIGIN_M) || range_m > query->near_m[lane]) return;
+    if (!(range_m > query->at_origin_m) || range_m > query->near_m[lane]) return;
     if (range_m == query->near_m[lane] && triangle > query->near[lane]) return;
     if (is_hole(query, lane, triangle, range_m)) return;
     query->near_m[lane] = range_m;
@@ -248,7 +195,7 @@ static void note_miss(struct bvh_query *query, uint32_t lane, uint32_t triangle,
 /* One ray and one triangle, of which double precision in lanes can't say whether they meet, or where. */
 static void try_one(struct bvh_query *query, float *tfar, uint32_t lane, const struct bvh_leaf *leaf, int which)
 {
-    const uint32_t triangle = leaf->triangle[which];
+    const uint32_t triangle = bvh_leaf_triangle(leaf, which);
     const struct bvh_plane *plane = &query->bvh->plane[triangle];
     double v[3][3], dir[3], o[3];
     for (int j = 0; j < 3; j++) {
@@ -269,7 +216,7 @@ static void try_one(struct bvh_query *query, float *tfar, uint32_t lane, const s
     const double nearest_m = query->range_m[lane];
     if (!met)
         note_miss(query, lane, triangle, range_m);
-    else if (range_m > BVH_AT_ORIGIN_M && range_m <= nearest_m + BVH_SAME * nearest_m)
+    else if (range_m > query->at_origin_m && range_m <= nearest_m + BVH_SAME * nearest_m)
         note(query, tfar, lane, triangle, range_m);
 }
 
@@ -284,13 +231,14 @@ VEC_INLINE void find_ranges(const struct bvh_query *query, const struct bvh_plan
     const double *px = query->local[0], *py = query->local[1], *pz = query->local[2], *nearest_m = query->range_m;
     const double nx = plane->n[0], ny = plane->n[1], nz = plane->n[2], d = plane->d;
     const double least = FLAT * FLAT * vec3_dot(plane->n, plane->n), off = nx * o[0] + ny * o[1] + nz * o[2];
+    const double begin_m = query->at_origin_m;
     const int own = query->has_own;
     VEC_LOOP
     for (uint32_t i = 0; i < BVH_PACKET; i++) {
         const double along = nx * dx[i] + ny * dy[i] + nz * dz[i];
         const double here = own ? nx * px[i] + ny * py[i] + nz * pz[i] : off, range = (d - here) / along;
         const double more = range + BVH_SAME * range, most = nearest_m[i] + BVH_SAME * nearest_m[i];
-        const int64_t ahead = range > BVH_AT_ORIGIN_M, nearer = more < nearest_m[i], as_near = range <= most;
+        const int64_t ahead = range > begin_m, nearer = more < nearest_m[i], as_near = range <= most;
         range_m[i] = range;
         becomes[i] = along * along > least ? (ahead & as_near) << (1 - nearer) : FLAT_SEEN;
     }
@@ -306,13 +254,11 @@ VEC_INLINE void take_nearer(struct bvh_query *query, float *tfar, uint32_t trian
         const int64_t take = takes[i];
         query->range_m[i] = take ? range_m[i] : query->range_m[i];
         query->hit_m[i] = take ? range_m[i] : query->hit_m[i];
-        above[i] = float_above(range_m[i] - query->start_m[i]);
+        above[i] = tfar_of(range_m[i], query->start_m[i]);
     }
     VEC_LOOP
-    for (uint32_t i = 0; i < BVH_PACKET; i++) {
+    for (uint32_t i = 0; i < BVH_PACKET; i++)
         query->triangle[i] = takes[i] ? triangle : query->triangle[i];
-        query->n_tied[i] = takes[i] ? 0 : query->n_tied[i];
-    }
     if (query->width == BVH_PACKET)
         for (uint32_t i = 0; i < BVH_PACKET; i++)
             tfar[i] = takes[i] ? above[i] : tfar[i];
@@ -325,7 +271,7 @@ VEC_INLINE void meet_triangle(struct bvh_query *query, float *tfar, const struct
                               const struct lanes *found)
 {
     const int shift = which * SECOND, may_pass = query->bvh->scene->cutout != NULL;
-    const uint32_t triangle = leaf->triangle[which];
+    const uint32_t triangle = bvh_leaf_triangle(leaf, which);
     double range_m[BVH_PACKET];
     int64_t becomes[BVH_PACKET];
     uint32_t takes[BVH_PACKET], others = 0;
@@ -351,7 +297,7 @@ VEC_INLINE void meet_triangle(struct bvh_query *query, float *tfar, const struct
 /* Where all rays are beside the two triangles. found: all bits of the rays that Embree asks for. */
 VEC_INLINE void judge_all(const struct bvh_query *query, const struct bvh_leaf *leaf, struct lanes *found)
 {
-    const double size = ((double)leaf->far_m + query->far_m) * (double)leaf->edge_m;
+    const double size = (bvh_leaf_far_m(leaf) + query->far_m) * bvh_leaf_edge_m(leaf);
     const struct lanes valid = *found;
     int64_t wide[BVH_PACKET];
     if (query->has_own) {
@@ -371,9 +317,9 @@ VEC_INLINE void judge_all(const struct bvh_query *query, const struct bvh_leaf *
 VEC_CLONES
 static void meet(struct bvh_query *query, float *tfar, const struct bvh_leaf *leaf, struct lanes *found)
 {
-    const int two = leaf->triangle[1] != BVH_NO_TRIANGLE;
-    __builtin_prefetch(&query->bvh->plane[leaf->triangle[0]]);
-    if (two) __builtin_prefetch(&query->bvh->plane[leaf->triangle[1]]);
+    const int two = bvh_leaf_has_two(leaf);
+    __builtin_prefetch(&query->bvh->plane[leaf->triangle]);
+    if (two) __builtin_prefetch(&query->bvh->plane[bvh_leaf_triangle(leaf, 1)]);
     query->leaves++;
     judge_all(query, leaf, found);
     if (any(found, EITHER)) meet_triangle(query, tfar, leaf, 0, found);

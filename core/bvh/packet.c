@@ -2,10 +2,8 @@
 #include <math.h>
 
 #include "core/bvh/bvh_inside.h"
+#include "core/bvh/nearest.h"
 #include "core/vecmath.h"
-
-/* Of packets that were cut, those that are left with as many as this are not worth it. */
-enum { FEW = 4 };
 
 struct packet {
     struct RTCRayHit16 at; /* or, from its beginning, one of fewer rays */
@@ -13,43 +11,41 @@ struct packet {
 } __attribute__((aligned(64)));
 
 #if RTC_VERSION_MAJOR >= 4
-static void begin(struct bvh_query *query)
+void bvh_begin_query(struct bvh_query *query)
 {
     rtcInitRayQueryContext(&query->context);
 }
 
-static void call(const struct bvh *bvh, struct bvh_query *query, struct packet *packet, uint32_t width)
+void bvh_call_embree(const struct bvh *bvh, struct bvh_query *query, const int *valid, void *rays, uint32_t width)
 {
     struct RTCIntersectArguments how;
     rtcInitIntersectArguments(&how);
     how.flags = RTC_RAY_QUERY_FLAG_COHERENT;
     how.context = &query->context;
-    void *rays = &packet->at;
     if (width == 16)
-        rtcIntersect16(packet->valid, bvh->rtc, rays, &how);
+        rtcIntersect16(valid, bvh->rtc, rays, &how);
     else if (width == 8)
-        rtcIntersect8(packet->valid, bvh->rtc, rays, &how);
+        rtcIntersect8(valid, bvh->rtc, rays, &how);
     else if (width == 4)
-        rtcIntersect4(packet->valid, bvh->rtc, rays, &how);
+        rtcIntersect4(valid, bvh->rtc, rays, &how);
     else
         rtcIntersect1(bvh->rtc, rays, &how);
 }
 #else
-static void begin(struct bvh_query *query)
+void bvh_begin_query(struct bvh_query *query)
 {
     rtcInitIntersectContext(&query->context);
     query->context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
 }
 
-static void call(const struct bvh *bvh, struct bvh_query *query, struct packet *packet, uint32_t width)
+void bvh_call_embree(const struct bvh *bvh, struct bvh_query *query, const int *valid, void *rays, uint32_t width)
 {
-    void *rays = &packet->at;
     if (width == 16)
-        rtcIntersect16(packet->valid, bvh->rtc, &query->context, rays);
+        rtcIntersect16(valid, bvh->rtc, &query->context, rays);
     else if (width == 8)
-        rtcIntersect8(packet->valid, bvh->rtc, &query->context, rays);
+        rtcIntersect8(valid, bvh->rtc, &query->context, rays);
     else if (width == 4)
-        rtcIntersect4(packet->valid, bvh->rtc, &query->context, rays);
+        rtcIntersect4(valid, bvh->rtc, &query->context, rays);
     else
         rtcIntersect1(bvh->rtc, &query->context, rays);
 }
@@ -92,13 +88,15 @@ VEC_INLINE void set_doubles(struct bvh_query *query, const struct bvh_batch *bat
     const double *const own[3] = {rays->from.own.x, rays->from.own.y, rays->from.own.z};
     const double *const local[3] = {batch->local.x, batch->local.y, batch->local.z};
     for (uint32_t i = 0; i < BVH_PACKET; i++) {
-        query->range_m[i] = INFINITY;
+        query->range_m[i] = query->most_m;
         query->hit_m[i] = NAN;
     }
-    for (uint32_t i = 0; i < BVH_PACKET; i++) {
+    if (query->most_m != INFINITY && batch->start_m != NULL)
+        for (uint32_t i = 0; i < n; i++)
+            query->range_m[i] += batch->start_m[first + i];
+    for (uint32_t i = 0; i < BVH_PACKET; i++)
         query->triangle[i] = BVH_NO_TRIANGLE;
-        query->n_tied[i] = 0;
-    }
+    query->unsure = 0;
     if (batch->start_m != NULL) memcpy(query->start_m, batch->start_m + first, n * sizeof(double));
     for (int j = 0; j < 3; j++) {
         memcpy(query->dir[j], dir[j] + first, n * sizeof(double));
@@ -120,10 +118,27 @@ static void take_near(struct bvh_query *query, uint32_t n)
 {
     for (uint32_t i = 0; i < n; i++) {
         if (query->near[i] == BVH_NO_TRIANGLE || query->hit_m[i] <= query->near_m[i]) continue;
+        if (query->near_m[i] > query->most_m + query->start_m[i]) continue;
         query->triangle[i] = query->near[i];
         query->hit_m[i] = query->near_m[i];
     }
     forget_near(query);
+}
+
+/* Casts rays again whose nearest range is known. No range is less, so the lowest number of those as near is found in any
+ * order. */
+static void settle(const struct bvh *bvh, struct bvh_query *query, struct packet *packet, uint32_t width)
+{
+    float *tfar = bvh_field(&packet->at, width, tfar);
+    for (uint32_t i = 0; i < width; i++) {
+        packet->valid[i] = (query->unsure >> i & 1) != 0 ? -1 : 0;
+        if (packet->valid[i] == 0) continue;
+        tfar[i] = tfar_of(query->range_m[i], query->start_m[i]);
+        query->triangle[i] = BVH_NO_TRIANGLE;
+        query->hit_m[i] = NAN;
+    }
+    query->unsure = 0;
+    bvh_call_embree(bvh, query, packet->valid, &packet->at, width);
 }
 
 VEC_INLINE void cast_one(const struct bvh *bvh, struct bvh_query *query, struct packet *packet,
@@ -134,7 +149,8 @@ VEC_INLINE void cast_one(const struct bvh *bvh, struct bvh_query *query, struct 
     set_doubles(query, batch, first, n);
     query->width = width;
     query->dir_float = width == BVH_PACKET ? bvh_field(&packet->at, width, dir_x) : NULL;
-    call(bvh, query, packet, width);
+    bvh_call_embree(bvh, query, packet->valid, &packet->at, width);
+    if (query->unsure != 0) settle(bvh, query, packet, width);
     if (query->decided != decided) take_near(query, n);
     memcpy(batch->rays->range_m + first, query->hit_m, n * sizeof *query->hit_m);
     memcpy(batch->rays->triangle + first, query->triangle, n * sizeof *query->triangle);
@@ -151,40 +167,25 @@ static void cast(const struct bvh *bvh, struct bvh_query *query, struct packet *
         cast_one(bvh, query, packet, batch, first, n, width);
 }
 
-/* The end of the packet that begins at `at`. */
-static uint32_t cut(const struct bvh_rays *rays, uint32_t width, uint32_t at)
-{
-    const uint32_t end = rays->n - at < width ? rays->n : at + width;
-    for (uint32_t i = at + 1; rays->begins != NULL && i < end; i++)
-        if (rays->begins[i]) return i;
-    return end;
-}
-
 void bvh_intersect(const struct bvh *bvh, struct bvh_query *query, struct bvh_batch *batch)
 {
     const struct bvh_rays *rays = batch->rays;
     const uint32_t width = rays->scattered ? 1 : bvh->info.packet;
-    struct packet whole, single;
-    begin(query);
-    begin_packet(&whole, batch, width);
-    if (rays->begins != NULL) begin_packet(&single, batch, 1);
+    struct packet packet;
+    bvh_begin_query(query);
+    begin_packet(&packet, batch, width);
     query->bvh = bvh;
+    query->at_origin_m = BVH_AT_ORIGIN_M;
     query->has_own = rays->from.own.x != NULL;
     query->far_m = batch->far_m;
+    query->most_m = batch->most_m;
     query->decided = query->leaves = 0;
     memcpy(query->at, rays->from.at_m, sizeof query->at);
     memcpy(query->at_local, batch->at_local, sizeof query->at_local);
     memset(query->start_m, 0, sizeof query->start_m);
     forget_near(query);
-    for (uint32_t at = 0, end; at < rays->n; at = end) {
-        end = cut(rays, width, at);
-        if (end - at > FEW || rays->begins == NULL) {
-            cast(bvh, query, &whole, batch, at, end - at, width);
-            continue;
-        }
-        for (uint32_t i = at; i < end; i++)
-            cast(bvh, query, &single, batch, i, 1, 1);
-    }
+    for (uint32_t at = 0; at < rays->n; at += width)
+        cast(bvh, query, &packet, batch, at, rays->n - at < width ? rays->n - at : width, width);
     batch->counters->decided += query->decided;
     batch->counters->leaves += query->leaves;
 }

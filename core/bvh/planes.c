@@ -46,24 +46,15 @@ int bvh_make_planes(struct bvh *bvh, const struct sh_report *report, struct sh_e
     return SH_OK;
 }
 
-/* Embree sorts a packet's directions by their signs, but takes what is smaller than 1e-18 for positive when
- * it divides by it: with a component of -1e-22, all rays of that packet with its signs would be lost. So
- * there are none. */
-VEC_INLINE float direction_component(double d)
-{
-    float f = (float)d;
-    return f < 0.0f && f > -1e-15f ? 0.0f : f;
-}
-
 VEC_CLONES
 void bvh_to_float(const struct vec3_in *dir, uint32_t n, float *restrict x, float *restrict y, float *restrict z)
 {
     const struct vec3_in d = *dir;
     VEC_LOOP
     for (uint32_t i = 0; i < n; i++) {
-        x[i] = direction_component(d.x[i]);
-        y[i] = direction_component(d.y[i]);
-        z[i] = direction_component(d.z[i]);
+        x[i] = embree_direction(d.x[i]);
+        y[i] = embree_direction(d.y[i]);
+        z[i] = embree_direction(d.z[i]);
     }
 }
 
@@ -96,6 +87,10 @@ static void find_steepness(const struct bvh *bvh, const struct bvh_rays *rays)
 
 void bvh_refine(const struct bvh *bvh, const struct bvh_rays *rays)
 {
+    if (bvh->scene->n_copies > 0) {
+        bvh_refine_copies(bvh, rays);
+        return;
+    }
     if (rays->label != NULL) find_labels(bvh, rays);
     if (rays->steep != NULL) find_steepness(bvh, rays);
 }
@@ -139,10 +134,11 @@ VEC_INLINE void ranges_of_lanes(const struct one_plane *p, const struct bvh_rays
 
 double bvh_range_of(const struct bvh *bvh, uint32_t triangle, const double at_m[3], const double dir[3])
 {
-    const struct bvh_plane *tri = &bvh->plane[triangle];
+    struct bvh_plane tri;
     double o[3];
+    bvh_get_plane(bvh, triangle, &tri);
     vec3_sub(at_m, bvh->origin_m, o);
-    return (tri->d - vec3_dot(tri->n, o)) / vec3_dot(tri->n, dir);
+    return (tri.d - vec3_dot(tri.n, o)) / vec3_dot(tri.n, dir);
 }
 
 /* What meets nothing, without arithmetic. */
@@ -205,8 +201,8 @@ void bvh_ranges_each(const struct bvh *bvh, const uint32_t *triangle, const stru
 }
 
 VEC_CLONES
-void bvh_cosines(const struct bvh *bvh, const uint32_t *restrict triangle, const struct vec3_in *dir, uint32_t n,
-                 double *restrict cosine)
+static void find_cosines(const struct bvh *bvh, const uint32_t *restrict triangle, const struct vec3_in *dir,
+                         uint32_t n, double *restrict cosine)
 {
     const double *tri = (const double *)bvh->plane, *dx = dir->x, *dy = dir->y, *dz = dir->z;
     const uint32_t n_triangles = bvh->scene->n_triangles;
@@ -217,4 +213,12 @@ void bvh_cosines(const struct bvh *bvh, const uint32_t *restrict triangle, const
         double c = fabs(nx * dx[i] + ny * dy[i] + nz * dz[i]) / sqrt(nx * nx + ny * ny + nz * nz);
         cosine[i] = c > 1.0 ? 1.0 : c;
     }
+}
+
+void bvh_cosines(const struct bvh *bvh, const uint32_t *triangle, const struct vec3_in *dir, uint32_t n, double *cosine)
+{
+    if (bvh->scene->n_copies > 0)
+        bvh_cosines_copies(bvh, triangle, dir, n, cosine);
+    else
+        find_cosines(bvh, triangle, dir, n, cosine);
 }

@@ -13,7 +13,7 @@
  *     points     points.c         positions, and entries of the block
  *
  * A stage that a setup does not need costs nothing. kernels*.c hold the arithmetic of the stages, texels.c
- * looks up textures, colours.c has what else colours may show. For setting up: outlines.c, floor.c. */
+ * looks up textures, colours.c has what else colours may show. For setting up: outlines.c. */
 #include "core/cast.h"
 
 #include <stdlib.h>
@@ -147,16 +147,12 @@ uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, cons
     int several = setup->beam != NULL || setup->detect != NULL;
     uint32_t *dt_ns = several ? block->dt_ns + block->capacity - run->n : block->dt_ns;
     kernel_times(run, dt_ns);
-    /* The first packet of a run may begin within a packet of the line; later chunks begin at one. */
-    uint32_t lead = run->in_line % SCHEDULE_PACKET;
     for (uint32_t first = 0; first < run->n; first += chunk.n) {
-        uint32_t n = lead != 0 ? SCHEDULE_PACKET - lead : CHUNK;
         chunk.first = first;
-        chunk.n = n < run->n - first ? n : run->n - first;
+        chunk.n = CHUNK < run->n - first ? CHUNK : run->n - first;
         chunk.pulse0 = run->pulse0 + first;
         chunk.dt_ns = dt_ns + first;
         echoes += cast_chunk(caster, &chunk);
-        lead = 0;
     }
     block->n_points = chunk.at;
     return echoes;

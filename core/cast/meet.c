@@ -24,10 +24,11 @@ struct seen {
 static int is_front(const struct cast_setup *s, const struct seen *seen, const double dir[3])
 {
     const struct cast_mover *m = seen->body != 0 ? caster_body(s, seen->body) : NULL;
-    const double *n = bvh_plane(m != NULL ? m->bvh : s->bvh, seen->triangle)->n;
+    struct bvh_plane plane;
     double along = 0.0;
+    bvh_get_plane(m != NULL ? m->bvh : s->bvh, seen->triangle, &plane);
     for (int i = 0; i < 3; i++)
-        along += dir[i] * (m == NULL ? n[i] : vec3_dot(m->rotation + 3 * i, n));
+        along += dir[i] * (m == NULL ? plane.n[i] : vec3_dot(m->rotation + 3 * i, plane.n));
     return along < 0.0;
 }
 
@@ -109,17 +110,14 @@ uint32_t caster_meet(struct caster *caster, const struct cast_setup *setup, cons
     struct meeting m = {
         .s = setup, .hit = hit, .period_s = 1e-9 * ((double)run->ns_quot + (double)run->ns_rem / (double)run->ns_den)};
     struct chunk chunk = {.s = setup, .run = run};
-    uint32_t lead = run->in_line % SCHEDULE_PACKET; /* as in caster_cast */
     for (uint32_t first = 0; first < run->n; first += chunk.n) {
-        const uint32_t n = lead != 0 ? SCHEDULE_PACKET - lead : CHUNK;
         chunk.first = first;
-        chunk.n = n < run->n - first ? n : run->n - first;
+        chunk.n = CHUNK < run->n - first ? CHUNK : run->n - first;
         chunk.pulse0 = run->pulse0 + first;
         caster->list.n = chunk.n;
         caster->list.n_further = 0;
         caster_aim(caster, &chunk);
         meet_chunk(caster, &chunk, &m);
-        lead = 0;
     }
     return m.n;
 }

@@ -1,8 +1,4 @@
-/* Through glass and off mirrors: only rays that meet such a surface are cast again, together.
- *
- * Packets of such rays depend on the packets of the rays that they continue, and so on the pulse number: each
- * SCHEDULE_PACKET rays have packets of their own, filled up with copies of their last ray, whose number is
- * CAST_NO_PATH. */
+/* Through glass and off mirrors: only rays that meet such a surface are cast again, together. */
 #include <math.h>
 #include <string.h>
 
@@ -25,22 +21,16 @@ int caster_is_bare(const struct cast_setup *s, uint32_t label, double rho)
 static void normal_of(const struct cast_setup *s, uint8_t body, uint32_t hit, double n[3])
 {
     const struct cast_mover *m = body != 0 ? caster_body(s, body) : NULL;
-    const double *at_rest = bvh_plane(m != NULL ? m->bvh : s->bvh, hit)->n;
-    double length = sqrt(vec3_dot(at_rest, at_rest));
+    struct bvh_plane at_rest;
+    bvh_get_plane(m != NULL ? m->bvh : s->bvh, hit, &at_rest);
+    double length = vec3_length(at_rest.n);
     for (int i = 0; i < 3; i++)
-        n[i] = (m == NULL ? at_rest[i] : vec3_dot(m->rotation + 3 * i, at_rest)) / length;
+        n[i] = (m == NULL ? at_rest.n[i] : vec3_dot(m->rotation + 3 * i, at_rest.n)) / length;
 }
 
-/* How far beyond a surface a way goes on, so that the surface itself is not met again: three times a float's
- * rounding of the place (in the BVH's frame), measured across the surface. */
-static double step_m(const struct cast_setup *s, const double at[3], double cosine)
-{
-    double most = 0.0, origin_m[3];
-    bvh_origin(s->bvh, origin_m);
-    for (int i = 0; i < 3; i++)
-        most = fmax(most, fabs(at[i] - origin_m[i]));
-    return fmax(1e-6, 3.0 * 0x1p-23 * most) / fmax(cosine, 1e-3);
-}
+/* A way goes on so far beyond a surface, measured across it, that the surface itself is not met again. Double precision
+ * leaves less than a tenth of it, up to 1e8 m from the scene's zero. */
+static const double STEP_M = 1e-6;
 
 /* Ray k sets out from what it has met. */
 static void set_out(const struct cast_setup *s, struct path_rays *p, uint32_t k)
@@ -49,7 +39,7 @@ static void set_out(const struct cast_setup *s, struct path_rays *p, uint32_t k)
     double at[3] = VEC3_AT(p->p, k), dir[3] = VEC3_AT(p->d, k), n[3];
     for (int a = 0; a < 3; a++)
         at[a] += p->range_m[k] * dir[a];
-    double step = step_m(s, at, p->cosine[k]), share = surface->glass;
+    double step = STEP_M / fmax(p->cosine[k], 1e-3), share = surface->glass;
     uint8_t ghost = p->ghost[k];
     if (surface->mirror > 0.0) {
         normal_of(s, p->body[k], p->hit[k], n);
@@ -84,17 +74,6 @@ static void copy_ray(struct path_rays *p, uint32_t to, uint32_t from)
     p->colour[to] = p->colour[from];
 }
 
-/* Fills the last packet up. */
-static uint32_t fill_up(struct path_rays *p, uint32_t n)
-{
-    uint32_t end = (n + SCHEDULE_PACKET - 1) / SCHEDULE_PACKET * SCHEDULE_PACKET;
-    for (uint32_t k = n; k < end; k++) {
-        copy_ray(p, k, n - 1);
-        p->ray[k] = CAST_NO_PATH;
-    }
-    return end;
-}
-
 /* The rays whose first hit lets them go on. */
 static void begin(const struct cast_setup *s, const struct met *met, struct path_rays *p)
 {
@@ -102,7 +81,6 @@ static void begin(const struct cast_setup *s, const struct met *met, struct path
     p->n = p->n_found = 0;
     for (uint32_t i = 0; i < rays->n; i++) {
         double at[3];
-        if (i % SCHEDULE_PACKET == 0) p->n = fill_up(p, p->n);
         p->first[i] = CAST_NO_PATH;
         if (isnan(rays->range_m[i]) || !caster_goes_on(s, rays->label[i])) continue;
         uint32_t k = p->n++;
@@ -119,7 +97,6 @@ static void begin(const struct cast_setup *s, const struct met *met, struct path
         p->hit[k] = rays->triangle[i];
         p->body[k] = met->body[i];
     }
-    p->n = fill_up(p, p->n);
 }
 
 /* What ray k met, at the end of the first ray's chain. */
@@ -163,12 +140,10 @@ void caster_follow(struct caster *c, const struct cast_setup *s, const struct me
                                 .colour = first->colour != NULL ? p->colour : NULL};
         caster_nearest(c, s, &met);
         for (uint32_t k = 0; k < p->n; k++) {
-            if (k % SCHEDULE_PACKET == 0) on = fill_up(p, on);
-            if (p->ray[k] == CAST_NO_PATH || isnan(p->range_m[k])) continue;
+            if (isnan(p->range_m[k])) continue;
             keep(p, k);
             if (caster_goes_on(s, p->label[k])) copy_ray(p, on++, k);
         }
-        on = fill_up(p, on);
         p->n = on;
     }
 }

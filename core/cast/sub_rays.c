@@ -6,9 +6,6 @@
 #include "core/cast/sub_rays.h"
 #include "core/surface.h"
 
-/* Pulses with fewer sub-rays than this share packets with their neighbours. */
-enum { ALONE = 64 };
-
 /* How much the surfaces send back that rays from `first` on have met. */
 static void weigh_pool(struct caster *c, const struct cast_setup *s, uint32_t first)
 {
@@ -40,47 +37,20 @@ static void look_through(struct caster *c, const struct cast_setup *s, const str
     }
 }
 
-/* Whether these two pulses of a chunk may share a packet. */
-static int together(uint32_t a, uint32_t b)
-{
-    return a / SCHEDULE_PACKET == b / SCHEDULE_PACKET;
-}
-
-/* Which rays share a packet depends on the pulse number alone, as it does for those of the pulses:
- * SCHEDULE_PACKET pulses have packets of their own. */
-static void mark_packets(struct sub_ray_work *w, uint32_t first)
-{
-    const struct job *last = NULL;
-    uint32_t n = 0; /* of rays in the packet */
-    memset(w->pool.begins + first, 0, w->pool.n - first);
-    for (uint32_t j = 0; j < w->n_jobs; j++) {
-        const struct job *job = &w->job[j];
-        if (job->first < first || job->n == 0) continue;
-        if (last == NULL || !together(last->pulse, job->pulse) || last->n >= ALONE || job->n >= ALONE) n = 0;
-        for (uint32_t i = job->first; i < job->first + job->n; i++, n++)
-            w->pool.begins[i] = n % SCHEDULE_PACKET == 0;
-        last = job;
-    }
-}
-
 /* Casts what is in the pool from ray `first` on. */
 static void cast_pool(struct caster *c, const struct chunk *k, uint32_t first)
 {
     const struct cast_setup *s = k->s;
     struct pool *p = &c->sub_rays->pool;
-    mark_packets(c->sub_rays, first);
     int plain = s->detect == NULL && !caster_has_bodies(s), through = s->detect != NULL && s->detect->depth > 0;
     if (first == 0) c->sub_rays->beyond.n = 0;
     c->counters.sub_rays += p->n - first;
     for (uint32_t at = first, n; at < p->n; at += n) {
         n = p->n - at < CHUNK ? p->n - at : CHUNK;
-        while (at + n < p->n && !p->begins[at + n])
-            n--;
         struct met met = {.rays = {.n = n,
                                    .from.own = VEC3_IN(p->p, at),
                                    .dir = VEC3_IN(p->d, at),
                                    .range_max_m = s->range_max_m,
-                                   .begins = p->begins + at,
                                    .range_m = p->range_m + at,
                                    .triangle = p->triangle + at,
                                    .label = p->label + at},
@@ -148,7 +118,9 @@ static float met_sigma(const struct caster *c, const struct cast_setup *s, const
     const struct beam_part part = {.xx = (double)p->xx[i], .xy = (double)p->xy[i], .yy = (double)p->yy[i]};
     if (p->triangle[i] == BVH_NO_TRIANGLE) /* of a body that moves, whole footprints, with an incidence */
         return beam_round_sigma(beam, p->range_m[i], p->cosine[i], part.xx);
-    return beam_part_sigma(beam, &job->sight, bvh_plane(s->bvh, p->triangle[i])->n, p->range_m[i], &part);
+    struct bvh_plane plane;
+    bvh_get_plane(s->bvh, p->triangle[i], &plane);
+    return beam_part_sigma(beam, &job->sight, plane.n, p->range_m[i], &part);
 }
 
 /* What sub-ray i of a job came to. */
@@ -219,15 +191,13 @@ static void run_jobs(struct caster *c, const struct chunk *k)
     w->n_jobs = w->pool.n = 0;
 }
 
-/* Whether there may be no room left for the pulses that share packets with this one, of `most` sub-rays each;
- * asked for each pulse, so that those before it that share its packets are all in. */
-static int is_full(const struct sub_ray_work *w, uint32_t pulse, uint32_t most)
+/* Whether there may be no room left for a pulse of `most` sub-rays. */
+static int is_full(const struct sub_ray_work *w, uint32_t most)
 {
-    _Static_assert(SCHEDULE_PACKET * (MAX_PASSES * BEAM_MAX_PARTS + BEAM_MAX_SUBRAYS) <= POOL, "room for a packet");
-    const uint32_t near = 8 * CHUNK; /* what stays in a cache, where that is enough */
-    uint32_t jobs = w->n_jobs + SCHEDULE_PACKET, room = 2 * SCHEDULE_PACKET * most > near ? POOL : near;
-    if (w->n_jobs == 0 || together(w->job[w->n_jobs - 1].pulse, pulse)) return 0;
-    return jobs > MAX_JOBS || jobs * most > room;
+    _Static_assert(MAX_PASSES * BEAM_MAX_PARTS + BEAM_MAX_SUBRAYS <= POOL, "room for a pulse");
+    const uint32_t near = 8 * CHUNK,
+                   room = 32 * most > near ? POOL : near; /* what stays in a cache, where that is enough */
+    return w->n_jobs == MAX_JOBS || (w->n_jobs + 1) * most > room;
 }
 
 /* The centre of an adaptive beam meets glass or a mirror. */
@@ -263,7 +233,7 @@ static void cast_whole(struct caster *c, const struct chunk *k, const uint32_t *
     struct sub_ray_work *w = c->sub_rays;
     w->scattered = 0;
     for (uint32_t i = 0; i < n; i++) {
-        if (is_full(w, pulse[i], k->s->beam->pattern.n)) run_jobs(c, k);
+        if (is_full(w, k->s->beam->pattern.n)) run_jobs(c, k);
         struct job *job = &w->job[w->n_jobs++];
         job->pulse = pulse[i];
         plan_whole(c, k, job);
@@ -290,7 +260,7 @@ static void cast_parts(struct caster *c, const struct chunk *k, uint32_t candida
     for (uint32_t i = 0; i < candidates; i++)
         __builtin_prefetch(bvh_plane(s->bvh, c->hit[w->candidate[i].pulse]), 0, 3);
     for (uint32_t i = 0; i < candidates; i++) {
-        if (is_full(w, w->candidate[i].pulse, most)) run_jobs(c, k);
+        if (is_full(w, most)) run_jobs(c, k);
         struct job *job = &w->job[w->n_jobs];
         uint32_t pulse = job->pulse = w->candidate[i].pulse;
         job->near = &w->candidate[i];

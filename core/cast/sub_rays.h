@@ -21,7 +21,6 @@ struct pool {
     uint32_t triangle[POOL_ROOM], label[POOL_ROOM];
     uint32_t colour[POOL_ROOM]; /* touched only where colours are those of textures */
     uint8_t body[POOL_ROOM];
-    uint8_t begins[POOL_ROOM]; /* a packet */
     uint32_t n;
     /* of the part that a sub-ray stands for: variances and covariance of x and y; touched only where
      * attributes are asked for */

@@ -9,7 +9,9 @@ static int uv_of(const struct cast_setup *s, const struct met *met, uint32_t i, 
 {
     const struct bvh_rays *rays = &met->rays;
     const struct cast_mover *m = met->body != NULL && met->body[i] != 0 ? caster_body(s, met->body[i]) : NULL;
-    const struct scene *scene = bvh_scene(m != NULL ? m->bvh : s->bvh);
+    struct scene_part part;
+    scene_find_part(bvh_scene(m != NULL ? m->bvh : s->bvh), rays->triangle[i], &part);
+    const struct scene *scene = part.scene;
     if (scene->uv == NULL) return 0;
     const double d[3] = VEC3_AT(rays->dir, i);
     double at[3], p[3];
@@ -20,10 +22,11 @@ static int uv_of(const struct cast_setup *s, const struct met *met, uint32_t i, 
         p[k] = m == NULL ? at[k]
                          : m->rotation[k] * (at[0] - m->shift_m[0]) + m->rotation[3 + k] * (at[1] - m->shift_m[1]) +
                                m->rotation[6 + k] * (at[2] - m->shift_m[2]);
-    const uint32_t *corner = scene->triangle[rays->triangle[i]];
+    if (part.copy != NULL) scene_copy_put_back(part.copy, ((const double[3]){p[0], p[1], p[2]}), p);
+    const uint32_t *corner = scene->triangle[part.triangle];
     const double *const vertex[3] = {scene->vertex_m[corner[0]], scene->vertex_m[corner[1]],
                                      scene->vertex_m[corner[2]]};
-    scene_uv_at(scene, rays->triangle[i], vertex, p, uv);
+    scene_uv_at(scene, part.triangle, vertex, p, uv);
     return isfinite(uv[0]) && isfinite(uv[1]);
 }
 

@@ -57,14 +57,14 @@ static void add_hits(struct worker *w, uint32_t n)
     atomic_fetch_add(&w->look->met, met);
 }
 
-/* Pulses first .. end of one line; runs end where packets do. */
+/* Pulses first .. end of one line. */
 static void cast_line(struct worker *w, const struct schedule_line *line, uint64_t first, uint64_t end)
 {
     const struct coverage_scan *scan = w->look->scan;
     while (first < end) {
         struct schedule_run run;
-        const uint32_t lead = (uint32_t)((first - line->pulse0) % SCHEDULE_PACKET), most = BVH_CHUNK - lead;
-        schedule_get_run(&scan->segment, line, first, (uint32_t)(end - first < most ? end - first : most), &run);
+        schedule_get_run(&scan->segment, line, first, (uint32_t)(end - first < BVH_CHUNK ? end - first : BVH_CHUNK),
+                         &run);
         if (scan->enter != NULL) scan->enter(scan->ctx, run.t0_ns, &w->setup);
         add_hits(w, caster_meet(w->caster, &w->setup, &run, w->hit));
         atomic_fetch_add(&w->look->cast, run.n);

@@ -12,19 +12,24 @@ static const double LEAST_LEFT = 0.2;
 
 enum { NO_MAP, MAP, OPTIONS };
 
-static const struct plan_ray_cost *ray_cost(const struct plan_sight_need *need)
+static const struct plan_ray_cost *ray_cost(uint32_t packet)
 {
     const struct plan_ray_cost *cost = plan_ray_costs;
     const struct plan_ray_cost *last = cost + sizeof plan_ray_costs / sizeof plan_ray_costs[0] - 1;
-    while (cost < last && cost->packet > need->packet)
+    while (cost < last && cost->packet > packet)
         cost++;
     return cost;
 }
 
 /* Of a triangle's plane, which both ways need. */
-static double plane_ns(const struct plan_sight_need *need)
+static double plane_ns(double n_triangles)
 {
-    return PLAN_COST_MILLION * fmin(1.0, sqrt(1e-6 * need->n_triangles));
+    return PLAN_COST_MILLION * fmin(1.0, sqrt(1e-6 * n_triangles));
+}
+
+double plan_pulse_ns(double n_triangles, uint32_t packet)
+{
+    return PLAN_COST_PULSE + ray_cost(packet)->met + plane_ns(n_triangles);
 }
 
 /* Cells of the whole cube, as many as its maker takes for so many pulses. */
@@ -45,18 +50,45 @@ struct costs {
     double bvh, map, build;
 };
 
-static void estimate(const struct plan_sight_need *need, const struct plan_sight_found *f, struct costs *c)
+/* The memory holds this part of so many cells that show more than one triangle. */
+static double fitting(const struct plan_sight_need *need, double mixed)
 {
-    const struct plan_ray_cost *cost = ray_cost(need);
-    const double mixed = (f->few + f->ask) * need->share * cells(need);
     const double bytes = PLAN_SIGHT_CELL_BYTES * (mixed + 1.0) + PLAN_SIGHT_RECORD_BYTES * need->n_triangles;
-    const double fits = fmin(1.0, (double)need->memory_bytes / bytes);
-    const double few = fits * f->few, ask = f->ask + f->few - few;
-    c->bvh =
-        f->nothing * cost->out + (1.0 - f->nothing) * (cost->met + plane_ns(need)) + (f->few + f->ask) * cost->border;
-    c->map = (f->one + f->nothing) * PLAN_COST_SIGHT_ONE + f->one * plane_ns(need) + few * PLAN_COST_SIGHT_FEW +
-             ask * (c->bvh + PLAN_COST_SIGHT_ASK);
+    return fmin(1.0, (double)need->memory_bytes / bytes);
+}
+
+/* Where the memory does not hold the cells, the map's maker takes some twice as wide (core/sight/sight.c). An outline
+ * goes through half as many of those, so that they are twice the share. */
+static void coarsen(const struct plan_sight_found *f, struct plan_sight_found *coarse)
+{
+    const double mixed = f->few + f->ask, all = f->one + f->nothing, wider = fmin(1.0, 2.0 * mixed);
+    *coarse = *f;
+    if (!(mixed > 0.0) || !(all > 0.0)) return;
+    coarse->few *= wider / mixed;
+    coarse->ask *= wider / mixed;
+    coarse->one *= (1.0 - wider) / all;
+    coarse->nothing *= (1.0 - wider) / all;
+}
+
+static void estimate(const struct plan_sight_need *need, const struct plan_sight_found *found, struct costs *c)
+{
+    const struct plan_ray_cost *cost = ray_cost(need->packet);
+    const struct plan_sight_found *f = found;
+    struct plan_sight_found coarse;
+    double mixed = (f->few + f->ask) * need->share * cells(need), fits = fitting(need, mixed);
     c->build = least_build_ns(need) + PLAN_COST_SIGHT_CELL * fits * mixed;
+    if (fits < 1.0) {
+        coarsen(f, &coarse);
+        f = &coarse;
+        mixed = (f->few + f->ask) * need->share * cells(need) / 4.0;
+        fits = fitting(need, mixed);
+        c->build += least_build_ns(need) + PLAN_COST_SIGHT_CELL * fits * mixed;
+    }
+    const double few = fits * f->few, ask = f->ask + f->few - few;
+    c->bvh = found->nothing * cost->out + (1.0 - found->nothing) * (cost->met + plane_ns(need->n_triangles)) +
+             (found->few + found->ask) * cost->border;
+    c->map = (f->one + f->nothing) * PLAN_COST_SIGHT_ONE + f->one * plane_ns(need->n_triangles) +
+             few * PLAN_COST_SIGHT_FEW + ask * (c->bvh + PLAN_COST_SIGHT_ASK);
 }
 
 static int pays(const struct plan_sight_need *need, const struct costs *c)
@@ -66,7 +98,7 @@ static int pays(const struct plan_sight_need *need, const struct costs *c)
 
 int plan_sight_may_pay(const struct plan_sight_need *need)
 {
-    const double saved_ns = ray_cost(need)->met + ray_cost(need)->border - PLAN_COST_SIGHT_ONE;
+    const double saved_ns = ray_cost(need->packet)->met + ray_cost(need->packet)->border - PLAN_COST_SIGHT_ONE;
     return (1.0 - LEAST_LEFT) * saved_ns * need->pulses > least_build_ns(need);
 }
 

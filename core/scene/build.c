@@ -59,6 +59,7 @@ void build_begin_file(struct scene_build *b, const struct scene_mesh_spec *spec)
     b->mesh = NULL;
     b->vertex0 = b->mesh_vertex0 = b->scene->n_vertices;
     b->triangle0 = b->scene->n_triangles;
+    b->n_welded = 0;
     b->counts = (struct scene_counts){0};
     b->scene->says = (struct scene_says){0};
     b->has_uv = false;
@@ -149,10 +150,10 @@ static int find_bounds(const struct scene_build *b, struct sh_err *err)
     return rc;
 }
 
-int build_finish(struct scene_build *b, struct scene **out, struct sh_err *err)
+int build_finish(struct scene_build *b, int may_be_empty, struct scene **out, struct sh_err *err)
 {
     struct scene *s = b->scene;
-    if (s->n_triangles == 0) return sh_fail(err, SH_EINPUT, "the scene has no triangles");
+    if (s->n_triangles == 0 && !may_be_empty) return sh_fail(err, SH_EINPUT, "the scene has no triangles");
     if (b->surface_tree != NULL) tdestroy(b->surface_tree, keep_surface);
     b->surface_tree = NULL;
     if (s->n_textures == 0) {
@@ -162,6 +163,7 @@ int build_finish(struct scene_build *b, struct scene **out, struct sh_err *err)
     int rc = settle_all(b, err);
     if (rc == SH_OK) rc = find_bounds(b, err);
     if (rc != SH_OK) return rc;
+    s->n_all = s->n_triangles;
     *out = s;
     b->scene = NULL;
     return SH_OK;
@@ -242,7 +244,7 @@ int build_vertex(struct scene_build *b, const double v[3], struct sh_err *err)
 {
     struct scene *s = b->scene;
     const struct scene_mesh_spec *spec = b->spec;
-    unsigned long long number = s->n_vertices - b->mesh_vertex0 + 1ull;
+    unsigned long long number = s->n_vertices - b->mesh_vertex0 + b->n_welded + 1ull;
     if (!isfinite(v[0]) || !isfinite(v[1]) || !isfinite(v[2]))
         return build_fail(b, SH_EINPUT, err, "vertex %llu (%g %g %g) is not finite", number, v[0], v[1], v[2]);
     int rc = grow_vertices(b, s->n_vertices + 1ull, err);

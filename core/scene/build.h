@@ -21,6 +21,7 @@ struct scene_build {
     const char *mesh;            /* name of the mesh within the file, for messages; may be NULL */
     uint32_t vertex0, triangle0; /* the scene's size before this file */
     uint32_t mesh_vertex0;       /* the scene's size before this mesh; messages count from here */
+    uint32_t n_welded;           /* vertices of this file that were there already: build_weld_vertex */
     struct scene_counts counts;
     uint64_t not_simple;
     /* the next polygon, room by build_corners */
@@ -38,8 +39,8 @@ int build_init(struct scene_build *b, double tolerance_m, const struct sh_report
 void build_begin_file(struct scene_build *b, const struct scene_mesh_spec *spec);
 /* Warns of what was left out; SH_EINPUT when the file gave no triangle. */
 int build_end_file(struct scene_build *b, struct sh_err *err);
-/* Hands the scene over. build_release is due in any case. */
-int build_finish(struct scene_build *b, struct scene **out, struct sh_err *err);
+/* Hands the scene over; it may be empty where something else follows. build_release is due in any case. */
+int build_finish(struct scene_build *b, int may_be_empty, struct scene **out, struct sh_err *err);
 void build_release(struct scene_build *b);
 
 /* Fails with "FILE, line N, mesh 'M': text". Returns code. */
@@ -51,6 +52,22 @@ int build_reserve(struct scene_build *b, uint64_t vertices, uint64_t triangles, 
 
 /* v in the file's units and axes. Its index in the scene is scene->n_vertices before the call. */
 int build_vertex(struct scene_build *b, const double v[3], struct sh_err *err);
+
+/* ---- weld.c: for a reader whose file has a vertex for each corner of a triangle. Zero-initialise. */
+enum { BUILD_RECENT = 65536 };
+struct build_weld {
+    uint32_t *number; /* [n] in the scene, of the file's vertices */
+    uint32_t n;
+    uint32_t *slot; /* [size] of a hash table: numbers in the scene */
+    size_t size, used;
+    /* By a part of the hash, the last vertex, its number + 1: most are met again soon, and so without a look at the table,
+     * which is larger than any cache. */
+    uint32_t recent[BUILD_RECENT];
+};
+int build_weld_begin(struct scene_build *b, struct build_weld *w, uint64_t vertices, struct sh_err *err);
+/* Adds the next of these vertices, as build_vertex, unless there is one at the same place, bit for bit. */
+int build_weld_vertex(struct scene_build *b, struct build_weld *w, const double v[3], struct sh_err *err);
+void build_weld_free(struct build_weld *w);
 
 /* Makes room for n corners in corner and corner_uv; what is in them stays. */
 int build_corners(struct scene_build *b, size_t n, struct sh_err *err);
@@ -99,6 +116,14 @@ static inline struct scene_import_limits build_limits(const struct scene_build *
 {
     return b->spec->limits != NULL ? *b->spec->limits : scene_import_defaults;
 }
+
+/* ---- copies.c: the mesh, which the scene owns from then on, at all these places. */
+int scene_add_copies(struct scene *scene, struct scene *mesh, const struct scene_places *places,
+                     const struct sh_report *report, struct sh_err *err);
+
+/* Part of scene_keep: each copy keeps what its labels say, and goes where that is nothing. label: new ones, by old ones.
+ * SH_EINPUT where copies of a mesh would keep different surfaces. */
+int scene_keep_copies(struct scene *scene, const uint8_t *keep, const uint16_t *label, struct sh_err *err);
 
 /* ---- cutouts.c */
 /* Holes in the textures of a scene that is complete. Warns of textures that can't be read. */

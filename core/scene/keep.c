@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/scene.h"
+#include "core/scene/build.h"
 
 /* Triangles of surfaces that are kept, with the new labels; their vertices get numbers in the old order. */
 static void keep_triangles(struct scene *s, const uint8_t *keep, const uint16_t *label, uint32_t *vertex)
@@ -62,16 +62,19 @@ int scene_keep(struct scene *s, const uint8_t *keep, struct sh_err *err)
         s->surface[n] = s->surface[i];
         label[i] = (uint16_t)n++;
     }
-    if (enough) {
+    int rc = enough ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory to leave out surfaces");
+    if (rc == SH_OK) {
         keep_triangles(s, keep, label, vertex);
         s->n_surfaces = n;
+        s->n_all = s->n_triangles;
         find_bounds(s);
         shrink(&s->triangle, s->n_triangles, sizeof *s->triangle);
         shrink(&s->label, s->n_triangles, sizeof *s->label);
         shrink(&s->uv, s->n_triangles, sizeof *s->uv);
         shrink(&s->vertex_m, s->n_vertices, sizeof *s->vertex_m);
+        rc = scene_keep_copies(s, keep, label, err);
     }
     free(label);
     free(vertex);
-    return enough ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory to leave out surfaces");
+    return rc;
 }

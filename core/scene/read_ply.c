@@ -10,6 +10,7 @@ struct ply {
     struct scene_build *b;
     struct ply_rows r;
     uint16_t label;
+    struct build_weld weld; /* number NULL: vertices are taken as they come */
 };
 
 static int check_mesh(const struct ply *y, struct sh_err *err)
@@ -31,7 +32,7 @@ static int check_mesh(const struct ply *y, struct sh_err *err)
 
 static int check_corners(struct ply *y, struct sh_err *err)
 {
-    uint32_t n = y->b->scene->n_vertices - y->b->vertex0;
+    const uint32_t *number = y->weld.number, n = y->b->scene->n_vertices - y->b->vertex0 + y->b->n_welded;
     int rc = build_corners(y->b, y->r.n_corners, err);
     if (rc != SH_OK) return rc;
     for (size_t i = 0; i < y->r.n_corners; i++) {
@@ -41,7 +42,7 @@ static int check_corners(struct ply *y, struct sh_err *err)
             snprintf(what, sizeof what, "index %.17g out of range; there are %u vertices", index, n);
             return ply_fail(&y->r, err, what);
         }
-        y->b->corner[i] = y->b->vertex0 + (uint32_t)index;
+        y->b->corner[i] = number != NULL ? number[(uint32_t)index] : y->b->vertex0 + (uint32_t)index;
     }
     return SH_OK;
 }
@@ -50,7 +51,9 @@ static int use_row(void *ply, struct sh_err *err)
 {
     struct ply *y = ply;
     y->b->line = ply_line(&y->r);
-    if (y->r.element->kind == PLY_VERTEX) return build_vertex(y->b, &y->r.scalar[PLY_X], err);
+    if (y->r.element->kind == PLY_VERTEX)
+        return y->weld.number != NULL ? build_weld_vertex(y->b, &y->weld, &y->r.scalar[PLY_X], err)
+                                      : build_vertex(y->b, &y->r.scalar[PLY_X], err);
     if (y->r.element->kind != PLY_FACE) return SH_OK;
     int rc = check_corners(y, err);
     if (rc != SH_OK) return rc;
@@ -72,11 +75,20 @@ static int note_rounding(const struct ply *y, struct sh_err *err)
     return build_single(y->b, largest, largest * BUILD_SINGLE_ROUNDING, false, err);
 }
 
+/* More vertices than faces: faces hardly share any. Where they do, there are half as many. */
+static bool is_torn(const struct ply *y, uint64_t vertices)
+{
+    for (int i = 0; i < y->r.h.n_elements; i++)
+        if (y->r.h.element[i].kind == PLY_FACE) return vertices > y->r.h.element[i].count && vertices < UINT32_MAX;
+    return false;
+}
+
 static int begin_element(void *ply, struct sh_err *err)
 {
     struct ply *y = ply;
     const struct ply_element *e = y->r.element;
     y->b->line = 0;
+    if (e->kind == PLY_VERTEX && is_torn(y, e->count)) return build_weld_begin(y->b, &y->weld, e->count, err);
     return build_reserve(y->b, e->kind == PLY_VERTEX ? e->count : 0, e->kind == PLY_FACE ? e->count : 0, err);
 }
 
@@ -99,6 +111,7 @@ int read_ply(struct scene_build *b, struct sh_err *err)
     if (rc == SH_OK) rc = check_mesh(y, err);
     if (rc == SH_OK) rc = read_body(y, err);
     ply_close(&y->r);
+    build_weld_free(&y->weld);
     free(y);
     return rc;
 }

@@ -47,30 +47,64 @@ static int load_file(struct scene_build *b, const struct scene_mesh_spec *spec, 
     return build_fail(b, SH_EINPUT, err, "unknown ending; allowed are .obj .ply .stl .gltf .glb .fbx .dae .ifc");
 }
 
+static int has_textures(const struct scene_mesh_spec *specs, size_t n_specs)
+{
+    int textures = 0;
+    for (size_t i = 0; i < n_specs; i++)
+        textures |= specs[i].textures;
+    return textures;
+}
+
 static int look_for_cutouts(struct scene *scene, const struct scene_mesh_spec *specs, size_t n_specs,
                             const struct sh_report *report, struct sh_err *err)
 {
-    int textures = 0, cutouts = 0, rc = SH_OK;
-    for (size_t i = 0; i < n_specs; i++) {
-        textures |= specs[i].textures;
+    const int textures = has_textures(specs, n_specs);
+    int cutouts = 0, rc = SH_OK;
+    for (size_t i = 0; i < n_specs; i++)
         cutouts |= specs[i].cutouts;
-    }
     if (cutouts && scene->n_textures > 0) rc = scene_find_cutouts(scene, report, err);
     if (!textures) scene_drop_textures(scene);
+    return rc;
+}
+
+/* Whether the mesh is one of the scene's own. */
+static int is_own(const struct scene_mesh_spec *spec)
+{
+    return spec->places.place == NULL;
+}
+
+static int load_own(const struct scene_mesh_spec *specs, size_t n_specs, double tolerance_m,
+                    const struct sh_report *report, struct scene **out, struct sh_err *err)
+{
+    struct scene_build b;
+    size_t n = 0;
+    int rc = build_init(&b, tolerance_m, report, err);
+    for (size_t i = 0; i < n_specs && rc == SH_OK; i++) {
+        if (!is_own(&specs[i])) continue;
+        rc = load_file(&b, &specs[i], err);
+        n++;
+    }
+    if (rc == SH_OK) rc = build_finish(&b, n < n_specs, out, err);
+    if (rc == SH_OK) rc = look_for_cutouts(*out, specs, n_specs, report, err);
+    build_release(&b);
     return rc;
 }
 
 int scene_load(const struct scene_mesh_spec *specs, size_t n_specs, double tolerance_m, const struct sh_report *report,
                struct scene **out, struct sh_err *err)
 {
-    struct scene_build b;
     *out = NULL;
-    int rc = build_init(&b, tolerance_m, report, err);
-    for (size_t i = 0; i < n_specs && rc == SH_OK; i++)
-        rc = load_file(&b, &specs[i], err);
-    if (rc == SH_OK) rc = build_finish(&b, out, err);
-    if (rc == SH_OK) rc = look_for_cutouts(*out, specs, n_specs, report, err);
-    build_release(&b);
+    int rc = load_own(specs, n_specs, tolerance_m, report, out, err);
+    for (size_t i = 0; i < n_specs && rc == SH_OK; i++) {
+        struct scene_mesh_spec alone = specs[i];
+        struct scene *mesh = NULL;
+        if (is_own(&specs[i])) continue;
+        alone.places = (struct scene_places){0};
+        alone.textures = has_textures(specs, n_specs);
+        rc = load_own(&alone, 1, tolerance_m, report, &mesh, err);
+        if (rc == SH_OK) rc = scene_add_copies(*out, mesh, &specs[i].places, report, err);
+        if (rc != SH_OK) scene_free(mesh);
+    }
     if (rc == SH_OK) return rc;
     scene_free(*out);
     *out = NULL;
@@ -133,7 +167,7 @@ int scene_from_arrays(const struct scene_arrays *arrays, struct scene **out, str
         b.scene->n_meshes = 1;
         rc = build_end_file(&b, err);
     }
-    if (rc == SH_OK) rc = build_finish(&b, out, err);
+    if (rc == SH_OK) rc = build_finish(&b, 0, out, err);
     build_release(&b);
     return rc;
 }
@@ -141,6 +175,11 @@ int scene_from_arrays(const struct scene_arrays *arrays, struct scene **out, str
 void scene_free(struct scene *scene)
 {
     if (scene == NULL) return;
+    for (uint32_t i = 0; i < scene->n_copied; i++) {
+        scene_free(scene->copied[i].mesh);
+        free(scene->copied[i].copy);
+    }
+    free(scene->copied);
     free(scene->vertex_m);
     free(scene->triangle);
     free(scene->label);

@@ -13,7 +13,7 @@ enum { MAX_THREADS = 64, FEW_RAYS = 4, TOO_FINE = 1, LARGE = 8 << 20 };
 
 int sight_possible(const struct scene *scene)
 {
-    return scene->cutout == NULL && scene->n_triangles < SIGHT_NUMBER;
+    return scene->cutout == NULL && scene->n_copies == 0 && scene->n_triangles < SIGHT_NUMBER;
 }
 
 uint64_t build_take(struct build_shared *b, struct build_arena *arena, uint64_t n, uint64_t size)

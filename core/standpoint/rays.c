@@ -75,8 +75,9 @@ double survey_cosine(const struct survey *s, uint32_t ray)
 {
     const struct survey_rays *r = &s->rays;
     const double dir[3] = {r->dir_x[ray], r->dir_y[ray], r->dir_z[ray]};
-    const double *n = bvh_plane(s->bvh, r->triangle[ray])->n;
-    return vec3_dot(n, dir) / vec3_length(n);
+    struct bvh_plane plane;
+    bvh_get_plane(s->bvh, r->triangle[ray], &plane);
+    return vec3_dot(plane.n, dir) / vec3_length(plane.n);
 }
 
 struct survey_sight survey_look(const struct survey *s, uint32_t first, uint32_t n)

@@ -1,4 +1,7 @@
 /* scanhead check: validates configuration, scene and links. Nothing runs. */
+#include <inttypes.h>
+#include <sys/resource.h>
+
 #include "core/vec3.h"
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/check_heads.h"
@@ -37,6 +40,34 @@ static void print_platform(const struct site *site)
            site->n_stretches);
 }
 
+static double bytes_of(const struct scene *scene, const struct bvh *bvh)
+{
+    struct bvh_info info;
+    bvh_get_info(bvh, &info);
+    const double triangle =
+        sizeof *scene->triangle + sizeof *scene->label + (scene->uv != NULL ? sizeof *scene->uv : 0);
+    double bytes = (double)info.bytes + scene->n_copies * (double)sizeof(struct scene_copy); /* with the meshes' BVHs */
+    for (uint32_t i = 0; i <= scene->n_copied; i++) {
+        const struct scene *mesh = i == 0 ? scene : scene->copied[i - 1].mesh;
+        bytes += mesh->n_triangles * triangle + mesh->n_vertices * (double)sizeof *mesh->vertex_m;
+    }
+    return bytes;
+}
+
+/* The peak counts all that the program had at once, also while it was loading. */
+static void print_memory(const struct site *site)
+{
+    struct rusage usage;
+    double bytes = bytes_of(site->scene, site->bvh), triangles = (double)scene_n_kept(site->scene);
+    for (uint32_t i = 0; i < site->n_movers; i++) {
+        bytes += bytes_of(site->mover[i].scene, site->mover[i].bvh);
+        triangles += (double)scene_n_kept(site->mover[i].scene);
+    }
+    getrusage(RUSAGE_SELF, &usage);
+    printf("memory    %.4g MB for meshes and BVH, %.0f bytes a triangle; %.4g MB at the peak\n", 1e-6 * bytes,
+           bytes / triangles, 1024e-6 * (double)usage.ru_maxrss);
+}
+
 static void print_output(const struct config *cfg, const struct site *site)
 {
     int heights = cfg->output.crs == GEOREF_UTM || cfg->output.crs == GEOREF_GEODETIC;
@@ -71,16 +102,28 @@ static void print_target(const struct site *site)
            target->others == OTHERS_HIDE ? "hide what is behind them and give no points" : "are left out");
 }
 
+/* Triangles of copies are counted with the others. */
+static const char *copies_text(const struct scene *scene, char *text, size_t len)
+{
+    text[0] = '\0';
+    if (scene->n_copies > 0)
+        snprintf(text, len, "%u %s (%" PRIu64 " triangles are kept), ", scene->n_copies,
+                 scene->n_copies == 1 ? "copy" : "copies", scene_n_kept(scene));
+    return text;
+}
+
 static int print_summary(const struct config *cfg, const struct sites *sites, struct sh_err *err)
 {
     const struct site *site = sites->first;
     const struct scene *scene = site->scene;
+    char copies[96];
     int rc = SH_OK;
     printf("%s: ok\n", cfg->file);
     check_print_heads(sites, stdout);
-    printf("scene     %u triangles, %u surfaces, x %.3f..%.3f  y %.3f..%.3f  z %.3f..%.3f m\n", scene->n_triangles,
-           scene->n_surfaces, scene->min_m[0], scene->max_m[0], scene->min_m[1], scene->max_m[1], scene->min_m[2],
-           scene->max_m[2]);
+    printf("scene     %u triangles, %u surfaces, %sx %.3f..%.3f  y %.3f..%.3f  z %.3f..%.3f m\n", scene->n_all,
+           scene->n_surfaces, copies_text(scene, copies, sizeof copies), scene->min_m[0], scene->max_m[0],
+           scene->min_m[1], scene->max_m[1], scene->min_m[2], scene->max_m[2]);
+    print_memory(site);
     print_target(site);
     check_print_anchor(site, stdout);
     if (site->stop != NULL) check_print_stops(site, stdout);
@@ -159,9 +202,9 @@ const struct app_command app_check = {
     .options = OPTIONS,
     .opens_links = 1,
     .notes =
-        "Prints the scanners, and where the scene and each station stand, in every frame that is known. Opens each\n"
-        "link but files and closes it again, so that a taken port or a wrong path shows. Of a wrong configuration\n"
-        "all faults are shown, up to 20, each with its line.\n"
+        "Prints the scanners, the memory that the scene takes, and where it and each station stand, in every frame\n"
+        "that is known. Opens each link but files and closes it again, so that a taken port or a wrong path shows.\n"
+        "Of a wrong configuration all faults are shown, up to 20, each with its line.\n"
         "\n"
         "--help SECTION prints the keys of one section: --help head, --help scene.anchor. --help profile prints\n"
         "those of head profiles.\n"

@@ -16,9 +16,11 @@ static int add(const struct config *cfg, uint32_t station, const struct sh_repor
     return rc == SH_OK ? site_load_beside(one->cfg, sites->first, &one->report.report, &one->site, err) : rc;
 }
 
-int sites_load(const struct config *cfg, const struct sh_report *report, struct sites *sites, struct sh_err *err)
+/* The first is there. */
+static int load_others(const struct config *cfg, const struct sh_report *report, struct sites *sites,
+                       struct sh_err *err)
 {
-    int rc = site_load(cfg, report, &sites->first, err);
+    int rc = SH_OK;
     int64_t said_ns = clock_now_ns();
     for (uint32_t i = 0; i < cfg->n_stations && rc == SH_OK; i++) {
         if (config_serves(cfg, i) || cfg->station[i].scanner != i + 1) continue;
@@ -29,6 +31,19 @@ int sites_load(const struct config *cfg, const struct sh_report *report, struct 
     }
     scanner_warnings_say(&sites->warnings, sites->first, report);
     return rc;
+}
+
+int sites_load(const struct config *cfg, const struct sh_report *report, struct sites *sites, struct sh_err *err)
+{
+    const int rc = site_load(cfg, report, &sites->first, err);
+    return rc == SH_OK ? load_others(cfg, report, sites, err) : rc;
+}
+
+int sites_load_written_out(const struct config *cfg, const struct sh_report *report, struct sites *sites,
+                           struct sh_err *err)
+{
+    const int rc = site_load_written_out(cfg, report, &sites->first, err);
+    return rc == SH_OK ? load_others(cfg, report, sites, err) : rc;
 }
 
 struct site *sites_of(const struct sites *sites, uint32_t station)

@@ -20,6 +20,8 @@ struct sites {
 
 /* sites begins as zeros, and is to be freed, also after an error. cfg must live on, with its sets. */
 int sites_load(const struct config *cfg, const struct sh_report *report, struct sites *sites, struct sh_err *err);
+int sites_load_written_out(const struct config *cfg, const struct sh_report *report, struct sites *sites,
+                           struct sh_err *err);
 /* That of the scanner at a station, from 0. */
 struct site *sites_of(const struct sites *sites, uint32_t station);
 void sites_free(struct sites *sites);

@@ -59,3 +59,11 @@ int64_t clock_thread_ns(void)
 {
     return read_ns(CLOCK_THREAD_CPUTIME_ID);
 }
+
+int clock_read_of_thread(clockid_t clock, int64_t *ns)
+{
+    struct timespec t;
+    if (clock_gettime(clock, &t) != 0) return 0;
+    *ns = (int64_t)t.tv_sec * 1000000000 + t.tv_nsec;
+    return 1;
+}

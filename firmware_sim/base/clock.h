@@ -5,6 +5,7 @@
 #define FIRMWARE_SIM_BASE_CLOCK_H
 
 #include <stdint.h>
+#include <time.h>
 
 /* CLOCK_MONOTONIC in nanoseconds. Real-time safe. */
 int64_t clock_now_ns(void);
@@ -17,5 +18,7 @@ void clock_sleep_until_ns(int64_t t_ns);
 /* Processor time of the whole process, seconds; of this thread, nanoseconds. */
 double clock_cpu_s(void);
 int64_t clock_thread_ns(void);
+/* Processor time of another thread, by its clock (pthread_getcpuclockid). It is 0 once the thread has ended. */
+int clock_read_of_thread(clockid_t clock, int64_t *ns);
 
 #endif

@@ -33,6 +33,7 @@
 
 enum {
     CONFIG_MAX_MESHES = 64,
+    CONFIG_MAX_COPIES = 256, /* that stand in the configuration itself, of all meshes together */
     CONFIG_MAX_LINKS = 8,
     CONFIG_MAX_STATIONS = 64,
     CONFIG_MAX_SURFACES = 64,
@@ -51,12 +52,21 @@ struct config_mesh {
      * seen from above, then shifted by move_m_s * t; with cycle_s, back and forth. All zero: the mesh stands
      * still. */
     double move_m_s[3], turn_deg_s, pivot_m[3], cycle_s;
+    char copies[CONFIG_PATH_LEN]; /* CSV file of places; empty: they stand in struct config_scene, or there are none */
+    int copy_labels;              /* each copy has surfaces of its own */
 };
 
 static inline int config_mesh_moves(const struct config_mesh *mesh)
 {
     return mesh->turn_deg_s != 0.0 || mesh->move_m_s[0] != 0.0 || mesh->move_m_s[1] != 0.0 || mesh->move_m_s[2] != 0.0;
 }
+
+/* A copy of a mesh that stands in the configuration itself. */
+struct config_copy {
+    uint32_t mesh;
+    struct scene_place place;
+};
+enum { CONFIG_COPY_SCALES = 1000 }; /* from one over so much to so much */
 
 /* How the scene lies on the Earth; core/geoframe.h. */
 enum config_anchor_source { ANCHOR_NONE, ANCHOR_EXPLICIT, ANCHOR_IFC, ANCHOR_UTM, ANCHOR_ECEF };
@@ -191,6 +201,8 @@ struct config_scene {
     struct config_target target;
     struct config_mesh mesh[CONFIG_MAX_MESHES];
     uint32_t n_meshes;
+    struct config_copy copy[CONFIG_MAX_COPIES];
+    uint32_t n_copies;
     double tolerance_m;
     int cutouts; /* rays pass where a texture's alpha is below a half */
     struct scene_import_limits import;
@@ -347,12 +359,6 @@ int config_apply_settings(struct config *cfg, const struct head_settings *settin
 static inline int config_limits_range(const struct config *cfg)
 {
     return cfg->head.range_min_m > cfg->head.profile_min_m || cfg->head.range_max_m < cfg->head.profile_max_m;
-}
-
-/* The farthest that commands may set, whatever head.range_max_m says. */
-static inline double config_range_most_m(const struct config *cfg)
-{
-    return cfg->head.profile_max_m > cfg->profile.range_max_m ? cfg->head.profile_max_m : cfg->profile.range_max_m;
 }
 
 /* Whether the scene needs texture coordinates and textures. */

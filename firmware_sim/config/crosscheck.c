@@ -252,6 +252,7 @@ void cfg_check(struct cfg_reader *rd, struct config *cfg)
     cfg_limit_range(rd, cfg);
     for (uint32_t i = 0; i < cfg->scene.n_meshes; i++)
         check_mesh(rd, &cfg->scene.mesh[i], i);
+    cfg_check_copies(rd, cfg);
     check_target(rd, cfg);
     cfg_check_places(rd, cfg);
     cfg_check_tripods(rd, cfg);

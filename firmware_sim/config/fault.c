@@ -165,7 +165,8 @@ int cfg_fail_unknown(struct cfg_reader *rd, int line, const char *parent, uint32
     /* Far more faults than are shown come from a hostile file: they cost no search of the table each. */
     if (rd->faults->n >= 10 * CONFIG_MAX_FAULTS) return cfg_fail(rd, line, "configuration", "unknown key");
     char known[256] = "", section[CFG_PATH_MAX], hint[CFG_PATH_MAX], shown[CFG_SHOW_MAX], name[3 * CFG_PATH_MAX];
-    char before[32] = "";
+    char before[CFG_PATH_MAX] = "";
+    if (rd->of != NULL) snprintf(before, sizeof before, "%s.", rd->of);
     if (rd->in_scanner) snprintf(before, sizeof before, "stations[%d].scanner.", rd->scanner);
     for (size_t i = 0; i < rd->table.n; i++) {
         const char *path = rd->table.keys[i].path, *here = cfg_word_below(path, parent);

@@ -31,6 +31,14 @@
      .help = "Axis that points up in the file; y turns (x, y, z) to (x, -z, y)."},
     {MESH(scale), CFG_REAL, "m/unit", NULL, 1e-9, 1e9, .example = "1", .help = "Metres per unit of the file."},
     {MESH(offset_m), CFG_VEC3, "m", "[0, 0, 0]", -1e9, 1e9, .help = "Added after axes and scale."},
+    {MESH(copies), CFG_PATH, .def = "", .example = "trees.csv",
+     .allowed = "a CSV file, or a list as [{ offset_m: [5, 0, 0], turn_deg: 30, scale: 1.2 }, ...]",
+     .help = "The mesh stands at each of these places, and nowhere else; it is kept once. The CSV file has the columns "
+             "x_m,y_m,z_m and may have turn_deg,scale. A copy is the mesh as placed by the keys above, then scaled, "
+             "turned about the vertical, clockwise seen from above, then shifted."},
+    {MESH(copy_labels), CFG_BOOL, .def = "off",
+     .help = "on: each copy has surfaces of its own, with objects \"NAME 1\", \"NAME 2\" ...; off: all copies share the "
+             "mesh's."},
     {MESH(move_m_s), CFG_VEC3, "m/s", "[0, 0, 0]", -1000, 1000,
      .help = "Velocity of the mesh, from the scan's start. At a stop it stands where it is at the stop's time."},
     {MESH(turn_deg_s), CFG_REAL, "deg/s", "0", -36000, 36000,
@@ -163,4 +171,4 @@
      .help = "live, in real time: address where poses arrive by UDP, as lines of t_s x y z roll pitch heading, up to "
              "3600 s ahead of device time."},
     {KEY(platform.port), CFG_COUNT, NULL, "0", 0, 65535, .help = "live: its port; 0: the system chooses."},
-/* clang-format on */
+    /* clang-format on */

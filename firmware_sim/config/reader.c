@@ -72,7 +72,7 @@ const char *cfg_full_name(const struct cfg_reader *rd, const struct cfg_key *key
     if (rd->own[cfg_row(rd, key)])
         snprintf(buf, 2 * CFG_PATH_MAX, "stations[%d].scanner.%s", rd->scanner, name);
     else
-        snprintf(buf, 2 * CFG_PATH_MAX, "%s", name);
+        snprintf(buf, 2 * CFG_PATH_MAX, "%s%s%s", rd->of != NULL ? rd->of : "", rd->of != NULL ? "." : "", name);
     return buf;
 }
 

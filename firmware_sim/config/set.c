@@ -163,7 +163,9 @@ static void apply_set(struct cfg_reader *rd, struct cfg_document *doc, const cha
     }
     const struct cfg_key *list = cfg_list_of(&rd->table, key);
     if (list != NULL && reach_item(rd, &set, list) != SH_OK) return;
-    if (key->type == CFG_MAP || key->type == CFG_LIST) {
+    cfg_forget_copies(rd, key, set.item);
+    const int is_copies = strcmp(key->path, "scene.meshes[].copies") == 0 && equals[1] == '[';
+    if (key->type == CFG_MAP || key->type == CFG_LIST || is_copies) {
         replace(rd, doc, &set, key, equals + 1, n_before);
         return;
     }

@@ -27,11 +27,11 @@ enum cfg_type {
 };
 
 enum cfg_flags {
-    CFG_FIGURE = 1, /* written { value: V, from: data sheet|quoted|assumed }; source, note, definition may follow */
-    CFG_HEX = 4,    /* written 0x1209, and only so: 1209 is read both ways */
-    CFG_ASCII = 2,  /* goes into *IDN?: printable ASCII without comma and quotes */
+    CFG_FIGURE = 1,   /* written { value: V, from: data sheet|quoted|assumed }; source, note, definition may follow */
+    CFG_HEX = 4,      /* written 0x1209, and only so: 1209 is read both ways */
+    CFG_ASCII = 2,    /* goes into *IDN?: printable ASCII without comma and quotes */
     CFG_WRITTEN = 16, /* of CFG_PATH: the file is written; without it, it is read */
-    CFG_NEEDED = 8, /* has no default that does in most configurations: the example gives it a value */
+    CFG_NEEDED = 8,   /* has no default that does in most configurations: the example gives it a value */
 };
 
 enum { CFG_MAX_ROWS = 256, CFG_MAX_ITEMS = 128, CFG_PATH_MAX = 96, CFG_FROM_SET = -1 };
@@ -81,6 +81,7 @@ struct cfg_reader {
     const struct config_profile *profile;            /* for the limits in errors; NULL: not known */
     unsigned char from[CFG_MAX_ROWS][CFG_MAX_ITEMS]; /* of figures: 1 + enum config_from; 0: not given */
     struct config_faults *faults;
+    const char *of;  /* what stands before its keys in errors; NULL: nothing */
     const char *set; /* the key of --set whose value is being parsed as YAML; NULL: none */
     /* The scanner of a station (scanner.c): */
     int scanner;                      /* station, from 0, whose section `scanner` counts; -1: none */
@@ -218,6 +219,12 @@ double cfg_real_figure(const struct config_profile *profile, const char *path);
 void cfg_load_profile(struct cfg_reader *rd, struct config *cfg);
 /* Everything that concerns more than one key, as far as these were read well. */
 void cfg_check(struct cfg_reader *rd, struct config *cfg);
+/* copies.c: a list of copies of a mesh: its rows; a reader of the next one, below a key of that name; its end. */
+extern const struct cfg_table cfg_copy_table;
+void cfg_begin_copy(struct cfg_reader *rd, const struct cfg_reader *of, uint32_t mesh, const char *name, int line);
+/* They are no more: all of them (scene, scene.meshes), or those of a mesh. */
+void cfg_forget_copies(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item);
+void cfg_check_copies(struct cfg_reader *rd, const struct config *cfg);
 /* places.c: the anchor, and the forms of a station's place. */
 void cfg_check_places(struct cfg_reader *rd, struct config *cfg);
 /* tripod.c: the tripods of stations. */

@@ -207,6 +207,35 @@ static void read_list(struct walk *w, const struct cfg_key *key, const yaml_node
     }
 }
 
+/* A list within a list: each element has a reader of its own. */
+static void read_copies(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
+{
+    struct config_scene *scene = &((struct config *)w->rd->base)->scene;
+    const yaml_node_item_t *first = node->data.sequence.items.start;
+    const ptrdiff_t n = node->data.sequence.items.top - first;
+    if (n == 0 || n > CONFIG_MAX_COPIES - (ptrdiff_t)scene->n_copies) {
+        cfg_fail_value(w->rd, key, item, line_of(w, node),
+                       "a list of %td copies; allowed 1 to %d of all meshes together, more in a CSV file", n,
+                       CONFIG_MAX_COPIES);
+        return;
+    }
+    for (ptrdiff_t i = 0; i < n; i++) {
+        const yaml_node_t *child = yaml_document_get_node(w->doc, first[i]);
+        struct cfg_reader rd;
+        struct walk in = *w;
+        char name[CFG_PATH_MAX];
+        snprintf(name, sizeof name, "scene.meshes[%u].copies[%td]", item, i);
+        cfg_begin_copy(&rd, w->rd, item, name, line_of(w, child));
+        in.rd = &rd;
+        if (child->type == YAML_MAPPING_NODE)
+            read_map(&in, child, "", 0);
+        else
+            cfg_fail(&rd, line_of(w, child), name, "here stands %s; allowed a section with offset_m, turn_deg, scale",
+                     kind_of(child));
+        if (child->type == YAML_MAPPING_NODE) cfg_fill_defaults(&rd, NULL);
+    }
+}
+
 /* Kept until it is known whose scanner is asked for. */
 static void keep_scanner(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
 {
@@ -223,6 +252,8 @@ static void read_value(struct walk *w, const struct cfg_key *key, uint32_t item,
         cfg_fail_value(w->rd, key, item, line_of(w, node), "has a tag; allowed none");
     } else if (key->flags & CFG_FIGURE) {
         read_figure(w, key, item, node);
+    } else if (strcmp(key->path, "scene.meshes[].copies") == 0 && node->type == YAML_SEQUENCE_NODE) {
+        read_copies(w, key, item, node);
     } else if (strcmp(key->path, "stations[].scanner") == 0) {
         keep_scanner(w, key, item, node);
     } else if (key->type == CFG_MAP && node->type == YAML_MAPPING_NODE) {

@@ -188,6 +188,7 @@ int loop_start(struct loop *loop, struct sh_err *err)
     if (rc == SH_OK) rc = links_start(&loop->links, err);
     if (rc == SH_OK) rc = pacer_start(loop, err);
     if (rc == SH_OK) rc = loop->device != NULL ? casters_start(loop, err) : player_start(loop, err);
+    if (rc == SH_OK && loop->device != NULL) loop->cost = cost_watch_start(loop);
     return rc;
 }
 
@@ -229,6 +230,8 @@ void loop_join(struct loop *loop, struct loop_stats *stats)
         stream_poke(stream);
     }
     casters_join(loop);
+    cost_watch_join(loop->cost);
+    loop->cost = NULL;
     player_join(loop);
     pacer_join(loop);
     mover_join(&loop->links.mover);

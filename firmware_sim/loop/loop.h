@@ -28,6 +28,7 @@ struct loop_options {
     const struct link_spec *extra;  /* one more link than the configuration has; NULL: none */
     const struct web_source *web;   /* what links of type web serve beside the page; NULL: nothing */
     const struct sh_report *report; /* warnings while running (from any thread); NULL: none */
+    double planned_ns;              /* for a pulse: of much more a warning says so; 0: what the site's plan has */
 };
 
 struct loop_stats {

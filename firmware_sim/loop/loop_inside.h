@@ -5,6 +5,7 @@
 
 #include <pthread.h>
 
+#include "firmware_sim/loop/cost_watch.h"
 #include "firmware_sim/loop/hash.h"
 #include "firmware_sim/loop/loop.h"
 #include "firmware_sim/loop/pace.h"
@@ -54,6 +55,7 @@ struct loop {
     struct pacer pacer;
     struct links links;
     struct hasher *hasher;       /* NULL: none is wanted */
+    struct cost_watch *cost;     /* NULL: nobody is to be warned */
     struct pose_feed *feed;      /* of a live platform in real time; NULL: none */
     _Atomic uint64_t final_tick; /* first tick that will never be; UINT64_MAX while unknown */
     _Atomic int stopping;        /* give up waiting for anything */

@@ -19,7 +19,7 @@ struct trial {
 /* The sample is to be freed, also after an error. */
 static int open_trial(struct trial *trial, struct site *site, const struct sh_report *report, struct sh_err *err)
 {
-    if (site->scene->n_triangles > MANY_TRIANGLES) sh_progress(report, "trying methods on the scene", -1.0);
+    if (site->scene->n_all > MANY_TRIANGLES) sh_progress(report, "trying methods on the scene", -1.0);
     trial->site = site;
     site_look_open(&trial->look, site);
     return plan_sample_create(trial->look.place, trial->look.n, report, &trial->sample, err);
@@ -27,13 +27,15 @@ static int open_trial(struct trial *trial, struct site *site, const struct sh_re
 
 /* ---- beams */
 
-/* What textures cut out of surfaces has outlines that nobody knows. */
-static const char *has_cutouts(const struct site *site)
+/* Nobody knows the outlines of what textures cut out, and those of copies are not made. */
+static const char *has_no_outlines(const struct site *site)
 {
-    int cutouts = site->scene->cutout != NULL;
+    int cutouts = site->scene->cutout != NULL, copies = site->scene->n_copies > 0;
     for (uint32_t i = 0; i < site->n_movers; i++)
         cutouts |= site->mover[i].scene->cutout != NULL;
-    return cutouts ? "outlines of what textures cut out (scene.cutouts) are not known" : NULL;
+    return cutouts  ? "outlines of what textures cut out (scene.cutouts) are not known"
+           : copies ? "outlines of copies (scene.meshes[].copies) are not known"
+                    : NULL;
 }
 
 /* Why a beam is not possible here; NULL: it is. */
@@ -43,7 +45,7 @@ static const char *why_not(const struct site *site, enum beam_mode mode)
     if (!config_has_footprint(site->cfg)) return "the head profile has no footprint";
     if (mode != BEAM_ADAPTIVE) return NULL;
     const char *moves = config_beam_moves(site->cfg);
-    return moves != NULL ? moves : has_cutouts(site);
+    return moves != NULL ? moves : has_no_outlines(site);
 }
 
 static int make_beam(const struct site *site, struct site_station *s, int adaptive, const struct sh_report *report,
@@ -60,7 +62,7 @@ static int make_beam(const struct site *site, struct site_station *s, int adapti
     if (site->scene->n_triangles > MANY_TRIANGLES) sh_progress(report, "looking for outlines", -1.0);
     const struct beam_outlines_spec spec = {site->scene,    s->at.position_m,  &beam->beam,
                                             p->range_max_m, site->detect.kind, report};
-    int rc = cast_outlines(&spec, s->bvh, &s->outlines, err);
+    int rc = cast_outlines(&spec, site->bvh, &s->outlines, err);
     beam->outlines = s->outlines;
     return rc;
 }
@@ -195,7 +197,7 @@ static int force_beam(struct site *site, const struct sh_report *report, struct 
     const struct config *cfg = site->cfg;
     struct plan_option option;
     struct trial trial = {0};
-    const char *why = cfg->beam.mode == BEAM_ADAPTIVE ? has_cutouts(site) : NULL;
+    const char *why = cfg->beam.mode == BEAM_ADAPTIVE ? has_no_outlines(site) : NULL;
     if (why != NULL)
         return sh_fail(err, SH_EINPUT, "%s: beam.mode: adaptive: %s; allowed here are single, rings and auto",
                        cfg->file, why);

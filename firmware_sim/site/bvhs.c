@@ -12,7 +12,5 @@ int site_build_bvhs(struct site *site, const struct sh_report *report, struct sh
         world->mover[i].bvh = m->bvh;
     }
     site->bvh = world->bvh;
-    for (uint32_t i = 0; i < site->n_stations; i++)
-        if (site->moving || config_serves(site->cfg, i)) site->station[i].bvh = site->bvh;
     return rc;
 }

@@ -227,27 +227,6 @@ void site_free_detect(struct site *site)
     free(site->detect.kind);
 }
 
-double site_farthest_m(const struct site *site, const double from_m[3])
-{
-    double far2 = 0.0;
-    for (int i = 0; i < 3; i++) {
-        double far = fmax(fabs(site->scene->min_m[i] - from_m[i]), fabs(site->scene->max_m[i] - from_m[i]));
-        far2 += far * far;
-    }
-    return sqrt(far2);
-}
-
-double site_ray_reach_m(const struct site *site, const double station_m[3])
-{
-    const struct config_instrument *k = &site->cfg->instrument;
-    double beside_m = hypot(k->transit_offset_m, k->mirror_offset_m);
-    if (casts_footprints(site)) beside_m += 0.5 * site->cfg->profile.beam_exit_m;
-    if (site->detect.cast.depth == 0) return beside_m;
-    /* What moves may be anywhere. */
-    double beyond_m = site->n_movers > 0 ? INFINITY : site_farthest_m(site, station_m) + 1e-3;
-    return beside_m + fmin(beyond_m, config_range_most_m(site->cfg));
-}
-
 double site_ball_m(const struct site *site)
 {
     const double *f = site->cfg->noise.ball.factor;

@@ -106,15 +106,49 @@ static int has_near_vertex(const struct scene *scene, const double p[3], double 
     return 0;
 }
 
+/* The distance of a point from the bounds of a copy. */
+static double distance_from(const struct scene_copy *copy, const double p[3])
+{
+    double off[3];
+    for (int k = 0; k < 3; k++)
+        off[k] = fmax(0.0, fmax(copy->min_m[k] - p[k], p[k] - copy->max_m[k]));
+    return vec3_length(off);
+}
+
+/* Copies of one mesh. */
+static int is_copy_reached(const struct scene_copied *of, const double p[3], double reach_m, int *reached,
+                           struct sh_err *err)
+{
+    struct distance *index = NULL;
+    struct distance_hit hit;
+    double in[3], vertex_m[3];
+    int rc = SH_OK;
+    for (uint32_t k = 0; k < of->n && !*reached; k++) { /* a vertex settles most cases */
+        scene_copy_put(&of->copy[k], of->mesh->vertex_m[of->mesh->triangle[0][0]], vertex_m);
+        *reached = vec3_distance(vertex_m, p) <= reach_m;
+    }
+    for (uint32_t k = 0; k < of->n && !*reached && rc == SH_OK; k++) {
+        if (distance_from(&of->copy[k], p) > reach_m) continue;
+        if (index == NULL) rc = distance_create(of->mesh, &index, err);
+        scene_copy_put_back(&of->copy[k], p, in);
+        if (rc == SH_OK) *reached = distance_query(index, in, reach_m / of->copy[k].scale, &hit);
+    }
+    distance_free(index);
+    return rc;
+}
+
 static int is_reached(const struct scene *scene, const double p[3], double reach_m, int *reached, struct sh_err *err)
 {
     struct distance *index = NULL;
     struct distance_hit hit;
+    int rc = SH_OK;
     *reached = has_near_vertex(scene, p, reach_m);
     for (int i = 0; i < 3; i++)
         if (p[i] < scene->min_m[i] - reach_m || p[i] > scene->max_m[i] + reach_m) return SH_OK;
-    if (*reached) return SH_OK;
-    int rc = distance_create(scene, &index, err);
+    for (uint32_t i = 0; i < scene->n_copied && !*reached && rc == SH_OK; i++)
+        rc = is_copy_reached(&scene->copied[i], p, reach_m, reached, err);
+    if (*reached || scene->n_triangles == 0 || rc != SH_OK) return rc;
+    rc = distance_create(scene, &index, err);
     if (rc == SH_OK) *reached = distance_query(index, p, reach_m, &hit);
     distance_free(index);
     return rc;
@@ -139,22 +173,22 @@ struct look {
     uint32_t triangle[LOOKS];
 };
 
-static void cast(const struct site_station *s, struct bvh_work *work, struct look *look, uint32_t n)
+static void cast(const struct site *site, const struct site_station *s, struct bvh_work *work, struct look *look)
 {
     const double *p = s->at.position_m;
-    const struct bvh_rays rays = {.n = n,
+    const struct bvh_rays rays = {.n = LOOKS,
                                   .from.at_m = {p[0], p[1], p[2]},
                                   .dir = {look->x, look->y, look->z},
                                   .range_max_m = 1e9,
                                   .scattered = 1,
                                   .range_m = look->range_m,
                                   .triangle = look->triangle};
-    bvh_hits(work, s->bvh, &rays);
+    bvh_hits(work, site->bvh, &rays);
 }
 
 /* Below a floor there is a surface above the head, and none under it. */
-static int doubt_floor(const struct site *site, uint32_t i, struct bvh_work *work, struct look *look,
-                       const struct sh_report *report, struct sh_err *err)
+static int doubt_floor(const struct site *site, uint32_t i, struct bvh_work *work, const struct sh_report *report,
+                       struct sh_err *err)
 {
     const struct site_station *s = &site->station[i];
     const double *p = s->at.position_m;
@@ -163,16 +197,13 @@ static int doubt_floor(const struct site *site, uint32_t i, struct bvh_work *wor
     memcpy(level, mat3_unit, sizeof level);
     if (site->anchor.known) rc = geoframe_level(&site->anchor.frame, p, level, err);
     if (rc != SH_OK) return rc;
-    for (int k = 0; k < 2; k++) {
-        const double sign = k == 0 ? 1.0 : -1.0, dir[3] = {sign * level[2], sign * level[5], sign * level[8]};
-        VEC3_SET(*look, k, dir);
-    }
-    cast(s, work, look, 2);
-    if (!isnan(look->range_m[0]) && isnan(look->range_m[1]))
+    const double up[3] = {level[2], level[5], level[8]}, down[3] = {-level[2], -level[5], -level[8]};
+    const double above_m = bvh_ray(work, site->bvh, p, up);
+    if (!isnan(above_m) && isnan(bvh_ray(work, site->bvh, p, down)))
         sh_warn(report,
                 "station %u %s at %.10g %.10g %.10g m: no surface below it, and one %.3g m above it: is it under the "
                 "floor?",
-                i + 1, s->station->name, p[0], p[1], p[2], look->range_m[0]);
+                i + 1, s->station->name, p[0], p[1], p[2], above_m);
     return SH_OK;
 }
 
@@ -225,7 +256,7 @@ static void doubt_view(const struct site *site, uint32_t i, struct bvh_work *wor
         fill_window(site, s, look);
     else
         fill_frame(site, s, look);
-    cast(s, work, look, LOOKS);
+    cast(site, s, work, look);
     for (int k = 0; k < LOOKS; k++) {
         near += look->range_m[k] < program->range_min_m;
         far += look->range_m[k] > program->range_max_m;
@@ -257,7 +288,7 @@ static int doubt_stations(const struct site *site, const struct sh_report *repor
         if (!config_serves(site->cfg, i)) continue;
         rc = doubt_reach(site, i, report, err);
         if (rc != SH_OK || site->n_movers > 0) continue;
-        rc = doubt_floor(site, i, work, look, report, err);
+        rc = doubt_floor(site, i, work, report, err);
         if (rc == SH_OK) doubt_view(site, i, work, look, report);
     }
     bvh_work_free(work);

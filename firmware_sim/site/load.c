@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/scene_copies.h"
 #include "firmware_sim/site/site_inside.h"
 #include "firmware_sim/site/plan_rows.h"
 
@@ -21,7 +22,8 @@ static struct scene_mesh_spec mesh_spec(const struct config *cfg, const struct c
 }
 
 /* A body by itself, in its own frame. */
-static int add_mover(struct site *site, uint32_t number, const struct sh_report *report, struct sh_err *err)
+static int add_mover(struct site *site, uint32_t number, const struct scene_mesh_spec *spec,
+                     const struct sh_report *report, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
     if (site->n_movers == CAST_MAX_MOVERS)
@@ -29,8 +31,7 @@ static int add_mover(struct site *site, uint32_t number, const struct sh_report 
     struct site_mover *m = &site->mover[site->n_movers++];
     m->mesh = &cfg->scene.mesh[number];
     m->number = number;
-    struct scene_mesh_spec spec = mesh_spec(cfg, m->mesh);
-    int rc = scene_load(&spec, 1, cfg->scene.tolerance_m, report, &m->scene, err);
+    int rc = scene_load(spec, 1, cfg->scene.tolerance_m, report, &m->scene, err);
     if (rc != SH_OK) return rc;
     if (site->n_surfaces + m->scene->n_surfaces > SCENE_MAX_SURFACES)
         return sh_fail(err, SH_EINPUT, "%s: too many surfaces; at most %d", m->mesh->file, SCENE_MAX_SURFACES);
@@ -62,22 +63,50 @@ static void place_movers(struct site *site)
     }
 }
 
+static int write_out(struct site *site, const struct sh_report *report, struct sh_err *err)
+{
+    int rc = scene_write_out_copies(site->scene, SITE_MOST_WRITTEN_OUT, report, err);
+    for (uint32_t i = 0; i < site->n_movers && rc == SH_OK; i++)
+        rc = scene_write_out_copies(site->mover[i].scene, SITE_MOST_WRITTEN_OUT, report, err);
+    return rc;
+}
+
+/* spec: [n_meshes] */
+static int load_meshes(struct site *site, const struct scene_mesh_spec *spec, const struct sh_report *report,
+                       struct sh_err *err)
+{
+    const struct config *cfg = site->cfg;
+    struct scene_mesh_spec standing[CONFIG_MAX_MESHES];
+    size_t n = 0;
+    for (uint32_t i = 0; i < cfg->scene.n_meshes; i++)
+        if (!config_mesh_moves(&cfg->scene.mesh[i])) standing[n++] = spec[i];
+    if (n == 0)
+        return sh_fail(err, SH_EINPUT, "%s: scene.meshes: all of them move; at least one has to stand still",
+                       cfg->file);
+    int rc = scene_load(standing, n, cfg->scene.tolerance_m, report, &site->scene, err);
+    if (rc == SH_OK) site->n_surfaces = site->scene->n_surfaces;
+    for (uint32_t i = 0; i < cfg->scene.n_meshes && rc == SH_OK; i++)
+        if (config_mesh_moves(&cfg->scene.mesh[i])) rc = add_mover(site, i, &spec[i], report, err);
+    if (rc == SH_OK) rc = site_select_target(site, err);
+    if (rc == SH_OK && site->world->written_out) rc = write_out(site, report, err);
+    if (rc == SH_OK) place_movers(site);
+    return rc;
+}
+
+/* All lists of copies come before the first mesh: what is wrong with them is soon said. */
 static int load_scene(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
     struct scene_mesh_spec spec[CONFIG_MAX_MESHES];
-    size_t n = 0;
-    for (uint32_t i = 0; i < cfg->scene.n_meshes; i++)
-        if (!config_mesh_moves(&cfg->scene.mesh[i])) spec[n++] = mesh_spec(cfg, &cfg->scene.mesh[i]);
-    if (n == 0)
-        return sh_fail(err, SH_EINPUT, "%s: scene.meshes: all of them move; at least one has to stand still",
-                       cfg->file);
-    int rc = scene_load(spec, n, cfg->scene.tolerance_m, report, &site->scene, err);
-    if (rc == SH_OK) site->n_surfaces = site->scene->n_surfaces;
-    for (uint32_t i = 0; i < cfg->scene.n_meshes && rc == SH_OK; i++)
-        if (config_mesh_moves(&cfg->scene.mesh[i])) rc = add_mover(site, i, report, err);
-    if (rc == SH_OK) rc = site_select_target(site, err);
-    if (rc == SH_OK) place_movers(site);
+    uint32_t n = 0;
+    int rc = SH_OK;
+    for (; n < cfg->scene.n_meshes && rc == SH_OK; n++) {
+        spec[n] = mesh_spec(cfg, &cfg->scene.mesh[n]);
+        rc = site_read_copies(cfg, n, report, &spec[n].places, err);
+    }
+    if (rc == SH_OK) rc = load_meshes(site, spec, report, err);
+    for (uint32_t i = 0; i < n; i++)
+        free(spec[i].places.place);
     return rc;
 }
 
@@ -105,7 +134,7 @@ static int place_stations(struct site *site, const struct sh_report *report, str
     site->n_stations = cfg->n_stations;
     for (uint32_t i = 0; i < cfg->n_stations && rc == SH_OK; i++) {
         site->station[i].station = &cfg->station[i];
-        rc = placement_find(cfg, i, &site->anchor, site->scene, &site->station[i].at, err);
+        rc = placement_find(cfg, i, &site->anchor, site->bvh, &site->station[i].at, err);
         if (rc == SH_OK) rc = sh_check_stop(report, err);
     }
     return rc == SH_OK && cfg->platform.kind == PLATFORM_STOPS ? site_load_stops(site, report, err) : rc;
@@ -137,9 +166,9 @@ static int load(struct site *site, const struct sh_report *report, struct sh_err
     if (rc == SH_OK) rc = site_name_legs(site, err);
     if (rc == SH_OK) rc = site_set_up_detect(site, report, err);
     if (rc == SH_OK) rc = site_set_up_silent(site, err);
+    if (rc == SH_OK) rc = site_build_bvhs(site, report, err);
     if (rc == SH_OK) rc = place_stations(site, report, err);
     if (rc == SH_OK && site->moving) rc = site_load_platform(site, report, err);
-    if (rc == SH_OK) rc = site_build_bvhs(site, report, err);
     if (rc == SH_OK) rc = site_set_up_tripods(site, report, err);
     if (rc == SH_OK && site->cfg->output.colour != COLOUR_NONE) rc = site_set_up_colours(site, report, err);
     if (rc == SH_OK) rc = site_warn_doubts(site, report, err); /* trying beams may take long where little is seen */
@@ -161,6 +190,7 @@ int site_create(const struct config *cfg, enum site_purpose purpose, const struc
     site->planned_frames = cfg->head.settings.frames;
     site->moving = config_head_moves(&cfg->platform);
     int rc = site_enter_world(site, other, err);
+    if (rc == SH_OK && purpose == SITE_WRITTEN_OUT) site->world->written_out = 1;
     if (rc == SH_OK) rc = load(site, &heard.report, err);
     if (rc == SH_OK && site->measures) rc = site_open_sights(site, 0, site->n_stations, report, err);
     if (rc == SH_OK && site->measures) rc = site_plan_rows(site, err);
@@ -173,6 +203,12 @@ int site_create(const struct config *cfg, enum site_purpose purpose, const struc
 int site_load(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err)
 {
     return site_create(cfg, SITE_FOR_SCANS, NULL, report, out, err);
+}
+
+int site_load_written_out(const struct config *cfg, const struct sh_report *report, struct site **out,
+                          struct sh_err *err)
+{
+    return site_create(cfg, SITE_WRITTEN_OUT, NULL, report, out, err);
 }
 
 int site_load_beside(const struct config *cfg, const struct site *other, const struct sh_report *report,

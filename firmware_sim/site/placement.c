@@ -117,15 +117,18 @@ static int find_position(const struct config_station *s, const struct geoframe *
 }
 
 /* From the place given down to the floor, and up by the instrument's height. */
-static int stand_on_floor(const struct config_station *s, const double level[9], const struct scene *scene,
+static int stand_on_floor(const struct config_station *s, const double level[9], const struct bvh *bvh,
                           struct placement *out, struct sh_err *err)
 {
     const double up[3] = {level[2], level[5], level[8]}, down[3] = {-up[0], -up[1], -up[2]};
-    double from_m[3], range_m;
+    double from_m[3];
+    struct bvh_work *work;
+    int rc = bvh_work_create(&work, err);
+    if (rc != SH_OK) return rc;
     for (int i = 0; i < 3; i++)
         from_m[i] = out->position_m[i] + FLOOR_ABOVE_M * up[i];
-    int rc = cast_floor(scene, from_m, down, &range_m, err);
-    if (rc != SH_OK) return rc;
+    const double range_m = bvh_ray(work, bvh, from_m, down);
+    bvh_work_free(work);
     if (isnan(range_m))
         return sh_fail(err, SH_EINPUT,
                        "instrument_height_m, but no surface of the scene lies below %.10g %.10g %.10g m; give a place "
@@ -137,7 +140,7 @@ static int stand_on_floor(const struct config_station *s, const double level[9],
     return SH_OK;
 }
 
-static int find(const struct config_station *s, const struct placement_anchor *anchor, const struct scene *scene,
+static int find(const struct config_station *s, const struct placement_anchor *anchor, const struct bvh *bvh,
                 struct placement *out, struct sh_err *err)
 {
     struct georef_place at;
@@ -147,7 +150,7 @@ static int find(const struct config_station *s, const struct placement_anchor *a
     if (rc == SH_OK && !s->has_position) rc = find_position(s, &anchor->frame, &at, out->position_m, err);
     memcpy(level, mat3_unit, sizeof level);
     if (rc == SH_OK && anchor->known) rc = geoframe_level(&anchor->frame, out->position_m, level, err);
-    if (rc == SH_OK && s->has_instrument_height) rc = stand_on_floor(s, level, scene, out, err);
+    if (rc == SH_OK && s->has_instrument_height) rc = stand_on_floor(s, level, bvh, out, err);
     if (rc == SH_OK && anchor->known) rc = geoframe_locate(&anchor->frame, out->position_m, &at, err);
     if (!anchor->known) at.height_m += out->position_m[2] - s->position_m[2]; /* both are where the search began */
     if (rc != SH_OK) return rc;
@@ -158,13 +161,13 @@ static int find(const struct config_station *s, const struct placement_anchor *a
     return SH_OK;
 }
 
-int placement_find(const struct config *cfg, uint32_t i, const struct placement_anchor *anchor,
-                   const struct scene *scene, struct placement *out, struct sh_err *err)
+int placement_find(const struct config *cfg, uint32_t i, const struct placement_anchor *anchor, const struct bvh *bvh,
+                   struct placement *out, struct sh_err *err)
 {
     struct sh_err why = {0, ""};
     memset(out, 0, sizeof *out);
     out->floor_m = NAN;
-    int rc = find(&cfg->station[i], anchor, scene, out, &why);
+    int rc = find(&cfg->station[i], anchor, bvh, out, &why);
     if (rc == SH_OK) return SH_OK;
     return sh_fail(err, rc, "%s: stations[%u] (%s): %.300s", cfg->file, i, cfg->station[i].name, why.text);
 }

@@ -5,7 +5,7 @@
 #define FIRMWARE_SIM_SITE_PLACEMENT_H
 
 #include "core/geoframe.h"
-#include "core/scene.h"
+#include "core/bvh.h"
 #include "firmware_sim/config/config.h"
 
 struct placement_anchor {
@@ -25,9 +25,9 @@ struct placement {
     double floor_m;            /* distance down to the floor that was looked for; NaN: it wasn't */
 };
 
-/* Station i (0...) of the configuration. Floors are those of the scene, without what moves. */
-int placement_find(const struct config *cfg, uint32_t i, const struct placement_anchor *anchor,
-                   const struct scene *scene, struct placement *out, struct sh_err *err);
+/* Station i (0...) of the configuration. Floors are those of the BVH, without what moves. */
+int placement_find(const struct config *cfg, uint32_t i, const struct placement_anchor *anchor, const struct bvh *bvh,
+                   struct placement *out, struct sh_err *err);
 
 /* The specification of a station's georeferencing, all but the CRS. */
 int placement_georef(const struct placement *placement, const struct placement_anchor *anchor, struct georef_spec *spec,

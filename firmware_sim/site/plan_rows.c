@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/plan/cost.h"
 #include "firmware_sim/site/rate.h"
 #include "firmware_sim/site/site_inside.h"
 
@@ -167,6 +168,45 @@ int site_plan_rows(struct site *site, struct sh_err *err)
     else
         add_georef(site, plan);
     return site_rate_row(site, &plan->row[plan->n++], err);
+}
+
+/* A row that depends on the scene has no figure: `most` takes its place. */
+static double cost_ns(const struct plan_row *row, double most)
+{
+    return isnan(row->cost_ns) ? most : row->cost_ns;
+}
+
+double site_planned_ns(const struct site *site)
+{
+    struct plan_row of_head[PLAN_HEAD_ROWS];
+    struct plan_head head;
+    struct bvh_info bvh;
+    const struct plan_methods *methods = &site->plan.methods;
+    ask_head(site, &head);
+    bvh_get_info(site->bvh, &bvh);
+    const size_t n = plan_head(&head, of_head);
+    double sum_ns = plan_pulse_ns(site->scene->n_triangles, bvh.packet) + cost_ns(&site->plan.sight, 0.0) +
+                    cost_ns(&site->plan.beam, PLAN_COST_OUTLINES + PLAN_COST_CUT) +
+                    cost_ns(&site->plan.optics, methods->depth * PLAN_COST_SUB_RAY);
+    for (uint32_t i = 0; i < site->n_movers; i++)
+        sum_ns += plan_pulse_ns(site->mover[i].scene->n_triangles, bvh.packet);
+    for (size_t i = 0; i < n; i++)
+        sum_ns += cost_ns(&of_head[i], 0.0);
+    if (site->cfg->output.layout != LINE_POLAR && site->n_stations > 0) sum_ns += cost_ns(&site->station[0].plan, 0.0);
+    return sum_ns;
+}
+
+void site_cost_reason(const struct site *site, char *text, size_t room)
+{
+    const struct plan_methods *methods = &site->plan.methods;
+    if (methods->beam != BEAM_SINGLE)
+        snprintf(text, room, "likely the sub-rays of footprints: beam.mode single has none");
+    else if (methods->depth > 0)
+        snprintf(text, room, "likely glass and mirrors: optics.depth 0 leaves them out");
+    else if (site->n_movers > 0)
+        snprintf(text, room, "likely the %u meshes that move, which are cast by themselves", site->n_movers);
+    else
+        snprintf(text, room, "likely many triangles that lie over one another as seen from the head");
 }
 
 void site_plan_text(const struct site *site, char *text, size_t room)

@@ -133,7 +133,7 @@ static int cover_path(struct site *site, struct sh_err *err)
             beyond_m =
                 fmax(beyond_m, vec3_distance(site->knot[k].pose.position_m, site->knot[end - 1].pose.position_m));
         if (until_ns != INT64_MAX) until_ns = (until_ns + 999999) / 1000000 * 1000000; /* as an anchor says it */
-        rc = add_stretch(site, centre_m, radius_m + beyond_m + 1e-3 + site_ray_reach_m(site, centre_m), until_ns, err);
+        rc = add_stretch(site, centre_m, radius_m + beyond_m + 1e-3, until_ns, err);
         i = end == site->n_knots || end == i + 1 ? end : end - 1; /* they share a pose */
     }
     return rc;
@@ -151,8 +151,7 @@ int site_load_platform(struct site *site, const struct sh_report *report, struct
         const double *arm = p->mount_m;
         double head_m = p->reach_m + sqrt(vec3_dot(arm, arm));
         site->live_reach_m = head_m + reach_m;
-        return add_stretch(site, site->station[0].at.position_m,
-                           head_m + site_ray_reach_m(site, site->station[0].at.position_m), INT64_MAX, err);
+        return add_stretch(site, site->station[0].at.position_m, head_m, INT64_MAX, err);
     }
     int rc = load_knots(site, report, err);
     return rc == SH_OK ? cover_path(site, err) : rc;

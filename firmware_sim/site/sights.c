@@ -19,6 +19,7 @@ static const char *why_not(const struct site *site)
     if (moves != NULL) return moves;
     if (!sight_possible(site->scene))
         return site->scene->cutout != NULL ? "textures cut holes into surfaces (scene.cutouts)"
+               : site->scene->n_copies > 0 ? "meshes have copies (scene.meshes[].copies)"
                                            : "the scene has too many triangles";
     return site->plan.methods.beam == BEAM_RINGS ? "the beam is rings, which have no ray for the centre" : NULL;
 }
@@ -59,7 +60,7 @@ static int choose(struct site *site, const struct sh_report *report, int *map, s
     site_view_of(site, look.at[0].station, &view);
     const struct plan_sight_need need = {.pulses = pulses_of(&look.place[0], cfg->head.settings.frames),
                                          .share = site_view_share(&view, SQUARE_RAD),
-                                         .n_triangles = site->scene->n_triangles,
+                                         .n_triangles = site->scene->n_all,
                                          .packet = bvh.packet,
                                          .memory_bytes = memory_bytes(site),
                                          .forced = asked == CHOICE_AUTO ? -1 : asked == CHOICE_ON,
@@ -86,7 +87,7 @@ static int make(struct site *site, uint32_t station, uint32_t of, const struct s
     struct sight *sight;
     struct sh_err why;
     site_view_of(site, station, &view);
-    struct sight_spec spec = {.bvh = s->bvh,
+    struct sight_spec spec = {.bvh = site->bvh,
                               .rays = site->plan.sight_rays,
                               .memory_bytes = memory_bytes(site) / of,
                               .sees = site_view_sees,
@@ -119,7 +120,7 @@ static void close_sight(struct site_station *s)
 static int still_holds(const struct site *site, const struct site *from, uint32_t i)
 {
     const struct site_station *a = &site->station[i], *b = &from->station[i];
-    return b->sight != NULL && a->bvh == b->bvh &&
+    return b->sight != NULL && site->bvh == from->bvh &&
            memcmp(&a->at.position_m, &b->at.position_m, sizeof a->at.position_m) == 0 &&
            memcmp(&a->at.rotation, &b->at.rotation, sizeof a->at.rotation) == 0;
 }

@@ -149,7 +149,7 @@ void site_cast_setup(const struct site *site, uint32_t station, struct cast_setu
     const struct config_profile *profile = &site->cfg->profile;
     const struct site_station *s = &site->station[station];
     memset(setup, 0, sizeof *setup);
-    setup->bvh = s->bvh;
+    setup->bvh = site->bvh;
     setup->sight = s->sight;
     setup->silent = site->silent;
     setup->georef = s->georef;

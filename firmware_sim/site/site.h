@@ -33,7 +33,6 @@ struct site_tripod {
 
 struct site_station {
     const struct config_station *station; /* of the configuration, or of stops */
-    struct bvh *bvh;                      /* the world's; NULL: this scanner does not scan from here */
     struct sight *_Atomic sight;          /* what it sees; NULL: rays go to the BVH (site_open_sights) */
     _Atomic uint32_t *sight_users;        /* sites that share the map */
     struct georef *georef;
@@ -90,6 +89,7 @@ struct site_plan {
 struct site_world {
     uint32_t n_users;
     uint32_t n_loads; /* how often the meshes were read: once */
+    int written_out;  /* copies are triangles of the scene */
     struct scene *scene;
     struct site_mover mover[CAST_MAX_MOVERS];
     uint32_t n_movers, n_surfaces;
@@ -160,6 +160,11 @@ struct site {
 
 /* cfg must outlive the site. */
 int site_load(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err);
+/* The same for tools that look at triangles one by one: copies of meshes are written out. SH_EINPUT where that were more
+ * than SITE_MOST_WRITTEN_OUT. */
+int site_load_written_out(const struct config *cfg, const struct sh_report *report, struct site **out,
+                          struct sh_err *err);
+#define SITE_MOST_WRITTEN_OUT 10000000
 /* The same beside another site, of another scanner of the same file: what is the same scene is loaded no second time,
  * with its BVHs. `other` may be freed before or after. */
 int site_load_beside(const struct config *cfg, const struct site *other, const struct sh_report *report,

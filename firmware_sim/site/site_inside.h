@@ -9,6 +9,7 @@ enum site_purpose {
     SITE_FOR_SCANS,
     SITE_FOR_PLAN, /* site_load_plan */
     SITE_MOVED,    /* site_load_moved */
+    SITE_WRITTEN_OUT,
 };
 int site_create(const struct config *cfg, enum site_purpose purpose, const struct site *other,
                 const struct sh_report *report, struct site **out, struct sh_err *err);
@@ -43,12 +44,6 @@ int site_vary_detect(struct site *site, struct sh_err *err);
 /* How many surfaces of glass or mirrors pulses are followed through, once that is known. */
 void site_set_depth(struct site *site, uint32_t depth);
 
-/* How far from the head's origin rays may begin, given where it stands: beams beside it, and ways beyond
- * glass. */
-double site_ray_reach_m(const struct site *site, const double station_m[3]);
-
-/* How far the scene goes, without what moves. */
-double site_farthest_m(const struct site *site, const double from_m[3]);
 /* How far noise may take a point, whether it is on or not; of that, the ball; a range, ten sigma of its noise. */
 double site_noise_m(const struct site *site);
 double site_ball_m(const struct site *site);
@@ -74,6 +69,10 @@ int site_enter_world(struct site *site, const struct site *other, struct sh_err 
 void site_leave_world(struct site *site);
 
 /* ---- target.c: scene.target. */
+
+/* Where the copies of a mesh stand: places->place is to be freed in any case, and NULL where it has none. */
+int site_read_copies(const struct config *cfg, uint32_t number, const struct sh_report *report,
+                     struct scene_places *places, struct sh_err *err);
 
 /* The meshes are loaded, each with labels of its own: leaves out what is no target, or notes it. SH_EINPUT where a pattern fits nothing, or nothing is
  * left. */

@@ -101,11 +101,25 @@ static int find_targets(const struct site *site, uint8_t *is_target, struct sh_e
     return SH_OK;
 }
 
+static uint32_t count_copied(const struct scene_copied *of, const uint8_t *is_target)
+{
+    uint32_t *of_label = calloc((size_t)of->mesh->n_surfaces + 1, sizeof *of_label), n = 0;
+    for (uint32_t i = 0; of_label != NULL && i < of->mesh->n_triangles; i++)
+        of_label[of->mesh->label[i]]++;
+    for (uint32_t k = 0; of_label != NULL && k < of->n; k++)
+        for (uint32_t j = 0; j < of->mesh->n_surfaces; j++)
+            n += is_target[of->copy[k].label0 + j] ? of_label[j] : 0;
+    free(of_label);
+    return n;
+}
+
 static uint32_t count_triangles(const struct scene *scene, const uint8_t *is_target)
 {
     uint32_t n = 0;
     for (uint32_t i = 0; i < scene->n_triangles; i++)
         n += is_target[scene->label[i]];
+    for (uint32_t i = 0; i < scene->n_copied; i++)
+        n += count_copied(&scene->copied[i], is_target);
     return n;
 }
 
@@ -113,11 +127,11 @@ static void count(const struct site *site, const uint8_t *is_target, struct site
 {
     uint32_t first = site->scene->n_surfaces;
     t->all_surfaces = site->n_surfaces;
-    t->all_triangles = site->scene->n_triangles;
+    t->all_triangles = site->scene->n_all;
     t->triangles = count_triangles(site->scene, is_target);
     for (uint32_t k = 0; k < site->n_movers; k++) {
         const struct scene *scene = site->mover[k].scene;
-        t->all_triangles += scene->n_triangles;
+        t->all_triangles += scene->n_all;
         t->triangles += count_triangles(scene, is_target + first);
         first += scene->n_surfaces;
     }
@@ -135,7 +149,7 @@ static int leave_out(struct site *site, const uint8_t *is_target, struct sh_err 
         const uint32_t was = m.scene->n_surfaces;
         if (rc == SH_OK) rc = scene_keep(m.scene, is_target + first, err);
         first += was;
-        if (rc == SH_OK && m.scene->n_triangles == 0)
+        if (rc == SH_OK && m.scene->n_all == 0)
             scene_free(m.scene);
         else
             site->mover[n++] = m;
@@ -144,7 +158,7 @@ static int leave_out(struct site *site, const uint8_t *is_target, struct sh_err 
     site->n_surfaces = site->scene->n_surfaces;
     for (uint32_t k = 0; k < n; k++)
         site->n_surfaces += site->mover[k].scene->n_surfaces;
-    if (rc != SH_OK || site->scene->n_triangles > 0) return rc;
+    if (rc != SH_OK || site->scene->n_all > 0) return rc;
     return sh_fail(err, SH_EINPUT,
                    "%s: scene.target.objects: nothing that stands still is among them; allowed with one that does, or "
                    "others: hide",

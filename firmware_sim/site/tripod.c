@@ -49,25 +49,6 @@ static int level_at(const struct site *site, const double at_m[3], double level[
 
 /* ---- height and opening */
 
-/* A station of another scanner has no BVH here. */
-static int find_ground(const struct site *site, struct site_station *s, struct bvh_work *work, struct sh_err *err)
-{
-    const double *down = s->tripod.cast.down;
-    double *range_m = &s->tripod.head_m;
-    if (s->bvh == NULL) return cast_floor(site->scene, s->at.position_m, down, range_m, err);
-    uint32_t triangle;
-    const double *p = s->at.position_m;
-    const struct bvh_rays ray = {.n = 1,
-                                 .from.at_m = {p[0], p[1], p[2]},
-                                 .dir = {&down[0], &down[1], &down[2]},
-                                 .range_max_m = 1e9,
-                                 .scattered = 1,
-                                 .range_m = range_m,
-                                 .triangle = &triangle};
-    bvh_hits(work, s->bvh, &ray);
-    return SH_OK;
-}
-
 static int open_legs(const struct site *site, struct site_station *s, uint32_t i, struct sh_err *err)
 {
     struct site_tripod *t = &s->tripod;
@@ -197,7 +178,6 @@ static int make_legs(const struct site *site, struct site_station *s, const doub
         t->legs->label[i] = (uint16_t)site->legs_label;
     t->legs->label0 = site->legs_label;
     t->cast.has_legs = 1;
-    if (s->bvh == NULL) return SH_OK;
     rc = bvh_create(t->legs, site->cfg->loop.threads, report, &t->bvh, err);
     if (rc != SH_OK) return rc;
     enclose(t->legs, &t->cast.legs);
@@ -214,12 +194,12 @@ static int set_up(const struct site *site, struct site_station *s, uint32_t i, s
     if (rc != SH_OK) return rc;
     for (int k = 0; k < 3; k++)
         t->cast.down[k] = -level[3 * k + 2];
-    rc = find_ground(site, s, work, err);
-    if (rc == SH_OK) rc = open_legs(site, s, i, err);
+    t->head_m = bvh_ray(work, site->bvh, s->at.position_m, t->cast.down);
+    rc = open_legs(site, s, i, err);
     if (rc != SH_OK) return rc;
     const int cone = t->from->cone == CHOICE_ON || (t->from->cone == CHOICE_AUTO && !t->from->legs);
     t->cast.cos_opening = cone ? cos(t->opening_rad) : 2.0;
-    if (s->bvh != NULL) warn(s, i, report);
+    warn(s, i, report);
     return t->from->legs ? make_legs(site, s, level, report, err) : SH_OK;
 }
 

@@ -12,7 +12,8 @@ static int is_same_scene(const struct site *site, const struct site *other)
     double error_m = other->scene != NULL ? other->scene->error_m : INFINITY;
     for (uint32_t i = 0; i < other->n_movers; i++)
         error_m = fmax(error_m, other->mover[i].scene->error_m);
-    return a->n_meshes == b->n_meshes && memcmp(a->mesh, b->mesh, sizeof a->mesh) == 0 && a->cutouts == b->cutouts &&
+    return a->n_meshes == b->n_meshes && memcmp(a->mesh, b->mesh, sizeof a->mesh) == 0 && a->n_copies == b->n_copies &&
+           memcmp(a->copy, b->copy, sizeof a->copy) == 0 && a->cutouts == b->cutouts &&
            memcmp(&a->target, &b->target, sizeof a->target) == 0 &&
            (config_wants_textures(other->cfg) || !config_wants_textures(site->cfg)) && error_m <= a->tolerance_m;
 }
@@ -40,6 +41,7 @@ int site_enter_world(struct site *site, const struct site *other, struct sh_err 
     site->world = calloc(1, sizeof *site->world);
     if (site->world == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     site->world->n_users = 1;
+    site->world->written_out = other != NULL && other->world->written_out;
     return SH_OK;
 }
 

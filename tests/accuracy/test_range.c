@@ -29,8 +29,9 @@ enum { BATCH = 1024, THREADS = 2 };
 #endif
 
 /* The promise: 1 um from 0.5 m to 2 km and to 89.9 degrees anywhere on the UTM grid. Derived: n . dir and n .
- * v as sums of three products in double are off by 8 x 2^-53 of range x |n|, and the planes are kept to
- * 2^-40: for triangles of up to 200 m (16 x 2^-53 x 2 km + 2^-40 x 200 m) / cos 89.9 = 1.1e-7 m. */
+ * v as sums of three products in double are off by 8 x 2^-53 of range x |n|, v counted from the BVH's origin: with
+ * planes up to 2 km from there 16 x 2^-53 x 4 km / cos 89.9 = 4e-9 m. Edges are rounded to 2^-53 of them, so a
+ * normal is tilted by that over the sine of the triangle's smallest angle. */
 static const double BOUND_M = 1e-6;
 static const double RANGE_MAX_M = 1e4;
 

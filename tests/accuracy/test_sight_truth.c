@@ -25,8 +25,8 @@ static const long RAYS = 1000;
 #endif
 
 static const double RANGE_MAX_M = 1e4;
-/* As for single rays (test_range): a plane's components are doubles, tilted by up to 2^-40, and the error grows by the
- * inverse of the incidence's cosine. */
+/* As for single rays (test_range): a plane's components are doubles, and the error grows by the inverse of the incidence's
+ * cosine. */
 static const double BOUND_M = 1e-6;
 /* Of the range: surfaces nearer to each other than this are met at once, and the lowest number is reported. */
 static const double TIED = 2e-12;

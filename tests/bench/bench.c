@@ -113,6 +113,18 @@ static int measure_scene(const struct bench_options *o, const char *name, struct
     return rc;
 }
 
+/* In the house, where its file is. */
+static int measure_reach(const struct bench_options *o, struct bench_report *report, struct sh_err *err)
+{
+    const char *house = o->house != NULL ? o->house : BENCH_HOUSE_FILE;
+    cpu_set_t before;
+    pin(&before);
+    int rc =
+        bench_reach(o->house != NULL || access(house, R_OK) == 0 ? house : NULL, report->reach, &report->n_reach, err);
+    unpin(&before);
+    return rc;
+}
+
 static int measure(const struct bench_options *o, struct bench_report *report, struct sh_err *err)
 {
     const char *list = o->scenes != NULL ? o->scenes : "";
@@ -120,6 +132,7 @@ static int measure(const struct bench_options *o, struct bench_report *report, s
     int rc = SH_OK;
     while (rc == SH_OK && (list = bench_next_name(list, name, sizeof name)) != NULL)
         rc = measure_scene(o, name, report, err);
+    if (rc == SH_OK && o->reach) rc = measure_reach(o, report, err);
     if (rc == SH_OK && o->leaks > 0.0) {
         rc = bench_leaks((uint64_t)o->leaks, 1, all_threads(o), &REPORT, report->leaks, err);
         report->have_leaks = rc == SH_OK;

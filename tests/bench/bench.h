@@ -24,8 +24,10 @@ struct bench_target {
 /* Triangles that a name like 10k, 1M or 25000 stands for; 0: it is no number of 100 to 100M. */
 uint32_t bench_count(const char *name);
 int bench_is_house(const char *name); /* one of the two below that need its file */
+int bench_is_made(const char *name);  /* one that is generated and is no terrain */
 /* "house" reads the IFC file, seen from its living room, and "garden" from outside; a number makes closed
- * terrain, 200 m wide and 3 m rough, seen from 4.7 m above its middle. */
+ * terrain, 200 m wide and 3 m rough, seen from 4.7 m above its middle; "foliage" is three crowns of 20,000 leaves in a box,
+ * "huge" a triangle of 1,000 km below 4,000 of some centimetres. */
 int bench_target_load(const char *name, const char *house, const struct sh_report *report, struct bench_target *out,
                       struct sh_err *err);
 void bench_target_free(struct bench_target *target);

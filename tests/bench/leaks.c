@@ -4,7 +4,8 @@
  * target it hits a face from outside: then it has left the mesh. One that meets the inside of the mesh behind its
  * target has passed an edge that it was aimed at: no leak, but no less wrong, and counted apart.
  *
- * The same rays are looked up in a sight of the station: each must be the cast's, bit by bit. */
+ * Every second batch is a moving head's: it goes about the station, up to half as far as the nearest wall. The rays of
+ * the others are looked up in a sight of the station, too: each must be the cast's, bit by bit. */
 #include <math.h>
 #include <stdio.h>
 #include <pthread.h>
@@ -16,6 +17,7 @@
 #include "tests/common/sight_beside.h"
 #include "tests/common/generate.h"
 #include "core/rng.h"
+#include "core/vec3.h"
 #include "tests/bench/bench.h"
 #include "tests/bench/closed_mesh.h"
 #include "firmware_sim/base/clock.h"
@@ -26,6 +28,7 @@ struct job {
     const struct bench_mesh *mesh;
     struct bvh *bvh;
     struct sight_beside sight; /* of the station; threads join it */
+    double room_m;             /* how far from the station a moving head goes */
     uint64_t n, key;
     _Atomic uint64_t next; /* first ray that nobody has taken yet */
     pthread_mutex_t lock;  /* of what follows */
@@ -35,6 +38,9 @@ struct job {
 
 struct batch {
     double dx[BATCH], dy[BATCH], dz[BATCH], target_m[BATCH], range_m[BATCH];
+    struct {
+        double x[BATCH], y[BATCH], z[BATCH];
+    } o; /* where rays begin */
     float fx[BATCH], fy[BATCH], fz[BATCH];
     uint32_t prim[BATCH];
 };
@@ -53,6 +59,18 @@ static void to_border(uint32_t cells, uint64_t r, double d[3], double *length)
     *length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
 }
 
+static int is_moving(uint64_t i)
+{
+    return i / BATCH % 2 == 1;
+}
+
+static void origin_of(const struct job *job, uint64_t i, double from[3])
+{
+    static const double turn[3] = {1.1e-5, 0.7e-5, 1.7e-5};
+    for (int j = 0; j < 3; j++)
+        from[j] = job->mesh->station_m[j] + (is_moving(i) ? job->room_m * sin(turn[j] * (double)i) / sqrt(3.0) : 0.0);
+}
+
 /* Ray number i: to a corner, or to a point of an edge. Four rays each to a row of neighbouring triangles,
  * which begins anywhere: rays of a packet are near each other, as in a scan. Of four, one goes on to a border of
  * the sight's cells. */
@@ -65,14 +83,16 @@ static void aim(const struct job *job, uint64_t i, struct batch *b, uint32_t k)
     uint32_t corner = (uint32_t)(r >> 32) % 3;
     const double *p = scene->vertex_m[scene->triangle[prim][corner]];
     const double *q = scene->vertex_m[scene->triangle[prim][(corner + 1) % 3]];
-    double s = r >> 63 != 0 ? 0.0 : (double)(rng_u64(job->key + 1, i) >> 11) * 0x1p-53, d[3], length2 = 0.0;
+    double s = r >> 63 != 0 ? 0.0 : (double)(rng_u64(job->key + 1, i) >> 11) * 0x1p-53, d[3], from[3], length2 = 0.0;
+    origin_of(job, i, from);
     for (int j = 0; j < 3; j++) {
-        d[j] = p[j] + s * (q[j] - p[j]) - job->mesh->station_m[j];
+        d[j] = p[j] + s * (q[j] - p[j]) - from[j];
         length2 += d[j] * d[j];
     }
     double length = sqrt(length2);
     b->target_m[k] = length;
-    if (job->sight.sight != NULL && i % 4 == 3) {
+    VEC3_SET(b->o, k, from);
+    if (job->sight.sight != NULL && i % 4 == 3 && !is_moving(i)) {
         to_border(job->sight.info.cells, r, d, &length);
         b->target_m[k] = INFINITY; /* it has left the edge, and may only not get out */
     }
@@ -105,6 +125,21 @@ static int judge(const struct bench_mesh *mesh, const struct batch *b, uint32_t 
     return hits_outside(mesh, prim, dir) ? 1 : 2;
 }
 
+static void cast(struct caster *caster, const struct job *job, uint64_t first, uint32_t n, struct batch *b)
+{
+    if (is_moving(first))
+        caster_hits(caster, job->bvh,
+                    &(struct bvh_rays){.n = n,
+                                       .from.own = {b->o.x, b->o.y, b->o.z},
+                                       .dir = {b->dx, b->dy, b->dz},
+                                       .range_max_m = BENCH_RANGE_MAX_M,
+                                       .range_m = b->range_m,
+                                       .triangle = b->prim});
+    else
+        hits_from(caster, job->bvh, job->mesh->station_m, BENCH_RANGE_MAX_M, n, b->dx, b->dy, b->dz, b->range_m,
+                  b->prim);
+}
+
 static void *job_main(void *arg)
 {
     struct job *job = arg;
@@ -124,12 +159,12 @@ static void *job_main(void *arg)
         uint32_t n = job->n - first < BATCH ? (uint32_t)(job->n - first) : BATCH;
         for (uint32_t k = 0; k < n; k++)
             aim(job, first + k, b, k);
-        hits_from(caster, job->bvh, job->mesh->station_m, BENCH_RANGE_MAX_M, n, b->dx, b->dy, b->dz, b->range_m,
-                  b->prim);
+        cast(caster, job, first, n, b);
         for (uint32_t k = 0; k < n; k++)
             counts[judge(job->mesh, b, k, b->range_m[k], b->prim[k], 1e-9)]++;
-        sight_beside_check(&sight, n, &(const struct vec3_in){b->dx, b->dy, b->dz}, BENCH_RANGE_MAX_M, b->range_m,
-                           b->prim);
+        if (!is_moving(first))
+            sight_beside_check(&sight, n, &(const struct vec3_in){b->dx, b->dy, b->dz}, BENCH_RANGE_MAX_M, b->range_m,
+                               b->prim);
     }
     caster_get_counters(caster, &c);
     pthread_mutex_lock(&job->lock);
@@ -178,7 +213,32 @@ static int run_job(struct job *job, uint32_t threads, const struct sh_report *re
     return SH_OK;
 }
 
-/* The same rays by Embree alone. */
+/* Half as far as the nearest wall, of which samples all around are within a tenth. */
+static int find_room(struct job *job, struct sh_err *err)
+{
+    struct caster *caster;
+    struct batch *b = aligned_alloc(64, sizeof *b);
+    double nearest_m = BENCH_RANGE_MAX_M;
+    int rc = b != NULL ? caster_create(&caster, err) : sh_fail(err, SH_ENOMEM, "bench: no memory");
+    for (uint32_t k = 0; k < BATCH && rc == SH_OK; k++) { /* a spiral: even over the sphere */
+        const double z = (2.0 * k + 1.0) / BATCH - 1.0, r = sqrt(1.0 - z * z), turn = 2.399963229728653 * k;
+        b->dx[k] = r * cos(turn);
+        b->dy[k] = r * sin(turn);
+        b->dz[k] = z;
+    }
+    if (rc == SH_OK) {
+        hits_from(caster, job->bvh, job->mesh->station_m, BENCH_RANGE_MAX_M, BATCH, b->dx, b->dy, b->dz, b->range_m,
+                  b->prim);
+        caster_free(caster);
+    }
+    for (uint32_t k = 0; k < BATCH && rc == SH_OK; k++)
+        nearest_m = b->range_m[k] < nearest_m ? b->range_m[k] : nearest_m;
+    job->room_m = 0.5 * nearest_m;
+    free(b);
+    return rc;
+}
+
+/* The rays from the station by Embree alone. */
 static int plain(struct job *job, struct sh_err *err)
 {
     struct embree_alone e;
@@ -187,7 +247,7 @@ static int plain(struct job *job, struct sh_err *err)
     if (rc == SH_OK && b == NULL) rc = sh_fail(err, SH_ENOMEM, "bench: no memory");
     if (rc == SH_OK) rc = embree_alone_rays(&e, b->fx, b->fy, b->fz, BATCH, err);
     uint64_t want = job->n < PLAIN_RAYS ? job->n : PLAIN_RAYS;
-    for (uint64_t first = 0; rc == SH_OK && first < want; first += BATCH) {
+    for (uint64_t first = 0; rc == SH_OK && first < 2 * want; first += 2 * BATCH) {
         for (uint32_t k = 0; k < BATCH; k++) {
             aim(job, first + k, b, k);
             b->fx[k] = (float)b->dx[k];
@@ -212,6 +272,7 @@ static int one_mesh(int which, uint64_t rays, uint64_t seed, uint32_t threads, c
     pthread_mutex_init(&job.lock, NULL);
     int rc = bench_mesh_create(which, &mesh, err);
     if (rc == SH_OK) rc = bvh_create(mesh.scene, 0, report, &job.bvh, err);
+    if (rc == SH_OK) rc = find_room(&job, err);
     if (rc == SH_OK) {
         out->mesh = mesh.name;
         out->triangles = mesh.scene->n_triangles;

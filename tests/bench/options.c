@@ -16,13 +16,16 @@
 static const char HELP[] =
     "bench [options]: speed figures as JSON on standard output\n\n"
     "  --scenes LIST   names with commas between: a number of triangles (10k, 2M, 25000) is generated closed terrain,\n"
-    "                  house is the IFC model from its living room, garden from outside; default " DEFAULT_SCENES "\n"
+    "                  house is the IFC model from its living room, garden from outside; foliage, huge: README.md;\n"
+    "                  default " DEFAULT_SCENES "\n"
     "  --house FILE    the IFC model; default " BENCH_HOUSE_FILE "\n"
     "  --seconds S     measure each scene for S seconds, but at least seven rounds; default 3\n"
     "  --pulses LIST   whole scans with and without a sight, of so many pulses (22.5M, 300k), or none; default 22.5M and\n"
     "                  1M in the house, 22.5M and 2.8M in scenes of 90,000 to 2 million triangles, none in others\n"
     "  --whole         cast all lines of these scans, not about 5 million pulses a round\n"
     "  --only-sight    measure nothing but these scans\n"
+    "  --reach         what a pulse costs a head or a body that moves, with a far station or reach, beside one that\n"
+    "                  stands; without --scenes nothing else is done\n"
     "  --threads N     casters of the run on all threads; default: one per processor\n"
     "  --leaks N       aim N rays at edges and corners of closed meshes and count those that slip through (fails\n"
     "                  when one does); without --scenes nothing else is done\n"
@@ -32,7 +35,17 @@ static const char HELP[] =
     "Ratios are medians over the rounds of Embree's time by ours. Then the same through the real loop with the null\n"
     "link.\n";
 
-enum { OPT_SCENES = 256, OPT_HOUSE, OPT_PULSES, OPT_WHOLE, OPT_ONLY_SIGHT, OPT_SECONDS, OPT_THREADS, OPT_LEAKS };
+enum {
+    OPT_SCENES = 256,
+    OPT_HOUSE,
+    OPT_PULSES,
+    OPT_WHOLE,
+    OPT_ONLY_SIGHT,
+    OPT_SECONDS,
+    OPT_THREADS,
+    OPT_LEAKS,
+    OPT_REACH
+};
 
 static const struct option OPTIONS[] = {{"scenes", required_argument, NULL, OPT_SCENES},
                                         {"house", required_argument, NULL, OPT_HOUSE},
@@ -42,6 +55,7 @@ static const struct option OPTIONS[] = {{"scenes", required_argument, NULL, OPT_
                                         {"only-sight", no_argument, NULL, OPT_ONLY_SIGHT},
                                         {"threads", required_argument, NULL, OPT_THREADS},
                                         {"leaks", required_argument, NULL, OPT_LEAKS},
+                                        {"reach", no_argument, NULL, OPT_REACH},
                                         {"help", no_argument, NULL, 'h'},
                                         {NULL, 0, NULL, 0}};
 
@@ -93,6 +107,9 @@ static int parse_option(struct bench_options *o, int opt, char **argv)
     case OPT_ONLY_SIGHT:
         o->only_sight = 1;
         return BENCH_OK;
+    case OPT_REACH:
+        o->reach = 1;
+        return BENCH_OK;
     case 'o':
         o->out = optarg;
         return BENCH_OK;
@@ -123,9 +140,11 @@ static int check_scenes(const char *list)
     uint32_t n = 0;
     if (*list == '\0') return usage("--scenes: a list is needed, such as %s", DEFAULT_SCENES);
     while ((list = bench_next_name(list, name, sizeof name)) != NULL)
-        if ((!bench_is_house(name) && bench_count(name) == 0) || ++n > BENCH_MAX_SCENES)
-            return usage("--scenes %s: allowed are up to %d of house, garden and numbers of triangles from 100 to 100M",
-                         name, BENCH_MAX_SCENES);
+        if ((!bench_is_house(name) && !bench_is_made(name) && bench_count(name) == 0) || ++n > BENCH_MAX_SCENES)
+            return usage(
+                "--scenes %s: allowed are up to %d of house, garden, foliage, huge and numbers of triangles from "
+                "100 to 100M",
+                name, BENCH_MAX_SCENES);
     return BENCH_OK;
 }
 
@@ -164,7 +183,7 @@ int bench_parse(struct bench_options *o, int argc, char **argv)
         if (status != BENCH_OK) return status;
     }
     if (optind != argc) return usage("%s: it takes no arguments, only options", argv[optind]);
-    if (o->scenes == NULL && o->leaks == 0.0) o->scenes = DEFAULT_SCENES;
+    if (o->scenes == NULL && o->leaks == 0.0 && !o->reach) o->scenes = DEFAULT_SCENES;
     if (o->scenes != NULL) status = check_scenes(o->scenes);
     if (status == BENCH_OK && o->pulses != NULL) status = check_pulses(o->pulses);
     return status == BENCH_OK ? -1 : status;

@@ -17,6 +17,7 @@ struct bench_options {
     const char *pulses; /* of the whole scans, with commas between; "none"; NULL: as README.md says */
     int whole;          /* all lines of them are cast */
     int only_sight;     /* nothing but these scans */
+    int reach;          /* what moves or is far */
     double leaks;       /* rays at edges and corners; 0: none */
 };
 

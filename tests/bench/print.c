@@ -169,6 +169,7 @@ int bench_print_json(FILE *out, const struct bench_report *report, struct sh_err
             put_leaks(&json, &report->leaks[i]);
         json_close_array(&json);
     }
+    if (report->n_reach != 0) bench_put_reach(&json, report->reach, report->n_reach);
     json_open_array(&json, "notes");
     for (uint32_t i = 0; i < report->n_notes; i++)
         json_string(&json, NULL, report->note[i]);
@@ -233,6 +234,7 @@ void bench_print_table(FILE *out, const struct bench_report *report)
         table_stages(out, report);
     }
     bench_table_sights(out, report);
+    bench_table_reach(out, report->reach, report->n_reach);
     if (report->have_leaks) table_leaks(out, report);
     for (uint32_t i = 0; i < report->n_notes; i++)
         fprintf(out, "\n%s\n", report->note[i]);

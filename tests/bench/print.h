@@ -6,6 +6,7 @@
 
 #include "firmware_sim/base/json.h"
 #include "tests/bench/bench.h"
+#include "tests/bench/reach.h"
 #include "tests/bench/sight.h"
 
 enum { BENCH_MAX_SCENES = 16, BENCH_MAX_NOTES = 8, BENCH_MAX_SCANS = 4 };
@@ -28,6 +29,8 @@ struct bench_report {
     uint32_t n_scenes;
     struct bench_leaks leaks[BENCH_LEAK_MESHES];
     int have_leaks;
+    struct bench_reach reach[BENCH_MAX_REACH];
+    uint32_t n_reach;
     char note[BENCH_MAX_NOTES][192];
     uint32_t n_notes;
 };

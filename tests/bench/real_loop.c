@@ -170,7 +170,6 @@ int bench_loop(const struct bench_case *c, const struct bench_result *one, uint3
                         .n_stations = 1,
                         .scale_m = BENCH_SCALE_M};
     memcpy(station->at.position_m, c->target->station_m, sizeof station->at.position_m);
-    station->bvh = c->bvh;
     station->scale[0] = station->scale[1] = station->scale[2] = BENCH_SCALE_M;
     pose_heading(0.0, station->at.rotation);
     int rc = bench_georef(c->target, &station->georef, err);

@@ -267,7 +267,7 @@ static void summarise(struct rows *r)
     out->pipeline_ratio = ratio(r, EMBREE, PIPELINE);
     out->pipeline_ratio_without = ratio(r, EMBREE, PIPELINE_WITHOUT);
     out->gain = ratio(r, WITHOUT, SIGHT);
-    out->plan_ratio = out->planned ? out->gain : 1.0;
+    out->plan_ratio = fmin(1.0, out->planned ? out->gain : 1.0 / out->gain);
     out->build_s = bench_median(r->build_s, n);
     out->build_ns = 1e9 * out->build_s / (double)out->scan.pulses;
     out->embree_ns = bench_median(r->ns[EMBREE], n);

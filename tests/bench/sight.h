@@ -40,7 +40,7 @@ struct bench_sight {
     double cast_ratio_without, pipeline_ratio_without;
     double gain;               /* of the cast: without by with, building included */
     int planned;               /* a map, for so many pulses */
-    double plan_s, plan_ratio; /* what choosing took; without by what the plan takes */
+    double plan_s, plan_ratio; /* what choosing took; the better of both by what the plan takes */
     uint64_t different;        /* pulses of a round that met something else than without */
     struct sight_info info;
 };

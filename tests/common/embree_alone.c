@@ -48,11 +48,12 @@ int embree_alone_create(const struct scene *scene, const struct embree_alone_spe
     RTCGeometry geometry = rtcNewGeometry(out->device, RTC_GEOMETRY_TYPE_TRIANGLE);
     int rc = fill_geometry(geometry, scene, spec->origin_m, err);
     if (rc == SH_OK) {
-        rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_HIGH);
+        const enum RTCBuildQuality quality = spec->medium ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH;
+        rtcSetGeometryBuildQuality(geometry, quality);
         rtcCommitGeometry(geometry);
         out->rtc = rtcNewScene(out->device);
         rtcSetSceneFlags(out->rtc, spec->robust ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE);
-        rtcSetSceneBuildQuality(out->rtc, RTC_BUILD_QUALITY_HIGH);
+        rtcSetSceneBuildQuality(out->rtc, quality);
         rtcAttachGeometry(out->rtc, geometry);
         rtcCommitScene(out->rtc);
         if (rtcGetDeviceError(out->device) != RTC_ERROR_NONE)

@@ -25,6 +25,7 @@ struct embree_alone {
 struct embree_alone_spec {
     double origin_m[3]; /* of the float coordinates */
     int robust;         /* Embree's flag */
+    int medium;         /* build quality; else high */
     unsigned threads;   /* of the build; 0: all */
     float range_max_m;
 };

@@ -109,6 +109,12 @@ has_points() {
     grep -q 'recording: 0\.[0-9]*[1-9]' "$1"
 }
 
+# The head is back, and more points have come than before.
+goes_on() {
+    awk '/recording: / { if (!back) before = $3; else if ($3 != before) more = 1 } /is back/ { back = 1 }
+         END { exit !more }' "$1"
+}
+
 # A recorder when its head goes in the middle of a scan: killed itself, left alone, and told to wait for the head. Needs a
 # head in real time, plug.sh and unplug.sh.
 check_cut_records() {
@@ -132,7 +138,7 @@ check_cut_records() {
     sh unplug.sh
     wait_for 5 is_unplugged
     sh plug.sh
-    check "$1: --replug goes on" wait_for 20 grep 'is back' again.err
+    check "$1: --replug goes on" wait_for 60 goes_on again.err
     kill -INT $client
     wait $client
     check "$1: exit status 1 when the head was away" test $? = 1
@@ -146,7 +152,7 @@ check_reset() {
     client=$!
     wait_for 20 has_points reset.err
     check "$1: reset" usbreset 1209:0001
-    check "$1: the recorder goes on after a reset" wait_for 20 grep 'is back' reset.err
+    check "$1: the recorder goes on after a reset" wait_for 60 goes_on reset.err
     check "$1: and calls it one" grep 'bus was reset' reset.err
     check "$1: not an unplugging" sh -c "! grep unplugged reset.err"
     kill -INT $client

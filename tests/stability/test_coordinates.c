@@ -232,7 +232,7 @@ static struct scene *make_slope(double cell_m)
         p[1] += UTM_N_M;
     }
     struct scene *scene = mesh_scene(&mesh);
-    for (uint32_t t = 0; t < scene->n_triangles; t++) /* of all sizes: planes carry them in their lowest bits */
+    for (uint32_t t = 0; t < scene->n_triangles; t++) /* of all sizes */
         scene->label[t] = (uint16_t)(48611 * (t + 1) % SCENE_MAX_SURFACES);
     mesh_free(&mesh);
     return scene;
@@ -274,14 +274,14 @@ static double slope_error_m(const struct rig *rig)
 
 /* Range = h / cos i, with n . dir and n . v0 as sums of three products in double: each off by at most 3
  * roundings of its largest product (below range x |n|), n itself by 2 more: 8 x 2^-53 x R / cos i, twice
- * (numerator and denominator). Planes are kept to 2^-40 about the middle of their triangle: 2^-40 x its
- * longest side / cos i. The corners are differences of UTM coordinates, exact here. Up to 89.9 degrees that
- * must stay below the micrometre promised; a face of 2.2 km does, with 1.2e-6 by this sum but 0.6e-6 from its
- * middle to its ends. */
+ * (numerator and denominator). v0 is counted from the BVH's origin, up to half of the slope's length away. A normal is
+ * tilted by the rounding of its edges, 4 x 2^-53 of the longest side / cos i. The corners are differences of UTM
+ * coordinates, exact here. Up to 89.9 degrees that must stay below the micrometre promised. */
 static double incidence_bound_m(double cell_m, double range_m, double incidence_deg)
 {
-    double longest_m = cell_m > 0.0 ? 1.5 * cell_m : 2300.0;
-    double bound_m = (16.0 * 0x1p-53 * range_m + 0x1p-40 * longest_m) / cos(incidence_deg * acos(-1.0) / 180.0);
+    const double longest_m = cell_m > 0.0 ? 1.5 * cell_m : 2300.0, origin_m = 1150.0;
+    double bound_m =
+        0x1p-53 * (16.0 * (range_m + origin_m) + 4.0 * longest_m) / cos(incidence_deg * acos(-1.0) / 180.0);
     return incidence_deg <= 89.9 ? fmin(bound_m, RIG_MICROMETRE) : bound_m;
 }
 

@@ -290,12 +290,59 @@ static void both_triangles_of_an_edge_agree(void **state)
     }
 }
 
+/* Plates one behind the other, which pass the ray at 1.4 cm while their boxes hold it, and a wall. */
+enum { PLATES = 100 };
+
+static struct scene *plates(void)
+{
+    static double v[3 * PLATES + 3][3];
+    static uint32_t t[PLATES + 1][3];
+    struct scene *scene;
+    struct sh_err err;
+    static const double corner[3][2] = {{-0.03, 0.05}, {0.05, -0.03}, {0.05, 0.05}};
+    static const double wall[3][2] = {{-50.0, -50.0}, {50.0, -50.0}, {-50.0, 50.0}};
+    for (uint32_t i = 0; i < 3 * (PLATES + 1); i++) {
+        const uint32_t plate = i / 3;
+        v[i][0] = plate == PLATES ? 20.0 : 1.0 + 0.1 * plate;
+        v[i][1] = plate == PLATES ? wall[i % 3][0] : corner[i % 3][0];
+        v[i][2] = plate == PLATES ? wall[i % 3][1] : corner[i % 3][1];
+        t[plate][i % 3] = i;
+    }
+    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])v, 3 * PLATES + 3, (const uint32_t(*)[3])t,
+                                                 PLATES + 1, NULL, NULL, 0},
+                          &scene, &err) != SH_OK)
+        fail_msg("%s", err.text);
+    return scene;
+}
+
+/* From the scene, and from far away. 1e-9 m: 2^-53 of 30 km is 3e-12 m. */
+static void no_number_of_plates_hides_a_wall(void **state)
+{
+    (void)state;
+    static const double back_m[] = {0.0, 300.0, 30000.0};
+    static const double along_x[3] = {1.0, 0.0, 0.0};
+    struct scene *scene = plates();
+    struct bvh_work *work = NULL;
+    struct bvh *bvh = NULL;
+    struct sh_err err;
+    if (bvh_create(scene, 1, NULL, &bvh, &err) != SH_OK || bvh_work_create(&work, &err) != SH_OK)
+        fail_msg("%s", err.text);
+    for (size_t i = 0; i < sizeof back_m / sizeof *back_m; i++) {
+        const double here[3] = {-back_m[i], 0, 0};
+        assert_true(fabs(bvh_ray(work, bvh, here, along_x) - 20.0 - back_m[i]) < 1e-9);
+    }
+    bvh_work_free(work);
+    bvh_free(bvh);
+    scene_free(scene);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_small_sheet_at_a_large_one),     cmocka_unit_test(sheets_that_cross_at_a_slant),
         cmocka_unit_test(a_sheet_along_the_ray_is_not_met), cmocka_unit_test(nobody_meets_what_he_stands_on),
         cmocka_unit_test(what_a_ray_begins_on_is_not_met),  cmocka_unit_test(both_triangles_of_an_edge_agree),
+        cmocka_unit_test(no_number_of_plates_hides_a_wall),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,7 +1,8 @@
 /* A face that stands twice in a mesh is met as the first of the two, wherever it is met, whatever its label and however
- * large it is. */
+ * large it is. Where any number of faces lie within 1e-12 of the nearest range, the first is met. */
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "core/bvh.h"
 #include "core/vec3.h"
@@ -76,8 +77,88 @@ static void the_first_is_met(void **state)
     assert_int_equal(wrong, 0);
 }
 
+enum { STACK = 64, STACKS = 60 };
+
+/* Faces behind each other, a twelfth or less of what counts as the same apart: in a random order, or each one before or
+ * behind the last. */
+static void stack_up(uint64_t *random, double vertex[3 * STACK][3], uint32_t face[STACK][3])
+{
+    const double far_m = 1.0 + 49.0 * case_unit(random), step_m = far_m * 1e-12 / (12.0 + 40.0 * case_unit(random));
+    const int64_t order = case_between(random, 0, 2);
+    uint32_t place[STACK];
+    for (uint32_t i = 0; i < STACK; i++) {
+        const uint32_t j = order == 0 ? (uint32_t)case_between(random, 0, i) : i;
+        place[i] = place[j];
+        place[j] = order == 2 ? STACK - i : i;
+    }
+    for (uint32_t i = 0; i < STACK; i++) {
+        const double at_m = far_m + place[i] * step_m, size_m = 4.0 * far_m * (1.0 + case_unit(random));
+        const double corner[3][3] = {{-size_m, at_m, -size_m}, {size_m, at_m, -size_m}, {0.0, at_m, size_m}};
+        memcpy(vertex + 3 * i, corner, sizeof corner);
+        for (uint32_t k = 0; k < 3; k++)
+            face[i][k] = 3 * i + k;
+    }
+}
+
+/* By the definition: the nearest of all, then the first that is as near. */
+static uint32_t first_of_nearest(const struct bvh *bvh, const double dir[3], uint32_t *ties)
+{
+    static const double at_m[3] = {0};
+    double range[STACK], nearest_m = INFINITY;
+    uint32_t first = STACK;
+    for (uint32_t i = 0; i < STACK; i++) {
+        range[i] = bvh_range_of(bvh, i, at_m, dir);
+        nearest_m = fmin(nearest_m, range[i]);
+    }
+    for (uint32_t i = STACK; i-- > 0;)
+        if (range[i] <= nearest_m + 1e-12 * nearest_m) first = i;
+    *ties += range[first] > nearest_m;
+    return first;
+}
+
+static void one_stack(uint64_t *random, uint32_t packet, uint32_t *ties)
+{
+    static struct scene_surface surface[1];
+    static uint16_t label[STACK];
+    double vertex[3 * STACK][3];
+    uint32_t face[STACK][3], wrong = 0;
+    stack_up(random, vertex, face);
+    const struct scene_arrays arrays = {
+        (const double(*)[3])vertex, 3 * STACK, (const uint32_t(*)[3])face, STACK, label, surface, 1};
+    struct scene *scene;
+    struct bvh *bvh;
+    struct bvh_work *work;
+    struct sh_err err;
+    if (scene_from_arrays(&arrays, &scene, &err) != SH_OK || bvh_create(scene, 1, NULL, &bvh, &err) != SH_OK ||
+        bvh_work_create(&work, &err) != SH_OK)
+        fail_msg("%s", err.text);
+    bvh_set_packet(bvh, packet);
+    aim(10.0);
+    bvh_hits(
+        work, bvh,
+        &(struct bvh_rays){.n = RAYS, .dir = {x, y, z}, .range_max_m = 1e5, .range_m = range_m, .triangle = triangle});
+    for (int i = 0; i < RAYS; i++) {
+        const double dir[3] = {x[i], y[i], z[i]};
+        wrong += triangle[i] != first_of_nearest(bvh, dir, ties);
+    }
+    assert_int_equal(wrong, 0);
+    bvh_work_free(work);
+    bvh_free(bvh);
+    scene_free(scene);
+}
+
+static void of_many_the_first(void **state)
+{
+    (void)state;
+    uint64_t random = 0x57ac;
+    uint32_t ties = 0;
+    for (int i = 0; i < STACKS; i++)
+        one_stack(&random, i % 2 == 0 ? 16 : 1, &ties);
+    assert_true(ties > STACKS * RAYS / 2); /* the first is seldom the nearest */
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(the_first_is_met)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(the_first_is_met), cmocka_unit_test(of_many_the_first)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -54,9 +54,9 @@ static void ranges_in_a_room_are_exact_to_the_planes_tilt(void **state)
             int wall = -1;
             const long double d[3] = {dx[i], dy[i], dz[i]};
             long double error = fabsl((long double)range[i] - box_range(lo, hi, station, d, &wall));
-            /* A stored normal is tilted by up to 2^-40 (core/bvh/bvh_inside.h) about the triangle's middle, at most 4.3 km
-             * from here; the incidence's cosine is at least 0.05: 4300 * 2^-40 / 0.05 = 8e-8 m. */
-            if (!(error < 8e-8L)) fail_msg("room %d, ray %d: range %.12g, %.3Lg m off", r, i, range[i], error);
+            /* Both terms of a plane's range are off by 8 units of 2^-53 of up to 4.3 km; the incidence's cosine is at least
+             * 0.05: 16 * 2^-53 * 4300 / 0.05 = 1.5e-10 m. Corners, normal and direction leave as much again, and more. */
+            if (!(error < 1e-9L)) fail_msg("room %d, ray %d: range %.12g, %.3Lg m off", r, i, range[i], error);
             assert_int_equal(rig->scene->label[triangle[i]], wall);
             if (error > worst) worst = error;
         }
@@ -116,9 +116,9 @@ static void ranges_to_a_tilted_plane_are_exact_to_the_planes_tilt(void **state)
                 nd += n[i] * d[i];
             }
             long double error = fabsl((long double)range - no / nd);
-            /* A stored normal is tilted by up to 2^-40 (core/bvh/bvh_inside.h) about the triangle's middle, at most 4.3 km
-             * from here; the incidence's cosine is at least 0.05: 4300 * 2^-40 / 0.05 = 8e-8 m. */
-            if (!(error < 8e-8L)) fail_msg("plane %d, ray %d: range %.12g, %.3Lg m off", p, ray, range, error);
+            /* Both terms of a plane's range are off by 8 units of 2^-53 of up to 4.3 km; the incidence's cosine is at least
+             * 0.05: 16 * 2^-53 * 4300 / 0.05 = 1.5e-10 m. Corners, normal and direction leave as much again, and more. */
+            if (!(error < 1e-9L)) fail_msg("plane %d, ray %d: range %.12g, %.3Lg m off", p, ray, range, error);
             if (error > worst) worst = error;
         }
         cast_rig_close(rig);
@@ -376,7 +376,7 @@ static double opposite_range(const double vertex[4][3], const double d[3])
 }
 
 /* A head on a corner of a mesh: the corner is no echo. What lies across is seen, and in other directions nothing is.
- * The corner is also as far from the BVH's origin as stations that share one may be. */
+ * The corner is also far from the BVH's origin. */
 static void what_a_ray_begins_on_is_no_hit(void **state)
 {
     (void)state;

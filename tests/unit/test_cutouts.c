@@ -393,20 +393,23 @@ static void a_scene_without_holes_has_nothing_of_it(void **state)
     scene_free(scene);
 }
 
-static void the_floor_is_looked_for_through_holes(void **state)
+static void one_ray_passes_through_holes(void **state)
 {
     (void)state;
     static const double y[3] = {0, 1, 0}, hole[3] = {-1.75, 0, -1.75}, solid[3] = {-1.25, 0, -1.75};
-    double range_m;
     struct sh_err err;
+    struct bvh *bvh;
+    struct bvh_work *work;
     begin_obj();
     quad("wall", 20, 9, 0);
     quad("board", 10, 2, 0);
     struct scene *scene = end_obj(0, 1);
-    assert_int_equal(cast_floor(scene, hole, y, &range_m, &err), SH_OK);
-    assert_true(fabs(range_m - 20.0) < 1e-9);
-    assert_int_equal(cast_floor(scene, solid, y, &range_m, &err), SH_OK);
-    assert_true(fabs(range_m - 10.0) < 1e-9);
+    assert_int_equal(bvh_create(scene, 1, NULL, &bvh, &err), SH_OK);
+    assert_int_equal(bvh_work_create(&work, &err), SH_OK);
+    assert_true(fabs(bvh_ray(work, bvh, hole, y) - 20.0) < 1e-9);
+    assert_true(fabs(bvh_ray(work, bvh, solid, y) - 10.0) < 1e-9);
+    bvh_work_free(work);
+    bvh_free(bvh);
     scene_free(scene);
 }
 
@@ -420,6 +423,6 @@ int main(void)
                                        cmocka_unit_test(scale_and_offset_of_obj_count),
                                        cmocka_unit_test(an_image_beside_the_mesh_is_found),
                                        cmocka_unit_test(a_scene_without_holes_has_nothing_of_it),
-                                       cmocka_unit_test(the_floor_is_looked_for_through_holes)};
+                                       cmocka_unit_test(one_ray_passes_through_holes)};
     return cmocka_run_group_tests(tests, make_files, remove_files);
 }

@@ -6,7 +6,7 @@ const struct room_config BEAM_ROOM = {.prr_hz = 20000,
                                       .pan_stop_deg = 24,
                                       .frames = 1,
                                       .links = LINK_YAML_TCP,
-                                      .more = "loop: {queue_ms: 5000, late_ms: 10000}\n"};
+                                      .more = "loop: {queue_ms: 10000, late_ms: 10000}\n"};
 
 static struct beam_run runs[2];
 

@@ -7,7 +7,7 @@ const struct room_config FAULT_ROOM = {.profile = "any-rate",
                                        .pan_stop_deg = 30,
                                        .frames = 1,
                                        .links = LINK_YAML_BOTH,
-                                       .more = "loop: {queue_ms: 5000, late_ms: 10000}\n"};
+                                       .more = "loop: {queue_ms: 10000, late_ms: 10000}\n"};
 
 struct head fault_head_start(struct wire *wire, const struct room_config *c, const char *faults,
                              const char *const *more)

@@ -11,7 +11,7 @@ static const struct room_config SCAN = {
     .pan_stop_deg = 60,
     .frames = 1,
     .links = "links: [{type: \"null\"}, {type: tcp, port: 0}]\n",
-    .more = "beam: {mode: adaptive}\nsignal: {model: on}\nloop: {queue_ms: 5000, late_ms: 10000}\n"};
+    .more = "beam: {mode: adaptive}\nsignal: {model: on}\nloop: {queue_ms: 10000, late_ms: 10000}\n"};
 
 enum { MOST = 200000 };
 struct told {

@@ -44,6 +44,25 @@ static void test_all_faults(void **state)
     free(told);
 }
 
+/* `memory    1.3 MB for meshes and BVH, 205 bytes a triangle; 18 MB at the peak`: the figures fit together, up to the four
+ * digits they have, and the peak has all of it. A triangle takes 58 bytes at the least: its plane, its corners' numbers
+ * and label, and a leaf that it shares. */
+static void check_memory(char *told)
+{
+    const char *memory = strstr(told, "\nmemory "), *scene = strstr(told, "\nscene ");
+    double mb, each, peak_mb;
+    unsigned triangles;
+    assert_non_null(memory);
+    assert_non_null(scene);
+    assert_int_equal(sscanf(scene, " scene %u triangles", &triangles), 1);
+    assert_int_equal(sscanf(memory, " memory %lf MB for meshes and BVH, %lf bytes a triangle; %lf MB at the peak", &mb,
+                            &each, &peak_mb),
+                     3);
+    assert_true(each >= 58.0 && peak_mb > mb);
+    assert_true(fabs(1e6 * mb - each * triangles) <= 0.5 * triangles + 1e3 * mb);
+    free(told);
+}
+
 /* The example passes `check`, and each of its keys is the one that the help has. */
 static void test_example(void **state)
 {
@@ -57,6 +76,7 @@ static void test_example(void **state)
     char *err = wire_read(wire_path(wire, "err"), NULL);
     if (status != 0 || err[0] != '\0') fail_msg("status %d: %s", status, err);
     free(err);
+    check_memory(wire_read(wire_path(wire, "out"), NULL));
 }
 
 static void test_help_of_a_section(void **state)

@@ -11,7 +11,7 @@ static const struct room_config ENDLESS = {.prr_hz = 100000,
                                            .frames = 0,
                                            .links = "links: [{type: tcp, port: 0, max_sessions: 4}, "
                                                     "{type: pty, path: port}]\n",
-                                           .more = "loop: {queue_ms: 3000, late_ms: 10000}\n"};
+                                           .more = "loop: {queue_ms: 10000, late_ms: 10000}\n"};
 
 static struct head start_endless(struct wire *wire)
 {

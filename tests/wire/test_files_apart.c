@@ -77,6 +77,7 @@ static const struct input {
     {WITH_CONFIG, "scene.meshes[0].file", "", "room.obj"},
     {WITH_CONFIG | INIT, "room.mtl, named in", "", "room.mtl"},
     {WITH_CONFIG | INIT, "room.png, named in", "", "room.png"},
+    {WITH_CONFIG, "scene.meshes[0].copies", "--set=scene.meshes[0].copies=@path.csv", "path.csv"},
     {WITH_CONFIG, "head.profile", "--set=head.profile=@own.yaml", "own.yaml"},
     {WITH_CONFIG, "head.profile: directions", "--set=head.profile=@own.yaml", "list.txt"},
     {WITH_CONFIG, "stations[1].scanner.head.profile", "--set=stations[1].scanner.head.profile=@own.yaml", "own.yaml"},

@@ -98,43 +98,56 @@ static void check_ranges(const struct house *house, const struct telegram *t)
 }
 
 /* The log has what the telegrams say, in the same order. */
-static void check_log(const struct grabber *grabber, const struct telegram *t, const struct rawlog_item *scan)
+static void check_log(const struct telegram *t, const struct rawlog_item *scan)
 {
     assert_int_equal(scan->kind, RAWLOG_SCAN);
-    if (scan->n != 1081) fail_msg("a scan of %u:\n%s", scan->n, grabber->said);
     for (uint32_t i = 0; i < scan->n; i++)
         assert_true(fabs(rawlog_range_m(scan, i) - 1e-3 * hex(t, 26 + (int)i)) < 1e-5); /* float */
 }
 
+/* Lets the client poll, and reads what it logs. Returns 0 where it took a part of a telegram for a scan: it waits 40 ms for the rest,
+ * and on a busy machine that may come later. */
+static int poll_scans(struct wire *wire, const char *endpoint, int number, struct rawlog *log)
+{
+    static struct grabber grabber;
+    char sensor[256], name[16];
+    int port, listener = listen_anywhere(&port), is_whole = 1;
+    pid_t relay = relay_start(wire, listener, endpoint);
+    close(listener);
+    snprintf(name, sizeof name, "SICK%d", number);
+    snprintf(sensor, sizeof sensor, "driver = CLMS100Eth\nip_address = 127.0.0.1\nTCP_port = %d\n", port);
+    grabber_start(wire, name, sensor, &grabber);
+    if (!grabber_wait(&grabber, SCANS)) fail_msg("rawlog-grabber complains:\n%s", grabber.said);
+    grabber_end(&grabber);
+    assert_int_equal(wire_wait(wire, relay), 0);
+    rawlog_read(&grabber, log);
+    assert_true(log->n_items >= SCANS);
+    for (uint32_t i = 0; i < log->n_items; i++)
+        is_whole &= log->item[i].n == 1081;
+    return is_whole;
+}
+
 static void test_polled(void **state)
 {
+    enum { TRIES = 5 };
     struct wire *wire = *state;
-    static struct grabber grabber;
     struct telegram t;
-    char sensor[256];
-    int port, listener;
+    struct rawlog log;
     grabber_or_skip();
     const char *const more[] = {"--set", "links.0.port=0", "--set", "head.profile=sick-lms111", NULL};
     struct head head = head_start(wire, "config/sick.yaml", house_options(wire, "13", more));
     struct house *house = house_load(wire);
-    listener = listen_anywhere(&port);
-    pid_t relay = relay_start(wire, listener, head_link(&head, 0));
-    close(listener);
-    snprintf(sensor, sizeof sensor, "driver = CLMS100Eth\nip_address = 127.0.0.1\nTCP_port = %d\n", port);
-    grabber_start(wire, "SICK", sensor, &grabber);
-    if (!grabber_wait(&grabber, SCANS)) fail_msg("rawlog-grabber complains:\n%s", grabber.said);
-    grabber_end(&grabber);
-    assert_int_equal(wire_wait(wire, relay), 0);
+    for (int i = 1; !poll_scans(wire, head_link(&head, 0), i, &log); i++) {
+        rawlog_free(&log);
+        if (i == TRIES) fail_msg("rawlog-grabber logs parts of scans, %d times", i);
+    }
     head_end(&head, SIGTERM);
-    struct rawlog log;
-    rawlog_read(&grabber, &log);
-    assert_true(log.n_items >= SCANS);
     char *text = wire_read(wire_path(wire, "telegrams"), NULL), *at = text;
     uint32_t last_count = 0, last_us = 0, n = 0;
     for (; next_telegram(&at, &t) && n < log.n_items; n++) {
         check_geometry(&t);
         check_ranges(house, &t);
-        check_log(&grabber, &t, &log.item[n]);
+        check_log(&t, &log.item[n]);
         const uint32_t count = hex(&t, 8), us = hex(&t, 9);
         /* The client is a little slower than the scanner, as it waits 40 ms for more after each telegram. */
         if (n > 0) assert_int_equal((uint16_t)(count - last_count) * PERIOD_US, us - last_us);

@@ -203,7 +203,7 @@ static const char LOSSY_CONFIG[] =
     "stations: [{position_m: [0.31, -0.42, 0.17]}]\n"
     "beam: {echoes: strongest}\n"
     "links: [{type: udp, protocol: velodyne, port: 2368}, {type: file, protocol: velodyne, path: clean}]\n"
-    "loop: {late_ms: 10000, queue_ms: 3000}\n";
+    "loop: {late_ms: 10000, queue_ms: 10000}\n";
 
 /* The scenario with each fault on link 1. */
 static const char *lossy_scenario(const struct wire *wire)

@@ -309,7 +309,7 @@ static void test_power_cycle_in_steps(void **state)
 static void power_cycle_at(struct wire *wire, const char *pace, const char *link)
 {
     struct head head = start(wire,
-                             "loop: {queue_ms: 5000, late_ms: 10000}\n"
+                             "loop: {queue_ms: 10000, late_ms: 10000}\n"
                              "faults: [{kind: power_cycle, from_pulse: 8000, for_ms: 300}]\n",
                              pace);
     struct scanhead *sh = client_open(head_endpoint(&head, link));
@@ -347,7 +347,7 @@ static void test_same_stream(void **state)
 {
     struct wire *wire = *state;
     static const char more[] = "time: {epoch: 2026-03-31T23:59:54.5Z}\n"
-                               "loop: {queue_ms: 5000, late_ms: 10000}\n"
+                               "loop: {queue_ms: 10000, late_ms: 10000}\n"
                                "faults:\n"
                                "  - {kind: slow_boot, for_ms: 33}\n"
                                "  - {kind: counters_high, n: 50}\n"

@@ -10,7 +10,7 @@ static const struct room_config ENDLESS = {.prr_hz = 200000,
                                            .pan_stop_deg = 360,
                                            .frames = 0,
                                            .links = LINK_YAML_BOTH,
-                                           .more = "loop: {queue_ms: 3000, late_ms: 10000}\n"};
+                                           .more = "loop: {queue_ms: 10000, late_ms: 10000}\n"};
 
 /* From the first frame on: nothing missing, and descriptor, anchor and names within a second of device time
  * (and the tick that the repetition falls in); points can be had from then on. */

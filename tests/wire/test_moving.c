@@ -10,7 +10,7 @@ static const struct room_config RIDE = {.profile = NULL,
                                         .links = LINK_YAML_TCP,
                                         .more = "platform: {kind: trajectory, file: ride.csv, mount_m: [0.1, 0.4, 0.3],"
                                                 " mount_heading_deg: 20, mount_pitch_deg: 5}\n"
-                                                "loop: {queue_ms: 5000, late_ms: 10000}\n"};
+                                                "loop: {queue_ms: 10000, late_ms: 10000}\n"};
 
 /* The platform goes round in a circle at constant rate, leaning: a closed form, whatever the interpolation. */
 static const double RADIUS_M = 1.7, RATE = 1.9, MIDDLE[3] = {0.6, -1.1, 0.1};
@@ -242,8 +242,8 @@ static void write_long(struct wire *wire, const char *name, const char *gate, ch
     snprintf(config, 352, "%s", wire_write_text(wire, name, text));
 }
 
-/* 5 km at 100 m/s along a wall 12 m away, and past a gate that slides: more than one BVH reaches, by any number of
- * threads the same. */
+/* 5 km at 100 m/s along a wall 12 m away, and past a gate that slides: several stretches, by any number of threads
+ * the same. */
 static void test_long_path(void **state)
 {
     struct wire *wire = *state;
@@ -312,7 +312,7 @@ static void test_poses_over_udp(void **state)
                                             .frames = 1,
                                             .links = LINK_YAML_TCP,
                                             .more = "platform: {kind: live, reach_m: 5, port: 0}\n"
-                                                    "loop: {queue_ms: 5000, late_ms: 10000}\n"};
+                                                    "loop: {queue_ms: 10000, late_ms: 10000}\n"};
     struct wire *wire = *state;
     struct scanhead_frame frame;
     struct scanhead_point point[256];
@@ -364,7 +364,8 @@ static void test_no_pose_at_all(void **state)
                                             .pan_stop_deg = 20,
                                             .frames = 1,
                                             .links = LINK_YAML_TCP,
-                                            .more = "platform: {kind: live}\nloop: {queue_ms: 5000, late_ms: 10000}\n"};
+                                            .more =
+                                                "platform: {kind: live}\nloop: {queue_ms: 10000, late_ms: 10000}\n"};
     struct wire *wire = *state;
     struct scanhead_frame frame;
     struct scanhead_pose pose;

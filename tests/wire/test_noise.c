@@ -10,7 +10,7 @@ static const struct room_config SHORT = {.prr_hz = 20000,
                                          .pan_stop_deg = 6,
                                          .frames = 1,
                                          .links = LINK_YAML_TCP,
-                                         .more = "loop: {queue_ms: 5000, late_ms: 10000}\n"};
+                                         .more = "loop: {queue_ms: 10000, late_ms: 10000}\n"};
 static char second[160], heading[80];
 
 /* Errors of the ranges by pulse, against the room's walls. Returns how many pulses there were. */

@@ -192,7 +192,7 @@ static void take(struct check *c, struct scanhead *sh, struct scanhead_frame *fr
 static void scan(struct wire *wire, const struct room_config *config, struct check *c, const char *link,
                  const char *pace)
 {
-    const char *const more[] = {"--pace", pace, "--set", "loop.queue_ms=5000", "--set", "loop.late_ms=10000", NULL};
+    const char *const more[] = {"--pace", pace, "--set", "loop.queue_ms=10000", "--set", "loop.late_ms=10000", NULL};
     struct head head = head_start(wire, room_config_write(wire, config), more);
     struct scanhead *sh = client_open(head_endpoint(&head, link));
     struct scanhead_frame frame;

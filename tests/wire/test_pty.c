@@ -12,7 +12,7 @@ static const struct room_config ENDLESS = {.prr_hz = 200000,
                                            .pan_stop_deg = 360,
                                            .frames = 0,
                                            .links = LINK_YAML_BOTH,
-                                           .more = "loop: {queue_ms: 3000, late_ms: 10000}\n"};
+                                           .more = "loop: {queue_ms: 10000, late_ms: 10000}\n"};
 
 static int port_open(const struct wire *wire)
 {

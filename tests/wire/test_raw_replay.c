@@ -24,7 +24,10 @@ static const char CONFIG[] =
     "beam: {echoes: strongest}\n"
     "time: {epoch: 2026-05-04T03:02:01Z}\n"
     "links: [{type: udp, protocol: velodyne, port: 2368}, {type: udp, protocol: velodyne-position, port: 8308}]\n"
-    "loop: {late_ms: 10000, queue_ms: 3000}\n";
+    "loop: {late_ms: 10000, queue_ms: 10000}\n";
+
+/* Live and captured it sends the same packets, however slow the machine is. */
+static const char *const FOR_A_WHILE[] = {"--duration", "0.8", NULL};
 
 /* ---- the namespace */
 
@@ -183,9 +186,9 @@ static void read_live(struct wire *wire, const char *config, struct read_packets
 {
     static struct grabber grabber;
     start_grabber(wire, "LIVE", &grabber);
-    struct head head = head_start(wire, config, NULL);
+    struct head head = head_start(wire, config, FOR_A_WHILE);
+    head_end(&head, 0);
     if (!grabber_wait(&grabber, OBJECTS)) fail_msg("rawlog-grabber complains:\n%s", grabber.said);
-    head_end(&head, SIGTERM);
     *dropped = grabber_dropped_at(DATA_PORT);
     grabber_end(&grabber);
     collect(&grabber, out);
@@ -194,7 +197,7 @@ static void read_live(struct wire *wire, const char *config, struct read_packets
 static void capture(struct wire *wire, const char *config)
 {
     struct raw_recorder recorder = raw_recorder_start(wire, "udp:127.0.0.1:2368,8308", NULL);
-    struct head head = head_start(wire, config, (const char *const[]){"--duration", "0.8", NULL});
+    struct head head = head_start(wire, config, FOR_A_WHILE);
     head_end(&head, 0);
     raw_recorder_end(&recorder, SIGINT, 0, NULL);
 }

@@ -229,7 +229,7 @@ static struct head start_head(struct wire *wire, const char *profile, const char
              "stations: [{position_m: [0.31, -0.42, 0.17], lat_deg: 48.1, lon_deg: 11.6, height_m: 500}]\n"
              "time: {epoch: utc}\n"
              "links: [%s]\n"
-             "gnss: {rate_hz: 20}\nloop: {late_ms: 10000, queue_ms: 3000}\n",
+             "gnss: {rate_hz: 20}\nloop: {late_ms: 10000, queue_ms: 10000}\n",
              profile, links);
     room_write(wire);
     return head_start(wire, wire_write_text(wire, "config.yaml", text), NULL);

@@ -104,7 +104,7 @@ static const char *velodyne_config(struct wire *wire, const int port[2])
              "beam: {echoes: strongest}\n"
              "links: [{type: udp, protocol: velodyne, port: %d}, {type: udp, protocol: velodyne-position, port: %d},\n"
              "  {type: file, protocol: velodyne, path: data}]\n"
-             "loop: {late_ms: 10000, queue_ms: 3000}\n",
+             "loop: {late_ms: 10000, queue_ms: 10000}\n",
              port[0], port[1]);
     room_write(wire);
     return wire_write_text(wire, "config.yaml", text);

@@ -9,7 +9,7 @@ static const struct room_config SHORT = {.profile = "any-rate",
                                          .pan_stop_deg = 60,
                                          .frames = 1,
                                          .links = LINK_YAML_BOTH,
-                                         .more = "loop: {queue_ms: 5000, late_ms: 10000}\n"};
+                                         .more = "loop: {queue_ms: 10000, late_ms: 10000}\n"};
 
 /* What a session leaves: the hash of the head, of the client, and what was scanned. */
 struct result {

@@ -23,7 +23,7 @@ static void write_drive(struct wire *wire, char config[352])
                              " height_m: 80, north_deg: 30}\n"
                              "stations: [{position_m: [0, 0, 0]}]\n"
                              "platform: {kind: trajectory, waypoints: way.csv, mount_heading_deg: -90}\n"
-                             "loop: {queue_ms: 5000, late_ms: 10000}\n"
+                             "loop: {queue_ms: 10000, late_ms: 10000}\n"
                              "links: [{type: tcp, port: 0}]\n"));
 }
 

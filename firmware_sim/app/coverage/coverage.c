@@ -143,13 +143,13 @@ static int open_all(struct coverage_run *r, struct sh_err *err)
     struct sh_err why = {0};
     int rc = check_platform(r->cfg, err);
     if (rc == SH_OK) rc = check_output(r, err);
-    if (rc == SH_OK) rc = sites_load(r->cfg, &app_report_stderr, &r->sites, err);
+    if (rc == SH_OK) rc = sites_load_written_out(r->cfg, &app_report_stderr, &r->sites, err);
     r->site = r->sites.first;
     if (rc == SH_OK && r->output != NULL)
         rc = mesh_check_box(r->output, r->site->scene->min_m, r->site->scene->max_m, err);
     if (rc != SH_OK) return rc;
     r->result.base = r->site->stop != NULL ? 0 : r->cfg->head.settings.station - 1;
-    const struct coverage_spec spec = {.bvh = r->site->station[r->result.base].bvh,
+    const struct coverage_spec spec = {.bvh = r->site->bvh,
                                        .silent = r->site->silent,
                                        .cell_m = r->cfg->coverage.cell_m,
                                        .memory_mib = r->cfg->coverage.memory_mib,
@@ -240,7 +240,8 @@ static int check_options(struct coverage_run *r)
 static int add_numbers(struct coverage_run *r)
 {
     const struct app_file file = {"output", r->output, APP_WRITES, .n_ending = sizeof ".gltf" - 1, .ending = ".bin"};
-    if (r->output == NULL || !app_ends_in(r->output, ".gltf") || app_add_file(&r->in, &file) == APP_OK) return APP_GO_ON;
+    if (r->output == NULL || !app_ends_in(r->output, ".gltf") || app_add_file(&r->in, &file) == APP_OK)
+        return APP_GO_ON;
     return APP_USAGE;
 }
 

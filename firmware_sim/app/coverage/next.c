@@ -42,8 +42,8 @@ static int estimate(struct chooser *c, double heading_deg, double (*turned)[3], 
         turn(c->f->dir[i], angle_rad(heading_deg), turned[i]);
     const struct coverage_directions directions = {c->f->n_dir, (const double(*)[3])turned, c->f->each_sr,
                                                    profile->range_min_m, profile->range_max_m};
-    return coverage_gains(c->coverage, c->f->bvh, &directions, (const double(*)[3])c->open_m, c->n_open, c->f->report,
-                          c->gain, err);
+    return coverage_gains(c->coverage, c->f->site->bvh, &directions, (const double(*)[3])c->open_m, c->n_open,
+                          c->f->report, c->gain, err);
 }
 
 static int estimate_all(struct chooser *c, double *estimate_m2, struct sh_err *err)
@@ -110,7 +110,7 @@ static int scan(struct chooser *c, uint32_t place, const char *what, struct sh_e
     struct cast_tripod tripod;
     if (at == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a scan");
     coverage_scan_of(c->f->site, c->f->result->base, at);
-    at->scan.setup.bvh = c->f->bvh;
+    at->scan.setup.bvh = c->f->site->bvh;
     at->scan.setup.sight = NULL;
     if (at->scan.setup.tripod != NULL) { /* its cone comes along; its legs stand where they are */
         tripod = *at->scan.setup.tripod;
@@ -213,7 +213,6 @@ int coverage_next_find(struct coverage_finder *finder, struct coverage *coverage
 
 void coverage_next_free(struct coverage_next *next, struct coverage_finder *finder)
 {
-    bvh_free(finder->bvh);
     free(finder->dir);
     free(finder->each_sr);
     free(next->place);

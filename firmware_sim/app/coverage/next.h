@@ -52,7 +52,6 @@ struct coverage_finder {
     const struct sh_report *report;
     struct coverage_next *next;
     size_t room;                /* of its places */
-    struct bvh *bvh;            /* of the scene */
     double (*dir)[3], *each_sr; /* of a level head with heading 0; coverage_gains */
     uint32_t n_dir;
 };

@@ -22,11 +22,6 @@ static int add_place(struct coverage_finder *f, const struct coverage_next_place
     return SH_OK;
 }
 
-static int make_bvh(struct coverage_finder *f, struct sh_err *err)
-{
-    return f->bvh != NULL ? SH_OK : bvh_create(f->site->scene, f->site->cfg->loop.threads, f->report, &f->bvh, err);
-}
-
 static int check_upright(const struct coverage_finder *f, struct sh_err *err)
 {
     const struct placement_anchor *anchor = &f->site->anchor;
@@ -47,8 +42,7 @@ static int find_on_grid(struct coverage_finder *f, struct sh_err *err)
         grid.max_m[i] = isnan(f->o->area_m[1][i]) ? scene->max_m[i] : f->o->area_m[1][i];
     }
     int rc = check_upright(f, err);
-    if (rc == SH_OK) rc = make_bvh(f, err);
-    if (rc == SH_OK) rc = standpoint_places(f->bvh, &grid, f->report, &found, &n, err);
+    if (rc == SH_OK) rc = standpoint_places(f->site->bvh, &grid, f->report, &found, &n, err);
     if (rc == SH_OK && n > MOST_PLACES)
         rc = sh_fail(err, SH_EINPUT, "--grid %g: %u places to stand; allowed are %d: a wider grid, or a part by --at",
                      f->o->grid_m, n, MOST_PLACES);
@@ -102,7 +96,7 @@ static int read_candidates(struct coverage_finder *f, struct sh_err *err)
     csv_close(&csv);
     if (more < 0) rc = more;
     if (rc == SH_OK && f->next->n == 0) rc = sh_fail(err, SH_EINPUT, "%s: there are no places in it", f->o->candidates);
-    return rc == SH_OK ? make_bvh(f, err) : rc;
+    return rc;
 }
 
 static int find_places(struct coverage_finder *f, struct sh_err *err)

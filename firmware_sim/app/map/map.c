@@ -109,6 +109,19 @@ static int prepare(void *ctx, uint32_t station, struct sh_err *err)
     return rc;
 }
 
+/* Their bounds: a little more than they take. */
+static void include_copies(const struct map_run *run, const struct scene_copied *of, struct map_spec *spec)
+{
+    for (uint32_t k = 0; k < of->n; k++)
+        for (int corner = 0; corner < 8; corner++) {
+            double v[3], p[3];
+            for (int i = 0; i < 3; i++)
+                v[i] = corner >> i & 1 ? of->copy[k].max_m[i] : of->copy[k].min_m[i];
+            to_map(run, v, p);
+            include(spec, p);
+        }
+}
+
 static int create_map(struct map_run *run, const struct site *site, struct sh_err *err)
 {
     const struct scene *scene = site->scene;
@@ -120,6 +133,8 @@ static int create_map(struct map_run *run, const struct site *site, struct sh_er
         to_map(run, scene->vertex_m[v], p);
         include(&spec, p);
     }
+    for (uint32_t i = 0; i < scene->n_copied && run->turned; i++)
+        include_copies(run, &scene->copied[i], &spec);
     if (!run->turned) {
         include(&spec, scene->min_m);
         include(&spec, scene->max_m);

@@ -31,8 +31,8 @@ static void say_what_runs(const struct config *cfg, const struct site *site, con
     bvh_get_info(site->bvh, &info);
     fprintf(stderr,
             "scanhead: %s %s, %s, %u triangles, %u surfaces; BVH in %.2f s, %.0f bytes per triangle, packets of %u\n",
-            cfg->profile.maker, cfg->profile.model, cfg->profile.name, site->scene->n_triangles,
-            site->scene->n_surfaces, info.build_s, (double)info.bytes / site->scene->n_triangles, info.packet);
+            cfg->profile.maker, cfg->profile.model, cfg->profile.name, site->scene->n_all, site->scene->n_surfaces,
+            info.build_s, (double)info.bytes / (double)scene_n_kept(site->scene), info.packet);
     if (!config_is_alone(cfg))
         fprintf(stderr,
                 "scanhead: it is the scanner of %u of %u stations; --set head.station=N serves that of another\n",
@@ -75,6 +75,14 @@ static void warn_of_replay(const struct run_options *o, const struct device *dev
         o->device.replay);
 }
 
+static int has_page(const struct config *cfg)
+{
+    int is_there = 0;
+    for (uint32_t i = 0; i < cfg->n_links; i++)
+        is_there |= cfg->link[i].type == LINK_WEB;
+    return is_there;
+}
+
 /* What a page is told beside the stream; where there is no web link there is nothing to tell. Where its readers hold
  * back the head, the observer does, too, and sees all of it. */
 static int open_watch(const struct config *cfg, const struct site *site, struct device *device,
@@ -84,12 +92,9 @@ static int open_watch(const struct config *cfg, const struct site *site, struct 
                                     .device = device,
                                     .scene_triangles = WATCH_SCENE_TRIANGLES,
                                     .report = &app_report_seconds};
-    int is_there = 0;
-    for (uint32_t i = 0; i < cfg->n_links; i++) {
-        is_there |= cfg->link[i].type == LINK_WEB;
+    for (uint32_t i = 0; i < cfg->n_links; i++)
         options.waits |= cfg->link[i].type == LINK_WEB && cfg->link[i].waits == LINK_WAITS_YES;
-    }
-    if (!is_there) return SH_OK;
+    if (!has_page(cfg)) return SH_OK;
     if (options.waits && cfg->loop.pace != PACE_REALTIME) options.cpu_share = 0.0;
     const int rc = watch_open(cfg, site, &options, watch, err);
     if (rc != SH_OK) return rc;
@@ -115,7 +120,8 @@ static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
         return sh_fail(err, SH_EINPUT,
                        "%s: links: none; run needs at least one of pty, tcp, udp, usb, web, file, null, or --view",
                        cfg->file);
-    rc = site_load(cfg, &app_report_stderr, &site, err);
+    rc = has_page(cfg) ? site_load_written_out(cfg, &app_report_stderr, &site, err) /* it looks at triangles */
+                       : site_load(cfg, &app_report_stderr, &site, err);
     if (rc == SH_OK) rc = site_open_sights(site, 0, site->n_stations, &app_report_stderr, err);
     /* After the plan, which is made for the configuration: a replayed journal gives the same stream without
      * --start. */

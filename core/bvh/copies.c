@@ -1,0 +1,260 @@
+/* Copies of meshes in a BVH: a packet that reaches one is cast in the mesh's own frame. bvh_inside.h says why that is
+ * exact. */
+#include <math.h>
+#include <stdlib.h>
+
+#include "core/bvh/bvh_inside.h"
+#include "core/bvh/nearest.h"
+#include "core/vec3.h"
+
+/* ---- making them */
+
+int bvh_make_copies(struct bvh *bvh, unsigned threads, const struct sh_report *report, struct sh_err *err)
+{
+    const struct scene *scene = bvh->scene;
+    uint32_t at = 0;
+    int rc = SH_OK;
+    if (scene->n_copies == 0) return SH_OK;
+    bvh->mesh = calloc(scene->n_copied, sizeof(struct bvh *));
+    bvh->copy = calloc(scene->n_copies, sizeof *bvh->copy);
+    if (bvh->mesh == NULL || bvh->copy == NULL)
+        return sh_fail(err, SH_ENOMEM, "bvh: no memory for %u copies", scene->n_copies);
+    for (uint32_t i = 0; i < scene->n_copied && rc == SH_OK; i++) {
+        const struct scene_copied *of = &scene->copied[i];
+        rc = bvh_create_whole(of->mesh, 1, threads, report, &bvh->mesh[i], err);
+        if (rc == SH_OK) bvh->info.bytes += bvh->mesh[i]->info.bytes;
+        for (uint32_t k = 0; k < of->n && rc == SH_OK; k++)
+            bvh->copy[at++] = (struct bvh_copy){
+                .at = &of->copy[k], .mesh = bvh->mesh[i], .first = of->first + k * of->mesh->n_triangles};
+    }
+    return rc;
+}
+
+void bvh_free_copies(struct bvh *bvh)
+{
+    for (uint32_t i = 0; bvh->mesh != NULL && i < bvh->scene->n_copied; i++)
+        bvh_free(bvh->mesh[i]);
+    free(bvh->mesh);
+    free(bvh->copy);
+}
+
+void embree_asks_copy_bounds(const struct RTCBoundsFunctionArguments *args)
+{
+    const struct bvh *bvh = args->geometryUserPtr;
+    const struct scene_copy *copy = bvh->copy[args->primID].at;
+    double lo[3], hi[3], far[3];
+    vec3_sub(copy->min_m, bvh->origin_m, lo);
+    vec3_sub(copy->max_m, bvh->origin_m, hi);
+    for (int k = 0; k < 3; k++)
+        far[k] = fmax(fabs(lo[k]), fabs(hi[k]));
+    bvh_pad_box(bvh, lo, hi, vec3_length(far), args->bounds_o);
+}
+
+/* ---- the way in and out */
+
+/* Directions, in double and as Embree gets them. */
+VEC_CLONES
+static void turn_directions(const struct bvh_query *query, const struct scene_copy *copy, struct bvh_query *in)
+{
+    const double *x = query->dir[0], *y = query->dir[1], *z = query->dir[2], c = copy->cosine, s = copy->sine;
+    VEC_LOOP
+    for (uint32_t i = 0; i < BVH_PACKET; i++) {
+        in->dir[0][i] = c * x[i] - s * y[i];
+        in->dir[1][i] = c * y[i] + s * x[i];
+        in->dir[2][i] = z[i];
+    }
+}
+
+/* Where rays begin, and how far from there the float rays do. */
+static void find_origin(const struct bvh_query *query, const struct bvh_copy *copy, struct bvh_query *in)
+{
+    scene_copy_put_back(copy->at, query->at, in->at);
+    vec3_sub(in->at, copy->mesh->origin_m, in->at_local);
+    in->far_m = vec3_length(in->at_local);
+    const double start_m = fmax(0.0, in->far_m - copy->mesh->radius_m);
+    for (uint32_t i = 0; i < BVH_PACKET; i++)
+        in->start_m[i] = start_m;
+}
+
+VEC_CLONES
+static void find_origins(const struct bvh_query *query, const struct bvh_copy *copy, struct bvh_query *in)
+{
+    const double *x = query->org[0], *y = query->org[1], *z = query->org[2], *at = copy->at->shift_m;
+    const double *origin = copy->mesh->origin_m, c = copy->at->cosine, s = copy->at->sine, scale = copy->at->scale;
+    const double radius_m = copy->mesh->radius_m, ax = at[0], ay = at[1], az = at[2];
+    const double ox = origin[0], oy = origin[1], oz = origin[2];
+    double far2[BVH_PACKET], most2 = 0.0;
+    VEC_LOOP
+    for (uint32_t i = 0; i < BVH_PACKET; i++) {
+        const double vx = x[i] - ax, vy = y[i] - ay, vz = z[i] - az;
+        const double px = (c * vx - s * vy) / scale, py = (c * vy + s * vx) / scale, pz = vz / scale;
+        const double lx = px - ox, ly = py - oy, lz = pz - oz;
+        in->org[0][i] = px;
+        in->org[1][i] = py;
+        in->org[2][i] = pz;
+        in->local[0][i] = lx;
+        in->local[1][i] = ly;
+        in->local[2][i] = lz;
+        far2[i] = lx * lx + ly * ly + lz * lz;
+        const double start_m = sqrt(far2[i]) - radius_m;
+        in->start_m[i] = start_m > 0.0 ? start_m : 0.0;
+    }
+    for (uint32_t i = 0; i < query->width; i++)
+        most2 = far2[i] > most2 ? far2[i] : most2;
+    in->far_m = sqrt(most2);
+}
+
+/* The float rays begin at start_m. Fields are those of `width` rays. */
+VEC_INLINE void set_floats(const struct bvh_query *in, struct bvh_nested *nested, uint32_t width)
+{
+    float *org = bvh_field(&nested->rays, width, org_x), *dir = bvh_field(&nested->rays, width, dir_x);
+    for (uint32_t j = 0; j < 3; j++)
+        for (uint32_t i = 0; i < width; i++) {
+            const double d = in->dir[j][i], o = in->has_own ? in->local[j][i] : in->at_local[j];
+            dir[j * width + i] = embree_direction(d);
+            org[j * width + i] = (float)(o + in->start_m[i] * d);
+        }
+}
+
+/* The rays end at the nearest hit so far. A hit that is as near is still found. */
+static int set_ends(const struct bvh_query *query, double scale, const float *tfar, const int *valid,
+                    struct bvh_nested *nested, uint32_t width)
+{
+    struct bvh_query *in = &nested->query;
+    float *to = bvh_field(&nested->rays, width, tfar);
+    int any = 0;
+    for (uint32_t i = 0; i < width; i++) {
+        const double end_m = ((double)tfar[i] + query->start_m[i]) / scale - in->start_m[i];
+        nested->valid[i] = valid[i] != 0 && end_m >= 0.0 ? -1 : 0;
+        any |= nested->valid[i];
+        to[i] = float_above(end_m > 0.0 ? end_m : 0.0);
+    }
+    for (uint32_t i = 0; i < BVH_PACKET; i++) {
+        in->range_m[i] = in->hit_m[i] = query->range_m[i] / scale;
+        in->triangle[i] = BVH_NO_TRIANGLE;
+        in->near_m[i] = INFINITY;
+        in->near[i] = BVH_NO_TRIANGLE;
+    }
+    in->unsure = 0;
+    return any;
+}
+
+static void begin_fields(struct bvh_nested *nested, uint32_t width)
+{
+    float *tnear = bvh_field(&nested->rays, width, tnear), *time = bvh_field(&nested->rays, width, time),
+          *mask = bvh_field(&nested->rays, width, mask);
+    memset(tnear, 0, width * sizeof *tnear);
+    memset(time, 0, width * sizeof *time);
+    memset(mask, 0xff, width * sizeof *mask);
+}
+
+/* The rays of the query in the mesh's frame. Returns whether any has a way to go there. */
+VEC_CLONES
+static int enter(const struct bvh_query *query, const struct bvh_copy *copy, const float *tfar, const int *valid,
+                 struct bvh_nested *nested)
+{
+    struct bvh_query *in = &nested->query;
+    in->bvh = copy->mesh;
+    in->width = query->width;
+    in->has_own = query->has_own;
+    in->at_origin_m = query->at_origin_m / copy->at->scale;
+    in->decided = in->leaves = 0;
+    turn_directions(query, copy->at, in);
+    if (query->has_own)
+        find_origins(query, copy, in);
+    else
+        find_origin(query, copy, in);
+    if (!set_ends(query, copy->at->scale, tfar, valid, nested, query->width)) return 0;
+    begin_fields(nested, query->width);
+    if (query->width == BVH_PACKET)
+        set_floats(in, nested, BVH_PACKET);
+    else
+        set_floats(in, nested, query->width);
+    in->dir_float = query->width == BVH_PACKET ? bvh_field(&nested->rays, BVH_PACKET, dir_x) : NULL;
+    return 1;
+}
+
+static void leave(struct bvh_query *query, const struct bvh_copy *copy, float *tfar, const struct bvh_nested *nested)
+{
+    const struct bvh_query *in = &nested->query;
+    const double scale = copy->at->scale;
+    for (uint32_t i = 0; i < query->width; i++) {
+        if (!nested->valid[i] || in->triangle[i] == BVH_NO_TRIANGLE) continue;
+        const double first_m = fmin(in->range_m[i] * scale, query->range_m[i]);
+        bvh_take_hit(query, tfar + i, i, copy->first + in->triangle[i], in->hit_m[i] * scale, first_m);
+    }
+    query->unsure |= in->unsure;
+    query->leaves += in->leaves;
+    query->decided += in->decided;
+    for (uint32_t i = 0; in->decided != 0 && i < query->width; i++) {
+        const uint32_t triangle = copy->first + in->near[i];
+        const double range_m = in->near_m[i] * scale;
+        if (!nested->valid[i] || in->near[i] == BVH_NO_TRIANGLE || range_m > query->near_m[i]) continue;
+        if (range_m == query->near_m[i] && triangle > query->near[i]) continue;
+        query->near_m[i] = range_m;
+        query->near[i] = triangle;
+    }
+}
+
+void bvh_meet_copy(const struct RTCIntersectFunctionNArguments *args)
+{
+    struct bvh_query *query = (struct bvh_query *)(void *)args->context;
+    const struct bvh_copy *copy = &query->bvh->copy[args->primID];
+    struct bvh_nested *nested = query->nested;
+    float *tfar = bvh_field(args->rayhit, args->N, tfar);
+    if (!enter(query, copy, tfar, args->valid, nested)) return;
+    bvh_begin_query(&nested->query);
+    bvh_call_embree(copy->mesh, &nested->query, nested->valid, &nested->rays, args->N);
+    leave(query, copy, tfar, nested);
+}
+
+/* ---- what was met */
+
+void bvh_get_plane(const struct bvh *bvh, uint32_t triangle, struct bvh_plane *plane)
+{
+    struct scene_part part;
+    if (triangle < bvh->scene->n_triangles) {
+        *plane = bvh->plane[triangle];
+        return;
+    }
+    scene_find_part(bvh->scene, triangle, &part);
+    const struct bvh *mesh = bvh->mesh[part.copied];
+    const struct bvh_plane *in = &mesh->plane[part.triangle];
+    const double s = part.copy->scale, above = in->d + vec3_dot(in->n, mesh->origin_m);
+    double off[3];
+    scene_copy_turn(part.copy, in->n, plane->n);
+    vec3_sub(part.copy->shift_m, bvh->origin_m, off);
+    for (int k = 0; k < 3; k++)
+        plane->n[k] *= s * s;
+    plane->d = s * s * s * above + vec3_dot(plane->n, off);
+}
+
+/* Which ray meets it at which cosine; its normal's length does not matter. */
+static double cosine_of(const struct bvh *bvh, uint32_t triangle, const struct vec3_in *dir, uint32_t i)
+{
+    const double d[3] = VEC3_AT(*dir, i);
+    struct bvh_plane plane;
+    if (triangle == BVH_NO_TRIANGLE) return NAN;
+    bvh_get_plane(bvh, triangle, &plane);
+    return fabs(vec3_dot(plane.n, d)) / vec3_length(plane.n);
+}
+
+void bvh_cosines_copies(const struct bvh *bvh, const uint32_t *triangle, const struct vec3_in *dir, uint32_t n,
+                        double *cosine)
+{
+    for (uint32_t i = 0; i < n; i++) {
+        const double c = cosine_of(bvh, triangle[i], dir, i);
+        cosine[i] = c > 1.0 ? 1.0 : c;
+    }
+}
+
+void bvh_refine_copies(const struct bvh *bvh, const struct bvh_rays *rays)
+{
+    for (uint32_t i = 0; i < rays->n; i++) {
+        const int is_hit = rays->triangle[i] != BVH_NO_TRIANGLE;
+        if (rays->label != NULL) rays->label[i] = is_hit ? scene_label(bvh->scene, rays->triangle[i]) : BVH_NO_LABEL;
+        if (rays->steep == NULL) continue;
+        const double c = cosine_of(bvh, rays->triangle[i], &rays->dir, i);
+        rays->steep[i] = (float)(1.0 / (c * c));
+    }
+}

@@ -1,0 +1,55 @@
+/* Private to core/bvh: the nearest hit of a ray so far, and those that count as the same. */
+#ifndef CORE_BVH_NEAREST_H
+#define CORE_BVH_NEAREST_H
+
+#include "core/bvh/bvh_inside.h"
+#include "core/vecmath.h"
+
+/* The next float above a number that is not negative. */
+VEC_INLINE float float_above(double x)
+{
+    const float f = (float)x;
+    uint32_t bits;
+    memcpy(&bits, &f, sizeof bits);
+    bits += (double)f <= x;
+    float above;
+    memcpy(&above, &bits, sizeof above);
+    return above;
+}
+
+/* Ties have to be found, too, so tfar lies beyond the nearest and all that is as near. */
+VEC_INLINE float tfar_of(double nearest_m, double start_m)
+{
+    return float_above(nearest_m + BVH_SAME * nearest_m - start_m);
+}
+
+/* As near as the nearest: the lowest number is the hit. Where the hit so far turns out not to be as near, it had kept
+ * others out that may be: the ray is cast again. */
+static inline void add_tied(struct bvh_query *query, uint32_t lane, uint32_t triangle, double range_m)
+{
+    const double nearest_m = query->range_m[lane];
+    const int is_past = query->hit_m[lane] > nearest_m + BVH_SAME * nearest_m;
+    query->unsure |= (uint32_t)is_past << lane;
+    if (!is_past && triangle >= query->triangle[lane]) return;
+    query->triangle[lane] = triangle;
+    query->hit_m[lane] = range_m;
+}
+
+/* Takes a hit. It is as near as something at first_m, which is no further than the nearest so far, or as near. */
+VEC_INLINE void bvh_take_hit(struct bvh_query *query, float *tfar, uint32_t lane, uint32_t triangle, double range_m,
+                             double first_m)
+{
+    const double nearest_m = query->range_m[lane];
+    if (first_m < nearest_m) {
+        query->range_m[lane] = first_m;
+        *tfar = tfar_of(first_m, query->start_m[lane]);
+    }
+    if (first_m + BVH_SAME * first_m < nearest_m) {
+        query->triangle[lane] = triangle;
+        query->hit_m[lane] = range_m;
+        return;
+    }
+    add_tied(query, lane, triangle, range_m);
+}
+
+#endif

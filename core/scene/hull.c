@@ -1,0 +1,110 @@
+/* The outline of a mesh seen from above. A copy is turned about the vertical, so its bounds follow from this outline. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/scene/hull.h"
+
+enum { WAYS = 8 };
+
+/* Twice the area of the triangle a, b, c: above 0 where it turns left. */
+static double turns(const double a[2], const double b[2], const double c[2])
+{
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+}
+
+static int compare(const void *a, const void *b)
+{
+    const double *p = a, *q = b;
+    if (p[0] != q[0]) return p[0] < q[0] ? -1 : 1;
+    return (p[1] > q[1]) - (p[1] < q[1]);
+}
+
+/* Points strictly within the octagon of the farthest ones in eight directions can't be of the outline. */
+static uint32_t leave_out_inner(double (*point)[2], uint32_t n)
+{
+    static const int way[WAYS][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}};
+    double far[WAYS][2];
+    uint32_t left = 0;
+    for (int w = 0; w < WAYS; w++) {
+        double most = -INFINITY;
+        for (uint32_t i = 0; i < n; i++) {
+            const double here = way[w][0] * point[i][0] + way[w][1] * point[i][1];
+            if (here <= most) continue;
+            most = here;
+            memcpy(far[w], point[i], sizeof far[w]);
+        }
+    }
+    for (uint32_t i = 0; i < n; i++) {
+        int inside = 1, edges = 0;
+        for (int w = 0; w < WAYS && inside; w++) {
+            const double *a = far[w], *b = far[(w + 1) % WAYS];
+            if (a[0] == b[0] && a[1] == b[1]) continue;
+            inside = turns(a, b, point[i]) > 0.0;
+            edges++;
+        }
+        if (!inside || edges == 0) memmove(point[left++], point[i], sizeof point[i]);
+    }
+    return left;
+}
+
+/* The chain from the left to the right end, or back, by A. M. Andrew. */
+static uint32_t add_chain(double (*hull)[2], uint32_t n, uint32_t least, const double p[2])
+{
+    while (n >= least + 2 && turns(hull[n - 2], hull[n - 1], p) <= 0.0)
+        n--;
+    memcpy(hull[n], p, sizeof hull[n]);
+    return n + 1;
+}
+
+int scene_find_hull(const struct scene *scene, struct scene_hull *out, struct sh_err *err)
+{
+    uint8_t *used = calloc((size_t)scene->n_vertices + 1, 1);
+    double(*point)[2] = malloc(((size_t)scene->n_vertices + 1) * sizeof *point);
+    uint32_t n = 0, k = 0;
+    *out = (struct scene_hull){.point = NULL};
+    for (uint32_t i = 0; used != NULL && i < scene->n_triangles; i++)
+        for (int c = 0; c < 3; c++)
+            used[scene->triangle[i][c]] = 1;
+    for (uint32_t i = 0; used != NULL && point != NULL && i < scene->n_vertices; i++)
+        if (used[i]) memcpy(point[n++], scene->vertex_m[i], sizeof *point);
+    const int is_short = point == NULL || used == NULL;
+    free(used);
+    if (n > 0) n = leave_out_inner(point, n);
+    out->point = malloc((2 * (size_t)n + 2) * sizeof *out->point);
+    if (is_short || out->point == NULL) {
+        free(point);
+        return sh_fail(err, SH_ENOMEM, "no memory for a mesh's outline");
+    }
+    qsort(point, n, sizeof *point, compare);
+    for (uint32_t i = 0; i < n; i++)
+        k = add_chain(out->point, k, 0, point[i]);
+    const uint32_t right = k > 0 ? k - 1 : 0;
+    for (uint32_t i = n; i > 1; i--)
+        k = add_chain(out->point, k, right, point[i - 2]);
+    free(point);
+    out->n = k;
+    return SH_OK;
+}
+
+void scene_free_hull(struct scene_hull *hull)
+{
+    free(hull->point);
+}
+
+void scene_set_copy_bounds(const struct scene *mesh, const struct scene_hull *hull, struct scene_copy *copy)
+{
+    for (int k = 0; k < 3; k++) {
+        copy->min_m[k] = INFINITY;
+        copy->max_m[k] = -INFINITY;
+    }
+    for (uint32_t i = 0; i < hull->n; i++)
+        for (int top = 0; top < 2; top++) {
+            const double v[3] = {hull->point[i][0], hull->point[i][1], top ? mesh->max_m[2] : mesh->min_m[2]};
+            double p[3];
+            scene_copy_put(copy, v, p);
+            for (int k = 0; k < 3; k++) {
+                copy->min_m[k] = fmin(copy->min_m[k], p[k]);
+                copy->max_m[k] = fmax(copy->max_m[k], p[k]);
+            }
+        }
+}

@@ -1,0 +1,82 @@
+/* Copies without some of their surfaces. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/scene/build.h"
+#include "core/scene/hull.h"
+
+static int keeps_any(const uint8_t *keep, uint32_t n)
+{
+    return memchr(keep, 1, n) != NULL;
+}
+
+/* The copies that keep something, with their new labels. kept: what that is, of the mesh. */
+static int keep_some(struct scene_copied *of, const uint8_t *keep, const uint16_t *label, const uint8_t **kept,
+                     struct sh_err *err)
+{
+    const uint32_t surfaces = of->mesh->n_surfaces;
+    uint32_t n = 0;
+    *kept = NULL;
+    for (uint32_t k = 0; k < of->n; k++) {
+        const uint8_t *here = keep + of->copy[k].label0;
+        if (!keeps_any(here, surfaces)) continue;
+        if (*kept == NULL) *kept = here;
+        if (memcmp(*kept, here, surfaces) != 0)
+            return sh_fail(err, SH_EINPUT,
+                           "scene.target.objects: copy %u of a mesh would keep other objects of it than one before; "
+                           "allowed are patterns that fit the same ones of each copy",
+                           k + 1);
+        of->copy[n] = of->copy[k];
+        of->copy[n++].label0 =
+            label[of->copy[k].label0 + (uint32_t)((const uint8_t *)memchr(here, 1, surfaces) - here)];
+    }
+    of->n = n;
+    return SH_OK;
+}
+
+static int bound(struct scene *scene, struct scene_copied *of, struct sh_err *err)
+{
+    struct scene_hull hull;
+    const int rc = scene_find_hull(of->mesh, &hull, err);
+    for (uint32_t k = 0; k < of->n && rc == SH_OK; k++) {
+        scene_set_copy_bounds(of->mesh, &hull, &of->copy[k]);
+        for (int i = 0; i < 3; i++) {
+            scene->min_m[i] = fmin(scene->min_m[i], of->copy[k].min_m[i]);
+            scene->max_m[i] = fmax(scene->max_m[i], of->copy[k].max_m[i]);
+        }
+    }
+    scene_free_hull(&hull);
+    return rc;
+}
+
+int scene_keep_copies(struct scene *scene, const uint8_t *keep, const uint16_t *label, struct sh_err *err)
+{
+    const uint32_t was = scene->n_copied;
+    uint32_t n = 0;
+    int rc = SH_OK;
+    scene->n_copies = 0;
+    for (uint32_t i = 0; i < was && rc == SH_OK; i++) {
+        struct scene_copied *of = &scene->copied[n];
+        const uint8_t *kept;
+        if (n != i) {
+            const struct scene_copied gone = *of; /* so that each is freed once, also after an error */
+            *of = scene->copied[i];
+            scene->copied[i] = gone;
+        }
+        rc = keep_some(of, keep, label, &kept, err);
+        if (rc == SH_OK && kept != NULL) rc = scene_keep(of->mesh, kept, err);
+        if (rc == SH_OK && kept != NULL) rc = bound(scene, of, err);
+        if (rc != SH_OK || kept == NULL || of->mesh->n_all == 0) continue;
+        of->first = scene->n_all;
+        scene->n_all += of->n * of->mesh->n_triangles;
+        scene->n_copies += of->n;
+        n++;
+    }
+    for (uint32_t i = n; i < was && rc == SH_OK; i++) {
+        scene_free(scene->copied[i].mesh);
+        free(scene->copied[i].copy);
+    }
+    if (rc == SH_OK) scene->n_copied = n;
+    return rc;
+}

@@ -1,0 +1,96 @@
+/* Where a file has vertices for each triangle, those at the same place, bit for bit, become one. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/huge.h"
+#include "core/rng.h"
+#include "core/scene/build.h"
+
+enum { NONE = 0xffffffff };
+
+static uint64_t key_of(const double p[3])
+{
+    uint64_t key = 0;
+    for (int i = 0; i < 3; i++) {
+        uint64_t bits;
+        memcpy(&bits, &p[i], sizeof bits);
+        key = rng_mix(key + bits);
+    }
+    return key;
+}
+
+static int is_same(const struct scene_build *b, uint32_t number, const double p[3])
+{
+    return memcmp(b->scene->vertex_m[number], p, sizeof *b->scene->vertex_m) == 0;
+}
+
+/* The slot that holds a vertex at that place, or the free one where it belongs. */
+static uint32_t *find(const struct scene_build *b, const struct build_weld *w, uint64_t key, const double p[3])
+{
+    size_t at = (size_t)key & (w->size - 1);
+    while (w->slot[at] != NONE && !is_same(b, w->slot[at], p))
+        at = (at + 1) & (w->size - 1);
+    return &w->slot[at];
+}
+
+/* A table of so many slots, with what the old one holds. */
+static int make_table(struct scene_build *b, struct build_weld *w, size_t size, struct sh_err *err)
+{
+    uint32_t *old = w->slot, *slot = huge_alloc(size * sizeof *slot);
+    const size_t before = w->size;
+    if (slot == NULL) return build_fail(b, SH_ENOMEM, err, "no memory to compare vertices");
+    memset(slot, 0xff, size * sizeof *slot);
+    w->slot = slot;
+    w->size = size;
+    for (size_t i = 0; i < before; i++) {
+        if (old[i] == NONE) continue;
+        const double *p = b->scene->vertex_m[old[i]];
+        *find(b, w, key_of(p), p) = old[i];
+    }
+    free(old);
+    return SH_OK;
+}
+
+/* A vertex is a corner of six triangles, as a rule: a third of the table is in use then. */
+int build_weld_begin(struct scene_build *b, struct build_weld *w, uint64_t vertices, struct sh_err *err)
+{
+    size_t size = 64;
+    while (size < vertices / 2)
+        size *= 2;
+    w->number = malloc((size_t)vertices * sizeof *w->number);
+    if (w->number == NULL)
+        return build_fail(b, SH_ENOMEM, err, "no memory for %llu vertices", (unsigned long long)vertices);
+    return make_table(b, w, size, err);
+}
+
+int build_weld_vertex(struct scene_build *b, struct build_weld *w, const double v[3], struct sh_err *err)
+{
+    /* It is at most half full, so that a free slot is near. */
+    int rc = 2 * (w->used + 1) > w->size ? make_table(b, w, 2 * w->size, err) : SH_OK;
+    if (rc == SH_OK) rc = build_vertex(b, v, err);
+    if (rc != SH_OK) return rc;
+    uint32_t number = b->scene->n_vertices - 1;
+    const double *p = b->scene->vertex_m[number];
+    const uint64_t key = key_of(p);
+    uint32_t *recent = &w->recent[key >> 32 & (BUILD_RECENT - 1)];
+    const int is_recent = *recent != 0 && is_same(b, *recent - 1, p);
+    uint32_t *slot = is_recent ? NULL : find(b, w, key, p);
+    if (slot != NULL && *slot == NONE) {
+        *slot = number;
+        w->used++;
+    } else {
+        number = is_recent ? *recent - 1 : *slot;
+        b->scene->n_vertices--;
+        b->n_welded++;
+    }
+    *recent = number + 1;
+    w->number[w->n++] = number;
+    return SH_OK;
+}
+
+void build_weld_free(struct build_weld *w)
+{
+    free(w->slot);
+    free(w->number);
+    *w = (struct build_weld){0};
+}

@@ -1,0 +1,276 @@
+/* Copies of meshes in a BVH against the same triangles written out: the same hits, labels and incidences. */
+#include <math.h>
+
+#include "core/bvh.h"
+#include "core/pose.h"
+#include "core/scene_copies.h"
+#include "core/vec3.h"
+#include "tests/unit/scene_files.h"
+
+enum { RAYS = 4096, PLACES = 40 };
+
+static uint64_t state_now;
+
+static double next(double lo, double hi)
+{
+    state_now = state_now * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
+    return lo + (hi - lo) * (double)(state_now >> 11) * 0x1p-53;
+}
+
+/* Two boxes, one on the other: closed, with faces that many copies share with the ground. */
+static const char TREE[] = "o trunk\nv -0.1 -0.1 0\nv 0.1 -0.1 0\nv 0.1 0.1 0\nv -0.1 0.1 0\n"
+                           "v -0.1 -0.1 2\nv 0.1 -0.1 2\nv 0.1 0.1 2\nv -0.1 0.1 2\n"
+                           "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n"
+                           "o crown\nv -1 -0.5 2\nv 1 -0.5 2\nv 1 0.5 2\nv -1 0.5 2\n"
+                           "v -0.4 -0.3 4\nv 0.4 -0.3 4\nv 0.4 0.3 4\nv -0.4 0.3 4\n"
+                           "f 12 11 10 9\nf 13 14 15 16\nf 9 10 14 13\nf 10 11 15 14\nf 11 12 16 15\nf 12 9 13 16\n";
+static const char GROUND[] = "o ground\nv -50 -50 0\nv 50 -50 0\nv 50 50 0\nv -50 50 0\nf 1 2 3 4\n";
+
+struct pair {
+    struct scene *scene[2]; /* with copies, and written out */
+    struct bvh *bvh[2];
+};
+
+static void scatter(struct scene_place place[PLACES], const double middle_m[3])
+{
+    for (int i = 0; i < PLACES; i++)
+        place[i] = (struct scene_place){.at_m = {middle_m[0] + next(-30, 30), middle_m[1] + next(-30, 30), middle_m[2]},
+                                        .turn_deg = next(-360, 360),
+                                        .scale = exp(next(-1, 1))};
+}
+
+static struct scene *load_one(struct scene_place *place, size_t n, int own_surfaces, const double middle_m[3])
+{
+    char tree[128], ground[128];
+    struct scene *scene;
+    struct sh_err err;
+    snprintf(tree, sizeof tree, "%s", write_text("tree.obj", TREE));
+    snprintf(ground, sizeof ground, "%s", write_text("ground.obj", GROUND));
+    const struct scene_mesh_spec spec[2] = {
+        {.file = tree, .scale = 1, .places = {.place = place, .n = n, .own_surfaces = own_surfaces, .says = "places"}},
+        {.file = ground, .scale = 1, .offset_m = {middle_m[0], middle_m[1], middle_m[2]}}};
+    const int rc = scene_load(spec, 2, 1e-3, NULL, &scene, &err);
+    unlink(tree);
+    unlink(ground);
+    if (rc != SH_OK) fail_msg("%s", err.text);
+    return scene;
+}
+
+static void open_pair(struct pair *p, struct scene_place *place, size_t n, int own_surfaces, const double middle_m[3])
+{
+    struct sh_err err;
+    for (int k = 0; k < 2; k++)
+        p->scene[k] = load_one(place, n, own_surfaces, middle_m);
+    assert_int_equal(p->scene[0]->n_copies, n);
+    if (scene_write_out_copies(p->scene[1], UINT32_MAX, NULL, &err) != SH_OK) fail_msg("%s", err.text);
+    assert_int_equal(p->scene[1]->n_triangles, p->scene[0]->n_all);
+    for (int k = 0; k < 2; k++)
+        if (bvh_create(p->scene[k], 1, NULL, &p->bvh[k], &err) != SH_OK) fail_msg("%s", err.text);
+}
+
+static void close_pair(struct pair *p)
+{
+    for (int k = 0; k < 2; k++) {
+        bvh_free(p->bvh[k]);
+        scene_free(p->scene[k]);
+    }
+}
+
+static double x[RAYS], y[RAYS], z[RAYS], dx[RAYS], dy[RAYS], dz[RAYS];
+static double range_m[2][RAYS], cosine[2][RAYS];
+static uint32_t triangle[2][RAYS], label[2][RAYS];
+static float steep[2][RAYS];
+
+/* from_own: each ray begins elsewhere, some of them within a copy. */
+static void cast(const struct pair *p, const double middle_m[3], int from_own, uint32_t packet)
+{
+    struct bvh_work *work;
+    struct sh_err err;
+    const double at[3] = {middle_m[0] + next(-20, 20), middle_m[1] + next(-20, 20), middle_m[2] + next(0.5, 5)};
+    for (int i = 0; i < RAYS; i++) {
+        double d[3] = {next(-1, 1), next(-1, 1), next(-0.3, 0.3)};
+        const double length = vec3_length(d);
+        for (int k = 0; k < 3; k++)
+            d[k] /= length;
+        dx[i] = d[0], dy[i] = d[1], dz[i] = d[2];
+        x[i] = middle_m[0] + next(-35, 35), y[i] = middle_m[1] + next(-35, 35), z[i] = middle_m[2] + next(0.1, 6);
+    }
+    assert_int_equal(bvh_work_create(&work, &err), SH_OK);
+    for (int k = 0; k < 2; k++) {
+        if (packet != 0) bvh_set_packet(p->bvh[k], packet);
+        struct bvh_rays rays = {.n = RAYS,
+                                .from.at_m = {at[0], at[1], at[2]},
+                                .dir = {dx, dy, dz},
+                                .range_max_m = 1000,
+                                .range_m = range_m[k],
+                                .triangle = triangle[k],
+                                .label = label[k],
+                                .steep = from_own ? NULL : steep[k]};
+        if (from_own) rays.from.own = (struct vec3_in){x, y, z};
+        bvh_hits(work, p->bvh[k], &rays);
+        bvh_cosines(p->bvh[k], triangle[k], &rays.dir, RAYS, cosine[k]);
+    }
+    bvh_work_free(work);
+}
+
+/* Corners are written out with an error of 2^-53 of the coordinates; a plane's tilt comes to that over the least edge,
+ * 0.07 m, over at most 100 m. A ray at a smaller sine than 0.01 is left out. */
+static void compare(const double middle_m[3], uint32_t least_hits)
+{
+    const double rounding_m = 0x1p-53 * (fabs(middle_m[0]) + fabs(middle_m[1]) + fabs(middle_m[2]) + 200.0);
+    const double most_m = 100.0 * 8.0 * rounding_m * 100.0 / 0.07;
+    uint32_t hits = 0, elsewhere = 0;
+    for (int i = 0; i < RAYS; i++) {
+        assert_int_equal(isnan(range_m[0][i]), isnan(range_m[1][i]));
+        if (isnan(range_m[0][i])) {
+            assert_int_equal(triangle[0][i], BVH_NO_TRIANGLE);
+            assert_int_equal(label[0][i], BVH_NO_LABEL);
+            continue;
+        }
+        hits++;
+        if (cosine[1][i] < 0.01) continue;
+        assert_true(fabs(range_m[0][i] - range_m[1][i]) <= most_m);
+        if (triangle[0][i] != triangle[1][i]) {
+            elsewhere++;
+            continue;
+        }
+        assert_int_equal(label[0][i], label[1][i]);
+        assert_true(fabs(cosine[0][i] - cosine[1][i]) < 1e-6);
+    }
+    assert_true(hits >= least_hits);
+    assert_true(elsewhere <= hits / 500); /* trunks end where crowns begin, and stand on the ground */
+}
+
+static void copies_are_what_they_are_written_out(void **state)
+{
+    (void)state;
+    static const double middle[][3] = {{0, 0, 0}, {500000.0, 5400000.0, 300.0}, {-1e7, 1e7, 1000.0}};
+    static const uint32_t packets[] = {0, 1, 4, 8};
+    struct scene_place place[PLACES];
+    for (size_t m = 0; m < sizeof middle / sizeof *middle; m++)
+        for (int own = 0; own < 2; own++) {
+            struct pair p;
+            state_now = 17 * m + (uint64_t)own;
+            scatter(place, middle[m]);
+            open_pair(&p, place, PLACES, own, middle[m]);
+            for (size_t k = 0; k < sizeof packets / sizeof *packets; k++)
+                for (int from_own = 0; from_own < 2; from_own++) {
+                    cast(&p, middle[m], from_own, packets[k]);
+                    compare(middle[m], RAYS / 4);
+                }
+            close_pair(&p);
+        }
+}
+
+/* Steepness is asked for of rays from one point; where it is large, its rounding is. */
+static void incidence_is_the_same(void **state)
+{
+    (void)state;
+    static const double here[3] = {0, 0, 0};
+    struct scene_place place[PLACES];
+    struct pair p;
+    state_now = 5;
+    scatter(place, here);
+    open_pair(&p, place, PLACES, 0, here);
+    cast(&p, here, 0, 0);
+    for (int i = 0; i < RAYS; i++)
+        if (triangle[0][i] == triangle[1][i] && !isnan(range_m[0][i]) && cosine[0][i] > 0.01)
+            assert_true(fabs((double)steep[0][i] / (double)steep[1][i] - 1.0) < 1e-5);
+    close_pair(&p);
+}
+
+/* Two copies at one place, and one of them again: the first is the hit, whatever order Embree finds them in. */
+static void the_first_of_equal_copies_is_hit(void **state)
+{
+    (void)state;
+    static const double here[3] = {0, 0, 0};
+    struct scene_place place[3];
+    struct pair p;
+    state_now = 3;
+    for (int i = 0; i < 3; i++)
+        place[i] = (struct scene_place){.at_m = {3, 4, 0}, .turn_deg = 33, .scale = 1.5};
+    open_pair(&p, place, 3, 1, here);
+    for (int from_own = 0; from_own < 2; from_own++) {
+        uint32_t met = 0;
+        cast(&p, here, from_own, 0);
+        for (int i = 0; i < RAYS; i++) {
+            if (triangle[0][i] < 2 || triangle[0][i] == BVH_NO_TRIANGLE) continue;
+            assert_true(triangle[0][i] < 2 + 24);
+            assert_true(label[0][i] == 1 || label[0][i] == 2);
+            met++;
+        }
+        assert_true(met > 5);
+    }
+    close_pair(&p);
+}
+
+/* The way a copy turns is that of bodies that turn. */
+static void a_copy_turns_clockwise(void **state)
+{
+    (void)state;
+    const double turn = 0.7, v[3] = {1, 2, 3};
+    const struct scene_copy copy = {.cosine = cos(turn), .sine = sin(turn), .scale = 2, .shift_m = {10, 20, 30}};
+    double rotation[9], p[3], back[3];
+    pose_heading(turn, rotation);
+    scene_copy_put(&copy, v, p);
+    scene_copy_put_back(&copy, p, back);
+    for (int k = 0; k < 3; k++) {
+        assert_true(fabs(p[k] - (2 * vec3_dot(rotation + 3 * k, v) + copy.shift_m[k])) < 1e-14 * 40);
+        assert_true(fabs(back[k] - v[k]) < 1e-14 * 40);
+    }
+}
+
+static void bounds_are_exact(void **state)
+{
+    (void)state;
+    static const double here[3] = {0, 0, 0};
+    struct scene_place place[PLACES];
+    struct pair p;
+    state_now = 11;
+    scatter(place, here);
+    open_pair(&p, place, PLACES, 0, here);
+    for (uint32_t k = 0; k < PLACES; k++) {
+        const struct scene_copy *copy = &p.scene[0]->copied[0].copy[k];
+        double lo[3] = {INFINITY, INFINITY, INFINITY}, hi[3] = {-INFINITY, -INFINITY, -INFINITY};
+        for (uint32_t t = 2 + 24 * k; t < 2 + 24 * (k + 1); t++)
+            for (int c = 0; c < 9; c++) {
+                const double at = p.scene[1]->vertex_m[p.scene[1]->triangle[t][c / 3]][c % 3];
+                lo[c % 3] = fmin(lo[c % 3], at);
+                hi[c % 3] = fmax(hi[c % 3], at);
+            }
+        for (int i = 0; i < 3; i++) {
+            assert_true(copy->min_m[i] == lo[i] && copy->max_m[i] == hi[i]);
+            assert_true(p.scene[0]->min_m[i] <= lo[i] && p.scene[0]->max_m[i] >= hi[i]);
+        }
+    }
+    close_pair(&p);
+}
+
+static void names_say_which_copy(void **state)
+{
+    (void)state;
+    static const double here[3] = {0, 0, 0};
+    struct scene_place place[PLACES];
+    state_now = 11;
+    scatter(place, here);
+    struct scene *scene = load_one(place, PLACES, 1, here);
+    assert_int_equal(scene->n_surfaces, 1 + 2 * PLACES);
+    assert_string_equal(scene->surface[0].object, "ground");
+    assert_string_equal(scene->surface[1].object, "trunk 1");
+    assert_string_equal(scene->surface[2 * PLACES].object, "crown 40");
+    assert_int_equal(scene_label(scene, scene->n_all - 1), 2 * PLACES);
+    scene_free(scene);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(copies_are_what_they_are_written_out),
+        cmocka_unit_test(incidence_is_the_same),
+        cmocka_unit_test(the_first_of_equal_copies_is_hit),
+        cmocka_unit_test(a_copy_turns_clockwise),
+        cmocka_unit_test(bounds_are_exact),
+        cmocka_unit_test(names_say_which_copy),
+    };
+    return cmocka_run_group_tests_name("copies", tests, make_folder, remove_folder);
+}
