@@ -1,9 +1,12 @@
-/* Where an IFC building model stands: its IFCSITE record, which mesh readers leave out.
+/* Where an IFC building model stands: its IFCMAPCONVERSION and IFCSITE records, which mesh readers leave out.
  *
  * Reads the STEP file (ISO 10303-21) for IfcSite.RefLatitude, RefLongitude, RefElevation; the site's
  * ObjectPlacement, whose origin is the point that they locate; and TrueNorth of the model's
- * IfcGeometricRepresentationContext. Strict: what is there but not as IFC2x3/IFC4 define it is an error, not
- * a guess. IfcMapConversion is not read. */
+ * IfcGeometricRepresentationContext. And for IfcMapConversion, by which the model's origin has coordinates in an
+ * IfcProjectedCRS. Strict: what is there but not as IFC2x3/IFC4 define it is an error, not a guess.
+ *
+ * IfcMapConversion.Scale is map units per unit of the model. Where IfcProjectedCRS has no MapUnit, the map's unit is the
+ * known one (metre, foot, US survey foot, or the model's own) that is nearest to unit of the model / Scale. */
 #ifndef CORE_IFC_SITE_H
 #define CORE_IFC_SITE_H
 
@@ -15,7 +18,13 @@ struct ifc_site {
     double origin_m[3]; /* the point that lies there, in the model's coordinates (z up) */
     double north_deg;   /* true north, clockwise from the model's y axis; 0 when not given */
     int has_north;
-    int has_map; /* there is an IfcMapConversion, which may say more exactly where the model is */
+    int has_place; /* latitude and longitude are known; else there is a map */
+    int has_map;
+    struct ifc_map {
+        char crs[128];                          /* the system's name, UTF-8: "EPSG:2056" */
+        double easting_m, northing_m, height_m; /* of the model's origin; height by the system's own datum */
+        double x_axis_rad;                      /* of the model's x axis, counter-clockwise from grid east */
+    } map;
 };
 
 /* Errors (SH_EINPUT) name file, record and line. */

@@ -33,6 +33,7 @@
 #ifndef CORE_BVH_BVH_INSIDE_H
 #define CORE_BVH_BVH_INSIDE_H
 
+#include <math.h>
 #include <stddef.h>
 #include <string.h>
 
@@ -181,6 +182,16 @@ void bvh_pad_box(const struct bvh *bvh, const double lo_m[3], const double hi_m[
 /* packet.c: Embree's context at its beginning; `width` rays through the BVH. */
 void bvh_begin_query(struct bvh_query *query);
 void bvh_call_embree(const struct bvh *bvh, struct bvh_query *query, const int *valid, void *rays, uint32_t width);
+
+/* Near misses of the packet before count no more. */
+static inline void bvh_forget_near(struct bvh_query *query)
+{
+    for (uint32_t i = 0; i < BVH_PACKET; i++) {
+        query->near_m[i] = INFINITY;
+        query->near[i] = BVH_NO_TRIANGLE;
+    }
+}
+
 /* packet.c: casts n <= BVH_CHUNK rays, whose float directions and origins are given. */
 struct bvh_batch {
     const struct bvh_rays *rays;

@@ -132,9 +132,8 @@ static int set_ends(const struct bvh_query *query, double scale, const float *tf
     for (uint32_t i = 0; i < BVH_PACKET; i++) {
         in->range_m[i] = in->hit_m[i] = query->range_m[i] / scale;
         in->triangle[i] = BVH_NO_TRIANGLE;
-        in->near_m[i] = INFINITY;
-        in->near[i] = BVH_NO_TRIANGLE;
     }
+    bvh_forget_near(in);
     in->unsure = 0;
     return any;
 }

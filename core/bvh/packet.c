@@ -106,14 +106,6 @@ VEC_INLINE void set_doubles(struct bvh_query *query, const struct bvh_batch *bat
     }
 }
 
-static void forget_near(struct bvh_query *query)
-{
-    for (uint32_t i = 0; i < BVH_PACKET; i++) {
-        query->near_m[i] = INFINITY;
-        query->near[i] = BVH_NO_TRIANGLE;
-    }
-}
-
 static void take_near(struct bvh_query *query, uint32_t n)
 {
     for (uint32_t i = 0; i < n; i++) {
@@ -122,7 +114,7 @@ static void take_near(struct bvh_query *query, uint32_t n)
         query->triangle[i] = query->near[i];
         query->hit_m[i] = query->near_m[i];
     }
-    forget_near(query);
+    bvh_forget_near(query);
 }
 
 /* Casts rays again whose nearest range is known. No range is less, so the lowest number of those as near is found in any
@@ -183,7 +175,7 @@ void bvh_intersect(const struct bvh *bvh, struct bvh_query *query, struct bvh_ba
     memcpy(query->at, rays->from.at_m, sizeof query->at);
     memcpy(query->at_local, batch->at_local, sizeof query->at_local);
     memset(query->start_m, 0, sizeof query->start_m);
-    forget_near(query);
+    bvh_forget_near(query);
     for (uint32_t at = 0; at < rays->n; at += width)
         cast(bvh, query, &packet, batch, at, rays->n - at < width ? rays->n - at : width, width);
     batch->counters->decided += query->decided;

@@ -140,7 +140,7 @@ static int set_copies(const struct scene *mesh, const struct scene_places *place
     return rc;
 }
 
-static void widen(struct scene *scene, const struct scene_copy *copy, size_t n)
+void scene_widen(struct scene *scene, const struct scene_copy *copy, size_t n)
 {
     for (size_t i = 0; i < n; i++)
         for (int k = 0; k < 3; k++) {
@@ -186,7 +186,7 @@ int scene_add_copies(struct scene *scene, struct scene *mesh, const struct scene
     int rc = copy != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory for %zu copies", places->n);
     if (rc == SH_OK) rc = set_copies(mesh, places, label0, report, copy, err);
     if (rc == SH_OK) rc = add_surfaces(scene, mesh, places, err);
-    if (rc == SH_OK) widen(scene, copy, places->n);
+    if (rc == SH_OK) scene_widen(scene, copy, places->n);
     if (rc == SH_OK) keep_counts(scene, mesh, copy, places->n);
     if (rc == SH_OK) rc = keep_copies(scene, mesh, copy, places->n, err);
     if (rc != SH_OK) free(copy);

@@ -2,22 +2,26 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "core/angle.h"
+#include "core/import/ifc/ifc_records.h"
 #include "core/scene/step.h"
 
 /* Places of attributes in a record, IFC2x3 TC1 and IFC4 ADD2. */
 enum { SITE_PLACEMENT = 5, SITE_LATITUDE = 9, SITE_LONGITUDE = 10, SITE_ELEVATION = 11, SITE_ARGS = 14 };
 enum { CONTEXT_TYPE = 1, CONTEXT_WORLD = 4, CONTEXT_NORTH = 5, CONTEXT_ARGS = 6 };
 enum { PROJECT_UNITS = 8, PROJECT_ARGS = 9 };
+enum { MAP_CRS = 1, MAP_EASTING, MAP_NORTHING, MAP_HEIGHT, MAP_ABSCISSA, MAP_ORDINATE, MAP_SCALE, MAP_ARGS };
+enum { CRS_NAME = 0, CRS_UNIT = 6, CRS_ARGS = 7 };
 
 static const char ADVICE[] = "an anchor of source explicit needs none of this";
 
 struct reader {
     struct text text;
-    struct step_record site, context, project;
-    int n_sites, n_contexts, n_projects, is_model, has_map;
+    struct step_record site, context, project, map;
+    int n_sites, n_contexts, n_projects, n_maps, is_model;
     struct sh_err *err;
 };
 
@@ -63,11 +67,15 @@ static int collect(struct reader *r)
             r->project = record;
             r->n_projects++;
         }
-        r->has_map |= text_is(record.type, "IFCMAPCONVERSION");
+        if (text_is(record.type, "IFCMAPCONVERSION") || text_is(record.type, "IFCMAPCONVERSIONSCALED")) {
+            r->map = record;
+            if (r->n_maps++ > 0) return fail(r, &record, "a second map conversion; allowed one");
+        }
     }
     if (rc < 0) return rc;
-    if (r->n_sites == 0)
-        return text_fail(&r->text, 0, SH_EINPUT, r->err, "no IFCSITE with RefLatitude and RefLongitude; %s", ADVICE);
+    if (r->n_sites == 0 && r->n_maps == 0)
+        return text_fail(&r->text, 0, SH_EINPUT, r->err,
+                         "no IFCMAPCONVERSION, and no IFCSITE with RefLatitude and RefLongitude; %s", ADVICE);
     return SH_OK;
 }
 
@@ -156,6 +164,12 @@ static int read_converted(struct reader *r, const struct step_record *unit, stru
     return SH_OK;
 }
 
+static int read_length(struct reader *r, const struct step_record *record, const struct text_span *of, double *m)
+{
+    if (text_is(record->type, "IFCSIUNIT")) return read_prefix(r, record, of[2], m);
+    return read_converted(r, record, of[3], m);
+}
+
 /* Metres per unit of length, as the project says. */
 static int read_unit(struct reader *r, double *m)
 {
@@ -175,8 +189,8 @@ static int read_unit(struct reader *r, double *m)
         if (!step_reference(unit[i], &id)) return fail(r, &units.record, "a unit that is no reference");
         if ((rc = step_find(&r->text, id, &record, r->err)) != SH_OK) return rc;
         if (step_split(record.args, of, STEP_MAX_ARGS) != 4 || !text_is(of[1], ".LENGTHUNIT.")) continue;
-        if (text_is(record.type, "IFCSIUNIT")) return read_prefix(r, &record, of[2], m);
-        if (text_is(record.type, "IFCCONVERSIONBASEDUNIT")) return read_converted(r, &record, of[3], m);
+        if (text_is(record.type, "IFCSIUNIT") || text_is(record.type, "IFCCONVERSIONBASEDUNIT"))
+            return read_length(r, &record, of, m);
     }
     return fail(r, &units.record, "no unit of length");
 }
@@ -251,21 +265,86 @@ static int read_north(struct reader *r, struct ifc_site *site)
     return SH_OK;
 }
 
-static int read_site(struct reader *r, struct ifc_site *site)
+/* ---- the map */
+
+/* A unit in that maps are made which is within 1 % of this: scales of the map itself are below that. */
+static double known_unit_m(double m, double model_m)
+{
+    const double known[] = {1.0, model_m, 0.3048, 1200.0 / 3937.0};
+    for (size_t i = 0; i < sizeof known / sizeof known[0]; i++)
+        if (fabs(m / known[i] - 1.0) < 0.01) return known[i];
+    return NAN;
+}
+
+static int read_map_unit(struct reader *r, const struct found *crs, double scale, double model_m, double *m)
+{
+    struct step_record record;
+    struct text_span of[STEP_MAX_ARGS];
+    uint64_t id;
+    if (step_reference(crs->arg[CRS_UNIT], &id)) {
+        int rc = step_find(&r->text, id, &record, r->err);
+        if (rc != SH_OK) return rc;
+        if (step_split(record.args, of, STEP_MAX_ARGS) != 4 || !text_is(of[1], ".LENGTHUNIT."))
+            return fail(r, &record, "the MapUnit of an IFCPROJECTEDCRS that is no unit of length");
+        return read_length(r, &record, of, m);
+    }
+    *m = known_unit_m(model_m / scale, model_m);
+    return isnan(*m) ? fail(r, &r->map, "no unit of maps fits its Scale, and the system has no MapUnit") : SH_OK;
+}
+
+/* A number; `missing` where there is none, NaN: there must be one. */
+static int read_number(struct reader *r, struct text_span arg, double missing, double *value)
+{
+    *value = missing;
+    if (text_is(arg, "$") && !isnan(missing)) return SH_OK;
+    return step_real(&r->text, arg, value) ? SH_OK : fail(r, &r->map, "a number is missing, or is none");
+}
+
+static int read_map_name(struct reader *r, const struct found *crs, struct ifc_map *map)
+{
+    char *name = ifc_text(crs->arg[CRS_NAME]);
+    if (name == NULL) return text_fail(&r->text, 0, SH_ENOMEM, r->err, "no memory for a name");
+    const size_t n = strlen(name);
+    if (n > 0 && n < sizeof map->crs) memcpy(map->crs, name, n + 1);
+    free(name);
+    return map->crs[0] != '\0' ? SH_OK : fail(r, &crs->record, "no name, or one of over 127 bytes, as \"EPSG:25832\"");
+}
+
+static int read_map(struct reader *r, double unit_m, struct ifc_map *map)
+{
+    struct text_span arg[STEP_MAX_ARGS];
+    struct found crs;
+    double value[MAP_ARGS], map_unit_m = 1.0;
+    if (step_split(r->map.args, arg, STEP_MAX_ARGS) < MAP_ARGS)
+        return fail(r, &r->map, "not the 8 attributes that IFC defines");
+    int rc = follow(r, &r->map, arg[MAP_CRS], "IFCPROJECTEDCRS", CRS_ARGS, &crs);
+    if (rc == SH_OK) rc = read_map_name(r, &crs, map);
+    for (int i = MAP_EASTING; i < MAP_ARGS && rc == SH_OK; i++)
+        rc = read_number(r, arg[i], i <= MAP_HEIGHT ? NAN : i == MAP_ORDINATE ? 0.0 : 1.0, &value[i]);
+    if (rc == SH_OK && !(value[MAP_SCALE] > 0.0)) rc = fail(r, &r->map, "a Scale that is not above 0");
+    if (rc == SH_OK && !(hypot(value[MAP_ABSCISSA], value[MAP_ORDINATE]) > 1e-9))
+        rc = fail(r, &r->map, "an x axis without a direction");
+    if (rc == SH_OK) rc = read_map_unit(r, &crs, value[MAP_SCALE], unit_m, &map_unit_m);
+    if (rc != SH_OK) return rc;
+    map->easting_m = value[MAP_EASTING] * map_unit_m;
+    map->northing_m = value[MAP_NORTHING] * map_unit_m;
+    map->height_m = value[MAP_HEIGHT] * map_unit_m;
+    map->x_axis_rad = atan2(value[MAP_ORDINATE], value[MAP_ABSCISSA]);
+    return SH_OK;
+}
+
+/* ---- the site */
+
+static int read_site(struct reader *r, double unit_m, struct ifc_site *site)
 {
     struct text_span arg[SITE_ARGS];
-    double unit_m = 1.0;
     if (step_split(r->site.args, arg, SITE_ARGS) != SITE_ARGS)
         return fail(r, &r->site, "not the 14 attributes that IFC defines");
     int rc = read_angle(r, arg[SITE_LATITUDE], "RefLatitude", 90.0, &site->lat_deg);
     if (rc == SH_OK) rc = read_angle(r, arg[SITE_LONGITUDE], "RefLongitude", 180.0, &site->lon_deg);
-    if (rc == SH_OK) rc = read_unit(r, &unit_m);
     if (rc == SH_OK) rc = read_origin(r, arg[SITE_PLACEMENT], unit_m, site->origin_m);
-    if (rc == SH_OK) rc = read_north(r, site);
     if (rc != SH_OK) return rc;
-    site->elevation_m = NAN;
-    if (text_is(arg[SITE_ELEVATION], "$")) return SH_OK;
-    if (!step_real(&r->text, arg[SITE_ELEVATION], &site->elevation_m))
+    if (!text_is(arg[SITE_ELEVATION], "$") && !step_real(&r->text, arg[SITE_ELEVATION], &site->elevation_m))
         return fail(r, &r->site, "RefElevation is not a number");
     site->elevation_m *= unit_m;
     return SH_OK;
@@ -274,11 +353,16 @@ static int read_site(struct reader *r, struct ifc_site *site)
 int ifc_site_read(const char *path, struct ifc_site *site, struct sh_err *err)
 {
     struct reader r = {.err = err};
-    memset(site, 0, sizeof *site);
+    double unit_m = 1.0;
+    *site = (struct ifc_site){.elevation_m = NAN};
     int rc = step_open(&r.text, path, err);
     if (rc == SH_OK) rc = collect(&r);
-    if (rc == SH_OK) rc = read_site(&r, site);
-    site->has_map = r.has_map;
+    if (rc == SH_OK) rc = read_unit(&r, &unit_m);
+    if (rc == SH_OK && r.n_sites > 0) rc = read_site(&r, unit_m, site);
+    if (rc == SH_OK) rc = read_north(&r, site);
+    if (rc == SH_OK && r.n_maps > 0) rc = read_map(&r, unit_m, &site->map);
+    site->has_place = r.n_sites > 0;
+    site->has_map = r.n_maps > 0;
     text_close(&r.text);
     return rc;
 }

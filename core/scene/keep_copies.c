@@ -39,13 +39,9 @@ static int bound(struct scene *scene, struct scene_copied *of, struct sh_err *er
 {
     struct scene_hull hull;
     const int rc = scene_find_hull(of->mesh, &hull, err);
-    for (uint32_t k = 0; k < of->n && rc == SH_OK; k++) {
+    for (uint32_t k = 0; k < of->n && rc == SH_OK; k++)
         scene_set_copy_bounds(of->mesh, &hull, &of->copy[k]);
-        for (int i = 0; i < 3; i++) {
-            scene->min_m[i] = fmin(scene->min_m[i], of->copy[k].min_m[i]);
-            scene->max_m[i] = fmax(scene->max_m[i], of->copy[k].max_m[i]);
-        }
-    }
+    if (rc == SH_OK) scene_widen(scene, of->copy, of->n);
     scene_free_hull(&hull);
     return rc;
 }

@@ -6,6 +6,7 @@
 
 #include "core/angle.h"
 #include "core/cast.h"
+#include "core/crs.h"
 #include "core/ifc_site.h"
 #include "core/locate.h"
 #include "core/mat3.h"
@@ -40,6 +41,58 @@ static int find_ifc(const struct config *cfg, const struct config_mesh **out, st
     return sh_fail(err, SH_EINPUT, "%s: scene.anchor: source ifc, but no mesh is an .ifc file", cfg->file);
 }
 
+/* A height that counts from the sea, unless the configuration gives one; NaN: the file has none. */
+static double ifc_height(const struct config *cfg, const struct sh_report *report, const char *file, const char *what,
+                         double height_m)
+{
+    if (cfg->scene.anchor.height_given) return cfg->scene.anchor.height_m;
+    if (isnan(height_m))
+        sh_warn(report,
+                "%s: no %s: 0 m, taken as height above the ellipsoid; scene.anchor.height_m can give that height", file,
+                what);
+    else
+        sh_warn(report,
+                "%s: %s counts from the sea, taken as height above the ellipsoid; scene.anchor.height_m can give that "
+                "height",
+                file, what);
+    return isnan(height_m) ? 0.0 : height_m;
+}
+
+/* How far two places of a model's own may be from each other before both are named. IfcSite is often that of the town. */
+#define SITE_FROM_MAP_M 10000.0
+
+static void compare_site(const struct sh_report *report, const char *file, const struct ifc_site *site,
+                         const struct crs_place *map)
+{
+    double a[3], b[3];
+    if (!site->has_place) return;
+    georef_geodetic_to_ecef(&(struct georef_place){site->lat_deg, site->lon_deg, 0.0}, a);
+    georef_geodetic_to_ecef(&(struct georef_place){map->at.lat_deg, map->at.lon_deg, 0.0}, b);
+    const double apart_m = hypot(hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2]);
+    if (apart_m > SITE_FROM_MAP_M)
+        sh_warn(
+            report,
+            "%s: its IFCSITE is %.0f km from where its IFCMAPCONVERSION puts the model; the map conversion is taken",
+            file, 1e-3 * apart_m);
+}
+
+/* The model's origin is at the map conversion's place, and its x axis lies in the grid, which is turned from true north. */
+static int anchor_by_map(const struct config *cfg, const struct sh_report *report, const struct config_mesh *mesh,
+                         const struct ifc_site *site, struct geoframe *frame, struct sh_err *err)
+{
+    const struct ifc_map *map = &site->map;
+    struct crs_place place;
+    struct sh_err why = {0};
+    const double height_m = ifc_height(cfg, report, mesh->file, "OrthogonalHeight", map->height_m);
+    int rc = crs_locate(map->crs, map->easting_m, map->northing_m, height_m, &place, &why);
+    if (rc != SH_OK) return sh_fail(err, rc, "%s: IFCMAPCONVERSION: %s", mesh->file, why.text);
+    compare_site(report, mesh->file, site, &place);
+    if (place.accuracy_m > 0.1)
+        sh_warn(report, "%s: %s is known to %.2g m only on WGS 84", mesh->file, map->crs, place.accuracy_m);
+    return geoframe_set_tangent(frame, mesh->offset_m, &place.at, angle_deg(map->x_axis_rad - place.convergence_rad),
+                                err);
+}
+
 static int anchor_by_ifc(const struct config *cfg, const struct sh_report *report, struct geoframe *frame,
                          struct sh_err *err)
 {
@@ -48,18 +101,12 @@ static int anchor_by_ifc(const struct config *cfg, const struct sh_report *repor
     int rc = find_ifc(cfg, &mesh, err);
     if (rc == SH_OK) rc = ifc_site_read(mesh->file, &site, err);
     if (rc != SH_OK) return rc;
-    double origin_m[3], height_m = cfg->scene.anchor.height_m;
+    if (site.has_map) return anchor_by_map(cfg, report, mesh, &site, frame, err);
+    double origin_m[3];
     for (int i = 0; i < 3; i++)
         origin_m[i] = site.origin_m[i] + mesh->offset_m[i];
-    if (!cfg->scene.anchor.height_given) {
-        height_m = isnan(site.elevation_m) ? 0.0 : site.elevation_m;
-        sh_warn(report, "%s: %s, taken as height above the ellipsoid; scene.anchor.height_m can give that height",
-                mesh->file, isnan(site.elevation_m) ? "no RefElevation: 0 m" : "RefElevation counts from the sea");
-    }
-    if (site.has_map)
-        sh_warn(report, "%s: its IFCMAPCONVERSION is not read; the anchor is IFCSITE's latitude and longitude",
-                mesh->file);
-    const struct georef_place at = {site.lat_deg, site.lon_deg, height_m};
+    const struct georef_place at = {site.lat_deg, site.lon_deg,
+                                    ifc_height(cfg, report, mesh->file, "RefElevation", site.elevation_m)};
     return geoframe_set_tangent(frame, origin_m, &at, site.north_deg, err);
 }
 

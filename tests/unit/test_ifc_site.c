@@ -85,8 +85,6 @@ static void what_is_not_given(void **state)
     assert_true(site.north_deg == 0.0 && !site.has_north);
     assert_loads(load_edited("$,$,#10,$", "$,$,$,$")); /* no placement: the origin */
     assert_true(site.origin_m[0] == 0.0 && site.origin_m[1] == 0.0 && site.origin_m[2] == 0.0);
-    assert_loads(load_edited("ENDSEC;\nEND", "#20= IFCMAPCONVERSION(#5,#21,1.,2.,3.,$,$,$);\nENDSEC;\nEND"));
-    assert_true(site.has_map);
     assert_loads(load_edited("#9= ", "/* #8= IFCSITE(; */ #9= "));
     /* A plan's own context and a site without angles count for nothing. */
     assert_loads(load_edited("#5= ", "#21= IFCGEOMETRICREPRESENTATIONCONTEXT($,'Plan',2,$,#22,$);\n"
@@ -126,6 +124,69 @@ static void units(void **state)
                              "#32= IFCSIUNIT(*,.LENGTHUNIT.,$,.METRE.);"));
     assert_near(site.elevation_m, 34500.0 * 0.3048);
     assert_near(site.origin_m[1], -2000.0 * 0.3048);
+}
+
+/* The model is in millimetres. */
+static int load_map(const char *map, const char *crs)
+{
+    char text[512];
+    snprintf(text, sizeof text,
+             "#20= IFCMAPCONVERSION(#5,#21,%s);\n#21= IFCPROJECTEDCRS(%s);\n"
+             "#22= IFCSIUNIT(*,.LENGTHUNIT.,$,.METRE.);\nENDSEC;\nEND",
+             map, crs);
+    return load_edited("ENDSEC;\nEND", text);
+}
+
+static void a_map_conversion(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *map, *crs;
+        double easting_m, x_axis_rad;
+    } good[] = {
+        /* The system says its unit. */
+        {"2000.5,1000.25,30.,0.,1.,0.001", "'EPSG:2056',$,$,$,$,$,#22", 2000.5, M_PI / 2},
+        /* It doesn't: Scale leads from millimetres to metres, or to the model's own millimetres; a grid's own scale of
+         * 0.9996 changes nothing. */
+        {"2000.5,1000.25,30.,$,$,0.001", "'EPSG:2056',$,$,$,$,$,$", 2000.5, 0.0},
+        {"2000.5,1000.25,30.,1.,-1.,0.0009996", "'EPSG:2056',$,$,$,$,$,$", 2000.5, -M_PI / 4},
+        {"2000.5,1000.25,30.,1.,0.,$", "'EPSG:2056',$,$,$,$,$,$", 2.0005, 0.0},
+        {"2000.5,1000.25,30.,1.,0.,0.0032808398950131", "'EPSG:2056',$,$,$,$,$,$", 2000.5 * 0.3048, 0.0}};
+    for (size_t i = 0; i < sizeof good / sizeof good[0]; i++) {
+        const double unit_m = good[i].easting_m / 2000.5;
+        assert_loads(load_map(good[i].map, good[i].crs));
+        assert_true(site.has_map && site.has_place);
+        assert_string_equal(site.map.crs, "EPSG:2056");
+        assert_near(site.map.easting_m, good[i].easting_m);
+        assert_near(site.map.northing_m, 1000.25 * unit_m);
+        assert_near(site.map.height_m, 30.0 * unit_m);
+        assert_near(site.map.x_axis_rad, good[i].x_axis_rad);
+    }
+    /* It needs no site. */
+    assert_loads(load_edited("(52,31,30,500000),(13,24,0),34500.,$,$);",
+                             "$,$,$,$,$);\n#20= IFCMAPCONVERSION(#5,#21,1.,2.,3.,$,$,0.001);\n"
+                             "#21= IFCPROJECTEDCRS('EPSG:25832',$,$,$,$,$,$);"));
+    assert_true(site.has_map && !site.has_place);
+}
+
+static void wrong_map_conversions_are_refused(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *map, *crs, *part;
+    } bad[] = {{"1.,2.,3.,$,$", "'a',$,$,$,$,$,$", "IFCMAPCONVERSION #20: not the 8 attributes"},
+               {"1.,2.,$,$,$,0.001", "'a',$,$,$,$,$,$", "IFCMAPCONVERSION #20: a number is missing"},
+               {"1.,2.,3.,0.,0.,0.001", "'a',$,$,$,$,$,$", "an x axis without a direction"},
+               {"1.,2.,3.,$,$,0.", "'a',$,$,$,$,$,$", "a Scale that is not above 0"},
+               {"1.,2.,3.,$,$,0.5", "'a',$,$,$,$,$,$", "no unit of maps fits its Scale"},
+               {"1.,2.,3.,$,$,0.001", "'a',$,$", "IFCPROJECTEDCRS #21: attributes are missing"},
+               {"1.,2.,3.,$,$,0.001", "$,$,$,$,$,$,$", "IFCPROJECTEDCRS #21: no name"},
+               {"1.,2.,3.,$,$,0.001", "'a',$,$,$,$,$,#4", "no unit of length"}};
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+        int code = load_map(bad[i].map, bad[i].crs);
+        if (code != SH_EINPUT || strstr(err.text, bad[i].part) == NULL)
+            fail_msg("case %zu: %d \"%s\" without \"%s\"", i, code, err.text, bad[i].part);
+    }
 }
 
 static void what_is_wrong_is_refused(void **state)
@@ -229,6 +290,8 @@ int main(void)
         cmocka_unit_test(what_is_not_given),
         cmocka_unit_test(angles),
         cmocka_unit_test(units),
+        cmocka_unit_test(a_map_conversion),
+        cmocka_unit_test(wrong_map_conversions_are_refused),
         cmocka_unit_test(what_is_wrong_is_refused),
         cmocka_unit_test(damaged_files_never_crash),
         cmocka_unit_test(the_house),

@@ -331,6 +331,52 @@ static void the_house_has_its_site(void **state)
     }
 }
 
+/* A slab of 8 x 8 m. Its x axis points 30 deg to the left of grid east; scene and grid agree but for the grid's scale. */
+static const char mapped_ifc[] =
+    "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\nFILE_NAME('a','2026-01-01T00:00:00',(''),(''),'','','');\n"
+    "FILE_SCHEMA(('IFC4'));\nENDSEC;\nDATA;\n#1=IFCPERSON($,'a',$,$,$,$,$,$);\n"
+    "#2=IFCORGANIZATION($,'a',$,$,$);\n#3=IFCPERSONANDORGANIZATION(#1,#2,$);\n#4=IFCAPPLICATION(#2,'1','a','a');\n"
+    "#5=IFCOWNERHISTORY(#3,#4,$,.ADDED.,$,$,$,0);\n#6=IFCSIUNIT(*,.LENGTHUNIT.,$,.METRE.);\n#8=IFCUNITASSIGNMENT((#6));\n"
+    "#9=IFCCARTESIANPOINT((0.,0.,0.));\n#10=IFCDIRECTION((0.,0.,1.));\n#12=IFCAXIS2PLACEMENT3D(#9,$,$);\n"
+    "#13=IFCGEOMETRICREPRESENTATIONCONTEXT($,'Model',3,1.E-5,#12,$);\n"
+    "#14=IFCPROJECTEDCRS('EPSG:32632',$,$,$,$,$,$);\n"
+    "#15=IFCMAPCONVERSION(#13,#14,691000.,5334000.,520.,0.866025403784439,0.5,1.);\n"
+    "#16=IFCPROJECT('0YvctVUKr0kugbFTf50000',#5,'p',$,$,$,$,(#13),#8);\n#21=IFCLOCALPLACEMENT($,#12);\n"
+    "#22=IFCSITE('0YvctVUKr0kugbFTf50001',#5,'site',$,$,#21,$,$,.ELEMENT.,(47,0,0),(11,0,0),$,$,$);\n"
+    "#23=IFCRELAGGREGATES('0YvctVUKr0kugbFTf50002',#5,$,$,#16,(#22));\n#25=IFCCARTESIANPOINT((0.,0.));\n"
+    "#26=IFCAXIS2PLACEMENT2D(#25,$);\n#27=IFCRECTANGLEPROFILEDEF(.AREA.,$,#26,8.,8.);\n"
+    "#33=IFCEXTRUDEDAREASOLID(#27,#12,#10,0.5);\n#34=IFCSHAPEREPRESENTATION(#13,'Body','SweptSolid',(#33));\n"
+    "#35=IFCPRODUCTDEFINITIONSHAPE($,$,(#34));\n"
+    "#41=IFCBUILDINGELEMENTPROXY('0YvctVUKr0kugbFTf50003',#5,'slab',$,$,#21,#35,$,$);\n"
+    "#42=IFCRELCONTAINEDINSPATIALSTRUCTURE('0YvctVUKr0kugbFTf50004',#5,$,$,(#41),#22);\nENDSEC;\nEND-ISO-10303-21;\n";
+
+static void a_map_conversion_goes_before_a_site(void **state)
+{
+    (void)state;
+    struct georef_place want;
+    double azimuth_deg, from_grid_deg;
+    write_in("mapped.ifc", mapped_ifc);
+    write_in("test.yaml", "head: {profile: riegl-vz400i}\nscene:\n  ifc_reader: assimp\n"
+                          "  meshes: [{file: mapped.ifc, up: y, scale: 1}]\n  anchor: {source: ifc}\n"
+                          "stations:\n  - {position_m: [3, 2, 2], heading_deg: 0}\noutput: {crs: utm, layout: geo}\n");
+    site_free(site);
+    site = NULL;
+    clear_warned();
+    ok(config_load(config_path, NULL, 0, cfg, &err));
+    ok(site_load(cfg, &report, &site, &err));
+    /* 3 along x and 2 along y, turned by 30 deg; 0.03 % of grid scale on 3.6 m are 1.1 mm, 1e-8 deg. */
+    const double c = cos(M_PI / 6), grid_m[3] = {691000 + 3 * c - 2 * 0.5, 5334000 + 3 * 0.5 + 2 * c, 522};
+    ok(georef_locate_utm(32, 1, grid_m, &want, &err));
+    assert_near(site->station[0].at.place.lat_deg, want.lat_deg, 1.5e-8);
+    assert_near(site->station[0].at.place.lon_deg, want.lon_deg, 1.5e-8);
+    assert_near(site->station[0].at.place.height_m, 522, 1e-5);
+    /* Heading 0 is the model's y, 30 deg left of grid north; the second angle is from the grid. */
+    read_azimuths(&azimuth_deg, &from_grid_deg);
+    assert_near(remainder(from_grid_deg + 30, 360), 0, 1e-6);
+    assert_non_null(strstr(warned, "OrthogonalHeight counts from the sea"));
+    assert_non_null(strstr(warned, "km from where its IFCMAPCONVERSION puts the model"));
+}
+
 static int tear_down(void **state)
 {
     site_free(site);
@@ -350,6 +396,7 @@ int main(void)
         cmocka_unit_test(an_instrument_height_counts_from_the_floor),
         cmocka_unit_test(what_has_no_place_is_refused),
         cmocka_unit_test(headings_and_convergence),
+        cmocka_unit_test(a_map_conversion_goes_before_a_site),
         cmocka_unit_test(the_house_has_its_site),
     };
     return cmocka_run_group_tests(tests, site_rig_setup, tear_down);

@@ -1,0 +1,24 @@
+/* Places in a named coordinate reference system: a national grid, as maps, terrain models and building models have it.
+ * In: the system's name ("EPSG:2056", or as the EPSG registry calls it) and coordinates in metres. Out: the place on the
+ * Earth, and how the grid lies there. PROJ does it, by its tables on this machine; it asks no network.
+ *
+ * Datums are WGS 84 at the end. Between two of them PROJ takes its best transformation; accuracy_m says how good that
+ * one is. Any thread. */
+#ifndef CORE_CRS_H
+#define CORE_CRS_H
+
+#include "core/err.h"
+#include "core/georef.h"
+
+struct crs_place {
+    struct georef_place at; /* height_m is passed through */
+    double convergence_rad; /* grid north, clockwise from true north */
+    double scale;           /* length in the grid / true length, on the ellipsoid */
+    double accuracy_m;      /* of the transformation between datums; NaN: not known */
+};
+
+/* SH_EINPUT: an unknown name, a system that is not projected, or a place outside of it. */
+int crs_locate(const char *name, double easting_m, double northing_m, double height_m, struct crs_place *place,
+               struct sh_err *err);
+
+#endif

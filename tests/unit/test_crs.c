@@ -1,0 +1,105 @@
+/* Named coordinate reference systems by PROJ, against GeographicLib's UTM and against published places. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include "core/angle.h"
+#include "core/crs.h"
+
+static struct sh_err err;
+
+static void assert_near(double got, double want, double bound)
+{
+    if (!(fabs(got - want) <= bound)) fail_msg("%.12g instead of %.12g", got, want);
+}
+
+static struct crs_place located(const char *name, double easting_m, double northing_m)
+{
+    struct crs_place place;
+    if (crs_locate(name, easting_m, northing_m, 7.5, &place, &err) != SH_OK) fail_msg("%s", err.text);
+    assert_true(place.at.height_m == 7.5);
+    return place;
+}
+
+/* Two libraries of the same projection; 1e-9 degrees are 0.1 mm. WGS 84 / UTM has no other datum to come from. */
+static void utm_is_that_of_geographiclib(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *name;
+        int zone, north;
+        double easting_m, northing_m;
+    } at[] = {{"EPSG:32632", 32, 1, 691607.8, 5334760.1},
+              {"EPSG:32733", 33, 0, 260000.0, 6250000.0},
+              {"WGS 84 / UTM zone 33N", 33, 1, 500000.0, 5819711.0},
+              {"EPSG:32660", 60, 1, 740000.0, 100000.0}};
+    for (size_t i = 0; i < sizeof at / sizeof at[0]; i++) {
+        const struct crs_place place = located(at[i].name, at[i].easting_m, at[i].northing_m);
+        struct georef_place want, up;
+        const double here[3] = {at[i].easting_m, at[i].northing_m, 0}, there[3] = {here[0], here[1] + 10.0, 0};
+        assert_int_equal(georef_locate_utm(at[i].zone, at[i].north, here, &want, &err), SH_OK);
+        assert_int_equal(georef_locate_utm(at[i].zone, at[i].north, there, &up, &err), SH_OK);
+        assert_near(place.at.lat_deg, want.lat_deg, 1e-9);
+        assert_near(place.at.lon_deg, want.lon_deg, 1e-9);
+        /* Ten metres to grid north, in ECEF: their direction, and how long they are. At 10 m a chord's direction has
+         * turned by less than 2e-6 rad from the tangent at its beginning. */
+        double a[3], b[3], east_m, north_m;
+        georef_geodetic_to_ecef(&want, a);
+        georef_geodetic_to_ecef(&up, b);
+        const double lat = angle_rad(want.lat_deg), lon = angle_rad(want.lon_deg);
+        const double d[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+        east_m = cos(lon) * d[1] - sin(lon) * d[0];
+        north_m = cos(lat) * d[2] - sin(lat) * (cos(lon) * d[0] + sin(lon) * d[1]);
+        assert_near(place.convergence_rad, atan2(east_m, north_m), 4e-6);
+        assert_near(place.scale, 10.0 / hypot(east_m, north_m), 1e-8);
+    }
+}
+
+/* The fundamental point of the Swiss grid, the old observatory of Bern, is at 2,600,000 1,200,000; swisstopo gives it as
+ * 46 deg 57 min 3.9 s N, 7 deg 26 min 19.1 s E on WGS 84. Half a digit there is 1.6 m. The grid's north is true there. */
+static void the_swiss_grid(void **state)
+{
+    (void)state;
+    const struct crs_place place = located("EPSG:2056", 2600000.0, 1200000.0);
+    assert_near(place.at.lat_deg, 46.0 + 57.0 / 60 + 3.9 / 3600, 2e-5);
+    assert_near(place.at.lon_deg, 7.0 + 26.0 / 60 + 19.1 / 3600, 3e-5);
+    assert_near(place.convergence_rad, 0.0, 1e-4); /* the datums' own turn, and that of the point by their shift */
+    assert_near(place.scale, 1.0, 2e-4);           /* the datums' ellipsoids */
+    assert_true(place.accuracy_m > 0.0 && place.accuracy_m <= 5.0);
+}
+
+static void what_is_none_is_refused(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *name;
+        double easting_m;
+        const char *part;
+    } bad[] = {{"EPSG:1", 0, "EPSG:1: no such coordinate reference system; allowed is a projected"},
+               {"", 0, "no such"},
+               {"local site grid", 0, "local site grid: no such"},
+               {"EPSG:4326", 10, "EPSG:4326: not a projected"},
+               {"EPSG:4978", 10, "not a projected"},
+               {"EPSG:32632", 1e12, "outside of it"},
+               {"EPSG:32632", NAN, "outside of it"}};
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+        struct crs_place place;
+        const int code = crs_locate(bad[i].name, bad[i].easting_m, 0.0, 0.0, &place, &err);
+        if (code != SH_EINPUT || strstr(err.text, bad[i].part) == NULL)
+            fail_msg("case %zu: %d \"%s\"", i, code, err.text);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(utm_is_that_of_geographiclib),
+        cmocka_unit_test(the_swiss_grid),
+        cmocka_unit_test(what_is_none_is_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
