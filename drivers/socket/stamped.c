@@ -6,6 +6,7 @@
 #include <net/if.h>
 #include <netdb.h>
 #include <netinet/in.h>
+#include <poll.h>
 #include <stdio.h>
 #include <string.h>
 #include <time.h>
@@ -28,7 +29,7 @@ void stamped_enable(int fd)
     setsockopt(fd, SOL_SOCKET, SO_TIMESTAMPNS, &one, sizeof one);
 }
 
-/* The kernel's time; where it gave none, as to the first packets after it was asked, the time of reading. */
+/* The kernel's time; where it gave none, the time of reading: stamped_begin. */
 static int64_t time_of(const struct cmsghdr *c)
 {
     struct timespec t;
@@ -199,6 +200,21 @@ void stamped_close(struct stamped_socket *socket)
 {
     if (socket->fd >= 0) close(socket->fd);
     socket->fd = -1;
+}
+
+void stamped_begin(struct stamped_socket *keeper)
+{
+    enum { TRIES = 1000 };
+    struct stamped_datagram got;
+    struct sh_err err;
+    char byte = 0;
+    if (stamped_open("127.0.0.1", 0, keeper, &err) != SH_OK) return;
+    for (int i = 0; i < TRIES; i++) {
+        if (sendto(keeper->fd, &byte, 1, 0, (struct sockaddr *)&keeper->own, keeper->own_len) != 1) return;
+        const int64_t sent_ns = stamped_now_ns();
+        poll(NULL, 0, 1); /* a stamp of its reading is later than this */
+        if (stamped_take(keeper, &byte, 1, &got, &err) != 1 || got.t_ns <= sent_ns) return;
+    }
 }
 
 /* ---- streams */

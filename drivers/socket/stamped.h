@@ -38,6 +38,10 @@ int stamped_take(const struct stamped_socket *socket, void *buf, size_t room, st
 uint64_t stamped_dropped(const struct stamped_socket *socket);
 void stamped_close(struct stamped_socket *socket);
 
+/* The kernel stamps what comes only some time after a socket first asked it to; what came before has the time of reading.
+ * Waits until it does, a second at most. `keeper` keeps it at it until it is closed. Without a loopback nothing waits. */
+void stamped_begin(struct stamped_socket *keeper);
+
 /* ---- streams */
 
 /* Connects, and waits for that at most so long (0: as long as the system does), or until a signal comes. *fd does not

@@ -9,7 +9,7 @@ import {both, CONFIG, recorded} from './rig.mjs';
 import {equal, finish, folder, giveUpAfter, is, near, test, whenFailed} from './work.mjs';
 
 const SIZE = [600, 480], SMALL = [360, 300]; // drawing in software takes most of the time
-giveUpAfter(280); // before run_tap.sh does
+giveUpAfter(1100); // before run_tap.sh does
 
 // A head, its page, and somebody else who asks it.
 async function open(browser, ...more) {

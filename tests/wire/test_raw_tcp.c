@@ -140,28 +140,6 @@ static void test_reset(void **state)
     captured_free(&captured);
 }
 
-/* The kernel begins to stamp what comes some time after the first socket asked for it. This one asks, and waits for it. */
-static int kernel_stamps(void)
-{
-    const int one = 1, fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-    struct sockaddr_in at = {.sin_family = AF_INET};
-    struct timespec sent;
-    struct stamped_datagram got;
-    char byte;
-    at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at), 0);
-    at.sin_port = htons((uint16_t)port_of(fd));
-    assert_int_equal(setsockopt(fd, SOL_SOCKET, SO_TIMESTAMPNS, &one, sizeof one), 0);
-    const struct stamped_socket stamped = {.fd = fd};
-    do {
-        assert_int_equal(sendto(fd, "a", 1, 0, (struct sockaddr *)&at, sizeof at), 1);
-        clock_gettime(CLOCK_REALTIME, &sent);
-        poll(NULL, 0, 1); /* else it would be stamped when it is read */
-        assert_int_equal(stamped_take(&stamped, &byte, 1, &got, NULL), 1);
-    } while (got.t_ns > sent.tv_sec * INT64_C(1000000000) + sent.tv_nsec);
-    return fd;
-}
-
 /* What the other end of a connection has not read yet, bytes. */
 static unsigned unread(int fd)
 {
@@ -186,7 +164,7 @@ static void test_times(void **state)
     struct wire *wire = *state;
     struct captured captured;
     char source[64];
-    const int stamping = kernel_stamps(), device = device_open(source);
+    const int device = device_open(source);
     struct raw_recorder recorder = raw_recorder_start(wire, source, NULL);
     const int fd = take_connection(device);
     raw_recorder_stop(&recorder);
@@ -198,7 +176,6 @@ static void test_times(void **state)
         poll(NULL, 0, 1);
     close(fd);
     close(device);
-    close(stamping);
     raw_recorder_end(&recorder, 0, 0, NULL);
     captured_read(wire, &captured);
     const uint32_t i = first_from(&captured, atoi(strrchr(source, ':') + 1));

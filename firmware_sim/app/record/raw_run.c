@@ -114,9 +114,13 @@ static int follow(struct raw *r, struct sh_err *err)
 
 static int record(struct raw *r, struct sh_err *err)
 {
+    struct stamped_socket keeper;
+    stamped_begin(&keeper);
     int rc = r->ops->open(r, err);
     if (rc == SH_OK) rc = app_say_ready(r->ready_fd, put_ready, r, err);
-    return rc == SH_OK ? follow(r, err) : rc;
+    if (rc == SH_OK) rc = follow(r, err);
+    stamped_close(&keeper);
+    return rc;
 }
 
 static int check_any(const struct raw *r, struct sh_err *err)

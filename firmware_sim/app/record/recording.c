@@ -11,10 +11,11 @@
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/command/head.h"
 
-enum { REPLY_MS = 5000, NEXT_MS = 250, END_MS = 5000, BOOT_MS = 30000, REPLUG_MS = 1000, SILENT_MS = 2000 };
+enum { REPLY_MS = 5000, NEXT_MS = 250, END_MS = 5000, LAST_MS = 60000, BOOT_MS = 30000, REPLUG_MS = 1000, SILENT_MS = 2000 };
 
 struct recording {
-    int64_t heard_ns; /* when pulses came last, or when the head was last asked why none come */
+    int64_t pulses_ns; /* when pulses came last */
+    int64_t heard_ns;  /* the same, or when the head was last asked why none come */
     struct scanhead *sh;
     const struct recording_options *o;
     struct recording_result *result;
@@ -212,7 +213,7 @@ static int step(struct recording *r, int timeout_ms, struct sh_err *err)
     if (rc != SCANHEAD_OK) return sh_fail(err, rc, "%s", scanhead_error(r->sh));
     look_at(r, &frame);
     if (frame.type == SCANHEAD_POINTS) {
-        r->heard_ns = clock_now_ns();
+        r->heard_ns = r->pulses_ns = clock_now_ns();
         count_points(r, &frame);
     }
     if (r->scan_t0_ns >= 0) r->into_s = 1e-9 * (double)ns_since(frame.t_ns, r->scan_t0_ns);
@@ -261,21 +262,26 @@ static int look_for_end(struct recording *r, struct sh_err *err)
     return SH_OK;
 }
 
+/* The scan was to end at a time. A queue that is long, or a slow way, may bring pulses from before for a while. */
+static int has_waited(const struct recording *r, int64_t asked_ns)
+{
+    const int64_t now_ns = clock_now_ns(), last_ns = r->pulses_ns > asked_ns ? r->pulses_ns : asked_ns;
+    return now_ns - last_ns > (int64_t)END_MS * 1000000 || now_ns - asked_ns > (int64_t)LAST_MS * 1000000;
+}
+
 static int follow(struct recording *r, struct sh_err *err)
 {
-    int64_t end_ns = INT64_MAX;
-    int asked = 0;
+    int64_t asked_ns = 0;
     r->heard_ns = clock_now_ns();
     while (!r->scan_over) {
         if (is_interrupted(r)) r->stopping = 1;
         if (r->stopping && r->o->listen) return SH_OK;
-        if (r->stopping && !asked) {
+        if (r->stopping && asked_ns == 0) {
             int rc = stop_scan(r, err);
             if (rc != SH_OK) return rc;
-            asked = 1;
-            end_ns = clock_now_ns() + (int64_t)END_MS * 1000000;
+            asked_ns = clock_now_ns();
         }
-        if (clock_now_ns() > end_ns)
+        if (asked_ns != 0 && has_waited(r, asked_ns))
             return sh_fail(err, SH_ETIMEOUT, "the head did not end the scan within %d s", END_MS / 1000);
         int rc = step(r, NEXT_MS, err);
         if (rc < 0) return rc;
