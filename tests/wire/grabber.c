@@ -1,6 +1,7 @@
 #include "tests/wire/grabber.h"
 
 #include <pty.h>
+#include <sched.h>
 
 #define PROGRAM "/usr/bin/rawlog-grabber"
 
@@ -9,6 +10,20 @@ void grabber_or_skip(void)
     if (access(PROGRAM, X_OK) == 0) return;
     print_message("%s is not there: package mrpt-apps\n", PROGRAM);
     skip();
+}
+
+void grabber_hurry(pid_t pid)
+{
+    char path[64];
+    snprintf(path, sizeof path, "/proc/%d/task", (int)pid);
+    DIR *dir = opendir(path);
+    assert_non_null(dir);
+    for (struct dirent *entry; (entry = readdir(dir)) != NULL;) {
+        const pid_t thread = (pid_t)atoi(entry->d_name);
+        const struct sched_param param = {.sched_priority = 1};
+        if (thread != 0 && sched_getscheduler(thread) == SCHED_OTHER) sched_setscheduler(thread, SCHED_RR, &param);
+    }
+    closedir(dir);
 }
 
 void grabber_start(struct wire *wire, const char *name, const char *sensor, struct grabber *grabber)
@@ -32,6 +47,7 @@ void grabber_start(struct wire *wire, const char *name, const char *sensor, stru
     fcntl(out[1], F_SETFD, FD_CLOEXEC);
     grabber->pid = wire_fork(wire);
     if (grabber->pid == 0) {
+        grabber_hurry(getpid());
         dup2(in[0], 0);
         dup2(out[1], 1);
         dup2(out[1], 2);

@@ -24,8 +24,12 @@ void grabber_start(struct wire *wire, const char *name, const char *sensor, stru
 /* Waits until it has saved so many observations. 0: it complained before. */
 int grabber_wait(struct grabber *grabber, int n_saved);
 
-/* Both; starts it anew where it complains. This client waits 100 ms for the reply to a command and then does without
- * it. Beside eight busy processes it has them in one of three tries or so; so its user has fifteen. */
+/* All threads of a process go before others, where the kernel permits that (root, RLIMIT_RTPRIO). So does this client. It
+ * waits 100 ms for the reply to a command and then does without it, so its head has to hurry, too. */
+void grabber_hurry(pid_t pid);
+
+/* Both; starts it anew where it complains. Beside eight busy processes, and where nothing may hurry, it has its replies in
+ * one of three tries or so; so its user has fifteen. */
 void grabber_start_and_wait(struct wire *wire, const char *name, const char *sensor, int n_saved,
                             struct grabber *grabber);
 

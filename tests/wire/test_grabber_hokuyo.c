@@ -74,11 +74,12 @@ static const char *sensor_of(const struct head *head, int i)
 }
 
 /* While it boots a head refuses to measure, and this client asks once. */
-static void wait_until_it_scans(const struct head *head)
+static void let_it_scan(const struct head *head)
 {
     struct scanhead *sh = client_open(head_link(head, 2));
     client_wait_state(sh, "scanning");
     scanhead_close(sh);
+    grabber_hurry(head->pid);
 }
 
 static void test_tcp_and_pty(void **state)
@@ -90,7 +91,7 @@ static void test_tcp_and_pty(void **state)
     struct head head = head_start(wire, "config/hokuyo.yaml", house_options(wire, "13", more));
     struct house *house = house_load(wire);
     check_mark(house);
-    wait_until_it_scans(&head);
+    let_it_scan(&head);
     grabber_start_and_wait(wire, "TCP", sensor_of(&head, 0), 1, &tcp);
     grabber_start_and_wait(wire, "PTY", sensor_of(&head, 1), SCANS, &pty);
     if (!grabber_wait(&tcp, SCANS)) fail_msg("rawlog-grabber complains:\n%s", tcp.said);
@@ -110,7 +111,7 @@ static void test_urg(void **state)
     const char *const more[] = {"--set", "links.0.port=0", "--set", "head.profile=hokuyo-urg-04lx", NULL};
     struct head head = head_start(wire, "config/hokuyo.yaml", house_options(wire, "13", more));
     struct house *house = house_load(wire);
-    wait_until_it_scans(&head);
+    let_it_scan(&head);
     grabber_start_and_wait(wire, "URG", sensor_of(&head, 1), BY_HOST + 4, &pty);
     grabber_end(&pty);
     head_end(&head, SIGTERM);

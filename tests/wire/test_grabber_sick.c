@@ -105,8 +105,8 @@ static void check_log(const struct telegram *t, const struct rawlog_item *scan)
         assert_true(fabs(rawlog_range_m(scan, i) - 1e-3 * hex(t, 26 + (int)i)) < 1e-5); /* float */
 }
 
-/* Lets the client poll, and reads what it logs. Returns 0 where it took a part of a telegram for a scan: it waits 40 ms for the rest,
- * and on a busy machine that may come later. */
+/* Lets the client poll, and reads what it logs. Returns 0 where it took a part of a telegram for a scan: it waits 40 ms for
+ * the rest, and on a busy machine that may come later. */
 static int poll_scans(struct wire *wire, const char *endpoint, int number, struct rawlog *log)
 {
     static struct grabber grabber;
@@ -137,6 +137,7 @@ static void test_polled(void **state)
     const char *const more[] = {"--set", "links.0.port=0", "--set", "head.profile=sick-lms111", NULL};
     struct head head = head_start(wire, "config/sick.yaml", house_options(wire, "13", more));
     struct house *house = house_load(wire);
+    grabber_hurry(head.pid);
     for (int i = 1; !poll_scans(wire, head_link(&head, 0), i, &log); i++) {
         rawlog_free(&log);
         if (i == TRIES) fail_msg("rawlog-grabber logs parts of scans, %d times", i);
