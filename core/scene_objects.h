@@ -28,10 +28,16 @@ struct scene_objects {
     uint32_t *of; /* [n_surfaces] the object of each surface */
 };
 
+/* Takes each open edge, from a to b, prcs: those that n_open counts. */
+struct scene_open_edges {
+    void *ctx;
+    int (*take)(void *ctx, const double a[3], const double b[3], struct sh_err *err);
+};
+
 /* Corners at the same place, bit for bit, are one. Takes up to 150 bytes a triangle of the largest object while it works.
- * SH_ENOMEM, SH_ESTOPPED. scene_objects_free is due in any case. */
-int scene_objects_find(const struct scene *scene, const struct sh_report *report, struct scene_objects *objects,
-                       struct sh_err *err);
+ * edges: NULL: they are only counted. SH_ENOMEM, SH_ESTOPPED, or as edges returns. scene_objects_free is due in any case. */
+int scene_objects_find(const struct scene *scene, const struct scene_open_edges *edges, const struct sh_report *report,
+                       struct scene_objects *objects, struct sh_err *err);
 void scene_objects_free(struct scene_objects *objects);
 
 #endif

@@ -29,6 +29,7 @@ struct work {
     uint32_t *order;  /* triangles, by object */
     struct edge *edge;
     uint64_t mask, room;
+    const struct scene_open_edges *edges; /* NULL: nobody asks for them */
     const struct sh_report *report;
     struct sh_err *err;
 };
@@ -204,6 +205,25 @@ static void add_part(const struct scene_copied *copied, uint32_t label, const st
         add(&o->object[o->of[copied->copy[i].label0 + label]], part, copied->copy[i].scale);
 }
 
+/* Those of the part that was measured last. */
+static int hand_out(const struct work *w, const struct scene_copied *copied)
+{
+    int rc = SH_OK;
+    for (uint64_t i = 0; i <= w->mask && rc == SH_OK; i++) {
+        const struct edge *e = &w->edge[i];
+        if (e->low == NONE || e->uses % 2 == 0) continue;
+        const double *from = w->mesh->vertex_m[e->low], *to = w->mesh->vertex_m[e->high];
+        if (copied == NULL) rc = w->edges->take(w->edges->ctx, from, to, w->err);
+        for (uint32_t k = 0; copied != NULL && k < copied->n && rc == SH_OK; k++) {
+            double a[3], b[3];
+            scene_copy_put(&copied->copy[k], from, a);
+            scene_copy_put(&copied->copy[k], to, b);
+            rc = w->edges->take(w->edges->ctx, a, b, w->err);
+        }
+    }
+    return rc;
+}
+
 /* Triangles of the mesh by object, by counting: begin[k] is where those of object k begin. */
 static void sort(struct work *w, const struct scene_objects *o, const uint32_t *of_label, uint32_t *begin)
 {
@@ -235,6 +255,7 @@ static int add_mesh(const struct scene *scene, const struct scene_copied *copied
         if (n == 0) continue;
         rc = measure(w, w->order + begin[k], n, &part);
         if (rc == SH_OK) add_part(copied, mesh->label[w->order[begin[k]]] - mesh->label0, &part, o);
+        if (rc == SH_OK && w->edges != NULL && part.state == SCENE_OBJECT_OPEN) rc = hand_out(w, copied);
         sh_progress(w->report, "measuring objects", (double)begin[k + 1] / mesh->n_triangles);
     }
     free(begin);
@@ -244,10 +265,10 @@ static int add_mesh(const struct scene *scene, const struct scene_copied *copied
     return rc;
 }
 
-int scene_objects_find(const struct scene *scene, const struct sh_report *report, struct scene_objects *objects,
-                       struct sh_err *err)
+int scene_objects_find(const struct scene *scene, const struct scene_open_edges *edges, const struct sh_report *report,
+                       struct scene_objects *objects, struct sh_err *err)
 {
-    struct work w = {.report = report, .err = err};
+    struct work w = {.edges = edges, .report = report, .err = err};
     *objects = (struct scene_objects){0};
     int rc = group(scene, objects, err);
     if (rc == SH_OK && scene->n_triangles > 0) rc = add_mesh(scene, NULL, &w, objects);

@@ -191,7 +191,7 @@ static int add_part(struct parts *parts, const struct scene *scene, const struct
 {
     struct part *p = &parts->part[parts->n++];
     *p = (struct part){.scene = scene, .is_mover = mover != NULL, .mesh = mover != NULL ? mover->number : 0};
-    int rc = scene_objects_find(scene, &app_report_seconds, &p->objects, err);
+    int rc = scene_objects_find(scene, NULL, &app_report_seconds, &p->objects, err);
     if (rc != SH_OK) return rc;
     p->order = malloc(((size_t)p->objects.n + 1) * sizeof *p->order);
     if (p->order == NULL) return sh_fail(err, SH_ENOMEM, "no memory to sort %u objects", p->objects.n);

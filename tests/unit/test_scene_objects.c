@@ -23,10 +23,30 @@ static struct scene *load_bodies(const char *text, double x_m, struct scene_plac
     return scene;
 }
 
+static uint64_t n_taken;
+static double length_m;
+
+static int take(void *ctx, const double a[3], const double b[3], struct sh_err *err)
+{
+    (void)ctx;
+    (void)err;
+    n_taken++;
+    length_m += sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
+    return SH_OK;
+}
+
+/* The edges that are handed out are those that are counted. */
 static void find(const struct scene *scene, struct scene_objects *o)
 {
+    static const struct scene_open_edges all = {NULL, take}, *edges = &all;
     struct sh_err err;
-    assert_int_equal(scene_objects_find(scene, NULL, o, &err), SH_OK);
+    uint64_t n_open = 0;
+    n_taken = 0;
+    length_m = 0.0;
+    assert_int_equal(scene_objects_find(scene, edges, NULL, o, &err), SH_OK);
+    for (uint32_t i = 0; i < o->n; i++)
+        n_open += o->object[i].n_open;
+    assert_int_equal(n_taken, n_open);
 }
 
 /* A metre near 5,000 km is rounded to 1e-9, and each of 12 faces takes some of it. */
@@ -141,6 +161,7 @@ static void copies_count(void **state)
             area_m2 += is_box ? o.object[i].area_m2 : 0;
             volume_m3 += is_box ? o.object[i].volume_m3 : 0;
         }
+        is_near(length_m, (2 + 3 + sqrt(13)) * (1 + 2 + 0.5)); /* of the lids */
         is_near(area_m2, 52 * (1 + 4 + 0.25));
         is_near(volume_m3, 24 * (1 + 8 + 0.125));
         scene_objects_free(&o);
