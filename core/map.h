@@ -30,6 +30,7 @@ enum {
     MAP_MAX_SIDE_PX = 16384,   /* longest side of the map */
     MAP_MAX_PIXELS = 16777216, /* of the map: 16 bytes each while it is made, 256 MiB */
     MAP_MAX_STATIONS = 4096,
+    MAP_MAX_EDGES = 100000, /* an SVG has a line for each */
     MAP_MIN_WIDTH_PX = 512, /* of the image; a narrower map is centred */
     MAP_NAME_LEN = 96,
 };
@@ -59,10 +60,15 @@ struct map_station {
 /* SH_EINPUT outside the area or beyond MAP_MAX_STATIONS. */
 int map_add_station(struct map *map, const struct map_station *station, struct sh_err *err);
 
+/* A line from a to b, prcs, as an open edge of the scene: red, under the stations. Ends outside of the area are moved to its border.
+ * Beyond MAP_MAX_EDGES it is left out and counted. SH_ENOMEM. */
+int map_add_edge(struct map *map, const double a[2], const double b[2], struct sh_err *err);
+
 struct map_counts {
     uint64_t drawn;   /* points that lie in the area */
     uint64_t outside; /* points beyond the area, or with |z| above MAP_MAX_Z_M */
     uint64_t empty;   /* points that are not finite */
+    uint64_t edges, edges_left_out;
 };
 void map_get_counts(const struct map *map, struct map_counts *counts);
 

@@ -25,7 +25,11 @@
 enum scene_up { SCENE_UP_Z, SCENE_UP_Y };
 
 enum {
-    SCENE_NAME_LEN = 256,       /* of an object or a material, with its NUL; longer names are cut, counted */
+    /* Of an object or a material, with its NUL. Longer names are cut, counted, and end in a number of the whole name, so
+     * that no two become one. */
+    SCENE_NAME_LEN = 256,
+    SCENE_TYPE_LEN = 64,        /* of a product's type, with its NUL */
+    SCENE_GUID_LEN = 24,        /* of its GlobalId, likewise */
     SCENE_MAX_SURFACES = 65534, /* labels are 16 bits on the wire; 0xffff means "none" */
 };
 
@@ -68,6 +72,10 @@ struct scene_mesh_spec {
     struct scene_places places;
 };
 
+/* A name of n bytes, and its NUL, into `room` bytes, at least 32. 1: it was too long, is cut between two characters of UTF-8,
+ * and ends in a number of all its bytes. */
+int scene_copy_name(char *out, size_t room, const char *name, size_t n);
+
 /* One surface label: an object of the file with one material.
  * Object: .obj the last o or g, else (and for .ply) the file's name without folder and ending; for the others
  * the node's name, or the mesh's where that is empty. */
@@ -79,6 +87,8 @@ struct scene_surface {
     uint16_t texture; /* of the diffuse colour: 1 + its number in the scene's textures; 0: none */
     uint16_t opacity; /* what cuts holes, likewise; 0: the alpha of texture does */
     float solid;      /* what is less opaque than this is a hole: 0.5, or what the format says; 0: there are none */
+    /* Of a product of IFC; else empty. */
+    char type[SCENE_TYPE_LEN], guid[SCENE_GUID_LEN];
 };
 
 /* An image that lies on surfaces. */
@@ -185,6 +195,10 @@ int scene_keep(struct scene *scene, const uint8_t *keep, struct sh_err *err);
 /* Finds triangles that have the same three corners, however they are written, and the same holes, as one with a lower
  * number: bit i % 64 of (*twin)[i / 64], to be freed. SH_ENOMEM, SH_ESTOPPED. */
 int scene_find_twins(const struct scene *scene, const struct sh_report *report, uint64_t **twin, struct sh_err *err);
+
+/* (*same)[i] is the first of the scene's own vertices at the place of vertex i, bit for bit; to be freed. SH_ENOMEM,
+ * SH_ESTOPPED. */
+int scene_find_same(const struct scene *scene, const struct sh_report *report, uint32_t **same, struct sh_err *err);
 
 void scene_free(struct scene *scene);
 

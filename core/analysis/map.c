@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/analysis/map_inside.h"
+#include "core/grow.h"
 
 /* A level must be higher than noise and slope of a floor within one pixel. */
 #define LEVEL_MIN_M 0.1
@@ -69,6 +70,7 @@ void map_free(struct map *map)
 {
     if (map == NULL) return;
     free(map->pixel);
+    free(map->edge);
     free(map);
 }
 
@@ -113,6 +115,22 @@ int map_add_station(struct map *map, const struct map_station *station, struct s
         return sh_fail(err, SH_EINPUT, "map: station at x %g m, y %g m; allowed x %g to %g, y %g to %g", station->x_m,
                        station->y_m, map->min_m[0], map->max_m[0], map->min_m[1], map->max_m[1]);
     map->station[map->n_stations++] = *station;
+    return SH_OK;
+}
+
+int map_add_edge(struct map *map, const double a[2], const double b[2], struct sh_err *err)
+{
+    if (map->counts.edges == MAP_MAX_EDGES) {
+        map->counts.edges_left_out++;
+        return SH_OK;
+    }
+    if (!grow(&map->edge, &map->room_edges, map->counts.edges + 1, sizeof *map->edge))
+        return sh_fail(err, SH_ENOMEM, "map: no memory for %d edges", (int)MAP_MAX_EDGES);
+    for (int k = 0; k < 2; k++) {
+        map->edge[map->counts.edges][0][k] = fmin(fmax(a[k], map->min_m[k]), map->max_m[k]);
+        map->edge[map->counts.edges][1][k] = fmin(fmax(b[k], map->min_m[k]), map->max_m[k]);
+    }
+    map->counts.edges++;
     return SH_OK;
 }
 

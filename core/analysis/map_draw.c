@@ -111,12 +111,30 @@ int map_draw_pixels(const struct map *map, struct picture *out, struct sh_err *e
     return SH_OK;
 }
 
-void map_station_place(const struct map *map, uint32_t station, double place[2])
+void map_place(const struct map *map, double x_m, double y_m, double place[2])
 {
     struct map_layout at;
     map_get_layout(map, &at);
-    place[0] = at.left + (map->station[station].x_m - map->min_m[0]) / map->pixel_m;
-    place[1] = at.top + map->height - (map->station[station].y_m - map->min_m[1]) / map->pixel_m;
+    place[0] = at.left + (x_m - map->min_m[0]) / map->pixel_m;
+    place[1] = at.top + map->height - (y_m - map->min_m[1]) / map->pixel_m;
+}
+
+void map_station_place(const struct map *map, uint32_t station, double place[2])
+{
+    map_place(map, map->station[station].x_m, map->station[station].y_m, place);
+}
+
+static void draw_edges(const struct map *map, struct pen *pen)
+{
+    if (map->counts.edges == 0) return;
+    pen->begin(pen->on, "edges", "open edges of the scene");
+    for (uint64_t i = 0; i < map->counts.edges; i++) {
+        double from[2], to[2];
+        map_place(map, map->edge[i][0][0], map->edge[i][0][1], from);
+        map_place(map, map->edge[i][1][0], map->edge[i][1][1], to);
+        pen->line(pen->on, from, to, 2, red);
+    }
+    pen->end(pen->on);
 }
 
 static void draw_triangle_about(struct pen *pen, const double at[2], double size, const uint8_t rgb[3])
@@ -242,6 +260,7 @@ int map_draw_marks(const struct map *map, struct pen *pen, struct sh_err *err)
     map_get_layout(map, &at);
     const struct height_range range = find_heights(map);
     const long margin = at.left < 24 ? (long)at.left : 24, row = (long)(at.top + at.map_height) + 30;
+    draw_edges(map, pen);
     draw_scale(map, margin, row, pen);
     if (range.high_m > range.low_m) draw_heights(range, margin + BAR_PX + 30, row, pen);
     draw_north((long)at.width - margin - 30, row, pen);

@@ -20,6 +20,8 @@ struct map {
     struct map_pixel *pixel; /* [height][width], the lowest y first */
     uint32_t n_stations;
     struct map_station station[MAP_MAX_STATIONS];
+    double (*edge)[2][2]; /* [counts.edges] ends, x and y */
+    size_t room_edges;
     struct map_counts counts;
 };
 
@@ -27,7 +29,8 @@ struct map {
 void map_colour(double structure, double height, uint8_t rgb[3]);
 /* The same of the pixels about a place, 0..1: 1 is a wall. */
 double map_structure(const struct map *map, uint32_t column, uint32_t row);
-/* Where a station is in the image. */
+/* Where a place is in the image, and a station. */
+void map_place(const struct map *map, double x_m, double y_m, double place[2]);
 void map_station_place(const struct map *map, uint32_t station, double place[2]);
 
 enum {

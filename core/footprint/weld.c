@@ -38,45 +38,6 @@ static uint64_t power_of_two(uint64_t least)
     return n;
 }
 
-static uint64_t place_key(const double p[3])
-{
-    uint64_t key = 0;
-    for (int i = 0; i < 3; i++) {
-        double x = p[i] + 0.0; /* no negative zeros */
-        uint64_t bits;
-        memcpy(&bits, &x, sizeof bits);
-        key = rng_mix(key + bits);
-    }
-    return key;
-}
-
-static int same_vertices(struct weld *w, struct sh_err *err)
-{
-    const struct scene *scene = w->scene;
-    uint64_t size = power_of_two(2 * (uint64_t)scene->n_vertices);
-    uint32_t *table = malloc(size * sizeof *table);
-    w->same = malloc((size_t)scene->n_vertices * sizeof *w->same);
-    if (table == NULL || w->same == NULL) {
-        free(table);
-        return sh_fail(err, SH_ENOMEM, "beam: no memory for %u corners", scene->n_vertices);
-    }
-    memset(table, 0xff, size * sizeof *table);
-    int rc = SH_OK;
-    for (uint32_t i = 0; i < scene->n_vertices && rc == SH_OK; i++) {
-        if ((i & 0xffff) == 0) rc = sh_check_stop(w->report, err);
-        const double *p = scene->vertex_m[i];
-        uint64_t at = place_key(p) & (size - 1);
-        for (; table[at] != NONE; at = (at + 1) & (size - 1)) {
-            const double *q = scene->vertex_m[table[at]];
-            if (p[0] == q[0] && p[1] == q[1] && p[2] == q[2]) break;
-        }
-        if (table[at] == NONE) table[at] = i;
-        w->same[i] = table[at];
-    }
-    free(table);
-    return rc;
-}
-
 static uint64_t find_edge(struct weld *w, uint32_t low, uint32_t high)
 {
     uint64_t at = rng_mix((uint64_t)low << 32 | high) & w->mask;
@@ -159,7 +120,7 @@ int outline_find(const struct beam_outlines_spec *spec, struct beam_outlines *o,
     w.of = kind != NULL ? malloc(size * sizeof *w.of) : NULL;
     int rc = w.slot == NULL || w.sides == NULL || (kind != NULL && w.of == NULL)
                  ? sh_fail(err, SH_ENOMEM, "beam: no memory for the edges of %u triangles", scene->n_triangles)
-                 : same_vertices(&w, err);
+                 : scene_find_same(scene, spec->report, &w.same, err);
     if (rc == SH_OK) {
         memset(w.slot, 0xff, size * sizeof *w.slot);
         rc = add_triangles(&w, err);

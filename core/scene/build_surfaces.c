@@ -1,11 +1,14 @@
 /* Surfaces of the scene that is being built: labels, names, textures. */
 #include "core/scene/build.h"
 
+#include <inttypes.h>
 #include <search.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+
+#include "core/rng.h"
 
 static int compare_surfaces(const void *a, const void *b)
 {
@@ -14,19 +17,31 @@ static int compare_surfaces(const void *a, const void *b)
     return order != 0 ? order : strcmp(x->material, y->material);
 }
 
-/* Cut between two characters of UTF-8, not within one. */
-static unsigned copy_name(char out[SCENE_NAME_LEN], struct text_span name)
+/* A number of all its bytes: names with the same beginning stay apart. */
+static uint64_t number_of(const char *name, size_t n)
 {
-    size_t len = name.n;
-    bool cut = len > SCENE_NAME_LEN - 1;
-    if (cut) {
-        len = SCENE_NAME_LEN - 1;
-        while (len > 0 && ((unsigned char)name.p[len] & 0xc0) == 0x80)
-            len--;
+    uint64_t number = n;
+    for (size_t i = 0; i < n; i++)
+        number = rng_mix(number + (unsigned char)name[i]);
+    return number;
+}
+
+int scene_copy_name(char *out, size_t room, const char *name, size_t n)
+{
+    char tail[24];
+    size_t len = n;
+    if (len < room) {
+        memcpy(out, name, len);
+        out[len] = '\0';
+        return 0;
     }
-    memcpy(out, name.p, len);
-    out[len] = '\0';
-    return cut ? 1 : 0;
+    const size_t tail_len = (size_t)snprintf(tail, sizeof tail, "~%016" PRIx64, number_of(name, n));
+    len = room - 1 - tail_len;
+    while (len > 0 && ((unsigned char)name[len] & 0xc0) == 0x80)
+        len--; /* not within a character of UTF-8 */
+    memcpy(out, name, len);
+    memcpy(out + len, tail, tail_len + 1);
+    return 1;
 }
 
 int build_label(struct scene_build *b, struct text_span object, struct text_span material, uint16_t *label,
@@ -37,17 +52,20 @@ int build_label(struct scene_build *b, struct text_span object, struct text_span
     fresh->has_colour = 0;
     fresh->texture = fresh->opacity = 0;
     fresh->solid = 0.5f;
-    unsigned cut = copy_name(fresh->object, object);
-    cut += copy_name(fresh->material, material);
+    fresh->type[0] = fresh->guid[0] = '\0';
+    int cut = scene_copy_name(fresh->object, sizeof fresh->object, object.p, object.n);
+    cut += scene_copy_name(fresh->material, sizeof fresh->material, material.p, material.n);
     struct scene_surface **found = tsearch(fresh, &b->surface_tree, compare_surfaces);
     if (found == NULL) return build_fail(b, SH_ENOMEM, err, "no memory for the scene's surfaces");
     if (*found == fresh) {
         if (s->n_surfaces == SCENE_MAX_SURFACES)
-            return build_fail(b, SH_EINPUT, err,
-                              "too many surfaces (an object with one material each): a scene holds up to %d",
-                              SCENE_MAX_SURFACES);
+            return build_fail(
+                b, SH_EINPUT, err,
+                "too many surfaces (an object with one material each): a scene holds up to %d, since labels "
+                "have 16 bits; join objects in the file, or scan parts of it, each with a configuration",
+                SCENE_MAX_SURFACES);
         s->n_surfaces++;
-        b->counts.names_cut += cut;
+        b->counts.names_cut += (unsigned)cut;
     }
     *label = (uint16_t)(*found - s->surface);
     return SH_OK;

@@ -57,14 +57,11 @@ uint64_t scene_n_kept(const struct scene *scene)
 /* "OBJECT 17": the number always has room. */
 static void name_object(char object[SCENE_NAME_LEN], size_t number)
 {
-    char tail[24];
+    char tail[24], name[SCENE_NAME_LEN];
     const size_t len = (size_t)snprintf(tail, sizeof tail, " %zu", number);
-    size_t end = strlen(object);
-    if (end + len > SCENE_NAME_LEN - 1) {
-        end = SCENE_NAME_LEN - 1 - len;
-        while (end > 0 && ((unsigned char)object[end] & 0xc0) == 0x80)
-            end--; /* not within a character of UTF-8 */
-    }
+    scene_copy_name(name, SCENE_NAME_LEN - len, object, strlen(object));
+    const size_t end = strlen(name);
+    memcpy(object, name, end);
     memcpy(object + end, tail, len + 1);
 }
 

@@ -1,5 +1,6 @@
 /* Places around the scene, from which it is looked at. */
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "core/angle.h"
@@ -24,10 +25,15 @@ static double distance_m(const struct survey *s, const double toward[3])
     return fmin(far_m, half_m + 0.3 * v->range_max_m + v->range_min_m);
 }
 
-/* The part of the view that holds the scene's bounds, as seen from p with the azimuth `ahead` in its middle. */
+/* The part of the view that holds the bounds, as seen from p with the azimuth `ahead` in its middle. */
 static void frame(const struct survey *s, double ahead_rad, struct standpoint *at)
 {
-    const double *p = at->position_m, *low = s->scene->min_m, *high = s->scene->max_m;
+    const double *p = at->position_m;
+    double low[3], high[3];
+    for (int i = 0; i < 3; i++) {
+        low[i] = s->centre_m[i] - 0.5 * s->size_m[i];
+        high[i] = s->centre_m[i] + 0.5 * s->size_m[i];
+    }
     double left = 0.0, right = 0.0, near_m[2], far_m = 0.0;
     for (int i = 0; i < 4; i++) {
         double x = (i & 1 ? high : low)[0] - p[0], y = (i & 2 ? high : low)[1] - p[1];
@@ -75,9 +81,93 @@ void survey_outside(struct survey *s, struct standpoint *out)
         struct survey_sight sight = look(s, &at);
         double liked = height_worth[k / SIDES] * side_worth[k % SIDES] * (0.5 + 0.5 * sight.front);
         double value = sight.seen * at.pan_rad * (at.line1_rad - at.line0_rad) * liked;
+        if (s->is_part) value *= sight.front; /* a place between bodies, not within one */
         if (value <= best) continue;
         best = value;
         *out = at;
         out->seen = sight.seen;
     }
+}
+
+/* ---- a part of the scene */
+
+struct cells {
+    uint32_t n[2];
+    double size_m;
+    double *area_m2;
+};
+
+static uint32_t cell_of(const struct survey *s, const struct cells *c, const double corner[3][3])
+{
+    uint32_t at[2];
+    for (int k = 0; k < 2; k++) {
+        const double middle = (corner[0][k] + corner[1][k] + corner[2][k]) / 3.0 - s->scene->min_m[k];
+        at[k] = (uint32_t)fmin(fmax(floor(middle / c->size_m), 0.0), c->n[k] - 1.0);
+    }
+    return at[1] * c->n[0] + at[0];
+}
+
+static void fill(const struct survey *s, struct cells *c)
+{
+    for (uint32_t i = 0; i < s->scene->n_all; i++) {
+        double corner[3][3], u[3], v[3], n[3];
+        scene_corners(s->scene, i, corner);
+        vec3_sub(corner[1], corner[0], u);
+        vec3_sub(corner[2], corner[0], v);
+        vec3_cross(u, v, n);
+        c->area_m2[cell_of(s, c, (const double(*)[3])corner)] += 0.5 * vec3_length(n);
+    }
+}
+
+/* That with the most surface; among equals, up to rounding, the one nearest to the middle. */
+static uint32_t find_fullest(const struct cells *c)
+{
+    uint32_t best = 0;
+    double best_aside = INFINITY, most_m2 = 0.0;
+    for (uint32_t i = 0; i < c->n[0] * c->n[1]; i++)
+        most_m2 = fmax(most_m2, c->area_m2[i]);
+    for (uint32_t i = 0; i < c->n[0] * c->n[1]; i++) {
+        const double aside = hypot(i % c->n[0] + 0.5 - 0.5 * c->n[0], (double)(i / c->n[0]) + 0.5 - 0.5 * c->n[1]);
+        if (c->area_m2[i] < most_m2 * (1.0 - 1e-6) || aside >= best_aside) continue;
+        best = i;
+        best_aside = aside;
+    }
+    return best;
+}
+
+/* From here on the survey looks at the bounds of what is in that cell. */
+static void narrow(struct survey *s, const struct cells *c, uint32_t cell)
+{
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (uint32_t i = 0; i < s->scene->n_all; i++) {
+        double corner[3][3];
+        scene_corners(s->scene, i, corner);
+        if (cell_of(s, c, (const double(*)[3])corner) != cell) continue;
+        for (int v = 0; v < 3; v++)
+            for (int k = 0; k < 3; k++) {
+                low[k] = fmin(low[k], corner[v][k]);
+                high[k] = fmax(high[k], corner[v][k]);
+            }
+    }
+    vec3_sub(high, low, s->size_m);
+    for (int k = 0; k < 3; k++)
+        s->centre_m[k] = low[k] + 0.5 * s->size_m[k];
+    s->radius_m = 0.5 * vec3_length(s->size_m);
+    s->is_part = 1;
+}
+
+int survey_narrow(struct survey *s, struct sh_err *err)
+{
+    enum { MOST_CELLS = 64 };
+    struct cells c = {.size_m = 0.25 * s->view->range_max_m};
+    for (int k = 0; k < 2; k++)
+        c.size_m = fmax(c.size_m, s->size_m[k] / MOST_CELLS);
+    for (int k = 0; k < 2; k++)
+        c.n[k] = (uint32_t)fmax(ceil(s->size_m[k] / c.size_m), 1.0);
+    c.area_m2 = calloc((size_t)c.n[0] * c.n[1], sizeof *c.area_m2);
+    if (c.area_m2 == NULL) return sh_fail(err, SH_ENOMEM, "no memory to look for a part of the scene");
+    fill(s, &c);
+    narrow(s, &c, find_fullest(&c));
+    free(c.area_m2);
+    return SH_OK;
 }

@@ -5,6 +5,20 @@
 
 #include "core/standpoint/survey.h"
 
+/* From outside a wide and sparse scene shows next to nothing: then a part of it is looked at. */
+static int look_from_outside(struct survey *s, struct standpoint *out, struct sh_err *err)
+{
+    const double least_seen = 0.02;
+    struct standpoint part = {0};
+    survey_outside(s, out);
+    if (out->seen >= least_seen) return SH_OK;
+    const int rc = survey_narrow(s, err);
+    if (rc != SH_OK) return rc;
+    survey_outside(s, &part);
+    if (part.seen > out->seen) *out = part;
+    return SH_OK;
+}
+
 static int find(struct survey *s, const struct sh_report *report, struct standpoint *out, struct sh_err *err)
 {
     struct survey_best best = {0};
@@ -15,9 +29,9 @@ static int find(struct survey *s, const struct sh_report *report, struct standpo
     else if (best.ground_score > 0.0)
         *out = best.ground;
     else
-        survey_outside(s, out);
+        rc = look_from_outside(s, out, err);
     out->faces_out = out->kind != STANDPOINT_INSIDE && best.faces_out;
-    return SH_OK;
+    return rc;
 }
 
 int standpoint_find(const struct scene *scene, const struct standpoint_view *view, const struct sh_report *report,

@@ -18,6 +18,7 @@ struct survey {
     const struct scene *scene;
     const struct standpoint_view *view;
     double centre_m[3], size_m[3], radius_m; /* of the bounds, and of the sphere around them */
+    int is_part;                             /* the bounds are those of a part of the scene */
     const struct bvh *bvh;
     struct bvh *own; /* NULL: borrowed */
     struct bvh_work *work;
@@ -60,5 +61,7 @@ int survey_floors(struct survey *s, const struct sh_report *report, struct surve
 
 /* outside.c */
 void survey_outside(struct survey *s, struct standpoint *out);
+/* The bounds become those of the part that has the most surface: a cell of a quarter of the range. */
+int survey_narrow(struct survey *s, struct sh_err *err);
 
 #endif

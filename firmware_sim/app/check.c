@@ -6,6 +6,7 @@
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/check_heads.h"
 #include "firmware_sim/app/check_places.h"
+#include "firmware_sim/app/check_scene.h"
 #include "firmware_sim/device/head_clock.h"
 #include "firmware_sim/loop/pose_feed.h"
 
@@ -151,13 +152,43 @@ static int print_time(const struct config *cfg, struct sh_err *err)
     return SH_OK;
 }
 
-static int check(struct config *cfg, void *ctx, struct sh_err *err)
+struct check_run {
+    struct app_input in;
+    int scene;       /* --scene */
+    const char *csv; /* --scene-csv */
+    unsigned n_warnings;
+};
+
+/* Warnings as they are, counted. */
+static void warn(void *ctx, const char *text)
+{
+    struct check_run *run = ctx;
+    run->n_warnings++;
+    app_report_stderr.warn(app_report_stderr.ctx, text);
+}
+
+static void progress(void *ctx, const char *what, double fraction)
 {
     (void)ctx;
+    app_report_stderr.progress(app_report_stderr.ctx, what, fraction);
+}
+
+static int stop(void *ctx)
+{
+    (void)ctx;
+    return app_report_stderr.stop(app_report_stderr.ctx);
+}
+
+static int check(struct config *cfg, void *ctx, struct sh_err *err)
+{
+    struct check_run *run = ctx;
+    const struct sh_report report = {.ctx = run, .warn = warn, .progress = progress, .stop = stop};
     struct sites sites = {0};
-    int rc = sites_load(cfg, &app_report_stderr, &sites, err);
+    int rc = sites_load(cfg, &report, &sites, err);
     if (rc == SH_OK) rc = check_links(cfg, err);
     if (rc == SH_OK) rc = print_summary(cfg, &sites, err);
+    if (rc == SH_OK && (run->scene || run->csv != NULL))
+        rc = check_print_scene(sites.first, run->n_warnings, run->csv, run->scene ? stdout : NULL, err);
     if (rc == SH_OK) rc = print_time(cfg, err);
     sites_free(&sites);
     return rc;
@@ -165,9 +196,9 @@ static int check(struct config *cfg, void *ctx, struct sh_err *err)
 
 static int run(int argc, char **argv)
 {
-    struct app_input in = {0};
-    int status = app_parse(&app_check, argc, argv, &in, &in);
-    return status == APP_GO_ON ? app_with_config(&in, check, NULL) : status;
+    struct check_run r = {0};
+    const int status = app_parse(&app_check, argc, argv, &r.in, &r);
+    return status == APP_GO_ON ? app_with_config(&r.in, check, &r) : status;
 }
 
 static int print_example(void *values, const char *text)
@@ -187,7 +218,12 @@ static int print_section(const char *section)
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
     OPTION_SET,
-    {APP_TEXT, "scenario", "FILE", .at = offsetof(struct app_input, scenario), .file = APP_READS,
+    {APP_FLAG, "scene", NULL, .at = offsetof(struct check_run, scene),
+     .help = "print what was read: objects with triangles, open edges, area, volume and colour, the 50 largest first; "
+             "their sum; those that are open, by name"},
+    {APP_TEXT, "scene-csv", "FILE", .at = offsetof(struct check_run, csv), .file = APP_WRITES,
+     .help = "write all objects, with IFC type and GlobalId, as CSV; - is standard output"},
+    {APP_TEXT, "scenario", "FILE", .at = offsetof(struct check_run, in.scenario), .file = APP_READS,
      .help = "with the faults of this file; a bare name is one of config/faults"},
     {APP_PRINT, "example", NULL, .apply = print_example,
      .help = "print a configuration with all keys, each with its help and its default, that passes this check"},
@@ -205,6 +241,11 @@ const struct app_command app_check = {
         "Prints the scanners, the memory that the scene takes, and where it and each station stand, in every frame\n"
         "that is known. Opens each link but files and closes it again, so that a taken port or a wrong path shows.\n"
         "Of a wrong configuration all faults are shown, up to 20, each with its line.\n"
+        "\n"
+        "--scene: an edge is open where only one triangle of the object has it, with corners at the same place, bit\n"
+        "for bit. A closed body has a volume, below 0 where its faces look inward. Where corners of one side lie in\n"
+        "the middle of edges of the other it is closed, too. In a turned one no edge is open, but faces beside each\n"
+        "other look to different sides.\n"
         "\n"
         "--help SECTION prints the keys of one section: --help head, --help scene.anchor. --help profile prints\n"
         "those of head profiles.\n"

@@ -131,12 +131,10 @@ static int name_ghosts(struct site *site, struct sh_err *err)
     if (ghost == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the names of ghosts");
     for (uint32_t i = 0; i < n; i++) {
         const struct scene_surface *of = site_surface(site, i);
-        int room = SCENE_NAME_LEN - (int)sizeof GHOST, len = (int)strlen(of->object);
-        if (len > room)
-            for (len = room; len > 0 && ((unsigned char)of->object[len] & 0xc0) == 0x80;)
-                len--; /* between two characters of UTF-8 */
+        const size_t before = sizeof GHOST - 1;
         ghost[i] = *of;
-        snprintf(ghost[i].object, SCENE_NAME_LEN, "%s%.*s", GHOST, len, of->object);
+        memcpy(ghost[i].object, GHOST, before);
+        scene_copy_name(ghost[i].object + before, SCENE_NAME_LEN - before, of->object, strlen(of->object));
     }
     d->ghost = ghost; /* from here on site_surface knows them */
     d->n_real = n;

@@ -170,6 +170,8 @@ static void schemas_units_and_places(void **state)
     must_read(1e-3);
     assert_int_equal(scene->n_surfaces, 2);
     assert_string_equal(scene->surface[0].object, "IfcWall_M\xc3\xbcnchen_guid_of_product__00000");
+    assert_string_equal(scene->surface[0].type, "IfcWall");
+    assert_string_equal(scene->surface[0].guid, "guid_of_product__00000");
     assert_non_null(strstr(scene->surface[1].object, "that names once had_guid_of_product__00001"));
     assert_true(fabs(total_area(scene) - 56) < 56e-6);
     scene_free(scene);
@@ -345,6 +347,24 @@ static void without_node_assimp_reads(void **state)
     free(had);
 }
 
+/* One product more than labels, all of one shape: refused by the records, before minutes go into bodies. */
+static void too_many_products(void **state)
+{
+    (void)state;
+    needs_readers();
+    ifc_write_text(text, "IFC4", NULL, NULL, ifc_shapes, 1, NULL);
+    char *end = strstr(text, "ENDSEC;\nEND-ISO"), *all = NULL;
+    size_t len;
+    FILE *out = open_memstream(&all, &len);
+    fwrite(text, 1, (size_t)(end - text), out);
+    for (unsigned i = 0; i < SCENE_MAX_SURFACES; i++)
+        fprintf(out, "#%u=IFCBUILDINGELEMENTPROXY('guid_of_copy_%05u',#5,'n',$,$,#1003,#1002,$,$);\n", 2000 + i, i);
+    fputs(end, out);
+    assert_int_equal(fclose(out), 0);
+    refuse("a.ifc", all, len, "65535 products with bodies, each of which is a surface at least");
+    free(all);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -352,6 +372,7 @@ int main(void)
         cmocka_unit_test(facets_hold_the_tolerance),
         cmocka_unit_test(openings_and_styles),
         cmocka_unit_test(schemas_units_and_places),
+        cmocka_unit_test(too_many_products),
         cmocka_unit_test(house_is_whole),
         cmocka_unit_test(one_reader_may_fail),
         cmocka_unit_test(reader_that_hangs_is_ended),

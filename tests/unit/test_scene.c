@@ -72,17 +72,25 @@ static void zero_area_is_counted(void **state)
     scene_free(s);
 }
 
+/* Two names that differ in their last byte alone, and whose cut would fall into a character of two bytes, stay two. */
 static void long_names_are_cut(void **state)
 {
     (void)state;
-    char text[512];
-    /* 62 bytes, then a character of two bytes that would be cut in half at 63 */
-    sprintf(text, "v 0 0 0\nv 1 0 0\nv 0 1 0\no %062d\xc3\xa4z\nusemtl %063d\nf 1 2 3\n", 1, 2);
+    char text[2048];
+    sprintf(
+        text,
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\no %0237d\xc3\xa4%020d\nusemtl %0255d\nf 1 2 3\no %0237d\xc3\xa4%020d\nf 1 2 3\n", 1,
+        1, 2, 1, 2);
     struct scene *s = load_text("long.obj", text);
-    assert_int_equal(strlen(s->surface[0].object), 62);
-    assert_int_equal(strlen(s->surface[0].material), 63);
-    assert_int_equal(s->counts.names_cut, 1);
-    assert_non_null(strstr(warnings, "long.obj: 1 names cut to 63 bytes"));
+    assert_int_equal(s->n_surfaces, 2);
+    for (int i = 0; i < 2; i++) {
+        assert_int_equal(strlen(s->surface[i].object), 237 + 1 + 16);
+        assert_int_equal(s->surface[i].object[237], '~');
+        assert_int_equal(strlen(s->surface[i].material), 255);
+    }
+    assert_memory_equal(s->surface[0].object, s->surface[1].object, 238);
+    assert_int_equal(s->counts.names_cut, 2);
+    assert_non_null(strstr(warnings, "long.obj: 2 names cut to 255 bytes"));
     scene_free(s);
 }
 

@@ -79,6 +79,60 @@ static void test_example(void **state)
     check_memory(wire_read(wire_path(wire, "out"), NULL));
 }
 
+/* 60 boxes of 2 x 3 x 4 m, each a little higher than the one before; of the first the top is missing. */
+static void write_boxes(struct wire *wire)
+{
+    char *text = NULL;
+    size_t len;
+    FILE *out = open_memstream(&text, &len);
+    for (int i = 0; i < 60; i++) {
+        const int n = 8 * i;
+        fprintf(out, "o box %d, \"red\"\n", i);
+        for (int c = 0; c < 8; c++)
+            fprintf(out, "v %g %g %g\n", 10.0 * i + 2 * (c % 4 == 1 || c % 4 == 2), 3.0 * (c % 4 >= 2),
+                    c < 4 ? 0.0 : 4 + 0.01 * i);
+        static const int face[6][4] = {{4, 3, 2, 1}, {1, 2, 6, 5}, {2, 3, 7, 6},
+                                       {3, 4, 8, 7}, {4, 1, 5, 8}, {5, 6, 7, 8}};
+        for (int f = 0; f < (i == 0 ? 5 : 6); f++)
+            fprintf(out, "f %d %d %d %d\n", n + face[f][0], n + face[f][1], n + face[f][2], n + face[f][3]);
+    }
+    assert_int_equal(fclose(out), 0);
+    wire_write_text(wire, "boxes.obj", text);
+    free(text);
+    wire_write_text(wire, "boxes.yaml",
+                    "head: {profile: sphere, step_deg: 2}\noutput: {crs: local}\n"
+                    "scene: {meshes: [{file: boxes.obj, up: z, scale: 1}]}\nstations: [{position_m: [5, 1, 1]}]\n");
+}
+
+/* The 50 largest objects; sums over all 60; the open one by name, though it is the smallest; all in the file. */
+static void test_objects(void **state)
+{
+    struct wire *wire = *state;
+    char config[352], csv[352];
+    write_boxes(wire);
+    snprintf(config, sizeof config, "%s", wire_path(wire, "boxes.yaml"));
+    snprintf(csv, sizeof csv, "%s", wire_path(wire, "all.csv"));
+    const char *const args[] = {"check", config, "--scene", "--scene-csv", csv, NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
+    char *out = wire_read(wire_path(wire, "out"), NULL), *all = wire_read(csv, NULL);
+    int rows = 0;
+    for (const char *p = out; (p = strstr(p, " closed none ")) != NULL; p++)
+        rows++;
+    assert_int_equal(rows, 50);
+    static const char *const has[] = {
+        "\nobjects   60, the largest first\n", "\n  and 10 more; --scene-csv FILE has all\n",
+        "\nopen      box 0, \"red\", 4 open edges\n", "sum: 59 closed, 1 open, 0 turned, 0 empty\n",
+        /* 5 * 2 + 59 * 12 triangles; 52 m2 + 10 i / 100 each, but for a top of 6; 24 m3 + 6 i / 100 each but one */
+        "\n         718          4         3291       1522.2  sum: "};
+    for (size_t i = 0; i < sizeof has / sizeof has[0]; i++)
+        if (strstr(out, has[i]) == NULL) fail_msg("%s is not in\n%s", has[i], out);
+    const char *last = strstr(all, "\n\"box 59, \"\"red\"\"\",,,no,12,0,closed,57.9,27.54,1,none\n");
+    if (last == NULL || strstr(all, "\n\"box 0, \"\"red\"\"\",,,no,10,4,open,46,,1,none\n") == NULL)
+        fail_msg("%s", all);
+    free(out);
+    free(all);
+}
+
 static void test_help_of_a_section(void **state)
 {
     struct wire *wire = *state;
@@ -101,6 +155,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_short_forms, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_all_faults, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_help_of_a_section, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_objects, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_example, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

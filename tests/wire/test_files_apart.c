@@ -20,7 +20,8 @@ enum {
     VIEW = 64,
     SOAK = 128,
     INIT = 256,
-    ALL = 511
+    CHECK = 512,
+    ALL = 1023
 };
 
 /* In words, @ stands for the folder and a slash. */
@@ -32,7 +33,7 @@ static const struct {
     {BATCH, "batch", "@c.yaml"},  {REPORT, "report", "@c.yaml @cloud.ply"},
     {MAP, "map", "@c.yaml"},      {COVERAGE, "coverage", "@c.yaml"},
     {VIEW, "view", "@cloud.ply"}, {SOAK, "soak", "@c.yaml"},
-    {INIT, "init", "@room.obj"},
+    {INIT, "init", "@room.obj"},  {CHECK, "check", "@c.yaml"},
 };
 enum { N_COMMANDS = sizeof COMMANDS / sizeof COMMANDS[0] };
 
@@ -45,12 +46,14 @@ static const struct output {
     {RUN, "--stats", "--stats=@o", "o"},
     {RUN, "--journal", "--journal=@o", "o"},
     {RUN, "--truth", "--truth=@o", "o"},
+    {RUN, "--surfaces", "--surfaces=@o", "o"},
     {RUN, "links[0].path", "--set=links[0].type=file --set=links[0].path=@o", "o"},
     {RECORD, "--output", "--output=@o.ply", "o.ply"},
     {RECORD, "--output", "--output=@o.obj", "o.mtl"},
     {RECORD, "--output", "--output=@o.obj", "o.png"},
     {RECORD, "--output", "--output=@o.gltf", "o.bin"},
     {RECORD, "--stats", "--stats=@o", "o"},
+    {RECORD, "--surfaces", "--surfaces=@o --output=@x.ply", "o"},
     {RECORD, "--truth", "--output=@x.shs --truth=@o", "o"},
     {BATCH, "--output", "--output=@", "manifest-1-of-1.jsonl"},
     {BATCH, "--output", "--output=@ --merge", "manifest.json"},
@@ -61,12 +64,14 @@ static const struct output {
     {SOAK, "--json", "--json=@o", "o"},
     {SOAK, "--truth", "--truth=@o", "o"},
     {SOAK, "links[0].path", "--set=links[0].type=file --set=links[0].path=@o", "o"},
+    {CHECK, "--scene-csv", "--scene-csv=@o", "o"},
+    {CHECK, "links[0].path", "--set=links[0].type=file --set=links[0].path=@o", "o"},
     {INIT, "--output", "--force --output=@o.yaml", "o.yaml"},
 };
 enum { N_OUTPUTS = sizeof OUTPUTS / sizeof OUTPUTS[0] };
 
 /* What is read: as which option or key, by which commands, with these words, and from which file. */
-enum { WITH_CONFIG = RUN | RECORD | REPORT | MAP | COVERAGE | SOAK };
+enum { WITH_CONFIG = RUN | RECORD | REPORT | MAP | COVERAGE | SOAK | CHECK };
 static const struct input {
     unsigned bits;
     const char *who, *words, *file;
@@ -81,10 +86,10 @@ static const struct input {
     {WITH_CONFIG, "head.profile", "--set=head.profile=@own.yaml", "own.yaml"},
     {WITH_CONFIG, "head.profile: directions", "--set=head.profile=@own.yaml", "list.txt"},
     {WITH_CONFIG, "stations[1].scanner.head.profile", "--set=stations[1].scanner.head.profile=@own.yaml", "own.yaml"},
-    {RUN | RECORD, "platform.file", "--set=platform.kind=trajectory --set=platform.file=@path.csv", "path.csv"},
-    {RUN | RECORD, "platform.waypoints", "--set=platform.kind=trajectory --set=platform.waypoints=@path.csv",
+    {RUN | RECORD | CHECK, "platform.file", "--set=platform.kind=trajectory --set=platform.file=@path.csv", "path.csv"},
+    {RUN | RECORD | CHECK, "platform.waypoints", "--set=platform.kind=trajectory --set=platform.waypoints=@path.csv",
      "path.csv"},
-    {RUN | RECORD | SOAK, "--scenario", "--scenario=@loss.yaml", "loss.yaml"},
+    {RUN | RECORD | SOAK | CHECK, "--scenario", "--scenario=@loss.yaml", "loss.yaml"},
     {BATCH, "--scenario", "--scenario=@loss.yaml", "loss.yaml"},
     {RUN, "--replay-journal", "--replay-journal=@journal", "journal"},
     {COVERAGE, "--candidates", "--candidates=@path.csv", "path.csv"},
@@ -118,6 +123,7 @@ static const struct {
     const char *line, *who, *other;
 } DOUBLES[] = {
     {"record @c.yaml --output=@o.ply --output=@./o.ply", "--output", "--output"},
+    {"record @c.yaml --output=@o.ply --surfaces=@o.ply", "--surfaces", "--output"},
     {"record @c.yaml --output=@o.ply --stats=@o.ply", "--stats", "--output"},
     {"record @c.yaml --truth=@o.ply --output=@o.ply", "--output", "--truth"},
     {"record @c.yaml --output=@o.obj --stats=@o.mtl", "--output", "--stats"},

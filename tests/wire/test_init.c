@@ -170,6 +170,67 @@ static void unit_and_axes_can_be_given(void **state)
     forget();
 }
 
+/* Boxes of 10 m, a kilometre from each other, in units of a metre from an origin. */
+static void write_city(const struct wire *wire, const char *name, double x, double y, double z)
+{
+    static const char *const faces[] = {"1 2 3 4", "5 8 7 6", "1 5 6 2", "2 6 7 3", "3 7 8 4", "4 8 5 1"};
+    char *obj = NULL;
+    size_t len;
+    FILE *to = open_memstream(&obj, &len);
+    for (int i = 0; i < 9; i++) {
+        for (int c = 0; c < 8; c++)
+            fprintf(to, "v %.3f %.3f %.3f\n", x + 1000 * (i % 3) + 10 * (c % 4 == 1 || c % 4 == 2),
+                    y + 1000 * (i / 3) + 10 * (c % 4 >= 2), z + 10 * (c / 4));
+        for (int f = 0; f < 6; f++) {
+            int v[4];
+            assert_int_equal(sscanf(faces[f], "%d %d %d %d", &v[0], &v[1], &v[2], &v[3]), 4);
+            fprintf(to, "f %d %d %d %d\n", 8 * i + v[0], 8 * i + v[3], 8 * i + v[2], 8 * i + v[1]);
+        }
+    }
+    assert_int_equal(fclose(to), 0);
+    wire_write_text(wire, name, obj);
+    free(obj);
+}
+
+/* Larger than 2 km without a unit: what else there is to see decides. A plate of 2 m by 1 cm nobody scans, and nobody puts
+ * an origin 2.7 km beside it. */
+static void the_unit_follows_from_what_there_is(void **state)
+{
+    struct wire *wire = *state;
+    write_city(wire, "city.obj", 2684500, 1246300, 440);
+    assert_int_equal(RUN(wire, "init", "city.obj", "--up", "z"), 0);
+    contains(text,
+             "a metre is assumed, since its coordinates, near 2685505 1247305 445, are those of a projected system");
+    contains(out, "size      2010 x 2010 x 10 m");
+    contains(out, "unit      1 m, assumed: its coordinates, near ");
+    write_city(wire, "here.obj", 0, 0, 0);
+    assert_int_equal(RUN(wire, "init", "here.obj", "--up", "z"), 0);
+    contains(text, "a metre is assumed, since it is wide and flat as a survey, and would be a plate in millimetres");
+    contains(out, "size      2010 x 2010 x 10 m");
+    write_room(wire, "mm.obj", 1000, 0);
+    assert_int_equal(RUN(wire, "init", "mm.obj", "--up", "z"), 0);
+    contains(out, "unit      0.001 m, assumed: the file doesn't say");
+    forget();
+}
+
+/* Nothing of nine boxes on two kilometres is to be seen from outside of all: the station stands near one of them. */
+static void a_sparse_city_is_looked_at(void **state)
+{
+    struct wire *wire = *state;
+    write_city(wire, "city.obj", 2684500, 1246300, 440);
+    assert_int_equal(RUN(wire, "init", "city.obj", "--up", "z"), 0);
+    contains(out, "outside, looking at the mesh");
+    double p[3];
+    assert_int_equal(sscanf(strstr(out, "station "), "station %lf %lf %lf m", &p[0], &p[1], &p[2]), 3);
+    /* That in the middle: a sphere of 8.7 m is around it, and the station is 2.5 of its radii away. */
+    assert_true(hypot(p[0] - 2685505, p[1] - 1247305) < 25 && p[2] > 440 && p[2] < 470);
+    const double seen = 0.01 * atof(strstr(out, "looking at the mesh; ") + strlen("looking at the mesh; "));
+    assert_true(seen > 0.3);
+    assert_int_equal(RUN(wire, "record", "city.yaml", "-o", "city.ply", "--quiet"), 0);
+    assert_true(points_of(wire, "city.ply") > 10000);
+    forget();
+}
+
 /* The command that comes next can be pasted into a shell; an error is one line. */
 static void names_may_have_any_bytes(void **state)
 {
@@ -320,6 +381,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(a_mesh_becomes_a_scan, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(unit_and_axes_can_be_given, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(the_unit_follows_from_what_there_is, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(a_sparse_city_is_looked_at, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(axes_that_no_key_can_say, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(names_may_have_any_bytes, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(a_body_is_looked_at, wire_setup, wire_teardown),

@@ -113,10 +113,38 @@ static void test_cuts(void **state)
     }
 }
 
+/* Each wall of the room is an object of its own, with four open edges; without the option none is drawn. */
+static void test_open_edges(void **state)
+{
+    struct wire *wire = *state;
+    char *svg = draw(wire, (const char *const[]){"--pixel-m", "0.01", "--open-edges", NULL}, "map.svg", 0);
+    const char *p = strstr(svg, "<title>open edges of the scene</title>");
+    assert_non_null(p);
+    const char *end = strstr(p, "</g>");
+    double least = INFINITY, most = -INFINITY;
+    int n = 0;
+    for (; (p = strstr(p, "<line x1=")) != NULL && p < end; p++, n++) {
+        double x[2], y[2];
+        assert_int_equal(sscanf(p, "<line x1=\"%lf\" y1=\"%lf\" x2=\"%lf\" y2=\"%lf\"", &x[0], &y[0], &x[1], &y[1]), 4);
+        least = fmin(least, fmin(x[0], x[1]));
+        most = fmax(most, fmax(x[0], x[1]));
+    }
+    assert_int_equal(n, 24);
+    expect("the room's width", most - least, 100.0 * (ROOM_MAX[0] - ROOM_MIN[0]));
+    free(svg);
+    svg = draw(wire, (const char *const[]){NULL}, "map.svg", 0);
+    assert_null(strstr(svg, "open edges"));
+    free(svg);
+    char *err = draw(wire, (const char *const[]){"--open-edges", "--perspective", NULL}, "map.png", 2);
+    assert_non_null(strstr(err, "--open-edges goes with a map from above"));
+    free(err);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_marks, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_open_edges, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_heights, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_cuts, wire_setup, wire_teardown),
     };

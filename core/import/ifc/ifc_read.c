@@ -67,15 +67,19 @@ static int add_part(struct reading *r, const struct ifc_part *part, uint16_t lab
 }
 
 /* A pair of object and material that is there already keeps its label, so each part of one material is one surface. */
-static int label_part(struct reading *r, const struct ifc_product *p, const char *object, const struct ifc_part *part,
-                      uint16_t *label)
+static int label_part(struct reading *r, const struct ifc_product *p, const struct ifc_body *body, const char *object,
+                      const struct ifc_part *part, uint16_t *label)
 {
+    const struct text_span type = body->type.n > 0 ? body->type : p->type;
     const struct ifc_style *style = ifc_style_by_colour(&r->records, p, part->colour);
     const char *material = style != NULL ? style->name : "<IFCDefault>";
     int rc = build_label(r->b, (struct text_span){object, strlen(object)},
                          (struct text_span){material, strlen(material)}, label, r->err);
-    if (rc != SH_OK || style == NULL) return rc;
+    if (rc != SH_OK) return rc;
     struct scene_surface *surface = &r->b->scene->surface[*label];
+    scene_copy_name(surface->type, sizeof surface->type, type.p, type.n);
+    snprintf(surface->guid, sizeof surface->guid, "%s", p->guid);
+    if (style == NULL) return SH_OK;
     memcpy(surface->colour, part->colour, sizeof surface->colour);
     surface->has_colour = 1;
     return SH_OK;
@@ -91,7 +95,7 @@ static int add_body(struct reading *r, const struct ifc_product *p, const struct
     for (size_t i = 0; i < body->n_parts && rc == SH_OK; i++) {
         const struct ifc_part *part = &of->part[body->first + i];
         uint16_t label;
-        rc = label_part(r, p, name, part, &label);
+        rc = label_part(r, p, body, name, part, &label);
         if (rc == SH_OK) rc = add_part(r, part, label);
     }
     r->b->scene->n_meshes++;
@@ -154,13 +158,30 @@ static int say_facets(struct reading *r, const struct ifc_fineness *fineness)
     return SH_OK;
 }
 
+/* Each product with a body is a surface at least. Before minutes are spent on bodies. */
+static int check_number(struct reading *r)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < r->records.n_products; i++)
+        n += !r->records.product[i].is_air && r->records.product[i].has_body;
+    if (n + r->b->scene->n_surfaces <= SCENE_MAX_SURFACES) return SH_OK;
+    return build_fail(
+        r->b, SH_EINPUT, r->err,
+        "%zu products with bodies, each of which is a surface at least, and the scene has %u before: it holds "
+        "up to %d, since labels have 16 bits; export parts of the model to files of their own, and scan "
+        "each with a configuration",
+        n, r->b->scene->n_surfaces, SCENE_MAX_SURFACES);
+}
+
 static int read_by_two(struct reading *r)
 {
     const struct ifc_fineness fineness = fineness_for(&r->records, r->b->tolerance_m);
     r->finding = calloc(r->records.n_products + 1, sizeof *r->finding);
     if (r->finding == NULL) return build_fail(r->b, SH_ENOMEM, r->err, "no memory for its products");
+    int rc = check_number(r);
+    if (rc != SH_OK) return rc;
     build_announce(r->b);
-    int rc = ifc_run_readers(r->b, fineness, &r->readings, r->err);
+    rc = ifc_run_readers(r->b, fineness, &r->readings, r->err);
     if (rc == SH_OK) rc = say_missing(r, "web-ifc", &r->readings.web_said);
     if (rc == SH_OK) rc = say_missing(r, "ifc-lite", &r->readings.lite_said);
     if (rc == SH_OK) rc = add_products(r);

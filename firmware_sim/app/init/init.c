@@ -257,7 +257,8 @@ const struct app_command app_init = {
     .notes =
         "MESH is a file .obj .ply .stl .gltf .glb .fbx .dae .ifc. Its unit and axes are taken where the format\n"
         "defines them (glTF, Collada, IFC) or the file says them (FBX). Else metres and z up are assumed, or\n"
-        "millimetres where the mesh would be larger than 2 km; a warning says so.\n"
+        "millimetres where the mesh would be larger than 2 km; a warning says so. Coordinates of a projected system\n"
+        "(large numbers beside the mesh's size), and a mesh that would be a thin plate in millimetres, are metres.\n"
         "\n"
         "The station is put above a floor inside, or on open ground, or outside with the mesh before it: where\n"
         "rays cast over the view of the head meet most. The configuration has comments; change what doesn't fit.\n",

@@ -9,8 +9,10 @@
 
 #include "firmware_sim/app/app.h"
 
-/* Larger than this in metres, a mesh without a unit is taken to be in millimetres. */
-static const double LARGEST_M = 2000.0;
+/* Larger than this in metres, a mesh without a unit is taken to be in millimetres, but for a survey. */
+static const double LARGEST_M = 2000.0, LARGEST_SURVEY_M = 50000.0;
+/* Less high than this, a mesh larger than LARGEST_M would be a plate of less than half a metre in millimetres. */
+static const double LEAST_HEIGHT_MM = 500.0;
 
 double init_largest_m(const struct scene *scene)
 {
@@ -62,6 +64,46 @@ static void choose_up(const struct init_wish *wish, const char *name, const stru
                 name);
 }
 
+/* Eastings and northings of projected systems: large numbers beside the size of what is there. In millimetres they would be
+ * some 100 m, where nobody puts an origin by intent. */
+static int is_projected(const struct scene *scene, const double middle[3])
+{
+    const double least = 50000.0, large = 200000.0, times = 20.0;
+    double up_to = 0.0, second = 0.0;
+    for (int k = 0; k < 3; k++) {
+        const double x = fabs(middle[k]);
+        second = x > up_to ? up_to : fmax(second, x);
+        up_to = fmax(up_to, x);
+    }
+    return up_to >= large && second >= least && up_to >= times * init_largest_m(scene);
+}
+
+static int is_survey(const struct scene *scene)
+{
+    double least = INFINITY;
+    for (int k = 0; k < 3; k++)
+        least = fmin(least, scene->max_m[k] - scene->min_m[k]);
+    return init_largest_m(scene) <= LARGEST_SURVEY_M && least < LEAST_HEIGHT_MM;
+}
+
+/* Metres per unit, from what there is to see, and why. */
+static double guess_unit(const struct scene *scene, char *why, size_t len)
+{
+    double middle[3];
+    for (int k = 0; k < 3; k++)
+        middle[k] = 0.5 * (scene->min_m[k] + scene->max_m[k]);
+    why[0] = '\0';
+    if (is_projected(scene, middle)) {
+        snprintf(why, len, "its coordinates, near %.7g %.7g %.7g, are those of a projected system", middle[0],
+                 middle[1], middle[2]);
+        return 1.0;
+    }
+    if (init_largest_m(scene) <= LARGEST_M) return 1.0;
+    if (!is_survey(scene)) return 0.001;
+    snprintf(why, len, "it is wide and flat as a survey, and would be a plate in millimetres");
+    return 1.0;
+}
+
 static void choose_scale(const struct init_wish *wish, const char *name, const struct scene *scene,
                          struct init_mesh *as)
 {
@@ -74,12 +116,14 @@ static void choose_scale(const struct init_wish *wish, const char *name, const s
         snprintf(as->scale_from, sizeof as->scale_from, "%s", said_by(wish->file));
         return;
     }
-    as->scale = size > LARGEST_M ? 0.001 : 1.0;
-    snprintf(as->scale_from, sizeof as->scale_from, "assumed: the file doesn't say");
+    char why[160];
+    as->scale = guess_unit(scene, why, sizeof why);
+    snprintf(as->scale_from, sizeof as->scale_from, "assumed: %s", why[0] != '\0' ? why : "the file doesn't say");
     sh_warn(&app_report_stderr,
-            "%s: its unit is not in the file: %s is assumed, which makes the mesh %.4g m large; "
+            "%s: its unit is not in the file: %s is assumed%s%s, which makes the mesh %.4g m large; "
             "--scale sets another one",
-            name, as->scale == 1.0 ? "a metre" : "a millimetre", as->scale * size);
+            name, as->scale == 1.0 ? "a metre" : "a millimetre", why[0] != '\0' ? ", since " : "", why,
+            as->scale * size);
 }
 
 /* To metres, z up: what the configuration will do. */

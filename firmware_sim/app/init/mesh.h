@@ -14,7 +14,7 @@ struct init_wish {
 struct init_mesh {
     enum scene_up up;
     double scale;
-    char up_from[64], scale_from[64]; /* where they are from, for comments */
+    char up_from[64], scale_from[176]; /* where they are from, for comments */
 };
 
 /* Warns of what is assumed, with `name` for the file. scene_free is due where it succeeds. */

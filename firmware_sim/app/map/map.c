@@ -7,6 +7,7 @@
 #include "core/map.h"
 #include "core/mat3.h"
 #include "core/newfile.h"
+#include "core/scene_objects.h"
 #include "core/vec3.h"
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/heads.h"
@@ -18,7 +19,7 @@ struct map_run {
     struct app_input in;
     const char *output;
     double pixel_m;
-    int quiet, perspective;
+    int quiet, perspective, open_edges;
     struct map_view_options view;
     struct map_view_plan plan;
     struct map *map;
@@ -151,6 +152,33 @@ static int create_map(struct map_run *run, const struct site *site, struct sh_er
     return map_create(&spec, &run->map, err);
 }
 
+static int add_edge(void *ctx, const double a[3], const double b[3], struct sh_err *err)
+{
+    struct map_run *run = ctx;
+    double from[3], to[3];
+    to_map(run, a, from);
+    to_map(run, b, to);
+    return map_add_edge(run->map, from, to, err);
+}
+
+/* Of what stands still. */
+static int mark_open_edges(struct map_run *run, const struct scene *scene, struct sh_err *err)
+{
+    const struct scene_open_edges edges = {run, add_edge};
+    struct scene_objects objects;
+    struct map_counts counts;
+    if (!run->open_edges) return SH_OK;
+    const int rc = scene_objects_find(scene, &edges, &app_report_seconds, &objects, err);
+    scene_objects_free(&objects);
+    map_get_counts(run->map, &counts);
+    if (counts.edges_left_out > 0)
+        sh_warn(&app_report_stderr, "map: %llu open edges are not drawn; a map has up to %d of them",
+                (unsigned long long)counts.edges_left_out, (int)MAP_MAX_EDGES);
+    else if (rc == SH_OK && !run->quiet)
+        fprintf(stderr, "scanhead: %llu open edges\n", (unsigned long long)counts.edges);
+    return rc;
+}
+
 static int write_map(struct map_run *run, uint32_t n_stations, struct sh_err *err)
 {
     struct map_label *label = malloc(n_stations * sizeof *label);
@@ -186,6 +214,7 @@ static int draw(struct config *cfg, void *ctx, struct sh_err *err)
     if (rc == SH_OK) rc = heads_open(heads, NULL, 0.0, &app_report_stderr, err);
     if (rc == SH_OK) options.last_station = heads->first->site->n_stations;
     if (rc == SH_OK) rc = create_map(run, heads->first->site, err);
+    if (rc == SH_OK) rc = mark_open_edges(run, heads->first->site->scene, err);
     if (rc == SH_OK) rc = heads_record(heads, &options, &result, err);
     if (rc == SH_OK && app_interrupted()) rc = sh_fail(err, SH_EIO, "interrupted; nothing written");
     if (rc == SH_OK) rc = write_map(run, heads->first->site->n_stations, err);
@@ -231,7 +260,9 @@ static int run_view(struct map_run *run)
     if (!app_ends_in(run->output, ".png"))
         return app_usage(&app_map, "-o %s: with --perspective it is an image; allowed is a name that ends in .png",
                          run->output);
-    if (run->pixel_m > 0) return app_usage(&app_map, "--pixel-m goes with a map from above, not with --perspective");
+    if (run->pixel_m > 0 || run->open_edges)
+        return app_usage(&app_map, "%s goes with a map from above, not with --perspective",
+                         run->open_edges ? "--open-edges" : "--pixel-m");
     if (map_view_read(&run->view, &run->plan, &err) != SH_OK) return app_usage(&app_map, "%s", err.text);
     if (is_cloud(operand)) {
         if (run->view.cloud != NULL)
@@ -254,7 +285,7 @@ static int run(int argc, char **argv)
     if (run.perspective) return run_view(&run);
     if (memcmp(&run.view, &map_view_default, sizeof run.view) != 0)
         return app_usage(&app_map, "an eye, sizes, colours and clouds go with --perspective; a map from above has -o, "
-                                   "--pixel-m, --set and --quiet");
+                                   "--pixel-m, --open-edges, --set and --quiet");
     if (is_cloud(run.in.operand[0]))
         return app_usage(&app_map, "%s is a point cloud; a map from above scans a CONFIG: add --perspective",
                          run.in.operand[0]);
@@ -271,6 +302,8 @@ static const struct app_option OPTIONS[] = {
     {APP_TEXT, "output", "FILE", .letter = 'o', .at = AT(output), .file = APP_WRITES, .help = "where to write: .png, or .svg (points as an image, all else as vectors)"},
     {APP_NUMBER, "pixel-m", "M", .min = 1e-4, .max = 1e4, .at = AT(pixel_m),
      .help = "side of a pixel; default: 1200 pixels on the longer side"},
+    {APP_FLAG, "open-edges", NULL, .at = AT(open_edges),
+     .help = "mark edges of open bodies in red, those that check --scene counts"},
     {APP_FLAG, "perspective", NULL, .at = AT(perspective),
      .help = "a picture as seen from a place, shaded by depth; the options below go with it"},
     {APP_TEXT, "cloud", "FILE", .at = AT(view.cloud), .file = APP_READS,

@@ -8,6 +8,7 @@
 
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/heads.h"
+#include "firmware_sim/app/surfaces.h"
 #include "firmware_sim/base/clock.h"
 
 enum { WAIT_MS = 1000 };
@@ -315,6 +316,7 @@ static int record_heads(struct record_job *r, struct config *cfg, struct heads *
     heads->fits = fits;
     heads->ctx = r;
     if (rc == SH_OK) rc = heads_open(heads, r->site, r->recording.duration_s, &app_report_stderr, err);
+    if (rc == SH_OK && r->surfaces != NULL) rc = surfaces_write(r->surfaces, heads->first->site, err);
     r->recording.head_ends = 1;
     r->files.recorder.may_wait = 1; /* pace fast */
     r->recording.prepare = prepare;

@@ -11,9 +11,10 @@ struct heads;
 struct site;
 
 struct record_job {
-    const char *source; /* of record_job_stream, as libscanhead opens it */
-    const char *truth;  /* of record_job_off_line: file for the faults that are injected; NULL: none */
-    const char *stats;  /* where to write what was received, as JSON; NULL: nowhere */
+    const char *source;   /* of record_job_stream, as libscanhead opens it */
+    const char *truth;    /* of record_job_off_line: file for the faults that are injected; NULL: none */
+    const char *surfaces; /* of record_job_off_line: CSV file for what labels mean; NULL: none */
+    const char *stats;    /* where to write what was received, as JSON; NULL: nowhere */
     struct record_files files;
     int each;                     /* files of each scan, too, as files.split makes them */
     int crs_given, no_hash, hash; /* hash: keep stream_sha256 without stats, too */
@@ -31,8 +32,8 @@ struct record_job {
     struct heads *heads;    /* of a configuration */
     struct record_files parts;
     struct recorder_scan first; /* of the scans, as the configuration says it */
-    int has_silent;  /* objects that give no echo (scene.target) */
-    int interrupted; /* before the files were completed, which an interrupted recording does, too */
+    int has_silent;             /* objects that give no echo (scene.target) */
+    int interrupted;            /* before the files were completed, which an interrupted recording does, too */
 };
 
 /* What can be known of a recording off line before the scene is loaded: SH_EINPUT where it can't be. cfg is changed. */

@@ -264,8 +264,8 @@ static int run(int argc, char **argv)
             "SOURCE %s: allowed usb, usb:VID:PID:SERIAL, tty:PATH, tcp:HOST:PORT, FILE.shs, FILE.pcapng, CONFIG.yaml",
             r.job.source);
     if (r.in.sets.n != 0) return app_usage(&app_record, "--set, --crs and --threads need a CONFIG as SOURCE");
-    if (r.in.scenario != NULL || r.job.truth != NULL)
-        return app_usage(&app_record, "--scenario and --truth need a CONFIG as SOURCE");
+    if (r.in.scenario != NULL || r.job.truth != NULL || r.job.surfaces != NULL)
+        return app_usage(&app_record, "--scenario, --truth and --surfaces need a CONFIG as SOURCE");
     return record_job_stream(&r.job, &err) == SH_OK ? APP_OK : app_fail(&err);
 }
 
@@ -324,6 +324,9 @@ static const struct app_option OPTIONS[] = {
      .help = "of a CONFIG: with the faults of this file (config/faults) beside its own"},
     {APP_TEXT, "truth", "FILE", .at = AT(job.truth), .file = APP_WRITES,
      .help = "of a CONFIG: write each fault that is injected as a line of JSON; - is standard output"},
+    {APP_TEXT, "surfaces", "FILE", .at = AT(job.surfaces), .file = APP_WRITES,
+     .help = "of a CONFIG: write the surfaces as CSV: label, object, material, IFC type and GlobalId, colour; - is standard "
+             "output"},
     {APP_TEXT, "stats", "FILE", .at = AT(job.stats), .file = APP_WRITES, .help = "write what was received as JSON; - is standard output"},
     OPTION_NO_HASH(AT(job.no_hash)),
     OPTION_SET,
@@ -346,7 +349,7 @@ static const char HELP_NOTES[] =
     "SOURCE is one of\n"
     "\n"
     "  CONFIG               a configuration: the head runs off line in this process, as fast as it computes.\n"
-    "                       Only with it: --set, --crs, --threads, --scenario, --truth\n"
+    "                       Only with it: --set, --crs, --threads, --scenario, --truth, --surfaces\n"
     "  usb                  a head on USB, as scanhead list shows it; more exactly usb:vid:pid or\n"
     "                       usb:vid:pid:serial\n"
     "  tty:/dev/...         a serial port\n"

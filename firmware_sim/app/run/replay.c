@@ -41,11 +41,12 @@ int run_check_options(const struct run_options *o, int is_recording)
     if (!is_recording) return check_head(o);
     const char *option = o->device.journal != NULL  ? "--journal"
                          : o->device.replay != NULL ? "--replay-journal"
+                         : o->surfaces != NULL      ? "--surfaces"
                          : o->frames_given          ? "--frames"
                                                     : NULL;
     if (option != NULL)
-        return app_usage(&app_run, "%s needs a head that computes, and %s is a recording; allowed with a CONFIG", option,
-                         o->in.operand[0]);
+        return app_usage(&app_run, "%s needs a head that computes, and %s is a recording; allowed with a CONFIG",
+                         option, o->in.operand[0]);
     if (o->config != NULL && o->links[0] != '\0')
         return app_usage(&app_run, "--config and --link: both say where the links are; allowed one of them");
     if (o->clients > 0 && !o->device.start)
@@ -102,7 +103,8 @@ static int replay(struct config *cfg, void *ctx, struct sh_err *err)
         rc = sh_fail(err, SH_EINPUT, "%s: links: none; a replay needs at least one of pty, tcp, usb, web, file, null",
                      cfg->file);
     if (rc == SH_OK && o->replay.speed > 0.0 && cfg->loop.pace != PACE_REALTIME)
-        rc = sh_fail(err, SH_EINPUT, "--speed: the pace is not realtime, and time passes otherwise; allowed without it");
+        rc =
+            sh_fail(err, SH_EINPUT, "--speed: the pace is not realtime, and time passes otherwise; allowed without it");
     o->replay.path = o->in.operand[0];
     if (!(o->replay.speed > 0.0)) o->replay.speed = 1.0;
     o->replay.start = o->device.start;

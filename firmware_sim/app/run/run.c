@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "firmware_sim/app/run/run.h"
+#include "firmware_sim/app/surfaces.h"
 #include "firmware_sim/app/watch/watch.h"
 #include "firmware_sim/site/plan_rows.h"
 #include "firmware_sim/site/rate.h"
@@ -122,6 +123,7 @@ static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
                        cfg->file);
     rc = has_page(cfg) ? site_load_written_out(cfg, &app_report_stderr, &site, err) /* it looks at triangles */
                        : site_load(cfg, &app_report_stderr, &site, err);
+    if (rc == SH_OK && o->surfaces != NULL) rc = surfaces_write(o->surfaces, site, err);
     if (rc == SH_OK) rc = site_open_sights(site, 0, site->n_stations, &app_report_stderr, err);
     /* After the plan, which is made for the configuration: a replayed journal gives the same stream without
      * --start. */
@@ -192,6 +194,8 @@ static const struct app_option OPTIONS[] = {
      .help = "with the faults of this file beside those of the configuration; a bare name is one of config/faults"},
     {APP_TEXT, "truth", "FILE", .at = AT(device.truth), .file = APP_WRITES,
      .help = "write each fault that is injected as a line of JSON; - is standard output"},
+    {APP_TEXT, "surfaces", "FILE", .at = AT(surfaces), .file = APP_WRITES,
+     .help = "write the surfaces as CSV: label, object, material, IFC type and GlobalId, colour; - is standard output"},
     {APP_TEXT, "replay-journal", "FILE", .at = AT(device.replay), .file = APP_READS,
      .help = "carry out the commands of a journal at their times, and end where its run ended"},
     {APP_WHOLE, "ready-fd", "N", .min = 1, .max = 65535, .at = AT(ready_fd),

@@ -12,8 +12,9 @@ struct run_options {
     struct replay_options replay; /* speed 0: not given */
     const char *config;           /* of a recording's links; NULL: none */
     long clients;
-    char links[4096];             /* --link, as YAML; empty: none */
+    char links[4096]; /* --link, as YAML; empty: none */
     const char *stats;
+    const char *surfaces; /* --surfaces */
     long ready_fd;
     int quiet, no_hash, frames_given, view;
 };

@@ -1,0 +1,13 @@
+/* What `scanhead check --scene` prints: the objects of the scene as a table, and those that are open by name. */
+#ifndef FIRMWARE_SIM_APP_CHECK_SCENE_H
+#define FIRMWARE_SIM_APP_CHECK_SCENE_H
+
+#include <stdio.h>
+
+#include "firmware_sim/site/site.h"
+
+/* The scene's, then those of each mesh that moves. n_warnings: that were printed while it was loaded. out: NULL: no
+ * table. csv: a file for all rows; NULL: none; -: standard output. */
+int check_print_scene(const struct site *site, unsigned n_warnings, const char *csv, FILE *out, struct sh_err *err);
+
+#endif

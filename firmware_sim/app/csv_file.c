@@ -1,0 +1,50 @@
+#include "firmware_sim/app/csv_file.h"
+
+#include <errno.h>
+#include <math.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "core/newfile.h"
+
+int csv_file_write(const char *path, void (*put)(FILE *out, const void *ctx), const void *ctx, struct sh_err *err)
+{
+    const int to_stdout = strcmp(path, "-") == 0;
+    int fd = -1, rc = to_stdout ? SH_OK : newfile_open(path, &fd, err);
+    if (rc != SH_OK) return rc;
+    FILE *out = to_stdout ? stdout : fdopen(fd, "w");
+    if (out == NULL) {
+        rc = sh_fail(err, SH_EIO, "%s: %s", path, strerror(errno));
+        close(fd);
+        return rc;
+    }
+    put(out, ctx);
+    int failed = fflush(out) != 0 || ferror(out);
+    const int why = errno;
+    if (!to_stdout) failed |= fclose(out) != 0;
+    if (!failed) return SH_OK;
+    return sh_fail(err, SH_EIO, "%s: %s", to_stdout ? "standard output" : path, strerror(why));
+}
+
+void csv_file_put_text(FILE *out, const char *text)
+{
+    if (text[strcspn(text, ",\"\r\n")] == '\0') {
+        fputs(text, out);
+        return;
+    }
+    putc('"', out);
+    for (const char *p = text; *p != '\0'; p++) {
+        if (*p == '"') putc('"', out);
+        putc(*p, out);
+    }
+    putc('"', out);
+}
+
+void csv_file_put_colour(FILE *out, const struct scene_surface *s)
+{
+    unsigned rgb[3];
+    if (!s->has_colour) return;
+    for (int k = 0; k < 3; k++)
+        rgb[k] = (unsigned)lround(255.0 * (double)s->colour[k]);
+    fprintf(out, "#%02x%02x%02x", rgb[0], rgb[1], rgb[2]);
+}

@@ -1,0 +1,18 @@
+/* CSV files that commands write: RFC 4180 with line feeds, UTF-8, a first line that names the columns. */
+#ifndef FIRMWARE_SIM_APP_CSV_FILE_H
+#define FIRMWARE_SIM_APP_CSV_FILE_H
+
+#include <stdio.h>
+
+#include "core/err.h"
+#include "core/scene.h"
+
+/* A file whose lines `put` writes; path "-" is standard output. */
+int csv_file_write(const char *path, void (*put)(FILE *out, const void *ctx), const void *ctx, struct sh_err *err);
+
+/* A text, in quotes where it needs them. */
+void csv_file_put_text(FILE *out, const char *text);
+/* #rrggbb, or nothing where the surface has no colour. */
+void csv_file_put_colour(FILE *out, const struct scene_surface *surface);
+
+#endif

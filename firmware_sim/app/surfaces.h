@@ -1,0 +1,10 @@
+/* The surfaces of a site as CSV, beside recordings: what each label of a point means. */
+#ifndef FIRMWARE_SIM_APP_SURFACES_H
+#define FIRMWARE_SIM_APP_SURFACES_H
+
+#include "firmware_sim/site/site.h"
+
+/* A line for each label, those of bodies that move, of tripods' legs and of ghosts, too. path -: standard output. */
+int surfaces_write(const char *path, const struct site *site, struct sh_err *err);
+
+#endif
