@@ -25,18 +25,18 @@
 enum scene_up { SCENE_UP_Z, SCENE_UP_Y };
 
 enum {
-    /* Of an object or a material, with its NUL. Longer names are cut, counted, and end in a number of the whole name, so
-     * that no two become one. */
+    /* The room of an object's or a material's name, with its NUL. Longer names are cut, counted, and end in a number of the
+     * whole name, so that no two become one. */
     SCENE_NAME_LEN = 256,
     SCENE_TYPE_LEN = 64,        /* of a product's type, with its NUL */
     SCENE_GUID_LEN = 24,        /* of its GlobalId, likewise */
     SCENE_MAX_SURFACES = 65534, /* labels are 16 bits on the wire; 0xffff means "none" */
 };
 
-/* Who reads bodies of IFC: two readers, and Assimp where they are not installed; or one alone. */
+/* Bodies of IFC are read by two readers, by Assimp where they are not installed, or by one alone. */
 enum scene_ifc_reader { IFC_READER_AUTO, IFC_READER_WEB, IFC_READER_LITE, IFC_READER_ASSIMP };
 
-/* What reading one file by others may take: Assimp, and each reader of IFC. */
+/* Limits of reading one file by others: by Assimp, and by each reader of IFC. */
 struct scene_import_limits {
     uint32_t memory_mib; /* on top of what the program has; the scene on its way back likewise */
     double time_s;       /* by the clock on the wall; of processor time likewise */
@@ -87,7 +87,7 @@ struct scene_surface {
     uint16_t texture; /* of the diffuse colour: 1 + its number in the scene's textures; 0: none */
     uint16_t opacity; /* what cuts holes, likewise; 0: the alpha of texture does */
     float solid;      /* what is less opaque than this is a hole: 0.5, or what the format says; 0: there are none */
-    /* Of a product of IFC; else empty. */
+    /* Type and GlobalId of a product of IFC; else empty. */
     char type[SCENE_TYPE_LEN], guid[SCENE_GUID_LEN];
 };
 

@@ -22,7 +22,7 @@ struct import_note {
     char text[512];
 };
 
-/* What the child gets. */
+/* The child gets this. */
 struct import_task {
     struct scene_build *b; /* of the parent; the child only reads it */
     struct scene_import_limits limits;

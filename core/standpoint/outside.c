@@ -119,7 +119,7 @@ static void fill(const struct survey *s, struct cells *c)
     }
 }
 
-/* That with the most surface; among equals, up to rounding, the one nearest to the middle. */
+/* The part with the most surface is taken; among equals, up to rounding, the one nearest to the middle. */
 static uint32_t find_fullest(const struct cells *c)
 {
     uint32_t best = 0;

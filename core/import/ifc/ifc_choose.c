@@ -34,7 +34,7 @@ static bool areas_differ(const struct ifc_figures *a, const struct ifc_figures *
     return fabs(a->volume_m3 - b->volume_m3) > share * fmax(fabs(a->volume_m3), fabs(b->volume_m3));
 }
 
-/* Of two closed bodies that differ, or of two open ones. A failure that one admits counts against it. ifc-lite rounds points
+/* Chooses between two closed bodies that differ, or two open ones. A failure that one admits counts against it. ifc-lite rounds points
  * beyond 1 km, web-ifc more often gets a profile or a cut wrong. */
 static enum ifc_source doubtful(const struct ifc_product *product, const struct ifc_body *web,
                                 const struct ifc_body *lite)

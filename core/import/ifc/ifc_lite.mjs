@@ -29,7 +29,7 @@ function run_job(api, pre, bytes, job) {
   const made = api.processGeometryBatchFromSource(pre.jobs.subarray(3 * job, 3 * job + 3), pre.unitScale, ...rtc,
     pre.needsShift, pre.voidKeys, pre.voidCounts, pre.voidValues, pre.styleIds, pre.styleColors,
     pre.planeAngleToRadians, pre.materialElementIds, pre.materialColorCounts, pre.materialColors)
-  // What was taken off before rounding, in y up.
+  // This was taken off before rounding, in y up.
   const back = [rtc[0], rtc[2], -rtc[1]]
   const parts = []
   let type = ''

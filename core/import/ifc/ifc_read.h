@@ -16,7 +16,7 @@ struct ifc_fineness {
     double deviation_m; /* of the largest circle's facets; 0: there is none */
 };
 
-/* What each reader has made. */
+/* The bodies that each reader has made. */
 struct ifc_readings {
     struct ifc_bodies web, lite;
     bool has_web, has_lite;
@@ -36,7 +36,8 @@ void ifc_readings_free(struct ifc_readings *r);
  * finding is the error instead. finding[records->n_products]. */
 int ifc_say_findings(struct scene_build *b, const struct ifc_records *records, const enum ifc_finding *finding,
                      bool strict, struct sh_err *err);
-/* What Assimp can't be relied on for: a warning that names them, or, with refuse, an error. why: no other reader. */
+/* Names the products that Assimp can't be relied on for, in a warning, or, with refuse, in an error. why: no other reader is
+ * there. */
 int ifc_say_assimp(struct scene_build *b, const struct ifc_records *records, bool refuse, const char *why,
                    struct sh_err *err);
 

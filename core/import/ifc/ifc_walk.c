@@ -1,5 +1,5 @@
-/* What the geometry of each product consists of: its shape, walked through from record to record, with that of its
- * openings. */
+/* The entities that the geometry of each product consists of: its shape is walked through from record to record, with
+ * that of its openings. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
