@@ -78,8 +78,6 @@ int csv_open(struct csv *csv, const char *path, const char *const *known, const 
     csv->known = known;
     csv->report = report;
     int rc = text_open(&csv->text, path, csv_heed_stop, csv, err);
-    if (rc == SH_OK && csv->text.size >= 3 && memcmp(csv->text.p, "\xef\xbb\xbf", 3) == 0)
-        csv->text.p += 3; /* a byte order mark, as spreadsheets write it */
     return rc == SH_OK ? read_names(csv, err) : rc;
 }
 

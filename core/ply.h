@@ -8,7 +8,7 @@
 
 #include "core/text.h"
 
-enum { PLY_MAX_ELEMENTS = 16, PLY_MAX_PROPERTIES = 512 };
+enum { PLY_MAX_ELEMENTS = 16, PLY_MAX_PROPERTIES = 512, PLY_MAX_TEXTURES = 256 };
 
 enum ply_format { PLY_ASCII, PLY_LITTLE, PLY_BIG };
 
@@ -17,7 +17,7 @@ enum ply_type { PLY_INT8, PLY_UINT8, PLY_INT16, PLY_UINT16, PLY_INT32, PLY_UINT3
 /* What a property is to us. */
 enum ply_use {
     PLY_SKIP,
-    PLY_X, /* of vertices, as the others up to PLY_SCALARS */
+    PLY_X, /* of vertices, as the others up to PLY_SCALARS; colours and texnumber also of faces */
     PLY_Y,
     PLY_Z,
     PLY_STATION,
@@ -31,8 +31,12 @@ enum ply_use {
     PLY_RED,
     PLY_GREEN,
     PLY_BLUE,
+    PLY_U, /* texture coordinates */
+    PLY_V,
+    PLY_TEXNUMBER,
     PLY_SCALARS,
-    PLY_CORNERS = PLY_SCALARS /* the list of a face */
+    PLY_CORNERS = PLY_SCALARS, /* lists of a face: its vertices, or those of strips */
+    PLY_TEXCOORDS              /* u and v of each corner */
 };
 
 struct ply_property {
@@ -41,7 +45,7 @@ struct ply_property {
     enum ply_use use;
 };
 
-enum ply_kind { PLY_OTHER, PLY_VERTEX, PLY_FACE };
+enum ply_kind { PLY_OTHER, PLY_VERTEX, PLY_FACE, PLY_STRIPS /* of triangles; -1 ends one */ };
 
 struct ply_element {
     char name[32];
@@ -55,6 +59,16 @@ struct ply_header {
     int n_elements, n_properties;
     struct ply_element element[PLY_MAX_ELEMENTS];
     struct ply_property property[PLY_MAX_PROPERTIES];
+    /* comment TextureFile: good until rows are read */
+    int n_textures;
+    struct text_span texture[PLY_MAX_TEXTURES];
+    uint64_t texture_line[PLY_MAX_TEXTURES];
+};
+
+/* The numbers of a list. */
+struct ply_list {
+    double *value;
+    size_t n, cap;
 };
 
 extern const uint8_t ply_type_size[8];                 /* bytes, by ply_type */
@@ -73,9 +87,9 @@ struct ply_rows {
     const struct ply_element *element; /* being read */
     uint64_t row;                      /* of it, from 0 */
     double scalar[PLY_SCALARS];        /* of the row, by ply_use; [PLY_SKIP] has no meaning */
-    double *corner;                    /* the list of use PLY_CORNERS */
-    size_t n_corners, cap_corners;
+    struct ply_list corners, texcoords;
     bool is_single; /* x, y or z of vertices are: read as they stand, but what they stood for was rounded */
+    bool is_kept;   /* bytes before p are read again: faces that come before their vertices */
     text_progress *progress;
     void *progress_ctx;
 };
@@ -91,10 +105,10 @@ struct ply_user {
     int (*begin)(void *ctx, struct sh_err *err); /* before the rows of r->element, whose count fits into the file */
     int (*row)(void *ctx, struct sh_err *err);   /* after each row, which is in r; row r->row of the element */
     const struct sh_report *report;              /* gets warnings */
-    bool has_faces;                              /* faces are used, not passed over */
+    bool has_faces;                              /* faces and strips are used, not passed over */
 };
 
-/* Reads all rows in the order of the file. Warns of elements that nobody uses, and of bytes after the last
+/* Reads all rows in the order of the file, but faces after the vertices. Warns of elements that nobody uses, and of bytes after the last
  * row. */
 int ply_walk(struct ply_rows *r, const struct ply_user *user, struct sh_err *err);
 

@@ -62,12 +62,12 @@ struct scene_places {
 };
 
 struct scene_mesh_spec {
-    const char *file; /* ending chooses the reader: .obj .ply in double; .ifc by two readers; others by Assimp */
+    const char *file; /* ending chooses the reader: .obj .ply .stl in double; .ifc by two readers; others by Assimp */
     enum scene_up up;
     double scale;       /* metres per unit of the file, > 0 */
     double offset_m[3]; /* added after axes and scale */
-    int textures;       /* keep texture coordinates, and the names of textures: of .obj, and of what Assimp reads */
-    int cutouts;        /* look for holes in textures; without `textures` only what has holes is kept */
+    int textures; /* keep texture coordinates, names of textures and colours of vertices, of all but .stl and .ifc */
+    int cutouts;  /* look for holes in textures; without `textures` only what has holes is kept */
     const struct scene_import_limits *limits; /* NULL: the defaults */
     struct scene_places places;
 };
@@ -76,17 +76,22 @@ struct scene_mesh_spec {
  * and ends in a number of all its bytes. */
 int scene_copy_name(char *out, size_t room, const char *name, size_t n);
 
+/* Of a surface's triangles, which have colours at their corners. */
+enum scene_vertex_colours { SCENE_COLOURS_NONE, SCENE_COLOURS_SOME, SCENE_COLOURS_ALL };
+
 /* One surface label: an object of the file with one material.
- * Object: .obj the last o or g, else (and for .ply) the file's name without folder and ending; for the others
- * the node's name, or the mesh's where that is empty. */
+ * Object: .obj the last o or g, .stl the name of the solid, else (and for .ply) the file's name without folder and
+ * ending; for the others the node's name, or the mesh's where that is empty.
+ * Material: of a .ply with several textures, the name of its own. */
 struct scene_surface {
     char object[SCENE_NAME_LEN];
     char material[SCENE_NAME_LEN];
     float colour[3]; /* diffuse, sRGB, 0..1: of glTF, FBX, Collada and IFC, and of OBJ with an mtllib (Kd) */
     int has_colour;
-    uint16_t texture; /* of the diffuse colour: 1 + its number in the scene's textures; 0: none */
-    uint16_t opacity; /* what cuts holes, likewise; 0: the alpha of texture does */
-    float solid;      /* what is less opaque than this is a hole: 0.5, or what the format says; 0: there are none */
+    uint16_t vertex_colours; /* enum scene_vertex_colours, once the load is over; they count before `colour` */
+    uint16_t texture;        /* of the diffuse colour: 1 + its number in the scene's textures; 0: none */
+    uint16_t opacity;        /* what cuts holes, likewise; 0: the alpha of texture does */
+    float solid; /* what is less opaque than this is a hole: 0.5, or what the format says; 0: there are none */
     /* Type and GlobalId of a product of IFC; else empty. */
     char type[SCENE_TYPE_LEN], guid[SCENE_GUID_LEN];
 };
@@ -142,7 +147,10 @@ struct scene {
     uint16_t *label;               /* [n_triangles] index into surface */
     struct scene_surface *surface; /* [n_surfaces] */
     /* Only where a spec asks for textures, or a texture has holes; else NULL, 0. */
-    float (*uv)[3][2];             /* [n_triangles] of the corners; the image's lower left corner is 0, 0; NaN: none */
+    float (*uv)[3][2]; /* [n_triangles] of the corners; the image's lower left corner is 0, 0; NaN: none */
+    /* Only where a spec asks for textures and a mesh has colours of its vertices; else NULL. sRGB; the fourth is 0 where
+     * the corner has none, else 255. */
+    uint8_t (*rgb)[3][4];          /* [n_triangles] of the corners */
     struct scene_texture *texture; /* [n_textures] */
     uint32_t n_textures;
     /* Holes: [n_surfaces], NULL for surfaces without; NULL: no surface has any, and nothing is spent on them.
@@ -159,9 +167,9 @@ struct scene {
 
 /* Loads all meshes into one scene.
  * tolerance_m: the largest error of a vertex that is allowed. A file read in single precision (all
- *   but .obj and .ply) is refused, with the figure, where 6e-8 of its coordinates, and of the numbers that place
+ *   but .obj, .ply and .stl) is refused, with the figure, where 6e-8 of its coordinates, and of the numbers that place
  *   them, come to more.
- *   An error above 1e-6 m is warned of, also that of a binary .ply with float coordinates.
+ *   An error above 1e-6 m is warned of, also that of a binary .ply with float coordinates, and of a binary .stl.
  * Errors (SH_EINPUT, naming the file): missing or unreadable, not a mesh, no triangles, a coordinate that is
  *   not finite, an index out of range, |coordinate| beyond 1e9 m, too many surfaces or triangles (2^32-1).
  * Progress goes to report about four times a second once a load takes longer than a second. SH_ESTOPPED where
@@ -260,6 +268,10 @@ static inline void scene_copy_put_back(const struct scene_copy *c, const double 
  * turned or shifted as it may be. */
 void scene_uv_at(const struct scene *scene, uint32_t triangle, const double *const corner[3], const double p[3],
                  double uv[2]);
+
+/* Likewise the colour there, between those of the corners, sRGB; scene->rgb is there. 0: some corner has none. */
+int scene_rgb_at(const struct scene *scene, uint32_t triangle, const double *const corner[3], const double p[3],
+                 uint8_t rgb[3]);
 
 /* Whether the triangle has a hole at p. Only where scene->cutout is there. */
 static inline const struct texture_mask *scene_cutout(const struct scene *scene, uint32_t triangle)

@@ -18,7 +18,7 @@
  * Where the mesh has a colour, the reflectance is its luminance in linear sRGB (ITU-R BT.709: 0.2126 R +
  * 0.7152 G + 0.0722 B). That is an assumption: what is light to the eye need not be light at the laser's
  * wavelength. Where it has a diffuse texture, the colour is multiplied by the texel at the hit, channel by
- * channel. */
+ * channel. Where it has no texture but colours of its vertices, the one between them at the hit counts. */
 #ifndef CORE_SURFACE_H
 #define CORE_SURFACE_H
 
@@ -49,6 +49,7 @@ struct surface_table {
     int has_mirror;
     struct surface *surface;          /* [n + 1] */
     struct surface_texture **texture; /* [n + 1], NULL where there is none; NULL: none has */
+    uint8_t *by_vertex;               /* [n + 1] 1: colours of vertices count; NULL: nowhere */
 };
 
 int surface_table_alloc(uint32_t n, struct surface_table *table, struct sh_err *err);
@@ -68,21 +69,28 @@ int surface_kinds(const struct surface_table *table, uint16_t *kind, struct sh_e
 int surface_table_texture(struct surface_table *table, uint32_t label, const struct scene_surface *named,
                           const struct scene_texture *texture, struct sh_err *err);
 
+/* Entry `label` gets its reflectance from the colours of vertices, where a hit has no texel. Glass and mirrors stay
+ * unchanged. */
+int surface_table_by_vertex(struct surface_table *table, uint32_t label, struct sh_err *err);
+
 /* Labels of hits hold the surface in their low 16 bits. Where a texture holds the reflectance, the
  * high ones are 1 + 65534 times that, else 0. uv: of the hit, finite. Only for surfaces with a texture. */
 uint32_t surface_texel(const struct surface_table *table, uint32_t label, const double uv[2]);
+/* Likewise of a hit with that colour, sRGB. */
+uint32_t surface_texel_of(uint32_t label, const uint8_t rgb[3]);
 static inline uint32_t surface_of_label(uint32_t label)
 {
     return label & 0xffff;
 }
 
-/* Colours by label, for clouds that show them: the texel at a hit, just as the image has it, and beside textures the
- * mesh's diffuse colour, or else grey. Packed: red << 16 | green << 8 | blue, sRGB. */
+/* Colours by label, for clouds that show them: the texel at a hit, just as the image has it; beside textures the
+ * colour between the vertices, else the mesh's diffuse colour, or else grey. Packed: red << 16 | green << 8 | blue, sRGB. */
 struct surface_image;
 struct surface_colours {
     uint32_t n;
     uint32_t *own;                /* [n] without a texel */
     struct surface_image **image; /* [n] NULL where there is none */
+    uint8_t *by_vertex;           /* [n] 1: some of its triangles have colours at their corners */
 };
 int surface_colours_alloc(uint32_t n, struct surface_colours *colours, struct sh_err *err);
 void surface_colours_free(struct surface_colours *colours);
@@ -91,8 +99,10 @@ void surface_colours_set(struct surface_colours *colours, uint32_t label, const 
 /* Entry `label` gets an image. SH_EINPUT, naming the file: can't be read; the entry stays as it is. */
 int surface_colours_texture(struct surface_colours *colours, uint32_t label, const struct scene_texture *texture,
                             struct sh_err *err);
-/* Of a hit; uv finite, or NULL: not known. Labels beyond the entries are grey. */
-uint32_t surface_colour(const struct surface_colours *colours, uint32_t label, const double uv[2]);
+/* Of a hit; uv finite, or NULL: not known. rgb: the colour between the vertices, or NULL: there is none. Labels beyond
+ * the entries are grey. */
+uint32_t surface_colour(const struct surface_colours *colours, uint32_t label, const double uv[2],
+                        const uint8_t rgb[3]);
 
 /* The surface of a label, entry n for one beyond the table. */
 static inline const struct surface *surface_at(const struct surface_table *table, uint32_t label)

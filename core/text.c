@@ -58,6 +58,7 @@ int text_open(struct text *t, const char *path, text_progress *progress, void *c
     if (rc != SH_OK) return rc;
     t->p = t->data;
     t->end = t->data + t->size;
+    if (t->size >= 3 && memcmp(t->p, "\xef\xbb\xbf", 3) == 0) t->p += 3; /* UTF-8's mark says nothing */
     t->c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0);
     if (t->c_locale == (locale_t)0) return text_fail(t, 0, SH_ENOMEM, err, "no memory for a locale");
     return SH_OK;

@@ -33,7 +33,7 @@ struct text {
 /* Called every 16 MiB that are read, fraction -1: unknown. What is not 0 ends the reading, with err filled. */
 typedef int text_progress(void *ctx, double fraction, struct sh_err *err);
 
-/* Reads the whole file; progress may be NULL. text_close is due in any case. */
+/* Reads the whole file; p is at its first byte, or after UTF-8's byte order mark. progress may be NULL. text_close is due in any case. */
 int text_open(struct text *t, const char *path, text_progress *progress, void *ctx, struct sh_err *err);
 void text_close(struct text *t);
 

@@ -29,6 +29,7 @@ static double range_sigma_m(const struct cast_setup *setup, double range_m, doub
     const struct surface_table *table = detect->surfaces;
     if (label < 0 || table == NULL || (uint32_t)label >= table->n) return (double)NAN;
     if (table->texture != NULL && table->texture[label] != NULL) return (double)NAN;
+    if (table->by_vertex != NULL && table->by_vertex[label]) return (double)NAN;
     const uint32_t one = (uint32_t)label;
     double rho;
     surface_return(table, 1, &one, &cosine, &rho);

@@ -1,20 +1,28 @@
-/* Where on a texture rays have met it. */
+/* Where on a texture, or between which vertices, rays have met a mesh. */
 #include <math.h>
 
 #include "core/cast/caster_private.h"
 #include "core/surface.h"
 
-/* Of what ray i has met. 0: there are none. */
-static int uv_of(const struct cast_setup *s, const struct met *met, uint32_t i, double uv[2])
+/* Where in a mesh ray i has met it, at rest. */
+struct place {
+    const struct scene *scene;
+    uint32_t triangle;
+    const double *corner[3];
+    double p[3];
+};
+
+static void find_place(const struct cast_setup *s, const struct met *met, uint32_t i, struct place *place)
 {
     const struct bvh_rays *rays = &met->rays;
     const struct cast_mover *m = met->body != NULL && met->body[i] != 0 ? caster_body(s, met->body[i]) : NULL;
     struct scene_part part;
     scene_find_part(bvh_scene(m != NULL ? m->bvh : s->bvh), rays->triangle[i], &part);
-    const struct scene *scene = part.scene;
-    if (scene->uv == NULL) return 0;
+    place->scene = part.scene;
+    place->triangle = part.triangle;
+    if (part.scene->uv == NULL && part.scene->rgb == NULL) return;
     const double d[3] = VEC3_AT(rays->dir, i);
-    double at[3], p[3];
+    double at[3], *p = place->p;
     bvh_origin_of(&rays->from, i, at);
     for (int k = 0; k < 3; k++)
         at[k] += rays->range_m[i] * d[k];
@@ -23,38 +31,61 @@ static int uv_of(const struct cast_setup *s, const struct met *met, uint32_t i, 
                          : m->rotation[k] * (at[0] - m->shift_m[0]) + m->rotation[3 + k] * (at[1] - m->shift_m[1]) +
                                m->rotation[6 + k] * (at[2] - m->shift_m[2]);
     if (part.copy != NULL) scene_copy_put_back(part.copy, ((const double[3]){p[0], p[1], p[2]}), p);
-    const uint32_t *corner = scene->triangle[part.triangle];
-    const double *const vertex[3] = {scene->vertex_m[corner[0]], scene->vertex_m[corner[1]],
-                                     scene->vertex_m[corner[2]]};
-    scene_uv_at(scene, part.triangle, vertex, p, uv);
+    for (int c = 0; c < 3; c++)
+        place->corner[c] = part.scene->vertex_m[part.scene->triangle[part.triangle][c]];
+}
+
+/* 0: there are none. */
+static int uv_of(const struct place *place, double uv[2])
+{
+    if (place->scene->uv == NULL) return 0;
+    scene_uv_at(place->scene, place->triangle, place->corner, place->p, uv);
     return isfinite(uv[0]) && isfinite(uv[1]);
+}
+
+static int rgb_of(const struct place *place, uint8_t rgb[3])
+{
+    return place->scene->rgb != NULL && scene_rgb_at(place->scene, place->triangle, place->corner, place->p, rgb);
 }
 
 static void set_reflectances(const struct cast_setup *s, const struct met *met, const struct surface_table *table)
 {
     const struct bvh_rays *rays = &met->rays;
+    struct place place;
     double uv[2];
+    uint8_t rgb[3];
     for (uint32_t i = 0; i < rays->n; i++) {
-        if (isnan(rays->range_m[i]) || rays->label[i] >= table->n || table->texture[rays->label[i]] == NULL) continue;
-        if (uv_of(s, met, i, uv)) rays->label[i] = surface_texel(table, rays->label[i], uv);
+        const uint32_t label = rays->label[i];
+        if (isnan(rays->range_m[i]) || label >= table->n) continue;
+        const int has_image = table->texture != NULL && table->texture[label] != NULL;
+        const int by_vertex = table->by_vertex != NULL && table->by_vertex[label];
+        if (!has_image && !by_vertex) continue;
+        find_place(s, met, i, &place);
+        if (has_image && uv_of(&place, uv)) rays->label[i] = surface_texel(table, label, uv);
+        if (by_vertex && rays->label[i] == label && rgb_of(&place, rgb)) rays->label[i] = surface_texel_of(label, rgb);
     }
 }
 
 static void set_colours(const struct cast_setup *s, const struct met *met, const struct surface_colours *colours)
 {
     const struct bvh_rays *rays = &met->rays;
+    struct place place;
     double uv[2];
+    uint8_t rgb[3];
     for (uint32_t i = 0; i < rays->n; i++) {
         const uint32_t label = surface_of_label(rays->label[i]);
         if (isnan(rays->range_m[i])) continue;
         const int has_image = label < colours->n && colours->image[label] != NULL;
-        met->colour[i] = surface_colour(colours, label, has_image && uv_of(s, met, i, uv) ? uv : NULL);
+        const int by_vertex = label < colours->n && colours->by_vertex[label];
+        if (has_image || by_vertex) find_place(s, met, i, &place);
+        met->colour[i] = surface_colour(colours, label, has_image && uv_of(&place, uv) ? uv : NULL,
+                                        by_vertex && rgb_of(&place, rgb) ? rgb : NULL);
     }
 }
 
 void caster_texels(const struct cast_setup *s, const struct met *met)
 {
     const struct surface_table *table = s->detect != NULL ? s->detect->surfaces : NULL;
-    if (table != NULL && table->texture != NULL) set_reflectances(s, met, table);
+    if (table != NULL && (table->texture != NULL || table->by_vertex != NULL)) set_reflectances(s, met, table);
     if (met->colour != NULL) set_colours(s, met, s->colour->surfaces);
 }

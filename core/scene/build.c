@@ -43,6 +43,7 @@ void build_release(struct scene_build *b)
     triangulate_free(&b->polygon);
     free(b->corner);
     free(b->corner_uv);
+    free(b->corner_rgb);
     scene_free(b->scene);
     b->scene = NULL;
 }
@@ -62,7 +63,7 @@ void build_begin_file(struct scene_build *b, const struct scene_mesh_spec *spec)
     b->n_welded = 0;
     b->counts = (struct scene_counts){0};
     b->scene->says = (struct scene_says){0};
-    b->has_uv = false;
+    b->has_uv = b->has_rgb = false;
     b->not_simple = 0;
     b->file_ns = now_ns();
 }
@@ -126,6 +127,7 @@ static int settle_all(const struct scene_build *b, struct sh_err *err)
     if (rc == SH_OK) rc = settle(b, (void **)&s->triangle, s->n_triangles, sizeof *s->triangle, err);
     if (rc == SH_OK) rc = settle(b, (void **)&s->label, s->n_triangles, sizeof *s->label, err);
     if (rc == SH_OK && s->uv != NULL) rc = settle(b, (void **)&s->uv, s->n_triangles, sizeof *s->uv, err);
+    if (rc == SH_OK && s->rgb != NULL) rc = settle(b, (void **)&s->rgb, s->n_triangles, sizeof *s->rgb, err);
     return rc;
 }
 
@@ -160,6 +162,7 @@ int build_finish(struct scene_build *b, int may_be_empty, struct scene **out, st
         free(s->uv);
         s->uv = NULL;
     }
+    build_note_colours(s);
     int rc = settle_all(b, err);
     if (rc == SH_OK) rc = find_bounds(b, err);
     if (rc != SH_OK) return rc;
@@ -224,10 +227,11 @@ static int grow_vertices(struct scene_build *b, uint64_t need, struct sh_err *er
 static int grow_triangles(struct scene_build *b, uint64_t need, struct sh_err *err)
 {
     struct scene *s = b->scene;
-    size_t cap_uv = b->cap_triangles, cap_label = b->cap_triangles;
+    size_t cap_uv = b->cap_triangles, cap_rgb = b->cap_triangles, cap_label = b->cap_triangles;
     if (need > UINT32_MAX - 1)
         return build_fail(b, SH_EINPUT, err, "too many triangles: a scene holds up to %u", UINT32_MAX - 1);
     if ((s->uv == NULL || grow(&s->uv, &cap_uv, need, sizeof *s->uv)) &&
+        (s->rgb == NULL || grow(&s->rgb, &cap_rgb, need, sizeof *s->rgb)) &&
         grow(&s->label, &cap_label, need, sizeof *s->label) &&
         grow(&s->triangle, &b->cap_triangles, need, sizeof *s->triangle))
         return SH_OK;
@@ -295,10 +299,24 @@ static int keep_uv(struct scene_build *b, const float uv[3][2], struct sh_err *e
     return SH_OK;
 }
 
+/* Likewise for colours. */
+static int keep_rgb(struct scene_build *b, const uint8_t rgb[3][4], struct sh_err *err)
+{
+    struct scene *s = b->scene;
+    if (s->rgb == NULL) {
+        if (!b->has_rgb) return SH_OK;
+        s->rgb = calloc(b->cap_triangles, sizeof *s->rgb);
+        if (s->rgb == NULL) return build_fail(b, SH_ENOMEM, err, "no memory for colours");
+    }
+    memcpy(s->rgb[s->n_triangles], rgb, sizeof *s->rgb);
+    return SH_OK;
+}
+
 int build_corners(struct scene_build *b, size_t n, struct sh_err *err)
 {
-    size_t cap_uv = b->cap_corners;
+    size_t cap_uv = b->cap_corners, cap_rgb = b->cap_corners;
     if (grow(&b->corner_uv, &cap_uv, n, sizeof *b->corner_uv) &&
+        grow(&b->corner_rgb, &cap_rgb, n, sizeof *b->corner_rgb) &&
         grow(&b->corner, &b->cap_corners, n, sizeof *b->corner))
         return SH_OK;
     return build_fail(b, SH_ENOMEM, err, "no memory for a face of %zu corners", n);
@@ -310,9 +328,11 @@ static int add_triangle(struct scene_build *b, const uint32_t at[3], uint16_t la
     struct scene *s = b->scene;
     uint32_t corner[3];
     float uv[3][2];
+    uint8_t rgb[3][4] = {{0}};
     for (int k = 0; k < 3; k++) {
         corner[k] = b->corner[at[k]];
         if (b->has_uv) memcpy(uv[k], b->corner_uv[at[k]], sizeof uv[k]);
+        if (b->has_rgb) memcpy(rgb[k], b->corner_rgb[at[k]], sizeof rgb[k]);
     }
     if (!has_area(s->vertex_m[corner[0]], s->vertex_m[corner[1]], s->vertex_m[corner[2]])) {
         b->counts.zero_area++;
@@ -320,6 +340,7 @@ static int add_triangle(struct scene_build *b, const uint32_t at[3], uint16_t la
     }
     int rc = grow_triangles(b, s->n_triangles + 1ull, err);
     if (rc == SH_OK) rc = keep_uv(b, b->has_uv ? (const float(*)[2])uv : no_uv, err);
+    if (rc == SH_OK) rc = keep_rgb(b, (const uint8_t(*)[4])rgb, err);
     if (rc != SH_OK) return rc;
     memcpy(s->triangle[s->n_triangles], corner, sizeof *s->triangle);
     s->label[s->n_triangles++] = label;

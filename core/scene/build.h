@@ -28,6 +28,8 @@ struct scene_build {
     uint32_t *corner;      /* indices into the scene, which the reader has checked */
     float (*corner_uv)[2]; /* where has_uv: their texture coordinates */
     bool has_uv;
+    uint8_t (*corner_rgb)[4]; /* where has_rgb: their colours, as scene->rgb has them */
+    bool has_rgb;
     /* the builder's own */
     size_t cap_corners, cap_vertices, cap_triangles;
     void *surface_tree;
@@ -69,7 +71,10 @@ int build_weld_begin(struct scene_build *b, struct build_weld *w, uint64_t verti
 int build_weld_vertex(struct scene_build *b, struct build_weld *w, const double v[3], struct sh_err *err);
 void build_weld_free(struct build_weld *w);
 
-/* Makes room for n corners in corner and corner_uv; what is in them stays. */
+/* A colour that a file says, times scale, as scene->rgb has it: limited to 0..255; NaN is 0. */
+void build_rgb(const double colour[3], double scale, uint8_t rgb[4]);
+
+/* Makes room for n corners in corner, corner_uv and corner_rgb; what is in them stays. */
 int build_corners(struct scene_build *b, size_t n, struct sh_err *err);
 /* Adds the polygon of the n >= 3 corners in corner. */
 int build_polygon(struct scene_build *b, size_t n, uint16_t label, struct sh_err *err);
@@ -85,10 +90,14 @@ int build_single(struct scene_build *b, double largest, double error, bool refus
 int build_label(struct scene_build *b, struct text_span object, struct text_span material, uint16_t *label,
                 struct sh_err *err);
 
+/* Which surfaces have colours at the corners of their triangles. */
+void build_note_colours(struct scene *scene);
+
 /* A texture as a reader finds it. */
 struct build_image {
-    struct text_span name; /* its file, as the mesh or its library names it, in the folder of the mesh */
-    const void *bytes;     /* of an image within the mesh's file, else NULL */
+    struct text_span name;   /* its file, as the mesh or its library names it */
+    struct text_span folder; /* of the library that names it, which counts before that of the mesh; p NULL: none */
+    const void *bytes;       /* of an image within the mesh's file, else NULL */
     size_t n_bytes;
     uint32_t raw_width, raw_height; /* struct texture_source */
     enum texture_wrap wrap[2];
@@ -100,6 +109,20 @@ static inline bool build_wants_textures(const struct scene_build *b)
 {
     return b->spec->textures || b->spec->cutouts;
 }
+
+/* Whether colours of vertices are. */
+static inline bool build_wants_colours(const struct scene_build *b)
+{
+    return b->spec->textures;
+}
+
+/* ---- find_file.c: files that a mesh names. Folders are paths up to their last slash, and may be empty. */
+struct text_span build_folder_of(const char *path);
+/* The path, with / for \\, to be freed; NULL: no memory. */
+char *build_join(struct text_span folder, struct text_span name);
+/* The file of that name: in one of the folders, then by its last part there; then both without regard to case. To be
+ * freed; NULL: it is nowhere. */
+char *build_find_file(const struct text_span *folder, size_t n, struct text_span name);
 
 /* Reports "reading FILE" about four times a second, once the load takes longer than a second, and heeds the
  * stop: SH_ESTOPPED. build: a struct scene_build. */
@@ -133,10 +156,17 @@ void scene_drop_textures(struct scene *scene);
 
 /* The readers. Each has the spec, and the file's name, from the builder. */
 int read_obj(struct scene_build *b, struct sh_err *err);
-/* Colours and textures of the surfaces from first_surface on, from the library that the OBJ names. Meshes
- * often come without it: then they have none, and whoever needs colours says so. */
-int read_mtl(struct scene_build *b, struct text_span name, uint32_t first_surface, struct sh_err *err);
+/* What follows mtllib in a line of an OBJ. */
+struct mtl_line {
+    struct text_span names;
+    uint64_t line;
+};
+/* Colours and textures of the surfaces from first_surface on, from the libraries that these lines name; the first one
+ * that knows a material counts. Meshes often come without a library: they have no colours then. Where textures are
+ * wanted, warnings say which libraries, materials and textures are missing. */
+int read_mtl(struct scene_build *b, const struct mtl_line *line, size_t n, uint32_t first_surface, struct sh_err *err);
 int read_ply(struct scene_build *b, struct sh_err *err);
+int read_stl(struct scene_build *b, struct sh_err *err);
 int import_apart(struct scene_build *b, struct sh_err *err); /* core/scene/import.h */
 int read_ifc(struct scene_build *b, struct sh_err *err);     /* core/import/ifc/ */
 

@@ -2,11 +2,11 @@
 #include "core/scene/build.h"
 
 #include <inttypes.h>
+#include <math.h>
 #include <search.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "core/rng.h"
 
@@ -44,13 +44,20 @@ int scene_copy_name(char *out, size_t room, const char *name, size_t n)
     return 1;
 }
 
+void build_rgb(const double colour[3], double scale, uint8_t rgb[4])
+{
+    for (int k = 0; k < 3; k++)
+        rgb[k] = (uint8_t)lrint(fmin(255.0, fmax(0.0, scale * colour[k])));
+    rgb[3] = 255;
+}
+
 int build_label(struct scene_build *b, struct text_span object, struct text_span material, uint16_t *label,
                 struct sh_err *err)
 {
     struct scene *s = b->scene;
     struct scene_surface *fresh = &s->surface[s->n_surfaces]; /* room for one more than allowed */
     fresh->has_colour = 0;
-    fresh->texture = fresh->opacity = 0;
+    fresh->texture = fresh->opacity = fresh->vertex_colours = 0;
     fresh->solid = 0.5f;
     fresh->type[0] = fresh->guid[0] = '\0';
     int cut = scene_copy_name(fresh->object, sizeof fresh->object, object.p, object.n);
@@ -71,38 +78,27 @@ int build_label(struct scene_build *b, struct text_span object, struct text_span
     return SH_OK;
 }
 
-/* A name in a mesh's file is that of a file in the same folder; other systems write \. */
-static char *in_folder(const struct scene_build *b, struct text_span name)
+void build_note_colours(struct scene *s)
 {
-    const char *slash = strrchr(b->spec->file, '/');
-    size_t folder = name.p[0] != '/' && slash != NULL ? (size_t)(slash - b->spec->file) + 1 : 0;
-    char *path = malloc(folder + name.n + 1);
-    if (path == NULL) return NULL;
-    memcpy(path, b->spec->file, folder);
-    for (size_t i = 0; i < name.n; i++)
-        path[folder + i] = name.p[i] == '\\' ? '/' : name.p[i];
-    path[folder + name.n] = '\0';
-    return path;
+    for (uint32_t i = 0; s->rgb != NULL && i < s->n_triangles; i++) {
+        const uint8_t(*at)[4] = (const uint8_t(*)[4])s->rgb[i];
+        const int has = at[0][3] != 0 && at[1][3] != 0 && at[2][3] != 0;
+        uint16_t *which = &s->surface[s->label[i]].vertex_colours, now = has ? 2 : 1; /* bit 0: some lack them */
+        *which |= now;
+    }
+    for (uint32_t i = 0; i < s->n_surfaces; i++) {
+        uint16_t *which = &s->surface[i].vertex_colours;
+        *which = *which == 2 ? SCENE_COLOURS_ALL : *which == 3 ? SCENE_COLOURS_SOME : SCENE_COLOURS_NONE;
+    }
 }
 
-/* Many meshes name the place where an image once was, on another machine. Where there is none, but a file
- * of that name lies beside the mesh, it is that one. */
-static char *beside(const struct scene_build *b, const struct build_image *image)
+/* Where the image is; where it isn't anywhere, the path that errors name. */
+static char *find_image(const struct scene_build *b, const struct build_image *image)
 {
-    const struct text_span name = image->name;
-    char *path = in_folder(b, name), *near;
-    size_t last = name.n;
-    if (path == NULL || image->bytes != NULL || access(path, F_OK) == 0) return path;
-    while (last > 0 && name.p[last - 1] != '/' && name.p[last - 1] != '\\')
-        last--;
-    if (last == 0 || last == name.n) return path;
-    near = in_folder(b, (struct text_span){name.p + last, name.n - last});
-    if (near == NULL || access(near, F_OK) != 0) {
-        free(near);
-        return path;
-    }
-    free(path);
-    return near;
+    const struct text_span folder[2] = {image->folder, build_folder_of(b->spec->file)};
+    const size_t first = image->folder.p == NULL;
+    char *path = image->bytes == NULL ? build_find_file(folder + first, 2 - first, image->name) : NULL;
+    return path != NULL ? path : build_join(folder[1], image->name);
 }
 
 static bool is_same(const struct scene_texture *t, const char *file, const struct build_image *image)
@@ -113,7 +109,7 @@ static bool is_same(const struct scene_texture *t, const char *file, const struc
 int build_texture(struct scene_build *b, const struct build_image *image, uint16_t *number, struct sh_err *err)
 {
     struct scene *s = b->scene;
-    char *file = beside(b, image);
+    char *file = find_image(b, image);
     for (uint32_t i = 0; file != NULL && i < s->n_textures; i++)
         if (is_same(&s->texture[i], file, image)) {
             free(file);

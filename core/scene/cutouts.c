@@ -46,6 +46,20 @@ void scene_uv_at(const struct scene *scene, uint32_t triangle, const double *con
             uv[k] += w[c] * (double)scene->uv[triangle][c][k];
 }
 
+int scene_rgb_at(const struct scene *scene, uint32_t triangle, const double *const corner[3], const double p[3],
+                 uint8_t rgb[3])
+{
+    const uint8_t(*at)[4] = (const uint8_t(*)[4])scene->rgb[triangle];
+    double w[3];
+    if (at[0][3] == 0 || at[1][3] == 0 || at[2][3] == 0) return 0;
+    weights(corner, p, w);
+    for (int k = 0; k < 3; k++) {
+        const double v = w[0] * at[0][k] + w[1] * at[1][k] + w[2] * at[2][k];
+        rgb[k] = (uint8_t)lrint(fmin(255.0, fmax(0.0, v))); /* at a border p lies a rounding outside */
+    }
+    return 1;
+}
+
 /* Which image cuts holes into a surface, from 1; 0: none. */
 static uint32_t image_of(const struct scene_surface *s)
 {
@@ -111,7 +125,7 @@ int scene_find_cutouts(struct scene *s, const struct sh_report *report, struct s
         struct texture_image image = {0};
         struct scene_texture *texture = &s->texture[number - 1];
         const int how = cuts_how(s, number);
-        if (how == 0) continue;
+        if (how == 0 || texture->unreadable) continue;
         rc = sh_check_stop(report, &why);
         if (rc == SH_OK) rc = scene_read_texture(texture, how == 1, &image, &why);
         if (rc == SH_OK) rc = cut_out(s, number, &image, &why);

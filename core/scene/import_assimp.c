@@ -140,12 +140,15 @@ static int add_face(struct import *im, const struct aiFace *face, const struct a
     if (rc != SH_OK) return rc;
     const struct aiVector3D *uv = build_wants_textures(b) ? mesh->mTextureCoords[im->uv.set] : NULL;
     b->has_uv = uv != NULL;
+    const struct aiColor4D *colour = build_wants_colours(b) ? mesh->mColors[0] : NULL;
+    b->has_rgb = colour != NULL;
     for (unsigned i = 0; i < face->mNumIndices; i++) {
         unsigned index = face->mIndices[i];
         if (index >= mesh->mNumVertices)
             return build_fail(b, SH_EINPUT, err, "index %u out of range; there are %u vertices", index,
                               mesh->mNumVertices);
         b->corner[i] = b->mesh_vertex0 + index;
+        if (colour != NULL) import_rgb(b, &colour[index], b->corner_rgb[i]);
         if (uv == NULL) continue;
         b->corner_uv[i][0] = (float)((double)uv[index].x * im->uv.scale[0] + im->uv.shift[0]);
         b->corner_uv[i][1] = (float)((double)uv[index].y * im->uv.scale[1] + im->uv.shift[1]);

@@ -44,6 +44,16 @@ static void keep_colour(const struct scene_build *b, const struct aiMaterial *ma
     surface->has_colour = 1;
 }
 
+void import_rgb(const struct scene_build *b, const struct aiColor4D *colour, uint8_t rgb[4])
+{
+    const float in[3] = {colour->r, colour->g, colour->b};
+    for (int k = 0; k < 3; k++) {
+        const float c = fminf(1.0f, fmaxf(0.0f, in[k])); /* NaN: 0 */
+        rgb[k] = (uint8_t)lrintf(255.0f * (is_gltf(b) ? to_srgb(c) : c));
+    }
+    rgb[3] = 255;
+}
+
 /* ---- textures */
 
 /* A texture as the material names it. */

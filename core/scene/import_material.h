@@ -6,10 +6,14 @@
 
 struct aiScene;
 struct aiMaterial;
+struct aiColor4D;
 
 /* What the material says of a surface; what is there already stays. */
 int import_material(struct scene_build *b, const struct aiScene *in, const struct aiMaterial *material,
                     struct scene_surface *surface, struct sh_err *err);
+
+/* The colour of a vertex, as scene->rgb has it. */
+void import_rgb(const struct scene_build *b, const struct aiColor4D *colour, uint8_t rgb[4]);
 
 /* How the material's textures lie on a mesh: coordinates of a set, times scale, plus shift. */
 struct import_uv {

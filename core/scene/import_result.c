@@ -1,5 +1,5 @@
 /* A scene as a file in memory, between two processes: head, textures, surfaces, vertices, triangles, labels,
- * texture coordinates, one array after the other. Read by pread, not mapped: each value is checked where it
+ * texture coordinates, colours, one array after the other. Read by pread, not mapped: each value is checked where it
  * then stays, and a file that has got shorter is an error of read. */
 #include "core/scene/import.h"
 
@@ -20,7 +20,7 @@ static const char MAGIC[8] = "shscene";
 
 struct result_head {
     char magic[8];
-    uint32_t n_vertices, n_triangles, n_surfaces, n_meshes, n_textures, has_uv;
+    uint32_t n_vertices, n_triangles, n_surfaces, n_meshes, n_textures, has_uv, has_rgb;
     struct scene_counts counts;
     double error_m;
     struct scene_says says;
@@ -81,6 +81,7 @@ int import_result_write(struct scene *scene, int fd, struct sh_err *err)
                                .n_meshes = s->n_meshes,
                                .n_textures = s->n_textures,
                                .has_uv = s->uv != NULL,
+                               .has_rgb = s->rgb != NULL,
                                .counts = s->counts,
                                .error_m = s->error_m,
                                .says = s->says};
@@ -92,6 +93,7 @@ int import_result_write(struct scene *scene, int fd, struct sh_err *err)
     if (rc == SH_OK) rc = put_array(fd, (void **)&s->triangle, s->n_triangles * sizeof *s->triangle, err);
     if (rc == SH_OK) rc = put_array(fd, (void **)&s->label, s->n_triangles * sizeof *s->label, err);
     if (rc == SH_OK && s->uv != NULL) rc = put_array(fd, (void **)&s->uv, s->n_triangles * sizeof *s->uv, err);
+    if (rc == SH_OK && s->rgb != NULL) rc = put_array(fd, (void **)&s->rgb, s->n_triangles * sizeof *s->rgb, err);
     return rc;
 }
 
@@ -244,6 +246,7 @@ struct triangles {
     uint32_t corner[AT_ONCE][3];
     uint16_t label[AT_ONCE];
     float uv[AT_ONCE][3][2];
+    uint8_t rgb[AT_ONCE][3][4];
 };
 
 /* NaN is none; anything else must be a number. */
@@ -265,14 +268,17 @@ static int add_triangle(struct result *r, const struct triangles *t, uint32_t i,
     if (r->head.has_uv && !is_uv(t->uv[i])) return wrong(r, "the texture coordinates of triangle", number);
     b->has_uv = r->head.has_uv != 0;
     if (b->has_uv) memcpy(b->corner_uv, t->uv[i], sizeof t->uv[i]);
+    b->has_rgb = r->head.has_rgb != 0; /* any byte is a colour */
+    if (b->has_rgb) memcpy(b->corner_rgb, t->rgb[i], sizeof t->rgb[i]);
     return build_polygon(b, 3, r->label[t->label[i]], r->err);
 }
 
 static int take_triangles(struct result *r, struct triangles *t)
 {
     const uint64_t n = r->head.n_triangles, labels_at = r->at + n * sizeof t->corner[0],
-                   uv_at = labels_at + n * sizeof t->label[0];
-    if (uv_at + (r->head.has_uv ? n * sizeof t->uv[0] : 0) != r->size) return wrong(r, "its size is", r->size);
+                   uv_at = labels_at + n * sizeof t->label[0],
+                   rgb_at = uv_at + (r->head.has_uv ? n * sizeof t->uv[0] : 0);
+    if (rgb_at + (r->head.has_rgb ? n * sizeof t->rgb[0] : 0) != r->size) return wrong(r, "its size is", r->size);
     int rc = build_corners(r->b, 3, r->err);
     for (uint64_t done = 0, some; done < n && rc == SH_OK; done += some) {
         some = n - done < AT_ONCE ? n - done : AT_ONCE;
@@ -280,6 +286,8 @@ static int take_triangles(struct result *r, struct triangles *t)
         if (rc == SH_OK) rc = take_at(r, labels_at + done * sizeof t->label[0], t->label, some * sizeof t->label[0]);
         if (rc == SH_OK && r->head.has_uv)
             rc = take_at(r, uv_at + done * sizeof t->uv[0], t->uv, some * sizeof t->uv[0]);
+        if (rc == SH_OK && r->head.has_rgb)
+            rc = take_at(r, rgb_at + done * sizeof t->rgb[0], t->rgb, some * sizeof t->rgb[0]);
         for (uint32_t i = 0; i < some && rc == SH_OK; i++)
             rc = add_triangle(r, t, i, (uint32_t)(done + i));
         if (rc == SH_OK) rc = sh_check_stop(r->b->report, r->err);
@@ -291,7 +299,8 @@ static int take_triangles(struct result *r, struct triangles *t)
 static uint64_t least_size(const struct result_head *head)
 {
     const struct scene *s = NULL;
-    uint64_t triangle = sizeof *s->triangle + sizeof *s->label + (head->has_uv ? sizeof *s->uv : 0);
+    uint64_t triangle = sizeof *s->triangle + sizeof *s->label + (head->has_uv ? sizeof *s->uv : 0) +
+                        (head->has_rgb ? sizeof *s->rgb : 0);
     return sizeof *head + head->n_textures * (uint64_t)sizeof(struct result_texture) +
            head->n_surfaces * (uint64_t)sizeof *s->surface + head->n_vertices * (uint64_t)sizeof *s->vertex_m +
            head->n_triangles * triangle;
@@ -307,6 +316,7 @@ static int take_head(struct result *r)
         rc = wrong(r, "its head is not one, of byte", 0);
     if (rc == SH_OK && r->head.n_triangles == 0) rc = wrong(r, "number of triangles:", 0);
     if (rc == SH_OK && r->head.has_uv > 1) rc = wrong(r, "texture coordinates:", r->head.has_uv);
+    if (rc == SH_OK && r->head.has_rgb > 1) rc = wrong(r, "colours:", r->head.has_rgb);
     if (rc == SH_OK && !(r->head.error_m >= 0.0 && r->head.error_m <= BUILD_MAX_COORDINATE_M))
         rc = wrong(r, "the error of its vertices, above m:", 0);
     if (rc == SH_OK && least_size(&r->head) > r->size) rc = wrong(r, "its size is", r->size);

@@ -14,6 +14,7 @@ static void keep_triangles(struct scene *s, const uint8_t *keep, const uint16_t 
         if (!keep[was]) continue;
         memcpy(s->triangle[n], s->triangle[i], sizeof s->triangle[n]);
         if (s->uv != NULL) memcpy(s->uv[n], s->uv[i], sizeof s->uv[n]);
+        if (s->rgb != NULL) memcpy(s->rgb[n], s->rgb[i], sizeof s->rgb[n]);
         s->label[n++] = label[was];
     }
     s->n_triangles = n;
@@ -71,6 +72,7 @@ int scene_keep(struct scene *s, const uint8_t *keep, struct sh_err *err)
         shrink(&s->triangle, s->n_triangles, sizeof *s->triangle);
         shrink(&s->label, s->n_triangles, sizeof *s->label);
         shrink(&s->uv, s->n_triangles, sizeof *s->uv);
+        shrink(&s->rgb, s->n_triangles, sizeof *s->rgb);
         shrink(&s->vertex_m, s->n_vertices, sizeof *s->vertex_m);
         rc = scene_keep_copies(s, keep, label, err);
     }

@@ -36,7 +36,10 @@ static int read_element(struct ply_header *h, struct text *t, struct sh_err *err
     struct ply_element *e = &h->element[h->n_elements++];
     *e = (struct ply_element){.count = (uint64_t)count, .first = h->n_properties};
     memcpy(e->name, name.p, name.n < sizeof e->name ? name.n : sizeof e->name - 1);
-    e->kind = text_is(name, "vertex") ? PLY_VERTEX : text_is(name, "face") ? PLY_FACE : PLY_OTHER;
+    e->kind = text_is(name, "vertex")      ? PLY_VERTEX
+              : text_is(name, "face")      ? PLY_FACE
+              : text_is(name, "tristrips") ? PLY_STRIPS
+                                           : PLY_OTHER;
     return SH_OK;
 }
 
@@ -65,19 +68,63 @@ const char *const ply_scalar_name[PLY_SCALARS] = {[PLY_X] = "x",
                                                   [PLY_AMPLITUDE] = "amplitude",
                                                   [PLY_RED] = "red",
                                                   [PLY_GREEN] = "green",
-                                                  [PLY_BLUE] = "blue"};
+                                                  [PLY_BLUE] = "blue",
+                                                  [PLY_U] = "s",
+                                                  [PLY_V] = "t",
+                                                  [PLY_TEXNUMBER] = "texnumber"};
+
+/* Other names of the same. */
+static const struct {
+    const char *name;
+    enum ply_use use;
+} synonyms[] = {{"diffuse_red", PLY_RED},
+                {"diffuse_green", PLY_GREEN},
+                {"diffuse_blue", PLY_BLUE},
+                {"texture_u", PLY_U},
+                {"texture_v", PLY_V},
+                {"u", PLY_U},
+                {"v", PLY_V}};
+
+static enum ply_use scalar_of(struct text_span name)
+{
+    for (unsigned i = PLY_X; i < PLY_SCALARS; i++)
+        if (text_is(name, ply_scalar_name[i])) return (enum ply_use)i;
+    for (size_t i = 0; i < sizeof synonyms / sizeof synonyms[0]; i++)
+        if (text_is(name, synonyms[i].name)) return synonyms[i].use;
+    return PLY_SKIP;
+}
+
+static enum ply_use face_use_of(const struct ply_property *p, struct text_span name)
+{
+    if (p->is_list)
+        return text_is(name, "vertex_indices") || text_is(name, "vertex_index") ? PLY_CORNERS
+               : text_is(name, "texcoord")                                      ? PLY_TEXCOORDS
+                                                                                : PLY_SKIP;
+    const enum ply_use use = scalar_of(name);
+    return use == PLY_TEXNUMBER || (use >= PLY_RED && use <= PLY_BLUE) ? use : PLY_SKIP;
+}
 
 static enum ply_use use_of(const struct ply_element *e, const struct ply_property *p, struct text_span name)
 {
-    if (e->kind == PLY_FACE && p->is_list && (text_is(name, "vertex_indices") || text_is(name, "vertex_index")))
-        return PLY_CORNERS;
+    if (e->kind == PLY_FACE || e->kind == PLY_STRIPS) return face_use_of(p, name);
     if (e->kind != PLY_VERTEX || p->is_list) return PLY_SKIP;
     static const char prefix[] = "scalar_"; /* CloudCompare's */
     const size_t n = sizeof prefix - 1;
     if (name.n > n && memcmp(name.p, prefix, n) == 0) name = (struct text_span){name.p + n, name.n - n};
-    for (unsigned i = PLY_X; i < PLY_SCALARS; i++)
-        if (text_is(name, ply_scalar_name[i])) return (enum ply_use)i;
-    return PLY_SKIP;
+    return scalar_of(name);
+}
+
+/* comment TextureFile NAME */
+static int read_comment(struct ply_header *h, struct text *t, struct sh_err *err)
+{
+    if (!text_is(text_word(t), "TextureFile")) return SH_OK;
+    const struct text_span name = text_rest(t);
+    if (name.n == 0) return SH_OK;
+    if (h->n_textures == PLY_MAX_TEXTURES)
+        return text_fail(t, t->line, SH_EINPUT, err, "more than %d textures", PLY_MAX_TEXTURES);
+    h->texture[h->n_textures] = name;
+    h->texture_line[h->n_textures++] = t->line;
+    return SH_OK;
 }
 
 static int read_property(struct ply_header *h, struct text *t, struct sh_err *err)
@@ -121,7 +168,7 @@ const struct ply_property *ply_find(const struct ply_header *h, const struct ply
 /* What holds for meshes and point clouds alike. */
 static int check_header(const struct ply_header *h, const struct text *t, struct sh_err *err)
 {
-    int n[3] = {0, 0, 0};
+    int n[4] = {0, 0, 0, 0};
     for (int i = 0; i < h->n_elements; i++) {
         const struct ply_element *e = &h->element[i];
         if (++n[e->kind] > 1 && e->kind != PLY_OTHER)
@@ -155,7 +202,9 @@ int ply_read_header(struct ply_header *h, struct text *t, struct sh_err *err)
             rc = read_element(h, t, err);
         } else if (text_is(word, "property")) {
             rc = read_property(h, t, err);
-        } else if (word.n > 0 && !text_is(word, "comment") && !text_is(word, "obj_info")) {
+        } else if (text_is(word, "comment")) {
+            rc = read_comment(h, t, err);
+        } else if (word.n > 0 && !text_is(word, "obj_info")) {
             rc = fail(t, err, "unknown word in the header", word);
         }
         if (rc != SH_OK) return rc;

@@ -16,7 +16,8 @@ int ply_open(struct ply_rows *r, const char *path, text_progress *progress, void
 
 void ply_close(struct ply_rows *r)
 {
-    free(r->corner);
+    free(r->corners.value);
+    free(r->texcoords.value);
     text_close(&r->t);
     *r = (struct ply_rows){0};
 }
@@ -80,11 +81,11 @@ static int read_scalar(struct ply_rows *r, enum ply_type type, double *value, st
     return SH_OK;
 }
 
-static int keep_corner(struct ply_rows *r, double value, struct sh_err *err)
+static int keep_value(struct ply_rows *r, struct ply_list *list, double value, struct sh_err *err)
 {
-    if (!grow(&r->corner, &r->cap_corners, r->n_corners + 1, sizeof *r->corner))
+    if (!grow(&list->value, &list->cap, list->n + 1, sizeof *list->value))
         return text_fail(&r->t, ply_line(r), SH_ENOMEM, err, "no memory for a face");
-    r->corner[r->n_corners++] = value;
+    list->value[list->n++] = value;
     return SH_OK;
 }
 
@@ -98,7 +99,8 @@ static int read_list(struct ply_rows *r, const struct ply_property *p, struct sh
     for (uint64_t i = 0; i < (uint64_t)count && rc == SH_OK; i++) {
         double value;
         rc = read_scalar(r, p->type, &value, err);
-        if (rc == SH_OK && p->use == PLY_CORNERS) rc = keep_corner(r, value, err);
+        if (rc == SH_OK && p->use == PLY_CORNERS) rc = keep_value(r, &r->corners, value, err);
+        if (rc == SH_OK && p->use == PLY_TEXCOORDS) rc = keep_value(r, &r->texcoords, value, err);
     }
     return rc;
 }
@@ -112,7 +114,7 @@ static void skip_blank_lines(struct text *t)
 static int read_row(struct ply_rows *r, struct sh_err *err)
 {
     const struct ply_element *e = r->element;
-    r->n_corners = 0;
+    r->corners.n = r->texcoords.n = 0;
     if (r->h.format == PLY_ASCII) {
         skip_blank_lines(&r->t);
         if (r->t.p >= r->t.end) return ply_fail(r, err, "the file ends before it");
@@ -148,32 +150,70 @@ static int begin(struct ply_rows *r, int i, struct sh_err *err)
 /* Rows are read once, in order: what is behind them goes, before the arrays that they fill have grown as large. */
 static int end_stretch(struct ply_rows *r, struct sh_err *err)
 {
-    text_drop_read(&r->t);
+    if (!r->is_kept) text_drop_read(&r->t);
     return r->progress(r->progress_ctx, (double)(r->t.p - r->t.data) / (double)r->t.size, err);
 }
 
+/* user NULL: rows are passed over. */
 static int walk_element(struct ply_rows *r, int i, const struct ply_user *user, struct sh_err *err)
 {
     int rc = begin(r, i, err);
-    if (rc == SH_OK) rc = user->begin(user->ctx, err);
+    if (rc == SH_OK && user != NULL) rc = user->begin(user->ctx, err);
     for (; r->row < r->element->count && rc == SH_OK; r->row++) {
         if ((r->row & 0xffff) == 0) rc = end_stretch(r, err);
         if (rc == SH_OK) rc = read_row(r, err);
-        if (rc == SH_OK) rc = user->row(user->ctx, err);
+        if (rc == SH_OK && user != NULL) rc = user->row(user->ctx, err);
     }
+    return rc;
+}
+
+static bool has_corners(const struct ply_element *e)
+{
+    return e->kind == PLY_FACE || e->kind == PLY_STRIPS;
+}
+
+static bool vertices_follow(const struct ply_header *h, int i)
+{
+    while (++i < h->n_elements)
+        if (h->element[i].kind == PLY_VERTEX) return true;
+    return false;
+}
+
+/* Faces that came before their vertices, from where they began. */
+static int walk_again(struct ply_rows *r, const struct text at[], const bool is_early[], const struct ply_user *user,
+                      struct sh_err *err)
+{
+    const char *end = r->t.p;
+    const uint64_t line = r->t.line;
+    int rc = SH_OK;
+    for (int i = 0; i < r->h.n_elements && rc == SH_OK; i++) {
+        if (!is_early[i]) continue;
+        r->t.p = at[i].p;
+        r->t.line = at[i].line;
+        rc = walk_element(r, i, user, err);
+    }
+    r->t.p = end;
+    r->t.line = line;
     return rc;
 }
 
 int ply_walk(struct ply_rows *r, const struct ply_user *user, struct sh_err *err)
 {
-    for (int i = 0; i < r->h.n_elements; i++) {
+    struct text at[PLY_MAX_ELEMENTS];
+    bool is_early[PLY_MAX_ELEMENTS] = {false};
+    int rc = SH_OK;
+    for (int i = 0; i < r->h.n_elements && rc == SH_OK; i++) {
         const struct ply_element *e = &r->h.element[i];
-        int rc = walk_element(r, i, user, err);
-        if (rc != SH_OK) return rc;
-        if (e->count > 0 && (e->kind == PLY_OTHER || (e->kind == PLY_FACE && !user->has_faces)))
+        is_early[i] = has_corners(e) && user->has_faces && vertices_follow(&r->h, i);
+        r->is_kept |= is_early[i];
+        at[i] = r->t;
+        rc = walk_element(r, i, is_early[i] ? NULL : user, err);
+        if (rc == SH_OK && e->count > 0 && (e->kind == PLY_OTHER || (has_corners(e) && !user->has_faces)))
             sh_warn(user->report, "%s: element '%s' (%llu of it) ignored", r->t.path, e->name,
                     (unsigned long long)e->count);
     }
+    if (rc == SH_OK) rc = walk_again(r, at, is_early, user, err);
+    if (rc != SH_OK) return rc;
     if (r->h.format == PLY_ASCII) skip_blank_lines(&r->t);
     if (r->t.p < r->t.end)
         sh_warn(user->report, "%s: %zu bytes after the last element ignored", r->t.path, (size_t)(r->t.end - r->t.p));

@@ -1,4 +1,4 @@
-/* Wavefront OBJ in double: v, f, o, g, usemtl, mtllib. Points and lines are counted; what has no shape is
+/* Wavefront OBJ in double: v with its colour, f, o, g, usemtl, mtllib. Points and lines are counted; what has no shape is
  * ignored. */
 #include <math.h>
 #include <stdlib.h>
@@ -8,12 +8,30 @@
 #include "core/scene/build.h"
 #include "core/text.h"
 
+/* A face that uses vertices, or texture coordinates, which come later in the file. */
+struct later {
+    const char *p;
+    uint64_t line;
+    uint32_t n_vertices;
+    size_t n_uv;
+    uint16_t label;
+};
+
 struct obj {
     struct scene_build *b;
     struct text t;
     float (*uv)[2]; /* all vt so far */
     size_t n_uv, cap_uv;
-    struct text_span object, material, library; /* library: the last one named */
+    uint8_t (*rgb)[4]; /* of the vertices so far, where they have colours and these are wanted */
+    uint32_t n_rgb;
+    size_t cap_rgb;
+    double rgb_scale; /* 0: not known yet */
+    struct later *later;
+    size_t n_later, cap_later;
+    const struct later *again; /* the one that is being read, at the end */
+    struct text_span object, material;
+    struct mtl_line *library; /* lines that name libraries */
+    size_t n_libraries, cap_libraries;
     uint16_t label;
     bool label_known;
     uint64_t n_unknown, unknown_line;
@@ -35,7 +53,7 @@ static bool at_statement_end(struct obj *o)
     return text_at_line_end(&o->t) || *o->t.p == '#';
 }
 
-/* Up to the statement's end: least to most numbers, else it fails with `what`. */
+/* Up to the statement's end: least to most numbers, else it fails with `what`. Those that are not there stay. */
 static int read_numbers(struct obj *o, int least, int most, double *number, const char *what, struct sh_err *err)
 {
     int n = 0;
@@ -44,13 +62,41 @@ static int read_numbers(struct obj *o, int least, int most, double *number, cons
     return n >= least ? SH_OK : fail_at(o, err, what);
 }
 
-/* x y z, then at most w or a colour, which are read and left alone: a weight is for curves only. */
+/* Colours are numbers up to 1, or up to 255 where one of them is above 1: the rest of the file says which. */
+static double find_rgb_scale(const struct obj *o)
+{
+    struct text t = o->t;
+    for (t.p = t.data; t.p < t.end; text_next_line(&t)) {
+        double v;
+        int n = 0;
+        if (!text_is(text_word(&t), "v")) continue;
+        for (text_skip_blanks(&t); n < 6 && text_number(&t, &v); text_skip_blanks(&t))
+            if (++n > 3 && v > 1.0) return 1.0;
+    }
+    return 255.0;
+}
+
+static int keep_rgb(struct obj *o, const double rgb[3], struct sh_err *err)
+{
+    const uint32_t at = o->b->scene->n_vertices - o->b->vertex0 - 1;
+    if (o->rgb_scale == 0.0) o->rgb_scale = find_rgb_scale(o);
+    if (!grow(&o->rgb, &o->cap_rgb, at + 1, sizeof *o->rgb))
+        return build_fail(o->b, SH_ENOMEM, err, "no memory for colours");
+    memset(o->rgb[o->n_rgb], 0, (at - o->n_rgb) * sizeof *o->rgb); /* of vertices between that have none */
+    build_rgb(rgb, o->rgb_scale, o->rgb[at]);
+    o->n_rgb = at + 1;
+    return SH_OK;
+}
+
+/* x y z, then at most w, or a colour of three numbers and what follows it. A weight is for curves only. */
 static int read_vertex(struct obj *o, struct sh_err *err)
 {
-    double v[8];
+    double v[8] = {[5] = NAN};
     int rc = read_numbers(o, 3, 8, v, "v takes 3 to 8 numbers", err);
     o->b->line = o->t.line;
-    return rc == SH_OK ? build_vertex(o->b, v, err) : rc;
+    if (rc == SH_OK) rc = build_vertex(o->b, v, err);
+    if (rc != SH_OK || !build_wants_colours(o->b) || isnan(v[5])) return rc;
+    return keep_rgb(o, &v[3], err);
 }
 
 /* vt u [v [w]] */
@@ -66,13 +112,18 @@ static int read_uv(struct obj *o, struct sh_err *err)
     return SH_OK;
 }
 
+/* LATER: it may come later. */
+enum { LATER = 1 };
+
 /* 0: the corner has none. */
 static int set_corner_uv(struct obj *o, int64_t index, float uv[2], struct sh_err *err)
 {
-    int64_t number = index < 0 ? (int64_t)o->n_uv + index : index - 1;
+    const size_t seen = o->again != NULL ? o->again->n_uv : o->n_uv;
+    int64_t number = index < 0 ? (int64_t)seen + index : index - 1;
+    if (number >= (int64_t)o->n_uv && o->again == NULL) return LATER;
     if (index != 0 && (number < 0 || number >= (int64_t)o->n_uv)) {
         o->b->line = o->t.line;
-        return build_fail(o->b, SH_EINPUT, err, "vt index %lld out of range; %zu so far", (long long)index, o->n_uv);
+        return build_fail(o->b, SH_EINPUT, err, "vt index %lld out of range; there are %zu", (long long)index, o->n_uv);
     }
     for (int k = 0; k < 2; k++)
         uv[k] = index != 0 ? o->uv[number][k] : (float)NAN;
@@ -80,14 +131,14 @@ static int set_corner_uv(struct obj *o, int64_t index, float uv[2], struct sh_er
 }
 
 /* One v, v/vt, v//vn or v/vt/vn; vn doesn't count, and vt where no textures are asked for. */
-static int read_corner(struct obj *o, uint32_t *corner, float uv[2], struct sh_err *err)
+static int read_corner(struct obj *o, uint32_t *corner, float uv[2], uint8_t rgb[4], struct sh_err *err)
 {
     struct text at = o->t;
     int64_t index, other, texture = 0;
     bool ok = text_integer(&o->t, &index);
     for (int slash = 0; ok && slash < 2 && *o->t.p == '/'; slash++) {
         o->t.p++;
-        if (slash == 0 && *o->t.p == '/') continue;
+        if (text_at_word_end(&o->t) || (slash == 0 && *o->t.p == '/')) continue; /* 1// and 1/ name vertices alone */
         ok = text_integer(&o->t, slash == 0 ? &texture : &other);
     }
     if (!ok || !text_at_word_end(&o->t)) {
@@ -95,30 +146,60 @@ static int read_corner(struct obj *o, uint32_t *corner, float uv[2], struct sh_e
         return fail_at(o, err, "f takes v, v/vt, v//vn or v/vt/vn");
     }
     int64_t n = o->b->scene->n_vertices - o->b->vertex0;
-    int64_t number = index < 0 ? n + index : index - 1;
+    int64_t number = index < 0 ? (o->again != NULL ? o->again->n_vertices : n) + index : index - 1;
+    if (index != 0 && number >= n && o->again == NULL) return LATER;
     if (index == 0 || number < 0 || number >= n) {
         o->b->line = o->t.line;
-        return build_fail(o->b, SH_EINPUT, err, "index %lld out of range; %lld vertices so far", (long long)index,
+        return build_fail(o->b, SH_EINPUT, err, "index %lld out of range; there are %lld vertices", (long long)index,
                           (long long)n);
     }
+    if (number < o->n_rgb)
+        memcpy(rgb, o->rgb[number], 4);
+    else
+        memset(rgb, 0, 4);
     *corner = o->b->vertex0 + (uint32_t)number;
     return uv != NULL ? set_corner_uv(o, texture, uv, err) : SH_OK;
 }
 
 static int use_label(struct obj *o, struct sh_err *err)
 {
-    if (o->label_known) return SH_OK;
+    if (o->again != NULL) o->label = o->again->label;
+    if (o->again != NULL || o->label_known) return SH_OK;
     o->label_known = true;
     return build_label(o->b, o->object, o->material, &o->label, err);
+}
+
+/* Returns how many words there were. */
+static uint64_t skip_statement(struct obj *o)
+{
+    uint64_t n = 0;
+    for (; !at_statement_end(o); n++)
+        text_word(&o->t);
+    return n;
+}
+
+static int keep_for_later(struct obj *o, const struct text *at, struct sh_err *err)
+{
+    int rc = use_label(o, err);
+    if (rc != SH_OK) return rc;
+    if (!grow(&o->later, &o->cap_later, o->n_later + 1, sizeof *o->later))
+        return build_fail(o->b, SH_ENOMEM, err, "no memory for faces whose vertices come later");
+    o->later[o->n_later++] =
+        (struct later){at->p, at->line, o->b->scene->n_vertices - o->b->vertex0, o->n_uv, o->label};
+    skip_statement(o);
+    return SH_OK;
 }
 
 static int read_face(struct obj *o, struct sh_err *err)
 {
     struct scene_build *b = o->b;
+    const struct text at = o->t;
     size_t n = 0;
     while (!at_statement_end(o)) {
         int rc = build_corners(b, n + 1, err);
-        if (rc == SH_OK) rc = read_corner(o, &b->corner[n], build_wants_textures(b) ? b->corner_uv[n] : NULL, err);
+        if (rc == SH_OK)
+            rc = read_corner(o, &b->corner[n], build_wants_textures(b) ? b->corner_uv[n] : NULL, b->corner_rgb[n], err);
+        if (rc == LATER) return keep_for_later(o, &at, err);
         if (rc != SH_OK) return rc;
         n++;
     }
@@ -129,6 +210,7 @@ static int read_face(struct obj *o, struct sh_err *err)
         return SH_OK;
     }
     b->has_uv = o->n_uv > 0;
+    b->has_rgb = o->n_rgb > 0;
     int rc = use_label(o, err);
     return rc == SH_OK ? build_polygon(b, n, o->label, err) : rc;
 }
@@ -140,13 +222,15 @@ static int read_name(struct obj *o, struct text_span *name)
     return SH_OK;
 }
 
-/* Returns how many words there were. */
-static uint64_t skip_statement(struct obj *o)
+static int read_library(struct obj *o, struct sh_err *err)
 {
-    uint64_t n = 0;
-    for (; !at_statement_end(o); n++)
-        text_word(&o->t);
-    return n;
+    if (!grow(&o->library, &o->cap_libraries, o->n_libraries + 1, sizeof *o->library))
+        return build_fail(o->b, SH_ENOMEM, err, "no memory for names of libraries");
+    o->t.continued = false; /* a backslash there may be a path's */
+    const uint64_t line = o->t.line;
+    o->library[o->n_libraries++] = (struct mtl_line){text_rest(&o->t), line};
+    o->t.continued = true;
+    return SH_OK;
 }
 
 /* Points count one by one, a line or a free-form curve or surface as one. */
@@ -193,26 +277,34 @@ static int read_statement(struct obj *o, struct sh_err *err)
     if (text_is(word, "p")) return count_left_out(o, true);
     if (text_is(word, "vt") && build_wants_textures(o->b)) return read_uv(o, err);
     if (text_is(word, "usemtl")) return read_name(o, &o->material);
-    if (text_is(word, "mtllib")) {
-        o->t.continued = false; /* a backslash there may be a path's */
-        o->library = text_rest(&o->t);
-        o->t.continued = true;
-        return SH_OK;
-    }
+    if (text_is(word, "mtllib")) return read_library(o, err);
     return read_other(o, word);
 }
 
 static int read_statements(struct obj *o, struct sh_err *err)
 {
-    static const char utf8_mark[] = "\xef\xbb\xbf";
-    if (o->t.size >= 3 && memcmp(o->t.p, utf8_mark, 3) == 0) o->t.p += 3;
-    if (memchr(o->t.p, '\0', o->t.size < 512 ? o->t.size : 512) != NULL)
+    const size_t n = (size_t)(o->t.end - o->t.p);
+    if (memchr(o->t.p, '\0', n < 512 ? n : 512) != NULL)
         return build_fail(o->b, SH_EINPUT, err, "not a text in UTF-8 or ASCII");
     int rc = SH_OK;
     for (uint64_t i = 0; o->t.p < o->t.end && rc == SH_OK; i++) {
         if ((i & 0xffff) == 0) rc = build_progress(o->b, (double)(o->t.p - o->t.data) / (double)o->t.size, err);
         if (rc == SH_OK) rc = read_statement(o, err);
         text_next_line(&o->t);
+    }
+    return rc;
+}
+
+/* All vertices are there now. */
+static int read_later(struct obj *o, struct sh_err *err)
+{
+    int rc = SH_OK;
+    for (size_t i = 0; i < o->n_later && rc == SH_OK; i++) {
+        o->again = &o->later[i];
+        o->t.p = o->again->p;
+        o->t.line = o->again->line;
+        if ((i & 0xffff) == 0) rc = build_progress(o->b, (double)i / (double)o->n_later, err);
+        if (rc == SH_OK) rc = read_face(o, err);
     }
     return rc;
 }
@@ -225,12 +317,16 @@ int read_obj(struct scene_build *b, struct sh_err *err)
     int rc = text_open(&o.t, b->spec->file, build_progress, b, err);
     o.t.continued = true;
     if (rc == SH_OK) rc = read_statements(&o, err);
+    if (rc == SH_OK) rc = read_later(&o, err);
     if (rc == SH_OK && o.n_unknown > 0)
         sh_warn(b->report, "%s: %llu unknown statements ignored; the first is '%s' in line %llu", b->name,
                 (unsigned long long)o.n_unknown, o.unknown, (unsigned long long)o.unknown_line);
-    if (rc == SH_OK && o.library.n > 0) rc = read_mtl(b, o.library, first_surface, err);
+    if (rc == SH_OK) rc = read_mtl(b, o.library, o.n_libraries, first_surface, err);
     b->scene->n_meshes++;
     free(o.uv);
+    free(o.library);
+    free(o.rgb);
+    free(o.later);
     text_close(&o.t);
     return rc;
 }

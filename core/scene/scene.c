@@ -15,7 +15,7 @@ static const struct {
     const char *ending;
     int (*read)(struct scene_build *b, struct sh_err *err);
 } readers[] = {
-    {".obj", read_obj},     {".ply", read_ply},     {".stl", import_apart}, {".gltf", import_apart},
+    {".obj", read_obj},     {".ply", read_ply},     {".stl", read_stl},     {".gltf", import_apart},
     {".glb", import_apart}, {".fbx", import_apart}, {".dae", import_apart}, {".ifc", read_ifc},
 };
 
@@ -123,7 +123,7 @@ static int copy_surfaces(struct scene_build *b, const struct scene_arrays *array
         if (memchr(surface[i].object, '\0', SCENE_NAME_LEN) == NULL ||
             memchr(surface[i].material, '\0', SCENE_NAME_LEN) == NULL)
             return build_fail(b, SH_EINPUT, err, "surface %u: a name has no end", i);
-        b->scene->surface[i].texture = b->scene->surface[i].opacity = 0;
+        b->scene->surface[i].texture = b->scene->surface[i].opacity = b->scene->surface[i].vertex_colours = 0;
     }
     b->scene->n_surfaces = n;
     return SH_OK;
@@ -185,6 +185,7 @@ void scene_free(struct scene *scene)
     free(scene->label);
     free(scene->surface);
     free(scene->uv);
+    free(scene->rgb);
     for (uint32_t i = 0; i < scene->n_textures; i++) {
         free(scene->texture[i].file);
         free(scene->texture[i].bytes);

@@ -24,14 +24,16 @@ static void fill_uv(struct scene *scene, uint32_t from, uint32_t to)
             scene->uv[i][k / 2][k % 2] = NAN;
 }
 
-static int make_room(struct scene *s, uint64_t vertices, uint64_t triangles, int uv, int cutouts)
+static int make_room(struct scene *s, uint64_t vertices, uint64_t triangles, int uv, int rgb, int cutouts)
 {
-    const int had_uv = s->uv != NULL, had_cutouts = s->cutout != NULL;
+    const int had_uv = s->uv != NULL, had_rgb = s->rgb != NULL, had_cutouts = s->cutout != NULL;
     if (!enlarge(&s->vertex_m, vertices, sizeof *s->vertex_m) ||
         !enlarge(&s->triangle, triangles, sizeof *s->triangle) || !enlarge(&s->label, triangles, sizeof *s->label))
         return 0;
     if ((uv || had_uv) && !enlarge(&s->uv, triangles, sizeof *s->uv)) return 0;
     if (uv && !had_uv) fill_uv(s, 0, s->n_triangles);
+    if ((rgb || had_rgb) && !enlarge(&s->rgb, triangles, sizeof *s->rgb)) return 0;
+    if (rgb && !had_rgb) memset(s->rgb, 0, s->n_triangles * sizeof *s->rgb);
     if (!cutouts && !had_cutouts) return 1;
     if (!enlarge(&s->cutout, s->n_surfaces, sizeof *s->cutout)) return 0;
     if (!had_cutouts) memset(s->cutout, 0, s->n_surfaces * sizeof *s->cutout);
@@ -49,7 +51,9 @@ static void write_copy(struct scene *s, const struct scene *mesh, const struct s
             s->triangle[at][k] = first + mesh->triangle[i][k];
         s->label[at] = (uint16_t)(s->label0 + copy->label0 + mesh->label[i]);
         if (mesh->uv != NULL) memcpy(s->uv[at], mesh->uv[i], sizeof *s->uv);
+        if (mesh->rgb != NULL) memcpy(s->rgb[at], mesh->rgb[i], sizeof *s->rgb);
     }
+    if (s->rgb != NULL && mesh->rgb == NULL) memset(s->rgb[triangle0], 0, mesh->n_triangles * sizeof *s->rgb);
     if (s->uv != NULL && mesh->uv == NULL) fill_uv(s, triangle0, s->n_triangles);
     for (uint32_t i = 0; s->cutout != NULL && i < mesh->n_surfaces; i++)
         s->cutout[copy->label0 + i] = mesh->cutout != NULL ? mesh->cutout[i] : NULL;
@@ -69,11 +73,12 @@ static int take_masks(struct scene *s, struct scene *mesh)
 int scene_write_out_copies(struct scene *s, uint64_t most, const struct sh_report *report, struct sh_err *err)
 {
     uint64_t vertices = s->n_vertices;
-    int uv = 0, cutouts = 0, rc = SH_OK;
+    int uv = 0, rgb = 0, cutouts = 0, rc = SH_OK;
     if (s->n_copies == 0) return SH_OK;
     for (uint32_t i = 0; i < s->n_copied; i++) {
         vertices += (uint64_t)s->copied[i].n * s->copied[i].mesh->n_vertices;
         uv |= s->copied[i].mesh->uv != NULL;
+        rgb |= s->copied[i].mesh->rgb != NULL;
         cutouts |= s->copied[i].mesh->cutout != NULL;
     }
     if (s->n_all > most || vertices > UINT32_MAX - 1)
@@ -81,7 +86,7 @@ int scene_write_out_copies(struct scene *s, uint64_t most, const struct sh_repor
                        "scene.meshes[].copies: %u copies come to %u triangles; reports, coverage and the page of `run` "
                        "look at them one by one: allowed there are %llu",
                        s->n_copies, s->n_all, (unsigned long long)most);
-    if (!make_room(s, vertices, s->n_all, uv, cutouts))
+    if (!make_room(s, vertices, s->n_all, uv, rgb, cutouts))
         return sh_fail(err, SH_ENOMEM, "no memory for the %u triangles of copies", s->n_all);
     for (uint32_t i = 0; i < s->n_copied && rc == SH_OK; i++) {
         struct scene_copied *of = &s->copied[i];

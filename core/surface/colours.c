@@ -24,7 +24,8 @@ int surface_colours_alloc(uint32_t n, struct surface_colours *colours, struct sh
     *colours = (struct surface_colours){.n = n};
     colours->own = calloc((size_t)n + 1, sizeof *colours->own);
     colours->image = calloc((size_t)n + 1, sizeof *colours->image);
-    if (colours->own != NULL && colours->image != NULL) return SH_OK;
+    colours->by_vertex = calloc((size_t)n + 1, 1);
+    if (colours->own != NULL && colours->image != NULL && colours->by_vertex != NULL) return SH_OK;
     surface_colours_free(colours);
     return sh_fail(err, SH_ENOMEM, "no memory for colours of %u surfaces", n);
 }
@@ -35,6 +36,7 @@ void surface_colours_free(struct surface_colours *colours)
         if (colours->image[i] != NULL && --colours->image[i]->users == 0) free(colours->image[i]);
     free(colours->image);
     free(colours->own);
+    free(colours->by_vertex);
     *colours = (struct surface_colours){.n = 0};
 }
 
@@ -45,6 +47,7 @@ void surface_colours_set(struct surface_colours *colours, uint32_t label, const 
     for (int i = 0; i < 3 && named->has_colour; i++)
         rgb[i] = (uint8_t)lrint(255.0 * fmin(1.0, fmax(0.0, (double)named->colour[i])));
     colours->own[label] = packed(rgb);
+    colours->by_vertex[label] = named->vertex_colours != SCENE_COLOURS_NONE;
 }
 
 static int load(const struct scene_texture *from, struct surface_image **out, struct sh_err *err)
@@ -78,11 +81,11 @@ int surface_colours_texture(struct surface_colours *colours, uint32_t label, con
     return SH_OK;
 }
 
-uint32_t surface_colour(const struct surface_colours *colours, uint32_t label, const double uv[2])
+uint32_t surface_colour(const struct surface_colours *colours, uint32_t label, const double uv[2], const uint8_t rgb[3])
 {
     label = surface_of_label(label);
     if (label >= colours->n) return packed(colour_grey);
     const struct surface_image *image = uv != NULL ? colours->image[label] : NULL;
     const int64_t at = image != NULL ? texture_at(&image->frame, uv) : -1;
-    return at < 0 ? colours->own[label] : packed(image->rgb[at]);
+    return at >= 0 ? packed(image->rgb[at]) : rgb != NULL ? packed(rgb) : colours->own[label];
 }

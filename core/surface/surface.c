@@ -30,7 +30,7 @@ double surface_linear(double srgb)
     return srgb <= 0.04045 ? srgb / 12.92 : pow((srgb + 0.055) / 1.055, 2.4);
 }
 
-static double surface_luminance(const float rgb[3])
+double surface_luminance(const float rgb[3])
 {
     return 0.2126 * surface_linear((double)rgb[0]) + 0.7152 * surface_linear((double)rgb[1]) +
            0.0722 * surface_linear((double)rgb[2]);
@@ -123,7 +123,7 @@ void surface_return(const struct surface_table *table, uint32_t n, const uint32_
                     double *rho)
 {
     const double *field = &table->surface[0].reflectance;
-    if (table->texture != NULL)
+    if (table->texture != NULL || table->by_vertex != NULL)
         lambert_texels(table, n, label, cos_incidence, rho);
     else
         lambert(field, table->n, n, label, cos_incidence, rho);

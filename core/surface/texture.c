@@ -21,7 +21,9 @@ void surface_textures_free(struct surface_table *table)
     for (uint32_t i = 0; table->texture != NULL && i <= table->n; i++)
         if (table->texture[i] != NULL && --table->texture[i]->users == 0) free(table->texture[i]);
     free(table->texture);
+    free(table->by_vertex);
     table->texture = NULL;
+    table->by_vertex = NULL;
 }
 
 static uint16_t as_texel(double reflectance)
@@ -86,6 +88,22 @@ int surface_table_texture(struct surface_table *table, uint32_t label, const str
     t->users++;
     table->texture[label] = t;
     return SH_OK;
+}
+
+int surface_table_by_vertex(struct surface_table *table, uint32_t label, struct sh_err *err)
+{
+    const struct surface *s = &table->surface[label];
+    if (s->glass > 0.0 || s->mirror > 0.0) return SH_OK;
+    if (table->by_vertex == NULL) table->by_vertex = calloc((size_t)table->n + 1, 1);
+    if (table->by_vertex == NULL) return sh_fail(err, SH_ENOMEM, "no memory for colours of vertices");
+    table->by_vertex[label] = 1;
+    return SH_OK;
+}
+
+uint32_t surface_texel_of(uint32_t label, const uint8_t rgb[3])
+{
+    const float colour[CHANNELS] = {(float)rgb[0] / 255.0f, (float)rgb[1] / 255.0f, (float)rgb[2] / 255.0f};
+    return label | (uint32_t)as_texel(surface_luminance(colour)) << 16;
 }
 
 uint32_t surface_texel(const struct surface_table *table, uint32_t label, const double uv[2])

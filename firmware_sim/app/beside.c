@@ -17,7 +17,8 @@ enum { NAME_MAX_LEN = 255, DEEPEST = 1 }; /* a mesh names a .mtl, which names im
 struct search {
     int (*take)(void *ctx, const char *name, const char *path);
     void *ctx;
-    char folder[PATH_MAX];
+    char folder[PATH_MAX]; /* of the mesh */
+    char here[PATH_MAX];   /* of the file that is being searched, perhaps a library in another folder */
     char **seen;
     size_t n_seen;
     struct sh_err *err;
@@ -53,12 +54,17 @@ static void decode(const char *name, char *out)
     *out = '\0';
 }
 
-static int is_file(const struct search *s, const char *name, char path[PATH_MAX])
+static int is_file_in(const char *folder, const char *name, char path[PATH_MAX])
 {
     struct stat st;
     const int n =
-        name[0] == '/' ? snprintf(path, PATH_MAX, "%s", name) : snprintf(path, PATH_MAX, "%s%s", s->folder, name);
+        name[0] == '/' ? snprintf(path, PATH_MAX, "%s", name) : snprintf(path, PATH_MAX, "%s%s", folder, name);
     return n < PATH_MAX && stat(path, &st) == 0 && S_ISREG(st.st_mode);
+}
+
+static int is_file(const struct search *s, const char *name, char path[PATH_MAX])
+{
+    return is_file_in(s->here, name, path) || is_file_in(s->folder, name, path);
 }
 
 /* As it stands; then by its last part, which is how files of other machines are found. */
@@ -86,7 +92,12 @@ static int found(struct search *s, const char *name, const char *path, int depth
     if (more == NULL || (s->seen[s->n_seen] = strdup(path)) == NULL) return sh_fail(s->err, SH_ENOMEM, "no memory");
     s->n_seen++;
     int rc = s->take(s->ctx, name, path);
-    return rc == SH_OK && depth < DEEPEST && app_ends_in(path, ".mtl") ? search(s, path, depth + 1) : rc;
+    if (rc != SH_OK || depth == DEEPEST || !app_ends_in(path, ".mtl")) return rc;
+    char here[PATH_MAX];
+    memcpy(here, s->here, sizeof here);
+    rc = search(s, path, depth + 1);
+    memcpy(s->here, here, sizeof here);
+    return rc;
 }
 
 /* The text up to `end` that began at or after `first`: all of it may be the name, or what follows a blank. */
@@ -124,10 +135,25 @@ static int search_bytes(struct search *s, const char *bytes, size_t len, int dep
     return rc;
 }
 
+static void set_folder(char folder[PATH_MAX], const char *file)
+{
+    const char *slash = strrchr(file, '/');
+    snprintf(folder, PATH_MAX, "%.*s", slash != NULL ? (int)(slash + 1 - file) : 0, file);
+}
+
+/* Only the header of a .ply is text. */
+static size_t length_of_text(const char *file, const char *bytes, size_t len)
+{
+    static const char end[] = "end_header";
+    const char *at = app_ends_in(file, ".ply") ? memmem(bytes, len, end, sizeof end - 1) : NULL;
+    return at != NULL ? (size_t)(at - bytes) : len;
+}
+
 static int search(struct search *s, const char *file, int depth)
 {
     const char *why;
     struct stat st;
+    set_folder(s->here, file);
     FILE *in = infile_open(file, &why);
     if (in == NULL) return sh_fail(s->err, SH_EINPUT, "%s: cannot be read: %s", file, why);
     int rc = SH_OK;
@@ -135,7 +161,7 @@ static int search(struct search *s, const char *file, int depth)
         void *bytes = mmap(NULL, (size_t)st.st_size, PROT_READ, MAP_PRIVATE, fileno(in), 0);
         if (bytes == MAP_FAILED) rc = sh_fail(s->err, SH_EIO, "%s: cannot be read", file);
         if (rc == SH_OK) {
-            rc = search_bytes(s, bytes, (size_t)st.st_size, depth);
+            rc = search_bytes(s, bytes, length_of_text(file, bytes, (size_t)st.st_size), depth);
             munmap(bytes, (size_t)st.st_size);
         }
     }
@@ -147,9 +173,8 @@ int app_beside(const char *mesh, int (*take)(void *ctx, const char *name, const 
                struct sh_err *err)
 {
     struct search s = {.take = take, .ctx = ctx, .err = err};
-    const char *slash = strrchr(mesh, '/');
-    if (app_ends_in(mesh, ".ply") || app_ends_in(mesh, ".stl")) return SH_OK;
-    snprintf(s.folder, sizeof s.folder, "%.*s", slash != NULL ? (int)(slash + 1 - mesh) : 0, mesh);
+    if (app_ends_in(mesh, ".stl")) return SH_OK;
+    set_folder(s.folder, mesh);
     int rc = search(&s, mesh, 0);
     for (size_t i = 0; i < s.n_seen; i++)
         free(s.seen[i]);

@@ -2,16 +2,16 @@
  * is there, in the order in which they are named.
  *
  * It doesn't read formats. A name is what ends in such an ending and leads to a file, as it stands or by its last
- * part, from the mesh's folder. So it may find more than a reader opens, but nothing less unless a name is coded
+ * part, from the folder of the file that names it, or the mesh's. So it may find more than a reader opens, but nothing less unless a name is coded
  * otherwise than with %20. */
 #ifndef FIRMWARE_SIM_APP_BESIDE_H
 #define FIRMWARE_SIM_APP_BESIDE_H
 
 #include "core/err.h"
 
-/* `take` gets the name as it stands, and the path; what it returns, if not SH_OK, ends the search. .ply and .stl name no
+/* `take` gets the name as it stands, and the path; what it returns, if not SH_OK, ends the search. .stl names no
  * files. */
 int app_beside(const char *mesh, int (*take)(void *ctx, const char *name, const char *path), void *ctx,
-                 struct sh_err *err);
+               struct sh_err *err);
 
 #endif

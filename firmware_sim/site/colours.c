@@ -17,7 +17,7 @@ static int load_textures(struct site *site, const struct sh_report *report, stru
         const struct scene_surface *surface = site_surface(site, i);
         const struct scene_texture *texture = site_texture(site, i);
         surface_colours_set(colours, i, surface);
-        bare += texture == NULL && !surface->has_colour;
+        bare += texture == NULL && !surface->has_colour && surface->vertex_colours != SCENE_COLOURS_ALL;
         if (texture == NULL || texture->unreadable) continue;
         rc = sh_check_stop(report, &why);
         if (rc == SH_OK) rc = surface_colours_texture(colours, i, texture, &why);

@@ -72,6 +72,9 @@ static int set_up_textures(struct site *site, const uint8_t *said, const struct 
     int rc = SH_OK;
     for (uint32_t i = 0; i < site->n_surfaces && rc == SH_OK; i++) {
         const struct scene_texture *texture = said[i] ? NULL : site_texture(site, i);
+        if (!said[i] && site_surface(site, i)->vertex_colours != SCENE_COLOURS_NONE)
+            rc = surface_table_by_vertex(&site->detect.surfaces, i, &why);
+        if (rc != SH_OK) break;
         if (texture == NULL || texture->unreadable) continue;
         rc = sh_check_stop(report, &why);
         if (rc == SH_OK) rc = surface_table_texture(&site->detect.surfaces, i, site_surface(site, i), texture, &why);
@@ -88,6 +91,11 @@ static int set_up_textures(struct site *site, const uint8_t *said, const struct 
     return rc;
 }
 
+static int lacks_colour(const struct scene_surface *s)
+{
+    return !s->has_colour && s->texture == 0 && s->vertex_colours != SCENE_COLOURS_ALL;
+}
+
 static int set_up_surfaces(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
@@ -101,7 +109,7 @@ static int set_up_surfaces(struct site *site, const struct sh_report *report, st
         if (rule >= 0) fits[rule]++;
         int said = rule >= 0 && !isnan(cfg->surface[rule].surface.reflectance);
         is_said[i] = (uint8_t)said;
-        unknown += !said && !site_surface(site, i)->has_colour && site_surface(site, i)->texture == 0;
+        unknown += !said && lacks_colour(site_surface(site, i));
     }
     if (rc == SH_OK && cfg->signal.on) rc = set_up_textures(site, is_said, report, err);
     free(is_said);

@@ -35,7 +35,7 @@ int site_name_legs(struct site *site, struct sh_err *err)
                        SCENE_MAX_SURFACES);
     site->legs = calloc(1, sizeof *site->legs);
     if (site->legs == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the legs of tripods");
-    *site->legs = (struct scene_surface){"tripod", "leg", {0.5f, 0.5f, 0.5f}, 1, 0, 0, 0.0f};
+    *site->legs = (struct scene_surface){"tripod", "leg", {0.5f, 0.5f, 0.5f}, .has_colour = 1};
     site->legs_label = site->n_surfaces++;
     return SH_OK;
 }

@@ -1,4 +1,4 @@
-/* Meshes by our own readers: .obj with its library of materials, .ply, and what of an .ifc we read ourselves. Input:
+/* Meshes by our own readers: .obj with its library of materials, .ply, .stl, and what of an .ifc we read ourselves. Input:
  * a byte (which, how), then the file; of an .obj what follows the line `#mtl` is its library in.mtl. A scene that is
  * made is whole; what is refused is refused in a line that names the file. */
 #include <math.h>
@@ -77,6 +77,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         break;
     case 1:
         load(fuzz_file(".ply", in.p, in.n), how);
+        break;
+    case 2:
+        load(fuzz_file(".stl", in.p, in.n), how);
         break;
     default:
         load_ifc(in.p, in.n);

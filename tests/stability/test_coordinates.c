@@ -5,6 +5,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "tests/common/collada.h"
 #include "tests/common/generate.h"
 #include "tests/common/thorough.h"
 #include "tests/stability/rig.h"
@@ -80,18 +81,14 @@ static void write_ply_binary(FILE *f, const struct mesh *m)
     }
 }
 
-static void write_stl(FILE *f, const struct mesh *m)
+/* A triangle is enough: it is refused. */
+static void write_collada(FILE *f, const struct mesh *m)
 {
-    fprintf(f, "solid site\n");
-    for (uint32_t i = 0; i < m->n_triangles; i++) {
-        fprintf(f, "facet normal 0 0 0\nouter loop\n");
-        for (int k = 0; k < 3; k++) {
-            const double *v = m->vertex[m->triangle[i][k]];
-            fprintf(f, "vertex %.10f %.10f %.10f\n", v[0], v[1], v[2]);
-        }
-        fprintf(f, "endloop\nendfacet\n");
-    }
-    fprintf(f, "endsolid site\n");
+    const double *v[3];
+    for (int k = 0; k < 3; k++)
+        v[k] = m->vertex[m->triangle[0][k]];
+    fprintf(f, COLLADA_TRIANGLE("%.10f %.10f %.10f %.10f %.10f %.10f %.10f %.10f %.10f"), v[0][0], v[0][1], v[0][2],
+            v[1][0], v[1][1], v[1][2], v[2][0], v[2][1], v[2][2]);
 }
 
 static int load_site(const struct mesh *mesh, const char *ending, void (*write)(FILE *f, const struct mesh *m),
@@ -144,14 +141,14 @@ static void refused_row(const struct place *place, const struct mesh *mesh)
     struct sh_err err;
     double worst_m = 0.0;
     char regime[96];
-    int rc = load_site(mesh, ".stl", write_stl, &scene, &err);
+    int rc = load_site(mesh, ".dae", write_collada, &scene, &err);
     double ours_m = rc == SH_EINPUT && scene == NULL ? 0.0 : INFINITY;
     if (rc == SH_OK) scene_free(scene);
     for (uint32_t i = 0; i < 3 * mesh->n_vertices; i++) {
         double x = mesh->vertex[i / 3][i % 3];
         worst_m = fmax(worst_m, fabs((double)(float)x - x));
     }
-    snprintf(regime, sizeof regime, "site at %s coordinates, STL: refused", place->name);
+    snprintf(regime, sizeof regime, "site at %s coordinates, Collada: refused", place->name);
     table_row(regime, "read as floats: vertices", worst_m, ours_m, 0.0, "m");
 }
 

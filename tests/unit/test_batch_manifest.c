@@ -228,8 +228,11 @@ static void test_beside(void **state)
     write_file("m.gltf", "w",
                "{\"buffers\":[{\"uri\":\"e.bin\"}],\"images\":[{\"uri\":\"b%20c.JPG\"},{\"uri\":\"tex/d.png\"}]}");
     expect_beside("m.gltf", "/e.bin;/b c.JPG;/tex/d.png;");
-    write_file("m.ply", "w", "ply\ncomment TextureFile a.png\n");
-    expect_beside("m.ply", "");
+    write_file("m.ply", "w", "ply\ncomment TextureFile a.png\nend_header\nother.png\n");
+    expect_beside("m.ply", "/a.png;");
+    write_file("tex/lib.mtl", "w", "newmtl one\nmap_Kd d.png\nmap_d a.png\n");
+    write_file("sub.obj", "w", "mtllib tex\\lib.mtl\nusemtl other.png\n");
+    expect_beside("sub.obj", "/tex/lib.mtl;/tex/d.png;/a.png;/other.png;");
     write_file("empty.obj", "w", "");
     expect_beside("empty.obj", "");
 }

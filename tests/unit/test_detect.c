@@ -110,12 +110,12 @@ static void names_and_colours_choose(void **state)
         {"*", "paint", {0.05, unsaid, 100.0, unsaid, unsaid, unsaid}},
         {"*", "silver", {unsaid, unsaid, 100.0, unsaid, unsaid, 0.8}},
     };
-    const struct scene_surface named[] = {{"window", "Glas, klar", {0.5f, 0.5f, 0.5f}, 1, 0, 0, 0.0f},
-                                          {"sign 1", "paint", {1, 1, 1}, 1, 0, 0, 0.0f},
-                                          {"sign 12", "paint", {1, 1, 1}, 1, 0, 0, 0.0f},
-                                          {"wall", "brick", {1, 0, 0}, 1, 0, 0, 0.0f},
-                                          {"wall", "brick", {0, 0, 0}, 0, 0, 0, 0.0f},
-                                          {"m", "silver", {1, 1, 1}, 1, 0, 0, 0.0f}};
+    const struct scene_surface named[] = {{"window", "Glas, klar", {0.5f, 0.5f, 0.5f}, .has_colour = 1},
+                                          {"sign 1", "paint", {1, 1, 1}, .has_colour = 1},
+                                          {"sign 12", "paint", {1, 1, 1}, .has_colour = 1},
+                                          {"wall", "brick", {1, 0, 0}, .has_colour = 1},
+                                          {"wall", "brick", {0, 0, 0}, .has_colour = 0},
+                                          {"m", "silver", {1, 1, 1}, .has_colour = 1}};
     static const int chosen[] = {0, 1, 2, -1, -1, 3};
     const double grey = 0.21404114, reflectance[] = {0.1 * grey, 0.3, 0.05, 0.2126, 0.6, 0.0};
     struct surface_table table;

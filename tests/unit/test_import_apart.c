@@ -16,6 +16,7 @@
 #include <assimp/version.h>
 
 #include "core/scene/import.h"
+#include "tests/common/collada.h"
 #include "tests/unit/scene_files.h"
 
 #define HOUSE "/usr/share/assimp/models/IFC/AC14-FZK-Haus.ifc"
@@ -234,16 +235,15 @@ static void hang_ends_in_time(void **state)
 static void signal_of_children_may_be_ignored(void **state)
 {
     (void)state;
-    static const char text[] = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
-                               "endloop\nendfacet\nendsolid a\n";
-    const struct scene_mesh_spec good = {.file = write_text("a.stl", text), .scale = 1};
+    static const char text[] = COLLADA_TRIANGLE("0 0 0 1 0 0 0 1 0");
+    const struct scene_mesh_spec good = {.file = write_text("a.dae", text), .scale = 1};
     struct scene *s;
     struct sh_err err = {0};
     void (*was)(int) = signal(SIGCHLD, SIG_IGN);
     if (load_spec(&good, 1e-3, &s, &err) != SH_OK) fail_msg("%s", err.text);
     assert_int_equal(s->n_triangles, 1);
     scene_free(s);
-    const struct scene_mesh_spec broken = {.file = write_text("a.stl", "solid a\nfacet"), .scale = 1};
+    const struct scene_mesh_spec broken = {.file = write_text("a.dae", "<COLLADA"), .scale = 1};
     assert_int_equal(load_spec(&broken, 1e-3, &s, &err), SH_EINPUT);
     assert_null(strstr(err.text, "makes no sense")); /* what the child said */
     signal(SIGCHLD, was);
@@ -254,7 +254,7 @@ static void signal_of_children_may_be_ignored(void **state)
 static void no_descriptors_are_left(void **state)
 {
     (void)state;
-    const struct scene_mesh_spec spec = {.file = write_text("a.stl", "solid a\n"), .scale = 1};
+    const struct scene_mesh_spec spec = {.file = write_text("a.dae", "<COLLADA/>"), .scale = 1};
     struct rlimit limit, few;
     struct scene *s;
     struct sh_err err = {0};

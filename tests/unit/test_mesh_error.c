@@ -1,4 +1,5 @@
 /* What single precision takes from a mesh: as much as the format holds is allowed, said, and planned with. */
+#include "tests/common/collada.h"
 #include "tests/unit/scene_files.h"
 
 #include <math.h>
@@ -6,12 +7,11 @@
 #include "firmware_sim/site/site.h"
 
 /* A hall of 30 m: its farthest coordinate is off by 31 * 6e-8 = 1.86e-6 m, told with two digits. */
-static const char HALL[] = "solid hall\nfacet normal 0 0 1\nouter loop\nvertex -1 -1 0\nvertex 31 -1 0\nvertex 0 31 0\n"
-                           "endloop\nendfacet\nendsolid hall\n";
+static const char HALL[] = COLLADA_TRIANGLE("-1 -1 0 31 -1 0 0 31 0");
 
 static int remove_files(void **state)
 {
-    static const char *const file[] = {"hall.stl", "hall.ply", "m.gltf", "run.yaml"};
+    static const char *const file[] = {"hall.dae", "hall.ply", "m.gltf", "run.yaml"};
     char name[160];
     for (size_t i = 0; i < sizeof file / sizeof *file; i++) {
         snprintf(name, sizeof name, "%s/%s", folder, file[i]);
@@ -72,12 +72,12 @@ static void check_accepted(const char *mesh, const char *tolerance, const char *
 static void as_much_as_the_format_holds_is_allowed(void **state)
 {
     (void)state;
-    write_text("hall.stl", HALL);
+    write_text("hall.dae", HALL);
     load_site = site_load_plan;
-    check_accepted("hall.stl", "", "");
+    check_accepted("hall.dae", "", "");
     load_site = site_load;
-    check_accepted("hall.stl", "", "plan: {tolerance_m: 2e-5}\n");
-    check_accepted("hall.stl", "  tolerance_m: 2e-6\n", "plan: {tolerance_m: 1e-6}\n");
+    check_accepted("hall.dae", "", "plan: {tolerance_m: 2e-5}\n");
+    check_accepted("hall.dae", "  tolerance_m: 2e-6\n", "plan: {tolerance_m: 1e-6}\n");
 }
 
 /* A tenth of what the plan may be off by, where that is said; the figure that is named is enough. */
@@ -87,12 +87,12 @@ static void a_refusal_names_key_and_figure(void **state)
     static struct config cfg;
     struct site *site;
     struct sh_err err;
-    write_text("hall.stl", HALL);
-    assert_int_equal(load_hall("hall.stl", "", "plan: {tolerance_m: 1e-5}\n", &cfg, &site, &err), SH_EINPUT);
+    write_text("hall.dae", HALL);
+    assert_int_equal(load_hall("hall.dae", "", "plan: {tolerance_m: 1e-5}\n", &cfg, &site, &err), SH_EINPUT);
     static const char want[] = "errors up to 1.9e-06 m; allowed are 1e-06 m (scene.tolerance_m, or else a tenth of "
                                "plan.tolerance_m): set it to 1.9e-06, move";
     if (strstr(err.text, want) == NULL) fail_msg("%s", err.text);
-    check_accepted("hall.stl", "  tolerance_m: 1.9e-6\n", "plan: {tolerance_m: 1e-5}\n");
+    check_accepted("hall.dae", "  tolerance_m: 1.9e-6\n", "plan: {tolerance_m: 1e-5}\n");
 }
 
 /* Float columns of a binary PLY: the reader is exact, the writer was not. */
@@ -120,18 +120,15 @@ static void a_coarse_mesh_is_to_be_moved(void **state)
     static const struct {
         const char *file, *x;
         int coarse;
-    } at[] = {{"hall.stl", "5000", 0}, {"hall.stl", "391437", 1}};
+    } at[] = {{"hall.dae", "5000", 0}, {"hall.dae", "391437", 1}};
     for (int i = 0; i < 2; i++) {
-        char stl[256];
+        char text[2048];
         struct scene *scene;
         struct sh_err err;
-        snprintf(stl, sizeof stl,
-                 "solid s\nfacet normal 0 0 1\nouter loop\nvertex %s 0 0\nvertex %s 9 0\nvertex 0 9 0\nendloop\n"
-                 "endfacet\nendsolid s\n",
-                 at[i].x, at[i].x);
-        const struct scene_mesh_spec spec = {.file = write_text(at[i].file, stl), .scale = 1};
+        snprintf(text, sizeof text, COLLADA_TRIANGLE("%s 0 0 %s 9 0 0 9 0"), at[i].x, at[i].x);
+        const struct scene_mesh_spec spec = {.file = write_text(at[i].file, text), .scale = 1};
         if (load_spec(&spec, 1.0, &scene, &err) != SH_OK) fail_msg("%s", err.text);
-        assert_int_equal(n_warnings, 1);
+        assert_non_null(strstr(warnings, "single precision")); /* beside what Assimp says of the file */
         assert_int_equal(strstr(warnings, "export it again") != NULL, at[i].coarse);
         scene_free(scene);
     }

@@ -7,6 +7,7 @@
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
+#include "tests/common/collada.h"
 #include "tests/unit/scene_files.h"
 
 #define MODELS "/usr/share/assimp/models/"
@@ -51,12 +52,12 @@ static void stl_is_read(void **state)
 static void single_precision_is_refused(void **state)
 {
     (void)state;
-    const char *text = stl_text(500000, 5800000, "0");
-    refuse("utm.stl", text, strlen(text),
+    static const char text[] = COLLADA_TRIANGLE("500000 5800000 0 500001 5800000 0 500000 5800001 0");
+    refuse("utm.dae", text, strlen(text),
            "coordinates up to 5800001 are read in single precision, with errors up to 0.35 m; allowed are 0.001 m");
     struct scene *s;
     struct sh_err err;
-    struct scene_mesh_spec spec = {.file = write_text("utm.stl", text), .scale = 1};
+    struct scene_mesh_spec spec = {.file = write_text("utm.dae", text), .scale = 1};
     assert_int_equal(load_spec(&spec, 0.36, &s, &err), SH_OK);
     scene_free(s);
     spec.scale = 1e-3; /* in millimetres it is good enough */

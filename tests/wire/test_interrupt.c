@@ -30,20 +30,27 @@ static void write_ply(FILE *f, const struct scene *s)
     }
 }
 
-static void write_stl(FILE *f, const struct scene *s)
+static void write_collada(FILE *f, const struct scene *s)
 {
-    char head[84] = "binary";
-    memcpy(head + 80, &s->n_triangles, 4);
-    put(f, head, sizeof head);
-    for (uint32_t i = 0; i < s->n_triangles; i++) {
-        float v[12] = {0};
-        uint16_t attribute = 0;
-        for (int c = 0; c < 3; c++)
-            for (int k = 0; k < 3; k++)
-                v[3 + 3 * c + k] = (float)s->vertex_m[s->triangle[i][c]][k];
-        put(f, v, sizeof v);
-        put(f, &attribute, sizeof attribute);
-    }
+    const uint32_t n = s->n_triangles;
+    fprintf(f,
+            "<?xml version=\"1.0\"?><COLLADA xmlns=\"http://www.collada.org/2005/11/COLLADASchema\" version=\"1.4.1\">"
+            "<library_geometries><geometry id=\"g\"><mesh><source id=\"p\"><float_array id=\"pa\" count=\"%u\">",
+            3 * s->n_vertices);
+    for (uint32_t i = 0; i < s->n_vertices; i++)
+        fprintf(f, "%.3f %.3f %.3f ", s->vertex_m[i][0], s->vertex_m[i][1], s->vertex_m[i][2]);
+    fprintf(f,
+            "</float_array><technique_common><accessor source=\"#pa\" count=\"%u\" stride=\"3\">"
+            "<param name=\"X\" type=\"float\"/><param name=\"Y\" type=\"float\"/><param name=\"Z\" type=\"float\"/>"
+            "</accessor></technique_common></source><vertices id=\"v\"><input semantic=\"POSITION\" source=\"#p\"/>"
+            "</vertices><triangles count=\"%u\"><input semantic=\"VERTEX\" source=\"#v\" offset=\"0\"/><p>",
+            s->n_vertices, n);
+    for (uint32_t i = 0; i < n; i++)
+        fprintf(f, "%u %u %u ", s->triangle[i][0], s->triangle[i][1], s->triangle[i][2]);
+    fputs("</p></triangles></mesh></geometry></library_geometries><library_visual_scenes><visual_scene id=\"s\">"
+          "<node><instance_geometry url=\"#g\"/></node></visual_scene></library_visual_scenes>"
+          "<scene><instance_visual_scene url=\"#s\"/></scene></COLLADA>",
+          f);
 }
 
 static const char *write_mesh(struct wire *wire, const char *name, void (*write)(FILE *f, const struct scene *s))
@@ -123,7 +130,7 @@ static void interrupted_when_it_says(struct wire *wire, const char *config, cons
 
 static void test_while_assimp_reads(void **state)
 {
-    const char *config = write_mesh(*state, "big.stl", write_stl);
+    const char *config = write_mesh(*state, "big.dae", write_collada);
     interrupted_when_it_says(*state, config, "reading ");
 }
 

@@ -1,5 +1,6 @@
 /* Wrong input through the real program: exit status 2, one line on stderr that says what, where and what is
  * allowed, nothing on stdout, no file left behind. */
+#include "tests/common/collada.h"
 #include "tests/wire/room.h"
 #include "tests/wire/usage_rig.h"
 
@@ -114,11 +115,6 @@ static void test_configurations(void **state)
 static const char CUT_PLY[] = "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\n"
                               "property float y\nproperty float z\nelement face 1\n"
                               "property list uchar int vertex_indices\nend_header\n0123456789";
-#define STL_FACET(x)                                                 \
-    "solid s\nfacet normal 0 0 1\nouter loop\nvertex " x             \
-    " 5800000 0\nvertex 500001 5800000 0\nvertex 500001 5800001 0\n" \
-    "endloop\nendfacet\nendsolid s\n"
-
 static const struct {
     const char *what, *name, *text; /* text NULL: no such file */
     const char *says[3];
@@ -141,7 +137,10 @@ static const struct {
     {"PLY cut in its data", "bad.ply", CUT_PLY, {"bad.ply"}},
     {"PLY cut in its header", "bad.ply", "ply\nformat ascii 1.0\nelement vertex 3\n", {"bad.ply"}},
     {"STL garbage", "bad.stl", "\x01\x02garbage", {"bad.stl"}},
-    {"STL at UTM coordinates", "bad.stl", STL_FACET("500000"), {"bad.stl", ".ply"}},
+    {"Collada at UTM coordinates",
+     "bad.dae",
+     COLLADA_TRIANGLE("500000 5800000 0 500001 5800000 0 500001 5800001 0"),
+     {"bad.dae", ".ply"}},
     {"empty glTF", "bad.gltf", "{}", {"bad.gltf"}},
     {"glTF that is none", "bad.glb", "glTFxxxx", {"bad.glb"}},
     {"IFC that is none", "bad.ifc", "ISO-10303-21;", {"bad.ifc"}},

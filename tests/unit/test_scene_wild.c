@@ -1,0 +1,339 @@
+/* OBJ, MTL, PLY and STL as other programs write them: names of other machines, orders and parts that few files have. What
+ * is left out is said, with its file and line. Colours of vertices: test_vertex_colours.c. */
+#include <math.h>
+#include <sys/stat.h>
+
+#include "tests/unit/scene_files.h"
+
+/* Two quads of 16 m2 each, with a red material and a green one. */
+#define QUADS                                                                              \
+    "v -2 -2 -1\nv 2 -2 -1\nv 2 2 -1\nv -2 2 -1\nv -2 -2 1\nv 2 -2 1\nv 2 2 1\nv -2 2 1\n" \
+    "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl red\nf 1/1 2/2 3/3 4/4\nusemtl green\nf 5/1 6/2 7/3 8/4\n"
+#define RED_GREEN "newmtl red\nKd 1 0 0\nnewmtl green\nKd 0 1 0\n"
+
+static char made[16][160]; /* files and folders of the test, to be removed */
+static int n_made;
+
+static void put(const char *name, const char *text)
+{
+    write_text(name, text);
+    strcpy(made[n_made++], path);
+}
+
+static void put_folder(const char *name)
+{
+    snprintf(made[n_made], sizeof made[0], "%s/%s", folder, name);
+    assert_int_equal(mkdir(made[n_made++], 0700), 0);
+}
+
+static void remove_made(void)
+{
+    while (n_made > 0)
+        remove(made[--n_made]);
+}
+
+/* With colours and textures. NULL: refused, why in *err. */
+static struct scene *load_coloured(const char *name, const char *text, struct sh_err *err)
+{
+    struct scene *s = NULL;
+    put(name, text);
+    const struct scene_mesh_spec spec = {.file = path, .scale = 1, .textures = 1};
+    load_spec(&spec, 1e-3, &s, err);
+    remove_made();
+    return s;
+}
+
+static struct scene *take(const char *name, const char *text)
+{
+    struct sh_err err;
+    struct scene *s = load_coloured(name, text, &err);
+    if (s == NULL) fail_msg("%s", err.text);
+    return s;
+}
+
+/* The surface's colour, 0xrgb with a digit a channel: 15 is 1; -1: it has none. */
+static int colour_of(const struct scene *s, uint32_t i)
+{
+    const float *c = s->surface[i].colour;
+    if (!s->surface[i].has_colour) return -1;
+    return (int)lround(15.0 * (double)c[0]) << 8 | (int)lround(15.0 * (double)c[1]) << 4 |
+           (int)lround(15.0 * (double)c[2]);
+}
+
+static void check_red_green(const char *name, const char *text)
+{
+    struct scene *s = take(name, text);
+    if (n_warnings != 0) fail_msg("%s", warnings);
+    assert_int_equal(s->n_surfaces, 2);
+    assert_int_equal(colour_of(s, 0), 0xf00);
+    assert_int_equal(colour_of(s, 1), 0x0f0);
+    scene_free(s);
+}
+
+static void libraries_are_found(void **state)
+{
+    (void)state;
+    put("a.mtl", "\xef\xbb\xbf" RED_GREEN);
+    check_red_green("bom.obj", "\xef\xbb\xbfmtllib a.mtl\n" QUADS);
+    put("r.mtl", "newmtl red\nKd 1 0 0\n");
+    put("g.mtl", "newmtl green\nKd 0 1 0\n");
+    check_red_green("two.obj", "mtllib r.mtl\nmtllib g.mtl\n" QUADS);
+    put("r.mtl", "newmtl red\nKd 1 0 0\n");
+    put("g h.mtl", "newmtl green\nKd 0 1 0\n");
+    check_red_green("line.obj", "mtllib r.mtl \"g h.mtl\"\n" QUADS);
+    put("a.mtl", RED_GREEN);
+    check_red_green("windows.obj", "mtllib C:\\work\\sub\\a.mtl\r\n" QUADS);
+    put("a.mtl", RED_GREEN);
+    check_red_green("posix.obj", "mtllib /nowhere/at/all/a.mtl\n" QUADS);
+    put("my lib.mtl", RED_GREEN);
+    check_red_green("quotes.obj", "mtllib \"my lib.mtl\"\n" QUADS);
+    put("my lib.mtl", RED_GREEN);
+    check_red_green("blanks.obj", "mtllib my lib.mtl  \r\n" QUADS);
+    put("a.mtl", RED_GREEN);
+    check_red_green("case.obj", "mtllib A.MTL\n" QUADS);
+    put_folder("Sub");
+    put("Sub/a.mtl", RED_GREEN);
+    check_red_green("folder.obj", "mtllib .\\sub\\A.mtl\n" QUADS);
+    put("a.mtl", "newmtl red\nKd 1 0 0 # red\nnewmtl green\nkd 0 1 0\n");
+    check_red_green("comment.obj", "mtllib a.mtl # lib\nusemtl red # warm\n" QUADS);
+}
+
+static void expect_warning(const char *name, const char *text, const char *expected)
+{
+    struct scene *s = take(name, text);
+    if (n_warnings != 1 || strstr(warnings, expected) == NULL) fail_msg("'%s' doesn't say '%s'", warnings, expected);
+    scene_free(s);
+}
+
+static void missing_things_are_named(void **state)
+{
+    (void)state;
+    expect_warning("a.obj", "# x\nmtllib nowhere.mtl\n" QUADS,
+                   "a.obj, line 2: the material library 'nowhere.mtl' is missing");
+    put("r.mtl", "newmtl red\nKd 1 0 0\n");
+    expect_warning("a.obj", "mtllib r.mtl g.mtl\n" QUADS, "a.obj, line 1: the material library 'g.mtl' is missing");
+    put("r.mtl", "newmtl red\nKd 1 0 0\nnewmtl Green\nKd 0 1 0\n");
+    expect_warning("a.obj", "mtllib r.mtl\n" QUADS,
+                   "a.obj: 1 of its surfaces have a material that no library defines; the first: 'green'");
+    put("r.mtl", "newmtl red\nKd 255 0 0\nnewmtl green\nKd 0.2\nKd xyz 1 1\n");
+    struct scene *s = take("a.obj", "mtllib r.mtl\n" QUADS);
+    assert_int_equal(colour_of(s, 0), -1);
+    assert_int_equal(colour_of(s, 1), 0x333); /* one number is a grey */
+    assert_int_equal(n_warnings, 1);
+    assert_non_null(
+        strstr(warnings, "r.mtl, line 2: Kd '255 0 0' is left out, with 1 more; allowed are numbers from 0"));
+    scene_free(s);
+    put("r.mtl", RED_GREEN "map_Kd C:\\maps\\no.png\n");
+    expect_warning("a.obj", "mtllib r.mtl\n" QUADS,
+                   "r.mtl, line 5: the texture 'C:\\maps\\no.png' is missing, with 0 ");
+}
+
+/* Whatever is in it: a file of that name is the texture. */
+static void check_texture(const char *library_line, const char *map, const char *file)
+{
+    char library[256], text[1024], expected[192];
+    snprintf(library, sizeof library, RED_GREEN "map_Kd %s\n", map);
+    put(strstr(library_line, "mat") != NULL ? "mat/m.mtl" : "m.mtl", library);
+    put(file, "x");
+    snprintf(expected, sizeof expected, "%s/%s", folder, file);
+    snprintf(text, sizeof text, "mtllib %s\n" QUADS, library_line);
+    struct scene *s = take("t.obj", text);
+    if (n_warnings != 0) fail_msg("%s", warnings);
+    assert_int_equal(s->n_textures, 1);
+    assert_string_equal(s->texture[0].file, expected);
+    assert_int_equal(s->surface[1].texture, 1);
+    scene_free(s);
+}
+
+static void textures_are_found(void **state)
+{
+    (void)state;
+    check_texture("m.mtl", "wall one.png", "wall one.png");
+    check_texture("m.mtl", "\"wall one.png\"", "wall one.png");
+    check_texture("m.mtl", "-s 2 2 -bm 0.5 -clamp on wall one.png", "wall one.png");
+    check_texture("m.mtl", "D:\\maps\\WALL.png", "wall.PNG");
+    put_folder("mat");
+    check_texture("mat/m.mtl", "inmat.png", "mat/inmat.png");
+    put_folder("mat");
+    check_texture("mat\\m.mtl", "beside.png", "beside.png");
+}
+
+/* Vertices that come later, indices without anything after the slash. */
+static void faces_are_read(void **state)
+{
+    (void)state;
+    struct scene *s = take("a.obj", "f 1 2 3\nv -2 -2 -1\nv 2 -2 -1\nf -2 -1 3\nv 2 2 -1\nv -2 2 -1\nf 1// 3// 4//\n");
+    static const uint32_t triangle[3][3] = {{0, 2, 3}, {0, 1, 2}, {0, 1, 2}};
+    assert_int_equal(s->n_triangles, 3);
+    assert_memory_equal(s->triangle, triangle, sizeof triangle);
+    assert_int_equal(n_warnings, 0);
+    scene_free(s);
+    s = take("a.obj",
+             "g a\nf 1/2/ 2/1/ 3/\\\n1\ng b\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 3 2 1\nvt 1 0\nf 1/ 2/ 3/\n");
+    assert_int_equal(s->n_triangles, 3);
+    assert_string_equal(s->surface[s->label[0]].object, "b");
+    assert_string_equal(s->surface[s->label[2]].object, "a");
+    scene_free(s);
+}
+
+#define PLY_HEAD "ply\nformat ascii 1.0\n"
+#define XYZ(n)   "element vertex " #n "\nproperty float x\nproperty float y\nproperty float z\n"
+#define LIST     "property list uchar int vertex_indices\n"
+#define SQUARE   "0 0 0\n1 0 0\n1 1 0\n0 1 0\n"
+
+static void ply_in_any_order(void **state)
+{
+    (void)state;
+    struct scene *s = take("a.ply", PLY_HEAD "element face 1\n" LIST XYZ(4) "end_header\n4 0 1 2 3\n" SQUARE);
+    assert_int_equal(s->n_triangles, 2);
+    assert_true(fabs(total_area(s) - 1.0) < 1e-12);
+    assert_int_equal(n_warnings, 0);
+    scene_free(s);
+    /* a strip of two triangles, and after -1 one of one */
+    s = take("a.ply", PLY_HEAD XYZ(4) "element tristrips 1\nproperty list int int vertex_indices\nend_header\n" SQUARE
+                                      "8 0 1 3 2 -1 1 2 3\n");
+    static const uint32_t triangle[3][3] = {{0, 1, 3}, {3, 1, 2}, {1, 2, 3}}; /* by the right-hand rule all look up */
+    assert_int_equal(s->n_triangles, 3);
+    for (int i = 0; i < 3; i++) { /* where each begins doesn't matter */
+        uint32_t turned[3] = {s->triangle[i][2], s->triangle[i][0], s->triangle[i][1]};
+        if (memcmp(s->triangle[i], triangle[i], sizeof turned) != 0) assert_memory_equal(turned, triangle[i], 12);
+    }
+    scene_free(s);
+    s = take("a.ply", PLY_HEAD XYZ(4) "element face 3\n" LIST "end_header\n" SQUARE "0\n4 0 1 2 3\n0\n");
+    assert_int_equal(s->n_triangles, 2);
+    assert_int_equal(n_warnings, 1);
+    assert_non_null(strstr(warnings, "a.ply: 2 faces without corners left out"));
+    scene_free(s);
+}
+
+static void ply_vertices_that_nothing_uses(void **state)
+{
+    (void)state;
+    struct sh_err err;
+    for (int welded = 0; welded < 2; welded++) { /* where there are more vertices than faces */
+        char text[512];
+        snprintf(text, sizeof text,
+                 PLY_HEAD XYZ(5) "element face %d\n" LIST "end_header\nnan nan nan\n5 5 5\n6 5 5\n6 6 5\n5 6 inf\n"
+                                 "3 1 2 3\n3 1 3 2\n%s",
+                 welded ? 2 : 5, welded ? "" : "3 1 2 3\n3 1 2 3\n3 1 2 3\n");
+        struct scene *s = take("a.ply", text);
+        assert_int_equal(s->n_vertices, welded ? 3 : 5);
+        for (uint32_t i = 0; i < s->n_vertices; i++) /* nothing lies beyond what is used */
+            assert_true(s->vertex_m[i][0] >= 5.0 && s->vertex_m[i][2] == 5.0);
+        assert_true(fabs(triangle_area(s, 1) - 0.5) < 1e-12);
+        assert_int_equal(n_warnings, 1);
+        assert_non_null(strstr(warnings, "a.ply: 2 vertices that are not finite left out; no face uses them"));
+        scene_free(s);
+    }
+    assert_null(load_coloured(
+        "a.ply", PLY_HEAD XYZ(4) "element face 1\n" LIST "end_header\n0 0 0\n1 0 0\n0 1 0\n1 nan 0\n3 0 1 3\n", &err));
+    assert_non_null(strstr(err.text, "a.ply, line 13: vertex 4 (1 nan 0) is not finite, and a face uses it"));
+}
+
+/* Texture coordinates by face and by vertex; one texture or several. */
+static void ply_textures(void **state)
+{
+    (void)state;
+    put("wall.png", "x");
+    struct scene *s =
+        take("a.ply",
+             PLY_HEAD "comment TextureFile wall.png\n" XYZ(4) "element face 2\n" LIST
+                                                              "property list uchar float texcoord\nend_header\n" SQUARE
+                                                              "4 0 1 2 3 8 0 0 1 0 1 1 0 1\n3 0 1 2 0\n");
+    assert_int_equal(s->n_textures, 1);
+    assert_int_equal(s->surface[0].texture, 1);
+    assert_string_equal(s->surface[0].material, "");
+    assert_true(s->uv[0][1][0] == 1.0f && s->uv[0][1][1] == 0.0f && isnan(s->uv[2][0][0]));
+    assert_int_equal(n_warnings, 0);
+    scene_free(s);
+    put("a.png", "x");
+    s = take("a.ply", PLY_HEAD "comment TextureFile a.png\ncomment TextureFile D:\\b c.png\n" XYZ(
+                          4) "property float texture_u\nproperty float texture_v\nelement face 3\n" LIST
+                             "property int texnumber\nend_header\n0 0 0 0 0\n1 0 0 1 0\n1 1 0 1 1\n0 1 0 0 1\n"
+                             "3 0 1 2 1\n3 0 2 3 0\n3 0 1 3 -1\n");
+    assert_int_equal(s->n_surfaces, 3);
+    assert_string_equal(s->surface[0].material, "D:\\b c.png");
+    assert_int_equal(s->surface[0].texture, 2);
+    assert_string_equal(s->surface[1].material, "a.png");
+    assert_int_equal(s->surface[1].texture, 1);
+    assert_int_equal(s->surface[2].texture, 0);
+    assert_true(s->uv[1][2][0] == 0.0f && s->uv[1][2][1] == 1.0f);
+    assert_int_equal(n_warnings, 1);
+    assert_non_null(
+        strstr(warnings, "a.ply, line 4: the texture 'D:\\b c.png' is missing; it belongs beside the mesh"));
+    scene_free(s);
+}
+
+/* ---- STL */
+
+static size_t binary_stl(char *out, const char *head, uint32_t says, uint32_t n)
+{
+    memset(out, 0, 84);
+    strcpy(out, head);
+    memcpy(out + 80, &says, 4);
+    for (uint32_t i = 0; i < n; i++) {
+        const float facet[12] = {0, 0, 1, 0.1f, 0, (float)i, 1, 0, (float)i, 0, 1, (float)i};
+        memset(out + 84 + 50 * i, 0, 50);
+        memcpy(out + 84 + 50 * i, facet, sizeof facet);
+    }
+    return 84 + 50 * n;
+}
+
+static void stl_by_its_size(void **state)
+{
+    (void)state;
+    char data[1024];
+    size_t n = binary_stl(data, "solid exported by CAD", 2, 2);
+    struct scene *s = load(write_file("a.stl", data, n));
+    assert_int_equal(s->n_triangles, 2);
+    assert_int_equal(s->n_meshes, 1);
+    assert_true(s->vertex_m[0][0] == (double)0.1f);
+    assert_string_equal(s->surface[0].object, "a");
+    assert_int_equal(n_warnings, 0);
+    scene_free(s);
+    s = load(write_file("a.stl", data, n + 7));
+    assert_int_equal(s->n_triangles, 2);
+    assert_non_null(strstr(warnings, "a.stl: 7 bytes after the last of its 2 triangles ignored"));
+    scene_free(s);
+    n = binary_stl(data, "solid", 4, 2);
+    refuse("a.stl", data, n, "cut off: a binary STL of 4 triangles has 284 bytes, and there are 184");
+    n = binary_stl(data, "x", 2, 2);
+    refuse("a.stl", data, n - 1, "cut off");
+    unlink(path);
+}
+
+#define FACET(z)                                                                                    \
+    "facet normal 0 0 1\nouter loop\nvertex 0 0 " #z "\nvertex 500000.1 0 " #z "\nvertex 0 1e0 " #z \
+    "\nendloop\nendfacet\n"
+
+static void stl_as_text(void **state)
+{
+    (void)state;
+    struct scene *s =
+        load_text("a.stl", "\r\n\n  solid room\r\n" FACET(1) FACET(1) "endsolid room\nSOLID\n" FACET(-0) "EndSolid");
+    assert_int_equal(s->n_triangles, 3);
+    assert_int_equal(s->n_vertices, 6);         /* those at the same place are one */
+    assert_true(s->vertex_m[1][0] == 500000.1); /* in double */
+    assert_int_equal(n_warnings, 0);
+    assert_string_equal(s->surface[0].object, "room");
+    assert_string_equal(s->surface[s->label[2]].object, "a");
+    scene_free(s);
+    static const char text[] = "solid a\n" FACET(1) "endsolid a\n";
+    for (size_t cut = 1; cut < sizeof text - 5; cut += 7) /* anywhere before the end of `endsolid` */
+        refuse("a.stl", text, cut, "");
+    refuse("a.stl", text, strlen(text) - 12, "cut off: the file ends where facet or endsolid is expected");
+    refuse("a.stl", "solid\nfacet normal\nouter loop\nvertex 0 0\n", 39,
+           "line 4: cut off: the file ends where a number of a vertex is expected");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(libraries_are_found), cmocka_unit_test(missing_things_are_named),
+        cmocka_unit_test(textures_are_found),  cmocka_unit_test(faces_are_read),
+        cmocka_unit_test(ply_in_any_order),    cmocka_unit_test(ply_vertices_that_nothing_uses),
+        cmocka_unit_test(ply_textures),        cmocka_unit_test(stl_by_its_size),
+        cmocka_unit_test(stl_as_text),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}

@@ -1,0 +1,318 @@
+/* Colours of vertices: as PLY, OBJ and what Assimp reads have them; between the corners at a hit; after a texture, before
+ * the material's colour; and nothing of it where a mesh has none, or nobody wants them. */
+#include <math.h>
+
+#include "core/cast.h"
+#include "core/colour.h"
+#include "core/scene_copies.h"
+#include "core/surface.h"
+#include "tests/unit/scene_files.h"
+
+static struct scene *take(const char *name, const char *text, int textures)
+{
+    struct sh_err err;
+    struct scene *s = NULL;
+    const struct scene_mesh_spec spec = {
+        .file = write_text(name, text), .scale = 1, .textures = textures, .cutouts = 1};
+    if (load_spec(&spec, 1e-3, &s, &err) != SH_OK) fail_msg("%s", err.text);
+    unlink(path);
+    return s;
+}
+
+/* The colour of corner c of triangle i. */
+static void check(const struct scene *s, uint32_t i, int c, int r, int g, int b)
+{
+    const uint8_t *at = s->rgb[i][c];
+    if (at[0] != r || at[1] != g || at[2] != b || at[3] != 255)
+        fail_msg("triangle %u, corner %d: %d %d %d %d, not %d %d %d", i, c, at[0], at[1], at[2], at[3], r, g, b);
+}
+
+#define HEAD "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+#define FACE "element face 1\nproperty list uchar int vertex_indices\n"
+#define RGB(type, prefix) \
+    "property " type " " prefix "red\nproperty " type " " prefix "green\nproperty " type " " prefix "blue\n"
+
+/* 51 is a fifth of 255, 13107 of 65535. */
+static void ply_of_any_type(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *property, *one, *fifth;
+    } as[] = {{RGB("uchar", ""), "255", "51"},
+              {RGB("uchar", "diffuse_"), "255", "51"},
+              {RGB("ushort", ""), "65535", "13107"},
+              {RGB("float", ""), "1.0", "0.2"},
+              {RGB("double", ""), "255.0", "51.0"}};
+    for (size_t i = 0; i < sizeof as / sizeof as[0]; i++) {
+        char text[1024];
+        snprintf(text, sizeof text, HEAD "%s" FACE "end_header\n0 0 0 %s 0 0\n1 0 0 0 %s 0\n0 1 0 %s %s %s\n3 0 1 2\n",
+                 as[i].property, as[i].one, as[i].fifth, as[i].fifth, as[i].fifth, as[i].one);
+        struct scene *s = take("a.ply", text, 1);
+        assert_non_null(s->rgb);
+        check(s, 0, 0, 255, 0, 0);
+        check(s, 0, 1, 0, 51, 0);
+        check(s, 0, 2, 51, 51, 255);
+        assert_int_equal(s->surface[0].vertex_colours, SCENE_COLOURS_ALL);
+        scene_free(s);
+    }
+}
+
+/* Corners at one place become one vertex, and keep their own colours. */
+static void ply_with_a_vertex_for_each_corner(void **state)
+{
+    (void)state;
+    struct scene *s = take(
+        "a.ply",
+        "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\n"
+        "property float z\n" RGB(
+            "uchar", "") "element face 2\n"
+                         "property list uchar int vertex_indices\nend_header\n0 0 0 1 0 0\n1 0 0 2 0 0\n0 1 0 3 0 0\n"
+                         "1 0 0 4 0 0\n1 1 0 5 0 0\n0 1 0 6 0 0\n3 0 1 2\n3 3 4 5\n",
+        1);
+    assert_int_equal(s->n_vertices, 4);
+    for (int i = 0; i < 6; i++)
+        check(s, (uint32_t)i / 3, i % 3, i + 1, 0, 0);
+    scene_free(s);
+}
+
+static void ply_by_face(void **state)
+{
+    (void)state;
+    struct scene *s = take("a.ply",
+                           HEAD "element face 2\nproperty list uchar int vertex_indices\n" RGB(
+                               "uchar", "") "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 9 8 7\n3 2 1 0 1 2 3\n",
+                           1);
+    check(s, 0, 2, 9, 8, 7);
+    check(s, 1, 0, 1, 2, 3);
+    scene_free(s);
+}
+
+/* As photogrammetry writes them; a weight is no colour. */
+static void obj_of_two_ranges(void **state)
+{
+    (void)state;
+    struct scene *s = take("a.obj", "v 0 0 0 1 0 0\nv 1 0 0 0 0.2 0\nv 0 1 0 0 0 0.6\nf 1 2 3\n", 1);
+    check(s, 0, 0, 255, 0, 0);
+    check(s, 0, 1, 0, 51, 0);
+    check(s, 0, 2, 0, 0, 153);
+    scene_free(s);
+    s = take("a.obj", "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nf 1 2 3\nv 0 1 0 0 0 153\n", 1); /* which the last one says */
+    check(s, 0, 0, 1, 0, 0);
+    check(s, 0, 2, 0, 0, 153);
+    scene_free(s);
+    s = take("a.obj",
+             "v 0 0 0 1.0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nv 0 1 1 0.2 0.2 0.2\no b\nf 1 2 4\n"
+             "v 1 1 1 0 0 0\nv 1 2 1 0 0 0\no c\nf 4 5 6\nf 1 2 3\n",
+             1);
+    assert_int_equal(s->rgb[0][0][3], 0);
+    check(s, 1, 2, 51, 51, 51);
+    assert_int_equal(s->surface[0].vertex_colours, SCENE_COLOURS_NONE);
+    assert_int_equal(s->surface[1].vertex_colours, SCENE_COLOURS_NONE); /* no triangle has all three */
+    assert_int_equal(s->surface[2].vertex_colours, SCENE_COLOURS_SOME);
+    scene_free(s);
+}
+
+/* Linear light as sRGB: 0.2158605 is 128 of 255. */
+static void gltf_is_linear(void **state)
+{
+    (void)state;
+    static const char gltf[] =
+        "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0}],"
+        "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0,\"COLOR_0\":1}}]}],\"accessors\":["
+        "{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\",\"min\":[0,0,0],\"max\":[1,1,0]},"
+        "{\"bufferView\":1,\"componentType\":5126,\"count\":3,\"type\":\"VEC4\"}],\"bufferViews\":["
+        "{\"buffer\":0,\"byteLength\":36},{\"buffer\":0,\"byteOffset\":36,\"byteLength\":48}],\"buffers\":["
+        "{\"byteLength\":84,\"uri\":\"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAACAPwAAAAAA"
+        "AAAAAACAPwAAAACJCl0+AAAAAAAAgD8AAAAAAAAAAAAAgD8AAIA/\"}]}";
+    struct scene *s = take("a.gltf", gltf, 1);
+    check(s, 0, 0, 255, 0, 0);
+    check(s, 0, 1, 0, 128, 0);
+    check(s, 0, 2, 0, 0, 255);
+    scene_free(s);
+}
+
+static const char board[] = "v -2 10 -2 1 0 0\nv 2 10 -2 0 1 0\nv 2 10 2 0 0 1\nv -2 10 2 1 1 1\nusemtl m\nf 1 2 3\n"
+                            "f 1 3 4\n";
+
+static void nothing_is_spent_without(void **state)
+{
+    (void)state;
+    struct scene *s = take("a.obj", board, 0);
+    assert_null(s->rgb);
+    assert_int_equal(s->surface[0].vertex_colours, SCENE_COLOURS_NONE);
+    scene_free(s);
+    s = take("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", 1);
+    assert_null(s->rgb);
+    scene_free(s);
+}
+
+/* Kept with their triangles: where surfaces go, where copies are written out. */
+static void colours_stay_with_triangles(void **state)
+{
+    (void)state;
+    struct sh_err err;
+    struct scene *s =
+        take("a.obj", "v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 1 0 0\nv 0 1 1 0 0 1\no a\nf 1 2 3\no b\nf 4 2 1\n", 1);
+    assert_int_equal(scene_keep(s, (const uint8_t[2]){0, 1}, &err), SH_OK);
+    check(s, 0, 0, 0, 0, 255);
+    scene_free(s);
+    struct scene_place place[2] = {{.scale = 1}, {.at_m = {5, 0, 0}, .scale = 1}};
+    char bare[128];
+    strcpy(bare, write_text("bare.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"));
+    const struct scene_mesh_spec spec[2] = {
+        {.file = bare, .scale = 1, .textures = 1},
+        {.file = write_text("a.obj", board), .scale = 1, .textures = 1, .places = {place, 2, .says = "copies"}}};
+    if (scene_load(spec, 2, 1e-3, NULL, &s, &err) != SH_OK) fail_msg("%s", err.text);
+    if (scene_write_out_copies(s, 100, NULL, &err) != SH_OK) fail_msg("%s", err.text);
+    assert_int_equal(s->n_triangles, 5);
+    assert_int_equal(s->rgb[0][0][3], 0);
+    check(s, 3, 1, 0, 255, 0);
+    check(s, 4, 2, 255, 255, 255);
+    scene_free(s);
+    unlink(path);
+    unlink(bare);
+}
+
+/* ---- at hits */
+
+/* By hand: the board's lower right half is between red, green and blue, its upper left one between red, blue and white. */
+static void expected(double x_m, double z_m, double rgb[3])
+{
+    const double u = (x_m + 2.0) / 4.0, v = (z_m + 2.0) / 4.0;
+    const double w[3] = {1.0 - fmax(u, v), fabs(u - v), fmin(u, v)}; /* red, the corner of its half, blue */
+    rgb[0] = 255.0 * (w[0] + (v > u ? w[1] : 0.0));
+    rgb[1] = 255.0 * w[1];
+    rgb[2] = 255.0 * (w[2] + (v > u ? w[1] : 0.0));
+}
+
+/* One line of 200 pulses through the board, upwards; its points, with colours, and labels with reflectances. */
+static void cast_line(const struct scene *scene, const struct cast_setup *setup, struct line_block *block)
+{
+    static const struct schedule_spec spec = {.prr_uhz = 20000000000,
+                                              .lines_uhz = 100000000,
+                                              .pan_udeg_s = 1000000,
+                                              .fov_min_udeg = -10000000,
+                                              .sweep_udeg = 20000000,
+                                              .line_start_udeg = -10000000,
+                                              .line_stop_udeg = 10000000,
+                                              .pan_start_udeg = -3000000,
+                                              .pan_stop_udeg = 3000000};
+    struct schedule_segment segment;
+    struct schedule_line line;
+    struct schedule_run run;
+    struct caster *caster;
+    struct bvh *bvh;
+    struct sh_err err;
+    struct cast_setup with = *setup;
+    schedule_start(&segment, &spec);
+    if (bvh_create(scene, 1, NULL, &bvh, &err) != SH_OK || caster_create(&caster, &err) != SH_OK)
+        fail_msg("%s", err.text);
+    with.bvh = bvh;
+    schedule_get_line(&segment, 0, &line);
+    schedule_get_run(&segment, &line, line.cast0, (uint32_t)(line.cast_end - line.cast0), &run);
+    caster_cast(caster, &with, &run, block);
+    caster_free(caster);
+    bvh_free(bvh);
+}
+
+static const struct cast_setup plain = {.rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1},
+                                        .range_max_m = 2000.0,
+                                        .mirror_counts = 0x1p32,
+                                        .pan_counts = 0x1p32,
+                                        .range_scale_m = 1e-5};
+
+static void hits_have_the_colour_between(void **state)
+{
+    (void)state;
+    struct scene *s = take("a.obj", board, 1);
+    struct surface_colours colours;
+    struct line_block block;
+    struct sh_err err;
+    assert_int_equal(surface_colours_alloc(1, &colours, &err), SH_OK);
+    surface_colours_set(&colours, 0, &s->surface[0]);
+    assert_int_equal(line_block_alloc(&block, 1000, &err), SH_OK);
+    assert_int_equal(line_block_alloc_colours(&block, &err), SH_OK);
+    const struct cast_colour colour = {.scale.mode = COLOUR_TEXTURE, .surfaces = &colours};
+    struct cast_setup setup = plain;
+    setup.colour = &colour;
+    cast_line(s, &setup, &block);
+    uint32_t n = 0;
+    for (uint32_t i = 0; i < block.n_points; i++) {
+        const double m = 0x1p-31 * M_PI * (int32_t)block.b[i], p = 0x1p-31 * M_PI * (int32_t)block.c[i];
+        const double x_m = 10.0 * tan(p), z_m = 10.0 * tan(m) / cos(p);
+        double rgb[3];
+        if (block.echo[i] == 0) continue;
+        expected(x_m, z_m, rgb);
+        for (int k = 0; k < 3; k++) /* half a step of rounding, and as much for the angles' */
+            if (fabs(rgb[k] - block.rgb[i][k]) > 1.0)
+                fail_msg("z %g: channel %d is %d, not %g", z_m, k, block.rgb[i][k], rgb[k]);
+        n++;
+    }
+    assert_true(n > 100);
+    line_block_free(&block);
+    surface_colours_free(&colours);
+    scene_free(s);
+}
+
+/* A rule says nothing of the reflectance: it is the colour's luminance, 0.2126 of red and so on, in linear light. */
+static void hits_reflect_as_their_colour(void **state)
+{
+    (void)state;
+    struct surface_table table;
+    struct sh_err err;
+    const struct scene_surface named = {.object = "a", .material = "m", .vertex_colours = SCENE_COLOURS_ALL};
+    static const struct {
+        uint8_t rgb[3];
+        double rho;
+    } as[] = {{{255, 255, 255}, 1.0}, {{255, 0, 0}, 0.2126}, {{0, 255, 0}, 0.7152}, {{0, 0, 0}, 0.0}};
+    assert_int_equal(surface_table_alloc(1, &table, &err), SH_OK);
+    surface_table_set(&table, 0, &named, NULL, 0, 0.6);
+    assert_int_equal(surface_table_by_vertex(&table, 0, &err), SH_OK);
+    for (size_t i = 0; i < sizeof as / sizeof as[0]; i++) {
+        const uint32_t label = surface_texel_of(0, as[i].rgb);
+        const double cosine = 1.0;
+        double rho;
+        surface_return(&table, 1, &label, &cosine, &rho);
+        assert_true(fabs(rho - as[i].rho) < 1.0 / 65534.0); /* a step of the 16 bits */
+    }
+    const uint32_t none = 0;
+    const double cosine = 1.0;
+    double rho;
+    surface_return(&table, 1, &none, &cosine, &rho);
+    assert_true(rho == 0.6); /* where no colour is known */
+    surface_table_free(&table);
+}
+
+/* One rule: texture, else the colour between the vertices, else the material's, else grey. */
+static void the_order_of_colours(void **state)
+{
+    (void)state;
+    struct surface_colours colours;
+    struct sh_err err;
+    const struct scene_surface named[2] = {{.colour = {0, 0, 1}, .has_colour = 1}, {.object = "a"}};
+    static const uint8_t rgb[3] = {1, 2, 3};
+    assert_int_equal(surface_colours_alloc(2, &colours, &err), SH_OK);
+    for (uint32_t i = 0; i < 2; i++)
+        surface_colours_set(&colours, i, &named[i]);
+    assert_int_equal(surface_colour(&colours, 0, NULL, rgb), 0x010203);
+    assert_int_equal(surface_colour(&colours, 0, NULL, NULL), 0x0000ff);
+    assert_int_equal(surface_colour(&colours, 1, NULL, NULL), 0x808080);
+    surface_colours_free(&colours);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(ply_of_any_type),
+        cmocka_unit_test(ply_with_a_vertex_for_each_corner),
+        cmocka_unit_test(ply_by_face),
+        cmocka_unit_test(obj_of_two_ranges),
+        cmocka_unit_test(gltf_is_linear),
+        cmocka_unit_test(nothing_is_spent_without),
+        cmocka_unit_test(colours_stay_with_triangles),
+        cmocka_unit_test(hits_have_the_colour_between),
+        cmocka_unit_test(hits_reflect_as_their_colour),
+        cmocka_unit_test(the_order_of_colours),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}
