@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-enum { ROOM = 1 << 16 };
+enum { ROOM = 1 << 18 };
 
 static uint8_t buffer[ROOM];
 static char views[ROOM];

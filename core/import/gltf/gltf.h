@@ -164,7 +164,8 @@ struct gltf_pose {
     uint32_t n_joints;
     struct gltf_view joints[GLTF_MAX_SETS], weights[GLTF_MAX_SETS];
     uint32_t n_sets;
-    double most[3]; /* |coordinate| of what is summed up to a position before joints move it */
+    double most[3];   /* |coordinate| of what is summed up to a position before joints move it */
+    double most_bent; /* |coordinate| of what is summed up where joints move it */
 };
 int gltf_pose_open(struct gltf *g, const json_t *node, const json_t *mesh, const json_t *primitive, const char *at,
                    struct gltf_pose *pose);

@@ -1,6 +1,7 @@
 /* Extensions: the known ones, and the rest. */
 #include "core/import/gltf/gltf.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -76,11 +77,33 @@ static int check_for_assimp(struct gltf *g, const json_t *required)
                                         "KHR_meshopt_compression"};
     for (size_t i = 0; i < sizeof other / sizeof other[0]; i++)
         if (is_in(required, other[i]))
-            return gltf_fail(g, "it requires KHR_draco_mesh_compression and %s; allowed is one of them", other[i]);
+            return gltf_fail(g, "it needs KHR_draco_mesh_compression and %s; allowed is one of them", other[i]);
     if (json_array_size(json_object_get(g->root, "skins")) > 0)
         sh_warn(g->b->report,
                 "%s: its meshes are packed by Draco, and so Assimp reads it: its skins move nothing there", g->b->name);
     return SH_OK;
+}
+
+/* Whether the positions of a primitive are there only as Draco packs them. */
+static bool is_packed(const struct gltf *g, const json_t *primitive)
+{
+    const json_t *at = json_object_get(json_object_get(primitive, "attributes"), "POSITION");
+    const json_t *position =
+        json_array_get(json_object_get(g->root, "accessors"), (size_t)fmax(json_number_value(at), 0.0));
+    return gltf_extension(primitive, "KHR_draco_mesh_compression") != NULL &&
+           json_object_get(position, "bufferView") == NULL && json_object_get(position, "sparse") == NULL;
+}
+
+/* Draco need not be required where other accessors stand for it; some writers leave out both. */
+static bool has_packed(const struct gltf *g)
+{
+    const json_t *meshes = json_object_get(g->root, "meshes");
+    for (size_t i = 0; i < json_array_size(meshes); i++) {
+        const json_t *primitives = json_object_get(json_array_get(meshes, i), "primitives");
+        for (size_t k = 0; k < json_array_size(primitives); k++)
+            if (is_packed(g, json_array_get(primitives, k))) return true;
+    }
+    return false;
 }
 
 int gltf_check_extensions(struct gltf *g)
@@ -98,6 +121,6 @@ int gltf_check_extensions(struct gltf *g)
     warn_unknown(g, used);
     if (is_in(used, "KHR_techniques_webgl") || is_in(used, "KHR_technique_webgl"))
         sh_warn(g->b->report, "%s: it has colours by shaders (KHR_techniques_webgl), which are not read", g->b->name);
-    g->by_assimp = is_in(required, "KHR_draco_mesh_compression");
+    g->by_assimp = is_in(required, "KHR_draco_mesh_compression") || has_packed(g);
     return g->by_assimp ? check_for_assimp(g, required) : SH_OK;
 }

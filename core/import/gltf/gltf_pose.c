@@ -165,28 +165,41 @@ static void morph(struct gltf_pose *pose, uint32_t i, double out[3])
     }
 }
 
-/* Weights are 1 in sum but for rounding, which the division takes back. */
-static int bend(struct gltf *g, const struct gltf_pose *pose, uint32_t i, double p[3])
+/* Adds what a joint makes of p. */
+static void add_joint(const struct gltf_pose *pose, uint32_t joint, double weight, const double p[3], double moved[3],
+                      double reach[3])
 {
-    double sum = 0.0, moved[3] = {0, 0, 0};
+    const double size[3] = {fabs(p[0]), fabs(p[1]), fabs(p[2])};
+    double at[3], far[3];
+    gltf_apply(pose->joint[joint], p, at);
+    gltf_apply(pose->reach[joint], size, far);
+    for (int k = 0; k < 3; k++) {
+        moved[k] += weight * at[k];
+        reach[k] += fabs(weight) * far[k];
+    }
+}
+
+/* Weights are 1 in sum but for rounding, which the division takes back. */
+static int bend(struct gltf *g, struct gltf_pose *pose, uint32_t i, double p[3])
+{
+    double sum = 0.0, moved[3] = {0, 0, 0}, reach[3] = {0, 0, 0};
     for (uint32_t s = 0; s < 4 * pose->n_sets; s++) {
         const double weight = gltf_value(&pose->weights[s / 4], i, s % 4);
         const double joint = gltf_value(&pose->joints[s / 4], i, s % 4);
-        double at[3];
         if (weight == 0.0) continue;
         if (!(joint >= 0.0 && joint < pose->n_joints))
             return gltf_fail(g, "vertex %u has joint %g; its skin has %u", i, joint, pose->n_joints);
-        gltf_apply(pose->joint[(uint32_t)joint], p, at);
+        add_joint(pose, (uint32_t)joint, weight, p, moved, reach);
         sum += weight;
-        for (int k = 0; k < 3; k++)
-            moved[k] += weight * at[k];
     }
     if (!(fabs(sum) > 1e-3)) {
         g->n_unweighted++;
         return SH_OK;
     }
-    for (int k = 0; k < 3; k++)
+    for (int k = 0; k < 3; k++) {
         p[k] = moved[k] / sum;
+        pose->most_bent = fmax(pose->most_bent, reach[k] / fabs(sum));
+    }
     return SH_OK;
 }
 
@@ -206,22 +219,10 @@ static double place_error(const gltf_matrix m, const double error[3])
     return most;
 }
 
-/* A joint has rounded the position, and as much again its inverse bind matrix. */
-static double joint_error(const struct gltf_pose *pose)
-{
-    double most = 0.0;
-    for (uint32_t j = 0; j < pose->n_joints; j++) {
-        double at[3];
-        gltf_apply(pose->reach[j], pose->most, at);
-        for (int k = 0; k < 3; k++)
-            most = fmax(most, 2.0 * BUILD_SINGLE_ROUNDING * at[k]);
-    }
-    return most;
-}
-
 void gltf_pose_error(struct gltf *g, const struct gltf_pose *pose, const gltf_matrix world)
 {
     const double half = 0.5 * gltf_step(&pose->position);
+    const double bent = 2.0 * BUILD_SINGLE_ROUNDING * pose->most_bent; /* the position, and its inverse bind matrices */
     double error[3];
     for (int k = 0; k < 3; k++)
         error[k] = half > 0.0 ? half : BUILD_SINGLE_ROUNDING * pose->most[k];
@@ -233,5 +234,5 @@ void gltf_pose_error(struct gltf *g, const struct gltf_pose *pose, const gltf_ma
     }
     for (int k = 0; k < 3; k++)
         g->largest = fmax(g->largest, pose->most[k]);
-    g->error = fmax(g->error, pose->joint != NULL ? joint_error(pose) : place_error(world, error));
+    g->error = fmax(g->error, pose->joint != NULL ? bent : place_error(world, error));
 }
