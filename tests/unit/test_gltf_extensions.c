@@ -171,7 +171,7 @@ static void meshopt_is_unpacked(void **state)
 
 /* ---- how textures lie */
 
-/* u' = offset + R * S * u, with v down; the set of the transform counts, not that of the texture. A quarter turn with the
+/* u' = offset + R * S * u, with v down; the set of the transform counts, and may stand before the first. A quarter turn with the
  * scale 1/2 and the offset (0, 1) is the example of the extension's text: the lower left quarter of the image. */
 static void turned_textures(void **state)
 {
@@ -184,7 +184,7 @@ static void turned_textures(void **state)
         "\"materials\":[{\"name\":\"q\",\"pbrMetallicRoughness\":{\"baseColorTexture\":{\"index\":0,\"texCoord\":0,"
         "\"extensions\":{\"KHR_texture_transform\":{\"texCoord\":1,\"offset\":[0,1],\"rotation\":1.5707963267948966,"
         "\"scale\":[0.5,0.5]}}}}}],\"textures\":[{\"source\":0}],\"images\":[{\"uri\":\"q.png\"}],"
-        "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0,\"TEXCOORD_0\":3,\"TEXCOORD_1\":1},\"indices\":2,"
+        "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0,\"TEXCOORD_1\":1,\"TEXCOORD_0\":3},\"indices\":2,"
         "\"material\":0}]}],\"accessors\":[" GLTF_QUAD_ACCESSORS
         ",{\"bufferView\":3,\"componentType\":5126,\"count\":4,\"type\":\"VEC2\"}]");
     assert_int_equal(n_warnings, 0);
