@@ -57,6 +57,15 @@ static int read_scene(struct gltf *g)
     return rc;
 }
 
+/* A file that is not as it should be: its words, and what to do. */
+static int say_what_to_do(int rc, struct sh_err *err)
+{
+    const struct sh_err said = *err;
+    if (rc != SH_EINPUT || strstr(said.text, "convert it") != NULL || strstr(said.text, "copy it there") != NULL)
+        return rc;
+    return sh_fail(err, rc, "%.440s: export it again, or convert it to .obj or .ply", said.text);
+}
+
 int import_gltf(struct scene_build *b, struct sh_err *err)
 {
     struct gltf g = {.b = b, .err = err};
@@ -67,5 +76,6 @@ int import_gltf(struct scene_build *b, struct sh_err *err)
     const bool by_assimp = g.by_assimp;
     if (rc == SH_OK && !by_assimp) rc = read_scene(&g);
     gltf_close(&g);
-    return rc == SH_OK && by_assimp ? import_assimp(b, err) : rc;
+    if (rc != SH_OK) return say_what_to_do(rc, err);
+    return by_assimp ? import_assimp(b, err) : SH_OK;
 }
