@@ -27,7 +27,8 @@ Q = $(Q_$(V))
 
 # What a fresh Debian 12 needs. Building and the demo:
 DEPS_BUILD = gcc g++ make pkg-config libc6-dev libembree-dev libassimp-dev libgeographiclib-dev libproj-dev libyaml-dev libpng-dev \
-	libstb-dev nettle-dev libusb-1.0-0-dev libusbredirparser-dev libwebsockets-dev assimp-testmodels \
+	libstb-dev nettle-dev libusb-1.0-0-dev libusbredirparser-dev libwebsockets-dev libjansson-dev libwebp-dev \
+	libmeshoptimizer-dev assimp-testmodels \
 	$(if $(shell command -v npm),,nodejs npm)
 # and the tests, with the second compiler and its sanitizers, clients and readers of recordings that are not ours:
 DEPS_TEST = $(DEPS_BUILD) libcmocka-dev clang libclang-rt-dev lld ccache gpsd gpsd-clients cloudcompare mrpt-apps proj-bin python3-numpy \
@@ -39,7 +40,7 @@ DEPS_BROWSER = chromium
 
 # Without libusbredirparser everything builds but the back end that needs it.
 USBREDIR = $(eval USBREDIR := $$(shell $(PKG_CONFIG) --exists libusbredirparser-0.5 && echo libusbredirparser-0.5))$(USBREDIR)
-PKGS = yaml-0.1 libpng proj nettle libusb-1.0 libwebsockets $(USBREDIR)
+PKGS = yaml-0.1 libpng proj nettle libusb-1.0 libwebsockets jansson libwebp $(USBREDIR)
 ask_pkg_config = $(shell $(PKG_CONFIG) $(1) $(PKGS))$(if $(filter-out 0,$(.SHELLSTATUS)),$(error $(PKG_CONFIG) does not \
 	find all of $(PKGS): make deps-build, or PKG_CONFIG=... for another machine))
 PKG_CFLAGS = $(eval PKG_CFLAGS := $$(call ask_pkg_config,--cflags))$(PKG_CFLAGS)
@@ -78,7 +79,7 @@ WIRESHARK_DIR = $(PREFIX)/share/scanhead/wireshark
 ALL_CPPFLAGS = -I. -D_GNU_SOURCE -DSH_EMBREE=$(EMBREE_VERSION) $(if $(USBREDIR),-DHAVE_USBREDIR) -MMD -MP $(CPPFLAGS)
 ALL_CFLAGS = -std=c11 $(OPT) -g $(FP) $(CWARN) $(WERROR) -fPIC -pthread $(SAN) $(PKG_CFLAGS) $(CFLAGS)
 ALL_CXXFLAGS = -std=c++17 $(OPT) -g $(FP) $(WARN) $(WERROR) -fPIC -pthread $(SAN) $(CXXFLAGS)
-LDLIBS = -lembree$(EMBREE_VERSION) -lassimp -lGeographicLib $(PKG_LIBS) -lstdc++ -lm -pthread
+LDLIBS = -lembree$(EMBREE_VERSION) -lassimp -lmeshoptimizer -lGeographicLib $(PKG_LIBS) -lstdc++ -lm -pthread
 
 CORE = $(wildcard core/*.c core/*/*.c core/import/*/*.c) core/georef/geographiclib_shim.cpp
 PROTO = $(wildcard drivers/protocol/*.c)

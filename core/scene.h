@@ -7,7 +7,7 @@
  *   Collada  comes in metres and y up, its unit and up_axis applied
  *   IFC      comes in metres and y up, from its own readers, too
  *   FBX      keeps the file's unit (mostly centimetres: scale 0.01) and axes (mostly y up)
- *   glTF     is metres and y up by definition
+ *   glTF     is metres and y up by definition; its tree is multiplied in double (core/import/gltf)
  *   STL      has neither
  * Every placement of a mesh in a node tree counts: an object that is there five times gives its triangles
  * five times. Polygons are cut into triangles. A pair of object and material that is there already keeps its
@@ -62,7 +62,9 @@ struct scene_places {
 };
 
 struct scene_mesh_spec {
-    const char *file; /* ending chooses the reader: .obj .ply .stl in double; .ifc by two readers; others by Assimp */
+    const char
+        *file; /* ending chooses the reader: .obj .ply .stl in double; .ifc by two readers; .gltf .glb by their own;
+                       * others by Assimp */
     enum scene_up up;
     double scale;       /* metres per unit of the file, > 0 */
     double offset_m[3]; /* added after axes and scale */

@@ -1,8 +1,8 @@
 /* Images that lie on a mesh. In: a file, or bytes within one, and texture coordinates. Out: texels as 8 bits
  * of red, green, blue and alpha; which texel lies at a coordinate; the holes that alpha cuts out.
  *
- * PNG, JPEG, TGA and BMP are read through stb_image, and what Assimp hands over unpacked. An image has up to
- * TEXTURE_MAX_SIDE texels a side, TEXTURE_MAX_TEXELS in all, and a file of up to TEXTURE_MAX_FILE bytes;
+ * PNG, JPEG, TGA and BMP are read through stb_image, WebP through libwebp, and what Assimp hands over unpacked. An image has
+ * up to TEXTURE_MAX_SIDE texels a side, TEXTURE_MAX_TEXELS in all, and a file of up to TEXTURE_MAX_FILE bytes;
  * decoding takes up to TEXTURE_MAX_MEMORY bytes, whatever the file says of itself. Gamma that a file names is
  * not applied: values are sRGB. Rows count from the top; the coordinate 0, 0 is the lower left corner.
  * Images and masks are constant once they are made: any thread. */

@@ -10,11 +10,9 @@
 #include <assimp/material.h>
 #include <assimp/scene.h>
 
-/* Linear light as sRGB has it, IEC 61966-2-1. */
-static float to_srgb(float linear)
+float import_to_srgb(double linear)
 {
-    double c = (double)linear;
-    return (float)(c <= 0.0031308 ? 12.92 * c : 1.055 * pow(c, 1.0 / 2.4) - 0.055);
+    return (float)(linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1.0 / 2.4) - 0.055);
 }
 
 /* Materials that Assimp makes up where a file has none. */
@@ -39,7 +37,7 @@ static void keep_colour(const struct scene_build *b, const struct aiMaterial *ma
     const float rgb[3] = {c.r, c.g, c.b};
     for (int i = 0; i < 3; i++) {
         if (!(rgb[i] >= 0.0f && rgb[i] <= 1.0f)) return; /* no colour of a surface */
-        surface->colour[i] = is_gltf(b) ? to_srgb(rgb[i]) : rgb[i];
+        surface->colour[i] = is_gltf(b) ? import_to_srgb((double)rgb[i]) : rgb[i];
     }
     surface->has_colour = 1;
 }
@@ -49,7 +47,7 @@ void import_rgb(const struct scene_build *b, const struct aiColor4D *colour, uin
     const float in[3] = {colour->r, colour->g, colour->b};
     for (int k = 0; k < 3; k++) {
         const float c = fminf(1.0f, fmaxf(0.0f, in[k])); /* NaN: 0 */
-        rgb[k] = (uint8_t)lrintf(255.0f * (is_gltf(b) ? to_srgb(c) : c));
+        rgb[k] = (uint8_t)lrintf(255.0f * (is_gltf(b) ? import_to_srgb((double)c) : c));
     }
     rgb[3] = 255;
 }

@@ -1,4 +1,4 @@
-/* Private to core/scene/import_*.c: materials of Assimp -> colour and textures of a surface. */
+/* Private to core/scene/import_*.c and core/import: materials of Assimp -> colour and textures of a surface. */
 #ifndef CORE_SCENE_IMPORT_MATERIAL_H
 #define CORE_SCENE_IMPORT_MATERIAL_H
 
@@ -7,6 +7,9 @@
 struct aiScene;
 struct aiMaterial;
 struct aiColor4D;
+
+/* Linear light as sRGB has it, IEC 61966-2-1. */
+float import_to_srgb(double linear);
 
 /* What the material says of a surface; what is there already stays. */
 int import_material(struct scene_build *b, const struct aiScene *in, const struct aiMaterial *material,

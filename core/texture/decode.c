@@ -1,10 +1,12 @@
-/* Images through stb_image, in memory that is counted: what a hostile file asks for has a limit. */
+/* Images through stb_image, and WebP through libwebp, in memory that is counted: what a hostile file asks for has a limit. */
 #include "core/texture.h"
 
 #include <limits.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+
+#include <webp/decode.h>
 
 #include "core/text.h"
 
@@ -75,7 +77,8 @@ static int check_size(const char *file, uint32_t width, uint32_t height, struct 
 
 static int fail_read(const char *file, const char *why, struct sh_err *err)
 {
-    return sh_fail(err, SH_EINPUT, "%s: no image that can be read (%s); allowed are PNG, JPEG, TGA and BMP", file, why);
+    return sh_fail(err, SH_EINPUT, "%s: no image that can be read (%s); allowed are PNG, JPEG, TGA, BMP and WebP", file,
+                   why);
 }
 
 /* Blue, green, red, alpha to red, green, blue, alpha. */
@@ -227,6 +230,41 @@ static int get_info(const uint8_t *bytes, size_t n, int *width, int *height, int
     return 1;
 }
 
+/* Containers that name themselves and that nobody reads here. */
+static const char *unread_kind(const uint8_t *bytes, size_t n)
+{
+    if (n >= 12 && memcmp(bytes, "\xabKTX 20\xbb\r\n\x1a\n", 12) == 0) return "it is KTX2";
+    if (n >= 12 && memcmp(bytes, "\xabKTX 11\xbb\r\n\x1a\n", 12) == 0) return "it is KTX";
+    if (n >= 4 && memcmp(bytes, "DDS ", 4) == 0) return "it is DDS";
+    return n >= 12 && memcmp(bytes + 4, "ftypavif", 8) == 0 ? "it is AVIF" : NULL;
+}
+
+static int is_webp(const uint8_t *bytes, size_t n)
+{
+    return n >= 12 && memcmp(bytes, "RIFF", 4) == 0 && memcmp(bytes + 8, "WEBP", 4) == 0;
+}
+
+/* What libwebp takes besides, it takes by the size, which is checked before. */
+static int decode_webp(const struct texture_source *source, const uint8_t *bytes, size_t n_bytes,
+                       struct texture_image *image, struct sh_err *err)
+{
+    WebPBitstreamFeatures is;
+    if (WebPGetFeatures(bytes, n_bytes, &is) != VP8_STATUS_OK)
+        return fail_read(source->file, "WebP without a whole header", err);
+    if (is.has_animation) return fail_read(source->file, "WebP that moves", err);
+    int rc = check_size(source->file, (uint32_t)is.width, (uint32_t)is.height, err);
+    if (rc != SH_OK) return rc;
+    const size_t row = 4 * (size_t)is.width, size = row * (size_t)is.height;
+    image->width = (uint32_t)is.width;
+    image->height = (uint32_t)is.height;
+    image->has_alpha = is.has_alpha;
+    if (source->alpha_only && !image->has_alpha) return SH_OK;
+    image->rgba = counted_alloc(size);
+    if (image->rgba == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory", source->file);
+    if (WebPDecodeRGBAInto(bytes, n_bytes, image->rgba, size, (int)row) != NULL) return SH_OK;
+    return fail_read(source->file, "WebP that is damaged or cut off", err);
+}
+
 static int decode(const struct texture_source *source, const uint8_t *bytes, size_t n_bytes,
                   struct texture_image *image, struct sh_err *err)
 {
@@ -239,6 +277,8 @@ static int decode(const struct texture_source *source, const uint8_t *bytes, siz
     if (n_bytes > 1 && has_long_table(bytes, n_bytes)) return fail_read(file, "a table of more than 256 codes", err);
     memory_left = TEXTURE_MAX_MEMORY;
     ran_out = 0;
+    if (is_webp(bytes, n_bytes)) return decode_webp(source, bytes, n_bytes, image, err);
+    if (unread_kind(bytes, n_bytes) != NULL) return fail_read(file, unread_kind(bytes, n_bytes), err);
     int rc = check_header(file, bytes, n_bytes, err);
     if (rc != SH_OK) return rc;
     if (!get_info(bytes, n_bytes, &width, &height, &channels)) return fail_read(file, stbi_failure_reason(), err);

@@ -355,7 +355,7 @@ static void hostile_files_take_no_gigabytes(void **state)
     fails(write_file("wide.png", bytes, png_of_size(bytes, 16385, 1)), "");
     fails(write_file("huge.png", bytes, png_of_size(bytes, 16384, 16384)), "allowed are 1 to 16384 a side");
     fails(write_file("most.png", bytes, png_of_size(bytes, 16384, 4096)), "no image that can be read");
-    fails(write_text("text.png", "no image"), "allowed are PNG, JPEG, TGA and BMP");
+    fails(write_text("text.png", "no image"), "allowed are PNG, JPEG, TGA, BMP and WebP");
     fails(write_text("empty.png", ""), "it is empty");
     fails(write_file("cut.png", JPEG, 40), "no image that can be read");
     fails(write_file("cut.tga", tga, write_tga(tga, 4, 1) - 1), "it is cut off");

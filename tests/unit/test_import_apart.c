@@ -188,7 +188,7 @@ static void names_have_an_end(void **state)
 
 /* ---- the process. Assimp's function stands in for itself here, and hangs for a mesh of this name. */
 
-#define ENDLESS "endless.gltf"
+#define ENDLESS "endless.dae"
 
 const struct aiScene *aiImportFileExWithProperties(const char *file, unsigned flags, struct aiFileIO *io,
                                                    const struct aiPropertyStore *options)
@@ -201,7 +201,7 @@ const struct aiScene *aiImportFileExWithProperties(const char *file, unsigned fl
     return real(file, flags, io, options);
 }
 
-static const char *endless_gltf(void)
+static const char *endless_dae(void)
 {
     return write_text(ENDLESS, "{}");
 }
@@ -221,12 +221,12 @@ static void hang_ends_in_time(void **state)
 {
     (void)state;
     const struct scene_import_limits limits = {.memory_mib = 1024, .time_s = 0.15, .files = 64};
-    const struct scene_mesh_spec spec = {.file = endless_gltf(), .scale = 1, .limits = &limits};
+    const struct scene_mesh_spec spec = {.file = endless_dae(), .scale = 1, .limits = &limits};
     struct scene *s;
     struct sh_err err;
     assert_int_equal(load_spec(&spec, 1e-3, &s, &err), SH_EINPUT);
     remove_endless();
-    if (strstr(err.text, "endless.gltf: Assimp has not read it within 0.15 s (scene.import_s)") == NULL)
+    if (strstr(err.text, "endless.dae: Assimp has not read it within 0.15 s (scene.import_s)") == NULL)
         fail_msg("%s", err.text);
     no_child_is_left();
 }
@@ -376,7 +376,7 @@ static void child_has_limits(void **state)
 {
     (void)state;
     const struct scene_import_limits limits = {.memory_mib = 100, .time_s = 60, .files = 7};
-    const struct scene_mesh_spec spec = {.file = endless_gltf(), .scale = 1, .limits = &limits};
+    const struct scene_mesh_spec spec = {.file = endless_dae(), .scale = 1, .limits = &limits};
     struct look look = {.core = -1};
     const struct sh_report report = {.ctx = &look, .stop = look_and_stop};
     struct scene *s;
@@ -406,7 +406,7 @@ static int say_child(void *ctx)
 static void child_dies_with_its_parent(void **state)
 {
     (void)state;
-    const struct scene_mesh_spec spec = {.file = endless_gltf(), .scale = 1};
+    const struct scene_mesh_spec spec = {.file = endless_dae(), .scale = 1};
     int said[2];
     pid_t child = 0;
     assert_int_equal(pipe(said), 0);

@@ -71,18 +71,21 @@ static void single_precision_within_the_tree(void **state)
 {
     (void)state;
     static const char text[] =
-        "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\"nodes\":["
-        "{\"name\":\"out\",\"translation\":[-500000,0,0],\"children\":[1]},"
-        "{\"name\":\"back\",\"translation\":[500000,0,0],\"mesh\":0}],"
-        "\"meshes\":[{\"name\":\"m\",\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}],"
-        "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"}],"
-        "\"bufferViews\":[{\"buffer\":0,\"byteLength\":36}],"
-        "\"buffers\":[{\"byteLength\":36,\"uri\":\"data:application/octet-stream;base64,"
-        "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA\"}]}";
-    refuse("tree.gltf", text, sizeof text - 1, "coordinates up to 500001 are read in single precision");
+        "<?xml version=\"1.0\"?><COLLADA xmlns=\"http://www.collada.org/2005/11/COLLADASchema\" version=\"1.4.1\">"
+        "<asset><unit meter=\"1\"/><up_axis>Y_UP</up_axis></asset><library_geometries><geometry id=\"g\"><mesh>"
+        "<source id=\"p\"><float_array id=\"pa\" count=\"9\">0 0 0 1 0 0 0 1 0</float_array><technique_common>"
+        "<accessor source=\"#pa\" count=\"3\" stride=\"3\"><param name=\"X\" type=\"float\"/>"
+        "<param name=\"Y\" type=\"float\"/><param name=\"Z\" type=\"float\"/></accessor></technique_common></source>"
+        "<vertices id=\"v\"><input semantic=\"POSITION\" source=\"#p\"/></vertices><triangles count=\"1\">"
+        "<input semantic=\"VERTEX\" source=\"#v\" offset=\"0\"/><p>0 1 2</p></triangles></mesh></geometry>"
+        "</library_geometries><library_visual_scenes><visual_scene id=\"s\"><node id=\"o\" name=\"out\">"
+        "<translate>-500000 0 0</translate><node id=\"n\" name=\"back\"><translate>500000 0 0</translate>"
+        "<instance_geometry url=\"#g\"/></node></node></visual_scene></library_visual_scenes>"
+        "<scene><instance_visual_scene url=\"#s\"/></scene></COLLADA>";
+    refuse("tree.dae", text, sizeof text - 1, "coordinates up to 500001 are read in single precision");
     struct scene *s;
     struct sh_err err;
-    const struct scene_mesh_spec spec = {.file = write_text("tree.gltf", text), .scale = 1};
+    const struct scene_mesh_spec spec = {.file = write_text("tree.dae", text), .scale = 1};
     assert_int_equal(load_spec(&spec, 1, &s, &err), SH_OK);
     unlink(path);
     static const double v[3][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};

@@ -1,0 +1,126 @@
+/* Extensions: the known ones, and the rest. */
+#include "core/import/gltf/gltf.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+/* A name that ends in * stands for all that begin so. */
+static const char *const known[] = {
+    /* read */
+    "KHR_mesh_quantization", "KHR_texture_transform", "KHR_node_visibility", "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression", "KHR_meshopt_compression", "EXT_texture_webp", "KHR_draco_mesh_compression",
+    /* other images than those that are read: or colours by shaders: said where one is missed */
+    "KHR_techniques_webgl", "KHR_technique_webgl", "KHR_texture_basisu", "EXT_texture_avif", "MSFT_texture_dds",
+    /* A laser sees nothing of these: lights, gloss, movement, levels of detail, what a program says of objects. */
+    "KHR_materials_*", "ADOBE_materials_*", "NV_materials_mdl", "KHR_lights_*", "EXT_lights_*", "KHR_animation_pointer",
+    "KHR_xmp", "KHR_xmp_json_ld", "KHR_node_selectability", "KHR_node_hoverability", "KHR_interactivity", "KHR_audio*",
+    "KHR_physics_*", "OMI_*", "MSFT_lod", "MSFT_packing_*", "MSFT_audio_emitter", "AGI_articulations",
+    "AGI_stk_metadata", "CESIUM_primitive_outline", "EXT_mesh_features", "EXT_feature_metadata",
+    "EXT_structural_metadata", "EXT_instance_features", "FB_geometry_metadata", "GRIFFEL_bim_data", "GODOT_single_root",
+    "VRM", "VRMC_*"};
+
+#define KNOWN_SAYS                                                                                        \
+    "KHR_mesh_quantization, KHR_texture_transform, KHR_draco_mesh_compression, EXT_meshopt_compression, " \
+    "EXT_mesh_gpu_instancing, EXT_texture_webp, and those of materials, lights and metadata"
+
+static bool is_known(const char *name)
+{
+    for (size_t i = 0; i < sizeof known / sizeof known[0]; i++) {
+        const size_t n = strlen(known[i]);
+        const bool begins = known[i][n - 1] == '*';
+        if (begins ? strncmp(name, known[i], n - 1) == 0 : strcmp(name, known[i]) == 0) return true;
+    }
+    return false;
+}
+
+static bool is_in(const json_t *list, const char *name)
+{
+    for (size_t i = 0; i < json_array_size(list); i++) {
+        const char *text = json_string_value(json_array_get(list, i));
+        if (text != NULL && strcmp(text, name) == 0) return true;
+    }
+    return false;
+}
+
+bool gltf_is_required(const struct gltf *g, const char *extension)
+{
+    return is_in(json_object_get(g->root, "extensionsRequired"), extension);
+}
+
+static void warn_unknown(struct gltf *g, const json_t *used)
+{
+    char names[256] = "";
+    size_t at = 0;
+    unsigned n = 0;
+    for (size_t i = 0; i < json_array_size(used); i++) {
+        const char *name = json_string_value(json_array_get(used, i));
+        if (name == NULL || is_known(name)) continue;
+        if (at < 200) at += (size_t)snprintf(names + at, sizeof names - at, "%s%.48s", n > 0 ? ", " : "", name);
+        n++;
+    }
+    if (n > 0)
+        sh_warn(g->b->report, "%s: %u extensions are not known, and were not required: they are not read: %s",
+                g->b->name, n, names);
+}
+
+bool gltf_is_by_shaders(const json_t *material)
+{
+    return gltf_extension(material, "KHR_techniques_webgl") != NULL ||
+           gltf_extension(material, "KHR_technique_webgl") != NULL;
+}
+
+/* Assimp unpacks Draco, and leaves out or misreads these. */
+static int check_for_assimp(struct gltf *g, const json_t *required)
+{
+    static const char *const other[] = {"EXT_mesh_gpu_instancing", "KHR_mesh_quantization", "EXT_meshopt_compression",
+                                        "KHR_meshopt_compression"};
+    for (size_t i = 0; i < sizeof other / sizeof other[0]; i++)
+        if (is_in(required, other[i]))
+            return gltf_fail(g, "it needs KHR_draco_mesh_compression and %s; allowed is one of them", other[i]);
+    if (json_array_size(json_object_get(g->root, "skins")) > 0)
+        sh_warn(g->b->report,
+                "%s: its meshes are packed by Draco, and so Assimp reads it: its skins move nothing there", g->b->name);
+    return SH_OK;
+}
+
+/* Whether the positions of a primitive are there only as Draco packs them. */
+static bool is_packed(const struct gltf *g, const json_t *primitive)
+{
+    const json_t *at = json_object_get(json_object_get(primitive, "attributes"), "POSITION");
+    const json_t *position =
+        json_array_get(json_object_get(g->root, "accessors"), (size_t)fmax(json_number_value(at), 0.0));
+    return gltf_extension(primitive, "KHR_draco_mesh_compression") != NULL &&
+           json_object_get(position, "bufferView") == NULL && json_object_get(position, "sparse") == NULL;
+}
+
+/* Draco need not be required where other accessors stand for it; some writers leave out both. */
+static bool has_packed(const struct gltf *g)
+{
+    const json_t *meshes = json_object_get(g->root, "meshes");
+    for (size_t i = 0; i < json_array_size(meshes); i++) {
+        const json_t *primitives = json_object_get(json_array_get(meshes, i), "primitives");
+        for (size_t k = 0; k < json_array_size(primitives); k++)
+            if (is_packed(g, json_array_get(primitives, k))) return true;
+    }
+    return false;
+}
+
+int gltf_check_extensions(struct gltf *g)
+{
+    json_t *required, *used;
+    int rc = gltf_list(g, g->root, "extensionsRequired", "", &required);
+    if (rc == SH_OK) rc = gltf_list(g, g->root, "extensionsUsed", "", &used);
+    if (rc != SH_OK) return rc;
+    for (size_t i = 0; i < json_array_size(required); i++) {
+        const char *name = json_string_value(json_array_get(required, i));
+        if (name == NULL) return gltf_fail(g, "extensionsRequired[%zu] is no text", i);
+        if (!is_known(name))
+            return gltf_fail(g, "it requires the extension %.60s, which is not known; known are " KNOWN_SAYS, name);
+    }
+    warn_unknown(g, used);
+    if (is_in(used, "KHR_techniques_webgl") || is_in(used, "KHR_technique_webgl"))
+        sh_warn(g->b->report, "%s: it has colours by shaders (KHR_techniques_webgl), which are not read", g->b->name);
+    g->by_assimp = is_in(required, "KHR_draco_mesh_compression") || has_packed(g);
+    return g->by_assimp ? check_for_assimp(g, required) : SH_OK;
+}

@@ -1,0 +1,227 @@
+/* Materials: the base colour, its texture, how that lies, and what its alpha cuts out. */
+#include "core/import/gltf/gltf.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/scene/import_material.h"
+
+enum { CLAMP_TO_EDGE = 33071, MIRRORED_REPEAT = 33648 };
+
+/* Two materials of one name would be one surface, with the colour of the first: the later one gets its number. So does one
+ * without a name. */
+int gltf_name_materials(struct gltf *g)
+{
+    json_t *materials, *seen = json_object();
+    int rc = gltf_list(g, g->root, "materials", "", &materials);
+    g->names = json_array();
+    for (uint32_t i = 0; i < json_array_size(materials) && rc == SH_OK; i++) {
+        const char *name = gltf_text(json_array_get(materials, i), "name");
+        const struct gltf_at number = gltf_at("materials[%u]", i);
+        char *own = NULL;
+        if (name != NULL && *name != '\0' && json_object_get(seen, name) != NULL &&
+            asprintf(&own, "%s[%u]", name, i) < 0)
+            own = NULL;
+        json_t *kept = json_string_nocheck(own != NULL ? own : name != NULL && *name != '\0' ? name : number.text);
+        if (json_object_set_nocheck(seen, json_string_value(kept) != NULL ? json_string_value(kept) : "", kept) != 0 ||
+            json_array_append_new(g->names, kept) != 0)
+            rc = build_fail(g->b, SH_ENOMEM, g->err, "no memory for the names of materials");
+        free(own);
+    }
+    json_decref(seen);
+    return rc;
+}
+
+/* ---- images */
+
+static enum texture_wrap wrap_of(uint64_t mode)
+{
+    return mode == CLAMP_TO_EDGE ? TEXTURE_CLAMP : mode == MIRRORED_REPEAT ? TEXTURE_MIRROR : TEXTURE_REPEAT;
+}
+
+static int read_wrap(struct gltf *g, const json_t *texture, const char *at, struct build_image *image)
+{
+    uint32_t number;
+    uint64_t mode[2] = {0, 0};
+    json_t *sampler = NULL;
+    int rc = gltf_index(g, texture, "sampler", at, &number);
+    if (rc == SH_OK && number != GLTF_NONE) rc = gltf_object(g, "samplers", number, &sampler);
+    if (rc == SH_OK) rc = gltf_whole(g, sampler, "wrapS", "samplers", &mode[0]);
+    if (rc == SH_OK) rc = gltf_whole(g, sampler, "wrapT", "samplers", &mode[1]);
+    for (int k = 0; k < 2; k++)
+        image->wrap[k] = wrap_of(mode[k]);
+    return rc;
+}
+
+/* A name that escapes characters, unless there is a file with the name as it is written. */
+static int add_file(struct gltf *g, const char *uri, struct build_image *image, uint16_t *number)
+{
+    char *name = gltf_uri_name(uri);
+    if (name == NULL) return build_fail(g->b, SH_ENOMEM, g->err, "no memory for a name");
+    image->name = (struct text_span){name, strlen(name)};
+    int rc = *name != '\0' ? build_texture(g->b, image, number, g->err) : SH_OK;
+    free(name);
+    return rc;
+}
+
+/* An image that lies within is named after the mesh's file, with its number. */
+static int add_image(struct gltf *g, uint32_t i, struct build_image *image, uint16_t *number)
+{
+    const char *slash = strrchr(g->b->spec->file, '/');
+    const struct gltf_at at = gltf_at("images[%u]", i);
+    json_t *object;
+    uint32_t view;
+    uint64_t stride;
+    struct gltf_bytes bytes = {0};
+    void *own = NULL;
+    char *name = NULL;
+    int rc = gltf_object(g, "images", i, &object);
+    const char *uri = rc == SH_OK ? gltf_text(object, "uri") : NULL;
+    if (uri != NULL && !gltf_uri_is_data(uri)) return add_file(g, uri, image, number);
+    if (rc == SH_OK && uri != NULL) rc = gltf_uri_data(g, uri, at.text, &own, &bytes);
+    if (rc == SH_OK && uri == NULL) rc = gltf_index(g, object, "bufferView", at.text, &view);
+    if (rc == SH_OK && uri == NULL) rc = gltf_buffer_view(g, view, &bytes, &stride);
+    const int len = asprintf(&name, "%s*%u", slash != NULL ? slash + 1 : g->b->spec->file, i);
+    if (rc == SH_OK && len < 0) rc = build_fail(g->b, SH_ENOMEM, g->err, "no memory for a name");
+    if (rc == SH_OK) {
+        image->name = (struct text_span){name, (size_t)len};
+        image->bytes = bytes.p != NULL ? bytes.p : (const uint8_t *)"";
+        image->n_bytes = bytes.n;
+        rc = build_texture(g->b, image, number, g->err);
+    }
+    if (len >= 0) free(name);
+    free(own);
+    return rc;
+}
+
+/* ---- textures */
+
+/* Where the only image is one that nobody reads here: an error where its colours are wanted and the file requires them. */
+static int miss_image(struct gltf *g, const json_t *texture, const char *at)
+{
+    const char *name = json_object_iter_key(json_object_iter(json_object_get(texture, "extensions")));
+    if (name == NULL) return SH_OK; /* a texture without an image is allowed */
+    if (g->b->spec->textures && gltf_is_required(g, name))
+        return gltf_fail(g,
+                         "%s is an image by %.60s, which is not read; allowed are PNG, JPEG, TGA, BMP and WebP: "
+                         "convert it, or scan without colours",
+                         at, name);
+    if (g->n_images++ == 0) snprintf(g->image, sizeof g->image, "%.60s", name);
+    return SH_OK;
+}
+
+static int add_texture(struct gltf *g, uint32_t i, uint16_t *number)
+{
+    const struct gltf_at at = gltf_at("textures[%u]", i);
+    struct build_image image = {0};
+    json_t *texture;
+    uint32_t source = GLTF_NONE;
+    int rc = gltf_object(g, "textures", i, &texture);
+    if (rc == SH_OK) rc = gltf_index(g, texture, "source", at.text, &source);
+    if (rc == SH_OK && source == GLTF_NONE)
+        rc = gltf_index(g, gltf_extension(texture, "EXT_texture_webp"), "source", at.text, &source);
+    if (rc == SH_OK && source == GLTF_NONE) return miss_image(g, texture, at.text);
+    if (rc == SH_OK) rc = read_wrap(g, texture, at.text, &image);
+    return rc == SH_OK ? add_image(g, source, &image, number) : rc;
+}
+
+/* u' = offset + turn * scale * u, from the upper left corner, with v down; a turn is counter-clockwise as one looks at the
+ * mesh. (The matrix is that of Khronos' viewer: their text's example, the lower left quarter, needs it so.) */
+static int read_lay(struct gltf *g, const json_t *info, const char *at, struct gltf_look *look)
+{
+    const json_t *lay = gltf_extension(info, "KHR_texture_transform");
+    double offset[2] = {0, 0}, scale[2] = {1, 1}, turn = 0.0;
+    uint32_t other = GLTF_NONE;
+    int rc = gltf_index(g, info, "texCoord", at, &look->uv_set);
+    if (rc == SH_OK) rc = gltf_index(g, lay, "texCoord", at, &other);
+    if (rc == SH_OK) rc = gltf_numbers(g, lay, "offset", at, 2, offset, NULL);
+    if (rc == SH_OK) rc = gltf_numbers(g, lay, "scale", at, 2, scale, NULL);
+    if (rc != SH_OK) return rc;
+    turn = json_number_value(json_object_get(lay, "rotation"));
+    if (other != GLTF_NONE) look->uv_set = other;
+    if (look->uv_set == GLTF_NONE) look->uv_set = 0;
+    const double c = cos(turn), s = sin(turn);
+    const double uv[2][3] = {{c * scale[0], s * scale[1], offset[0]}, {-s * scale[0], c * scale[1], offset[1]}};
+    memcpy(look->uv, uv, sizeof uv);
+    return SH_OK;
+}
+
+/* ---- materials */
+
+/* As the format says of each material. */
+static float solid_of(const json_t *material)
+{
+    const char *mode = gltf_text(material, "alphaMode");
+    const json_t *cutoff = json_object_get(material, "alphaCutoff");
+    if (mode == NULL || strcmp(mode, "OPAQUE") == 0) return 0.0f;
+    if (strcmp(mode, "MASK") != 0 || !json_is_number(cutoff)) return 0.5f;
+    return (float)fmin(fmax(json_number_value(cutoff), 0.0), 1.0);
+}
+
+/* Where the base colour stands: KHR_materials_pbrSpecularGlossiness has names of its own. */
+struct base {
+    json_t *of;
+    const char *factor, *texture;
+};
+
+static int find_base(struct gltf *g, const json_t *material, const char *at, struct base *base)
+{
+    *base = (struct base){NULL, "baseColorFactor", "baseColorTexture"};
+    json_t *glossy = gltf_extension(material, "KHR_materials_pbrSpecularGlossiness");
+    if (glossy == NULL) return gltf_child(g, material, "pbrMetallicRoughness", at, &base->of);
+    *base = (struct base){glossy, "diffuseFactor", "diffuseTexture"};
+    return SH_OK;
+}
+
+static int keep_colour(struct gltf *g, const struct base *base, const char *at, struct scene_surface *surface)
+{
+    double rgba[4] = {1, 1, 1, 1};
+    if (surface->has_colour) return SH_OK;
+    int rc = gltf_numbers(g, base->of, base->factor, at, 4, rgba, NULL);
+    for (int k = 0; k < 3 && rc == SH_OK; k++) {
+        if (!(rgba[k] >= 0.0 && rgba[k] <= 1.0)) return SH_OK; /* no colour of a surface */
+        surface->colour[k] = import_to_srgb(rgba[k]);
+    }
+    surface->has_colour = rc == SH_OK;
+    return rc;
+}
+
+static int keep_texture(struct gltf *g, const struct base *base, const json_t *material, const char *at,
+                        struct gltf_look *look)
+{
+    json_t *info;
+    struct scene_surface *surface = &g->b->scene->surface[look->label];
+    uint32_t texture = GLTF_NONE;
+    int rc = gltf_child(g, base->of, base->texture, at, &info);
+    if (rc == SH_OK) rc = gltf_index(g, info, "index", at, &texture);
+    if (rc != SH_OK || texture == GLTF_NONE) return rc;
+    rc = read_lay(g, info, at, look);
+    if (rc == SH_OK && surface->texture == 0) {
+        surface->solid = solid_of(material);
+        rc = add_texture(g, texture, &surface->texture);
+    }
+    look->has_texture = surface->texture != 0;
+    return rc;
+}
+
+int gltf_look_open(struct gltf *g, const char *object, const json_t *primitive, const char *at, struct gltf_look *look)
+{
+    uint32_t number;
+    json_t *material = NULL;
+    *look = (struct gltf_look){0};
+    int rc = gltf_index(g, primitive, "material", at, &number);
+    if (rc == SH_OK && number != GLTF_NONE) rc = gltf_object(g, "materials", number, &material);
+    if (rc != SH_OK) return rc;
+    const char *name = material != NULL ? json_string_value(json_array_get(g->names, number)) : "";
+    rc = build_label(g->b, (struct text_span){object, strlen(object)}, (struct text_span){name, strlen(name)},
+                     &look->label, g->err);
+    if (rc != SH_OK || material == NULL) return rc;
+    const struct gltf_at own = gltf_at("materials[%u]", number);
+    struct base base;
+    if (gltf_is_by_shaders(material)) return SH_OK;
+    rc = find_base(g, material, own.text, &base);
+    if (rc == SH_OK) rc = keep_colour(g, &base, own.text, &g->b->scene->surface[look->label]);
+    return rc == SH_OK && build_wants_textures(g->b) ? keep_texture(g, &base, material, own.text, look) : rc;
+}

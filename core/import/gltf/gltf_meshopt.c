@@ -1,0 +1,91 @@
+/* EXT_meshopt_compression and KHR_meshopt_compression: buffer views that meshoptimizer has packed. */
+#include "core/import/gltf/gltf.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include <meshoptimizer.h>
+
+struct packed {
+    struct gltf_bytes from;
+    uint64_t stride, count;
+    const char *mode, *filter;
+};
+
+/* meshoptimizer asserts the sizes that it is called with, so that they are looked at before. */
+static bool sizes_fit(const struct packed *p)
+{
+    const bool is_vertices = strcmp(p->mode, "ATTRIBUTES") == 0;
+    if (is_vertices && (p->stride == 0 || p->stride % 4 != 0 || p->stride > 256)) return false;
+    if (!is_vertices && p->stride != 2 && p->stride != 4) return false;
+    if (strcmp(p->mode, "TRIANGLES") == 0 && p->count % 3 != 0) return false;
+    if (strcmp(p->filter, "OCTAHEDRAL") == 0) return is_vertices && (p->stride == 4 || p->stride == 8);
+    return strcmp(p->filter, "QUATERNION") != 0 || (is_vertices && p->stride == 8);
+}
+
+/* 0, or what the decoder makes of damage. */
+static int decode(const struct packed *p, void *out)
+{
+    const size_t n = (size_t)p->count, size = (size_t)p->stride;
+    if (strcmp(p->mode, "TRIANGLES") == 0) return meshopt_decodeIndexBuffer(out, n, size, p->from.p, p->from.n);
+    if (strcmp(p->mode, "INDICES") == 0) return meshopt_decodeIndexSequence(out, n, size, p->from.p, p->from.n);
+    int rc = meshopt_decodeVertexBuffer(out, n, size, p->from.p, p->from.n);
+    if (rc != 0) return rc;
+    if (strcmp(p->filter, "OCTAHEDRAL") == 0) meshopt_decodeFilterOct(out, n, size);
+    if (strcmp(p->filter, "QUATERNION") == 0) meshopt_decodeFilterQuat(out, n, size);
+    if (strcmp(p->filter, "EXPONENTIAL") == 0) meshopt_decodeFilterExp(out, n, size);
+    return 0;
+}
+
+static bool is_one_of(const char *text, const char *const *known)
+{
+    for (; *known != NULL; known++)
+        if (strcmp(text, *known) == 0) return true;
+    return false;
+}
+
+static int check(struct gltf *g, const struct packed *p, const char *at)
+{
+    static const char *const modes[] = {"ATTRIBUTES", "TRIANGLES", "INDICES", NULL}, *const filters[] = {
+                                                                                         "NONE", "OCTAHEDRAL",
+                                                                                         "QUATERNION", "EXPONENTIAL",
+                                                                                         NULL};
+    if (!is_one_of(p->mode, modes))
+        return gltf_fail(g, "%s: meshopt's mode %.40s is not known; known are ATTRIBUTES, TRIANGLES, INDICES", at,
+                         p->mode);
+    if (!is_one_of(p->filter, filters))
+        return gltf_fail(g, "%s: meshopt's filter %.40s is not known; known are OCTAHEDRAL, QUATERNION, EXPONENTIAL",
+                         at, p->filter);
+    if (!sizes_fit(p) || p->count >= GLTF_NONE)
+        return gltf_fail(g, "%s: meshopt has no %s of %llu times %llu bytes", at, p->mode, (unsigned long long)p->count,
+                         (unsigned long long)p->stride);
+    return SH_OK;
+}
+
+int gltf_meshopt(struct gltf *g, const json_t *more, const char *at, struct gltf_kept *out)
+{
+    struct packed p = {.mode = gltf_text(more, "mode"), .filter = gltf_text(more, "filter")};
+    uint64_t offset = 0, length = 0;
+    uint32_t buffer;
+    int rc = gltf_index(g, more, "buffer", at, &buffer);
+    if (rc == SH_OK) rc = gltf_whole(g, more, "byteOffset", at, &offset);
+    if (rc == SH_OK) rc = gltf_whole(g, more, "byteLength", at, &length);
+    if (rc == SH_OK) rc = gltf_whole(g, more, "byteStride", at, &p.stride);
+    if (rc == SH_OK) rc = gltf_whole(g, more, "count", at, &p.count);
+    if (rc == SH_OK) rc = gltf_buffer(g, buffer, &p.from);
+    if (rc != SH_OK) return rc;
+    if (p.mode == NULL) p.mode = "(none)";
+    if (p.filter == NULL) p.filter = "NONE";
+    if (offset > p.from.n || length > p.from.n - offset)
+        return gltf_fail(g, "%s goes beyond its buffer of %zu bytes", at, p.from.n);
+    p.from = (struct gltf_bytes){p.from.p + offset, (size_t)length};
+    rc = check(g, &p, at);
+    if (rc != SH_OK) return rc;
+    out->own = malloc((size_t)(p.count * p.stride) + 1);
+    if (out->own == NULL) return build_fail(g->b, SH_ENOMEM, g->err, "no memory for %s", at);
+    out->bytes = (struct gltf_bytes){out->own, (size_t)(p.count * p.stride)};
+    rc = decode(&p, out->own);
+    return rc == 0
+               ? SH_OK
+               : gltf_fail(g, "%s: meshoptimizer can't decode it (%d): it is damaged, or of a newer version", at, rc);
+}

@@ -1,0 +1,263 @@
+/* The tree of nodes, in double. A node has one parent at most, and none above it is itself: the file is refused else, so that
+ * the walk ends. No recursion: a chain may be as long as the file. */
+#include "core/import/gltf/gltf.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+void gltf_multiply(const gltf_matrix a, const gltf_matrix b, gltf_matrix out)
+{
+    gltf_matrix m;
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 4; k++)
+            m[i][k] = a[i][0] * b[0][k] + a[i][1] * b[1][k] + a[i][2] * b[2][k] + (k == 3 ? a[i][3] : 0.0);
+    memcpy(out, m, sizeof m);
+}
+
+void gltf_apply(const gltf_matrix m, const double v[3], double out[3])
+{
+    const double x = v[0], y = v[1], z = v[2];
+    for (int i = 0; i < 3; i++)
+        out[i] = m[i][0] * x + m[i][1] * y + m[i][2] * z + m[i][3];
+}
+
+bool gltf_compose(const double t[3], const double r[4], const double s[3], gltf_matrix out)
+{
+    const double n2 = r[0] * r[0] + r[1] * r[1] + r[2] * r[2] + r[3] * r[3];
+    if (!(n2 > 1e-12)) return false;
+    const double k = 2.0 / n2, x = r[0], y = r[1], z = r[2], w = r[3];
+    const double turn[3][3] = {{1.0 - k * (y * y + z * z), k * (x * y - z * w), k * (x * z + y * w)},
+                               {k * (x * y + z * w), 1.0 - k * (x * x + z * z), k * (y * z - x * w)},
+                               {k * (x * z - y * w), k * (y * z + x * w), 1.0 - k * (x * x + y * y)}};
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++)
+            out[i][j] = turn[i][j] * s[j];
+        out[i][3] = t[i];
+    }
+    return true;
+}
+
+/* Columns of the file; its last row is 0, 0, 0, 1 but for what single precision has left of that. */
+static int take_matrix(struct gltf *g, const double in[16], const char *at, gltf_matrix out)
+{
+    if (fabs(in[3]) + fabs(in[7]) + fabs(in[11]) + fabs(in[15] - 1.0) > 1e-6)
+        return gltf_fail(g, "%s.matrix has the last row %g %g %g %g; allowed is 0 0 0 1", at, in[3], in[7], in[11],
+                         in[15]);
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 4; k++)
+            out[i][k] = in[4 * k + i];
+    return SH_OK;
+}
+
+static int read_local(struct gltf *g, const json_t *node, const char *at, gltf_matrix out)
+{
+    double m[16], t[3] = {0, 0, 0}, r[4] = {0, 0, 0, 1}, s[3] = {1, 1, 1};
+    bool has_matrix;
+    int rc = gltf_numbers(g, node, "matrix", at, 16, m, &has_matrix);
+    if (rc == SH_OK && has_matrix) return take_matrix(g, m, at, out);
+    if (rc == SH_OK) rc = gltf_numbers(g, node, "translation", at, 3, t, NULL);
+    if (rc == SH_OK) rc = gltf_numbers(g, node, "rotation", at, 4, r, NULL);
+    if (rc == SH_OK) rc = gltf_numbers(g, node, "scale", at, 3, s, NULL);
+    if (rc == SH_OK && !gltf_compose(t, r, s, out)) rc = gltf_fail(g, "%s.rotation is 0 0 0 0, which is none", at);
+    return rc;
+}
+
+static int take_children(struct gltf *g, uint32_t i, const json_t *node)
+{
+    const struct gltf_at at = gltf_at("nodes[%u]", i);
+    json_t *children;
+    int rc = gltf_list(g, node, "children", at.text, &children);
+    for (size_t k = 0; k < json_array_size(children) && rc == SH_OK; k++) {
+        const double child = json_number_value(json_array_get(children, k));
+        if (!(child >= 0.0 && child < g->n_nodes) || floor(child) != child)
+            return gltf_fail(g, "%s.children[%zu] is no node; there are %u", at.text, k, g->n_nodes);
+        struct gltf_node *below = &g->node[(uint32_t)child];
+        if (below->parent != GLTF_NONE)
+            return gltf_fail(g, "nodes[%.0f] is a child of nodes[%u] and of nodes[%u]; allowed is one parent", child,
+                             below->parent, i);
+        below->parent = i;
+    }
+    return rc;
+}
+
+static uint32_t child_of(const json_t *children, size_t k)
+{
+    return (uint32_t)json_number_value(json_array_get(children, k));
+}
+
+/* All below a node without a parent. stack: [n_nodes] */
+static void place_tree(struct gltf *g, const json_t *nodes, uint32_t root, uint32_t *stack)
+{
+    size_t n = 0;
+    stack[n++] = root;
+    while (n > 0) {
+        struct gltf_node *node = &g->node[stack[--n]];
+        const json_t *children = json_object_get(json_array_get(nodes, (size_t)(node - g->node)), "children");
+        if (node->parent != GLTF_NONE) gltf_multiply(g->node[node->parent].world, node->world, node->world);
+        node->has_world = true;
+        for (size_t k = json_array_size(children); k > 0; k--)
+            stack[n++] = child_of(children, k - 1);
+    }
+}
+
+static int place_all(struct gltf *g, uint32_t *stack)
+{
+    const json_t *nodes = json_object_get(g->root, "nodes");
+    json_t *node;
+    int rc = SH_OK;
+    for (uint32_t i = 0; i < g->n_nodes; i++)
+        g->node[i].parent = GLTF_NONE;
+    for (uint32_t i = 0; i < g->n_nodes && rc == SH_OK; i++) {
+        rc = gltf_object(g, "nodes", i, &node);
+        if (rc == SH_OK) rc = read_local(g, node, gltf_at("nodes[%u]", i).text, g->node[i].world);
+        if (rc == SH_OK) rc = take_children(g, i, node);
+    }
+    for (uint32_t i = 0; i < g->n_nodes && rc == SH_OK; i++)
+        if (g->node[i].parent == GLTF_NONE) place_tree(g, nodes, i, stack);
+    for (uint32_t i = 0; i < g->n_nodes && rc == SH_OK; i++)
+        if (!g->node[i].has_world) rc = gltf_fail(g, "nodes[%u] is below itself", i);
+    return rc;
+}
+
+int gltf_place_nodes(struct gltf *g)
+{
+    uint32_t *stack = malloc((g->n_nodes + (size_t)1) * sizeof *stack);
+    int rc = stack != NULL ? place_all(g, stack) : build_fail(g->b, SH_ENOMEM, g->err, "no memory for nodes");
+    free(stack);
+    return rc;
+}
+
+/* ---- instances */
+
+static int open_instances(struct gltf *g, const json_t *attributes, const char *at, struct gltf_view view[3])
+{
+    static const char *const name[3] = {"TRANSLATION", "ROTATION", "SCALE"}, *const type[3] = {"VEC3", "VEC4", "VEC3"};
+    uint32_t n = GLTF_NONE;
+    for (int k = 0; k < 3; k++) {
+        uint32_t accessor;
+        int rc = gltf_index(g, attributes, name[k], at, &accessor);
+        view[k].count = GLTF_NONE;
+        if (rc == SH_OK && accessor != GLTF_NONE) rc = gltf_view_open(g, accessor, type[k], &view[k]);
+        if (rc != SH_OK) return rc;
+        if (view[k].count == GLTF_NONE) continue;
+        if (n != GLTF_NONE && view[k].count != n)
+            return gltf_fail(g, "%s has %u of %s and %u of another", at, view[k].count, name[k], n);
+        n = view[k].count;
+    }
+    return n != GLTF_NONE ? SH_OK : gltf_fail(g, "%s has none of TRANSLATION, ROTATION and SCALE", at);
+}
+
+static int add_instances(struct gltf *g, uint32_t i, const char *object, const json_t *instancing)
+{
+    const struct gltf_at at = gltf_at("nodes[%u].extensions.EXT_mesh_gpu_instancing.attributes", i);
+    struct gltf_view view[3];
+    int rc = open_instances(g, json_object_get(instancing, "attributes"), at.text, view);
+    for (uint32_t k = 0; rc == SH_OK; k++) {
+        double trs[3][4] = {{0, 0, 0, 0}, {0, 0, 0, 1}, {1, 1, 1, 0}};
+        gltf_matrix m;
+        for (int a = 0; a < 3; a++) {
+            if (view[a].count == GLTF_NONE) continue;
+            if (k == view[a].count) return SH_OK;
+            for (uint32_t c = 0; c < view[a].n_components; c++)
+                trs[a][c] = gltf_value(&view[a], k, c);
+        }
+        if (!gltf_compose(trs[0], trs[1], trs[2], m))
+            return gltf_fail(g, "%s: instance %u has the rotation 0 0 0 0, which is none", at.text, k);
+        gltf_multiply(g->node[i].world, m, m);
+        rc = gltf_add_mesh(g, i, object, m);
+    }
+    return rc;
+}
+
+/* ---- the scene */
+
+/* The node's name, or its place in the file. */
+static int draw_node(struct gltf *g, uint32_t i, const json_t *node)
+{
+    const char *name = gltf_text(node, "name");
+    const struct gltf_at own = gltf_at("nodes[%u]", i);
+    const json_t *instancing = gltf_extension(node, "EXT_mesh_gpu_instancing");
+    if (name == NULL || *name == '\0') name = own.text;
+    if (instancing != NULL && json_object_get(node, "skin") != NULL)
+        return gltf_fail(g, "%s has a skin and instances; allowed is one of them", own.text);
+    return instancing != NULL ? add_instances(g, i, name, instancing) : gltf_add_mesh(g, i, name, g->node[i].world);
+}
+
+static bool is_hidden(const json_t *node)
+{
+    return json_is_false(json_object_get(gltf_extension(node, "KHR_node_visibility"), "visible"));
+}
+
+/* A node's own mesh first, then its children in their order: stack holds what is still to come, [n_nodes]. What is below a
+ * hidden node is hidden. */
+static int draw_tree(struct gltf *g, const json_t *nodes, uint32_t root, uint32_t *stack)
+{
+    size_t n = 0;
+    int rc = SH_OK;
+    stack[n++] = root;
+    while (n > 0 && rc == SH_OK) {
+        const uint32_t i = stack[--n];
+        const json_t *node = json_array_get(nodes, i), *children = json_object_get(node, "children");
+        g->node[i].is_drawn = true;
+        g->n_drawn++;
+        if (is_hidden(node)) {
+            g->n_hidden++;
+            continue;
+        }
+        if (json_object_get(node, "mesh") != NULL) rc = draw_node(g, i, node);
+        for (size_t k = json_array_size(children); k > 0; k--)
+            stack[n++] = child_of(children, k - 1);
+    }
+    return rc;
+}
+
+static int draw_roots(struct gltf *g, const json_t *roots, const char *at, uint32_t *stack)
+{
+    const json_t *nodes = json_object_get(g->root, "nodes");
+    int rc = SH_OK;
+    for (size_t k = 0; k < json_array_size(roots) && rc == SH_OK; k++) {
+        const double i = json_number_value(json_array_get(roots, k));
+        if (!(i >= 0.0 && i < g->n_nodes) || floor(i) != i)
+            return gltf_fail(g, "%s.nodes[%zu] is no node; there are %u", at, k, g->n_nodes);
+        const struct gltf_node *node = &g->node[(uint32_t)i];
+        if (node->parent != GLTF_NONE)
+            return gltf_fail(g, "%s.nodes has nodes[%.0f], which is a child of nodes[%u]: allowed are roots", at, i,
+                             node->parent);
+        if (node->is_drawn) return gltf_fail(g, "%s.nodes has nodes[%.0f] twice", at, i);
+        rc = draw_tree(g, nodes, (uint32_t)i, stack);
+    }
+    return rc;
+}
+
+/* Without scenes all nodes count; of several without a default the first. */
+static int draw_default(struct gltf *g, uint32_t *stack)
+{
+    const json_t *nodes = json_object_get(g->root, "nodes");
+    json_t *scenes, *scene = NULL, *roots = NULL;
+    uint32_t number;
+    int rc = gltf_list(g, g->root, "scenes", "", &scenes);
+    if (rc == SH_OK) rc = gltf_index(g, g->root, "scene", "", &number);
+    if (rc == SH_OK && number == GLTF_NONE && json_array_size(scenes) == 0) {
+        for (uint32_t i = 0; i < g->n_nodes && rc == SH_OK; i++)
+            if (g->node[i].parent == GLTF_NONE) rc = draw_tree(g, nodes, i, stack);
+        return rc;
+    }
+    if (rc == SH_OK && number == GLTF_NONE && json_array_size(scenes) > 1)
+        sh_warn(g->b->report, "%s: it has %zu scenes, and says of none that it is the default: the first is read",
+                g->b->name, json_array_size(scenes));
+    if (number == GLTF_NONE) number = 0;
+    const struct gltf_at at = gltf_at("scenes[%u]", number);
+    if (rc == SH_OK) rc = gltf_object(g, "scenes", number, &scene);
+    if (rc == SH_OK) rc = gltf_list(g, scene, "nodes", at.text, &roots);
+    return rc == SH_OK ? draw_roots(g, roots, at.text, stack) : rc;
+}
+
+int gltf_draw_scene(struct gltf *g)
+{
+    uint32_t *stack = malloc((g->n_nodes + (size_t)1) * sizeof *stack);
+    int rc = stack != NULL ? draw_default(g, stack) : build_fail(g->b, SH_ENOMEM, g->err, "no memory for nodes");
+    free(stack);
+    return rc;
+}

@@ -1,0 +1,81 @@
+#include "core/import/gltf/gltf_read.h"
+
+#include <math.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/stat.h>
+
+#include "core/import/gltf/gltf.h"
+#include "core/scene/import.h"
+
+bool gltf_is_name(const char *file)
+{
+    const char *dot = strrchr(file, '.');
+    return dot != NULL && (strcasecmp(dot, ".gltf") == 0 || strcasecmp(dot, ".glb") == 0);
+}
+
+/* What was left out or taken otherwise, a line for each kind. */
+static void say_counts(const struct gltf *g)
+{
+    const struct sh_report *report = g->b->report;
+    const char *name = g->b->name;
+    if (g->n_hidden > 0)
+        sh_warn(report, "%s: %u nodes are hidden (KHR_node_visibility), and left out with what is below them", name,
+                g->n_hidden);
+    if (g->n_shapeless > 0) sh_warn(report, "%s: %u primitives without POSITION left out", name, g->n_shapeless);
+    if (g->n_unmapped > 0)
+        sh_warn(report, "%s: %u primitives have no texture coordinates for their texture: they are without it", name,
+                g->n_unmapped);
+    if (g->n_unweighted > 0)
+        sh_warn(report, "%s: %llu vertices of a skin have no weights: no joint moves them", name,
+                (unsigned long long)g->n_unweighted);
+    if (g->n_images > 0)
+        sh_warn(report, "%s: %u textures are images by %s, which is not read: the surfaces are without them", name,
+                g->n_images, g->image);
+}
+
+/* Whole numbers are as the file's writer has made them: never refused. */
+static int say_errors(struct gltf *g)
+{
+    struct scene_build *b = g->b;
+    const double step_m = g->step_error * b->spec->scale;
+    b->scene->error_m = fmax(b->scene->error_m, step_m);
+    if (step_m > 1e-6)
+        sh_warn(b->report, "%s: its positions are whole numbers (KHR_mesh_quantization), so good to %.2g m only",
+                b->name, step_m);
+    return build_single(b, g->largest, g->error, true, g->err);
+}
+
+static int read_scene(struct gltf *g)
+{
+    g->b->scene->says = (struct scene_says){.unit_m = 1.0, .up = 2};
+    int rc = gltf_name_materials(g);
+    if (rc == SH_OK) rc = gltf_place_nodes(g);
+    if (rc == SH_OK) rc = gltf_draw_scene(g);
+    if (rc == SH_OK) rc = say_errors(g);
+    if (rc == SH_OK) say_counts(g);
+    return rc;
+}
+
+/* A file that is not as it should be: its words, and what to do. */
+static int say_what_to_do(int rc, struct sh_err *err)
+{
+    const struct sh_err said = *err;
+    if (rc != SH_EINPUT || strstr(said.text, "convert it") != NULL || strstr(said.text, "copy it there") != NULL)
+        return rc;
+    return sh_fail(err, rc, "%.440s: export it again, or convert it to .obj or .ply", said.text);
+}
+
+int import_gltf(struct scene_build *b, struct sh_err *err)
+{
+    struct gltf g = {.b = b, .err = err};
+    struct stat st;
+    if (stat(b->spec->file, &st) == 0 && st.st_size > 8 << 20) build_announce(b);
+    int rc = gltf_open(&g);
+    if (rc == SH_OK && !g.by_assimp) rc = gltf_check_extensions(&g);
+    const bool by_assimp = g.by_assimp;
+    if (rc == SH_OK && !by_assimp) rc = read_scene(&g);
+    gltf_close(&g);
+    if (rc != SH_OK) return say_what_to_do(rc, err);
+    return by_assimp ? import_assimp(b, err) : SH_OK;
+}

@@ -1,0 +1,13 @@
+/* glTF 2.0 into a scene, by its specification. README.md has the rules. */
+#ifndef CORE_IMPORT_GLTF_GLTF_READ_H
+#define CORE_IMPORT_GLTF_GLTF_READ_H
+
+#include "core/scene/build.h"
+
+/* Whether the file is one, by its ending. */
+bool gltf_is_name(const char *file);
+
+/* Fills b as a reader does, in the process that reads. What Assimp is to read (glTF 1.0, Draco) it hands to import_assimp. */
+int import_gltf(struct scene_build *b, struct sh_err *err);
+
+#endif

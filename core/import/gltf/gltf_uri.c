@@ -1,0 +1,83 @@
+/* URIs of glTF: data within them (RFC 2397), and relative names of files (RFC 3986). */
+#include "core/import/gltf/gltf.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+bool gltf_uri_is_data(const char *uri)
+{
+    return strncasecmp(uri, "data:", 5) == 0;
+}
+
+static int digit_of(char c)
+{
+    return c >= '0' && c <= '9'   ? c - '0'
+           : c >= 'a' && c <= 'f' ? c - 'a' + 10
+           : c >= 'A' && c <= 'F' ? c - 'A' + 10
+                                  : -1;
+}
+
+/* %XX is one byte; what else follows a % is as it stands. A NUL would end the name: it stays as it is written. */
+static size_t unescape(const char *in, char *out)
+{
+    char *to = out;
+    for (; *in != '\0'; in++) {
+        const int high = *in == '%' ? digit_of(in[1]) : -1, low = high >= 0 ? digit_of(in[2]) : -1;
+        if (low >= 0 && high + low > 0) {
+            *to++ = (char)(16 * high + low);
+            in += 2;
+        } else {
+            *to++ = *in;
+        }
+    }
+    *to = '\0';
+    return (size_t)(to - out);
+}
+
+char *gltf_uri_name(const char *uri)
+{
+    char *name = malloc(strlen(uri) + 1);
+    if (name != NULL) unescape(uri, name);
+    return name;
+}
+
+/* Both alphabets of RFC 4648. */
+static int sextet_of(char c)
+{
+    return c >= 'A' && c <= 'Z'   ? c - 'A'
+           : c >= 'a' && c <= 'z' ? c - 'a' + 26
+           : c >= '0' && c <= '9' ? c - '0' + 52
+           : c == '+' || c == '-' ? 62
+           : c == '/' || c == '_' ? 63
+                                  : -1;
+}
+
+/* The place of the first character that is none of base64; NULL: all are. */
+static const char *decode_base64(const char *in, uint8_t *out, size_t *n)
+{
+    uint32_t bits = 0;
+    size_t n_sextets = 0;
+    *n = 0;
+    for (; *in != '\0' && *in != '='; in++) {
+        const int sextet = sextet_of(*in);
+        if (sextet < 0) return in;
+        bits = bits << 6 | (uint32_t)sextet;
+        if (++n_sextets % 4 == 1) continue;
+        out[(*n)++] = (uint8_t)(bits >> (6 - 2 * ((n_sextets + 3) % 4)));
+    }
+    return NULL;
+}
+
+int gltf_uri_data(struct gltf *g, const char *uri, const char *at, void **own, struct gltf_bytes *out)
+{
+    const char *comma = strchr(uri, ','), *wrong;
+    if (comma == NULL || comma - uri < 7 || strncasecmp(comma - 7, ";base64", 7) != 0)
+        return gltf_fail(g, "%s.uri has data that are not base64", at);
+    uint8_t *data = malloc(strlen(comma) + 1);
+    if (data == NULL) return build_fail(g->b, SH_ENOMEM, g->err, "no memory for %s", at);
+    *own = data;
+    wrong = decode_base64(comma + 1, data, &out->n);
+    out->p = data;
+    return wrong == NULL ? SH_OK : gltf_fail(g, "%s.uri: byte %td is none of base64", at, wrong - uri);
+}
