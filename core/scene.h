@@ -78,7 +78,7 @@ struct scene_mesh_spec {
  * and ends in a number of all its bytes. */
 int scene_copy_name(char *out, size_t room, const char *name, size_t n);
 
-/* Of a surface's triangles, which have colours at their corners. */
+/* Which of a surface's triangles have colours at their corners. */
 enum scene_vertex_colours { SCENE_COLOURS_NONE, SCENE_COLOURS_SOME, SCENE_COLOURS_ALL };
 
 /* One surface label: an object of the file with one material.

@@ -99,8 +99,8 @@ void surface_colours_set(struct surface_colours *colours, uint32_t label, const 
 /* Entry `label` gets an image. SH_EINPUT, naming the file: can't be read; the entry stays as it is. */
 int surface_colours_texture(struct surface_colours *colours, uint32_t label, const struct scene_texture *texture,
                             struct sh_err *err);
-/* Of a hit; uv finite, or NULL: not known. rgb: the colour between the vertices, or NULL: there is none. Labels beyond
- * the entries are grey. */
+/* The colour of a hit; uv finite, or NULL: not known. rgb: the colour between the vertices, or NULL: there is none.
+ * Labels beyond the entries are grey. */
 uint32_t surface_colour(const struct surface_colours *colours, uint32_t label, const double uv[2],
                         const uint8_t rgb[3]);
 

@@ -156,7 +156,7 @@ void scene_drop_textures(struct scene *scene);
 
 /* The readers. Each has the spec, and the file's name, from the builder. */
 int read_obj(struct scene_build *b, struct sh_err *err);
-/* What follows mtllib in a line of an OBJ. */
+/* Takes what follows mtllib in a line of an OBJ. */
 struct mtl_line {
     struct text_span names;
     uint64_t line;

@@ -244,7 +244,7 @@ static int is_webp(const uint8_t *bytes, size_t n)
     return n >= 12 && memcmp(bytes, "RIFF", 4) == 0 && memcmp(bytes + 8, "WEBP", 4) == 0;
 }
 
-/* What libwebp takes besides, it takes by the size, which is checked before. */
+/* Memory that libwebp takes besides goes by the size, which is checked before. */
 static int decode_webp(const struct texture_source *source, const uint8_t *bytes, size_t n_bytes,
                        struct texture_image *image, struct sh_err *err)
 {

@@ -222,7 +222,7 @@ static void a_sparse_city_is_looked_at(void **state)
     contains(out, "outside, looking at the mesh");
     double p[3];
     assert_int_equal(sscanf(strstr(out, "station "), "station %lf %lf %lf m", &p[0], &p[1], &p[2]), 3);
-    /* That in the middle: a sphere of 8.7 m is around it, and the station is 2.5 of its radii away. */
+    /* The box in the middle: a sphere of 8.7 m is around it, and the station is 2.5 of its radii away. */
     assert_true(hypot(p[0] - 2685505, p[1] - 1247305) < 25 && p[2] > 440 && p[2] < 470);
     const double seen = 0.01 * atof(strstr(out, "looking at the mesh; ") + strlen("looking at the mesh; "));
     assert_true(seen > 0.3);

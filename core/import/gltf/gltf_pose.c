@@ -54,7 +54,7 @@ static int open_targets(struct gltf *g, const json_t *node, const json_t *mesh, 
 
 /* ---- skins */
 
-/* What a product sums up, without signs: rounding of single precision is a part of that. */
+/* The sum of a product without signs: rounding of single precision is a part of that. */
 static void take_reach(const gltf_matrix world, const gltf_matrix bind, gltf_matrix out)
 {
     gltf_matrix a, b;

@@ -14,7 +14,7 @@ bool gltf_is_name(const char *file)
     return dot != NULL && (strcasecmp(dot, ".gltf") == 0 || strcasecmp(dot, ".glb") == 0);
 }
 
-/* What was left out or taken otherwise, a line for each kind. */
+/* Says what was left out or taken otherwise, a line for each kind. */
 static void say_counts(const struct gltf *g)
 {
     const struct sh_report *report = g->b->report;
