@@ -161,7 +161,7 @@ static int add_edge(void *ctx, const double a[3], const double b[3], struct sh_e
     return map_add_edge(run->map, from, to, err);
 }
 
-/* The objects of what stands still. */
+/* Edges of what stands still are marked; those of bodies that move are not. */
 static int mark_open_edges(struct map_run *run, const struct scene *scene, struct sh_err *err)
 {
     const struct scene_open_edges edges = {run, add_edge};
