@@ -43,8 +43,8 @@ const struct ifc_shape ifc_shapes[IFC_SHAPES] = {
      8 * PI + 2, 2 * PI, 2.5},
     {"half space, tilted", "@50",
      HALF("0.,0.,0.5", "@55,@56") "55=IFCDIRECTION((-0.25,0.,1.))\n56=IFCDIRECTION((1.,0.,0.25))",
-     /* below z = 0.5 + x / 4: 2 m of slope, then the top; sides of 0.5 to 1 m */
-     8 + 4 + sqrt(17) + 1 + 2 + 2 * 3.5, 7, 0},
+     /* below z = 0.5 + x / 4: 2 m of slope, sqrt(17) m2, then the top; sides of 0.5 to 1 m */
+     8 + 4 + 4.123105625617661 + 1 + 2 + 2 * 3.5, 7, 0},
     {"half space, far", "@50", HALF("5000.,-3000.,0.5", "$,$"), 22, 4, 0},
     {"union", "@50",
      IFC_BOX_ROWS "50=IFCBOOLEANRESULT(.UNION.,@60,@51)\n51=IFCEXTRUDEDAREASOLID(@52,@53,#10,2.)\n" IFC_RECT(52, 1., 1.)
@@ -84,9 +84,9 @@ const struct ifc_shape ifc_shapes[IFC_SHAPES] = {
     {"mirrored", "@50", MAPPED("IFCCARTESIANTRANSFORMATIONOPERATOR3D(@54,@55,#9,1.,#10)"), 28, 8, 0},
     {"scaled", "@50", MAPPED("IFCCARTESIANTRANSFORMATIONOPERATOR3DNONUNIFORM(#11,@55,#9,2.,#10,1.,3.)"), 92, 48, 0},
     {"tapered", "@50", "50=IFCEXTRUDEDAREASOLIDTAPERED(@51,#12,#10,1.,@52)\n" IFC_RECT(51, 2., 2.) IFC_RECT(52, 1., 1.),
-     5 + 3 * sqrt(5), 7.0 / 3.0, 0},
-    {"cone", "@50", "50=IFCCSGSOLID(@51)\n51=IFCRIGHTCIRCULARCONE(#12,1.,1.)", PI *(1 + sqrt(2)), PI / 3, 1},
-    {"pyramid", "@50", "50=IFCCSGSOLID(@51)\n51=IFCRECTANGULARPYRAMID(#12,2.,2.,1.)", 4 + 4 * sqrt(2), 4.0 / 3.0, 0},
+     5 + 3 * 2.23606797749979 /* sqrt(5) */, 7.0 / 3.0, 0},
+    {"cone", "@50", "50=IFCCSGSOLID(@51)\n51=IFCRIGHTCIRCULARCONE(#12,1.,1.)", PI *(1 + M_SQRT2), PI / 3, 1},
+    {"pyramid", "@50", "50=IFCCSGSOLID(@51)\n51=IFCRECTANGULARPYRAMID(#12,2.,2.,1.)", 4 + 4 * M_SQRT2, 4.0 / 3.0, 0},
     {"hole in a profile", "@50",
      EXTRUDED(
          "IFCARBITRARYPROFILEDEFWITHVOIDS(.AREA.,$,@52,(@57))",

@@ -200,7 +200,7 @@ static void cast_line(const struct scene *scene, const struct cast_setup *setup,
     struct schedule_segment segment;
     struct schedule_line line;
     struct schedule_run run;
-    struct caster *caster;
+    struct caster *caster = NULL;
     struct bvh *bvh;
     struct sh_err err;
     struct cast_setup with = *setup;
