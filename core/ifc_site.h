@@ -21,9 +21,10 @@ struct ifc_site {
     int has_place; /* latitude and longitude are known; else there is a map */
     int has_map;
     struct ifc_map {
-        char crs[128];                          /* the system's name, UTF-8: "EPSG:2056" */
-        double easting_m, northing_m, height_m; /* of the model's origin; height by the system's own datum */
-        double x_axis_rad;                      /* of the model's x axis, counter-clockwise from grid east */
+        char crs[128]; /* the system's name, UTF-8: "EPSG:2056" */
+        double easting_m, northing_m,
+            height_m;      /* of the model's origin; height by the system's own datum, NaN: not given */
+        double x_axis_rad; /* of the model's x axis, counter-clockwise from grid east */
     } map;
 };
 

@@ -212,6 +212,10 @@ int scene_find_same(const struct scene *scene, const struct sh_report *report, u
 
 void scene_free(struct scene *scene);
 
+/* Where a file is that a mesh or its library names: in one of n <= 4 folders, then by its last part there; then both without
+ * regard to case. Folders are paths up to their last slash, and may be empty. To be freed; NULL: it is nowhere. */
+char *scene_find_file(const char *const *folder, size_t n, const char *name);
+
 /* The image of a texture: texture_read. */
 int scene_read_texture(const struct scene_texture *texture, int alpha_only, struct texture_image *image,
                        struct sh_err *err);

@@ -5,38 +5,70 @@
 
 #include "core/angle.h"
 
-/* The name as the user's file has it; the kind must be projected, since a head needs metres. */
-static int check_kind(PJ_CONTEXT *context, const char *name, struct sh_err *err)
+/* A system of the registry, as far as it counts here. */
+struct grid {
+    const char *name;
+    PJ *to; /* to longitude and latitude in degrees, in this order, whatever the order of the systems' own axes */
+    double unit_m;                                   /* of its axes */
+    double west_deg, south_deg, east_deg, north_deg; /* where it is used; west NaN: not known */
+};
+
+static double axis_unit(PJ_CONTEXT *context, const PJ *crs)
 {
-    PJ *crs = proj_create(context, name), *flat = NULL;
-    PJ_TYPE kind = crs != NULL ? proj_get_type(crs) : PJ_TYPE_UNKNOWN;
-    if (kind == PJ_TYPE_COMPOUND_CRS) {
-        flat = proj_crs_get_sub_crs(context, crs, 0);
-        kind = flat != NULL ? proj_get_type(flat) : PJ_TYPE_UNKNOWN;
-    }
-    const int known = crs != NULL;
-    proj_destroy(flat);
-    proj_destroy(crs);
-    if (kind == PJ_TYPE_PROJECTED_CRS) return SH_OK;
-    return sh_fail(err, SH_EINPUT, "%s: %s; allowed is a projected system, as EPSG:25832 is", name,
-                   known ? "not a projected coordinate reference system" : "no such coordinate reference system");
+    PJ *axes = proj_crs_get_coordinate_system(context, crs);
+    double unit_m = 1.0;
+    if (axes != NULL) proj_cs_get_axis_info(context, axes, 0, NULL, NULL, NULL, &unit_m, NULL, NULL, NULL);
+    proj_destroy(axes);
+    return unit_m > 0.0 ? unit_m : 1.0;
 }
 
-/* Longitude and latitude in degrees, in this order, whatever the order of the systems' own axes. */
-static PJ *open_transformation(PJ_CONTEXT *context, const char *name)
+static void read_projected(PJ_CONTEXT *context, const PJ *crs, struct grid *grid)
 {
-    PJ *raw = proj_create_crs_to_crs(context, name, "EPSG:4326", NULL);
-    PJ *to = raw != NULL ? proj_normalize_for_visualization(context, raw) : NULL;
+    grid->unit_m = axis_unit(context, crs);
+    if (!proj_get_area_of_use(context, crs, &grid->west_deg, &grid->south_deg, &grid->east_deg, &grid->north_deg,
+                              NULL) ||
+        grid->west_deg < -180.0)
+        grid->west_deg = NAN;
+}
+
+/* The kind must be projected, since a head needs metres. */
+static int read_system(PJ_CONTEXT *context, struct grid *grid, struct sh_err *err)
+{
+    PJ *crs = proj_create(context, grid->name);
+    const int is_known = crs != NULL;
+    if (is_known && proj_get_type(crs) == PJ_TYPE_COMPOUND_CRS) {
+        PJ *flat = proj_crs_get_sub_crs(context, crs, 0);
+        proj_destroy(crs);
+        crs = flat;
+    }
+    const int is_projected = crs != NULL && proj_get_type(crs) == PJ_TYPE_PROJECTED_CRS;
+    if (is_projected) read_projected(context, crs, grid);
+    proj_destroy(crs);
+    if (is_projected) return SH_OK;
+    return sh_fail(err, SH_EINPUT, "%s: %s; allowed is a projected system, as EPSG:25832 is", grid->name,
+                   is_known ? "not a projected coordinate reference system" : "no such coordinate reference system");
+}
+
+static int open_transformation(PJ_CONTEXT *context, struct grid *grid, struct sh_err *err)
+{
+    PJ *raw = proj_create_crs_to_crs(context, grid->name, "EPSG:4326", NULL);
+    grid->to = raw != NULL ? proj_normalize_for_visualization(context, raw) : NULL;
     proj_destroy(raw);
-    return to;
+    return grid->to != NULL ? SH_OK : sh_fail(err, SH_EINPUT, "%s: PROJ knows no way from it to WGS 84", grid->name);
+}
+
+static PJ_COORD transformed(const struct grid *grid, double easting_m, double northing_m)
+{
+    return proj_trans(grid->to, PJ_FWD, proj_coord(easting_m / grid->unit_m, northing_m / grid->unit_m, 0.0, 0.0));
 }
 
 /* By differences over 100 m each way: what they leave out is of the third order, below 1e-9 in any grid of survey. */
-static void measure_grid(PJ *to, double easting_m, double northing_m, const PJ_COORD *at, struct crs_place *place)
+static void measure_grid(const struct grid *grid, double easting_m, double northing_m, const PJ_COORD *at,
+                         struct crs_place *place)
 {
     static const double step_m = 100.0, a_m = 6378137.0, e2 = 0.00669437999014;
-    const PJ_COORD south = proj_trans(to, PJ_FWD, proj_coord(easting_m, northing_m - step_m, 0.0, 0.0));
-    const PJ_COORD north = proj_trans(to, PJ_FWD, proj_coord(easting_m, northing_m + step_m, 0.0, 0.0));
+    const PJ_COORD south = transformed(grid, easting_m, northing_m - step_m);
+    const PJ_COORD north = transformed(grid, easting_m, northing_m + step_m);
     const double lat = angle_rad(at->xy.y), w = sqrt(1.0 - e2 * sin(lat) * sin(lat));
     const double east_m = angle_rad(remainder(north.xy.x - south.xy.x, 360.0)) * a_m / w * cos(lat);
     const double north_m = angle_rad(north.xy.y - south.xy.y) * a_m * (1.0 - e2) / (w * w * w);
@@ -44,17 +76,30 @@ static void measure_grid(PJ *to, double easting_m, double northing_m, const PJ_C
     place->scale = 2.0 * step_m / hypot(east_m, north_m);
 }
 
-static int locate(PJ *to, const char *name, double easting_m, double northing_m, struct crs_place *place,
+/* Areas of use are rough, and end at borders. A missing digit or a wrong unit leads further off than this. */
+#define AREA_MARGIN_DEG 2.0
+
+static int is_within(const struct grid *grid, const PJ_COORD *at)
+{
+    if (!(fabs(at->xy.x) <= 180.0 && fabs(at->xy.y) <= 90.0)) return 0;
+    if (isnan(grid->west_deg)) return 1;
+    const double middle = 0.5 * (grid->west_deg + grid->east_deg) + (grid->east_deg < grid->west_deg ? 180.0 : 0.0);
+    const double half = fabs(remainder(grid->east_deg - middle, 360.0));
+    return fabs(remainder(at->xy.x - middle, 360.0)) <= half + AREA_MARGIN_DEG &&
+           at->xy.y >= grid->south_deg - AREA_MARGIN_DEG && at->xy.y <= grid->north_deg + AREA_MARGIN_DEG;
+}
+
+static int locate(const struct grid *grid, double easting_m, double northing_m, struct crs_place *place,
                   struct sh_err *err)
 {
-    const PJ_COORD at = proj_trans(to, PJ_FWD, proj_coord(easting_m, northing_m, 0.0, 0.0));
-    if (!(fabs(at.xy.x) <= 180.0 && fabs(at.xy.y) <= 90.0))
-        return sh_fail(err, SH_EINPUT, "%s: easting %.10g, northing %.10g m are outside of it", name, easting_m,
-                       northing_m);
+    const PJ_COORD at = transformed(grid, easting_m, northing_m);
+    if (!is_within(grid, &at))
+        return sh_fail(err, SH_EINPUT, "%s: easting %.10g, northing %.10g m are outside of where it is used",
+                       grid->name, easting_m, northing_m);
     place->at.lon_deg = at.xy.x;
     place->at.lat_deg = at.xy.y;
-    measure_grid(to, easting_m, northing_m, &at, place);
-    PJ *used = proj_trans_get_last_used_operation(to);
+    measure_grid(grid, easting_m, northing_m, &at, place);
+    PJ *used = proj_trans_get_last_used_operation(grid->to);
     const double accuracy_m = used != NULL ? proj_pj_info(used).accuracy : -1.0;
     proj_destroy(used);
     place->accuracy_m = accuracy_m >= 0.0 ? accuracy_m : NAN;
@@ -64,16 +109,16 @@ static int locate(PJ *to, const char *name, double easting_m, double northing_m,
 int crs_locate(const char *name, double easting_m, double northing_m, double height_m, struct crs_place *place,
                struct sh_err *err)
 {
+    struct grid grid = {.name = name};
     *place = (struct crs_place){.at.height_m = height_m, .accuracy_m = NAN};
     PJ_CONTEXT *context = proj_context_create();
     if (context == NULL) return sh_fail(err, SH_ENOMEM, "no memory for PROJ");
     proj_log_level(context, PJ_LOG_NONE);
     proj_context_set_enable_network(context, 0);
-    int rc = check_kind(context, name, err);
-    PJ *to = rc == SH_OK ? open_transformation(context, name) : NULL;
-    if (rc == SH_OK && to == NULL) rc = sh_fail(err, SH_EINPUT, "%s: PROJ knows no way from it to WGS 84", name);
-    if (rc == SH_OK) rc = locate(to, name, easting_m, northing_m, place, err);
-    proj_destroy(to);
+    int rc = read_system(context, &grid, err);
+    if (rc == SH_OK) rc = open_transformation(context, &grid, err);
+    if (rc == SH_OK) rc = locate(&grid, easting_m, northing_m, place, err);
+    proj_destroy(grid.to);
     proj_context_destroy(context);
     return rc;
 }

@@ -292,12 +292,18 @@ static int read_map_unit(struct reader *r, const struct found *crs, double scale
     return isnan(*m) ? fail(r, &r->map, "no unit of maps fits its Scale, and the system has no MapUnit") : SH_OK;
 }
 
-/* A number; `missing` where there is none, NaN: there must be one. */
-static int read_number(struct reader *r, struct text_span arg, double missing, double *value)
+/* A number of the map conversion. The first two must be there; a height that is not is NaN. */
+static int read_number(struct reader *r, struct text_span arg, int which, double *value)
 {
-    *value = missing;
-    if (text_is(arg, "$") && !isnan(missing)) return SH_OK;
-    return step_real(&r->text, arg, value) ? SH_OK : fail(r, &r->map, "a number is missing, or is none");
+    static const char *const name[MAP_ARGS] = {
+        [MAP_EASTING] = "Eastings",       [MAP_NORTHING] = "Northings",     [MAP_HEIGHT] = "OrthogonalHeight",
+        [MAP_ABSCISSA] = "XAxisAbscissa", [MAP_ORDINATE] = "XAxisOrdinate", [MAP_SCALE] = "Scale"};
+    char what[64];
+    *value = which == MAP_HEIGHT ? NAN : which == MAP_ORDINATE ? 0.0 : 1.0;
+    if (text_is(arg, "$") && which > MAP_NORTHING) return SH_OK;
+    if (step_real(&r->text, arg, value)) return SH_OK;
+    snprintf(what, sizeof what, "%s is missing, or is no number", name[which]);
+    return fail(r, &r->map, what);
 }
 
 static int read_map_name(struct reader *r, const struct found *crs, struct ifc_map *map)
@@ -320,7 +326,7 @@ static int read_map(struct reader *r, double unit_m, struct ifc_map *map)
     int rc = follow(r, &r->map, arg[MAP_CRS], "IFCPROJECTEDCRS", CRS_ARGS, &crs);
     if (rc == SH_OK) rc = read_map_name(r, &crs, map);
     for (int i = MAP_EASTING; i < MAP_ARGS && rc == SH_OK; i++)
-        rc = read_number(r, arg[i], i <= MAP_HEIGHT ? NAN : i == MAP_ORDINATE ? 0.0 : 1.0, &value[i]);
+        rc = read_number(r, arg[i], i, &value[i]);
     if (rc == SH_OK && !(value[MAP_SCALE] > 0.0)) rc = fail(r, &r->map, "a Scale that is not above 0");
     if (rc == SH_OK && !(hypot(value[MAP_ABSCISSA], value[MAP_ORDINATE]) > 1e-9))
         rc = fail(r, &r->map, "an x axis without a direction");

@@ -1,4 +1,4 @@
-/* STL, glTF, FBX, Collada, and IFC where its readers are not installed, through Assimp's C interface, node tree and all.
+/* glTF 1.0 and Draco, FBX, Collada, and IFC where its readers are not installed, through Assimp's C interface, node tree and all.
  *
  * No post-processing: polygons are cut by our own triangulation, and node transforms are applied in double,
  * one level after the other, so that what single precision has rounded on the way is known. */

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "core/infile.h"
+#include "core/scene.h"
 #include "firmware_sim/app/app.h"
 
 enum { NAME_MAX_LEN = 255, DEEPEST = 1 }; /* a mesh names a .mtl, which names images */
@@ -27,8 +28,8 @@ struct search {
 /* The ending at a dot; 0: none of those. A mesh has a dot in each number: most of them end at the first test. */
 static size_t ending_at(const char *p, const char *end)
 {
-    static const char *const endings[] = {".mtl", ".bin", ".png", ".jpg", ".jpeg", ".tga", ".bmp"};
-    if (end - p < 2 || strchr("mbpjt", p[1] | 0x20) == NULL) return 0;
+    static const char *const endings[] = {".mtl", ".bin", ".png", ".jpg", ".jpeg", ".tga", ".bmp", ".webp"};
+    if (end - p < 2 || strchr("mbpjtw", p[1] | 0x20) == NULL) return 0;
     for (size_t i = 0; i < sizeof endings / sizeof endings[0]; i++) {
         const size_t n = strlen(endings[i]);
         if ((size_t)(end - p) >= n && strncasecmp(p, endings[i], n) == 0) return n;
@@ -67,13 +68,17 @@ static int is_file(const struct search *s, const char *name, char path[PATH_MAX]
     return is_file_in(s->here, name, path) || is_file_in(s->folder, name, path);
 }
 
-/* As it stands; then by its last part, which is how files of other machines are found. */
+/* As it stands; then as readers find it: by its last part, which is how files of other machines are found, in any case. */
 static int find(const struct search *s, const char *name, char path[PATH_MAX])
 {
     char decoded[NAME_MAX_LEN + 1];
     decode(name, decoded);
     const char *slash = strrchr(decoded, '/');
-    return is_file(s, name, path) || is_file(s, decoded, path) || (slash != NULL && is_file(s, slash + 1, path));
+    if (is_file(s, name, path) || is_file(s, decoded, path) || (slash != NULL && is_file(s, slash + 1, path))) return 1;
+    char *other = scene_find_file((const char *const[]){s->here, s->folder}, 2, decoded);
+    const int is_found = other != NULL && is_file_in("", other, path);
+    free(other);
+    return is_found;
 }
 
 static int is_seen(struct search *s, const char *path)

@@ -42,13 +42,14 @@ static void colour_text(const struct part *p, uint32_t object, char text[CELL_LE
 {
     const struct scene *scene = p->scene;
     const struct scene_surface *first = NULL;
-    int differ = 0, textures = 0;
+    int differ = 0, textures = 0, vertices = 0;
     uint32_t left = p->objects.object[object].n_surfaces;
     for (uint32_t i = p->objects.object[object].surface; left > 0; i++) {
         const struct scene_surface *s = &scene->surface[i];
         if (p->objects.of[i] != object) continue;
         left--;
         textures |= s->texture != 0;
+        vertices |= s->vertex_colours != SCENE_COLOURS_NONE;
         if (!s->has_colour) continue;
         differ |= first != NULL && memcmp(first->colour, s->colour, sizeof s->colour) != 0;
         if (first == NULL) first = s;
@@ -58,6 +59,8 @@ static void colour_text(const struct part *p, uint32_t object, char text[CELL_LE
     if (cell == NULL) return;
     if (textures)
         fputs("texture", cell);
+    else if (vertices)
+        fputs("vertices", cell);
     else if (differ)
         fputs("several", cell);
     else if (first != NULL)

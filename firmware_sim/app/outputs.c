@@ -118,7 +118,7 @@ static int add_of_mesh(void *ctx, const char *name, const char *path)
  * only then: it takes as long as reading the files. */
 static int add_of_meshes(struct files *f)
 {
-    static const char *const endings[] = {".obj", ".gltf", ".glb", ".fbx", ".dae", ".ifc"};
+    static const char *const endings[] = {".obj", ".ply", ".gltf", ".glb", ".fbx", ".dae", ".ifc"};
     int rc = SH_OK;
     for (size_t i = 0, n = f->n; i < n && rc == SH_OK; i++) {
         for (size_t k = 0; k < sizeof endings / sizeof endings[0] && rc == SH_OK; k++) {

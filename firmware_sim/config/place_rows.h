@@ -9,10 +9,10 @@
      .help = "Rays pass where a texture's alpha or opacity map is below a half, as between leaves. Textures are then "
              "read when the scene is loaded; without such a texture it costs nothing more."},
     {"scene.import_memory_mib", IN_CONFIG(scene.import.memory_mib), CFG_COUNT, "MiB", "8192", 16, 1 << 24,
-     .help = "Memory that Assimp, or each reader of .ifc, may take for one mesh (all formats but .obj and .ply); more is an "
-             "error. They read in processes of their own, since broken files make them crash, hang or take all memory."},
+     .help = "Memory that the reader of a mesh may take, or each reader of an .ifc (all formats but .obj, .ply and .stl); more is "
+             "an error. They read in processes of their own, since broken files make them crash, hang or take all memory."},
     {"scene.import_s", IN_CONFIG(scene.import.time_s), CFG_REAL, "s", "300", 0.1, 1e6,
-     .help = "Time that Assimp, or each reader of .ifc, may take for one mesh; more is an error."},
+     .help = "Time that they may take for one mesh; more is an error."},
     {"scene.import_files", IN_CONFIG(scene.import.files), CFG_COUNT, NULL, "64", 4, 1000,
      .help = "Files that Assimp may have open at a time: a mesh and those that it names."},
     {"scene.ifc_reader", IN_CONFIG(scene.import.ifc_reader), CFG_ENUM, .def = "auto",
@@ -21,8 +21,8 @@
              "installed Assimp, which is an error where a product consists of what Assimp is known to get wrong. web-ifc, "
              "ifc-lite: that one alone, not cross-checked. assimp: Assimp, and such products are named."},
     {"scene.ifc_strict", IN_CONFIG(scene.import.ifc_strict), CFG_BOOL, .def = "off",
-     .help = "A product that the readers of .ifc make differently, or that only one of them makes, is an error. When off it "
-             "is named in a warning."},
+     .help = "A product that the readers of .ifc make differently, or that only one of them makes, is an error, and so is a file "
+             "that only one has read. When off it is a warning."},
     {"scene.meshes", .type = CFG_LIST, .min = 1, .max = CONFIG_MAX_MESHES, LIST_OF(scene.mesh, scene.n_meshes),
      .help = "Mesh files; together they are the scene."},
     {"scene.meshes[]", .type = CFG_MAP, .help = "A mesh file."},
@@ -62,13 +62,13 @@
      WORDS([ANCHOR_NONE] = "none", [ANCHOR_EXPLICIT] = "explicit", [ANCHOR_IFC] = "ifc", [ANCHOR_UTM] = "utm",
            [ANCHOR_ECEF] = "ecef"),
      .help = "none: each station has a place of its own; explicit: origin_m lies at lat_deg, lon_deg, height_m; ifc: "
-             "as the IFC mesh's IFCSITE says; utm, ecef: the meshes' coordinates are UTM (or UPS), or ECEF."},
+             "as the IFC mesh's IFCMAPCONVERSION says, or else its IFCSITE; utm, ecef: the meshes' coordinates are UTM (or UPS), or ECEF."},
     {KEY(scene.anchor.origin_m), CFG_VEC3, "m", "[0, 0, 0]", -1e9, 1e9,
      .help = "explicit: the scene's point that lies at lat_deg, lon_deg, height_m."},
     {KEY(scene.anchor.lat_deg), CFG_REAL, "deg", "", -90, 90, .example = "49.1", .help = "explicit: its latitude, WGS 84."},
     {KEY(scene.anchor.lon_deg), CFG_REAL, "deg", "", -180, 180, .example = "8.436", .help = "explicit: its longitude."},
     {KEY(scene.anchor.height_m), CFG_REAL, "m", "", -1000, 10000, .example = "110",
-     .help = "explicit: its height above the ellipsoid; ifc: the same, instead of RefElevation (above the sea)."},
+     .help = "explicit: its height above the ellipsoid; ifc: the same, instead of the file's (above the sea)."},
     {KEY(scene.anchor.north_deg), CFG_REAL, "deg", "0", -360, 360,
      .help = "explicit: where true north lies, clockwise from the scene's y axis."},
     {KEY(scene.anchor.utm_zone), CFG_COUNT, NULL, "", 0, 60, .example = "32",

@@ -72,6 +72,18 @@ static void the_swiss_grid(void **state)
     assert_true(place.accuracy_m > 0.0 && place.accuracy_m <= 5.0);
 }
 
+/* New York's grid of Long Island is in US survey feet: 980,000 200,000 ft, by NOAA's formula of that zone (a Lambert cone) in
+ * Battery Park, 40.7156 N, 74.0153 W. NAD83 and WGS 84 differ by a metre or two, 2e-5 degrees. */
+static void a_grid_in_feet(void **state)
+{
+    (void)state;
+    const double foot_m = 1200.0 / 3937.0;
+    const struct crs_place place = located("EPSG:2263", 980000.0 * foot_m, 200000.0 * foot_m);
+    assert_near(place.at.lat_deg, 40.7156, 1e-4);
+    assert_near(place.at.lon_deg, -74.0153, 1e-4);
+    assert_near(place.scale, 1.0, 1e-4);
+}
+
 static void what_is_none_is_refused(void **state)
 {
     (void)state;
@@ -84,8 +96,9 @@ static void what_is_none_is_refused(void **state)
                {"local site grid", 0, "local site grid: no such"},
                {"EPSG:4326", 10, "EPSG:4326: not a projected"},
                {"EPSG:4978", 10, "not a projected"},
-               {"EPSG:32632", 1e12, "outside of it"},
-               {"EPSG:32632", NAN, "outside of it"}};
+               {"EPSG:32632", 1e12, "outside of where it is used"},
+               {"EPSG:2056", 684500, "outside of where it is used"}, /* a digit is missing */
+               {"EPSG:32632", NAN, "outside of where it is used"}};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
         struct crs_place place;
         const int code = crs_locate(bad[i].name, bad[i].easting_m, 0.0, 0.0, &place, &err);
@@ -99,6 +112,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(utm_is_that_of_geographiclib),
         cmocka_unit_test(the_swiss_grid),
+        cmocka_unit_test(a_grid_in_feet),
         cmocka_unit_test(what_is_none_is_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

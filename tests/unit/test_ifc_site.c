@@ -162,6 +162,8 @@ static void a_map_conversion(void **state)
         assert_near(site.map.height_m, 30.0 * unit_m);
         assert_near(site.map.x_axis_rad, good[i].x_axis_rad);
     }
+    assert_loads(load_map("1.,2.,$,1.,0.,0.001", "'EPSG:2056',$,$,$,$,$,$"));
+    assert_true(isnan(site.map.height_m));
     /* It needs no site. */
     assert_loads(load_edited("(52,31,30,500000),(13,24,0),34500.,$,$);",
                              "$,$,$,$,$);\n#20= IFCMAPCONVERSION(#5,#21,1.,2.,3.,$,$,0.001);\n"
@@ -175,7 +177,7 @@ static void wrong_map_conversions_are_refused(void **state)
     static const struct {
         const char *map, *crs, *part;
     } bad[] = {{"1.,2.,3.,$,$", "'a',$,$,$,$,$,$", "IFCMAPCONVERSION #20: not the 8 attributes"},
-               {"1.,2.,$,$,$,0.001", "'a',$,$,$,$,$,$", "IFCMAPCONVERSION #20: a number is missing"},
+               {"1.,$,3.,$,$,0.001", "'a',$,$,$,$,$,$", "IFCMAPCONVERSION #20: Northings is missing"},
                {"1.,2.,3.,0.,0.,0.001", "'a',$,$,$,$,$,$", "an x axis without a direction"},
                {"1.,2.,3.,$,$,0.", "'a',$,$,$,$,$,$", "a Scale that is not above 0"},
                {"1.,2.,3.,$,$,0.5", "'a',$,$,$,$,$,$", "no unit of maps fits its Scale"},

@@ -194,6 +194,11 @@ static int read_by_two(struct reading *r)
 static int read_by_assimp(struct reading *r, const char *why)
 {
     const bool asked = r->limits.ifc_reader == IFC_READER_ASSIMP;
+    if (r->limits.ifc_strict)
+        return build_fail(r->b, SH_EINPUT, r->err,
+                          "%s, so nothing is cross-checked; allowed only with both readers "
+                          "(scene.ifc_strict)",
+                          why);
     if (!asked) sh_warn(r->b->report, "%s: %s: Assimp reads it", r->b->name, why);
     const int rc = ifc_say_assimp(r->b, &r->records, !asked, why, r->err);
     return rc == SH_OK ? import_apart(r->b, r->err) : rc;
@@ -204,7 +209,11 @@ static int read_records(struct reading *r)
     char why[160] = "";
     int rc = ifc_records_open(&r->records, r->b->spec->file, r->err);
     if (rc != SH_OK) return rc;
-    if (r->limits.ifc_reader == IFC_READER_ASSIMP) return read_by_assimp(r, why);
+    if (r->limits.ifc_reader == IFC_READER_ASSIMP) return read_by_assimp(r, "scene.ifc_reader is assimp");
+    if (r->limits.ifc_strict && r->limits.ifc_reader != IFC_READER_AUTO)
+        return build_fail(r->b, SH_EINPUT, r->err,
+                          "one reader alone is not cross-checked; allowed only with both readers "
+                          "(scene.ifc_strict)");
     if (ifc_readers_are_there(&r->limits, why, sizeof why))
         rc = read_by_two(r);
     else if (r->limits.ifc_reader == IFC_READER_AUTO)

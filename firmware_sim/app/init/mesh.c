@@ -78,16 +78,17 @@ static int is_projected(const struct scene *scene, const double middle[3])
     return up_to >= large && second >= least && up_to >= times * init_largest_m(scene);
 }
 
-static int is_survey(const struct scene *scene)
+/* Wide and flat, and lying. Walls stand, and furniture is not ten times as wide as it is high. */
+static int is_survey(const struct scene *scene, int y_up)
 {
-    double least = INFINITY;
-    for (int k = 0; k < 3; k++)
-        least = fmin(least, scene->max_m[k] - scene->min_m[k]);
-    return init_largest_m(scene) <= LARGEST_SURVEY_M && least < LEAST_HEIGHT_MM;
+    const double *low = scene->min_m, *high = scene->max_m;
+    const int up = y_up ? 1 : 2, other = y_up ? 2 : 1;
+    const double height = high[up] - low[up], width = fmin(high[0] - low[0], high[other] - low[other]);
+    return init_largest_m(scene) <= LARGEST_SURVEY_M && height < LEAST_HEIGHT_MM && width > 10.0 * height;
 }
 
 /* Metres per unit, from what there is to see, and why. */
-static double guess_unit(const struct scene *scene, char *why, size_t len)
+static double guess_unit(const struct scene *scene, int y_up, char *why, size_t len)
 {
     double middle[3];
     for (int k = 0; k < 3; k++)
@@ -99,7 +100,7 @@ static double guess_unit(const struct scene *scene, char *why, size_t len)
         return 1.0;
     }
     if (init_largest_m(scene) <= LARGEST_M) return 1.0;
-    if (!is_survey(scene)) return 0.001;
+    if (!is_survey(scene, y_up)) return 0.001;
     snprintf(why, len, "it is wide and flat as a survey, and would be a plate in millimetres");
     return 1.0;
 }
@@ -117,7 +118,7 @@ static void choose_scale(const struct init_wish *wish, const char *name, const s
         return;
     }
     char why[160];
-    as->scale = guess_unit(scene, why, sizeof why);
+    as->scale = guess_unit(scene, as->up == SCENE_UP_Y, why, sizeof why);
     snprintf(as->scale_from, sizeof as->scale_from, "assumed: %s", why[0] != '\0' ? why : "the file doesn't say");
     sh_warn(&app_report_stderr,
             "%s: its unit is not in the file: %s is assumed%s%s, which makes the mesh %.4g m large; "
