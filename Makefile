@@ -222,9 +222,9 @@ $(READERS)/installed: $(wildcard tests/readers/*) | $(if $(DEPS_ARE_THERE),,deps
 	else echo "npm could not install the readers for LAS and E57 ($(@D)/npm.log): their tests will be skipped"; fi
 # The readers of IFC bodies are npm's, in the versions of the lock file. Without npm or node Assimp reads IFC.
 ifc-readers: $(IFC_READERS)/installed $(IFC_PROGRAMS)
-$(IFC_READERS)/installed: $(addprefix core/import/ifc/,package.json package-lock.json .npmrc)
+$(IFC_READERS)/installed: $(wildcard $(addprefix core/import/ifc/,package.json package-lock.json .npmrc))
 	@mkdir -p $(@D)
-	@cp $^ $(@D)
+	@$(if $^,cp $^ $(@D),:)
 	@if [ '$(DEPS)' = no ]; then echo "DEPS=no: the readers of IFC are not installed: Assimp reads it"; \
 	elif (cd $(@D) && npm ci --ignore-scripts --no-audit --no-fund --loglevel=error --fetch-retries=1 --fetch-timeout=60000) \
 		>$(@D)/npm.log 2>&1; then touch $@; \

@@ -142,6 +142,13 @@ static void try_result(const uint8_t *bytes, size_t n)
     build_release(&b);
 }
 
+/* The middle of what a name leaves free: any of it is like the rest. */
+static int is_padding(const uint8_t *bytes, size_t at, size_t n)
+{
+    static const uint8_t none[36];
+    return at >= 16 && at + 20 <= n && memcmp(bytes + at - 16, none, sizeof none) == 0;
+}
+
 /* Every word of it with every value that means something: counts too large, indices out of range, NaN, infinite,
  * names without an end; and many lengths. */
 static void broken_result_is_refused(void **state)
@@ -152,6 +159,7 @@ static void broken_result_is_refused(void **state)
     size_t n = write_result(bytes, sizeof bytes);
     n_refused = 0;
     for (size_t at = 0; at + 4 <= n; at += 4) {
+        if (is_padding(bytes, at, n)) continue;
         for (size_t i = 0; i < sizeof values / sizeof values[0]; i++) {
             memcpy(broken, bytes, n);
             memcpy(broken + at, &values[i], 4);
@@ -160,9 +168,9 @@ static void broken_result_is_refused(void **state)
     }
     assert_true(n_refused > 100); /* of 700; most of the words are of names, which may be anything */
     n_refused = 0;
-    for (size_t len = 0; len < n; len += 5)
+    for (size_t len = 0; len < n; len += 13)
         try_result(bytes, len);
-    assert_int_equal(n_refused, (n + 4) / 5); /* too short, all of them */
+    assert_int_equal(n_refused, (n + 12) / 13); /* too short, all of them */
     memcpy(broken, bytes, n);
     n_refused = 0;
     try_result(broken, n + 4);
