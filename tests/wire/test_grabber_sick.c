@@ -105,21 +105,24 @@ static void check_log(const struct telegram *t, const struct rawlog_item *scan)
         assert_true(fabs(rawlog_range_m(scan, i) - 1e-3 * hex(t, 26 + (int)i)) < 1e-5); /* float */
 }
 
-/* Lets the client poll, and reads what it logs. Returns 0 where it took a part of a telegram for a scan: it waits 40 ms for
- * the rest, and on a busy machine that may come later. */
+/* Lets the client poll, and reads what it logs. Returns 0 where it complains, or took a part of a telegram for a scan: it
+ * waits 40 ms for the rest, and on a busy machine that may come later. */
 static int poll_scans(struct wire *wire, const char *endpoint, int number, struct rawlog *log)
 {
     static struct grabber grabber;
     char sensor[256], name[16];
     int port, listener = listen_anywhere(&port), is_whole = 1;
     pid_t relay = relay_start(wire, listener, endpoint);
+    grabber_hurry(relay); /* else the client, which polls all the time, goes before it */
     close(listener);
     snprintf(name, sizeof name, "SICK%d", number);
     snprintf(sensor, sizeof sensor, "driver = CLMS100Eth\nip_address = 127.0.0.1\nTCP_port = %d\n", port);
     grabber_start(wire, name, sensor, &grabber);
-    if (!grabber_wait(&grabber, SCANS)) fail_msg("rawlog-grabber complains:\n%s", grabber.said);
+    *log = (struct rawlog){0};
+    const int is_content = grabber_wait(&grabber, SCANS);
     grabber_end(&grabber);
     assert_int_equal(wire_wait(wire, relay), 0);
+    if (!is_content) return 0;
     rawlog_read(&grabber, log);
     assert_true(log->n_items >= SCANS);
     for (uint32_t i = 0; i < log->n_items; i++)
@@ -140,7 +143,7 @@ static void test_polled(void **state)
     grabber_hurry(head.pid);
     for (int i = 1; !poll_scans(wire, head_link(&head, 0), i, &log); i++) {
         rawlog_free(&log);
-        if (i == TRIES) fail_msg("rawlog-grabber logs parts of scans, %d times", i);
+        if (i == TRIES) fail_msg("rawlog-grabber complains, or logs parts of scans, %d times", i);
     }
     head_end(&head, SIGTERM);
     char *text = wire_read(wire_path(wire, "telegrams"), NULL), *at = text;
