@@ -44,6 +44,15 @@ void text_drop_read(struct text *t);
 int text_fail(const struct text *t, uint64_t line, int code, struct sh_err *err, const char *fmt, ...)
     __attribute__((format(printf, 5, 6)));
 
+/* 0 to 15; -1: it is no hexadecimal digit. */
+static inline int text_hex_digit(char c)
+{
+    return c >= '0' && c <= '9'   ? c - '0'
+           : c >= 'a' && c <= 'f' ? c - 'a' + 10
+           : c >= 'A' && c <= 'F' ? c - 'A' + 10
+                                  : -1;
+}
+
 /* Blanks, and line ends that a backslash hides. */
 void text_skip_blanks(struct text *t);
 

@@ -130,17 +130,8 @@ static int read_angle(struct reader *r, struct text_span span, const char *name,
 /* Metres per unit of an IFCSIUNIT of length. */
 static int read_prefix(struct reader *r, const struct step_record *unit, struct text_span prefix, double *m)
 {
-    static const struct {
-        const char *name;
-        double m;
-    } known[] = {{"$", 1.0},        {".MILLI.", 1e-3}, {".CENTI.", 1e-2}, {".DECI.", 1e-1},
-                 {".MICRO.", 1e-6}, {".KILO.", 1e3},   {".DECA.", 10.0},  {".HECTO.", 100.0}};
-    for (size_t i = 0; i < sizeof known / sizeof known[0]; i++) {
-        if (!text_is(prefix, known[i].name)) continue;
-        *m = known[i].m;
-        return SH_OK;
-    }
-    return fail(r, unit, "a length unit with an unknown prefix");
+    *m = ifc_prefix(prefix);
+    return isnan(*m) ? fail(r, unit, "a length unit with an unknown prefix") : SH_OK;
 }
 
 /* IFCCONVERSIONBASEDUNIT(dimensions, .LENGTHUNIT., name, #IFCMEASUREWITHUNIT(measure(x), #unit)), as of

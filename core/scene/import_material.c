@@ -4,11 +4,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
 #include <assimp/GltfMaterial.h>
 #include <assimp/material.h>
 #include <assimp/scene.h>
+
+#include "core/import/gltf/gltf_read.h"
 
 float import_to_srgb(double linear)
 {
@@ -22,12 +23,6 @@ static bool is_made_up(const char *material)
            strcmp(material, "<IFCDefault>") == 0;
 }
 
-static bool is_gltf(const struct scene_build *b)
-{
-    const char *dot = strrchr(b->spec->file, '.');
-    return dot != NULL && (strcasecmp(dot, ".gltf") == 0 || strcasecmp(dot, ".glb") == 0);
-}
-
 /* The first colour that comes with a material's name stays. glTF has linear colours. */
 static void keep_colour(const struct scene_build *b, const struct aiMaterial *material, struct scene_surface *surface)
 {
@@ -37,7 +32,7 @@ static void keep_colour(const struct scene_build *b, const struct aiMaterial *ma
     const float rgb[3] = {c.r, c.g, c.b};
     for (int i = 0; i < 3; i++) {
         if (!(rgb[i] >= 0.0f && rgb[i] <= 1.0f)) return; /* no colour of a surface */
-        surface->colour[i] = is_gltf(b) ? import_to_srgb((double)rgb[i]) : rgb[i];
+        surface->colour[i] = gltf_is_name(b->spec->file) ? import_to_srgb((double)rgb[i]) : rgb[i];
     }
     surface->has_colour = 1;
 }
@@ -47,7 +42,7 @@ void import_rgb(const struct scene_build *b, const struct aiColor4D *colour, uin
     const float in[3] = {colour->r, colour->g, colour->b};
     for (int k = 0; k < 3; k++) {
         const float c = fminf(1.0f, fmaxf(0.0f, in[k])); /* NaN: 0 */
-        rgb[k] = (uint8_t)lrintf(255.0f * (is_gltf(b) ? import_to_srgb((double)c) : c));
+        rgb[k] = (uint8_t)lrintf(255.0f * (gltf_is_name(b->spec->file) ? import_to_srgb((double)c) : c));
     }
     rgb[3] = 255;
 }
@@ -148,7 +143,8 @@ static float solid_from(const struct scene_build *b, const struct aiMaterial *ma
     struct aiString mode;
     ai_real cutoff = 0.5f;
     if ((flags & aiTextureFlags_IgnoreAlpha) != 0) return 0.0f;
-    if (!is_gltf(b) || aiGetMaterialString(material, AI_MATKEY_GLTF_ALPHAMODE, &mode) != AI_SUCCESS) return 0.5f;
+    if (!gltf_is_name(b->spec->file) || aiGetMaterialString(material, AI_MATKEY_GLTF_ALPHAMODE, &mode) != AI_SUCCESS)
+        return 0.5f;
     if (strcmp(mode.data, "OPAQUE") == 0) return 0.0f;
     if (strcmp(mode.data, "MASK") != 0) return 0.5f;
     aiGetMaterialFloatArray(material, AI_MATKEY_GLTF_ALPHACUTOFF, &cutoff, NULL);

@@ -205,7 +205,7 @@ static void add_part(const struct scene_copied *copied, uint32_t label, const st
         add(&o->object[o->of[copied->copy[i].label0 + label]], part, copied->copy[i].scale);
 }
 
-/* Those of the part that was measured last. */
+/* Hands out the open edges of the part that was measured last. */
 static int hand_out(const struct work *w, const struct scene_copied *copied)
 {
     int rc = SH_OK;

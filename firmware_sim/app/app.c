@@ -226,19 +226,26 @@ void app_warn_empty(uint64_t pulses, uint64_t with_echo, uint64_t faint)
             (unsigned long long)faint);
 }
 
+int app_open_new(const char *path, FILE **out, struct sh_err *err)
+{
+    const int to_stdout = strcmp(path, "-") == 0;
+    int fd = -1, rc = to_stdout ? SH_OK : newfile_open(path, &fd, err);
+    if (rc != SH_OK) return rc;
+    *out = to_stdout ? stdout : fdopen(fd, "w");
+    if (*out != NULL) return SH_OK;
+    rc = sh_fail(err, SH_EIO, "%s: %s", path, strerror(errno));
+    close(fd);
+    return rc;
+}
+
 int app_write_json(const char *path, void (*put)(struct json *json, const void *ctx), const void *ctx,
                    struct sh_err *err)
 {
     const int to_stdout = strcmp(path, "-") == 0;
     struct sh_err why = {0};
-    int fd = -1, rc = to_stdout ? SH_OK : newfile_open(path, &fd, err);
+    FILE *out;
+    int rc = app_open_new(path, &out, err);
     if (rc != SH_OK) return rc;
-    FILE *out = to_stdout ? stdout : fdopen(fd, "w");
-    if (out == NULL) {
-        rc = sh_fail(err, SH_EIO, "%s: %s", path, strerror(errno));
-        close(fd);
-        return rc;
-    }
     struct json json;
     json_begin(&json, out);
     put(&json, ctx);

@@ -71,6 +71,9 @@ int app_is_recording(const char *path);
 /* Prints a warning where fewer than one pulse in twenty has an echo. */
 void app_warn_empty(uint64_t pulses, uint64_t with_echo, uint64_t faint);
 
+/* The file that a user names for output, new; "-": standard output, which is not to be closed. */
+int app_open_new(const char *path, FILE **out, struct sh_err *err);
+
 /* One JSON value, written by `put`, to a file; path "-" is standard output. */
 int app_write_json(const char *path, void (*put)(struct json *json, const void *ctx), const void *ctx,
                    struct sh_err *err);

@@ -11,6 +11,7 @@
 
 #include "core/infile.h"
 #include "core/scene.h"
+#include "core/text.h"
 #include "firmware_sim/app/app.h"
 
 enum { NAME_MAX_LEN = 255, DEEPEST = 1 }; /* a mesh names a .mtl, which names images */
@@ -37,19 +38,13 @@ static size_t ending_at(const char *p, const char *end)
     return 0;
 }
 
-static int hex_value(char c)
-{
-    const char *digits = "0123456789abcdef", *at = c != '\0' ? strchr(digits, c | 0x20) : NULL;
-    return at != NULL ? (int)(at - digits) : -1;
-}
-
 /* Backslashes become slashes, %20 a blank. */
 static void decode(const char *name, char *out)
 {
     for (; *name != '\0'; name++, out++) {
         *out = *name == '\\' ? '/' : *name;
-        if (*name != '%' || hex_value(name[1]) < 0 || hex_value(name[2]) < 0) continue;
-        *out = (char)(16 * hex_value(name[1]) + hex_value(name[2]));
+        if (*name != '%' || text_hex_digit(name[1]) < 0 || text_hex_digit(name[2]) < 0) continue;
+        *out = (char)(16 * text_hex_digit(name[1]) + text_hex_digit(name[2]));
         name += 2;
     }
     *out = '\0';

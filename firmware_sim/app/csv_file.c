@@ -3,21 +3,15 @@
 #include <errno.h>
 #include <math.h>
 #include <string.h>
-#include <unistd.h>
 
-#include "core/newfile.h"
+#include "firmware_sim/app/app.h"
 
 int csv_file_write(const char *path, void (*put)(FILE *out, const void *ctx), const void *ctx, struct sh_err *err)
 {
     const int to_stdout = strcmp(path, "-") == 0;
-    int fd = -1, rc = to_stdout ? SH_OK : newfile_open(path, &fd, err);
+    FILE *out;
+    const int rc = app_open_new(path, &out, err);
     if (rc != SH_OK) return rc;
-    FILE *out = to_stdout ? stdout : fdopen(fd, "w");
-    if (out == NULL) {
-        rc = sh_fail(err, SH_EIO, "%s: %s", path, strerror(errno));
-        close(fd);
-        return rc;
-    }
     put(out, ctx);
     int failed = fflush(out) != 0 || ferror(out);
     const int why = errno;

@@ -10,20 +10,12 @@ bool gltf_uri_is_data(const char *uri)
     return strncasecmp(uri, "data:", 5) == 0;
 }
 
-static int digit_of(char c)
-{
-    return c >= '0' && c <= '9'   ? c - '0'
-           : c >= 'a' && c <= 'f' ? c - 'a' + 10
-           : c >= 'A' && c <= 'F' ? c - 'A' + 10
-                                  : -1;
-}
-
 /* %XX is one byte; what else follows a % is as it stands. A NUL would end the name: it stays as it is written. */
 static size_t unescape(const char *in, char *out)
 {
     char *to = out;
     for (; *in != '\0'; in++) {
-        const int high = *in == '%' ? digit_of(in[1]) : -1, low = high >= 0 ? digit_of(in[2]) : -1;
+        const int high = *in == '%' ? text_hex_digit(in[1]) : -1, low = high >= 0 ? text_hex_digit(in[2]) : -1;
         if (low >= 0 && high + low > 0) {
             *to++ = (char)(16 * high + low);
             in += 2;

@@ -63,7 +63,7 @@ int ifc_walk(struct ifc_records *r, struct sh_err *err);
 
 /* ---- ifc_styles.c */
 int ifc_styles_collect(struct ifc_records *r, struct sh_err *err);
-/* Those of an item, from *first on. */
+/* Returns how many styles an item has; they stand from *first on. */
 size_t ifc_styles_of(const struct ifc_records *r, uint64_t item, size_t *first);
 /* The style that a reader means by a colour of a product's part; NULL: the colour is the reader's own. */
 const struct ifc_style *ifc_style_by_colour(const struct ifc_records *r, const struct ifc_product *p,
@@ -77,5 +77,7 @@ char *ifc_text(struct text_span quoted);
 
 /* ---- ifc_unit.c: metres per unit of length. 1 where the file doesn't say. */
 double ifc_unit_m(const struct ifc_records *r);
+/* Metres per unit of an IfcSIUnit of length with this prefix, "$" for none; NaN: it is not known. */
+double ifc_prefix(struct text_span prefix);
 
 #endif

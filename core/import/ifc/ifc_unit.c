@@ -1,4 +1,5 @@
 /* The unit of length of an IFC file's project. Readers of bodies apply it themselves; here it scales what the records say. */
+#include <math.h>
 #include <string.h>
 
 #include "core/import/ifc/ifc_records.h"
@@ -12,16 +13,23 @@ static const struct step_record *follow(const struct ifc_records *r, struct text
     return to != NULL && (type == NULL || text_is(to->type, type)) ? to : NULL;
 }
 
-static double prefix(struct text_span name)
+double ifc_prefix(struct text_span prefix)
 {
     static const struct {
         const char *name;
         double m;
-    } known[] = {{".MILLI.", 1e-3}, {".CENTI.", 1e-2}, {".DECI.", 1e-1},  {".MICRO.", 1e-6},
-                 {".KILO.", 1e3},   {".DECA.", 10.0},  {".HECTO.", 100.0}};
+    } known[] = {{"$", 1.0},        {".MILLI.", 1e-3}, {".CENTI.", 1e-2}, {".DECI.", 1e-1},
+                 {".MICRO.", 1e-6}, {".KILO.", 1e3},   {".DECA.", 10.0},  {".HECTO.", 100.0}};
     for (size_t i = 0; i < sizeof known / sizeof known[0]; i++)
-        if (text_is(name, known[i].name)) return known[i].m;
-    return 1.0;
+        if (text_is(prefix, known[i].name)) return known[i].m;
+    return NAN;
+}
+
+/* One that is not known counts as none. */
+static double prefix_or_none(struct text_span prefix)
+{
+    const double m = ifc_prefix(prefix);
+    return isnan(m) ? 1.0 : m;
 }
 
 /* IfcMeasureWithUnit(measure(x), unit). */
@@ -34,7 +42,7 @@ static double converted(const struct ifc_records *r, const struct step_record *m
     double factor;
     if (open == NULL || close == NULL || si == NULL || step_split(si->args, of, 4) != 4) return 1.0;
     if (!step_real(&r->text, (struct text_span){open + 1, (size_t)(close - open - 1)}, &factor)) return 1.0;
-    return factor > 0.0 ? factor * prefix(of[2]) : 1.0;
+    return factor > 0.0 ? factor * prefix_or_none(of[2]) : 1.0;
 }
 
 static const struct step_record *units_of_project(const struct ifc_records *r)
@@ -55,7 +63,7 @@ double ifc_unit_m(const struct ifc_records *r)
         const struct step_record *unit = ifc_records_find(r, id);
         struct text_span of[4];
         if (unit == NULL || step_split(unit->args, of, 4) != 4 || !text_is(of[1], ".LENGTHUNIT.")) continue;
-        if (text_is(unit->type, "IFCSIUNIT")) return prefix(of[2]);
+        if (text_is(unit->type, "IFCSIUNIT")) return prefix_or_none(of[2]);
         if (text_is(unit->type, "IFCCONVERSIONBASEDUNIT")) return converted(r, follow(r, of[3], "IFCMEASUREWITHUNIT"));
     }
     return 1.0;

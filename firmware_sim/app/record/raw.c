@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/text.h"
+
 int raw_is_wanted(int argc, char **argv)
 {
     for (int i = 1; i < argc && strcmp(argv[i], "--") != 0; i++)
@@ -13,21 +15,13 @@ int raw_is_wanted(int argc, char **argv)
 
 /* ---- escapes */
 
-static int hex_of(char c)
-{
-    return c >= '0' && c <= '9'   ? c - '0'
-           : c >= 'a' && c <= 'f' ? c - 'a' + 10
-           : c >= 'A' && c <= 'F' ? c - 'A' + 10
-                                  : -1;
-}
-
 /* After the backslash: how many characters it takes; 0: it is none. */
 static size_t read_escape(const char *at, uint8_t *byte)
 {
     static const char names[] = "nrt\\\"'0", bytes[] = "\n\r\t\\\"'";
     const char *name = *at != '\0' ? strchr(names, *at) : NULL;
     if (*at == 'x') {
-        const int high = hex_of(at[1]), low = high >= 0 ? hex_of(at[2]) : -1;
+        const int high = text_hex_digit(at[1]), low = high >= 0 ? text_hex_digit(at[2]) : -1;
         *byte = (uint8_t)(16 * high + low);
         return low >= 0 ? 3 : 0;
     }
