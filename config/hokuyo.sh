@@ -1,17 +1,20 @@
 #!/bin/sh
 # Records scans of the head of hokuyo.yaml with rawlog-grabber, which runs until it has saved some.
 #   sh config/hokuyo.sh INI PREFIX        PREFIX: the rawlog_prefix that INI names
-# It gives up where an answer takes more than 0.1 s (TCP) or 0.2 s (serial), as on a busy machine. Then it is started
-# again, up to three times, as also where it has saved nothing in 40 s.
+# It gives up where an answer takes more than 0.1 s (TCP) or 0.2 s (serial), as on a busy machine, and asks no more where
+# the head was still booting. It is started again when it has saved nothing in 10 s; after two minutes no more.
 set -eu
 ini=$1
 prefix=$2
-for try in 1 2 3; do
+end_s=$(($(date +%s) + 120))
+while [ "$(date +%s)" -lt $end_s ]; do
     rm -f "$prefix"_*.rawlog "$prefix.said"
     # What it reads is a key that ends it, and comes once it has said how it goes.
-    until grep -qs 'Saved\|Error in response' "$prefix.said"; do sleep 2; done |
-        timeout 40 stdbuf -oL rawlog-grabber "$ini" | tee "$prefix.said"
+    for _ in 1 2 3 4 5 6 7 8 9 10; do
+        sleep 1
+        ! grep -qs 'Saved\|Error in response' "$prefix.said" || break
+    done | timeout 40 stdbuf -oL rawlog-grabber "$ini" | tee "$prefix.said"
     ! grep -q Saved "$prefix.said" || exit 0
-    echo "try $try: no scans" >&2
+    echo "no scans were saved; rawlog-grabber is started again" >&2
 done
 exit 1

@@ -193,7 +193,7 @@ expect 0 'a program that is not there' '```sh run with no-such-program' 'false' 
 interrupted="trap 'exit 0' INT; echo here; while :; do sleep 0.1; done"
 expect 0 'a command that Ctrl-C ends' '```sh run until Ctrl-C' "$interrupted" '```'
 expect 1 'a command that Ctrl-C breaks' '```sh run until Ctrl-C' 'echo here; sleep 60' '```'
-expect 1 'a command that says nothing until Ctrl-C' '```sh run until Ctrl-C' 'sleep 60' '```'
+limit_s=2 expect 1 'a command that says nothing until Ctrl-C' '```sh run until Ctrl-C' 'sleep 60' '```'
 expect 1 'a program that is there, and a command that fails' '```sh run with true' 'false' '```'
 expect 1 'a command that fails' '```sh run' 'false' 'true' '```'
 limit_s=2 expect 1 'a command that does not end' '```sh run' 'sleep 60' '```'

@@ -64,18 +64,6 @@ static int64_t device_ns(const struct head *head)
     return t_ns;
 }
 
-/* While power is off nobody listens, or the connection ends with it. Then another one is made. */
-static void connect_again(struct client *c, const struct head *head)
-{
-    for (int n = 0; n < DEADLINE_MS; n++) {
-        *c = (struct client){.fd = raw_try_connect(head_endpoint(head, "tcp"))};
-        if (c->fd >= 0 && ask(c, "sRN ODpwrc") != NULL) return;
-        if (c->fd >= 0) close(c->fd);
-        poll(NULL, 0, 1);
-    }
-    fail_msg("%s", "no session after the reboot");
-}
-
 static void reboots(void **state)
 {
     struct wire *wire = *state;
@@ -101,7 +89,8 @@ static void reboots(void **state)
     assert_null(next(&other)); /* all clients share the device */
     close(c.fd);
     close(other.fd);
-    connect_again(&c, &head);
+    c = (struct client){.fd = raw_connect_again(head_endpoint(&head, "tcp"), "\2sRN ODpwrc\3")};
+    assert_non_null(next(&c));
     expect(&c, "sRN ODpwrc", "sRA ODpwrc 2");
     expect(&c, "sMN GetAccessMode", "sAN GetAccessMode 1");
     read_scan(&c, &telegrams, &scans, &start_us);

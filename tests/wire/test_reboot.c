@@ -30,11 +30,10 @@ static int is_over(int fd, int within_ms)
     return 0;
 }
 
-/* The answer up to its empty line, good until the next call. */
-static const char *ask(struct client *c, const char *line)
+/* The next answer up to its empty line, good until the next call. */
+static const char *answer(struct client *c)
 {
     static char text[sizeof c->bytes + 1];
-    raw_write(c->fd, line, strlen(line));
     for (;;) {
         const char *end = memmem(c->bytes, c->len, "\n\n", 2);
         if (end != NULL) {
@@ -50,6 +49,12 @@ static const char *ask(struct client *c, const char *line)
         assert_true(got > 0);
         c->len += (size_t)got;
     }
+}
+
+static const char *ask(struct client *c, const char *line)
+{
+    raw_write(c->fd, line, strlen(line));
+    return answer(c);
 }
 
 static void expect_in(struct client *c, const char *line, const char *piece)
@@ -106,7 +111,8 @@ static void reboot(struct scanhead *sh, struct client *c, const struct head *hea
         over = is_over(c->fd, 100);
     }
     close(c->fd);
-    connect_to(c, head);
+    *c = (struct client){.fd = raw_connect_again(head_endpoint(head, "tcp"), "QT\n")};
+    assert_string_equal(answer(c), "QT\n00P\n\n");
 }
 
 static const char LINKS[] = "links: [{type: tcp, port: 0, protocol: scip}, {type: pty, path: native}]\n";

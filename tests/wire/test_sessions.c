@@ -319,21 +319,6 @@ static void garbage_and_sudden_ends(void **state)
 /* ---- the session's end from the head's side */
 
 /* RB twice within a second: the sensor starts anew, and its connection is over; the port stays. */
-/* While power is off nobody listens, or the connection ends with it: then another one is made. */
-static const char *ask_again(struct client *c, const char *endpoint, const char *text)
-{
-    const ssize_t len = (ssize_t)strlen(text);
-    const char *got;
-    for (int n = 0; n < DEADLINE_MS; n++) {
-        *c = (struct client){.fd = raw_try_connect(endpoint)};
-        if (c->fd >= 0 && send(c->fd, text, (size_t)len, MSG_NOSIGNAL) == len && (got = answer(c)) != NULL) return got;
-        if (c->fd >= 0) close(c->fd);
-        poll(NULL, 0, 1);
-    }
-    fail_msg("%s", "no session after the reboot");
-    return NULL;
-}
-
 static void a_session_that_the_head_ends(void **state)
 {
     struct wire *wire = *state;
@@ -347,7 +332,8 @@ static void a_session_that_the_head_ends(void **state)
     expect(&c, "RB\n", "RB\n00P");
     assert_null(answer(&c));
     close(c.fd);
-    assert_memory_equal(ask_again(&c, at, "VV\n"), "VV\n00P", 6);
+    c = (struct client){.fd = raw_connect_again(at, "VV\n")};
+    assert_memory_equal(answer(&c), "VV\n00P", 6);
     close(c.fd);
     head_end(&head, SIGTERM);
 }

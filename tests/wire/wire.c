@@ -371,6 +371,23 @@ int raw_connect(const char *endpoint)
     return fd;
 }
 
+int raw_connect_again(const char *endpoint, const char *question)
+{
+    const ssize_t len = (ssize_t)strlen(question);
+    char byte;
+    for (const int64_t end_ms = wire_now_ms() + DEADLINE_MS; wire_now_ms() < end_ms; poll(NULL, 0, 1)) {
+        const int fd = raw_try_connect(endpoint);
+        struct pollfd slot = {.fd = fd, .events = POLLIN};
+        if (fd < 0) continue;
+        if (send(fd, question, (size_t)len, MSG_NOSIGNAL) == len && poll(&slot, 1, DEADLINE_MS) == 1 &&
+            recv(fd, &byte, 1, MSG_PEEK) == 1)
+            return fd;
+        close(fd);
+    }
+    fail_msg("connect %s: no answer after the reboot", endpoint);
+    return -1;
+}
+
 void raw_write(int fd, const void *data, size_t len)
 {
     for (size_t done = 0; done < len;) {

@@ -149,6 +149,9 @@ void client_wait_state(struct scanhead *sh, const char *state);
 int raw_connect(const char *endpoint);
 /* The same; -1: nobody listens there now. */
 int raw_try_connect(const char *endpoint);
+/* The same when the head has rebooted: until the question is answered, which is left to be read. While power is off nobody
+ * listens, or the connection ends with it. */
+int raw_connect_again(const char *endpoint, const char *question);
 
 void raw_write(int fd, const void *data, size_t len);
 
