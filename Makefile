@@ -188,13 +188,14 @@ $(BUILD)/tests/%.o: private override CWARN += $(TEST_WARN)
 $(BUILD)/tests/unit/% $(BUILD)/tests/wire/% $(BUILD)/tests/guest/%: private OPT += -O1
 # Some 500 programs are linked; gold takes two thirds of the time.
 # clang's sanitizers need its own: gold has doubts about their symbols.
+# A program loads the libraries that it needs and no others: those of Embree and Assimp take longer than many a test.
 FAST_LD = $(if $(CROSS_COMPILE),,$(if $(findstring clang,$(CC)),$(LLD),$(GOLD)))
 GOLD := $(if $(shell command -v ld.gold),-fuse-ld=gold)
 LLD := $(if $(shell command -v ld.lld),-fuse-ld=lld)
 .SECONDEXPANSION:
 $(BUILD)/tests/%: $(BUILD)/tests/%.c.o $$(call RIGS,tests/$$*) $(BUILD)/$(LIMIT).o $(BUILD)/common.a $(BUILD)/modules.a
 	@echo "  TEST  $@"
-	$(Q)$(CC) $(SAN) $(FAST_LD) $(LINK_LIMIT) -o $@ $^ -lcmocka $(LDLIBS)
+	$(Q)$(CC) $(SAN) $(FAST_LD) $(LINK_LIMIT) -o $@ $^ -Wl,--as-needed -lcmocka $(LDLIBS)
 # What runs in the guest has the client library alone, with its inside: it starts faster there.
 $(BUILD)/tests/guest/%: $(BUILD)/tests/guest/%.c.o $$(call RIGS,tests/guest/$$*) $(BUILD)/$(LIMIT).o $(BUILD)/client.a
 	@echo "  TEST  $@"
