@@ -5,6 +5,20 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Sanitizers are for the code, not for the count: each turn takes up to ten times as long with them. What depends on these
+ * runs as shipped, too (tests/shipped.sh). */
+#ifdef SH_SANITIZE
+enum { SANITIZED = 1 };
+#else
+enum { SANITIZED = 0 };
+#endif
+
+/* A share of n turns where sanitizers are in, one at least; else n. */
+static inline int fewer(int n)
+{
+    return SANITIZED ? (n + 9) / 10 : n;
+}
+
 /* full where THOROUGH=1 is in the environment, else quick: counts of cases, rays, seconds. Bounds that depend on the
  * count have to be computed from what this returned. Beside other threads only while none of them changes the
  * environment. */

@@ -34,7 +34,7 @@ static void ranges_in_a_room_are_exact_to_the_planes_tilt(void **state)
     static uint32_t triangle[RAYS];
     uint64_t seed = 1;
     long double worst = 0.0L;
-    for (int r = 0; r < 60; r++) {
+    for (int r = 0; r < fewer(60); r++) {
         double lo[3], hi[3], station[3];
         for (int i = 0; i < 3; i++) {
             lo[i] = -100.0 * case_unit(&seed) - 1.0;
@@ -74,7 +74,7 @@ static void ranges_to_a_tilted_plane_are_exact_to_the_planes_tilt(void **state)
     static const uint32_t triangle[2][3] = {{0, 1, 2}, {0, 2, 3}};
     uint64_t seed = 2;
     long double worst = 0.0L;
-    for (int p = 0; p < thorough(300, 60); p++) {
+    for (int p = 0; p < fewer(thorough(300, 60)); p++) {
         double axis[3], across[3], u[3], v[3], vertex[4][3];
         any_direction(&seed, axis);
         any_direction(&seed, across);
@@ -384,7 +384,7 @@ static void what_a_ray_begins_on_is_no_hit(void **state)
     static double dx[RAYS], dy[RAYS], dz[RAYS], range[RAYS];
     static uint32_t triangle[RAYS];
     uint64_t seed = 7;
-    for (int t = 0; t < 100; t++) {
+    for (int t = 0; t < fewer(100); t++) {
         double v[4][3], origin[3];
         for (int k = 0; k < 4; k++)
             for (int a = 0; a < 3; a++)

@@ -9,13 +9,10 @@
 
 #include <cmocka.h>
 
+#include "tests/common/thorough.h"
 #include "tests/unit/command_device.h"
 
-#ifdef SH_SANITIZE /* sanitizers are for the code, not for the count: the first tenth of the same lines */
-enum { SHARE = 10 };
-#else
-enum { SHARE = 1 };
-#endif
+enum { SHARE = SANITIZED ? 10 : 1 };
 enum { N_RANDOM = 200000 / SHARE, N_MUTATED = 300000 / SHARE, N_BYTES = 2000000 / SHARE };
 
 static uint64_t rng;

@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include "core/distance.h"
+#include "tests/common/thorough.h"
 
 #ifdef __SIZEOF_FLOAT128__
 typedef __float128 quad;
@@ -222,7 +223,7 @@ static void points_on_the_surface(void **state)
 {
     (void)state;
     srand(23);
-    for (int turn = 0; turn < 200; turn++) {
+    for (int turn = 0; turn < fewer(200); turn++) {
         double origin[3] = {turn % 2 ? 500000 : 0, turn % 2 ? 5800000 : 0, 0}, v[3][3];
         for (int c = 0; c < 3; c++)
             for (int k = 0; k < 3; k++)
@@ -259,7 +260,7 @@ static void needles(void **state)
 {
     (void)state;
     srand(31);
-    for (int turn = 0; turn < 400; turn++) {
+    for (int turn = 0; turn < fewer(400); turn++) {
         double length = pow(10, uniform(-1, 2)), ratio = pow(10, uniform(-11, -2)), d[3], e[3], v[3][3];
         double azimuth = uniform(0, 7), dip = uniform(-1.5, 1.5);
         d[0] = cos(azimuth) * cos(dip); /* along */

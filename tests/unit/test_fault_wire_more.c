@@ -201,9 +201,9 @@ static uint32_t below(uint32_t n)
 
 static struct fault any_fault(int native)
 {
-    static const enum fault_kind kinds[] = {FAULT_DROP, FAULT_DUPLICATE, FAULT_REORDER, FAULT_DELAY, FAULT_JITTER,
-                                            FAULT_TRUNCATE, FAULT_FLIP, FAULT_FLIP, FAULT_STALL, FAULT_SPLIT,
-                                            FAULT_MERGE, FAULT_GARBAGE};
+    static const enum fault_kind kinds[] = {FAULT_DROP,   FAULT_DUPLICATE, FAULT_REORDER, FAULT_DELAY,
+                                            FAULT_JITTER, FAULT_TRUNCATE,  FAULT_FLIP,    FAULT_FLIP,
+                                            FAULT_STALL,  FAULT_SPLIT,     FAULT_MERGE,   FAULT_GARBAGE};
     struct fault any = fault_of_kind(kinds[below(sizeof kinds / sizeof kinds[0])]);
     any.seed = below(1000);
     any.of = native && below(4) == 0 ? FAULT_OF_NOTICES : FAULT_OF_STREAM;
@@ -256,7 +256,7 @@ static void mixtures_are_what_their_notes_say(void **state)
     static uint8_t out[RIG_OUT];
     static struct fault_note note[RIG_NOTES];
     uint32_t kinds[FAULT_N_KINDS] = {0}, whole = 0, in = 0;
-    const uint32_t seeds = (uint32_t)thorough(600, 120);
+    const uint32_t seeds = (uint32_t)thorough(600, SANITIZED ? 40 : 120);
     for (uint64_t seed = 0; seed < seeds; seed++) {
         size_t n_out = 0;
         uint32_t n_notes = 0;

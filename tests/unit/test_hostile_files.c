@@ -20,15 +20,12 @@
 
 #include "core/rng.h"
 #include "core/scene.h"
+#include "tests/common/thorough.h"
 #include "tests/unit/hostile_models.h"
 
 enum { N_FILES = 600, PROCESSES = 2, ROOM = 1 << 18 };
 
-#ifdef SH_SANITIZE
-enum { USUAL_EVERY = 10 };
-#else
-enum { USUAL_EVERY = 1 };
-#endif
+enum { USUAL_EVERY = SANITIZED ? 30 : 1 };
 
 /* Figures of a broken model are small; what is honest needs a tenth of that. */
 /* IFC by Assimp: its other readers, which take a second each, have test_ifc_broken. */

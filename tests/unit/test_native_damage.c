@@ -2,12 +2,7 @@
 #include "tests/common/thorough.h"
 #include "tests/unit/native_stream.h"
 
-/* SH_SANITIZE: sanitizers are for the code, not for the count. Each damage is fed in pieces of one size there. */
-#ifdef SH_SANITIZE
-enum { SIZES_EACH = 1 };
-#else
-enum { SIZES_EACH = 4 };
-#endif
+enum { SIZES_EACH = SANITIZED ? 1 : 4 }; /* of the pieces in which each damage is fed */
 
 /* How many counted frames a hurt range costs, from the layout of the stream: a jump is only seen between good
  * ones. */

@@ -297,7 +297,7 @@ static void the_house_has_its_site(void **state)
     }
     static const char text[] =
         "head: {profile: riegl-vz400i}\n"
-        "scene:\n  meshes: [{file: /usr/share/assimp/models/IFC/AC14-FZK-Haus.ifc, up: %s, scale: %g, "
+        "scene:\n  ifc_reader: assimp\n  meshes: [{file: /usr/share/assimp/models/IFC/AC14-FZK-Haus.ifc, up: %s, scale: %g, "
         "offset_m: [100, 0, 0]}]\n  anchor: {source: ifc%s}\n"
         "stations:\n  - {position_m: [100, 0, 0]}\n  - {position_m: [105.5, 2.2, 1], instrument_height_m: 1.6}\n"
         "output: {crs: utm, layout: geo}\n";

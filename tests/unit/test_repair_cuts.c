@@ -1,12 +1,9 @@
 /* Repair, in process: a small file of each format cut at every byte, damaged at every third, of another format, and with
  * numbers beyond all reason. What comes out holds the whole units and is whole, or it is as it was. */
+#include "tests/common/thorough.h"
 #include "tests/unit/repair_rig.h"
 
-#ifdef SH_SANITIZE /* sanitizers are for the code, not for the count: each 23rd byte there */
-enum { EACH = 23 };
-#else
-enum { EACH = 1 };
-#endif
+enum { EACH = SANITIZED ? 101 : 1 }; /* of the bytes */
 
 /* Repairs what is in repair_part; 1: it is whole now, as *file says, and the bytes are in *got. 0: it was refused, and stays. */
 static int repair(const void *data, size_t len, struct repaired *file, struct bytes *got)

@@ -1,5 +1,6 @@
 /* The ring of slots, with all its threads at once. */
 #include "tests/common/cases.h"
+#include "tests/common/thorough.h"
 
 #include <pthread.h>
 #include <sched.h>
@@ -13,11 +14,7 @@
  * two of the readers, as in the pace `fast`, and not for the slow ones; one of these looks at slots where they lie.
  * Slots grow all the while. For one tick in seven caster and pacing thread race: 8,600 times, so that what goes wrong
  * once in 2,900 races is seen in 95 of 100 runs. */
-#ifdef SH_SANITIZE /* sanitizers are for the code, not for the count */
-enum { TICKS = 20000 };
-#else
-enum { TICKS = 40000 };
-#endif
+enum { TICKS = SANITIZED ? 20000 : 40000 };
 enum { CASTERS = 2, READERS = 4, SLOW = 2, LOOKING = 3, MAX_BYTES = 3 * SLOT_BYTES };
 
 static struct {

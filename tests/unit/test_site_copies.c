@@ -6,6 +6,7 @@
 
 #include "core/cast.h"
 #include "firmware_sim/site/site.h"
+#include "tests/common/thorough.h"
 #include "tests/unit/config_rig.h"
 
 enum { CAST_LINES = 40, LINE_ROOM = 8192 };
@@ -153,7 +154,7 @@ static void points_are_those_of_triangles(void **state)
         "", "beam: {mode: rings, rings: 2}\n", "signal: {model: on}\nnoise: {range: signal}\n",
         "signal: {model: on}\nbeam: {mode: rings, rings: 2}\noutput: {attributes: on}\n",
         "signal: {model: on}\nsurfaces: [{object: crown*, mirror: 0.6, reflectance: 0.1}]\noptics: {depth: 2}\n"};
-    for (size_t i = 0; i < sizeof more / sizeof *more; i++) {
+    for (size_t i = SANITIZED ? 3 : 0; i < sizeof more / sizeof *more; i++) {
         compare_sites(text_of("", "copies: trees.csv", more[i]), 0.0);
         compare_sites(text_of("", "copies: trees.csv, copy_labels: on", more[i]), 0.0);
     }

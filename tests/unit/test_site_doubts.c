@@ -16,13 +16,13 @@ static void write_box(double z0, double z1)
     write_in("mesh.obj", text);
 }
 
-/* Without the search for a beam, which takes long and has nothing to do with this. */
+/* Without what takes long and has nothing to do with this: the search for a beam, and IFC's other readers. */
 static void load_file(const char *path)
 {
-    static const char *const sets[] = {"beam.mode=single"};
+    static const char *const sets[] = {"beam.mode=single", "scene.ifc_reader=assimp"};
     struct site *site = NULL;
     clear_warned();
-    int rc = config_load(path, sets, 1, cfg, &err);
+    int rc = config_load(path, sets, 2, cfg, &err);
     if (rc == SH_OK) rc = site_load(cfg, &report, &site, &err);
     if (rc != SH_OK) fail_msg("%s", err.text);
     site_free(site);

@@ -3,13 +3,9 @@
 #include "tests/unit/usb_models.h"
 
 #include "drivers/usb/head_device.h"
+#include "tests/common/thorough.h"
 
-/* SH_SANITIZE: sanitizers are for the code, not for the count. */
-#ifdef SH_SANITIZE
-enum { EVERY = 7 };
-#else
-enum { EVERY = 1 };
-#endif
+enum { EVERY = SANITIZED ? 7 : 1 };
 
 enum { DEF = 1, ADR = 2, CFG = 4, ALL = 7 };      /* states in which a case succeeds */
 enum { FS = 1, HS = 2, SS = 4, ANY = 7, NO = 0 }; /* and rates */

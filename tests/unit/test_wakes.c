@@ -12,6 +12,7 @@
 #include "firmware_sim/loop/bell.h"
 #include "firmware_sim/loop/loop.h"
 #include "tests/common/cases.h"
+#include "tests/common/thorough.h"
 
 static const int64_t DEADLINE_NS = 240000000000;
 
@@ -165,11 +166,7 @@ static void run_case(const struct loop_case *c, uint64_t seed, char sha256[65])
     memcpy(sha256, stats.sha256, sizeof stats.sha256);
 }
 
-#ifdef SH_SANITIZE /* sanitizers are for the code, not for the count */
-enum { EVERY = 5, STEPS = 250 };
-#else
-enum { EVERY = 1, STEPS = 600 };
-#endif
+enum { EVERY = SANITIZED ? 5 : 1, STEPS = SANITIZED ? 250 : 600 };
 
 /* The same ticks in all of them, so the same bytes. */
 static void a_fast_loop_never_stands_still(void **state)

@@ -1,6 +1,6 @@
 /* Every model of Debian's assimp-testmodels whose ending the scene reader takes: `scanhead init` and `scanhead
  * record` with no further key scan it, or refuse it with a reason that says what to do. Nothing dies, nothing
- * hangs. The counts are printed. One in three is scanned; all with THOROUGH=1. */
+ * hangs. The counts are printed. One in six is scanned; all with THOROUGH=1. */
 #define _XOPEN_SOURCE 700
 #include "tests/common/thorough.h"
 #include "tests/wire/wire.h"
@@ -76,7 +76,7 @@ static pid_t start_init(struct wire *wire, int i)
 static pid_t start_record(struct wire *wire, int i)
 {
     char err[16];
-    if (status[i] != 0 || i % thorough(1, 3) != 0) return 0;
+    if (status[i] != 0 || i % thorough(1, 6) != 0) return 0;
     snprintf(err, sizeof err, "%03d.record", i);
     const char *const args[] = {"record", name_of(wire, i, ".yaml"), "--stats", name_of(wire, i, ".json"), NULL};
     return wire_spawn(wire, args, "out", err, -1);
@@ -114,14 +114,14 @@ static void each_is_scanned_or_refused(void **state)
     run_all(wire, start_record);
     for (int i = 0; i < n_models; i++) {
         n_taken += taken[i];
-        if (!taken[i] || i % thorough(1, 3) != 0) continue;
+        if (!taken[i] || i % thorough(1, 6) != 0) continue;
         check_recording(wire, i);
         scanned++;
     }
     printf(
         "# %d models: %d taken, %d of these scanned; refused: %d for single precision, %d without triangles, %d broken\n",
         n_models, n_taken, scanned, single, empty, broken);
-    assert_true(scanned >= n_taken / 4); /* one in three, or all */
+    assert_true(scanned >= n_taken / 8); /* one in six, or all */
     assert_true(n_taken >= 100);         /* 101 of Debian 12's 140; Assimp of another version may read others */
 }
 

@@ -200,12 +200,13 @@ static void test_house(void **state)
     snprintf(cloud, sizeof cloud, "%s", wire_path(wire, "car.ply"));
     snprintf(
         config, sizeof config, "%s",
-        wire_write_text(wire, "car.yaml",
-                        "head: {profile: full-sweep, prr_hz: 50000, lines_hz: 100, pan_deg_s: 0, frames: 0}\n"
-                        "scene: {meshes: [{file: /usr/share/assimp/models/IFC/AC14-FZK-Haus.ifc, up: y, scale: 1}]}\n"
-                        "stations: [{position_m: [0, 0, 0]}]\n"
-                        "platform: {kind: trajectory, waypoints: way.csv, mount_m: [0, 0.5, 1.5],"
-                        " mount_heading_deg: -90}\n"));
+        wire_write_text(
+            wire, "car.yaml",
+            "head: {profile: full-sweep, prr_hz: 50000, lines_hz: 100, pan_deg_s: 0, frames: 0}\n"
+            "scene: {ifc_reader: assimp, meshes: [{file: /usr/share/assimp/models/IFC/AC14-FZK-Haus.ifc, up: y, scale: 1}]}\n"
+            "stations: [{position_m: [0, 0, 0]}]\n"
+            "platform: {kind: trajectory, waypoints: way.csv, mount_m: [0, 0.5, 1.5],"
+            " mount_heading_deg: -90}\n"));
     const char *const record[] = {"record", config, "-o", cloud, "--quiet", NULL};
     assert_int_equal(wire_wait(wire, wire_spawn(wire, record, "head.out", "head.err", -1)), 0);
     const char *const report[] = {"report", config, cloud, "--json", "--tolerance-m", "0.001", NULL};
