@@ -44,7 +44,11 @@ PKGS = yaml-0.1 libpng proj nettle libusb-1.0 libwebsockets jansson libwebp $(US
 ask_pkg_config = $(shell $(PKG_CONFIG) $(1) $(PKGS))$(if $(filter-out 0,$(.SHELLSTATUS)),$(error $(PKG_CONFIG) does not \
 	find all of $(PKGS): make deps-build, or PKG_CONFIG=... for another machine))
 PKG_CFLAGS = $(eval PKG_CFLAGS := $$(call ask_pkg_config,--cflags))$(PKG_CFLAGS)
-PKG_LIBS = $(eval PKG_LIBS := $$(call ask_pkg_config,--libs))$(PKG_LIBS)
+PKG_LIBS = $(eval PKG_LIBS := $$(filter-out -lproj,$$(call ask_pkg_config,--libs)))$(PKG_LIBS)
+# PROJ is loaded when it is asked for (core/georef/proj_lib.h), by the name that a program linked with it would have.
+find_proj = $(or $(shell readelf -d $$($(CC) -print-file-name=libproj.so) | sed -n 's/.*SONAME.*\[\(.*\)\]/\1/p'),$(error no \
+	libproj.so for $(CC): make deps-build))
+PROJ_SONAME = $(eval PROJ_SONAME := $$(find_proj))$(PROJ_SONAME)
 # Embree: the version of headers and library, decided here alone. EMBREE=4 asks for that one; else 3 where both are.
 has_embree = $(shell $(CC) $(CPPFLAGS) -E -xc -include embree$(1)/rtcore.h /dev/null >/dev/null 2>&1 && echo $(1))
 find_embree = $(or $(firstword $(foreach v,$(filter 3 4,$(or $(EMBREE),3 4)),$(call has_embree,$(v)))),$(error no \
@@ -127,6 +131,7 @@ $(BUILD)/drivers/link/web_pages.inc: ALWAYS
 	@new=$@.$$$$; n=0; for f in $(WEB_FILES); do n=$$((n + 1)); echo "WEB_PAGE($$n, \"$$f\", \"/$${f##*/}\")"; done >$$new; \
 	cmp -s $$new $@ || cp $$new $@; rm $$new
 $(BUILD)/drivers/link/web_pages.c.o: private override ALL_CPPFLAGS += -I$(BUILD)
+$(BUILD)/core/georef/proj_lib.c.o: private override ALL_CPPFLAGS += -DPROJ_SONAME='"$(PROJ_SONAME)"'
 $(BUILD)/drivers/link/web_pages.c.o: $(BUILD)/drivers/link/web_pages.inc $(WEB_FILES)
 ALWAYS:
 # All modules for the program and the tests, and the client library alone.

@@ -2,8 +2,8 @@
  * In: the system's name ("EPSG:2056", or as the EPSG registry calls it) and coordinates in metres. Out: the place on the
  * Earth, and how the grid lies there. PROJ does it, by its tables on this machine; it asks no network.
  *
- * Metres also where the grid itself is in feet. Datums are WGS 84 at the end. Between two of them PROJ takes its best transformation; accuracy_m says how good that
- * one is. Any thread. */
+ * Metres also where the grid itself is in feet. Datums are WGS 84 at the end. Between two of them PROJ takes its best
+ * transformation; accuracy_m says how good that one is. Any thread. */
 #ifndef CORE_CRS_H
 #define CORE_CRS_H
 
@@ -17,8 +17,8 @@ struct crs_place {
     double accuracy_m;      /* of the transformation between datums; NaN: not known */
 };
 
-/* SH_EINPUT: an unknown name, a system that is not projected, or a place more than 2 degrees
- * outside of where it is used. */
+/* SH_EINPUT: an unknown name, a system that is not projected, a place more than 2 degrees outside of where it is used,
+ * or no PROJ on this machine. */
 int crs_locate(const char *name, double easting_m, double northing_m, double height_m, struct crs_place *place,
                struct sh_err *err);
 

@@ -200,15 +200,15 @@ check "a test that is removed is not run" removed_test
 # ---- the archive, of the objects of both compilers; that of the program is there
 only_the_interface() {
     archive=$1/libscanhead.a
-    if [ -n "${2:-}" ]; then
-        env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -s BUILD="$1" DEPS=no $2 "$archive" || return
+    if [ $# -gt 1 ]; then
+        env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -s BUILD="$1" DEPS=no "${@:2}" "$archive" || return
     fi
     nm -g --defined-only "$archive" | awk 'NF == 3 && $3 !~ /^scanhead_/ { print; bad = 1 } NF == 3 { n++ }
         END { exit bad || n < 20 }'
 }
 check "the archive defines scanhead_... and nothing else for others" only_the_interface "$(dirname "${SCANHEAD:-build/scanhead}")"
 if command -v clang >/dev/null; then
-    check "the same of clang's objects" only_the_interface "${BUILD:-build}/clang" "OPT=-O0 CC=clang CFLAGS=-g0"
+    check "the same of clang's objects" only_the_interface "${BUILD:-build}/clang" OPT=-O0 "CC=$(command -v ccache) clang" CFLAGS=-g0
 fi
 # A client with functions that are called as some of the library's inside are.
 cat >"$work/client.c" <<END

@@ -1,65 +1,71 @@
 #include "core/crs.h"
 
 #include <math.h>
-#include <proj.h>
 
 #include "core/angle.h"
+#include "core/georef/proj_lib.h"
 
 /* A system of the registry, as far as it counts here. */
 struct grid {
     const char *name;
+    struct proj_lib lib;
+    PJ_CONTEXT *context;
     PJ *to; /* to longitude and latitude in degrees, in this order, whatever the order of the systems' own axes */
     double unit_m;                                   /* of its axes */
     double west_deg, south_deg, east_deg, north_deg; /* where it is used; west NaN: not known */
 };
 
-static double axis_unit(PJ_CONTEXT *context, const PJ *crs)
+static double axis_unit(const struct grid *grid, const PJ *crs)
 {
-    PJ *axes = proj_crs_get_coordinate_system(context, crs);
+    const struct proj_lib *lib = &grid->lib;
+    PJ *axes = lib->proj_crs_get_coordinate_system(grid->context, crs);
     double unit_m = 1.0;
-    if (axes != NULL) proj_cs_get_axis_info(context, axes, 0, NULL, NULL, NULL, &unit_m, NULL, NULL, NULL);
-    proj_destroy(axes);
+    if (axes != NULL) lib->proj_cs_get_axis_info(grid->context, axes, 0, NULL, NULL, NULL, &unit_m, NULL, NULL, NULL);
+    lib->proj_destroy(axes);
     return unit_m > 0.0 ? unit_m : 1.0;
 }
 
-static void read_projected(PJ_CONTEXT *context, const PJ *crs, struct grid *grid)
+static void read_projected(struct grid *grid, const PJ *crs)
 {
-    grid->unit_m = axis_unit(context, crs);
-    if (!proj_get_area_of_use(context, crs, &grid->west_deg, &grid->south_deg, &grid->east_deg, &grid->north_deg,
-                              NULL) ||
+    grid->unit_m = axis_unit(grid, crs);
+    if (!grid->lib.proj_get_area_of_use(grid->context, crs, &grid->west_deg, &grid->south_deg, &grid->east_deg,
+                                        &grid->north_deg, NULL) ||
         grid->west_deg < -180.0)
         grid->west_deg = NAN;
 }
 
 /* The kind must be projected, since a head needs metres. */
-static int read_system(PJ_CONTEXT *context, struct grid *grid, struct sh_err *err)
+static int read_system(struct grid *grid, struct sh_err *err)
 {
-    PJ *crs = proj_create(context, grid->name);
+    const struct proj_lib *lib = &grid->lib;
+    PJ *crs = lib->proj_create(grid->context, grid->name);
     const int is_known = crs != NULL;
-    if (is_known && proj_get_type(crs) == PJ_TYPE_COMPOUND_CRS) {
-        PJ *flat = proj_crs_get_sub_crs(context, crs, 0);
-        proj_destroy(crs);
+    if (is_known && lib->proj_get_type(crs) == PJ_TYPE_COMPOUND_CRS) {
+        PJ *flat = lib->proj_crs_get_sub_crs(grid->context, crs, 0);
+        lib->proj_destroy(crs);
         crs = flat;
     }
-    const int is_projected = crs != NULL && proj_get_type(crs) == PJ_TYPE_PROJECTED_CRS;
-    if (is_projected) read_projected(context, crs, grid);
-    proj_destroy(crs);
+    const int is_projected = crs != NULL && lib->proj_get_type(crs) == PJ_TYPE_PROJECTED_CRS;
+    if (is_projected) read_projected(grid, crs);
+    lib->proj_destroy(crs);
     if (is_projected) return SH_OK;
     return sh_fail(err, SH_EINPUT, "%s: %s; allowed is a projected system, as EPSG:25832 is", grid->name,
                    is_known ? "not a projected coordinate reference system" : "no such coordinate reference system");
 }
 
-static int open_transformation(PJ_CONTEXT *context, struct grid *grid, struct sh_err *err)
+static int open_transformation(struct grid *grid, struct sh_err *err)
 {
-    PJ *raw = proj_create_crs_to_crs(context, grid->name, "EPSG:4326", NULL);
-    grid->to = raw != NULL ? proj_normalize_for_visualization(context, raw) : NULL;
-    proj_destroy(raw);
+    const struct proj_lib *lib = &grid->lib;
+    PJ *raw = lib->proj_create_crs_to_crs(grid->context, grid->name, "EPSG:4326", NULL);
+    grid->to = raw != NULL ? lib->proj_normalize_for_visualization(grid->context, raw) : NULL;
+    lib->proj_destroy(raw);
     return grid->to != NULL ? SH_OK : sh_fail(err, SH_EINPUT, "%s: PROJ knows no way from it to WGS 84", grid->name);
 }
 
 static PJ_COORD transformed(const struct grid *grid, double easting_m, double northing_m)
 {
-    return proj_trans(grid->to, PJ_FWD, proj_coord(easting_m / grid->unit_m, northing_m / grid->unit_m, 0.0, 0.0));
+    const PJ_COORD in = {.xyzt = {easting_m / grid->unit_m, northing_m / grid->unit_m, 0.0, 0.0}};
+    return grid->lib.proj_trans(grid->to, PJ_FWD, in);
 }
 
 /* By differences over 100 m each way: what they leave out is of the third order, below 1e-9 in any grid of survey. */
@@ -99,9 +105,9 @@ static int locate(const struct grid *grid, double easting_m, double northing_m, 
     place->at.lon_deg = at.xy.x;
     place->at.lat_deg = at.xy.y;
     measure_grid(grid, easting_m, northing_m, &at, place);
-    PJ *used = proj_trans_get_last_used_operation(grid->to);
-    const double accuracy_m = used != NULL ? proj_pj_info(used).accuracy : -1.0;
-    proj_destroy(used);
+    PJ *used = grid->lib.proj_trans_get_last_used_operation(grid->to);
+    const double accuracy_m = used != NULL ? grid->lib.proj_pj_info(used).accuracy : -1.0;
+    grid->lib.proj_destroy(used);
     place->accuracy_m = accuracy_m >= 0.0 ? accuracy_m : NAN;
     return SH_OK;
 }
@@ -111,14 +117,16 @@ int crs_locate(const char *name, double easting_m, double northing_m, double hei
 {
     struct grid grid = {.name = name};
     *place = (struct crs_place){.at.height_m = height_m, .accuracy_m = NAN};
-    PJ_CONTEXT *context = proj_context_create();
-    if (context == NULL) return sh_fail(err, SH_ENOMEM, "no memory for PROJ");
-    proj_log_level(context, PJ_LOG_NONE);
-    proj_context_set_enable_network(context, 0);
-    int rc = read_system(context, &grid, err);
-    if (rc == SH_OK) rc = open_transformation(context, &grid, err);
+    int rc = proj_lib_load(&grid.lib, err);
+    if (rc != SH_OK) return rc;
+    grid.context = grid.lib.proj_context_create();
+    if (grid.context == NULL) return sh_fail(err, SH_ENOMEM, "no memory for PROJ");
+    grid.lib.proj_log_level(grid.context, PJ_LOG_NONE);
+    grid.lib.proj_context_set_enable_network(grid.context, 0);
+    rc = read_system(&grid, err);
+    if (rc == SH_OK) rc = open_transformation(&grid, err);
     if (rc == SH_OK) rc = locate(&grid, easting_m, northing_m, place, err);
-    proj_destroy(grid.to);
-    proj_context_destroy(context);
+    grid.lib.proj_destroy(grid.to);
+    grid.lib.proj_context_destroy(grid.context);
     return rc;
 }

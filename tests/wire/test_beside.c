@@ -1,8 +1,9 @@
 /* A personality's link leaves the native stream as it is: the same hash with it and without. And its ports outlive
  * clients that come, say half a word and go. */
+#include "tests/common/thorough.h"
 #include "tests/wire/wire.h"
 
-enum { CLIENTS = 10000 };
+#define CLIENTS thorough(10000, 2000)
 
 struct personality {
     const char *config, *asks; /* asks: what makes it send all that it has; NULL: it sends by itself */

@@ -3,6 +3,7 @@
 #include <sched.h>
 #include <sys/mount.h>
 
+#include "tests/common/thorough.h"
 #include "tests/wire/room.h"
 
 static const char CONFIG[] = "head: {profile: sphere, step_deg: 4}\n"
@@ -66,7 +67,7 @@ static void nothing_is_left(void **state)
     struct wire *wire = *state;
     for (size_t i = 0; i < sizeof endings / sizeof endings[0]; i++) {
         int n_full = 0, status = 1;
-        for (unsigned kib = 4; status != 0 && kib < 1 << 16; kib += 4 + kib / 12 * 4) {
+        for (unsigned kib = 4; status != 0 && kib < 1 << 16; kib += 4 + kib / (unsigned)thorough(12, 4) * 4) {
             status = record(wire, endings[i], kib);
             assert_in_range(status, 0, 1);
             n_full += status;

@@ -1,5 +1,6 @@
 /* Sessions of protocols that are not native: they don't touch the stream, take part in journals, hold back what may
  * wait, and lose whole units where a client doesn't read. */
+#include "tests/common/thorough.h"
 #include "tests/wire/room.h"
 
 static const char SCIP_LINKS[] = "links: [{type: tcp, port: 0, protocol: scip}, {type: pty, path: native}]\n";
@@ -164,7 +165,7 @@ static void what_a_client_does_is_replayed(void **state)
 static void many_come_one_after_the_other(void **state)
 {
     struct wire *wire = *state;
-    enum { CONNECTIONS = 10000 };
+    const int connections = thorough(10000, 2000);
     int refused = 0;
     static struct client c;
     room_write(wire);
@@ -173,7 +174,7 @@ static void many_come_one_after_the_other(void **state)
         head_start(wire, room_config_write(wire, &config), (const char *const[]){"--set", "head.start=on", NULL});
     const char *at = head_endpoint(&head, "tcp");
     wait_for_scan(at);
-    for (int i = 0; i < CONNECTIONS; i++) {
+    for (int i = 0; i < connections; i++) {
         c = (struct client){.fd = raw_connect(at)};
         say(&c, i % 3 == 0 ? "PP\n" : i % 3 == 1 ? "VV\nPP\nMD0000" : "");
         if (i % 3 != 2) refused += answer(&c) == NULL;
@@ -181,7 +182,7 @@ static void many_come_one_after_the_other(void **state)
     }
     /* None is turned away because of the one before, except where the system delivers the end of one and the begin of
      * the next out of order, on two processors: seen once in 50,000 on a busy machine. */
-    assert_true(refused <= CONNECTIONS / 100);
+    assert_true(refused <= connections / 100);
     head_end(&head, SIGTERM);
     assert_true(stats_uint(wire, "pulses") > 0); /* the scan went on */
     assert_int_equal(stats_link_uint(wire, "lost_units"), 0);
