@@ -199,9 +199,10 @@ check "a test that is removed is not run" removed_test
 
 # ---- the archive, of the objects of both compilers; that of the program is there
 only_the_interface() {
-    archive=$1/libscanhead.a
-    if [ $# -gt 1 ]; then
-        env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -s BUILD="$1" DEPS=no "${@:2}" "$archive" || return
+    folder=$1 archive=$1/libscanhead.a
+    shift
+    if [ $# -gt 0 ]; then
+        env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -s BUILD="$folder" DEPS=no "$@" "$archive" || return
     fi
     nm -g --defined-only "$archive" | awk 'NF == 3 && $3 !~ /^scanhead_/ { print; bad = 1 } NF == 3 { n++ }
         END { exit bad || n < 20 }'
