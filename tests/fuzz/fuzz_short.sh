@@ -4,11 +4,11 @@
 #
 #   FUZZ_BUILD=build/fuzz sh tests/fuzz/fuzz_short.sh [NAME...]      without names: all targets
 #
-# FUZZ_SHORT_S: seconds a target, default 3. The seed of the random numbers is fixed; how far it comes depends on the machine.
+# FUZZ_SHORT_S: seconds a target, default 1. The seed of the random numbers is fixed; how far it comes depends on the machine.
 # JOBS targets run at a time.
 set -u
 build=${FUZZ_BUILD:-build/fuzz}
-seconds=${FUZZ_SHORT_S:-3}
+seconds=${FUZZ_SHORT_S:-1}
 jobs=${JOBS:-$(getconf _NPROCESSORS_ONLN)}
 work=$(mktemp -d /tmp/scanhead-fuzzing-XXXXXX) || exit 1
 trap 'rm -rf "$work"' EXIT
