@@ -38,12 +38,12 @@ commands_of() {
 options_are_there() {
     n=0
     for command in $(commands_of) "record --raw"; do
-        page=$pages/scanhead-${command/ --/-}.1.txt
+        page=$'\n'$(cat "$pages/scanhead-${command/ --/-}.1.txt")$'\n'
         offered=$(_scanhead_options "${command% *}")
         grep -q "^ *${command% *} .*$" "$pages/scanhead.1.txt" || { echo "scanhead.1: no $command"; return 1; }
         for option in $(options_of $command); do
             n=$((n + 1))
-            grep -q -e "^ *\(-., \)\{0,1\}$option\([ ,]\|$\)" "$page" || { echo "${page##*/}: no $option"; return 1; }
+            [[ $page =~ $'\n'\ *(-., )?$option[$' ,\n'] ]] || { echo "$command.1: no $option"; return 1; }
             [[ $command == *raw || " $offered " == *" $option "* ]] ||
                 { echo "completion of $command: no $option"; return 1; }
         done
@@ -71,9 +71,9 @@ keys_are_there() {
     "$program" check --help | sed -n '/^Configuration keys:/,$p' |
         grep '^[a-z_]*\(\[\]\)\{0,1\}\([.][a-z_]*\(\[\]\)\{0,1\}\)*$' >"$work/keys"
     [ "$(wc -l <"$work/keys")" -gt 200 ] || { echo "only $(wc -l <"$work/keys") keys were found"; return 1; }
-    while read -r key; do
-        grep -qF "       $key" "$pages/scanhead.yaml.5.txt" || { echo "scanhead.yaml.5: no $key"; return 1; }
-    done <"$work/keys"
+    awk 'NR == FNR { page = page $0 "\n"; next }
+        !index(page, "       " $0) { print "scanhead.yaml.5: no " $0; bad = 1 }
+        END { exit bad }' "$pages/scanhead.yaml.5.txt" "$work/keys"
 }
 
 # completes "WORDS BEFORE" WORD EXPECTED...: what bash offers for the last word; words are taken apart as bash does it.
