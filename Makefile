@@ -101,6 +101,7 @@ EVERYTHING = $(OBJ) $(BUILD)/firmware_sim/main.c.o
 
 IFC_READERS = $(BUILD)/ifc
 IFC_PROGRAMS = $(patsubst core/import/ifc/%,$(IFC_READERS)/%,$(wildcard core/import/ifc/*.mjs))
+#? all               build/scanhead, and the client library as build/libscanhead.{a,so}
 all: $(BUILD)/scanhead $(BUILD)/libscanhead.a $(BUILD)/libscanhead.so $(IFC_PROGRAMS)
 
 $(BUILD)/%.c.o: %.c $(BUILD)/flags
@@ -219,6 +220,7 @@ define install_missing
 endef
 # The readers for LAS and E57 are npm's, in the versions of the lock file. Without npm's registry their tests are skipped.
 READERS = $(BUILD)/readers
+#? deps              install what building, the demo and the tests need (Debian)
 deps: deps-test $(READERS)/installed
 $(READERS)/installed: $(wildcard tests/readers/*) | $(if $(DEPS_ARE_THERE),,deps-test)
 	@mkdir -p $(@D)
@@ -255,6 +257,7 @@ deps-build:
 	$(call install_missing,$(DEPS_BUILD))
 	@$(MAKE) --no-print-directory ifc-readers
 
+#? demo              a head on a virtual serial port scans the house; a client records it
 demo: deps-build
 	@$(MAKE) --no-print-directory -j2 all
 	@sh config/demo.sh $(BUILD)/scanhead $(BUILD)/demo
@@ -280,6 +283,7 @@ SUBMAKE = @$(MAKE) --no-print-directory -j$(JOBS)
 RUN = SCANHEAD=$(BUILD)/test/scanhead READERS=$(READERS)
 # `make test T=test_ring` builds and runs that one alone, of whatever folder; also a script: T=check_includes, T=test_kernel_usbip.
 T ?=
+#? test              all tests; T=test_ring one alone, THOROUGH=1 in full depth, DEPS=no installs nothing
 ifeq ($(T),)
 test: deps-test
 	@$(MAKE) --no-print-directory DEPS_ARE_THERE=1 $(READERS)/installed & status=0; \
@@ -298,11 +302,13 @@ test: deps
 		$(if $(filter tests/guest/%,$(SCRIPT)),$(patsubst $(BUILD)/%,$(BUILD)/test/%,$(call PROGRAMS,guest)))
 	@$(RUN) BUILD=$(BUILD) bash tests/run_tap.sh $(ONE:%=$(BUILD)/test/%) $(SCRIPT)
 endif
+#? test-unit         the tests of a folder: test-unit, test-wire, test-accuracy, test-stability, test-guest
 test-unit test-wire test-accuracy test-stability test-guest: deps
 	$(SUBMAKE) $(STRICT) BUILD=$(BUILD)/test test-programs
 	@$(RUN) sh tests/run_all.sh $(BUILD) $(@:test-%=%)
 
 # The other end of a usbredir channel goes, comes back and resets 1,000 times (`make test`: 20).
+#? soak-usb          1,000 times a USB cable is pulled and put back
 soak-usb: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test all $(BUILD)/test/tests/wire/test_usb_soak
 	@TEST_LIMIT_S=7200 USB_SOAK_EVENTS=1000 SCANHEAD=$(BUILD)/test/scanhead $(BUILD)/test/tests/wire/test_usb_soak
@@ -310,11 +316,13 @@ soak-usb: deps
 # Recorders that are killed, and disks that are full, at N random moments for each format (`make test`: one of
 # each): some minutes.
 N ?= 200
+#? repair            N=200 killed recorders and full disks for each format
 repair: deps-build
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test all $(BUILD)/test/tests/wire/test_repair
 	@TEST_LIMIT_S=7200 REPAIR_N=$(N) $(RUN) $(BUILD)/test/tests/wire/test_repair
 
 # 600 broken meshes, with and without sanitizers (there `make test` tries every tenth): half a minute.
+#? test-hostile      600 broken meshes
 test-hostile: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test $(BUILD)/test/tests/unit/test_hostile_files
 	@$(MAKE) --no-print-directory -j2 $(ASAN) $(BUILD)/asan/tests/unit/test_hostile_files
@@ -322,11 +330,13 @@ test-hostile: deps
 	@TEST_LIMIT_S=7200 HOSTILE_EVERY=1 $(BUILD)/asan/tests/unit/test_hostile_files
 
 # What a station sees, by its map and by the BVH, in 50,000 random scenes: some minutes.
+#? test-sight        50,000 random scenes: what a station sees, by its map and by the BVH
 test-sight: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test $(BUILD)/test/tests/accuracy/test_sight
 	@TEST_LIMIT_S=7200 SIGHT_SCENES=50000 $(BUILD)/test/tests/accuracy/test_sight
 
 # A million pulses over each kind of USB, each with the hash that TCP gives: some minutes in an emulated machine.
+#? test-usb-million  a million pulses over each kind of USB
 test-usb-million: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test test-programs
 	@SCANHEAD=$(BUILD)/test/scanhead BUILD=$(BUILD) GUEST_PAN_DEG_S=0.4 GUEST_LIMIT_S=1200 \
@@ -334,6 +344,7 @@ test-usb-million: deps
 
 # ---- figures: speed and leaks; speed against accuracy, each method
 DEPS_CHART = gnuplot-nox
+#? bench             speed, and leaks of 10^8 rays; also bench-beam, -plain, -copies, -loading, -loop, -kernels, -page, -panorama, -velodyne
 bench: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/bench
 	@$(BUILD)/bench --scenes 10k,100k,1M,10M,house,garden --reach --leaks 1e8 -o $(BUILD)/bench.json
@@ -361,6 +372,7 @@ bench-page: deps-build deps-browser
 	@$(MAKE) --no-print-directory -j2 all
 	@SCANHEAD=$(BUILD)/scanhead node tests/bench/page.mjs $(PAGE)
 # The page in three widths and both themes, to be looked at.
+#? page-pictures     the page of a web link in three widths and both themes
 page-pictures: deps-build deps-browser
 	@$(MAKE) --no-print-directory -j2 all
 	@SCANHEAD=$(BUILD)/scanhead node tests/page/pictures.mjs --out $(BUILD)/pictures
@@ -388,6 +400,7 @@ bench-loop: deps-build
 bench-loading: deps-build
 	@$(MAKE) --no-print-directory -j2 all $(BUILD)/tests/bench/loading
 	@$(BUILD)/tests/bench/loading --program $(BUILD)/scanhead $(LOADING)
+#? chart             speed against accuracy, each method: config/speed_accuracy*.png
 chart: deps-build
 	$(call install_missing,$(DEPS_CHART))
 	@$(MAKE) --no-print-directory -j2 $(CHARTS)
@@ -415,6 +428,7 @@ IFC_FILES = $(addprefix node_modules/web-ifc/,package.json LICENSE.md web-ifc-ap
 	$(addprefix node_modules/@ifc-lite/wasm/,package.json LICENSE pkg/ifc-lite.js pkg/ifc-lite_bg.wasm)
 # BUILT=yes installs what is there, however it was built: with `make CFLAGS=...`, or for another user than root.
 BUILT ?= no
+#? install           into PREFIX=/usr/local, below DESTDIR; BUILT=yes builds nothing
 install: $(if $(filter yes,$(BUILT)),,all)
 	install -d "$(DESTDIR)$(PREFIX)/bin" "$(DESTDIR)$(PREFIX)/$(LIB)" "$(DESTDIR)$(PREFIX)/include" "$(DESTDIR)$(HEADS_DIR)" \
 		"$(DESTDIR)$(SCENES_DIR)" "$(DESTDIR)$(FAULTS_DIR)" "$(DESTDIR)$(CAMPAIGN_DIR)" "$(DESTDIR)$(UDEV_DIR)" "$(DESTDIR)$(PC_DIR)" "$(DESTDIR)$(PREFIX)/share/scanhead/python" \
@@ -443,11 +457,16 @@ install: $(if $(filter yes,$(BUILT)),,all)
 	$(PRINTER) help --completion bash > "$(DESTDIR)$(COMPLETION_DIR)/scanhead"
 	sed "s|@PREFIX@|$(PREFIX)|; s|@LIB@|$(LIB)|; s|@VERSION@|$$(sed -n 's/^#define SCANHEAD_VERSION  *"\(.*\)"$$/\1/p' \
 		drivers/host/scanhead.h)|" drivers/host/libscanhead.pc.in > "$(DESTDIR)$(PC_DIR)/libscanhead.pc"
+#? format            clang-format on all sources
 format:
 	clang-format -i $$(git ls-files '*.c' '*.h' '*.cpp')
+#? clean             remove build/
 clean:
 	rm -rf $(BUILD)
+#? help              these lines
+help:
+	@sed -n 's/^#? /make /p' $(filter Makefile %.mk,$(MAKEFILE_LIST))
 .PHONY: ALWAYS all ifc-readers deps deps-test deps-build deps-guest deps-browser demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb repair \
-	test-usb-million test-hostile test-sight objects test-unit-programs test-programs bench bench-beam bench-plain bench-copies bench-velodyne bench-page page-pictures bench-loop bench-loading bench-kernels bench-panorama chart install format clean
+	test-usb-million test-hostile test-sight objects test-unit-programs test-programs bench bench-beam bench-plain bench-copies bench-velodyne bench-page page-pictures bench-loop bench-loading bench-kernels bench-panorama chart install format clean help
 .SECONDARY:
 -include $(shell find $(patsubst %,$(BUILD)/%,core drivers firmware_sim tests) -name '*.d' 2>/dev/null)

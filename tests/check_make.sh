@@ -39,6 +39,15 @@ runs_all_of() {
 check "make mutants alone tries all faults" runs_all_of mutants " '\*'\$"
 check "make machines alone runs all machines" runs_all_of machines " 'trixie' 'avx' 'sse' 'aarch64'\$"
 
+# Each line of the help is of a target that is there.
+help_is_true() {
+    make -s help >"$work/help" && [ "$(wc -l <"$work/help")" -gt 20 ] || return
+    for target in $(awk '{ print $2 }' "$work/help"); do
+        grep -qE "^([a-z-]+ )*$target( [a-z-]+)*:" Makefile tests/*/*.mk config/*/*.mk || { echo "no target $target"; return 1; }
+    done
+}
+check "make help" help_is_true
+
 # ---- a cross compiler for ARM, its pkg-config, and both Embrees where it looks
 mkdir -p "$work/bin" "$work/include/embree3" "$work/include/embree4"
 : >"$work/include/embree3/rtcore.h"

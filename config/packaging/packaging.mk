@@ -10,6 +10,7 @@ DEB_SOURCES = Makefile README.md LICENSE config core drivers firmware_sim tests
 DEB_TIME = $${SOURCE_DATE_EPOCH:-$$(git log -1 --format=%ct 2>/dev/null || stat -c %Y drivers/host/scanhead.h)}
 DEB_DATE = $(shell date -R -u -d "@$(DEB_TIME)")
 
+#? deb               Debian's packages into build/
 deb:
 	$(call install_missing,$(DEPS_BUILD) $(DEPS_DEB))
 	@rm -rf --one-file-system $(DEB_DIR)
@@ -27,6 +28,7 @@ deb:
 		dpkg-buildpackage -us -uc -b
 	@rm -rf $(DEB_TREE)
 	@ls -l $(DEB_DIR)/*.deb
+#? deb-check         the packages in a root of their own
 deb-check: deb
 	$(call install_missing,$(DEPS_DEB_CHECK))
 	@bash config/packaging/check.sh $(DEB_DIR) $(RELEASE) | tee $(DEB_DIR)/check.log

@@ -1,5 +1,6 @@
 # How late the pacing thread wakes up, beside cyclictest in turns: under two minutes.
 .PHONY: bench-rt
+#? bench-rt          how late the pacing thread wakes up, beside cyclictest
 bench-rt: deps-build
 	$(call install_missing,rt-tests)
 	@$(MAKE) --no-print-directory -j2 all

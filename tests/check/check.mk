@@ -16,6 +16,7 @@ TSAN = $(ASAN_CC) OPT=-O1 WERROR= CFLAGS="-g1 -w" CXXFLAGS="-g1 -w" CPPFLAGS=-DS
 check-tsan: deps-check
 	@$(MAKE) --no-print-directory -j$(JOBS) BUILD=$(BUILD)/tsan $(TSAN) $(BUILD)/tsan/scanhead
 	@python3 tests/check/tsan.py --scanhead $(BUILD)/tsan/scanhead --out $(BUILD)/tsan/rounds --seconds $(CHECK_S)
+#? check             analysers and ThreadSanitizer: some minutes
 check: check-analysers check-tsan
 .PHONY: deps-check check check-analysers check-tsan check-tsan-short
 

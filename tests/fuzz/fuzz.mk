@@ -42,6 +42,7 @@ fuzz-objects: $(FUZZ_PROGRAMS)
 fuzz-programs: deps-test
 	@command -v $(lastword $(FUZZ_CC)) >/dev/null || { echo "make fuzz: $(FUZZ_CC) is not here; fuzzing needs clang" >&2; exit 2; }
 	@$(FUZZ_MAKE) fuzz-objects F="$(F)"
+#? fuzz              look for inputs that fail: S=600 seconds a target, F=NAME one target
 fuzz: fuzz-programs
 	@$(FUZZ_RUN) S='$(S)' N='$(if $(filter file,$(origin N)),,$(N))' bash tests/fuzz/fuzz_run.sh $(or $(F),$(FUZZ_NAMES))
 fuzz-short: fuzz-programs

@@ -2,6 +2,7 @@
 # M is shared with `make mutants`, so it has no default of its own.
 # Under another name, so that `make -n` prints the line and does not run it.
 MACHINES_MAKE = $(MAKE) --no-print-directory
+#? machines          the tests on Debian 13, ARM, x86 without AVX2 and without AVX: hours
 machines:
 	@MAKE='$(MACHINES_MAKE)' JOBS=$(JOBS) sh tests/machines/run.sh $(BUILD) $(foreach m,$(or $(M),trixie avx sse aarch64),'$(m)')
 .PHONY: machines

@@ -2,6 +2,7 @@
 # that their own tests miss. tests/mutants/README.md says more.
 # M is shared with `make machines`, so it has no default of its own.
 ALL ?= no
+#? mutants           small faults, one at a time: do the tests see them? Half an hour
 mutants: deps
 	@bash tests/mutants/run.sh -j $(JOBS) $(if $(filter yes,$(ALL)),-a) $(BUILD) '$(or $(M),*)'
 .PHONY: mutants

@@ -1,6 +1,7 @@
 # Every scenario of config/faults over each kind of link, with our own client; usb in an emulated machine, where it can
 # be had. At the end a table: some ten minutes.
 SOAK_S ?= 30
+#? soak              long runs that are judged at their end
 soak: soak-scenarios soak-long
 soak-scenarios: deps-build
 	@$(MAKE) --no-print-directory -j2 all
@@ -9,6 +10,7 @@ soak-scenarios: deps-build
 # An hour of device time at 10 kHz, recorded, replayed at pace fast and recorded again: half a minute, and 1.8 GB in
 # build/ meanwhile.
 REPLAY_S ?= 3600
+#? replay-hour       an hour of a recording, replayed
 replay-hour: deps-build
 	@$(MAKE) --no-print-directory -j2 all
 	@sh tests/soak/replay_hour.sh $(REPLAY_S) $(BUILD)
@@ -23,6 +25,7 @@ soak-long: deps-build
 
 # 10^9 rays aimed at edges and corners: none may leak. `make test` aims 10^6.
 LEAKS ?= 1e9
+#? leaks             LEAKS=1e9 rays aimed at edges and corners: none may pass
 leaks: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/bench
 	@$(BUILD)/bench --scenes 10k --leaks $(LEAKS) -o $(BUILD)/leaks.json
