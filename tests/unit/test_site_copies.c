@@ -108,7 +108,7 @@ static void cast_lines(const struct site *site, double t_s, struct lines *out)
         schedule_get_line(&segment, i * 6, &line);
         const uint64_t n = line.cast_end - line.cast0;
         schedule_get_run(&segment, &line, line.cast0, (uint32_t)(n < LINE_ROOM ? n : LINE_ROOM), &run);
-        assert_int_equal(line_block_alloc(&out->block[i], LINE_ROOM * LINE_MAX_ECHOES, &err), SH_OK);
+        assert_int_equal(line_block_alloc(&out->block[i], run.n * site_points_per_pulse(site), &err), SH_OK);
         out->n += caster_cast(caster, &setup, &run, &out->block[i]);
     }
     caster_free(caster);
