@@ -2,6 +2,7 @@
 
 #include <math.h>
 #include <proj.h>
+#include <string.h>
 
 #include "core/angle.h"
 
@@ -47,6 +48,21 @@ static int read_system(PJ_CONTEXT *context, struct grid *grid, struct sh_err *er
     if (is_projected) return SH_OK;
     return sh_fail(err, SH_EINPUT, "%s: %s; allowed is a projected system, as EPSG:25832 is", grid->name,
                    is_known ? "not a projected coordinate reference system" : "no such coordinate reference system");
+}
+
+static int read_vertical(PJ_CONTEXT *context, const char *name, double *unit_m, struct sh_err *err)
+{
+    PJ *crs = proj_create(context, name), *axes = NULL;
+    const char *direction = "";
+    if (crs != NULL && proj_get_type(crs) == PJ_TYPE_VERTICAL_CRS) axes = proj_crs_get_coordinate_system(context, crs);
+    const int is_up = axes != NULL &&
+                      proj_cs_get_axis_info(context, axes, 0, NULL, NULL, &direction, unit_m, NULL, NULL, NULL) &&
+                      strcmp(direction, "up") == 0;
+    proj_destroy(axes);
+    proj_destroy(crs);
+    if (is_up) return SH_OK;
+    return sh_fail(err, SH_EINPUT, "%s: not a system of heights that count upward; allowed is one, as EPSG:5773 is",
+                   name);
 }
 
 static int open_transformation(PJ_CONTEXT *context, struct grid *grid, struct sh_err *err)
@@ -106,15 +122,37 @@ static int locate(const struct grid *grid, double easting_m, double northing_m, 
     return SH_OK;
 }
 
+/* PROJ without its words on stderr, and without a network. */
+static PJ_CONTEXT *open_proj(struct sh_err *err)
+{
+    PJ_CONTEXT *context = proj_context_create();
+    if (context == NULL) {
+        sh_fail(err, SH_ENOMEM, "no memory for PROJ");
+        return NULL;
+    }
+    proj_log_level(context, PJ_LOG_NONE);
+    proj_context_set_enable_network(context, 0);
+    return context;
+}
+
+int crs_unit(const char *name, int is_vertical, double *unit_m, struct sh_err *err)
+{
+    struct grid grid = {.name = name};
+    PJ_CONTEXT *context = open_proj(err);
+    if (context == NULL) return SH_ENOMEM;
+    int rc = is_vertical ? read_vertical(context, name, unit_m, err) : read_system(context, &grid, err);
+    if (rc == SH_OK && !is_vertical) *unit_m = grid.unit_m;
+    proj_context_destroy(context);
+    return rc;
+}
+
 int crs_locate(const char *name, double easting_m, double northing_m, double height_m, struct crs_place *place,
                struct sh_err *err)
 {
     struct grid grid = {.name = name};
     *place = (struct crs_place){.at.height_m = height_m, .accuracy_m = NAN};
-    PJ_CONTEXT *context = proj_context_create();
-    if (context == NULL) return sh_fail(err, SH_ENOMEM, "no memory for PROJ");
-    proj_log_level(context, PJ_LOG_NONE);
-    proj_context_set_enable_network(context, 0);
+    PJ_CONTEXT *context = open_proj(err);
+    if (context == NULL) return SH_ENOMEM;
     int rc = read_system(context, &grid, err);
     if (rc == SH_OK) rc = open_transformation(context, &grid, err);
     if (rc == SH_OK) rc = locate(&grid, easting_m, northing_m, place, err);
