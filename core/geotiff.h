@@ -17,6 +17,7 @@ struct geotiff {
     int unit_given;         /* 0: neither system nor unit is named, so metres are assumed */
     int height_unit_given;  /* likewise of the heights */
     double unit_m;          /* of easting and northing in the file */
+    int maps_heights;       /* its scale or tie point has a part for heights, not used since these have no system */
     /* At the middle of the first cell, where its height is; then what a column adds, and a row. Metres also of systems in
      * feet. */
     double easting_m[3], northing_m[3];

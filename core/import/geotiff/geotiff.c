@@ -32,6 +32,7 @@ struct reader {
     double key[4 * MOST_KEYS];
     size_t n_key;
     double map[8]; /* rows: easting and northing, in the file's units, of column, row, -, 1; 0, 0 as the file counts */
+    double z_scale, z_offset; /* of heights, by scale and tie point */
     struct sh_err *err;
 };
 
@@ -45,7 +46,8 @@ int geotiff_is_name(const char *file)
 static unsigned key(const struct reader *r, unsigned id)
 {
     for (size_t i = 4; i + 4 <= r->n_key; i += 4)
-        if (r->key[i] == id && r->key[i + 1] == 0.0) return (unsigned)r->key[i + 3];
+        if (r->key[i] == id && r->key[i + 1] == 0.0)
+            return r->key[i + 3] >= 0.0 && r->key[i + 3] <= UINT16_MAX ? (unsigned)r->key[i + 3] : USER_DEFINED;
     return 0;
 }
 
@@ -74,9 +76,8 @@ static int fail_unplaced(const struct reader *r, size_t n_tie)
     if (n_tie > 6)
         return sh_fail(
             r->err, SH_EINPUT,
-            "%s: its place is given by %zu control points; allowed is a grid: gdalwarp -t_srs EPSG:CODE makes "
-            "one of it",
-            r->tags.path, n_tie / 6);
+            "%s: its place is given by control points; allowed is a grid: gdalwarp -t_srs EPSG:CODE makes one of it",
+            r->tags.path);
     return sh_fail(r->err, SH_EINPUT,
                    "%s: no GeoTIFF: it doesn't say where its cells are (ModelTransformation, or ModelPixelScale and "
                    "ModelTiepoint); gdal_translate puts what a .tfw beside it says into a new one",
@@ -91,6 +92,8 @@ static int read_scale(struct reader *r)
     if (rc == SH_OK) rc = tags_numbers(&r->tags, TIE_POINTS, tie, 12, &n_tie, r->err);
     if (rc != SH_OK) return rc;
     if (n_scale < 2 || n_tie < 6) return fail_unplaced(r, n_tie);
+    r->z_scale = scale[2] != 0.0 ? scale[2] : 1.0;
+    r->z_offset = scale[2] != 0.0 ? tie[5] - scale[2] * tie[2] : 0.0;
     const double map[8] = {scale[0], 0.0,       0.0, tie[3] - scale[0] * tie[0],
                            0.0,      -scale[1], 0.0, tie[4] + scale[1] * tie[1]};
     memcpy(r->map, map, sizeof map);
@@ -115,11 +118,13 @@ static int fail_degrees(const struct reader *r)
     const double *m = r->map, *n = r->map + 4, w = 0.5 * r->g->width, h = 0.5 * r->g->height;
     const double lon = m[0] * w + m[1] * h + m[3], lat = n[0] * w + n[1] * h + n[3];
     const int zone = fabs(lon) < 180.0 ? (int)floor(lon / 6.0) + 31 : 1;
-    return sh_fail(
-        r->err, SH_EINPUT,
-        "%s: its cells are degrees (EPSG:%u); allowed are systems in metres or feet: gdalwarp -t_srs EPSG:%d "
-        "-r bilinear makes one in UTM",
-        r->tags.path, key(r, GEOGRAPHIC), (lat < 0.0 ? 32700 : 32600) + zone);
+    const unsigned system = key(r, GEOGRAPHIC);
+    char name[24] = "of its own";
+    if (system != 0 && system != USER_DEFINED) snprintf(name, sizeof name, "EPSG:%u", system);
+    return sh_fail(r->err, SH_EINPUT,
+                   "%s: its cells are degrees (%s); allowed are systems in metres or feet: gdalwarp -t_srs EPSG:%d "
+                   "-r bilinear makes one in UTM",
+                   r->tags.path, name, (lat < 0.0 ? 32700 : 32600) + zone);
 }
 
 /* Of a unit's code; 0: not known here. */
@@ -148,8 +153,7 @@ static int read_system(struct reader *r, double *unit_m)
     const unsigned model = key(r, MODEL), code = key(r, PROJECTED), unit = key(r, UNIT);
     int rc = SH_OK;
     *unit_m = 1.0;
-    if (model == MODEL_GEOGRAPHIC || (model != MODEL_PROJECTED && code == 0 && key(r, GEOGRAPHIC) != 0))
-        return fail_degrees(r);
+    if (model == MODEL_GEOGRAPHIC || (model == 0 && code == 0 && key(r, GEOGRAPHIC) != 0)) return fail_degrees(r);
     if (model == MODEL_GEOCENTRIC)
         return sh_fail(r->err, SH_EINPUT, "%s: its system is geocentric; allowed are projected ones", r->tags.path);
     if (code != 0 && code != USER_DEFINED) {
@@ -252,8 +256,11 @@ static int read_heights(struct reader *r)
     if (rc == SH_OK) {
         r->g->no_data = strtod(text, &end);
         if (end == text) r->g->no_data = NAN;
-        r->g->height_m = unit_m * number_of(metadata, "offset", 0.0);
-        r->g->height_scale_m = unit_m * number_of(metadata, "scale", 1.0);
+        /* As GDAL has it: scale and tie point count where the heights have a system. */
+        const int is_vertical = key(r, VERTICAL) != 0 || key(r, VERTICAL_UNIT) != 0;
+        r->g->height_m = unit_m * number_of(metadata, "offset", is_vertical ? r->z_offset : 0.0);
+        r->g->height_scale_m = unit_m * number_of(metadata, "scale", is_vertical ? r->z_scale : 1.0);
+        r->g->maps_heights = !is_vertical && (r->z_scale != 1.0 || r->z_offset != 0.0);
     }
     free(metadata);
     return rc;
@@ -265,6 +272,8 @@ int geotiff_read(const char *path, struct geotiff *geotiff, struct sh_err *err)
     *geotiff = (struct geotiff){0};
     if (r == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the tags of a GeoTIFF");
     r->g = geotiff;
+    r->z_scale = 1.0;
+    r->z_offset = 0.0;
     r->err = err;
     int rc = tags_open(&r->tags, path, err);
     if (rc == SH_OK) rc = read_size(r);

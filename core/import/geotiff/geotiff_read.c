@@ -287,8 +287,9 @@ static int count_alone(struct raster *r, struct sh_err *err)
 /* Values that mean no height, as a rule, where the file doesn't say so. There are none of these on the Earth. */
 static void doubt_heights(const struct raster *r)
 {
-    const double odd = r->lowest < -11500.0 || r->lowest == -9999.0 ? r->lowest : r->highest;
-    if (odd != r->lowest && odd <= 9000.0) return;
+    const int is_low = r->lowest < -11500.0 || r->lowest == -9999.0;
+    const double odd = is_low ? r->lowest : r->highest;
+    if (!is_low && odd <= 9000.0) return;
     sh_warn(
         r->b->report,
         "%s: its heights go from %g to %g m; where %g means that there is none, gdal_translate -a_nodata says it in the "
@@ -312,6 +313,12 @@ static int say(struct raster *r, struct sh_err *err)
     if (!r->g.height_unit_given && r->g.unit_m != 1.0)
         sh_warn(report, "%s: its system is in feet, and the unit of its heights is not named: metres are assumed",
                 r->b->name);
+    if (r->g.maps_heights)
+        sh_warn(
+            report,
+            "%s: its ModelPixelScale or ModelTiepoint scales the heights, which is not used, since the file names no "
+            "system of theirs",
+            r->b->name);
     doubt_heights(r);
     return rc;
 }
