@@ -4,7 +4,7 @@
 #include <tiffio.h>
 
 #include "core/geotiff.h"
-#include "tests/unit/geotiff_rig.h"
+#include "tests/common/tif.h"
 #include "tests/unit/scene_files.h"
 
 /* 5 x 4 cells; whole numbers, which all types hold. */

@@ -4,7 +4,7 @@
 #include <math.h>
 
 #include "core/crs.h"
-#include "tests/unit/geotiff_rig.h"
+#include "tests/common/tif.h"
 
 static struct site *site;
 static double flat[21 * 21];

@@ -2,7 +2,7 @@
 #include <tiffio.h>
 
 #include "tests/common/thorough.h"
-#include "tests/unit/geotiff_rig.h"
+#include "tests/common/tif.h"
 #include "tests/unit/scene_files.h"
 
 static const double heights[20] = {10, 11, 12, 13, 14, 20, 22, 24, 26, 28, 5, 6, 7, 8, 9, 100, 90, 80, 70, 60};

@@ -1,6 +1,6 @@
 /* Small GeoTIFFs for tests, by libtiff. */
-#ifndef TESTS_UNIT_GEOTIFF_RIG_H
-#define TESTS_UNIT_GEOTIFF_RIG_H
+#ifndef TESTS_COMMON_TIF_H
+#define TESTS_COMMON_TIF_H
 
 #include <stddef.h>
 #include <stdint.h>

@@ -1,4 +1,4 @@
-#include "tests/unit/geotiff_rig.h"
+#include "tests/common/tif.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
