@@ -27,7 +27,7 @@ Q = $(Q_$(V))
 
 # What a fresh Debian 12 needs. Building and the demo:
 DEPS_BUILD = gcc g++ make pkg-config libc6-dev libembree-dev libassimp-dev libgeographiclib-dev libproj-dev libyaml-dev libpng-dev \
-	libstb-dev nettle-dev libusb-1.0-0-dev libusbredirparser-dev libwebsockets-dev libjansson-dev libwebp-dev \
+	libstb-dev nettle-dev libusb-1.0-0-dev libusbredirparser-dev libwebsockets-dev libjansson-dev libwebp-dev libtiff-dev \
 	libmeshoptimizer-dev assimp-testmodels \
 	$(if $(shell command -v npm),,nodejs npm)
 # and the tests, with the second compiler and its sanitizers, clients and readers of recordings that are not ours:
@@ -40,7 +40,7 @@ DEPS_BROWSER = chromium
 
 # Without libusbredirparser everything builds but the back end that needs it.
 USBREDIR = $(eval USBREDIR := $$(shell $(PKG_CONFIG) --exists libusbredirparser-0.5 && echo libusbredirparser-0.5))$(USBREDIR)
-PKGS = yaml-0.1 libpng proj nettle libusb-1.0 libwebsockets jansson libwebp $(USBREDIR)
+PKGS = yaml-0.1 libpng proj nettle libusb-1.0 libwebsockets jansson libwebp libtiff-4 $(USBREDIR)
 ask_pkg_config = $(shell $(PKG_CONFIG) $(1) $(PKGS))$(if $(filter-out 0,$(.SHELLSTATUS)),$(error $(PKG_CONFIG) does not \
 	find all of $(PKGS): make deps-build, or PKG_CONFIG=... for another machine))
 PKG_CFLAGS = $(eval PKG_CFLAGS := $$(call ask_pkg_config,--cflags))$(PKG_CFLAGS)

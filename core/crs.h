@@ -22,4 +22,8 @@ struct crs_place {
 int crs_locate(const char *name, double easting_m, double northing_m, double height_m, struct crs_place *place,
                struct sh_err *err);
 
+/* Metres per unit of a projected system's axes, or of a vertical one's, which must point up. SH_EINPUT: an unknown name, or
+ * another kind of system. */
+int crs_unit(const char *name, int is_vertical, double *unit_m, struct sh_err *err);
+
 #endif

@@ -62,8 +62,8 @@ struct scene_places {
 };
 
 struct scene_mesh_spec {
-    const char
-        *file; /* ending chooses the reader: .obj .ply .stl in double; .ifc by two readers; .gltf .glb by their own;
+    const char *
+        file; /* ending chooses the reader: .obj .ply .stl .tif in double; .ifc by two readers; .gltf .glb by their own;
                        * others by Assimp */
     enum scene_up up;
     double scale;       /* metres per unit of the file, > 0 */
@@ -169,7 +169,7 @@ struct scene {
 
 /* Loads all meshes into one scene.
  * tolerance_m: the largest error of a vertex that is allowed. A file read in single precision (all
- *   but .obj, .ply and .stl) is refused, with the figure, where 6e-8 of its coordinates, and of the numbers that place
+ *   but .obj, .ply, .stl and .tif) is refused, with the figure, where 6e-8 of its coordinates, and of the numbers that place
  *   them, come to more.
  *   An error above 1e-6 m is warned of, also that of a binary .ply with float coordinates, and of a binary .stl.
  * Errors (SH_EINPUT, naming the file): missing or unreadable, not a mesh, no triangles, a coordinate that is

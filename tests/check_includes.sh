@@ -8,11 +8,11 @@
 #
 # In core and in firmware_sim a room may use itself and the rooms before it in this list. Files that lie in core itself are
 # the first room, `core`: errors, lines, vectors, angles, random numbers.
-core_order='core picture mesh texture scene schedule georef pose surface instrument detect bvh sight footprint cast plan analysis standpoint coverage'
+core_order='core picture mesh texture georef scene schedule pose surface instrument detect bvh sight footprint cast plan analysis standpoint coverage'
 firmware_order='base command fault config site device loop replay app'
 # The folders of core/import are of the room `scene`, which calls them, and whose builder they fill.
 # Headers in core/ that belong to a room with another name, as HEADER:ROOM.
-core_headers='scan_mesh:mesh decimate:mesh cloud:analysis cloud_picture:analysis deviation:analysis figures:analysis distance:analysis map:analysis view:analysis geoframe:georef locate:georef crs:georef ifc_site:scene scene_copies:scene scene_objects:scene body:scene embree:bvh'
+core_headers='scan_mesh:mesh decimate:mesh cloud:analysis cloud_picture:analysis deviation:analysis figures:analysis distance:analysis map:analysis view:analysis geoframe:georef locate:georef crs:georef ifc_site:scene geotiff:scene scene_copies:scene scene_objects:scene body:scene embree:bvh'
 # Everything in firmware_sim may use core and drivers. core uses nothing else. In drivers:
 #   protocol       itself, core/line.h, core/err.h
 #   socket         itself, core/err.h

@@ -1,6 +1,7 @@
 #include "core/crs.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "core/angle.h"
 #include "core/georef/proj_lib.h"
@@ -51,6 +52,24 @@ static int read_system(struct grid *grid, struct sh_err *err)
     if (is_projected) return SH_OK;
     return sh_fail(err, SH_EINPUT, "%s: %s; allowed is a projected system, as EPSG:25832 is", grid->name,
                    is_known ? "not a projected coordinate reference system" : "no such coordinate reference system");
+}
+
+static int read_vertical(const struct grid *grid, double *unit_m, struct sh_err *err)
+{
+    const struct proj_lib *lib = &grid->lib;
+    PJ *crs = lib->proj_create(grid->context, grid->name), *axes = NULL;
+    const char *direction = "";
+    if (crs != NULL && lib->proj_get_type(crs) == PJ_TYPE_VERTICAL_CRS)
+        axes = lib->proj_crs_get_coordinate_system(grid->context, crs);
+    const int is_up =
+        axes != NULL &&
+        lib->proj_cs_get_axis_info(grid->context, axes, 0, NULL, NULL, &direction, unit_m, NULL, NULL, NULL) &&
+        strcmp(direction, "up") == 0;
+    lib->proj_destroy(axes);
+    lib->proj_destroy(crs);
+    if (is_up) return SH_OK;
+    return sh_fail(err, SH_EINPUT, "%s: not a system of heights that count upward; allowed is one, as EPSG:5773 is",
+                   grid->name);
 }
 
 static int open_transformation(struct grid *grid, struct sh_err *err)
@@ -112,17 +131,36 @@ static int locate(const struct grid *grid, double easting_m, double northing_m, 
     return SH_OK;
 }
 
+/* PROJ without its words on stderr, and without a network. */
+static int open_proj(struct grid *grid, struct sh_err *err)
+{
+    int rc = proj_lib_load(&grid->lib, err);
+    if (rc != SH_OK) return rc;
+    grid->context = grid->lib.proj_context_create();
+    if (grid->context == NULL) return sh_fail(err, SH_ENOMEM, "no memory for PROJ");
+    grid->lib.proj_log_level(grid->context, PJ_LOG_NONE);
+    grid->lib.proj_context_set_enable_network(grid->context, 0);
+    return SH_OK;
+}
+
+int crs_unit(const char *name, int is_vertical, double *unit_m, struct sh_err *err)
+{
+    struct grid grid = {.name = name};
+    int rc = open_proj(&grid, err);
+    if (rc != SH_OK) return rc;
+    rc = is_vertical ? read_vertical(&grid, unit_m, err) : read_system(&grid, err);
+    if (rc == SH_OK && !is_vertical) *unit_m = grid.unit_m;
+    grid.lib.proj_context_destroy(grid.context);
+    return rc;
+}
+
 int crs_locate(const char *name, double easting_m, double northing_m, double height_m, struct crs_place *place,
                struct sh_err *err)
 {
     struct grid grid = {.name = name};
     *place = (struct crs_place){.at.height_m = height_m, .accuracy_m = NAN};
-    int rc = proj_lib_load(&grid.lib, err);
+    int rc = open_proj(&grid, err);
     if (rc != SH_OK) return rc;
-    grid.context = grid.lib.proj_context_create();
-    if (grid.context == NULL) return sh_fail(err, SH_ENOMEM, "no memory for PROJ");
-    grid.lib.proj_log_level(grid.context, PJ_LOG_NONE);
-    grid.lib.proj_context_set_enable_network(grid.context, 0);
     rc = read_system(&grid, err);
     if (rc == SH_OK) rc = open_transformation(&grid, err);
     if (rc == SH_OK) rc = locate(&grid, easting_m, northing_m, place, err);

@@ -1,5 +1,5 @@
-/* Import apart. Assimp and the readers of IFC crash, hang or take all memory on some broken files; so each, and the reader
- * of glTF, which calls decoders of others, reads in a process of its own, with limits, and what it gives is checked before it is used.
+/* Import apart. Assimp and the readers of IFC crash, hang or take all memory on some broken files; so each, and the readers
+ * of glTF and GeoTIFF, which call decoders of others, reads in a process of its own, with limits, and what it gives is checked before it is used.
  *
  *   import_apart.c     this process: starts the other ones, looks after them, says how they ended
  *   import_child.c     the other process: its limits, its messages, its work, or the program that does it
@@ -27,7 +27,8 @@ struct import_task {
     struct scene_build *b; /* of the parent; the child only reads it */
     struct scene_import_limits limits;
     const char *name;        /* of the reader, for messages */
-    const char *const *argv; /* a program that reads, NULL-terminated, found by PATH; NULL: Assimp or glTF, in a fork */
+    const char *const *argv; /* a program that reads, NULL-terminated, found by PATH; NULL: `read`, in a fork */
+    int (*read)(struct scene_build *b, struct sh_err *err); /* fills a builder of the fork */
     pid_t parent;
     int result_fd, note_fd; /* the scene, the messages; a program finds them as 3 and 4 */
 };

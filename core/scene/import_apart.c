@@ -1,3 +1,5 @@
+#include "core/geotiff.h"
+#include "core/import/geotiff/geotiff_read.h"
 #include "core/import/gltf/gltf_read.h"
 #include "core/scene/import.h"
 
@@ -238,8 +240,14 @@ int import_judge(struct import_apart *a, struct sh_err *err)
 
 int import_apart(struct scene_build *b, struct sh_err *err)
 {
-    struct import_apart a = {.task = {.b = b, .limits = build_limits(b), .name = "Assimp"}};
-    if (gltf_is_name(b->spec->file)) a.task.name = "the reader of glTF";
+    struct import_apart a = {.task = {.b = b, .limits = build_limits(b), .name = "Assimp", .read = import_assimp}};
+    if (gltf_is_name(b->spec->file)) {
+        a.task.name = "the reader of glTF";
+        a.task.read = import_gltf;
+    } else if (geotiff_is_name(b->spec->file)) {
+        a.task.name = "the reader of GeoTIFF";
+        a.task.read = import_geotiff;
+    }
     struct import_apart *const all[1] = {&a};
     int rc = import_start(&a, err);
     if (rc != SH_OK) return rc;

@@ -1,9 +1,8 @@
 /* The process that reads: limits first, then the work, then the scene into the file of the task.
  *
- * For Assimp and for glTF it is a fork without exec, perhaps of a process with threads, of which only this one is left. glibc lets
+ * For all but IFC it is a fork without exec, perhaps of a process with threads, of which only this one is left. glibc lets
  * such a process use malloc and stdio; nothing else of the parent's threads is touched. It ends by _exit,
  * which runs nobody's destructors. */
-#include "core/import/gltf/gltf_read.h"
 #include "core/scene/import.h"
 
 #include <errno.h>
@@ -140,7 +139,7 @@ static int read_scene(const struct import_task *task, struct sh_err *err)
     if (rc != SH_OK) return rc;
     own.start_ns = task->b->start_ns;
     build_begin_file(&own, task->b->spec);
-    rc = gltf_is_name(own.spec->file) ? import_gltf(&own, err) : import_assimp(&own, err);
+    rc = task->read(&own, err);
     if (rc == SH_OK) rc = build_end_file(&own, err);
     return rc == SH_OK ? import_result_write(own.scene, RESULT_FD, err) : rc;
 }

@@ -15,8 +15,9 @@ static const struct {
     const char *ending;
     int (*read)(struct scene_build *b, struct sh_err *err);
 } readers[] = {
-    {".obj", read_obj},     {".ply", read_ply},     {".stl", read_stl},     {".gltf", import_apart},
-    {".glb", import_apart}, {".fbx", import_apart}, {".dae", import_apart}, {".ifc", read_ifc},
+    {".obj", read_obj},     {".ply", read_ply},      {".stl", read_stl},     {".gltf", import_apart},
+    {".glb", import_apart}, {".fbx", import_apart},  {".dae", import_apart}, {".ifc", read_ifc},
+    {".tif", import_apart}, {".tiff", import_apart},
 };
 
 static int check_spec(struct scene_build *b, struct sh_err *err)
@@ -44,7 +45,8 @@ static int load_file(struct scene_build *b, const struct scene_mesh_spec *spec, 
         if (rc == SH_OK) rc = readers[i].read(b, err);
         return rc == SH_OK ? build_end_file(b, err) : rc;
     }
-    return build_fail(b, SH_EINPUT, err, "unknown ending; allowed are .obj .ply .stl .gltf .glb .fbx .dae .ifc");
+    return build_fail(b, SH_EINPUT, err,
+                      "unknown ending; allowed are .obj .ply .stl .gltf .glb .fbx .dae .ifc .tif .tiff");
 }
 
 static int has_textures(const struct scene_mesh_spec *specs, size_t n_specs)

@@ -20,8 +20,11 @@ void check_print_anchor(const struct site *site, FILE *out)
 {
     const struct config *cfg = site->cfg;
     const struct geoframe *f = &site->anchor.frame;
-    static const char *const source[] = {
-        [ANCHOR_EXPLICIT] = "explicit", [ANCHOR_IFC] = "ifc", [ANCHOR_UTM] = "utm", [ANCHOR_ECEF] = "ecef"};
+    static const char *const source[] = {[ANCHOR_EXPLICIT] = "explicit",
+                                         [ANCHOR_IFC] = "ifc",
+                                         [ANCHOR_UTM] = "utm",
+                                         [ANCHOR_ECEF] = "ecef",
+                                         [ANCHOR_GEOTIFF] = "geotiff"};
     const int of_station = cfg->scene.anchor.source == ANCHOR_NONE;
     if (!site->anchor.known) {
         fputs("anchor    none: each station stands for itself, the scene's y axis is its true north\n", out);

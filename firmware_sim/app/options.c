@@ -271,7 +271,7 @@ static const struct {
     const char *endings, *what, *verb, *rest;
 } others[] = {
     {".shs.pcapng", "a recorded stream", "record", " -o points.ply writes its points"},
-    {".obj.stl.gltf.glb.fbx.dae.ifc", "a mesh", "init", " writes a configuration that scans it"},
+    {".obj.stl.gltf.glb.fbx.dae.ifc.tif.tiff", "a mesh", "init", " writes a configuration that scans it"},
     {".ply", "a mesh or a point cloud", "init", " writes a configuration that scans a mesh"},
     {".las.laz.e57.ptx", "a recording", "report CONFIG", " compares points with the scene"},
 };

@@ -69,13 +69,13 @@ struct config_copy {
 enum { CONFIG_COPY_SCALES = 1000 }; /* from one over so much to so much */
 
 /* How the scene lies on the Earth; core/geoframe.h. */
-enum config_anchor_source { ANCHOR_NONE, ANCHOR_EXPLICIT, ANCHOR_IFC, ANCHOR_UTM, ANCHOR_ECEF };
+enum config_anchor_source { ANCHOR_NONE, ANCHOR_EXPLICIT, ANCHOR_IFC, ANCHOR_UTM, ANCHOR_ECEF, ANCHOR_GEOTIFF };
 struct config_anchor {
     enum config_anchor_source source;
     double origin_m[3], lat_deg, lon_deg, height_m, north_deg;
     uint32_t utm_zone; /* 0: UPS */
     int north;         /* hemisphere */
-    int height_given;  /* ifc: height_m stands in for RefElevation */
+    int height_given;  /* ifc: height_m stands in for RefElevation; geotiff: it is not 0 by default */
 };
 
 /* In which form a station's place on the Earth is given. */

@@ -63,15 +63,18 @@ static void check_head(struct cfg_reader *rd, const struct config *cfg)
 
 static void check_mesh(struct cfg_reader *rd, const struct config_mesh *mesh, uint32_t i)
 {
-    static const char *const endings[] = {".obj", ".ply", ".stl", ".gltf", ".glb", ".fbx", ".dae", ".ifc"};
+    static const char *const endings[] = {".obj", ".ply", ".stl", ".gltf", ".glb",
+                                          ".fbx", ".dae", ".ifc", ".tif",  ".tiff"};
     static const char path[] = "scene.meshes[].file";
     char shown[CFG_SHOW_MAX];
     const char *slash = strrchr(mesh->file, '/'), *dot = strrchr(mesh->file, '.'), *why;
     size_t known = 0;
-    while (known < 8 && (dot == NULL || (slash != NULL && dot < slash) || strcasecmp(dot, endings[known]) != 0))
+    while (known < CFG_LEN(endings) &&
+           (dot == NULL || (slash != NULL && dot < slash) || strcasecmp(dot, endings[known]) != 0))
         known++;
-    if (known == 8) {
-        cfg_fail_key(rd, path, i, "\"%s\" has no known ending; allowed .obj .ply .stl .gltf .glb .fbx .dae .ifc",
+    if (known == CFG_LEN(endings)) {
+        cfg_fail_key(rd, path, i,
+                     "\"%s\" has no known ending; allowed .obj .ply .stl .gltf .glb .fbx .dae .ifc .tif .tiff",
                      cfg_show(mesh->file, shown));
         return;
     }

@@ -15,7 +15,12 @@ static int fail_required(struct cfg_reader *rd, const char *path, uint32_t item,
 
 static void check_anchor(struct cfg_reader *rd, struct config *cfg)
 {
-    enum { IN_EXPLICIT = 1u << ANCHOR_EXPLICIT, IN_IFC = 1u << ANCHOR_IFC, IN_UTM = 1u << ANCHOR_UTM };
+    enum {
+        IN_EXPLICIT = 1u << ANCHOR_EXPLICIT,
+        IN_IFC = 1u << ANCHOR_IFC,
+        IN_UTM = 1u << ANCHOR_UTM,
+        IN_GEOTIFF = 1u << ANCHOR_GEOTIFF
+    };
     static const struct {
         const char *path;
         unsigned taken, required; /* bits of sources */
@@ -23,16 +28,15 @@ static void check_anchor(struct cfg_reader *rd, struct config *cfg)
         {"scene.anchor.origin_m", IN_EXPLICIT, 0},
         {"scene.anchor.lat_deg", IN_EXPLICIT, IN_EXPLICIT},
         {"scene.anchor.lon_deg", IN_EXPLICIT, IN_EXPLICIT},
-        {"scene.anchor.height_m", IN_EXPLICIT | IN_IFC, IN_EXPLICIT},
+        {"scene.anchor.height_m", IN_EXPLICIT | IN_IFC | IN_GEOTIFF, IN_EXPLICIT},
         {"scene.anchor.north_deg", IN_EXPLICIT, 0},
         {"scene.anchor.utm_zone", IN_UTM, IN_UTM},
         {"scene.anchor.hemisphere", IN_UTM, IN_UTM},
     };
-    static const char *const has[] = {[ANCHOR_NONE] = "source alone",
-                                      [ANCHOR_EXPLICIT] = "origin_m, lat_deg, lon_deg, height_m, north_deg",
-                                      [ANCHOR_IFC] = "height_m",
-                                      [ANCHOR_UTM] = "utm_zone, hemisphere",
-                                      [ANCHOR_ECEF] = "source alone"};
+    static const char *const has[] = {
+        [ANCHOR_NONE] = "source alone", [ANCHOR_EXPLICIT] = "origin_m, lat_deg, lon_deg, height_m, north_deg",
+        [ANCHOR_IFC] = "height_m",      [ANCHOR_UTM] = "utm_zone, hemisphere",
+        [ANCHOR_ECEF] = "source alone", [ANCHOR_GEOTIFF] = "height_m"};
     const char *source = cfg_word(rd, "scene.anchor.source", (int)cfg->scene.anchor.source);
     char why[64];
     cfg->scene.anchor.height_given = cfg_is_given(rd, "scene.anchor.height_m", 0);

@@ -10,6 +10,7 @@
 #include "core/ifc_site.h"
 #include "core/locate.h"
 #include "core/mat3.h"
+#include "firmware_sim/site/anchor_geotiff.h"
 
 /* A floor at the place that was given, or this little above it, is still found. */
 #define FLOOR_ABOVE_M 0.01
@@ -122,6 +123,8 @@ int placement_find_anchor(const struct config *cfg, const struct sh_report *repo
         return geoframe_set_tangent(&anchor->frame, a->origin_m, &at, a->north_deg, err);
     case ANCHOR_IFC:
         return anchor_by_ifc(cfg, report, &anchor->frame, err);
+    case ANCHOR_GEOTIFF:
+        return anchor_by_geotiff(cfg, report, &anchor->frame, err);
     case ANCHOR_UTM:
         return geoframe_set_grid(&anchor->frame, (int)a->utm_zone, a->north, err);
     case ANCHOR_ECEF:

@@ -13,7 +13,7 @@ struct placement_anchor {
     struct geoframe frame;
 };
 
-/* Sets the scene's frame; reads the IFC mesh where it is the source. report may be NULL. */
+/* Sets the scene's frame; reads the IFC or GeoTIFF meshes where they are the source. report may be NULL. */
 int placement_find_anchor(const struct config *cfg, const struct sh_report *report, struct placement_anchor *anchor,
                           struct sh_err *err);
 

@@ -1,9 +1,10 @@
-/* Meshes by our own readers: .obj with its library of materials, .ply, .stl, and what of an .ifc we read ourselves. Input:
+/* Meshes by our own readers: .obj with its library of materials, .ply, .stl, and what of an .ifc and a .tif we read ourselves. Input:
  * a byte (which, how), then the file; of an .obj what follows the line `#mtl` is its library in.mtl. A scene that is
  * made is whole; what is refused is refused in a line that names the file. */
 #include <math.h>
 #include <string.h>
 
+#include "core/geotiff.h"
 #include "core/ifc_site.h"
 #include "core/scene.h"
 #include "core/import/ifc/ifc_records.h"
@@ -58,6 +59,17 @@ static void load_ifc(const uint8_t *data, size_t size)
         fuzz_must_be_line(&err);
 }
 
+static void load_tif(const uint8_t *data, size_t size)
+{
+    struct geotiff g;
+    struct sh_err err = {0};
+    if (geotiff_read(fuzz_file(".tif", data, size), &g, &err) != SH_OK) {
+        fuzz_must_be_line(&err);
+        return;
+    }
+    fuzz_must(g.width >= 2 && g.height >= 2, "a raster has cells");
+}
+
 static void load_obj(const uint8_t *data, size_t size, unsigned how)
 {
     const uint8_t *at = size > 5 ? memmem(data, size, "\n#mtl\n", 6) : NULL;
@@ -81,8 +93,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     case 2:
         load(fuzz_file(".stl", in.p, in.n), how);
         break;
-    default:
-        load_ifc(in.p, in.n);
+    default: /* their first bytes tell them apart */
+        if (in.n > 1 && in.p[0] == in.p[1])
+            load_tif(in.p, in.n);
+        else
+            load_ifc(in.p, in.n);
         break;
     }
     return 0;

@@ -9,7 +9,7 @@ need qemu-aarch64-static qemu-user-static
 # Packages are unpacked and no more, so nothing of ARM runs while the root is made. The compilers of this machine link with
 # the libraries of the root: its Debian has to be the same.
 . /etc/os-release
-make_root "${VERSION_CODENAME:-bookworm}" --variant=extract --arch=arm64 --include=libc6-dev,libstdc++-$(aarch64-linux-gnu-gcc -dumpversion)-dev,libembree-dev,libassimp-dev,libgeographiclib-dev,libproj-dev,libyaml-dev,libpng-dev,libstb-dev,nettle-dev,libusb-1.0-0-dev,libusbredirparser-dev,libwebsockets-dev,libjansson-dev,libwebp-dev,libmeshoptimizer-dev,libcmocka-dev
+make_root "${VERSION_CODENAME:-bookworm}" --variant=extract --arch=arm64 --include=libc6-dev,libstdc++-$(aarch64-linux-gnu-gcc -dumpversion)-dev,libembree-dev,libassimp-dev,libgeographiclib-dev,libproj-dev,libyaml-dev,libpng-dev,libstb-dev,nettle-dev,libusb-1.0-0-dev,libusbredirparser-dev,libwebsockets-dev,libjansson-dev,libwebp-dev,libtiff-dev,libmeshoptimizer-dev,libcmocka-dev
 root=$(cd "$at/root" && pwd)
 # Links that begin at the root lead into this machine from here, and the linker would take static libraries instead.
 find "$root/usr/lib" "$root/lib" -type l -lname '/*' | while read -r link; do

@@ -255,8 +255,8 @@ const struct app_command app_init = {
     .summary = "write a first configuration for a mesh",
     .options = OPTIONS,
     .notes =
-        "MESH is a file .obj .ply .stl .gltf .glb .fbx .dae .ifc. Its unit and axes are taken where the format\n"
-        "defines them (glTF, Collada, IFC) or the file says them (FBX). Else metres and z up are assumed, or\n"
+        "MESH is a file .obj .ply .stl .gltf .glb .fbx .dae .ifc .tif. Its unit and axes are taken where the format\n"
+        "defines them (glTF, Collada, IFC, GeoTIFF) or the file says them (FBX). Else metres and z up are assumed, or\n"
         "millimetres where the mesh would be larger than 2 km; a warning says so. Coordinates of a projected system\n"
         "(large numbers beside the mesh's size), and a mesh that would be a thin plate in millimetres, are metres.\n"
         "\n"

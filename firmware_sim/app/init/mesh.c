@@ -7,6 +7,7 @@
 #include <strings.h>
 #include <unistd.h>
 
+#include "core/geotiff.h"
 #include "firmware_sim/app/app.h"
 
 /* Larger than this in metres, a mesh without a unit is taken to be in millimetres, but for a survey. */
@@ -145,9 +146,10 @@ static void turn(struct scene *scene, const struct init_mesh *as, double scale)
     }
 }
 
-static int fail(const struct sh_err *why, int code, struct sh_err *err)
+/* A raster is not to become a mesh: its reader says what to do. */
+static int fail(const char *file, const struct sh_err *why, int code, struct sh_err *err)
 {
-    if (code != SH_EINPUT) return sh_fail(err, code, "%s", why->text);
+    if (code != SH_EINPUT || geotiff_is_name(file)) return sh_fail(err, code, "%s", why->text);
     return sh_fail(err, code, "%.380s; a mesh of triangles is needed: export it again, for instance as .obj or .ply",
                    why->text);
 }
@@ -163,7 +165,7 @@ int init_load_mesh(const struct init_wish *wish, const char *name, struct scene 
     struct sh_err why = {0};
     if (access(wish->file, R_OK) != 0) return sh_fail(err, SH_EINPUT, "%s: %s", wish->file, strerror(errno));
     int rc = scene_load(&spec, 1, INFINITY, &quiet, scene, &why);
-    if (rc != SH_OK) return fail(&why, rc, err);
+    if (rc != SH_OK) return fail(wish->file, &why, rc, err);
     choose_up(wish, name, *scene, mesh);
     choose_scale(wish, name, *scene, mesh);
     turn(*scene, mesh, mesh->scale / spec.scale);

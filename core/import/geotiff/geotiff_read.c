@@ -1,0 +1,358 @@
+/* Cells by libtiff, row by row: whatever is packed, predicted, striped or tiled comes as plain numbers of this machine. */
+#include "core/import/geotiff/geotiff_read.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <tiffio.h>
+
+#include "core/geotiff.h"
+
+#define NONE UINT32_MAX /* no vertex */
+
+struct raster {
+    struct scene_build *b;
+    struct geotiff g;
+    TIFF *tif;
+    char said[160]; /* libtiff's error */
+    uint16_t bits, format;
+    double no_data;                     /* as the cells' type holds it */
+    uint32_t block_width, block_height; /* of a tile, or of a strip, which is as wide as the raster */
+    size_t block_bytes;
+    uint8_t *block;
+    double *value;    /* [block_height][width] heights in metres; NaN: none */
+    uint32_t *number; /* [2][width] vertices of the row before, and of this one */
+    uint16_t label;
+    uint64_t n_holes, n_alone; /* cells without a height; heights that touch no triangle */
+    double lowest, highest;    /* values, m */
+};
+
+/* ---- the file */
+
+static int keep_error(TIFF *tif, void *raster, const char *module, const char *fmt, va_list ap)
+{
+    struct raster *r = raster;
+    (void)tif;
+    (void)module;
+    if (r->said[0] == '\0') vsnprintf(r->said, sizeof r->said, fmt, ap);
+    return 1;
+}
+
+static int drop_warning(TIFF *tif, void *raster, const char *module, const char *fmt, va_list ap)
+{
+    (void)tif, (void)raster, (void)module, (void)fmt, (void)ap;
+    return 1; /* the tags of GeoTIFF are unknown to libtiff */
+}
+
+static int fail_reading(struct raster *r, const char *what, struct sh_err *err)
+{
+    return build_fail(r->b, SH_EINPUT, err, "%s can't be read: %s", what,
+                      r->said[0] != '\0' ? r->said : "libtiff says no reason");
+}
+
+static int open_tiff(struct raster *r, struct sh_err *err)
+{
+    TIFFOpenOptions *options = TIFFOpenOptionsAlloc();
+    if (options == NULL) return build_fail(r->b, SH_ENOMEM, err, "no memory");
+    TIFFOpenOptionsSetErrorHandlerExtR(options, keep_error, r);
+    TIFFOpenOptionsSetWarningHandlerExtR(options, drop_warning, r);
+    r->tif = TIFFOpenExt(r->b->spec->file, "r", options);
+    TIFFOpenOptionsFree(options);
+    return r->tif != NULL ? SH_OK : fail_reading(r, "its directory", err);
+}
+
+/* Other images of the file: smaller ones of the same are left, a mask would be holes, others are not looked at. */
+static int look_at_others(struct raster *r, struct sh_err *err)
+{
+    unsigned n = 0, n_masks = 0;
+    while (TIFFReadDirectory(r->tif)) {
+        uint32_t type = 0;
+        TIFFGetFieldDefaulted(r->tif, TIFFTAG_SUBFILETYPE, &type);
+        n_masks += (type & FILETYPE_MASK) != 0;
+        n += (type & (FILETYPE_MASK | FILETYPE_REDUCEDIMAGE)) == 0;
+    }
+    if (n_masks > 0)
+        return build_fail(
+            r->b, SH_EINPUT, err,
+            "a mask says which cells have no height; allowed is a value for them: gdalwarp -dstnodata -9999 "
+            "makes one");
+    if (n > 0) sh_warn(r->b->report, "%s: %u further images in it are not read, only the first", r->b->name, n);
+    r->said[0] = '\0'; /* of the directory that there is not */
+    return TIFFSetDirectory(r->tif, 0) ? SH_OK : fail_reading(r, "its directory", err);
+}
+
+/* Heights: one band of numbers that is no picture. */
+static int check_band(struct raster *r, struct sh_err *err)
+{
+    uint16_t bands = 1, photometric = PHOTOMETRIC_MINISBLACK;
+    TIFFGetFieldDefaulted(r->tif, TIFFTAG_SAMPLESPERPIXEL, &bands);
+    TIFFGetFieldDefaulted(r->tif, TIFFTAG_BITSPERSAMPLE, &r->bits);
+    TIFFGetFieldDefaulted(r->tif, TIFFTAG_SAMPLEFORMAT, &r->format);
+    TIFFGetField(r->tif, TIFFTAG_PHOTOMETRIC, &photometric);
+    if (photometric != PHOTOMETRIC_MINISBLACK)
+        return build_fail(
+            r->b, SH_EINPUT, err,
+            "a picture (%u bands, PhotometricInterpretation %u), not heights; allowed is one band of heights", bands,
+            photometric);
+    if (bands != 1)
+        return build_fail(r->b, SH_EINPUT, err,
+                          "%u bands; allowed is one, of heights: gdal_translate -b 1 takes the first", bands);
+    const int is_float = r->format == SAMPLEFORMAT_IEEEFP;
+    if ((is_float || r->format == SAMPLEFORMAT_UINT || r->format == SAMPLEFORMAT_INT) &&
+        (r->bits == 32 || r->bits == 64 || (!is_float && (r->bits == 8 || r->bits == 16))))
+        return SH_OK;
+    return build_fail(
+        r->b, SH_EINPUT, err,
+        "cells of %u bits, SampleFormat %u; allowed are whole numbers of 8, 16, 32, 64 bits and floats of 32, "
+        "64: gdal_translate -ot Float32 makes these",
+        r->bits, r->format);
+}
+
+/* Vertices, triangles and labels, here and on their way back. */
+static int check_memory(struct raster *r, struct sh_err *err)
+{
+    const struct scene *s = NULL;
+    const double cells = (double)r->g.width * r->g.height;
+    const double mib = cells * 2.0 * (sizeof *s->vertex_m + 2.0 * (sizeof *s->triangle + sizeof *s->label)) / 1048576.0;
+    const unsigned allowed = build_limits(r->b).memory_mib;
+    if (mib <= allowed) return SH_OK;
+    return build_fail(
+        r->b, SH_EINPUT, err,
+        "%u x %u cells are up to %.3g million triangles, and reading them takes up to %.0f MiB; allowed are %u "
+        "(scene.import_memory_mib): cut a part out (gdal_translate -projwin), or make it coarser "
+        "(gdal_translate -outsize 25%% 25%% -r average)",
+        r->g.width, r->g.height, 2e-6 * cells, mib, allowed);
+}
+
+static int set_up_blocks(struct raster *r, struct sh_err *err)
+{
+    uint32_t width = 0, height = 0;
+    TIFFGetField(r->tif, TIFFTAG_IMAGEWIDTH, &width);
+    TIFFGetField(r->tif, TIFFTAG_IMAGELENGTH, &height);
+    if (width != r->g.width || height != r->g.height)
+        return build_fail(r->b, SH_EINPUT, err, "its size makes no sense: %u x %u", width, height);
+    r->block_width = width;
+    r->block_height = height;
+    if (TIFFIsTiled(r->tif)) {
+        TIFFGetField(r->tif, TIFFTAG_TILEWIDTH, &r->block_width);
+        TIFFGetField(r->tif, TIFFTAG_TILELENGTH, &r->block_height);
+    } else {
+        TIFFGetFieldDefaulted(r->tif, TIFFTAG_ROWSPERSTRIP, &r->block_height);
+    }
+    if (r->block_height > height && !TIFFIsTiled(r->tif)) r->block_height = height;
+    const tmsize_t bytes = TIFFIsTiled(r->tif) ? TIFFTileSize(r->tif) : TIFFStripSize(r->tif);
+    if (bytes <= 0 || r->block_width == 0 || r->block_height == 0 ||
+        (uint64_t)bytes != (uint64_t)r->block_width * r->block_height * (r->bits / 8u))
+        return build_fail(r->b, SH_EINPUT, err, "its tiles or strips of %u x %u cells make no sense", r->block_width,
+                          r->block_height);
+    r->block_bytes = (size_t)bytes;
+    r->block = malloc(r->block_bytes);
+    r->value = calloc((size_t)r->block_height * width, sizeof *r->value);
+    r->number = calloc(2 * (size_t)width, sizeof *r->number);
+    if (r->block != NULL && r->value != NULL && r->number != NULL) return SH_OK;
+    return build_fail(r->b, SH_ENOMEM, err, "no memory for its tiles or strips of %u x %u cells", r->block_width,
+                      r->block_height);
+}
+
+/* ---- cells */
+
+#define LOAD(type)               \
+    do {                         \
+        type v;                  \
+        memcpy(&v, p, sizeof v); \
+        return (double)v;        \
+    } while (0)
+
+static double load(const struct raster *r, const uint8_t *p)
+{
+    const int is_signed = r->format == SAMPLEFORMAT_INT;
+    if (r->format == SAMPLEFORMAT_IEEEFP && r->bits == 32) LOAD(float);
+    if (r->format == SAMPLEFORMAT_IEEEFP) LOAD(double);
+    if (r->bits == 8 && is_signed) LOAD(int8_t);
+    if (r->bits == 8) LOAD(uint8_t);
+    if (r->bits == 16 && is_signed) LOAD(int16_t);
+    if (r->bits == 16) LOAD(uint16_t);
+    if (r->bits == 32 && is_signed) LOAD(int32_t);
+    if (r->bits == 32) LOAD(uint32_t);
+    if (is_signed) LOAD(int64_t);
+    LOAD(uint64_t);
+}
+
+static double height_of(const struct raster *r, const uint8_t *p)
+{
+    const double value = load(r, p);
+    return isfinite(value) && value != r->no_data ? r->g.height_m + r->g.height_scale_m * value : NAN;
+}
+
+/* The cells of the block at a column and row. One without bytes is left out by who wrote the file: it has no heights. */
+static int read_block(struct raster *r, uint32_t x, uint32_t y, struct sh_err *err)
+{
+    const int is_tiled = TIFFIsTiled(r->tif);
+    const uint32_t n = is_tiled ? TIFFComputeTile(r->tif, x, y, 0, 0) : TIFFComputeStrip(r->tif, y, 0);
+    const uint32_t rows = r->g.height - y < r->block_height ? r->g.height - y : r->block_height;
+    const uint32_t columns = r->g.width - x < r->block_width ? r->g.width - x : r->block_width;
+    const size_t bytes = r->bits / 8u, need = bytes * r->block_width * (is_tiled ? r->block_height : rows);
+    const int is_empty = TIFFGetStrileByteCount(r->tif, n) == 0;
+    tmsize_t got = (tmsize_t)need;
+    if (!is_empty)
+        got = is_tiled ? TIFFReadEncodedTile(r->tif, n, r->block, (tmsize_t)r->block_bytes)
+                       : TIFFReadEncodedStrip(r->tif, n, r->block, (tmsize_t)r->block_bytes);
+    if (got < (tmsize_t)need) {
+        char what[64];
+        snprintf(what, sizeof what, "the %s of cells at column %u, row %u", is_tiled ? "tile" : "strip", x, y);
+        return fail_reading(r, what, err);
+    }
+    for (uint32_t i = 0; i < rows; i++)
+        for (uint32_t k = 0; k < columns; k++)
+            r->value[(size_t)i * r->g.width + x + k] =
+                is_empty ? NAN : height_of(r, r->block + bytes * ((size_t)i * r->block_width + k));
+    return SH_OK;
+}
+
+/* ---- triangles */
+
+static int add_row(struct raster *r, uint32_t y, const double *height, uint32_t *number, struct sh_err *err)
+{
+    const double *e = r->g.easting_m, *n = r->g.northing_m;
+    int rc = SH_OK;
+    for (uint32_t x = 0; x < r->g.width && rc == SH_OK; x++) {
+        number[x] = NONE;
+        if (isnan(height[x])) {
+            r->n_holes++;
+            continue;
+        }
+        const double v[3] = {e[0] + e[1] * x + e[2] * y, n[0] + n[1] * x + n[2] * y, height[x]};
+        r->lowest = fmin(r->lowest, height[x]);
+        r->highest = fmax(r->highest, height[x]);
+        number[x] = r->b->scene->n_vertices;
+        rc = build_vertex(r->b, v, err);
+    }
+    return rc;
+}
+
+/* Between four middles, counter-clockwise seen from above. With three heights it is the triangle between these. */
+static int add_quad(struct raster *r, const uint32_t *above, const uint32_t *below, int is_mirrored, struct sh_err *err)
+{
+    const uint32_t round[4] = {above[0], below[0], below[1], above[1]};
+    uint32_t corner[4];
+    size_t n = 0;
+    for (size_t i = 0; i < 4; i++) {
+        const uint32_t c = round[is_mirrored ? 3 - i : i];
+        if (c != NONE) corner[n++] = c;
+    }
+    int rc = SH_OK;
+    for (size_t i = 0; i + 2 < n && rc == SH_OK; i++) {
+        const uint32_t three[3] = {corner[0], corner[i + 1], corner[i + 2]};
+        memcpy(r->b->corner, three, sizeof three);
+        rc = build_polygon(r->b, 3, r->label, err);
+    }
+    return rc;
+}
+
+static int add_all(struct raster *r, struct sh_err *err)
+{
+    const struct geotiff *g = &r->g;
+    const int is_mirrored = g->easting_m[1] * g->northing_m[2] - g->easting_m[2] * g->northing_m[1] > 0.0;
+    int rc = SH_OK;
+    for (uint32_t y = 0; y < g->height && rc == SH_OK; y++) {
+        const uint32_t in_block = y % r->block_height;
+        uint32_t *number = r->number + (y % 2) * (size_t)g->width,
+                 *above = r->number + ((y + 1) % 2) * (size_t)g->width;
+        if (in_block == 0) rc = build_progress(r->b, (double)y / g->height, err);
+        for (uint32_t x = 0; in_block == 0 && x < g->width && rc == SH_OK; x += r->block_width)
+            rc = read_block(r, x, y, err);
+        if (rc == SH_OK) rc = add_row(r, y, r->value + (size_t)in_block * g->width, number, err);
+        for (uint32_t x = 0; y > 0 && x + 1 < g->width && rc == SH_OK; x++)
+            rc = add_quad(r, above + x, number + x, is_mirrored, err);
+    }
+    return rc;
+}
+
+/* ---- what is said */
+
+static int count_alone(struct raster *r, struct sh_err *err)
+{
+    const struct scene *s = r->b->scene;
+    uint8_t *used = calloc(s->n_vertices + 1u, 1);
+    if (used == NULL) return build_fail(r->b, SH_ENOMEM, err, "no memory");
+    for (uint32_t i = 0; i < s->n_triangles; i++)
+        for (int k = 0; k < 3; k++)
+            used[s->triangle[i][k]] = 1;
+    for (uint32_t i = 0; i < s->n_vertices; i++)
+        r->n_alone += !used[i];
+    free(used);
+    return SH_OK;
+}
+
+/* Values that mean no height, as a rule, where the file doesn't say so. There are none of these on the Earth. */
+static void doubt_heights(const struct raster *r)
+{
+    const int is_low = r->lowest < -11500.0 || r->lowest == -9999.0;
+    const double odd = is_low ? r->lowest : r->highest;
+    if (!is_low && odd <= 9000.0) return;
+    sh_warn(
+        r->b->report,
+        "%s: its heights go from %g to %g m; where %g means that there is none, gdal_translate -a_nodata says it in the "
+        "file",
+        r->b->name, r->lowest, r->highest, (odd - r->g.height_m) / r->g.height_scale_m);
+}
+
+static int say(struct raster *r, struct sh_err *err)
+{
+    const struct sh_report *report = r->b->report;
+    int rc = r->n_holes > 0 ? count_alone(r, err) : SH_OK;
+    if (r->n_holes == (uint64_t)r->g.width * r->g.height)
+        return build_fail(r->b, SH_EINPUT, err, "no cell of %u x %u has a height", r->g.width, r->g.height);
+    if (r->n_holes > 0)
+        sh_warn(report,
+                "%s: %llu of %llu cells have no height, and are holes; %llu heights beside them touch no triangle",
+                r->b->name, (unsigned long long)r->n_holes, (unsigned long long)r->g.width * r->g.height,
+                (unsigned long long)r->n_alone);
+    if (!r->g.unit_given)
+        sh_warn(report, "%s: neither its system nor its unit is named: metres are assumed", r->b->name);
+    if (!r->g.height_unit_given && r->g.unit_m != 1.0)
+        sh_warn(report, "%s: its system is in feet, and the unit of its heights is not named: metres are assumed",
+                r->b->name);
+    if (r->g.maps_heights)
+        sh_warn(
+            report,
+            "%s: its ModelPixelScale or ModelTiepoint scales the heights, which is not used, since the file names no "
+            "system of theirs",
+            r->b->name);
+    doubt_heights(r);
+    return rc;
+}
+
+static int read_raster(struct raster *r, struct sh_err *err)
+{
+    struct scene_build *b = r->b;
+    const uint64_t cells = (uint64_t)r->g.width * r->g.height;
+    int rc = check_band(r, err);
+    if (rc == SH_OK) rc = look_at_others(r, err);
+    if (rc == SH_OK) rc = check_memory(r, err);
+    if (rc == SH_OK) rc = set_up_blocks(r, err);
+    if (rc == SH_OK) rc = build_label(b, build_base_name(b), (struct text_span){"", 0}, &r->label, err);
+    if (rc == SH_OK) rc = build_corners(b, 3, err);
+    if (rc == SH_OK) rc = build_reserve(b, cells, 2 * cells, err);
+    if (rc != SH_OK) return rc;
+    r->no_data = r->format == SAMPLEFORMAT_IEEEFP && r->bits == 32 ? (double)(float)r->g.no_data : r->g.no_data;
+    r->lowest = INFINITY;
+    r->highest = -INFINITY;
+    b->scene->n_meshes++;
+    b->scene->says = (struct scene_says){.unit_m = 1.0, .up = 3};
+    rc = add_all(r, err);
+    return rc == SH_OK ? say(r, err) : rc;
+}
+
+int import_geotiff(struct scene_build *b, struct sh_err *err)
+{
+    struct raster r = {.b = b};
+    int rc = geotiff_read(b->spec->file, &r.g, err);
+    if (rc == SH_OK) rc = open_tiff(&r, err);
+    if (rc == SH_OK) rc = read_raster(&r, err);
+    if (r.tif != NULL) TIFFClose(r.tif);
+    free(r.block);
+    free(r.value);
+    free(r.number);
+    return rc;
+}

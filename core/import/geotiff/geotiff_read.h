@@ -1,0 +1,10 @@
+/* A GeoTIFF of heights into a scene: a vertex at the middle of each cell, two triangles between four of them. */
+#ifndef CORE_IMPORT_GEOTIFF_GEOTIFF_READ_H
+#define CORE_IMPORT_GEOTIFF_GEOTIFF_READ_H
+
+#include "core/scene/build.h"
+
+/* Fills b as a reader does, in the process that reads: easting, northing and height, in metres, z up. */
+int import_geotiff(struct scene_build *b, struct sh_err *err);
+
+#endif

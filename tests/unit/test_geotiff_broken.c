@@ -1,0 +1,99 @@
+/* Broken GeoTIFFs, and ones too large: a line of text that names the file, and no reader that crashes. */
+#include <tiffio.h>
+
+#include "tests/common/thorough.h"
+#include "tests/common/tif.h"
+#include "tests/unit/scene_files.h"
+
+static const double heights[20] = {10, 11, 12, 13, 14, 20, 22, 24, 26, 28, 5, 6, 7, 8, 9, 100, 90, 80, 70, 60};
+
+static const char *tif_path(const char *name)
+{
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    return path;
+}
+
+/* A packed one of 5 x 4 cells; its length. */
+static size_t pack(uint8_t data[8192])
+{
+    struct tif t = tif_of(5, 4, heights);
+    t.compression = COMPRESSION_LZW;
+    t.predictor = 3;
+    tif_write(tif_path("whole.tif"), &t);
+    FILE *f = fopen(path, "rb");
+    assert_non_null(f);
+    const size_t n = fread(data, 1, 8192, f);
+    fclose(f);
+    unlink(path);
+    assert_true(n > 100 && n < 8192);
+    return n;
+}
+
+/* Anywhere: the directory is at the end, so each is an error with the file's name. */
+static void cut_off_anywhere(void **state)
+{
+    (void)state;
+    static uint8_t data[8192];
+    const size_t n = pack(data);
+    for (size_t cut = 0; cut < n; cut += cut < 16 ? 1 : (size_t)thorough(1, 11))
+        refuse("cut.tif", data, cut, cut < 8 ? "no TIFF" : "");
+    refuse("text.tif", "solid hall, or any other text", 29, "no TIFF by its first bytes");
+}
+
+/* One byte in a hundred is another one, by a fixed seed: terrain, or one line that names the file; no reader that crashes. */
+static void broken_bytes(void **state)
+{
+    (void)state;
+    static uint8_t whole[8192], data[8192];
+    const size_t n = pack(whole);
+    uint64_t seed = 34;
+    for (int i = 0; i < thorough(600, 40); i++) {
+        struct scene *s;
+        struct sh_err err;
+        memcpy(data, whole, n);
+        for (size_t k = 0; k < n; k++) {
+            seed = seed * 6364136223846793005u + 1442695040888963407u;
+            if (seed >> 33 < (1u << 31) / 100) data[k] = (uint8_t)(seed >> 25);
+        }
+        const struct scene_mesh_spec spec = {.file = write_file("broken.tif", data, n), .scale = 1};
+        const int rc = load_spec(&spec, 1e-3, &s, &err);
+        unlink(path);
+        if (rc != SH_OK && (strstr(err.text, "broken.tif: ") == NULL || strstr(err.text, "crashed") != NULL))
+            fail_msg("case %d: %s", i, err.text);
+        scene_free(s);
+    }
+}
+
+/* A raster too large is refused by its figures, before its cells are looked at. */
+static void too_many_triangles(void **state)
+{
+    (void)state;
+    struct tif t = tif_of(5, 4, heights);
+    struct scene_import_limits limits = scene_import_defaults;
+    struct scene *s;
+    struct sh_err err;
+    double *value = calloc(1000 * 900, sizeof *value);
+    t.width = 1000;
+    t.height = 900;
+    t.value = value;
+    limits.memory_mib = 64; /* 1000 * 900 * 2 * (24 + 2 * 14) bytes are 89.3 MiB */
+    tif_write(tif_path("large.tif"), &t);
+    const struct scene_mesh_spec spec = {.file = path, .scale = 1, .limits = &limits};
+    assert_int_equal(load_spec(&spec, 1e-3, &s, &err), SH_EINPUT);
+    unlink(path);
+    free(value);
+    if (strstr(err.text,
+               "1000 x 900 cells are up to 1.8 million triangles, and reading them takes up to 89 MiB; allowed "
+               "are 64 (scene.import_memory_mib)") == NULL)
+        fail_msg("%s", err.text);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(cut_off_anywhere),
+        cmocka_unit_test(broken_bytes),
+        cmocka_unit_test(too_many_triangles),
+    };
+    return cmocka_run_group_tests_name("geotiff_broken", tests, make_folder, remove_folder);
+}
