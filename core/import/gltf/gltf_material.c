@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/scene/import_material.h"
+#include "core/colour.h"
 
 enum { CLAMP_TO_EDGE = 33071, MIRRORED_REPEAT = 33648 };
 
@@ -182,7 +182,7 @@ static int keep_colour(struct gltf *g, const struct base *base, const char *at, 
     int rc = gltf_numbers(g, base->of, base->factor, at, 4, rgba, NULL);
     for (int k = 0; k < 3 && rc == SH_OK; k++) {
         if (!(rgba[k] >= 0.0 && rgba[k] <= 1.0)) return SH_OK; /* no colour of a surface */
-        surface->colour[k] = import_to_srgb(rgba[k]);
+        surface->colour[k] = (float)colour_srgb_encode(rgba[k]);
     }
     surface->has_colour = rc == SH_OK;
     return rc;
