@@ -132,13 +132,13 @@ static int add_products(struct reading *r)
 /* One that was asked and gave no answer. */
 static int say_missing(struct reading *r, const char *name, const struct sh_err *said)
 {
+    char why[IFC_REASON_LEN];
     if (said->code == 0) return SH_OK;
+    ifc_reason(r->b, name, said, why);
     if (r->limits.ifc_strict)
         return build_fail(r->b, SH_EINPUT, r->err,
-                          "not cross-checked; allowed only with both readers "
-                          "(scene.ifc_strict): %s: %.300s",
-                          name, said->text);
-    sh_warn(r->b->report, "%s: not cross-checked: %s gave no answer: %.300s", r->b->name, name, said->text);
+                          "not cross-checked; allowed only with both readers (scene.ifc_strict): %s", why);
+    sh_warn(r->b->report, "%s: not cross-checked: %s gave no answer: %s", r->b->name, name, why);
     return SH_OK;
 }
 
@@ -204,10 +204,23 @@ static int read_by_assimp(struct reading *r, const char *why)
     return rc == SH_OK ? import_apart(r->b, r->err) : rc;
 }
 
+/* Both readers take one that they don't know for metres. */
+static int say_unit(struct reading *r)
+{
+    const struct sh_err *said = &r->records.no_unit;
+    if (said->code == 0) return SH_OK;
+    if (r->limits.ifc_strict)
+        return sh_fail(r->err, SH_EINPUT, "%.420s; allowed only with one (scene.ifc_strict)", said->text);
+    sh_warn(r->b->report, "%s; it is read in metres (scene.meshes[].scale)", said->text);
+    return SH_OK;
+}
+
 static int read_records(struct reading *r)
 {
     char why[160] = "";
     int rc = ifc_records_open(&r->records, r->b->spec->file, r->err);
+    if (rc != SH_OK) return rc;
+    rc = say_unit(r);
     if (rc != SH_OK) return rc;
     if (r->limits.ifc_reader == IFC_READER_ASSIMP) return read_by_assimp(r, "scene.ifc_reader is assimp");
     if (r->limits.ifc_strict && r->limits.ifc_reader != IFC_READER_AUTO)
