@@ -228,16 +228,24 @@ static int read_materials(struct mtl *m, struct sh_err *err)
     return rc;
 }
 
+/* ", with 3 more", or nothing. */
+static const char *others(const struct missing *m, char text[40])
+{
+    text[0] = '\0';
+    if (m->n > 1) snprintf(text, 40, ", with %llu more", (unsigned long long)m->n - 1);
+    return text;
+}
+
 static void warn_of_missing(const struct mtl *m, const char *path)
 {
+    char more[40];
     if (!build_wants_textures(m->b)) return;
     if (m->colour.n > 0)
-        sh_warn(m->b->report, "%s, line %llu: Kd '%s' is left out, with %llu more; allowed are numbers from 0 to 1",
-                path, (unsigned long long)m->colour.line, m->colour.first, (unsigned long long)m->colour.n - 1);
+        sh_warn(m->b->report, "%s, line %llu: Kd '%s' is left out%s; allowed are numbers from 0 to 1", path,
+                (unsigned long long)m->colour.line, m->colour.first, others(&m->colour, more));
     if (m->texture.n > 0)
-        sh_warn(m->b->report,
-                "%s, line %llu: the texture '%s' is missing, with %llu more; it belongs beside the library or the mesh",
-                path, (unsigned long long)m->texture.line, m->texture.first, (unsigned long long)m->texture.n - 1);
+        sh_warn(m->b->report, "%s, line %llu: the texture '%s' is missing%s; it belongs beside the library or the mesh",
+                path, (unsigned long long)m->texture.line, m->texture.first, others(&m->texture, more));
 }
 
 static int read_library(struct mtl *m, const char *path, uint64_t line, struct sh_err *err)

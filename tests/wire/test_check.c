@@ -133,6 +133,46 @@ static void test_objects(void **state)
     free(all);
 }
 
+/* The table of a pipe is alone there, from its first line on. */
+static void test_objects_by_pipe(void **state)
+{
+    struct wire *wire = *state;
+    char config[352];
+    write_boxes(wire);
+    snprintf(config, sizeof config, "%s", wire_path(wire, "boxes.yaml"));
+    const char *const args[] = {"check", config, "--scene", "--scene-csv", "-", NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
+    char *out = wire_read(wire_path(wire, "out"), NULL), *err = wire_read(wire_path(wire, "err"), NULL);
+    int lines = 0;
+    for (const char *p = out; (p = strchr(p, '\n')) != NULL; p++)
+        lines++;
+    assert_int_equal(strncmp(out, "object,type,", 12), 0);
+    assert_int_equal(lines, 61);
+    assert_true(strstr(err, ": ok\n") != NULL && strstr(err, "\nobjects   60") != NULL);
+    free(out);
+    free(err);
+}
+
+/* Grey is what has no colour at all; of what has some, a part. */
+static void test_colours_in_part(void **state)
+{
+    struct wire *wire = *state;
+    wire_write_text(wire, "part.obj",
+                    "v 0 0 0 1 0 0\nv 9 0 0 0 1 0\nv 9 9 0 0 0 1\nv 0 9 0\no part\nf 1 2 3\nf 1 3 4\n");
+    wire_write_text(wire, "part.yaml",
+                    "head: {profile: sphere, step_deg: 2}\noutput: {crs: local, colour: texture}\n"
+                    "scene: {meshes: [{file: part.obj, up: z, scale: 1}]}\nstations: [{position_m: [5, 1, 1]}]\n");
+    char config[352];
+    snprintf(config, sizeof config, "%s", wire_path(wire, "part.yaml"));
+    const char *const args[] = {"check", config, NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
+    char *err = wire_read(wire_path(wire, "err"), NULL);
+    if (strstr(err, "have neither") != NULL ||
+        strstr(err, "1 of 1 surfaces have colours at some of their corners only") == NULL)
+        fail_msg("%s", err);
+    free(err);
+}
+
 static void test_help_of_a_section(void **state)
 {
     struct wire *wire = *state;
@@ -156,6 +196,8 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_all_faults, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_help_of_a_section, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_objects, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_objects_by_pipe, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_colours_in_part, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_example, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -145,9 +145,18 @@ static void turn(struct scene *scene, const struct init_mesh *as, double scale)
     }
 }
 
+/* An error may say what to do, or what is allowed, by itself. */
+static int has_advice(const char *text)
+{
+    static const char *const words[] = {"export ", "convert ", "copy it", "allowed", "scene.", "join "};
+    for (size_t i = 0; i < sizeof words / sizeof words[0]; i++)
+        if (strstr(text, words[i]) != NULL) return 1;
+    return 0;
+}
+
 static int fail(const struct sh_err *why, int code, struct sh_err *err)
 {
-    if (code != SH_EINPUT) return sh_fail(err, code, "%s", why->text);
+    if (code != SH_EINPUT || has_advice(why->text)) return sh_fail(err, code, "%s", why->text);
     return sh_fail(err, code, "%.380s; a mesh of triangles is needed: export it again, for instance as .obj or .ply",
                    why->text);
 }
