@@ -76,6 +76,7 @@ int build_label(struct scene_build *b, struct text_span object, struct text_span
     fresh->has_colour = 0;
     fresh->texture = fresh->opacity = fresh->vertex_colours = 0;
     fresh->solid = 0.5f;
+    fresh->clear = 0.0f;
     fresh->type[0] = fresh->guid[0] = '\0';
     int cut = scene_copy_name(fresh->object, sizeof fresh->object, object.p, object.n);
     cut += scene_copy_name(fresh->material, sizeof fresh->material, material.p, material.n);

@@ -33,6 +33,15 @@ static void keep_colour(const struct scene_build *b, const struct aiMaterial *ma
     surface->has_colour = 1;
 }
 
+/* glTF's own reader says it of its files; of those by Draco this does. */
+static void keep_clear(const struct aiMaterial *material, struct scene_surface *surface)
+{
+    ai_real opacity = 1.0f;
+    if (surface->clear > 0.0f || is_made_up(surface->material)) return;
+    if (aiGetMaterialFloatArray(material, AI_MATKEY_OPACITY, &opacity, NULL) != AI_SUCCESS) return;
+    if (opacity >= 0.0f && opacity < 1.0f) surface->clear = 1.0f - opacity;
+}
+
 void import_rgb(struct scene_build *b, const struct aiColor4D *colour, uint8_t rgb[4])
 {
     double c[3] = {(double)colour->r, (double)colour->g, (double)colour->b};
@@ -165,5 +174,6 @@ int import_material(struct scene_build *b, const struct aiScene *in, const struc
                     struct scene_surface *surface, struct sh_err *err)
 {
     keep_colour(b, material, surface);
+    keep_clear(material, surface);
     return build_wants_textures(b) ? keep_textures(b, in, material, surface, err) : SH_OK;
 }

@@ -1,5 +1,5 @@
-/* The material libraries of an OBJ file: newmtl; Kd, the diffuse colour; map_Kd, its texture; map_d, what cuts
- * holes. The rest is ignored. */
+/* The material libraries of an OBJ file: newmtl; Kd, the diffuse colour; d or Tr, its opacity; map_Kd, its texture; map_d,
+ * what cuts holes. The rest is ignored. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -23,6 +23,7 @@ struct mtl {
     uint32_t first;            /* surface of the OBJ */
     uint8_t *known;            /* [surfaces from first on] a library has their material */
     struct text_span material; /* newmtl */
+    bool has_opacity;          /* d of the material at hand, which counts before Tr */
     struct missing colour, texture;
 };
 
@@ -71,6 +72,7 @@ static bool has_material(const struct scene_surface *s, struct text_span materia
 static void set_material(struct mtl *m, struct text_span material)
 {
     m->material = material;
+    m->has_opacity = false;
     for (uint32_t i = m->first; i < m->b->scene->n_surfaces; i++)
         m->known[i - m->first] |= has_material(&m->b->scene->surface[i], material);
 }
@@ -109,6 +111,18 @@ static void take_colour(struct mtl *m)
         set_colour(m, rgb);
     else
         add_missing(&m->colour, at.line, text_rest(&at));
+}
+
+/* d: opacity; Tr: 1 less that. d -halo depends on the direction, and is none. */
+static void take_opacity(struct mtl *m, bool is_opacity)
+{
+    double share;
+    text_skip_blanks(&m->t);
+    if (!text_number(&m->t, &share) || !(share >= 0.0 && share <= 1.0) || (m->has_opacity && !is_opacity)) return;
+    m->has_opacity |= is_opacity;
+    for (uint32_t i = m->first; i < m->b->scene->n_surfaces; i++)
+        if (has_material(&m->b->scene->surface[i], m->material))
+            m->b->scene->surface[i].clear = (float)(is_opacity ? 1.0 - share : share);
 }
 
 /* ---- textures */
@@ -221,6 +235,7 @@ static int read_materials(struct mtl *m, struct sh_err *err)
         struct text_span word = text_word(&m->t);
         if (is_word(word, "newmtl")) set_material(m, text_rest(&m->t));
         if (is_word(word, "Kd")) take_colour(m);
+        if (is_word(word, "d") || is_word(word, "Tr")) take_opacity(m, is_word(word, "d"));
         bool is_opacity = is_word(word, "map_d");
         if ((is_opacity || is_word(word, "map_Kd")) && build_wants_textures(m->b))
             rc = set_texture(m, text_rest(&m->t), is_opacity, err);

@@ -95,6 +95,7 @@ static void products_are_found(void **state)
     const struct ifc_style *style = ifc_style_by_colour(&records, floor, (const float[4]){0.2f, 0.4f, 0.6f, 0.3f});
     assert_non_null(style);
     assert_string_equal(style->name, "Glas");
+    assert_true(style->clear == 0.7f);
     assert_null(ifc_style_by_colour(&records, floor, (const float[4]){1, 1, 1, 1}));
     assert_null(ifc_style_by_colour(&records, far, (const float[4]){0.2f, 0.4f, 0.6f, 0.3f}));
     ifc_records_close(&records);

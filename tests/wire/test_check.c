@@ -173,6 +173,42 @@ static void test_colours_in_part(void **state)
     free(err);
 }
 
+/* What a file calls transparent is solid until `surfaces` says something; the line to write is in the warning. */
+static void test_transparent(void **state)
+{
+    struct wire *wire = *state;
+    static const char begin[] =
+        "head: {profile: sphere, step_deg: 2}\noutput: {crs: local}\nstations: [{position_m: [5, 1, 1]}]\n"
+        "scene: {meshes: [{file: pane.obj, up: z, scale: 1}]}\n";
+    static const char line[] = "surfaces: [{material: \"a [1]\", glass: 0.7}, {material: \"b\", glass: 0.9}]";
+    char config[352], text[1024], *rules;
+    wire_write_text(wire, "pane.mtl", "newmtl a [1]\nKd 1 1 1\nTr 0.1\nd 0.3\nnewmtl b\nTr 1\nnewmtl c\nd 1\n");
+    wire_write_text(wire, "pane.obj",
+                    "mtllib pane.mtl\nv 0 0 0\nv 9 0 0\nv 9 9 0\nv 0 9 0\nusemtl a [1]\no x\nf 1 2 3\no y\nf 1 3 4\n"
+                    "usemtl b\nf 1 2 4\nusemtl c\nf 2 3 4\n");
+    for (int i = 0; i < 2; i++) {
+        char *escaped = strdup(line), *at = i == 0 ? NULL : strstr(escaped, "[1]");
+        snprintf(text, sizeof text, "%s", begin);
+        if (at != NULL)
+            snprintf(text + strlen(text), sizeof text - strlen(text), "%.*s\\\\%s\n", (int)(at - escaped), escaped, at);
+        free(escaped);
+        snprintf(config, sizeof config, "%s", wire_write_text(wire, "pane.yaml", text));
+        const char *const args[] = {"check", config, "--scene", NULL};
+        if (wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)) != 0)
+            fail_msg("%s", wire_read(wire_path(wire, "err"), NULL));
+        char *err = wire_read(wire_path(wire, "err"), NULL), *out = wire_read(wire_path(wire, "out"), NULL);
+        rules = strstr(err, "3 surfaces are transparent by the file, and measured as solid;");
+        assert_int_equal(rules != NULL, i == 0);
+        if (i == 0)
+            assert_non_null(strstr(rules, "{material: \"a \\\\[1]\", glass: 0.7}, {material: \"b\", glass: 0.9}]"));
+        if (strstr(out, "clear     70 %: x, material a [1]\n") == NULL ||
+            strstr(out, "clear     100 %: y, material b\n") == NULL || strstr(out, "material c") != NULL)
+            fail_msg("%s", out);
+        free(err);
+        free(out);
+    }
+}
+
 static void test_help_of_a_section(void **state)
 {
     struct wire *wire = *state;
@@ -197,6 +233,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_help_of_a_section, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_objects, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_objects_by_pipe, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_transparent, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_colours_in_part, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_example, wire_setup, wire_teardown),
     };

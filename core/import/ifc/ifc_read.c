@@ -82,6 +82,7 @@ static int label_part(struct reading *r, const struct ifc_product *p, const stru
     if (style == NULL) return SH_OK;
     memcpy(surface->colour, part->colour, sizeof surface->colour);
     surface->has_colour = 1;
+    surface->clear = style->clear;
     return SH_OK;
 }
 
@@ -115,13 +116,14 @@ static int add_products(struct reading *r)
     const struct ifc_readings *in = &r->readings;
     int rc = SH_OK;
     for (size_t i = 0; i < r->records.n_products && rc == SH_OK; i++) {
-        const struct ifc_product *p = &r->records.product[i];
+        struct ifc_product *p = &r->records.product[i];
         if (p->opens_nothing) r->finding[i] = IFC_UNCUT;
         if (p->is_air) continue;
         const struct ifc_body *web = with_parts(&in->web, in->has_web, p->id),
                               *lite = with_parts(&in->lite, in->has_lite, p->id);
         const struct ifc_choice choice = ifc_choose(p, web, lite, in->has_web && in->has_lite);
         r->finding[i] = choice.finding;
+        p->is_coarse = p->is_curved && choice.source == IFC_LITE;
         if (choice.source == IFC_WEB) rc = add_body(r, p, &in->web, web);
         if (choice.source == IFC_LITE) rc = add_body(r, p, &in->lite, lite);
         if (rc == SH_OK) rc = sh_check_stop(r->b->report, r->err);
@@ -186,6 +188,7 @@ static int read_by_two(struct reading *r)
     if (rc == SH_OK) rc = say_missing(r, "ifc-lite", &r->readings.lite_said);
     if (rc == SH_OK) rc = add_products(r);
     if (rc == SH_OK) rc = say_facets(r, &fineness);
+    if (rc == SH_OK) ifc_say_coarse(r->b, &r->records);
     if (rc == SH_OK) rc = ifc_say_findings(r->b, &r->records, r->finding, r->limits.ifc_strict, r->err);
     if (rc == SH_OK) rc = build_single(r->b, r->largest_m, BUILD_SINGLE_ROUNDING * r->largest_m, true, r->err);
     return rc;

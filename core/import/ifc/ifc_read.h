@@ -40,6 +40,8 @@ void ifc_readings_free(struct ifc_readings *r);
  * finding is the error instead. finding[records->n_products]. */
 int ifc_say_findings(struct scene_build *b, const struct ifc_records *records, const enum ifc_finding *finding,
                      bool strict, struct sh_err *err);
+/* Names the curved products whose facets follow no tolerance. */
+void ifc_say_coarse(struct scene_build *b, const struct ifc_records *records);
 /* Names the products that Assimp can't be relied on for, in a warning, or, with refuse, in an error. why: no other reader is
  * there. */
 int ifc_say_assimp(struct scene_build *b, const struct ifc_records *records, bool refuse, const char *why,

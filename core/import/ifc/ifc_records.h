@@ -14,6 +14,7 @@ struct ifc_style {
     uint64_t item;   /* 0: it is a material's */
     char *name;      /* may be empty */
     float colour[3]; /* 0..1 */
+    float clear;     /* its transparency, 0..1 */
 };
 
 struct ifc_product {
@@ -25,9 +26,10 @@ struct ifc_product {
     bool opens_nothing;    /* an opening that no IfcRelVoidsElement names */
     bool has_body;         /* its shape, walked through, has a solid or a surface */
     bool is_curved;
-    bool is_turned;                /* it has a solid that is turned about an axis */
-    double points_m;               /* largest coordinate of its points */
-    bool is_far;                   /* it has points beyond 1 km of their own origin */
+    bool is_coarse;  /* curved, and ifc-lite's body is taken, which cuts circles up by levels of its own */
+    bool is_turned;  /* it has a solid that is turned about an axis */
+    double points_m; /* largest coordinate of its points */
+    bool is_far;     /* it has points beyond 1 km of their own origin */
     struct text_span assimp_wrong; /* the first entity in it that Assimp is known to get wrong; n 0: none */
     uint32_t *style;               /* [n_styles] of its items, places in the records' style */
     size_t n_styles, room_styles;
