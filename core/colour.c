@@ -27,6 +27,16 @@ void colour_ramp(double part, uint8_t rgb[3])
         rgb[i] = (uint8_t)lrint(knot[from][i] + (at - from) * (knot[from + 1][i] - knot[from][i]));
 }
 
+double colour_srgb_encode(double linear)
+{
+    return linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1.0 / 2.4) - 0.055;
+}
+
+double colour_srgb_decode(double srgb)
+{
+    return srgb <= 0.04045 ? srgb / 12.92 : pow((srgb + 0.055) / 1.055, 2.4);
+}
+
 void colour_between(double low, double high, double figure, uint8_t rgb[3])
 {
     colour_ramp(high > low || isnan(figure) ? (figure - low) / (high - low) : 0.0, rgb);

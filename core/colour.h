@@ -43,6 +43,10 @@ void colour_reflectance(double db, uint8_t rgb[3]);
 /* A hue for each number, a golden section of the circle apart: however many there are, neighbours differ. */
 void colour_number(uint32_t number, uint8_t rgb[3]);
 
+/* Linear light of 0 to 1 as sRGB has it, and back, IEC 61966-2-1. What is beyond that stays beyond. */
+double colour_srgb_encode(double linear);
+double colour_srgb_decode(double srgb);
+
 extern const uint8_t colour_unknown[3]; /* a light blue: the figure is not modelled */
 extern const uint8_t colour_grey[3];    /* no surface, no colour */
 

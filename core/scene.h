@@ -93,6 +93,7 @@ struct scene_surface {
     uint16_t vertex_colours; /* enum scene_vertex_colours, once the load is over; they count before `colour` */
     uint16_t texture;        /* of the diffuse colour: 1 + its number in the scene's textures; 0: none */
     uint16_t opacity;        /* what cuts holes, likewise; 0: the alpha of texture does */
+    float clear; /* share of the light that goes through it, as the file says, 0..1. Nothing here follows from it */
     float solid; /* what is less opaque than this is a hole: 0.5, or what the format says; 0: there are none */
     /* Type and GlobalId of a product of IFC; else empty. */
     char type[SCENE_TYPE_LEN], guid[SCENE_GUID_LEN];

@@ -10,6 +10,7 @@
 #include <assimp/material.h>
 #include <assimp/scene.h>
 
+#include "core/colour.h"
 #include "core/mesh/assimp_files.h"
 
 static const double MAX_BYTES = 4294000000.0; /* of 2^32, less than 1 MB for the rest of a .glb */
@@ -33,13 +34,6 @@ struct export_scene {
     struct aiTexture *texture, **textures; /* of .glb, which holds its images */
     int is_fbx, holds_images;
 };
-
-/* sRGB (IEC 61966-2-1) to linear. */
-static float linear_of(uint8_t value)
-{
-    const double v = value / 255.0;
-    return (float)(v <= 0.04045 ? v / 12.92 : pow((v + 0.055) / 1.055, 2.4));
-}
 
 static void set_string(struct aiString *to, const char *text)
 {
@@ -72,7 +66,7 @@ static int fill_vertices(const struct export_scene *s, const struct mesh *m, int
     if (m->uv != NULL) to->mNumUVComponents[0] = 2;
     float light[256];
     for (int i = 0; i < 256; i++)
-        light[i] = !s->is_fbx ? linear_of((uint8_t)i) : (float)i / 255.0f;
+        light[i] = !s->is_fbx ? (float)colour_srgb_decode(i / 255.0) : (float)i / 255.0f;
     for (uint32_t i = 0; i < n; i++) {
         const uint32_t v = first + i;
         to->mVertices[i] = turned(s, m->xyz_m[v][0], m->xyz_m[v][1], m->xyz_m[v][2]);

@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/colour.h"
+
 int picture_make(struct picture *picture, uint32_t width, uint32_t height, const uint8_t rgb[3], struct sh_err *err)
 {
     const size_t n = (size_t)width * height;
@@ -21,13 +23,6 @@ void picture_free(struct picture *picture)
     *picture = (struct picture){0};
 }
 
-static double srgb_encode(double linear)
-{
-    /* IEC 61966-2-1 */
-    const double v = fmin(1, fmax(0, linear));
-    return v <= 0.0031308 ? 12.92 * v : 1.055 * pow(v, 1 / 2.4) - 0.055;
-}
-
 static double lab_inverse(double t)
 {
     return t > 6.0 / 29 ? t * t * t : 3 * (6.0 / 29) * (6.0 / 29) * (t - 4.0 / 29);
@@ -41,7 +36,7 @@ void picture_lab(double l, double a, double b, uint8_t rgb[3])
                               -0.9692660 * x + 1.8760108 * y + 0.0415560 * z,
                               0.0556434 * x - 0.2040259 * y + 1.0572252 * z};
     for (int i = 0; i < 3; i++)
-        rgb[i] = (uint8_t)lrint(255 * srgb_encode(linear[i]));
+        rgb[i] = (uint8_t)lrint(255 * colour_srgb_encode(fmin(1, fmax(0, linear[i]))));
 }
 
 void picture_blend(struct picture *picture, long column, long row, const uint8_t rgb[3], double coverage)

@@ -64,7 +64,7 @@ void build_begin_file(struct scene_build *b, const struct scene_mesh_spec *spec)
     b->counts = (struct scene_counts){0};
     b->scene->says = (struct scene_says){0};
     b->has_uv = b->has_rgb = false;
-    b->not_simple = 0;
+    b->not_simple = b->n_rgb_limited = 0;
     b->file_ns = now_ns();
 }
 
@@ -91,6 +91,9 @@ int build_end_file(struct scene_build *b, struct sh_err *err)
     if (b->not_simple > 0)
         sh_warn(b->report, "%s: %llu polygons cross themselves; their triangles overlap", b->name,
                 (unsigned long long)b->not_simple);
+    if (b->n_rgb_limited > 0)
+        sh_warn(b->report, "%s: %llu colour%s of vertices beyond the range of 0 to 1, or to 255, limited to it",
+                b->name, (unsigned long long)b->n_rgb_limited, b->n_rgb_limited > 1 ? "s" : "");
     b->scene->counts.zero_area += b->counts.zero_area;
     b->scene->counts.not_triangles += b->counts.not_triangles;
     b->scene->counts.names_cut += b->counts.names_cut;

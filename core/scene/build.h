@@ -24,6 +24,7 @@ struct scene_build {
     uint32_t n_welded;           /* vertices of this file that were there already: build_weld_vertex */
     struct scene_counts counts;
     uint64_t not_simple;
+    uint64_t n_rgb_limited; /* colours of corners or vertices beyond their range */
     /* the next polygon, room by build_corners */
     uint32_t *corner;      /* indices into the scene, which the reader has checked */
     float (*corner_uv)[2]; /* where has_uv: their texture coordinates */
@@ -71,8 +72,18 @@ int build_weld_begin(struct scene_build *b, struct build_weld *w, uint64_t verti
 int build_weld_vertex(struct scene_build *b, struct build_weld *w, const double v[3], struct sh_err *err);
 void build_weld_free(struct build_weld *w);
 
-/* A colour that a file says, times scale, as scene->rgb has it: limited to 0..255; NaN is 0. */
-void build_rgb(const double colour[3], double scale, uint8_t rgb[4]);
+/* A colour that a file says, times scale, as scene->rgb has it. What is beyond 0..255, or NaN, is limited and counted. */
+void build_rgb(struct scene_build *b, const double colour[3], double scale, uint8_t rgb[4]);
+
+/* What floating numbers of colours say of their range. Zero-initialise. */
+struct build_rgb_range {
+    double largest;
+    uint64_t n_above, n_between; /* above 1; between 0 and 1 */
+};
+void build_rgb_look(struct build_rgb_range *range, double number);
+/* To 0..255: 255, or 1 where the numbers go up to that. One is 2 at least then, and more are above 1 than between 0 and 1:
+ * rounding leaves numbers just above 1, and colours that shine are few. */
+double build_rgb_scale(const struct build_rgb_range *range);
 
 /* Makes room for n corners in corner, corner_uv and corner_rgb; what is in them stays. */
 int build_corners(struct scene_build *b, size_t n, struct sh_err *err);

@@ -44,11 +44,28 @@ int scene_copy_name(char *out, size_t room, const char *name, size_t n)
     return 1;
 }
 
-void build_rgb(const double colour[3], double scale, uint8_t rgb[4])
+void build_rgb(struct scene_build *b, const double colour[3], double scale, uint8_t rgb[4])
 {
-    for (int k = 0; k < 3; k++)
-        rgb[k] = (uint8_t)lrint(fmin(255.0, fmax(0.0, scale * colour[k])));
+    bool is_limited = false;
+    for (int k = 0; k < 3; k++) {
+        const double level = scale * colour[k];
+        is_limited |= !(level >= 0.0 && level <= 255.0);
+        rgb[k] = (uint8_t)lrint(fmin(255.0, fmax(0.0, level)));
+    }
     rgb[3] = 255;
+    b->n_rgb_limited += is_limited;
+}
+
+void build_rgb_look(struct build_rgb_range *range, double number)
+{
+    range->largest = fmax(range->largest, number);
+    range->n_above += number > 1.0;
+    range->n_between += number > 0.0 && number < 1.0;
+}
+
+double build_rgb_scale(const struct build_rgb_range *range)
+{
+    return range->largest >= 2.0 && range->n_above > range->n_between ? 1.0 : 255.0;
 }
 
 int build_label(struct scene_build *b, struct text_span object, struct text_span material, uint16_t *label,
@@ -59,6 +76,7 @@ int build_label(struct scene_build *b, struct text_span object, struct text_span
     fresh->has_colour = 0;
     fresh->texture = fresh->opacity = fresh->vertex_colours = 0;
     fresh->solid = 0.5f;
+    fresh->clear = 0.0f;
     fresh->type[0] = fresh->guid[0] = '\0';
     int cut = scene_copy_name(fresh->object, sizeof fresh->object, object.p, object.n);
     cut += scene_copy_name(fresh->material, sizeof fresh->material, material.p, material.n);

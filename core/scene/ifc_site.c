@@ -12,23 +12,30 @@
 /* Places of attributes in a record, IFC2x3 TC1 and IFC4 ADD2. */
 enum { SITE_PLACEMENT = 5, SITE_LATITUDE = 9, SITE_LONGITUDE = 10, SITE_ELEVATION = 11, SITE_ARGS = 14 };
 enum { CONTEXT_TYPE = 1, CONTEXT_WORLD = 4, CONTEXT_NORTH = 5, CONTEXT_ARGS = 6 };
-enum { PROJECT_UNITS = 8, PROJECT_ARGS = 9 };
 enum { MAP_CRS = 1, MAP_EASTING, MAP_NORTHING, MAP_HEIGHT, MAP_ABSCISSA, MAP_ORDINATE, MAP_SCALE, MAP_ARGS };
 enum { CRS_NAME = 0, CRS_UNIT = 6, CRS_ARGS = 7 };
 
 static const char ADVICE[] = "an anchor of source explicit needs none of this";
 
 struct reader {
-    struct text text;
-    struct step_record site, context, project, map;
-    int n_sites, n_contexts, n_projects, n_maps, is_model;
+    struct ifc_records records;
+    struct step_record site, context, map;
+    int n_sites, n_contexts, n_maps, is_model;
     struct sh_err *err;
 };
 
 static int fail(struct reader *r, const struct step_record *at, const char *what)
 {
-    return text_fail(&r->text, at->line, SH_EINPUT, r->err, "%.*s #%llu: %s; %s", (int)at->type.n, at->type.p,
-                     (unsigned long long)at->id, what, ADVICE);
+    char text[256];
+    snprintf(text, sizeof text, "%.190s; %s", what, ADVICE);
+    return ifc_records_fail(&r->records, at, r->err, text);
+}
+
+/* What is wrong with a unit. */
+static int advise(struct reader *r, int rc)
+{
+    const struct sh_err said = *r->err;
+    return rc == SH_EINPUT ? sh_fail(r->err, rc, "%.440s; %s", said.text, ADVICE) : rc;
 }
 
 /* Sites without angles (of other parts of a complex) don't count. */
@@ -53,30 +60,28 @@ static int take_context(struct reader *r, const struct step_record *record)
     return SH_OK;
 }
 
+static int take_record(struct reader *r, const struct step_record *record)
+{
+    if (text_is(record->type, "IFCSITE") && is_located(record)) {
+        r->site = *record;
+        if (r->n_sites++ > 0) return fail(r, record, "a second site with a latitude; allowed one");
+    }
+    if (text_is(record->type, "IFCMAPCONVERSION") || text_is(record->type, "IFCMAPCONVERSIONSCALED")) {
+        r->map = *record;
+        if (r->n_maps++ > 0) return fail(r, record, "a second map conversion; allowed one");
+    }
+    return text_is(record->type, "IFCGEOMETRICREPRESENTATIONCONTEXT") ? take_context(r, record) : SH_OK;
+}
+
 static int collect(struct reader *r)
 {
-    struct step_record record;
-    int rc;
-    while ((rc = step_next(&r->text, &record, r->err)) == 1) {
-        if (text_is(record.type, "IFCSITE") && is_located(&record)) {
-            r->site = record;
-            if (r->n_sites++ > 0) return fail(r, &record, "a second site with a latitude; allowed one");
-        } else if (text_is(record.type, "IFCGEOMETRICREPRESENTATIONCONTEXT")) {
-            if ((rc = take_context(r, &record)) != SH_OK) return rc;
-        } else if (text_is(record.type, "IFCPROJECT")) {
-            r->project = record;
-            r->n_projects++;
-        }
-        if (text_is(record.type, "IFCMAPCONVERSION") || text_is(record.type, "IFCMAPCONVERSIONSCALED")) {
-            r->map = record;
-            if (r->n_maps++ > 0) return fail(r, &record, "a second map conversion; allowed one");
-        }
-    }
-    if (rc < 0) return rc;
-    if (r->n_sites == 0 && r->n_maps == 0)
-        return text_fail(&r->text, 0, SH_EINPUT, r->err,
+    int rc = SH_OK;
+    for (size_t i = 0; i < r->records.n && rc == SH_OK; i++)
+        rc = take_record(r, &r->records.record[i]);
+    if (rc == SH_OK && r->n_sites == 0 && r->n_maps == 0)
+        return text_fail(&r->records.text, 0, SH_EINPUT, r->err,
                          "no IFCMAPCONVERSION, and no IFCSITE with RefLatitude and RefLongitude; %s", ADVICE);
-    return SH_OK;
+    return rc;
 }
 
 /* A record with its attributes. */
@@ -94,9 +99,9 @@ static int follow(struct reader *r, const struct step_record *from, struct text_
     char what[96];
     snprintf(what, sizeof what, "no reference to %s where one is needed", type);
     if (!step_reference(ref, &id)) return fail(r, from, what);
-    int rc = step_find(&r->text, id, &to->record, r->err);
-    if (rc != SH_OK) return rc;
-    if (!text_is(to->record.type, type)) return fail(r, from, what);
+    const struct step_record *record = ifc_records_find(&r->records, id);
+    if (record == NULL || !text_is(record->type, type)) return fail(r, from, what);
+    to->record = *record;
     if (step_split(to->record.args, to->arg, STEP_MAX_ARGS) < n) return fail(r, &to->record, "attributes are missing");
     return SH_OK;
 }
@@ -127,65 +132,6 @@ static int read_angle(struct reader *r, struct text_span span, const char *name,
     return fabs(*deg) <= limit_deg ? SH_OK : fail(r, &r->site, what);
 }
 
-/* Metres per unit of an IFCSIUNIT of length. */
-static int read_prefix(struct reader *r, const struct step_record *unit, struct text_span prefix, double *m)
-{
-    *m = ifc_prefix(prefix);
-    return isnan(*m) ? fail(r, unit, "a length unit with an unknown prefix") : SH_OK;
-}
-
-/* IFCCONVERSIONBASEDUNIT(dimensions, .LENGTHUNIT., name, #IFCMEASUREWITHUNIT(measure(x), #unit)), as of
- * feet. */
-static int read_converted(struct reader *r, const struct step_record *unit, struct text_span ref, double *m)
-{
-    struct found measure, si;
-    struct text_span list;
-    double factor;
-    int rc = follow(r, unit, ref, "IFCMEASUREWITHUNIT", 2, &measure);
-    if (rc == SH_OK) rc = follow(r, &measure.record, measure.arg[1], "IFCSIUNIT", 4, &si);
-    if (rc == SH_OK) rc = read_prefix(r, &si.record, si.arg[2], m);
-    if (rc != SH_OK) return rc;
-    struct text_span value = measure.arg[0];
-    const char *open = memchr(value.p, '(', value.n);
-    size_t skip = open != NULL ? (size_t)(open - value.p) : 0;
-    if (!step_list((struct text_span){value.p + skip, value.n - skip}, &list) || !step_real(&r->text, list, &factor) ||
-        factor <= 0.0)
-        return fail(r, &measure.record, "no factor of a length unit");
-    *m *= factor;
-    return SH_OK;
-}
-
-static int read_length(struct reader *r, const struct step_record *record, const struct text_span *of, double *m)
-{
-    if (text_is(record->type, "IFCSIUNIT")) return read_prefix(r, record, of[2], m);
-    return read_converted(r, record, of[3], m);
-}
-
-/* Metres per unit of length, as the project says. */
-static int read_unit(struct reader *r, double *m)
-{
-    struct text_span arg[PROJECT_ARGS], list, unit[STEP_MAX_ARGS], of[STEP_MAX_ARGS];
-    struct found units;
-    struct step_record record;
-    if (r->n_projects != 1)
-        return text_fail(&r->text, 0, SH_EINPUT, r->err, "%d IFCPROJECT records; allowed one; %s", r->n_projects,
-                         ADVICE);
-    if (step_split(r->project.args, arg, PROJECT_ARGS) != PROJECT_ARGS)
-        return fail(r, &r->project, "not the 9 attributes that IFC defines");
-    int rc = follow(r, &r->project, arg[PROJECT_UNITS], "IFCUNITASSIGNMENT", 1, &units);
-    if (rc != SH_OK) return rc;
-    size_t n = step_list(units.arg[0], &list) ? step_split(list, unit, STEP_MAX_ARGS) : 0;
-    for (size_t i = 0; i < n && i < STEP_MAX_ARGS; i++) {
-        uint64_t id;
-        if (!step_reference(unit[i], &id)) return fail(r, &units.record, "a unit that is no reference");
-        if ((rc = step_find(&r->text, id, &record, r->err)) != SH_OK) return rc;
-        if (step_split(record.args, of, STEP_MAX_ARGS) != 4 || !text_is(of[1], ".LENGTHUNIT.")) continue;
-        if (text_is(record.type, "IFCSIUNIT") || text_is(record.type, "IFCCONVERSIONBASEDUNIT"))
-            return read_length(r, &record, of, m);
-    }
-    return fail(r, &units.record, "no unit of length");
-}
-
 /* n = 2 or 3 numbers of "(a, b, c)". */
 static int read_numbers(struct reader *r, const struct step_record *at, struct text_span span, size_t min, size_t max,
                         double *value)
@@ -194,7 +140,7 @@ static int read_numbers(struct reader *r, const struct step_record *at, struct t
     size_t n = step_list(span, &list) ? step_split(list, part, 3) : 0;
     if (n < min || n > max) return fail(r, at, "not the numbers that are needed");
     for (size_t i = 0; i < n; i++)
-        if (!step_real(&r->text, part[i], &value[i])) return fail(r, at, "a coordinate that is not a number");
+        if (!step_real(&r->records.text, part[i], &value[i])) return fail(r, at, "a coordinate that is not a number");
     return SH_OK;
 }
 
@@ -267,17 +213,24 @@ static double known_unit_m(double m, double model_m)
     return NAN;
 }
 
+/* Scale has to lead from the model's unit to MapUnit, but for what the map's own scale is. 1 says nothing: it stands also for a
+ * Scale that is left out. */
+static int check_scale(struct reader *r, double scale, double expected)
+{
+    char what[128];
+    if (scale == 1.0 || fabs(scale / expected - 1.0) < 0.01) return SH_OK;
+    snprintf(what, sizeof what,
+             "a Scale of %.9g beside a MapUnit; allowed about %.9g, the model's unit in units of the map", scale,
+             expected);
+    return fail(r, &r->map, what);
+}
+
 static int read_map_unit(struct reader *r, const struct found *crs, double scale, double model_m, double *m)
 {
-    struct step_record record;
-    struct text_span of[STEP_MAX_ARGS];
     uint64_t id;
     if (step_reference(crs->arg[CRS_UNIT], &id)) {
-        int rc = step_find(&r->text, id, &record, r->err);
-        if (rc != SH_OK) return rc;
-        if (step_split(record.args, of, STEP_MAX_ARGS) != 4 || !text_is(of[1], ".LENGTHUNIT."))
-            return fail(r, &record, "the MapUnit of an IFCPROJECTEDCRS that is no unit of length");
-        return read_length(r, &record, of, m);
+        int rc = advise(r, ifc_unit_of(&r->records, ifc_records_find(&r->records, id), m, r->err));
+        return rc == SH_OK ? check_scale(r, scale, model_m / *m) : rc;
     }
     *m = known_unit_m(model_m / scale, model_m);
     return isnan(*m) ? fail(r, &r->map, "no unit of maps fits its Scale, and the system has no MapUnit") : SH_OK;
@@ -292,7 +245,7 @@ static int read_number(struct reader *r, struct text_span arg, int which, double
     char what[64];
     *value = which == MAP_HEIGHT ? NAN : which == MAP_ORDINATE ? 0.0 : 1.0;
     if (text_is(arg, "$") && which > MAP_NORTHING) return SH_OK;
-    if (step_real(&r->text, arg, value)) return SH_OK;
+    if (step_real(&r->records.text, arg, value)) return SH_OK;
     snprintf(what, sizeof what, "%s is missing, or is no number", name[which]);
     return fail(r, &r->map, what);
 }
@@ -300,7 +253,7 @@ static int read_number(struct reader *r, struct text_span arg, int which, double
 static int read_map_name(struct reader *r, const struct found *crs, struct ifc_map *map)
 {
     char *name = ifc_text(crs->arg[CRS_NAME]);
-    if (name == NULL) return text_fail(&r->text, 0, SH_ENOMEM, r->err, "no memory for a name");
+    if (name == NULL) return text_fail(&r->records.text, 0, SH_ENOMEM, r->err, "no memory for a name");
     const size_t n = strlen(name);
     if (n > 0 && n < sizeof map->crs) memcpy(map->crs, name, n + 1);
     free(name);
@@ -341,7 +294,7 @@ static int read_site(struct reader *r, double unit_m, struct ifc_site *site)
     if (rc == SH_OK) rc = read_angle(r, arg[SITE_LONGITUDE], "RefLongitude", 180.0, &site->lon_deg);
     if (rc == SH_OK) rc = read_origin(r, arg[SITE_PLACEMENT], unit_m, site->origin_m);
     if (rc != SH_OK) return rc;
-    if (!text_is(arg[SITE_ELEVATION], "$") && !step_real(&r->text, arg[SITE_ELEVATION], &site->elevation_m))
+    if (!text_is(arg[SITE_ELEVATION], "$") && !step_real(&r->records.text, arg[SITE_ELEVATION], &site->elevation_m))
         return fail(r, &r->site, "RefElevation is not a number");
     site->elevation_m *= unit_m;
     return SH_OK;
@@ -352,14 +305,14 @@ int ifc_site_read(const char *path, struct ifc_site *site, struct sh_err *err)
     struct reader r = {.err = err};
     double unit_m = 1.0;
     *site = (struct ifc_site){.elevation_m = NAN};
-    int rc = step_open(&r.text, path, err);
+    int rc = ifc_records_index(&r.records, path, err);
     if (rc == SH_OK) rc = collect(&r);
-    if (rc == SH_OK) rc = read_unit(&r, &unit_m);
+    if (rc == SH_OK) rc = advise(&r, ifc_unit_find(&r.records, &unit_m, err));
     if (rc == SH_OK && r.n_sites > 0) rc = read_site(&r, unit_m, site);
     if (rc == SH_OK) rc = read_north(&r, site);
     if (rc == SH_OK && r.n_maps > 0) rc = read_map(&r, unit_m, &site->map);
     site->has_place = r.n_sites > 0;
     site->has_map = r.n_maps > 0;
-    text_close(&r.text);
+    ifc_records_close(&r.records);
     return rc;
 }

@@ -35,6 +35,9 @@ struct import_task {
 
 /* ---- import_apart.c */
 
+/* At the end of errors, after ": ". */
+#define IMPORT_ELSE_CONVERT "export the mesh again, or convert it to .obj or .ply"
+
 /* Bytes of a process, as the kernel counts them; 0: not known. */
 enum import_memory { IMPORT_ADDRESSES, IMPORT_RESIDENT };
 uint64_t import_memory_of(pid_t pid, enum import_memory which);

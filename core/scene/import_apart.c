@@ -19,8 +19,6 @@
 
 enum { LOOK_MS = 20, MAX_WARNINGS = 1000 };
 
-#define ELSE_CONVERT "export the mesh again, or convert it to .obj or .ply"
-
 #define LEAST_MORE_NS ((int64_t)10000000000) /* for a second reader, once the first has ended */
 
 static int64_t now_ns(void)
@@ -197,7 +195,7 @@ static int fail_by_memory(const struct import_apart *a, struct sh_err *err)
 {
     return build_fail(a->task.b, SH_EINPUT, err,
                       "%s takes more than %u MiB to read it (scene.import_memory_mib): raise that where the mesh "
-                      "needs it; a broken file takes any amount: " ELSE_CONVERT,
+                      "needs it; a broken file takes any amount: " IMPORT_ELSE_CONVERT,
                       a->task.name, a->task.limits.memory_mib);
 }
 
@@ -205,7 +203,7 @@ static int fail_by_time(const struct import_apart *a, struct sh_err *err)
 {
     return build_fail(a->task.b, SH_EINPUT, err,
                       "%s has not read it within %g s (scene.import_s): raise that where the mesh needs it; with "
-                      "a broken file it may hang: " ELSE_CONVERT,
+                      "a broken file it may hang: " IMPORT_ELSE_CONVERT,
                       a->task.name, 1e-9 * (double)(a->end_ns - a->start_ns));
 }
 
@@ -216,9 +214,9 @@ static int fail_by_signal(const struct import_apart *a, int number, struct sh_er
     if (number == SIGKILL)
         return build_fail(a->task.b, SH_EINPUT, err,
                           "the process in which %s read it was killed (SIGKILL), as the system does where memory "
-                          "is short; scene.import_memory_mib is %u: " ELSE_CONVERT,
+                          "is short; scene.import_memory_mib is %u: " IMPORT_ELSE_CONVERT,
                           a->task.name, a->task.limits.memory_mib);
-    return build_fail(a->task.b, SH_EINPUT, err, "%s crashed on it (SIG%s): the file is broken: " ELSE_CONVERT,
+    return build_fail(a->task.b, SH_EINPUT, err, "%s crashed on it (SIG%s): the file is broken: " IMPORT_ELSE_CONVERT,
                       a->task.name, name != NULL ? name : "?");
 }
 
@@ -234,7 +232,7 @@ int import_judge(struct import_apart *a, struct sh_err *err)
     if (WEXITSTATUS(a->status) == 0) return SH_OK;
     return build_fail(a->task.b, SH_EINPUT, err,
                       "the process in which %s read it ended without a word (exit status %d): the file is "
-                      "broken: " ELSE_CONVERT,
+                      "broken: " IMPORT_ELSE_CONVERT,
                       a->task.name, WEXITSTATUS(a->status));
 }
 

@@ -9,12 +9,8 @@
 #include <assimp/material.h>
 #include <assimp/scene.h>
 
+#include "core/colour.h"
 #include "core/import/gltf/gltf_read.h"
-
-float import_to_srgb(double linear)
-{
-    return (float)(linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1.0 / 2.4) - 0.055);
-}
 
 /* Materials that Assimp makes up where a file has none. */
 static bool is_made_up(const char *material)
@@ -32,19 +28,26 @@ static void keep_colour(const struct scene_build *b, const struct aiMaterial *ma
     const float rgb[3] = {c.r, c.g, c.b};
     for (int i = 0; i < 3; i++) {
         if (!(rgb[i] >= 0.0f && rgb[i] <= 1.0f)) return; /* no colour of a surface */
-        surface->colour[i] = gltf_is_name(b->spec->file) ? import_to_srgb((double)rgb[i]) : rgb[i];
+        surface->colour[i] = gltf_is_name(b->spec->file) ? (float)colour_srgb_encode((double)rgb[i]) : rgb[i];
     }
     surface->has_colour = 1;
 }
 
-void import_rgb(const struct scene_build *b, const struct aiColor4D *colour, uint8_t rgb[4])
+/* glTF's own reader says it of its files; of those by Draco this does. */
+static void keep_clear(const struct aiMaterial *material, struct scene_surface *surface)
 {
-    const float in[3] = {colour->r, colour->g, colour->b};
-    for (int k = 0; k < 3; k++) {
-        const float c = fminf(1.0f, fmaxf(0.0f, in[k])); /* NaN: 0 */
-        rgb[k] = (uint8_t)lrintf(255.0f * (gltf_is_name(b->spec->file) ? import_to_srgb((double)c) : c));
-    }
-    rgb[3] = 255;
+    ai_real opacity = 1.0f;
+    if (surface->clear > 0.0f || is_made_up(surface->material)) return;
+    if (aiGetMaterialFloatArray(material, AI_MATKEY_OPACITY, &opacity, NULL) != AI_SUCCESS) return;
+    if (opacity >= 0.0f && opacity < 1.0f) surface->clear = 1.0f - opacity;
+}
+
+void import_rgb(struct scene_build *b, const struct aiColor4D *colour, uint8_t rgb[4])
+{
+    double c[3] = {(double)colour->r, (double)colour->g, (double)colour->b};
+    for (int k = 0; k < 3 && gltf_is_name(b->spec->file); k++)
+        c[k] = colour_srgb_encode(c[k]);
+    build_rgb(b, c, 255.0, rgb);
 }
 
 /* ---- textures */
@@ -171,5 +174,6 @@ int import_material(struct scene_build *b, const struct aiScene *in, const struc
                     struct scene_surface *surface, struct sh_err *err)
 {
     keep_colour(b, material, surface);
+    keep_clear(material, surface);
     return build_wants_textures(b) ? keep_textures(b, in, material, surface, err) : SH_OK;
 }

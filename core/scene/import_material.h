@@ -8,15 +8,12 @@ struct aiScene;
 struct aiMaterial;
 struct aiColor4D;
 
-/* Linear light as sRGB has it, IEC 61966-2-1. */
-float import_to_srgb(double linear);
-
 /* What the material says of a surface; what is there already stays. */
 int import_material(struct scene_build *b, const struct aiScene *in, const struct aiMaterial *material,
                     struct scene_surface *surface, struct sh_err *err);
 
 /* The colour of a vertex, as scene->rgb has it. */
-void import_rgb(const struct scene_build *b, const struct aiColor4D *colour, uint8_t rgb[4]);
+void import_rgb(struct scene_build *b, const struct aiColor4D *colour, uint8_t rgb[4]);
 
 /* How the material's textures lie on a mesh: coordinates of a set, times scale, plus shift. */
 struct import_uv {

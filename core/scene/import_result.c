@@ -197,6 +197,7 @@ static int add_surface(struct result *r, const struct scene_surface *in, uint32_
     if (in->has_colour && !is_colour(in)) return wrong(r, "the colour of surface", i);
     if (in->texture > r->head.n_textures || in->opacity > r->head.n_textures)
         return wrong(r, "the texture of surface", i);
+    if (!(in->clear >= 0.0f && in->clear <= 1.0f)) return wrong(r, "the transparency of surface", i);
     if (!(in->solid >= 0.0f && in->solid <= 1.0f)) return wrong(r, "the opacity of surface", i);
     int rc = build_label(r->b, (struct text_span){in->object, object}, (struct text_span){in->material, material},
                          &r->label[i], r->err);
@@ -204,6 +205,7 @@ static int add_surface(struct result *r, const struct scene_surface *in, uint32_
     struct scene_surface *out = &r->b->scene->surface[r->label[i]];
     if (!out->has_colour && in->has_colour) memcpy(out->colour, in->colour, sizeof out->colour);
     out->has_colour |= in->has_colour;
+    if (out->clear == 0.0f) out->clear = in->clear;
     if (out->texture == 0 && out->opacity == 0) out->solid = in->solid;
     if (out->texture == 0 && in->texture != 0) out->texture = r->texture[in->texture - 1];
     if (out->opacity == 0 && in->opacity != 0) out->opacity = r->texture[in->opacity - 1];

@@ -1,5 +1,5 @@
-/* The material libraries of an OBJ file: newmtl; Kd, the diffuse colour; map_Kd, its texture; map_d, what cuts
- * holes. The rest is ignored. */
+/* The material libraries of an OBJ file: newmtl; Kd, the diffuse colour; d or Tr, its opacity; map_Kd, its texture; map_d,
+ * what cuts holes. The rest is ignored. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -23,6 +23,7 @@ struct mtl {
     uint32_t first;            /* surface of the OBJ */
     uint8_t *known;            /* [surfaces from first on] a library has their material */
     struct text_span material; /* newmtl */
+    bool has_opacity;          /* d of the material at hand, which counts before Tr */
     struct missing colour, texture;
 };
 
@@ -71,6 +72,7 @@ static bool has_material(const struct scene_surface *s, struct text_span materia
 static void set_material(struct mtl *m, struct text_span material)
 {
     m->material = material;
+    m->has_opacity = false;
     for (uint32_t i = m->first; i < m->b->scene->n_surfaces; i++)
         m->known[i - m->first] |= has_material(&m->b->scene->surface[i], material);
 }
@@ -109,6 +111,18 @@ static void take_colour(struct mtl *m)
         set_colour(m, rgb);
     else
         add_missing(&m->colour, at.line, text_rest(&at));
+}
+
+/* d: opacity; Tr: 1 less that. d -halo depends on the direction, and is none. */
+static void take_opacity(struct mtl *m, bool is_opacity)
+{
+    double share;
+    text_skip_blanks(&m->t);
+    if (!text_number(&m->t, &share) || !(share >= 0.0 && share <= 1.0) || (m->has_opacity && !is_opacity)) return;
+    m->has_opacity |= is_opacity;
+    for (uint32_t i = m->first; i < m->b->scene->n_surfaces; i++)
+        if (has_material(&m->b->scene->surface[i], m->material))
+            m->b->scene->surface[i].clear = (float)(is_opacity ? 1.0 - share : share);
 }
 
 /* ---- textures */
@@ -221,6 +235,7 @@ static int read_materials(struct mtl *m, struct sh_err *err)
         struct text_span word = text_word(&m->t);
         if (is_word(word, "newmtl")) set_material(m, text_rest(&m->t));
         if (is_word(word, "Kd")) take_colour(m);
+        if (is_word(word, "d") || is_word(word, "Tr")) take_opacity(m, is_word(word, "d"));
         bool is_opacity = is_word(word, "map_d");
         if ((is_opacity || is_word(word, "map_Kd")) && build_wants_textures(m->b))
             rc = set_texture(m, text_rest(&m->t), is_opacity, err);
@@ -228,16 +243,24 @@ static int read_materials(struct mtl *m, struct sh_err *err)
     return rc;
 }
 
+/* ", with 3 more", or nothing. */
+static const char *others(const struct missing *m, char text[40])
+{
+    text[0] = '\0';
+    if (m->n > 1) snprintf(text, 40, ", with %llu more", (unsigned long long)m->n - 1);
+    return text;
+}
+
 static void warn_of_missing(const struct mtl *m, const char *path)
 {
+    char more[40];
     if (!build_wants_textures(m->b)) return;
     if (m->colour.n > 0)
-        sh_warn(m->b->report, "%s, line %llu: Kd '%s' is left out, with %llu more; allowed are numbers from 0 to 1",
-                path, (unsigned long long)m->colour.line, m->colour.first, (unsigned long long)m->colour.n - 1);
+        sh_warn(m->b->report, "%s, line %llu: Kd '%s' is left out%s; allowed are numbers from 0 to 1", path,
+                (unsigned long long)m->colour.line, m->colour.first, others(&m->colour, more));
     if (m->texture.n > 0)
-        sh_warn(m->b->report,
-                "%s, line %llu: the texture '%s' is missing, with %llu more; it belongs beside the library or the mesh",
-                path, (unsigned long long)m->texture.line, m->texture.first, (unsigned long long)m->texture.n - 1);
+        sh_warn(m->b->report, "%s, line %llu: the texture '%s' is missing%s; it belongs beside the library or the mesh",
+                path, (unsigned long long)m->texture.line, m->texture.first, others(&m->texture, more));
 }
 
 static int read_library(struct mtl *m, const char *path, uint64_t line, struct sh_err *err)

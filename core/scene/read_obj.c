@@ -62,18 +62,21 @@ static int read_numbers(struct obj *o, int least, int most, double *number, cons
     return n >= least ? SH_OK : fail_at(o, err, what);
 }
 
-/* Colours are numbers up to 1, or up to 255 where one of them is above 1: the rest of the file says which. */
+/* Colours are numbers up to 1, or up to 255: all of them together say which. */
 static double find_rgb_scale(const struct obj *o)
 {
     struct text t = o->t;
+    struct build_rgb_range range = {0};
     for (t.p = t.data; t.p < t.end; text_next_line(&t)) {
-        double v;
+        double v[6];
         int n = 0;
         if (!text_is(text_word(&t), "v")) continue;
-        for (text_skip_blanks(&t); n < 6 && text_number(&t, &v); text_skip_blanks(&t))
-            if (++n > 3 && v > 1.0) return 1.0;
+        for (text_skip_blanks(&t); n < 6 && text_number(&t, &v[n]); text_skip_blanks(&t))
+            n++;
+        for (int k = 3; k < n && n == 6; k++)
+            build_rgb_look(&range, v[k]);
     }
-    return 255.0;
+    return build_rgb_scale(&range);
 }
 
 static int keep_rgb(struct obj *o, const double rgb[3], struct sh_err *err)
@@ -83,7 +86,7 @@ static int keep_rgb(struct obj *o, const double rgb[3], struct sh_err *err)
     if (!grow(&o->rgb, &o->cap_rgb, at + 1, sizeof *o->rgb))
         return build_fail(o->b, SH_ENOMEM, err, "no memory for colours");
     memset(o->rgb[o->n_rgb], 0, (at - o->n_rgb) * sizeof *o->rgb); /* of vertices between that have none */
-    build_rgb(rgb, o->rgb_scale, o->rgb[at]);
+    build_rgb(o->b, rgb, o->rgb_scale, o->rgb[at]);
     o->n_rgb = at + 1;
     return SH_OK;
 }

@@ -132,15 +132,16 @@ int ply_keep_vertex_colour(struct ply *y, struct sh_err *err)
     return SH_OK;
 }
 
-/* Floating numbers go up to 1, or up to 255 where one of them is above 1. */
+/* Floating numbers go up to 1, or up to 255: all of them together say which. */
 static double find_scale(const struct ply *y)
 {
     const double scale = scale_of(find(y, PLY_VERTEX, PLY_RED));
+    struct build_rgb_range range = {0};
     if (scale > 0.0) return scale;
     for (size_t i = 0; i < y->n_colours; i++)
         for (int k = 0; k < 3; k++)
-            if (y->colour[i].rgb[k] > 1.0f) return 1.0;
-    return 255.0;
+            build_rgb_look(&range, (double)y->colour[i].rgb[k]);
+    return build_rgb_scale(&range);
 }
 
 int ply_begin_face(struct ply *y, struct sh_err *err)
@@ -160,9 +161,9 @@ void ply_set_corner_colour(struct ply *y, size_t to, size_t from, uint32_t verte
     struct scene_build *b = y->b;
     const struct ply_colour *c = vertex < y->n_colours ? &y->colour[vertex] : NULL;
     if (b->has_rgb && y->has_face_rgb)
-        build_rgb(&y->r.scalar[PLY_RED], y->face_scale, b->corner_rgb[to]);
+        build_rgb(b, &y->r.scalar[PLY_RED], y->face_scale, b->corner_rgb[to]);
     else if (b->has_rgb && c != NULL)
-        build_rgb((const double[3]){(double)c->rgb[0], (double)c->rgb[1], (double)c->rgb[2]}, y->rgb_scale,
+        build_rgb(b, (const double[3]){(double)c->rgb[0], (double)c->rgb[1], (double)c->rgb[2]}, y->rgb_scale,
                   b->corner_rgb[to]);
     for (size_t k = 0; k < 2 && b->has_uv; k++)
         b->corner_uv[to][k] = y->has_texcoords                ? (float)y->r.texcoords.value[2 * from + k]

@@ -42,7 +42,7 @@ static int blank_comments(struct text *t, struct sh_err *err)
 int step_open(struct text *t, const char *path, struct sh_err *err)
 {
     int rc = text_open(t, path, NULL, NULL, err);
-    if (rc == SH_OK && (t->size < 12 || strncmp(t->data, "ISO-10303-21", 12) != 0))
+    if (rc == SH_OK && (t->end - t->p < 12 || strncmp(t->p, "ISO-10303-21", 12) != 0)) /* after a byte order mark */
         rc = text_fail(t, 1, SH_EINPUT, err, "not STEP: it doesn't begin with ISO-10303-21");
     return rc == SH_OK ? blank_comments(t, err) : rc;
 }
@@ -101,16 +101,6 @@ int step_next(struct text *t, struct step_record *record, struct sh_err *err)
         t->p = end + 1;
         if (*start == '#') return read_record(t, trim(start, end), record, err);
     }
-}
-
-int step_find(struct text *t, uint64_t id, struct step_record *record, struct sh_err *err)
-{
-    int rc;
-    t->p = t->data;
-    t->line = 1;
-    while ((rc = step_next(t, record, err)) == 1)
-        if (record->id == id) return SH_OK;
-    return rc < 0 ? rc : text_fail(t, 0, SH_EINPUT, err, "there is no record #%llu", (unsigned long long)id);
 }
 
 size_t step_split(struct text_span list, struct text_span *part, size_t max)

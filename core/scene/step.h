@@ -17,9 +17,6 @@ int step_open(struct text *t, const char *path, struct sh_err *err);
 /* The next record from t->p on: 1, 0 at the end, or a negative SH_E code. */
 int step_next(struct text *t, struct step_record *record, struct sh_err *err);
 
-/* The record of a number, searched from the start. */
-int step_find(struct text *t, uint64_t id, struct step_record *record, struct sh_err *err);
-
 /* Splits at commas outside of brackets and quotes, blanks cut off. Returns how many there are; the first max
  * are stored. */
 size_t step_split(struct text_span list, struct text_span *part, size_t max);

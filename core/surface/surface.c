@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/colour.h"
 #include "core/surface/texture.h"
 #include "core/vecmath.h"
 
@@ -25,15 +26,10 @@ void surface_table_free(struct surface_table *table)
     table->surface = NULL;
 }
 
-double surface_linear(double srgb)
-{
-    return srgb <= 0.04045 ? srgb / 12.92 : pow((srgb + 0.055) / 1.055, 2.4);
-}
-
 double surface_luminance(const float rgb[3])
 {
-    return 0.2126 * surface_linear((double)rgb[0]) + 0.7152 * surface_linear((double)rgb[1]) +
-           0.0722 * surface_linear((double)rgb[2]);
+    return 0.2126 * colour_srgb_decode((double)rgb[0]) + 0.7152 * colour_srgb_decode((double)rgb[1]) +
+           0.0722 * colour_srgb_decode((double)rgb[2]);
 }
 
 int surface_table_set(struct surface_table *table, uint32_t label, const struct scene_surface *named,

@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/colour.h"
+
 /* Rows from the top; each texel as in the high bits of a label. Shared by labels of the same image and
  * colour. */
 struct surface_texture {
@@ -38,7 +40,7 @@ static void fill(struct surface_texture *t, const uint8_t *rgba, size_t n, const
     double part[CHANNELS][256];
     for (int c = 0; c < CHANNELS; c++)
         for (int v = 0; v < 256; v++)
-            part[c][v] = weight[c] * surface_linear((double)colour[c]) * surface_linear(v / 255.0);
+            part[c][v] = weight[c] * colour_srgb_decode((double)colour[c]) * colour_srgb_decode(v / 255.0);
     for (size_t i = 0; i < n; i++)
         t->texel[i] = as_texel(part[0][rgba[4 * i]] + part[1][rgba[4 * i + 1]] + part[2][rgba[4 * i + 2]]);
 }

@@ -5,7 +5,6 @@
 
 #include "core/surface.h"
 
-double surface_linear(double srgb);
 double surface_luminance(const float rgb[3]);
 void surface_textures_free(struct surface_table *table);
 

@@ -68,11 +68,6 @@ static int is_own_origin(const struct fields *f)
            strncasecmp(f->origin.s + n, f->host.s, f->host.len) == 0;
 }
 
-static int hex_of(char c)
-{
-    return c >= '0' && c <= '9' ? c - '0' : (c | 32) >= 'a' && (c | 32) <= 'f' ? (c | 32) - 'a' + 10 : -1;
-}
-
 /* Text with its %41. 0; 1: it is cut; 400. */
 static int decode(struct http_text in, char *out, size_t room)
 {
@@ -80,8 +75,8 @@ static int decode(struct http_text in, char *out, size_t room)
     for (size_t i = 0; i < in.len; i++) {
         int c = (unsigned char)in.s[i];
         if (c == '%') {
-            if (in.len - i < 3 || hex_of(in.s[i + 1]) < 0 || hex_of(in.s[i + 2]) < 0) return 400;
-            c = hex_of(in.s[i + 1]) * 16 + hex_of(in.s[i + 2]);
+            if (in.len - i < 3 || http_hex_digit(in.s[i + 1]) < 0 || http_hex_digit(in.s[i + 2]) < 0) return 400;
+            c = http_hex_digit(in.s[i + 1]) * 16 + http_hex_digit(in.s[i + 2]);
             i += 2;
             if (c == 0) return 400;
         }

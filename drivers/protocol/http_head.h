@@ -13,6 +13,12 @@ struct http_text {
     size_t len;
 };
 
+/* Of %41: 0 to 15; -1: it is no hexadecimal digit. */
+static inline int http_hex_digit(char c)
+{
+    return c >= '0' && c <= '9' ? c - '0' : (c | 32) >= 'a' && (c | 32) <= 'f' ? (c | 32) - 'a' + 10 : -1;
+}
+
 /* Letters of either case are the same. */
 int http_text_is(struct http_text text, const char *word);
 /* Whether a comma-separated list has the word. */

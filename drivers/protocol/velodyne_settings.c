@@ -5,6 +5,7 @@
 #include <string.h>
 #include <strings.h>
 
+#include "drivers/protocol/http_head.h"
 #include "drivers/protocol/velodyne.h"
 
 enum { MAX_PAIRS = 8, MAX_REPLY = 512 };
@@ -219,13 +220,6 @@ int velodyne_takes_forms(const char *path)
 
 /* ---- forms: key=value&key=value, with + and %41 */
 
-static int hex_digit(char c)
-{
-    if (c >= '0' && c <= '9') return c - '0';
-    if ((c | 32) >= 'a' && (c | 32) <= 'f') return (c | 32) - 'a' + 10;
-    return -1;
-}
-
 /* In place, and puts a NUL after it: there is room for one after len characters. 0, or -1: not a form's
  * text. */
 static int decode(char *s, size_t len)
@@ -234,8 +228,8 @@ static int decode(char *s, size_t len)
     for (size_t i = 0; i < len; i++, to++) {
         *to = s[i] == '+' ? ' ' : s[i];
         if (s[i] == '%') {
-            if (i + 2 >= len || hex_digit(s[i + 1]) < 0 || hex_digit(s[i + 2]) < 0) return -1;
-            *to = (char)(hex_digit(s[i + 1]) << 4 | hex_digit(s[i + 2]));
+            if (i + 2 >= len || http_hex_digit(s[i + 1]) < 0 || http_hex_digit(s[i + 2]) < 0) return -1;
+            *to = (char)(http_hex_digit(s[i + 1]) << 4 | http_hex_digit(s[i + 2]));
             i += 2;
         }
         if ((unsigned char)*to < 32) return -1;

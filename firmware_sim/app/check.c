@@ -1,5 +1,6 @@
 /* scanhead check: validates configuration, scene and links. Nothing runs. */
 #include <inttypes.h>
+#include <string.h>
 #include <sys/resource.h>
 
 #include "core/vec3.h"
@@ -28,17 +29,17 @@ static int check_links(const struct config *cfg, struct sh_err *err)
     return rc;
 }
 
-static void print_platform(const struct site *site)
+static void print_platform(const struct site *site, FILE *out)
 {
     const struct config_platform *p = &site->cfg->platform;
-    if (p->kind == PLATFORM_LIVE) printf("platform  live, up to %g m from station 1\n", p->reach_m);
+    if (p->kind == PLATFORM_LIVE) fprintf(out, "platform  live, up to %g m from station 1\n", p->reach_m);
     if (p->kind != PLATFORM_TRAJECTORY) return;
     double way_m = 0.0;
     for (size_t i = 1; i < site->n_knots; i++)
         way_m += vec3_distance(site->knot[i].pose.position_m, site->knot[i - 1].pose.position_m);
-    printf("platform  trajectory of %.3f s, %.3f m; %zu poses keep the head within %.3g m of it; %zu BVH\n",
-           1e-9 * (double)site->knot[site->n_knots - 1].t_ns, way_m, site->n_knots, site->knot_error_m,
-           site->n_stretches);
+    fprintf(out, "platform  trajectory of %.3f s, %.3f m; %zu poses keep the head within %.3g m of it; %zu BVH\n",
+            1e-9 * (double)site->knot[site->n_knots - 1].t_ns, way_m, site->n_knots, site->knot_error_m,
+            site->n_stretches);
 }
 
 static double bytes_of(const struct scene *scene, const struct bvh *bvh)
@@ -56,7 +57,7 @@ static double bytes_of(const struct scene *scene, const struct bvh *bvh)
 }
 
 /* The peak counts all that the program had at once, also while it was loading. */
-static void print_memory(const struct site *site)
+static void print_memory(const struct site *site, FILE *out)
 {
     struct rusage usage;
     double bytes = bytes_of(site->scene, site->bvh), triangles = (double)scene_n_kept(site->scene);
@@ -65,42 +66,42 @@ static void print_memory(const struct site *site)
         triangles += (double)scene_n_kept(site->mover[i].scene);
     }
     getrusage(RUSAGE_SELF, &usage);
-    printf("memory    %.4g MB for meshes and BVH, %.0f bytes a triangle; %.4g MB at the peak\n", 1e-6 * bytes,
-           bytes / triangles, 1024e-6 * (double)usage.ru_maxrss);
+    fprintf(out, "memory    %.4g MB for meshes and BVH, %.0f bytes a triangle; %.4g MB at the peak\n", 1e-6 * bytes,
+            bytes / triangles, 1024e-6 * (double)usage.ru_maxrss);
 }
 
-static void print_output(const struct config *cfg, const struct site *site)
+static void print_output(const struct config *cfg, const struct site *site, FILE *out)
 {
     int heights = cfg->output.crs == GEOREF_UTM || cfg->output.crs == GEOREF_GEODETIC;
-    printf("output    %s, %g m per count%s\n", cfg->output.layout == LINE_GEO ? "geo" : "polar", site->scale_m,
-           !heights                              ? ""
-           : site->geoid != NULL                 ? ", heights above the geoid"
-           : cfg->output.heights == HEIGHTS_AUTO ? ", heights above the ellipsoid (no geoid data is installed)"
-                                                 : ", heights above the ellipsoid");
+    fprintf(out, "output    %s, %g m per count%s\n", cfg->output.layout == LINE_GEO ? "geo" : "polar", site->scale_m,
+            !heights                              ? ""
+            : site->geoid != NULL                 ? ", heights above the geoid"
+            : cfg->output.heights == HEIGHTS_AUTO ? ", heights above the ellipsoid (no geoid data is installed)"
+                                                  : ", heights above the ellipsoid");
 }
 
-static void print_links(const struct config *cfg)
+static void print_links(const struct config *cfg, FILE *out)
 {
     for (uint32_t i = 0; i < cfg->n_links; i++) {
         const struct link_spec *link = &cfg->link[i];
         const int has_port = link->type == LINK_TCP || link->type == LINK_UDP || link->type == LINK_WEB;
-        printf("link      %s", link_ops_get(link->type)->name);
+        fprintf(out, "link      %s", link_ops_get(link->type)->name);
         if (has_port && link->port != 0)
-            printf(":%s:%d", link->address[0] != '\0' ? link->address : "127.0.0.1", link->port);
+            fprintf(out, ":%s:%d", link->address[0] != '\0' ? link->address : "127.0.0.1", link->port);
         else if (link->path[0] != '\0')
-            printf(":%s", link->path);
-        printf(", %s\n", protocol_ops_get((enum protocol_id)link->protocol)->name);
+            fprintf(out, ":%s", link->path);
+        fprintf(out, ", %s\n", protocol_ops_get((enum protocol_id)link->protocol)->name);
     }
 }
 
-static void print_target(const struct site *site)
+static void print_target(const struct site *site, FILE *out)
 {
     const struct config_target *target = &site->cfg->scene.target;
     const struct site_target *t = &site->world->target;
     if (target->n_objects == 0) return;
-    printf("target    %u of %u triangles, %u of %u surfaces; the others %s\n", t->triangles, t->all_triangles,
-           t->surfaces, t->all_surfaces,
-           target->others == OTHERS_HIDE ? "hide what is behind them and give no points" : "are left out");
+    fprintf(out, "target    %u of %u triangles, %u of %u surfaces; the others %s\n", t->triangles, t->all_triangles,
+            t->surfaces, t->all_surfaces,
+            target->others == OTHERS_HIDE ? "hide what is behind them and give no points" : "are left out");
 }
 
 /* Triangles of copies are counted with the others. */
@@ -113,30 +114,30 @@ static const char *copies_text(const struct scene *scene, char *text, size_t len
     return text;
 }
 
-static int print_summary(const struct config *cfg, const struct sites *sites, struct sh_err *err)
+static int print_summary(const struct config *cfg, const struct sites *sites, FILE *out, struct sh_err *err)
 {
     const struct site *site = sites->first;
     const struct scene *scene = site->scene;
     char copies[96];
     int rc = SH_OK;
-    printf("%s: ok\n", cfg->file);
-    check_print_heads(sites, stdout);
-    printf("scene     %u triangles, %u surfaces, %sx %.3f..%.3f  y %.3f..%.3f  z %.3f..%.3f m\n", scene->n_all,
-           scene->n_surfaces, copies_text(scene, copies, sizeof copies), scene->min_m[0], scene->max_m[0],
-           scene->min_m[1], scene->max_m[1], scene->min_m[2], scene->max_m[2]);
-    print_memory(site);
-    print_target(site);
-    check_print_anchor(site, stdout);
-    if (site->stop != NULL) check_print_stops(site, stdout);
+    fprintf(out, "%s: ok\n", cfg->file);
+    check_print_heads(sites, out);
+    fprintf(out, "scene     %u triangles, %u surfaces, %sx %.3f..%.3f  y %.3f..%.3f  z %.3f..%.3f m\n", scene->n_all,
+            scene->n_surfaces, copies_text(scene, copies, sizeof copies), scene->min_m[0], scene->max_m[0],
+            scene->min_m[1], scene->max_m[1], scene->min_m[2], scene->max_m[2]);
+    print_memory(site, out);
+    print_target(site, out);
+    check_print_anchor(site, out);
+    if (site->stop != NULL) check_print_stops(site, out);
     for (uint32_t i = 0; i < site->n_stations && rc == SH_OK && site->stop == NULL; i++)
-        rc = check_print_station(sites_of(sites, i), i, stdout, err);
-    print_platform(site);
-    print_output(cfg, site);
-    print_links(cfg);
+        rc = check_print_station(sites_of(sites, i), i, out, err);
+    print_platform(site, out);
+    print_output(cfg, site, out);
+    print_links(cfg, out);
     return rc;
 }
 
-static int print_time(const struct config *cfg, struct sh_err *err)
+static int print_time(const struct config *cfg, FILE *out, struct sh_err *err)
 {
     struct head_clock clock;
     struct utc_time utc;
@@ -147,7 +148,7 @@ static int print_time(const struct config *cfg, struct sh_err *err)
     utc_format(&utc, 0, now);
     utc_from_tai(&clock.table, utc_tai_from_posix(&clock.table, clock.table.expires_s * UTC_SECOND_NS), &utc);
     utc_format(&utc, 0, end);
-    printf("time      %s at power-up; leap seconds are known up to %.10s\n", now, end);
+    fprintf(out, "time      %s at power-up; leap seconds are known up to %.10s\n", now, end);
     if (clock.warning[0] != '\0') app_report_stderr.warn(app_report_stderr.ctx, clock.warning);
     return SH_OK;
 }
@@ -184,12 +185,13 @@ static int check(struct config *cfg, void *ctx, struct sh_err *err)
     struct check_run *run = ctx;
     const struct sh_report report = {.ctx = run, .warn = warn, .progress = progress, .stop = stop};
     struct sites sites = {0};
+    FILE *out = run->csv != NULL && strcmp(run->csv, "-") == 0 ? stderr : stdout; /* the table has it for itself */
     int rc = sites_load(cfg, &report, &sites, err);
     if (rc == SH_OK) rc = check_links(cfg, err);
-    if (rc == SH_OK) rc = print_summary(cfg, &sites, err);
+    if (rc == SH_OK) rc = print_summary(cfg, &sites, out, err);
     if (rc == SH_OK && (run->scene || run->csv != NULL))
-        rc = check_print_scene(sites.first, run->n_warnings, run->csv, run->scene ? stdout : NULL, err);
-    if (rc == SH_OK) rc = print_time(cfg, err);
+        rc = check_print_scene(sites.first, run->n_warnings, run->csv, run->scene ? out : NULL, err);
+    if (rc == SH_OK) rc = print_time(cfg, out, err);
     sites_free(&sites);
     return rc;
 }
@@ -222,7 +224,8 @@ static const struct app_option OPTIONS[] = {
      .help = "print what was read: objects with triangles, open edges, area, volume and colour, the 50 largest first; "
              "their sum; those that are open, by name"},
     {APP_TEXT, "scene-csv", "FILE", .at = offsetof(struct check_run, csv), .file = APP_WRITES,
-     .help = "write all objects, with IFC type and GlobalId, as CSV; - is standard output"},
+     .help = "write all objects, with IFC type and GlobalId, as CSV; - is standard output, and all "
+             "else goes to standard error"},
     {APP_TEXT, "scenario", "FILE", .at = offsetof(struct check_run, in.scenario), .file = APP_READS,
      .help = "with the faults of this file; a bare name is one of config/faults"},
     {APP_PRINT, "example", NULL, .apply = print_example,

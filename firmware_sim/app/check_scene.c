@@ -131,6 +131,21 @@ static void print_state(const struct part *p, enum scene_object_state state, FIL
     if (n > MAX_ROWS) fprintf(out, "%-9s and %u more; --scene-csv FILE has all\n", state_words[state], n - MAX_ROWS);
 }
 
+/* Surfaces that the file calls transparent, a line each. */
+static void print_clear(const struct part *p, FILE *out)
+{
+    uint32_t n = 0;
+    for (uint32_t i = 0; i < p->scene->n_surfaces; i++) {
+        const struct scene_surface *s = &p->scene->surface[i];
+        char name[2 * SCENE_NAME_LEN + 16];
+        if ((double)s->clear < SITE_CLEAR_LEAST || ++n > MAX_ROWS) continue;
+        snprintf(name, sizeof name, "%s, material %s", s->object, s->material);
+        sh_keep_line(name);
+        fprintf(out, "clear     %.0f %%: %s\n", 100.0 * (double)s->clear, name);
+    }
+    if (n > MAX_ROWS) fprintf(out, "clear     and %u more\n", n - MAX_ROWS);
+}
+
 static void print_part(const struct part *p, FILE *out)
 {
     const uint32_t n = p->objects.n, rows = n < MAX_ROWS ? n : MAX_ROWS;
@@ -145,6 +160,7 @@ static void print_part(const struct part *p, FILE *out)
     print_sum(p, out);
     print_state(p, SCENE_OBJECT_OPEN, out);
     print_state(p, SCENE_OBJECT_TURNED, out);
+    print_clear(p, out);
 }
 
 static void print_left_out(const struct parts *parts, FILE *out)

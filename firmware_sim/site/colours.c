@@ -10,14 +10,17 @@ static int load_textures(struct site *site, const struct sh_report *report, stru
     const uint32_t n = site->detect.ghost != NULL ? site->detect.n_real : site->n_surfaces;
     struct surface_colours *colours = &site->colours.surfaces;
     struct sh_err why = {0}, first = {0};
-    uint32_t failed = 0, bare = 0;
+    uint32_t failed = 0, bare = 0, partly = 0;
     int rc = surface_colours_alloc(n, colours, err);
     if (rc != SH_OK) return rc;
     for (uint32_t i = 0; i < n && rc == SH_OK; i++) {
         const struct scene_surface *surface = site_surface(site, i);
         const struct scene_texture *texture = site_texture(site, i);
         surface_colours_set(colours, i, surface);
-        bare += texture == NULL && !surface->has_colour && surface->vertex_colours != SCENE_COLOURS_ALL;
+        if (texture == NULL && !surface->has_colour) {
+            bare += surface->vertex_colours == SCENE_COLOURS_NONE;
+            partly += surface->vertex_colours == SCENE_COLOURS_SOME;
+        }
         if (texture == NULL || texture->unreadable) continue;
         rc = sh_check_stop(report, &why);
         if (rc == SH_OK) rc = surface_colours_texture(colours, i, texture, &why);
@@ -36,6 +39,11 @@ static int load_textures(struct site *site, const struct sh_report *report, stru
                 "%s: output.colour: texture, but %u of %u surfaces have neither texture nor colour: their points "
                 "are grey",
                 site->cfg->file, bare, n);
+    if (partly > 0)
+        sh_warn(report,
+                "%s: output.colour: texture, but %u of %u surfaces have colours at some of their corners only: points "
+                "of triangles without are grey",
+                site->cfg->file, partly, n);
     return SH_OK;
 }
 

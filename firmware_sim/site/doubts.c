@@ -96,6 +96,22 @@ static void doubt_colours(const struct site *site, const struct sh_report *repor
             cfg->file);
 }
 
+/* A file's transparency is for pictures: whether a laser goes through, the configuration says. */
+static void doubt_clear(const struct site *site, const struct sh_report *report)
+{
+    const struct config *cfg = site->cfg;
+    const uint32_t n = site->detect.ghost != NULL ? site->detect.n_real : site->n_surfaces;
+    struct site_clear clear = {0};
+    for (uint32_t i = 0; i < n; i++)
+        site_clear_add(&clear, site_surface(site, i), cfg->surface, cfg->n_surfaces);
+    if (clear.n == 0) return;
+    sh_warn(report,
+            "%s: %u surface%s transparent by the file, and measured as solid; glass is what the configuration says: "
+            "surfaces: [%s]%s",
+            cfg->file, clear.n, clear.n > 1 ? "s are" : " is", clear.rules,
+            clear.n_left_out > 0 ? ", and more: check --scene lists all" : "");
+}
+
 /* A vertex within reach settles most cases without an index of distances. */
 static int has_near_vertex(const struct scene *scene, const double p[3], double reach_m)
 {
@@ -303,5 +319,6 @@ int site_warn_doubts(const struct site *site, const struct sh_report *report, st
     doubt_lines(site, report);
     doubt_attributes(site, report);
     doubt_colours(site, report);
+    doubt_clear(site, report);
     return doubt_stations(site, report, err);
 }

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/colour.h"
 #include "core/detect.h"
 #include "core/line.h"
 #include "core/rng.h"
@@ -76,9 +77,9 @@ static void what_surfaces_send_back(void **state)
 static void dark_colours_are_straight(void **state)
 {
     (void)state;
-    assert_true(fabs(surface_linear(0.02) - 0.02 / 12.92) < 1e-16 && surface_linear(0.0) == 0.0);
-    assert_true(fabs(surface_linear(0.04045) - surface_linear(0.04046)) < 1e-6);
-    assert_true(fabs(surface_linear(0.5) - 0.21404114) < 1e-8 && surface_linear(1.0) == 1.0);
+    assert_true(fabs(colour_srgb_decode(0.02) - 0.02 / 12.92) < 1e-16 && colour_srgb_decode(0.0) == 0.0);
+    assert_true(fabs(colour_srgb_decode(0.04045) - colour_srgb_decode(0.04046)) < 1e-6);
+    assert_true(fabs(colour_srgb_decode(0.5) - 0.21404114) < 1e-8 && colour_srgb_decode(1.0) == 1.0);
 }
 
 /* The widest lobe there is, of gloss 0, ends 90 degrees off the mirror direction, too: met at 45 degrees. */

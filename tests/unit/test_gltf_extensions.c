@@ -40,6 +40,27 @@ static void required_and_harmless(void **state)
     scene_free(s);
 }
 
+/* How much light goes through is kept, and nothing made of it. */
+static void transparency_is_kept(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *material;
+        float clear;
+    } as[] = {{"\"alphaMode\":\"BLEND\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,0.25]}", 0.75f},
+              {"\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,0.25]}", 0.0f},
+              {"\"alphaMode\":\"BLEND\"", 0.0f},
+              {"\"extensions\":{\"KHR_materials_transmission\":{\"transmissionFactor\":0.5}}", 0.5f}};
+    for (size_t i = 0; i < sizeof as / sizeof as[0]; i++) {
+        char rest[1024];
+        gltf_quad();
+        snprintf(rest, sizeof rest, ONE_NODE "\"materials\":[{%s}]," PLAIN_MESH, as[i].material);
+        struct scene *s = gltf_load(rest);
+        if (s->surface[0].clear != as[i].clear) fail_msg("%zu: %g", i, (double)s->surface[0].clear);
+        scene_free(s);
+    }
+}
+
 /* ---- images */
 
 static int load_images(const char *required, const char *texture, int textures, struct scene **s, struct sh_err *err)
@@ -245,10 +266,11 @@ static void names_and_data_of_images(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(required_and_unknown),       cmocka_unit_test(required_and_harmless),
-        cmocka_unit_test(images_that_are_not_read),   cmocka_unit_test(webp_is_decoded),
-        cmocka_unit_test(meshopt_is_unpacked),        cmocka_unit_test(turned_textures),
-        cmocka_unit_test(each_material_is_a_surface), cmocka_unit_test(names_and_data_of_images),
+        cmocka_unit_test(required_and_unknown),     cmocka_unit_test(required_and_harmless),
+        cmocka_unit_test(transparency_is_kept),     cmocka_unit_test(images_that_are_not_read),
+        cmocka_unit_test(webp_is_decoded),          cmocka_unit_test(meshopt_is_unpacked),
+        cmocka_unit_test(turned_textures),          cmocka_unit_test(each_material_is_a_surface),
+        cmocka_unit_test(names_and_data_of_images),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

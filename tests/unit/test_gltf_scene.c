@@ -86,6 +86,50 @@ static void trees_that_are_none(void **state)
     refuse_tree("\"nodes\":[{\"mesh\":3}]", "meshes[3] is not there: there are 1");
 }
 
+/* What is drawn is an error, and what is not a warning: each names the first index that names nothing. */
+static void indices_of_nothing(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *old, *with, *says;
+    } as[] = {
+        {"\"mesh\":0", "\"mesh\":0,\"camera\":4", "nodes[0].camera is 4, and there are 0 cameras"},
+        {"\"at\":1", "\"bufferView\":9", "images[0].bufferView is 9, and there are 3 bufferViews"},
+        {"\"tx\":1", "\"source\":1,\"sampler\":2", "textures[0].source is 1, and there are 1 images"},
+        {"\"mx\":1", "\"pbrMetallicRoughness\":{\"baseColorTexture\":{\"index\":3}}",
+         "materials[0].pbrMetallicRoughness.baseColorTexture.index is 3, and there are 1 textures"},
+        {"\"mx\":1", "\"extensions\":{\"KHR_materials_clearcoat\":{\"clearcoatTexture\":{\"index\":-1}}}",
+         "KHR_materials_clearcoat.clearcoatTex.index is -1, and there are 1 textures"},
+        {"\"sx\":1", "\"joints\":[0,1,5],\"inverseBindMatrices\":0", "skins[0].joints[2] is 5, and there are 2 nodes"},
+        {"\"px\":1", "\"material\":6", "meshes[1].primitives[0].material is 6, and there are 1 materials"},
+        {"\"px\":1", "\"targets\":[{\"POSITION\":0},{\"NORMAL\":8}]",
+         "meshes[1].primitives[0].targets[1].NORMAL is 8, and there are 3 accessors"},
+        {"\"nx\":1", "\"mesh\":2,\"skin\":3", "2 indices name what is not there; the first: nodes[1].mesh is 2"},
+        {"\"ex\":1", "\"EXT_mesh_gpu_instancing\":{\"attributes\":{\"SCALE\":9}}",
+         "SCALE is 9, and there are 3 accessors"},
+    };
+    static const char base[] =
+        "\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0},{\"nx\":1,\"extensions\":{\"ex\":1}}],"
+        "\"images\":[{\"at\":1}],\"textures\":[{\"tx\":1}],\"materials\":[{\"mx\":1}],\"skins\":[{\"sx\":1}],"
+        "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0},\"indices\":2}]},"
+        "{\"primitives\":[{\"px\":1}]}],\"accessors\":[" GLTF_QUAD_ACCESSORS "]";
+    for (size_t i = 0; i < sizeof as / sizeof as[0]; i++) {
+        char rest[2048];
+        const char *at = strstr(base, as[i].old);
+        snprintf(rest, sizeof rest, "%.*s%s%s", (int)(at - base), base, as[i].with, at + strlen(as[i].old));
+        gltf_quad();
+        struct scene *s = gltf_load(rest);
+        if (n_warnings != 1 || strstr(warnings, as[i].says) == NULL) fail_msg("%zu: %s", i, warnings);
+        scene_free(s);
+    }
+    refuse_tree("\"nodes\":[{\"mesh\":0,\"skin\":3}]", "skins[3] is not there: there are 0");
+    gltf_quad();
+    gltf_refuse("\"nodes\":[{\"mesh\":0}],\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}],"
+                "\"accessors\":[{\"componentType\":5126,\"count\":3,\"type\":\"VEC3\",\"sparse\":{\"count\":1,"
+                "\"indices\":{\"componentType\":5123},\"values\":{\"bufferView\":0}}}]",
+                "an index into bufferViews is missing where one is needed");
+}
+
 /* A chain as long as a file may make it: no stack is used up. */
 static void a_deep_chain_is_walked(void **state)
 {
@@ -216,6 +260,7 @@ int main(void)
         cmocka_unit_test(matrices_and_their_parts),
         cmocka_unit_test(the_tree_is_in_double),
         cmocka_unit_test(trees_that_are_none),
+        cmocka_unit_test(indices_of_nothing),
         cmocka_unit_test(a_deep_chain_is_walked),
         cmocka_unit_test(instances_are_written_out),
         cmocka_unit_test(hidden_nodes_are_left_out),

@@ -95,6 +95,7 @@ static void products_are_found(void **state)
     const struct ifc_style *style = ifc_style_by_colour(&records, floor, (const float[4]){0.2f, 0.4f, 0.6f, 0.3f});
     assert_non_null(style);
     assert_string_equal(style->name, "Glas");
+    assert_true(style->clear == 0.7f);
     assert_null(ifc_style_by_colour(&records, floor, (const float[4]){1, 1, 1, 1}));
     assert_null(ifc_style_by_colour(&records, far, (const float[4]){0.2f, 0.4f, 0.6f, 0.3f}));
     ifc_records_close(&records);
@@ -125,6 +126,17 @@ static void what_is_not_whole_is_refused(void **state)
     refused("IFCRELVOIDSELEMENT #7000 refers to #7777, but there is no such record");
     ifc_write_text(text, "IFC4", NULL, NULL, block, 1, "#1000=IFCPERSON($,'a',$,$,$,$,$,$);\n");
     refused("a second record #1000");
+}
+
+/* No place follows from these. */
+static void placement_in_a_ring_is_refused(void **state)
+{
+    (void)state;
+    ifc_write_text(text, "IFC4", NULL, NULL, block, 1,
+                   "#7000=IFCLOCALPLACEMENT(#7001,#12);\n#7001=IFCLOCALPLACEMENT(#7000,#12);\n"
+                   "#7002=IFCWALL('guid_of_ring',#5,'round',$,$,#7000,#1002,$,$);\n");
+    refused("is relative to itself, so IFCWALL 'round' guid_of_ring has no place");
+    assert_non_null(strstr(err.text, ", line "));
 }
 
 /* Records that refer to each other in a ring end. */
@@ -242,6 +254,7 @@ int main(void)
         cmocka_unit_test(units_are_read),
         cmocka_unit_test(products_are_found),
         cmocka_unit_test(what_is_not_whole_is_refused),
+        cmocka_unit_test(placement_in_a_ring_is_refused),
         cmocka_unit_test(ring_ends),
         cmocka_unit_test(block_is_closed_and_its_parts_are_not),
         cmocka_unit_test(corner_within_an_edge_is_closed),

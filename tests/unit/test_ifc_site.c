@@ -87,9 +87,19 @@ static void what_is_not_given(void **state)
     assert_true(site.origin_m[0] == 0.0 && site.origin_m[1] == 0.0 && site.origin_m[2] == 0.0);
     assert_loads(load_edited("#9= ", "/* #8= IFCSITE(; */ #9= "));
     /* A plan's own context and a site without angles count for nothing. */
-    assert_loads(load_edited("#5= ", "#21= IFCGEOMETRICREPRESENTATIONCONTEXT($,'Plan',2,$,#22,$);\n"
+    assert_loads(load_edited("#5= ", "#21= IFCGEOMETRICREPRESENTATIONCONTEXT($,'Plan',2,$,#6,$);\n"
                                      "#23= IFCSITE('t',$,$,$,$,$,$,$,.PARTIAL.,$,$,$,$,$);\n#5= "));
     assert_near(site.north_deg, 45.0);
+}
+
+/* A byte order mark says nothing. */
+static void byte_order_mark(void **state)
+{
+    (void)state;
+    char text[sizeof base + 3];
+    snprintf(text, sizeof text, "\xef\xbb\xbf%s", base);
+    assert_loads(load_text(text));
+    assert_near(site.lon_deg, 13.4);
 }
 
 static void angles(void **state)
@@ -119,7 +129,7 @@ static void units(void **state)
     assert_loads(load_edited(".MILLI.", "$"));
     assert_near(site.elevation_m, 34500.0);
     assert_loads(load_edited("#3= IFCSIUNIT(*,.LENGTHUNIT.,.MILLI.,.METRE.);",
-                             "#3= IFCCONVERSIONBASEDUNIT(#30,.LENGTHUNIT.,'FOOT',#31);\n"
+                             "#3= IFCCONVERSIONBASEDUNIT($,.LENGTHUNIT.,'FOOT',#31);\n"
                              "#31= IFCMEASUREWITHUNIT(IFCLENGTHMEASURE(0.3048),#32);\n"
                              "#32= IFCSIUNIT(*,.LENGTHUNIT.,$,.METRE.);"));
     assert_near(site.elevation_m, 34500.0 * 0.3048);
@@ -150,6 +160,8 @@ static void a_map_conversion(void **state)
          * 0.9996 changes nothing. */
         {"2000.5,1000.25,30.,$,$,0.001", "'EPSG:2056',$,$,$,$,$,$", 2000.5, 0.0},
         {"2000.5,1000.25,30.,1.,-1.,0.0009996", "'EPSG:2056',$,$,$,$,$,$", 2000.5, -M_PI / 4},
+        {"2000.5,1000.25,30.,0.,1.,0.0009996", "'EPSG:2056',$,$,$,$,$,#22", 2000.5, M_PI / 2},
+        {"2000.5,1000.25,30.,0.,1.,$", "'EPSG:2056',$,$,$,$,$,#22", 2000.5, M_PI / 2},
         {"2000.5,1000.25,30.,1.,0.,$", "'EPSG:2056',$,$,$,$,$,$", 2.0005, 0.0},
         {"2000.5,1000.25,30.,1.,0.,0.0032808398950131", "'EPSG:2056',$,$,$,$,$,$", 2000.5 * 0.3048, 0.0}};
     for (size_t i = 0; i < sizeof good / sizeof good[0]; i++) {
@@ -181,6 +193,8 @@ static void wrong_map_conversions_are_refused(void **state)
                {"1.,2.,3.,0.,0.,0.001", "'a',$,$,$,$,$,$", "an x axis without a direction"},
                {"1.,2.,3.,$,$,0.", "'a',$,$,$,$,$,$", "a Scale that is not above 0"},
                {"1.,2.,3.,$,$,0.5", "'a',$,$,$,$,$,$", "no unit of maps fits its Scale"},
+               {"1.,2.,3.,$,$,7.", "'a',$,$,$,$,$,#22",
+                "line 19: IFCMAPCONVERSION #20: a Scale of 7 beside a MapUnit; allowed about 0.001,"},
                {"1.,2.,3.,$,$,0.001", "'a',$,$", "IFCPROJECTEDCRS #21: attributes are missing"},
                {"1.,2.,3.,$,$,0.001", "$,$,$,$,$,$,$", "IFCPROJECTEDCRS #21: no name"},
                {"1.,2.,3.,$,$,0.001", "'a',$,$,$,$,$,#4", "no unit of length"}};
@@ -212,7 +226,7 @@ static void what_is_wrong_is_refused(void **state)
         {"34500.", "'34500'", "RefElevation is not a number"},
         {",$,$);\n#9", ",$);\n#9", "not the 14 attributes"},
         {"#10= IFCLOCALPLACEMENT($", "#10= IFCLOCALPLACEMENT(#6", "relative to another"},
-        {"$,$,#10,$", "$,$,#99,$", "there is no record #99"},
+        {"$,$,#10,$", "$,$,#99,$", "line 13: IFCSITE #8 refers to #99, but there is no such record"},
         {"$,$,#10,$", "$,$,#12,$", "no reference to IFCLOCALPLACEMENT"},
         {"$,$,#10,$", "$,$,10,$", "no reference to IFCLOCALPLACEMENT"},
         {"#7= IFCCARTESIANPOINT((0.,0.,0.));", "#7= IFCCARTESIANPOINT((0.,1.,0.));", "WorldCoordinateSystem"},
@@ -220,10 +234,11 @@ static void what_is_wrong_is_refused(void **state)
         {"(1.,1.)", "(1.,x)", "not a number"},
         {".MILLI.", ".FURLONG.", "unknown prefix"},
         {".LENGTHUNIT.", ".AREAUNIT.", "no unit of length"},
+        {"#10= IFC", "#10 IFC", "no record of the form"},
         {"ENDSEC;\nEND", "#40= IFCSITE('s',$,$,$,$,$,$,$,.ELEMENT.,(1,2,3),(1,2,3),$,$,$);\nENDSEC;\nEND",
          "a second site"},
         {"ISO-10303-21;\nH", "ISO\nH", "doesn't begin with ISO-10303-21"},
-        {"END-ISO-10303-21;", "#13= IFCWALL(", "without its ';'"},
+        {"END-ISO-10303-21;", "#13= IFCWALL(", "cut off"},
         {"END-ISO-10303-21;", "'", "a text without an end"},
         {"END-ISO-10303-21;", "/*", "a comment without an end"},
         {"#9= IFCDIRECTION", "#9 IFCDIRECTION", "no record of the form"},
@@ -290,6 +305,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_site_is_read),
         cmocka_unit_test(what_is_not_given),
+        cmocka_unit_test(byte_order_mark),
         cmocka_unit_test(angles),
         cmocka_unit_test(units),
         cmocka_unit_test(a_map_conversion),

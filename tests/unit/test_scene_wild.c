@@ -125,7 +125,7 @@ static void missing_things_are_named(void **state)
     scene_free(s);
     put("r.mtl", RED_GREEN "map_Kd C:\\maps\\no.png\n");
     expect_warning("a.obj", "mtllib r.mtl\n" QUADS,
-                   "r.mtl, line 5: the texture 'C:\\maps\\no.png' is missing, with 0 ");
+                   "r.mtl, line 5: the texture 'C:\\maps\\no.png' is missing; it belongs beside");
 }
 
 /* Whatever is in it: a file of that name is the texture. */

@@ -112,6 +112,34 @@ static void obj_of_two_ranges(void **state)
     scene_free(s);
 }
 
+/* Numbers that rounding left above 1, or a few that shine, make no file one of 0 to 255. They are cut to 1, and counted. */
+static void a_little_above_one(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *name, *text, *says;
+        int first, second;
+    } as[] = {{"a.obj", "v 0 0 0 1.0001 0 0\nv 1 0 0 0.2 0 0\nv 0 1 0 0 0 0\nf 1 2 3\n", "a.obj: 1 colour", 255, 51},
+              {"a.obj", "v 0 0 0 7.5 0 0\nv 1 0 0 0.2 0.4 0\nv 0 1 0 0 0 0\nf 1 2 3\n", "a.obj: 1 colour", 255, 51},
+              {"a.obj", "v 0 0 0 255 0 0\nv 1 0 0 0.5 254.5 9\nv 0 1 0 300 0 0\nf 1 2 3\n", "a.obj: 1 colour", 255, 0},
+              {"a.obj", "v 0 0 0 2 0 0\nv 1 0 0 1 0 0\nv 0 1 0 0 0 0\nf 1 2 3\n", NULL, 2, 1},
+              {"a.ply",
+               HEAD RGB("float", "") FACE "end_header\n0 0 0 1.0001 0 0\n1 0 0 0.2 0 0\n0 1 0 0 0 0\n3 0 1 2\n",
+               "a.ply: 1 colour", 255, 51},
+              {"a.ply",
+               HEAD "element face 1\nproperty list uchar int vertex_indices\n" RGB(
+                   "float", "") "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 1.5 0.2 0\n",
+               "a.ply: 3 colours", 255, 255}};
+    for (size_t i = 0; i < sizeof as / sizeof as[0]; i++) {
+        struct scene *s = take(as[i].name, as[i].text, 1);
+        assert_int_equal(s->rgb[0][0][0], as[i].first);
+        assert_int_equal(s->rgb[0][1][0], as[i].second);
+        assert_int_equal(n_warnings, as[i].says != NULL);
+        if (as[i].says != NULL && strstr(warnings, as[i].says) == NULL) fail_msg("%zu: %s", i, warnings);
+        scene_free(s);
+    }
+}
+
 /* Linear light as sRGB: 0.2158605 is 128 of 255. */
 static void gltf_is_linear(void **state)
 {
@@ -307,6 +335,7 @@ int main(void)
         cmocka_unit_test(ply_with_a_vertex_for_each_corner),
         cmocka_unit_test(ply_by_face),
         cmocka_unit_test(obj_of_two_ranges),
+        cmocka_unit_test(a_little_above_one),
         cmocka_unit_test(gltf_is_linear),
         cmocka_unit_test(nothing_is_spent_without),
         cmocka_unit_test(colours_stay_with_triangles),

@@ -133,6 +133,82 @@ static void test_objects(void **state)
     free(all);
 }
 
+/* The table of a pipe is alone there, from its first line on. */
+static void test_objects_by_pipe(void **state)
+{
+    struct wire *wire = *state;
+    char config[352];
+    write_boxes(wire);
+    snprintf(config, sizeof config, "%s", wire_path(wire, "boxes.yaml"));
+    const char *const args[] = {"check", config, "--scene", "--scene-csv", "-", NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
+    char *out = wire_read(wire_path(wire, "out"), NULL), *err = wire_read(wire_path(wire, "err"), NULL);
+    int lines = 0;
+    for (const char *p = out; (p = strchr(p, '\n')) != NULL; p++)
+        lines++;
+    assert_int_equal(strncmp(out, "object,type,", 12), 0);
+    assert_int_equal(lines, 61);
+    assert_true(strstr(err, ": ok\n") != NULL && strstr(err, "\nobjects   60") != NULL);
+    free(out);
+    free(err);
+}
+
+/* Grey is what has no colour at all; of what has some, a part. */
+static void test_colours_in_part(void **state)
+{
+    struct wire *wire = *state;
+    wire_write_text(wire, "part.obj",
+                    "v 0 0 0 1 0 0\nv 9 0 0 0 1 0\nv 9 9 0 0 0 1\nv 0 9 0\no part\nf 1 2 3\nf 1 3 4\n");
+    wire_write_text(wire, "part.yaml",
+                    "head: {profile: sphere, step_deg: 2}\noutput: {crs: local, colour: texture}\n"
+                    "scene: {meshes: [{file: part.obj, up: z, scale: 1}]}\nstations: [{position_m: [5, 1, 1]}]\n");
+    char config[352];
+    snprintf(config, sizeof config, "%s", wire_path(wire, "part.yaml"));
+    const char *const args[] = {"check", config, NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
+    char *err = wire_read(wire_path(wire, "err"), NULL);
+    if (strstr(err, "have neither") != NULL ||
+        strstr(err, "1 of 1 surfaces have colours at some of their corners only") == NULL)
+        fail_msg("%s", err);
+    free(err);
+}
+
+/* What a file calls transparent is solid until `surfaces` says something; the line to write is in the warning. */
+static void test_transparent(void **state)
+{
+    struct wire *wire = *state;
+    static const char begin[] =
+        "head: {profile: sphere, step_deg: 2}\noutput: {crs: local}\nstations: [{position_m: [5, 1, 1]}]\n"
+        "scene: {meshes: [{file: pane.obj, up: z, scale: 1}]}\n";
+    static const char line[] = "surfaces: [{material: \"a [1]\", glass: 0.7}, {material: \"b\", glass: 0.9}]";
+    char config[352], text[1024], *rules;
+    wire_write_text(wire, "pane.mtl", "newmtl a [1]\nKd 1 1 1\nTr 0.1\nd 0.3\nnewmtl b\nTr 1\nnewmtl c\nd 1\n");
+    wire_write_text(wire, "pane.obj",
+                    "mtllib pane.mtl\nv 0 0 0\nv 9 0 0\nv 9 9 0\nv 0 9 0\nusemtl a [1]\no x\nf 1 2 3\no y\nf 1 3 4\n"
+                    "usemtl b\nf 1 2 4\nusemtl c\nf 2 3 4\n");
+    for (int i = 0; i < 2; i++) {
+        char *escaped = strdup(line), *at = i == 0 ? NULL : strstr(escaped, "[1]");
+        snprintf(text, sizeof text, "%s", begin);
+        if (at != NULL)
+            snprintf(text + strlen(text), sizeof text - strlen(text), "%.*s\\\\%s\n", (int)(at - escaped), escaped, at);
+        free(escaped);
+        snprintf(config, sizeof config, "%s", wire_write_text(wire, "pane.yaml", text));
+        const char *const args[] = {"check", config, "--scene", NULL};
+        if (wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)) != 0)
+            fail_msg("%s", wire_read(wire_path(wire, "err"), NULL));
+        char *err = wire_read(wire_path(wire, "err"), NULL), *out = wire_read(wire_path(wire, "out"), NULL);
+        rules = strstr(err, "3 surfaces are transparent by the file, and measured as solid;");
+        assert_int_equal(rules != NULL, i == 0);
+        if (i == 0)
+            assert_non_null(strstr(rules, "{material: \"a \\\\[1]\", glass: 0.7}, {material: \"b\", glass: 0.9}]"));
+        if (strstr(out, "clear     70 %: x, material a [1]\n") == NULL ||
+            strstr(out, "clear     100 %: y, material b\n") == NULL || strstr(out, "material c") != NULL)
+            fail_msg("%s", out);
+        free(err);
+        free(out);
+    }
+}
+
 static void test_help_of_a_section(void **state)
 {
     struct wire *wire = *state;
@@ -156,6 +232,9 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_all_faults, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_help_of_a_section, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_objects, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_objects_by_pipe, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_transparent, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_colours_in_part, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_example, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -321,6 +321,7 @@ static void wrong_use_says_what_is_allowed(void **state)
         "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"}]}\n");
     assert_int_equal(RUN(wire, "init", "apart.gltf"), 2);
     contains(text, "gone.bin\"; its geometry is in that file, which belongs in the same folder");
+    assert_null(strstr(text, "a mesh of triangles is needed")); /* one piece of advice is enough */
     assert_int_equal(RUN(wire, "init", "none.obj"), 2);
     contains(text, "none.obj: No such file or directory");
     assert_int_equal(RUN(wire, "init", "room.obj", "-o", "no/room.yaml"), 2);

@@ -47,6 +47,29 @@ static void surfaces_of_recordings(void **state)
     }
 }
 
+/* Each job of a campaign has its table, which counts among its files. */
+static void surfaces_of_a_campaign(void **state)
+{
+    struct wire *wire = *state;
+    char config[352];
+    write_scene(wire);
+    snprintf(config, sizeof config, "%s", wire_path(wire, "c.yaml"));
+    const char *line[] = {"batch", config, "-o", wire->dir, "--surfaces", "--quiet", NULL, NULL};
+    for (int i = 0; i < 2; i++) { /* made, and made again where it is lost */
+        if (wire_wait(wire, wire_spawn(wire, line, "out", "err", -1)) != 0)
+            fail_msg("%s", wire_read(wire_path(wire, "err"), NULL));
+        char *text = wire_read(wire_path(wire, "0001_station-1.surfaces.csv"), NULL);
+        assert_string_equal(text, EXPECTED);
+        free(text);
+        assert_int_equal(unlink(wire_path(wire, "0001_station-1.surfaces.csv")), 0);
+    }
+    line[6] = "--merge";
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, line, "out", "err", -1)), 1);
+    char *err = wire_read(wire_path(wire, "err"), NULL);
+    assert_non_null(strstr(err, "0001_station-1.surfaces.csv: is not there"));
+    free(err);
+}
+
 /* A recording has labels, but no surfaces. */
 static void a_recording_has_none(void **state)
 {
@@ -72,6 +95,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(surfaces_of_recordings, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(surfaces_of_a_campaign, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(a_recording_has_none, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

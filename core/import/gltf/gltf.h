@@ -52,6 +52,7 @@ struct gltf {
     uint32_t n_hidden;     /* nodes with meshes that KHR_node_visibility hides */
     uint32_t n_shapeless;  /* primitives without POSITION */
     uint32_t n_unmapped;   /* primitives without the texture coordinates that their material asks for */
+    uint32_t n_jointless;  /* primitives with a skin, but without JOINTS_0: their node places them */
     uint64_t n_unweighted; /* vertices of a skin that no joint moves */
     uint32_t n_images;     /* textures of a format that isn't read */
     char image[64];        /* the extension of the first of them */
@@ -104,6 +105,9 @@ int gltf_check_extensions(struct gltf *g);
 /* Whether a material has its colours by shaders, which are not read. */
 bool gltf_is_by_shaders(const json_t *material);
 bool gltf_is_required(const struct gltf *g, const char *extension);
+
+/* ---- gltf_indices.c: warns of indices that name nothing, wherever they are. */
+void gltf_say_indices(struct gltf *g);
 
 /* ---- gltf_meshopt.c: decodes a buffer view, `more` is its extension. */
 int gltf_meshopt(struct gltf *g, const json_t *more, const char *at, struct gltf_kept *out);

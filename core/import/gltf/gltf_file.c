@@ -195,6 +195,7 @@ static int open_buffer(struct gltf *g, uint32_t buffer, struct gltf_kept *out)
 int gltf_buffer(struct gltf *g, uint32_t buffer, struct gltf_bytes *out)
 {
     const char *mesh = g->b->mesh;
+    if (buffer == GLTF_NONE) return gltf_fail(g, "a buffer view names no buffer");
     if (buffer >= g->n_buffers) return gltf_fail(g, "buffers[%u] is not there: there are %u", buffer, g->n_buffers);
     struct gltf_kept *kept = &g->buffer[buffer];
     g->b->mesh = NULL;

@@ -28,6 +28,7 @@ int gltf_object(struct gltf *g, const char *list, uint32_t i, json_t **out)
     json_t *all;
     int rc = gltf_list(g, g->root, list, "", &all);
     if (rc != SH_OK) return rc;
+    if (i == GLTF_NONE) return gltf_fail(g, "an index into %s is missing where one is needed", list);
     if (i >= json_array_size(all))
         return gltf_fail(g, "%s[%u] is not there: there are %zu", list, i, json_array_size(all));
     *out = json_array_get(all, i);

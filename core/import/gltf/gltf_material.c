@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/scene/import_material.h"
+#include "core/colour.h"
 
 enum { CLAMP_TO_EDGE = 33071, MIRRORED_REPEAT = 33648 };
 
@@ -175,6 +175,20 @@ static int find_base(struct gltf *g, const json_t *material, const char *at, str
     return SH_OK;
 }
 
+/* The base colour's alpha where that is blended, or what KHR_materials_transmission says. */
+static int keep_clear(struct gltf *g, const struct base *base, const json_t *material, const char *at,
+                      struct scene_surface *surface)
+{
+    const char *mode = gltf_text(material, "alphaMode");
+    double rgba[4] = {1, 1, 1, 1}, clear = 0.0;
+    int rc = gltf_numbers(g, base->of, base->factor, at, 4, rgba, NULL);
+    if (mode != NULL && strcmp(mode, "BLEND") == 0) clear = 1.0 - rgba[3];
+    const json_t *through = gltf_extension(material, "KHR_materials_transmission");
+    clear = fmax(clear, json_number_value(json_object_get(through, "transmissionFactor")));
+    surface->clear = (float)fmin(fmax(clear, 0.0), 1.0);
+    return rc;
+}
+
 static int keep_colour(struct gltf *g, const struct base *base, const char *at, struct scene_surface *surface)
 {
     double rgba[4] = {1, 1, 1, 1};
@@ -182,7 +196,7 @@ static int keep_colour(struct gltf *g, const struct base *base, const char *at, 
     int rc = gltf_numbers(g, base->of, base->factor, at, 4, rgba, NULL);
     for (int k = 0; k < 3 && rc == SH_OK; k++) {
         if (!(rgba[k] >= 0.0 && rgba[k] <= 1.0)) return SH_OK; /* no colour of a surface */
-        surface->colour[k] = import_to_srgb(rgba[k]);
+        surface->colour[k] = (float)colour_srgb_encode(rgba[k]);
     }
     surface->has_colour = rc == SH_OK;
     return rc;
@@ -223,5 +237,6 @@ int gltf_look_open(struct gltf *g, const char *object, const json_t *primitive, 
     if (gltf_is_by_shaders(material)) return SH_OK;
     rc = find_base(g, material, own.text, &base);
     if (rc == SH_OK) rc = keep_colour(g, &base, own.text, &g->b->scene->surface[look->label]);
+    if (rc == SH_OK) rc = keep_clear(g, &base, material, own.text, &g->b->scene->surface[look->label]);
     return rc == SH_OK && build_wants_textures(g->b) ? keep_texture(g, &base, material, own.text, look) : rc;
 }

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/scene/import_material.h"
+#include "core/colour.h"
 
 enum { POINTS, LINES, LINE_LOOP, LINE_STRIP, TRIANGLES, TRIANGLE_STRIP, TRIANGLE_FAN, N_MODES };
 
@@ -44,8 +44,8 @@ static void add_rgb(const struct part *p, uint32_t i, uint8_t out[4])
 {
     double rgb[3];
     for (uint32_t k = 0; k < 3; k++)
-        rgb[k] = (double)import_to_srgb(fmin(1.0, fmax(0.0, gltf_value(&p->colour, i, k))));
-    build_rgb(rgb, 255.0, out);
+        rgb[k] = (double)colour_srgb_encode(gltf_value(&p->colour, i, k));
+    build_rgb(p->g->b, rgb, 255.0, out);
 }
 
 /* corner: places in the list of indices, or of vertices where there is none. */

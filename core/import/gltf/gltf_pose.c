@@ -132,12 +132,15 @@ int gltf_pose_open(struct gltf *g, const json_t *node, const json_t *mesh, const
 {
     const json_t *attributes = json_object_get(primitive, "attributes");
     uint32_t position, skin = GLTF_NONE;
+    json_t *is_there;
     *pose = (struct gltf_pose){0};
     int rc = gltf_index(g, attributes, "POSITION", at, &position);
     if (rc == SH_OK) rc = gltf_view_open(g, position, "VEC3", &pose->position);
     if (rc == SH_OK) rc = open_targets(g, node, mesh, primitive, at, pose);
     if (rc == SH_OK) rc = gltf_index(g, node, "skin", "node", &skin);
+    if (rc == SH_OK && skin != GLTF_NONE) rc = gltf_object(g, "skins", skin, &is_there);
     if (rc == SH_OK && skin != GLTF_NONE) rc = open_sets(g, attributes, at, pose);
+    g->n_jointless += rc == SH_OK && skin != GLTF_NONE && pose->n_sets == 0;
     if (rc == SH_OK && pose->n_sets > 0) rc = open_skin(g, skin, pose);
     return rc;
 }

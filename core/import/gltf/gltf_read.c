@@ -26,6 +26,8 @@ static void say_counts(const struct gltf *g)
     if (g->n_unmapped > 0)
         sh_warn(report, "%s: %u primitives have no texture coordinates for their texture: they are without it", name,
                 g->n_unmapped);
+    if (g->n_jointless > 0)
+        sh_warn(report, "%s: %u primitives have a skin and no JOINTS_0: no joint moves them", name, g->n_jointless);
     if (g->n_unweighted > 0)
         sh_warn(report, "%s: %llu vertices of a skin have no weights: no joint moves them", name,
                 (unsigned long long)g->n_unweighted);
@@ -49,6 +51,7 @@ static int say_errors(struct gltf *g)
 static int read_scene(struct gltf *g)
 {
     g->b->scene->says = (struct scene_says){.unit_m = 1.0, .up = 2};
+    gltf_say_indices(g);
     int rc = gltf_name_materials(g);
     if (rc == SH_OK) rc = gltf_place_nodes(g);
     if (rc == SH_OK) rc = gltf_draw_scene(g);

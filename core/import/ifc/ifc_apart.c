@@ -91,15 +91,26 @@ static int finish(struct import_apart *a, struct ifc_bodies *bodies, bool *has, 
     return rc;
 }
 
+void ifc_reason(const struct scene_build *b, const char *name, const struct sh_err *said, char out[IFC_REASON_LEN])
+{
+    const char *text = said->text;
+    const size_t n = strlen(b->name);
+    if (strncmp(text, b->name, n) == 0 && text[n] == ':') text += n + 1 + strspn(text + n + 1, " ");
+    const char *advice = strstr(text, ": " IMPORT_ELSE_CONVERT);
+    const int len = advice != NULL ? (int)(advice - text) : (int)strlen(text);
+    const bool is_named = strstr(text, name) != NULL;
+    snprintf(out, IFC_REASON_LEN, "%s%s%.*s", is_named ? "" : name, is_named ? "" : ": ", len, text);
+}
+
 static int judge(struct scene_build *b, const struct ifc_readings *out, struct sh_err *err)
 {
     const int rc = sh_check_stop(b->report, err);
     if (rc != SH_OK || out->has_web || out->has_lite) return rc;
-    const struct sh_err *first = out->web_said.code != 0 ? &out->web_said : &out->lite_said;
-    const struct sh_err *second = out->lite_said.code != 0 ? &out->lite_said : first;
-    if (first == second) return sh_fail(err, SH_EINPUT, "%s", first->text);
-    return build_fail(b, SH_EINPUT, err, "no reader can read it. web-ifc: %.150s; ifc-lite: %.150s", first->text,
-                      second->text);
+    char web[IFC_REASON_LEN] = "", lite[IFC_REASON_LEN] = "";
+    if (out->web_said.code != 0) ifc_reason(b, "web-ifc", &out->web_said, web);
+    if (out->lite_said.code != 0) ifc_reason(b, "ifc-lite", &out->lite_said, lite);
+    return sh_fail(err, SH_EINPUT, "%s: no reader can read it: %s%s%s: " IMPORT_ELSE_CONVERT, b->name, web,
+                   *web != '\0' && *lite != '\0' ? "; " : "", lite);
 }
 
 int ifc_run_readers(struct scene_build *b, struct ifc_fineness fineness, struct ifc_readings *out, struct sh_err *err)

@@ -82,6 +82,7 @@ static int label_part(struct reading *r, const struct ifc_product *p, const stru
     if (style == NULL) return SH_OK;
     memcpy(surface->colour, part->colour, sizeof surface->colour);
     surface->has_colour = 1;
+    surface->clear = style->clear;
     return SH_OK;
 }
 
@@ -115,13 +116,14 @@ static int add_products(struct reading *r)
     const struct ifc_readings *in = &r->readings;
     int rc = SH_OK;
     for (size_t i = 0; i < r->records.n_products && rc == SH_OK; i++) {
-        const struct ifc_product *p = &r->records.product[i];
+        struct ifc_product *p = &r->records.product[i];
         if (p->opens_nothing) r->finding[i] = IFC_UNCUT;
         if (p->is_air) continue;
         const struct ifc_body *web = with_parts(&in->web, in->has_web, p->id),
                               *lite = with_parts(&in->lite, in->has_lite, p->id);
         const struct ifc_choice choice = ifc_choose(p, web, lite, in->has_web && in->has_lite);
         r->finding[i] = choice.finding;
+        p->is_coarse = p->is_curved && choice.source == IFC_LITE;
         if (choice.source == IFC_WEB) rc = add_body(r, p, &in->web, web);
         if (choice.source == IFC_LITE) rc = add_body(r, p, &in->lite, lite);
         if (rc == SH_OK) rc = sh_check_stop(r->b->report, r->err);
@@ -132,13 +134,13 @@ static int add_products(struct reading *r)
 /* One that was asked and gave no answer. */
 static int say_missing(struct reading *r, const char *name, const struct sh_err *said)
 {
+    char why[IFC_REASON_LEN];
     if (said->code == 0) return SH_OK;
+    ifc_reason(r->b, name, said, why);
     if (r->limits.ifc_strict)
         return build_fail(r->b, SH_EINPUT, r->err,
-                          "not cross-checked; allowed only with both readers "
-                          "(scene.ifc_strict): %s: %.300s",
-                          name, said->text);
-    sh_warn(r->b->report, "%s: not cross-checked: %s gave no answer: %.300s", r->b->name, name, said->text);
+                          "not cross-checked; allowed only with both readers (scene.ifc_strict): %s", why);
+    sh_warn(r->b->report, "%s: not cross-checked: %s gave no answer: %s", r->b->name, name, why);
     return SH_OK;
 }
 
@@ -186,6 +188,7 @@ static int read_by_two(struct reading *r)
     if (rc == SH_OK) rc = say_missing(r, "ifc-lite", &r->readings.lite_said);
     if (rc == SH_OK) rc = add_products(r);
     if (rc == SH_OK) rc = say_facets(r, &fineness);
+    if (rc == SH_OK) ifc_say_coarse(r->b, &r->records);
     if (rc == SH_OK) rc = ifc_say_findings(r->b, &r->records, r->finding, r->limits.ifc_strict, r->err);
     if (rc == SH_OK) rc = build_single(r->b, r->largest_m, BUILD_SINGLE_ROUNDING * r->largest_m, true, r->err);
     return rc;
@@ -204,10 +207,23 @@ static int read_by_assimp(struct reading *r, const char *why)
     return rc == SH_OK ? import_apart(r->b, r->err) : rc;
 }
 
+/* Both readers take one that they don't know for metres. */
+static int say_unit(struct reading *r)
+{
+    const struct sh_err *said = &r->records.no_unit;
+    if (said->code == 0) return SH_OK;
+    if (r->limits.ifc_strict)
+        return sh_fail(r->err, SH_EINPUT, "%.420s; allowed only with one (scene.ifc_strict)", said->text);
+    sh_warn(r->b->report, "%s; it is read in metres (scene.meshes[].scale)", said->text);
+    return SH_OK;
+}
+
 static int read_records(struct reading *r)
 {
     char why[160] = "";
     int rc = ifc_records_open(&r->records, r->b->spec->file, r->err);
+    if (rc != SH_OK) return rc;
+    rc = say_unit(r);
     if (rc != SH_OK) return rc;
     if (r->limits.ifc_reader == IFC_READER_ASSIMP) return read_by_assimp(r, "scene.ifc_reader is assimp");
     if (r->limits.ifc_strict && r->limits.ifc_reader != IFC_READER_AUTO)

@@ -26,6 +26,10 @@ struct ifc_readings {
 /* Whether node and both readers are there; else why not: a phrase. */
 bool ifc_readers_are_there(const struct scene_import_limits *limits, char *why, size_t size);
 
+/* What a reader said, with its name, but without the file's name and what to do. */
+enum { IFC_REASON_LEN = 150 };
+void ifc_reason(const struct scene_build *b, const char *name, const struct sh_err *said, char out[IFC_REASON_LEN]);
+
 /* Runs the readers that are asked for, both at the same time. Fails where none gives an answer. */
 int ifc_run_readers(struct scene_build *b, struct ifc_fineness fineness, struct ifc_readings *out, struct sh_err *err);
 void ifc_readings_free(struct ifc_readings *r);
@@ -36,6 +40,8 @@ void ifc_readings_free(struct ifc_readings *r);
  * finding is the error instead. finding[records->n_products]. */
 int ifc_say_findings(struct scene_build *b, const struct ifc_records *records, const enum ifc_finding *finding,
                      bool strict, struct sh_err *err);
+/* Names the curved products whose facets follow no tolerance. */
+void ifc_say_coarse(struct scene_build *b, const struct ifc_records *records);
 /* Names the products that Assimp can't be relied on for, in a warning, or, with refuse, in an error. why: no other reader is
  * there. */
 int ifc_say_assimp(struct scene_build *b, const struct ifc_records *records, bool refuse, const char *why,

@@ -6,7 +6,7 @@
 #include "core/grow.h"
 
 /* Attributes of an IfcProduct: GlobalId, OwnerHistory, Name, Description, ObjectType, ObjectPlacement, Representation. */
-enum { PRODUCT_GUID = 0, PRODUCT_NAME = 2, PRODUCT_SHAPE = 6, PRODUCT_ARGS = 7 };
+enum { PRODUCT_GUID = 0, PRODUCT_NAME = 2, PRODUCT_PLACEMENT = 5, PRODUCT_SHAPE = 6, PRODUCT_ARGS = 7 };
 
 static int compare_records(const void *a, const void *b)
 {
@@ -18,6 +18,12 @@ const struct step_record *ifc_records_find(const struct ifc_records *r, uint64_t
 {
     const struct step_record key = {.id = id};
     return r->n > 0 ? bsearch(&key, r->record, r->n, sizeof key, compare_records) : NULL;
+}
+
+int ifc_records_fail(const struct ifc_records *r, const struct step_record *at, struct sh_err *err, const char *what)
+{
+    return text_fail(&r->text, at->line, SH_EINPUT, err, "%.*s #%llu: %s", (int)at->type.n, at->type.p,
+                     (unsigned long long)at->id, what);
 }
 
 static int compare_products(const void *a, const void *b)
@@ -104,6 +110,26 @@ static bool is_air(struct text_span type)
     return false;
 }
 
+/* IfcLocalPlacement(PlacementRelTo, RelativePlacement): up to one that is absolute. A chain without end has more links than the
+ * file has records. */
+static int check_placement(const struct ifc_records *r, const struct ifc_product *p, struct text_span placement,
+                           struct sh_err *err)
+{
+    const struct step_record *at = NULL;
+    uint64_t id;
+    for (size_t n = 0; step_reference(placement, &id); n++) {
+        at = ifc_records_find(r, id);
+        if (at == NULL || !text_is(at->type, "IFCLOCALPLACEMENT") || step_split(at->args, &placement, 1) < 1)
+            return SH_OK;
+        if (n > r->n)
+            return text_fail(&r->text, at->line, SH_EINPUT, err,
+                             "IFCLOCALPLACEMENT #%llu is relative to itself, so %.*s '%.40s' %.22s has no place",
+                             (unsigned long long)at->id, (int)(p->type.n < 48 ? p->type.n : 48), p->type.p, p->name,
+                             p->guid);
+    }
+    return SH_OK;
+}
+
 /* Whatever its type is called: its first attribute is a GlobalId, and its seventh a shape. */
 static int add_product(struct ifc_records *r, const struct step_record *record, struct sh_err *err)
 {
@@ -123,18 +149,24 @@ static int add_product(struct ifc_records *r, const struct step_record *record, 
                               .name = ifc_text(arg[PRODUCT_NAME]),
                               .shape = shape,
                               .is_air = is_air(record->type)};
-    return p->guid != NULL && p->name != NULL ? SH_OK : no_memory(r, err);
+    if (p->guid == NULL || p->name == NULL) return no_memory(r, err);
+    return check_placement(r, p, arg[PRODUCT_PLACEMENT], err);
 }
 
-int ifc_records_open(struct ifc_records *r, const char *path, struct sh_err *err)
+int ifc_records_index(struct ifc_records *r, const char *path, struct sh_err *err)
 {
     *r = (struct ifc_records){.unit_m = 1.0};
     int rc = step_open(&r->text, path, err);
     if (rc == SH_OK) rc = check_end(r, err);
     if (rc == SH_OK) rc = read_all(r, err);
-    if (rc == SH_OK) rc = check_references(r, err);
+    return rc == SH_OK ? check_references(r, err) : rc;
+}
+
+int ifc_records_open(struct ifc_records *r, const char *path, struct sh_err *err)
+{
+    int rc = ifc_records_index(r, path, err);
     if (rc != SH_OK) return rc;
-    r->unit_m = ifc_unit_m(r);
+    if (ifc_unit_find(r, &r->unit_m, &r->no_unit) != SH_OK) r->unit_m = 1.0;
     for (size_t i = 0; i < r->n && rc == SH_OK; i++)
         rc = add_product(r, &r->record[i], err);
     if (rc == SH_OK) rc = ifc_styles_collect(r, err);

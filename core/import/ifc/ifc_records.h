@@ -14,6 +14,7 @@ struct ifc_style {
     uint64_t item;   /* 0: it is a material's */
     char *name;      /* may be empty */
     float colour[3]; /* 0..1 */
+    float clear;     /* its transparency, 0..1 */
 };
 
 struct ifc_product {
@@ -25,9 +26,10 @@ struct ifc_product {
     bool opens_nothing;    /* an opening that no IfcRelVoidsElement names */
     bool has_body;         /* its shape, walked through, has a solid or a surface */
     bool is_curved;
-    bool is_turned;                /* it has a solid that is turned about an axis */
-    double points_m;               /* largest coordinate of its points */
-    bool is_far;                   /* it has points beyond 1 km of their own origin */
+    bool is_coarse;  /* curved, and ifc-lite's body is taken, which cuts circles up by levels of its own */
+    bool is_turned;  /* it has a solid that is turned about an axis */
+    double points_m; /* largest coordinate of its points */
+    bool is_far;     /* it has points beyond 1 km of their own origin */
     struct text_span assimp_wrong; /* the first entity in it that Assimp is known to get wrong; n 0: none */
     uint32_t *style;               /* [n_styles] of its items, places in the records' style */
     size_t n_styles, room_styles;
@@ -40,19 +42,25 @@ struct ifc_records {
     struct ifc_product *product; /* [n_products] in the order of ids */
     size_t n_products, room_products;
     double unit_m;
+    struct sh_err no_unit;   /* why the file's unit of length is not known, so that unit_m is 1; code 0: it is */
     double radius_m;         /* of the largest circle that anything is cut of; 0: there is none */
     uint32_t *mark, stamp;   /* [n] of the last walk */
     struct ifc_style *style; /* [n_styles] by item */
     size_t n_styles, room_styles;
 };
 
-/* ifc_records_close is due in any case. Errors (SH_EINPUT) name file, line and record: a file that is cut off, a number
- * that two records have, a reference to a record that is not there. No reader of bodies says any of these. */
+/* Its records alone; ifc_records_close is due in any case. Errors (SH_EINPUT) name file, line and record: a file that is cut
+ * off, a number that two records have, a reference to a record that is not there. No reader of bodies says any of these. */
+int ifc_records_index(struct ifc_records *r, const char *path, struct sh_err *err);
+/* Likewise with its products. Placements that lead back to themselves are an error, too: it names the product. */
 int ifc_records_open(struct ifc_records *r, const char *path, struct sh_err *err);
 void ifc_records_close(struct ifc_records *r);
 
 /* The next record number in a list of attributes, from *p on; texts are passed over. 0: there is none. */
 uint64_t ifc_next_reference(const char **p, const char *end);
+
+/* "FILE, line N: TYPE #n: what": SH_EINPUT. */
+int ifc_records_fail(const struct ifc_records *r, const struct step_record *at, struct sh_err *err, const char *what);
 
 /* NULL: there is none of that number. */
 const struct step_record *ifc_records_find(const struct ifc_records *r, uint64_t id);
@@ -75,9 +83,9 @@ const struct ifc_style *ifc_style_by_colour(const struct ifc_records *r, const s
  * ($, *): empty. NULL: no memory. */
 char *ifc_text(struct text_span quoted);
 
-/* ---- ifc_unit.c: metres per unit of length. 1 where the file doesn't say. */
-double ifc_unit_m(const struct ifc_records *r);
-/* Metres per unit of an IfcSIUnit of length with this prefix, "$" for none; NaN: it is not known. */
-double ifc_prefix(struct text_span prefix);
+/* ---- ifc_unit.c: metres per unit of length, as the project says; SH_EINPUT where it doesn't. *m is good on success. */
+int ifc_unit_find(const struct ifc_records *r, double *m, struct sh_err *err);
+/* Likewise of one record. */
+int ifc_unit_of(const struct ifc_records *r, const struct step_record *unit, double *m, struct sh_err *err);
 
 #endif

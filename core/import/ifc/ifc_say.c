@@ -72,6 +72,16 @@ int ifc_say_findings(struct scene_build *b, const struct ifc_records *records, c
     return SH_OK;
 }
 
+void ifc_say_coarse(struct scene_build *b, const struct ifc_records *records)
+{
+    struct lines l = {.b = b, .text = "curved, and taken from ifc-lite, whose facets don't follow scene.tolerance_m"};
+    for (size_t i = 0; i < records->n_products; i++)
+        l.n += records->product[i].is_coarse;
+    for (size_t i = 0; i < records->n_products; i++)
+        if (records->product[i].is_coarse) add_name(&l, &records->product[i]);
+    end_group(&l);
+}
+
 int ifc_say_assimp(struct scene_build *b, const struct ifc_records *records, bool refuse, const char *why,
                    struct sh_err *err)
 {

@@ -25,6 +25,15 @@ static bool read_colour(const struct ifc_records *r, const struct step_record *s
     return true;
 }
 
+/* The second attribute, a share; of IfcSurfaceStyleShading from IFC4 on. */
+static float read_clear(const struct ifc_records *r, const struct step_record *shading)
+{
+    struct text_span arg[2];
+    double share;
+    if (step_split(shading->args, arg, 2) < 2 || !step_real(&r->text, arg[1], &share)) return 0.0f;
+    return (float)fmin(fmax(share, 0.0), 1.0);
+}
+
 /* IfcSurfaceStyle(name, side, styles). */
 static bool add_style(struct ifc_records *r, uint64_t item, const struct step_record *surface_style)
 {
@@ -37,6 +46,7 @@ static bool add_style(struct ifc_records *r, uint64_t item, const struct step_re
         if (to == NULL) continue;
         if (text_is(to->type, "IFCSURFACESTYLERENDERING") || text_is(to->type, "IFCSURFACESTYLESHADING"))
             has_colour = read_colour(r, to, style.colour);
+        if (has_colour) style.clear = read_clear(r, to);
     }
     if (!has_colour || step_split(surface_style->args, arg, 1) < 1) return true;
     if (!grow(&r->style, &r->room_styles, r->n_styles + 1, sizeof style)) return false;

@@ -9,11 +9,7 @@ static int hex(const char *p, const char *end, int digits, uint32_t *value)
     *value = 0;
     if (end - p < digits) return 0;
     for (int i = 0; i < digits; i++) {
-        const char c = p[i];
-        const int digit = c >= '0' && c <= '9'   ? c - '0'
-                          : c >= 'A' && c <= 'F' ? c - 'A' + 10
-                          : c >= 'a' && c <= 'f' ? c - 'a' + 10
-                                                 : -1;
+        const int digit = text_hex_digit(p[i]);
         if (digit < 0) return 0;
         *value = 16 * *value + (uint32_t)digit;
     }

@@ -1,70 +1,98 @@
-/* The unit of length of an IFC file's project. Readers of bodies apply it themselves; here it scales what the records say. */
+/* The unit of length of an IFC file's project. Readers of bodies apply it themselves; here it scales what the records say, and
+ * what an anchor is read from. */
 #include <math.h>
 #include <string.h>
 
 #include "core/import/ifc/ifc_records.h"
 
-enum { PROJECT_UNITS = 8 };
+enum { PROJECT_UNITS = 8, PROJECT_ARGS = 9, SI_ARGS = 4 };
 
+/* The record that an attribute refers to, if it is of this type. */
 static const struct step_record *follow(const struct ifc_records *r, struct text_span ref, const char *type)
 {
     uint64_t id;
     const struct step_record *to = step_reference(ref, &id) ? ifc_records_find(r, id) : NULL;
-    return to != NULL && (type == NULL || text_is(to->type, type)) ? to : NULL;
+    return to != NULL && text_is(to->type, type) ? to : NULL;
 }
 
-double ifc_prefix(struct text_span prefix)
+static int read_si(const struct ifc_records *r, const struct step_record *unit, double *m, struct sh_err *err)
 {
     static const struct {
         const char *name;
         double m;
     } known[] = {{"$", 1.0},        {".MILLI.", 1e-3}, {".CENTI.", 1e-2}, {".DECI.", 1e-1},
                  {".MICRO.", 1e-6}, {".KILO.", 1e3},   {".DECA.", 10.0},  {".HECTO.", 100.0}};
+    struct text_span of[SI_ARGS];
+    if (step_split(unit->args, of, SI_ARGS) != SI_ARGS)
+        return ifc_records_fail(r, unit, err, "not the 4 attributes that IFC defines");
     for (size_t i = 0; i < sizeof known / sizeof known[0]; i++)
-        if (text_is(prefix, known[i].name)) return known[i].m;
-    return NAN;
+        if (text_is(of[2], known[i].name)) {
+            *m = known[i].m;
+            return SH_OK;
+        }
+    return ifc_records_fail(r, unit, err, "a length unit with an unknown prefix");
 }
 
-/* One that is not known counts as none. */
-static double prefix_or_none(struct text_span prefix)
+/* IFCCONVERSIONBASEDUNIT(dimensions, .LENGTHUNIT., name, #IFCMEASUREWITHUNIT(measure(x), #unit)), as of feet. */
+static int read_converted(const struct ifc_records *r, const struct step_record *unit, struct text_span ref, double *m,
+                          struct sh_err *err)
 {
-    const double m = ifc_prefix(prefix);
-    return isnan(m) ? 1.0 : m;
-}
-
-/* IfcMeasureWithUnit(measure(x), unit). */
-static double converted(const struct ifc_records *r, const struct step_record *measure)
-{
-    struct text_span arg[2], of[4];
-    if (measure == NULL || step_split(measure->args, arg, 2) != 2) return 1.0;
-    const char *open = memchr(arg[0].p, '(', arg[0].n), *close = memrchr(arg[0].p, ')', arg[0].n);
-    const struct step_record *si = follow(r, arg[1], "IFCSIUNIT");
+    const struct step_record *measure = follow(r, ref, "IFCMEASUREWITHUNIT");
+    struct text_span arg[2], list;
     double factor;
-    if (open == NULL || close == NULL || si == NULL || step_split(si->args, of, 4) != 4) return 1.0;
-    if (!step_real(&r->text, (struct text_span){open + 1, (size_t)(close - open - 1)}, &factor)) return 1.0;
-    return factor > 0.0 ? factor * prefix_or_none(of[2]) : 1.0;
+    if (measure == NULL)
+        return ifc_records_fail(r, unit, err, "no reference to IFCMEASUREWITHUNIT where one is needed");
+    if (step_split(measure->args, arg, 2) != 2) return ifc_records_fail(r, measure, err, "attributes are missing");
+    const struct step_record *si = follow(r, arg[1], "IFCSIUNIT");
+    if (si == NULL) return ifc_records_fail(r, measure, err, "no reference to IFCSIUNIT where one is needed");
+    const char *open = memchr(arg[0].p, '(', arg[0].n);
+    const size_t skip = open != NULL ? (size_t)(open - arg[0].p) : 0;
+    if (!step_list((struct text_span){arg[0].p + skip, arg[0].n - skip}, &list) ||
+        !step_real(&r->text, list, &factor) || factor <= 0.0)
+        return ifc_records_fail(r, measure, err, "no factor of a length unit");
+    int rc = read_si(r, si, m, err);
+    *m *= factor;
+    return rc;
 }
 
-static const struct step_record *units_of_project(const struct ifc_records *r)
+static bool is_length(const struct step_record *unit, struct text_span of[SI_ARGS])
 {
-    struct text_span arg[PROJECT_UNITS + 1];
-    for (size_t i = 0; i < r->n; i++)
-        if (text_is(r->record[i].type, "IFCPROJECT") &&
-            step_split(r->record[i].args, arg, PROJECT_UNITS + 1) > PROJECT_UNITS)
-            return follow(r, arg[PROJECT_UNITS], "IFCUNITASSIGNMENT");
-    return NULL;
+    return step_split(unit->args, of, SI_ARGS) == SI_ARGS && text_is(of[1], ".LENGTHUNIT.") &&
+           (text_is(unit->type, "IFCSIUNIT") || text_is(unit->type, "IFCCONVERSIONBASEDUNIT"));
 }
 
-double ifc_unit_m(const struct ifc_records *r)
+int ifc_unit_of(const struct ifc_records *r, const struct step_record *unit, double *m, struct sh_err *err)
 {
-    const struct step_record *units = units_of_project(r);
-    const char *p = units != NULL ? units->args.p : NULL, *end = units != NULL ? p + units->args.n : NULL;
-    for (uint64_t id; p != NULL && (id = ifc_next_reference(&p, end)) != 0;) {
-        const struct step_record *unit = ifc_records_find(r, id);
-        struct text_span of[4];
-        if (unit == NULL || step_split(unit->args, of, 4) != 4 || !text_is(of[1], ".LENGTHUNIT.")) continue;
-        if (text_is(unit->type, "IFCSIUNIT")) return prefix_or_none(of[2]);
-        if (text_is(unit->type, "IFCCONVERSIONBASEDUNIT")) return converted(r, follow(r, of[3], "IFCMEASUREWITHUNIT"));
+    struct text_span of[SI_ARGS];
+    if (!is_length(unit, of)) return ifc_records_fail(r, unit, err, "no unit of length where one is needed");
+    return text_is(unit->type, "IFCSIUNIT") ? read_si(r, unit, m, err) : read_converted(r, unit, of[3], m, err);
+}
+
+static int find_project(const struct ifc_records *r, const struct step_record **out, struct sh_err *err)
+{
+    int n = 0;
+    for (size_t i = 0; i < r->n; i++) {
+        if (!text_is(r->record[i].type, "IFCPROJECT")) continue;
+        *out = &r->record[i];
+        n++;
     }
-    return 1.0;
+    return n == 1 ? SH_OK : text_fail(&r->text, 0, SH_EINPUT, err, "%d IFCPROJECT records; allowed one", n);
+}
+
+int ifc_unit_find(const struct ifc_records *r, double *m, struct sh_err *err)
+{
+    struct text_span arg[PROJECT_ARGS], of[SI_ARGS];
+    const struct step_record *project = NULL;
+    int rc = find_project(r, &project, err);
+    if (rc != SH_OK) return rc;
+    if (step_split(project->args, arg, PROJECT_ARGS) != PROJECT_ARGS)
+        return ifc_records_fail(r, project, err, "not the 9 attributes that IFC defines");
+    const struct step_record *units = follow(r, arg[PROJECT_UNITS], "IFCUNITASSIGNMENT");
+    if (units == NULL) return ifc_records_fail(r, project, err, "no unit of length: it names no IFCUNITASSIGNMENT");
+    const char *p = units->args.p, *end = p + units->args.n;
+    for (uint64_t id; (id = ifc_next_reference(&p, end)) != 0;) {
+        const struct step_record *unit = ifc_records_find(r, id);
+        if (unit != NULL && is_length(unit, of)) return ifc_unit_of(r, unit, m, err);
+    }
+    return ifc_records_fail(r, units, err, "no unit of length");
 }

@@ -127,6 +127,8 @@ static struct app_option OPTIONS[APP_MAX_OPTIONS + 1] = {
     {APP_TEXT, "shard", "I/N", .at = AT(shard_text), .help = "only every N-th job, from the I-th on (default 1/1: all)"},
     {APP_FLAG, "merge", NULL, .at = AT(merge),
      .help = "check all files of all shards, and write manifest.json where all are whole"},
+    {APP_FLAG, "surfaces", NULL, .at = AT(surfaces),
+     .help = "beside each job's files, the surfaces as CSV: NAME.surfaces.csv, as `record --surfaces` writes it"},
     {APP_FLAG, "force", NULL, .at = AT(force),
      .help = "do jobs again that were made with another configuration, release, ..."},
     OPTION_SET,

@@ -20,7 +20,7 @@ struct batch {
     /* as given */
     struct app_input in; /* CONFIG, --set and --scenario */
     const char *dir, *shard_text, *stations_text, *format, *threads;
-    int list, json, merge, force, quiet;
+    int list, json, merge, force, quiet, surfaces;
     struct batch_sweeps sweeps;
     struct app_words options; /* of record, which each job gets as they are */
     /* as read */

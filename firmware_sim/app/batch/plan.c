@@ -33,6 +33,8 @@ int batch_line_make(const struct batch *b, uint32_t combination, uint32_t statio
     add(line, "--station=%u", station);
     for (int i = 0; i < b->n_endings; i++)
         add(line, "--output=%s%s%s.%s", b->dir != NULL ? b->dir : "", b->dir != NULL ? "/" : "", name, b->ending[i]);
+    if (b->surfaces)
+        add(line, "--surfaces=%s%s%s.surfaces.csv", b->dir != NULL ? b->dir : "", b->dir != NULL ? "/" : "", name);
     for (int i = 0; i < b->in.sets.n; i++)
         add(line, "--set=%s", b->in.sets.set[i]);
     batch_sweeps_at(&b->sweeps, combination, set);
@@ -77,7 +79,7 @@ int batch_is_of_speed(const char *set)
 void batch_job_made(const struct batch *b, uint32_t job, struct batch_made *made)
 {
     const char *set[BATCH_MAX_SWEEPS],
-        *text[APP_MAX_SETS + BATCH_MAX_SWEEPS + 2 * APP_MAX_OPTIONS + RECORD_MAX_FILES + 2];
+        *text[APP_MAX_SETS + BATCH_MAX_SWEEPS + 2 * APP_MAX_OPTIONS + RECORD_MAX_FILES + 3];
     char name[BATCH_NAME_LEN], station[16];
     uint32_t n = 0;
     batch_job_name(b, job, name);
@@ -93,6 +95,7 @@ void batch_job_made(const struct batch *b, uint32_t job, struct batch_made *made
         text[n++] = b->options.word[i];
     for (int i = 0; i < b->n_endings; i++)
         text[n++] = b->ending[i];
+    if (b->surfaces) text[n++] = "surfaces.csv";
     *made = b->made[b->job[job].combination];
     batch_made_job(made, text, n);
 }

@@ -51,9 +51,10 @@ static int add_beside(void *ctx, const char *name, const char *path)
     return strncmp(name, l->name, strlen(l->name)) == 0 && strchr(name, '/') == NULL ? add_file(l, path) : SH_OK;
 }
 
-static int list_files(const struct batch *b, uint32_t job, const struct record_files *files, struct batch_entry *entry,
+static int list_files(const struct batch *b, uint32_t job, const struct record_job *done, struct batch_entry *entry,
                       struct sh_err *err)
 {
+    const struct record_files *files = &done->files;
     struct listing l = {.b = b, .entry = entry, .err = err};
     int rc = SH_OK;
     batch_job_name(b, job, l.name);
@@ -64,6 +65,7 @@ static int list_files(const struct batch *b, uint32_t job, const struct record_f
         if (rc == SH_OK && (app_ends_in(path, ".obj") || app_ends_in(path, ".gltf")))
             rc = app_beside(path, add_beside, &l, err);
     }
+    if (rc == SH_OK && done->surfaces != NULL) rc = add_file(&l, done->surfaces);
     return rc;
 }
 
@@ -76,7 +78,7 @@ static int note_done(struct runner *r, uint32_t job, const struct record_job *do
     entry.seconds = 1e-3 * round(1e-6 * (double)(clock_now_ns() - start_ns));
     snprintf(entry.stream_sha, sizeof entry.stream_sha, "%s", result->sha256);
     batch_job_made(r->b, job, &entry.made);
-    int rc = list_files(r->b, job, &done->files, &entry, err);
+    int rc = list_files(r->b, job, done, &entry, err);
     if (rc == SH_OK) rc = batch_manifest_add(r->manifest, &entry, err);
     batch_entry_free(&entry);
     return rc;

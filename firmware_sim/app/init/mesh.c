@@ -146,10 +146,18 @@ static void turn(struct scene *scene, const struct init_mesh *as, double scale)
     }
 }
 
-/* A raster is not to become a mesh: its reader says what to do. */
+/* An error may say what to do, or what is allowed, by itself. That of a raster does, which is not to become a mesh. */
+static int has_advice(const char *file, const char *text)
+{
+    static const char *const words[] = {"export ", "convert ", "copy it", "allowed", "scene.", "join "};
+    for (size_t i = 0; i < sizeof words / sizeof words[0]; i++)
+        if (strstr(text, words[i]) != NULL) return 1;
+    return geotiff_is_name(file);
+}
+
 static int fail(const char *file, const struct sh_err *why, int code, struct sh_err *err)
 {
-    if (code != SH_EINPUT || geotiff_is_name(file)) return sh_fail(err, code, "%s", why->text);
+    if (code != SH_EINPUT || has_advice(file, why->text)) return sh_fail(err, code, "%s", why->text);
     return sh_fail(err, code, "%.380s; a mesh of triangles is needed: export it again, for instance as .obj or .ply",
                    why->text);
 }

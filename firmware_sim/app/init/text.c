@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "core/angle.h"
+#include "firmware_sim/site/site.h"
 
 static const double MOST_PULSES = 200000.0, MOST_LINES_HZ = 200.0;
 
@@ -111,6 +112,15 @@ static void put_scene(const struct init_text *t, FILE *out)
     fprintf(out, "      scale: %.7g # metres per unit; %s\n", t->mesh->scale, t->mesh->scale_from);
 }
 
+/* Glass is nothing that a file can decide: it is for the user to take the mark away. */
+static void put_clear(const struct scene *scene, FILE *out)
+{
+    struct site_clear clear = {0};
+    for (uint32_t i = 0; i < scene->n_surfaces; i++)
+        site_clear_add(&clear, &scene->surface[i], NULL, 0);
+    if (clear.n > 0) fprintf(out, "# transparent by the file; as glass:\n# surfaces: [%s]\n", clear.rules);
+}
+
 static void put_station(const struct init_text *t, FILE *out)
 {
     static const char *const name[] = {
@@ -131,6 +141,7 @@ void init_write_text(const struct init_text *t, FILE *out)
             s->max_m[0] - s->min_m[0], s->max_m[1] - s->min_m[1], s->max_m[2] - s->min_m[2], s->n_triangles);
     put_head(t, out);
     put_scene(t, out);
+    put_clear(s, out);
     put_station(t, out);
     fprintf(out, "links: # for `scanhead run`; recording off line needs none\n  - {type: pty");
     if (t->link_name != NULL) {

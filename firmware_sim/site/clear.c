@@ -1,0 +1,54 @@
+/* Surfaces that their file calls transparent, and the rules that would make glass of them. */
+#include <fnmatch.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "firmware_sim/site/site.h"
+
+/* A pane scatters some of what it doesn't pass on, also where a file says that all goes through. */
+static const double MOST_GLASS = 0.9;
+
+/* A rule about glass or a mirror decides, whatever it says. */
+static int is_decided(const struct scene_surface *s, const struct surface_rule *rule, uint32_t n)
+{
+    for (uint32_t i = 0; i < n; i++)
+        if (fnmatch(rule[i].object, s->object, 0) == 0 && fnmatch(rule[i].material, s->material, 0) == 0)
+            return !isnan(rule[i].surface.glass) || !isnan(rule[i].surface.mirror);
+    return 0;
+}
+
+/* A pattern that fits this name alone, as a double-quoted scalar of YAML. Cut where there is no room. */
+static void quote(const char *name, char *out, size_t room)
+{
+    size_t n = 0;
+    out[n++] = '"';
+    for (const char *p = name; *p != '\0' && n + 6 < room; p++) {
+        const unsigned char c = (unsigned char)*p;
+        if (strchr("*?[\\", *p) != NULL) n += (size_t)snprintf(out + n, room - n, "\\\\"); /* of fnmatch */
+        if (*p == '"' || *p == '\\') out[n++] = '\\';
+        if (c < 0x20 || c == 0x7f)
+            n += (size_t)snprintf(out + n, room - n, "\\x%02x", c);
+        else
+            out[n++] = *p;
+    }
+    out[n++] = '"';
+    out[n] = '\0';
+}
+
+void site_clear_add(struct site_clear *c, const struct scene_surface *s, const struct surface_rule *rule, uint32_t n)
+{
+    char name[2 * SCENE_NAME_LEN], entry[2 * SCENE_NAME_LEN + 48];
+    if ((double)s->clear < SITE_CLEAR_LEAST || is_decided(s, rule, n)) return;
+    const int by_material = s->material[0] != '\0';
+    c->n++;
+    quote(by_material ? s->material : s->object, name, sizeof name);
+    const int key = snprintf(entry, sizeof entry, "{%s: %s, ", by_material ? "material" : "object", name);
+    if (strstr(c->rules, entry) != NULL) return;
+    snprintf(entry + key, sizeof entry - (size_t)key, "glass: %.2g}", fmin(MOST_GLASS, (double)s->clear));
+    const size_t len = strlen(c->rules), more = strlen(entry) + 2;
+    if (len + more >= sizeof c->rules)
+        c->n_left_out++;
+    else
+        snprintf(c->rules + len, sizeof c->rules - len, "%s%s", len > 0 ? ", " : "", entry);
+}
