@@ -249,6 +249,7 @@ const struct bad bad[] = {
     {AT_16("surfaces: {material: a}"), 16, "surfaces", "allowed a list of 0 to 64"},
     {AT_16("surfaces: [{reflectance: 0.5}, {glass: 0.5, mirror: 0.5}]"), 16, "surfaces[1].mirror", "either glass or mirror"},
     {AT_16("surfaces: [{reflectance: 0.5, glass: 0.6}]"), 16, "surfaces[0]", "add up to 1.1; allowed at most 1"},
+    {AT_16("surfaces: [{reflectance: 0.3, specular: 0.1, mirror: 0.7}]"), 16, "surfaces[0]", "add up to 1.1; allowed"},
     {AT_16("surfaces: [{retro: -1}]"), 16, "surfaces[0].retro", "allowed 0 to 1000000"},
     {AT_16("surfaces: [{reflektance: 1}]"), 16, "surfaces[0].reflektance", "did you mean surfaces[0].reflectance?"},
     {AT_16("optics: {depth: 5}"), 16, "optics.depth", "0 to 4"},

@@ -225,6 +225,15 @@ static void places_are_taken_in_each_form(void **state)
     assert_says("stations[0].position_m: missing, and no place on the Earth is given either");
 }
 
+static void seeds_follow_that_of_the_noise(void **state)
+{
+    (void)state;
+    assert_loads(load_edited("output:", "noise: {seed: 7, ball: {radius_m: 0.1}}\noutput:"));
+    assert_true(cfg->noise.seed == 7 && cfg->noise.ball.seed == 7);
+    assert_loads(load_edited("output:", "noise: {seed: 7, ball: {radius_m: 0.1, seed: 0}}\noutput:"));
+    assert_true(cfg->noise.seed == 7 && cfg->noise.ball.seed == 0);
+}
+
 /* ---- damaged files */
 
 static uint32_t next_random(uint32_t *x) /* xorshift32, Marsaglia 2003 */
@@ -280,6 +289,7 @@ int main(void)
         cmocka_unit_test(defaults_are_those_of_the_table),
         cmocka_unit_test(odd_but_right_configurations_load),
         cmocka_unit_test(places_are_taken_in_each_form),
+        cmocka_unit_test(seeds_follow_that_of_the_noise),
         cmocka_unit_test(damaged_files_never_crash),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

@@ -10,6 +10,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -144,6 +145,54 @@ static void test_full(void **state)
     assert_int_equal(mkdir(dir, 0700), 0);
 }
 
+/* Bytes of disk that the part has, beyond its length as well. */
+static uint64_t room(void)
+{
+    struct stat st;
+    char part[80];
+    snprintf(part, sizeof part, "%s.part", path);
+    assert_int_equal(stat(part, &st), 0);
+    assert_int_equal(st.st_size, 0);
+    return (uint64_t)st.st_blocks * 512;
+}
+
+/* Whether the file system has room beyond a file's end. */
+static int can_have_room(void)
+{
+    char probe[80];
+    snprintf(probe, sizeof probe, "%s/probe", dir);
+    const int fd = open(probe, O_RDWR | O_CREAT, 0600), can = fallocate(fd, FALLOC_FL_KEEP_SIZE, 0, 4096) == 0;
+    assert_int_equal(unlink(probe), 0);
+    close(fd);
+    return can;
+}
+
+/* Without a limit on files their ends have room on the disk, where the file system can do that. With a limit there is
+ * none: it would lie beyond the limit. */
+static void test_room_and_limits(void **state)
+{
+    enum { ROOM = 1 << 20, LIMIT = 1 << 26 };
+    struct outfile file;
+    struct rlimit before, limit;
+    (void)state;
+    assert_int_equal(getrlimit(RLIMIT_FSIZE, &before), 0);
+    if (before.rlim_cur != RLIM_INFINITY) skip();
+    begin(&file, 0);
+    const int can = can_have_room();
+    assert_int_equal(outfile_reserve(&file, ROOM, &err), SH_OK);
+    assert_true(!can || room() >= ROOM);
+    assert_int_equal(outfile_close(&file, OUTFILE_DROP, &err), 0);
+    begin(&file, 0);
+    limit = before;
+    limit.rlim_cur = LIMIT;
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &limit), 0);
+    assert_int_equal(outfile_reserve(&file, ROOM, &err), SH_OK);
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &before), 0);
+    assert_true(room() < ROOM);
+    assert_int_equal(outfile_close(&file, OUTFILE_DROP, &err), 0);
+    if (!can) skip();
+}
+
 static int setup(void **state)
 {
     uint32_t v = 1;
@@ -165,10 +214,8 @@ static int teardown(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_pieces),
-        cmocka_unit_test(test_whole_buffer),
-        cmocka_unit_test(test_border),
-        cmocka_unit_test(test_full),
+        cmocka_unit_test(test_pieces), cmocka_unit_test(test_whole_buffer),    cmocka_unit_test(test_border),
+        cmocka_unit_test(test_full),   cmocka_unit_test(test_room_and_limits),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }

@@ -257,11 +257,37 @@ static void test_short_not_ok(void **state)
     bench_close(&bench);
 }
 
+/* What a host has asked for and not got counts up to 64 MiB (drivers/usb/usbip_private.h), its last byte as well: one more
+ * cuts it off. */
+static void test_bytes_pending(void **state)
+{
+    (void)state;
+    enum { MIB = 1 << 20 };
+    static const uint32_t lens[] = {16 * MIB, 16 * MIB, 16 * MIB, 16 * MIB - 3};
+    struct bench bench = usbip_bench("N");
+    struct client c;
+    uint8_t byte;
+    client_import(&c, &bench);
+    assert_int_equal(client_control(&c, &r, 0x00, 9, 1, 0, 0, NULL), 0);
+    assert_int_equal(client_control(&c, &r, 0x41, 0x22, 1, 2, 0, NULL), 0);
+    bench_expect(&bench, LINK_OPENED, 0);
+    for (size_t i = 0; i < sizeof lens / sizeof lens[0]; i++)
+        client_submit(&c, 1, 3, NULL, NULL, lens[i]);
+    assert_int_equal(client_control(&c, &r, 0x80, GET_STATUS, 0, 0, 2, NULL), 0); /* these are given back */
+    client_submit(&c, 1, 3, NULL, NULL, 3);
+    assert_int_equal(client_control(&c, &r, 0x02, 1, 0, 0x83, 0, NULL), 0); /* no byte: it is still served */
+    client_submit(&c, 1, 3, NULL, NULL, 1);
+    assert_false(client_read(&c, &byte, 1));
+    close(c.fd);
+    bench_close(&bench);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_silent), cmocka_unit_test(test_oldest),   cmocka_unit_test(test_pipelining),
-        cmocka_unit_test(test_turns),  cmocka_unit_test(test_segments), cmocka_unit_test(test_short_not_ok),
+        cmocka_unit_test(test_silent),        cmocka_unit_test(test_oldest),   cmocka_unit_test(test_pipelining),
+        cmocka_unit_test(test_turns),         cmocka_unit_test(test_segments), cmocka_unit_test(test_short_not_ok),
+        cmocka_unit_test(test_bytes_pending),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

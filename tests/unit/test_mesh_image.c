@@ -1,0 +1,72 @@
+/* Images of grids that are larger than a texture may be: how many lines and rows share a texel is said, of that scan where
+ * it is most. */
+#include "tests/unit/recorder_rig.h"
+
+enum { PULSES = 20000 }; /* of a line, 1000 a second as the rig has them */
+
+static void begin_scan(uint32_t scan)
+{
+    static uint8_t out[1024];
+    const struct native_descriptor d = {.idn = "Maker,Model,SN1,1.0",
+                                        .profile = "model",
+                                        .scan = scan,
+                                        .layout = NATIVE_GEO,
+                                        .prr_uhz = INT64_C(1000000000),
+                                        .lines_uhz = INT64_C(1000000000) / PULSES,
+                                        .pan_udeg_s = 1800000,
+                                        .pan_stop_udeg = 360000000,
+                                        .sweep_udeg = 360000000,
+                                        .line_stop_udeg = 360000000,
+                                        .range_max_m = 100,
+                                        .frames = 1,
+                                        .mirror_counts_per_turn = 3600,
+                                        .pan_counts_per_turn = 3600,
+                                        .range_scale_m = 1e-3};
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, scan);
+    memcpy(a.axes, (const double[9]){1, 0, 0, 0, 1, 0, 0, 0, 1}, sizeof a.axes);
+    for (int k = 0; k < 3; k++)
+        a.scale[k] = 1e-3;
+    rig_put(out, native_encode_descriptor(out, sizeof out, &d, 0, 0));
+    rig_anchor(&a);
+}
+
+/* Two lines of two shots, which make triangles, and one more shot in that many rows. */
+static void put_wall(uint32_t rows)
+{
+    for (uint32_t line = 0; line < 2; line++) {
+        const int32_t x = 1000 * (int32_t)line;
+        const struct rig_point p[2] = {{x, 10000, 0, -500, 1, 1, 1}, {x, 10000, 1000, -500, 1, 1, 1}};
+        const struct rig_point last = {x, 10000, 50000, -500, 1, 1, 1};
+        const uint64_t pulse = (uint64_t)line * PULSES;
+        rig_points(line, pulse, pulse, p, 2);
+        rig_points(line, pulse, pulse + rows - 1, &last, 1);
+    }
+}
+
+/* A texture has up to 16384 rows: two of 16385 share one, whatever scan comes before or after. */
+static void the_largest_step_is_said(void **state)
+{
+    (void)state;
+    static const uint32_t rows[][2] = {{16385, 3}, {3, 16385}, {16385, 16384}, {16384, 16384}};
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        struct sh_err err;
+        rig_begin();
+        for (uint32_t scan = 1; scan <= 2; scan++) {
+            begin_scan(scan);
+            put_wall(rows[i][scan - 1]);
+        }
+        if (rig_record(rig_path("a.obj"), (struct recorder_options){.long_edge = 0}, RIG_KEEP, &err) != SH_OK)
+            fail_msg("%s", err.text);
+        const char *said = strstr(rig_notes, "2 lines and rows are one of the texture's, which has up to 16384 a side");
+        if ((said != NULL) != (i < 3)) fail_msg("%u and %u rows: %s", rows[i][0], rows[i][1], rig_notes);
+        static const char *const files[] = {"a.obj", "a.mtl", "a.1.png", "a.2.png"};
+        for (int k = 0; k < 4; k++)
+            assert_int_equal(unlink(rig_path(files[k])), 0);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(the_largest_step_is_said)};
+    return cmocka_run_group_tests(tests, rig_set_up, rig_tear_down);
+}

@@ -1,0 +1,110 @@
+/* What a site makes of a configuration's air and encoders, and of mirrors in scenes of many surfaces. */
+#include "tests/unit/site_rig.h"
+
+#include <math.h>
+
+#include "core/instrument.h"
+
+static const char FLOOR[] = "o floor\nv -9 -9 0\nv 9 -9 0\nv 9 9 0\nf 1 2 3\n";
+
+static int load(const char *more, struct site **site)
+{
+    char text[1024];
+    *site = NULL;
+    clear_warned();
+    snprintf(text, sizeof text,
+             "head: {profile: riegl-vz400i}\nscene: {meshes: [{file: room.obj, up: z, scale: 1}]}\n"
+             "stations: [{position_m: [0, 0, 1.7]}]\nbeam: {mode: single}\n%s",
+             more);
+    write_in("test.yaml", text);
+    int rc = config_load(config_path, NULL, 0, cfg, &err);
+    return rc == SH_OK ? site_load(cfg, &report, site, &err) : rc;
+}
+
+/* Amplitude of a white target at 400 m. */
+static double amplitude(const char *signal)
+{
+    char text[128];
+    struct site *site;
+    snprintf(text, sizeof text, "signal: {model: on%s}\n", signal);
+    write_in("room.obj", FLOOR);
+    if (load(text, &site) != SH_OK) fail_msg("%s", err.text);
+    const double a = detect_amplitude(site->detect.cast.signal, 400.0, 1.0);
+    site_free(site);
+    return a;
+}
+
+/* An extinction is that of the air, all of it. The data sheet's reaches hold for air that lets 23 km be seen, whose
+ * extinction at 1550 nm is, after Kruse, 3.912 / 23 km (550 / 1550)^1.3. So the signal changes by the difference of both,
+ * on the way there and back. The exponentials are rounded to some 1e-16 each. */
+static void extinction_replaces_that_of_the_days_air(void **state)
+{
+    (void)state;
+    char text[64];
+    const double day_1_km = 3.912 / 23.0 * pow(550.0 / 1550.0, 1.3), as_quoted = amplitude("");
+    snprintf(text, sizeof text, ", extinction_1_km: %.17g", day_1_km);
+    assert_true(fabs(amplitude(text) / as_quoted - 1.0) < 1e-13);
+    assert_true(fabs(amplitude(", visibility_m: 23000") / as_quoted - 1.0) < 1e-13);
+    const double ratio = exp(-2.0 * 0.4 * (0.5 - day_1_km));
+    assert_true(fabs(amplitude(", extinction_1_km: 0.5") / as_quoted / ratio - 1.0) < 1e-13);
+}
+
+/* An encoder reads too much by eccentricity sin(angle - phase): nothing at its own phase, all of it a quarter of a turn
+ * on. A rounding of a turn is 1e-16. */
+static void each_encoder_has_a_phase_of_its_own(void **state)
+{
+    (void)state;
+    struct site *site;
+    double mirror_turn[2] = {10.0 / 360, 100.0 / 360}, pan_turn[2] = {70.0 / 360, 160.0 / 360};
+    write_in("room.obj", FLOOR);
+    if (load("instrument: {mirror_eccentricity_deg: 0.36, mirror_phase_deg: 10,\n"
+             "             pan_eccentricity_deg: 0.72, pan_phase_deg: 70}\n",
+             &site) != SH_OK)
+        fail_msg("%s", err.text);
+    instrument_read(&site->detect.instrument, 2, mirror_turn, pan_turn);
+    assert_true(fabs(mirror_turn[0] - 10.0 / 360) < 1e-15 && fabs(mirror_turn[1] - 100.0 / 360 - 0.001) < 1e-15);
+    assert_true(fabs(pan_turn[0] - 70.0 / 360) < 1e-15 && fabs(pan_turn[1] - 160.0 / 360 - 0.002) < 1e-15);
+    site_free(site);
+}
+
+/* n surfaces, the first of a mirror. */
+static void write_surfaces(uint32_t n)
+{
+    char *text = malloc(100 * (size_t)n + 100), *p = text;
+    assert_non_null(text);
+    for (uint32_t i = 0; i < n; i++)
+        p += sprintf(p, "o %u\nusemtl %s\nv %u 0 0\nv %u 1 0\nv %u 0 1\nf -3 -2 -1\n", i, i == 0 ? "silver" : "plaster",
+                     i, i, i);
+    write_in("room.obj", text);
+    free(text);
+}
+
+/* Labels are 16 bits, and 65535 is none: 65534 are left, a half of them for ghosts. */
+static void ghosts_need_labels(void **state)
+{
+    (void)state;
+    static const char mirror[] = "surfaces: [{material: silver, mirror: 0.9}]\noptics: {depth: 1}\n";
+    struct site *site;
+    write_surfaces(32767);
+    if (load(mirror, &site) != SH_OK) fail_msg("%s", err.text);
+    assert_int_equal(site->n_surfaces, 65534);
+    assert_string_equal(site_surface(site, 65533)->object, "ghost of 32766");
+    site_free(site);
+    write_surfaces(32768);
+    assert_int_equal(load(mirror, &site), SH_EINPUT);
+    assert_non_null(strstr(err.text,
+                           "32768 surfaces and a mirror: each needs a second label for its ghost; allowed up to "
+                           "32767"));
+    assert_int_equal(load("", &site), SH_OK); /* without a mirror they are allowed */
+    site_free(site);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(extinction_replaces_that_of_the_days_air),
+        cmocka_unit_test(each_encoder_has_a_phase_of_its_own),
+        cmocka_unit_test(ghosts_need_labels),
+    };
+    return cmocka_run_group_tests(tests, site_rig_setup, site_rig_teardown);
+}
