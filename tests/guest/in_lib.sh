@@ -82,7 +82,7 @@ tap() {
         esac
         seen=$((seen + 1))
     done </tmp/tap.out
-    [ $failed = 0 ] || tail -n 10 /tmp/tap.err | sed 's/^/#   /' >&3
+    [ $failed = 0 ] || { tail -n 10 /tmp/tap.err /tmp/head.err; dmesg | tail -n 10; } 2>&1 | sed 's/^/#   /' >&3
     [ "$seen" = "$planned" ] && [ $((status != 0)) = $failed ] && return
     fail "$prefix: $1" "planned ${planned:-none}, seen $seen, exit status $status"
     cat /tmp/tap.out /tmp/tap.err | tail -n 20 | sed 's/^/#   /' >&3
