@@ -24,7 +24,7 @@ struct mtl {
     uint8_t *known;            /* [surfaces from first on] a library has their material */
     struct text_span material; /* newmtl */
     bool has_opacity;          /* d of the material at hand, which counts before Tr */
-    struct missing colour, texture;
+    struct missing colour, opacity, texture;
 };
 
 static void add_missing(struct missing *m, uint64_t line, struct text_span text)
@@ -116,9 +116,14 @@ static void take_colour(struct mtl *m)
 /* d: opacity; Tr: 1 less that. d -halo depends on the direction, and is none. */
 static void take_opacity(struct mtl *m, bool is_opacity)
 {
+    struct text at = m->t;
     double share;
     text_skip_blanks(&m->t);
-    if (!text_number(&m->t, &share) || !(share >= 0.0 && share <= 1.0) || (m->has_opacity && !is_opacity)) return;
+    if (!text_number(&m->t, &share) || !(share >= 0.0 && share <= 1.0)) {
+        add_missing(&m->opacity, at.line, text_rest(&at));
+        return;
+    }
+    if (m->has_opacity && !is_opacity) return;
     m->has_opacity |= is_opacity;
     for (uint32_t i = m->first; i < m->b->scene->n_surfaces; i++)
         if (has_material(&m->b->scene->surface[i], m->material))
@@ -254,6 +259,9 @@ static const char *others(const struct missing *m, char text[40])
 static void warn_of_missing(const struct mtl *m, const char *path)
 {
     char more[40];
+    if (m->opacity.n > 0)
+        sh_warn(m->b->report, "%s, line %llu: the opacity '%s' is left out%s; allowed are numbers from 0 to 1", path,
+                (unsigned long long)m->opacity.line, m->opacity.first, others(&m->opacity, more));
     if (!build_wants_textures(m->b)) return;
     if (m->colour.n > 0)
         sh_warn(m->b->report, "%s, line %llu: Kd '%s' is left out%s; allowed are numbers from 0 to 1", path,
@@ -268,7 +276,7 @@ static int read_library(struct mtl *m, const char *path, uint64_t line, struct s
     struct sh_err why;
     int rc = SH_OK;
     m->folder = build_folder_of(path);
-    m->colour = m->texture = (struct missing){0};
+    m->colour = m->opacity = m->texture = (struct missing){0};
     if (text_open(&m->t, path, NULL, NULL, &why) == SH_OK) {
         rc = read_materials(m, err);
         if (rc == SH_OK) warn_of_missing(m, path);

@@ -20,6 +20,11 @@ struct terrain {
     const double *offset_m;
 };
 
+static const char *named(const char *crs)
+{
+    return crs[0] != '\0' ? crs : "none of the EPSG registry";
+}
+
 static int add_raster(const struct config *cfg, const struct config_mesh *mesh, struct terrain *t, struct sh_err *err)
 {
     struct geotiff g;
@@ -38,12 +43,15 @@ static int add_raster(const struct config *cfg, const struct config_mesh *mesh, 
         memcpy(t->crs, g.crs, sizeof t->crs);
         memcpy(t->bounds_m, bounds_m, sizeof t->bounds_m);
     }
-    if (strcmp(g.crs, t->crs) != 0 || memcmp(mesh->offset_m, t->offset_m, sizeof mesh->offset_m) != 0)
+    if (strcmp(g.crs, t->crs) != 0)
         return sh_fail(
             err, SH_EINPUT,
-            "%s: scene.anchor: source geotiff, but %s and %s differ in their system (%s, %s) or offset_m; allowed is "
-            "one of both",
-            cfg->file, t->file, mesh->file, t->crs, g.crs);
+            "%s: scene.anchor: source geotiff, but the system of %s is %s, and that of %s is %s; allowed is one",
+            cfg->file, t->file, named(t->crs), mesh->file, named(g.crs));
+    if (memcmp(mesh->offset_m, t->offset_m, sizeof mesh->offset_m) != 0)
+        return sh_fail(err, SH_EINPUT,
+                       "%s: scene.anchor: source geotiff, but %s and %s differ in offset_m; allowed is one for both",
+                       cfg->file, t->file, mesh->file);
     for (int k = 0; k < 2; k++) {
         t->bounds_m[k] = fmin(t->bounds_m[k], bounds_m[k]);
         t->bounds_m[k + 2] = fmax(t->bounds_m[k + 2], bounds_m[k + 2]);
@@ -64,7 +72,7 @@ static int find_terrain(const struct config *cfg, struct terrain *t, struct sh_e
     return sh_fail(
         err, SH_EINPUT,
         "%s: its system has no code of the EPSG registry, so nothing says where it is on the Earth; allowed: "
-        "gdal_edit.py -a_srs EPSG:CODE, gdalwarp -t_srs EPSG:CODE, or a scene.anchor of another source",
+        "gdal_edit.py -a_srs EPSG:CODE, gdalwarp -t_srs EPSG:CODE -dstnodata -9999, or a scene.anchor of another source",
         t->file);
 }
 
@@ -114,10 +122,10 @@ static void say(const struct config *cfg, const struct sh_report *report, const 
     if (!cfg->scene.anchor.height_given)
         sh_warn(report,
                 "%s: its heights, which as a rule count from the sea, are taken as heights above the ellipsoid; "
-                "scene.anchor.height_m can give the height of their 0",
+                "scene.anchor.height_m says how high above it their 0 is",
                 t->file);
     if (at->accuracy_m > 0.1)
-        sh_warn(report, "%s: %s is known to %.2g m only on WGS 84", t->file, t->crs, at->accuracy_m);
+        sh_warn(report, "%s: coordinates in %s are good to %.2g m on WGS 84", t->file, t->crs, at->accuracy_m);
 }
 
 static int set_tangent(const struct sh_report *report, const struct terrain *t, const double middle_m[2],
@@ -129,11 +137,11 @@ static int set_tangent(const struct sh_report *report, const struct terrain *t, 
     if (rc == SH_OK) rc = measure_corners(t, frame, at->at.height_m, &worst_m, err);
     if (rc != SH_OK || worst_m < CORNER_M) return rc;
     const int zone = (int)fmin(floor(at->at.lon_deg / 6.0) + 31.0, 60.0);
-    char exact[96];
+    char exact[112];
     if (is_utm)
         snprintf(exact, sizeof exact, "offset_m: [0, 0, %.10g]", at->at.height_m);
     else
-        snprintf(exact, sizeof exact, "a raster in UTM: gdalwarp -t_srs EPSG:%d -r bilinear",
+        snprintf(exact, sizeof exact, "a raster in UTM: gdalwarp -t_srs EPSG:%d -r bilinear -dstnodata -9999",
                  (at->at.lat_deg < 0.0 ? 32700 : 32600) + zone);
     sh_warn(
         report,

@@ -94,6 +94,7 @@ static void set_place(TIFF *tif, const struct tif *t)
 
 static void set_raster(TIFF *tif, const struct tif *t)
 {
+    if (t->kind != 0) TIFFSetField(tif, TIFFTAG_SUBFILETYPE, t->kind);
     TIFFSetField(tif, TIFFTAG_IMAGEWIDTH, t->width);
     TIFFSetField(tif, TIFFTAG_IMAGELENGTH, t->height);
     TIFFSetField(tif, TIFFTAG_BITSPERSAMPLE, t->bits);

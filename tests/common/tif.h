@@ -16,6 +16,7 @@ struct tif {
     const char *no_data, *metadata;
     const char *mode; /* of libtiff: "w", "w8" BigTIFF, "wb" big-endian */
     int with_mask;    /* a second image, which is a mask */
+    uint32_t kind;    /* NewSubfileType of the first one */
 };
 
 /* EPSG:32632, cells of 2 x 3 m, the corner at 690000, 5336000; 32-bit floats. */

@@ -184,7 +184,7 @@ static void holes(void **state)
         assert_true(assert_up(s) == 2.0 * (72.0 - 4.0 * 3.0));
         for (uint32_t i = 0; i < s->n_vertices; i++)
             assert_false(fabs(s->vertex_m[i][0] - 690003.0) < 0.5 && fabs(s->vertex_m[i][1] - 5335995.5) < 0.5);
-        assert_non_null(strstr(warnings, "1 of 20 cells have no height, and are holes; 0 heights"));
+        assert_non_null(strstr(warnings, "1 of 20 cells have no height, and are holes"));
         assert_int_equal(n_warnings, 1);
         scene_free(s);
     }
@@ -197,7 +197,8 @@ static void holes(void **state)
     t.no_data = "255 ";
     struct scene *s = read_tif(&t);
     assert_int_equal(s->n_triangles, 8);
-    assert_non_null(strstr(warnings, "9 of 20 cells have no height, and are holes; 1 heights"));
+    assert_non_null(strstr(warnings, "9 of 20 cells have no height, and are holes"));
+    assert_non_null(strstr(warnings, "1 heights beside holes touch no triangle"));
     scene_free(s);
     for (int i = 0; i < 20; i++)
         value[i] = 255;
@@ -331,6 +332,34 @@ static void what_is_refused(void **state)
          t.photometric = PHOTOMETRIC_RGB);
     WITH("cells of 16 bits, SampleFormat 6", t.bits = 16; t.format = SAMPLEFORMAT_COMPLEXIEEEFP);
     WITH("a mask says which cells have no height", t.with_mask = 1);
+    WITH("its first image is a mask or a smaller copy", t.kind = FILETYPE_REDUCEDIMAGE);
+    static char many[1 << 16];
+    memset(many, ' ', sizeof many - 1);
+    WITH("its tag 42112 has 65536 bytes; allowed are up to 65535", t.metadata = many);
+}
+
+/* Another up or scale would turn the terrain over, or shrink it; and a mask beside it says where holes are. */
+static void refuse_spec(const struct scene_mesh_spec *spec, const char *expected)
+{
+    struct scene *scene;
+    struct sh_err err;
+    assert_int_equal(load_spec(spec, 1e-3, &scene, &err), SH_EINPUT);
+    if (strstr(err.text, expected) == NULL) fail_msg("'%s' doesn't say '%s'", err.text, expected);
+}
+
+static void what_is_beside_it(void **state)
+{
+    (void)state;
+    const struct tif t = tif_of(5, 4, heights);
+    char mask[192];
+    tif_write(tif_path("dtm.tif"), &t);
+    refuse_spec(&(struct scene_mesh_spec){.file = path, .scale = 0.5}, "dtm.tif: a GeoTIFF has z up, and metres");
+    refuse_spec(&(struct scene_mesh_spec){.file = path, .scale = 1, .up = SCENE_UP_Y}, "allowed up: z, scale: 1");
+    snprintf(mask, sizeof mask, "%s.msk", path);
+    tif_write(mask, &t);
+    refuse_spec(&(struct scene_mesh_spec){.file = path, .scale = 1}, "a mask says which cells have no height");
+    unlink(mask);
+    unlink(path);
 }
 
 int main(void)
@@ -345,6 +374,7 @@ int main(void)
         cmocka_unit_test(odd_heights_are_doubted),
         cmocka_unit_test(what_is_left_out_is_said),
         cmocka_unit_test(what_is_refused),
+        cmocka_unit_test(what_is_beside_it),
     };
     return cmocka_run_group_tests_name("geotiff", tests, make_folder, remove_folder);
 }

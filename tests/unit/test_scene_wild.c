@@ -123,6 +123,8 @@ static void missing_things_are_named(void **state)
     assert_non_null(
         strstr(warnings, "r.mtl, line 2: Kd '255 0 0' is left out, with 1 more; allowed are numbers from 0"));
     scene_free(s);
+    put("r.mtl", RED_GREEN "d 2\n");
+    expect_warning("a.obj", "mtllib r.mtl\n" QUADS, "r.mtl, line 5: the opacity '2' is left out; allowed are numbers");
     put("r.mtl", RED_GREEN "map_Kd C:\\maps\\no.png\n");
     expect_warning("a.obj", "mtllib r.mtl\n" QUADS,
                    "r.mtl, line 5: the texture 'C:\\maps\\no.png' is missing; it belongs beside");

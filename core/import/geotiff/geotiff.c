@@ -76,7 +76,7 @@ static int fail_unplaced(const struct reader *r, size_t n_tie)
     if (n_tie > 6)
         return sh_fail(
             r->err, SH_EINPUT,
-            "%s: its place is given by control points; allowed is a grid: gdalwarp -t_srs EPSG:CODE makes one of it",
+            "%s: its place is given by control points; allowed is a grid: gdalwarp -t_srs EPSG:CODE -dstnodata -9999 makes one of it",
             r->tags.path);
     return sh_fail(r->err, SH_EINPUT,
                    "%s: no GeoTIFF: it doesn't say where its cells are (ModelTransformation, or ModelPixelScale and "
@@ -123,7 +123,7 @@ static int fail_degrees(const struct reader *r)
     if (system != 0 && system != USER_DEFINED) snprintf(name, sizeof name, "EPSG:%u", system);
     return sh_fail(r->err, SH_EINPUT,
                    "%s: its cells are degrees (%s); allowed are systems in metres or feet: gdalwarp -t_srs EPSG:%d "
-                   "-r bilinear makes one in UTM",
+                   "-r bilinear -dstnodata -9999 makes one in UTM",
                    r->tags.path, name, (lat < 0.0 ? 32700 : 32600) + zone);
 }
 

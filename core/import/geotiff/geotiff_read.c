@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <tiffio.h>
+#include <unistd.h>
 
 #include "core/geotiff.h"
 
@@ -61,13 +62,32 @@ static int open_tiff(struct raster *r, struct sh_err *err)
     return r->tif != NULL ? SH_OK : fail_reading(r, "its directory", err);
 }
 
+static uint32_t kind_of(struct raster *r)
+{
+    uint32_t type = 0;
+    TIFFGetFieldDefaulted(r->tif, TIFFTAG_SUBFILETYPE, &type);
+    return type;
+}
+
+/* GDAL writes a mask into a file of its own, too. */
+static int has_mask_beside(const struct raster *r)
+{
+    char *name = NULL;
+    const int is_there = asprintf(&name, "%s.msk", r->b->spec->file) >= 0 && access(name, F_OK) == 0;
+    free(name);
+    return is_there;
+}
+
 /* Other images of the file: smaller ones of the same are left, a mask would be holes, others are not looked at. */
 static int look_at_others(struct raster *r, struct sh_err *err)
 {
-    unsigned n = 0, n_masks = 0;
+    unsigned n = 0, n_masks = has_mask_beside(r) ? 1 : 0;
+    if ((kind_of(r) & (FILETYPE_MASK | FILETYPE_REDUCEDIMAGE)) != 0)
+        return build_fail(
+            r->b, SH_EINPUT, err,
+            "its first image is a mask or a smaller copy; allowed is a file whose first image has the heights");
     while (TIFFReadDirectory(r->tif)) {
-        uint32_t type = 0;
-        TIFFGetFieldDefaulted(r->tif, TIFFTAG_SUBFILETYPE, &type);
+        const uint32_t type = kind_of(r);
         n_masks += (type & FILETYPE_MASK) != 0;
         n += (type & (FILETYPE_MASK | FILETYPE_REDUCEDIMAGE)) == 0;
     }
@@ -304,9 +324,10 @@ static int say(struct raster *r, struct sh_err *err)
     if (r->n_holes == (uint64_t)r->g.width * r->g.height)
         return build_fail(r->b, SH_EINPUT, err, "no cell of %u x %u has a height", r->g.width, r->g.height);
     if (r->n_holes > 0)
-        sh_warn(report,
-                "%s: %llu of %llu cells have no height, and are holes; %llu heights beside them touch no triangle",
-                r->b->name, (unsigned long long)r->n_holes, (unsigned long long)r->g.width * r->g.height,
+        sh_warn(report, "%s: %llu of %llu cells have no height, and are holes", r->b->name,
+                (unsigned long long)r->n_holes, (unsigned long long)r->g.width * r->g.height);
+    if (r->n_alone > 0)
+        sh_warn(report, "%s: %llu heights beside holes touch no triangle, and are left out", r->b->name,
                 (unsigned long long)r->n_alone);
     if (!r->g.unit_given)
         sh_warn(report, "%s: neither its system nor its unit is named: metres are assumed", r->b->name);
@@ -347,6 +368,8 @@ static int read_raster(struct raster *r, struct sh_err *err)
 int import_geotiff(struct scene_build *b, struct sh_err *err)
 {
     struct raster r = {.b = b};
+    if (b->spec->up != SCENE_UP_Z || b->spec->scale != 1.0)
+        return build_fail(b, SH_EINPUT, err, "a GeoTIFF has z up, and metres; allowed up: z, scale: 1");
     int rc = geotiff_read(b->spec->file, &r.g, err);
     if (rc == SH_OK) rc = open_tiff(&r, err);
     if (rc == SH_OK) rc = read_raster(&r, err);

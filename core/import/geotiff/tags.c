@@ -122,7 +122,10 @@ int tags_text(const struct tags *tags, unsigned tag, char *out, size_t room, str
 {
     struct entry found;
     int rc = find(tags, tag, &found, err);
-    const size_t n = rc != SH_OK || found.type != ASCII ? 0 : found.n < room ? (size_t)found.n : room - 1;
+    if (rc == SH_OK && found.type == ASCII && found.n >= room)
+        rc = sh_fail(err, SH_EINPUT, "%s: its tag %u has %llu bytes; allowed are up to %zu", tags->path, tag,
+                     (unsigned long long)found.n, room - 1);
+    const size_t n = rc != SH_OK || found.type != ASCII ? 0 : (size_t)found.n;
     if (n > 0) rc = take(tags, found.at, out, n, err);
     out[n] = '\0';
     return rc;

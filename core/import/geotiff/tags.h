@@ -21,7 +21,7 @@ void tags_close(struct tags *tags);
 
 /* The first `most` numbers of a tag, whatever their type; *n of them, 0: there is no such tag. */
 int tags_numbers(const struct tags *tags, unsigned tag, double *out, size_t most, size_t *n, struct sh_err *err);
-/* Its text, cut to `room` bytes with the NUL; empty: there is none. */
+/* Its text; empty: there is none. SH_EINPUT: it and a NUL have no room. */
 int tags_text(const struct tags *tags, unsigned tag, char *out, size_t room, struct sh_err *err);
 
 #endif

@@ -214,7 +214,8 @@ static int say_unit(struct reading *r)
     if (said->code == 0) return SH_OK;
     if (r->limits.ifc_strict)
         return sh_fail(r->err, SH_EINPUT, "%.420s; allowed only with one (scene.ifc_strict)", said->text);
-    sh_warn(r->b->report, "%s; it is read in metres (scene.meshes[].scale)", said->text);
+    sh_warn(r->b->report, "%s; as a rule it is read in metres then: compare its size (scene.meshes[].scale)",
+            said->text);
     return SH_OK;
 }
 
