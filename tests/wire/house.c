@@ -76,7 +76,9 @@ struct house *house_load(const struct wire *wire)
     assert_non_null(house);
     char mark[352];
     snprintf(mark, sizeof mark, "%s", wire_path(wire, "mark.obj"));
-    const struct scene_mesh_spec spec[] = {{.file = HOUSE, .up = SCENE_UP_Y, .scale = 1.0},
+    struct scene_import_limits limits = scene_import_defaults;
+    limits.ifc_reader = IFC_READER_ASSIMP; /* as house_options has it */
+    const struct scene_mesh_spec spec[] = {{.file = HOUSE, .up = SCENE_UP_Y, .scale = 1.0, .limits = &limits},
                                            {.file = mark, .up = SCENE_UP_Z, .scale = 1.0}};
     struct sh_err err;
     if (scene_load(spec, 2, 1e-3, NULL, &house->scene, &err) != SH_OK) fail_msg("%s", err.text);
