@@ -43,7 +43,7 @@ static void check_reason(const struct wire *wire, int i, int *single, int *empty
     if (line == NULL) line = strstr(text, "scanhead: ");
     assert_non_null(line);
     if (strstr(text, "export it again") == NULL && strstr(text, "convert it") == NULL &&
-        strstr(text, "--scale") == NULL && strstr(text, "tolerance_m") == NULL)
+        strstr(text, "--scale") == NULL && strstr(text, "tolerance_m") == NULL && strstr(text, "copy it there") == NULL)
         fail_msg("%s: refused, and nothing says what to do: %s", model[i], text);
     if (strstr(text, "single precision") != NULL)
         ++*single;
