@@ -9,7 +9,7 @@
 
 #include "core/err.h"
 
-/* Those that are used here. */
+/* This project calls these. */
 #define PROJ_CALLS(CALL)                     \
     CALL(proj_context_create)                \
     CALL(proj_context_destroy)               \

@@ -75,7 +75,7 @@ void build_weld_free(struct build_weld *w);
 /* A colour that a file says, times scale, as scene->rgb has it. What is beyond 0..255, or NaN, is limited and counted. */
 void build_rgb(struct scene_build *b, const double colour[3], double scale, uint8_t rgb[4]);
 
-/* What floating numbers of colours say of their range. Zero-initialise. */
+/* The range of floating colours is judged by these counts. Zero-initialise. */
 struct build_rgb_range {
     double largest;
     uint64_t n_above, n_between; /* above 1; between 0 and 1 */

@@ -31,7 +31,7 @@ static int fail(struct reader *r, const struct step_record *at, const char *what
     return ifc_records_fail(&r->records, at, r->err, text);
 }
 
-/* What is wrong with a unit. */
+/* Adds advice to the error of a unit. */
 static int advise(struct reader *r, int rc)
 {
     const struct sh_err said = *r->err;

@@ -13,7 +13,7 @@ struct http_text {
     size_t len;
 };
 
-/* Of %41: 0 to 15; -1: it is no hexadecimal digit. */
+/* The value of a digit of %41 is 0 to 15; -1: it is no hexadecimal digit. */
 static inline int http_hex_digit(char c)
 {
     return c >= '0' && c <= '9' ? c - '0' : (c | 32) >= 'a' && (c | 32) <= 'f' ? (c | 32) - 'a' + 10 : -1;

@@ -86,7 +86,7 @@ static void trees_that_are_none(void **state)
     refuse_tree("\"nodes\":[{\"mesh\":3}]", "meshes[3] is not there: there are 1");
 }
 
-/* What is drawn is an error, and what is not a warning: each names the first index that names nothing. */
+/* A wrong index is an error where something drawn needs it, else a warning; each names the first one. */
 static void indices_of_nothing(void **state)
 {
     (void)state;

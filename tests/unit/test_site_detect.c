@@ -1,4 +1,4 @@
-/* What a site makes of a configuration's air and encoders, and of mirrors in scenes of many surfaces. */
+/* A site follows a configuration's air and encoders, and has mirrors in scenes of many surfaces. */
 #include "tests/unit/site_rig.h"
 
 #include <math.h>

@@ -257,7 +257,7 @@ static void test_short_not_ok(void **state)
     bench_close(&bench);
 }
 
-/* What a host has asked for and not got counts up to 64 MiB (drivers/usb/usbip_private.h), its last byte as well: one more
+/* Bytes asked for and not got count up to 64 MiB (drivers/usb/usbip_private.h), the last one as well: one more
  * cuts it off. */
 static void test_bytes_pending(void **state)
 {

@@ -127,7 +127,7 @@ static int fail_degrees(const struct reader *r)
                    r->tags.path, name, (lat < 0.0 ? 32700 : 32600) + zone);
 }
 
-/* Of a unit's code; 0: not known here. */
+/* The unit that a code names, in metres; 0: it is not known here. */
 static double unit_of(unsigned code)
 {
     return code == 9001 ? 1.0 : code == 9002 ? FOOT_M : code == 9003 ? US_FOOT_M : 0.0;
@@ -186,7 +186,7 @@ static int read_place(struct reader *r)
 
 /* ---- heights */
 
-/* What GDAL writes into its metadata: <Item name="SCALE" sample="0" role="scale">0.1</Item>. NULL: it isn't there. */
+/* GDAL writes this into its metadata: <Item name="SCALE" sample="0" role="scale">0.1</Item>. NULL: it isn't there. */
 static const char *item(const char *metadata, const char *role)
 {
     char mark[40];

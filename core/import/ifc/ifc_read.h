@@ -26,7 +26,7 @@ struct ifc_readings {
 /* Whether node and both readers are there; else why not: a phrase. */
 bool ifc_readers_are_there(const struct scene_import_limits *limits, char *why, size_t size);
 
-/* What a reader said, with its name, but without the file's name and what to do. */
+/* A reader's words, with its name, are kept without the file's name and without advice. */
 enum { IFC_REASON_LEN = 150 };
 void ifc_reason(const struct scene_build *b, const char *name, const struct sh_err *said, char out[IFC_REASON_LEN]);
 
