@@ -136,13 +136,12 @@ static int set_tangent(const struct sh_report *report, const struct terrain *t, 
     int rc = geoframe_set_tangent(frame, origin_m, &at->at, -angle_deg(at->convergence_rad), err);
     if (rc == SH_OK) rc = measure_corners(t, frame, at->at.height_m, &worst_m, err);
     if (rc != SH_OK || worst_m < CORNER_M) return rc;
-    const int zone = (int)fmin(floor(at->at.lon_deg / 6.0) + 31.0, 60.0);
     char exact[112];
     if (is_utm)
         snprintf(exact, sizeof exact, "offset_m: [0, 0, %.10g]", at->at.height_m);
     else
         snprintf(exact, sizeof exact, "a raster in UTM: gdalwarp -t_srs EPSG:%d -r bilinear -dstnodata -9999",
-                 (at->at.lat_deg < 0.0 ? 32700 : 32600) + zone);
+                 geotiff_utm_code(at->at.lat_deg, at->at.lon_deg));
     sh_warn(
         report,
         "%s: the scene is tangent to the Earth at its middle, which puts its corners up to %.2g m from where %s has "

@@ -1,12 +1,9 @@
 #include "tests/unit/coverage_rig.h"
 
 #include "core/pose.h"
+#include "tests/common/thorough.h"
 
-#ifdef SH_SANITIZE /* sanitizers are for the code, not for the count */
-const struct cover_sweep cover_everywhere = {3.0, -90.0, 90.0, 0.0, 360.0, 1000.0};
-#else
-const struct cover_sweep cover_everywhere = {0.5, -90.0, 90.0, 0.0, 360.0, 1000.0};
-#endif
+const struct cover_sweep cover_everywhere = {SANITIZED ? 3.0 : 0.5, -90.0, 90.0, 0.0, 360.0, 1000.0};
 
 struct cover *cover_open(struct scene *scene, double cell_m, unsigned threads)
 {

@@ -159,7 +159,7 @@ static void facets_of_ifc_lite_are_said(void **state)
     }
 }
 
-/* web-ifc hangs on some broken files. It ends 10 s after the other reader has ended, or with the limit. */
+/* web-ifc never ends by itself on some broken files. It is ended 10 s after the other reader has ended, or with the limit. */
 static void reader_that_hangs_is_ended(void **state)
 {
     (void)state;

@@ -50,7 +50,7 @@ const char *const *house_options(const struct wire *wire, const char *ptys, cons
                                 "noise.range=off",
                                 "noise.angle=off",
                                 "beam.mode=single",
-                                "scene.ifc_reader=assimp"}; /* the others take 3 s of processor time */
+                                IFC_BY_ASSIMP};
     int n = 0;
     for (size_t i = 0; i < sizeof sets / sizeof sets[0]; i++) {
         options[n++] = "--set";

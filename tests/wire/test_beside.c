@@ -31,7 +31,7 @@ static const struct personality VELODYNE = {"config/velodyne.yaml",
 static struct head start(struct wire *wire, const struct personality *p, int with, int fast, const char *const *keys)
 {
     static char path[2][400];
-    const char *args[WIRE_MAX_ARGS] = {"--set", "scene.ifc_reader=assimp"}; /* the other readers take 3 s each time */
+    const char *args[WIRE_MAX_ARGS] = {"--set", IFC_BY_ASSIMP};
     int n = 2;
     for (int i = 0; i < 2 && p->ptys[i] != NULL; i++) {
         snprintf(path[i], sizeof path[i], "%s=%s", p->ptys[i], wire_path(wire, p->ptys[i]));

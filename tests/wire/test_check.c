@@ -173,7 +173,7 @@ static void test_colours_in_part(void **state)
     free(err);
 }
 
-/* What a file calls transparent is solid until `surfaces` says something; the line to write is in the warning. */
+/* Surfaces that a file calls transparent are solid until `surfaces` says something. The warning has the line to write. */
 static void test_transparent(void **state)
 {
     struct wire *wire = *state;

@@ -71,8 +71,7 @@ static void compare(int lines, int scans, double unit_ms)
 static struct head start(struct wire *wire, const char *config, const char *const *ptys, const char *const *sets)
 {
     static char path[4][400];
-    /* IFC's other readers take 3 s of processor time each time */
-    const char *more[WIRE_MAX_ARGS] = {"--set", "noise.range=on", "--set", "scene.ifc_reader=assimp"};
+    const char *more[WIRE_MAX_ARGS] = {"--set", "noise.range=on", "--set", IFC_BY_ASSIMP};
     int n = 4;
     for (int i = 0; ptys[i] != NULL; i++) {
         char name[16];

@@ -36,9 +36,8 @@ static const struct recipe RECIPES[] = {
 static uint64_t record(struct wire *wire, const struct recipe *recipe, const char *sight, char hash[65])
 {
     char config[128], stats[352];
-    /* IFC's other readers take 3 s of processor time each time */
-    const char *args[WIRE_MAX_ARGS] = {
-        "record", config, "--stats", stats, "--quiet", "--set", sight, "--set", "scene.ifc_reader=assimp"};
+    const char *args[WIRE_MAX_ARGS] = {"record", config, "--stats", stats,        "--quiet",
+                                       "--set",  sight,  "--set",   IFC_BY_ASSIMP};
     int n = 9;
     snprintf(config, sizeof config, "config/%s.yaml", recipe->config);
     snprintf(stats, sizeof stats, "%s", wire_path(wire, "stats.json"));

@@ -202,7 +202,7 @@ static void expect_at_most(const struct wire *wire, const char *key, long long m
 /* A ready configuration on ports of the system's choice; a key that ends in `path` gets a path in the folder. */
 static struct head start(struct wire *wire, const char *config, const char *const *sets)
 {
-    const char *more[WIRE_MAX_ARGS] = {"--set", "scene.ifc_reader=assimp"}; /* the other readers take 3 s each time */
+    const char *more[WIRE_MAX_ARGS] = {"--set", IFC_BY_ASSIMP};
     char path[4][400];
     int n = 2, n_paths = 0;
     for (; *sets != NULL; sets++) {

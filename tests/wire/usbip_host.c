@@ -29,14 +29,11 @@ static uint32_t get_be32(const uint8_t *at)
 
 struct usbip_host usbip_host_open_within(const struct head *head, int timeout_ms)
 {
-    const struct sockaddr_in at = {.sin_family = AF_INET,
-                                   .sin_addr.s_addr = htonl(INADDR_LOOPBACK),
-                                   .sin_port = htons((uint16_t)endpoint_port(head_endpoint(head, "usb")))};
     for (const int64_t end_ms = wire_now_ms() + timeout_ms; wire_now_ms() < end_ms;) {
-        int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-        const int there = connect(fd, (const struct sockaddr *)&at, sizeof at) == 0;
+        const int fd = raw_try_connect(head_endpoint(head, "usb"));
+        if (fd < 0) continue;
         close(fd);
-        if (there) return usbip_host_open(head);
+        return usbip_host_open(head);
     }
     fail_msg("nobody listens");
     return (struct usbip_host){.fd = -1};

@@ -145,6 +145,9 @@ void client_until_soon(struct scanhead *sh, uint32_t code, struct scanhead_frame
  */
 void client_wait_state(struct scanhead *sh, const char *state);
 
+/* IFC by Assimp alone, for tests with another subject: the other readers take 3 s of processor time a start. */
+#define IFC_BY_ASSIMP "scene.ifc_reader=assimp"
+
 /* A plain socket to the "tcp:127.0.0.1:PORT" of the head. */
 int raw_connect(const char *endpoint);
 /* The same; -1: nobody listens there now. */

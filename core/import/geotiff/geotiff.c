@@ -117,14 +117,13 @@ static int fail_degrees(const struct reader *r)
 {
     const double *m = r->map, *n = r->map + 4, w = 0.5 * r->g->width, h = 0.5 * r->g->height;
     const double lon = m[0] * w + m[1] * h + m[3], lat = n[0] * w + n[1] * h + n[3];
-    const int zone = fabs(lon) < 180.0 ? (int)floor(lon / 6.0) + 31 : 1;
     const unsigned system = key(r, GEOGRAPHIC);
     char name[24] = "of its own";
     if (system != 0 && system != USER_DEFINED) snprintf(name, sizeof name, "EPSG:%u", system);
     return sh_fail(r->err, SH_EINPUT,
                    "%s: its cells are degrees (%s); allowed are systems in metres or feet: gdalwarp -t_srs EPSG:%d "
                    "-r bilinear -dstnodata -9999 makes one in UTM",
-                   r->tags.path, name, (lat < 0.0 ? 32700 : 32600) + zone);
+                   r->tags.path, name, geotiff_utm_code(lat, lon));
 }
 
 /* The unit that a code names, in metres; 0: it is not known here. */
@@ -282,6 +281,12 @@ int geotiff_read(const char *path, struct geotiff *geotiff, struct sh_err *err)
     tags_close(&r->tags);
     free(r);
     return rc;
+}
+
+int geotiff_utm_code(double lat_deg, double lon_deg)
+{
+    const int zone = fabs(lon_deg) < 180.0 ? (int)floor(lon_deg / 6.0) + 31 : 1;
+    return (lat_deg < 0.0 ? 32700 : 32600) + zone;
 }
 
 void geotiff_bounds(const struct geotiff *geotiff, double bounds_m[4])
