@@ -139,6 +139,33 @@ static void placement_in_a_ring_is_refused(void **state)
     assert_non_null(strstr(err.text, ", line "));
 }
 
+/* Each product stands on the one before it, and has an opening. Where each product would follow its chain to the end, and look at
+ * every opening, these 40,000 would take minutes, and the program's limit would end the test. */
+static void long_chains_take_little_time(void **state)
+{
+    (void)state;
+    enum { N = 40000 };
+    size_t size = 0;
+    char *long_text = NULL;
+    FILE *out = open_memstream(&long_text, &size);
+    fputs("ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\n#1=IFCPRODUCTDEFINITIONSHAPE($,$,());\n"
+          "#2=IFCLOCALPLACEMENT($,$);\n",
+          out);
+    for (unsigned i = 1; i <= N; i++)
+        fprintf(out,
+                "#%u=IFCLOCALPLACEMENT(#%u,$);\n#%u=IFCWALL('g',$,'n',$,$,#%u,#1,$,$);\n"
+                "#%u=IFCOPENINGELEMENT('o',$,'n',$,$,$,#1,$,$);\n#%u=IFCRELVOIDSELEMENT('v',$,$,$,#%u,#%u);\n",
+                10 * i, i > 1 ? 10 * i - 10 : 2, 10 * i + 1, 10 * i, 10 * i + 2, 10 * i + 3, 10 * i + 1, 10 * i + 2);
+    fputs("ENDSEC;\nEND-ISO-10303-21;\n", out);
+    fclose(out);
+    assert_int_equal(ifc_records_open(&records, write_text("a.ifc", long_text), &err), SH_OK);
+    assert_int_equal(records.n_products, 2 * N);
+    assert_false(ifc_records_product(&records, 10 * N + 2)->opens_nothing);
+    ifc_records_close(&records);
+    unlink(path);
+    free(long_text);
+}
+
 /* Records that refer to each other in a ring end. */
 static void ring_ends(void **state)
 {
@@ -256,6 +283,7 @@ int main(void)
         cmocka_unit_test(what_is_not_whole_is_refused),
         cmocka_unit_test(placement_in_a_ring_is_refused),
         cmocka_unit_test(ring_ends),
+        cmocka_unit_test(long_chains_take_little_time),
         cmocka_unit_test(block_is_closed_and_its_parts_are_not),
         cmocka_unit_test(corner_within_an_edge_is_closed),
         cmocka_unit_test(rules_choose),

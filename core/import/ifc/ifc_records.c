@@ -110,22 +110,25 @@ static bool is_air(struct text_span type)
     return false;
 }
 
-/* IfcLocalPlacement(PlacementRelTo, RelativePlacement): up to one that is absolute. A chain without end has more links than the
- * file has records. */
-static int check_placement(const struct ifc_records *r, const struct ifc_product *p, struct text_span placement,
+/* IfcLocalPlacement(PlacementRelTo, RelativePlacement): up to one that is absolute, or that another product's chain has
+ * passed. A chain that meets a link of its own has no end. */
+static int check_placement(struct ifc_records *r, const struct ifc_product *p, struct text_span placement,
                            struct sh_err *err)
 {
-    const struct step_record *at = NULL;
+    const uint32_t own = ++r->stamp;
     uint64_t id;
-    for (size_t n = 0; step_reference(placement, &id); n++) {
-        at = ifc_records_find(r, id);
+    while (step_reference(placement, &id)) {
+        const struct step_record *at = ifc_records_find(r, id);
         if (at == NULL || !text_is(at->type, "IFCLOCALPLACEMENT") || step_split(at->args, &placement, 1) < 1)
             return SH_OK;
-        if (n > r->n)
+        uint32_t *mark = &r->mark[at - r->record];
+        if (*mark == own)
             return text_fail(&r->text, at->line, SH_EINPUT, err,
                              "IFCLOCALPLACEMENT #%llu is relative to itself, so %.*s '%.40s' %.22s has no place",
                              (unsigned long long)at->id, (int)(p->type.n < 48 ? p->type.n : 48), p->type.p, p->name,
                              p->guid);
+        if (*mark != 0) return SH_OK;
+        *mark = own;
     }
     return SH_OK;
 }
@@ -167,6 +170,8 @@ int ifc_records_open(struct ifc_records *r, const char *path, struct sh_err *err
     int rc = ifc_records_index(r, path, err);
     if (rc != SH_OK) return rc;
     if (ifc_unit_find(r, &r->unit_m, &r->no_unit) != SH_OK) r->unit_m = 1.0;
+    r->mark = calloc(r->n + 1, sizeof *r->mark);
+    if (r->mark == NULL) return no_memory(r, err);
     for (size_t i = 0; i < r->n && rc == SH_OK; i++)
         rc = add_product(r, &r->record[i], err);
     if (rc == SH_OK) rc = ifc_styles_collect(r, err);

@@ -205,14 +205,26 @@ static bool collect_voids(struct walk *w)
     return true;
 }
 
+static size_t first_void(const struct walk *w, uint64_t product)
+{
+    size_t low = 0, high = w->n_voids;
+    while (low < high) {
+        const size_t middle = (low + high) / 2;
+        if (w->voids[2 * middle] < product)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
 static bool walk_product(struct walk *w, struct ifc_product *product)
 {
     w->product = product;
     w->r->stamp++;
     bool done = walk_from(w, product->shape);
     const bool has_body = product->has_body; /* an opening's is none of its own */
-    for (size_t i = 0; i < w->n_voids && done; i++) {
-        if (w->voids[2 * i] != product->id) continue;
+    for (size_t i = first_void(w, product->id); i < w->n_voids && w->voids[2 * i] == product->id && done; i++) {
         const struct ifc_product *opening = ifc_records_product(w->r, w->voids[2 * i + 1]);
         if (opening != NULL) done = walk_from(w, opening->shape);
     }
@@ -225,19 +237,18 @@ static bool walk_product(struct walk *w, struct ifc_product *product)
 
 static void mark_lost_openings(struct walk *w)
 {
-    for (size_t i = 0; i < w->r->n_products; i++) {
-        struct ifc_product *p = &w->r->product[i];
-        p->opens_nothing = text_is(p->type, "IFCOPENINGELEMENT");
-        for (size_t k = 0; k < w->n_voids && p->opens_nothing; k++)
-            p->opens_nothing = w->voids[2 * k + 1] != p->id;
+    for (size_t i = 0; i < w->r->n_products; i++)
+        w->r->product[i].opens_nothing = text_is(w->r->product[i].type, "IFCOPENINGELEMENT");
+    for (size_t k = 0; k < w->n_voids; k++) {
+        const struct ifc_product *opening = ifc_records_product(w->r, w->voids[2 * k + 1]);
+        if (opening != NULL) w->r->product[opening - w->r->product].opens_nothing = false;
     }
 }
 
 int ifc_walk(struct ifc_records *r, struct sh_err *err)
 {
     struct walk w = {.r = r};
-    r->mark = calloc(r->n + 1, sizeof *r->mark);
-    bool done = r->mark != NULL && collect_voids(&w);
+    bool done = collect_voids(&w);
     for (size_t i = 0; i < r->n_products && done; i++)
         if (!r->product[i].is_air) done = walk_product(&w, &r->product[i]);
     if (done) mark_lost_openings(&w);
