@@ -47,16 +47,27 @@ static void transparency_is_kept(void **state)
     static const struct {
         const char *material;
         float clear;
-    } as[] = {{"\"alphaMode\":\"BLEND\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,0.25]}", 0.75f},
-              {"\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,0.25]}", 0.0f},
-              {"\"alphaMode\":\"BLEND\"", 0.0f},
-              {"\"extensions\":{\"KHR_materials_transmission\":{\"transmissionFactor\":0.5}}", 0.5f}};
+        const char *odd; /* what a warning names; NULL: there is none */
+    } as[] = {{"\"alphaMode\":\"BLEND\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,0.25]}", 0.75f, NULL},
+              {"\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,0.25]}", 0.0f, NULL},
+              {"\"alphaMode\":\"BLEND\"", 0.0f, NULL},
+              {"\"extensions\":{\"KHR_materials_transmission\":{\"transmissionFactor\":0.5}}", 0.5f, NULL},
+              {"\"alphaMode\":\"MASK\",\"alphaCutoff\":1.5", 0.0f, NULL},
+              {"\"extensions\":{\"KHR_materials_transmission\":{\"transmissionFactor\":1.5}}", 0.0f,
+               "1 value of materials left out, which the format doesn't allow; the first: materials[0]: transmissionF"},
+              {"\"alphaMode\":\"BLENDED\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,0.25]}", 0.0f,
+               "materials[0]: alphaMode"},
+              {"\"alphaMode\":\"BLEND\",\"alphaCutoff\":-1,\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,-1]}",
+               0.0f,
+               "2 values of materials left out, which the format doesn't allow; the first: materials[0]: alphaCut"}};
     for (size_t i = 0; i < sizeof as / sizeof as[0]; i++) {
         char rest[1024];
         gltf_quad();
         snprintf(rest, sizeof rest, ONE_NODE "\"materials\":[{%s}]," PLAIN_MESH, as[i].material);
         struct scene *s = gltf_load(rest);
         if (s->surface[0].clear != as[i].clear) fail_msg("%zu: %g", i, (double)s->surface[0].clear);
+        assert_int_equal(n_warnings, as[i].odd != NULL);
+        if (as[i].odd != NULL) assert_non_null(strstr(warnings, as[i].odd));
         scene_free(s);
     }
 }

@@ -56,6 +56,8 @@ struct gltf {
     uint64_t n_unweighted; /* vertices of a skin that no joint moves */
     uint32_t n_images;     /* textures of a format that isn't read */
     char image[64];        /* the extension of the first of them */
+    uint32_t n_odd;        /* values of materials that the format doesn't allow */
+    char odd[48];          /* the first of them */
 };
 
 /* "FILE, mesh 'M': text": SH_EINPUT. */
@@ -106,8 +108,8 @@ int gltf_check_extensions(struct gltf *g);
 bool gltf_is_by_shaders(const json_t *material);
 bool gltf_is_required(const struct gltf *g, const char *extension);
 
-/* ---- gltf_indices.c: warns of indices that name nothing, wherever they are. */
-void gltf_say_indices(struct gltf *g);
+/* ---- gltf_indices.c: warns of indices that name nothing, wherever they are. Of what is drawn they were errors. */
+void gltf_say_indices(const struct gltf *g);
 
 /* ---- gltf_meshopt.c: decodes a buffer view, `more` is its extension. */
 int gltf_meshopt(struct gltf *g, const json_t *more, const char *at, struct gltf_kept *out);

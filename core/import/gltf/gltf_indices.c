@@ -40,7 +40,7 @@ static const char *const entered[] = {"EXT_mesh_gpu_instancing",
                                       NULL};
 
 struct search {
-    struct gltf *g;
+    const struct gltf *g;
     uint64_t n;
     struct gltf_at first; /* of them */
     double number;
@@ -126,7 +126,7 @@ static void walk(struct search *s, const json_t *value, const char *key, const c
             walk_object(s, json_array_get(value, i), key, gltf_at("%.80s[%zu]", at, i).text, depth);
 }
 
-void gltf_say_indices(struct gltf *g)
+void gltf_say_indices(const struct gltf *g)
 {
     struct search s = {.g = g};
     walk(&s, g->root, "", "", 0);

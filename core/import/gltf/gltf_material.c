@@ -10,6 +10,53 @@
 
 enum { CLAMP_TO_EDGE = 33071, MIRRORED_REPEAT = 33648 };
 
+/* ---- what the format allows */
+
+/* glTF 2.0, material: base colour and transmission are 0..1, a cutoff is not negative, and there are three modes. What is not so
+ * is left out; it is counted here, and the first one is named. */
+static void note(struct gltf *g, bool is_allowed, const char *key, uint32_t material)
+{
+    if (is_allowed || g->n_odd++ > 0) return;
+    snprintf(g->odd, sizeof g->odd, "materials[%u]: %s", material, key);
+}
+
+static bool is_share(const json_t *value)
+{
+    const double share = json_number_value(value);
+    return json_is_number(value) && share >= 0.0 && share <= 1.0;
+}
+
+static bool are_shares(const json_t *list)
+{
+    bool all = true;
+    for (size_t i = 0; i < json_array_size(list); i++)
+        all = all && is_share(json_array_get(list, i));
+    return all;
+}
+
+static bool is_mode(const char *mode)
+{
+    return mode != NULL && (strcmp(mode, "OPAQUE") == 0 || strcmp(mode, "MASK") == 0 || strcmp(mode, "BLEND") == 0);
+}
+
+static const json_t *transmission(const json_t *material)
+{
+    return json_object_get(gltf_extension(material, "KHR_materials_transmission"), "transmissionFactor");
+}
+
+static void note_odd(struct gltf *g, const json_t *material, uint32_t number)
+{
+    const json_t *cutoff = json_object_get(material, "alphaCutoff"), *through = transmission(material);
+    const json_t *rough = json_object_get(material, "pbrMetallicRoughness");
+    const json_t *glossy = gltf_extension(material, "KHR_materials_pbrSpecularGlossiness");
+    note(g, json_object_get(material, "alphaMode") == NULL || is_mode(gltf_text(material, "alphaMode")), "alphaMode",
+         number);
+    note(g, cutoff == NULL || json_number_value(cutoff) >= 0.0, "alphaCutoff", number);
+    note(g, through == NULL || is_share(through), "transmissionFactor", number);
+    note(g, are_shares(json_object_get(rough, "baseColorFactor")), "baseColorFactor", number);
+    note(g, are_shares(json_object_get(glossy, "diffuseFactor")), "diffuseFactor", number);
+}
+
 /* Two materials of one name would be one surface, with the colour of the first: the later one gets its number. So does one
  * without a name. */
 int gltf_name_materials(struct gltf *g)
@@ -21,6 +68,7 @@ int gltf_name_materials(struct gltf *g)
         const char *name = gltf_text(json_array_get(materials, i), "name");
         const struct gltf_at number = gltf_at("materials[%u]", i);
         char *own = NULL;
+        note_odd(g, json_array_get(materials, i), i);
         if (name != NULL && *name != '\0' && json_object_get(seen, name) != NULL &&
             asprintf(&own, "%s[%u]", name, i) < 0)
             own = NULL;
@@ -155,9 +203,9 @@ static float solid_of(const json_t *material)
 {
     const char *mode = gltf_text(material, "alphaMode");
     const json_t *cutoff = json_object_get(material, "alphaCutoff");
-    if (mode == NULL || strcmp(mode, "OPAQUE") == 0) return 0.0f;
-    if (strcmp(mode, "MASK") != 0 || !json_is_number(cutoff)) return 0.5f;
-    return (float)fmin(fmax(json_number_value(cutoff), 0.0), 1.0);
+    if (!is_mode(mode) || strcmp(mode, "OPAQUE") == 0) return 0.0f;
+    if (strcmp(mode, "MASK") != 0 || !json_is_number(cutoff) || json_number_value(cutoff) < 0.0) return 0.5f;
+    return (float)fmin(json_number_value(cutoff), 1.0);
 }
 
 /* Where the base colour stands: KHR_materials_pbrSpecularGlossiness has names of its own. */
@@ -182,10 +230,9 @@ static int keep_clear(struct gltf *g, const struct base *base, const json_t *mat
     const char *mode = gltf_text(material, "alphaMode");
     double rgba[4] = {1, 1, 1, 1}, clear = 0.0;
     int rc = gltf_numbers(g, base->of, base->factor, at, 4, rgba, NULL);
-    if (mode != NULL && strcmp(mode, "BLEND") == 0) clear = 1.0 - rgba[3];
-    const json_t *through = gltf_extension(material, "KHR_materials_transmission");
-    clear = fmax(clear, json_number_value(json_object_get(through, "transmissionFactor")));
-    surface->clear = (float)fmin(fmax(clear, 0.0), 1.0);
+    if (mode != NULL && strcmp(mode, "BLEND") == 0 && rgba[3] >= 0.0 && rgba[3] <= 1.0) clear = 1.0 - rgba[3];
+    if (is_share(transmission(material))) clear = fmax(clear, json_number_value(transmission(material)));
+    surface->clear = (float)clear;
     return rc;
 }
 

@@ -19,6 +19,7 @@ static void say_counts(const struct gltf *g)
 {
     const struct sh_report *report = g->b->report;
     const char *name = g->b->name;
+    gltf_say_indices(g);
     if (g->n_hidden > 0)
         sh_warn(report, "%s: %u nodes are hidden (KHR_node_visibility), and left out with what is below them", name,
                 g->n_hidden);
@@ -34,6 +35,9 @@ static void say_counts(const struct gltf *g)
     if (g->n_images > 0)
         sh_warn(report, "%s: %u textures are images by %s, which is not read: the surfaces are without them", name,
                 g->n_images, g->image);
+    if (g->n_odd > 0)
+        sh_warn(report, "%s: %u value%s of materials left out, which the format doesn't allow; the first: %s", name,
+                g->n_odd, g->n_odd > 1 ? "s" : "", g->odd);
 }
 
 /* Whole numbers are as the file's writer has made them: never refused. */
@@ -51,7 +55,6 @@ static int say_errors(struct gltf *g)
 static int read_scene(struct gltf *g)
 {
     g->b->scene->says = (struct scene_says){.unit_m = 1.0, .up = 2};
-    gltf_say_indices(g);
     int rc = gltf_name_materials(g);
     if (rc == SH_OK) rc = gltf_place_nodes(g);
     if (rc == SH_OK) rc = gltf_draw_scene(g);
