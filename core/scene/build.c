@@ -92,8 +92,8 @@ int build_end_file(struct scene_build *b, struct sh_err *err)
         sh_warn(b->report, "%s: %llu polygons cross themselves; their triangles overlap", b->name,
                 (unsigned long long)b->not_simple);
     if (b->n_rgb_limited > 0)
-        sh_warn(b->report, "%s: %llu colour%s of vertices beyond the range of 0 to 1, or to 255, limited to it",
-                b->name, (unsigned long long)b->n_rgb_limited, b->n_rgb_limited > 1 ? "s" : "");
+        sh_warn(b->report, "%s: %llu colour%s of corners or vertices beyond the range of 0 to %g, limited to it",
+                b->name, (unsigned long long)b->n_rgb_limited, b->n_rgb_limited > 1 ? "s" : "", b->rgb_most);
     b->scene->counts.zero_area += b->counts.zero_area;
     b->scene->counts.not_triangles += b->counts.not_triangles;
     b->scene->counts.names_cut += b->counts.names_cut;

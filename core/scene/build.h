@@ -25,6 +25,7 @@ struct scene_build {
     struct scene_counts counts;
     uint64_t not_simple;
     uint64_t n_rgb_limited; /* colours of corners or vertices beyond their range */
+    double rgb_most;        /* the end of it, in the file: 1 or 255 */
     /* the next polygon, room by build_corners */
     uint32_t *corner;      /* indices into the scene, which the reader has checked */
     float (*corner_uv)[2]; /* where has_uv: their texture coordinates */

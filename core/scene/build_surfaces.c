@@ -54,6 +54,7 @@ void build_rgb(struct scene_build *b, const double colour[3], double scale, uint
     }
     rgb[3] = 255;
     b->n_rgb_limited += is_limited;
+    if (is_limited) b->rgb_most = 255.0 / scale;
 }
 
 void build_rgb_look(struct build_rgb_range *range, double number)

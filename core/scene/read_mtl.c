@@ -22,7 +22,8 @@ struct mtl {
     struct text_span folder;
     uint32_t first;            /* surface of the OBJ */
     uint8_t *known;            /* [surfaces from first on] a library has their material */
-    struct text_span material; /* newmtl */
+    char name[SCENE_NAME_LEN]; /* newmtl, cut as the names of surfaces are */
+    struct text_span material; /* of name */
     bool has_opacity;          /* d of the material at hand, which counts before Tr */
     struct missing colour, opacity, texture;
 };
@@ -62,7 +63,6 @@ static bool is_same(struct text_span a, struct text_span b)
 static bool has_material(const struct scene_surface *s, struct text_span material)
 {
     const struct text_span used = {s->material, strlen(s->material)};
-    if (material.n > SCENE_NAME_LEN - 1) material.n = SCENE_NAME_LEN - 1; /* as the names were cut */
     return is_same(used, material) || is_same(without_quotes(used), without_quotes(material)) ||
            is_same(without_comment(used), material);
 }
@@ -71,10 +71,11 @@ static bool has_material(const struct scene_surface *s, struct text_span materia
 
 static void set_material(struct mtl *m, struct text_span material)
 {
-    m->material = material;
+    scene_copy_name(m->name, sizeof m->name, material.p, material.n);
+    m->material = (struct text_span){m->name, strlen(m->name)};
     m->has_opacity = false;
     for (uint32_t i = m->first; i < m->b->scene->n_surfaces; i++)
-        m->known[i - m->first] |= has_material(&m->b->scene->surface[i], material);
+        m->known[i - m->first] |= has_material(&m->b->scene->surface[i], m->material);
 }
 
 /* All surfaces with the material at hand; the first colour stays. */

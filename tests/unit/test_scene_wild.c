@@ -70,6 +70,25 @@ static void check_red_green(const char *name, const char *text)
     scene_free(s);
 }
 
+/* The names of two materials differ beyond the bytes that a name has: each has its own colour. */
+static void long_names_keep_their_colours(void **state)
+{
+    (void)state;
+    char name[301], text[4096];
+    memset(name, 'n', 300);
+    name[300] = '\0';
+    snprintf(text, sizeof text, "newmtl %s1\nKd 1 0 0\nnewmtl %s2\nKd 0 1 0\n", name, name);
+    put("long.mtl", text);
+    snprintf(text, sizeof text,
+             "mtllib long.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl %s1\nf 1 2 3\nusemtl %s2\nf 3 2 1\n", name, name);
+    struct scene *s = take("long.obj", text);
+    if (n_warnings != 1) fail_msg("%s", warnings);
+    assert_non_null(strstr(warnings, "2 names cut to 255 bytes"));
+    assert_int_equal(colour_of(s, 0), 0xf00);
+    assert_int_equal(colour_of(s, 1), 0x0f0);
+    scene_free(s);
+}
+
 static void libraries_are_found(void **state)
 {
     (void)state;
@@ -331,10 +350,15 @@ static void stl_as_text(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(libraries_are_found), cmocka_unit_test(missing_things_are_named),
-        cmocka_unit_test(textures_are_found),  cmocka_unit_test(faces_are_read),
-        cmocka_unit_test(ply_in_any_order),    cmocka_unit_test(ply_vertices_that_nothing_uses),
-        cmocka_unit_test(ply_textures),        cmocka_unit_test(stl_by_its_size),
+        cmocka_unit_test(libraries_are_found),
+        cmocka_unit_test(long_names_keep_their_colours),
+        cmocka_unit_test(missing_things_are_named),
+        cmocka_unit_test(textures_are_found),
+        cmocka_unit_test(faces_are_read),
+        cmocka_unit_test(ply_in_any_order),
+        cmocka_unit_test(ply_vertices_that_nothing_uses),
+        cmocka_unit_test(ply_textures),
+        cmocka_unit_test(stl_by_its_size),
         cmocka_unit_test(stl_as_text),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

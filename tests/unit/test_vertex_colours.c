@@ -119,9 +119,11 @@ static void a_little_above_one(void **state)
     static const struct {
         const char *name, *text, *says;
         int first, second;
-    } as[] = {{"a.obj", "v 0 0 0 1.0001 0 0\nv 1 0 0 0.2 0 0\nv 0 1 0 0 0 0\nf 1 2 3\n", "a.obj: 1 colour", 255, 51},
+    } as[] = {{"a.obj", "v 0 0 0 1.0001 0 0\nv 1 0 0 0.2 0 0\nv 0 1 0 0 0 0\nf 1 2 3\n",
+               "a.obj: 1 colour of corners or vertices beyond the range of 0 to 1,", 255, 51},
               {"a.obj", "v 0 0 0 7.5 0 0\nv 1 0 0 0.2 0.4 0\nv 0 1 0 0 0 0\nf 1 2 3\n", "a.obj: 1 colour", 255, 51},
-              {"a.obj", "v 0 0 0 255 0 0\nv 1 0 0 0.5 254.5 9\nv 0 1 0 300 0 0\nf 1 2 3\n", "a.obj: 1 colour", 255, 0},
+              {"a.obj", "v 0 0 0 255 0 0\nv 1 0 0 0.5 254.5 9\nv 0 1 0 300 0 0\nf 1 2 3\n",
+               "beyond the range of 0 to 255,", 255, 0},
               {"a.obj", "v 0 0 0 2 0 0\nv 1 0 0 1 0 0\nv 0 1 0 0 0 0\nf 1 2 3\n", NULL, 2, 1},
               {"a.ply",
                HEAD RGB("float", "") FACE "end_header\n0 0 0 1.0001 0 0\n1 0 0 0.2 0 0\n0 1 0 0 0 0\n3 0 1 2\n",
