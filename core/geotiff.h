@@ -16,8 +16,10 @@ struct geotiff {
     char crs[16];           /* of easting and northing, "EPSG:25832"; empty: the file names none of the registry */
     int unit_given;         /* 0: neither system nor unit is named, so metres are assumed */
     int height_unit_given;  /* likewise of the heights */
+    int above_ellipsoid;    /* the heights count from an ellipsoid, by a code of GeoTIFF's own */
     double unit_m;          /* of easting and northing in the file */
     int maps_heights;       /* its scale or tie point has a part for heights, not used since these have no system */
+    int turns_heights;      /* its ModelTransformation has one, not used */
     /* At the middle of the first cell, where its height is; then what a column adds, and a row. Metres also of systems in
      * feet. */
     double easting_m[3], northing_m[3];
@@ -35,7 +37,7 @@ int geotiff_is_name(const char *file);
 /* Bounds of the cells' middles, metres: low easting, low northing, high ones. */
 void geotiff_bounds(const struct geotiff *geotiff, double bounds_m[4]);
 
-/* The EPSG code of a place's UTM zone, for advice: without the exceptions of Norway and the poles. */
+/* The EPSG code of a place's UTM zone, for advice: without the exceptions of Norway. Near a pole that of UPS. */
 int geotiff_utm_code(double lat_deg, double lon_deg);
 
 #endif

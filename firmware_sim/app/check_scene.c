@@ -70,6 +70,19 @@ static void colour_text(const struct part *p, uint32_t object, char text[CELL_LE
     fclose(cell);
 }
 
+/* The clearest surface of that name. */
+static float clear_of(const struct part *p, uint32_t object)
+{
+    float clear = 0.0f;
+    uint32_t left = p->objects.object[object].n_surfaces;
+    for (uint32_t i = p->objects.object[object].surface; left > 0; i++) {
+        if (p->objects.of[i] != object) continue;
+        left--;
+        clear = fmaxf(clear, p->scene->surface[i].clear);
+    }
+    return clear;
+}
+
 /* ---- the table */
 
 static double area_of(const struct part *p, uint32_t object)
@@ -143,7 +156,7 @@ static void print_clear(const struct part *p, FILE *out)
         sh_keep_line(name);
         fprintf(out, "clear     %.0f %%: %s\n", 100.0 * (double)s->clear, name);
     }
-    if (n > MAX_ROWS) fprintf(out, "clear     and %u more\n", n - MAX_ROWS);
+    if (n > MAX_ROWS) fprintf(out, "clear     and %u more; --scene-csv FILE has all\n", n - MAX_ROWS);
 }
 
 static void print_part(const struct part *p, FILE *out)
@@ -183,7 +196,7 @@ static void print_left_out(const struct parts *parts, FILE *out)
 static void put_csv(FILE *out, const void *ctx)
 {
     const struct parts *parts = ctx;
-    fputs("object,type,guid,moves,triangles,open_edges,body,area_m2,volume_m3,surfaces,colour\n", out);
+    fputs("object,type,guid,moves,triangles,open_edges,body,area_m2,volume_m3,surfaces,colour,clear\n", out);
     for (uint32_t i = 0; i < parts->n; i++) {
         const struct part *p = &parts->part[i];
         for (uint32_t k = 0; k < p->objects.n; k++) {
@@ -199,7 +212,7 @@ static void put_csv(FILE *out, const void *ctx)
             fprintf(out, ",%s,%" PRIu64 ",%" PRIu64 ",%s,%.12g,", p->is_mover ? "yes" : "no", o->n_triangles, o->n_open,
                     state_words[o->state], o->area_m2);
             if (o->state == SCENE_OBJECT_CLOSED) fprintf(out, "%.12g", o->volume_m3);
-            fprintf(out, ",%u,%s\n", o->n_surfaces, colour);
+            fprintf(out, ",%u,%s,%.3g\n", o->n_surfaces, colour, (double)clear_of(p, k));
         }
     }
 }

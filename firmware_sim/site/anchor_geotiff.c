@@ -18,6 +18,7 @@ struct terrain {
     char crs[sizeof((struct geotiff *)0)->crs];
     double bounds_m[4]; /* low easting, low northing, high ones */
     const double *offset_m;
+    int above_ellipsoid; /* the heights of all of them */
 };
 
 static const char *named(const char *crs)
@@ -39,7 +40,7 @@ static int add_raster(const struct config *cfg, const struct config_mesh *mesh, 
     if (rc != SH_OK) return rc;
     geotiff_bounds(&g, bounds_m);
     if (t->file == NULL) {
-        *t = (struct terrain){.file = mesh->file, .offset_m = mesh->offset_m};
+        *t = (struct terrain){.file = mesh->file, .offset_m = mesh->offset_m, .above_ellipsoid = 1};
         memcpy(t->crs, g.crs, sizeof t->crs);
         memcpy(t->bounds_m, bounds_m, sizeof t->bounds_m);
     }
@@ -52,6 +53,7 @@ static int add_raster(const struct config *cfg, const struct config_mesh *mesh, 
         return sh_fail(err, SH_EINPUT,
                        "%s: scene.anchor: source geotiff, but %s and %s differ in offset_m; allowed is one for both",
                        cfg->file, t->file, mesh->file);
+    t->above_ellipsoid &= g.above_ellipsoid;
     for (int k = 0; k < 2; k++) {
         t->bounds_m[k] = fmin(t->bounds_m[k], bounds_m[k]);
         t->bounds_m[k + 2] = fmax(t->bounds_m[k + 2], bounds_m[k + 2]);
@@ -119,7 +121,7 @@ static int measure_corners(const struct terrain *t, const struct geoframe *frame
 static void say(const struct config *cfg, const struct sh_report *report, const struct terrain *t,
                 const struct crs_place *at)
 {
-    if (!cfg->scene.anchor.height_given)
+    if (!cfg->scene.anchor.height_given && !t->above_ellipsoid)
         sh_warn(report,
                 "%s: its heights, which as a rule count from the sea, are taken as heights above the ellipsoid; "
                 "scene.anchor.height_m says how high above it their 0 is",

@@ -18,17 +18,20 @@ static int is_decided(const struct scene_surface *s, const struct surface_rule *
     return 0;
 }
 
-/* A pattern that fits this name alone, as a double-quoted scalar of YAML. Cut where there is no room. */
-static void quote(const char *name, char *out, size_t room)
+/* A byte becomes up to four: a control character, or a backslash, which fnmatch and YAML take one half of each. */
+enum { NAME_ROOM = 4 * SCENE_NAME_LEN };
+
+/* A pattern that fits this name alone, as a double-quoted scalar of YAML. */
+static void quote(const char *name, char out[NAME_ROOM])
 {
     size_t n = 0;
     out[n++] = '"';
-    for (const char *p = name; *p != '\0' && n + 6 < room; p++) {
+    for (const char *p = name; *p != '\0'; p++) {
         const unsigned char c = (unsigned char)*p;
-        if (strchr("*?[\\", *p) != NULL) n += (size_t)snprintf(out + n, room - n, "\\\\"); /* of fnmatch */
+        if (strchr("*?[\\", *p) != NULL) n += (size_t)snprintf(out + n, NAME_ROOM - n, "\\\\"); /* of fnmatch */
         if (*p == '"' || *p == '\\') out[n++] = '\\';
         if (c < 0x20 || c == 0x7f)
-            n += (size_t)snprintf(out + n, room - n, "\\x%02x", c);
+            n += (size_t)snprintf(out + n, NAME_ROOM - n, "\\x%02x", c);
         else
             out[n++] = *p;
     }
@@ -38,16 +41,17 @@ static void quote(const char *name, char *out, size_t room)
 
 void site_clear_add(struct site_clear *c, const struct scene_surface *s, const struct surface_rule *rule, uint32_t n)
 {
-    char name[2 * SCENE_NAME_LEN], entry[2 * SCENE_NAME_LEN + 48];
+    char name[NAME_ROOM], entry[NAME_ROOM + 48];
     if ((double)s->clear < SITE_CLEAR_LEAST || is_decided(s, rule, n)) return;
     const int by_material = s->material[0] != '\0';
     c->n++;
-    quote(by_material ? s->material : s->object, name, sizeof name);
+    quote(by_material ? s->material : s->object, name);
     const int key = snprintf(entry, sizeof entry, "{%s: %s, ", by_material ? "material" : "object", name);
     if (strstr(c->rules, entry) != NULL) return;
     snprintf(entry + key, sizeof entry - (size_t)key, "glass: %.2g}", fmin(MOST_GLASS, (double)s->clear));
     const size_t len = strlen(c->rules), more = strlen(entry) + 2;
-    if (len + more >= sizeof c->rules)
+    const size_t room = c->room > 0 ? c->room : sizeof c->rules;
+    if (len + more >= room)
         c->n_left_out++;
     else
         snprintf(c->rules + len, sizeof c->rules - len, "%s%s", len > 0 ? ", " : "", entry);

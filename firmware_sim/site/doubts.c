@@ -101,15 +101,15 @@ static void doubt_clear(const struct site *site, const struct sh_report *report)
 {
     const struct config *cfg = site->cfg;
     const uint32_t n = site->detect.ghost != NULL ? site->detect.n_real : site->n_surfaces;
-    struct site_clear clear = {0};
+    struct site_clear clear = {.room = 320}; /* a warning is a line */
     for (uint32_t i = 0; i < n; i++)
         site_clear_add(&clear, site_surface(site, i), cfg->surface, cfg->n_surfaces);
     if (clear.n == 0) return;
+    const char *const left = clear.n_left_out == 0 ? "" : "; check --scene-csv FILE has all";
     sh_warn(report,
             "%s: %u surface%s transparent by the file, and measured as solid; glass is what the configuration says: "
             "surfaces: [%s]%s",
-            cfg->file, clear.n, clear.n > 1 ? "s are" : " is", clear.rules,
-            clear.n_left_out > 0 ? ", and more: check --scene lists all" : "");
+            cfg->file, clear.n, clear.n > 1 ? "s are" : " is", clear.rules[0] != '\0' ? clear.rules : "...", left);
 }
 
 /* A vertex within reach settles most cases without an index of distances. */

@@ -229,17 +229,18 @@ uint32_t site_points_per_pulse(const struct site *site);
 uint32_t site_most_points_per_pulse(const struct site *site);
 
 /* Names of a label below n_surfaces. */
-/* ---- clear.c: surfaces that their file calls transparent, and that no rule decides about. Zero-initialise. */
-#define SITE_CLEAR_LEAST 0.01 /* a file's rounding lets less than this through */
-struct site_clear {
-    uint32_t n, n_left_out; /* surfaces; rules for which there was no room */
-    char rules[320];        /* "{material: "Glas", glass: 0.7}, ...", for `surfaces` */
-};
-void site_clear_add(struct site_clear *c, const struct scene_surface *s, const struct surface_rule *rule, uint32_t n);
-
 const struct scene_surface *site_surface(const struct site *site, uint32_t label);
 /* The texture of a real surface; NULL: none. */
 const struct scene_texture *site_texture(const struct site *site, uint32_t label);
+
+/* ---- clear.c: surfaces that their file calls transparent, and that no rule decides about. Zero-initialise. */
+#define SITE_CLEAR_LEAST 0.01 /* a file's rounding lets less than this through */
+struct site_clear {
+    uint32_t n, n_left_out;         /* surfaces; rules that had no room */
+    size_t room;                    /* for the rules; 0: all of them */
+    char rules[8 * SCENE_NAME_LEN]; /* "{material: "Glas", glass: 0.7}, ...", for `surfaces`; any one has room */
+};
+void site_clear_add(struct site_clear *c, const struct scene_surface *s, const struct surface_rule *rule, uint32_t n);
 
 /* On which stretch a moving head is at a time of the scan; and what the casters need there, in a setup for
  * the station.

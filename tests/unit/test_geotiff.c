@@ -297,6 +297,18 @@ static void what_is_left_out_is_said(void **state)
     assert_non_null(strstr(warnings, "neither its system nor its unit is named"));
     assert_int_equal(n_warnings, 1);
     scene_free(s);
+    const double matrix[16] = {2, 0, 0, 690000, 0, -3, 0, 5336000, 0, 0, 0.5, 7, 0, 0, 0, 1};
+    t = tif_of(5, 4, heights);
+    memcpy(t.matrix, matrix, sizeof matrix);
+    s = read_tif(&t);
+    assert_grid(s, 690001.0, 5335998.5, 2.0, -3.0, 1.0, 0.0);
+    if (n_warnings != 1 || strstr(warnings, "its ModelTransformation changes the heights, which is not used") == NULL)
+        fail_msg("%s", warnings);
+    scene_free(s);
+    t.matrix[10] = 0.0; /* a map of the plane alone */
+    s = read_tif(&t);
+    assert_int_equal(n_warnings, 0);
+    scene_free(s);
 }
 
 #define WITH(expected, ...)                   \
@@ -318,6 +330,10 @@ static void what_is_refused(void **state)
          t.key[2][0] = 2048; t.key[2][1] = 4258; t.tie[3] = 11.5; t.tie[4] = 48.1; t.scale[0] = t.scale[1] = 1e-4);
     WITH("gdalwarp -t_srs EPSG:32756", t.key[0][1] = 2; t.tie[3] = 151.2; t.tie[4] = -33.8;
          t.scale[0] = t.scale[1] = 1e-4);
+    WITH("gdalwarp -t_srs EPSG:32661", t.key[0][1] = 2; t.tie[3] = 15.0; t.tie[4] = 85.0;
+         t.scale[0] = t.scale[1] = 1e-4);
+    WITH("gdalwarp -t_srs EPSG:32761", t.key[0][1] = 2; t.tie[3] = 15.0; t.tie[4] = -80.1;
+         t.scale[0] = t.scale[1] = 1e-4);
     WITH("its cells are degrees (of its own)", t.key[0][1] = 2; t.key[2][0] = 2048; t.key[2][1] = 32767);
     WITH("geocentric", t.key[0][1] = 3);
     WITH("EPSG:9999: no such coordinate reference system", t.key[2][1] = 9999);
@@ -327,6 +343,13 @@ static void what_is_refused(void **state)
     WITH("EPSG:5715: not a system of heights that count upward", t.key[3][0] = 4096; t.key[3][1] = 5715);
     WITH("the unit of its heights is 'parsec'; allowed are m, ft, US survey foot",
          t.metadata = "<Item name=\"UNITTYPE\" sample=\"0\" role=\"unittype\">parsec</Item>");
+    WITH("the scale of its heights is 'nan'; allowed are numbers, and no scale of 0",
+         t.metadata = "<Item name=\"SCALE\" sample=\"0\" role=\"scale\">nan</Item>");
+    WITH("the scale of its heights is '0'", t.metadata = "<Item name=\"SCALE\" sample=\"0\" role=\"scale\">0</Item>");
+    WITH("the offset of its heights is '1e999'",
+         t.metadata = "<Item name=\"OFFSET\" sample=\"0\" role=\"offset\">1e999</Item>");
+    WITH("the offset of its heights is 'abc'",
+         t.metadata = "<Item name=\"OFFSET\" sample=\"0\" role=\"offset\">abc</Item>");
     WITH("2 bands; allowed is one, of heights: gdal_translate -b 1", t.bands = 2);
     WITH("a picture (3 bands, PhotometricInterpretation 2), not heights", t.bands = 3; t.bits = 8; t.format = 1;
          t.photometric = PHOTOMETRIC_RGB);

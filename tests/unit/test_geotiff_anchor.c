@@ -10,13 +10,16 @@ static struct site *site;
 static double flat[21 * 21];
 
 /* A raster of 21 x 21 cells of `cell` units in the rig's folder. */
-static void write_tif(const char *name, uint16_t epsg, double cell, double easting, double northing)
+static void write_tif_of(const char *name, uint16_t epsg, uint16_t vertical, double cell, double easting,
+                         double northing)
 {
     char file[192];
     struct tif t = tif_of(21, 21, flat);
     for (int i = 0; i < 21 * 21; i++)
         flat[i] = 100.0;
     t.key[2][1] = epsg;
+    t.key[3][0] = vertical != 0 ? 4096 : 0;
+    t.key[3][1] = vertical;
     t.scale[0] = t.scale[1] = cell;
     t.tie[3] = easting;
     t.tie[4] = northing;
@@ -24,6 +27,11 @@ static void write_tif(const char *name, uint16_t epsg, double cell, double easti
     snprintf(strrchr(file, '/') + 1, 64, "%s", name);
     write_in(name, ""); /* the rig removes it */
     tif_write(file, &t);
+}
+
+static void write_tif(const char *name, uint16_t epsg, double cell, double easting, double northing)
+{
+    write_tif_of(name, epsg, 0, cell, easting, northing);
 }
 
 static int load(const char *meshes, const char *anchor, const char *position)
@@ -78,6 +86,19 @@ static void a_raster_in_utm_makes_the_scene_that_grid(void **state)
     ok(load(MESH("dtm.tif", ""), ", height_m: 0", "{position_m: [260020, 6249970, 102]}"));
     assert_true(site->anchor.frame.zone == 33 && site->anchor.frame.north == 0);
     assert_null(strstr(warned, "ellipsoid"));
+}
+
+/* 5030 is WGS 84 among GeoTIFF's codes of ellipsoids; 5703 counts from the sea. One raster without is enough to doubt. */
+static void heights_above_an_ellipsoid_are_not_doubted(void **state)
+{
+    (void)state;
+    static const uint16_t code[] = {5030, 5703};
+    write_tif_of("a.tif", 32632, 5030, 1.0, 690000.0, 5336000.0);
+    for (int i = 0; i < 2; i++) {
+        write_tif_of("b.tif", 32632, code[i], 1.0, 690021.0, 5336000.0);
+        ok(load(MESH("a.tif", "") ", " MESH("b.tif", ""), "", "{position_m: [690020, 5335990, 102]}"));
+        assert_int_equal(strstr(warned, "as a rule count from the sea") != NULL, i);
+    }
 }
 
 /* The geoid's height: exact with an offset of the same height, else tangent. */
@@ -165,6 +186,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_raster_in_utm_makes_the_scene_that_grid),
+        cmocka_unit_test(heights_above_an_ellipsoid_are_not_doubted),
         cmocka_unit_test(height_m_is_that_of_the_raster_s_zero),
         cmocka_unit_test(another_grid_makes_it_tangent),
         cmocka_unit_test(tiles_are_one_raster),

@@ -64,6 +64,27 @@ static void broken_bytes(void **state)
     }
 }
 
+/* The first image is whole, and what should follow lies beyond the file. */
+static void what_follows_is_broken(void **state)
+{
+    (void)state;
+    static uint8_t data[8192];
+    const size_t n = pack(data);
+    uint32_t at;
+    uint16_t tags;
+    struct scene *s;
+    struct sh_err err;
+    memcpy(&at, data + 4, sizeof at); /* of the directory */
+    memcpy(&tags, data + at, sizeof tags);
+    memset(data + at + 2 + 12 * tags, 0x7f, 4);
+    const struct scene_mesh_spec spec = {.file = write_file("next.tif", data, n), .scale = 1};
+    assert_int_equal(load_spec(&spec, 1e-3, &s, &err), SH_OK);
+    if (n_warnings != 1 || strstr(warnings, "next.tif: only its first image is read; what follows is broken: ") == NULL)
+        fail_msg("%s", warnings);
+    scene_free(s);
+    unlink(path);
+}
+
 /* A raster too large is refused by its figures, before its cells are looked at. */
 static void too_many_triangles(void **state)
 {
@@ -93,6 +114,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(cut_off_anywhere),
         cmocka_unit_test(broken_bytes),
+        cmocka_unit_test(what_follows_is_broken),
         cmocka_unit_test(too_many_triangles),
     };
     return cmocka_run_group_tests_name("geotiff_broken", tests, make_folder, remove_folder);

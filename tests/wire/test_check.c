@@ -126,8 +126,8 @@ static void test_objects(void **state)
         "\n         718          4         3291       1522.2  sum: "};
     for (size_t i = 0; i < sizeof has / sizeof has[0]; i++)
         if (strstr(out, has[i]) == NULL) fail_msg("%s is not in\n%s", has[i], out);
-    const char *last = strstr(all, "\n\"box 59, \"\"red\"\"\",,,no,12,0,closed,57.9,27.54,1,none\n");
-    if (last == NULL || strstr(all, "\n\"box 0, \"\"red\"\"\",,,no,10,4,open,46,,1,none\n") == NULL)
+    const char *last = strstr(all, "\n\"box 59, \"\"red\"\"\",,,no,12,0,closed,57.9,27.54,1,none,0\n");
+    if (last == NULL || strstr(all, "\n\"box 0, \"\"red\"\"\",,,no,10,4,open,46,,1,none,0\n") == NULL)
         fail_msg("%s", all);
     free(out);
     free(all);

@@ -21,7 +21,7 @@ enum {
     VERTICAL_UNIT = 4099
 };
 enum { MODEL_PROJECTED = 1, MODEL_GEOGRAPHIC, MODEL_GEOCENTRIC, RASTER_IS_POINT = 2, USER_DEFINED = 32767 };
-enum { MOST_KEYS = 512, FIRST_VERTICAL_EPSG = 5100 }; /* 5001 to 5033 are GeoTIFF's own, for ellipsoids */
+enum { MOST_KEYS = 512, FIRST_ELLIPSOID = 5001, LAST_ELLIPSOID = 5033, FIRST_VERTICAL_EPSG = 5100 };
 
 #define FOOT_M    0.3048
 #define US_FOOT_M (1200.0 / 3937.0)
@@ -31,7 +31,7 @@ struct reader {
     struct geotiff *g;
     double key[4 * MOST_KEYS];
     size_t n_key;
-    double map[8]; /* rows: easting and northing, in the file's units, of column, row, -, 1; 0, 0 as the file counts */
+    double map[16];           /* rows: easting, northing and height, in the file's units, of column, row, value, 1 */
     double z_scale, z_offset; /* of heights, by scale and tie point */
     struct sh_err *err;
 };
@@ -103,10 +103,13 @@ static int read_scale(struct reader *r)
 static int read_map(struct reader *r)
 {
     size_t n;
-    int rc = tags_numbers(&r->tags, TRANSFORMATION, r->map, 8, &n, r->err);
+    int rc = tags_numbers(&r->tags, TRANSFORMATION, r->map, 16, &n, r->err);
     if (rc == SH_OK && n < 8) rc = read_scale(r);
     if (rc != SH_OK) return rc;
-    const double *m = r->map, area = m[0] * m[5] - m[1] * m[4];
+    const double *m = r->map, *z = r->map + 8;
+    /* GDAL doesn't use the third row either. Without a part for the value it is a map of the plane alone. */
+    r->g->turns_heights = n >= 12 && z[2] != 0.0 && (z[0] != 0.0 || z[1] != 0.0 || z[2] != 1.0 || z[3] != 0.0);
+    const double area = m[0] * m[5] - m[1] * m[4];
     if (isfinite(area) && area != 0.0 && isfinite(m[3]) && isfinite(m[7])) return SH_OK;
     return sh_fail(r->err, SH_EINPUT, "%s: its cells have no area, or no place that is a number", r->tags.path);
 }
@@ -194,12 +197,16 @@ static const char *item(const char *metadata, const char *role)
     return at != NULL ? at + strlen(mark) : NULL;
 }
 
-static double number_of(const char *metadata, const char *role, double other)
+static int read_item(const struct reader *r, const char *metadata, const char *role, double *value)
 {
     const char *at = item(metadata, role);
+    const int n = at != NULL ? (int)strcspn(at, "<") : 0;
     char *end = NULL;
-    const double value = at != NULL ? strtod(at, &end) : other;
-    return at == NULL || end == at ? other : value;
+    if (n == 0) return SH_OK;
+    *value = strtod(at, &end);
+    if (end == at + n && isfinite(*value) && (*value != 0.0 || strcmp(role, "scale") != 0)) return SH_OK;
+    return sh_fail(r->err, SH_EINPUT, "%s: the %s of its heights is '%.*s'; allowed are numbers, and no scale of 0",
+                   r->tags.path, role, n < 40 ? n : 40, at);
 }
 
 /* 1: it is named. */
@@ -229,6 +236,7 @@ static int read_height_unit(const struct reader *r, const char *metadata, double
     char name[16];
     int rc = SH_OK;
     *unit_m = 1.0;
+    r->g->above_ellipsoid = system >= FIRST_ELLIPSOID && system <= LAST_ELLIPSOID;
     if (system >= FIRST_VERTICAL_EPSG && system != USER_DEFINED) {
         snprintf(name, sizeof name, "EPSG:%u", system);
         rc = find_unit(r, name, 1, unit_m);
@@ -257,8 +265,11 @@ static int read_heights(struct reader *r)
         if (end == text) r->g->no_data = NAN;
         /* As GDAL has it: scale and tie point count where the heights have a system. */
         const int is_vertical = key(r, VERTICAL) != 0 || key(r, VERTICAL_UNIT) != 0;
-        r->g->height_m = unit_m * number_of(metadata, "offset", is_vertical ? r->z_offset : 0.0);
-        r->g->height_scale_m = unit_m * number_of(metadata, "scale", is_vertical ? r->z_scale : 1.0);
+        double offset = is_vertical ? r->z_offset : 0.0, scale = is_vertical ? r->z_scale : 1.0;
+        rc = read_item(r, metadata, "offset", &offset);
+        if (rc == SH_OK) rc = read_item(r, metadata, "scale", &scale);
+        r->g->height_m = unit_m * offset;
+        r->g->height_scale_m = unit_m * scale;
         r->g->maps_heights = !is_vertical && (r->z_scale != 1.0 || r->z_offset != 0.0);
     }
     free(metadata);
@@ -285,6 +296,8 @@ int geotiff_read(const char *path, struct geotiff *geotiff, struct sh_err *err)
 
 int geotiff_utm_code(double lat_deg, double lon_deg)
 {
+    if (lat_deg > 84.0) return 32661;
+    if (lat_deg < -80.0) return 32761;
     const int zone = fabs(lon_deg) < 180.0 ? (int)floor(lon_deg / 6.0) + 31 : 1;
     return (lat_deg < 0.0 ? 32700 : 32600) + zone;
 }

@@ -96,8 +96,12 @@ static int look_at_others(struct raster *r, struct sh_err *err)
             r->b, SH_EINPUT, err,
             "a mask says which cells have no height; allowed is a value for them: gdalwarp -dstnodata -9999 "
             "makes one");
-    if (n > 0) sh_warn(r->b->report, "%s: %u further images in it are not read, only the first", r->b->name, n);
-    r->said[0] = '\0'; /* of the directory that there is not */
+    if (n > 0)
+        sh_warn(r->b->report, "%s: only its first image is read; there %s %u more", r->b->name, n > 1 ? "are" : "is",
+                n);
+    if (r->said[0] != '\0')
+        sh_warn(r->b->report, "%s: only its first image is read; what follows is broken: %.200s", r->b->name, r->said);
+    r->said[0] = '\0';
     return TIFFSetDirectory(r->tif, 0) ? SH_OK : fail_reading(r, "its directory", err);
 }
 
@@ -112,8 +116,8 @@ static int check_band(struct raster *r, struct sh_err *err)
     if (photometric != PHOTOMETRIC_MINISBLACK)
         return build_fail(
             r->b, SH_EINPUT, err,
-            "a picture (%u bands, PhotometricInterpretation %u), not heights; allowed is one band of heights", bands,
-            photometric);
+            "a picture (%u band%s, PhotometricInterpretation %u), not heights; allowed is one band of heights", bands,
+            bands > 1 ? "s" : "", photometric);
     if (bands != 1)
         return build_fail(r->b, SH_EINPUT, err,
                           "%u bands; allowed is one, of heights: gdal_translate -b 1 takes the first", bands);
@@ -150,7 +154,8 @@ static int set_up_blocks(struct raster *r, struct sh_err *err)
     TIFFGetField(r->tif, TIFFTAG_IMAGEWIDTH, &width);
     TIFFGetField(r->tif, TIFFTAG_IMAGELENGTH, &height);
     if (width != r->g.width || height != r->g.height)
-        return build_fail(r->b, SH_EINPUT, err, "its size makes no sense: %u x %u", width, height);
+        return build_fail(r->b, SH_EINPUT, err, "its size is %u x %u cells for libtiff, and %u x %u by its tags", width,
+                          height, r->g.width, r->g.height);
     r->block_width = width;
     r->block_height = height;
     if (TIFFIsTiled(r->tif)) {
@@ -163,8 +168,9 @@ static int set_up_blocks(struct raster *r, struct sh_err *err)
     const tmsize_t bytes = TIFFIsTiled(r->tif) ? TIFFTileSize(r->tif) : TIFFStripSize(r->tif);
     if (bytes <= 0 || r->block_width == 0 || r->block_height == 0 ||
         (uint64_t)bytes != (uint64_t)r->block_width * r->block_height * (r->bits / 8u))
-        return build_fail(r->b, SH_EINPUT, err, "its tiles or strips of %u x %u cells make no sense", r->block_width,
-                          r->block_height);
+        return build_fail(r->b, SH_EINPUT, err,
+                          "its tiles or strips of %u x %u cells don't hold the bytes that libtiff counts",
+                          r->block_width, r->block_height);
     r->block_bytes = (size_t)bytes;
     r->block = malloc(r->block_bytes);
     r->value = calloc((size_t)r->block_height * width, sizeof *r->value);
@@ -340,6 +346,9 @@ static int say(struct raster *r, struct sh_err *err)
             "%s: its ModelPixelScale or ModelTiepoint scales the heights, which is not used, since the file names no "
             "system of theirs",
             r->b->name);
+    if (r->g.turns_heights)
+        sh_warn(report, "%s: its ModelTransformation changes the heights, which is not used: they stay as they are",
+                r->b->name);
     doubt_heights(r);
     return rc;
 }

@@ -87,7 +87,8 @@ static int find(const struct tags *t, unsigned tag, struct entry *found, struct 
         if (load(t, p, 2) != tag) continue;
         const unsigned type = (unsigned)load(t, p + 2, 2);
         if (size_of(type) == 0)
-            return sh_fail(err, SH_EINPUT, "%s: its tag %u has values of type %u, which makes no sense", t->path, tag,
+            return sh_fail(err, SH_EINPUT,
+                           "%s: its tag %u has values of type %u; read are 2, 3, 4, 12 and 16 of TIFF's", t->path, tag,
                            type);
         const uint64_t n = load(t, p + 4, field);
         *found = (struct entry){type, n, n <= field / size_of(type) ? at + 4 + field : load(t, p + 4 + field, field)};

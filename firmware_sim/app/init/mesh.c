@@ -7,6 +7,7 @@
 #include <strings.h>
 #include <unistd.h>
 
+#include "core/crs.h"
 #include "core/geotiff.h"
 #include "firmware_sim/app/app.h"
 
@@ -162,20 +163,55 @@ static int fail(const char *file, const struct sh_err *why, int code, struct sh_
                    why->text);
 }
 
-/* Without tolerance and warnings: both come when the configuration is checked. */
+/* The system of a raster, where the scene can be anchored by it. */
+static void find_crs(const struct init_wish *wish, struct init_mesh *mesh)
+{
+    struct geotiff g;
+    struct crs_place at;
+    struct sh_err why;
+    if (!geotiff_is_name(wish->file) || mesh->up != SCENE_UP_Z || mesh->scale != 1.0) return;
+    if (geotiff_read(wish->file, &g, &why) != SH_OK || g.crs[0] == '\0') return;
+    if (crs_locate(g.crs, g.easting_m[0], g.northing_m[0], 0.0, &at, &why) == SH_OK)
+        snprintf(mesh->crs, sizeof mesh->crs, "%s", g.crs);
+}
+
+/* ---- reading */
+
+static void keep_warning(void *ctx, const char *warning)
+{
+    fprintf(ctx, "%s\n", warning);
+}
+
+/* The reader's warnings come when the configuration is checked; where it fails, they are said now. */
+static int read_mesh(const struct scene_mesh_spec *spec, struct scene **scene, struct sh_err *why)
+{
+    const struct sh_report *all = &app_report_stderr;
+    char *warnings = NULL, *rest, *line;
+    size_t size;
+    FILE *kept = open_memstream(&warnings, &size);
+    if (kept == NULL) return sh_fail(why, SH_ENOMEM, "no memory");
+    const struct sh_report keep = {.ctx = kept, .warn = keep_warning, .progress = all->progress, .stop = all->stop};
+    const int rc = scene_load(spec, 1, INFINITY, &keep, scene, why);
+    fclose(kept);
+    for (rest = warnings; rc != SH_OK && (line = strsep(&rest, "\n")) != NULL;)
+        if (*line != '\0') sh_warn(all, "%s", line);
+    free(warnings);
+    return rc;
+}
+
+/* Without a tolerance: that comes when the configuration is checked. */
 int init_load_mesh(const struct init_wish *wish, const char *name, struct scene **scene, struct init_mesh *mesh,
                    struct sh_err *err)
 {
-    const struct sh_report *all = &app_report_stderr;
-    const struct sh_report quiet = {.ctx = all->ctx, .progress = all->progress, .stop = all->stop};
     const struct scene_mesh_spec spec = {
         .file = wish->file, .up = SCENE_UP_Z, .scale = wish->scale > 0.0 ? wish->scale : 1.0};
     struct sh_err why = {0};
     if (access(wish->file, R_OK) != 0) return sh_fail(err, SH_EINPUT, "%s: %s", wish->file, strerror(errno));
-    int rc = scene_load(&spec, 1, INFINITY, &quiet, scene, &why);
+    int rc = read_mesh(&spec, scene, &why);
     if (rc != SH_OK) return fail(wish->file, &why, rc, err);
     choose_up(wish, name, *scene, mesh);
     choose_scale(wish, name, *scene, mesh);
+    find_crs(wish, mesh);
     turn(*scene, mesh, mesh->scale / spec.scale);
     return SH_OK;
 }

@@ -15,6 +15,7 @@ struct init_mesh {
     enum scene_up up;
     double scale;
     char up_from[64], scale_from[176]; /* where they are from, for comments */
+    char crs[16];                      /* of a GeoTIFF as it is, which PROJ can place; else empty */
 };
 
 /* Warns of what is assumed, with `name` for the file. scene_free is due where it succeeds. */

@@ -110,6 +110,9 @@ static void put_scene(const struct init_text *t, FILE *out)
     put_quoted(t->mesh_path, out);
     fprintf(out, "\n      up: %s # %s\n", t->mesh->up == SCENE_UP_Y ? "y" : "z", t->mesh->up_from);
     fprintf(out, "      scale: %.7g # metres per unit; %s\n", t->mesh->scale, t->mesh->scale_from);
+    if (t->mesh->crs[0] != '\0')
+        fprintf(out, "  anchor: {source: geotiff} # %s; height_m: how high its 0 is above the ellipsoid\n",
+                t->mesh->crs);
 }
 
 /* Glass is nothing that a file can decide: it is for the user to take the mark away. */
@@ -119,6 +122,7 @@ static void put_clear(const struct scene *scene, FILE *out)
     for (uint32_t i = 0; i < scene->n_surfaces; i++)
         site_clear_add(&clear, &scene->surface[i], NULL, 0);
     if (clear.n > 0) fprintf(out, "# transparent by the file; as glass:\n# surfaces: [%s]\n", clear.rules);
+    if (clear.n_left_out > 0) fputs("# and more: `scanhead check --scene-csv FILE` has all\n", out);
 }
 
 static void put_station(const struct init_text *t, FILE *out)
