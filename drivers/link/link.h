@@ -117,6 +117,10 @@ struct link_ops {
      * none. After the link's thread has ended, or by that thread. */
     uint64_t (*refused)(const void *link);
 
+    /* Bytes of a session that were written and that its reader has not taken: they are lost once the link is closed. The
+     * system may know of the last ones a moment late. NULL: none get lost so. */
+    int (*unread)(void *link, int session);
+
     /* Ends a session from this side: what was written goes out, and a LINK_CLOSED follows from poll. NULL: sessions of
      * this link can't be ended. */
     void (*end)(void *link, int session);

@@ -24,18 +24,20 @@
  *     the next hang-up sets it right.
  *   - Nothing is written while an open event is unread: it would be of the old session, for the new client. */
 #include <errno.h>
+#include <fcntl.h>
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/inotify.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include "drivers/link/link_poll.h"
 #include "drivers/link/pty_device.h"
 
 struct pty_link {
-    pthread_mutex_t naming;   /* for a new device: pty_endpoint is called from other threads */
+    pthread_mutex_t naming; /* for a new device: pty_endpoint is called from other threads */
     struct pty_device device;
     int unplugged; /* there is no pair, and no symlink */
     int inotify, watch;
@@ -233,6 +235,23 @@ static ssize_t pty_write(void *link, int session, const void *buf, size_t len)
     return errno == EAGAIN || errno == EINTR ? 0 : SH_ECLOSED;
 }
 
+/* The kernel throws away what waits in a terminal when its master is closed, and counts it for the slave alone. We look at the
+ * end only, when nobody new is waited for: so our own opening is not watched. A slave that is another's alone (TIOCEXCL) can't be
+ * looked at. */
+static int pty_unread(void *link, int session)
+{
+    struct pty_link *pty = link;
+    int n = 0;
+    if (session != 0 || !pty->open || (pty_now(pty) & POLLHUP) != 0) return 0;
+    if (pty->watch >= 0) inotify_rm_watch(pty->inotify, pty->watch);
+    pty->watch = -1;
+    const int fd = open(pty->device.slave, O_RDONLY | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+    if (fd < 0) return 0;
+    if (ioctl(fd, FIONREAD, &n) != 0) n = 0;
+    close(fd);
+    return n;
+}
+
 /* ---- faults on request */
 
 /* The session is over, and nobody hears of the terminal any more. */
@@ -309,6 +328,7 @@ const struct link_ops link_pty = {
     .poll = pty_poll,
     .read = pty_read,
     .write = pty_write,
+    .unread = pty_unread,
     .fault = pty_fault,
     .close = pty_close,
 };

@@ -155,6 +155,17 @@ static int take_events(struct pump *pump, uint32_t want_write, int timeout_ms)
     return n;
 }
 
+/* True while bytes wait in the system that it would throw away. It knows of the last ones a moment late. */
+static int is_unread(struct pump *pump, struct session *s, int index, int64_t now_ns)
+{
+    static const int64_t MOMENT_NS = 20000000;
+    if (pump->ops->unread == NULL || !s->open) return 0;
+    const int unread = pump->ops->unread(pump->link, index);
+    if (unread != s->unread) s->moved_ns = now_ns;
+    s->unread = unread;
+    return unread > 0 || now_ns - s->moved_ns < MOMENT_NS;
+}
+
 /* True while some session has something to bring out and its reader takes it. */
 static int has_more(struct pump *pump)
 {
@@ -163,8 +174,10 @@ static int has_more(struct pump *pump)
     if (pump->over_ns == 0) pump->over_ns = now_ns;
     for (int i = 0; i < LINK_MAX_SESSIONS; i++) {
         struct session *s = &pump->session[i];
-        int pending = s->open && (s->out_pos < s->out_len || s->cursor < released || s->commands.reply_len != 0 ||
-                                  s->commands.moving || s->units.n != 0 || session_wire_waits(s));
+        const int pending =
+            (s->open && (s->out_pos < s->out_len || s->cursor < released || s->commands.reply_len != 0 ||
+                         s->commands.moving || s->units.n != 0 || session_wire_waits(s))) ||
+            is_unread(pump, s, i, now_ns);
         const int in_time = now_ns - pump->over_ns < DRAIN_NS || !session_wire_keeps_back(s, now_ns);
         if (pending && in_time && now_ns - s->moved_ns < DRAIN_NS) return 1;
     }

@@ -60,7 +60,8 @@ struct session {
     int hang_up;       /* the session ends once its units are out */
     struct wire *wire; /* NULL: no fault so far */
     char peer[64];
-    int64_t moved_ns; /* clock_now_ns() when a byte last went out */
+    int64_t moved_ns; /* clock_now_ns() when a byte last went out, or, at the end, was taken by the reader */
+    int unread;       /* at the end: bytes that wait in the system for the reader */
 };
 
 /* Faults at connections (USB: at enumerations); pump_connections.c */

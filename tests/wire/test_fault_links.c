@@ -17,7 +17,7 @@ static struct head start(struct wire *wire, const char *link, const char *fault,
     int n = 3;
     room_write(wire);
     snprintf(links, sizeof links, "links: [{%s}, {type: tcp, port: 0}]\n", link);
-    snprintf(faults, sizeof faults, "faults: [{link: 1, %s}]\n", fault);
+    snprintf(faults, sizeof faults, "faults: [{link: 1, %s}]\nloop: {queue_ms: 10000}\n", fault); /* for late readers */
     config.links = links;
     config.more = faults;
     snprintf(path, sizeof path, "%s", room_config_write(wire, &config));

@@ -49,6 +49,7 @@ static void look_at(struct look *look, int fd, int frames)
 {
     native_parser_init(&look->parser);
     look->n = 0;
+    look->first_seq = 0;
     look->texts = 0;
     for (size_t bytes = 0; look->n < frames;) {
         size_t room;
@@ -66,7 +67,10 @@ static void look_at(struct look *look, int fd, int frames)
                 look->texts++;
                 continue;
             }
-            if (look->n++ == 0) {
+            look->n++;
+            if ((look->parser.header.flags & (NATIVE_REPEAT | NATIVE_LOCAL)) != 0)
+                continue; /* said again to this one */
+            if (look->first_seq == 0) {
                 look->first_ns = look->parser.header.t_ns;
                 look->first_seq = look->parser.header.seq;
             } else {
@@ -179,6 +183,48 @@ static void test_taken_over_at_once(void **state)
     head_end(&head, SIGTERM);
 }
 
+/* The kernel throws away what waits in a terminal when its master is closed. The head waits for a reader who is slow to take the
+ * end: here one who reads nothing for a third of a second, when the whole scan is with the kernel. */
+static void test_a_slow_reader_has_the_end(void **state)
+{
+    struct wire *wire = *state;
+    struct room_config scan = ENDLESS;
+    struct scanhead_frame frame;
+    static struct native_parser parser;
+    uint32_t last = 0;
+    ssize_t got;
+    scan.prr_hz = 1000;
+    scan.frames = 1;
+    scan.pan_stop_deg = 2; /* 100 ms */
+    room_write(wire);
+    struct head head = head_start(wire, room_config_write(wire, &scan), NULL);
+    struct scanhead *watch = client_open(head_endpoint(&head, "tcp"));
+    int fd = port_open(wire);
+    client_wait_state(watch, "idle");
+    raw_write(fd, "SCAN:STAR\n", 10);
+    client_until(watch, SCANHEAD_EV_SCAN_END, &frame);
+    scanhead_close(watch);
+    assert_int_equal(kill(head.pid, SIGTERM), 0);
+    struct pollfd gone = {.fd = pidfd_open(head.pid, 0), .events = POLLIN};
+    assert_int_equal(poll(&gone, 1, 300), 0);
+    close(gone.fd);
+    native_parser_init(&parser);
+    do {
+        size_t room;
+        uint8_t *to = native_parser_room(&parser, &room);
+        struct pollfd slot = {.fd = fd, .events = POLLIN};
+        assert_int_equal(poll(&slot, 1, DEADLINE_MS), 1);
+        got = read(fd, to, room);
+        native_parser_added(&parser, got > 0 ? (size_t)got : 0);
+        for (enum native_item item; (item = native_parser_next(&parser)) != NATIVE_MORE;)
+            if (item == NATIVE_FRAME) last = parser.header.seq;
+    } while (got > 0);
+    close(fd);
+    head_end(&head, 0);
+    assert_true(last >= frame.seq);
+    assert_int_equal(parser.stats.seq_lost, 0);
+}
+
 /* Opened and closed as fast as it goes, with a command or without: the head is there for the one who stays.
  */
 static void test_fast_open_and_close(void **state)
@@ -231,6 +277,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_clients_with_default_settings, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_nothing_stale, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_taken_over_at_once, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_a_slow_reader_has_the_end, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_fast_open_and_close, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_command_by_redirection, wire_setup, wire_teardown),
     };

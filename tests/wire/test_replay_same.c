@@ -14,13 +14,18 @@ struct heard {
 static void hear(struct wire *wire, const char *file, const char *link, const char *const *more, uint32_t n_frames,
                  struct heard *heard)
 {
-    const char *args[WIRE_MAX_ARGS] = {"--link", link, "--quiet", "--set",
-                                       "loop.late_ms=10000"}; /* on a busy machine, too */
+    const char *args[WIRE_MAX_ARGS] = {"--link",
+                                       link,
+                                       "--quiet",
+                                       "--set",
+                                       "loop.late_ms=10000",
+                                       "--set",
+                                       "loop.queue_ms=10000"}; /* on a busy machine, too */
     struct scanhead_frame frame;
     char hash[65];
-    for (int i = 5; more != NULL && *more != NULL; i++)
+    for (int i = 7; more != NULL && *more != NULL; i++)
         args[i] = *more++;
-    const int is_step = strcmp(args[6], "step") == 0;
+    const int is_step = strcmp(args[8], "step") == 0;
     struct head head = head_start(wire, file, args);
     struct scanhead *sh = client_open(head_link(&head, 0));
     memset(heard, 0, sizeof *heard);
