@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # scanhead. `make` builds build/scanhead and build/libscanhead.{a,so}.
 # `make demo` and `make test` install what is missing (Debian; sudo when not root), build and run.
 BUILD ?= build
@@ -31,7 +32,7 @@ DEPS_BUILD = gcc g++ make pkg-config libc6-dev libembree-dev libassimp-dev libge
 	libmeshoptimizer-dev assimp-testmodels \
 	$(if $(shell command -v npm),,nodejs npm)
 # and the tests, with the second compiler and its sanitizers, clients and readers of recordings that are not ours:
-DEPS_TEST = $(DEPS_BUILD) libcmocka-dev clang libclang-rt-dev lld ccache gpsd gpsd-clients cloudcompare mrpt-apps proj-bin python3-numpy \
+DEPS_TEST = $(DEPS_BUILD) libcmocka-dev clang clang-format libclang-rt-dev lld ccache gpsd gpsd-clients cloudcompare mrpt-apps proj-bin python3-numpy \
 	parallel patch tshark tcpreplay
 # The guest tests; they are skipped where these can't be had. The kernel (linux-image-amd64) is fetched, not installed.
 DEPS_GUEST = qemu-system-x86 busybox-static cpio kmod xz-utils usbutils usbip

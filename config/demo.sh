@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: MIT
 # The demo: a head on a virtual serial port scans a house in real time, and a client records it.
 #   sh config/demo.sh SCANHEAD OUTDIR
 set -eu

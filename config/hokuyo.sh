@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: MIT
 # Records scans of the head of hokuyo.yaml with rawlog-grabber, which runs until it has saved some.
 #   sh config/hokuyo.sh INI PREFIX        PREFIX: the rawlog_prefix that INI names
 # It gives up where an answer takes more than 0.1 s (TCP) or 0.2 s (serial), as on a busy machine, and asks no more where

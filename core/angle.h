@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Degrees and radians. Inside the program angles are in radians; degrees come from files and go to people. */
 #ifndef CORE_ANGLE_H
 #define CORE_ANGLE_H

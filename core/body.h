@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Area, volume and openness of a body. In: its triangles, in any order, and a box around them (metres). Out: figures that
  * do not depend on how its faces are divided. All sums are of doubles, from the middle of the box, so that a body far from
  * the origin loses nothing. Pure; any thread. */

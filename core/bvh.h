@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The BVH: what rays meet first in a scene, exactly, wherever they begin.
  *
  * In: a scene (vertices in double, prcs, metres), rays as points and unit directions in prcs. Out: for each

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Casting: a run of pulses -> echoes, as entries of a block.
  *
  * In: a setup (what stays the same for all pulses of a scan) and a run (angles and times of consecutive

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A recorded point cloud, and how far it lies from the scene. In: a PLY or LAS file, the scene's index of
  * distances, the stations' georeferences. Out: points; per point a distance in metres and a triangle;
  * statistics and coverage of them.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A cloud from above, coloured by a figure. In: places (metres, x to the right, y up) and a figure each. Out: an image of
  * the pixels' means.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/colour.h"
 
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Colours that show figures: a figure in, red, green and blue out (sRGB, 8 bits a channel). One place for recordings,
  * maps, reports and the wire. Pure; any thread. */
 #ifndef CORE_COLOUR_H

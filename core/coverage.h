@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Coverage: how much of a scene's surface pulses meet, and where a head would see most of what is left.
  *
  * In: a scene with its BVH (prcs, metres), and scans as setups and schedules. Out: figures of each cell of the surface,

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Places in a named coordinate reference system: a national grid, as maps, terrain models and building models have it.
  * In: the system's name ("EPSG:2056", or as the EPSG registry calls it) and coordinates in metres. Out: the place on the
  * Earth, and how the grid lies there. PROJ does it, by its tables on this machine; it asks no network.

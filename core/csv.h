@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A CSV file of numbers whose first line names the columns. In: a path, the names that are known. Out: line by line, the
  * numbers by column. Empty lines, and those that begin with a number sign, do not count. Not real-time safe. */
 #ifndef CORE_CSV_H

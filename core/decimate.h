@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A coarse mesh of a fine one, for drawing. In: vertices and triangles (metres, any frame), and how many triangles there
  * may be. Out: vertices in double in the same frame, and triangles.
  *

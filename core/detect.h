@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Detection: what comes back to the head -> what it reports. Over arrays with one entry per echo, several per
  * pulse.
  *

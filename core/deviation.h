@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* How far recorded points are from where their beams meet the scene, and how far they may be. In: a cloud
  * (core/cloud.h) with its distances, and what each station's head is. Out: per point the deviation along the
  * beam, its expected sigma, range and incidence, in metres and as cosines.

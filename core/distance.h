@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The exact distance of a point to the scene. In: a scene, and a point in prcs (metres). Out: the nearest
  * point of the mesh. Embree's point query proposes triangles, double precision decides.
  *

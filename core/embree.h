@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Embree 3 or 4: the one place that includes it, and what its errors mean. Which one, the Makefile decides
  * (SH_EMBREE), with the library that it links. Point queries are the same in both. */
 #ifndef CORE_EMBREE_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Emitters: how the pulses of a head are arranged, as data. In: figures of a head profile. Out: tables that
  * the schedule (schedule.h) reads, constant from then on.
  *

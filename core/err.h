@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The one error scheme: 0 or a negative SH_E code, and one line of text for the user.
  *
  * A function that can fail for a reason the user can act on takes a `struct sh_err *` as its last

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Figures of a compared cloud, for tables and pictures: by groups, as histograms, how dense its points lie, when they
  * came. In: distances (core/cloud.h) and deviations (core/deviation.h), metres. Out: statistics. What is NaN takes no
  * part. Pure; whoever makes arrays says how they are freed. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The beam: a pulse is not a ray. Definitions first.
  *
  * Width. Irradiance across the beam is Gaussian, I = I0 exp(-2 r^2 / w^2); w is the 1/e^2 radius. Diameters

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* How the scene's frame (prcs) lies on the Earth. In: points of the scene, or places on the Earth (degrees,
  * metres). Out: the other, and rotations between the frames. It is set up once for a scene, so that all
  * stations agree.

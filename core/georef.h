@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* From the scene's frame (prcs) to a coordinate reference system (CRS), through GeographicLib.
  *
  * In: points of the scene, as differences from a centre in metres. Out: differences from the anchor in the

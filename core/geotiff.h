@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Where the heights of a GeoTIFF are: what its tags say beside the raster. In: a path. Out: the raster's size, the map from
  * cells to a projected system, units, and which value means that a cell has no height.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Arrays that grow. In: an array, and how many elements it must hold. Out: the array, moved where it had to
  * be. */
 #ifndef CORE_GROW_H

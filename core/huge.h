@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Memory for large arrays that are read at random. It lies in large pages where the system has them, since
  * page walks would cost as much as the data. Released with free(). NULL when there is no memory. */
 #ifndef CORE_HUGE_H

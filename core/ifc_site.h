@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Where an IFC building model stands: its IFCMAPCONVERSION and IFCSITE records, which mesh readers leave out.
  *
  * Reads the STEP file (ISO 10303-21) for IfcSite.RefLatitude, RefLongitude, RefElevation; the site's

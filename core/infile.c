@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/infile.h"
 
 #include <errno.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Opens input files. In: a path. Out: a stream to read; or why there is none, in words for a message.
  *
  * Only regular files: a FIFO waits for a writer, perhaps for ever, and a device may have no end. Every reader

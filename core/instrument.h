@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Instrument errors: the geometry of a scanner that is not quite as designed. Its mechanics say where the
  * beam really goes, its encoders what the head believes. In: scheduled angles in turns, errors. Out:
  * directions and origins of beams (socs, metres), and what the encoders read (turns).

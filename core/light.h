@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The speed of light in vacuum, in metres per second. A range is half the way that light goes in the time
  * back and forth. */
 #ifndef CORE_LIGHT_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/line.h"
 
 #include <stdlib.h>

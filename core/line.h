@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The result: part of one scan line as arrays. The only thing that leaves core.
  *
  * A line is one mirror sweep. It leaves in blocks (a slow mirror must not mean late packets); each block is a

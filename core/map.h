@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The scan map: points seen from above, as a PNG or SVG. In: points and stations in prcs (metres). Out: an
  * image.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Products of 3 by 3 matrices, row by row in nine doubles; out is never an input. */
 #ifndef CORE_MAT3_H
 #define CORE_MAT3_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Meshes to files: vertices and triangles in, one file out (and the files that it names); which format, its ending
  * says: .ply, .obj, .gltf, .glb, .fbx.
  *

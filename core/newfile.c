@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/newfile.h"
 
 #include <errno.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Files that the program makes: recordings, streams, statistics, journals, maps. In: a path. Out: an empty
  * file behind a descriptor.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Pictures: marks, lines and text on an image, as a PNG file or as SVG. In: places in pixels from the upper left
  * corner, x to the right, y down; colours as sRGB, 8 bits a channel. Out: an image, a PNG (libpng), an SVG.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The plan: which method each stage uses. In go a tolerance, the options of a stage and what is known of head
  * and scene; out come the method, and a row that says its error bound (m), its cost (ns per pulse), what was
  * left out, and why.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Where a platform, and the head on it, is and how it stands. In: angles in radians, positions in metres,
  * trajectories from CSV files. Out: attitudes as quaternions or matrices, and the pose at any time.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The one random generator: counter-based, so that a number depends on (seed, station, scan, pulse, echo,
  * purpose) and on nothing else.
  *
@@ -20,9 +21,9 @@ enum rng_purpose {
     RNG_PAN = 6,
     RNG_BALL = 7, /* ball-shaped noise: direction */
     RNG_BALL_RADIUS = 8,
-    RNG_FAULT = 9, /* faults on request */
+    RNG_FAULT = 9,   /* faults on request */
     RNG_SPARSE = 16, /* points spread over a mesh */
-    RNG_PLAN = 20, /* which pulses the plan looks at */
+    RNG_PLAN = 20,   /* which pulses the plan looks at */
 };
 
 VEC_INLINE uint64_t rng_mix(uint64_t x)

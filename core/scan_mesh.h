@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The mesh of a scan's grid. In: points with their places in the grid, a column a line and a row a shot. Out: triangles
  * that face the head, normals, and points spread evenly over them.
  *

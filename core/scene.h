@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The scene: meshes from files, as one list of triangles with surfaces. In: files and how to place them. Out:
  * vertices in double, in the project frame (prcs): metres, z up.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Copies of meshes in a scene (core/scene.h), for those who need something else. */
 #ifndef CORE_SCENE_COPIES_H
 #define CORE_SCENE_COPIES_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The objects of a scene, and figures of each: triangles, open edges, area, volume. An object is all surfaces of one name,
  * with their copies. In: a scene. Out: a row for each object, in the order of their first labels. Not real-time safe. */
 #ifndef CORE_SCENE_OBJECTS_H

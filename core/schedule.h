@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The schedule: when each pulse fires, and how far mirror and pan have turned then. In: the settings of a
  * scan, and a pulse number. Out: nanoseconds since the scan's start, angles in turns. Integers and exact
  * ratios; nothing accumulates. core/cast/aim.c makes directions from the turns.

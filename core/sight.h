@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Sight: what a standing station sees in each direction, known before rays are cast.
  *
  * In: a BVH (core/bvh.h), the one point where all rays begin, and which directions matter. Out: a map of

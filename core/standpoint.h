@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A place from which a head sees much of a scene: for a first scan of a mesh that nobody has looked at yet.
  *
  * In: a scene (prcs, metres, z up) and what a head reaches. Out: a position, a heading, and the part of the

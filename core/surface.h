@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Surfaces: how much of a pulse comes back from what it met. In: label, incidence and texel of each hit. Out:
  * the power that comes back, relative to a white target (below).
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A file in memory, and reading text from it: words, numbers, lines. In: a path. Out: its bytes, and a place
  * in them that each call moves on. Numbers are exact (nearest double) and don't depend on the locale. */
 #ifndef CORE_TEXT_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Images that lie on a mesh. In: a file, or bytes within one, and texture coordinates. Out: texels as 8 bits
  * of red, green, blue and alpha; which texel lies at a coordinate; the holes that alpha cuts out.
  *

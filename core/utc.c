@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/utc.h"
 
 #include <stdio.h>

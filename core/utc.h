@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* UTC, TAI and GPS time.
  *
  * One continuous scale inside: TAI in nanoseconds since 1970-01-01T00:00:00 TAI, which is what CLOCK_TAI

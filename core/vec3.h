@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Vectors of three doubles: sums and products of two of them, and arrays of them as kernels take them, an
  * array for each component. */
 #ifndef CORE_VEC3_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Arithmetic that compilers turn into vectors: branch-free, the same bits on every instruction set (no FMA
  * contraction, see the Makefile), for loops over arrays. */
 #ifndef CORE_VECMATH_H

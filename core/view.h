@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A picture of points as seen from a place: a pinhole camera, hidden points removed, shading by depth. In: points of
  * any number, one after the other, in prcs (metres), each with a figure or a colour. Out: an image.
  *

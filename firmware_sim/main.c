@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* scanhead: the command line. */
 #include <errno.h>
 #include <malloc.h>

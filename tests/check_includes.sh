@@ -1,4 +1,5 @@
 #!/bin/bash
+# SPDX-License-Identifier: MIT
 # The order of the rooms: which folder may use which, by #include and by call; a README in each; C++ in one file; no file
 # has the marks of an unfinished merge.
 # Prints TAP.

@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: MIT
 # What `make install` installs is enough for a client: the README's example, compiled with the installed files alone,
 # reads a scan. Prints TAP. $SCANHEAD: the program of the build that is installed.
 set -u

@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: MIT
 # What make would do elsewhere: for another machine, with both Embrees or the one that is asked for, and what the archive
 # shows of the library. Compilers and headers that aren't here are played by scripts; of those builds only the commands
 # are looked at. Prints TAP.

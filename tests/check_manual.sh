@@ -1,4 +1,5 @@
 #!/bin/bash
+# SPDX-License-Identifier: MIT
 # Manual pages and the completion for bash have every command, option and key that the help has; man reads the pages without
 # a warning, and bash completes commands, options, words, keys, files. Prints TAP. $SCANHEAD: the program.
 set -u

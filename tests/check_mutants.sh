@@ -1,4 +1,5 @@
 #!/bin/bash
+# SPDX-License-Identifier: MIT
 # The list of small faults in tests/mutants is whole: each patch says what is wrong and which tests find it, these tests
 # exist, and it applies to the tree as it is. Whether the tests find it: `make mutants`. Prints TAP.
 set -u

@@ -1,4 +1,5 @@
 #!/bin/bash
+# SPDX-License-Identifier: MIT
 # What `make deb` would put into packages, without building any: symbols, versions, files, the unit, licences. The packages
 # themselves: make deb-check. Prints TAP. $SCANHEAD: the program of the build whose library is looked at.
 set -u

@@ -1,4 +1,5 @@
 #!/bin/bash
+# SPDX-License-Identifier: MIT
 # The page's decoder in node: samples, damage, and recordings of the built program beside the client in Python.
 # tests/unit/page_native.mjs says what is compared.
 set -eu

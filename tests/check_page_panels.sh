@@ -1,4 +1,5 @@
 #!/bin/bash
+# SPDX-License-Identifier: MIT
 # The page's panels in node, without a browser: tests/unit/page_panels.mjs says what is compared.
 set -eu
 cd "$(dirname "$0")/.."

@@ -1,4 +1,5 @@
 #!/bin/bash
+# SPDX-License-Identifier: MIT
 # The points from before a page came, in node; tests/unit/page_past.mjs says what.
 set -eu
 cd "$(dirname "$0")/.."

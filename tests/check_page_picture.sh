@@ -1,4 +1,5 @@
 #!/bin/bash
+# SPDX-License-Identifier: MIT
 # The pure parts of the page's picture in node; tests/unit/page_picture.mjs says which.
 set -eu
 cd "$(dirname "$0")/.."

@@ -1,4 +1,5 @@
 #!/bin/bash
+# SPDX-License-Identifier: MIT
 # The page takes what a head says as text, never as HTML or as a program, and loads nothing from elsewhere: names of
 # surfaces, texts of errors and replies come from a head that may be hostile. Prints TAP.
 set -u

@@ -1,4 +1,5 @@
 #!/bin/bash
+# SPDX-License-Identifier: MIT
 # The documents' recipes, run as they stand, and their links. Prints TAP. $SCANHEAD: the program of the build under test.
 #
 #   check_recipes.sh [DOCUMENT...]      default: every .md below the root of the tree

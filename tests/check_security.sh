@@ -1,4 +1,5 @@
 #!/bin/bash
+# SPDX-License-Identifier: MIT
 # Each test that the section Security of firmware_sim/README.md names is there, the case in it, too. Prints TAP.
 set -u
 cd "$(dirname "$0")/.." || exit 1

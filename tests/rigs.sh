@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: MIT
 # Which rigs a test program is linked with: those whose headers it includes, directly or not. Prints PROGRAM:SOURCE for
 # each, without folders of its own choosing: `#include "tests/unit/cast_rig.h"` links tests/unit/cast_rig.c, if there is one.
 # The Makefile calls this; what lies in tests/common and tests/bench is a library and not listed.

@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: MIT
 # Runs the tests that make has built: sh tests/run_all.sh BUILD [unit|wire|accuracy|stability|guest]. Without a part all of
 # them: the unit tests with the sanitizers in, and those that make built as shipped once more. Ends with one line of counts.
 #
@@ -48,7 +49,7 @@ fi
 if wanted unit; then set -- "$@" +tests/check_recipes.sh; fi
 if wanted accuracy; then set -- "$@" $(programs accuracy); fi
 if wanted stability; then set -- "$@" $(programs stability); fi
-if wanted unit; then set -- "$@" tests/check_includes.sh tests/check_make.sh tests/check_mutants.sh tests/check_security.sh tests/check_manual.sh $(ls tests/check_page_*.sh) $(programs unit); fi
+if wanted unit; then set -- "$@" tests/check_includes.sh tests/check_format.sh tests/check_make.sh tests/check_mutants.sh tests/check_security.sh tests/check_manual.sh $(ls tests/check_page_*.sh) $(programs unit); fi
 if [ -z "$part" ]; then
     export FUZZ_BUILD="$build/asan" JOBS=1
     export TSAN_HEAD="$build/tsan_short/tsan_head"

@@ -1,4 +1,5 @@
 #!/bin/bash
+# SPDX-License-Identifier: MIT
 # Runs test programs that print TAP (cmocka programs, scripts) and adds up.
 #
 #   run_tap.sh [-t SECONDS] [-j N] PROGRAM... [--M PROGRAM...] [-- PROGRAM...]

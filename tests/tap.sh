@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # For scripts that print TAP; to be sourced, with the folder $work. It ends with the plan: echo "1..$tests".
 tests=0
 

@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: MIT
 # A campaign by GNU parallel: so many shards at a time, on this machine or on several; then all files checked.
 #
 #   sh parallel.sh CONFIG -o DIR [options of scanhead batch]

@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: MIT
 # A campaign as a Slurm array: each task is one shard.
 #
 #   sbatch --array=1-16 slurm.sh CONFIG -o DIR [options of scanhead batch]

@@ -1,4 +1,5 @@
 #!/bin/bash
+# SPDX-License-Identifier: MIT
 # The packages in a new root of Debian 12: installed by apt, tried, removed, purged; nothing may be left. Run by make
 # deb-check. Prints TAP, lintian's output, and what of systemd can be looked at without booting.
 #

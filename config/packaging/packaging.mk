@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # make deb: packages for Debian, in build/deb. make deb-check: installs, tries and removes them in a new root (needs root).
 DEPS_DEB = debhelper fakeroot lintian
 DEPS_DEB_CHECK = mmdebstrap systemd-container

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A cloud's memory, and which reader a file gets. */
 #include <stdio.h>
 #include <stdlib.h>

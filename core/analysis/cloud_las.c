@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* LAS 1.2 to 1.4 (ASPRS), point formats 0 to 10, not compressed. */
 #include "core/analysis/cloud_readers.h"
 #include "core/infile.h"

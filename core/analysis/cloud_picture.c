@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/cloud_picture.h"
 
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Points from a PLY file. */
 #include <math.h>
 #include <stdio.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to core/analysis: the readers that cloud_read chooses from. In: the path of a PLY or LAS file. Out:
  * its points in the file's coordinates, with station, label and echo where the file has them. */
 #ifndef CORE_ANALYSIS_CLOUD_READERS_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Deviations along the beam; definitions in core/deviation.h. */
 #include "core/deviation.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The sigma and the bound expected of a point, by noise and counts; formulas in core/deviation.h. */
 #include <math.h>
 

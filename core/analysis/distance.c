@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Distance to the scene by Embree's point query.
  *
  * Rounding. Embree sees v' = float(v - c) and q' = float(q - c), c the centre of the bounds. With h the

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Figures by group; times and echoes. */
 #include "core/figures.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* How dense points lie: cells of surfaces in a hash table. */
 #include <math.h>
 #include <stdlib.h>

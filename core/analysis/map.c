@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/map.h"
 
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to core/analysis: the parts of the map. Points (prcs, metres) make pixels (map.c); pixels make an
  * image (map_draw.c), with labels where they find room (map_labels.c). */
 #ifndef CORE_ANALYSIS_MAP_INSIDE_H

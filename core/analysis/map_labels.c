@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Where the labels of stations stand. Each one tries places about its station, the nearest first, and takes the one
  * that costs least: it must lie in the map, cover no other label and no station, and should cover few walls. */
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Places as an image: colour, light, and the mean of a pixel's places. */
 #include <math.h>
 #include <stdlib.h>

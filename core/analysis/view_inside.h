@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to core/analysis: the parts of the view. Points make places (view.c); places make an image (view_draw.c,
  * view_shade.c). */
 #ifndef CORE_ANALYSIS_VIEW_INSIDE_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What stands beside a view: stations and the legend. */
 #include <math.h>
 #include <stdio.h>

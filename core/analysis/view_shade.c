@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Depths as surfaces, and light on them. */
 #include <math.h>
 #include <stdlib.h>

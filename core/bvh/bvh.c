@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Makes a BVH: the leaves, Embree's tree of them, the planes. */
 #include "core/bvh/bvh_inside.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to core/bvh: leaves that decide in double, and Embree, which finds the leaves.
  *
  * Meeting a triangle. A leaf has one or two triangles, with its corners in double. Seen from the origin o of a ray, a

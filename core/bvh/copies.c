@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Copies of meshes in a BVH: a packet that reaches one is cast in the mesh's own frame. bvh_inside.h says why that is
  * exact. */
 #include <math.h>

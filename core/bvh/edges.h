@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to core/bvh: on which side of a triangle's edges a ray passes, and how near, in double. Corners are relative
  * to the ray's origin. */
 #ifndef CORE_BVH_EDGES_H

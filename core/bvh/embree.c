@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/embree.h"
 
 #include <stdio.h>

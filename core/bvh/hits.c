@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Exact hits of rays, chunk by chunk. */
 #include <math.h>
 #include <stdlib.h>

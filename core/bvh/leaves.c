@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Leaves: two triangles that share an edge go to one, where their common box is smaller than the two of their own. */
 #include <math.h>
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A packet at a leaf, in double: which rays meet its triangles, and how far. bvh_inside.h says by which rules. */
 #include <math.h>
 

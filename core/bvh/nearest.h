@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to core/bvh: the nearest hit of a ray so far, and those that count as the same. */
 #ifndef CORE_BVH_NEAREST_H
 #define CORE_BVH_NEAREST_H

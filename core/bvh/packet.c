@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Rays into Embree, in packets of 4, 8 or 16, or one by one. */
 #include <math.h>
 

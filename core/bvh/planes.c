@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Planes of triangles in double: ranges, labels and steepness from them. Loops over arrays that compilers turn into
  * vectors. */
 #include <math.h>

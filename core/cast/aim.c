@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Where the beams of a chunk go and begin, and where the head believes that they go. */
 #include <string.h>
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to core/cast/kernels*.c: what their loops over directions have in common. */
 #ifndef CORE_CAST_AIM_INLINE_H
 #define CORE_CAST_AIM_INLINE_H

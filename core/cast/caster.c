@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The way of a pulse, from its place in the schedule to a point. cast_chunk has the stages in their order:
  *
  *     aim        aim.c            angles -> where the beam goes and begins, and what the encoders read of it

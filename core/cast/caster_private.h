@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to core/cast: the working memory of one thread, and the stages of a pulse, which share it. */
 #ifndef CORE_CAST_CASTER_PRIVATE_H
 #define CORE_CAST_CASTER_PRIVATE_H

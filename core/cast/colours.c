@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Colours of echoes, as they are to be sent. Those of textures came along with the hits. */
 #include "core/colour.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a chunk's pulses met -> echoes as the head reports them: which are seen, how they merge, which a pulse
  * sends, and their noise. One list, for single rays, footprints, and what glass and mirrors show. */
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/cast/kernels.h"
 
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to core/cast: the arithmetic around the cast, as loops over arrays that compilers turn into
  * vectors. */
 #ifndef CORE_CAST_KERNELS_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Pulses of a moving head: each turned and placed by the pose of its own time, as pose_between has it. */
 #include <math.h>
 

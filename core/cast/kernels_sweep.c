@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Directions of a run whose axes turn evenly, by the addition theorems: sine and cosine are worked out where blocks of
  * a line have their middle, and turned from there by whole steps, whose sines are in a table. Blocks are counted from
  * the line's first pulse. So a pulse's direction depends on nothing but its place in the line, however runs are cut.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What pulses meet, with the triangles: the first stages of a pulse (caster.c), and of the echoes only whether there
  * is one. */
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What the rays of a chunk meet first: the scene that stands still, the bodies that move in it, the tripod's legs. */
 #include <math.h>
 #include <string.h>

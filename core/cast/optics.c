@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Through glass and off mirrors: only rays that meet such a surface are cast again, together. */
 #include <math.h>
 #include <string.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Outlines, looked at by casting. */
 #include <string.h>
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Echoes -> points, as entries of the block: the one writer, for single rays and for pulses of several
  * echoes. */
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Which sub-rays a pulse gets, and where in its footprint. */
 #include <math.h>
 #include <string.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Pulses with a footprint: central hits, and where they are not all, sub-rays -> echoes. */
 #include <math.h>
 #include <stdlib.h>

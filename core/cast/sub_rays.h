@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to core/cast/sub_ray*.c: working memory for pulses with a footprint. */
 #ifndef CORE_CAST_SUB_RAYS_H
 #define CORE_CAST_SUB_RAYS_H

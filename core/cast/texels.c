@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Where on a texture, or between which vertices, rays have met a mesh. */
 #include <math.h>
 

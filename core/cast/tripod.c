@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What the head's tripod hides below it: a cone about the plumb line, whose opening is that of the legs. */
 #include <math.h>
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What has gone wrong with the head, and changes what it measures. */
 #include <math.h>
 

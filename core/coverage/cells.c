@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The surface as cells: cutting triangles, and which pieces are one cell. */
 #include <math.h>
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/coverage/cut.h"
 
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to core/coverage: a triangle cut into pieces of a size. In: its corners, the size. Out: how many pieces there
  * are, the one that a point lies in, its corners, and its share of the area.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Sums over cells. */
 #include <math.h>
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What heads at other places would see that no station has seen. */
 #include <math.h>
 #include <pthread.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to core/coverage: cells, the pieces that they are made of, and what has been met of each. */
 #ifndef CORE_COVERAGE_INSIDE_H
 #define CORE_COVERAGE_INSIDE_H

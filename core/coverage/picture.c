@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The cells as a coloured mesh. */
 #include <math.h>
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Figures of a beam, and patterns of sub-rays. */
 #include "core/footprint.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Outlines across a footprint. */
 #include <math.h>
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The parts that outlines cut a footprint into. */
 #include <math.h>
 #include <string.h>

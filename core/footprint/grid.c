@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Outlines by direction: every cell that a footprint can reach an edge from knows it. */
 #include <math.h>
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Returns -> echoes. */
 #include <math.h>
 #include <string.h>

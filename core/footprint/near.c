@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Pulses that outlines are near to, by the cells of their directions. */
 #include <math.h>
 #include <string.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to core/footprint: outlines of a scene from a station, and the cells of direction that lead to
  * them.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Which stretches of an outline are steps that can be seen, or the end of a kind of surface. */
 #include <math.h>
 #include <string.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Which edges of a mesh are outlines, seen from a station.
  *
  * An edge and the station span a plane. With triangles on both sides of it, the surface goes on beyond the

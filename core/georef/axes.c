@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The rotation in the map at its centre. */
 #include <math.h>
 #include <string.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/georef/geographiclib_shim.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What we use of GeographicLib, for C, beside georef_geodetic and georef_geoid_free. Only the files of
  * core/georef include this. Angles are in degrees, lengths in metres. No exception crosses: each becomes a
  * text, or NaN. */

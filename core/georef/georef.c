@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/georef.h"
 
 #include <math.h>

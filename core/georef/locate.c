@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Places on WGS 84 from and to other systems, one at a time. */
 #include "core/locate.h"
 

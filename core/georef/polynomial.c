@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The map as a polynomial: fit and bound.
  *
  * Fit. The map is taken by GeographicLib at 7 x 7 x 7 Chebyshev nodes of a cube about the centre and

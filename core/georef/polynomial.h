@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The map's Taylor polynomial about its centre, in the form whose series settles fastest. Used within
  * core/georef. In: differences in prcs from the centre (metres). Out: differences from the anchor, in units
  * of the CRS.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/georef/polynomial_kernels.h"
 
 POLYNOMIAL_KERNELS(VEC_CLONES, native)

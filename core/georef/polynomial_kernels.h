@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The loops that evaluate polynomials, as a macro: the program has them in clones for the CPU at hand
  * (polynomial_apply.c), the chart once for each width of vectors (tests/bench). */
 #ifndef CORE_GEOREF_POLYNOMIAL_KERNELS_H

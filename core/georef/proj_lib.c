@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/georef/proj_lib.h"
 
 #include <dlfcn.h>

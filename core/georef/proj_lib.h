@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* PROJ, loaded once somebody asks for a grid. Its libraries, curl and all that curl needs, take longer to load than all
  * others of the head together, and few scenes lie in a grid.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Counts on the wire: how much of the CRS's unit one is. */
 #include <math.h>
 

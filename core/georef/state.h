@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to core/georef: what a georef consists of. georef.c fills it; axes.c and scale.c read it. Lengths
  * are in metres, positions in prcs or in units of the CRS. */
 #ifndef CORE_GEOREF_STATE_H

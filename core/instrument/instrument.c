@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/instrument.h"
 
 #include <math.h>

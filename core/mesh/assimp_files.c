@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/mesh/assimp_files.h"
 
 #include <errno.h>

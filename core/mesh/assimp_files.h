@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to this room: the files that Assimp's exporter opens. They are ours, of one output (inside.h). */
 #ifndef CORE_MESH_ASSIMP_FILES_H
 #define CORE_MESH_ASSIMP_FILES_H

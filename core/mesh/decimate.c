@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Vertex clustering; core/decimate.h has the definitions. */
 #include "core/decimate.h"
 

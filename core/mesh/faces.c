@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What is made of triangles, whichever they are: normals, the points in use, points spread over them. */
 #include <math.h>
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What Assimp 5.2 writes as binary FBX lacks the empty node that ends each list of nodes: neither Blender nor Assimp
  * itself reads it. Here the nodes are copied, each list with its end, and the ends that nodes name are moved on by that.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Triangles of a scan's grid. First all triangles; then the mean of their edges; then the filter.
  *
  * Each edge counts once. Diagonals belong to one cell. An edge along a column, and one across two columns, borders on two

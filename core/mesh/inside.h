@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What the formats of this room share: a file that is being written, and the table of formats. */
 #ifndef CORE_MESH_INSIDE_H
 #define CORE_MESH_INSIDE_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/mesh.h"
 
 #include <math.h>

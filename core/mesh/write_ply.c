@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* .ply: little-endian, or text. Vertices, then faces. */
 #include <math.h>
 #include <string.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The font's strokes. Drawn by hand on a grid: capitals are 28 high, small letters 20, descenders go to -8. */
 #include "core/picture/inside.h"
 

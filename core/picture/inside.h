@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to core/picture: glyphs and encoders. */
 #ifndef CORE_PICTURE_INSIDE_H
 #define CORE_PICTURE_INSIDE_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* An image, colours and the few marks pictures need. */
 #include "core/picture.h"
 

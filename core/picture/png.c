@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* An image as a PNG, and files that appear whole. */
 #include <errno.h>
 #include <png.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* SVG 1.1: a text that grows in memory, written at the end. Numbers don't depend on the locale. */
 #include <math.h>
 #include <stdlib.h>

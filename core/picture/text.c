@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Text: UTF-8 -> strokes -> pixels by their distance from the strokes. */
 #include <math.h>
 #include <stdlib.h>

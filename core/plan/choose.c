@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Which of several options. */
 #include <math.h>
 #include <stdio.h>

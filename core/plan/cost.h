@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What methods cost: rounded ns of one core, to compare methods by. To get them again: `make bench-beam`
  * measures single rays, sub-rays and the adaptive beam (house, wires, foliage), `make bench` stages, `make
  * chart` ways to georeference. Sub-rays cost 65 ns in a house and 105 ns among leaves, a pulse that outlines

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* How points get into the CRS. */
 #include "core/plan.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Rows of the stages about which there is little to choose. */
 #include "core/plan.h"
 

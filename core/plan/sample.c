@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Pulses of the head, drawn by chance, cast with a method and with the reference. */
 #include <math.h>
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Whether a map of what the station sees pays. */
 #include <math.h>
 #include <stdio.h>

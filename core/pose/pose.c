@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Attitudes, and what lies between two poses. */
 #include "core/pose.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Samples over time -> the pose at any time, and the knots that a scan uses. */
 #include <math.h>
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to core/pose: what a trajectory consists of. In: samples (seconds, poses in prcs, metres), which
  * trajectory_files.c reads. Out: the struct from which trajectory.c makes the curve and its knots. */
 #ifndef CORE_POSE_TRAJECTORY_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Trajectories from files: samples, and way-points. */
 #include <math.h>
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Whether a body is closed, by integrals along its edges.
  *
  * A body is closed where the edges of its triangles, each with its direction, cancel. By Stokes the sum of any field's

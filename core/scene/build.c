@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/scene/build.h"
 
 #include <math.h>

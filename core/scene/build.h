@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* How the readers make a scene: vertices and faces go in file by file, in file coordinates, and the builder
  * turns, scales, shifts, checks, cuts polygons up, names surfaces and counts what was left out. */
 #ifndef CORE_SCENE_BUILD_H

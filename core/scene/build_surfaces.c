@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Surfaces of the scene that is being built: labels, names, textures. */
 #include "core/scene/build.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A mesh that stands in a scene many times: its triangles are kept once, or written out for each of its places. */
 #include <math.h>
 #include <stdio.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Holes that textures cut out of surfaces, and what lies where on a texture. */
 #include <math.h>
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Files that a mesh or its library names, where they are now. Many names come from other machines: with \ for /, with
  * folders that are not here, or in another case. */
 #include <dirent.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to core/scene: the outline of a mesh seen from above, and the bounds of its copies. */
 #ifndef CORE_SCENE_HULL_H
 #define CORE_SCENE_HULL_H

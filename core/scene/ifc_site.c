@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/ifc_site.h"
 
 #include <math.h>

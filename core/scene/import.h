@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Import apart. Assimp and the readers of IFC crash, hang or take all memory on some broken files; so each, and the readers
  * of glTF and GeoTIFF, which call decoders of others, reads in a process of its own, with limits, and what it gives is checked before it is used.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/geotiff.h"
 #include "core/import/geotiff/geotiff_read.h"
 #include "core/import/gltf/gltf_read.h"

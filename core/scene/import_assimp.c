@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* glTF 1.0 and Draco, FBX, Collada, and IFC where its readers are not installed, through Assimp's C interface, node tree and all.
  *
  * No post-processing: polygons are cut by our own triangulation, and node transforms are applied in double,

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The process that reads: limits first, then the work, then the scene into the file of the task.
  *
  * For all but IFC it is a fork without exec, perhaps of a process with threads, of which only this one is left. glibc lets

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/scene/import_material.h"
 
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to core/scene/import_*.c and core/import: materials of Assimp -> colour and textures of a surface. */
 #ifndef CORE_SCENE_IMPORT_MATERIAL_H
 #define CORE_SCENE_IMPORT_MATERIAL_H

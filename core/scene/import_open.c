@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/scene/import_open.h"
 
 #include <stdio.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Files as Assimp opens them while it imports: the mesh, and what it names (buffers of a glTF, ...). Only regular files, as
  * core/infile.h has it: a FIFO would be waited for. */
 #ifndef CORE_SCENE_IMPORT_OPEN_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A scene as a file in memory, between two processes: head, textures, surfaces, vertices, triangles, labels,
  * texture coordinates, colours, one array after the other. Read by pread, not mapped: each value is checked where it
  * then stays, and a file that has got shorter is an error of read. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Which formats define unit and axes: core/scene.h has the list. FBX says them in its global settings, which
  * Assimp hands on as metadata; what newer ones apply of them is taken back (import_assimp.c). */
 #include "core/scene/import_says.h"

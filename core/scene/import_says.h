@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Unit and axes of an imported file, as it comes out of Assimp: some formats define them, some files say
  * them. */
 #ifndef CORE_SCENE_IMPORT_SAYS_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A scene without some of its surfaces. */
 #include <math.h>
 #include <stdlib.h>

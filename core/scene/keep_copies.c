@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Copies without some of their surfaces. */
 #include <math.h>
 #include <stdlib.h>

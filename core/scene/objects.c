@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Figures of objects: each mesh is cut into those parts of it that are of one object, and each part is measured once,
  * however many copies of it there are. */
 #include "core/scene_objects.h"

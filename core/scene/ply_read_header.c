@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/ply.h"
 
 #include <string.h>

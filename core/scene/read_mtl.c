@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The material libraries of an OBJ file: newmtl; Kd, the diffuse colour; d or Tr, its opacity; map_Kd, its texture; map_d,
  * what cuts holes. The rest is ignored. */
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Wavefront OBJ in double: v with its colour, f, o, g, usemtl, mtllib. Points and lines are counted; what has no shape is
  * ignored. */
 #include <math.h>

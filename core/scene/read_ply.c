@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* PLY in double: ASCII and binary of either byte order, any types, polygons and strips. One surface per file, or per
  * texture where it has several. Colours and textures: read_ply_colours.c. */
 #include "core/scene/read_ply.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to core/scene/read_ply*.c: a PLY mesh while it is read. */
 #ifndef CORE_SCENE_READ_PLY_H
 #define CORE_SCENE_READ_PLY_H

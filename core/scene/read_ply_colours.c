@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Colours and textures of a PLY mesh: red, green and blue of vertices or faces; textures by `comment TextureFile`, with
  * texture coordinates by vertex, or by face in a list texcoord. texnumber says which of several textures a face has. */
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* STL, text and binary, in double. A binary is told by its size, 84 + 50 bytes a triangle: many begin with "solid", too.
  * Normals are left alone: the order of the corners says which side is out. */
 #include <math.h>

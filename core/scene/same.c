@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Vertices at the same place. */
 #include <stdlib.h>
 #include <string.h>

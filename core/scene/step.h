@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Records of a STEP file (ISO 10303-21): #id= TYPE(arguments); in memory, found by type or number. */
 #ifndef CORE_SCENE_STEP_H
 #define CORE_SCENE_STEP_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/scene/triangulate.h"
 
 #include <math.h>

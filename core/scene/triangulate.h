@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Polygons -> triangles by ear clipping, in double.
  *
  * The polygon is projected along the largest axis of its Newell normal. Points that lie on an edge keep their

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Faces that stand in a mesh twice. */
 #include <stdlib.h>
 #include <string.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Where a file has vertices for each triangle, those at the same place, bit for bit, become one. */
 #include <stdlib.h>
 #include <string.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Copies as triangles of the scene, for tools that need plain ones. Each triangle keeps its number. */
 #include <math.h>
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Where mirror and pan are at a pulse: for runs that are cast, and for the encoders. */
 #include <string.h>
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Lists of directions for a head that fires along them. */
 #include <math.h>
 #include <stdlib.h>

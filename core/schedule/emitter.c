@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/emitter.h"
 
 #include <stdio.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/schedule/schedule_inside.h"
 
 #include <string.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to this folder: pulses and ticks, lines and places of a segment.
  *
  * A tick is seg->tick_num / seg->tick_den nanoseconds. Without a firing table each tick has a pulse; with one,

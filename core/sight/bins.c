@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Which triangles may be seen in which region. */
 #include <math.h>
 #include <stdlib.h>

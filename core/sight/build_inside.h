@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to core/sight: how a sight is made.
  *
  * Triangles are sorted into regions, squares of cells on the faces (bins.c). Each region is then divided as

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The figures of a triangle as seen from the station: where it is, how far, and how well that is known. */
 #include <math.h>
 #include <stdlib.h>

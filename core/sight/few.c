@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Rays decided among a few triangles, by rules that sight_inside.h explains: four rays of a list at a time. */
 #include <math.h>
 #include <string.h>

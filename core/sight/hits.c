@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Rays looked up in the map, a chunk at a time. */
 #include <stdlib.h>
 #include <string.h>

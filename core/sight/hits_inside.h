@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to core/sight: how rays are looked up. Neighbours share a leaf, mostly: rays are cut into runs of one leaf,
  * and what a leaf says is done for a run at a time. */
 #ifndef CORE_SIGHT_HITS_INSIDE_H

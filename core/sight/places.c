@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Where rays lie on the cube, and which leaves are there. */
 #include <math.h>
 #include <string.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to core/sight: four doubles at a time, by hand, where compilers leave a loop as it is. Vectors go by address:
  * compilers warn of a changed way to pass them where there is no AVX. */
 #ifndef CORE_SIGHT_QUAD_H

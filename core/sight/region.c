@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A region, divided until its squares are leaves. */
 #include <math.h>
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A sight: made by several threads, region by region, and given back. */
 #include <math.h>
 #include <pthread.h>

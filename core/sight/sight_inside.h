@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to core/sight: the map of directions, and the triangles that rays of it are decided among.
  *
  * A direction d belongs to the face of the cube that its largest component points through: face

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Places above floors. */
 #include <math.h>
 #include <stdlib.h>

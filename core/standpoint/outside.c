@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Places around the scene, from which it is looked at. */
 #include <math.h>
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Places on a grid where a tripod can stand. */
 #include <math.h>
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A scene under survey, and bundles of rays in it. */
 #include <math.h>
 #include <string.h>

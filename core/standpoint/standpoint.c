@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The order of the three kinds. */
 #include "core/standpoint.h"
 

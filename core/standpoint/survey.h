@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to this folder: the scene that is looked at, and bundles of rays in it. */
 #ifndef CORE_STANDPOINT_SURVEY_H
 #define CORE_STANDPOINT_SURVEY_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Colours of surfaces: their textures as they are, texel by texel. */
 #include <math.h>
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/surface.h"
 
 #include <fnmatch.h>

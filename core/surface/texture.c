@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/surface/texture.h"
 
 #include <math.h>

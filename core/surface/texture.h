@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to core/surface: images that hold the reflectance. In: sRGB values 0 to 1, a table with textures.
  * Out: linear values; the textures freed. */
 #ifndef CORE_SURFACE_TEXTURE_H

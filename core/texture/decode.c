@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Images through stb_image, and WebP through libwebp, in memory that is counted: what a hostile file asks for has a limit. */
 #include "core/texture.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Which texel lies at a coordinate, and masks of holes. */
 #include <math.h>
 #include <stdlib.h>

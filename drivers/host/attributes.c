@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What comes beside the points: attributes and colour of each, sums of each line. */
 #include <math.h>
 

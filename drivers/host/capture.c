@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Recordings as pcapng: the packets of link type 147 (drivers/protocol/pcapng.h) are the stream, one after the other.
  *
  * What follows a block that is cut or damaged goes to the parser as it is. It finds the frames in it, and counts the
@@ -14,8 +15,8 @@ struct host_capture {
     struct pcapng_reader reader;
     size_t start, end; /* of what was read and not taken */
     const uint8_t *data;
-    size_t data_len;  /* of a packet: what was not handed on yet */
-    int is_raw;       /* no blocks any more */
+    size_t data_len; /* of a packet: what was not handed on yet */
+    int is_raw;      /* no blocks any more */
     uint8_t buf[4 * NATIVE_MAX_FRAME];
 };
 
@@ -46,7 +47,8 @@ static int next_packet(struct host_source *source)
     struct sh_err unsaid;
     for (;;) {
         size_t used, needed;
-        const int item = pcapng_read(&c->reader, c->buf + c->start, c->end - c->start, &packet, &used, &needed, &unsaid);
+        const int item =
+            pcapng_read(&c->reader, c->buf + c->start, c->end - c->start, &packet, &used, &needed, &unsaid);
         c->start += used;
         if (item == PCAPNG_PACKET && packet.link == PCAPNG_USER0 && packet.len != 0) {
             c->data = packet.data;

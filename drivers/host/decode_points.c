@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Points of a frame as doubles. The hot path of every recorder. */
 #include <math.h>
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* One command line out, one reply line back, while frames go on coming. */
 #include <errno.h>
 #include <poll.h>

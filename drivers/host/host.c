@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/host/host.h"
 
 #include <stdio.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A scanhead handle's own struct and what the files of this folder share. Private to libscanhead. */
 #ifndef DRIVERS_HOST_HOST_H
 #define DRIVERS_HOST_HOST_H

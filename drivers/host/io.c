@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Bytes in: waiting and reading, with deadlines on the monotonic clock; and the sources that are
  * descriptors. */
 #include <errno.h>

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # scanhead.h -> libscanhead.3: the header's first comment, then each declaration with the comment before it.
 #   awk -f drivers/host/libscanhead.3.awk drivers/host/scanhead.h
 # All of it stays as it is written: the header is made to be read.
@@ -12,12 +13,12 @@ function put(text) {
     print text
 }
 /^#define SCANHEAD_VERSION / { version = $3; gsub(/"/, "", version) }
-{ line[NR] = $0 }
+!/SPDX-License-Identifier/ { line[++n] = $0 }
 END {
     print ".TH LIBSCANHEAD 3 \"\" \"scanhead " version "\"\n.SH NAME\nlibscanhead \\- client of a laser scanner head"
     print ".SH SYNOPSIS\n.nf\n\\fB#include <scanhead.h>\\fR"
     print "cc client.c $(pkg\\-config \\-\\-cflags \\-\\-libs libscanhead)\n.fi\n.SH DESCRIPTION\n.nf"
-    for (i = 1; i <= NR && line[i] !~ /^#ifndef/; i++) {
+    for (i = 1; i <= n && line[i] !~ /^#ifndef/; i++) {
         text = line[i]
         sub(/^\/\* /, "", text)
         sub(/^ \* ?/, "", text)
@@ -25,7 +26,7 @@ END {
         put(text)
     }
     print ".fi\n.SH DECLARATIONS\n.nf"
-    for (; i <= NR; i++) {
+    for (; i <= n; i++) {
         if (line[i] ~ /^#ifdef __cplusplus/) { i += 2; continue }
         if (line[i] ~ /^#(ifndef|endif|include|define SCANHEAD_H$)/) continue
         if (line[i] != "" || last != "") put(line[i])

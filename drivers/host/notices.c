@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What is wrong with the stream, as it is found: from the parser, the exchange of lines and the connection to whoever
  * listens. */
 #include <string.h>

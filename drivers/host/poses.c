@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Poses of a moving head: kept for a while, and points taken to the scene with them. */
 #include <math.h>
 #include <stdlib.h>

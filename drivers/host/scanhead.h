@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* libscanhead: the client side of a scan head. It connects, sends commands, and hands out frames and points.
  *
  * The stream is the native protocol (drivers/protocol/PROTOCOL.md). `make install` installs this header. It

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Sources by name: usb..., tty:PATH, tcp:HOST:PORT, fd:N, or the path of a recorded stream (.shs, .pcapng). */
 #include <errno.h>
 #include <fcntl.h>
@@ -20,9 +21,10 @@ enum { CONNECT_TIMEOUT_MS = 10000, RECEIVE_BUFFER = 4 << 20 };
 
 static int fail_open(struct sh_err *err, int code, const char *name)
 {
-    return sh_fail(err, code,
-                   "%s: cannot open: %s (a source is usb, tty:PATH, tcp:HOST:PORT, fd:N or the path of a .shs or .pcapng file)",
-                   name, strerror(errno));
+    return sh_fail(
+        err, code,
+        "%s: cannot open: %s (a source is usb, tty:PATH, tcp:HOST:PORT, fd:N or the path of a .shs or .pcapng file)",
+        name, strerror(errno));
 }
 
 static int open_tty(const char *path, struct host_source *out, struct sh_err *err)

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What the stream says of itself: descriptor, anchor, names, losses, hash. */
 #include <math.h>
 #include <stdlib.h>

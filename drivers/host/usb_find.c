@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Which of the USB devices are heads, and the one that is wanted. */
 #include <ctype.h>
 #include <stdio.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The head as a USB device: finding it, and its vendor interface as a source of bytes, over libusb.
  *
  * The vendor interface has class, subclass and protocol FF/53/48 and one bulk pair: the native stream comes

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Source of bytes: the bulk pair of the head's vendor interface.
  *
  * Several reads are always under way, so that the bus never waits for this program: a ring of transfers,

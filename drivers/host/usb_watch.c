@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Waiting for a head to be plugged in: the system's hot-plug events, where it has them. */
 #include <stdlib.h>
 #include <time.h>

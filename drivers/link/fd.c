@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The fd link: one session over a connected stream socket that somebody else made (socketpair). The
  * descriptor's flags are left alone, since the other holder of a shared description would see them change. */
 #include <errno.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The file link: one session, the stream as it is into a file.
  *
  * Regular files and character devices (/dev/null, /dev/full) are taken; a directory, a FIFO or a socket is

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Links: how bytes of the head get to the world, and back. A link knows nothing of frames or protocols.
  *
  * A kind of link is one file of this folder with one `const struct link_ops`, whose members are the contract;

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/link/link_poll.h"
 
 #include <errno.h>

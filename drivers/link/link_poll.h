@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What the poll functions of the links share: the events that are being filled in, the wait, the wake-up.
  * Private. */
 #ifndef DRIVERS_LINK_LINK_POLL_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The null link: one session that swallows everything. For benchmarks, and the skeleton for new links. */
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The pty link: one session, a virtual serial port that clients open and close as they like.
  *
  * When does a session begin and end? The kernel offers two signals, each with a weakness:

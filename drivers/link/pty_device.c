@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/link/pty_device.h"
 
 #include <errno.h>

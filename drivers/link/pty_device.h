@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The terminal of the pty link: the pair, its resting state and the symlink to its slave. Private to the
  * link. */
 #ifndef DRIVERS_LINK_PTY_DEVICE_H

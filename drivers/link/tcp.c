@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The TCP link: a listener and up to max_sessions clients.
  *
  * A session is over when its peer resets, takes no more, or vanishes (keep-alive, about 25 s). A peer that shuts down

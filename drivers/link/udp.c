@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The UDP link: one session, open from the start. Each write is one datagram to the receiver.
  *
  * Unicast to any address; broadcast only from an interface that the configuration names, to that interface's own

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The usb link: the head as a USB device, with the sessions of its look (drivers/usb/looks.h): console and stream,
  * or one alone.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The web link: the page and its owner's resources by HTTP, the stream and commands by WebSocket, on one port.
  *
  * A session is a WebSocket at /ws. What the owner writes in one call goes out as one message: text where its first byte

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a web link serves besides the page's own files: resources of its owner, by path. */
 #ifndef DRIVERS_LINK_WEB_H
 #define DRIVERS_LINK_WEB_H

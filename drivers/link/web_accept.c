@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Connections until their first request is whole. It is judged here as it comes, without taking it out of the socket: what
  * is wrong is answered at its first wrong byte, and libwebsockets never meets it. For a right one libwebsockets gets a
  * request that is made anew, with what it needs alone: it closes without a word where there are more fields or arguments

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Answers by HTTP, and their way out in pieces. One request, one connection: it ends with its first answer. */
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to web*.c: a web link, its connections and sessions. */
 #ifndef DRIVERS_LINK_WEB_INSIDE_H
 #define DRIVERS_LINK_WEB_INSIDE_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/link/web_pages.h"
 
 #include <string.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The page's own files, as they stand in the folder web, built into the program. Private to the web link. */
 #ifndef DRIVERS_LINK_WEB_PAGES_H
 #define DRIVERS_LINK_WEB_PAGES_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/link/web_places.h"
 
 #include <netinet/in.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Who holds the connections of a web link, and who makes room for one more. Private to the web link.
  *
  * Pure; times are of one clock, in ms. */

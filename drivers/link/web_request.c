@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Reads a request of the web link, and decides whether its client may ask it. */
 #include <arpa/inet.h>
 #include <stdio.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Little-endian loads and stores at any alignment. One instruction each on little-endian machines. */
 #ifndef DRIVERS_PROTOCOL_BYTES_H
 #define DRIVERS_PROTOCOL_BYTES_H

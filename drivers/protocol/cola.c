@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* SICK CoLa-A and CoLa-B (SOPAS): TiM5xx, TiM7xx, LMS1xx. COLA.md is its page. */
 #include <stdlib.h>
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/protocol/cola_clock.h"
 
 #define SECOND_NS INT64_C(1000000000)

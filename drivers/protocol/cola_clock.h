@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Calendar dates of the clock that a scanner shows: ns since 1970-01-01, no leap seconds. Pure. */
 #ifndef DRIVERS_PROTOCOL_COLA_CLOCK_H
 #define DRIVERS_PROTOCOL_COLA_CLOCK_H

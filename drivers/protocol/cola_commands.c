@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Requests of CoLa by name. One table: what exists, who may do it, which function does it. */
 #include <stdio.h>
 #include <string.h>

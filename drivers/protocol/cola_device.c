@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Identity, states, log-in and clock. */
 #include <stdio.h>
 #include <string.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* LMPscancfg and mLMPsetscancfg: line rate and step. They are the head's, so all its readers see another one. */
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The telegram LMDscandata; COLA.md draws it. Both forms are this one sequence of values. */
 #include <math.h>
 #include <string.h>

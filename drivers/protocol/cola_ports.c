@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Fields, inputs and outputs. None is active; what is read says so, in the form that the scanner has. COLA.md draws it.
  */
 #include <stdio.h>

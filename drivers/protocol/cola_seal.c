@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* LMDscandata whose values are changed, and whose check byte is made right again. COLA.md draws the telegram. */
 #include <string.h>
 

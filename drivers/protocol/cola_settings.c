@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a client sets and asks for the measurement. */
 #include <stdio.h>
 #include <string.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* CoLa telegrams: numbers and texts of both forms, and the frames around them.
  *
  * CoLa-A:  02  sRA Name value value ...                03

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/protocol/cola_units.h"
 
 enum { TURN_E4 = 3600000, FORWARD_E4 = 900000, MOST_DISTANCE = 65535 };

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The head's geometry, rates and signals in SICK's units; COLA.md has the scales. Angles: 0 is right, 90 degrees
  * forward, counted counter-clockwise seen from above. Beam 0 has the smallest angle; beams are the places of
  * struct planar_head. Pure. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/protocol/crc32c.h"
 
 #include <pthread.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* CRC-32C (Castagnoli, reflected polynomial 0x82f63b78, initial value and final inversion 0xffffffff; RFC
  * 3720 appendix B.4): by the CPU's instruction where there is one, else by table. The check value of
  * "123456789" is 0xe3069283. Pure; any thread. */

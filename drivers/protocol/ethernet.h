@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Ethernet frames made anew around the payload of a datagram, or of a piece of a TCP stream: what a capture on the wire
  * would have, where only a socket's view is at hand.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Payloads of fixed length as tables: a row for each struct member, in wire order without gaps.
  *
  * The same table encodes and decodes, so the two can't differ. PROTOCOL.md gives the resulting offsets, and

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/protocol/http_head.h"
 
 #include <string.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The head of a request of HTTP/1.x: its lines, as RFC 9112 has them. For the web link and the settings of a VLP-16.
  *
  * In go bytes as they come from a client, out come texts within them, or the status that a broken head is answered

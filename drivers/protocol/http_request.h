@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Requests of HTTP/1.0 and 1.1 out of a stream of bytes: what a small device needs of RFC 9112, with bounded
  * memory.
  *

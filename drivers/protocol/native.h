@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The native protocol for those who read it: bytes of a stream go in, frames, reply lines and their contents
  * come out.
  *

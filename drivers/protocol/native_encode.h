@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* From the head's data to native frames: descriptor, anchor, lines, poses, names. native.h has the way back.
  *
  * Each function writes one whole frame at dst (points: as many frames as needed) and returns the length. It

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The native protocol on a link: the stream as it is, and command lines with their replies (PROTOCOL.md).
  *
  * There is no module to call. The loop copies whole ticks of frames to the client, up to millions of pulses per second,

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The sequence numbers of frames: which frame comes in order, which came already, which comes too late, and which are
  * missing. PROTOCOL.md, *Sequence numbers*, has the rules.
  *

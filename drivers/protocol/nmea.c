@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/protocol/nmea.h"
 
 #include <math.h>

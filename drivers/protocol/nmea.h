@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A GNSS fix goes in, NMEA 0183 sentences (versions 2.3 to 4.0) come out.
  *
  * A sentence is "$", talker and type, fields with commas between, "*", the XOR of all characters between "$"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The GNSS receiver on a link: after each fix its sentences (nmea.h), all of them as one unit. It takes no commands. */
 #include <stdlib.h>
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Sentences whose numbers are changed, and whose checksums are made right again. */
 #include <string.h>
 

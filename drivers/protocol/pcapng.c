@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/protocol/pcapng.h"
 
 #include <string.h>

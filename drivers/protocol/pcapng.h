@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Captures as pcapng has them (draft-ietf-opsawg-pcapng): blocks to bytes, and bytes to packets.
  *
  * In and out: bytes of a file, in pieces of any size. Times are nanoseconds. Pure: no I/O, no clock, no allocation.
@@ -19,10 +20,10 @@ enum pcapng_link {
 };
 
 enum {
-    PCAPNG_FRONT_ROOM = 512,      /* that a section, or an interface, has with its texts */
-    PCAPNG_MAX_TEXT = 160,        /* longer texts are cut */
-    PCAPNG_PACKET_HEAD = 28,      /* of a packet block, before its data */
-    PCAPNG_MAX_BLOCK = 16 << 20,  /* a longer one is no block */
+    PCAPNG_FRONT_ROOM = 512,     /* that a section, or an interface, has with its texts */
+    PCAPNG_MAX_TEXT = 160,       /* longer texts are cut */
+    PCAPNG_PACKET_HEAD = 28,     /* of a packet block, before its data */
+    PCAPNG_MAX_BLOCK = 16 << 20, /* a longer one is no block */
     PCAPNG_MAX_INTERFACES = 64,
     PCAPNG_LOST = 16,
 };
@@ -62,7 +63,7 @@ struct pcapng_packet {
     uint16_t link; /* enum pcapng_link, or another link type */
     int has_time;
     int64_t t_ns;
-    const uint8_t *data; /* within the bytes that were given */
+    const uint8_t *data;        /* within the bytes that were given */
     uint32_t len, original_len; /* original_len > len: the capture cut it */
 };
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/protocol/planar_scan.h"
 
 #include <stddef.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Native frames of a planar head go in, whole turns of it come out: the echoes of each step, and when step 0 was.
  *
  * Steps are numbered counter-clockwise seen from above, first..last; those of a head that turns clockwise are

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/protocol/protocol.h"
 
 /* The one list of protocols. A new one is a file of this folder that defines its protocol_ops, an id in protocol.h, and

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Protocols: what a head speaks on a link. Native frames of the stream, bytes from a client and device time go
  * in; units for the client and calls on the device come out.
  *

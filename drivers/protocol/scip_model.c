@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/protocol/scip_model.h"
 
 #include <stddef.h>

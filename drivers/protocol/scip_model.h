@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Hokuyo models: what a head says of itself over SCIP, and which commands it has. A row a model, in
  * scip_model.c. Geometry, ranges and speed are not here: they come from the stream. Constant data; any
  * thread. */
@@ -7,18 +8,18 @@
 #include <stdint.h>
 
 enum scip_feature {
-    SCIP_INTENSITY = 1 << 0,   /* GE ME */
-    SCIP_MULTI_ECHO = 1 << 1,  /* HD ND, and HE NE with intensity */
-    SCIP_MOTOR_SPEED = 1 << 2, /* CR; else 04 */
-    SCIP_BIT_RATE = 1 << 3,    /* SS; else 0F, as Ethernet models */
-    SCIP_REBOOT = 1 << 4,      /* RB RT */
-    SCIP_SLEEP = 1 << 5,       /* %SL */
-    SCIP_SIMULATION = 1 << 6,  /* DB; else 04 */
-    SCIP_TIME_ALONE = 1 << 7,  /* in the time mode nothing but TM is taken, and TM1 is taken only there */
-    SCIP_TIME_HEX = 1 << 8,    /* TIME of II is six hexadecimal digits; else four characters */
-    SCIP_STATE = 1 << 9,       /* %ST */
+    SCIP_INTENSITY = 1 << 0,      /* GE ME */
+    SCIP_MULTI_ECHO = 1 << 1,     /* HD ND, and HE NE with intensity */
+    SCIP_MOTOR_SPEED = 1 << 2,    /* CR; else 04 */
+    SCIP_BIT_RATE = 1 << 3,       /* SS; else 0F, as Ethernet models */
+    SCIP_REBOOT = 1 << 4,         /* RB RT */
+    SCIP_SLEEP = 1 << 5,          /* %SL */
+    SCIP_SIMULATION = 1 << 6,     /* DB; else 04 */
+    SCIP_TIME_ALONE = 1 << 7,     /* in the time mode nothing but TM is taken, and TM1 is taken only there */
+    SCIP_TIME_HEX = 1 << 8,       /* TIME of II is six hexadecimal digits; else four characters */
+    SCIP_STATE = 1 << 9,          /* %ST */
     SCIP_FIRST_AT_ONCE = 1 << 11, /* no turn is left out before the first scan of a stream */
-    SCIP_TIME_US = 1 << 10,    /* %TM %MD %ME: times in microseconds; with some firmware alone */
+    SCIP_TIME_US = 1 << 10,       /* %TM %MD %ME: times in microseconds; with some firmware alone */
 };
 
 struct scip_model {

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/protocol/scip_reply.h"
 
 #include <stdarg.h>

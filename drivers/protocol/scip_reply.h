@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Replies of SCIP: status, key lines, time stamps and blocks of data go in, the bytes of one unit come out.
  *
  *   echo LF  status(2) sum LF  [KEY:VALUE ; sum LF]...  [time(4 or 11) sum LF]  [to 64 characters, sum LF]...  LF

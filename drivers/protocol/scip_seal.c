@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Replies whose data are changed, and whose sums are made right again. */
 #include <string.h>
 

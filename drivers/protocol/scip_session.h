@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A SCIP session: what scip.c, scip_command.c, scip_info.c, scip_measure.c and scip_simulate.c share. Not for
  * others. Device times in ns; a status is two characters. */
 #ifndef DRIVERS_PROTOCOL_SCIP_SESSION_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Velodyne VLP-16 as protocols: data packets, position packets, settings over HTTP. VELODYNE.md has the
  * layouts, what they are taken from, and what the real device does that this one doesn't.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a VLP-16 shows of itself over HTTP: documents of JSON with the fields that known clients read.
  * VELODYNE.md has them. Values of the head are asked for by native queries; what isn't modelled is constant. */
 #ifndef DRIVERS_PROTOCOL_VELODYNE_PAGES_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/protocol/velodyne_settings.h"
 
 #include <stdio.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The settings of a VLP-16 as its clients post them: forms go in, native commands to the device and a status
  * of HTTP come out. And what of the settings can be read. VELODYNE.md has all keys.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A capture of what came over a wire that is not the native protocol's: Ethernet frames to a .pcapng.
  *
  * In: frames (drivers/protocol/ethernet.h), each with its time of UTC and the place it came from. Out: a file that

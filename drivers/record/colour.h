@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A colour per point, of what the stream says of it: for recordings whose colours the head does not send, or whose
  * limits are known only at the end. In: the points of a track. Out: sRGB. A shot without echo is grey. Pure; any thread. */
 #ifndef DRIVERS_RECORD_COLOUR_H

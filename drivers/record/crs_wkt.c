@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/record/crs_wkt.h"
 
 #include <stdio.h>

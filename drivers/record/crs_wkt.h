@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A CRS as well-known text 1 (OGC 01-009), as LAS 1.4 and E57 want it. In: an EPSG
  * code, and which heights. Out: the text. */
 #ifndef DRIVERS_RECORD_CRS_WKT_H

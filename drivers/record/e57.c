@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* .e57: ASTM E2807, one data3D per scan: points in the head's frame as counts of the stream's scale, and the
  * pose that takes them to the recording's frame (station_pose.h). Intensity is the reflectance in dB; row and
  * column are shot and line. The label is a field of an extension, which readers pass over that don't know it.

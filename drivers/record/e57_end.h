@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The end of an E57 file, for its recorder and for its repair: what makes a whole file of the points in it. */
 #ifndef DRIVERS_RECORD_E57_END_H
 #define DRIVERS_RECORD_E57_END_H
@@ -6,7 +7,10 @@
 #include "drivers/record/e57_xml.h"
 #include "drivers/record/repair.h"
 
-enum { E57_XML_ROOM = 16384, E57_XML_ROOM_SCAN = 8192 }; /* bytes that suffice for the XML section, and for each scan in it */
+enum {
+    E57_XML_ROOM = 16384,
+    E57_XML_ROOM_SCAN = 8192
+}; /* bytes that suffice for the XML section, and for each scan in it */
 
 /* Puts the XML section, cuts what is behind it, then writes the headers of the scans, and last, once all that is on the
  * disk, the file's own. report: its stop gives up; may be NULL. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What stands before the points of each scan in an E57 file, so that a file whose recorder was killed can be completed
  * (e57_repair.c): what its XML section would say of the scan, but for what is counted from the points. It is a binary
  * section of the kind that the standard calls a blob, and the XML names it as the scan's `sh:begin`. Readers pass over it.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Data packets of an E57 file (ASTM E2807), as our files have them: each field of a record has a stream of its own in the
  * packet, of as many bits per record as its range needs. All packets of a scan but its last hold a number of records that
  * is a multiple of 8, so that no stream of bits runs across packets.

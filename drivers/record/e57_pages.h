@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The pages of an E57 file (ASTM E2807). A page is 1020 bytes of content, then their CRC-32C, big-endian.
  * Offsets that count content alone are logical, those that count the CRCs too are physical. */
 #ifndef DRIVERS_RECORD_E57_PAGES_H

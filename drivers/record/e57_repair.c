@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Repair of E57 files: the packets of each scan are counted up to the last whole one, and the file is ended as its recorder
  * would have ended it there (e57_end.h). A note before each scan says what the points don't (e57_note.h).
  *

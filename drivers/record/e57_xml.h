@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The XML section of an E57 file (ASTM E2807): what is in the file, and where. Facts go in (e57.c gathers
  * them), text comes out. Pure. */
 #ifndef DRIVERS_RECORD_E57_XML_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* .las: LAS 1.4, point data record format 6 (7 with colour) followed by the label; one record per echo. On
  * request LAS 1.2 for older readers: format 1 (3), five returns, no labels, scan angles or attributes. What the
  * numbers mean stands in the file itself (las_header.c).

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The header and the variable length records of a LAS file, and one point's record. LAS 1.4 (ASPRS LAS 1.4 R15)
  * with point data record format 6, or 7 with colour; LAS 1.2 with format 1, or 3. Facts go in (las.c gathers
  * them), bytes come out. Pure. */
@@ -25,7 +26,7 @@ enum {
     LAS_FRONT_MAX = LAS_HEADER_LEN + 3 * LAS_VLR_HEAD_LEN + 3 * LAS_EXTRA_LEN + CRS_WKT_MAX + LAS_NOTE_MAX,
 };
 
-#define LAS_SOFTWARE "scanhead"
+#define LAS_SOFTWARE            "scanhead"
 #define LAS_SOFTWARE_INCOMPLETE "scanhead, its end is missing" /* of a file that has not been completed */
 
 struct las_facts {

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/record/las_repair.h"
 
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Meshes of scans: .obj, .gltf, .glb and .fbx, and .ply with --mesh; points spread over the mesh: .ply with --sparse.
  *
  * The first echo of each shot is a point of the scan's grid (mesh_grid.h); core/scan_mesh.h makes triangles of it. A mesh

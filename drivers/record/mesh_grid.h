@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The grid of a scan (of one sweep of the pan, of all rings of a sphere) that is being recorded: which point lies in
  * which line and row, and where the head was. In: points, as the track gives them. Out: a struct scan_grid. */
 #ifndef DRIVERS_RECORD_MESH_GRID_H

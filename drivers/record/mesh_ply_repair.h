@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The repair of .ply that is a mesh (repair.h). It is written in one piece at the end: all of it is there, as after a kill
  * before the file got its name, or nothing is kept. */
 #ifndef DRIVERS_RECORD_MESH_PLY_REPAIR_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to mesh.c and mesh_write.c: a mesh that is being recorded. mesh.c makes it, mesh_write.c writes it. */
 #ifndef DRIVERS_RECORD_MESH_RECORDER_H
 #define DRIVERS_RECORD_MESH_RECORDER_H

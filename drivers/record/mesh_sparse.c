@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/record/mesh_sparse.h"
 
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Points spread evenly over the mesh of a recording. In: the mesh's points and triangles, part by part. Out: points, each
  * with what its triangle's corners have, interpolated; its label and station are those of the corner with the largest
  * weight. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/record/mesh_texture.h"
 
 #include <stdlib.h>

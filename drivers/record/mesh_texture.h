@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The image of a scan's grid as the texture of its mesh: a column a line and a row a shot, the scan's first row below.
  *
  * A point's texture coordinate is the middle of its texel, so that colours between points are those between texels. Where

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The file of a recorded mesh: objects and textures by their names, the header's facts, columns. */
 #include <inttypes.h>
 #include <stdio.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/record/outfile.h"
 
 #include <errno.h>
@@ -192,7 +193,8 @@ static int has_limit(void)
 
 int outfile_reserve(struct outfile *file, uint64_t len, struct sh_err *err)
 {
-    if (has_limit() || fallocate(file->fd, FALLOC_FL_KEEP_SIZE, (off_t)OUTFILE_RESERVE_AT, (off_t)len) == 0) return SH_OK;
+    if (has_limit() || fallocate(file->fd, FALLOC_FL_KEEP_SIZE, (off_t)OUTFILE_RESERVE_AT, (off_t)len) == 0)
+        return SH_OK;
     if (errno != ENOSPC) return SH_OK;
     return sh_fail(err, SH_EIO, "%s: cannot write: %s", file->part, strerror(errno));
 }
@@ -201,7 +203,8 @@ void outfile_release(struct outfile *file)
 {
     struct stat st;
     if (fstat(file->fd, &st) != 0 || (uint64_t)st.st_size > OUTFILE_RESERVE_AT) return;
-    if (fallocate(file->fd, FALLOC_FL_KEEP_SIZE | FALLOC_FL_PUNCH_HOLE, (off_t)OUTFILE_RESERVE_AT, OUTFILE_RESERVE_MOST) != 0)
+    if (fallocate(file->fd, FALLOC_FL_KEEP_SIZE | FALLOC_FL_PUNCH_HOLE, (off_t)OUTFILE_RESERVE_AT,
+                  OUTFILE_RESERVE_MOST) != 0)
         return; /* it had none */
 }
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A file that appears whole or not at all (core/newfile.h). It is written as PATH.part through a buffer. What of it came to
  * the disk before a failure may stay as PATH.part, for a repair (repair.h). */
 #ifndef DRIVERS_RECORD_OUTFILE_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* .pcapng: each frame of the stream as a packet, for capinfos, tshark and other readers of captures
  * (drivers/protocol/pcapng.h). A packet's time is the frame's device time, nanoseconds since power-up. */
 #include "drivers/protocol/pcapng.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* .ply: one vertex per echo. The format is described in the header's own comments.
  *
  * Positions are in the stream's CRS (geo), or in the scene frame (polar), as scanhead_to_scene has it.

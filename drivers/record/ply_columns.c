@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/record/ply_columns.h"
 
 #include <inttypes.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The header of a PLY recording: facts and names of surfaces go in, text comes out. It stands at the
  * beginning of the file and is known at the end, so its size is reserved first. */
 #ifndef DRIVERS_RECORD_PLY_COLUMNS_H
@@ -13,7 +14,7 @@
 
 enum { PLY_MAX_HEADS = 128, PLY_PAD_MIN = 8 /* "comment\n" */ };
 /* The line of a header that was written before the recording had its end. */
-#define PLY_CRS "comment crs " /* the first line of comment, which tells that this program has written a file */
+#define PLY_CRS        "comment crs " /* the first line of comment, which tells that this program has written a file */
 #define PLY_INCOMPLETE "comment incomplete: its end is missing, and losses were not counted\n"
 
 struct ply_facts {
@@ -23,7 +24,7 @@ struct ply_facts {
     uint64_t n_vertices, n_unplaced; /* points before their descriptor and anchor were seen */
     uint64_t n_without_pose;         /* points of a moving head whose pose was lost */
     uint64_t n_without_attributes;   /* echoes */
-    int incomplete; /* the recording goes on: its losses are not known */
+    int incomplete;                  /* the recording goes on: its losses are not known */
     int have_gps;
     double gps_s; /* GPS time of the first scan's start */
     /* The heads: of the first scan, then wherever another one begins. */

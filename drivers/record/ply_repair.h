@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The repair of .ply (repair.h): points, binary or text, with any columns of one number each. A mesh goes to the repair of
  * meshes. The count in the header is made right, in the header's own room: lines of blank comment give way. */
 #ifndef DRIVERS_RECORD_PLY_REPAIR_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* .poses.csv: where the head truly was, which a registration or a trajectory has to find.
  *
  * Of a head that stands: one row per scan. The pose takes points from the head's frame to the frame of the

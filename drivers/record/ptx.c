@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* .ptx: one grid per scan, a column per line and a row per shot. Points are in the head's frame; the pose
  * takes them to the recording's frame (station_pose.h). A shot without echo is "0 0 0 0.5". So is a place of
  * the grid without a shot: lines differ by a pulse where the pulse rate is no multiple of the line rate, and

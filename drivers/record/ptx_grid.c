@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/record/ptx_grid.h"
 
 #include <errno.h>

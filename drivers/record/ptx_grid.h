@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The shots of one scan, kept in a file beside the recording (PATH.grid) until the scan is over: a PTX grid begins with its
  * size, and all its columns are of the same height, which is known last. Memory holds one column.
  *

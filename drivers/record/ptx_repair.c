@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Repair of PTX files. Whole grids are in FILE.part as text. The grid of the scan that was not over is in FILE.grid
  * (ptx_grid.h): its text is made now, as its recorder would have made it, and takes the place of whatever its recorder had
  * begun to write of it. FILE.grid goes last, so that a repair that is killed can begin again.

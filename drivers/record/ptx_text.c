@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/record/ptx_text.h"
 
 #include <inttypes.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/record/recorder.h"
 
 #include <inttypes.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Recorders: the frames of a stream in, one file out; which format, its ending says.
  *
  * A format is one file of this folder with a `const struct recorder_ops`, and one row in the table in

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Repair: what a recorder that was killed, or a full disk, has left as FILE.part becomes a whole file of the same format,
  * with what is in it.
  *

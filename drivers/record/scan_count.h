@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* For repairs: how many scans frames, or points, are of. Pure. */
 #ifndef DRIVERS_RECORD_SCAN_COUNT_H
 #define DRIVERS_RECORD_SCAN_COUNT_H

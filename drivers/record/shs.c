@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* .shs: the stream as it came, frame after frame, without the reply lines. scanhead_open reads it as a
  * source. */
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/record/station_pose.h"
 
 #include <math.h>
@@ -46,6 +47,6 @@ int station_pose_check(const struct station_pose *pose, const char *path, struct
     station_pose_quaternion(pose, q);
     if (isfinite(s[0]) && isfinite(s[1]) && isfinite(s[2]) && isfinite(q[0] + q[1] + q[2] + q[3])) return SH_OK;
     return sh_fail(err, SH_EFORMAT,
-                   "%s: the stream is broken: the pose of a scan, at (%g %g %g) and turned by (%g %g %g %g), is none", path,
-                   s[0], s[1], s[2], q[0], q[1], q[2], q[3]);
+                   "%s: the stream is broken: the pose of a scan, at (%g %g %g) and turned by (%g %g %g %g), is none",
+                   path, s[0], s[1], s[2], q[0], q[1], q[2], q[3]);
 }

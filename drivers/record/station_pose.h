@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Where the head stands in the frame that a recording's points are in: the stream's CRS (geo layout) or the
  * scene frame (polar layout).
  *

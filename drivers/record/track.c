@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/record/track_inside.h"
 
 #include <math.h>

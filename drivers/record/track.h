@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What every recorder of points follows in a stream: where scans begin, the one frame of coordinates, the
  * head's pose, and the line and the shot of each point. Frames go in, one by one; points come out in batches.
  *

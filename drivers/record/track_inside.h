@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to drivers/record/track*.c: points that wait for attributes and colours. */
 #ifndef DRIVERS_RECORD_TRACK_INSIDE_H
 #define DRIVERS_RECORD_TRACK_INSIDE_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Points that wait for the frames that follow theirs. */
 #include "drivers/record/track_inside.h"
 

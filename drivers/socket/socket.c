@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/socket/socket.h"
 
 #include <errno.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Stream sockets, for links and USB back ends: opening, settings, bytes in and out. Nothing but socket_open
  * waits.
  *

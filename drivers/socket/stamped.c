@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/socket/stamped.h"
 
 #include <errno.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Sockets that say when bytes came: datagrams and TCP streams with the time at which the kernel received them.
  *
  * Times are UTC, in ns since 1970. Nothing waits but stamped_connect. Errors: SH_E, as socket.h has them. Any thread. */

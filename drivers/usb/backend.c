@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The list of back ends. */
 #include "drivers/usb/backend.h"
 

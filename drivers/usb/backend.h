@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Back ends: the ways between a host and the device core (usb.h). What a host does goes in, the core's
  * answers come out.
  *

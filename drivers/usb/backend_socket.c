@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Sockets of the back ends that talk over one. */
 #include <errno.h>
 #include <stdio.h>

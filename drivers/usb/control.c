@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Control requests: chapter 9, strictly. What the specification leaves open, or says is not specified,
  * stalls.
  *

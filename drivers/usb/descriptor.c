@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A model as descriptors, byte by byte. */
 #include <string.h>
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The functionfs back end: the device on a real device controller of this machine (a board with a UDC), as a
  * gadget of the Linux kernel. The kernel answers the standard requests from the descriptors it was given;
  * what concerns our own interfaces comes as events on ep0. The core hears of a configuration as if it had

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The console of a gadget: the kernel's f_acm, whose other end is /dev/ttyGSn. */
 #include <errno.h>
 #include <fcntl.h>

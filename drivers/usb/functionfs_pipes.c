@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Endpoints of FunctionFS. write(2) on them blocks until the host has taken the data, so they are driven by
  * the kernel's asynchronous I/O, whose completions an eventfd counts. */
 #include <errno.h>

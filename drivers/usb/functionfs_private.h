@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The functionfs back end's own parts: endpoints with asynchronous I/O, and the console over the kernel's
  * tty. Private. */
 #ifndef DRIVERS_USB_FUNCTIONFS_PRIVATE_H

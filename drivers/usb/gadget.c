@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/usb/gadget.h"
 
 #include <dirent.h>

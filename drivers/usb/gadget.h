@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A USB gadget of the Linux kernel, made through configfs: identity, strings, one configuration, FunctionFS
  * for what this program does itself, if there is any, and f_acm for a CDC-ACM console. Private to the functionfs
  * back end.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The gadget and its controller: plugging in and out, speeds, states. */
 #include <dirent.h>
 #include <errno.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The device's descriptions that FunctionFS gets through ep0, in the format of <linux/usb/functionfs.h>. */
 #include <errno.h>
 #include <linux/usb/functionfs.h>

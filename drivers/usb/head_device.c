@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/usb/head_device.h"
 
 #include <linux/usb/cdc.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The head as a USB device, in one of its looks (looks.h): what of the host's requests and data begins and ends the
  * sessions, and the requests of a CDC-ACM port.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/usb/looks.h"
 
 #include <linux/usb/cdc.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a head looks like on USB: as itself, or as one of the devices whose protocol it speaks. Each is data: a
  * model (usb.h), ids, and where its sessions are.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/usb/own_identity.h"
 
 #include <errno.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A head's own USB identity, where none is configured: a serial number that is the same whenever it starts again, and a
  * number among the USB heads that run on this machine, for the bus id of USB/IP.
  *

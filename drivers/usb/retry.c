@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "drivers/usb/retry.h"
 
 #include <errno.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A device that plugs itself in (`attach: on`) comes back after its host has let go of it. This is the timer
  * for its attempts, and the news about them. Private to the back ends. */
 #ifndef DRIVERS_USB_RETRY_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The USB device core: descriptors, control requests, endpoints and cancellation, with no transport in it.
  *
  * A device is data: a struct usb_model and what it points to. The core answers all of chapter 9 from it.

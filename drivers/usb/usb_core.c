@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* States, endpoints and transfers. */
 #include <stdlib.h>
 #include <string.h>

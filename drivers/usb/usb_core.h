@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The device core's own struct, for the two files that make it: usb_core.c and control.c. Private. */
 #ifndef DRIVERS_USB_USB_CORE_H
 #define DRIVERS_USB_USB_CORE_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a device does wrong on request. How a transfer is shortened is in usb_core.c, what a configuration says of its
  * length in control.c. */
 #include "drivers/usb/usb_core.h"

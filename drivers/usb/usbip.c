@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The usbip back end: a USB/IP server, on TCP port 3240 of the loopback by default, or one connection by
  * socket pair to this machine's vhci_hcd. One host at a time has the device; others may list it.
  *

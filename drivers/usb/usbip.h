@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The USB/IP protocol, version 1.1.1, as Linux describes it (Documentation/usb/usbip_protocol.rst): sizes,
  * offsets and numbers. Everything is big-endian. Private to the back end and its tests. */
 #ifndef DRIVERS_USB_USBIP_H

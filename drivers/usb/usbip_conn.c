@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A connection of a USB/IP client: DEVLIST and IMPORT, then SUBMIT and UNLINK.
  *
  * The peer is not trusted: what breaks the protocol, or asks for more memory than a host needs, ends the

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* One connection of the usbip back end: operations first, then URBs once the device is imported. Private. */
 #ifndef DRIVERS_USB_USBIP_CONN_H
 #define DRIVERS_USB_USBIP_CONN_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a USB/IP client asks before it has the device: which there are (DEVLIST), and one of them (IMPORT). */
 #include <stdio.h>
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The parts of a usbip connection: URBs and their memory, replies and their order, operations. Private. */
 #ifndef DRIVERS_USB_USBIP_PRIVATE_H
 #define DRIVERS_USB_USBIP_PRIVATE_H

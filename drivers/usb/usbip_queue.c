@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Memory of a connection, and its replies: in the order in which they were queued, whatever pieces the socket
  * takes. */
 #include <errno.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The usbredir back end: the device for a virtual machine (QEMU's usb-redir), over a Unix socket or TCP; no
  * root needed. One guest at a time; one that has not said hello yet gives way to the next that comes.
  * libusbredirparser does the wire format, which spice/usbredir's usb-redirection-protocol.md describes; this

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The usbredir back end: bulk and interrupt packets.
  *
  * Interrupt endpoints are not asked packet by packet here: the guest starts and stops receiving, and between

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The usbredir back end's own struct, for its files: the socket, requests, data. Private. */
 #ifndef DRIVERS_USB_USBREDIR_PRIVATE_H
 #define DRIVERS_USB_USBREDIR_PRIVATE_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The usbredir back end: what the device is, and requests to it. */
 #include "drivers/usb/backend.h"
 

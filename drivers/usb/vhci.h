@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Plugs one end of a socket into this machine's virtual host controller (vhci_hcd) without any tool.
  * Private. */
 #ifndef DRIVERS_USB_VHCI_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What the commands of the command line share: exit status, messages, loading, signals, files of figures.
  *
  * Each command is one file and one struct app_command. Only commands print, and only main exits. An error is

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The files that a mesh file names: materials (.mtl), buffers (.bin), images. In: the mesh's path. Out: each one that
  * is there, in the order in which they are named.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* scanhead check: validates configuration, scene and links. Nothing runs. */
 #include <inttypes.h>
 #include <string.h>

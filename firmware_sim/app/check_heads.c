@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/app/check_heads.h"
 
 static void print_stations(const struct config *cfg, FILE *out)

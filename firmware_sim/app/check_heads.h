@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What `scanhead check` says about heads: of one configuration the scanner of head.station, then those of other
  * stations. Out: lines, with rates in Hz and ranges in metres. */
 #ifndef FIRMWARE_SIM_APP_CHECK_HEADS_H

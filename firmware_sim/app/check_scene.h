@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* `scanhead check --scene` prints this: the objects of the scene as a table, and those that are open by name. */
 #ifndef FIRMWARE_SIM_APP_CHECK_SCENE_H
 #define FIRMWARE_SIM_APP_CHECK_SCENE_H

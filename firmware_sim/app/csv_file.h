@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* CSV files that commands write: RFC 4180 with line feeds, UTF-8, a first line that names the columns. */
 #ifndef FIRMWARE_SIM_APP_CSV_FILE_H
 #define FIRMWARE_SIM_APP_CSV_FILE_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/app/heads.h"
 
 #include <nettle/sha2.h>

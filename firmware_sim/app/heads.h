@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The heads of a configuration, off line: one for each scanner that its stations have, in one scene. In: a
  * configuration, and from which stations to scan. Out: the frames of all scans, station by station, and what came of
  * them in one sum.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* scanhead list: head profiles, kinds of links, scenarios of faults, and the heads that USB shows. */
 #include <stdio.h>
 #include <string.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A head that runs in this process, for commands that work off line. In: a configuration. Out: a client's
  * handle, as of a head on a wire. Head and client are joined by a socket pair, and the pace is `fast`. */
 #ifndef FIRMWARE_SIM_APP_OFFLINE_H

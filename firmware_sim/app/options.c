@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/app/options.h"
 
 #include <ctype.h>
@@ -92,9 +93,14 @@ void app_pass_options(struct app_option *rows, const struct app_command *other, 
         while (*name != NULL && strcmp(*name, row->name) != 0)
             name++;
         if (*name != NULL)
-            rows[n++] = (struct app_option){APP_PASS,         row->name,       row->argument,
-                                            .at = at,         .key = row->key, .choices = row->choices,
-                                            .n_choices = row->n_choices, .help = row->help};
+            rows[n++] = (struct app_option){APP_PASS,
+                                            row->name,
+                                            row->argument,
+                                            .at = at,
+                                            .key = row->key,
+                                            .choices = row->choices,
+                                            .n_choices = row->n_choices,
+                                            .help = row->help};
     }
     rows[n] = (struct app_option)OPTION_END;
 }
@@ -309,7 +315,8 @@ static int too_many(const struct app_command *command, int needed, int n, char *
 static int take_operands(const struct app_command *command, int n, char *const *words, struct app_input *in)
 {
     int needed = 0;
-    if (in->alone && n > 0) return app_usage(command, "%s: with these options it takes no %s", words[0], command->operand[0]);
+    if (in->alone && n > 0)
+        return app_usage(command, "%s: with these options it takes no %s", words[0], command->operand[0]);
     if (in->alone) return APP_GO_ON;
     while (needed < APP_MAX_OPERANDS && command->operand[needed] != NULL)
         needed++;

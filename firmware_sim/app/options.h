@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Commands and their options as tables. The rows alone give parsing, errors and --help.
  *
  * In: argv and the command's table. Out: the operands, the settings of configuration keys, and the values of

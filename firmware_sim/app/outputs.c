@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Whether the files that a command reads and those that it is to write are apart, so that none is destroyed. */
 #include <limits.h>
 #include <stdio.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* JSON that a page asks for, of a head and of a recording alike: in memory, for a web link to send. Any thread. */
 #ifndef FIRMWARE_SIM_APP_PAGE_JSON_H
 #define FIRMWARE_SIM_APP_PAGE_JSON_H

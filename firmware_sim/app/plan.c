@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* scanhead plan: which method each stage will use. It loads the scene as a run does and prints what the run
  * uses. */
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/app/sites.h"
 
 #include <stdlib.h>

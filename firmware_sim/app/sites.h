@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The sites of all scanners of a configuration, in one scene (site_load_beside). For commands that ask each station
  * what its own scanner sees from there. */
 #ifndef FIRMWARE_SIM_APP_SITES_H

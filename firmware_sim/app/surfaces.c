@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/app/surfaces.h"
 
 #include "firmware_sim/app/csv_file.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The surfaces of a site as CSV, beside recordings: what each label of a point means. */
 #ifndef FIRMWARE_SIM_APP_SURFACES_H
 #define FIRMWARE_SIM_APP_SURFACES_H

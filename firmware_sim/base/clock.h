@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The system's clocks. All that reads or waits for time of the machine does it here.
  *
  * Out: ns, of CLOCK_MONOTONIC unless the name says otherwise. Device time (device.h) is another matter. */

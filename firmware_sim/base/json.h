@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The one JSON writer. In: values and their keys, one call each. Out: RFC 8259 text in a FILE, either one
  * member per line with two blanks per level, or all on one line without blanks.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/base/line_writer.h"
 
 #include <errno.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A text file whose lines are written by a thread of its own, so that whoever has a line never waits for a disk or a
  * reader.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* How near two words are, to suggest what a mistyped one may have meant. */
 #ifndef FIRMWARE_SIM_BASE_NEAREST_H
 #define FIRMWARE_SIM_BASE_NEAREST_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/base/notify.h"
 
 #include <errno.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The service manager's notification socket: sd_notify(3) of systemd.
  *
  * In: lines such as READY=1. Out: one datagram to the socket that $NOTIFY_SOCKET names, a path or @NAME of the abstract

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* One line from split to reply: find its row, take its value, check control, let the row act. */
 #include "firmware_sim/command/command_inside.h"
 

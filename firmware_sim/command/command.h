@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The command set: one SCPI-style line in, one reply line out, and the error queue of SCPI-99 (21.8).
  *
  *   common    *IDN?  *RST  *CLS  *OPC?  *STB?  HELP?  HELP:SETtings?

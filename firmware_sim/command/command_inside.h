@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The command set from the inside: pieces of a line, numbers, the rows of the table. For the files of this
  * folder. */
 #ifndef FIRMWARE_SIM_COMMAND_COMMAND_INSIDE_H

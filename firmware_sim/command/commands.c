@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The only list of commands, and what each of them does. What settings have in common is in setting.c. */
 #include "firmware_sim/command/command_inside.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The error queue and its texts. */
 #include "firmware_sim/command/command_inside.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* FAULt: faults on request. What a fault is, its owner knows; here are the lines. */
 #include <stdio.h>
 #include <string.h>
@@ -53,8 +54,7 @@ int command_fault_clear(struct command_call *call)
     int64_t number;
     if (dev->faults == NULL) return none(call);
     if (take_number(call, &number) != 0) return -1;
-    if (dev->faults->remove(dev->faults_owner, (uint32_t)number) == 0 && number != 0)
-        return no_such(call, number);
+    if (dev->faults->remove(dev->faults_owner, (uint32_t)number) == 0 && number != 0) return no_such(call, number);
     call->out->effect = COMMAND_FAULTS;
     return command_reply(call, "OK");
 }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The head: its state machine as a pure function, its settings, and what its profile allows. In: a state and
  * an event. Out: the next state.
  *

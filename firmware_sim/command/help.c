@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* HELP? and HELP:SETtings?: the table of commands, for people and for programs. */
 #include "firmware_sim/command/command_inside.h"
 

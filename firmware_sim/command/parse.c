@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A line in its parts, headers against patterns, and decimal numbers as they are written. */
 #include "firmware_sim/command/command_inside.h"
 

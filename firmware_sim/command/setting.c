@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Query and change of a setting: its row gives the field, the limits and the unit. */
 #include "firmware_sim/command/command_inside.h"
 

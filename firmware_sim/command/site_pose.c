@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* SITE:POSE: where a station stands, and that it is to stand elsewhere. */
 #include <math.h>
 #include <stdio.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Bytes to lines. */
 #include "firmware_sim/command/command.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* SCAN:STEP, SCAN:STEP:LINE, SCAN:STEP:PAN: angles from pulse to pulse and from line to line, in nano-degrees. Of a
  * line head they follow from its rates, which they set, and the pulse rate stays:
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The pose that a step may carry. */
 #include <math.h>
 #include <stdlib.h>

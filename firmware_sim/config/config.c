@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* config_load: file, --set, profile, defaults, checks, in this order. */
 #include "firmware_sim/config/table.h"
 

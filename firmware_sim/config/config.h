@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The configuration: a YAML file and --set in, struct config out, checked. One table (keys.c) of key, type,
  * unit, default, range and help gives parsing, defaults, errors and the reference.
  *

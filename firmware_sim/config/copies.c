@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Copies of meshes: the list that may stand in the place of a CSV file. */
 #include <string.h>
 

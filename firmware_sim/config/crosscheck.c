@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What concerns more than one key, or the world: limits of the head profile, order of angles, files, keys of
  * links and platforms. Places on the Earth: places.c; noise, signal, surfaces: measurement.c. */
 #include "firmware_sim/config/table.h"

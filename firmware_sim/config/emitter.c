@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Emitters of head profiles: which keys belong to which of them, and what follows from them: pulse rates,
  * limits of line angles, the schedule of a head. */
 #include "firmware_sim/config/table.h"

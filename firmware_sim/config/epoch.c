@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/config/epoch.h"
 
 #include <string.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The list of faults: each is one line that says where, which key, what is wrong and what is allowed. */
 #include <stdarg.h>
 #include <stdio.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Faults that change what is measured: what a head must have, so that they do what they say. */
 #include "firmware_sim/config/table.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Rows of faults, for the table of a configuration and for that of a scenario, which has nothing else. Before it is
  * included, FAULT_LIST_AT(member) says where a member of struct fault_list is. Private to keys.c and faults.c. */
 /* clang-format off */
@@ -63,4 +64,4 @@
 #undef FAULT
 #undef FAULT_MEMBER
 #undef FAULT_LIST_AT
-/* clang-format on */
+    /* clang-format on */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Faults on request: their keys with each other, with the links and with the head; scenarios, and faults that commands
  * add. (What is wrong with a configuration is in fault.c.) */
 #include <stdio.h>
@@ -41,8 +42,7 @@ static const struct {
 };
 
 /* Keys that say what. */
-static const char *const what[] = {"n",      "byte", "reseal", "for_ms",  "factor",
-                                   "deg",    "hz",   "loss_db", "jump_s", "ppm"};
+static const char *const what[] = {"n", "byte", "reseal", "for_ms", "factor", "deg", "hz", "loss_db", "jump_s", "ppm"};
 
 /* Those that a kind has, and up to what n goes. needs_ms: for_ms above 0 must be given. */
 static const struct {

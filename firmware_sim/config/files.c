@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/config/files.h"
 
 #include "firmware_sim/config/table.h"

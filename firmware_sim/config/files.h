@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The files that a configuration names, by its table of keys. In: a loaded configuration. Out: each key that has a
  * path, with it. */
 #ifndef FIRMWARE_SIM_CONFIG_FILES_H

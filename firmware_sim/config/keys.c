@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The table of a configuration's keys; profile_keys.c has that of head profiles. A row has the key's path,
  * type, unit, default, limits and member of struct config. Parsing, defaults, errors, --set and `scanhead
  * check --help` come from the rows alone; what concerns more than one key stands in crosscheck.c, places.c

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a link's protocol needs: of the link, of the stream, of the head, of the time. */
 #include <stdio.h>
 #include <string.h>

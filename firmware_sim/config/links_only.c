@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A configuration of links, loop and faults alone, for what has no head and no scene: a recording that is replayed. */
 #include <stdio.h>
 #include <string.h>

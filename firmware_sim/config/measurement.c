@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Noise, signal and surfaces: checks that concern more than one key. */
 #include "firmware_sim/config/table.h"
 

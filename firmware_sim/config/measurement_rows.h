@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Rows of the table of keys: from the beam to what is measured. Private to keys.c, whose macros they are written with. */
 /* clang-format off */
     {"beam", .type = CFG_MAP, .help = "The footprint of the pulses."},
@@ -126,4 +127,4 @@
     {KEY(instrument.range_offset_m), CFG_REAL, "m", "0", -10, 10, .help = "Measured ranges are too long by this."},
     {KEY(instrument.range_scale_ppm), CFG_REAL, "ppm", "0", -1e4, 1e4,
      .help = "Measured ranges are too long by this share: a clock that runs too fast."},
-/* clang-format on */
+    /* clang-format on */

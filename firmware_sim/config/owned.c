@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Keys that only some kinds of link, back end or platform have, and what a link of a kind needs. */
 #include <stdio.h>
 #include <string.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Rows of the table of keys: the scene, the stations in it, and what the head stands on. Private to keys.c, whose macros
  * they are written with. */
 /* clang-format off */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Keys that say where things are on the Earth: the scene's anchor, and each station in one of several
  * forms. */
 #include "firmware_sim/config/table.h"

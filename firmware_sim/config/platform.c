@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Checks across the keys of what the head stands on: which part of a trajectory, and where and when it stops. How long
  * a trajectory is, its file says (firmware_sim/site/platform.c). */
 #include "firmware_sim/config/table.h"

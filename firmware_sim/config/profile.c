@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Head profiles: where they are, reading one, listing them. */
 #include "firmware_sim/config/table.h"
 

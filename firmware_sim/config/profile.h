@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A head profile: the figures of a kind of head, as its file in config/heads has them, and what follows from them. In
  * the units of the file's keys; constant once it is loaded. */
 #ifndef FIRMWARE_SIM_CONFIG_PROFILE_H

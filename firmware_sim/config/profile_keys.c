@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The table of a head profile's keys. */
 #include "firmware_sim/config/table.h"
 
@@ -7,7 +8,7 @@
 #define KEY(member)        #member, IN_PROFILE(member)
 #define EMITTER(member)    #member, IN_PROFILE(arrangement.member)
 #define BEAM(member)       CFG_MEMBER(struct config_profile_beam, member)
-#define GEOMETRY(member) CFG_MEMBER(struct config_geometry, member)
+#define GEOMETRY(member)   CFG_MEMBER(struct config_geometry, member)
 #define REACH(member)      "reaches[]." #member, CFG_MEMBER(struct config_reach, member)
 
 #define PROGRAM(member) CFG_MEMBER(struct config_program, member)

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What `scanhead list` shows of a head profile: its programs, the protocols that speak for it, and how sure its
  * figures are. */
 #include "firmware_sim/config/table.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Programs of a head profile: what depends on its pulse rate. In: the figures as the file has them. Out: each
  * program complete, or faults with their lines. Also the widths of the beam, from the maker's definition to
  * this project's. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* head.range_min_m and head.range_max_m: how near and how far the head looks, within its profile. */
 #include "firmware_sim/config/table.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Rows of the table, and where they were given. */
 #include "firmware_sim/config/table.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What the tables say of all keys, printed: as a reference, and as a configuration to begin with. */
 #include "firmware_sim/config/table.h"
 

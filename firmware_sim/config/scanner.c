@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Several scanners in one file: stations with a section `scanner`, whose keys stand in for the file's own. In: the
  * file, once for each scanner. Out: which stations have which, and faults of any of them. */
 #include "firmware_sim/config/table.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Scenarios by name: those that come with the program, in the folder faults. */
 #include "firmware_sim/config/table.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* --set KEY=VALUE: the same rows, one at a time: a single value, or YAML for a list or a section. */
 #include "firmware_sim/config/yaml.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to this folder: the rows of the tables, and the reader that fills a struct from YAML and --set by
  * them.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Tripods of stations: that a leg is there, and what stands on them. */
 #include "firmware_sim/config/table.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Which device a usb link shows itself as: that whose protocol it speaks, with that device's ids where none are given. */
 #include <limits.h>
 #include <stdio.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Texts to values: exact decimals, ranges, words, paths. */
 #include "firmware_sim/config/table.h"
 

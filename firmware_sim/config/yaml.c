@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* YAML to the struct, by the table. libyaml's document API keeps the line of each node. */
 #include "firmware_sim/config/yaml.h"
 

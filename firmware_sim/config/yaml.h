@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to yaml.c and yaml_file.c: a file's one document, and what is read of it later. */
 #ifndef FIRMWARE_SIM_CONFIG_YAML_H
 #define FIRMWARE_SIM_CONFIG_YAML_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A YAML file as one document: bytes, limits, syntax. */
 #include "firmware_sim/config/yaml.h"
 

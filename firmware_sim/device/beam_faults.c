@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Faults that change what is measured: from which pulse of a scan to which they strike, and what they do together.
  *
  * A fault strikes at the pulses of a scan between from_pulse and until_pulse that fire at from_s or later, and before

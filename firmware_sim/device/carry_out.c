@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Commands: carried out, written to the journal, and replayed from one. */
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Faults of the head's time of day: jumps, gains, standstills, leap seconds, PPS that is missing. They hold from their
  * very nanosecond on, not from a tick on. */
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The device: commands, states and the scan program. It does what a head's main processor does.
  *
  * In: command lines, poses of a live platform, and claims of ticks. Out: replies, and what each tick consists

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Faults on request: the board of the run. */
 #include "firmware_sim/device/device_state.h"
 

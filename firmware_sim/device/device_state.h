@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to the files of this folder: what the device holds, each part with one owner. */
 #ifndef FIRMWARE_SIM_DEVICE_DEVICE_STATE_H
 #define FIRMWARE_SIM_DEVICE_DEVICE_STATE_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Events on their way into ticks. */
 #include <stdio.h>
 #include <string.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/device/fault_desk.h"
 
 #include <stdio.h>

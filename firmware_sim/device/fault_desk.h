@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* FAULt commands: what a client says of faults on request, carried out on the board of the run.
  *
  * In: a board, the configuration that says which faults there can be, and device time. Out: struct command_faults for the
@@ -12,8 +13,8 @@
 struct fault_desk {
     const struct config *cfg;
     struct fault_board *board;
-    int64_t now_ns;  /* from which a fault counts that is added now; set before each command */
-    int no_head;     /* nothing computes: faults in the head are refused */
+    int64_t now_ns; /* from which a fault counts that is added now; set before each command */
+    int no_head;    /* nothing computes: faults in the head are refused */
 };
 
 extern const struct command_faults fault_desk_commands; /* their owner is a struct fault_desk */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What the device says of itself: descriptor, anchor, telemetry. */
 #include <math.h>
 #include <string.h>

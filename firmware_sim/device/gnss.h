@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The GNSS receiver that stands with the head.
  *
  * In: the head's pose and the true time (head_clock.h). Out: fixes with the position of its antenna at multiples

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/device/head_clock.h"
 
 #include <errno.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The head's clock: device time -> time of day.
  *
  * In: device time, ns from power-up. Out: TAI, ns (core/utc.h).

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Faults in the head: which of them are at work in a tick, when each begins and ends, and the notes of that.
  *
  * In: the board of the run, and each tick as it is claimed. Out: the faults that are at work in it. A fault that begins

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The journal: every command that had an effect, with its device time. Replayed, it reproduces the session.
  *
  * In: commands as the device carries them out. Out: a text file, which can be read back. It begins with the

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Where the head is: the end of a trajectory, and a live platform's poses. */
 #include <math.h>
 #include <stdio.h>

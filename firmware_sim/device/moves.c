@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Stations that are moved: planned without the lock, put in the place of the site of now under it, and freed when nobody
  * uses them any more.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What the head loses, announced in events. Ticks and pulses that it could not compute in time are counted here
  * (lost_pulses, lost_ticks). Lines of its files are counted by who writes them (base/line_writer.h), frames that a slow
  * reader lost by loop/lost_frames.c. */

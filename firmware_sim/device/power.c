@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Power and boots: what a power cycle ends and begins anew, and what goes wrong in a boot on request.
  *
  * Device time, scan numbers and the stations' places go on over a power cycle, and so does the time of day, which has a

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/device/pps.h"
 
 #include <stdlib.h>

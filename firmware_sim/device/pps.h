@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The state of the pulses per second that the head's clock follows.
  *
  * In: each full second that has a pulse, in order of time. Out: at a device time, whether pulses come (absent: none for

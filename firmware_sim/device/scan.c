@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The scan program: which pulses and frames each tick has while a scan is on. */
 #include <math.h>
 #include <string.h>

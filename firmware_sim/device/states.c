@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The states of the head, and when each one ends. */
 #include <math.h>
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The device's time of day: PPS, what TIME: answers, and the GNSS receiver. */
 #include <stdio.h>
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Sites that are planned for settings which commands have given: ranges, noise, step of a sphere. Made by the command,
  * which is refused where there is no such plan; taken by the scan; freed once no work of a scan needs it. */
 #include <stdio.h>

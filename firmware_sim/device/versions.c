@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The sites of now and of before: who uses one holds it, and what nobody uses is freed. And where the stations are now. */
 #include <math.h>
 #include <stdlib.h>

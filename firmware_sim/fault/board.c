@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/fault/board.h"
 
 #include <pthread.h>
@@ -43,8 +44,8 @@ int fault_board_create(const struct fault_list *list, const char *truth_path, _A
     memset(board->injected, 0, board->counted * sizeof *board->injected);
     pthread_mutex_init(&board->lock, NULL);
     for (uint32_t i = 0; i < list->n; i++)
-        board->entry[board->n++] = (struct fault_entry){
-            .number = i + 1, .until_ns = INT64_MAX, .from_start = 1, .fault = list->fault[i]};
+        board->entry[board->n++] =
+            (struct fault_entry){.number = i + 1, .until_ns = INT64_MAX, .from_start = 1, .fault = list->fault[i]};
     board->last_number = board->n;
     atomic_store(&board->version, board->n != 0);
     *out = board;
@@ -128,8 +129,8 @@ int fault_board_add(struct fault_board *board, const struct fault *fault, int64_
     } else if ((*number = take_number(board)) == 0) {
         rc = sh_fail(err, SH_ENOMEM, "no memory for another fault");
     } else {
-        board->entry[board->n++] = (struct fault_entry){
-            .number = *number, .since_ns = t_ns, .until_ns = INT64_MAX, .fault = *fault};
+        board->entry[board->n++] =
+            (struct fault_entry){.number = *number, .since_ns = t_ns, .until_ns = INT64_MAX, .fault = *fault};
         atomic_fetch_add(&board->version, 1);
     }
     pthread_mutex_unlock(&board->lock);

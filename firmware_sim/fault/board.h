@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The faults of a run: the list, which commands may change, and what was injected so far.
  *
  * In: faults, with the device time from which they count; notes of what was injected. Out: a copy of the list for each
@@ -11,7 +12,7 @@
 enum { FAULT_KEPT = 2 * FAULT_MAX }; /* faults that there are, and those that were taken out last */
 
 struct fault_entry {
-    uint32_t number; /* first, for fault_find. From 1, in the order in which they were added; never used again */
+    uint32_t number;  /* first, for fault_find. From 1, in the order in which they were added; never used again */
     int64_t since_ns; /* device time from which it counts: 0, or when it was added */
     int64_t until_ns; /* when it was taken out; INT64_MAX: it is there */
     int from_start;   /* it was there at power-up: it counts a session's frames from the first */

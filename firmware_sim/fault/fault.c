@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/fault/fault.h"
 
 #include "core/rng.h"

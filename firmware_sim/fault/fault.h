@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A fault on request, as data: what goes wrong, where, and when.
  *
  * In: a fault of the list, and a place where it may strike (a frame, a reply, a connection, a moment of the head).
@@ -42,13 +43,13 @@ enum fault_kind {
     FAULT_SLOW_ENUMERATION,  /* each control request takes for_ms */
     FAULT_DESCRIPTOR_LENGTH, /* the configuration says that it is n bytes longer than it is */
     /* in the head: what is measured changes, and so does the hash */
-    FAULT_SLOW_BOOT,    /* takes for_ms longer */
-    FAULT_POWER_CYCLE,  /* everything is off for for_ms, and boots again */
-    FAULT_SELF_TEST,    /* fails at the end of boot */
-    FAULT_MIRROR_SLOW,  /* turns at `factor` of its speed */
-    FAULT_MIRROR_STUCK, /* stands where it is */
-    FAULT_MIRROR_WOBBLE,/* runs ahead and behind by deg, hz times a second; the encoder shows it */
-    FAULT_PAN_SLIP,     /* the head looks deg farther than the pan's encoder says */
+    FAULT_SLOW_BOOT,     /* takes for_ms longer */
+    FAULT_POWER_CYCLE,   /* everything is off for for_ms, and boots again */
+    FAULT_SELF_TEST,     /* fails at the end of boot */
+    FAULT_MIRROR_SLOW,   /* turns at `factor` of its speed */
+    FAULT_MIRROR_STUCK,  /* stands where it is */
+    FAULT_MIRROR_WOBBLE, /* runs ahead and behind by deg, hz times a second; the encoder shows it */
+    FAULT_PAN_SLIP,      /* the head looks deg farther than the pan's encoder says */
     FAULT_LASER_OFF,
     FAULT_WINDOW_SOILED, /* loss_db on the way there and back; noise grows as the signal fades */
     FAULT_CLOCK_JUMP,    /* the time of day, by jump_s */
@@ -85,8 +86,8 @@ struct fault {
     double from_s, until_s;           /* until 0: no end */
     uint64_t seed;
     /* what: as the kinds say */
-    uint32_t n;    /* 0: the kind's own */
-    int64_t byte;  /* from 0; -1: any */
+    uint32_t n;   /* 0: the kind's own */
+    int64_t byte; /* from 0; -1: any */
     int reseal;
     double for_ms;
     double factor, deg, hz, loss_db, jump_s, ppm;

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/fault/tally.h"
 
 void fault_tally_renew(struct fault_tally *tally, const struct fault_entry *entry, uint32_t n)

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* How often each fault of the list has struck, over all sessions of a link. For faults whose count holds for the link.
  *
  * In: a fault's number. Out: its count, which the caller raises. Thread: one. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/fault/truth.h"
 
 #include <errno.h>
@@ -73,7 +74,10 @@ static void put_place(struct json *json, const struct fault_note *note)
     if (note->session != 0) json_uint(json, "session", note->session);
     if (place == FAULT_AT_FRAME || place == FAULT_AT_REPLY) json_string(json, "of", of_names[note->of]);
     if (note->number != 0)
-        json_uint(json, place == FAULT_AT_REPLY ? "reply" : place == FAULT_AT_CONNECTION ? "connection" : "frame",
+        json_uint(json,
+                  place == FAULT_AT_REPLY        ? "reply"
+                  : place == FAULT_AT_CONNECTION ? "connection"
+                                                 : "frame",
                   note->number);
     if (note->has_seq) json_uint(json, "seq", note->seq);
     if (note->has_seq) json_uint(json, "type", note->type);
@@ -131,8 +135,8 @@ __attribute__((format(printf, 2, 3))) static void add(char text[TRUTH_TEXT_LEN],
 void truth_text(const struct fault_note *note, char text[TRUTH_TEXT_LEN])
 {
     text[0] = '\0';
-    add(text, "fault %" PRIu32 " %s%s: t_ns %" PRId64, note->fault, fault_names[note->kind],
-        note->ended ? " over" : "", note->t_ns);
+    add(text, "fault %" PRIu32 " %s%s: t_ns %" PRId64, note->fault, fault_names[note->kind], note->ended ? " over" : "",
+        note->t_ns);
     if (note->link != 0) add(text, ", link %" PRIu32, note->link);
     if (note->session != 0) add(text, ", session %" PRIu32, note->session);
     if (note->number != 0) add(text, ", %s %" PRIu64, of_names[note->of], note->number);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The truth about injected faults: what was done, where, and when.
  *
  * In: a note of one fault. Out: a line of JSON in a file, and a line of text for the journal. Thread: a writer may be
@@ -13,7 +14,7 @@
 struct fault_note {
     uint32_t fault; /* number of the entry, from 1 */
     enum fault_kind kind;
-    int64_t t_ns; /* device time */
+    int64_t t_ns;           /* device time */
     uint32_t link, session; /* from 1; 0: in the head */
     int of;                 /* enum fault_of */
     uint64_t number;        /* of the frame, reply or connection, as this fault counts them */
@@ -25,7 +26,7 @@ struct fault_note {
     uint32_t bit;   /* of that byte, the first that a flip changed; 0 is the one of value 1 */
     uint64_t n;     /* bytes, bits, copies, frames: as the kind has it */
     double for_ms;
-    int ended; /* a fault of the head is over */
+    int ended;     /* a fault of the head is over */
     char text[64]; /* anything more, plain ASCII without quotes; empty: nothing */
 };
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/fault/wire_inside.h"
 
 #include <stdlib.h>
@@ -88,7 +89,7 @@ static int concerns(struct wire *wire, struct wire_fault *fault, int of)
     const struct fault *f = &fault->entry.fault;
     if (fault_is_act(f->kind) && (wire->spec.acts & UINT32_C(1) << (f->kind - FAULT_DISCONNECT)) == 0) return 0;
     if (f->count != 0 && *hits_of(wire, fault) >= f->count) return 0;
-    return fault_place_of(f->kind) == FAULT_AT_REPLY  ? of == FAULT_OF_REPLIES
+    return fault_place_of(f->kind) == FAULT_AT_REPLY   ? of == FAULT_OF_REPLIES
            : fault_place_of(f->kind) == FAULT_AT_FRAME ? of == f->of
                                                        : 0;
 }

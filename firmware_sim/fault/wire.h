@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The bytes of one session through the faults of its link.
  *
  * In: frames of the native protocol, units of another one, reply lines, in the order in which the session would write
@@ -34,7 +35,7 @@ struct wire_spec {
     /* Of the protocol (protocol.h). */
     void (*content)(const uint8_t *unit, size_t len, uint8_t *mask);
     void (*reseal)(uint8_t *unit, size_t len);
-    uint32_t acts; /* what the link can do: bit 0 is FAULT_DISCONNECT, and so on; others don't strike */
+    uint32_t acts;             /* what the link can do: bit 0 is FAULT_DISCONNECT, and so on; others don't strike */
     struct fault_tally *tally; /* of its acts, over all sessions of the link; outlives the wire. NULL: by session */
 };
 

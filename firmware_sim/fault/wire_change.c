@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What each kind of fault does to one frame, unit or reply. Each returns 1; 0: there is nothing for it to do; or
  * SH_ENOMEM. */
 #include <math.h>

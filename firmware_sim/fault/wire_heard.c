@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/fault/wire_heard.h"
 
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a client sent and has no answer to yet: what an echo sends back.
  *
  * In: its bytes, in pieces of any size. Out: the lines among them that get an answer, one after the other; or, of a

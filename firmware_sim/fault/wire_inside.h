@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to wire.c and wire_change.c. */
 #ifndef FIRMWARE_SIM_FAULT_WIRE_INSIDE_H
 #define FIRMWARE_SIM_FAULT_WIRE_INSIDE_H
@@ -20,12 +21,12 @@ struct wire {
     uint64_t count[FAULT_N_OF];
     uint64_t merge_until[FAULT_N_OF]; /* up to this one, frames are in a write that a merge began */
     struct wire_queue queue;
-    int64_t last_due_ns;  /* delays keep the order */
-    int64_t reply_due_ns; /* and late replies that of replies */
-    int is_over;          /* an act that ends the session waits: what comes after it goes nowhere */
+    int64_t last_due_ns;               /* delays keep the order */
+    int64_t reply_due_ns;              /* and late replies that of replies */
+    int is_over;                       /* an act that ends the session waits: what comes after it goes nowhere */
     uint64_t void_frames, void_pulses; /* so much */
-    uint8_t *unit; /* the copy of the one at hand that faults change */
-    uint8_t *mask; /* its bits that a flip may change */
+    uint8_t *unit;                     /* the copy of the one at hand that faults change */
+    uint8_t *mask;                     /* its bits that a flip may change */
     size_t unit_room, mask_room;
     uint8_t *last_reply; /* the reply before */
     size_t last_reply_len, last_reply_room;

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a session will write, in order: pieces with the time before which they must not go out, and acts and pauses in
  * between; and beside the queue the pieces that are held back, until frames have overtaken them or their time has come.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/loop/bell.h"
 
 #include <errno.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A bell: threads sleep until something has changed, and whoever changed it rings.
  *
  * The rule that keeps all of them alive: change first, then ring; and look again after each sleep. A ring that finds

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Casters: threads that claim ticks ahead of their time, compute them and put them into the stream. */
 #include <stdio.h>
 #include <string.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Warns, once, where casting takes more than ten times what the plan has for a pulse.
  *
  * In: the casters' processor time, the pulses that they claimed and the ticks that were released, read once a second by

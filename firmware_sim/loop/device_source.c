@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The head that computes, as what the loop serves. */
 #include "firmware_sim/loop/source.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* stream_sha256 of all that is released: a reader of the stream with a thread of its own.
  *
  * In: the stream. Out: SHA-256 of the frames that drivers/protocol/PROTOCOL.md names, in hexadecimal. */

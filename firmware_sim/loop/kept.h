@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The last descriptor, emitter and anchor that were released: what a client that joins needs first.
  *
  * In: frames of the stream, at release. Out: copies of them, with the flags of a repetition. One thread keeps, any number

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/loop/lateness.h"
 
 static uint32_t bin_of(uint64_t ns)

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* How late something was, over a whole run: counts in bins of fixed memory, and percentiles of them.
  *
  * In: one lateness after the other, in ns. Out: how late a share of them was at most, and a short histogram. Below 32 ns

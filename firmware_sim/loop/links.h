@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The links of a head: each open link is a pump (pump.h) with a thread of its own.
  *
  * In: the links of the configuration, and the stream. Out: frames and replies to clients, commands to the

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The fixed-rate loop: casters that compute ahead, one pacing thread, one thread per link.
  *
  * In: the site, the device and the links of the configuration. Out: the stream on the links, and statistics.

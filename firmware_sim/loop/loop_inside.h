@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to loop.c, casters.c and pacer.c: the struct loop, whose parts each belong to one of these
  * files. */
 #ifndef FIRMWARE_SIM_LOOP_LOOP_INSIDE_H

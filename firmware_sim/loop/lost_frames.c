@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Frames that a reader lost: counted here (reader_lost_frames), announced to the reader in an event of its
  * own, and reported to the error queue. Pulses that the head could not compute in time are another matter:
  * device/overrun.c. */

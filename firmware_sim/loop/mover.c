@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/loop/mover.h"
 
 #include <stdio.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The thread that plans a station's new place (SITE:POSE), so that no link stands still meanwhile.
  *
  * In: a move that the device has begun (COMMAND_MOVE). Out: its reply, in the box of the session that commanded it, and a

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/loop/pace.h"
 
 static int64_t due_of(const struct pace *pace, uint64_t tick)

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What the pacing thread does next, in real time: pure, the clock is the caller's.
  *
  * In: the tick whose turn it is, whether it is ready, and the time. Out: sleep, wait for the tick, release it, or give it

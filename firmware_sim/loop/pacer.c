@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The pacing thread: releases each tick when its time has come. It takes no lock, allocates and logs nothing,
  * and calls the system for the clock, for wake-ups and for the bell of a tick that is late. */
 #include <errno.h>

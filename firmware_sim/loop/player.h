@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The thread that puts the ticks of a source into the stream, where the source makes them itself (source.h): what
  * casters are for a head that computes.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Poses of a live platform over UDP.
  *
  * In: datagrams. Each one holds one or more lines

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A link with its thread: frames and replies out, command lines in, for each of the link's sessions.
  *
  * In: the stream, through the links it belongs to, and what clients write. Out: bytes on the link. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Commands of a session: lines in, replies out. */
 #include <string.h>
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Faults on request at connections: clients that are turned away, and USB enumerations that go wrong. Connections are
  * counted from 1 on the link, those that are turned away too. Of a USB link, each time that a host gets the device is
  * one. */

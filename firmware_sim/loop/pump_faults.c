@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Faults on the wire: what a session would write goes through its wire (firmware_sim/fault/wire.h), and what comes out
  * of that is written. A session has a wire from the first fault on. Without one nothing of this is called.
  *
@@ -91,8 +92,7 @@ int session_waits_for_files(const struct pump *pump, const struct session *s)
 
 static void put(struct pump *pump, struct session *s, int of, const uint8_t *bytes, size_t len, uint64_t tick)
 {
-    const struct wire_item item = {
-        .of = of, .bytes = bytes, .len = len, .t_ns = (int64_t)tick * pump->stream->tick_ns};
+    const struct wire_item item = {.of = of, .bytes = bytes, .len = len, .t_ns = (int64_t)tick * pump->stream->tick_ns};
     if (wire_put(s->wire, &item, clock_now_ns()) != SH_OK)
         source_report(pump->links->source, CMD_E_READER, "no memory for the faults of a session: a frame is lost");
 }
@@ -226,8 +226,10 @@ int session_write_faulty(struct pump *pump, struct session *s, int index)
         const int over = atomic_load(&pump->stream->over);
         session_fill(pump, s);
         last = over && s->out_pos == s->out_len; /* nothing more comes: nothing is held for it */
-        if (s->out_pos < s->out_len) take_over(pump, s);
-        else if (!last) break;
+        if (s->out_pos < s->out_len)
+            take_over(pump, s);
+        else if (!last)
+            break;
         wire_time(s->wire, (int64_t)s->cursor * pump->stream->tick_ns);
     }
     wire_time(s->wire, (int64_t)s->cursor * pump->stream->tick_ns);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to pump*.c, session.c and lost_frames.c: a link with its sessions. */
 #ifndef FIRMWARE_SIM_LOOP_PUMP_INSIDE_H
 #define FIRMWARE_SIM_LOOP_PUMP_INSIDE_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A power cycle on request, as the clients of a link see it: their sessions end abruptly, and nobody answers until
  * power is there again (device_work.power).
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A session of a protocol that is not native: frames and time go in, and units come out (drivers/protocol/protocol.h).
  *
  * In real time the protocol keeps up with the head, whether its client reads or not, as the firmware of a device does.

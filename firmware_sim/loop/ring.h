@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The ring of slots between casters, the pacing thread and readers: one slot per tick, with the tick's
  * frames.
  *
@@ -62,8 +63,8 @@ struct ring_slot {
     struct ring_tick tick;        /* its arrays lie in store, or in longer */
     uint32_t n_frames, first_seq; /* set at release; so is: */
     uint64_t pulses_before;       /* delivered before this tick, since power-up */
-    uint8_t *store;  /* room for a usual tick */
-    uint8_t *longer; /* of a tick that needs more; the next one in the slot gives it back. Else NULL */
+    uint8_t *store;               /* room for a usual tick */
+    uint8_t *longer;              /* of a tick that needs more; the next one in the slot gives it back. Else NULL */
 };
 
 struct ring {

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A session of a link: takes ticks from the stream into a buffer of its own, and writes that to the link.
  *
  * A session copies each tick before it writes it. So a slow reader holds up nobody. When what it has to read

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What the loop serves: a head that computes, or a recording that is replayed.
  *
  * In: command lines of sessions. Out: their replies; and, where it makes its ticks itself, the frames of each. The head

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/loop/stream.h"
 
 #include <sys/eventfd.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The stream: what casters, the pacing thread and readers share while the loop runs.
  *
  * In: ticks that casters filled (ring.h). Out: the native frames of each released tick, numbered, for every

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/loop/unit_queue.h"
 
 #include <stdlib.h>

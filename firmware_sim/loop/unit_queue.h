@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Units of a protocol on their way to a client: first in, first out, each whole or not at all.
  *
  * In: units with the tick at which they were made. Out: the oldest one, in pieces as the link takes them.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* One tick's work: casting its pulses and writing its frames.
  *
  * In: what the device says a tick consists of (device_work). Out: the tick's frames as bytes, the line ends

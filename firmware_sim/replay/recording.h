@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A recording, frame by frame, with the time at which the head released each.
  *
  * In: a file of the native protocol's frames (.shs, .pcapng), read by the client library. Out: its frames as they are, in

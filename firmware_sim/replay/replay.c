@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Ticks of a recording: which frames go out with which. */
 #include "firmware_sim/replay/replay.h"
 
@@ -155,7 +156,7 @@ static void fill(struct replay *r, uint64_t tick, int may_skip)
     while ((found = look(r)) == 1) {
         const uint64_t due = due_tick(r, tick);
         if (due > tick && !(may_skip && r->len == 0)) return;
-        if (due > tick) r->start_tick -= due - tick; /* modulo 2^64, as the sum in due_tick() is */
+        if (due > tick) r->start_tick -= due - tick;    /* modulo 2^64, as the sum in due_tick() is */
         if (r->len + r->frame.len > MOST_BYTES) return; /* the rest comes with the next tick */
         add(r, r->frame.bytes, r->frame.len, tick);
         r->has_frame = 0;

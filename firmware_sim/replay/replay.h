@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A recording as what the loop serves (loop/source.h): the same bytes, with the timing that they had.
  *
  * In: a recording, and commands of clients. Out: ticks with its frames. It is played when a client commands SCAN:STARt, or
@@ -18,13 +19,13 @@ struct replay;
 
 struct replay_options {
     const char *path;
-    double speed;          /* > 0; 1 but in the pace realtime */
-    double from_s, to_s;   /* device time since the recording's first frame; to_s 0: up to its end */
-    int loop;              /* at its end it begins anew */
-    int start;             /* play at once; and end the run at the end, unless loop */
-    uint32_t clients;      /* with start: once so many clients are there; 0: at once */
-    double duration_s;     /* > 0: end the run after that time; with start: from when it begins to be played */
-    const char *truth;     /* file for the faults that are injected; NULL: none */
+    double speed;                   /* > 0; 1 but in the pace realtime */
+    double from_s, to_s;            /* device time since the recording's first frame; to_s 0: up to its end */
+    int loop;                       /* at its end it begins anew */
+    int start;                      /* play at once; and end the run at the end, unless loop */
+    uint32_t clients;               /* with start: once so many clients are there; 0: at once */
+    double duration_s;              /* > 0: end the run after that time; with start: from when it begins to be played */
+    const char *truth;              /* file for the faults that are injected; NULL: none */
     const struct sh_report *report; /* warnings while it is played, from the player's thread */
 };
 
@@ -39,11 +40,11 @@ extern const struct loop_source_ops replay_source; /* self: the struct replay */
 /* For messages. */
 struct replay_summary {
     char idn[96];
-    uint32_t times;           /* how often it was begun */
-    uint64_t frames;          /* sent, of all times */
-    uint64_t bad_bytes;       /* of the file, that are in no frame; of the last time */
-    uint64_t repeated, late;  /* frames of the file that were left out, since they came twice or too late */
-    int cut;                  /* the file ends within a frame */
+    uint32_t times;          /* how often it was begun */
+    uint64_t frames;         /* sent, of all times */
+    uint64_t bad_bytes;      /* of the file, that are in no frame; of the last time */
+    uint64_t repeated, late; /* frames of the file that were left out, since they came twice or too late */
+    int cut;                 /* the file ends within a frame */
 };
 void replay_get_summary(struct replay *replay, struct replay_summary *summary);
 /* After the loop is joined: 0, or why it could not be read to its end. */

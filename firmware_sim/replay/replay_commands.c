@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Commands to a recording: queries are answered by its descriptor. */
 #include <math.h>
 #include <stdio.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What of the frames commands and statistics show: settings, states, counts. */
 #include "firmware_sim/replay/replay_state.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Opening: what the recording says of its head, before anything is played. */
 #include <math.h>
 #include <stdio.h>
@@ -95,8 +96,7 @@ static int check_faults(const struct config *cfg, struct sh_err *err)
     for (uint32_t i = 0; i < cfg->faults.n; i++) {
         const struct fault *fault = &cfg->faults.fault[i];
         const char *why = fault_desk_why_not(fault);
-        if (why != NULL)
-            return sh_fail(err, SH_EINPUT, "fault %u, %s: %s", i + 1, fault_names[fault->kind], why);
+        if (why != NULL) return sh_fail(err, SH_EINPUT, "fault %u, %s: %s", i + 1, fault_names[fault->kind], why);
     }
     return SH_OK;
 }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to the files of this folder. */
 #ifndef FIRMWARE_SIM_REPLAY_REPLAY_STATE_H
 #define FIRMWARE_SIM_REPLAY_REPLAY_STATE_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* When a head released the frames of a recording.
  *
  * In: frames of the native protocol, in the order of the stream. Out: for each a device time in the tick at whose end the

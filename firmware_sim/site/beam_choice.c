@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Beam and optics: looks at the scene as the head does, has core/plan choose, and makes the beams. */
 #include "firmware_sim/site/site_inside.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/site/site_inside.h"
 
 /* The sites of a world share them: whoever comes first builds them. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Surfaces that their file calls transparent, and the rules that would make glass of them. */
 #include <fnmatch.h>
 #include <math.h>

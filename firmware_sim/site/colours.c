@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Colours of points: what output.colour shows, and its limits where the configuration gives none. */
 #include <math.h>
 #include <stdio.h>

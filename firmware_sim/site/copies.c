@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Where the copies of a mesh stand: from the configuration, or from a CSV file. */
 #include <math.h>
 #include <stdlib.h>

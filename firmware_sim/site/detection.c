@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/site/site_inside.h"
 
 #include <math.h>

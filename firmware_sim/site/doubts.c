@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What is allowed, and hardly meant. Each doubt is one warning with its figures, and the key to look at. */
 #include <math.h>
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Georeferencing of a site: heights, method, counts. */
 #include "firmware_sim/site/site_inside.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Loading a site: site_load at the end of this file says in which order. */
 #include <math.h>
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/site/site_inside.h"
 
 static void enter(void *ctx, int64_t t_ns, struct cast_setup *setup)

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A station that stands elsewhere: the site that a configuration with that place would have, beside the one that is. */
 #include <stdio.h>
 #include <stdlib.h>

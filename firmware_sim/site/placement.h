@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Where the stations of a site stand: in the scene, and where the scene's anchor or the station says so, on
  * the Earth.
  */

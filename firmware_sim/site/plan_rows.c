@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/site/plan_rows.h"
 
 #include <math.h>

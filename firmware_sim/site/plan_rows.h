@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The plan of a site as rows for people to read. core/plan chooses, the site applies it (site->plan); nothing else decides on methods. */
 #ifndef FIRMWARE_SIM_SITE_PLAN_ROWS_H
 #define FIRMWARE_SIM_SITE_PLAN_ROWS_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* How many pulses per second this machine computes of a site, measured on the head's own pulses: the whole
  * cast to points, and their frames. Figures are of this machine at this moment, so nothing is chosen by them.
  * Each call takes about 10 ms, at most 20. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Warnings of loading: which there were, so that a site beside says only what is new. */
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What scans and commands ask of a site that is loaded. Nothing here changes it. */
 #include "firmware_sim/site/site.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The site: what a configuration loads once and all scans share. In goes a checked configuration; out come
  * the scene, its BVHs, the stations' places (scene frame, metres) and georeferences, and the planned methods.
  * load.c makes it, site.c reads it. It is constant once loaded: any thread. A station that is moved is in another

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to this folder: the steps of loading a site (load.c), and what they share. */
 #ifndef FIRMWARE_SIM_SITE_SITE_INSIDE_H
 #define FIRMWARE_SIM_SITE_SITE_INSIDE_H

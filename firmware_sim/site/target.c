@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What of the scene is scanned: objects by name (scene.target). The others are left out of the scene, or stay in it and
  * give no echo. */
 #include <fnmatch.h>

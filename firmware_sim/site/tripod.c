@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Tripods: how far their legs are open, from the head's height above the ground; what they hide; their legs as a mesh.
  *
  * The ground is the first surface straight below the head's origin, of what stands still; the vertical is the plumb

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A site with other ranges, noise or step of a sphere: what depends on them is planned again, all else is shared. */
 #include <stdlib.h>
 #include <string.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What sites of one scene share. */
 #include <math.h>
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/accuracy/block_copy.h"
 
 static void *twin(const void *from, size_t bytes)

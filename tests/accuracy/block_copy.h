@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A copy of a block's entries, to compare another cast with. */
 #ifndef TESTS_ACCURACY_BLOCK_COPY_H
 #define TESTS_ACCURACY_BLOCK_COPY_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/accuracy/lit_plates.h"
 
 const double STATION[3] = {0.0, 0.0, 0.0};

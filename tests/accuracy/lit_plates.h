@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Two plates, one behind the other, in one beam: what each echo must bring back, written down. For tests of footprints
  * with detection. */
 #ifndef TESTS_ACCURACY_LIT_PLATES_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A room full of what a sight must get right, and two casts of it: one asks the BVH for each ray, one has a sight. */
 #ifndef TESTS_ACCURACY_SEEN_ROOM_H
 #define TESTS_ACCURACY_SEEN_ROOM_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/accuracy/slanted.h"
 
 const struct beam_view AHEAD = {0.0, 0.001, -0.001, 0.001, 4, 4};

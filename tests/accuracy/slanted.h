@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Slanted surfaces in a beam, and how wide an echo they make by the definition in core/footprint.h: many sub-rays, met with
  * the plane one by one. For tests of attributes. */
 #ifndef TESTS_ACCURACY_SLANTED_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Places all over the Earth, points about them, and how far two methods are apart. */
 #ifndef TESTS_ACCURACY_STATIONS_H
 #define TESTS_ACCURACY_STATIONS_H

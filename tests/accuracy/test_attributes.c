@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Amplitudes against the range equation; and amplitude and width beside their echo, whatever becomes of that. */
 #include "tests/accuracy/lit_plates.h"
 

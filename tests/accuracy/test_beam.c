@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The beam against its definitions (core/footprint.h). */
 #include <math.h>
 #include <setjmp.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Points do not depend on how a line is cut into runs: a tick or a thread may take any part of it. */
 #include <math.h>
 #include <setjmp.h>

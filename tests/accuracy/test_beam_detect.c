@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Footprints and detection together: each echo of a pulse by itself, against what can be written down. */
 #include "core/rng.h"
 #include "tests/accuracy/block_copy.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Footprints with a detection that asks for nothing, and which of the echoes are sent: neither changes an echo. */
 #include "tests/common/generate.h"
 #include "core/rng.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Footprints on glass, on mirrors, and on surfaces that mix within one plane, against what can be written down. */
 #include "tests/accuracy/lit_plates.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The beam against 1,000 sub-rays a pulse. */
 #include <math.h>
 #include <setjmp.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Detection over many pulses: the noise has the sigma that the data sheet's figures give, is normal, and depends on
  * nothing; targets vanish where the data sheet says. Seeds are fixed. Where a statistic of n numbers is compared, 4.75
  * of its standard errors are allowed, which chance exceeds twice in a million. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Widths of echoes against the spread of many sub-rays, worked out from the definition in core/footprint.h. */
 #include "tests/accuracy/slanted.h"
 #include "tests/common/thorough.h"

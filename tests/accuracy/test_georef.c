@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Georeferencing at 200 places all over the Earth: exact figures against definitions in long double (tests/common/geodesy.h),
  * every order's error against its bound. */
 #include <math.h>

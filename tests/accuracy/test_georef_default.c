@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a run does within 2 km, in every CRS and from every kind of scene frame: 200 places, 20,000 points each with
  * THOROUGH=1 and 5,000 else, against GeographicLib point by point. And what it costs against that. */
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Plans against the reference: what a configuration's run uses, as planned, meets what the plan says, on pulses other
  * than those that the plan has looked at. Footprints against 1,000 sub-rays on a spiral, each cast by itself; all else
  * against a run with exact planes, the deepest way through glass, and georeferencing point by point. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* From a configuration to points: with each shipped head, a wall of 20 or 90 % head on vanishes where the profile says,
  * and the range noise is the profile's where it says. */
 #include <math.h>

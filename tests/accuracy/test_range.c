@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Range error of normal scans against the long double reference: at most a micrometre, on the right surface.
  */
 #include <math.h>

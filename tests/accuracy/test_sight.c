@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a standing station sees, by its map and by the BVH: the same bits, in random scenes of what is hard.
  *
  * SIGHT_SCENES: how many scenes (default 400, THOROUGH=1: 1000), SIGHT_FIRST: the number of the first (0), SIGHT_RAYS: rays from

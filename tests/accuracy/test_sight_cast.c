@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Blocks with and without a sight are the same, byte by byte, whatever else a setup asks for. */
 #include <math.h>
 #include <stdio.h>

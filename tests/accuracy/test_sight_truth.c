@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a sight says of rays at corners and edges, and within 4 units in the last place of its cells' borders, against
  * long double: which triangle is met, and at what range.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Pulses as single rays, as rings of sub-rays, and adaptive: cost, and error against 1,000 sub-rays.
  *
  *   build/tests/bench/beam [--chart|--speed] [house|wires|foliage|leaves ...]

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* build/bench: how fast the head computes, beside Embree alone; README.md says what is measured and how. */
 #include <errno.h>
 #include <stdio.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* For all programs of tests/bench: what is measured, and what it is measured with. README.md says the method.
  * Metres and nanoseconds per pulse; positions in the scene frame. */
 #ifndef TESTS_BENCH_BENCH_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Speed against accuracy of the ways to cast: rows of the chart's table to standard output. README.md tells
  * how to read it.
  *

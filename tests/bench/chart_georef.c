@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Speed against accuracy of the ways to georeference: rows of the chart's table to standard output. README.md tells how
  * to read it. Scene frame to UTM and UPS; errors are against tests/common/geodesy.h, which shares nothing with GeographicLib.
  */

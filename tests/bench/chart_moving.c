@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A head that moves, and a body that moves: rows of the chart's table to standard output.
  *
  * Each ray begins at its own point; of a body each chunk of rays sees another pose. Against the program stand what Embree

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* From how many pulses a scan has on a sight pays: rows of the chart's table to standard output.
  *
  * Cost of a pulse, a sight's building shared by all pulses of the scan; Embree alone, robust, for comparison. On the

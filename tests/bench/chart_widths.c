@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What the polynomials of georeferencing cost on each width of vectors that this CPU has: rows of the chart's table,
  * which it does not draw. The loops are those of the program (core/georef/polynomial_kernels.h), compiled once more for
  * each instruction set; errors are against the exact method. README.md tells how to read it. */

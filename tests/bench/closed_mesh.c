@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/bench/closed_mesh.h"
 
 #include <math.h>

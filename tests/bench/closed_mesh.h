@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to leaks.c: closed meshes with a station inside. */
 #ifndef TESTS_BENCH_CLOSED_MESH_H
 #define TESTS_BENCH_CLOSED_MESH_H

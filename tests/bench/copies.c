@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A forest of copies: 10,000 of a tree of 100,000 triangles. What memory it takes, and what a ray costs, in turns with
  * one tree by itself and with the trees about it as triangles of their own. Processor time of the thread, medians of
  * the rounds.

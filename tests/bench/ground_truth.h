@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Where a ray really hits, for the chart: Moeller and Trumbore's test in long double over all triangles that
  * stand in the cells of a plain grid (x, y) that the ray passes over. Shares nothing with core/cast or
  * Embree. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What the arithmetic around the cast costs: each kernel alone, on arrays that stay in the cache, in turns. Processor
  * time of the thread, medians of the rounds, ns per pulse.
  *

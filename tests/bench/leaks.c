@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Rays aimed at edges and corners of closed meshes, from inside: does any slip through?
  *
  * A ray leaks when it hits nothing, when it reports the outer wall of nested meshes, or when behind its

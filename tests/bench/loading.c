@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Measures what loading a large mesh costs: `scanhead check` of terrain in a file, beside bare Embree on the same triangles.
  *
  *   build/tests/bench/loading [options] [CASE...]

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What the real loop costs around the cast: whole programs in turns, on the null link, with one caster.
  *
  *   build/tests/bench/loop_cost [options] PROGRAM...

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* One thread: Embree, robust and not, the exact cast, the whole pipeline, the pipeline by stages, in turns. */
 #include <stdlib.h>
 #include <string.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The command line of build/bench: words in, what to measure out. Prints its errors, one line each. */
 #ifndef TESTS_BENCH_OPTIONS_H
 #define TESTS_BENCH_OPTIONS_H

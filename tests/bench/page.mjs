@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // make bench-page: what a browser costs a head at its limit, and how fast the page is. A table for each question:
 //   1. 2.2 million pulses a second of a small room, without a browser, and with one at nice 10 that can't follow
 //   2. pictures a second of 2, 5 and 10 million points, drawn in software

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A whole panorama of 0.1 degrees to a binary PLY file, beside Embree alone on the same rays.
  *
  *   build/tests/bench/panorama [options]

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Benches stay on one processor: what a round finds in the caches is its own. */
 #ifndef TESTS_BENCH_PIN_H
 #define TESTS_BENCH_PIN_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What effects cost that a configuration names and a scene doesn't need: the cast as the program sets it up, by the
  * plain one of the same rays, which knows of none. In turns, line by line, processor time of the thread; the median of
  * the rounds' ratios is to lie within 5 %.

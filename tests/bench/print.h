@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What build/bench measured, as JSON and as a table. */
 #ifndef TESTS_BENCH_PRINT_H
 #define TESTS_BENCH_PRINT_H

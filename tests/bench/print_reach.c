@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Prints what bench_reach measured: JSON and a table, and beside each figure the bound that it is to hold. */
 #include <string.h>
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What bench_sight measured: JSON and tables, and beside each figure the bound that it is to hold. */
 #include <math.h>
 #include <string.h>

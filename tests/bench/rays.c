@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The rays of a normal scan. */
 #include <stdlib.h>
 #include <string.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* One thread: the cases of a group line by line in turns, the whole cast of each. */
 #include "tests/bench/reach.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Heads and bodies that move, far stations and reaches (tests/common/reach_cases.h): what a pulse costs beside a head, or a
  * body, that stands. README.md says how it is measured. */
 #ifndef TESTS_BENCH_REACH_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The real loop with the null link, as fast as it goes, and Embree on as many threads, in turns. */
 #include <math.h>
 #include <poll.h>

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # How late the pacing thread wakes up, beside cyclictest in turns: under two minutes.
 .PHONY: bench-rt
 #? bench-rt          how late the pacing thread wakes up, beside cyclictest

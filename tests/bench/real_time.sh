@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: MIT
 # How late the pacing thread wakes up, beside cyclictest in turns: sh tests/bench/real_time.sh SCANHEAD FOLDER. Five pairs;
 # both sleep up to absolute times, 1 ms apart, with the same priority: SCHED_FIFO 80 where that is permitted to both, else
 # none. Prints a table, the ratio of the medians of p99, and a verdict: status 1 where it is above 1.5.

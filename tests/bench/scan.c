@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A whole scan, and what a sight is made of for it. */
 #include <math.h>
 #include <string.h>

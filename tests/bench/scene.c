@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Where is scanned. */
 #include <stdio.h>
 #include <stdlib.h>

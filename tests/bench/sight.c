@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Whole scans, one thread: Embree, the cast and the pipeline, each without and with a sight, in turns. */
 #include "tests/bench/sight.h"
 

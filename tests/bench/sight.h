@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a sight saves in whole scans, its building included, beside Embree alone on the same rays. README.md
  * says how it is measured. ns: per pulse, one core. */
 #ifndef TESTS_BENCH_SIGHT_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The pipeline once more, line by line, with the counter of cycles read between its stages. */
 #include <stdlib.h>
 

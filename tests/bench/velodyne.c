@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a VLP-16's data packets cost: the protocol alone, from the head's points frames of 76 packets, a turn
  * at 600 rpm, to packets that go nowhere, in processor time of the thread. Medians of the rounds.
  *

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """clang-tidy's analyzer and cppcheck over the code: python3 tests/check/analyse.py --out FOLDER [--jobs N] FILE... -- FLAGS...
 
 What they find is printed, but what tests/check/answered.txt has an answer to. A line there that answers nothing any more is

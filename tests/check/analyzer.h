@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* For clang-tidy's analyzer alone, which reads one file at a time: a function of another file may return anything, it
  * believes, so that each failure might be none. Here it sees that these always return the code of a failure.
  *

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # Analysers over the code, and ThreadSanitizer over the program: README.md here.
 #   make check                all of it
 #   make check-analysers      clang-tidy's analyzer and cppcheck

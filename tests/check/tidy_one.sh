@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: MIT
 # What clang-tidy finds in one file: sh tests/check/tidy_one.sh FILE CACHE FLAGS... Prints lines `FILE:LINE: TEXT [CHECK]`.
 # CACHE is a folder: a file that is, with all that it includes, as it was is not looked at again.
 set -u

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """ThreadSanitizer over the built program: python3 tests/check/tsan.py --scanhead PROGRAM --out FOLDER [--short]
 
 Heads on all kinds of links, and clients that come, go, stall, misbehave and turn knobs. Each round is one head; it fails

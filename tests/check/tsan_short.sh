@@ -1,4 +1,5 @@
 #!/bin/bash
+# SPDX-License-Identifier: MIT
 # ThreadSanitizer over one head with all kinds of links and their clients, faults on, knobs turned: the short form of
 # `make check-tsan`, for `make test`. Prints TAP. TSAN_HEAD: the program, which `make check-tsan-short` builds.
 set -u

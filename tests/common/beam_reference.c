@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/common/beam_reference.h"
 
 #include <math.h>

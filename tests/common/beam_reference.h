@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The beam by brute force: 1,000 sub-rays a pulse, each cast by itself to its exact range, on a spiral (Vogel 1979) in
  * place of rings, and echoes from a plain reading of core/footprint.h. */
 #ifndef TESTS_COMMON_BEAM_REFERENCE_H

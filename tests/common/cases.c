@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/common/cases.h"
 
 uint64_t case_u64(uint64_t *state)

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* For tests with many random cases: cmocka, and a generator of its own kind (xorshift64*, Vigna 2016), so
  * that the cases have nothing in common with the numbers under test. */
 #ifndef TESTS_COMMON_CASES_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A chart: an image with a colour of its own in each texel, in files of each format, and a board that it lies on. Which
  * texel lies at a coordinate is worked out here by hand, apart from the program. */
 #ifndef TESTS_COMMON_CHART_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A Collada file of one triangle, as a literal: COLLADA_TRIANGLE("0 0 0 1 0 0 0 1 0"). The numbers may be conversions of
  * printf. For tests of what Assimp reads, in single precision. */
 #ifndef TESTS_COMMON_COLLADA_H

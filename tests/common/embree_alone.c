@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/common/embree_alone.h"
 
 #include <stdio.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Embree as it comes, which the cast is measured against: the mesh with shared vertices, rounded to float in the frame of
  * an origin, float rays in packets, the range as Embree gives it. Metres. */
 #ifndef TESTS_COMMON_EMBREE_ALONE_H

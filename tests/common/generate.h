@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Generated scenes for measuring and tests: bumpy ground in a closed box; wires and railings; foliage. */
 #ifndef TESTS_COMMON_GENERATE_H
 #define TESTS_COMMON_GENERATE_H

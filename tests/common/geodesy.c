@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/common/geodesy.h"
 
 void geodesy_ecef(double lat_deg, double lon_deg, double height_m, const double d[3], long double p[3])

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* WGS 84 in long double, from definitions and sharing nothing with GeographicLib: what tests hold our positions
  * against.
  *

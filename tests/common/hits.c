@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/common/hits.h"
 
 void hits_from(struct caster *caster, const struct bvh *bvh, const double from_m[3], double range_max_m, uint32_t n,

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Exact hits of rays from one point, their directions as three arrays. */
 #ifndef TESTS_COMMON_HITS_H
 #define TESTS_COMMON_HITS_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A limit for each test program: one that waits for ever is ended, and says where. It is linked with every test program.
  *
  * The limit is TEST_LIMIT_S seconds (run_tap.sh sets it to its own; 0: none; else DEFAULT_S). It only catches a hang, and

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/common/nmea_reader.h"
 
 void read_line(const char *text, size_t len, const char *type, int n_fields, struct nmea_line *line)

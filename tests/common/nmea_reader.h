@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A reader of NMEA 0183 of the tests' own: fields, checksum, angles. */
 #ifndef TESTS_COMMON_NMEA_READER_H
 #define TESTS_COMMON_NMEA_READER_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/common/odd_judge.h"
 
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Judges hits in odd scenes by the reference in long double. */
 #ifndef TESTS_COMMON_ODD_JUDGE_H
 #define TESTS_COMMON_ODD_JUDGE_H

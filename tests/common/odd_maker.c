@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/common/odd_maker.h"
 
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to odd_scenes: what parts are made with. */
 #ifndef TESTS_COMMON_ODD_MAKER_H
 #define TESTS_COMMON_ODD_MAKER_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Parts: in units of their size, about their centre. */
 #include "tests/common/odd_maker.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/common/odd_rays.h"
 
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Rays from a station where they are hard to decide: at corners and edges, where outlines cross, within planes,
  * at the borders of the cells that a sight has (core/sight.h), along the axes; and lines as a scan has them. */
 #ifndef TESTS_COMMON_ODD_RAYS_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/common/odd_scenes.h"
 
 #include <math.h>

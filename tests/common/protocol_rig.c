@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/common/protocol_rig.h"
 
 #include <math.h>

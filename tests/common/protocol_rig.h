@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A protocol driven from bytes to bytes: a host that keeps what the protocol sends and calls, and native frames of
  * heads that spin, made from ranges by hand. */
 #ifndef TESTS_COMMON_PROTOCOL_RIG_H

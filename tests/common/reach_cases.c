@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/common/reach_cases.h"
 
 #include <dirent.h>

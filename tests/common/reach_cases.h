@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Heads and bodies that move, stations far away, and heads that may go far: cases that may cost no more than a head that
  * stands near what it scans. Each is a whole configuration, loaded as for a run, so that all that loading sets up is in
  * it. Metres and seconds. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The reference of the casting tests: all in long double, independent of core/cast and of Embree.
  *
  * Corners relative to the ray's origin are formed in long double, where the difference of two doubles of a

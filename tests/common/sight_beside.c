@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/common/sight_beside.h"
 
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A sight beside the BVH that it was made for: the same rays through both, and each bit compared. */
 #ifndef TESTS_COMMON_SIGHT_BESIDE_H
 #define TESTS_COMMON_SIGHT_BESIDE_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/common/generate.h"
 
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Thin things in front of a backdrop: wires and railings, leaves. */
 #include <math.h>
 #include <stdlib.h>

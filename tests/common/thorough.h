@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* How deep a test goes: everything in full depth with THOROUGH=1 in the environment, less without. */
 #ifndef TESTS_COMMON_THOROUGH_H
 #define TESTS_COMMON_THOROUGH_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/common/tif.h"
 
 #include <setjmp.h>

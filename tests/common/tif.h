@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Small GeoTIFFs for tests, by libtiff. */
 #ifndef TESTS_COMMON_TIF_H
 #define TESTS_COMMON_TIF_H

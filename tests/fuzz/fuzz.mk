@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # Fuzzing: a libFuzzer program for each input of the head. They need clang; tests/fuzz/README.md says the rest.
 #   make fuzz S=600           each for so many seconds, JOBS at a time; then a table
 #   make fuzz N=1000000       each for so many executions; with S as well: what comes first

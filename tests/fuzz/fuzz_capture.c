@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Captures and recordings that are replayed: .pcapng by its reader, in pieces; then as a recording, frame by frame
  * with its times. Input: a byte (how it is cut, which ending), then the file. All bytes are taken, or the reader
  * says at which byte it stops. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The client library talking to a head that may say anything. Input: a byte, then records: bytes that come, a
  * command, a frame that is asked for. A reply fits its room and is one line; the library never waits longer than it
  * was told. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Recorded clouds and streams, as `report` and `view` read them. Input: a byte that says the ending and the columns,
  * then the file. What is read has points that are finite, or empty shots; what is refused is refused in a line. */
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Configurations: a YAML file, with the settings of --set as its comments `#set KEY=VALUE`, and faults as FAULt:ADD
  * has them as `#fault {...}`. What is refused is refused in lines; what is taken has values within the limits that
  * later stages count on. */

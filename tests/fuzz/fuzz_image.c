@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Images that lie on meshes: PNG, JPEG, TGA, BMP, and texels as a mesh's file holds them. Input: four bytes, then
  * the image. What is decoded has all its texels, and a hole is asked of any coordinate. */
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Journals, and the manifests of campaigns. Input: the file. A journal that is read is sorted by tick, and written
  * anew gives the same commands. */
 #include <stdio.h>

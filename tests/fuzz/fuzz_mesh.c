@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Meshes by our own readers: .obj with its library of materials, .ply, .stl, and what of an .ifc and a .tif we read ourselves. Input:
  * a byte (which, how), then the file; of an .obj what follows the line `#mtl` is its library in.mtl. A scene that is
  * made is whole; what is refused is refused in a line that names the file. */

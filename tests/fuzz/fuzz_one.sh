@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # For the scripts of this folder, to be sourced. $build: where the targets are built.
 
 # fuzz_one NAME FOLDER OPTION...: runs a target, from its seeds, what was found before and $FOLDER/corpus. FOLDER gets its

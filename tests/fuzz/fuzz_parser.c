@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The native stream's parser and decoders. Input: a byte, how it is cut into pieces, then the stream. The same bytes
  * in other pieces give the same frames, lines, notices and counts; and each byte is in one item, or counted as bad. */
 #include <string.h>

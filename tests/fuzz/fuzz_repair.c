@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* `record --repair`: what a killed recorder has left, of any format. Input: a byte (ending, whether as FILE.part),
  * then the file. What is repaired is whole: a second repair finds nothing to do. What is refused is as it was. */
 #include <fcntl.h>

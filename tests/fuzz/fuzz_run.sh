@@ -1,4 +1,5 @@
 #!/bin/bash
+# SPDX-License-Identifier: MIT
 # Runs fuzz targets for long, and prints a table of them. `make fuzz` calls it.
 #
 #   S=600 N=0 JOBS=2 FUZZ_BUILD=build/fuzz bash tests/fuzz/fuzz_run.sh NAME...

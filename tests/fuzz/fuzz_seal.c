@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Faults that no checksum shows: content() and reseal() of each protocol, on any bytes. Input: a byte (which), then
  * the unit. What may be changed lies in the unit; a unit sealed twice is as sealed once; and a change of content,
  * sealed, is sealed. */

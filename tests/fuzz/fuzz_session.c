@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Sessions of the protocols that are other heads': nmea, scip, cola, velodyne with its position packets and its
  * pages. Input: a byte (which), a byte (how), then records: bytes from the client, points and events of a head that
  * spins, time, frames lost, a client that reads nothing. No unit is longer than the protocol says, and commands to
@@ -75,7 +76,7 @@ static int64_t next_fix_ns(void *ctx, int64_t t_ns)
 static void open_session(enum protocol_id id, unsigned how)
 {
     static const char *const models[] = {"UTM-30LX-EW", "UST-20LX", "URG-04LX", "TiM571",
-                                         "LMS111",   "TiM561",   "VLP-16",   "TiM781"};
+                                         "LMS111",      "TiM561",   "VLP-16",   "TiM781"};
     struct sh_err err = {0};
     device = command_test_device();
     rig.ops = protocol_ops_get(id);
@@ -92,14 +93,15 @@ static void open_session(enum protocol_id id, unsigned how)
     snprintf(rig.identity.serial, sizeof rig.identity.serial, "17210001");
     snprintf(rig.identity.firmware, sizeof rig.identity.firmware, "1.2.3");
     snprintf(rig.identity.name, sizeof rig.identity.name, "rig");
-    rig.spec = (struct protocol_spec){.identity = &rig.identity,
-                                      .host = {&rig, send_unit, run_command, utc_ns, fix, count, hang_up, next_fix_ns, NULL},
-                                      .session = 1,
-                                      .fixes_hz = 1,
-                                      .near_wrap = how & 64 ? 3 : 0,
-                                      .waits = how >> 7 & 1,
-                                      .address = "127.0.0.1",
-                                      .port = 2368};
+    rig.spec =
+        (struct protocol_spec){.identity = &rig.identity,
+                               .host = {&rig, send_unit, run_command, utc_ns, fix, count, hang_up, next_fix_ns, NULL},
+                               .session = 1,
+                               .fixes_hz = 1,
+                               .near_wrap = how & 64 ? 3 : 0,
+                               .waits = how >> 7 & 1,
+                               .address = "127.0.0.1",
+                               .port = 2368};
     rig.protocol = NULL;
     if (rig.ops->create(&rig.spec, &rig.protocol, &err) != SH_OK) {
         fuzz_must_be_line(&err);

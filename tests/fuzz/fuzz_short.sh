@@ -1,4 +1,5 @@
 #!/bin/bash
+# SPDX-License-Identifier: MIT
 # The short form of fuzzing, for `make test`: each target runs its seeds and what was found before, then new inputs made of
 # them for some seconds. Prints TAP, one test a target.
 #

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The native stream through the client library, with recorders behind it. Input: three bytes of choices, then the
  * stream, whose checksums are made right. Whatever comes, each recorder makes a file or says in a line why it can't. */
 #include <stdio.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Trajectories: samples and way-points as CSV. Input: a byte, then the file. What is read gives finite poses over
  * its span, and knots that rise in time. */
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The USB device core with the head on it, in each of its looks: what a host does, as records of bytes. Input: a
  * byte (look, speeds), then records: control transfers, bulk and interrupt transfers, cancellations, resets,
  * suspend, faults. Each transfer comes back once, and nothing is written beyond the room that the host gave. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* USB/IP: what a host sends over its connection. Input: a byte (look, whether the device is imported already), then
  * the bytes, which come in pieces. What is wrong ends the connection; nothing is left of it. */
 #include <stdlib.h>

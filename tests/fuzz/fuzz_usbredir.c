@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* usbredir: what a virtual machine sends over its channel. Input: a byte (look, how ids are written), then the
  * bytes; the hello that all channels begin with is put before them, unless the byte says no. */
 #include <poll.h>

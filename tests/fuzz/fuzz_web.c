@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The web link: bytes of one client, over a socket of this machine. Input: a byte, then the bytes: a request, and
  * after an upgrade WebSocket frames; `@HOST@` becomes the link's own address. The link goes on, and the client's
  * session ends with it. libwebsockets itself is not instrumented; what is ours around it is. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What the fuzz targets share: a file in memory that has a path, a folder that goes away, bytes taken one after the
  * other, and a claim that must hold.
  *

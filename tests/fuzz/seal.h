@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Checksums that fuzzing would never guess: makes those of all frames in a stream right. */
 #ifndef TESTS_FUZZ_SEAL_H
 #define TESTS_FUZZ_SEAL_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/guest/chapter9.h"
 
 struct t t;

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Chapter 9 of the USB specification asked of a head, over libusb and through a real kernel: every standard request,
  * wrong lengths and indices, halted endpoints, zero-length packets, transfers cancelled at each stage, resets back to
  * back.

@@ -1,4 +1,5 @@
 #!/bin/bash
+# SPDX-License-Identifier: MIT
 # All guest tests as one TAP program; results come one after the other. `tests/guest/guest.sh usbip` runs one of them.
 # A guest has one processor and waits for its bus half of the time: so there is one more at a time than this machine has
 # processors, those that take longest first. All at once they only make each other late.

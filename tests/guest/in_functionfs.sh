@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # Inside the guest: the kernel's gadget at high and at super speed. Sourced by init.
 . /in_usb.sh
 export CONSOLE=/dev/ttyACM0 CHAPTER9_KERNEL=1

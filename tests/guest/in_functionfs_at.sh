@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # Inside the guest: a gadget at the speed $speed. Sourced by in_functionfs.sh.
 packet=512 replugs=$often
 [ $speed = high ] || packet=1024 replugs=2 # the speed is no matter of plugs: only that it is there again

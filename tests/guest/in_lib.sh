@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # Inside the guest: results for the host, as TAP on descriptor 3. Sourced by init before the test's script.
 tests=0
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # Inside the guest: `scanhead soak` with a head that is plugged into the virtual host controller, scenario by scenario.
 . /soak_of.sh
 load vhci-hcd

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # Inside the guest: a head on the bus, and what is asked of it. Sourced by the scripts of the tests.
 . /often.sh
 

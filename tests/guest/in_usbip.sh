@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # Inside the guest: the kernel's virtual host controller, without a tool and with the stock one. Sourced by init.
 . /in_usb.sh
 export CONSOLE=/dev/ttyACM0

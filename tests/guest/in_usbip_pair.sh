@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # Inside the guest: a head that plugs itself in. Sourced by in_usbip.sh.
 head_start "{type: usb, attach: on}" --pace fast
 check_enumeration "socket pair" 512

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # Inside the guest: a head that the stock tool plugs in. Sourced by in_usbip.sh.
 head_start "{type: usb}" --pace fast
 check "usbip list shows it" sh -c "usbip list -r 127.0.0.1 2>/dev/null | grep 1209:0001"

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 . /in_usb.sh
 . /hashes.sh
 export CONSOLE=/dev/ttyACM0

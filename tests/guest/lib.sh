@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # The host's side of the guest tests: a real kernel in QEMU, and what it says as TAP. Sourced by tests/guest/test_kernel_*.sh.
 #
 #   guest_prepare                  kernel, modules and libraries into $BUILD/guest; skips the test where that can't be

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/guest/plan_room.h"
 
 #include <math.h>

@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: MIT
 # Each scenario of config/faults over usb, on the virtual host controller of a guest: sh tests/guest/soak.sh SECONDS
 # [SCENARIO...]. The lines "# FILE NAME TEXT" of its output are the sheets, line by line; tests/soak/soak.sh takes them.
 . tests/guest/lib.sh

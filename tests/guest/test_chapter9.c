@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Chapter 9 of the USB specification: standard requests, wrong lengths and indices. */
 #include "tests/guest/chapter9.h"
 

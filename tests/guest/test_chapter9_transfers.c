@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Halted endpoints, zero-length packets, transfers cancelled at each stage, resets back to back. */
 #include "tests/guest/chapter9.h"
 

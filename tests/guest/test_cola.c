@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A head that shows itself as a SICK TiM561: what its users' programs find and do over libusb.
  *
  * The sequence is sick_tim's: open by ids, claim interface 0, bulk OUT 02h and bulk IN 81h with reads of 65535 bytes;

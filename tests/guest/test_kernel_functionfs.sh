@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: MIT
 # The head as a gadget of the kernel at high and then at super speed, on a device controller that dummy_hcd makes up.
 . tests/guest/lib.sh
 guest_prepare

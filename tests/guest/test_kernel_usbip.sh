@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: MIT
 # The head on this machine's virtual host controller: by socket pair and without any tool; then as a USB/IP server, by TCP
 # with the stock tool.
 . tests/guest/lib.sh

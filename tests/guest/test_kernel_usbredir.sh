@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: MIT
 # The head as a device of a virtual machine: its process on the host, usbredir between the two. The guest says when the
 # process is to be killed and started again.
 . tests/guest/lib.sh

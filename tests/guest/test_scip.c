@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A head that shows itself as a Hokuyo URG-04LX: what its users' programs find and do, through the system's own driver.
  *
  * The sequence is urg_library's: open without waiting, set the line, throw away what is there, a bare line end, QT,

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The client's side of a head on a real bus: console, a scan with every frame looked at, and unplugging in its middle.
  *
  * From the environment: SOURCE (default usb), CONSOLE (a tty), PLUG and UNPLUG (shell

@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: MIT
 # 64-bit ARM: cross-built with the libraries of an arm64 Debian, under qemu-aarch64
 here=$(dirname "$0") build=$1 at=$2
 . "$here/lib.sh"

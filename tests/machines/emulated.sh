@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: MIT
 # One test program under an emulator, for run_tap.sh: sh tests/machines/emulated.sh PROGRAM EMULATOR...
 # A program that isn't done within $LIMIT_S seconds of processor time, and had no failure until then, is skipped and says so.
 # What can't be had under an emulator, as PROGRAM reason:

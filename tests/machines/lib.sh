@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # What the machines share; sourced by their scripts with $build, and $at: the folder of this machine, which is kept.
 set -u
 nicely="nice -n 5"

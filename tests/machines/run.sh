@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: MIT
 # The tests on other machines: sh tests/machines/run.sh BUILD MACHINE...   (make machines)
 #
 # A machine is a script of this folder, MACHINE.sh. It is given the folder BUILD/machines/MACHINE, which is kept: its root

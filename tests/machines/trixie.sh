@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: MIT
 # Debian 13 in a root of its own: Embree 4, gcc 14, clang 19; all of make test
 here=$(dirname "$0") build=$1 at=$2
 . "$here/lib.sh"

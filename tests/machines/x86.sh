@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: MIT
 # Another x86 processor, by QEMU's name of it: the programs of this machine as they are. sh x86.sh BUILD FOLDER CPU ISA
 here=$(dirname "$0") build=$1 at=$2
 . "$here/lib.sh"

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # The list of small faults; to be sourced, with the root of the tree as the working folder.
 
 # mutants_list FILE...: a line a patch of five fields, apart by \037: the file, the fault, the tests that find it, why none

@@ -1,4 +1,5 @@
 #!/bin/bash
+# SPDX-License-Identifier: MIT
 # Puts one small fault after the other into a copy of the tree, and looks whether the tests see it.
 #
 #   run.sh [-j JOBS] [-a] BUILD [PATTERN]

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // Chromium without a window, told what to do by the DevTools protocol over a pipe: it ends with this program, however that
 // ends, and opens no port for it. Its profile is its own; no address but 127.0.0.1 is found.
 import {spawn, spawnSync} from 'node:child_process';

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What a recording (.shs) holds, for a page to be compared with: prints JSON with the number of echoes and shots, the
 bounds of all echoes in the scene's frame, and the hash over all records of the points frames: counts.py FILE.shs
 

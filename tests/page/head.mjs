@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // The program under test: heads with their ready line, recordings, and a client by TCP that shares nothing with the page.
 import {spawn, spawnSync} from 'node:child_process';
 import {createConnection} from 'node:net';

@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: MIT
 # The page in a real browser: what it shows beside what was recorded, and what it does to its head. Prints TAP; skipped where
 # the browser or node is missing. $SCANHEAD: the program. CHROMIUM=... names another browser.
 set -u

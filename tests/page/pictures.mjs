@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // make page-pictures: the page of a scan in progress, of that scan done, and of its recording, in three widths and both
 // themes, to be looked at.   node tests/page/pictures.mjs [--out FOLDER] [--only WORD] [--best FILE]
 // --best: the picture of the first page alone: config/demo.yaml from its three stations, 1280 x 900.

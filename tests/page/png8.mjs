@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // A picture with 256 colours: a PNG of a browser's (8 bits a channel, not interlaced) as a smaller one, for documents.
 // Needs node 20.15 or later.
 import zlib from 'node:zlib';

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // The scene of the page's tests, and what the page has to show of it.
 import {execFileSync} from 'node:child_process';
 import {resolve} from 'node:path';

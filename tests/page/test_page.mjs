@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // The page of a head, of a recording, and of a head that goes: in one browser. What is expected is computed by others:
 // `record`, the Python client, and a client by TCP.
 import {createServer} from 'node:http';

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // A folder of one's own and what was started, both gone at the end, whatever kind of end it is; and TAP.
 import {mkdtempSync, rmSync, writeFileSync} from 'node:fs';
 import {tmpdir} from 'node:os';

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A panorama in Blender: an independent synthetic scanner, made of geometry nodes, to compare scanhead's points with.
 
     blender -b --factory-startup -P blender_scan.py -- SCENE.obj STEP_DEG OUT STATION...

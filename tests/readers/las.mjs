@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // Prints what @loaders.gl/las reads of a LAS file: count, bounds by the header (min, max of x, y, z), then the points.
 import fs from 'node:fs';
 import {parse} from '@loaders.gl/core';

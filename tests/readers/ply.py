@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # Writes x, y, z of a PLY file's vertices, read by its header alone (Python's struct module); with a third name, the corners
 # of its faces there.
 import struct

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Clients of the long soak: those that read all, come and go, stall, or misbehave, one class a kind.
 
 Each is a thread. `visits` counts how often it came, `good` how often it got what a client should get, `turned_away` how often

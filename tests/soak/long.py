@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The long soak: python3 tests/soak/long.py --seconds S --scanhead PROGRAM --out FOLDER
 
 A head of 2.2 million pulses a second on every kind of link, and one of each maker whose protocol we speak. Clients come,

@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: MIT
 # An hour of device time at 10 kHz, recorded, replayed at pace fast over TCP, and recorded again: sh tests/soak/replay_hour.sh
 # SECONDS BUILD. Both files must be the same bytes, with the same hash and as many pulses. Of an hour they have 880 MB each.
 set -eu

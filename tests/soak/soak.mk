@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # Every scenario of config/faults over each kind of link, with our own client; usb in an emulated machine, where it can
 # be had. At the end a table: some ten minutes.
 SOAK_S ?= 30

@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: MIT
 # Each scenario of config/faults over each kind of link, for $1 seconds: sh tests/soak/soak.sh SECONDS BUILD. At the end a
 # table. Status 1 when a verdict is bad. Two heads run at a time. Then the same over usb, one by one, in a guest.
 set -u

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/stability/mesh.h"
 
 #include <math.h>

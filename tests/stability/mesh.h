@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Meshes for the casting tests, put together from parts. */
 #ifndef TESTS_STABILITY_MESH_H
 #define TESTS_STABILITY_MESH_H

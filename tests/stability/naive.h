@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The plain way to cast with Embree, which the stability table shows beside ours: one float mesh with shared
  * vertices, float rays, the range as Embree tells it. */
 #ifndef TESTS_STABILITY_NAIVE_H

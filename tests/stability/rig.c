@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/common/hits.h"
 #include "tests/stability/rig.h"
 

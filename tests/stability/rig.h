@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* One scene seen from one station by ours and by the reference, and what rays of it come to. */
 #ifndef TESTS_STABILITY_RIG_H
 #define TESTS_STABILITY_RIG_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The stability table: a TAP comment line per regime with the naive method's figure, ours and the bound.
  *
  * A row fails where ours breaks the bound, and where the naive method keeps it: then the row proves nothing.

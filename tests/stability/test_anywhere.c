@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Rays that begin anywhere: at the station, within the scene, on faces, at corners, and from a thousand to a million
  * times as far away as the scene is large, up to 1e7 m. Scenes are of what is hard (odd_scenes.h), a third of them at UTM. Beside the reference in long
  * double; and a ray by itself, among others from the same point, and among rays from elsewhere meets the same, to the

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Footprints where a beam of few sub-rays goes wrong: thin things. */
 #include <math.h>
 #include <stdio.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Where plain float coordinates fail: large ones, short and long ranges, grazing incidence. */
 #include <math.h>
 #include <stdio.h>

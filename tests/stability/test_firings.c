@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Firing times and azimuths of a head with a firing table over an hour: pulse periods that are rounded or added
  * up, and angles that are added up. The truth is whole nanoseconds: 55296 a sequence, 2304 a firing. */
 #include <math.h>

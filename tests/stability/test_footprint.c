@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Footprints that one ray stands for, or few: ground under grazing incidence, and edges with every step up to and
  * beyond the pulse's width. The plain ways: the ray in the centre alone, and sub-rays whose returns go into a waveform
  * of bins.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Where common shortcuts on the way to the Earth fail: poles, the antimeridian, zones' borders and exceptions, heights,
  * distance from the anchor. Truth is tests/common/geodesy.h, which shares nothing with GeographicLib. */
 #include <math.h>

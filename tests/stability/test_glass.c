@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Behind a pane: where a second ray that sets out a fixed step behind a float hit meets the pane again. */
 #include <math.h>
 #include <stdio.h>

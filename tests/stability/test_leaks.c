@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Rays aimed at edges and vertices of closed and of nested closed meshes, 2.5 x 10^6 in all with THOROUGH=1, a quarter of
  * them else: none may come out. With none among so many the share of leaks is below 1.2, or 5, in a million at 95 %; `make
  * bench` tries 10^8. Each edge of a mesh is hit some nine times, or twice, and the naive casts, which leak some ten in a

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Meshes as they come: needles, triangles without area, T-junctions, unwelded soups, faces twice over. */
 #include <math.h>
 #include <stdio.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A head that moves: what becomes of points when the pose is held for a line or a tick, or its path cut short. */
 #include <math.h>
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Moving heads among moving bodies: odd scenes (odd_scenes.h), some of them at UTM, with up to three bodies that turn
  * and shift, each an odd scene of its own, and a head that moves through all of it. The caster's points stand beside
  * the reference in long double, which has the bodies' triangles where they are at the time.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Where the head stands and what it stands in: against a wall, in a solid, in a face's plane, among
  * kilometres and millimetres, before surfaces that cross. */
 #include <math.h>

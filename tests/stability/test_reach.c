@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Where rays begin, and how large the scene around a body is, does not make them dear: counted in leaves that a packet
  * is tested against, and in triangles that are looked at one by one. No clock is read.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A head that moves or may go far, a station far away and a body that moves cost what a head costs that stands nearby:
  * whole configurations, counted in leaves that a packet is tested against. No clock is read.
  *

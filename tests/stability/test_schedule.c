@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The schedule over a day, over many changes, and with line rates that do not divide the pulse rate. */
 #include <math.h>
 #include <stdio.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a standing station sees, by a map as one would first write it: a face of a cube in cells, of each cell which
  * triangles may be seen there, and rays decided by the sides of edges. Three ways to see the wrong triangle. */
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Signals that run off the scale, and returns that run into each other: retro-reflectors, and a pane close in front of
  * a wall. */
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Rays that pass the outline of something in front of something else so closely that floats see the wrong
  * one. */
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/bus_rig.h"
 
 size_t make_event(uint8_t *to, size_t room, uint32_t seq)

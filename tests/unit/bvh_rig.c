@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/bvh_rig.h"
 
 const double ORIGIN[3] = {10.0, -20.0, 5.0};

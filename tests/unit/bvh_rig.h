@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* For tests of the BVH alone: a few triangles about ORIGIN, and a BVH. */
 #ifndef TESTS_UNIT_BVH_RIG_H
 #define TESTS_UNIT_BVH_RIG_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/cast_rig.h"
 
 struct scene *box_scene(const double lo[3], const double hi[3])

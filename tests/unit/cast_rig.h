@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* For tests of casting: rooms and planes with known ranges, a head in them, and a scan line cast into a
  * block. */
 #ifndef TESTS_UNIT_CAST_RIG_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/cola_rig.h"
 
 struct protocol_rig cola;

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* For tests of CoLa: a TiM571 or LMS111 in a rig, requests and answers, and a reader of LMDscandata that is written
  * from the layout of its public description alone. */
 #ifndef TESTS_UNIT_COLA_RIG_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Cases of test_config.c: edits of a configuration that loads, which must not. */
 #ifndef TESTS_UNIT_CONFIG_CASES_H
 #define TESTS_UNIT_CONFIG_CASES_H

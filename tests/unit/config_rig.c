@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/config_rig.h"
 
 const char base[] = "head:\n"                     /* 1 */

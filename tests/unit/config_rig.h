@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* For tests of the configuration: one that loads, edits of it in a folder of their own, and what they load as. Run from
  * the top of the source tree. */
 #ifndef TESTS_UNIT_CONFIG_RIG_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/coverage_rig.h"
 
 #include "core/pose.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* For tests of coverage: closed rooms, a head that looks everywhere, and where the walls of an L-shaped room are seen
  * from, worked out by hand. */
 #ifndef TESTS_UNIT_COVERAGE_RIG_H

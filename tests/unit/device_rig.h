@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A device without threads: a small scene, a configuration made for the test, ticks claimed and filled one by
  * one. */
 #ifndef TESTS_UNIT_DEVICE_RIG_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/e57_rig.h"
 
 enum { PAGE = 1024, CONTENT = 1020, MAX_STREAMS = 15 };

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* E57 files by a small reader of their own: pages, sections, packets and bit streams as ASTM E2807 has them. It shares
  * nothing with the project's writer. One file at a time. */
 #ifndef TESTS_UNIT_E57_RIG_H

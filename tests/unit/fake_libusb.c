@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/fake_libusb.h"
 
 struct fake_bus bus;

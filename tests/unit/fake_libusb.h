@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A bus in place of libusb's: its functions, defined here, come before the library's when a test program is linked. One
  * thread, no time of its own: what is scripted happens when events are handled, and when nothing is scripted, `idle` is
  * called, where the test may plug and unplug. What the library would not forgive ends the test: a transfer freed or

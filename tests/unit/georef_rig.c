@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/georef_rig.h"
 
 struct georef *make(enum georef_crs crs, double lat_deg, double lon_deg, double height_m, int zone)

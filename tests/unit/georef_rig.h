@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* For tests of georeferencing: the ellipsoid, one station, comparisons. */
 #ifndef TESTS_UNIT_GEOREF_RIG_H
 #define TESTS_UNIT_GEOREF_RIG_H

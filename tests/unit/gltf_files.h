@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* For tests of glTF: .glb files of a few bytes. Blocks of a buffer become buffer views, in their order; the test writes the
  * rest of the JSON. */
 #ifndef TESTS_UNIT_GLTF_FILES_H

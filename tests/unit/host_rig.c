@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/host_rig.h"
 
 uint8_t out[1 << 18];

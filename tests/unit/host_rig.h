@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* For tests of libscanhead: frames of a head, written to a descriptor, and a handle at its other end. */
 #ifndef TESTS_UNIT_HOST_RIG_H
 #define TESTS_UNIT_HOST_RIG_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/hostile_models.h"
 
 #include <stdio.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Small whole models of the formats that Assimp reads, for breaking. */
 #ifndef TESTS_UNIT_HOSTILE_MODELS_H
 #define TESTS_UNIT_HOSTILE_MODELS_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* IFC files of one product a shape, for tests: records in local numbers, written out with a project around them. */
 #ifndef TESTS_UNIT_IFC_FILES_H
 #define TESTS_UNIT_IFC_FILES_H

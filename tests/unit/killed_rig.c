@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/killed_rig.h"
 
 #include <fcntl.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* For tests of repair: what is on the disk while a recording goes on, and a file that is repaired in place. */
 #ifndef TESTS_UNIT_KILLED_RIG_H
 #define TESTS_UNIT_KILLED_RIG_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What the link tests share: a link under test and waiting for its events. A wait ends with the event, or
  * fails the test after WAIT_MS, which no sound run comes near; nothing sleeps. Once one has failed so, those of the
  * tests after it end after a second. A poll that does not come back in that time ends the program (SIGALRM). */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/native_rig.h"
 
 uint64_t wire(const uint8_t *p, size_t at, int bytes)

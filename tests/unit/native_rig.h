@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* For tests of the native protocol: frames to encode, and their bytes apart from the code under test. */
 #ifndef TESTS_UNIT_NATIVE_RIG_H
 #define TESTS_UNIT_NATIVE_RIG_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/native_stream.h"
 
 uint8_t stream[STREAM_MAX];

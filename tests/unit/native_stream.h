@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* For tests of the parser: a stream of frames and reply lines whose pieces are known, and what the parser finds in it.
  */
 #ifndef TESTS_UNIT_NATIVE_STREAM_H

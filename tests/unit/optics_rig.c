@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/optics_rig.h"
 
 const double STATION[3] = {0.5, 0.25, 0.125};

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* For tests of glass and mirrors: a head in a room, whose surfaces are set by hand, and sheets across its way. */
 #ifndef TESTS_UNIT_OPTICS_RIG_H
 #define TESTS_UNIT_OPTICS_RIG_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/pacing_rig.h"
 
 #ifndef SH_SANITIZE

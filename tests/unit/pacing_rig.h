@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Finds what the pacing thread must not do. Functions that allocate, lock or print are replaced by ones that look who
  * calls them. A filter of the kernel's (seccomp) shows every system call of the thread but those that it needs: to sleep by
  * the clock, to read it, the futexes of semaphores, and wake-ups: 8 bytes to an eventfd.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What page_native.mjs compares notices with: page_hurt.py NAME writes streams with random faults of every kind,
 NAME-0.shs and more, and for each NAME-0.notices, what the client in Python notices and takes of it, a line each."""
 import os

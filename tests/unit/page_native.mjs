@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // The page's decoder (drivers/link/web/native.js): samples of SAMPLES.md value by value, damage, and recordings beside
 // the client in Python. TAP on standard output.
 //

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // The page's panels without a browser: contrast of its colours, what a head says of its settings, events in words, the
 // files of a recording. Expected values are by hand.
 import {readFileSync} from 'node:fs';

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // The points from before a page came (drivers/link/web/past.js): each points frame is shown once, whichever way it comes,
 // whatever the page's connections did meanwhile. TAP on standard output. The stream is made here, with a keeper of it that
 // answers as the head's does.

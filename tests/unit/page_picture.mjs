@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // The pure parts of the page's picture (drivers/link/web): the points that are held and their order, the camera, colours
 // and limits, picking, dragging, levels of detail, the scene's bytes. TAP on standard output.
 import {Cloud, BLOCK, evenOrder, pointOf} from '../../drivers/link/web/cloud.js';

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What page_native.mjs compares with: page_points.py NAME..., for each NAME.shs the files NAME.points, of each echo
 x, y, z (scene, m), t (s), range (m), reflectance, amplitude (dB), label, echo, echoes and pulse as doubles, and
 NAME.said, the hash of points and the number of shots."""

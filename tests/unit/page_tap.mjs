@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // Runs tests one after the other, and prints TAP.
 const tests = [];
 export const test = (name, run) => tests.push([name, run]);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/ply_rig.h"
 
 char dir[] = "/tmp/test_ply_XXXXXX";

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* For tests of the PLY and raw recorders: a stream, recorded, and the file's bytes. */
 #ifndef TESTS_UNIT_PLY_RIG_H
 #define TESTS_UNIT_PLY_RIG_H

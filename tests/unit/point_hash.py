@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The hash of points of a recording, as drivers/link/web/README.md defines it: point_hash.py FILE.shs"""
 import os
 import struct

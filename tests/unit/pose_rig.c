@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/pose_rig.h"
 
 const double DEG = M_PI / 180.0;

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* For tests of poses. */
 #ifndef TESTS_UNIT_POSE_RIG_H
 #define TESTS_UNIT_POSE_RIG_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/pty_rig.h"
 
 pid_t fork_child(void)

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* For tests of the pty link: its clients, in this process and in children. */
 #ifndef TESTS_UNIT_PTY_RIG_H
 #define TESTS_UNIT_PTY_RIG_H

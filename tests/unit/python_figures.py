@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Figures of the client in Python that few streams show: python_figures.py numpy|plain prints "same", or "no numpy"."""
 import math
 import os

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/recorder_rig.h"
 
 static char rig_dir[] = "/tmp/test_recorder_XXXXXX";

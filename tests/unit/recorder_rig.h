@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* For tests of recorders: a stream written shot by shot, recorded, and the file's bytes. */
 #ifndef TESTS_UNIT_RECORDER_RIG_H
 #define TESTS_UNIT_RECORDER_RIG_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/repair_rig.h"
 
 #include <sys/stat.h>

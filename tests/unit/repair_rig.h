@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* For tests of repair: what killed recorders leave, beside the whole files of the same small stream. */
 #ifndef TESTS_UNIT_REPAIR_RIG_H
 #define TESTS_UNIT_REPAIR_RIG_H

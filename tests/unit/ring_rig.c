@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/ring_rig.h"
 
 const struct ring_size SIZE = {AHEAD, QUEUE, SPARE, SLOT_BYTES};

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* For tests of the ring: a small one, made anew for each test. */
 #ifndef TESTS_UNIT_RING_RIG_H
 #define TESTS_UNIT_RING_RIG_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* For tests of the scene: files in a folder of their own, a load that collects warnings. */
 #ifndef TESTS_UNIT_SCENE_FILES_H
 #define TESTS_UNIT_SCENE_FILES_H

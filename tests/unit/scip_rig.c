@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/scip_rig.h"
 
 struct protocol_rig rig;

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* For tests of SCIP: a head that spins, what its session answers, and a decoder of scans written from the
  * protocol's description alone. */
 #ifndef TESTS_UNIT_SCIP_RIG_H

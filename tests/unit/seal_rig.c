@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/seal_rig.h"
 
 #include "core/rng.h"

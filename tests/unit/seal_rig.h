@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Units whose content is changed and whose checksums are made right again, for each protocol that has units: what a
  * reader that knows the protocol's description alone makes of them. */
 #ifndef TESTS_UNIT_SEAL_RIG_H

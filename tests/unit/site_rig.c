@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/site_rig.h"
 
 enum { MAX_FILES = 8 };

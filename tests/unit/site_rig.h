@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* For tests that load a site from a configuration: a folder of their own, what the load warned of. */
 #ifndef TESTS_UNIT_SITE_RIG_H
 #define TESTS_UNIT_SITE_RIG_H

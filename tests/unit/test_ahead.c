@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* How far ahead casters are: as far as loop.ahead_ms allows, and never further. A command waits for the ticks that are
  * claimed already, and the ring has slots for so many. */
 #include "tests/unit/device_rig.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Lines of a campaign's manifest: what is written is read, what isn't whole is none; files that a mesh names. */
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a campaign varies: values, combinations in their order, stations, shards, names of files. */
 #include <setjmp.h>
 #include <stdarg.h>

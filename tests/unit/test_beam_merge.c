@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Returns of a pulse -> echoes, and figures of a beam: by the definitions of core/footprint.h, in numbers that can be
  * done by hand. */
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Streams whose frames are whole and whose numbers are absurd: nothing is written that is none, and what is left out is
  * counted. Each file's reader would take infinities, or wrapped integers, for points. */
 #include "tests/unit/recorder_rig.h"

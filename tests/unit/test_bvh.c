@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Rays that float misjudges: two surfaces within its resolution of each other, a sheet along the ray, one that the ray
  * begins on. */
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Leaves: each triangle is in one of them, with its own corners; and memory of large scenes. */
 #include <math.h>
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A face that stands twice in a mesh is met as the first of the two, wherever it is met, whatever its label and however
  * large it is. Where any number of faces lie within 1e-12 of the nearest range, the first is met. */
 #include <math.h>

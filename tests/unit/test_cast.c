@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Casting: ranges against planes worked out in long double, independence of the cuts, limits and noise. */
 #include <math.h>
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Casting: what the counts on the wire mean. Angles, senses of rotation, encoders, positions, and frames far
  * from the origin. */
 #include "tests/common/hits.h"

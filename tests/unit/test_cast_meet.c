@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What pulses meet, with the triangles: the same pulses and ranges as casting has them, in a room with a sheet of glass
  * and a mirror, with and without a model of the signal. */
 #include "tests/unit/site_rig.h"

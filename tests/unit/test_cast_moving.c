@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A head that moves while it casts: each pulse from its own place, in its own direction. Against long double. */
 #include "tests/common/hits.h"
 #include "tests/unit/cast_rig.h"

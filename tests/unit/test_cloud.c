@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Reading recorded point clouds. */
 #include <math.h>
 

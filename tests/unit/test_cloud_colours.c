@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Colours, ranges and reflectances of recorded clouds. */
 #include <math.h>
 

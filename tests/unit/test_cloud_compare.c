@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Point clouds against a scene: the way back to it, distances and statistics with known answers. */
 #include <math.h>
 #include <setjmp.h>

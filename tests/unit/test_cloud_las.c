@@ -1,9 +1,11 @@
+/* SPDX-License-Identifier: MIT */
 /* LAS files as clouds: what the recorder wrote, which other people's readers check elsewhere, and broken ones. */
 #include "core/cloud.h"
 #include "tests/unit/recorder_rig.h"
 
-static const struct rig_point points[] = {
-    {3000, -4000, 12000, -1234, 7, 1, 2}, {3001, -4001, 12001, INT16_MIN, 40008, 2, 2}, {0, 0, 0, INT16_MIN, 0xffff, 0, 0}};
+static const struct rig_point points[] = {{3000, -4000, 12000, -1234, 7, 1, 2},
+                                          {3001, -4001, 12001, INT16_MIN, 40008, 2, 2},
+                                          {0, 0, 0, INT16_MIN, 0xffff, 0, 0}};
 
 static void write_las(uint32_t crs, uint32_t epsg, int geo)
 {
@@ -198,7 +200,8 @@ static void test_label_behind_others(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_read), cmocka_unit_test(test_geodetic), cmocka_unit_test(test_label_behind_others), cmocka_unit_test(test_degrees),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_read), cmocka_unit_test(test_geodetic),
+                                       cmocka_unit_test(test_label_behind_others), cmocka_unit_test(test_degrees),
                                        cmocka_unit_test(test_broken)};
     return cmocka_run_group_tests(tests, rig_set_up, rig_tear_down);
 }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* CoLa's commands: the sequences of real clients, both forms, log-in, errors, and what is no telegram. */
 #include "tests/unit/cola_rig.h"
 

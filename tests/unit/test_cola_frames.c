@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* CoLa's frames: both forms on one connection, what is no telegram, and telegrams that are broken at random. */
 #include "tests/unit/cola_rig.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* CoLa: line rate and step of a head that has some, by mLMPsetscancfg. */
 #include "tests/unit/cola_rig.h"
 

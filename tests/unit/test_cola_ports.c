@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* CoLa: fields, inputs and outputs, in the forms of real scanners (an LMS111 V1.80.2 and a TiM781S V3.13). */
 #include "tests/unit/cola_rig.h"
 

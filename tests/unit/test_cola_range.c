@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* CoLa: LMPoutputRange. What is written, read back, said and sent. */
 #include "tests/unit/cola_rig.h"
 

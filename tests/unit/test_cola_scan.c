@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* CoLa's LMDscandata: what stands in it against the ranges, times and angles that went in. Read back by the public
  * layout alone (cola_rig). */
 #include <math.h>

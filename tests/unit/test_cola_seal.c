@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* CoLa: LMDscandata whose values are changed on request, with a check byte that is right. Read by the public layout
  * alone (cola_rig). */
 #include "tests/unit/cola_rig.h"

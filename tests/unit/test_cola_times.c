@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* CoLa's LMDscandata: its times and counters, what is lost, and when it is sent. */
 #include <math.h>
 

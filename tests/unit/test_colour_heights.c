@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Heights that colours show of points in a CRS, beside the scene's own: georeferencing takes points there, the recorder takes
  * their heights back. */
 #include <math.h>

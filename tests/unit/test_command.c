@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Command lines one by one: replies, errors, the status byte, places, faults on request. */
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Headers of commands: long and short forms, in any case and from the root, nothing between or beyond them; and that
  * HELP? lists them all. */
 #include <setjmp.h>

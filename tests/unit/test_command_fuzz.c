@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* No line whatever may crash the command set, get more than one reply or one error, or leave settings that
  * the head could not run with. Fixed seeds: a failure names the line and comes again. */
 #include <setjmp.h>

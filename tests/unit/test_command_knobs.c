@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Ranges, noise and angular steps as settings, and settings that describe themselves. Expected values by hand. */
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* COMMANDS.md beside the table of commands: what stands in its columns is what the commands do. */
 #include <setjmp.h>
 #include <stdarg.h>
@@ -97,12 +98,12 @@ static void fill_line(char line[256], const struct command_row *row, int query)
 {
     size_t len = strcspn(row->header, "[");
     snprintf(line, 256, "%.*s%s", (int)len, row->header,
-             query          ? "?"
+             query               ? "?"
              : is_of_faults(row) ? (strstr(row->header, "ADD") != NULL ? " {kind: drop}" : " ALL")
-             : row->own     ? " 1, DEF"
-             : row->setting ? " DEF"
-             : row->unit    ? " 1"
-                            : "");
+             : row->own          ? " 1, DEF"
+             : row->setting      ? " DEF"
+             : row->unit         ? " 1"
+                                 : "");
 }
 
 static int refused(const struct command_row *row, enum head_state state, uint32_t control)

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The error queue and the collector of lines. */
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Numbers, ranges, control and effects of the command set. */
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The configuration: what it takes, what it refuses and where it says so. */
 #include "tests/common/thorough.h"
 #include "tests/unit/config_cases.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Faults that change what is measured: heads that can't have them are told why. */
 #include "tests/unit/config_rig.h"
 

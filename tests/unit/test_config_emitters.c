@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Emitters of head profiles: what follows from them, and what is refused, with file, line and key. */
 #include "tests/unit/config_rig.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* All faults of a configuration at once, in their order, and none that only follows from another one; and
  * files that are none. */
 #include "tests/unit/config_rig.h"

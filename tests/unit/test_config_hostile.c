@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Configurations that are made to cost much: anchors without end, lists that name each other, a document within itself.
  * Each is refused by a limit, with its line, long before it costs anything. Depth and size: test_config. */
 #include "tests/unit/config_rig.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Head profiles: those that come with the program, and what is refused of one. */
 #include "tests/unit/config_rig.h"
 

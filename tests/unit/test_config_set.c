@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* --set: values changed and elements added on the command line. */
 #include "tests/unit/config_rig.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The configuration table itself: its reference, its example, and the soundness of its rows. */
 #include "tests/unit/config_rig.h"
 
@@ -10,8 +11,7 @@ static void the_reference_names_every_key(void **state)
     config_print_reference(out);
     fclose(out);
     char *joined = strdup(text); /* help texts are wrapped */
-    for (char *at = joined; (at = strstr(at, "\n    ")) != NULL;)
-    {
+    for (char *at = joined; (at = strstr(at, "\n    ")) != NULL;) {
         memmove(at + 1, at + 5, strlen(at + 5) + 1);
         *at = ' ';
     }
@@ -20,8 +20,7 @@ static void the_reference_names_every_key(void **state)
         for (size_t i = 0; i < tables[t]->n; i++) {
             const struct cfg_key *key = &tables[t]->keys[i];
             snprintf(line, sizeof line, "\n%s\n", key->path);
-            if (strstr(text, line) == NULL || strstr(joined, key->help) == NULL)
-                fail_msg("%s is not there", key->path);
+            if (strstr(text, line) == NULL || strstr(joined, key->help) == NULL) fail_msg("%s is not there", key->path);
         }
     free(text);
     free(joined);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Copies of meshes in a BVH against the same triangles written out: the same hits, labels and incidences. */
 #include <math.h>
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A run that takes more than ten times what its plan says is warned of: by figures that the test brings, and once in a
  * loop whose plan has next to nothing for a pulse. */
 #include "tests/unit/device_rig.h"

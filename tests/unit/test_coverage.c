@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Coverage: areas are kept, a box is seen as a whole, an L-shaped room as geometry says, whatever the threads. */
 #include "tests/unit/coverage_rig.h"
 

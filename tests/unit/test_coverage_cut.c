@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Triangles in pieces: their areas add up, none is too large, and points are found in the piece that holds them. And sums
  * over cells. */
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The next station: places where a tripod can stand, and what would be gained there. */
 #include "tests/unit/coverage_rig.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Named coordinate reference systems by PROJ, against GeographicLib's UTM and against published places. */
 #include <math.h>
 #include <setjmp.h>

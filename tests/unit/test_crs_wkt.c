@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What CRS texts say, and LAS 1.2's keys: meridians, false origins, axes, codes and kinds of heights (EPSG). */
 #include "drivers/record/crs_wkt.h"
 #include "drivers/record/las_header.h"

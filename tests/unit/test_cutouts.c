@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Holes that textures cut out: where a ray goes on is computed here ray by ray, from the texels as they are
  * written, without the head's code. */
 #include "tests/unit/scene_files.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Coarse meshes by vertex clustering: counts by hand, bounds, what is refused. */
 #include <math.h>
 #include <setjmp.h>

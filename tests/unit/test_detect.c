@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Surfaces, signal, zones and the ball, against closed forms. */
 #include "tests/common/cases.h"
 

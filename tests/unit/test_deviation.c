@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Deviations along beams, and what is expected of them, by hand. */
 #include <math.h>
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The device in device time: each tick claimed by the test, with no threads and no clock. */
 #include "tests/common/cases.h"
 #include "tests/unit/device_rig.h"

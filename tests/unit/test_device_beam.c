@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Faults that change what is measured, tick by tick: where they begin and end, and that no pulse is lost by it. */
 #include "tests/unit/device_rig.h"
 

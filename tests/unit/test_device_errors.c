@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Events of errors: how many of them, and that none is forgotten. */
 #include "tests/unit/device_rig.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Faults of the head's states, power, time and counters, as the device carries them out: tick by tick. */
 #include "tests/unit/device_rig.h"
 

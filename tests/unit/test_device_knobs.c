@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Commands that change what a scan is planned for: the scan is that of a head with the same keys, byte by byte; the one
  * before and the one after are not touched. */
 #include "tests/unit/device_rig.h"

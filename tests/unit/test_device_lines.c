@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What the device's ticks hold, as a client adds it up: no pulse and no line is lost or doubled, however a
  * scan goes on and ends. */
 #include "tests/common/cases.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Ticks that the head could not compute in time: what was in them is said again. */
 #include "tests/unit/device_rig.h"
 

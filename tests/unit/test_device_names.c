@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Names of surfaces on the wire: all of them reach who joins late, also names so long that a chunk takes two frames. */
 #include "tests/unit/device_rig.h"
 

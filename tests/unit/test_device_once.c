@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What sessions of other protocols than the native one have of the device: commands without lasting control, what the
  * head is at the moment, UTC and fixes. */
 #include "tests/unit/device_rig.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Where the head is: on a trajectory, after its end, and on a platform whose poses come live. */
 #include <math.h>
 
@@ -153,20 +154,13 @@ static void a_fix_is_where_the_head_was(void **state)
     assert_non_null(f);
     fputs("x_m,y_m,z_m,speed_m_s\n0,0,0,20\n0,100,0,20\n", f);
     assert_int_equal(fclose(f), 0);
-    const char *const sets[] = {"platform.kind=trajectory",
-                                set,
-                                "stations[1].name=b",
-                                "head.frames=0",
-                                "stations[0].lat_deg=0",
-                                "stations[0].lon_deg=11",
-                                "stations[0].height_m=0",
-                                "stations[1].lat_deg=1",
-                                "stations[1].lon_deg=11",
-                                "stations[1].height_m=0",
-                                "links[0].type=null",
-                                "links[0].protocol=nmea",
-                                "gnss.rate_hz=10",
-                                "time.epoch=2026-01-01T00:00:00Z"};
+    const char *const sets[] = {"platform.kind=trajectory", set,
+                                "stations[1].name=b",       "head.frames=0",
+                                "stations[0].lat_deg=0",    "stations[0].lon_deg=11",
+                                "stations[0].height_m=0",   "stations[1].lat_deg=1",
+                                "stations[1].lon_deg=11",   "stations[1].height_m=0",
+                                "links[0].type=null",       "links[0].protocol=nmea",
+                                "gnss.rate_hz=10",          "time.epoch=2026-01-01T00:00:00Z"};
     struct rig *rig = rig_open(&(struct device_options){.start = 1}, sets, 14);
     const int64_t t0_ns = (int64_t)rig_wait(rig, NATIVE_EV_SCAN_START, 1000)->b;
     rig_go_to(rig, rig->next + 1500);

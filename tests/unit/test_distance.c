@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Distance to the scene against brute force in 113-bit arithmetic by another algorithm. */
 #include <math.h>
 #include <setjmp.h>

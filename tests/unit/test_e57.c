@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* E57 files, by a reader of the test's own. */
 #include "tests/unit/e57_rig.h"
 
@@ -91,10 +92,14 @@ static void test_xml(void **state)
         assert_true(fabs(e57rig_number(turn, name[i]) - want[i]) < 1e-15);
     for (int i = 0; i < 3; i++)
         assert_true(e57rig_number(shift, name[i + 1]) == a.anchor[i]);
-    assert_true(fabs(e57rig_number(e57rig_xml, "xMinimum")) < 1e-9 && fabs(e57rig_number(e57rig_xml, "xMaximum") - 4.001) < 1e-9);
-    assert_true(fabs(e57rig_number(e57rig_xml, "yMinimum")) < 1e-9 && fabs(e57rig_number(e57rig_xml, "yMaximum") - 3.001) < 1e-9);
-    assert_true(fabs(e57rig_number(e57rig_xml, "zMinimum") + 5) < 1e-9 && fabs(e57rig_number(e57rig_xml, "zMaximum") - 12.001) < 1e-9);
-    assert_true(e57rig_number(e57rig_xml, "intensityMinimum") == -12.34 && e57rig_number(e57rig_xml, "intensityMaximum") == 327.67);
+    assert_true(fabs(e57rig_number(e57rig_xml, "xMinimum")) < 1e-9 &&
+                fabs(e57rig_number(e57rig_xml, "xMaximum") - 4.001) < 1e-9);
+    assert_true(fabs(e57rig_number(e57rig_xml, "yMinimum")) < 1e-9 &&
+                fabs(e57rig_number(e57rig_xml, "yMaximum") - 3.001) < 1e-9);
+    assert_true(fabs(e57rig_number(e57rig_xml, "zMinimum") + 5) < 1e-9 &&
+                fabs(e57rig_number(e57rig_xml, "zMaximum") - 12.001) < 1e-9);
+    assert_true(e57rig_number(e57rig_xml, "intensityMinimum") == -12.34 &&
+                e57rig_number(e57rig_xml, "intensityMaximum") == 327.67);
     assert_true(e57rig_number(e57rig_xml, "rowMinimum") == 6 && e57rig_number(e57rig_xml, "rowMaximum") == 9);
     assert_true(e57rig_number(e57rig_xml, "columnMinimum") == 3 && e57rig_number(e57rig_xml, "columnMaximum") == 3);
     assert_true(e57rig_number(e57rig_xml, "returnMaximum") == 1);
@@ -133,7 +138,8 @@ static void test_bounds_of_empty_shots(void **state)
     rig_anchor(&a);
     rig_points(0, 0, 0, (struct rig_point[]){empty, far, empty}, 3);
     record_e57(1);
-    assert_true(fabs(e57rig_number(e57rig_xml, "xMinimum") - 4) < 1e-9 && fabs(e57rig_number(e57rig_xml, "zMinimum") - 12) < 1e-9);
+    assert_true(fabs(e57rig_number(e57rig_xml, "xMinimum") - 4) < 1e-9 &&
+                fabs(e57rig_number(e57rig_xml, "zMinimum") - 12) < 1e-9);
 }
 
 /* More records than a packet holds, with streams of one, two and four bits across its edge. */
@@ -196,8 +202,10 @@ static void test_colours(void **state)
     }
     for (int i = 0; i < 3; i++)
         assert_non_null(strstr(e57rig_xml, name[i]));
-    assert_true(strstr(e57rig_xml, name[0]) < strstr(e57rig_xml, name[1]) && strstr(e57rig_xml, name[1]) < strstr(e57rig_xml, name[2]));
-    assert_true(e57rig_number(e57rig_xml, "colorRedMinimum") == 0 && e57rig_number(e57rig_xml, "colorBlueMaximum") == 255);
+    assert_true(strstr(e57rig_xml, name[0]) < strstr(e57rig_xml, name[1]) &&
+                strstr(e57rig_xml, name[1]) < strstr(e57rig_xml, name[2]));
+    assert_true(e57rig_number(e57rig_xml, "colorRedMinimum") == 0 &&
+                e57rig_number(e57rig_xml, "colorBlueMaximum") == 255);
 }
 
 static void test_no_points(void **state)
@@ -257,9 +265,14 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_scans),     cmocka_unit_test(test_xml),        cmocka_unit_test(test_packets),
-        cmocka_unit_test(test_no_points), cmocka_unit_test(test_same_bytes), cmocka_unit_test(test_disk_full),
-        cmocka_unit_test(test_colours),   cmocka_unit_test(test_intensity_limits),
+        cmocka_unit_test(test_scans),
+        cmocka_unit_test(test_xml),
+        cmocka_unit_test(test_packets),
+        cmocka_unit_test(test_no_points),
+        cmocka_unit_test(test_same_bytes),
+        cmocka_unit_test(test_disk_full),
+        cmocka_unit_test(test_colours),
+        cmocka_unit_test(test_intensity_limits),
         cmocka_unit_test(test_bounds_of_empty_shots),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* E57 files whose recorder was killed, or whose disk was full: what a repair makes of them, wherever they end. */
 #include "tests/unit/e57_rig.h"
 #include "tests/unit/killed_rig.h"
@@ -400,11 +401,8 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_cuts),
-        cmocka_unit_test(test_end),
-        cmocka_unit_test(test_refused),
-        cmocka_unit_test(test_elsewhere),
-        cmocka_unit_test(test_absurd),
+        cmocka_unit_test(test_cuts),      cmocka_unit_test(test_end),    cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_elsewhere), cmocka_unit_test(test_absurd),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Frames made anew: their headers read back by their offsets, their checksums summed by another way, and a connection
  * whose numbers fit. */
 #include <setjmp.h>

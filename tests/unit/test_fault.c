@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Faults as data: when one strikes, by chance as well; the list of a run; the truth as JSON and as text. */
 #include <setjmp.h>
 #include <stdarg.h>
@@ -72,9 +73,9 @@ static void what_belongs_to_different_places_is_independent(void **state)
     other.seed = 2;
     uint64_t agree[5] = {0};
     for (uint64_t number = 1; number <= N; number++) {
-        const uint64_t all[] = {fault_random(&one, 1, 1, number, 0),   fault_random(&other, 1, 1, number, 0),
-                                fault_random(&one, 2, 1, number, 0),   fault_random(&one, 1, 2, number, 0),
-                                fault_random(&one, 1, 1, number, 1),   fault_random(&one, 1, 1, number + 1, 0)};
+        const uint64_t all[] = {fault_random(&one, 1, 1, number, 0), fault_random(&other, 1, 1, number, 0),
+                                fault_random(&one, 2, 1, number, 0), fault_random(&one, 1, 2, number, 0),
+                                fault_random(&one, 1, 1, number, 1), fault_random(&one, 1, 1, number + 1, 0)};
         for (int i = 0; i < 5; i++)
             agree[i] += (uint64_t)__builtin_popcountll(~(all[0] ^ all[i + 1]));
     }
@@ -176,20 +177,42 @@ static const struct {
     struct fault_note note;
     const char *json, *text;
 } notes[] = {
-    {{.fault = 3, .kind = FAULT_FLIP, .t_ns = 12, .link = 1, .session = 2, .number = 7, .has_seq = 1, .seq = 4294967295u,
-      .type = 3, .has_pulse = 1, .pulse = 900, .byte = 33, .bit = 6, .n = 2, .text = "resealed"},
+    {{.fault = 3,
+      .kind = FAULT_FLIP,
+      .t_ns = 12,
+      .link = 1,
+      .session = 2,
+      .number = 7,
+      .has_seq = 1,
+      .seq = 4294967295u,
+      .type = 3,
+      .has_pulse = 1,
+      .pulse = 900,
+      .byte = 33,
+      .bit = 6,
+      .n = 2,
+      .text = "resealed"},
      "{\"fault\":3,\"kind\":\"flip\",\"t_ns\":12,\"link\":1,\"session\":2,\"of\":\"stream\",\"frame\":7,\"seq\":4294967295,"
      "\"type\":3,\"pulse\":900,\"byte\":33,\"bit\":6,\"n\":2,\"text\":\"resealed\"}\n",
      "fault 3 flip: t_ns 12, link 1, session 2, stream 7, seq 4294967295, pulse 900, byte 33, n 2, resealed"},
-    {{.fault = 1, .kind = FAULT_LATE_REPLY, .t_ns = 5, .link = 2, .session = 9, .of = FAULT_OF_REPLIES, .number = 1,
-      .byte = -1, .for_ms = 12.5},
+    {{.fault = 1,
+      .kind = FAULT_LATE_REPLY,
+      .t_ns = 5,
+      .link = 2,
+      .session = 9,
+      .of = FAULT_OF_REPLIES,
+      .number = 1,
+      .byte = -1,
+      .for_ms = 12.5},
      "{\"fault\":1,\"kind\":\"late_reply\",\"t_ns\":5,\"link\":2,\"session\":9,\"of\":\"replies\",\"reply\":1,"
      "\"for_ms\":12.5}\n",
      "fault 1 late_reply: t_ns 5, link 2, session 9, replies 1, for 12.5 ms"},
     {{.fault = 2, .kind = FAULT_REFUSE, .t_ns = 0, .link = 1, .session = 1, .number = 4, .byte = -1},
-     "{\"fault\":2,\"kind\":\"refuse\",\"t_ns\":0,\"link\":1,\"session\":1,\"connection\":4}\n", NULL},
+     "{\"fault\":2,\"kind\":\"refuse\",\"t_ns\":0,\"link\":1,\"session\":1,\"connection\":4}\n",
+     NULL},
     {{.fault = 4, .kind = FAULT_CLOCK_STOP, .t_ns = 99, .byte = -1, .ended = 1},
-     "{\"fault\":4,\"kind\":\"clock_stop\",\"t_ns\":99,\"ended\":true}\n", NULL},
+     "{\"fault\":4,\"kind\":\"clock_stop\",\"t_ns\":99,\"ended\":true}\n",
+     NULL},
 };
 
 static void the_truth_is_written_line_by_line(void **state)
@@ -249,9 +272,19 @@ static void the_longest_note_is_not_cut(void **state)
 {
     (void)state;
     char text[TRUTH_TEXT_LEN];
-    struct fault_note note = {.fault = UINT32_MAX, .kind = FAULT_DESCRIPTOR_LENGTH, .t_ns = INT64_MIN, .link = UINT32_MAX,
-                              .session = UINT32_MAX, .of = FAULT_OF_REPLIES, .number = UINT64_MAX, .has_seq = 1,
-                              .seq = UINT32_MAX, .has_pulse = 1, .pulse = UINT64_MAX, .byte = 65535, .n = 1000000,
+    struct fault_note note = {.fault = UINT32_MAX,
+                              .kind = FAULT_DESCRIPTOR_LENGTH,
+                              .t_ns = INT64_MIN,
+                              .link = UINT32_MAX,
+                              .session = UINT32_MAX,
+                              .of = FAULT_OF_REPLIES,
+                              .number = UINT64_MAX,
+                              .has_seq = 1,
+                              .seq = UINT32_MAX,
+                              .has_pulse = 1,
+                              .pulse = UINT64_MAX,
+                              .byte = 65535,
+                              .n = 1000000,
                               .for_ms = 1e-300 / 3.0};
     strcpy(note.text, "resealed");
     truth_text(&note, text);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Faults on request as the configuration, scenarios and FAULt:ADD read them: which keys a kind has, their limits, and
  * what they are when not given. */
 #include "firmware_sim/command/command.h"
@@ -28,8 +29,8 @@ enum { N_KINDS = sizeof kinds / sizeof kinds[0] };
 
 static const struct {
     const char *key, *value;
-} what[] = {{"n", "5"},     {"byte", "30"}, {"reseal", "on"}, {"for_ms", "3"}, {"factor", "0.5"},
-            {"deg", "1"},   {"hz", "2"},    {"loss_db", "3"}, {"jump_s", "1"}, {"ppm", "5"}};
+} what[] = {{"n", "5"},   {"byte", "30"}, {"reseal", "on"}, {"for_ms", "3"}, {"factor", "0.5"},
+            {"deg", "1"}, {"hz", "2"},    {"loss_db", "3"}, {"jump_s", "1"}, {"ppm", "5"}};
 enum { N_WHAT = sizeof what / sizeof what[0] };
 
 static struct fault fault;

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Faults on the wire, each kind by itself: exactly the frames that it notes are changed, at exactly that byte. All
  * others come as they were, and in order. (Kinds that change when a frame comes are in test_fault_wire_order.c.) */
 #include "drivers/protocol/native.h"
@@ -94,8 +95,8 @@ static void so_many_bits_are_flipped_where_noted(void **state)
         assert_int_equal(count_bits(&rig.item[0]), cases[i].bits);
         assert_int_equal(rig.note[0].n, cases[i].bits);
         if (f.byte >= 0) assert_int_equal(rig.note[0].byte, f.byte);
-        if (cases[i].bits == 1) assert_int_equal(rig.out[rig.note[0].byte] ^ rig.item[0].bytes[rig.note[0].byte],
-                                                 1 << rig.note[0].bit);
+        if (cases[i].bits == 1)
+            assert_int_equal(rig.out[rig.note[0].byte] ^ rig.item[0].bytes[rig.note[0].byte], 1 << rig.note[0].bit);
         rig_end(0);
     }
     f.byte = 68; /* a frame that has no such byte is not hit */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Faults on the wire: when they strike, as they are added and taken out at run time too; what a wire keeps; and mixtures
  * of all kinds by chance, whose output is what their notes say. */
 #include "tests/common/thorough.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Faults on the wire that change when a frame comes, after which others, and in which write: reorder, delay, jitter,
  * stall, split, merge. */
 #include "tests/unit/wire_rig.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Faults on the wire: replies that are missing, late or wrong, echoes, and from which reply on a fault counts. */
 #include "tests/unit/wire_rig.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Figures of clouds, by hand. */
 #include <math.h>
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Schedules with a firing table, against what a data sheet says: firing times as fractions in 128-bit integers. */
 #include "tests/common/cases.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The functionfs back end with a test's files in place of the kernel's: FIFOs for endpoints, which the same
  * asynchronous I/O reads and writes, and a socket pair for ep0. An empty FIFO answers a read as an endpoint does that
  * is not enabled: at once, with -EAGAIN. What a kernel answers itself is left to the guest tests. */

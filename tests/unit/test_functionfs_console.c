@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The console of a gadget, with a socket pair in place of the kernel's tty: it, too, says how much nobody has taken yet
  * (TIOCOUTQ is SIOCOUTQ), and an eventfd in place of the timer. Clients that stop reading, and those who come after them. */
 #include "tests/unit/usb_host.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* How a scene lies on the Earth: stations of one scene agree, directions and scale are right, traps are told. */
 #include <math.h>
 #include <setjmp.h>

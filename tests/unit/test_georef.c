@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Georeferencing against analytic positions on the WGS 84 ellipsoid. */
 #include "tests/unit/georef_rig.h"
 

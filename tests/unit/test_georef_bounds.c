@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Bounds of georeferencing where the scene's frame does not lie level: what is far there may be far up here. */
 #include "core/angle.h"
 #include "core/geoframe.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Heights above a geoid, by a file that the test makes: a surface that rises by a metre a degree of latitude, which the
  * cubic interpolation of GeographicLib reproduces but for rounding. */
 #include <stdlib.h>

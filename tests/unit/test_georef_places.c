@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Georeferencing: places in each system, the map's convergence, another centre, the scale of counts, refusals. */
 #include "core/locate.h"
 #include "tests/unit/georef_rig.h"
@@ -163,8 +164,12 @@ static void test_sides(void **state)
         expect_near(anchor[1], side > 0 ? -11053 : 1e7 + 11053, 1);
         georef_free(georef);
     }
-    struct georef_spec spec = {
-        .crs = GEOREF_UTM, .station_m = {500000, 6e6, 5}, .lat_deg = -36, .lon_deg = 15, .prcs_is_grid = 1, .prcs_zone = 33};
+    struct georef_spec spec = {.crs = GEOREF_UTM,
+                               .station_m = {500000, 6e6, 5},
+                               .lat_deg = -36,
+                               .lon_deg = 15,
+                               .prcs_is_grid = 1,
+                               .prcs_zone = 33};
     struct georef *georef = NULL;
     if (georef_create(&spec, &georef, &err) != SH_OK) fail_msg("%s", err.text);
     assert_int_equal(georef_epsg(georef), 32733);
@@ -189,7 +194,8 @@ static void test_degrees(void **state)
     assert_true(georef_bound_m(georef, GEOREF_EXACT, 100, 10) >= 1e-9);
     georef_free(georef);
     /* a scene whose x axis points north */
-    struct georef_spec spec = {.crs = GEOREF_GEODETIC, .lat_deg = 47, .lon_deg = 9, .rotation = {0, -1, 0, 1, 0, 0, 0, 0, 1}};
+    struct georef_spec spec = {
+        .crs = GEOREF_GEODETIC, .lat_deg = 47, .lon_deg = 9, .rotation = {0, -1, 0, 1, 0, 0, 0, 0, 1}};
     struct sh_err err = {0, ""};
     if (georef_create(&spec, &georef, &err) != SH_OK) fail_msg("%s", err.text);
     georef_axes(georef, axes);
@@ -248,9 +254,9 @@ static void test_refusals(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_places), cmocka_unit_test(test_convergence), cmocka_unit_test(test_recentre),
-        cmocka_unit_test(test_scale),  cmocka_unit_test(test_refusals),
-        cmocka_unit_test(test_sides),  cmocka_unit_test(test_degrees),    cmocka_unit_test(test_orders),
+        cmocka_unit_test(test_places),  cmocka_unit_test(test_convergence), cmocka_unit_test(test_recentre),
+        cmocka_unit_test(test_scale),   cmocka_unit_test(test_refusals),    cmocka_unit_test(test_sides),
+        cmocka_unit_test(test_degrees), cmocka_unit_test(test_orders),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

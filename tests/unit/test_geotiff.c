@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Terrain from GeoTIFF: places and heights against the numbers that were written, holes, what is refused. */
 #include <math.h>
 #include <sys/stat.h>

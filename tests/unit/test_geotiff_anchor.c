@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The anchor that GeoTIFF meshes give: against GeographicLib where the system is UTM, against PROJ elsewhere. */
 #include "tests/unit/site_rig.h"
 

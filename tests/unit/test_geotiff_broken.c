@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Broken GeoTIFFs, and ones too large: a line of text that names the file, and no reader that crashes. */
 #include <tiffio.h>
 

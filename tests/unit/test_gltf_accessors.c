@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Accessors of glTF: types of numbers, strides, sparse ones, bounds; and the modes of primitives. */
 #include "tests/unit/gltf_files.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Extensions of glTF: known and required ones, packed buffers, images of other formats, textures that are turned, names of
  * materials. */
 #include "tests/unit/gltf_files.h"

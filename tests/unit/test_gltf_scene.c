@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The tree of glTF in double, scenes, instances, skins and morph targets in their default pose. */
 #include "tests/unit/gltf_files.h"
 

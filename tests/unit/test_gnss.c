@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The receiver's positions and times, against closed forms of WGS 84. */
 #include "tests/unit/device_rig.h"
 

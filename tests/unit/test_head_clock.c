@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The head's clock: full seconds to the nanosecond, its errors, and what of the device goes by it. */
 #include "tests/unit/device_rig.h"
 

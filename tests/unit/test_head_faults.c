@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Faults in the head: when they begin and end, and what is noted (firmware_sim/device/head_faults.h). */
 #include "firmware_sim/device/head_faults.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* libscanhead over socket pairs and files: what it tells of a stream. */
 #include <fcntl.h>
 #include <math.h>

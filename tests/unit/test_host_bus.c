@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* libscanhead on a bus that is played: what a device calls itself, permissions, several heads, waiting for one. What a
  * real bus does is for tests/guest. */
 #include "tests/unit/bus_rig.h"

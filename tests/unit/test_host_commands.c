@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* libscanhead: commands over a socket pair, a pty and TCP. */
 #include <arpa/inet.h>
 #include <fcntl.h>

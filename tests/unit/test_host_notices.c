@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* libscanhead: what it notices of a stream, of replies and of connections, and when. */
 #include <arpa/inet.h>
 #include <pthread.h>

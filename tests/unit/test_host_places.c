@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* libscanhead: what a frame of points needs of others. Where points are placed and until when, what follows them, whose
  * emitter it is, what the head's clock says, and the turn between two poses. */
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* libscanhead: points of both layouts in metres. */
 #include <math.h>
 

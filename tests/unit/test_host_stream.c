@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* libscanhead: what it counts, hashes and refuses of a stream. */
 #include <nettle/sha2.h>
 

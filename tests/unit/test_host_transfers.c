@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* libscanhead on a bus that is played: transfers that fail, unplugging at each moment, closing with some under way.
  * What a real bus does is for tests/guest. */
 #include "tests/unit/bus_rig.h"

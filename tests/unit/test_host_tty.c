@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* libscanhead on a terminal that was in its usual mode, with echo, while the head was sending: what the head took for
  * commands is answered with errors, and the first command gets its own reply all the same. */
 #include <fcntl.h>

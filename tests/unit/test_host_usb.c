@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* libscanhead: names of USB heads, and a head that goes away and comes back. What a real bus does is for tests/guest.
  */
 #include <arpa/inet.h>

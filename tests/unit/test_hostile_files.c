@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Broken files of the formats that Assimp reads: small models with bytes changed, lines deleted or doubled, numbers
  * made huge, records of another type, cut off. Each either gives a scene or one line that says what is wrong; this
  * process neither dies nor hangs, whatever becomes of Assimp's.

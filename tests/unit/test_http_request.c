@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* HTTP as others speak it: pieces, limits, broken requests, garbage. Through the settings of a VLP-16. */
 #include <setjmp.h>
 #include <stdarg.h>

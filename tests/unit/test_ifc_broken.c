@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* IFC files that are damaged, each by one fault drawn from a seed: both readers answer or are ended, an error is one line,
  * and of what the file's own records still say nothing goes lost without a word. BROKEN_FILES=84: so many (8). The tests are
  * skipped where npm has not installed the readers. */

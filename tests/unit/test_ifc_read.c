@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* IFC by its two readers: shapes with known area and volume, names, units, places far away. The
  * tests that need the readers are skipped where npm has not installed them. */
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The records of IFC files: texts, units, products, what is not whole; and the figures and rules that choose a body. No reader
  * of bodies is needed. */
 #include <math.h>

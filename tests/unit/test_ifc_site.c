@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The site of an IFC model: written files, and the house that Debian ships. */
 #include <math.h>
 #include <setjmp.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* IFC where a reader fails, waits for ever or isn't there: programs of a line in place of the two readers, and what is said of
  * theirs. The tests that need node are skipped where it is not installed. */
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Images: each format against the same picture, wrap modes against texels by hand, and what hostile files may
  * not do. BMP and TGA are written here byte by byte; the JPEG is libjpeg-turbo's of the same picture. */
 #include "tests/unit/scene_files.h"

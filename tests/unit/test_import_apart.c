@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Import by Assimp in a process of its own: what comes back is not trusted; limits, crashes and the end of
  * either process are one line, and nothing stays behind. */
 #include <dlfcn.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Textures as meshes name them: within the file, with wrap modes, a second set of coordinates, and
  * what the format says of alpha. */
 #include "tests/unit/scene_files.h"

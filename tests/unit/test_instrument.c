@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Instrument errors, each against a closed form of its own, and measured in two faces. */
 #include "tests/unit/cast_rig.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Signals of the command line: one is a wish to end in good order, and so are two at once; more mean now. */
 #include <setjmp.h>
 #include <signal.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* LAS files, field by field at the offsets of the ASPRS specification (LAS 1.4 R15). */
 #include "tests/unit/recorder_rig.h"
 

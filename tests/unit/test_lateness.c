@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Percentiles and counts of known latenesses. */
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Which table of leap seconds a head's clock takes: the system's where that reaches further than the built-in one, else
  * the built-in one. The system's file is one of the test's own. */
 #include "tests/unit/device_rig.h"

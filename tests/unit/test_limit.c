@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The limit of test programs (tests/common/limit.c, tests/run_tap.sh): this program is run again with tests that hang. */
 #include <setjmp.h>
 #include <stdarg.h>

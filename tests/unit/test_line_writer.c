@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Lines on their way into a file: whole, in order, and never waited for. What a file does not take is counted, in it and
  * beside it. */
 #include <setjmp.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The links null, file, fd and tcp; pty and udp have their own programs. */
 #include "tests/unit/link_test.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Faults of links on request: what ends, what its client sees, and that the link is as before once they are over. */
 #include <arpa/inet.h>
 #include <limits.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The pty link: one client after the other, and the path it is found at. */
 #include <sys/resource.h>
 #include <sys/stat.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The pty link: clients that come and go at the moments when nobody watches the terminal. The link's own calls of the
  * kernel go through here, so that a client can act within them. */
 #include <poll.h>
@@ -7,9 +8,9 @@
 #include "tests/unit/pty_rig.h"
 
 static struct bench bench;
-static int visitor = -1;              /* a client's descriptor */
-static void (*when_unwatched)(void);  /* called once, after the watch is taken away */
-static void (*between_looks)(void);   /* called once, after poll has looked at all descriptors but the last */
+static int visitor = -1;             /* a client's descriptor */
+static void (*when_unwatched)(void); /* called once, after the watch is taken away */
+static void (*between_looks)(void);  /* called once, after poll has looked at all descriptors but the last */
 
 static void call_once(void (**what)(void))
 {

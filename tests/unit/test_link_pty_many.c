@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The pty link against clients that come and go as fast as they can, many at once, and killed. */
 #include <poll.h>
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What every TCP socket of a head has, whoever accepted it: a peer that vanishes without a word is noticed, and one that
  * comes when there are no descriptors is turned away. The test finds the link's end of a connection among this process's
  * own descriptors. */

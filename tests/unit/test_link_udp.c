@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The udp link: a write is a datagram, whoever listens or doesn't; where packets may go, and where not. */
 #include "tests/unit/link_test.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The web link: what requests get, sessions by WebSocket, and what it does not let in. Clients are bytes on a socket, as
  * RFC 9112 and RFC 6455 write them. */
 #include <sys/socket.h>

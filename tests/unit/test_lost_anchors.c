@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What was to be said in ticks that are lost is said again: descriptor and anchor, on a drive along which the anchor
  * changes. */
 #include "tests/unit/device_rig.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The scan map, read back through libpng's simplified interface. */
 #include <stdarg.h>
 #include <stddef.h>

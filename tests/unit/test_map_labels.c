@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Names on the map, and the map as SVG: read back by a small reader of XML, its image by libpng. */
 #include <stdarg.h>
 #include <stddef.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What single precision takes from a mesh: as much as the format holds is allowed, said, and planned with. */
 #include "tests/common/collada.h"
 #include "tests/unit/scene_files.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Meshes written, and read back by readers that share nothing with the writers: our own of .obj and .ply, Assimp's of .gltf,
  * .glb and .fbx. */
 #include <math.h>

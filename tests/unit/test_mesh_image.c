@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Images of grids that are larger than a texture may be: how many lines and rows share a texel is said, of that scan where
  * it is most. */
 #include "tests/unit/recorder_rig.h"

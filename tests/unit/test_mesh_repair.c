@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Meshes whose recorder was killed while it wrote them, wherever they end. */
 #include "core/mesh.h"
 #include "tests/common/thorough.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* SITE:POSE in the device, without threads: a scan from a station that was moved has the bytes of one whose configuration
  * says that place; what is shared stays; what is not used is freed, once; and what can't be done changes nothing. */
 #include "tests/unit/device_rig.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Frames encoded and decoded: every field at its place, with extreme values. */
 #include "tests/unit/native_rig.h"
 

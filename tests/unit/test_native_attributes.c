@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Frames of attributes, byte by byte: sent behind their points, cut with them, refused where they are wrong. */
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Frames of colours, byte by byte: sent after their points, and after the attributes of these, cut with them, refused where
  * they are wrong. */
 #include <setjmp.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The parser against every single damage. */
 #include "tests/common/thorough.h"
 #include "tests/unit/native_stream.h"

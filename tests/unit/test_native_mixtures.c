@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Random mixtures of faults on a synthetic stream whose truth is known: the parser gives exactly the frames that came
  * whole, in order and for the first time, and notices each thing at its byte.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What the parser notices of a hurt stream: each thing once, at its byte, however the bytes are cut. */
 #include "tests/unit/native_stream.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The parser: bytes in pieces of any size, its limits, and garbage. */
 #include "tests/unit/native_stream.h"
 

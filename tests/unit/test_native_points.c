@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Points encoded and decoded, and cut into frames. */
 #include "tests/unit/native_rig.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The sequence numbers of frames: what is missing, came already, came too late, or begins anew. */
 #include "tests/unit/native_rig.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Counters that begin near their wrap, as a fault on request has them: they pass it as the protocol's page says. */
 #include "tests/unit/cola_rig.h"
 #include "tests/unit/scip_rig.h"

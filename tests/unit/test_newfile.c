@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Files that the program makes: links are not followed, only files are replaced, and two writers never end in one file. */
 #include <errno.h>
 #include <fcntl.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* NMEA sentences against published examples and a reader that shares nothing with the encoder. */
 #include <math.h>
 #include <setjmp.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The GNSS receiver as a protocol: from device time to sentences. */
 #include <setjmp.h>
 #include <stdarg.h>

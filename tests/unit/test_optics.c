@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Glass and mirrors, against rooms whose images can be written down; and detection that asks for nothing. */
 #include "tests/unit/optics_rig.h"
 

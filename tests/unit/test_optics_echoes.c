@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Echoes behind glass, in mirrors and on bodies: which are ghosts, which are sent, and what of them is met. */
 #include "tests/unit/optics_rig.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* drivers/record/outfile.h: beyond OUTFILE_DIRECT_FROM a file is written past the system's cache, in whole blocks. Its bytes
  * are those that were given, whatever their pieces, and whether the file system can do that or not. Files begin with a hole
  * up to there, so that the tests cost little. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Which pulses outlines are near to, beside the geometry alone: a pulse whose footprint reaches an edge is found, wherever
  * it looks and whatever pulses are looked up together with it. */
 #include "tests/common/cases.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Files that a command is to write: none may destroy another, or what is read. */
 #include <setjmp.h>
 #include <stdarg.h>

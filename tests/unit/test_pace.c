@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The pacing thread's decisions on a machine with a clock of its own: in time, late, after the machine stood still. The
  * naive ways are tried beside ours: to sleep up to the next beat while late, and to give a stall no credit. */
 #include <setjmp.h>

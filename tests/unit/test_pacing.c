@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The pacing thread allocates nothing, takes no lock and calls the system for nothing but the clock, the semaphores of
  * threads that sleep, and wake-ups. It is watched (pacing_rig.h) while a head with several links, clients, faults and a hash
  * starts and stops scans, changes its rate so that slots grow, comes too late and catches up again. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The points that a head keeps for pages that come late: pieces that a reader can begin with, bounds, and queries. */
 #include <stdarg.h>
 #include <stddef.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* pcapng, block by block: every frame is a packet with its bytes and its device time. And read back, whole, cut and
  * damaged. */
 #include "core/rng.h"
@@ -214,8 +215,9 @@ static void test_of_others(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_packets), cmocka_unit_test(test_disk_full),
-                                       cmocka_unit_test(test_read), cmocka_unit_test(test_damaged),
-                                       cmocka_unit_test(test_of_others), cmocka_unit_test(test_statistics), cmocka_unit_test(test_loss)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_packets),   cmocka_unit_test(test_disk_full),
+                                       cmocka_unit_test(test_read),      cmocka_unit_test(test_damaged),
+                                       cmocka_unit_test(test_of_others), cmocka_unit_test(test_statistics),
+                                       cmocka_unit_test(test_loss)};
     return cmocka_run_group_tests(tests, rig_set_up, rig_tear_down);
 }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* From a configuration to where its stations stand. Run from the top of the source tree. */
 #include "tests/unit/site_rig.h"
 

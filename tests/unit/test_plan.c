@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Which of several options, and what the plan says about it. */
 #include <math.h>
 #include <setjmp.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Frames of a planar head into whole turns, alone: what is where, and what is missing. A head of 16 steps a turn,
  * of which 3 to 14 are cast and 6 looks ahead; 100 turns a second. */
 #include <setjmp.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The PLY recorder: what it writes is read back by a reader of its own. */
 #include <math.h>
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* core/pose: the attitude convention, what lies between poses, trajectories and their knots. */
 #include "tests/unit/pose_rig.h"
 

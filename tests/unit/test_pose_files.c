@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* core/pose: trajectories from files of samples and of waypoints. */
 #include <unistd.h>
 
@@ -274,15 +275,21 @@ static void test_messages_are_lines(void **state)
     assert_non_null(strstr(err.text, "column \"?[2J??\" is unknown"));
     sh_warn(&report, "%s", "a name\r\n\x1b[0m\x7f \xc3\xa4");
     assert_string_equal(warning, "a name???[0m? \xc3\xa4");
-    sh_warn(&report, "%s", "\xc2\x9b" "2J \xc2\xa7 \xc2"); /* CSI of one character; a sign; half of one */
+    sh_warn(&report, "%s",
+            "\xc2\x9b"
+            "2J \xc2\xa7 \xc2"); /* CSI of one character; a sign; half of one */
     assert_string_equal(warning, "??2J \xc2\xa7 \xc2");
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_csv),       cmocka_unit_test(test_csv_errors),     cmocka_unit_test(test_csv_upright),
-        cmocka_unit_test(test_waypoints), cmocka_unit_test(test_slow_waypoints), cmocka_unit_test(test_level_waypoints),
+        cmocka_unit_test(test_csv),
+        cmocka_unit_test(test_csv_errors),
+        cmocka_unit_test(test_csv_upright),
+        cmocka_unit_test(test_waypoints),
+        cmocka_unit_test(test_slow_waypoints),
+        cmocka_unit_test(test_level_waypoints),
         cmocka_unit_test(test_messages_are_lines),
     };
     return cmocka_run_group_tests(tests, make_file, remove_file);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* States of the pulses per second, by pulses that come, don't come, or come at another time. */
 #include <setjmp.h>
 #include <stdarg.h>

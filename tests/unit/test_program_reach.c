@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Programs of a head, by command: HEAD:PRR within a scan changes reach, echoes and smallest range as the table
  * of the head says, from the pulse on at which the rate changes. The tables below were typed from the profiles'
  * sources, not read from the program. */

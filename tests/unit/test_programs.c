@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Programs of head profiles as the configuration reads them: what is completed, what is refused and at which
  * line; widths by their definitions; grades of the profiles that come with the program. */
 #include <dirent.h>

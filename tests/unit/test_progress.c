@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* How far work is, and how long it will take. */
 #include "firmware_sim/app/progress.h"
 #include "tests/unit/recorder_rig.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* PTX grids, line by line, and the files of true poses. */
 #include "tests/unit/recorder_rig.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* PTX files whose recorder was killed, or whose disk was full: what a repair makes of them and of the grid beside them,
  * wherever these end. */
 #include "tests/common/thorough.h"

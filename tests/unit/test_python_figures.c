@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The client in Python: figures that few streams show (python_figures.py), with numpy and without. Run from the top of the
  * source tree. */
 #include <setjmp.h>

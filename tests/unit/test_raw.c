@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* `record --raw`: what came at several sockets is passed on in its order, whenever it is asked for; and the escapes of
  * --send. */
 #include <setjmp.h>

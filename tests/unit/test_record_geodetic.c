@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Recordings in geodetic coordinates: their digits, the antimeridian, scan angles and the scales of degrees. */
 #include "tests/unit/recorder_rig.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Streams that lost frames between scans: no point goes to another station, row or pose than its own. */
 #include "tests/unit/e57_rig.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Meshes of recorded grids, and points spread over them: streams whose triangles are counted by hand. */
 #include "core/scene.h"
 #include "tests/unit/recorder_rig.h"

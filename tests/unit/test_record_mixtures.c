@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Streams that change: what one file can hold of it, and what it says; rows and grids of heads that are no line heads; parts
  * of meshes. */
 #include "drivers/record/mesh_grid.h"

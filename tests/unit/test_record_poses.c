@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Files of poses: stations, stops, ways; each pose once, what is missing, and what links the scene to the Earth. */
 #include "tests/unit/recorder_rig.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What recordings say of the time: creation day, GPS times, the start of each scan, and a clock that comes late. */
 #include "tests/unit/e57_rig.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Recorders: a file is whole or not there, the raw stream is kept byte by byte, and endings are known. */
 #include <signal.h>
 #include <sys/resource.h>

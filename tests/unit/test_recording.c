@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Taking a scan: a head by script, over TCP, loses frames to the recorder and is unplugged; which scans count as
  * broken. */
 #include <arpa/inet.h>

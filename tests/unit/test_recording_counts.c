@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The counts of a recording: what a scan lost on its way, and scans whose end did not come. */
 #include <setjmp.h>
 #include <stdarg.h>

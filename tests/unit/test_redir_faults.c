@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* USB faults on request over usbredir: what a virtual machine's end sees of each. */
 #ifdef HAVE_USBREDIR
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Repair, in process: a small file of each format cut at every byte, damaged at every third, of another format, and with
  * numbers beyond all reason. What comes out holds the whole units and is whole, or it is as it was. */
 #include "tests/common/thorough.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Repair and the files of other programs: these may end or go on in ways that no recorder knows. So they are checked, and
  * never changed. */
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Repair, in process: which file is meant, that none is replaced, that who gives up finds it as it was; and when a recorder
  * writes what it has. */
 #include <sys/stat.h>

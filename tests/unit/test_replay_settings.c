@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a replay says of its head's settings, from what the recording says of itself. */
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A recording that is replayed, without its threads: when its frames went out, and the states it had. */
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Charts of the report's page: bars as high as their counts, figures of the axes where their values are. */
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a report says of a cloud: by its bound, by its noise, or that nothing can be said. */
 #include <setjmp.h>
 #include <stdarg.h>

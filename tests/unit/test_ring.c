@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The ring of slots: its states one by one. */
 #include "tests/common/cases.h"
 

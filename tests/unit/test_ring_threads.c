@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The ring of slots, with all its threads at once. */
 #include "tests/common/cases.h"
 #include "tests/common/thorough.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The random generator. All seeds are fixed, so a run can't fail by chance; the limits are chosen as if they
  * weren't: each check would fail for one good generator in 10^5 or fewer (about 140 checks, so together for
  * one in 700). */

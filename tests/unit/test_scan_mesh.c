@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The mesh of a scan's grid: counts worked out by hand, surfaces that must close, points spread over them. */
 #include <math.h>
 #include <setjmp.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The scene: axes, files together, checks, names, limits and refusals. */
 #include <math.h>
 

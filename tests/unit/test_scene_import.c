@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Formats that come through Assimp: node tree, names, axes and units, single precision, broken files. */
 #include <fcntl.h>
 #include <math.h>

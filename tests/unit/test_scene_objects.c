@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Objects of a scene and their figures (core/scene_objects.h), on bodies whose figures are known. */
 #include <math.h>
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The scene: our own readers of OBJ and PLY, and their numbers. Formats by Assimp: test_scene_import.c. */
 #include <locale.h>
 #include <math.h>

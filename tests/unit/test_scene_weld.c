@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Meshes in binary PLY that have a vertex for each corner: those at the same place become one, as by a naive comparison of
  * all of them. Meshes that share vertices stay as they are. */
 #include "core/rng.h"

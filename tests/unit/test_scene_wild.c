@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* OBJ, MTL, PLY and STL as other programs write them: names of other machines, orders and parts that few files have. What
  * is left out is said, with its file and line. Colours of vertices: test_vertex_colours.c. */
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The schedule against a model of its own: each pulse's time, place and angle as one fraction in 128-bit
  * integers. */
 #include "tests/common/cases.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Settings that change in the middle of a scan: nothing lost or doubled, and time, mirror and pan go on where
  * they were. */
 #include "tests/common/cases.h"

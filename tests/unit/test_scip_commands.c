@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* SCIP, the sensor's side: commands and their answers. What is expected was written from Hokuyo's description
  * of the protocol, sums added up apart from this program; whole replies of an URG-04LX are those that its
  * maker has published. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* SCIP, the sensor's side: what a line may bring, and a client that sends nonsense. */
 #include "tests/unit/scip_rig.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* SCIP, the sensor's side: what each model says of itself, and of its state. Whole replies of the URG-04LX and the
  * UTM-30LX are those of real devices (SCIP.md, source D), with their sums; sums of the others were added up apart from
  * this program. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* SCIP, the sensor's side: what a scan has. Bytes by hand from the protocol's description, and a decoder written from
  * it. */
 #include "tests/unit/scip_rig.h"

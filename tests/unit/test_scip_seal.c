@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* SCIP: scans whose values are changed on request, with sums that are right. Read by a decoder written from the
  * protocol's description alone. */
 #include "tests/unit/scip_rig.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* SCIP, the sensor's side: how scans follow each other. Streams, their begin and end, what is lost between them, and
  * time. */
 #include "tests/unit/scip_rig.h"

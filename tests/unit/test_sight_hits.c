@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A sight's hits are those of the BVH, bit by bit: random scenes with all that makes surfaces hard to order, and rays
  * aimed at edges, corners and the borders of the map's cells. */
 #include <math.h>

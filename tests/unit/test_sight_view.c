@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A map of the directions that a head looks into knows all of them, also at the corners of what it looks at at once. */
 #include "tests/unit/cast_rig.h"
 

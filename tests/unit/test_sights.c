@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Maps of what stations see, as a site makes them: when, for which directions, and when not. */
 #include "tests/unit/site_rig.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a site makes of a configuration's beams and mirrors: names of ghosts, profiles that have no footprint to use. */
 #include "tests/unit/cast_rig.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Copies of meshes in a whole site: points as from the same triangles written out, lists from the configuration and from
  * a file, and what is wrong with them. */
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Textures with holes in a configuration: single rays and footprints through a board that moves, and what
  * the plan makes of beams then. */
 #include "tests/unit/scene_files.h"

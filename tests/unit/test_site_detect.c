@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A site follows a configuration's air and encoders, and has mirrors in scenes of many surfaces. */
 #include "tests/unit/site_rig.h"
 

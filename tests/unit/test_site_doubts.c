@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What is allowed and hardly meant is said once, with figures; what is usual is not. Run from the top of the
  * source tree. */
 #include "tests/unit/site_rig.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Bodies that move: a wall that goes away, a door that turns. Ranges by hand at any time. */
 #include "tests/unit/cast_rig.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A station that a client moves: where it then stands, which way the head looks, and where that is on the Earth. */
 #include "tests/unit/site_rig.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a count of the stream is, by the head's longest range. Run from the top of the source tree. */
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Stops of a head along a trajectory: how many, when, where, and how it is turned there by its mount. */
 #include "tests/unit/site_rig.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The judge of a soak: what was done to a frame beside what its client saw. A client that is wrong must show. */
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A sphere by its angle: rings within limits of elevation, a sector of azimuths, a circle. Each pulse's line, angles and
  * whether it is cast, by counting steps in whole numbers. Nothing of core/schedule is used for what is expected. */
 #include <math.h>

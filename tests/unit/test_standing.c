@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* How a head stands: attitude by vectors known by hand, and the floor below it. */
 #include <math.h>
 #include <setjmp.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Places to stand: in rooms, on land, before objects. */
 #include <math.h>
 #include <setjmp.h>

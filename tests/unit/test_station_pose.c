@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The head's pose in a recording's frame, against GeographicLib; the CRS texts; the place of a shot in its line. */
 #include "drivers/record/station_pose.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Schedules of heads that fire in steps, rings and lists: counted by hand. */
 #include "tests/common/cases.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Long work asks whether to stop, and ends; and what Embree's errors mean. */
 #include <setjmp.h>
 #include <stdarg.h>

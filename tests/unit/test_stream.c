@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The stream at release: numbers of frames, counts of echoes in line ends, and readers that are waited for. */
 #include "tests/common/cases.h"
 

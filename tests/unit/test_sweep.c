@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* core/cast/kernels_sweep.c: directions of runs whose axes turn evenly, against long double, against angles taken one
  * by one, and cut in all ways. And the runs' times. */
 #include "tests/common/cases.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What of a scene is scanned: surfaces that are left out of it, and surfaces that give no echo. */
 #include "firmware_sim/site/site.h"
 #include "tests/unit/cast_rig.h"
@@ -152,8 +153,7 @@ static void wrong_targets_are_refused(void **state)
         {"{objects: tree}", "scene.target.objects: here stands a single value; allowed a list of 0 to 64"},
         {"{objects: [{a: b}]}", "scene.target.objects[0]: here stands a section with keys"},
         {"{objects: [\"\"]}", "scene.target.objects[0]"},
-        {"{objects: [tree], others: keep}",
-         "scene.target.others: \"keep\" is not known; allowed left_out, hide"},
+        {"{objects: [tree], others: keep}", "scene.target.others: \"keep\" is not known; allowed left_out, hide"},
         {"7", "scene.target: here stands a single value"},
     };
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Reflectance from a mesh's texture: a board of dark and light squares, whose places are known. */
 #include "tests/common/cases.h"
 

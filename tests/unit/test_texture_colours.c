@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Colours of points by texture: a chart with a colour of its own in each texel, on a board whose coordinates are known.
  * Each point has exactly the texel that lies there by hand: for each image format, each way to wrap, images beside the
  * mesh and within it, seen plainly, under a footprint, in a mirror and on a mesh that moves. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* When a head released the frames of a recording, from the frames alone. The times that are wanted come from the rules of
  * the schedule, written out here once more: a packet is 16 pulses from the line's first, and leaves with its last. */
 #include "tests/unit/native_rig.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A moving head in all formats of points: the same points in each, those without a pose in none. */
 #include "tests/unit/recorder_rig.h"
 

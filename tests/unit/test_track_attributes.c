@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Recordings of a stream with attributes: points wait for them, and come out with their own or with none. */
 #include "tests/unit/recorder_rig.h"
 

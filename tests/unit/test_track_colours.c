@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Recordings with colours: as the head sends them, where points wait for them, and as they are made of the points. */
 #include "tests/unit/recorder_rig.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Polygons become triangles that cover them once. */
 #include <math.h>
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a tripod hides, by geometry alone: the cone on level and sloping ground, at heights up to where it hovers; legs
  * as prisms; and nothing else of a scan changes. */
 #include "tests/unit/site_rig.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The queue of units to a client, and the frames that are kept for one that joins. */
 #include <setjmp.h>
 #include <stdarg.h>

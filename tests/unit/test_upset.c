@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Heads with a fault, cast: a slipped pan is a head whose pan began elsewhere, but for what it reads; a soiled window
  * is a weaker signal. */
 #include "tests/unit/cast_rig.h"

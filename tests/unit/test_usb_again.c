@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Clients of a USB link that attach again without having let go: the session before ends, and one of their own begins.
  * What was meant for the one, or sent in it, is not the other's. */
 #include "tests/unit/usbip_client.h"

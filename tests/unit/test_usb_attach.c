@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A device that plugs itself in (`attach: on`) and whose host lets go of it: it comes back by itself, and says so. */
 #include "tests/unit/usbip_client.h"
 

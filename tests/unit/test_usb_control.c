@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Control requests against chapter 9: each standard request in each state and at each speed, right and malformed. */
 #include "tests/unit/usb_host.h"
 #include "tests/unit/usb_models.h"

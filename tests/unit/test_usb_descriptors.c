@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Descriptors against the published layouts: USB 2.0 tables 9-8 to 9-16, USB 3.2 section 9.6, Microsoft OS 2.0
  * Descriptors Specification tables 3 to 15. The bytes here are written out by hand from these. */
 #include "tests/unit/usb_host.h"

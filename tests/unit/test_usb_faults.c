@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* USB faults on request, in the device core and over USB/IP: what a host sees of each, and that no byte is lost. */
 #include <netinet/tcp.h>
 
@@ -290,9 +291,14 @@ static void test_enumeration(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_short_packets), cmocka_unit_test(test_halt),  cmocka_unit_test(test_descriptor_length),
-        cmocka_unit_test(test_stall),         cmocka_unit_test(test_reset), cmocka_unit_test(test_unplug),
-        cmocka_unit_test(test_enumeration),   cmocka_unit_test(test_reset_of_idle),
+        cmocka_unit_test(test_short_packets),
+        cmocka_unit_test(test_halt),
+        cmocka_unit_test(test_descriptor_length),
+        cmocka_unit_test(test_stall),
+        cmocka_unit_test(test_reset),
+        cmocka_unit_test(test_unplug),
+        cmocka_unit_test(test_enumeration),
+        cmocka_unit_test(test_reset_of_idle),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

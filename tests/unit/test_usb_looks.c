@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The looks of a head on USB: their descriptors, byte by byte, and what begins and ends their sessions.
  *
  * The bytes are written out by hand from the layouts of USB 2.0 (tables 9-8, 9-10, 9-12, 9-13) and CDC 1.20 (tables 15

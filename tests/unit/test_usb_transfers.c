@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Transfers: filling, short and zero-length packets, cancellation at each stage, halts, resets. */
 #include "tests/unit/usb_host.h"
 #include "tests/unit/usb_models.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Telegrams on USB: each one is a transfer, over the device core, USB/IP and usbredir.
  *
  * A unit ends with a packet shorter than wMaxPacketSize (USB 2.0, 5.8.3). One whose length is a multiple of it needs

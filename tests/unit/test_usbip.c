@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The usbip back end and the usb link over it, with a client of the test's own and no kernel. */
 #include "tests/unit/usbip_client.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Clients of the usbip back end that are silent, pipeline, or cut their bytes anywhere. */
 #include "tests/unit/usbip_client.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The usbredir back end and the usb link over it, with the library's own guest-side parser at the other end of a Unix
  * socket, and no virtual machine. */
 #ifdef HAVE_USBREDIR

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Peers of the usbredir back end that are silent, never read, ask the wrong endpoint, or go away from a device that
  * connected to them. */
 #ifdef HAVE_USBREDIR

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* UTC, TAI and GPS time against published dates and the system's own table and calendar. */
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* core/vecmath.h against the long double functions of libm, whose 64-bit mantissa is 2048 times finer than a
  * double's. */
 #include "tests/common/cases.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* VLP-16 data packets against their published layout: what a client computes is what the head measured. */
 #include <math.h>
 #include <setjmp.h>

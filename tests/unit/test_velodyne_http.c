@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The settings of a VLP-16 over HTTP, from bytes to bytes: what known clients send, and what they read. */
 #include <setjmp.h>
 #include <stdarg.h>

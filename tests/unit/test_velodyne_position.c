@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* VLP-16 position packets: their fields, their rate, the receiver's sentence. */
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* VLP-16 data packets: return modes, what is lost, and what a device of this kind would never send. */
 #include <math.h>
 #include <setjmp.h>

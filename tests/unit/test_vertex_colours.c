@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Colours of vertices: as PLY, OBJ and what Assimp reads have them; between the corners at a hit; after a texture, before
  * the material's colour; and nothing of it where a mesh has none, or nobody wants them. */
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Plugging into vhci_hcd, with files in place of the kernel's. The lines of `status` are as Linux 6.1 prints them. */
 #include <setjmp.h>
 #include <stdarg.h>

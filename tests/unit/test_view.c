@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Points in perspective: where they are, which are seen, how they are lit, and from where all is seen. */
 #include <stdarg.h>
 #include <stddef.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What `scanhead view` makes of a recording: files into points, points and triangles into bytes, queries into answers.
  * Expected values are worked out by hand. */
 #include <math.h>
@@ -303,10 +304,13 @@ static void places_beyond_any_are_left_out(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_ply_with_all_columns),  cmocka_unit_test(geocentric_places_are_turned),
+        cmocka_unit_test(a_ply_with_all_columns),
+        cmocka_unit_test(geocentric_places_are_turned),
         cmocka_unit_test(places_beyond_any_are_left_out),
-        cmocka_unit_test(wrong_files_are_refused), cmocka_unit_test(points_as_bytes),
-        cmocka_unit_test(triangles_as_bytes),      cmocka_unit_test(requests),
+        cmocka_unit_test(wrong_files_are_refused),
+        cmocka_unit_test(points_as_bytes),
+        cmocka_unit_test(triangles_as_bytes),
+        cmocka_unit_test(requests),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

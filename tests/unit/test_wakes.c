@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Nobody sleeps for ever: bells, and the whole loop with queues of a few ticks, where each thread waits for each other
  * one again and again. A lost wake-up shows as a time-out. */
 #include "tests/unit/device_rig.h"

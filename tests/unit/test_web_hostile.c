@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What comes to a web link's port and is no request of a browser: each gets an answer and an end at once, and nobody
  * keeps others out. Clients are bytes on a socket. */
 #include <sys/socket.h>

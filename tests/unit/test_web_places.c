@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Who makes room at a web link. */
 #include <setjmp.h>
 #include <stdarg.h>

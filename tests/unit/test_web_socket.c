@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Frames of a client that break RFC 6455, and those that keep it: with which code its session ends. */
 #include <sys/socket.h>
 #include <stdio.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/usb_host.h"
 
 static void host_complete(void *ctx, struct usb_transfer *transfer)

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What the USB tests share: a host's side of the device core. */
 #ifndef TESTS_UNIT_USB_HOST_H
 #define TESTS_UNIT_USB_HOST_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/usb_models.h"
 
 /* A vendor class with one bulk pair, that is all. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/usbip_client.h"
 
 struct bench usbip_bench(const char *serial)

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A USB/IP client without a kernel, against a usb link: the test polls the link itself, so one thread plays both
  * ends. Numbers are written out from the kernel's Documentation/usb/usbip_protocol.rst. */
 #ifndef TESTS_UNIT_USBIP_CLIENT_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/usbredir_guest.h"
 
 char *guest_dir, guest_path[100];

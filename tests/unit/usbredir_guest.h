@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A virtual machine's end of a usbredir channel, with the library's own guest-side parser and no virtual machine: the
  * test polls the link itself, so one thread plays both ends. */
 #ifndef TESTS_UNIT_USBREDIR_GUEST_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* In place of the tests of usbredir where its parser is missing: they are skipped, and say why. */
 #ifndef TESTS_UNIT_USBREDIR_MISSING_H
 #define TESTS_UNIT_USBREDIR_MISSING_H

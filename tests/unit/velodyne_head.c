@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/velodyne_head.h"
 
 #include <math.h>

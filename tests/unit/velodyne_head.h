@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Firings of a VLP-16 for a protocol under test: pulse k of the scan is beam k mod 16 of sequence k div 16,
  * at the times of the data sheet, at the azimuth that the turn has then. */
 #ifndef TESTS_UNIT_VELODYNE_HEAD_H

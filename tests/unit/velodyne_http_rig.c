@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/velodyne_http_rig.h"
 
 #include <setjmp.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A session of VLP-16 settings: text goes in, and what came back is text. */
 #ifndef TESTS_UNIT_VELODYNE_HTTP_RIG_H
 #define TESTS_UNIT_VELODYNE_HTTP_RIG_H

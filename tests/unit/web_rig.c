@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/web_rig.h"
 
 #include <arpa/inet.h>

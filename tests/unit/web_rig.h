@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A web link, and its clients: bytes on a socket, as RFC 9112 and RFC 6455 write them. */
 #ifndef TESTS_UNIT_WEB_RIG_H
 #define TESTS_UNIT_WEB_RIG_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/unit/wire_rig.h"
 
 #include "drivers/protocol/protocol.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* For tests of faults on the wire: frames and replies go in, with a clock of the test's own, and what comes out is kept
  * with its times; and beside it what should have come out, by the notes of the faults alone. */
 #ifndef TESTS_UNIT_WIRE_RIG_H

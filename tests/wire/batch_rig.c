@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/wire/batch_rig.h"
 
 #include "tests/wire/room.h"

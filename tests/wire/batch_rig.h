@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A campaign of six jobs in a test's folder: started, run to its end, and compared with another one. A test fails where
  * one of these does. */
 #ifndef TESTS_WIRE_BATCH_RIG_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/wire/beam_run.h"
 
 const struct room_config BEAM_ROOM = {.prr_hz = 20000,

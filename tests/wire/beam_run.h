@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A scan of the room with faults, made off line, as a native client has it: its shots by pulse number, its line ends,
  * and the truth about the faults. */
 #ifndef TESTS_WIRE_BEAM_RUN_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/wire/capture_rig.h"
 
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Captures of the native protocol made by hand: TCP on Ethernet, USB bulk as usbmon has it, and frames in packets of
  * their own (link type 147), all in one pcapng. */
 #ifndef TESTS_WIRE_CAPTURE_RIG_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/wire/captured.h"
 
 #include "drivers/protocol/pcapng.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What `record --raw` is to be tried with: the recorder, started and ended, and its captures read back into packets;
  * and what tshark says of them. */
 #ifndef TESTS_WIRE_CAPTURED_H

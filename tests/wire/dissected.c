@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/wire/dissected.h"
 
 #include <limits.h>

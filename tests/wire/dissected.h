@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What tshark with drivers/protocol/wireshark/scanhead.lua says of a capture: each field as a queue of its values, in
  * the order of the stream. The test asks for them in that order, too; what is left over in the end was not expected. */
 #ifndef TESTS_WIRE_DISSECTED_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/wire/dissected_frames.h"
 
 #include "drivers/protocol/native.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Each field of each frame type as tshark has it, beside what libscanhead says of the same frame. */
 #ifndef TESTS_WIRE_DISSECTED_FRAMES_H
 #define TESTS_WIRE_DISSECTED_FRAMES_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/wire/emitter_rig.h"
 
 /* Steps from 0 to 1439 of a turn, 0..1080 seen, 540 ahead, counter-clockwise; 40 turns a second. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* When and where the shots of some heads go, by the formulas of their data sheets. Nothing of the program is used. */
 #ifndef TESTS_WIRE_EMITTER_RIG_H
 #define TESTS_WIRE_EMITTER_RIG_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/wire/fault_head.h"
 
 const struct room_config FAULT_ROOM = {.profile = "any-rate",

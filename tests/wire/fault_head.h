@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A head with faults on request, and the truth about them in truth.json of the test's folder. */
 #ifndef TESTS_WIRE_FAULT_HEAD_H
 #define TESTS_WIRE_FAULT_HEAD_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/wire/gnss_rig.h"
 
 static const struct room_config ROOM = {

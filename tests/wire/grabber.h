@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* rawlog-grabber of Debian's mrpt-apps, unmodified: started with a configuration of the test's, ended as its user ends
  * it, and what it has recorded. A rawlog is a gzip stream of MRPT's serialised objects; of these the rig reads scans,
  * turns and GPS observations. */

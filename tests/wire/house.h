@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a scanner must see in the living room of the house: the ready configurations' mesh and a mark, cast by the
  * reference of tests/common, which shares nothing with core/cast. The mark is a post to the right of the head and
  * on no other side: a scan that is mirrored, turned or shifted does not fit. */

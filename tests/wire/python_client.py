@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What test_python.c asks of the Python client. Its answers are binary rows or plain numbers.
 
     python_client.py FOLDER_OF_THE_CLIENT numpy|plain WHAT ...

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Recordings as readers see them that are not ours: the points that a stream holds, other people's programs, and how
  * what they read differs. */
 #ifndef TESTS_WIRE_READERS_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/wire/repair_rows.h"
 
 #include "drivers/protocol/bytes.h"
@@ -333,7 +334,8 @@ const char *repair_row_beside(const struct repair_row *row)
     }
 
 /* READERS: an absolute path, which the harness sets. */
-#define WEB_E57 "[ -e \"$READERS/installed\" ] || exit 127; node --experimental-wasm-modules \"$READERS\"/e57.mjs \"$F\" e57.xyz && cat e57.xyz && rm e57.xyz"
+#define WEB_E57 \
+    "[ -e \"$READERS/installed\" ] || exit 127; node --experimental-wasm-modules \"$READERS\"/e57.mjs \"$F\" e57.xyz && cat e57.xyz && rm e57.xyz"
 
 const struct repair_row repair_rows[] = {
     {"stream", ".shs", {NULL}, {NULL}, check_shs, is_no_shs},

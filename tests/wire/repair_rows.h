@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The formats that a killed recorder or a full disk may leave, and what a repair has to make of them. A row for each; what is
  * checked knows nothing of the code that repairs. */
 #ifndef TESTS_WIRE_REPAIR_ROWS_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/wire/replay_rig.h"
 
 #include "drivers/protocol/native.h"

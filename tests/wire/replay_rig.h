@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What tests of a replay share: frames of a session, each with the tick in which it came, and files of them. */
 #ifndef TESTS_WIRE_REPLAY_RIG_H
 #define TESTS_WIRE_REPLAY_RIG_H

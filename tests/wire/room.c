@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/wire/room.h"
 
 const double ROOM_MIN[3] = {-4.37, -6.21, -1.53}, ROOM_MAX[3] = {5.83, 3.94, 2.71};

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The scenes of the wire tests, their configurations, and what must come out of them: a closed room whose
  * walls are known planes, and a schedule in exact rational arithmetic that shares nothing with core/schedule.
  */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* An animation: stops at stations while meshes move, and at way-points, counted in frames. A file for each frame and one
  * of all; each point lies on its body where that stands in the frame. */
 #include <math.h>

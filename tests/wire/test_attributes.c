@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* output.attributes from the configuration to the files: what it leaves alone, what it adds, and what a reader makes of
  * it who has lost a part. */
 #include "drivers/protocol/native.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Campaigns: the same bytes in 1, 2 and 7 shards; by Slurm's variables and by GNU parallel; jobs that fail. */
 #include "tests/wire/batch_rig.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Campaigns that are killed and gone on with: the same bytes in the end. What was changed since is found, and nothing is mixed. */
 #include <sys/file.h>
 #include <sys/inotify.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Faults of the beam: what a native client notices of each, by pulse number, is what the truth says. */
 #include "tests/wire/beam_run.h"
 

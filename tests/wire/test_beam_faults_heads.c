@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Faults of the beam with other heads, other ways to cast and other paces: the same pulses, and the same bytes. */
 #include "tests/wire/beam_run.h"
 #include "tests/wire/emitter_rig.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* build/bench: the JSON has the keys that scripts rely on, figures that can be, and stages that add up.
  * The program is $BENCH, or `bench` beside $SCANHEAD. */
 #include "tests/wire/wire.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A personality's link leaves the native stream as it is: the same hash with it and without. And its ports outlive
  * clients that come, say half a word and go. */
 #include "tests/common/thorough.h"

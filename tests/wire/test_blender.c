@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The same scene, stations and step in Blender: tests/readers/blender_scan.py scans with geometry nodes, in single
  * precision and code of which nothing is ours. Here scanhead records the same, and each of its shots is compared with
  * Blender's ray of that direction: both meet something or neither does, and then at the same place.

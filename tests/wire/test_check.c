@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What `scanhead check` prints: all faults of a configuration, the keys of a section, an example that
  * passes. And short options as getopt takes them. */
 #include "tests/wire/room.h"

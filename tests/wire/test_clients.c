@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Clients that die, babble, crowd or go quiet: the head carries on, tells what happened, and serves the next
  * one. */
 #include "tests/wire/room.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* CoLa: mSCreboot reboots the head. All sessions end, and its clock, counters and count of power-ups begin anew. */
 
 #include "tests/wire/room.h"

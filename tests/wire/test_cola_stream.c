@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Three SICK clients at once: CoLa-A and CoLa-B over TCP, CoLa-B over a pty; others between them send garbage. Each
  * client gets every scan; what all have of a scan is the same. */
 #include "tests/wire/house.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Colours from the configuration to the files, through the real program: texels to the texel, the smallest and the largest
  * figure at the ends of the ramp, the same in each format, the same points with colours and without. */
 #include "core/colour.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* scanhead coverage, through the real program: figures, the mesh of cells, the next station, and what it refuses. */
 #include "tests/wire/room.h"
 #include "tests/wire/usage_rig.h"

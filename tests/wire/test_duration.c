@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* --duration: of `record` off line, and of `run --start`, or head.start. Both are device time. */
 #include "tests/wire/room.h"
 

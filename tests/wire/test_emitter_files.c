@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What becomes of heads that are no line heads: files, plan, map and report. */
 #include "tests/wire/emitter_rig.h"
 #include "tests/wire/room.h"

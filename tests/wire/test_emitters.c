@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Heads that are no line heads, through the real program: each shot's time, direction and range against the
  * formulas of their data sheets (emitter_rig.c) and the known walls of a room. */
 #include "tests/wire/emitter_rig.h"

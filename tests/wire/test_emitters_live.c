@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Heads that are no line heads, while they scan: settings that change, and rates that follow from others. */
 #include "tests/wire/emitter_rig.h"
 #include "tests/wire/room.h"

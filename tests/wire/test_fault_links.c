@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Links that are cut, refused and unplugged on request, by the program: the truth says where, the client sees it
  * there, comes back and goes on; the neighbour's stream is the clean one. */
 #include "drivers/protocol/bytes.h"
@@ -223,7 +224,8 @@ static void test_fast(void **state)
                  ? scanhead_command(hit, "HEAD:STAT?", reply, sizeof reply, DEADLINE_MS)
                  : SCANHEAD_ECLOSED;
     while (rc != SCANHEAD_OK);
-    const char *told = client_ask(hit, "SYST:ERR?"); /* said while it scans: on a busy machine the scan is over sooner */
+    const char *told =
+        client_ask(hit, "SYST:ERR?"); /* said while it scans: on a busy machine the scan is over sooner */
     if (strcmp(told, "0,\"No error\"") != 0 && strstr(told, "Client lost; session 1") == NULL) fail_msg("%s", told);
     assert_string_equal(client_ask(hit, "SYST:ERR?"), "0,\"No error\"");
     scanhead_close(hit);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Faults on request that cost a client time: replies that don't come, or come late; a stall, which makes a slow reader; and
  * what a run still sends at its end. */
 #include "tests/wire/fault_head.h"

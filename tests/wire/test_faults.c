@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Faults on request, in the program as its users meet it: the same seed gives the same truth at any pace, with any
  * number of threads, over any link and however the client reads; a link without faults has the clean stream; a client
  * reports what was injected, by number and length; a journal brings faults back. */
@@ -129,8 +130,8 @@ static void test_the_same_truth(void **state)
     static const struct {
         const char *pace, *threads, *link;
         size_t piece; /* 0: by the library */
-    } runs[] = {{"fast", "1", "tcp", 0},       {"fast", "2", "tcp", 300},     {"fast", "2", "tcp", 1 << 20},
-                {"realtime", "1", "tcp", 700}, {"realtime", "2", "tcp", 0},   {"fast", "2", "pty", 0},
+    } runs[] = {{"fast", "1", "tcp", 0},       {"fast", "2", "tcp", 300},   {"fast", "2", "tcp", 1 << 20},
+                {"realtime", "1", "tcp", 700}, {"realtime", "2", "tcp", 0}, {"fast", "2", "pty", 0},
                 {"realtime", "1", "pty", 0}};
     static struct truth first, other;
     struct wire *wire = *state;
@@ -149,7 +150,7 @@ static void test_the_same_truth(void **state)
         snprintf(who, sizeof who, "%s, %s threads, %s", runs[i].pace, runs[i].threads, runs[i].link);
         if (i != 0) expect_same(&first, &other, who);
     }
-    static const char *const kinds[] = {"drop",  "duplicate", "reorder", "truncate", "flip",   "stall",
+    static const char *const kinds[] = {"drop",   "duplicate", "reorder", "truncate", "flip",   "stall",
                                         "jitter", "delay",     "split",   "merge",    "garbage"};
     for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)
         assert_true(count_kind(&first, kinds[i]) > 0);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Files that the program makes, where others may have put a link or a device; and a standard output that takes nothing. */
 #include "tests/wire/room.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A client that is wrong as fast as it can be, beside one that reads a scan: the reader is told a bounded number of
  * errors and exactly how many there were, and neither the stream nor the loop's beat is disturbed. */
 #include "tests/wire/room.h"

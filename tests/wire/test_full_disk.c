@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Meshes on a disk that gets full: why is said, and what to do; and no file of theirs is left, neither under its name nor
  * under that of a part. */
 #include <sched.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The GNSS receiver on its links: whole sentences in their order, all of them or what is lost counted; and the PPS of
  * the native stream beside them. */
 #include "tests/wire/gnss_rig.h"

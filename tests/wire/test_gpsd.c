@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The GNSS receiver read by gpsd, the client that everybody has, and gpspipe. */
 #include "tests/wire/gnss_rig.h"
 #include "tests/wire/unit_faults.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* rawlog-grabber reads the ready configuration of a Hokuyo, over TCP and over a pty at once: rates and times by the
  * device's own clock, nothing lost, ranges where they are. And a URG-04LX, which is slower, over its pty. */
 #include "tests/wire/grabber.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* PCL's VLPGrabber, where PCL is installed: turns are whole, and each point lies on the house. It takes all lasers of
  * a firing sequence as fired at once; the test knows better, as it knows the laser by its elevation. */
 #include "tests/wire/house.h"

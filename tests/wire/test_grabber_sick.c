@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* rawlog-grabber's CLMS100Eth reads a SICK LMS111 over TCP. It polls, and logs times of the host, so the device's own
  * times and counts are those of the telegrams: a relay between the two keeps them. The client itself waits 15 s
  * while it turns the scanner on. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* rawlog-grabber reads the ready configuration of a VLP-16, which needs no other key: each packet of some turns comes,
  * at its time and azimuth, with the ranges of the house, and the receiver's time dates the turns. Then a head that
  * loses packets on request. The grabber takes two fixed ports of this machine. */

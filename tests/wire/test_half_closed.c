@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Clients of tcp that shut down their sending side, as `nc -N` does: each gets what is due to it, and then its session
  * ends. Clients that never read what they get, or what the head throws away, hold up nobody. Of many that ask at once each is answered. */
 #include <errno.h>
@@ -8,12 +9,8 @@
 /* Ten lines: a scan of 0.4 s. */
 static struct head start(struct wire *wire, const char *links, const char *pace)
 {
-    const struct room_config config = {.prr_hz = 10000,
-                                       .lines_hz = 25,
-                                       .pan_deg_s = 100,
-                                       .pan_stop_deg = 40,
-                                       .frames = 1,
-                                       .links = links};
+    const struct room_config config = {
+        .prr_hz = 10000, .lines_hz = 25, .pan_deg_s = 100, .pan_stop_deg = 40, .frames = 1, .links = links};
     const char *const more[] = {"--pace", pace, NULL};
     room_write(wire);
     return head_start(wire, room_config_write(wire, &config), more);
@@ -108,11 +105,11 @@ static void a_scan_and_no_more(void **state)
 static void two_scans_of_scip(void **state)
 {
     static char got[1 << 16];
-    const struct room_config config = {
-        .profile = "hokuyo-utm-30lx",
-        .prr_hz = 57600,
-        .lines_hz = 40,
-        .links = "links: [{type: tcp, protocol: scip, port: 0}, {type: tcp, port: 0}]\n"};
+    const struct room_config config = {.profile = "hokuyo-utm-30lx",
+                                       .prr_hz = 57600,
+                                       .lines_hz = 40,
+                                       .links =
+                                           "links: [{type: tcp, protocol: scip, port: 0}, {type: tcp, port: 0}]\n"};
     struct wire *wire = *state;
     room_write(wire);
     struct head head = head_start(wire, room_config_write(wire, &config), NULL);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Faults of the head's states, power, time and counters, as a client of the program sees them; and that they are what
  * --truth says, by number and by time. Most run in the pace step: then nothing depends on when a client connects. */
 #include "tests/wire/room.h"

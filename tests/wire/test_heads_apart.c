@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Two VLP-16 and two LMS111 behind one interface, at the same ports: one client tells them apart by their addresses, and
  * gets from each what that one measures. Each head stands in a square room of its own. */
 #include <arpa/inet.h>

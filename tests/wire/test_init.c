@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The first ten minutes with a mesh of one's own: `scanhead init`, and what is said where a scan would show
  * little. */
 #include "tests/wire/room.h"

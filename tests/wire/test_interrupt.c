@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* SIGTERM while the head loads: heeded within half a second, in one line, whatever the load is at. */
 #include <sys/inotify.h>
 #include <sys/resource.h>

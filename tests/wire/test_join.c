@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Readers that come late and streams that lost bytes: what is needed comes again, and only what was hit is
  * missing. */
 #include "tests/wire/room.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What clients set between scans, over TCP: the scan is the one that record makes with the same keys; the journal
  * brings it back; and what HELP? says of a setting is what it takes. */
 #include "tests/wire/room.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* From command to beam: a start, a change and a stop take effect within 100 ms of device time, with the
  * settings a head has by default. Device time is a property of the program; wall time would be one of the
  * machine. */

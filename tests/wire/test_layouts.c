@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Personalities read twice at once: by a parser written from the published layout alone, and by libscanhead from the
  * native link beside it. Both get the same points, to half a unit of the protocol's last digit. Range noise is on,
  * so that no two scans are alike, and scans are matched by what is in them. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What is hit and is no echo is counted, in every line end and in the statistics: of head and of recorder. */
 #include <inttypes.h>
 

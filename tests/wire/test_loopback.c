@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Where no address is given, a head listens at 127.0.0.1 alone. A listener at all addresses of the machine would take
  * a connection to 127.0.0.2, which is loopback, too; one at 127.0.0.1 refuses it. So no other machine is needed to see. */
 #include <arpa/inet.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* scanhead map, from above: stations stand where they are and look where they look, one beside the scene among them; of
  * a picture in perspective, what --above and --below leave out is left out. */
 #include "tests/wire/room.h"

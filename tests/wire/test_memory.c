@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The head's memory fits what is set: slots have room for usual ticks of the settings at power-up, and grow when a
  * command sets more. What goes out is the same as from a head that was set to more from the start. */
 #include "tests/wire/room.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Every model of Debian's assimp-testmodels whose ending the scene reader takes: `scanhead init` and `scanhead
  * record` with no further key scan it, or refuse it with a reason that says what to do. Nothing dies, nothing
  * hangs. The counts are printed. One in six is scanned; all with THOROUGH=1. */

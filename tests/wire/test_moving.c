@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A head that moves: what a client hears must be enough to take the polar points back to the scene. */
 #include "tests/wire/room.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Recordings of a moving head, and in degrees, read by other people's software: the same points in all formats. */
 #include "drivers/record/crs_wkt.h"
 #include "tests/common/thorough.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Noise is new in each scan and at each station, and yet the same bytes wherever the same scans are made. */
 #include "tests/wire/room.h"
 

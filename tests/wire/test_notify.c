@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* $NOTIFY_SOCKET: the service manager hears READY=1 once the links are open, and STOPPING=1 when the end begins. The test
  * is the manager: a socket of its own, by a path and by an abstract name. */
 #include <stddef.h>
@@ -86,7 +87,7 @@ static void test_socket_with_a_path(void **state)
 /* And the longest that there is: 107 bytes after the '@'. */
 static void test_abstract_socket(void **state)
 {
-    char name[sizeof ((struct sockaddr_un *)0)->sun_path];
+    char name[sizeof((struct sockaddr_un *)0)->sun_path];
     snprintf(name, sizeof name, "@scanhead test %d", (int)getpid());
     hears_both(*state, name);
     size_t n = strlen(name);
@@ -140,10 +141,11 @@ static void test_bad_sockets(void **state)
     static const struct {
         const char *name, *says;
         int status;
-    } bad[] = {{"notify", "NOTIFY_SOCKET=notify: no socket's name; allowed are a path from / and @NAME, 2 to 107 bytes", 2},
-               {"@", "NOTIFY_SOCKET=@: no socket's name", 2},
-               {"vsock:2:1234", "NOTIFY_SOCKET=vsock:2:1234: no socket's name", 2},
-               {"/nowhere/notify", "NOTIFY_SOCKET=/nowhere/notify: No such file", 1}};
+    } bad[] = {
+        {"notify", "NOTIFY_SOCKET=notify: no socket's name; allowed are a path from / and @NAME, 2 to 107 bytes", 2},
+        {"@", "NOTIFY_SOCKET=@: no socket's name", 2},
+        {"vsock:2:1234", "NOTIFY_SOCKET=vsock:2:1234: no socket's name", 2},
+        {"/nowhere/notify", "NOTIFY_SOCKET=/nowhere/notify: No such file", 1}};
     char longer[109] = "@";
     memset(longer + 1, 'x', 107);
     room_write(*state);

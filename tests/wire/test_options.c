@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Options and help of each command. What is wrong has exit status 2 and one line of error, which says what was
  * meant. */
 #include "tests/wire/room.h"
@@ -16,7 +17,8 @@ static const struct {
     {{"fly"}, {"unknown command fly;", "--help"}},
     {{"recrod", "CONFIG"}, {"unknown command recrod, did you mean record?"}},
     {{"run"}, {"one CONFIG"}},
-    {{"run", "CONFIG", "CONFIG"}, {"one CONFIG|FILE.shs is needed, and 2 are given", "config.yaml, ", "config.yaml; see"}},
+    {{"run", "CONFIG", "CONFIG"},
+     {"one CONFIG|FILE.shs is needed, and 2 are given", "config.yaml, ", "config.yaml; see"}},
     {{"run", "--", "CONFIG", "--start"}, {"one CONFIG|FILE.shs is needed, and 2 are given", "--start"}},
     {{"report", "CONFIG", "DIR/x.ply", "DIR/y.ply"}, {"y.ply is one too many"}},
     {{"plan", "DIR/scan.shs"}, {"scan.shs is a recorded stream", "scanhead record ", "scan.shs -o points.ply"}},
@@ -86,7 +88,8 @@ static const struct {
     {{"record", "CONFIG", "-o", "DIR/x.las", "--las-version", "1.3"}, {"--las-version 1.3", "1.2, 1.4"}},
     {{"record", "CONFIG", "-o", "DIR/x.ply", "--colour", "red"}, {"--colour red", "reflectance, label"}},
     {{"record", "CONFIG", "-o", "DIR/x.ply", "--ply-names", "x"}, {"--ply-names x", "scanhead, cloudcompare"}},
-    {{"record", "CONFIG", "-o", "DIR/x.ply", "--ply-columns", "range,size"}, {"--ply-columns range,size", "reflectance"}},
+    {{"record", "CONFIG", "-o", "DIR/x.ply", "--ply-columns", "range,size"},
+     {"--ply-columns range,size", "reflectance"}},
     {{"record", "CONFIG", "-o", "DIR/x.e57", "--ply-columns", "xyz"}, {"--ply-columns: no .ply"}},
     {{"record", "CONFIG", "-o", "DIR/x.e57", "--ply-names", "cloudcompare"}, {"--ply-names: no .ply"}},
     {{"record", "CONFIG", "-o", "DIR/x.ply", "--las-version", "1.2"}, {"--las-version: no .las"}},

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A head that cannot keep up, and one that stood still: what is lost is announced, and the accounts balance
  * to the pulse. Cast pulses by exact arithmetic = pulses received + pulses lost, whatever happened. */
 #include "tests/wire/room.h"

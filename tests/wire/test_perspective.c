@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* map --perspective: a scan, its recording, and the recording brought back from another CRS give the same picture. */
 #include "tests/wire/room.h"
 

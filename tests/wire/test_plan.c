@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* scanhead plan, through the program: rows and keys, the method by tolerance and extent, stations that differ, and what
  * can't be had. */
 #include "tests/wire/room.h"

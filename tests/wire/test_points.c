@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A whole scan through the real program, over a pty and over TCP, against what geometry and exact arithmetic
  * say. */
 #include "tests/wire/room.h"

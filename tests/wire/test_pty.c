@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The virtual serial port under clients that know nothing of it: opened with whatever settings it has, closed
  * in the middle of a frame. The next one never sees what was meant for the one before. */
 #include "tests/wire/room.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The client in Python beside libscanhead: every number of every point is the same, with numpy and without. */
 #include "tests/common/thorough.h"
 #include "tests/wire/room.h"

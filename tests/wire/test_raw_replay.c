@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A capture of a VLP-16, replayed by tcpreplay onto loopback, is read by rawlog-grabber as the live sensor was; so is the
  * file itself. The head is started twice, and sends the same bytes both times: to the grabber, and to the recorder.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* `record --raw` of TCP: what the recorder and a device say to each other, a Hokuyo with its client over the relay, a
  * SICK scanner and the native protocol asked by --send; and connections that end in odd ways. */
 #include <linux/sockios.h>

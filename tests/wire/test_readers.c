@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Recordings as readers see them that are not ours: a scan of two stations in UTM, written in each format at once, read
  * back by other people's software, point by point against the raw stream. A reader that is not installed is skipped. */
 #include "core/georef.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A reboot that a client of SCIP asks for, and what it says of the head's state, by the program. Most is in the pace
  * step: then nothing depends on when a client connects. */
 #include "tests/wire/room.h"

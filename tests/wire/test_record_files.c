@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* `scanhead record` and the files it is to write: what can't be is refused before anything is scanned. */
 #include <dirent.h>
 #include <sys/inotify.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Recorders that are killed, and disks that are full, at random moments: what came to the disk is in the repaired file, and it
  * says that its end is missing. The recorder reads a stream through a pipe, so that a moment is a byte of the stream, and a
  * little after it. What was left is known from FILE.part itself. REPAIR_N is how many moments each format has; from 20 on
@@ -311,7 +312,8 @@ static void fill(const struct repair_row *row, const struct bytes *whole, struct
     const int is_left = access(part, F_OK) == 0; /* on the smallest disks nothing is */
     if (at == NULL || strstr(at + 1, says) != NULL || (strstr(said, "scanhead record --repair ") != NULL) != is_left)
         fail_msg("%s: %s", path, said);
-    if (is_real && repair_row_beside(row) != NULL) assert_int_equal(mount("none", disk, NULL, MS_REMOUNT, "size=16m"), 0);
+    if (is_real && repair_row_beside(row) != NULL)
+        assert_int_equal(mount("none", disk, NULL, MS_REMOUNT, "size=16m"), 0);
     check_left(row, path, whole, tally);
     remove_all(row, path);
     if (is_real) assert_int_equal(umount(disk), 0);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a recording answers to commands: queries as the head did, settings not at all; and how it is played. */
 #include "drivers/protocol/native_encode.h"
 #include "tests/wire/replay_rig.h"

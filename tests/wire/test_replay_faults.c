@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What goes wrong while a recording is replayed: faults on the wire, readers that are too slow or leave, an end. */
 #include "tests/wire/replay_rig.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Parts of recordings, several in one file, and the same one again and again. */
 #include "tests/wire/replay_rig.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What is hurt, what is no recording, and options that are wrong. */
 #include "tests/wire/replay_rig.h"
 

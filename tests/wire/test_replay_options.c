@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Options of a replay: which are refused, and what they must not do. */
 #include "tests/wire/replay_rig.h"
 
@@ -46,7 +47,7 @@ static void test_wrong_options(void **state)
     const char *const backward[] = {"run", file, "--start", "--quiet", "--from", "0.002", "--to", "0.001", NULL};
     assert_int_equal(replay_call(wire, backward), 2);
     replay_said(wire, "is not after --from");
-    static const char *const heads[][2] = {{"--speed", "2"}, {"--from", "1"}, {"--to", "1"},
+    static const char *const heads[][2] = {{"--speed", "2"},  {"--from", "1"},   {"--to", "1"},
                                            {"--link", "tcp"}, {"--config", "x"}, {"--loop", NULL}};
     for (size_t i = 0; i < sizeof heads / sizeof *heads; i++) {
         const char *const args[] = {"run", "x.yaml", heads[i][0], heads[i][1], NULL};
@@ -83,8 +84,7 @@ static void test_view(void **state)
     const char *const more[][3] = {{NULL}, {"--link", link}, {"--config", yaml}};
     static const char *const beside[] = {"link tcp:", "link tty:", "link tcp:"};
     for (size_t i = 0; i < sizeof more / sizeof *more; i++) {
-        const char *const args[] = {"run",  file,     "--start",  "--pace",   "fast",
-                                    "--view", more[i][0], more[i][1], NULL};
+        const char *const args[] = {"run", file, "--start", "--pace", "fast", "--view", more[i][0], more[i][1], NULL};
         assert_int_equal(replay_call(wire, args), 0);
         replay_said(wire, "link http://");
         replay_said(wire, beside[i]);
@@ -104,8 +104,9 @@ static uint32_t grant(struct scanhead *sh, const char *step, uint64_t *last_ns)
 /* It begins once both are there, and lasts its time from then on: waiting, of any length, does not count. */
 static void test_clients_and_duration(void **state)
 {
-    static const char *const args[] = {"--start", "--clients", "2",      "--duration", "0.1",     "--pace",
-                                       "step",    "--link",    "type: tcp, port: 0", "--quiet", NULL};
+    static const char *const args[] = {"--start", "--clients", "2",      "--duration",         "0.1",
+                                       "--pace",  "step",      "--link", "type: tcp, port: 0", "--quiet",
+                                       NULL};
     uint64_t last_ns = 0;
     record(*state);
     struct head head = head_start(*state, file, args);

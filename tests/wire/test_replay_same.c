@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What is replayed and what was recorded are the same bytes: over each link, in each pace, from each kind of recording,
  * and once more from a recording of the replay. */
 #include "tests/wire/replay_rig.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A recording that is replayed has the timing that the head had: in the pace step, where each tick is granted by itself,
  * each frame comes with the same tick, and all bytes are the same. */
 #include "tests/wire/emitter_rig.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Answers of SCIP and CoLa that go wrong on request: none, another one, a late one, an echo before it. What is counted
  * as an answer, and what as a unit of the stream. */
 #include "tests/wire/room.h"

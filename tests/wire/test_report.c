@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* scanhead report: a noise-free recording deviates by no more than plan and counts allow, a noisy one by its noise, in
  * all layouts; what is not so is said; the page is whole, whatever the names. */
 #include "tests/wire/room.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* stream_sha256 is the same for every pace, number of threads and link, as the head computes it, as a client
  * hears it and as `record` makes it off line; and a journal brings back a whole session. */
 #include "tests/wire/room.h"

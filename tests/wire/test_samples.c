@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* SAMPLES.md beside the program: its frames are what the encoder writes, its session is what the head says. */
 #include "tests/wire/room.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Meshes of scans through the real program: a sphere in a closed room is a closed surface, in every format, as readers that
  * are not ours see it; points spread over it; what is no mesh. */
 #include "core/scene.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Several scanners in one scene, range limits and targets: what `record` writes of them, point by point. The room's
  * walls are known planes; a board stands before one of them. */
 #include "tests/wire/room.h"

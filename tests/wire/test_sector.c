@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Panoramas by angle through the real program: a sector of a sphere and a circle on the wire, in the client in Python,
  * and as rows and columns of files; what is said of a step that doesn't divide; tripods with any number of threads. */
 #include "tests/wire/room.h"

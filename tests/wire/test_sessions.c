@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Sessions of protocols that are not native: they don't touch the stream, take part in journals, hold back what may
  * wait, and lose whole units where a client doesn't read. */
 #include "tests/common/thorough.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a station sees, mapped or not: the ready configurations give the same stream with cast.sight on and off, and a
  * head that can have no map says so. */
 #include "tests/common/thorough.h"

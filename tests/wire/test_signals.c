@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* SIGTERM and SIGINT end the program in good order wherever it is: status 0, statistics written, symlink
  * gone, files whole. */
 #include <inttypes.h>

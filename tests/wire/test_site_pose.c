@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* SITE:POSE on the wire: the scan after it is that of `record` with a configuration that says that place, in the paces fast
  * and step; the journal brings the session back; and what comes at the wrong time is refused. */
 #include "tests/wire/room.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A reader that cannot follow: in real time it loses whole frames and is told exactly how many, and nobody
  * else loses any; at the pace `fast` the run waits for it and nothing is lost. */
 #include "tests/wire/room.h"

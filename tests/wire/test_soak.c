@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* scanhead soak: each scenario for two seconds; the sheet against the truth about what was injected.
  *
  * The heads run beside each other and mostly wait. Their ticks may be late, so that a busy machine costs no pulses. */
@@ -49,9 +50,9 @@ static pid_t start(struct wire *wire, const char *name, const char *seconds, con
     snprintf(err, sizeof err, "%s.err", name);
     char port[64];
     snprintf(port, sizeof port, "links.1.path=%s-port", name);
-    const char *const args[] = {"soak",    config,    "--scenario", file,     "--duration", seconds,
-                                "--link",  link,      "--json",     json,     "--truth",    truth,
-                                "--quiet", "--set",   port,         "--pace", "realtime",   NULL};
+    const char *const args[] = {"soak",    config,  "--scenario", file,     "--duration", seconds,
+                                "--link",  link,    "--json",     json,     "--truth",    truth,
+                                "--quiet", "--set", port,         "--pace", "realtime",   NULL};
     return wire_spawn(wire, args, out, err, -1);
 }
 
@@ -161,8 +162,9 @@ static void test_the_pace_fast(void **state)
     char config[352], json[352];
     snprintf(config, sizeof config, "%s", room_config_write(wire, &SLOW));
     snprintf(json, sizeof json, "%s", wire_path(wire, "fast.json"));
-    const char *const args[] = {"soak",   config, "--scenario", "config/faults/lossy-udp.yaml", "--duration", "5",
-                                "--json", json,   "--quiet",    "--pace", "fast", NULL};
+    const char *const args[] = {"soak",       config,   "--scenario", "config/faults/lossy-udp.yaml",
+                                "--duration", "5",      "--json",     json,
+                                "--quiet",    "--pace", "fast",       NULL};
     assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
     char *text = wire_read(json, NULL);
     assert_true(total(text, "injected") > 100);
@@ -186,15 +188,17 @@ static void test_datagrams(void **state)
     snprintf(config, sizeof config, "%s", wire_path(wire, "beams.yaml"));
     FILE *f = fopen(config, "w");
     assert_non_null(f);
-    fprintf(f, "head: {profile: velodyne-vlp16, lines_hz: 10, frames: 0}\n"
-               "scene: {meshes: [{file: room.obj, up: z, scale: 1}]}\nstations: [{position_m: [0, 0, 0.2]}]\n"
-               "loop: {late_ms: 900, queue_ms: 2000}\nbeam: {mode: single, echoes: strongest}\n%s",
+    fprintf(f,
+            "head: {profile: velodyne-vlp16, lines_hz: 10, frames: 0}\n"
+            "scene: {meshes: [{file: room.obj, up: z, scale: 1}]}\nstations: [{position_m: [0, 0, 0.2]}]\n"
+            "loop: {late_ms: 900, queue_ms: 2000}\nbeam: {mode: single, echoes: strongest}\n%s",
             links);
     assert_int_equal(fclose(f), 0);
     snprintf(json, sizeof json, "%s", wire_path(wire, "udp.json"));
     snprintf(truth, sizeof truth, "%s", wire_path(wire, "udp.truth"));
-    const char *const args[] = {"soak", config,    "--scenario", "config/faults/hostile-wire.yaml", "--duration", "2", "--json",
-                                json,   "--truth", truth,        "--quiet", NULL};
+    const char *const args[] = {"soak",       config, "--scenario", "config/faults/hostile-wire.yaml",
+                                "--duration", "2",    "--json",     json,
+                                "--truth",    truth,  "--quiet",    NULL};
     const int status = wire_wait(wire, wire_spawn(wire, args, "out", "err", -1));
     if (status != 0) wire_show(wire, "out");
     assert_int_equal(status, 0);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Several scans of one recording: in one file, and each in its own. */
 #include "tests/wire/room.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Files that a head writes beside its stream, and nobody who reads them: a FIFO takes the place of a slow disk. No pulse
  * is lost by that and no client waits; what the files lack is counted in them, by SYST:LOST? and in the statistics. */
 #include <pthread.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* One exit status for one kind of failure, whichever command meets it: the table of
  * firmware_sim/app/README.md. */
 #include "tests/wire/room.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Pace `step`: time is what a client grants, and the stream is the one of every other pace. */
 #include "tests/wire/room.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* TIME:STEP over every protocol at once: when OK is there, all that fell due in the granted time lies in each client's
  * socket. Each client is emptied once after OK, without waiting. What comes later than that must be due later: each
  * unit says in itself when the device could send it.

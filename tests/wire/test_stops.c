@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Stop-and-go: the head stands at some poses of a trajectory, and scans. */
 #include "tests/wire/room.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* --surfaces of record and run: what each label of a point means, as CSV beside the recording. */
 #include "tests/wire/room.h"
 

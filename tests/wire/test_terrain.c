@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Terrain by the program: init, check --scene, record, map and coverage of a GeoTIFF. */
 #include <math.h>
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A Hokuyo, a SICK and a VLP-16 at once, each with clients of its personality, of the native stream and of the GNSS
  * receiver, for 6 s (THOROUGH=1: 15 s) of device time on whatever processors there are: nothing is lost. */
 #include "tests/common/thorough.h"

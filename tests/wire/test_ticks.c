@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* `loop.tick_hz` cuts the stream into other frames, so that its hash is another one; the points in them are the same.
  */
 #include "drivers/protocol/native.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A drive of 30 km: the anchor moves along with the head, so that counts keep 1e-6 m, and every point is where
  * GeographicLib has it. */
 #include "tests/wire/room.h"

@@ -1,25 +1,25 @@
+/* SPDX-License-Identifier: MIT */
 /* Faults on the units of SCIP, CoLa, NMEA and Velodyne: the faulty session has what the truth makes of the units of a
  * clean session beside it, byte by byte, and answers of a client go wrong as they were told to. */
 #include "tests/wire/room.h"
 #include "tests/wire/unit_faults.h"
 
 /* Faults of numbers up to 60. Those of the datagrams stay within 150 packets, of which 20 are sent as more. */
-static const char FAULTS[] =
-    "faults:\n"
-    "  - {kind: drop, link: 1, from: 3, until: 60, every: 7}\n"
-    "  - {kind: duplicate, link: 1, at: 4, n: 2}\n"
-    "  - {kind: reorder, link: 1, from: 5, until: 60, every: 9, n: 4}\n"
-    "  - {kind: truncate, link: 1, from: 8, until: 60, probability: 0.1}\n"
-    "  - {kind: flip, link: 1, at: 9, n: 3}\n"
-    "  - {kind: flip, link: 1, at: 11, n: 1, reseal: on}\n"
-    "  - {kind: flip, link: 1, at: 18, n: 8, reseal: on}\n"
-    "  - {kind: garbage, link: 1, from: 12, until: 60, every: 11, n: 40}\n"
-    "  - {kind: split, link: 1, at: 13, n: 5}\n"
-    "  - {kind: merge, link: 1, at: 15, n: 3}\n"
-    "  - {kind: delay, link: 1, at: 19, for_ms: 5}\n"
-    "  - {kind: jitter, link: 1, at: 20, for_ms: 5}\n"
-    "  - {kind: stall, link: 1, at: 21, for_ms: 5}\n"
-    "  - {kind: flip, link: 1, from: 40, until: 60, every: 8, n: 2}\n";
+static const char FAULTS[] = "faults:\n"
+                             "  - {kind: drop, link: 1, from: 3, until: 60, every: 7}\n"
+                             "  - {kind: duplicate, link: 1, at: 4, n: 2}\n"
+                             "  - {kind: reorder, link: 1, from: 5, until: 60, every: 9, n: 4}\n"
+                             "  - {kind: truncate, link: 1, from: 8, until: 60, probability: 0.1}\n"
+                             "  - {kind: flip, link: 1, at: 9, n: 3}\n"
+                             "  - {kind: flip, link: 1, at: 11, n: 1, reseal: on}\n"
+                             "  - {kind: flip, link: 1, at: 18, n: 8, reseal: on}\n"
+                             "  - {kind: garbage, link: 1, from: 12, until: 60, every: 11, n: 40}\n"
+                             "  - {kind: split, link: 1, at: 13, n: 5}\n"
+                             "  - {kind: merge, link: 1, at: 15, n: 3}\n"
+                             "  - {kind: delay, link: 1, at: 19, for_ms: 5}\n"
+                             "  - {kind: jitter, link: 1, at: 20, for_ms: 5}\n"
+                             "  - {kind: stall, link: 1, at: 21, for_ms: 5}\n"
+                             "  - {kind: flip, link: 1, from: 40, until: 60, every: 8, n: 2}\n";
 enum { UNITS = 70 };
 
 static const char CONFIG[] =
@@ -144,9 +144,9 @@ static void test_scip(void **state)
 {
     static const struct unit_kind kind = {.whole = scip_whole, .is_sound = scip_is_sound};
     struct wire *wire = *state;
-    struct head head = start(wire, "hokuyo-utm-30lx",
-                             "links: [{type: tcp, protocol: scip, port: 0}, {type: tcp, protocol: scip, port: 0}]\n",
-                             FAULTS, NULL);
+    struct head head =
+        start(wire, "hokuyo-utm-30lx",
+              "links: [{type: tcp, protocol: scip, port: 0}, {type: tcp, protocol: scip, port: 0}]\n", FAULTS, NULL);
     const int clean = raw_connect(head_link(&head, 1)), faulty = raw_connect(head_link(&head, 0));
     scip_start(clean);
     scip_start(faulty);
@@ -197,9 +197,9 @@ static void test_cola(void **state)
 {
     static const struct unit_kind kind = {.whole = cola_whole, .adapt = cola_count, .is_sound = cola_is_sound};
     struct wire *wire = *state;
-    struct head head = start(wire, "sick-tim571",
-                             "links: [{type: tcp, protocol: cola, port: 0}, {type: tcp, protocol: cola, port: 0}]\n",
-                             FAULTS, NULL);
+    struct head head =
+        start(wire, "sick-tim571",
+              "links: [{type: tcp, protocol: cola, port: 0}, {type: tcp, protocol: cola, port: 0}]\n", FAULTS, NULL);
     const int clean = raw_connect(head_link(&head, 1)), faulty = raw_connect(head_link(&head, 0));
     cola_start(clean);
     cola_start(faulty);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Wrong input through the real program: exit status 2, one line on stderr that says what, where and what is
  * allowed, nothing on stdout, no file left behind. */
 #include "tests/common/collada.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A head whose stream a USB of its speed can't carry says so at start, with both figures; one that it can carry runs.
  *
  * The figures are worked out by hand. A point has 20 bytes (PROTOCOL.md), and full-sweep's mirror (36 facets, gain 10)

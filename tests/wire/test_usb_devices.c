@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Heads that show themselves on USB as the device whose protocol they speak: ids, strings, interfaces, and a question
  * with its answer. What is configured of the identity stays as it is. The kernel's drivers and libusb on the same
  * devices: tests/guest. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Heads on USB/IP with nothing configured of their identity: two that run at a time differ in serial number and bus id,
  * and in nothing that belongs to the stream; what is configured stays as it is. */
 #include "tests/wire/room.h"

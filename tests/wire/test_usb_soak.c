@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A head on usbredir whose other end goes away, comes back and resets at random, in the middle of the stream: nothing
  * may hang, nothing may leak, and what is lost must be announced. The virtual machine is played by this program, with
  * the library that QEMU has for it. USB_SOAK_EVENTS: how often (default 20; `make soak-usb`: 1000). */

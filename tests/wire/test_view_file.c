@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* `scanhead view` through the real program: what its page gets over HTTP equals what `scanhead record` makes of the same
  * recording; its end; ports that are taken. The recording is a sphere in a closed room, whose mesh has no hole. */
 #include <netinet/in.h>

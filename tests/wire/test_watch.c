@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a page is told of a scan while it is on: a noise-free scan that the observer sees all of has the figures that
  * `scanhead report` and `scanhead coverage` have of the same one; with noise it is judged by it; stations follow the head;
  * the coarse scene is the scene. The answers come by HTTP, as a browser gets them. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The dissector in Wireshark beside libscanhead: frames of every kind over TCP, on USB and in packets of their own, value
  * by value. */
 #include "tests/wire/dissected_frames.h"

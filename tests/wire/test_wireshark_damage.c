@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The dissector in Wireshark and damage: frames that were hurt are marked, and a stream with damage is read as libscanhead
  * reads it, in one pass and in two. */
 #include "tests/wire/wireshark_rig.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/wire/unit_faults.h"
 
 /* ---- lists of units */
@@ -135,8 +136,8 @@ struct piece {
     uint64_t n_bits;
     int64_t byte;
     uint64_t split;
-    uint64_t after;  /* 0, or the unit behind which it comes */
-    int is_joined;   /* in the write of the piece before it */
+    uint64_t after; /* 0, or the unit behind which it comes */
+    int is_joined;  /* in the write of the piece before it */
 };
 
 struct pieces {

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Units of a faulty session against those of a clean one: what the session's faults must have made of them, by the
  * truth that the head wrote alone, and whether that is what came. Nothing of the program's faults is used. */
 #ifndef TESTS_WIRE_UNIT_FAULTS_H

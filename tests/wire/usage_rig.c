@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/wire/usage_rig.h"
 
 #include <dirent.h>

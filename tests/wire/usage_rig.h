@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Wrong input through the real program, for the tests that look at what it answers. */
 #ifndef TESTS_WIRE_USAGE_RIG_H
 #define TESTS_WIRE_USAGE_RIG_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/wire/usbip_host.h"
 
 enum { HEADER = 48, TO_DEVICE = 0, FROM_DEVICE = 1 };

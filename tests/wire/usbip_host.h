@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A USB/IP host without a kernel, for heads that run: the list, the import, and one transfer at a time. Numbers on the
  * wire: the kernel's Documentation/usb/usbip_protocol.rst, version 1.1.1. */
 #ifndef TESTS_WIRE_USBIP_HOST_H

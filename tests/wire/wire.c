@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/wire/wire.h"
 
 int64_t wire_now_ms(void)

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What the wire tests share: a folder of their own, the real program started in it, its endpoints, its end.
  *
  * Nothing here sleeps to let something happen: every wait is on a descriptor (ready line, frame, reply,

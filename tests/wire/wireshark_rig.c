@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "tests/wire/wireshark_rig.h"
 
 #include "drivers/protocol/crc32c.h"

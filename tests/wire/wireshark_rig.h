@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Streams of every kind, and the carriers that a capture has them on: what the tests of the dissector share. */
 #ifndef TESTS_WIRE_WIRESHARK_RIG_H
 #define TESTS_WIRE_WIRESHARK_RIG_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/geotiff.h"
 
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Cells by libtiff, row by row: whatever is packed, predicted, striped or tiled comes as plain numbers of this machine. */
 #include "core/import/geotiff/geotiff_read.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/import/geotiff/tags.h"
 
 #include <string.h>

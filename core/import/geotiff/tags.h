@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Tags of a TIFF's first directory. Nothing in the file is trusted: what lies outside of it is an error. */
 #ifndef CORE_IMPORT_GEOTIFF_TAGS_H
 #define CORE_IMPORT_GEOTIFF_TAGS_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to core/import/gltf: a glTF 2.0 file on its way into a scene. All of it is read in a process of its own, as what
  * Assimp reads is: limits and clean-up of memory after a crash are that process's. Indices, counts and offsets come from the
  * file: nothing is used before it is checked. */

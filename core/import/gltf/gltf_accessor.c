@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Accessors and buffer views. Numbers of the file are up to 2^53, counts below 2^32 and strides up to 2^16, so that sums and
  * products of them stay within 64 bits. */
 #include "core/import/gltf/gltf.h"

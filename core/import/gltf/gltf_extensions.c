@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Extensions: the known ones, and the rest. */
 #include "core/import/gltf/gltf.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The file itself: JSON, alone or in a .glb, and its buffers.
  *
  *   .glb   "glTF" version length | length "JSON" ... | length "BIN\0" ... | others, which nobody knows

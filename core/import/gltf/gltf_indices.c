@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Indices of the whole file, also of what no scene draws: each that names nothing is counted, and the first one named. What is
  * drawn is an error once it is read; this says the rest. */
 #include "core/import/gltf/gltf.h"

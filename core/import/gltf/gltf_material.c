@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Materials: the base colour, its texture, how that lies, and what its alpha cuts out. */
 #include "core/import/gltf/gltf.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The primitives of a mesh into the builder, of any mode. A vertex is added when a triangle first has it: primitives may share
  * accessors that are much larger than they are. */
 #include "core/import/gltf/gltf.h"

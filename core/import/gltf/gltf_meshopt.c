@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* EXT_meshopt_compression and KHR_meshopt_compression: buffer views that meshoptimizer has packed. */
 #include "core/import/gltf/gltf.h"
 

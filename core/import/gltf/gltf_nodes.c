@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The tree of nodes, in double. A node has one parent at most, and none above it is itself: the file is refused else, so that
  * the walk ends. No recursion: a chain may be as long as the file. */
 #include "core/import/gltf/gltf.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Morph targets with their default weights, and skins with their joints where the nodes are: the pose of a file without its
  * animations.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/import/gltf/gltf_read.h"
 
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* glTF 2.0 into a scene, by its specification. README.md has the rules. */
 #ifndef CORE_IMPORT_GLTF_GLTF_READ_H
 #define CORE_IMPORT_GLTF_GLTF_READ_H

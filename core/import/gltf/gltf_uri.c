@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* URIs of glTF: data within them (RFC 2397), and relative names of files (RFC 3986). */
 #include "core/import/gltf/gltf.h"
 

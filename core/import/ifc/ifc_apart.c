@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The two readers, each a program of node in a process of its own (core/scene/import.h). */
 #include <math.h>
 #include <stdio.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/import/ifc/ifc_bodies.h"
 
 #include <errno.h>

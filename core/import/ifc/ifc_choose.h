@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Chooses each product's body of two readings, by rules that core/import/ifc/README.md has. */
 #ifndef CORE_IMPORT_IFC_IFC_CHOOSE_H
 #define CORE_IMPORT_IFC_IFC_CHOOSE_H

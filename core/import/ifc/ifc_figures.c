@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Area, volume, box, and whether a body is closed: core/body.h over all its edges. */
 #include <float.h>
 #include <math.h>

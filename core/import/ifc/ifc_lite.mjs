@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // ifc-lite: the bodies of an IFC file to descriptor 3, as result.mjs has them.
 //   node ifc_lite.mjs FILE LEVEL      LEVEL: lowest low medium high highest; how fine curves are cut up
 import fs from 'node:fs'

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "core/import/ifc/ifc_read.h"
 
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* IFC files into a scene, each body by two independent readers. README.md has the rules. */
 #ifndef CORE_IMPORT_IFC_IFC_READ_H
 #define CORE_IMPORT_IFC_IFC_READ_H

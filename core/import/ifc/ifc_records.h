@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The records of an IFC file, by number, and what they say of its products: what no reader of bodies gives. In: a path.
  * Out: products with type, GlobalId and name, metres per unit, and marks of what their geometry consists of. */
 #ifndef CORE_IMPORT_IFC_IFC_RECORDS_H

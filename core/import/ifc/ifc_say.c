@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Findings as lines that name their products. */
 #include <stdio.h>
 #include <string.h>

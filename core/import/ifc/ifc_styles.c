@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Styles of surfaces: IfcStyledItem, and what it leads to. Readers of bodies give colours; the names are only here. */
 #include <math.h>
 #include <stdlib.h>

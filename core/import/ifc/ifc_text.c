@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Texts of STEP files (ISO 10303-21, 6.4.3) as UTF-8. */
 #include <stdlib.h>
 #include <string.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The unit of length of an IFC file's project. Readers of bodies apply it themselves; here it scales what the records say, and
  * what an anchor is read from. */
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The entities that the geometry of each product consists of: its shape is walked through from record to record, with
  * that of its openings. */
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // The form in which a reader gives its products to scanhead, on descriptor 3; and errors, on descriptor 4. Numbers are in
 // the machine's order. Coordinates are metres, y up, as other formats of y up come.
 //

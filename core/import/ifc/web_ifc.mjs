@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // web-ifc: the bodies of an IFC file to descriptor 3, as result.mjs has them.
 //   node web_ifc.mjs FILE SEGMENTS      SEGMENTS: of a full circle
 import { createRequire } from 'node:module'

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Client of a scanhead in one file: commands, frames, points as arrays. Python 3.9, standard library.
 
     head = scanhead.open("tcp:127.0.0.1:5025")

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // The bar: state and control in words; start, stop; the banner when the head is gone.
 import {atMostEvery, byId, say, clock, grouped} from './page.js';
 import {stateWord, why} from './session.js';

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // The points that are held: blocks of typed arrays, the newest `capacity` of them and less than a block more; the oldest
 // blocks go.
 //

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // CRC-32C of RFC 3720 (reflected polynomial 0x82f63b78), eight bytes a step: slicing by 8, after Kounavis and Berry,
 // "Novel Table Lookup-Based Algorithms for High-Performance CRC Generation", IEEE Transactions on Computers 57 (2008).
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // What the head says about its settings: HELP:SETtings? lists them, and HELP? of each describes it. A head without
 // these has MIN, MAX and DEF.
 

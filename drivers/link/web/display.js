@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // How the picture looks: colours with their legend, point size, what is drawn besides points, from where.
 import {bodyOf, byId, kept, make, say} from './page.js';
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // State in figures: what the head delivers, what of it came here, what was lost, what the page does with it.
 import {bodyOf, byId, duration, figureList, grouped, make, makeSvg, say, short, NONE} from './page.js';
 

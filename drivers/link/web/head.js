@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // One head: its connection, commands and replies, control, what it says of itself, and what was lost.
 import {STATES} from './native.js';
 import {Losses} from './losses.js';

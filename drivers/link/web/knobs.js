@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // The head's settings, as the head describes them: a field each, with limits, unit and the head's own refusals.
 import {bodyOf, byId, make, say, atMostEvery} from './page.js';
 import {describeSettings} from './describe.js';

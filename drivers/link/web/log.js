@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // Events and errors in words, the newest on top; and the plan.
 import {bodyOf, byId, clock, fetchJson, grouped, make, metres, percent, say} from './page.js';
 import {peerOf} from './head.js';

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // What was lost of a connection's scans, by the words of PROTOCOL.md (*What the counts mean*), and where a scan ends
 // whose SCAN_END was lost (*A reader that lost SCAN_END*). Pure.
 import {STATES} from './native.js';

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // Connects the page's modules: a head and its points, or a recording.
 import {byId, fetchJson, kept, say} from './page.js';
 import {Head} from './head.js';

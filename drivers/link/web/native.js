@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // The native protocol, from PROTOCOL.md alone: bytes to frames (Parser), frames to values and batches of points in the
 // scene frame (Decoder). Pure: it runs in a page, in a worker and in node.
 import {LOCAL, Parser, REPEAT} from './native_parser.js';

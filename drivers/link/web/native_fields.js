@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // Payloads of fixed layout by the tables of PROTOCOL.md, as objects. A payload that PROTOCOL.md tells a reader to
 // refuse throws Refused.
 //

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // The records of a points frame, as columns in the scene frame. The hot path: no object, no BigInt a point.
 import {fitCubic, geodeticToEcef, toScene} from './native_earth.js';
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // Poses of a head that moves: points of the polar layout go from its frame to the scene by the pose of their time
 // (PROTOCOL.md, *8 poses*, Rule).
 

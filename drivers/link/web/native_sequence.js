@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // The sequence numbers of frames, as PROTOCOL.md has them (*Sequence numbers*): what is missing, came already, or too late.
 const SEEN = 256, GAPS = 64, GAP_MOST = 65536, LATE_RUN = 256; // how far back a jump is looked into, as libscanhead does
 const LOCAL = 2;

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // What all panels share: making elements, writing figures, and doing things no more often than needed.
 
 // Makes an element: make('p', {id: 'x', class: 'y'}, 'text', child). A function as a value is a listener.

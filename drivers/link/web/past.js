@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // The points that the scans had before this page came, or while it was away: the head keeps the last ones, and gives them
 // in pieces (GET /past, firmware_sim/app/watch/README.md). They are frames of the stream with the numbers that they had.
 // So each points frame is taken once, either from there or from the connection.

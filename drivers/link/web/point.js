@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // The point under the pointer, in figures. Its place is there also while there is none: nothing jumps.
 import {byId, grouped, make, say, NONE} from './page.js';
 

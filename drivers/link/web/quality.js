@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // How good the scan is so far, as the head reports it at /quality: it knows the truth.
 import {bodyOf, byId, fetchJson, figureList, grouped, make, makeSvg, metres, percent, say, short, NONE} from './page.js';
 

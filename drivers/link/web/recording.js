@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // A recording, without a head: its points, the mesh of a scan, or points spread evenly over that mesh.
 import {atMostEvery, bodyOf, byId, figureList, grouped, make, metres, say, short} from './page.js';
 import {batchesOf, countWithin, fetchCloud, fetchMesh} from './recording_files.js';

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // What the link serves of a recording: clouds in columns, meshes whose triangles are sorted. Pure but for fetch.
 
 const KINDS = {1: Uint8Array, 2: Uint16Array, 3: Uint32Array, 4: Float32Array};

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // Command lines and their replies, by COMMANDS.md: each line has one reply, in the order of the lines. After a line
 // whose reply did not come in time the reply may still come: then the head is asked *IDN?, and all replies before the
 // answer to that are nobody's (*Coming into step*).

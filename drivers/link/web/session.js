@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // What the page knows of its head at any moment: connection, state, who has control. The panels ask it, and hear
 // 'change' of it.
 import {STATES} from './native.js';

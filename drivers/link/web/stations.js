@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // Where the stations stand: to be read, and, with control and while the head is idle, to be moved.
 import {bodyOf, fetchJson, make, say} from './page.js';
 import {why} from './session.js';

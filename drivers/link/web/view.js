@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // The picture of a cloud: WebGL 2 points, the scene, the stations, and what is under the pointer. See README.md for what
 // it offers. While the view moves it draws a level of detail, as much as a frame's time allows; once it rests the rest is
 // added, a slice at a time; points that come are added to what is there.

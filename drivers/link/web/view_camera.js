@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // The camera: where the eye is, where it looks, and what lies where on the screen. Pure; lengths in metres, angles in
 // radians, scene frame (x east, y north, z up) in doubles. Screen places are CSS pixels from the top left corner.
 //

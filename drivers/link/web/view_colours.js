@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // Colours of points: what each mode shows, its ramp and limits, and the legend for it. Pure.
 //
 // A point has one number, which the shader turns into a colour: `ramp` by a table of 256 colours between the limits,

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // What is drawn, piece by piece, into a picture that is kept: a prefix of each part while the view moves, the rest of
 // each once it rests, and only what is new as points come.
 //

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // Shaders, programs and targets of the picture: WebGL 2, and nothing of what they are used for.
 //
 // All positions are relative to an origin of their own; the eye relative to it comes as the sum of two floats. Depth is

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // Pointer, touch, wheel and keys on the picture, turned into turns, shifts and zooms of the camera.
 //
 //   drag, one finger          orbit about what is under the pointer; look round from inside

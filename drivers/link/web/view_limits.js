@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // Limits of the colours and of the view, from what the cloud has. They change rarely, so that nothing flickers: each time
 // the cloud has twice the points, and then only where they miss much.
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // Meshes as arrays: the coarse scene from its bytes, its edges, and the shapes of a station. Pure.
 
 const MAGIC = 0x43534853; // "SHSC"

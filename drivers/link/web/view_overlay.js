@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // What stands over the points: scale bar, axes with north, stations' names and handles, the point under the pointer.
 // On a 2D canvas over the picture, so that lines and letters are sharp; each with an edge in the ground's colour.
 

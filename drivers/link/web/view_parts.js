@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // The parts that are drawn into the kept picture (view_draw.js): blocks of points with their buffers on the GPU, and
 // meshes.
 

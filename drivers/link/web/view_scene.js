@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // What is drawn besides points: the coarse scene, a recording's mesh, the stations. Owns their buffers on the GPU.
 
 import {Mesh, useMesh} from './view_parts.js';

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // The stations in the picture: tripods, which one is selected, and moving it: dragged along the plane at its height,
 // turned by its handle, or by keys. While it is moved, a ghost stays where it was.
 

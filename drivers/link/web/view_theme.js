@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // The picture's colours, from the page's: its ground, ink and accent (CSS variables), as the shaders and the overlay want
 // them. The page's scheme decides which of the two sets of the rest is taken.
 

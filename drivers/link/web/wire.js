@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 // One connection with a head, decoded: what runs in the page's worker (wire_worker.js), or in the page itself where it
 // has no workers. It hands on what came in messages of many things, and reads no further while its owner has not
 // taken them (`ack`).

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: MIT
 -- scanhead's native protocol in Wireshark and tshark: drivers/protocol/PROTOCOL.md, byte by byte.
 --
 --     wireshark -X lua_script:scanhead.lua scan.pcapng

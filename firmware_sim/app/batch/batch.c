@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* scanhead batch: its options (batch.h). */
 #include "firmware_sim/app/batch/batch.h"
 

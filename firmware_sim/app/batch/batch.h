@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A campaign: many recordings off line, each of which is a station and values of keys. In: the command line of
  * `batch`. Out: the list of jobs in its fixed order, which of them are done, their files, and the manifests.
  *

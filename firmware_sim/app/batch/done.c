@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Which jobs of a campaign are done (batch.h). */
 #include <limits.h>
 #include <stdio.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The jobs of a campaign, printed (batch.h). */
 #include <stdio.h>
 

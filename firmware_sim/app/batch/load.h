@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The scene that jobs of a campaign share. In: a combination of values. Out: its configuration and its site, which stay
  * loaded for further stations of it.
  *

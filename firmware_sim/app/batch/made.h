@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What the files of a job were made of, as hashes: two jobs that say the same make the same bytes. In: a
  * configuration, what it names, and a job's settings. Out: a struct batch_made.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What is done of a campaign. Each shard has a file manifest-I-of-N.jsonl in the campaign's folder, a line of JSON for
  * each job that it has finished; nothing but whole lines counts. Out: the entries of all such files of a folder.
  *

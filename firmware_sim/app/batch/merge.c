@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* All shards of a campaign together (batch.h). */
 #include <dirent.h>
 #include <limits.h>

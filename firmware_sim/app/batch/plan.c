@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/app/batch/batch.h"
 
 #include <stdarg.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The jobs of one shard (batch.h). */
 #include <errno.h>
 #include <limits.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a campaign varies. In: the texts of --sweep and --stations. Out: the values of each key, every combination
  * of them by its number, and numbers of stations. Pure; errors are SH_EINPUT or SH_ENOMEM. */
 #ifndef FIRMWARE_SIM_APP_BATCH_SWEEP_H

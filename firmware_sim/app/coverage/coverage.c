@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* scanhead coverage: how much of the scene's surface the stations see, and where to stand next. */
 #include "firmware_sim/app/coverage/coverage.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to this folder: what `scanhead coverage` found, and how it is shown. */
 #ifndef FIRMWARE_SIM_APP_COVERAGE_COVERAGE_H
 #define FIRMWARE_SIM_APP_COVERAGE_COVERAGE_H

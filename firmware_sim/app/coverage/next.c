@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Where to stand next: places, what each would see that nobody has seen, and scans of the best. */
 #include "firmware_sim/app/coverage/next.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to this folder: where to stand next, for `scanhead coverage --next`. */
 #ifndef FIRMWARE_SIM_APP_COVERAGE_NEXT_H
 #define FIRMWARE_SIM_APP_COVERAGE_NEXT_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The next stations of `scanhead coverage` as text and as JSON. */
 #include <inttypes.h>
 #include <math.h>

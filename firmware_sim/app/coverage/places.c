@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Places to compare, on a grid or from a file, and the rays that they are compared by. */
 #include <math.h>
 #include <stdlib.h>

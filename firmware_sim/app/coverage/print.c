@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The figures of `scanhead coverage` as text and as JSON. */
 #include <inttypes.h>
 #include <math.h>

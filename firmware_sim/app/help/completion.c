@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A completion for bash: commands, options, their words, configuration keys with theirs, files and folders. */
 #include <ctype.h>
 #include <string.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* scanhead help: the command, and the help of the program as a whole. */
 #include "firmware_sim/app/help/help.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* scanhead help: what the program says of itself, for people, for man and for a shell.
  *
  * In: the list of commands (main.c) and their tables, the table of configuration keys. Out: the help's text, manual pages

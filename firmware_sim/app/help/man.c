@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Manual pages: one for the program, one for each command, one for the configuration. */
 #include <string.h>
 
@@ -132,8 +133,9 @@ static void put_configuration(void)
 {
     roff_head("scanhead.yaml", "5", "configurations and head profiles of scanhead");
     puts(".SH DESCRIPTION");
-    roff_text("A configuration names a head profile, a scene, stations and links. `scanhead check FILE` says what is wrong "
-              "with one. `scanhead check --example` prints one with all keys.");
+    roff_text(
+        "A configuration names a head profile, a scene, stations and links. `scanhead check FILE` says what is wrong "
+        "with one. `scanhead check --example` prints one with all keys.");
     put_keys(CONFIG_KEYS, "KEYS OF CONFIGURATIONS");
     put_keys(CONFIG_PROFILE_KEYS, "KEYS OF HEAD PROFILES");
     puts(".SH SEE ALSO");

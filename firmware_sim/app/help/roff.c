@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Text as roff. */
 #include <string.h>
 
@@ -8,14 +9,29 @@ void roff_put(const char *text, size_t n)
 {
     for (size_t i = 0; i < n; i++) {
         switch (text[i]) {
-        case '\\': fputs("\\e", stdout); break;
-        case '-': fputs("\\-", stdout); break;
-        case '\'': fputs("\\(aq", stdout); break;
-        case '`': fputs("\\(ga", stdout); break;
-        case '^': fputs("\\(ha", stdout); break;
-        case '~': fputs("\\(ti", stdout); break;
-        case '.': fputs(i == 0 ? "\\&." : ".", stdout); break;
-        default: putchar(text[i]);
+        case '\\':
+            fputs("\\e", stdout);
+            break;
+        case '-':
+            fputs("\\-", stdout);
+            break;
+        case '\'':
+            fputs("\\(aq", stdout);
+            break;
+        case '`':
+            fputs("\\(ga", stdout);
+            break;
+        case '^':
+            fputs("\\(ha", stdout);
+            break;
+        case '~':
+            fputs("\\(ti", stdout);
+            break;
+        case '.':
+            fputs(i == 0 ? "\\&." : ".", stdout);
+            break;
+        default:
+            putchar(text[i]);
         }
     }
 }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* scanhead init: a first configuration for a mesh. */
 #include <errno.h>
 #include <fcntl.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Looking at a mesh file for `scanhead init`. In: its path, and what the user says of it. Out: the mesh in
  * metres with z up, how it has to be read for that, and where that is known from. */
 #ifndef FIRMWARE_SIM_APP_INIT_MESH_H

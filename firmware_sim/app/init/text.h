@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The text of a first configuration. In: the mesh, what is known or assumed of it, and a place to stand. Out:
  * commented YAML. */
 #ifndef FIRMWARE_SIM_APP_INIT_TEXT_H

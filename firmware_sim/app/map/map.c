@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* scanhead map: a picture of the scene from above. The head scans it off line. */
 #include <math.h>
 #include <stdio.h>

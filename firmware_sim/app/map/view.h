@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* scanhead map --perspective: a picture of points as seen from a place. In: the options, and a configuration whose
  * stations are scanned, or a recorded cloud, or both: then the cloud is shown, and the configuration says where its
  * stations are. Out: a PNG. */

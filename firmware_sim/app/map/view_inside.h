@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to map --perspective: what scan and cloud share. */
 #ifndef FIRMWARE_SIM_APP_MAP_VIEW_INSIDE_H
 #define FIRMWARE_SIM_APP_MAP_VIEW_INSIDE_H

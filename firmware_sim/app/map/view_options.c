@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The options of map --perspective: words and numbers into a plan. */
 #include <math.h>
 #include <stdio.h>
@@ -89,7 +90,8 @@ static int read_limits(const struct map_view_options *o, struct map_view_plan *p
     if (!read_numbers(o->limits, ',', plan->limit, 2) || !(plan->limit[1] > plan->limit[0]))
         return sh_fail(err, SH_EINPUT, "--limits %s: limits are LOW,HIGH, the second larger than the first", o->limits);
     if (plan->colour > MAP_VIEW_RANGE)
-        return sh_fail(err, SH_EINPUT, "--limits goes with --colour height and range, not %s", map_view_colours[plan->colour]);
+        return sh_fail(err, SH_EINPUT, "--limits goes with --colour height and range, not %s",
+                       map_view_colours[plan->colour]);
     return SH_OK;
 }
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The picture of map --perspective: eye, points, colours, legend. */
 #include <math.h>
 #include <stdio.h>

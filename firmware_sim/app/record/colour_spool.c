@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/app/record/colour_spool.h"
 
 #include <errno.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The frames of a recording, kept until the smallest and the largest of what its colours show are known. In: each frame
  * of the stream. Out: these two figures, and the frames again, in their order. The frames lie in a nameless file beside
  * the recording; memory holds none of them. One thread. */

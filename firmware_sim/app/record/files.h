@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The files of one `scanhead record`. In: paths, then each frame of the stream. Out: the files, which a
  * recorder for each ending writes (drivers/record). All are opened, fed and closed together. All scans go
  * into the same files, or each scan into files of its own.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* One recording: which scans of which source go to which files, with its messages and statistics. `record` makes
  * one from its options, `batch` one for each job. In: a struct record_job, zeroed and filled. Out: the files. */
 #ifndef FIRMWARE_SIM_APP_RECORD_JOB_H

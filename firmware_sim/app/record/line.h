@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The command line of `record`, read. `batch` makes such a line for each of its jobs, so that it has the options of
  * `record` as they are. In: argv. Out: one recording (job.h), with the settings of keys. */
 #ifndef FIRMWARE_SIM_APP_RECORD_LINE_H
@@ -12,11 +13,11 @@ struct record_line {
     struct app_input in;
     struct record_job job;
     int quiet;
-    double long_edge; /* negative: not given */
-    long sparse_seed; /* likewise */
-    int has_rgb, limited; /* --colour-rgb, --colour-limits */
-    int raw;              /* raw.h takes the whole line then */
-    const char *raw_only; /* an option that needs it */
+    double long_edge;                       /* negative: not given */
+    long sparse_seed;                       /* likewise */
+    int has_rgb, limited;                   /* --colour-rgb, --colour-limits */
+    int raw;                                /* raw.h takes the whole line then */
+    const char *raw_only;                   /* an option that needs it */
     const char *repair[RECORD_MAX_REPAIRS]; /* --repair; with it nothing is recorded */
     int n_repairs;
 };

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The command line of `record --raw`. */
 #include "firmware_sim/app/record/raw.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* `record --raw`: what other protocols than the native one have on the wire, to a .pcapng that other programs read.
  *
  * In: the command line. Out: Ethernet frames (drivers/protocol/ethernet.h) with the kernel's times of receiving. A

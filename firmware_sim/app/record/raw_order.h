@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What came at several sockets, in the order in which it came. Each socket is an input that holds one piece at most.
  *
  * A piece is passed on once every other input was asked after it was taken: what they have with an earlier time is then

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The recording of `record --raw`: from open files to closed ones, whatever the source is. */
 #include <errno.h>
 #include <limits.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/app/record/raw_talk.h"
 
 #include <string.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A connection that `record --raw` has between two ends, and its frames.
  *
  * End 0 asked for the connection: a client that is relayed, or this program itself with its --send. End 1 is the

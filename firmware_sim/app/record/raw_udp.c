@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* `record --raw` of UDP: a socket a port, and each datagram as a frame. */
 #include <stdlib.h>
 #include <string.h>

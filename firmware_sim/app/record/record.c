@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* scanhead record: the points of scans to files. */
 #include <math.h>
 #include <stdio.h>

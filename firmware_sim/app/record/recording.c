@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/app/record/recording.h"
 
 #include <math.h>
@@ -11,7 +12,15 @@
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/command/head.h"
 
-enum { REPLY_MS = 5000, NEXT_MS = 250, END_MS = 5000, LAST_MS = 60000, BOOT_MS = 30000, REPLUG_MS = 1000, SILENT_MS = 2000 };
+enum {
+    REPLY_MS = 5000,
+    NEXT_MS = 250,
+    END_MS = 5000,
+    LAST_MS = 60000,
+    BOOT_MS = 30000,
+    REPLUG_MS = 1000,
+    SILENT_MS = 2000
+};
 
 struct recording {
     int64_t pulses_ns; /* when pulses came last */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Following scans through libscanhead: start a scan, pass on its frames until it ends, stop it on time.
  *
  * In: a client's handle of a head (on a wire, or of offline.h) and what to scan. Out: each frame to a
@@ -18,13 +19,13 @@ struct recording_options {
     /* Of a recording that other heads begin or go on with: its first and last station, for progress and for what is
      * missing. 0: this is all of it. */
     uint32_t begin_station, end_station;
-    long frames;                          /* per scan; -1: as the head is set */
-    double duration_s;                    /* > 0: stop each scan after this device time ... */
-    int head_ends;                        /* ... which the head does by itself: no command is needed */
-    double replug_s;                      /* > 0: how long to wait for a head that was unplugged, to go on then */
-    int hash;                             /* keep stream_sha256 */
-    int progress;                         /* 1: to the report, about once a second */
-    uint64_t source_bytes;                /* of a stream in a file, for progress; 0: not known */
+    long frames;           /* per scan; -1: as the head is set */
+    double duration_s;     /* > 0: stop each scan after this device time ... */
+    int head_ends;         /* ... which the head does by itself: no command is needed */
+    double replug_s;       /* > 0: how long to wait for a head that was unplugged, to go on then */
+    int hash;              /* keep stream_sha256 */
+    int progress;          /* 1: to the report, about once a second */
+    uint64_t source_bytes; /* of a stream in a file, for progress; 0: not known */
     const struct sh_report *report;
     /* Before each scan, while the head is idle; station as above. NULL: there is nothing to do. */
     int (*prepare)(void *ctx, uint32_t station, struct sh_err *err);

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "firmware_sim/app/record/recording_counts.h"
 
 #include <string.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The pulses of a recording: what came, and what the head says of the rest. PROTOCOL.md defines the words (What
  * the counts mean).
  *

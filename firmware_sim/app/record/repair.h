@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* `scanhead record --repair`: what drivers/record/repair.h makes of each file, printed. */
 #ifndef FIRMWARE_SIM_APP_RECORD_REPAIR_H
 #define FIRMWARE_SIM_APP_RECORD_REPAIR_H

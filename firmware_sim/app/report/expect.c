@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What deviations are expected of a recording, by its configuration, and whether they are so. */
 #include <math.h>
 #include <stdio.h>

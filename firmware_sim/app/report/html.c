@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The report as a page: its sections in their order. */
 #include <ctype.h>
 #include <errno.h>

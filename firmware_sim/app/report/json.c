@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The report as JSON. Keys that are there stay. */
 #include <math.h>
 

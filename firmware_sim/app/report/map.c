@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The map of a report: the cloud from above, coloured by distance from the scene, with the stations. */
 #include <inttypes.h>
 #include <math.h>

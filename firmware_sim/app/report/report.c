@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* scanhead report: how far a recording's points lie from the scene of its configuration. The command; report.h says
  * where its parts are. */
 #include <stddef.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Parts of `scanhead report`, of nobody else: the figures (work.c), what is expected of them
  * (expect.c), and the forms in which they are written (text.c, json.c, html.c). */
 #ifndef FIRMWARE_SIM_APP_REPORT_REPORT_H
@@ -54,7 +55,7 @@ struct report {
     struct timespec modified; /* of the cloud's file */
     struct config *cfg;
     struct sites sites;
-    struct site *site; /* of the scanner of head.station */
+    struct site *site;            /* of the scanner of head.station */
     const struct georef **georef; /* of each station */
     struct distance *index;
     struct distance *mover_index[CAST_MAX_MOVERS]; /* of each body that moves, in its own frame */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Tables of the report's page. */
 #include <inttypes.h>
 #include <math.h>

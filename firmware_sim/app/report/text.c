@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The report as text. The first lines are those that scripts know. */
 #include <inttypes.h>
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What deviations are expected of a head, and whether those of its points are so. */
 #include "firmware_sim/app/report/verdict.h"
 

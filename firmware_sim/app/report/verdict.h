@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Whether the deviations of points are as expected of configuration and plan: of a recording's station (expect.c), and
  * of a scan that is still on (firmware_sim/app/watch). In: what the station's head is, and the figures of its points
  * (core/figures.h). Out: a judgement, its limits, and one sentence or two. Pure. */

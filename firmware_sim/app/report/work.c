@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The figures of a report: reads, compares, counts. Nothing is printed here but progress. */
 #include <math.h>
 #include <stdlib.h>

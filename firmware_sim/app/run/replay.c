@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* scanhead run FILE.shs: serves a recording. */
 #include <stdio.h>
 #include <stdlib.h>

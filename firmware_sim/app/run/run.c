@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* scanhead run: serves the head on its links. */
 #include <math.h>
 #include <stdio.h>

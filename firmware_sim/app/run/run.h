@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* `scanhead run`: its options, and what its files share. */
 #ifndef FIRMWARE_SIM_APP_RUN_RUN_H
 #define FIRMWARE_SIM_APP_RUN_RUN_H

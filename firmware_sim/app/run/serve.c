@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What `run` does with a head and with a recording alike: serving until the end, statistics. */
 #include <errno.h>
 #include <poll.h>

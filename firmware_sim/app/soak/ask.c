@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Questions of a recorder whose right answers are known, and what became of the answers. */
 #include <string.h>
 
@@ -46,7 +47,7 @@ static int is_version(const char *text)
 
 struct answer {
     int rc, is_right;
-    int is_same; /* as the reply before */
+    int is_same;      /* as the reply before */
     int is_after_end; /* it was asked just after a session ended */
     double ms;
 };

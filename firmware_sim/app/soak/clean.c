@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The clean stream: a reader within the head's own process, whom no fault of a link meets. */
 #include <errno.h>
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A client for each link: what a good recorder does. It starts a scan, reads all frames, asks now and then, opens the
  * head again when the connection goes, and starts the scan again when the head has forgotten it. */
 #include <stdio.h>
@@ -58,8 +59,8 @@ static int open_link(struct soak *soak, uint32_t i, const struct link_place *pla
     link->datagrams = soak->datagrams[i];
     link->not_soaked = only != 0 && only != i + 1 ? "not asked for (--link)"
                        : link->datagrams == NULL  ? why_not(place, &soak->cfg->link[i])
-                       : begins_anew(soak)        ? "its packets begin anew with power or plug, so nothing is beside them"
-                                                  : NULL;
+                       : begins_anew(soak) ? "its packets begin anew with power or plug, so nothing is beside them"
+                                           : NULL;
     link->usable = link->not_soaked == NULL;
     if (!link->usable) return 0;
     link->fact = calloc(SOAK_RING, sizeof *link->fact);
@@ -124,8 +125,8 @@ static void open_head(struct recorder *r)
     char why[256];
     while (atomic_load(&link->soak->phase) != SOAK_ENDS) {
         const int64_t from_ns = clock_now_ns();
-        const int rc = link->sh == NULL ? scanhead_open(link->source, &link->sh, why, sizeof why)
-                                        : scanhead_reattach(link->sh, 0);
+        const int rc =
+            link->sh == NULL ? scanhead_open(link->source, &link->sh, why, sizeof why) : scanhead_reattach(link->sh, 0);
         if (rc == SCANHEAD_OK) {
             scanhead_on_notice(link->sh, soak_saw_notice, link);
             soak_usb_opened(link, 1e-6 * (double)(clock_now_ns() - from_ns));

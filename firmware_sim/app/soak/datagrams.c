@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A reader of a link that sends datagrams: it compares each with those of a second link, which has no faults.
  *
  * Both links speak the same protocol and begin at power-up. So datagram n of the clean one is what unit n of the other

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Faults in the head, as the client of a link notices them: by states, times and encoders of the frames that it got. */
 #include <math.h>
 #include <string.h>
@@ -45,11 +46,8 @@ static void add_moment(struct soak_link *link, const struct fault_note *note)
         return;
     }
     struct soak_moment *m = &link->moment[link->n_moments++];
-    *m = (struct soak_moment){.kind = note->kind,
-                              .fault = note->fault,
-                              .from_ns = note->t_ns,
-                              .to_ns = INT64_MAX,
-                              .for_ms = note->for_ms};
+    *m = (struct soak_moment){
+        .kind = note->kind, .fault = note->fault, .from_ns = note->t_ns, .to_ns = INT64_MAX, .for_ms = note->for_ms};
     if (note->fault >= 1 && note->fault <= link->soak->faults.n) m->what = link->soak->faults.fault[note->fault - 1];
 }
 

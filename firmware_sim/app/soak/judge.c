@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Compares what was done to each frame of a link with what its client saw of it.
  *
  * A frame is judged once thousands of later ones came, or at the end. Then nothing more will come of it, and the clean
@@ -110,8 +111,7 @@ static void judge_late(struct soak_link *link, const struct soak_fact *f)
 static int take_bytes(struct soak_link *link, const struct soak_fact *f, uint64_t n)
 {
     struct soak_clean_frame before;
-    const int64_t from_ns =
-        soak_clean_get(link, f->seq - NEAR_FRAMES, &before) ? before.t_ns : f->t_ns - FAR_NS;
+    const int64_t from_ns = soak_clean_get(link, f->seq - NEAR_FRAMES, &before) ? before.t_ns : f->t_ns - FAR_NS;
     for (uint32_t i = 0; i < link->n_runs; i++) {
         struct soak_run *run = &link->run[i];
         if (run->t_ns < from_ns || run->t_ns > f->t_ns + NEAR_NS || run->n < n) continue;

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What was done to the frames of a link, as the head says, and what its client saw of them.
  *
  * The head says it in the thread of the link, before the client can see it. Frames are told apart by their numbers,
@@ -98,8 +99,9 @@ static void hit_frame(struct soak_link *link, const struct fault_note *note)
 {
     struct soak_row *row = &link->row[row_of(note)];
     if (note->kind == FAULT_ENDPOINT_STALL || note->kind == FAULT_SHORT_PACKETS) {
-        soak_hide(row, 1, note->kind == FAULT_SHORT_PACKETS ? "the bytes are the same"
-                                                            : "the library clears the halt: the bytes are the same");
+        soak_hide(row, 1,
+                  note->kind == FAULT_SHORT_PACKETS ? "the bytes are the same"
+                                                    : "the library clears the halt: the bytes are the same");
         return;
     }
     if (note->kind >= FAULT_DISCONNECT) {
@@ -118,8 +120,8 @@ static void hit_frame(struct soak_link *link, const struct fault_note *note)
         soak_hide(row, 1, "the frame has no such byte: nothing was changed");
         return;
     }
-    struct soak_fact *fact = touch(link, link->datagrams != NULL ? soak_unit(note->number)
-                                                                   : soak_seq_of(link->soak, note->seq));
+    struct soak_fact *fact =
+        touch(link, link->datagrams != NULL ? soak_unit(note->number) : soak_seq_of(link->soak, note->seq));
     if (fact == NULL) {
         soak_hide(row, 1, "it was seen too late");
         return;
@@ -274,8 +276,7 @@ static void add_run(struct soak_link *link, const struct scanhead_notice *notice
 {
     link->bad_bytes += notice->n;
     link->ask.bad_bytes += notice->n;
-    if (link->n_runs == SOAK_MAX_RUNS)
-        memmove(link->run, link->run + 1, --link->n_runs * sizeof *link->run);
+    if (link->n_runs == SOAK_MAX_RUNS) memmove(link->run, link->run + 1, --link->n_runs * sizeof *link->run);
     link->run[link->n_runs++] = (struct soak_run){notice->t_ns, notice->n};
 }
 

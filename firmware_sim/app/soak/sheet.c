@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What came of a soak: a row for each kind of fault and link, the sums, and the verdict. */
 #include <inttypes.h>
 #include <stdio.h>
@@ -139,8 +140,7 @@ void soak_print(const struct soak *soak, FILE *out)
             " not noticed\n",
             "all", "", sum.injected, sum.noticed, sum.lost, sum.accepted, sum.hidden, sum.missed);
     if (soak->n_failures == 0)
-        fprintf(out, "verdict: good; frames wrongly accepted: %" PRIu64 ", none but resealed flips\n",
-                sum.accepted);
+        fprintf(out, "verdict: good; frames wrongly accepted: %" PRIu64 ", none but resealed flips\n", sum.accepted);
     for (uint32_t i = 0; i < soak->n_failures; i++)
         fprintf(out, "verdict: bad: %s\n", soak->failures[i]);
 }
@@ -247,7 +247,8 @@ void soak_say_progress(struct soak *soak, double s)
             missed += link->row[row].missed;
         pthread_mutex_unlock(&link->lock);
     }
-    fprintf(stderr, "scanhead: soak: %.0f s, %" PRIu64 " faults injected, %" PRIu64 " frames received, %" PRIu64
+    fprintf(stderr,
+            "scanhead: soak: %.0f s, %" PRIu64 " faults injected, %" PRIu64 " frames received, %" PRIu64
             " faults not noticed\n",
             s, fault_board_injected(soak->board, 0), frames, missed);
 }

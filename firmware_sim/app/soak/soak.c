@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* scanhead soak: the head with faults on request, and our own clients; at the end a sheet of what each noticed. */
 #include "firmware_sim/app/soak/soak.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to this folder: a soak, and how its parts meet.
  *
  *   soak.c     the command; runs the head and all threads
@@ -27,8 +28,15 @@
 enum { SOAK_RESEALED = FAULT_N_KINDS, SOAK_N_ROWS };
 
 /* Frames that are remembered, clean and by link: a power of two. Half of them at most wait to be judged. */
-enum { SOAK_RING = 1 << 16, SOAK_MAX_RUNS = 1024, SOAK_MAX_ACTS = 64, SOAK_MAX_REPLY_NOTES = 16, SOAK_MAX_MOMENTS = 64,
-       SOAK_MAX_PLUGS = 8, SOAK_REPLY_LEN = 600 };
+enum {
+    SOAK_RING = 1 << 16,
+    SOAK_MAX_RUNS = 1024,
+    SOAK_MAX_ACTS = 64,
+    SOAK_MAX_REPLY_NOTES = 16,
+    SOAK_MAX_MOMENTS = 64,
+    SOAK_MAX_PLUGS = 8,
+    SOAK_REPLY_LEN = 600
+};
 
 struct soak_row {
     uint64_t injected;
@@ -64,7 +72,7 @@ struct soak_clean {
     struct scanhead *sh;
     pthread_t thread;
     int running;
-    atomic_int want_health;  /* 1: asks the head how it is; 2: it has */
+    atomic_int want_health;   /* 1: asks the head how it is; 2: it has */
     char idn[256], state[64]; /* as it answered then */
     char sha256[65];
     uint64_t reader_lost;
@@ -82,11 +90,11 @@ struct soak_fact {
     uint64_t digest;
     uint32_t got, gap, repeated, late;
     int64_t after_ns; /* from the time that the frame itself says to its arrival, by another clock: link->offset_ns */
-    int away;       /* there was no session then */
+    int away;         /* there was no session then */
     /* what was done to it */
     int64_t t_ns;
     uint8_t times[FAULT_REFUSE]; /* by kind */
-    uint8_t resealed, merged; /* merged: it went into one datagram with others */
+    uint8_t resealed, merged;    /* merged: it went into one datagram with others */
     uint32_t copies, behind, garbage;
     uint32_t cut_to; /* bytes that truncation left; 0: all */
     double for_ms;   /* delay, jitter and stall: the longest */
@@ -106,8 +114,8 @@ struct soak_act {
 /* A fault in the head that the client has not noticed yet. */
 struct soak_moment {
     enum fault_kind kind;
-    uint32_t fault;       /* its number */
-    struct fault what;    /* as configured */
+    uint32_t fault;         /* its number */
+    struct fault what;      /* as configured */
     int64_t from_ns, to_ns; /* device time; INT64_MAX: it is at work */
     double for_ms;
 };
@@ -121,14 +129,14 @@ struct soak_times {
 };
 
 struct soak_ask {
-    int active;           /* a question is out */
-    int settling;         /* the library first comes into step, with questions of its own */
-    uint32_t n;           /* faults that hit replies since the question went out */
+    int active;   /* a question is out */
+    int settling; /* the library first comes into step, with questions of its own */
+    uint32_t n;   /* faults that hit replies since the question went out */
     struct fault_note note[SOAK_MAX_REPLY_NOTES];
-    uint32_t echoes;      /* noticed since then, and: */
+    uint32_t echoes; /* noticed since then, and: */
     uint64_t bad_bytes;
-    uint64_t others;      /* faults of any other kind since then */
-    int64_t ended_ns;     /* clock: when a session last ended, or a client was turned away; 0: not yet */
+    uint64_t others;             /* faults of any other kind since then */
+    int64_t ended_ns;            /* clock: when a session last ended, or a client was turned away; 0: not yet */
     char before[SOAK_REPLY_LEN]; /* the last reply that came */
     uint64_t asked, answered, timeouts, wrong, hurt, odd;
     uint32_t next;
@@ -138,7 +146,7 @@ struct soak_link {
     struct soak *soak;
     uint32_t number; /* from 1 */
     char type[16], endpoint[512];
-    char source[192]; /* what the client opens */
+    char source[192];       /* what the client opens */
     const char *not_soaked; /* why; NULL: it is */
     int usable;             /* 1: it has a client */
     pthread_t thread;
@@ -151,14 +159,14 @@ struct soak_link {
     int begun, in_session;
     soak_seq judged, first, last, top; /* the next to be judged; of the frames received; known of at all */
     uint64_t frames, bytes, refused_frames, sessions, closings, refused;
-    uint64_t refused_now;  /* frames since the last one that was taken */
-    uint64_t lost_plain;   /* without a fault ... */
-    uint64_t reader_lost;  /* ... and those that the head said it left out, as the client was too slow */
-    uint64_t wrong_plain;  /* differ from the clean frame without a fault, or came twice */
-    uint64_t unknown;      /* the clean reader did not get them */
-    uint64_t odd_closings; /* the connection was closed without a fault */
+    uint64_t refused_now;       /* frames since the last one that was taken */
+    uint64_t lost_plain;        /* without a fault ... */
+    uint64_t reader_lost;       /* ... and those that the head said it left out, as the client was too slow */
+    uint64_t wrong_plain;       /* differ from the clean frame without a fault, or came twice */
+    uint64_t unknown;           /* the clean reader did not get them */
+    uint64_t odd_closings;      /* the connection was closed without a fault */
     int64_t odd_ns, no_open_ns; /* when that last was, and when there was no connection; 0: never */
-    uint64_t away;         /* frames that came while there was no session */
+    uint64_t away;              /* frames that came while there was no session */
     /* Bytes that belong to no frame: noticed, and by the faults. Beside them a reply may be hurt, too. */
     uint64_t bad_bytes, expected_bad_min, expected_bad_max;
     struct soak_run run[SOAK_MAX_RUNS];
@@ -172,14 +180,14 @@ struct soak_link {
     uint32_t n_moments;
     struct soak_times times;
     int have_pulse;
-    uint64_t pulse0;      /* of the last points frame */
-    double usual_rate;    /* of the mirror, rad/s; 0: not known */
-    int64_t last_t_ns;    /* device time of the last frame */
-    int64_t offset_ns;   /* the smallest time from a frame's own to its arrival */
+    uint64_t pulse0;   /* of the last points frame */
+    double usual_rate; /* of the mirror, rad/s; 0: not known */
+    int64_t last_t_ns; /* device time of the last frame */
+    int64_t offset_ns; /* the smallest time from a frame's own to its arrival */
     int have_offset;
     struct soak_ask ask;
-    char failed[256]; /* why the client gave up; empty: it did not */
-    uint64_t bad_units; /* datagrams that are none of the clean ones */
+    char failed[256];                 /* why the client gave up; empty: it did not */
+    uint64_t bad_units;               /* datagrams that are none of the clean ones */
     struct soak_datagrams *datagrams; /* NULL: the link speaks the native protocol */
     /* the client's own */
     struct scanhead *sh;

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A head that is attached to this machine as a USB device: how its client finds it, and enumerations that went wrong. */
 #include <glob.h>
 #include <string.h>
@@ -59,7 +60,8 @@ static int64_t excess_of(const char *serial)
     for (size_t i = 0; i < found.gl_pathc && excess < 0; i++) {
         if (!is_serial(found.gl_pathv[i], serial)) continue;
         const size_t n = read_file(found.gl_pathv[i], "descriptors", d, sizeof d);
-        if (n >= DEVICE_LEN + CONFIG_HEADER_LEN) excess = DEVICE_LEN + (int64_t)le_get16(d + DEVICE_LEN + 2) - (int64_t)n;
+        if (n >= DEVICE_LEN + CONFIG_HEADER_LEN)
+            excess = DEVICE_LEN + (int64_t)le_get16(d + DEVICE_LEN + 2) - (int64_t)n;
     }
     globfree(&found);
     return excess;

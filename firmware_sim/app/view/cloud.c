@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Points of a .ply or .las file. */
 #include <math.h>
 #include <stdio.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What `scanhead view` serves, as bytes: points, triangles, and the description of both. In: a recording. Out: bodies that
  * the caller frees. The formats are in README.md; all numbers are little-endian. */
 #ifndef FIRMWARE_SIM_APP_VIEW_ENCODE_H

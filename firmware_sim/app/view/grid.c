@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A mesh of a grid that is complete: triangles, and by which factor the long-edge filter drops each. */
 #include <math.h>
 #include <stdlib.h>

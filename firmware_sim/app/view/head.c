@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The description of a recording, as JSON. */
 #include <math.h>
 #include <stdio.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The arrays of points: room for them, their columns by number. */
 #include <stdlib.h>
 #include <string.h>

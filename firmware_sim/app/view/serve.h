@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The resources of a recording by their paths: /head, /cloud, /mesh, /sparse. In: path and query of a request. Out: a
  * body. One thread. */
 #ifndef FIRMWARE_SIM_APP_VIEW_SERVE_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Points and meshes of a .shs: the frames go through the track that recorders have, and grids are those of
  * drivers/record/mesh.c. */
 #include "firmware_sim/app/view/stream.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to stream.c and grid.c: a stream that is being loaded. */
 #ifndef FIRMWARE_SIM_APP_VIEW_STREAM_H
 #define FIRMWARE_SIM_APP_VIEW_STREAM_H

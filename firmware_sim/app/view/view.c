@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* scanhead view: a recording in the browser, without a head. */
 #include <errno.h>
 #include <stdio.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Loads a recording, by its ending and first bytes; what is done with all of them afterwards. */
 #include "firmware_sim/app/view/viewed.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A recording that is shown: its points, its meshes, and what the file says of itself. In: a file (.shs, .ply, .las). Out:
  * arrays, in metres, in one frame with z up.
  *

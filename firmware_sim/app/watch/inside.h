@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to this folder: the watch, and how its parts meet.
  *
  *   scene.c    /scene, made once; /head and /plan, of now

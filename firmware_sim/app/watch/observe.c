@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The observer: reads the stream as any client does, and takes some of its points to the scene's frame. */
 #include <math.h>
 #include <string.h>

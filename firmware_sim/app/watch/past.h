@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The past of the scans, for a page that is opened late, or again: the last points of the stream, as frames.
  *
  * In: frames of the stream, in their order. Out: these frames in pieces, as the body of `/past` (README.md has its

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* /quality: the observer leaves figures, whoever asks gets the last ones. */
 #include <math.h>
 #include <string.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The points of a scan that are looked at: one of `every` pulses, whichever these are by their hash, so that fewer can be
  * kept of them later and still be spread evenly. */
 #include <math.h>

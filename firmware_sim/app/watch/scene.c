@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The scene, coarse; what the head is; its plan. */
 #include <stdio.h>
 #include <stdlib.h>

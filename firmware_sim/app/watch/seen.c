@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Which cells of the surface have points: a bit for each, by station. */
 #include <math.h>
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The watch as a whole: opened, started, asked, closed. */
 #include <errno.h>
 #include <math.h>

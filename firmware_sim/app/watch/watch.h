@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a head that runs tells a page beside its stream: what it is (/head), the scene, coarse (/scene), the plan (/plan),
  * and how good the scan is while it is on (/quality). README.md has the formats.
  *

@@ -1,0 +1,42 @@
+#!/bin/bash
+# SPDX-License-Identifier: MIT
+# The layout of the C sources is that of .clang-format, by version 14: another one lays some lines out otherwise. And each source
+# names its licence. Prints TAP.
+#   clang-format -i FILE    mends a file
+set -u
+cd "$(dirname "$0")/.." || exit 1
+work=$(mktemp -d) || exit 1
+trap 'rm -rf "$work"' EXIT
+. tests/tap.sh
+VERSION=14
+
+sources() { # SUFFIX...
+    find core drivers firmware_sim tests config -regextype posix-egrep -regex ".*\.($(IFS='|' && echo "$*"))" ! -path 'tests/fuzz/seeds/*'
+}
+
+# laid_out FILE...: names those that are not.
+laid_out() {
+    local said
+    said=$(clang-format --dry-run "$@" 2>&1 | sed -n 's/: warning: code should be clang-formatted.*//p')
+    [ -z "$said" ] || { echo "$said" && return 1; }
+}
+
+licensed() {
+    ! grep -L 'SPDX-License-Identifier: MIT' "$@" | grep .
+}
+
+finds() { # FUNCTION FILE: what it must object to, it does
+    ! "$1" "$2" >"$work/said" 2>&1
+}
+
+printf 'int  x;\n' >"$work/odd.c"
+if clang-format --version 2>/dev/null | grep -q "version $VERSION\."; then
+    check "another layout is seen" finds laid_out "$work/odd.c"
+    check "layout" laid_out $(sources c h cpp)
+else
+    tests=1
+    echo "ok 1 - layout # SKIP clang-format $VERSION is missing (Debian 12: clang-format)"
+fi
+check "a source without a licence is seen" finds licensed "$work/odd.c"
+check "licences" licensed Makefile $(sources c h cpp js mjs css sh py lua mk)
+echo "1..$tests"
