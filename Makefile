@@ -98,6 +98,12 @@ UNIT = $(call PROGRAMS,unit)
 # (`make test`; tests/run_all.sh, which asks for the same), or as shipped alone (`make test-unit`).
 SHIPPED = $(patsubst tests/%.c,$(BUILD)/tests/%,$(shell sh tests/shipped.sh))
 TESTS = $(UNIT) $(call PROGRAMS,wire) $(call PROGRAMS,accuracy) $(call PROGRAMS,stability) $(call PROGRAMS,guest)
+# Those that are linked at once: all, the unit tests, or all but those of them that don't run as shipped.
+JOIN ?= all
+JOINED_unit = $(UNIT)
+JOINED_all = $(filter-out $(call PROGRAMS,guest),$(TESTS))
+JOINED_shipped = $(filter-out $(filter-out $(SHIPPED),$(UNIT)),$(JOINED_all))
+JOINED = $(JOINED_$(JOIN))
 EVERYTHING = $(OBJ) $(BUILD)/firmware_sim/main.c.o
 
 IFC_READERS = $(BUILD)/ifc
@@ -199,10 +205,19 @@ $(BUILD)/tests/unit/% $(BUILD)/tests/wire/% $(BUILD)/tests/guest/%: private OPT 
 FAST_LD = $(if $(CROSS_COMPILE),,$(if $(findstring clang,$(CC)),$(LLD),$(GOLD)))
 GOLD := $(if $(shell command -v ld.gold),-fuse-ld=gold)
 LLD := $(if $(shell command -v ld.lld),-fuse-ld=lld)
+LINK_TEST = $(CC) $(SAN) $(FAST_LD) $(LINK_LIMIT)
+TEST_LIBS = -Wl,--as-needed -lcmocka $(LDLIBS)
 .SECONDEXPANSION:
+# All of them, a file for each folder.
+$(BUILD)/tests/joined: $$(sort $$(foreach p,$$(JOINED),$$(p).c.o $$(call RIGS,$$(patsubst $$(BUILD)/%,%,$$(p))))) $(BUILD)/$(LIMIT).o \
+	$(BUILD)/common.a $(BUILD)/modules.a tests/join.sh
+	@echo "  JOIN  $(words $(JOINED)) test programs"
+	$(Q)LINK='$(LINK_TEST)' LIBS='$(TEST_LIBS)' LD='$(CROSS_COMPILE)ld' OBJCOPY='$(OBJCOPY)' JOBS=$(JOBS) bash tests/join.sh $(BUILD) $(JOINED)
+	@touch $@
 $(BUILD)/tests/%: $(BUILD)/tests/%.c.o $$(call RIGS,tests/$$*) $(BUILD)/$(LIMIT).o $(BUILD)/common.a $(BUILD)/modules.a
 	@echo "  TEST  $@"
-	$(Q)$(CC) $(SAN) $(FAST_LD) $(LINK_LIMIT) -o $@ $^ -Wl,--as-needed -lcmocka $(LDLIBS)
+	@rm -f $@
+	$(Q)$(LINK_TEST) -o $@ $^ $(TEST_LIBS)
 # What runs in the guest has the client library alone, with its inside: it starts faster there.
 $(BUILD)/tests/guest/%: $(BUILD)/tests/guest/%.c.o $$(call RIGS,tests/guest/$$*) $(BUILD)/$(LIMIT).o $(BUILD)/client.a
 	@echo "  TEST  $@"
@@ -288,10 +303,10 @@ T ?=
 ifeq ($(T),)
 test: deps-test
 	@$(MAKE) --no-print-directory DEPS_ARE_THERE=1 $(READERS)/installed & status=0; \
-	$(MAKE) --no-print-directory -j$(JOBS) $(STRICT) BUILD=$(BUILD)/test ALL_UNIT=no test-programs || status=1; wait; exit $$status
+	$(MAKE) --no-print-directory -j$(JOBS) $(STRICT) BUILD=$(BUILD)/test JOIN=shipped test-programs || status=1; wait; exit $$status
 	$(if $(HAS_CLANG),,@echo "no clang: its warnings are not looked at")
 	@$(MAKE) --no-print-directory $(READERS)/pcl_vlp16 & status=0; \
-	$(MAKE) --no-print-directory -j$(JOBS) $(ASAN) objects test-unit-programs $(if $(HAS_CLANG),fuzz-objects) || status=1; wait; exit $$status
+	$(MAKE) --no-print-directory -j$(JOBS) $(ASAN) JOIN=unit objects test-unit-programs $(if $(HAS_CLANG),fuzz-objects) || status=1; wait; exit $$status
 	$(if $(HAS_CLANG),@$(MAKE) --no-print-directory -j$(JOBS) $(TSAN_SHORT))
 	@$(RUN) sh tests/run_all.sh $(BUILD)
 else
@@ -416,9 +431,8 @@ chart: deps-build
 	gnuplot -e "csv='$(CHART).csv'; base='$(CHART)_more'" tests/bench/chart_more.gp
 	gnuplot -e "csv='$(CHART).csv'; base='$(CHART)_moving'" tests/bench/chart_moving.gp
 objects: $(EVERYTHING)
-test-unit-programs: $(UNIT)
-ALL_UNIT ?= yes
-test-programs: all $(BUILD)/bench $(filter-out $(if $(filter no,$(ALL_UNIT)),$(filter-out $(SHIPPED),$(UNIT))),$(TESTS)) $(FIGURES)
+test-unit-programs test-programs: $(BUILD)/tests/joined
+test-programs: all $(BUILD)/bench $(call PROGRAMS,guest) $(FIGURES)
 
 # What takes long and proves much is described where it stands.
 include $(wildcard tests/*/*.mk config/*/*.mk)

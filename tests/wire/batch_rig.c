@@ -60,14 +60,14 @@ pid_t batch_start(struct wire *wire, const char *dir, const char *const *more)
     return wire_spawn(wire, w.word, "out", "err", -1);
 }
 
-int batch_run(struct wire *wire, const char *dir, const char *const *more)
+int batch_call(struct wire *wire, const char *dir, const char *const *more)
 {
     return wire_wait(wire, batch_start(wire, dir, more));
 }
 
 void batch_expect(struct wire *wire, const char *dir, const char *const *more, int status, const char *says)
 {
-    const int got = batch_run(wire, dir, more);
+    const int got = batch_call(wire, dir, more);
     char *err = wire_read(wire_path(wire, "err"), NULL);
     if (got != status || strstr(err, says) == NULL)
         fail_msg("status %d, not %d; no \"%s\" in: %s", got, status, says, err);
@@ -126,7 +126,7 @@ void batch_shards(struct wire *wire, const char *dir, int n, const char *threads
     for (int i = n; i >= 1; i--) {
         char shard[32];
         snprintf(shard, sizeof shard, "%d/%d", i, n);
-        assert_int_equal(batch_run(wire, dir, WITH("--shard", shard, "--threads", threads, "--quiet")), 0);
+        assert_int_equal(batch_call(wire, dir, WITH("--shard", shard, "--threads", threads, "--quiet")), 0);
     }
     batch_expect(wire, dir, WITH("--merge"), 0, "6 jobs are whole");
 }

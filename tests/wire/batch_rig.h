@@ -20,7 +20,7 @@ void batch_campaign(struct wire *wire, struct batch_words *w, const char *const 
                     const char *const *more);
 
 pid_t batch_start(struct wire *wire, const char *dir, const char *const *more);
-int batch_run(struct wire *wire, const char *dir, const char *const *more); /* its status */
+int batch_call(struct wire *wire, const char *dir, const char *const *more); /* its status */
 /* The status, and a text among the errors. */
 void batch_expect(struct wire *wire, const char *dir, const char *const *more, int status, const char *says);
 void batch_whole(struct wire *wire, const char *dir);

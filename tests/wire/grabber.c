@@ -109,7 +109,7 @@ void grabber_start_and_wait(struct wire *wire, const char *name, const char *sen
 
 void grabber_end(struct grabber *grabber)
 {
-    raw_write(grabber->in_fd, "\n", 1);
+    raw_send(grabber->in_fd, "\n", 1);
     while (listen_to(grabber)) {
     }
     close(grabber->in_fd);

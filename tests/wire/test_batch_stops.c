@@ -140,7 +140,7 @@ static void test_nothing_is_mixed(void **state)
 {
     struct wire *wire = *state;
     char manifest[352], engine[128];
-    assert_int_equal(batch_run(wire, "one", WITH("--shard", "1/3", "--quiet")), 0);
+    assert_int_equal(batch_call(wire, "one", WITH("--shard", "1/3", "--quiet")), 0);
     batch_expect(wire, "one", WITH("--list"), 0, "");
     char *list = wire_read(wire_path(wire, "out"), NULL);
     const char *second = strchr(list, '\n') + 1;
@@ -187,7 +187,7 @@ static void test_nothing_is_mixed(void **state)
 static void test_locked(void **state)
 {
     struct wire *wire = *state;
-    assert_int_equal(batch_run(wire, "one", WITH("--shard", "1/2", "--quiet")), 0);
+    assert_int_equal(batch_call(wire, "one", WITH("--shard", "1/2", "--quiet")), 0);
     const int fd = open(batch_in(wire, "one", "manifest-2-of-2.jsonl"), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
     assert_int_equal(flock(fd, LOCK_EX | LOCK_NB), 0);
     batch_expect(wire, "one", WITH("--shard", "2/2"), 1, "another process is at shard 2/2");

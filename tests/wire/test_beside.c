@@ -63,7 +63,7 @@ static pid_t ask_and_drain(struct wire *wire, const char *endpoint, const char *
     if (pid != 0) return pid;
     size_t sum = 0;
     int fd = raw_connect(endpoint);
-    raw_write(fd, asks, strlen(asks));
+    raw_send(fd, asks, strlen(asks));
     for (ssize_t n; (n = read(fd, bytes, sizeof bytes)) > 0;)
         sum += (size_t)n;
     _exit(sum < 100000); /* scans came, not only replies */
@@ -140,7 +140,7 @@ static pid_t crowd(struct wire *wire, const char *endpoint, const char *half)
     if (pid != 0) return pid;
     for (int i = 0; i < CLIENTS; i++) {
         int fd = raw_connect(endpoint);
-        raw_write(fd, half, strlen(half));
+        raw_send(fd, half, strlen(half));
         shutdown(fd, SHUT_WR);
         while (read(fd, rest, sizeof rest) > 0) /* until the head has closed it: so nobody stands in a queue */
             continue;

@@ -220,11 +220,11 @@ static void babbling_client(struct wire *wire, const char *link)
 
     /* Half a command is not carried out, not even by what the next client sends. */
     fd = raw_open(&head, link);
-    raw_write(fd, "SCAN:ST", 7);
+    raw_send(fd, "SCAN:ST", 7);
     close(fd);
     expect_error(watch, 105, NONE);
     fd = raw_open(&head, link);
-    raw_write(fd, "OP\n", 3);
+    raw_send(fd, "OP\n", 3);
     close(fd);
     expect_error(watch, -113, (const int[]){101, 0});
     expect_error(watch, 101, NONE);
@@ -323,7 +323,7 @@ static void test_many_short_clients(void **state)
     start_scan(watch);
     for (int i = 0; i < 200; i++) {
         int fd = raw_connect(endpoint);
-        if (i % 4 == 0) raw_write(fd, "*IDN?\nHEAD:PRR?\n", 16);
+        if (i % 4 == 0) raw_send(fd, "*IDN?\nHEAD:PRR?\n", 16);
         if (i % 8 == 0) setsockopt(fd, SOL_SOCKET, SO_LINGER, &(struct linger){1, 0}, sizeof(struct linger));
         close(fd);
         if (i % 20 == 0) expect_points(watch, 1);

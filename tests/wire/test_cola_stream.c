@@ -94,7 +94,7 @@ static void start_client(struct client *c, const char *endpoint, int is_b)
     static const char a[] = "\2sEN LMDscandata 1\3";
     static const char b[] = "\2\2\2\2\0\0\0\x11sEN LMDscandata \1\x33"; /* 0x11 bytes; their XOR */
     *c = (struct client){.fd = connect_to(endpoint), .is_b = is_b};
-    raw_write(c->fd, is_b ? b : a, (is_b ? sizeof b : sizeof a) - 1);
+    raw_send(c->fd, is_b ? b : a, (is_b ? sizeof b : sizeof a) - 1);
     assert_memory_equal(next_telegram(c) + (is_b ? 8 : 1), "sEA LMDscandata ", 16);
 }
 
@@ -103,7 +103,7 @@ static void send_garbage(const char *endpoint, int i)
 {
     static const char *const garbage[] = {"GET / HTTP/1.1\r\n\r\n", "\2\2\2\2\xff\xff\xff\xff", "\2sRN ", "\r\n\r\n"};
     const int fd = raw_connect(endpoint);
-    raw_write(fd, garbage[i % 4], strlen(garbage[i % 4]));
+    raw_send(fd, garbage[i % 4], strlen(garbage[i % 4]));
     close(fd);
 }
 

@@ -80,7 +80,7 @@ static void scan_raw(const struct head *head, size_t piece)
     scanhead_close(sh);
     const int fd = raw_connect(head_endpoint(head, "tcp"));
     native_parser_init(&parser);
-    raw_write(fd, "SCAN:STAR\n", 10);
+    raw_send(fd, "SCAN:STAR\n", 10);
     for (int over = 0; !over;) {
         size_t room;
         uint8_t *to = native_parser_room(&parser, &room);

@@ -139,7 +139,7 @@ static void test_receiver_takes_no_commands(void **state)
     assert_non_null(strstr(head.ready, "gnss\",\"protocol\":\"nmea\"}"));
     client_wait_state(sh, "idle");
     int fd = open(wire_path(wire, "gnss"), O_RDWR | O_NOCTTY | O_CLOEXEC);
-    raw_write(fd, noise, sizeof noise - 1);
+    raw_send(fd, noise, sizeof noise - 1);
     while (t.moments < 3)
         tally_read(&t, fd);
     assert_string_equal(client_ask(sh, "HEAD:STAT?"), "idle");

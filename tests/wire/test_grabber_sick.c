@@ -31,7 +31,7 @@ static int pass_on(int from, int to, FILE *keep)
     ssize_t n = read(from, bytes, sizeof bytes);
     if (n <= 0) return 0;
     if (keep != NULL) fwrite(bytes, 1, (size_t)n, keep);
-    raw_write(to, bytes, (size_t)n);
+    raw_send(to, bytes, (size_t)n);
     return 1;
 }
 

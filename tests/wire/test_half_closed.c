@@ -27,7 +27,7 @@ static void wait_idle(const char *endpoint)
 static int say_all(const char *endpoint, const char *text)
 {
     const int fd = raw_connect(endpoint);
-    raw_write(fd, text, strlen(text));
+    raw_send(fd, text, strlen(text));
     assert_int_equal(shutdown(fd, SHUT_WR), 0);
     return fd;
 }
@@ -170,7 +170,7 @@ static void a_crowd_that_asks(void **state)
         int fd[CLIENTS];
         for (int i = 0; i < CLIENTS; i++) {
             fd[i] = raw_connect(head_link(&head, 0));
-            raw_write(fd[i], ask, sizeof ask - 1);
+            raw_send(fd[i], ask, sizeof ask - 1);
         }
         for (int i = 0; i < CLIENTS; i++) {
             char got[4096] = "";

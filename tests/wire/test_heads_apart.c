@@ -87,7 +87,7 @@ static void ask_last_scan(int i, int port, char *got, size_t cap)
     size_t n = 0;
     ssize_t more = 1;
     assert_int_equal(connect(fd, (const struct sockaddr *)&at, sizeof at), 0);
-    raw_write(fd, request, sizeof request - 1);
+    raw_send(fd, request, sizeof request - 1);
     assert_int_equal(shutdown(fd, SHUT_WR), 0);
     while (more > 0) {
         struct pollfd slot = {.fd = fd, .events = POLLIN};

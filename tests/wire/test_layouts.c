@@ -178,10 +178,10 @@ static void test_scip(void **state)
     struct head head = start(wire, "config/hokuyo.yaml", ptys, sets);
     struct scanhead *sh = client_open(head_link(&head, 2));
     reader_open(head_link(&head, 0));
-    raw_write(reader.fd, "BM\n", 3);
+    raw_send(reader.fd, "BM\n", 3);
     while (strstr(read_until("\n\n"), "BM\n00P\n") == NULL) /* not yet, while it boots */
-        raw_write(reader.fd, "BM\n", 3);
-    raw_write(reader.fd, "MD0000108001000\n", 16);
+        raw_send(reader.fd, "BM\n", 3);
+    raw_send(reader.fd, "MD0000108001000\n", 16);
     assert_non_null(strstr(read_until("\n\n"), "00P\n"));
     for (int i = 0; i < SCANS; i++)
         scip_scan(read_until("\n\n"), &spoken[i]);
@@ -223,7 +223,7 @@ static void test_cola(void **state)
     struct head head = start(wire, "config/sick.yaml", ptys, sets);
     struct scanhead *sh = client_open(head_link(&head, 2));
     reader_open(head_link(&head, 0));
-    raw_write(reader.fd, "\2sEN LMDscandata 1\3", 19);
+    raw_send(reader.fd, "\2sEN LMDscandata 1\3", 19);
     assert_string_equal(read_until("\3"), "\2sEA LMDscandata 1\3");
     for (int i = 0; i < SCANS; i++)
         cola_scan(read_until("\3"), &spoken[i]);

@@ -126,11 +126,11 @@ static void test_nothing_stale(void **state)
     client_wait_state(watch, "scanning");
     for (int i = 0; i < 6; i++) {
         int fd = port_open(wire);
-        raw_write(fd, "*IDN?\nHEAD:PRR?\n", 16);
+        raw_send(fd, "*IDN?\nHEAD:PRR?\n", 16);
         /* 50 frames later the terminal's buffer is full. */
         for (int n = 0; n < 50; n++)
             client_next(watch, &frame);
-        raw_write(fd, "nonsense\n", 9); /* the head has read it, and keeps its reply until there is room */
+        raw_send(fd, "nonsense\n", 9); /* the head has read it, and keeps its reply until there is room */
         for (int64_t end_ms = wire_now_ms() + DEADLINE_MS; atoi(client_ask(watch, "SYST:ERR?")) != -113;) {
             if (wire_now_ms() > end_ms) fail_msg("the head has not read the command");
             scanhead_next(watch, &frame, 1);
@@ -202,7 +202,7 @@ static void test_a_slow_reader_has_the_end(void **state)
     struct scanhead *watch = client_open(head_endpoint(&head, "tcp"));
     int fd = port_open(wire);
     client_wait_state(watch, "idle");
-    raw_write(fd, "SCAN:STAR\n", 10);
+    raw_send(fd, "SCAN:STAR\n", 10);
     client_until(watch, SCANHEAD_EV_SCAN_END, &frame);
     scanhead_close(watch);
     assert_int_equal(kill(head.pid, SIGTERM), 0);
@@ -235,8 +235,8 @@ static void test_fast_open_and_close(void **state)
     struct head head = head_start(wire, room_config_write(wire, &ENDLESS), NULL);
     for (int i = 0; i < 200; i++) {
         int fd = port_open(wire);
-        if (i % 3 == 0) raw_write(fd, "*OPC?\n", 6);
-        if (i % 7 == 0) raw_write(fd, "HEAD:PR", 7);
+        if (i % 3 == 0) raw_send(fd, "*OPC?\n", 6);
+        if (i % 7 == 0) raw_send(fd, "HEAD:PR", 7);
         close(fd);
     }
     struct scanhead *sh = client_open(head_endpoint(&head, "pty"));
@@ -264,7 +264,7 @@ static void test_command_by_redirection(void **state)
     struct scanhead_frame frame;
     client_wait_state(watch, "idle");
     int fd = port_open(wire);
-    raw_write(fd, "HEAD:PRR 54321\nSCAN:STAR\n", 25);
+    raw_send(fd, "HEAD:PRR 54321\nSCAN:STAR\n", 25);
     close(fd);
     client_until_soon(watch, SCANHEAD_EV_SCAN_START, &frame);
     assert_string_equal(client_ask(watch, "HEAD:PRR?"), "54321");

@@ -101,10 +101,10 @@ static void test_send(void **state)
     assert_int_equal(getpeername(fd, (struct sockaddr *)&peer, &len), 0);
     read_all(fd, got, 5);
     assert_memory_equal(got, "\2one\3", 5);
-    raw_write(fd, answer, sizeof answer);
+    raw_send(fd, answer, sizeof answer);
     read_all(fd, got, 5);
     assert_memory_equal(got, "two\n\0", 5);
-    raw_write(fd, "end", 3);
+    raw_send(fd, "end", 3);
     close(fd);
     close(device);
     raw_recorder_end(&recorder, 0, 0, NULL);
@@ -169,7 +169,7 @@ static void test_times(void **state)
     struct raw_recorder recorder = raw_recorder_start(wire, source, NULL);
     const int fd = take_connection(device);
     raw_recorder_stop(&recorder);
-    raw_write(fd, "a", 1);
+    raw_send(fd, "a", 1);
     for (int unsent = 1; unsent != 0;) /* until it has arrived */
         assert_int_equal(ioctl(fd, SIOCOUTQ, &unsent), 0);
     const int64_t standing_ns = raw_recorder_go_on(&recorder);
@@ -223,7 +223,7 @@ struct exchange {
 /* An answer of SCIP ends with an empty line. */
 static void ask(struct exchange *x, const char *text, int ends)
 {
-    raw_write(x->fd, text, strlen(text));
+    raw_send(x->fd, text, strlen(text));
     assert_true(x->n_said + strlen(text) < sizeof x->said);
     memcpy(x->said + x->n_said, text, strlen(text));
     x->n_said += strlen(text);
@@ -325,7 +325,7 @@ static void test_clients(void **state)
     const int device_port = port_of(device);
     struct raw_recorder recorder = raw_recorder_start(wire, source, (const char *const[]){"--relay", "0", NULL});
     int client = raw_connect(recorder.endpoint), fd = take_connection(device);
-    raw_write(client, "a", 1);
+    raw_send(client, "a", 1);
     read_all(fd, &byte, 1);
     socket_break(client);
     close(client);
@@ -338,10 +338,10 @@ static void test_clients(void **state)
     device = device_open_at(device_port, source);
     client = raw_connect(recorder.endpoint);
     fd = take_connection(device);
-    raw_write(client, "b", 1);
+    raw_send(client, "b", 1);
     read_all(fd, &byte, 1);
     assert_int_equal(byte, 'b');
-    raw_write(fd, "c", 1);
+    raw_send(fd, "c", 1);
     close(fd); /* the device dies */
     assert_int_equal(read_all(client, &byte, 1), 1);
     assert_int_equal(read_all(client, &byte, 0), 0);

@@ -54,7 +54,7 @@ static const char *answer(struct client *c)
 
 static const char *ask(struct client *c, const char *line)
 {
-    raw_write(c->fd, line, strlen(line));
+    raw_send(c->fd, line, strlen(line));
     return answer(c);
 }
 

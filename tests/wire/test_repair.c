@@ -9,7 +9,7 @@
 #include <sys/mount.h>
 #include <sys/resource.h>
 
-#include "tests/wire/repair_rows.h"
+#include "tests/wire/repair_cases.h"
 
 enum { N_QUICK = 1, N_WITH_READERS = 20, SMALL = 1 << 16, PAGE = 4096 };
 
@@ -435,10 +435,10 @@ int main(void)
 {
     struct CMUnitTest tests[64] = {{0}};
     char name[64][32];
-    for (size_t i = 0; i < n_repair_rows && i < 63; i++) {
-        snprintf(name[i], sizeof name[i], "%s%s", repair_rows[i].name, repair_rows[i].ending);
-        tests[i] = (struct CMUnitTest){name[i], test_format, NULL, NULL, (void *)(uintptr_t)&repair_rows[i]};
+    for (size_t i = 0; i < n_repair_cases && i < 63; i++) {
+        snprintf(name[i], sizeof name[i], "%s%s", repair_cases[i].name, repair_cases[i].ending);
+        tests[i] = (struct CMUnitTest){name[i], test_format, NULL, NULL, (void *)(uintptr_t)&repair_cases[i]};
     }
-    tests[n_repair_rows] = (struct CMUnitTest)cmocka_unit_test(test_slow_head);
-    return _cmocka_run_group_tests("repair", tests, n_repair_rows + 1, set_up, tear_down);
+    tests[n_repair_cases] = (struct CMUnitTest)cmocka_unit_test(test_slow_head);
+    return _cmocka_run_group_tests("repair", tests, n_repair_cases + 1, set_up, tear_down);
 }

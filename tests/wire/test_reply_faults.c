@@ -37,7 +37,7 @@ static void play(int fd, const struct step *step)
     char got[512];
     for (; step->request != NULL; step++) {
         const int64_t sent_ms = wire_now_ms();
-        raw_write(fd, step->request, strlen(step->request));
+        raw_send(fd, step->request, strlen(step->request));
         const size_t len = strlen(step->answer);
         for (size_t n = 0; n < len;) {
             struct pollfd slot = {.fd = fd, .events = POLLIN};

@@ -23,7 +23,7 @@ struct client {
 
 static void say(struct client *c, const char *text)
 {
-    raw_write(c->fd, text, strlen(text));
+    raw_send(c->fd, text, strlen(text));
 }
 
 /* The next answer without its empty line, NUL-terminated; NULL: the connection is over. Good until the next call. */

@@ -129,7 +129,7 @@ static void test_lines_sent_ahead(void **state)
     struct scanhead_frame frame;
     client_wait_state(sh, "idle");
     int fd = raw_connect(head_endpoint(&head, "tcp"));
-    raw_write(fd, lines, sizeof lines - 1);
+    raw_send(fd, lines, sizeof lines - 1);
     hear_of_it(sh);
     client_until(sh, SCANHEAD_EV_SCAN_END, &frame);
     close(fd);

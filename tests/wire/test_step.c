@@ -149,7 +149,7 @@ static void test_commands_sent_ahead(void **state)
     static const char lines[] = "TIME:STEP 40 MS\nTIME?\nTIME:STEP 60 MS\nTIME?\nTIME:STEP 900 MS\nHEAD:STAT?\nTIME?\n";
     static const char *const want[] = {"OK", "40000000", "OK", "100000000", "OK", "idle", "1000000000"};
     int fd = raw_connect(head_endpoint(&head, "tcp"));
-    raw_write(fd, lines, strlen(lines));
+    raw_send(fd, lines, strlen(lines));
     static struct native_parser parser;
     native_parser_init(&parser);
     for (int n = 0; n < 7;) {

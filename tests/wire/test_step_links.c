@@ -177,7 +177,7 @@ static void run_steps(struct bench *bench, struct scanhead *stepper)
     client_tell(stepper, "SCAN:STAR");
     for (int i = 0; i < bench->n; i++)
         if (bench->client[i].request != NULL)
-            raw_write(bench->client[i].fd, bench->client[i].request, strlen(bench->client[i].request));
+            raw_send(bench->client[i].fd, bench->client[i].request, strlen(bench->client[i].request));
     for (int step = 0; step < STEPS; step++) {
         draw = draw * 1664525u + 1013904223u;
         const int ms = 1 + (int)(draw >> 16) % 20;

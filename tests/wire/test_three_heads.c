@@ -60,10 +60,10 @@ static const char *read_scip(struct reader *r)
     char piece[8192] = "", *at;
     long last = -1;
     do {
-        raw_write(r->fd, "BM\n", 3);
+        raw_send(r->fd, "BM\n", 3);
         if (take(r, "\n\n", piece, sizeof piece) != 0) return "no answer to BM";
     } while (strncmp(piece, "BM\n00P\n", 7) != 0);
-    raw_write(r->fd, "MD0000108001000\n", 16);
+    raw_send(r->fd, "MD0000108001000\n", 16);
     if (take(r, "\n\n", piece, sizeof piece) != 0) return "no answer to MD";
     for (long n = 0; n < 40 * SECONDS; n++) {
         if (take(r, "\n\n", piece, sizeof piece) != 0 || (at = strstr(piece, "\n99b\n")) == NULL) return "no scan";
@@ -81,7 +81,7 @@ static const char *read_cola(struct reader *r)
 {
     char piece[16384];
     unsigned long count, us, last_count = 0, first_us = 0;
-    raw_write(r->fd, "\2sEN LMDscandata 1\3", 19);
+    raw_send(r->fd, "\2sEN LMDscandata 1\3", 19);
     if (take(r, "\3", piece, sizeof piece) != 0) return "no answer to sEN";
     for (long n = 0; n < 15 * SECONDS; n++) {
         if (take(r, "\3", piece, sizeof piece) != 0) return "no telegram";

@@ -133,7 +133,7 @@ static void scip_start(int fd)
     static const char request[] = "ME0000010001000\n", refused[] = "10Q\n\n", begins[] = "00P\n\n";
     const char *status;
     do {
-        raw_write(fd, request, strlen(request));
+        raw_send(fd, request, strlen(request));
         expect(fd, request, strlen(request));
         status = take(fd, strlen(begins));
     } while (memcmp(status, refused, strlen(refused)) == 0);
@@ -189,7 +189,7 @@ static void cola_count(uint8_t *unit, size_t len, uint64_t number)
 
 static void cola_start(int fd)
 {
-    raw_write(fd, COLA_START, sizeof COLA_START - 1);
+    raw_send(fd, COLA_START, sizeof COLA_START - 1);
     expect(fd, COLA_BEGINS, sizeof COLA_BEGINS - 1);
 }
 

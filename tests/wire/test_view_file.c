@@ -75,9 +75,9 @@ static char *get(const char *resource, int status, size_t *len, char **whole)
     snprintf(address, sizeof address, "%.*s", (int)strcspn(endpoint + strlen("http://"), "/"),
              endpoint + strlen("http://"));
     int fd = raw_connect(address);
-    raw_write(fd, request,
-              (size_t)snprintf(request, sizeof request, "GET %s HTTP/1.1\r\nHost: %s\r\nConnection: close\r\n\r\n",
-                               resource, address));
+    raw_send(fd, request,
+             (size_t)snprintf(request, sizeof request, "GET %s HTTP/1.1\r\nHost: %s\r\nConnection: close\r\n\r\n",
+                              resource, address));
     *whole = malloc(room);
     for (ssize_t got = 1; got > 0 && n + 1 < room; n += (size_t)(got > 0 ? got : 0))
         got = read(fd, *whole + n, room - 1 - n);

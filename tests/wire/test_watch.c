@@ -42,7 +42,7 @@ static char *get(const struct head *head, const char *path, size_t *len)
     const int fd = raw_connect(head_endpoint(head, "web"));
     const int port = endpoint_port(head_endpoint(head, "web"));
     snprintf(request, sizeof request, "GET %s HTTP/1.1\r\nHost: 127.0.0.1:%d\r\nConnection: close\r\n\r\n", path, port);
-    raw_write(fd, request, strlen(request));
+    raw_send(fd, request, strlen(request));
     do {
         if (n + 65536 > room) answer = realloc(answer, room = 2 * room + 65536 + 1);
         assert_non_null(answer);

@@ -48,14 +48,14 @@ struct usbip_host usbip_host_open(const struct head *head)
     char at[128]; /* "usbip:127.0.0.1:PORT" as the socket that it is */
     snprintf(at, sizeof at, "tcp%s", strchr(head_endpoint(head, "usb"), ':'));
     host.fd = raw_connect(at);
-    raw_write(host.fd, list, sizeof list);
+    raw_send(host.fd, list, sizeof list);
     read_all(host.fd, reply, 12);
     assert_int_equal(reply[11], 1);
     read_all(host.fd, host.device, USBIP_DEVICE_LEN);
     assert_in_range(host.device[311], 1, USBIP_MAX_INTERFACES);
     read_all(host.fd, host.interface, 4u * host.device[311]);
     memcpy(import + 8, host.device + USBIP_BUS_ID, USBIP_BUS_ID_LEN);
-    raw_write(host.fd, import, sizeof import);
+    raw_send(host.fd, import, sizeof import);
     read_all(host.fd, reply, 8);
     assert_int_equal(reply[7], 0);
     read_all(host.fd, host.device, USBIP_DEVICE_LEN);
@@ -77,7 +77,7 @@ static void start_transfer(struct usbip_host *host, unsigned endpoint, int in, c
     put_be32(submit + 16, endpoint);
     put_be32(submit + 24, len);
     if (setup != NULL) memcpy(submit + 40, setup, 8);
-    raw_write(host->fd, submit, sizeof submit);
+    raw_send(host->fd, submit, sizeof submit);
 }
 
 void usbip_host_ask(struct usbip_host *host, unsigned endpoint, uint32_t len)
@@ -90,7 +90,7 @@ static int transfer(struct usbip_host *host, unsigned endpoint, int in, const ui
 {
     uint8_t reply[HEADER];
     start_transfer(host, endpoint, in, setup, len);
-    if (!in && len > 0) raw_write(host->fd, data, len);
+    if (!in && len > 0) raw_send(host->fd, data, len);
     read_all(host->fd, reply, sizeof reply);
     assert_int_equal(get_be32(reply), 3);
     assert_int_equal(get_be32(reply + 4), host->seqnum);

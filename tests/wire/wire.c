@@ -389,7 +389,7 @@ int raw_connect_again(const char *endpoint, const char *question)
     return -1;
 }
 
-void raw_write(int fd, const void *data, size_t len)
+void raw_send(int fd, const void *data, size_t len)
 {
     for (size_t done = 0; done < len;) {
         ssize_t n = write(fd, (const char *)data + done, len - done);

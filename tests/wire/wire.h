@@ -157,7 +157,7 @@ int raw_try_connect(const char *endpoint);
  * listens, or the connection ends with it. */
 int raw_connect_again(const char *endpoint, const char *question);
 
-void raw_write(int fd, const void *data, size_t len);
+void raw_send(int fd, const void *data, size_t len);
 
 struct scanhead *client_from_fd(int fd);
 

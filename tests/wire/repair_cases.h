@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* The formats that a killed recorder or a full disk may leave, and what a repair has to make of them. A row for each; what is
  * checked knows nothing of the code that repairs. */
-#ifndef TESTS_WIRE_REPAIR_ROWS_H
-#define TESTS_WIRE_REPAIR_ROWS_H
+#ifndef TESTS_WIRE_REPAIR_CASES_H
+#define TESTS_WIRE_REPAIR_CASES_H
 
 #include "tests/wire/wire.h"
 
@@ -24,12 +24,12 @@ struct repair_row {
     int (*is_none)(const struct bytes *left);
 };
 
-extern const struct repair_row repair_rows[];
+extern const struct repair_row repair_cases[];
 
 /* The ending of a file beside the recording, FILE + that, of which a repair makes the rest of it: on a full disk it needs more
  * room. The file goes with the repair. NULL: there is none. */
 const char *repair_row_beside(const struct repair_row *row);
 extern struct bytes repair_beside; /* what was left of that file */
-extern const size_t n_repair_rows;
+extern const size_t n_repair_cases;
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "tests/wire/repair_rows.h"
+#include "tests/wire/repair_cases.h"
 
 #include "drivers/protocol/bytes.h"
 
@@ -337,7 +337,7 @@ const char *repair_row_beside(const struct repair_row *row)
 #define WEB_E57 \
     "[ -e \"$READERS/installed\" ] || exit 127; node --experimental-wasm-modules \"$READERS\"/e57.mjs \"$F\" e57.xyz && cat e57.xyz && rm e57.xyz"
 
-const struct repair_row repair_rows[] = {
+const struct repair_row repair_cases[] = {
     {"stream", ".shs", {NULL}, {NULL}, check_shs, is_no_shs},
     {"packets", ".pcapng", {NULL}, {"tshark", "-r", "$F"}, check_pcapng, is_no_pcapng},
     {"points", ".ply", {NULL}, CLOUDCOMPARE, check_ply, is_no_ply},
@@ -352,4 +352,4 @@ const struct repair_row repair_rows[] = {
     {"shots", ".e57", {"--empty-shots", "--colour", "label"}, {NULL}, check_e57, is_no_e57},
     {"grids", ".ptx", {NULL}, CLOUDCOMPARE, check_ptx, is_no_ptx},
 };
-const size_t n_repair_rows = sizeof repair_rows / sizeof repair_rows[0];
+const size_t n_repair_cases = sizeof repair_cases / sizeof repair_cases[0];

@@ -1,0 +1,71 @@
+#!/bin/bash
+# SPDX-License-Identifier: MIT
+# Joins test programs: those of a folder become one file, and test_NAME a link to it, which runs the one of its name. To link each
+# of some 500 takes as much of a processor's time as to compile them.
+#   LINK='cc ...' LIBS='-l...' LD=ld OBJCOPY=objcopy JOBS=2 join.sh BUILD PROGRAM...     PROGRAM: BUILD/tests/FOLDER/test_NAME
+#
+# Of a program and its rigs main alone is seen from outside, under the program's name: so programs may use the same names. One that
+# puts a function of its own in the place of a library's, or of the head's, is linked by itself: in the joined file all would
+# call it.
+set -eu
+build=$1
+shift
+archives="$build/common.a $build/modules.a"
+limit=$build/tests/common/limit.c.o
+work=$build/tests/joining
+mkdir -p "$work"
+
+# PROGRAM OBJECT... for each, its own object first.
+sh tests/rigs.sh | awk -v build="$build" -v programs="$*" '
+    { split($0, pair, ":"); rigs[build "/" pair[1]] = rigs[build "/" pair[1]] " " build "/" pair[2] ".o" }
+    END { n = split(programs, list, " "); for (i = 1; i <= n; i++) print list[i], list[i] ".c.o" rigs[list[i]] }' >"$work/list"
+
+# Those whose symbols the archives define or lack.
+nm -P -g $archives "$limit" | awk 'NF >= 2 { print $1 }' | sort -u >"$work/theirs"
+cut -d ' ' -f 2- "$work/list" | tr ' ' '\n' | sort -u | xargs nm -P -g -A --defined-only |
+    awk 'NR == FNR { theirs[$1] = 1; next }
+        $2 in theirs && $2 != "main" && $2 !~ /^__/ { sub(/:$/, "", $1); print $1 }' "$work/theirs" - | sort -u >"$work/own"
+awk 'NR == FNR { own[$1] = 1; next } { for (i = 2; i <= NF; i++) if ($i in own) { print; next } }' "$work/own" "$work/list" >"$work/apart"
+grep -v -x -F -f "$work/apart" "$work/list" >"$work/joined" || : # none
+
+# one FOLDER/NAME OBJECT...: an object in which main is called after the program; it stays until one of its own is newer.
+one() {
+    local program=$1 name=${1##*/}
+    local out=$work/${program%/*}-$name.o object
+    shift
+    for object; do [ "$out" -nt "$object" ] || break; done
+    [ -e "$out" ] && [ "$out" -nt "$object" ] && return
+    "$LD" -r -o "$out" "$@"
+    "$OBJCOPY" --redefine-sym main="$name" --keep-global-symbol="$name" "$out"
+}
+by_itself() {
+    local program=$1
+    shift
+    rm -f "$program"
+    $LINK -o "$program" "$@" "$limit" $archives $LIBS
+}
+export work limit archives
+export -f one by_itself
+sed "s|^$build/tests/||" "$work/joined" | xargs -r -P "$JOBS" -L 1 bash -c 'set -eu; one "$@"' -
+xargs -r -P "$JOBS" -L 1 bash -c 'set -eu; by_itself "$@"' - <"$work/apart"
+
+for folder in $(cut -d ' ' -f 1 "$work/joined" | sed 's|/[^/]*$||' | sort -u); do
+    names=$(sed -n "s|^$folder/\([^ ]*\) .*|\1|p" "$work/joined")
+    {
+        printf '#include <stdio.h>\n#include <string.h>\n'
+        for name in $names; do echo "int $name(int argc, char **argv);"; done
+        echo 'static const struct { const char *name; int (*main)(int argc, char **argv); } all[] = {'
+        for name in $names; do echo "{\"$name\", $name},"; done
+        echo '};
+int main(int argc, char **argv)
+{
+    const char *slash = strrchr(argv[0], 47), *name = slash != NULL ? slash + 1 : argv[0];
+    for (size_t i = 0; i < sizeof all / sizeof all[0]; i++)
+        if (strcmp(all[i].name, name) == 0) return all[i].main(argc, argv);
+    fprintf(stderr, "%s: not one of the joined programs\n", name);
+    return 2;
+}'
+    } >"$work/main.c"
+    $LINK -o "$folder/joined" "$work/main.c" $(printf "$work/${folder##*/}-%s.o " $names) "$limit" $archives $LIBS
+    for name in $names; do ln -sf joined "$folder/$name"; done
+done
