@@ -208,7 +208,7 @@ LLD := $(if $(shell command -v ld.lld),-fuse-ld=lld)
 LINK_TEST = $(CC) $(SAN) $(FAST_LD) $(LINK_LIMIT)
 TEST_LIBS = -Wl,--as-needed -lcmocka $(LDLIBS)
 .SECONDEXPANSION:
-# All of them, a file for each folder.
+# All of them, twenty in a file.
 $(BUILD)/tests/joined: $$(sort $$(foreach p,$$(JOINED),$$(p).c.o $$(call RIGS,$$(patsubst $$(BUILD)/%,%,$$(p))))) $(BUILD)/$(LIMIT).o \
 	$(BUILD)/common.a $(BUILD)/modules.a tests/join.sh
 	@echo "  JOIN  $(words $(JOINED)) test programs"

@@ -1,18 +1,19 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
-# Joins test programs: those of a folder become one file, and test_NAME a link to it, which runs the one of its name. To link each
-# of some 500 takes as much of a processor's time as to compile them.
+# Joins test programs: twenty of a folder become one file, and test_NAME a link to it, which runs the one of its name. To link each
+# of some 500 takes as much of a processor's time as to compile them. (More than twenty cost again: at the end of a program the
+# sanitizer of leaks looks through the variables of all of them.)
 #   LINK='cc ...' LIBS='-l...' LD=ld OBJCOPY=objcopy JOBS=2 join.sh BUILD PROGRAM...     PROGRAM: BUILD/tests/FOLDER/test_NAME
 #
 # Of a program and its rigs main alone is seen from outside, under the program's name: so programs may use the same names. One that
 # puts a function of its own in the place of a library's, or of the head's, is linked by itself: in the joined file all would
 # call it.
-set -eu
+set -euo pipefail
 build=$1
 shift
 archives="$build/common.a $build/modules.a"
 limit=$build/tests/common/limit.c.o
-work=$build/tests/joining
+work=$build/tests/joining AT_ONCE=20
 mkdir -p "$work"
 
 # PROGRAM OBJECT... for each, its own object first.
@@ -26,7 +27,7 @@ cut -d ' ' -f 2- "$work/list" | tr ' ' '\n' | sort -u | xargs nm -P -g -A --defi
     awk 'NR == FNR { theirs[$1] = 1; next }
         $2 in theirs && $2 != "main" && $2 !~ /^__/ { sub(/:$/, "", $1); print $1 }' "$work/theirs" - | sort -u >"$work/own"
 awk 'NR == FNR { own[$1] = 1; next } { for (i = 2; i <= NF; i++) if ($i in own) { print; next } }' "$work/own" "$work/list" >"$work/apart"
-grep -v -x -F -f "$work/apart" "$work/list" >"$work/joined" || : # none
+grep -v -x -F -f "$work/apart" "$work/list" >"$work/together" || : # none
 
 # one FOLDER/NAME OBJECT...: an object in which main is called after the program; it stays until one of its own is newer.
 one() {
@@ -46,16 +47,18 @@ by_itself() {
 }
 export work limit archives
 export -f one by_itself
-sed "s|^$build/tests/||" "$work/joined" | xargs -r -P "$JOBS" -L 1 bash -c 'set -eu; one "$@"' -
+sed "s|^$build/tests/||" "$work/together" | xargs -r -P "$JOBS" -L 1 bash -c 'set -eu; one "$@"' -
 xargs -r -P "$JOBS" -L 1 bash -c 'set -eu; by_itself "$@"' - <"$work/apart"
 
-for folder in $(cut -d ' ' -f 1 "$work/joined" | sed 's|/[^/]*$||' | sort -u); do
-    names=$(sed -n "s|^$folder/\([^ ]*\) .*|\1|p" "$work/joined")
+# join FILE OBJECTS-PREFIX NAME...: one file of these programs
+join() {
+    local file=$1 folder=${1%/*} prefix=$2 name
+    shift 2
     {
         printf '#include <stdio.h>\n#include <string.h>\n'
-        for name in $names; do echo "int $name(int argc, char **argv);"; done
+        for name; do echo "int $name(int argc, char **argv);"; done
         echo 'static const struct { const char *name; int (*main)(int argc, char **argv); } all[] = {'
-        for name in $names; do echo "{\"$name\", $name},"; done
+        for name; do echo "{\"$name\", $name},"; done
         echo '};
 int main(int argc, char **argv)
 {
@@ -65,7 +68,15 @@ int main(int argc, char **argv)
     fprintf(stderr, "%s: not one of the joined programs\n", name);
     return 2;
 }'
-    } >"$work/main.c"
-    $LINK -o "$folder/joined" "$work/main.c" $(printf "$work/${folder##*/}-%s.o " $names) "$limit" $archives $LIBS
-    for name in $names; do ln -sf joined "$folder/$name"; done
+    } >"$file.c"
+    $LINK -o "$file" "$file.c" $(printf "$prefix%s.o " "$@") "$limit" $archives $LIBS
+    rm "$file.c"
+    for name; do ln -sf "${file##*/}" "$folder/$name"; done
+}
+export -f join
+
+rm -f "$build"/tests/*/joined-*
+for folder in $(cut -d ' ' -f 1 "$work/together" | sed 's|/[^/]*$||' | sort -u); do
+    sed -n "s|^$folder/\([^ ]*\) .*|\1|p" "$work/together" | xargs -n "$AT_ONCE" | awk -v folder="$folder" '{ print folder "/joined-" NR, $0 }' |
+        xargs -P "$JOBS" -L 1 bash -c 'set -eu; file=$1; shift; join "$file" "$work/$(basename "${file%/*}")-" "$@"' -
 done
