@@ -98,7 +98,7 @@ UNIT = $(call PROGRAMS,unit)
 # (`make test`; tests/run_all.sh, which asks for the same), or as shipped alone (`make test-unit`).
 SHIPPED = $(patsubst tests/%.c,$(BUILD)/tests/%,$(shell sh tests/shipped.sh))
 TESTS = $(UNIT) $(call PROGRAMS,wire) $(call PROGRAMS,accuracy) $(call PROGRAMS,stability) $(call PROGRAMS,guest)
-# Those that are linked at once: all, the unit tests, or all but those of them that don't run as shipped.
+# JOIN says which programs are linked at once: all, the unit tests, or all but those of them that don't run as shipped.
 JOIN ?= all
 JOINED_unit = $(UNIT)
 JOINED_all = $(filter-out $(call PROGRAMS,guest),$(TESTS))
@@ -121,13 +121,14 @@ $(BUILD)/%.cpp.o: %.cpp $(BUILD)/flags
 	$(Q)$(CXX) $(ALL_CPPFLAGS) $(ALL_CXXFLAGS) -c $< -o $@
 # What a build is made of, a file for each: all is built again once the tools or flags have changed, and an archive once a
 # source has come or gone. ccache and -Werror change nothing of an object.
-STAMPS = $(patsubst %,$(BUILD)/%,flags modules.members library.members common.members benches.members)
+STAMPS = $(patsubst %,$(BUILD)/%,flags modules.members library.members common.members benches.members joined.members)
 $(BUILD)/flags: NOW = $(filter-out ccache %/ccache -Werror,$(CC) $(CXX) $(AR) $(OBJCOPY) $(ALL_CPPFLAGS) $(ALL_CFLAGS) $(ALL_CXXFLAGS) \
 	$(CORE_OPT) $(TEST_WARN) $(LDFLAGS) $(LDLIBS))
 $(BUILD)/modules.members: NOW = $(SRC)
 $(BUILD)/library.members: NOW = $(LIBOBJ)
 $(BUILD)/common.members: NOW = $(COMMON)
 $(BUILD)/benches.members: NOW = $(BENCHES)
+$(BUILD)/joined.members: NOW = $(JOINED)
 quoted = '$(subst ','\'',$(strip $(1)))'
 $(STAMPS): ALWAYS
 	@mkdir -p $(@D)
@@ -199,7 +200,7 @@ $(BUILD)/core/%.o: private override OPT += $(CORE_OPT)
 $(BUILD)/tests/%.o: private override CWARN += $(TEST_WARN)
 # What computes little itself is built in half the time.
 $(BUILD)/tests/unit/% $(BUILD)/tests/wire/% $(BUILD)/tests/guest/%: private OPT += -O1
-# Some 500 programs are linked; gold takes two thirds of the time.
+# Some 500 programs are linked, twenty at a time; gold takes two thirds of the time.
 # clang's sanitizers need its own: gold has doubts about their symbols.
 # A program loads the libraries that it needs and no others: those of Embree and Assimp take longer than many a test.
 FAST_LD = $(if $(CROSS_COMPILE),,$(if $(findstring clang,$(CC)),$(LLD),$(GOLD)))
@@ -208,9 +209,9 @@ LLD := $(if $(shell command -v ld.lld),-fuse-ld=lld)
 LINK_TEST = $(CC) $(SAN) $(FAST_LD) $(LINK_LIMIT)
 TEST_LIBS = -Wl,--as-needed -lcmocka $(LDLIBS)
 .SECONDEXPANSION:
-# All of them, twenty in a file.
+# This one links all of them, twenty in a file.
 $(BUILD)/tests/joined: $$(sort $$(foreach p,$$(JOINED),$$(p).c.o $$(call RIGS,$$(patsubst $$(BUILD)/%,%,$$(p))))) $(BUILD)/$(LIMIT).o \
-	$(BUILD)/common.a $(BUILD)/modules.a tests/join.sh
+	$(BUILD)/common.a $(BUILD)/modules.a $(BUILD)/joined.members tests/join.sh
 	@echo "  JOIN  $(words $(JOINED)) test programs"
 	$(Q)LINK='$(LINK_TEST)' LIBS='$(TEST_LIBS)' LD='$(CROSS_COMPILE)ld' OBJCOPY='$(OBJCOPY)' JOBS=$(JOBS) bash tests/join.sh $(BUILD) $(JOINED)
 	@touch $@

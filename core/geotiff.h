@@ -38,7 +38,7 @@ int geotiff_is_name(const char *file);
 /* Bounds of the cells' middles, metres: low easting, low northing, high ones. */
 void geotiff_bounds(const struct geotiff *geotiff, double bounds_m[4]);
 
-/* The EPSG code of a place's UTM zone, for advice: without the exceptions of Norway. Near a pole that of UPS. */
+/* The EPSG code of a place's UTM zone, for advice: without the exceptions of Norway. Near a pole it is the code of UPS. */
 int geotiff_utm_code(double lat_deg, double lon_deg);
 
 #endif

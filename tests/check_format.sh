@@ -16,9 +16,7 @@ sources() { # SUFFIX...
 
 # laid_out FILE...: names those that are not.
 laid_out() {
-    local said
-    said=$(clang-format --dry-run "$@" 2>&1 | sed -n 's/: warning: code should be clang-formatted.*//p')
-    [ -z "$said" ] || { echo "$said" && return 1; }
+    clang-format --style=file:.clang-format --dry-run --Werror "$@"
 }
 
 licensed() {

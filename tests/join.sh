@@ -5,7 +5,7 @@
 # sanitizer of leaks looks through the variables of all of them.)
 #   LINK='cc ...' LIBS='-l...' LD=ld OBJCOPY=objcopy JOBS=2 join.sh BUILD PROGRAM...     PROGRAM: BUILD/tests/FOLDER/test_NAME
 #
-# Of a program and its rigs main alone is seen from outside, under the program's name: so programs may use the same names. One that
+# Only main of a program and its rigs is seen from outside, under the program's name: programs may use the same names. One that
 # puts a function of its own in the place of a library's, or of the head's, is linked by itself: in the joined file all would
 # call it.
 set -euo pipefail
@@ -21,7 +21,7 @@ sh tests/rigs.sh | awk -v build="$build" -v programs="$*" '
     { split($0, pair, ":"); rigs[build "/" pair[1]] = rigs[build "/" pair[1]] " " build "/" pair[2] ".o" }
     END { n = split(programs, list, " "); for (i = 1; i <= n; i++) print list[i], list[i] ".c.o" rigs[list[i]] }' >"$work/list"
 
-# Those whose symbols the archives define or lack.
+# A program is linked by itself when the archives define or lack a symbol of it.
 nm -P -g $archives "$limit" | awk 'NF >= 2 { print $1 }' | sort -u >"$work/theirs"
 cut -d ' ' -f 2- "$work/list" | tr ' ' '\n' | sort -u | xargs nm -P -g -A --defined-only |
     awk 'NR == FNR { theirs[$1] = 1; next }
@@ -36,8 +36,9 @@ one() {
     shift
     for object; do [ "$out" -nt "$object" ] || break; done
     [ -e "$out" ] && [ "$out" -nt "$object" ] && return
-    "$LD" -r -o "$out" "$@"
-    "$OBJCOPY" --redefine-sym main="$name" --keep-global-symbol="$name" "$out"
+    "$LD" -r -o "$out.new" "$@"
+    "$OBJCOPY" --redefine-sym main="$name" --keep-global-symbol="$name" "$out.new"
+    mv "$out.new" "$out"
 }
 by_itself() {
     local program=$1

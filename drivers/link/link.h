@@ -119,7 +119,8 @@ struct link_ops {
     uint64_t (*refused)(const void *link);
 
     /* Bytes of a session that were written and that its reader has not taken: they are lost once the link is closed. The
-     * system may know of the last ones a moment late. NULL: none get lost so. */
+     * system may know of the last ones a moment late, and counts to a limit only: there may be more. 0 also where it can't be
+     * known. NULL: none get lost so. */
     int (*unread)(void *link, int session);
 
     /* Ends a session from this side: what was written goes out, and a LINK_CLOSED follows from poll. NULL: sessions of

@@ -71,7 +71,7 @@ static void colour_text(const struct part *p, uint32_t object, char text[CELL_LE
     fclose(cell);
 }
 
-/* The clearest surface of that name. */
+/* An object is as clear as the clearest surface of its name. */
 static float clear_of(const struct part *p, uint32_t object)
 {
     float clear = 0.0f;

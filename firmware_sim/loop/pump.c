@@ -241,8 +241,12 @@ static void *pump_main(void *arg)
         at_once |= pump_power(pump, want_write);
         at_once |= set_wake(pump);
     }
-    for (int i = 0; i < LINK_MAX_SESSIONS; i++)
+    for (int i = 0; i < LINK_MAX_SESSIONS; i++) {
+        if (pump->session[i].open && pump->session[i].unread > 0)
+            sh_warn(pump->links->report, "link %s: its reader has left %d bytes or more in the system, which are lost",
+                    pump->ops->name, pump->session[i].unread);
         if (pump->session[i].open) session_leave(pump, &pump->session[i]);
+    }
     atomic_fetch_sub(&pump->links->n_busy, 1);
     return NULL;
 }

@@ -229,7 +229,7 @@ uint32_t site_points_per_pulse(const struct site *site);
 /* The same whatever is planned once a station was moved. */
 uint32_t site_most_points_per_pulse(const struct site *site);
 
-/* Names of a label below n_surfaces. */
+/* A label's names; it is below n_surfaces. */
 const struct scene_surface *site_surface(const struct site *site, uint32_t label);
 /* The texture of a real surface; NULL: none. */
 const struct scene_texture *site_texture(const struct site *site, uint32_t label);

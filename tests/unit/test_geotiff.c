@@ -225,7 +225,7 @@ static void units(void **state)
         {{{3072, 32767}, {3076, 9002}, {4099, 9001}}, NULL, 0.3048, 1, 0, NULL},
         {{{3072, 32632}},
          "<GDALMetadata>\n<Item name=\"OFFSET\" sample=\"0\" role=\"offset\">100</Item>\n"
-         "<Item name=\"SCALE\" sample=\"0\" role=\"scale\">0.5</Item>\n"
+         "<Item name=\"SCALE\" sample=\"0\" role=\"scale\">0.5 </Item>\n"
          "<Item name=\"UNITTYPE\" sample=\"0\" role=\"unittype\">ft</Item></GDALMetadata>",
          0,
          0.5 * 0.3048,
@@ -306,7 +306,11 @@ static void what_is_left_out_is_said(void **state)
     if (n_warnings != 1 || strstr(warnings, "its ModelTransformation changes the heights, which is not used") == NULL)
         fail_msg("%s", warnings);
     scene_free(s);
-    t.matrix[10] = 0.0; /* a map of the plane alone */
+    t.matrix[10] = 0.0; /* an offset alone */
+    s = read_tif(&t);
+    assert_int_equal(n_warnings, 1);
+    scene_free(s);
+    t.matrix[11] = 0.0; /* a map of the plane alone */
     s = read_tif(&t);
     assert_int_equal(n_warnings, 0);
     scene_free(s);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What `scanhead init` takes from a mesh's file beside its shape: a raster's place, glass, and what its reader says. */
+/* `scanhead init` takes more from a mesh's file than its shape: a raster's place, glass, and what its reader says. */
 #include "tests/common/tif.h"
 #include "tests/wire/wire.h"
 

@@ -108,8 +108,8 @@ static int read_map(struct reader *r)
     if (rc == SH_OK && n < 8) rc = read_scale(r);
     if (rc != SH_OK) return rc;
     const double *m = r->map, *z = r->map + 8;
-    /* GDAL doesn't use the third row either. Without a part for the value it is a map of the plane alone. */
-    r->g->turns_heights = n >= 12 && z[2] != 0.0 && (z[0] != 0.0 || z[1] != 0.0 || z[2] != 1.0 || z[3] != 0.0);
+    /* GDAL doesn't use the third row either. It says nothing as 0 0 0 0, a map of the plane alone, and as 0 0 1 0. */
+    r->g->turns_heights = n >= 12 && (z[0] != 0.0 || z[1] != 0.0 || z[3] != 0.0 || (z[2] != 0.0 && z[2] != 1.0));
     const double area = m[0] * m[5] - m[1] * m[4];
     if (isfinite(area) && area != 0.0 && isfinite(m[3]) && isfinite(m[7])) return SH_OK;
     return sh_fail(r->err, SH_EINPUT, "%s: its cells have no area, or no place that is a number", r->tags.path);
@@ -126,7 +126,7 @@ static int fail_degrees(const struct reader *r)
     if (system != 0 && system != USER_DEFINED) snprintf(name, sizeof name, "EPSG:%u", system);
     return sh_fail(r->err, SH_EINPUT,
                    "%s: its cells are degrees (%s); allowed are systems in metres or feet: gdalwarp -t_srs EPSG:%d "
-                   "-r bilinear -dstnodata -9999 makes one in UTM",
+                   "-r bilinear -dstnodata -9999 makes one in metres",
                    r->tags.path, name, geotiff_utm_code(lat, lon));
 }
 
@@ -205,6 +205,7 @@ static int read_item(const struct reader *r, const char *metadata, const char *r
     char *end = NULL;
     if (n == 0) return SH_OK;
     *value = strtod(at, &end);
+    end += end > at ? strspn(end, " \t\r\n") : 0;
     if (end == at + n && isfinite(*value) && (*value != 0.0 || strcmp(role, "scale") != 0)) return SH_OK;
     return sh_fail(r->err, SH_EINPUT, "%s: the %s of its heights is '%.*s'; allowed are numbers, and no scale of 0",
                    r->tags.path, role, n < 40 ? n : 40, at);

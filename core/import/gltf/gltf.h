@@ -109,7 +109,7 @@ int gltf_check_extensions(struct gltf *g);
 bool gltf_is_by_shaders(const json_t *material);
 bool gltf_is_required(const struct gltf *g, const char *extension);
 
-/* ---- gltf_indices.c: warns of indices that name nothing, wherever they are. Of what is drawn they were errors. */
+/* ---- gltf_indices.c: warns of indices that name nothing, wherever they are. What is drawn has none: there they are errors. */
 void gltf_say_indices(const struct gltf *g);
 
 /* ---- gltf_meshopt.c: decodes a buffer view, `more` is its extension. */

@@ -52,7 +52,7 @@ static void note_odd(struct gltf *g, const json_t *material, uint32_t number)
     const json_t *glossy = gltf_extension(material, "KHR_materials_pbrSpecularGlossiness");
     note(g, json_object_get(material, "alphaMode") == NULL || is_mode(gltf_text(material, "alphaMode")), "alphaMode",
          number);
-    note(g, cutoff == NULL || json_number_value(cutoff) >= 0.0, "alphaCutoff", number);
+    note(g, cutoff == NULL || (json_is_number(cutoff) && json_number_value(cutoff) >= 0.0), "alphaCutoff", number);
     note(g, through == NULL || is_share(through), "transmissionFactor", number);
     note(g, are_shares(json_object_get(rough, "baseColorFactor")), "baseColorFactor", number);
     note(g, are_shares(json_object_get(glossy, "diffuseFactor")), "diffuseFactor", number);

@@ -164,7 +164,7 @@ static int fail(const char *file, const struct sh_err *why, int code, struct sh_
                    why->text);
 }
 
-/* The system of a raster, where the scene can be anchored by it. */
+/* A raster's system is kept where the scene can be anchored by it. */
 static void find_crs(const struct init_wish *wish, struct init_mesh *mesh)
 {
     struct geotiff g;
