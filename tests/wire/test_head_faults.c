@@ -314,11 +314,15 @@ static void power_cycle_at(struct wire *wire, const char *pace, const char *link
                              "faults: [{kind: power_cycle, from_pulse: 8000, for_ms: 300}]\n",
                              pace);
     struct scanhead *sh = client_open(head_endpoint(&head, link));
+    struct scanhead_frame frame;
     uint64_t pulse_end = 0;
-    int ends = 0;
+    int ends = 0, rc;
     client_wait_state(sh, "idle");
     client_tell(sh, "SCAN:START");
-    client_until(sh, SCANHEAD_EV_SCAN_START, &(struct scanhead_frame){0});
+    while ((rc = scanhead_next(sh, &frame, DEADLINE_MS)) == SCANHEAD_OK && !is_event(&frame, SCANHEAD_EV_SCAN_START))
+        continue;
+    /* A client that is late is hung up before it has read that, and what it has not read is lost. */
+    if (rc != SCANHEAD_OK && rc != SCANHEAD_ECLOSED) fail_msg("%s", scanhead_error(sh));
     ends = -1; /* for the state `scanning` */
     const int64_t last_ns = until_hung_up(sh, &pulse_end, &ends);
     assert_true(ends <= 0);
