@@ -38,17 +38,22 @@ static const char *name_of(const struct part *p, uint32_t object)
     return p->scene->surface[p->objects.object[object].surface].object;
 }
 
-/* The surfaces of one name are few, but need not follow each other. */
+/* The surfaces of one name are few, but need not follow each other. *left counts those from i on: NULL once it is 0. */
+static const struct scene_surface *next_surface(const struct part *p, uint32_t object, uint32_t *i, uint32_t *left)
+{
+    if (*left == 0) return NULL;
+    while (p->objects.of[*i] != object)
+        ++*i;
+    --*left;
+    return &p->scene->surface[(*i)++];
+}
+
 static void colour_text(const struct part *p, uint32_t object, char text[CELL_LEN])
 {
-    const struct scene *scene = p->scene;
-    const struct scene_surface *first = NULL;
+    const struct scene_surface *first = NULL, *s;
     int differ = 0, textures = 0, vertices = 0;
-    uint32_t left = p->objects.object[object].n_surfaces;
-    for (uint32_t i = p->objects.object[object].surface; left > 0; i++) {
-        const struct scene_surface *s = &scene->surface[i];
-        if (p->objects.of[i] != object) continue;
-        left--;
+    uint32_t i = p->objects.object[object].surface, left = p->objects.object[object].n_surfaces;
+    while ((s = next_surface(p, object, &i, &left)) != NULL) {
         textures |= s->texture != 0;
         vertices |= s->vertex_colours != SCENE_COLOURS_NONE;
         if (!s->has_colour) continue;
@@ -74,13 +79,11 @@ static void colour_text(const struct part *p, uint32_t object, char text[CELL_LE
 /* An object is as clear as the clearest surface of its name. */
 static float clear_of(const struct part *p, uint32_t object)
 {
+    const struct scene_surface *s;
     float clear = 0.0f;
-    uint32_t left = p->objects.object[object].n_surfaces;
-    for (uint32_t i = p->objects.object[object].surface; left > 0; i++) {
-        if (p->objects.of[i] != object) continue;
-        left--;
-        clear = fmaxf(clear, p->scene->surface[i].clear);
-    }
+    uint32_t i = p->objects.object[object].surface, left = p->objects.object[object].n_surfaces;
+    while ((s = next_surface(p, object, &i, &left)) != NULL)
+        clear = fmaxf(clear, s->clear);
     return clear;
 }
 

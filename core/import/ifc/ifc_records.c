@@ -39,6 +39,21 @@ const struct ifc_product *ifc_records_product(const struct ifc_records *r, uint6
     return r->n_products > 0 ? bsearch(&key, r->product, r->n_products, sizeof key, compare_products) : NULL;
 }
 
+size_t ifc_first(const void *list, size_t n, size_t size, uint64_t id)
+{
+    size_t low = 0, high = n;
+    while (low < high) {
+        const size_t middle = (low + high) / 2;
+        uint64_t at;
+        memcpy(&at, (const char *)list + middle * size, sizeof at);
+        if (at < id)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
 static int no_memory(const struct ifc_records *r, struct sh_err *err)
 {
     return text_fail(&r->text, 0, SH_ENOMEM, err, "no memory for its records");

@@ -12,7 +12,7 @@
 
 /* A style of surfaces, and an item that has it. */
 struct ifc_style {
-    uint64_t item;   /* 0: it is a material's */
+    uint64_t item;   /* first, for ifc_first; 0: it is a material's */
     char *name;      /* may be empty */
     float colour[3]; /* 0..1 */
     float clear;     /* its transparency, 0..1 */
@@ -66,6 +66,9 @@ int ifc_records_fail(const struct ifc_records *r, const struct step_record *at, 
 /* NULL: there is none of that number. */
 const struct step_record *ifc_records_find(const struct ifc_records *r, uint64_t id);
 const struct ifc_product *ifc_records_product(const struct ifc_records *r, uint64_t id);
+
+/* The place of the first entry of a sorted list whose number, its first member, is id or above; n: there is none. */
+size_t ifc_first(const void *list, size_t n, size_t size, uint64_t id);
 
 /* ---- ifc_walk.c: fills the marks of all products. */
 int ifc_walk(struct ifc_records *r, struct sh_err *err);

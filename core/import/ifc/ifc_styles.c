@@ -96,18 +96,10 @@ int ifc_styles_collect(struct ifc_records *r, struct sh_err *err)
 
 size_t ifc_styles_of(const struct ifc_records *r, uint64_t item, size_t *first)
 {
-    size_t low = 0, high = r->n_styles;
-    while (low < high) {
-        const size_t middle = (low + high) / 2;
-        if (r->style[middle].item < item)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    *first = low;
-    while (high < r->n_styles && r->style[high].item == item)
-        high++;
-    return high - low;
+    size_t end = *first = ifc_first(r->style, r->n_styles, sizeof *r->style, item);
+    while (end < r->n_styles && r->style[end].item == item)
+        end++;
+    return end - *first;
 }
 
 static bool is_same(const struct ifc_style *style, const float colour[4])

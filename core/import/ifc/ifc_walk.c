@@ -206,26 +206,14 @@ static bool collect_voids(struct walk *w)
     return true;
 }
 
-static size_t first_void(const struct walk *w, uint64_t product)
-{
-    size_t low = 0, high = w->n_voids;
-    while (low < high) {
-        const size_t middle = (low + high) / 2;
-        if (w->voids[2 * middle] < product)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    return low;
-}
-
 static bool walk_product(struct walk *w, struct ifc_product *product)
 {
     w->product = product;
     w->r->stamp++;
     bool done = walk_from(w, product->shape);
     const bool has_body = product->has_body; /* an opening's is none of its own */
-    for (size_t i = first_void(w, product->id); i < w->n_voids && w->voids[2 * i] == product->id && done; i++) {
+    for (size_t i = ifc_first(w->voids, w->n_voids, 2 * sizeof *w->voids, product->id);
+         i < w->n_voids && w->voids[2 * i] == product->id && done; i++) {
         const struct ifc_product *opening = ifc_records_product(w->r, w->voids[2 * i + 1]);
         if (opening != NULL) done = walk_from(w, opening->shape);
     }
