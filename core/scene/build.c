@@ -2,7 +2,6 @@
 #include "core/scene/build.h"
 
 #include <math.h>
-#include <search.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -26,21 +25,12 @@ int build_init(struct scene_build *b, double tolerance_m, const struct sh_report
     b->polygon.report = report;
     b->scene = calloc(1, sizeof *b->scene);
     if (b->scene == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a scene");
-    /* In full, since the tree holds pointers into it: pages that are not used are never touched. */
-    b->scene->surface = malloc((SCENE_MAX_SURFACES + 1) * sizeof *b->scene->surface);
-    if (b->scene->surface == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the scene's surfaces");
     return SH_OK;
-}
-
-static void keep_surface(void *surface)
-{
-    (void)surface; /* the scene owns it */
 }
 
 void build_release(struct scene_build *b)
 {
-    if (b->surface_tree != NULL) tdestroy(b->surface_tree, keep_surface);
-    b->surface_tree = NULL;
+    build_forget_surfaces(b);
     triangulate_free(&b->polygon);
     free(b->corner);
     free(b->corner_uv);
@@ -160,8 +150,7 @@ int build_finish(struct scene_build *b, int may_be_empty, struct scene **out, st
 {
     struct scene *s = b->scene;
     if (s->n_triangles == 0 && !may_be_empty) return sh_fail(err, SH_EINPUT, "the scene has no triangles");
-    if (b->surface_tree != NULL) tdestroy(b->surface_tree, keep_surface);
-    b->surface_tree = NULL;
+    build_forget_surfaces(b);
     if (s->n_textures == 0) {
         free(s->uv);
         s->uv = NULL;

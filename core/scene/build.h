@@ -34,8 +34,8 @@ struct scene_build {
     uint8_t (*corner_rgb)[4]; /* where has_rgb: their colours, as scene->rgb has them */
     bool has_rgb;
     /* the builder's own */
-    size_t cap_corners, cap_vertices, cap_triangles;
-    void *surface_tree;
+    size_t cap_corners, cap_vertices, cap_triangles, cap_surfaces;
+    void *surface_tree; /* of pointers into the scene's surfaces, by name */
     struct triangulate polygon;
     int64_t start_ns, file_ns, reported_ns; /* of the load, of this file, of the last report */
 };
@@ -94,12 +94,16 @@ int build_polygon(struct scene_build *b, size_t n, uint16_t label, struct sh_err
 
 #define BUILD_SINGLE_ROUNDING 6e-8 /* 2^-24: of the nearest float */
 
+/* The names are not searched any more: the scene is done, or given up. */
+void build_forget_surfaces(struct scene_build *b);
+
 /* The file's coordinates, up to `largest`, were rounded to single precision, and so are off by up to
  * `error`; both in its units. Keeps that, warns of more than a micrometre, and fails where it is more than
  * allowed, if `refuse`. */
 int build_single(struct scene_build *b, double largest, double error, bool refuse, struct sh_err *err);
 
-/* The label of a pair of names; a new pair gets the next number. */
+/* The label of a pair of names; a new pair gets the next number. Pointers into the scene's surfaces last until the next
+ * label. */
 int build_label(struct scene_build *b, struct text_span object, struct text_span material, uint16_t *label,
                 struct sh_err *err);
 

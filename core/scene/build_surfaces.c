@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/grow.h"
 #include "core/rng.h"
 
 static int compare_surfaces(const void *a, const void *b)
@@ -70,11 +71,35 @@ double build_rgb_scale(const struct build_rgb_range *range)
     return range->largest >= 2.0 && range->n_above > range->n_between ? 1.0 : 255.0;
 }
 
+static void keep_surface(void *surface)
+{
+    (void)surface; /* the scene owns it */
+}
+
+void build_forget_surfaces(struct scene_build *b)
+{
+    if (b->surface_tree != NULL) tdestroy(b->surface_tree, keep_surface);
+    b->surface_tree = NULL;
+}
+
+/* Room for one more surface. The tree points into the array, so it is made again where the array has moved. */
+static bool has_room(struct scene_build *b)
+{
+    struct scene *s = b->scene;
+    if (s->n_surfaces < b->cap_surfaces) return true;
+    build_forget_surfaces(b);
+    if (!grow(&s->surface, &b->cap_surfaces, s->n_surfaces + 1, sizeof *s->surface)) return false;
+    for (uint32_t i = 0; i < s->n_surfaces; i++)
+        if (tsearch(&s->surface[i], &b->surface_tree, compare_surfaces) == NULL) return false;
+    return true;
+}
+
 int build_label(struct scene_build *b, struct text_span object, struct text_span material, uint16_t *label,
                 struct sh_err *err)
 {
     struct scene *s = b->scene;
-    struct scene_surface *fresh = &s->surface[s->n_surfaces]; /* room for one more than allowed */
+    if (!has_room(b)) return build_fail(b, SH_ENOMEM, err, "no memory for the scene's surfaces");
+    struct scene_surface *fresh = &s->surface[s->n_surfaces];
     fresh->has_colour = 0;
     fresh->texture = fresh->opacity = fresh->vertex_colours = 0;
     fresh->solid = 0.5f;

@@ -8,6 +8,7 @@
 #include <strings.h>
 #include <sys/stat.h>
 
+#include "core/grow.h"
 #include "core/scene/build.h"
 
 const struct scene_import_limits scene_import_defaults = {.memory_mib = 8192, .time_s = 300, .files = 64};
@@ -121,6 +122,8 @@ static int copy_surfaces(struct scene_build *b, const struct scene_arrays *array
     uint32_t n = arrays->surface != NULL ? arrays->n_surfaces : 1;
     if (n == 0 || n > SCENE_MAX_SURFACES)
         return build_fail(b, SH_EINPUT, err, "%u surfaces; allowed are 1 to %d", n, SCENE_MAX_SURFACES);
+    if (!grow(&b->scene->surface, &b->cap_surfaces, n, sizeof *surface))
+        return build_fail(b, SH_ENOMEM, err, "no memory for %u surfaces", n);
     memcpy(b->scene->surface, surface, n * sizeof *surface);
     for (uint32_t i = 0; i < n; i++) {
         if (memchr(surface[i].object, '\0', SCENE_NAME_LEN) == NULL ||

@@ -17,7 +17,7 @@ static int sees(const void *ctx, const double dir[3], double radius_rad)
 /* How often the BVH is asked for that ray. */
 static uint64_t asked_for(const struct bvh *bvh, const double ray[3])
 {
-    struct sight_spec spec = {.bvh = bvh, .rays = 1e5, .memory_bytes = 16 << 20, .sees = sees, .ctx = ray};
+    struct sight_spec spec = {.bvh = bvh, .rays = 1e5, .memory_bytes = 1 << 20, .sees = sees, .ctx = ray};
     struct sight *sight = NULL;
     struct sight_work *work = NULL;
     struct bvh_work *bvh_work = NULL;
