@@ -35,6 +35,16 @@ static volatile size_t n_begun;
 static volatile sig_atomic_t ended_one; /* a thread has begun to say where all are */
 static volatile sig_atomic_t answered;
 
+#ifdef SH_SANITIZE
+/* What the address sanitizer keeps of memory stays mapped, and is written anew: to unmap it and to fault it in again takes
+ * a third of the time of a test that makes large arrays often. */
+const char *__asan_default_options(void);
+const char *__asan_default_options(void)
+{
+    return "clear_shadow_mmap_threshold=1073741824:allocator_release_to_os_interval_ms=-1";
+}
+#endif
+
 /* ---- what a signal handler may do: write(2) */
 
 __attribute__((format(printf, 1, 2))) static void say(const char *format, ...)
