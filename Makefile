@@ -45,11 +45,12 @@ PKGS = yaml-0.1 libpng proj nettle libusb-1.0 libwebsockets jansson libwebp libt
 ask_pkg_config = $(shell $(PKG_CONFIG) $(1) $(PKGS))$(if $(filter-out 0,$(.SHELLSTATUS)),$(error $(PKG_CONFIG) does not \
 	find all of $(PKGS): make deps-build, or PKG_CONFIG=... for another machine))
 PKG_CFLAGS = $(eval PKG_CFLAGS := $$(call ask_pkg_config,--cflags))$(PKG_CFLAGS)
-PKG_LIBS = $(eval PKG_LIBS := $$(filter-out -lproj,$$(call ask_pkg_config,--libs)))$(PKG_LIBS)
-# PROJ is loaded when it is asked for (core/georef/proj_lib.h), by the name that a program linked with it would have.
-find_proj = $(or $(shell readelf -d $$($(CC) -print-file-name=libproj.so) | sed -n 's/.*SONAME.*\[\(.*\)\]/\1/p'),$(error no \
-	libproj.so for $(CC): make deps-build))
-PROJ_SONAME = $(eval PROJ_SONAME := $$(find_proj))$(PROJ_SONAME)
+PKG_LIBS = $(eval PKG_LIBS := $$(filter-out $$(LATE:%=-l%),$$(call ask_pkg_config,--libs)))$(PKG_LIBS)
+# These are loaded when they are asked for (core/late.h), by the name that a program linked with them would have.
+LATE = proj assimp tiff websockets
+find_soname = $(or $(shell readelf -d $$($(CC) -print-file-name=lib$(1).so) | sed -n 's/.*SONAME.*\[\(.*\)\]/\1/p'),$(error no \
+	lib$(1).so for $(CC): make deps-build))
+SONAMES = $(eval SONAMES := $$(foreach l,$$(LATE),-DSONAME_$$(l)='"$$(call find_soname,$$(l))"'))$(SONAMES)
 # Embree: the version of headers and library, decided here alone. EMBREE=4 asks for that one; else 3 where both are.
 has_embree = $(shell $(CC) $(CPPFLAGS) -E -xc -include embree$(1)/rtcore.h /dev/null >/dev/null 2>&1 && echo $(1))
 find_embree = $(or $(firstword $(foreach v,$(filter 3 4,$(or $(EMBREE),3 4)),$(call has_embree,$(v)))),$(error no \
@@ -84,7 +85,7 @@ WIRESHARK_DIR = $(PREFIX)/share/scanhead/wireshark
 ALL_CPPFLAGS = -I. -D_GNU_SOURCE -DSH_EMBREE=$(EMBREE_VERSION) $(if $(USBREDIR),-DHAVE_USBREDIR) -MMD -MP $(CPPFLAGS)
 ALL_CFLAGS = -std=c11 $(OPT) -g $(FP) $(CWARN) $(WERROR) -fPIC -pthread $(SAN) $(PKG_CFLAGS) $(CFLAGS)
 ALL_CXXFLAGS = -std=c++17 $(OPT) -g $(FP) $(WARN) $(WERROR) -fPIC -pthread $(SAN) $(CXXFLAGS)
-LDLIBS = -lembree$(EMBREE_VERSION) -lassimp -lmeshoptimizer -lGeographicLib $(PKG_LIBS) -lstdc++ -lm -pthread
+LDLIBS = -lembree$(EMBREE_VERSION) -lmeshoptimizer -lGeographicLib $(PKG_LIBS) -lstdc++ -lm -pthread
 
 CORE = $(wildcard core/*.c core/*/*.c core/import/*/*.c) core/georef/geographiclib_shim.cpp
 PROTO = $(wildcard drivers/protocol/*.c)
@@ -140,7 +141,7 @@ $(BUILD)/drivers/link/web_pages.inc: ALWAYS
 	@new=$@.$$$$; n=0; for f in $(WEB_FILES); do n=$$((n + 1)); echo "WEB_PAGE($$n, \"$$f\", \"/$${f##*/}\")"; done >$$new; \
 	cmp -s $$new $@ || cp $$new $@; rm $$new
 $(BUILD)/drivers/link/web_pages.c.o: private override ALL_CPPFLAGS += -I$(BUILD)
-$(BUILD)/core/georef/proj_lib.c.o: private override ALL_CPPFLAGS += -DPROJ_SONAME='"$(PROJ_SONAME)"'
+$(BUILD)/core/late.c.o: private override ALL_CPPFLAGS += $(SONAMES)
 $(BUILD)/drivers/link/web_pages.c.o: $(BUILD)/drivers/link/web_pages.inc $(WEB_FILES)
 ALWAYS:
 # All modules for the program and the tests, and the client library alone.
@@ -207,7 +208,7 @@ FAST_LD = $(if $(CROSS_COMPILE),,$(if $(findstring clang,$(CC)),$(LLD),$(GOLD)))
 GOLD := $(if $(shell command -v ld.gold),-fuse-ld=gold)
 LLD := $(if $(shell command -v ld.lld),-fuse-ld=lld)
 LINK_TEST = $(CC) $(SAN) $(FAST_LD) $(LINK_LIMIT)
-TEST_LIBS = -Wl,--as-needed -lcmocka $(LDLIBS)
+TEST_LIBS = -Wl,--as-needed -lcmocka -lassimp -ltiff $(LDLIBS)
 .SECONDEXPANSION:
 # This one links all of them, twenty in a file.
 $(BUILD)/tests/joined: $$(sort $$(foreach p,$$(JOINED),$$(p).c.o $$(call RIGS,$$(patsubst $$(BUILD)/%,%,$$(p))))) $(BUILD)/$(LIMIT).o \

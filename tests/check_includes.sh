@@ -18,7 +18,7 @@ core_headers='scan_mesh:mesh decimate:mesh cloud:analysis cloud_picture:analysis
 #   protocol       itself, core/line.h, core/err.h
 #   socket         itself, core/err.h
 #   usb            itself, protocol (its data), socket, core/err.h
-#   link           itself, usb, socket, protocol's lines of HTTP, core/err.h, core/newfile.h
+#   link           itself, usb, socket, protocol's lines of HTTP, core/err.h, core/late.h, core/newfile.h
 #   host           itself, protocol, core/err.h, core's headers without a source (vectors, matrices, arithmetic, growing arrays)
 #   record         the same, host's public header, core/newfile.h, core/infile.h, core/colour.h, core's rooms mesh and picture
 #                  core/scan_mesh.h and core/picture.h
@@ -62,6 +62,7 @@ rules='
         }
         if (to == "core/err.h") return 1
         if (to == "core/colour.h" || to == "core/infile.h" || b == "core/mesh" || b == "core/picture") return a == "drivers/record"
+        if (to == "core/late.h") return a == "drivers/link"
         if (to == "core/newfile.h") return a == "drivers/record" || a == "drivers/link"
         if (a == "drivers/host" || a == "drivers/record")
             return b == "drivers/protocol" || to ~ /^core\/(vec3|mat3|vecmath|grow)\.h$/ || \

@@ -1,16 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* PROJ, loaded once somebody asks for a grid. Its libraries, curl and all that curl needs, take longer to load than all
- * others of the head together, and few scenes lie in a grid.
- *
- * A call of PROJ is lib.proj_create(...), with the types of proj.h. Any thread; the library stays until the process ends. */
+/* PROJ, for scenes that lie in a grid (core/late.h). It brings curl and all that curl needs. */
 #ifndef CORE_GEOREF_PROJ_LIB_H
 #define CORE_GEOREF_PROJ_LIB_H
 
 #include <proj.h>
 
-#include "core/err.h"
+#include "core/late.h"
 
-/* This project calls these. */
 #define PROJ_CALLS(CALL)                     \
     CALL(proj_context_create)                \
     CALL(proj_context_destroy)               \
@@ -29,13 +25,6 @@
     CALL(proj_trans_get_last_used_operation) \
     CALL(proj_pj_info)
 
-struct proj_lib {
-#define PROJ_MEMBER(call) __typeof__(call) *call;
-    PROJ_CALLS(PROJ_MEMBER)
-#undef PROJ_MEMBER
-};
-
-/* SH_EINPUT: it is not on this machine, or another version. */
-int proj_lib_load(struct proj_lib *lib, struct sh_err *err);
+LATE_LIBRARY(proj, PROJ_CALLS)
 
 #endif

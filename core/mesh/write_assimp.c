@@ -6,11 +6,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <assimp/cexport.h>
-#include <assimp/cimport.h>
 #include <assimp/material.h>
 #include <assimp/scene.h>
 
+#include "core/assimp_lib.h"
 #include "core/colour.h"
 #include "core/mesh/assimp_files.h"
 
@@ -292,16 +291,19 @@ static int export_scene(const struct mesh_format *format, struct mesh_output *ou
                         const struct mesh_work *work, struct sh_err *err)
 {
     const char *path = out->path;
+    struct assimp_lib lib;
+    int rc = assimp_lib_load(&lib, err);
+    if (rc != SH_OK) return rc;
     struct exporter e = {.out = out, .is_raw = s->is_fbx, .io = {assimp_open, assimp_close, NULL}};
     e.io.UserData = (char *)(void *)&e;
     sh_progress(work->report, work->what, -1);
-    const enum aiReturn done = aiExportSceneEx(&s->scene, format->exporter, path, &e.io, 0);
+    const enum aiReturn done = lib.aiExportSceneEx(&s->scene, format->exporter, path, &e.io, 0);
     if (e.rc != SH_OK) return sh_fail(err, e.rc, "%s", e.err.text);
-    int rc = assimp_check_files(&e, err);
+    rc = assimp_check_files(&e, err);
     if (rc != SH_OK) return rc;
     if (done == aiReturn_OUTOFMEMORY) return sh_fail(err, SH_ENOMEM, "%s: no memory to export it", path);
     if (done != aiReturn_SUCCESS || e.n_files == 0)
-        return sh_fail(err, SH_EIO, "%s: Assimp cannot export it: %.200s", path, aiGetErrorString());
+        return sh_fail(err, SH_EIO, "%s: Assimp cannot export it: %.200s", path, lib.aiGetErrorString());
     rc = sh_check_stop(work->report, err);
     return rc == SH_OK && e.is_raw ? assimp_copy_raw(&e, err) : rc;
 }

@@ -10,10 +10,10 @@
 #include <strings.h>
 #include <sys/stat.h>
 
-#include <assimp/cimport.h>
 #include <assimp/config.h>
 #include <assimp/scene.h>
 
+#include "core/assimp_lib.h"
 #include "core/scene/import.h"
 #include "core/scene/import_material.h"
 #include "core/scene/import_open.h"
@@ -29,6 +29,7 @@ struct import_log {
 
 struct import {
     struct scene_build *b;
+    struct assimp_lib lib;
     const struct aiScene *in;
     const struct aiMatrix4x4 *level[MAX_DEPTH]; /* of the node and above it, root first; identities left out */
     int n_levels;
@@ -169,13 +170,13 @@ static int label_of(struct import *im, const struct aiNode *node, const struct a
     const struct aiMaterial *material = NULL;
     struct aiString name = {0};
     if (mesh->mMaterialIndex < im->in->mNumMaterials) material = im->in->mMaterials[mesh->mMaterialIndex];
-    import_uv(material, &im->uv);
+    import_uv(&im->lib, material, &im->uv);
     im->n_turned += im->uv.is_turned && build_wants_textures(im->b);
     if (im->uv.set >= AI_MAX_NUMBER_OF_TEXTURECOORDS || mesh->mTextureCoords[im->uv.set] == NULL) im->uv.set = 0;
-    if (material != NULL) aiGetMaterialString(material, AI_MATKEY_NAME, &name);
+    if (material != NULL) im->lib.aiGetMaterialString(material, AI_MATKEY_NAME, &name);
     int rc = build_label(im->b, span_of(object), span_of(&name), label, err);
     if (rc != SH_OK || material == NULL) return rc;
-    return import_material(im->b, im->in, material, &im->b->scene->surface[*label], err);
+    return import_material(&im->lib, im->b, im->in, material, &im->b->scene->surface[*label], err);
 }
 
 static int add_mesh(struct import *im, const struct aiNode *node, const struct aiMesh *mesh, struct sh_err *err)
@@ -219,20 +220,22 @@ static uint64_t count_faces(const struct aiScene *in, const struct aiNode *node)
     return n;
 }
 
-static const struct aiScene *import_file(struct scene_build *b, struct import_log *log, struct sh_err *err)
+static const struct aiScene *import_file(const struct assimp_lib *lib, struct scene_build *b, struct import_log *log,
+                                         struct sh_err *err)
 {
     struct import_open open;
     struct aiLogStream stream = {.callback = keep_log, .user = (char *)(void *)log};
     import_open_set_up(&open);
-    aiAttachLogStream(&stream);
-    struct aiPropertyStore *options = aiCreatePropertyStore();
-    aiSetImportPropertyInteger(options, AI_CONFIG_IMPORT_COLLADA_USE_COLLADA_NAMES, 1);      /* not the ids */
-    aiSetImportPropertyInteger(options, AI_CONFIG_IMPORT_IFC_SKIP_SPACE_REPRESENTATIONS, 1); /* air is no surface */
-    const struct aiScene *in = aiImportFileExWithProperties(b->spec->file, 0, &open.io, options);
-    aiReleasePropertyStore(options);
-    aiDetachLogStream(&stream);
+    lib->aiAttachLogStream(&stream);
+    struct aiPropertyStore *options = lib->aiCreatePropertyStore();
+    lib->aiSetImportPropertyInteger(options, AI_CONFIG_IMPORT_COLLADA_USE_COLLADA_NAMES, 1); /* not the ids */
+    lib->aiSetImportPropertyInteger(options, AI_CONFIG_IMPORT_IFC_SKIP_SPACE_REPRESENTATIONS,
+                                    1); /* air is no surface */
+    const struct aiScene *in = lib->aiImportFileExWithProperties(b->spec->file, 0, &open.io, options);
+    lib->aiReleasePropertyStore(options);
+    lib->aiDetachLogStream(&stream);
     if (in == NULL || in->mRootNode == NULL) {
-        const char *why = in == NULL ? aiGetErrorString() : "nothing in it";
+        const char *why = in == NULL ? lib->aiGetErrorString() : "nothing in it";
         const char *hint = strstr(why, "could not open referenced file") != NULL
                                ? "; its geometry is in that file, which belongs in the same folder: copy it there"
                                : "";
@@ -240,7 +243,7 @@ static const struct aiScene *import_file(struct scene_build *b, struct import_lo
             build_fail(b, SH_EINPUT, err, "%s; allowed are regular files", open.refused);
         else
             build_fail(b, SH_EINPUT, err, "%s%s", *why != '\0' ? why : "not readable", hint);
-        if (in != NULL) aiReleaseImport(in);
+        if (in != NULL) lib->aiReleaseImport(in);
         in = NULL;
     }
     return in;
@@ -252,7 +255,8 @@ static struct aiNode root_of(const struct aiScene *in, const char *file)
 {
     struct aiNode root = *in->mRootNode;
     const char *dot = strrchr(file, '.');
-    if (dot != NULL && strcasecmp(dot, ".fbx") == 0) aiIdentityMatrix4(&root.mTransformation);
+    if (dot != NULL && strcasecmp(dot, ".fbx") == 0)
+        root.mTransformation = (struct aiMatrix4x4){.a1 = 1, .b2 = 1, .c3 = 1, .d4 = 1};
     return root;
 }
 
@@ -263,18 +267,20 @@ int import_assimp(struct scene_build *b, struct sh_err *err)
     struct stat st;
     /* Assimp's C interface has no progress: say once that a large file will take a while. */
     if (stat(b->spec->file, &st) == 0 && st.st_size > 8 << 20) build_announce(b);
-    im.in = import_file(b, &log, err);
+    int rc = assimp_lib_load(&im.lib, err);
+    if (rc != SH_OK) return rc;
+    im.in = import_file(&im.lib, b, &log, err);
     if (im.in == NULL) return SH_EINPUT;
     b->scene->says = import_says(im.in, b->spec->file);
     im.n_faces = count_faces(im.in, im.in->mRootNode);
     const struct aiNode root = root_of(im.in, b->spec->file);
-    int rc = add_node(&im, &root, 0, err);
+    rc = add_node(&im, &root, 0, err);
     if (rc == SH_OK) rc = build_single(b, im.largest, im.error, true, err);
     if (rc == SH_OK && log.n > 0)
         sh_warn(b->report, "%s: %u warnings while read, the first: %s", b->name, log.n, log.first);
     if (rc == SH_OK && im.n_turned > 0)
         sh_warn(b->report, "%s: the textures of %u meshes are turned: they are read as if they were not", b->name,
                 im.n_turned);
-    aiReleaseImport(im.in);
+    im.lib.aiReleaseImport(im.in);
     return rc;
 }

@@ -10,6 +10,7 @@
 #include <assimp/material.h>
 #include <assimp/scene.h>
 
+#include "core/assimp_lib.h"
 #include "core/colour.h"
 #include "core/import/gltf/gltf_read.h"
 
@@ -21,11 +22,12 @@ static bool is_made_up(const char *material)
 }
 
 /* The first colour that comes with a material's name stays. glTF has linear colours. */
-static void keep_colour(const struct scene_build *b, const struct aiMaterial *material, struct scene_surface *surface)
+static void keep_colour(const struct assimp_lib *lib, const struct scene_build *b, const struct aiMaterial *material,
+                        struct scene_surface *surface)
 {
     struct aiColor4D c;
     if (surface->has_colour || is_made_up(surface->material)) return;
-    if (aiGetMaterialColor(material, AI_MATKEY_COLOR_DIFFUSE, &c) != AI_SUCCESS) return;
+    if (lib->aiGetMaterialColor(material, AI_MATKEY_COLOR_DIFFUSE, &c) != AI_SUCCESS) return;
     const float rgb[3] = {c.r, c.g, c.b};
     for (int i = 0; i < 3; i++) {
         if (!(rgb[i] >= 0.0f && rgb[i] <= 1.0f)) return; /* no colour of a surface */
@@ -35,11 +37,11 @@ static void keep_colour(const struct scene_build *b, const struct aiMaterial *ma
 }
 
 /* glTF's own reader says it of its files; of those by Draco this does. */
-static void keep_clear(const struct aiMaterial *material, struct scene_surface *surface)
+static void keep_clear(const struct assimp_lib *lib, const struct aiMaterial *material, struct scene_surface *surface)
 {
     ai_real opacity = 1.0f;
     if (surface->clear > 0.0f || is_made_up(surface->material)) return;
-    if (aiGetMaterialFloatArray(material, AI_MATKEY_OPACITY, &opacity, NULL) != AI_SUCCESS) return;
+    if (lib->aiGetMaterialFloatArray(material, AI_MATKEY_OPACITY, &opacity, NULL) != AI_SUCCESS) return;
     if (opacity >= 0.0f && opacity < 1.0f) surface->clear = 1.0f - opacity;
 }
 
@@ -60,32 +62,34 @@ struct slot {
     unsigned uv_set, flags;
 };
 
-static bool find_slot(const struct aiMaterial *material, enum aiTextureType type, struct slot *slot)
+static bool find_slot(const struct assimp_lib *lib, const struct aiMaterial *material, enum aiTextureType type,
+                      struct slot *slot)
 {
     *slot = (struct slot){.wrap = {aiTextureMapMode_Wrap, aiTextureMapMode_Wrap}};
-    return aiGetMaterialTexture(material, type, 0, &slot->path, NULL, &slot->uv_set, NULL, NULL, slot->wrap,
-                                &slot->flags) == AI_SUCCESS &&
+    return lib->aiGetMaterialTexture(material, type, 0, &slot->path, NULL, &slot->uv_set, NULL, NULL, slot->wrap,
+                                     &slot->flags) == AI_SUCCESS &&
            slot->path.length > 0;
 }
 
 /* Physically based materials have a base colour, and some no diffuse one beside it. */
-static bool find_diffuse(const struct aiMaterial *material, struct slot *slot)
+static bool find_diffuse(const struct assimp_lib *lib, const struct aiMaterial *material, struct slot *slot)
 {
-    return find_slot(material, aiTextureType_DIFFUSE, slot) || find_slot(material, aiTextureType_BASE_COLOR, slot);
+    return find_slot(lib, material, aiTextureType_DIFFUSE, slot) ||
+           find_slot(lib, material, aiTextureType_BASE_COLOR, slot);
 }
 
-void import_uv(const struct aiMaterial *material, struct import_uv *uv)
+void import_uv(const struct assimp_lib *lib, const struct aiMaterial *material, struct import_uv *uv)
 {
     struct slot slot;
     struct aiUVTransform lay;
     enum aiTextureType type = aiTextureType_DIFFUSE;
     *uv = (struct import_uv){.scale = {1.0, 1.0}};
     if (material == NULL) return;
-    if (!find_slot(material, type, &slot) && !find_slot(material, type = aiTextureType_BASE_COLOR, &slot) &&
-        !find_slot(material, type = aiTextureType_OPACITY, &slot))
+    if (!find_slot(lib, material, type, &slot) && !find_slot(lib, material, type = aiTextureType_BASE_COLOR, &slot) &&
+        !find_slot(lib, material, type = aiTextureType_OPACITY, &slot))
         return;
     uv->set = slot.uv_set;
-    if (aiGetMaterialUVTransform(material, AI_MATKEY_UVTRANSFORM(type, 0), &lay) != AI_SUCCESS) return;
+    if (lib->aiGetMaterialUVTransform(material, AI_MATKEY_UVTRANSFORM(type, 0), &lay) != AI_SUCCESS) return;
     uv->scale[0] = (double)lay.mScaling.x;
     uv->scale[1] = (double)lay.mScaling.y;
     uv->shift[0] = (double)lay.mTranslation.x;
@@ -142,39 +146,41 @@ static int add_image(struct scene_build *b, const struct aiScene *in, const stru
 }
 
 /* glTF says whether alpha counts; other formats may say that it doesn't. */
-static float solid_from(const struct scene_build *b, const struct aiMaterial *material, unsigned flags)
+static float solid_from(const struct assimp_lib *lib, const struct scene_build *b, const struct aiMaterial *material,
+                        unsigned flags)
 {
     struct aiString mode;
     ai_real cutoff = 0.5f;
     if ((flags & aiTextureFlags_IgnoreAlpha) != 0) return 0.0f;
-    if (!gltf_is_name(b->spec->file) || aiGetMaterialString(material, AI_MATKEY_GLTF_ALPHAMODE, &mode) != AI_SUCCESS)
+    if (!gltf_is_name(b->spec->file) ||
+        lib->aiGetMaterialString(material, AI_MATKEY_GLTF_ALPHAMODE, &mode) != AI_SUCCESS)
         return 0.5f;
     if (strcmp(mode.data, "OPAQUE") == 0) return 0.0f;
     if (strcmp(mode.data, "MASK") != 0) return 0.5f;
-    aiGetMaterialFloatArray(material, AI_MATKEY_GLTF_ALPHACUTOFF, &cutoff, NULL);
+    lib->aiGetMaterialFloatArray(material, AI_MATKEY_GLTF_ALPHACUTOFF, &cutoff, NULL);
     return cutoff > 0.0f && cutoff <= 1.0f ? cutoff : cutoff > 1.0f ? 1.0f : 0.0f;
 }
 
-static int keep_textures(struct scene_build *b, const struct aiScene *in, const struct aiMaterial *material,
-                         struct scene_surface *surface, struct sh_err *err)
+static int keep_textures(const struct assimp_lib *lib, struct scene_build *b, const struct aiScene *in,
+                         const struct aiMaterial *material, struct scene_surface *surface, struct sh_err *err)
 {
     struct slot slot;
     int rc = SH_OK;
-    if (surface->texture == 0 && find_diffuse(material, &slot)) {
-        surface->solid = solid_from(b, material, slot.flags);
+    if (surface->texture == 0 && find_diffuse(lib, material, &slot)) {
+        surface->solid = solid_from(lib, b, material, slot.flags);
         rc = add_image(b, in, &slot, &surface->texture, err);
     }
-    if (rc == SH_OK && surface->opacity == 0 && find_slot(material, aiTextureType_OPACITY, &slot)) {
+    if (rc == SH_OK && surface->opacity == 0 && find_slot(lib, material, aiTextureType_OPACITY, &slot)) {
         surface->solid = 0.5f;
         rc = add_image(b, in, &slot, &surface->opacity, err);
     }
     return rc;
 }
 
-int import_material(struct scene_build *b, const struct aiScene *in, const struct aiMaterial *material,
-                    struct scene_surface *surface, struct sh_err *err)
+int import_material(const struct assimp_lib *lib, struct scene_build *b, const struct aiScene *in,
+                    const struct aiMaterial *material, struct scene_surface *surface, struct sh_err *err)
 {
-    keep_colour(b, material, surface);
-    keep_clear(material, surface);
-    return build_wants_textures(b) ? keep_textures(b, in, material, surface, err) : SH_OK;
+    keep_colour(lib, b, material, surface);
+    keep_clear(lib, material, surface);
+    return build_wants_textures(b) ? keep_textures(lib, b, in, material, surface, err) : SH_OK;
 }

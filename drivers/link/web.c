@@ -24,6 +24,8 @@
 #include "drivers/link/web_inside.h"
 #include "drivers/socket/socket.h"
 
+struct websockets_lib web_lws;
+
 void web_refused(struct web_link *web, const char *peer)
 {
     snprintf(web->refused, sizeof web->refused, "%s", peer);
@@ -43,7 +45,7 @@ static int open_context(struct web_link *web)
 {
     struct lws_context_creation_info info;
     memset(&info, 0, sizeof info);
-    lws_set_log_level(0, NULL);
+    web_lws.lws_set_log_level(0, NULL);
     info.port = CONTEXT_PORT_NO_LISTEN_SERVER;
     info.protocols = protocols;
     info.user = web;
@@ -54,9 +56,9 @@ static int open_context(struct web_link *web)
     info.timeout_secs = WEB_PATIENCE_S;
     info.keepalive_timeout = WEB_PATIENCE_S;
     info.alpn = "http/1.1";
-    web->context = lws_create_context(&info);
+    web->context = web_lws.lws_create_context(&info);
     if (web->context == NULL) return -1;
-    web->vhost = lws_create_vhost(web->context, &info);
+    web->vhost = web_lws.lws_create_vhost(web->context, &info);
     return web->vhost != NULL ? 0 : -1;
 }
 
@@ -68,10 +70,12 @@ static int web_open(const struct link_spec *spec, void **link, struct sh_err *er
     if (spec->max_sessions < 1 || spec->max_sessions > LINK_MAX_SESSIONS)
         return sh_fail(err, SH_EINPUT, "link web:%s:%d: %d sessions; allowed are 1 to %d", host, spec->port,
                        spec->max_sessions, LINK_MAX_SESSIONS);
+    int rc = websockets_lib_load(&web_lws, err);
+    if (rc != SH_OK) return rc;
     struct web_link *web = calloc(1, sizeof *web);
     if (web == NULL) return sh_fail(err, SH_ENOMEM, "link web:%s:%d: no memory", host, spec->port);
     const struct socket_place place = {.what = "link web", .host = host, .port = spec->port};
-    int rc = socket_open(&place, &web->listener, web->at, sizeof web->at, err);
+    rc = socket_open(&place, &web->listener, web->at, sizeof web->at, err);
     if (rc != SH_OK) {
         free(web);
         return rc;
@@ -84,7 +88,7 @@ static int web_open(const struct link_spec *spec, void **link, struct sh_err *er
     if (open_context(web) == 0) web->listening = web_wait_for(web, web->listener, NULL);
     if (web->listening == NULL) {
         if (web->vhost == NULL) close(web->listener);
-        if (web->context != NULL) lws_context_destroy(web->context);
+        if (web->context != NULL) web_lws.lws_context_destroy(web->context);
         if (web->reserve_fd >= 0) close(web->reserve_fd);
         free(web);
         return sh_fail(err, SH_ENOMEM, "link web:%s:%d: libwebsockets has no memory, or no descriptors", host,
@@ -110,7 +114,7 @@ static void session_open(struct web_link *web, struct web_conn *conn)
     if (slot == web->n_sessions) {
         web_refused(web, conn->peer);
         web_set_phase(conn, WEB_PARTING);
-        lws_callback_on_writable(conn->wsi);
+        web_lws.lws_callback_on_writable(conn->wsi);
         return;
     }
     struct web_session *s = &web->session[slot];
@@ -129,7 +133,7 @@ static int turn_away(struct web_link *web, struct lws *wsi)
     int n = web->n_sessions == 1
                 ? snprintf((char *)why, sizeof why, "the only place of this link is taken")
                 : snprintf((char *)why, sizeof why, "all %d places of this link are taken", web->n_sessions);
-    lws_close_reason(wsi, (enum lws_close_status)WEB_TRY_LATER, why, (size_t)n);
+    web_lws.lws_close_reason(wsi, (enum lws_close_status)WEB_TRY_LATER, why, (size_t)n);
     return -1;
 }
 
@@ -158,28 +162,30 @@ static int close_for(struct web_conn *conn, enum lws_close_status status, const 
     unsigned char words[80];
     int n = snprintf((char *)words, sizeof words, "%s", why);
     session_gone(conn);
-    lws_close_reason(conn->wsi, status, words, (size_t)n);
+    web_lws.lws_close_reason(conn->wsi, status, words, (size_t)n);
     return -1;
 }
 
 /* A close frame is on its way or out: ours, or that of libwebsockets, which reports it seconds later. */
 static int is_closing(struct lws *wsi)
 {
-    return lws_get_close_length(wsi) > 0;
+    return web_lws.lws_get_close_length(wsi) > 0;
 }
 
 static int take_text(struct web_conn *conn, struct lws *wsi, const void *in, size_t len)
 {
     struct web_session *s = conn->session;
-    if (lws_frame_is_binary(wsi)) return close_for(conn, LWS_CLOSE_STATUS_UNACCEPTABLE_OPCODE, "commands are text");
-    if (lws_is_first_fragment(wsi)) s->message_len = 0;
+    if (web_lws.lws_frame_is_binary(wsi))
+        return close_for(conn, LWS_CLOSE_STATUS_UNACCEPTABLE_OPCODE, "commands are text");
+    if (web_lws.lws_is_first_fragment(wsi)) s->message_len = 0;
     s->message_len += len;
-    if (s->message_len + lws_remaining_packet_payload(wsi) > WEB_MAX_MESSAGE || len + 1 > WEB_IN_ROOM - s->in_len)
+    if (s->message_len + web_lws.lws_remaining_packet_payload(wsi) > WEB_MAX_MESSAGE ||
+        len + 1 > WEB_IN_ROOM - s->in_len)
         return close_for(conn, LWS_CLOSE_STATUS_MESSAGE_TOO_LARGE, "a message has at most 4096 bytes");
     memcpy(s->in + s->in_len, in, len);
     s->in_len += len;
-    if (lws_is_final_fragment(wsi) && s->in_len > 0 && s->in[s->in_len - 1] != '\n') s->in[s->in_len++] = '\n';
-    if (s->in_len > WEB_IN_ROOM / 2) lws_rx_flow_control(wsi, 0);
+    if (web_lws.lws_is_final_fragment(wsi) && s->in_len > 0 && s->in[s->in_len - 1] != '\n') s->in[s->in_len++] = '\n';
+    if (s->in_len > WEB_IN_ROOM / 2) web_lws.lws_rx_flow_control(wsi, 0);
     return 0;
 }
 
@@ -187,14 +193,14 @@ static int send_message(struct web_session *s, struct lws *wsi)
 {
     if (s->out_len == 0 && s->state == WEB_LEAVING) { /* all has gone out */
         static unsigned char why[] = "the head has ended";
-        lws_close_reason(wsi, LWS_CLOSE_STATUS_GOINGAWAY, why, sizeof why - 1);
+        web_lws.lws_close_reason(wsi, LWS_CLOSE_STATUS_GOINGAWAY, why, sizeof why - 1);
         return -1;
     }
     if (s->out_len == 0) return 0;
     unsigned char *from = s->out + LWS_PRE;
-    int n = lws_write(wsi, from, s->out_len, (from[0] & 0x80) != 0 ? LWS_WRITE_BINARY : LWS_WRITE_TEXT);
+    int n = web_lws.lws_write(wsi, from, s->out_len, (from[0] & 0x80) != 0 ? LWS_WRITE_BINARY : LWS_WRITE_TEXT);
     s->out_len = 0; /* what the socket did not take, libwebsockets holds; it calls again after that */
-    if (s->state == WEB_LEAVING) lws_callback_on_writable(wsi);
+    if (s->state == WEB_LEAVING) web_lws.lws_callback_on_writable(wsi);
     return n < 0 ? -1 : 0;
 }
 
@@ -232,10 +238,10 @@ static int web_callback(struct lws *wsi, enum lws_callback_reasons reason, void 
     (void)user;
     if (reason == LWS_CALLBACK_SERVER_NEW_CLIENT_INSTANTIATED) {
         struct web_conn *entering = web_link_of(wsi)->entering;
-        lws_set_opaque_user_data(wsi, entering);
+        web_lws.lws_set_opaque_user_data(wsi, entering);
         entering->wsi = wsi;
     }
-    struct web_conn *conn = lws_get_opaque_user_data(wsi);
+    struct web_conn *conn = web_lws.lws_get_opaque_user_data(wsi);
     return conn != NULL && conn->wsi == wsi ? serve_client(conn, reason, in, len) : 0;
 }
 
@@ -252,7 +258,7 @@ static int take_wake_fd(struct web_link *web, int wake_fd)
 
 static void report_session(struct web_session *s, int slot, uint32_t want_write, struct link_events *events)
 {
-    if (s->wsi != NULL && is_closing(s->wsi)) session_gone(lws_get_opaque_user_data(s->wsi));
+    if (s->wsi != NULL && is_closing(s->wsi)) session_gone(web_lws.lws_get_opaque_user_data(s->wsi));
     if (s->state == WEB_ENDED && link_events_push(events, LINK_CLOSED, slot, s->peer)) s->state = WEB_FREE;
     if (s->state == WEB_OPENING && link_events_push(events, LINK_OPENED, slot, s->peer)) s->state = WEB_OPEN;
     if (s->state != WEB_OPEN) return;
@@ -281,9 +287,10 @@ static int web_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
     if (take_wake_fd(web, wake_fd) != SH_OK) return SH_EIO;
     report(web, want_write, &events);
     if (events.n > 0) timeout_ms = 0;
-    if (timeout_ms > 0) lws_sul_schedule(web->context, 0, &web->timer, time_is_over, (lws_usec_t)timeout_ms * 1000);
-    if (lws_service(web->context, timeout_ms == 0 ? -1 : 0) < 0) return SH_EIO;
-    lws_sul_schedule(web->context, 0, &web->timer, time_is_over, LWS_SET_TIMER_USEC_CANCEL);
+    if (timeout_ms > 0)
+        web_lws.lws_sul_schedule(web->context, 0, &web->timer, time_is_over, (lws_usec_t)timeout_ms * 1000);
+    if (web_lws.lws_service(web->context, timeout_ms == 0 ? -1 : 0) < 0) return SH_EIO;
+    web_lws.lws_sul_schedule(web->context, 0, &web->timer, time_is_over, LWS_SET_TIMER_USEC_CANCEL);
     if (events.n == 0) report(web, want_write, &events);
     return events.n;
 }
@@ -302,7 +309,7 @@ static ssize_t web_read(void *link, int session, void *buf, size_t len)
     memcpy(buf, s->in, len);
     memmove(s->in, s->in + len, s->in_len - len);
     s->in_len -= len;
-    if (s->in_len <= WEB_IN_ROOM / 2) lws_rx_flow_control(s->wsi, 1);
+    if (s->in_len <= WEB_IN_ROOM / 2) web_lws.lws_rx_flow_control(s->wsi, 1);
     return (ssize_t)len;
 }
 
@@ -319,7 +326,7 @@ static ssize_t web_write(void *link, int session, const void *buf, size_t len)
     }
     memcpy(s->out + LWS_PRE, buf, len);
     s->out_len = len;
-    lws_callback_on_writable(s->wsi);
+    web_lws.lws_callback_on_writable(s->wsi);
     return (ssize_t)len;
 }
 
@@ -327,7 +334,7 @@ static ssize_t web_write(void *link, int session, const void *buf, size_t len)
 
 void web_break(struct lws *wsi)
 {
-    const int fd = lws_get_socket_fd(wsi);
+    const int fd = web_lws.lws_get_socket_fd(wsi);
     if (wsi == web_link_of(wsi)->listening)
         shutdown(fd, SHUT_RDWR); /* nobody is accepted any more, and who waits is turned away */
     else
@@ -340,7 +347,7 @@ static int web_cut(struct web_link *web, int session)
     struct web_session *s = web_session(web, session);
     if (s == NULL) return SH_ESTATE;
     web_break(s->wsi);
-    session_gone(lws_get_opaque_user_data(s->wsi));
+    session_gone(web_lws.lws_get_opaque_user_data(s->wsi));
     return SH_OK;
 }
 
@@ -396,21 +403,21 @@ static void say_goodbye(struct web_link *web)
     for (int s = 0; s < web->n_sessions; s++) {
         if (web->session[s].wsi == NULL) continue;
         web->session[s].state = WEB_LEAVING;
-        lws_callback_on_writable(web->session[s].wsi);
+        web_lws.lws_callback_on_writable(web->session[s].wsi);
     }
-    lws_usec_t end = lws_now_usecs() + (lws_usec_t)WEB_GOODBYE_MS * 1000;
-    for (lws_usec_t now; any_session(web) && (now = lws_now_usecs()) < end;) {
-        lws_sul_schedule(web->context, 0, &web->timer, time_is_over, end - now);
-        if (lws_service(web->context, 0) < 0) break;
+    lws_usec_t end = web_lws.lws_now_usecs() + (lws_usec_t)WEB_GOODBYE_MS * 1000;
+    for (lws_usec_t now; any_session(web) && (now = web_lws.lws_now_usecs()) < end;) {
+        web_lws.lws_sul_schedule(web->context, 0, &web->timer, time_is_over, end - now);
+        if (web_lws.lws_service(web->context, 0) < 0) break;
     }
-    lws_sul_schedule(web->context, 0, &web->timer, time_is_over, LWS_SET_TIMER_USEC_CANCEL);
+    web_lws.lws_sul_schedule(web->context, 0, &web->timer, time_is_over, LWS_SET_TIMER_USEC_CANCEL);
 }
 
 static void web_close(void *link)
 {
     struct web_link *web = link;
     say_goodbye(web);
-    lws_context_destroy(web->context);
+    web_lws.lws_context_destroy(web->context);
     if (web->reserve_fd >= 0) close(web->reserve_fd);
     for (int s = 0; s < LINK_MAX_SESSIONS; s++)
         free(web->session[s].out);

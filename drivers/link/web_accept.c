@@ -20,7 +20,7 @@ struct lws *web_wait_for(struct web_link *web, int fd, struct web_conn *conn)
                                    .fd = {.filefd = fd},
                                    .vh_prot_name = WEB_BARE,
                                    .opaque = conn};
-    struct lws *wsi = lws_adopt_descriptor_vhost_via_info(&info);
+    struct lws *wsi = web_lws.lws_adopt_descriptor_vhost_via_info(&info);
     if (wsi == NULL) close(fd);
     return wsi;
 }
@@ -52,19 +52,19 @@ static void say(int fd, int status, const char *words, int head_only)
 
 static int linger(struct web_conn *conn)
 {
-    const int fd = lws_get_socket_fd(conn->wsi);
+    const int fd = web_lws.lws_get_socket_fd(conn->wsi);
     shutdown(fd, SHUT_WR);
     wait_for_more(fd, 0);
     web_set_phase(conn, WEB_LINGERING);
-    lws_set_timer_usecs(conn->wsi, WEB_GOODBYE_MS * LWS_US_PER_MS);
+    web_lws.lws_set_timer_usecs(conn->wsi, WEB_GOODBYE_MS * LWS_US_PER_MS);
     return drain(fd);
 }
 
 /* A wsi of its own is with the descriptor again, so that libwebsockets may close its one. */
 void web_linger(struct web_link *web, struct web_conn *conn)
 {
-    const int fd = dup(lws_get_socket_fd(conn->wsi));
-    lws_set_opaque_user_data(conn->wsi, NULL);
+    const int fd = dup(web_lws.lws_get_socket_fd(conn->wsi));
+    web_lws.lws_set_opaque_user_data(conn->wsi, NULL);
     conn->wsi = fd >= 0 ? web_wait_for(web, fd, conn) : NULL;
     if (conn->wsi == NULL)
         web_conn_end(conn);
@@ -79,9 +79,9 @@ static void make_room(struct web_link *web, struct web_conn *conn)
 {
     if (conn->place.phase == WEB_ASKING || conn->place.phase == WEB_ANSWERING) web_refused(web, conn->peer);
     if (conn->place.phase == WEB_ASKING && conn->n_seen > 0)
-        say(lws_get_socket_fd(conn->wsi), 408, "others wait; a request comes whole, and at once", 0);
-    lws_set_opaque_user_data(conn->wsi, NULL);
-    lws_set_timeout(conn->wsi, PENDING_TIMEOUT_SHUTDOWN_FLUSH, LWS_TO_KILL_ASYNC);
+        say(web_lws.lws_get_socket_fd(conn->wsi), 408, "others wait; a request comes whole, and at once", 0);
+    web_lws.lws_set_opaque_user_data(conn->wsi, NULL);
+    web_lws.lws_set_timeout(conn->wsi, PENDING_TIMEOUT_SHUTDOWN_FLUSH, LWS_TO_KILL_ASYNC);
     web_conn_end(conn);
 }
 
@@ -91,7 +91,7 @@ static void welcome(struct web_link *web, int fd, const struct sockaddr_storage 
     unsigned char address[sizeof web->conn->place.address];
     web_address(from, address);
     const int at = web_places_take((struct web_places){&web->conn[0].place, sizeof web->conn[0]}, address,
-                                   lws_now_usecs() / LWS_US_PER_MS);
+                                   web_lws.lws_now_usecs() / LWS_US_PER_MS);
     if (at < 0) {
         say(fd, 503, "all connections of this link are taken", 0);
         close(fd);
@@ -108,7 +108,7 @@ static void welcome(struct web_link *web, int fd, const struct sockaddr_storage 
     memcpy(conn->place.address, address, sizeof address);
     snprintf(conn->peer, sizeof conn->peer, "%s", peer);
     web_set_phase(conn, WEB_ASKING);
-    lws_set_timer_usecs(conn->wsi, WEB_PATIENCE_S * LWS_USEC_PER_SEC);
+    web_lws.lws_set_timer_usecs(conn->wsi, WEB_PATIENCE_S * LWS_USEC_PER_SEC);
 }
 
 static void accept_some(struct web_link *web)
@@ -133,7 +133,7 @@ static void accept_some(struct web_link *web)
 static int hand_over(struct web_link *web, struct web_conn *conn)
 {
     char text[400] = "GET / HTTP/1.1\r\n\r\n";
-    const int fd = dup(lws_get_socket_fd(conn->wsi)); /* the one at hand goes with what it was waited for by */
+    const int fd = dup(web_lws.lws_get_socket_fd(conn->wsi)); /* the one at hand goes with what it was waited for by */
     if (fd < 0) return -1;
     if (conn->request.key[0] != '\0')
         snprintf(text, sizeof text,
@@ -143,18 +143,18 @@ static int hand_over(struct web_link *web, struct web_conn *conn)
                  conn->request.names_protocol ? "Sec-WebSocket-Protocol: scanhead-native-1\r\n" : "");
     /* While it answers, libwebsockets does not read, but would wake up again and again. */
     wait_for_more(fd, conn->request.key[0] != '\0' ? 0 : WEB_CHUNK);
-    lws_set_opaque_user_data(conn->wsi, NULL);
+    web_lws.lws_set_opaque_user_data(conn->wsi, NULL);
     conn->wsi = NULL;
     web_set_phase(conn, WEB_ANSWERING);
     web->entering = conn;
-    lws_adopt_socket_vhost_readbuf(web->vhost, fd, text, strlen(text)); /* which closes it when it fails */
+    web_lws.lws_adopt_socket_vhost_readbuf(web->vhost, fd, text, strlen(text)); /* which closes it when it fails */
     if (conn->wsi == NULL) web_conn_end(conn);
     return -1;
 }
 
 static int judge(struct web_link *web, struct web_conn *conn, const char *request, size_t begin, int result)
 {
-    const int fd = lws_get_socket_fd(conn->wsi);
+    const int fd = web_lws.lws_get_socket_fd(conn->wsi);
     const char *words = result == 505 ? "HTTP/1.0 and 1.1 are spoken here" : "this is not a request of HTTP/1.1";
     if (result == HTTP_SCAN_WHOLE) {
         char taken[WEB_MAX_REQUEST];
@@ -174,7 +174,7 @@ static int judge(struct web_link *web, struct web_conn *conn, const char *reques
 static int look_at_request(struct web_link *web, struct web_conn *conn)
 {
     char request[WEB_MAX_REQUEST];
-    const int fd = lws_get_socket_fd(conn->wsi);
+    const int fd = web_lws.lws_get_socket_fd(conn->wsi);
     struct pollfd peer = {.fd = fd, .events = POLLRDHUP};
     const int ended = poll(&peer, 1, 0) > 0; /* before looking: then nothing comes after what is seen */
     const ssize_t n = recv(fd, request, sizeof request, MSG_PEEK);
@@ -193,7 +193,7 @@ static int look_at_request(struct web_link *web, struct web_conn *conn)
 static int give_up(struct web_conn *conn)
 {
     if (conn->place.phase != WEB_ASKING || conn->n_seen == 0) return -1;
-    say(lws_get_socket_fd(conn->wsi), 408, "a whole request comes within 20 s", 0);
+    say(web_lws.lws_get_socket_fd(conn->wsi), 408, "a whole request comes within 20 s", 0);
     return linger(conn);
 }
 
@@ -203,7 +203,8 @@ static int serve_client(struct web_link *web, struct web_conn *conn, enum lws_ca
     case LWS_CALLBACK_TIMER:
         return give_up(conn);
     case LWS_CALLBACK_RAW_RX_FILE:
-        return conn->place.phase == WEB_ASKING ? look_at_request(web, conn) : drain(lws_get_socket_fd(conn->wsi));
+        return conn->place.phase == WEB_ASKING ? look_at_request(web, conn)
+                                               : drain(web_lws.lws_get_socket_fd(conn->wsi));
     default:
         return 0;
     }
@@ -212,7 +213,7 @@ static int serve_client(struct web_link *web, struct web_conn *conn, enum lws_ca
 int web_bare_callback(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t len)
 {
     struct web_link *web = web_link_of(wsi);
-    struct web_conn *conn = lws_get_opaque_user_data(wsi);
+    struct web_conn *conn = web_lws.lws_get_opaque_user_data(wsi);
     uint64_t count;
     (void)user, (void)in, (void)len;
     if (conn != NULL && conn->wsi == wsi) return serve_client(web, conn, reason);

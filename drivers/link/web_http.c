@@ -55,9 +55,9 @@ static int answer(struct web_conn *conn, int status, const char *type)
 {
     unsigned char text[LWS_PRE + WEB_TEXT_ROOM], *head = text + LWS_PRE;
     const int n = write_head((char *)head, WEB_TEXT_ROOM, status, type, conn->len);
-    if (n >= WEB_TEXT_ROOM || lws_write(conn->wsi, head, (size_t)n, LWS_WRITE_HTTP_HEADERS) != n) return -1;
+    if (n >= WEB_TEXT_ROOM || web_lws.lws_write(conn->wsi, head, (size_t)n, LWS_WRITE_HTTP_HEADERS) != n) return -1;
     if (conn->request.head_only) conn->len = 0;
-    lws_callback_on_writable(conn->wsi);
+    web_lws.lws_callback_on_writable(conn->wsi);
     return 0;
 }
 
@@ -102,10 +102,10 @@ int web_http_go_on(struct web_link *web, struct web_conn *conn)
     }
     if (n > WEB_CHUNK) n = WEB_CHUNK;
     memcpy(chunk + LWS_PRE, conn->bytes + conn->sent, n);
-    if (lws_write(conn->wsi, chunk + LWS_PRE, n, LWS_WRITE_HTTP) != (int)n) return -1;
+    if (web_lws.lws_write(conn->wsi, chunk + LWS_PRE, n, LWS_WRITE_HTTP) != (int)n) return -1;
     conn->sent += n;
     web_set_phase(conn, WEB_ANSWERING);
-    lws_set_timeout(conn->wsi, PENDING_TIMEOUT_HTTP_CONTENT, WEB_PATIENCE_S);
-    lws_callback_on_writable(conn->wsi);
+    web_lws.lws_set_timeout(conn->wsi, PENDING_TIMEOUT_HTTP_CONTENT, WEB_PATIENCE_S);
+    web_lws.lws_callback_on_writable(conn->wsi);
     return 0;
 }

@@ -5,10 +5,44 @@
 
 #include <libwebsockets.h>
 
+#include "core/late.h"
 #include "drivers/link/link.h"
 #include "drivers/link/web.h"
 #include "drivers/link/web_places.h"
 #include "drivers/protocol/http_head.h"
+
+#define WEBSOCKETS_CALLS(CALL)                \
+    CALL(lws_adopt_descriptor_vhost_via_info) \
+    CALL(lws_adopt_socket_vhost_readbuf)      \
+    CALL(lws_callback_on_writable)            \
+    CALL(lws_close_reason)                    \
+    CALL(lws_context_destroy)                 \
+    CALL(lws_context_user)                    \
+    CALL(lws_create_context)                  \
+    CALL(lws_create_vhost)                    \
+    CALL(lws_frame_is_binary)                 \
+    CALL(lws_get_close_length)                \
+    CALL(lws_get_context)                     \
+    CALL(lws_get_opaque_user_data)            \
+    CALL(lws_get_socket_fd)                   \
+    CALL(lws_is_final_fragment)               \
+    CALL(lws_is_first_fragment)               \
+    CALL(lws_now_usecs)                       \
+    CALL(lws_remaining_packet_payload)        \
+    CALL(lws_rx_flow_control)                 \
+    CALL(lws_service)                         \
+    CALL(lws_set_log_level)                   \
+    CALL(lws_set_opaque_user_data)            \
+    CALL(lws_set_timeout)                     \
+    CALL(lws_set_timer_usecs)                 \
+    CALL(lws_sul_schedule)                    \
+    CALL(lws_write)
+
+LATE_LIBRARY(websockets, WEBSOCKETS_CALLS)
+
+/* libwebsockets, which brings OpenSSL (core/late.h); constant once the first web link is open. Its callbacks have nothing
+ * but itself to find it by. */
+extern struct websockets_lib web_lws;
 
 enum {
     WEB_MAX_REQUEST = 8192,    /* a request's line and fields; one more: 413 */
@@ -83,13 +117,13 @@ struct web_link {
 
 static inline struct web_link *web_link_of(struct lws *wsi)
 {
-    return lws_context_user(lws_get_context(wsi));
+    return web_lws.lws_context_user(web_lws.lws_get_context(wsi));
 }
 
 static inline void web_set_phase(struct web_conn *conn, enum web_phase phase)
 {
     conn->place.phase = phase;
-    conn->place.since_ms = lws_now_usecs() / 1000;
+    conn->place.since_ms = web_lws.lws_now_usecs() / 1000;
 }
 
 /* web.c */

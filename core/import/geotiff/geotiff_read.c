@@ -9,12 +9,36 @@
 #include <unistd.h>
 
 #include "core/geotiff.h"
+#include "core/late.h"
+
+#define TIFF_CALLS(CALL)                       \
+    CALL(TIFFClose)                            \
+    CALL(TIFFComputeStrip)                     \
+    CALL(TIFFComputeTile)                      \
+    CALL(TIFFGetField)                         \
+    CALL(TIFFGetFieldDefaulted)                \
+    CALL(TIFFGetStrileByteCount)               \
+    CALL(TIFFIsTiled)                          \
+    CALL(TIFFOpenExt)                          \
+    CALL(TIFFOpenOptionsAlloc)                 \
+    CALL(TIFFOpenOptionsFree)                  \
+    CALL(TIFFOpenOptionsSetErrorHandlerExtR)   \
+    CALL(TIFFOpenOptionsSetWarningHandlerExtR) \
+    CALL(TIFFReadDirectory)                    \
+    CALL(TIFFReadEncodedStrip)                 \
+    CALL(TIFFReadEncodedTile)                  \
+    CALL(TIFFSetDirectory)                     \
+    CALL(TIFFStripSize)                        \
+    CALL(TIFFTileSize)
+
+LATE_LIBRARY(tiff, TIFF_CALLS)
 
 #define NONE UINT32_MAX /* no vertex */
 
 struct raster {
     struct scene_build *b;
     struct geotiff g;
+    struct tiff_lib lib;
     TIFF *tif;
     char said[160]; /* libtiff's error */
     uint16_t bits, format;
@@ -54,19 +78,21 @@ static int fail_reading(struct raster *r, const char *what, struct sh_err *err)
 
 static int open_tiff(struct raster *r, struct sh_err *err)
 {
-    TIFFOpenOptions *options = TIFFOpenOptionsAlloc();
+    const int rc = tiff_lib_load(&r->lib, err);
+    if (rc != SH_OK) return rc;
+    TIFFOpenOptions *options = r->lib.TIFFOpenOptionsAlloc();
     if (options == NULL) return build_fail(r->b, SH_ENOMEM, err, "no memory");
-    TIFFOpenOptionsSetErrorHandlerExtR(options, keep_error, r);
-    TIFFOpenOptionsSetWarningHandlerExtR(options, drop_warning, r);
-    r->tif = TIFFOpenExt(r->b->spec->file, "r", options);
-    TIFFOpenOptionsFree(options);
+    r->lib.TIFFOpenOptionsSetErrorHandlerExtR(options, keep_error, r);
+    r->lib.TIFFOpenOptionsSetWarningHandlerExtR(options, drop_warning, r);
+    r->tif = r->lib.TIFFOpenExt(r->b->spec->file, "r", options);
+    r->lib.TIFFOpenOptionsFree(options);
     return r->tif != NULL ? SH_OK : fail_reading(r, "its directory", err);
 }
 
 static uint32_t kind_of(struct raster *r)
 {
     uint32_t type = 0;
-    TIFFGetFieldDefaulted(r->tif, TIFFTAG_SUBFILETYPE, &type);
+    r->lib.TIFFGetFieldDefaulted(r->tif, TIFFTAG_SUBFILETYPE, &type);
     return type;
 }
 
@@ -87,7 +113,7 @@ static int look_at_others(struct raster *r, struct sh_err *err)
         return build_fail(
             r->b, SH_EINPUT, err,
             "its first image is a mask or a smaller copy; allowed is a file whose first image has the heights");
-    while (TIFFReadDirectory(r->tif)) {
+    while (r->lib.TIFFReadDirectory(r->tif)) {
         const uint32_t type = kind_of(r);
         n_masks += (type & FILETYPE_MASK) != 0;
         n += (type & (FILETYPE_MASK | FILETYPE_REDUCEDIMAGE)) == 0;
@@ -103,17 +129,17 @@ static int look_at_others(struct raster *r, struct sh_err *err)
     if (r->said[0] != '\0')
         sh_warn(r->b->report, "%s: only its first image is read; what follows is broken: %.200s", r->b->name, r->said);
     r->said[0] = '\0';
-    return TIFFSetDirectory(r->tif, 0) ? SH_OK : fail_reading(r, "its directory", err);
+    return r->lib.TIFFSetDirectory(r->tif, 0) ? SH_OK : fail_reading(r, "its directory", err);
 }
 
 /* Heights: one band of numbers that is no picture. */
 static int check_band(struct raster *r, struct sh_err *err)
 {
     uint16_t bands = 1, photometric = PHOTOMETRIC_MINISBLACK;
-    TIFFGetFieldDefaulted(r->tif, TIFFTAG_SAMPLESPERPIXEL, &bands);
-    TIFFGetFieldDefaulted(r->tif, TIFFTAG_BITSPERSAMPLE, &r->bits);
-    TIFFGetFieldDefaulted(r->tif, TIFFTAG_SAMPLEFORMAT, &r->format);
-    TIFFGetField(r->tif, TIFFTAG_PHOTOMETRIC, &photometric);
+    r->lib.TIFFGetFieldDefaulted(r->tif, TIFFTAG_SAMPLESPERPIXEL, &bands);
+    r->lib.TIFFGetFieldDefaulted(r->tif, TIFFTAG_BITSPERSAMPLE, &r->bits);
+    r->lib.TIFFGetFieldDefaulted(r->tif, TIFFTAG_SAMPLEFORMAT, &r->format);
+    r->lib.TIFFGetField(r->tif, TIFFTAG_PHOTOMETRIC, &photometric);
     if (photometric != PHOTOMETRIC_MINISBLACK)
         return build_fail(
             r->b, SH_EINPUT, err,
@@ -152,21 +178,21 @@ static int check_memory(struct raster *r, struct sh_err *err)
 static int set_up_blocks(struct raster *r, struct sh_err *err)
 {
     uint32_t width = 0, height = 0;
-    TIFFGetField(r->tif, TIFFTAG_IMAGEWIDTH, &width);
-    TIFFGetField(r->tif, TIFFTAG_IMAGELENGTH, &height);
+    r->lib.TIFFGetField(r->tif, TIFFTAG_IMAGEWIDTH, &width);
+    r->lib.TIFFGetField(r->tif, TIFFTAG_IMAGELENGTH, &height);
     if (width != r->g.width || height != r->g.height)
         return build_fail(r->b, SH_EINPUT, err, "its size is %u x %u cells for libtiff, and %u x %u by its tags", width,
                           height, r->g.width, r->g.height);
     r->block_width = width;
     r->block_height = height;
-    if (TIFFIsTiled(r->tif)) {
-        TIFFGetField(r->tif, TIFFTAG_TILEWIDTH, &r->block_width);
-        TIFFGetField(r->tif, TIFFTAG_TILELENGTH, &r->block_height);
+    if (r->lib.TIFFIsTiled(r->tif)) {
+        r->lib.TIFFGetField(r->tif, TIFFTAG_TILEWIDTH, &r->block_width);
+        r->lib.TIFFGetField(r->tif, TIFFTAG_TILELENGTH, &r->block_height);
     } else {
-        TIFFGetFieldDefaulted(r->tif, TIFFTAG_ROWSPERSTRIP, &r->block_height);
+        r->lib.TIFFGetFieldDefaulted(r->tif, TIFFTAG_ROWSPERSTRIP, &r->block_height);
     }
-    if (r->block_height > height && !TIFFIsTiled(r->tif)) r->block_height = height;
-    const tmsize_t bytes = TIFFIsTiled(r->tif) ? TIFFTileSize(r->tif) : TIFFStripSize(r->tif);
+    if (r->block_height > height && !r->lib.TIFFIsTiled(r->tif)) r->block_height = height;
+    const tmsize_t bytes = r->lib.TIFFIsTiled(r->tif) ? r->lib.TIFFTileSize(r->tif) : r->lib.TIFFStripSize(r->tif);
     if (bytes <= 0 || r->block_width == 0 || r->block_height == 0 ||
         (uint64_t)bytes != (uint64_t)r->block_width * r->block_height * (r->bits / 8u))
         return build_fail(r->b, SH_EINPUT, err,
@@ -214,16 +240,16 @@ static double height_of(const struct raster *r, const uint8_t *p)
 /* The cells of the block at a column and row. One without bytes is left out by who wrote the file: it has no heights. */
 static int read_block(struct raster *r, uint32_t x, uint32_t y, struct sh_err *err)
 {
-    const int is_tiled = TIFFIsTiled(r->tif);
-    const uint32_t n = is_tiled ? TIFFComputeTile(r->tif, x, y, 0, 0) : TIFFComputeStrip(r->tif, y, 0);
+    const int is_tiled = r->lib.TIFFIsTiled(r->tif);
+    const uint32_t n = is_tiled ? r->lib.TIFFComputeTile(r->tif, x, y, 0, 0) : r->lib.TIFFComputeStrip(r->tif, y, 0);
     const uint32_t rows = r->g.height - y < r->block_height ? r->g.height - y : r->block_height;
     const uint32_t columns = r->g.width - x < r->block_width ? r->g.width - x : r->block_width;
     const size_t bytes = r->bits / 8u, need = bytes * r->block_width * (is_tiled ? r->block_height : rows);
-    const int is_empty = TIFFGetStrileByteCount(r->tif, n) == 0;
+    const int is_empty = r->lib.TIFFGetStrileByteCount(r->tif, n) == 0;
     tmsize_t got = (tmsize_t)need;
     if (!is_empty)
-        got = is_tiled ? TIFFReadEncodedTile(r->tif, n, r->block, (tmsize_t)r->block_bytes)
-                       : TIFFReadEncodedStrip(r->tif, n, r->block, (tmsize_t)r->block_bytes);
+        got = is_tiled ? r->lib.TIFFReadEncodedTile(r->tif, n, r->block, (tmsize_t)r->block_bytes)
+                       : r->lib.TIFFReadEncodedStrip(r->tif, n, r->block, (tmsize_t)r->block_bytes);
     if (got < (tmsize_t)need) {
         char what[64];
         snprintf(what, sizeof what, "the %s of cells at column %u, row %u", is_tiled ? "tile" : "strip", x, y);
@@ -383,7 +409,7 @@ int import_geotiff(struct scene_build *b, struct sh_err *err)
     int rc = geotiff_read(b->spec->file, &r.g, err);
     if (rc == SH_OK) rc = open_tiff(&r, err);
     if (rc == SH_OK) rc = read_raster(&r, err);
-    if (r.tif != NULL) TIFFClose(r.tif);
+    if (r.tif != NULL) r.lib.TIFFClose(r.tif);
     free(r.block);
     free(r.value);
     free(r.number);
