@@ -2,6 +2,7 @@
 /* Which pulses outlines are near to, beside the geometry alone: a pulse whose footprint reaches an edge is found, wherever
  * it looks and whatever pulses are looked up together with it. */
 #include "tests/common/cases.h"
+#include "tests/common/thorough.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -92,7 +93,7 @@ static void edges_are_found_in_any_direction(void **state)
     for (int where = 0; where < 26; where++) {
         const int w = where < 13 ? where : where + 1; /* 13 is (0, 0, 0) */
         const double around[3] = {w % 3 - 1, w / 3 % 3 - 1, w / 9 - 1};
-        for (int turn = 0; turn < 8; turn++) {
+        for (int turn = 0; turn < fewer(8); turn++) {
             double corner[3][3], d[3];
             make_edge(around, turn * M_PI / 8 + 0.1, corner);
             struct beam_outlines *outlines = outlines_of((const double(*)[3])corner, &beam);
