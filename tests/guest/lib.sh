@@ -221,12 +221,14 @@ guest_boot() {
     # No KVM, and one CPU: a second one makes small transfers ten times slower on two host cores.
     (
         exec 3<&- 4<&-
-        status=0
         timeout -k 5 "$limit_s" qemu-system-x86_64 -accel tcg -cpu Nehalem -smp 1 -m 768 -M q35 -nodefaults -no-user-config \
             -display none -no-reboot -monitor none -kernel "$guest_kernel/vmlinux" -initrd "$guest_work/initrd" \
             -append "console=ttyS0 quiet panic=-1 mitigations=off nokaslr norandmaps no_timer_check cryptomgr.notests init_on_alloc=0" -chardev "file,id=console,path=$guest_work/console.log" \
             -serial chardev:console -chardev "pipe,id=results,path=$guest_work/results" -serial chardev:results "$@" \
-            >"$guest_work/qemu.log" 2>&1 || status=$?
+            >"$guest_work/qemu.log" 2>&1 &
+        trap 'kill $!; exit' TERM # a test that is ended leaves no machine behind
+        status=0
+        wait $! || status=$?
         echo "ENDED $status" >"$guest_work/results.out"
     ) &
     guest_pid=$!
