@@ -13,7 +13,7 @@ for program in clang llvm-cov llvm-profdata ccache python3 setpriv prlimit; do
 done
 
 draws_repeat() {
-    python3 - <<'END'
+    python3 -B - <<'END'
 import itertools, sys
 sys.path.insert(0, "tests/mutants")
 import draw, tree
@@ -43,7 +43,7 @@ int lines(int n)
 }
 END
 operators_make_c() {
-    python3 - "$work/lines.c" <<'END'
+    python3 -B - "$work/lines.c" <<'END'
 import subprocess, sys
 sys.path.insert(0, "tests/mutants")
 import draw
@@ -97,7 +97,7 @@ int main(void)
 }
 END
 cp -r "$work/tiny" "$work/before"
-tiny() { LINK=cc LIBS='' SHIPPED=CC=cc python3 "$top/tests/mutants/run.py" -n 100 -j 2 build >"$work/tiny.out" 2>&1; }
+tiny() { LINK=cc LIBS='' SHIPPED=CC=cc python3 -B "$top/tests/mutants/run.py" -n 100 -j 2 build >"$work/tiny.out" 2>&1; }
 whole() {
     tiny
     [ $? = 1 ] || { cat "$work/tiny.out"; return 1; }

@@ -10,7 +10,7 @@ import re
 RELATIONS = {"<": ["<=", ">"], "<=": ["<"], ">": [">=", "<"], ">=": [">"], "==": ["!="], "!=": ["=="]}
 TOKEN = re.compile(r"[A-Za-z_]\w*|(?:\d+\.\d*|\.\d+|\d+)(?:[eE][-+]?\d+)?[uUlLfF]*|0[xX][0-9a-fA-F]+[uUlL]*|<<=|>>=|->|\+\+|--|"
                    r"<<|>>|[-+*/%&|^<>=!]=|&&|\|\||[^\sA-Za-z_0-9]")
-ENOUGH_IN_VAIN = 10000  # draws one after the other that brought nothing new
+ENOUGH_IN_VAIN = 1000  # draws one after the other that brought nothing new
 KEYWORDS = {"return", "if", "else", "for", "while", "do", "switch", "case", "default", "break", "continue", "goto", "sizeof", "typedef"}
 
 

@@ -6,5 +6,5 @@ LINK_SANITIZED = clang $(ASAN_FLAGS) $(LLD) $(LINK_LIMIT)
 #? mutants           N=200 SEED=1: small changes drawn by rule, one at a time: do the tests see them? ONLY=core/bvh, LIST=yes
 mutants: $(if $(LIST),,deps)
 	@LINK='$(LINK_TEST)' LIBS='$(TEST_LIBS)' SHIPPED='$(STRICT)' LINK_SANITIZED='$(LINK_SANITIZED)' SANITIZED='$(if $(HAS_CLANG),$(ASAN))' \
-		python3 tests/mutants/run.py -j $(JOBS) -n $(N) --seed '$(SEED)' --only '$(ONLY)' $(if $(LIST),--list) $(BUILD)
+		python3 -B tests/mutants/run.py -j $(JOBS) -n $(N) --seed '$(SEED)' --only '$(ONLY)' $(if $(LIST),--list) $(BUILD)
 .PHONY: mutants

@@ -77,8 +77,12 @@ class Reach:
         lld = " -fuse-ld=lld" if shutil.which("ld.lld") else ""
         marked = Build(self.tree, "reach", SETTINGS, f"clang {MARKS}{lld}")
         with concurrent.futures.ThreadPoolExecutor(self.tree.jobs) as pool:
-            for i, (program, status, took_s) in enumerate(pool.map(lambda program: self.run_one(marked, program, keys[program]), missing)):
-                self.say(f"[{i + 1:3}/{len(missing)}] {program} {took_s:.1f} s{'' if status == 0 else ', fails there'}")
+            try:
+                for i, (program, status, took_s) in enumerate(pool.map(lambda program: self.run_one(marked, program, keys[program]), missing)):
+                    self.say(f"[{i + 1:3}/{len(missing)}] {program} {took_s:.1f} s{'' if status == 0 else ', fails there'}")
+            except BaseException:
+                self.tree.children.end_all()  # those that wait for a thread end at once, too
+                raise
 
     def run_one(self, marked, program, key):
         work = f"{self.folder}/{program.replace('/', '-')}"

@@ -134,7 +134,7 @@ def judged(judge, mutants, n):
             judge.tree.children.end_all()
 
 
-def report(mutants, seed, of):
+def report(mutants, seed):
     counts = collections.Counter(mutant["is"] for mutant in mutants)
     total = sum(counts[what] for what in JUDGED)
     if total == 0:
@@ -144,8 +144,6 @@ def report(mutants, seed, of):
             say(f"{mutant['is']} {shown(mutant)}\n    reached by {len(mutant['by'])} tests {' '.join(mutant['by'][:8])}{' ...' * (len(mutant['by']) > 8)}")
     say(f"{total} mutants of seed {seed}: {counts['found']} found ({100 * counts['found'] // total} %), {counts['survived']} survived, "
         f"{counts['unreached']} unreached; beside them {counts['equivalent']} equivalent, {counts['broken']} did not compile")
-    with open(of, "w", encoding="utf-8") as file:
-        json.dump({"seed": seed, "counts": counts, "mutants": mutants}, file, indent=1)
     return 0 if counts["found"] >= LEAST * total else 1
 
 
@@ -178,17 +176,19 @@ def builds(tree):
 
 
 def run(asked, mutants):
-    tree = trees.Tree(asked.build, asked.jobs)
+    tree, done = trees.Tree(asked.build, asked.jobs), []
     try:
         shipped, sanitized = builds(tree)
-        done = []
         for mutant in judged(Judge(Reach(shipped, say), shipped, sanitized), mutants, asked.n):
             done.append(mutant)
             counted = sum(one["is"] in JUDGED for one in done)
             say(f"[{counted:3}/{asked.n}] {mutant['is']:10} {shown(mutant)}{'  by ' + mutant['by'][0] if mutant['is'] == 'found' else ''}")
-        return report(done, asked.seed, f"{tree.work}/{asked.seed}.json")
+        return report(done, asked.seed)
     finally:
         tree.children.end_all()
+        if done:
+            with open(f"{tree.work}/{asked.seed}.json", "w", encoding="utf-8") as file:
+                json.dump({"seed": asked.seed, "mutants": done}, file, indent=1)
 
 
 def main():
