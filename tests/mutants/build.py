@@ -19,7 +19,7 @@ class Build:
     def __init__(self, tree, name, settings, link, tests=()):
         """`settings` are make's, `link` what links a program. `tests` are the sources of tests that are compiled, too."""
         self.tree, self.name, self.link_words = tree, name, shlex.split(link)
-        self.folder, self.work = f"build/{name}", f"{tree.work}/{name}"
+        self.folder, self.work = f"build/{name}", f"{tree.path}/build/{name}"  # programs find readers of IFC above their own folder
         self.commands, self.deps, self.codes, self.locks, self.lock = {}, {}, {}, {}, threading.Lock()
         words = [*shlex.split(settings), f"BUILD={self.folder}", "objects", *(f"{self.folder}/{source}.o" for source in tests)]
         tree.make(*words)

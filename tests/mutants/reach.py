@@ -8,6 +8,7 @@ import glob
 import hashlib
 import json
 import os
+import shlex
 import shutil
 
 import tree as trees
@@ -75,7 +76,8 @@ class Reach:
     def run(self, missing, keys):
         self.say(f"which test reaches which line: {len(missing)} of {len(keys)} test programs run once")
         lld = " -fuse-ld=lld" if shutil.which("ld.lld") else ""
-        marked = Build(self.tree, "reach", SETTINGS, f"clang {MARKS}{lld}")
+        at_exit = os.path.join(os.path.dirname(os.path.abspath(__file__)), "exit.c")
+        marked = Build(self.tree, "reach", SETTINGS, f"clang -fPIC {MARKS}{lld} {shlex.quote(at_exit)}")
         with concurrent.futures.ThreadPoolExecutor(self.tree.jobs) as pool:
             try:
                 for i, (program, status, took_s) in enumerate(pool.map(lambda program: self.run_one(marked, program, keys[program]), missing)):

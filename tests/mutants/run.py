@@ -48,12 +48,14 @@ class Judge:
         self.tree, self.reach, self.shipped, self.sanitized, self.passing = shipped.tree, reach, shipped, sanitized, {}
         self.workers = queue.SimpleQueue()
         for i in range(self.tree.jobs):
-            self.workers.put(f"{self.tree.work}/worker-{i}")
+            self.workers.put(f"{self.tree.path}/build/worker-{i}")
 
     def __call__(self, mutant):
         worker = self.workers.get()
         try:
             shutil.rmtree(worker, ignore_errors=True)
+            os.makedirs(worker)
+            os.symlink("../ifc", f"{worker}/ifc")  # a program finds the readers of IFC above its own folder
             mutant["is"], mutant["by"] = self.judge(mutant, worker)
         finally:
             shutil.rmtree(worker, ignore_errors=True)
