@@ -84,14 +84,19 @@ class Judge:
         tests = self.reach.tests_of(name, mutant["line"])
         if not tests:
             return "unreached", []
-        by = self.first_that_fails(self.shipped, name, worker, changed, tests)
-        if by is None and self.sanitized is not None:
-            by = self.first_that_fails(self.sanitized, name, worker, {user: self.sanitized.compile(user, worker) for user in changed},
-                                       [test for test in tests if test.startswith("unit/")])
-        return ("survived", tests) if by is None else ("found", [by])
+        units, others = ([test for test in tests if test.startswith("unit/") == is_unit] for is_unit in (True, False))
+        rounds = [(self.shipped, units), (self.sanitized, units), (self.shipped, others)]  # the others take longest
+        for build, some in rounds:
+            if build is None or not some:
+                continue
+            objects = changed if build is self.shipped else {user: build.compile(user, worker) for user in changed}
+            by = self.first_that_fails(build, name, worker, objects, some)
+            if by is not None:
+                return "found", [by]
+        return "survived", tests
 
     def first_that_fails(self, build, name, worker, changed, tests):
-        if not tests or None in changed.values():
+        if None in changed.values():
             return None
         env = build.environment(f"{worker}/{build.name}")
         build.link_library(f"{worker}/{build.name}", changed)
