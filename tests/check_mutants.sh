@@ -1,56 +1,113 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
-# The list of small faults in tests/mutants is whole: each patch says what is wrong and which tests find it, these tests
-# exist, and it applies to the tree as it is. Whether the tests find it: `make mutants`. Prints TAP.
+# The tool of `make mutants`: draws are the same for a seed, what each operator makes is C, and in an example of few lines each
+# mutant is judged as it should be. Whether the tests find mutants of the product: `make mutants`. Prints TAP.
 set -u
 cd "$(dirname "$0")/.." || exit 1
-. tests/mutants/list.sh
-command -v patch >/dev/null || { echo "1..0 # SKIP patch is missing (Debian: patch)"; exit 0; }
+top=$PWD
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
 . tests/tap.sh
+for program in clang llvm-cov llvm-profdata ccache python3 setpriv prlimit; do
+    command -v $program >/dev/null || { echo "1..0 # SKIP $program is missing"; exit 0; }
+done
 
-# lines_whole FILE...: prints what is wrong with the text of patches, and names of tests that are not there.
-lines_whole() {
-    local file fault tests argued wrong name bad=0
-    while IFS=$'\037' read -r file fault tests argued wrong; do
-        for name in $tests; do mutants_test "$name" >/dev/null || wrong="no test $name"; done
-        if [ -n "$wrong" ]; then echo "$file: $wrong" && bad=1; fi
-    done < <(mutants_list "$@")
-    return $bad
+draws_repeat() {
+    python3 -B - <<'END'
+import itertools, sys
+sys.path.insert(0, "tests/mutants")
+import draw, tree
+places = [(name, 1 + i) for name in tree.sources() for i in range(tree.read(name).count(b"\n"))]
+one, same, other = (list(map(str, itertools.islice(draw.draw(places, seed), 30))) for seed in ("7", "7", "8"))
+sys.exit(0 if one == same and one != other and len(set(one)) == 30 else "\n".join(one + same + other))
+END
 }
+check "a seed has the same draws each time, none twice, and another seed has others" draws_repeat
 
-# Nothing is written. A patch that an earlier one has moved still applies; one whose surroundings have changed does not.
-all_apply() {
-    local file bad=0
-    for file; do
-        patch -p1 --dry-run --fuzz=0 --force <"$file" >"$work/said" 2>&1 || { echo "$file: $(tail -n 1 "$work/said")" && bad=1; }
-    done
-    return $bad
+# ---- operators
+cat >"$work/lines.c" <<'END'
+#include <pthread.h>
+static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
+static int add(int a, int b) { return a + b; }
+int lines(int n)
+{
+    int sum = 0;
+    for (int i = 0; i < n; i++)
+        sum += add(i, n);
+    if (sum > 3 && n != 2)
+        sum = (int)(2.5 * sum);
+    pthread_mutex_lock(&mutex);
+    n = 0;
+    pthread_mutex_unlock(&mutex);
+    return sum;
 }
+END
+operators_make_c() {
+    python3 -B - "$work/lines.c" <<'END'
+import subprocess, sys
+sys.path.insert(0, "tests/mutants")
+import draw
+source, met = draw.Source(sys.argv[1]), {}
+for number in range(len(source.lines)):
+    for name, edits in draw.mutants_of(source, number):
+        met.setdefault(name, edits)
+missing = {*draw.OPERATORS, "lock"} - set(met)
+bad = [name for name, edits in met.items() if subprocess.run(
+    ["cc", "-fsyntax-only", "-w", "-x", "c", "-"], text=True, check=False,
+    input="\n".join(edits.get(i, line) for i, line in enumerate(source.lines))).returncode != 0]
+sys.exit(f"no mutant of {sorted(missing)}; not C: {bad}" if missing or bad else 0)
+END
+}
+check "each operator makes something, and it is C" operators_make_c
 
-# finds FUNCTION FILE: what it must object to, it does.
-finds() {
-    ! "$1" "$2" >"$work/said" 2>&1
+# ---- an example with one mutant of each kind
+mkdir -p "$work/tiny/core/tiny" "$work/tiny/tests/unit"
+cd "$work/tiny" || exit 1
+cp "$top/tests/rigs.sh" tests/
+cat >Makefile <<'END'
+objects: $(BUILD)/core/tiny/tiny.c.o
+$(BUILD)/%.c.o: %.c
+	@mkdir -p $(@D)
+	$(CC) $(SAN) -O2 -I. -MMD -MP -fPIC -c $< -o $@
+END
+cat >core/tiny/tiny.c <<'END'
+int tiny_most(int a, int b);
+int tiny_is_of_age(int years);
+int tiny_negative(int a);
+int tiny_most(int a, int b)
+{
+    a |= a;
+    return a < b ? b : a;
 }
-
-named() { # FILE, LINE BEFORE, CHANGED FILE: a patch that is wrong in one place
-    printf '%s\n--- a/%s\n+++ b/%s\n@@ -1 +1 @@\n-no such line\n+x\n' "$2" "$3" "$3" >"$work/$1"
+int tiny_is_of_age(int years)
+{
+    return years >= 20;
 }
-both=$'Fault: x\nFound by: check_mutants'
-named no-test.patch $'Fault: x\nFound by: test_that_is_not_there' core/err.c
-named no-reason.patch 'Fault: x' core/err.c
-named no-fault.patch 'Found by: check_mutants' core/err.c
-named a-test.patch "$both" tests/tap.sh
-named name.patch "$both" core/err.c
-named it-whole.patch "$both" core/err.c
-check "a test that is not there is seen" finds lines_whole "$work/no-test.patch"
-check "a patch without a reason is seen" finds lines_whole "$work/no-reason.patch"
-check "a patch without its fault is seen" finds lines_whole "$work/no-fault.patch"
-check "a patch of a test is seen" finds lines_whole "$work/a-test.patch"
-check "a name without an area is seen" finds lines_whole "$work/name.patch"
-check "one that is whole passes" lines_whole "$work/it-whole.patch"
-check "one that does not apply is seen" finds all_apply "$work/it-whole.patch"
-check "all patches have their lines, and their tests are there" lines_whole tests/mutants/*.patch
-check "all patches apply" all_apply tests/mutants/*.patch
+int tiny_negative(int a)
+{
+    return -a;
+}
+END
+cat >tests/unit/test_tiny.c <<'END'
+int tiny_most(int a, int b);
+int tiny_is_of_age(int years);
+int main(void)
+{
+    return tiny_most(1, 2) != 2 || tiny_is_of_age(10) || !tiny_is_of_age(30);
+}
+END
+cp -r "$work/tiny" "$work/before"
+tiny() { LINK=cc LIBS='' SHIPPED=CC=cc python3 -B "$top/tests/mutants/run.py" -n 100 -j 2 build >"$work/tiny.out" 2>&1; }
+whole() {
+    tiny
+    [ $? = 1 ] || { cat "$work/tiny.out"; return 1; }
+}
+said() { grep -e "$1" "$work/tiny.out" || { cat "$work/tiny.out"; return 1; }; }
+check "the example is tried to its end" whole
+check "what a test sees is found" said '] found .*relation: return a < b ? b : a;  ->  return a > b ? b : a;  by unit/test_tiny'
+check "what is the same code is equivalent" said '] equivalent .*dropped: a |= a;'
+check "what no test sees survives" said '^survived .*relation: return years >= 20;  ->  return years > 20;'
+check "what no test calls is unreached" said '^unreached .*sign: return -a;  ->  return a;'
+unchanged() { diff -r -x build "$work/before" . && [ -z "$(find build -name 'worker-*')" ]; }
+check "no source has changed, and no worker's folder is left" unchanged
 echo "1..$tests"

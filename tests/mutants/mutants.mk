@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-# Small faults, put in one at a time: do the tests see them? M='record-*' takes some. ALL=yes runs all tests against those
-# that their own tests miss. tests/mutants/README.md says more.
-# M is shared with `make machines`, so it has no default of its own.
-ALL ?= no
-#? mutants           small faults, one at a time: do the tests see them? Half an hour
-mutants: deps
-	@bash tests/mutants/run.sh -j $(JOBS) $(if $(filter yes,$(ALL)),-a) $(BUILD) '$(or $(M),*)'
+# Small changes of the product, drawn by rule from a seed: do the tests see them? N has its default in the Makefile.
+SEED ?= 1
+ONLY ?=
+LINK_SANITIZED = clang $(ASAN_FLAGS) $(LLD) $(LINK_LIMIT)
+#? mutants           N=200 SEED=1: small changes drawn by rule, one at a time: do the tests see them? ONLY=core/bvh, LIST=yes
+mutants: $(if $(LIST),,deps)
+	@LINK='$(LINK_TEST)' LIBS='$(TEST_LIBS)' SHIPPED='$(STRICT)' LINK_SANITIZED='$(LINK_SANITIZED)' SANITIZED='$(if $(HAS_CLANG),$(ASAN))' \
+		python3 -B tests/mutants/run.py -j $(JOBS) -n $(N) --seed '$(SEED)' --only '$(ONLY)' $(if $(LIST),--list) $(BUILD)
 .PHONY: mutants

@@ -72,6 +72,24 @@ static void the_tree_is_in_double(void **state)
                low, high, 0.0);
 }
 
+/* Positions are floats. One of 2 m is rounded by up to 2 * 2^-24 m, which a scale makes larger: 100,000 makes it 0.0119 m, and 10,000
+ * 0.00119 m. The tolerance is 0.001 m, so both are refused; a scale of 1,000 is not. */
+static void a_coarse_mesh_is_refused(void **state)
+{
+    (void)state;
+    static const double low[3] = {-2000, -1, -2}, high[3] = {2000, 1, -2};
+    refuse_tree("\"nodes\":[{\"mesh\":0,\"scale\":[100000,1,1]}]",
+                "read in single precision, with errors up to 0.012 m");
+    refuse_tree("\"nodes\":[{\"mesh\":0,\"scale\":[10000,1,1]}]",
+                "read in single precision, with errors up to 0.0012 m");
+    char rest[2048];
+    gltf_quad();
+    snprintf(rest, sizeof rest, "\"nodes\":[{\"mesh\":0,\"scale\":[1000,1,1]}]," MESH_AND_ACCESSORS);
+    struct scene *s = gltf_load(rest);
+    gltf_check_box(s, low, high, 0.0);
+    scene_free(s);
+}
+
 static void trees_that_are_none(void **state)
 {
     (void)state;
@@ -262,6 +280,7 @@ int main(void)
         cmocka_unit_test(order_and_scenes),
         cmocka_unit_test(matrices_and_their_parts),
         cmocka_unit_test(the_tree_is_in_double),
+        cmocka_unit_test(a_coarse_mesh_is_refused),
         cmocka_unit_test(trees_that_are_none),
         cmocka_unit_test(indices_of_nothing),
         cmocka_unit_test(a_deep_chain_is_walked),
