@@ -483,6 +483,7 @@ install: $(if $(filter yes,$(BUILT)),,all)
 	sed "s|@PREFIX@|$(PREFIX)|" config/packaging/scanhead@.service.in > "$(DESTDIR)$(UNIT_DIR)/scanhead@.service"
 	pages=$$($(PRINTER) help --man list) && for p in $$pages; do \
 		$(PRINTER) help --man $$p > "$(DESTDIR)$(MAN_DIR)/man$${p##*.}/$$p" || exit; done
+	echo ".so man1/scanhead.1" > "$(DESTDIR)$(MAN_DIR)/man1/scanheadd.1"
 	awk -f drivers/host/libscanhead.3.awk drivers/host/scanhead.h > "$(DESTDIR)$(MAN_DIR)/man3/libscanhead.3"
 	$(PRINTER) help --completion bash > "$(DESTDIR)$(COMPLETION_DIR)/scanhead"
 	sed "s|@PREFIX@|$(PREFIX)|; s|@LIB@|$(LIB)|; s|@VERSION@|$$(sed -n 's/^#define SCANHEAD_VERSION  *"\(.*\)"$$/\1/p' \
