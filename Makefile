@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# scanhead. `make` builds build/scanhead and build/libscanhead.{a,so}.
+# scanhead. `make` builds build/scanhead, build/scanheadd and build/libscanhead.{a,so}.
 # `make demo` and `make test` install what is missing (Debian; sudo when not root), build and run.
 BUILD ?= build
 PREFIX ?= /usr/local
@@ -87,11 +87,14 @@ ALL_CFLAGS = -std=c11 $(OPT) -g $(FP) $(CWARN) $(WERROR) -fPIC -pthread $(SAN) $
 ALL_CXXFLAGS = -std=c++17 $(OPT) -g $(FP) $(WARN) $(WERROR) -fPIC -pthread $(SAN) $(CXXFLAGS)
 LDLIBS = -lembree$(EMBREE_VERSION) -lmeshoptimizer -lGeographicLib $(PKG_LIBS) -lstdc++ -lm -pthread
 
-CORE = $(wildcard core/*.c core/*/*.c core/import/*/*.c) core/georef/geographiclib_shim.cpp
+CORE = $(wildcard core/*.c core/*/*.c core/*/*/*.c) core/georef/geographiclib_shim.cpp
 PROTO = $(wildcard drivers/protocol/*.c)
 HOST = $(wildcard drivers/host/*.c)
-SRC = $(CORE) $(wildcard drivers/*/*.c firmware_sim/*/*.c firmware_sim/*/*/*.c)
+SRC = $(CORE) $(wildcard drivers/*/*.c firmware_sim/*/*.c firmware_sim/*/*/*.c firmware_sim/*/*/*/*.c)
 OBJ = $(SRC:%=$(BUILD)/%.o)
+# The head is all but the studio; tests/check_includes.sh has the same list.
+STUDIO = core/studio/% drivers/record/% firmware_sim/app/studio/%
+HEAD_OBJ = $(filter-out $(STUDIO:%=$(BUILD)/%),$(OBJ))
 LIBOBJ = $(patsubst %,$(BUILD)/%.o,core/err.c $(PROTO) $(HOST))
 PROGRAMS = $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/$(1)/test_*.c))
 UNIT = $(call PROGRAMS,unit)
@@ -105,12 +108,14 @@ JOINED_unit = $(UNIT)
 JOINED_all = $(filter-out $(call PROGRAMS,guest),$(TESTS))
 JOINED_shipped = $(filter-out $(filter-out $(SHIPPED),$(UNIT)),$(JOINED_all))
 JOINED = $(JOINED_$(JOIN))
-EVERYTHING = $(OBJ) $(BUILD)/firmware_sim/main.c.o
+# The programs: a main each, and what these share.
+MAINS = $(patsubst %,$(BUILD)/firmware_sim/%.c.o,main scanheadd program)
+EVERYTHING = $(OBJ) $(MAINS)
 
 IFC_READERS = $(BUILD)/ifc
 IFC_PROGRAMS = $(patsubst core/import/ifc/%,$(IFC_READERS)/%,$(wildcard core/import/ifc/*.mjs))
-#? all               build/scanhead, and the client library as build/libscanhead.{a,so}
-all: $(BUILD)/scanhead $(BUILD)/libscanhead.a $(BUILD)/libscanhead.so $(IFC_PROGRAMS)
+#? all               build/scanhead, build/scanheadd, and the client library as build/libscanhead.{a,so}
+all: $(BUILD)/scanhead $(BUILD)/scanheadd $(BUILD)/libscanhead.a $(BUILD)/libscanhead.so $(IFC_PROGRAMS)
 
 $(BUILD)/%.c.o: %.c $(BUILD)/flags
 	@mkdir -p $(@D)
@@ -122,10 +127,11 @@ $(BUILD)/%.cpp.o: %.cpp $(BUILD)/flags
 	$(Q)$(CXX) $(ALL_CPPFLAGS) $(ALL_CXXFLAGS) -c $< -o $@
 # What a build is made of, a file for each: all is built again once the tools or flags have changed, and an archive once a
 # source has come or gone. ccache and -Werror change nothing of an object.
-STAMPS = $(patsubst %,$(BUILD)/%,flags modules.members library.members common.members benches.members joined.members)
+STAMPS = $(patsubst %,$(BUILD)/%,flags modules.members head.members library.members common.members benches.members joined.members)
 $(BUILD)/flags: NOW = $(filter-out ccache %/ccache -Werror,$(CC) $(CXX) $(AR) $(OBJCOPY) $(ALL_CPPFLAGS) $(ALL_CFLAGS) $(ALL_CXXFLAGS) \
 	$(CORE_OPT) $(TEST_WARN) $(LDFLAGS) $(LDLIBS))
 $(BUILD)/modules.members: NOW = $(SRC)
+$(BUILD)/head.members: NOW = $(HEAD_OBJ)
 $(BUILD)/library.members: NOW = $(LIBOBJ)
 $(BUILD)/common.members: NOW = $(COMMON)
 $(BUILD)/benches.members: NOW = $(BENCHES)
@@ -146,6 +152,8 @@ $(BUILD)/drivers/link/web_pages.c.o: $(BUILD)/drivers/link/web_pages.inc $(WEB_F
 ALWAYS:
 # All modules for the program and the tests, and the client library alone.
 $(BUILD)/modules.a: $(OBJ) $(BUILD)/modules.members
+$(BUILD)/head.a: $(HEAD_OBJ) $(BUILD)/head.members
+$(BUILD)/modules.a $(BUILD)/head.a:
 	@rm -f $@
 	@echo "  AR    $@"
 	$(Q)$(AR) rcs $@ $(filter %.o,$^)
@@ -164,9 +172,15 @@ $(BUILD)/libscanhead.so: $(LIBOBJ) $(BUILD)/library.members drivers/host/libscan
 	@echo "  LD    $@"
 	$(Q)$(CC) -shared $(SAN) $(LDFLAGS) -Wl,--version-script=drivers/host/libscanhead.map -Wl,-soname,libscanhead.so.1 \
 		-o $@ $(LIBOBJ) -lnettle -lusb-1.0 -lm
-$(BUILD)/scanhead: $(BUILD)/firmware_sim/main.c.o $(BUILD)/modules.a
+$(BUILD)/scanhead: $(BUILD)/firmware_sim/main.c.o $(BUILD)/firmware_sim/program.c.o $(BUILD)/modules.a
 	@echo "  LD    $@"
 	$(Q)$(CC) $(SAN) $(LDFLAGS) -o $@ $^ $(LDLIBS)
+#? scanheadd         the head alone, for a board: run, plan, check, list
+scanheadd: $(BUILD)/scanheadd
+# With the libraries that it needs and no others.
+$(BUILD)/scanheadd: $(BUILD)/firmware_sim/scanheadd.c.o $(BUILD)/firmware_sim/program.c.o $(BUILD)/head.a
+	@echo "  LD    $@"
+	$(Q)$(CC) $(SAN) $(LDFLAGS) -o $@ $^ -Wl,--as-needed $(LDLIBS)
 
 # ---- test programs. A program of tests/ is linked with
 #   common.a    tests/common: scenes, references, clients                   all of them
@@ -451,7 +465,7 @@ install: $(if $(filter yes,$(BUILT)),,all)
 		"$(DESTDIR)$(SCENES_DIR)" "$(DESTDIR)$(FAULTS_DIR)" "$(DESTDIR)$(CAMPAIGN_DIR)" "$(DESTDIR)$(UDEV_DIR)" "$(DESTDIR)$(PC_DIR)" "$(DESTDIR)$(PREFIX)/share/scanhead/python" \
 		"$(DESTDIR)$(WIRESHARK_DIR)" "$(DESTDIR)$(UNIT_DIR)" "$(DESTDIR)$(COMPLETION_DIR)" \
 		"$(DESTDIR)$(MAN_DIR)/man1" "$(DESTDIR)$(MAN_DIR)/man3" "$(DESTDIR)$(MAN_DIR)/man5"
-	install $(BUILD)/scanhead "$(DESTDIR)$(PREFIX)/bin/"
+	install $(BUILD)/scanhead $(BUILD)/scanheadd "$(DESTDIR)$(PREFIX)/bin/"
 	install -m 644 $(BUILD)/libscanhead.a "$(DESTDIR)$(PREFIX)/$(LIB)/"
 	install $(BUILD)/libscanhead.so "$(DESTDIR)$(PREFIX)/$(LIB)/libscanhead.so.1"
 	ln -sf libscanhead.so.1 "$(DESTDIR)$(PREFIX)/$(LIB)/libscanhead.so"
@@ -470,6 +484,7 @@ install: $(if $(filter yes,$(BUILT)),,all)
 	sed "s|@PREFIX@|$(PREFIX)|" config/packaging/scanhead@.service.in > "$(DESTDIR)$(UNIT_DIR)/scanhead@.service"
 	pages=$$($(PRINTER) help --man list) && for p in $$pages; do \
 		$(PRINTER) help --man $$p > "$(DESTDIR)$(MAN_DIR)/man$${p##*.}/$$p" || exit; done
+	echo ".so man1/scanhead.1" > "$(DESTDIR)$(MAN_DIR)/man1/scanheadd.1"
 	awk -f drivers/host/libscanhead.3.awk drivers/host/scanhead.h > "$(DESTDIR)$(MAN_DIR)/man3/libscanhead.3"
 	$(PRINTER) help --completion bash > "$(DESTDIR)$(COMPLETION_DIR)/scanhead"
 	sed "s|@PREFIX@|$(PREFIX)|; s|@LIB@|$(LIB)|; s|@VERSION@|$$(sed -n 's/^#define SCANHEAD_VERSION  *"\(.*\)"$$/\1/p' \
@@ -483,7 +498,7 @@ clean:
 #? help              these lines
 help:
 	@sed -n 's/^#? /make /p' $(filter Makefile %.mk,$(MAKEFILE_LIST))
-.PHONY: ALWAYS all ifc-readers deps deps-test deps-build deps-guest deps-browser demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb repair \
+.PHONY: ALWAYS all scanheadd ifc-readers deps deps-test deps-build deps-guest deps-browser demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb repair \
 	test-usb-million test-hostile test-sight objects test-unit-programs test-programs bench bench-beam bench-plain bench-copies bench-velodyne bench-page page-pictures bench-loop bench-loading bench-kernels bench-panorama chart install format clean help
 .SECONDARY:
 -include $(shell find $(patsubst %,$(BUILD)/%,core drivers firmware_sim tests) -name '*.d' 2>/dev/null)

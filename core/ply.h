@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Reading PLY files, as meshes (core/scene/read_ply.c) or points (core/analysis/cloud_ply.c): text, or binary
+/* Reading PLY files, as meshes (core/import/read_ply.c) or points (core/studio/analysis/cloud_ply.c): text, or binary
  * of either byte order, with numbers of any type. In: a file. Out: its elements, and their rows one after the
  * other as doubles.
  *

@@ -7,21 +7,31 @@
 #   check_includes.sh [ROOT [OBJECTS]]      ROOT: default the tree this script is in
 #                                           OBJECTS: where make has put the objects; default ROOT/build/test
 #
-# In core and in firmware_sim a room may use itself and the rooms before it in this list. Files that lie in core itself are
-# the first room, `core`: errors, lines, vectors, angles, random numbers.
-core_order='core picture mesh texture georef scene schedule pose surface instrument detect bvh sight footprint cast plan analysis standpoint coverage'
-firmware_order='base command fault config site device loop replay app'
-# The folders of core/import are of the room `scene`, which calls them, and whose builder they fill.
-# Headers in core/ that belong to a room with another name, as HEADER:ROOM.
-core_headers='scan_mesh:mesh decimate:mesh cloud:analysis cloud_picture:analysis deviation:analysis figures:analysis distance:analysis map:analysis view:analysis geoframe:georef locate:georef crs:georef ifc_site:scene geotiff:scene scene_copies:scene scene_objects:scene body:scene embree:bvh'
+# Two floors: the studio is what people do with scans, the head is everything else. Nothing of the head uses the studio.
+studio='^(core/studio/|drivers/record/|firmware_sim/app/studio/|firmware_sim/main[.]c$)'
+#
+# In core and in firmware_sim a room may use itself and the rooms before it in this list, so that no rooms form a circle.
+# Files that lie in core itself are the first room, `core`: errors, lines, vectors, angles, random numbers.
+core_order='core texture georef scene import schedule pose surface instrument detect bvh sight footprint cast plan
+    studio/picture studio/mesh studio/analysis studio/standpoint studio/coverage'
+firmware_order='base command fault config site device loop replay app app/help app/run app/studio app/studio/record app/studio/report
+    app/studio/map app/studio/coverage app/studio/init app/studio/batch app/studio/soak app/studio/view app/studio/watch'
+# The folders of core/import are one room: it calls them, and they fill what it hands out.
+# Headers in core/ and core/studio/ that belong to a room with another name, as HEADER:ROOM.
+core_headers='distance:bvh geoframe:georef locate:georef crs:georef scene_copies:scene scene_objects:scene body:scene embree:bvh
+    ifc_site:import geotiff:import ply:import studio/scan_mesh:studio/mesh studio/decimate:studio/mesh studio/cloud:studio/analysis
+    studio/cloud_picture:studio/analysis studio/deviation:studio/analysis studio/figures:studio/analysis studio/map:studio/analysis
+    studio/view:studio/analysis'
+# On the way of a pulse core has no clock, no thread and no other process. Importing and the studio may have them. So may
+# these files, which prepare a scene before the first pulse: they measure how long that takes, and share it among threads.
+prepares='core/scene/build.c core/bvh/bvh.c core/sight/sight.c'
 # Everything in firmware_sim may use core and drivers. core uses nothing else. In drivers:
 #   protocol       itself, core/line.h, core/err.h
 #   socket         itself, core/err.h
 #   usb            itself, protocol (its data), socket, core/err.h
 #   link           itself, usb, socket, protocol's lines of HTTP, core/err.h, core/late.h, core/newfile.h
 #   host           itself, protocol, core/err.h, core's headers without a source (vectors, matrices, arithmetic, growing arrays)
-#   record         the same, host's public header, core/newfile.h, core/infile.h, core/colour.h, core's rooms mesh and picture
-#                  core/scan_mesh.h and core/picture.h
+#   record         the same, host's public header, core/newfile.h, core/infile.h, core/colour.h, the studio's rooms mesh and picture
 # The arrows that run upward, one a line as FROM TO REASON: room FROM includes header TO, or calls what that header declares.
 # At most one in core, one in firmware_sim and one in drivers.
 upward='
@@ -37,31 +47,33 @@ rules='
         n = split(core_order, list, " "); for (i = 1; i <= n; i++) rank["core/" list[i]] = i
         n = split(firmware_order, list, " "); for (i = 1; i <= n; i++) rank["firmware_sim/" list[i]] = i
         n = split(core_headers, list, " "); for (i = 1; i <= n; i++) { split(list[i], pair, ":"); at["core/" pair[1]] = "core/" pair[2] }
+        n = split(prepares, list, " "); for (i = 1; i <= n; i++) preparing[list[i]] = 1
         n = split(upward, list, "\n")
         for (i = 1; i <= n; i++) if (split(list[i], word, " ") > 1) exception[word[1], word[2]] = 1
     }
-    # The room that a file lies in; of a header in core/ itself the room that it declares.
-    function room(path,   part, n, name) {
+    # The room that a file lies in; of a header in core/ or core/studio/ itself the room that it declares.
+    function room(path,   part, n, name, folder) {
         n = split(path, part, "/")
-        if (n > 3 && part[1] == "core" && part[2] == "import") return "core/scene"
-        if (n > 2) return part[1] "/" part[2]
-        name = path; sub(/\.[a-z]*$/, "", name)
+        name = folder = path; sub(/\.[a-z]*$/, "", name); sub(/\/[^\/]*$/, "", folder)
         if (name in at) return at[name]
-        if (part[1] == "core") return name in rank ? name : "core/core"
-        return part[1] "/" part[1]
+        if (folder == "core" || folder == "core/studio") return name in rank ? name : folder == "core" ? "core/core" : folder
+        if (folder ~ /^core\/import\//) return "core/import"
+        if (folder in rank || n == 2) return n == 2 ? part[1] "/" part[1] : folder
+        return part[1] == "drivers" ? part[1] "/" part[2] : folder
     }
     function may_use(from, to,   a, b, top) {
         a = room(from); b = room(to)
+        if (to ~ studio && from !~ studio) return 0
         if (a == b) return 1
         if ((a, to) in exception) return 1
         split(a, top, "/")
         if (top[1] == "core") return b in rank && b ~ /^core\// && rank[b] < rank[a]
         if (top[1] == "firmware_sim") {
-            if (from == "firmware_sim/main.c") return to ~ /^(core|drivers|firmware_sim)\//
+            if (a == "firmware_sim/firmware_sim") return to ~ /^(core|drivers|firmware_sim)\//
             return b ~ /^(core|drivers)\// || (b in rank && b ~ /^firmware_sim\// && rank[b] < rank[a])
         }
         if (to == "core/err.h") return 1
-        if (to == "core/colour.h" || to == "core/infile.h" || b == "core/mesh" || b == "core/picture") return a == "drivers/record"
+        if (to == "core/colour.h" || to == "core/infile.h" || b == "core/studio/mesh" || b == "core/studio/picture") return a == "drivers/record"
         if (to == "core/late.h") return a == "drivers/link"
         if (to == "core/newfile.h") return a == "drivers/record" || a == "drivers/link"
         if (a == "drivers/host" || a == "drivers/record")
@@ -74,8 +86,9 @@ rules='
 
 include_rules='
     FNR == 1 {
-        if (FILENAME ~ /^firmware_sim\/[^\/]*$/ && FILENAME != "firmware_sim/main.c") print FILENAME ": only main.c lies here"
-        else if (FILENAME !~ /^drivers\/[^\/]+\// && FILENAME != "firmware_sim/main.c" && !(room(FILENAME) in rank))
+        main = FILENAME ~ /^firmware_sim\/(main|scanheadd|program)\.[ch]$/
+        if (FILENAME ~ /^firmware_sim\/[^\/]*$/ && !main) print FILENAME ": only the mains and what they share lie here"
+        else if (FILENAME !~ /^drivers\/[^\/]+\// && !main && !(room(FILENAME) in rank))
             print FILENAME ": a room that the order does not name"
     }
     /^[ \t]*#[ \t]*include/ {
@@ -94,6 +107,7 @@ include_rules='
 
 # Of the lines of nm -A -P: what an object lacks, and which one defines it. The client library is called by its public names.
 call_rules='
+    BEGIN { system_call = "^(clock_.*|gettimeofday|time|nanosleep|usleep|pthread_.*|thrd_.*|fork|vfork|exec.*|posix_spawn.*|wait.*|system|popen|socket.*)$" }
     { path = $1; sub(/\.o(\[.*\])?:$/, "", path) }
     $3 == "U" { needs[path] = needs[path] " " $2; next }
     $3 ~ /^[TDBRCVWi]$/ { home[$2] = path }
@@ -101,10 +115,12 @@ call_rules='
         for (path in needs) {
             n = split(needs[path], symbol, " ")
             for (i = 1; i <= n; i++) {
+                if (path ~ /^core\// && room(path) != "core/import" && path !~ studio && !(path in preparing) && symbol[i] ~ system_call)
+                    print path ": must not call " symbol[i]
                 if (!(symbol[i] in home)) continue
                 to = home[symbol[i]]
                 sub(/\.(c|cpp)$/, ".h", to)
-                if (match(to, /^core\/(mesh|picture)\//) && path !~ /^core\//) to = substr(to, 1, RLENGTH - 1) ".h"
+                if (match(to, /^core\/studio\/(mesh|picture)\//) && path !~ /^core\//) to = substr(to, 1, RLENGTH - 1) ".h"
                 if (to ~ /^drivers\/host\// && symbol[i] ~ /^scanhead_/) to = "drivers/host/scanhead.h"
                 if (!may_use(path, to)) print path ": must not call " symbol[i] " of " home[symbol[i]]
             }
@@ -113,6 +129,7 @@ call_rules='
 
 run_rules() { # awk's program, then its arguments
     awk -v core_order="$core_order" -v firmware_order="$firmware_order" -v core_headers="$core_headers" -v upward="$upward" \
+        -v studio="$studio" -v prepares="$prepares" \
         "$rules $1" "${@:2}"
 }
 
@@ -201,14 +218,17 @@ clean_tree() {
     rm -rf "$work/tree"
     plant core/scene/load.c '#include "core/scene.h"' '#include <embree3/rtcore.h>' '#include <stdio.h>' '#include "core/err.h"'
     plant core/plan/plan.c '#include "core/plan.h"' '#include "core/cast.h"' '#include "core/geoframe.h"'
-    plant core/cloud.h '#include "core/bvh/bvh.h"'
+    plant core/studio/cloud.h '#include "core/bvh/bvh.h"' '#include "core/distance.h"'
+    plant core/import/load.c '#include "core/scene/build.h"' '#include "core/import/gltf/gltf_read.h"'
     plant core/georef/geographiclib_shim.cpp '#include "core/georef/shim.h"' '#include <GeographicLib/UTMUPS.hpp>'
     plant drivers/protocol/native.c '#include "drivers/protocol/native.h"' '#include "core/line.h"' '#include "core/err.h"'
     plant drivers/link/tcp.c '#include "drivers/link/link.h"' '#include "core/err.h"' '#include <sys/socket.h>'
     plant drivers/usb/usb_core.c '#include "drivers/usb/device.h"' '#include "drivers/protocol/native.h"' '#include "drivers/socket/socket.h"'
     plant drivers/record/ply.c '#include "drivers/host/scanhead.h"' '#include "drivers/protocol/native.h"'
     plant drivers/host/open.c '#include "drivers/host/scanhead.h"' '#include "drivers/protocol/native.h"' '#include "core/err.h"'
-    plant firmware_sim/main.c '#include "firmware_sim/app/app.h"'
+    plant firmware_sim/main.c '#include "firmware_sim/program.h"' '#include "firmware_sim/app/studio/watch/watch.h"'
+    plant firmware_sim/scanheadd.c '#include "firmware_sim/program.h"' '#include "firmware_sim/app/app.h"'
+    plant firmware_sim/app/studio/watch/watch.c '#include "firmware_sim/app/run/page.h"' '#include "core/studio/figures.h"'
     plant firmware_sim/loop/loop.c '#include "firmware_sim/device/device.h"' '#include "core/scene.h"' '#include "drivers/link/link.h"' '#include "drivers/host/scanhead.h"' \
         '/* #include "tests/nothing.h" */' '// #include "../core/err.h"'
     plant build-asan/generated.cpp 'int built;'
@@ -260,9 +280,15 @@ expect_violation drivers/host/bad.c '#include "firmware_sim/command/head.h"'
 expect_violation core/err.c '#include "core/scene.h"'
 expect_violation core/line.h '#include "core/georef.h"'
 expect_violation core/scene/bad.c '#include "core/cast/caster.h"'
-expect_violation core/georef/bad.h '#include "core/map.h"'
+expect_violation core/georef/bad.h '#include "core/studio/map.h"'
 expect_violation core/cast/bad.c '#include "core/plan.h"'
 expect_violation core/attic/bad.c 'int bad;'
+expect_violation core/studio/bad.h 'int bad;'
+expect_violation core/scene/bad.c '#include "core/import/readers.h"'
+expect_violation core/plan/bad.c '#include "core/studio/map.h"'
+expect_violation core/studio/picture/bad.c '#include "core/studio/mesh.h"'
+expect_violation drivers/host/bad.c '#include "core/studio/mesh.h"'
+expect_violation drivers/record/bad.c '#include "core/studio/map.h"'
 expect_violation drivers/link/bad.c '#include "drivers/record/recorder.h"'
 expect_violation drivers/usb/bad.c '#include "drivers/link/link.h"'
 expect_violation drivers/record/bad.c '#include "drivers/host/session.h"'
@@ -274,6 +300,13 @@ expect_violation firmware_sim/site/bad.c '#include "firmware_sim/device/device.h
 expect_violation firmware_sim/device/bad.c '#include "firmware_sim/loop/loop.h"'
 expect_violation firmware_sim/loop/bad.c '#include "firmware_sim/app/app.h"'
 expect_violation firmware_sim/app/bad.c '#include "tests/unit/command_device.h"'
+expect_violation firmware_sim/loop/bad.c '#include "drivers/record/recorder.h"'
+expect_violation firmware_sim/site/bad.c '#include "core/studio/cloud.h"'
+expect_violation firmware_sim/app/bad.c '#include "firmware_sim/app/run/run.h"'
+expect_violation firmware_sim/app/bad.c '#include "firmware_sim/program.h"'
+expect_violation firmware_sim/app/run/bad.c '#include "firmware_sim/app/studio/watch/watch.h"'
+expect_violation firmware_sim/app/studio/record/bad.c '#include "firmware_sim/app/studio/map/view.h"'
+expect_violation firmware_sim/program.c '#include "firmware_sim/app/studio/watch/watch.h"'
 expect_violation firmware_sim/attic/bad.c '#include "core/err.h"'
 expect_violation firmware_sim/bad.c '#include "core/err.h"'
 expect_violation firmware_sim/app/bad.cpp 'int bad;'
@@ -304,6 +337,30 @@ expect_call 1 firmware_sim/base/json.c firmware_sim/config/config.c
 expect_call 1 drivers/protocol/native.c drivers/link/tcp.c
 expect_call 1 drivers/record/ply.c drivers/host/open.c session_open
 expect_call 1 core/cast/caster.c firmware_sim/loop/loop.c
+expect_call 0 drivers/record/mesh.c core/studio/mesh/file.c
+expect_call 0 firmware_sim/main.c firmware_sim/app/studio/map/map.c
+expect_call 1 firmware_sim/scanheadd.c firmware_sim/app/studio/map/map.c
+expect_call 1 firmware_sim/app/run/run.c firmware_sim/app/studio/watch/watch.c
+expect_call 1 firmware_sim/site/doubts.c core/studio/analysis/distance.c
+expect_call 1 firmware_sim/loop/loop.c drivers/record/shs.c
+
+expect_system() { # violations caller symbol
+    local found
+    rm -rf "$work/tree"
+    plant "$2" "void $3(void); void calls(void); void calls(void) { $3(); }"
+    mkdir -p "$work/tree/built/$(dirname "$2")"
+    ${CC:-cc} -fno-builtin -c "$work/tree/$2" -o "$work/tree/built/$2.o" || return
+    found=$(call_violations "$work/tree/built" "$work/tree")
+    [ "$(printf '%s' "$found" | grep -c '')" = "$1" ]
+    report $? "$([ "$1" = 0 ] && echo passes || echo finds) a call from $2 to $3" "found: ${found:-nothing}"
+}
+expect_system 1 core/cast/caster.c clock_gettime
+expect_system 1 core/bvh/packet.c pthread_create
+expect_system 1 core/scene/body.c fork
+expect_system 0 core/import/ifc/ifc_apart.c fork
+expect_system 0 core/bvh/bvh.c clock_gettime
+expect_system 0 core/studio/coverage/look.c pthread_create
+expect_system 0 firmware_sim/loop/loop.c clock_gettime
 
 expect_readme() { # violations line...
     local found

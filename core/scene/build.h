@@ -171,20 +171,4 @@ int scene_find_cutouts(struct scene *scene, const struct sh_report *report, stru
 /* Texture coordinates and textures go, unless they have holes. */
 void scene_drop_textures(struct scene *scene);
 
-/* The readers. Each has the spec, and the file's name, from the builder. */
-int read_obj(struct scene_build *b, struct sh_err *err);
-/* Takes what follows mtllib in a line of an OBJ. */
-struct mtl_line {
-    struct text_span names;
-    uint64_t line;
-};
-/* Colours and textures of the surfaces from first_surface on, from the libraries that these lines name; the first one
- * that knows a material counts. Meshes often come without a library: they have no colours then. Where textures are
- * wanted, warnings say which libraries, materials and textures are missing. */
-int read_mtl(struct scene_build *b, const struct mtl_line *line, size_t n, uint32_t first_surface, struct sh_err *err);
-int read_ply(struct scene_build *b, struct sh_err *err);
-int read_stl(struct scene_build *b, struct sh_err *err);
-int import_apart(struct scene_build *b, struct sh_err *err); /* core/scene/import.h */
-int read_ifc(struct scene_build *b, struct sh_err *err);     /* core/import/ifc/ */
-
 #endif

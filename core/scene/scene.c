@@ -1,119 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 #include "core/scene.h"
 
-#include <errno.h>
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
-#include <sys/stat.h>
 
 #include "core/grow.h"
 #include "core/scene/build.h"
 
 const struct scene_import_limits scene_import_defaults = {.memory_mib = 8192, .time_s = 300, .files = 64};
-
-static const struct {
-    const char *ending;
-    int (*read)(struct scene_build *b, struct sh_err *err);
-} readers[] = {
-    {".obj", read_obj},     {".ply", read_ply},      {".stl", read_stl},     {".gltf", import_apart},
-    {".glb", import_apart}, {".fbx", import_apart},  {".dae", import_apart}, {".ifc", read_ifc},
-    {".tif", import_apart}, {".tiff", import_apart},
-};
-
-static int check_spec(struct scene_build *b, struct sh_err *err)
-{
-    const struct scene_mesh_spec *spec = b->spec;
-    if (!(spec->scale > 0) || !isfinite(spec->scale))
-        return build_fail(b, SH_EINPUT, err, "scale %g; allowed are numbers above 0", spec->scale);
-    for (int k = 0; k < 3; k++)
-        if (!isfinite(spec->offset_m[k]))
-            return build_fail(b, SH_EINPUT, err, "offset %g; allowed are finite numbers", spec->offset_m[k]);
-    struct stat st;
-    if (stat(spec->file, &st) != 0) return build_fail(b, SH_EINPUT, err, "%s", strerror(errno));
-    if (!S_ISREG(st.st_mode)) return build_fail(b, SH_EINPUT, err, "not a file");
-    return SH_OK;
-}
-
-static int load_file(struct scene_build *b, const struct scene_mesh_spec *spec, struct sh_err *err)
-{
-    build_begin_file(b, spec);
-    size_t len = strlen(spec->file);
-    for (size_t i = 0; i < sizeof readers / sizeof readers[0]; i++) {
-        size_t ending_len = strlen(readers[i].ending);
-        if (len <= ending_len || strcasecmp(spec->file + len - ending_len, readers[i].ending) != 0) continue;
-        int rc = check_spec(b, err);
-        if (rc == SH_OK) rc = readers[i].read(b, err);
-        return rc == SH_OK ? build_end_file(b, err) : rc;
-    }
-    return build_fail(b, SH_EINPUT, err,
-                      "unknown ending; allowed are .obj .ply .stl .gltf .glb .fbx .dae .ifc .tif .tiff");
-}
-
-static int has_textures(const struct scene_mesh_spec *specs, size_t n_specs)
-{
-    int textures = 0;
-    for (size_t i = 0; i < n_specs; i++)
-        textures |= specs[i].textures;
-    return textures;
-}
-
-static int look_for_cutouts(struct scene *scene, const struct scene_mesh_spec *specs, size_t n_specs,
-                            const struct sh_report *report, struct sh_err *err)
-{
-    const int textures = has_textures(specs, n_specs);
-    int cutouts = 0, rc = SH_OK;
-    for (size_t i = 0; i < n_specs; i++)
-        cutouts |= specs[i].cutouts;
-    if (cutouts && scene->n_textures > 0) rc = scene_find_cutouts(scene, report, err);
-    if (!textures) scene_drop_textures(scene);
-    return rc;
-}
-
-/* Whether the mesh is one of the scene's own. */
-static int is_own(const struct scene_mesh_spec *spec)
-{
-    return spec->places.place == NULL;
-}
-
-static int load_own(const struct scene_mesh_spec *specs, size_t n_specs, double tolerance_m,
-                    const struct sh_report *report, struct scene **out, struct sh_err *err)
-{
-    struct scene_build b;
-    size_t n = 0;
-    int rc = build_init(&b, tolerance_m, report, err);
-    for (size_t i = 0; i < n_specs && rc == SH_OK; i++) {
-        if (!is_own(&specs[i])) continue;
-        rc = load_file(&b, &specs[i], err);
-        n++;
-    }
-    if (rc == SH_OK) rc = build_finish(&b, n < n_specs, out, err);
-    if (rc == SH_OK) rc = look_for_cutouts(*out, specs, n_specs, report, err);
-    build_release(&b);
-    return rc;
-}
-
-int scene_load(const struct scene_mesh_spec *specs, size_t n_specs, double tolerance_m, const struct sh_report *report,
-               struct scene **out, struct sh_err *err)
-{
-    *out = NULL;
-    int rc = load_own(specs, n_specs, tolerance_m, report, out, err);
-    for (size_t i = 0; i < n_specs && rc == SH_OK; i++) {
-        struct scene_mesh_spec alone = specs[i];
-        struct scene *mesh = NULL;
-        if (is_own(&specs[i])) continue;
-        alone.places = (struct scene_places){0};
-        alone.textures = has_textures(specs, n_specs);
-        rc = load_own(&alone, 1, tolerance_m, report, &mesh, err);
-        if (rc == SH_OK) rc = scene_add_copies(*out, mesh, &specs[i].places, report, err);
-        if (rc != SH_OK) scene_free(mesh);
-    }
-    if (rc == SH_OK) return rc;
-    scene_free(*out);
-    *out = NULL;
-    return rc;
-}
 
 static int copy_surfaces(struct scene_build *b, const struct scene_arrays *arrays, struct sh_err *err)
 {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Meshes of scans: .obj, .gltf, .glb and .fbx, and .ply with --mesh; points spread over the mesh: .ply with --sparse.
  *
- * The first echo of each shot is a point of the scan's grid (mesh_grid.h); core/scan_mesh.h makes triangles of it. A mesh
+ * The first echo of each shot is a point of the scan's grid (mesh_grid.h); core/studio/scan_mesh.h makes triangles of it. A mesh
  * is made when its scan is over, and the file when all scans are. All points are held until then, with about 110 bytes
  * each, and triangles with 12, two a point.
  *
@@ -15,7 +15,7 @@
 #include <unistd.h>
 
 #include "core/grow.h"
-#include "core/mesh.h"
+#include "core/studio/mesh.h"
 #include "core/newfile.h"
 #include "drivers/protocol/native.h"
 #include "drivers/record/mesh_ply_repair.h"

@@ -4,7 +4,7 @@
 #ifndef DRIVERS_RECORD_MESH_GRID_H
 #define DRIVERS_RECORD_MESH_GRID_H
 
-#include "core/scan_mesh.h"
+#include "core/studio/scan_mesh.h"
 #include "drivers/record/track.h"
 
 struct mesh_grid {

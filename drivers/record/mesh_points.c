@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/mesh.h"
+#include "core/studio/mesh.h"
 
 /* One array: room for n elements. */
 static int resize(void *array, size_t n, size_t size)

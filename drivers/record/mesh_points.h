@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The points of a mesh that is being recorded: arrays that grow together. In: points one by one. Out: arrays as
- * core/mesh.h takes them. All points of a recording are held, with what belongs to them. */
+ * core/studio/mesh.h takes them. All points of a recording are held, with what belongs to them. */
 #ifndef DRIVERS_RECORD_MESH_POINTS_H
 #define DRIVERS_RECORD_MESH_POINTS_H
 

@@ -5,8 +5,8 @@
 
 #include <string.h>
 
-#include "core/mesh.h"
-#include "core/picture.h"
+#include "core/studio/mesh.h"
+#include "core/studio/picture.h"
 #include "drivers/record/mesh_grid.h"
 #include "drivers/record/mesh_points.h"
 #include "drivers/record/recorder.h"

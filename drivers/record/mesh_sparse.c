@@ -5,8 +5,8 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "core/mesh.h"
-#include "core/scan_mesh.h"
+#include "core/studio/mesh.h"
+#include "core/studio/scan_mesh.h"
 
 enum { POINTS_BETWEEN_STOPS = 1 << 16 };
 enum { BYTES_A_POINT = 110 }; /* of struct mesh_points, whose arrays grow by half */

@@ -7,8 +7,8 @@
 #ifndef DRIVERS_RECORD_MESH_TEXTURE_H
 #define DRIVERS_RECORD_MESH_TEXTURE_H
 
-#include "core/picture.h"
-#include "core/scan_mesh.h"
+#include "core/studio/picture.h"
+#include "core/studio/scan_mesh.h"
 #include "drivers/record/mesh_grid.h"
 #include "drivers/record/mesh_points.h"
 

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "core/grow.h"
-#include "core/mesh.h"
+#include "core/studio/mesh.h"
 #include "drivers/record/mesh_recorder.h"
 #include "drivers/record/mesh_sparse.h"
 #include "drivers/record/ply_columns.h"

@@ -14,9 +14,22 @@
 #include "firmware_sim/base/json.h"
 #include "firmware_sim/config/config.h"
 
-/* main.c lists them. */
-extern const struct app_command app_run, app_record, app_plan, app_map, app_report, app_check, app_list, app_init,
-    app_batch, app_coverage, app_view, app_soak;
+/* The only list of commands, in the order of `scanhead --help`. scanheadd has those of HEAD, scanhead has all of them. */
+#define APP_COMMANDS(HEAD, STUDIO) \
+    HEAD(run)                      \
+    STUDIO(record)                 \
+    STUDIO(batch)                  \
+    HEAD(plan)                     \
+    STUDIO(map)                    \
+    STUDIO(report)                 \
+    STUDIO(coverage)               \
+    HEAD(check)                    \
+    HEAD(list)                     \
+    STUDIO(init)                   \
+    STUDIO(view)                   \
+    STUDIO(soak)
+#define APP_DECLARE(name) extern const struct app_command app_##name;
+APP_COMMANDS(APP_DECLARE, APP_DECLARE)
 
 /* Prints "scanhead: TEXT" and gives the exit status for the error. */
 int app_fail(const struct sh_err *err);

@@ -238,7 +238,7 @@ struct config_cast {
 };
 
 struct config_coverage {
-    double cell_m, memory_mib; /* core/coverage.h */
+    double cell_m, memory_mib; /* core/studio/coverage.h */
 };
 
 struct config_noise {

@@ -16,7 +16,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "core/mesh.h"
+#include "core/studio/mesh.h"
 #include "firmware_sim/base/clock.h"
 #include "tests/bench/bench.h"
 #include "tests/bench/options.h"

@@ -15,9 +15,9 @@
 #include <unistd.h>
 
 #include "drivers/protocol/bytes.h"
-#include "firmware_sim/app/offline.h"
-#include "firmware_sim/app/record/files.h"
-#include "firmware_sim/app/record/recording.h"
+#include "firmware_sim/app/studio/record/offline.h"
+#include "firmware_sim/app/studio/record/files.h"
+#include "firmware_sim/app/studio/record/recording.h"
 #include "tests/bench/options.h"
 #include "tests/bench/sight.h"
 

@@ -6,7 +6,7 @@
 #   make check-tsan-short     what `make test` runs of it
 DEPS_CHECK = clang clang-tidy libclang-rt-dev cppcheck python3 python3-numpy
 CHECK_S ?= 15
-CHECK_FILES = $(SRC) firmware_sim/main.c
+CHECK_FILES = $(SRC) $(wildcard firmware_sim/*.c)
 CHECK_FLAGS = -std=c11 -I. -I$(BUILD) -D_GNU_SOURCE -DSH_EMBREE=$(EMBREE_VERSION) $(if $(USBREDIR),-DHAVE_USBREDIR) $(PKG_CFLAGS)
 deps-check: deps-build
 	$(call install_missing,$(DEPS_CHECK))
@@ -26,7 +26,7 @@ check: check-analysers check-tsan
 PLAIN ?= $(BUILD)/test
 TSAN_SHARED = $(wildcard firmware_sim/loop/*.c firmware_sim/device/*.c firmware_sim/fault/*.c drivers/link/*.c)
 TSAN_SHORT = $(TSAN) OPT=-O0 BUILD=$(BUILD)/tsan_short PLAIN=$(PLAIN) $(BUILD)/tsan_short/tsan_head
-$(BUILD)/tsan_head: $(TSAN_SHARED:%=$(BUILD)/%.o) $(PLAIN)/firmware_sim/main.c.o $(PLAIN)/modules.a
+$(BUILD)/tsan_head: $(TSAN_SHARED:%=$(BUILD)/%.o) $(PLAIN)/firmware_sim/main.c.o $(PLAIN)/firmware_sim/program.c.o $(PLAIN)/modules.a
 	@echo "  LD    $@"
 	$(Q)$(CC) $(SAN) $(FAST_LD) -o $@ $^ $(LDLIBS)
 check-tsan-short: deps-check

@@ -11,7 +11,7 @@
 #include <unistd.h>
 
 #include "core/cast/caster_private.h"
-#include "core/mesh.h"
+#include "core/studio/mesh.h"
 #include "tests/common/generate.h"
 
 #define LIVE(reach) "platform: {kind: live, reach_m: " reach "}\n"

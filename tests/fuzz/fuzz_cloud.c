@@ -4,8 +4,8 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/cloud.h"
-#include "firmware_sim/app/view/viewed.h"
+#include "core/studio/cloud.h"
+#include "firmware_sim/app/studio/view/viewed.h"
 #include "tests/fuzz/rig.h"
 #include "tests/fuzz/seal.h"
 

@@ -6,7 +6,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "firmware_sim/app/batch/manifest.h"
+#include "firmware_sim/app/studio/batch/manifest.h"
 #include "firmware_sim/device/journal.h"
 #include "tests/fuzz/rig.h"
 

@@ -14,7 +14,7 @@
 #include <string.h>
 #include <cmocka.h>
 
-#include "core/coverage.h"
+#include "core/studio/coverage.h"
 #include "core/vec3.h"
 
 /* A room with a coverage. */

@@ -13,7 +13,7 @@
 #include <unistd.h>
 
 #include "firmware_sim/app/beside.h"
-#include "firmware_sim/app/batch/manifest.h"
+#include "firmware_sim/app/studio/batch/manifest.h"
 
 static char dir[64];
 

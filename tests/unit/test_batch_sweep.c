@@ -9,7 +9,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "firmware_sim/app/batch/sweep.h"
+#include "firmware_sim/app/studio/batch/sweep.h"
 
 /* The values of one --sweep, each in brackets; or the error, after a "!". */
 static const char *values(const char *text)

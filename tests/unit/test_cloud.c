@@ -2,7 +2,7 @@
 /* Reading recorded point clouds. */
 #include <math.h>
 
-#include "core/cloud.h"
+#include "core/studio/cloud.h"
 #include "tests/unit/scene_files.h"
 
 #define LENGTH(a) (sizeof(a) / sizeof *(a))

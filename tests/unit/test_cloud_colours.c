@@ -2,7 +2,7 @@
 /* Colours, ranges and reflectances of recorded clouds. */
 #include <math.h>
 
-#include "core/cloud.h"
+#include "core/studio/cloud.h"
 #include "tests/unit/scene_files.h"
 
 static struct cloud read_cloud(const char *name, const void *data, size_t len)

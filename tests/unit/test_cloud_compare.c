@@ -9,7 +9,7 @@
 #include <string.h>
 #include <cmocka.h>
 
-#include "core/cloud.h"
+#include "core/studio/cloud.h"
 
 #define LENGTH(a) (sizeof(a) / sizeof *(a))
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* LAS files as clouds: what the recorder wrote, which other people's readers check elsewhere, and broken ones. */
-#include "core/cloud.h"
+#include "core/studio/cloud.h"
 #include "tests/unit/recorder_rig.h"
 
 static const struct rig_point points[] = {{3000, -4000, 12000, -1234, 7, 1, 2},

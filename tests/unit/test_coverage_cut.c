@@ -9,8 +9,8 @@
 #include <stdio.h>
 #include <cmocka.h>
 
-#include "core/coverage/cut.h"
-#include "core/coverage/inside.h"
+#include "core/studio/coverage/cut.h"
+#include "core/studio/coverage/inside.h"
 #include "core/rng.h"
 #include "core/vec3.h"
 

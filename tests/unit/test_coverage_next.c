@@ -2,7 +2,7 @@
 /* The next station: places where a tripod can stand, and what would be gained there. */
 #include "tests/unit/coverage_rig.h"
 
-#include "core/standpoint.h"
+#include "core/studio/standpoint.h"
 
 static const double RIGHT[3] = {5.0, 1.0, 1.2};
 static const double HEIGHT_M = 1.2;

@@ -2,7 +2,7 @@
 /* Deviations along beams, and what is expected of them, by hand. */
 #include <math.h>
 
-#include "core/deviation.h"
+#include "core/studio/deviation.h"
 #include "tests/unit/scene_files.h"
 
 static const double UNIT[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};

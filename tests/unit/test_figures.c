@@ -2,7 +2,7 @@
 /* Figures of clouds, by hand. */
 #include <math.h>
 
-#include "core/figures.h"
+#include "core/studio/figures.h"
 #include "core/rng.h"
 #include "tests/unit/scene_files.h"
 

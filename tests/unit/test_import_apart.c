@@ -16,7 +16,7 @@
 #include <assimp/version.h>
 
 #include "core/assimp_lib.h"
-#include "core/scene/import.h"
+#include "core/import/import.h"
 #include "tests/common/collada.h"
 #include "tests/common/thorough.h"
 #include "tests/unit/scene_files.h"

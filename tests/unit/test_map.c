@@ -17,7 +17,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "core/map.h"
+#include "core/studio/map.h"
 
 struct picture {
     uint32_t width, height;

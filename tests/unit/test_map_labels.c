@@ -14,8 +14,8 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "core/map.h"
-#include "core/picture.h"
+#include "core/studio/map.h"
+#include "core/studio/picture.h"
 
 static char dir[] = "/tmp/test_map_labels.XXXXXX";
 

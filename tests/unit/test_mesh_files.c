@@ -3,8 +3,8 @@
  * .glb and .fbx. */
 #include <math.h>
 
-#include "core/mesh.h"
-#include "core/picture.h"
+#include "core/studio/mesh.h"
+#include "core/studio/picture.h"
 #include "tests/unit/scene_files.h"
 
 /* A sheet of four triangles in two parts. Its coordinates are all different, so that an axis that is swapped shows, and

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Meshes whose recorder was killed while it wrote them, wherever they end. */
-#include "core/mesh.h"
+#include "core/studio/mesh.h"
 #include "tests/common/thorough.h"
 #include "tests/unit/killed_rig.h"
 

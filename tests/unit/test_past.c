@@ -10,7 +10,7 @@
 
 #include "drivers/protocol/bytes.h"
 #include "drivers/protocol/native_encode.h"
-#include "firmware_sim/app/watch/past.h"
+#include "firmware_sim/app/studio/watch/past.h"
 
 enum { POINTS_OF_FRAME = 3000 };
 

@@ -9,8 +9,8 @@
 #include <string.h>
 
 #include "core/rng.h"
-#include "firmware_sim/app/record/raw.h"
-#include "firmware_sim/app/record/raw_order.h"
+#include "firmware_sim/app/studio/record/raw.h"
+#include "firmware_sim/app/studio/record/raw_order.h"
 
 enum { INPUTS = 3, PIECES = 3000 };
 

@@ -15,7 +15,7 @@
 #include <cmocka.h>
 
 #include "drivers/protocol/native_encode.h"
-#include "firmware_sim/app/record/recording.h"
+#include "firmware_sim/app/studio/record/recording.h"
 #include "firmware_sim/command/head.h"
 
 /* What the head does, one after the other. */

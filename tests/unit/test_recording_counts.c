@@ -7,7 +7,7 @@
 #include <cmocka.h>
 
 #include "drivers/protocol/native_encode.h"
-#include "firmware_sim/app/record/recording_counts.h"
+#include "firmware_sim/app/studio/record/recording_counts.h"
 
 static enum recording_news points(struct recording_counts *c, uint32_t n_pulses)
 {

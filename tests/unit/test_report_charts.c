@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "firmware_sim/app/report/page.h"
+#include "firmware_sim/app/studio/report/page.h"
 
 /* Of charts.c, in units of the picture. Places are written with one or two decimals. */
 static const double LEFT = 70.0, RIGHT = 625.0, BOTTOM = 245.0, ROUNDED = 0.051;

@@ -8,7 +8,7 @@
 
 #include <math.h>
 
-#include "firmware_sim/app/report/verdict.h"
+#include "firmware_sim/app/studio/report/verdict.h"
 
 /* 1,000 points on smooth faces, all of known noise; z as it should be. */
 static struct figures noisy(double z_mean, double z_rms)

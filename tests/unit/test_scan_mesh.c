@@ -11,7 +11,7 @@
 #include <cmocka.h>
 
 #include "core/rng.h"
-#include "core/scan_mesh.h"
+#include "core/studio/scan_mesh.h"
 
 enum { MAX_POINTS = 4096, MAX_COLUMNS = 128 };
 

@@ -10,7 +10,7 @@
 #include <string.h>
 
 #include "drivers/protocol/native.h"
-#include "firmware_sim/app/soak/soak.h"
+#include "firmware_sim/app/studio/soak/soak.h"
 
 enum { FIRST = 1000, N_FRAMES = 200, TICK_NS = 1000000, PAYLOAD = 20 };
 

@@ -10,7 +10,7 @@
 #include <cmocka.h>
 
 #include "core/angle.h"
-#include "core/standpoint.h"
+#include "core/studio/standpoint.h"
 
 enum { MAX_BOXES = 8, LAND = 20 };
 

@@ -14,8 +14,8 @@
 #include <cmocka.h>
 
 #include "drivers/protocol/bytes.h"
-#include "firmware_sim/app/view/encode.h"
-#include "firmware_sim/app/view/serve.h"
+#include "firmware_sim/app/studio/view/encode.h"
+#include "firmware_sim/app/studio/view/serve.h"
 
 static struct sh_err err;
 static char path[64];

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "tests/wire/wire.h"
 
+#include <limits.h>
+
 int64_t wire_now_ms(void)
 {
     struct timespec now;
@@ -156,9 +158,23 @@ pid_t wire_spawn_program(struct wire *wire, const char *program, const char *con
     _exit(127);
 }
 
+/* $SCANHEAD may be scanheadd, a head to be tested. Its clients and judges are then of the scanhead beside it. */
+static const char *program_for(const char *command, char path[PATH_MAX])
+{
+    static const char *const head[] = {"run", "plan", "check", "list"};
+    const char *program = wire_program();
+    const size_t n = strlen(program);
+    if (command == NULL || n < 2 || strcmp(program + n - 2, "dd") != 0) return program;
+    for (size_t i = 0; i < sizeof head / sizeof head[0]; i++)
+        if (strcmp(command, head[i]) == 0) return program;
+    snprintf(path, PATH_MAX, "%.*s", (int)n - 1, program);
+    return path;
+}
+
 pid_t wire_spawn(struct wire *wire, const char *const *args, const char *out, const char *err, int ready_fd)
 {
-    return wire_spawn_program(wire, wire_program(), args, out, err, ready_fd);
+    char path[PATH_MAX];
+    return wire_spawn_program(wire, program_for(args[0], path), args, out, err, ready_fd);
 }
 
 int wire_wait(struct wire *wire, pid_t pid)

@@ -7,7 +7,7 @@
 #include <sys/stat.h>
 
 #include "core/import/gltf/gltf.h"
-#include "core/scene/import.h"
+#include "core/import/import.h"
 
 bool gltf_is_name(const char *file)
 {

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/scene/import.h"
+#include "core/import/import.h"
 
 enum { LEAST_SEGMENTS = 24, MOST_SEGMENTS = 360 };
 #define FAR_LEVEL_SEGMENTS 48 /* from here on ifc-lite, too, is asked for finer facets */

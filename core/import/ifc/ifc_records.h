@@ -8,7 +8,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "core/scene/step.h"
+#include "core/import/ifc/step.h"
 
 /* A style of surfaces, and an item that has it. */
 struct ifc_style {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 // The points that the scans had before this page came, or while it was away: the head keeps the last ones, and gives them
-// in pieces (GET /past, firmware_sim/app/watch/README.md). They are frames of the stream with the numbers that they had.
+// in pieces (GET /past, firmware_sim/app/studio/watch/README.md). They are frames of the stream with the numbers that they had.
 // So each points frame is taken once, either from there or from the connection.
 //
 // A live frame that can't be placed yet is left to /past. Of /past, frames are left out that the connection brings, or that

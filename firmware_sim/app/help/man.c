@@ -2,6 +2,7 @@
 /* Manual pages: one for the program, one for each command, one for the configuration. */
 #include <string.h>
 
+#include "firmware_sim/app/app.h"
 #include "firmware_sim/app/help/help.h"
 #include "firmware_sim/config/config.h"
 
@@ -87,6 +88,11 @@ static void put_command(const struct app_command *command)
     put_ends("scanhead", "1");
 }
 
+/* Names of the commands that scanheadd has. */
+#define SPACED(name) " " #name
+#define NOTHING(name)
+static const char HEAD_ALONE[] = APP_COMMANDS(SPACED, NOTHING);
+
 static void put_program(const struct app_command *const *commands)
 {
     char arguments[128], name[NAME_MAX_LEN];
@@ -107,6 +113,11 @@ static void put_program(const struct app_command *const *commands)
     puts(".SH OPTIONS");
     put_option('h', "help", NULL, "all commands, in short");
     put_option('\0', "version", NULL, "which release this is");
+    puts(".SH SCANHEADD");
+    roff_text(
+        "scanheadd is the head alone, for a board. It needs fewer libraries, and has the same help and these commands, "
+        "with the same options:");
+    roff_text(HEAD_ALONE + 1);
     puts(".SH ENVIRONMENT\n.TP\n.B SCANHEAD_HEADS");
     roff_text("the folder of head profiles, in place of the installed one");
     puts(".TP\n.B NOTIFY_SOCKET");

@@ -4,9 +4,9 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "firmware_sim/app/run/page.h"
 #include "firmware_sim/app/run/run.h"
 #include "firmware_sim/app/surfaces.h"
-#include "firmware_sim/app/watch/watch.h"
 #include "firmware_sim/site/plan_rows.h"
 #include "firmware_sim/site/rate.h"
 
@@ -77,12 +77,19 @@ static void warn_of_replay(const struct run_options *o, const struct device *dev
         o->device.replay);
 }
 
-static int has_page(const struct config *cfg)
+static const struct run_page *page; /* NULL: a page is told the stream alone */
+
+void run_take_page(const struct run_page *told)
+{
+    page = told;
+}
+
+static int tells_page(const struct config *cfg)
 {
     int is_there = 0;
     for (uint32_t i = 0; i < cfg->n_links; i++)
         is_there |= cfg->link[i].type == LINK_WEB;
-    return is_there;
+    return is_there && page != NULL;
 }
 
 /* What a page is told beside the stream; where there is no web link there is nothing to tell. Where its readers hold
@@ -96,13 +103,13 @@ static int open_watch(const struct config *cfg, const struct site *site, struct 
                                     .report = &app_report_seconds};
     for (uint32_t i = 0; i < cfg->n_links; i++)
         options.waits |= cfg->link[i].type == LINK_WEB && cfg->link[i].waits == LINK_WAITS_YES;
-    if (!has_page(cfg)) return SH_OK;
+    if (!tells_page(cfg)) return SH_OK;
     if (options.waits && cfg->loop.pace != PACE_REALTIME) options.cpu_share = 0.0;
-    const int rc = watch_open(cfg, site, &options, watch, err);
+    const int rc = page->open(cfg, site, &options, watch, err);
     if (rc != SH_OK) return rc;
-    loop->extra = watch_link(*watch);
-    loop->web = watch_source(*watch);
-    return watch_start(*watch, err);
+    loop->extra = page->link(*watch);
+    loop->web = page->source(*watch);
+    return page->start(*watch, err);
 }
 
 static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
@@ -122,8 +129,8 @@ static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
         return sh_fail(err, SH_EINPUT,
                        "%s: links: none; run needs at least one of pty, tcp, udp, usb, web, file, null, or --view",
                        cfg->file);
-    rc = has_page(cfg) ? site_load_written_out(cfg, &app_report_stderr, &site, err) /* it looks at triangles */
-                       : site_load(cfg, &app_report_stderr, &site, err);
+    rc = tells_page(cfg) ? site_load_written_out(cfg, &app_report_stderr, &site, err) /* it looks at triangles */
+                         : site_load(cfg, &app_report_stderr, &site, err);
     if (rc == SH_OK && o->surfaces != NULL) rc = surfaces_write(o->surfaces, site, err);
     if (rc == SH_OK) rc = site_open_sights(site, 0, site->n_stations, &app_report_stderr, err);
     /* After the plan, which is made for the configuration: a replayed journal gives the same stream without
@@ -139,7 +146,7 @@ static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
         rc = serve(o, loop, device, err);
     }
     loop_free(loop);
-    watch_close(watch);
+    if (watch != NULL) page->close(watch);
     device_free(device);
     site_free(site);
     return rc;

@@ -1,0 +1,319 @@
+/* SPDX-License-Identifier: MIT */
+#include "core/ifc_site.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/angle.h"
+#include "core/import/ifc/ifc_records.h"
+#include "core/import/ifc/step.h"
+
+/* Places of attributes in a record, IFC2x3 TC1 and IFC4 ADD2. */
+enum { SITE_PLACEMENT = 5, SITE_LATITUDE = 9, SITE_LONGITUDE = 10, SITE_ELEVATION = 11, SITE_ARGS = 14 };
+enum { CONTEXT_TYPE = 1, CONTEXT_WORLD = 4, CONTEXT_NORTH = 5, CONTEXT_ARGS = 6 };
+enum { MAP_CRS = 1, MAP_EASTING, MAP_NORTHING, MAP_HEIGHT, MAP_ABSCISSA, MAP_ORDINATE, MAP_SCALE, MAP_ARGS };
+enum { CRS_NAME = 0, CRS_UNIT = 6, CRS_ARGS = 7 };
+
+static const char ADVICE[] = "an anchor of source explicit needs none of this";
+
+struct reader {
+    struct ifc_records records;
+    struct step_record site, context, map;
+    int n_sites, n_contexts, n_maps, is_model;
+    struct sh_err *err;
+};
+
+static int fail(struct reader *r, const struct step_record *at, const char *what)
+{
+    char text[256];
+    snprintf(text, sizeof text, "%.190s; %s", what, ADVICE);
+    return ifc_records_fail(&r->records, at, r->err, text);
+}
+
+/* Adds advice to the error of a unit. */
+static int advise(struct reader *r, int rc)
+{
+    const struct sh_err said = *r->err;
+    return rc == SH_EINPUT ? sh_fail(r->err, rc, "%.440s; %s", said.text, ADVICE) : rc;
+}
+
+/* Sites without angles (of other parts of a complex) don't count. */
+static int is_located(const struct step_record *site)
+{
+    struct text_span arg[SITE_ARGS];
+    return step_split(site->args, arg, SITE_ARGS) != SITE_ARGS || !text_is(arg[SITE_LATITUDE], "$") ||
+           !text_is(arg[SITE_LONGITUDE], "$");
+}
+
+/* Contexts of type 'Model' go before those of plans. */
+static int take_context(struct reader *r, const struct step_record *record)
+{
+    struct text_span arg[CONTEXT_ARGS];
+    if (step_split(record->args, arg, CONTEXT_ARGS) != CONTEXT_ARGS)
+        return fail(r, record, "not the 6 attributes that IFC defines");
+    int is_model = text_is(arg[CONTEXT_TYPE], "'Model'");
+    if (r->n_contexts++ == 0 || (is_model && !r->is_model)) {
+        r->context = *record;
+        r->is_model = is_model;
+    }
+    return SH_OK;
+}
+
+static int take_record(struct reader *r, const struct step_record *record)
+{
+    if (text_is(record->type, "IFCSITE") && is_located(record)) {
+        r->site = *record;
+        if (r->n_sites++ > 0) return fail(r, record, "a second site with a latitude; allowed one");
+    }
+    if (text_is(record->type, "IFCMAPCONVERSION") || text_is(record->type, "IFCMAPCONVERSIONSCALED")) {
+        r->map = *record;
+        if (r->n_maps++ > 0) return fail(r, record, "a second map conversion; allowed one");
+    }
+    return text_is(record->type, "IFCGEOMETRICREPRESENTATIONCONTEXT") ? take_context(r, record) : SH_OK;
+}
+
+static int collect(struct reader *r)
+{
+    int rc = SH_OK;
+    for (size_t i = 0; i < r->records.n && rc == SH_OK; i++)
+        rc = take_record(r, &r->records.record[i]);
+    if (rc == SH_OK && r->n_sites == 0 && r->n_maps == 0)
+        return text_fail(&r->records.text, 0, SH_EINPUT, r->err,
+                         "no IFCMAPCONVERSION, and no IFCSITE with RefLatitude and RefLongitude; %s", ADVICE);
+    return rc;
+}
+
+/* A record with its attributes. */
+struct found {
+    struct step_record record;
+    struct text_span arg[STEP_MAX_ARGS];
+};
+
+/* The record that an attribute refers to, of this type and with n attributes at least (n <=
+ * STEP_MAX_ARGS). */
+static int follow(struct reader *r, const struct step_record *from, struct text_span ref, const char *type, size_t n,
+                  struct found *to)
+{
+    uint64_t id;
+    char what[96];
+    snprintf(what, sizeof what, "no reference to %s where one is needed", type);
+    if (!step_reference(ref, &id)) return fail(r, from, what);
+    const struct step_record *record = ifc_records_find(&r->records, id);
+    if (record == NULL || !text_is(record->type, type)) return fail(r, from, what);
+    to->record = *record;
+    if (step_split(to->record.args, to->arg, STEP_MAX_ARGS) < n) return fail(r, &to->record, "attributes are missing");
+    return SH_OK;
+}
+
+/* Whole degrees, minutes, seconds, and perhaps millionths of seconds, all of one sign. */
+static int read_angle(struct reader *r, struct text_span span, const char *name, double limit_deg, double *deg)
+{
+    static const double per_deg[4] = {1.0, 60.0, 3600.0, 3.6e9};
+    static const long limit[4] = {360, 60, 60, 1000000};
+    struct text_span list, part[4];
+    char what[160];
+    long value[4], sign = 0;
+    size_t n = step_list(span, &list) ? step_split(list, part, 4) : 0;
+    snprintf(what, sizeof what, "%s has %zu components; allowed 3 or 4: degrees, minutes, seconds, millionths", name,
+             n);
+    if (n != 3 && n != 4) return fail(r, &r->site, what);
+    *deg = 0.0;
+    for (size_t i = n; i-- > 0;) {
+        snprintf(what, sizeof what, "%s: component %zu is not a whole number within %ld", name, i + 1, limit[i]);
+        if (!step_integer(part[i], &value[i]) || value[i] <= -limit[i] || value[i] >= limit[i])
+            return fail(r, &r->site, what);
+        snprintf(what, sizeof what, "%s: components of different sign; allowed all of one", name);
+        if (value[i] != 0 && sign != 0 && (value[i] > 0) != (sign > 0)) return fail(r, &r->site, what);
+        if (value[i] != 0) sign = value[i];
+        *deg += (double)value[i] / per_deg[i];
+    }
+    snprintf(what, sizeof what, "%s of %.9g deg; allowed -%g to %g deg", name, *deg, limit_deg, limit_deg);
+    return fabs(*deg) <= limit_deg ? SH_OK : fail(r, &r->site, what);
+}
+
+/* n = 2 or 3 numbers of "(a, b, c)". */
+static int read_numbers(struct reader *r, const struct step_record *at, struct text_span span, size_t min, size_t max,
+                        double *value)
+{
+    struct text_span list, part[3];
+    size_t n = step_list(span, &list) ? step_split(list, part, 3) : 0;
+    if (n < min || n > max) return fail(r, at, "not the numbers that are needed");
+    for (size_t i = 0; i < n; i++)
+        if (!step_real(&r->records.text, part[i], &value[i])) return fail(r, at, "a coordinate that is not a number");
+    return SH_OK;
+}
+
+/* Location of an IFCAXIS2PLACEMENT3D, in units of the file; axes[0], axes[1]: its z and x axes. */
+static int read_axes(struct reader *r, const struct step_record *from, struct text_span ref, double location[3],
+                     double axes[2][3])
+{
+    static const double plain[2][3] = {{0.0, 0.0, 1.0}, {1.0, 0.0, 0.0}};
+    struct found placement, found;
+    int rc = follow(r, from, ref, "IFCAXIS2PLACEMENT3D", 3, &placement);
+    if (rc == SH_OK) rc = follow(r, &placement.record, placement.arg[0], "IFCCARTESIANPOINT", 1, &found);
+    if (rc == SH_OK) rc = read_numbers(r, &found.record, found.arg[0], 3, 3, location);
+    for (int i = 0; i < 2 && rc == SH_OK; i++) {
+        memcpy(axes[i], plain[i], sizeof plain[i]);
+        if (text_is(placement.arg[1 + i], "$")) continue;
+        rc = follow(r, &placement.record, placement.arg[1 + i], "IFCDIRECTION", 1, &found);
+        if (rc == SH_OK) rc = read_numbers(r, &found.record, found.arg[0], 3, 3, axes[i]);
+    }
+    return rc;
+}
+
+/* The site's own placement, absolute: its location is the point that has latitude and longitude. */
+static int read_origin(struct reader *r, struct text_span ref, double unit_m, double origin_m[3])
+{
+    struct found local;
+    double axes[2][3];
+    memset(origin_m, 0, 3 * sizeof *origin_m);
+    if (text_is(ref, "$")) return SH_OK;
+    int rc = follow(r, &r->site, ref, "IFCLOCALPLACEMENT", 2, &local);
+    if (rc != SH_OK) return rc;
+    if (!text_is(local.arg[0], "$"))
+        return fail(r, &local.record, "the site's placement is relative to another; allowed absolute");
+    rc = read_axes(r, &local.record, local.arg[1], origin_m, axes);
+    for (int i = 0; i < 3; i++)
+        origin_m[i] *= unit_m;
+    return rc;
+}
+
+/* TrueNorth counts in the world coordinate system, which has to be the model's own. */
+static int read_north(struct reader *r, struct ifc_site *site)
+{
+    struct text_span arg[CONTEXT_ARGS];
+    struct found direction;
+    double at[3], axes[2][3], north[3];
+    if (r->n_contexts == 0) return SH_OK;
+    step_split(r->context.args, arg, CONTEXT_ARGS);
+    int rc = read_axes(r, &r->context, arg[CONTEXT_WORLD], at, axes);
+    if (rc != SH_OK) return rc;
+    for (int i = 0; i < 3; i++)
+        if (at[i] != 0.0 || fabs(axes[0][i] - (i == 2)) > 1e-9 || fabs(axes[1][i] - (i == 0)) > 1e-9)
+            return fail(r, &r->context, "a WorldCoordinateSystem that is shifted or turned; allowed the origin");
+    if (text_is(arg[CONTEXT_NORTH], "$")) return SH_OK;
+    rc = follow(r, &r->context, arg[CONTEXT_NORTH], "IFCDIRECTION", 1, &direction);
+    if (rc == SH_OK) rc = read_numbers(r, &direction.record, direction.arg[0], 2, 3, north);
+    if (rc != SH_OK) return rc;
+    if (!(hypot(north[0], north[1]) > 1e-9)) return fail(r, &direction.record, "a true north without a direction");
+    site->north_deg = angle_deg(atan2(north[0], north[1]));
+    site->has_north = 1;
+    return SH_OK;
+}
+
+/* ---- the map */
+
+/* A unit in that maps are made which is within 1 % of this: scales of the map itself are below that. */
+static double known_unit_m(double m, double model_m)
+{
+    const double known[] = {1.0, model_m, 0.3048, 1200.0 / 3937.0};
+    for (size_t i = 0; i < sizeof known / sizeof known[0]; i++)
+        if (fabs(m / known[i] - 1.0) < 0.01) return known[i];
+    return NAN;
+}
+
+/* Scale has to lead from the model's unit to MapUnit, but for what the map's own scale is. 1 says nothing: it stands also for a
+ * Scale that is left out. */
+static int check_scale(struct reader *r, double scale, double expected)
+{
+    char what[128];
+    if (scale == 1.0 || fabs(scale / expected - 1.0) < 0.01) return SH_OK;
+    snprintf(what, sizeof what,
+             "a Scale of %.9g beside a MapUnit; allowed about %.9g, the model's unit in units of the map", scale,
+             expected);
+    return fail(r, &r->map, what);
+}
+
+static int read_map_unit(struct reader *r, const struct found *crs, double scale, double model_m, double *m)
+{
+    uint64_t id;
+    if (step_reference(crs->arg[CRS_UNIT], &id)) {
+        int rc = advise(r, ifc_unit_of(&r->records, ifc_records_find(&r->records, id), m, r->err));
+        return rc == SH_OK ? check_scale(r, scale, model_m / *m) : rc;
+    }
+    *m = known_unit_m(model_m / scale, model_m);
+    return isnan(*m) ? fail(r, &r->map, "no unit of maps fits its Scale, and the system has no MapUnit") : SH_OK;
+}
+
+/* A number of the map conversion. The first two must be there; a height that is not is NaN. */
+static int read_number(struct reader *r, struct text_span arg, int which, double *value)
+{
+    static const char *const name[MAP_ARGS] = {
+        [MAP_EASTING] = "Eastings",       [MAP_NORTHING] = "Northings",     [MAP_HEIGHT] = "OrthogonalHeight",
+        [MAP_ABSCISSA] = "XAxisAbscissa", [MAP_ORDINATE] = "XAxisOrdinate", [MAP_SCALE] = "Scale"};
+    char what[64];
+    *value = which == MAP_HEIGHT ? NAN : which == MAP_ORDINATE ? 0.0 : 1.0;
+    if (text_is(arg, "$") && which > MAP_NORTHING) return SH_OK;
+    if (step_real(&r->records.text, arg, value)) return SH_OK;
+    snprintf(what, sizeof what, "%s is missing, or is no number", name[which]);
+    return fail(r, &r->map, what);
+}
+
+static int read_map_name(struct reader *r, const struct found *crs, struct ifc_map *map)
+{
+    char *name = ifc_text(crs->arg[CRS_NAME]);
+    if (name == NULL) return text_fail(&r->records.text, 0, SH_ENOMEM, r->err, "no memory for a name");
+    const size_t n = strlen(name);
+    if (n > 0 && n < sizeof map->crs) memcpy(map->crs, name, n + 1);
+    free(name);
+    return map->crs[0] != '\0' ? SH_OK : fail(r, &crs->record, "no name, or one of over 127 bytes, as \"EPSG:25832\"");
+}
+
+static int read_map(struct reader *r, double unit_m, struct ifc_map *map)
+{
+    struct text_span arg[STEP_MAX_ARGS];
+    struct found crs;
+    double value[MAP_ARGS], map_unit_m = 1.0;
+    if (step_split(r->map.args, arg, STEP_MAX_ARGS) < MAP_ARGS)
+        return fail(r, &r->map, "not the 8 attributes that IFC defines");
+    int rc = follow(r, &r->map, arg[MAP_CRS], "IFCPROJECTEDCRS", CRS_ARGS, &crs);
+    if (rc == SH_OK) rc = read_map_name(r, &crs, map);
+    for (int i = MAP_EASTING; i < MAP_ARGS && rc == SH_OK; i++)
+        rc = read_number(r, arg[i], i, &value[i]);
+    if (rc == SH_OK && !(value[MAP_SCALE] > 0.0)) rc = fail(r, &r->map, "a Scale that is not above 0");
+    if (rc == SH_OK && !(hypot(value[MAP_ABSCISSA], value[MAP_ORDINATE]) > 1e-9))
+        rc = fail(r, &r->map, "an x axis without a direction");
+    if (rc == SH_OK) rc = read_map_unit(r, &crs, value[MAP_SCALE], unit_m, &map_unit_m);
+    if (rc != SH_OK) return rc;
+    map->easting_m = value[MAP_EASTING] * map_unit_m;
+    map->northing_m = value[MAP_NORTHING] * map_unit_m;
+    map->height_m = value[MAP_HEIGHT] * map_unit_m;
+    map->x_axis_rad = atan2(value[MAP_ORDINATE], value[MAP_ABSCISSA]);
+    return SH_OK;
+}
+
+/* ---- the site */
+
+static int read_site(struct reader *r, double unit_m, struct ifc_site *site)
+{
+    struct text_span arg[SITE_ARGS];
+    if (step_split(r->site.args, arg, SITE_ARGS) != SITE_ARGS)
+        return fail(r, &r->site, "not the 14 attributes that IFC defines");
+    int rc = read_angle(r, arg[SITE_LATITUDE], "RefLatitude", 90.0, &site->lat_deg);
+    if (rc == SH_OK) rc = read_angle(r, arg[SITE_LONGITUDE], "RefLongitude", 180.0, &site->lon_deg);
+    if (rc == SH_OK) rc = read_origin(r, arg[SITE_PLACEMENT], unit_m, site->origin_m);
+    if (rc != SH_OK) return rc;
+    if (!text_is(arg[SITE_ELEVATION], "$") && !step_real(&r->records.text, arg[SITE_ELEVATION], &site->elevation_m))
+        return fail(r, &r->site, "RefElevation is not a number");
+    site->elevation_m *= unit_m;
+    return SH_OK;
+}
+
+int ifc_site_read(const char *path, struct ifc_site *site, struct sh_err *err)
+{
+    struct reader r = {.err = err};
+    double unit_m = 1.0;
+    *site = (struct ifc_site){.elevation_m = NAN};
+    int rc = ifc_records_index(&r.records, path, err);
+    if (rc == SH_OK) rc = collect(&r);
+    if (rc == SH_OK) rc = advise(&r, ifc_unit_find(&r.records, &unit_m, err));
+    if (rc == SH_OK && r.n_sites > 0) rc = read_site(&r, unit_m, site);
+    if (rc == SH_OK) rc = read_north(&r, site);
+    if (rc == SH_OK && r.n_maps > 0) rc = read_map(&r, unit_m, &site->map);
+    site->has_place = r.n_sites > 0;
+    site->has_map = r.n_maps > 0;
+    ifc_records_close(&r.records);
+    return rc;
+}

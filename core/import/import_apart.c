@@ -1,0 +1,258 @@
+/* SPDX-License-Identifier: MIT */
+#include "core/geotiff.h"
+#include "core/import/geotiff/geotiff_read.h"
+#include "core/import/gltf/gltf_read.h"
+#include "core/import/import.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <math.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/pidfd.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+enum { LOOK_MS = 20, MAX_WARNINGS = 1000 };
+
+#define LEAST_MORE_NS ((int64_t)10000000000) /* for a second reader, once the first has ended */
+
+static int64_t now_ns(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (int64_t)t.tv_sec * 1000000000 + t.tv_nsec;
+}
+
+uint64_t import_memory_of(pid_t pid, enum import_memory which)
+{
+    char path[32], text[128];
+    unsigned long long pages[2] = {0, 0};
+    snprintf(path, sizeof path, "/proc/%ld/statm", (long)pid);
+    int fd = open(path, O_RDONLY | O_CLOEXEC);
+    if (fd < 0) return 0;
+    ssize_t n = read(fd, text, sizeof text - 1);
+    close(fd);
+    if (n <= 0) return 0;
+    text[n] = '\0';
+    if (sscanf(text, "%llu %llu", &pages[0], &pages[1]) != 2) return 0;
+    return pages[which] * (uint64_t)sysconf(_SC_PAGESIZE);
+}
+
+/* ---- start */
+
+static int open_all(struct import_apart *a, struct sh_err *err)
+{
+    a->result_fd = memfd_create("scene", MFD_CLOEXEC);
+    if (a->result_fd < 0 || pipe2(a->note, O_CLOEXEC) != 0)
+        return build_fail(a->task.b, SH_EIO, err, "no process can be made to read it: %s", strerror(errno));
+    fcntl(a->note[0], F_SETFL, O_NONBLOCK);
+    return SH_OK;
+}
+
+void import_close(struct import_apart *a)
+{
+    int *const fd[] = {&a->result_fd, &a->note[0], &a->note[1], &a->pid_fd};
+    for (size_t i = 0; i < sizeof fd / sizeof fd[0]; i++) {
+        if (*fd[i] >= 0) close(*fd[i]);
+        *fd[i] = -1;
+    }
+}
+
+/* Signals are blocked until the child has handlers of its own: this process's must not run there. */
+static int start_child(struct import_apart *a, struct sh_err *err)
+{
+    sigset_t all, before;
+    const struct scene_import_limits *limits = &a->task.limits;
+    a->task.parent = getpid();
+    a->task.result_fd = a->result_fd;
+    a->task.note_fd = a->note[1];
+    a->most_bytes = import_memory_of(a->task.parent, IMPORT_RESIDENT) + ((uint64_t)limits->memory_mib << 20);
+    a->start_ns = now_ns();
+    a->end_ns = a->start_ns + (int64_t)(1e9 * limits->time_s);
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &before);
+    a->pid = fork();
+    if (a->pid == 0) import_child(&a->task);
+    int why = errno;
+    pthread_sigmask(SIG_SETMASK, &before, NULL);
+    if (a->pid < 0) return build_fail(a->task.b, SH_EIO, err, "no process can be made to read it: %s", strerror(why));
+    close(a->note[1]);
+    a->note[1] = -1;
+    a->pid_fd = pidfd_open(a->pid, 0);
+    return SH_OK;
+}
+
+int import_start(struct import_apart *a, struct sh_err *err)
+{
+    a->result_fd = a->note[0] = a->note[1] = a->pid_fd = -1;
+    int rc = open_all(a, err);
+    if (rc == SH_OK) rc = start_child(a, err);
+    if (rc != SH_OK) import_close(a);
+    return rc;
+}
+
+/* ---- what it says */
+
+static void take_note(struct import_apart *a, struct import_note *note)
+{
+    const struct sh_report *report = a->task.b->report;
+    note->text[sizeof note->text - 1] = '\0';
+    sh_keep_line(note->text);
+    if (note->kind == IMPORT_WARNING && a->n_warnings++ < MAX_WARNINGS) sh_warn(report, "%s", note->text);
+    if (note->kind == IMPORT_PROGRESS) sh_progress(report, note->text, note->fraction <= 1.0 ? note->fraction : -1.0);
+    if (note->kind == IMPORT_ERROR)
+        sh_fail(&a->said, note->code >= SH_ELOST && note->code < 0 ? note->code : SH_EINPUT, "%s", note->text);
+}
+
+/* All that has come. Notes come whole. 0: the pipe is closed. */
+static int take_notes(struct import_apart *a)
+{
+    struct import_note note;
+    if (a->note[0] < 0) return 0;
+    for (;;) {
+        ssize_t n = read(a->note[0], &note, sizeof note);
+        if (n < 0 && errno == EINTR) continue;
+        if (n < 0) return 1;
+        if (n == 0) return 0;
+        if (n == (ssize_t)sizeof note) take_note(a, &note);
+    }
+}
+
+/* ---- how it ends */
+
+/* 1: it has ended, and is gone. */
+static int reap(struct import_apart *a, int flags)
+{
+    for (;;) {
+        pid_t got = waitpid(a->pid, &a->status, flags);
+        if (got < 0 && errno == EINTR) continue;
+        /* Where SIGCHLD is ignored, as some programs leave it to those they start, or where somebody else has waited, there
+         * is no status. Its error and its result say enough: a result that is not whole is refused. */
+        if (got < 0) a->status = 0;
+        return got != 0;
+    }
+}
+
+/* Why it must end now; IMPORT_ENDED: it need not. */
+static enum import_end must_end(const struct import_apart *a)
+{
+    if (sh_stopped(a->task.b->report)) return IMPORT_STOPPED;
+    if (now_ns() > a->end_ns) return IMPORT_TIME;
+    return import_memory_of(a->pid, IMPORT_RESIDENT) > a->most_bytes ? IMPORT_MEMORY : IMPORT_ENDED;
+}
+
+/* Whether it is over. */
+static int look(struct import_apart *a)
+{
+    if (!take_notes(a) && a->note[0] >= 0) {
+        close(a->note[0]);
+        a->note[0] = -1;
+    }
+    if (reap(a, WNOHANG)) {
+        take_notes(a);
+        return 1;
+    }
+    a->end = must_end(a);
+    if (a->end == IMPORT_ENDED) return 0;
+    kill(a->pid, SIGKILL);
+    reap(a, 0);
+    return 1;
+}
+
+/* One that hangs would else hold up what the other has read for minutes. */
+static void shorten(struct import_apart *a, const struct import_apart *done)
+{
+    const int64_t now = now_ns(), took = 10 * (now - done->start_ns);
+    const int64_t end_ns = now + (took > LEAST_MORE_NS ? took : LEAST_MORE_NS);
+    if (done->status == 0 && done->end == IMPORT_ENDED && end_ns < a->end_ns) a->end_ns = end_ns;
+}
+
+void import_watch(struct import_apart *const a[], size_t n)
+{
+    struct pollfd on[4];
+    for (size_t left = n; left > 0;) {
+        for (size_t i = 0; i < n; i++) {
+            on[2 * i] = (struct pollfd){.fd = a[i]->is_over ? -1 : a[i]->pid_fd, .events = POLLIN};
+            on[2 * i + 1] = (struct pollfd){.fd = a[i]->is_over ? -1 : a[i]->note[0], .events = POLLIN};
+        }
+        poll(on, 2 * n, LOOK_MS);
+        for (size_t i = 0; i < n; i++) {
+            if (a[i]->is_over || !look(a[i])) continue;
+            a[i]->is_over = 1;
+            left--;
+            for (size_t k = 0; k < n; k++)
+                shorten(a[k], a[i]);
+        }
+    }
+}
+
+static int fail_by_memory(const struct import_apart *a, struct sh_err *err)
+{
+    return build_fail(a->task.b, SH_EINPUT, err,
+                      "%s takes more than %u MiB to read it (scene.import_memory_mib): raise that where the mesh "
+                      "needs it; a broken file takes any amount: " IMPORT_ELSE_CONVERT,
+                      a->task.name, a->task.limits.memory_mib);
+}
+
+static int fail_by_time(const struct import_apart *a, struct sh_err *err)
+{
+    return build_fail(a->task.b, SH_EINPUT, err,
+                      "%s has not read it within %g s (scene.import_s): raise that where the mesh needs it; with "
+                      "a broken file it may hang: " IMPORT_ELSE_CONVERT,
+                      a->task.name, 1e-9 * (double)(a->end_ns - a->start_ns));
+}
+
+static int fail_by_signal(const struct import_apart *a, int number, struct sh_err *err)
+{
+    const char *name = sigabbrev_np(number);
+    if (number == SIGXCPU) return fail_by_time(a, err);
+    if (number == SIGKILL)
+        return build_fail(a->task.b, SH_EINPUT, err,
+                          "the process in which %s read it was killed (SIGKILL), as the system does where memory "
+                          "is short; scene.import_memory_mib is %u: " IMPORT_ELSE_CONVERT,
+                          a->task.name, a->task.limits.memory_mib);
+    return build_fail(a->task.b, SH_EINPUT, err, "%s crashed on it (SIG%s): the file is broken: " IMPORT_ELSE_CONVERT,
+                      a->task.name, name != NULL ? name : "?");
+}
+
+int import_judge(struct import_apart *a, struct sh_err *err)
+{
+    if (a->end == IMPORT_STOPPED) return sh_fail_stopped(err);
+    if (a->end == IMPORT_TIME) return fail_by_time(a, err);
+    if (a->end == IMPORT_MEMORY) return fail_by_memory(a, err);
+    if (WIFSIGNALED(a->status)) return fail_by_signal(a, WTERMSIG(a->status), err);
+    /* What is refused at once, as larger than all memory, never was in use. */
+    if (a->said.code == SH_ENOMEM || strstr(a->said.text, "bad_alloc") != NULL) return fail_by_memory(a, err);
+    if (a->said.code != 0) return sh_fail(err, a->said.code, "%s", a->said.text);
+    if (WEXITSTATUS(a->status) == 0) return SH_OK;
+    return build_fail(a->task.b, SH_EINPUT, err,
+                      "the process in which %s read it ended without a word (exit status %d): the file is "
+                      "broken: " IMPORT_ELSE_CONVERT,
+                      a->task.name, WEXITSTATUS(a->status));
+}
+
+int import_apart(struct scene_build *b, struct sh_err *err)
+{
+    struct import_apart a = {.task = {.b = b, .limits = build_limits(b), .name = "Assimp", .read = import_assimp}};
+    if (gltf_is_name(b->spec->file)) {
+        a.task.name = "the reader of glTF";
+        a.task.read = import_gltf;
+    } else if (geotiff_is_name(b->spec->file)) {
+        a.task.name = "the reader of GeoTIFF";
+        a.task.read = import_geotiff;
+    }
+    struct import_apart *const all[1] = {&a};
+    int rc = import_start(&a, err);
+    if (rc != SH_OK) return rc;
+    import_watch(all, 1);
+    rc = import_judge(&a, err);
+    if (rc == SH_OK) rc = import_result_read(b, a.result_fd, err);
+    import_close(&a);
+    return rc;
+}

@@ -1,0 +1,157 @@
+/* SPDX-License-Identifier: MIT */
+/* The process that reads: limits first, then the work, then the scene into the file of the task.
+ *
+ * For all but IFC it is a fork without exec, perhaps of a process with threads, of which only this one is left. glibc lets
+ * such a process use malloc and stdio; nothing else of the parent's threads is touched. It ends by _exit,
+ * which runs nobody's destructors. */
+#include "core/import/import.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <math.h>
+#include <signal.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+enum { RESULT_FD = 3, NOTE_FD, FIRST_FREE_FD };
+enum { PROGRAM_FILES = 256 }; /* node opens some 30 of its own */
+
+_Static_assert(sizeof(struct import_note) <= 4096, "PIPE_BUF on Linux: written in one piece");
+
+static int note_fd; /* where the pipe is until it is in its place, and then */
+
+/* An error can't be told but by the pipe; where that fails the exit status says that something did. */
+static void send_note(const struct import_note *note)
+{
+    while (write(note_fd, note, sizeof *note) < 0 && errno == EINTR)
+        continue;
+}
+
+static void send_text(int kind, int code, double fraction, const char *text)
+{
+    struct import_note note = {.kind = kind, .code = code, .fraction = fraction};
+    snprintf(note.text, sizeof note.text, "%s", text);
+    send_note(&note);
+}
+
+static void send_warning(void *ctx, const char *text)
+{
+    (void)ctx;
+    send_text(IMPORT_WARNING, 0, 0.0, text);
+}
+
+static void send_progress(void *ctx, const char *what, double fraction)
+{
+    (void)ctx;
+    send_text(IMPORT_PROGRESS, 0, fraction, what);
+}
+
+/* Signals as they are in a new program. Ctrl-C reaches both processes: the parent decides what it means. */
+static void set_signals(void)
+{
+    static const int parents[] = {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGXFSZ};
+    sigset_t none;
+    for (int s = 1; s < NSIG; s++)
+        signal(s, SIG_DFL);
+    for (size_t i = 0; i < sizeof parents / sizeof parents[0]; i++)
+        signal(parents[i], SIG_IGN);
+    sigemptyset(&none);
+    sigprocmask(SIG_SETMASK, &none, NULL);
+}
+
+/* Nothing of the parent's stays open but what the task needs: its sockets and terminals must close when it
+ * closes them. Whatever is printed goes nowhere. */
+static int set_descriptors(const struct import_task *task)
+{
+    int result = fcntl(task->result_fd, F_DUPFD, FIRST_FREE_FD), note = fcntl(task->note_fd, F_DUPFD, FIRST_FREE_FD);
+    int nothing = open("/dev/null", O_RDWR);
+    if (result < 0 || note < 0 || nothing < 0) return 0;
+    note_fd = note;
+    for (int fd = 0; fd < 3; fd++)
+        if (dup2(nothing, fd) < 0) return 0;
+    if (dup2(result, RESULT_FD) < 0 || dup2(note, NOTE_FD) < 0) return 0;
+    note_fd = NOTE_FD;
+    return close_range(FIRST_FREE_FD, ~0u, 0) == 0;
+}
+
+static int set_limit(__rlimit_resource_t resource, uint64_t value)
+{
+    struct rlimit limit;
+    if (getrlimit(resource, &limit) != 0) return 0;
+    if (value < limit.rlim_max) limit.rlim_max = (rlim_t)value;
+    limit.rlim_cur = limit.rlim_max;
+    return setrlimit(resource, &limit) == 0;
+}
+
+/* Where memory gets short all the same, this process is the one to end. */
+static void offer_to_the_oom_killer(void)
+{
+    int fd = open("/proc/self/oom_score_adj", O_WRONLY);
+    if (fd < 0) return;
+    if (write(fd, "1000", 4) < 0) send_warning(NULL, "import: /proc/self/oom_score_adj can't be written");
+    close(fd);
+}
+
+/* The parent looks at memory in use, and at the clock. What the kernel watches is the second line: processor
+ * time where the parent is stopped, and for Assimp the address space. That one is twice the limit, since there is always
+ * more of it than of memory; the address sanitizer takes terabytes of it. */
+static int set_limits(const struct import_task *task)
+{
+    const struct scene_import_limits *limits = &task->limits;
+    const uint64_t bytes = (uint64_t)limits->memory_mib << 20;
+    const uint64_t files = task->argv != NULL ? PROGRAM_FILES : limits->files;
+    int done = set_limit(RLIMIT_CORE, 0) && set_limit(RLIMIT_CPU, (uint64_t)ceil(limits->time_s) + 1) &&
+               set_limit(RLIMIT_NOFILE, FIRST_FREE_FD + files) && set_limit(RLIMIT_FSIZE, bytes);
+#ifndef SH_SANITIZE
+    /* node reserves many times the address space that it uses. */
+    if (task->argv == NULL)
+        done = done && set_limit(RLIMIT_AS, import_memory_of(getpid(), IMPORT_ADDRESSES) + 2 * bytes);
+#endif
+    offer_to_the_oom_killer();
+    return done && prctl(PR_SET_DUMPABLE, 0) == 0; /* no core by a pipe either, which asks for no limit */
+}
+
+static int prepare(const struct import_task *task, struct sh_err *err)
+{
+    note_fd = task->note_fd;
+    set_signals();
+    if (!set_descriptors(task))
+        return sh_fail(err, SH_EIO, "the descriptors of the process that reads can't be set: %s", strerror(errno));
+    if (!set_limits(task))
+        return sh_fail(err, SH_EIO, "the limits of the process that reads can't be set: %s", strerror(errno));
+    return SH_OK;
+}
+
+/* Returns only where there is no such program. */
+static int run_program(const struct import_task *task, struct sh_err *err)
+{
+    execvp(task->argv[0], (char *const *)(uintptr_t)task->argv);
+    return sh_fail(err, SH_EIO, "%s: %s", task->argv[0], strerror(errno));
+}
+
+static int read_scene(const struct import_task *task, struct sh_err *err)
+{
+    static const struct sh_report report = {.warn = send_warning, .progress = send_progress};
+    struct scene_build own;
+    int rc = build_init(&own, task->b->tolerance_m, &report, err);
+    if (rc != SH_OK) return rc;
+    own.start_ns = task->b->start_ns;
+    build_begin_file(&own, task->b->spec);
+    rc = task->read(&own, err);
+    if (rc == SH_OK) rc = build_end_file(&own, err);
+    return rc == SH_OK ? import_result_write(own.scene, RESULT_FD, err) : rc;
+}
+
+_Noreturn void import_child(const struct import_task *task)
+{
+    struct sh_err err = {0};
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (getppid() != task->parent) _exit(1); /* it died before that */
+    int rc = prepare(task, &err);
+    if (rc == SH_OK) rc = task->argv != NULL ? run_program(task, &err) : read_scene(task, &err);
+    if (rc != SH_OK) send_text(IMPORT_ERROR, rc, 0.0, err.text);
+    _exit(rc == SH_OK ? 0 : 1);
+}

@@ -1,0 +1,29 @@
+/* SPDX-License-Identifier: MIT */
+/* Private to import_*.c: materials of Assimp -> colour and textures of a surface. */
+#ifndef CORE_IMPORT_IMPORT_MATERIAL_H
+#define CORE_IMPORT_IMPORT_MATERIAL_H
+
+#include "core/scene/build.h"
+
+struct assimp_lib;
+struct aiScene;
+struct aiMaterial;
+struct aiColor4D;
+
+/* What the material says of a surface; what is there already stays. */
+int import_material(const struct assimp_lib *lib, struct scene_build *b, const struct aiScene *in,
+                    const struct aiMaterial *material, struct scene_surface *surface, struct sh_err *err);
+
+/* The colour of a vertex, as scene->rgb has it. */
+void import_rgb(struct scene_build *b, const struct aiColor4D *colour, uint8_t rgb[4]);
+
+/* How the material's textures lie on a mesh: coordinates of a set, times scale, plus shift. */
+struct import_uv {
+    unsigned set;
+    double scale[2], shift[2];
+    bool is_turned; /* and turned, which is not read: Assimp says it in ways that differ by format */
+};
+/* material: NULL for none. */
+void import_uv(const struct assimp_lib *lib, const struct aiMaterial *material, struct import_uv *uv);
+
+#endif

@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: MIT */
+/* Files as Assimp opens them while it imports: the mesh, and what it names (buffers of a glTF, ...). Only regular files, as
+ * core/infile.h has it: a FIFO would be waited for. */
+#ifndef CORE_IMPORT_IMPORT_OPEN_H
+#define CORE_IMPORT_IMPORT_OPEN_H
+
+#include <assimp/cfileio.h>
+
+struct import_open {
+    struct aiFileIO io; /* for Assimp; UserData is this struct */
+    char refused[400];  /* the first file that is there and can't be opened, and why; empty: none */
+};
+
+void import_open_set_up(struct import_open *open);
+
+#endif

@@ -1,0 +1,375 @@
+/* SPDX-License-Identifier: MIT */
+/* The material libraries of an OBJ file: newmtl; Kd, the diffuse colour; d or Tr, its opacity; map_Kd, its texture; map_d,
+ * what cuts holes. The rest is ignored. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <unistd.h>
+
+#include "core/import/readers.h"
+#include "core/text.h"
+
+/* Things of a kind that one warning counts, and of which it names the first. */
+struct missing {
+    uint64_t n, line;
+    char first[96];
+};
+
+struct mtl {
+    struct scene_build *b;
+    struct text t; /* the library at hand */
+    struct text_span folder;
+    uint32_t first;            /* surface of the OBJ */
+    uint8_t *known;            /* [surfaces from first on] a library has their material */
+    char name[SCENE_NAME_LEN]; /* newmtl, cut as the names of surfaces are */
+    struct text_span material; /* of name */
+    bool has_opacity;          /* d of the material at hand, which counts before Tr */
+    struct missing colour, opacity, texture;
+};
+
+static void add_missing(struct missing *m, uint64_t line, struct text_span text)
+{
+    if (m->n++ > 0) return;
+    m->line = line;
+    snprintf(m->first, sizeof m->first, "%.*s", (int)(text.n < sizeof m->first ? text.n : sizeof m->first - 1), text.p);
+}
+
+/* ---- names */
+
+static struct text_span without_quotes(struct text_span name)
+{
+    const bool quoted = name.n >= 2 && name.p[0] == '"' && name.p[name.n - 1] == '"';
+    return quoted ? (struct text_span){name.p + 1, name.n - 2} : name;
+}
+
+/* Before " # ", where some writers add a comment. "Material #25" is a name as it stands. */
+static struct text_span without_comment(struct text_span name)
+{
+    for (size_t i = 1; i + 1 < name.n; i++) {
+        if (name.p[i] != '#' || name.p[i - 1] != ' ' || name.p[i + 1] != ' ') continue;
+        while (i > 0 && name.p[i - 1] == ' ')
+            i--;
+        return (struct text_span){name.p, i};
+    }
+    return name;
+}
+
+static bool is_same(struct text_span a, struct text_span b)
+{
+    return a.n == b.n && memcmp(a.p, b.p, a.n) == 0;
+}
+
+static bool has_material(const struct scene_surface *s, struct text_span material)
+{
+    const struct text_span used = {s->material, strlen(s->material)};
+    return is_same(used, material) || is_same(without_quotes(used), without_quotes(material)) ||
+           is_same(without_comment(used), material);
+}
+
+/* ---- colours */
+
+static void set_material(struct mtl *m, struct text_span material)
+{
+    scene_copy_name(m->name, sizeof m->name, material.p, material.n);
+    m->material = (struct text_span){m->name, strlen(m->name)};
+    m->has_opacity = false;
+    for (uint32_t i = m->first; i < m->b->scene->n_surfaces; i++)
+        m->known[i - m->first] |= has_material(&m->b->scene->surface[i], m->material);
+}
+
+/* All surfaces with the material at hand; the first colour stays. */
+static void set_colour(struct mtl *m, const double rgb[3])
+{
+    struct scene *scene = m->b->scene;
+    for (uint32_t i = m->first; i < scene->n_surfaces; i++) {
+        struct scene_surface *s = &scene->surface[i];
+        if (s->has_colour || !has_material(s, m->material)) continue;
+        for (int k = 0; k < 3; k++)
+            s->colour[k] = (float)rgb[k];
+        s->has_colour = 1;
+    }
+}
+
+/* Kd r [g b] with r, g, b in 0..1; r alone is a grey. A spectrum or CIE colour is none that is known here. */
+static bool read_colour(struct text *t, double rgb[3])
+{
+    int n = 0;
+    for (; n < 3; n++) {
+        text_skip_blanks(t);
+        if (!text_number(t, &rgb[n]) || !(rgb[n] >= 0.0 && rgb[n] <= 1.0)) break;
+    }
+    text_skip_blanks(t);
+    if (n == 1 && text_at_line_end(t)) rgb[1] = rgb[2] = rgb[0];
+    return n == 3 || (n == 1 && text_at_line_end(t));
+}
+
+static void take_colour(struct mtl *m)
+{
+    struct text at = m->t;
+    double rgb[3];
+    if (read_colour(&m->t, rgb))
+        set_colour(m, rgb);
+    else
+        add_missing(&m->colour, at.line, text_rest(&at));
+}
+
+/* d: opacity; Tr: 1 less that. d -halo depends on the direction, and is none. */
+static void take_opacity(struct mtl *m, bool is_opacity)
+{
+    struct text at = m->t;
+    double share;
+    text_skip_blanks(&m->t);
+    if (!text_number(&m->t, &share) || !(share >= 0.0 && share <= 1.0)) {
+        add_missing(&m->opacity, at.line, text_rest(&at));
+        return;
+    }
+    if (m->has_opacity && !is_opacity) return;
+    m->has_opacity |= is_opacity;
+    for (uint32_t i = m->first; i < m->b->scene->n_surfaces; i++)
+        if (has_material(&m->b->scene->surface[i], m->material))
+            m->b->scene->surface[i].clear = (float)(is_opacity ? 1.0 - share : share);
+}
+
+/* ---- textures */
+
+/* A map: where its image lies, and how. */
+struct map {
+    struct build_image image;
+    double scale[2], shift[2];
+};
+
+static struct text_span next_word(const char **p, const char *end)
+{
+    const char *from = *p;
+    while (*p < end && **p != ' ' && **p != '\t')
+        (*p)++;
+    struct text_span word = {from, (size_t)(*p - from)};
+    while (*p < end && (**p == ' ' || **p == '\t'))
+        (*p)++;
+    return word;
+}
+
+static bool is_number(struct text_span word, double *value)
+{
+    char text[32], *end;
+    if (word.n == 0 || word.n >= sizeof text) return false;
+    memcpy(text, word.p, word.n);
+    text[word.n] = '\0';
+    *value = strtod(text, &end);
+    return *end == '\0' && isfinite(*value);
+}
+
+/* One value of an option; false: it is none, so that the file's name begins there. */
+static bool take_value(struct map *map, struct text_span option, struct text_span word, int n)
+{
+    double value = 0.0;
+    const bool number = is_number(word, &value), scale = text_is(option, "-s"), shift = text_is(option, "-o");
+    if (scale || shift || text_is(option, "-t")) {
+        if (!number || n == 3) return false;
+        if (n < 2 && (scale || shift)) (scale ? map->scale : map->shift)[n] = value;
+        return true;
+    }
+    if (text_is(option, "-clamp") && text_is(word, "on")) map->image.wrap[0] = map->image.wrap[1] = TEXTURE_CLAMP;
+    return n < (text_is(option, "-mm") ? 2 : 1);
+}
+
+/* Options before the file's name: -clamp on, -s u v w, -o u v w, and others, which have one or two values. The name is
+ * the rest, blanks and all. */
+static void read_map(struct text_span text, struct map *map)
+{
+    const char *p = text.p, *end = text.p + text.n;
+    *map = (struct map){.scale = {1.0, 1.0}};
+    while (p < end && *p == '-') {
+        const struct text_span option = next_word(&p, end);
+        for (int n = 0; p < end; n++) {
+            const char *at = p;
+            if (take_value(map, option, next_word(&p, end), n)) continue;
+            p = at;
+            break;
+        }
+    }
+    map->image.name = without_quotes((struct text_span){p, (size_t)(end - p)});
+}
+
+/* How an image lies on the triangles of a surface: their coordinates on it, from those of the file. */
+static void move_uv(struct scene_build *b, uint32_t label, const struct map *map)
+{
+    struct scene *s = b->scene;
+    if (s->uv == NULL || (map->scale[0] == 1.0 && map->scale[1] == 1.0 && map->shift[0] == 0.0 && map->shift[1] == 0.0))
+        return;
+    for (uint32_t i = b->triangle0; i < s->n_triangles; i++)
+        for (int k = 0; k < 6 && s->label[i] == label; k++)
+            s->uv[i][k / 2][k % 2] = (float)((double)s->uv[i][k / 2][k % 2] * map->scale[k % 2] + map->shift[k % 2]);
+}
+
+/* map_Kd or map_d. Of a surface with both, the first one says how they lie. An image that is not there is said here. */
+static int set_texture(struct mtl *m, struct text_span text, bool is_opacity, struct sh_err *err)
+{
+    struct scene *scene = m->b->scene;
+    struct map map;
+    int rc = SH_OK;
+    bool is_missing = false;
+    read_map(text, &map);
+    map.image.folder = m->folder;
+    for (uint32_t i = m->first; i < scene->n_surfaces && map.image.name.n > 0 && rc == SH_OK; i++) {
+        struct scene_surface *s = &scene->surface[i];
+        uint16_t *number = is_opacity ? &s->opacity : &s->texture;
+        if (*number != 0 || !has_material(s, m->material)) continue;
+        if (s->opacity == 0 && s->texture == 0) move_uv(m->b, i, &map);
+        rc = build_texture(m->b, &map.image, number, err);
+        if (rc != SH_OK || access(scene->texture[*number - 1].file, F_OK) == 0) continue;
+        scene->texture[*number - 1].unreadable = 1;
+        is_missing = true;
+    }
+    if (is_missing) add_missing(&m->texture, m->t.line, map.image.name);
+    return rc;
+}
+
+/* ---- libraries */
+
+static bool is_word(struct text_span word, const char *name)
+{
+    return word.n == strlen(name) && strncasecmp(word.p, name, word.n) == 0;
+}
+
+static int read_materials(struct mtl *m, struct sh_err *err)
+{
+    int rc = SH_OK;
+    m->material = (struct text_span){"", 0};
+    for (; m->t.p < m->t.end && rc == SH_OK; text_next_line(&m->t)) {
+        struct text_span word = text_word(&m->t);
+        if (is_word(word, "newmtl")) set_material(m, text_rest(&m->t));
+        if (is_word(word, "Kd")) take_colour(m);
+        if (is_word(word, "d") || is_word(word, "Tr")) take_opacity(m, is_word(word, "d"));
+        bool is_opacity = is_word(word, "map_d");
+        if ((is_opacity || is_word(word, "map_Kd")) && build_wants_textures(m->b))
+            rc = set_texture(m, text_rest(&m->t), is_opacity, err);
+    }
+    return rc;
+}
+
+/* ", with 3 more", or nothing. */
+static const char *others(const struct missing *m, char text[40])
+{
+    text[0] = '\0';
+    if (m->n > 1) snprintf(text, 40, ", with %llu more", (unsigned long long)m->n - 1);
+    return text;
+}
+
+static void warn_of_missing(const struct mtl *m, const char *path)
+{
+    char more[40];
+    if (m->opacity.n > 0)
+        sh_warn(m->b->report, "%s, line %llu: the opacity '%s' is left out%s; allowed are numbers from 0 to 1", path,
+                (unsigned long long)m->opacity.line, m->opacity.first, others(&m->opacity, more));
+    if (!build_wants_textures(m->b)) return;
+    if (m->colour.n > 0)
+        sh_warn(m->b->report, "%s, line %llu: Kd '%s' is left out%s; allowed are numbers from 0 to 1", path,
+                (unsigned long long)m->colour.line, m->colour.first, others(&m->colour, more));
+    if (m->texture.n > 0)
+        sh_warn(m->b->report, "%s, line %llu: the texture '%s' is missing%s; it belongs beside the library or the mesh",
+                path, (unsigned long long)m->texture.line, m->texture.first, others(&m->texture, more));
+}
+
+static int read_library(struct mtl *m, const char *path, uint64_t line, struct sh_err *err)
+{
+    struct sh_err why;
+    int rc = SH_OK;
+    m->folder = build_folder_of(path);
+    m->colour = m->opacity = m->texture = (struct missing){0};
+    if (text_open(&m->t, path, NULL, NULL, &why) == SH_OK) {
+        rc = read_materials(m, err);
+        if (rc == SH_OK) warn_of_missing(m, path);
+    } else {
+        sh_warn(m->b->report, "%s, line %llu: %s", m->b->name, (unsigned long long)line, why.text);
+    }
+    text_close(&m->t);
+    return rc;
+}
+
+static int read_if_there(struct mtl *m, struct text_span name, uint64_t line, bool *found, struct sh_err *err)
+{
+    const struct text_span folder = build_folder_of(m->b->spec->file);
+    char *path = build_find_file(&folder, 1, name);
+    *found = path != NULL;
+    int rc = *found ? read_library(m, path, line, err) : SH_OK;
+    free(path);
+    return rc;
+}
+
+static void warn_of_library(const struct mtl *m, struct text_span name, uint64_t line)
+{
+    if (!build_wants_textures(m->b)) return;
+    sh_warn(m->b->report, "%s, line %llu: the material library '%.*s' is missing; it belongs beside the mesh",
+            m->b->name, (unsigned long long)line, (int)(name.n < 200 ? name.n : 200), name.p);
+}
+
+/* The next name: within quotes, or up to a blank. */
+static struct text_span next_name(const char **p, const char *end)
+{
+    const char *quote = **p == '"' ? memchr(*p + 1, '"', (size_t)(end - *p - 1)) : NULL;
+    if (quote == NULL) return next_word(p, end);
+    const struct text_span name = {*p + 1, (size_t)(quote - *p - 1)};
+    for (*p = quote + 1; *p < end && (**p == ' ' || **p == '\t');)
+        (*p)++;
+    return name;
+}
+
+/* A line holds several names, or one with blanks, perhaps with a comment after it: it is that of which there is a file. */
+static int read_line(struct mtl *m, const struct mtl_line *line, bool *all, struct sh_err *err)
+{
+    const struct text_span whole = without_quotes(line->names), bare = without_comment(line->names);
+    bool found = false;
+    int rc = read_if_there(m, whole, line->line, &found, err);
+    if (!found && rc == SH_OK && bare.n < line->names.n)
+        rc = read_if_there(m, without_quotes(bare), line->line, &found, err);
+    if (found || rc != SH_OK) return rc;
+    bool any = false;
+    const char *end = bare.p + bare.n;
+    for (const char *p = bare.p; p < end && rc == SH_OK;) {
+        rc = read_if_there(m, next_name(&p, end), line->line, &found, err);
+        any |= found;
+    }
+    for (const char *p = bare.p; p < end && any;) { /* some are there: each of the others is missing by itself */
+        const struct text_span folder = build_folder_of(m->b->spec->file), name = next_name(&p, end);
+        char *path = build_find_file(&folder, 1, name);
+        if (path == NULL) warn_of_library(m, name, line->line);
+        *all &= path != NULL;
+        free(path);
+    }
+    if (!any) warn_of_library(m, whole, line->line);
+    *all &= any;
+    return rc;
+}
+
+/* Materials that no library has; where a library is missing, that has been said. */
+static void warn_of_materials(const struct mtl *m)
+{
+    const struct scene *scene = m->b->scene;
+    const char *first = NULL;
+    uint32_t n = 0;
+    for (uint32_t i = m->first; i < scene->n_surfaces; i++) {
+        if (m->known[i - m->first] || scene->surface[i].material[0] == '\0') continue;
+        if (n++ == 0) first = scene->surface[i].material;
+    }
+    if (n > 0 && build_wants_textures(m->b))
+        sh_warn(m->b->report, "%s: %u of its surfaces have a material that no library defines; the first: '%.100s'",
+                m->b->name, n, first);
+}
+
+int read_mtl(struct scene_build *b, const struct mtl_line *line, size_t n, uint32_t first_surface, struct sh_err *err)
+{
+    struct mtl m = {.b = b, .first = first_surface};
+    bool all = true;
+    int rc = SH_OK;
+    if (n == 0) return SH_OK;
+    m.known = calloc(b->scene->n_surfaces - first_surface + 1u, 1);
+    if (m.known == NULL) return build_fail(b, SH_ENOMEM, err, "no memory for materials");
+    for (size_t i = 0; i < n && rc == SH_OK; i++)
+        rc = read_line(&m, &line[i], &all, err);
+    if (rc == SH_OK && all) warn_of_materials(&m);
+    free(m.known);
+    return rc;
+}

@@ -1,0 +1,54 @@
+/* SPDX-License-Identifier: MIT */
+/* Private to read_ply*.c: a PLY mesh while it is read. */
+#ifndef CORE_IMPORT_READ_PLY_H
+#define CORE_IMPORT_READ_PLY_H
+
+#include "core/ply.h"
+#include "core/import/readers.h"
+
+/* A vertex that is not finite. */
+struct ply_lost {
+    uint32_t number; /* from 0 */
+    uint64_t line;
+    double v[3];
+};
+
+struct ply {
+    struct scene_build *b;
+    struct ply_rows r;
+    uint16_t label;         /* of the next face */
+    struct build_weld weld; /* number NULL: vertices are taken as they come */
+    struct ply_lost *lost;  /* in the order of the file */
+    size_t n_lost, cap_lost;
+    uint64_t n_empty; /* faces without corners */
+    /* ---- read_ply_colours.c */
+    struct ply_colour {
+        float rgb[3], uv[2]; /* as they stand in the file; NaN: none */
+    } * colour;              /* of each vertex, where colours or texture coordinates are wanted and there */
+    size_t n_colours, cap_colours;
+    double rgb_scale;                  /* of colours of vertices; 0: not known yet */
+    double face_scale;                 /* of those of faces */
+    bool has_vertex_rgb;               /* each is also wanted */
+    bool has_face_rgb;                 /* the element at hand */
+    bool has_uv;                       /* by vertex, face or both */
+    bool has_vertex_uv, has_texcoords; /* of vertices; of the row at hand, one pair a corner */
+    bool has_texnumbers;
+    bool has_label[PLY_MAX_TEXTURES + 1];
+    uint16_t labels[PLY_MAX_TEXTURES + 1]; /* by texture; the last is that of faces without */
+    uint16_t texture[PLY_MAX_TEXTURES];    /* their numbers in the scene, 0: unused */
+    char *texture_name[PLY_MAX_TEXTURES];
+    uint64_t n_unfit; /* faces with another number of texture coordinates than corners */
+};
+
+/* Before any row: textures that are there, and those that are missing. */
+int ply_begin_textures(struct ply *y, struct sh_err *err);
+void ply_begin_colours(struct ply *y); /* of the element */
+int ply_keep_vertex_colour(struct ply *y, struct sh_err *err);
+/* The row's label, has_rgb and has_uv. */
+int ply_begin_face(struct ply *y, struct sh_err *err);
+/* Corner `to` of the polygon: colour and texture coordinates of the row's corner `from`, which is that vertex. */
+void ply_set_corner_colour(struct ply *y, size_t to, size_t from, uint32_t vertex);
+void ply_end_textures(struct ply *y);
+void ply_free_colours(struct ply *y);
+
+#endif

@@ -1,0 +1,212 @@
+/* SPDX-License-Identifier: MIT */
+/* STL, text and binary, in double. A binary is told by its size, 84 + 50 bytes a triangle: many begin with "solid", too.
+ * Normals are left alone: the order of the corners says which side is out. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+#include "core/import/readers.h"
+#include "core/text.h"
+
+enum { HEAD = 84, FACET = 50, COUNT_AT = 80 };
+
+struct stl {
+    struct scene_build *b;
+    struct text t;
+    struct build_weld weld; /* each triangle has corners of its own */
+    uint16_t label;
+    double largest;
+};
+
+/* Corner `at` of the next triangle. */
+static int take_vertex(struct stl *s, size_t at, const double v[3], struct sh_err *err)
+{
+    int rc = build_corners(s->b, at + 1, err);
+    const double p[3] = {v[0] + 0.0, v[1] + 0.0, v[2] + 0.0}; /* -0 is the same place as 0 */
+    if (rc == SH_OK) rc = build_weld_vertex(s->b, &s->weld, p, err);
+    if (rc != SH_OK) return rc;
+    s->b->corner[at] = s->weld.number[0];
+    s->weld.n = 0; /* numbers of before are not needed again */
+    for (int k = 0; k < 3; k++)
+        s->largest = fmax(s->largest, fabs(v[k]));
+    return SH_OK;
+}
+
+static int begin_solid(struct stl *s, struct text_span name, struct sh_err *err)
+{
+    s->b->scene->n_meshes++;
+    return build_label(s->b, name.n > 0 ? name : build_base_name(s->b), (struct text_span){"", 0}, &s->label, err);
+}
+
+/* ---- binary */
+
+static uint32_t load_u32(const char *p)
+{
+    uint32_t v = 0;
+    for (int i = 3; i >= 0; i--)
+        v = v << 8 | (unsigned char)p[i];
+    return v;
+}
+
+static double load_float(const char *p)
+{
+    const uint32_t bits = load_u32(p);
+    float v;
+    memcpy(&v, &bits, sizeof v);
+    return (double)v;
+}
+
+static uint64_t binary_size(const struct text *t)
+{
+    return t->size >= HEAD ? HEAD + FACET * (uint64_t)load_u32(t->data + COUNT_AT) : UINT64_MAX;
+}
+
+static int read_facet(struct stl *s, const char *p, struct sh_err *err)
+{
+    int rc = SH_OK;
+    for (size_t c = 0; c < 3 && rc == SH_OK; c++) {
+        const char *at = p + 12 * (c + 1); /* after the normal */
+        rc = take_vertex(s, c, (const double[3]){load_float(at), load_float(at + 4), load_float(at + 8)}, err);
+    }
+    return rc == SH_OK ? build_polygon(s->b, 3, s->label, err) : rc;
+}
+
+/* Corners are floats: rounded when the file was written, and taken as they are. */
+static int read_binary(struct stl *s, struct sh_err *err)
+{
+    const uint32_t n = load_u32(s->t.data + COUNT_AT);
+    int rc = begin_solid(s, (struct text_span){"", 0}, err);
+    if (rc == SH_OK) rc = build_weld_begin(s->b, &s->weld, 3 * (uint64_t)n + 1, err);
+    if (rc == SH_OK) rc = build_reserve(s->b, 0, n, err);
+    for (uint32_t i = 0; i < n && rc == SH_OK; i++) {
+        s->t.p = s->t.data + HEAD + FACET * (size_t)i;
+        if ((i & 0xffff) == 0) rc = build_progress(s->b, (double)i / n, err);
+        if ((i & 0xffff) == 0) text_drop_read(&s->t);
+        if (rc == SH_OK) rc = read_facet(s, s->t.p, err);
+    }
+    if (rc == SH_OK) rc = build_single(s->b, s->largest, s->largest * BUILD_SINGLE_ROUNDING, false, err);
+    if (rc == SH_OK && s->t.size > binary_size(&s->t))
+        sh_warn(s->b->report, "%s: %llu bytes after the last of its %u triangles ignored", s->b->name,
+                (unsigned long long)(s->t.size - binary_size(&s->t)), n);
+    return rc;
+}
+
+/* ---- text */
+
+static bool is_word(struct text_span word, const char *name)
+{
+    return word.n == strlen(name) && strncasecmp(word.p, name, word.n) == 0;
+}
+
+static int fail_at(struct stl *s, struct text_span word, const char *expected, struct sh_err *err)
+{
+    s->b->line = s->t.line;
+    if (word.n == 0 && s->t.p >= s->t.end)
+        return build_fail(s->b, SH_EINPUT, err, "cut off: the file ends where %s is expected", expected);
+    return build_fail(s->b, SH_EINPUT, err, "'%.*s' where %s is expected", (int)(word.n < 40 ? word.n : 40), word.p,
+                      expected);
+}
+
+/* Words may stand in any lines. */
+static struct text_span next_word(struct text *t)
+{
+    struct text_span word = text_word(t);
+    while (word.n == 0 && t->p < t->end) {
+        text_next_line(t);
+        word = text_word(t);
+    }
+    return word;
+}
+
+static int expect(struct stl *s, const char *name, struct sh_err *err)
+{
+    const struct text_span word = next_word(&s->t);
+    return is_word(word, name) ? SH_OK : fail_at(s, word, name, err);
+}
+
+static int read_vertex(struct stl *s, size_t at, struct sh_err *err)
+{
+    double v[3];
+    for (int k = 0; k < 3; k++) {
+        text_skip_blanks(&s->t);
+        if (!text_number(&s->t, &v[k])) return fail_at(s, text_word(&s->t), "a number of a vertex", err);
+    }
+    s->b->line = s->t.line;
+    return take_vertex(s, at, v, err);
+}
+
+/* After the word facet. */
+static int read_text_facet(struct stl *s, struct sh_err *err)
+{
+    size_t n = 0;
+    text_next_line(&s->t); /* the normal */
+    int rc = expect(s, "outer", err);
+    if (rc == SH_OK) rc = expect(s, "loop", err);
+    struct text_span word = {"", 0};
+    while (rc == SH_OK && is_word(word = next_word(&s->t), "vertex"))
+        rc = read_vertex(s, n++, err);
+    if (rc == SH_OK && !is_word(word, "endloop")) rc = fail_at(s, word, n < 3 ? "vertex" : "endloop", err);
+    if (rc == SH_OK) rc = expect(s, "endfacet", err);
+    if (rc != SH_OK) return rc;
+    s->b->counts.not_triangles += n < 3;
+    return n < 3 ? SH_OK : build_polygon(s->b, n, s->label, err);
+}
+
+/* After the word solid. */
+static int read_solid(struct stl *s, struct sh_err *err)
+{
+    struct text_span word = {"", 0};
+    int rc = begin_solid(s, text_rest(&s->t), err);
+    for (uint64_t i = 0; rc == SH_OK && is_word(word = next_word(&s->t), "facet"); i++) {
+        if ((i & 0xffff) == 0) rc = build_progress(s->b, (double)(s->t.p - s->t.data) / (double)s->t.size, err);
+        if ((i & 0xffff) == 0) text_drop_read(&s->t);
+        if (rc == SH_OK) rc = read_text_facet(s, err);
+    }
+    if (rc != SH_OK) return rc;
+    if (!is_word(word, "endsolid")) return fail_at(s, word, "facet or endsolid", err);
+    text_next_line(&s->t); /* its name again */
+    return SH_OK;
+}
+
+static int read_text(struct stl *s, struct sh_err *err)
+{
+    struct text_span word;
+    int rc = build_weld_begin(s->b, &s->weld, s->t.size / 64 + 1, err);
+    while (rc == SH_OK && (word = next_word(&s->t)).n > 0)
+        rc = is_word(word, "solid") ? read_solid(s, err) : fail_at(s, word, "solid", err);
+    return rc;
+}
+
+/* Its first word is solid, and no byte near it is 0. */
+static bool is_text(const struct stl *s)
+{
+    struct text t = s->t;
+    return is_word(next_word(&t), "solid") &&
+           memchr(s->t.data, '\0', s->t.size < 2 * HEAD ? s->t.size : 2 * HEAD) == NULL;
+}
+
+static int read_either(struct stl *s, struct sh_err *err)
+{
+    const uint64_t size = binary_size(&s->t);
+    if (size != s->t.size && is_text(s)) return read_text(s, err);
+    if (size <= s->t.size) return read_binary(s, err);
+    if (size == UINT64_MAX)
+        return build_fail(s->b, SH_EINPUT, err, "neither a text that begins with 'solid' nor a binary STL");
+    return build_fail(s->b, SH_EINPUT, err,
+                      "cut off: a binary STL of %u triangles has %llu bytes, and there are %zu; it isn't a text either",
+                      load_u32(s->t.data + COUNT_AT), (unsigned long long)size, s->t.size);
+}
+
+int read_stl(struct scene_build *b, struct sh_err *err)
+{
+    struct stl *s = calloc(1, sizeof *s);
+    if (s == NULL) return build_fail(b, SH_ENOMEM, err, "no memory");
+    s->b = b;
+    int rc = text_open(&s->t, b->spec->file, build_progress, b, err);
+    if (rc == SH_OK) rc = read_either(s, err);
+    text_close(&s->t);
+    build_weld_free(&s->weld);
+    free(s);
+    return rc;
+}

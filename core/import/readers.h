@@ -1,0 +1,25 @@
+/* SPDX-License-Identifier: MIT */
+/* Private to core/import: the readers that scene_load chooses from. In: a builder that is at a file. Out: its vertices and
+ * faces in the builder's scene. */
+#ifndef CORE_IMPORT_READERS_H
+#define CORE_IMPORT_READERS_H
+
+#include "core/scene/build.h"
+
+/* The readers. Each has the spec, and the file's name, from the builder. */
+int read_obj(struct scene_build *b, struct sh_err *err);
+/* Takes what follows mtllib in a line of an OBJ. */
+struct mtl_line {
+    struct text_span names;
+    uint64_t line;
+};
+/* Colours and textures of the surfaces from first_surface on, from the libraries that these lines name; the first one
+ * that knows a material counts. Meshes often come without a library: they have no colours then. Where textures are
+ * wanted, warnings say which libraries, materials and textures are missing. */
+int read_mtl(struct scene_build *b, const struct mtl_line *line, size_t n, uint32_t first_surface, struct sh_err *err);
+int read_ply(struct scene_build *b, struct sh_err *err);
+int read_stl(struct scene_build *b, struct sh_err *err);
+int import_apart(struct scene_build *b, struct sh_err *err); /* core/import/import.h */
+int read_ifc(struct scene_build *b, struct sh_err *err);     /* core/import/ifc/ */
+
+#endif

@@ -1,0 +1,86 @@
+/* SPDX-License-Identifier: MIT */
+/* A cloud's memory, and which reader a file gets. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/studio/analysis/cloud_readers.h"
+#include "core/infile.h"
+
+static int reserve_one(void *array, size_t n, size_t size)
+{
+    void *made = calloc(n, size);
+    memcpy(array, &made, sizeof made); /* whatever it points to */
+    return made != NULL;
+}
+
+int cloud_reserve(struct cloud *cloud, size_t n, unsigned has, struct sh_err *err)
+{
+    if (n == 0) return SH_OK;
+    const struct {
+        unsigned bit;
+        void *array;
+        size_t size;
+    } column[] = {
+        {CLOUD_HAS_STATION, &cloud->station, sizeof *cloud->station},
+        {CLOUD_HAS_LABEL, &cloud->label, sizeof *cloud->label},
+        {CLOUD_HAS_ECHO, &cloud->echo, sizeof *cloud->echo},
+        {CLOUD_TIME, &cloud->time_s, sizeof *cloud->time_s},
+        {CLOUD_RANGE, &cloud->range_m, sizeof *cloud->range_m},
+        {CLOUD_REFLECTANCE, &cloud->reflectance_db, sizeof *cloud->reflectance_db},
+        {CLOUD_AMPLITUDE, &cloud->amplitude_db, sizeof *cloud->amplitude_db},
+        {CLOUD_RGB, &cloud->rgb, sizeof *cloud->rgb},
+        {CLOUD_ECHO_COUNT, &cloud->echo_count, sizeof *cloud->echo_count},
+    };
+    int ok = reserve_one(&cloud->xyz_m, n, sizeof *cloud->xyz_m);
+    for (size_t i = 0; i < sizeof column / sizeof column[0] && ok; i++)
+        if (has & column[i].bit) ok = reserve_one(column[i].array, n, column[i].size);
+    if (!ok) return sh_fail(err, SH_ENOMEM, "no memory for %zu points", n);
+    cloud->n = n;
+    return SH_OK;
+}
+
+/* No, where it can't be read: then the reader says why. */
+static bool is_neither(const char *path)
+{
+    char magic[3] = "";
+    const char *why;
+    FILE *in = infile_open(path, &why);
+    if (in == NULL) return false;
+    size_t n = fread(magic, 1, sizeof magic, in);
+    fclose(in);
+    return (n != sizeof magic || memcmp(magic, "ply", sizeof magic) != 0) && !cloud_is_las(path);
+}
+
+int cloud_read(const char *path, const struct sh_report *report, struct cloud *out, struct sh_err *err)
+{
+    return cloud_read_columns(path, 0, report, out, err);
+}
+
+int cloud_read_columns(const char *path, unsigned columns, const struct sh_report *report, struct cloud *out,
+                       struct sh_err *err)
+{
+    *out = (struct cloud){.epsg = CLOUD_EPSG_UNKNOWN};
+    if (is_neither(path))
+        return sh_fail(err, SH_EINPUT, "%s: not a PLY file and not a LAS file; a point cloud of one of these is needed",
+                       path);
+    int rc = cloud_is_las(path) ? cloud_read_las(path, columns, report, out, err)
+                                : cloud_read_ply(path, columns, report, out, err);
+    if (rc != SH_OK) cloud_free(out);
+    return rc;
+}
+
+void cloud_free(struct cloud *cloud)
+{
+    free(cloud->xyz_m);
+    free(cloud->station);
+    free(cloud->label);
+    free(cloud->echo);
+    free(cloud->time_s);
+    free(cloud->range_m);
+    free(cloud->reflectance_db);
+    free(cloud->amplitude_db);
+    free(cloud->echo_count);
+    free(cloud->rgb);
+    *cloud = (struct cloud){.epsg = CLOUD_EPSG_UNKNOWN};
+}

@@ -1,0 +1,318 @@
+/* SPDX-License-Identifier: MIT */
+/* Deviations along the beam; definitions in core/studio/deviation.h. */
+#include "core/studio/deviation.h"
+
+#include <math.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/vec3.h"
+
+enum { CHUNK = 16 * BVH_CHUNK, MAX_THREADS = 256, PLACES_AROUND = 12 };
+
+/* As core/studio/deviation.h has it: what may differ where the nearest surface is the one that the beam meets. */
+static const double SAME_SHARE = 0.01, SAME_M = 2e-6;
+
+/* The rays around a footprint, by its radius: outlines that cut it don't pass between neighbours of twelve. */
+static const double AROUND = 1.1;
+
+/* So near to each other surfaces can't be told apart by a noise that small in any case. */
+static const double LEAST_CLEAR_M = 2e-5;
+
+struct work {
+    const struct cloud *cloud;
+    const struct cloud_site *site;
+    const struct deviation_head *head;
+    const double *distance_m;
+    const uint32_t *triangle;
+    const struct deviation_points *out;
+    const struct sh_report *report;
+    size_t every; /* so many points have one whose sigma is worked out */
+    atomic_size_t next;
+    atomic_int failed;
+};
+
+/* Rays of one station, and the points that they lead to. */
+struct batch {
+    struct bvh_work *bvh;
+    uint32_t n;
+    size_t point[BVH_CHUNK];
+    double x[BVH_CHUNK], y[BVH_CHUNK], z[BVH_CHUNK], range_m[BVH_CHUNK], hit_m[BVH_CHUNK];
+    uint32_t triangle[BVH_CHUNK];
+    uint8_t is_cut[BVH_CHUNK];   /* the footprint meets something else, too */
+    double around[4][BVH_CHUNK]; /* of rays along the footprint's border: directions, ranges */
+    uint32_t triangle_around[BVH_CHUNK];
+};
+
+int deviation_points_create(size_t n, struct deviation_points *out, struct sh_err *err)
+{
+    float **array[] = {&out->along_m, &out->sigma_m, &out->counts_m, &out->cosine, &out->range_m};
+    *out = (struct deviation_points){0};
+    for (int k = 0; k < 5; k++)
+        if ((*array[k] = malloc((n + 1) * sizeof(float))) == NULL) {
+            deviation_points_free(out);
+            return sh_fail(err, SH_ENOMEM, "no memory for the deviations of %zu points", n);
+        }
+    return SH_OK;
+}
+
+void deviation_points_free(struct deviation_points *points)
+{
+    free(points->along_m);
+    free(points->sigma_m);
+    free(points->counts_m);
+    free(points->cosine);
+    free(points->range_m);
+    free(points->met);
+    *points = (struct deviation_points){0};
+}
+
+/* Whether the line from a place crosses the triangle itself, not only its plane. A thousandth of a millionth beside
+ * it counts. */
+static int crosses(const struct scene *scene, uint32_t triangle, const double at_m[3])
+{
+    const double *corner[3];
+    double e[2][3], n[3];
+    for (int k = 0; k < 3; k++)
+        corner[k] = scene->vertex_m[scene->triangle[triangle][k]];
+    vec3_sub(corner[1], corner[0], e[0]);
+    vec3_sub(corner[2], corner[0], e[1]);
+    vec3_cross(e[0], e[1], n);
+    const double least = -1e-9 * vec3_dot(n, n);
+    for (int k = 0; k < 3; k++) {
+        double side[3], to[3], c[3];
+        vec3_sub(corner[(k + 1) % 3], corner[k], side);
+        vec3_sub(at_m, corner[k], to);
+        vec3_cross(side, to, c);
+        if (!(vec3_dot(c, n) >= least)) return 0;
+    }
+    return 1;
+}
+
+/* Sets the normal, and gives the cosine of the incidence. */
+static double normal_of(const struct bvh *bvh, uint32_t triangle, struct deviation_hit *hit)
+{
+    const double *n = bvh_plane(bvh, triangle)->n;
+    const double length = vec3_length(n);
+    for (int k = 0; k < 3; k++)
+        hit->normal[k] = n[k] / length;
+    return fabs(vec3_dot(hit->normal, hit->beam));
+}
+
+static int is_same(double distance_m, double along_m, double cosine)
+{
+    const double across_m = fabs(along_m) * cosine;
+    return fabs(distance_m - across_m) <= SAME_SHARE * across_m + SAME_M;
+}
+
+/* Whether nothing else lies around the place where the beam meets a face: within the balls of radius_m that touch it
+ * there, in front and behind. */
+static int is_alone(const struct distance *index, const double at_m[3], const double normal[3], double radius_m)
+{
+    struct distance_hit hit;
+    for (int side = -1; side <= 1; side += 2) {
+        double middle[3];
+        for (int k = 0; k < 3; k++)
+            middle[k] = at_m[k] + side * radius_m * normal[k];
+        if (distance_query(index, middle, 0.999 * radius_m, &hit)) return 0;
+    }
+    return 1;
+}
+
+/* Evenly taken of all, whatever their order: by Fibonacci hashing. */
+static int is_sampled(const struct work *w, size_t i)
+{
+    return w->every <= 1 || ((uint64_t)i * 0x9e3779b97f4a7c15ULL >> 32) % w->every == 0;
+}
+
+static void judge(const struct work *w, const struct deviation_head *head, size_t i, const double at_m[3],
+                  const struct deviation_hit *hit)
+{
+    if (!is_sampled(w, i)) return;
+    double counts_m;
+    const double sigma_m = deviation_sigma_m(head, hit, &counts_m),
+                 radius_m = DEVIATION_CLEAR * hypot(sigma_m, counts_m);
+    if (radius_m > LEAST_CLEAR_M && !is_alone(w->site->index, at_m, hit->normal, radius_m)) return;
+    w->out->sigma_m[i] = (float)sigma_m;
+    w->out->counts_m[i] = (float)counts_m;
+}
+
+/* The nearest surface is the one that the beam meets, along_m before the point. */
+static void keep(const struct work *w, const struct deviation_head *head, size_t i, double along_m,
+                 const struct deviation_hit *hit)
+{
+    double at_m[3];
+    for (int k = 0; k < 3; k++)
+        at_m[k] = head->setup.station_m[k] + (hit->range_m - along_m) * hit->beam[k];
+    w->out->along_m[i] = (float)along_m;
+    judge(w, head, i, at_m, hit);
+}
+
+static void settle(const struct work *w, const struct batch *b, uint32_t k, const struct deviation_head *head)
+{
+    const struct bvh *bvh = head->setup.bvh;
+    const struct scene *scene = bvh_scene(bvh);
+    const size_t i = b->point[k];
+    const double *from = head->setup.station_m;
+    const uint32_t first = b->triangle[k], nearest = w->triangle[i];
+    struct deviation_hit hit = {.range_m = b->range_m[k], .beam = {b->x[k], b->y[k], b->z[k]}, .label = -1};
+    double along_m = (double)NAN, cosine = (double)NAN;
+    int same = 0;
+    if (first != BVH_NO_TRIANGLE && !isnan(b->hit_m[k])) {
+        along_m = b->range_m[k] - b->hit_m[k];
+        cosine = normal_of(bvh, first, &hit);
+        hit.label = (int32_t)(scene->label[first] - scene->label0);
+        same = is_same(w->distance_m[i], along_m, cosine);
+    }
+    if (same && w->out->met != NULL) w->out->met[i] = first;
+    if (!same && nearest != first) {
+        const double range_m = bvh_range_of(bvh, nearest, from, hit.beam);
+        const double at_m[3] = {from[0] + range_m * hit.beam[0], from[1] + range_m * hit.beam[1],
+                                from[2] + range_m * hit.beam[2]};
+        if (range_m > 0.0 && crosses(scene, nearest, at_m)) {
+            along_m = b->range_m[k] - range_m;
+            cosine = normal_of(bvh, nearest, &hit);
+            hit.label = -1; /* the share of the power that got there is not known */
+            same = is_same(w->distance_m[i], along_m, cosine);
+        }
+    }
+    w->out->cosine[i] = (float)cosine;
+    if (same && b->is_cut[k] == 0) keep(w, head, i, along_m, &hit);
+}
+
+/* Whether a ray around another one meets the same plane as that. */
+static int is_on_plane(const struct batch *b, uint32_t k, const struct bvh *bvh)
+{
+    if (b->triangle[k] == BVH_NO_TRIANGLE || b->triangle_around[k] == BVH_NO_TRIANGLE) return 0;
+    const double *n = bvh_plane(bvh, b->triangle[k])->n;
+    const double u[3] = {b->x[k], b->y[k], b->z[k]};
+    const double v[3] = {b->around[0][k], b->around[1][k], b->around[2][k]};
+    const double range_m = b->hit_m[k] * vec3_dot(n, u) / vec3_dot(n, v);
+    return fabs(b->around[3][k] - range_m) <= 1e-6 * range_m + SAME_M;
+}
+
+/* Rays along the border of each footprint: where one of them does not meet the plane of the middle, the footprint is
+ * cut. */
+static void look_around(struct batch *b, const struct deviation_head *head, const struct bvh_rays *central)
+{
+    struct bvh_rays rays = *central;
+    rays.dir = (struct vec3_in){b->around[0], b->around[1], b->around[2]};
+    rays.range_m = b->around[3];
+    rays.triangle = b->triangle_around;
+    for (int place = 0; place < PLACES_AROUND; place++) {
+        const double turn = 2.0 * M_PI * place / PLACES_AROUND;
+        for (uint32_t k = 0; k < b->n; k++) {
+            const double u[3] = {b->x[k], b->y[k], b->z[k]};
+            const double slope = AROUND * beam_radius(&head->setup.beam->beam, b->range_m[k]) / b->range_m[k];
+            double e1[3], e2[3], v[3];
+            beam_axes(u, e1, e2);
+            for (int j = 0; j < 3; j++)
+                v[j] = u[j] + slope * (cos(turn) * e1[j] + sin(turn) * e2[j]);
+            const double length = vec3_length(v);
+            for (int j = 0; j < 3; j++)
+                b->around[j][k] = v[j] / length;
+        }
+        bvh_hits(b->bvh, head->setup.bvh, &rays);
+        for (uint32_t k = 0; k < b->n; k++)
+            b->is_cut[k] |= !is_on_plane(b, k, head->setup.bvh);
+    }
+}
+
+static void cast(const struct work *w, struct batch *b, const struct deviation_head *head)
+{
+    if (b->n == 0) return;
+    double far_m = 0.0;
+    for (uint32_t k = 0; k < b->n; k++)
+        far_m = fmax(far_m, b->range_m[k]);
+    struct bvh_rays rays = {.n = b->n,
+                            .dir = {b->x, b->y, b->z},
+                            .range_max_m = 2.0 * far_m + 1.0,
+                            .range_m = b->hit_m,
+                            .triangle = b->triangle};
+    memcpy(rays.from.at_m, head->setup.station_m, sizeof rays.from.at_m);
+    bvh_hits(b->bvh, head->setup.bvh, &rays);
+    memset(b->is_cut, 0, b->n);
+    if (head->setup.beam != NULL) look_around(b, head, &rays);
+    for (uint32_t k = 0; k < b->n; k++)
+        settle(w, b, k, head);
+    b->n = 0;
+}
+
+/* The point's ray, where there is one: not of shots without echo, of points that are far, nor of bodies. */
+static void add(const struct work *w, struct batch *b, size_t i, const struct deviation_head *head)
+{
+    double p[3], d[3];
+    const struct deviation_points *out = w->out;
+    out->along_m[i] = out->sigma_m[i] = out->counts_m[i] = out->cosine[i] = out->range_m[i] = (float)NAN;
+    if (out->met != NULL) out->met[i] = w->triangle[i];
+    if (isnan(w->cloud->xyz_m[i][0])) return;
+    cloud_to_scene(w->cloud, w->site, i, p);
+    vec3_sub(p, head->setup.station_m, d);
+    const double range_m = vec3_length(d);
+    out->range_m[i] = (float)range_m;
+    if (!isfinite(w->distance_m[i]) || w->triangle[i] == CLOUD_TRIANGLE_NONE || !(range_m > 0.0)) return;
+    const uint32_t k = b->n++;
+    b->point[k] = i;
+    b->x[k] = d[0] / range_m;
+    b->y[k] = d[1] / range_m;
+    b->z[k] = d[2] / range_m;
+    b->range_m[k] = range_m;
+}
+
+static void work_on(struct work *w, int reports)
+{
+    struct batch *b = malloc(sizeof *b);
+    const size_t n = w->cloud->n;
+    size_t first;
+    if (b == NULL || bvh_work_create(&b->bvh, NULL) != SH_OK) {
+        free(b);
+        atomic_store(&w->failed, 1);
+        return;
+    }
+    b->n = 0;
+    while ((first = atomic_fetch_add(&w->next, CHUNK)) < n && !sh_stopped(w->report)) {
+        const size_t end = n - first < CHUNK ? n : first + CHUNK;
+        unsigned station = 0;
+        for (size_t i = first; i < end; i++) {
+            const unsigned its = cloud_station(w->cloud, i);
+            if (b->n == BVH_CHUNK || (its != station && station != 0)) cast(w, b, &w->head[station - 1]);
+            station = its;
+            add(w, b, i, &w->head[station - 1]);
+        }
+        if (station != 0) cast(w, b, &w->head[station - 1]);
+        if (reports) sh_progress(w->report, "following the beams", (double)end / (double)n);
+    }
+    bvh_work_free(b->bvh);
+    free(b);
+}
+
+static void *helper_main(void *work)
+{
+    work_on(work, 0);
+    return NULL;
+}
+
+int deviation_along(const struct cloud *cloud, const struct cloud_site *site, const struct deviation_head *head,
+                    const double *distance_m, const uint32_t *triangle, const struct sh_report *report,
+                    const struct deviation_points *out, struct sh_err *err)
+{
+    struct work w = {.cloud = cloud,
+                     .site = site,
+                     .head = head,
+                     .distance_m = distance_m,
+                     .triangle = triangle,
+                     .out = out,
+                     .report = report,
+                     .every = (cloud->n + DEVIATION_SAMPLE - 1) / DEVIATION_SAMPLE};
+    pthread_t helper[MAX_THREADS];
+    unsigned n = 0;
+    while (n + 1 < site->threads && n < MAX_THREADS && pthread_create(&helper[n], NULL, helper_main, &w) == 0)
+        n++;
+    work_on(&w, 1);
+    while (n > 0)
+        pthread_join(helper[--n], NULL);
+    if (atomic_load(&w.failed)) return sh_fail(err, SH_ENOMEM, "no memory to follow the beams");
+    return sh_check_stop(report, err);
+}

@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: MIT */
+/* Private to core/studio/analysis: the parts of the view. Points make places (view.c); places make an image (view_draw.c,
+ * view_shade.c). */
+#ifndef CORE_STUDIO_ANALYSIS_VIEW_INSIDE_H
+#define CORE_STUDIO_ANALYSIS_VIEW_INSIDE_H
+
+#include "core/studio/view.h"
+
+enum { VIEW_SUB = 2 }; /* places along a pixel's side: edges are even */
+
+struct view_place {
+    float order_m; /* of the disc there, bulge included: what is nearest; INFINITY: none */
+    float depth_m; /* of its centre */
+    union {
+        float value;
+        uint8_t rgb[4];
+    };
+};
+
+struct view {
+    struct view_spec spec;
+    double right[3], up[3], ahead[3];
+    double focal; /* in places */
+    uint32_t width, height;
+    struct view_place *place; /* [height][width], the upper row first */
+    int has_rgb;
+    struct view_counts counts;
+};
+
+/* Depths as surfaces: [height][width] of smoothed depths, small holes closed by what surrounds them. INFINITY: nothing
+ * is there. near: the place that closes a hole has its colour from, as an index. */
+int view_smooth(const struct view *view, float *depth_m, uint32_t *near, struct sh_err *err);
+/* Brightness of each place, 0..1, from these depths. log_depth: room for as many figures, for the work. SH_ESTOPPED
+ * where colours->report asks to stop. */
+int view_shade(const struct view *view, const float *depth_m, const struct view_colours *colours, float *log_depth,
+               float *light, struct sh_err *err);
+
+#endif

@@ -1,0 +1,127 @@
+/* SPDX-License-Identifier: MIT */
+/* A recorded point cloud, and how far it lies from the scene. In: a PLY or LAS file, the scene's index of
+ * distances, the stations' georeferences. Out: points; per point a distance in metres and a triangle;
+ * statistics and coverage of them.
+ *
+ * PLY: ASCII, or binary of either byte order, any number types. Element vertex has the properties x, y, z
+ * and, where they are there, station (from 1), echo and label, as our recorder writes them. Everything else
+ * is ignored. LAS: 1.2 to 1.4, not compressed. There the point source ID is the station, the return number
+ * the echo, the extra bytes "label" the label. Further columns are read where they are asked for; colours are
+ * those of 8 bits in PLY, and in LAS the upper 8 of 16. Ownership:
+ * cloud_read allocates, cloud_free releases. A cloud is constant after cloud_read, any thread.
+ *
+ * Memory: 29 bytes a point; time 8, range, reflectance and amplitude 4 each, colours 3, the number of echoes 1. The
+ * file itself is in memory while it is read. */
+#ifndef CORE_STUDIO_CLOUD_H
+#define CORE_STUDIO_CLOUD_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "core/distance.h"
+#include "core/err.h"
+#include "core/georef.h"
+
+enum {
+    CLOUD_LABEL_NONE = 0xffff,
+    CLOUD_EPSG_UNKNOWN = -1,
+    CLOUD_TRIANGLE_NONE = 0xffffffff,
+};
+
+struct cloud {
+    size_t n;
+    double (*xyz_m)[3]; /* [n] as in the file; three times NaN: a shot without echo */
+    uint16_t *station;  /* [n] from 1; NULL: the file has none */
+    uint16_t *label;    /* [n] CLOUD_LABEL_NONE: none; NULL: the file has none */
+    uint8_t *echo;      /* [n] 0: shot without echo; NULL: the file has none */
+    double count_m; /* what the file rounds coordinates to, on the ground: of LAS the scale, of a PLY as text the 1e-6
+                         * m that our recorder writes, in single precision two units in the last place; 0: nothing */
+    int has_own_counts; /* 1: a LAS file of ours: points of its first station stand as the stream's own counts */
+    /* Where they were asked for and the file has them, else NULL: */
+    double *time_s;        /* [n] PLY: since the scan's start; LAS: as the file counts it */
+    float *range_m;        /* [n] PLY alone; NaN: a shot without echo */
+    float *reflectance_db; /* [n] NaN: not modelled; LAS: of scanhead's own files, whose intensity holds it */
+    float *amplitude_db;   /* [n] PLY alone; NaN: none */
+    uint8_t *echo_count;   /* [n] echoes of the point's pulse; 0: shot without echo */
+    uint8_t (*rgb)[3];     /* [n] sRGB */
+    int64_t epsg;          /* of the header's comment "epsg N", 0: scene frame; CLOUD_EPSG_UNKNOWN: it has none */
+};
+
+/* Errors (SH_EINPUT, naming file and line, or byte): missing or unreadable, not a PLY or LAS file, x, y or z
+ * missing, a count the file can't hold, truncated, infinite coordinates, or only some of the three NaN, a
+ * station, echo or label that is not a whole number in its range. Warns of other elements and of bytes after
+ * the last one. */
+int cloud_read(const char *path, const struct sh_report *report, struct cloud *out, struct sh_err *err);
+enum cloud_column {
+    CLOUD_TIME = 1,
+    CLOUD_RANGE = 2,
+    CLOUD_REFLECTANCE = 4,
+    CLOUD_ECHO_COUNT = 8,
+    CLOUD_RGB = 16,
+    CLOUD_AMPLITUDE = 32
+};
+/* The same, with these columns. SH_ESTOPPED where report asks to stop. */
+int cloud_read_columns(const char *path, unsigned columns, const struct sh_report *report, struct cloud *out,
+                       struct sh_err *err);
+void cloud_free(struct cloud *cloud);
+
+/* How cloud_compare takes a point to the scene. */
+struct cloud_site {
+    const struct distance *index;
+    const struct georef *const
+        *georef; /* [n_stations], by station - 1; NULL: the cloud is in the scene frame already */
+    uint32_t n_stations;
+    double max_m; /* how far to look */
+    /* Bodies that do not stand in the scene; NULL: there are none. Takes a point of such a body's label from
+     * the scene to the body's own frame and gives the body's index; NULL: the point is of the scene. From any
+     * thread. */
+    const struct distance *(*body)(void *ctx, unsigned station, uint16_t label, double p_prcs[3]);
+    void *body_ctx;
+    unsigned threads; /* at least 1; the result does not depend on it */
+};
+
+/* Per point: its distance from the nearest triangle (NaN: shot without echo; INFINITY: nothing
+ * within max_m) and that triangle's number, or CLOUD_TRIANGLE_NONE, also for a body's. Points without a
+ * station are of the first one. SH_EINPUT: a point's station is not among n_stations. SH_ESTOPPED. */
+int cloud_compare(const struct cloud *cloud, const struct cloud_site *site, const struct sh_report *report,
+                  double *distance_m, uint32_t *triangle, struct sh_err *err);
+
+/* The station of point i, from 1, and its place in the scene. */
+static inline unsigned cloud_station(const struct cloud *cloud, size_t i)
+{
+    return cloud->station != NULL ? cloud->station[i] : 1;
+}
+void cloud_to_scene(const struct cloud *cloud, const struct cloud_site *site, size_t i, double p_prcs[3]);
+/* All points become places in the scene, once for all that follows; then there are no georefs any more. As
+ * cloud_compare fails; after that the cloud is of no more use. */
+int cloud_into_scene(struct cloud *cloud, struct cloud_site *site, const struct sh_report *report, struct sh_err *err);
+
+struct cloud_coverage {
+    uint32_t surfaces_hit, triangles_hit;
+};
+
+/* The surface of point i: its label, or where the file has none its nearest triangle's; CLOUD_LABEL_NONE when
+ * there is no such triangle. */
+uint16_t cloud_surface(const struct cloud *cloud, const struct scene *scene, const uint32_t *triangle, size_t i);
+
+/* How many of the n_surfaces, the scene's and then those of bodies, and of the scene's triangles have points
+ * (far ones have no triangle). SH_EINPUT: a label of n_surfaces or more. */
+int cloud_cover(const struct cloud *cloud, const struct scene *scene, uint32_t n_surfaces, const uint32_t *triangle,
+                struct cloud_coverage *out, struct sh_err *err);
+
+/* A percentile is the nearest rank: the smallest value that at least so many of all do not exceed. Mean, RMS,
+ * percentiles and maximum are over the points that are not far, and NaN when there are none. */
+struct cloud_stats {
+    size_t points; /* with coordinates, far ones included */
+    size_t empty;  /* shots without echo */
+    size_t far;    /* nothing within the reach of the search */
+    size_t beyond; /* farther than the tolerance, far ones included */
+    double mean_m, rms_m, p50_m, p95_m, p999_m, max_m;
+    size_t worst; /* the first point at max_m, the first far one if there is one; n when no point has
+                     coordinates */
+};
+
+/* distance_m as cloud_compare gives it; not negative. */
+void cloud_stats(const double *distance_m, size_t n, double tolerance_m, struct cloud_stats *out);
+
+#endif

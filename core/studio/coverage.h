@@ -1,0 +1,155 @@
+/* SPDX-License-Identifier: MIT */
+/* Coverage: how much of a scene's surface pulses meet, and where a head would see most of what is left.
+ *
+ * In: a scene with its BVH (prcs, metres), and scans as setups and schedules. Out: figures of each cell of the surface,
+ * sums over all cells, a mesh of the cells.
+ *
+ * Cells. Each triangle is cut into pieces that are at most cell_m across (core/studio/coverage/cut.h); the sum of their areas
+ * is its area. Pieces whose centres lie in one cube of side cell_m, that have one
+ * label, and whose normals have the same largest component with the same sign, are one cell. So small triangles share
+ * a cell, and the two sides of a wall never do. A cell reaches at most 2.5 cell_m along each axis. Area counts, not
+ * the number of cells.
+ *
+ * A cell is seen where the centre of a pulse meets one of its pieces, from whichever side, in a way that the head can
+ * report (cast_meet: within its ranges and above its threshold, both without noise; through glass, not in mirrors).
+ * Triangles with the same corners are one surface: all but one are left out (scene_find_twins). Bodies that move hide
+ * what they hide, and have no cells. What lies between bodies, as the inner faces of layers of a wall, counts as
+ * surface that nobody sees.
+ *
+ * Results do not depend on the number of threads. One coverage belongs to one thread; the work is shared out below. */
+#ifndef CORE_STUDIO_COVERAGE_H
+#define CORE_STUDIO_COVERAGE_H
+
+#include <stdint.h>
+
+#include "core/bvh.h"
+#include "core/cast.h"
+#include "core/err.h"
+#include "core/schedule.h"
+
+struct coverage;
+
+struct coverage_spec {
+    const struct bvh *bvh; /* its scene is cut; both must outlive the coverage */
+    const uint8_t *silent; /* by label: surfaces that give no echo (cast_setup), and so have no cells; NULL: none */
+    double cell_m;
+    double memory_mib; /* for cells and pieces */
+    unsigned threads;  /* at least 1 */
+};
+
+/* SH_EINPUT: the cells need more memory than allowed; the text has the figures and a cell that would do. SH_ESTOPPED
+ * where report asks to stop. */
+int coverage_create(const struct coverage_spec *spec, const struct sh_report *report, struct coverage **out,
+                    struct sh_err *err);
+void coverage_free(struct coverage *coverage);
+
+enum { COVERAGE_MAX_STATIONS = 65535 };
+
+/* A scan: from where and with what, and the pulses. */
+struct coverage_scan {
+    struct cast_setup setup;
+    struct schedule_segment segment; /* has an end */
+    /* Poses of what moves at a time of the scan; NULL: nothing does. From any thread, each with a setup of its own. */
+    void (*enter)(void *ctx, int64_t t_ns, struct cast_setup *setup);
+    void *ctx;
+};
+
+struct coverage_pulses {
+    uint64_t cast, met;   /* with at least one hit that counts, on what stands still */
+    uint64_t hits, front; /* of these hits, on the front of a triangle */
+};
+
+/* Casts a scan. Its result waits until it is kept or dropped. Work of over a second reports how far it is. */
+int coverage_look(struct coverage *coverage, const struct coverage_scan *scan, const char *what,
+                  const struct sh_report *report, struct coverage_pulses *pulses, struct sh_err *err);
+/* Of the scan that waits: the area that it sees, and what of that no scan before has seen. */
+void coverage_waiting(const struct coverage *coverage, double *seen_m2, double *gain_m2);
+/* It becomes the next station's, counted from 1 in this order. */
+void coverage_keep(struct coverage *coverage);
+void coverage_drop(struct coverage *coverage);
+
+/* ---- figures */
+
+/* Shares of area, weakest first. */
+struct coverage_spread {
+    double mean, p05, p50, p95; /* NaN: nothing is seen */
+};
+
+struct coverage_sums {
+    uint32_t stations, cells;
+    uint64_t pieces, triangles;
+    double area_m2, twin_m2, silent_m2;   /* of all cells; of faces left out: they lie on others; they give no echo */
+    double none_m2, one_m2, several_m2;   /* by how many stations see it */
+    struct coverage_spread density_1_m2;  /* pulses per area, of all stations; over the area that is seen */
+    struct coverage_spread incidence_rad; /* the smallest of each cell, likewise */
+    struct coverage_spread range_m;       /* the smallest of each cell, likewise */
+};
+int coverage_sum(const struct coverage *coverage, struct coverage_sums *sums, struct sh_err *err);
+
+/* alone_m2[n], n the number of stations that were kept: what only this one sees. */
+void coverage_alone(const struct coverage *coverage, double *alone_m2);
+
+struct coverage_of_label {
+    double area_m2, seen_m2, several_m2;
+    uint64_t pulses;
+};
+/* label[n_surfaces] of the scene. */
+void coverage_by_label(const struct coverage *coverage, struct coverage_of_label *label);
+
+/* One cell, for tests and pictures. */
+struct coverage_cell {
+    double area_m2;
+    uint32_t pulses, stations;
+    double incidence_rad, range_m; /* NaN: not seen */
+    uint16_t label, first_station; /* 0: none */
+};
+uint32_t coverage_cells(const struct coverage *coverage);
+void coverage_get(const struct coverage *coverage, uint32_t cell, struct coverage_cell *out);
+
+/* The cell of a place on a triangle of the scene, of which p_m is the nearest point or near it; COVERAGE_NO_CELL: the
+ * triangle is left out (it lies on another one, or is silent). For points that somebody else has measured. Any thread. */
+enum { COVERAGE_NO_CELL = 0xffffffff };
+uint32_t coverage_cell_at(const struct coverage *coverage, uint32_t triangle, const double p_m[3]);
+
+/* Calls `piece` for all pieces in their order, with the cell and n = 3 or 4 corners (prcs), counter-clockwise where the
+ * triangle's are. Neighbouring pieces of one triangle and one cell may come as one. */
+typedef void coverage_piece(void *ctx, uint32_t cell, int n, const double corner[4][3]);
+void coverage_pieces(const struct coverage *coverage, coverage_piece *piece, void *ctx);
+
+/* ---- a picture: the cells as a mesh with colours and the scalars stations, density, incidence_deg, range_m and cell.
+ * Where a figure is not there it is -1. The ending says the format (core/studio/mesh.h); scalars are of .ply alone. */
+
+/* SEEN: seen by none red, by one yellow, by several green. COUNT: how many stations, blue none to red all. DENSITY:
+ * points per area, decades, blue the 5 % to red the 95 % of the area. INCIDENCE: blue head on to red at 90 degrees.
+ * Where nothing is seen the last two are grey. */
+enum coverage_colour { COVERAGE_SEEN, COVERAGE_COUNT, COVERAGE_DENSITY, COVERAGE_INCIDENCE };
+int coverage_write_mesh(const struct coverage *coverage, const char *path, enum coverage_colour colour,
+                        const struct sh_report *report, struct sh_err *err);
+
+/* ---- the next station */
+
+/* Directions of a head, prcs, and the solid angle that each stands for. */
+struct coverage_directions {
+    uint32_t n;
+    const double (*dir)[3]; /* [n] unit vectors */
+    const double *each_sr;  /* [n] */
+    double range_min_m, range_max_m;
+};
+
+/* What a head at a place would see that no station has seen, by far fewer rays than a scan has. Each ray that meets
+ * such a cell stands for the area range^2 each_sr / cos(incidence), cos at least 0.02. Where that is less than the
+ * cell's, the cell is met by several rays, and counts as a whole, as it does in a scan. Where it is more, the ray stands
+ * for the cells around, too, and counts with its area. An infinite each_sr lets each cell that is met count as a whole.
+ * What this leaves out: cells of which only corners are seen, between rays. What it adds: cells that a scan's own points
+ * are too far apart for, and ray areas that reach beyond an outline, half of one on average along all outlines. Glass
+ * counts as a wall, and what moves as nothing. */
+struct coverage_gain {
+    double gain_m2;
+    double front; /* of what the rays meet, the share met from the front; NaN: nothing is met */
+};
+/* gain[n] for places place_m[n]. bvh: of the coverage's scene; it reaches the places. */
+int coverage_gains(const struct coverage *coverage, const struct bvh *bvh, const struct coverage_directions *directions,
+                   const double (*place_m)[3], uint32_t n, const struct sh_report *report, struct coverage_gain *gain,
+                   struct sh_err *err);
+
+#endif

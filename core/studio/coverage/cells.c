@@ -1,0 +1,334 @@
+/* SPDX-License-Identifier: MIT */
+/* The surface as cells: cutting triangles, and which pieces are one cell. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/studio/coverage/inside.h"
+#include "core/grow.h"
+#include "core/huge.h"
+#include "core/rng.h"
+#include "core/vec3.h"
+
+/* What makes pieces one cell. */
+struct key {
+    int32_t cube[3];
+    uint32_t label_side;
+};
+
+/* At most, where each piece is a cell and a column of its own: entries, the cell's key, places of the table, and what
+ * growing arrays leaves over. */
+enum { PIECE_BYTES = 4 + 2 * (4 + sizeof(struct cell) + sizeof(struct key)) + sizeof(struct cell_met) + 16 };
+enum { TRIANGLE_BYTES = 4 };
+static const double MAX_PIECES = 4e9; /* they are numbered in 32 bits */
+enum { REPORT_EVERY = 1 << 16 };
+/* The corner of the cubes lies so many cells before that of the scene's bounds: walls at round coordinates shall not
+ * lie on a cube's side, where rounding would deal their pieces out to two. */
+static const double ASIDE = 0.38196601125010515;
+
+struct build {
+    struct coverage *c;
+    const struct sh_report *report;
+    struct key *key; /* of each cell */
+    size_t key_room, cell_room;
+    uint32_t *table; /* 1 + cell, by the key's hash; 0: free */
+    uint64_t table_size;
+    uint32_t at; /* piece */
+    uint32_t label_side;
+    double piece_m2;
+    struct sh_err *err;
+    int rc;
+};
+
+void coverage_corners(const struct coverage *c, uint32_t triangle, double corner[3][3])
+{
+    for (int i = 0; i < 3; i++)
+        memcpy(corner[i], c->scene->vertex_m[c->scene->triangle[triangle][i]], sizeof corner[i]);
+}
+
+float coverage_float(uint32_t bits)
+{
+    float f;
+    memcpy(&f, &bits, sizeof f);
+    return f;
+}
+
+uint32_t coverage_bits(double value)
+{
+    const float f = (float)value;
+    uint32_t bits;
+    memcpy(&bits, &f, sizeof bits);
+    return bits;
+}
+
+/* Twice the area as a vector. */
+static void normal_of(const double corner[3][3], double n[3])
+{
+    double a[3], b[3];
+    vec3_sub(corner[1], corner[0], a);
+    vec3_sub(corner[2], corner[0], b);
+    vec3_cross(a, b, n);
+}
+
+/* The largest component, and its sign: 0..5. */
+static uint32_t side_of(const double n[3])
+{
+    int axis = fabs(n[1]) > fabs(n[0]) ? 1 : 0;
+    if (fabs(n[2]) > fabs(n[axis])) axis = 2;
+    return 2 * (uint32_t)axis + (n[axis] < 0.0);
+}
+
+/* ---- how many pieces there are */
+
+static int is_silent(const struct coverage *c, uint32_t t)
+{
+    return c->spec.silent != NULL && c->spec.silent[c->scene->label[t]];
+}
+
+static int has_cells(const struct coverage *c, uint32_t t)
+{
+    return !is_silent(c, t) && (c->twin[t / 64] >> t % 64 & 1) == 0;
+}
+
+static double count_pieces(const struct coverage *c, double cell_m)
+{
+    double pieces = 0.0;
+    for (uint32_t t = 0; t < c->scene->n_triangles; t++) {
+        double corner[3][3];
+        if (!has_cells(c, t)) continue;
+        coverage_corners(c, t, corner);
+        pieces += cut_count((const double(*)[3])corner, cell_m);
+    }
+    return pieces;
+}
+
+static double mib_of(const struct coverage *c, double pieces)
+{
+    return (pieces * PIECE_BYTES + (double)c->scene->n_triangles * TRIANGLE_BYTES) / 0x1p20;
+}
+
+static int refuse(const struct coverage *c, double pieces, struct sh_err *err)
+{
+    double cell_m = c->spec.cell_m;
+    int tries = 0;
+    do
+        cell_m *= 1.5;
+    while (mib_of(c, count_pieces(c, cell_m)) > c->spec.memory_mib && ++tries < 100);
+    if (tries == 100)
+        return sh_fail(err, SH_EINPUT,
+                       "%u triangles need %.0f MiB for coverage even in the largest cells, and %.0f MiB are allowed",
+                       c->scene->n_triangles, mib_of(c, c->scene->n_triangles), c->spec.memory_mib);
+    return sh_fail(err, SH_EINPUT,
+                   "cells of %g m cut the surface into %.3g pieces, which take up to %.0f MiB, and %.0f MiB are "
+                   "allowed; a cell of %.2g m would do",
+                   c->spec.cell_m, pieces, mib_of(c, pieces), c->spec.memory_mib, cell_m);
+}
+
+/* ---- which pieces are one cell */
+
+static uint64_t hash_of(const struct key *k)
+{
+    uint64_t words[2];
+    memcpy(words, k, sizeof words);
+    return rng_mix(words[0] + 0x9e3779b97f4a7c15ULL * rng_mix(words[1]));
+}
+
+static int enlarge(struct build *b)
+{
+    const uint64_t size = b->table_size != 0 ? 2 * b->table_size : 1 << 12;
+    free(b->table);
+    b->table = calloc(size, sizeof *b->table);
+    b->table_size = size;
+    if (b->table == NULL) return 0;
+    for (uint32_t i = 0; i < b->c->n_cells; i++) {
+        uint64_t at = hash_of(&b->key[i]) & (size - 1);
+        while (b->table[at] != 0)
+            at = (at + 1) & (size - 1);
+        b->table[at] = i + 1;
+    }
+    return 1;
+}
+
+static uint32_t find_cell(struct build *b, const struct key *key)
+{
+    struct coverage *c = b->c;
+    const int has_room = 2 * ((uint64_t)c->n_cells + 1) <= b->table_size || enlarge(b);
+    if (!has_room || !grow(&b->key, &b->key_room, c->n_cells + 1, sizeof *b->key) ||
+        !grow(&c->cell, &b->cell_room, c->n_cells + 1, sizeof *c->cell)) {
+        b->rc = sh_fail(b->err, SH_ENOMEM, "no memory for the cells of coverage");
+        return NO_CELL;
+    }
+    uint64_t at = hash_of(key) & (b->table_size - 1);
+    for (; b->table[at] != 0; at = (at + 1) & (b->table_size - 1))
+        if (memcmp(&b->key[b->table[at] - 1], key, sizeof *key) == 0) return b->table[at] - 1;
+    b->table[at] = ++c->n_cells;
+    b->key[c->n_cells - 1] = *key;
+    c->cell[c->n_cells - 1] = (struct cell){.label = (uint16_t)(key->label_side >> 3)};
+    return c->n_cells - 1;
+}
+
+static void add_piece(struct build *b, const double corner[4][3], int n)
+{
+    struct key key = {.label_side = b->label_side};
+    for (int i = 0; i < 3; i++) {
+        double sum_m = 0.0;
+        for (int k = 0; k < n; k++)
+            sum_m += corner[k][i];
+        const double centre_m = sum_m / n;
+        key.cube[i] = (int32_t)floor((centre_m - b->c->origin_m[i]) / b->c->spec.cell_m);
+    }
+    const uint32_t cell = find_cell(b, &key);
+    if (cell == NO_CELL) return;
+    b->c->cell[cell].area_m2 += b->piece_m2;
+    b->c->piece[b->at++] = cell;
+}
+
+static void cut_triangle(struct build *b, uint32_t t)
+{
+    struct coverage *c = b->c;
+    double corner[3][3], n[3];
+    struct cut cut;
+    coverage_corners(c, t, corner);
+    normal_of((const double(*)[3])corner, n);
+    const double area_m2 = 0.5 * vec3_length(n);
+    if (c->first[t] == NO_CELL) {
+        *(is_silent(c, t) ? &c->silent_m2 : &c->twin_m2) += area_m2;
+        return;
+    }
+    b->label_side = (uint32_t)(c->scene->label[t] - c->scene->label0) << 3 | side_of(n);
+    cut_set_up((const double(*)[3])corner, c->spec.cell_m, &cut);
+    for (uint32_t k = 0; k < cut_columns(&cut); k++) {
+        const uint32_t rows = cut_rows(&cut, k);
+        b->piece_m2 = area_m2 * cut_share(&cut, k);
+        for (uint32_t r = 0; r < rows && b->rc == SH_OK; r++) {
+            double at[4][3];
+            const int corners = cut_corners(&cut, (const double(*)[3])corner, k, r, r + 1, at);
+            add_piece(b, (const double(*)[3])at, corners);
+        }
+    }
+}
+
+static int build(struct coverage *c, const struct sh_report *report, struct sh_err *err)
+{
+    struct build b = {.c = c, .report = report, .err = err};
+    for (uint32_t t = 0; t < c->scene->n_triangles && b.rc == SH_OK; t++) {
+        if (t % REPORT_EVERY == 0) sh_progress(report, "cutting the surface", (double)b.at / (double)c->n_pieces);
+        if (t % 1024 == 0) b.rc = sh_check_stop(report, err);
+        if (b.rc == SH_OK) cut_triangle(&b, t);
+    }
+    free(b.key);
+    free(b.table);
+    if (b.rc != SH_OK) return b.rc;
+    c->met = calloc(c->n_cells, sizeof *c->met);
+    return c->met != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory for the cells of coverage");
+}
+
+static int set_up(struct coverage *c, struct sh_err *err)
+{
+    double span_m = 0.0;
+    for (int i = 0; i < 3; i++) {
+        c->origin_m[i] = c->scene->min_m[i] - ASIDE * c->spec.cell_m;
+        span_m = fmax(span_m, c->scene->max_m[i] - c->scene->min_m[i]);
+    }
+    if (span_m / c->spec.cell_m > 1e9)
+        return sh_fail(err, SH_EINPUT, "cells of %g m in a scene of %.3g m; allowed is a cell of at least %.2g m",
+                       c->spec.cell_m, span_m, 1e-9 * span_m);
+    const double pieces = count_pieces(c, c->spec.cell_m);
+    return mib_of(c, pieces) > c->spec.memory_mib || !(pieces < MAX_PIECES) ? refuse(c, pieces, err) : SH_OK;
+}
+
+/* Where each triangle's columns begin, and each column's pieces. */
+static int number_pieces(struct coverage *c, struct sh_err *err)
+{
+    const uint32_t n = c->scene->n_triangles;
+    size_t room = 0;
+    c->first = malloc(n * sizeof *c->first);
+    int has_room = c->first != NULL;
+    for (uint32_t t = 0; t < n && has_room; t++) {
+        double corner[3][3];
+        struct cut cut;
+        c->first[t] = NO_CELL;
+        if (!has_cells(c, t)) continue;
+        c->first[t] = (uint32_t)c->n_columns;
+        coverage_corners(c, t, corner);
+        cut_set_up((const double(*)[3])corner, c->spec.cell_m, &cut);
+        const uint32_t columns = cut_columns(&cut);
+        has_room = grow(&c->column, &room, c->n_columns + columns, sizeof *c->column);
+        for (uint32_t k = 0; k < columns && has_room; k++) {
+            c->column[c->n_columns++] = (uint32_t)c->n_pieces;
+            c->n_pieces += cut_rows(&cut, k);
+        }
+    }
+    if (has_room) has_room = (c->piece = huge_alloc((c->n_pieces + 1) * sizeof *c->piece)) != NULL;
+    return has_room ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory for the pieces of %u triangles", n);
+}
+
+int coverage_create(const struct coverage_spec *spec, const struct sh_report *report, struct coverage **out,
+                    struct sh_err *err)
+{
+    struct coverage *c = *out = calloc(1, sizeof *c);
+    if (c == NULL) return sh_fail(err, SH_ENOMEM, "no memory for coverage");
+    c->spec = *spec;
+    c->scene = bvh_scene(spec->bvh);
+    int rc = scene_find_twins(c->scene, report, &c->twin, err);
+    if (rc == SH_OK) rc = set_up(c, err);
+    if (rc == SH_OK) rc = number_pieces(c, err);
+    if (rc == SH_OK) rc = build(c, report, err);
+    if (rc == SH_OK) return SH_OK;
+    coverage_free(c);
+    *out = NULL;
+    return rc;
+}
+
+void coverage_free(struct coverage *coverage)
+{
+    if (coverage == NULL) return;
+    free(coverage->twin);
+    free(coverage->first);
+    free(coverage->column);
+    free(coverage->piece);
+    free(coverage->cell);
+    free(coverage->met);
+    free(coverage);
+}
+
+/* Of corner i: the part of the normal that the opposite edge and the point make. */
+uint32_t coverage_cell_at(const struct coverage *c, uint32_t triangle, const double p_m[3])
+{
+    if (c->first[triangle] == NO_CELL) return NO_CELL;
+    double corner[3][3], n[3], weight[3];
+    struct cut cut;
+    uint32_t column, row;
+    coverage_corners(c, triangle, corner);
+    normal_of((const double(*)[3])corner, n);
+    for (int i = 0; i < 3; i++) {
+        double edge[3], to[3], across[3];
+        vec3_sub(corner[(i + 2) % 3], corner[(i + 1) % 3], edge);
+        vec3_sub(p_m, corner[(i + 1) % 3], to);
+        vec3_cross(edge, to, across);
+        weight[i] = fmax(vec3_dot(n, across), 0.0);
+    }
+    cut_set_up((const double(*)[3])corner, c->spec.cell_m, &cut);
+    cut_find(&cut, weight, &column, &row);
+    return c->piece[c->column[c->first[triangle] + column] + row];
+}
+
+uint32_t coverage_cells(const struct coverage *coverage)
+{
+    return coverage->n_cells;
+}
+
+void coverage_get(const struct coverage *coverage, uint32_t cell, struct coverage_cell *out)
+{
+    const struct cell *c = &coverage->cell[cell];
+    *out = (struct coverage_cell){.area_m2 = c->area_m2,
+                                  .pulses = c->pulses,
+                                  .stations = c->stations,
+                                  .incidence_rad = (double)NAN,
+                                  .range_m = (double)NAN,
+                                  .label = c->label,
+                                  .first_station = c->first_station};
+    if (c->stations == 0) return;
+    out->incidence_rad = acos(fmin((double)coverage_float(c->cosine), 1.0));
+    out->range_m = 1.0 / (double)coverage_float(c->nearness);
+}

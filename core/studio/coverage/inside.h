@@ -1,0 +1,46 @@
+/* SPDX-License-Identifier: MIT */
+/* Private to core/studio/coverage: cells, the pieces that they are made of, and what has been met of each. */
+#ifndef CORE_STUDIO_COVERAGE_INSIDE_H
+#define CORE_STUDIO_COVERAGE_INSIDE_H
+
+#include <stdatomic.h>
+
+#include "core/studio/coverage.h"
+#include "core/studio/coverage/cut.h"
+
+enum { NO_CELL = COVERAGE_NO_CELL };
+
+/* The nearest a cell was met and the steepest it was met, as the bits of a float: of positive ones these have the same
+ * order as the numbers, so that threads can keep the larger one without a lock. */
+struct cell_met {
+    _Atomic uint32_t pulses, cosine, nearness; /* nearness: 1 / range */
+};
+
+struct cell {
+    double area_m2;
+    uint32_t pulses, cosine, nearness; /* of all scans that were kept */
+    uint16_t stations, first_station, label;
+};
+
+struct coverage {
+    struct coverage_spec spec;
+    const struct scene *scene;
+    double origin_m[3]; /* corner of the cubes */
+    uint32_t *first;    /* [n_triangles] its first column (cut.h); NO_CELL: the triangle is left out */
+    uint32_t *column;   /* [n_columns] its first piece */
+    uint32_t *piece;    /* [n_pieces] its cell */
+    uint64_t n_columns, n_pieces;
+    uint32_t n_cells, n_stations;
+    uint64_t *twin; /* bits: triangles that lie on others */
+    double twin_m2, silent_m2;
+    struct cell *cell;
+    struct cell_met *met; /* of the scan that waits */
+};
+
+/* Corners of a triangle, prcs. */
+void coverage_corners(const struct coverage *c, uint32_t triangle, double corner[3][3]);
+
+float coverage_float(uint32_t bits);
+uint32_t coverage_bits(double value);
+
+#endif

@@ -1,0 +1,104 @@
+/* SPDX-License-Identifier: MIT */
+/* Figures of a compared cloud, for tables and pictures: by groups, as histograms, how dense its points lie, when they
+ * came. In: distances (core/studio/cloud.h) and deviations (core/studio/deviation.h), metres. Out: statistics. What is NaN takes no
+ * part. Pure; whoever makes arrays says how they are freed. */
+#ifndef CORE_STUDIO_FIGURES_H
+#define CORE_STUDIO_FIGURES_H
+
+#include "core/studio/cloud.h"
+#include "core/studio/deviation.h"
+
+/* Of one group of points. Distances are to the nearest triangle and never negative; `along` is signed (measured minus
+ * exact range, on smooth faces). Figures without a point are NaN. */
+struct figures {
+    size_t points, far;                            /* with coordinates; of these, farther than everything */
+    double mean_m, rms_m, p95_m, max_m;            /* of the distances that are not far; nearest rank */
+    size_t along;                                  /* on smooth faces, at an incidence up to FIGURES_STEEPEST */
+    double along_mean_m, along_rms_m, along_max_m; /* the last: the largest without its sign */
+    size_t judged;                                 /* of these, of known sigma */
+    double judged_mean_m, judged_rms_m;            /* of their deviations */
+    double expected_rms_m;                         /* of their sigmas and counts_m together */
+    size_t noisy;                                  /* of these, of sigma above 0 */
+    double z_mean, z_rms; /* of their deviations over their sigmas: 0 and 1 are expected of noise alone */
+    double z_counts;      /* RMS of counts_m over their sigmas */
+};
+
+/* Cosine of 80 degrees. Beyond, any small error across the beam is a large one along it, and sigma to first order is no
+ * longer good to 1 %. */
+#define FIGURES_STEEPEST 0.17364817766693041
+
+struct figures_in {
+    size_t n;
+    const double *distance_m;
+    const struct deviation_points *points; /* NULL: no deviations along beams */
+};
+
+enum { FIGURES_NO_GROUP = 0xffffffff };
+
+/* group(ctx, i): of point i, below n_groups or FIGURES_NO_GROUP. Takes 8 bytes a point while it works. */
+int figures_by(const struct figures_in *in, uint32_t n_groups, uint32_t (*group)(void *ctx, size_t i), void *ctx,
+               struct figures *out, struct sh_err *err);
+
+/* Bins of one width; the first begins at from. */
+enum { FIGURES_MAX_BINS = 80 };
+struct figures_histogram {
+    double from, width;
+    uint32_t bins;
+    uint64_t count[FIGURES_MAX_BINS], below, above;
+};
+/* Of values; at least a share of them lies within. Bins begin at multiples of their width (1, 2 or 5 times a power of
+ * ten), signed ones go as far to both sides. Values that are not finite don't count. No value: 0 bins. */
+void figures_histogram_of(const double *value, size_t n, double share, struct figures_histogram *out);
+void figures_histogram_of_signed(const float *value, size_t n, double share, struct figures_histogram *out);
+/* The smallest of 1, 2, 5 times a power of ten that is v or more; v > 0. */
+double figures_nice(double v);
+
+/* How dense the points of one station lie on the surfaces. The scene is cut into cells: a triangle's plane is seen
+ * along the axis that it faces most, and divided into squares of cell_m there. A cell is such a square of one plane,
+ * by one station; its area is cell_m^2 / |n|, n the normal's part along that axis. Its density is points / area. Cells
+ * at a border count as whole ones, so theirs is a lower limit. A percentile p is the density that p of the points do
+ * not exceed, as nearest rank: half of the points lie where it is p50 or more. */
+struct figures_cell {
+    uint64_t key;
+    uint32_t n;
+    float area_m2, range_sum_m; /* the sum over its points */
+};
+struct figures_density_row {
+    size_t cells, points;
+    double p5, p50, p95; /* points a square metre */
+};
+struct figures_density {
+    double cell_m; /* as it was used: doubled where there were too many cells */
+    size_t n;
+    struct figures_cell *cell; /* [n] by density */
+};
+/* Needs points->range_m. Points without a triangle take no part. Up to 4 million cells, 96 MiB. */
+int figures_density_of(const struct cloud *cloud, const struct cloud_site *site, const struct scene *scene,
+                       const struct figures_in *in, const uint32_t *triangle, double cell_m,
+                       const struct sh_report *report, struct figures_density *out, struct sh_err *err);
+/* The same with a cell that nobody has chosen: first_m, doubled until half of the points lie in cells of 16, or nearly, and
+ * up to 50 m. all: the figures of all its cells. */
+int figures_density_fit(const struct cloud *cloud, const struct cloud_site *site, const struct scene *scene,
+                        const struct figures_in *in, const uint32_t *triangle, double first_m,
+                        const struct sh_report *report, struct figures_density *out, struct figures_density_row *all,
+                        struct sh_err *err);
+void figures_density_free(struct figures_density *density);
+/* Of the cells of one station (from 1; 0: of all), whose mean range is from from_m to below to_m. NaN: no cell. */
+void figures_density_within(const struct figures_density *density, unsigned station, double from_m, double to_m,
+                            struct figures_density_row *row);
+
+/* When the points of a station came, in the order of the file. Where time goes back another scan begins. */
+struct figures_times {
+    size_t points, scans;
+    double first_s, last_s, span_s; /* the last: of all scans together */
+    size_t gaps;                    /* longer than the station's gap_s, between points that follow each other */
+    double longest_s, longest_at_s; /* where it begins */
+};
+/* cloud->time_s is there; gap_s and out: [n_stations]. */
+void figures_times_of(const struct cloud *cloud, uint32_t n_stations, const double *gap_s, struct figures_times *out);
+
+/* Shots by their number of echoes, from echo and echo_count, which are there; 0 only where the file keeps them. */
+enum { FIGURES_MAX_ECHOES = 15 };
+void figures_echoes_of(const struct cloud *cloud, uint64_t shots[FIGURES_MAX_ECHOES + 1]);
+
+#endif

@@ -1,0 +1,93 @@
+/* SPDX-License-Identifier: MIT */
+/* Meshes to files: vertices and triangles in, one file out (and the files that it names); which format, its ending
+ * says: .ply, .obj, .gltf, .glb, .fbx.
+ *
+ * Units and frames: metres, z up, right-handed. What each format makes of it:
+ *   .ply   binary, little-endian: coordinates as double. As text: to the nanometre.
+ *   .obj   coordinates to the nanometre; z up (the format has neither unit nor axes). With a material (a texture, or
+ *          parts): NAME.mtl beside it.
+ *   .gltf, .glb  float; metres and y up, as the format demands: (x, y, z) is written as (x, z, -y). Colours are linear
+ *          there, and left out where a texture is. .gltf has its numbers in NAME.bin beside it, .glb all it
+ *          needs within.
+ *          Vertices nearer to each other than 10 micrometres that agree in all else may become one.
+ *   .fbx   binary, float; z up and metres, and its header says so (UpAxis 2, UnitScaleFactor 100).
+ * Float steps by up to 6e-8 of a coordinate. Where half a step is more than MESH_FLOAT_PART of the mesh's size (and
+ * more than 1 micrometre), the mesh is refused with the figures: nothing is moved to the origin in silence.
+ *
+ * Ownership: all arrays are the caller's and are not changed. .gltf, .glb and .fbx take about 500 bytes a face of memory
+ * while they are written. Not real-time safe; any thread, one file each. */
+#ifndef CORE_STUDIO_MESH_H
+#define CORE_STUDIO_MESH_H
+
+#include <stdint.h>
+
+#include "core/err.h"
+
+struct picture; /* core/studio/picture.h */
+
+#define MESH_FLOAT_PART 1e-6
+enum {
+    MESH_MAX_VERTICES = INT32_MAX, /* PLY's indices, and those of its readers, are int */
+    MESH_MAX_PARTS = 65535,
+    MESH_NAME_LEN = 256,
+};
+
+/* What a figure is, in memory and in the file. */
+enum mesh_type { MESH_DOUBLE, MESH_FLOAT, MESH_UINT16, MESH_UINT8 };
+
+/* A figure a vertex. Of .ply alone. value: [n_vertices] of double, float, uint16_t or uint8_t, as type says. */
+struct mesh_scalar {
+    const char *name; /* of the property: a word */
+    const void *value;
+    enum mesh_type type;
+};
+
+/* A range of vertices and of faces, which use these vertices alone: an object of .obj, .gltf, .glb and .fbx. In .ply
+ * parts don't show. */
+struct mesh_part {
+    const char *name; /* without control characters */
+    uint32_t n_vertices, n_faces;
+    const char *texture; /* as mesh.texture */
+    /* That image itself: it is written beside the file under that name, or into a .glb. NULL: it is the caller's. */
+    const struct picture *image;
+};
+
+struct mesh {
+    uint32_t n_vertices, n_faces;
+    const double (*xyz_m)[3]; /* [n_vertices] */
+    const float (*normal)[3]; /* [n_vertices] unit vectors; NULL: none */
+    const uint8_t (*rgb)[3];  /* [n_vertices] sRGB; NULL: none */
+    const float (*uv)[2]; /* [n_vertices] 0, 0 is the image's lower left corner; NULL: none. No place in .ply: s, t */
+    const uint32_t (
+        *face)[3]; /* [n_faces] indices of vertices, counter-clockwise seen from outside; NULL: points alone */
+    const uint8_t (*face_rgb)[3];     /* [n_faces] of .ply alone; NULL: none */
+    const struct mesh_scalar *scalar; /* [n_scalars] */
+    uint32_t n_scalars;
+    const char *const *comment; /* [n_comments] lines for the header of .ply and .obj */
+    uint32_t n_comments;
+    const char *texture;          /* name of the image that uv are of, as the file's reader finds it; NULL: none */
+    const struct mesh_part *part; /* [n_parts] one after the other, all vertices and all faces; then texture is NULL */
+    uint32_t n_parts;             /* 0: one, named as the file */
+    int ascii;                    /* .ply as text */
+};
+
+/* 1: the ending is that of a format that this module writes. */
+int mesh_has_format(const char *path);
+
+/* 1: the ending is that of a format for points without faces: .ply and .obj. */
+int mesh_takes_points(const char *path);
+
+/* 1: the ending is that of a format whose coordinates are float. */
+int mesh_is_float(const char *path);
+
+/* SH_EINPUT where the ending is of a format of floats and they can't hold coordinates between low and high, with the
+ * figures and what to do. For an early refusal; mesh_write asks the same. */
+int mesh_check_box(const char *path, const double low[3], const double high[3], struct sh_err *err);
+
+/* Whole or not at all (core/newfile.h), with the files that it names: all are written as NAME.part, and once all are whole
+ * they are renamed, the mesh last. Where one can't be written, none is left. SH_EINPUT: an ending that is not known, with
+ * those that are; a number that is not finite; what the format can't hold. SH_ESTOPPED where report asks to stop; progress
+ * of what lasts over a second. */
+int mesh_write(const char *path, const struct mesh *mesh, const struct sh_report *report, struct sh_err *err);
+
+#endif

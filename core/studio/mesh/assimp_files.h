@@ -1,0 +1,30 @@
+/* SPDX-License-Identifier: MIT */
+/* Private to this room: the files that Assimp's exporter opens. They are ours, of one output (inside.h). */
+#ifndef CORE_STUDIO_MESH_ASSIMP_FILES_H
+#define CORE_STUDIO_MESH_ASSIMP_FILES_H
+
+#include <assimp/cfileio.h>
+
+#include "core/studio/mesh/inside.h"
+
+enum { ASSIMP_FILES = 4 };
+
+struct exporter {
+    struct mesh_output *out;
+    struct mesh_file *file[ASSIMP_FILES]; /* in the order in which they were opened */
+    struct aiFile handle[ASSIMP_FILES];
+    int n_files, rc;
+    int is_raw; /* what is written is to be copied, from NAME.raw.part */
+    struct sh_err err;
+    struct aiFileIO io;
+};
+
+/* out, is_raw and io are set; io.OpenProc and CloseProc are these two, io.UserData is the exporter. */
+struct aiFile *assimp_open(struct aiFileIO *io, const char *path, const char *mode);
+void assimp_close(struct aiFileIO *io, struct aiFile *handle);
+/* After the export: fails where something could not be written, and says why. */
+int assimp_check_files(struct exporter *exporter, struct sh_err *err);
+/* After that, of raw: the file as it is to be, from what was exported. */
+int assimp_copy_raw(struct exporter *exporter, struct sh_err *err);
+
+#endif

@@ -1,0 +1,302 @@
+/* SPDX-License-Identifier: MIT */
+/* Vertex clustering; core/studio/decimate.h has the definitions. */
+#include "core/studio/decimate.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/grow.h"
+#include "core/rng.h"
+#include "core/vec3.h"
+
+static const uint32_t NONE = UINT32_MAX;
+enum { AXIS_BITS = 20, FIRST_BITS = 12, MOST_PASSES = 40, STOP_EVERY = 1 << 16 };
+
+/* Numbers by key, in a hash table of open addressing. A triangle's key takes 96 bits. */
+struct slot {
+    uint64_t key;
+    uint32_t more, number; /* NONE: free */
+};
+struct table {
+    struct slot *slot; /* [1 << bits] */
+    unsigned bits;
+    uint32_t n;
+};
+
+struct cluster {
+    double sum_m[3]; /* since the lower bound */
+    uint32_t n;
+    uint32_t vertex; /* of the result; NONE: no triangle uses it yet */
+};
+
+struct work {
+    const struct decimate_mesh *mesh;
+    const struct sh_report *report;
+    double low_m[3], extent_m[3], area_m2;
+    /* of a pass */
+    double per_step[3]; /* steps a metre */
+    double cell_m;
+    uint32_t most;
+    uint32_t *of_vertex; /* [n_vertices] its cluster; NONE: not met yet */
+    struct table clusters, faces;
+    struct cluster *cluster;
+    uint32_t (*face)[3]; /* of clusters */
+    size_t cluster_room, face_room;
+};
+
+/* ---- tables */
+
+static int table_enlarge(struct table *t)
+{
+    const struct table old = *t;
+    t->bits = old.bits != 0 ? old.bits + 1 : FIRST_BITS;
+    t->slot = malloc(((size_t)1 << t->bits) * sizeof *t->slot);
+    if (t->slot == NULL) {
+        *t = old;
+        return 0;
+    }
+    memset(t->slot, 0xff, ((size_t)1 << t->bits) * sizeof *t->slot);
+    const size_t mask = ((size_t)1 << t->bits) - 1;
+    for (size_t i = 0; old.bits != 0 && i <= mask >> 1; i++) {
+        if (old.slot[i].number == NONE) continue;
+        size_t at = (size_t)rng_mix(old.slot[i].key + 0x9e3779b97f4a7c15ULL * old.slot[i].more) & mask;
+        while (t->slot[at].number != NONE)
+            at = (at + 1) & mask;
+        t->slot[at] = old.slot[i];
+    }
+    free(old.slot);
+    return 1;
+}
+
+/* The number of a key, and whether it is new; NONE: no memory. */
+static uint32_t table_number(struct table *t, uint64_t key, uint32_t more, int *is_new)
+{
+    if ((t->bits == 0 || 2 * ((size_t)t->n + 1) > (size_t)1 << t->bits) && !table_enlarge(t)) return NONE;
+    const size_t mask = ((size_t)1 << t->bits) - 1;
+    size_t at = (size_t)rng_mix(key + 0x9e3779b97f4a7c15ULL * more) & mask;
+    while (t->slot[at].number != NONE && (t->slot[at].key != key || t->slot[at].more != more))
+        at = (at + 1) & mask;
+    *is_new = t->slot[at].number == NONE;
+    if (*is_new) t->slot[at] = (struct slot){key, more, t->n++};
+    return t->slot[at].number;
+}
+
+static void table_clear(struct table *t)
+{
+    if (t->bits != 0) memset(t->slot, 0xff, ((size_t)1 << t->bits) * sizeof *t->slot);
+    t->n = 0;
+}
+
+/* ---- a pass over the mesh */
+
+/* The cluster of a vertex; NONE: no memory. */
+static uint32_t cluster_of(struct work *w, uint32_t vertex)
+{
+    const double *v = w->mesh->vertex_m[vertex];
+    uint64_t key = 0;
+    int is_new;
+    if (w->of_vertex[vertex] != NONE) return w->of_vertex[vertex];
+    for (int i = 0; i < 3; i++)
+        key = key << (AXIS_BITS + 1) | (uint64_t)((v[i] - w->low_m[i]) * w->per_step[i] + 0.5);
+    const uint32_t c = table_number(&w->clusters, key, 0, &is_new);
+    if (c == NONE || !grow(&w->cluster, &w->cluster_room, (size_t)c + 1, sizeof *w->cluster)) return NONE;
+    if (is_new) w->cluster[c] = (struct cluster){.vertex = NONE};
+    for (int i = 0; i < 3; i++)
+        w->cluster[c].sum_m[i] += v[i] - w->low_m[i];
+    w->cluster[c].n++;
+    return w->of_vertex[vertex] = c;
+}
+
+static void swap_if_above(uint32_t *a, uint32_t *b)
+{
+    const uint32_t kept = *a;
+    if (*a <= *b) return;
+    *a = *b;
+    *b = kept;
+}
+
+/* A triangle of clusters, unless it is there already. 0: no memory. */
+static int add_face(struct work *w, const uint32_t c[3])
+{
+    uint32_t s[3] = {c[0], c[1], c[2]};
+    int is_new;
+    swap_if_above(&s[0], &s[1]);
+    swap_if_above(&s[1], &s[2]);
+    swap_if_above(&s[0], &s[1]);
+    const uint32_t f = table_number(&w->faces, (uint64_t)s[0] << 32 | s[1], s[2], &is_new);
+    if (f == NONE || !grow(&w->face, &w->face_room, (size_t)f + 1, sizeof *w->face)) return 0;
+    if (is_new) memcpy(w->face[f], c, sizeof w->face[f]);
+    return 1;
+}
+
+static void begin_pass(struct work *w, double cell_m)
+{
+    w->cell_m = cell_m;
+    for (int i = 0; i < 3; i++) {
+        const double steps = fmin(ceil(w->extent_m[i] / cell_m), (double)(1 << AXIS_BITS));
+        w->per_step[i] = w->extent_m[i] > 0.0 ? steps / w->extent_m[i] : 0.0;
+    }
+    table_clear(&w->clusters);
+    table_clear(&w->faces);
+    memset(w->of_vertex, 0xff, w->mesh->n_vertices * sizeof *w->of_vertex);
+}
+
+/* How many triangles there are, or how many there would be where they are more than `most`; then the pass ends before
+ * all is done. Negative: an error. */
+static double pass(struct work *w, double cell_m, struct sh_err *err)
+{
+    const struct decimate_mesh *m = w->mesh;
+    begin_pass(w, cell_m);
+    for (uint32_t t = 0; t < m->n_triangles; t++) {
+        uint32_t c[3];
+        if (t % STOP_EVERY == 0) {
+            sh_progress(w->report, "making a coarse mesh", (double)t / m->n_triangles);
+            if (sh_stopped(w->report)) return sh_fail_stopped(err);
+        }
+        for (int k = 0; k < 3; k++)
+            c[k] = cluster_of(w, m->triangle[t][k]);
+        if (c[0] == NONE || c[1] == NONE || c[2] == NONE) return sh_fail(err, SH_ENOMEM, "no memory for a coarse mesh");
+        if (c[0] == c[1] || c[1] == c[2] || c[2] == c[0]) continue;
+        if (!add_face(w, c)) return sh_fail(err, SH_ENOMEM, "no memory for a coarse mesh");
+        if (w->faces.n > w->most || w->clusters.n / 4 > w->most)
+            return fmax(w->faces.n, w->clusters.n / 4.0) * ((double)m->n_triangles / (t + 1.0));
+    }
+    return w->faces.n;
+}
+
+/* ---- what is there, and what comes out */
+
+/* Bounds and area of all triangles. */
+static void measure(struct work *w)
+{
+    const struct decimate_mesh *m = w->mesh;
+    double high_m[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (int i = 0; i < 3; i++)
+        w->low_m[i] = INFINITY;
+    for (uint32_t t = 0; t < m->n_triangles; t++) {
+        const double *corner[3];
+        double e[2][3], n[3];
+        for (int k = 0; k < 3; k++) {
+            corner[k] = m->vertex_m[m->triangle[t][k]];
+            for (int i = 0; i < 3; i++) {
+                if (corner[k][i] < w->low_m[i]) w->low_m[i] = corner[k][i];
+                if (corner[k][i] > high_m[i]) high_m[i] = corner[k][i];
+            }
+        }
+        vec3_sub(corner[1], corner[0], e[0]);
+        vec3_sub(corner[2], corner[0], e[1]);
+        vec3_cross(e[0], e[1], n);
+        w->area_m2 += 0.5 * vec3_length(n);
+    }
+    for (int i = 0; i < 3; i++)
+        w->extent_m[i] = m->n_triangles > 0 ? high_m[i] - w->low_m[i] : 0.0;
+}
+
+/* Clusters that triangles use become vertices, in the order of their triangles. */
+static int keep(const struct work *w, struct decimated *out, struct sh_err *err)
+{
+    const uint32_t n = w->faces.n;
+    uint32_t n_vertices = 0;
+    *out = (struct decimated){.n_triangles = n, .cell_m = w->cell_m};
+    out->triangle = malloc(((size_t)n + 1) * sizeof *out->triangle);
+    out->vertex_m = malloc(((size_t)(w->clusters.n < 3 * n ? w->clusters.n : 3 * n) + 1) * sizeof *out->vertex_m);
+    if (out->triangle == NULL || out->vertex_m == NULL) {
+        decimated_free(out);
+        return sh_fail(err, SH_ENOMEM, "no memory for a mesh of %u triangles", n);
+    }
+    for (uint32_t t = 0; t < n; t++)
+        for (int k = 0; k < 3; k++) {
+            struct cluster *c = &w->cluster[w->face[t][k]];
+            if (c->vertex == NONE) {
+                for (int i = 0; i < 3; i++)
+                    out->vertex_m[n_vertices][i] = w->low_m[i] + c->sum_m[i] / c->n;
+                c->vertex = n_vertices++;
+            }
+            out->triangle[t][k] = c->vertex;
+        }
+    out->n_vertices = n_vertices;
+    return SH_OK;
+}
+
+static int copy(const struct decimate_mesh *mesh, struct decimated *out, struct sh_err *err)
+{
+    *out = (struct decimated){.n_vertices = mesh->n_vertices, .n_triangles = mesh->n_triangles};
+    out->vertex_m = malloc(((size_t)mesh->n_vertices + 1) * sizeof *out->vertex_m);
+    out->triangle = malloc(((size_t)mesh->n_triangles + 1) * sizeof *out->triangle);
+    if (out->vertex_m == NULL || out->triangle == NULL) {
+        decimated_free(out);
+        return sh_fail(err, SH_ENOMEM, "no memory for a mesh of %u triangles", mesh->n_triangles);
+    }
+    memcpy(out->vertex_m, mesh->vertex_m, mesh->n_vertices * sizeof *out->vertex_m);
+    memcpy(out->triangle, mesh->triangle, mesh->n_triangles * sizeof *out->triangle);
+    return SH_OK;
+}
+
+static int set_up(struct work *w, const struct decimate_mesh *mesh, const struct sh_report *report, struct sh_err *err)
+{
+    *w = (struct work){.mesh = mesh, .report = report, .most = UINT32_MAX};
+    w->of_vertex = malloc(((size_t)mesh->n_vertices + 1) * sizeof *w->of_vertex);
+    if (w->of_vertex == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a coarse mesh");
+    measure(w);
+    return SH_OK;
+}
+
+static void tear_down(struct work *w)
+{
+    free(w->of_vertex);
+    free(w->clusters.slot);
+    free(w->faces.slot);
+    free(w->cluster);
+    free(w->face);
+}
+
+int decimate_by_cell(const struct decimate_mesh *mesh, double cell_m, const struct sh_report *report,
+                     struct decimated *out, struct sh_err *err)
+{
+    struct work w;
+    *out = (struct decimated){0};
+    if (!(cell_m > 0.0)) return sh_fail(err, SH_EINPUT, "a cell of %g m: allowed is more than 0", cell_m);
+    int rc = set_up(&w, mesh, report, err);
+    if (rc != SH_OK) return rc;
+    const double n = pass(&w, cell_m, err);
+    rc = n < 0.0 ? (int)n : keep(&w, out, err);
+    tear_down(&w);
+    return rc;
+}
+
+/* The number of triangles goes with 1 / cell^2 where the mesh is finer than the cells. A grid cuts a surface at an angle
+ * into half as many cells more, and each of them has two triangles. A first guess that gives far fewer triangles is made
+ * finer once. */
+int decimate(const struct decimate_mesh *mesh, uint32_t most, const struct sh_report *report, struct decimated *out,
+             struct sh_err *err)
+{
+    struct work w;
+    double n = 0.0;
+    *out = (struct decimated){0};
+    if (most < DECIMATE_LEAST)
+        return sh_fail(err, SH_EINPUT, "a mesh of %u triangles: allowed are %d or more", most, DECIMATE_LEAST);
+    if (mesh->n_triangles <= most) return copy(mesh, out, err);
+    int rc = set_up(&w, mesh, report, err);
+    if (rc != SH_OK) return rc;
+    w.most = most;
+    double cell_m = fmax(sqrt(3.0 * w.area_m2 / most), 1e-6 * vec3_length(w.extent_m)), fits_m = INFINITY;
+    for (int i = 0; i < MOST_PASSES; i++) {
+        n = pass(&w, cell_m, err);
+        const int was_too_coarse = n >= 0.0 && n < 0.7 * most && isinf(fits_m);
+        if (n <= most && !was_too_coarse) break;
+        if (was_too_coarse) fits_m = cell_m;
+        const double ratio = 1.03 * sqrt(fmax(n, 1.0) / most);
+        cell_m = was_too_coarse ? cell_m * fmin(ratio, 0.9) : fmin(cell_m * fmin(fmax(ratio, 1.1), 4.0), fits_m);
+    }
+    rc = n < 0.0 ? (int)n : n > most ? sh_fail(err, SH_ESTATE, "no grid gives %u triangles", most) : keep(&w, out, err);
+    tear_down(&w);
+    return rc;
+}
+
+void decimated_free(struct decimated *mesh)
+{
+    free(mesh->vertex_m);
+    free(mesh->triangle);
+    *mesh = (struct decimated){0};
+}

@@ -1,0 +1,78 @@
+/* SPDX-License-Identifier: MIT */
+/* What the formats of this room share: a file that is being written, and the table of formats. */
+#ifndef CORE_STUDIO_MESH_INSIDE_H
+#define CORE_STUDIO_MESH_INSIDE_H
+
+#include <stdio.h>
+#include <sys/types.h>
+
+#include "core/studio/mesh.h"
+#include "core/studio/picture.h"
+
+/* A file that is written as PATH.part through a buffer. */
+struct mesh_file {
+    char *path, *part;
+    int fd;        /* -1: it is whole, and on the disk */
+    FILE *file;    /* reads, too */
+    int is_named;  /* it has its name by now */
+    off_t at, end; /* of the stream, also after a write has failed */
+    int error;     /* errno of the first write that failed; 0: none */
+};
+
+/* The files of one output, which come and go together (file.c). Begins as zeros but for path. */
+struct mesh_output {
+    const char *path; /* of the mesh: its file is renamed last */
+    struct mesh_file **file;
+    size_t n, room;
+};
+
+/* Errors name the path. mesh_output_close is due in any case; file is the output's. */
+int mesh_output_open(struct mesh_output *out, const char *path, struct mesh_file **file, struct sh_err *err);
+int mesh_file_write(struct mesh_file *file, const void *data, size_t len, struct sh_err *err);
+/* Fails where something of it could not be written, and says why. */
+int mesh_file_check(struct mesh_file *file, struct sh_err *err);
+/* It is whole: goes to the disk, and is closed. It gets its name with the others. */
+int mesh_file_finish(struct mesh_file *file, struct sh_err *err);
+/* Removes it alone. */
+void mesh_output_drop(struct mesh_output *out, struct mesh_file *file);
+/* keep: finishes and renames all. Else, and where that fails, nothing is left. */
+int mesh_output_close(struct mesh_output *out, int keep, struct sh_err *err);
+/* The images of parts, beside the mesh. */
+int mesh_output_images(struct mesh_output *out, const struct mesh *mesh, struct sh_err *err);
+
+/* Copies a binary FBX file as Assimp exports it, with what is missing in it. SH_EIO: it is not one. */
+int mesh_fbx_copy(const uint8_t *raw, size_t n_raw, struct mesh_file *to, struct sh_err *err);
+
+/* Long work: what is done of it. Reports and asks for a stop every 65536 steps. */
+struct mesh_work {
+    const struct sh_report *report;
+    char what[96];
+    uint64_t done, all;
+};
+int mesh_work_step(struct mesh_work *work, struct sh_err *err);
+
+/* A coordinate in metres as decimals to the nanometre, without zeros at its end. At least MESH_NUMBER_LEN bytes. */
+enum { MESH_NUMBER_LEN = 336 };
+size_t mesh_put_number(char *to, double v);
+
+/* The path's name without folders; its length without the ending. */
+const char *mesh_stem(const char *path, size_t *len);
+/* The path with another ending; free it. NULL: no memory. */
+char *mesh_beside(const char *path, const char *ending);
+
+struct mesh_format {
+    const char *ending;
+    int is_float, takes_points;
+    const char *exporter; /* Assimp's name of the format */
+    /* Opens and writes out->path and what belongs to it; the caller closes. */
+    int (*write)(const struct mesh_format *format, struct mesh_output *out, const struct mesh *mesh,
+                 struct mesh_work *work, struct sh_err *err);
+};
+int mesh_write_ply(const struct mesh_format *format, struct mesh_output *out, const struct mesh *mesh,
+                   struct mesh_work *work, struct sh_err *err);
+int mesh_write_obj(const struct mesh_format *format, struct mesh_output *out, const struct mesh *mesh,
+                   struct mesh_work *work, struct sh_err *err);
+int mesh_write_assimp(const struct mesh_format *format, struct mesh_output *out, const struct mesh *mesh,
+                      struct mesh_work *work, struct sh_err *err);
+
+#endif

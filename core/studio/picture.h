@@ -1,0 +1,89 @@
+/* SPDX-License-Identifier: MIT */
+/* Pictures: marks, lines and text on an image, as a PNG file or as SVG. In: places in pixels from the upper left
+ * corner, x to the right, y down; colours as sRGB, 8 bits a channel. Out: an image, a PNG (libpng), an SVG.
+ *
+ * A pen draws on either: on an image, where edges are even by coverage, or into an SVG, as elements of vectors. So
+ * what is drawn is said once. The font is one of strokes and our own: ASCII, the letters of Latin-1 with their
+ * accents, and the degree sign. Other characters are boxes on an image; an SVG has them as they are.
+ *
+ * Ownership: picture_make allocates, picture_free releases; so do svg_begin and svg_end. Thread: a picture
+ * belongs to one at a time. Not real-time safe. */
+#ifndef CORE_STUDIO_PICTURE_H
+#define CORE_STUDIO_PICTURE_H
+
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+
+#include "core/err.h"
+
+struct picture {
+    uint32_t width, height;
+    uint8_t *rgb; /* [height][width][3], the upper row first */
+};
+
+int picture_make(struct picture *picture, uint32_t width, uint32_t height, const uint8_t rgb[3], struct sh_err *err);
+void picture_free(struct picture *picture);
+
+/* Outside the image nothing happens, here and below. coverage 0..1: how much of the pixel gets the colour. */
+void picture_blend(struct picture *picture, long column, long row, const uint8_t rgb[3], double coverage);
+void picture_fill(struct picture *picture, long column, long row, long width, long height, const uint8_t rgb[3]);
+/* With round ends; from and to may be the same place: a disc. */
+void picture_line(struct picture *picture, const double from[2], const double to[2], double width,
+                  const uint8_t rgb[3]);
+void picture_triangle(struct picture *picture, const double corner[3][2], const uint8_t rgb[3]);
+
+enum picture_anchor { PICTURE_LEFT, PICTURE_MIDDLE, PICTURE_RIGHT };
+
+struct picture_type {
+    double size_px; /* height of capitals; lines of text are 1.9 of that apart */
+    int bold;
+    double halo_px; /* > 0: so much white around the strokes */
+};
+/* UTF-8; x is the left end, middle or right end, y the baseline. */
+void picture_text(struct picture *picture, double x, double y, enum picture_anchor anchor,
+                  const struct picture_type *type, const uint8_t rgb[3], const char *text);
+double picture_text_width(const struct picture_type *type, const char *text);
+
+/* CIE 1976 L*a*b* (white D65), L* 0..100, to sRGB; what lies outside the gamut is moved to its border. */
+void picture_lab(double l, double a, double b, uint8_t rgb[3]);
+
+/* Writes the image: to path.part beside it first, then renamed, so that path is whole or as it was. Errors begin
+ * with `what` and name the path. */
+int picture_write_png(const struct picture *picture, const char *what, const char *path, struct sh_err *err);
+
+/* Its PNG to a stream, which is flushed. Errors say why alone. */
+int picture_put_png(FILE *out, const struct picture *picture, struct sh_err *err);
+
+/* For pages that hold pictures: the image as the URI of a PNG's data, with one colour transparent (NULL: none); and a
+ * text in XML or HTML, in an attribute, too. What is no character of XML becomes U+FFFD. */
+int picture_put_uri(FILE *out, const struct picture *picture, const uint8_t *clear, struct sh_err *err);
+void picture_put_escaped(FILE *out, const char *text);
+
+/* ---- pens */
+
+struct pen {
+    void *on; /* a struct picture, or a struct svg */
+    void (*fill)(void *on, long column, long row, long width, long height, const uint8_t rgb[3]);
+    void (*line)(void *on, const double from[2], const double to[2], double width, const uint8_t rgb[3]);
+    void (*triangle)(void *on, const double corner[3][2], const uint8_t rgb[3]);
+    void (*text)(void *on, double x, double y, enum picture_anchor anchor, const struct picture_type *type,
+                 const uint8_t rgb[3], const char *text);
+    /* What is drawn between the two belongs together: a group with a title. */
+    void (*begin)(void *on, const char *class_name, const char *title);
+    void (*end)(void *on);
+};
+
+struct pen picture_pen(struct picture *picture);
+
+struct svg;
+int svg_begin(uint32_t width, uint32_t height, const char *title, struct svg **out, struct sh_err *err);
+struct pen svg_pen(struct svg *svg);
+/* Part of an image, as PNG data, at the same place. */
+int svg_image(struct svg *svg, const struct picture *picture, long column, long row, uint32_t width, uint32_t height,
+              struct sh_err *err);
+/* Writes as picture_write_png does. */
+int svg_write(struct svg *svg, const char *what, const char *path, struct sh_err *err);
+void svg_end(struct svg *svg);
+
+#endif

@@ -1,0 +1,32 @@
+/* SPDX-License-Identifier: MIT */
+/* Private to core/studio/picture: glyphs and encoders. */
+#ifndef CORE_STUDIO_PICTURE_INSIDE_H
+#define CORE_STUDIO_PICTURE_INSIDE_H
+
+#include <stdio.h>
+
+#include "core/studio/picture.h"
+
+/* Strokes of a character, in units of 1/28 of a capital's height, y up from the baseline; NULL: there are none.
+ *   x,y x,y ...   straight lines          ~x,y ...   a curve from the first to the last point
+ *   o x,y ...     a closed curve          |          the next stroke
+ * Curves are quadratic B-splines: they pass the middle of each side of the control polygon. */
+const char *glyph_strokes(uint32_t code);
+/* A letter with an accent: its base letter, and the accent's strokes about x = 0 for a small letter; 0: it is none. An
+ * accent that begins with _ has the same height on a capital. */
+uint32_t glyph_base(uint32_t code, const char **accent);
+
+/* The rest of a file after the stream was made; writes nothing to what is not its own. */
+typedef int picture_encoder(const void *what, FILE *file, struct sh_err *why);
+int picture_write_file(picture_encoder *encode, const void *source, const char *what, const char *path,
+                       struct sh_err *err);
+
+struct picture_part {
+    const struct picture *picture;
+    uint32_t column, row, width, height;
+    const uint8_t *clear; /* this colour is transparent; NULL: none is */
+};
+/* A struct picture_part as a PNG. */
+int picture_encode_png(const void *part, FILE *file, struct sh_err *why);
+
+#endif

@@ -1,0 +1,93 @@
+/* SPDX-License-Identifier: MIT */
+/* An image as a PNG, and files that appear whole. */
+#include <errno.h>
+#include <png.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "core/newfile.h"
+#include "core/studio/picture/inside.h"
+
+/* libpng reports by a callback that must not return. */
+static void on_error(png_structp png, png_const_charp text)
+{
+    sh_fail(png_get_error_ptr(png), SH_EIO, "%s", text);
+    png_longjmp(png, 1);
+}
+
+static void on_warning(png_structp png, png_const_charp text)
+{
+    (void)png;
+    (void)text; /* libpng's warnings concern chunks that we do not write */
+}
+
+/* Nothing here is changed between setjmp and longjmp but through pointers. */
+static int encode(const struct picture_part *part, FILE *file, png_structp png, png_infop info)
+{
+    if (setjmp(png_jmpbuf(png)) != 0) return SH_EIO;
+    png_init_io(png, file);
+    png_set_compression_level(png, 9);
+    png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_FILTER_NONE); /* best for pictures of few colours */
+    png_set_IHDR(png, info, part->width, part->height, 8, PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
+                 PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+    png_set_sRGB(png, info, PNG_sRGB_INTENT_RELATIVE);
+    if (part->clear != NULL) {
+        const png_color_16 clear = {.red = part->clear[0], .green = part->clear[1], .blue = part->clear[2]};
+        png_set_tRNS(png, info, NULL, 0, &clear);
+    }
+    png_write_info(png, info);
+    for (uint32_t row = part->row; row < part->row + part->height; row++)
+        png_write_row(png, part->picture->rgb + ((size_t)row * part->picture->width + part->column) * 3);
+    png_write_end(png, info);
+    return SH_OK;
+}
+
+int picture_encode_png(const void *part, FILE *file, struct sh_err *why)
+{
+    png_infop info = NULL;
+    png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, why, on_error, on_warning);
+    if (png != NULL) info = png_create_info_struct(png);
+    int rc = info != NULL ? encode(part, file, png, info) : sh_fail(why, SH_EIO, "no memory");
+    png_destroy_write_struct(&png, &info);
+    if (rc == SH_OK && fflush(file) != 0) rc = sh_fail(why, SH_EIO, "%s", strerror(errno));
+    return rc;
+}
+
+/* fd is taken in any case. */
+static int write_part(picture_encoder *encoder, const void *source, const char *path, const char *part, int fd,
+                      struct sh_err *err)
+{
+    struct sh_err why = {0};
+    FILE *file = fdopen(dup(fd), "wb");
+    int rc = file != NULL ? encoder(source, file, &why) : sh_fail(&why, SH_EIO, "%s", strerror(errno));
+    if (file != NULL && fclose(file) != 0 && rc == SH_OK) rc = sh_fail(&why, SH_EIO, "%s", strerror(errno));
+    if (rc == SH_OK) return newfile_keep(path, part, fd, err);
+    newfile_drop(part, fd);
+    return sh_fail(err, rc, "%s: cannot be written: %s", path, why.text);
+}
+
+int picture_write_file(picture_encoder *encoder, const void *source, const char *what, const char *path,
+                       struct sh_err *err)
+{
+    struct sh_err why = {0};
+    char *part;
+    int fd;
+    if (asprintf(&part, "%s.part", path) < 0) return sh_fail(err, SH_ENOMEM, "%s %s: no memory", what, path);
+    int rc = newfile_part(path, part, &fd, &why);
+    if (rc == SH_OK) rc = write_part(encoder, source, path, part, fd, &why);
+    free(part);
+    return rc == SH_OK ? SH_OK : sh_fail(err, rc, "%s %s", what, why.text);
+}
+
+int picture_put_png(FILE *out, const struct picture *picture, struct sh_err *err)
+{
+    const struct picture_part whole = {picture, 0, 0, picture->width, picture->height, NULL};
+    return picture_encode_png(&whole, out, err);
+}
+
+int picture_write_png(const struct picture *picture, const char *what, const char *path, struct sh_err *err)
+{
+    const struct picture_part whole = {picture, 0, 0, picture->width, picture->height, NULL};
+    return picture_write_file(picture_encode_png, &whole, what, path, err);
+}

@@ -1,0 +1,242 @@
+/* SPDX-License-Identifier: MIT */
+/* SVG 1.1: a text that grows in memory, written at the end. Numbers don't depend on the locale. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/studio/picture/inside.h"
+
+struct svg {
+    FILE *out; /* into text */
+    char *text;
+    size_t size;
+};
+
+/* Hundredths of a pixel, as people write them. */
+static void put_number(FILE *out, double v)
+{
+    const long hundredths = lrint(fmin(1e9, fmax(-1e9, v)) * 100), a = labs(hundredths);
+    fprintf(out, "%s%ld", hundredths < 0 ? "-" : "", a / 100);
+    if (a % 100 != 0) fprintf(out, a % 10 == 0 ? ".%01ld" : ".%02ld", a % 10 == 0 ? a % 100 / 10 : a % 100);
+}
+
+static void put_attribute(FILE *out, const char *name, double v)
+{
+    fprintf(out, " %s=\"", name);
+    put_number(out, v);
+    fputc('"', out);
+}
+
+static void put_colour(FILE *out, const char *name, const uint8_t rgb[3])
+{
+    fprintf(out, " %s=\"#%02x%02x%02x\"", name, rgb[0], rgb[1], rgb[2]);
+}
+
+/* Length of a whole UTF-8 character that XML allows; 0: it is none. */
+static size_t character(const unsigned char *p)
+{
+    if (*p < 0x80) return *p >= 0x20 && *p != 0x7f ? 1 : 0;
+    const size_t n = *p >= 0xc2 && *p < 0xe0 ? 2 : *p >= 0xe0 && *p < 0xf0 ? 3 : *p >= 0xf0 && *p < 0xf5 ? 4 : 0;
+    for (size_t i = 1; i < n; i++)
+        if ((p[i] & 0xc0) != 0x80) return 0;
+    if ((*p == 0xe0 && p[1] < 0xa0) || (*p == 0xed && p[1] >= 0xa0) || (*p == 0xf0 && p[1] < 0x90) ||
+        (*p == 0xf4 && p[1] >= 0x90) || (*p == 0xef && p[1] == 0xbf && p[2] >= 0xbe))
+        return 0;
+    return n;
+}
+
+/* What is no character of XML becomes U+FFFD, the sign for that. */
+void picture_put_escaped(FILE *out, const char *text)
+{
+    for (const unsigned char *p = (const unsigned char *)text; *p != '\0';) {
+        const size_t n = character(p);
+        if (*p == '&')
+            fputs("&amp;", out);
+        else if (*p == '<')
+            fputs("&lt;", out);
+        else if (*p == '>')
+            fputs("&gt;", out);
+        else if (*p == '"')
+            fputs("&quot;", out);
+        else if (n > 0)
+            fwrite(p, 1, n, out);
+        else
+            fputs("\xef\xbf\xbd", out);
+        p += n > 0 ? n : 1;
+    }
+}
+
+int svg_begin(uint32_t width, uint32_t height, const char *title, struct svg **out, struct sh_err *err)
+{
+    struct svg *svg = calloc(1, sizeof *svg);
+    if (svg != NULL) svg->out = open_memstream(&svg->text, &svg->size);
+    if (svg == NULL || svg->out == NULL) {
+        free(svg);
+        return sh_fail(err, SH_ENOMEM, "no memory for an SVG");
+    }
+    fprintf(svg->out,
+            "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" "
+            "xmlns:xlink=\"http://www.w3.org/1999/xlink\" version=\"1.1\" width=\"%u\" height=\"%u\" "
+            "viewBox=\"0 0 %u %u\">\n<title>",
+            width, height, width, height);
+    picture_put_escaped(svg->out, title);
+    fprintf(svg->out, "</title>\n<rect width=\"%u\" height=\"%u\" fill=\"#ffffff\"/>\n", width, height);
+    *out = svg;
+    return SH_OK;
+}
+
+void svg_end(struct svg *svg)
+{
+    if (svg == NULL) return;
+    if (svg->out != NULL) fclose(svg->out);
+    free(svg->text);
+    free(svg);
+}
+
+/* ---- the pen */
+
+static void pen_fill(void *on, long column, long row, long width, long height, const uint8_t rgb[3])
+{
+    FILE *out = ((struct svg *)on)->out;
+    fprintf(out, "<rect x=\"%ld\" y=\"%ld\" width=\"%ld\" height=\"%ld\"", column, row, width, height);
+    put_colour(out, "fill", rgb);
+    fputs("/>\n", out);
+}
+
+static void pen_line(void *on, const double from[2], const double to[2], double width, const uint8_t rgb[3])
+{
+    FILE *out = ((struct svg *)on)->out;
+    fputs("<line", out);
+    put_attribute(out, "x1", from[0]);
+    put_attribute(out, "y1", from[1]);
+    put_attribute(out, "x2", to[0]);
+    put_attribute(out, "y2", to[1]);
+    put_attribute(out, "stroke-width", width);
+    put_colour(out, "stroke", rgb);
+    fputs(" stroke-linecap=\"round\"/>\n", out);
+}
+
+static void pen_triangle(void *on, const double corner[3][2], const uint8_t rgb[3])
+{
+    FILE *out = ((struct svg *)on)->out;
+    fputs("<polygon points=\"", out);
+    for (int i = 0; i < 3; i++) {
+        if (i > 0) fputc(' ', out);
+        put_number(out, corner[i][0]);
+        fputc(',', out);
+        put_number(out, corner[i][1]);
+    }
+    fputc('"', out);
+    put_colour(out, "fill", rgb);
+    fputs("/>\n", out);
+}
+
+/* Capitals of the usual sans-serif fonts are 0.72 of the font's size. The width is that of our own font, so that
+ * what was placed beside each other stays so. */
+static void pen_text(void *on, double x, double y, enum picture_anchor anchor, const struct picture_type *type,
+                     const uint8_t rgb[3], const char *text)
+{
+    static const char *const names[] = {"start", "middle", "end"};
+    FILE *out = ((struct svg *)on)->out;
+    if (text[0] == '\0') return;
+    fputs("<text", out);
+    put_attribute(out, "x", x);
+    put_attribute(out, "y", y);
+    put_attribute(out, "font-size", type->size_px / 0.72);
+    put_attribute(out, "textLength", picture_text_width(type, text));
+    fprintf(out, " lengthAdjust=\"spacingAndGlyphs\" font-family=\"sans-serif\" text-anchor=\"%s\"", names[anchor]);
+    put_colour(out, "fill", rgb);
+    if (type->bold) fputs(" font-weight=\"bold\"", out);
+    if (type->halo_px > 0) {
+        fputs(" stroke=\"#ffffff\" paint-order=\"stroke\" stroke-linejoin=\"round\"", out);
+        put_attribute(out, "stroke-width", 2 * type->halo_px);
+    }
+    fputc('>', out);
+    picture_put_escaped(out, text);
+    fputs("</text>\n", out);
+}
+
+static void pen_begin(void *on, const char *class_name, const char *title)
+{
+    FILE *out = ((struct svg *)on)->out;
+    fprintf(out, "<g class=\"%s\">\n<title>", class_name);
+    picture_put_escaped(out, title);
+    fputs("</title>\n", out);
+}
+
+static void pen_end(void *on)
+{
+    fputs("</g>\n", ((struct svg *)on)->out);
+}
+
+struct pen svg_pen(struct svg *svg)
+{
+    return (struct pen){svg, pen_fill, pen_line, pen_triangle, pen_text, pen_begin, pen_end};
+}
+
+/* ---- images and the file */
+
+/* RFC 4648. */
+static void put_base64(FILE *out, const char *bytes, size_t n)
+{
+    static const char digit[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    const unsigned char *p = (const unsigned char *)bytes;
+    for (size_t i = 0; i < n; i += 3) {
+        const size_t left = n - i;
+        const uint32_t v = (uint32_t)p[i] << 16 | (left > 1 ? (uint32_t)p[i + 1] << 8 : 0) | (left > 2 ? p[i + 2] : 0);
+        fputc(digit[v >> 18], out);
+        fputc(digit[v >> 12 & 63], out);
+        fputc(left > 1 ? digit[v >> 6 & 63] : '=', out);
+        fputc(left > 2 ? digit[v & 63] : '=', out);
+    }
+}
+
+static int put_uri(FILE *out, const struct picture_part *part, struct sh_err *err)
+{
+    char *bytes = NULL;
+    size_t n = 0;
+    FILE *file = open_memstream(&bytes, &n);
+    if (file == NULL) return sh_fail(err, SH_ENOMEM, "no memory for an image");
+    int rc = picture_encode_png(part, file, err);
+    if (fclose(file) != 0 && rc == SH_OK) rc = sh_fail(err, SH_ENOMEM, "no memory for an image");
+    if (rc == SH_OK) {
+        fputs("data:image/png;base64,", out);
+        put_base64(out, bytes, n);
+    }
+    free(bytes);
+    return rc;
+}
+
+int picture_put_uri(FILE *out, const struct picture *picture, const uint8_t *clear, struct sh_err *err)
+{
+    const struct picture_part whole = {picture, 0, 0, picture->width, picture->height, clear};
+    return put_uri(out, &whole, err);
+}
+
+int svg_image(struct svg *svg, const struct picture *picture, long column, long row, uint32_t width, uint32_t height,
+              struct sh_err *err)
+{
+    const struct picture_part part = {picture, (uint32_t)column, (uint32_t)row, width, height, NULL};
+    fprintf(svg->out,
+            "<image x=\"%ld\" y=\"%ld\" width=\"%u\" height=\"%u\" image-rendering=\"optimizeSpeed\" xlink:href=\"",
+            column, row, width, height);
+    int rc = put_uri(svg->out, &part, err);
+    fputs("\"/>\n", svg->out);
+    return rc;
+}
+
+static int copy(const void *source, FILE *file, struct sh_err *why)
+{
+    const struct svg *svg = source;
+    if (fwrite(svg->text, 1, svg->size, file) == svg->size && fflush(file) == 0) return SH_OK;
+    return sh_fail(why, SH_EIO, "%m");
+}
+
+int svg_write(struct svg *svg, const char *what, const char *path, struct sh_err *err)
+{
+    fputs("</svg>\n", svg->out);
+    const int whole = fclose(svg->out) == 0;
+    svg->out = NULL;
+    if (!whole) return sh_fail(err, SH_ENOMEM, "%s %s: no memory", what, path);
+    return picture_write_file(copy, svg, what, path, err);
+}

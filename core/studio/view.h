@@ -1,0 +1,120 @@
+/* SPDX-License-Identifier: MIT */
+/* A picture of points as seen from a place: a pinhole camera, hidden points removed, shading by depth. In: points of
+ * any number, one after the other, in prcs (metres), each with a figure or a colour. Out: an image.
+ *
+ * Camera: at eye, looking at look_at, z up in the picture. A point p with right, up and ahead coordinates (r, u, d)
+ * from the eye is at
+ *     column = width / 2 + f r / d,  row = height / 2 - f u / d,  f = width / 2 / tan(fov / 2)
+ * in pixels, d > 0. fov is the angle across the width.
+ *
+ * Each point is a disc: point_m wide, and at least point_px. Where discs overlap, that of the nearer point counts;
+ * discs bulge, so that on a surface each place takes the nearest centre. Memory depends on the image alone: 12
+ * bytes for each of SUB x SUB places of a pixel.
+ *
+ * Shading: surfaces are bright that face the light from the upper left of the eye; places are dark whose neighbours
+ * are nearer (eye-dome lighting, C. Boucheny: Visualisation scientifique de grands volumes de donnees: pour une
+ * approche perceptive, thesis, Grenoble 2009), at several distances in the image. Normals come from the depths,
+ * which are smoothed within surfaces.
+ *
+ * Ownership: view_create allocates, view_free releases. One thread at a time. Not real-time safe. */
+#ifndef CORE_STUDIO_VIEW_H
+#define CORE_STUDIO_VIEW_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "core/err.h"
+#include "core/studio/picture.h"
+
+enum {
+    VIEW_MIN_PX = 16,
+    VIEW_MAX_SIDE_PX = 8192,
+    VIEW_MAX_PIXELS = 16777216, /* 1.8 GiB while it is drawn */
+};
+
+struct view_camera {
+    double eye_m[3], look_at_m[3];
+    double fov_rad; /* across the width; 0.01 to 2.8 */
+    uint32_t width, height;
+};
+
+struct view_spec {
+    struct view_camera camera;
+    double point_m;  /* width of a point in the scene; 0: point_px alone counts */
+    double point_px; /* its least width in the image */
+};
+
+struct view;
+
+/* SH_EINPUT: a size or angle out of its limits, an eye at the place it looks at, figures that are not finite. Looked
+ * at straight from above, y is up in the picture; from below, -y. */
+int view_create(const struct view_spec *spec, struct view **out, struct sh_err *err);
+void view_free(struct view *view);
+
+/* n points in prcs. Each has a colour (rgb, may be NULL) or else a figure (value; NaN: not known). Points that are not
+ * finite are shots without echo and left out. */
+void view_add_points(struct view *view, size_t n, const double (*xyz_m)[3], const float *value,
+                     const uint8_t (*rgb)[3]);
+
+struct view_counts {
+    uint64_t drawn;  /* points whose disc touches the image: some of them are hidden */
+    uint64_t beyond; /* outside of the image, or behind the eye */
+    uint64_t empty;  /* not finite */
+};
+void view_get_counts(const struct view *view, struct view_counts *counts);
+
+/* Where a place is in the image; depth_m ahead of the eye. 0: it is not before the eye. */
+int view_project(const struct view *view, const double p_m[3], double place_px[2], double *depth_m);
+
+/* Smallest and largest figure that is seen, but for the lowest and highest half percent of the places; 0: none is. */
+int view_range(const struct view *view, double *low, double *high);
+
+/* Colours of figures. */
+struct view_colours {
+    void (*colour)(const void *ctx, double value, uint8_t rgb[3]);
+    const void *ctx;
+    double shade;                   /* 0: none, 1: usual strength */
+    uint8_t background[3];          /* where nothing is */
+    const struct sh_report *report; /* of the work, line by line; NULL: none */
+};
+
+/* The image; the caller frees it with picture_free. SH_ESTOPPED where report asks to stop; there is no image then. */
+int view_draw(const struct view *view, const struct view_colours *colours, struct picture *out, struct sh_err *err);
+
+/* ---- what stands beside the picture */
+
+/* Even steps of CIE L*a*b* from blue (0) over green and yellow to red (1): as the map's heights, but stronger. NaN:
+ * colour_unknown. */
+void view_ramp(double part, uint8_t rgb[3]);
+
+/* Stations' marks, where they are before the eye and in the image, and their names where they cover no other name
+ * and no other mark.
+ * Returns how many names are left out of those whose marks are drawn. */
+struct view_station {
+    double p_m[3];
+    const char *name;
+};
+uint32_t view_draw_stations(const struct view *view, struct picture *picture, const struct view_station *station,
+                            uint32_t n);
+
+/* Below on the left: colours from low to high with round figures beside them. title has the unit. */
+void view_draw_scale(struct picture *picture, const char *title, double low, double high,
+                     const struct view_colours *colours);
+
+struct view_entry {
+    uint8_t rgb[3];
+    char name[64];
+};
+enum { VIEW_MAX_NAMES = 12 };
+/* The same for n things that have names, of which the first VIEW_MAX_NAMES are needed; as many as there is room for, and
+ * how many more there are. */
+void view_draw_names(struct picture *picture, const char *title, const struct view_entry *entry, uint32_t n);
+
+/* ---- where to look from */
+
+/* An eye from which a box fills the image: in the direction azimuth (clockwise from y, seen from above, where the eye
+ * stands) and elevation above the horizon, below 90 degrees. fov, width and height are given; eye and look_at are set. */
+void view_frame(const double min_m[3], const double max_m[3], double azimuth_rad, double elevation_rad,
+                struct view_camera *camera);
+
+#endif

@@ -1,0 +1,48 @@
+/* SPDX-License-Identifier: MIT */
+/* The place for what a head that runs tells a page beside its stream. `run` only opens, starts and closes it. The main of
+ * scanhead fills the place (firmware_sim/app/studio/watch); that of scanheadd leaves it empty, and its page shows the
+ * stream alone.
+ *
+ *     open(cfg, site, &options, &watch, err)            before the loop is made
+ *     loop_options.extra = link(watch), loop_options.web = source(watch); loop_create(...)
+ *     start(watch, err); loop_start(...)
+ *     ...
+ *     loop_free(...); close(watch)                      before device and site go
+ */
+#ifndef FIRMWARE_SIM_APP_RUN_PAGE_H
+#define FIRMWARE_SIM_APP_RUN_PAGE_H
+
+#include "drivers/link/link.h"
+#include "drivers/link/web.h"
+#include "firmware_sim/device/device.h"
+#include "firmware_sim/site/site.h"
+
+struct watch;
+
+struct watch_options {
+    double cpu_share;         /* of one processor, that looking at points may take; 0: no limit, and no low priority */
+    int waits;                /* 1: the observer holds back the paces fast and step, and so sees everything */
+    struct device *device;    /* whose scans they are; is to be closed after the watch */
+    uint32_t scene_triangles; /* of /scene, at most, without what moves */
+    const struct sh_report *report;
+};
+enum { WATCH_SCENE_TRIANGLES = 100000 };
+#define WATCH_CPU_SHARE 0.05
+
+struct run_page {
+    /* Builds what the observer needs: index of distances, cells of coverage, the coarse scene. report hears of it, and is
+     * warned of what there is no room for. cfg and site outlive the watch. On failure *out is NULL. */
+    int (*open)(const struct config *cfg, const struct site *site, const struct watch_options *options,
+                struct watch **out, struct sh_err *err);
+    /* For the loop, which takes its descriptor over. */
+    const struct link_spec *(*link)(struct watch *watch);
+    /* Its get may be called by any thread from open until close. */
+    const struct web_source *(*source)(const struct watch *watch);
+    int (*start)(struct watch *watch, struct sh_err *err);
+    void (*close)(struct watch *watch);
+};
+
+/* Before the command runs; page outlives it. */
+void run_take_page(const struct run_page *page);
+
+#endif

@@ -1,0 +1,248 @@
+/* SPDX-License-Identifier: MIT */
+#include "firmware_sim/app/studio/batch/manifest.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "core/infile.h"
+#include "core/newfile.h"
+#include "firmware_sim/app/app.h"
+
+void batch_entry_free(struct batch_entry *entry)
+{
+    free(entry->file);
+    *entry = (struct batch_entry){0};
+}
+
+/* ---- a line, as batch_manifest_add writes it: the same members in the same order, texts without escapes */
+
+static int take_literal(const char **p, const char *literal)
+{
+    const size_t n = strlen(literal);
+    if (strncmp(*p, literal, n) != 0) return 0;
+    *p += n;
+    return 1;
+}
+
+static int take_key(const char **p, const char *key)
+{
+    return take_literal(p, "\"") && take_literal(p, key) && take_literal(p, "\":");
+}
+
+static int take_uint(const char **p, const char *key, uint64_t *value)
+{
+    char *end;
+    if (!take_key(p, key) || **p < '0' || **p > '9') return 0;
+    errno = 0;
+    *value = strtoull(*p, &end, 10);
+    *p = end;
+    return errno == 0;
+}
+
+static int take_text(const char **p, const char *key, char *buf, size_t len)
+{
+    if (!take_key(p, key) || !take_literal(p, "\"")) return 0;
+    const char *end = strchr(*p, '"');
+    if (end == NULL || (size_t)(end - *p) >= len || memchr(*p, '\\', (size_t)(end - *p)) != NULL) return 0;
+    memcpy(buf, *p, (size_t)(end - *p));
+    buf[end - *p] = '\0';
+    *p = end + 1;
+    return 1;
+}
+
+static int take_made(const char **p, struct batch_made *made)
+{
+    return take_key(p, "made_with") && take_literal(p, "{") &&
+           take_text(p, "program", made->program, sizeof made->program) && take_literal(p, ",") &&
+           take_text(p, "engine", made->engine, sizeof made->engine) && take_literal(p, ",") &&
+           take_text(p, "configuration_sha256", made->configuration, BATCH_SHA_LEN) && take_literal(p, ",") &&
+           take_text(p, "inputs_sha256", made->inputs, BATCH_SHA_LEN) && take_literal(p, ",") &&
+           take_text(p, "job_sha256", made->job, BATCH_SHA_LEN) && take_literal(p, "},");
+}
+
+/* A name in the folder, and in no other. */
+static int take_file(const char **p, struct batch_file *file)
+{
+    return take_literal(p, "{") && take_text(p, "name", file->name, sizeof file->name) && take_literal(p, ",") &&
+           take_uint(p, "bytes", &file->bytes) && take_literal(p, ",") &&
+           take_text(p, "sha256", file->sha, BATCH_SHA_LEN) && take_literal(p, "}") && strchr(file->name, '/') == NULL;
+}
+
+static int take_files(const char **p, struct batch_entry *entry)
+{
+    if (!take_key(p, "files") || !take_literal(p, "[")) return 0;
+    do {
+        struct batch_file *more = realloc(entry->file, (entry->n_files + 1) * sizeof *more);
+        if (more == NULL) return 0;
+        entry->file = more;
+        if (!take_file(p, &more[entry->n_files])) return 0;
+        entry->n_files++;
+    } while (take_literal(p, ","));
+    return take_literal(p, "]");
+}
+
+static int take_seconds(const char **p, double *seconds)
+{
+    char *end;
+    if (!take_key(p, "seconds")) return 0;
+    *seconds = strtod(*p, &end);
+    const int some = end != *p;
+    *p = end;
+    return some;
+}
+
+int batch_entry_read(const char *p, struct batch_entry *entry)
+{
+    uint64_t job = 0;
+    *entry = (struct batch_entry){0};
+    if (take_literal(&p, "{") && take_uint(&p, "job", &job) && take_literal(&p, ",") && take_made(&p, &entry->made) &&
+        take_uint(&p, "pulses", &entry->pulses) && take_literal(&p, ",") && take_uint(&p, "points", &entry->points) &&
+        take_literal(&p, ",") && take_text(&p, "stream_sha256", entry->stream_sha, BATCH_SHA_LEN) &&
+        take_literal(&p, ",") && take_seconds(&p, &entry->seconds) && take_literal(&p, ",") && take_files(&p, entry) &&
+        take_literal(&p, "}") && *p == '\0' && job > 0 && job <= BATCH_MAX_JOBS) {
+        entry->job = (uint32_t)job;
+        return 1;
+    }
+    batch_entry_free(entry);
+    return 0;
+}
+
+/* ---- all manifests of a folder */
+
+static int read_lines(const char *path, int (*take)(void *ctx, struct batch_entry *entry, struct sh_err *err),
+                      void *ctx, const struct sh_report *report, struct sh_err *err)
+{
+    const char *why;
+    char *line = NULL;
+    size_t room = 0;
+    unsigned number = 0;
+    int rc = SH_OK;
+    FILE *in = infile_open(path, &why);
+    if (in == NULL) return sh_fail(err, SH_EINPUT, "%s: cannot be read: %s", path, why);
+    for (ssize_t n; rc == SH_OK && (n = getline(&line, &room, in)) > 0;) {
+        struct batch_entry entry;
+        number++;
+        if (line[n - 1] != '\n') break; /* not whole */
+        line[n - 1] = '\0';
+        if (batch_entry_read(line, &entry))
+            rc = take(ctx, &entry, err);
+        else
+            sh_warn(report, "%s:%u: this line is none of a campaign; it doesn't count", path, number);
+    }
+    if (rc == SH_OK && ferror(in)) rc = sh_fail(err, SH_EIO, "%s: cannot be read", path);
+    free(line);
+    fclose(in);
+    return rc;
+}
+
+static int is_manifest(const struct dirent *entry)
+{
+    unsigned i, n;
+    int end = 0;
+    return sscanf(entry->d_name, "manifest-%u-of-%u.jsonl%n", &i, &n, &end) == 2 && end > 0 &&
+           entry->d_name[end] == '\0';
+}
+
+int batch_manifest_read(const char *dir, int (*take)(void *ctx, struct batch_entry *entry, struct sh_err *err),
+                        void *ctx, const struct sh_report *report, struct sh_err *err)
+{
+    struct dirent **found = NULL;
+    const int n = scandir(dir, &found, is_manifest, alphasort);
+    int rc = SH_OK;
+    if (n < 0 && errno != ENOENT) rc = sh_fail(err, SH_EINPUT, "%s: cannot be read: %s", dir, strerror(errno));
+    for (int i = 0; i < n; i++) {
+        char path[PATH_MAX];
+        snprintf(path, sizeof path, "%s/%s", dir, found[i]->d_name);
+        if (rc == SH_OK) rc = read_lines(path, take, ctx, report, err);
+        free(found[i]);
+    }
+    free(found);
+    return rc;
+}
+
+/* ---- a shard's own */
+
+/* What follows the last newline was cut short when its writer was killed. */
+static int cut_tail(int fd, const char *path, struct sh_err *err)
+{
+    off_t end = lseek(fd, 0, SEEK_END), at = end;
+    char c = '\0';
+    while (at > 0 && c != '\n')
+        if (pread(fd, &c, 1, --at) != 1) return sh_fail(err, SH_EIO, "%s: cannot be read: %s", path, strerror(errno));
+    if (c == '\n') at++;
+    if (at == end || ftruncate(fd, at) == 0) return SH_OK;
+    return sh_fail(err, SH_EIO, "%s: its unfinished line cannot be cut off: %s", path, strerror(errno));
+}
+
+int batch_manifest_open(const char *dir, uint32_t shard, uint32_t n_shards, int *fd, struct sh_err *err)
+{
+    char path[PATH_MAX];
+    struct sh_err why;
+    snprintf(path, sizeof path, "%s/manifest-%u-of-%u.jsonl", dir, shard, n_shards);
+    int rc = newfile_append(path, fd, &why);
+    if (rc == SH_ESTATE)
+        return sh_fail(err, rc, "%s: another process is at shard %u/%u; allowed once it has ended, or another shard",
+                       path, shard, n_shards);
+    if (rc != SH_OK) return sh_fail(err, rc, "%s", why.text);
+    rc = cut_tail(*fd, path, err);
+    if (rc != SH_OK) close(*fd);
+    return rc;
+}
+
+static void put_entry(FILE *out, const struct batch_entry *entry)
+{
+    struct json json;
+    json_begin_one_line(&json, out);
+    json_open_object(&json, NULL);
+    json_uint(&json, "job", entry->job);
+    json_open_object(&json, "made_with");
+    json_string(&json, "program", entry->made.program);
+    json_string(&json, "engine", entry->made.engine);
+    json_string(&json, "configuration_sha256", entry->made.configuration);
+    json_string(&json, "inputs_sha256", entry->made.inputs);
+    json_string(&json, "job_sha256", entry->made.job);
+    json_close_object(&json);
+    json_uint(&json, "pulses", entry->pulses);
+    json_uint(&json, "points", entry->points);
+    json_string(&json, "stream_sha256", entry->stream_sha);
+    json_double(&json, "seconds", entry->seconds);
+    json_open_array(&json, "files");
+    for (uint32_t i = 0; i < entry->n_files; i++) {
+        json_open_object(&json, NULL);
+        json_string(&json, "name", entry->file[i].name);
+        json_uint(&json, "bytes", entry->file[i].bytes);
+        json_string(&json, "sha256", entry->file[i].sha);
+        json_close_object(&json);
+    }
+    json_close_array(&json);
+    json_close_object(&json);
+    json_end(&json, NULL);
+}
+
+/* In one call of write, so that no reader sees a part of it but where the disk is full. */
+int batch_manifest_add(int fd, const struct batch_entry *entry, struct sh_err *err)
+{
+    char *line = NULL;
+    size_t len = 0;
+    FILE *out = open_memstream(&line, &len);
+    if (out == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a line of the manifest");
+    put_entry(out, entry);
+    int rc = fclose(out) == 0 ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory for a line of the manifest");
+    if (rc == SH_OK) {
+        const off_t before = lseek(fd, 0, SEEK_END);
+        const ssize_t n = write(fd, line, len);
+        const int error = n >= 0 && n != (ssize_t)len ? ENOSPC : errno;
+        if (n != (ssize_t)len || fsync(fd) != 0) {
+            rc = sh_fail(err, SH_EIO, "the manifest: cannot write: %s", strerror(error));
+            if (ftruncate(fd, before) != 0) sh_fail(err, SH_EIO, "the manifest: cannot write: %s", strerror(errno));
+        }
+    }
+    free(line);
+    return rc;
+}

@@ -1,0 +1,42 @@
+/* SPDX-License-Identifier: MIT */
+/* What is done of a campaign. Each shard has a file manifest-I-of-N.jsonl in the campaign's folder, a line of JSON for
+ * each job that it has finished; nothing but whole lines counts. Out: the entries of all such files of a folder.
+ *
+ * The file is locked while its shard runs. Lines are appended and synced one by one. One thread. */
+#ifndef FIRMWARE_SIM_APP_STUDIO_BATCH_MANIFEST_H
+#define FIRMWARE_SIM_APP_STUDIO_BATCH_MANIFEST_H
+
+#include "firmware_sim/app/studio/batch/made.h"
+#include "firmware_sim/app/studio/batch/sweep.h"
+
+struct batch_file {
+    char name[BATCH_NAME_LEN + 32]; /* in the campaign's folder */
+    uint64_t bytes;
+    char sha[BATCH_SHA_LEN];
+};
+
+struct batch_entry {
+    uint32_t job; /* its number, from 1 */
+    struct batch_made made;
+    uint64_t pulses, points;
+    char stream_sha[BATCH_SHA_LEN];
+    double seconds; /* that it took */
+    struct batch_file *file;
+    uint32_t n_files;
+};
+void batch_entry_free(struct batch_entry *entry);
+
+/* One line without its newline; *entry is to be freed. 0: it is none of ours, or not whole. */
+int batch_entry_read(const char *line, struct batch_entry *entry);
+
+/* Gives every entry of every manifest of the folder to `take`, file by file, in the order of their lines; of a job
+ * that stands in a file twice, also the earlier one. `take` owns the entry. Lines that can't be read are warned of, but
+ * for the last one of a file: its writer may have been killed, or still be there. */
+int batch_manifest_read(const char *dir, int (*take)(void *ctx, struct batch_entry *entry, struct sh_err *err),
+                        void *ctx, const struct sh_report *report, struct sh_err *err);
+
+/* A shard's manifest, open to append; an unfinished last line is cut off. SH_ESTATE: another process has it. */
+int batch_manifest_open(const char *dir, uint32_t shard, uint32_t n_shards, int *fd, struct sh_err *err);
+int batch_manifest_add(int fd, const struct batch_entry *entry, struct sh_err *err);
+
+#endif

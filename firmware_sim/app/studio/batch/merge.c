@@ -1,0 +1,198 @@
+/* SPDX-License-Identifier: MIT */
+/* All shards of a campaign together (batch.h). */
+#include <dirent.h>
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "core/newfile.h"
+#include "firmware_sim/app/studio/batch/batch.h"
+#include "firmware_sim/base/clock.h"
+
+enum { MOST_LINES = 20 };
+
+/* A job that isn't there, or isn't what it was. */
+struct gaps {
+    uint32_t n;
+};
+
+static void tell(struct gaps *gaps, uint32_t job, const char *name, const char *why)
+{
+    if (gaps->n++ < MOST_LINES) fprintf(stderr, "scanhead: job %u, %s: %s\n", job + 1, name, why);
+}
+
+static int check_job(struct batch *b, uint32_t job, struct gaps *gaps, struct sh_err *err)
+{
+    char name[BATCH_NAME_LEN];
+    struct sh_err why = {0};
+    batch_job_name(b, job, name);
+    if (!b->job[job].is_done) {
+        tell(gaps, job, name, b->job[job].other != NULL ? b->job[job].other : "missing");
+        return SH_OK;
+    }
+    const int rc = batch_check_files(b, job, &why);
+    if (rc == SH_ESTOPPED) return sh_fail_stopped(err);
+    if (rc != SH_OK) tell(gaps, job, name, why.text);
+    return SH_OK;
+}
+
+/* Files of one campaign come from one kind of machine. */
+static int check_engines(const struct batch *b, struct sh_err *err)
+{
+    const struct batch_job *first = NULL;
+    for (uint32_t i = 0; i < b->n_jobs; i++) {
+        const struct batch_job *job = &b->job[i];
+        if (!job->is_done) continue;
+        if (first == NULL) first = job;
+        if (strcmp(first->entry.made.engine, job->entry.made.engine) != 0)
+            return sh_fail(
+                err, SH_ESTATE,
+                "%s: job %u was made by %s, job %u by %s; allowed one kind, as rays may meet other triangles on "
+                "another",
+                b->dir, first->entry.job, first->entry.made.engine, job->entry.job, job->entry.made.engine);
+    }
+    return SH_OK;
+}
+
+static int check_jobs(struct batch *b, struct gaps *gaps, struct sh_err *err)
+{
+    int64_t next_ns = clock_now_ns() + 1000000000;
+    for (uint32_t i = 0; i < b->n_jobs; i++) {
+        int rc = check_job(b, i, gaps, err);
+        if (rc != SH_OK) return rc;
+        if (b->quiet || clock_now_ns() < next_ns) continue;
+        next_ns = clock_now_ns() + 1000000000;
+        sh_progress(&app_report_stderr, "checking files", (double)i / b->n_jobs);
+    }
+    return SH_OK;
+}
+
+/* ---- files that begin with a job's number and are none of its files: of an earlier --force, say */
+
+static int is_of_job(const struct batch *b, const char *name)
+{
+    char *end;
+    const unsigned long job = strtoul(name, &end, 10);
+    if (name[0] < '0' || name[0] > '9' || end - name < 4 || *end != '_') return 1; /* not by its name */
+    if (job == 0 || job > b->n_jobs) return 0;
+    const struct batch_entry *entry = &b->job[job - 1].entry;
+    for (uint32_t i = 0; i < entry->n_files; i++)
+        if (strcmp(entry->file[i].name, name) == 0) return 1;
+    return 0;
+}
+
+static void warn_of_strangers(const struct batch *b)
+{
+    char first[NAME_MAX + 1] = "";
+    unsigned n = 0;
+    DIR *dir = opendir(b->dir);
+    for (struct dirent *file; dir != NULL && (file = readdir(dir)) != NULL;) {
+        if (is_of_job(b, file->d_name)) continue;
+        if (n++ == 0 || strcmp(file->d_name, first) < 0) snprintf(first, sizeof first, "%s", file->d_name);
+    }
+    if (dir != NULL) closedir(dir);
+    if (n != 0)
+        sh_warn(&app_report_stderr, "%s: %u files are of no job of this campaign, the first: %s", b->dir, n, first);
+}
+
+/* ---- the manifest: nothing in it depends on how the campaign was cut, or on when */
+
+static void put_job(struct json *json, const struct batch *b, uint32_t i)
+{
+    const struct batch_entry *entry = &b->job[i].entry;
+    json_open_object(json, NULL);
+    batch_put_job(json, b, i);
+    json_string(json, "inputs_sha256", entry->made.inputs);
+    json_string(json, "job_sha256", entry->made.job);
+    json_uint(json, "pulses", entry->pulses);
+    json_uint(json, "points", entry->points);
+    json_string(json, "stream_sha256", entry->stream_sha);
+    json_open_array(json, "files");
+    for (uint32_t k = 0; k < entry->n_files; k++) {
+        json_open_object(json, NULL);
+        json_string(json, "name", entry->file[k].name);
+        json_uint(json, "bytes", entry->file[k].bytes);
+        json_string(json, "sha256", entry->file[k].sha);
+        json_close_object(json);
+    }
+    json_close_array(json);
+    json_close_object(json);
+}
+
+static void put_all(struct json *json, const struct batch *b)
+{
+    const struct batch_made *made = &b->job[0].entry.made;
+    const char *slash = strrchr(b->in.operand[0], '/');
+    json_open_object(json, NULL);
+    json_string(json, "program", made->program);
+    json_string(json, "engine", made->engine);
+    json_string(json, "configuration", slash != NULL ? slash + 1 : b->in.operand[0]);
+    json_string(json, "configuration_sha256", made->configuration);
+    json_open_array(json, "set");
+    for (int i = 0; i < b->in.sets.n; i++)
+        if (!batch_is_of_speed(b->in.sets.set[i])) json_string(json, NULL, b->in.sets.set[i]);
+    json_close_array(json);
+    json_open_array(json, "options");
+    for (int i = 0; i < b->options.n; i++)
+        json_string(json, NULL, b->options.word[i]);
+    json_close_array(json);
+    json_open_array(json, "jobs");
+    for (uint32_t i = 0; i < b->n_jobs; i++)
+        put_job(json, b, i);
+    json_close_array(json);
+    json_close_object(json);
+}
+
+static int write_whole(const struct batch *b, struct sh_err *err)
+{
+    char path[PATH_MAX], part[PATH_MAX];
+    struct json json;
+    int fd;
+    snprintf(path, sizeof path, "%s/manifest.json", b->dir);
+    snprintf(part, sizeof part, "%s/manifest.json.part", b->dir);
+    int rc = newfile_part(path, part, &fd, err);
+    if (rc != SH_OK) return rc;
+    const int copy = dup(fd);
+    FILE *out = copy >= 0 ? fdopen(copy, "w") : NULL;
+    if (out == NULL) {
+        if (copy >= 0) close(copy);
+        newfile_drop(part, fd);
+        return sh_fail(err, SH_EIO, "%s: cannot be written", path);
+    }
+    json_begin(&json, out);
+    put_all(&json, b);
+    rc = json_end(&json, err);
+    if (fclose(out) != 0 && rc == SH_OK) rc = sh_fail(err, SH_EIO, "%s: cannot be written", path);
+    if (rc == SH_OK) return newfile_keep(path, part, fd, err);
+    newfile_drop(part, fd);
+    return rc;
+}
+
+static int check_folder(const struct batch *b, struct sh_err *err)
+{
+    struct stat st;
+    if (stat(b->dir, &st) == 0 && S_ISDIR(st.st_mode)) return SH_OK;
+    return sh_fail(err, SH_EINPUT, "-o %s: no such folder; allowed is that of a campaign", b->dir);
+}
+
+int batch_merge(struct batch *b)
+{
+    struct gaps gaps = {0};
+    struct sh_err err = {0};
+    int rc = check_folder(b, &err);
+    if (rc == SH_OK) rc = batch_find_done(b, 1, &err);
+    if (rc == SH_OK) rc = check_engines(b, &err);
+    if (rc == SH_OK) rc = check_jobs(b, &gaps, &err);
+    if (rc == SH_OK && gaps.n > MOST_LINES) fprintf(stderr, "scanhead: and %u more\n", gaps.n - MOST_LINES);
+    if (rc == SH_OK && gaps.n != 0)
+        rc =
+            sh_fail(&err, SH_EIO, "%s: %u of %u jobs are not whole; run their shards again", b->dir, gaps.n, b->n_jobs);
+    if (rc == SH_OK) warn_of_strangers(b);
+    if (rc == SH_OK) rc = write_whole(b, &err);
+    if (rc != SH_OK) return app_fail(&err);
+    if (!b->quiet) fprintf(stderr, "scanhead: %u jobs are whole: %s/manifest.json\n", b->n_jobs, b->dir);
+    return APP_OK;
+}

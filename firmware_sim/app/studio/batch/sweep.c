@@ -1,0 +1,250 @@
+/* SPDX-License-Identifier: MIT */
+#include "firmware_sim/app/studio/batch/sweep.h"
+
+#include <ctype.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "drivers/protocol/crc32c.h"
+
+enum { NAME_KEPT = 96 };
+
+/* ---- values */
+
+static int add_value(struct batch_sweep *s, const char *value, size_t len, struct sh_err *err)
+{
+    char **grown = realloc(s->set, (s->n + 1) * sizeof *s->set), *set = NULL;
+    if (grown != NULL) s->set = grown;
+    if (grown == NULL || asprintf(&set, "%s=%.*s", s->key, (int)len, value) < 0)
+        return sh_fail(err, SH_ENOMEM, "no memory for the values of %s", s->key);
+    for (uint32_t i = 0; i < s->n; i++) {
+        if (strcmp(s->set[i], set) != 0) continue;
+        free(set);
+        return sh_fail(err, SH_EINPUT, "--sweep %s: the value %.*s is given twice", s->key, (int)len, value);
+    }
+    s->set[s->n++] = set;
+    if (s->n > BATCH_MAX_VALUES)
+        return sh_fail(err, SH_EINPUT, "--sweep %s: more than %d values", s->key, BATCH_MAX_VALUES);
+    return SH_OK;
+}
+
+/* Where a value ends: the next comma outside of brackets and quotes, or the end. NULL: a bracket or a quote is open. */
+static const char *value_end(const char *p)
+{
+    int depth = 0;
+    char quote = '\0';
+    for (; *p != '\0'; p++) {
+        if (quote != '\0') {
+            if (*p == quote) quote = '\0';
+        } else if (*p == '"' || *p == '\'')
+            quote = *p;
+        else if (*p == '[' || *p == '{')
+            depth++;
+        else if (*p == ']' || *p == '}')
+            depth--;
+        else if (*p == ',' && depth == 0)
+            break;
+        if (depth < 0) return NULL;
+    }
+    return depth == 0 && quote == '\0' ? p : NULL;
+}
+
+static int add_list(struct batch_sweep *s, const char *values, struct sh_err *err)
+{
+    int rc = SH_OK;
+    for (const char *p = values;; p++) {
+        const char *end = value_end(p);
+        if (end == NULL)
+            return sh_fail(err, SH_EINPUT, "--sweep %s=%s: a bracket or a quote without its other half", s->key,
+                           values);
+        if (end == p)
+            return sh_fail(err, SH_EINPUT, "--sweep %s=%s: an empty value; allowed as in %s=A,B", s->key, values,
+                           s->key);
+        rc = add_value(s, p, (size_t)(end - p), err);
+        if (rc != SH_OK || *end == '\0') return rc;
+        p = end;
+    }
+}
+
+/* FIRST:LAST:STEP, three numbers. */
+static int is_range(const char *values, double range[3])
+{
+    const char *p = values;
+    for (int i = 0; i < 3; i++) {
+        char *end;
+        range[i] = strtod(p, &end);
+        if (end == p || isspace((unsigned char)*p) || *end != (i < 2 ? ':' : '\0')) return 0;
+        p = end + 1;
+    }
+    return isfinite(range[0]) && isfinite(range[1]) && isfinite(range[2]);
+}
+
+/* The last value may lie beyond LAST by a rounding error: 1e-9 of a step. Twelve digits: 0.3 and not
+ * 0.30000000000000004. */
+static int add_range(struct batch_sweep *s, const char *values, const double range[3], struct sh_err *err)
+{
+    const double steps = floor((range[1] - range[0]) / range[2] + 1e-9);
+    if (!(steps >= 0.0) || range[2] == 0.0)
+        return sh_fail(err, SH_EINPUT,
+                       "--sweep %s=%s: no value from FIRST to LAST; allowed FIRST:LAST:STEP as in 0:10:2", s->key,
+                       values);
+    if (steps >= BATCH_MAX_VALUES)
+        return sh_fail(err, SH_EINPUT, "--sweep %s=%s: %.9g values; allowed at most %d", s->key, values, steps + 1.0,
+                       BATCH_MAX_VALUES);
+    for (int i = 0, rc; i <= (int)steps; i++) {
+        char text[32];
+        const int n = snprintf(text, sizeof text, "%.12g", range[0] + i * range[2]);
+        if ((rc = add_value(s, text, (size_t)n, err)) != SH_OK) return rc;
+    }
+    return SH_OK;
+}
+
+/* a[0].b is a.0.b. */
+static const char *next_letter(const char *p)
+{
+    while (*p == ']')
+        p++;
+    return p;
+}
+
+const char *batch_after_key(const char *text, const char *key)
+{
+    for (text = next_letter(text), key = next_letter(key); *key != '\0';
+         text = next_letter(text + 1), key = next_letter(key + 1))
+        if ((*text == '[' ? '.' : *text) != (*key == '[' ? '.' : *key)) return NULL;
+    return text;
+}
+
+int batch_sweeps_add(struct batch_sweeps *sweeps, const char *text, struct sh_err *err)
+{
+    const char *equals = strchr(text, '=');
+    double range[3];
+    if (equals == NULL || equals == text || equals[1] == '\0')
+        return sh_fail(err, SH_EINPUT,
+                       "--sweep %s: allowed KEY=A,B,... or KEY=FIRST:LAST:STEP, as in head.prr_hz=300000,600000", text);
+    if (sweeps->n == BATCH_MAX_SWEEPS) return sh_fail(err, SH_EINPUT, "--sweep: at most %d keys", BATCH_MAX_SWEEPS);
+    struct batch_sweep *s = &sweeps->sweep[sweeps->n++];
+    *s = (struct batch_sweep){.key = strndup(text, (size_t)(equals - text))};
+    if (s->key == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
+    for (uint32_t i = 0; i + 1 < sweeps->n; i++) {
+        const char *after = batch_after_key(s->key, sweeps->sweep[i].key);
+        if (after != NULL && *after == '\0')
+            return sh_fail(err, SH_EINPUT, "--sweep %s: the key is given twice; allowed once, with all its values",
+                           s->key);
+        after = batch_after_key(sweeps->sweep[i].key, s->key);
+        if (after != NULL && (*after == '.' || *after == '['))
+            return sh_fail(err, SH_EINPUT, "--sweep %s: it would replace the values of --sweep %s; allowed before that",
+                           s->key, sweeps->sweep[i].key);
+    }
+    return is_range(equals + 1, range) ? add_range(s, equals + 1, range, err) : add_list(s, equals + 1, err);
+}
+
+void batch_sweeps_free(struct batch_sweeps *sweeps)
+{
+    for (uint32_t i = 0; i < sweeps->n; i++) {
+        struct batch_sweep *s = &sweeps->sweep[i];
+        for (uint32_t k = 0; k < s->n; k++)
+            free(s->set[k]);
+        free(s->set);
+        free(s->key);
+    }
+    sweeps->n = 0;
+}
+
+/* ---- combinations */
+
+int batch_sweeps_count(const struct batch_sweeps *sweeps, uint32_t *n, struct sh_err *err)
+{
+    uint64_t all = 1;
+    for (uint32_t i = 0; i < sweeps->n; i++) {
+        all *= sweeps->sweep[i].n;
+        if (all > BATCH_MAX_JOBS) return sh_fail(err, SH_EINPUT, "--sweep: more than %d combinations", BATCH_MAX_JOBS);
+    }
+    *n = (uint32_t)all;
+    return SH_OK;
+}
+
+void batch_sweeps_at(const struct batch_sweeps *sweeps, uint32_t combination, const char *set[BATCH_MAX_SWEEPS])
+{
+    for (uint32_t i = sweeps->n; i-- > 0;) {
+        const struct batch_sweep *s = &sweeps->sweep[i];
+        set[i] = s->set[combination % s->n];
+        combination /= s->n;
+    }
+}
+
+/* ---- stations and shards */
+
+/* A whole number from 1 to `max` at *p, which is moved on. 0: there is none. */
+static uint32_t take_number(const char **p, uint32_t max)
+{
+    uint64_t number = 0;
+    while (**p >= '0' && **p <= '9' && number <= max)
+        number = 10 * number + (uint64_t)(*(*p)++ - '0');
+    return number <= max ? (uint32_t)number : 0;
+}
+
+static int fail_stations(const char *text, struct sh_err *err)
+{
+    return sh_fail(err, SH_EINPUT, "--stations %s: allowed all, or rising numbers from 1 to %d, as in 1,3-5", text,
+                   CONFIG_MAX_STOPS);
+}
+
+int batch_stations_parse(const char *text, struct batch_stations *stations, struct sh_err *err)
+{
+    uint32_t last = 0;
+    stations->n = 0;
+    stations->all = strcmp(text, "all") == 0;
+    if (stations->all) return SH_OK;
+    for (const char *p = text;; p++) {
+        const uint32_t from = take_number(&p, CONFIG_MAX_STOPS);
+        uint32_t to = from;
+        if (*p == '-') {
+            p++;
+            to = take_number(&p, CONFIG_MAX_STOPS);
+        }
+        if (from <= last || to < from || (*p != ',' && *p != '\0')) return fail_stations(text, err);
+        for (last = from; last <= to; last++)
+            stations->number[stations->n++] = last;
+        last = to;
+        if (*p == '\0') return SH_OK;
+    }
+}
+
+int batch_shard_parse(const char *text, uint32_t *i, uint32_t *n, struct sh_err *err)
+{
+    const char *p = text;
+    *i = take_number(&p, BATCH_MAX_JOBS);
+    *n = 0;
+    if (*i > 0 && *p == '/') {
+        p++;
+        *n = take_number(&p, BATCH_MAX_JOBS);
+    }
+    if (*n != 0 && *p == '\0' && *i <= *n) return SH_OK;
+    return sh_fail(err, SH_EINPUT, "--shard %s: allowed I/N, from 1/N to N/N, N up to %d", text, BATCH_MAX_JOBS);
+}
+
+/* ---- names */
+
+void batch_name(uint32_t number, int digits, uint32_t station, const char *const *set, uint32_t n,
+                char name[BATCH_NAME_LEN])
+{
+    static const char safe[] = "-+.,=_";
+    char *all = NULL;
+    size_t size;
+    FILE *out = open_memstream(&all, &size);
+    name[0] = '\0';
+    if (out == NULL) return;
+    fprintf(out, "%0*u_station-%u", digits, number, station);
+    for (uint32_t i = 0; i < n; i++)
+        fprintf(out, "_%s", set[i]);
+    if (fclose(out) == 0 && size > NAME_KEPT)
+        snprintf(name, BATCH_NAME_LEN, "%.*s_%08x", NAME_KEPT, all, crc32c(0, all, size));
+    else if (all != NULL)
+        snprintf(name, BATCH_NAME_LEN, "%s", all);
+    free(all);
+    for (char *p = name; *p != '\0'; p++)
+        if (!isalnum((unsigned char)*p) && strchr(safe, *p) == NULL) *p = '_';
+}

@@ -1,0 +1,56 @@
+/* SPDX-License-Identifier: MIT */
+/* What a campaign varies. In: the texts of --sweep and --stations. Out: the values of each key, every combination
+ * of them by its number, and numbers of stations. Pure; errors are SH_EINPUT or SH_ENOMEM. */
+#ifndef FIRMWARE_SIM_APP_STUDIO_BATCH_SWEEP_H
+#define FIRMWARE_SIM_APP_STUDIO_BATCH_SWEEP_H
+
+#include <stdint.h>
+
+#include "core/err.h"
+#include "firmware_sim/config/config.h"
+
+enum { BATCH_MAX_SWEEPS = 16, BATCH_MAX_VALUES = 10000, BATCH_MAX_JOBS = 1000000 };
+
+struct batch_sweep {
+    char *key;
+    char **set; /* KEY=VALUE, as --set takes it */
+    uint32_t n;
+};
+
+struct batch_sweeps {
+    struct batch_sweep sweep[BATCH_MAX_SWEEPS];
+    uint32_t n;
+};
+
+/* KEY=A,B,... or KEY=FIRST:LAST:STEP, whole steps from FIRST that don't go beyond LAST. Commas within brackets,
+ * braces and quotes belong to a value. A key, or a value of a key, that is there already is an error. */
+int batch_sweeps_add(struct batch_sweeps *sweeps, const char *text, struct sh_err *err);
+void batch_sweeps_free(struct batch_sweeps *sweeps);
+
+/* Whether a text begins with that key, in either spelling (a.0.b, a[0].b): where it ends there. NULL: it doesn't. */
+const char *batch_after_key(const char *text, const char *key);
+
+/* How many combinations there are: 1 without sweeps. SH_EINPUT: more than BATCH_MAX_JOBS. */
+int batch_sweeps_count(const struct batch_sweeps *sweeps, uint32_t *n, struct sh_err *err);
+/* The settings of a combination, from 0, in the order of the sweeps; the last sweep varies fastest. */
+void batch_sweeps_at(const struct batch_sweeps *sweeps, uint32_t combination, const char *set[BATCH_MAX_SWEEPS]);
+
+/* Numbers of stations, from 1. */
+struct batch_stations {
+    int all;
+    uint32_t n, number[CONFIG_MAX_STOPS]; /* rising */
+};
+
+/* "all", or numbers and ranges as 1,3-5. */
+int batch_stations_parse(const char *text, struct batch_stations *stations, struct sh_err *err);
+
+/* A job's name, of letters that are safe in names of files everywhere: its number with `digits` digits, the
+ * station's number, then the settings. Other characters become _ ; the end of a long one becomes a hash of it. */
+enum { BATCH_NAME_LEN = 128 };
+void batch_name(uint32_t number, int digits, uint32_t station, const char *const *set, uint32_t n,
+                char name[BATCH_NAME_LEN]);
+
+/* i/n, 1 <= i <= n. */
+int batch_shard_parse(const char *text, uint32_t *i, uint32_t *n, struct sh_err *err);
+
+#endif

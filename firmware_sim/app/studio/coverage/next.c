@@ -1,0 +1,239 @@
+/* SPDX-License-Identifier: MIT */
+/* Where to stand next: places, what each would see that nobody has seen, and scans of the best. */
+#include "firmware_sim/app/studio/coverage/next.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/angle.h"
+
+static const double LEAST_FRONT = 0.5;
+
+struct chooser {
+    struct coverage_finder *f;
+    struct coverage *coverage;
+    struct coverage_gain *gain; /* [places] */
+    double (*open_m)[3];        /* places that are still open, and which they are */
+    uint32_t *open, n_open;
+};
+
+/* ---- rounds */
+
+static void turn(const double dir[3], double heading_rad, double out[3])
+{
+    const double s = sin(heading_rad), c = cos(heading_rad);
+    out[0] = c * dir[0] + s * dir[1];
+    out[1] = c * dir[1] - s * dir[0];
+    out[2] = dir[2];
+}
+
+/* Places of one heading at a time: they share directions. */
+static int estimate(struct chooser *c, double heading_deg, double (*turned)[3], struct sh_err *err)
+{
+    const struct config_profile *profile = &c->f->site->cfg->profile;
+    c->n_open = 0;
+    for (uint32_t i = 0; i < c->f->next->n; i++) {
+        const struct coverage_next_place *p = &c->f->next->place[i];
+        if (p->out || p->heading_deg != heading_deg) continue;
+        memcpy(c->open_m[c->n_open], p->position_m, sizeof *c->open_m);
+        c->open[c->n_open++] = i;
+    }
+    for (uint32_t i = 0; i < c->f->n_dir; i++)
+        turn(c->f->dir[i], angle_rad(heading_deg), turned[i]);
+    const struct coverage_directions directions = {c->f->n_dir, (const double(*)[3])turned, c->f->each_sr,
+                                                   profile->range_min_m, profile->range_max_m};
+    return coverage_gains(c->coverage, c->f->site->bvh, &directions, (const double(*)[3])c->open_m, c->n_open,
+                          c->f->report, c->gain, err);
+}
+
+static int estimate_all(struct chooser *c, double *estimate_m2, struct sh_err *err)
+{
+    struct coverage_next *next = c->f->next;
+    double(*turned)[3] = malloc(c->f->n_dir * sizeof *turned);
+    char *done = calloc(next->n, 1);
+    int rc = turned != NULL && done != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory for directions");
+    for (uint32_t i = 0; i < next->n; i++)
+        estimate_m2[i] = 0.0;
+    for (uint32_t i = 0; i < next->n && rc == SH_OK; i++) {
+        if (done[i] || next->place[i].out) continue;
+        rc = estimate(c, next->place[i].heading_deg, turned, err);
+        for (uint32_t k = 0; k < c->n_open && rc == SH_OK; k++) {
+            estimate_m2[c->open[k]] = c->gain[k].gain_m2;
+            next->place[c->open[k]].front = c->gain[k].front;
+            done[c->open[k]] = 1;
+        }
+    }
+    free(turned);
+    free(done);
+    return rc;
+}
+
+/* Where the stations see fronts, a place that sees backs lies within a closed body. Places of one's own are taken as
+ * they are. */
+static void leave_out_bodies(struct chooser *c, double *estimate_m2)
+{
+    uint64_t hits = 0, front = 0;
+    for (uint32_t i = 0; i < c->f->site->n_stations; i++) {
+        hits += c->f->result->station[i].pulses.hits;
+        front += c->f->result->station[i].pulses.front;
+    }
+    if (c->f->o->candidates != NULL || (double)front < LEAST_FRONT * (double)hits) return;
+    for (uint32_t i = 0; i < c->f->next->n; i++) {
+        struct coverage_next_place *p = &c->f->next->place[i];
+        if (p->out || !(p->front < LEAST_FRONT)) continue;
+        p->out = COVERAGE_PLACE_WITHIN;
+        c->f->next->within++;
+        estimate_m2[i] = 0.0;
+    }
+}
+
+/* The open place with the largest estimate of those not tried yet; n: none. */
+static uint32_t best_of(const struct coverage_next *next, const double *estimate_m2,
+                        const struct coverage_next_round *round)
+{
+    uint32_t best = next->n;
+    for (uint32_t i = 0; i < next->n; i++) {
+        int tried = next->place[i].out != 0 || !(estimate_m2[i] > 0.0);
+        for (uint32_t k = 0; k < round->n_tried; k++)
+            tried |= round->tried[k] == i;
+        if (!tried && (best == next->n || estimate_m2[i] > estimate_m2[best])) best = i;
+    }
+    return best;
+}
+
+/* A whole scan from a place; its result waits. */
+static int scan(struct chooser *c, uint32_t place, const char *what, struct sh_err *err)
+{
+    const struct coverage_next_place *p = &c->f->next->place[place];
+    struct coverage_scan_at *at = malloc(sizeof *at);
+    struct coverage_pulses pulses;
+    struct cast_tripod tripod;
+    if (at == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a scan");
+    coverage_scan_of(c->f->site, c->f->result->base, at);
+    at->scan.setup.bvh = c->f->site->bvh;
+    at->scan.setup.sight = NULL;
+    if (at->scan.setup.tripod != NULL) { /* its cone comes along; its legs stand where they are */
+        tripod = *at->scan.setup.tripod;
+        tripod.has_legs = 0;
+        at->scan.setup.tripod = &tripod;
+    }
+    memcpy(at->scan.setup.station_m, p->position_m, sizeof at->scan.setup.station_m);
+    pose_heading(angle_rad(p->heading_deg), at->scan.setup.rotation);
+    int rc = coverage_look(c->coverage, &at->scan, what, c->f->report, &pulses, err);
+    free(at);
+    return rc;
+}
+
+/* In order of gain, of equal ones the first place. */
+static void insert(struct coverage_next_round *round, uint32_t place, double seen_m2, double gain_m2)
+{
+    uint32_t at = round->n_tried++;
+    for (; at > 0 && gain_m2 > round->gain_m2[at - 1]; at--) {
+        round->tried[at] = round->tried[at - 1];
+        round->seen_m2[at] = round->seen_m2[at - 1];
+        round->gain_m2[at] = round->gain_m2[at - 1];
+    }
+    round->tried[at] = place;
+    round->seen_m2[at] = seen_m2;
+    round->gain_m2[at] = gain_m2;
+}
+
+static double none_m2(struct coverage *coverage)
+{
+    double sum_m2 = 0.0;
+    for (uint32_t i = 0; i < coverage_cells(coverage); i++) {
+        struct coverage_cell cell;
+        coverage_get(coverage, i, &cell);
+        if (cell.stations == 0) sum_m2 += cell.area_m2;
+    }
+    return sum_m2;
+}
+
+/* 1: a place was chosen; 0: there is nothing to gain; or a negative error. */
+static int choose(struct chooser *c, uint32_t number, struct sh_err *err)
+{
+    struct coverage_next *next = c->f->next;
+    double *estimate_m2 = next->estimate_m2 + (size_t)number * next->n;
+    struct coverage_next_round *round = &next->round[number];
+    char what[64];
+    uint32_t last = next->n;
+    int rc = estimate_all(c, estimate_m2, err);
+    if (rc == SH_OK && number == 0) leave_out_bodies(c, estimate_m2);
+    while (rc == SH_OK && round->n_tried < (uint32_t)c->f->o->scans) {
+        const uint32_t best = best_of(next, estimate_m2, round);
+        double seen_m2, gain_m2;
+        if (best == next->n) break;
+        snprintf(what, sizeof what, "next station %u, scan %u of %ld", number + 1, round->n_tried + 1, c->f->o->scans);
+        rc = scan(c, best, what, err);
+        if (rc != SH_OK) break;
+        coverage_waiting(c->coverage, &seen_m2, &gain_m2);
+        insert(round, best, seen_m2, gain_m2);
+        last = best;
+    }
+    if (rc != SH_OK || round->n_tried == 0 || !(round->gain_m2[0] > 0.0)) return rc;
+    round->place = round->tried[0];
+    if (round->place != last) rc = scan(c, round->place, "next station, once more", err);
+    if (rc != SH_OK) return rc;
+    coverage_keep(c->coverage);
+    next->place[round->place].out = COVERAGE_PLACE_CHOSEN;
+    round->none_m2 = none_m2(c->coverage);
+    return 1;
+}
+
+static int choose_all(struct chooser *c, struct sh_err *err)
+{
+    struct coverage_next *next = c->f->next;
+    const size_t rounds = (size_t)c->f->o->stations;
+    c->gain = malloc(next->n * sizeof *c->gain);
+    c->open_m = malloc(next->n * sizeof *c->open_m);
+    c->open = malloc(next->n * sizeof *c->open);
+    next->estimate_m2 = calloc(rounds * next->n, sizeof *next->estimate_m2);
+    next->round = calloc(rounds, sizeof *next->round);
+    if (c->gain == NULL || c->open_m == NULL || c->open == NULL || next->estimate_m2 == NULL || next->round == NULL)
+        return sh_fail(err, SH_ENOMEM, "no memory for %u places", next->n);
+    next->n_asked = (uint32_t)rounds;
+    for (uint32_t i = 0; i < rounds; i++) {
+        int chosen = choose(c, i, err);
+        if (chosen < 0) return chosen;
+        if (chosen == 0) break;
+        next->n_rounds++;
+    }
+    return SH_OK;
+}
+
+int coverage_next_find(struct coverage_finder *finder, struct coverage *coverage, struct sh_err *err)
+{
+    struct chooser c = {.f = finder, .coverage = coverage};
+    int rc = choose_all(&c, err);
+    free(c.gain);
+    free(c.open_m);
+    free(c.open);
+    return rc;
+}
+
+void coverage_next_free(struct coverage_next *next, struct coverage_finder *finder)
+{
+    free(finder->dir);
+    free(finder->each_sr);
+    free(next->place);
+    free(next->estimate_m2);
+    free(next->round);
+}
+
+int coverage_next_area(const char *text, double area_m[2][3])
+{
+    double v[6];
+    int n = 0, end = 0;
+    for (; n < 6 && sscanf(text, n == 0 ? "%lf%n" : ",%lf%n", &v[n], &end) == 1; n++) {
+        if (!isfinite(v[n])) return 0;
+        text += end;
+    }
+    if (*text != '\0' || (n != 4 && n != 6)) return 0;
+    for (int i = 0; i < 2; i++)
+        for (int k = 0; k < 2; k++)
+            area_m[i][k] = v[2 * i + k];
+    area_m[0][2] = n == 6 ? v[4] : (double)NAN;
+    area_m[1][2] = n == 6 ? v[5] : (double)NAN;
+    return area_m[0][0] < area_m[1][0] && area_m[0][1] < area_m[1][1] && !(area_m[0][2] > area_m[1][2]);
+}

@@ -1,0 +1,75 @@
+/* SPDX-License-Identifier: MIT */
+/* Private to this folder: where to stand next, for `scanhead coverage --next`. */
+#ifndef FIRMWARE_SIM_APP_STUDIO_COVERAGE_NEXT_H
+#define FIRMWARE_SIM_APP_STUDIO_COVERAGE_NEXT_H
+
+#include "firmware_sim/app/studio/coverage/coverage.h"
+
+enum { COVERAGE_MOST_NEXT = 100, COVERAGE_MOST_SCANS = 20 };
+
+struct coverage_next_options {
+    long stations;          /* 0: nobody asks */
+    double grid_m;          /* 0: no grid */
+    double height_m;        /* above the floor */
+    double area_m[2][3];    /* of the grid: least, most x, y, floor; NaN: the scene's */
+    const char *candidates; /* a file of places instead; NULL: none */
+    double step_deg;        /* between rays */
+    long scans;             /* of the best places each round */
+};
+
+enum coverage_place { COVERAGE_PLACE_OPEN, COVERAGE_PLACE_WITHIN, COVERAGE_PLACE_CHOSEN };
+
+struct coverage_next_place {
+    double position_m[3], heading_deg;
+    double floor_m;          /* z; NaN: not known */
+    double front;            /* of what is seen, the share seen from the front */
+    enum coverage_place out; /* WITHIN: it sees mostly backs, so it lies within a body */
+};
+
+/* A round: who was best, by a whole scan. */
+struct coverage_next_round {
+    uint32_t place, n_tried, tried[COVERAGE_MOST_SCANS]; /* by gain, the best one first */
+    double seen_m2[COVERAGE_MOST_SCANS], gain_m2[COVERAGE_MOST_SCANS];
+    double none_m2; /* seen by none, with this one */
+};
+
+struct coverage_next {
+    struct coverage_next_place *place;
+    uint32_t n, within; /* places; of these left out, since they lie within bodies */
+    uint32_t directions;
+    double step_deg;
+    int whole_cells;     /* rays are pulses of the head: a cell that is met counts as a whole */
+    double *estimate_m2; /* [rounds][n] */
+    struct coverage_next_round *round;
+    uint32_t n_asked;
+    uint32_t n_rounds; /* fewer than asked for where nothing is left to gain */
+};
+
+/* Places, and the rays that they are compared by (places.c). */
+struct coverage_finder {
+    const struct coverage_next_options *o;
+    const struct coverage_result *result;
+    const struct site *site;
+    const struct sh_report *report;
+    struct coverage_next *next;
+    size_t room;                /* of its places */
+    double (*dir)[3], *each_sr; /* of a level head with heading 0; coverage_gains */
+    uint32_t n_dir;
+};
+
+/* Before the stations scan: finds the places, or says why there are none. result needs its site and base.
+ * coverage_next_free is due in any case. */
+int coverage_next_open(const struct coverage_next_options *options, const struct coverage_result *result,
+                       const struct sh_report *report, struct coverage_next *next, struct coverage_finder *finder,
+                       struct sh_err *err);
+/* Compares them. Figures of the stations must be in result; the coverage gets further stations, one for each round. */
+int coverage_next_find(struct coverage_finder *finder, struct coverage *coverage, struct sh_err *err);
+void coverage_next_free(struct coverage_next *next, struct coverage_finder *finder);
+
+void coverage_next_print(const struct coverage_next *next, const struct coverage_result *result);
+void coverage_next_put(struct json *json, const struct coverage_next *next, const struct coverage_result *result);
+
+/* X0,Y0,X1,Y1 or with the floors' Z0,Z1. 0: it isn't that. */
+int coverage_next_area(const char *text, double area_m[2][3]);
+
+#endif

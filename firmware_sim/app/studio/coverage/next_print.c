@@ -1,0 +1,139 @@
+/* SPDX-License-Identifier: MIT */
+/* The next stations of `scanhead coverage` as text and as JSON. */
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+
+#include "firmware_sim/app/studio/coverage/next.h"
+
+enum { LINE_LEN = 160 };
+
+/* An element of the list `stations`, as YAML has it on one line. */
+static const char *ready_line(const struct coverage_next_place *p, uint32_t number, char line[LINE_LEN])
+{
+    char heading[40] = "";
+    if (p->heading_deg != 0.0) snprintf(heading, sizeof heading, ", heading_deg: %.10g", p->heading_deg);
+    snprintf(line, LINE_LEN, "{name: next-%u, position_m: [%.3f, %.3f, %.3f]%s}", number, p->position_m[0],
+             p->position_m[1], p->position_m[2], heading);
+    return line;
+}
+
+/* How far scans are from what the rays said, at most. */
+static double largest_error_m2(const struct coverage_next *next)
+{
+    double most_m2 = 0.0;
+    for (uint32_t i = 0; i < next->n_rounds; i++) {
+        const struct coverage_next_round *r = &next->round[i];
+        for (uint32_t k = 0; k < r->n_tried; k++)
+            most_m2 = fmax(most_m2, fabs(r->gain_m2[k] - next->estimate_m2[(size_t)i * next->n + r->tried[k]]));
+    }
+    return most_m2;
+}
+
+static void print_round(const struct coverage_next *next, const struct coverage_result *result, uint32_t number)
+{
+    const struct coverage_next_round *r = &next->round[number];
+    char line[LINE_LEN];
+    printf("\nnext station %u: the best places, by a whole scan from each\n", number + 1);
+    printf("%10s %10s %10s %9s %12s %8s %12s %12s\n", "x m", "y m", "z m", "height m", "gains m2", "%", "estimated",
+           "sees m2");
+    for (uint32_t k = 0; k < r->n_tried; k++) {
+        const struct coverage_next_place *p = &next->place[r->tried[k]];
+        char height[24] = "-";
+        if (!isnan(p->floor_m)) snprintf(height, sizeof height, "%.3f", p->position_m[2] - p->floor_m);
+        printf("%10.3f %10.3f %10.3f %9s %12.3f %8.3f %12.3f %12.3f\n", p->position_m[0], p->position_m[1],
+               p->position_m[2], height, r->gain_m2[k], coverage_percent(r->gain_m2[k], result->sums.area_m2),
+               next->estimate_m2[(size_t)number * next->n + r->tried[k]], r->seen_m2[k]);
+    }
+    printf("with the first of them %.3f m2 (%.3f %%) are seen by none:\n  - %s\n", r->none_m2,
+           coverage_percent(r->none_m2, result->sums.area_m2), ready_line(&next->place[r->place], number + 1, line));
+}
+
+void coverage_next_print(const struct coverage_next *next, const struct coverage_result *result)
+{
+    printf("\nplaces     %" PRIu32 " to stand at", next->n);
+    if (next->within > 0)
+        printf(", %" PRIu32 " of them left out: they see mostly backs of faces, so they lie within bodies",
+               next->within);
+    printf("\nestimates  %" PRIu32 " rays from each place, ", next->directions);
+    if (next->whole_cells)
+        printf("pulses of the head; each cell that is met counts");
+    else
+        printf("%g deg apart", next->step_deg);
+    if (next->n_rounds > 0) printf("; whole scans differ by up to %.3f m2", largest_error_m2(next));
+    printf("\n");
+    for (uint32_t i = 0; i < next->n_rounds; i++)
+        print_round(next, result, i);
+    if (next->n_rounds < next->n_asked)
+        printf("\nno %sstation: from these places nothing is seen that no station sees\n",
+               next->n_rounds > 0 ? "further " : "");
+}
+
+static void put_position(struct json *json, const struct coverage_next_place *p)
+{
+    json_open_array(json, "position_m");
+    for (int k = 0; k < 3; k++)
+        json_double(json, NULL, p->position_m[k]);
+    json_close_array(json);
+}
+
+static void put_round(struct json *json, const struct coverage_next *next, const struct coverage_result *result,
+                      uint32_t number)
+{
+    const struct coverage_next_round *r = &next->round[number];
+    const struct coverage_next_place *best = &next->place[r->place];
+    char line[LINE_LEN];
+    json_open_object(json, NULL);
+    put_position(json, best);
+    json_double(json, "heading_deg", best->heading_deg);
+    json_double(json, "gain_m2", r->gain_m2[0]);
+    json_double(json, "gain_percent", coverage_percent(r->gain_m2[0], result->sums.area_m2));
+    json_double(json, "seen_m2", r->seen_m2[0]);
+    json_double(json, "none_m2", r->none_m2);
+    json_double(json, "none_percent", coverage_percent(r->none_m2, result->sums.area_m2));
+    json_string(json, "station", ready_line(best, number + 1, line));
+    json_open_array(json, "tried");
+    for (uint32_t k = 0; k < r->n_tried; k++) {
+        json_open_object(json, NULL);
+        json_uint(json, "place", r->tried[k]);
+        json_double(json, "gain_m2", r->gain_m2[k]);
+        json_double(json, "estimate_m2", next->estimate_m2[(size_t)number * next->n + r->tried[k]]);
+        json_double(json, "seen_m2", r->seen_m2[k]);
+        json_close_object(json);
+    }
+    json_close_array(json);
+    json_close_object(json);
+}
+
+static void put_place(struct json *json, const struct coverage_next *next, uint32_t i)
+{
+    const struct coverage_next_place *p = &next->place[i];
+    json_open_object(json, NULL);
+    put_position(json, p);
+    json_double(json, "heading_deg", p->heading_deg);
+    json_double(json, "floor_m", p->floor_m);
+    json_bool(json, "within_body", p->out == COVERAGE_PLACE_WITHIN);
+    json_double(json, "front", p->front);
+    json_open_array(json, "estimate_m2");
+    for (uint32_t r = 0; r < next->n_rounds; r++)
+        json_double(json, NULL, next->estimate_m2[(size_t)r * next->n + i]);
+    json_close_array(json);
+    json_close_object(json);
+}
+
+void coverage_next_put(struct json *json, const struct coverage_next *next, const struct coverage_result *result)
+{
+    json_open_object(json, "next");
+    json_uint(json, "directions", next->directions);
+    json_double(json, "step_deg", next->whole_cells ? (double)NAN : next->step_deg);
+    json_double(json, "largest_difference_m2", largest_error_m2(next));
+    json_open_array(json, "stations");
+    for (uint32_t i = 0; i < next->n_rounds; i++)
+        put_round(json, next, result, i);
+    json_close_array(json);
+    json_open_array(json, "places");
+    for (uint32_t i = 0; i < next->n; i++)
+        put_place(json, next, i);
+    json_close_array(json);
+    json_close_object(json);
+}

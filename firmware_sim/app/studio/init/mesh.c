@@ -1,0 +1,218 @@
+/* SPDX-License-Identifier: MIT */
+#include "firmware_sim/app/studio/init/mesh.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <unistd.h>
+
+#include "core/crs.h"
+#include "core/geotiff.h"
+#include "firmware_sim/app/app.h"
+
+/* Larger than this in metres, a mesh without a unit is taken to be in millimetres, but for a survey. */
+static const double LARGEST_M = 2000.0, LARGEST_SURVEY_M = 50000.0;
+/* Less high than this, a mesh larger than LARGEST_M would be a plate of less than half a metre in millimetres. */
+static const double LEAST_HEIGHT_MM = 500.0;
+
+double init_largest_m(const struct scene *scene)
+{
+    double size = 0.0;
+    for (int i = 0; i < 3; i++)
+        size = fmax(size, scene->max_m[i] - scene->min_m[i]);
+    return size;
+}
+
+static const char *said_by(const char *file)
+{
+    const char *dot = strrchr(file, '.');
+    return dot != NULL && strcasecmp(dot, ".fbx") == 0 ? "as the file says" : "as the format defines it";
+}
+
+/* --up turns the mesh so that y or z becomes z. Other axes it can't mend. */
+static void warn_of_axes(const char *name, const struct scene_says *says, int y_up)
+{
+    if (says->up == 1 || says->up < 0)
+        sh_warn(&app_report_stderr,
+                "%s: its %s%c axis points up, which no key can say: with up: %c the mesh %s; export it with y or z up",
+                name, says->up < 0 ? "-" : "", "xyz"[abs(says->up) - 1], y_up ? 'y' : 'z',
+                says->up == (y_up ? -2 : -3) ? "stands on its head" : "lies on its side");
+    if (says->is_left_handed)
+        sh_warn(
+            &app_report_stderr,
+            "%s: its axes are left-handed, which no key can say: the mesh is mirrored; export it with right-handed axes",
+            name);
+}
+
+static void choose_up(const struct init_wish *wish, const char *name, const struct scene *scene, struct init_mesh *as)
+{
+    const int says = scene->says.up;
+    const char *from = "given by --up";
+    int y_up = says == 2 || says == -2;
+    if (wish->up != NULL)
+        y_up = strcmp(wish->up, "y") == 0;
+    else if (says == 2 || says == 3)
+        from = said_by(wish->file);
+    else
+        from = says == 0 ? "assumed: the file doesn't say; y is up in many a file" : "assumed";
+    as->up = y_up ? SCENE_UP_Y : SCENE_UP_Z;
+    snprintf(as->up_from, sizeof as->up_from, "%s", from);
+    warn_of_axes(name, &scene->says, y_up);
+    if (wish->up == NULL && says == 0)
+        sh_warn(&app_report_stderr,
+                "%s: which axis points up is not in the file: z is assumed; if the mesh lies on "
+                "its side, --up y",
+                name);
+}
+
+/* Eastings and northings of projected systems: large numbers beside the size of what is there. In millimetres they would be
+ * some 100 m, where nobody puts an origin by intent. */
+static int is_projected(const struct scene *scene, const double middle[3])
+{
+    const double least = 50000.0, large = 200000.0, times = 20.0;
+    double up_to = 0.0, second = 0.0;
+    for (int k = 0; k < 3; k++) {
+        const double x = fabs(middle[k]);
+        second = x > up_to ? up_to : fmax(second, x);
+        up_to = fmax(up_to, x);
+    }
+    return up_to >= large && second >= least && up_to >= times * init_largest_m(scene);
+}
+
+/* Wide and flat, and lying. Walls stand, and furniture is not ten times as wide as it is high. */
+static int is_survey(const struct scene *scene, int y_up)
+{
+    const double *low = scene->min_m, *high = scene->max_m;
+    const int up = y_up ? 1 : 2, other = y_up ? 2 : 1;
+    const double height = high[up] - low[up], width = fmin(high[0] - low[0], high[other] - low[other]);
+    return init_largest_m(scene) <= LARGEST_SURVEY_M && height < LEAST_HEIGHT_MM && width > 10.0 * height;
+}
+
+/* Metres per unit, from what there is to see, and why. */
+static double guess_unit(const struct scene *scene, int y_up, char *why, size_t len)
+{
+    double middle[3];
+    for (int k = 0; k < 3; k++)
+        middle[k] = 0.5 * (scene->min_m[k] + scene->max_m[k]);
+    why[0] = '\0';
+    if (is_projected(scene, middle)) {
+        snprintf(why, len, "its coordinates, near %.7g %.7g %.7g, are those of a projected system", middle[0],
+                 middle[1], middle[2]);
+        return 1.0;
+    }
+    if (init_largest_m(scene) <= LARGEST_M) return 1.0;
+    if (!is_survey(scene, y_up)) return 0.001;
+    snprintf(why, len, "it is wide and flat as a survey, and would be a plate in millimetres");
+    return 1.0;
+}
+
+static void choose_scale(const struct init_wish *wish, const char *name, const struct scene *scene,
+                         struct init_mesh *as)
+{
+    const double size = init_largest_m(scene);
+    as->scale = wish->scale;
+    snprintf(as->scale_from, sizeof as->scale_from, "given by --scale");
+    if (wish->scale > 0.0) return;
+    if (scene->says.unit_m > 0.0) {
+        as->scale = scene->says.unit_m;
+        snprintf(as->scale_from, sizeof as->scale_from, "%s", said_by(wish->file));
+        return;
+    }
+    char why[160];
+    as->scale = guess_unit(scene, as->up == SCENE_UP_Y, why, sizeof why);
+    snprintf(as->scale_from, sizeof as->scale_from, "assumed: %s", why[0] != '\0' ? why : "the file doesn't say");
+    sh_warn(&app_report_stderr,
+            "%s: its unit is not in the file: %s is assumed%s%s, which makes the mesh %.4g m large; "
+            "--scale sets another one",
+            name, as->scale == 1.0 ? "a metre" : "a millimetre", why[0] != '\0' ? ", since " : "", why,
+            as->scale * size);
+}
+
+/* To metres, z up: what the configuration will do. */
+static void turn(struct scene *scene, const struct init_mesh *as, double scale)
+{
+    const int y_up = as->up == SCENE_UP_Y;
+    const double low[3] = {scene->min_m[0], scene->min_m[1], scene->min_m[2]}, *high = scene->max_m;
+    const double min[3] = {low[0], y_up ? -high[2] : low[1], y_up ? low[1] : low[2]};
+    const double max[3] = {high[0], y_up ? -low[2] : high[1], y_up ? high[1] : high[2]};
+    for (uint32_t i = 0; i < scene->n_vertices; i++) {
+        double *v = scene->vertex_m[i], turned[3] = {v[0], y_up ? -v[2] : v[1], y_up ? v[1] : v[2]};
+        for (int k = 0; k < 3; k++)
+            v[k] = turned[k] * scale;
+    }
+    for (int k = 0; k < 3; k++) {
+        scene->min_m[k] = min[k] * scale;
+        scene->max_m[k] = max[k] * scale;
+    }
+}
+
+/* An error may say what to do, or what is allowed, by itself. That of a raster does, which is not to become a mesh. */
+static int has_advice(const char *file, const char *text)
+{
+    static const char *const words[] = {"export ", "convert ", "copy it", "allowed", "scene.", "join "};
+    for (size_t i = 0; i < sizeof words / sizeof words[0]; i++)
+        if (strstr(text, words[i]) != NULL) return 1;
+    return geotiff_is_name(file);
+}
+
+static int fail(const char *file, const struct sh_err *why, int code, struct sh_err *err)
+{
+    if (code != SH_EINPUT || has_advice(file, why->text)) return sh_fail(err, code, "%s", why->text);
+    return sh_fail(err, code, "%.380s; a mesh of triangles is needed: export it again, for instance as .obj or .ply",
+                   why->text);
+}
+
+/* A raster's system is kept where the scene can be anchored by it. */
+static void find_crs(const struct init_wish *wish, struct init_mesh *mesh)
+{
+    struct geotiff g;
+    struct crs_place at;
+    struct sh_err why;
+    if (!geotiff_is_name(wish->file) || mesh->up != SCENE_UP_Z || mesh->scale != 1.0) return;
+    if (geotiff_read(wish->file, &g, &why) != SH_OK || g.crs[0] == '\0') return;
+    if (crs_locate(g.crs, g.easting_m[0], g.northing_m[0], 0.0, &at, &why) == SH_OK)
+        snprintf(mesh->crs, sizeof mesh->crs, "%s", g.crs);
+}
+
+/* ---- reading */
+
+static void keep_warning(void *ctx, const char *warning)
+{
+    fprintf(ctx, "%s\n", warning);
+}
+
+/* The reader's warnings come when the configuration is checked; where it fails, they are said now. */
+static int read_mesh(const struct scene_mesh_spec *spec, struct scene **scene, struct sh_err *why)
+{
+    const struct sh_report *all = &app_report_stderr;
+    char *warnings = NULL, *rest, *line;
+    size_t size;
+    FILE *kept = open_memstream(&warnings, &size);
+    if (kept == NULL) return sh_fail(why, SH_ENOMEM, "no memory");
+    const struct sh_report keep = {.ctx = kept, .warn = keep_warning, .progress = all->progress, .stop = all->stop};
+    const int rc = scene_load(spec, 1, INFINITY, &keep, scene, why);
+    fclose(kept);
+    for (rest = warnings; rc != SH_OK && (line = strsep(&rest, "\n")) != NULL;)
+        if (*line != '\0') sh_warn(all, "%s", line);
+    free(warnings);
+    return rc;
+}
+
+/* Without a tolerance: that comes when the configuration is checked. */
+int init_load_mesh(const struct init_wish *wish, const char *name, struct scene **scene, struct init_mesh *mesh,
+                   struct sh_err *err)
+{
+    const struct scene_mesh_spec spec = {
+        .file = wish->file, .up = SCENE_UP_Z, .scale = wish->scale > 0.0 ? wish->scale : 1.0};
+    struct sh_err why = {0};
+    if (access(wish->file, R_OK) != 0) return sh_fail(err, SH_EINPUT, "%s: %s", wish->file, strerror(errno));
+    int rc = read_mesh(&spec, scene, &why);
+    if (rc != SH_OK) return fail(wish->file, &why, rc, err);
+    choose_up(wish, name, *scene, mesh);
+    choose_scale(wish, name, *scene, mesh);
+    find_crs(wish, mesh);
+    turn(*scene, mesh, mesh->scale / spec.scale);
+    return SH_OK;
+}

@@ -1,0 +1,120 @@
+/* SPDX-License-Identifier: MIT */
+#include "firmware_sim/app/studio/record/colour_spool.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { FRAMES_BETWEEN_STOPS = 256 };
+
+static int look_at_scan(void *ctx, struct sh_err *err)
+{
+    const struct colour_spool *spool = ctx;
+    return colour_check(spool->mode, &spool->track, err);
+}
+
+static int look_at_points(void *ctx, int n, struct sh_err *err)
+{
+    struct colour_spool *spool = ctx;
+    (void)err;
+    for (int i = 0; i < n; i++) {
+        const double figure = colour_figure(spool->mode, &spool->track, i);
+        if (!isfinite(figure)) continue;
+        if (!spool->has_points || figure < spool->low) spool->low = figure;
+        if (!spool->has_points || figure > spool->high) spool->high = figure;
+        spool->has_points = 1;
+    }
+    return SH_OK;
+}
+
+static int fail_spool(const struct colour_spool *spool, struct sh_err *err)
+{
+    const int code = errno == EACCES || errno == EPERM || errno == EROFS ? SH_EPERM
+                     : errno == ENOENT || errno == ENOTDIR               ? SH_EINPUT
+                                                                         : SH_EIO;
+    return sh_fail(err, code, "%s: cannot keep the frames until the limits of the colours are known: %s", spool->path,
+                   strerror(errno));
+}
+
+int colour_spool_open(struct colour_spool *spool, const char *path, enum colour_mode mode, struct sh_err *err)
+{
+    static const struct track_ops ops = {.scan = look_at_scan, .points = look_at_points};
+    memset(spool, 0, sizeof *spool);
+    spool->mode = mode;
+    spool->track.path = path;
+    spool->track.ops = &ops;
+    spool->track.rec = spool;
+    if (asprintf(&spool->path, "%s.frames-XXXXXX", path) < 0) {
+        spool->path = NULL;
+        return sh_fail(err, SH_ENOMEM, "%s: no memory to write it", path);
+    }
+    const int fd = mkstemp(spool->path);
+    if (fd < 0) return fail_spool(spool, err);
+    unlink(spool->path); /* gone with its last user, however that ends */
+    spool->file = fdopen(fd, "w+b");
+    if (spool->file != NULL) return SH_OK;
+    close(fd);
+    return fail_spool(spool, err);
+}
+
+int colour_spool_frame(struct colour_spool *spool, struct scanhead *sh, const struct scanhead_frame *frame,
+                       struct sh_err *err)
+{
+    const int rc = track_frame(&spool->track, sh, frame, err);
+    if (rc != SH_OK) return rc; /* the frames before it are good */
+    if (fwrite(frame->raw, frame->raw_len, 1, spool->file) != 1) return fail_spool(spool, err);
+    spool->bytes += frame->raw_len;
+    return SH_OK;
+}
+
+/* The handle gets a descriptor of its own, which it closes. */
+static int open_again(struct colour_spool *spool, struct sh_err *err)
+{
+    char source[32], why[512];
+    if (fflush(spool->file) != 0 || lseek(fileno(spool->file), 0, SEEK_SET) != 0) return fail_spool(spool, err);
+    const int fd = dup(fileno(spool->file));
+    if (fd < 0) return fail_spool(spool, err);
+    snprintf(source, sizeof source, "fd:%d", fd);
+    const int rc = scanhead_open(source, &spool->sh, why, sizeof why);
+    if (rc == SCANHEAD_OK) return SH_OK;
+    close(fd);
+    spool->sh = NULL;
+    return sh_fail(err, rc, "%s: %s", spool->path, why);
+}
+
+int colour_spool_drain(struct colour_spool *spool,
+                       int (*fn)(void *ctx, struct scanhead *sh, const struct scanhead_frame *frame,
+                                 struct sh_err *err),
+                       void *ctx, const struct sh_report *report, struct sh_err *err)
+{
+    struct scanhead_frame frame;
+    struct scanhead_stats stats = {0};
+    uint64_t done = 0;
+    int rc = open_again(spool, err), got = SCANHEAD_OK;
+    for (uint32_t n = 1; rc == SH_OK && (got = scanhead_next(spool->sh, &frame, -1)) == SCANHEAD_OK; n++) {
+        rc = fn(ctx, spool->sh, &frame, err);
+        done += frame.raw_len;
+        if (rc != SH_OK || n % FRAMES_BETWEEN_STOPS != 0) continue;
+        sh_progress(report, "colouring the points", (double)done / (double)spool->bytes);
+        if (sh_stopped(report))
+            rc = sh_fail(err, SH_ESTOPPED, "%s: interrupted while it was completed; it is not written",
+                         spool->track.path);
+    }
+    /* Bytes, not frames: after a replug a frame may equal one before, which is then taken for that one. */
+    if (rc == SH_OK) scanhead_get_stats(spool->sh, &stats);
+    if (rc == SH_OK && (got != SCANHEAD_ECLOSED || stats.bytes != spool->bytes || stats.bad_bytes != 0))
+        rc = sh_fail(err, SH_EIO, "%s: the frames that were kept can't be read back: %s", spool->track.path,
+                     scanhead_error(spool->sh));
+    return rc;
+}
+
+void colour_spool_close(struct colour_spool *spool)
+{
+    if (spool->sh != NULL) scanhead_close(spool->sh);
+    if (spool->file != NULL) fclose(spool->file);
+    track_free(&spool->track);
+    free(spool->path);
+    memset(spool, 0, sizeof *spool);
+}

@@ -1,0 +1,336 @@
+/* SPDX-License-Identifier: MIT */
+#include "firmware_sim/app/studio/record/files.h"
+
+#include <dirent.h>
+#include <limits.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/studio/mesh.h"
+#include "core/newfile.h"
+
+int record_files_add(struct record_files *files, const char *path, struct sh_err *err)
+{
+    if (files->n == RECORD_MAX_FILES) return sh_fail(err, SH_EINPUT, "record: at most %d files", RECORD_MAX_FILES);
+    for (int i = 0; i < files->n; i++)
+        if (strcmp(files->file[i].path, path) == 0) return sh_fail(err, SH_EINPUT, "record: -o %s: given twice", path);
+    const struct recorder_ops *ops = recorder_find(path, err);
+    if (ops == NULL) return err->code;
+    files->file[files->n++] = (struct record_file){.path = path, .ops = ops};
+    return SH_OK;
+}
+
+/* STEM-N.ENDING of a path STEM.ENDING. */
+static int is_name_of_scan(const struct record_file *file, const char *path)
+{
+    const size_t stem = strlen(file->path) - strlen(file->ops->ending);
+    if (strncmp(path, file->path, stem) != 0 || path[stem] != '-') return 0;
+    const size_t digits = strspn(path + stem + 1, "0123456789");
+    return digits > 0 && strcmp(path + stem + 1 + digits, file->path + stem) == 0;
+}
+
+int record_files_check_each(const struct record_files *files, struct sh_err *err)
+{
+    for (int i = 0; i < files->n; i++)
+        for (int k = 0; k < files->n; k++)
+            if (is_name_of_scan(&files->file[i], files->file[k].path))
+                return sh_fail(err, SH_EINPUT,
+                               "-o %s: with --each the file of one scan of %s has that name; allowed any other",
+                               files->file[k].path, files->file[i].path);
+    return SH_OK;
+}
+
+void record_files_shape(struct record_files *files)
+{
+    for (int i = 0; i < files->n; i++)
+        files->file[i].ops = recorder_shape(files->file[i].ops, &files->recorder);
+}
+
+int record_files_have_meshes(const struct record_files *files)
+{
+    for (int i = 0; i < files->n; i++)
+        if (files->file[i].ops->is_mesh) return 1;
+    return 0;
+}
+
+int record_files_have(const struct record_files *files, const char *ending)
+{
+    for (int i = 0; i < files->n; i++)
+        if (strcmp(files->file[i].ops->ending, ending) == 0) return 1;
+    return 0;
+}
+
+int record_files_have_colours(const struct record_files *files)
+{
+    for (int i = 0; i < files->n; i++)
+        if (files->file[i].ops->track.wants_colours) return 1;
+    return 0;
+}
+
+int record_files_check_degrees(const struct record_files *files, struct sh_err *err)
+{
+    for (int i = 0; i < files->n; i++)
+        if (files->file[i].ops->track.metres)
+            return sh_fail(err, SH_EINPUT,
+                           "record: -o %s: this format holds metres, and output.crs is geodetic; allowed local, ecef, "
+                           "utm, or .las, .ply",
+                           files->file[i].path);
+    return SH_OK;
+}
+
+int record_files_check_floats(const struct record_files *files, struct sh_err *err)
+{
+    for (int i = 0; i < files->n; i++)
+        if (files->file[i].ops->is_mesh && mesh_is_float(files->file[i].path))
+            return sh_fail(
+                err, SH_EINPUT,
+                "record: -o %s: %s holds coordinates as float, which are up to 0.5 m apart at the millions of "
+                "metres of utm and ecef; allowed --crs local, or .ply, .obj",
+                files->file[i].path, files->file[i].ops->ending);
+    return SH_OK;
+}
+
+int record_files_check_facing(const struct record_files *files, struct sh_err *err)
+{
+    for (int i = 0; i < files->n; i++)
+        if (files->file[i].ops->is_mesh)
+            return sh_fail(err, SH_EINPUT,
+                           "record: -o %s: a mesh faces the head, and where a moving head was is known in the scene's "
+                           "frame alone; allowed output.crs: local, or output.layout: polar",
+                           files->file[i].path);
+    return SH_OK;
+}
+
+int record_files_check_surface(const struct record_files *files, struct sh_err *err)
+{
+    for (int i = 0; i < files->n; i++)
+        if (files->file[i].ops->is_mesh)
+            return sh_fail(
+                err, SH_EINPUT,
+                "record: -o %s: a mesh needs a surface, and all lines of this head are one: it neither "
+                "pans nor moves, nor has it several rings; allowed .ply (without --mesh and --sparse) .las .ptx .e57 .shs",
+                files->file[i].path);
+    return SH_OK;
+}
+
+int record_files_check_emitter(const struct record_files *files, enum emitter_kind kind, struct sh_err *err)
+{
+    if (kind != EMITTER_BEAMS && kind != EMITTER_DIRECTIONS) return SH_OK;
+    for (int i = 0; i < files->n; i++)
+        if (files->file[i].ops->track.grid)
+            return sh_fail(err, SH_EINPUT,
+                           "record: -o %s: a grid has rows and columns, and this head fires %s; allowed .ply .las "
+                           ".e57 .shs",
+                           files->file[i].path, kind == EMITTER_BEAMS ? "beams in turn" : "along a list");
+    return SH_OK;
+}
+
+int record_files_check_heads(const struct record_files *files, struct sh_err *err)
+{
+    for (int i = 0; i < files->n && !files->split; i++)
+        if (files->file[i].ops->track.points == NULL && files->file[i].ops->track.scan == NULL)
+            return sh_fail(err, SH_EINPUT,
+                           "record: -o %s: it is the stream of one head, and the stations have several scanners; "
+                           "allowed with --split, or with --station N",
+                           files->file[i].path);
+    return SH_OK;
+}
+
+int record_files_check_scan(const struct record_files *files, const struct recorder_scan *first,
+                            const struct recorder_scan *scan, struct sh_err *err)
+{
+    struct sh_err why = {0};
+    for (int i = 0; i < files->n; i++) {
+        const struct record_file *file = &files->file[i];
+        const int rc = file->ops->fits != NULL
+                           ? file->ops->fits(file->path, &files->recorder, files->split ? scan : first, scan, &why)
+                           : SH_OK;
+        if (rc != SH_OK) return sh_fail(err, rc, "record: station %u: -o %s", scan->station, why.text);
+    }
+    return SH_OK;
+}
+
+static void close_spools(struct record_files *files)
+{
+    for (uint32_t i = 0; i < files->n_spools; i++) {
+        colour_spool_close(files->spool[i]);
+        free(files->spool[i]);
+    }
+    free(files->spool);
+    files->spool = NULL;
+    files->n_spools = 0;
+    files->spooling = 0;
+}
+
+/* Of this scan, where each has its own. To be freed; NULL: no memory. */
+static char *present_path(const struct record_files *files, const struct record_file *file, struct sh_err *err)
+{
+    const int stem = (int)(strlen(file->path) - strlen(file->ops->ending));
+    char *path = NULL;
+    if ((files->split ? asprintf(&path, "%.*s-%u%s", stem, file->path, files->part, file->path + stem)
+                      : asprintf(&path, "%s", file->path)) >= 0)
+        return path;
+    sh_fail(err, SH_ENOMEM, "%s: no memory for its name", file->path);
+    return NULL;
+}
+
+/* The frames of another head are another stream. */
+static int add_spool(struct record_files *files, struct sh_err *err)
+{
+    struct colour_spool **more = realloc(files->spool, (files->n_spools + 1) * sizeof *more);
+    if (more != NULL) files->spool = more;
+    struct colour_spool *spool = more != NULL ? calloc(1, sizeof *spool) : NULL;
+    if (spool == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory to keep its frames", files->file[0].path);
+    files->spool[files->n_spools++] = spool;
+    return colour_spool_open(spool, files->file[0].now, files->recorder.colour.scale.mode, err);
+}
+
+/* A file that is coloured when all is known is opened at once, too: what can't be written is to be said before the
+ * scan. */
+static int open_file(const struct record_files *files, struct record_file *file, struct sh_err *err)
+{
+    file->now = present_path(files, file, err);
+    return file->now != NULL ? recorder_open(file->ops, file->now, &files->recorder, &file->rec, err) : SH_ENOMEM;
+}
+
+static int check_part(const char *part, const char *path, struct sh_err *err)
+{
+    const long long len = newfile_left_len(part);
+    if (len == 0) return SH_OK;
+    return sh_fail(
+        err, SH_EINPUT,
+        "%s: an earlier recording has left %lld bytes there; scanhead record --repair %s makes a file of them; "
+        "or remove it",
+        part, len, path);
+}
+
+/* What is left of the files of single scans: a later one would stop the recording at its scan. */
+static int check_parts_of_scans(const struct record_file *file, struct sh_err *err)
+{
+    const char *slash = strrchr(file->path, '/');
+    const int folder = slash != NULL ? (int)(slash - file->path) + 1 : 0;
+    char *name = folder > 0 ? strndup(file->path, (size_t)folder) : strdup(".");
+    DIR *dir = name != NULL ? opendir(name) : NULL;
+    int rc = SH_OK;
+    free(name);
+    for (const struct dirent *entry; dir != NULL && rc == SH_OK && (entry = readdir(dir)) != NULL;) {
+        const int n = (int)strlen(entry->d_name) - 5; /* without ".part" */
+        char path[PATH_MAX], part[PATH_MAX + 8];
+        if (n <= 0 || strcmp(entry->d_name + n, ".part") != 0) continue;
+        snprintf(path, sizeof path, "%.*s%.*s", folder, file->path, n, entry->d_name);
+        snprintf(part, sizeof part, "%s.part", path);
+        if (is_name_of_scan(file, path)) rc = check_part(part, path, err);
+    }
+    if (dir != NULL) closedir(dir); /* without it, the file can't be opened either */
+    return rc;
+}
+
+static int check_left(const struct record_files *files, const struct record_file *file, struct sh_err *err)
+{
+    char part[PATH_MAX + 8];
+    if (files->takes_over || file->ops->repair == NULL) return SH_OK;
+    if (files->split) return check_parts_of_scans(file, err);
+    snprintf(part, sizeof part, "%s.part", file->path);
+    return check_part(part, file->path, err);
+}
+
+int record_files_open(struct record_files *files, struct sh_err *err)
+{
+    int rc = SH_OK;
+    for (int i = 0; i < files->n && rc == SH_OK && files->part == 0; i++)
+        rc = check_left(files, &files->file[i], err);
+    files->part++;
+    files->recorder.padding = &files->padding;
+    files->has_points = 0;
+    for (int i = 0; i < files->n && rc == SH_OK; i++)
+        rc = open_file(files, &files->file[i], err);
+    if (rc == SH_OK && files->own_limits && record_files_have_colours(files)) {
+        files->spooling = 1;
+        rc = add_spool(files, err);
+    }
+    return rc;
+}
+
+static int to_coloured(void *ctx, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
+{
+    struct record_files *files = ctx;
+    int rc = SH_OK;
+    for (int i = 0; i < files->n && rc == SH_OK; i++)
+        if (files->file[i].ops->track.wants_colours) rc = recorder_frame(files->file[i].rec, sh, frame, err);
+    return rc;
+}
+
+/* Gives the frames that waited to the files with colours, with limits that are those of all. */
+static int colour_files(struct record_files *files, struct sh_err *err)
+{
+    double low = INFINITY, high = -INFINITY;
+    int rc = SH_OK;
+    for (uint32_t i = 0; i < files->n_spools; i++) {
+        if (!files->spool[i]->has_points) continue;
+        low = fmin(low, files->spool[i]->low);
+        high = fmax(high, files->spool[i]->high);
+    }
+    for (int i = 0; i < files->n; i++)
+        if (files->file[i].rec != NULL && low <= high) recorder_set_limits(files->file[i].rec, low, high);
+    for (uint32_t i = 0; i < files->n_spools && rc == SH_OK; i++)
+        rc = colour_spool_drain(files->spool[i], to_coloured, files, files->recorder.report, err);
+    return rc;
+}
+
+int record_files_close(struct record_files *files, int keep, struct sh_err *err)
+{
+    int rc = files->spooling && keep ? colour_files(files, err) : SH_OK;
+    const int is_coloured = rc == SH_OK;
+    for (int i = 0; i < files->n; i++) {
+        struct sh_err why = {0};
+        if (files->file[i].rec == NULL) continue;
+        const int is_whole = is_coloured || !files->file[i].ops->track.wants_colours;
+        int e = recorder_close(files->file[i].rec, keep && is_whole, &why);
+        files->file[i].rec = NULL;
+        if (e != SH_OK && rc != SH_OK) sh_warn(files->recorder.report, "%s", why.text); /* each is named */
+        if (e != SH_OK && rc == SH_OK) rc = sh_fail(err, e, "%s", why.text);
+    }
+    close_spools(files);
+    for (int i = 0; i < files->n; i++) {
+        free(files->file[i].now);
+        files->file[i].now = NULL;
+    }
+    return rc;
+}
+
+int record_files_save(struct record_files *files, struct sh_err *err)
+{
+    int rc = SH_OK;
+    for (int i = 0; i < files->n && rc == SH_OK; i++)
+        if (files->file[i].rec != NULL) rc = recorder_save(files->file[i].rec, err);
+    return rc;
+}
+
+/* A scan begins with its event or, where that was lost, with a descriptor that is no repetition. */
+static int begins_scan(const struct scanhead_frame *frame)
+{
+    if (frame->type == SCANHEAD_EVENT) return frame->event == SCANHEAD_EV_SCAN_START;
+    return frame->type == SCANHEAD_DESCRIPTOR && (frame->flags & SCANHEAD_REPEAT) == 0;
+}
+
+int record_files_frame(struct record_files *files, struct scanhead *sh, const struct scanhead_frame *frame,
+                       struct sh_err *err)
+{
+    int rc = SH_OK;
+    const int is_other = files->sh != NULL && sh != files->sh;
+    files->sh = sh;
+    if (files->split && files->has_points && (begins_scan(frame) || is_other)) {
+        rc = record_files_close(files, 1, err);
+        if (rc == SH_OK) rc = record_files_open(files, err);
+    } else if (files->spooling && is_other) {
+        rc = add_spool(files, err);
+    }
+    if (frame->type == SCANHEAD_POINTS) files->has_points = 1;
+    if (rc == SH_OK && files->spooling) rc = colour_spool_frame(files->spool[files->n_spools - 1], sh, frame, err);
+    for (int i = 0; i < files->n && rc == SH_OK; i++)
+        if (!files->spooling || !files->file[i].ops->track.wants_colours)
+            rc = recorder_frame(files->file[i].rec, sh, frame, err);
+    return rc;
+}

@@ -1,0 +1,75 @@
+/* SPDX-License-Identifier: MIT */
+/* The files of one `scanhead record`. In: paths, then each frame of the stream. Out: the files, which a
+ * recorder for each ending writes (drivers/record). All are opened, fed and closed together. All scans go
+ * into the same files, or each scan into files of its own.
+ *
+ * Where colours shall go from the smallest to the largest figure in the files, formats with colours get the frames at
+ * the end, when both are known (colour_spool.h). */
+#ifndef FIRMWARE_SIM_APP_STUDIO_RECORD_FILES_H
+#define FIRMWARE_SIM_APP_STUDIO_RECORD_FILES_H
+
+#include "core/emitter.h"
+#include "drivers/record/recorder.h"
+#include "firmware_sim/app/studio/record/colour_spool.h"
+
+enum { RECORD_MAX_FILES = 8 };
+
+struct record_files {
+    int split; /* each scan to files of its own: NAME-1.ply, NAME-2.ply, ... */
+    struct recorder_options recorder;
+    int takes_over; /* what an earlier recording has left as FILE.part is overwritten; else record_files_open refuses */
+    int own_limits; /* the limits of recorder.colour.scale are found in the frames */
+    /* inner state */
+    struct recorder_padding padding; /* in all parts */
+    struct record_file {
+        const char *path;
+        char *now; /* of the present scan's file, where each has its own; else the same */
+        const struct recorder_ops *ops;
+        struct recorder *rec;
+    } file[RECORD_MAX_FILES];
+    int n;
+    unsigned part;               /* number of the scan in split files, from 1 */
+    int has_points;              /* in the present files */
+    int spooling;                /* the frames of the present files wait for the limits */
+    struct colour_spool **spool; /* one for each head that comes, in their order */
+    uint32_t n_spools;
+    const struct scanhead *sh; /* that the last frame came from */
+};
+
+/* SH_EINPUT: more than RECORD_MAX_FILES, a path twice, an ending without a recorder. path must live on. */
+int record_files_add(struct record_files *files, const char *path, struct sh_err *err);
+/* With files of each scan beside those of all: SH_EINPUT where two of them would have one name. */
+int record_files_check_each(const struct record_files *files, struct sh_err *err);
+/* Once all options are read: each file gets the format that they make of it. */
+void record_files_shape(struct record_files *files);
+/* Whether one of them is a mesh, or points spread over one. */
+int record_files_have_meshes(const struct record_files *files);
+/* Whether one of them has that ending, as recorders name it. */
+int record_files_have(const struct record_files *files, const char *ending);
+/* Whether one of them has a place for colours. */
+int record_files_have_colours(const struct record_files *files);
+/* For a stream of geodetic coordinates: SH_EINPUT where a file can hold only metres. */
+int record_files_check_degrees(const struct record_files *files, struct sh_err *err);
+/* For a stream in coordinates of the Earth: SH_EINPUT where a file's numbers are too coarse for them. */
+int record_files_check_floats(const struct record_files *files, struct sh_err *err);
+/* For a head that moves, in coordinates of the Earth: SH_EINPUT where a file is a mesh, which faces the head. */
+int record_files_check_facing(const struct record_files *files, struct sh_err *err);
+/* For a head that stands still, and whose lines are all one: SH_EINPUT where a file is a mesh. */
+int record_files_check_surface(const struct record_files *files, struct sh_err *err);
+/* SH_EINPUT where a file is a grid, and such a head fires without rows and columns. */
+int record_files_check_emitter(const struct record_files *files, enum emitter_kind kind, struct sh_err *err);
+/* SH_EINPUT where a file is the stream of one head, and several heads would send into it. */
+int record_files_check_heads(const struct record_files *files, struct sh_err *err);
+/* SH_EINPUT, which names file and station, where a file can't hold a scan; `first` is the first one of the recording. */
+int record_files_check_scan(const struct record_files *files, const struct recorder_scan *first,
+                            const struct recorder_scan *scan, struct sh_err *err);
+/* SH_ESTATE: a recording that was killed has left something there, and the format can be repaired. */
+int record_files_open(struct record_files *files, struct sh_err *err);
+/* About once a second: what has come goes to the disk. */
+int record_files_save(struct record_files *files, struct sh_err *err);
+int record_files_frame(struct record_files *files, struct scanhead *sh, const struct scanhead_frame *frame,
+                       struct sh_err *err);
+/* Closes all, also after a failure; keep 0: removes them. The first error, if any; err may be NULL. */
+int record_files_close(struct record_files *files, int keep, struct sh_err *err);
+
+#endif

@@ -1,0 +1,49 @@
+/* SPDX-License-Identifier: MIT */
+/* One recording: which scans of which source go to which files, with its messages and statistics. `record` makes
+ * one from its options, `batch` one for each job. In: a struct record_job, zeroed and filled. Out: the files. */
+#ifndef FIRMWARE_SIM_APP_STUDIO_RECORD_JOB_H
+#define FIRMWARE_SIM_APP_STUDIO_RECORD_JOB_H
+
+#include "firmware_sim/app/studio/record/files.h"
+#include "firmware_sim/app/studio/record/recording.h"
+#include "firmware_sim/config/config.h"
+
+struct heads;
+struct site;
+
+struct record_job {
+    const char *source;   /* of record_job_stream, as libscanhead opens it */
+    const char *truth;    /* of record_job_off_line: file for the faults that are injected; NULL: none */
+    const char *surfaces; /* of record_job_off_line: CSV file for what labels mean; NULL: none */
+    const char *stats;    /* where to write what was received, as JSON; NULL: nowhere */
+    struct record_files files;
+    int each;                     /* files of each scan, too, as files.split makes them */
+    int crs_given, no_hash, hash; /* hash: keep stream_sha256 without stats, too */
+    int texture;                  /* of record_job_off_line: the head is to send colours of textures */
+    long station;                 /* 0: as the head is set; APP_WORD: all */
+    struct site *site; /* of record_job_off_line: loaded by offline_load, of cfg; NULL: it loads one itself */
+    int only_whole;    /* an incomplete recording leaves no files */
+    int brief;         /* no line about the result */
+    double wait_s;     /* of record_job_stream: how long the source may take to be there */
+    struct recording_options recording; /* how long, and progress; the rest is filled in here */
+    struct recording_result result;     /* out */
+    /* inner state */
+    struct sh_report notes; /* of the recorders */
+    int64_t reported_ns;    /* when their progress was printed last */
+    struct heads *heads;    /* of a configuration */
+    struct record_files parts;
+    struct recorder_scan first; /* of the scans, as the configuration says it */
+    int has_silent;             /* objects that give no echo (scene.target) */
+    int interrupted;            /* before the files were completed, which an interrupted recording does, too */
+};
+
+/* What can be known of a recording off line before the scene is loaded: SH_EINPUT where it can't be. cfg is changed. */
+int record_job_check(struct record_job *job, struct config *cfg, struct sh_err *err);
+/* The head of cfg runs off line in this process, and so do those of other scanners that the stations have; cfg is
+ * changed, and must live on until then, with the sets that it was loaded with. SH_EINPUT: what such a
+ * recording can't have. SH_ELOST and others as recording_check_complete: the files keep what came. */
+int record_job_off_line(struct record_job *job, struct config *cfg, struct sh_err *err);
+/* A head on a wire, or a raw stream in a file. */
+int record_job_stream(struct record_job *job, struct sh_err *err);
+
+#endif

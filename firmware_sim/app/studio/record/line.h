@@ -1,0 +1,29 @@
+/* SPDX-License-Identifier: MIT */
+/* The command line of `record`, read. `batch` makes such a line for each of its jobs, so that it has the options of
+ * `record` as they are. In: argv. Out: one recording (job.h), with the settings of keys. */
+#ifndef FIRMWARE_SIM_APP_STUDIO_RECORD_LINE_H
+#define FIRMWARE_SIM_APP_STUDIO_RECORD_LINE_H
+
+#include "firmware_sim/app/app.h"
+#include "firmware_sim/app/studio/record/job.h"
+
+enum { RECORD_MAX_REPAIRS = 64 };
+
+struct record_line {
+    struct app_input in;
+    struct record_job job;
+    int quiet;
+    double long_edge;                       /* negative: not given */
+    long sparse_seed;                       /* likewise */
+    int has_rgb, limited;                   /* --colour-rgb, --colour-limits */
+    int raw;                                /* raw.h takes the whole line then */
+    const char *raw_only;                   /* an option that needs it */
+    const char *repair[RECORD_MAX_REPAIRS]; /* --repair; with it nothing is recorded */
+    int n_repairs;
+};
+
+/* APP_GO_ON, or the exit status with the reason printed. The strings are argv's own, or lie in `line`, which must
+ * stay where it is. */
+int record_line_read(struct record_line *line, int argc, char **argv);
+
+#endif

@@ -1,0 +1,116 @@
+/* SPDX-License-Identifier: MIT */
+#include "firmware_sim/app/studio/record/offline.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "firmware_sim/loop/loop.h"
+
+static int connect_client(struct offline *off, int fd, struct sh_err *err)
+{
+    char source[32], why[256];
+    snprintf(source, sizeof source, "fd:%d", fd);
+    int rc = scanhead_open(source, &off->sh, why, sizeof why);
+    if (rc != SCANHEAD_OK) close(fd);
+    return rc == SCANHEAD_OK ? SH_OK : sh_fail(err, rc, "off line: %s", why);
+}
+
+int offline_load(struct config *cfg, const struct site *beside, const struct sh_report *report, struct site **site,
+                 struct sh_err *err)
+{
+    cfg->loop.pace = PACE_FAST;
+    cfg->n_links = 0;
+    return site_load_beside(cfg, beside, report, site, err);
+}
+
+/* A head at off->site. */
+static int power_up(struct offline *off, double scan_s, const struct sh_report *report, struct sh_err *err)
+{
+    int fd[2];
+    if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, fd) != 0)
+        return sh_fail(err, SH_EIO, "socket pair: %s", strerror(errno));
+    struct link_spec spec = {.type = LINK_FD, .fd = fd[0]};
+    struct device_options device = {.scan_s = scan_s, .truth = off->truth};
+    struct loop_options options = {.extra = &spec, .report = report};
+    int rc = device_create(off->site, &device, &off->device, err);
+    if (rc == SH_OK) rc = loop_create(off->site, off->device, &options, &off->loop, err);
+    if (rc != SH_OK) {
+        close(fd[0]);
+        close(fd[1]);
+        return rc;
+    }
+    off->fd = fd[1];
+    rc = connect_client(off, fd[1], err);
+    return rc == SH_OK ? loop_start(off->loop, err) : rc;
+}
+
+int offline_open_at(struct site *site, double scan_s, const struct sh_report *report, struct offline *off,
+                    struct sh_err *err)
+{
+    off->site = site;
+    off->shares_site = 1;
+    return power_up(off, scan_s, report, err);
+}
+
+int offline_open(struct config *cfg, double scan_s, const struct sh_report *report, struct offline *off,
+                 struct sh_err *err)
+{
+    int rc = offline_load(cfg, NULL, report, &off->site, err);
+    return rc == SH_OK ? power_up(off, scan_s, report, err) : rc;
+}
+
+int offline_open_beside(struct config *cfg, const struct offline *other, double scan_s, const struct sh_report *report,
+                        struct offline *off, struct sh_err *err)
+{
+    int rc = offline_load(cfg, other->site, report, &off->site, err);
+    return rc == SH_OK ? power_up(off, scan_s, report, err) : rc;
+}
+
+int offline_prepare(struct offline *off, uint32_t station, const struct sh_report *report, struct sh_err *err)
+{
+    if (station == 0) station = off->site->cfg->head.settings.station;
+    return site_open_sights(off->site, station - 1, 1, report, err);
+}
+
+static void end_loop(struct offline *off)
+{
+    struct loop_stats stats;
+    if (off->loop != NULL) {
+        loop_end(off->loop);
+        loop_join(off->loop, &stats);
+    }
+    loop_free(off->loop);
+    off->loop = NULL;
+}
+
+static void end(struct offline *off)
+{
+    end_loop(off);
+    device_free(off->device);
+    if (!off->shares_site) site_free(off->site);
+    off->device = NULL;
+    off->site = NULL;
+}
+
+int offline_finish(struct offline *off, struct sh_err *err)
+{
+    if (off->sh != NULL) shutdown(off->fd, SHUT_RDWR); /* as below */
+    end_loop(off);
+    return off->device != NULL ? device_close_journal(off->device, err) : SH_OK;
+}
+
+void offline_stop(struct offline *off)
+{
+    if (off->sh != NULL) shutdown(off->fd, SHUT_RDWR); /* a loop that waited for this reader goes on */
+    end(off);
+}
+
+void offline_close(struct offline *off)
+{
+    if (off->sh != NULL) scanhead_close(off->sh); /* likewise */
+    off->sh = NULL;
+    end(off);
+}

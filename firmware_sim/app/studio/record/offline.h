@@ -1,0 +1,46 @@
+/* SPDX-License-Identifier: MIT */
+/* A head that runs in this process, for commands that work off line. In: a configuration. Out: a client's
+ * handle, as of a head on a wire. Head and client are joined by a socket pair, and the pace is `fast`. */
+#ifndef FIRMWARE_SIM_APP_STUDIO_RECORD_OFFLINE_H
+#define FIRMWARE_SIM_APP_STUDIO_RECORD_OFFLINE_H
+
+#include "core/err.h"
+#include "drivers/host/scanhead.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/site/site.h"
+
+struct offline {
+    const char *truth;   /* the caller's: file for the faults that are injected; NULL: none */
+    struct scanhead *sh; /* the client's handle */
+    struct site *site;
+    /* inner state */
+    int fd; /* of the client */
+    struct device *device;
+    struct loop *loop;
+    int shares_site; /* it is the caller's */
+};
+
+/* Loads the scene and starts the head. Its own links stay closed. scan_s > 0: it ends each scan after this device
+ * time, to the pulse. cfg is changed (pace, links) and must live
+ * on. `offline` begins as zeros but for truth, and is to be closed, also after an error. */
+int offline_open(struct config *cfg, double scan_s, const struct sh_report *report, struct offline *offline,
+                 struct sh_err *err);
+/* The same in parts, for heads that are powered up one after the other at a loaded site: offline_load changes cfg and
+ * gives the site, which is site_free's; offline_open_at takes it. beside: a site to share a scene with, as
+ * site_load_beside has it; NULL: none. */
+int offline_load(struct config *cfg, const struct site *beside, const struct sh_report *report, struct site **site,
+                 struct sh_err *err);
+int offline_open_at(struct site *site, double scan_s, const struct sh_report *report, struct offline *offline,
+                    struct sh_err *err);
+/* The same beside another one, of another scanner of the file: the scene that both have is loaded once. */
+int offline_open_beside(struct config *cfg, const struct offline *other, double scan_s, const struct sh_report *report,
+                        struct offline *offline, struct sh_err *err);
+/* The head ends, its scene and threads are given back. What the client's handle was told stays. */
+void offline_stop(struct offline *offline);
+/* The head ends, and the file of the truth is whole: the first error in writing it. Site and handle stay. */
+int offline_finish(struct offline *offline, struct sh_err *err);
+/* Makes ready for a scan from a station, from 1; 0: where the head stands at power-up. While none is on. */
+int offline_prepare(struct offline *offline, uint32_t station, const struct sh_report *report, struct sh_err *err);
+void offline_close(struct offline *offline);
+
+#endif

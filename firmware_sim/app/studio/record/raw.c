@@ -1,0 +1,189 @@
+/* SPDX-License-Identifier: MIT */
+/* The command line of `record --raw`. */
+#include "firmware_sim/app/studio/record/raw.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/text.h"
+
+int raw_is_wanted(int argc, char **argv)
+{
+    for (int i = 1; i < argc && strcmp(argv[i], "--") != 0; i++)
+        if (strcmp(argv[i], "--raw") == 0) return 1;
+    return 0;
+}
+
+/* ---- escapes */
+
+/* After the backslash: how many characters it takes; 0: it is none. */
+static size_t read_escape(const char *at, uint8_t *byte)
+{
+    static const char names[] = "nrt\\\"'0", bytes[] = "\n\r\t\\\"'";
+    const char *name = *at != '\0' ? strchr(names, *at) : NULL;
+    if (*at == 'x') {
+        const int high = text_hex_digit(at[1]), low = high >= 0 ? text_hex_digit(at[2]) : -1;
+        *byte = (uint8_t)(16 * high + low);
+        return low >= 0 ? 3 : 0;
+    }
+    if (name == NULL) return 0;
+    *byte = (uint8_t)bytes[name - names];
+    return 1;
+}
+
+const char *raw_unescape(const char *text, uint8_t *out, size_t *len)
+{
+    *len = 0;
+    while (*text != '\0') {
+        uint8_t *byte = &out[(*len)++];
+        *byte = (uint8_t)*text;
+        if (*text++ != '\\') continue;
+        const size_t n = read_escape(text, byte);
+        if (n == 0) return "allowed after a backslash: n, r, t, 0, \\, \", ', or x and two hexadecimal digits";
+        text += n;
+    }
+    return *len > 0 ? NULL : "it is empty";
+}
+
+/* ---- options */
+
+static const struct app_command command;
+
+static int take_file(void *values, const char *text)
+{
+    struct raw *r = values;
+    if (r->path != NULL) return app_usage(&command, "-o %s: --raw writes one file, and there is %s", text, r->path);
+    if (!app_ends_in(text, ".pcapng")) return app_usage(&command, "-o %s: with --raw allowed is NAME.pcapng", text);
+    r->path = text;
+    return APP_OK;
+}
+
+static int take_send(void *values, const char *text)
+{
+    struct raw *r = values;
+    const size_t room = strlen(text) + 1;
+    if (r->n_sends == RAW_MAX_SENDS) return app_usage(&command, "--send: at most %d are allowed", RAW_MAX_SENDS);
+    if (room > 60000) return app_usage(&command, "--send: at most 60000 characters each are allowed");
+    struct raw_send *send = &r->send[r->n_sends];
+    if ((send->bytes = malloc(room)) == NULL) return app_usage(&command, "--send: no memory");
+    const char *wrong = raw_unescape(text, send->bytes, &send->len);
+    r->n_sends++;
+    return wrong == NULL ? APP_OK : app_usage(&command, "--send %s: %s", text, wrong);
+}
+
+static int read_port(const char *text, const char **end)
+{
+    char *after;
+    const long port = *text >= '0' && *text <= '9' ? strtol(text, &after, 10) : -1;
+    if (port < 0 || port > 65535) return -1;
+    *end = after;
+    return (int)port;
+}
+
+/* "HOST:PORT[,PORT...]", "[::1]:PORT". 0: it is not. */
+static int read_place(const char *text, int max_ports, struct raw_place *place)
+{
+    const char *colon = strrchr(text, ':');
+    if (colon == NULL || colon == text) return 0;
+    const int bracket = text[0] == '[' && colon[-1] == ']';
+    const int n = snprintf(place->host, sizeof place->host, "%.*s", (int)(colon - text) - 2 * bracket, text + bracket);
+    if (n <= 0 || n >= (int)sizeof place->host) return 0;
+    for (const char *at = colon + 1;; at++) {
+        const int port = place->n_ports < max_ports ? read_port(at, &at) : -1;
+        if (port < 0) return 0;
+        place->port[place->n_ports++] = port;
+        if (*at == '\0') return 1;
+        if (*at != ',') return 0;
+    }
+}
+
+/* 0: none; 0 itself is any free one. */
+static int port_twice(const struct raw_place *place)
+{
+    for (int i = 0; i < place->n_ports; i++)
+        for (int k = 0; k < i; k++)
+            if (place->port[i] == place->port[k] && place->port[i] != 0) return place->port[i];
+    return 0;
+}
+
+static int read_source(struct raw *r)
+{
+    const char *source = r->in.operand[0];
+    const int udp = strncmp(source, "udp:", 4) == 0, tcp = strncmp(source, "tcp:", 4) == 0;
+    r->ops = udp ? &raw_udp : &raw_tcp;
+    if ((!udp && !tcp) || !read_place(source + 4, udp ? RAW_MAX_PORTS : 1, &r->place) || (tcp && r->place.port[0] == 0))
+        return app_usage(&command, "SOURCE %s: with --raw allowed udp:ADDRESS:PORT,PORT,... and tcp:HOST:PORT", source);
+    if (port_twice(&r->place) != 0)
+        return app_usage(&command, "%s: port %d is there twice", source, port_twice(&r->place));
+    if (udp && (r->n_sends > 0 || r->relay != NULL))
+        return app_usage(&command, "%s: --send and --relay need tcp:HOST:PORT", source);
+    if (r->n_sends > 0 && r->relay != NULL)
+        return app_usage(&command, "--send and --relay: what is sent is the client's; allowed one of them");
+    return APP_GO_ON;
+}
+
+int raw_record(int argc, char **argv)
+{
+    static struct raw raw;
+    struct raw *r = &raw;
+    struct sh_err err = {0};
+    int status = app_parse(&command, argc, argv, &r->in, r);
+    if (status == APP_GO_ON && r->path == NULL) status = app_usage(&command, "-o FILE.pcapng is needed");
+    if (status == APP_GO_ON) status = read_source(r);
+    if (status == APP_GO_ON) {
+        app_catch_signals();
+        int rc = app_check_files(&r->in, NULL, &err);
+        if (rc == SH_OK) rc = raw_run(r, &err);
+        status = rc == SH_OK ? APP_OK : app_fail(&err);
+    }
+    for (int i = 0; i < r->n_sends; i++)
+        free(r->send[i].bytes);
+    return status;
+}
+
+#define AT(member) offsetof(struct raw, member)
+
+/* clang-format off */
+static const struct app_option OPTIONS[] = {
+    {APP_FLAG, "raw", NULL, .at = AT(raw), .help = "what is on the wire, whatever its protocol is, to a capture"},
+    {APP_CALL, "output", "FILE", .letter = 'o', .apply = take_file, .file = APP_WRITES, .help = "NAME.pcapng"},
+    {APP_NUMBER, "duration", "S", .min = 0.001, .max = 1e8, .at = AT(duration_s),
+     .help = "end S seconds after the first packet"},
+    {APP_NUMBER, "wait", "S", .min = 0.0, .max = 1e8, .at = AT(wait_s),
+     .help = "wait up to S seconds for SOURCE to be there, and for its first packet (default: that as long as --duration)"},
+    {APP_CALL, "send", "TEXT", .apply = take_send,
+     .help = "of tcp: send this when connected. \\n, \\r, \\t, \\0, \\\\ and \\xHH are bytes. May be repeated: the next one goes "
+             "when an answer has come and 50 ms were silent, at the latest after 1 s"},
+    {APP_TEXT, "relay", "[ADDRESS:]PORT", .at = AT(relay),
+     .help = "of tcp: listen there (default: 127.0.0.1), and join each client to SOURCE; both directions are recorded, "
+             "until Ctrl-C"},
+    {APP_TEXT, "stats", "FILE", .at = AT(stats), .file = APP_WRITES, .help = "write packets, bytes and dropped as JSON; - is standard output"},
+    {APP_WHOLE, "ready-fd", "N", .min = 1, .max = 65535, .at = AT(ready_fd),
+     .help = "once it listens, write a line of JSON with the endpoint to descriptor N"},
+    {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "no progress"},
+    OPTION_END
+};
+/* clang-format on */
+
+static const char HELP_NOTES[] =
+    "SOURCE is one of\n"
+    "\n"
+    "  udp:ADDRESS:PORT,...     datagrams that come to an address of this machine, 0.0.0.0 (all of them), a\n"
+    "                           broadcast or a group (GROUP%INTERFACE)\n"
+    "  tcp:HOST:PORT            a connection to it, or those of clients (--relay)\n"
+    "\n"
+    "Each packet is an Ethernet frame with the kernel's time. Headers are made anew: addresses, ports, lengths,\n"
+    "checksums and sequence numbers are right, hardware addresses are made up.\n"
+    "\n"
+    "Exit status 1: no packet came, the kernel dropped some, the device said nothing or broke the connection.\n"
+    "FILE keeps what came.\n";
+
+static const struct app_command command = {
+    .name = "record",
+    .operand = {"SOURCE"},
+    .needs = "--raw -o FILE.pcapng",
+    .summary = "what is on the wire to a capture",
+    .options = OPTIONS,
+    .notes = HELP_NOTES,
+    .run = raw_record,
+};

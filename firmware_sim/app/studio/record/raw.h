@@ -1,0 +1,90 @@
+/* SPDX-License-Identifier: MIT */
+/* `record --raw`: what other protocols than the native one have on the wire, to a .pcapng that other programs read.
+ *
+ * In: the command line. Out: Ethernet frames (drivers/protocol/ethernet.h) with the kernel's times of receiving. A
+ * source is UDP (sockets of its own) or TCP (a connection of its own, or those of others that it passes on). */
+#ifndef FIRMWARE_SIM_APP_STUDIO_RECORD_RAW_H
+#define FIRMWARE_SIM_APP_STUDIO_RECORD_RAW_H
+
+#include <poll.h>
+#include <stdio.h>
+
+#include "drivers/protocol/ethernet.h"
+#include "drivers/record/capture.h"
+#include "drivers/socket/stamped.h"
+#include "firmware_sim/app/app.h"
+
+enum { RAW_MAX_PORTS = 16, RAW_MAX_SENDS = 64, RAW_MAX_POLLS = 64, RAW_MAX_PASSES = 512 };
+
+struct raw_send {
+    uint8_t *bytes;
+    size_t len;
+};
+
+/* Where the bytes come from. */
+struct raw_place {
+    char host[128];
+    int port[RAW_MAX_PORTS]; /* TCP: one */
+    int n_ports;
+};
+
+struct raw;
+
+/* UDP and TCP. Functions return SH_OK or SH_E. */
+struct raw_ops {
+    /* Whatever is to be there at first. May wait up to r->wait_s. close follows in any case. */
+    int (*open)(struct raw *r, struct sh_err *err);
+    /* What to wait for, up to RAW_MAX_POLLS; returns how many. *timeout_ms is made shorter where there is a reason. */
+    int (*wait_for)(struct raw *r, struct pollfd *fds, int *timeout_ms);
+    /* Whatever came, up to RAW_MAX_PASSES pieces, to the file. Returns how many, or SH_E. */
+    int (*work)(struct raw *r, struct sh_err *err);
+    /* The recording ends: what is left to be written. */
+    int (*finish)(struct raw *r, struct sh_err *err);
+    /* After all: whether something is missing in the recording. */
+    int (*check)(const struct raw *r, struct sh_err *err);
+    /* Members of the statistics. */
+    void (*put)(struct json *json, const struct raw *r);
+    uint64_t (*dropped)(const struct raw *r);
+    void (*close)(struct raw *r);
+};
+
+struct raw {
+    /* the command line */
+    struct app_input in;
+    const char *path, *stats, *relay;
+    struct raw_send send[RAW_MAX_SENDS];
+    int n_sends;
+    double duration_s, wait_s; /* 0: not given */
+    long ready_fd;
+    int raw, quiet;
+    struct raw_place place;
+    const struct raw_ops *ops;
+    /* the recording */
+    struct capture capture;
+    uint64_t bytes;     /* of payload */
+    int64_t first_ns;   /* monotonic, of the first packet; 0: none came */
+    int64_t last_t_ns;  /* of the last packet */
+    int over;           /* by itself */
+    char endpoint[160]; /* where it listens; for --ready-fd */
+    void *state;        /* of ops */
+    double wall_s;
+};
+
+extern const struct raw_ops raw_udp, raw_tcp;
+
+/* `record` with --raw among its arguments. Returns the exit status. */
+int raw_is_wanted(int argc, char **argv);
+int raw_record(int argc, char **argv);
+
+/* ---- inside */
+
+/* From open files to closed ones. SH_ELOST: something is missing, the file keeps the rest. */
+int raw_run(struct raw *r, struct sh_err *err);
+/* A frame to the file. payload: how many bytes of it count. */
+int raw_write(struct raw *r, const struct capture_frame *frame, size_t payload, struct sh_err *err);
+struct ethernet_end raw_end_of(const struct sockaddr_storage *at);
+/* The text with its escapes as bytes; in out, which has room for as many as the text has. NULL: *len bytes; else what is
+ * wrong with it. */
+const char *raw_unescape(const char *text, uint8_t *out, size_t *len);
+
+#endif

@@ -1,0 +1,25 @@
+/* SPDX-License-Identifier: MIT */
+/* What came at several sockets, in the order in which it came. Each socket is an input that holds one piece at most.
+ *
+ * A piece is passed on once every other input was asked after it was taken: what they have with an earlier time is then
+ * known. In: inputs. Out: calls of `pass`. */
+#ifndef FIRMWARE_SIM_APP_STUDIO_RECORD_RAW_ORDER_H
+#define FIRMWARE_SIM_APP_STUDIO_RECORD_RAW_ORDER_H
+
+#include <stdint.h>
+
+#include "core/err.h"
+
+struct raw_input {
+    int is_full; /* it has a piece, of t_ns */
+    int64_t t_ns;
+    /* Asked while it is empty: 1, with t_ns, where it has one now; 0: none; or SH_E. */
+    int (*take)(struct raw_input *input, struct sh_err *err);
+    /* The piece goes on; the input is empty then. SH_OK or SH_E. */
+    int (*pass)(struct raw_input *input, struct sh_err *err);
+};
+
+/* Passes on up to `most` pieces. Returns how many, or SH_E of an input. */
+int raw_pass_in_order(struct raw_input *const *input, int n, int most, struct sh_err *err);
+
+#endif

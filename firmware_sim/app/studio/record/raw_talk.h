@@ -1,0 +1,49 @@
+/* SPDX-License-Identifier: MIT */
+/* A connection that `record --raw` has between two ends, and its frames.
+ *
+ * End 0 asked for the connection: a client that is relayed, or this program itself with its --send. End 1 is the
+ * device. Bytes that come from one end are written to the capture, and then sent to the other one. */
+#ifndef FIRMWARE_SIM_APP_STUDIO_RECORD_RAW_TALK_H
+#define FIRMWARE_SIM_APP_STUDIO_RECORD_RAW_TALK_H
+
+#include "firmware_sim/app/studio/record/raw.h"
+#include "firmware_sim/app/studio/record/raw_order.h"
+
+enum { TALK_PIECE = 65536 };
+
+struct talk_end {
+    struct raw_input input; /* first, so that an input is its end */
+    struct talk *talk;
+    int number;
+    int fd;      /* end 0 is this program: -1 */
+    int is_over; /* its FIN or RST came */
+    int is_deaf; /* what is sent to it fails */
+    enum { TALK_BYTES, TALK_END, TALK_RESET } news;
+    uint64_t received;
+    uint8_t
+        bytes[TALK_PIECE]; /* from it: a piece that is to be passed on, then the rest that the other does not take */
+    size_t len, sent;
+};
+
+struct talk {
+    struct raw *r;
+    struct tcp_talk segments;
+    struct talk_end end[2];
+    int is_used, is_over, was_reset;
+    int next_send;             /* of r->send */
+    int64_t sent_ns, heard_ns; /* monotonic: when it was sent, and when the device said something last */
+    char name[80];             /* of end 0, for messages */
+};
+
+/* Both descriptors are taken; fd 0: -1, for this program itself. began_ns: UTC, when the connection was asked for. It
+ * writes the handshake. */
+int talk_open(struct talk *talk, struct raw *r, const int fd[2], int64_t began_ns, struct sh_err *err);
+/* What the descriptors are to be polled for; up to two. */
+int talk_wait_for(const struct talk *talk, struct pollfd *fds, int *timeout_ms);
+/* Sends what the ends did not take before. */
+int talk_push(struct talk *talk, struct sh_err *err);
+/* The recording ends before the connection does: end 0 closes it. */
+int talk_finish(struct talk *talk, struct sh_err *err);
+void talk_close(struct talk *talk);
+
+#endif

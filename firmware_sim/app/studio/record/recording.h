@@ -1,0 +1,68 @@
+/* SPDX-License-Identifier: MIT */
+/* Following scans through libscanhead: start a scan, pass on its frames until it ends, stop it on time.
+ *
+ * In: a client's handle of a head (on a wire, or of offline.h) and what to scan. Out: each frame to a
+ * callback, and what came of it in figures. One recording at a time per handle; not real-time safe. */
+#ifndef FIRMWARE_SIM_APP_STUDIO_RECORD_RECORDING_H
+#define FIRMWARE_SIM_APP_STUDIO_RECORD_RECORDING_H
+
+#include <stdint.h>
+
+#include "core/err.h"
+#include "drivers/host/scanhead.h"
+#include "firmware_sim/app/studio/record/recording_counts.h"
+#include "firmware_sim/base/json.h"
+
+struct recording_options {
+    int listen;                           /* send nothing; take what comes until the stream or the time ends */
+    uint32_t first_station, last_station; /* scanned one after the other, from 1; 0: as the head is set */
+    /* Of a recording that other heads begin or go on with: its first and last station, for progress and for what is
+     * missing. 0: this is all of it. */
+    uint32_t begin_station, end_station;
+    long frames;           /* per scan; -1: as the head is set */
+    double duration_s;     /* > 0: stop each scan after this device time ... */
+    int head_ends;         /* ... which the head does by itself: no command is needed */
+    double replug_s;       /* > 0: how long to wait for a head that was unplugged, to go on then */
+    int hash;              /* keep stream_sha256 */
+    int progress;          /* 1: to the report, about once a second */
+    uint64_t source_bytes; /* of a stream in a file, for progress; 0: not known */
+    const struct sh_report *report;
+    /* Before each scan, while the head is idle; station as above. NULL: there is nothing to do. */
+    int (*prepare)(void *ctx, uint32_t station, struct sh_err *err);
+    /* Gets each frame, in order. A negative SH_E ends the recording with it. */
+    int (*frame)(void *ctx, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
+    /* About once a second or more often, also while no frames come. NULL: not called. A negative SH_E as of frame. */
+    int (*second)(void *ctx, struct sh_err *err);
+    void *ctx;
+    /* Asked often: non-zero ends the recording in good order. NULL: never. */
+    int (*interrupted)(void);
+};
+
+struct recording_result {
+    uint64_t points, empty, frames; /* received; empty: shots without echo */
+    uint64_t with_reflectance;      /* points whose reflectance is modelled */
+    struct recording_counts counts; /* of pulses and scans */
+    uint64_t crowded, faint, unfit; /* hits that are no echoes, as the line ends count them */
+    char missing[128];              /* what was asked for and left out because of `interrupted`; empty: nothing */
+    double wall_s;                  /* how long the recording took */
+    struct scanhead_stats stream;   /* as the client counts */
+    char sha256[65];                /* of the stream; empty where none was kept */
+    uint64_t replugs, broken_scans; /* how often the head was away and came back; scans in which it was away */
+    uint64_t bus_resets;            /* how often its USB bus was reset, which ended the session */
+};
+
+/* SH_OK, or the first failure. result is filled in both cases. */
+int recording_run(struct scanhead *sh, const struct recording_options *options, struct recording_result *result,
+                  struct sh_err *err);
+
+/* Adds what another part of the recording gave; not the figures of its stream, nor its hash. */
+void recording_add(struct recording_result *sum, const struct recording_result *more);
+/* Writes the result as one JSON object; ctx is the struct recording_result. */
+void recording_put(struct json *json, const void *ctx);
+/* 1: frames came twice or too late, or the head started again; the text says how often. 0: none of it. What came twice
+ * or too late is in no file. */
+int recording_describe_order(const struct recording_result *result, char *text, size_t len);
+/* SH_OK, or what is missing: frames, pulses, parts of scans. Echoes that the head left out do not count. */
+int recording_check_complete(const struct recording_result *result, struct sh_err *err);
+
+#endif

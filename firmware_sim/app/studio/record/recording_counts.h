@@ -1,0 +1,46 @@
+/* SPDX-License-Identifier: MIT */
+/* The pulses of a recording: what came, and what the head says of the rest. PROTOCOL.md defines the words (What
+ * the counts mean).
+ *
+ * In: each frame of the stream. Out: sums over the scans whose end is known, by SCAN_END or, where that was lost,
+ * by telemetry of the idle head. */
+#ifndef FIRMWARE_SIM_APP_STUDIO_RECORD_RECORDING_COUNTS_H
+#define FIRMWARE_SIM_APP_STUDIO_RECORD_RECORDING_COUNTS_H
+
+#include <stdint.h>
+
+#include "drivers/host/scanhead.h"
+
+struct recording_counts {
+    uint64_t scans;       /* that ended */
+    uint64_t pulses;      /* received, in scans that have not ended, too */
+    uint64_t fired, cast; /* of scans that ended */
+    uint64_t lost;        /* by the head */
+    uint64_t left_out;    /* in frames that the head left out for this reader, as it says */
+    uint64_t missing;     /* delivered by the head in scans that ended, and not received, whatever the reason */
+    /* inner state: the scan at hand */
+    int within; /* points of it came, and its end did not */
+    struct {
+        uint32_t number;                 /* 0: not known */
+        uint64_t pulses, left_out, lost; /* since it began, or the recording did; lost: as OVERRUN says */
+    } scan;
+    struct {
+        uint32_t scan; /* 0: none came */
+        uint64_t cast;
+    } told;         /* by the last telemetry */
+    uint32_t ended; /* number of the last scan that ended, until the next one begins */
+};
+
+enum recording_news {
+    RECORDING_NOTHING,
+    RECORDING_SCAN_OVER, /* its SCAN_END came */
+    RECORDING_END_LOST,  /* the scan is over, and its SCAN_END did not come */
+};
+
+/* Takes a frame. frames_lost: some were lost in this recording. */
+enum recording_news recording_count(struct recording_counts *counts, const struct scanhead_frame *frame,
+                                    int frames_lost);
+/* Something else says that the scan at hand is over. */
+void recording_count_end(struct recording_counts *counts);
+
+#endif

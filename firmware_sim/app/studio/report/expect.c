@@ -1,0 +1,84 @@
+/* SPDX-License-Identifier: MIT */
+/* What deviations are expected of a recording, by its configuration, and whether they are so. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "firmware_sim/app/studio/report/report.h"
+
+/* LAS files of ours hold the stream's own counts of the first scan's station; all else they round once more. */
+static double file_count_m(const struct report *r, uint32_t station, int polar)
+{
+    const struct cloud *c = &r->cloud;
+    const int is_first = c->n > 0 && cloud_station(c, 0) == station + 1;
+    return !polar && c->has_own_counts && is_first ? 0.0 : c->count_m;
+}
+
+void report_heads(struct report *r)
+{
+    const int polar = r->cfg->output.layout == LINE_POLAR;
+    for (uint32_t s = 0; s < r->site->n_stations; s++) {
+        struct deviation_head *head = &r->f.station[s].head;
+        report_head_of(sites_of(&r->sites, s), s, head);
+        head->file_count_m = file_count_m(r, s, polar);
+    }
+}
+
+static void count_beyond(struct report *r)
+{
+    for (size_t i = 0; i < r->cloud.n; i++) {
+        struct report_station *s = &r->f.station[cloud_station(&r->cloud, i) - 1];
+        report_count(&s->verdict, &s->head, r->distance_m[i], (double)r->points.along_m[i],
+                     (double)r->points.range_m[i]);
+    }
+}
+
+static void say(struct report_verdict *v, enum report_judgement judgement, const char *text)
+{
+    v->judgement = judgement;
+    snprintf(v->text, sizeof v->text, "%s", text);
+}
+
+static void judge_station(const struct report *r, struct report_station *s)
+{
+    const struct report_subject subject = {&s->figures, &s->head, r->site->moving, "--max-m"};
+    report_judge_one(&subject, &s->verdict);
+}
+
+static void judge_all(struct report *r)
+{
+    struct report_verdict *all = &r->f.verdict;
+    uint32_t n[3] = {0, 0, 0}, n_with_points = 0;
+    const struct report_verdict *only = NULL;
+    all->bound_m = 0.0;
+    for (uint32_t s = 0; s < r->site->n_stations; s++) {
+        const struct report_verdict *v = &r->f.station[s].verdict;
+        if (r->f.station[s].figures.points == 0) continue;
+        n[v->judgement]++;
+        n_with_points++;
+        only = v;
+        all->judged += v->judged;
+        all->beyond += v->beyond;
+        all->bound_m = fmax(all->bound_m, v->bound_m);
+    }
+    all->judgement = n[REPORT_BEYOND] > 0 ? REPORT_BEYOND : n[REPORT_NONE] > 0 ? REPORT_NONE : REPORT_WITHIN;
+    if (n_with_points == 0)
+        say(all, REPORT_NONE, "Not judged: there are no points.");
+    else if (n_with_points == 1)
+        *all = *only;
+    else if (all->judgement == REPORT_WITHIN)
+        snprintf(all->text, sizeof all->text, "Within the expected error, at all %u stations.", n_with_points);
+    else
+        snprintf(all->text, sizeof all->text,
+                 "%s: of %u stations, %u are within the expected error, %u are not, %u can't be judged.",
+                 all->judgement == REPORT_BEYOND ? "Not within the expected error" : "Not judged", n_with_points,
+                 n[REPORT_WITHIN], n[REPORT_BEYOND], n[REPORT_NONE]);
+}
+
+void report_judge(struct report *r)
+{
+    if (!r->site->moving) count_beyond(r);
+    for (uint32_t s = 0; s < r->site->n_stations; s++)
+        judge_station(r, &r->f.station[s]);
+    judge_all(r);
+}

@@ -1,0 +1,306 @@
+/* SPDX-License-Identifier: MIT */
+/* The report as a page: its sections in their order. */
+#include <ctype.h>
+#include <errno.h>
+#include <inttypes.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "core/newfile.h"
+#include "firmware_sim/app/studio/report/report.h"
+#include "firmware_sim/app/studio/report/page.h"
+
+static const char *file_name(const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    return slash != NULL ? slash + 1 : path;
+}
+
+static void put_fact(FILE *out, const char *what, const char *text)
+{
+    fprintf(out, "<dt>%s</dt><dd>", what);
+    page_text(out, text);
+    fputs("</dd>\n", out);
+}
+
+static const char *frame_name(const struct report *r)
+{
+    static const char *const names[] = {"the scene's own frame", "ECEF", "UTM or UPS", "latitude, longitude, height"};
+    if (r->cfg->output.layout == LINE_POLAR) return "the scene's own frame";
+    return names[r->cfg->output.crs];
+}
+
+/* One, or one for each station that has another than the station before. */
+static void put_scanners(FILE *out, const struct report *r)
+{
+    char what[48] = "Scanner", text[256];
+    for (uint32_t s = 0; s < r->site->n_stations; s++) {
+        const struct config *cfg = sites_of(&r->sites, s)->cfg;
+        if (s > 0 && cfg == sites_of(&r->sites, s - 1)->cfg) continue;
+        if (r->sites.n > 0) snprintf(what, sizeof what, "Scanner, from station %" PRIu32 " on", s + 1);
+        snprintf(text, sizeof text, "%s %s, range noise %s, angle noise %s, ball noise %s", cfg->profile.maker,
+                 cfg->profile.model,
+                 cfg->noise.range == RANGE_NOISE_OFF  ? "off"
+                 : cfg->noise.range == RANGE_NOISE_ON ? "on"
+                                                      : "by the signal",
+                 cfg->noise.angle ? "on" : "off", cfg->noise.ball.radius_m > 0.0 ? "on" : "off");
+        put_fact(out, what, text);
+    }
+}
+
+static void put_top(FILE *out, const struct report *r)
+{
+    char text[CONFIG_PATH_LEN + 64];
+    struct tm day;
+    fputs("<h1>Scan report: ", out);
+    page_text(out, file_name(r->cloud_path));
+    fputs("</h1>\n<dl class=\"facts\">\n", out);
+    put_fact(out, "Recording", r->cloud_path);
+    if (gmtime_r(&r->modified.tv_sec, &day) != NULL && strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S UTC", &day) > 0)
+        put_fact(out, "Written", text);
+    put_fact(out, "Configuration", r->cfg->file);
+    for (uint32_t i = 0; i < r->cfg->scene.n_meshes; i++)
+        put_fact(out, i == 0 ? "Scene" : "", r->cfg->scene.mesh[i].file);
+    put_scanners(out, r);
+    snprintf(text, sizeof text, "%s; EPSG %lld", frame_name(r), (long long)r->f.epsg);
+    if (r->f.epsg <= 0) snprintf(text, sizeof text, "%s", frame_name(r));
+    put_fact(out, "Coordinates", text);
+    fputs("</dl>\n", out);
+}
+
+static void put_verdict(FILE *out, const struct report_verdict *v)
+{
+    static const char *const kind[] = {"open", "within", "beyond"};
+    static const char *const sign[] = {"? Not judged", "\xe2\x9c\x93 Within the expected error",
+                                       "\xe2\x9c\x97 Not within the expected error"};
+    const char *text = strpbrk(v->text, ":.,"); /* the words before stand in the heading */
+    if (text != NULL) text += 1 + strspn(text + 1, " ");
+    fprintf(out, "<div class=\"verdict %s\"><b>%s</b>", kind[v->judgement], sign[v->judgement]);
+    if (text == NULL) text = v->text;
+    if (*text != 0) fputc(toupper((unsigned char)*text), out); /* ours begin with a letter of ASCII */
+    page_text(out, *text != 0 ? text + 1 : text);
+    fputs("</div>\n", out);
+}
+
+static void begin_card(FILE *out, const char *what)
+{
+    fprintf(out, "<div><span>%s</span><b>", what);
+}
+
+static void put_length_card(FILE *out, const char *what, double m, int is_signed)
+{
+    begin_card(out, what);
+    if (is_signed)
+        page_signed_length(out, m);
+    else
+        page_length(out, m);
+    fputs("</b></div>\n", out);
+}
+
+static void put_count_card(FILE *out, const char *what, uint64_t n, const char *more)
+{
+    begin_card(out, what);
+    page_count(out, n);
+    fprintf(out, "</b>%s</div>\n", more);
+}
+
+static void put_cards(FILE *out, const struct report *r)
+{
+    const struct report_figures *f = &r->f;
+    char more[96];
+    fputs("<div class=\"cards\">\n", out);
+    put_count_card(out, "Points", f->stats.points, "");
+    put_count_card(out, "Shots without echo in the file", f->stats.empty - f->ghosts, "");
+    if (f->ghosts > 0) put_count_card(out, "Seen in mirrors, left out", f->ghosts, "");
+    put_length_card(out, "Distance, mean", f->stats.mean_m, 0);
+    put_length_card(out, "Distance, RMS", f->stats.rms_m, 0);
+    put_length_card(out, "Distance, 95 % within", f->stats.p95_m, 0);
+    put_length_card(out, "Distance, largest", f->stats.max_m, 0);
+    snprintf(more, sizeof more, "<span>than %g m</span>", r->tolerance_m);
+    put_count_card(out, "Farther", f->stats.beyond, more);
+    put_length_card(out, "Along the beam, mean", f->all.along_mean_m, 1);
+    put_length_card(out, "Along the beam, RMS", f->all.along_rms_m, 0);
+    begin_card(out, "Density, median");
+    page_number(out, f->density_all.p50);
+    fputs("</b><span>points/m\xc2\xb2</span></div>\n", out);
+    snprintf(more, sizeof more, "<span>of %u have points</span>", r->site->n_surfaces);
+    put_count_card(out, "Surfaces", f->coverage.surfaces_hit, more);
+    snprintf(more, sizeof more, "<span>of %u have points</span>", r->site->scene->n_triangles);
+    put_count_card(out, "Triangles", f->coverage.triangles_hit, more);
+    fputs("</div>\n", out);
+}
+
+/* Points that are expected between two deviations: of each station's judged ones, by their RMS sigma. */
+static double expected_within(void *ctx, double from, double to)
+{
+    const struct report *r = ctx;
+    double n = 0.0;
+    for (uint32_t s = 0; s < r->site->n_stations; s++) {
+        const struct figures *f = &r->f.station[s].figures;
+        if (f->judged == 0 || !(f->expected_rms_m > 0.0)) continue;
+        const double per = M_SQRT1_2 / f->expected_rms_m;
+        n += (double)f->along * 0.5 * (erf(to * per) - erf(from * per));
+    }
+    return n;
+}
+
+static void put_beyond(FILE *out, const struct figures_histogram *h)
+{
+    if (h->below + h->above == 0) return;
+    fputs(" Not shown, as they lie beyond the axis: ", out);
+    page_count(out, h->below + h->above);
+    fputs(" points.", out);
+}
+
+static void put_histograms(FILE *out, struct report *r)
+{
+    const struct report_figures *f = &r->f;
+    const int noisy = f->all.judged > 0 && !isfinite(f->verdict.bound_m);
+    fputs("<div class=\"pair\">\n<figure>\n", out);
+    page_histogram(out, "How many points lie how far from the scene", &f->distances, NULL, NULL);
+    fputs("<figcaption>Points by their distance from the nearest surface.", out);
+    put_beyond(out, &f->distances);
+    fputs("</figcaption></figure>\n<figure>\n", out);
+    page_histogram(out, "How many points lie how far before or after the surface along the beam", &f->along,
+                   noisy ? expected_within : NULL, r);
+    fputs("<figcaption>Points by their deviation along the beam; to the right of 0 they lie beyond the surface.", out);
+    if (noisy) fputs(" The line shows what is expected of the noise.", out);
+    put_beyond(out, &f->along);
+    fputs("</figcaption></figure>\n</div>\n", out);
+}
+
+static void put_bars(FILE *out, const char *title, const char *axis, uint32_t n, const char (*group)[32],
+                     const struct figures *figures, const char *caption)
+{
+    double value_m[REPORT_MAX_RANGES][PAGE_SERIES];
+    for (uint32_t k = 0; k < n; k++) {
+        value_m[k][0] = figures[k].rms_m;
+        value_m[k][1] = figures[k].p95_m;
+        value_m[k][2] = figures[k].judged_rms_m;
+        value_m[k][3] = figures[k].expected_rms_m;
+    }
+    const struct page_bars bars = {.title = title,
+                                   .axis = axis,
+                                   .series = {"RMS distance", "95 % distance", "RMS along the beam", "expected"},
+                                   .n_groups = n,
+                                   .group = group,
+                                   .value_m = (const double(*)[PAGE_SERIES])value_m};
+    fputs("<figure>\n", out);
+    page_bars(out, &bars);
+    fprintf(out, "<figcaption>%s</figcaption></figure>\n", caption);
+}
+
+static void put_charts(FILE *out, const struct report *r)
+{
+    char ranges[REPORT_MAX_RANGES][32], incidences[REPORT_INCIDENCES][32];
+    report_name_ranges(r, ranges);
+    report_name_incidences(incidences);
+    if (r->f.n_ranges == 0) return;
+    fputs("<div class=\"pair\">\n", out);
+    put_bars(out, "Deviations by range", "distance from the station, m", r->f.n_ranges, (const char(*)[32])ranges,
+             r->f.range, "Deviations by the distance from the station.");
+    if (!r->site->moving)
+        put_bars(out, "Deviations by incidence", "angle between the beam and the surface's normal", REPORT_INCIDENCES,
+                 (const char(*)[32])incidences, r->f.incidence,
+                 "Deviations by the angle at which the beam meets the surface; 0\xc2\xb0 is head on. Beyond 80\xc2\xb0 "
+                 "there are distances alone.");
+    fputs("</div>\n", out);
+}
+
+static void put_worst(FILE *out, const struct report *r)
+{
+    const struct scene_surface *s = report_worst_surface(r);
+    if (r->f.stats.far > 0)
+        fprintf(out, "<p>The first point farther than %g m from everything is number %zu of the file, at", r->max_m,
+                r->f.stats.worst + 1);
+    else
+        fprintf(out, "<p>The point farthest from the scene is number %zu of the file, at", r->f.stats.worst + 1);
+    report_put_worst(out, r);
+    if (s != NULL) {
+        char name[REPORT_SURFACE_LEN];
+        report_name_surface(s, name);
+        fputs(", on ", out);
+        page_text(out, name);
+    }
+    fputs(".</p>\n", out);
+}
+
+static void put_words(FILE *out, const struct report *r)
+{
+    fputs(
+        "<h2>What the words mean</h2>\n<dl class=\"words\">\n"
+        "<dt>Distance</dt><dd>From the point to the nearest surface of the scene, whatever the direction. Never "
+        "negative. The mean, the RMS (the root of the mean square) and the largest are of these. 95 % of the points "
+        "have no larger one.</dd>\n"
+        "<dt>Along the beam</dt><dd>The beam is followed from the station through the point to the scene. The "
+        "deviation is the measured range minus the exact one. It is positive where the point lies beyond the "
+        "surface.</dd>\n"
+        "<dt>On smooth faces</dt><dd>Points whose nearest surface is the one that the beam meets, at an incidence up "
+        "to 80\xc2\xb0. At an edge a small error across the beam is a large one along it, so there are distances "
+        "alone.</dd>\n"
+        "<dt>Judged</dt><dd>Points on smooth faces whose noise alone decides about their deviation: nothing else is "
+        "as near to the face as eight times their noise. Up to about 400,000 are taken, evenly.</dd>\n"
+        "<dt>Expected</dt><dd>The RMS deviation along the beam that follows from the configured noise (of ranges, angles "
+        "and places) and from the counts of encoders and numbers. It is worked out for each judged point from its range "
+        "and incidence.</dd>\n"
+        "<dt>Bound</dt><dd>Without noise of unlimited size no point may be farther from the scene than this: the "
+        "errors that the plan promises, half a count an axis of the numbers on the wire, and half a count of the "
+        "encoders.</dd>\n",
+        out);
+    fprintf(
+        out,
+        "<dt>Density</dt><dd>Each surface is cut into squares with sides of %g m. A square's density is the number of "
+        "one station's points in it, divided by its area. Half of the points lie where the density is the median or "
+        "more. Squares at a border count as whole ones, so theirs is a lower limit.</dd>\n"
+        "<dt>Surfaces, triangles</dt><dd>How many of the scene's have at least one point.</dd>\n</dl>\n",
+        r->f.density.cell_m);
+}
+
+static int put_page(struct report *r, FILE *out, struct sh_err *err)
+{
+    char title[300];
+    snprintf(title, sizeof title, "Scan report: %.250s", file_name(r->cloud_path));
+    page_begin(out, title);
+    put_top(out, r);
+    put_verdict(out, &r->f.verdict);
+    put_cards(out, r);
+    put_worst(out, r);
+    fputs("<h2>Pictures</h2>\n", out);
+    int rc = report_put_map(r, out, err);
+    if (rc != SH_OK) return rc;
+    put_histograms(out, r);
+    put_charts(out, r);
+    report_put_stations(out, r);
+    report_put_bins(out, r);
+    rc = report_put_surfaces(out, r, err);
+    if (rc != SH_OK) return rc;
+    report_put_times(out, r);
+    put_words(out, r);
+    page_end(out);
+    return SH_OK;
+}
+
+/* fd is taken in any case. */
+static int write_part(struct report *r, const char *part, int fd, struct sh_err *err)
+{
+    struct sh_err why = {0};
+    FILE *out = fdopen(dup(fd), "wb");
+    int rc = out != NULL ? put_page(r, out, &why) : sh_fail(&why, SH_EIO, "%s", strerror(errno));
+    if (out != NULL && fclose(out) != 0 && rc == SH_OK) rc = sh_fail(&why, SH_EIO, "%s", strerror(errno));
+    if (rc == SH_OK) return newfile_keep(r->html_path, part, fd, err);
+    newfile_drop(part, fd);
+    return sh_fail(err, rc, "%s: cannot be written: %.300s", r->html_path, why.text);
+}
+
+int report_write_html(struct report *r, struct sh_err *err)
+{
+    char *part;
+    int fd;
+    if (asprintf(&part, "%s.part", r->html_path) < 0) return sh_fail(err, SH_ENOMEM, "%s: no memory", r->html_path);
+    int rc = newfile_part(r->html_path, part, &fd, err);
+    if (rc == SH_OK) rc = write_part(r, part, fd, err);
+    free(part);
+    return rc;
+}

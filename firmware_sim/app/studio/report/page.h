@@ -1,0 +1,46 @@
+/* SPDX-License-Identifier: MIT */
+/* What a page is made of: its frame, lengths in words, charts. In: figures in metres. Out: HTML 5 and SVG, whole by
+ * themselves: no script, nothing from elsewhere; light or dark as the reader's system is; fit for printing. */
+#ifndef FIRMWARE_SIM_APP_STUDIO_REPORT_PAGE_H
+#define FIRMWARE_SIM_APP_STUDIO_REPORT_PAGE_H
+
+#include <stdint.h>
+#include <stdio.h>
+
+#include "core/studio/figures.h"
+
+/* Everything before the first section, and after the last. */
+void page_begin(FILE *out, const char *title);
+void page_end(FILE *out);
+
+/* The text, escaped. */
+void page_text(FILE *out, const char *text);
+/* A length in the unit that suits it, nm to m, with three or four digits; NaN: a dash. */
+void page_length(FILE *out, double m);
+/* The same with its sign. */
+void page_signed_length(FILE *out, double m);
+/* With the thousands apart. */
+void page_count(FILE *out, uint64_t n);
+/* Three or four digits; NaN: a dash. */
+void page_number(FILE *out, double v);
+
+/* A unit for all figures of an axis, and what to multiply metres by. */
+const char *page_unit(double largest_m, double *per_m);
+
+/* Bars. curve(ctx, from, to): how many are expected from..to, drawn as a line; NULL: none. */
+void page_histogram(FILE *out, const char *title, const struct figures_histogram *h,
+                    double (*curve)(void *ctx, double from, double to), void *ctx);
+
+/* Groups of bars side by side, one group for each place on the axis. value: [n_groups][n_series], NaN: none. The last
+ * series is drawn as a line across its group, as what is expected. */
+enum { PAGE_SERIES = 4 };
+struct page_bars {
+    const char *title, *axis; /* what the groups are, with their unit */
+    const char *series[PAGE_SERIES];
+    uint32_t n_groups;
+    const char (*group)[32];
+    const double (*value_m)[PAGE_SERIES];
+};
+void page_bars(FILE *out, const struct page_bars *bars);
+
+#endif

@@ -1,0 +1,108 @@
+/* SPDX-License-Identifier: MIT */
+/* scanhead report: how far a recording's points lie from the scene of its configuration. The command; report.h says
+ * where its parts are. */
+#include <stddef.h>
+#include <stdio.h>
+
+#include "firmware_sim/app/studio/report/report.h"
+#include "firmware_sim/base/clock.h"
+
+static int write_all(struct report *r, struct sh_err *err)
+{
+    if (r->f.stats.points == 0)
+        return sh_fail(err, SH_EINPUT, "%s: there are no points in it (%zu shots without echo)", r->cloud_path,
+                       r->f.stats.empty);
+    int rc = r->html_path != NULL ? report_write_html(r, err) : SH_OK;
+    if (rc == SH_OK && r->json) rc = app_write_json("-", report_put_json, r, err);
+    if (rc == SH_OK && !r->json) report_print_text(r);
+    if (rc == SH_OK && fflush(stdout) != 0) rc = sh_fail(err, SH_EIO, "standard output: writing failed");
+    if (rc != SH_OK || r->f.stats.beyond == 0) return rc;
+    return sh_fail(err, SH_ESTATE, "%s: %zu of %zu points are farther than %g m from the scene", r->cloud_path,
+                   r->f.stats.beyond, r->f.stats.points, r->tolerance_m);
+}
+
+static int report(struct config *cfg, void *ctx, struct sh_err *err)
+{
+    struct report *r = ctx;
+    app_catch_signals();
+    r->cfg = cfg;
+    r->reported_ns = clock_now_ns();
+    r->cloud_path = r->in.operand[1];
+    int rc = report_work(r, err);
+    if (rc == SH_OK) rc = write_all(r, err);
+    report_free(r);
+    return rc;
+}
+
+static int run(int argc, char **argv)
+{
+    struct report r = {.tolerance_m = 0.001, .max_m = 10};
+    int status = app_parse(&app_report, argc, argv, &r.in, &r);
+    if (status == APP_GO_ON && r.tolerance_m > r.max_m)
+        status = app_usage(&app_report, "--tolerance-m %g is more than --max-m %g", r.tolerance_m, r.max_m);
+    if (status == APP_GO_ON && r.html_path != NULL && !app_ends_in(r.html_path, ".html") &&
+        !app_ends_in(r.html_path, ".htm"))
+        status = app_usage(&app_report, "--html %s: it would hold a page; allowed is a name that ends in .html",
+                           r.html_path);
+    return status == APP_GO_ON ? app_with_config(&r.in, report, &r) : status;
+}
+
+#define AT(member) offsetof(struct report, member)
+#define FARTHEST_M 1e9 /* no scene is larger */
+
+/* clang-format off */
+static const struct app_option OPTIONS[] = {
+    {APP_NUMBER, "tolerance-m", "T", .min = 0.0, .max = FARTHEST_M, .at = AT(tolerance_m),
+     .help = "how far a point may be from the scene (default 0.001)"},
+    {APP_NUMBER, "max-m", "M", .min = 1e-9, .max = FARTHEST_M, .at = AT(max_m),
+     .help = "how far to look for the scene; a point farther than that counts as far, and fails (default 10)"},
+    {APP_NUMBER, "cell-m", "C", .min = 1e-3, .max = 1000.0, .at = AT(cell_m),
+     .help = "side of the cells in which the density of points is counted (default: 0.1, doubled until half of the points "
+             "lie in cells of 16)"},
+    {APP_FLAG, "json", NULL, .at = AT(json),
+     .help = "the figures as JSON, in metres: points, empty, ghosts, mean_m, rms_m, p50_m, p95_m, p999_m, max_m, "
+             "beyond, far, tolerance_m, surfaces_hit, surfaces, triangles_hit, triangles, worst, verdict, all, stations, "
+             "by_range, by_incidence, by_surface, distances, along_beam, shots_by_echoes"},
+    {APP_TEXT, "html", "FILE.html", .at = AT(html_path), .file = APP_WRITES,
+     .help = "also writes a page with tables and pictures: one file, which needs nothing else"},
+    OPTION_SET,
+    OPTION_END
+};
+/* clang-format on */
+
+static const char NOTES[] =
+    "CONFIG is the configuration of the recording: its scene, stations, output.crs and output.layout are used.\n"
+    "CLOUD is a LAS file, or a PLY file with x, y, z and, where it has them, station, echo and label, as\n"
+    "scanhead record writes both. Points without a station are taken to be of the first one. Three times NaN is\n"
+    "a shot without echo.\n"
+    "\n"
+    "Each point's distance to the nearest triangle of the scene is measured in double precision. Points seen in\n"
+    "mirrors lie where nothing is: with the mirrors in CONFIG (surfaces) they are left out. Mean, RMS, percentiles\n"
+    "(nearest rank) and maximum are over all points that are not far. Percentiles are of the distances, which are\n"
+    "never negative.\n"
+    "\n"
+    "Along the beam: the line from the station through a point is followed to the scene. Measured minus exact\n"
+    "range is given for points on smooth faces, away from edges. Beside it stands what is expected of noise and\n"
+    "counts. The last line says whether the points are within that: without noise each point has to be within\n"
+    "its bound (the plan's, and half a count an axis); with noise the RMS of deviation over sigma has to be 1.\n"
+    "Heads that moved have distances alone, and are not judged. Where only smooth faces are judged (noise, a\n"
+    "footprint), half of the points have to lie there. A point farther than --max-m fails in any case.\n"
+    "\n"
+    "Density: of the points of one station in squares of --cell-m on each surface. Squares at a border count as\n"
+    "whole ones. There may be 4 million; beyond, their side is doubled.\n"
+    "\n"
+    "Memory: about 90 bytes a point, 9 GB for 100 million points.\n"
+    "\n"
+    "Bodies that move stand where they stood at the station's stop (platform.kind: stops). Points on what moved\n"
+    "during a scan are refused.\n"
+    "\n"
+    "Exit status: 0 all points are within the tolerance, 1 some are not, 2 wrong usage or input.\n";
+
+const struct app_command app_report = {
+    .name = "report",
+    .operand = {"CONFIG", "CLOUD"},
+    .summary = "distance of a recording's points from the configuration's scene",
+    .options = OPTIONS,
+    .notes = NOTES,
+    .run = run,
+};

@@ -1,0 +1,41 @@
+/* SPDX-License-Identifier: MIT */
+/* Whether the deviations of points are as expected of configuration and plan: of a recording's station (expect.c), and
+ * of a scan that is still on (firmware_sim/app/studio/watch). In: what the station's head is, and the figures of its points
+ * (core/studio/figures.h). Out: a judgement, its limits, and one sentence or two. Pure. */
+#ifndef FIRMWARE_SIM_APP_STUDIO_REPORT_VERDICT_H
+#define FIRMWARE_SIM_APP_STUDIO_REPORT_VERDICT_H
+
+#include "core/studio/deviation.h"
+#include "core/studio/figures.h"
+#include "firmware_sim/site/site.h"
+
+enum report_judgement { REPORT_NONE, REPORT_WITHIN, REPORT_BEYOND };
+struct report_verdict {
+    enum report_judgement judgement;
+    size_t judged, beyond;          /* points; of these, farther than their bound where there is one */
+    double bound_m;                 /* the largest bound of its points; INFINITY: noise without a bound */
+    double least_ratio, most_ratio; /* of the RMS deviation over sigma; 0 where something else decides */
+    char text[400];                 /* one sentence or two, in plain words */
+};
+
+/* "within", "beyond", "not judged". */
+const char *report_judgement_name(enum report_judgement judgement);
+
+/* What the head of a site is at a station, from 0. file_count_m is the caller's. */
+void report_head_of(const struct site *site, uint32_t station, struct deviation_head *head);
+
+/* Counts one point: its distance from the scene, its deviation along the beam and its range, as core/studio/deviation.h has
+ * them. */
+void report_count(struct report_verdict *v, const struct deviation_head *head, double distance_m, double along_m,
+                  double range_m);
+
+/* After all points were counted. */
+struct report_subject {
+    const struct figures *figures;
+    const struct deviation_head *head;
+    int moving;        /* the head moved while it scanned */
+    const char *reach; /* how far the scene was looked for: "10 m" */
+};
+void report_judge_one(const struct report_subject *subject, struct report_verdict *v);
+
+#endif

@@ -1,0 +1,149 @@
+/* SPDX-License-Identifier: MIT */
+/* Questions of a recorder whose right answers are known, and what became of the answers. */
+#include <string.h>
+
+#include "firmware_sim/app/studio/soak/soak.h"
+#include "firmware_sim/base/clock.h"
+
+/* On a busy machine a reply takes seconds behind the frames that a terminal still has to carry. */
+enum { REPLY_MS = 5000, REPLY_LEN = SOAK_REPLY_LEN };
+static const double MARGIN_MS = 5.0;
+static const int64_t AFTER_END_NS = 1000000000;
+/* The library comes into step with questions of its own; one that has no answer it asks again after a second. */
+static const double ASKED_AGAIN_MS = 900.0;
+
+static int is_count(const char *text)
+{
+    return text[0] != '\0' && strlen(text) <= 2 && strspn(text, "0123456789") == strlen(text);
+}
+
+static int is_state(const char *text)
+{
+    static const char *const words[] = {"off", "boot", "idle", "spin-up", "scanning", "spin-down", "fault"};
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+        if (strcmp(text, words[i]) == 0) return 1;
+    return 0;
+}
+
+static int is_start(const char *text)
+{
+    return strcmp(text, "OK") == 0 || strncmp(text, "ERR -203", 8) == 0 || strncmp(text, "ERR -221", 8) == 0;
+}
+
+static int is_identity(const char *text)
+{
+    int commas = 0;
+    for (const char *at = text; *at != '\0'; at++)
+        commas += *at == ',';
+    return commas == 3;
+}
+
+static int is_version(const char *text)
+{
+    return strcmp(text, "1999.0") == 0;
+}
+
+/* ---- one question */
+
+struct answer {
+    int rc, is_right;
+    int is_same;      /* as the reply before */
+    int is_after_end; /* it was asked just after a session ended */
+    double ms;
+};
+
+static int is_noticed(const struct soak_ask *ask, const struct fault_note *note, const struct answer *a)
+{
+    switch (note->kind) {
+    case FAULT_NO_REPLY:
+        return a->rc == SCANHEAD_ETIMEOUT || a->ms >= ASKED_AGAIN_MS;
+    case FAULT_LATE_REPLY:
+        return a->rc == SCANHEAD_ETIMEOUT || a->ms >= note->for_ms - MARGIN_MS;
+    case FAULT_WRONG_REPLY:
+        return a->rc == SCANHEAD_ETIMEOUT || !a->is_right;
+    default: /* an echo without CR is no line of the protocol */
+        return ask->echoes != 0 || ask->bad_bytes >= note->n;
+    }
+}
+
+static void judge_note(struct soak_link *link, const struct fault_note *note, const struct answer *a)
+{
+    const struct soak_ask *ask = &link->ask;
+    struct soak_row *row = &link->row[note->kind];
+    if (is_noticed(ask, note, a))
+        row->noticed++;
+    else if (a->rc != SCANHEAD_OK && a->rc != SCANHEAD_ETIMEOUT)
+        soak_hide(row, 1, "the session was over before it");
+    else if (note->kind == FAULT_WRONG_REPLY && a->is_same)
+        soak_hide(row, 1, "the reply before was the same");
+    else if (ask->settling)
+        soak_hide(row, 1, "it hit a question of the library itself, which comes into step");
+    else
+        row->missed++;
+}
+
+/* What is odd has no fault that would explain it. A reply that comes next to hurt bytes is lost with them, and one to a
+ * question that goes out while the connection is being made again may be lost with the one before. */
+static void judge(struct soak_link *link, const struct answer *a)
+{
+    struct soak_ask *ask = &link->ask;
+    ask->answered += a->rc == SCANHEAD_OK && a->is_right;
+    ask->timeouts += a->rc == SCANHEAD_ETIMEOUT;
+    ask->wrong += a->rc == SCANHEAD_OK && !a->is_right;
+    for (uint32_t i = 0; i < ask->n; i++)
+        judge_note(link, &ask->note[i], a);
+    if (ask->bad_bytes != 0) link->expected_bad_max += REPLY_LEN;
+    if (ask->n == 0 && (a->rc == SCANHEAD_ETIMEOUT || (a->rc == SCANHEAD_OK && !a->is_right))) {
+        const int is_hurt = ask->others != 0 || a->is_after_end;
+        ask->hurt += (uint64_t)is_hurt;
+        ask->odd += (uint64_t)!is_hurt;
+    }
+}
+
+static int put(struct soak_link *link, const char *command, int (*is_right)(const char *text), char reply[REPLY_LEN])
+{
+    struct soak_ask *ask = &link->ask;
+    struct answer a;
+    pthread_mutex_lock(&link->lock);
+    ask->active = 1;
+    ask->n = ask->echoes = 0;
+    ask->others = ask->bad_bytes = 0;
+    ask->asked++;
+    const int64_t from_ns = clock_now_ns();
+    a.is_after_end = ask->ended_ns != 0 && from_ns - ask->ended_ns < AFTER_END_NS;
+    pthread_mutex_unlock(&link->lock);
+    a.rc = scanhead_command(link->sh, command, reply, REPLY_LEN, REPLY_MS);
+    a.ms = 1e-6 * (double)(clock_now_ns() - from_ns);
+    a.is_right = a.rc == SCANHEAD_OK && is_right(reply);
+    a.is_same = a.rc == SCANHEAD_OK && strcmp(reply, ask->before) == 0;
+    if (a.rc == SCANHEAD_OK) memcpy(ask->before, reply, sizeof ask->before);
+    pthread_mutex_lock(&link->lock);
+    judge(link, &a);
+    ask->active = 0;
+    ask->settling = a.rc == SCANHEAD_ETIMEOUT;
+    pthread_mutex_unlock(&link->lock);
+    return a.is_right;
+}
+
+/* ---- what is asked */
+
+void soak_ask_next(struct soak_link *link)
+{
+    static const struct {
+        const char *command;
+        int (*is_right)(const char *text);
+    } questions[] = {{"*IDN?", is_identity}, {"SYST:ERR:COUN?", is_count}, {"SYST:VERS?", is_version}};
+    const uint32_t which = link->ask.next++ % (sizeof questions / sizeof *questions);
+    char reply[REPLY_LEN] = "";
+    const int is_right = put(link, questions[which].command, questions[which].is_right, reply);
+    if (which == 0 && is_right) snprintf(link->idn, sizeof link->idn, "%.255s", reply);
+}
+
+void soak_ask_scan(struct soak_link *link)
+{
+    char reply[REPLY_LEN] = "";
+    if (!put(link, "HEAD:STATe?", is_state, reply)) return;
+    soak_saw_state(link, reply);
+    if (strcmp(reply, "idle") == 0) put(link, "SCAN:STARt", is_start, reply);
+    if (strcmp(reply, "fault") == 0) put(link, "*RST", is_start, reply);
+}

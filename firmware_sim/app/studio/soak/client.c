@@ -1,0 +1,271 @@
+/* SPDX-License-Identifier: MIT */
+/* A client for each link: what a good recorder does. It starts a scan, reads all frames, asks now and then, opens the
+ * head again when the connection goes, and starts the scan again when the head has forgotten it. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "firmware_sim/app/studio/soak/soak.h"
+#include "firmware_sim/base/clock.h"
+
+enum { NEXT_MS = 50 };
+static const int64_t OPEN_EVERY_NS = 20000000, ASK_EVERY_NS = 200000000, POINTS_WITHIN_NS = 500000000;
+
+struct recorder {
+    struct soak_link *link;
+    int64_t asked_ns, points_ns;
+    int ended;
+};
+
+/* ---- which links */
+
+/* Why a link has no client here; NULL: it has one. */
+static const char *why_not(const struct link_place *place, const struct link_spec *spec)
+{
+    if (strcmp(place->type, "usb") == 0)
+        return soak_usb_is_here(spec) ? NULL
+                                      : "only a head of protocol native with backend usbip and attach on is on this "
+                                        "machine";
+    if (strcmp(place->type, "udp") == 0) return "its packets go elsewhere, or their port is taken";
+    if (strcmp(place->type, "pty") != 0 && strcmp(place->type, "tcp") != 0) {
+        if (strcmp(place->type, "web") == 0) return "libscanhead does not speak WebSocket";
+        return "nothing answers there";
+    }
+    if (strncmp(place->endpoint, "tty:/dev/pts/", 13) == 0)
+        return "a terminal that goes and comes needs a path, links[].path, to be found again";
+    if (place->protocol != NULL && strcmp(place->protocol, "native") != 0)
+        return "libscanhead speaks the native protocol alone";
+    return NULL;
+}
+
+/* Its packets begin anew then, and those of the link beside it don't. */
+static int begins_anew(const struct soak *soak)
+{
+    for (uint32_t i = 0; i < soak->faults.n; i++)
+        if (soak->faults.fault[i].kind == FAULT_POWER_CYCLE || soak->faults.fault[i].kind == FAULT_UNPLUG) return 1;
+    return 0;
+}
+
+static int open_link(struct soak *soak, uint32_t i, const struct link_place *place, uint32_t only)
+{
+    struct soak_link *link = &soak->link[i];
+    link->soak = soak;
+    link->number = i + 1;
+    snprintf(link->type, sizeof link->type, "%s", place->type);
+    snprintf(link->endpoint, sizeof link->endpoint, "%s", place->endpoint);
+    snprintf(link->source, sizeof link->source, "%.191s", place->endpoint);
+    if (strcmp(place->type, "usb") == 0) soak_usb_source(&soak->cfg->link[i], link->source, sizeof link->source);
+    pthread_mutex_init(&link->lock, NULL);
+    link->datagrams = soak->datagrams[i];
+    link->not_soaked = only != 0 && only != i + 1 ? "not asked for (--link)"
+                       : link->datagrams == NULL  ? why_not(place, &soak->cfg->link[i])
+                       : begins_anew(soak) ? "its packets begin anew with power or plug, so nothing is beside them"
+                                           : NULL;
+    link->usable = link->not_soaked == NULL;
+    if (!link->usable) return 0;
+    link->fact = calloc(SOAK_RING, sizeof *link->fact);
+    return link->fact != NULL ? 1 : -1;
+}
+
+int soak_clients_open(struct soak *soak, const struct loop *loop, uint32_t only, struct sh_err *err)
+{
+    struct link_place place;
+    int n = 0;
+    for (uint32_t i = 0; i < soak->n_links && loop_get_place(loop, i, &place); i++) {
+        const int is_open = open_link(soak, i, &place, only);
+        if (is_open < 0) return sh_fail(err, SH_ENOMEM, "no memory for the clients");
+        n += is_open;
+    }
+    if (n > 0) return SH_OK;
+    return sh_fail(err, SH_EINPUT,
+                   "%s: links: none that can be soaked; allowed pty, tcp and usb (attach on) with protocol "
+                   "native, as --set links.0.type=tcp",
+                   soak->cfg->file);
+}
+
+/* ---- the thread */
+
+static int is_over(const struct soak_link *link)
+{
+    const int phase = atomic_load(&link->soak->phase);
+    return phase == SOAK_ENDS || (phase == SOAK_DRAINS && atomic_load(&link->done));
+}
+
+/* Nothing but the end is waited for once it has all frames up to the last fault, and the head scans. */
+static void see_whether_done(struct recorder *r)
+{
+    struct soak_link *link = r->link;
+    if (atomic_load(&link->soak->phase) != SOAK_DRAINS || atomic_load(&link->done)) return;
+    pthread_mutex_lock(&link->lock);
+    const int is_done = link->in_session && link->last >= atomic_load(&link->soak->until);
+    pthread_mutex_unlock(&link->lock);
+    if (is_done && clock_now_ns() - r->points_ns < POINTS_WITHIN_NS) atomic_store(&link->done, 1);
+}
+
+static void give_up(struct recorder *r, const char *why)
+{
+    snprintf(r->link->failed, sizeof r->link->failed, "%.255s", why);
+    r->ended = 1;
+}
+
+static void began(struct recorder *r)
+{
+    struct soak_link *link = r->link;
+    r->points_ns = r->asked_ns = clock_now_ns() - ASK_EVERY_NS;
+    soak_saw_open(link);
+    pthread_mutex_lock(&link->lock);
+    link->ask.settling = strcmp(link->type, "pty") == 0;
+    pthread_mutex_unlock(&link->lock);
+}
+
+/* Each try is one of its own, so that a refusal is seen. Until the head is there, or the soak ends. */
+static void open_head(struct recorder *r)
+{
+    struct soak_link *link = r->link;
+    char why[256];
+    while (atomic_load(&link->soak->phase) != SOAK_ENDS) {
+        const int64_t from_ns = clock_now_ns();
+        const int rc =
+            link->sh == NULL ? scanhead_open(link->source, &link->sh, why, sizeof why) : scanhead_reattach(link->sh, 0);
+        if (rc == SCANHEAD_OK) {
+            scanhead_on_notice(link->sh, soak_saw_notice, link);
+            soak_usb_opened(link, 1e-6 * (double)(clock_now_ns() - from_ns));
+            began(r);
+            return;
+        }
+        soak_saw_no_open(link);
+        clock_sleep_until_ns(clock_now_ns() + OPEN_EVERY_NS);
+    }
+    r->ended = 1;
+}
+
+/* The connection is over. */
+static void reattach(struct recorder *r)
+{
+    struct soak_link *link = r->link;
+    if (atomic_load(&link->soak->phase) == SOAK_ENDS) {
+        r->ended = 1;
+        return;
+    }
+    soak_saw_end(link);
+    open_head(r);
+}
+
+/* A frame whose content the library refuses, or a stream without frames, which is over. */
+static void refuse_frame(struct recorder *r)
+{
+    struct scanhead_stats stats;
+    scanhead_get_stats(r->link->sh, &stats);
+    if (stats.frames == 0) {
+        reattach(r);
+        return;
+    }
+    pthread_mutex_lock(&r->link->lock);
+    r->link->refused_frames++;
+    r->link->refused_now++;
+    pthread_mutex_unlock(&r->link->lock);
+}
+
+static void take_frame(struct recorder *r, const struct scanhead_frame *frame)
+{
+    const int64_t now_ns = clock_now_ns();
+    soak_saw_frame(r->link, frame, now_ns);
+    soak_saw_inside(r->link, frame);
+    if (frame->type == SCANHEAD_POINTS) r->points_ns = now_ns;
+}
+
+static void ask(struct recorder *r)
+{
+    const int64_t now_ns = clock_now_ns();
+    if (now_ns - r->asked_ns < ASK_EVERY_NS || atomic_load(&r->link->soak->phase) == SOAK_ENDS) return;
+    r->asked_ns = now_ns;
+    if (now_ns - r->points_ns > POINTS_WITHIN_NS || r->link->frames == 0)
+        soak_ask_scan(r->link);
+    else
+        soak_ask_next(r->link);
+}
+
+static void step(struct recorder *r)
+{
+    struct scanhead_frame frame;
+    const int rc = scanhead_next(r->link->sh, &frame, NEXT_MS);
+    switch (rc) {
+    case SCANHEAD_OK:
+        take_frame(r, &frame);
+        break;
+    case SCANHEAD_ETIMEOUT:
+        break;
+    case SCANHEAD_EFORMAT:
+        refuse_frame(r);
+        break;
+    case SCANHEAD_ECLOSED:
+    case SCANHEAD_ELOST:
+    case SCANHEAD_ERESET:
+        reattach(r);
+        break;
+    default:
+        give_up(r, scanhead_error(r->link->sh));
+        break;
+    }
+}
+
+static void *compare(void *arg)
+{
+    struct soak_link *link = arg;
+    while (atomic_load(&link->soak->phase) == SOAK_RUNS)
+        soak_datagrams_step(link);
+    const soak_seq until = soak_datagrams_top(link) + 1; /* the last one of a kind that was hit is before it */
+    while (atomic_load(&link->soak->phase) != SOAK_ENDS) {
+        soak_datagrams_step(link);
+        if (link->last >= until) atomic_store(&link->done, 1);
+    }
+    soak_datagrams_finish(link);
+    return NULL;
+}
+
+static void *record(void *arg)
+{
+    struct recorder r = {.link = arg};
+    struct soak_link *link = arg;
+    open_head(&r);
+    while (!r.ended) {
+        step(&r);
+        see_whether_done(&r);
+        if (!r.ended && !is_over(link)) ask(&r);
+    }
+    atomic_store(&link->done, 1);
+    return NULL;
+}
+
+int soak_clients_start(struct soak *soak, struct sh_err *err)
+{
+    for (uint32_t i = 0; i < soak->n_links; i++) {
+        struct soak_link *link = &soak->link[i];
+        if (!link->usable) continue;
+        link->running = pthread_create(&link->thread, NULL, link->datagrams != NULL ? compare : record, link) == 0;
+        if (!link->running) return sh_fail(err, SH_EIO, "no thread for the client of link %u", link->number);
+    }
+    return SH_OK;
+}
+
+void soak_clients_join(struct soak *soak)
+{
+    for (uint32_t i = 0; i < soak->n_links; i++) {
+        struct soak_link *link = &soak->link[i];
+        if (link->running) pthread_join(link->thread, NULL);
+        link->running = 0;
+        if (link->sh == NULL) continue;
+        struct scanhead_stats stats;
+        scanhead_get_stats(link->sh, &stats);
+        link->reader_lost = stats.reader_lost;
+    }
+}
+
+void soak_clients_close(struct soak *soak)
+{
+    for (uint32_t i = 0; i < soak->n_links; i++) {
+        scanhead_close(soak->link[i].sh);
+        free(soak->link[i].fact);
+        soak_datagrams_close(soak->datagrams[i]);
+    }
+}

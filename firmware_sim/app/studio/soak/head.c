@@ -1,0 +1,306 @@
+/* SPDX-License-Identifier: MIT */
+/* Faults in the head, as the client of a link notices them: by states, times and encoders of the frames that it got. */
+#include <math.h>
+#include <string.h>
+
+#include "firmware_sim/app/studio/soak/soak.h"
+#include "firmware_sim/command/head.h"
+
+/* What another reader of the stream would take for a step of the clock: far above a nanosecond, far below a jump. */
+static const double STEP_S = 1e-3, GAIN_S = 1e-6, PPS_WITHIN_S = 1.5;
+
+/* Kinds that a client can't notice by itself, and why. */
+static const char *why_hidden(const struct soak *soak, enum fault_kind kind)
+{
+    const int has_mirror = soak->cfg->profile.emitter.kind == EMITTER_LINE && soak->cfg->output.layout == LINE_POLAR;
+    switch (kind) {
+    case FAULT_PAN_SLIP:
+        return "no encoder shows it: points that no longer fit do";
+    case FAULT_WINDOW_SOILED:
+        return "amplitudes fall: that needs others to compare with";
+    case FAULT_COUNTERS_HIGH:
+        return "numbers go on over their wrap";
+    case FAULT_MIRROR_SLOW:
+    case FAULT_MIRROR_STUCK:
+    case FAULT_MIRROR_WOBBLE:
+        return has_mirror ? NULL : "the encoder of a mirror is in the polar layout of a line head alone";
+    default:
+        return NULL;
+    }
+}
+
+/* ---- what was done */
+
+static void add_moment(struct soak_link *link, const struct fault_note *note)
+{
+    struct soak_row *row = &link->row[note->kind];
+    const char *why = why_hidden(link->soak, note->kind);
+    row->injected++;
+    link->ask.others++;
+    if (note->kind == FAULT_POWER_CYCLE) soak_usb_forget(link, "power went before a client opened it");
+    if (link->datagrams != NULL) why = "the packets are compared with those of the same head";
+    if (!link->usable) why = "the link has no client here";
+    if (why == NULL && link->n_moments == SOAK_MAX_MOMENTS) why = "too many at a time";
+    if (why != NULL) {
+        soak_hide(row, 1, why);
+        return;
+    }
+    struct soak_moment *m = &link->moment[link->n_moments++];
+    *m = (struct soak_moment){
+        .kind = note->kind, .fault = note->fault, .from_ns = note->t_ns, .to_ns = INT64_MAX, .for_ms = note->for_ms};
+    if (note->fault >= 1 && note->fault <= link->soak->faults.n) m->what = link->soak->faults.fault[note->fault - 1];
+}
+
+void soak_heard_head(struct soak_link *link, const struct fault_note *note)
+{
+    link->ask.others++;
+    if (!note->ended) {
+        add_moment(link, note);
+        return;
+    }
+    for (uint32_t i = 0; i < link->n_moments; i++)
+        if (link->moment[i].fault == note->fault && link->moment[i].to_ns == INT64_MAX)
+            link->moment[i].to_ns = note->t_ns;
+}
+
+/* ---- what the client saw */
+
+static void see(struct soak_link *link, struct soak_moment *m)
+{
+    link->row[m->kind].noticed++;
+    *m = link->moment[--link->n_moments];
+}
+
+static void hide_moment(struct soak_link *link, uint32_t i, const char *why)
+{
+    soak_hide(&link->row[link->moment[i].kind], 1, why);
+    link->moment[i] = link->moment[--link->n_moments];
+}
+
+/* All of a kind that were at work within a time. */
+static void see_kind(struct soak_link *link, enum fault_kind kind, int64_t from_ns, int64_t to_ns)
+{
+    for (uint32_t i = link->n_moments; i-- > 0;) {
+        struct soak_moment *m = &link->moment[i];
+        if (m->kind == kind && m->from_ns <= to_ns && m->to_ns >= from_ns) see(link, m);
+    }
+}
+
+int soak_saw_power_go(struct soak_link *link, int64_t before_ns)
+{
+    for (uint32_t i = 0; i < link->n_moments; i++) {
+        struct soak_moment *m = &link->moment[i];
+        if (m->kind != FAULT_POWER_CYCLE || m->from_ns > before_ns) continue;
+        see(link, m);
+        return 1;
+    }
+    return 0;
+}
+
+/* The event that ends a boot says that it was slow. */
+static int is_before(const struct soak_moment *m, const struct scanhead_frame *frame)
+{
+    const int ends_boot = frame->type == SCANHEAD_EVENT && frame->event == SCANHEAD_EV_STATE;
+    if (m->kind == FAULT_POWER_CYCLE) return m->from_ns < frame->t_ns;
+    return m->kind == FAULT_SLOW_BOOT && !ends_boot && frame->t_ns - m->from_ns >= (int64_t)(1e6 * m->for_ms);
+}
+
+void soak_head_begins(struct soak_link *link, const struct scanhead_frame *frame)
+{
+    for (uint32_t i = link->n_moments; i-- > 0;)
+        if (is_before(&link->moment[i], frame)) hide_moment(link, i, "it was before the client had a frame");
+}
+
+void soak_saw_state(struct soak_link *link, const char *state)
+{
+    pthread_mutex_lock(&link->lock);
+    if (strcmp(state, "boot") == 0) see_kind(link, FAULT_SLOW_BOOT, INT64_MIN, INT64_MAX);
+    if (strcmp(state, "fault") == 0) see_kind(link, FAULT_SELF_TEST, INT64_MIN, INT64_MAX);
+    pthread_mutex_unlock(&link->lock);
+}
+
+/* A boot that took longer than it was told to be; a self-test that failed. */
+static void take_state(struct soak_link *link, const struct scanhead_frame *frame)
+{
+    if (frame->event_value[0] == HEAD_FAULT) see_kind(link, FAULT_SELF_TEST, INT64_MIN, frame->t_ns);
+    for (uint32_t i = link->n_moments; i-- > 0 && frame->event_value[1] == HEAD_BOOT;) {
+        struct soak_moment *m = &link->moment[i];
+        if (m->kind == FAULT_SLOW_BOOT && frame->t_ns - m->from_ns >= (int64_t)(1e6 * m->for_ms)) see(link, m);
+    }
+}
+
+/* The client's first time has no other to compare with. */
+static void hide_clock(struct soak_link *link, int64_t at_ns)
+{
+    for (uint32_t i = link->n_moments; i-- > 0;) {
+        const struct soak_moment *m = &link->moment[i];
+        const int is_over = (m->kind == FAULT_CLOCK_JUMP && m->from_ns <= at_ns) ||
+                            ((m->kind == FAULT_CLOCK_STOP || m->kind == FAULT_CLOCK_DRIFT) && m->to_ns <= at_ns);
+        if (is_over) hide_moment(link, i, "it was before the client had a time");
+    }
+}
+
+/* The head's clock beside device time: since the last event that had both. */
+static void take_time(struct soak_link *link, int64_t at_ns, int64_t gps_ns)
+{
+    struct soak_times *t = &link->times;
+    if (gps_ns == 0) return;
+    const double by_s = 1e-9 * (double)((gps_ns - t->gps_ns) - (at_ns - t->at_ns));
+    for (uint32_t i = link->n_moments; i-- > 0 && t->have;) {
+        struct soak_moment *m = &link->moment[i];
+        if (m->from_ns > at_ns || m->to_ns < t->at_ns) continue;
+        const double jump_s = m->what.jump_s;
+        const int seen = (m->kind == FAULT_CLOCK_JUMP && fabs(by_s - jump_s) < 0.5 * fabs(jump_s)) ||
+                         (m->kind == FAULT_CLOCK_STOP && by_s < -STEP_S) ||
+                         (m->kind == FAULT_CLOCK_DRIFT && fabs(by_s) > GAIN_S && fabs(by_s) < STEP_S);
+        if (seen) see(link, m);
+    }
+    if (!t->have) hide_clock(link, at_ns);
+    t->have = 1;
+    t->at_ns = at_ns;
+    t->gps_ns = gps_ns;
+}
+
+/* No PPS for longer than a second, from the last one on, or from the first frame. */
+static void miss_pps(struct soak_link *link, int64_t at_ns)
+{
+    const int64_t last_ns = link->times.pps_ns;
+    if (1e-9 * (double)(at_ns - last_ns) > PPS_WITHIN_S) see_kind(link, FAULT_PPS_LOST, last_ns, at_ns);
+}
+
+/* Its first PPS came soon after its first frame: those before that it can't miss. */
+static void hide_pps(struct soak_link *link, int64_t first_ns)
+{
+    for (uint32_t i = link->n_moments; i-- > 0;)
+        if (link->moment[i].kind == FAULT_PPS_LOST && link->moment[i].from_ns < first_ns)
+            hide_moment(link, i, "it was before the client had a frame");
+}
+
+static void take_pps(struct soak_link *link, const struct scanhead_frame *frame)
+{
+    struct soak_times *t = &link->times;
+    const int64_t at_ns = (int64_t)frame->event_value[1];
+    const int64_t leap_s = (int64_t)frame->event_value[2] - (int64_t)frame->event_value[0];
+    miss_pps(link, at_ns);
+    if (!t->have_pps) hide_pps(link, t->pps_ns);
+    if (t->have_pps && leap_s != t->leap_s) see_kind(link, FAULT_LEAP_SECOND, INT64_MIN, at_ns);
+    t->have_pps = 1;
+    t->pps_ns = at_ns;
+    t->leap_s = leap_s;
+}
+
+static void take_event(struct soak_link *link, const struct scanhead_frame *frame)
+{
+    const int64_t a = (int64_t)frame->event_value[1], b = (int64_t)frame->event_value[2];
+    if (frame->event == SCANHEAD_EV_STATE) take_state(link, frame);
+    if (frame->event == SCANHEAD_EV_TIME || frame->event == SCANHEAD_EV_SCAN_START) take_time(link, a, b);
+    if (frame->event == SCANHEAD_EV_TIME) miss_pps(link, a);
+    if (frame->event != SCANHEAD_EV_PPS) return;
+    take_time(link, a, b * 1000000000);
+    take_pps(link, frame);
+}
+
+/* ---- the mirror and the laser, by the points of one frame */
+
+static int is_all_empty(struct soak_link *link, const struct scanhead_frame *frame)
+{
+    struct scanhead_point p;
+    for (uint32_t i = 0; i < frame->n_points; i++)
+        if (scanhead_points(link->sh, frame, i, &p, 1) != 1 || p.echo_count != 0) return 0;
+    return frame->n_points != 0;
+}
+
+/* Of the mirror's encoder, rad/s; NaN: not known. */
+static double turn_rate(struct soak_link *link, const struct scanhead_frame *frame)
+{
+    struct scanhead_point first, last;
+    if (frame->n_points < 2 || scanhead_points(link->sh, frame, 0, &first, 1) != 1 ||
+        scanhead_points(link->sh, frame, frame->n_points - 1, &last, 1) != 1 || last.t_ns <= first.t_ns)
+        return (double)NAN;
+    return remainder(last.mirror_rad - first.mirror_rad, 2.0 * M_PI) / (1e-9 * (double)(last.t_ns - first.t_ns));
+}
+
+static int is_seen_in(struct soak_link *link, const struct soak_moment *m, const struct scanhead_frame *frame,
+                      double rate)
+{
+    const double usual = link->usual_rate, share = rate / usual;
+    switch (m->kind) {
+    case FAULT_MIRROR_SLOW:
+        return fabs(share - m->what.factor) < 0.25 * fabs(1.0 - m->what.factor);
+    case FAULT_MIRROR_STUCK:
+        return fabs(share) < 0.01;
+    case FAULT_MIRROR_WOBBLE: /* a quarter of what the rate changes by, at most */
+        return fabs(rate - usual) > 0.25 * 2.0 * M_PI * m->what.hz * fabs(m->what.deg) * M_PI / 180.0;
+    case FAULT_LASER_OFF:
+        return is_all_empty(link, frame);
+    default:
+        return 0;
+    }
+}
+
+static int is_of_mirror(const struct soak_moment *m)
+{
+    return m->kind == FAULT_MIRROR_SLOW || m->kind == FAULT_MIRROR_STUCK || m->kind == FAULT_MIRROR_WOBBLE;
+}
+
+/* The rate at which the mirror turns when nothing is wrong with it. With what was wrong before there is nothing to
+ * compare. */
+static void take_usual_rate(struct soak_link *link, int64_t t_ns, double rate)
+{
+    for (uint32_t i = 0; i < link->n_moments; i++)
+        if (is_of_mirror(&link->moment[i]) && link->moment[i].from_ns <= t_ns && t_ns < link->moment[i].to_ns) return;
+    for (uint32_t i = link->n_moments; i-- > 0;)
+        if (is_of_mirror(&link->moment[i]) && link->moment[i].to_ns <= t_ns)
+            hide_moment(link, i, "the client's scan began with it");
+    link->usual_rate = rate;
+}
+
+static void take_points(struct soak_link *link, const struct scanhead_frame *frame)
+{
+    /* A scan that begins anew shows that power was away, even to who was not connected when it went. */
+    if (link->have_pulse && frame->pulse0 < link->pulse0) soak_saw_power_go(link, frame->t_ns);
+    link->have_pulse = 1;
+    link->pulse0 = frame->pulse0;
+    if (link->n_moments == 0 && link->usual_rate != 0.0) return;
+    const double rate = turn_rate(link, frame);
+    if (link->usual_rate == 0.0 && isfinite(rate)) take_usual_rate(link, frame->t_ns, rate);
+    for (uint32_t i = link->n_moments; i-- > 0;) {
+        struct soak_moment *m = &link->moment[i];
+        if (m->from_ns <= frame->t_ns && frame->t_ns < m->to_ns && is_seen_in(link, m, frame, rate)) see(link, m);
+    }
+}
+
+void soak_saw_inside(struct soak_link *link, const struct scanhead_frame *frame)
+{
+    pthread_mutex_lock(&link->lock);
+    if (link->frames == 1) link->times.pps_ns = frame->t_ns;
+    if (frame->type == SCANHEAD_EVENT) take_event(link, frame);
+    if (frame->type == SCANHEAD_POINTS) take_points(link, frame);
+    pthread_mutex_unlock(&link->lock);
+}
+
+/* ---- at the end */
+
+int soak_is_head_seen(struct soak_link *link)
+{
+    pthread_mutex_lock(&link->lock);
+    uint32_t n = 0;
+    for (uint32_t i = 0; i < link->n_moments; i++)
+        n += link->moment[i].kind != FAULT_LEAP_SECOND;
+    pthread_mutex_unlock(&link->lock);
+    return n == 0;
+}
+
+void soak_judge_head(struct soak_link *link)
+{
+    for (uint32_t i = 0; i < link->n_moments; i++) {
+        const struct soak_moment *m = &link->moment[i];
+        if (m->kind == FAULT_LEAP_SECOND)
+            soak_hide(&link->row[m->kind], 1, "the minute was not over");
+        else if (m->kind == FAULT_SLOW_BOOT && !link->soak->realtime)
+            soak_hide(&link->row[m->kind], 1, "out of real time it may be over before a client is there");
+        else
+            link->row[m->kind].missed++;
+    }
+    link->n_moments = 0;
+}

@@ -1,0 +1,264 @@
+/* SPDX-License-Identifier: MIT */
+/* scanhead soak: the head with faults on request, and our own clients; at the end a sheet of what each noticed. */
+#include "firmware_sim/app/studio/soak/soak.h"
+
+#include <poll.h>
+#include <stdlib.h>
+
+#include "firmware_sim/app/app.h"
+#include "firmware_sim/base/clock.h"
+
+enum { WAIT_MS = 20, READY_MS = 30000, HEAD_SEEN_MS = 2500, DRAIN_MS = 5000, HEALTH_MS = 6000 };
+
+struct soak_options {
+    struct app_input in;
+    struct device_options device;
+    double duration_s;
+    long link;
+    const char *json;
+    int quiet;
+};
+
+struct soak_head {
+    struct site *site;
+    struct device *device;
+    struct loop *loop;
+};
+
+/* ---- waiting */
+
+static int wait_until(struct soak *soak, int (*is_so)(struct soak *soak), int64_t most_ms)
+{
+    const int64_t end_ns = clock_now_ns() + 1000000 * most_ms;
+    while (!is_so(soak)) {
+        if (app_interrupted() || clock_now_ns() > end_ns) return 0;
+        poll(NULL, 0, WAIT_MS);
+    }
+    return 1;
+}
+
+static int has_answered(struct soak *soak)
+{
+    return atomic_load(&soak->clean.want_health) == 2 || soak->clean.failed[0] != '\0';
+}
+
+static int scans(struct soak *soak)
+{
+    pthread_mutex_lock(&soak->clean.lock);
+    const int is_so = soak->clean.points_frames != 0;
+    pthread_mutex_unlock(&soak->clean.lock);
+    return is_so;
+}
+
+static int all_done(struct soak *soak)
+{
+    for (uint32_t i = 0; i < soak->n_links; i++)
+        if (soak->link[i].usable && !atomic_load(&soak->link[i].done)) return 0;
+    return 1;
+}
+
+static int is_head_seen(struct soak *soak)
+{
+    for (uint32_t i = 0; i < soak->n_links; i++)
+        if (!soak_is_head_seen(&soak->link[i])) return 0;
+    return 1;
+}
+
+/* ---- the run */
+
+/* Of the clock, in real time; else of the head. */
+static double passed_s(struct soak *soak, int64_t from_ns)
+{
+    if (soak->realtime) return 1e-9 * (double)(clock_now_ns() - from_ns);
+    pthread_mutex_lock(&soak->clean.lock);
+    const double s = 1e-9 * (double)(soak->clean.last_t_ns - soak->clean.first_points_ns);
+    pthread_mutex_unlock(&soak->clean.lock);
+    return s;
+}
+
+static void soak_on(const struct soak_options *o, struct soak *soak)
+{
+    const int64_t from_ns = clock_now_ns();
+    int64_t said_ns = from_ns;
+    double s;
+    while ((s = passed_s(soak, from_ns)) < o->duration_s && !app_interrupted() && soak->clean.failed[0] == '\0' &&
+           !all_done(soak)) {
+        poll(NULL, 0, WAIT_MS);
+        if (o->quiet || clock_now_ns() - said_ns < 1000000000) continue;
+        said_ns += 1000000000;
+        soak_say_progress(soak, s);
+    }
+    soak->wall_s = 1e-9 * (double)(clock_now_ns() - from_ns);
+}
+
+/* No more faults; what was done so far gets the time to be noticed. */
+static void drain(struct soak *soak)
+{
+    fault_board_remove(soak->board, 0);
+    wait_until(soak, is_head_seen, HEAD_SEEN_MS);
+    atomic_store(&soak->until, soak_clean_top(soak) + 1);
+    atomic_store(&soak->phase, SOAK_DRAINS);
+    wait_until(soak, all_done, DRAIN_MS);
+    atomic_store(&soak->clean.want_health, 1);
+    wait_until(soak, has_answered, HEALTH_MS);
+}
+
+static int run_clients(const struct soak_options *o, struct soak *soak, struct sh_err *err)
+{
+    int rc = soak_clean_start(soak, err);
+    if (rc == SH_OK) rc = soak_clients_start(soak, err);
+    if (rc != SH_OK) return rc;
+    if (!wait_until(soak, scans, READY_MS) && !app_interrupted())
+        return sh_fail(err, SH_ESTATE, "soak: no scan began within %d s", READY_MS / 1000);
+    soak_on(o, soak);
+    drain(soak);
+    return SH_OK;
+}
+
+/* Clients read on until the links are closed, which is when the loop is freed. */
+static int serve(const struct soak_options *o, struct soak *soak, struct soak_head *head, struct sh_err *err)
+{
+    int rc = loop_start(head->loop, err);
+    if (rc == SH_OK) rc = run_clients(o, soak, err);
+    atomic_store(&soak->phase, SOAK_ENDS);
+    loop_end(head->loop);
+    loop_join(head->loop, &soak->stats);
+    loop_free(head->loop);
+    head->loop = NULL;
+    soak_clients_join(soak);
+    soak_clean_join(soak);
+    if (rc == SH_OK) rc = device_close_journal(head->device, err);
+    for (uint32_t i = 0; i < soak->n_links; i++) {
+        soak_judge(&soak->link[i], 1);
+        soak_judge_head(&soak->link[i]);
+    }
+    return rc;
+}
+
+/* ---- the command */
+
+static int say_result(const struct soak_options *o, struct soak *soak, struct sh_err *err)
+{
+    soak_conclude(soak);
+    soak_print(soak, stdout);
+    const int rc = o->json != NULL ? app_write_json(o->json, soak_put, soak, err) : SH_OK;
+    if (rc != SH_OK || soak->n_failures == 0) return rc;
+    return sh_fail(err, SH_ESTATE, "soak: %s", soak->failures[0]);
+}
+
+/* A second link beside each that sends datagrams, without faults. Where it has no room, its first is not soaked. A
+ * device on USB gets a name. Where nobody could start a scan, the head does so itself. */
+static void open_twins(struct config *cfg, struct soak *soak, struct soak_options *o)
+{
+    int starts = 0;
+    soak->n_links = cfg->n_links;
+    for (uint32_t i = 0; i < soak->n_links; i++) {
+        soak_usb_name(&cfg->link[i], i + 1);
+        starts |= cfg->link[i].protocol == 0 && (cfg->link[i].type == LINK_TCP || cfg->link[i].type == LINK_PTY);
+        starts |= soak_usb_is_here(&cfg->link[i]);
+        if (cfg->link[i].type != LINK_UDP || cfg->n_links == CONFIG_MAX_LINKS) continue;
+        soak->datagrams[i] = soak_datagrams_open(&cfg->link[i], &cfg->link[cfg->n_links]);
+        cfg->n_links += soak->datagrams[i] != NULL;
+    }
+    o->device.start = !starts || cfg->head.start;
+}
+
+static int open_head(struct soak_options *o, struct config *cfg, struct soak *soak, struct soak_head *head,
+                     struct sh_err *err)
+{
+    const struct loop_options options = {.hash = 1, .extra = &soak->clean.link, .report = &app_report_stderr};
+    o->device.report = &app_report_stderr;
+    int rc = site_load(cfg, &app_report_stderr, &head->site, err);
+    if (rc == SH_OK) rc = site_open_sights(head->site, 0, head->site->n_stations, &app_report_stderr, err);
+    cfg->head.settings.frames = 0; /* after the plan, as `run --start --duration` */
+    if (rc == SH_OK) rc = device_create(head->site, &o->device, &head->device, err);
+    if (rc == SH_OK) rc = soak_clean_open(soak, err);
+    if (rc == SH_OK) rc = loop_create(head->site, head->device, &options, &head->loop, err);
+    if (rc != SH_OK) return rc;
+    soak->board = device_faults(head->device);
+    rc = soak_clients_open(soak, head->loop, (uint32_t)o->link, err);
+    if (rc == SH_OK) fault_board_listen(soak->board, soak_heard, soak);
+    return rc;
+}
+
+/* What is compared is what went over the wire, not how fast the machine is: a busy one delivers later, and all of it. */
+static void be_patient(struct config *cfg)
+{
+    static const double PATIENCE_MS = 3000.0;
+    if (cfg->loop.queue_ms < PATIENCE_MS) cfg->loop.queue_ms = PATIENCE_MS;
+    if (cfg->loop.late_ms < PATIENCE_MS) cfg->loop.late_ms = PATIENCE_MS;
+}
+
+static int soak_head(struct config *cfg, void *ctx, struct sh_err *err)
+{
+    struct soak_options *o = ctx;
+    struct soak_head head = {0};
+    if (cfg->loop.pace == PACE_STEP)
+        return sh_fail(err, SH_EINPUT, "loop.pace: step, where nobody grants time; allowed realtime and fast");
+    if (o->link > (long)cfg->n_links)
+        return sh_fail(err, SH_EINPUT, "--link %ld: there is no such link; allowed 1 to %u", o->link, cfg->n_links);
+    struct soak *soak = calloc(1, sizeof *soak);
+    if (soak == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
+    be_patient(cfg);
+    soak->cfg = cfg;
+    soak->realtime = cfg->loop.pace == PACE_REALTIME;
+    soak->faults = cfg->faults;
+    open_twins(cfg, soak, o);
+    int rc = open_head(o, cfg, soak, &head, err);
+    if (rc == SH_OK) rc = serve(o, soak, &head, err);
+    if (rc == SH_OK) rc = say_result(o, soak, err);
+    loop_free(head.loop);
+    soak_clients_close(soak);
+    soak_clean_close(soak);
+    device_free(head.device);
+    site_free(head.site);
+    free(soak);
+    return rc;
+}
+
+static int run(int argc, char **argv)
+{
+    struct soak_options o = {.duration_s = 30.0};
+    const int status = app_parse(&app_soak, argc, argv, &o.in, &o);
+    if (status != APP_GO_ON) return status;
+    app_catch_signals();
+    return app_with_config(&o.in, soak_head, &o);
+}
+
+#define AT(member) offsetof(struct soak_options, member)
+
+/* clang-format off */
+static const struct app_option OPTIONS[] = {
+    {APP_TEXT, "scenario", "FILE", .at = AT(in.scenario), .file = APP_READS,
+     .help = "with the faults of this file beside those of the configuration; a bare name is one of config/faults"},
+    {APP_NUMBER, "duration", "S", .min = 0.1, .max = 1e8, .at = AT(duration_s),
+     .help = "faults strike for S seconds from the first points on (30); of device time in the pace fast"},
+    {APP_WHOLE, "link", "N", .min = 1, .max = CONFIG_MAX_LINKS, .at = AT(link),
+     .help = "a client on this link of the configuration alone"},
+    {APP_TEXT, "json", "FILE", .at = AT(json), .file = APP_WRITES, .help = "write the sheet as JSON, too; - is standard output"},
+    {APP_TEXT, "truth", "FILE", .at = AT(device.truth), .file = APP_WRITES,
+     .help = "write each fault that is injected as a line of JSON; - is standard output"},
+    {APP_KEY, "pace", "PACE", .key = "loop.pace", .help = "realtime or fast"},
+    OPTION_SET,
+    {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "no progress"},
+    OPTION_END
+};
+/* clang-format on */
+
+static const char NOTES[] =
+    "The sheet has a row for each link and kind of fault: how often it was injected, how often the client noticed\n"
+    "it at its place, frames that the client lost by it, and frames that it accepted although they differ from the\n"
+    "clean ones. A fault that no client can notice has a -, and why.\n"
+    "\n"
+    "Exit status 0: each fault that can be noticed was; frames were lost by faults alone; those that were wrongly\n"
+    "accepted are resealed flips; the head is healthy. 1: one of these does not hold.\n";
+
+const struct app_command app_soak = {
+    .name = "soak",
+    .operand = {"CONFIG"},
+    .summary = "the head with faults on request and our own clients; what they noticed",
+    .options = OPTIONS,
+    .opens_links = 1,
+    .notes = NOTES,
+    .run = run,
+};

@@ -1,0 +1,41 @@
+/* SPDX-License-Identifier: MIT */
+/* What `scanhead view` serves, as bytes: points, triangles, and the description of both. In: a recording. Out: bodies that
+ * the caller frees. The formats are in README.md; all numbers are little-endian. */
+#ifndef FIRMWARE_SIM_APP_STUDIO_VIEW_ENCODE_H
+#define FIRMWARE_SIM_APP_STUDIO_VIEW_ENCODE_H
+
+#include "drivers/link/web.h"
+#include "firmware_sim/app/studio/view/viewed.h"
+
+enum {
+    VIEW_MAX_POINTS = 1 << 20,    /* in an answer */
+    VIEW_MAX_TRIANGLES = 1 << 20, /* the same */
+    VIEW_MAX_SPARSE = 4000000,    /* points spread over meshes at once */
+    VIEW_CLOUD_HEAD = 56,
+    VIEW_CLOUD_COLUMN = 32,
+    VIEW_MESH_HEAD = 40
+};
+
+/* Types of columns. */
+enum view_type { VIEW_UINT8 = 1, VIEW_UINT16, VIEW_UINT32, VIEW_FLOAT32 };
+
+struct view_column {
+    const char *name, *unit; /* unit NULL: none */
+    enum view_type type;
+    uint32_t components;
+};
+/* By enum viewed_column. */
+extern const struct view_column view_columns[VIEWED_COLUMNS];
+const char *view_type_name(enum view_type type);
+
+/* Points first, first + every, ...: at most `most` of them, and no more than an answer holds. every >= 1. Positions are
+ * relative to origin_m, times to t0_s. SH_ENOMEM. */
+int view_encode_points(const struct viewed_points *points, const double origin_m[3], double t0_s, uint32_t first,
+                       uint32_t every, uint32_t most, struct web_body *body, struct sh_err *err);
+/* Triangles of a mesh by rising ratio, from `first` on. SH_ENOMEM. */
+int view_encode_mesh(const struct viewed_mesh *mesh, uint32_t first, uint32_t most, struct web_body *body,
+                     struct sh_err *err);
+/* The JSON of /head. SH_ENOMEM. */
+int view_encode_head(const struct viewed *viewed, struct web_body *body, struct sh_err *err);
+
+#endif

@@ -1,0 +1,71 @@
+/* SPDX-License-Identifier: MIT */
+/* The arrays of points: room for them, their columns by number. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "firmware_sim/app/studio/view/viewed.h"
+
+/* A column's array, wherever it points to, and the bytes of a value. */
+static void *place_of(struct viewed_points *p, enum viewed_column column, size_t *size)
+{
+    const struct {
+        void *at;
+        size_t size;
+    } all[VIEWED_COLUMNS] = {
+        [VIEWED_RANGE] = {&p->range_m, sizeof *p->range_m},
+        [VIEWED_REFLECTANCE] = {&p->reflectance_db, sizeof *p->reflectance_db},
+        [VIEWED_AMPLITUDE] = {&p->amplitude_db, sizeof *p->amplitude_db},
+        [VIEWED_T] = {&p->t_s, sizeof *p->t_s},
+        [VIEWED_LABEL] = {&p->label, sizeof *p->label},
+        [VIEWED_STATION] = {&p->station, sizeof *p->station},
+        [VIEWED_ECHO] = {&p->echo, sizeof *p->echo},
+        [VIEWED_ECHOES] = {&p->echoes, sizeof *p->echoes},
+        [VIEWED_RGB] = {&p->rgb, sizeof *p->rgb},
+    };
+    *size = all[column].size;
+    return all[column].at;
+}
+
+static void *pointer_at(const void *place)
+{
+    void *array;
+    memcpy(&array, place, sizeof array);
+    return array;
+}
+
+const void *viewed_array(const struct viewed_points *points, enum viewed_column column, size_t *size)
+{
+    struct viewed_points copy = *points; /* the same pointers */
+    return pointer_at(place_of(&copy, column, size));
+}
+
+static int resize(void *place, size_t n, size_t size)
+{
+    if (n > SIZE_MAX / size) return 0;
+    void *bigger = realloc(pointer_at(place), n * size);
+    if (bigger == NULL) return 0;
+    memcpy(place, &bigger, sizeof bigger);
+    return 1;
+}
+
+int viewed_points_room(struct viewed_points *p, size_t n, unsigned has, struct sh_err *err)
+{
+    const size_t room = n > 0 ? n : 1;
+    int ok = resize(&p->xyz_m, room, sizeof *p->xyz_m);
+    for (int c = 0; c < VIEWED_COLUMNS && ok; c++) {
+        size_t size;
+        void *place = place_of(p, (enum viewed_column)c, &size);
+        if ((has >> c & 1u) != 0) ok = resize(place, room, size);
+    }
+    return ok ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory for %zu points", n);
+}
+
+void viewed_points_free(struct viewed_points *p)
+{
+    free(p->xyz_m);
+    for (int c = 0; c < VIEWED_COLUMNS; c++) {
+        size_t size;
+        free(pointer_at(place_of(p, (enum viewed_column)c, &size)));
+    }
+    memset(p, 0, sizeof *p);
+}

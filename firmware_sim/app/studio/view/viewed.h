@@ -1,0 +1,120 @@
+/* SPDX-License-Identifier: MIT */
+/* A recording that is shown: its points, its meshes, and what the file says of itself. In: a file (.shs, .ply, .las). Out:
+ * arrays, in metres, in one frame with z up.
+ *
+ * Points without echo are counted, not held. Meshes are those of `scanhead record --mesh` before the long-edge filter;
+ * their triangles carry what the filter asks for, so that any factor can be shown at once.
+ *
+ * Memory: 24 bytes a point; range, reflectance and amplitude 4 each, time 8, label and station 2 each, echo and echoes 1
+ * each, colour 3; of a mesh 20 a triangle, two a point. Constant after viewed_load; any thread. */
+#ifndef FIRMWARE_SIM_APP_STUDIO_VIEW_VIEWED_H
+#define FIRMWARE_SIM_APP_STUDIO_VIEW_VIEWED_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "core/err.h"
+
+/* Columns beside the position. */
+enum viewed_column {
+    VIEWED_RANGE,
+    VIEWED_REFLECTANCE,
+    VIEWED_AMPLITUDE,
+    VIEWED_T,
+    VIEWED_LABEL,
+    VIEWED_STATION,
+    VIEWED_ECHO,
+    VIEWED_ECHOES,
+    VIEWED_RGB,
+    VIEWED_COLUMNS
+};
+
+enum { VIEWED_LABEL_NONE = 0xffff };
+
+struct viewed_points {
+    uint32_t n;
+    double (*xyz_m)[3];                             /* [n] */
+    float *range_m, *reflectance_db, *amplitude_db; /* [n] NaN: none; NULL, as the others: the file has none */
+    double *t_s;                                    /* [n] as the file counts it */
+    uint16_t *label, *station;                      /* [n] VIEWED_LABEL_NONE; from 1 */
+    uint8_t *echo, *echoes;                         /* [n] */
+    uint8_t (*rgb)[3];                              /* [n] */
+};
+
+/* The array of a column, or NULL; *size: bytes of one value, its components together. */
+const void *viewed_array(const struct viewed_points *points, enum viewed_column column, size_t *size);
+/* Room for n points, in arrays that are there; has: bit c for column c, with n 0 to begin with. SH_ENOMEM: points is as it
+ * was, but for room. */
+int viewed_points_room(struct viewed_points *points, size_t n, unsigned has, struct sh_err *err);
+void viewed_points_free(struct viewed_points *points);
+
+struct viewed_mesh {
+    uint32_t station, scan, sweep;  /* the scan's number in its stream */
+    uint32_t first_point, n_points; /* its corners are among these points of the recording */
+    uint32_t n_faces;
+    uint32_t (*face)[3]; /* [n_faces] points, from first_point on; in the order of the grid */
+    float *ratio;    /* [n_faces] longest edge over mean edge, rounded upwards: a float f keeps it where it is <= f */
+    uint32_t *order; /* [n_faces] faces by rising ratio */
+    double mean_edge_m;
+    uint64_t n_edges, n_flat;
+};
+
+struct viewed_station {
+    uint32_t number;
+    int placed; /* 1: where it is, is known: */
+    double p_m[3], heading_rad, pitch_rad, roll_rad;
+};
+
+struct viewed_surface {
+    uint32_t label;
+    char *object, *material;
+};
+
+struct viewed {
+    const char *path;
+    const char *format; /* "shs", "ply", "las" */
+    struct viewed_points points;
+    uint64_t n_empty, n_left_out; /* shots without echo; echoes that could not be placed */
+    int complete;                 /* .shs: nothing is missing, as far as the stream says; else 1 */
+    int64_t epsg;                 /* of the file; 0: scene frame; -1: not known */
+    int turned;                   /* 1: points were turned to east, north, up of this place: */
+    double lat_deg, lon_deg, height_m;
+    struct viewed_mesh *mesh;
+    size_t n_meshes, room_meshes;
+    char why_no_mesh[512];
+    struct viewed_station *station;
+    size_t n_stations, room_stations;
+    struct viewed_surface *surface;
+    size_t n_surfaces, room_surfaces;
+    char idn[128], profile[64]; /* empty: not known */
+    /* of all points: */
+    double min_m[3], max_m[3], origin_m[3], t0_s;
+    double low[VIEWED_COLUMNS], high[VIEWED_COLUMNS]; /* over finite values (labels: those that are some); NaN: none */
+};
+
+/* By the file's ending and first bytes. Errors name the file: SH_EINPUT where it is none of these, SH_ENOMEM,
+ * SH_ESTOPPED. viewed_free is due in any case. path must live on. */
+int viewed_load(struct viewed *viewed, const char *path, const struct sh_report *report, struct sh_err *err);
+void viewed_free(struct viewed *viewed);
+
+/* ---- the steps of viewed_load */
+
+/* SH_OK where the ending is one that is shown. */
+int viewed_check_ending(const char *path, struct sh_err *err);
+int viewed_load_cloud(struct viewed *viewed, const struct sh_report *report, struct sh_err *err);
+int viewed_load_stream(struct viewed *viewed, const struct sh_report *report, struct sh_err *err);
+/* Whether a point of a file in this CRS has a place that can be shown: within 10^12 m, in degrees at a latitude. Of numbers
+ * beyond that, which broken files hold, nothing finite would be left when they are turned. */
+int viewed_can_show(int64_t epsg, const double p[3]);
+/* Takes points and stations in ECEF or in degrees to metres east, north, up of the first point. */
+int viewed_turn(struct viewed *viewed, struct sh_err *err);
+/* Bounds, origin, and the columns' limits. */
+void viewed_measure(struct viewed *viewed);
+/* SH_ENOMEM. The text is copied. */
+int viewed_add_surface(struct viewed *viewed, uint32_t label, const char *object, const char *material,
+                       struct sh_err *err);
+struct viewed_station *viewed_find_station(struct viewed *viewed, uint32_t number);
+/* The one of that number, made where there was none. NULL: no memory, with err filled. */
+struct viewed_station *viewed_add_station(struct viewed *viewed, uint32_t number, struct sh_err *err);
+
+#endif

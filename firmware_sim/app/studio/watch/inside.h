@@ -1,0 +1,152 @@
+/* SPDX-License-Identifier: MIT */
+/* Private to this folder: the watch, and how its parts meet.
+ *
+ *   scene.c    /scene, made once; /head and /plan, of now
+ *   observe.c  the thread: frames of the stream to points in the scene's frame
+ *   sample.c   these points: which are kept, how far they are from the scene, the figures of all of them
+ *   seen.c     which cells of the surface they are on
+ *   quality.c  /quality: the last figures as JSON
+ *   past.c     /past: the frames of the last points */
+#ifndef FIRMWARE_SIM_APP_STUDIO_WATCH_INSIDE_H
+#define FIRMWARE_SIM_APP_STUDIO_WATCH_INSIDE_H
+
+#include <pthread.h>
+#include <stdatomic.h>
+
+#include "core/studio/coverage.h"
+#include "core/studio/deviation.h"
+#include "core/studio/figures.h"
+#include "drivers/host/scanhead.h"
+#include "firmware_sim/app/studio/report/verdict.h"
+#include "firmware_sim/app/studio/watch/past.h"
+#include "firmware_sim/app/studio/watch/watch.h"
+
+/* Points kept of a scan, at most; so many are compared at a time; one of so many pulses is looked at, at the least. */
+enum { WATCH_MOST_POINTS = 1 << 17, WATCH_BATCH = 1024, WATCH_LEAST_SHARE = 1 << 20, WATCH_BINS = 64 };
+
+/* Points of the scan at hand that are looked at, in the scene's frame. */
+struct watch_sample {
+    uint32_t every; /* a power of two: one of so many pulses */
+    size_t n, done; /* points, and how many of them were compared */
+    double (*xyz_m)[3];
+    uint32_t *hash; /* of the point's pulse: kept where hash % every is 0 */
+    double *distance_m;
+    uint32_t *triangle;
+    struct deviation_points points;
+    double point_ns, spent_ns; /* what comparing one costs, and all of them in this scan */
+    double cell_m;             /* of densities */
+};
+
+struct watch_histogram {
+    double from_m, to_m;
+    uint64_t below, above, count[WATCH_BINS];
+    uint32_t bins; /* 0: no value */
+    int along;     /* of deviations along the beam; 0: of distances */
+};
+
+/* The figures of one scan. */
+struct watch_scan {
+    uint32_t scan, station; /* both from 1; 0: none */
+    int over;
+    uint64_t points, shots, empty; /* that came */
+    uint64_t left_out;             /* of the points: on what moves, on legs, in mirrors */
+    uint64_t sampled_points;       /* that the figures below are of: those of one of `every` pulses */
+    uint32_t every;
+    int in_scene; /* points could be taken to the scene's frame */
+    struct figures figures;
+    struct figures_density_row density; /* of the points looked at, times `every` */
+    double density_cell_m;
+    struct watch_histogram histogram;
+    struct report_verdict verdict;
+    uint32_t cells_seen;
+    double seen_share;
+};
+
+struct watch_seen {
+    struct coverage *coverage; /* NULL: none */
+    double cell_m, area_m2;
+    uint32_t n_cells;
+    size_t words;
+    double *cell_m2; /* [n_cells] */
+    uint64_t *bits;  /* [n_stations][words] cells that each has seen */
+    uint64_t *all;   /* [words] while counting */
+    uint32_t n_seen; /* by any station ... */
+    double seen_m2;
+};
+
+struct watch {
+    const struct config *cfg;
+    const struct site *site;
+    struct watch_options options;
+    struct link_spec link;
+    struct web_source source;
+    int link_given; /* its descriptor is the loop's */
+    int fd;         /* the observer's end; the handle's */
+    struct scanhead *sh;
+    pthread_t thread;
+    int running;
+    atomic_int ending;
+
+    /* the observer's, but for what is constant */
+    struct distance *index;
+    struct deviation_head *head; /* [n_stations] */
+    struct deviation_head now;   /* of the scan at hand */
+    struct device_held held;     /* what `now` is of */
+    struct georef *now_georef;   /* of the scan at hand; NULL: its points are in the scene's frame, or nowhere */
+    struct watch_sample sample;
+    struct watch_seen seen;
+    struct watch_scan at; /* the scan at hand */
+    int fresh;            /* a scan began, and none of its points has come */
+    int dirty;            /* something came since the last figures */
+    int64_t began_ns, began_thread_ns, published_ns, publish_ns;
+    uint64_t lost_frames;
+
+    struct past *past; /* the observer fills it */
+
+    /* made once */
+    char *scene_bytes;
+    size_t scene_len;
+
+    /* what is asked for by other threads */
+    pthread_mutex_t lock;
+    struct watch_scan shown;
+    struct watch_scan *shown_station; /* [n_stations] the last scan of each; scan 0: none */
+    uint32_t shown_cells, shown_seen;
+    double shown_share;
+    uint64_t shown_lost;
+};
+
+/* ---- scene.c */
+int watch_make_scene(struct watch *w, struct sh_err *err);
+int watch_get_scene(const struct watch *w, struct web_body *out, struct sh_err *err);
+int watch_get_head(struct watch *w, struct web_body *out, struct sh_err *err);
+int watch_get_plan(struct watch *w, struct web_body *out, struct sh_err *err);
+
+/* ---- observe.c */
+void *watch_observe(void *watch);
+
+/* ---- sample.c */
+int watch_sample_open(struct watch *w, struct sh_err *err);
+void watch_sample_close(struct watch *w);
+void watch_sample_begin(struct watch *w);
+/* A point of the scene, and its pulse's hash. */
+void watch_sample_add(struct watch *w, const double p_m[3], uint32_t hash);
+/* Compares what has not been compared yet. SH_E where that fails; then the sample is as it was. */
+int watch_sample_compare(struct watch *w, struct sh_err *err);
+/* The figures of w->at. */
+int watch_sample_figures(struct watch *w, struct sh_err *err);
+
+/* ---- seen.c */
+int watch_seen_open(struct watch *w, struct sh_err *err);
+void watch_seen_close(struct watch_seen *seen);
+void watch_seen_begin(struct watch_seen *seen, uint32_t station);
+void watch_seen_mark(struct watch_seen *seen, uint32_t station, uint32_t triangle, const double p_m[3]);
+/* Counts the cells of a station, and those of all. */
+void watch_seen_count(struct watch_seen *seen, uint32_t station, uint32_t n_stations, uint32_t *cells, double *share);
+
+/* ---- quality.c */
+/* The observer: works out figures, and shows them. */
+void watch_publish(struct watch *w);
+int watch_get_quality(struct watch *w, struct web_body *out, struct sh_err *err);
+
+#endif

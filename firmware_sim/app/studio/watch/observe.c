@@ -1,0 +1,227 @@
+/* SPDX-License-Identifier: MIT */
+/* The observer: reads the stream as any client does, and takes some of its points to the scene's frame. */
+#include <math.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include "core/mat3.h"
+#include "core/vec3.h"
+#include "drivers/protocol/native.h"
+#include "firmware_sim/app/studio/watch/inside.h"
+#include "firmware_sim/base/clock.h"
+#include "firmware_sim/command/head.h"
+
+enum { NEXT_MS = 100, LOWEST = 19 };
+/* The stream comes tick by tick. Taken in larger pieces it costs half: so much of 2.2 million pulses a second fits into
+ * the socket, and the link's queue has the rest. */
+static const int64_t NAP_NS = 4000000;
+static const int64_t PUBLISH_NS = 500000000;
+
+/* ---- scans */
+
+static int is_about(const struct georef *georef, const struct scanhead_info *info)
+{
+    double d[3];
+    georef_difference(georef, info->anchor, d);
+    return fabs(d[0]) <= info->scale[0] && fabs(d[1]) <= info->scale[1] && fabs(d[2]) <= info->scale[2];
+}
+
+/* A georeference about the place that the stream says: of the station's, which may have moved since. 0: there is none. */
+static int follow_georef(struct watch *w, const struct georef *of, const struct scanhead_info *info)
+{
+    struct sh_err err;
+    if (of == NULL || georef_recentre(of, info->station_m, &w->now_georef, &err) != SH_OK) return 0;
+    return is_about(w->now_georef, info);
+}
+
+static void let_go(struct watch *w)
+{
+    device_let_go(&w->held);
+    georef_free(w->now_georef);
+    w->now_georef = NULL;
+}
+
+/* Of the settings and the place that the scan is made with; gives the site that has them. Where the scan is over already,
+ * the configuration's settings have to do, at the place that the stream says. */
+static const struct site *find_head(struct watch *w, const struct scanhead_info *info)
+{
+    const uint32_t station = info->station - 1;
+    const struct site *site = device_hold_scan(w->options.device, info->scan, &w->held);
+    w->now = w->head[station];
+    if (site != NULL) report_head_of(site, station, &w->now);
+    if (!w->site->moving) memcpy(w->now.setup.station_m, info->station_m, sizeof w->now.setup.station_m);
+    memcpy(w->now.setup.rotation, info->rotation, sizeof w->now.setup.rotation);
+    if (site == NULL) site = w->site;
+    site_set_program(site, llround(info->prr_hz * 1e6), &w->now.setup);
+    return site;
+}
+
+/* What the head is in this scan: as the device has it, at the place and the rate that the stream says. */
+static void begin_scan(struct watch *w, const struct scanhead_info *info)
+{
+    let_go(w);
+    w->at = (struct watch_scan){.scan = info->scan, .station = info->station};
+    const struct site *site = find_head(w, info);
+    w->at.in_scene = !info->geo || info->crs == 0 ||
+                     (!info->moving && follow_georef(w, site->station[info->station - 1].georef, info));
+    w->began_ns = clock_now_ns();
+    w->began_thread_ns = clock_thread_ns();
+    w->fresh = 0;
+    watch_sample_begin(w);
+    watch_seen_begin(&w->seen, info->station);
+}
+
+static void end_scan(struct watch *w)
+{
+    if (w->at.scan == 0 || w->at.over) return;
+    w->at.over = 1;
+    w->dirty = 1;
+    watch_publish(w);
+    w->at.in_scene = 0; /* no more of its points come, and what it was made with is given back */
+    let_go(w);
+}
+
+/* 0: points can't be taken yet. */
+static int follow_scan(struct watch *w)
+{
+    struct scanhead_info info;
+    if (scanhead_get_info(w->sh, &info) != SCANHEAD_OK) return 0;
+    if (info.station < 1 || info.station > w->site->n_stations) return 0;
+    if (w->fresh || info.scan != w->at.scan || info.station != w->at.station) {
+        end_scan(w);
+        begin_scan(w, &info);
+    }
+    return 1;
+}
+
+/* ---- points */
+
+static int to_scene(struct watch *w, struct scanhead_point *point, double p_m[3])
+{
+    struct scanhead_info info;
+    if (scanhead_get_info(w->sh, &info) != SCANHEAD_OK) return 0;
+    if (!info.geo && scanhead_to_scene(w->sh, point, 1, NULL) != 0) return 0;
+    const double p[3] = {point->x, point->y, point->z};
+    memcpy(p_m, p, sizeof p);
+    if (w->now_georef != NULL) {
+        double d[3];
+        georef_difference(w->now_georef, p, d);
+        georef_reverse(w->now_georef, d, p_m);
+    }
+    return isfinite(p_m[0]) && isfinite(p_m[1]) && isfinite(p_m[2]);
+}
+
+static void take_point(struct watch *w, const struct scanhead_frame *frame, uint32_t i, uint32_t hash)
+{
+    struct scanhead_point point;
+    double p_m[3];
+    if (scanhead_points(w->sh, frame, i, &point, 1) != 1) return;
+    if (to_scene(w, &point, p_m)) watch_sample_add(w, p_m, hash);
+}
+
+/* Fibonacci hashing; neighbouring pulses, and those of neighbouring lines, have nothing in common. */
+static uint32_t hash_of(uint64_t pulse)
+{
+    const uint64_t h = pulse * 0x9e3779b97f4a7c15ULL;
+    return (uint32_t)(h >> 32 ^ h >> 13);
+}
+
+/* Echoes of one pulse follow each other, at the same time. Of all points only this is looked at. */
+static void take_points(struct watch *w, const struct scanhead_frame *frame)
+{
+    const uint32_t keeps = w->at.in_scene ? w->sample.every - 1 : 0, n_surfaces = w->site->scene->n_surfaces;
+    uint64_t pulse = frame->pulse0 - 1;
+    if (w->at.over) return;
+    uint32_t empty = 0, left_out = 0, hash = 0, last_dt = UINT32_MAX, last_echo = 0;
+    for (uint32_t i = 0; i < frame->n_points; i++) {
+        struct native_point p;
+        native_decode_point(frame->payload, i, &p);
+        if (p.echo == 0 || p.dt_ns != last_dt || p.echo <= last_echo) hash = hash_of(++pulse);
+        last_dt = p.dt_ns;
+        last_echo = p.echo;
+        if (p.echo_count == 0)
+            empty++;
+        else if (p.label >= n_surfaces && p.label != SCANHEAD_NO_LABEL)
+            left_out++; /* on what moves, on legs, in mirrors */
+        else if ((hash & keeps) == 0 && w->at.in_scene)
+            take_point(w, frame, i, hash);
+    }
+    w->at.points += frame->n_points - empty;
+    w->at.empty += empty;
+    w->at.left_out += left_out;
+    w->at.shots += frame->n_pulses;
+    w->dirty = 1;
+}
+
+/* ---- the thread */
+
+/* The event of a scan's end may be among what is lost. */
+static void take_telemetry(struct watch *w, const struct scanhead_frame *frame)
+{
+    struct native_telemetry t;
+    if (native_decode_telemetry(frame->payload, frame->payload_len, &t) != SH_OK || w->fresh) return;
+    if (t.scan == w->at.scan && t.state != HEAD_SCANNING && t.state != HEAD_SPIN_DOWN) end_scan(w);
+}
+
+static void take_frame(struct watch *w, const struct scanhead_frame *frame)
+{
+    struct sh_err err;
+    past_take(w->past, frame, w->lost_frames);
+    if (frame->type == SCANHEAD_POINTS && follow_scan(w)) {
+        take_points(w, frame);
+        if (w->sample.n - w->sample.done >= WATCH_BATCH && watch_sample_compare(w, &err) != SH_OK)
+            w->sample.n = w->sample.done; /* no memory now: these are passed over */
+    }
+    if (frame->type == SCANHEAD_TELEMETRY) take_telemetry(w, frame);
+    if (frame->type != SCANHEAD_EVENT) return;
+    if (frame->event == SCANHEAD_EV_SCAN_END) end_scan(w);
+    if (frame->event == SCANHEAD_EV_SCAN_START) {
+        end_scan(w);
+        w->fresh = 1;
+    }
+}
+
+/* Figures cost time, too: the more, the less often. */
+static int is_due(const struct watch *w)
+{
+    const double share = w->options.cpu_share;
+    const int64_t rest_ns = share > 0.0 ? (int64_t)((double)w->publish_ns / (0.25 * share)) : 0;
+    return w->dirty && clock_now_ns() - w->published_ns >= (rest_ns > PUBLISH_NS ? rest_ns : PUBLISH_NS);
+}
+
+/* The next frame. Where none is there it rests first, unless the head would wait for that. */
+static int next_frame(const struct watch *w, struct scanhead_frame *frame)
+{
+    if (w->options.cpu_share > 0.0) {
+        const int rc = scanhead_next(w->sh, frame, 0);
+        if (rc != SCANHEAD_ETIMEOUT) return rc;
+        clock_sleep_until_ns(clock_now_ns() + NAP_NS);
+    }
+    return scanhead_next(w->sh, frame, NEXT_MS);
+}
+
+/* For the processor: of this thread alone; where it fails it is as others are. An observer that the head waits for
+ * stays as the head is: on a busy machine the whole head would be as slow as it. */
+static void be_last(void)
+{
+    setpriority(PRIO_PROCESS, (id_t)gettid(), LOWEST);
+}
+
+void *watch_observe(void *watch)
+{
+    struct watch *w = watch;
+    struct scanhead_frame frame;
+    if (w->options.cpu_share > 0.0) be_last();
+    while (!atomic_load(&w->ending)) {
+        const int rc = next_frame(w, &frame);
+        if (rc == SCANHEAD_OK)
+            take_frame(w, &frame);
+        else if (rc != SCANHEAD_ETIMEOUT)
+            break;
+        if (is_due(w)) watch_publish(w);
+    }
+    if (w->dirty) watch_publish(w);
+    let_go(w);
+    return NULL;
+}

@@ -1,0 +1,264 @@
+/* SPDX-License-Identifier: MIT */
+#include "firmware_sim/app/studio/watch/past.h"
+
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "drivers/protocol/bytes.h"
+#include "drivers/protocol/native_encode.h"
+#include "firmware_sim/base/clock.h"
+
+enum {
+    VERSION = 1,
+    ROOM = PAST_PIECE + 4 * NATIVE_MAX_FRAME, /* a piece ends after the block of points that fills it */
+    MOST_PIECES = 2 * (PAST_MOST_BYTES / PAST_PIECE),
+};
+
+struct piece {
+    uint8_t *bytes; /* [ROOM]; the system gives the memory as it is written */
+    size_t len;
+    uint64_t base;   /* position of its first byte */
+    uint64_t points; /* in it */
+};
+
+/* Descriptor, emitter, anchor: the frames that points need, as they came. */
+enum { KINDS = 3 };
+struct placing {
+    uint8_t *frame; /* NULL: there is none */
+    size_t len;
+};
+
+struct past {
+    struct past_limits limits;
+    uint64_t run; /* another one in each run of a head */
+    /* the taker's */
+    struct placing placing[KINDS];
+    int is_new;     /* they are not in the last piece yet */
+    int after_pose; /* the last frame was one of poses: points that need it follow */
+
+    pthread_mutex_t lock; /* of all below */
+    struct piece piece[MOST_PIECES];
+    uint32_t first, n; /* a ring of pieces */
+    uint64_t points, bytes, end, gone, lost_frames;
+    uint32_t next_seq; /* frames before this number were taken, or lost */
+};
+
+struct past *past_create(const struct past_limits *limits)
+{
+    struct past *past = calloc(1, sizeof *past);
+    if (past == NULL) return NULL;
+    past->limits = *limits;
+    const int64_t now_ns = clock_now_ns();
+    past->run = (uint64_t)clock_utc_ns(now_ns) ^ (uint64_t)now_ns << 20;
+    pthread_mutex_init(&past->lock, NULL);
+    return past;
+}
+
+void past_free(struct past *past)
+{
+    if (past == NULL) return;
+    for (uint32_t i = 0; i < MOST_PIECES; i++)
+        free(past->piece[i].bytes);
+    for (int k = 0; k < KINDS; k++)
+        free(past->placing[k].frame);
+    pthread_mutex_destroy(&past->lock);
+    free(past);
+}
+
+uint64_t past_run(const struct past *past)
+{
+    return past->run;
+}
+
+/* ---- taking */
+
+static struct piece *piece_at(struct past *past, uint32_t i)
+{
+    return &past->piece[(past->first + i) % MOST_PIECES];
+}
+
+static void drop_oldest(struct past *past)
+{
+    struct piece *oldest = piece_at(past, 0);
+    past->points -= oldest->points;
+    past->bytes -= oldest->len;
+    past->gone += oldest->points;
+    free(oldest->bytes);
+    *oldest = (struct piece){0};
+    past->first = (past->first + 1) % MOST_PIECES;
+    past->n--;
+}
+
+/* The last piece stays, however much it has. */
+static void keep_limits(struct past *past)
+{
+    while (past->n > 1 && (past->points > past->limits.points || past->bytes > past->limits.bytes))
+        drop_oldest(past);
+}
+
+static void append(struct past *past, struct piece *piece, const uint8_t *frame, size_t len)
+{
+    memcpy(piece->bytes + piece->len, frame, len);
+    piece->len += len;
+    past->bytes += len;
+    past->end += len;
+}
+
+/* A reader that has these frames already, because it has read the piece before, finds them marked as repeated. */
+static void append_placing(struct past *past, struct piece *piece, int again)
+{
+    for (int k = 0; k < KINDS; k++) {
+        const struct placing *p = &past->placing[k];
+        uint8_t *at = piece->bytes + piece->len;
+        if (p->frame == NULL) continue;
+        append(past, piece, p->frame, p->len);
+        if (!again) continue;
+        at[3] |= NATIVE_REPEAT | NATIVE_LOCAL;
+        native_seal(at, 0);
+    }
+}
+
+/* The piece that a frame goes into; NULL: no memory. */
+static struct piece *find_piece(struct past *past, const struct scanhead_frame *frame)
+{
+    struct piece *last = past->n > 0 ? piece_at(past, past->n - 1) : NULL;
+    const int may_begin = frame->type == SCANHEAD_POSES || (frame->type == SCANHEAD_POINTS && !past->after_pose);
+    const size_t need = frame->raw_len + KINDS * (size_t)NATIVE_MAX_FRAME;
+    if (last != NULL && !(may_begin && last->len >= PAST_PIECE) && last->len + need <= ROOM) {
+        if (past->is_new) append_placing(past, last, 0);
+        past->is_new = 0;
+        return last;
+    }
+    if (past->n == MOST_PIECES) drop_oldest(past);
+    last = piece_at(past, past->n);
+    *last = (struct piece){.bytes = malloc(ROOM), .base = past->end};
+    if (last->bytes == NULL) return NULL;
+    past->n++;
+    append_placing(past, last, !past->is_new);
+    past->is_new = 0;
+    return last;
+}
+
+static void keep(struct past *past, const struct scanhead_frame *frame)
+{
+    const uint64_t points = frame->type == SCANHEAD_POINTS ? frame->n_points : 0;
+    struct piece *piece = find_piece(past, frame);
+    if (piece == NULL) {
+        past->gone += points;
+        return;
+    }
+    append(past, piece, frame->raw, frame->raw_len);
+    piece->points += points;
+    past->points += points;
+    keep_limits(past);
+}
+
+/* One that came before says nothing new; its flags and its time may differ. */
+static int is_same(const struct placing *p, const struct scanhead_frame *frame)
+{
+    return p->frame != NULL && p->len == frame->raw_len &&
+           memcmp(p->frame + NATIVE_HEADER_LEN, frame->payload, frame->payload_len) == 0;
+}
+
+static void take_placing(struct past *past, int kind, const struct scanhead_frame *frame)
+{
+    struct placing *p = &past->placing[kind];
+    if ((frame->flags & SCANHEAD_REPEAT) != 0 && is_same(p, frame)) return;
+    uint8_t *copy = realloc(p->frame, frame->raw_len);
+    if (copy == NULL) return; /* the next repetition brings it */
+    p->frame = copy;
+    p->len = frame->raw_len;
+    memcpy(copy, frame->raw, frame->raw_len);
+    past->is_new = 1;
+    if (kind != 0) return;
+    for (int k = 1; k < KINDS; k++) { /* those of its own follow */
+        free(past->placing[k].frame);
+        past->placing[k] = (struct placing){0};
+    }
+}
+
+void past_take(struct past *past, const struct scanhead_frame *frame, uint64_t lost_frames)
+{
+    if ((frame->flags & SCANHEAD_LOCAL) != 0) return;
+    pthread_mutex_lock(&past->lock);
+    switch (frame->type) {
+    case SCANHEAD_DESCRIPTOR:
+        take_placing(past, 0, frame);
+        break;
+    case SCANHEAD_EMITTER:
+        take_placing(past, 1, frame);
+        break;
+    case SCANHEAD_ANCHOR:
+        take_placing(past, 2, frame);
+        break;
+    case SCANHEAD_POINTS:
+    case SCANHEAD_POSES:
+    case SCANHEAD_ATTRIBUTES:
+    case SCANHEAD_COLOURS:
+        keep(past, frame);
+        past->after_pose = frame->type == SCANHEAD_POSES;
+        break;
+    default:
+        break;
+    }
+    past->next_seq = frame->seq + 1;
+    past->lost_frames = lost_frames;
+    pthread_mutex_unlock(&past->lock);
+}
+
+/* ---- giving */
+
+static int read_query(const char *query, uint64_t *from, struct sh_err *err)
+{
+    static const char name[] = "from=";
+    const size_t named = sizeof name - 1;
+    *from = 0;
+    if (query[0] == '\0') return SH_OK;
+    const size_t digits = strncmp(query, name, named) == 0 ? strspn(query + named, "0123456789") : 0;
+    if (digits < 1 || digits > 18 || query[named + digits] != '\0')
+        return sh_fail(err, SH_EINPUT, "%.64s: allowed is from=POSITION, a whole number of up to 18 digits", query);
+    *from = strtoull(query + named, NULL, 10);
+    return SH_OK;
+}
+
+static struct piece *find(struct past *past, uint64_t *from)
+{
+    if (past->n == 0) return NULL;
+    if (*from < piece_at(past, 0)->base) *from = piece_at(past, 0)->base;
+    for (uint32_t i = 0; i < past->n; i++) {
+        struct piece *piece = piece_at(past, i);
+        if (*from < piece->base + piece->len) return piece;
+    }
+    return NULL;
+}
+
+static void put_head(const struct past *past, uint64_t next, uint8_t *to)
+{
+    memcpy(to, "SHPA", 4);
+    le_put32(to + 4, VERSION);
+    le_put64(to + 8, past->run);
+    le_put64(to + 16, next);
+    le_put64(to + 24, past->end);
+    le_put64(to + 32, past->gone);
+    le_put64(to + 40, past->lost_frames);
+    le_put32(to + 48, past->next_seq);
+    le_put32(to + 52, 0);
+}
+
+int past_get(struct past *past, const char *query, struct web_body *out, struct sh_err *err)
+{
+    uint64_t from;
+    int rc = read_query(query, &from, err);
+    if (rc != SH_OK) return rc;
+    pthread_mutex_lock(&past->lock);
+    const struct piece *piece = find(past, &from);
+    const size_t len = piece != NULL ? piece->len - (size_t)(from - piece->base) : 0;
+    *out = (struct web_body){"application/octet-stream", malloc(PAST_HEAD_LEN + len), PAST_HEAD_LEN + len};
+    if (out->bytes != NULL) {
+        put_head(past, piece != NULL ? from + len : past->end, (uint8_t *)out->bytes);
+        if (len > 0) memcpy(out->bytes + PAST_HEAD_LEN, piece->bytes + (from - piece->base), len);
+    }
+    pthread_mutex_unlock(&past->lock);
+    return out->bytes != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory for the points so far");
+}

@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: MIT */
+/* The past of the scans, for a page that is opened late, or again: the last points of the stream, as frames.
+ *
+ * In: frames of the stream, in their order. Out: these frames in pieces, as the body of `/past` (README.md has its
+ * format). A piece begins with the descriptor, the emitter and the anchor that its points need, so that a reader of the
+ * protocol can begin with any piece.
+ *
+ * Kept are points with their attributes and colours, poses, and what places them. When there are more than `points` or
+ * `bytes`, the oldest piece goes, and its points are counted as gone.
+ *
+ * Memory: none but this until the first points come; then a piece of PAST_PIECE bytes after the other, up to `bytes`.
+ * Threads: one takes frames; any number of others read. */
+#ifndef FIRMWARE_SIM_APP_STUDIO_WATCH_PAST_H
+#define FIRMWARE_SIM_APP_STUDIO_WATCH_PAST_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "drivers/host/scanhead.h"
+#include "drivers/link/web.h"
+
+struct past;
+
+struct past_limits {
+    uint64_t points; /* shots without echo among them */
+    size_t bytes;    /* at least two pieces */
+};
+/* 10 million points of 20 bytes with their attributes, colours and headers take up to 320 MiB. */
+#define PAST_MOST_POINTS 10000000ULL
+enum { PAST_PIECE = 1 << 20, PAST_MOST_BYTES = 320 << 20, PAST_HEAD_LEN = 56 };
+
+/* NULL: no memory. */
+struct past *past_create(const struct past_limits *limits);
+/* lost_frames: of the taker's so far, which readers are told. Where there is no memory for points they are gone, and
+ * counted. */
+void past_take(struct past *past, const struct scanhead_frame *frame, uint64_t lost_frames);
+/* The frames from a position on, up to its piece's end. A position that is kept no more is the oldest that is; one beyond
+ * all gives no frames. query: "from=POSITION", or "" for 0; else SH_EINPUT. SH_ENOMEM. */
+int past_get(struct past *past, const char *query, struct web_body *out, struct sh_err *err);
+/* A number that another run of a head does not have. */
+uint64_t past_run(const struct past *past);
+void past_free(struct past *past);
+
+#endif

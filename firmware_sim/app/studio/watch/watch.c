@@ -1,0 +1,117 @@
+/* SPDX-License-Identifier: MIT */
+/* The watch as a whole: opened, started, asked, closed. */
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "firmware_sim/app/studio/watch/inside.h"
+
+static int get(void *ctx, const char *path, const char *query, struct web_body *out, struct sh_err *err)
+{
+    struct watch *w = ctx;
+    if (strcmp(path, "/past") == 0) return past_get(w->past, query, out, err);
+    if (strcmp(path, "/quality") == 0) return watch_get_quality(w, out, err);
+    if (strcmp(path, "/scene") == 0) return watch_get_scene(w, out, err);
+    if (strcmp(path, "/head") == 0) return watch_get_head(w, out, err);
+    if (strcmp(path, "/plan") == 0) return watch_get_plan(w, out, err);
+    return SH_EINPUT;
+}
+
+static int connect_observer(struct watch *w, struct sh_err *err)
+{
+    int fd[2];
+    char source[32], why[256];
+    if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, fd) != 0)
+        return sh_fail(err, SH_EIO, "socket pair: %s", strerror(errno));
+    w->link =
+        (struct link_spec){.type = LINK_FD, .fd = fd[0], .waits = w->options.waits ? LINK_WAITS_YES : LINK_WAITS_NO};
+    snprintf(source, sizeof source, "fd:%d", fd[1]);
+    const int rc = scanhead_open(source, &w->sh, why, sizeof why);
+    if (rc != SCANHEAD_OK) close(fd[1]);
+    w->fd = rc == SCANHEAD_OK ? fd[1] : -1;
+    return rc == SCANHEAD_OK ? SH_OK : sh_fail(err, rc, "the observer: %s", why);
+}
+
+static int make_room(struct watch *w, struct sh_err *err)
+{
+    const uint32_t n = w->site->n_stations;
+    w->head = calloc(n, sizeof *w->head);
+    w->shown_station = calloc(n, sizeof *w->shown_station);
+    for (uint32_t i = 0; i < n && w->head != NULL; i++)
+        if (config_serves(w->cfg, i)) report_head_of(w->site, i, &w->head[i]);
+    const struct past_limits limits = {PAST_MOST_POINTS, PAST_MOST_BYTES};
+    w->past = past_create(&limits);
+    if (w->head != NULL && w->shown_station != NULL && w->past != NULL) return SH_OK;
+    return sh_fail(err, SH_ENOMEM, "no memory for %u stations", n);
+}
+
+static void join(struct watch *w)
+{
+    if (!w->running) return;
+    pthread_join(w->thread, NULL);
+    w->running = 0;
+}
+
+static void close_watch(struct watch *w)
+{
+    atomic_store(&w->ending, 1);
+    if (w->fd >= 0) shutdown(w->fd, SHUT_RDWR);
+    join(w);
+    scanhead_close(w->sh);
+    if (w->link.fd >= 0 && !w->link_given) close(w->link.fd);
+    watch_sample_close(w);
+    watch_seen_close(&w->seen);
+    past_free(w->past);
+    free(w->head);
+    free(w->shown_station);
+    free(w->scene_bytes);
+    pthread_mutex_destroy(&w->lock);
+    free(w);
+}
+
+static int open_watch(const struct config *cfg, const struct site *site, const struct watch_options *options,
+                      struct watch **out, struct sh_err *err)
+{
+    struct watch *w = *out = calloc(1, sizeof *w);
+    if (w == NULL) return sh_fail(err, SH_ENOMEM, "no memory for what a page is told");
+    w->cfg = cfg;
+    w->site = site;
+    w->options = *options;
+    w->source = (struct web_source){w, get};
+    w->fd = w->link.fd = -1;
+    atomic_init(&w->ending, 0);
+    pthread_mutex_init(&w->lock, NULL);
+    int rc = make_room(w, err);
+    if (rc == SH_OK) rc = watch_make_scene(w, err);
+    if (rc == SH_OK) rc = watch_sample_open(w, err);
+    if (rc == SH_OK) rc = watch_seen_open(w, err);
+    if (rc == SH_OK) rc = connect_observer(w, err);
+    w->shown_share = w->seen.coverage != NULL ? 0.0 : (double)NAN;
+    if (rc == SH_OK) return SH_OK;
+    close_watch(w);
+    *out = NULL;
+    return rc;
+}
+
+static const struct link_spec *link_of(struct watch *watch)
+{
+    watch->link_given = 1;
+    return &watch->link;
+}
+
+static const struct web_source *source_of(const struct watch *watch)
+{
+    return &watch->source;
+}
+
+static int start(struct watch *w, struct sh_err *err)
+{
+    w->running = pthread_create(&w->thread, NULL, watch_observe, w) == 0;
+    return w->running ? SH_OK : sh_fail(err, SH_EIO, "no thread for the observer");
+}
+
+const struct run_page watch_page = {open_watch, link_of, source_of, start, close_watch};

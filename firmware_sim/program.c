@@ -1,0 +1,76 @@
+/* SPDX-License-Identifier: MIT */
+#include "firmware_sim/program.h"
+
+#include <errno.h>
+#include <malloc.h>
+#include <string.h>
+#include <sys/resource.h>
+
+#include "drivers/host/scanhead.h"
+#include "firmware_sim/app/help/help.h"
+
+static int fail_unknown(const struct program *program, const char *word)
+{
+    enum { MOST = 32 };
+    const char *known[MOST], *meant;
+    size_t n = 0;
+    for (const char *const *name = program->elsewhere; *name != NULL; name++) {
+        if (strcmp(word, *name) != 0) continue;
+        fprintf(stderr, "scanhead: %s: not in scanheadd; use scanhead\n", word);
+        return APP_USAGE;
+    }
+    while (program->command[n] != NULL && n < MOST) {
+        known[n] = program->command[n]->name;
+        n++;
+    }
+    meant = app_nearest(word, known, n);
+    fprintf(stderr, "scanhead: unknown command %s%s%s%s; see scanhead --help\n", word,
+            meant != NULL ? ", did you mean " : "", meant != NULL ? meant : "", meant != NULL ? "?" : "");
+    return APP_USAGE;
+}
+
+static int run(const struct program *program, int argc, char **argv)
+{
+    if (argc < 2) {
+        help_print(program->command, stderr);
+        return APP_USAGE;
+    }
+    if (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0) {
+        help_print(program->command, stdout);
+        return APP_OK;
+    }
+    if (strcmp(argv[1], "help") == 0) return help_run(program->command, argc - 1, argv + 1);
+    if (strcmp(argv[1], "--version") == 0) {
+        printf("scanhead %s\n", scanhead_version());
+        return APP_OK;
+    }
+    for (const struct app_command *const *c = program->command; *c != NULL; c++)
+        if (strcmp(argv[1], (*c)->name) == 0) return (*c)->run(argc - 1, argv + 1);
+    return fail_unknown(program, argv[1]);
+}
+
+/* Configurations and blocks of pulses lie on stacks, which threads get as large as this limit; 384 KiB were enough. */
+static int check_stack(void)
+{
+    enum { NEEDED_KIB = 1024 };
+    struct rlimit limit;
+    if (getrlimit(RLIMIT_STACK, &limit) != 0 || limit.rlim_cur >= NEEDED_KIB * 1024) return APP_OK;
+    fprintf(stderr, "scanhead: the stack is limited to %llu KiB; allowed %d and more: ulimit -s %d\n",
+            (unsigned long long)limit.rlim_cur / 1024, NEEDED_KIB, NEEDED_KIB);
+    return APP_USAGE;
+}
+
+/* What a command printed may still be in the buffer. A full disk or a closed pipe shows only here. */
+int program_main(const struct program *program, int argc, char **argv)
+{
+    /* Memory of meshes goes back to the system at once, however large the file was that was freed before. */
+    mallopt(M_MMAP_THRESHOLD, 4 << 20);
+    int status = check_stack();
+    if (status == APP_OK) status = run(program, argc, argv);
+    errno = 0;
+    const int failed = fflush(stdout) != 0 || ferror(stdout) != 0;
+    if (!failed || status != APP_OK) return status;
+    fprintf(stderr, "scanhead: standard output: writing failed%s%s\n", errno != 0 ? ": " : "",
+            errno != 0 ? strerror(errno) : "");
+    return APP_FAILED;
+}

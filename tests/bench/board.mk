@@ -1,0 +1,7 @@
+# SPDX-License-Identifier: MIT
+# What scanheadd asks of a board, beside scanhead in turns: seconds.
+.PHONY: bench-board
+#? bench-board       size of scanheadd, its memory at idle, and what its start takes
+bench-board: deps-build
+	@$(MAKE) --no-print-directory -j2 all
+	@bash tests/bench/board.sh $(BUILD)/bench-board $(BUILD)/scanheadd $(BUILD)/scanhead

@@ -1,0 +1,64 @@
+#!/bin/bash
+# SPDX-License-Identifier: MIT
+# scanheadd is the head alone: its libraries and commands, and the same stream as scanhead's. Prints TAP. $SCANHEAD: a
+# program; the two that lie beside it are looked at.
+set -u
+built=$(dirname "${SCANHEAD:-build/scanhead}")
+head=$built/scanheadd
+work=$(mktemp -d) || exit 1
+trap 'rm -rf "$work"' EXIT
+. tests/tap.sh
+
+needed() {
+    readelf -d "$1" | sed -n 's/.*(NEEDED).*\[lib\([^.]*\)\.so.*/\1/p' | sort
+}
+
+# What the head needs, and why: casting, meshes (Assimp, glTF, its packing), the Earth, configurations, hashes and USB
+# identities, `list`, the page, textures and terrain, usbredir where it is installed. Pictures are the studio's.
+ALLOWED='embree[34] assimp meshoptimizer GeographicLib yaml-0 nettle usb-1 websockets jansson webp tiff usbredirparser
+    stdc++ m gcc_s c ld-linux.*'
+libraries() {
+    needed "$head" | grep -vxE "$(echo $ALLOWED | sed 's/+/\\+/g; s/ /|/g')" && return 1
+    needed "$head" | grep -qx yaml-0 && needed "$built/scanhead" | grep -q '^png'
+}
+
+# A name is defined by the studio alone, and scanheadd has none of these.
+without_studio() {
+    (cd "$built" && find core/studio drivers/record firmware_sim/app/studio -name '*.c.o' -exec nm -g --defined-only {} +) |
+        awk 'NF == 3 { print $3 }' | sort >"$work/studio"
+    nm -g --defined-only "$head" | awk '{ print $3 }' | sort -u >"$work/head"
+    [ "$(wc -l <"$work/studio")" -gt 200 ] && grep -qx app_run "$work/head" || return
+    ! comm -12 "$work/studio" "$work/head" | grep .
+}
+
+commands_of() {
+    "$1" --help | sed -n 's/^  scanhead \([a-z]*\) .*/\1/p'
+}
+commands() {
+    [ "$(commands_of "$head" | tr '\n' ' ')" = "run plan check list help " ] || return
+    for command in $(commands_of "$built/scanhead"); do
+        commands_of "$head" | grep -qx "$command" && continue
+        said=$("$head" "$command" --help 2>&1)
+        [ $? = 2 ] && [ "$said" = "scanhead: $command: not in scanheadd; use scanhead" ] || { echo "$command: $said"; return 1; }
+    done
+    said=$("$head" lits 2>&1)
+    [ $? = 2 ] && [[ $said == *"did you mean list?"* ]]
+}
+
+# With a page, too: it is served without what the studio says of the scan.
+same_stream() {
+    sed 's|^links:.*||' tests/guest/head.yaml >"$work/config.yaml"
+    cp tests/guest/room.obj "$work/"
+    for program in scanhead scanheadd; do
+        "$built/$program" run "$work/config.yaml" --set 'links[0].type=null' --start --frames 1 --duration 0.2 --pace fast --quiet \
+            --view --stats "$work/$program.json" >"$work/$program.url" || return
+    done
+    sed -n '/stream_sha256/p' "$work/scanhead.json" >"$work/hash"
+    grep -q '[0-9a-f]\{64\}' "$work/hash" && grep stream_sha256 "$work/scanheadd.json" | diff "$work/hash" -
+}
+
+check "scanheadd is linked with the libraries of the head, and no others" libraries
+check "nothing of the studio is in it" without_studio
+check "its commands, and what it says to others" commands
+check "its stream has the bytes of scanhead's" same_stream
+echo "1..$tests"
