@@ -128,7 +128,8 @@ check "T=NAME makes the program where a test of that name runs it" programs_of
 toy=$work/toy
 mkdir -p "$toy/tools" && cp Makefile "$toy/"
 for file in core/err.c core/one.c core/sub/two.c core/georef/geographiclib_shim.cpp drivers/protocol/three.c drivers/host/four.c \
-    drivers/host/libscanhead.map firmware_sim/main.c firmware_sim/scanheadd.c firmware_sim/program.c tests/bench/bench.c tests/common/limit.c tests/common/five.c \
+    drivers/host/libscanhead.map firmware_sim/main.c firmware_sim/scanheadd.c firmware_sim/program.c \
+    tests/bench/bench.c tests/common/limit.c tests/common/five.c \
     tests/unit/test_toy.c tests/wire/test_other.c; do
     mkdir -p "$toy/${file%/*}" && : >"$toy/$file"
 done

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to import_*.c: materials of Assimp -> colour and textures of a surface. */
+/* Private to core/import: materials of Assimp -> colour and textures of a surface. */
 #ifndef CORE_IMPORT_IMPORT_MATERIAL_H
 #define CORE_IMPORT_IMPORT_MATERIAL_H
 

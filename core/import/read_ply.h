@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to read_ply*.c: a PLY mesh while it is read. */
+/* Private to core/import/read_ply*.c: a PLY mesh while it is read. */
 #ifndef CORE_IMPORT_READ_PLY_H
 #define CORE_IMPORT_READ_PLY_H
 

@@ -2,7 +2,7 @@
 /* For clang-tidy's analyzer alone, which reads one file at a time: a function of another file may return anything, it
  * believes, so that each failure might be none. Here it sees that these always return the code of a failure.
  *
- * DEFINES_...: the file that is looked at is the one that defines it. IN_SCENE: it is one of core/scene. */
+ * DEFINES_...: the file that is looked at is the one that defines it. IN_SCENE: it is one of core/scene or core/import. */
 #ifndef TESTS_CHECK_ANALYZER_H
 #define TESTS_CHECK_ANALYZER_H
 

@@ -15,7 +15,7 @@ checks="$checks,bugprone-bad-signal-to-kill-thread,bugprone-suspicious-realloc-u
 for name in sh_fail sh_fail_stopped text_fail build_fail ply_fail; do
     ! grep -q "^int $name(" "$file" || set -- "$@" "-DDEFINES_$name"
 done
-case $file in core/scene/*) set -- "$@" -DIN_SCENE ;; esac
+case $file in core/import/*/*) ;; core/scene/* | core/import/*) set -- "$@" -DIN_SCENE ;; esac
 case $file in *.cpp) ;; *) set -- "$@" -include tests/check/analyzer.h ;; esac # what it says is C
 set -- "$@" -w
 key=$({ echo "$checks"; clang -E -C "$@" "$file"; } | sha256sum | cut -c 1-40)
