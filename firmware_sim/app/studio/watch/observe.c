@@ -12,7 +12,7 @@
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/command/head.h"
 
-enum { NEXT_MS = 100, LOWEST = 19 };
+enum { NEXT_MS = 100, QUIET = 20, LOWEST = 19 };
 /* The stream comes tick by tick. Taken in larger pieces it costs half: so much of 2.2 million pulses a second fits into
  * the socket, and the link's queue has the rest. */
 static const int64_t NAP_NS = 4000000;
@@ -156,12 +156,14 @@ static void take_points(struct watch *w, const struct scanhead_frame *frame)
 
 /* ---- the thread */
 
-/* The event of a scan's end may be among what is lost. */
+/* The event of a scan's end may be among what is lost; so may all of its points, and that it began. */
 static void take_telemetry(struct watch *w, const struct scanhead_frame *frame)
 {
     struct native_telemetry t;
-    if (native_decode_telemetry(frame->payload, frame->payload_len, &t) != SH_OK || w->fresh) return;
-    if (t.scan == w->at.scan && t.state != HEAD_SCANNING && t.state != HEAD_SPIN_DOWN) end_scan(w);
+    if (native_decode_telemetry(frame->payload, frame->payload_len, &t) != SH_OK || t.scan == 0) return;
+    if (t.state == HEAD_SCANNING || t.state == HEAD_SPIN_DOWN) return;
+    if ((w->fresh || t.scan != w->at.scan) && !follow_scan(w)) return;
+    if (t.scan == w->at.scan) end_scan(w);
 }
 
 static void take_frame(struct watch *w, const struct scanhead_frame *frame)
@@ -180,6 +182,14 @@ static void take_frame(struct watch *w, const struct scanhead_frame *frame)
         end_scan(w);
         w->fresh = 1;
     }
+}
+
+/* Nothing has come for QUIET times NEXT_MS. At the pace `fast` no time passes for an idle head, so it sends no telemetry:
+ * where the end of its scan was lost, nothing else says that it is over. */
+static void rest(struct watch *w)
+{
+    if (device_scans(w->options.device) == 0 || device_rests_from(w->options.device) == UINT64_MAX) return;
+    if ((w->at.scan != 0 && !w->fresh) || follow_scan(w)) end_scan(w);
 }
 
 /* Figures cost time, too: the more, the less often. */
@@ -212,13 +222,17 @@ void *watch_observe(void *watch)
 {
     struct watch *w = watch;
     struct scanhead_frame frame;
+    int quiet = 0;
     if (w->options.cpu_share > 0.0) be_last();
     while (!atomic_load(&w->ending)) {
         const int rc = next_frame(w, &frame);
+        quiet = rc == SCANHEAD_ETIMEOUT ? quiet + 1 : 0;
         if (rc == SCANHEAD_OK)
             take_frame(w, &frame);
         else if (rc != SCANHEAD_ETIMEOUT)
             break;
+        else if (quiet == QUIET)
+            rest(w);
         if (is_due(w)) watch_publish(w);
     }
     if (w->dirty) watch_publish(w);
