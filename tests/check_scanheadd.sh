@@ -13,10 +13,9 @@ needed() {
     readelf -d "$1" | sed -n 's/.*(NEEDED).*\[lib\([^.]*\)\.so.*/\1/p' | sort
 }
 
-# What the head needs, and why: casting, meshes (Assimp, glTF, its packing), the Earth, configurations, hashes and USB
-# identities, `list`, the page, textures and terrain, usbredir where it is installed. Pictures are the studio's.
-ALLOWED='embree[34] assimp meshoptimizer GeographicLib yaml-0 nettle usb-1 websockets jansson webp tiff usbredirparser
-    stdc++ m gcc_s c ld-linux.*'
+# What the head needs, and why: casting, packed glTF, the Earth, configurations, hashes, USB, JSON, textures, and usbredir
+# where it is installed. Others are loaded when they are asked for (core/late.h). Pictures are the studio's.
+ALLOWED='embree[34] meshoptimizer GeographicLib yaml-0 nettle usb-1 jansson webp usbredirparser stdc++ m gcc_s c ld-linux.*'
 libraries() {
     needed "$head" | grep -vxE "$(echo $ALLOWED | sed 's/+/\\+/g; s/ /|/g')" && return 1
     needed "$head" | grep -qx yaml-0 && needed "$built/scanhead" | grep -q '^png'
