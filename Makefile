@@ -33,7 +33,7 @@ DEPS_BUILD = gcc g++ make pkg-config libc6-dev libembree-dev libassimp-dev libge
 	$(if $(shell command -v npm),,nodejs npm)
 # and the tests, with the second compiler and its sanitizers, clients and readers of recordings that are not ours:
 DEPS_TEST = $(DEPS_BUILD) libcmocka-dev clang clang-format libclang-rt-dev lld ccache gpsd gpsd-clients cloudcompare mrpt-apps proj-bin python3-numpy \
-	parallel patch tshark tcpreplay
+	llvm parallel tshark tcpreplay
 # The guest tests; they are skipped where these can't be had. The kernel (linux-image-amd64) is fetched, not installed.
 DEPS_GUEST = qemu-system-x86 busybox-static cpio kmod xz-utils usbutils usbip
 # The browser that the page is tested in; these tests are skipped where it can't be had.
@@ -108,7 +108,7 @@ JOINED_unit = $(UNIT)
 JOINED_all = $(filter-out $(call PROGRAMS,guest),$(TESTS))
 JOINED_shipped = $(filter-out $(filter-out $(SHIPPED),$(UNIT)),$(JOINED_all))
 JOINED = $(JOINED_$(JOIN))
-# The programs: a main each, and what these share.
+# Each program has a main, and they share the rest.
 MAINS = $(patsubst %,$(BUILD)/firmware_sim/%.c.o,main scanheadd program)
 EVERYTHING = $(OBJ) $(MAINS)
 
@@ -129,7 +129,7 @@ $(BUILD)/%.cpp.o: %.cpp $(BUILD)/flags
 # source has come or gone. ccache and -Werror change nothing of an object.
 STAMPS = $(patsubst %,$(BUILD)/%,flags modules.members head.members library.members common.members benches.members joined.members)
 $(BUILD)/flags: NOW = $(filter-out ccache %/ccache -Werror,$(CC) $(CXX) $(AR) $(OBJCOPY) $(ALL_CPPFLAGS) $(ALL_CFLAGS) $(ALL_CXXFLAGS) \
-	$(CORE_OPT) $(TEST_WARN) $(LDFLAGS) $(LDLIBS))
+	$(CORE_OPT) $(TEST_WARN) $(LDFLAGS) $(LDLIBS) $(SONAMES))
 $(BUILD)/modules.members: NOW = $(SRC)
 $(BUILD)/head.members: NOW = $(HEAD_OBJ)
 $(BUILD)/library.members: NOW = $(LIBOBJ)
@@ -177,7 +177,7 @@ $(BUILD)/scanhead: $(BUILD)/firmware_sim/main.c.o $(BUILD)/firmware_sim/program.
 	$(Q)$(CC) $(SAN) $(LDFLAGS) -o $@ $^ $(LDLIBS)
 #? scanheadd         the head alone, for a board: run, plan, check, list
 scanheadd: $(BUILD)/scanheadd
-# With the libraries that it needs and no others.
+# It is linked with the libraries that it needs and no others.
 $(BUILD)/scanheadd: $(BUILD)/firmware_sim/scanheadd.c.o $(BUILD)/firmware_sim/program.c.o $(BUILD)/head.a
 	@echo "  LD    $@"
 	$(Q)$(CC) $(SAN) $(LDFLAGS) -o $@ $^ -Wl,--as-needed $(LDLIBS)
@@ -186,7 +186,7 @@ $(BUILD)/scanheadd: $(BUILD)/firmware_sim/scanheadd.c.o $(BUILD)/firmware_sim/pr
 #   common.a    tests/common: scenes, references, clients                   all of them
 #   benches.a   what the programs of tests/bench share                      build/bench and the charts'
 #   its rigs    tests/unit/cast_rig.c where it includes cast_rig.h          tests of a folder; tests/rigs.sh finds which
-#   modules.a   the head, without main.c                                    all of them
+#   modules.a   head and studio, no main                                    all of them
 FIGURES = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_moving chart_sight chart_georef chart_widths beam plain velodyne loop_cost loading kernels panorama copies)
 BENCH_MAINS = $(FIGURES:$(BUILD)/%=%.c) tests/bench/bench.c
 # LIMIT ends a test program that waits for ever; each is linked with it as an object, as nobody calls it.

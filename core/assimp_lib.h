@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Assimp, for meshes that the project doesn't read or write itself (core/late.h). */
+/* Assimp reads and writes the meshes that the project doesn't know itself. It is loaded late (core/late.h). */
 #ifndef CORE_ASSIMP_LIB_H
 #define CORE_ASSIMP_LIB_H
 

@@ -4,7 +4,7 @@
 #include <dlfcn.h>
 #include <string.h>
 
-/* The names that a program linked with them would have: the Makefile asks the libraries. */
+/* A program linked with them would have these names: the Makefile asks the libraries. */
 static const struct {
     const char *file, *needs;
 } libraries[] = {
@@ -17,7 +17,7 @@ static const struct {
 int late_load(enum late_library which, const char *const *name, void *calls, size_t n, struct sh_err *err)
 {
     const char *file = libraries[which].file;
-    void *library = dlopen(file, RTLD_LAZY | RTLD_LOCAL | RTLD_NODELETE);
+    void *library = dlopen(file, RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE);
     if (library == NULL) return sh_fail(err, SH_EINPUT, "%s: %s", libraries[which].needs, dlerror());
     for (size_t i = 0; i < n; i++) {
         void *call = dlsym(library, name[i]);

@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* Libraries that few runs need, loaded once somebody asks. These, and what they need themselves, take twice as long to load
- * as all that every run needs.
+/* Libraries that few runs need, loaded once somebody asks. These, and what they need themselves, take twice as long
+ * to load as all that every run needs.
  *
  *   #define PROJ_CALLS(CALL) CALL(proj_create) CALL(proj_destroy)      the calls that the project uses
  *   LATE_LIBRARY(proj, PROJ_CALLS)
  *
- * makes `struct proj_lib`, whose members are these calls, and `int proj_lib_load(struct proj_lib *lib, struct sh_err *err)`:
- * SH_EINPUT where the library is not on this machine, or lacks a call. A call is lib.proj_create(...), with the types of the
- * library's own header. Any thread; the library stays until the process ends. Its name is in late.c. */
+ * makes `struct proj_lib`, whose members are these calls, and `int proj_lib_load(struct proj_lib *lib, struct sh_err
+ * *err)`: SH_EINPUT where the library is not on this machine, or lacks a call. A call is lib.proj_create(...), with
+ * the types of the library's own header. Any thread; the library stays until the process ends. Its name is in
+ * late.c. */
 #ifndef CORE_LATE_H
 #define CORE_LATE_H
 
@@ -17,7 +18,7 @@
 
 enum late_library { LATE_proj, LATE_assimp, LATE_tiff, LATE_websockets };
 
-/* calls[n]: pointers to functions, of these names. */
+/* Fills calls[n], pointers to functions, by their names. With n = 0 it loads the library and no more. */
 int late_load(enum late_library which, const char *const *name, void *calls, size_t n, struct sh_err *err);
 
 #define LATE_MEMBER(call) __typeof__(call) *call;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* scanhead: head and studio, all commands. */
+/* scanhead has head and studio, all commands. */
 #include "firmware_sim/program.h"
 #include "firmware_sim/app/studio/watch/watch.h"
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the programs share, scanhead and scanheadd: each is a main with a table of its commands. */
+/* scanhead and scanheadd share this: each is a main with a table of its commands. */
 #ifndef FIRMWARE_SIM_PROGRAM_H
 #define FIRMWARE_SIM_PROGRAM_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* scanheadd: the head alone, for a board. It is linked with nothing of the studio. */
+/* scanheadd is the head alone, for a board. It is linked with nothing of the studio. */
 #include "firmware_sim/program.h"
 
 #define COMMAND(name) &app_##name,

@@ -13,7 +13,7 @@ needed() {
     readelf -d "$1" | sed -n 's/.*(NEEDED).*\[lib\([^.]*\)\.so.*/\1/p' | sort
 }
 
-# What the head needs, and why: casting, packed glTF, the Earth, configurations, hashes, USB, JSON, textures, and usbredir
+# The head needs these for casting, packed glTF, the Earth, configurations, hashes, USB, JSON, textures, and usbredir
 # where it is installed. Others are loaded when they are asked for (core/late.h). Pictures are the studio's.
 ALLOWED='embree[34] meshoptimizer GeographicLib yaml-0 nettle usb-1 jansson webp usbredirparser stdc++ m gcc_s c ld-linux.*'
 libraries() {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* PROJ, for scenes that lie in a grid (core/late.h). It brings curl and all that curl needs. */
+/* PROJ knows the grids that scenes lie in. It is loaded late (core/late.h), and brings curl and all that curl needs. */
 #ifndef CORE_GEOREF_PROJ_LIB_H
 #define CORE_GEOREF_PROJ_LIB_H
 

@@ -3,6 +3,7 @@
 #include "core/import/geotiff/geotiff_read.h"
 #include "core/import/gltf/gltf_read.h"
 #include "core/import/import.h"
+#include "core/late.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -132,8 +133,8 @@ static int reap(struct import_apart *a, int flags)
     for (;;) {
         pid_t got = waitpid(a->pid, &a->status, flags);
         if (got < 0 && errno == EINTR) continue;
-        /* Where SIGCHLD is ignored, as some programs leave it to those they start, or where somebody else has waited, there
-         * is no status. Its error and its result say enough: a result that is not whole is refused. */
+        /* Where SIGCHLD is ignored, as some programs leave it to those they start, or where somebody else has
+         * waited, there is no status. Its error and its result say enough: a result that is not whole is refused. */
         if (got < 0) a->status = 0;
         return got != 0;
     }
@@ -237,6 +238,15 @@ int import_judge(struct import_apart *a, struct sh_err *err)
                       a->task.name, WEXITSTATUS(a->status));
 }
 
+/* Loads it before the fork: the child of a process with threads must not load any, nor should each child do it
+ * again. */
+static int load_library(const struct import_apart *a, struct sh_err *err)
+{
+    if (a->task.read == import_assimp) return late_load(LATE_assimp, NULL, NULL, 0, err);
+    if (a->task.read == import_geotiff) return late_load(LATE_tiff, NULL, NULL, 0, err);
+    return SH_OK;
+}
+
 int import_apart(struct scene_build *b, struct sh_err *err)
 {
     struct import_apart a = {.task = {.b = b, .limits = build_limits(b), .name = "Assimp", .read = import_assimp}};
@@ -248,7 +258,8 @@ int import_apart(struct scene_build *b, struct sh_err *err)
         a.task.read = import_geotiff;
     }
     struct import_apart *const all[1] = {&a};
-    int rc = import_start(&a, err);
+    int rc = load_library(&a, err);
+    if (rc == SH_OK) rc = import_start(&a, err);
     if (rc != SH_OK) return rc;
     import_watch(all, 1);
     rc = import_judge(&a, err);

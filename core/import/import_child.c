@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* The process that reads: limits first, then the work, then the scene into the file of the task.
  *
- * For all but IFC it is a fork without exec, perhaps of a process with threads, of which only this one is left. glibc lets
- * such a process use malloc and stdio; nothing else of the parent's threads is touched. It ends by _exit,
- * which runs nobody's destructors. */
+ * For all but IFC it is a fork without exec, perhaps of a process with threads, of which only this one is left.
+ * glibc lets such a process use malloc and stdio; libraries are loaded before, and nothing else of the parent's
+ * threads is touched. It ends by _exit, which runs nobody's destructors. */
 #include "core/import/import.h"
 
 #include <errno.h>
@@ -95,8 +95,8 @@ static void offer_to_the_oom_killer(void)
     close(fd);
 }
 
-/* The parent looks at memory in use, and at the clock. What the kernel watches is the second line: processor
- * time where the parent is stopped, and for Assimp the address space. That one is twice the limit, since there is always
+/* The parent looks at memory in use, and at the clock. What the kernel watches is the second line: processor time
+ * where the parent is stopped, and for Assimp the address space. That one is twice the limit, since there is always
  * more of it than of memory; the address sanitizer takes terabytes of it. */
 static int set_limits(const struct import_task *task)
 {

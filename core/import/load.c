@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* scene_load: the reader of each file by its ending, and the scene of all of them. */
+/* scene_load finds the reader of each file by its ending, and makes the scene of all of them. */
 #include <errno.h>
 #include <math.h>
 #include <string.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/import: the readers that scene_load chooses from. In: a builder that is at a file. Out: its vertices and
+/* Private to core/import. scene_load chooses from these readers. In: a builder that is at a file. Out: its vertices and
  * faces in the builder's scene. */
 #ifndef CORE_IMPORT_READERS_H
 #define CORE_IMPORT_READERS_H

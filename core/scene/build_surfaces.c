@@ -82,7 +82,7 @@ void build_forget_surfaces(struct scene_build *b)
     b->surface_tree = NULL;
 }
 
-/* Room for one more surface. The tree points into the array, so it is made again where the array has moved. */
+/* It makes room for one more surface. The tree points into the array, so it is made again where the array has moved. */
 static bool has_room(struct scene_build *b)
 {
     struct scene *s = b->scene;

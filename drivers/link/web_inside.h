@@ -40,8 +40,8 @@
 
 LATE_LIBRARY(websockets, WEBSOCKETS_CALLS)
 
-/* libwebsockets, which brings OpenSSL (core/late.h); constant once the first web link is open. Its callbacks have nothing
- * but itself to find it by. */
+/* libwebsockets, which brings OpenSSL (core/late.h); each web link that is opened fills it in, always with the same.
+ * Its callbacks have nothing but itself to find it by. */
 extern struct websockets_lib web_lws;
 
 enum {
@@ -142,8 +142,8 @@ struct lws *web_wait_for(struct web_link *web, int fd, struct web_conn *conn);
 /* The answer is out. Takes the connection from libwebsockets' HTTP, and lets its client end. */
 void web_linger(struct web_link *web, struct web_conn *conn);
 
-/* web_request.c: 0; the status of a request that does not get what it asks for, and why; or WEB_FOREIGN. head: its lines,
- * len bytes with the empty one. */
+/* web_request.c: 0; the status of a request that does not get what it asks for, and why; or WEB_FOREIGN. head: its
+ * lines, len bytes with the empty one. */
 int web_request_read(const struct web_link *web, const char *head, size_t len, struct web_request *out,
                      const char **words);
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# What scanheadd asks of a board, beside scanhead in turns: seconds.
+# It measures scanheadd beside scanhead, in turns, and takes seconds.
 .PHONY: bench-board
 #? bench-board       size of scanheadd, its memory at idle, and what its start takes
 bench-board: deps-build

@@ -1,6 +1,6 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
-# What a head asks of a board: bash tests/bench/board.sh FOLDER PROGRAM...
+# It measures size, memory and start of a head for a board: bash tests/bench/board.sh FOLDER PROGRAM...
 #   MiB          the program's file without symbols for debuggers; its libraries come on top
 #   idle MiB     memory of a head that waits for a client: all of it, and what is its own (anonymous)
 #   start s      processor time from the start until its links are open, of all its threads

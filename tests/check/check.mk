@@ -7,7 +7,7 @@
 DEPS_CHECK = clang clang-tidy libclang-rt-dev cppcheck python3 python3-numpy
 CHECK_S ?= 15
 CHECK_FILES = $(SRC) $(wildcard firmware_sim/*.c)
-CHECK_FLAGS = -std=c11 -I. -I$(BUILD) -D_GNU_SOURCE -DSH_EMBREE=$(EMBREE_VERSION) $(if $(USBREDIR),-DHAVE_USBREDIR) $(PKG_CFLAGS)
+CHECK_FLAGS = -std=c11 -I. -I$(BUILD) -D_GNU_SOURCE -DSH_EMBREE=$(EMBREE_VERSION) $(if $(USBREDIR),-DHAVE_USBREDIR) $(SONAMES) $(PKG_CFLAGS)
 deps-check: deps-build
 	$(call install_missing,$(DEPS_CHECK))
 check-analysers: deps-check $(BUILD)/drivers/link/web_pages.inc

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* A limit for each test program: one that waits for ever is ended, and says where. It is linked with every test program.
+/* A limit for each test program: one that waits for ever is ended, and says where. It is linked with every test
+ * program.
  *
- * The limit is TEST_LIMIT_S seconds (run_tap.sh sets it to its own; 0: none; else DEFAULT_S). It only catches a hang, and
- * no result depends on it: where more want to run than there are processors, it is longer by that ratio. The main thread
- * gets the signal of a timer. It prints the running test as failed and where each thread is, and ends the program with
- * status 124, as timeout(1) does. A SIGALRM of a test's own alarm() does the same at once. */
+ * The limit is TEST_LIMIT_S seconds (run_tap.sh sets it to its own; 0: none; else DEFAULT_S). It only catches a
+ * hang, and no result depends on it: where more want to run than there are processors, it is longer by that ratio.
+ * The main thread gets the signal of a timer. It prints the running test as failed and where each thread is, and
+ * ends the program with status 124, as timeout(1) does. A SIGALRM of a test's own alarm() does the same at once. */
 #include <errno.h>
 #include <execinfo.h>
 #include <fcntl.h>
@@ -36,8 +37,8 @@ static volatile sig_atomic_t ended_one; /* a thread has begun to say where all a
 static volatile sig_atomic_t answered;
 
 #ifdef SH_SANITIZE
-/* What the address sanitizer keeps of memory stays mapped, and is written anew: to unmap it and to fault it in again takes
- * a third of the time of a test that makes large arrays often. */
+/* The address sanitizer's marks of memory stay mapped, and are written anew: to unmap them and to fault them in
+ * again takes a quarter of the time of a test that makes large arrays often. */
 const char *__asan_default_options(void);
 const char *__asan_default_options(void)
 {

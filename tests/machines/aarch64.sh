@@ -29,7 +29,7 @@ built "$(aarch64-linux-gnu-gcc -dumpversion | sed 's/^/gcc /'), Embree $(sed -n 
 emulate="qemu-aarch64-static -L $root"
 build_here all "$at/here.txt" || exit 1
 $nicely $emulate "$at/build/scanhead" $RECORD -o "$at/record.ply" 2>"$at/record.log" && compare_record "$at/record.ply"
-# The head alone, as a board would have it.
+# A board would have the head alone.
 $nicely $emulate "$at/build/scanheadd" check config/glass.yaml >"$at/scanheadd.txt" 2>&1 || exit 1
 aarch64-linux-gnu-strip -o "$at/scanheadd" "$at/build/scanheadd"
 echo "    scanheadd: $(stat -c %s "$at/scanheadd") bytes; it needs$(readelf -d "$at/scanheadd" | sed -n 's/.*(NEEDED).*\[lib\([^.]*\).*/ \1/p' | tr -d '\n')"

@@ -40,7 +40,7 @@ class Build:
                 self.commands[words[words.index("-c") + 1]] = words
 
     def read_deps(self):
-        """Which sources, of the product and of tests, include a file."""
+        """Finds the sources, of the product and of tests, that include a file."""
         for name in self.commands:
             rule = read(f"{self.tree.path}/{self.folder}/{name}.d").decode().replace("\\\n", " ").split("\n")[0]
             for used in rule.split()[1:]:
@@ -50,7 +50,7 @@ class Build:
         return f"{self.folder}/{name}.o"
 
     def environment(self, folder=None):
-        """Of a program with the library in a folder, or the one without a mutant."""
+        """Makes the environment of a program, with the library in a folder or the one without a mutant."""
         return {"LD_LIBRARY_PATH": folder or self.work, **({"ASAN_OPTIONS": f"hard_rss_limit_mb={MOST_MEMORY >> 20}"} if self.name == "asan" else {})}
 
     # ---- linking
@@ -64,7 +64,7 @@ class Build:
         self.link([f"-Wl,-rpath,{self.work}", "-Wl,--enable-new-dtags"], [*objects, f"{self.work}/{LIBRARY}"], target)
 
     def link(self, options, objects, target):
-        """Again only where an object is newer."""
+        """Links again only where an object is newer."""
         newest = max(os.path.getmtime(os.path.join(self.tree.path, name)) for name in objects)
         if not os.path.exists(target) or os.path.getmtime(target) < newest:
             os.makedirs(os.path.dirname(target), exist_ok=True)
@@ -72,7 +72,7 @@ class Build:
             os.replace(f"{target}.new", target)
 
     def program(self, name):
-        """The path of a test program without a mutant. It is linked when it is first asked for."""
+        """Returns the path of a test program without a mutant. It is linked when it is first asked for."""
         target = f"{self.work}/tests/{name}"
         with self.lock:
             lock = self.locks.setdefault(name, threading.Lock())
@@ -81,7 +81,7 @@ class Build:
         return target
 
     def program_with(self, header, worker, name):
-        """The same with a mutant. A test that includes its file is compiled again. None: it does not compile."""
+        """Does the same with a mutant. A test that includes its file is compiled again. None: it does not compile."""
         users = self.deps.get(header, ())
         own, common = ([source for source in sources if source in users] for sources in (self.tree.sources_of(name), self.tree.common()))
         if not own and not common:
@@ -97,7 +97,7 @@ class Build:
     # ---- compiling
 
     def compile(self, name, worker):
-        """The object of a source with the worker's mutant. None: it does not compile, or the compiler warns, which `make test` sees."""
+        """Compiles a source with the worker's mutant. None: it does not compile, or the compiler warns, which `make test` sees."""
         words, target, changed = list(self.commands[name]), f"{worker}/{self.name}/{name}.o", f"{worker}/changed"
         if os.path.exists(f"{changed}/{name}"):
             words[words.index("-c") + 1] = f"{changed}/{name}"
@@ -109,13 +109,13 @@ class Build:
         return target if os.path.exists(target) else None
 
     def code_before(self, name):
-        """Of a source without a mutant; found out once."""
+        """Returns the hash of a source's object without a mutant, found out once."""
         if name not in self.codes:
             self.codes[name] = self.code_of(self.object(name))
         return self.codes[name]
 
     def code_of(self, name):
-        """A hash of an object without what debuggers need, which has lines and columns of the source."""
+        """Hashes an object without what debuggers need, which has lines and columns of the source."""
         bare = f"{self.work}/bare-{threading.get_ident()}"
         self.tree.call(["strip", "--strip-debug", "-o", bare, name])
         code = hashlib.sha256(read(bare)).hexdigest()

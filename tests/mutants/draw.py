@@ -8,20 +8,20 @@ import random
 import re
 
 RELATIONS = {"<": ["<=", ">"], "<=": ["<"], ">": [">=", "<"], ">=": [">"], "==": ["!="], "!=": ["=="]}
-TOKEN = re.compile(r"[A-Za-z_]\w*|(?:\d+\.\d*|\.\d+|\d+)(?:[eE][-+]?\d+)?[uUlLfF]*|0[xX][0-9a-fA-F]+[uUlL]*|<<=|>>=|->|\+\+|--|"
+TOKEN = re.compile(r"[A-Za-z_]\w*|0[xX][0-9a-fA-F]+[uUlL]*|(?:\d+\.\d*|\.\d+|\d+)(?:[eE][-+]?\d+)?[uUlLfF]*|<<=|>>=|->|\+\+|--|"
                    r"<<|>>|[-+*/%&|^<>=!]=|&&|\|\||[^\sA-Za-z_0-9]")
 ENOUGH_IN_VAIN = 1000  # draws one after the other that brought nothing new
 KEYWORDS = {"return", "if", "else", "for", "while", "do", "switch", "case", "default", "break", "continue", "goto", "sizeof", "typedef"}
 
 
 def blank_out(text):
-    """The text with its comments, strings and characters blanked out: the same length, so that places stay."""
+    """Blanks out comments, strings and characters. The length is the same, so that places stay."""
     pattern = re.compile(r"/\*.*?\*/|//[^\n]*|\"(?:\\.|[^\"\\\n])*\"|'(?:\\.|[^'\\\n])*'", re.S)
     return pattern.sub(lambda found: re.sub(r"[^\n]", " ", found.group()), text)
 
 
 def tokens(code):
-    """(token, from, to) of a line."""
+    """Splits a line into (token, from, to)."""
     return [(found.group(), found.start(), found.end()) for found in TOKEN.finditer(code)]
 
 
@@ -59,7 +59,7 @@ def sign(line, code):
 
 
 def bound(line, code):
-    """A whole number, or the right side of a relation, by one."""
+    """Changes a whole number, or the right side of a relation, by one."""
     found = tokens(code)
     for i, (token, at, to) in enumerate(found):
         if re.fullmatch(r"\d+[uUlL]*", token):
@@ -89,7 +89,7 @@ def condition(line, code):
 
 
 def parts_of(code, begin):
-    """Where the list after an open bracket begins, its commas, and where it ends. Empty where its end is in another line."""
+    """Finds where the list after an open bracket begins, its commas, and where it ends. The result is empty where its end is in another line."""
     depth, cuts = 1, [begin]
     for at in range(begin, len(code)):
         depth += code[at] in "([{"
@@ -102,12 +102,12 @@ def parts_of(code, begin):
 
 
 def is_declaration(code):
-    """Of a function: it begins in the first column, or with a type and a name."""
+    """Tells whether the line begins a function: it begins in the first column, or with a type and a name."""
     return not code[:1].isspace() or bool(re.match(r"\s*(?!return\b|else\b|goto\b|case\b)[A-Za-z_]\w*( [A-Za-z_]\w*)*[ *]+(\w+|\(\*\w+\))\(", code))
 
 
 def arguments(line, code):
-    """Two neighbours of a call."""
+    """Swaps two neighbours of a call."""
     for call in re.finditer(r"[A-Za-z_]\w*\(", code):
         if call.group()[:-1] in KEYWORDS or is_declaration(code):
             continue
@@ -120,7 +120,7 @@ def arguments(line, code):
 
 
 def is_statement(code):
-    """One that is whole in its line, and declares nothing."""
+    """Drops a statement that is whole in its line, and declares nothing."""
     text = code.strip()
     if not text.endswith(";") or text.count("(") != text.count(")") or text.count(";") != 1:
         return False
@@ -140,7 +140,7 @@ OPERATORS = {f.__name__: f for f in (relation, connective, sign, bound, constant
 
 
 def drop_lock(lines, codes, number):
-    """The lock of a line, and its unlocks up to the function's end. None: there is no lock."""
+    """Drops the lock of a line, and its unlocks up to the function's end. None: there is no lock."""
     found = re.search(r"pthread_mutex_lock\((.*)\);", codes[number])
     if found is None or not is_statement(codes[number]):
         return None
@@ -161,7 +161,7 @@ class Source:
 
 
 def mutants_of(source, number):
-    """(operator, {line: new text}) of a line, each different from it."""
+    """Yields (operator, {line: new text}) of a line, each different from it."""
     line, code = source.lines[number], source.codes[number]
     for name, operator in OPERATORS.items():
         for new in operator(line, code):
@@ -173,7 +173,7 @@ def mutants_of(source, number):
 
 
 def draw(places, seed):
-    """The line first, each alike; then the operator; then the place in it. No mutant comes twice. Ends where no more are found."""
+    """Draws the line first, each alike; then the operator; then the place in it. No mutant comes twice. Ends where no more are found."""
     rng, sources, seen, in_vain = random.Random(seed), {}, set(), 0
     while in_vain < ENOUGH_IN_VAIN:
         in_vain += 1

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Part of the library with marks of coverage: a child process that ends by _exit() writes what it reached, too. */
+/* This is part of the library with marks of coverage: a child process that ends by _exit() writes what it reached,
+ * too. */
 #include <sys/syscall.h>
 #include <unistd.h>
 

@@ -63,7 +63,7 @@ class Judge:
         return mutant
 
     def judge(self, mutant, worker):
-        """The verdict; and the test that found it, or all that reach it."""
+        """Returns the verdict, and the test that found it, or all that reach it."""
         name = mutant["file"]
         lines = draw.Source(f"{self.tree.path}/{name}").lines
         for number, text in mutant["edits"].items():
@@ -110,7 +110,7 @@ class Judge:
         return None
 
     def fails(self, build, test, program, log, env):
-        """Because of the mutant: it fails twice, and passes without. What does not end is not tried again."""
+        """Tells whether a test fails because of the mutant: it fails twice, and passes without. What does not end is not tried again."""
         limit_s = LIMIT_S + LIMIT_TIMES * self.reach.tests[test]
         status, _ = self.tree.run_test(program, limit_s, log, **env)
         if status == 0 or (status is not None and self.tree.run_test(program, limit_s, log, **env)[0] == 0):
@@ -124,7 +124,7 @@ class Judge:
 
 
 def judged(judge, mutants, n):
-    """The first n of the draws that count, and those before them that don't, in the order of the draws."""
+    """Returns the first n of the draws that count, and those before them that don't, in the order of the draws."""
     counted, todo = 0, collections.deque()
     with concurrent.futures.ThreadPoolExecutor(judge.tree.jobs) as pool:
         try:

@@ -17,11 +17,11 @@ MOST_MEMORY, MOST_FILE = 8 << 30, 2 << 30  # of one process of a test: a mutant 
 
 
 class Failed(Exception):
-    """What can't go on: one line."""
+    """An error that ends the run, in one line."""
 
 
 class Children:
-    """Processes that run, each with a group of its own, so that they can be ended with all that they started."""
+    """The processes that run. Each has a group of its own, so that they can be ended with all that they started."""
 
     def __init__(self):
         self.lock, self.groups, self.is_over = threading.Lock(), set(), False
@@ -74,7 +74,7 @@ def files_below(part):
 
 
 def sources():
-    """Of the product, in order."""
+    """Returns the sources of the product, in order."""
     return sorted(name for part in PRODUCT for name in files_below(part) if name.endswith((".c", ".h", ".cpp")))
 
 
@@ -120,7 +120,7 @@ class Tree:
     # ---- what is in it
 
     def programs(self):
-        """FOLDER/test_NAME of all."""
+        """Returns FOLDER/test_NAME of all."""
         return [os.path.relpath(name, f"{self.path}/tests")[:-2]
                 for folder in FOLDERS for name in sorted(glob.glob(f"{self.path}/tests/{folder}/test_*.c"))]
 
@@ -136,7 +136,7 @@ class Tree:
         return self.children.run(command, cwd=self.path, env=self.env)
 
     def call(self, command):
-        """What it printed. A command that fails ends all."""
+        """Returns the output. A command that fails ends all."""
         status, said = self.attempt(command)
         if status != 0:
             raise Failed(f"{' '.join(command)[:200]}: {said.strip()[-2000:]}")

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Libraries that are loaded when they are asked for: their calls, and one that they lack. */
+/* Each library that is loaded late is found, and a call that it lacks is said. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -9,7 +9,6 @@
 
 #include "core/late.h"
 
-/* Each by a call that has no arguments, or any. */
 static void each_is_there(void **state)
 {
     (void)state;

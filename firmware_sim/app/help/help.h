@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* scanhead help: what the program says of itself, for people, for man and for a shell.
  *
- * In: the list of commands (main.c) and their tables, the table of configuration keys. Out: the help's text, manual pages
- * as roff, a completion for bash. No command or option is named here: what --help has, pages and completion have. */
+ * In: the list of commands (app.h) and their tables, the table of configuration keys. Out: the help's text, manual
+ * pages as roff, a completion for bash. No command or option is named here: what --help has, pages and completion
+ * have. */
 #ifndef FIRMWARE_SIM_APP_HELP_HELP_H
 #define FIRMWARE_SIM_APP_HELP_HELP_H
 

@@ -88,7 +88,7 @@ static void put_command(const struct app_command *command)
     put_ends("scanhead", "1");
 }
 
-/* Names of the commands that scanheadd has. */
+/* It names the commands that scanheadd has. */
 #define SPACED(name) " " #name
 #define NOTHING(name)
 static const char HEAD_ALONE[] = APP_COMMANDS(SPACED, NOTHING);

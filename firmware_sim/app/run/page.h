@@ -1,14 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* The place for what a head that runs tells a page beside its stream. `run` only opens, starts and closes it. The main of
- * scanhead fills the place (firmware_sim/app/studio/watch); that of scanheadd leaves it empty, and its page shows the
- * stream alone.
+/* A head that runs tells a page more than its stream: this is the place for it. `run` only opens, starts and closes
+ * it. The main of scanhead fills the place (firmware_sim/app/studio/watch); that of scanheadd leaves it empty, and
+ * its page shows the stream alone.
  *
  *     open(cfg, site, &options, &watch, err)            before the loop is made
  *     loop_options.extra = link(watch), loop_options.web = source(watch); loop_create(...)
  *     start(watch, err); loop_start(...)
  *     ...
- *     loop_free(...); close(watch)                      before device and site go
- */
+ *     loop_free(...); close(watch)                      before device and site go */
 #ifndef FIRMWARE_SIM_APP_RUN_PAGE_H
 #define FIRMWARE_SIM_APP_RUN_PAGE_H
 
@@ -30,11 +29,11 @@ enum { WATCH_SCENE_TRIANGLES = 100000 };
 #define WATCH_CPU_SHARE 0.05
 
 struct run_page {
-    /* Builds what the observer needs: index of distances, cells of coverage, the coarse scene. report hears of it, and is
-     * warned of what there is no room for. cfg and site outlive the watch. On failure *out is NULL. */
+    /* Builds what the observer needs: index of distances, cells of coverage, the coarse scene. report hears of it,
+     * and is warned of what there is no room for. cfg and site outlive the watch. On failure *out is NULL. */
     int (*open)(const struct config *cfg, const struct site *site, const struct watch_options *options,
                 struct watch **out, struct sh_err *err);
-    /* For the loop, which takes its descriptor over. */
+    /* The loop takes its descriptor over. */
     const struct link_spec *(*link)(struct watch *watch);
     /* Its get may be called by any thread from open until close. */
     const struct web_source *(*source)(const struct watch *watch);
@@ -42,7 +41,7 @@ struct run_page {
     void (*close)(struct watch *watch);
 };
 
-/* Before the command runs; page outlives it. */
+/* Call it before the command runs; page outlives it. */
 void run_take_page(const struct run_page *page);
 
 #endif

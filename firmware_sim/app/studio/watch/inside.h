@@ -97,6 +97,7 @@ struct watch {
     struct watch_seen seen;
     struct watch_scan at; /* the scan at hand */
     int fresh;            /* a scan began, and none of its points has come */
+    int missed;           /* frames were lost on the way here: a scan's end may be among them */
     int dirty;            /* something came since the last figures */
     int64_t began_ns, began_thread_ns, published_ns, publish_ns;
     uint64_t lost_frames;

@@ -27,7 +27,8 @@ static int is_about(const struct georef *georef, const struct scanhead_info *inf
     return fabs(d[0]) <= info->scale[0] && fabs(d[1]) <= info->scale[1] && fabs(d[2]) <= info->scale[2];
 }
 
-/* A georeference about the place that the stream says: of the station's, which may have moved since. 0: there is none. */
+/* A georeference about the place that the stream says: of the station's, which may have moved since. 0: there is
+ * none. */
 static int follow_georef(struct watch *w, const struct georef *of, const struct scanhead_info *info)
 {
     struct sh_err err;
@@ -42,8 +43,8 @@ static void let_go(struct watch *w)
     w->now_georef = NULL;
 }
 
-/* Of the settings and the place that the scan is made with; gives the site that has them. Where the scan is over already,
- * the configuration's settings have to do, at the place that the stream says. */
+/* Of the settings and the place that the scan is made with; gives the site that has them. Where the scan is over
+ * already, the configuration's settings have to do, at the place that the stream says. */
 static const struct site *find_head(struct watch *w, const struct scanhead_info *info)
 {
     const uint32_t station = info->station - 1;
@@ -177,6 +178,7 @@ static void take_frame(struct watch *w, const struct scanhead_frame *frame)
     }
     if (frame->type == SCANHEAD_TELEMETRY) take_telemetry(w, frame);
     if (frame->type != SCANHEAD_EVENT) return;
+    if (frame->event == SCANHEAD_EV_READER_LOST) w->missed = 1;
     if (frame->event == SCANHEAD_EV_SCAN_END) end_scan(w);
     if (frame->event == SCANHEAD_EV_SCAN_START) {
         end_scan(w);
@@ -184,11 +186,13 @@ static void take_frame(struct watch *w, const struct scanhead_frame *frame)
     }
 }
 
-/* Nothing has come for QUIET times NEXT_MS. At the pace `fast` no time passes for an idle head, so it sends no telemetry:
- * where the end of its scan was lost, nothing else says that it is over. */
+/* Nothing has come for QUIET times NEXT_MS. At the pace `fast` no time passes for an idle head, so it sends no
+ * telemetry: where the end of its scan was lost, nothing else says that it is over. */
 static void rest(struct watch *w)
 {
-    if (device_scans(w->options.device) == 0 || device_rests_from(w->options.device) == UINT64_MAX) return;
+    if (!w->missed || device_scans(w->options.device) == 0 || device_rests_from(w->options.device) == UINT64_MAX)
+        return;
+    w->missed = 0;
     if ((w->at.scan != 0 && !w->fresh) || follow_scan(w)) end_scan(w);
 }
 

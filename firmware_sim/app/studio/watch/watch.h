@@ -1,17 +1,17 @@
 /* SPDX-License-Identifier: MIT */
-/* What a head that runs tells a page beside its stream: what it is (/head), the scene, coarse (/scene), the plan (/plan),
- * and how good the scan is while it is on (/quality). README.md has the formats.
+/* A head that runs tells a page this beside its stream: what it is (/head), the scene, coarse (/scene), the plan
+ * (/plan), and how good the scan is while it is on (/quality). README.md has the formats.
  *
- * In: configuration and site. Out: a link for the loop (a client like any other, whose other end the observer reads), and
- * a source for web links. The observer is a thread at the lowest priority that looks at some of the points; a loop never
- * waits for it, unless asked to. Then it has the priority of the loop's threads. Where nobody opens a watch, nothing of
- * this costs anything. */
+ * In: configuration and site. Out: a link for the loop (a client like any other, whose other end the observer
+ * reads), and a source for web links. The observer is a thread at the lowest priority that looks at some of the
+ * points; a loop never waits for it, unless asked to. Then it has the priority of the loop's threads. Where nobody
+ * opens a watch, nothing of this costs anything. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_WATCH_WATCH_H
 #define FIRMWARE_SIM_APP_STUDIO_WATCH_WATCH_H
 
 #include "firmware_sim/app/run/page.h"
 
-/* For run_take_page. */
+/* main.c gives it to run_take_page. */
 extern const struct run_page watch_page;
 
 #endif
