@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* A USB gadget of the Linux kernel, made through configfs: identity, strings, one configuration, FunctionFS
- * for what this program does itself, if there is any, and f_acm for a CDC-ACM console. Private to the functionfs
- * back end.
+/* A USB gadget of the Linux kernel, made through configfs: identity, strings, one configuration, f_acm for a
+ * CDC-ACM console, and FunctionFS for all other interfaces, if there are any. Private to the functionfs back
+ * end.
  *
  * Why f_acm: FunctionFS takes no class-specific interface descriptors (type 24h), without which no host knows
  * a CDC console. The kernel's has them; what it lacks is described in functionfs_private.h. */
@@ -40,7 +40,7 @@ int gadget_describe(const struct gadget *gadget, int ep0, const struct usb_ident
 int gadget_bind(struct gadget *gadget, const char *udc, struct sh_err *err);
 /* Without FunctionFS, after binding: state_fd, which poll(2) reports with POLLPRI when the state has changed. */
 int gadget_watch_state(struct gadget *gadget, struct sh_err *err);
-/* The host has configured it. before: what was said last, which still holds while the bus is suspended. */
+/* Whether the host has configured it. before: the last answer, which still holds while the bus is suspended. */
 int gadget_is_configured(const struct gadget *gadget, int before);
 /* "full", "high", "super". */
 const char *gadget_rate_name(enum usb_rate rate);

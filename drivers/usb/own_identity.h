@@ -12,7 +12,7 @@
 
 enum { USB_MAX_HEADS = 126 }; /* USB/IP shows them as devices 2 to 127 of one bus */
 
-/* Descriptors that hold what a head has for itself, until they are closed; -1: none. */
+/* Descriptors that reserve a head's number and serial number until they are closed; -1: none. */
 struct usb_claims {
     int number, place;
 };
