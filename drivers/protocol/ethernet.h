@@ -50,9 +50,9 @@ struct tcp_talk {               /* begins with both ends, and zeros */
     uint32_t acked[2];          /* sequence number up to which each has acknowledged the other end's bytes */
 };
 
-/* Each puts one frame of the end `side`, and returns its length; 0: none is needed. */
+/* Each function writes one frame of the end `side`, and returns its length; 0: none is needed. */
 
-/* The handshake: of side 0, of side 1, and then tcp_put_ack of side 0. */
+/* The handshake is tcp_put_syn for side 0, then for side 1, then tcp_put_ack for side 0. */
 size_t tcp_put_syn(struct tcp_talk *talk, int side, uint8_t *to);
 /* 1 <= len <= ETHERNET_MAX_SEGMENT; it acknowledges all that came so far. */
 size_t tcp_put_data(struct tcp_talk *talk, int side, const void *data, size_t len, uint8_t *to);

@@ -84,8 +84,8 @@ static void destroy(void *protocol)
     free(protocol);
 }
 
-/* What comes next does not belong to what came before. The device has no packets with holes. Nobody was too slow:
- * the head never sent the pulses that would fill this one. */
+/* The next pulse does not follow the last one, so the packet is dropped: the device has no packets with holes. The
+ * reader was not too slow: the head never sent the pulses that would fill the packet. */
 static void fall_out_of_step(struct velodyne *v)
 {
     v->host.count(v->host.ctx, PROTOCOL_PULSES_UNSENT, v->n_firings);
@@ -157,15 +157,15 @@ static void put_entry(struct velodyne *v, uint8_t *at, const struct native_point
     at[2] = refl;
 }
 
-/* What came back, in 0.01 dB, up to a constant of the head: by reflectance and by the square of the range.
- * Without modelled reflectances all are alike, and the nearest is the strongest. */
+/* Received power in 0.01 dB, up to a constant of the head: from the reflectance and the square of the range.
+ * Without modelled reflectances the nearest is the strongest. */
 static double strength_cdb(const struct native_point *p)
 {
     const double refl_cdb = p->refl_cdb == (int16_t)LINE_REFL_NONE ? 0.0 : p->refl_cdb;
     return refl_cdb - 2000.0 * log10(p->a);
 }
 
-/* Of n points from `first` on. */
+/* The index of the strongest of n points from `first` on. */
 static uint32_t strongest(const uint8_t *payload, uint32_t first, uint32_t n)
 {
     double best_cdb = -INFINITY;

@@ -208,7 +208,7 @@ static void put_column(FILE *out, const struct ply_facts *facts, const struct co
             c->name);
 }
 
-/* Of the rest of its lines, so much goes into the header. */
+/* How much of the names and of the padding goes into the header. */
 struct filling {
     size_t names, padding; /* bytes */
     uint64_t n_left_out;

@@ -121,8 +121,8 @@ static int usbip_prepare(void *backend, struct pollfd *fds)
     return N_FDS;
 }
 
-/* A free place, or that of the one which has been here longest without importing: one host at most has
- * imported. */
+/* A free place, or that of the connection that has been here longest without importing. There always is one, since
+ * at most one host has imported. */
 static struct usbip_conn *make_room(struct usbip *self)
 {
     struct usbip_conn *oldest = NULL;

@@ -8,8 +8,8 @@ import {dot, sub} from './view_camera.js';
 // Four pixels beside the pointer count as much as lying a tenth further away.
 const PIXELS_PER_DEPTH = 4 / Math.log(1.1);
 
-// Can a box have a place at most `slope` from the ray, per length along it? By the sphere around it: never false where
-// it has. centre, half: relative to the eye.
+// Whether a box may have a place at most `slope` from the ray, per length along it. It tests the sphere around the box,
+// so it may be true without such a place. centre, half: relative to the eye.
 function meets(block, eye, forward, slope) {
   const c = [0, 1, 2].map((a) => 0.5 * (block.lo[a] + block.hi[a]) - eye[a]);
   const r = 0.5 * Math.hypot(...[0, 1, 2].map((a) => block.hi[a] - block.lo[a]));

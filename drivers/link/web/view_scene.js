@@ -57,7 +57,7 @@ export class Solids {
     return null;
   }
 
-  // Those of the kept picture, under the points.
+  // The parts of the kept picture, under the points.
   parts(camera, colours) {
     const parts = [];
     if (this.sceneMesh && this.sceneMode === 'solid') {
@@ -67,7 +67,8 @@ export class Solids {
     return parts;
   }
 
-  // Those over it, each time it is shown. behind: the kept picture's depth; plain: of the scene its longest edges alone.
+  // Draws over the kept picture, each time it is shown. behind: that picture's depth; plain: only the longest edges of
+  // the scene.
   overlay(camera, colours, stations, behind, plain) {
     const {gl} = this;
     gl.enable(gl.DEPTH_TEST);
