@@ -39,7 +39,7 @@ static void geocentric(double lat_deg, double lon_deg, double h, double p[3])
     p[2] = (n * (1 - e2) + h) * s;
 }
 
-/* What geo points have in common once x, y, z and range_m are set. */
+/* Sets the other members of a geo point, once x, y, z and range_m are set. */
 static inline void end_geo(struct scanhead_point *p)
 {
     p->mirror_rad = p->pan_rad = NAN;

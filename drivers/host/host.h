@@ -52,7 +52,7 @@ struct host_kept {
     size_t bytes;
 };
 
-/* What the stream has said of time. */
+/* Times reported by the stream. */
 struct host_times {
     int have_scan_t0, have_gps;
     int64_t scan_t0_ns;        /* device time of the scan's start */

@@ -99,7 +99,7 @@ int scanhead_list_usb(struct scanhead_usb_head *heads, int max, char *err, size_
  * meanwhile are kept, and scanhead_next() gives them later. It keeps at most 64 MiB of them; then it drops
  * the oldest and counts them (stats.dropped). A reply "ERR n,..." is returned as it is, with SCANHEAD_OK: the
  * command was answered. Before the first command on a "tty:" it sends an empty line and *IDN?, and skips all
- * reply lines up to the answer to *IDN?: before raw mode the terminal may have echoed to the head what the
+ * reply lines up to the answer to *IDN?. For before raw mode the terminal may have echoed to the head what the
  * head sent. It does the same after SCANHEAD_ETIMEOUT, since the reply may still come. */
 int scanhead_command(struct scanhead *sh, const char *command, char *reply, size_t reply_len, int timeout_ms);
 
@@ -155,7 +155,7 @@ struct scanhead_frame {
  * come after newer ones are left out and counted, see scanhead_on_notice. */
 int scanhead_next(struct scanhead *sh, struct scanhead_frame *frame, int timeout_ms);
 
-/* What may be wrong with a stream. Each event gives one notice. Losses are counted in two independent ways:
+/* Notices about a stream, one for each event. Losses are counted in two independent ways:
  *   By frame number: GAP, REPEATED, LATE, RESTARTED. Each frame that did not come in order is in one GAP, even if it
  *   comes later. Only a restart hides missing frames. The n of all GAPs add up to stats.seq_lost.
  *   By byte: BAD_PAYLOAD, BAD_BYTES, CUT. Each byte that belongs to no frame and no reply is in one of them. Their n
@@ -360,8 +360,8 @@ int scanhead_to_scene(struct scanhead *sh, struct scanhead_point *points, uint32
 
 /* GPS time of t_ns since the scan's start (scanhead_point.t_ns) by the head's clock, in LAS's adjusted
  * standard form: seconds since 1980-01-06T00:00:00Z without leap seconds, less 1e9. Add 1e9 and divide by
- * 604800 for week and second of week. It is valid for frames up to the one that scanhead_next returned last,
- * since it counts from the last time that the head reported: at the scan's start and each second (events
+ * 604800 for week and second of week. It is valid for frames up to the one that scanhead_next returned last.
+ * It counts from the last time that the head reported, at the scan's start and each second (events
  * SCAN_START, PPS, TIME). It is exact to the nanosecond where the head's clock has no drift; a double of that
  * size has steps of 0.12 us. SCANHEAD_ESTATE where the head doesn't know the time, or before the time and the
  * scan's start have come. Where the head knows the time, it comes before the first points that can be

@@ -71,7 +71,7 @@ struct link_event {
     char peer[200]; /* of LINK_OPENED, LINK_CLOSED, LINK_REFUSED: the other side's name, for the log */
 };
 
-/* Injected faults: what a link can be told to do wrong. */
+/* Faults that can be injected into a link. */
 enum link_fault {
     LINK_FAULT_DISCONNECT,        /* ends the session at once; what was not taken by the other side is lost */
     LINK_FAULT_UNPLUG,            /* ends all sessions, and the endpoint is not there until LINK_FAULT_PLUG */
@@ -137,7 +137,7 @@ struct link_ops {
 
 /* From the one list of links, in link.c. NULL for an unknown type. */
 const struct link_ops *link_ops_get(enum link_type type);
-/* What a link of this spec can be told to do wrong: LINK_FAULT_BIT of each, without LINK_FAULT_PLUG. */
+/* The faults that can be injected into a link of this spec: LINK_FAULT_BIT of each, without LINK_FAULT_PLUG. */
 uint32_t link_faults(const struct link_spec *spec);
 
 #endif

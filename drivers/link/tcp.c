@@ -240,7 +240,7 @@ static ssize_t tcp_write(void *link, int session, const void *buf, size_t len)
     return moved(link, self, socket_write(self->fd, buf, len));
 }
 
-/* What was written goes out, then the end of the stream; the client's own end is not waited for. */
+/* Sends what was written, then the end of the stream, and does not wait for the client's own end. */
 static void tcp_end(void *link, int session)
 {
     struct tcp_session *self = tcp_session(link, session);

@@ -88,7 +88,7 @@ static double usb_capacity(const void *link)
     return rate[usb_device_identity(self->head.device)->highest];
 }
 
-/* What came in a session that is over, and is not read yet. */
+/* Number of unread bytes from a session that is over. */
 static size_t left_over(const struct usb_link *self, int i)
 {
     const uint8_t out = row_of(self, i)->out;

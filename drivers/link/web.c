@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* The web link: the page and its owner's resources by HTTP, the stream and commands by WebSocket, on one port.
  *
- * A session is a WebSocket at /ws. What the owner writes in one call goes out as one message: text where its first byte
- * is ASCII (replies), binary otherwise (frames). What comes in is text, whose lines are commands; the last line of a
- * message need not have an end. So frames, replies and commands are those of the protocol, and nothing is cut.
+ * A session is a WebSocket at /ws. The bytes that the owner writes in one call go out as one message: text if the first
+ * byte is ASCII (replies), else binary (frames). Messages of clients are text, whose lines are commands; the last line
+ * of a message need not have an end. So frames, replies and commands are those of the protocol, and none is cut.
  *
- * libwebsockets does HTTP and WebSocket, and waits (lws_service) for its connections, for the listening socket and
- * for the owner's wake-up, which are given to it as plain descriptors. All is done in the owner's thread.
+ * libwebsockets does HTTP and WebSocket, and waits (lws_service) for its connections, for the listening socket and for
+ * the owner's wake-up, which are given to it as plain descriptors. All is done in the owner's thread.
  *
  * Another site's page must not read or command a head on somebody's machine. A browser sends Host, the name in its
  * address bar, and Origin, the page that asks. So a Host that is neither a number nor a name of this machine is refused

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* Connections until their first request is whole. The request is judged here as it comes, without taking it out of the
  * socket. A wrong one is answered at its first wrong byte, and libwebsockets never sees it. For a correct one
- * libwebsockets gets a new request that has only what it needs, and nothing of what follows the request: it would close
- * without a word where there are more fields or arguments than it has room for, and act on fields that we don't support
- * (h2c). */
+ * libwebsockets gets a new request with only the fields that it needs, and nothing of what follows the request. With
+ * more fields or arguments than it has room for it would close without a word, and it would act on fields that we don't
+ * support (h2c). */
 #include <errno.h>
 #include <poll.h>
 #include <stdio.h>

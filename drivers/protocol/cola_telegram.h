@@ -15,7 +15,7 @@
 
 enum cola_form { COLA_A, COLA_B };
 
-/* What `sFA` says: SICK's numbers (COLA.md has the list and its sources). */
+/* Errors in an `sFA`, by SICK's numbers (COLA.md has the list and its sources). */
 enum cola_error {
     COLA_LATER = -1, /* no error: the answer comes later */
     COLA_OK = 0,

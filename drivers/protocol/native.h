@@ -341,16 +341,16 @@ void native_parser_init(struct native_parser *parser);
 uint8_t *native_parser_room(struct native_parser *parser, size_t *room); /* room is never 0 after NATIVE_MORE */
 void native_parser_added(struct native_parser *parser, size_t n);
 enum native_item native_parser_next(struct native_parser *parser);
-/* Nothing more will be added. What waits for more bytes is then searched as garbage, so that whole frames
- * after a cut one come out at the end of a recording too. */
+/* Nothing more will be added. An incomplete frame is then searched as garbage, so that whole frames after a cut
+ * one come out at the end of a recording, too. */
 void native_parser_finish(struct native_parser *parser);
 /* After native_parser_finish() and all its items: bytes of another connection to the same head will follow.
  * Counters and sequence go on; native_sequence_resume(). Items that were not taken are bad bytes. */
 void native_parser_resume(struct native_parser *parser);
 
-/* 1 if a frame with this header belongs to stream_sha256: the hash runs over u8 type, u32 length (LE) and the
- * payload of each descriptor, emitter, anchor, points, line-end, poses, attributes and colours frame that has
- * neither NATIVE_REPEAT nor NATIVE_LOCAL. */
+/* 1 if a frame with this header belongs to stream_sha256. These are descriptor, emitter, anchor, points, line-end,
+ * poses, attributes and colours frames with neither NATIVE_REPEAT nor NATIVE_LOCAL. The hash runs over u8 type,
+ * u32 length (LE) and the payload of each. */
 int native_is_hashed(const struct native_header *header);
 
 #endif

@@ -196,7 +196,7 @@ static size_t put_colours(uint8_t *dst, size_t cap, const struct line_block *blo
     return put_header(dst, NATIVE_COLOURS, 0, payload_len, t_ns);
 }
 
-/* What follows a points frame: 0 where there is no room for it. */
+/* Attributes and colours behind a points frame; 0: there is no room. */
 static size_t put_beside(uint8_t *dst, size_t cap, const struct line_block *block, uint32_t first,
                          const struct native_points *points, int64_t t_ns)
 {

@@ -11,7 +11,7 @@
 
 struct native_header;
 
-/* What is noticed of a stream. The values are those of enum scanhead_notice_kind, which says what each means. */
+/* Kinds of notices. The values are those of enum scanhead_notice_kind, which explains each. */
 enum native_notice_kind {
     NATIVE_NO_NOTICE = 0,
     NATIVE_GAP = 1,
@@ -57,8 +57,8 @@ struct native_sequence {
 enum native_notice_kind native_sequence_take(struct native_sequence *sequence, const struct native_header *header,
                                              uint32_t *first, uint32_t *n);
 
-/* What follows comes on another connection. The first frame there is REPEATED only if it is the one that came last, and
- * never LATE: the head may have started again. */
+/* Frames now come on another connection. The first of them is REPEATED only if it equals the last one of the old
+ * connection, and it is never LATE: the head may have started again. */
 void native_sequence_resume(struct native_sequence *sequence);
 
 #endif

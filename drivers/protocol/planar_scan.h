@@ -20,7 +20,7 @@ enum {
     PLANAR_UNSEEN = 0xff,
 };
 
-/* What descriptor and emitter frames say. */
+/* A head as descriptor and emitter frames describe it. */
 struct planar_head {
     int known;         /* 0: none came, or it is not planar, or has more steps than fit. The rest is then void */
     uint32_t steps, n; /* steps of a turn; those that are cast */

@@ -29,7 +29,7 @@ enum protocol_id {
     PROTOCOL_N
 };
 
-/* What a protocol needs of the stream. */
+/* Requirements of a protocol on the stream. */
 enum protocol_needs {
     PROTOCOL_NEEDS_POLAR = 1 << 0,      /* output.layout: polar */
     PROTOCOL_NEEDS_ATTRIBUTES = 1 << 1, /* output.attributes: on; amplitudes are LINE_AMPLITUDE_NONE without
@@ -47,7 +47,7 @@ enum protocol_pps {
     PROTOCOL_PPS_ERROR, /* they come at other times than the clock's full seconds */
 };
 
-/* What is counted of a session beside the frames it lost. */
+/* Counts of a session, beside the frames it lost. */
 enum protocol_count {
     PROTOCOL_UNITS_LOST,    /* units that were not sent: no room, or parts of them were missing */
     PROTOCOL_INPUT_LOST,    /* bytes from the client that were thrown away: overlong, out of frame, garbage */
@@ -58,8 +58,8 @@ enum protocol_count {
     PROTOCOL_N_COUNTS
 };
 
-/* What the owner of a session does for its protocol. ctx is the owner's. All of it may be called from within
- * any op but create and destroy. */
+/* Services of a session's owner for its protocol. ctx is the owner's. All of them may be called from within any
+ * op but create and destroy. */
 struct protocol_host {
     void *ctx;
     /* Queues one unit for the client, whole or not at all. 0; or 1: there was no room, it is lost. The owner
@@ -88,7 +88,7 @@ struct protocol_host {
 
 enum { PROTOCOL_MAX_GEOMETRIES = 8 };
 
-/* What a protocol says of the head; constant, and outlives the instance. The rest stands in the descriptor. */
+/* Facts about the head that the descriptor doesn't have; constant, and outlives the instance. */
 struct protocol_identity {
     char maker[32], model[64]; /* of the head profile */
     char profile[32];          /* its name */

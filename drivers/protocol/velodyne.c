@@ -22,7 +22,7 @@
  *   1206 +----------------------------------------------+ */
 enum { AT_TIME = 1200, AT_MODE = 1204, AT_MODEL = 1205, ENTRY_LEN = 3, FLAG = 0xeeff };
 
-/* Reflectivities by 0.01 dB. What is below reads 0, what is above 255. */
+/* Range of the table of reflectivities, 0.01 dB. A reflectance below it gives 0, one above it 255. */
 enum { REFL_LEAST_CDB = -2302, REFL_MOST_CDB = 3080, N_REFL = REFL_MOST_CDB - REFL_LEAST_CDB + 1 };
 
 struct velodyne {
@@ -194,7 +194,7 @@ static void put_azimuth(const struct velodyne *v, uint8_t *block, uint32_t pan_c
     le_put16(block + 2, (uint16_t)((uint32_t)(pan_count * v->azimuth_per_count + 0.5) % 36000u));
 }
 
-/* What the odd block of a pair has: the strongest of n > 1 returns, or where that is the last one, the second
+/* The return for the odd block of a pair: the strongest of n > 1 returns or, if that is the last one, the second
  * strongest. */
 static void find_other(const uint8_t *payload, uint32_t first, uint32_t n, struct native_point *out)
 {

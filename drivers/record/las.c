@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* .las: LAS 1.4, point data record format 6 (7 with colour) followed by the label; one record per echo. On
- * request LAS 1.2 for older readers: format 1 (3), five returns, no labels, scan angles or attributes. What the
- * numbers mean stands in the file itself (las_header.c).
+ * request LAS 1.2 for older readers: format 1 (3), five returns, no labels, scan angles or attributes. The
+ * file itself describes its numbers (las_header.c).
  *
  * Coordinates are counts of the stream's own scale from the first scan's station. So those of the first scan
  * are the numbers of the stream. Those of other stations are rounded once, by half a count at most. Nothing

@@ -42,7 +42,7 @@ static int ply_begin(void *rec, struct sh_err *err)
     return 0;
 }
 
-/* What is known of the header by now, in the room that it has. */
+/* Makes the header from the facts known by now, in the length of its room. */
 static int make_header(struct ply *ply, int incomplete, char **text, size_t *len, struct sh_err *err)
 {
     uint64_t n_left_out;

@@ -38,7 +38,7 @@ struct ply_facts {
 
 /* Those of the columns that points of the track have. To be called once the track has begun. */
 unsigned ply_columns_there(const struct track *track, unsigned columns);
-/* What the coordinates of the track's points are. */
+/* The meaning of the track's coordinates, in words. */
 const char *ply_crs_text(const struct track *track);
 /* "label N OBJECT | MATERIAL", a line each with `before` in front, of all surfaces that the stream has named so far. */
 void ply_put_names(FILE *out, const char *before, const struct scanhead *sh);

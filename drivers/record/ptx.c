@@ -11,8 +11,8 @@
  * With colours each line goes on with red, green and blue, 0 to 255; all 0 for a place without a point.
  *
  * A PTX grid has one point per shot: the first echo. Intensity is the reflectance as a fraction: 1 for a
- * white Lambertian target and for what is brighter, 0.5 where not modelled. What the grid had no room for is
- * reported at the end, with counts.
+ * white Lambertian target and for what is brighter, 0.5 where not modelled. Echoes without room in the
+ * grid are counted and reported at the end.
  *
  * Places without a shot are bounded, so that a small stream never makes a huge file. A grid has no more lines,
  * and pulses in a line, than the descriptor says a scan can have. All grids of a recording together, also in

@@ -101,7 +101,7 @@ static void set_limits(struct track *t, const struct native_descriptor *d)
     t->max_lines = d->frames > 0 ? whole_u32(d->frames * (ceil(fabs(sweep_s) * lines_hz) + 1)) : UINT32_MAX;
 }
 
-/* What an emitter frame says beyond its descriptor. A turn of beams begins anywhere in a firing sequence. */
+/* Limits from the emitter frame, which the descriptor lacks. A turn of beams begins anywhere in a firing sequence. */
 static void set_emitter_limits(struct track *t)
 {
     if (scanhead_get_emitter(t->sh, &t->emitter) != 0) return;

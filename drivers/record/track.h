@@ -96,9 +96,9 @@ struct track {
     struct track_state state;
 };
 
-/* A new frame of the stream. SH_EFORMAT where the stream goes to what one file can't hold: another CRS,
- * another kind of heights, a head that begins or ceases to move or to send (wanted) attributes or colours, a
- * station number above 65535; where its points have no figure that the colours show. */
+/* Takes a new frame of the stream. SH_EFORMAT if one file can't hold what the stream goes on with: another CRS or
+ * kind of heights, a head that begins or ceases to move or to send (wanted) attributes or colours, a station
+ * number above 65535. SH_EFORMAT also if its points lack the figure that the colours show. */
 int track_frame(struct track *track, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
 
 /* 1 where an echo's position is infinite or NaN, as in a broken stream. It is counted, and the caller leaves it out.

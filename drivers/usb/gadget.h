@@ -17,7 +17,7 @@ struct gadget {
     char udc[256];  /* empty: not bound */
     int tty_number; /* /dev/ttyGSn; -1: no console */
     int state_fd;   /* of its controller's state, where there is no FunctionFS to report it; -1: none */
-    /* What FunctionFS carries, numbered from 0 as it wants it: the model without the console. */
+    /* The part of the model that FunctionFS carries: all but the console, numbered from 0 as FunctionFS wants it. */
     struct usb_model part;
     struct usb_interface_row row[USB_MAX_INTERFACES];
     struct usb_function_row function[USB_MAX_INTERFACES];
@@ -46,7 +46,7 @@ int gadget_is_configured(const struct gadget *gadget, int before);
 const char *gadget_rate_name(enum usb_rate rate);
 /* 0: its controller sees no host. */
 int gadget_is_on_bus(const struct gadget *gadget);
-/* Of the bus it is on. */
+/* The rate of the bus it is on. */
 enum usb_rate gadget_rate(const struct gadget *gadget);
 /* SH_EINPUT: the controller it is bound to is not as fast. */
 int gadget_check_rate(const struct gadget *gadget, enum usb_rate wanted, struct sh_err *err);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The head as a USB device, with one of its USB identities, called looks (looks.h): which requests and data of the host
- * begin and end sessions, and the requests of a CDC-ACM port.
+/* The head as a USB device, with one of its USB identities, called looks (looks.h). Requests and data of the host begin
+ * and end sessions; requests to a CDC-ACM port are answered.
  *
  * Native: both the console and the stream take commands and give replies and stream frames. Sessions end when their
  * interface goes away; looks.h says what else ends them. The request that begins the stream ends an open one first. */

@@ -95,7 +95,7 @@ static inline int usb_is_self_powered(const struct usb_model *model)
     return model->self_powered || model->max_power_ma == 0;
 }
 
-/* What differs from one device of a model to the next. */
+/* Properties in which the devices of a model differ. */
 struct usb_identity {
     uint16_t vid, pid;
     char serial[64];       /* UTF-8; empty: no serial number string */

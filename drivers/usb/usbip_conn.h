@@ -42,8 +42,8 @@ void usbip_conn_write(struct usbip_conn *conn);
 void usbip_conn_answer_slow(struct usbip_conn *conn, int (*go_on)(void *ctx), void *ctx);
 /* When the next of these is due; INT64_MAX: there is none. */
 int64_t usbip_conn_due_ns(const struct usbip_conn *conn);
-/* Sends what is queued and waits until the peer has taken it and hung up, timeout_ms at most for each step:
- * closing with requests of the peer unread would throw away replies on their way. */
+/* Sends the queue and waits until the peer has taken it and hung up, timeout_ms at most for each step. Closing
+ * with unread requests of the peer would throw away replies on their way. */
 void usbip_conn_drain(struct usbip_conn *conn, int timeout_ms);
 /* Detaches the device if it was imported here, and frees everything. */
 void usbip_conn_end(struct usbip_conn *conn);

@@ -215,7 +215,7 @@ export class Cloud {
     return this.total;
   }
 
-  /* * The first `total` points that came are of another run of the head, which counts its scans anew. So the next scan
+  /** The first `total` points that came are of another run of the head, which counts its scans anew. So the next scan
    * of a station replaces them, whatever its number. */
   outdate(total) {
     this.#outdated = total;

@@ -20,7 +20,8 @@ export class Losses {
   #counts = null; // the last telemetry
   #say;
 
-  /** say(name, detail): 'lost' and 'scan', as Head's events. What comes has `shots`, the pulses received before it. */
+  /** say(name, detail): 'lost' and 'scan', as Head's events. Events given to this class have `shots`, the pulses
+   * received before them. */
   constructor(say) {
     this.#say = say;
   }
@@ -97,7 +98,7 @@ export class Losses {
     return t !== null && t.scan === scan && STATES[t.state] === 'spin-down' ? t : null;
   }
 
-  // counts: a telemetry's; null: they were lost. Of a scan that this page joined late, what came before it is missing,
+  // counts: a telemetry's; null: they were lost. If this page joined the scan late, the pulses before that are missing,
   // too.
   #end(scan, counts, shots) {
     if (!this.#isRunning || scan !== this.#scan) return;

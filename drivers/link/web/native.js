@@ -20,7 +20,7 @@ export {POINTS};
 export const BESIDE_POINTS = [POINTS, ATTRIBUTES, COLOURS]; // points, and what says more of them
 const HEAD = 40, RECORD = 20, MAX_POINTS = 3274, ROOM = 32768, NO_AMPLITUDE = -32768;
 
-/* * Frames to values. State that PROTOCOL.md calls void is forgotten. A frame that it tells readers to refuse is
+/** Frames to values. State that PROTOCOL.md calls void is forgotten. A frame that it tells readers to refuse is
  * counted, and otherwise ignored. Only callbacks may throw. */
 export class Decoder {
   /** Each callback may be left out: points(batch), descriptor(d), anchor(a), emitter(e), names(list), lineEnd(l),

@@ -32,7 +32,7 @@ const isPrintable = (byte) => byte >= 0x20 && byte <= 0x7e;
 
 /** Takes bytes as they come. It keeps what it has not understood yet: less than a frame, 64 KiB. */
 export class Parser {
-  /* * Callbacks, each of which may be left out: frame(frame), text(line without its end), notice({kind, at_byte, seq,
+  /** Callbacks, each of which may be left out: frame(frame), text(line without its end), notice({kind, at_byte, seq,
    * n, t_ns}). A notice comes before the item that follows it. kind is gap, repeated, late, restarted, bad payload, bad
    * bytes or cut; drivers/host/scanhead.h explains the rest. t_ns is a BigInt, or null before the first frame. */
   constructor({frame, text, notice} = {}) {

@@ -59,7 +59,7 @@ export class Columns {
   }
 }
 
-// What the layouts share, for record i at `at`, which is point number `to`.
+// Sets the columns that both layouts share, from record i at `at` to point number `to`.
 function common(c, to, i, view, at, pulse, t0_ns, tail) {
   const reflectance = view.getInt16(at + 12, true);
   c.reflectance[to] = reflectance === NO_REFLECTANCE ? NaN : reflectance / 100;
@@ -113,7 +113,7 @@ export function polarPlacer(descriptor, anchor) {
   };
 }
 
-/* * The same for a geo stream. `exact` as toScene's. The range is the distance from the anchor, in the CRS or, if that
+/** The same for a geo stream. `exact` as toScene's. The range is the distance from the anchor, in the CRS or, if that
  * is geodetic, straight through space. It is NaN where the head moves, since the anchor is not its place. */
 export function geoPlacer(descriptor, anchor) {
   const {at: exactAt, exact, isFlat} = toScene(anchor), [sx, sy, sz] = anchor.scale, isGeodetic = anchor.crs === 3;

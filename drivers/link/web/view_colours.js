@@ -2,7 +2,7 @@
 // Colours of points: what each mode shows, its ramp and limits, and the legend for it. Pure.
 //
 // A point has one number, which the shader turns into a colour: `ramp` by a table of 256 colours between the limits,
-// `list` by a table of colours by number, `rgb` as it is. What is not known is GREY, not the end of a ramp.
+// `list` by a table of colours by number, `rgb` as it is. An unknown value is GREY, not the end of a ramp.
 
 export const NONE = Math.fround(-1e30); // in place of NaN, which shaders needn't know; the same in a Float32Array
 export const GREY = [128, 132, 138];

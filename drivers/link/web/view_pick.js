@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// What lies under the pointer: the nearest point on the screen, nearer ones before those behind them. Pure.
+// Finds the point under the pointer: the nearest one on the screen; nearer ones win over those behind them. Pure.
 //
 // Only blocks whose box meets the cone around the ray are looked through, 10 ns a point.
 

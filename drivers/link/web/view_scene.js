@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// What is drawn besides points: the coarse scene, a recording's mesh, the stations. Owns their buffers on the GPU.
+// Draws all but the points: the coarse scene, a recording's mesh, the stations. Owns their buffers on the GPU.
 
 import {Mesh, useMesh} from './view_parts.js';
 import {featureEdges, legsMesh, parseScene, stationMesh} from './view_mesh.js';
