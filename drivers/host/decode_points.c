@@ -16,7 +16,7 @@ void host_turn_table(struct scanhead *sh)
     }
 }
 
-/* Point i as on the wire; what all layouts share goes to p. */
+/* Point i as on the wire; members that all layouts share are set in p. */
 static inline struct native_point take(const uint8_t *payload, uint32_t i, int64_t t0_ns, struct scanhead_point *p)
 {
     struct native_point w;

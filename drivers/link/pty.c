@@ -146,7 +146,7 @@ static short pty_now(const struct pty_link *pty)
 static int pty_wait_for_client(struct pty_link *pty)
 {
     if (pty_watch(pty) != SH_OK) return SH_EIO;
-    pty_read_inotify(pty, 0); /* before we look: whoever comes and goes afterwards is noted */
+    pty_read_inotify(pty, 0); /* before we look: a client that comes and goes afterwards is noted */
     short now = pty_now(pty);
     if ((now & POLLHUP) == 0) {
         pty_begin(pty, 1);
@@ -253,7 +253,7 @@ static int pty_unread(void *link, int session)
     return n;
 }
 
-/* ---- faults on request */
+/* ---- injected faults */
 
 /* Ends the session and stops watching the terminal. */
 static void pty_let_go(struct pty_link *pty)

@@ -4,7 +4,7 @@
  * A session is over when its peer resets, takes no more, or vanishes (keep-alive, about 25 s). A peer that shuts down
  * its sending side is LINK_SHUT, and goes on reading. One that has closed its socket looks the same until something is
  * written to it.
- * A client that finds all sessions taken is accepted and closed at once, so that it does not wait in vain. Where
+ * A client that finds all sessions taken is accepted and closed at once, so that it does not wait. Where
  * clients come for one request, the session that has been silent for longest ends instead. A client that comes while
  * another client sends no more gets that one's session, as soon as what was sent has been read. */
 #include <errno.h>
@@ -250,7 +250,7 @@ static void tcp_end(void *link, int session)
     self->state = TCP_ENDED;
 }
 
-/* ---- faults on request */
+/* ---- injected faults */
 
 static int tcp_cut(struct tcp_link *tcp, int session)
 {

@@ -229,7 +229,7 @@ static ssize_t usb_write(void *link, int session, const void *buf, size_t len)
     return SH_ECLOSED;
 }
 
-/* ---- faults on request */
+/* ---- injected faults */
 
 enum {
     USB_FAULTS = LINK_FAULT_BIT(LINK_FAULT_UNPLUG) | LINK_FAULT_BIT(LINK_FAULT_BUS_RESET),

@@ -330,7 +330,7 @@ static ssize_t web_write(void *link, int session, const void *buf, size_t len)
     return (ssize_t)len;
 }
 
-/* ---- faults on request */
+/* ---- injected faults */
 
 void web_break(struct lws *wsi)
 {

@@ -106,7 +106,7 @@ struct web_link {
     int listener, wake_fd, woken;
     int reserve_fd; /* given up when there are no more, to turn a connection away; -1: none */
     int port, n_sessions, n_refused;
-    char refused[64]; /* who came last in vain */
+    char refused[64]; /* the last client that was refused */
     char at[72];      /* "127.0.0.1:40123" */
     char host[64];    /* as the user named it */
     const struct web_source *source;

@@ -251,7 +251,7 @@ static int functionfs_more(const void *backend)
     return self->backlog;
 }
 
-/* ---- faults on request */
+/* ---- injected faults */
 
 static int unplug(struct functionfs *self)
 {

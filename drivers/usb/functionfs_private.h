@@ -104,7 +104,7 @@ struct functionfs {
     int ep0;         /* -1: nothing of the device is FunctionFS's */
     char moved[200]; /* message about endpoints with other addresses than the device's; reported once */
     int moved_due;
-    char unplugged[256]; /* on request, from this controller; empty: it is not */
+    char unplugged[256]; /* unplugged from this controller by an injected fault; empty: it is not */
     int backlog;         /* stopped before everything was looked at */
     struct ffs_pipes pipes;
     struct ffs_console console;

@@ -33,7 +33,7 @@ int scanhead_usb_create(const struct usb_look *look, const struct usb_identity *
 void scanhead_usb_update(struct scanhead_usb *head);
 /* One line, each only once: what has cut sessions off. NULL: nothing. */
 const char *scanhead_usb_cut(struct scanhead_usb *head);
-/* The end of a session has been reported to whoever serves it. */
+/* To be called once the end of a session has been reported to its owner. */
 void scanhead_usb_ended(struct scanhead_usb *head, int session);
 
 #endif

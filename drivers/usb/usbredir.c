@@ -250,7 +250,7 @@ static int64_t usbredir_due_ns(const void *backend)
     return usbredir_slow_due_ns(backend);
 }
 
-/* ---- faults on request. The channel to the virtual machine stays: the device alone is unplugged from it. */
+/* ---- injected faults. The channel to the virtual machine stays: the device alone is unplugged from it. */
 
 static int unplug(struct usbredir *self)
 {

@@ -18,7 +18,7 @@ struct usbredir {
     struct usbredirparser *parser; /* NULL: no connection (yet) */
     int broken;
     int greeted;                                  /* its hello has come */
-    int unplugged;                                /* on request */
+    int unplugged;                                /* by an injected fault */
     struct redir_request *slow_first, *slow_last; /* requests that take their time */
     uint32_t n_slow;
     int (*go_on)(void *ctx);

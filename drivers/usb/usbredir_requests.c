@@ -139,7 +139,7 @@ static void answer_control(struct usbredir *self, uint64_t id, struct usb_redir_
     free(room);
 }
 
-/* ---- requests that take their time, on request */
+/* ---- requests held by an injected fault */
 
 enum { MAX_SLOW = 256 };
 

@@ -206,7 +206,7 @@ export class Target {
   }
 }
 
-// Sets what all programs that place things need. `eye` relative to the thing's origin, split.
+// Sets the uniforms by which a program places things. `eye` is relative to the thing's origin, split.
 export function setPlace(gl, program, camera, eye) {
   const [right, up, forward] = camera.rotation;
   gl.uniform3fv(program.u_eye_hi, eye.hi);
