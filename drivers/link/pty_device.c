@@ -93,7 +93,7 @@ static int link_look(const char *path, const char *slave, struct sh_err *err)
                        err);
 }
 
-/* In place of what is there: 0, or -1 with errno. */
+/* Replaces what is at path by the new symlink: 0, or -1 with errno. */
 static int link_replace(const char *path, const char *slave)
 {
     char beside[300];

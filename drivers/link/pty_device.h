@@ -29,7 +29,7 @@ int pty_device_rest(struct pty_device *device);
  * and slave is another name. SH_EIO: no new pair can be had, and the old one stays. */
 int pty_device_renew(struct pty_device *device);
 
-/* As far as it goes with a client present: what was sent and not read is dropped, settings stay. */
+/* Drops what was sent and not read. Settings stay, since a client may have the slave open. */
 void pty_device_drop_output(struct pty_device *device);
 
 /* Closes the pair and removes the symlink, if it still is ours. */

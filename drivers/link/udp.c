@@ -132,7 +132,7 @@ static int check_receiver(const struct link_spec *spec, struct sockaddr *to, str
     return SH_OK;
 }
 
-/* Where packets go out, and how far. */
+/* Sets the interface that packets go out on, and their TTL. */
 static int set_way(int fd, const struct link_spec *spec, const struct sockaddr *to)
 {
     const int ttl = spec->ttl, is_v4 = to->sa_family == AF_INET;

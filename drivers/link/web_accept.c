@@ -191,7 +191,7 @@ static int look_at_request(struct web_link *web, struct web_conn *conn)
     return ended ? -1 : wait_for_more(fd, (int)n);
 }
 
-/* Its time is over. */
+/* Ends a connection whose time is over. */
 static int give_up(struct web_conn *conn)
 {
     if (conn->place.phase != WEB_ASKING || conn->n_seen == 0) return -1;

@@ -82,7 +82,7 @@ typedef enum cola_error cola_handler(struct cola *self, struct cola_args *args, 
 void cola_deliver(struct cola *self);
 /* sRN LMDscandata: the last scan, or later the first one. */
 cola_handler cola_read_scan;
-/* As at power-up; the settings, too. */
+/* Sets the session and its settings as at power-up. */
 void cola_power_up(struct cola *self);
 
 /* Device time as the scanner counts it: us, 32 bits. */

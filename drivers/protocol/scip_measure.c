@@ -14,7 +14,7 @@ int scip_has_head(const struct scip *s)
     return s->scan.head.known && s->scan.head.last < SCIP_MAX_STEPS;
 }
 
-/* Where no frames show that the head scans, it is asked, and started from rest. */
+/* If no frames show that the head scans, it is asked for its state, and started if it rests. */
 const char *scip_laser_on(struct scip *s)
 {
     enum { LATELY_NS = 500000000 };

@@ -24,7 +24,7 @@ struct velodyne_state {
     uint32_t rpm;
     const char *returns; /* "Strongest", "Last", "Dual"; "" for the head's other selection */
 };
-/* As the head says now. */
+/* Asks the head for its present state. */
 void velodyne_read_state(const struct protocol_spec *spec, struct velodyne_state *out);
 
 /* The address that data are sent to, as far as it is known. */

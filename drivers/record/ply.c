@@ -100,7 +100,7 @@ static inline uint8_t *put_length(uint8_t *to, double v, int as_float)
     return to + (as_float ? 4 : 8);
 }
 
-/* Where the row ends. Inlined where the columns are known, it has no branches. */
+/* Returns the end of the row. Inlined with known columns, it has no branches. */
 static inline __attribute__((always_inline)) uint8_t *put_columns(uint8_t *to, const struct vertex *v, unsigned columns)
 {
     const struct scanhead_point *p = v->point;
@@ -151,7 +151,7 @@ static size_t put_number(char *to, size_t room, int digits, double v)
     return n > 0 && (size_t)n < room ? (size_t)n : room;
 }
 
-/* Where the row ends, or NULL where numbers are absurdly long. */
+/* Returns the end of the row, or NULL if numbers are too long for it. */
 static uint8_t *put_ascii(uint8_t *row, const struct vertex *v, unsigned columns, int degrees)
 {
     const struct scanhead_point *p = v->point;

@@ -15,7 +15,7 @@ extern const struct recorder_ops recorder_mesh_ply;
 
 enum { HEADER_BEGIN = 1 << 16, HEADER_MOST = 64 << 20, WORD = 32, NO_COLUMN = -1 };
 
-/* What the header says. */
+/* A header that was read. */
 struct ply_header {
     char *text; /* NUL at its end */
     size_t len;

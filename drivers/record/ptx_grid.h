@@ -22,7 +22,7 @@ struct ptx_cell {
     double p_socs[3];
 };
 
-/* Of a grid, before its cells. */
+/* The head of a grid's file, before its cells. */
 struct ptx_head {
     char magic[8];
     uint64_t text_at; /* bytes of the recording before the text of the grid */

@@ -169,7 +169,7 @@ static int end_text(struct repair *r, struct place *p, struct sh_err *err)
 
 /* ---- the last grid has a file */
 
-/* Its text, from head->text_at on. */
+/* Writes the grid's text, from head->text_at on. */
 static int put_grid(struct repair *r, struct ptx_grid *grid, const struct ptx_head *head, struct place *p,
                     struct sh_err *err)
 {

@@ -47,7 +47,7 @@ struct track_missing {
     uint64_t n_without_colours;    /* echoes whose colour was lost */
 };
 
-/* Where in its scan the stream is; of track.c alone. */
+/* The place of the stream in its scan; only track.c uses it. */
 struct track_state {
     int new_scan, have_next_line;
     uint32_t next_line, last_station, last_scan;

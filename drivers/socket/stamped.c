@@ -147,7 +147,7 @@ int stamped_open(const char *host, int port, struct stamped_socket *out, struct 
     return rc;
 }
 
-/* Where the datagram went to, when it came, and what was thrown away before. */
+/* Reads the datagram's destination, its time, and how many were thrown away before it. */
 static void read_notes(struct msghdr *m, struct stamped_datagram *out)
 {
     for (struct cmsghdr *c = CMSG_FIRSTHDR(m); c != NULL; c = CMSG_NXTHDR(m, c)) {

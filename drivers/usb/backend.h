@@ -26,7 +26,7 @@ struct usb_backend_spec {
     int retry_ms;     /* with attach: time between attempts to come back after the host has let go; 0: 1000 */
 };
 
-/* What fault() of a back end does. UNPLUG: the device and its endpoint are not there until PLUG. RESET: sessions end as
+/* Faults of fault(). UNPLUG: the device and its endpoint are not there until PLUG. RESET: sessions end as
  * by a reset of the bus, or as near to that as the back end's host can be brought. */
 enum usb_fault { USB_FAULT_UNPLUG, USB_FAULT_PLUG, USB_FAULT_RESET };
 

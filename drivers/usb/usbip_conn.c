@@ -16,7 +16,7 @@ enum {
     MAX_READS = 256,          /* in one call: a peer that sends without end must not occupy the thread */
 };
 
-/* Where the host's driver forbids short packets, a host controller makes an error of them. */
+/* If the host's driver forbids short packets, they are an error, as in a host controller. */
 static void return_urb(struct usbip_conn *conn, struct usbip_urb *urb, int status, uint32_t actual)
 {
     enum { WIRE_EREMOTEIO = 121 };

@@ -31,7 +31,7 @@ struct usbip_conn {
 
 /* fd is connected and not blocking; the connection owns it from now on. */
 void usbip_conn_start(struct usbip_conn *conn, int fd, struct usb_device *device, int *taken);
-/* As if the device had been imported: for a host that begins with URBs. */
+/* Imports the device without a request, for a host that begins with URBs. */
 void usbip_conn_import(struct usbip_conn *conn);
 /* Reads and acts until nothing is left, go_on returns 0 or the connection is full; some hundred times at most. */
 void usbip_conn_read(struct usbip_conn *conn, int (*go_on)(void *ctx), void *ctx);

@@ -58,7 +58,7 @@ export function tableOf(mode) {
   return table;
 }
 
-// Which of ECHOES.
+// The index into ECHOES of a packed echo number and count.
 const echoClass = (packed) => {
   const echo = packed & 15, echoes = packed >> 4;
   return echoes <= 1 ? 0 : echo === 1 ? 1 : echo === echoes ? 3 : 2;

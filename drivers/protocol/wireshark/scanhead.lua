@@ -883,7 +883,7 @@ local function known_len(h, bytes, at)
   return math.min(ROWS[h.type].len, h.length)
 end
 
--- What a, b and c of an event are; {name, "s"} is nanoseconds, {name, STATES} a state.
+-- Names of an event's a, b and c; {name, "s"} is nanoseconds, {name, STATES} a state.
 local SECONDS = "s"
 local EVENTS = {
   {"new state", "state before"}, {"scan", "device time of pulse 0", "its GPS time"},
@@ -992,7 +992,7 @@ local function put_header(tree, tvb, at, header_ok, payload_ok)
   if not header_ok then crc:add_proto_expert_info(E.bad_header) end
 end
 
--- What the packet list says of a frame.
+-- The text of a frame in the packet list.
 local function summary(h, bytes, at, m)
   local name = TYPES[h.type] or string.format("Type %d", h.type)
   if m.wrong or h.version ~= 1 then return name .. " [wrong]" end
@@ -1017,7 +1017,7 @@ end
 
 -- ---- the search for frames, as native_parser.c does it
 
--- What a correct header says; nil: these are none. 28 bytes of it are there.
+-- The fields of a header, or nil if it is not correct. 28 bytes have to be there.
 local function header_at(bytes, at)
   if byte(bytes, at + 1) ~= SYNC then return nil end
   local _, kind, version, flags, length, seq, payload_crc = unpack_bytes("<BBBBI4I4I4", bytes, at + 1)
@@ -1294,7 +1294,7 @@ local function conn_of(key, is_stream)
   return conns[key]
 end
 
--- What tells connections apart is taken from pinfo: fields of other dissectors are not there when Wireshark reads a
+-- Connections are identified by pinfo, since fields of other dissectors are not there when Wireshark reads a
 -- capture for the first time and shows nothing yet.
 local PORT_TYPE_TCP = 2
 local function tcp_key(pinfo)
