@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What comes beside the points: attributes and colour of each, sums of each line. */
+/* Stream frames that follow the points: attributes and colour of each point, sums of each line. */
 #include <math.h>
 
 #include "drivers/host/host.h"
@@ -16,7 +16,7 @@ int scanhead_has_colours(const struct scanhead *sh)
     return (sh->descriptor.content & NATIVE_HAS_COLOURS) != 0;
 }
 
-/* The frame that follows the last points as the `after`th one, and is about the same ones. */
+/* Whether the frame is number `after` behind the last points frame, and belongs to the same points. */
 static int is_of_points(const struct scanhead *sh, const struct scanhead_frame *frame, uint32_t after)
 {
     return sh->have_points && frame->seq == sh->points_seq + after && frame->pulse0 == sh->of_points.pulse0 &&

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Recordings as pcapng: the packets of link type 147 (drivers/protocol/pcapng.h) are the stream, one after the other.
  *
- * What follows a block that is cut or damaged goes to the parser as it is. It finds the frames in it, and counts the
- * rest as bad bytes: nothing is left out in silence. */
+ * Bytes after a block that is cut or damaged go to the parser as they are. The parser finds the frames in them, and
+ * counts the rest as bad bytes: nothing is left out in silence. */
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>

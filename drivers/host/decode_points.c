@@ -16,7 +16,7 @@ void host_turn_table(struct scanhead *sh)
     }
 }
 
-/* Point i as on the wire; what all layouts share goes to p. */
+/* Point i as on the wire; members that all layouts share are set in p. */
 static inline struct native_point take(const uint8_t *payload, uint32_t i, int64_t t0_ns, struct scanhead_point *p)
 {
     struct native_point w;
@@ -39,7 +39,7 @@ static void geocentric(double lat_deg, double lon_deg, double h, double p[3])
     p[2] = (n * (1 - e2) + h) * s;
 }
 
-/* What geo points have in common once x, y, z and range_m are set. */
+/* Sets the other members of a geo point, once x, y, z and range_m are set. */
 static inline void end_geo(struct scanhead_point *p)
 {
     p->mirror_rad = p->pan_rad = NAN;
@@ -86,7 +86,7 @@ static void points_geo(const struct scanhead *sh, const struct scanhead_frame *f
 enum { BLOCK = 64 };
 struct polar_block {
     double mirror[BLOCK], pan[BLOCK]; /* turns */
-    int one_mirror;                   /* it stands, as along a ring: of it only what is at 0 is worked out */
+    int one_mirror;                   /* all mirror angles are equal, as along a ring: only index 0 is computed */
     double sin_m[BLOCK], cos_m[BLOCK], sin_pan[BLOCK], cos_pan[BLOCK];
     double mirror_rad[BLOCK], pan_rad[BLOCK];
 };
@@ -101,8 +101,8 @@ VEC_INLINE double floor_of(double x, uint64_t *bits)
 }
 
 /* sin and cos of u[n] >= 0 turns: the table gives whole 1/256 turns, the series the rest. |r| <= pi/256, so the
- * first terms left out, r^7/7! and r^8/8!, are below 2^-56 and 2^-66: nothing against the rounding of u itself, and
- * nothing has to be reduced by a pi that is not exact. */
+ * first terms left out, r^7/7! and r^8/8!, are below 2^-56 and 2^-66, far below the rounding of u itself. Angles in
+ * turns need no reduction by an inexact pi. */
 VEC_CLONES static void sincos_turns(const double *restrict sin_part, const double *restrict cos_part,
                                     const double *restrict u, int n, double *restrict s, double *restrict c)
 {
@@ -149,8 +149,8 @@ static void points_polar(const struct scanhead *sh, const struct scanhead_frame 
                          struct scanhead_point *p, uint32_t n)
 {
     const struct native_descriptor *d = &sh->descriptor;
-    /* The mirror angle is given in the turn around the middle of the line, so that it runs through without a
-     * jump. Other heads' is an elevation. */
+    /* The mirror angle lies within half a turn of the line's middle, so that it has no jump along the line. With other
+     * heads it is an elevation. */
     const double middle = ((double)d->line_start_udeg + (double)d->line_stop_udeg) / 720e6;
     const double lo = (sh->emitter.kind == NATIVE_EMIT_LINE ? middle : 0) - 0.5;
     const double mirror_turns = 1 / d->mirror_counts_per_turn, pan_turns = 1 / d->pan_counts_per_turn;

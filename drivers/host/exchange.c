@@ -36,7 +36,7 @@ static int asks_identity(const char *command)
     return strncasecmp(command + strspn(command, " :"), "*IDN?", 5) == 0;
 }
 
-/* A question of settle() that was given up may be answered yet. That is as it should be, and no notice. */
+/* The late answer to a question of settle() gives no notice. */
 void host_stray_line(struct scanhead *sh)
 {
     if (sh->source.asked > 0 && is_identity(sh->parser.text)) {
@@ -95,7 +95,7 @@ static int wait_writable(struct scanhead *sh, int64_t deadline_ns)
     return rc == 0 && sh->ended ? host_over(sh) : rc;
 }
 
-/* What had come can still be read. */
+/* The head is gone, but what came before can still be read. */
 static int gone_while_writing(struct scanhead *sh, int error)
 {
     host_note_loss(sh, error);
@@ -153,8 +153,8 @@ static int copy_reply(struct scanhead *sh, char *reply, size_t reply_len)
 
 static const char identity_query[] = "*IDN?";
 
-/* Skips lines until every question has its answer. A question that was given up may be lost. So once one
- * answer is there, the others have ANSWERS_MS to come. */
+/* Skips lines until every question has its answer. An earlier question or its answer may be lost. So once one answer
+ * is there, the others have ANSWERS_MS to come. */
 static int pass_over(struct scanhead *sh, int64_t deadline_ns)
 {
     int answered = 0;
@@ -182,11 +182,10 @@ static int is_late(struct scanhead *sh, const char *command)
     return 1;
 }
 
-/* Before the first exchange on a terminal, and after a command that was given up. Between open() and raw mode
- * the terminal echoes what the head sends, and the head takes it for commands; another program may have left
- * half a line. So that line is ended, and the answers to all that are passed over up to the one to a question
- * of our own. An answer behind half a frame of the program before is lost with it: so the question is asked
- * again. */
+/* Comes into step with the replies, before the first exchange on a terminal and after a command that was given up.
+ * Between open() and raw mode the terminal echoes what the head sends, and the head takes it for commands; another
+ * program may have left half a line. So an empty line ends that line, and all replies are skipped up to the answer to a
+ * question of our own. Half a frame for the program before may swallow that answer: so the question is asked again. */
 static int settle(struct scanhead *sh, int64_t deadline_ns)
 {
     static const char question[] = "\n*IDN?\n";
@@ -200,7 +199,7 @@ static int settle(struct scanhead *sh, int64_t deadline_ns)
     }
 }
 
-/* The reply may come yet, and is not that of the next command: come into step before that. */
+/* The reply may still come, and must not count as that of the next command: so settle() comes before that. */
 static void give_up(struct scanhead *sh, const char *command)
 {
     const int asks = asks_identity(command);

@@ -23,8 +23,8 @@ const char *scanhead_version(void)
     return SCANHEAD_VERSION;
 }
 
-/* Tries to open a source until the deadline while it isn't there. wrong_too: also while its name seems wrong,
- * because it was right once. */
+/* Tries to open a source until the deadline, as long as it isn't there. wrong_too: also as long as its name seems
+ * wrong, because it was right once. */
 static int open_in_time(const char *source, int wrong_too, int64_t deadline_ns, struct host_source *out,
                         struct sh_err *err)
 {
@@ -123,7 +123,7 @@ static struct host_node *pop(struct scanhead *sh)
     return node;
 }
 
-/* Drops the oldest frame. What it says of the stream is taken in first, and it stays in the hash. */
+/* Drops the oldest frame. Its facts about the stream are taken in first, and it stays in the hash. */
 static int drop_oldest(struct scanhead *sh)
 {
     struct host_node *node = pop(sh);

@@ -41,8 +41,8 @@ struct host_source {
     struct host_usb *usb;
     struct host_capture *capture; /* of a .pcapng; else NULL */
     int is_file, is_socket;
-    int unsettled;  /* lines may come that answer nothing of ours: on a new terminal, after a time-out */
-    int asked;      /* questions that went out to settle that, and have no answer yet */
+    int unsettled;  /* lines may come that answer no command of ours: on a new terminal, after a time-out */
+    int asked;      /* *IDN? that went out to skip such lines, and have no answer yet */
     char name[256]; /* for messages, and to open it again */
 };
 
@@ -52,7 +52,7 @@ struct host_kept {
     size_t bytes;
 };
 
-/* What the stream has said of time. */
+/* Times reported by the stream. */
 struct host_times {
     int have_scan_t0, have_gps;
     int64_t scan_t0_ns;        /* device time of the scan's start */
@@ -81,7 +81,7 @@ struct scanhead {
     const uint8_t *payload; /* of the frame that scanhead_next returned last */
     int have_points;        /* a points frame has been handed out: */
     uint32_t points_seq;
-    struct native_attributes of_points; /* as its attributes will begin */
+    struct native_attributes of_points; /* how its attributes must begin */
 
     /* what the stream has said, as of the frame handed out last */
     int have_descriptor, have_anchor, have_pulse;
@@ -123,16 +123,16 @@ int host_usb_watch_wait(struct host_usb_watch *watch, int rc, int64_t deadline_n
 
 /* io.c: whether an errno of the source's read or write means that the other side is gone. */
 int host_is_hang_up(const struct scanhead *sh, int error);
-/* What that errno says of a head on USB: unplugged, or its bus reset. */
+/* Notes what that errno means for a head on USB: it was unplugged, or its bus was reset. */
 void host_note_loss(struct scanhead *sh, int error);
 /* Sets and returns the error for when nothing more will come. */
 int host_gone(struct scanhead *sh);
-/* The same, where all that had come was taken: it is noticed, too. */
+/* The same once all that had come was taken: also gives the notice that the connection is over. */
 int host_over(struct scanhead *sh);
 
 /* notices.c: hands on what the parser notices. Called once, after native_parser_init. */
 void host_listen(struct scanhead *sh);
-/* The parser is at a line that answers nothing that is waited for; or at the echo of what was just sent. */
+/* Gives the notice for the parser's present line: nobody waits for it, or it echoes what was just sent. */
 void host_note_line(struct scanhead *sh, int is_echo);
 /* The connection is over, and the parser has given all of it. Once for each connection. */
 void host_note_closed(struct scanhead *sh);

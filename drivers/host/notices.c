@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What is wrong with the stream, as it is found: from the parser, the exchange of lines and the connection to whoever
- * listens. */
+/* Hands notices of the parser, of the exchange of lines and of the connection to the user's function, as they come. */
 #include <string.h>
 
 #include "drivers/host/host.h"

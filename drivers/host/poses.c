@@ -39,7 +39,7 @@ int host_absorb_poses(struct scanhead *sh, const uint8_t *payload, size_t len)
     return 0;
 }
 
-/* Two poses of a frame with a time between them, the latest such; 0 where there is none. */
+/* Finds the latest two poses of one stream frame with t_ns between them; 0 where there are none. */
 static int find(const struct host_poses *poses, int64_t t_ns, const struct native_pose **a,
                 const struct native_pose **b)
 {

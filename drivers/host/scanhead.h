@@ -35,7 +35,7 @@
 extern "C" {
 #endif
 
-/* Of this release, the only place that says it: program, library and libscanhead.pc have the same. */
+/* The version of this release. Program, library and libscanhead.pc take it from here. */
 #define SCANHEAD_VERSION     "1.0.0"
 #define SCANHEAD_API_VERSION 1
 
@@ -76,10 +76,10 @@ void scanhead_close(struct scanhead *sh);
 const char *scanhead_error(const struct scanhead *sh);
 
 /* Waits until the same head is there again, and goes on with it. To be called after SCANHEAD_ELOST,
- * SCANHEAD_ERESET or SCANHEAD_ECLOSED, once all frames that had come were taken. Counters, hash and what the
- * stream has said of itself go on too; a jump in the sequence shows what was lost meanwhile. On USB the same
- * head is the one with the same ids and serial number. SCANHEAD_ESTATE for a file or "fd:N". Any other error: it
- * did not come back in time, or a signal came; call again, or close. */
+ * SCANHEAD_ERESET or SCANHEAD_ECLOSED, once all frames that had come were taken. Counters, the hash and what the
+ * stream has reported so far are kept; a jump in the sequence shows what was lost meanwhile. On USB the same
+ * head is the one with the same ids and serial number. SCANHEAD_ESTATE for a file or "fd:N". Any other error: the
+ * head did not come back in time, or a signal came; call again, or close. */
 int scanhead_reattach(struct scanhead *sh, int timeout_ms);
 
 /* Heads on USB now. */
@@ -99,8 +99,8 @@ int scanhead_list_usb(struct scanhead_usb_head *heads, int max, char *err, size_
  * meanwhile are kept, and scanhead_next() gives them later. It keeps at most 64 MiB of them; then it drops
  * the oldest and counts them (stats.dropped). A reply "ERR n,..." is returned as it is, with SCANHEAD_OK: the
  * command was answered. Before the first command on a "tty:" it sends an empty line and *IDN?, and skips all
- * reply lines up to the answer to that. For until the terminal was in raw mode, it may have echoed to the
- * head what the head sent. It does the same after SCANHEAD_ETIMEOUT, since the reply may still come. */
+ * reply lines up to the answer to *IDN?. For before raw mode the terminal may have echoed to the head what the
+ * head sent. It does the same after SCANHEAD_ETIMEOUT, since the reply may still come. */
 int scanhead_command(struct scanhead *sh, const char *command, char *reply, size_t reply_len, int timeout_ms);
 
 enum scanhead_frame_type { /* as on the wire */
@@ -141,56 +141,57 @@ struct scanhead_frame {
     size_t payload_len;
     const uint8_t *raw; /* the frame as on the wire, header and payload; valid as payload is */
     size_t raw_len;
-    /* of SCANHEAD_POINTS; of SCANHEAD_ATTRIBUTES and SCANHEAD_COLOURS scan_line, n_points and pulse0 alone */
+    /* for SCANHEAD_POINTS; for SCANHEAD_ATTRIBUTES and SCANHEAD_COLOURS only scan_line, n_points and pulse0 */
     uint32_t scan_frame, scan_line, n_points, n_pulses;
     uint64_t pulse0;
     int64_t scan_t0_ns, line_t0_ns; /* since the scan's start: of pulse0, of the line's first pulse */
-    /* of SCANHEAD_EVENT */
+    /* for SCANHEAD_EVENT */
     uint32_t event; /* enum scanhead_event_code */
     uint64_t event_value[3];
     char event_text[96];
 };
 
-/* The next frame, in order. timeout_ms < 0 waits for ever. Frames with a wrong CRC never come out, nor do frames that
- * came already, or after newer ones. All of them are counted, see scanhead_on_notice. */
+/* The next frame, in order. timeout_ms < 0 waits for ever. Frames with a wrong CRC, repeated frames, and frames that
+ * come after newer ones are left out and counted, see scanhead_on_notice. */
 int scanhead_next(struct scanhead *sh, struct scanhead_frame *frame, int timeout_ms);
 
-/* What may be wrong with a stream. Each event gives one notice. Two ways of looking stay apart:
- *   The numbers of frames: GAP, REPEATED, LATE, RESTARTED. A frame that did not come in order is in one GAP, whatever
- *   became of it, but for those that a restart hides. So the n of all gaps are stats.seq_lost.
- *   The bytes: BAD_PAYLOAD, BAD_BYTES, CUT. Each byte that belongs to no frame and no reply is in one of them. So their
- *   n are stats.bad_bytes.
- * A frame that was hurt is in both: its bytes first, then its number, once the next frame shows that it is missing. */
+/* Notices about a stream, one for each event. Losses are counted in two independent ways:
+ *   By frame number: GAP, REPEATED, LATE, RESTARTED. Each frame that did not come in order is in one GAP, even if it
+ *   comes later. Only a restart hides missing frames. The n of all GAPs add up to stats.seq_lost.
+ *   By byte: BAD_PAYLOAD, BAD_BYTES, CUT. Each byte that belongs to no frame and no reply is in one of them. Their n
+ *   add up to stats.bad_bytes.
+ * A damaged frame is counted both ways: first its bytes, then its number, once the next frame shows the gap. */
 enum scanhead_notice_kind {
-    /* Frames are missing: n of them, from seq on. at_byte: of the frame that came instead. Where the head says that the
-     * reader was too slow (SCANHEAD_EV_READER_LOST), it has left them out. */
+    /* n frames are missing, from seq on. at_byte: of the frame that came instead. Where the head reports that the
+     * reader was too slow (SCANHEAD_EV_READER_LOST), the head has left these frames out. */
     SCANHEAD_NOTICE_GAP = 1,
-    /* A frame came once more: number, time, type and checksum are those of one of the last 256. It is not handed out
-     * again. A LOCAL frame has no number; it is compared with the frame before it alone. */
+    /* A frame came again: its number, time, type and checksum equal those of one of the last 256 frames. It is not
+     * handed out again. A LOCAL frame has no number; it is compared only with the frame before it. */
     SCANHEAD_NOTICE_REPEATED = 2,
-    /* A frame that was missing came after newer ones. It is not handed out, and stays counted as lost. The last 64 gaps
-     * are remembered, but for those of more than 65536 frames. 256 such frames in a row are a restart. */
+    /* A frame that was missing came after newer ones. It is not handed out, and stays counted as lost. Only the last 64
+     * gaps of at most 65536 frames are remembered. 256 late frames with consecutive numbers count as a restart. */
     SCANHEAD_NOTICE_LATE = 3,
-    /* The sequence jumps back, and it is neither of the two: a head that started again, or another recording. seq: the
-     * first number of the new sequence. The frame is handed out. How many are missing is not known. */
+    /* The sequence jumps back, and the frame is neither REPEATED nor LATE: the head started again, or this is another
+     * recording. seq: the first number of the new sequence. The frame is handed out. How many are missing is not
+     * known. */
     SCANHEAD_NOTICE_RESTARTED = 4,
-    /* A frame whose header is right, and whose payload is not: seq is its number, t_ns its time. n: bytes of it, up to
-     * the next frame that is right: fewer than its length says where bytes were lost. */
+    /* A frame with a correct header and a wrong payload: seq is its number, t_ns its time. n: its bytes up to the next
+     * correct frame. These are fewer than its length says where bytes were lost. */
     SCANHEAD_NOTICE_BAD_PAYLOAD = 5,
     /* n bytes that belong to nothing: garbage, a frame with a broken header, a broken reply, replies after these up to
      * the next frame. A whole run of them is one notice, before the next frame or reply. */
     SCANHEAD_NOTICE_BAD_BYTES = 6,
-    /* The connection or the recording ended within a frame or a reply: n bytes of it had come. seq: of the frame, where
-     * its header had come. */
+    /* The connection or the recording ended within a frame or a reply, of which n bytes had come. seq: the frame's
+     * number, if its header had come. */
     SCANHEAD_NOTICE_CUT = 7,
     /* The line that was just sent came back before its reply; it was passed over. n: its length. */
     SCANHEAD_NOTICE_ECHO = 8,
     /* A reply came that nobody waits for, after a command that was given up. n: its length. */
     SCANHEAD_NOTICE_LATE_REPLY = 9,
-    /* The same, and no command was given up: a reply that came twice, or lines that a terminal kept. */
+    /* A reply came that nobody waits for, and no command was given up: it came twice, or a terminal had kept it. */
     SCANHEAD_NOTICE_UNASKED = 10,
     /* The connection is over, and all that had come was taken. n: -SCANHEAD_ECLOSED, -SCANHEAD_ELOST or
-     * -SCANHEAD_ERESET. Not of a recording. */
+     * -SCANHEAD_ERESET. A recording gives no such notice. */
     SCANHEAD_NOTICE_CLOSED = 11,
     /* scanhead_reattach has found the head again. */
     SCANHEAD_NOTICE_REATTACHED = 12,
@@ -203,14 +204,14 @@ struct scanhead_notice {
     uint32_t seq;     /* 0 where no number is named above */
     uint64_t at_byte; /* where it begins, in all bytes that this handle has received, over all its connections */
     uint64_t n;       /* as above; 1 for one frame */
-    int64_t t_ns; /* device time of the frame that it is about; of bytes, lines and connections that of the last whole
-                   * frame before, or SCANHEAD_NO_TIME */
+    int64_t t_ns; /* device time of the frame concerned. For bytes, lines and connections: that of the last whole frame
+                   * before, or SCANHEAD_NO_TIME */
 };
 
 /* fn gets each notice, from within scanhead_next, scanhead_command and scanhead_reattach, and in the order of the
  * stream: at_byte never falls. A notice comes before the frame that follows it in the stream. While a command waits for
- * its reply, frames that came earlier may still be kept for scanhead_next. fn may call scanhead_get_stats, which counts
- * the notice already; nothing else on this handle. NULL: nobody listens, as at first. Counters go on either way. */
+ * its reply, frames that came earlier may still be kept for scanhead_next. On this handle fn may only call
+ * scanhead_get_stats, which already counts the notice. NULL, as at first: no function. Counters go on either way. */
 void scanhead_on_notice(struct scanhead *sh, void (*fn)(void *ctx, const struct scanhead_notice *notice), void *ctx);
 /* The kind in lower case, such as "bad payload"; "?" for another number. */
 const char *scanhead_notice_name(int kind);
@@ -250,12 +251,12 @@ int scanhead_attributes(struct scanhead *sh, const struct scanhead_frame *frame,
  * descriptor has come. */
 int scanhead_has_attributes(const struct scanhead *sh);
 
-/* A colour for each point, sRGB: what it shows, the head's output.colour says. A shot without echo is grey. */
+/* A colour for each point, sRGB. The head's key output.colour decides what it shows. A shot without echo is grey. */
 struct scanhead_colour {
     uint8_t red, green, blue;
 };
-/* Of a frame of SCANHEAD_COLOURS, as scanhead_attributes. It comes after the points, and after their attributes where
- * the head sends both. */
+/* Decodes colours from a frame of SCANHEAD_COLOURS, as scanhead_attributes does attributes. That frame comes after the
+ * points, and after their attributes where the head sends both. */
 int scanhead_colours(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
                      struct scanhead_colour *colours, uint32_t max);
 /* 1: a frame of colours follows each frame of points; else as scanhead_has_attributes. */
@@ -265,8 +266,8 @@ struct scanhead_line_end {
     uint32_t scan_frame, scan_line;
     uint64_t pulse0;          /* the line's first pulse in the scan */
     int64_t t0_ns, t1_ns;     /* since the scan's start: this line's first pulse, the next one's */
-    uint32_t n_fired, n_cast; /* pulses of the whole sweep; of these, not in its blind part */
-    uint32_t n_echoes;        /* sent; it and the last three are 0 also where parts were lost */
+    uint32_t n_fired, n_cast; /* pulses of the whole sweep; those outside its blind part */
+    uint32_t n_echoes;        /* echoes sent; this and the last three are also 0 where parts were lost */
     uint32_t mirror_count, pan_count,
         status;         /* encoders at its last pulse; bit 0: last of the frame, bit 1: stopped within */
     uint32_t n_crowded; /* echoes left out, the weakest: a pulse had more than the head sends */
@@ -277,8 +278,7 @@ struct scanhead_line_end {
  * payload. */
 int scanhead_line_end(struct scanhead *sh, const struct scanhead_frame *frame, struct scanhead_line_end *end);
 
-/* What the stream has said of itself, by descriptor and anchor. Strings are the handle's, until its next
- * call. */
+/* What descriptor and anchor say about the stream. Strings are the handle's, until its next call. */
 struct scanhead_info {
     const char *idn, *profile;
     int geo;           /* 1: geo layout, 0: polar */
@@ -321,13 +321,13 @@ struct scanhead_emitter {
     int turn;                                  /* +1: clockwise seen from above, -1: the other way */
     uint32_t rings;                            /* sphere: of a frame; the elevation of ring i is */
     double first_ring_deg, ring_step_deg;      /* first_ring_deg + i ring_step_deg; ring_step_deg 0: one ring alone */
-    int echoes;                                /* sent of a pulse's: 0 all, 1 first, 2 last, 3 strongest */
+    int echoes;                                /* which of a pulse are sent: 0 all, 1 first, 2 last, 3 strongest */
     uint64_t sequence_ns_num, sequence_ns_den; /* beams: a firing sequence lasts num / den nanoseconds */
     uint32_t n_beams;                          /* pulse k of a scan is firing k mod n_beams */
     struct scanhead_beam beam[SCANHEAD_MAX_BEAMS];
 };
-/* SCANHEAD_ESTATE before the descriptor has come. It is that of the points that follow: settings that change
- * within a scan are said anew. */
+/* SCANHEAD_ESTATE before the descriptor has come. The emitter holds for the points that follow. When settings change
+ * within a scan, the head sends it again. */
 int scanhead_get_emitter(const struct scanhead *sh, struct scanhead_emitter *emitter);
 
 /* Where a moving head was. Between two poses of one frame of SCANHEAD_POSES the position goes along the
@@ -360,8 +360,8 @@ int scanhead_to_scene(struct scanhead *sh, struct scanhead_point *points, uint32
 
 /* GPS time of t_ns since the scan's start (scanhead_point.t_ns) by the head's clock, in LAS's adjusted
  * standard form: seconds since 1980-01-06T00:00:00Z without leap seconds, less 1e9. Add 1e9 and divide by
- * 604800 for week and second of week. It is valid for frames up to the one that scanhead_next returned last,
- * since it counts from the last time that the head reported: at the scan's start and each second (events
+ * 604800 for week and second of week. It is valid for frames up to the one that scanhead_next returned last.
+ * It counts from the last time that the head reported, at the scan's start and each second (events
  * SCAN_START, PPS, TIME). It is exact to the nanosecond where the head's clock has no drift; a double of that
  * size has steps of 0.12 us. SCANHEAD_ESTATE where the head doesn't know the time, or before the time and the
  * scan's start have come. Where the head knows the time, it comes before the first points that can be
@@ -379,7 +379,7 @@ struct scanhead_stats {
     uint64_t pulses_lost; /* pulses the head says it could not compute */
     /* How often each notice came. seq_gaps above counts restarts, too. frames counts neither repeated nor late ones. */
     uint64_t repeated, late, restarts, cuts, echoes, late_replies, unasked, closed, reattached;
-    /* Of bad_payload, what no gap shows: before the first frame, before a restart, and after the last frame. So
+    /* Frames of bad_payload that no gap shows: before the first frame, before a restart, and after the last frame. So
      * seq_lost + bad_unseen frames are known to be lost on the way. */
     uint64_t bad_unseen;
 };

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the stream says of itself: descriptor, anchor, names, losses, hash. */
+/* The state that the stream describes: descriptor, anchor, names, losses, hash. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -49,7 +49,7 @@ static int absorb_anchor(struct scanhead *sh, const struct native_header *header
     struct native_anchor a;
     if (native_decode_anchor(payload, header->length, &a) != 0) return bad(sh, "a wrong anchor");
     sh->anchor = a;
-    /* Without the descriptor of its scan, an anchor may as well be one of the scan before. */
+    /* Without the descriptor of its scan, an anchor may be one of the scan before. */
     sh->have_anchor = sh->have_descriptor;
     return 0;
 }
@@ -301,7 +301,7 @@ void scanhead_get_stats(const struct scanhead *sh, struct scanhead_stats *stats)
         .seq_lost = s->seq_lost,
         .dropped = sh->dropped,
         .reader_lost = sh->reader_lost,
-        /* both count the same; of either, some may not have come */
+        /* both count the same losses; some events of either kind may not have come */
         .pulses_lost = sh->pulses_lost_told > sh->pulses_lost_ended ? sh->pulses_lost_told : sh->pulses_lost_ended,
         .repeated = s->repeated,
         .late = s->late,

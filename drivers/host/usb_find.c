@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Which of the USB devices are heads, and the one that is wanted. */
+/* Finds the heads among the USB devices, and the one that is wanted. */
 #include <ctype.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -70,8 +70,8 @@ static int is_wanted_id(const struct usb_wanted *wanted, const struct libusb_dev
     return (wanted->vid < 0 || wanted->vid == d->idVendor) && (wanted->pid < 0 || wanted->pid == d->idProduct);
 }
 
-/* A device may call itself anything. What goes to terminals and logs is printable and still different for two
- * devices: other characters, and backslashes, are written as \xNN. What does not fit is left out. */
+/* A device may call itself anything. Texts for terminals and logs must be printable, yet differ between two devices:
+ * other characters, and backslashes, are written as \xNN. What does not fit is left out. */
 static void read_string(libusb_device_handle *handle, uint8_t index, char *text, size_t len)
 {
     unsigned char ascii[128];
@@ -93,7 +93,7 @@ struct search {
     char refused[64];
 };
 
-/* For the message that there are several; where there is no room for all, it shows that. */
+/* Names another head in the message that there are several; the message shows where there was no room for all. */
 static void name_another(struct search *s, const char *name)
 {
     const size_t used = strlen(s->others), room = sizeof s->others - used;

@@ -18,7 +18,7 @@ enum {
     USB_CONTROL_MS = 1000,
 };
 
-/* What a source asks for: "usb", "usb:vid:pid", "usb:vid:pid:serial", ids in hexadecimal as lsusb prints
+/* The device that a source names: "usb", "usb:vid:pid", "usb:vid:pid:serial", ids in hexadecimal as lsusb prints
  * them. */
 struct usb_wanted {
     int vid, pid;     /* -1: any */

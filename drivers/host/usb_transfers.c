@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* Source of bytes: the bulk pair of the head's vendor interface.
  *
- * Several reads are always under way, so that the bus never waits for this program: a ring of transfers,
- * which the kernel completes in order and which are used up and sent off again in order. Nothing runs on a
- * thread of its own: completions are taken in while the caller reads or waits, and between these calls the
- * kernel fills what is under way. */
+ * Several reads are always under way, so that the bus never waits for this program. They are a ring of
+ * transfers, which the kernel completes in order, and which are read and submitted again in order. There is no
+ * thread: completions are taken in while the caller reads or waits, and between these calls the kernel fills
+ * the transfers under way. */
 #include "drivers/host/usb_inside.h"
 
 #include <errno.h>
@@ -17,8 +17,7 @@
 /* A read is a multiple of every packet size (64, 512, 1024 bytes): so none can be sent more than it has room
  * for. */
 enum { IN_TRANSFERS = 16, IN_BYTES = 64 << 10, OUT_BYTES = 2048, CANCEL_MS = 1000 };
-/* How long a bus may fail with the device still on it, as it does until the hub has noticed an unplugged
- * one. */
+/* How long a bus may fail with the device still on it, as it does until the hub notices an unplugged device. */
 enum { FAILING_MS = 1000, FAILING_PAUSE_MS = 20, RELAPSE_MS = 10000 };
 
 struct in_transfer {
@@ -74,7 +73,7 @@ static void LIBUSB_CALL out_done(struct libusb_transfer *transfer)
     if (usb->out_error == 0) usb->out_failing.n = 0;
 }
 
-/* What the bus or the system says to a request: EPROTO may be over in a moment. */
+/* The errno for the result of a request: EPROTO may be over in a moment. */
 static int errno_of_rc(int rc)
 {
     return rc == 0 ? 0 : rc == LIBUSB_ERROR_NO_DEVICE ? ENODEV : EPROTO;
@@ -127,8 +126,8 @@ static int submit(struct in_transfer *in)
 }
 
 /* Starts an endpoint again that has stalled, or whose bus has garbled something. A device that is being
- * unplugged looks the same until the hub has noticed: so the second try and later ones wait a moment. 0:
- * worth another try; ENODEV: the device is gone, or has not let anything through for too long. */
+ * unplugged looks the same until the hub has noticed. So the second and later tries wait a moment. 0: worth
+ * another try; ENODEV: the device is gone, or no transfer has succeeded for too long. */
 static int recover(struct host_usb *usb, struct failing *failing, uint8_t endpoint)
 {
     const struct timespec pause = {.tv_nsec = FAILING_PAUSE_MS * 1000000};
@@ -214,8 +213,8 @@ static ssize_t usb_read(struct host_source *source, void *to, size_t len)
     }
 }
 
-/* A write that failed is not sent again: the head may have it. Its command gets no reply in time, the next
- * one goes out when the endpoint has been started again. */
+/* A write that failed is not repeated: the head may have got it. If not, its command times out; the next one
+ * goes out after the endpoint has been started again. */
 static ssize_t usb_write(struct host_source *source, const void *data, size_t len)
 {
     struct host_usb *usb = source->usb;
@@ -299,7 +298,7 @@ static int make_transfers(struct host_usb *usb, struct sh_err *err)
     return SH_OK;
 }
 
-/* The system limits what may be under way (usbfs_memory_mb): fewer transfers do as well, only slower. */
+/* The system limits the bytes under way (usbfs_memory_mb): fewer transfers work, too, but slower. */
 static int submit_all(struct host_usb *usb, const char *name, struct sh_err *err)
 {
     int rc = 0;

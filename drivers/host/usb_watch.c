@@ -7,7 +7,7 @@
 #include "drivers/host/usb_inside.h"
 
 /* No event reports a permission that comes late, a configuration that the kernel sets, or another program
- * that lets go. So what has just come is looked at often for a while, and everything once a second. */
+ * that closes the device. So for a while after a device has come, tries are frequent; else once a second. */
 enum { PAUSE_MS = 50, HURRY_MS = 2000, LOOK_MS = 1000 };
 
 struct host_usb_watch {
@@ -23,8 +23,8 @@ static int LIBUSB_CALL on_arrival(libusb_context *ctx, libusb_device *device, li
     return 0;
 }
 
-/* libusb hears of devices from udev, once its rules are through; where no udev runs (a container, a small
- * guest) it hears nothing, and does not know that. */
+/* Whether udev runs. libusb gets events of devices from udev, after udev's rules. Without udev (a container, a
+ * small guest) it gets none, and does not know that. */
 static int has_events(void)
 {
     return libusb_has_capability(LIBUSB_CAP_HAS_HOTPLUG) && access("/run/udev/control", F_OK) == 0;

@@ -18,8 +18,8 @@ enum { LINK_MAX_SESSIONS = 8, LINK_MAX_EVENTS = 2 * LINK_MAX_SESSIONS + 2 };
 
 enum link_type { LINK_NULL, LINK_FILE, LINK_PTY, LINK_TCP, LINK_USB, LINK_UDP, LINK_WEB, LINK_FD };
 
-/* Whether readers of a link hold back the paces fast and step, where nothing is lost. Those of the others lose frames
- * as in real time. */
+/* Whether the paces fast and step wait for the readers of a link, so that they lose nothing. Readers of other links
+ * lose frames as in real time. */
 enum link_waits { LINK_WAITS_BY_TYPE /* all but web do */, LINK_WAITS_YES, LINK_WAITS_NO };
 
 struct web_source; /* web.h */
@@ -28,18 +28,18 @@ struct link_spec {
     enum link_type type;
     char path[256];     /* file: where to write; pty: symlink to the slave, may be empty; usb: see below */
     char address[64];   /* tcp, udp, web: numeric or name; empty: 127.0.0.1 */
-    int port;           /* tcp, web: 0 lets the system choose; udp: of the receiver */
+    int port;           /* tcp, web: 0 lets the system choose; udp: the receiver's */
     char interface[32]; /* udp: its name; needed for broadcasts and multicast. Empty: the system chooses */
     char source[64];    /* udp: numeric address of this machine that packets come from; empty: the system chooses */
-    int source_port;    /* udp: that they come from; 0: the system chooses */
+    int source_port;    /* udp: port that packets come from; 0: the system chooses */
     int usual_port;     /* udp: 1: another source_port will do where this one can't be had; a notice says so */
     int ttl;            /* udp: of the packets; 0: 1 to a multicast group, else the system's */
     int max_sessions;   /* tcp, web: 1..LINK_MAX_SESSIONS */
     int protocol;       /* what its owner speaks on it; 0: the usual. Links don't look at it */
     int units; /* 1: what is written are units. Each write has one of them, or the rest of one, up to its end */
-    int brief; /* tcp: 1: clients come for a request. Without a place, whoever has been silent for longest makes room */
+    int brief; /* tcp: 1: clients come for one request. When all places are taken, the longest silent one makes room */
     int waits; /* enum link_waits; its owner sees to it */
-    int clean; /* 1: no faults on request meet it; its owner sees to it */
+    int clean; /* 1: it gets no injected faults; its owner sees to it */
     const struct web_source *web; /* web: what it serves beside the page; outlives the link. NULL: nothing */
     int fd;                       /* fd: a connected stream descriptor (socket pair), taken over */
     /* usb; address, port and path as struct usb_backend_spec has them, which explains these as well */
@@ -60,7 +60,7 @@ enum link_event_kind {
     LINK_WRITABLE, /* write() will take something; only for sessions in want_write */
     LINK_WOKEN,    /* wake_fd was signalled; poll has drained it (eventfd) */
     LINK_REFUSED,  /* somebody was turned away: all sessions taken */
-    LINK_NOTICE,   /* something that whoever runs the head should know: the text is in peer */
+    LINK_NOTICE,   /* a message to the person who runs the head: the text is in peer */
     LINK_PLUGGED,  /* usb: a host has got the device, and will enumerate it once poll() is called again */
     LINK_SHUT,     /* tcp: the other side sends nothing more, and all of it was read; it may go on reading */
 };
@@ -71,27 +71,27 @@ struct link_event {
     char peer[200]; /* of LINK_OPENED, LINK_CLOSED, LINK_REFUSED: the other side's name, for the log */
 };
 
-/* Faults on request: what a link can be told to do wrong. */
+/* Faults that can be injected into a link. */
 enum link_fault {
     LINK_FAULT_DISCONNECT,        /* ends the session at once; what was not taken by the other side is lost */
     LINK_FAULT_UNPLUG,            /* ends all sessions, and the endpoint is not there until LINK_FAULT_PLUG */
     LINK_FAULT_BUS_RESET,         /* usb */
     LINK_FAULT_ENDPOINT_STALL,    /* usb: the session's endpoint to the host is halted until the host clears it */
     LINK_FAULT_SHORT_PACKETS,     /* usb: each of the session's next n transfers ends early, in a short packet */
-    LINK_FAULT_REFUSE,            /* ends the session before a byte went out: to be told at LINK_OPENED */
-    LINK_FAULT_SLOW_ENUMERATION,  /* usb: until told again, each control request takes for_ms: at LINK_PLUGGED */
-    LINK_FAULT_DESCRIPTOR_LENGTH, /* usb: until told again, the configuration says that it is n bytes longer: likewise */
+    LINK_FAULT_REFUSE,            /* ends the session before a byte went out; to be called at LINK_OPENED */
+    LINK_FAULT_SLOW_ENUMERATION,  /* usb: until changed, each control request takes for_ms; at LINK_PLUGGED */
+    LINK_FAULT_DESCRIPTOR_LENGTH, /* usb: until changed, the configuration claims n bytes too many; at LINK_PLUGGED */
     LINK_FAULT_PLUG,              /* ends LINK_FAULT_UNPLUG */
 };
 #define LINK_FAULT_BIT(fault) (UINT32_C(1) << (fault))
 
 struct link_ops {
     const char *name;
-    int datagrams; /* 1: each write goes out with a checksum of the system's, and one that is damaged never arrives */
+    int datagrams; /* 1: the system adds a checksum to each write, so a damaged one never arrives */
     int messages;  /* 1: each write goes out as one message; the owner puts text or frames into it, not both */
 
     uint32_t faults;                               /* what fault() can do: LINK_FAULT_BIT of each */
-    uint32_t (*can)(const struct link_spec *spec); /* of these, what a link of this spec can do; NULL: all */
+    uint32_t (*can)(const struct link_spec *spec); /* those that a link of this spec can do; NULL: all */
 
     /* Opens as spec says. When it fails, nothing of it stays. The text of err names the endpoint. */
     int (*open)(const struct link_spec *spec, void **link, struct sh_err *err);
@@ -114,21 +114,21 @@ struct link_ops {
     ssize_t (*read)(void *link, int session, void *buf, size_t len);
     ssize_t (*write)(void *link, int session, const void *buf, size_t len);
 
-    /* Writes that were taken and did not arrive, as far as the system reports it: refused, or without a route. NULL:
-     * none. After the link's thread has ended, or by that thread. */
+    /* Number of writes that were taken and did not arrive, as far as the system reports it: refused, or without a
+     * route. NULL: none. To be called by the link's thread, or after it has ended. */
     uint64_t (*refused)(const void *link);
 
-    /* Bytes of a session that were written and that its reader has not taken: they are lost once the link is closed. The
-     * system may know of the last ones a moment late, and counts to a limit only: there may be more. 0 also where it can't be
-     * known. NULL: none get lost so. */
+    /* Bytes written to a session that its reader has not taken: closing the link loses them. There may be more: the
+     * system learns of the last ones a moment late, and counts only up to a limit. 0 also where it can't be known.
+     * NULL: closing loses none. */
     int (*unread)(void *link, int session);
 
     /* Ends a session from this side: what was written goes out, and a LINK_CLOSED follows from poll. NULL: sessions of
      * this link can't be ended. */
     void (*end)(void *link, int session);
 
-    /* Does something wrong, as enum link_fault says. A LINK_CLOSED follows for each session that ends by it. Returns 0,
-     * or SH_ESTATE: it can't be done now; PLUG: somebody else has the endpoint. NULL where `faults` is 0. */
+    /* Injects a fault, as enum link_fault says. A LINK_CLOSED follows for each session that ends by it. Returns 0, or
+     * SH_ESTATE when it can't be done now (PLUG: somebody else has the endpoint). NULL where `faults` is 0. */
     int (*fault)(void *link, enum link_fault what, int session, uint32_t n, double for_ms);
 
     /* Closes everything, removes what open made (symlink). link is void afterwards. */
@@ -137,7 +137,7 @@ struct link_ops {
 
 /* From the one list of links, in link.c. NULL for an unknown type. */
 const struct link_ops *link_ops_get(enum link_type type);
-/* What a link of this spec can be told to do wrong: LINK_FAULT_BIT of each, without LINK_FAULT_PLUG. */
+/* The faults that can be injected into a link of this spec: LINK_FAULT_BIT of each, without LINK_FAULT_PLUG. */
 uint32_t link_faults(const struct link_spec *spec);
 
 #endif

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the poll functions of the links share: the events that are being filled in, the wait, the wake-up.
- * Private. */
+/* Shared by the poll functions of the links: the events that are being filled in, the wait, the wake-up. Private. */
 #ifndef DRIVERS_LINK_LINK_POLL_H
 #define DRIVERS_LINK_LINK_POLL_H
 

@@ -3,9 +3,9 @@
  *
  * When does a session begin and end? The kernel offers two signals, each with a weakness:
  *   hang-up   poll(2) on the master reports POLLHUP exactly while nobody has the slave open. It is a level: a
- *             close followed by an open before we look leaves no trace. And it is always reported. So a
- *             master that hangs up must stay out of the descriptors that we wait for, and can't report that
- *             somebody comes.
+ *             close followed by an open before we look leaves no trace. And POLLHUP makes every poll return at
+ *             once. So a master that hangs up must stay out of the descriptors that we wait for, and can't
+ *             report that somebody comes.
  *   inotify   reports each open and close of the slave, in order. But it merges equal events in a row as long
  *             as we have not read them, so opens and closes can't be counted when clients overlap.
  * So inotify wakes us, and the hang-up decides:
@@ -13,7 +13,7 @@
  *     because the slave lives as long as the master. pty_device_rest opens it for a moment, while we do not
  *     watch it.
  *   - No session: we wait for inotify only. An open event starts a session, even if the hang-up says that the
- *     client has left already: what it wrote is still to be read (echo '*RST' > /dev/pts/3).
+ *     client has left already: its bytes are still to be read (echo '*RST' > /dev/pts/3).
  *   - Session: we wait for the master as well. The session ends when the master hangs up and all that was
  *     written is read. A close event is queued before the close takes effect, and an open event after the
  *     open did. An open that comes after our hang-up is therefore still unread when the watch is set up
@@ -23,7 +23,7 @@
  *     neighbours: nothing is merged, the count is exact, and we report LINK_CLOSED and LINK_OPENED. Only
  *     clients that overlap can make the count wrong. Then two sessions may be reported as one, or one as two;
  *     the next hang-up sets it right.
- *   - Nothing is written while an open event is unread: it would be of the old session, for the new client. */
+ *   - Nothing is written while an open event is unread: the new client would get bytes of the old session. */
 #include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>
@@ -142,11 +142,11 @@ static short pty_now(const struct pty_link *pty)
     return poll(&slot, 1, 0) >= 0 ? slot.revents : (short)0;
 }
 
-/* Sets up the watch. A client that came before it is found by what the master says. */
+/* Sets up the watch. A client that came before it is found by the master's state. */
 static int pty_wait_for_client(struct pty_link *pty)
 {
     if (pty_watch(pty) != SH_OK) return SH_EIO;
-    pty_read_inotify(pty, 0); /* before we look: whoever comes and goes afterwards is noted */
+    pty_read_inotify(pty, 0); /* before we look: a client that comes and goes afterwards is noted */
     short now = pty_now(pty);
     if ((now & POLLHUP) == 0) {
         pty_begin(pty, 1);
@@ -236,9 +236,9 @@ static ssize_t pty_write(void *link, int session, const void *buf, size_t len)
     return errno == EAGAIN || errno == EINTR ? 0 : SH_ECLOSED;
 }
 
-/* The kernel throws away what waits in a terminal when its master is closed, and counts it for the slave alone. We look at the
- * end only, when nobody new is waited for: so our own opening is not watched. A slave that is another's alone (TIOCEXCL) can't be
- * looked at. */
+/* When the master is closed the kernel throws away what waits in the terminal. It reports the count through the slave
+ * alone, which we therefore open. This is done only at the end, when no new client is expected, since the watch would
+ * see our own opening. A slave that a client holds exclusively (TIOCEXCL) can't be opened. */
 static int pty_unread(void *link, int session)
 {
     struct pty_link *pty = link;
@@ -253,9 +253,9 @@ static int pty_unread(void *link, int session)
     return n;
 }
 
-/* ---- faults on request */
+/* ---- injected faults */
 
-/* The session is over, and nobody hears of the terminal any more. */
+/* Ends the session and stops watching the terminal. */
 static void pty_let_go(struct pty_link *pty)
 {
     pty->due_closed = pty->due_closed || (pty->open && !pty->due_opened);

@@ -21,9 +21,8 @@ static int pair_open(int *master, char *slave, size_t slave_len)
     return -1;
 }
 
-/* The master's ioctls for settings act on the slave; TCSAFLUSH drops what the slave's line discipline holds,
- * and TCOFLUSH before it what is still on its way there. Unlike tcflush on the slave they need no open slave.
- */
+/* The master's ioctls for settings act on the slave. TCOFLUSH drops what is still on its way to the slave's line
+ * discipline, then TCSAFLUSH what that holds. Unlike tcflush on the slave they need no open slave. */
 static void drop_output(int master, const struct termios *settings)
 {
     tcflush(master, TCOFLUSH);
@@ -68,8 +67,8 @@ static int link_errno(const char *path, struct sh_err *err)
     return sh_fail(err, code, "link pty:%s: the symlink cannot be made: %s", path, strerror(errno));
 }
 
-/* The link of a head that was killed, whose terminal's number another program has got since: ours, as the name
- * of a slave, and older than the terminal. A head makes the terminal first. */
+/* Whether the symlink is left from a head that was killed, while its terminal's number went to another program.
+ * Such a symlink names a slave, and is older than the terminal, as a head makes the terminal first. */
 static int is_left_over(const char *text, const struct stat *link, const struct stat *terminal)
 {
     const struct timespec made = link->st_mtim, born = terminal->st_ctim;
@@ -94,7 +93,7 @@ static int link_look(const char *path, const char *slave, struct sh_err *err)
                        err);
 }
 
-/* In place of what is there: 0, or -1 with errno. */
+/* Replaces what is at path by the new symlink: 0, or -1 with errno. */
 static int link_replace(const char *path, const char *slave)
 {
     char beside[300];

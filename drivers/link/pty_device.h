@@ -25,11 +25,11 @@ int pty_device_open(struct pty_device *device, const char *path, struct sh_err *
  * the same symlink; slave is then another name. SH_EIO when that fails as well. */
 int pty_device_rest(struct pty_device *device);
 
-/* Hangs up whoever has the slave open, and lets go of what they have not read: a new pair at rest takes its place under
- * the same symlink, and slave is another name. SH_EIO: there is none, and the old one stays. */
+/* Hangs up all clients, and drops what they have not read: a new pair at rest takes its place under the same symlink,
+ * and slave is another name. SH_EIO: no new pair can be had, and the old one stays. */
 int pty_device_renew(struct pty_device *device);
 
-/* As far as it goes with a client present: what was sent and not read is dropped, settings stay. */
+/* Drops what was sent and not read. Settings stay, since a client may have the slave open. */
 void pty_device_drop_output(struct pty_device *device);
 
 /* Closes the pair and removes the symlink, if it still is ours. */

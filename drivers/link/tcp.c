@@ -4,9 +4,9 @@
  * A session is over when its peer resets, takes no more, or vanishes (keep-alive, about 25 s). A peer that shuts down
  * its sending side is LINK_SHUT, and goes on reading. One that has closed its socket looks the same until something is
  * written to it.
- * A client that finds all sessions taken is accepted and closed at once, so that it does not wait in vain. Where
- * clients come for a request alone, the session that has been silent for longest ends in its place. One that comes
- * while another's peer sends no more gets that session: it waits until what the other sent has been read. */
+ * A client that finds all sessions taken is accepted and closed at once, so that it does not wait. Where
+ * clients come for one request, the session that has been silent for longest ends instead. A client that comes while
+ * another client sends no more gets that one's session, as soon as what was sent has been read. */
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -25,7 +25,7 @@ struct tcp_session {
     enum tcp_state state;
     int shut; /* LINK_SHUT was reported */
     int fd;
-    uint64_t turn; /* the higher, the later it came, said or was told something */
+    uint64_t turn; /* the higher, the later it came, sent or got something */
     char peer[64];
 };
 
@@ -81,7 +81,7 @@ static int free_slot(const struct tcp_link *tcp)
     return slot;
 }
 
-/* The first session whose client sends no more, as the owner knows by now, ends. */
+/* Ends the first session whose LINK_SHUT the owner has got. */
 static void give_up_one(struct tcp_link *tcp)
 {
     for (int s = 0; s < tcp->n_sessions; s++) {
@@ -105,8 +105,8 @@ static int is_any_ending(const struct tcp_link *tcp)
     return ending || poll(fds, (nfds_t)tcp->n_sessions, 0) > 0;
 }
 
-/* Ends the session that has been silent for longest, if somebody waits for its place. Those whose bytes wait for the owner
- * are not silent. */
+/* Ends the session that has been silent for longest, if a client waits for its place. A session whose bytes wait for
+ * the owner is not silent. */
 static void make_room(struct tcp_link *tcp)
 {
     struct pollfd waiting = {.fd = tcp->listener, .events = POLLIN};
@@ -240,7 +240,7 @@ static ssize_t tcp_write(void *link, int session, const void *buf, size_t len)
     return moved(link, self, socket_write(self->fd, buf, len));
 }
 
-/* What was written goes out, then the end of the stream; the client's own end is not waited for. */
+/* Sends what was written, then the end of the stream, and does not wait for the client's own end. */
 static void tcp_end(void *link, int session)
 {
     struct tcp_session *self = tcp_session(link, session);
@@ -250,7 +250,7 @@ static void tcp_end(void *link, int session)
     self->state = TCP_ENDED;
 }
 
-/* ---- faults on request */
+/* ---- injected faults */
 
 static int tcp_cut(struct tcp_link *tcp, int session)
 {

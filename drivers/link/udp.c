@@ -2,20 +2,20 @@
 /* The UDP link: one session, open from the start. Each write is one datagram to the receiver.
  *
  * Unicast to any address; broadcast only from an interface that the configuration names, to that interface's own
- * broadcast address or to 255.255.255.255. The packets' source is then the interface's address. That alone makes the
- * system send 255.255.255.255 there when no route says otherwise, so that the address of the interface's own network
- * is used for it. (SO_BINDTODEVICE would do without, but takes a privilege.) Multicast, too, goes out on an interface
- * that is named, and on no other.
+ * broadcast address or to 255.255.255.255. The packets' source is then the interface's address. That address alone
+ * does not direct 255.255.255.255 to the interface if a route says otherwise, so the interface's own broadcast address
+ * takes its place. (SO_BINDTODEVICE would direct it, but takes a privilege.) Multicast, too, goes out only on an
+ * interface that is named.
  *
  * A source port may be one that a receiver on this machine listens on, too. So addresses are shared (SO_REUSEADDR), and
- * the socket is connected: it gets nothing but what its receiver sends back. It never has its receiver's own address and
- * port, since it would get its own packets. On the loopback, where the receiver has the port, the source is the address
- * after the receiver's. Receivers that don't share their port (MRPT, PCL) could not listen on this machine then. So
- * the usual port of a protocol is not taken there unless the link names its source.
+ * the socket is connected: it gets only what its receiver sends back. It never has its receiver's own address and port,
+ * since it would get its own packets. On the loopback, where the receiver has the port, the source is the address after
+ * the receiver's. Receivers that don't share their port (MRPT, PCL) could not listen on this machine then. So the usual
+ * port of a protocol is not used there unless the link names its source.
  *
- * A receiver that is not there is no failure: what was sent is gone, and so is what the system had no room for on its
- * way out. Both are counted. A refused datagram counts when its refusal comes; several may share one refusal. What
- * arrives at the socket can be read. */
+ * A receiver that is not there is no failure: datagrams to it are lost, as are those that the system has no room for.
+ * Both are counted. A refused datagram counts when its refusal comes; several may share one refusal. What arrives at
+ * the socket can be read. */
 #include <arpa/inet.h>
 #include <errno.h>
 #include <ifaddrs.h>
@@ -70,7 +70,7 @@ static in_addr_t ipv4_of(const struct sockaddr *at)
     return ((const struct sockaddr_in *)(const void *)at)->sin_addr.s_addr;
 }
 
-/* What of an interface the link needs. */
+/* Properties of an interface that the link needs. */
 struct network {
     int found, has_broadcast;
     struct sockaddr_storage own; /* its address, of the receiver's family */
@@ -132,7 +132,7 @@ static int check_receiver(const struct link_spec *spec, struct sockaddr *to, str
     return SH_OK;
 }
 
-/* Where packets go out, and how far. */
+/* Sets the interface that packets go out on, and their TTL. */
 static int set_way(int fd, const struct link_spec *spec, const struct sockaddr *to)
 {
     const int ttl = spec->ttl, is_v4 = to->sa_family == AF_INET;
@@ -180,7 +180,7 @@ static int is_own_machine(const struct sockaddr_storage *to, const struct sockad
            (b.ss_family == AF_INET && ntohl(ipv4_of((struct sockaddr *)&b)) >> 24 == IN_LOOPBACKNET);
 }
 
-/* Whether one machine can have the address: no group, no broadcast, not all addresses. */
+/* Whether the address can be that of one machine: not a group, a broadcast or "all addresses". */
 static int is_of_one(const struct sockaddr_storage *at)
 {
     struct ifaddrs *list;
@@ -357,7 +357,7 @@ static ssize_t udp_write(void *link, int session, const void *buf, size_t len)
     return (ssize_t)len; /* no route, no memory: gone as on any way */
 }
 
-/* The socket stays, so that the source of the datagrams does. What came meanwhile is not for the head. */
+/* The socket stays, so that the source of the datagrams stays the same. What came meanwhile is dropped. */
 static int udp_fault(void *link, enum link_fault what, int session, uint32_t n, double for_ms)
 {
     struct udp_link *udp = link;

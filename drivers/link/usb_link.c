@@ -3,8 +3,8 @@
  * or one alone.
  *
  * The back end carries out the host's acts one at a time. It stops when one has begun or ended a session,
- * until that has been reported: so nothing can happen twice between two polls. The end of a session is
- * reported once what came in it has been read. */
+ * until that has been reported: so a session begins or ends at most once between two polls. The end of a
+ * session is reported once what came in it has been read. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -88,7 +88,7 @@ static double usb_capacity(const void *link)
     return rate[usb_device_identity(self->head.device)->highest];
 }
 
-/* What came in a session that is over, and is not read yet. */
+/* Number of unread bytes from a session that is over. */
 static size_t left_over(const struct usb_link *self, int i)
 {
     const uint8_t out = row_of(self, i)->out;
@@ -115,7 +115,7 @@ static int has_to_report(const struct usb_link *self, int i)
     return self->reported[i] != self->head.session[i].open;
 }
 
-/* A host has got the device, and has learnt nothing of it so far. */
+/* Whether a host has got the device since the last report, and so has not enumerated it. */
 static int is_plugged_anew(const struct usb_link *self)
 {
     return self->plugged != usb_device_attaches(self->head.device);
@@ -143,7 +143,8 @@ static void report(struct usb_link *self, int i, uint32_t want_write, struct lin
     if ((want_write >> i & 1u) != 0 && is_writable(self, i)) link_events_push(events, LINK_WRITABLE, i, NULL);
 }
 
-/* A back end that was unplugged may have more to say of it. */
+/* Takes the next news. The back end's own come first; of an unplug they say more than scanhead_usb_cut, which is then
+ * left out. */
 static void take_news(struct usb_link *self)
 {
     if (self->news == NULL && self->ops->news != NULL) self->news = self->ops->news(self->backend);
@@ -228,7 +229,7 @@ static ssize_t usb_write(void *link, int session, const void *buf, size_t len)
     return SH_ECLOSED;
 }
 
-/* ---- faults on request */
+/* ---- injected faults */
 
 enum {
     USB_FAULTS = LINK_FAULT_BIT(LINK_FAULT_UNPLUG) | LINK_FAULT_BIT(LINK_FAULT_BUS_RESET),
@@ -246,7 +247,7 @@ static uint32_t usb_can(const struct link_spec *spec)
            ((ops->faults & USB_CAN_ENUMERATE_WRONG) != 0 ? ENUMERATES : 0);
 }
 
-/* Of the endpoint that a session writes to. */
+/* Injects a fault of the endpoint that a session writes to. */
 static int fault_endpoint(struct usb_link *self, enum link_fault what, int session, uint32_t n)
 {
     if (session < 0 || session >= self->n || !self->head.session[session].open) return SH_ESTATE;

@@ -1,17 +1,17 @@
 /* SPDX-License-Identifier: MIT */
 /* The web link: the page and its owner's resources by HTTP, the stream and commands by WebSocket, on one port.
  *
- * A session is a WebSocket at /ws. What the owner writes in one call goes out as one message: text where its first byte
- * is ASCII (replies), binary otherwise (frames). What comes in is text, whose lines are commands; the last line of a
- * message need not have an end. So frames, replies and commands are those of the protocol, and nothing is cut.
+ * A session is a WebSocket at /ws. The bytes that the owner writes in one call go out as one message: text if the first
+ * byte is ASCII (replies), else binary (frames). Messages of clients are text, whose lines are commands; the last line
+ * of a message need not have an end. So frames, replies and commands are those of the protocol, and none is cut.
  *
- * libwebsockets does HTTP and WebSocket, and waits (lws_service) for its connections, for the listening socket and
- * for the owner's wake-up, which are given to it as plain descriptors. All is done in the owner's thread.
+ * libwebsockets does HTTP and WebSocket, and waits (lws_service) for its connections, for the listening socket and for
+ * the owner's wake-up, which are given to it as plain descriptors. All is done in the owner's thread.
  *
- * Another site's page must not read or command a head on somebody's machine. A browser says who asks: Host is what the
- * address bar had, Origin is the page that asks. So a Host that is neither a number nor a name of this machine is
- * refused (a name of the other site's that leads here: DNS rebinding), and an Origin that is not this link gets no
- * byte. Programs that aren't browsers have no Origin. */
+ * Another site's page must not read or command a head on somebody's machine. A browser sends Host, the name in its
+ * address bar, and Origin, the page that asks. So a Host that is neither a number nor a name of this machine is refused
+ * (DNS rebinding: a name of the other site that leads here), and an Origin that is not this link gets no byte. Programs
+ * that aren't browsers have no Origin. */
 #include <arpa/inet.h>
 #include <errno.h>
 #include <libwebsockets.h>
@@ -126,7 +126,7 @@ static void session_open(struct web_link *web, struct web_conn *conn)
     conn->session = s;
 }
 
-/* A browser more than there are places: it is told so, by the words that a WebSocket closes with. */
+/* Turns away a browser for which no session is free, with these words as the reason of the WebSocket's end. */
 static int turn_away(struct web_link *web, struct lws *wsi)
 {
     unsigned char why[80];
@@ -156,7 +156,7 @@ void web_conn_end(struct web_conn *conn)
     conn->place.phase = WEB_NOBODY;
 }
 
-/* Ends a session whose client does not keep to the rules: nothing more goes out but why. */
+/* Ends a session whose client breaks the rules: nothing more goes out but the reason. */
 static int close_for(struct web_conn *conn, enum lws_close_status status, const char *why)
 {
     unsigned char words[80];
@@ -330,7 +330,7 @@ static ssize_t web_write(void *link, int session, const void *buf, size_t len)
     return (ssize_t)len;
 }
 
-/* ---- faults on request */
+/* ---- injected faults */
 
 void web_break(struct lws *wsi)
 {
@@ -397,7 +397,7 @@ static int any_session(const struct web_link *web)
     return 0;
 }
 
-/* What was written goes out, and why there is no more of it. A client that does not take it has so long. */
+/* Sends what was written, and the reason of the end. Waits WEB_GOODBYE_MS for clients to take it. */
 static void say_goodbye(struct web_link *web)
 {
     for (int s = 0; s < web->n_sessions; s++) {

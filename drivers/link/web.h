@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a web link serves besides the page's own files: resources of its owner, by path. */
+/* Resources that the owner of a web link adds to the page's own files, by path. */
 #ifndef DRIVERS_LINK_WEB_H
 #define DRIVERS_LINK_WEB_H
 
@@ -15,9 +15,10 @@ struct web_body {
 
 struct web_source {
     void *ctx;
-    /* path: "/scene"; query: what follows its '?', or "". Called by the thread that owns the link, whose sessions wait
-     * meanwhile: some milliseconds at most. SH_OK; SH_EINPUT: with an empty err there is nothing at that path, else
-     * err says what is wrong with the request; other SH_E: it can't be had, and err says why. */
+    /* path: "/scene"; query: the text after its '?', or "". Called by the thread that owns the link, whose sessions
+     * wait meanwhile: it must take some milliseconds at most. SH_EINPUT with an empty err: there is nothing at that
+     * path; with a text: err says what is wrong with the request. Other SH_E: the resource can't be had, and err says
+     * why. */
     int (*get)(void *ctx, const char *path, const char *query, struct web_body *out, struct sh_err *err);
 };
 

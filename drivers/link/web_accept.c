@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* Connections until their first request is whole. It is judged here as it comes, without taking it out of the socket: what
- * is wrong is answered at its first wrong byte, and libwebsockets never meets it. For a right one libwebsockets gets a
- * request that is made anew, with what it needs alone: it closes without a word where there are more fields or arguments
- * than it has room for, and acts on fields that are none of ours (h2c). What stands behind a request is not its either. */
+/* Connections until their first request is whole. The request is judged here as it comes, without taking it out of the
+ * socket. A wrong one is answered at its first wrong byte, and libwebsockets never sees it. For a correct one
+ * libwebsockets gets a new request with only the fields that it needs, and nothing of what follows the request. With
+ * more fields or arguments than it has room for it would close without a word, and it would act on fields that we don't
+ * support (h2c). */
 #include <errno.h>
 #include <poll.h>
 #include <stdio.h>
@@ -32,7 +33,8 @@ static int wait_for_more(int fd, int have)
     return setsockopt(fd, SOL_SOCKET, SO_RCVLOWAT, &low, sizeof low);
 }
 
-/* Takes what a client goes on to send: the system would reset the connection, answer and all, otherwise. -1: it has ended. */
+/* Takes what a client goes on to send. Else the system would reset the connection, and the answer would be lost. -1:
+ * the client has ended. */
 static int drain(int fd)
 {
     char rest[WEB_MAX_REQUEST];
@@ -42,7 +44,7 @@ static int drain(int fd)
     return n < 0 ? -1 : 0;
 }
 
-/* As far as the socket takes it at once: it is the first that goes out. */
+/* Sends a short answer. The socket takes it at once, since nothing was sent before. */
 static void say(int fd, int status, const char *words, int head_only)
 {
     char text[WEB_TEXT_ROOM];
@@ -60,7 +62,7 @@ static int linger(struct web_conn *conn)
     return drain(fd);
 }
 
-/* A wsi of its own is with the descriptor again, so that libwebsockets may close its one. */
+/* The descriptor is duplicated for a new wsi, so that libwebsockets may close its own. */
 void web_linger(struct web_link *web, struct web_conn *conn)
 {
     const int fd = dup(web_lws.lws_get_socket_fd(conn->wsi));
@@ -74,7 +76,7 @@ void web_linger(struct web_link *web, struct web_conn *conn)
 
 /* ---- who comes in */
 
-/* Half a request is told why it ends; to the others there is nothing to say. Who has had an answer does not come in vain. */
+/* A client with half a request gets the reason; others get nothing. One without a whole answer counts as refused. */
 static void make_room(struct web_link *web, struct web_conn *conn)
 {
     if (conn->place.phase == WEB_ASKING || conn->place.phase == WEB_ANSWERING) web_refused(web, conn->peer);
@@ -129,7 +131,7 @@ static void accept_some(struct web_link *web)
 
 /* ---- what is asked */
 
-/* libwebsockets takes its request at once, and makes of the connection what it is from now on. */
+/* Hands the connection to libwebsockets, which reads the new request at once, for its answer or its WebSocket. */
 static int hand_over(struct web_link *web, struct web_conn *conn)
 {
     char text[400] = "GET / HTTP/1.1\r\n\r\n";
@@ -189,7 +191,7 @@ static int look_at_request(struct web_link *web, struct web_conn *conn)
     return ended ? -1 : wait_for_more(fd, (int)n);
 }
 
-/* Its time is over. */
+/* Ends a connection whose time is over. */
 static int give_up(struct web_conn *conn)
 {
     if (conn->place.phase != WEB_ASKING || conn->n_seen == 0) return -1;

@@ -28,7 +28,8 @@ static const char *reason_of(int status)
     return "Error";
 }
 
-/* As snprintf. What a browser holds a page to: nothing from elsewhere, no frame around it, no type guessed. */
+/* As snprintf. Its fields bind a browser: nothing is loaded from elsewhere, no frame around the page, no type
+ * guessed. */
 static int write_head(char *to, size_t room, int status, const char *type, size_t len)
 {
     const char *more = status == 405   ? "allow: GET, HEAD\r\n"

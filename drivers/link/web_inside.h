@@ -40,8 +40,8 @@
 
 LATE_LIBRARY(websockets, WEBSOCKETS_CALLS)
 
-/* libwebsockets, which brings OpenSSL (core/late.h); each web link that is opened fills it in, always with the same.
- * Its callbacks have nothing but itself to find it by. */
+/* libwebsockets, which brings OpenSSL (core/late.h); each link that is opened fills it in, always with the same. It
+ * is global since libwebsockets' callbacks need it to find their link. */
 extern struct websockets_lib web_lws;
 
 enum {
@@ -54,7 +54,7 @@ enum {
     WEB_AT_A_TIME = 16,   /* accepted before the connections that are there are looked at again */
     WEB_PATIENCE_S = 20,  /* for a whole request; for an answer, since the client last took some of it */
     WEB_TRY_LATER = 1013, /* RFC 6455's registry of close codes */
-    WEB_FOREIGN = 1,      /* no status: another site's page asks, and gets no byte */
+    WEB_FOREIGN = 1,      /* not a status: another site's page asks, and gets no byte */
 };
 
 enum web_state {
@@ -83,8 +83,8 @@ struct web_request {
     int names_protocol;
 };
 
-/* One client, from its coming to its end. libwebsockets has it first as a plain descriptor (web_accept.c), then for its
- * answer or its WebSocket, and after an answer as a descriptor again; wsi is the one of now. */
+/* One client, from its coming to its end. To libwebsockets it is first a plain descriptor (web_accept.c), then an HTTP
+ * answer or a WebSocket, and after an answer a descriptor again; wsi is the present one. */
 struct web_conn {
     struct web_place place;
     struct lws *wsi;
@@ -106,7 +106,7 @@ struct web_link {
     int listener, wake_fd, woken;
     int reserve_fd; /* given up when there are no more, to turn a connection away; -1: none */
     int port, n_sessions, n_refused;
-    char refused[64]; /* who came last in vain */
+    char refused[64]; /* the last client that was refused */
     char at[72];      /* "127.0.0.1:40123" */
     char host[64];    /* as the user named it */
     const struct web_source *source;
@@ -137,13 +137,13 @@ void web_break(struct lws *wsi);
  * wake-up, connections whose request has not come whole or whose answer is out. */
 #define WEB_BARE "bare"
 int web_bare_callback(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t len);
-/* Gives a descriptor to lws_service to wait for. It is closed with the context, or at once where NULL comes back. */
+/* Has lws_service wait for a descriptor. It is closed with the context, or at once if NULL is returned. */
 struct lws *web_wait_for(struct web_link *web, int fd, struct web_conn *conn);
 /* The answer is out. Takes the connection from libwebsockets' HTTP, and lets its client end. */
 void web_linger(struct web_link *web, struct web_conn *conn);
 
-/* web_request.c: 0; the status of a request that does not get what it asks for, and why; or WEB_FOREIGN. head: its
- * lines, len bytes with the empty one. */
+/* web_request.c: judges a request. 0; the status of a refused request, with *words saying why; or WEB_FOREIGN. head:
+ * its lines, len bytes with the empty one. */
 int web_request_read(const struct web_link *web, const char *head, size_t len, struct web_request *out,
                      const char **words);
 

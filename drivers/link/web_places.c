@@ -31,7 +31,7 @@ static int count_of(struct web_places places, const unsigned char address[8])
     return n;
 }
 
-/* The lower, the sooner it goes; 0: it stays. */
+/* Rank of a client in making room: the lowest goes first; 0: it stays. */
 static int rank_of(const struct web_place *place, int64_t now_ms)
 {
     switch (place->phase) {

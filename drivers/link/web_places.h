@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Who holds the connections of a web link, and who makes room for one more. Private to the web link.
+/* The clients that hold the connections of a web link, and which one makes room for another. Private to the web link.
  *
  * Pure; times are of one clock, in ms. */
 #ifndef DRIVERS_LINK_WEB_PLACES_H
@@ -39,9 +39,9 @@ struct web_places {
     size_t stride;
 };
 
-/* Where somebody from this address may come in: an index. The one who is there now has to go when its phase isn't NOBODY:
- * the oldest silent one of that address when it holds as many as it may, else of the address that holds the most. -1:
- * nobody is silent. */
+/* The index of a place for a new client from this address. If its phase isn't NOBODY, its present client has to go: the
+ * oldest silent one of that address if the address holds as many as it may, else of the address that holds the most.
+ * -1: no client is silent. */
 int web_places_take(struct web_places places, const unsigned char address[8], int64_t now_ms);
 
 #endif

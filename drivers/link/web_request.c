@@ -49,7 +49,7 @@ static int is_number(const char *host)
     return inet_pton(AF_INET, host, address) == 1;
 }
 
-/* The address bar has one of these names: a number, localhost, the name that the configuration has or the machine's own. */
+/* Whether Host is a name of this machine: a number, localhost, the name in the configuration or the machine's own. */
 static int is_own_host(const struct web_link *web, const struct http_place *place)
 {
     char host[300], own[256] = "";
@@ -69,7 +69,7 @@ static int is_own_origin(const struct fields *f)
            strncasecmp(f->origin.s + n, f->host.s, f->host.len) == 0;
 }
 
-/* Text with its %41. 0; 1: it is cut; 400. */
+/* Decodes %41 and the like. 0; 1: the text is cut; 400. */
 static int decode(struct http_text in, char *out, size_t room)
 {
     size_t n = 0;
@@ -111,7 +111,7 @@ static int read_upgrade(const struct fields *f, struct web_request *out, const c
     return 0;
 }
 
-/* For which host, and for which page of a browser. */
+/* Checks Host and Origin. */
 static int check_asker(struct fields *f, int minor, struct http_text place_of_target, struct http_place *place)
 {
     if (f->n_host > 1 || (f->n_host == 0 && minor > 0)) return 400;

@@ -86,7 +86,7 @@ static void take_frame(void *protocol, const uint8_t *frame, size_t len)
         self->host.count(self->host.ctx, PROTOCOL_UNITS_LOST, news.broken);
 }
 
-/* What is missing shows in the scan that it is missing from. */
+/* Nothing to do: the scan itself shows what is missing in it. */
 static void pass_gap(void *protocol, uint32_t n_frames)
 {
     (void)protocol;
@@ -104,7 +104,7 @@ static void pass_time(void *protocol, int64_t t_ns)
     cola_start_scan(self);
 }
 
-/* A scan before the head was set to another geometry is not what is asked for. */
+/* 1: the last scan has the geometry that the head is set to. */
 static int is_as_set(const struct cola *self)
 {
     const struct planar_head *had = &self->scan.head, *set = cola_head(self);

@@ -19,7 +19,7 @@ enum {
 /* Who is logged in. */
 enum cola_level { COLA_RUN = 1, COLA_MAINTENANCE = 2, COLA_CLIENT = 3, COLA_SERVICE = 4 };
 
-/* What clients set; as at power-up at the session's start, and after a reboot. */
+/* Settings of the client. They begin as at power-up, and do so again after a reboot. */
 struct cola_settings {
     /* LMDscandatacfg */
     uint8_t channels[2], rssi, rssi_16bit, unit, encoder[2], position, name, comment, time;
@@ -41,19 +41,19 @@ struct cola {
     const struct cola_model *model;
     struct cola_settings set;
     enum cola_level level;
-    int measures;            /* LMCstopmeas: 0. Output of this session alone */
+    int measures;            /* 0 after LMCstopmeas: no output, of this session alone */
     int started;             /* LMCstartmeas was called since */
-    int reboots;             /* once the answer is sent */
-    struct planar_head head; /* of a head with geometries, as it is set: its next scan has this one */
+    int reboots;             /* it reboots once the answer is sent */
+    struct planar_head head; /* a head with geometries: the geometry of its next scan */
     struct {
-        int is_due; /* mLMPsetscancfg is answered, and done, once the head's scan has ended */
+        int is_due; /* mLMPsetscancfg is to be done and answered once the head's scan has ended */
         enum cola_form form;
         int64_t lines_uhz;
         uint32_t steps;
     } next;
     uint32_t field;  /* number in the name of the request at hand, field012 */
     int outputs_due; /* LIDoutputstate is sent once, behind the answer */
-    int wants_scan;  /* measurement was asked for, and no scan has come yet; next look at the head at try_ns */
+    int wants_scan;  /* measurement was asked for, and no scan has come yet; try_ns: when to look at the head next */
     int64_t try_ns;
     int64_t now_ns;
     int64_t power_ns; /* device time of power-up: its clock begins there */
@@ -78,11 +78,11 @@ typedef enum cola_error cola_handler(struct cola *self, struct cola_args *args, 
 
 /* cola.c */
 
-/* A scan that is done goes to who waits for it. */
+/* Sends a scan that is done, if the client waits for it. */
 void cola_deliver(struct cola *self);
 /* sRN LMDscandata: the last scan, or later the first one. */
 cola_handler cola_read_scan;
-/* As at power-up; the settings, too. */
+/* Sets the session and its settings as at power-up. */
 void cola_power_up(struct cola *self);
 
 /* Device time as the scanner counts it: us, 32 bits. */
@@ -100,7 +100,7 @@ void cola_content(const uint8_t *unit, size_t len, uint8_t *mask);
 /* The check byte of CoLa-B. */
 void cola_reseal(uint8_t *unit, size_t len);
 
-/* cola_settings.c: what is set and asked for the measurement. */
+/* cola_settings.c: requests about the measurement. */
 
 void cola_settings_reset(struct cola *self);
 /* The beams that are sent: those of LMPoutputRange, of a head that is known. */
@@ -111,11 +111,11 @@ struct cola_beams cola_sent_beams(const struct cola *self, const struct planar_h
 cola_handler cola_read_output_range, cola_write_output_range, cola_read_scan_data_cfg, cola_write_scan_data_cfg,
     cola_read_filter, cola_write_filter, cola_read_scale, cola_write_scale;
 
-/* cola_geometry.c: line rate and step, which are the head's and not this session's. */
+/* cola_geometry.c: line rate and step, which belong to the head, not to this session. */
 
-/* The head as it is set. The last scan may be of another step: that is in scan.head. */
+/* The head with its present settings. The last scan, in scan.head, may have another step. */
 const struct planar_head *cola_head(const struct cola *self);
-/* Asks the head how it is set. Before each request. */
+/* Asks the head for its settings; to be called before each request. */
 void cola_look_at_head(struct cola *self);
 /* Time has passed: answers mLMPsetscancfg once the head's scan has ended. */
 void cola_geometry_time(struct cola *self);

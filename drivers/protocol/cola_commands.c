@@ -177,7 +177,8 @@ static enum cola_error carry_out(struct cola *self, const struct cola_request *r
     return c->carry_out(self, &p.args, out);
 }
 
-/* The head's power cycle ends all sessions. Where there is none, as of a recording, this session alone begins anew. */
+/* The head's power cycle ends all sessions. Where there can't be one, as with a recording, only this session begins
+ * anew. */
 static void reboot(struct cola *self)
 {
     char reply[512];

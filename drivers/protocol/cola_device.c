@@ -199,7 +199,7 @@ enum cola_error cola_start(struct cola *self, struct cola_args *args, struct col
     return COLA_OK;
 }
 
-/* Of this session alone: the head goes on, since others may read it. */
+/* Stops the output of this session alone: the head goes on, since others may read it. */
 enum cola_error cola_stop(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
     const enum cola_error error = cola_args_end(args);

@@ -36,7 +36,7 @@ static double ask(struct cola *self, const char *query)
     return self->host.command(self->host.ctx, query, reply, sizeof reply) == 0 ? strtod(reply, NULL) : 0.0;
 }
 
-/* A head that scans says it in its stream. One that rests says nothing there when it is set. */
+/* A head that scans reports its settings in the stream. A head at rest reports nothing there when it is set. */
 void cola_look_at_head(struct cola *self)
 {
     if (self->identity->n_geometries == 0) return;
@@ -72,7 +72,7 @@ struct scan_cfg {
     int32_t sectors, start_e4, stop_e4;
 };
 
-/* Both ends are the nearest beams, as of LMPoutputRange. */
+/* Both ends become the nearest beams, as with LMPoutputRange. */
 static int area_fits(const struct planar_head *head, const struct scan_cfg *asked)
 {
     return cola_beam_at(head, asked->start_e4) == 0 && cola_beam_at(head, asked->stop_e4) == head->n - 1;
@@ -106,7 +106,7 @@ static int set_lines(struct cola *self)
     return self->host.command(self->host.ctx, line, reply, sizeof reply);
 }
 
-/* Which one comes first depends on the geometry before: each must be one that the head has. */
+/* The order of the two commands depends on the geometry before: each step must lead to a geometry that the head has. */
 static enum cola_error set_head(struct cola *self)
 {
     char line[48], reply[REPLY_LEN];
@@ -124,7 +124,7 @@ static int is_turning(struct cola *self)
     return state == COLA_HEAD_SPIN_UP || state == COLA_HEAD_SCANNING;
 }
 
-/* A scanner that nobody has told to measure, and one that was stopped, takes another geometry. */
+/* A scanner takes another geometry only before it was told to measure, or after it was stopped. */
 static int is_measuring(const struct cola *self)
 {
     return self->measures && (self->started || self->streams);

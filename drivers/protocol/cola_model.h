@@ -14,13 +14,13 @@ enum cola_ports {
 struct cola_model {
     const char *model;    /* of the head profile; NULL: the row for all others, with the profile's own text */
     const char *version;  /* of DeviceIdent, where the profile has no firmware */
-    const char *firmware; /* what FirmwareVersion says where the version is that one; else it says the version */
+    const char *firmware; /* FirmwareVersion where the version is `version`; else FirmwareVersion is the version */
     uint8_t echoes;       /* DIST1, DIST2 */
     uint8_t rssi;         /* LMDscandatacfg at power-up: 1 with RSSI */
     uint8_t rssi_16bit;   /* 0: 8 bit */
     uint8_t n_fields;     /* field000 and on are answered */
     uint8_t n_records;    /* the first of them have a record, the others say that there is none */
-    uint8_t named;        /* 1: a record is numbered, named and of segments; 0: nothing of it is configured */
+    uint8_t named;        /* 1: a record has a number, a name and segments; 0: none of these is configured */
     uint8_t n_results;    /* of LFErec */
     uint8_t n_outputs;    /* of LIDoutputstate */
     uint8_t ports;        /* enum cola_ports */

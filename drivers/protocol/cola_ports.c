@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Fields, inputs and outputs. None is active; what is read says so, in the form that the scanner has. COLA.md draws it.
- */
+/* Fields, inputs and outputs. None is active; the answers say so, in the form of the real scanner. COLA.md draws it. */
 #include <stdio.h>
 #include <string.h>
 

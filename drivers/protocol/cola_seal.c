@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* LMDscandata whose values are changed, and whose check byte is made right again. COLA.md draws the telegram. */
+/* For injected faults: marks the values of LMDscandata, and corrects its check byte. COLA.md draws the telegram. */
 #include <string.h>
 
 #include "drivers/protocol/cola.h"
@@ -65,7 +65,7 @@ static size_t hex_of(const uint8_t *digits, size_t len)
     return v;
 }
 
-/* Bits that turn a hexadecimal digit into another one, whichever of them change. */
+/* Bits of a hexadecimal digit; after any change of these it is still one. */
 static uint8_t digit_bits(uint8_t c)
 {
     return c >= '0' && c <= '7' ? 7 : c == '8' || c == '9' || (c >= 'B' && c <= 'E') ? 1 : 0;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a client sets and asks for the measurement. */
+/* Settings of the measurement that clients write and read. */
 #include <stdio.h>
 #include <string.h>
 
@@ -20,7 +20,7 @@ static uint32_t clamped(int64_t beam, const struct planar_head *head)
     return beam < 0 ? 0 : beam >= head->n ? head->n - 1 : (uint32_t)beam;
 }
 
-/* Found anew for each telegram: the head's step may have become another one since the range was written. */
+/* Computed for each telegram, since the head's step may have changed after the range was written. */
 struct cola_beams cola_sent_beams(const struct cola *self, const struct planar_head *head)
 {
     if (!self->set.narrowed) return (struct cola_beams){0, head->n};

@@ -15,7 +15,7 @@
 
 enum cola_form { COLA_A, COLA_B };
 
-/* What `sFA` says: SICK's numbers (COLA.md has the list and its sources). */
+/* Errors in an `sFA`, by SICK's numbers (COLA.md has the list and its sources). */
 enum cola_error {
     COLA_LATER = -1, /* no error: the answer comes later */
     COLA_OK = 0,
@@ -47,7 +47,7 @@ void cola_arg_text(struct cola_args *args, char *dst, size_t cap);
 /* The error so far; COLA_TOO_LONG where values are left. */
 enum cola_error cola_args_end(const struct cola_args *args);
 
-/* ---- writing a telegram. What finds no room is left out, and cola_end says so. */
+/* ---- writing a telegram. Values without room are left out, and cola_end says so. */
 struct cola_out {
     uint8_t *buf;
     size_t cap, len;

@@ -42,8 +42,8 @@ uint32_t crc32c_table(uint32_t crc, const void *data, size_t len)
 
 /* The instruction takes a word per cycle but answers after three, so long data go through three lanes at
  * once. The lanes are joined by carry-less products with x^(8n-33) mod P, bits reflected, for n = LANE and 2
- * LANE bytes: the product of two reflected 32-bit words is one bit short, which is the x, and the crc32
- * instruction gives the x^32. */
+ * LANE bytes. The missing x^33 comes from two places: the product of two reflected 32-bit words is one bit
+ * short, which is x, and the crc32 instruction gives x^32. */
 enum { LANE = 336, LANES = 3 * LANE };
 #define SHIFT_ONE_LANE  0xa60ce07bu
 #define SHIFT_TWO_LANES 0xcec3662eu

@@ -120,7 +120,7 @@ static uint8_t *put_front(uint8_t *to, const struct ethernet_end *from, const st
     return to + LINK_LEN + (from->is_v6 ? IPV6_LEN : IPV4_LEN);
 }
 
-/* Over addresses, protocol and length, too (RFC 768, RFC 8200 8.1). The checksum's own place is zero then. */
+/* The checksum covers addresses, protocol and length, too (RFC 768, RFC 8200 8.1). Its own place is still zero. */
 static uint16_t checksum(const uint8_t *packet, size_t len, const struct ethernet_end *from,
                          const struct ethernet_end *dest, int protocol)
 {
@@ -203,7 +203,7 @@ size_t tcp_put_fin(struct tcp_talk *talk, int side, uint8_t *to)
     return put_segment(talk, side, TCP_FIN | TCP_ACK, NULL, 0, to);
 }
 
-/* Who was never open acknowledges what is refused (RFC 9293, 3.10.7.1). */
+/* An end that was never open acknowledges the segment that it refuses (RFC 9293, 3.10.7.1). */
 size_t tcp_put_reset(struct tcp_talk *talk, int side, uint8_t *to)
 {
     return put_segment(talk, side, TCP_RST | TCP_ACK, NULL, 0, to);

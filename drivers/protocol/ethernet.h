@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Ethernet frames made anew around the payload of a datagram, or of a piece of a TCP stream: what a capture on the wire
- * would have, where only a socket's view is at hand.
+/* Makes Ethernet frames around the payload of a datagram or of a piece of a TCP stream. They stand for a capture on the
+ * wire, where only a socket's bytes are at hand.
  *
  * In: both ends and the payload. Out: bytes of a frame: Ethernet, IPv4 or IPv6, UDP or TCP, with right lengths and
  * checksums. Addresses and ports are true. The rest of the headers is made up:
@@ -47,12 +47,12 @@ size_t ethernet_put_tcp(uint8_t *to, const struct ethernet_end *from, const stru
 struct tcp_talk {               /* begins with both ends, and zeros */
     struct ethernet_end end[2]; /* 0: who connects; 1: who listens */
     uint32_t next[2];           /* sequence number of the next byte of each */
-    uint32_t acked[2];          /* of the other end's bytes, what each has acknowledged */
+    uint32_t acked[2];          /* sequence number up to which each has acknowledged the other end's bytes */
 };
 
-/* Each puts one frame of the end `side`, and returns its length; 0: none is needed. */
+/* Each function writes one frame of the end `side`, and returns its length; 0: none is needed. */
 
-/* The handshake: of side 0, of side 1, and then tcp_put_ack of side 0. */
+/* The handshake is tcp_put_syn for side 0, then for side 1, then tcp_put_ack for side 0. */
 size_t tcp_put_syn(struct tcp_talk *talk, int side, uint8_t *to);
 /* 1 <= len <= ETHERNET_MAX_SEGMENT; it acknowledges all that came so far. */
 size_t tcp_put_data(struct tcp_talk *talk, int side, const void *data, size_t len, uint8_t *to);

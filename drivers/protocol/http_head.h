@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /* The head of a request of HTTP/1.x: its lines, as RFC 9112 has them. For the web link and the settings of a VLP-16.
  *
- * In go bytes as they come from a client, out come texts within them, or the status that a broken head is answered
- * with. A bare LF ends a line, too. Pure; allocates nothing; any thread. */
+ * Bytes from a client go in. Texts within these bytes come out, or the status that answers a broken head. A bare LF
+ * ends a line, too. Pure; allocates nothing; any thread. */
 #ifndef DRIVERS_PROTOCOL_HTTP_HEAD_H
 #define DRIVERS_PROTOCOL_HTTP_HEAD_H
 
 #include <stddef.h>
 
-/* Part of a client's bytes: no NUL ends it, and it holds as long as they do. */
+/* A part of a client's bytes: it has no NUL at its end, and is valid as long as these bytes are. */
 struct http_text {
     const char *s;
     size_t len;
@@ -53,7 +53,7 @@ struct http_field {
 /* "Host: localhost": 0 or 400. */
 int http_read_field(struct http_text line, struct http_field *out);
 
-/* Decimal digits alone; more than a million counts as a million and some. 0 or 400. */
+/* Decimal digits alone; a number above a million becomes some number above a million. 0 or 400. */
 int http_read_length(struct http_text text, size_t *out);
 
 struct http_place {

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* Requests of HTTP/1.0 and 1.1 out of a stream of bytes: what a small device needs of RFC 9112, with bounded
- * memory.
+/* Reads requests of HTTP/1.0 and 1.1 from a stream of bytes: the part of RFC 9112 that a small device needs,
+ * with bounded memory.
  *
- * Bytes go in in pieces of any size. What comes out is one request after the other, or the status that a
- * broken one is answered with; after such a one the connection can't go on. Bodies have a Content-Length;
- * chunked ones are refused. Pure; allocates nothing; any thread. */
+ * Bytes go in, in pieces of any size. Requests come out one after the other, or the status that answers a
+ * broken one; after a broken one the connection can't go on. Bodies have a Content-Length; chunked ones are
+ * refused. Pure; allocates nothing; any thread. */
 #ifndef DRIVERS_PROTOCOL_HTTP_REQUEST_H
 #define DRIVERS_PROTOCOL_HTTP_REQUEST_H
 

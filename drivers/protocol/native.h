@@ -100,20 +100,20 @@ enum native_emitter_kind {
     NATIVE_EMIT_PLANAR = 1, /* one plane, elevation 0: `steps` a turn; a line is a turn, from step 0 on */
     NATIVE_EMIT_BEAMS = 2,  /* a firing sequence of beams spins about the vertical; a line is a turn, from azimuth 0 */
     NATIVE_EMIT_SPHERE =
-        3, /* rings of one elevation each, `steps` a turn; a line is a ring, a frame all of them; of the
-                                * first and the last, which are poles, one pulse is cast */
+        3, /* rings of one elevation each, `steps` a turn; a line is a ring, a frame is all rings. The first and the
+            * last ring are poles, where one pulse is cast */
     NATIVE_EMIT_DIRECTIONS = 4, /* a list; a line and a frame are the list once */
 };
 struct native_emitter { /* begin of an emitter payload, 64 bytes; then n_beams of 12 */
     uint32_t kind, n_beams;
-    uint32_t steps;                /* planar, sphere: a turn; directions: in the list; beams: 0 */
-    int32_t first_step, last_step; /* planar: cast, both included */
+    uint32_t steps;                /* planar, sphere: of a turn; directions: length of the list; beams: 0 */
+    int32_t first_step, last_step; /* planar: range of steps that are cast, both included */
     int32_t front_step;            /* planar, sphere: the step that looks along y */
     int32_t turn;                  /* +1: steps and azimuth go clockwise seen from above, -1: the other way */
     uint32_t rings;                /* sphere */
-    uint64_t sequence_ns_num, sequence_ns_den; /* beams: a firing sequence lasts num / den ns; else of one pulse */
+    uint64_t sequence_ns_num, sequence_ns_den; /* num / den ns is the time of a firing sequence (beams) or a pulse */
     int64_t first_ring_udeg; /* sphere: elevation of ring 0, rounded; the others follow by 180 deg / gaps */
-    uint32_t echoes;         /* enum native_echoes: which of a pulse's are sent */
+    uint32_t echoes;         /* enum native_echoes: which echoes of a pulse are sent */
     uint32_t gaps;           /* sphere without all its rings: gaps between rings from pole to pole; else 0: rings - 1 */
 };
 enum native_echoes {
@@ -156,7 +156,7 @@ struct native_anchor {
     double rotation[9];  /* socs -> scene frame, row by row: p_prcs = station_m + rotation * p_socs */
     double scale[3];     /* geo: position = anchor + scale[k] * count[k]; 0: scale_m */
     uint32_t heights;    /* enum native_heights, of utm and geodetic */
-    uint32_t until_ms;   /* of the scan: for points before that; 0: for all that follow */
+    uint32_t until_ms;   /* time in the scan until which it holds; 0: for all points that follow */
     double axes[9]; /* differences in the scene frame at the anchor -> axes of the CRS, row by row, without its scale;
                        geodetic: -> east, north, up. All 0: the unit matrix */
     double frame;   /* at a stop: frame scalar of the trajectory */
@@ -228,7 +228,7 @@ struct native_telemetry {
     uint64_t reader_lost_frames;               /* of the reader who gets this frame; 0 in the common stream */
     int64_t utc_ns;                            /* UTC of this frame's device time, ns since 1970, 0 when unknown */
     uint64_t scan_fired, scan_cast, scan_lost; /* pulses of that scan up to here */
-    uint64_t lost_lines; /* that the head's files lack; 0 is not sent, and is what a payload has that ends before it */
+    uint64_t lost_lines;                       /* missing in the head's files; sent only where it is not 0 */
 };
 
 enum native_event_code {
@@ -291,13 +291,13 @@ enum native_item { NATIVE_MORE = 0, NATIVE_FRAME = 1, NATIVE_TEXT = 2 };
 struct native_stats {
     uint64_t frames, bytes, texts;   /* items given, and all bytes */
     uint64_t bad_payload, bad_bytes; /* frames with a wrong payload CRC; bytes that belong to no item */
-    uint64_t seq_gaps, seq_lost;     /* jumps in seq, both ways; frames missing by those forward */
-    uint64_t repeated, late;         /* frames dropped, since they came already, or after newer ones */
+    uint64_t seq_gaps, seq_lost;     /* jumps in seq, both ways; frames missing by forward jumps */
+    uint64_t repeated, late;         /* frames dropped: they had come before; they came after newer ones */
     uint64_t restarts, cuts;         /* jumps back to another sequence; connections that ended within an item */
-    uint64_t bad_unseen; /* of bad_payload, what no gap shows: before a sequence's first frame, after the last */
+    uint64_t bad_unseen; /* those of bad_payload that no gap shows: before a sequence's first frame, after its last */
 };
 
-/* Something wrong in the stream; scanhead.h says what n and at_byte are of each kind. */
+/* Something wrong in the stream; scanhead.h says what n and at_byte mean for each kind. */
 struct native_notice {
     enum native_notice_kind kind;
     uint32_t seq;
@@ -341,16 +341,16 @@ void native_parser_init(struct native_parser *parser);
 uint8_t *native_parser_room(struct native_parser *parser, size_t *room); /* room is never 0 after NATIVE_MORE */
 void native_parser_added(struct native_parser *parser, size_t n);
 enum native_item native_parser_next(struct native_parser *parser);
-/* Nothing more will be added. What waits for more bytes is then searched as garbage, so that whole frames
- * after a cut one come out at the end of a recording too. */
+/* Nothing more will be added. An incomplete frame is then searched as garbage, so that whole frames after a cut
+ * one come out at the end of a recording, too. */
 void native_parser_finish(struct native_parser *parser);
 /* After native_parser_finish() and all its items: bytes of another connection to the same head will follow.
  * Counters and sequence go on; native_sequence_resume(). Items that were not taken are bad bytes. */
 void native_parser_resume(struct native_parser *parser);
 
-/* 1 if a frame with this header belongs to stream_sha256: the hash runs over u8 type, u32 length (LE) and the
- * payload of each descriptor, emitter, anchor, points, line-end, poses, attributes and colours frame that has
- * neither NATIVE_REPEAT nor NATIVE_LOCAL. */
+/* 1 if a frame with this header belongs to stream_sha256. These are descriptor, emitter, anchor, points, line-end,
+ * poses, attributes and colours frames with neither NATIVE_REPEAT nor NATIVE_LOCAL. The hash runs over u8 type,
+ * u32 length (LE) and the payload of each. */
 int native_is_hashed(const struct native_header *header);
 
 #endif

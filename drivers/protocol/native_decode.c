@@ -69,7 +69,7 @@ void native_decode_attribute(const uint8_t *payload, uint32_t i, struct native_a
     out->width_cns = le_get16(p + 2);
 }
 
-/* It begins as attributes do. */
+/* A colours payload begins as an attributes payload does. */
 int native_decode_colours(const uint8_t *payload, size_t len, struct native_attributes *out)
 {
     int rc = fields_decode(&fields_attributes, payload, len, out);

@@ -138,8 +138,8 @@ static uint32_t points_that_fit(const struct line_block *block, uint32_t first)
     return n;
 }
 
-/* The hot loop; its cost is the number of stores, so three wide ones. Returns the bits that any time had
- * beyond the 24 there are room for. */
+/* The hot loop. Its cost is the number of stores, so there are three wide ones. Returns the bits of any time
+ * beyond the 24 that have room. */
 static uint32_t put_points(uint8_t *restrict dst, const struct line_block *block, uint32_t first, uint32_t n,
                            uint32_t dt0_ns)
 {
@@ -168,8 +168,7 @@ static uint32_t count_pulses(const uint8_t *echo, uint32_t n)
     return pulses;
 }
 
-/* Attributes of the block's entries first .. first + n, which the frame with this head has gone out with. 0:
- * no room. */
+/* Attributes of the block's entries first .. first + n, whose points frame had this head. 0: no room. */
 static size_t put_attributes(uint8_t *dst, size_t cap, const struct line_block *block, uint32_t first,
                              const struct native_points *points, int64_t t_ns)
 {
@@ -197,7 +196,7 @@ static size_t put_colours(uint8_t *dst, size_t cap, const struct line_block *blo
     return put_header(dst, NATIVE_COLOURS, 0, payload_len, t_ns);
 }
 
-/* What follows a points frame: 0 where there is no room for it. */
+/* Attributes and colours behind a points frame; 0: there is no room. */
 static size_t put_beside(uint8_t *dst, size_t cap, const struct line_block *block, uint32_t first,
                          const struct native_points *points, int64_t t_ns)
 {

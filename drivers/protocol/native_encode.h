@@ -20,9 +20,9 @@ size_t native_encode_emitter(uint8_t *dst, size_t cap, const struct native_emitt
 size_t native_encode_telemetry(uint8_t *dst, size_t cap, const struct native_telemetry *t, int64_t t_ns, int flags);
 size_t native_encode_event(uint8_t *dst, size_t cap, const struct native_event *e, int64_t t_ns, int flags);
 
-/* A block as one or more points frames of at most NATIVE_MAX_POINTS, and after each of them the frame of its
- * attributes and that of its colours where the block has some. Cuts lie between pulses, so that a pulse's echoes stay in one frame.
- * scan_t0_ns: device time of the scan's start. */
+/* A block as one or more points frames of at most NATIVE_MAX_POINTS. After each of them come the frame of its
+ * attributes and that of its colours, where the block has some. Cuts lie between pulses, so that a pulse's echoes stay
+ * in one frame. scan_t0_ns: device time of the scan's start. */
 size_t native_encode_points(uint8_t *dst, size_t cap, const struct line_block *block, int64_t scan_t0_ns);
 size_t native_encode_line_end(uint8_t *dst, size_t cap, const struct line_end *end, int64_t scan_t0_ns);
 
@@ -36,8 +36,7 @@ struct native_names {
     void (*name)(void *ctx, uint32_t label, const char **object, const char **material);
     void *ctx;
 };
-/* As many names as fit into one frame of at most max_payload bytes. `names` then holds those that are
- * left. */
+/* As many names as fit into one frame with at most max_payload bytes of payload. `names` then holds the rest. */
 size_t native_encode_surfaces(uint8_t *dst, size_t cap, size_t max_payload, struct native_names *names, int64_t t_ns);
 
 /* Sets the sequence number of the whole frame at frame and renews the header CRC. Returns the frame's

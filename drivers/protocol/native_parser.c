@@ -52,7 +52,7 @@ static void give_notice(const struct native_parser *parser, const struct native_
 
 /* ---- bytes that belong to no item */
 
-/* Of the frame that `bad` begins with. Nobody misses a LOCAL one. */
+/* Counts the frame that `bad` begins with. A LOCAL frame is not missed. */
 static void count_bad_payload(struct native_parser *parser)
 {
     parser->stats.bad_payload++;
@@ -93,7 +93,7 @@ static void begin_bad_frame(struct native_parser *parser, enum native_notice_kin
     parser->bad.most = NATIVE_HEADER_LEN + (uint64_t)header->length;
 }
 
-/* n bytes from the one at hand on. What goes beyond a broken frame is another thing. */
+/* Adds n bytes from the present one on. Bytes beyond the length of a broken frame give a notice of their own. */
 static void add_bad(struct native_parser *parser, uint64_t n)
 {
     struct native_bad *bad = &parser->bad;
@@ -167,7 +167,7 @@ static void count_notice(struct native_stats *stats, const struct native_notice 
     stats->restarts += notice->kind == NATIVE_RESTARTED;
 }
 
-/* A frame in order, or after a gap, shows which were missing before it; a sequence's first one doesn't. */
+/* A frame in order, or after a gap, shows which frames were missing before it. The first one of a sequence doesn't. */
 static void see_bad(struct native_parser *parser, int is_first)
 {
     if (is_first)
@@ -225,7 +225,7 @@ static enum native_item take_text(struct native_parser *parser, size_t len)
     return NATIVE_TEXT;
 }
 
-/* Goes on at the next sync byte after the one at hand. */
+/* Goes on at the next sync byte after the present one. */
 static void skip(struct native_parser *parser)
 {
     const uint8_t *from = parser->buf + parser->start, *to = parser->buf + parser->end;

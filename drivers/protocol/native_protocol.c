@@ -1,17 +1,17 @@
 /* SPDX-License-Identifier: MIT */
 /* The native protocol on a link: the stream as it is, and command lines with their replies (PROTOCOL.md).
  *
- * There is no module to call. The loop copies whole ticks of frames to the client, up to millions of pulses per second,
- * and looks into none. And it carries the lines out itself: the reply to TIME:STEP comes after the frames of the time
- * that it lets pass, lines wait for it, and a client keeps control between its lines (firmware_sim/loop/session.c,
- * pump_commands.c). */
+ * There is no module to call. The loop copies whole ticks of frames to the client without looking into them, up to
+ * millions of pulses per second. It also carries out the command lines (firmware_sim/loop/session.c, pump_commands.c):
+ * the reply to TIME:STEP comes after the frames of that time, lines wait for it, and a client keeps control between its
+ * lines. */
 #include <string.h>
 
 #include "drivers/protocol/native.h"
 #include "drivers/protocol/native_encode.h"
 #include "drivers/protocol/protocol.h"
 
-/* The payload: what the header says of length and numbers stays true. */
+/* Marks the payload, so that length and number in the header stay true. */
 static void mark_payload(const uint8_t *frame, size_t len, uint8_t *mask)
 {
     (void)frame;

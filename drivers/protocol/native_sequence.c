@@ -40,7 +40,7 @@ static void add_gap(struct native_sequence *s, uint32_t first, uint32_t n)
     s->gap[s->n_gaps++ % NATIVE_GAPS].n = n;
 }
 
-/* 1: seq was missing; it is so no more. */
+/* 1: seq was missing; now it counts as there. */
 static int fills_gap(struct native_sequence *s, uint32_t seq)
 {
     for (uint32_t i = 0; i < NATIVE_GAPS; i++) {
@@ -60,7 +60,8 @@ static void forget(struct native_sequence *s)
         s->gap[i].n = 0;
 }
 
-/* Of a late frame. A head that started again while many frames were lost may have numbers that are all missing. */
+/* Whether late frames in a row are another sequence: if a head started again while many frames were lost, all its new
+ * numbers may be missing ones. */
 static int is_run(struct native_sequence *s, uint32_t seq)
 {
     s->late_run = s->late_run > 0 && seq == s->last_late + 1 ? s->late_run + 1 : 1;
@@ -68,7 +69,7 @@ static int is_run(struct native_sequence *s, uint32_t seq)
     return s->late_run == NATIVE_LATE_RUN;
 }
 
-/* Of a frame that is not the next one. */
+/* The kind of notice for a frame that is not the next one. */
 static enum native_notice_kind look_at_jump(struct native_sequence *s, const struct native_seen *frame, int fresh,
                                             uint32_t *first, uint32_t *n)
 {
@@ -85,7 +86,7 @@ static enum native_notice_kind look_at_jump(struct native_sequence *s, const str
     return NATIVE_RESTARTED;
 }
 
-/* LOCAL frames are not numbered, and a head may well send equal ones. It never sends one twice in a row. */
+/* LOCAL frames are not numbered, and a head may send equal ones, but never two in a row. */
 static enum native_notice_kind look_at_local(struct native_sequence *s, const struct native_seen *frame)
 {
     if (is_same(&s->local, frame)) return NATIVE_REPEATED;

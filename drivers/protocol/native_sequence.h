@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* The sequence numbers of frames: which frame comes in order, which came already, which comes too late, and which are
+/* The sequence numbers of stream frames: which frame comes in order, which is repeated, which comes late, and which are
  * missing. PROTOCOL.md, *Sequence numbers*, has the rules.
  *
- * Headers of whole frames go in, one after the other. For each comes out what is to be noticed about it. Numbers are
- * modulo 2^32 throughout. A frame in order costs one store; only a jump is looked into. */
+ * Headers of whole frames go in, one after the other. A kind of notice comes out for each. Numbers are modulo 2^32
+ * throughout. A frame in order costs one store; only a jump is examined. */
 #ifndef DRIVERS_PROTOCOL_NATIVE_SEQUENCE_H
 #define DRIVERS_PROTOCOL_NATIVE_SEQUENCE_H
 
@@ -11,7 +11,7 @@
 
 struct native_header;
 
-/* What is noticed of a stream. The values are those of enum scanhead_notice_kind, which says what each means. */
+/* Kinds of notices. The values are those of enum scanhead_notice_kind, which explains each. */
 enum native_notice_kind {
     NATIVE_NO_NOTICE = 0,
     NATIVE_GAP = 1,
@@ -26,8 +26,8 @@ enum native_notice_kind {
 enum {
     NATIVE_SEEN = 256,       /* frames that a repeated one is compared with */
     NATIVE_GAPS = 64,        /* ranges of missing frames that a late one may be of */
-    NATIVE_GAP_MOST = 65536, /* frames in such a range: where more are missing, none of them is waited for */
-    NATIVE_LATE_RUN = 256,   /* late frames in a row, one after the other: so many are another sequence */
+    NATIVE_GAP_MOST = 65536, /* frames in such a range: a larger one is not remembered */
+    NATIVE_LATE_RUN = 256,   /* so many late frames with consecutive numbers are another sequence */
 };
 
 struct native_seen {
@@ -53,12 +53,12 @@ struct native_sequence {
 
 /* Takes the next whole frame. NATIVE_NO_NOTICE: in order, or LOCAL. NATIVE_GAP: *n frames from *first on are missing
  * before it. NATIVE_RESTARTED: the sequence begins anew with it. NATIVE_REPEATED, NATIVE_LATE: it is to be dropped.
- * *first is its own number but for a gap. *n is 1 but for a gap. */
+ * Except for a gap, *first is the frame's own number and *n is 1. */
 enum native_notice_kind native_sequence_take(struct native_sequence *sequence, const struct native_header *header,
                                              uint32_t *first, uint32_t *n);
 
-/* What follows comes on another connection. The first frame there is REPEATED only if it is the one that came last, and
- * never LATE: the head may have started again. */
+/* Frames now come on another connection. The first of them is REPEATED only if it equals the last one of the old
+ * connection, and it is never LATE: the head may have started again. */
 void native_sequence_resume(struct native_sequence *sequence);
 
 #endif

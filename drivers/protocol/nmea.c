@@ -103,7 +103,7 @@ size_t nmea_encode_rmc(char *dst, size_t cap, const struct nmea_fix *fix)
     return end(&s);
 }
 
-/* Which satellites they are is not modelled: the first 12 numbers. */
+/* Single satellites are not modelled, so it lists the numbers from 1 on, 12 at most. */
 size_t nmea_encode_gsa(char *dst, size_t cap, const struct nmea_fix *fix)
 {
     struct sentence s = begin(dst, cap, fix, "GSA");

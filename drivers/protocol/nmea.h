@@ -41,8 +41,8 @@ size_t nmea_encode_all(char *dst, size_t cap, const struct nmea_fix *fix);
 /* XOR of len characters. */
 uint8_t nmea_checksum(const char *text, size_t len);
 
-/* Of the sentences among these bytes, for protocol_ops of the same names: decimals behind a point, and checksums. A
- * decimal may become another one, so that each field stays a number. */
+/* For protocol_ops of the same names: content marks the decimals after a point, reseal corrects the checksums of the
+ * sentences. A changed decimal is another decimal, so that each field stays a number. */
 void nmea_content(const uint8_t *bytes, size_t len, uint8_t *mask);
 void nmea_reseal(uint8_t *bytes, size_t len);
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Sentences whose numbers are changed, and whose checksums are made right again. */
+/* For injected faults: marks the decimals of sentences, and corrects their checksums. */
 #include <string.h>
 
 #include "drivers/protocol/nmea.h"
@@ -22,7 +22,7 @@ static int next_sentence(const uint8_t *bytes, size_t len, size_t *at, size_t *s
     return 0;
 }
 
-/* Bits that turn a digit into another one, whichever of them change. */
+/* Bits of a digit; after any change of these it is still a digit. */
 static uint8_t digit_bits(uint8_t c)
 {
     return c >= '0' && c <= '7' ? 7 : c == '8' || c == '9' ? 1 : 0;

@@ -3,9 +3,9 @@
  *
  * In and out: bytes of a file, in pieces of any size. Times are nanoseconds. Pure: no I/O, no clock, no allocation.
  *
- * Written are one section of little-endian blocks, interfaces with times in nanoseconds, and enhanced packets. Read is
- * what tshark, editcap and mergecap make of that, too: simple packets, other resolutions, blocks of other kinds, which
- * are passed over. Big-endian sections are refused. */
+ * It writes one section of little-endian blocks, interfaces with times in nanoseconds, and enhanced packets. It also
+ * reads what tshark, editcap and mergecap make of these: simple packets and other resolutions; blocks of other kinds
+ * are skipped. Big-endian sections are refused. */
 #ifndef DRIVERS_PROTOCOL_PCAPNG_H
 #define DRIVERS_PROTOCOL_PCAPNG_H
 
@@ -20,7 +20,7 @@ enum pcapng_link {
 };
 
 enum {
-    PCAPNG_FRONT_ROOM = 512,     /* that a section, or an interface, has with its texts */
+    PCAPNG_FRONT_ROOM = 512,     /* enough for a section or an interface with its texts */
     PCAPNG_MAX_TEXT = 160,       /* longer texts are cut */
     PCAPNG_PACKET_HEAD = 28,     /* of a packet block, before its data */
     PCAPNG_MAX_BLOCK = 16 << 20, /* a longer one is no block */
@@ -43,7 +43,7 @@ size_t pcapng_put_packet(uint8_t *to, uint32_t interface, int64_t t_ns, const vo
  * pcapng_packet_len. */
 size_t pcapng_put_packet_after_loss(uint8_t *to, uint32_t interface, int64_t t_ns, const void *data, size_t data_len,
                                     uint64_t lost);
-/* What came at an interface until t_ns, and what the system had no room for; within PCAPNG_FRONT_ROOM. */
+/* Frames that came at an interface until t_ns, and those that the system dropped; within PCAPNG_FRONT_ROOM. */
 size_t pcapng_put_statistics(uint8_t *to, uint32_t interface, int64_t t_ns, uint64_t received, uint64_t dropped);
 
 /* ---- reading */
@@ -69,8 +69,8 @@ struct pcapng_packet {
 
 enum pcapng_item { PCAPNG_MORE = 0, PCAPNG_PACKET = 1, PCAPNG_OTHER = 2 };
 
-/* Takes the block that the bytes begin with. PCAPNG_MORE: they have no whole block yet; *used is 0, and *needed (NULL:
- * not asked) how many bytes are known to be needed. PCAPNG_PACKET and PCAPNG_OTHER: *used bytes were the block.
+/* Takes the block that the bytes begin with. PCAPNG_MORE: they have no whole block yet; *used is 0, and *needed (may be
+ * NULL) is the number of bytes known to be needed. PCAPNG_PACKET and PCAPNG_OTHER: *used bytes were the block.
  * SH_EFORMAT: this is no block; err says at which byte of the file, and why. */
 int pcapng_read(struct pcapng_reader *reader, const uint8_t *bytes, size_t len, struct pcapng_packet *packet,
                 size_t *used, size_t *needed, struct sh_err *err);

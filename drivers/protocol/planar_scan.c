@@ -166,7 +166,7 @@ static void take_points(struct planar_scan *s, const struct native_header *heade
     end_if_whole(s, news);
 }
 
-/* Those of another frame are left alone: then the next frame finds these still missing. */
+/* Attributes of other points are ignored. Then the next frame finds that these points still lack theirs. */
 static void take_attributes(struct planar_scan *s, const uint8_t *payload, const struct native_attributes *head,
                             struct planar_news *news)
 {

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* Native frames of a planar head go in, whole turns of it come out: the echoes of each step, and when step 0 was.
+/* Native frames of a planar head go in, whole turns come out: the echoes of each step, and the time of step 0.
  *
  * Steps are numbered counter-clockwise seen from above, first..last; those of a head that turns clockwise are
  * numbered backward. A place is a step's number less `first`: 0..n-1.
  *
  * A turn is whole once each place has its pulse, and its attributes where the head sends them: that is when the
- * beam has passed the last step. A turn of which something is missing is broken, never comes out, and is counted.
- * Not counted: the turn within which the first frame came, or the scan ended, or the steps became others.
+ * beam has passed the last step. A turn with something missing is broken: it never comes out, and is counted. Turns
+ * within which the first frame came, the scan ended or the steps changed are not counted.
  *
  * Pure. Nothing is allocated; real-time safe. */
 #ifndef DRIVERS_PROTOCOL_PLANAR_SCAN_H
@@ -20,11 +20,11 @@ enum {
     PLANAR_UNSEEN = 0xff,
 };
 
-/* What descriptor and emitter frames say. */
+/* A head as descriptor and emitter frames describe it. */
 struct planar_head {
     int known;         /* 0: none came, or it is not planar, or has more steps than fit. The rest is then void */
-    uint32_t steps, n; /* a turn; that are cast */
-    int32_t first, last, front; /* numbers; front looks along y and may lie outside of first..last */
+    uint32_t steps, n; /* steps of a turn; those that are cast */
+    int32_t first, last, front; /* steps; front looks along y and may lie outside of first..last */
     uint64_t lines_uhz, prr_uhz;
     double range_min_m, range_max_m, m_per_count;
     int attributes; /* points have amplitudes, unless these are not modelled */
@@ -51,7 +51,7 @@ struct planar_scan {
     struct native_emitter emitter;
     uint32_t scan, line, number0; /* number0: turns of the scans before */
     int64_t scan_t0_ns;
-    int seen, fresh, done; /* a turn was seen; what was missed up to now is no loss; the turn at hand needs no more */
+    int seen, fresh, done; /* a turn was seen; pulses missed so far are no loss; the present turn needs no more */
     uint32_t n_seen;       /* places that have their pulse */
     double pan_counts, steps_per_count;
     uint32_t pan0_place; /* where pan count 0 is, 0..steps-1 */

@@ -29,7 +29,7 @@ enum protocol_id {
     PROTOCOL_N
 };
 
-/* What a protocol needs of the stream. */
+/* Requirements of a protocol on the stream. */
 enum protocol_needs {
     PROTOCOL_NEEDS_POLAR = 1 << 0,      /* output.layout: polar */
     PROTOCOL_NEEDS_ATTRIBUTES = 1 << 1, /* output.attributes: on; amplitudes are LINE_AMPLITUDE_NONE without
@@ -47,26 +47,26 @@ enum protocol_pps {
     PROTOCOL_PPS_ERROR, /* they come at other times than the clock's full seconds */
 };
 
-/* What is counted of a session beside the frames it lost. */
+/* Counts of a session, beside the frames it lost. */
 enum protocol_count {
     PROTOCOL_UNITS_LOST,    /* units that were not sent: no room, or parts of them were missing */
     PROTOCOL_INPUT_LOST,    /* bytes from the client that were thrown away: overlong, out of frame, garbage */
     PROTOCOL_WRONG,         /* requests that were answered with an error */
-    PROTOCOL_POINTS_LOST,   /* echoes that were sent as none: the protocol has no number for their range */
-    PROTOCOL_PULSES_UNSENT, /* pulses that went into no unit, and no reader was too slow: of a unit that was begun and
-                             * never full, or that the protocol has no words for */
+    PROTOCOL_POINTS_LOST,   /* echoes sent as "no echo": the protocol has no number for their range */
+    PROTOCOL_PULSES_UNSENT, /* pulses that went into no unit, though the reader was not too slow: their unit never got
+                             * full, or the protocol can't express them */
     PROTOCOL_N_COUNTS
 };
 
-/* What the owner of a session does for its protocol. ctx is the owner's. All of it may be called from within
- * any op but create and destroy. */
+/* Services of a session's owner for its protocol. ctx is the owner's. All of them may be called from within any
+ * op but create and destroy. */
 struct protocol_host {
     void *ctx;
     /* Queues one unit for the client, whole or not at all. 0; or 1: there was no room, it is lost. The owner
      * counts that. */
     int (*send)(void *ctx, const void *unit, size_t len);
     /* Carries out one line of the native command set (COMMANDS.md), "HEAD:LINES 20" for example, as this
-     * session; control is given back at once. reply (cap 480 and more) gets the reply line without its end.
+     * session, which then releases control. reply (cap 480 and more) gets the reply line without its end.
      * Returns 0, or the SCPI error number. */
     int (*command)(void *ctx, const char *line, char *reply, size_t cap);
     /* UTC of a device time, ns since 1970; INT64_MIN: not known. */
@@ -88,7 +88,7 @@ struct protocol_host {
 
 enum { PROTOCOL_MAX_GEOMETRIES = 8 };
 
-/* What a protocol says of the head; constant, and outlives the instance. The rest stands in the descriptor. */
+/* Facts about the head that the descriptor doesn't have; constant, and outlives the instance. */
 struct protocol_identity {
     char maker[32], model[64]; /* of the head profile */
     char profile[32];          /* its name */
@@ -108,7 +108,7 @@ struct protocol_spec {
     struct protocol_host host;
     uint32_t session;   /* from 1, over all links */
     uint32_t fixes_hz;  /* of the GNSS receiver */
-    int64_t power_ns;   /* device time at which power came last: what the device counts since power-up counts from it */
+    int64_t power_ns;   /* device time of the last power-up, from which the device's counters count */
     uint32_t power_ons; /* how often power has come, by power cycles and reboots, with the first time */
     uint32_t near_wrap; /* counters begin so many below their wrap; 0: at 0 */
     int waits;          /* 1: paces fast and step: device time says nothing of how long a client takes */
@@ -123,9 +123,9 @@ struct protocol_ops {
     uint32_t emitters; /* bit per enum native_emitter_kind of the heads that it can speak for; 0: all */
     uint32_t n_beams;  /* that a head of beams must have; 0: any number */
     uint32_t max_unit; /* bytes; no unit is longer */
-    int brief;         /* 1: clients come for a request, and one that is silent may be ended for another */
-    /* Of faults on request, for one that no reader can see by checksums: bits of a unit are changed, and its checksums
-     * are made right again. Both are pure, and good for any bytes.
+    int brief;         /* 1: clients come for one request, and a silent one may have to make room for another */
+    /* For the injected fault that checksums can't show: bits of a unit are changed, then its checksums are made right
+     * again. Both functions are pure, and take any bytes.
      * content: sets the bits of mask (len bytes, all 0 before) that may be changed: what is measured. Marks, lengths,
      * names and checksums are left out, so that the unit stays one. NULL: all bits may be changed.
      * reseal: makes the checksums right. NULL: units have none. */

@@ -79,7 +79,7 @@ static void take_line(struct scip *s)
     s->is_over = s->foul = 0;
 }
 
-/* What has no room is counted as it comes: the end of such a line may never come. */
+/* Bytes without room are counted as they come, since the end of such a line may never come. */
 static void input(void *protocol, const uint8_t *bytes, size_t len)
 {
     struct scip *s = protocol;
@@ -108,15 +108,15 @@ static void frame(void *protocol, const uint8_t *bytes, size_t len)
     if (news.whole || news.broken != 0) scip_scans_came(s, news);
 }
 
-/* What is missing shows by the turns' times and steps. */
+/* Nothing to do: the times and steps of the turns show what is missing. */
 static void gap(void *protocol, uint32_t n_frames)
 {
     (void)protocol;
     (void)n_frames;
 }
 
-/* The second RB was a second ago. The power cycle ends this session, too. Where none can be, as of a recording, this
- * session alone begins anew. */
+/* The second RB was a second ago. The power cycle ends this session, too. Where there can't be one, as with a
+ * recording, only this session begins anew. */
 static void reboot(struct scip *s)
 {
     char reply[512];

@@ -14,7 +14,7 @@ int scip_has_head(const struct scip *s)
     return s->scan.head.known && s->scan.head.last < SCIP_MAX_STEPS;
 }
 
-/* Where no frames show that the head scans, it is asked, and started from rest. */
+/* If no frames show that the head scans, it is asked for its state, and started if it rests. */
 const char *scip_laser_on(struct scip *s)
 {
     enum { LATELY_NS = 500000000 };
@@ -83,8 +83,8 @@ static const char *begin(struct scip *s, struct scip_request *q, const char *lin
     return scip_laser_on(s);
 }
 
-/* A second M or N replaces the first, but not when it is refused. A second G or H before the first is
- * answered repeats what is already being processed. */
+/* A second M or N replaces the first, unless it is refused. A second G or H before the first is answered
+ * repeats the request that is being processed. */
 void scip_measure(struct scip *s, const char *line, size_t len)
 {
     enum { WAIT_NS = 2000000000 };
@@ -108,8 +108,8 @@ void scip_measure(struct scip *s, const char *line, size_t len)
     scip_answer(s, line, len, "00");
 }
 
-/* The head may have been about to stop when it was asked for scans. Once its first scan has come, who stops the head
- * means it. */
+/* Starts the head again while no scan has come: it may have been about to stop when it was asked for scans. After the
+ * first scan a stop is meant, and is left alone. */
 static void wake_head(struct scip *s)
 {
     const int waits = s->single.active || (s->stream.active && s->stream.sent == 0);
@@ -139,8 +139,8 @@ static uint32_t range_mm(const struct measured *m, const struct planar_echo *ech
     return mm < 4e9 ? (uint32_t)(mm + 0.5) : UINT32_MAX;
 }
 
-/* 100 at the detection threshold, or 1000 of a matt white surface under zero incidence; the root of the
- * power. */
+/* The root of the power: 100 at the detection threshold or, without amplitudes, 1000 for a matt white surface at
+ * zero incidence. */
 static uint32_t intensity_of(const struct measured *m, const struct planar_echo *echo)
 {
     const int amplitudes = m->head->attributes;
@@ -150,7 +150,7 @@ static uint32_t intensity_of(const struct measured *m, const struct planar_echo 
     return value < 1.0 ? 1 : value > 65535.0 ? 65535 : (uint32_t)lround(value);
 }
 
-/* Echoes of a step; 0 also where it can't be measured. */
+/* Number of echoes of a step; 0 also where the step can't be measured. */
 static int n_echoes(const struct measured *m, int32_t number)
 {
     if (number < m->head->first || number > m->head->last) return 0;
@@ -246,7 +246,7 @@ static void stream_scan(struct scip *s)
     if (q->count != 0 && q->remaining == 0) q->active = s->laser = 0;
 }
 
-/* A broken scan isn't sent and isn't one of the count: as many whole ones come as were asked for. */
+/* A broken scan is neither sent nor counted: the client gets as many whole scans as it asked for. */
 void scip_scans_came(struct scip *s, struct planar_news news)
 {
     const int streams = s->stream.active, waits = s->single.active;

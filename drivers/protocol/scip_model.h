@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Hokuyo models: what a head says of itself over SCIP, and which commands it has. A row a model, in
- * scip_model.c. Geometry, ranges and speed are not here: they come from the stream. Constant data; any
- * thread. */
+/* Hokuyo models: identity, texts and commands of each over SCIP, one row per model, in scip_model.c.
+ * Geometry, ranges and speed are not here: they come from the stream. Constant data; any thread. */
 #ifndef DRIVERS_PROTOCOL_SCIP_MODEL_H
 #define DRIVERS_PROTOCOL_SCIP_MODEL_H
 

@@ -12,7 +12,7 @@
 #include <stdint.h>
 
 enum {
-    SCIP_MAX_STEPS = 2880,       /* 0 to the last step that a head may have, less one: a turn of 0.125 degrees */
+    SCIP_MAX_STEPS = 2880,       /* steps of a turn, at 0.125 degrees; the last one has number 2879 */
     SCIP_MAX_ECHOES = 3,         /* of a step */
     SCIP_MAX_LINE = 64,          /* of a command; the longest that is defined has 32 characters */
     SCIP_BLOCK = 64,             /* characters of data in a line */
@@ -45,7 +45,8 @@ void scip_reply_mark(struct scip_reply *r, char mark);
 /* The last block, and the empty line. */
 void scip_reply_end(struct scip_reply *r);
 
-/* For protocol_ops of the same names: ranges and intensities of scans; sums of all replies. */
+/* For protocol_ops of the same names: content marks ranges and intensities of scans, reseal corrects the sums of all
+ * replies. */
 void scip_content(const uint8_t *unit, size_t len, uint8_t *mask);
 void scip_reseal(uint8_t *unit, size_t len);
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Replies whose data are changed, and whose sums are made right again. */
+/* For injected faults: marks the data of replies, and corrects their sums. */
 #include <string.h>
 
 #include "drivers/protocol/scip_reply.h"

@@ -25,7 +25,7 @@ struct scip_request {
     int64_t until_ns; /* G, H: answered by then */
 };
 
-/* DB: a malfunction that is played. */
+/* DB: the malfunction that is simulated. */
 struct scip_simulation {
     int mode;           /* of DB: 2 to 5; 0: none */
     int broken;         /* the laser is out of order */
@@ -38,12 +38,12 @@ struct scip {
     const struct scip_model *model;
     uint32_t features; /* enum scip_feature, with its firmware */
     int64_t now_ns;
-    int64_t epoch_ns, epoch_us_ns; /* when the time stamp is 0, and that in microseconds */
+    int64_t epoch_ns, epoch_us_ns; /* when the time stamp is 0, and when the one in microseconds is */
     int64_t laser_ns;              /* since when the laser is on */
-    int64_t try_ns;                /* a request that no scan has come for: when to look at the head again */
+    int64_t try_ns;                /* when to look at the head again for a request that waits for its first scan */
     int laser, time_mode, speed_changed, asleep;
     uint32_t bit_rate;
-    int64_t rb_ns, reboot_ns; /* of the last RB alone, of the end that RB RB asked for; INT64_MIN: none */
+    int64_t rb_ns, reboot_ns; /* time of the last single RB; time of the reboot that RB RB asked for; INT64_MIN: none */
     struct scip_request stream, single;
     struct scip_simulation simulation;
     /* the line at hand */
@@ -85,21 +85,22 @@ uint32_t scip_millimetres(double range_m);
 /* scip_measure.c */
 /* 0: there is no head yet, or it has steps that no command can name. */
 int scip_has_head(const struct scip *s);
-/* BM and what switches the laser on by itself. NULL, or the status to refuse with: 10 while the head can't
- * scan, 50 while it is out of order. */
+/* For BM, and for commands that switch the laser on by themselves. NULL, or the status to refuse with: 10 while
+ * the head can't scan, 50 while it is out of order. */
 const char *scip_laser_on(struct scip *s);
 /* Ends stream and laser; a G or H that waits is answered with status 10. */
 void scip_laser_off(struct scip *s);
 void scip_measure(struct scip *s, const char *line, size_t len);
-/* What the scans at hand are for. */
+/* Answers requests with the scans at hand. */
 void scip_scans_came(struct scip *s, struct planar_news news);
-/* A request that waits: the head is started again where it stopped meanwhile; a G or H may have waited too long. */
+/* Serves a request that waits: starts the head again if it has stopped meanwhile, and ends a G or H that waited too
+ * long. */
 void scip_measure_time(struct scip *s);
 
 /* scip_simulate.c */
 void scip_simulate(struct scip *s, const char *line, size_t len);
-/* Before a scan of the stream: NULL: it is sent; "": it is not; else the status that is sent in its place. 50
- * is the stream's end. */
+/* To be called before a scan of the stream. NULL: it is sent; "": it is not; else the status that is sent in its
+ * place, of which 50 ends the stream. */
 const char *scip_simulated(struct scip *s);
 
 #endif

@@ -22,7 +22,7 @@
  *   1206 +----------------------------------------------+ */
 enum { AT_TIME = 1200, AT_MODE = 1204, AT_MODEL = 1205, ENTRY_LEN = 3, FLAG = 0xeeff };
 
-/* Reflectivities by 0.01 dB. What is below reads 0, what is above 255. */
+/* Range of the table of reflectivities, 0.01 dB. A reflectance below it gives 0, one above it 255. */
 enum { REFL_LEAST_CDB = -2302, REFL_MOST_CDB = 3080, N_REFL = REFL_MOST_CDB - REFL_LEAST_CDB + 1 };
 
 struct velodyne {
@@ -84,8 +84,8 @@ static void destroy(void *protocol)
     free(protocol);
 }
 
-/* What comes next does not belong to what came before. The device has no packets with holes. Nobody was too slow:
- * the head never sent the pulses that would fill this one. */
+/* The next pulse does not follow the last one, so the packet is dropped: the device has no packets with holes. The
+ * reader was not too slow: the head never sent the pulses that would fill the packet. */
 static void fall_out_of_step(struct velodyne *v)
 {
     v->host.count(v->host.ctx, PROTOCOL_PULSES_UNSENT, v->n_firings);
@@ -157,15 +157,15 @@ static void put_entry(struct velodyne *v, uint8_t *at, const struct native_point
     at[2] = refl;
 }
 
-/* What came back, in 0.01 dB, up to a constant of the head: by reflectance and by the square of the range.
- * Without modelled reflectances all are alike, and the nearest is the strongest. */
+/* Received power in 0.01 dB, up to a constant of the head: from the reflectance and the square of the range.
+ * Without modelled reflectances the nearest is the strongest. */
 static double strength_cdb(const struct native_point *p)
 {
     const double refl_cdb = p->refl_cdb == (int16_t)LINE_REFL_NONE ? 0.0 : p->refl_cdb;
     return refl_cdb - 2000.0 * log10(p->a);
 }
 
-/* Of n points from `first` on. */
+/* The index of the strongest of n points from `first` on. */
 static uint32_t strongest(const uint8_t *payload, uint32_t first, uint32_t n)
 {
     double best_cdb = -INFINITY;
@@ -194,7 +194,7 @@ static void put_azimuth(const struct velodyne *v, uint8_t *block, uint32_t pan_c
     le_put16(block + 2, (uint16_t)((uint32_t)(pan_count * v->azimuth_per_count + 0.5) % 36000u));
 }
 
-/* What the odd block of a pair has: the strongest of n > 1 returns, or where that is the last one, the second
+/* The return for the odd block of a pair: the strongest of n > 1 returns or, if that is the last one, the second
  * strongest. */
 static void find_other(const uint8_t *payload, uint32_t first, uint32_t n, struct native_point *out)
 {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Velodyne VLP-16 as protocols: data packets, position packets, settings over HTTP. VELODYNE.md has the
- * layouts, what they are taken from, and what the real device does that this one doesn't.
+ * layouts, their sources, and what the real device does and this one doesn't.
  *
  * Here is what the three share. Pure; any thread; real-time safe but for what HTTP asks of the device. */
 #ifndef DRIVERS_PROTOCOL_VELODYNE_H
@@ -26,8 +26,8 @@ enum {
 
 enum velodyne_return_mode { VELODYNE_STRONGEST = 0x37, VELODYNE_LAST = 0x38, VELODYNE_DUAL = 0x39 };
 
-/* Microseconds since the top of the hour at a device time, rounded down, 0..3599999999: of UTC, or where
- * that is not known, or was not set by then, of the time since power-up. */
+/* Microseconds since the top of the hour at a device time, rounded down, 0..3599999999. The hour is that of UTC.
+ * Where UTC is not known, or was not set by then, it is that of the time since power-up. */
 uint32_t velodyne_hour_us(const struct protocol_host *host, int64_t t_ns);
 
 /* State of the pulses per second at a device time; absent where UTC is not known. */

@@ -10,7 +10,7 @@
 #include "drivers/protocol/velodyne_settings.h"
 
 enum { MAX_BODY = 2048, MAX_ANSWER = 512 + MAX_BODY };
-/* A link has a few sessions. Who sends no request, or half of one, does not keep them from others. */
+/* A link has few sessions. A client without a request, or with half of one, must not keep them from others for ever. */
 static const int64_t IDLE_NS = 30000000000;
 
 struct server {

@@ -87,8 +87,7 @@ static int set_returns(const struct posted *p, const char *value, int apply)
     return refuse(p, 400, "returns: Strongest, Last or Dual");
 }
 
-/* Turns per second as the head takes them, in steps of 1e-6 Hz. Of what does not divide by 3, so is the
- * error. */
+/* The head takes turns per second in steps of 1e-6 Hz. A speed that 3 does not divide is rounded to that step. */
 static int set_rpm(const struct posted *p, const char *value, int apply)
 {
     char line[40];
@@ -221,8 +220,7 @@ int velodyne_takes_forms(const char *path)
 
 /* ---- forms: key=value&key=value, with + and %41 */
 
-/* In place, and puts a NUL after it: there is room for one after len characters. 0, or -1: not a form's
- * text. */
+/* Decodes in place, and puts a NUL after the text, for which there is room. 0, or -1: not a form's text. */
 static int decode(char *s, size_t len)
 {
     char *to = s;

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* The settings of a VLP-16 as its clients post them: forms go in, native commands to the device and a status
- * of HTTP come out. And what of the settings can be read. VELODYNE.md has all keys.
+ * of HTTP come out. Also reads the present settings. VELODYNE.md has all keys.
  *
- * What a form says is checked as a whole before the first command. Then its commands are carried out in
- * order; the first one that the head refuses ends it. */
+ * A form is checked as a whole before its first command. Then its commands are carried out in order; the first
+ * one that the head refuses ends it. */
 #ifndef DRIVERS_PROTOCOL_VELODYNE_SETTINGS_H
 #define DRIVERS_PROTOCOL_VELODYNE_SETTINGS_H
 
@@ -24,10 +24,10 @@ struct velodyne_state {
     uint32_t rpm;
     const char *returns; /* "Strongest", "Last", "Dual"; "" for the head's other selection */
 };
-/* As the head says now. */
+/* Asks the head for its present state. */
 void velodyne_read_state(const struct protocol_spec *spec, struct velodyne_state *out);
 
-/* Where data are sent, as far as it is known. */
+/* The address that data are sent to, as far as it is known. */
 const char *velodyne_host_address(const struct protocol_spec *spec);
 int velodyne_host_port(const struct protocol_spec *spec);
 

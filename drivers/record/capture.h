@@ -16,22 +16,23 @@ struct capture {
 
 /* SH_EINPUT, too, where an earlier one has left PATH.part, for a repair. */
 int capture_open(struct capture *capture, const char *path, struct sh_err *err);
-/* A place that frames come from, which readers show by its name; they count from 0. */
+/* Adds an interface that frames come from; readers show its name. Interfaces are numbered from 0. */
 int capture_add_interface(struct capture *capture, const char *name, const char *comment, struct sh_err *err);
 struct capture_frame {
     uint32_t interface;
     int64_t t_ns;
     const uint8_t *bytes;
     size_t len;
-    uint64_t lost; /* how many of its interface the system threw away since the one before */
+    uint64_t lost; /* frames of its interface that the system threw away just before it */
 };
 int capture_add(struct capture *capture, const struct capture_frame *frame, struct sh_err *err);
-/* Of an interface, at the end: what came, and what the system had no room for. */
+/* Statistics of an interface, at the end: how many frames came, and how many the system had no room for. */
 int capture_add_statistics(struct capture *capture, uint32_t interface, int64_t t_ns, uint64_t received,
                            uint64_t dropped, struct sh_err *err);
 /* To be called each second: as outfile_save. */
 int capture_save(struct capture *capture, struct sh_err *err);
-/* keep 0: there is no file. Else, where it can't be completed, what came to the disk stays as PATH.part, for a repair. */
+/* keep 0: leaves no file. Else, if the file can't be completed, what reached the disk stays as PATH.part, for a
+ * repair. */
 int capture_close(struct capture *capture, int keep, struct sh_err *err);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A colour per point, of what the stream says of it: for recordings whose colours the head does not send, or whose
- * limits are known only at the end. In: the points of a track. Out: sRGB. A shot without echo is grey. Pure; any thread. */
+/* Computes a colour per point from the stream, for recordings whose colours the head does not send, or whose limits are
+ * known only at the end. In: the points of a track. Out: sRGB. A shot without echo is grey. Pure; any thread. */
 #ifndef DRIVERS_RECORD_COLOUR_H
 #define DRIVERS_RECORD_COLOUR_H
 
@@ -17,13 +17,14 @@ struct colour_choice {
     struct colour_scale scale; /* 1: made here, by this; not texture, which only the head knows */
 };
 
-/* Of the scan that begins: SH_EFORMAT where its points have no such figure (frames of a head on no trajectory;
- * of one that moves ranges in the geo layout, heights in ECEF). */
+/* Checks the scan that begins. SH_EFORMAT where its points have no such figure: frame without a trajectory; with a
+ * moving head also ranges in the geo layout, and heights in ECEF. */
 int colour_check(enum colour_mode mode, const struct track *track, struct sh_err *err);
 
-/* What range, height or frame shows of point i of the track's batch: metres, metres above the scene's zero, frame scalar.
- * NaN: lost, or a shot without echo. Heights of geo points are taken back to the scene by the tangent at the station
- * and the Earth's curvature. Those of a head that moves through a CRS on the Earth are the CRS's own. */
+/* The figure that range, height or frame shows for point i of the track's batch: metres, metres above the scene's zero,
+ * frame scalar. NaN: lost, or a shot without echo. Heights of geo points are taken back to the scene by the tangent at
+ * the station and the Earth's curvature. For a head that moves through a CRS on the Earth they are the CRS's
+ * heights. */
 double colour_figure(enum colour_mode mode, const struct track *track, int i);
 
 /* The colour of point i. */

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* .e57: ASTM E2807, one data3D per scan: points in the head's frame as counts of the stream's scale, and the
- * pose that takes them to the recording's frame (station_pose.h). Intensity is the reflectance in dB; row and
- * column are shot and line. The label is a field of an extension, which readers pass over that don't know it.
+ * pose that takes them to the recording's coordinate frame (station_pose.h). Intensity is the reflectance in dB; row
+ * and column are shot and line. The label is a field of an extension, which readers that don't know it skip.
  *
- * A binary section is a header and packets (e57_packet.h). The XML section, which says where everything is, comes last;
- * then headers are written over, the file's own after all others: a file with a header is whole. Until then a note before
- * each scan (e57_note.h) says what a repair needs. A packet spans no more than 0.1 s of device time, so that little is
+ * A binary section is a header and packets (e57_packet.h). The XML section, which says where everything is, comes last.
+ * Then headers are overwritten, the file's own as the last: a file with a header is whole. Until then a note before
+ * each scan (e57_note.h) has what a repair needs. A packet spans no more than 0.1 s of device time. So little is
  * missing at any moment, and the same stream still gives the same bytes. */
 #include <math.h>
 #include <stdio.h>
@@ -26,7 +26,7 @@ struct e57 {
     struct e57_facts facts;
     struct e57_scan *scan; /* the present one */
     struct e57_packet gathered;
-    int64_t t0_ns; /* of its first record */
+    int64_t t0_ns; /* of the first record in `gathered` */
     uint8_t packet[E57_PACKET_MAX];
 };
 

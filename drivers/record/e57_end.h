@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The end of an E57 file, for its recorder and for its repair: what makes a whole file of the points in it. */
+/* Writes the end of an E57 file, which makes it complete. For the recorder and for the repair. */
 #ifndef DRIVERS_RECORD_E57_END_H
 #define DRIVERS_RECORD_E57_END_H
 
@@ -12,8 +12,8 @@ enum {
     E57_XML_ROOM_SCAN = 8192
 }; /* bytes that suffice for the XML section, and for each scan in it */
 
-/* Puts the XML section, cuts what is behind it, then writes the headers of the scans, and last, once all that is on the
- * disk, the file's own. report: its stop gives up; may be NULL. */
+/* Writes the XML section, cuts what is behind it, then writes the headers of the scans. The file's own header comes
+ * last, once all that is on the disk. report: its stop gives up; may be NULL. */
 int e57_end(struct e57_pages *pages, const struct e57_facts *facts, const struct sh_report *report, struct sh_err *err);
 
 /* recorder_ops.repair: keeps all whole packets. */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* What stands before the points of each scan in an E57 file, so that a file whose recorder was killed can be completed
- * (e57_repair.c): what its XML section would say of the scan, but for what is counted from the points. It is a binary
- * section of the kind that the standard calls a blob, and the XML names it as the scan's `sh:begin`. Readers pass over it.
+/* The note before the points of each scan in an E57 file. It lets a repair complete a file whose recorder was killed
+ * (e57_repair.c): it holds what the XML section would say about the scan, except what is counted from the points. It is
+ * a binary section that the standard calls a blob, and the XML names it as the scan's `sh:begin`. Readers skip it.
  *
  *   0   blob's header: type 0, zeros   8 bytes; length of the section   uint64
  *  16   "scanhead e57 1"   16 bytes
@@ -20,7 +20,8 @@
 
 enum { E57_BLOB_HEADER_LEN = 16, E57_NOTE_LEN = 288 }; /* of the section, with the blob's header */
 
-/* Where a note stands that would begin at `logical`: there, or in the next page. */
+/* Place of the next note when the file has got to `logical`: there or, so that it fits into a page, in the next
+ * page. */
 static inline uint64_t e57_note_place(uint64_t logical)
 {
     const uint64_t used = logical % E57_PAGE_CONTENT;
@@ -28,7 +29,7 @@ static inline uint64_t e57_note_place(uint64_t logical)
 }
 
 void e57_note_put(const struct e57_facts *facts, const struct e57_scan *scan, uint8_t out[E57_NOTE_LEN]);
-/* Sets of facts and scan what the note says. -1: it is none. */
+/* Sets those members of facts and scan that the note has. -1: it is not a note. */
 int e57_note_get(const uint8_t note[E57_NOTE_LEN], struct e57_facts *facts, struct e57_scan *scan);
 
 #endif

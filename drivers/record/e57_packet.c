@@ -67,7 +67,7 @@ size_t e57_packet_make(struct e57_packet *packet, const struct e57_facts *facts,
 
 /* ---- what is in a packet */
 
-/* Where each stream is: how many records they hold, or -1. */
+/* Finds the streams in a packet, and returns the number of records in them, or -1. */
 static int find_streams(const uint8_t *packet, size_t len, const struct e57_facts *facts,
                         const uint8_t *stream[E57_N_STREAMS])
 {

@@ -1,15 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* Data packets of an E57 file (ASTM E2807), as our files have them: each field of a record has a stream of its own in the
- * packet, of as many bits per record as its range needs. All packets of a scan but its last hold a number of records that
- * is a multiple of 8, so that no stream of bits runs across packets.
+/* Data packets of an E57 file (ASTM E2807), as our files have them. Each field of a record has its own stream in the
+ * packet, with as many bits per record as its range needs. Packets hold a multiple of 8 records, so that no stream
+ * of bits runs across packets; only the last packet of a scan may hold another number.
  *
  *   type = 1, flags = 0   2 x uint8
  *   length of the packet less 1, number of streams   2 x uint16
  *   length of each stream   uint16 each
  *   streams, in the order of enum e57_stream; zeros up to a multiple of 4
  *
- * Records go in, bytes come out; what the XML section says of a scan is counted from these bytes, by the recorder and by
- * the repair of what it left. Pure. */
+ * Records go in, bytes come out. Recorder and repair count the figures of the XML section from these bytes. Pure. */
 #ifndef DRIVERS_RECORD_E57_PACKET_H
 #define DRIVERS_RECORD_E57_PACKET_H
 
@@ -47,11 +46,11 @@ struct e57_packet {
 
 /* The low `bits` of v as record i of a stream; a byte holds several, from its low end. */
 void e57_put_bits(uint8_t *stream, unsigned bits, unsigned i, unsigned v);
-/* The packet of the first n <= packet->n records; those after them, fewer than 8 where there are some, become the first
- * ones. Its length. */
+/* Makes the packet of the first n <= packet->n records, and returns its length. The records after them (fewer than 8)
+ * become the first ones of the next packet. */
 size_t e57_packet_make(struct e57_packet *packet, const struct e57_facts *facts, unsigned n,
                        uint8_t out[E57_PACKET_MAX]);
-/* Adds the packet to what is known of its scan. -1: it is none of this file. */
+/* Adds the packet to the figures of its scan. -1: it is not a packet of this file. */
 int e57_packet_count(const uint8_t *packet, size_t len, const struct e57_facts *facts, struct e57_scan *scan);
 
 #endif

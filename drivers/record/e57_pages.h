@@ -34,7 +34,7 @@ int e57_patch(struct e57_pages *pages, uint64_t logical, const void *data, size_
 
 /* The file's own header, once everything else is there. */
 void e57_file_header(uint64_t n_pages, uint64_t xml, size_t xml_len, uint8_t out[E57_FILE_HEADER_LEN]);
-/* Of packets that follow it, without an index of them. section and len are logical. */
+/* The header of a section of packets without an index. section and len are logical. */
 void e57_section_header(uint64_t section, uint64_t len, uint8_t out[E57_SECTION_HEADER_LEN]);
 
 #endif

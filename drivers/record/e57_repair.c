@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* Repair of E57 files: the packets of each scan are counted up to the last whole one, and the file is ended as its recorder
- * would have ended it there (e57_end.h). A note before each scan says what the points don't (e57_note.h).
+/* Repair of E57 files: counts the packets of each scan up to the last whole one, and ends the file there as its
+ * recorder would have done (e57_end.h). A note before each scan has what the points don't say (e57_note.h).
  *
- * A file with its own header is whole, as that is written last. A page with a wrong CRC is none; where pages follow it that
- * are right, the file is damaged and not only cut, and is left as it is. */
+ * A file with its own header is whole, as that is written last. A page with a wrong CRC does not count. Where correct
+ * pages follow it, the file is damaged and not only cut; it is left as it is. */
 #include <errno.h>
 #include <inttypes.h>
 #include <stdlib.h>
@@ -139,8 +139,8 @@ static int take_scans(struct left *l, struct sh_err *err)
     return rc;
 }
 
-/* What is behind the part that is kept may be the beginning of a packet or of a scan, zeros that fill its page, or the XML
- * section. */
+/* Checks what is behind the part that is kept: the beginning of a packet or of a scan, zeros that fill its page, or the
+ * XML section. */
 static int look_behind(struct left *l, struct sh_err *err)
 {
     uint8_t tail[E57_PAGE_CONTENT + E57_NOTE_LEN + E57_SECTION_HEADER_LEN] = {0}; /* more than a scan's beginning */
@@ -210,7 +210,8 @@ static int write_end(struct left *l, struct sh_err *err)
     return rc;
 }
 
-/* In a whole file of this program the XML section follows the last packet. What else is between is not counted here. */
+/* In a whole file of this program the XML section follows the last packet. Else the file is not ours,
+ * or of an older release. */
 static int check_ours(struct left *l, struct sh_err *err)
 {
     uint8_t header[E57_FILE_HEADER_LEN];

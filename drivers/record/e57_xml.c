@@ -122,7 +122,7 @@ static void put_colour_limits(FILE *out)
     fputs("</colorLimits>\n", out);
 }
 
-/* In the order of the packets' streams (e57_packet.h), and of their widths. */
+/* Fields have the order and the widths of the packets' streams (e57_packet.h). */
 static void put_prototype(FILE *out, const struct e57_facts *facts, const struct e57_scan *s)
 {
     static const char *const xyz[] = {"cartesianX", "cartesianY", "cartesianZ"};

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* .las: LAS 1.4, point data record format 6 (7 with colour) followed by the label; one record per echo. On
- * request LAS 1.2 for older readers: format 1 (3), five returns, no labels, scan angles or attributes. What the
- * numbers mean stands in the file itself (las_header.c).
+ * request LAS 1.2 for older readers: format 1 (3), five returns, no labels, scan angles or attributes. The
+ * file itself describes its numbers (las_header.c).
  *
  * Coordinates are counts of the stream's own scale from the first scan's station. So those of the first scan
- * are the numbers of the stream. Those of further stations are rounded once, by half a count at most. Nothing
- * is clipped: what is too far for 32 bits is an error. Longitudes go on beyond 180 or -180 degrees where a
+ * are the numbers of the stream. Those of other stations are rounded once, by half a count at most. Nothing
+ * is clipped: a point too far for 32 bits is an error. Longitudes go on beyond 180 or -180 degrees where a
  * scan crosses the antimeridian: all lie within 180 degrees of the first station. */
 #include <math.h>
 #include <stdio.h>
@@ -41,8 +41,8 @@ static int las_begin(void *rec, struct sh_err *err)
     return 0;
 }
 
-/* Header and records before the points, whose counts are written over at the end. Until then they say that the file is
- * incomplete: for a repair (las_repair.c). */
+/* Writes header and records before the points. Their counts are overwritten at the end. Until then they mark the file
+ * as incomplete, for a repair (las_repair.c). */
 static int put_front(struct las *las, struct sh_err *err)
 {
     uint8_t front[LAS_FRONT_MAX];
@@ -105,7 +105,7 @@ static int las_scan(void *rec, struct sh_err *err)
     return put_front(las, err);
 }
 
-/* Stations whose points are all too far from the first one. Of degrees it is said when they come. */
+/* Refuses stations whose points are all too far from the first one. In degrees that is found when the points come. */
 static int las_fits(const char *path, const struct recorder_options *options, const struct recorder_scan *first,
                     const struct recorder_scan *scan, struct sh_err *err)
 {
@@ -177,7 +177,7 @@ static int set_time(const struct las *las, double *time_s, int i, struct sh_err 
     return 0;
 }
 
-/* In the head's frame, well enough for an angle. */
+/* Turns p into the head's frame, accurately enough for an angle. */
 static void set_socs(const struct track *t, double p[3])
 {
     if (t->info.crs == NATIVE_CRS_GEODETIC) {

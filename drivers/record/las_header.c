@@ -136,7 +136,7 @@ static uint8_t format_of(const struct las_facts *f)
     return (uint8_t)(f->minor == 2 ? (f->has_colour ? 3 : 1) : (f->has_colour ? 7 : 6));
 }
 
-/* Where they stand differs; format 6 and 7 leave those of 32 bits 0. */
+/* The places of the counts differ by version; formats 6 and 7 leave the counts of 32 bits 0. */
 static void put_numbers(uint8_t *to, const struct las_facts *f)
 {
     if (f->minor != 2) le_put64(to + 247, f->n_points);

@@ -55,13 +55,13 @@ struct las_point {
 size_t las_point_len(const struct las_facts *facts);
 void las_put_point(const struct las_facts *facts, const struct las_point *point, uint8_t *to);
 
-/* A point's record as it is in the file: its place and its return. Of the facts minor is needed. */
+/* Counts a point's record as it is in the file: its place and its return. Of the facts it needs `minor`. */
 void las_count_record(struct las_facts *facts, const uint8_t *record);
-/* The number of points, of returns, and the bounds, in a header that has the rest. */
+/* Writes the number of points, of returns, and the bounds into a header that has the rest. */
 void las_put_counts(const struct las_facts *facts, uint8_t *header);
 
-/* Everything before the points. Returns its length, which depends on the CRS, the time's kind and attributes
- * alone, so that it can be written again when the counts are known. */
+/* Everything before the points. Returns its length, which depends only on the CRS, the kind of time and the
+ * attributes. So it can be written again when the counts are known. */
 size_t las_front(const struct las_facts *facts, uint8_t to[LAS_FRONT_MAX]);
 
 #endif

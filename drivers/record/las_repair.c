@@ -31,7 +31,7 @@ static void take_record(void *ctx, const uint8_t *record)
     point_scans_take(&r->scans, le_get16(record + r->station_at), le_get_double(record + r->time_at));
 }
 
-/* What las.c writes, and nothing else: *front_len bytes, then records of r->len. */
+/* Accepts only files as las.c writes them: *front_len bytes, then records of r->len. */
 static int parse_header(const struct repair *repair, const uint8_t *header, size_t len, struct records *r,
                         uint32_t *front_len, struct sh_err *err)
 {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The repair of .las (repair.h): LAS 1.2 and 1.4 as las.c writes them. What of the header is known at the end, points,
- * returns and bounds, is counted again from the records, by the code that counts them in a recording. */
+/* The repair of .las (repair.h): LAS 1.2 and 1.4 as las.c writes them. It counts points, returns and bounds again from
+ * the records, by the code that counts them in a recording. */
 #ifndef DRIVERS_RECORD_LAS_REPAIR_H
 #define DRIVERS_RECORD_LAS_REPAIR_H
 

@@ -24,7 +24,8 @@
 #include "drivers/record/obj_repair.h"
 
 static const double GIB = 1073741824.0;
-/* Points, grid, triangles, and what is grown at once; what the exporter takes besides (measured with 6.5 million). */
+/* Bytes per point, with its grid and triangles, also while arrays grow; what the exporter takes besides (measured with
+ * 6.5 million points). */
 enum { BYTES_A_POINT = 170, BYTES_OF_EXPORTER = 900 };
 
 static int check_points(const char *path, double n, struct sh_err *err)
@@ -63,7 +64,8 @@ static int check_place(const char *path, int moves, const double place_m[3], dou
     return mesh_check_box(path, low, high, err);
 }
 
-/* A scan by itself. Whether it fits after those before it is known when it begins: shots without echo take no room. */
+/* Looks at a scan by itself. Whether it fits after the earlier scans is known when it begins, since shots without echo
+ * take no room. */
 static int mesh_fits(const char *path, const struct recorder_options *options, const struct recorder_scan *first,
                      const struct recorder_scan *scan, struct sh_err *err)
 {
@@ -120,7 +122,7 @@ static int add_part(struct mesh_recorder *m, struct part **part, struct sh_err *
     return SH_OK;
 }
 
-/* Of the grid's triangles: points get normals, and what a texture takes. */
+/* Finishes the grid's triangles: points get normals, and texture coordinates and colours if there is a texture. */
 static int finish_grid(struct mesh_recorder *m, struct scan_faces *faces, struct sh_err *err)
 {
     const struct mesh_grid *g = &m->grid;
@@ -170,7 +172,7 @@ static int end_grid(struct mesh_recorder *m, struct sh_err *err)
 
 /* ---- points come */
 
-/* A file beside the mesh that is written at the end: whether it can be is to be said before the scan. */
+/* Checks before the scan that a file beside the mesh can be written at the end. */
 static int try_beside(const struct mesh_recorder *m, const char *ending, struct sh_err *err)
 {
     const char *path = m->base.file.path;

@@ -10,7 +10,7 @@
 
 /* The last line borders on the first one where they are at most so many steps of the pan apart. */
 static const double CLOSES_STEPS = 1.5;
-/* Rings so near to a pole are poles: their elevations are rounded to 1e-6 degrees. */
+/* A ring so near to a pole is a pole, since elevations are rounded to 1e-6 degrees. */
 static const double POLE_DEG = 1e-5;
 
 int mesh_grid_check(const struct track *t, struct sh_err *err)

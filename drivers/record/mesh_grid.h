@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The grid of a scan (of one sweep of the pan, of all rings of a sphere) that is being recorded: which point lies in
- * which line and row, and where the head was. In: points, as the track gives them. Out: a struct scan_grid. */
+/* The grid of a scan that is being recorded: the line and row of each point, and where the head was. A grid spans one
+ * sweep of the pan, or all rings of a sphere. In: points, as the track gives them. Out: a struct scan_grid. */
 #ifndef DRIVERS_RECORD_MESH_GRID_H
 #define DRIVERS_RECORD_MESH_GRID_H
 
@@ -19,7 +19,7 @@ struct mesh_grid {
     int kind; /* enum scanhead_emitter_kind */
     uint32_t rings, rows_per_turn;
     double first_ring_deg, ring_step_deg;
-    double lines_per_turn; /* 0: lines of a pan that does not turn */
+    double lines_per_turn; /* 0: the pan does not turn */
     double head_m[3];
     int moving;
     size_t room_row, room_line, room_head, room_column; /* inner state */

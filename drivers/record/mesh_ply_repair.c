@@ -24,7 +24,7 @@ static size_t size_of(const char *type)
     return strcmp(type, "uchar") == 0;
 }
 
-/* As core/studio/mesh writes them. 0: another header. */
+/* Takes a line of a header as core/mesh writes it. 0: another header. */
 static int take_header(struct mesh_lines *m, const char *line)
 {
     char word[16];

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The repair of .ply that is a mesh (repair.h). It is written in one piece at the end: all of it is there, as after a kill
- * before the file got its name, or nothing is kept. */
+/* The repair of a .ply that is a mesh (repair.h). Such a file is written in one piece at the end. So the repair keeps
+ * it only if it is complete, as after a kill just before the file got its name. */
 #ifndef DRIVERS_RECORD_MESH_PLY_REPAIR_H
 #define DRIVERS_RECORD_MESH_PLY_REPAIR_H
 

@@ -40,7 +40,7 @@ static inline int is_ply(const struct mesh_recorder *m)
     return strcmp(m->base.ops->ending, ".ply") == 0;
 }
 
-/* Files with a material have their colours in its image, but for --colour none. */
+/* A format with materials has its colours in an image, except with --colour none. */
 static inline int is_textured(const struct mesh_recorder *m)
 {
     const struct colour_choice *c = &m->base.options.colour;

@@ -72,8 +72,8 @@ static int add_twin(struct unwrap *w, uint32_t point, float du, float dv, uint32
     return mesh_points_add(w->points, &copy, err);
 }
 
-/* Corners on the near side of the seam, which the others are more than half a turn away from, go beyond it. place: line or
- * row of a point, from 0 on. */
+/* Moves corners on the near side of the seam beyond it, if the other corners are more than half a turn away. place:
+ * line or row of a point, from 0 on. */
 static int cross_seam(struct unwrap *w, uint32_t face[3], const uint32_t place[3], uint32_t turn, float du, float dv,
                       struct sh_err *err)
 {

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* The image of a scan's grid as the texture of its mesh: a column a line and a row a shot, the scan's first row below.
+/* The image of a scan's grid as the texture of its mesh: one column per line, one row per shot, the first row at the
+ * bottom.
  *
  * A point's texture coordinate is the middle of its texel, so that colours between points are those between texels. Where
- * the mesh closes behind its last line or row, and at poles, points are doubled: a point has one texture coordinate, and
- * needs two there. Images have up to MESH_TEXTURE_SIDE texels a side; of a larger grid each n-th line and row is taken. */
+ * the mesh closes behind its last line or row, and at poles, a point needs two texture coordinates, so it is doubled.
+ * Images have up to MESH_TEXTURE_SIDE texels a side; a larger grid has only each n-th line and row in the image. */
 #ifndef DRIVERS_RECORD_MESH_TEXTURE_H
 #define DRIVERS_RECORD_MESH_TEXTURE_H
 
@@ -15,13 +16,13 @@
 enum { MESH_TEXTURE_SIDE = 16384 };
 
 /* Sets the texture coordinates of the grid's points, and draws their colours; places without an echo are black.
- * picture_free is due in any case. *every: 1, or which lines and rows the image has. SH_ENOMEM. */
+ * picture_free is due in any case. *every: the image has each so many-th line and row. SH_ENOMEM. */
 int mesh_texture_draw(const struct mesh_grid *grid, struct mesh_points *points, struct picture *image, uint32_t *every,
                       struct sh_err *err);
 
-/* Doubles points, at the end of `points`, where faces cross the seam; they get texture coordinates beyond 1, where the image
- * is repeated. faces: of all points of the recording; those from first_face on are of this grid, whose points are all
- * there are from grid->first on, in their order. */
+/* Doubles points where faces cross the seam. The new points stand at the end of `points` and have texture coordinates
+ * beyond 1, where the image is repeated. Faces from first_face on belong to this grid; its points are all points from
+ * grid->first on, in their order. */
 int mesh_texture_unwrap(const struct mesh_grid *grid, struct mesh_points *points, uint32_t (*face)[3], uint32_t n_faces,
                         struct sh_err *err);
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Repair of .obj. A mesh is held in memory until all scans are over, so only a recorder that was killed while it wrote the file
- * has left something: lines of text, in which a triangle follows the vertices that it names. All whole lines are kept. The
- * file of materials, which is written after them, is missing then. */
+/* Repair of .obj. A mesh is held in memory until all scans are over. So only a recorder that was killed while it wrote
+ * the file leaves something: lines of text, in which a triangle follows its vertices. All whole lines are kept. The
+ * file of materials is written after them, so it is missing. */
 #include "drivers/record/obj_repair.h"
 
 #include <stdio.h>

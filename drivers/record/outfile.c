@@ -43,7 +43,7 @@ int outfile_open(struct outfile *file, const char *path, struct sh_err *err)
     return rc;
 }
 
-/* Where the file system can't, or the system is older, it stays as it was. */
+/* Where the file system or an older kernel can't do it, the descriptor stays as it was. */
 static void set_direct(struct outfile *file, int on)
 {
     if (file->is_direct == on) return;
@@ -184,7 +184,7 @@ int outfile_close(struct outfile *file, enum outfile_end how, struct sh_err *err
     return how == OUTFILE_LEAVE ? 0 : rc;
 }
 
-/* A limit on files would end the program here: some file systems count from a file's begin. */
+/* With a limit on file sizes reserving would end the program: some file systems count from the file's begin. */
 static int has_limit(void)
 {
     struct rlimit most;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A file that appears whole or not at all (core/newfile.h). It is written as PATH.part through a buffer. What of it came to
- * the disk before a failure may stay as PATH.part, for a repair (repair.h). */
+/* A file that appears whole or not at all (core/newfile.h). It is written as PATH.part through a buffer. After a
+ * failure PATH.part may stay with what reached the disk, for a repair (repair.h). */
 #ifndef DRIVERS_RECORD_OUTFILE_H
 #define DRIVERS_RECORD_OUTFILE_H
 
@@ -12,7 +12,7 @@
 enum {
     OUTFILE_BUFFER = 1 << 20,
     OUTFILE_BLOCK = 4096,           /* of direct writing: places and lengths are multiples of it */
-    OUTFILE_DIRECT_FROM = 32 << 20, /* what is shorter stays in the system's cache, where it is read again soon */
+    OUTFILE_DIRECT_FROM = 32 << 20, /* a shorter file stays in the system's cache, as it is often read again soon */
 };
 
 struct outfile {
@@ -38,26 +38,26 @@ int outfile_write(struct outfile *file, const void *data, size_t len, struct sh_
 uint8_t *outfile_room(struct outfile *file, size_t n, struct sh_err *err);
 void outfile_used(struct outfile *file, size_t n);
 int outfile_flush(struct outfile *file, struct sh_err *err);
-/* SH_EIO where a write has failed before, whatever is on the disk now; it says the same as that. */
+/* SH_EIO with the error of that write, if an earlier write has failed. */
 int outfile_check(const struct outfile *file, struct sh_err *err);
-/* To be called about once a second: flushes, unless some of it was written since the last call. So nothing waits for longer
- * than two calls, and who writes much pays nothing. */
+/* To be called about once a second: flushes, unless a part of the file was written since the last call. So no data wait
+ * for longer than two calls, and a busy writer pays nothing. */
 int outfile_save(struct outfile *file, struct sh_err *err);
 /* Overwrites bytes that were flushed. */
 int outfile_patch(struct outfile *file, uint64_t at, const void *data, size_t len, struct sh_err *err);
-/* Gives the place up: PATH.part is removed, so that something else can be written as PATH. Only outfile_close may follow,
- * which then frees alone. */
+/* Removes PATH.part, so that something else can be written as PATH. Only outfile_close may follow, which then only
+ * frees. */
 void outfile_yield(struct outfile *file);
 /* OUTFILE_KEEP: flush, sync, rename; where that fails, PATH.part is removed. OUTFILE_KEEP_PART: it then stays, unless it is
  * empty. OUTFILE_LEAVE: it stays, with all that can be flushed, and is not renamed. OUTFILE_DROP: it is removed. Frees
  * everything in any case. */
 enum outfile_end { OUTFILE_DROP = 0, OUTFILE_KEEP = 1, OUTFILE_KEEP_PART, OUTFILE_LEAVE };
 int outfile_close(struct outfile *file, enum outfile_end how, struct sh_err *err);
-/* Room on the disk for the end of a file, of len bytes in all: so that a full disk, or a repair on one, has it. It lies far
- * behind the end, and does not count as length. Where the file system has no such room, or files have a limit, there is none.
- * SH_EIO: the disk is full. */
+/* Reserves len bytes on the disk for the end of the file, so that the end, or a repair, can be written when the disk is
+ * full. The reserved room lies far behind the end, and does not count as length. Nothing is reserved where the file
+ * system can't do that, or files have a limit. SH_EIO: the disk is full. */
 int outfile_reserve(struct outfile *file, uint64_t len, struct sh_err *err);
-/* Gives it back, for what is written next. */
+/* Frees the reserved room, for what is written next. */
 void outfile_release(struct outfile *file);
 /* Writes over an open file from `at` on; path is for messages. SH_ENOMEM. Only outfile_leave ends it: it flushes nothing,
  * and leaves fd open. */

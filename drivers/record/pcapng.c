@@ -122,7 +122,7 @@ static int ends_with_block(const struct repair *r, uint64_t from, struct sh_err 
     return rc != SH_OK ? rc : le_get32(first) == n;
 }
 
-/* What follows the last whole block may be the piece of another one, and then zeros. */
+/* Checks that only the piece of another block, and then zeros, follow the last whole block. */
 static int check_behind(const struct repair *r, const struct packets *p, struct sh_err *err)
 {
     enum { HEAD = 12 };

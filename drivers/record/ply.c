@@ -5,8 +5,8 @@
  *
  * The header comes first in the file but is known last (count, names, losses). When the first points arrive,
  * the number of surfaces is known, so room is left for the header. So no byte of the points is written twice,
- * which matters at 100 MB/s. What does not fit in the room after all (names longer than heads send) is left out and
- * reported. Until the end a header stands there that says that the file is incomplete: for a repair (ply_repair.c). */
+ * which matters at 100 MB/s. Names that don't fit after all (longer than heads send) are left out and reported.
+ * Until the end a first header marks the file as incomplete, for a repair (ply_repair.c). */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -42,7 +42,7 @@ static int ply_begin(void *rec, struct sh_err *err)
     return 0;
 }
 
-/* What is known of the header by now, in the room that it has. */
+/* Makes the header from the facts known by now, in the length of its room. */
 static int make_header(struct ply *ply, int incomplete, char **text, size_t *len, struct sh_err *err)
 {
     uint64_t n_left_out;
@@ -81,7 +81,7 @@ static int write_header(struct ply *ply, int incomplete, struct sh_err *err)
     return rc;
 }
 
-/* A row of the file. Which of its columns are there, the recorder says. */
+/* A row of the file; the recorder's `columns` say which members are written. */
 struct vertex {
     double xyz[3];
     const struct scanhead_point *point;
@@ -100,7 +100,7 @@ static inline uint8_t *put_length(uint8_t *to, double v, int as_float)
     return to + (as_float ? 4 : 8);
 }
 
-/* Where the row ends. Inlined where the columns are known, it has no branches. */
+/* Returns the end of the row. Inlined with known columns, it has no branches. */
 static inline __attribute__((always_inline)) uint8_t *put_columns(uint8_t *to, const struct vertex *v, unsigned columns)
 {
     const struct scanhead_point *p = v->point;
@@ -151,7 +151,7 @@ static size_t put_number(char *to, size_t room, int digits, double v)
     return n > 0 && (size_t)n < room ? (size_t)n : room;
 }
 
-/* Where the row ends, or NULL where numbers are absurdly long. */
+/* Returns the end of the row, or NULL if numbers are too long for it. */
 static uint8_t *put_ascii(uint8_t *row, const struct vertex *v, unsigned columns, int degrees)
 {
     const struct scanhead_point *p = v->point;
@@ -227,13 +227,13 @@ static int check_float(const char *path, unsigned columns, int in_degrees, const
 static int ply_fits(const char *path, const struct recorder_options *options, const struct recorder_scan *first,
                     const struct recorder_scan *scan, struct sh_err *err)
 {
-    static const double way[3] = {0, 0, 0}; /* of a head that moves in the scene's frame: known at the end */
+    static const double way[3] = {0, 0, 0}; /* a moving head's places in the scene frame are known at the end */
     (void)first;
     return check_float(path, options->columns, scan->in_degrees, scan->moves && !scan->is_geo ? way : scan->place_m,
                        err);
 }
 
-/* A head that moves comes to places that nobody knows before. Its points may be as much farther as those of a station. */
+/* The places of a moving head are not known before. Its points may be as far from it as those of a station. */
 static int check_floats_on_the_way(const struct ply *ply, int n, struct sh_err *err)
 {
     const struct track *t = &ply->base.track;

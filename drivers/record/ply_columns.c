@@ -90,7 +90,7 @@ static void put_colour_comment(FILE *out, const struct track *t)
                 scale->mode == COLOUR_LABEL ? "show the label" : "are one colour for all");
 }
 
-/* What came and what did not: known at the end. */
+/* Counts of what came and what was lost, known at the end. */
 static void put_losses(FILE *out, const struct ply_facts *facts)
 {
     const struct scanhead_stats *s = &facts->stats;
@@ -208,7 +208,7 @@ static void put_column(FILE *out, const struct ply_facts *facts, const struct co
             c->name);
 }
 
-/* Of the rest of its lines, so much goes into the header. */
+/* How much of the names and of the padding goes into the header. */
 struct filling {
     size_t names, padding; /* bytes */
     uint64_t n_left_out;

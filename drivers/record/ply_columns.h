@@ -14,13 +14,13 @@
 
 enum { PLY_MAX_HEADS = 128, PLY_PAD_MIN = 8 /* "comment\n" */ };
 /* The line of a header that was written before the recording had its end. */
-#define PLY_CRS        "comment crs " /* the first line of comment, which tells that this program has written a file */
+#define PLY_CRS        "comment crs " /* the first line of comment, which shows that this program wrote the file */
 #define PLY_INCOMPLETE "comment incomplete: its end is missing, and losses were not counted\n"
 
 struct ply_facts {
     const struct track *track; /* its kind of points, and the handle that knows the surfaces' names */
     int ascii, empty_shots, scalar_names;
-    unsigned columns;                /* enum ply_column: that are asked for, and are there */
+    unsigned columns;                /* enum ply_column: those that are asked for and exist */
     uint64_t n_vertices, n_unplaced; /* points before their descriptor and anchor were seen */
     uint64_t n_without_pose;         /* points of a moving head whose pose was lost */
     uint64_t n_without_attributes;   /* echoes */
@@ -32,19 +32,18 @@ struct ply_facts {
         uint32_t station;
         char idn[96], profile[32];
     } head[PLY_MAX_HEADS];
-    uint32_t n_heads, more_heads; /* room is to be left for so many more */
+    uint32_t n_heads, more_heads; /* more_heads: room is left for so many more */
     struct scanhead_stats stats;
 };
 
-/* Of columns, those that points of the track have. Once the track has begun. */
+/* Those of the columns that points of the track have. To be called once the track has begun. */
 unsigned ply_columns_there(const struct track *track, unsigned columns);
-/* What the coordinates of the track's points are. */
+/* The meaning of the track's coordinates, in words. */
 const char *ply_crs_text(const struct track *track);
 /* "label N OBJECT | MATERIAL", a line each with `before` in front, of all surfaces that the stream has named so far. */
 void ply_put_names(FILE *out, const char *before, const struct scanhead *sh);
 
-/* Bytes to leave for the header: all that is known now, and room for those names of n_surfaces that are
- * not. */
+/* Bytes to leave for the header: all that is known now, and room for the names of n_surfaces not known yet. */
 size_t ply_header_reserve(const struct ply_facts *facts, uint32_t n_surfaces);
 
 /* The header, padded by comment lines to exactly `size` bytes; 0: as long as it gets. Names, and heads after the first, that

@@ -15,7 +15,7 @@ extern const struct recorder_ops recorder_mesh_ply;
 
 enum { HEADER_BEGIN = 1 << 16, HEADER_MOST = 64 << 20, WORD = 32, NO_COLUMN = -1 };
 
-/* What the header says. */
+/* A header that was read. */
 struct ply_header {
     char *text; /* NUL at its end */
     size_t len;
@@ -86,8 +86,8 @@ int ply_repair_count(const char *line, const char *head, uint64_t *count)
     return 1;
 }
 
-/* One line; 0: such a file is not repaired. Comments may be anything: a header that was being written over when its
- * recorder was killed may have half a line. */
+/* Takes one line; 0: such a file is not repaired. Comments may be anything: if the recorder was killed while it
+ * overwrote the header, a line may be cut. */
 static int take_header_line(struct ply_header *h, const char *line)
 {
     if (strcmp(line, "format ascii 1.0") == 0) return h->is_ascii = 1;
@@ -118,7 +118,7 @@ static int parse_header(const struct repair *r, struct ply_header *h, struct sh_
     return repair_fail_none(r, "PLY file of points", err);
 }
 
-/* Blank comments, and pieces of comments of a header that was being written over when its recorder was killed. */
+/* Blank comments, and pieces of comments left when the recorder was killed while it overwrote the header. */
 static int is_padding(const char *line, size_t n)
 {
     static const char *const first[] = {"ply",      "format ",   "comment ",  "obj_info ",
@@ -130,7 +130,8 @@ static int is_padding(const char *line, size_t n)
     return strncmp(line, "comment ", 8) == 0 && strspn(line + 7, " ") >= n - 7;
 }
 
-/* What a header is renewed with; padding: blank comments before the count; blanks: at the end of the first comment. Bytes. */
+/* What goes into a renewed header. In bytes: padding of blank comments before the count, blanks at the end of the first
+ * comment. */
 struct renewal {
     uint64_t n_vertices;
     int incomplete;
@@ -239,8 +240,8 @@ static int read_points(const struct repair *r, const struct ply_header *h, struc
     return rc;
 }
 
-/* Cuts first: what makes the file whole, its header, is written last. A repair that ends between the two finds the same
- * points again. */
+/* Cuts first; the header, which makes the file whole, is written last. A repair that is interrupted between the two
+ * finds the same points again. */
 static int make_whole(struct repair *r, const struct ply_header *h, const struct points *p, uint64_t end,
                       struct sh_err *err)
 {

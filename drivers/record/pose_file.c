@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /* .poses.csv: where the head truly was, which a registration or a trajectory has to find.
  *
- * Of a head that stands: one row per scan. The pose takes points from the head's frame to the frame of the
+ * A head that stands has one row per scan. The pose takes points from the head's frame to the frame of the
  * recordings beside it (station_pose.h). At a stop the row has the frame scalar, too. Where the recordings
  * are geodetic, the position is NaN and the axes are east, north, up.
  *
- * Of a head that moves: one row per pose, each time once, in the scene frame, with times since the scan's
- * start. That is a trajectory file of its own (core/pose.h). Lines of comment say where frames were lost, and
- * what links the scene frame to the CRS of the geo layout. */
+ * A head that moves has one row per pose, each time once, in the scene frame, with times since the scan's
+ * start. So the file is a trajectory file (core/pose.h). Lines of comment say where stream frames were lost, and
+ * how the scene frame lies in the CRS of the geo layout. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -70,7 +70,7 @@ static int put(struct pose_file *file, const struct scanhead_pose *p, struct sh_
     return outfile_write(&file->base.file, line, (size_t)n, err);
 }
 
-/* Poses are in the scene frame; where the points are in a CRS: what links the two, as comments. */
+/* Poses are in the scene frame. If the points are in a CRS, comments say how the scene frame lies in it. */
 static int put_link(struct pose_file *file, const struct scanhead_info *info, struct sh_err *err)
 {
     char text[4 * LINE];

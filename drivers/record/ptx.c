@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* .ptx: one grid per scan, a column per line and a row per shot. Points are in the head's frame; the pose
- * takes them to the recording's frame (station_pose.h). A shot without echo is "0 0 0 0.5". So is a place of
- * the grid without a shot: lines differ by a pulse where the pulse rate is no multiple of the line rate, and
- * lines may have been lost.
+ * takes them to the recording's coordinate frame (station_pose.h). A shot without echo is "0 0 0 0.5". So is a
+ * place of the grid without a shot: lines may have been lost, and they differ by a pulse where the pulse rate is
+ * no multiple of the line rate.
  *
  * The grid of a planar head has a column a turn and a row a step, from the first step that is cast on; that of a
  * sphere a column a ring, and of a pole one shot. Beams and lists of directions have no rows and columns: they
@@ -11,8 +11,8 @@
  * With colours each line goes on with red, green and blue, 0 to 255; all 0 for a place without a point.
  *
  * A PTX grid has one point per shot: the first echo. Intensity is the reflectance as a fraction: 1 for a
- * white Lambertian target and for what is brighter, 0.5 where not modelled. What the grid had no room for is
- * reported at the end, with counts.
+ * white Lambertian target and for what is brighter, 0.5 where not modelled. Echoes without room in the
+ * grid are counted and reported at the end.
  *
  * Places without a shot are bounded, so that a small stream never makes a huge file. A grid has no more lines,
  * and pulses in a line, than the descriptor says a scan can have. All grids of a recording together, also in
@@ -26,7 +26,7 @@
 #include "drivers/record/recorder.h"
 
 enum {
-    PADDING_FREE = 1 << 24, /* 160 MiB of text; a scan of 4,500 lines of 3,700 pulses of which one line came */
+    PADDING_FREE = 1 << 24, /* 160 MiB of text: enough for 4,500 lines of 3,700 pulses if only one line came */
     PADDING_PER_SHOT = 8,
 };
 
@@ -120,8 +120,8 @@ static int make_cell(struct ptx *ptx, int i, struct ptx_cell *cell)
     return 1;
 }
 
-/* Until its text is written, an empty grid stands where that will be: so that the recording is no empty file, of which
- * nobody would think that something was left. */
+/* Writes an empty grid where the text will be. So a killed recorder leaves no empty file, which nobody would try to
+ * repair. */
 static int begin_grid(struct ptx *ptx, struct sh_err *err)
 {
     static const char text[] = "0\n0\n";

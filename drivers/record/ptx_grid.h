@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* The shots of one scan, kept in a file beside the recording (PATH.grid) until the scan is over: a PTX grid begins with its
- * size, and all its columns are of the same height, which is known last. Memory holds one column.
+/* The shots of one scan, kept in a file beside the recording (PATH.grid) until the scan is over. A PTX grid begins with
+ * its size, and all its columns have the same height, so it can be written only then. Memory holds one column.
  *
- * A recorder that was killed has left the file there, and a repair makes the grid of it (ptx_repair.c). It has a head, which
- * says what the cells don't, then cells. Each has a checksum. A shot without echo has a cell where no other one says how
- * large the grid is. Numbers are the machine's own. */
+ * A recorder that was killed leaves the file there, and a repair makes the grid from it (ptx_repair.c). The file has a
+ * head, then cells; each has a checksum. A shot without echo has a cell only where the size of the grid depends on it.
+ * Numbers are in the machine's byte order. */
 #ifndef DRIVERS_RECORD_PTX_GRID_H
 #define DRIVERS_RECORD_PTX_GRID_H
 
@@ -22,7 +22,7 @@ struct ptx_cell {
     double p_socs[3];
 };
 
-/* Of a grid, before its cells. */
+/* The head of a grid's file, before its cells. */
 struct ptx_head {
     char magic[8];
     uint64_t text_at; /* bytes of the recording before the text of the grid */
@@ -35,22 +35,22 @@ struct ptx_grid {
     char *path, *part;                                 /* of the file; of the recording as long as it is written */
     uint32_t column_min, column_max, row_min, row_max; /* of all shots, those without echo included */
     uint64_t n_shots, n_cells;
-    int is_empty; /* the file is: there is nothing to make a grid of */
+    int is_empty; /* the file is empty: there is no grid */
 };
 
 /* Makes the file for a recording at `path`. SH_EIO, SH_EPERM, SH_EINPUT, SH_ENOMEM. */
 int ptx_grid_open(struct ptx_grid *grid, const char *path, struct sh_err *err);
-/* The file goes, unless it holds a grid of which the recording (PATH.part) has nothing yet, and that is there. */
+/* Removes the file, unless it holds a grid that is not yet in the recording's PATH.part, and PATH.part exists. */
 void ptx_grid_close(struct ptx_grid *grid);
 /* Before the first shot of a grid. */
 int ptx_grid_begin(struct ptx_grid *grid, uint64_t text_at, const struct station_pose *pose, int coloured,
                    struct sh_err *err);
-/* A shot at this place; 1: the grid has become larger by it. Cells are then given for those with an echo. Columns never go
- * back. */
+/* Takes a shot at this place; 1: it makes the grid larger. A cell is then given for each shot with an echo. Columns
+ * never go back. */
 int ptx_grid_shot(struct ptx_grid *grid, uint32_t column, uint32_t row);
 /* intensity -1: a shot without echo. */
 int ptx_grid_cell(struct ptx_grid *grid, const struct ptx_cell *cell, struct sh_err *err);
-/* What was given goes to the file. */
+/* Writes what was given to the file. */
 int ptx_grid_save(struct ptx_grid *grid, struct sh_err *err);
 /* Calls fn for each column with its cells from row_min to row_max; a cell without echo has intensity -1. Then
  * the grid is without shots; its file stays until ptx_grid_clear. */
@@ -62,8 +62,8 @@ int ptx_grid_clear(struct ptx_grid *grid, struct sh_err *err);
 
 /* ---- for a repair. spool and path are set, and nothing else. */
 
-/* 1: the grid is there, *head and its size are of it, and *cut is how many bytes at its end are none of its. 0: the file
- * holds no grid. SH_EFORMAT: it is damaged. */
+/* 1: the file holds a grid; *head and the size are set, and *cut is the number of bytes at its end that are no cell. 0:
+ * the file holds no grid. SH_EFORMAT: it is damaged. */
 int ptx_grid_find(struct ptx_grid *grid, struct ptx_head *head, uint64_t *cut, struct sh_err *err);
 
 #endif

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /* Repair of PTX files. Whole grids are in FILE.part as text. The grid of the scan that was not over is in FILE.grid
- * (ptx_grid.h): its text is made now, as its recorder would have made it, and takes the place of whatever its recorder had
- * begun to write of it. FILE.grid goes last, so that a repair that is killed can begin again.
+ * (ptx_grid.h). Its text is made now, as its recorder would have made it, and replaces any text of it that the recorder
+ * had begun. FILE.grid is removed last, so that a repair that is killed can begin again.
  *
- * Without a FILE.grid, for instance of a part that was copied alone, the points of the last grid are kept all the same: its
- * last column is filled up like shots without echo, and its header gets the number of columns that are there. Spaces after
- * that number keep its place as long as it was.
+ * Without a FILE.grid, for instance when FILE.part was copied alone, the points of the last grid are kept all the same:
+ * its last column is filled up with shots without echo, and its header gets the number of columns that are there.
+ * Spaces after that number keep the line's length.
  *
- * The format has no place for the mark of a program. So a file that has not the name of a part is checked, and never
- * changed: it may be another program's. */
+ * The format has no place for the mark of a program. So only a file named .part is changed; any other one may be
+ * another program's, and is only checked. */
 #include <errno.h>
 #include <inttypes.h>
 #include <stdlib.h>
@@ -21,7 +21,7 @@
 enum { LINE_MOST = 512, HEADER_LINES = 10 };
 static const uint64_t MOST = UINT32_MAX; /* columns, rows */
 
-/* Where the text is in its grids. */
+/* How far the text has been read, in grids. */
 struct place {
     uint64_t at, grid_at;            /* bytes: behind the last line, and before the grid */
     uint64_t columns, rows, n_lines; /* of the grid; lines that were there */
@@ -134,7 +134,7 @@ static int set_columns(const struct repair *r, const struct place *p, uint64_t c
     return repair_write(r, p->grid_at, text, (size_t)n, err);
 }
 
-/* What is to be changed. */
+/* Checks that the file may be changed. */
 static int check_ours(const struct repair *r, const struct place *p, struct sh_err *err)
 {
     if (!repair_is_part(r))
@@ -169,7 +169,7 @@ static int end_text(struct repair *r, struct place *p, struct sh_err *err)
 
 /* ---- the last grid has a file */
 
-/* Its text, from head->text_at on. */
+/* Writes the grid's text, from head->text_at on. */
 static int put_grid(struct repair *r, struct ptx_grid *grid, const struct ptx_head *head, struct place *p,
                     struct sh_err *err)
 {

@@ -29,7 +29,7 @@ static int put_vector(struct ptx_text *t, int digits, const double v[3], const c
     return outfile_write(t->file, text, (size_t)n, err);
 }
 
-/* Vectors are rows in PTX: what stands in the matrix is the rotation's transpose, the shift below it. */
+/* Vectors are rows in PTX. So the matrix has the transposed rotation, and the shift below it. */
 static int put_header(struct ptx_text *t, struct sh_err *err)
 {
     const struct ptx_grid *g = t->grid;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A grid as the text of PTX. The cells go in (ptx_grid.h), lines come out: columns, rows, the pose, then a line a cell. For
- * the recorder, and for the repair of what it left. */
+/* A grid as the text of PTX. The cells go in (ptx_grid.h), lines come out: columns, rows, the pose, then one line per
+ * cell. For the recorder and for the repair. */
 #ifndef DRIVERS_RECORD_PTX_TEXT_H
 #define DRIVERS_RECORD_PTX_TEXT_H
 

@@ -86,7 +86,8 @@ int recorder_save(struct recorder *rec, struct sh_err *err)
     return rc;
 }
 
-/* After a failed write it is not completed, also where there is room again: points would follow that are missing. */
+/* After a failed write the file is not completed, even if there is room again: points in its middle would be
+ * missing. */
 static int finish(struct recorder *rec, struct sh_err *err)
 {
     int rc = outfile_check(&rec->file, err);
@@ -129,7 +130,7 @@ static void report_losses(const struct recorder *rec)
     recorder_report(rec, t->missing.n_without_colours, "points that are grey, since their colours were lost");
 }
 
-/* After a failure what is on the disk stays, where that is of use; whoever gives up the file does not want it. */
+/* After a failure what is on the disk stays, where a repair can use it. A file that the user gave up is removed. */
 static enum outfile_end how_it_ends(const struct recorder *rec, int keep, int rc)
 {
     const int can_be_repaired = rec->ops->repair != NULL;

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* Recorders: the frames of a stream in, one file out; which format, its ending says.
+/* Recorders: the frames of a stream go in, one file comes out. The file's ending decides its format.
  *
  * A format is one file of this folder with a `const struct recorder_ops`, and one row in the table in
- * recorder.c. What all of them do is here and in recorder.c: the file that appears whole or not at all
- * (outfile.h), the points and poses of the stream (track.h), what was left out. A recorder's own struct
- * begins with a struct recorder. One thread per recorder. */
+ * recorder.c. Shared by all formats are the file that appears whole or not at all (outfile.h), the points and
+ * poses of the stream (track.h), and the report of what was left out. A recorder's own struct begins with a
+ * struct recorder. One thread per recorder. */
 #ifndef DRIVERS_RECORD_RECORDER_H
 #define DRIVERS_RECORD_RECORDER_H
 
@@ -15,7 +15,7 @@
 #include "drivers/record/repair.h"
 #include "drivers/record/track.h"
 
-/* Of the grids that are written: shots, and places filled up between them. */
+/* Counts of the grids that are written: shots, and empty places filled up between them. */
 struct recorder_padding {
     uint64_t n_shots, n_places;
 };
@@ -45,17 +45,17 @@ struct recorder_options {
     struct colour_choice colour; /* of formats that hold one */
     unsigned columns;            /* of .ply: enum ply_column; 0: all, in double */
     int scalar_names;            /* PLY's columns besides coordinates and colour are called scalar_NAME */
-    uint32_t n_heads;            /* that the scans are of, one after the other, in one scene; 0: one, as far as known */
+    uint32_t n_heads;            /* heads that scan one after the other in one scene; 0: one, as far as known */
     int may_wait;  /* the stream waits for the recorder: large files are written past the system's cache (outfile.h) */
     int las_minor; /* LAS 1.2 or 1.4: 2 or 4; 0: 4 */
     int mesh;      /* .ply is a mesh of the scan's grid */
-    double long_edge;     /* of meshes: triangles with an edge of more than so many means are left out; 0: none */
-    double sparse_per_m2; /* > 0: .ply is points spread over the mesh, so many a square metre, ... */
-    uint64_t sparse_seed; /* ... drawn by this seed */
-    /* Is given, at the end, what the format had no room for. Its stop gives up a file that is being completed, which may
+    double long_edge;     /* of meshes: leaves out triangles with an edge longer than so many mean edges; 0: none */
+    double sparse_per_m2; /* > 0: .ply has points spread over the mesh, so many per square metre */
+    uint64_t sparse_seed; /* of the random choice of these points */
+    /* Gets, at the end, what the format had no room for. Its stop gives up a file that is being completed, which may
      * take long. May be NULL; must live until close. */
     const struct sh_report *report;
-    /* Files of one recording share what may be filled up. NULL: a file alone; else it must live until close. */
+    /* Files of one recording share the limit of empty places. NULL: a file alone; else it must live until close. */
     struct recorder_padding *padding;
 };
 
@@ -73,7 +73,7 @@ struct recorder {
     struct recorder_options options;
     struct outfile file;
     struct track track; /* file.path is its path in messages */
-    int has_failed;     /* something could not be written: it is not completed */
+    int has_failed;     /* a write failed: the file is not completed */
 };
 
 /* What a format is. Each function gets the recorder's own struct as rec; each may be NULL. Errors: SH_E, text
@@ -83,8 +83,8 @@ struct recorder_ops {
     int is_mesh;            /* of the scan's grid, or points spread over it */
     size_t size;            /* of the recorder's own struct; after its struct recorder it begins zeroed */
     struct track_ops track; /* takes points in batches */
-    /* Before the first scan: SH_EINPUT where the format can't hold a scan, which comes into one file with `first`. NULL: it
-     * holds all. */
+    /* Before the first scan: SH_EINPUT where the format can't hold a scan in one file with `first`. NULL: it holds
+     * all. */
     int (*fits)(const char *path, const struct recorder_options *options, const struct recorder_scan *first,
                 const struct recorder_scan *scan, struct sh_err *err);
     /* The file is open and empty. */
@@ -93,35 +93,35 @@ struct recorder_ops {
     int (*frame)(void *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
     /* All points have come: completes the file (counts in the header) and reports what it had no room for. */
     int (*finish)(void *rec, struct sh_err *err);
-    /* Now and then, about once a second of a long recording: what has come goes to the disk, so that a repair finds it
-     * there. NULL: flushing the file is enough. */
+    /* Called about once a second: writes what has come to the disk, so that a repair finds it there. NULL: flushing the
+     * file is enough. */
     int (*save)(void *rec, struct sh_err *err);
     /* Frees what the recorder's own struct holds; also after begin has failed. */
     void (*release)(void *rec);
-    /* Makes a whole file of what was left of one (repair.h). SH_EFORMAT: it is none of this format, or too little came to
-     * the disk to say what it is. NULL: the format is written in one piece at its end, and there is nothing to keep. */
+    /* Makes a whole file of an incomplete one (repair.h). SH_EFORMAT: it is not of this format, or too short to tell.
+     * NULL: the format is written in one piece at its end, so there is nothing to keep. */
     int (*repair)(struct repair *repair, struct sh_err *err);
 };
 
 /* By the path's ending. NULL, and the list of known endings in err, where there is none. */
 const struct recorder_ops *recorder_find(const char *path, struct sh_err *err);
 
-/* The format that these options make of it: .ply of a mesh. */
+/* The format with these options: .ply may be a mesh. */
 const struct recorder_ops *recorder_shape(const struct recorder_ops *ops, const struct recorder_options *options);
 
 /* Opens path for writing. Nothing is written to path itself before close succeeds: the data go to a file
  * beside it (".part") that is renamed at the end. Options are copied. */
 int recorder_open(const struct recorder_ops *ops, const char *path, const struct recorder_options *options,
                   struct recorder **rec, struct sh_err *err);
-/* Other limits for its colours: before its first frame. */
+/* Sets other limits for its colours; to be called before its first frame. */
 void recorder_set_limits(struct recorder *rec, double low, double high);
 /* Each frame of the stream, in order, with the handle for information, points and surfaces. The handle must
  * live until close. Whole scans may come from different handles: heads in one scene, whose labels mean the same. */
 int recorder_frame(struct recorder *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
-/* About once a second: what has come and would wait in memory goes to the disk. */
+/* To be called about once a second: writes what waits in memory to the disk. */
 int recorder_save(struct recorder *rec, struct sh_err *err);
-/* Finishes the file, syncs and renames it; keep = 0: throws it away. rec is freed, also after a failure. Where it fails, what
- * came to the disk stays as PATH.part, if the format can be repaired; a note in the report says so. */
+/* Finishes the file, syncs and renames it; keep = 0: throws it away. rec is freed, also after a failure. After a
+ * failure what reached the disk stays as PATH.part, if the format can be repaired; a note in the report says so. */
 int recorder_close(struct recorder *rec, int keep, struct sh_err *err);
 
 /* For formats: reports "PATH: n what", unless n is 0. */

@@ -41,7 +41,7 @@ int repair_read(const struct repair *r, uint64_t at, void *to, size_t len, struc
     return SH_OK;
 }
 
-/* A file that is not ours to change was opened for reading. */
+/* A file that we may not change was opened for reading only. */
 static int check_writable(const struct repair *r, struct sh_err *err)
 {
     if ((fcntl(r->fd, F_GETFL) & O_ACCMODE) != O_RDONLY) return SH_OK;
@@ -203,7 +203,7 @@ static int is_there(const char *path)
     return lstat(path, &st) == 0;
 }
 
-/* Which of the two is meant. */
+/* Finds out whether path means FILE or FILE.part. */
 static int choose(const char *path, struct repaired *d, struct sh_err *err)
 {
     const int named = ends_in_part(path);
@@ -237,7 +237,7 @@ static int repair_open(struct repair *r, const struct recorder_ops *ops, struct 
     return ops->repair(r, err);
 }
 
-/* Gives it its name. */
+/* Renames a repaired FILE.part to FILE. */
 static int settle(struct repaired *d, int *fd, struct sh_err *err)
 {
     if (d->was_left && !is_there(d->path)) {

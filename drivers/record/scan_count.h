@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* For repairs: how many scans frames, or points, are of. Pure. */
+/* For repairs: counts the scans that frames or points belong to. Pure. */
 #ifndef DRIVERS_RECORD_SCAN_COUNT_H
 #define DRIVERS_RECORD_SCAN_COUNT_H
 
@@ -10,7 +10,8 @@ struct scan_count { /* begins as zeros */
     int within; /* points of a scan have come, or its descriptor */
 };
 
-/* Of .shs and .pcapng: each frame, in order. A scan begins with a descriptor that is no repetition, or with points before any. */
+/* Takes each frame of a .shs or .pcapng, in order. A scan begins with a descriptor that is no repetition, or with
+ * points before any descriptor. */
 static inline void scan_count_frame(struct scan_count *count, uint8_t type, uint8_t flags)
 {
     const int begins = type == NATIVE_DESCRIPTOR && (flags & NATIVE_REPEAT) == 0;
@@ -25,7 +26,7 @@ struct point_scans { /* begins as zeros */
     double time_s;
 };
 
-/* Of .las and .ply: each point, in order. Another scan has another station, or its times begin anew. */
+/* Takes each point of a .las or .ply, in order. A new scan has another station, or its times begin anew. */
 static inline void point_scans_take(struct point_scans *scans, long station, double time_s)
 {
     scans->n += (uint64_t)(scans->n == 0 || station != scans->station || time_s < scans->time_s);

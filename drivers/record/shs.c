@@ -47,7 +47,7 @@ static int read_frames(const struct repair *r, struct frames *f, struct sh_err *
     return rc;
 }
 
-/* Cut behind the last whole frame. What is damaged before that stays: readers pass over it. */
+/* Cuts the file behind the last whole frame. Damage before that stays: readers skip it. */
 static int shs_repair(struct repair *r, struct sh_err *err)
 {
     struct frames *f = calloc(1, sizeof *f);

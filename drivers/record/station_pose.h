@@ -36,8 +36,8 @@ void station_pose_reverse(const struct station_pose *pose, double p[3]);
 /* The unit quaternion w, x, y, z of the rotation; w is not negative. */
 void station_pose_quaternion(const struct station_pose *pose, double q[4]);
 
-/* SH_EFORMAT, with path in its text: the stream is broken, and the shift or the quaternion has a figure that is infinite or
- * no number. For formats that hold poses. */
+/* SH_EFORMAT, with path in its text, where the stream is broken: the shift or the quaternion is infinite or NaN. For
+ * formats that hold poses. */
 int station_pose_check(const struct station_pose *pose, const char *path, struct sh_err *err);
 
 #endif

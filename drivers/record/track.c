@@ -72,7 +72,8 @@ static void set_pose(struct track *t)
         station_pose_of(&t->info, &t->pose);
 }
 
-/* A descriptor that is no repetition, pulses that go back, another station or scan: whichever of them reached us. */
+/* A scan begins with a descriptor that is no repetition, pulses that go back, or another station or scan. Any of these
+ * will do, since frames may be lost. */
 static int begins_scan(const struct track *t, const struct scanhead_frame *frame)
 {
     return t->n_scans == 0 || t->state.new_scan || frame->pulse0 < t->state.last_pulse0 ||
@@ -100,7 +101,7 @@ static void set_limits(struct track *t, const struct native_descriptor *d)
     t->max_lines = d->frames > 0 ? whole_u32(d->frames * (ceil(fabs(sweep_s) * lines_hz) + 1)) : UINT32_MAX;
 }
 
-/* What an emitter frame says beyond its descriptor. A turn of beams begins anywhere in a firing sequence. */
+/* Limits from the emitter frame, which the descriptor lacks. A turn of beams begins anywhere in a firing sequence. */
 static void set_emitter_limits(struct track *t)
 {
     if (scanhead_get_emitter(t->sh, &t->emitter) != 0) return;
@@ -136,8 +137,8 @@ static uint64_t first_row(const struct track *t, const struct scanhead_frame *fr
     return whole_u32(since_s * t->info.prr_hz);
 }
 
-/* Echoes of one pulse follow each other: a new pulse begins wherever the number is 0 or 1. A frame that begins
- * with a later echo is none of a head's; that echo goes to the row before. */
+/* Echoes of one pulse follow each other: a new pulse begins wherever the number is 0 or 1. No head sends a frame that
+ * begins with a later echo; such an echo goes to the row before. */
 static uint64_t number_rows(struct track *t, uint64_t row, int n)
 {
     for (int i = 0; i < n; i++) {
@@ -155,7 +156,7 @@ static void keep_point(struct track *t, int from, int to)
     t->frame[to] = t->frame[from];
 }
 
-/* How many are left. */
+/* Returns how many points are left. */
 static int leave_out_nowhere(struct track *t, int n)
 {
     int kept = 0;
@@ -176,7 +177,7 @@ static void set_geo_frames(struct track *t, int n)
         t->frame[i] = scanhead_pose(t->sh, t->point[i].t_ns, &pose) == SCANHEAD_OK ? pose.frame : NAN;
 }
 
-/* How many are left, or a negative error. */
+/* Returns how many points are left, or a negative error. */
 static int place_moving(struct track *t, int n, struct sh_err *err)
 {
     int kept = 0;

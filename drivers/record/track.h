@@ -1,17 +1,18 @@
 /* SPDX-License-Identifier: MIT */
-/* What every recorder of points follows in a stream: where scans begin, the one frame of coordinates, the
- * head's pose, and the line and the shot of each point. Frames go in, one by one; points come out in batches.
+/* A track follows a stream for every recorder of points: where scans begin, the one coordinate frame, the head's pose,
+ * and the line and the shot of each point. Stream frames go in, one by one; points come out in batches.
  *
- * Points of a moving head come out where they were hit, each by the pose of its own time. In the polar layout
- * they are then in the scene frame, and the pose of the scan changes nothing. In the geo layout they are in
- * the CRS, as those of a standing head, and the pose is the first anchor's. Points of the polar layout whose
- * pose was lost are left out and counted. Those of the geo layout need no pose.
+ * Each point of a moving head is placed by the pose at its own time. In the polar layout these points are in the scene
+ * frame, and the scan's pose is the identity. In the geo layout they are in the CRS, as those of a standing head, and
+ * the pose is the first anchor's. Points of the polar layout whose pose was lost are left out and counted. Those of the
+ * geo layout need no pose.
  *
- * Where a recorder wants attributes or colours and the head sends them, points wait for the frames that follow
- * theirs. Where one of them was lost, they come out with the next points, or at the end. Their attributes are then
- * NaN, their colour is grey, and they are counted. Colours that the head does not send are made here, of the points.
+ * Where a recorder wants attributes or colours and the head sends them, points wait for the frames that follow theirs.
+ * Where one of these was lost, the points come out with the next ones, or at the end. Their attributes are then NaN,
+ * their colour is grey, and they are counted. Colours that the head does not send are computed here from the points.
  *
- * The owner sets path, ops and rec, and colour where it wants another than the head's, in a zeroed struct. One thread per track. */
+ * In a zeroed struct the owner sets path, ops and rec, and colour where it wants another one than the head's. One
+ * thread per track. */
 #ifndef DRIVERS_RECORD_TRACK_H
 #define DRIVERS_RECORD_TRACK_H
 
@@ -31,7 +32,7 @@ struct track_ops {
      * frame, or in the scene frame where the head moves. NULL: no points wanted. */
     int (*points)(void *rec, int n, struct sh_err *err);
     int metres;           /* 1: SH_EFORMAT where points of a scan are in geodetic coordinates */
-    int grid;             /* 1: a file of rows and columns: no head that fires beams in turn or along a list */
+    int grid;             /* 1: a file of rows and columns: refuses heads that fire beams in turn or along a list */
     int wants_attributes; /* 1: it has a place for amplitude and width */
     int wants_colours;    /* 1: it has a place for a colour */
 };
@@ -40,13 +41,13 @@ struct track_ops {
 struct track_missing {
     uint64_t n_unplaced;           /* points before their descriptor and anchor were seen */
     uint64_t n_without_pose;       /* points of a moving head whose pose was lost */
-    uint64_t n_nowhere;            /* echoes whose coordinates are beyond any number, of a broken stream */
+    uint64_t n_nowhere;            /* echoes whose coordinates are infinite or NaN, of a broken stream */
     uint64_t n_without_attributes; /* echoes whose attributes were lost */
     uint64_t n_attributes_unheld;  /* echoes with attributes that the recorder has no place for */
     uint64_t n_without_colours;    /* echoes whose colour was lost */
 };
 
-/* Where in its scan the stream is; of track.c alone. */
+/* The place of the stream in its scan; only track.c uses it. */
 struct track_state {
     int new_scan, have_next_line;
     uint32_t next_line, last_station, last_scan;
@@ -61,7 +62,7 @@ struct track {
     struct colour_choice colour;
     /* of the frame that the points at hand are in */
     struct scanhead *sh;    /* of the last frame of any kind */
-    struct scanhead *named; /* of all heads in a scene, which have the same labels, the one that names most of them */
+    struct scanhead *named; /* heads in a scene have the same labels: the head that names most of them */
     uint32_t n_named;
     struct scanhead_info info;
     struct station_pose pose;
@@ -95,13 +96,13 @@ struct track {
     struct track_state state;
 };
 
-/* A new frame of the stream. SH_EFORMAT where the stream goes to what one file can't hold: another CRS,
- * another kind of heights, a head that begins or ceases to move or to send (wanted) attributes or colours, a
- * station number above 65535; where its points have no figure that the colours show. */
+/* Takes a new frame of the stream. SH_EFORMAT if one file can't hold what the stream goes on with: another CRS or
+ * kind of heights, a head that begins or ceases to move or to send (wanted) attributes or colours, a station
+ * number above 65535. SH_EFORMAT also if its points lack the figure that the colours show. */
 int track_frame(struct track *track, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
 
-/* 1 where an echo's position is infinite or no number: a broken stream's. It is counted, and to be left out. Points come
- * out of the track with finite coordinates; a recorder that transforms them asks again. */
+/* 1 where an echo's position is infinite or NaN, as in a broken stream. It is counted, and the caller leaves it out.
+ * Points come out of the track with finite coordinates; a recorder that transforms them asks again. */
 static inline int track_is_nowhere(struct track *track, double x, double y, double z)
 {
     if ((x - x) + (y - y) + (z - z) == 0) return 0; /* a difference is NaN where one of them is not finite */
@@ -109,7 +110,7 @@ static inline int track_is_nowhere(struct track *track, double x, double y, doub
     return 1;
 }
 
-/* At the end: gives out the points that still wait for what follows them. */
+/* At the end: gives out the points that still wait for attributes or colours. */
 int track_flush(struct track *track, struct sh_err *err);
 void track_free(struct track *track);
 

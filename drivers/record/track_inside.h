@@ -7,14 +7,14 @@
 
 /* Whether frames that follow the points are wanted, and sent. */
 int track_waits(const struct track *track);
-/* Before the points of a frame; none wait any more. SH_ENOMEM. */
+/* To be called before the points of a frame, when no points wait any more. SH_ENOMEM. */
 int track_begin_waiting(struct track *track, struct sh_err *err);
 /* Keeps the n points of the batch. */
 void track_keep(struct track *track, int n);
 /* Gives out the n points of the batch, with the colours that are made here. */
 int track_give(struct track *track, int n, struct sh_err *err);
-/* Frames of attributes and of colours: with the last that is waited for, points come out. Those of points that were
- * lost are passed over. */
+/* Takes frames of attributes and of colours. With the last one that points wait for, these come out. Attributes and
+ * colours of lost points are skipped. */
 int track_attributes(struct track *track, const struct scanhead_frame *frame, struct sh_err *err);
 int track_colours(struct track *track, const struct scanhead_frame *frame, struct sh_err *err);
 

@@ -58,7 +58,7 @@ int track_give(struct track *t, int n, struct sh_err *err)
     return t->ops->points(t->rec, n, err);
 }
 
-/* What point k of those that wait takes along, as point n of the batch. */
+/* Gives point n of the batch the attributes and the colour of waiting point k, and counts lost ones. */
 static void take_along(struct track *t, uint32_t k, int n)
 {
     static const struct scanhead_attribute none = {(double)NAN, (double)NAN};

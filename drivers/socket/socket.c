@@ -61,7 +61,7 @@ static int accept_next(int listener, int *reserve, int *fd, struct sockaddr *at,
 
 int socket_accept(int listener, int *reserve, int *fd, struct sockaddr_storage *from, socklen_t *len)
 {
-    /* One link at a time: another's client could take the descriptor that is given up, and the reserve would be lost. */
+    /* One link at a time: else another link's client could take the descriptor that is given up for a moment. */
     static pthread_mutex_t turn = PTHREAD_MUTEX_INITIALIZER;
     pthread_mutex_lock(&turn);
     const int came = accept_next(listener, reserve, fd, (struct sockaddr *)from, len);
@@ -150,7 +150,7 @@ ssize_t socket_write(int fd, const void *buf, size_t len)
     return SH_ECLOSED;
 }
 
-/* Linux: without an address to connect to, a connection is reset. */
+/* On Linux connecting to AF_UNSPEC resets the connection. */
 void socket_break(int fd)
 {
     const struct sockaddr none = {.sa_family = AF_UNSPEC};

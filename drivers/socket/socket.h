@@ -31,10 +31,10 @@ int socket_error_code(int error);
 
 /* A descriptor to be given up for a moment when there are no more; -1: none is left. */
 int socket_reserve(void);
-/* The next client of a listener. Returns 1 with its descriptor, which does not block; or with -1 where it was turned
- * away, as the process or the system has no descriptor for it. It would wake who waits for the listener again and again
- * otherwise. 0: there is none. reserve: socket_reserve()'s; its owner closes it. from may be NULL.
- * Listeners in several threads take turns. */
+/* The next client of a listener. 0: there is none. 1: *fd is its descriptor, which does not block, or -1 where the
+ * process or the system had no descriptor left. Such a client is turned away, since it would wake the listener's thread
+ * again and again otherwise. reserve: socket_reserve()'s; its owner closes it. from may be NULL. Listeners in several
+ * threads take turns. */
 int socket_accept(int listener, int *reserve, int *fd, struct sockaddr_storage *from, socklen_t *len);
 
 /* An address as "127.0.0.1:40123" or "[::1]:40123"; that of a Unix socket's client as "a local client". */
@@ -44,15 +44,15 @@ void socket_address_text(const struct sockaddr *address, socklen_t len, char *te
  * without a word ends the connection after about 25 s. With bytes under way to it, that takes until the
  * system gives up repeating them (Linux: some 15 minutes). */
 void socket_tune(int fd);
-/* After socket_tune, for a peer that always reads: about 25 s with bytes under way, too. It also cuts off a
- * peer that only rests for that long. */
+/* After socket_tune, for a peer that always reads: the connection ends after about 25 s with bytes under way, too.
+ * That also cuts off a peer that only pauses for so long. */
 void socket_tune_impatient(int fd);
 
 /* Connected sockets, never blocking and never raising SIGPIPE. Bytes moved; 0: none now; SH_ECLOSED: end of
  * stream, reset or any other failure. */
 ssize_t socket_read(int fd, void *buf, size_t len);
 ssize_t socket_write(int fd, const void *buf, size_t len);
-/* Breaks a connected TCP socket: its peer sees a reset, and what it has not taken is lost. The descriptor stays. */
+/* Breaks a connected TCP socket: its peer sees a reset, and loses what it has not taken. The descriptor stays. */
 void socket_break(int fd);
 /* Reads and throws away what has come, so that closing the socket does not reset the connection. A peer that sends
  * faster than this reads is not waited for. */
@@ -61,8 +61,8 @@ void socket_drain(int fd);
 /* The state of a connected socket, from the events of poll(2). */
 enum socket_state {
     SOCKET_OPEN,  /* bytes may come, or are there */
-    SOCKET_SHUT,  /* the peer sends nothing more, and all of it was read; it may still read. Linux can't tell one that
-                   * has closed a TCP socket from it before something is written */
+    SOCKET_SHUT,  /* the peer sends nothing more, and all of it was read; the peer may still read. On Linux a peer that
+                   * has closed its TCP socket looks the same until something is written to it */
     SOCKET_ENDED, /* the peer is gone and nothing is left to read */
 };
 enum socket_state socket_state(int fd, short revents);

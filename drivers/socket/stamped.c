@@ -30,7 +30,7 @@ void stamped_enable(int fd)
     setsockopt(fd, SOL_SOCKET, SO_TIMESTAMPNS, &one, sizeof one);
 }
 
-/* The kernel's time; where it gave none, the time of reading: stamped_begin. */
+/* The kernel's time or, where it gave none (see stamped_begin), the time of reading. */
 static int64_t time_of(const struct cmsghdr *c)
 {
     struct timespec t;
@@ -147,7 +147,7 @@ int stamped_open(const char *host, int port, struct stamped_socket *out, struct 
     return rc;
 }
 
-/* Where the datagram went to, when it came, and what was thrown away before. */
+/* Reads the datagram's destination, its time, and how many were thrown away before it. */
 static void read_notes(struct msghdr *m, struct stamped_datagram *out)
 {
     for (struct cmsghdr *c = CMSG_FIRSTHDR(m); c != NULL; c = CMSG_NXTHDR(m, c)) {
@@ -220,7 +220,7 @@ void stamped_begin(struct stamped_socket *keeper)
 
 /* ---- streams */
 
-/* Nobody listens, and the system chose the port that was asked for: TCP then connects a socket to itself. */
+/* Where nobody listens and the system chose that same port for us, TCP connects the socket to itself. */
 static int is_own_end(int fd)
 {
     struct sockaddr_storage own = {0}, peer = {0};

@@ -20,9 +20,9 @@ struct stamped_socket {
     socklen_t own_len;
 };
 
-/* host: an address of this machine, 0.0.0.0 or :: for all of them, a broadcast, or a group, with %INTERFACE where
- * the route to it is not the way. Groups and 255.255.255.255 may be read by others at the same time. port 0: the system
- * chooses. SH_EINPUT (the address, the port is taken), SH_EPERM, SH_EIO. */
+/* host: an address of this machine, 0.0.0.0 or :: for all of them, a broadcast, or a group; a group may have %INTERFACE
+ * where its route leads elsewhere. Groups and 255.255.255.255 may be read by others at the same time. port 0: the
+ * system chooses. SH_EINPUT (the address, the port is taken), SH_EPERM, SH_EIO. */
 int stamped_open(const char *host, int port, struct stamped_socket *out, struct sh_err *err);
 
 struct stamped_datagram {
@@ -39,16 +39,17 @@ int stamped_take(const struct stamped_socket *socket, void *buf, size_t room, st
 uint64_t stamped_dropped(const struct stamped_socket *socket);
 void stamped_close(struct stamped_socket *socket);
 
-/* The kernel stamps what comes only some time after a socket first asked it to; what came before has the time of reading.
- * Waits until it does, a second at most. `keeper` keeps it at it until it is closed. Without a loopback nothing waits. */
+/* Waits until the kernel stamps what comes, a second at most: it begins some time after a socket first asked it to.
+ * Earlier bytes have the time of reading. While `keeper` is open the kernel goes on stamping. Without a loopback it
+ * does not wait. */
 void stamped_begin(struct stamped_socket *keeper);
 
 /* ---- streams */
 
-/* Connects, and waits for that at most so long (0: as long as the system does), or until a signal comes. *fd does not
- * block from then on. */
+/* Connects. Waits for at most timeout_ms (0: as long as the system does), or until a signal comes. *fd does not block
+ * from then on. */
 int stamped_connect(const char *host, int port, int timeout_ms, int *fd, struct sh_err *err);
-/* Times of what comes on a socket of socket.h, from now on. */
+/* Has a socket of socket.h report times of what comes, from now on. */
 void stamped_enable(int fd);
 /* Bytes; *t_ns: when the last of them came. 0: none now. SH_ECLOSED: the end of the stream. SH_ERESET: the connection
  * broke. */

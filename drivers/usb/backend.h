@@ -26,11 +26,11 @@ struct usb_backend_spec {
     int retry_ms;     /* with attach: time between attempts to come back after the host has let go; 0: 1000 */
 };
 
-/* What fault() of a back end does. UNPLUG: the device and its endpoint are not there until PLUG. RESET: sessions end as
+/* Faults of fault(). UNPLUG: the device and its endpoint are not there until PLUG. RESET: sessions end as
  * by a reset of the bus, or as near to that as the back end's host can be brought. */
 enum usb_fault { USB_FAULT_UNPLUG, USB_FAULT_PLUG, USB_FAULT_RESET };
 
-/* Of the faults that concern transfers and requests. Unplugging and resets all back ends can. */
+/* Injected faults of transfers and requests, which a back end may lack. All back ends can unplug and reset. */
 enum { USB_CAN_STALL = 1, USB_CAN_SHORTEN = 2, USB_CAN_ENUMERATE_WRONG = 4 };
 
 struct usb_backend_ops {
@@ -52,23 +52,23 @@ struct usb_backend_ops {
     int (*handle)(void *backend, const struct pollfd *fds, int n, int (*go_on)(void *ctx), void *ctx);
     int (*more)(const void *backend); /* NULL: poll(2) says it all */
 
-    /* One line that whoever runs the head should know, each only once; NULL: nothing. Valid until the next
-     * call. The member itself is NULL for a back end that never has any. */
+    /* One line for the person who runs the head, each only once; NULL: nothing. Valid until the next call. The
+     * member itself is NULL for a back end that never has any. */
     const char *(*news)(void *backend);
-    /* Who was turned away since the last call, as there was no descriptor for it; NULL: nobody. NULL as a member: nobody
-     * comes. */
+    /* The client turned away since the last call for want of a descriptor; NULL: none. The member itself is NULL for
+     * a back end without clients. */
     const char *(*refused)(void *backend);
 
     /* Sends what the core has completed, as far as the wire takes it. After usb_device_write and
      * usb_device_read. */
     void (*flush)(void *backend);
 
-    /* When handle() has something to do though no descriptor is ready, ns of usb_now_ns(); INT64_MAX: never. NULL:
-     * never. */
+    /* Time of usb_now_ns(), in ns, at which handle() has work though no descriptor is ready; INT64_MAX: never. The
+     * member itself is NULL for a back end that never has. */
     int64_t (*due_ns)(const void *backend);
 
-    /* Faults on request; the others are the device core's. `faults`: USB_CAN_… of those that reach the host through
-     * this back end. fault() returns 0, or SH_ESTATE: it can't be done now. */
+    /* Injected faults. `faults`: USB_CAN_… of those that the device core makes and that reach the host through this
+     * back end. fault() returns 0, or SH_ESTATE: it can't be done now. */
     uint32_t faults;
     int (*fault)(void *backend, enum usb_fault what);
 
@@ -97,9 +97,9 @@ int usb_backend_accept(int listener, struct usb_door *door);
 /* As the member `refused`. */
 const char *usb_backend_refused(struct usb_door *door);
 
-/* The address that a socket of usb_backend_socket is connected to, and connecting to it again, without
- * waiting and without looking up names. 0: *fd is connected. EINPROGRESS: it will be when poll(2) finds it
- * writable; usb_backend_connect_error then says how it went. Any other errno: *fd is -1. backend_socket.c */
+/* The address that a socket of usb_backend_socket is connected to. usb_backend_connect connects to it again,
+ * without waiting or looking up names. 0: *fd is connected. EINPROGRESS: once poll(2) finds *fd writable,
+ * usb_backend_connect_error says how it went. Any other errno: *fd is -1. backend_socket.c */
 struct usb_backend_address {
     struct sockaddr_storage at;
     socklen_t len;

@@ -23,7 +23,7 @@ int usb_backend_connect(const struct usb_backend_address *to, int *fd)
     return error;
 }
 
-/* Where nobody listens on a port of this machine, TCP may connect a socket to itself, from that very port. */
+/* Where nobody listens on a port of this machine, TCP may connect a socket to itself, from that same port. */
 static int is_own(int fd)
 {
     struct sockaddr_storage here = {0}, there = {0};

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Control requests: chapter 9, strictly. What the specification leaves open, or says is not specified,
- * stalls.
+/* Control requests: chapter 9, strictly. Requests that the specification leaves open stall.
  *
  * Not supported, and said so by stalling: remote wake-up, latency tolerance messages, test modes (there is no
  * transceiver to test), SET_DESCRIPTOR, SYNCH_FRAME (no isochronous endpoints). */

@@ -26,7 +26,7 @@ enum {
     LATER = 0,               /* a length that patch16 puts in at the end */
 };
 
-/* What does not fit is counted and not written. */
+/* Bytes that do not fit are counted and not written. */
 struct sink {
     uint8_t *out;
     size_t room, len;
@@ -93,7 +93,7 @@ size_t usb_describe_device(const struct usb_model *model, const struct usb_ident
     return to.len;
 }
 
-/* What the device would be at the other one of full and high speed. */
+/* Describes the device at the other one of full and high speed. */
 size_t usb_describe_qualifier(const struct usb_model *model, const struct usb_identity *id, enum usb_rate rate,
                               uint8_t *out, size_t room)
 {

@@ -4,8 +4,8 @@
  * what concerns our own interfaces comes as events on ep0. The core hears of a configuration as if it had
  * answered the requests itself.
  *
- * A device that is nothing but a port has no ep0 of ours: the kernel's f_acm is all of it. What the host does then
- * shows in the state of the controller, and in a port that is hung up. */
+ * A device that is only a port has no ep0 of ours: the kernel's f_acm is all of it. Then the state of the controller,
+ * and the hang-up of the port, show what the host does. */
 #include <errno.h>
 #include <fcntl.h>
 #include <linux/usb/functionfs.h>
@@ -102,7 +102,7 @@ static void disable(struct functionfs *self, int unplugged)
     ffs_console_stop(&self->console);
 }
 
-/* The controller names endpoints, and not every one has those that the model asks for. */
+/* The controller chooses the endpoints' addresses, and some controllers lack those that the model asks for. */
 static void look_at_addresses(struct functionfs *self)
 {
     uint8_t given = 0;
@@ -138,8 +138,8 @@ static void stall(struct functionfs *self, int in)
 }
 
 /* The kernel has put its own numbers in wIndex: interfaces count from 0, endpoints from 1 in the order of our
- * descriptors. To the model's. An endpoint that nobody described becomes endpoint 0, and no function answers
- * for it. */
+ * descriptors. This puts the model's numbers there. An unknown endpoint becomes endpoint 0, for which no function
+ * answers. */
 static void translate_index(const struct functionfs *self, struct usb_ctrlrequest *setup)
 {
     const unsigned index = le_get16(&setup->wIndex), recipient = setup->bRequestType & USB_RECIP_MASK;
@@ -168,7 +168,7 @@ static void answer(struct functionfs *self, struct usb_ctrlrequest setup)
     if (n == USB_STALL) stall(self, in);
 }
 
-/* Without ep0: what the controller's state says, now and since. A port that is hung up was down in between. */
+/* Without ep0: follows the controller's state. If the port was hung up, the device was not configured in between. */
 static void take_state(struct functionfs *self, int hung_up)
 {
     char text[32];
@@ -221,8 +221,8 @@ static int functionfs_handle(void *backend, const struct pollfd *fds, int n, int
     int going = go_on(ctx), any = 1;
     const int hung_up = fds[AT_TTY].fd == self->console.fd && (fds[AT_TTY].revents & POLLHUP) != 0;
     if (going && self->ep0 < 0 && (fds[AT_EP0].revents != 0 || hung_up)) take_state(self, hung_up);
-    /* What came on the endpoints came before the event on ep0: a session is not closed before its last data
-     * are in. */
+    /* Data on the endpoints came before the event on ep0. So they are taken first: a session is not closed before
+     * its last data are in. */
     for (int events = 0; going && any && events < MAX_EVENTS; events++) {
         int taken = 0;
         for (; going && taken < MAX_TAKEN && ffs_pipes_take(&self->pipes); taken++)
@@ -251,7 +251,7 @@ static int functionfs_more(const void *backend)
     return self->backlog;
 }
 
-/* ---- faults on request */
+/* ---- injected faults */
 
 static int unplug(struct functionfs *self)
 {
@@ -271,7 +271,7 @@ static int plug(struct functionfs *self)
     return SH_OK;
 }
 
-/* A gadget has no word of a reset: it leaves its controller, and is back at once. */
+/* A gadget can't report a reset. So it leaves its controller, and is back at once. */
 static int functionfs_fault(void *backend, enum usb_fault what)
 {
     struct functionfs *self = backend;

@@ -39,7 +39,7 @@ int ffs_console_open(struct ffs_console *console, struct usb_device *device, int
     return SH_OK;
 }
 
-/* As the host's driver would: the kernel's function does not report it. */
+/* Opens or closes the session as a host's driver does by DTR, which the kernel's function does not report. */
 static void set_session(struct ffs_console *console, int open)
 {
     struct usb_ctrlrequest setup = {.bRequestType = USB_DIR_OUT | USB_TYPE_CLASS | USB_RECIP_INTERFACE,
@@ -58,8 +58,8 @@ static void offer_tx(struct ffs_console *console)
     usb_device_submit(console->device, &console->tx);
 }
 
-/* The tty passes its bytes on in up to 16 requests, one per write. Only then does its buffer fill and show
- * that nobody takes them. So a small amount is written in many pieces. */
+/* The tty passes its bytes on in up to 16 requests, one per write. Only when these are used up does its buffer
+ * fill and show that nobody takes the bytes. So a small amount is written in many pieces. */
 static void write_tx(struct ffs_console *console)
 {
     if (console->lead_pos < console->lead_len) {

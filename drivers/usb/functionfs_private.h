@@ -12,10 +12,10 @@
 
 enum { FFS_SLOTS = 8, FFS_SLOT_BYTES = 32768, FFS_MAX_PIPES = 8, FFS_MAX_FAILURES = 16 };
 
-/* A slot is a buffer that goes round. IN: it waits at the core as if a host had asked for that much, is
- * filled, and is written to the kernel. OUT: it is read from the kernel, and waits at the core until the
- * function has read it. On an endpoint that is down the kernel gives it back at once; then it is idle until
- * the next configuration comes up. */
+/* A slot is a buffer that goes back and forth between core and kernel. IN: it waits at the core as if a host
+ * had asked for that much, is filled, and is written to the kernel. OUT: it is read from the kernel, and waits
+ * at the core until the function has read it. On an endpoint that is down the kernel gives it back at once;
+ * then it is idle until the next configuration comes up. */
 enum ffs_slot_state { FFS_IDLE, FFS_AT_CORE, FFS_AT_KERNEL };
 
 struct ffs_slot {
@@ -48,12 +48,12 @@ struct ffs_pipes {
 
 /* Opens the endpoints of the part, in the order of its descriptors. */
 int ffs_pipes_open(struct ffs_pipes *pipes, struct usb_device *device, const struct gadget *gadget, struct sh_err *err);
-/* The configuration has come up: everything goes round. */
+/* The configuration has come up: puts all slots to use. */
 void ffs_pipes_start(struct ffs_pipes *pipes);
 void ffs_pipes_stop(struct ffs_pipes *pipes);
 /* Takes one completion; 0: there is none. */
 int ffs_pipes_take(struct ffs_pipes *pipes);
-/* What was handed to the kernel in a session that is over is taken back: it is not for the next one. */
+/* Takes back what was handed to the kernel in a session that is over, so that the next one does not get it. */
 void ffs_pipes_withdraw(struct ffs_pipes *pipes);
 /* The core gives a transfer of a slot back. */
 void ffs_pipes_complete(struct ffs_pipes *pipes, struct usb_transfer *transfer);
@@ -67,9 +67,9 @@ uint8_t ffs_pipes_moved(const struct ffs_pipes *pipes, uint8_t *given);
 uint8_t ffs_pipes_address(const struct ffs_pipes *pipes, unsigned number);
 
 /* The console. The kernel's f_acm does not report DTR. So a session begins with the first bytes of the host,
- * and ends when the host has taken none of the waiting bytes for one or two seconds. What the tty holds by
- * then can't be taken back. The next reader gets that first, cut within a frame, and then a frame of its own
- * that brings it into step. */
+ * and ends when the host has taken none of the waiting bytes for one or two seconds. What the tty then still
+ * holds can't be taken back. The next reader gets it first, cut within a stream frame, and then a frame of its
+ * own that brings it into step. */
 struct ffs_console {
     struct usb_device *device;
     int fd;    /* of the tty; -1: not plugged in, or no console */
@@ -102,9 +102,9 @@ struct functionfs {
     struct usb_device *device;
     struct gadget gadget;
     int ep0;         /* -1: nothing of the device is FunctionFS's */
-    char moved[200]; /* of endpoints that are not where the device has them; to be told once */
+    char moved[200]; /* message about endpoints with other addresses than the device's; reported once */
     int moved_due;
-    char unplugged[256]; /* on request, from this controller; empty: it is not */
+    char unplugged[256]; /* unplugged from this controller by an injected fault; empty: it is not */
     int backlog;         /* stopped before everything was looked at */
     struct ffs_pipes pipes;
     struct ffs_console console;

@@ -63,7 +63,7 @@ static int started_at(long pid, unsigned long long *ticks)
     return -1;
 }
 
-/* Its maker is gone: there is no such process, or it is another one that got the number since. */
+/* Whether the process that made it is gone: there is none of that number, or a later one has got the number. */
 static int is_left_behind(const char *name)
 {
     long pid;
@@ -204,8 +204,8 @@ static int write_configuration(const struct gadget *gadget, const struct usb_mod
            (usb_describe_ms_os(model, NULL, 0) != 0 ? write_os_descriptors(dir, model) : 0);
 }
 
-/* The model's protocol for f_acm, which reports AT commands (1) by itself. Older kernels can't be told (Debian's 6.1), newer ones
- * (6.12) only before the function is in a configuration. */
+/* Sets the model's protocol for f_acm, which reports AT commands (1) by default. Older kernels (Debian's 6.1) can't set
+ * it, newer ones (6.12) only before the function is in a configuration. */
 static int set_console_protocol(const struct gadget *gadget, const struct usb_model *model, struct sh_err *err)
 {
     char file[96];

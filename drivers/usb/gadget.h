@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* A USB gadget of the Linux kernel, made through configfs: identity, strings, one configuration, FunctionFS
- * for what this program does itself, if there is any, and f_acm for a CDC-ACM console. Private to the functionfs
- * back end.
+/* A USB gadget of the Linux kernel, made through configfs: identity, strings, one configuration, f_acm for a
+ * CDC-ACM console, and FunctionFS for all other interfaces, if there are any. Private to the functionfs back
+ * end.
  *
  * Why f_acm: FunctionFS takes no class-specific interface descriptors (type 24h), without which no host knows
  * a CDC console. The kernel's has them; what it lacks is described in functionfs_private.h. */
@@ -17,7 +17,7 @@ struct gadget {
     char udc[256];  /* empty: not bound */
     int tty_number; /* /dev/ttyGSn; -1: no console */
     int state_fd;   /* of its controller's state, where there is no FunctionFS to report it; -1: none */
-    /* What FunctionFS carries, numbered from 0 as it wants it: the model without the console. */
+    /* The part of the model that FunctionFS carries: all but the console, numbered from 0 as FunctionFS wants it. */
     struct usb_model part;
     struct usb_interface_row row[USB_MAX_INTERFACES];
     struct usb_function_row function[USB_MAX_INTERFACES];
@@ -40,13 +40,13 @@ int gadget_describe(const struct gadget *gadget, int ep0, const struct usb_ident
 int gadget_bind(struct gadget *gadget, const char *udc, struct sh_err *err);
 /* Without FunctionFS, after binding: state_fd, which poll(2) reports with POLLPRI when the state has changed. */
 int gadget_watch_state(struct gadget *gadget, struct sh_err *err);
-/* The host has configured it. before: what was said last, which still holds while the bus is suspended. */
+/* Whether the host has configured it. before: the last answer, which still holds while the bus is suspended. */
 int gadget_is_configured(const struct gadget *gadget, int before);
 /* "full", "high", "super". */
 const char *gadget_rate_name(enum usb_rate rate);
 /* 0: its controller sees no host. */
 int gadget_is_on_bus(const struct gadget *gadget);
-/* Of the bus it is on. */
+/* The rate of the bus it is on. */
 enum usb_rate gadget_rate(const struct gadget *gadget);
 /* SH_EINPUT: the controller it is bound to is not as fast. */
 int gadget_check_rate(const struct gadget *gadget, enum usb_rate wanted, struct sh_err *err);

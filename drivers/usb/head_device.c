@@ -22,7 +22,7 @@ static void set_open(struct scanhead_usb *head, int index, int open)
 
 /* ---- requests */
 
-/* Any rate is taken: there is no line whose speed it could be. */
+/* Any rate is accepted: there is no serial line that it could apply to. */
 static int set_line_coding(struct scanhead_usb *head, const uint8_t *data)
 {
     if (data == NULL) return 0;

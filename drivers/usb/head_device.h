@@ -1,10 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* The head as a USB device, in one of its looks (looks.h): what of the host's requests and data begins and ends the
- * sessions, and the requests of a CDC-ACM port.
+/* The head as a USB device, with one of its USB identities, called looks (looks.h). Requests and data of the host begin
+ * and end sessions; requests to a CDC-ACM port are answered.
  *
- * Native: both the console and the stream take commands and give replies and frames. Sessions end when their
- * interface goes away, and otherwise as looks.h says of what began them. The request that begins the stream, while
- * one is open, ends it and begins another. */
+ * Native: both the console and the stream take commands and give replies and stream frames. Sessions end when their
+ * interface goes away; looks.h says what else ends them. The request that begins the stream ends an open one first. */
 #ifndef DRIVERS_USB_HEAD_DEVICE_H
 #define DRIVERS_USB_HEAD_DEVICE_H
 
@@ -13,7 +12,7 @@
 /* A session as the host sees it. */
 struct scanhead_usb_session {
     int open;
-    int again;     /* opened again while open: opens once more when its end has been reported */
+    int again;     /* the host opened it while it was open: it opens again once its end has been reported */
     int state_due; /* the serial state is still to be sent: the port came to life, or DTR rose */
 };
 
@@ -22,19 +21,19 @@ struct scanhead_usb {
     struct usb_device *device;
     struct scanhead_usb_session session[USB_MAX_SESSIONS]; /* look->n_sessions of them */
     uint8_t line_coding[7];
-    int cut_due; /* the bus has ended a session that its host had not; scanhead_usb_cut says why */
+    int cut_due; /* the bus, not the host, has ended a session; scanhead_usb_cut says why */
     enum usb_end cut;
 };
 
 /* Makes the device of head, which must be zeroed and stay where it is. usb_device_free(head->device). */
 int scanhead_usb_create(const struct usb_look *look, const struct usb_identity *id, struct scanhead_usb *head,
                         struct sh_err *err);
-/* What follows from the host's transfers rather than its requests: a session that begins with data, the
- * notification of a port. To be called after each of them. */
+/* Does what follows from the host's transfers rather than from its requests: begins a session by data, sends the
+ * notification of a port. To be called after each transfer. */
 void scanhead_usb_update(struct scanhead_usb *head);
 /* One line, each only once: what has cut sessions off. NULL: nothing. */
 const char *scanhead_usb_cut(struct scanhead_usb *head);
-/* The end of a session has been reported to whoever serves it. */
+/* To be called once the end of a session has been reported to its owner. */
 void scanhead_usb_ended(struct scanhead_usb *head, int session);
 
 #endif

@@ -3,7 +3,7 @@
 
 #include <linux/usb/cdc.h>
 
-/* bInterfaceProtocol: no AT commands (1). Modem managers send those to every port that says it takes them. */
+/* bInterfaceProtocol: not 1, which means AT commands. Modem managers send these to every port of protocol 1. */
 enum { PORT_PROTOCOL = USB_CDC_PROTO_NONE };
 
 /* ---- a CDC-ACM port, on interfaces 0 and 1: the console of the native look, all of the hokuyo look */
@@ -142,7 +142,7 @@ static const struct usb_model sick_model = {
     .fixed_addresses = 1,
 };
 
-/* Its clients tell it nothing when they come or go. */
+/* Clients do not report when they come or go. */
 static const struct usb_session_row sick_sessions[] = {
     {"usb telegrams", TELEGRAM_INTERFACE, TELEGRAM_INTERFACE, TELEGRAM_IN, TELEGRAM_OUT, 0, USB_BEGINS_DATA}};
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a head looks like on USB: as itself, or as one of the devices whose protocol it speaks. Each is data: a
+/* USB identities of a head ("looks"): its own, and those of the devices whose protocols it speaks. Each is data: a
  * model (usb.h), ids, and where its sessions are.
  *
  *   look     from protocol   what the host sees
@@ -9,8 +9,8 @@
  *
  * Sources. URG series: ids, strings and "no serial number" as heads of several years report them to Linux
  * (UrgNetwork/urg_library issue 29; udev rules in use name the strings). TiM: `lsusb -v` of a TiM571
- * (uos/sick_tim issue 29); endpoints as sick_tim uses them. What was not seen of them is as in the native look:
- * of the URG the endpoints' numbers and sizes, and the power it asks for. */
+ * (uos/sick_tim issue 29); endpoints as sick_tim uses them. Not known of the URG, and so taken from the native look,
+ * are the endpoints' numbers and sizes, and the power it asks for. */
 #ifndef DRIVERS_USB_LOOKS_H
 #define DRIVERS_USB_LOOKS_H
 
@@ -29,7 +29,7 @@ enum {
 /* Numbers of the native look. The port of the hokuyo look has those of the console. */
 enum { CONSOLE_INTERFACE, CONSOLE_DATA_INTERFACE, STREAM_INTERFACE };
 enum { CONSOLE_NOTIFY = 0x82, CONSOLE_IN = 0x81, CONSOLE_OUT = 0x01, STREAM_IN = 0x83, STREAM_OUT = 0x03 };
-/* And of the sick look. */
+/* Numbers of the sick look. */
 enum { TELEGRAM_INTERFACE = 0, TELEGRAM_IN = 0x81, TELEGRAM_OUT = 0x02 };
 
 /* What begins a session. */
@@ -43,7 +43,7 @@ enum { USB_MAX_SESSIONS = 2 };
 
 struct usb_session_row {
     const char *name;  /* for the log */
-    uint8_t interface; /* which requests and ends are about */
+    uint8_t interface; /* the one that begins and ends the session */
     uint8_t also;      /* a second interface of the session, or the same */
     uint8_t in, out;   /* endpoints */
     uint8_t notify;    /* of a CDC-ACM port: its interrupt endpoint; 0: none */

@@ -29,8 +29,8 @@ static void digest_text(const char *text, size_t len, uint8_t digest[SHA256_DIGE
     sha256_digest(&ctx, SHA256_DIGEST_SIZE, digest);
 }
 
-/* A machine has an id for good (machine-id(5), which asks not to show it as it is), or at least one until it is
- * started again. */
+/* A machine has a permanent id, or at least one until it is started again. machine-id(5) asks not to show the id, so it
+ * is hashed. */
 static void put_serial(struct usb_identity *id, const char *whose, unsigned place)
 {
     char machine[64], text[400];

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A head's own USB identity, where none is configured: a serial number that is the same whenever it starts again, and a
- * number among the USB heads that run on this machine, for the bus id of USB/IP.
+/* A head's own USB identity, where none is configured. It has a serial number, which is the same whenever the head
+ * starts again, and a number among the USB heads that run on this machine, for the bus id of USB/IP.
  *
  * The serial number follows from the machine and from whose head it is (its configuration). So it does not depend on
  * which other heads run. Where several of the same configuration run at a time, the second and later ones have serial
@@ -12,7 +12,7 @@
 
 enum { USB_MAX_HEADS = 126 }; /* USB/IP shows them as devices 2 to 127 of one bus */
 
-/* Descriptors that hold what a head has for itself, until they are closed; -1: none. */
+/* Descriptors that reserve a head's number and serial number until they are closed; -1: none. */
 struct usb_claims {
     int number, place;
 };
@@ -20,7 +20,7 @@ struct usb_claims {
 
 /* Sets id->number, and appends to id->serial "-" and eight hexadecimal digits. whose: text that is the same when the
  * head starts again. Heads in different network namespaces don't see each other. SH_EINPUT: all numbers are taken;
- * SH_EIO. What was claimed is to be given up in both cases. */
+ * SH_EIO. The caller gives up the claims in both cases. */
 int usb_own_identity(struct usb_identity *id, const char *whose, struct usb_claims *claims, struct sh_err *err);
 void usb_give_up(struct usb_claims *claims);
 

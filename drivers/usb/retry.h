@@ -19,7 +19,7 @@ struct usb_retry {
 /* pace_ms 0: USB_RETRY_MS. what: "usbip", for errors. */
 int usb_retry_open(struct usb_retry *retry, const char *what, int pace_ms, struct sh_err *err);
 void usb_retry_close(struct usb_retry *retry);
-/* The host is gone: an attempt is due every pace_ms from now. SH_EIO: there can't be any. */
+/* The host is gone: an attempt is due every pace_ms from now. SH_EIO: the timer can't be set. */
 int usb_retry_start(struct usb_retry *retry);
 /* After poll(2) on the timer: 1 when an attempt is due. */
 int usb_retry_is_due(struct usb_retry *retry, short revents);

@@ -11,14 +11,14 @@
  *   usb_device_submit, usb_device_cancel     a bulk or interrupt transfer of the host, and its withdrawal
  *
  * A transfer is one request of the host's driver (a URB). An IN transfer waits until the function writes, an
- * OUT transfer until the function has read all of it. A real bus does that by NAK. So a function that does
- * not read holds the host back. A transfer belongs to the core from submit until the host's complete() is
+ * OUT transfer until the function has read all of it, as a real bus does by NAK. So a function that does not
+ * read holds the host back. A transfer belongs to the core from submit until the back end's complete() is
  * called with it. That happens exactly once, maybe within submit.
  *
- * IN packets: a transfer ends when it is full, or with a short packet. What one usb_device_write() leaves
- * ends with a short packet, or with one of zero length where it is a whole number of packets. Where the bytes
+ * IN packets: a transfer ends when it is full, or with a short packet. The data of one usb_device_write() end
+ * with a short packet, or with a zero-length packet where they are a whole number of packets. Where they
  * filled the transfer exactly, the zero-length packet ends the next transfer, unless more is written first. On an
- * endpoint of units that next transfer may be one that waits already, and nothing comes before that packet. A
+ * endpoint of units the zero-length packet always comes first, at once if a transfer waits already. A
  * transfer whose rest is smaller than the next packet fails with USB_OVERFLOW, as on a real bus. That packet
  * stays with the function: nothing is lost.
  *
@@ -53,7 +53,7 @@ struct usb_endpoint_row {
     uint16_t packet[USB_N_RATES]; /* wMaxPacketSize by rate */
     uint8_t interval[USB_N_RATES];
     uint8_t burst; /* super speed: bMaxBurst */
-    uint8_t units; /* IN: what one write leaves is a unit, whose end comes at once */
+    uint8_t units; /* IN: the data of one write are a unit, whose end goes out at once */
 };
 
 /* One alternate setting of an interface; rows of one interface follow each other, alt 0 first. */
@@ -66,7 +66,7 @@ struct usb_interface_row {
     uint8_t n_endpoints;
 };
 
-/* What belongs together: one driver of the host. */
+/* Interfaces that one driver of the host serves. */
 struct usb_function_row {
     uint8_t first, count; /* interfaces; above 1, in devices of class EF: with an association descriptor */
     uint8_t class, subclass, protocol;
@@ -95,7 +95,7 @@ static inline int usb_is_self_powered(const struct usb_model *model)
     return model->self_powered || model->max_power_ma == 0;
 }
 
-/* What differs from one device of a model to the next. */
+/* Properties in which the devices of a model differ. */
 struct usb_identity {
     uint16_t vid, pid;
     char serial[64];       /* UTF-8; empty: no serial number string */
@@ -118,7 +118,7 @@ size_t usb_describe_string(const struct usb_model *model, const struct usb_ident
                            size_t room);
 /* The Microsoft OS 2.0 descriptor set; 0 without compatible ids. */
 size_t usb_describe_ms_os(const struct usb_model *model, uint8_t *out, size_t room);
-/* Where tables of endpoints have one: 0 to 15 OUT, 16 to 31 IN. */
+/* Index of an endpoint in tables: 0 to 15 OUT, 16 to 31 IN. */
 static inline unsigned usb_endpoint_index(unsigned address)
 {
     return (address & USB_ENDPOINT_NUMBER_MASK) + ((address & USB_DIR_IN) != 0 ? 16u : 0u);
@@ -152,11 +152,11 @@ struct usb_transfer {
 /* Why interfaces ended. Some hosts' drivers don't pass a reset on; they configure the device anew. */
 enum usb_end { USB_END_CONFIGURED, USB_END_RESET, USB_END_UNPLUGGED };
 
-/* What the function gets to know. All may be NULL. Called within the calls of the back end. */
+/* Calls to the function, within the calls of the back end. All may be NULL. */
 struct usb_hooks {
     /* A class or vendor request. OUT: data holds wLength bytes; return 0. IN: fill at most wLength bytes,
-     * return how many. USB_STALL refuses it. OUT with wLength above 0 and data NULL: asked before the data
-     * come; answer as if, and do nothing. The interface or endpoint it names exists in the present
+     * return how many. USB_STALL refuses it. OUT with wLength above 0 and data NULL: the data have not come
+     * yet; answer as if they had, and do nothing. The interface or endpoint it names exists in the present
      * configuration. */
     int (*request)(void *ctx, const struct usb_ctrlrequest *setup, uint8_t *data);
     /* An interface came to life or ended: configuration, alternate setting, reset, unplugging. */
@@ -207,22 +207,22 @@ const struct usb_interface_row *usb_device_row(const struct usb_device *device, 
 /* How often it was attached. */
 uint32_t usb_device_attaches(const struct usb_device *device);
 
-/* ---- faults on request */
+/* ---- injected faults */
 
-/* As a host's reset of the bus, after which it has configured the device again. */
+/* Acts as if the host had reset the bus and configured the device again. */
 void usb_device_restart(struct usb_device *device);
-/* After that, where the host had no transfer pending on the endpoint: its next one ends as these do, so that it learns of
- * the reset. due 0: no more, since a new reader begins. */
+/* After a restart, for an endpoint without a pending transfer: the host's next transfer ends as pending ones did, so
+ * that the host learns of the reset. due 0 takes that back, since a new reader begins. */
 void usb_device_set_gone_due(struct usb_device *device, uint8_t endpoint, int due);
 /* Halts the endpoint, until the host clears it. 0: there is none now. */
 int usb_device_halt(struct usb_device *device, uint8_t endpoint);
 /* IN: each of the next n transfers that carry more than a byte ends in a short packet, about half way; the rest goes
  * into the one after it. Until the interface ends. */
 void usb_device_shorten(struct usb_device *device, uint8_t endpoint, uint32_t n);
-/* How long each control request takes. The back end sees to it. 0: it is answered at once. */
+/* How long each control request takes; the back end makes it wait. 0: it is answered at once. */
 void usb_device_set_slow(struct usb_device *device, double ms);
 double usb_device_slow_ms(const struct usb_device *device);
-/* The configuration says that it is so many bytes longer than it is. For back ends that ask the core for it. */
+/* Makes the configuration descriptor claim n bytes more than it has, with back ends that ask the core for it. */
 void usb_device_lengthen(struct usb_device *device, uint32_t n);
 
 /* ---- for functions. An endpoint that is not there, is halted or suspended has no room and nothing to read. */
@@ -230,14 +230,14 @@ void usb_device_lengthen(struct usb_device *device, uint32_t n);
 /* Bytes taken by waiting IN transfers, maybe 0. */
 size_t usb_device_write(struct usb_device *device, uint8_t endpoint, const void *data, size_t len);
 int usb_device_can_write(const struct usb_device *device, uint8_t endpoint);
-/* Of one epoch at a time. */
+/* Reads bytes of one epoch at a time. */
 size_t usb_device_read(struct usb_device *device, uint8_t endpoint, void *data, size_t len);
-/* Bytes that wait of the oldest transfer; *epoch (may be NULL) is its. */
+/* Unread bytes of the oldest transfer; *epoch (may be NULL) gets its epoch. */
 size_t usb_device_can_read(const struct usb_device *device, uint8_t endpoint, uint32_t *epoch);
-/* What waits on an OUT endpoint and came in an epoch before `epoch` is taken and dropped; returns bytes. */
+/* Drops what waits on an OUT endpoint from epochs before `epoch`; returns how many bytes. */
 size_t usb_device_drop(struct usb_device *device, uint8_t endpoint, uint32_t epoch);
-/* A count the function may raise at borders between its sessions. OUT transfers are stamped with it; a back
- * end that holds IN data on its way takes it back when it has changed. */
+/* A count that the function may raise between two sessions. OUT transfers are stamped with it. When it has
+ * changed, a back end withdraws IN data that are still on their way. */
 uint32_t usb_device_epoch(const struct usb_device *device, uint8_t endpoint);
 void usb_device_next_epoch(struct usb_device *device, uint8_t endpoint);
 

@@ -27,14 +27,14 @@ static void finish(struct usb_device *device, struct usb_pipe *pipe, enum usb_st
     device->complete(device->host_ctx, transfer);
 }
 
-/* Nothing is left to wait for in a transfer of no bytes that has come to the front of a pipe. */
+/* A transfer of no bytes ends as soon as it comes to the front of a pipe. */
 static void finish_empty(struct usb_device *device, struct usb_pipe *pipe)
 {
     while (pipe->first != NULL && pipe->first->length == 0)
         finish(device, pipe, USB_OK);
 }
 
-/* Only what is there now: a back end may submit again from within complete(). */
+/* Finishes only the transfers that are there now: a back end may submit again from within complete(). */
 static void flush(struct usb_device *device, struct usb_pipe *pipe, enum usb_status status)
 {
     struct usb_pipe old = *pipe;
@@ -164,7 +164,7 @@ void usb_device_submit(struct usb_device *device, struct usb_transfer *transfer)
     }
     append(pipe, transfer);
     if (pipe->first != transfer) return;
-    /* Nothing to wait for: no bytes go either way, or the end of what was written before. */
+    /* A transfer of no bytes has nothing to wait for; neither has one that takes the end of the write before. */
     if (transfer->length != 0 && !pipe->zero_due) return;
     pipe->zero_due = 0;
     finish(device, pipe, USB_OK);
@@ -197,7 +197,7 @@ static uint32_t half_of(uint32_t n, uint32_t packet)
     return n / 2 % packet != 0 ? n / 2 : n / 2 - 1;
 }
 
-/* As many whole packets as fit; a packet that does not is not taken. */
+/* Takes as many whole packets as fit; a packet that does not fit is left. */
 static uint32_t fill_transfer(struct usb_pipe *pipe, uint32_t packet, const uint8_t *data, size_t len,
                               enum usb_status *status)
 {

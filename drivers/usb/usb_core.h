@@ -14,8 +14,8 @@ struct usb_pipe {
     uint32_t epoch;
     struct usb_transfer *first, *last;
     uint32_t used;    /* OUT: bytes of the first one already read */
-    uint32_t shorten; /* IN: so many transfers are to end early */
-    int gone_due;     /* the next transfer ends as those that were pending at a reset */
+    uint32_t shorten; /* IN: number of transfers that are still to end early */
+    int gone_due;     /* the next transfer ends like those that were pending at a reset */
 };
 
 struct usb_device {
@@ -31,8 +31,8 @@ struct usb_device {
     int suspended;
     int u1_enabled, u2_enabled;
     uint32_t attaches;
-    double slow_ms;    /* that a control request takes */
-    uint32_t lengthen; /* bytes that the configuration says it has, and hasn't */
+    double slow_ms;    /* how long a control request takes */
+    uint32_t lengthen; /* bytes that the configuration claims and doesn't have */
     uint8_t alt[USB_MAX_INTERFACES];
     struct usb_pipe pipe[32]; /* 0..15 OUT, 16..31 IN; the two of endpoint 0 stay empty */
 };

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a device does wrong on request. How a transfer is shortened is in usb_core.c, what a configuration says of its
- * length in control.c. */
+/* Injected faults of a device. usb_core.c shortens transfers, control.c lengthens the configuration. */
 #include "drivers/usb/usb_core.h"
 
 void usb_device_restart(struct usb_device *device)

@@ -25,7 +25,7 @@ enum { MAX_CONNS = 4, SEND_BUFFER_BYTES = 1 << 20, CLOSE_WAIT_MS = 500 };
 struct usbip {
     struct usb_device *device;
     int here;      /* attached to this machine: nobody else may come */
-    int unplugged; /* on request */
+    int unplugged; /* by an injected fault */
     int listener;  /* -1: none */
     struct usb_door door;
     struct usb_backend_spec served; /* where it listens; once open with the port that it has */
@@ -121,8 +121,8 @@ static int usbip_prepare(void *backend, struct pollfd *fds)
     return N_FDS;
 }
 
-/* A free place, or that of the one which has been here longest without importing: one host at most has
- * imported. */
+/* A free place, or that of the connection that has been here longest without importing. There always is one, since
+ * at most one host has imported. */
 static struct usbip_conn *make_room(struct usbip *self)
 {
     struct usbip_conn *oldest = NULL;
@@ -214,7 +214,7 @@ static int64_t usbip_due_ns(const void *backend)
     return due_ns;
 }
 
-/* ---- faults on request */
+/* ---- injected faults */
 
 static int unplug(struct usbip *self)
 {

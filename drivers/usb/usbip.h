@@ -32,8 +32,8 @@ enum {
     DIR_IN = 1,
 };
 
-/* Where a head is on the server's side: device number + 1 of bus 1 (the bus itself is device 1), in its port
- * `number`, bus id "1-number". */
+/* Place of a head on the server's side: bus 1, device number + 1 (the bus itself is device 1), port `number`, bus
+ * id "1-number". */
 enum { USBIP_BUS = 1 };
 
 #endif

@@ -16,7 +16,7 @@ enum {
     MAX_READS = 256,          /* in one call: a peer that sends without end must not occupy the thread */
 };
 
-/* Where the host's driver forbids short packets, a host controller makes an error of them. */
+/* If the host's driver forbids short packets, they are an error, as in a host controller. */
 static void return_urb(struct usbip_conn *conn, struct usbip_urb *urb, int status, uint32_t actual)
 {
     enum { WIRE_EREMOTEIO = 121 };
@@ -29,7 +29,7 @@ static void return_urb(struct usbip_conn *conn, struct usbip_urb *urb, int statu
     usbip_queue(conn, urb, URB_HEADER + (urb->in ? actual : 0));
 }
 
-/* Linux's numbers, whatever this system's are: they are the protocol's. */
+/* The protocol uses Linux's errno numbers, whatever this system's are. */
 static int errno_of(enum usb_status status)
 {
     enum { WIRE_ECONNRESET = 104, WIRE_EPIPE = 32, WIRE_ESHUTDOWN = 108, WIRE_EOVERFLOW = 75 };
@@ -77,7 +77,7 @@ static void run_control(struct usbip_conn *conn, struct usbip_urb *urb)
         return_urb(conn, urb, 0, urb->in ? (uint32_t)n : urb->room);
 }
 
-/* One after the other: each takes its time. */
+/* Held requests are answered one after the other: each takes the delay that was asked for. */
 static void hold_control(struct usbip_conn *conn, struct usbip_urb *urb)
 {
     const int64_t now_ns = usb_now_ns();

@@ -6,7 +6,7 @@
 #include "drivers/usb/usb.h"
 #include "drivers/usb/usbip.h"
 
-/* As URBs and the virtual host controller name the device: bus and device. */
+/* The number of bus and device, by which URBs and the virtual host controller name the device. */
 uint32_t usbip_devid(const struct usb_device *device);
 
 struct usbip_urb; /* a transfer with its header and bytes */
@@ -15,7 +15,7 @@ struct usbip_conn {
     int fd;          /* -1: free */
     uint64_t number; /* of arrival */
     int imported;
-    int broken; /* to be closed: the peer is gone, or says what it must not */
+    int broken; /* to be closed: the peer is gone, or broke the protocol */
     struct usb_device *device;
     int *taken; /* shared: the device is imported by some connection */
     uint8_t head[URB_HEADER];
@@ -25,26 +25,25 @@ struct usbip_conn {
     struct usbip_urb *out_first, *out_last; /* replies to send */
     uint32_t out_pos;
     struct usbip_urb *slow_first, *slow_last; /* control requests that take their time */
-    uint32_t n_pending, n_unsent;             /* URBs: of the first kind the device has not answered yet */
+    uint32_t n_pending, n_unsent;             /* URBs that the device has not answered; answers not sent yet */
     uint64_t pending_bytes, unsent_bytes;
 };
 
-/* fd is connected and not blocking, and taken over. */
+/* fd is connected and not blocking; the connection owns it from now on. */
 void usbip_conn_start(struct usbip_conn *conn, int fd, struct usb_device *device, int *taken);
-/* As if the device had been imported: for a host that begins with URBs. */
+/* Imports the device without a request, for a host that begins with URBs. */
 void usbip_conn_import(struct usbip_conn *conn);
-/* Reads and acts until nothing is left, go_on says 0 or the connection is full; no longer than some hundred
- * times. */
+/* Reads and acts until nothing is left, go_on returns 0 or the connection is full; some hundred times at most. */
 void usbip_conn_read(struct usbip_conn *conn, int (*go_on)(void *ctx), void *ctx);
-/* Too many replies wait for the host to read them: nothing more is read before. */
+/* Whether so many replies wait for the host that nothing more is read until it takes some. */
 int usbip_conn_is_full(const struct usbip_conn *conn);
 void usbip_conn_write(struct usbip_conn *conn);
 /* Answers control requests whose time has come, until go_on says 0. */
 void usbip_conn_answer_slow(struct usbip_conn *conn, int (*go_on)(void *ctx), void *ctx);
-/* When the next one's has; INT64_MAX: there is none. */
+/* When the next of these is due; INT64_MAX: there is none. */
 int64_t usbip_conn_due_ns(const struct usbip_conn *conn);
-/* Sends what is queued and waits until the peer has taken it and hung up, timeout_ms at most for each step:
- * closing with requests of the peer unread would throw away replies on their way. */
+/* Sends the queue and waits until the peer has taken it and hung up, timeout_ms at most for each step. Closing
+ * with unread requests of the peer would throw away replies on their way. */
 void usbip_conn_drain(struct usbip_conn *conn, int timeout_ms);
 /* Detaches the device if it was imported here, and frees everything. */
 void usbip_conn_end(struct usbip_conn *conn);

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* What a USB/IP client asks before it has the device: which there are (DEVLIST), and one of them (IMPORT). */
+/* Requests of a USB/IP client before it has the device: the list of devices (DEVLIST), and one of them (IMPORT). */
 #include <stdio.h>
 
 #include "drivers/usb/usbip_private.h"
 
-/* Of this head on the server's side: 1 unless it has a number of its own. */
+/* The port of this head on the server's side: 1 unless it has a number of its own. */
 static unsigned port_of(const struct usb_device *device)
 {
     const unsigned number = usb_device_identity(device)->number;

@@ -20,7 +20,7 @@ struct usbip_urb {
     struct usbip_urb *next;
     uint32_t seqnum;
     uint8_t setup[8]; /* of a control request */
-    int64_t due_ns;   /* of one that is held */
+    int64_t due_ns;   /* when a held request is to be answered */
     int in;
     int short_is_error;
     uint32_t send_len; /* of wire, once it is a reply */
@@ -54,21 +54,22 @@ static inline unsigned get_be16(const uint8_t *at)
 
 /* ---- usbip_queue.c */
 
-/* NULL: too much is pending, or no memory. It counts as pending until it is queued or freed. */
+/* A new URB. NULL: too much is pending, or no memory. It counts as pending until it is queued or freed. */
 struct usbip_urb *usbip_urb_new(struct usbip_conn *conn, uint32_t room);
-/* One that was not queued. */
+/* Frees an URB that was not queued. */
 void usbip_urb_free(struct usbip_conn *conn, struct usbip_urb *urb);
-/* As a reply, of len bytes of wire. It is freed once it is sent. */
+/* Queues the URB as a reply of len bytes of wire. It is freed once it is sent. */
 void usbip_queue(struct usbip_conn *conn, struct usbip_urb *urb, uint32_t len);
-/* A reply that is nothing but its own bytes, which are 0; NULL breaks the connection. */
+/* Queues a reply of len bytes without an URB, and returns these, all 0, to be filled in. NULL: the connection is
+ * broken. */
 uint8_t *usbip_queue_plain(struct usbip_conn *conn, uint32_t len);
 void usbip_queue_clear(struct usbip_conn *conn);
 
 /* ---- usbip_ops.c */
 
-/* How many bytes an operation needs, as far as it has come. */
+/* Number of bytes that the operation needs, as far as those in conn->head tell. */
 uint32_t usbip_op_need(const struct usbip_conn *conn);
-/* All bytes of it are in conn->head. */
+/* Carries out the operation, whose bytes are all in conn->head. */
 void usbip_op_take(struct usbip_conn *conn);
 
 #endif

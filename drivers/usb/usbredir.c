@@ -145,9 +145,8 @@ static void note_path(struct usbredir *self, const char *path)
     self->path_inode = st.st_ino;
 }
 
-/* Unless it was removed meanwhile, and another program listens there. To be called before the listener is
- * closed: until then nobody takes the path for an abandoned one, and no other file gets the inode's
- * number. */
+/* Removes the path, unless another program listens there by now. To be called before the listener is closed:
+ * until then nobody takes the path for an abandoned one, and no other file gets the inode's number. */
 static void remove_path(const struct usbredir *self)
 {
     struct stat st;
@@ -251,7 +250,7 @@ static int64_t usbredir_due_ns(const void *backend)
     return usbredir_slow_due_ns(backend);
 }
 
-/* ---- faults on request. The channel to the virtual machine stays: the device alone is unplugged from it. */
+/* ---- injected faults. The channel to the virtual machine stays: the device alone is unplugged from it. */
 
 static int unplug(struct usbredir *self)
 {
@@ -275,7 +274,7 @@ static int plug(struct usbredir *self)
     return SH_OK;
 }
 
-/* There is no word of a reset from this end: the device is unplugged, and plugged in at once. */
+/* The protocol has no packet for a reset from this end. So the device is unplugged, and plugged in at once. */
 static int usbredir_fault(void *backend, enum usb_fault what)
 {
     struct usbredir *self = backend;

@@ -34,7 +34,7 @@ static int status_of(enum usb_status status)
     return numbers[status];
 }
 
-/* room: for what goes to the host; bytes: what it holds in all, also of what came. */
+/* room: for bytes to the host; bytes: all that the transfer holds, those that came included. */
 static struct redir_transfer *new_transfer(struct usbredir *self, uint32_t room, uint32_t bytes)
 {
     if (self->n_pending >= MAX_PENDING || self->n_bytes + bytes > MAX_PENDING_BYTES) return NULL;
@@ -188,7 +188,7 @@ static void on_stop_interrupt(void *priv, uint64_t id, struct usb_redir_stop_int
     usbredirparser_send_interrupt_receiving_status(self->parser, id, &status);
 }
 
-/* A packet that was under way is answered as cancelled; one that is answered already needs no more. */
+/* Cancels a packet that is under way. One that is answered already needs no second answer. */
 static void on_cancel(void *priv, uint64_t id)
 {
     struct usbredir *self = priv;

@@ -18,7 +18,7 @@ struct usbredir {
     struct usbredirparser *parser; /* NULL: no connection (yet) */
     int broken;
     int greeted;                                  /* its hello has come */
-    int unplugged;                                /* on request */
+    int unplugged;                                /* by an injected fault */
     struct redir_request *slow_first, *slow_last; /* requests that take their time */
     uint32_t n_slow;
     int (*go_on)(void *ctx);
@@ -32,21 +32,21 @@ struct usbredir {
     struct usb_retry retry;               /* of a connection we make */
     struct usb_backend_address peer;      /* where to */
     char path[256];                       /* to be removed; empty: none */
-    dev_t path_device;                    /* what we made there, which it need not be any more */
+    dev_t path_device;                    /* the socket that we made there; another file may have its place by now */
     ino_t path_inode;
     char name[USB_BACKEND_NAME_MAX];
 };
 
 /* usbredir_requests.c */
 void usbredir_take_requests(struct usbredirparser *parser);
-/* The library passes on packets from before the hello, too: 1, and the connection is broken. */
+/* 1: the packet came before the hello, and the connection is now marked broken. The library passes on such packets. */
 int usbredir_is_early(struct usbredir *self);
 
-/* The guest, which has said hello, gets the device. */
+/* Gives the device to the guest, which has said hello. */
 void usbredir_plug(struct usbredir *self);
 /* Answers requests whose time has come, until go_on says 0. */
 void usbredir_answer_slow(struct usbredir *self);
-/* When the next one's has; INT64_MAX: there is none. */
+/* When the next of these is due; INT64_MAX: there is none. */
 int64_t usbredir_slow_due_ns(const struct usbredir *self);
 /* 1: the request was held, and is answered as cancelled. */
 int usbredir_cancel_slow(struct usbredir *self, uint64_t id);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The usbredir back end: what the device is, and requests to it. */
+/* The usbredir back end: descriptions of the device, and control requests. */
 #include "drivers/usb/backend.h"
 
 #ifdef HAVE_USBREDIR
@@ -139,7 +139,7 @@ static void answer_control(struct usbredir *self, uint64_t id, struct usb_redir_
     free(room);
 }
 
-/* ---- requests that take their time, on request */
+/* ---- requests held by an injected fault */
 
 enum { MAX_SLOW = 256 };
 
@@ -167,7 +167,7 @@ static void answer(struct usbredir *self, struct redir_request *r)
     usbredirparser_free_packet_data(self->parser, r->data);
 }
 
-/* One after the other: each takes its time. */
+/* Held requests are answered one after the other: each takes the delay that was asked for. */
 static void hold(struct usbredir *self, const struct redir_request *given)
 {
     const int64_t now_ns = usb_now_ns();

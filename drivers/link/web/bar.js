@@ -30,7 +30,7 @@ export class Bar {
     document.title = words ? `${words} · scanhead` : 'scanhead';
   }
 
-  // Of the scan: how many frames it has, how many are done, and how long a frame takes (0: not known).
+  // Frames of the scan, those that are done, and the time of one frame (0: not known).
   progress({frames = this.#frames, done = this.#done, frame_s = this.#frame_s}) {
     if (frames === this.#frames && done === this.#done && frame_s === this.#frame_s) return;
     if (frames !== this.#frames || frame_s !== this.#frame_s || done < this.#done) this.#share = null;
@@ -66,7 +66,7 @@ export class Bar {
   #timer = 0;
   #notice = '';
   #kind = '';
-  // kind: '' for what is only told, 'warn', 'bad'.
+  // kind: '' for information, 'warn', 'bad'.
   notice(text, ms, kind = '') {
     clearTimeout(this.#timer);
     this.#notice = text;

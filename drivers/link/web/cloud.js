@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-// The points that are held: blocks of typed arrays, the newest `capacity` of them and less than a block more; the oldest
-// blocks go.
+// The points that are held, in blocks of typed arrays: the newest `capacity` points and less than a block more. The
+// oldest blocks are dropped.
 //
 // Positions are Float32, relative to `origin` (Float64, scene frame): the place of the first point. So a cloud at UTM
 // coordinates keeps 0.03 mm within 500 m of it, where Float32 of the coordinates themselves would have 0.5 m.
 //
-// The order inside a closed block is such that its first k points are spread evenly over the block, for any k: one
-// point at random from each k-th of it. So a level of detail is a prefix of each block. Every k-th point would not do:
-// k may be the length of a line. The block that is still filled has the points as they came.
+// In a closed block the first k points are spread evenly over the block, for any k: one point at random from each k-th
+// part of it. So a level of detail is a prefix of each block. Every k-th point would not do, since k may be the length
+// of a line. The block that is still filled has the points in the order in which they came.
 
 export const BLOCK = 65536;
 
@@ -38,7 +38,7 @@ function mix(h) {
   return (h ^ (h >>> 16)) >>> 8;
 }
 
-const MODELLED = ['reflectance', 'amplitude']; // NaN where not: an array of its own only where a block has any
+const MODELLED = ['reflectance', 'amplitude']; // NaN where not modelled; a block without any has no array for it
 
 class Block {
   n = 0;
@@ -141,8 +141,8 @@ class Block {
 
 export class Cloud {
   total = 0; // points that came since it was cleared
-  gone = 0; // of these, no longer held
-  replaced = 0; // how often points went because their scan was made again
+  gone = 0; // those of them that are no longer held
+  replaced = 0; // how often points were dropped because their scan was made again
   origin = null;
   blocks = [];
   changed = null; // called after each change
@@ -215,8 +215,8 @@ export class Cloud {
     return this.total;
   }
 
-  /** The first so many points that came are of another run of the head, which counts its scans anew: the next scan of a
-   * station takes their place, whatever its number. */
+  /** The first `total` points that came are of another run of the head, which counts its scans anew. So the next scan
+   * of a station replaces them, whatever its number. */
   outdate(total) {
     this.#outdated = total;
     this.#scans.clear();
@@ -242,7 +242,7 @@ export class Cloud {
     this.changed?.();
   }
 
-  // {min, max} in the scene frame, of the points held, or of all that came; null of none.
+  // {min, max} in the scene frame, of the points held, or of all that came; null without points.
   #within(lo, hi) {
     lo = [...lo];
     hi = [...hi];

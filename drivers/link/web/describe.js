@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// What the head says about its settings: HELP:SETtings? lists them, and HELP? of each describes it. A head without
-// these has MIN, MAX and DEF.
+// Descriptions of the head's settings: HELP:SETtings? lists them, HELP? of each describes it. A head without these
+// commands has MIN, MAX and DEF.
 
 // 'number,"Hz",1000,1200000,300000,0.000001,"all",""' -> its fields; a field in quotes may hold commas.
 export function splitReply(reply) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// How the picture looks: colours with their legend, point size, what is drawn besides points, from where.
+// The look of the picture: colours with their legend, point size, what is drawn besides points, the place to look from.
 import {bodyOf, byId, kept, make, say} from './page.js';
 
 const MODES = [['height', 'Height'], ['range', 'Range'], ['reflectance', 'Reflectance'], ['amplitude', 'Amplitude'],

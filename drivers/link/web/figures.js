@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// State in figures: what the head delivers, what of it came here, what was lost, what the page does with it.
+// State in figures: what the head delivers, how much of it came here, what was lost, how the page handles it.
 import {bodyOf, byId, duration, figureList, grouped, make, makeSvg, say, short, NONE} from './page.js';
 
 const HEAD = [

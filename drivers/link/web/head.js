@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// One head: its connection, commands and replies, control, what it says of itself, and what was lost.
+// One head: its connection, commands and replies, control, its description, and losses.
 import {STATES} from './native.js';
 import {Losses} from './losses.js';
 import {CommandError, Replies} from './replies.js';
@@ -36,9 +36,9 @@ export class Head extends EventTarget {
   state = null; // a word of STATES
   session = 0; // this page's; 0: not known
   controller = 0; // the session in control; 0: nobody
-  who = ''; // of it, the kind of link and the address; '': not known
+  who = ''; // kind of link and address of the session in control; '': not known
   idn = '';
-  descriptor = null; // what came last of each, of this connection
+  descriptor = null; // the last frame of each type on this connection
   anchor = null;
   emitter = null;
   telemetry = null;
@@ -55,7 +55,7 @@ export class Head extends EventTarget {
   #figures = {};
   #losses = null;
   #knowsWho = false; // the head says who has control
-  #told = ''; // who has control, as `control` said it last
+  #told = ''; // who has control, as in the last `control` event
 
   /** url: "ws://host:port/ws", or "/ws" in a page. worker: false decodes in this thread. past: true takes the points from
    * before, too, where the head keeps them; a batch of these has `past`. It connects at once, and again and again until
@@ -107,17 +107,15 @@ export class Head extends EventTarget {
     this.#wire.end();
   }
 
-  /**
-   * Counts of this connection, by the words of PROTOCOL.md (*What the counts mean*). frames, bytes, points (records,
-   * shots without echo among them), pulses (received), empty; lost_frames: missing in the sequence, of which
-   * left_out_frames with left_out_pulses because this page was too slow; lost_pulses: lost by the head; missing_pulses:
-   * of all scans that ended here, delivered and not received; dropped_points, dropped_pulses: decoded, and dropped by
-   * the page itself; unplaced_points, unplaced_pulses: came before their anchor or their pose;
-   * past_points, past_pulses, past_hash: of these, what came from before this connection, in none of the other counts;
-   * past_gone: points that the head keeps no more, past_lost_frames: frames that it could not keep; repeated_frames,
-   * late_frames: came twice, or after newer ones, and were dropped; jumps_back: how often the sequence of frames began
-   * anew; bad_bytes, bad_payloads, refused; decode_ns_per_point; point_hash.
-   */
+  /** Counts of this connection, by the words of PROTOCOL.md (*What the counts mean*): - frames, bytes, points
+   * (records, shots without echo among them), pulses (received), empty - lost_frames: missing in the sequence; of these
+   * left_out_frames with left_out_pulses because this page was too slow - lost_pulses: lost by the head;
+   * missing_pulses: of all scans that ended here, delivered and not received - dropped_points, dropped_pulses: decoded,
+   * and dropped by the page itself - unplaced_points, unplaced_pulses: came before their anchor or their pose -
+   * past_points, past_pulses, past_hash: from before this connection, and in none of the other counts - past_gone:
+   * points that the head keeps no more; past_lost_frames: frames that it could not keep - repeated_frames, late_frames:
+   * came twice, or after newer ones, and were dropped - jumps_back: how often the sequence of frames began anew -
+   * bad_bytes, bad_payloads, refused; decode_ns_per_point; point_hash / */
   figures() {
     const f = this.#figures, l = this.#losses;
     return {...f, pulses: f.shots, dropped_pulses: f.dropped_shots, unplaced_pulses: f.unplaced_shots,
@@ -207,8 +205,8 @@ export class Head extends EventTarget {
     this.#introduce().catch(() => {}); // gone again, which `close` says
   }
 
-  // Who the head is and what it does. HELP first: an older head does not know a session's number, and asking it would
-  // be an error in its queue.
+  // Asks for identity and state. HELP comes first: an older head has no session numbers, and the question would put an
+  // error into its queue.
   async #introduce() {
     const [idn, state, controller, help] = await Promise.all(
       ['*IDN?', 'HEAD:STATe?', 'SYSTem:CONTrol?', 'HELP?'].map((line) => this.command(line)));

@@ -4,7 +4,8 @@ import {bodyOf, byId, make, say, atMostEvery} from './page.js';
 import {describeSettings} from './describe.js';
 import {why} from './session.js';
 
-// What people call them, in the order of the page. A setting that is not here stands under "More" with its header.
+// Names of the settings for people, in the order of the page. A setting that is not here stands under "More" with its
+// header.
 const GROUPS = [
   ['Rates', [['HEAD:PRR', 'Pulses'], ['HEAD:LINes', 'Lines'], ['HEAD:PAN', 'Pan']]],
   ['Angular step', [['SCAN:STEP', 'Both ways'], ['SCAN:STEP:LINE', 'In the line'], ['SCAN:STEP:PAN', 'Line to line']]],
@@ -33,8 +34,8 @@ function readable(text) {
 
 const decimals = (text) => (/^\d*\.(\d*)$/.exec(text)?.[1] ?? '').length;
 
-// A limit in few figures, where these are all it has: 1200000 -> '1.2 M'. A limit one step away from what may not be
-// reached is said by that: 59.999999 -> '< 60'; the whole number stands in the tooltip.
+// A limit in few figures, where it has no more: 1200000 -> '1.2 M'. A limit one step beside a round number that is not
+// allowed is shown by that number: 59.999999 -> '< 60'; the tooltip has all figures.
 export function limit(text, step = '', isUpper = false) {
   const round = Number(Number(text).toFixed(Math.max(0, decimals(step) - 2)));
   const off = Math.abs(round - Number(text));
@@ -51,8 +52,8 @@ export function limit(text, step = '', isUpper = false) {
   return readable(text.replace(/^-?\d*\.\d+$/, (all) => inward(all, isUpper)));
 }
 
-// A number that takes more than four figures after its point is cut to four: a lower limit up, an upper one down, so
-// that what is read is allowed.
+// A number with more than four figures after its point is rounded to four: a lower limit up, an upper one down, so that
+// the shown number is allowed.
 function inward(text, isUpper) {
   const value = Number(text), places = Math.min(12, 3 - Math.min(-1, Math.floor(Math.log10(Math.abs(value) || 1))));
   if ((text.split('.')[1] ?? '').length <= places) return text;
@@ -60,7 +61,7 @@ function inward(text, isUpper) {
   return String(Number(((isUpper ? Math.floor : Math.ceil)(value * scale) / scale).toFixed(places)));
 }
 
-// Nothing else can be set now: one value is allowed, or, as at a pan that stands still, none but the one that holds.
+// Whether no other value can be set now: only one is allowed or, as with a pan that stands still, only the present one.
 const isFixed = ({min, max}) => Boolean(min) && Boolean(max) && Number(min) >= Number(max);
 
 const unitName = (unit) => unit.replace('deg', '°');
@@ -92,7 +93,8 @@ export class Knobs extends EventTarget {
     this.#allow();
   }
 
-  // A client in control may turn a knob between scans, of which no event tells; a glance every two seconds does.
+  // A client in control may change a setting between scans, which no event reports. So the settings are read every two
+  // seconds.
   #watchOthers() {
     const {link, mine, owner} = this.#session;
     if (link === 'open' && !mine && owner && !document.hidden && byId('panel-knobs').open) this.askAgain();
@@ -214,7 +216,7 @@ export class Knobs extends EventTarget {
     await Promise.all([...this.#knobs.values()].map(async (knob) => {
       const value = await this.#session.command(`${knob.setting.header}?`);
       if (knob.field !== document.activeElement || knob.field.value === knob.value) this.#put(knob, value);
-      else knob.value = value; // somebody types: their text stays, Escape brings the value that holds
+      else knob.value = value; // the user types: the text stays, Escape brings the present value
     }));
     this.dispatchEvent(new Event('values'));
   }

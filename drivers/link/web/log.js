@@ -6,7 +6,7 @@ import {sessionWords, stateName, stateWord} from './session.js';
 
 const MOST = 200; // entries that are kept
 
-// Errors that no command made, by COMMANDS.md (*Errors*): their text says who or how many.
+// Errors not caused by a command, by COMMANDS.md (*Errors*): their text says who or how many.
 const HEADS_OWN = {101: 'Client lost (101):', 102: 'Reader too slow (102):', 103: 'Pulses lost (103):', 104: 'Client refused (104):',
   105: 'Incomplete command (105):', 106: 'Lines lost (106):'};
 
@@ -61,7 +61,7 @@ export class Log {
     if (!this.#timer) this.#timer = setTimeout(() => this.#show(), 250);
   }
 
-  // Whoever reads further down keeps their place: what comes on top moves the view by its height.
+  // A user who reads further down keeps the place: a new entry on top moves the view by its height.
   #show() {
     this.#timer = 0;
     const list = this.#list, before = list.scrollHeight, top = list.scrollTop;

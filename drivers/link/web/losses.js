@@ -1,26 +1,27 @@
 /* SPDX-License-Identifier: MIT */
-// What was lost of a connection's scans, by the words of PROTOCOL.md (*What the counts mean*), and where a scan ends
+// Losses of a connection's scans, as PROTOCOL.md defines them (*What the counts mean*). It also finds the end of a scan
 // whose SCAN_END was lost (*A reader that lost SCAN_END*). Pure.
 import {STATES} from './native.js';
 
 const IN_SCAN = ['scanning', 'spin-down'];
 
 export class Losses {
-  leftOutFrames = 0; // for this page was too slow: by READER_LOST
+  leftOutFrames = 0; // by the head, since this page was too slow (READER_LOST)
   leftOutPulses = 0;
   missing = 0; // pulses of the scans that ended: delivered, and not received
-  #said = 0; // pulses lost by the head, as OVERRUN and
-  #ended = 0; // as the ends of scans have it: both count the same; of either, some may not have come
-  #damaged = 0; // frames missing that no READER_LOST accounts for, told
-  #unexplained = 0; // the same, as the last telemetry found it
+  #said = 0; // pulses lost by the head, from OVERRUN events, and
+  #ended = 0; // the same from the ends of scans; some events of either kind may not have come
+  #damaged = 0; // missing frames that no READER_LOST explains, and that were reported
+  #unexplained = 0; // all such frames at the last telemetry
   #scan = null;
   #isRunning = false;
   #shots = 0; // pulses received before the scan
-  #before = {scan: null, shots: 0}; // received of a scan from before this page came
+  #before = {scan: null, shots: 0}; // pulses received of a scan from before this page came
   #counts = null; // the last telemetry
   #say;
 
-  /** say(name, detail): 'lost' and 'scan', as Head's events. What comes has `shots`, the pulses received before it. */
+  /** say(name, detail): 'lost' and 'scan', as Head's events. Events given to this class have `shots`, the pulses
+   * received before them. */
   constructor(say) {
     this.#say = say;
   }
@@ -50,8 +51,8 @@ export class Losses {
     this.#counts = t;
     if (t.scan !== this.#scan) this.#end(this.#scan, null, t.shots);
     else if (!IN_SCAN.includes(STATES[t.state])) this.#end(t.scan, t, t.shots);
-    // READER_LOST may come after the jump that it explains: what was missing at the telemetry before, and still is, is
-    // damage.
+    // READER_LOST may come after the jump that it explains. Frames that were unexplained at the telemetry before, and
+    // still are, count as damage.
     const now = Math.max(0, lost_frames - this.leftOutFrames), sure = Math.min(now, this.#unexplained);
     if (sure > this.#damaged) this.#say('lost', {by: 'wire', frames: sure - this.#damaged, pulses: 0});
     this.#damaged = Math.max(this.#damaged, sure);
@@ -97,7 +98,7 @@ export class Losses {
     return t !== null && t.scan === scan && STATES[t.state] === 'spin-down' ? t : null;
   }
 
-  // counts: a telemetry's; null: they were lost. Of a scan that this page joined late, what came before it is missing,
+  // counts: a telemetry's; null: they were lost. If this page joined the scan late, the pulses before that are missing,
   // too.
   #end(scan, counts, shots) {
     if (!this.#isRunning || scan !== this.#scan) return;

@@ -41,13 +41,13 @@ async function makeView(cloud) {
   }
 }
 
-// What people call things: surfaces and stations, as /head names them.
+// Names of surfaces and stations for people, as /head has them.
 class Names {
   surfaces = new Map();
   stations = null;
 
-  // list: [{label, object, material}]. Of an IFC model's object the type before its name and the id after it are left
-  // out.
+  // list: [{label, object, material}]. For an object of an IFC model the type before its name and the id after it are
+  // left out.
   add(list) {
     for (const {label, object, material} of list) {
       const name = object.replace(/Ifc[A-Z]\w+?_(?=.)/, '').replace(/_[0-9A-Za-z_$]{22}$/, '');

@@ -20,8 +20,8 @@ export {POINTS};
 export const BESIDE_POINTS = [POINTS, ATTRIBUTES, COLOURS]; // points, and what says more of them
 const HEAD = 40, RECORD = 20, MAX_POINTS = 3274, ROOM = 32768, NO_AMPLITUDE = -32768;
 
-/** Frames to values. What PROTOCOL.md says is void is forgotten; a frame that it says to refuse is counted, and is as
- * if it had not come. Nothing is thrown but what a callback throws. */
+/** Frames to values. State that PROTOCOL.md calls void is forgotten. A frame that it tells readers to refuse is
+ * counted, and otherwise ignored. Only callbacks may throw. */
 export class Decoder {
   /** Each callback may be left out: points(batch), descriptor(d), anchor(a), emitter(e), names(list), lineEnd(l),
    * telemetry(t), event(e), poses(list), refused(why, frame). All but lists have the header's `t_ns` (BigInt),
@@ -68,7 +68,7 @@ export class Decoder {
   /** Hands on the points that are there. A frame whose attributes or colours are still to come stays, unless `all`. */
   flush(all = false) {
     const {columns: c, batch} = this;
-    const waits = this.last !== null && !all; // what waits for its attributes or colours
+    const waits = this.last !== null && !all; // the last frame waits for its attributes or colours
     const to = waits ? this.last.from : c.n, held = waits ? this.last.shots : 0;
     if (batch === null || (to === 0 && this.shots === held)) return;
     const copy = c.copy(0, to, batch.rgb);
@@ -193,7 +193,8 @@ export class Decoder {
     if (missing > 0) c.dropNaN(from);
   }
 
-  // The points frame that attributes or colours follow as number `after`; null: it was lost, or these are of another.
+  // The points frame that attributes or colours follow as number `after`. null: it was lost, or they belong to another
+  // one.
   #besidePoints(frame, beside, after) {
     const l = this.last;
     const isOfIt = l !== null && frame.seq === (l.seq + after) >>> 0 && beside.pulse0_low === l.low &&

@@ -106,7 +106,7 @@ function utmGrid(lon0_deg, north0_m) {
   };
 }
 
-// The EPSG code of the grid in which the place has the station's coordinates: that of the scene itself. 0: none.
+// The EPSG code of the scene's own grid: the one in which the station has its scene coordinates. 0: none.
 function gridOfScene(a) {
   if (a.lat_deg === 0 && a.lon_deg === 0 && a.height_m === 0) return 0;
   const zone = Math.floor((a.lon_deg + 180) / 6), codes = [32661, 32761];
@@ -119,7 +119,7 @@ function gridOfScene(a) {
 
 const transposedTimes = (m, v) => [0, 1, 2].map((i) => m[i] * v[0] + m[3 + i] * v[1] + m[6 + i] * v[2]);
 
-// Scene frame -> ECEF, applied to a difference the other way.
+// A function that takes a difference in ECEF to the scene frame.
 function sceneTurn(a, grid) {
   if (a.crs === 1) return (d) => transposedTimes(a.axes, d);
   let [lat_deg, lon_deg] = a.anchor, g = 0;

@@ -2,8 +2,8 @@
 // Payloads of fixed layout by the tables of PROTOCOL.md, as objects. A payload that PROTOCOL.md tells a reader to
 // refuse throws Refused.
 //
-// Whole numbers of 64 bits: times (`_ns`), the seed and an event's a, b, c are BigInt. All others are Numbers; one
-// that a Number can't hold exactly, which is beyond 2^53, is a BigInt.
+// Whole numbers of 64 bits: times (`_ns`), the seed and an event's a, b, c are BigInt. All others are Numbers, or
+// BigInt where a Number can't hold them exactly (beyond 2^53).
 
 export class Refused extends Error {}
 
@@ -117,7 +117,7 @@ export function readTelemetry(view) {
   return t;
 }
 
-// What a, b and c of an event mean: names in their order; _ns is BigInt, the others Numbers.
+// Names of an event's a, b and c, in this order; _ns is BigInt, the others are Numbers.
 const EVENTS = {
   1: ['STATE', 'state', 'before'],
   2: ['SCAN_START', 'scan', 'at_ns', 'gps_ns'],
@@ -191,7 +191,7 @@ export function readNames(view) {
   return Array.from({length: count}, (_, i) => ({label: first + i, object: name(), material: name()}));
 }
 
-/** What attributes and colours begin with. */
+/** The beginning of attributes and colours frames. */
 export function readBeside(view, bytes, what) {
   if (view.byteLength < 16) refuse(`${what} shorter than their header`);
   const n_points = view.getUint32(12, true);

@@ -32,9 +32,9 @@ const isPrintable = (byte) => byte >= 0x20 && byte <= 0x7e;
 
 /** Takes bytes as they come. It keeps what it has not understood yet: less than a frame, 64 KiB. */
 export class Parser {
-  /** frame(frame), text(line without its end), notice({kind, at_byte, seq, n, t_ns}): something wrong, once each and
-   * before the item that follows it. kind is gap, repeated, late, restarted, bad payload, bad bytes or cut, and the rest
-   * as drivers/host/scanhead.h has it; t_ns is a BigInt, or null before the first frame. Each may be left out. */
+  /** Callbacks, each of which may be left out: frame(frame), text(line without its end), notice({kind, at_byte, seq,
+   * n, t_ns}). A notice comes before the item that follows it. kind is gap, repeated, late, restarted, bad payload, bad
+   * bytes or cut; drivers/host/scanhead.h explains the rest. t_ns is a BigInt, or null before the first frame. */
   constructor({frame, text, notice} = {}) {
     this.onFrame = frame ?? (() => {});
     this.onText = text ?? (() => {});
@@ -163,7 +163,7 @@ export class Parser {
     else if (!this.bad || this.bad.n === this.bad.most) this.#beginBad('cut', this.from + at);
   }
 
-  // What is beyond a broken frame is another thing.
+  // Bytes beyond the length of a broken frame give a notice of their own.
   #addBad(at_byte, n) {
     this.stats.bad_bytes += n;
     const own = this.bad ? Math.min(n, this.bad.most - this.bad.n) : 0;
@@ -173,8 +173,8 @@ export class Parser {
     this.bad.n = n - own;
   }
 
-  // An item follows, or atEnd nothing. A frame that seemed to be cut by the end is a broken one if others stood within
-  // its length.
+  // An item follows or, with atEnd, nothing. A frame that seemed to be cut by the end is a broken one if other frames
+  // stood within its length.
   #endBad(atEnd) {
     if (!this.bad) return;
     const {at_byte, n, seq, t_ns} = this.bad;

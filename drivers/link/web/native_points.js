@@ -59,7 +59,7 @@ export class Columns {
   }
 }
 
-// What the layouts share, for record i at `at`, which is point number `to`.
+// Sets the columns that both layouts share, from record i at `at` to point number `to`.
 function common(c, to, i, view, at, pulse, t0_ns, tail) {
   const reflectance = view.getInt16(at + 12, true);
   c.reflectance[to] = reflectance === NO_REFLECTANCE ? NaN : reflectance / 100;
@@ -71,7 +71,7 @@ function common(c, to, i, view, at, pulse, t0_ns, tail) {
   c.record[to] = i;
 }
 
-/** What a polar stream needs of its descriptor and anchor. */
+/** Makes the function that places the points of a polar stream, from its descriptor and anchor. */
 export function polarPlacer(descriptor, anchor) {
   const m = Float64Array.from(anchor.rotation), [x0, y0, z0] = anchor.station_m, scale = descriptor.range_scale_m;
   const lineTurn = 1 / descriptor.mirror_counts_per_turn, panTurn = 1 / descriptor.pan_counts_per_turn;
@@ -113,8 +113,8 @@ export function polarPlacer(descriptor, anchor) {
   };
 }
 
-/** What a geo stream needs. `exact` as toScene's. range: from the anchor, in the CRS; geodetic: straight through space;
- * NaN of a head that moves: the anchor is not where the head is. */
+/** The same for a geo stream. `exact` as toScene's. The range is the distance from the anchor, in the CRS or, if that
+ * is geodetic, straight through space. It is NaN where the head moves, since the anchor is not its place. */
 export function geoPlacer(descriptor, anchor) {
   const {at: exactAt, exact, isFlat} = toScene(anchor), [sx, sy, sz] = anchor.scale, isGeodetic = anchor.crs === 3;
   let place = isFlat ? placeFlat(exactAt, anchor) : isGeodetic ? placeExactly(exactAt) : null;
@@ -163,8 +163,8 @@ function placeExactly(exactAt) {
   };
 }
 
-// A grid: the cubic through the exact map within the head's reach d. What it leaves out is about d^4 / R^3 with the
-// Earth's radius R: 0.1 um at 2 km.
+// A grid: the cubic through the exact map within the head's reach d. Its error is about d^4 / R^3 with the Earth's
+// radius R: 0.1 um at 2 km.
 function placeByCubic(exactAt, anchor, descriptor) {
   const reach_m = Math.min(Math.max(1.1 * descriptor.range_max_m, 10), 20000), [ax, ay, az] = anchor.anchor;
   const k = fitCubic((u, v, w) => exactAt([ax + reach_m * u, ay + reach_m * v, az + reach_m * w]));

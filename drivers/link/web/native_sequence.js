@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// The sequence numbers of frames, as PROTOCOL.md has them (*Sequence numbers*): what is missing, came already, or too late.
+// The sequence numbers of frames, as PROTOCOL.md has them (*Sequence numbers*): which are missing, repeated or late.
 const SEEN = 256, GAPS = 64, GAP_MOST = 65536, LATE_RUN = 256; // how far back a jump is looked into, as libscanhead does
 const LOCAL = 2;
 
@@ -73,7 +73,7 @@ export class Sequence {
     return false;
   }
 
-  // Of a late frame: so many in a row are another sequence, whose numbers were all missing.
+  // Whether LATE_RUN late frames came in a row: they are another sequence, whose numbers were all missing.
   #isRun(seq) {
     this.#lateRun = this.#lateRun > 0 && seq === (this.#lastLate + 1) >>> 0 ? this.#lateRun + 1 : 1;
     this.#lastLate = seq;

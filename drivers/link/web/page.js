@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// What all panels share: making elements, writing figures, and doing things no more often than needed.
+// Helpers of all panels: making elements, writing figures, and doing things no more often than needed.
 
 // Makes an element: make('p', {id: 'x', class: 'y'}, 'text', child). A function as a value is a listener.
 export function make(name, attributes = {}, ...children) {

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-// The points that the scans had before this page came, or while it was away: the head keeps the last ones, and gives them
-// in pieces (GET /past, firmware_sim/app/studio/watch/README.md). They are frames of the stream with the numbers that they had.
-// So each points frame is taken once, either from there or from the connection.
+// The points from before this page came, or while it was away: the head keeps the last ones, and gives them in pieces
+// (GET /past, firmware_sim/app/studio/watch/README.md). They are frames of the stream with their own numbers. So each points
+// frame is taken once, either from /past or from the connection.
 //
-// A live frame that can't be placed yet is left to /past. Of /past, frames are left out that the connection brings, or that
-// an earlier connection with the same run of the head brought.
+// A live frame that can't be placed yet is left to /past. Frames of /past are left out if this connection brings them,
+// or an earlier connection with the same run of the head brought them.
 import {BESIDE_POINTS, Decoder, isBefore, LOCAL, Parser, POINTS} from './native.js';
 
 const HEAD = 56, VERSION = 1;
@@ -24,7 +24,7 @@ function readHead(bytes) {
 export class Past {
   stats = {past_points: 0, past_pulses: 0, past_gone: 0, past_lost_frames: 0};
   unplaced = {points: 0, shots: 0}; // of live frames, left to a /past that is not there
-  #left = {points: 0, shots: 0}; // of live frames, to /past
+  #left = {points: 0, shots: 0}; // of live frames that are left to /past
   #give;
   #hasRoom;
   #get;
@@ -33,10 +33,10 @@ export class Past {
   #isReading = false;
   #run = null;
   #at = 0; // position in /past
-  #last = null; // number of the newest points frame that was taken: of all, and
-  #seen = null; // of earlier connections
-  #first = null; // of the first live one that was taken
-  #need = null; // of the newest frame that only /past brings
+  #last = null; // number of the newest points frame that was taken
+  #seen = null; // the same, from earlier connections only
+  #first = null; // number of the first live points frame that was taken
+  #need = null; // number of the newest frame that only /past brings
   #takesLive = true;
   #takesPast = true;
 
@@ -117,7 +117,7 @@ export class Past {
     if (this.#takesPast || !BESIDE_POINTS.includes(frame.type)) this.decoder.take(frame);
   }
 
-  // Reads what there is, and what live frames were left to it.
+  // Reads /past up to the live frames that were left to it.
   async #read() {
     if (this.#isReading || this.#url === null) return;
     this.#isReading = true;
@@ -164,7 +164,7 @@ export class Past {
       past_lost_frames: head.lost_frames});
   }
 
-  // A head that keeps nothing, as an older one: what was left to it has no place.
+  // The head keeps nothing, as an older one: live frames that were left to /past stay without a place.
   #hasNone() {
     this.unplaced.points += this.#left.points;
     this.unplaced.shots += this.#left.shots;

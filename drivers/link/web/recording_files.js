@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// What the link serves of a recording: clouds in columns, meshes whose triangles are sorted. Pure but for fetch.
+// Reads a recording from the link: clouds in columns, meshes with sorted triangles. Pure but for fetch.
 
 const KINDS = {1: Uint8Array, 2: Uint16Array, 3: Uint32Array, 4: Float32Array};
 const POINTS_AT_A_TIME = 200000, TRIANGLES_AT_A_TIME = 1 << 20;

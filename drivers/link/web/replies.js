@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-// Command lines and their replies, by COMMANDS.md: each line has one reply, in the order of the lines. After a line
-// whose reply did not come in time the reply may still come: then the head is asked *IDN?, and all replies before the
-// answer to that are nobody's (*Coming into step*).
+// Command lines and their replies, by COMMANDS.md: each line has one reply, in the order of the lines. A reply that did
+// not come in time may still come. So the head is then asked *IDN?, and all replies before the answer to that are
+// dropped (*Coming into step*).
 
 /** A command that the head refused. number: SCPI's, text: the head's words. */
 export class CommandError extends Error {
@@ -95,7 +95,7 @@ export class Replies {
     one.reject(error);
   }
 
-  // All that were sent after it are given up with it, as their replies can no longer be told apart.
+  // Lines that were sent after it are given up with it, since their replies can no longer be told apart.
   #late(one) {
     const waits = this.#waiting.indexOf(one);
     const words = `no reply within ${one.timeout_s} s`;

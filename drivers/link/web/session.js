@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// What the page knows of its head at any moment: connection, state, who has control. The panels ask it, and hear
-// 'change' of it.
+// The present state of the head for the panels: connection, state, who has control. It sends 'change' events.
 import {STATES} from './native.js';
 import {kept} from './page.js';
 
@@ -29,8 +28,8 @@ export class Session extends EventTarget {
   scan = 0;
   pace = '';        // as the configuration has it; '': not known
   owner = 0;        // the session in control, 0: nobody
-  who = '';         // it in words, for a sentence's beginning
-  mine = false;     // it is this page that has control
+  who = '';         // that session in words, for a sentence's beginning
+  mine = false;     // this page has control
   since = null;     // when the connection ended, and why
   words = '';
   wasOpen = false;  // there was a connection

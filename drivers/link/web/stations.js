@@ -50,7 +50,7 @@ export class Stations extends EventTarget {
     this.#allow();
   }
 
-  // A head that moves stations says where they stand now; of another one /head has it.
+  // A head that can move stations reports their present places; for another head /head has them.
   async reload(list = null) {
     const stations = list ?? (await fetchJson('/head'))?.stations;
     if (!stations) return;
@@ -102,7 +102,7 @@ export class Stations extends EventTarget {
     return this.list.find((station) => station.number === number);
   }
 
-  // Somebody's half-typed numbers stay, unless asked for.
+  // Numbers that the user is typing stay, unless `anyway`.
   #fill(station, anyway = false) {
     const {place, fields, item} = this.#items.get(station.number);
     say(place, station.x_m === null ? 'not in the file' : [station.x_m, station.y_m, station.z_m].map((v) => v.toFixed(2)).join('  ').replaceAll('-', '−'));

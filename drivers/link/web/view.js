@@ -18,10 +18,10 @@ import {readTheme} from './view_theme.js';
 import {pointOf} from './cloud.js';
 
 const REST_MS = 120; // without a movement: the view rests
-const SHOW_MS = 160; // between two showings of a picture that grows; at least twice the time that one takes
+const SHOW_MS = 160; // between two updates of a picture that grows; at least twice the time that one takes
 const HOVER_MS = 70;
-const GONE_SHARE = 0.04; // of the points gone that are still drawn: drawn anew
-const PLAIN = 150_000; // points a frame: with fewer, it is plain
+const GONE_SHARE = 0.04; // of the capacity: if more drawn points are gone, the picture is drawn anew
+const PLAIN = 150_000; // with fewer points per frame, a frame is plain
 const COARSE = 0.5; // scale of such a frame
 const SHADING = 260; // eye-dome lighting: per unit of logarithmic depth
 
@@ -45,7 +45,7 @@ export class View extends EventTarget {
   #scheduled = false;
   #lost = false;
   #touched = false;
-  #fitted = 0; // points there were when it was fitted
+  #fitted = 0; // number of points when the view was fitted
   #pointSize = 2;
   #hover = {timer: 0, stop: null, point: null};
   #waiting = [];
@@ -59,7 +59,7 @@ export class View extends EventTarget {
   #made = null; // {target, camera} of a frame that is not on the page yet
   #grown = false; // more is drawn than on the page
   #showEvery = SHOW_MS;
-  #seen = this.camera; // with which what is on the page was drawn
+  #seen = this.camera; // camera of the picture that is on the page
 
   constructor(canvas, cloud) {
     super();
@@ -163,7 +163,7 @@ export class View extends EventTarget {
     this.#ask('restart');
   }
 
-  // From which value to which the ramp goes; without them: from what is there now.
+  // Sets the ramp's ends; without arguments: finds them from the present points.
   limits(lo, hi) {
     this.#scale.fix(lo, hi);
     this.#ask('restart');
@@ -195,7 +195,7 @@ export class View extends EventTarget {
     this.cameraMoved();
   }
 
-  // Turns about what is at a place of the canvas from now on, and goes half the way to it.
+  // From now on turns about the point at a place of the canvas, and goes half the way to it.
   lookAt({x, y}) {
     searchSlowly(this.cloud, this.camera, x, y, 12, (found) => {
       if (!found) return;
@@ -348,7 +348,7 @@ export class View extends EventTarget {
     }
   }
 
-  // What is shown, shaded, with what stands over it: into a target that goes onto the page once it is done.
+  // Draws the shown picture, shaded, with its overlay, into a target that goes onto the page once it is done.
   #present() {
     const gl = this.#gl;
     const {shade} = this.programs;
@@ -445,7 +445,7 @@ export class View extends EventTarget {
 
   // ---- what follows from the cloud
 
-  // True: too much is drawn of what is gone, or the colours' limits have changed.
+  // True: too many drawn points are gone, or the colours' limits have changed.
   #follow() {
     const {cloud} = this;
     const gone = cloud.gone;

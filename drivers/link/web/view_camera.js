@@ -9,7 +9,7 @@ export const NEAR_M = 1e-3;
 export const FAR_M = 1e6;
 const TURN = 2 * Math.PI;
 const STEEPEST = Math.PI / 2 - 1e-3;
-const FILLED = 0.97; // of the picture's width or height, by what is fitted into it
+const FILLED = 0.97; // share of the picture's width or height that a fitted box fills
 
 export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 export const add = (a, b, k = 1) => [a[0] + k * b[0], a[1] + k * b[1], a[2] + k * b[2]];
@@ -18,7 +18,7 @@ export const clamp = (v, lo, hi) => Math.min(hi, Math.max(lo, v));
 export const degrees = (rad) => ((rad * 180 / Math.PI) % 360 + 360) % 360;
 export const radians = (deg) => deg * Math.PI / 180;
 
-// Of a distance along the line of sight: 0 at NEAR_M, 1 at FAR_M.
+// Depth of a distance along the line of sight: 0 at NEAR_M, 1 at FAR_M.
 export const depthOf = (w) => Math.log2(w / NEAR_M) / Math.log2(FAR_M / NEAR_M);
 
 // A double as the sum of two floats; the difference to a float coordinate, hi first, loses nothing near the eye.
@@ -89,7 +89,7 @@ export class Camera {
     this.target = add(eye, this.forward, this.distance);
   }
 
-  // What lies at distance w goes with the pointer.
+  // A point at distance w follows the pointer.
   pan(dx, dy, w) {
     const k = w / this.focal;
     this.inside = false;

@@ -2,7 +2,7 @@
 // Colours of points: what each mode shows, its ramp and limits, and the legend for it. Pure.
 //
 // A point has one number, which the shader turns into a colour: `ramp` by a table of 256 colours between the limits,
-// `list` by a table of colours by number, `rgb` as it is. What is not known is GREY, not the end of a ramp.
+// `list` by a table of colours by number, `rgb` as it is. An unknown value is GREY, not the end of a ramp.
 
 export const NONE = Math.fround(-1e30); // in place of NaN, which shaders needn't know; the same in a Float32Array
 export const GREY = [128, 132, 138];
@@ -58,7 +58,7 @@ export function tableOf(mode) {
   return table;
 }
 
-// Which of ECHOES.
+// The index into ECHOES of a packed echo number and count.
 const echoClass = (packed) => {
   const echo = packed & 15, echoes = packed >> 4;
   return echoes <= 1 ? 0 : echo === 1 ? 1 : echo === echoes ? 3 : 2;
@@ -103,8 +103,8 @@ export function sampleOf(cloud, mode, most = 20000) {
   return all.filter((v) => v !== NONE && v === v);
 }
 
-// From the 1st to the 99th percentile, a little wider, so that single far points don't take all colours, and at least so far apart; null of
-// none.
+// Limits from the 1st to the 99th percentile, a little wider, so that single far points don't take all colours. They
+// are at least `least` apart; null without values.
 export function robustLimits(values, least = 0) {
   if (values.length === 0) return null;
   const sorted = Float64Array.from(values).sort();
@@ -114,7 +114,7 @@ export function robustLimits(values, least = 0) {
   return [lo - margin, hi + margin];
 }
 
-// The limits after more points: the same, unless they miss more than a tenth of what is there; then wider.
+// The limits after more points: widened where the fresh ones exceed them by more than a tenth of their range.
 export function widened(old, fresh) {
   if (old === null || fresh === null) return fresh ?? old;
   const slack = 0.1 * (old[1] - old[0]);
@@ -132,9 +132,9 @@ export function ticks([lo, hi], most = 6) {
   return out;
 }
 
-// What panels show of it: {mode, title, unit, none} and, of a ramp, {stops: colours, from, to, ticks: [{at, text}]}, of a
-// list, {items: [{label, name, colour}]}, the most frequent first; name undefined: what the page calls it. A colour is
-// [r, g, b] of 255. Of rgb null: there is nothing to explain, unless the points have no colours of their own.
+// The legend for panels: {mode, title, unit, none}. A ramp adds {stops: colours, from, to, ticks: [{at, text}]}, a list
+// {items: [{label, name, colour}]}, the most frequent first; if name is undefined, the page names the item. A colour is
+// [r, g, b] of 255. null for rgb, which needs no legend unless the points have no colours of their own.
 export function legendOf(mode, {limits, offset = 0, sample = [], hasColours = true}) {
   const {title, unit, kind, ramp} = MODES[mode];
   const legend = {mode, title, unit, none: GREY};

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// What is drawn, piece by piece, into a picture that is kept: a prefix of each part while the view moves, the rest of
-// each once it rests, and only what is new as points come.
+// Draws parts piece by piece into a picture that is kept: a prefix of each part while the view moves, the rest once it
+// rests, and only new points as they come.
 //
 // A part: {n, drawn, weight, skip, draw(from, to)}. `drawn` of its elements are in the picture being worked on. The
 // amount per step follows from the time that the last steps took on the GPU (by fences), so that a step takes STEP_MS.
@@ -12,7 +12,9 @@ const MOVE_MS = 55; // a frame while it moves
 const LEAST = 25_000;
 const MOST = 20_000_000;
 
-const EVENLY = 400_000; // of a resting view, before the rest comes part by part: each call to draw costs as 1000 points
+// Points of a resting view that are spread over all parts, before the rest comes part by part: each call to draw costs
+// as much as 1000 points.
+const EVENLY = 400_000;
 
 export class Budget {
   constructor(goal_ms, points) {
@@ -20,7 +22,7 @@ export class Budget {
     this.points = points;
   }
 
-  // A step of so many points took so long. Where it was cut short by lack of points, it says nothing of more.
+  // A step of `points` took `ms`. If it had fewer points than allowed, it says nothing about larger steps.
   took(ms, points) {
     const factor = Math.min(1.6, Math.max(0.4, this.goal_ms / Math.max(1, ms)));
     if (factor < 1 || points > 0.7 * this.points) this.points = Math.min(MOST, Math.max(LEAST, this.points * factor));
@@ -39,8 +41,8 @@ export function shares(parts, more) {
   return parts.map((part) => (part.skip ? part.drawn : Math.max(part.drawn, f === 1 ? part.n : Math.ceil(f * part.n))));
 }
 
-// The same of a view that rests: first a share of each, then one part after the other. A part that is `whole` comes at
-// once: what of it a share leaves out is not known later.
+// The same for a view that rests: first a share of each, then one part after the other. A part that is `whole` is drawn
+// at once, since later it is not known which of its elements a share has left out.
 export function restShares(parts, more) {
   if (progress(parts).drawn < EVENLY) {
     return shares(parts, more).map((upTo, i) => (parts[i].whole && !parts[i].skip && more > 0 ? parts[i].n : upTo));
@@ -54,9 +56,9 @@ export function restShares(parts, more) {
   });
 }
 
-// The targets: one that is shown, one that is drawn into (the same, or one that takes its place once it has enough), and
-// one of what goes onto the page. All of a moving view are smaller. A page's frame is made aside, and put onto the canvas
-// only once the GPU has it: a browser that composes in software waits for the canvas, and the page with it.
+// The targets: one that is shown, one that is drawn into (the same, or one that replaces it once it has enough points),
+// and one for the page. Those of a moving view are smaller. A frame for the page is drawn aside, and put onto the
+// canvas only once the GPU has it: a browser that composes in software waits for the canvas, and the page waits, too.
 export class Painter {
   moving = new Budget(MOVE_MS, 150_000);
   resting = new Budget(STEP_MS, 150_000);

@@ -91,8 +91,8 @@ void main() {
 }`,
 };
 
-// What was drawn, onto the page: the ground where nothing is, and darker beside what is nearer (Boucheny 2009, eye-dome
-// lighting): with logarithmic depth the same at all scales.
+// Puts the picture onto the page: the ground where nothing is, and darker beside nearer things (eye-dome lighting,
+// Boucheny 2009). With logarithmic depth the shading is the same at all scales.
 const SHADE = {
   vertex: `${HEAD}
 void main() { gl_Position = vec4(vec2(gl_VertexID & 1, gl_VertexID >> 1) * 4.0 - 1.0, 0.0, 1.0); }`,
@@ -206,7 +206,7 @@ export class Target {
   }
 }
 
-// Sets what all programs that place things need. `eye` relative to the thing's origin, split.
+// Sets the uniforms by which a program places things. `eye` is relative to the thing's origin, split.
 export function setPlace(gl, program, camera, eye) {
   const [right, up, forward] = camera.rotation;
   gl.uniform3fv(program.u_eye_hi, eye.hi);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// Limits of the colours and of the view, from what the cloud has. They change rarely, so that nothing flickers: each time
-// the cloud has twice the points, and then only where they miss much.
+// Limits of the colours and of the view, from the cloud's points. They change rarely, so that nothing flickers: each
+// time the cloud has twice the points, and then only if they miss much.
 
 import {MODES, legendOf, robustLimits, sampleOf, widened} from './view_colours.js';
 
@@ -71,8 +71,8 @@ function robustBox({blocks, origin}) {
   return {min: limits.map((l, a) => l[0] + origin[a]), max: limits.map((l, a) => l[1] + origin[a])};
 }
 
-// What a view of all shows: the points, or before there are any the scene; and the stations. sceneFirst: the scene, also
-// where there are points.
+// The box of a view of all: the points (or, before there are any, the scene), and the stations. sceneFirst: the scene,
+// even if there are points.
 export function boxOf(cloud, stations, solids, sceneFirst = false) {
   const scene = sceneFirst || cloud.count <= 500 ? solids.bounds() : null;
   const box = scene ?? (cloud.count > 500 ? robustBox(cloud) : cloud.bounds);

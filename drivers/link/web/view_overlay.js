@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// What stands over the points: scale bar, axes with north, stations' names and handles, the point under the pointer.
-// On a 2D canvas over the picture, so that lines and letters are sharp; each with an edge in the ground's colour.
+// The overlay over the points: scale bar, axes with north, stations' names and handles, the point under the pointer. It
+// is a 2D canvas over the picture, so that lines and letters are sharp; each has an edge in the ground's colour.
 
 import {roundBelow} from './view_camera.js';
 

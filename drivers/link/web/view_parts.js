@@ -90,7 +90,7 @@ class BlockPart {
     }
   }
 
-  // Once it is closed, or after every k-th point, `drawn` says nothing of which points are there.
+  // After the block was closed, or every k-th point was drawn, `drawn` does not say which points are in the picture.
   settle() {
     if (this.thinned || (this.block.closed && !this.#closed && this.drawn > 0 && this.drawn < this.n)) this.drawn = 0;
     this.thinned = false;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// What lies under the pointer: the nearest point on the screen, nearer ones before those behind them. Pure.
+// Finds the point under the pointer: the nearest one on the screen; nearer ones win over those behind them. Pure.
 //
 // Only blocks whose box meets the cone around the ray are looked through, 10 ns a point.
 
@@ -8,8 +8,8 @@ import {dot, sub} from './view_camera.js';
 // Four pixels beside the pointer count as much as lying a tenth further away.
 const PIXELS_PER_DEPTH = 4 / Math.log(1.1);
 
-// Can a box have a place at most `slope` from the ray, per length along it? By the sphere around it: never false where
-// it has. centre, half: relative to the eye.
+// Whether a box may have a place at most `slope` from the ray, per length along it. It tests the sphere around the box,
+// so it may be true without such a place. centre, half: relative to the eye.
 function meets(block, eye, forward, slope) {
   const c = [0, 1, 2].map((a) => 0.5 * (block.lo[a] + block.hi[a]) - eye[a]);
   const r = 0.5 * Math.hypot(...[0, 1, 2].map((a) => block.hi[a] - block.lo[a]));

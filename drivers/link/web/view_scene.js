@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// What is drawn besides points: the coarse scene, a recording's mesh, the stations. Owns their buffers on the GPU.
+// Draws all but the points: the coarse scene, a recording's mesh, the stations. Owns their buffers on the GPU.
 
 import {Mesh, useMesh} from './view_parts.js';
 import {featureEdges, legsMesh, parseScene, stationMesh} from './view_mesh.js';
@@ -57,7 +57,7 @@ export class Solids {
     return null;
   }
 
-  // Those of the kept picture, under the points.
+  // The parts of the kept picture, under the points.
   parts(camera, colours) {
     const parts = [];
     if (this.sceneMesh && this.sceneMode === 'solid') {
@@ -67,7 +67,8 @@ export class Solids {
     return parts;
   }
 
-  // Those over it, each time it is shown. behind: the kept picture's depth; plain: of the scene its longest edges alone.
+  // Draws over the kept picture, each time it is shown. behind: that picture's depth; plain: only the longest edges of
+  // the scene.
   overlay(camera, colours, stations, behind, plain) {
     const {gl} = this;
     gl.enable(gl.DEPTH_TEST);

@@ -7,7 +7,7 @@ import {feetBelow} from './view_mesh.js';
 import {toSegment} from './view_pick.js';
 
 const GRAB_PX = 18;
-const KEYS_END_MS = 700; // keys at rest for so long: it is let go
+const KEYS_END_MS = 700; // after so long without a key the station is let go
 
 export class Stations {
   list = [];
@@ -19,7 +19,7 @@ export class Stations {
   #timer = 0;
   #hold = null; // of a drag: {what, dx, dy, dHeading}
 
-  // changed(): to be drawn anew; tell(move): let go.
+  // changed(): the picture has to be drawn anew; tell(move): a station was let go.
   constructor(changed, tell) {
     this.#changed = changed;
     this.#tell = tell;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// The picture's colours, from the page's: its ground, ink and accent (CSS variables), as the shaders and the overlay want
-// them. The page's scheme decides which of the two sets of the rest is taken.
+// The picture's colours for shaders and overlay. Ground, ink and accent are the page's (CSS variables); the page's
+// scheme, light or dark, selects the set of the others.
 
 let probe = null;
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-// One connection with a head, decoded: what runs in the page's worker (wire_worker.js), or in the page itself where it
-// has no workers. It hands on what came in messages of many things, and reads no further while its owner has not
-// taken them (`ack`).
+// One connection with a head, decoded. It runs in the page's worker (wire_worker.js), or in the page itself if it has
+// no workers. It hands on frames and replies in messages of many, and reads no further until its owner has taken these
+// (`ack`).
 //
 // Two ways to read. A WebSocketStream is read when there is room: what isn't read stays with the head, which leaves
 // out whole frames for this reader and says how many, or waits, as its link is set. A plain WebSocket can't be told to
@@ -29,7 +29,7 @@ export class Wire {
   #room = null; // resolves when the owner has taken enough
   #opening = 0; // a timer, as
   #limit = 0;
-  #number = 0; // of the connection: what comes late from an older one is nothing
+  #number = 0; // of the connection, so that late events of an older one are ignored
   #past = new Past({give: (batch) => this.#addPast(batch), hasRoom: () => this.#untaken < MAX_UNTAKEN});
   #pastUrl = null;
 
@@ -88,8 +88,8 @@ export class Wire {
     this.#socket = typeof WebSocketStream === 'function' ? readStream(url, on) : readSocket(url, on);
   }
 
-  // Open is what isn't refused: a link whose places are taken says so after the connection is there, and what would be
-  // sent to it before that would cost its words.
+  // A connection counts as open once it has not been refused for a while: a link whose places are taken says so only
+  // after connecting, and its reason would be lost if something were sent before.
   #open() {
     if (this.#opening === 0) return;
     clearTimeout(this.#opening);
@@ -164,7 +164,7 @@ export class Wire {
     this.#transfer.push(batch.x.buffer);
   }
 
-  // Before live points that have not been handed on it would be in the middle of their batch.
+  // Live points that wait are handed on first: else this batch would be in the middle of theirs.
   #addPast(batch) {
     this.decoder.flush();
     this.#addPoints(batch);

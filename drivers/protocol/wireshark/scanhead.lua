@@ -4,12 +4,12 @@
 --     wireshark -X lua_script:scanhead.lua scan.pcapng
 --
 -- One file, so that a copy of it is all that Wireshark needs. From top to bottom: checksum, tables of fields, sequence
--- numbers, what the stream has said of itself, items of the tree, the search for frames, carriers.
+-- numbers, state of the stream, items of the tree, the search for frames, carriers.
 --
--- What depends on earlier packets (sequence, scales, anchor, replies) is worked out when a packet is seen for the first
--- time, and kept by packet: the same packet always shows the same. Written for Lua 5.2 and later.
+-- Facts from earlier packets (sequence, scales, anchor, replies) are found when a packet is seen for the first time,
+-- and kept by packet. So the same packet always shows the same. Written for Lua 5.2 and later.
 
--- It may be installed, and named on the command line, too. An unknown name is nil here, or an error.
+-- The script may be loaded twice: installed, and named on the command line. An unknown name is nil here, or an error.
 local is_asked, known = pcall(Dissector.get, "scanhead")
 if is_asked and known then return end
 
@@ -51,7 +51,7 @@ local function make_tables()
   end
 end
 
--- Of n bytes of a string, from the position `at` on, which counts from 0.
+-- The CRC of n bytes of a string from position `at`, counted from 0.
 local function crc32c(bytes, at, n)
   if not low_half then make_tables() end
   local low, high, crc = low_half, high_half, 0xffffffff
@@ -114,7 +114,7 @@ local function time_of(ns)
   return NSTime.new(s:tonumber(), (ns - s * 1000000000):tonumber())
 end
 
--- A kind: how long it is on the wire, its field in Wireshark, and its value where that is not what Wireshark reads.
+-- A kind: its length on the wire, its field in Wireshark, and its value if Wireshark reads another one.
 local function micro(range) return range:le_uint64():tonumber() / 1e6 end
 local function signed_micro(range) return range:le_int64():tonumber() / 1e6 end
 local KINDS = {
@@ -139,8 +139,8 @@ local KINDS = {
   text = {nil, ProtoField.string},
 }
 
--- A table of PROTOCOL.md: {name, kind, title, unit or names of values, count}. Of a text the fourth is its width. Of
--- `hex` and `zero` it is how far known bits go: what is above them is reserved.
+-- A table of PROTOCOL.md: {name, kind, title, unit or names of values, count}. The fourth is the width for a text; for
+-- `hex` and `zero` it gives the known bits: the bits above them are reserved.
 local function rows_of(prefix, rows)
   local at = 0
   for _, row in ipairs(rows) do
@@ -398,7 +398,7 @@ local function look_at_jump(s, h)
   return RESTARTED
 end
 
--- h.look is all by which frames are compared. Gives what is noticed: kind, first frame missing, how many.
+-- Frames are compared by h.look. Returns the notice: kind, first missing frame, how many.
 local function take_sequence(s, h)
   if h.is_local then
     if s.last_local == h.look then return REPEATED end
@@ -416,8 +416,8 @@ local function take_sequence(s, h)
   return kind, first, n
 end
 
--- ---- payloads: what is wrong with one, as native_decode.c has it, and what later frames need of it. Positions count
--- from 0, payloads begin at `at`.
+-- ---- payloads: errors in one, as native_decode.c finds them, and values that later frames need. Positions count from
+-- 0, payloads begin at `at`.
 
 local function number_at(bytes, at, format) return (unpack_bytes(format or "<I4", bytes, at + 1)) end
 -- Exact up to 2^53.
@@ -521,7 +521,7 @@ local function wrong_payload(h, bytes, at)
   return problem or WRONG[h.type] and WRONG[h.type](bytes, at, h.length)
 end
 
--- ---- what the stream has said of itself, as drivers/host/state.c follows it
+-- ---- the state that the stream describes, as drivers/host/state.c follows it
 
 local function forget(flow) flow.descriptor, flow.anchor, flow.emitter = nil, nil, nil end
 
@@ -633,7 +633,7 @@ end
 
 -- ---- items of the tree
 
--- Whether anybody looks: the tree is shown, or a filter or a column asks for one of these.
+-- Whether these fields are needed: the tree is shown, or a filter or a column uses one of them.
 local function is_wanted(tree, fields)
   if tree.visible then return true end
   for _, field in ipairs(fields) do
@@ -718,7 +718,7 @@ local function geocentric(lat_deg, lon_deg, height)
     (n * (1 - e2) + height) * s
 end
 
--- Of the fields of points, by what follows their dot, those that somebody looks at; a frame has thousands of points.
+-- The fields of points that are needed, by the name after their dot; a frame has thousands of points.
 local function looked_at(tree)
   local wanted, any = {}, false
   for _, name in ipairs({"pulse", "t_s", "echo", "echo_count", "label", "reflectance_db", "range_m", "line_deg",
@@ -871,7 +871,7 @@ end
 
 local RECORDS = {[POINTS] = put_points, [ATTRIBUTES] = put_attributes, [COLOURS] = put_colours,
                  [SURFACES] = put_surfaces, [POSES] = put_poses, [EMITTER] = put_beams}
--- Bytes of a payload with its records, for what may stand after them.
+-- Length of a payload with its records; bytes after that may belong to a later version.
 local function known_len(h, bytes, at)
   if h.type == POINTS then return 40 + 20 * number_at(bytes, at + 36) end
   if h.type == ATTRIBUTES then return 16 + 4 * number_at(bytes, at + 12) end
@@ -883,7 +883,7 @@ local function known_len(h, bytes, at)
   return math.min(ROWS[h.type].len, h.length)
 end
 
--- What a, b and c of an event are; {name, "s"} is nanoseconds, {name, STATES} a state.
+-- Names of an event's a, b and c; {name, "s"} is nanoseconds, {name, STATES} a state.
 local SECONDS = "s"
 local EVENTS = {
   {"new state", "state before"}, {"scan", "device time of pulse 0", "its GPS time"},
@@ -943,7 +943,7 @@ local function put_payload(tree, tvb, bytes, at, h, m)
   end
 end
 
--- What later frames said of it, or it of earlier ones.
+-- Findings that link it to earlier or later frames.
 local function put_findings(tree, h, m)
   if m.notice then
     tree:add(F["seq.notice"], m.notice):set_generated()
@@ -992,7 +992,7 @@ local function put_header(tree, tvb, at, header_ok, payload_ok)
   if not header_ok then crc:add_proto_expert_info(E.bad_header) end
 end
 
--- What the packet list says of a frame.
+-- The text of a frame in the packet list.
 local function summary(h, bytes, at, m)
   local name = TYPES[h.type] or string.format("Type %d", h.type)
   if m.wrong or h.version ~= 1 then return name .. " [wrong]" end
@@ -1017,7 +1017,7 @@ end
 
 -- ---- the search for frames, as native_parser.c does it
 
--- What a correct header says; nil: these are none. 28 bytes of it are there.
+-- The fields of a header, or nil if it is not correct. 28 bytes have to be there.
 local function header_at(bytes, at)
   if byte(bytes, at + 1) ~= SYNC then return nil end
   local _, kind, version, flags, length, seq, payload_crc = unpack_bytes("<BBBBI4I4I4", bytes, at + 1)
@@ -1043,8 +1043,8 @@ local function new_flow()
           line = {pulses = 0, whole = false}}
 end
 
--- What was found in a packet when it came first. Wireshark may cut the same bytes otherwise when it looks again: so the
--- content is the key, and what is there twice is a list that is taken in turns.
+-- Findings of a packet's first look. Wireshark may cut the same bytes otherwise at the next look, so the content is the
+-- key. Equal contents share a list, which is taken in turns.
 local memo
 
 local function memo_of(pinfo)
@@ -1083,8 +1083,8 @@ local function note_info(pinfo, words)
   pinfo.cols.info:append((tostring(pinfo.cols.info) == "" and "" or "; ") .. words)
 end
 
--- Looks into one piece of the stream: first it finds what is there (`items`), then it shows that, or not yet. can_wait:
--- more bytes may come.
+-- Searches one piece of the stream: first it finds items (`items`), then it shows them, or waits. can_wait: more bytes
+-- may come.
 local Search = {}
 Search.__index = Search
 
@@ -1132,7 +1132,7 @@ function Search:end_garbage()
   self:add(self.show_garbage, from, self.at, self.conn.is_stream and not self.started)
 end
 
--- reach: up to where it took bytes to see that.
+-- Skips bytes up to `to`. reach: the end of the bytes that were needed to decide this.
 function Search:skip(to, reach)
   if not self.garbage then self.garbage = self.at end
   self.reach = math.max(self.reach, reach or to)
@@ -1184,7 +1184,7 @@ function Search:take_broken(h, is_cut)
   self.in_step = false
 end
 
--- true: it waits, for so many bytes (nil: not known); else it went on.
+-- Returns true and a number when it waits for that many bytes (nil: not known); else it went on.
 function Search:look_frame()
   local have = self.len - self.at
   if have < HEADER_LEN then
@@ -1233,9 +1233,9 @@ function Search:look_text()
   self:skip(self.len)
 end
 
--- Gives where it waits, for how many bytes more (nil: not known), and whether TCP must not join them: what stands
--- before that place was found with bytes from beyond it, or the place is within the bytes that the last search has
--- waited with. Or nothing, where all is used.
+-- Returns nothing if all bytes are used. Else the place where it waits, the number of bytes that it waits for (nil: not
+-- known), and whether TCP must not join them. It must not where items before the place were found with bytes from
+-- beyond it, or where the place lies within the bytes that the last search has kept.
 function Search:run()
   local waits, more
   while self.at < self.len and not waits do
@@ -1294,14 +1294,14 @@ local function conn_of(key, is_stream)
   return conns[key]
 end
 
--- What tells connections apart is taken from pinfo: fields of other dissectors are not there when Wireshark reads a
+-- Connections are identified by pinfo, since fields of other dissectors are not there when Wireshark reads a
 -- capture for the first time and shows nothing yet.
 local PORT_TYPE_TCP = 2
 local function tcp_key(pinfo)
   local one, other = tostring(pinfo.src) .. " " .. pinfo.src_port, tostring(pinfo.dst) .. " " .. pinfo.dst_port
   return one < other and one .. " " .. other or other .. " " .. one
 end
--- Of USB one end is `host`, the other one bus, device and endpoint.
+-- On USB one end is `host`, the other one is bus, device and endpoint.
 local function usb_end(pinfo)
   local from, to = tostring(pinfo.src), tostring(pinfo.dst)
   if to == "host" then return "usb " .. from, true end
@@ -1313,8 +1313,8 @@ local function begin_packet(pinfo)
   pinfo.cols.info:clear()
 end
 
--- Frames that go on in the next packet are joined here, unless `ask` gets TCP to do it: ask(at, more). At some places
--- TCP would give again what was taken already, or cut it otherwise at the next look. There, too, it is done here.
+-- Frames that go on in the next packet are joined here, unless `ask` has TCP do it: ask(at, more). They are joined here
+-- also where TCP would give bytes again that were taken already, or cut them otherwise at the next look.
 local function dissect_joined(tvb, pinfo, tree, conn, side, run, ask)
   local key, packet, first_time = side .. tvb:offset(), memo_of(pinfo), not pinfo.visited
   local kept = packet[key]
@@ -1369,7 +1369,7 @@ local function is_from_head(tvb, pinfo, conn)
   return pinfo.src_port < pinfo.dst_port
 end
 
--- The same for ever, once a packet was seen.
+-- The side is fixed once a packet was seen.
 local function side_of(tvb, pinfo, conn)
   local packet = memo_of(pinfo)
   if packet.side == nil then packet.side = is_from_head(tvb, pinfo, conn) end
@@ -1443,7 +1443,7 @@ DissectorTable.get("ws.protocol"):add("scanhead-native-1", web)
 local USER0 = wtap and wtap.USER0 or wtap_encaps and wtap_encaps.USER0 or 45
 
 local port
-local others = DissectorTable.get("wtap_encap"):get_dissector(USER0) -- what Wireshark does with it by itself
+local others = DissectorTable.get("wtap_encap"):get_dissector(USER0) -- Wireshark's own dissector for it
 local function register()
   local tcp, encapsulations = DissectorTable.get("tcp.port"), DissectorTable.get("wtap_encap")
   if port then tcp:remove(port, scanhead) end
