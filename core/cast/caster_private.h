@@ -8,7 +8,7 @@
 /* Pulses worked on at a time: the arrays stay in the second-level cache, the hits' planes are on their way.
  */
 enum { CHUNK = BVH_CHUNK, CAST_FOUND = CHUNK * CAST_MAX_DEPTH };
-/* Arrays whose distance is a power of two, or a page, would get into each other's way in a cache. */
+/* Arrays whose distance is a power of two, or a page, would collide in a cache. */
 enum { CHUNK_ROOM = CHUNK + 48, CAST_LIST = CHUNK * LINE_MAX_ECHOES + 80 };
 enum { CAST_NO_PATH = 0xffffffff };
 

@@ -89,7 +89,8 @@ struct sight_record {
 #define SIGHT_TILT_DOUBT 0x1p-38
 /* Of plane . d, against the plane's length: its components 1, the product 3; twice, here and there. */
 #define SIGHT_PLANE_DOUBT (16.0 * 0x1p-53)
-/* Sines of angles below this are not decided here. Below 1e-6 core/bvh holds ranges between edges. */
+/* Planes seen at a smaller sine are not decided here. Below 1e-6 core/bvh limits ranges to those between
+ * the edges. */
 #define SIGHT_GRAZE 0x1p-15
 /* core/bvh takes ranges within 1e-12 of each other for the same: the lowest triangle wins. Above
  * this they are not for certain. */
