@@ -4,7 +4,7 @@
 #include <dlfcn.h>
 #include <string.h>
 
-/* The names that a program linked with them would have: the Makefile asks the libraries. */
+/* The sonames that a linked program would record: the Makefile reads them from the libraries. */
 static const struct {
     const char *file, *needs;
 } libraries[] = {

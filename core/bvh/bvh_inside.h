@@ -99,8 +99,8 @@ struct bvh {
     struct bvh_copy *copy;   /* [scene->n_copies] */
     struct bvh_plane *plane; /* one more than there are: the last stands for a miss, all NaN */
     double origin_m[3];      /* the middle of the scene, or where most of its triangles are (leaves.c) */
-    double radius_m;         /* nothing of it is further from there */
-    double stretch_m;        /* float rays are no longer; INFINITY: as long as they like */
+    double radius_m;         /* no vertex of the scene is further from there */
+    double stretch_m;        /* float rays are no longer than this; INFINITY: they have any length */
     struct bvh_info info;
     int64_t bytes; /* as Embree reports */
 };
@@ -138,7 +138,7 @@ struct bvh_query {
     double range_m[BVH_PACKET];    /* out: of the nearest so far; INFINITY: none */
     uint32_t triangle[BVH_PACKET]; /* out: the hit */
     double hit_m[BVH_PACKET];      /* out: its range */
-    uint32_t unsure;               /* a bit for each ray of which another hit may have a lower number */
+    uint32_t unsure;               /* a bit for each ray that may have another hit of lower number */
     double near_m[BVH_PACKET];     /* of the nearest triangle that is missed by rounding alone; INFINITY: none */
     uint32_t near[BVH_PACKET];
     uint64_t decided, leaves; /* struct bvh_counters */

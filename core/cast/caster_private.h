@@ -5,8 +5,7 @@
 
 #include "core/cast/kernels.h"
 
-/* Pulses worked on at a time: the arrays stay in the second-level cache, the hits' planes are on their way.
- */
+/* Pulses worked on at a time: the arrays fit into the second-level cache while the hits' planes are fetched. */
 enum { CHUNK = BVH_CHUNK, CAST_FOUND = CHUNK * CAST_MAX_DEPTH };
 /* Arrays whose distance is a power of two, or a page, would collide in a cache. */
 enum { CHUNK_ROOM = CHUNK + 48, CAST_LIST = CHUNK * LINE_MAX_ECHOES + 80 };
@@ -86,7 +85,7 @@ struct path_hit {
 /* Rays that go on through glass or off a mirror: their origins, directions, and hits before. */
 struct path_rays {
     uint32_t n;
-    uint32_t ray[CHUNK]; /* of those that they go on from */
+    uint32_t ray[CHUNK]; /* number of the ray that each goes on from */
     struct chunk_vectors p, d;
     double length_m[CHUNK]; /* of the way so far */
     double energy[CHUNK];
@@ -130,13 +129,13 @@ void caster_aim(struct caster *c, struct chunk *k);
 void caster_aim_read(struct caster *c, struct chunk *k);
 
 /* ---- upset.c: disturbances of the head; each is called only where the setup has it. */
-/* The angles of a chunk with their wobbles. */
+/* Adds wobbles to the angles of a chunk. */
 void caster_wobble(struct caster *c, const struct chunk *k);
 /* socs -> socs: directions as the encoders read them become those of a beam whose pan has slipped. */
 void caster_slip(const struct cast_upset *upset, double slip[9]);
-/* Shots of a laser that does not fire. */
+/* Makes all shots empty, as of a laser that does not fire. */
 void caster_darken(struct caster *c, const struct chunk *k);
-/* What comes back through a window that is soiled. */
+/* Weakens the returns by a soiled window. */
 void caster_weaken(const struct cast_upset *upset, uint32_t n, double *rho);
 
 /* ---- nearest.c */
@@ -171,7 +170,7 @@ void caster_follow(struct caster *c, const struct cast_setup *s, const struct me
 /* The pulses of a chunk as footprints -> the list, with rho where something asks for it. */
 void caster_sub_rays(struct caster *c, const struct chunk *k);
 
-/* ---- echoes.c: from what was met to what the head reports; the list has a place for each pulse. */
+/* ---- echoes.c: from hits to the echoes that the head reports; the list has a place for each pulse. */
 /* Further echoes of a pulse: room for n at the end of the list. Returns the first. */
 uint32_t echoes_further(struct echo_list *list, uint32_t pulse, uint32_t n);
 void caster_echoes(struct caster *c, const struct chunk *k);
