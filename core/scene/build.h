@@ -74,7 +74,8 @@ int build_weld_begin(struct scene_build *b, struct build_weld *w, uint64_t verti
 int build_weld_vertex(struct scene_build *b, struct build_weld *w, const double v[3], struct sh_err *err);
 void build_weld_free(struct build_weld *w);
 
-/* A colour that a file says, times scale, as scene->rgb has it. What is beyond 0..255, or NaN, is limited and counted. */
+/* A colour that a file says, times scale, as scene->rgb has it. Values beyond 0..255, and NaN, are limited and
+ * counted. */
 void build_rgb(struct scene_build *b, const double colour[3], double scale, uint8_t rgb[4]);
 
 /* The range of floating colours is judged by these counts. Zero-initialise. */
@@ -88,7 +89,7 @@ void build_rgb_look(struct build_rgb_range *range, double number);
  * white. */
 double build_rgb_scale(const struct build_rgb_range *range);
 
-/* Makes room for n corners in corner, corner_uv and corner_rgb; what is in them stays. */
+/* Makes room for n corners in corner, corner_uv and corner_rgb; their contents stay. */
 int build_corners(struct scene_build *b, size_t n, struct sh_err *err);
 /* Adds the polygon of the n >= 3 corners in corner. */
 int build_polygon(struct scene_build *b, size_t n, uint16_t label, struct sh_err *err);
@@ -108,7 +109,7 @@ int build_single(struct scene_build *b, double largest, double error, bool refus
 int build_label(struct scene_build *b, struct text_span object, struct text_span material, uint16_t *label,
                 struct sh_err *err);
 
-/* Which surfaces have colours at the corners of their triangles. */
+/* Notes which surfaces have colours at the corners of their triangles. */
 void build_note_colours(struct scene *scene);
 
 /* A texture as a reader finds it. */

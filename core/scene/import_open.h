@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Files as Assimp opens them while it imports: the mesh, and what it names (buffers of a glTF, ...). Only regular files, as
- * core/infile.h has it: a FIFO would be waited for. */
+/* Files as Assimp opens them while it imports: the mesh, and what it names (buffers of a glTF, ...). Only regular
+ * files, as in core/infile.h: opening a FIFO would wait. */
 #ifndef CORE_SCENE_IMPORT_OPEN_H
 #define CORE_SCENE_IMPORT_OPEN_H
 
