@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* The BVH: what rays meet first in a scene, exactly, wherever they begin.
+/* The BVH: the exact first hits of rays in a scene, wherever the rays begin.
  *
  * In: a scene (vertices in double, prcs, metres), rays as points and unit directions in prcs. Out: for each
- * ray the range (m) to what it meets first, the triangle, and its label.
+ * ray the range (m) of its first hit, the triangle, and its label.
  *
  * Embree finds leaves for float rays, in packets of the machine's native width. The leaves decide in double which ray
- * meets which triangle, and where that is not enough without any rounding. Ranges are those of the triangles' planes in
- * double. How that is proven: core/bvh/bvh_inside.h.
+ * hits which triangle, and without any rounding where double is not enough. Ranges are those of the triangles' planes
+ * in double. The proof is in core/bvh/bvh_inside.h.
  *
  * A BVH depends on the scene alone. It is constant after it is made, and may be used from any thread; each thread has
  * working memory of its own. */
@@ -33,8 +33,8 @@ int bvh_create(const struct scene *scene, unsigned threads, const struct sh_repo
                struct sh_err *err);
 void bvh_free(struct bvh *bvh);
 
-/* Rays per Embree call: 1, 4, 8 or 16; for measuring and tests. 1 where this machine has no such packets. The hits are
- * the same. */
+/* Rays per Embree call: 1, 4, 8 or 16; for measuring and tests. Where this machine has no such packets, it is 1. The
+ * hits are the same. */
 void bvh_set_packet(struct bvh *bvh, uint32_t rays);
 /* This machine's engine, in words: Embree's version, rays a packet, instructions. Where two machines
  * say the same, the same rays meet the same triangles. */
@@ -44,8 +44,8 @@ void bvh_get_info(const struct bvh *bvh, struct bvh_info *info);
 void bvh_origin(const struct bvh *bvh, double origin_m[3]);
 const struct scene *bvh_scene(const struct bvh *bvh);
 
-/* The plane of a triangle in the local frame: points p of it have n . p = d. n is e1 x e2, twice the area
- * long. */
+/* The plane of a triangle in the local frame: its points p have n . p = d. n is e1 x e2: its length is
+ * twice the area. */
 struct bvh_plane {
     double n[3], d;
 } __attribute__((aligned(32))); /* half a cache line */
@@ -80,7 +80,7 @@ struct bvh_rays {
     struct bvh_origins from;
     struct vec3_in dir; /* unit vectors, prcs */
     double range_max_m; /* hits beyond it may or may not be reported */
-    int scattered;      /* neighbours have nothing in common: one by one */
+    int scattered;      /* 1: neighbours have nothing in common, and are cast one by one */
     /* out: */
     double *range_m;    /* along the ray; NaN: it meets nothing */
     uint32_t *triangle; /* of the scene; BVH_NO_TRIANGLE */
@@ -90,7 +90,7 @@ struct bvh_rays {
 
 struct bvh_counters {
     uint64_t leaves;  /* that packets were tested against, each for all its rays */
-    uint64_t decided; /* pairs of a ray and a triangle, so near an edge that they were looked at by themselves */
+    uint64_t decided; /* pairs of ray and triangle so near an edge that they were examined singly */
 };
 
 /* Cost by stage, for measuring: `now` counts in any unit and is read between the stages of each chunk. The
@@ -100,7 +100,7 @@ struct bvh_profile {
     uint64_t (*now)(void);
     uint64_t last, spent[2 * BVH_STAGES];
 };
-/* The time since the stage before belongs to this one. */
+/* Adds the time since the end of the stage before to this one. */
 static inline void bvh_stage_ends(struct bvh_profile *profile, int stage)
 {
     if (profile == NULL) return;
@@ -118,20 +118,21 @@ const struct bvh_counters *bvh_work_counters(const struct bvh_work *work);
 struct bvh_profile *bvh_work_profile(const struct bvh_work *work);
 /* Directions of the last chunk, as Embree gets them. */
 struct vec3_floats bvh_work_directions(const struct bvh_work *work);
-/* Sets them, for n <= BVH_CHUNK rays that something else than bvh_hits decides. */
+/* Sets them, for n <= BVH_CHUNK rays that are decided without bvh_hits. */
 void bvh_work_set_directions(struct bvh_work *work, const struct vec3_in *dir, uint32_t n);
 
-/* Exact hits. What a ray begins on, within half a micrometre, it does not meet. Range error: see
+/* Exact hits. A ray does not hit the surface that it begins on, within half a micrometre. Range error: see
  * tests/accuracy. Allocates nothing. */
 void bvh_hits(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays);
 
-/* The range of what one ray meets first; NaN: nothing. */
+/* The range of one ray's first hit; NaN: none. */
 double bvh_ray(struct bvh_work *work, const struct bvh *bvh, const double at_m[3], const double dir[3]);
 
-/* ---- for rays from one point whose triangles are known otherwise (core/sight); no scene with holes. */
+/* ---- for rays from one point whose triangles are known from elsewhere (core/sight); not for scenes with
+ * holes. */
 
-/* Rays from .. to - 1 meet that triangle, or nothing (BVH_NO_TRIANGLE): their ranges, labels and steepness, bit by
- * bit what bvh_hits has. Up to seven more of the rays may be overwritten, so later ones are to be set after. */
+/* Rays from .. to - 1 hit that triangle, or nothing (BVH_NO_TRIANGLE). Sets their ranges, labels and steepness,
+ * bit by bit as bvh_hits does. It may overwrite up to seven rays after these, so set later ones afterwards. */
 void bvh_ranges_of(const struct bvh *bvh, uint32_t triangle, const struct bvh_rays *rays, uint32_t from, uint32_t to);
 /* The same where each has its own triangle[0 ..]; numbers beyond the scene's are passed over. */
 void bvh_ranges_each(const struct bvh *bvh, const uint32_t *triangle, const struct bvh_rays *rays, uint32_t from,

@@ -29,7 +29,7 @@
 enum { CAST_MAX_MOVERS = 16, CAST_MAX_WOBBLES = 32 };
 
 /* A rigid body that moves, with a BVH of its own, built at rest: p_prcs = rotation * p_rest + shift_m. The
- * pose holds for the runs that are cast with it; rays that pass by the sphere around the body cost one test a
+ * pose holds for the runs that are cast with it; rays that miss the sphere around the body cost one test a
  * chunk. */
 struct cast_mover {
     const struct bvh *bvh;
@@ -37,8 +37,8 @@ struct cast_mover {
     double rotation[9], shift_m[3];
 };
 
-/* What the head stands on, and so does not see. It is looked at for the pulse's first way alone: what mirrors
- * show of it is legs, if there are any. */
+/* The tripod under the head: a cone without echoes, and maybe legs. The cone hides only a pulse's first path;
+ * mirrors show the legs, if there are any. */
 struct cast_tripod {
     double down[3]; /* unit, prcs: along the plumb line, however the head is tilted */
     double
@@ -47,17 +47,16 @@ struct cast_tripod {
     struct cast_mover legs; /* a body that stands still */
 };
 
-/* Glass and mirrors that a pulse may meet, one after the other, and still be followed. */
+/* A pulse is followed through at most so many panes and mirrors. */
 enum { CAST_MAX_DEPTH = 4 };
 
-/* What happens between a hit and a point, as far as a configuration asks for it. Each part is left out where
- * it is NULL or 0. Where all of it is, cast_setup.detect is NULL.
+/* The steps between a hit and a point that a configuration asks for. A part that is NULL or 0 is left out.
+ * Where all are, cast_setup.detect is NULL.
  *
- * Echoes of a pulse: of each pane that it passes, and of what lies beyond. A mirror has none of its own
- * unless its reflectance says so; what is seen in it is a ghost, at the length of the folded way along the
- * beam, with a label of its own: ghost_label more than the surface's. Only pulses that meet such a surface
- * are cast again; a way does not branch.
- * Panes are of no thickness but their mesh's: not refracted. */
+ * A pulse has an echo of each pane that it passes, and of the surface beyond. A mirror has one only where
+ * its reflectance says so. A surface seen in a mirror gives a ghost: its range is the length of the folded
+ * path, along the beam, and its label is ghost_label more than the surface's. Only pulses that hit glass
+ * or a mirror are cast again; a path does not branch. Panes don't refract, and are as thick as their mesh. */
 struct cast_detect {
     const struct instrument *instrument;
     const struct surface_table *surfaces; /* for signal and depth; must outlive the scan */
@@ -72,10 +71,10 @@ struct cast_detect {
     const struct detect_ball *ball;
 };
 
-/* A beam with a footprint (core/footprint.h). Constant; any thread. With cast_detect, echoes weigh by what
- * comes back of them, each by itself is detected or not, and has noise of its own. Where a footprint of an
- * adaptive beam lies on glass or a mirror, in part or as a whole, it is cast as rings: the outlines of what
- * is seen there are not known. */
+/* A beam with a footprint (core/footprint.h). Constant; any thread. With cast_detect, echoes are weighted
+ * by the power that comes back. Each is detected, and has noise, by itself. Where any part of an adaptive
+ * beam's footprint lies on glass or a mirror, it is cast as rings: the outlines of what is seen there are
+ * not known. */
 struct cast_beam {
     struct beam beam;
     enum beam_mode mode; /* BEAM_RINGS, or BEAM_ADAPTIVE with outlines: then the head and the scene stand still,
@@ -85,23 +84,23 @@ struct cast_beam {
     const struct beam_outlines *outlines;
 };
 
-/* Colours of points. Range and height are those that are sent (the height along the beam as it went, where encoders
- * err), the frame that of the pulse. */
+/* Colours of points. Range is the one that is sent; where encoders err, height is along the true beam. The frame
+ * scalar is that at the pulse's firing time. */
 struct cast_colour {
     struct colour_scale scale;
     double frame;                           /* of a head that stands; a moving one has those of its knots */
     const struct surface_colours *surfaces; /* texture; must outlive the scan */
 };
 
-/* What has gone wrong with a head, for the runs that are cast with it. Its encoders read wobbles; of the rest it knows
- * nothing. All 0, with a share of 1: nothing. */
+/* Disturbances of a head, for the runs that are cast with it. Its encoders read the wobbles; the head doesn't notice
+ * the others. All 0, with a share of 1: none. */
 struct cast_upset {
     int dark;         /* the laser does not fire: every shot is empty */
     double slip_turn; /* the beam goes so much farther in pan than its encoder reads */
-    /* Of the optical power that a clean window lets through, both ways together. With a signal model each return is so
-     * much weaker, and detect.h has the rest. Without one the fixed part of the range noise grows by 1 / share. That is
-     * the jitter of detect.h: rise time over the ratio of signal and noise as voltages (Skolnik). The voltage goes with
-     * the optical power, and a receiver's thermal noise is the same without light. */
+    /* The share of the optical power that a clean window lets through, both ways together. With a signal model each
+     * return is so much weaker, and detect.h has the rest. Without one the fixed part of the range noise grows by 1 /
+     * share. That is the jitter of detect.h: rise time over the ratio of signal and noise as voltages (Skolnik). The
+     * voltage goes with the optical power, and a receiver's thermal noise is the same without light. */
     double share;
     uint32_t n_wobbles; /* the axes run ahead and behind: turn * sin(2 pi hz (t - begin)), t since the scan's start */
     struct cast_wobble {
@@ -117,8 +116,8 @@ void cast_wobble(const struct cast_upset *upset, int64_t t_ns, double *mirror_tu
 struct cast_setup {
     const struct bvh *bvh;
     /* NULL: none. Else of the BVH and of station_m: rays that begin there are looked up in it, with the same
-     * hits. The BVH has all others: beams that begin beside the station, sub-rays, what glass and mirrors show,
-     * bodies that move. A head that moves has none. */
+     * hits. All other rays are cast into the BVH: beams that begin beside the station, sub-rays, rays beyond
+     * glass and mirrors, and those to moving bodies. A head that moves has no sight. */
     const struct sight *sight;
     const struct georef *georef; /* geo layout */
     double station_m[3];         /* the head's origin, prcs */
@@ -140,15 +139,15 @@ struct cast_setup {
         pulse_m; /* c tau / 2 of the pulse, a beam's resolution_m; for the widths of echoes, where a block has room */
     uint32_t n_movers;
     struct cast_mover mover[CAST_MAX_MOVERS];
-    const struct cast_tripod *tripod; /* NULL: none. Of a head that stands still */
+    const struct cast_tripod *tripod; /* NULL: none. For a head that stands still */
     /* A moving head: poses of the head (socs -> prcs) in order of time, pose_between them. They cover the
      * firing times of the runs; before the first and after the last the head stands. station_m is then only
      * what geo positions are relative to, and rotation is not used. n_knots 0: the head stands still at
      * station_m. */
     uint32_t n_knots;
     const struct pose_knot *knot;
-    /* NULL: every hit within the limits is one echo, the head is ideal. Its max_echoes is also the beam's. */
     const uint8_t *silent; /* by label: surfaces that hide what is behind them and give no echo; NULL: none */
+    /* NULL: every hit within the limits is one echo, the head is ideal. Its max_echoes is also the beam's. */
     const struct cast_detect *detect;
     const struct cast_colour *colour; /* for blocks with room for colours; NULL: none, and nothing is spent on them */
     const struct cast_upset *upset;   /* NULL: nothing has gone wrong. Not for caster_meet */
@@ -160,7 +159,7 @@ struct cast_counters {
     uint64_t few, asked; /* with a sight: struct sight_counters */
     uint64_t unfit;      /* echoes whose position did not fit into the wire's integers: sent as shots without echo */
     uint64_t faint;      /* hits below the detection threshold, in a blind time, or on a surface without echo: shots
-                       * without echo, or echoes less */
+                          * without echo, or fewer echoes */
     uint64_t crowded;    /* echoes beyond max_echoes: the weakest, left out */
     uint64_t hidden;     /* pulses into the tripod's cone: shots without echo */
     /* with a beam */
@@ -175,15 +174,15 @@ struct caster;
 int caster_create(struct caster **out, struct sh_err *err);
 void caster_free(struct caster *caster);
 
-/* Fills block from the run, with attributes where it has room for them: the width of a single ray's echo is
- * the pulse's, of a footprint's as core/footprint.h has it, of what glass and mirrors bring together
- * likewise; an amplitude needs a signal model. Noise of ranges moves echoes, and doesn't widen them. The
+/* Fills block from the run, with attributes where it has room for them. The echo of a single ray has the
+ * width of the pulse. That of a footprint, or of returns merged from glass and mirrors, has the width of
+ * core/footprint.h. An amplitude needs a signal model. Range noise moves echoes, and doesn't widen them. The
  * block has capacity >= run->n times the echoes that a pulse may have (1 + depth, beam->max_echoes). Returns
  * the number of echoes. Allocates nothing. */
 uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
                      struct line_block *block);
 
-/* What the centre of a pulse meets, for those who want to know the triangle. */
+/* The hit of a pulse's centre, with its triangle. */
 struct cast_hit {
     double p_m[3], range_m; /* prcs; along the beam */
     double cosine;          /* of the incidence, 0..1 */
@@ -193,10 +192,10 @@ struct cast_hit {
     uint8_t front;          /* the triangle's corners go counter-clockwise as seen from there */
 };
 
-/* The hits of a run's pulses that the head can report, each pulse as one ray: within its ranges and zones, and of what
- * comes back at least at the threshold, all without noise. Of a pane that is passed and what lies beyond, each is a
- * hit; what is seen in mirrors is none: nothing is there. The head stands still. hit has room for (1 + depth) run->n.
- * Returns the number of hits, in no order but that of chunks. Allocates nothing. */
+/* The hits of a run's pulses that the head can report, each pulse as one ray, without noise. They lie within its
+ * ranges and zones, and are at or above the detection threshold. A pane that is passed is a hit, and so is the surface
+ * beyond it. A surface seen in a mirror is no hit: nothing is there. The head stands still. hit has room for (1 +
+ * depth) run->n. Returns the number of hits. They are in order of chunks only. Allocates nothing. */
 uint32_t caster_meet(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
                      struct cast_hit *hit);
 

@@ -21,7 +21,7 @@ enum colour_mode {
 /* The words for them, as configuration and options have them. */
 extern const char *const colour_words[COLOUR_MODES];
 
-/* How figures become colours. A point that has no echo is colour_grey. */
+/* How figures become colours. A shot without echo is colour_grey. */
 struct colour_scale {
     enum colour_mode mode;
     uint8_t rgb[3];   /* solid */
@@ -44,7 +44,8 @@ void colour_reflectance(double db, uint8_t rgb[3]);
 /* A hue for each number, a golden section of the circle apart: however many there are, neighbours differ. */
 void colour_number(uint32_t number, uint8_t rgb[3]);
 
-/* Linear light of 0 to 1 as sRGB has it, and back, IEC 61966-2-1. What is beyond that stays beyond. */
+/* Linear light of 0 to 1 as sRGB has it, and back, IEC 61966-2-1. Values beyond that range stay beyond
+ * it. */
 double colour_srgb_encode(double linear);
 double colour_srgb_decode(double srgb);
 

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* Places in a named coordinate reference system: a national grid, as maps, terrain models and building models have it.
  * In: the system's name ("EPSG:2056", or as the EPSG registry calls it) and coordinates in metres. Out: the place on the
- * Earth, and how the grid lies there. PROJ does it, by its tables on this machine; it asks no network.
+ * Earth, and how the grid lies there. PROJ computes this from its tables on this machine, without network.
  *
- * Metres also where the grid itself is in feet. Datums are WGS 84 at the end. Between two of them PROJ takes its best
- * transformation; accuracy_m says how good that one is. Any thread. */
+ * Coordinates are metres even where the grid itself is in feet. The result is on WGS 84. Between datums PROJ takes
+ * its best transformation; accuracy_m is the accuracy of that one. Any thread. */
 #ifndef CORE_CRS_H
 #define CORE_CRS_H
 
@@ -18,7 +18,7 @@ struct crs_place {
     double accuracy_m;      /* of the transformation between datums; NaN: not known */
 };
 
-/* SH_EINPUT: an unknown name, a system that is not projected, a place more than 2 degrees outside of where it is used,
+/* SH_EINPUT: an unknown name, a system that is not projected, a place more than 2 degrees outside of its area of use,
  * or no PROJ on this machine. */
 int crs_locate(const char *name, double easting_m, double northing_m, double height_m, struct crs_place *place,
                struct sh_err *err);

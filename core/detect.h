@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Detection: what comes back to the head -> what it reports. Over arrays with one entry per echo, several per
- * pulse.
+/* Detection: from the light that comes back to the echoes that the head reports. Arrays have one entry per
+ * echo, and several per pulse.
  *
  * Signal. The range equation for a target that the beam doesn't miss (W. Wagner et al., Gaussian
  * decomposition and calibration of a novel small-footprint full-waveform digitising airborne laser scanner,
@@ -10,10 +10,10 @@
  *     A = E rho(i) o(R) exp(-2 a R) / rho_min(R)
  *
  * with E the share of the pulse's energy that took this way, rho(i) as in surface.h, and rho_min(R) the
- * reflectance that is just seen at R. That comes from the data sheet's ranges R_k for targets of rho_k:
- * through each of them log rho_min = 2 log R + g(R), g linear between them: the extinction of the air on the
- * data sheet's day, 2 a = slope; beyond the last, and before the first, as between the nearest two, with a
- * single one none. a is therefore only the extinction beyond that of the data sheet's day.
+ * reflectance that is just seen at R. That comes from the data sheet's ranges R_k for targets of rho_k: log
+ * rho_min = 2 log R + g(R) passes through each of them, and g is linear between them. The slope of g is 2 a
+ * for the air on the data sheet's day. Beyond the last and before the first R_k the nearest slope holds;
+ * with a single R_k it is 0. So the a in A is only the extinction beyond that of the data sheet's day.
  * o(R) = 1 - exp(-(R / R_o)^2): at short range part of the light misses the detector (Y. Fang et al.,
  * Intensity correction of terrestrial laser scanning data by estimating laser transmission function, 2015,
  * with the lens's parameters taken together into R_o, near which the signal is strongest).
@@ -26,14 +26,14 @@
  * 10 log10 (A + n/k): 0 dB or more of what is detected.
  *
  * Range noise. The time of an echo has a jitter of rise time over signal-to-noise ratio (M. Skolnik,
- * Introduction to radar systems, 1980), beside one that no signal helps against (clock, digits):
+ * Introduction to radar systems, 1980), and a part that no signal makes smaller (clock, digits):
  *
  *     sigma^2 = floor^2 + (X^2 - floor^2) (A_Y / A)^2,  and a part per distance added to sigma
  *
  * for a data sheet's `X at Y m`, A_Y the amplitude of a target of its reflectance at Y, head on.
  *
- * Random numbers are keyed by (seed, scan, pulse, echo, purpose): nothing depends on what else was detected. No
- * echo stays no echo. Pure; any thread; allocates nothing. */
+ * Random numbers are keyed by (seed, scan, pulse, echo, purpose): nothing depends on what else was detected.
+ * Entries without echo stay so. Pure; any thread; allocates nothing. */
 #ifndef CORE_DETECT_H
 #define CORE_DETECT_H
 
@@ -114,8 +114,8 @@ enum detect_ambiguity { DETECT_AMBIGUITY_NONE, DETECT_FOLDED, DETECT_RESOLVED };
 void detect_zones(enum detect_ambiguity how, double period_s, uint32_t zones, double range_min_m, uint32_t n,
                   double *range_m);
 
-/* The ball-shaped noise of TLSynth: each point is moved to anywhere in a ball around it, all places in it
- * being as likely. The ball's radius is radius_m (1 + per_distance_1_m R), then each axis is stretched by its
+/* The ball-shaped noise of TLSynth: each point is moved to a place in a ball around it, with all places
+ * equally likely. The ball's radius is radius_m (1 + per_distance_1_m R), then each axis is stretched by its
  * factor. */
 struct detect_ball {
     double radius_m, factor[3], per_distance_1_m;

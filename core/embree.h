@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Embree 3 or 4: the one place that includes it, and what its errors mean. Which one, the Makefile decides
- * (SH_EMBREE), with the library that it links. Point queries are the same in both. */
+/* Embree 3 or 4: the only place that includes it, and the meaning of its errors. The Makefile chooses the
+ * version (SH_EMBREE) with the library that it links. Point queries are the same in both. */
 #ifndef CORE_EMBREE_H
 #define CORE_EMBREE_H
 
@@ -17,17 +17,18 @@
 #include "core/err.h"
 #include "core/vecmath.h"
 
-/* The error that one of Embree's is. what: what was to be made. */
+/* Turns an error of Embree into ours. what: the thing that was to be made. */
 int embree_fail(enum RTCError code, const char *what, struct sh_err *err);
 
-/* Whether it takes packets of 4, 8 or 16 rays as they are. Others it takes apart, and a leaf gets rays of several. */
+/* Whether Embree takes packets of that many rays (4, 8 or 16) as they are. It takes others apart, and a leaf then
+ * gets rays of several. */
 int embree_has_packet(RTCDevice device, uint32_t rays);
 /* Rays a packet at which Embree is best on this machine: 16, 8, 4 or 1. */
 uint32_t embree_packet(RTCDevice device);
 
-/* Embree sorts a packet's directions by their signs, but takes what is smaller than 1e-18 for positive when
- * it divides by it: with a component of -1e-22, all rays of that packet with its signs would be lost. So
- * there are none. */
+/* Embree sorts a packet's directions by their signs, but treats components smaller than 1e-18 as positive
+ * when it divides by them. With a component of -1e-22, all rays of the packet with the same signs would be
+ * lost. So this makes no such components. */
 VEC_INLINE float embree_direction(double d)
 {
     float f = (float)d;

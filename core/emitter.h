@@ -69,16 +69,16 @@ int emitter_set_beams(struct emitter *emitter, const struct emitter_beam *beam, 
 /* Steps and rings nearest to step_udeg (0.01 to 90 deg): a turn has 360 / step steps, and from pole to pole there are
  * 180 / step gaps between rings, both rounded to whole numbers. */
 void emitter_set_sphere(struct emitter *emitter, int64_t step_udeg);
-/* Of a ring, with that step. */
+/* Steps of a ring, with that step. */
 static inline uint32_t emitter_sphere_steps(int64_t step_udeg)
 {
     return (uint32_t)((360000000 + step_udeg / 2) / step_udeg);
 }
 /* Whether the step of a sphere divides both, so that nothing was rounded. */
 int emitter_sphere_is_exact(const struct emitter *emitter);
-/* Of a sphere only the rings from start to stop, elevations of -90 to 90 deg, start <= stop. A ring within a
- * micro-degree of a limit counts as inside. Where both are the same it is a circle: one ring, at just that
- * elevation. SH_EINPUT: no ring lies there; the text names the nearest ones. */
+/* Limits a sphere to the rings from start to stop, elevations of -90 to 90 deg, start <= stop. A ring within
+ * a micro-degree of a limit counts as inside. Where both limits are the same, it is a circle: one ring, at
+ * exactly that elevation. SH_EINPUT: no ring lies there; the text names the nearest ones. */
 int emitter_set_rings(struct emitter *emitter, int64_t start_udeg, int64_t stop_udeg, struct sh_err *err);
 /* Elevation of ring i (0 .. rings - 1) of a sphere, in turns. */
 double emitter_ring_turn(const struct emitter *emitter, uint64_t ring);

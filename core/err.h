@@ -16,11 +16,11 @@ enum sh_code {
     SH_EPERM = -4,     /* a permission is missing; the text says which */
     SH_ETIMEOUT = -5,  /* nothing happened in time */
     SH_ECLOSED = -6,   /* the other end is gone */
-    SH_EFORMAT = -7,   /* bytes that are not what the protocol says */
+    SH_EFORMAT = -7,   /* bytes that break the protocol */
     SH_ESTATE = -8,    /* not possible in the present state */
     SH_ELOST = -9,     /* a device is not there, or not any more */
-    SH_ERESET = -10,   /* a device is still there, but what was open on it is over */
-    SH_ESTOPPED = -11, /* whoever asked for the work wants it to end: exit status 1 */
+    SH_ERESET = -10,   /* a device is still there, but was reset: what was open on it is closed */
+    SH_ESTOPPED = -11, /* the caller has stopped the work: exit status 1 */
 };
 
 struct sh_err {
@@ -29,21 +29,22 @@ struct sh_err {
 };
 
 /* Fills err (which may be NULL) and returns code, so that `return sh_fail(err, SH_EINPUT, ...)` reads well.
- * A text too long for the buffer is cut at its end. It goes through
- * sh_keep_line, and so does that of sh_warn. */
+ * A text too long for the buffer is cut at its end. The texts of sh_fail and sh_warn go through
+ * sh_keep_line. */
 int sh_fail(struct sh_err *err, int code, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
 
-/* Makes control characters question marks: a name from a file, or a path, may have any bytes, among them line ends and
- * what a terminal takes for a command. */
+/* Replaces control characters by question marks. Names from files, and paths, may have any bytes, such as line ends
+ * and terminal commands. */
 void sh_keep_line(char *text);
 
-/* Where long work reports to. Each member may be NULL. Called from the thread that does the work. */
+/* Receives the reports of long work. Each member may be NULL. Called from the thread that does the
+ * work. */
 struct sh_report {
     void *ctx;
     void (*warn)(void *ctx, const char *text);                      /* one line, without a newline */
     void (*progress)(void *ctx, const char *what, double fraction); /* 0..1; negative where unknown */
-    /* 1: the work is to end, from now on at every call. From any thread of the work, and often: it only looks
-     * at a flag. */
+    /* 1: the work is to end; then it is 1 at every later call. Called from any thread of the work, and often:
+     * it only reads a flag. */
     int (*stop)(void *ctx);
 };
 

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* The beam: a pulse is not a ray. Definitions first.
+/* The beam of a pulse, which is wider than a ray. In: exit diameter, divergence, pulse width. Out:
+ * sub-rays, outlines that cut a footprint, and the echoes that returns are merged into.
  *
  * Width. Irradiance across the beam is Gaussian, I = I0 exp(-2 r^2 / w^2); w is the 1/e^2 radius. Diameters
- * and divergences are full ones at 1/e^2. Makers define them in other ways; enum beam_definition has these.
+ * and divergences are full widths at 1/e^2. Other definitions that makers use are in enum beam_definition.
  * With exit diameter D and divergence theta, and the waist in the exit plane, w(R)^2 = (D/2)^2 + (R
  * theta/2)^2: the hyperbola of ISO 11146-1, which holds for beams that are not diffraction-limited as well.
  *
@@ -17,24 +18,25 @@
  * energy: ring k lies where half of the energy of its annulus is inside. (Energy within rho, from the
  * irradiance: (1 - exp(-2 rho^2)) / (1 - exp(-2)).)
  *
- * Returns of a pulse, one for each sub-ray that meets something, become echoes: sorted by range, a gap larger
- * than the range resolution (c tau / 2 of the pulse width tau) begins a new one. An echo's range is the
- * energy-weighted mean of its returns - with two surfaces closer than the resolution, the mixed pixel's -,
- * its surface the one that most of it comes back from, its energy the sum: the centroid of equal pulses that
- * overlap, whatever their shape. Less than
- * 1 % of the footprint's energy is no echo. Of more echoes than the head can report, the weakest are left
- * out, and counted. Where surfaces are modelled (core/surface.h), what weighs is what comes back: energy
- * times the surface's return, times the share that glass and mirrors before it let through; the 1 % is still
- * of the footprint (and where nothing comes back of any of them, energy weighs). The width of an echo is that
- * of the pulse, resolution_m, and 2.355 sigma of its ranges, added as squares (full widths at half maximum of
- * Gaussians). Of a return that stands for a part of the footprint, or for what lies around a sub-ray, the
- * ranges within it count as well, to first order on its plane: short by half of (s tan i)^2 of the standard
- * deviation, s = theta / 2; where lines cross in the footprint, by a few percent more, as its parts are then
- * known by places.
+ * Echoes. Each sub-ray that hits something is a return. Returns of a pulse are sorted by range; a gap larger
+ * than the range resolution (c tau / 2 of the pulse width tau) begins a new echo. An echo's range is the
+ * energy-weighted mean of its returns: the centroid of equal pulses that overlap, whatever their shape. Two
+ * surfaces closer than the resolution make a mixed pixel. An echo's energy is the sum of its returns'; its
+ * surface is the one that sends most of it back. Less than 1 % of the footprint's energy is no echo. Where
+ * there are more echoes than the head can report, the weakest are left out, and counted. Where surfaces are
+ * modelled (core/surface.h), the weight of a return is the power that comes back: energy times the surface's
+ * return, times the share that glass and mirrors before it let through. The 1 % is still of the footprint's
+ * energy. Where nothing comes back of any return, energy is the weight.
  *
- * One ray for all of the footprint. Where it lies on one plane at incidence i, the mean over it is not the
- * range of its centre: a sub-ray at (rho, phi) meets the plane at (R - rho D/2 tan i cos phi) / (1 - rho s
- * tan i sin phi), s = theta / 2, times sqrt(1 + rho^2 s^2) along itself. The mean over phi is R sqrt((1 +
+ * Width. An echo's width adds two widths as squares: that of the pulse, resolution_m, and 2.355 sigma of its
+ * ranges (full widths at half maximum of Gaussians). A return may stand for a part of the footprint, or for
+ * the area around a sub-ray. The ranges within it count as well, to first order on its plane: the standard
+ * deviation is short by half of (s tan i)^2 of it, s = theta / 2. Where lines cross in the footprint it is
+ * short by a few percent more, as its parts are then known by sample places.
+ *
+ * One ray for the whole footprint. Where the footprint lies on one plane at incidence i, its mean range is
+ * not that of its centre: a sub-ray at (rho, phi) meets the plane at (R - rho D/2 tan i cos phi) / (1 - rho
+ * s tan i sin phi), s = theta / 2, times sqrt(1 + rho^2 s^2) along itself. The mean over phi is R sqrt((1 +
  * rho^2 s^2) / (1 - rho^2 s^2 tan^2 i)). Over the footprint, with t = rho^2 distributed as exp(-2 t) on 0 ..
  * 1, mean t = 0.343, mean t^2 = 0.187:
  * R (1 + 0.343 s^2 / (2 cos^2 i) + ...), 0.14 mm at 800 m, 80 deg and 0.35 mrad. */
@@ -69,7 +71,7 @@ enum {
     BEAM_HALF_STEPS = 1024,
 };
 #define BEAM_LEAST_ENERGY 0.01 /* of the footprint's, for an echo */
-#define BEAM_LEAST_STEP_M 5e-4 /* what lies nearer to each other at an outline makes none */
+#define BEAM_LEAST_STEP_M 5e-4 /* no outline where both sides are nearer to each other */
 
 /* A beam's figures. Constant after beam_init; any thread. */
 struct beam {
@@ -104,15 +106,15 @@ void beam_half_squares(const struct beam *beam, double h, double *along, double 
 struct beam_pattern {
     uint32_t n;
     float x[BEAM_SUBRAY_ROOM], y[BEAM_SUBRAY_ROOM]; /* whole words of bits; from n on: nothing */
-    double rest; /* variance of the footprint's x, and of its y, less that of the places: what lies around each */
+    double rest; /* variance of the footprint's x (and y) minus that of the places: spread around each */
 };
 /* rings: 0 (the centre alone) to BEAM_MAX_RINGS. */
 void beam_rings(uint32_t rings, struct beam_pattern *pattern);
 
-/* At the end of a plane those sub-rays that still meet it stand for the part of the footprint that does. Their
- * middle is off by less than this times w, and the echo's range by less than this times w(R) tan i: 0.12 with 4
- * rings, 0.05 with 12; the RMS over all cuts is about a quarter. No fit through the same sub-rays does better,
- * for each is all or nothing of 1/n of the energy; outlines cut exactly. */
+/* At the end of a plane, the sub-rays that hit it stand for the part of the footprint on it. The error of their
+ * centre is less than this times w, and that of the echo's range less than this times w(R) tan i: 0.12 with 4
+ * rings, 0.05 with 12. The RMS over all cuts is about a quarter of it. No fit through the same sub-rays does
+ * better, since each has 1/n of the energy or nothing. Outlines cut exactly. */
 double beam_end_error(uint32_t rings);
 
 /* Two axes across a beam's direction. */
@@ -121,7 +123,7 @@ struct beam_sight {
     double dir[3], e1[3], e2[3];
 };
 
-/* What one sub-ray, or one part of a footprint, brings back. */
+/* The return of one sub-ray, or of one part of a footprint. */
 struct beam_return {
     double range_m;
     double energy; /* of the footprint's */
@@ -136,32 +138,31 @@ struct beam_echo {
     double energy, back; /* sums over its returns */
     float width_m;
     uint32_t label, colour;
-    uint8_t number; /* among the pulse's, from 0, those counted that were left out: for random numbers */
+    uint8_t number; /* among the pulse's echoes, from 0, left-out ones included; keys random numbers */
 };
 
-/* What makes one echo of several returns. */
+/* How returns are merged into echoes. */
 struct beam_merging {
     double gap_m;        /* a larger one begins a new echo */
     double pulse_m;      /* width of the pulse, c tau / 2 */
     double least_energy; /* less is no echo */
-    int by_surface;      /* an echo is of the surface that most comes back from; else of its strongest return */
+    int by_surface;      /* 1: an echo's surface is the one that returns most; 0: that of its strongest return */
     uint32_t most;       /* echoes of a pulse; the weakest are left out */
 };
 /* For a footprint, as defined above. */
 void beam_merging(const struct beam *beam, uint32_t most, struct beam_merging *how);
-/* Returns of one pulse -> its echoes, by range; room for most + 1 of them. The returns change places. Gives
- * how many echoes there are; *left_out counts those that were left out on top of what it holds. */
+/* Merges the returns of one pulse into its echoes, by range; echo has room for most + 1. Reorders the
+ * returns. Returns the number of echoes, and adds the number of those left out to *left_out. */
 uint32_t beam_merge(const struct beam_merging *how, struct beam_return *returns, uint32_t n, struct beam_echo *echo,
                     uint64_t *left_out);
 
 /* ---- what a footprint may reach besides the surface in its centre */
 
-/* The outlines of a scene as seen from one place: edges with the surface on one side only. Where there is no
- * outline, the surface that a pulse meets in its centre is all that its footprint meets: one ray will do.
- * Edges between two triangles on both sides of them are none, however sharp: ranges are continuous there.
- * What is asked of all edges is asked once, here; for a pulse one looks up the cell of its direction, which
- * names the edges that footprints within it may reach, and the nearest of them. Constant after it is made;
- * any thread. */
+/* The outlines of a scene as seen from one place: edges with the surface on one side only. A footprint
+ * without an outline lies on the surface that its centre hits: one ray is enough. An edge with a triangle on
+ * each side is no outline, however sharp: ranges are continuous there. All edges are examined once, here.
+ * For a pulse, the cell of its direction is looked up. It lists the edges that footprints within it may
+ * reach, and the nearest of them. Constant after it is made; any thread. */
 struct beam_outlines;
 
 /* Casts rays from the station: unit directions -> ranges, NaN for none, and the kinds of surfaces that they
@@ -183,10 +184,10 @@ struct beam_outlines_spec {
 };
 /* probe, NULL: all outlines count. Else rays are cast close along both sides of each, a footprint's radius
  * apart. A stretch of an outline is left out where it is hidden, or where the ranges on both sides agree to
- * BEAM_LEAST_STEP_M (a wall that stands on a floor; parts of a wall): it can't make another echo. Left out,
- * as any fold between triangles is, it may move a range by a sixth of the footprint's radius times the change
- * of slope. What is hidden from the station may be seen from the edge of the exit: a strip of at most its
- * radius. */
+ * BEAM_LEAST_STEP_M (a wall that stands on a floor; parts of a wall): it can't make another echo. Like any
+ * fold between triangles, an outline that is left out may move a range by a sixth of the footprint's radius
+ * times the change of slope. The edge of the exit may see what is hidden from the station: a strip of at
+ * most the exit's radius. */
 int beam_outlines_create(const struct beam_outlines_spec *spec, const struct beam_probe *probe,
                          struct beam_outlines **out, struct sh_err *err);
 void beam_outlines_free(struct beam_outlines *outlines);
@@ -197,7 +198,7 @@ struct beam_near {
     uint32_t pulse, first, end;
     double next_m; /* beam_find_lines */
 };
-/* Those, at whatever range, of n <= BEAM_NEAR_MOST unit directions. Returns how many. */
+/* Finds such pulses, at any range, among n <= BEAM_NEAR_MOST unit directions. Returns how many. */
 uint32_t beam_near_outlines(const struct beam_outlines *outlines, const struct beam *beam,
                             const struct vec3_floats *dir, uint32_t n, struct beam_near *near);
 
@@ -208,8 +209,8 @@ struct beam_line {
     double n[2], h;
 };
 /* The outlines that cross the footprint of a pulse nearer than limit_m; the lines refer to its axes. Returns
- * their number, up to BEAM_MAX_LINES, or BEAM_MAX_LINES + 1: more than that. near->next_m: from which range
- * on there may be more (INFINITY: none, or nothing crosses it up to limit_m). */
+ * their number, up to BEAM_MAX_LINES, or BEAM_MAX_LINES + 1: more than that. near->next_m: the range from
+ * which there may be more (INFINITY: none, or nothing crosses it up to limit_m). */
 uint32_t beam_find_lines(const struct beam_outlines *outlines, const struct beam *beam, struct beam_near *near,
                          const struct beam_sight *sight, double limit_m, struct beam_line *line);
 
@@ -224,8 +225,8 @@ struct beam_parts {
     uint32_t n, centre; /* the part with the centre of the disc */
     struct beam_part part[BEAM_MAX_PARTS];
 };
-/* fine: of BEAM_FINE_RINGS. Returns 0, or 1 where there are more than BEAM_MAX_PARTS. Parts of less than 0.05
- * % of the energy are left out. */
+/* fine: the pattern of BEAM_FINE_RINGS. Returns 0, or 1 where there are more than BEAM_MAX_PARTS. Parts of
+ * less than 0.05 % of the energy are left out. */
 int beam_cut(const struct beam *beam, const struct beam_pattern *fine, const struct beam_line *line, uint32_t n,
              int spreads, struct beam_parts *parts);
 
@@ -233,7 +234,7 @@ int beam_cut(const struct beam *beam, const struct beam_pattern *fine, const str
  * centre. */
 float beam_part_sigma(const struct beam *beam, const struct beam_sight *sight, const double n[3], double range_m,
                       const struct beam_part *part);
-/* Likewise of a part that spreads the same all around, where only the incidence is known. */
+/* The same for a part that spreads the same all around, where only the incidence is known. */
 float beam_round_sigma(const struct beam *beam, double range_m, double cosine, double variance);
 
 #endif

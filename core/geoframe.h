@@ -38,11 +38,11 @@ void geoframe_set_ecef(struct geoframe *frame);
 int geoframe_locate(const struct geoframe *frame, const double p_prcs[3], struct georef_place *at, struct sh_err *err);
 int geoframe_find(const struct geoframe *frame, const struct georef_place *at, double p_prcs[3], struct sh_err *err);
 
-/* Rotation of the axes that a levelled head of heading 0 has at p_prcs to prcs, row by row: the unit matrix
- * except for ecef. Its third column is up. */
+/* The rotation from the axes of a levelled head with heading 0 at p_prcs to prcs, row by row: the unit
+ * matrix except for ecef. Its third column is up. */
 int geoframe_level(const struct geoframe *frame, const double p_prcs[3], double rotation[9], struct sh_err *err);
 
-/* Rotation of prcs to east, north, up at p_prcs; of a grid without its scale. */
+/* The rotation from prcs to east, north, up at p_prcs; for a grid without its scale. */
 int geoframe_to_enu(const struct geoframe *frame, const double p_prcs[3], double rotation[9], struct sh_err *err);
 
 /* Sets station, place and frame of a specification for a head at p_prcs. */

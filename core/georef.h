@@ -7,11 +7,12 @@
  *
  * The scene's frame is one of these: the tangent frame of the station (x east, y north, z up along the
  * ellipsoid's normal); the tangent frame of another place, turned against it (rotation); a grid.
+ * The CRS is one of these:
  *   local     prcs itself: metres in the mesh's frame
  *   ecef      WGS 84 geocentric X, Y, Z: a rotation and a shift
  *   utm       easting, northing (with false origin), height. Zone automatic or forced; UPS beyond 84 N and 80
- *             S when it is automatic. Grid convergence and scale are part of the map. From a scene in the
- *             same grid (which utm_zone 0 then means): the scene's own coordinates.
+ *             S when it is automatic. Grid convergence and scale are part of the map. Where the scene is
+ *             in the same grid (which utm_zone 0 then means), they are the scene's own coordinates.
  *   geodetic  latitude and longitude in degrees, height; longitude differences the short way round, in
  *             -180..180
  *
@@ -37,7 +38,7 @@ enum georef_method { GEOREF_AUTO, GEOREF_EXACT, GEOREF_ORDER1, GEOREF_ORDER2, GE
 
 struct georef_geoid;
 
-/* As a zone where 0 means by position. */
+/* The zone of UPS, where 0 means by position. */
 enum { GEOREF_UPS = -1 };
 
 struct georef_spec {
@@ -81,9 +82,9 @@ struct georef;
 int georef_create(const struct georef_spec *spec, struct georef **out, struct sh_err *err);
 void georef_free(struct georef *georef);
 
-/* Another one about another centre, for a head that moves and for ranges that no longer fit: same scene
- * frame, same CRS, zone and false origin, polynomials and anchor about centre_m (prcs). SH_EINPUT where the
- * zone does not reach. Method as before; its bound may be another. */
+/* Makes a georef about another centre, for a head that moves or ranges that no longer fit. Scene frame,
+ * CRS, zone and false origin are the same; polynomials and anchor are about centre_m (prcs). SH_EINPUT
+ * where the zone does not reach. Method as before; its bound may be another. */
 int georef_recentre(const struct georef *georef, const double centre_m[3], struct georef **out, struct sh_err *err);
 
 /* The centre in the CRS: what the differences are added to. */
@@ -98,25 +99,24 @@ enum georef_crs georef_crs(const struct georef *georef);
 /* 1: heights are above the geoid; 0: above the ellipsoid. */
 int georef_has_geoid(const struct georef *georef);
 
-/* Of the output's grid at the centre: bearing of grid north, clockwise from true north, and metres of grid
+/* The output's grid at the centre: bearing of grid north, clockwise from true north, and metres of grid
  * per metre on the ellipsoid. 0 and 1 where there is no grid, or it is the scene's own. */
 void georef_convergence(const struct georef *georef, double *convergence_rad, double *scale);
 
 /* 1 and the matrix, row by row, where differences from the anchor are a rotation of those in prcs; else 0. */
 int georef_rotation(const struct georef *georef, double rotation[9]);
 
-/* Differences in prcs at the centre -> axes of the CRS (geodetic: east, north, up), row by row: the rotation
- * that is left of the map there without its scale. The unit matrix at a pole in geodetic output. */
+/* Differences in prcs at the centre -> axes of the CRS (geodetic: east, north, up), row by row: the map's
+ * rotation there, without its scale. The unit matrix at a pole in geodetic output. */
 void georef_axes(const struct georef *georef, double rotation[9]);
 
-/* What georef_forward is to use. SH_EINPUT: GEOREF_AUTO, or an order that has no polynomial here. Before
- * other threads see the georef. */
+/* Sets what georef_forward uses. SH_EINPUT: GEOREF_AUTO, or an order that has no polynomial here. To be
+ * called before other threads see the georef. */
 int georef_set_method(struct georef *georef, enum georef_method method, struct sh_err *err);
 enum georef_method georef_method(const struct georef *georef);
 
-/* No point within radius_m (horizontally) and height_m (up or down) of the centre is further from the true
- * position than this with the method, metres on the ground; INFINITY where that is not known. polynomial.c
- * says how it is known. */
+/* The bound of a method's error, metres on the ground, for points within radius_m (horizontally) and
+ * height_m (up or down) of the centre; INFINITY where it is not known. polynomial.c derives it. */
 double georef_bound_m(const struct georef *georef, enum georef_method method, double radius_m, double height_m);
 
 /* n points, d_prcs relative to the centre (metres) -> difference from the anchor, in units of the CRS
@@ -132,12 +132,12 @@ void georef_difference(const struct georef *georef, const double p_crs[3], doubl
 
 /* Units of the CRS per count, so that a count is at most scale_m on the ground (utm, ecef, local: just
  * scale_m, of the grid) for points within reach_m of the centre, and so that these fit into 31 bits and a
- * sign. Degrees of longitude have a scale of their own: near a pole they are long in degrees and short on the
- * ground, and where up to 360 of them don't fit otherwise, that scale alone is coarser, up to 2 pi reach_m /
- * 2^31 on the ground. SH_EINPUT, naming the smallest scale_m that would do, where the others don't fit. */
+ * sign. Degrees of longitude have a scale of their own: near a pole, differences are large in degrees and
+ * short on the ground. Where 360 degrees don't fit otherwise, that scale alone is coarser, up to 2 pi reach_m
+ * / 2^31 on the ground. SH_EINPUT, naming the smallest scale_m that would do, where the others don't fit. */
 int georef_scale(const struct georef *georef, double scale_m, double reach_m, double scale[3], struct sh_err *err);
-/* The longest that a count of these is within reach_m, metres (on the ground, or of the grid): scale_m, or
- * what longitude has. */
+/* The largest length of one count of these scales within reach_m, metres (on the ground, or of the grid):
+ * scale_m, or that of longitude. */
 double georef_count_m(const struct georef *georef, double reach_m, const double scale[3]);
 
 /* A point east, north and up (metres) in the tangent frame at a place on WGS 84 -> its own latitude and

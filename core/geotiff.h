@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* Where the heights of a GeoTIFF are: what its tags say beside the raster. In: a path. Out: the raster's size, the map from
- * cells to a projected system, units, and which value means that a cell has no height.
+/* The place of a GeoTIFF's heights, from its tags; the raster is not read. In: a path. Out: the raster's size, the map
+ * from cells to a projected system, units, and which value means that a cell has no height.
  *
  * Sources: TIFF 6.0 and BigTIFF; OGC GeoTIFF 1.1 (19-008r4), clauses 7 and B.6; GDAL's tags 42112 (scale, offset and unit
- * of the heights) and 42113 (no data). It reads the first directory by itself, without a library: a configuration's anchor asks
- * for it in the process of the head, where a broken file must do no harm. Any thread. */
+ * of the heights) and 42113 (no data). It reads the first directory by itself, without a library: a configuration's
+ * anchor needs it in the process of the head, where a broken file must do no harm. Any thread. */
 #ifndef CORE_GEOTIFF_H
 #define CORE_GEOTIFF_H
 

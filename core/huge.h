@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Memory for large arrays that are read at random. It lies in large pages where the system has them, since
- * page walks would cost as much as the data. Released with free(). NULL when there is no memory. */
+/* Allocates memory for large arrays that are read at random. It is in huge pages where the system has
+ * them, since page walks would cost as much as the data. Released with free(). NULL when there is no
+ * memory. */
 #ifndef CORE_HUGE_H
 #define CORE_HUGE_H
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Opens input files. In: a path. Out: a stream to read; or why there is none, in words for a message.
+/* Opens input files. In: a path. Out: a stream to read, or the reason why there is none, as text for a
+ * message.
  *
  * Only regular files: a FIFO waits for a writer, perhaps for ever, and a device may have no end. Every reader
  * of files that a user names opens them here. */

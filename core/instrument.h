@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Instrument errors: the geometry of a scanner that is not quite as designed. Its mechanics say where the
- * beam really goes, its encoders what the head believes. In: scheduled angles in turns, errors. Out:
- * directions and origins of beams (socs, metres), and what the encoders read (turns).
+/* Instrument errors: the geometry of a scanner that is not quite as designed. Its mechanics determine the
+ * true direction of the beam, its encoders the direction that the head reports. In: scheduled angles in
+ * turns, errors. Out: directions and origins of beams (socs, metres), and what the encoders read (turns).
  *
  * Terms as in D. Lichti, Error modelling, calibration and analysis of an AM-CW terrestrial laser scanner
  * system (2007), and B. Muralikrishnan et al., Volumetric performance evaluation of a laser scanner based on
@@ -20,7 +20,8 @@
  *
  * Encoders, each: reading = a + index + scale a + eccentricity sin(a - phase); a: true angle, as scheduled.
  * Range: reading = (1 + range_scale) R + range_offset.
- * Angle noise, each pulse by itself: the beam goes to m + n_m, p + n_p, the encoders don't know.
+ * Angle noise, independent for each pulse: the beam goes to m + n_m, p + n_p, and the encoders don't see
+ * it.
  *
  * Pure; any thread; allocates nothing. */
 #ifndef CORE_INSTRUMENT_H
@@ -43,7 +44,7 @@ struct instrument {
     uint64_t mirror_key, pan_key;           /* rng_key(seed, RNG_MIRROR), RNG_PAN */
 };
 
-/* True when all of it is zero: such an instrument is best left out. */
+/* True when all errors are zero: such an instrument is best left out. */
 int instrument_is_ideal(const struct instrument *instrument);
 /* True when beams begin beside the head's origin. */
 int instrument_has_offset(const struct instrument *instrument);

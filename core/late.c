@@ -4,7 +4,7 @@
 #include <dlfcn.h>
 #include <string.h>
 
-/* A program linked with them would have these names: the Makefile asks the libraries. */
+/* The sonames that a linked program would record: the Makefile reads them from the libraries. */
 static const struct {
     const char *file, *needs;
 } libraries[] = {

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* The result: part of one scan line as arrays. The only thing that leaves core.
+/* The result: part of one scan line as arrays. Nothing else leaves core.
  *
- * A line is one mirror sweep. It leaves in blocks (a slow mirror must not mean late packets); each block is a
- * run of consecutive cast pulses of one line, with one entry per echo, and one entry for a shot without echo.
- * Entries are in order of pulse, then of range. Times and pulse numbers count from the scan's start.
+ * A line is one mirror sweep. It leaves in blocks, so that packets are not late where the mirror is slow;
+ * each block is a run of consecutive cast pulses of one line, with one entry per echo, and one entry for a
+ * shot without echo. Entries are in order of pulse, then of range. Times and pulse numbers count from the
+ * scan's start.
  *
  * Ownership: line_block_alloc makes the arrays for `capacity` entries, line_block_alloc_attributes and
  * line_block_alloc_colours those that are optional, line_block_free releases them all; a block belongs to one thread. Nothing else allocates. */
@@ -44,13 +45,13 @@ struct line_block {
     int16_t *refl_cdb;   /* 0.01 dB relative to a white Lambertian target; LINE_REFL_NONE */
     uint8_t *echo;       /* number (1..15) in the low nibble, count in the high one; 0: shot without echo */
     uint16_t *label;     /* surface label; LINE_LABEL_NONE */
-    /* Attributes: both, or both NULL: not asked for, and nobody works them out. */
+    /* Attributes: both, or both NULL: not asked for, and not computed. */
     int16_t *amplitude_cdb; /* 0.01 dB above the detection threshold, with the detector's noise; LINE_AMPLITUDE_NONE */
     uint16_t *width_cns;    /* width of the echo, full at half maximum, 0.01 ns; LINE_WIDTH_NONE, LINE_WIDTH_MOST */
     uint8_t (*rgb)[3];      /* colour, sRGB; NULL: not asked for */
 };
 
-/* One line is over. */
+/* The end of a line. */
 struct line_end {
     uint32_t frame, line;
     uint64_t pulse0;                  /* the line's first pulse in the scan */
@@ -60,7 +61,7 @@ struct line_end {
     int64_t t0_ns, t1_ns;             /* first pulse of this line, first pulse of the next, since the scan's start */
     uint32_t mirror_count, pan_count; /* encoder readings at the last pulse of this line */
     uint32_t status;                  /* LINE_LAST_OF_FRAME, LINE_PARTIAL */
-    /* what was hit and is no echo of the line, see struct cast_counters; 0 also where blocks of the line were
+    /* hits that are no echo of the line, see struct cast_counters; 0 also where blocks of the line were
      * lost */
     uint32_t n_crowded, n_faint, n_unfit;
 };

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* One place on the Earth: is it one, its local axes, and its position, convergence and scale in a grid. In:
- * core/georef.h's struct georef_place. Degrees, metres; heights above the ellipsoid. Errors (SH_EINPUT) say
- * what is allowed. Any thread. */
+/* One place on the Earth: a check of it, its local axes, and its position, convergence and scale in a grid.
+ * In: core/georef.h's struct georef_place. Degrees, metres; heights above the ellipsoid. Errors (SH_EINPUT)
+ * say what is allowed. Any thread. */
 #ifndef CORE_LOCATE_H
 #define CORE_LOCATE_H
 

@@ -75,7 +75,7 @@ static const char *kind_of(mode_t mode)
                             : "block device";
 }
 
-/* What a rename may replace. */
+/* Checks that a rename may replace the target. */
 static int check_target(const char *path, struct sh_err *err)
 {
     struct stat st;
@@ -120,13 +120,14 @@ static int fail_locked(const char *path, int fd, int code, struct sh_err *err)
                    name);
 }
 
-/* As long as fd is open. A file system without locks has none to offer. */
+/* Locks the file as long as fd is open. Does nothing on a file system without locks. */
 static int lock(const char *path, int fd, int code, struct sh_err *err)
 {
     return flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK ? fail_locked(path, fd, code, err) : SH_OK;
 }
 
-/* A file that somebody writes in place must not be replaced: it would go on without a name. */
+/* A file that somebody writes in place must not be replaced: its writer would go on in a file without a
+ * name. */
 static int check_unlocked(const char *path, struct sh_err *err)
 {
     const int fd = open(path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
@@ -185,7 +186,7 @@ int newfile_append(const char *path, int *out, struct sh_err *err)
 
 /* ---- files that appear whole */
 
-/* One that is there, and not made just now: left by a writer that was killed, or put there by somebody. */
+/* Checks a part that existed before: left by a killed writer, or put there by somebody. */
 static int check_left(const char *part, int fd, struct sh_err *err)
 {
     struct stat st;
@@ -287,8 +288,8 @@ long long newfile_left_len(const char *part)
     return len;
 }
 
-/* So that the new name survives a power cut as well. Some file systems can't sync a directory; then they need
- * not. */
+/* Syncs the folder, so that the new name survives a power cut, too. Errors are ignored: some file systems
+ * can't sync a directory. */
 static void sync_folder(const char *path)
 {
     char *copy = strdup(path);

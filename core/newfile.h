@@ -4,8 +4,8 @@
  *
  * The one rule for links: a symbolic link at the last name of a path is refused, whoever made it. In a folder
  * like /tmp anybody can put one there, and the program would write where it leads. Links to folders are
- * followed, and so are the system's own, /dev/stdout, /dev/stderr and /dev/fd/N. A file with further names
- * (hard links) is not overwritten either.
+ * followed, and so are the system's own, /dev/stdout, /dev/stderr and /dev/fd/N. A file with more than one
+ * name (hard links) is not overwritten either.
  *
  * Any thread. Errors name the path: SH_EINPUT (no such folder, a link, the wrong kind of file), SH_EPERM,
  * SH_EIO. */
@@ -14,33 +14,35 @@
 
 #include "core/err.h"
 
-/* A file that is written in place: made, or emptied. It is locked as long as *fd is open: a second writer is refused
- * before it empties the file. Devices are taken as they are, and pipes that have a reader. *fd is for writing, and
- * blocks. */
+/* Opens a file that is written in place: it is made, or emptied. It is locked as long as *fd is open: a second
+ * writer is refused before it empties the file. Devices are taken as they are, and pipes that have a reader. *fd is
+ * for writing, and blocks. */
 int newfile_open(const char *path, int *fd, struct sh_err *err);
 
-/* A file that grows line by line: made, or as it is. It is locked as long as *fd is open, for reading and appending; SH_ESTATE
- * where another process has it. A file system without locks has none to offer. */
+/* Opens a file that grows line by line, for reading and appending: it is made, or stays as it is. It is locked as long
+ * as *fd is open; SH_ESTATE where another process has it. On a file system without locks it is not locked. */
 int newfile_append(const char *path, int *fd, struct sh_err *err);
 
 /* A file that appears at `path` whole or not at all. It is written as `part` in the same folder, and renamed
  * at the end. `path` is free or a regular file: nothing else is ever replaced. `part` is locked as long as it
- * has its name, so that a second writer of the same file is refused. So is one of a file that is being written in
- * place. What a writer that was killed has left there is taken over. *fd is for reading and writing. */
+ * has its name, so that a second writer of the same file is refused. A writer of a file that is being written in
+ * place is refused, too. A `part` that a killed writer has left is taken over. *fd is for reading and writing. */
 int newfile_part(const char *path, const char *part, int *fd, struct sh_err *err);
-/* Before long work: whether newfile_part would make `path` with `.part` behind it. It leaves nothing behind. */
+/* Before long work: checks whether newfile_part would make `path`, with `path`.part as its part. It leaves no
+ * file behind. */
 int newfile_check(const char *path, struct sh_err *err);
-/* What a writer that was killed has left as `part`: an existing regular file, for reading and writing, locked as newfile_part
- * has it. SH_EINPUT: there is none; SH_ESTATE: it is still being written. */
+/* Opens the `part` that a killed writer has left: an existing regular file, for reading and writing, locked as
+ * newfile_part does. SH_EINPUT: there is none; SH_ESTATE: it is still being written. */
 int newfile_left(const char *part, int *fd, struct sh_err *err);
-/* A regular file that is there, for reading; for writing, too, and locked, where it may be written to: it is the user's own
- * and has no further names. */
+/* Opens an existing regular file for reading. Where it is the user's own and has no other name, it is opened for
+ * writing, too, and locked. */
 int newfile_whole(const char *path, int *fd, struct sh_err *err);
-/* The bytes of a part that was left and that nobody writes, or 0. */
+/* The size in bytes of a part that was left and that nobody writes, or 0. */
 long long newfile_left_len(const char *part);
 /* Syncs, renames and closes. After a failure part stays, and fd is open. */
 int newfile_settle(const char *path, const char *part, int fd, struct sh_err *err);
-/* The two steps of that, for files that come together: all are synced before any is renamed. fd stays open. */
+/* The two steps of newfile_settle, for files that belong together: all are synced before any is renamed. fd
+ * stays open. */
 int newfile_sync(const char *part, int fd, struct sh_err *err);
 int newfile_rename(const char *path, const char *part, struct sh_err *err);
 /* newfile_settle, but nothing at path is replaced: SH_ESTATE where something is there. */

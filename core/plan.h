@@ -119,36 +119,36 @@ struct plan_sight_need {
     const char *why_not;   /* no map is possible; NULL: it is */
 };
 
-/* Of the pulses, shares that go to a cell that shows one triangle, nothing, a few triangles, many. */
+/* Shares of the pulses by what their cell shows: one triangle, nothing, a few triangles, many. */
 struct plan_sight_found {
     double one, nothing, few, ask;
 };
 
-/* Chooses (*map: 1: one is made) and fills row. Looks at some pulses of the places, where so many may pay at all. */
+/* Chooses (*map: 1: one is made) and fills row. Casts some pulses of the places, unless a map can't pay anyway. */
 int plan_sight(const struct plan_sight_need *need, struct plan_place *place, uint32_t n_places,
                const struct sh_report *report, int *map, struct plan_row *row, struct sh_err *err);
 
-/* The steps of that. False where so few pulses pay for no map, whatever they meet. */
+/* The steps of plan_sight. 0: so few pulses don't pay for a map, whatever they hit. */
 int plan_sight_may_pay(const struct plan_sight_need *need);
-/* Casts around pulses of the head, at the corners of cells so far across. */
+/* Casts rays around pulses of the head, at the corners of cells cell_rad across. */
 void plan_sample_sight(struct plan_sample *sample, double cell_rad, struct plan_sight_found *found);
-/* Returns whether a map is made. found NULL: nobody has looked. */
+/* Returns whether a map is made. found NULL: nothing was sampled. */
 int plan_sight_choose(const struct plan_sight_need *need, const struct plan_sight_found *found, struct plan_row *row);
 
 /* ---- the other stages */
 
-/* What of beam and optics a scan uses. */
+/* The methods that a scan uses. */
 struct plan_methods {
     enum beam_mode beam; /* BEAM_SINGLE, BEAM_RINGS, BEAM_ADAPTIVE */
     uint32_t rings;      /* of sub-rays; adaptive: for footprints with more edges than it tells apart */
     uint32_t depth;      /* of glass and mirrors */
-    int sight;           /* first hits are looked up in a map of the station's */
+    int sight;           /* first hits are looked up in the station's map */
 };
 
 /* A beam's name, and its cost where that does not depend on the scene. Its error is not known yet. */
 void plan_beam_option(enum beam_mode mode, uint32_t rings, struct plan_option *option);
 
-/* The row of the mesh: what its vertices may be off by, see struct scene. */
+/* The row of the mesh: the error of its vertices, see struct scene. */
 void plan_mesh(double error_m, struct plan_row *row);
 /* The row of the cast: what is always done. packet: rays per Embree call. */
 void plan_cast(uint32_t packet, struct plan_row *row);
@@ -169,8 +169,8 @@ enum { PLAN_HEAD_ROWS = 6 };
 
 /* Stages that are left out have the method "none" and say why. Returns how many rows. */
 size_t plan_head(const struct plan_head *head, struct plan_row rows[PLAN_HEAD_ROWS]);
-/* Processor time of a pulse, ns: one ray into a scene of so many triangles, in packets of so many, and all that each
- * pulse takes beside. Rows have what methods cost beyond that. */
+/* Processor time of a pulse, ns: one ray into a scene of n_triangles, in packets of that many rays, and the rest of
+ * the work for each pulse. Rows have the cost of methods beyond that. */
 double plan_pulse_ns(double n_triangles, uint32_t packet);
 /* A row about which there is nothing to choose. */
 void plan_say(struct plan_row *row, const char *stage, const char *method, double error_m, double cost_ns,

@@ -15,7 +15,7 @@ enum ply_format { PLY_ASCII, PLY_LITTLE, PLY_BIG };
 
 enum ply_type { PLY_INT8, PLY_UINT8, PLY_INT16, PLY_UINT16, PLY_INT32, PLY_UINT32, PLY_FLOAT, PLY_DOUBLE };
 
-/* What a property is to us. */
+/* The use of a property. */
 enum ply_use {
     PLY_SKIP,
     PLY_X, /* of vertices, as the others up to PLY_SCALARS; colours and texnumber also of faces */
@@ -89,7 +89,7 @@ struct ply_rows {
     uint64_t row;                      /* of it, from 0 */
     double scalar[PLY_SCALARS];        /* of the row, by ply_use; [PLY_SKIP] has no meaning */
     struct ply_list corners, texcoords;
-    bool is_single; /* x, y or z of vertices are: read as they stand, but what they stood for was rounded */
+    bool is_single; /* x, y or z of vertices is a float of a binary file: its writer has rounded it */
     bool is_kept;   /* bytes before p are read again: faces that come before their vertices */
     text_progress *progress;
     void *progress_ctx;
@@ -100,7 +100,7 @@ struct ply_rows {
 int ply_open(struct ply_rows *r, const char *path, text_progress *progress, void *ctx, struct sh_err *err);
 void ply_close(struct ply_rows *r);
 
-/* Who takes the rows. */
+/* The user of the rows. */
 struct ply_user {
     void *ctx;
     int (*begin)(void *ctx, struct sh_err *err); /* before the rows of r->element, whose count fits into the file */

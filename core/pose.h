@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Where a platform, and the head on it, is and how it stands. In: angles in radians, positions in metres,
+/* Position and attitude of a platform and of the head on it. In: angles in radians, positions in metres,
  * trajectories from CSV files. Out: attitudes as quaternions or matrices, and the pose at any time.
  *
  * Attitude, the one convention of the project: a rotation R takes the body's frame (x right, y forward, z up)
@@ -76,7 +76,7 @@ void pose_mount(const struct pose *body, const struct pose *mount, struct pose *
 /* The last of n >= 1 knots, in order of time, at or before t_ns; before the first one 0. */
 size_t pose_find_knot(const struct pose_knot *knot, size_t n, int64_t t_ns);
 
-/* Files of millions of samples take seconds: what has a report ends with SH_ESTOPPED where that asks to
+/* Files of millions of samples take seconds. Functions with a report end with SH_ESTOPPED where it asks to
  * stop. */
 struct trajectory;
 
@@ -96,9 +96,9 @@ int trajectory_from_samples(const struct pose_sample *sample, size_t n, struct t
 
 /* A CSV file whose first line names the columns, in any order: t_s, x_m, y_m, z_m, and either heading_deg,
  * pitch_deg, roll_deg (heading alone will do) or qw, qx, qy, qz; frame where wanted (else the sample's
- * number, from 0); the columns scan and flags of `scanhead record -o NAME.poses.csv` are ignored, and a byte
- * order mark of UTF-8. Lines that begin with '#' and empty lines don't count. Times are within 4e9 s of 0, so
- * that nanoseconds between any two fit into 64 bits. Everything else is an error with file and line. */
+ * number, from 0); the columns scan and flags of `scanhead record -o NAME.poses.csv` are ignored, and so is a
+ * byte order mark of UTF-8. Lines that begin with '#' and empty lines don't count. Times are within 4e9 s of
+ * 0, so that nanoseconds between any two fit into 64 bits. Everything else is an error with file and line. */
 int trajectory_read_csv(const char *path, const struct sh_report *report, struct trajectory **out, struct sh_err *err);
 
 /* Way-points, from a CSV file as well: x_m, y_m, z_m, speed_m_s, and pause_s where wanted. The platform goes
@@ -114,7 +114,7 @@ void trajectory_free(struct trajectory *trajectory);
 void trajectory_span(const struct trajectory *trajectory, double *first_s, double *last_s);
 void trajectory_at(const struct trajectory *trajectory, double t_s, struct pose *pose, double *frame);
 
-/* What the knots of a path have to keep. */
+/* Rules for the knots of a path. */
 struct pose_knot_rules {
     double start_s, end_s; /* on the trajectory */
     double tolerance_m;    /* between two knots pose_between may differ from the trajectory by this */

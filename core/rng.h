@@ -17,7 +17,7 @@ enum rng_purpose {
     RNG_SCENE = 2,
     RNG_GNSS = 3,
     RNG_SIGNAL = 4, /* of the detector */
-    RNG_MIRROR = 5, /* where the beam goes, line angle */
+    RNG_MIRROR = 5, /* line angle of the true beam */
     RNG_PAN = 6,
     RNG_BALL = 7, /* ball-shaped noise: direction */
     RNG_BALL_RADIUS = 8,
@@ -39,8 +39,8 @@ VEC_INLINE uint64_t rng_key(uint64_t seed, enum rng_purpose purpose)
     return rng_mix(rng_mix(seed + 0x9e3779b97f4a7c15ULL) + (uint64_t)purpose * 0xd1b54a32d192ed03ULL);
 }
 
-/* What keeps the draws of a scan apart from those of all others, to be XORed into keys: the station and which
- * of its scans it is, both counted from 1. 0 for the first scan at the first station. Once per scan. */
+/* A number to be XORed into keys, which separates the draws of scans: from the station and the number of its
+ * scan, both counted from 1. 0 for the first scan at the first station. Once per scan. */
 VEC_INLINE uint64_t rng_scan(uint32_t station, uint32_t scan)
 {
     return rng_mix((uint64_t)(station - 1) << 32 | (scan - 1));
@@ -51,8 +51,8 @@ VEC_INLINE uint64_t rng_u64(uint64_t key, uint64_t pulse)
     return rng_mix(rng_mix(pulse * 0x9e3779b97f4a7c15ULL + key) ^ key);
 }
 
-/* What to ask with for an echo of a pulse: number counts from 0, so that a pulse's only echo is asked for by
- * the pulse. Pulse numbers stay below 2^56. */
+/* The key of a pulse's echo. number counts from 0, so that a pulse's only echo has the pulse number as its
+ * key. Pulse numbers stay below 2^56. */
 VEC_INLINE uint64_t rng_echo(uint64_t pulse, uint32_t number)
 {
     return pulse | (uint64_t)number << 56;
@@ -104,8 +104,8 @@ VEC_INLINE double rng_normal(uint64_t key, uint64_t pulse)
     return rng_normal_of(rng_u64(key, pulse));
 }
 
-/* Arrays are worked on in blocks: first the bits of a block, then what is made of them. A processor overlaps more
- * passes of two short loops than of one long one. Returns how many bits it made. */
+/* Arrays are filled in blocks: first the random bits of a block, then the numbers made from them. A processor
+ * overlaps more passes of two short loops than of one long one. Returns how many bits it made. */
 enum { RNG_BLOCK = 64 };
 VEC_INLINE uint32_t rng_bits(uint64_t key, const uint64_t *restrict pulse, uint32_t n, uint64_t bits[RNG_BLOCK])
 {

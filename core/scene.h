@@ -37,13 +37,13 @@ enum {
 /* Bodies of IFC are read by two readers, by Assimp where they are not installed, or by one alone. */
 enum scene_ifc_reader { IFC_READER_AUTO, IFC_READER_WEB, IFC_READER_LITE, IFC_READER_ASSIMP };
 
-/* Limits of reading one file by others: by Assimp, and by each reader of IFC. */
+/* Limits for readers in processes of their own: Assimp, and each reader of IFC. */
 struct scene_import_limits {
-    uint32_t memory_mib; /* on top of what the program has; the scene on its way back likewise */
+    uint32_t memory_mib; /* on top of the program's own; the same for the scene that is handed back */
     double time_s;       /* by the clock on the wall; of processor time likewise */
     uint32_t files;      /* open at a time by Assimp */
     enum scene_ifc_reader ifc_reader;
-    int ifc_strict;         /* where the readers of IFC differ is an error */
+    int ifc_strict;         /* 1: a difference between the readers of IFC is an error */
     const char *ifc_folder; /* where they are; NULL: installed, or built, beside the program */
 };
 extern const struct scene_import_limits scene_import_defaults;
@@ -59,7 +59,7 @@ struct scene_places {
     size_t n;
     int own_surfaces; /* each copy has surfaces of its own: "OBJECT 1", "OBJECT 2" ... */
     int written_out;  /* as triangles of the scene */
-    const char *says; /* what the list of them is called in errors */
+    const char *says; /* the name of the list in errors */
 };
 
 struct scene_mesh_spec {
@@ -117,7 +117,7 @@ struct scene_counts {
     uint64_t names_cut;     /* object or material names cut to SCENE_NAME_LEN - 1 bytes */
 };
 
-/* What a file, or its format by definition, says of its unit and axes. Nothing follows from it by itself. */
+/* The unit and axes that a file, or its format by definition, states. The load doesn't apply them. */
 struct scene_says {
     double unit_m;      /* metres per unit; 0: it doesn't say */
     int up;             /* the axis that points up: 1 x, 2 y, 3 z; negative: down; 0: it doesn't say */
@@ -131,7 +131,7 @@ struct scene_copy {
     uint32_t label0;           /* what is added to the mesh's labels */
 };
 
-/* A mesh that stands in the scene any number of times, and is there once. Its frame: metres, z up, as it was loaded. */
+/* A mesh that is kept once and stands in the scene any number of times. Its frame: metres, z up, as it was loaded. */
 struct scene_copied {
     struct scene *mesh;      /* owned; its surfaces and textures are the scene's */
     struct scene_copy *copy; /* [n] owned */
@@ -139,7 +139,8 @@ struct scene_copied {
     uint32_t first; /* triangle of the first copy; those of the others follow, copy by copy */
 };
 
-/* Triangles are numbered: the scene's own first, then those of the copies. All arrays are of its own alone. */
+/* Triangles are numbered: the scene's own first, then those of the copies. The arrays hold its own triangles
+ * alone. */
 struct scene {
     uint32_t n_vertices, n_triangles, n_surfaces;
     struct scene_copied *copied;   /* [n_copied] */
@@ -179,8 +180,8 @@ struct scene {
  * Progress goes to report about four times a second once a load takes longer than a second. SH_ESTOPPED where
  *   report asks to stop.
  * Assimp reads in a process of its own, forked here: it crashes, hangs or takes all memory on some broken
- *   files. Its death and its limits are SH_EINPUT, too. No zombie stays, and it does not outlive the thread
- *   that calls. */
+ *   files. Its crash, or a limit that it reaches, is SH_EINPUT, too. The child is reaped, and does not
+ *   outlive the calling thread. */
 int scene_load(const struct scene_mesh_spec *specs, size_t n_specs, double tolerance_m, const struct sh_report *report,
                struct scene **out, struct sh_err *err);
 
@@ -200,12 +201,12 @@ int scene_from_arrays(const struct scene_arrays *arrays, struct scene **out, str
 
 /* Leaves out all surfaces but those that are to be kept: keep[n_surfaces], by label. What is left has new labels and
  * vertices, in the old order, and bounds of its own; there may be nothing left (n_all 0). SH_EINPUT where copies of a
- * mesh would keep different surfaces of it. After an error the scene is only to be freed. Before anyone uses it, and
- * before label0 is set. */
+ * mesh would keep different surfaces of it. After an error the scene is only to be freed. To be called before anyone
+ * uses the scene, and before label0 is set. */
 int scene_keep(struct scene *scene, const uint8_t *keep, struct sh_err *err);
 
-/* Finds triangles that have the same three corners, however they are written, and the same holes, as one with a lower
- * number: bit i % 64 of (*twin)[i / 64], to be freed. SH_ENOMEM, SH_ESTOPPED. */
+/* Marks duplicate faces: triangles with the same three corners, in any order, and the same holes, as one with a lower
+ * number. Triangle i has bit i % 64 of (*twin)[i / 64], to be freed. SH_ENOMEM, SH_ESTOPPED. */
 int scene_find_twins(const struct scene *scene, const struct sh_report *report, uint64_t **twin, struct sh_err *err);
 
 /* (*same)[i] is the first of the scene's own vertices at the place of vertex i, bit for bit; to be freed. SH_ENOMEM,
@@ -214,8 +215,9 @@ int scene_find_same(const struct scene *scene, const struct sh_report *report, u
 
 void scene_free(struct scene *scene);
 
-/* Where a file is that a mesh or its library names: in one of n <= 4 folders, then by its last part there; then both without
- * regard to case. Folders are paths up to their last slash, and may be empty. To be freed; NULL: it is nowhere. */
+/* Finds a file that a mesh or its library names. It is searched by its name in n <= 4 folders, then by its last part
+ * there; then both without regard to case. Folders are paths up to their last slash, and may be empty. To be freed;
+ * NULL: it is nowhere. */
 char *scene_find_file(const char *const *folder, size_t n, const char *name);
 
 /* The image of a texture: texture_read. */
@@ -224,7 +226,7 @@ int scene_read_texture(const struct scene_texture *texture, int alpha_only, stru
 
 /* ---- copies. */
 
-/* A triangle's number stands for this. */
+/* The mesh, copy and triangle that a triangle's number stands for. */
 struct scene_part {
     const struct scene *scene;     /* the mesh, or the scene itself */
     const struct scene_copy *copy; /* NULL: the scene itself */
@@ -272,8 +274,8 @@ static inline void scene_copy_put_back(const struct scene_copy *c, const double 
         out[k] /= c->scale;
 }
 
-/* Texture coordinates at point p of a triangle's plane; scene->uv is there. corner and p in the same frame,
- * turned or shifted as it may be. */
+/* Texture coordinates at point p of a triangle's plane; scene->uv must be there. corner and p are in the
+ * same frame, whichever it is. */
 void scene_uv_at(const struct scene *scene, uint32_t triangle, const double *const corner[3], const double p[3],
                  double uv[2]);
 
@@ -281,7 +283,8 @@ void scene_uv_at(const struct scene *scene, uint32_t triangle, const double *con
 int scene_rgb_at(const struct scene *scene, uint32_t triangle, const double *const corner[3], const double p[3],
                  uint8_t rgb[3]);
 
-/* Whether the triangle has a hole at p. Only where scene->cutout is there. */
+/* The mask with the holes of one of the scene's own triangles; NULL: it has none. scene->cutout must be
+ * there. */
 static inline const struct texture_mask *scene_cutout(const struct scene *scene, uint32_t triangle)
 {
     return scene->cutout[scene->label[triangle] - scene->label0];

@@ -8,7 +8,7 @@
 
 enum scene_object_state {
     SCENE_OBJECT_EMPTY,  /* no triangle is left of it */
-    SCENE_OBJECT_CLOSED, /* each edge has its counterpart, or what has none cancels (core/body.h) */
+    SCENE_OBJECT_CLOSED, /* each edge has its counterpart, or edges without one cancel (core/body.h) */
     SCENE_OBJECT_TURNED, /* there are no open edges, but neighbouring faces look to different sides */
     SCENE_OBJECT_OPEN,
 };
@@ -29,7 +29,7 @@ struct scene_objects {
     uint32_t *of; /* [n_surfaces] the object of each surface */
 };
 
-/* Takes each open edge, from a to b, prcs: those that n_open counts. */
+/* Receives each open edge that n_open counts, from a to b, prcs. */
 struct scene_open_edges {
     void *ctx;
     int (*take)(void *ctx, const double a[3], const double b[3], struct sh_err *err);

@@ -10,7 +10,7 @@
  * formed in 128 bits: exact for pulse numbers to 2^50 (15 years at 2.2 MHz).
  *
  * Angles are in turns (1 turn = 2 pi rad) until a sine is needed, so that reduction is exact.
- * A frame is one sweep of the pan and a whole number of lines; with pan speed 0, or no pan range, one line.
+ * A frame is one sweep of the pan, in a whole number of lines; with pan speed 0, or no pan range, one line.
  * Pure; any thread. */
 #ifndef CORE_SCHEDULE_H
 #define CORE_SCHEDULE_H
@@ -116,10 +116,11 @@ void schedule_get_run(const struct schedule_segment *seg, const struct schedule_
 
 /* Angle at pulse k of what sweeps a line, in turns: the mirror of a line head, the rotor of one with beams. */
 double schedule_sweep_turn(const struct schedule_segment *seg, uint64_t k);
-/* The run while that stands still at sweep_turn, and lines go on by time: of a line head, or of one with beams. */
+/* Changes a run, of a line head or one with beams: what sweeps stands still at sweep_turn, and lines go on by
+ * time. */
 void schedule_hold_run(const struct schedule_segment *seg, double sweep_turn, struct schedule_run *run);
 
-/* So many pulses, at least one, fire within max_ns. */
+/* The number of pulses that fire within max_ns, at least one. */
 uint64_t schedule_longest_run(const struct schedule_segment *seg, int64_t max_ns);
 
 /* Pan angle and mirror angle of any pulse, in turns, for the encoders. The pan's is not reduced to one

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* Sight: what a standing station sees in each direction, known before rays are cast.
+/* Sight: a visibility map. It holds what a standing station sees in each direction, before rays are cast.
  *
  * In: a BVH (core/bvh.h), the one point where all rays begin, and which directions matter. Out: a map of
  * directions. For a ray the map says which triangle it meets, or that it meets nothing, without a walk through
  * the BVH. The hits are those of bvh_hits, bit by bit: range, triangle, label.
  *
  * Directions are the cells of a cube around the station. Each cell says one of four things: this triangle
- * alone; nothing; one of these few (decided ray by ray in double); ask the BVH. Why no cell says too much:
- * core/sight/sight_inside.h.
+ * alone; nothing; one of a list of candidates (decided ray by ray in double); ask the BVH. The proof that
+ * cells are right is in core/sight/sight_inside.h.
  *
  * A sight is constant after it is made, and may be used from any thread; each thread has working memory of
  * its own. The scene must stand still, and have no surface with holes. */
@@ -23,12 +23,12 @@ struct sight;
 struct sight_spec {
     const struct bvh *bvh; /* must outlive the sight */
     double station_m[3];   /* where the rays begin, prcs */
-    /* Rays that will be cast, if they were spread evenly over all directions. Cells are made no finer than so
-     * many rays pay for. */
+    /* The number of rays that will be cast, as if spread evenly over all directions. Cells are made no finer
+     * than that many rays pay for. */
     double rays;
-    uint64_t memory_bytes; /* the sight takes no more, also while it is made; what does not fit asks the BVH */
-    /* False where no ray goes within radius_rad of the unit vector dir (prcs). NULL: rays go everywhere. A ray
-     * where there should be none asks the BVH. */
+    uint64_t memory_bytes; /* the most that the sight takes, also while it is made; cells that don't fit ask the BVH */
+    /* False where no ray goes within radius_rad of the unit vector dir (prcs). NULL: rays go everywhere. Rays
+     * outside of these directions ask the BVH. */
     int (*sees)(const void *ctx, const double dir[3], double radius_rad);
     const void *ctx;
 };
@@ -36,12 +36,12 @@ struct sight_spec {
 struct sight_info {
     uint32_t cells;                /* along an edge of the cube's faces */
     double one, nothing, few, ask; /* shares of the directions that were looked at */
-    uint64_t lists, records;       /* of few: lists; triangles in them, each once a region */
+    uint64_t lists, records;       /* candidate lists; triangles in them, each counted once a region */
     uint64_t bytes, peak_bytes;    /* kept; while it was made */
     double build_s;
 };
 
-/* True where a sight can be had: no surface has holes, and triangles are few enough to be numbered. */
+/* True where a sight is possible: no surface has holes, and triangles are few enough to be numbered. */
 int sight_possible(const struct scene *scene);
 /* Cells along an edge of the cube's faces, for rays and memory_bytes as of struct sight_spec. */
 uint32_t sight_cells(double rays, uint64_t memory_bytes);
@@ -65,7 +65,7 @@ const struct sight_counters *sight_work_counters(const struct sight_work *work);
 
 /* Exact hits, as bvh_hits. The rays begin at the station (rays->from.own.x is NULL, at_m the station's, bit by
  * bit); rays->scattered is not used. Hits beyond range_max_m may or may not be reported.
- * bvh_work: for what the BVH is asked; where rays->steep is given, bvh_work_directions are then those of the last
+ * bvh_work: for rays that ask the BVH. Where rays->steep is given, bvh_work_directions are then those of the last
  * chunk, as after bvh_hits.
  * Allocates nothing. */
 void sight_hits(struct sight_work *work, struct bvh_work *bvh_work, const struct sight *sight,

@@ -17,9 +17,10 @@
  * refraction). A mirror sends a share on by the law of reflection.
  *
  * Where the mesh has a colour, the reflectance is its luminance in linear sRGB (ITU-R BT.709: 0.2126 R +
- * 0.7152 G + 0.0722 B). That is an assumption: what is light to the eye need not be light at the laser's
- * wavelength. Where it has a diffuse texture, the colour is multiplied by the texel at the hit, channel by
- * channel. Where it has no texture but colours of its vertices, the one between them at the hit counts. */
+ * 0.7152 G + 0.0722 B). That is an assumption: a surface bright to the eye need not be bright at the
+ * laser's wavelength. Where it has a diffuse texture, the colour is multiplied by the texel at the hit,
+ * channel by channel. Where it has no texture but colours of its vertices, the colour interpolated at the
+ * hit counts. */
 #ifndef CORE_SURFACE_H
 #define CORE_SURFACE_H
 
@@ -61,7 +62,7 @@ void surface_table_free(struct surface_table *table);
 int surface_table_set(struct surface_table *table, uint32_t label, const struct scene_surface *named,
                       const struct surface_rule *rule, uint32_t n_rules, double unknown);
 
-/* Labels of equal surfaces get the same number: kind[n], of the caller. */
+/* Gives labels of equal surfaces the same number: kind[n], the caller's array. */
 int surface_kinds(const struct surface_table *table, uint16_t *kind, struct sh_err *err);
 
 /* Entry `label` gets its reflectance from a texture (core/texture.h), its gamma taken for that of sRGB. Beyond a
@@ -84,8 +85,8 @@ static inline uint32_t surface_of_label(uint32_t label)
     return label & 0xffff;
 }
 
-/* Colours by label, for clouds that show them: the texel at a hit, just as the image has it; beside textures the
- * colour between the vertices, else the mesh's diffuse colour, or else grey. Packed: red << 16 | green << 8 | blue, sRGB. */
+/* Colours by label, for clouds that show them: the texel at a hit, as the image has it. Without a texel it is the
+ * colour between the vertices, else the mesh's diffuse colour, else grey. Packed: red << 16 | green << 8 | blue. */
 struct surface_image;
 struct surface_colours {
     uint32_t n;
@@ -100,8 +101,8 @@ void surface_colours_set(struct surface_colours *colours, uint32_t label, const 
 /* Entry `label` gets an image. SH_EINPUT, naming the file: can't be read; the entry stays as it is. */
 int surface_colours_texture(struct surface_colours *colours, uint32_t label, const struct scene_texture *texture,
                             struct sh_err *err);
-/* The colour of a hit; uv finite, or NULL: not known. rgb: the colour between the vertices, or NULL: there is none.
- * Labels beyond the entries are grey. */
+/* The colour of a hit. uv is finite, or NULL where it is not known; rgb is the colour between the vertices, or NULL
+ * where there is none. Labels beyond the entries are grey. */
 uint32_t surface_colour(const struct surface_colours *colours, uint32_t label, const double uv[2],
                         const uint8_t rgb[3]);
 

@@ -67,7 +67,7 @@ int text_open(struct text *t, const char *path, text_progress *progress, void *c
 
 void text_drop_read(struct text *t)
 {
-    const size_t block = (size_t)2 << 20; /* of large pages, of which a part can't go */
+    const size_t block = (size_t)2 << 20; /* of huge pages: a part of one can't be given back */
     const size_t first = (block - (uintptr_t)t->data % block) % block, read = (size_t)(t->p - t->data);
     const size_t from = t->n_dropped > first ? t->n_dropped : first;
     if (read < from + block) return;

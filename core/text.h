@@ -31,7 +31,8 @@ struct text {
     size_t n_dropped; /* bytes from data on: text_drop_read */
 };
 
-/* Called every 16 MiB that are read, fraction -1: unknown. What is not 0 ends the reading, with err filled. */
+/* Called every 16 MiB that are read, fraction -1: unknown. A result other than 0 ends the reading, with err
+ * filled. */
 typedef int text_progress(void *ctx, double fraction, struct sh_err *err);
 
 /* Reads the whole file; p is at its first byte, or after UTF-8's byte order mark. progress may be NULL. text_close is due in any case. */
@@ -63,7 +64,7 @@ bool text_at_word_end(const struct text *t);
 /* At the end of the line (LF, CR LF or CR), or of the file? */
 bool text_at_line_end(const struct text *t);
 
-/* Past the end of this line, whatever is still on it. */
+/* Moves past the end of this line, whatever is still on it. */
 void text_next_line(struct text *t);
 
 /* The next run of characters that are not blank; empty at the line's end. */
@@ -72,7 +73,7 @@ struct text_span text_word(struct text *t);
 /* The rest of the line, without blanks at either end. */
 struct text_span text_rest(struct text *t);
 
-/* A number that fills the word at p; false and p unmoved when it isn't one. nan and inf are numbers here. */
+/* A number that fills the word at p; false and p unmoved when it isn't one. NaN and inf are numbers here. */
 bool text_number(struct text *t, double *value);
 
 /* Decimal digits with a sign, up to 10^18; what follows is the caller's. */

@@ -2,10 +2,10 @@
 /* Images that lie on a mesh. In: a file, or bytes within one, and texture coordinates. Out: texels as 8 bits
  * of red, green, blue and alpha; which texel lies at a coordinate; the holes that alpha cuts out.
  *
- * PNG, JPEG, TGA and BMP are read through stb_image, WebP through libwebp, and what Assimp hands over unpacked. An image has
- * up to TEXTURE_MAX_SIDE texels a side, TEXTURE_MAX_TEXELS in all, and a file of up to TEXTURE_MAX_FILE bytes;
- * decoding takes up to TEXTURE_MAX_MEMORY bytes, whatever the file says of itself. Gamma that a file names is
- * not applied: values are sRGB. Rows count from the top; the coordinate 0, 0 is the lower left corner.
+ * PNG, JPEG, TGA and BMP are read through stb_image, WebP through libwebp, and images that Assimp gives are unpacked
+ * already. An image has up to TEXTURE_MAX_SIDE texels a side, TEXTURE_MAX_TEXELS in all, and a file of up to
+ * TEXTURE_MAX_FILE bytes; decoding takes up to TEXTURE_MAX_MEMORY bytes, whatever the file says of itself. Gamma that a
+ * file names is not applied: values are sRGB. Rows count from the top; the coordinate 0, 0 is the lower left corner.
  * Images and masks are constant once they are made: any thread. */
 #ifndef CORE_TEXTURE_H
 #define CORE_TEXTURE_H
@@ -22,7 +22,7 @@ enum {
     TEXTURE_MAX_MEMORY = 1 << 30,
 };
 
-/* What lies beyond 0..1, in each direction. Decal: no image, the surface is what it is without one. */
+/* What lies beyond 0..1, in each direction. Decal: no image there, and the surface is as without one. */
 enum texture_wrap { TEXTURE_REPEAT, TEXTURE_CLAMP, TEXTURE_MIRROR, TEXTURE_DECAL };
 
 struct texture_source {
@@ -58,7 +58,7 @@ struct texture_mask;
  * luma instead (an opacity map). *out is NULL where there is no hole; else it is released with free(). */
 int texture_mask_create(const struct texture_image *image, const enum texture_wrap wrap[2], double solid, int by_light,
                         struct texture_mask **out, struct sh_err *err);
-/* uv that are not finite, and what lies beyond a decal, are no hole. */
+/* There is no hole where uv is not finite, or beyond a decal. */
 int texture_is_hole(const struct texture_mask *mask, const double uv[2]);
 
 #endif

@@ -42,12 +42,13 @@ struct utc_gps {
     int64_t ns;   /* of the week */
 };
 
-/* What was known when this was written. */
+/* The leap seconds that were known when the program was written. */
 const struct utc_table *utc_table_builtin(void);
 /* The text of a leap-seconds.list (IERS, NIST, tzdata): NTP seconds and TAI-UTC, `#@` the expiry. On failure
  * out is unspecified; the error names the line. */
 int utc_table_parse(const char *text, struct utc_table *out, struct sh_err *err);
-/* Adds a leap second before this POSIX second, the full minute or not. 0: there is one already, or the table is full. */
+/* Adds a leap second before this POSIX second, which need not be a full minute. 0: there is one already, or the table
+ * is full. */
 int utc_table_add(struct utc_table *table, int64_t posix_s);
 
 void utc_from_tai(const struct utc_table *table, int64_t tai_ns, struct utc_time *out);
@@ -64,7 +65,7 @@ struct utc_gps utc_gps_week(int64_t tai_ns);
 
 /* ISO 8601: "2016-12-31T23:59:60Z", with up to 9 decimals of the second. Nothing else is taken. */
 int utc_parse(const char *text, struct utc_time *out, struct sh_err *err);
-/* The same; n decimals (0 to 9) of the second, cut, not rounded: a second begins when it begins. */
+/* The same; n decimals (0 to 9) of the second, cut, not rounded, so that no second begins early. */
 void utc_format(const struct utc_time *utc, int decimals, char buf[UTC_TEXT_LEN]);
 
 #endif

@@ -53,7 +53,7 @@ struct vec3_floats {
     const float *x, *y, *z;
 };
 
-/* Of anything with arrays x, y and z: what begins at its element i. */
+/* The arrays x, y and z of anything, from element i on. */
 #define VEC3_IN(a, i)  ((struct vec3_in){(a).x + (i), (a).y + (i), (a).z + (i)})
 #define VEC3_OUT(a, i) ((struct vec3_out){(a).x + (i), (a).y + (i), (a).z + (i)})
 

@@ -8,7 +8,8 @@
 #include <string.h>
 #include <time.h>
 
-/* Its name and those of the other two that Embree's threads get to are in tests/check/tsan.supp. */
+/* tests/check/tsan.supp has the names of this function and of the two others that Embree's threads
+ * call. */
 static bool embree_counts_bytes(void *user, ssize_t bytes, bool post)
 {
     (void)post;
@@ -17,14 +18,14 @@ static bool embree_counts_bytes(void *user, ssize_t bytes, bool post)
     return true;
 }
 
-/* From Embree's threads, often; false ends the building. */
+/* Called from Embree's threads, often; false ends the build. */
 static bool embree_may_go_on(void *report, double fraction)
 {
     (void)fraction;
     return !sh_stopped(report);
 }
 
-/* What Embree's last error was, since that was asked last. */
+/* Fails with the error that Embree has noted since the last check. */
 static int check_device(RTCDevice device, struct sh_err *err)
 {
     enum RTCError code = rtcGetDeviceError(device);
@@ -45,7 +46,7 @@ static void attach(struct bvh *bvh, uint32_t n, RTCBoundsFunction bounds, RTCInt
     rtcReleaseGeometry(geometry);
 }
 
-/* Builds what Embree has, unless report asks to stop. */
+/* Builds Embree's tree, unless report asks to stop. */
 static int commit(struct bvh *bvh, const struct sh_report *report, struct sh_err *err)
 {
     union { /* Embree only passes it on */
@@ -60,7 +61,7 @@ static int commit(struct bvh *bvh, const struct sh_report *report, struct sh_err
     return check_device(bvh->device, err);
 }
 
-/* The planes are made once Embree has given back what it takes for building. */
+/* The planes are made after Embree has freed its memory for building, so that the peak is lower. */
 static int build(struct bvh *bvh, unsigned threads, const struct sh_report *report, struct sh_err *err)
 {
     int rc = bvh_make_leaves(bvh, report, err);
@@ -77,8 +78,8 @@ static double seconds(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/* Embree may hang so many leaves at one node of its tree. Four of them, where it finds that cheaper, save a seventh of
- * the memory, and rays are as fast where surfaces hang together. In foliage a ray would try half as many leaves
+/* The most leaves that Embree may put at one node of its tree. Four, where it finds that cheaper, save a seventh of
+ * the memory, and rays are as fast where surfaces are connected. In foliage a ray would try half as many leaves
  * more. */
 static unsigned most_together(const struct scene *scene)
 {

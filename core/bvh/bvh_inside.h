@@ -4,27 +4,27 @@
  * Meeting a triangle. A leaf has one or two triangles, with its corners in double. Seen from the origin o of a ray, a
  * corner A is p = A - o, rounded once. The ray with direction d passes an edge from p to q on the side that the sign
  * of (p x (q - p)) . d says, and meets a triangle where the sides of its edges, taken one way round, don't differ.
- * Where single or double precision tells the sign beyond its rounding, it is taken as it is, by vectors (meet.c).
- * Else it is worked out again in one way for whichever triangle asks (edges.h), so that both triangles of an edge
- * have the same number, turned: no ray passes between them. A ray that meets nothing nearer, but passes the edges of
- * a triangle by less than their rounding, meets that triangle. So nothing passes at corners, either, nor where a
- * corner lies on another's edge up to rounding.
+ * Where the sign is certain beyond the rounding of single or double precision, it is taken from there, by vectors
+ * (meet.c). Else it is computed again, in one way for both triangles of the edge (edges.h), so that both get the
+ * same number with opposite signs: no ray passes between them. A ray that meets nothing nearer, but passes the
+ * edges of a triangle by less than their rounding, meets that triangle. So nothing passes at corners, either, nor
+ * where a corner lies on another's edge up to rounding.
  *
  * How far. The range is that of the triangle's plane, in double (planes.c). Of all that a ray meets, the nearest is
  * the hit. Hits within 1e-12 of its range count as equal: the one with the lowest number wins, in whatever order they
  * were tried. Where the order may have mattered, the ray is cast again from the nearest range on (packet.c).
  *
- * That no leaf is left out. Embree works in float. In units of 2^-24 its ray lies off the real one by at most 2 |o| +
+ * Why no leaf is left out. Embree works in float. In units of 2^-24 its ray lies off the real one by at most 2 |o| +
  * |h| where it meets something at h, both counted from the BVH's origin: the rounding of the ray's origin, and of its
  * direction over the range, which is |o| + |h| at most. Embree's test of a box is the fast one for such geometry,
- * whatever the scene's flags say (3.13 and 4.4): with the reciprocal of a direction, its products and their
- * difference it errs by up to 7 units of the range. Together that is at most 9 |o| + 8 |h|. The boxes are larger than
- * their triangles by 8 (2 r + |h|), r being the radius of the scene. Where that is more than 9 R + 17 |h|, boxes are
- * larger by this, and float rays are at most R long: then |o| is at most |h| + R. A hit makes tfar the next float above
- * its range. At that range the real ray is at its triangle, so the float ray is in its box, and has entered it before.
- * Rays begin at most 1.5 r from the scene's middle: those from further away are taken along until they have come that
- * near (hits.c). So nothing here depends on where rays begin. Large things make the boxes of small ones hardly larger
- * where those are near the BVH's origin. In a large scene it is where most triangles are, else in the middle.
+ * whatever the scene's flags say (3.13 and 4.4): with the reciprocal of a direction, its products and their difference
+ * it errs by up to 7 units of the range. Together that is at most 9 |o| + 8 |h|. The boxes are larger than their
+ * triangles by 8 (2 r + |h|), r being the radius of the scene. Where that is more than 9 R + 17 |h|, boxes are larger
+ * by this, and float rays are at most R long: then |o| is at most |h| + R. A hit makes tfar the next float above its
+ * range. At that range the real ray is at its triangle, so the float ray is in its box, and has entered it before. Rays
+ * begin at most 1.5 r from the scene's middle: a ray from further away is moved along its direction until it is that
+ * near (hits.c). So nothing here depends on where rays begin. Large triangles hardly enlarge the boxes of small ones
+ * near the BVH's origin. In a large scene that origin is where most triangles are, else in the middle.
  *
  * Copies of a mesh. The mesh has a BVH of its own, in its own frame. Its copies are primitives of the scene's BVH, with
  * boxes made larger in the same way. A packet that reaches one is turned into the mesh's frame in double, and cast
@@ -47,8 +47,8 @@ _Static_assert(sizeof(struct bvh_plane) == 4 * sizeof(double), "gathered as doub
 struct bvh_leaf {
     double corner_m[4][3]; /* prcs */
     uint32_t triangle;     /* 0 */
-    /* By bits: how far triangle 1 follows triangle 0 in the scene's list, 4, 0: there is none; and two lengths, 14
-     * each. */
+    /* Bit fields. 4 bits: how far triangle 1 follows triangle 0 in the scene's list, 0: there is none. Then two
+     * lengths of 14 bits each. */
     uint32_t rest;
 };
 _Static_assert(sizeof(struct bvh_leaf) == 104, "there are half as many as triangles");
@@ -63,7 +63,7 @@ static inline double bvh_leaf_length(const struct bvh_leaf *leaf, int at)
     memcpy(&f, &bits, sizeof f);
     return (double)f;
 }
-/* Its farthest corner from the BVH's origin, and its longest edge; at least. */
+/* Upper bounds of its farthest corner's distance from the BVH's origin, and of its longest edge. */
 static inline double bvh_leaf_far_m(const struct bvh_leaf *leaf)
 {
     return bvh_leaf_length(leaf, BVH_LEAF_FAR);
@@ -99,14 +99,14 @@ struct bvh {
     struct bvh_copy *copy;   /* [scene->n_copies] */
     struct bvh_plane *plane; /* one more than there are: the last stands for a miss, all NaN */
     double origin_m[3];      /* the middle of the scene, or where most of its triangles are (leaves.c) */
-    double radius_m;         /* nothing of it is further from there */
-    double stretch_m;        /* float rays are no longer; INFINITY: as long as they like */
+    double radius_m;         /* no vertex of the scene is further from there */
+    double stretch_m;        /* float rays are no longer than this; INFINITY: they have any length */
     struct bvh_info info;
     int64_t bytes; /* as Embree reports */
 };
 
-/* What a ray meets no further than this from where it begins is no hit: there it begins on the surface, and
- * goes on. Half of the wire's finest count, and far more than rounding leaves of zero. */
+/* A surface no further than this from a ray's origin is no hit: the ray begins on it, and goes on. This is
+ * half of the wire's finest count, and far more than rounding makes of zero. */
 #define BVH_AT_ORIGIN_M 5e-7
 /* Ranges that differ by no more than this share of them are the same. */
 #define BVH_SAME 1e-12
@@ -119,7 +119,7 @@ typedef struct RTCRayQueryContext bvh_context;
 typedef struct RTCIntersectContext bvh_context;
 #endif
 
-/* A packet in double: what leaves see of it. Embree hands on its context, which is the first member. */
+/* A packet in double, as leaves see it. Embree passes its context on, which is the first member. */
 struct bvh_nested;
 struct bvh_query {
     bvh_context context;
@@ -127,7 +127,7 @@ struct bvh_query {
     struct bvh_nested *nested; /* for copies; of a query within a copy: NULL */
     double at_origin_m;        /* no hit is nearer than this */
     uint32_t width;            /* rays of the call */
-    int has_own;               /* each ray begins at its own point, org; else all at at */
+    int has_own;               /* each ray begins at its own point, org; else all begin at `at` */
     double at[3], at_local[3]; /* prcs; from the BVH's origin */
     double far_m;              /* no ray begins further from the BVH's origin */
     double most_m;             /* of a float ray, as in struct bvh_batch */
@@ -138,7 +138,7 @@ struct bvh_query {
     double range_m[BVH_PACKET];    /* out: of the nearest so far; INFINITY: none */
     uint32_t triangle[BVH_PACKET]; /* out: the hit */
     double hit_m[BVH_PACKET];      /* out: its range */
-    uint32_t unsure;               /* a bit for each ray of which another hit may have a lower number */
+    uint32_t unsure;               /* a bit for each ray that may have another hit of lower number */
     double near_m[BVH_PACKET];     /* of the nearest triangle that is missed by rounding alone; INFINITY: none */
     uint32_t near[BVH_PACKET];
     uint64_t decided, leaves; /* struct bvh_counters */
@@ -184,7 +184,7 @@ void bvh_pad_box(const struct bvh *bvh, const double lo_m[3], const double hi_m[
 void bvh_begin_query(struct bvh_query *query);
 void bvh_call_embree(const struct bvh *bvh, struct bvh_query *query, const int *valid, void *rays, uint32_t width);
 
-/* Near misses of the packet before count no more. */
+/* Forgets the near misses of the packet before. */
 static inline void bvh_forget_near(struct bvh_query *query)
 {
     for (uint32_t i = 0; i < BVH_PACKET; i++) {
@@ -207,7 +207,7 @@ struct bvh_batch {
 void bvh_intersect(const struct bvh *bvh, struct bvh_query *query, struct bvh_batch *batch);
 
 /* planes.c */
-/* Labels and steepness of the hits; those of what a ray does not meet. */
+/* Fills labels and steepness of all rays; those that hit nothing get the values of a miss. */
 void bvh_refine(const struct bvh *bvh, const struct bvh_rays *rays);
 /* copies.c: the same where there are copies. */
 void bvh_refine_copies(const struct bvh *bvh, const struct bvh_rays *rays);

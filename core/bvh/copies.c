@@ -66,7 +66,7 @@ static void turn_directions(const struct bvh_query *query, const struct scene_co
     }
 }
 
-/* Where rays begin, and how far from there the float rays do. */
+/* Finds where rays begin, and how far along them the float rays begin. */
 static void find_origin(const struct bvh_query *query, const struct bvh_copy *copy, struct bvh_query *in)
 {
     scene_copy_put_back(copy->at, query->at, in->at);
@@ -148,7 +148,7 @@ static void begin_fields(struct bvh_nested *nested, uint32_t width)
     memset(mask, 0xff, width * sizeof *mask);
 }
 
-/* The rays of the query in the mesh's frame. Returns whether any has a way to go there. */
+/* Turns the query's rays into the mesh's frame. Returns whether any of them can hit something there. */
 VEC_CLONES
 static int enter(const struct bvh_query *query, const struct bvh_copy *copy, const float *tfar, const int *valid,
                  struct bvh_nested *nested)
@@ -229,7 +229,7 @@ void bvh_get_plane(const struct bvh *bvh, uint32_t triangle, struct bvh_plane *p
     plane->d = s * s * s * above + vec3_dot(plane->n, off);
 }
 
-/* Which ray meets it at which cosine; its normal's length does not matter. */
+/* Cosine of the incidence of a ray on the triangle; the length of the normal does not matter. */
 static double cosine_of(const struct bvh *bvh, uint32_t triangle, const struct vec3_in *dir, uint32_t i)
 {
     const double d[3] = VEC3_AT(*dir, i);

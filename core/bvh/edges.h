@@ -16,8 +16,8 @@ static inline int before(const double a[3], const double b[3])
 }
 
 /* On which side of the edge a-b the ray passes, as the distance across the ray times the edge's length;
- * corners relative to the ray's origin. Taken in one order of the corners whatever triangle asks, so that two
- * triangles of an edge get the same number with opposite signs. */
+ * corners relative to the ray's origin. The corners are taken in one order, whichever triangle asks. So the
+ * two triangles of an edge get the same number with opposite signs. */
 static inline double edge_side(const double a[3], const double b[3], const double dir[3])
 {
     int swap = before(b, a);
@@ -67,8 +67,8 @@ static inline double blur(const double a[3], const double b[3])
 }
 
 /* Whether a ray that is as near to the line of an edge as rounding passes between the edge's ends, or past one of them
- * by no more than rounding. How near it is to the line is not asked of the nearest points: where the ray goes almost
- * along the edge they are uncertain by far more. */
+ * by no more than rounding. The nearest points of ray and line are not used: where the ray goes almost along the
+ * edge, their error is far larger. */
 static inline int is_beside(const double a[3], const double b[3], const double dir[3])
 {
     double e[3], across[3];
@@ -81,7 +81,7 @@ static inline int is_beside(const double a[3], const double b[3], const double d
     return vec3_dot(across, across) <= 0x1p-98 * vec3_dot(end, end); /* 16 units of 2^-53 of its distance */
 }
 
-/* Whether a ray that passes outside of a triangle does so by no more than that: beside an edge, not beyond its ends. */
+/* Whether a ray misses a triangle by no more than rounding: beside an edge, not beyond its ends. */
 static inline int is_near_miss(double v[3][3], const double side[3], const double dir[3])
 {
     const double sign = side[0] + side[1] + side[2] < 0.0 ? -1.0 : 1.0; /* of n . dir */
@@ -94,8 +94,8 @@ static inline int is_near_miss(double v[3][3], const double side[3], const doubl
     return touches;
 }
 
-/* A ray within the plane, as far as double precision shows, does not meet the triangle; what stands on its
- * edges it does. */
+/* A ray within the plane, as far as double precision shows, does not hit the triangle. It hits other
+ * triangles at the edges. */
 static inline int is_edge_on(double v[3][3], const double side[3])
 {
     return fabs(side[0] + side[1] + side[2]) <= blur(v[0], v[1]) + blur(v[1], v[2]) + blur(v[2], v[0]);

@@ -7,7 +7,7 @@
 #include "core/bvh/bvh_inside.h"
 #include "core/vecmath.h"
 
-enum { ROOM = BVH_CHUNK + 48 }; /* arrays of a power of two would get into each other's way in a cache */
+enum { ROOM = BVH_CHUNK + 48 }; /* arrays of a power of two would collide in a cache */
 
 struct bvh_work {
     struct bvh_query query;
@@ -62,7 +62,7 @@ struct bvh_profile *bvh_work_profile(const struct bvh_work *work)
     return work->profile;
 }
 
-/* Origins in the local frame. Returns the square of how far the farthest is from its origin. */
+/* Origins in the local frame. Returns the square of the largest distance from the frame's origin. */
 VEC_CLONES
 static double to_local(const struct vec3_in *own, const double origin_m[3], uint32_t n, const struct vec3_out *out)
 {
@@ -83,8 +83,7 @@ static double to_local(const struct vec3_in *own, const double origin_m[3], uint
     return far2;
 }
 
-/* Rays that begin further from the origin than the scene goes come within its radius before they meet anything: the float
- * ray begins there. */
+/* Rays that begin outside of the scene's radius enter it before they hit anything: the float ray begins there. */
 static void take_along(struct bvh_work *w, const struct bvh *bvh, const struct bvh_rays *rays, struct bvh_batch *batch)
 {
     struct bvh_origins from = {.own = batch->local};
@@ -119,7 +118,8 @@ static void set_origins(struct bvh_work *w, const struct bvh *bvh, const struct 
     }
 }
 
-/* Ray i of a chunk has met nothing in its first stretch: the next ones, until it has left the scene. */
+/* Ray i of a chunk has hit nothing in its first stretch: casts the next ones, until the ray has left the
+ * scene. */
 static void cast_further(struct bvh_work *w, const struct bvh *bvh, const struct bvh_batch *batch, uint32_t i)
 {
     const struct bvh_rays *rays = batch->rays;

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* Leaves: two triangles that share an edge go to one, where their common box is smaller than the two of their own. */
+/* Leaves: two triangles that share an edge make one leaf, where their common box is smaller than their two boxes
+ * together. */
 #include <math.h>
 #include <stdlib.h>
 
 #include "core/bvh/bvh_inside.h"
 #include "core/huge.h"
 
-/* The corner of a triangle that is none of another's that shares an edge with it; 3: they share none. */
+/* The corner of a triangle that is not on its common edge with another one; 3: they share no edge. */
 static int odd_corner(const uint32_t a[3], const uint32_t b[3])
 {
     int odd = 3, n = 0;
@@ -60,7 +61,7 @@ static void fill_leaf(const struct bvh *bvh, uint32_t first, uint32_t second, st
                  length_bits(far_m) << BVH_LEAF_FAR;
 }
 
-/* How far all of the scene lies from the origin. */
+/* The radius of the scene about the origin. */
 static double radius_of(const struct bvh *bvh)
 {
     const struct scene *scene = bvh->scene;
@@ -100,7 +101,7 @@ static void measure(struct bvh *bvh)
     bvh->radius_m = radius_of(bvh);
 }
 
-/* Half the surface of the box around two triangles; the same one twice: around it. */
+/* Half the surface of the box around two triangles, which may be the same one. */
 static double box_m2(const struct scene *scene, uint32_t first, uint32_t second)
 {
     double d[3];
@@ -121,8 +122,8 @@ static int is_taken(const uint64_t *taken, uint32_t triangle)
     return (taken[triangle / 64] >> triangle % 64 & 1) != 0;
 }
 
-/* Returns the one that makes the smallest box with the triangle, among those that follow it in the list as far as a leaf
- * can name; or BVH_NO_TRIANGLE. */
+/* Returns the partner that makes the smallest box with the triangle, among the next ones of the list that a leaf can
+ * name; or BVH_NO_TRIANGLE. */
 static uint32_t partner(const struct scene *scene, uint32_t triangle, const uint64_t *taken)
 {
     const uint32_t left = scene->n_triangles - triangle,

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A packet at a leaf, in double: which rays meet its triangles, and how far. bvh_inside.h says by which rules. */
+/* A packet at a leaf, in double: finds which rays hit its triangles, and at what range. The rules are in
+ * bvh_inside.h. */
 #include <math.h>
 
 #include "core/bvh/bvh_inside.h"
@@ -15,16 +16,16 @@ static const uint8_t edge_from[EDGES] = {0, 1, 2, 1, 3}, edge_to[EDGES] = {1, 2,
 static const uint8_t corner_of[2][3] = {{0, 1, 2}, {1, 3, 2}};
 
 /* An edge's side is (p x (q - p)) . d. Its error in double is at most 9 units of 2^-53 of |p| |q - p|: 1 for the
- * difference, 3 for the cross product, 5 for the dot product of three terms. It is added for here and for edges.h,
- * and so are the 8 units that edges.h takes for hit. */
+ * difference, 3 for the cross product, 5 for the dot product of three terms. The bound counts it twice, for here
+ * and for edges.h, and adds the 8 units within which edges.h takes an edge for hit. */
 #define SIDE_DOUBT (32.0 * 0x1p-53)
-/* The same in single precision, which looks first where all rays begin at one point: the cross product is made in
- * double and rounded, 1; the direction 1; the dot product 5. */
+/* The same in single precision, which is tried first where all rays begin at one point: the cross product is made
+ * in double and rounded, 1; the direction 1; the dot product 5. */
 #define FLOAT_DOUBT (12.0 * 0x1p-24)
-/* A plane that is seen at a sine below this one has its range from the edges. */
+/* Where a plane is seen at a smaller sine, the range comes from the edges. */
 #define FLAT 1e-6
 
-/* How a ray and a triangle of the leaf lie to each other: by bits, those of triangle 1 two further. */
+/* How a ray passes a triangle of the leaf, as bits; those of triangle 1 are shifted by two. */
 enum { INSIDE = 1, DOUBT = 2, SECOND = 2, EITHER = INSIDE | DOUBT };
 
 /* Lanes of a packet that Embree asks for, a byte each. */
@@ -39,8 +40,8 @@ static int any(const struct lanes *lanes, uint8_t bits)
     return ((half[0] | half[1]) & UINT64_C(0x0101010101010101) * bits) != 0;
 }
 
-/* From the sides of a triangle's edges: inside where all have one sign for certain, outside where two have different
- * ones. */
+/* Judges by the sides of a triangle's edges: inside where all certainly have one sign, outside where two have
+ * different ones. */
 VEC_INLINE int64_t judge(double a, double b, double c, double doubt)
 {
     const double ab_lo = a < b ? a : b, ab_hi = a < b ? b : a, lo = ab_lo < c ? ab_lo : c, hi = ab_hi < c ? c : ab_hi;
@@ -57,7 +58,7 @@ VEC_INLINE int32_t judge_floats(float a, float b, float c, float doubt)
     return in | (1 - (in | out)) << 1;
 }
 
-/* All rays from one point: what an edge's side is multiplied by is the same for all of them. */
+/* For rays from one point: the moment p x (q - p) of an edge is then the same for all of them. */
 VEC_INLINE void find_moments(const struct bvh_query *query, const struct bvh_leaf *leaf, double moment[EDGES][3])
 {
     double p[4][3], e[3];
@@ -69,7 +70,7 @@ VEC_INLINE void find_moments(const struct bvh_query *query, const struct bvh_lea
     }
 }
 
-/* In single precision. Returns whether a ray that is valid is in doubt. */
+/* Judges in single precision. Returns whether a valid ray is in doubt. */
 VEC_INLINE int judge_fast(const double moment[EDGES][3], const float *dir, float doubt, struct lanes *found)
 {
     const float *dx = dir, *dy = dir + BVH_PACKET, *dz = dir + 2 * BVH_PACKET;
@@ -148,15 +149,15 @@ static int is_hole(const struct bvh_query *query, uint32_t lane, uint32_t triang
     return texture_is_hole(scene_cutout(scene, triangle), uv);
 }
 
-/* A triangle that the ray meets, at a range that is no further than the nearest and what counts as the same. */
+/* Notes a hit whose range is no further than the nearest, or counts as the same. */
 VEC_INLINE void note(struct bvh_query *query, float *tfar, uint32_t lane, uint32_t triangle, double range_m)
 {
     if (query->bvh->scene->cutout != NULL && is_hole(query, lane, triangle, range_m)) return;
     bvh_take_hit(query, tfar, lane, triangle, range_m, range_m);
 }
 
-/* Range to a triangle that the ray meets, and almost in its plane, where the plane's own range runs away: it is kept
- * between the edges that the ray passes. NaN: it passes none. */
+/* Range to a triangle that the ray hits almost in its plane. The plane's own range is then useless, so it is limited
+ * to between the edges that the ray passes. NaN: it passes none. */
 static double held_range(double v[3][3], const double dir[3], double range_m)
 {
     double lo = INFINITY, hi = -INFINITY, longest = 0.0;
@@ -173,8 +174,8 @@ static double held_range(double v[3][3], const double dir[3], double range_m)
     return range_m < lo || isnan(range_m) ? lo : range_m > hi ? hi : range_m;
 }
 
-/* A ray from a corner begins on the surface, and meets it nowhere else. The sides of two edges are 0 there, whatever
- * way it goes, and the plane's range is what rounding leaves. */
+/* A ray from a corner begins on the surface, and hits it nowhere else. Whatever its direction, the sides of two
+ * edges are 0, and the plane's range is rounding. */
 static int begins_at_corner(double v[3][3])
 {
     for (int i = 0; i < 3; i++)
@@ -182,8 +183,8 @@ static int begins_at_corner(double v[3][3])
     return 0;
 }
 
-/* A triangle that the ray misses by no more than double precision resolves at its edges. Of several the frontmost
- * counts, and of those the one with the lowest number. */
+/* Notes a triangle that the ray misses by no more than double precision resolves at its edges. Of several, the
+ * nearest counts; of equally near ones, that with the lowest number. */
 static void note_miss(struct bvh_query *query, uint32_t lane, uint32_t triangle, double range_m)
 {
     if (!(range_m > query->at_origin_m) || range_m > query->near_m[lane]) return;
@@ -193,7 +194,8 @@ static void note_miss(struct bvh_query *query, uint32_t lane, uint32_t triangle,
     query->near[lane] = triangle;
 }
 
-/* One ray and one triangle, of which double precision in lanes can't say whether they meet, or where. */
+/* Decides one ray and one triangle where double precision in lanes is in doubt whether they meet, or
+ * where. */
 static void try_one(struct bvh_query *query, float *tfar, uint32_t lane, const struct bvh_leaf *leaf, int which)
 {
     const uint32_t triangle = bvh_leaf_triangle(leaf, which);
@@ -224,7 +226,7 @@ static void try_one(struct bvh_query *query, float *tfar, uint32_t lane, const s
 /* The fate of a ray that is inside of a triangle for certain. */
 enum { BEHIND, NEARER, SAME, FLAT_SEEN };
 
-/* Ranges of one triangle's plane, and what becomes of the rays. */
+/* Finds the ranges of one triangle's plane, and the fate of each ray. */
 VEC_INLINE void find_ranges(const struct bvh_query *query, const struct bvh_plane *plane, double *range_m,
                             int64_t *becomes)
 {
@@ -245,7 +247,7 @@ VEC_INLINE void find_ranges(const struct bvh_query *query, const struct bvh_plan
     }
 }
 
-/* Rays that meet the triangle before all else so far. */
+/* Takes the triangle as the hit of rays for which it is the nearest so far. */
 VEC_INLINE void take_nearer(struct bvh_query *query, float *tfar, uint32_t triangle, const double *range_m,
                             const uint32_t *takes)
 {

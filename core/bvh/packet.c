@@ -118,8 +118,8 @@ static void take_near(struct bvh_query *query, uint32_t n)
     bvh_forget_near(query);
 }
 
-/* Casts rays again whose nearest range is known. No range is less, so the lowest number of those as near is found in any
- * order. */
+/* Casts rays again whose nearest range is known. No range is smaller, so the lowest number among equally near hits is
+ * found in any order. */
 static void settle(const struct bvh *bvh, struct bvh_query *query, struct packet *packet, uint32_t width)
 {
     float *tfar = bvh_field(&packet->at, width, tfar);

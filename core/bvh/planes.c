@@ -9,7 +9,7 @@
 #include "core/vec3.h"
 #include "core/vecmath.h"
 
-/* a b - c d, rounded about once: of a needle's normal nothing would be left otherwise (W. Kahan). */
+/* a b - c d, rounded about once: otherwise a needle's normal would lose all digits (W. Kahan). */
 static double difference(double a, double b, double c, double d)
 {
     const double ab = a * b, cd = c * d;
@@ -116,7 +116,7 @@ VEC_INLINE void range_of_one(const struct one_plane *p, const struct bvh_rays *r
     if (rays->steep != NULL) rays->steep[i] = (float)p->nn / (float)(along * along);
 }
 
-/* Lanes by hand: compilers leave so short a loop as it is. */
+/* Lanes are written by hand: compilers don't vectorise so short a loop. */
 VEC_INLINE void ranges_of_lanes(const struct one_plane *p, const struct bvh_rays *rays, uint32_t at)
 {
     const number_lanes triangle = (number_lanes){0} + p->triangle, label = (number_lanes){0} + p->label;
@@ -142,7 +142,7 @@ double bvh_range_of(const struct bvh *bvh, uint32_t triangle, const double at_m[
     return (tri.d - vec3_dot(tri.n, o)) / vec3_dot(tri.n, dir);
 }
 
-/* What meets nothing, without arithmetic. */
+/* Sets rays that hit nothing, without arithmetic. */
 static void say_nothing(const struct bvh_rays *rays, uint32_t from, uint32_t to)
 {
     for (uint32_t i = from; i < to; i++)

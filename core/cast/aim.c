@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* Where the beams of a chunk go and begin, and where the head believes that they go. */
+/* True directions and origins of a chunk's beams, and the directions that the head reads from its
+ * encoders. */
 #include <string.h>
 
 #include "core/cast/caster_private.h"
 #include "core/mat3.h"
 
-/* Socs to where positions go: straight to the CRS where that is a rotation, else to prcs. Returns 1 in the
- * first case. */
+/* The rotation from socs to the frame of positions: to the CRS where that is a rotation, else to prcs.
+ * Returns 1 in the first case. */
 static int reading_rotation(const struct cast_setup *s, double to_crs[9])
 {
     double g[9];
@@ -40,7 +41,7 @@ static void move(const struct cast_setup *s, int64_t t0_ns, const uint32_t *dt_n
     }
 }
 
-/* Where beams go, but not what the encoders read, where the pan has slipped. */
+/* The rotation for the true beams where the pan has slipped; the encoders don't see the slip. */
 static const double *slipped_rotation(const struct cast_setup *s, const double rotation[9], double out[9])
 {
     double slip[9];
@@ -50,7 +51,7 @@ static const double *slipped_rotation(const struct cast_setup *s, const double r
     return out;
 }
 
-/* An ideal head: its beams go where its encoders say, but for the encoders' steps. */
+/* For an ideal head: its beams go where its encoders say, except for the encoders' steps. */
 static void aim_ideal(struct caster *c, struct chunk *k, const struct kernel_turns *turns)
 {
     const struct cast_setup *s = k->s;
@@ -90,7 +91,7 @@ static void slip_bent(struct caster *c, const struct chunk *k, int offset)
     if (offset) kernel_turn_back(&VEC3_IN(c->read, 0), back, k->n, &VEC3_OUT(c->read, 0));
 }
 
-/* A head whose mechanics and encoders are not: the turns become what the encoders say. */
+/* For a head with errors of mechanics and encoders: the turns become the encoders' readings. */
 static void aim_bent(struct caster *c, struct chunk *k, const struct instrument *instrument)
 {
     const struct cast_setup *s = k->s;
@@ -141,8 +142,7 @@ void caster_aim(struct caster *c, struct chunk *k)
         aim_ideal(c, k, &(struct kernel_turns){k->n, l->mirror_turn, l->pan_turn});
 }
 
-/* Entries at .. at + n; c->socs is of no use any more. Those of a pulse that moves are at the times of dt_ns.
- */
+/* Reads entries at .. at + n; overwrites c->socs. Where the head moves, they have the times dt_ns. */
 static void read_part(struct caster *c, const struct chunk *k, uint32_t at, uint32_t n, const uint32_t *dt_ns)
 {
     const struct cast_setup *s = k->s;

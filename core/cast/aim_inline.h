@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/cast/kernels*.c: what their loops over directions have in common. */
+/* Private to core/cast/kernels*.c: shared parts of their loops over directions. */
 #ifndef CORE_CAST_AIM_INLINE_H
 #define CORE_CAST_AIM_INLINE_H
 
@@ -25,7 +25,7 @@ VEC_INLINE void aim_direction(struct aim_matrix m, double sm, double cm, double 
     d.z[i] = m.zx * x + m.zy * y + m.zz * sm;
 }
 
-/* An encoder: counts per turn, and a count in radians; 0 where both of a head are ideal: they have no error. */
+/* An encoder: counts per turn, and a count in radians; 0 where both encoders of a head are ideal. */
 struct aim_encoder {
     double counts, count_rad;
 };

@@ -73,7 +73,7 @@ void caster_hits(struct caster *caster, const struct bvh *bvh, const struct bvh_
     bvh_hits(caster->bvh, bvh, rays);
 }
 
-/* The pulses' places in the list, before anything is met. */
+/* Sets the pulses' places in the list, before rays are cast. */
 static void begin_echoes(struct echo_list *l, const struct chunk *k)
 {
     l->n = k->n;
@@ -83,12 +83,12 @@ static void begin_echoes(struct echo_list *l, const struct chunk *k)
         l->width_m[i] = (float)k->s->pulse_m;
 }
 
-/* The rays of the pulses' centres, and where goes what they meet. */
+/* The rays of the pulses' centres, and the places for their hits. */
 static struct met centres(struct caster *c, const struct chunk *k)
 {
     const struct cast_setup *s = k->s;
     const int surfaces = s->detect != NULL && s->detect->surfaces != NULL && s->beam == NULL;
-    const int bodies = surfaces || (k->texels && caster_has_bodies(s)); /* of which a texel is to be known */
+    const int bodies = surfaces || (k->texels && caster_has_bodies(s)); /* texels need the body that was hit */
     return (struct met){.rays = {.n = k->n,
                                  .from = k->from,
                                  .dir = VEC3_IN(c->d, 0),

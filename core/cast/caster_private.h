@@ -5,10 +5,9 @@
 
 #include "core/cast/kernels.h"
 
-/* Pulses worked on at a time: the arrays stay in the second-level cache, the hits' planes are on their way.
- */
+/* Pulses worked on at a time: the arrays fit into the second-level cache while the hits' planes are fetched. */
 enum { CHUNK = BVH_CHUNK, CAST_FOUND = CHUNK * CAST_MAX_DEPTH };
-/* Arrays whose distance is a power of two, or a page, would get into each other's way in a cache. */
+/* Arrays whose distance is a power of two, or a page, would collide in a cache. */
 enum { CHUNK_ROOM = CHUNK + 48, CAST_LIST = CHUNK * LINE_MAX_ECHOES + 80 };
 enum { CAST_NO_PATH = 0xffffffff };
 
@@ -32,12 +31,12 @@ struct chunk {
     int linear;     /* the directions that the encoders read are turned into the CRS already */
     int attributes; /* the block has room for them */
     int colours;    /* likewise */
-    int texels;     /* colours are those of textures: they go along with what is met */
+    int texels;     /* colours are those of textures: hits carry them */
 };
 
-/* Rays, and what they meet first of all there is. */
+/* Rays, and their first hits among scene and bodies. */
 struct met {
-    struct bvh_rays rays; /* a triangle is that of the body that was met */
+    struct bvh_rays rays; /* a triangle's number is that in the body that was hit */
     /* only where surfaces are modelled or bodies move, else NULL: */
     double *cosine; /* of the incidence */
     uint8_t *body;  /* 0: what stands still; k + 1: mover k */
@@ -63,7 +62,7 @@ struct echo_list {
     struct list_vectors e; /* direction as the encoders read it, then the position; geo layout */
     struct list_vectors p; /* where the head is, prcs; touched only where it moves */
     /* touched only where something asks for it: */
-    uint8_t number[CAST_LIST]; /* among the pulse's, from 0, those counted that were left out */
+    uint8_t number[CAST_LIST]; /* among the pulse's echoes, from 0, left-out ones included */
     uint64_t key[CAST_LIST];   /* for random numbers */
     double cosine[CAST_LIST];
     double energy[CAST_LIST]; /* share of the pulse's energy that took this way */
@@ -75,7 +74,7 @@ struct echo_list {
     uint32_t colour[CAST_LIST]; /* packed */
 };
 
-/* What a ray met after it passed glass or left a mirror. */
+/* The hit of a ray after it passed glass or left a mirror. */
 struct path_hit {
     double range_m, cosine, energy; /* along the folded way; the share of the ray's energy */
     uint32_t label, next;           /* the ray's next one, or CAST_NO_PATH */
@@ -83,10 +82,10 @@ struct path_hit {
     uint8_t ghost, body;
 };
 
-/* Rays that go on through glass or off a mirror: where they begin, where they go, what they met before. */
+/* Rays that go on through glass or off a mirror: their origins, directions, and hits before. */
 struct path_rays {
     uint32_t n;
-    uint32_t ray[CHUNK]; /* of those that they go on from */
+    uint32_t ray[CHUNK]; /* number of the ray that each goes on from */
     struct chunk_vectors p, d;
     double length_m[CHUNK]; /* of the way so far */
     double energy[CHUNK];
@@ -94,7 +93,7 @@ struct path_rays {
     double range_m[CHUNK], cosine[CHUNK];
     uint32_t label[CHUNK], hit[CHUNK], colour[CHUNK];
     uint8_t body[CHUNK];
-    /* what was found on the ways, chained per ray: first[i] .. last[i] */
+    /* hits on the paths, chained per ray: first[i] .. last[i] */
     uint32_t first[CHUNK], last[CHUNK];
     uint32_t n_found;
     struct path_hit found[CAST_FOUND];
@@ -126,17 +125,17 @@ struct caster {
 
 /* ---- aim.c: angles, beam directions and origins; directions as the encoders read them. */
 void caster_aim(struct caster *c, struct chunk *k);
-/* What the encoders read has changed: e of the list anew. */
+/* Computes e of the list again, after the encoders' angles have changed. */
 void caster_aim_read(struct caster *c, struct chunk *k);
 
-/* ---- upset.c: what has gone wrong with the head; each only where the setup has it. */
-/* The angles of a chunk with their wobbles. */
+/* ---- upset.c: disturbances of the head; each is called only where the setup has it. */
+/* Adds wobbles to the angles of a chunk. */
 void caster_wobble(struct caster *c, const struct chunk *k);
 /* socs -> socs: directions as the encoders read them become those of a beam whose pan has slipped. */
 void caster_slip(const struct cast_upset *upset, double slip[9]);
-/* Shots of a laser that does not fire. */
+/* Makes all shots empty, as of a laser that does not fire. */
 void caster_darken(struct caster *c, const struct chunk *k);
-/* What comes back through a window that is soiled. */
+/* Weakens the returns by a soiled window. */
 void caster_weaken(const struct cast_upset *upset, uint32_t n, double *rho);
 
 /* ---- nearest.c */
@@ -152,11 +151,11 @@ static inline int caster_has_bodies(const struct cast_setup *s)
 {
     return s->n_movers != 0 || (s->tripod != NULL && s->tripod->has_legs);
 }
-/* ---- tripod.c: pulses into the tripod's cone lose their echoes. With single rays before optics, so that nothing is
- * followed; with footprints when those have become echoes. */
+/* ---- tripod.c: pulses into the tripod's cone lose their echoes. Called before optics for single rays, so that
+ * nothing is followed; for footprints once these have become echoes. */
 void caster_hide(struct caster *c, const struct chunk *k);
-/* ---- texels.c: labels of what has been met get the reflectance there, as surface_texel has it, and met->colour
- * the colour. Nothing where the surfaces have no textures, and no colours are asked for. */
+/* ---- texels.c: labels of hits get the reflectance there, as surface_texel has it, and met->colour gets the
+ * colour. Does nothing where surfaces have no textures and no colours are asked for. */
 void caster_texels(const struct cast_setup *s, const struct met *met);
 
 /* ---- optics.c */
@@ -164,14 +163,14 @@ void caster_texels(const struct cast_setup *s, const struct met *met);
 int caster_goes_on(const struct cast_setup *s, uint32_t label);
 /* A bare pane or mirror sends nothing back: no echo, whether there is a signal model or not. */
 int caster_is_bare(const struct cast_setup *s, uint32_t label, double rho);
-/* What up to CHUNK rays come to through glass and off mirrors -> chains of c->paths. */
+/* Follows up to CHUNK rays through glass and off mirrors. Their hits are chains in c->paths. */
 void caster_follow(struct caster *c, const struct cast_setup *s, const struct met *met);
 
 /* ---- sub_rays.c */
 /* The pulses of a chunk as footprints -> the list, with rho where something asks for it. */
 void caster_sub_rays(struct caster *c, const struct chunk *k);
 
-/* ---- echoes.c: from what was met to what the head reports; the list has a place for each pulse. */
+/* ---- echoes.c: from hits to the echoes that the head reports; the list has a place for each pulse. */
 /* Further echoes of a pulse: room for n at the end of the list. Returns the first. */
 uint32_t echoes_further(struct echo_list *list, uint32_t pulse, uint32_t n);
 void caster_echoes(struct caster *c, const struct chunk *k);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Colours of echoes, as they are to be sent. Those of textures came along with the hits. */
+/* Colours of the echoes that are sent. Colours of textures came with the hits. */
 #include "core/colour.h"
 
 #include <math.h>
@@ -24,7 +24,7 @@ static double frame_at(const struct chunk *k, uint32_t pulse)
     return a->frame + fmin(1.0, f) * (b->frame - a->frame);
 }
 
-/* Of echo i, along the beam of its pulse. */
+/* Height of echo i, along the true beam of its pulse. */
 static double height_of(const struct caster *c, const struct chunk *k, uint32_t i, uint32_t pulse)
 {
     double from[3];
@@ -32,7 +32,7 @@ static double height_of(const struct caster *c, const struct chunk *k, uint32_t 
     return from[2] + c->list.range_m[i] * c->d.z[pulse];
 }
 
-/* Of echo i, one of this pulse's. */
+/* Colour of echo i, which belongs to this pulse. */
 static uint32_t colour_of(const struct caster *c, const struct chunk *k, uint32_t i, uint32_t pulse)
 {
     const struct colour_scale *scale = &k->s->colour->scale;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* What a chunk's pulses met -> echoes as the head reports them: which are seen, how they merge, which a pulse
- * sends, and their noise. One list, for single rays, footprints, and what glass and mirrors show. */
+/* From the hits of a chunk's pulses to the echoes that the head reports: which are detected, how they merge,
+ * their noise, and which a pulse sends. One list, for single rays, footprints, and what glass and mirrors
+ * show. */
 #include <math.h>
 #include <string.h>
 
@@ -16,7 +17,7 @@ uint32_t echoes_further(struct echo_list *l, uint32_t pulse, uint32_t n)
     return first;
 }
 
-/* What the pulses of single rays met on their ways goes into the list. */
+/* Puts the hits on the paths of single rays into the list. */
 static void list_paths(struct caster *c, const struct chunk *k)
 {
     const struct path_rays *p = &c->paths;
@@ -51,7 +52,7 @@ static int comes_back(const struct echo_list *l, uint32_t i)
     return l->rho[i] > 0.0 && !isnan(l->range_m[i]);
 }
 
-/* Echo `at` of the list becomes what several returns are together. */
+/* Makes echo `at` of the list from several returns. */
 static void take_echo(struct echo_list *l, uint32_t at, uint8_t number, const struct beam_echo *echo, int texels)
 {
     if (texels) l->colour[at] = echo->colour;
@@ -62,8 +63,8 @@ static void take_echo(struct echo_list *l, uint32_t at, uint8_t number, const st
     l->number[at] = number;
 }
 
-/* Returns of a pulse that are nearer to each other than the range resolution make one echo. One that nothing
- * comes back from stays apart, and keeps its number. */
+/* Returns of a pulse that are nearer to each other than the range resolution make one echo. A return without
+ * power stays apart, and keeps its number. */
 static uint32_t merge_pulse(struct echo_list *l, const struct beam_merging *how, const struct further *f, int texels)
 {
     const uint32_t n = f->n + 1;
@@ -154,14 +155,15 @@ static void detect(struct caster *c, const struct chunk *k)
     c->counters.faint += before - count_echoes(l);
 }
 
-/* Where signals are modelled, noise that does not depend on them was asked for. */
+/* With a signal model, noise that doesn't depend on the signal was asked for: a soiled window leaves it as
+ * it is. */
 static double fixed_sigma_m(const struct cast_setup *s)
 {
     const int is_modelled = s->detect != NULL && s->detect->signal != NULL;
     return s->upset != NULL && !is_modelled ? s->range_sigma_m / s->upset->share : s->range_sigma_m;
 }
 
-/* Keyed by scan, pulse and echo, whether others are sent or not. */
+/* Noise is keyed by scan, pulse and echo, so that it doesn't depend on which others are sent. */
 static void add_noise(struct caster *c, const struct cast_setup *s)
 {
     const struct cast_detect *d = s->detect;
@@ -186,7 +188,7 @@ static void make_keys(struct echo_list *l, const struct chunk *k)
     }
 }
 
-/* An echo of the pulse at hand. */
+/* An echo of the current pulse. */
 struct heard {
     double range_m, strength;
     uint64_t key;
@@ -208,7 +210,7 @@ static uint32_t hear(const struct echo_list *l, const double *strength, const st
     return n;
 }
 
-/* By range, as it is sent: folding may have changed the order. */
+/* Sorts by the range that is sent: folding may have changed the order. */
 static void sort_heard(struct heard *h, uint32_t n)
 {
     for (uint32_t i = 1; i < n; i++)
@@ -228,7 +230,7 @@ static uint32_t drop_weakest(struct heard *h, uint32_t n)
     return n - 1;
 }
 
-/* The echo that is asked for becomes the only one. */
+/* Keeps only the echo that is asked for. */
 static uint32_t choose(struct heard *h, uint32_t n, enum beam_select select)
 {
     uint32_t best = select == BEAM_LAST ? n - 1 : 0;
@@ -245,7 +247,7 @@ uint32_t caster_max_echoes(const struct cast_setup *s)
     return s->max_echoes != 0 && s->max_echoes < most ? s->max_echoes : most;
 }
 
-/* Of each pulse with several echoes only those that it sends stay in the list. */
+/* Keeps those echoes in the list that pulses send, of pulses with several. */
 static void choose_echoes(struct caster *c, const struct chunk *k)
 {
     const struct cast_setup *s = k->s;
@@ -278,7 +280,7 @@ static void choose_echoes(struct caster *c, const struct chunk *k)
     l->n = end;
 }
 
-/* What meets a surface that gives no echo. */
+/* Removes hits on surfaces that give no echo. */
 static void silence(struct caster *c, const struct cast_setup *s)
 {
     struct echo_list *l = &c->list;

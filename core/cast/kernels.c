@@ -199,7 +199,8 @@ uint32_t kernel_geo(const struct vec3_in *p, const double scale[3], uint32_t n, 
            counts_of(p->z, 1.0 / scale[2], n, out->c);
 }
 
-/* All three coordinates are NaN, or none is. What does not fit is none of three: the entry is no echo. */
+/* All three coordinates are NaN, or none is. Where one does not fit, all three are LINE_XYZ_NONE: the
+ * entry is no echo. */
 VEC_CLONES
 uint32_t kernel_place(const struct vec3_in *direction, const double *restrict range_m, const double scale[3],
                       uint32_t n, const struct kernel_wire *out)
@@ -252,7 +253,7 @@ static void times_of_table(const struct schedule_run *run, uint32_t *dt_ns)
     }
 }
 
-/* What TIMES pulses in a row add: whole nanoseconds, and 1 / den of one, below den. */
+/* The time of TIMES pulses: whole nanoseconds, and a rest in 1 / den, below den. */
 enum { TIMES = 64 };
 struct times {
     int64_t part[TIMES + 1];

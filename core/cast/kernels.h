@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Private to core/cast: the arithmetic around the cast, as loops over arrays that compilers turn into
- * vectors. */
+ * vector code. */
 #ifndef CORE_CAST_KERNELS_H
 #define CORE_CAST_KERNELS_H
 
@@ -19,8 +19,8 @@ struct kernel_turns {
 };
 /* Directions in prcs: rotation times (sin p cos m, cos p cos m, sin m). */
 void kernel_directions(const struct kernel_turns *turns, const double rotation[9], const struct vec3_out *d);
-/* The same, and beside it e: the directions as the encoders read them (whole counts), turned by to_crs
- * instead. */
+/* The same, and also e: the directions as the encoders read them (whole counts), turned by to_crs instead
+ * of rotation. */
 void kernel_directions_read(const struct cast_setup *setup, const struct kernel_turns *turns, const double rotation[9],
                             const double to_crs[9], const struct vec3_out *d, const struct vec3_out *e);
 
@@ -32,8 +32,8 @@ struct kernel_steps {
     double mirror_turn, pan_turn; /* a step */
     double sm[KERNEL_BLOCK], cm[KERNEL_BLOCK], sp[KERNEL_BLOCK], cp[KERNEL_BLOCK];
 };
-/* The steps of a run; where they are those of the run before nothing is done. 0 where the run has a table, or its
- * steps are too large. */
+/* Computes the steps of a run, unless they are those of the run before. 0 where the run has a table, or its steps
+ * are too large. */
 int kernel_sweep_steps(struct kernel_steps *steps, const struct schedule_run *run);
 /* Up to BVH_CHUNK pulses of a run, from its pulse `first` on. (Clang 19 crashes on a function with clones for several
  * instruction sets when a struct has the same name.) */
@@ -73,12 +73,12 @@ void kernel_turn_back(const struct vec3_in *d, const double rotation[9], uint32_
 
 /* NaN for ranges outside of the head's limits. */
 void kernel_limit(double *range_m, double min_m, double max_m, uint32_t n);
-/* What random numbers of the echoes are asked for with: rng_echo. */
+/* The keys of the echoes' random numbers: rng_echo. */
 void kernel_keys(uint64_t pulse0, const uint8_t *number, uint32_t n, uint64_t *key);
 
 /* Echo bytes and labels of pulses with one echo at most. Returns the number of echoes. */
 uint32_t kernel_entries(const double *range_m, const uint32_t *label, uint32_t n, uint8_t *echo, uint16_t *out);
-/* Widths in 0.01 ns of what is an echo, LINE_WIDTH_NONE for the rest. */
+/* Widths of echoes in 0.01 ns, LINE_WIDTH_NONE for entries without echo. */
 void kernel_widths(const float *width_m, const uint8_t *echo, uint32_t n, uint16_t *out);
 
 /* The three numbers of entries on the wire. */
@@ -89,9 +89,9 @@ struct kernel_wire {
 void kernel_polar(const struct cast_setup *setup, const double *range_m, const struct kernel_turns *turns,
                   const struct kernel_wire *out);
 /* Coordinates in counts of scale[], LINE_XYZ_NONE for NaN and for what doesn't fit. Returns how many
- * coordinates did not. */
+ * coordinates did not fit. */
 uint32_t kernel_geo(const struct vec3_in *p, const double scale[3], uint32_t n, const struct kernel_wire *out);
-/* The same of direction * range, where that is the position already. 0 where all fit. */
+/* The same for direction * range, where that is the position already. 0 where all fit. */
 uint32_t kernel_place(const struct vec3_in *direction, const double *range_m, const double scale[3], uint32_t n,
                       const struct kernel_wire *out);
 void kernel_scale(const double *range_m, uint32_t n, const struct vec3_out *e);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Directions of a run whose axes turn evenly, by the addition theorems: sine and cosine are worked out where blocks of
- * a line have their middle, and turned from there by whole steps, whose sines are in a table. Blocks are counted from
- * the line's first pulse. So a pulse's direction depends on nothing but its place in the line, however runs are cut.
+/* Directions of a run whose axes turn evenly, by the addition theorems: sine and cosine are computed in the middle of
+ * each block of a line, and turned from there by whole steps, whose sines are in a table. Blocks are counted from the
+ * line's first pulse. So a pulse's direction depends only on its place in the line, however runs are cut.
  *
  * sin(a + b) = sin a + (sin a (cos b - 1) + cos a sin b): what is in brackets is small, and so is its rounding. With
  * the middle's sine in two doubles the sum is good to its last bit; tests/unit/test_sweep.c compares with
@@ -45,7 +45,7 @@ struct middles {
     double sine[ROOM], sine1[ROOM], cosine[ROOM], cosine1[ROOM];
 };
 
-/* At zero + (count + b * more) * unit. The counts are whole numbers below 2^53: what a block's middle is does not
+/* At zero + (count + b * more) * unit. The counts are whole numbers below 2^53, so that a block's middle doesn't
  * depend on which block comes first. */
 VEC_INLINE void find_middles(double zero, double count, double more, double unit, uint32_t blocks, struct middles *m)
 {
@@ -61,7 +61,7 @@ VEC_INLINE void find_middles(double zero, double count, double more, double unit
     }
 }
 
-/* What the kernels work through. */
+/* The part of a line that the kernels work on. */
 struct part {
     uint32_t blocks, skip; /* blocks that the pulses lie in; pulses of the first one before them */
     struct middles mirror, pan;
@@ -79,7 +79,7 @@ VEC_INLINE void begin(const struct kernel_pulses *sweep, struct part *p)
     find_middles(run->pan0_turn, middle, BLOCK, run->pan_step_turn, p->blocks, &p->pan);
 }
 
-/* By a step of the table from the middle of block b. */
+/* Turns by a step of the table from the middle of block b. */
 VEC_INLINE void turn_on(const struct middles *m, uint32_t b, double s, double c1, double *sine, double *cosine)
 {
     *sine = m->sine[b] + (m->sine1[b] + (m->sine[b] * c1 + m->cosine[b] * s));

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What pulses meet, with the triangles: the first stages of a pulse (caster.c), and of the echoes only whether there
- * is one. */
+/* Hits of pulses, with their triangles: the first stages of a pulse (caster.c). Of the echoes it only decides
+ * whether there is one. */
 #include <math.h>
 
 #include "core/cast/caster_private.h"
@@ -15,7 +15,7 @@ struct meeting {
     uint32_t n;
 };
 
-/* What came of one ray. */
+/* The result of one ray. */
 struct seen {
     uint32_t pulse, label, triangle; /* pulse: of the chunk */
     uint8_t body;
@@ -33,7 +33,7 @@ static int is_front(const struct cast_setup *s, const struct seen *seen, const d
     return along < 0.0;
 }
 
-/* As caster_echoes has it, for an echo by itself and without noise. */
+/* Decides as caster_echoes does, for a single echo without noise. */
 static int is_reported(const struct meeting *m, const struct seen *seen)
 {
     const struct cast_detect *d = m->s->detect;
@@ -52,7 +52,7 @@ static int is_reported(const struct meeting *m, const struct seen *seen)
     return !isnan(range_m);
 }
 
-/* Glass is not refracted: what lies beyond is on the same line. */
+/* Glass does not refract: hits beyond it are on the same line. */
 static void take(struct meeting *m, const struct met *met, const struct seen *seen)
 {
     const double dir[3] = VEC3_AT(met->rays.dir, seen->pulse);

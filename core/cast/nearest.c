@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What the rays of a chunk meet first: the scene that stands still, the bodies that move in it, the tripod's legs. */
+/* First hits of a chunk's rays: on the scene that stands still, on the bodies that move in it, on the tripod's
+ * legs. */
 #include <math.h>
 #include <string.h>
 
@@ -17,7 +18,7 @@ static double spread_m(const struct vec3_in *p, uint32_t n)
     return sqrt(most2);
 }
 
-/* Of the body's hits what is nearer. */
+/* Where the body's hit is nearer, it replaces the scene's. */
 static void keep_nearer(struct caster *c, const struct cast_mover *m, uint8_t body, const struct met *met)
 {
     const struct bvh_rays *rays = &met->rays;
@@ -33,7 +34,7 @@ static void keep_nearer(struct caster *c, const struct cast_mover *m, uint8_t bo
     }
 }
 
-/* A body that is not of the scene, cast in its own frame: what it hides gives way. */
+/* Casts into a body outside of the scene, in the body's own frame: its nearer hits replace the others. */
 static void cast_body(struct caster *c, const struct cast_setup *s, uint8_t body, const struct met *met)
 {
     const struct cast_mover *m = caster_body(s, body);

@@ -29,11 +29,11 @@ static void normal_of(const struct cast_setup *s, uint8_t body, uint32_t hit, do
         n[i] = (m == NULL ? at_rest.n[i] : vec3_dot(m->rotation + 3 * i, at_rest.n)) / length;
 }
 
-/* A way goes on so far beyond a surface, measured across it, that the surface itself is not met again. Double precision
- * leaves less than a tenth of it, up to 1e8 m from the scene's zero. */
+/* A path goes on this far beyond a surface, measured across it, so that it does not hit the surface again. The error of
+ * double precision is less than a tenth of it, up to 1e8 m from the scene's zero. */
 static const double STEP_M = 1e-6;
 
-/* Ray k sets out from what it has met. */
+/* Ray k starts from its hit. */
 static void set_out(const struct cast_setup *s, struct path_rays *p, uint32_t k)
 {
     const struct surface *surface = surface_at(s->detect->surfaces, p->label[k]);
@@ -75,7 +75,7 @@ static void copy_ray(struct path_rays *p, uint32_t to, uint32_t from)
     p->colour[to] = p->colour[from];
 }
 
-/* The rays whose first hit lets them go on. */
+/* Begins the paths of rays whose first hit lets them go on. */
 static void begin(const struct cast_setup *s, const struct met *met, struct path_rays *p)
 {
     const struct bvh_rays *rays = &met->rays;
@@ -100,7 +100,7 @@ static void begin(const struct cast_setup *s, const struct met *met, struct path
     }
 }
 
-/* What ray k met, at the end of the first ray's chain. */
+/* Puts the hit of ray k at the end of its first ray's chain. */
 static void keep(struct path_rays *p, uint32_t k)
 {
     uint32_t at = p->n_found++, ray = p->ray[k];

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Outlines, looked at by casting. */
+/* Outlines, probed by casting rays. */
 #include <string.h>
 
 #include "core/cast.h"

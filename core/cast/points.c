@@ -6,7 +6,7 @@
 
 #include "core/cast/caster_private.h"
 
-/* What further echoes have in common with the pulse's first one. */
+/* Copies to further echoes what they share with the pulse's first one. */
 static void follow_pulse(struct caster *c, const struct chunk *k)
 {
     struct echo_list *l = &c->list;
@@ -22,8 +22,8 @@ static void follow_pulse(struct caster *c, const struct chunk *k)
     }
 }
 
-/* Positions as a head computes them, from ranges and what its encoders read: the three numbers of echoes at
- * .. at + n of the list. Returns 0 where all fit; what does not is LINE_XYZ_NONE. */
+/* Positions as a head computes them, from ranges and what its encoders read: writes the three numbers of
+ * echoes at .. at + n of the list. Returns 0 where all fit; numbers that don't are LINE_XYZ_NONE. */
 static uint32_t place(struct caster *c, const struct chunk *k, uint32_t at, uint32_t n, const struct kernel_wire *out)
 {
     const struct cast_setup *s = k->s;
@@ -49,13 +49,13 @@ static void put_colour(uint8_t to[3], uint32_t colour)
         to[i] = (uint8_t)(colour >> (16 - 8 * i));
 }
 
-/* Of all entries but their times and three numbers: the first echoes of the pulses. Returns how many there
- * are. */
+/* Writes the first echoes of the pulses, except times and the three numbers. Returns the number of
+ * echoes. */
 static uint32_t write_firsts(struct caster *c, const struct chunk *k)
 {
     const struct echo_list *l = &c->list;
     struct line_block *b = k->block;
-    int16_t *refl_cdb = b->refl_cdb + k->at; /* by a pointer of its own the loop is vectors */
+    int16_t *refl_cdb = b->refl_cdb + k->at; /* a pointer of its own lets the loop become vector code */
     const uint8_t *echo = b->echo + k->at;
     const int signal = k->s->detect != NULL && k->s->detect->signal != NULL;
     uint32_t echoes = kernel_entries(l->range_m, l->label, k->n, b->echo + k->at, b->label + k->at);
@@ -70,7 +70,7 @@ static uint32_t write_firsts(struct caster *c, const struct chunk *k)
     return echoes;
 }
 
-/* n entries of the block, but for their times. */
+/* Moves n entries of the block, except their times. */
 static void move_entries(struct line_block *b, uint32_t to, uint32_t from, uint32_t n)
 {
     memmove(b->a + to, b->a + from, n * sizeof *b->a);
@@ -103,7 +103,8 @@ static void write_further(struct caster *c, const struct chunk *k, uint32_t to, 
     b->amplitude_cdb[to] = signal ? l->amplitude_cdb[i] : (int16_t)LINE_AMPLITUDE_NONE;
 }
 
-/* The further echoes go after the first ones of their pulses: from the last one on, which moves furthest. */
+/* Inserts further echoes after the first ones of their pulses, beginning with the last, which moves
+ * furthest. */
 static void insert_further(struct caster *c, const struct chunk *k)
 {
     struct line_block *b = k->block;
@@ -123,7 +124,8 @@ static void insert_further(struct caster *c, const struct chunk *k)
     }
 }
 
-/* Times of all entries. They may wait in the same array, further on: from the first one on. */
+/* Writes the times of all entries. The pulses' times may stand further on in the same array, so it begins
+ * with the first. */
 static void write_times(const struct echo_list *l, const struct chunk *k)
 {
     uint32_t *to = k->block->dt_ns + k->at, from = 0;
@@ -154,9 +156,8 @@ static void keep_entry(struct line_block *b, uint32_t to, uint32_t from, int fit
     b->width_cns[to] = fits ? b->width_cns[from] : (uint16_t)LINE_WIDTH_NONE;
 }
 
-/* Where positions did not fit: these are no echoes, and counted; the pulse's other echoes are numbered anew,
- * but one entry of a pulse stays. Returns how many entries are left of n; *echoes: how many echoes are among
- * them. */
+/* Drops and counts echoes whose positions did not fit. The pulse's other echoes get new numbers; each pulse
+ * keeps at least one entry. Returns how many of n entries are left; *echoes: how many of them are echoes. */
 static uint32_t drop_unfit(struct caster *c, struct line_block *b, uint32_t at, uint32_t n, uint32_t *echoes)
 {
     uint32_t to = at;

@@ -15,8 +15,8 @@ VEC_INLINE void sub_ray(const struct beam *beam, const struct beam_sight *restri
         origin[i] += beam->exit_radius_m * (x * sight->e1[i] + y * sight->e2[i]);
         out[i] = sight->dir[i] + beam->slope * (x * sight->e2[i] - y * sight->e1[i]);
     }
-    /* 1 / sqrt(1 + t): without a root and a quotient to wait for; what is left out is below t^4, with t <
-     * 2.5e-5. */
+    /* 1 / sqrt(1 + t) as a series, which is faster than root and division. Its error is below t^4, with t
+     * < 2.5e-5. */
     double t = beam->slope * beam->slope * (x * x + y * y);
     double over = 1.0 - t * (0.5 - t * (0.375 - 0.3125 * t));
     for (int i = 0; i < 3; i++)
@@ -65,8 +65,8 @@ void plan_whole(struct caster *c, const struct chunk *k, struct job *job)
     }
 }
 
-/* The part with the centre lies on the surface that is met there: its range at (x, y) needs no ray. Returns 0
- * where it does: seen at a small angle that plane runs away. */
+/* The part with the centre lies on the surface that the centre hits: its range at (x, y) needs no ray.
+ * Returns 0 where it does need one: at a small angle the plane's range is useless. */
 static int known_centre(const struct caster *c, const struct chunk *k, struct job *job, const struct beam_part *part)
 {
     const uint32_t p = job->pulse;
@@ -89,9 +89,9 @@ static int known_centre(const struct caster *c, const struct chunk *k, struct jo
     return 1;
 }
 
-/* The centre is beyond doubt on its side of the lines: where the outlines' floats and the ray's hit might
- * differ on it, what the centre meets says nothing about its part. Floats from the station are good to 2^-24
- * of the range: less than
+/* Whether the centre is certainly on its side of the lines. Where the outlines' floats and the ray's hit
+ * might disagree, the centre's hit says nothing about its part. Floats from the station have an error of
+ * 2^-24 of the range: less than
  * 1e-3 of the radius where that is 6e-5 of the range or more, as beams of 0.12 mrad and wider have it. */
 static int is_centre_clear(const struct beam_line *line, uint32_t n)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Pulses with a footprint: central hits, and where they are not all, sub-rays -> echoes. */
+/* Pulses with a footprint: echoes from central hits, and from sub-rays where one hit is not enough. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,7 +7,7 @@
 #include "core/cast/sub_rays.h"
 #include "core/surface.h"
 
-/* How much the surfaces send back that rays from `first` on have met. */
+/* Finds how much comes back from the surfaces that rays from `first` on have hit. */
 static void weigh_pool(struct caster *c, const struct cast_setup *s, uint32_t first)
 {
     struct pool *p = &c->sub_rays->pool;
@@ -17,7 +17,7 @@ static void weigh_pool(struct caster *c, const struct cast_setup *s, uint32_t fi
     if (s->detect->depth > 0) surface_return(s->detect->surfaces, b->n, b->label, b->cosine, b->rho);
 }
 
-/* What rays from `at` on of the pool come to beyond what they have met. */
+/* Follows rays of the pool from `at` on beyond their first hits. */
 static void look_through(struct caster *c, const struct cast_setup *s, const struct met *met, uint32_t at)
 {
     const struct path_rays *p = &c->paths;
@@ -38,7 +38,7 @@ static void look_through(struct caster *c, const struct cast_setup *s, const str
     }
 }
 
-/* Casts what is in the pool from ray `first` on. */
+/* Casts the rays of the pool from `first` on. */
 static void cast_pool(struct caster *c, const struct chunk *k, uint32_t first)
 {
     const struct cast_setup *s = k->s;
@@ -67,7 +67,7 @@ static void cast_pool(struct caster *c, const struct chunk *k, uint32_t first)
     weigh_pool(c, s, first);
 }
 
-/* Outlines beyond what the centre meets count too, where another part of the footprint looks past it. */
+/* Outlines beyond the centre's hit count, too, where another part of the footprint sees past it. */
 static void look_further(struct caster *c, const struct chunk *k)
 {
     const struct cast_setup *s = k->s;
@@ -111,7 +111,7 @@ static void add_centre(struct caster *c, const struct cast_setup *s, const struc
     add_return(c, s, &job->centre, 1.0, rho);
 }
 
-/* Of the ranges within what sub-ray i of a job stands for. */
+/* Sigma of the ranges within the part that sub-ray i of a job stands for. */
 static float met_sigma(const struct caster *c, const struct cast_setup *s, const struct job *job, uint32_t i)
 {
     const struct pool *p = &c->sub_rays->pool;
@@ -124,7 +124,7 @@ static float met_sigma(const struct caster *c, const struct cast_setup *s, const
     return beam_part_sigma(beam, &job->sight, plane.n, p->range_m[i], &part);
 }
 
-/* What sub-ray i of a job came to. */
+/* Adds the hits of sub-ray i of a job. */
 static void add_met(struct caster *c, const struct chunk *k, const struct job *job, uint32_t i)
 {
     const struct cast_setup *s = k->s;
@@ -148,7 +148,7 @@ static void add_met(struct caster *c, const struct chunk *k, const struct job *j
     }
 }
 
-/* Adaptive, and a part of the footprint lies on glass or a mirror: what can be seen there has outlines of its
+/* Adaptive, and a part of the footprint lies on glass or a mirror: the scene seen there has outlines of its
  * own. */
 static int sees_through(const struct caster *c, const struct cast_setup *s, const struct job *job)
 {
@@ -197,7 +197,7 @@ static int is_full(const struct sub_ray_work *w, uint32_t most)
 {
     _Static_assert(MAX_PASSES * BEAM_MAX_PARTS + BEAM_MAX_SUBRAYS <= POOL, "room for a pulse");
     const uint32_t near = 8 * CHUNK,
-                   room = 32 * most > near ? POOL : near; /* what stays in a cache, where that is enough */
+                   room = 32 * most > near ? POOL : near; /* what fits into a cache, where that is enough */
     return w->n_jobs == MAX_JOBS || (w->n_jobs + 1) * most > room;
 }
 
@@ -228,7 +228,7 @@ static uint32_t find_candidates(struct caster *c, const struct chunk *k)
     return all;
 }
 
-/* Sub-rays all over the footprints of these pulses. */
+/* Casts sub-rays over the whole footprints of these pulses. */
 static void cast_whole(struct caster *c, const struct chunk *k, const uint32_t *pulse, uint32_t n)
 {
     struct sub_ray_work *w = c->sub_rays;
@@ -242,9 +242,9 @@ static void cast_whole(struct caster *c, const struct chunk *k, const uint32_t *
     if (w->n_jobs > 0) run_jobs(c, k);
 }
 
-/* Up to where outlines may cut a footprint whose centre meets a surface at that range, and 1 / cos^2 of its
- * incidence: beyond it by the slope of the surface, doubled and more, for it may bend away, and by some
- * footprints. */
+/* The range up to which outlines may cut a footprint. Its centre hits a surface at range_m, and steep is 1
+ * / cos^2 of the incidence. The limit is beyond the hit by some footprints, and by more than twice the
+ * surface's slope, since the surface may bend away. */
 static double limit_m(const struct beam *beam, double range_m, float steep)
 {
     double s = steep < 1e6f ? (double)steep : 1e6;
@@ -278,7 +278,7 @@ static void cast_parts(struct caster *c, const struct chunk *k, uint32_t candida
     if (w->n_jobs > 0) run_jobs(c, k);
 }
 
-/* The echoes of pulses with sub-rays take the place of what their centres met. */
+/* Replaces the hits of the centres by the echoes of pulses with sub-rays. */
 static void list_echoes(struct caster *c, const struct chunk *k)
 {
     const struct sub_ray_work *w = c->sub_rays;
@@ -300,7 +300,7 @@ static void list_echoes(struct caster *c, const struct chunk *k)
     }
 }
 
-/* What comes back of pulses whose central ray stands for all of the footprint. */
+/* Finds what comes back of pulses whose central ray stands for the whole footprint. */
 static void weigh_central(struct caster *c, const struct chunk *k)
 {
     struct echo_list *l = &c->list;

@@ -7,7 +7,7 @@
 
 enum {
     POOL = 24 * CHUNK,     /* sub-rays worked on at a time */
-    POOL_ROOM = POOL + 16, /* arrays of a power of two would get into each other's way in a cache */
+    POOL_ROOM = POOL + 16, /* arrays of a power of two would collide in a cache */
     MAX_JOBS = 256,        /* pulses with sub-rays, likewise */
     MAX_PASSES = 4,        /* over their outlines */
 };
@@ -28,7 +28,7 @@ struct pool {
     float xx[POOL_ROOM], xy[POOL_ROOM], yy[POOL_ROOM];
 };
 
-/* What sub-rays come to through glass and off mirrors; touched only where there is such. */
+/* Hits of sub-rays through glass and off mirrors; touched only where there are any. */
 struct beyond {
     uint32_t first[POOL_ROOM], count[POOL_ROOM]; /* of a sub-ray */
     uint32_t n;
@@ -42,12 +42,12 @@ struct beyond {
 /* A pulse for which one ray is not enough. */
 struct job {
     uint32_t pulse, first, n;  /* its sub-rays */
-    uint32_t lines, passes;    /* outlines that cut it; how often they were looked at */
+    uint32_t lines, passes;    /* outlines that cut it; how often they were searched */
     struct beam_near *near;    /* the outlines */
-    double next_m;             /* from where on outlines were left out */
+    double next_m;             /* the range from which outlines were left out */
     struct beam_return centre; /* known without a ray; energy 0: none */
     struct beam_sight sight;
-    int whole; /* sub-rays all over the footprint, whatever its outlines */
+    int whole; /* sub-rays over the whole footprint, whatever its outlines */
 };
 
 struct sub_ray_work {
@@ -55,7 +55,7 @@ struct sub_ray_work {
     struct beam_near candidate[CHUNK]; /* pulses to look at */
     struct beam_near reach[CHUNK];     /* with glass or mirrors: those near outlines */
     uint32_t near[CHUNK], n_near;      /* those with sub-rays, in order */
-    uint32_t again[CHUNK], n_again;    /* glass or a mirror was met beside the centre */
+    uint32_t again[CHUNK], n_again;    /* glass or a mirror was hit beside the centre */
     struct job job[MAX_JOBS];
     uint32_t n_jobs;
     int scattered; /* the pool's rays have nothing in common */
@@ -72,10 +72,10 @@ struct sub_ray_work {
 };
 
 /* ---- sub_ray_plan.c: jobs, their sub-rays at the end of the pool. */
-/* Sub-rays all over the footprint. */
+/* Sub-rays over the whole footprint. */
 void plan_whole(struct caster *c, const struct chunk *k, struct job *job);
-/* The rays that a pulse needs, given the outlines up to limit_m. Returns 0 where those of `known` outlines
- * will do, or (0) the central one. */
+/* The rays that a pulse needs, given the outlines up to limit_m. Returns 0 where the rays for `known`
+ * outlines are enough (0: the central ray). */
 int plan_parts(struct caster *c, const struct chunk *k, struct job *job, double limit_m, uint32_t known);
 
 #endif

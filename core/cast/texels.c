@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* Where on a texture, or between which vertices, rays have met a mesh. */
+/* The place on a texture, or between vertices, where rays have hit a mesh. */
 #include <math.h>
 
 #include "core/cast/caster_private.h"
 #include "core/surface.h"
 
-/* Where in a mesh ray i has met it, at rest. */
+/* The place of ray i's hit in a mesh, at rest. */
 struct place {
     const struct scene *scene;
     uint32_t triangle;

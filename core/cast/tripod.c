@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the head's tripod hides below it: a cone about the plumb line, whose opening is that of the legs. */
+/* The cone that the head's tripod hides: about the plumb line, with the opening of the legs. */
 #include <math.h>
 
 #include "core/cast/caster_private.h"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What has gone wrong with the head, and changes what it measures. */
+/* Disturbances of the head that change what it measures. */
 #include <math.h>
 
 #include "core/cast/caster_private.h"

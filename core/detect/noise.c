@@ -72,7 +72,7 @@ static void in_unit_ball(const struct detect_ball *ball, uint64_t scan_key, uint
 }
 
 /* The point lies in the plane of the line angle, at `ahead` and `up`, and is moved by v: to the right, ahead
- * (along the head's horizon), up. Where the line angle looks backward over the zenith it still does so
+ * (along the head's horizon), up. A line angle that looks backward over the zenith still does so
  * afterwards. */
 static void move_point(const double v[3], double *range_m, double *mirror_turn, double *pan_turn)
 {

@@ -28,8 +28,8 @@ static int fit_reaches(const struct detect_signal_spec *spec, struct detect_sign
         const struct detect_reach *a = &reach[i], *b = &reach[i + 1];
         double slope =
             (log(b->reflectance / a->reflectance) - 2.0 * log(b->range_m / a->range_m)) / (b->range_m - a->range_m);
-        /* A data sheet rounds its figures to a few percent: an R^2 that fails by less than 10 % is none of
-         * its claims. */
+        /* A data sheet rounds its figures to a few percent: a deviation from R^2 of less than 10 % is no
+         * claim of it. */
         if (!(b->range_m > a->range_m) || slope * (b->range_m - a->range_m) < -0.1)
             return sh_fail(err, SH_EINPUT,
                            "%.4g m on %.4g and %.4g m on %.4g: a signal falls at least with the square of the range",

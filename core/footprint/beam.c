@@ -20,7 +20,7 @@ static double mean_t2(void)
     return mean_t() - exp(-2.0) / (1.0 - exp(-2.0));
 }
 
-/* Per distance of a line from the centre: the Gaussian, cut off at the disc's edge. */
+/* The Gaussian, cut off at the disc's edge, per distance of a line from the centre. */
 struct across {
     double energy, along, across; /* energy; its second moments, by the distance and along the line */
 };
@@ -123,8 +123,8 @@ void beam_plane_means(const struct beam *beam, const float *steep, uint32_t n, d
     plane_means(term, (float)(0.25 / s2), steep, n, range_m);
 }
 
-/* Variance of the ranges, to first order in s tan i: that of rho cos phi, half the mean t, times w(R)^2 tan^2
- * i. Beyond most the plane is along the beam. */
+/* Variance of the ranges, to first order in s tan i: that of rho cos phi (half the mean t) times w(R)^2 tan^2
+ * i. Beyond `most` the plane counts as along the beam. */
 VEC_CLONES
 void beam_plane_widths(const struct beam *beam, const float *restrict steep, const double *restrict range_m, uint32_t n,
                        float *restrict width_m)
@@ -207,8 +207,8 @@ void beam_rings(uint32_t rings, struct beam_pattern *pattern)
     }
 }
 
-/* Above what all cuts of the patterns of 1 to 18 rings give that leave 1 % of the energy (test_beam.c). The centre
- * alone may stand for a sliver at the footprint's rim. */
+/* An upper bound of the errors of all cuts that leave 1 % of the energy, with 1 to 18 rings (test_beam.c). The
+ * centre alone may stand for a sliver at the footprint's rim. */
 double beam_end_error(uint32_t rings)
 {
     return rings == 0 ? 1.0 : 0.35 * pow(rings, -0.75);

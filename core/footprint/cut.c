@@ -8,7 +8,7 @@
 
 #define LEAST_PART 0.0005
 
-/* Of a portion: its energy, and its moments about the footprint's centre. */
+/* Takes a portion away: its energy, and its moments about the footprint's centre. */
 static void take_from(struct beam_part *a, const struct beam_part *b)
 {
     a->energy -= b->energy;
@@ -19,7 +19,7 @@ static void take_from(struct beam_part *a, const struct beam_part *b)
     a->yy -= b->yy;
 }
 
-/* A portion becomes a part, about its own centre. */
+/* Adds a portion as a part, with moments about its own centre. */
 static void add_part(struct beam_parts *parts, const struct beam_part *p, int centre)
 {
     if (p->energy < LEAST_PART) return;
@@ -30,7 +30,7 @@ static void add_part(struct beam_parts *parts, const struct beam_part *p, int ce
     if (centre) parts->centre = i;
 }
 
-/* Beyond a line; second moments only where they are asked for. */
+/* The portion beyond a line; with second moments only where they are asked for. */
 static struct beam_part cap_of(const struct beam *beam, const struct beam_line *line, int squares)
 {
     struct beam_part p = {.xx = 0.0};
@@ -46,8 +46,8 @@ static struct beam_part cap_of(const struct beam *beam, const struct beam_line *
     return p;
 }
 
-/* What one or two lines cut off, in closed form. All h >= 0: the caps lie beyond. Returns 0 where the lines
- * meet in the disc. */
+/* The parts that one or two lines cut off, in closed form. All h >= 0: the caps lie beyond. Returns 0 where
+ * the lines meet in the disc. */
 static int cut_caps(const struct beam *beam, const struct beam_line *line, uint32_t n, int spreads,
                     struct beam_parts *parts)
 {
@@ -59,7 +59,7 @@ static int cut_caps(const struct beam *beam, const struct beam_line *line, uint3
         double y = line[1].h * line[0].n[0] - line[0].h * line[1].n[0];
         if (x * x + y * y < cross * cross) return 0;
         if (line[0].n[0] * line[1].n[0] + line[0].n[1] * line[1].n[1] > 0.0) {
-            /* one cap in the other, unless they stand beside each other */
+            /* one cap is in the other, unless they are side by side */
             int inner = line[0].h > line[1].h ? 0 : 1, outer = 1 - inner;
             const struct beam_line *in = &line[inner], *out = &line[outer];
             double middle = in->h * (in->n[0] * out->n[0] + in->n[1] * out->n[1]);

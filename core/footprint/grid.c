@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Outlines by direction: every cell that a footprint can reach an edge from knows it. */
+/* Outlines by direction: each cell lists the edges that footprints within it can reach. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -23,7 +23,7 @@ struct draw {
     uint64_t n;
 };
 
-/* Stretches of edges that count. */
+/* Stretches of edges that count as outlines. */
 struct stretches {
     struct outline_stretch *at;
     size_t n, room;
@@ -52,7 +52,7 @@ static void put_row(struct draw *d, uint32_t face, int32_t row, double from, dou
         put(d, outline_place(face, (uint32_t)i, (uint32_t)row), range_m);
 }
 
-/* A piece from p to q (in cells) and all that is within `wide` cells of it, row by row. */
+/* Draws a piece from p to q (in cells), and all cells within `wide` of it, row by row. */
 static void draw_on_face(struct draw *d, uint32_t face, const double p[2], const double q[2], double wide,
                          float range_m)
 {
@@ -73,7 +73,7 @@ static void draw_on_face(struct draw *d, uint32_t face, const double p[2], const
     }
 }
 
-/* A short piece: on each face that it or a footprint at it may reach. */
+/* Draws a short piece on each face that it, or a footprint at it, may reach. */
 static void draw_piece(struct draw *d, const double p[3], const double q[3], double range_m)
 {
     const double half = 0.5 * OUTLINE_CELLS;
@@ -120,7 +120,7 @@ static int add_stretch(struct stretches *s, const double p[3], const double q[3]
     return SH_OK;
 }
 
-/* Pieces of an edge, each short as seen from the station; of these, what counts. */
+/* Cuts an edge into pieces that are short as seen from the station, and keeps the stretches that count. */
 static int cut_edge(struct stretches *s, struct outline_prober *prober, const double p[3], const double q[3],
                     uint32_t edge, double range_max_m)
 {
@@ -213,8 +213,8 @@ static int sort_cells(struct beam_outlines *o, const struct beam_outlines_spec *
     return SH_OK;
 }
 
-/* Edges in the order in which cells name them, so that pulses near each other read edges near each other.
- * Those that no cell names are left out. */
+/* Puts edges in the order in which cells name them, so that neighbouring pulses read neighbouring edges.
+ * Edges that no cell names are left out. */
 static int order_edges(struct beam_outlines *o, struct sh_err *err)
 {
     const uint32_t none = 0xffffffff;

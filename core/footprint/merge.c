@@ -29,13 +29,14 @@ static void sort(struct beam_return *r, uint32_t n)
         }
 }
 
-/* What counts of a return: what comes back, or its energy where nothing does of any. */
+/* The weight of a return: the power that comes back, or its energy where nothing comes back of any
+ * return. */
 static double weight_of(const struct beam_return *r, int by_back)
 {
     return by_back ? r->back : r->energy;
 }
 
-/* A return of the surface that most comes back from: many weak returns may be of one surface. */
+/* A return of the surface that most power comes back from: many weak returns may be of one surface. */
 static uint32_t of_strongest_surface(const struct beam_return *r, uint32_t n, int by_back)
 {
     uint32_t best = 0;
@@ -56,14 +57,15 @@ static uint32_t of_strongest_surface(const struct beam_return *r, uint32_t n, in
     return best;
 }
 
-/* An echo's mean range (from the first return's), the variance of its ranges, and the index of the return
- * that it is of. */
+/* An echo's mean range (relative to the first return's), the variance of its ranges, and the index of the
+ * return that gives its surface. */
 struct average {
     double mean, variance;
     uint32_t strongest;
 };
 
-/* Weighted by what comes back, or else by energy, `all` together. */
+/* Averages returns, weighted by the power that comes back, or by energy; `all` is the sum of the
+ * weights. */
 static struct average average(const struct beam_merging *how, const struct beam_return *r, uint32_t n, double all,
                               int by_back)
 {
@@ -103,7 +105,8 @@ static int make_echo(const struct beam_merging *how, const struct beam_return *r
     return 1;
 }
 
-/* What differs by less than a float's resolution is as weak: the first of these goes. */
+/* Drops the weakest echo. Echoes that differ by less than a float's resolution count as equal: the first
+ * of them goes. */
 static void drop_weakest(struct beam_echo *e, uint32_t n)
 {
     uint32_t weakest = 0;
@@ -112,7 +115,7 @@ static void drop_weakest(struct beam_echo *e, uint32_t n)
     memmove(e + weakest, e + weakest + 1, (n - weakest - 1) * sizeof *e);
 }
 
-/* From so many returns on it is faster to look first. */
+/* From so many returns on it is faster to look for gaps before sorting. */
 enum { MANY = 7 };
 
 /* Most footprints lie on one surface: there is no gap between their returns, whatever their order. The

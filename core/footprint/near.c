@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* Pulses that outlines are near to, by the cells of their directions. */
+/* Finds pulses near outlines, by the cells of their directions. */
 #include <math.h>
 #include <string.h>
 
 #include "core/footprint/outlines.h"
 #include "core/vecmath.h"
 
-enum { TOGETHER = 8 }; /* pulses on either side of one for which it is asked */
+enum { TOGETHER = 8 }; /* pulses on either side of the one that is looked up */
 
 /* Square of the longest way from one direction to the next. */
 VEC_CLONES
@@ -52,7 +52,8 @@ static int is_set(const uint32_t *bits, uint32_t cell)
     return bits[cell / 32] >> cell % 32 & 1;
 }
 
-/* Pulses some way around which there are outlines: of so many at a time, that is asked of the middle one. */
+/* Lists pulses with outlines somewhere around them: of up to TOGETHER pulses on either side, only the
+ * middle one is looked up. */
 static uint32_t list_around(const struct beam_outlines *o, const struct vec3_floats *dir, uint32_t n, struct few *few,
                             uint32_t *pulse)
 {
@@ -74,7 +75,7 @@ static uint32_t list_around(const struct beam_outlines *o, const struct vec3_flo
     return found;
 }
 
-/* Pulses in cells that lead to some; near->first: the cell. */
+/* Pulses in cells that lead to edges; near->first: the cell. */
 static uint32_t in_cells(const struct beam_outlines *o, const struct vec3_floats *dir, uint32_t n,
                          struct beam_near *near)
 {
@@ -91,7 +92,7 @@ static uint32_t in_cells(const struct beam_outlines *o, const struct vec3_floats
     return found;
 }
 
-/* Brings what looking for lines is going to read, step by step for all pulses at once. */
+/* Prefetches the data that the search for lines will read, step by step for all pulses at once. */
 static void look_up(const struct beam_outlines *o, struct beam_near *near, uint32_t n)
 {
     for (uint32_t k = 0; k < n; k++)
@@ -104,8 +105,8 @@ static void look_up(const struct beam_outlines *o, struct beam_near *near, uint3
     }
 }
 
-/* Most cells lead to none, and most of those that lead to some are wider than the footprint; ranges are
- * looked at later. */
+/* Most cells lead to no edge, and most of the others are wider than the footprint. Ranges are compared
+ * later. */
 uint32_t beam_near_outlines(const struct beam_outlines *o, const struct beam *beam, const struct vec3_floats *dir,
                             uint32_t n, struct beam_near *near)
 {

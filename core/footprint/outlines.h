@@ -2,7 +2,7 @@
 /* Private to core/footprint: outlines of a scene from a station, and the cells of direction that lead to
  * them.
  *
- * A direction belongs to a cell of one of a cube's faces, n x n cells each. Let z be its largest component:
+ * A direction belongs to a cell on a face of a cube, with n x n cells each. Let z be its largest component:
  * the cell follows from x / |z| and y / |z|, both from -1 to 1. */
 #ifndef CORE_FOOTPRINT_OUTLINES_H
 #define CORE_FOOTPRINT_OUTLINES_H
@@ -11,10 +11,10 @@
 
 enum { OUTLINE_CELLS = 512 }; /* along a face: 2.6 mrad in its middle, half of that in its corners */
 
-/* Neighbours among pulses are looked up together where they are as near as this to one of them. */
+/* Pulses that are within this angle of one of them are looked up together. */
 #define OUTLINE_AROUND_RAD 4e-3
 
-/* An edge's ends, from the station. */
+/* An edge's ends, relative to the station. */
 struct outline_edge {
     float a[3], b[3];
 };
@@ -29,13 +29,13 @@ struct beam_outlines {
     uint32_t n_edges;
     struct outline_edge *edge;
     uint32_t *first;             /* entries of cell c: first[c] .. first[c + 1] */
-    uint32_t *any;               /* a bit for each cell: it leads to some */
+    uint32_t *any;               /* a bit for each cell: it leads to some edges */
     uint32_t *around;            /* likewise: some cell within OUTLINE_AROUND_RAD of a direction in it does */
     struct outline_entry *entry; /* by range */
     uint64_t n_entries;
 };
 
-/* Part of an edge that counts, from the station. */
+/* Part of an edge that counts as an outline, relative to the station. */
 struct outline_stretch {
     double p[3], q[3];
     uint32_t edge;
@@ -44,7 +44,7 @@ struct outline_stretch {
 /* probe.c: looks along both sides of a piece of an edge. */
 enum { PROBE_MOST = 512 };
 struct outline_prober {
-    const struct beam_probe *probe; /* NULL: all counts */
+    const struct beam_probe *probe; /* NULL: everything counts */
     const struct beam *beam;
     struct {
         double x[2 * PROBE_MOST], y[2 * PROBE_MOST], z[2 * PROBE_MOST];
@@ -53,8 +53,8 @@ struct outline_prober {
     uint16_t kind[2 * PROBE_MOST];
     uint8_t counts[PROBE_MOST];
 };
-/* The piece from p to q in equal parts, each about a footprint's radius: how many, and in counts whether each
- * counts. */
+/* Divides the piece from p to q into equal parts, each about a footprint's radius. Returns how many; counts
+ * says whether each one counts. */
 uint32_t outline_probe(struct outline_prober *prober, const double p[3], const double q[3], double range_m);
 
 /* weld.c: the outlines among the edges of a scene: o->edge and n_edges. */
@@ -67,7 +67,7 @@ static inline uint32_t outline_place(uint32_t face, uint32_t i, uint32_t j)
     return ((face * tiles + j / 4) * tiles + i / 4) * 16 + j % 4 * 4 + i % 4;
 }
 
-/* In float: the cells know what is a hundredth of a cell beside them, too. */
+/* Float is enough: cells also list edges up to a hundredth of a cell beside them. */
 static inline __attribute__((always_inline)) uint32_t outline_cell(float dx, float dy, float dz)
 {
     const float ax = __builtin_fabsf(dx), ay = __builtin_fabsf(dy), az = __builtin_fabsf(dz);

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* Which stretches of an outline are steps that can be seen, or the end of a kind of surface. */
+/* Finds the stretches of an outline that are visible steps, or the end of a kind of surface. */
 #include <math.h>
 #include <string.h>
 
 #include "core/footprint/outlines.h"
 #include "core/vec3.h"
 
-/* Beside the edge by this much of the footprint's radius: what is thinner could not make an echo. */
+/* Rays pass beside the edge by this share of the footprint's radius: anything thinner could not make an
+ * echo. */
 #define BESIDE 2e-3
 /* Steeper surfaces than this look like a step, and count as one. */
 #define SLOPE 20.0

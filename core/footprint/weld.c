@@ -2,9 +2,9 @@
 /* Which edges of a mesh are outlines, seen from a station.
  *
  * An edge and the station span a plane. With triangles on both sides of it, the surface goes on beyond the
- * edge, without a step in range; with triangles on one side only, it ends there, and where those on both
- * sides are of different kinds, one kind does. That needs neither normals nor an order of corners. Corners at
- * the same place, bit by bit, are one. */
+ * edge, without a step in range; with triangles on one side only, it ends there. Where triangles on both
+ * sides are of different kinds, one kind of surface ends there. This needs neither normals nor an order of
+ * corners. Corners at the same place, bit by bit, are one. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -6,11 +6,11 @@
 #include "core/georef/state.h"
 #include "core/mat3.h"
 
-/* Far enough for nanometres of rounding to be 1e-10 rad, near enough for a quadratic map to be linear by
- * symmetry. */
+/* Far enough that nanometres of rounding are 1e-10 rad. Differences to both sides are exact for a
+ * quadratic map. */
 static const double STEP_M = 100.0;
 
-/* Column k is what a metre along axis k becomes. */
+/* Column k is the image of a metre along axis k. */
 static void jacobian(const struct georef *georef, double j[9])
 {
     double lat_m, lon_m, axis_m, out[2][3];

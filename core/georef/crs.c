@@ -7,7 +7,7 @@
 #include "core/angle.h"
 #include "core/georef/proj_lib.h"
 
-/* A system of the registry, as far as it counts here. */
+/* The data of a system of the registry that are used here. */
 struct grid {
     const char *name;
     struct proj_lib lib;
@@ -88,7 +88,7 @@ static PJ_COORD transformed(const struct grid *grid, double easting_m, double no
     return grid->lib.proj_trans(grid->to, PJ_FWD, in);
 }
 
-/* By differences over 100 m each way: what they leave out is of the third order, below 1e-9 in any grid of survey. */
+/* Measures by differences over 100 m each way: their error is of the third order, below 1e-9 in any survey grid. */
 static void measure_grid(const struct grid *grid, double easting_m, double northing_m, const PJ_COORD *at,
                          struct crs_place *place)
 {
@@ -132,7 +132,7 @@ static int locate(const struct grid *grid, double easting_m, double northing_m, 
     return SH_OK;
 }
 
-/* PROJ without its words on stderr, and without a network. */
+/* Opens PROJ without messages on stderr, and without network. */
 static int open_proj(struct grid *grid, struct sh_err *err)
 {
     int rc = proj_lib_load(&grid->lib, err);

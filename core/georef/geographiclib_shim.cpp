@@ -61,9 +61,9 @@ static int utmups_zone(int zone)
     return zone == 0 ? int(UTMUPS::STANDARD) : zone < 0 ? int(UTMUPS::UPS) : zone;
 }
 
-/* UTMUPS chooses and checks zone and hemisphere for the station, once. Points go through the projections that
- * it uses itself: UTMUPS would add 10,000 km to a point beyond the equator and throw beyond the edge of its
- * table. */
+/* UTMUPS chooses and checks zone and hemisphere for the station, once. Points then go through UTMUPS's own
+ * projections directly: UTMUPS would add 10,000 km to a point beyond the equator, and throw beyond the edge
+ * of its table. */
 struct shim_map {
     /* in: the scene frame */
     bool from_grid;

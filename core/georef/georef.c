@@ -12,8 +12,8 @@
 #include "core/mat3.h"
 #include "core/vec3.h"
 
-/* Polynomials are fitted within this; within 1/64 of the distance from the axis where longitude is one of
- * their outputs: its series converges within that distance. */
+/* Polynomials are fitted within this. Where longitude is one of their outputs it is 1/64 of the distance
+ * from the axis: the series of longitude converges within that distance. */
 #define FIT_MAX_M   20000.0
 #define FIT_OF_AXIS (1.0 / 64.0)
 #define FIT_LEAST_M 1.0
@@ -35,7 +35,7 @@ static int check_spec(const struct georef_spec *spec, struct sh_err *err)
     return rc;
 }
 
-/* What differs from a unit matrix is wrong by more than rounding. */
+/* Refuses a matrix that is no rotation by more than rounding. */
 static int check_rotation(const double r[9], struct sh_err *err)
 {
     for (int i = 0; i < 9; i++) {
@@ -60,7 +60,7 @@ static int set_up_frame(struct georef_spec *spec, struct sh_err *err)
     return sh_fail(err, SH_EINPUT, "georef: zone %d of the scene frame; allowed 1 to 60, or 0: UPS", spec->prcs_zone);
 }
 
-/* Points in the grid that they are in already. */
+/* Whether the output's grid is the one that the scene is in. */
 static int is_same_grid(const struct georef_spec *spec)
 {
     return spec->crs == GEOREF_UTM && spec->prcs_is_grid &&

@@ -1,18 +1,18 @@
 /* SPDX-License-Identifier: MIT */
 /* The map as a polynomial: fit and bound.
  *
- * Fit. The map is taken by GeographicLib at 7 x 7 x 7 Chebyshev nodes of a cube about the centre and
- * interpolated (products of Lagrange polynomials, whose coefficients are made in long double). The nodes are
- * kilometres apart, so that the nanometres of rounding in GeographicLib's figures are divided by (20 km)^k in
- * a coefficient of degree k and come back multiplied by (scene / 20 km)^k; derivatives by small differences
- * would do the opposite. Terms up to degree 6 are kept, up to 3 or 5 are used. In the meridian the nodes lie
- * in its plane.
+ * Fit. GeographicLib computes the map at 7 x 7 x 7 Chebyshev nodes of a cube about the centre. It is
+ * interpolated by products of Lagrange polynomials, whose coefficients are made in long double. The nodes are
+ * kilometres apart. So the nanometres of rounding in GeographicLib's figures are divided by (20 km)^k in a
+ * coefficient of degree k, and return multiplied by (scene / 20 km)^k only. Derivatives by small differences
+ * would amplify the rounding. Terms up to degree 6 are kept, up to 3 or 5 are used. In the meridian the nodes
+ * lie in its plane.
  *
- * Bound. What an order leaves out is, for every point of the cylinder, at most the sum of the absolute values
- * of the terms left out up to degree 6, each at its own worst place; plus the rest of the series, which is
- * taken as geometric with the ratio of degree 5 to degree 4; plus ten times what the fit can have folded into
- * lower terms of degree 7; plus FLOOR_M for rounding. The first part is proven by the triangle inequality,
- * the others are small beside it; tests/accuracy/test_georef.c holds the whole against true errors at 200
+ * Bound. The error of an order, at every point of the cylinder, is at most the sum of four parts: the
+ * absolute values of the terms left out up to degree 6, each at its own worst place; the rest of the series,
+ * taken as geometric with the ratio of degree 5 to degree 4; ten times the part of degree 7 that the fit may
+ * have folded into lower terms; and FLOOR_M for rounding. The triangle inequality proves the first part, and
+ * the others are small beside it. tests/accuracy/test_georef.c compares the whole with true errors at 200
  * places. */
 #include "core/georef/polynomial.h"
 
@@ -94,7 +94,7 @@ static void sample_meridian(const struct shim_map *map, const struct polynomial 
     }
 }
 
-/* Of those of degree d, x^a y^b is the one (d-a)(d-a+1)/2 after the first, y^b z^c the one d(d+1)/2 + c. */
+/* Among the terms of degree d, x^a y^b has the place (d-a)(d-a+1)/2, and y^b z^c the place d(d+1)/2 + c. */
 static void set_up_plane(struct polynomial *p)
 {
     int first = 0, at = 0, meridian = p->form == POLYNOMIAL_MERIDIAN;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The map's Taylor polynomial about its centre, in the form whose series settles fastest. Used within
+/* The map's Taylor polynomial about its centre, in the form whose series converges fastest. Used within
  * core/georef. In: differences in prcs from the centre (metres). Out: differences from the anchor, in units
  * of the CRS.
  *   space     three polynomials of x, y, z: a metric frame to a grid, a grid to ECEF
@@ -9,9 +9,9 @@
  *                 s = hypot(a, e),  a = s0 + u cos lat - n sin lat,
  *             and its longitude differs from the centre's by 2 atan(e / (s + a)). Turned back into the
  *             centre's meridian, the point moves by s - a away from the axis. There latitude and height are
- *             polynomials of n and u alone, which are smooth at the pole. As a polynomial longitude would
- *             have an error of (scene / s0)^4 s0. A UPS grid has the pole in its plane: the same with a = s0
- *             -+ n. */
+ *             polynomials of n and u alone, which are smooth at the pole. A polynomial for longitude would
+ *             have an error of (scene / s0)^4 s0. A UPS grid has the pole in its plane: the same holds with
+ *             a = s0 -+ n. */
 #ifndef CORE_GEOREF_POLYNOMIAL_H
 #define CORE_GEOREF_POLYNOMIAL_H
 
@@ -41,8 +41,8 @@ void polynomial_fit(const struct shim_map *map, enum polynomial_form form, doubl
 /* Whether there is this order: 1 to 3, and 5 where it is flat. */
 int polynomial_has_order(const struct polynomial *p, int order);
 
-/* What is left out above `order`, within radius_m and height_m of the centre; weight: metres on the ground
- * per unit of each output. INFINITY beyond half_m, and where the series does not settle. */
+/* A bound of the terms above `order`, within radius_m and height_m of the centre; weight: metres on the
+ * ground per unit of each output. INFINITY beyond half_m, and where the series does not converge. */
 double polynomial_bound_m(const struct polynomial *p, int order, double radius_m, double height_m,
                           const double weight[3]);
 

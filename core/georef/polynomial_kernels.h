@@ -13,8 +13,8 @@
 
 enum { POLYNOMIAL_BLOCK = 128 }; /* most points that a kernel takes at a time */
 
-/* out is none of the inputs. A restrict pointer that is a parameter: compilers don't see one that comes from
- * a struct. */
+/* out is none of the inputs. The restrict pointers are parameters, since compilers ignore restrict on
+ * members of a struct. */
 typedef void polynomial_space(const double c[POLYNOMIAL_USED], size_t n, struct vec3_in d, double *restrict out);
 typedef void polynomial_flat(const double c[POLYNOMIAL_PLANE], size_t n, struct vec3_in d, double *restrict out);
 typedef void polynomial_meridian(const struct polynomial *p, size_t n, struct vec3_in d,

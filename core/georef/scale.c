@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Counts on the wire: how much of the CRS's unit one is. */
+/* The size of a count on the wire, in units of the CRS. */
 #include <math.h>
 
 #include "core/angle.h"
@@ -8,8 +8,8 @@
 /* Half a count less than 2^31, for rounding; -2^31 says that there is no point. */
 static const double MOST_COUNTS = 2147483646.5;
 
-/* Largest difference of each coordinate from the anchor, in units of the CRS, and what a count of one metre
- * would be. */
+/* Finds the largest difference of each coordinate from the anchor, in units of the CRS, and the size of a
+ * count of one metre. */
 static void spans(const struct georef *georef, double reach_m, double span[3], double unit[3])
 {
     for (int i = 0; i < 3; i++) {

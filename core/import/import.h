@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Import apart. Assimp and the readers of IFC crash, hang or take all memory on some broken files; so each, and the readers
- * of glTF and GeoTIFF, which call decoders of others, reads in a process of its own, with limits, and what it gives is checked before it is used.
+/* Import in a process of its own. Assimp and the readers of IFC crash, hang or take all memory on some broken files.
+ * The readers of glTF and GeoTIFF call decoders of others. So each of them reads in a process of its own, with limits.
+ * Its result is checked before it is used.
  *
  *   import_apart.c     this process: starts the other ones, looks after them, says how they ended
  *   import_child.c     the other process: its limits, its messages, its work, or the program that does it
@@ -58,9 +59,10 @@ struct import_apart {
 };
 /* Fails where no process can be made; nothing is open then. */
 int import_start(struct import_apart *a, struct sh_err *err);
-/* Until all n <= 2 are over. Once one has ended as it should, another gets ten times as long, or 10 s where that is more. */
+/* Waits until all n <= 2 are over. Once one has ended as it should, the other gets ten times as long as that one took,
+ * or 10 s where that is more. */
 void import_watch(struct import_apart *const a[], size_t n);
-/* How it ended: 0, or the error. result_fd then has what it made. */
+/* Returns how the process ended: 0, or the error. With 0, result_fd has its result. */
 int import_judge(struct import_apart *a, struct sh_err *err);
 void import_close(struct import_apart *a);
 
@@ -79,7 +81,7 @@ int import_assimp(struct scene_build *b, struct sh_err *err);
 int import_result_write(struct scene *scene, int fd, struct sh_err *err);
 
 /* Adds the scene in the file to b, after b's other files. Nothing in it is trusted: SH_EINPUT says what is
- * wrong. What has been read is cut out of the file. */
+ * wrong. The parts that have been read are cut out of the file, to free memory. */
 int import_result_read(struct scene_build *b, int fd, struct sh_err *err);
 
 #endif

@@ -111,7 +111,7 @@ static void take_note(struct import_apart *a, struct import_note *note)
         sh_fail(&a->said, note->code >= SH_ELOST && note->code < 0 ? note->code : SH_EINPUT, "%s", note->text);
 }
 
-/* All that has come. Notes come whole. 0: the pipe is closed. */
+/* Takes all notes that have come, each of them whole. 0: the pipe is closed. */
 static int take_notes(struct import_apart *a)
 {
     struct import_note note;
@@ -127,20 +127,20 @@ static int take_notes(struct import_apart *a)
 
 /* ---- how it ends */
 
-/* 1: it has ended, and is gone. */
+/* Collects the process's status. 1: it has ended. */
 static int reap(struct import_apart *a, int flags)
 {
     for (;;) {
         pid_t got = waitpid(a->pid, &a->status, flags);
         if (got < 0 && errno == EINTR) continue;
-        /* Where SIGCHLD is ignored, as some programs leave it to those they start, or where somebody else has
-         * waited, there is no status. Its error and its result say enough: a result that is not whole is refused. */
+        /* There is no status where SIGCHLD is ignored, which programs may inherit, or where another waiter has taken
+         * it. The child's error and result are enough: an incomplete result is refused. */
         if (got < 0) a->status = 0;
         return got != 0;
     }
 }
 
-/* Why it must end now; IMPORT_ENDED: it need not. */
+/* The reason to end the process now; IMPORT_ENDED: none. */
 static enum import_end must_end(const struct import_apart *a)
 {
     if (sh_stopped(a->task.b->report)) return IMPORT_STOPPED;
@@ -148,7 +148,7 @@ static enum import_end must_end(const struct import_apart *a)
     return import_memory_of(a->pid, IMPORT_RESIDENT) > a->most_bytes ? IMPORT_MEMORY : IMPORT_ENDED;
 }
 
-/* Whether it is over. */
+/* Checks on the process; whether it is over. */
 static int look(struct import_apart *a)
 {
     if (!take_notes(a) && a->note[0] >= 0) {
@@ -166,7 +166,7 @@ static int look(struct import_apart *a)
     return 1;
 }
 
-/* One that hangs would else hold up what the other has read for minutes. */
+/* Shortens the other reader's time: one that hangs would else delay the finished result for minutes. */
 static void shorten(struct import_apart *a, const struct import_apart *done)
 {
     const int64_t now = now_ns(), took = 10 * (now - done->start_ns);
@@ -228,7 +228,7 @@ int import_judge(struct import_apart *a, struct sh_err *err)
     if (a->end == IMPORT_TIME) return fail_by_time(a, err);
     if (a->end == IMPORT_MEMORY) return fail_by_memory(a, err);
     if (WIFSIGNALED(a->status)) return fail_by_signal(a, WTERMSIG(a->status), err);
-    /* What is refused at once, as larger than all memory, never was in use. */
+    /* A request larger than all memory is refused at once, and never counts as memory in use. */
     if (a->said.code == SH_ENOMEM || strstr(a->said.text, "bad_alloc") != NULL) return fail_by_memory(a, err);
     if (a->said.code != 0) return sh_fail(err, a->said.code, "%s", a->said.text);
     if (WEXITSTATUS(a->status) == 0) return SH_OK;

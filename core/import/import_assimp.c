@@ -2,7 +2,7 @@
 /* glTF 1.0 and Draco, FBX, Collada, and IFC where its readers are not installed, through Assimp's C interface, node tree and all.
  *
  * No post-processing: polygons are cut by our own triangulation, and node transforms are applied in double,
- * one level after the other, so that what single precision has rounded on the way is known. */
+ * one level after the other, so that the rounding of single precision on the way is known. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -21,7 +21,7 @@
 
 enum { MAX_DEPTH = 256 };
 
-/* What Assimp says while it reads; some of it is geometry that it left out. */
+/* Assimp's messages while it reads; some are about geometry that it left out. */
 struct import_log {
     unsigned n;
     char first[160];
@@ -74,8 +74,8 @@ static double largest_of(const double v[3], double largest)
     return largest;
 }
 
-/* What rounding to single precision does to one coordinate: those of the vertices, up to `most` in each
- * direction, and the numbers of a matrix. 0 and 1 are exact. */
+/* Adds the error of one coordinate by rounding to single precision: of vertices, up to `most` in each
+ * direction, and of the numbers of a matrix. 0 and 1 are exact. */
 static void add_rounding(const ai_real row[4], const double most[3], const double error[3], double *out_most,
                          double *out_error)
 {
@@ -89,7 +89,7 @@ static void add_rounding(const ai_real row[4], const double most[3], const doubl
     }
 }
 
-/* Vertices of a mesh, up to `most` in each direction, through all levels. */
+/* Keeps the error of a mesh's vertices, up to `most` in each direction, through all levels. */
 static void keep_error(struct import *im, const double most_in[3])
 {
     double most[3], error[3], next_most[3], next_error[3];
@@ -249,8 +249,8 @@ static const struct aiScene *import_file(const struct assimp_lib *lib, struct sc
     return in;
 }
 
-/* The tree's root. An FBX file has none itself: Assimp adds it, and from 5.4 on it turns the file's axes to y up there.
- * The file's axes stay, as with older ones. */
+/* The tree's root. An FBX file has no root itself. Assimp adds one, and from 5.4 on turns the file's axes to y up
+ * there. This is undone: the file's axes stay, as with older versions. */
 static struct aiNode root_of(const struct aiScene *in, const char *file)
 {
     struct aiNode root = *in->mRootNode;

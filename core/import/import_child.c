@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* The process that reads: limits first, then the work, then the scene into the file of the task.
  *
- * For all but IFC it is a fork without exec, perhaps of a process with threads, of which only this one is left.
- * glibc lets such a process use malloc and stdio; libraries are loaded before, and nothing else of the parent's
- * threads is touched. It ends by _exit, which runs nobody's destructors. */
-#include "core/import/import.h"
+ * For all but IFC it is a fork without exec. The parent may have threads; only this one is left in the fork. glibc lets
+ * such a process use malloc and stdio; nothing else of the parent's threads is touched. It ends by _exit, which runs
+ * no destructors. */
+#include "core/scene/import.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -21,9 +21,10 @@ enum { PROGRAM_FILES = 256 }; /* node opens some 30 of its own */
 
 _Static_assert(sizeof(struct import_note) <= 4096, "PIPE_BUF on Linux: written in one piece");
 
-static int note_fd; /* where the pipe is until it is in its place, and then */
+static int note_fd; /* the pipe, before and after it is moved to its place */
 
-/* An error can't be told but by the pipe; where that fails the exit status says that something did. */
+/* Errors are reported by the pipe alone. Where that fails, the exit status still shows that something
+ * did. */
 static void send_note(const struct import_note *note)
 {
     while (write(note_fd, note, sizeof *note) < 0 && errno == EINTR)
@@ -49,7 +50,8 @@ static void send_progress(void *ctx, const char *what, double fraction)
     send_text(IMPORT_PROGRESS, 0, fraction, what);
 }
 
-/* Signals as they are in a new program. Ctrl-C reaches both processes: the parent decides what it means. */
+/* Sets signals as they are in a new program. Ctrl-C reaches both processes: the parent decides what it
+ * means. */
 static void set_signals(void)
 {
     static const int parents[] = {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGXFSZ};
@@ -62,8 +64,8 @@ static void set_signals(void)
     sigprocmask(SIG_SETMASK, &none, NULL);
 }
 
-/* Nothing of the parent's stays open but what the task needs: its sockets and terminals must close when it
- * closes them. Whatever is printed goes nowhere. */
+/* Closes all of the parent's descriptors that the task doesn't need: its sockets and terminals must close
+ * when the parent closes them. Output is discarded. */
 static int set_descriptors(const struct import_task *task)
 {
     int result = fcntl(task->result_fd, F_DUPFD, FIRST_FREE_FD), note = fcntl(task->note_fd, F_DUPFD, FIRST_FREE_FD);
@@ -86,7 +88,7 @@ static int set_limit(__rlimit_resource_t resource, uint64_t value)
     return setrlimit(resource, &limit) == 0;
 }
 
-/* Where memory gets short all the same, this process is the one to end. */
+/* Where memory still runs short, the kernel ends this process first. */
 static void offer_to_the_oom_killer(void)
 {
     int fd = open("/proc/self/oom_score_adj", O_WRONLY);
@@ -95,9 +97,9 @@ static void offer_to_the_oom_killer(void)
     close(fd);
 }
 
-/* The parent looks at memory in use, and at the clock. What the kernel watches is the second line: processor time
- * where the parent is stopped, and for Assimp the address space. That one is twice the limit, since there is always
- * more of it than of memory; the address sanitizer takes terabytes of it. */
+/* The parent watches the memory in use, and the clock. The kernel's limits are the second line: processor time where
+ * the parent is stopped, and for Assimp the address space. The latter is twice the limit, since a process has more
+ * address space than memory. The address sanitizer takes terabytes of it. */
 static int set_limits(const struct import_task *task)
 {
     const struct scene_import_limits *limits = &task->limits;
@@ -111,7 +113,7 @@ static int set_limits(const struct import_task *task)
         done = done && set_limit(RLIMIT_AS, import_memory_of(getpid(), IMPORT_ADDRESSES) + 2 * bytes);
 #endif
     offer_to_the_oom_killer();
-    return done && prctl(PR_SET_DUMPABLE, 0) == 0; /* no core by a pipe either, which asks for no limit */
+    return done && prctl(PR_SET_DUMPABLE, 0) == 0; /* no core dump by a pipe either, which ignores the limit */
 }
 
 static int prepare(const struct import_task *task, struct sh_err *err)
@@ -149,7 +151,7 @@ _Noreturn void import_child(const struct import_task *task)
 {
     struct sh_err err = {0};
     prctl(PR_SET_PDEATHSIG, SIGKILL);
-    if (getppid() != task->parent) _exit(1); /* it died before that */
+    if (getppid() != task->parent) _exit(1); /* the parent died before that */
     int rc = prepare(task, &err);
     if (rc == SH_OK) rc = task->argv != NULL ? run_program(task, &err) : read_scene(task, &err);
     if (rc != SH_OK) send_text(IMPORT_ERROR, rc, 0.0, err.text);

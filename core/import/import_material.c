@@ -36,7 +36,7 @@ static void keep_colour(const struct assimp_lib *lib, const struct scene_build *
     surface->has_colour = 1;
 }
 
-/* glTF's own reader says it of its files; of those by Draco this does. */
+/* Keeps transparency, also of glTF packed by Draco; for other glTF their own reader does it. */
 static void keep_clear(const struct assimp_lib *lib, const struct aiMaterial *material, struct scene_surface *surface)
 {
     ai_real opacity = 1.0f;

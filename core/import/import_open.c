@@ -52,7 +52,7 @@ static void on_flush(struct aiFile *file)
     (void)file;
 }
 
-/* Assimp asks for many a name that need not be there. */
+/* Assimp asks for many names that need not exist. */
 static struct aiFile *on_open(struct aiFileIO *io, const char *path, const char *mode)
 {
     struct import_open *open = (struct import_open *)(void *)io->UserData;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* A scene as a file in memory, between two processes: head, textures, surfaces, vertices, triangles, labels,
- * texture coordinates, colours, one array after the other. Read by pread, not mapped: each value is checked where it
- * then stays, and a file that has got shorter is an error of read. */
-#include "core/import/import.h"
+ * texture coordinates, colours, one array after the other. It is read by pread, not mapped: each value is checked in
+ * its final place, and a file that has become shorter is an error of read. */
+#include "core/scene/import.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -116,7 +116,8 @@ static int wrong(const struct result *r, const char *what, uint64_t number)
                       what, (unsigned long long)number);
 }
 
-/* From any place of the file. What is taken is cut out of it: the scene is not there twice. */
+/* Reads from any place of the file. The part that is read is cut out of the file, so that the scene is not
+ * in memory twice. */
 static int take_at(struct result *r, uint64_t at, void *data, size_t size)
 {
     if (at > r->size || size > r->size - at) return wrong(r, "it ends at byte", r->size);
@@ -137,7 +138,7 @@ static int take(struct result *r, void *data, size_t size)
     return rc;
 }
 
-/* A name in the folder of the mesh comes back with that folder. */
+/* A name in the mesh's folder is handed back with that folder. */
 static int add_texture(struct result *r, const char *file, const void *bytes, const struct result_texture *size,
                        uint32_t i)
 {
@@ -244,7 +245,7 @@ static int take_vertices(struct result *r)
     return rc;
 }
 
-/* Some triangles, as the three arrays of the file have them. */
+/* Some triangles, as the file's arrays have them. */
 struct triangles {
     uint32_t corner[AT_ONCE][3];
     uint16_t label[AT_ONCE];

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Which formats define unit and axes: core/scene.h has the list. FBX says them in its global settings, which
- * Assimp hands on as metadata; what newer ones apply of them is taken back (import_assimp.c). */
+/* Which formats define unit and axes: core/scene.h has the list. FBX has them in its global settings, which
+ * Assimp passes on as metadata. Newer versions of Assimp apply some of them; import_assimp.c undoes that. */
 #include "core/import/import_says.h"
 
 #include <math.h>
@@ -50,7 +50,8 @@ static int is_left_handed(int right, int up, int front)
     return (b == a % 3 + 1) == ((right < 0) + (up < 0) + (front < 0)) % 2;
 }
 
-/* UnitScaleFactor is in centimetres; UpAxis counts from 0 for x. A figure that can't be is none. */
+/* UnitScaleFactor is in centimetres; UpAxis counts from 0 for x. An impossible figure counts as
+ * missing. */
 static struct scene_says fbx_says(const struct aiScene *in)
 {
     struct scene_says says = {0};

@@ -154,7 +154,7 @@ static int read_property(struct ply_header *h, struct text *t, struct sh_err *er
     for (int i = e->first; i < h->n_properties - 1; i++) {
         if (p->use == PLY_SKIP || h->property[i].use != p->use) continue;
         if (p->use < PLY_TIME || p->use >= PLY_SCALARS) return fail(t, err, "property is there twice:", word);
-        p->use = PLY_SKIP; /* of what says nothing about the place the first one counts */
+        p->use = PLY_SKIP; /* of properties that don't concern the position, the first one counts */
     }
     return SH_OK;
 }
@@ -166,7 +166,7 @@ const struct ply_property *ply_find(const struct ply_header *h, const struct ply
     return NULL;
 }
 
-/* What holds for meshes and point clouds alike. */
+/* Checks that hold for meshes and point clouds alike. */
 static int check_header(const struct ply_header *h, const struct text *t, struct sh_err *err)
 {
     int n[4] = {0, 0, 0, 0};

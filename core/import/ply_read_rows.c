@@ -28,7 +28,7 @@ uint64_t ply_line(const struct ply_rows *r)
     return r->h.format == PLY_ASCII ? r->t.line : 0;
 }
 
-/* Where a text goes wrong is its line; in a binary it is the byte. */
+/* The place of an error is a line in a text, and a byte in a binary file. */
 int ply_fail(const struct ply_rows *r, struct sh_err *err, const char *what)
 {
     char place[64] = "";
@@ -41,7 +41,7 @@ static double load_binary(const unsigned char *p, enum ply_type type, bool big)
 {
     uint64_t bits = 0;
     unsigned size = ply_type_size[type];
-    if (size == 8 && !big) /* most are, and most bytes: at once, by the machine's own order, which is little-endian */
+    if (size == 8 && !big) /* the common case: read at once, in the machine's own order, which is little-endian */
         memcpy(&bits, p, 8);
     else
         for (unsigned i = 0; i < size; i++)
@@ -148,7 +148,7 @@ static int begin(struct ply_rows *r, int i, struct sh_err *err)
                      (unsigned long long)e->count, e->name, (unsigned long long)least, (unsigned long long)rest);
 }
 
-/* Rows are read once, in order: what is behind them goes, before the arrays that they fill have grown as large. */
+/* Rows are read once, in order. So memory of rows that were read is given back while the arrays grow. */
 static int end_stretch(struct ply_rows *r, struct sh_err *err)
 {
     if (!r->is_kept) text_drop_read(&r->t);

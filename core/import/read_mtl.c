@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The material libraries of an OBJ file: newmtl; Kd, the diffuse colour; d or Tr, its opacity; map_Kd, its texture; map_d,
- * what cuts holes. The rest is ignored. */
+ * its holes. The rest is ignored. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,7 +11,7 @@
 #include "core/import/readers.h"
 #include "core/text.h"
 
-/* Things of a kind that one warning counts, and of which it names the first. */
+/* Missing things of a kind: one warning counts them, and names the first. */
 struct missing {
     uint64_t n, line;
     char first[96];
@@ -79,7 +79,7 @@ static void set_material(struct mtl *m, struct text_span material)
         m->known[i - m->first] |= has_material(&m->b->scene->surface[i], m->material);
 }
 
-/* All surfaces with the material at hand; the first colour stays. */
+/* Sets the colour of all surfaces with the current material; the first colour stays. */
 static void set_colour(struct mtl *m, const double rgb[3])
 {
     struct scene *scene = m->b->scene;
@@ -92,7 +92,7 @@ static void set_colour(struct mtl *m, const double rgb[3])
     }
 }
 
-/* Kd r [g b] with r, g, b in 0..1; r alone is a grey. A spectrum or CIE colour is none that is known here. */
+/* Kd r [g b] with r, g, b in 0..1; r alone is a grey. Spectra and CIE colours are not read. */
 static bool read_colour(struct text *t, double rgb[3])
 {
     int n = 0;
@@ -115,7 +115,7 @@ static void take_colour(struct mtl *m)
         add_missing(&m->colour, at.line, text_rest(&at));
 }
 
-/* d: opacity; Tr: 1 less that. d -halo depends on the direction, and is none. */
+/* d: opacity; Tr: 1 - opacity. d -halo depends on the direction, and is ignored. */
 static void take_opacity(struct mtl *m, bool is_opacity)
 {
     struct text at = m->t;
@@ -134,7 +134,7 @@ static void take_opacity(struct mtl *m, bool is_opacity)
 
 /* ---- textures */
 
-/* A map: where its image lies, and how. */
+/* A map: its image file, and how the image lies. */
 struct map {
     struct build_image image;
     double scale[2], shift[2];
@@ -161,7 +161,7 @@ static bool is_number(struct text_span word, double *value)
     return *end == '\0' && isfinite(*value);
 }
 
-/* One value of an option; false: it is none, so that the file's name begins there. */
+/* Takes one value of an option; false: the word is no value, so the file's name begins there. */
 static bool take_value(struct map *map, struct text_span option, struct text_span word, int n)
 {
     double value = 0.0;
@@ -204,7 +204,7 @@ static void move_uv(struct scene_build *b, uint32_t label, const struct map *map
             s->uv[i][k / 2][k % 2] = (float)((double)s->uv[i][k / 2][k % 2] * map->scale[k % 2] + map->shift[k % 2]);
 }
 
-/* map_Kd or map_d. Of a surface with both, the first one says how they lie. An image that is not there is said here. */
+/* map_Kd or map_d. Where a surface has both, the first one says how they lie. Warns of an image that is missing. */
 static int set_texture(struct mtl *m, struct text_span text, bool is_opacity, struct sh_err *err)
 {
     struct scene *scene = m->b->scene;
@@ -317,7 +317,8 @@ static struct text_span next_name(const char **p, const char *end)
     return name;
 }
 
-/* A line holds several names, or one with blanks, perhaps with a comment after it: it is that of which there is a file. */
+/* A line holds several names, or one with blanks, perhaps with a comment after it. The reading for which a file exists
+ * is taken. */
 static int read_line(struct mtl *m, const struct mtl_line *line, bool *all, struct sh_err *err)
 {
     const struct text_span whole = without_quotes(line->names), bare = without_comment(line->names);
@@ -332,7 +333,7 @@ static int read_line(struct mtl *m, const struct mtl_line *line, bool *all, stru
         rc = read_if_there(m, next_name(&p, end), line->line, &found, err);
         any |= found;
     }
-    for (const char *p = bare.p; p < end && any;) { /* some are there: each of the others is missing by itself */
+    for (const char *p = bare.p; p < end && any;) { /* some exist: the others are reported singly */
         const struct text_span folder = build_folder_of(m->b->spec->file), name = next_name(&p, end);
         char *path = build_find_file(&folder, 1, name);
         if (path == NULL) warn_of_library(m, name, line->line);
@@ -344,7 +345,7 @@ static int read_line(struct mtl *m, const struct mtl_line *line, bool *all, stru
     return rc;
 }
 
-/* Materials that no library has; where a library is missing, that has been said. */
+/* Warns of materials that no library has, unless a missing library has been reported. */
 static void warn_of_materials(const struct mtl *m)
 {
     const struct scene *scene = m->b->scene;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Wavefront OBJ in double: v with its colour, f, o, g, usemtl, mtllib. Points and lines are counted; what has no shape is
- * ignored. */
+/* Wavefront OBJ in double: v with its colour, f, o, g, usemtl, mtllib. Points and lines are counted; statements without
+ * shape are ignored. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -54,7 +54,8 @@ static bool at_statement_end(struct obj *o)
     return text_at_line_end(&o->t) || *o->t.p == '#';
 }
 
-/* Up to the statement's end: least to most numbers, else it fails with `what`. Those that are not there stay. */
+/* Reads least to most numbers up to the statement's end, else fails with `what`. Missing numbers keep their
+ * values. */
 static int read_numbers(struct obj *o, int least, int most, double *number, const char *what, struct sh_err *err)
 {
     int n = 0;
@@ -63,7 +64,7 @@ static int read_numbers(struct obj *o, int least, int most, double *number, cons
     return n >= least ? SH_OK : fail_at(o, err, what);
 }
 
-/* Colours are numbers up to 1, or up to 255: all of them together say which. */
+/* Colours are numbers up to 1, or up to 255: all of them together decide which. */
 static double find_rgb_scale(const struct obj *o)
 {
     struct text t = o->t;
@@ -86,13 +87,14 @@ static int keep_rgb(struct obj *o, const double rgb[3], struct sh_err *err)
     if (o->rgb_scale == 0.0) o->rgb_scale = find_rgb_scale(o);
     if (!grow(&o->rgb, &o->cap_rgb, at + 1, sizeof *o->rgb))
         return build_fail(o->b, SH_ENOMEM, err, "no memory for colours");
-    memset(o->rgb[o->n_rgb], 0, (at - o->n_rgb) * sizeof *o->rgb); /* of vertices between that have none */
+    memset(o->rgb[o->n_rgb], 0, (at - o->n_rgb) * sizeof *o->rgb); /* for vertices in between without colours */
     build_rgb(o->b, rgb, o->rgb_scale, o->rgb[at]);
     o->n_rgb = at + 1;
     return SH_OK;
 }
 
-/* x y z, then at most w, or a colour of three numbers and what follows it. A weight is for curves only. */
+/* Reads x y z, then at most w, or a colour of three numbers and anything after it. The weight w is for
+ * curves only. */
 static int read_vertex(struct obj *o, struct sh_err *err)
 {
     double v[8] = {[5] = NAN};

@@ -54,7 +54,7 @@ static int lose_vertex(struct ply *y, const double v[3], struct sh_err *err)
     return build_vertex(y->b, nowhere, err);
 }
 
-/* Their places in the scene are none; they must not widen it. */
+/* Gives vertices that are not finite a harmless place: they must not widen the scene's bounds. */
 static void put_away_lost(struct ply *y)
 {
     struct scene *s = y->b->scene;
@@ -152,7 +152,7 @@ static int use_row(void *ply, struct sh_err *err)
 
 /* ---- the file */
 
-/* What they stood for was rounded when the file was written: nothing can be done about that here. */
+/* Notes the rounding of float coordinates, which happened when the file was written. */
 static int note_rounding(const struct ply *y, struct sh_err *err)
 {
     const struct scene_build *b = y->b;
@@ -164,7 +164,8 @@ static int note_rounding(const struct ply *y, struct sh_err *err)
     return build_single(y->b, largest, largest * BUILD_SINGLE_ROUNDING, false, err);
 }
 
-/* More vertices than faces: faces hardly share any. Where they do, there are half as many. */
+/* With more vertices than faces, faces hardly share vertices. Where they share them, there are half as
+ * many vertices as faces. */
 static bool is_torn(const struct ply *y, uint64_t vertices)
 {
     for (int i = 0; i < y->r.h.n_elements; i++)

@@ -23,7 +23,7 @@ struct ply {
     uint64_t n_empty; /* faces without corners */
     /* ---- read_ply_colours.c */
     struct ply_colour {
-        float rgb[3], uv[2]; /* as they stand in the file; NaN: none */
+        float rgb[3], uv[2]; /* as in the file; NaN: none */
     } * colour;              /* of each vertex, where colours or texture coordinates are wanted and there */
     size_t n_colours, cap_colours;
     double rgb_scale;                  /* of colours of vertices; 0: not known yet */
@@ -40,13 +40,14 @@ struct ply {
     uint64_t n_unfit; /* faces with another number of texture coordinates than corners */
 };
 
-/* Before any row: textures that are there, and those that are missing. */
+/* Before any row: finds the textures, and those that are missing. */
 int ply_begin_textures(struct ply *y, struct sh_err *err);
 void ply_begin_colours(struct ply *y); /* of the element */
 int ply_keep_vertex_colour(struct ply *y, struct sh_err *err);
-/* The row's label, has_rgb and has_uv. */
+/* Sets the row's label, has_rgb and has_uv. */
 int ply_begin_face(struct ply *y, struct sh_err *err);
-/* Corner `to` of the polygon: colour and texture coordinates of the row's corner `from`, which is that vertex. */
+/* Gives corner `to` of the polygon the colour and texture coordinates of the row's corner `from`, which is that
+ * vertex. */
 void ply_set_corner_colour(struct ply *y, size_t to, size_t from, uint32_t vertex);
 void ply_end_textures(struct ply *y);
 void ply_free_colours(struct ply *y);

@@ -22,7 +22,7 @@ static bool has_rgb(const struct ply *y, enum ply_kind kind)
     return find(y, kind, PLY_RED) != NULL && find(y, kind, PLY_GREEN) != NULL && find(y, kind, PLY_BLUE) != NULL;
 }
 
-/* To 0..255; 0: a floating type, whose numbers have to say it. */
+/* The factor to 0..255; 0: a floating type, whose numbers decide. */
 static double scale_of(const struct ply_property *p)
 {
     return p->type == PLY_FLOAT || p->type == PLY_DOUBLE ? 0.0 : p->type == PLY_UINT16 ? 255.0 / 65535.0 : 1.0;
@@ -133,7 +133,7 @@ int ply_keep_vertex_colour(struct ply *y, struct sh_err *err)
     return SH_OK;
 }
 
-/* Floating numbers go up to 1, or up to 255: all of them together say which. */
+/* Floating numbers go up to 1, or up to 255: all of them together decide which. */
 static double find_scale(const struct ply *y)
 {
     const double scale = scale_of(find(y, PLY_VERTEX, PLY_RED));

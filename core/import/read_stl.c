@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* STL, text and binary, in double. A binary is told by its size, 84 + 50 bytes a triangle: many begin with "solid", too.
- * Normals are left alone: the order of the corners says which side is out. */
+ * Normals are ignored: the order of the corners says which side is outside. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -27,7 +27,7 @@ static int take_vertex(struct stl *s, size_t at, const double v[3], struct sh_er
     if (rc == SH_OK) rc = build_weld_vertex(s->b, &s->weld, p, err);
     if (rc != SH_OK) return rc;
     s->b->corner[at] = s->weld.number[0];
-    s->weld.n = 0; /* numbers of before are not needed again */
+    s->weld.n = 0; /* earlier numbers are not needed again */
     for (int k = 0; k < 3; k++)
         s->largest = fmax(s->largest, fabs(v[k]));
     return SH_OK;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Which of several options. */
+/* Chooses one of several options. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -12,7 +12,7 @@ int plan_holds(const struct plan_option *option, const struct plan_tolerance *to
            option->echo_share <= tolerance->echo_share;
 }
 
-/* How far an option misses the tolerance; nothing known is worst. */
+/* How far an option misses the tolerance; an unknown bound is worst. */
 static double excess(const struct plan_option *option, const struct plan_tolerance *tolerance)
 {
     if (option->why_not[0] != '\0') return (double)INFINITY;
@@ -68,7 +68,7 @@ uint32_t plan_choose(const struct plan_choice *choice, struct plan_row *row)
         chosen = i;
         holds = 1;
     }
-    /* Of those that miss it by as much, the last, which is the most exact. */
+    /* Of options that miss it equally, the last is taken, which is the most exact. */
     for (uint32_t i = 0; i < choice->n && !holds; i++) {
         double over = excess(&option[i], tolerance), least = excess(&option[chosen], tolerance);
         if (over < least || (over == least && over < 1e300)) chosen = i;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* What methods cost: rounded ns of one core, to compare methods by. To get them again: `make bench-beam`
- * measures single rays, sub-rays and the adaptive beam (house, wires, foliage), `make bench` stages, `make
- * chart` ways to georeference. Sub-rays cost 65 ns in a house and 105 ns among leaves, a pulse that outlines
- * cut 0.2 to 2.2 us. */
+/* Costs of methods, to compare them: rounded ns on one core. To get them again: `make bench-beam` measures
+ * single rays, sub-rays and the adaptive beam (house, wires, foliage), `make bench` stages, `make chart`
+ * ways to georeference. Sub-rays cost 65 ns in a house and 105 ns among leaves. A pulse that outlines cut
+ * costs 0.2 to 2.2 us. */
 #ifndef CORE_PLAN_COST_H
 #define CORE_PLAN_COST_H
 
@@ -15,10 +15,10 @@
 
 /* ---- a ray's first hit, and the map of core/sight (build/bench --only-sight) */
 
-/* Costs of the BVH, by how many rays Embree takes at once: met something, met nothing, and more where a border is near,
- * since rays of a packet then go to more leaves. They are from `without` of house, garden and terrain, 1 to 22.5 million
- * pulses: met and out where borders are few, border from the growth with their share. Those for packets of 8 and 4 follow
- * the ratios of Embree's packets in the chart. */
+/* Costs of the BVH, by how many rays Embree takes at once: for a hit, for a miss, and extra near a border, since rays
+ * of a packet then go to more leaves. They are from `without` of house, garden and terrain, 1 to 22.5 million pulses:
+ * met and out where borders are few, border from the growth with their share. Those for packets of 8 and 4 follow the
+ * ratios of Embree's packets in the chart. */
 struct plan_ray_cost {
     uint32_t packet;
     double met, out, border;
@@ -28,10 +28,12 @@ static const struct plan_ray_cost plan_ray_costs[] = {
 
 #define PLAN_COST_SIGHT_ONE 2.0   /* looked up: one triangle or nothing there, */
 #define PLAN_COST_SIGHT_FEW 35.0  /* one of a few, */
-#define PLAN_COST_SIGHT_ASK 150.0 /* the BVH is asked after all: such rays have nothing in common */
-/* What is more in a scene of a million triangles, whose planes lie in no cache; by the root of their number. */
+#define PLAN_COST_SIGHT_ASK 150.0 /* the BVH is asked after all, ray by ray: these have nothing in common */
+/* Extra in a scene of a million triangles, whose planes fit into no cache; it grows with the root of their
+ * number. */
 #define PLAN_COST_MILLION 10.0
-/* To make it: in any case, by triangle, and by cell that shows more than one; such a cell's memory. */
+/* Cost of making the map: fixed, per triangle, and per cell that shows more than one; memory of such a
+ * cell. */
 #define PLAN_COST_SIGHT          3e6
 #define PLAN_COST_SIGHT_TRIANGLE 330.0
 #define PLAN_COST_SIGHT_CELL     110.0

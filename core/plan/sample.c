@@ -9,8 +9,8 @@
 #include "core/plan/cost.h"
 #include "core/rng.h"
 
-/* Two rays' ranges further apart than that are not those of one smooth surface: at 80 deg, 100 m and 0.35
- * mrad, the mean over a footprint differs from its centre by 2 um. */
+/* Rays whose ranges differ by more do not hit one smooth surface: at 80 deg, 100 m and 0.35 mrad, the mean
+ * over a footprint differs from its centre by 2 um. */
 static const double SMOOTH_M = 5e-5;
 
 enum {
@@ -24,7 +24,7 @@ enum {
     ROOM = 64,       /* in the block; more than LINE_MAX_ECHOES */
     SIGHT_DRAWN = 1024,
     SIGHT_RAYS = 5, /* to the middle of a cell, and to its corners */
-    SIGHT_FEW = 3,  /* so many triangles among them are a few */
+    SIGHT_FEW = 3,  /* up to so many triangles among them are a few */
 };
 
 struct echoes {
@@ -94,7 +94,7 @@ static void say_tries_ended(struct plan_sample *s)
         TRIES, (unsigned long long)s->found);
 }
 
-/* The next pulse by chance that is cast. Returns 0 where none is found. */
+/* Draws the next pulse that is cast. Returns 0 where none is found. */
 static int draw(struct plan_sample *s, struct look *look)
 {
     while (s->tries < TRIES) {
@@ -131,7 +131,7 @@ static void cast_look(struct plan_sample *s, struct cast_setup *setup, const str
     out->last_label = out->n != 0 ? b->label[out->n - 1] : LINE_LABEL_NONE;
 }
 
-/* The run's setup, but exact: ranges in their finest counts, without noise, thresholds sharp. */
+/* The run's setup made exact: ranges in their finest counts, no noise, sharp thresholds. */
 struct exact {
     struct cast_setup setup;
     struct cast_detect detect;
@@ -208,7 +208,7 @@ static void prepare_beam(struct plan_sample *s)
         cast_beam(s, &s->look[i], BEAM_RINGS, &s->look[i].reference);
 }
 
-/* What was found. Of mixed pulses each stands for itself, of the others each stands for many. */
+/* What was found. Each mixed pulse stands for itself, each other one for many. */
 struct tally {
     double echoes, further;          /* further: beyond the first of a pulse */
     double sum2, sum4;               /* of range errors, squared, and to the fourth power */
@@ -227,7 +227,7 @@ static void compare(struct tally *t, const struct echoes *got, const struct echo
     }
 }
 
-/* Upper limit, at 95 %, of a Poisson mean of which `found` were found: half the quantile of chi-squared with
+/* Upper limit, at 95 %, of a Poisson mean where `found` were counted: half the quantile of chi-squared with
  * 2 found + 2 degrees of freedom, after Wilson and Hilferty (1931). */
 static double poisson_limit(double found)
 {
@@ -373,7 +373,7 @@ void plan_sample_sight(struct plan_sample *s, double cell_rad, struct plan_sight
                                            : &found->one) += 1.0;
     }
     if (n == 0) found->ask = n = 1;
-    found->few += 0.5 * found->ask; /* lists hold about half of those that look so */
+    found->few += 0.5 * found->ask; /* about half of those that look so are decided by lists */
     found->ask *= 0.5;
     *found = (struct plan_sight_found){found->one / n, found->nothing / n, found->few / n, found->ask / n};
 }

@@ -7,8 +7,8 @@
 #include "core/plan.h"
 #include "core/plan/cost.h"
 
-/* Of what a map saves, so much must be left when it is paid for: costs here are rounded, and a wrong choice shall
- * not make a scan slower. */
+/* This share of a map's saving must be left after its cost. Costs here are rounded, and a wrong choice must not
+ * make a scan slower. */
 static const double LEAST_LEFT = 0.2;
 
 enum { NO_MAP, MAP, OPTIONS };
@@ -22,7 +22,7 @@ static const struct plan_ray_cost *ray_cost(uint32_t packet)
     return cost;
 }
 
-/* Of a triangle's plane, which both ways need. */
+/* Cost of reading a triangle's plane, which both ways need. */
 static double plane_ns(double n_triangles)
 {
     return PLAN_COST_MILLION * fmin(1.0, sqrt(1e-6 * n_triangles));
@@ -33,25 +33,25 @@ double plan_pulse_ns(double n_triangles, uint32_t packet)
     return PLAN_COST_PULSE + ray_cost(packet)->met + plane_ns(n_triangles);
 }
 
-/* Cells of the whole cube, as many as its maker takes for so many pulses. */
+/* Cells of the whole cube, as sight_cells chooses them for that many pulses. */
 static double cells(const struct plan_sight_need *need)
 {
     const double edge = sight_cells(need->pulses / need->share, need->memory_bytes);
     return 6.0 * edge * edge;
 }
 
-/* A map costs at least that, whatever it shows. */
+/* The least cost of making a map, whatever it shows. */
 static double least_build_ns(const struct plan_sight_need *need)
 {
     return PLAN_COST_SIGHT + PLAN_COST_SIGHT_TRIANGLE * need->n_triangles;
 }
 
-/* Of a scan, ns: per pulse, but build. */
+/* Costs of a scan, ns: per pulse, except build. */
 struct costs {
     double bvh, map, build;
 };
 
-/* The memory holds this part of so many cells that show more than one triangle. */
+/* The share of the cells with more than one triangle that the memory holds. */
 static double fitting(const struct plan_sight_need *need, double mixed)
 {
     const double bytes = PLAN_SIGHT_CELL_BYTES * (mixed + 1.0) + PLAN_SIGHT_RECORD_BYTES * need->n_triangles;
@@ -59,7 +59,7 @@ static double fitting(const struct plan_sight_need *need, double mixed)
 }
 
 /* Where the memory does not hold the cells, the map's maker takes some twice as wide (core/sight/sight.c). An outline
- * goes through half as many of those, so that they are twice the share. */
+ * crosses half as many of these, so their share is twice as large. */
 static void coarsen(const struct plan_sight_found *f, struct plan_sight_found *coarse)
 {
     const double mixed = f->few + f->ask, all = f->one + f->nothing, wider = fmin(1.0, 2.0 * mixed);

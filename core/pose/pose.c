@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Attitudes, and what lies between two poses. */
+/* Attitudes, and poses between two poses. */
 #include "core/pose.h"
 
 #include <math.h>
@@ -44,7 +44,7 @@ void pose_matrix(const double quat[4], double r[9])
 }
 
 /* R's middle column is (sin h cos p, cos h cos p, sin p). Turned back by the heading, its first row is (cos r, 0, sin r).
- * Near the pole, where the heading has a large error, roll has the opposite one then, and the attitude has neither. */
+ * Near the pole the heading has a large error. Roll then has the opposite one, so that the attitude has neither. */
 static void matrix_to_angles(const double r[9], double *heading_rad, double *pitch_rad, double *roll_rad)
 {
     double flat = hypot(r[1], r[4]);

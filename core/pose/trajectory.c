@@ -143,8 +143,8 @@ static double acceleration(const struct trajectory *tr, size_t i)
     return sqrt(fmax(at_a, at_b));
 }
 
-/* Parts that interval i is cut in, and the deviation that is left. arm_m: of the head, from the body's
- * origin. */
+/* The number of parts for interval i, and the remaining deviation. arm_m: the head's distance from the
+ * body's origin. */
 static double parts_of(const struct trajectory *tr, size_t i, const struct pose_knot_rules *rules, double arm_m,
                        double *error_m)
 {

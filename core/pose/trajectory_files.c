@@ -124,7 +124,7 @@ int trajectory_read_csv(const char *path, const struct sh_report *report, struct
 enum { WX, WY, WZ, SPEED, PAUSE };
 static const char *const waypoint_columns[] = {"x_m", "y_m", "z_m", "speed_m_s", "pause_s", NULL};
 
-/* The points as samples, their times without the pauses; and these. */
+/* The points as samples, whose times are without the pauses; and the pauses. */
 struct way {
     struct samples points;
     double *pause_s, pauses_s; /* of each; their sum */
@@ -198,15 +198,15 @@ static void heading_at(const struct trajectory *curve, double t_s, double d, con
     if (hypot(on_m[0], on_m[1]) > d * SLOWEST_M_S) *heading_rad = atan2(on_m[0], on_m[1]);
 }
 
-/* How far along an interval the platform is after its share f of the time: f, but from or to a standstill
- * smoothly. */
+/* The platform's share of an interval after the share f of its time: f, but smooth from or to a
+ * standstill. */
 static double along(double f, int from_rest, int to_rest)
 {
     double g = 1.0 - f;
     return f + f * g * (f * to_rest - g * from_rest);
 }
 
-/* Parts of the way after point i: STEP_S each, or STEP_M where that is longer. */
+/* The number of parts of the way after point i: STEP_S each, or STEP_M where that is longer. */
 static size_t leg_parts(const struct trajectory *curve, size_t i)
 {
     if (i + 1 >= curve->n) return 1;
@@ -243,11 +243,11 @@ static int put_sample(struct walk *w, double curve_s, double t_s, double d, stru
     return SH_OK;
 }
 
-/* The curve as samples that are near each other, heading along it, with the pauses. */
+/* Samples the curve densely, heading along it, with the pauses. */
 static int follow(struct walk *w, const double *pause_s, struct sh_err *err)
 {
     const struct trajectory *curve = w->curve;
-    const double near = 0.005; /* of a step, to either side: the heading there */
+    const double near = 0.005; /* of a step, to either side, for the heading */
     double t_s = 0.0, before_s = STEP_S;
     size_t n = 0;
     int rc = SH_OK;

@@ -3,8 +3,8 @@
  *
  * A body is closed where the edges of its triangles, each with its direction, cancel. By Stokes the sum of any field's
  * integrals along them is then 0, however the faces are divided: an edge whose other side has a corner in its middle
- * cancels, too, which a count of equal edges would miss. So fields are integrated that have nothing in common with the body:
- * w cos(k x + p), with directions, wave numbers and phases from a fixed table. Per area that lacks, the sum is some |k|. */
+ * cancels, too, which a count of equal edges would miss. The fields are independent of the body: w cos(k x + p), with
+ * directions, wave numbers and phases from a fixed table. Per missing area, the sum is about |k|. */
 #include "core/body.h"
 
 #include <math.h>

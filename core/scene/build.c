@@ -95,7 +95,7 @@ int build_end_file(struct scene_build *b, struct sh_err *err)
     return SH_OK;
 }
 
-/* The array as it stays: without the room to grow, and where lookups all over it are quick. */
+/* Gives the array its final place: without room to grow, and in memory where random reads are quick. */
 static int settle(const struct scene_build *b, void **array, size_t n, size_t size, struct sh_err *err)
 {
     const size_t step = (size_t)16 << 20;
@@ -179,7 +179,7 @@ int build_fail(struct scene_build *b, int code, struct sh_err *err, const char *
     return sh_fail(err, code, "%s%s: %s", b->name, place, text);
 }
 
-/* Up to the next number of two digits. */
+/* Rounds up to two digits. */
 static double two_digits_up(double x)
 {
     double digit = pow(10.0, floor(log10(x)) - 1.0);
@@ -189,7 +189,7 @@ static double two_digits_up(double x)
 int build_single(struct scene_build *b, double largest, double error, bool refuse, struct sh_err *err)
 {
     const double most_m = 1.0;    /* of the tolerance */
-    const double coarse_m = 1e-3; /* from here on a scan shows it */
+    const double coarse_m = 1e-3; /* a larger error is visible in a scan */
     double error_m = error * b->spec->scale;
     char set[48] = "";
     if (!(error_m > 0.0)) return SH_OK;
@@ -277,7 +277,7 @@ static bool has_area(const double *a, const double *b, const double *c)
 
 static const float no_uv[3][2] = {{NAN, NAN}, {NAN, NAN}, {NAN, NAN}};
 
-/* The first triangle that has some makes room for those of all. */
+/* Keeps texture coordinates. The first triangle that has some makes room for all triangles. */
 static int keep_uv(struct scene_build *b, const float uv[3][2], struct sh_err *err)
 {
     struct scene *s = b->scene;

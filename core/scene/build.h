@@ -65,8 +65,8 @@ struct build_weld {
     uint32_t n;
     uint32_t *slot; /* [size] of a hash table: numbers in the scene */
     size_t size, used;
-    /* By a part of the hash, the last vertex, its number + 1: most are met again soon, and so without a look at the table,
-     * which is larger than any cache. */
+    /* By a part of the hash: the number + 1 of the last vertex. Most vertices come again soon, and are found here,
+     * without a look at the table, which is larger than any cache. */
     uint32_t recent[BUILD_RECENT];
 };
 int build_weld_begin(struct scene_build *b, struct build_weld *w, uint64_t vertices, struct sh_err *err);
@@ -74,7 +74,8 @@ int build_weld_begin(struct scene_build *b, struct build_weld *w, uint64_t verti
 int build_weld_vertex(struct scene_build *b, struct build_weld *w, const double v[3], struct sh_err *err);
 void build_weld_free(struct build_weld *w);
 
-/* A colour that a file says, times scale, as scene->rgb has it. What is beyond 0..255, or NaN, is limited and counted. */
+/* A colour that a file says, times scale, as scene->rgb has it. Values beyond 0..255, and NaN, are limited and
+ * counted. */
 void build_rgb(struct scene_build *b, const double colour[3], double scale, uint8_t rgb[4]);
 
 /* The range of floating colours is judged by these counts. Zero-initialise. */
@@ -83,11 +84,12 @@ struct build_rgb_range {
     uint64_t n_above, n_between; /* above 1; between 0 and 1 */
 };
 void build_rgb_look(struct build_rgb_range *range, double number);
-/* To 0..255: 255, or 1 where the numbers go up to that. One is 2 at least then, and more are above 1 than between 0 and 1:
- * rounding leaves numbers just above 1, and colours that shine are few. */
+/* The factor that takes colours to 0..255: 255, or 1 where they go up to 255 already. They do where one is 2 at least,
+ * and more are above 1 than between 0 and 1: rounding leaves numbers just above 1, and few colours are brighter than
+ * white. */
 double build_rgb_scale(const struct build_rgb_range *range);
 
-/* Makes room for n corners in corner, corner_uv and corner_rgb; what is in them stays. */
+/* Makes room for n corners in corner, corner_uv and corner_rgb; their contents stay. */
 int build_corners(struct scene_build *b, size_t n, struct sh_err *err);
 /* Adds the polygon of the n >= 3 corners in corner. */
 int build_polygon(struct scene_build *b, size_t n, uint16_t label, struct sh_err *err);
@@ -97,9 +99,9 @@ int build_polygon(struct scene_build *b, size_t n, uint16_t label, struct sh_err
 /* The names are not searched any more: the scene is done, or given up. */
 void build_forget_surfaces(struct scene_build *b);
 
-/* The file's coordinates, up to `largest`, were rounded to single precision, and so are off by up to
- * `error`; both in its units. Keeps that, warns of more than a micrometre, and fails where it is more than
- * allowed, if `refuse`. */
+/* The file's coordinates, up to `largest`, were rounded to single precision, with an error of up to
+ * `error`; both in its units. Records the error, and warns of more than a micrometre. With `refuse` it
+ * fails where the error is more than allowed. */
 int build_single(struct scene_build *b, double largest, double error, bool refuse, struct sh_err *err);
 
 /* The label of a pair of names; a new pair gets the next number. Pointers into the scene's surfaces last until the next
@@ -107,7 +109,7 @@ int build_single(struct scene_build *b, double largest, double error, bool refus
 int build_label(struct scene_build *b, struct text_span object, struct text_span material, uint16_t *label,
                 struct sh_err *err);
 
-/* Which surfaces have colours at the corners of their triangles. */
+/* Notes which surfaces have colours at the corners of their triangles. */
 void build_note_colours(struct scene *scene);
 
 /* A texture as a reader finds it. */
@@ -151,7 +153,7 @@ void build_announce(struct scene_build *b);
 /* The file's name without folders and ending: the object's name where a file has none. */
 struct text_span build_base_name(const struct scene_build *b);
 
-/* Limits of a reader apart: the file's, or the defaults. */
+/* Limits of a reader in a process of its own: the file's, or the defaults. */
 static inline struct scene_import_limits build_limits(const struct scene_build *b)
 {
     return b->spec->limits != NULL ? *b->spec->limits : scene_import_defaults;
@@ -161,14 +163,14 @@ static inline struct scene_import_limits build_limits(const struct scene_build *
 int scene_add_copies(struct scene *scene, struct scene *mesh, const struct scene_places *places,
                      const struct sh_report *report, struct sh_err *err);
 
-/* Part of scene_keep: each copy keeps what its labels say, and goes where that is nothing. label: new ones, by old ones.
- * SH_EINPUT where copies of a mesh would keep different surfaces. */
+/* Part of scene_keep: each copy keeps what its labels say, and is removed where that is nothing. label: new labels, by
+ * old ones. SH_EINPUT where copies of a mesh would keep different surfaces. */
 int scene_keep_copies(struct scene *scene, const uint8_t *keep, const uint16_t *label, struct sh_err *err);
 
 /* ---- cutouts.c */
-/* Holes in the textures of a scene that is complete. Warns of textures that can't be read. */
+/* Finds holes in the textures of a complete scene. Warns of textures that can't be read. */
 int scene_find_cutouts(struct scene *scene, const struct sh_report *report, struct sh_err *err);
-/* Texture coordinates and textures go, unless they have holes. */
+/* Drops texture coordinates and textures, unless they have holes. */
 void scene_drop_textures(struct scene *scene);
 
 #endif

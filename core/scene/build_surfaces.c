@@ -19,7 +19,7 @@ static int compare_surfaces(const void *a, const void *b)
     return order != 0 ? order : strcmp(x->material, y->material);
 }
 
-/* A number of all its bytes: names with the same beginning stay apart. */
+/* A hash of all bytes of a name, so that names with the same beginning differ. */
 static uint64_t number_of(const char *name, size_t n)
 {
     uint64_t number = n;
@@ -137,7 +137,7 @@ void build_note_colours(struct scene *s)
     }
 }
 
-/* Where the image is; where it isn't anywhere, the path that errors name. */
+/* The path of the image; where there is none, the path that errors name. */
 static char *find_image(const struct scene_build *b, const struct build_image *image)
 {
     const struct text_span folder[2] = {image->folder, build_folder_of(b->spec->file)};

@@ -66,7 +66,7 @@ static void name_object(char object[SCENE_NAME_LEN], size_t number)
     memcpy(object + end, tail, len + 1);
 }
 
-/* Behind those of the scene; textures follow with them. sets: how often the mesh's surfaces are there. */
+/* Adds the mesh's surfaces and textures after the scene's. sets: how many times each surface is added. */
 static int add_surfaces(struct scene *scene, struct scene *mesh, const struct scene_places *places, struct sh_err *err)
 {
     const size_t sets = places->own_surfaces ? places->n : 1, n = sets * mesh->n_surfaces;

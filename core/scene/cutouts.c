@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Holes that textures cut out of surfaces, and what lies where on a texture. */
+/* Holes that textures cut out of surfaces, and texture coordinates and colours at a point. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -72,7 +72,7 @@ static int same_holes(const struct scene_surface *a, const struct scene_surface 
     return image_of(a) == image_of(b) && (a->opacity != 0) == (b->opacity != 0) && a->solid == b->solid;
 }
 
-/* The mask of surface i for itself and all later ones like it. */
+/* Adds the mask of surface i, for it and all later surfaces of the same kind. */
 static int add_mask(struct scene *s, uint32_t i, const struct texture_image *image, struct sh_err *err)
 {
     const struct scene_surface *own = &s->surface[i];
@@ -101,13 +101,12 @@ static int cut_out(struct scene *s, uint32_t number, const struct texture_image 
     for (uint32_t i = 0; i < s->n_surfaces && rc == SH_OK; i++) {
         if (image_of(&s->surface[i]) != number || (s->cutout != NULL && s->cutout[i] != NULL)) continue;
         if (last == NULL || !same_holes(last, &s->surface[i])) rc = add_mask(s, i, image, err);
-        last = &s->surface[i]; /* it has none: nor have those like it */
+        last = &s->surface[i]; /* it has no holes, nor have surfaces of the same kind */
     }
     return rc;
 }
 
-/* How the image of a texture cuts: bit 0 by alpha, bit 1 as an opacity map; 0: no surface of the scene has it
- * for that. */
+/* How a texture's image cuts holes: bit 0 by alpha, bit 1 as an opacity map; 0: no surface uses it to cut. */
 static int cuts_how(const struct scene *s, uint32_t number)
 {
     int how = 0;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Files that a mesh or its library names, where they are now. Many names come from other machines: with \ for /, with
- * folders that are not here, or in another case. */
+/* Finds files that a mesh or its library names. Many names come from other machines: with \ for /, with folders that
+ * are not here, or in another case. */
 #include <dirent.h>
 #include <stdlib.h>
 #include <string.h>
@@ -33,8 +33,8 @@ char *build_join(struct text_span folder, struct text_span name)
     return path;
 }
 
-/* The part of the path at `part`, a text of its own, becomes the entry that differs from it in case only. `folder` is
- * what is before it. Of several entries the first by their bytes is taken. */
+/* Replaces the part of the path at `part`, a string of its own, by the entry of `folder` that differs in case only.
+ * Of several entries, the first in byte order is taken. */
 static bool match_part(const char *folder, char *part)
 {
     DIR *dir = opendir(folder[0] != '\0' ? folder : ".");
@@ -52,7 +52,7 @@ static bool match_part(const char *folder, char *part)
     return found;
 }
 
-/* Parts of the path from `at` on get the case that they have on this disk. */
+/* Gives the parts of the path from `at` on the case that they have on this disk. */
 static bool match_case(char *path, size_t at)
 {
     for (char *part = path + at; *part != '\0';) {

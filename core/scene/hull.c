@@ -20,7 +20,8 @@ static int compare(const void *a, const void *b)
     return (p[1] > q[1]) - (p[1] < q[1]);
 }
 
-/* Points strictly within the octagon of the farthest ones in eight directions can't be of the outline. */
+/* Leaves out points strictly within the octagon of the farthest points in eight directions: they can't be
+ * on the outline. */
 static uint32_t leave_out_inner(double (*point)[2], uint32_t n)
 {
     static const int way[WAYS][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}};

@@ -15,7 +15,7 @@ struct scene_hull {
 int scene_find_hull(const struct scene *scene, struct scene_hull *out, struct sh_err *err);
 void scene_free_hull(struct scene_hull *hull);
 void scene_set_copy_bounds(const struct scene *mesh, const struct scene_hull *hull, struct scene_copy *copy);
-/* The scene's bounds take these in. */
+/* Widens the scene's bounds by these copies. */
 void scene_widen(struct scene *scene, const struct scene_copy *copy, size_t n);
 
 #endif

@@ -46,7 +46,7 @@ static void find_bounds(struct scene *s)
     }
 }
 
-/* Gives back what is not needed; where that fails it stays. */
+/* Gives unused memory back; where that fails, the array stays as it is. */
 static void shrink(void *array_of, size_t n, size_t size)
 {
     void **array = array_of, *less = *array != NULL && n > 0 ? realloc(*array, n * size) : NULL;

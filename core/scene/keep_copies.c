@@ -12,7 +12,8 @@ static int keeps_any(const uint8_t *keep, uint32_t n)
     return memchr(keep, 1, n) != NULL;
 }
 
-/* The copies that keep something, with their new labels. kept: what that is, of the mesh. */
+/* Keeps the copies that keep some surface, with new labels. kept: the surfaces of the mesh that they
+ * keep. */
 static int keep_some(struct scene_copied *of, const uint8_t *keep, const uint16_t *label, const uint8_t **kept,
                      struct sh_err *err)
 {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Figures of objects: each mesh is cut into those parts of it that are of one object, and each part is measured once,
- * however many copies of it there are. */
+/* Figures of objects: each mesh is cut into parts of one object each. Each part is measured once, however many copies
+ * it has. */
 #include "core/scene_objects.h"
 
 #include <math.h>
@@ -13,7 +13,7 @@
 
 enum { NONE = 0xffffffff };
 
-/* A gap narrower than this share of the body is none: rounding to single precision leaves 1e-7. */
+/* A gap narrower than this share of the body doesn't count: rounding to single precision leaves 1e-7. */
 #define CLOSED_SHARE 1e-5
 
 /* An edge between two corners. In the direction from low to high it counts +1, in the other -1. */
@@ -30,7 +30,7 @@ struct work {
     uint32_t *order;  /* triangles, by object */
     struct edge *edge;
     uint64_t mask, room;
-    const struct scene_open_edges *edges; /* NULL: nobody asks for them */
+    const struct scene_open_edges *edges; /* NULL: not asked for */
     const struct sh_report *report;
     struct sh_err *err;
 };
@@ -138,8 +138,8 @@ static void bounds_of(const struct work *w, const uint32_t *triangle, uint32_t n
             }
 }
 
-/* Edges without a counterpart may cancel all the same, where one of their sides has corners in the middle. Else they leave
- * an area open, whose mean width follows from the edges' length. */
+/* Edges without a counterpart may still cancel, where one side has more corners along the same edge. Else they leave an
+ * area open, whose mean width follows from the edges' length. */
 static enum scene_object_state judge(const struct work *w, struct body_sum *sum, double diagonal_m, uint64_t *n_open)
 {
     double length_m = 0.0;
@@ -183,7 +183,7 @@ static int measure(struct work *w, const uint32_t *triangle, uint32_t n, struct 
     return SH_OK;
 }
 
-/* The worst state of an object's parts is its own. A part without a volume makes that of the whole NaN. */
+/* An object has the worst state of its parts. A part without a volume makes the whole volume NaN. */
 static void add(struct scene_object *to, const struct scene_object *part, double scale)
 {
     to->n_triangles += part->n_triangles;
@@ -206,7 +206,7 @@ static void add_part(const struct scene_copied *copied, uint32_t label, const st
         add(&o->object[o->of[copied->copy[i].label0 + label]], part, copied->copy[i].scale);
 }
 
-/* Hands out the open edges of the part that was measured last. */
+/* Hands over the open edges of the part that was measured last. */
 static int hand_out(const struct work *w, const struct scene_copied *copied)
 {
     int rc = SH_OK;
@@ -225,7 +225,7 @@ static int hand_out(const struct work *w, const struct scene_copied *copied)
     return rc;
 }
 
-/* Triangles of the mesh by object, by counting: begin[k] is where those of object k begin. */
+/* Sorts the mesh's triangles by object, by counting: those of object k begin at begin[k]. */
 static void sort(struct work *w, const struct scene_objects *o, const uint32_t *of_label, uint32_t *begin)
 {
     const struct scene *mesh = w->mesh;

@@ -3,8 +3,8 @@
  *
  * The polygon is projected along the largest axis of its Newell normal. Points that lie on an edge keep their
  * place (no triangle skips them, so neighbours still meet), and holes may be joined by a keyhole edge.
- * n - 2 triangles always come out; those of a polygon that crosses itself overlap; `simple` is false where
- * that was noticed. Cost: n for convex polygons, n times the number of reflex corners otherwise. */
+ * The result is always n - 2 triangles. Those of a polygon that crosses itself overlap; `simple` is false
+ * where this was noticed. Cost: n for convex polygons, n times the number of reflex corners otherwise. */
 #ifndef CORE_SCENE_TRIANGULATE_H
 #define CORE_SCENE_TRIANGULATE_H
 
@@ -28,7 +28,7 @@ struct triangulate {
     struct triangulate_entry *at;
     size_t cap, n_reflex;
     bool simple;                    /* out */
-    const struct sh_report *report; /* its stop is heeded; NULL: nothing stops */
+    const struct sh_report *report; /* its stop is obeyed; NULL: nothing stops */
     bool stopped;                   /* out: there are no triangles */
 };
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Faces that stand in a mesh twice. */
+/* Duplicate faces of a mesh. */
 #include <stdlib.h>
 #include <string.h>
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Where mirror and pan are at a pulse: for runs that are cast, and for the encoders. */
+/* Angles of mirror and pan at a pulse: for runs that are cast, and for the encoders. */
 #include <string.h>
 
 #include "core/schedule/schedule_inside.h"

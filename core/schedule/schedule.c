@@ -40,7 +40,7 @@ static void set_rates(struct schedule_segment *seg, const struct schedule_spec *
     seg->ns_rem = seg->tick_num % seg->tick_den;
 }
 
-/* Where the window goes across azimuth 0, a ring begins with its first step in it. */
+/* Where the window crosses azimuth 0, a ring begins with the window's first step. */
 static void set_sector(struct schedule_segment *seg, const struct schedule_spec *spec)
 {
     const uint64_t n = spec->emitter->steps, turn = (uint64_t)TURN_UDEG;
@@ -125,7 +125,8 @@ void schedule_change(struct schedule_segment *seg, const struct schedule_segment
     set_spec(&next, spec);
     next.k0 = k;
     next.t0_ns = schedule_time_ns(before, k);
-    /* The rest of a nanosecond goes over to the new rate, cut to a part of 1 / tick_den: it does not add up. */
+    /* The rest of a nanosecond is carried to the new rate, cut to a multiple of 1 / tick_den. The cuts do not
+     * accumulate. */
     u128 rest = (before->t0_acc + (u128)firing_ticks(before, k) * before->ns_rem) % before->tick_den;
     next.t0_acc = (uint64_t)(rest * next.tick_den / before->tick_den);
     next.line0 = n;

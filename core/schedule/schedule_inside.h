@@ -85,8 +85,8 @@ static inline uint32_t frame_of_line(const struct schedule_segment *seg, uint64_
 }
 
 /* angles.c: pan at pulse k, which belongs to the frame that begins with first_line: whole micro-degrees and
- * 2^-24 parts, rounded up, so that a frame that a change cuts in two never needs a line more for what was
- * rounded off. */
+ * 2^-24 parts. It is rounded up, so that a frame that a change cuts in two never needs another line because
+ * of rounding. */
 int64_t pan_fine(const struct schedule_segment *seg, uint64_t k, uint64_t first_line);
 
 #endif

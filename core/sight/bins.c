@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Which triangles may be seen in which region. */
+/* Finds which triangles may be seen in which region. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,8 +17,8 @@ struct range {
 #define BESIDE (1e6 * SIGHT_TILT_DOUBT)
 
 /* Whether all corners lie beyond one of the pyramid's four sides, or behind the station. a, b across, w along.
- * Corners that touch a side count as within: what is seen edge-on may be met a little beside its end (SIGHT_TILT_DOUBT,
- * over the sine of 1e-6 below which core/bvh holds ranges between edges). */
+ * Corners that touch a side count as within: a triangle seen edge-on may be hit a little beside its end. That is
+ * SIGHT_TILT_DOUBT over 1e-6, the sine below which core/bvh limits ranges to those between the edges. */
 static int is_beside(const double w[3], const double a[3], const double b[3], double far_m)
 {
     const double behind = -BESIDE * far_m;
@@ -67,7 +67,7 @@ static double farthest(double v[3][3])
     return far_m;
 }
 
-/* All of the face's regions where a corner lies behind the station, or almost. */
+/* The range is all of the face's regions where a corner lies behind the station, or almost. */
 static int range_of(double v[3][3], double far_m, uint32_t face, uint32_t regions, struct range *r)
 {
     const uint32_t axis = face / 2, n1 = (axis + 1) % 3, n2 = (axis + 2) % 3;
@@ -88,7 +88,7 @@ static uint32_t region_number(const struct build_shared *b, uint32_t face, uint3
     return (face * b->regions + v) * b->regions + u;
 }
 
-/* Directions of a region: its middle, and how far its corners lie from that. */
+/* Finds the regions where rays go, by a region's middle and the distance of its corners from it. */
 static void find_seen(struct build_shared *b)
 {
     const double half = 1.0 / b->regions;
@@ -156,7 +156,7 @@ int build_bins(struct build_shared *b, struct sh_err *err)
     if (b->seen == NULL || b->bin == NULL || b->kept == NULL)
         return sh_fail(err, SH_ENOMEM, "sight: no memory for %u regions", regions);
     find_seen(b);
-    /* Counted one place too far, so that each region's begin moves to its end while it is filled. */
+    /* Regions were counted one place further: filling a region moves its begin to its end. */
     b->bin++;
     int rc = put_all(b, 0, err);
     for (uint32_t i = 0; i < regions; i++)

@@ -2,9 +2,9 @@
 /* Private to core/sight: how a sight is made.
  *
  * Triangles are sorted into regions, squares of cells on the faces (bins.c). Each region is then divided as
- * Warnock's algorithm does (J. Warnock, A hidden surface algorithm, 1969): a square with the triangles that may
- * be seen in it is a leaf where one of them covers it all and hides the rest, or where there are none; else its
- * quarters are looked at, down to a cell (region.c). */
+ * Warnock's algorithm does (J. Warnock, A hidden surface algorithm, 1969): a square is a leaf where one of the
+ * triangles that may be seen in it covers it and hides the rest, or where there are none. Else its quarters are
+ * examined, down to a cell (region.c). */
 #ifndef CORE_SIGHT_BUILD_INSIDE_H
 #define CORE_SIGHT_BUILD_INSIDE_H
 
@@ -29,7 +29,7 @@ struct build_candidate {
     uint32_t record; /* BUILD_NO_RECORD: not yet in a list */
 };
 
-/* Arrays that all threads take from, and none may outgrow. */
+/* Arrays that all threads take elements from, up to a fixed size. */
 struct build_arena {
     _Atomic uint64_t used;
     uint64_t room; /* elements */
@@ -47,10 +47,10 @@ struct build_shared {
     uint32_t *binned;                /* triangles by region */
     _Atomic uint32_t next;           /* region to be divided */
     _Atomic uint64_t bytes;          /* taken, of spec->memory_bytes */
-    _Atomic uint64_t given_back;     /* of these, when all is done */
+    _Atomic uint64_t given_back;     /* of these, at the end */
     struct build_arena leaf, list, record;
     _Atomic uint64_t cells[4]; /* by what they say: one, nothing, few, ask */
-    int may_coarsen;           /* where the memory is full, it is better to begin again with larger cells */
+    int may_coarsen;           /* 1: where the memory is full, the build begins again with larger cells */
     _Atomic int full;          /* bytes would have become more than the memory */
     _Atomic int failed;        /* SH_ENOMEM, SH_ESTOPPED */
 };
@@ -64,7 +64,7 @@ int build_bins(struct build_shared *b, struct sh_err *err);
 /* ---- candidate.c */
 /* Corners relative to the station. */
 void sight_corners(const struct sight *sight, uint32_t triangle, double v[3][3]);
-/* Figures of triangles in many regions, ahead. */
+/* Computes the figures of triangles in many regions in advance. */
 void build_figures(struct build_shared *b);
 /* False where no ray meets the triangle: it has no area, or a corner is at the station. */
 int build_candidate(const struct build_shared *b, uint32_t face, uint32_t triangle, struct build_candidate *c);

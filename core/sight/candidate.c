@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The figures of a triangle as seen from the station: where it is, how far, and how well that is known. */
+/* The figures of a triangle as seen from the station: its directions, its distance, and the doubts of
+ * both. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,7 +8,7 @@
 #include "core/sight/build_inside.h"
 #include "core/vec3.h"
 
-/* Of triangles that lie in so many regions the figures are kept, where they take no larger share of the memory. */
+/* The figures of triangles in at least so many regions are kept, unless they take a larger share of the memory. */
 enum { MANY_REGIONS = 4, FIGURES_SHARE = 8 };
 
 void sight_corners(const struct sight *sight, uint32_t triangle, double v[3][3])
@@ -17,7 +18,7 @@ void sight_corners(const struct sight *sight, uint32_t triangle, double v[3][3])
         vec3_sub(scene->vertex_m[scene->triangle[triangle][i]], sight->station_m, v[i]);
 }
 
-/* A function linear in the direction, in the coordinates of a face. */
+/* Takes a function linear in the direction to the coordinates of a face. */
 static void to_face(const double f[3], uint32_t face, double out[3])
 {
     const uint32_t axis = face / 2;
@@ -57,7 +58,7 @@ static int set_plane(const struct sight *sight, struct build_candidate *c)
     const double height_m = fabs(off) / length;
     for (int i = 0; i < 3; i++)
         m[i] = p->n[i] / off;
-    if (!(vec3_length(m) < 1e300)) { /* the station lies in the plane: to be decided wherever its edges don't say */
+    if (!(vec3_length(m) < 1e300)) { /* the station lies in the plane: undecided unless the edges decide */
         c->plane[0] = c->plane[1] = c->plane[2] = c->slack = 0.0;
         c->graze = 1e300;
         return 1;
@@ -68,12 +69,12 @@ static int set_plane(const struct sight *sight, struct build_candidate *c)
     return 1;
 }
 
-/* A triangle of which double precision can't say from which side the station sees it: on which side of its edges a ray
- * passes has no sign. Two strips of directions hold all that may meet it; the narrower one takes the place of the
- * edges, so that what lies beside it is outside for certain, and nothing is inside.
- * - Those along the plane. What meets a plane at a larger angle does so where the ray begins (SIGHT_NEAR).
+/* For a triangle where double precision can't say from which side the station sees it, the sides of its edges have no
+ * certain sign. Two strips of directions each hold all rays that may hit it. The narrower one replaces the edges:
+ * directions beside it are certainly outside, and none is inside.
+ * - Directions along the plane. A ray at a larger angle hits the plane where the ray begins (SIGHT_NEAR).
  *   This also holds where the plane is at the station up to rounding.
- * - Those past the longest edge by no more than the triangle is wide: inside, the sides of all three edges together
+ * - Directions past the longest edge by at most the triangle's width: inside, the sides of all three edges together
  *   are n . d, and have one sign. */
 static void set_strip(const struct sight *sight, struct build_candidate *c, double v[3][3])
 {
@@ -100,7 +101,7 @@ static void set_strip(const struct sight *sight, struct build_candidate *c, doub
     }
 }
 
-/* A triangle with a corner at the station: rays begin on it, and meet it nowhere else. */
+/* Whether the triangle has a corner at the station: rays begin on it, and hit it nowhere else. */
 static int is_at_corner(double v[3][3])
 {
     for (int i = 0; i < 3; i++)
@@ -160,7 +161,8 @@ int build_candidate(const struct build_shared *b, uint32_t face, uint32_t triang
     return 1;
 }
 
-/* kept[i] is how many regions a triangle lies in; it becomes its place in figures. */
+/* Before, kept[i] is the number of regions that triangle i lies in; afterwards it is its place in
+ * figures. */
 void build_figures(struct build_shared *b)
 {
     const uint32_t n = bvh_scene(b->sight->bvh)->n_triangles;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Rays decided among a few triangles, by rules that sight_inside.h explains: four rays of a list at a time. */
+/* Decides rays among a few triangles, by the rules of sight_inside.h: four rays of a list at a time. */
 #include <math.h>
 #include <string.h>
 
@@ -8,19 +8,19 @@
 
 enum { LANES = QUAD_LANES };
 
-/* What rays make of the records of a list. Lane by lane. */
+/* Results of rays against the records of a list, lane by lane. */
 struct looks {
     quad x, y, z;
     quad q[SIGHT_MAX_LIST];                             /* of the records: 1 / range */
     quad_mask met[SIGHT_MAX_LIST], may[SIGHT_MAX_LIST]; /* the ray passes inside for certain; may do so */
     quad first_q;
-    quad_mask first, any; /* the one that comes first; something may be met */
+    quad_mask first, any; /* the record that comes first; something may be hit */
     quad_mask open, asks; /* not decided; nor to be decided in double */
 };
 
-/* Of each record, on which side of its edges the rays pass, and when they meet its plane. Which of those that are met
- * for certain comes first. Another one may come before that where it is met, or may be, and its plane does not lie
- * behind for certain. */
+/* Finds for each record on which side of its edges the rays pass, and where they hit its plane. Then it finds the
+ * first of the triangles that are certainly hit. Another one may come before that, where it is or may be hit and its
+ * plane is not certainly behind. */
 VEC_INLINE void look_at(const struct sight *s, const uint32_t *list, struct looks *w)
 {
     const quad x = w->x, y = w->y, z = w->z;
@@ -61,8 +61,8 @@ VEC_INLINE void look_at(const struct sight *s, const uint32_t *list, struct look
     w->open = open | asks | (any & (first >> 63));
 }
 
-/* Rays that meet several planes at the same place, all within the borders: by the rule of core/bvh, and by its
- * ranges. */
+/* Decides rays that hit several planes at the same place, all within the borders: by the rule of core/bvh, and
+ * by its ranges. */
 static uint32_t decide_tie(const struct sight *s, const struct bvh_rays *rays, const uint32_t *list,
                            const struct looks *w, int i)
 {

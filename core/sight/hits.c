@@ -10,7 +10,7 @@ struct sight_work {
     struct sight_places places;
     struct sight_run run[HITS_ROOM];
     uint32_t triangle[HITS_ROOM]; /* of a run's rays */
-    /* Rays that the BVH is asked for. */
+    /* Rays that go to the BVH. */
     uint8_t asks[HITS_ROOM]; /* 1: of the chunk's */
     uint32_t ray[HITS_ROOM]; /* which ones they are */
     double x[HITS_ROOM], y[HITS_ROOM], z[HITS_ROOM], range_m[HITS_ROOM];
@@ -42,7 +42,7 @@ static void ask(struct sight_work *w, uint32_t from, uint32_t to, uint32_t *aske
     *asked += to - from;
 }
 
-/* Rays that meet one of a few. What the records can't decide asks. */
+/* Decides rays that have a list. Rays that the records can't decide go to the BVH. */
 static void do_few(struct sight_work *w, const struct sight *s, const struct bvh_rays *rays,
                    const struct sight_run *run, uint32_t *asked)
 {
@@ -54,8 +54,8 @@ static void do_few(struct sight_work *w, const struct sight *s, const struct bvh
     }
 }
 
-/* What a run needs lies anywhere: where the map is larger than the cache each would wait for it. So it is asked for
- * ahead; first of lists how long they are, then their records. */
+/* The data of a run may lie anywhere: where the map is larger than the cache, each run would wait for it. So it is
+ * prefetched: first the lengths of lists, then their records. */
 enum { LISTS_AHEAD = 12, RECORDS_AHEAD = 6, RECORDS_EACH = 4 };
 
 static inline void ask_list(const struct sight *s, const struct sight_run *run)
@@ -77,7 +77,7 @@ static inline void ask_records(const struct sight *s, const struct sight_run *ru
     }
 }
 
-/* Later runs after earlier ones: bvh_ranges_of says why. */
+/* Runs are done in order, since bvh_ranges_of may overwrite later rays. */
 static uint32_t do_runs(struct sight_work *w, const struct sight *s, const struct bvh_rays *rays, uint32_t runs)
 {
     const struct sight_run *last = w->run + runs - 1;

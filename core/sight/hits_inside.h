@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/sight: how rays are looked up. Neighbours share a leaf, mostly: rays are cut into runs of one leaf,
- * and what a leaf says is done for a run at a time. */
+/* Private to core/sight: how rays are looked up. Neighbours mostly share a leaf. So rays are cut into runs of one
+ * leaf, and each run is decided at once. */
 #ifndef CORE_SIGHT_HITS_INSIDE_H
 #define CORE_SIGHT_HITS_INSIDE_H
 
 #include "core/sight/sight_inside.h"
 
-enum { HITS_ROOM = BVH_CHUNK + 48 }; /* arrays of a power of two would get into each other's way in a cache */
+enum { HITS_ROOM = BVH_CHUNK + 48 }; /* arrays of a power of two would collide in a cache */
 
 /* Rays from here on, up to the next run, have this leaf. */
 struct sight_run {
@@ -18,13 +18,13 @@ struct sight_places {
     int32_t tile[HITS_ROOM], within[HITS_ROOM];
     uint8_t changes[HITS_ROOM];
 };
-/* Cuts up to BVH_CHUNK rays into runs. Returns how many; one more then says where the last ends. */
+/* Cuts up to BVH_CHUNK rays into runs. Returns how many; one more entry marks the end of the last. */
 uint32_t sight_find_runs(const struct sight *sight, const struct vec3_in *dir, uint32_t n, struct sight_places *places,
                          struct sight_run *run);
 
 /* ---- few.c */
-/* Rays from .. to - 1, which have that list -> triangle[0 ..]: BVH_NO_TRIANGLE for nothing, FEW_OPEN where
- * the records can't decide. Returns whether any of them has that. */
+/* Decides rays from .. to - 1, which have that list, into triangle[0 ..]: BVH_NO_TRIANGLE for nothing,
+ * FEW_OPEN where the records can't decide. Returns whether any of them has that. */
 enum { FEW_OPEN = 0xfffffffe };
 int few_decide(const struct sight *sight, const struct bvh_rays *rays, const uint32_t *list, uint32_t from, uint32_t to,
                uint32_t *triangle);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/sight: four doubles at a time, by hand, where compilers leave a loop as it is. Vectors go by address:
- * compilers warn of a changed way to pass them where there is no AVX. */
+/* Private to core/sight: four doubles at a time, by hand, where compilers leave a loop as it is. Vectors are passed by
+ * address: without AVX, compilers warn of a changed calling convention. */
 #ifndef CORE_SIGHT_QUAD_H
 #define CORE_SIGHT_QUAD_H
 

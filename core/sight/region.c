@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A region, divided until its squares are leaves. */
+/* Divides a region until its squares are leaves. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -20,7 +20,7 @@ struct square {
 struct seen {
     uint32_t *list, n; /* numbers of candidates, with the bit COVERS where it does */
     uint32_t *above;   /* where the stack is free */
-    uint32_t cover;    /* hides all others that there are; or NO_CANDIDATE */
+    uint32_t cover;    /* hides all others of the list; or NO_CANDIDATE */
     uint32_t *leaf;    /* the leaf of this list, once it has been made; squares with the same list share it */
     uint32_t own_leaf;
 };
@@ -42,13 +42,14 @@ struct quarters {
     struct seen seen[4];
     quad u, v;   /* their middles */
     double half; /* of each, with the pad */
-    /* The planes of what covers each; cover is NO_CANDIDATE, and first 0, where nothing does. */
+    /* The plane of the candidate that covers each quarter; cover is NO_CANDIDATE, and first 0, where none
+     * does. */
     quad_mask cover;
     quad first, plane[3], slope, slack;
 };
 
-/* What becomes known of a candidate in the four quarters: outside, covers. */
-enum { OUTSIDE_BITS = 15, COVERS_SHIFT = 4 }; /* four bits each, a quarter each */
+/* Flags of a candidate in the four quarters: outside, covers. */
+enum { OUTSIDE_BITS = 15, COVERS_SHIFT = 4 }; /* four bits each, one a quarter */
 
 VEC_INLINE void at_middles(const double f[3], const struct quarters *four, quad *out)
 {
@@ -62,15 +63,15 @@ VEC_INLINE uint32_t bits_of(const quad_mask *which)
     return (uint32_t)(bit[0] | bit[1] | bit[2] | bit[3]);
 }
 
-/* Where the plane is seen at so small an angle, or from so near, that its distance says nothing: 0. */
+/* Whether a plane's distance can be used: 0 where it is seen at too small an angle, or from too near. */
 VEC_INLINE void find_clear(const struct build_candidate *c, const quad *middle, double half, quad_mask *clear)
 {
     const double r = c->plane_slope * half;
     *clear = (quad_mask)(*middle - r > 2.0 * c->graze) & (quad_mask)(*middle + r < SIGHT_NEAR);
 }
 
-/* Which candidates lie outside of each quarter, which cover it, and which of those comes first in its middle. Rays
- * here are 1 to sqrt(3) long, since a direction's largest component is 1: doubts count twice. */
+/* Finds which candidates lie outside of each quarter, which cover it, and which of those comes first in its
+ * middle. Rays here are 1 to sqrt(3) long, since a direction's largest component is 1. So doubts count twice. */
 VEC_INLINE void find_covers(const struct build_work *w, const struct seen *in, struct quarters *four)
 {
     quad first = {0.0, 0.0, 0.0, 0.0};
@@ -98,7 +99,7 @@ VEC_INLINE void find_covers(const struct build_work *w, const struct seen *in, s
     four->cover = cover;
 }
 
-/* The planes of what covers, side by side. Returns 0 where nothing covers anything. */
+/* Takes the planes of the covering candidates, side by side. Returns 0 where none covers a quarter. */
 VEC_INLINE int take_covers(const struct build_work *w, struct quarters *four)
 {
     const quad none = {0.0, 0.0, 0.0, 0.0};
@@ -116,8 +117,8 @@ VEC_INLINE int take_covers(const struct build_work *w, struct quarters *four)
     return any;
 }
 
-/* In which quarters all of a candidate lies behind what covers them. One that is seen at too small an angle is
- * compared as a whole. */
+/* Finds the quarters in which all of a candidate lies behind the covering one. A candidate seen at too small
+ * an angle is compared as a whole. */
 VEC_INLINE void find_behind(const struct build_candidate *c, const struct quarters *four, quad_mask *behind)
 {
     const double half = four->half;
@@ -133,7 +134,7 @@ VEC_INLINE void find_behind(const struct build_candidate *c, const struct quarte
               (~clear & (quad_mask)(c->near_m * (four->first - reach) > 2.0));
 }
 
-/* Of a square's candidates those that may be seen in each quarter. */
+/* Finds the candidates of a square that may be seen in each quarter. */
 VEC_CLONES
 static void look(const struct build_work *w, const struct seen *in, struct quarters *four)
 {
@@ -160,7 +161,7 @@ static void look(const struct build_work *w, const struct seen *in, struct quart
     }
 }
 
-/* A square's leaf: tiles as a whole, or in the block at hand. */
+/* Sets a square's leaf: of whole tiles, or in the current block. */
 static void put_leaf(const struct division *d, const struct square *q, uint32_t leaf)
 {
     struct sight *s = d->b->sight;
@@ -255,7 +256,7 @@ static void divide_quarters(struct division *d, const struct square *q, const st
     }
 }
 
-/* A tile whose leaves differ: they are made beside each other, and become a block. */
+/* Divides a tile whose leaves differ: they are made next to each other, and become a block. */
 static void divide_tile(struct division *d, const struct square *q, const struct seen *seen)
 {
     uint32_t block[SIGHT_BLOCK], same = 1;
@@ -278,8 +279,8 @@ static void divide_tile(struct division *d, const struct square *q, const struct
     put_leaf(d, q, (uint32_t)SIGHT_TILED << SIGHT_KIND_SHIFT | (uint32_t)at);
 }
 
-/* Where all that is left covers the square, a few of them, their planes cross or lie in each other: rays are
- * decided. */
+/* Where a few candidates are left and all cover the square, their planes cross or coincide: more division is
+ * useless, and rays are decided one by one. */
 static void divide(struct division *d, const struct square *q, const struct seen *seen)
 {
     if (seen->n == 0)
@@ -310,7 +311,7 @@ static size_t stacked(const struct build_shared *b, size_t n)
     return lists * n;
 }
 
-/* Whether the memory allows to divide a region of n triangles. What grows does so by half. */
+/* Whether there is memory to divide a region of n triangles. Arrays grow by half of their size. */
 static int may_take(struct build_shared *b, struct build_work *w, size_t n)
 {
     const uint64_t each = sizeof *w->candidate + sizeof *w->where;

@@ -35,7 +35,8 @@ static uint64_t tiles_of(uint32_t cells)
     return SIGHT_FACES * edge * edge;
 }
 
-/* So many that FEW_RAYS rays come to each, and that most of the memory is left for what they say. */
+/* So many cells that FEW_RAYS rays come to each, and that most of the memory is left for leaves and
+ * lists. */
 uint32_t sight_cells(double rays, uint64_t memory_bytes)
 {
     uint32_t cells = SIGHT_MIN_CELLS;
@@ -45,8 +46,8 @@ uint32_t sight_cells(double rays, uint64_t memory_bytes)
     return cells;
 }
 
-/* Arrays as large as they may become: what is never touched takes no memory. Large pages: they are filled at once, and
- * read at random. */
+/* Arrays have their largest size: pages that are never touched take no memory. They are in huge pages, since they are
+ * filled at once and read at random. */
 static void *take_array(struct build_shared *b, struct build_arena *arena, uint64_t most, uint64_t size)
 {
     const uint64_t within = b->spec->memory_bytes / size + 1;
@@ -71,7 +72,8 @@ static int take_arrays(struct build_shared *b, struct sh_err *err)
     return SH_OK;
 }
 
-/* Coarser cells, all of them, are better than some fine ones; but not if they have to be much coarser. */
+/* Coarser cells everywhere are better than fine ones in some places, unless they have to be much
+ * coarser. */
 static int is_too_fine(const struct build_shared *b)
 {
     return b->may_coarsen && atomic_load_explicit(&b->full, memory_order_relaxed);
@@ -178,7 +180,8 @@ static void free_arrays(struct sight *s)
     s->record = NULL;
 }
 
-/* With the cells at hand. TOO_FINE where the memory does not hold them, and may_coarsen. */
+/* Builds with the current number of cells. TOO_FINE where the memory does not hold them, and
+ * may_coarsen. */
 static int try_cells(struct sight *s, const struct sight_spec *spec, unsigned threads, const struct sh_report *report,
                      int may_coarsen, struct sh_err *err)
 {

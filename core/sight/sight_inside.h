@@ -11,13 +11,13 @@
  * edge, (a x (b - a)) . d, is positive inside; and plane . d = 1 / range.
  *
  * A face has cells x cells squares, in tiles of SIGHT_TILE x SIGHT_TILE. A tile is one leaf, or a block of
- * leaves. Whoever looks a direction up may round its coordinates: each leaf holds SIGHT_PAD beyond its own
+ * leaves. A look-up may round a direction's coordinates: each leaf is valid for SIGHT_PAD beyond its own
  * borders.
  *
- * Why a leaf says no more than is true. The hit of a ray, as core/bvh has it, depends on the triangles
- * that the ray meets or misses by less than double precision tells, and on where it meets their planes. So it
- * is enough to show that all other triangles of the scene leave the hit as it is. A triangle is left out of a
- * square only in one of three ways:
+ * Why leaves are right. The hit of a ray, as core/bvh has it, depends on the triangles that the ray meets or
+ * misses by less than double precision tells, and on where it meets their planes. So it is enough to show
+ * that all other triangles of the scene leave the hit as it is. A triangle is left out of a square only in
+ * one of three ways:
  * - Beside it (bins.c, region.c): the side of one edge is below minus its doubt at the four corners of the square,
  *   pad included. It is linear, so it is below that everywhere in the square: all rays miss the triangle, by more
  *   than core/bvh takes for a near miss. Regions hold every triangle whose corners are not all beyond one side of the
@@ -28,11 +28,11 @@
  *   so it comes later as well.
  * - Behind as a whole: where plane . d says nothing, since the plane is seen at a sine below SIGHT_GRAZE somewhere in
  *   the square, the triangle's nearest point is further away than what covers the square is anywhere.
- * What is left: one that covers is a leaf of its own; none at all is nothing; a few are decided ray by ray with the
- * same doubts (few.c); where a doubt remains, core/bvh decides. Planes seen at a sine below SIGHT_GRAZE neither
- * cover nor hide.
- * Doubts are per unit length of a ray. A ray whose largest component is 1 is up to sqrt(3) long: over squares they
- * count twice. */
+ * The leaf holds the triangles that are left: one that covers the square (SIGHT_ONE), none (SIGHT_NOTHING), or a
+ * few. A few are decided ray by ray with the same doubts (few.c). Where a doubt remains, core/bvh decides. Planes
+ * seen at a sine below SIGHT_GRAZE neither cover nor hide. A doubt bounds the rounding error of such a function,
+ * per unit length of a ray. A ray whose largest component is 1 is up to sqrt(3) long: over squares they count
+ * twice. */
 #ifndef CORE_SIGHT_SIGHT_INSIDE_H
 #define CORE_SIGHT_SIGHT_INSIDE_H
 
@@ -67,7 +67,7 @@ static inline enum sight_kind sight_kind(uint32_t leaf)
 /* A triangle of a list, as rays are decided. d is the ray's unit vector. Where q = plane . d:
  * - inside for certain: all of edge[k] . d >= 1. Outside for certain: one is <= -1. (Edges are divided by
  *   what double precision leaves in doubt, here and in core/bvh together.)
- * - not met at all for certain, or not to be decided here: q < graze, or q > SIGHT_NEAR.
+ * - certainly not hit, or not to be decided here: q < graze, or q > SIGHT_NEAR.
  * - of two triangles the one with the larger q comes first for certain where the q differ by more than
  *   slack + slack' + SIGHT_SAME q. */
 struct sight_record {
@@ -82,26 +82,29 @@ struct sight_record {
  * length: 10 units of 2^-53 here (the difference of the corners 1, the cross product 6, the product with a
  * direction 3), as many in core/bvh, and 8 more within which an edge that is missed there is nearly hit. */
 #define SIGHT_EDGE_DOUBT (32.0 * 0x1p-53)
-/* The doubt of a . (b x c), against the product of their lengths, here and in core/bvh together. */
+/* The doubt of a . (b x c), relative to the product of their lengths, here and in core/bvh together. */
 #define SIGHT_VOLUME_DOUBT (32.0 * 0x1p-53)
 /* How far the plane that core/bvh has of a triangle may lie off it, against its longest edge: far more than rounding
  * leaves. */
 #define SIGHT_TILT_DOUBT 0x1p-38
 /* Of plane . d, against the plane's length: its components 1, the product 3; twice, here and there. */
 #define SIGHT_PLANE_DOUBT (16.0 * 0x1p-53)
-/* Sines of angles below this are not decided here. Below 1e-6 core/bvh holds ranges between edges. */
+/* Planes seen at a smaller sine are not decided here. Below 1e-6 core/bvh limits ranges to those between
+ * the edges. */
 #define SIGHT_GRAZE 0x1p-15
 /* core/bvh takes ranges within 1e-12 of each other for the same: the lowest triangle wins. Above
  * this they are not for certain. */
 #define SIGHT_SAME 4e-12
-/* 1 / m. What a ray begins on it does not meet (BVH_AT_ORIGIN_M); nearer than twice that, the BVH decides. */
+/* 1 / m. A ray does not hit the surface that it begins on (BVH_AT_ORIGIN_M). Nearer than twice that, the BVH
+ * decides. */
 #define SIGHT_NEAR 1e6
 
 struct sight {
     const struct bvh *bvh;
     double station_m[3];
     uint32_t cells; /* power of two */
-    uint32_t *tile; /* [SIGHT_FACES][cells / SIGHT_TILE][cells / SIGHT_TILE], v outside, u inside; one that asks */
+    /* [SIGHT_FACES][cells / SIGHT_TILE][cells / SIGHT_TILE], v outside, u inside; one more that says SIGHT_ASK */
+    uint32_t *tile;
     uint32_t *leaf; /* blocks */
     uint32_t *list;
     struct sight_record *record;

@@ -49,7 +49,8 @@ int surface_table_set(struct surface_table *table, uint32_t label, const struct 
         for (int k = 0; k < FIELDS; k++)
             if (!isnan(said[k])) field[k] = said[k];
         memcpy(s, field, sizeof field);
-        /* A pane scatters what it doesn't pass on, as far as its colour says; a mirror is clean. */
+        /* A pane scatters light that it doesn't pass on, according to its colour; a mirror scatters
+         * none. */
         if (isnan(rule[found].surface.reflectance)) s->reflectance *= s->mirror > 0.0 ? 0.0 : 1.0 - s->glass;
     }
     table->has_lobes |= s->specular > 0.0 || s->retro > 0.0;

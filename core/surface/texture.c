@@ -34,7 +34,7 @@ static uint16_t as_texel(double reflectance)
     return (uint16_t)(1 + lround(65534.0 * fmin(1.0, fmax(0.0, reflectance))));
 }
 
-/* Alpha doesn't darken: what is not a hole has the colour that the image says. */
+/* Alpha doesn't darken: texels that are no hole have the colour of the image. */
 static void fill(struct surface_texture *t, const uint8_t *rgba, size_t n, const float colour[CHANNELS])
 {
     static const double weight[CHANNELS] = {0.2126, 0.7152, 0.0722};

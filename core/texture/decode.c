@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Images through stb_image, and WebP through libwebp, in memory that is counted: what a hostile file asks for has a limit. */
+/* Images through stb_image, and WebP through libwebp. Memory is counted, so that a hostile file can't ask for more than
+ * a limit. */
 #include "core/texture.h"
 
 #include <limits.h>
@@ -14,7 +15,7 @@
 /* A block's size stands before it. */
 enum { HEAD = 16 };
 static _Thread_local size_t memory_left;
-static _Thread_local int ran_out; /* something was refused for want of it */
+static _Thread_local int ran_out; /* memory was refused */
 
 static void *counted_realloc(void *old, size_t size)
 {
@@ -45,7 +46,7 @@ static void counted_free(void *p)
     free(block);
 }
 
-/* As a header of the system it gives no warnings; static, its functions that are left out would. */
+/* Included as a system header, so that unused static functions give no warnings. */
 #define STB_IMAGE_IMPLEMENTATION
 #define STBI_NO_STDIO
 #define STBI_NO_HDR
@@ -82,7 +83,7 @@ static int fail_read(const char *file, const char *why, struct sh_err *err)
                    why);
 }
 
-/* Blue, green, red, alpha to red, green, blue, alpha. */
+/* Turns blue, green, red, alpha into red, green, blue, alpha. */
 static int unpack(const struct texture_source *s, struct texture_image *image, struct sh_err *err)
 {
     size_t n = (size_t)s->raw_width * s->raw_height;
@@ -121,8 +122,8 @@ static int has_transparent_colour(const uint8_t *bytes, size_t n)
     return bytes[0] == 0x89 && memmem(bytes, data != NULL ? (size_t)(data - bytes) : n, "tRNS", 4) != NULL;
 }
 
-/* stb_image fills in what a TGA or BMP lacks, in silence. Both say the bits of a texel; of packed ones only what
- * no run can make is missed: they are as long as they are. */
+/* stb_image silently fills in what a TGA or BMP lacks. Unpacked files have a length that follows from the bits
+ * of a texel. A packed TGA is refused only where no runs could make so many texels, a packed BMP never. */
 static int is_cut_off(const uint8_t *bytes, size_t n, uint64_t texels)
 {
     if (n < 18 || bytes[0] == 0x89 || (bytes[0] == 0xff && bytes[1] == 0xd8)) return 0;
@@ -134,9 +135,9 @@ static int is_cut_off(const uint8_t *bytes, size_t n, uint64_t texels)
     return !is_packed && first + texels * bytes[is_bmp ? 28 : 16] / 8 > n;
 }
 
-/* A table of a JPEG's Huffman codes that says more than 256 of them: stb_image 2.27 writes them all, past
- * the end of its array. Every place that looks like such a table is asked, since a decoder may get to any
- * of them. */
+/* Whether a JPEG has a table with more than 256 Huffman codes: stb_image 2.27 writes them all, past the
+ * end of its array. Each place that looks like such a table is checked, since a decoder may get to any of
+ * them. */
 static int has_long_table(const uint8_t *bytes, size_t n)
 {
     const uint8_t *end = bytes + n, *marker = bytes;
@@ -155,8 +156,9 @@ static int has_long_table(const uint8_t *bytes, size_t n)
     return 0;
 }
 
-/* As stb_image loads a JPEG, but for the tables that a file uses and does not define: stb_image leaves them as the memory was,
- * and goes by them past their ends. Here they are empty, so that a code of theirs is one that no table has. */
+/* Loads a JPEG as stb_image does, but clears the tables first. Tables that a file uses and does not define are
+ * uninitialised in stb_image, which then reads past their ends. Here they are empty, so that none of their codes is
+ * known. */
 static uint8_t *load_jpeg(stbi__context *s, int *width, int *height, int *channels)
 {
     int no_codes[16] = {0};
@@ -193,7 +195,7 @@ static int is_jpeg(const uint8_t *bytes, size_t n)
     return n > 3 && bytes[0] == 0xff && bytes[1] == 0xd8;
 }
 
-/* The segment of a JPEG that says its size, or NULL: frames have the markers 0xc0 to 0xcf but for three. */
+/* The segment of a JPEG with its size (SOF), or NULL. Its markers are 0xc0 to 0xcf, except three. */
 static const uint8_t *find_frame(const uint8_t *bytes, size_t n)
 {
     for (size_t at = 2; at + 9 <= n && bytes[at] == 0xff;) {
@@ -205,8 +207,8 @@ static const uint8_t *find_frame(const uint8_t *bytes, size_t n)
     return NULL;
 }
 
-/* stb_image refuses sizes of PNG and JPEG that are too large itself, and goes on to ask the other formats, so that its
- * reason is another one. */
+/* stb_image itself refuses PNG and JPEG that are too large. But it then tries the other formats, so that its reason is
+ * a wrong one. */
 static int check_header(const char *file, const uint8_t *bytes, size_t n, struct sh_err *err)
 {
     const uint8_t *frame = is_jpeg(bytes, n) ? find_frame(bytes, n) : NULL;
@@ -218,8 +220,8 @@ static int check_header(const char *file, const uint8_t *bytes, size_t n, struct
     return check_size(file, side[0], side[1], err);
 }
 
-/* As stbi_info_from_memory, with the reason of the format that the file is of. A BMP's height is negative where its rows
- * come from the top. */
+/* As stbi_info_from_memory, with the reason of the file's own format. A BMP's height is negative where its rows begin
+ * at the top. */
 static int get_info(const uint8_t *bytes, size_t n, int *width, int *height, int *channels)
 {
     stbi__context s;
@@ -231,7 +233,7 @@ static int get_info(const uint8_t *bytes, size_t n, int *width, int *height, int
     return 1;
 }
 
-/* Containers that name themselves and that nobody reads here. */
+/* The names of formats that are recognised but not read here. */
 static const char *unread_kind(const uint8_t *bytes, size_t n)
 {
     if (n >= 12 && memcmp(bytes, "\xabKTX 20\xbb\r\n\x1a\n", 12) == 0) return "it is KTX2";
@@ -245,7 +247,7 @@ static int is_webp(const uint8_t *bytes, size_t n)
     return n >= 12 && memcmp(bytes, "RIFF", 4) == 0 && memcmp(bytes + 8, "WEBP", 4) == 0;
 }
 
-/* Memory that libwebp takes besides goes by the size, which is checked before. */
+/* libwebp's other memory depends on the image's size, which is checked before. */
 static int decode_webp(const struct texture_source *source, const uint8_t *bytes, size_t n_bytes,
                        struct texture_image *image, struct sh_err *err)
 {

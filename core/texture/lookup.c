@@ -10,7 +10,7 @@ struct texture_mask {
     uint64_t hole[]; /* bit i % 64 of word i / 64: texel i */
 };
 
-/* Where along a side of n texels; -1: beyond a decal's. */
+/* The texel along a side of n; -1: beyond a decal. */
 static int64_t along(double x, uint32_t n, enum texture_wrap wrap)
 {
     double turn = floor(x), part = x - turn;
@@ -32,7 +32,7 @@ static int64_t along(double x, uint32_t n, enum texture_wrap wrap)
     return at < (int64_t)n ? at : (int64_t)n - 1; /* at the end, or rounded to it */
 }
 
-/* From the top, so that what lies on a border of two rows belongs to the upper one, as ever. */
+/* Counted from the top, so that a point on the border of two rows belongs to the upper one. */
 static int64_t down(double y, uint32_t n, enum texture_wrap wrap)
 {
     double turn = floor(y), part = y - turn;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Cells by libtiff, row by row: whatever is packed, predicted, striped or tiled comes as plain numbers of this machine. */
+/* Reads cells by libtiff, row by row: packed, predicted, striped and tiled ones alike become plain numbers. */
 #include "core/import/geotiff/geotiff_read.h"
 
 #include <math.h>
@@ -105,7 +105,7 @@ static int has_mask_beside(const struct raster *r)
     return is_there;
 }
 
-/* Other images of the file: smaller ones of the same are left, a mask would be holes, others are not looked at. */
+/* Checks the other images of the file: smaller copies are ignored, a mask would be holes, others are not read. */
 static int look_at_others(struct raster *r, struct sh_err *err)
 {
     unsigned n = 0, n_masks = has_mask_beside(r) ? 1 : 0;
@@ -159,7 +159,7 @@ static int check_band(struct raster *r, struct sh_err *err)
         r->bits, r->format);
 }
 
-/* Vertices, triangles and labels, here and on their way back. */
+/* Checks the memory for vertices, triangles and labels, here and on their way back. */
 static int check_memory(struct raster *r, struct sh_err *err)
 {
     const struct scene *s = NULL;
@@ -237,7 +237,8 @@ static double height_of(const struct raster *r, const uint8_t *p)
     return isfinite(value) && value != r->no_data ? r->g.height_m + r->g.height_scale_m * value : NAN;
 }
 
-/* The cells of the block at a column and row. One without bytes is left out by who wrote the file: it has no heights. */
+/* The cells of the block at a column and row. A block without bytes was left out by the writer of the file: it has no
+ * heights. */
 static int read_block(struct raster *r, uint32_t x, uint32_t y, struct sh_err *err)
 {
     const int is_tiled = r->lib.TIFFIsTiled(r->tif);
@@ -337,7 +338,7 @@ static int count_alone(struct raster *r, struct sh_err *err)
     return SH_OK;
 }
 
-/* Values that mean no height, as a rule, where the file doesn't say so. There are none of these on the Earth. */
+/* Warns of values that usually mean no height, where the file doesn't say so. No place on the Earth has them. */
 static void doubt_heights(const struct raster *r)
 {
     const int is_low = r->lowest < -11500.0 || r->lowest == -9999.0;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/import/gltf: a glTF 2.0 file on its way into a scene. All of it is read in a process of its own, as what
- * Assimp reads is: limits and clean-up of memory after a crash are that process's. Indices, counts and offsets come from the
- * file: nothing is used before it is checked. */
+/* Private to core/import/gltf: reads a glTF 2.0 file into a scene. As with Assimp, all of it is read in a process of
+ * its own: that has the limits, and its end frees memory after a crash. Indices, counts and offsets come from the file:
+ * none is used before it is checked. */
 #ifndef CORE_IMPORT_GLTF_GLTF_H
 #define CORE_IMPORT_GLTF_GLTF_H
 
@@ -22,7 +22,7 @@ struct gltf_bytes {
     size_t n;
 };
 
-/* Bytes that are there once, however often they are asked for. */
+/* Bytes that are kept once, however often they are asked for. */
 struct gltf_kept {
     struct gltf_bytes bytes;
     void *own; /* to be freed; NULL: they are part of something else */
@@ -83,7 +83,7 @@ int gltf_numbers(struct gltf *g, const json_t *of, const char *key, const char *
 int gltf_list(struct gltf *g, const json_t *of, const char *key, const char *at, json_t **out);
 /* An object; NULL where it isn't there. */
 int gltf_child(struct gltf *g, const json_t *of, const char *key, const char *at, json_t **out);
-/* NULL where it isn't there, or is none. */
+/* NULL where there is no such extension. */
 json_t *gltf_extension(const json_t *of, const char *name);
 const char *gltf_text(const json_t *of, const char *key);
 
@@ -96,20 +96,21 @@ int gltf_buffer(struct gltf *g, uint32_t buffer, struct gltf_bytes *out);
 
 /* ---- gltf_uri.c */
 
-/* Whether the URI has its data within. */
+/* Whether the URI contains its data. */
 bool gltf_uri_is_data(const char *uri);
-/* Decodes such a one; *own is to be freed. */
+/* Decodes a URI that contains its data; *own is to be freed. */
 int gltf_uri_data(struct gltf *g, const char *uri, const char *at, void **own, struct gltf_bytes *out);
-/* A name of a file, in the words of the file system (%20); to be freed. NULL: no memory. */
+/* The file name that a URI stands for, with %20 and the like decoded; to be freed. NULL: no memory. */
 char *gltf_uri_name(const char *uri);
 
-/* ---- gltf_extensions.c: refuses what is required and not known; warns of others that are not known. */
+/* ---- gltf_extensions.c: refuses unknown extensions that are required; warns of other unknown ones. */
 int gltf_check_extensions(struct gltf *g);
 /* Whether a material has its colours by shaders, which are not read. */
 bool gltf_is_by_shaders(const json_t *material);
 bool gltf_is_required(const struct gltf *g, const char *extension);
 
-/* ---- gltf_indices.c: warns of indices that name nothing, wherever they are. What is drawn has none: there they are errors. */
+/* ---- gltf_indices.c: warns of indices that name nothing, in all of the file. In what is drawn, such indices are
+ * errors. */
 void gltf_say_indices(const struct gltf *g);
 
 /* ---- gltf_meshopt.c: decodes a buffer view, `more` is its extension. */
@@ -140,14 +141,14 @@ int gltf_buffer_view(struct gltf *g, uint32_t view, struct gltf_bytes *out, uint
 int gltf_view_open(struct gltf *g, uint32_t accessor, const char *type, struct gltf_view *out);
 /* Component k of element i; normalized ones are -1 to 1. */
 double gltf_value(const struct gltf_view *v, uint32_t i, uint32_t k);
-/* Whole numbers are good to half of this. 0: they are floats. */
+/* Whole numbers have an error of up to half of this. 0: they are floats. */
 double gltf_step(const struct gltf_view *v);
 
 /* ---- gltf_nodes.c */
 
 void gltf_multiply(const gltf_matrix a, const gltf_matrix b, gltf_matrix out);
 void gltf_apply(const gltf_matrix m, const double v[3], double out[3]);
-/* Translation, rotation (x, y, z, w) and scale as a matrix. False: the rotation is none. */
+/* Translation, rotation (x, y, z, w) and scale as a matrix. False: r is no rotation. */
 bool gltf_compose(const double t[3], const double r[4], const double s[3], gltf_matrix out);
 /* Finds where each node is. */
 int gltf_place_nodes(struct gltf *g);
@@ -165,20 +166,20 @@ struct gltf_target {
 
 struct gltf_pose {
     struct gltf_view position;
-    struct gltf_target *target; /* those that count */
+    struct gltf_target *target; /* those with an effect */
     size_t n_targets;
-    gltf_matrix *joint, *reach; /* [n_joints] NULL: no skin. reach: the sizes of what is summed up in joint */
+    gltf_matrix *joint, *reach; /* [n_joints] NULL: no skin. reach: joint's sums, of absolute values */
     uint32_t n_joints;
     struct gltf_view joints[GLTF_MAX_SETS], weights[GLTF_MAX_SETS];
     uint32_t n_sets;
-    double most[3];   /* |coordinate| of what is summed up to a position before joints move it */
-    double most_bent; /* |coordinate| of what is summed up where joints move it */
+    double most[3];   /* |coordinate| of the terms of a position before joints move it */
+    double most_bent; /* |coordinate| of the terms where joints move it */
 };
 int gltf_pose_open(struct gltf *g, const json_t *node, const json_t *mesh, const json_t *primitive, const char *at,
                    struct gltf_pose *pose);
 /* Vertex i < position.count, in the frame of the node, or of the scene where there is a skin. */
 int gltf_pose_vertex(struct gltf *g, struct gltf_pose *pose, uint32_t i, double out[3]);
-/* Adds what rounding has done to vertices, once `world` has placed them. */
+/* Adds the rounding error of vertices, once `world` has placed them. */
 void gltf_pose_error(struct gltf *g, const struct gltf_pose *pose, const gltf_matrix world);
 void gltf_pose_close(struct gltf_pose *pose);
 
@@ -189,7 +190,7 @@ struct gltf_look {
     uint16_t label;
     bool has_texture;
     uint32_t uv_set;
-    double uv[2][3]; /* rows of what a texture coordinate goes through */
+    double uv[2][3]; /* rows of the transform of texture coordinates */
 };
 int gltf_name_materials(struct gltf *g);
 /* object: its name. */

@@ -93,7 +93,7 @@ static int open_elements(struct gltf *g, const json_t *of, const char *at, uint3
     return SH_OK;
 }
 
-/* ---- sparse ones: a copy in which some elements are others */
+/* ---- sparse ones: a copy in which some elements are replaced */
 
 static int put_sparse(struct gltf *g, const json_t *sparse, const char *at, const struct gltf_view *v, uint32_t size,
                       uint8_t *to)

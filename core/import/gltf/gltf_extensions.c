@@ -11,9 +11,10 @@ static const char *const known[] = {
     /* read */
     "KHR_mesh_quantization", "KHR_texture_transform", "KHR_node_visibility", "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression", "KHR_meshopt_compression", "EXT_texture_webp", "KHR_draco_mesh_compression",
-    /* other images than those that are read: or colours by shaders: said where one is missed */
+    /* other image formats than those that are read, or colours by shaders: a warning comes where one is
+     * missed */
     "KHR_techniques_webgl", "KHR_technique_webgl", "KHR_texture_basisu", "EXT_texture_avif", "MSFT_texture_dds",
-    /* A laser sees nothing of these: lights, gloss, movement, levels of detail, what a program says of objects. */
+    /* These make no difference to a laser: lights, gloss, movement, levels of detail, metadata of objects. */
     "KHR_materials_*", "ADOBE_materials_*", "NV_materials_mdl", "KHR_lights_*", "EXT_lights_*", "KHR_animation_pointer",
     "KHR_xmp", "KHR_xmp_json_ld", "KHR_node_selectability", "KHR_node_hoverability", "KHR_interactivity", "KHR_audio*",
     "KHR_physics_*", "OMI_*", "MSFT_lod", "MSFT_packing_*", "MSFT_audio_emitter", "AGI_articulations",
@@ -85,7 +86,7 @@ static int check_for_assimp(struct gltf *g, const json_t *required)
     return SH_OK;
 }
 
-/* Whether the positions of a primitive are there only as Draco packs them. */
+/* Whether a primitive has its positions only in Draco's form. */
 static bool is_packed(const struct gltf *g, const json_t *primitive)
 {
     const json_t *at = json_object_get(json_object_get(primitive, "attributes"), "POSITION");
@@ -95,7 +96,7 @@ static bool is_packed(const struct gltf *g, const json_t *primitive)
            json_object_get(position, "bufferView") == NULL && json_object_get(position, "sparse") == NULL;
 }
 
-/* Draco need not be required where other accessors stand for it; some writers leave out both. */
+/* A file need not require Draco where it has plain accessors, too. Some writers leave out both. */
 static bool has_packed(const struct gltf *g)
 {
     const json_t *meshes = json_object_get(g->root, "meshes");

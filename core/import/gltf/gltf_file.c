@@ -69,7 +69,7 @@ static int check_version(struct gltf *g)
     return SH_OK;
 }
 
-/* As whole numbers of any size come as doubles, they need not fit into 64 bits. */
+/* Whole numbers are read as doubles, so they need not fit into 64 bits. */
 static int parse(struct gltf *g, struct gltf_bytes json)
 {
     json_error_t error;
@@ -143,7 +143,7 @@ static char *beside(const struct gltf *g, const char *name)
     return asprintf(&path, "%.*s%s", folder, mesh, name) >= 0 ? path : NULL;
 }
 
-/* A name as it is written, for writers that escape nothing, where there is no other. */
+/* Tries the unescaped name, too, for writers that escape nothing. */
 static int read_file(struct gltf *g, const char *uri, struct gltf_kept *out)
 {
     struct text t = {0};
@@ -192,7 +192,7 @@ static int open_buffer(struct gltf *g, uint32_t buffer, struct gltf_kept *out)
     return rc;
 }
 
-/* Its errors are not those of the mesh that asks first. */
+/* Errors of a buffer don't name the mesh that happens to need it first. */
 int gltf_buffer(struct gltf *g, uint32_t buffer, struct gltf_bytes *out)
 {
     const char *mesh = g->b->mesh;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Indices of the whole file, also of what no scene draws: each that names nothing is counted, and the first one named. What is
- * drawn is an error once it is read; this says the rest. */
+/* Checks indices of the whole file, also where no scene draws them: those that name nothing are counted, and the first
+ * one is named. In drawn parts such an index is an error when it is read; this warns of the rest. */
 #include "core/import/gltf/gltf.h"
 
 #include <math.h>
@@ -9,7 +9,8 @@
 
 enum { MAX_DEPTH = 12 };
 
-/* A key that holds an index, or a list of them, by the object's own key where it has another meaning elsewhere. */
+/* Keys that hold an index, or a list of them. Where a key has another meaning elsewhere, the object's own key is
+ * given, too. */
 static const struct {
     const char *key, *within, *list;
 } indices[] = {{"mesh", NULL, "meshes"},
@@ -29,7 +30,7 @@ static const struct {
                {"bufferView", NULL, "bufferViews"},
                {"buffer", NULL, "buffers"}};
 
-/* Their other keys mean what they will, or nothing that is read. */
+/* Objects under these keys may have keys of any meaning, or are not read. */
 static const char *const passed_over[] = {"extras",     "animations", "asset", "extensionsUsed",
                                           "attributes", "targets",    NULL};
 static const char *const entered[] = {"EXT_mesh_gpu_instancing",
@@ -60,7 +61,7 @@ static void look_at(struct search *s, const json_t *value, const char *list, con
     const double number = json_number_value(value);
     const size_t n = json_array_size(json_object_get(s->g->root, list));
     if (json_is_number(value) && number >= 0.0 && number < (double)n && floor(number) == number) return;
-    if (!json_is_number(value) || s->n++ > 0) return; /* what is no number is an error where it is read */
+    if (!json_is_number(value) || s->n++ > 0) return; /* a value that is no number is an error where it is read */
     s->first = gltf_at("%s", at);
     s->number = number;
     s->list = list;

@@ -13,8 +13,8 @@ enum { CLAMP_TO_EDGE = 33071, MIRRORED_REPEAT = 33648 };
 
 /* ---- what the format allows */
 
-/* glTF 2.0, material: base colour and transmission are 0..1, a cutoff is not negative, and there are three modes. What is not so
- * is left out; it is counted here, and the first one is named. */
+/* glTF 2.0, material: base colour and transmission are 0..1, a cutoff is not negative, and there are three modes. Other
+ * values are left out and counted; the first one is named. */
 static void note(struct gltf *g, bool is_allowed, const char *key, uint32_t material)
 {
     if (is_allowed || g->n_odd++ > 0) return;
@@ -104,7 +104,7 @@ static int read_wrap(struct gltf *g, const json_t *texture, const char *at, stru
     return rc;
 }
 
-/* A name that escapes characters, unless there is a file with the name as it is written. */
+/* Decodes escaped characters in a file's name, unless a file has the name as it is written. */
 static int add_file(struct gltf *g, const char *uri, struct build_image *image, uint16_t *number)
 {
     char *name = gltf_uri_name(uri);
@@ -147,7 +147,8 @@ static int add_image(struct gltf *g, uint32_t i, struct build_image *image, uint
 
 /* ---- textures */
 
-/* Where the only image is one that nobody reads here: an error where its colours are wanted and the file requires them. */
+/* The texture's only image has a format that isn't read: an error where its colours are wanted and the file requires
+ * them. */
 static int miss_image(struct gltf *g, const json_t *texture, const char *at)
 {
     const char *name = json_object_iter_key(json_object_iter(json_object_get(texture, "extensions")));
@@ -199,7 +200,7 @@ static int read_lay(struct gltf *g, const json_t *info, const char *at, struct g
 
 /* ---- materials */
 
-/* As the format says of each material. */
+/* The opacity below which a material has holes, as the format says. */
 static float solid_of(const json_t *material)
 {
     const char *mode = gltf_text(material, "alphaMode");

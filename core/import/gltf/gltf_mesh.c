@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The primitives of a mesh into the builder, of any mode. A vertex is added when a triangle first has it: primitives may share
- * accessors that are much larger than they are. */
+/* The primitives of a mesh into the builder, of any mode. A vertex is added when a triangle first uses it: primitives
+ * may share accessors that are much larger than themselves. */
 #include "core/import/gltf/gltf.h"
 
 #include <math.h>
@@ -72,7 +72,7 @@ static int add_triangle(struct part *p, const uint32_t corner[3])
     return rc;
 }
 
-/* Corners that are no whole triangle count as one that is left out. */
+/* Left-over corners that make no whole triangle count as one triangle left out. */
 static int add_triangles(struct part *p, uint32_t mode, uint32_t n)
 {
     const uint32_t n_triangles = mode == TRIANGLES ? n / 3 : n > 2 ? n - 2 : 0;

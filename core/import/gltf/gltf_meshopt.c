@@ -13,7 +13,7 @@ struct packed {
     const char *mode, *filter;
 };
 
-/* meshoptimizer asserts the sizes that it is called with, so that they are looked at before. */
+/* meshoptimizer asserts the sizes that it gets, so they are checked before. */
 static bool sizes_fit(const struct packed *p)
 {
     const bool is_vertices = strcmp(p->mode, "ATTRIBUTES") == 0;
@@ -24,7 +24,7 @@ static bool sizes_fit(const struct packed *p)
     return strcmp(p->filter, "QUATERNION") != 0 || (is_vertices && p->stride == 8);
 }
 
-/* 0, or what the decoder makes of damage. */
+/* 0, or the decoder's error code for damaged data. */
 static int decode(const struct packed *p, void *out)
 {
     const size_t n = (size_t)p->count, size = (size_t)p->stride;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The tree of nodes, in double. A node has one parent at most, and none above it is itself: the file is refused else, so that
- * the walk ends. No recursion: a chain may be as long as the file. */
+/* The tree of nodes, in double. A node has at most one parent, and is not above itself. Other files are refused, so
+ * that the walk ends. No recursion: a chain may be as long as the file. */
 #include "core/import/gltf/gltf.h"
 
 #include <math.h>
@@ -40,7 +40,7 @@ bool gltf_compose(const double t[3], const double r[4], const double s[3], gltf_
     return true;
 }
 
-/* Columns of the file; its last row is 0, 0, 0, 1 but for what single precision has left of that. */
+/* Takes the file's columns; the last row is 0, 0, 0, 1 up to rounding to single precision. */
 static int take_matrix(struct gltf *g, const double in[16], const char *at, gltf_matrix out)
 {
     if (fabs(in[3]) + fabs(in[7]) + fabs(in[11]) + fabs(in[15] - 1.0) > 1e-6)
@@ -88,7 +88,7 @@ static uint32_t child_of(const json_t *children, size_t k)
     return (uint32_t)json_number_value(json_array_get(children, k));
 }
 
-/* All below a node without a parent. stack: [n_nodes] */
+/* Places all nodes below a node without a parent. stack: [n_nodes] */
 static void place_tree(struct gltf *g, const json_t *nodes, uint32_t root, uint32_t *stack)
 {
     size_t n = 0;
@@ -191,8 +191,8 @@ static bool is_hidden(const json_t *node)
     return json_is_false(json_object_get(gltf_extension(node, "KHR_node_visibility"), "visible"));
 }
 
-/* A node's own mesh first, then its children in their order: stack holds what is still to come, [n_nodes]. What is below a
- * hidden node is hidden. */
+/* Draws a node's own mesh first, then its children in their order. stack[n_nodes] holds the nodes still to come. Nodes
+ * below a hidden one are hidden. */
 static int draw_tree(struct gltf *g, const json_t *nodes, uint32_t root, uint32_t *stack)
 {
     size_t n = 0;

@@ -55,7 +55,7 @@ static int open_targets(struct gltf *g, const json_t *node, const json_t *mesh, 
 
 /* ---- skins */
 
-/* The sum of a product without signs: rounding of single precision is a part of that. */
+/* A product of matrices with absolute values: the rounding of single precision is a share of it. */
 static void take_reach(const gltf_matrix world, const gltf_matrix bind, gltf_matrix out)
 {
     gltf_matrix a, b;
@@ -169,7 +169,7 @@ static void morph(struct gltf_pose *pose, uint32_t i, double out[3])
     }
 }
 
-/* Adds what a joint makes of p. */
+/* Adds the weighted image of p by a joint. */
 static void add_joint(const struct gltf_pose *pose, uint32_t joint, double weight, const double p[3], double moved[3],
                       double reach[3])
 {
@@ -183,7 +183,7 @@ static void add_joint(const struct gltf_pose *pose, uint32_t joint, double weigh
     }
 }
 
-/* Weights are 1 in sum but for rounding, which the division takes back. */
+/* The sum of weights is 1 up to rounding, which the division removes. */
 static int bend(struct gltf *g, struct gltf_pose *pose, uint32_t i, double p[3])
 {
     double sum = 0.0, moved[3] = {0, 0, 0}, reach[3] = {0, 0, 0};

@@ -15,7 +15,7 @@ bool gltf_is_name(const char *file)
     return dot != NULL && (strcasecmp(dot, ".gltf") == 0 || strcasecmp(dot, ".glb") == 0);
 }
 
-/* Says what was left out or taken otherwise, a line for each kind. */
+/* Warns of what was left out or changed, one line for each kind. */
 static void say_counts(const struct gltf *g)
 {
     const struct sh_report *report = g->b->report;
@@ -41,7 +41,7 @@ static void say_counts(const struct gltf *g)
                 g->n_odd, g->n_odd > 1 ? "s" : "", g->odd);
 }
 
-/* Whole numbers are as the file's writer has made them: never refused. */
+/* The error of whole numbers is the writer's choice: it is never refused. */
 static int say_errors(struct gltf *g)
 {
     struct scene_build *b = g->b;
@@ -64,7 +64,7 @@ static int read_scene(struct gltf *g)
     return rc;
 }
 
-/* A file that is not as it should be: its words, and what to do. */
+/* Adds advice to the error of a faulty file. */
 static int say_what_to_do(int rc, struct sh_err *err)
 {
     const struct sh_err said = *err;

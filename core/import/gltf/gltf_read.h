@@ -8,7 +8,8 @@
 /* Whether the file is one, by its ending. */
 bool gltf_is_name(const char *file);
 
-/* Fills b as a reader does, in the process that reads. What Assimp is to read (glTF 1.0, Draco) it hands to import_assimp. */
+/* Fills b as a reader does, in the process that reads. Files that Assimp has to read (glTF 1.0, Draco) go to
+ * import_assimp. */
 int import_gltf(struct scene_build *b, struct sh_err *err);
 
 #endif

@@ -11,7 +11,7 @@ bool gltf_uri_is_data(const char *uri)
     return strncasecmp(uri, "data:", 5) == 0;
 }
 
-/* %XX is one byte; what else follows a % is as it stands. A NUL would end the name: it stays as it is written. */
+/* %XX is one byte; any other % stays as it is. %00 stays, too, since a NUL would end the name. */
 static size_t unescape(const char *in, char *out)
 {
     char *to = out;
@@ -46,7 +46,7 @@ static int sextet_of(char c)
                                   : -1;
 }
 
-/* The place of the first character that is none of base64; NULL: all are. */
+/* Decodes base64. Returns the first character that is not base64; NULL: all are. */
 static const char *decode_base64(const char *in, uint8_t *out, size_t *n)
 {
     uint32_t bits = 0;

@@ -22,7 +22,7 @@ struct ifc_part {
 struct ifc_figures {
     double area_m2, volume_m3; /* signed: above 0 where the faces look outward */
     double min_m[3], max_m[3];
-    double open_m2; /* about what closes it; rounding leaves some 1e-7 of the area */
+    double open_m2; /* an estimate of the area that would close it; rounding leaves some 1e-7 of the area */
 };
 
 struct ifc_body {
@@ -33,7 +33,7 @@ struct ifc_body {
     struct ifc_figures figures;
 };
 
-/* All that one reader has made. */
+/* All bodies of one reader. */
 struct ifc_bodies {
     uint8_t *bytes; /* of the file; parts point into it */
     size_t size;

@@ -4,7 +4,7 @@
 #include <math.h>
 
 /* Facets of curves explain this much of an area or a volume: 24 sides for a circle lack 1.1 % of its area, and half the
- * sides in each direction of a sphere twice that. Without curves, what rounding explains. */
+ * sides in each direction of a sphere twice that. Without curves, only rounding is allowed. */
 #define CURVED_SHARE     0.03
 #define PLAIN_SHARE      1e-4
 #define BOX_M            0.01
@@ -35,8 +35,8 @@ static bool areas_differ(const struct ifc_figures *a, const struct ifc_figures *
     return fabs(a->volume_m3 - b->volume_m3) > share * fmax(fabs(a->volume_m3), fabs(b->volume_m3));
 }
 
-/* Chooses between two closed bodies that differ, or two open ones. A failure that one admits counts against it. ifc-lite rounds points
- * beyond 1 km, web-ifc more often gets a profile or a cut wrong. */
+/* Chooses between two closed bodies that differ, or two open ones. A failure that a reader reports counts against it.
+ * ifc-lite rounds points beyond 1 km, web-ifc more often gets a profile or a cut wrong. */
 static enum ifc_source doubtful(const struct ifc_product *product, const struct ifc_body *web,
                                 const struct ifc_body *lite)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Chooses each product's body of two readings, by rules that core/import/ifc/README.md has. */
+/* Chooses each product's body from two readings, by the rules of core/import/ifc/README.md. */
 #ifndef CORE_IMPORT_IFC_IFC_CHOOSE_H
 #define CORE_IMPORT_IFC_IFC_CHOOSE_H
 
@@ -20,7 +20,7 @@ enum ifc_finding {
     IFC_CLOSED_LITE, /* likewise */
     IFC_OPEN,        /* both make the same, which is open */
     IFC_FAILED,      /* the one that is taken admits a failure */
-    IFC_UNCUT,       /* an opening, by the records, of nothing */
+    IFC_UNCUT,       /* the records have an opening that cuts nothing */
     IFC_FINDINGS,
 };
 

@@ -67,7 +67,7 @@ static int add_part(struct reading *r, const struct ifc_part *part, uint16_t lab
     return rc;
 }
 
-/* A pair of object and material that is there already keeps its label, so each part of one material is one surface. */
+/* An existing pair of object and material keeps its label, so all parts of one material are one surface. */
 static int label_part(struct reading *r, const struct ifc_product *p, const struct ifc_body *body, const char *object,
                       const struct ifc_part *part, uint16_t *label)
 {
@@ -132,7 +132,7 @@ static int add_products(struct reading *r)
     return rc;
 }
 
-/* One that was asked and gave no answer. */
+/* Warns of a reader that was run and gave no answer. */
 static int say_missing(struct reading *r, const char *name, const struct sh_err *said)
 {
     char why[IFC_REASON_LEN];
@@ -161,7 +161,7 @@ static int say_facets(struct reading *r, const struct ifc_fineness *fineness)
     return SH_OK;
 }
 
-/* Each product with a body is a surface at least. Before minutes are spent on bodies. */
+/* Each product with a body has at least one surface. Checked before minutes are spent on bodies. */
 static int check_number(struct reading *r)
 {
     size_t n = 0;
@@ -208,7 +208,7 @@ static int read_by_assimp(struct reading *r, const char *why)
     return rc == SH_OK ? import_apart(r->b, r->err) : rc;
 }
 
-/* Both readers take one that they don't know for metres. */
+/* Warns of an unknown unit: both readers take it for metres. */
 static int say_unit(struct reading *r)
 {
     const struct sh_err *said = &r->records.no_unit;

@@ -27,7 +27,7 @@ struct ifc_readings {
 /* Whether node and both readers are there; else why not: a phrase. */
 bool ifc_readers_are_there(const struct scene_import_limits *limits, char *why, size_t size);
 
-/* A reader's words, with its name, are kept without the file's name and without advice. */
+/* Writes a reader's error with the reader's name, without the file's name and without advice. */
 enum { IFC_REASON_LEN = 150 };
 void ifc_reason(const struct scene_build *b, const char *name, const struct sh_err *said, char out[IFC_REASON_LEN]);
 
@@ -37,14 +37,14 @@ void ifc_readings_free(struct ifc_readings *r);
 
 /* ---- ifc_say.c */
 
-/* Warnings that name products, some a line, at most MAX_NAMED of them. With strict the first line of the first doubtful
- * finding is the error instead. finding[records->n_products]. */
+/* Warnings that name products, some a line, at most MAX_NAMED of them. With strict, the first line of the first
+ * doubtful finding is an error instead. finding[records->n_products]. */
 int ifc_say_findings(struct scene_build *b, const struct ifc_records *records, const enum ifc_finding *finding,
                      bool strict, struct sh_err *err);
 /* Names the curved products whose facets follow no tolerance. */
 void ifc_say_coarse(struct scene_build *b, const struct ifc_records *records);
-/* Names the products that Assimp can't be relied on for, in a warning, or, with refuse, in an error. why: no other reader is
- * there. */
+/* Names the products that Assimp may read wrongly, in a warning or, with refuse, in an error. why: the reason that no
+ * other reader is there. */
 int ifc_say_assimp(struct scene_build *b, const struct ifc_records *records, bool refuse, const char *why,
                    struct sh_err *err);
 

@@ -114,7 +114,7 @@ static int check_references(const struct ifc_records *r, struct sh_err *err)
     return SH_OK;
 }
 
-/* No type ends in these but what is air, or is drawn. */
+/* Types without a surface: air, drawings, and connections. */
 static bool is_air(struct text_span type)
 {
     static const char *const air[] = {"IFCOPENINGELEMENT", "IFCOPENINGSTANDARDCASE", "IFCVOIDINGFEATURE",
@@ -149,7 +149,7 @@ static int check_placement(struct ifc_records *r, const struct ifc_product *p, s
     return SH_OK;
 }
 
-/* Whatever its type is called: its first attribute is a GlobalId, and its seventh a shape. */
+/* Recognises a product of any type: its first attribute is a GlobalId, and its seventh a shape. */
 static int add_product(struct ifc_records *r, const struct step_record *record, struct sh_err *err)
 {
     struct text_span arg[PRODUCT_ARGS];

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The records of an IFC file, by number, and what they say of its products: what no reader of bodies gives. In: a path.
- * Out: products with type, GlobalId and name, metres per unit, and marks of what their geometry consists of. */
+/* The records of an IFC file, by number, and what they say of its products. Readers of bodies don't give this. In: a
+ * path. Out: products with type, GlobalId and name, metres per unit, and marks of what their geometry consists of. */
 #ifndef CORE_IMPORT_IFC_IFC_RECORDS_H
 #define CORE_IMPORT_IFC_IFC_RECORDS_H
 
@@ -27,10 +27,10 @@ struct ifc_product {
     bool opens_nothing;    /* an opening that no IfcRelVoidsElement names */
     bool has_body;         /* its shape, walked through, has a solid or a surface */
     bool is_curved;
-    bool is_coarse;  /* curved, and ifc-lite's body is taken, which cuts circles up by levels of its own */
-    bool is_turned;  /* it has a solid that is turned about an axis */
-    double points_m; /* largest coordinate of its points */
-    bool is_far;     /* it has points beyond 1 km of their own origin */
+    bool is_coarse;                /* curved, and the body is ifc-lite's, which cuts circles up by levels of its own */
+    bool is_turned;                /* it has a solid that is turned about an axis */
+    double points_m;               /* largest coordinate of its points */
+    bool is_far;                   /* it has points beyond 1 km of their own origin */
     struct text_span assimp_wrong; /* the first entity in it that Assimp is known to get wrong; n 0: none */
     uint32_t *style;               /* [n_styles] of its items, places in the records' style */
     size_t n_styles, room_styles;
@@ -44,16 +44,17 @@ struct ifc_records {
     size_t n_products, room_products;
     double unit_m;
     struct sh_err no_unit;   /* why the file's unit of length is not known, so that unit_m is 1; code 0: it is */
-    double radius_m;         /* of the largest circle that anything is cut of; 0: there is none */
+    double radius_m;         /* of the largest circle that is cut into edges; 0: there is none */
     uint32_t *mark, stamp;   /* [n] of the last walk */
     struct ifc_style *style; /* [n_styles] by item */
     size_t n_styles, room_styles;
 };
 
-/* Its records alone; ifc_records_close is due in any case. Errors (SH_EINPUT) name file, line and record: a file that is cut
- * off, a number that two records have, a reference to a record that is not there. No reader of bodies says any of these. */
+/* Reads the records alone; ifc_records_close is due in any case. Errors (SH_EINPUT) name file, line and record: a file
+ * that is cut off, a number that two records have, a reference to a record that is not there. No reader of bodies
+ * reports any of these. */
 int ifc_records_index(struct ifc_records *r, const char *path, struct sh_err *err);
-/* Likewise with its products. Placements that lead back to themselves are an error, too: it names the product. */
+/* Reads the products, too. A placement that leads back to itself is an error as well, which names the product. */
 int ifc_records_open(struct ifc_records *r, const char *path, struct sh_err *err);
 void ifc_records_close(struct ifc_records *r);
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Findings as lines that name their products. */
+/* Reports findings as lines that name their products. */
 #include <stdio.h>
 #include <string.h>
 

@@ -205,7 +205,7 @@ static int read_north(struct reader *r, struct ifc_site *site)
 
 /* ---- the map */
 
-/* A unit in that maps are made which is within 1 % of this: scales of the map itself are below that. */
+/* The usual unit of maps that is within 1 % of this: the scale of a map itself differs by less. */
 static double known_unit_m(double m, double model_m)
 {
     const double known[] = {1.0, model_m, 0.3048, 1200.0 / 3937.0};
@@ -214,8 +214,8 @@ static double known_unit_m(double m, double model_m)
     return NAN;
 }
 
-/* Scale has to lead from the model's unit to MapUnit, but for what the map's own scale is. 1 says nothing: it stands also for a
- * Scale that is left out. */
+/* Scale has to convert the model's unit to MapUnit, except for the map's own scale. 1 says nothing: it also stands for
+ * a Scale that is left out. */
 static int check_scale(struct reader *r, double scale, double expected)
 {
     char what[128];

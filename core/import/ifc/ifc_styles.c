@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Styles of surfaces: IfcStyledItem, and what it leads to. Readers of bodies give colours; the names are only here. */
+/* Styles of surfaces: IfcStyledItem, and the records that it refers to. Readers of bodies give colours; the names are
+ * only here. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -57,7 +58,7 @@ static bool add_style(struct ifc_records *r, uint64_t item, const struct step_re
     return true;
 }
 
-/* Down to the surface styles; from IFC4 on they may stand in the styled item itself. */
+/* Walks down to the surface styles; from IFC4 on they may stand in the styled item itself. */
 static bool collect_from(struct ifc_records *r, uint64_t item, const struct step_record *from, int depth)
 {
     bool done = true;

@@ -38,7 +38,8 @@ static char *put(char *out, uint32_t code)
     return out;
 }
 
-/* \X2\ 4 digits a character, pairs of UTF-16 among them, or \X4\ 8 digits; up to \X0\. Past it. */
+/* Reads \X2\ (4 digits a character, with pairs of UTF-16) or \X4\ (8 digits), up to \X0\. Returns the
+ * place after it. */
 static const char *wide(const char *p, const char *end, int digits, char **out)
 {
     uint32_t code, low;
@@ -53,7 +54,7 @@ static const char *wide(const char *p, const char *end, int digits, char **out)
     return end - p >= 4 && memcmp(p, "\\X0\\", 4) == 0 ? p + 4 : p;
 }
 
-/* Bytes of one character in UTF-8, 0: it is none. Some programs write that, others Latin-1. */
+/* Bytes of one character in UTF-8; 0: it is not UTF-8. Some programs write UTF-8, others Latin-1. */
 static int utf8_length(const char *p, const char *end)
 {
     const unsigned char c = (unsigned char)*p;
@@ -64,7 +65,7 @@ static int utf8_length(const char *p, const char *end)
     return n;
 }
 
-/* An escape at p, which is a backslash. Past it; p: it is none. */
+/* Reads an escape at p, which is a backslash. Returns the place after it; p: it is no escape. */
 static const char *escape(const char *p, const char *end, char **out)
 {
     uint32_t code;

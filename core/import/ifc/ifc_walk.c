@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The entities that the geometry of each product consists of: its shape is walked through from record to record, with
- * that of its openings. */
+/* Finds the entities in the geometry of each product. It walks through the product's shape, and those of its
+ * openings, from record to record. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
