@@ -22,8 +22,8 @@ struct cost_watch {
     clockid_t clock[CONFIG_MAX_THREADS]; /* of the casters; they may have ended when it is read */
 };
 
-/* A head that rests releases ticks without pulses: their time is not counted. Where no tick is released either, a pulse
- * of those that were claimed takes all of that time. */
+/* A head that rests releases ticks without pulses: their time is not counted. Where no tick is released either, the
+ * casters work on pulses that are claimed already, so that time is counted. */
 double cost_add(struct cost_figures *f, const struct cost_sample *now)
 {
     const struct cost_sample last = f->last;
