@@ -47,7 +47,7 @@ static int run(int argc, char **argv)
     return fail_unknown(argv[1]);
 }
 
-/* Configurations and blocks of pulses lie on stacks, which threads get as large as this limit; 384 KiB were enough. */
+/* Configurations and blocks of pulses are on stacks. Threads get stacks as large as this limit; 384 KiB are enough. */
 static int check_stack(void)
 {
     enum { NEEDED_KIB = 1024 };
@@ -58,10 +58,11 @@ static int check_stack(void)
     return APP_USAGE;
 }
 
-/* What a command printed may still be in the buffer. A full disk or a closed pipe shows only here. */
+/* A command's output may still be in the buffer: a full disk or a closed pipe shows only when it is flushed here. */
 int main(int argc, char **argv)
 {
-    /* Memory of meshes goes back to the system at once, however large the file was that was freed before. */
+    /* A fixed threshold, so that freed memory of meshes always goes back to the system at once: glibc would raise it
+     * after a large block was freed. */
     mallopt(M_MMAP_THRESHOLD, 4 << 20);
     int status = check_stack();
     if (status == APP_OK) status = run(argc, argv);

@@ -263,8 +263,7 @@ void cfg_check_emitter_settings(struct cfg_reader *rd, struct config *cfg);
 void cfg_check_loop(struct cfg_reader *rd, const struct config *cfg);
 /* owned.c: keys that only some kinds of link have, and what a link needs. */
 void cfg_check_links(struct cfg_reader *rd, struct config *cfg);
-/* usb_look.c: fills in the USB identity of a usb link from its protocol, and ids and serial number that are not given.
- */
+/* usb_look.c: fills in the USB identity of a usb link from its protocol; and ids and serial number if not given. */
 void cfg_set_usb_serial(struct cfg_reader *rd, const struct config *cfg, struct link_spec *link, uint32_t item);
 void cfg_set_usb_look(struct cfg_reader *rd, struct link_spec *link, uint32_t item);
 /* The same for keys of platforms. Returns whether all of them belong to this kind. */

@@ -114,9 +114,7 @@ int device_replay_ends(const struct device *device);
 /* Ends and closes the journal and the file of the truth, if there are any. Returns the first error in writing them; the
  * lines that they lack are counted. A file that takes nothing for 2 s is given up. After the loop is joined. */
 int device_close_journal(struct device *device, struct sh_err *err);
-/* 1: one of these files is behind; time should wait where it can, so that nothing is dropped. Any thread; takes no
- * lock.
- */
+/* 1: one of these files is behind; callers that can wait should. Any thread; takes no lock. */
 int device_files_fill(const struct device *device);
 
 /* The board of injected faults, from the configuration and from commands. It belongs to the device. */
@@ -207,8 +205,7 @@ int device_fix(struct device *device, int64_t t_ns, struct nmea_fix *fix);
 /* The pulses per second at a device time that was claimed (pps.h). */
 enum protocol_pps device_pps(struct device *device, int64_t t_ns, int *set);
 
-/* The tick after the one that reports that the head waits for a command; UINT64_MAX: it boots, scans, or is about to.
- */
+/* The tick after the one that reports the head idle; UINT64_MAX: it boots, scans, or is about to. */
 uint64_t device_rests_from(struct device *device);
 
 /* Device time at which power last came, or, while it is off, will come back; 0: it has always been on. */

@@ -41,8 +41,7 @@ struct device_machine {
     uint32_t n_changes; /* since power-up */
 };
 
-/* The site, planned again for settings that commands have given (site_vary). It is kept while a scan or a work uses it.
- */
+/* The site, planned again for settings that commands gave (site_vary). It is kept while a scan or a work uses it. */
 struct device_variant {
     struct device_variant *next;
     struct device_version *version; /* that it is made from, and that it holds */
@@ -281,8 +280,7 @@ int device_head_pose(struct device *device, int64_t t_ns, struct pose *head);
 void device_take_poses(struct device *device, struct device_work *work);
 
 /* beam_faults.c */
-/* The schedule of a site's head with its present settings, slowed by faults of its mirror. Also sets the scan's rates.
- */
+/* The schedule of a site's head with its present settings, slowed by faults of its mirror. Sets the scan's rates. */
 void device_fill_spec(struct device *device, const struct site *site, struct schedule_spec *spec);
 /* Begins and ends the faults that do so at the scan's next pulse, if that fires before until_ns of the scan. The
  * segment has the new rates from there on; each change is noted on the board. Sets the next edge. */

@@ -76,8 +76,7 @@ struct wire_piece *wire_due(struct wire *wire, int64_t now_ns, int last);
 /* When the next one may go out; INT64_MAX: there is none. */
 int64_t wire_next_ns(const struct wire *wire);
 void wire_pop(struct wire *wire);
-/* Whether cap bytes wait, or WIRE_DELAY_BYTES while frames are delayed. Pieces that wait for later frames don't count.
- */
+/* Whether cap bytes wait, or WIRE_DELAY_BYTES while frames are delayed. Pieces held for later frames don't count. */
 int wire_is_full(const struct wire *wire, size_t cap, int64_t now_ns);
 int wire_is_empty(const struct wire *wire);
 /* Whether a fault holds back the next piece: a stall that is on or begins now, or a time that is still to come. */

@@ -10,8 +10,7 @@
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/loop/pump_inside.h"
 
-/* At the end a reader may take this long between two bytes, and bytes that faults hold back may take this long in all.
- */
+/* At the end a reader may take this long between two bytes, and bytes held back by faults this long in all. */
 static const int64_t DRAIN_NS = 2000000000;
 
 int pump_open(struct links *links, uint32_t index, const struct link_spec *spec, struct pump **out, struct sh_err *err)

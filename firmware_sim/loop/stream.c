@@ -120,8 +120,7 @@ static void complete_event(struct stream *stream, uint8_t *frame, const struct n
     native_encode_event(frame, native_frame_len(frame), &event, header->t_ns, header->flags);
 }
 
-/* Lost pulses are those that were cast and not delivered. They are known here: all ticks before were released or lost.
- */
+/* Lost pulses were cast and not delivered. They are known here: all ticks before were released or lost. */
 static void complete_counts(struct stream *stream, uint8_t *frame)
 {
     struct native_header header;

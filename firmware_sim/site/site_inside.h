@@ -100,8 +100,7 @@ void site_free_tripod(struct site_tripod *tripod);
 /* After stations are placed and the path of a moving head is known. Fills the stations' georef, plan, scale and leg,
  * and site->scale_m. Warns where a tolerance is not met. */
 int site_georeference(struct site *site, const struct sh_report *report, struct sh_err *err);
-/* The same for one station without a georeference, and for the scale, which depends on all stations; without warnings.
- */
+/* The same for one station without a georeference, and for the scale, which depends on all stations. No warnings. */
 int site_georeference_one(struct site *site, uint32_t station, struct sh_err *err);
 void site_free_georeference(struct site *site, uint32_t station);
 
