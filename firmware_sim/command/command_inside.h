@@ -70,7 +70,7 @@ struct command_unit {
     } suffix[4];
 };
 
-/* A bound. Of the profile: value is the offset in struct head_limits. Else value is the bound. */
+/* A bound. If it is the profile's, value is the offset in struct head_limits. Else value is the bound itself. */
 struct command_bound {
     int of_profile;
     int64_t value;

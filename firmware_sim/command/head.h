@@ -74,7 +74,7 @@ static inline int64_t head_step_udeg(uint32_t steps)
     return (360000000 + steps / 2) / steps;
 }
 
-/* What the head can do: from its profile. */
+/* The limits of the head, from its profile. */
 struct head_limits {
     int64_t prr_min_uhz, prr_max_uhz, lines_min_uhz, lines_max_uhz, pan_max_udeg_s;
     uint32_t n_rates;                 /* of a head with fixed pulse rates; 0: any from prr_min to prr_max */

@@ -356,7 +356,7 @@ void config_set_steps(struct config_profile *profile, uint32_t steps);
  * settings must be allowed for it (command.h). SH_EINPUT: no ring of the sphere is left. */
 int config_apply_settings(struct config *cfg, const struct head_settings *settings, struct sh_err *err);
 
-/* head.range_min_m or range_max_m leaves less than the profile has. */
+/* Whether head.range_min_m or range_max_m leaves less than the profile's range. */
 static inline int config_limits_range(const struct config *cfg)
 {
     return cfg->head.range_min_m > cfg->head.profile_min_m || cfg->head.range_max_m < cfg->head.profile_max_m;

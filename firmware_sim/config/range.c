@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* head.range_min_m and head.range_max_m: how near and how far the head looks, within its profile. */
+/* head.range_min_m and head.range_max_m: the head's smallest and largest range, within its profile. */
 #include "firmware_sim/config/table.h"
 
 #include <math.h>

@@ -139,7 +139,7 @@ int cfg_are_sound(const struct cfg_reader *rd, uint32_t item, const char *const 
 #define CFG_SOUND(rd, item, ...)                                    \
     cfg_are_sound((rd), (item), (const char *const[]){__VA_ARGS__}, \
                   sizeof((const char *const[]){__VA_ARGS__}) / sizeof(const char *))
-/* text as it can stand in one line of an error: cut, without control characters. buf holds CFG_SHOW_MAX. */
+/* text made fit for one line of an error: cut, without control characters. buf holds CFG_SHOW_MAX. */
 enum { CFG_SHOW_MAX = 64 };
 const char *cfg_show(const char *text, char *buf);
 
@@ -221,26 +221,28 @@ double cfg_real_figure(const struct config_profile *profile, const char *path);
 void cfg_load_profile(struct cfg_reader *rd, struct config *cfg);
 /* Checks everything that concerns more than one key, as far as these keys were read well. */
 void cfg_check(struct cfg_reader *rd, struct config *cfg);
-/* copies.c: a list of copies of a mesh: its rows; a reader of the next one, below a key of that name; its end. */
+/* copies.c: lists of copies of a mesh: the rows of a copy; a reader for the next copy, below the key `name`; the checks
+ * once all are read. */
 extern const struct cfg_table cfg_copy_table;
 void cfg_begin_copy(struct cfg_reader *rd, const struct cfg_reader *of, uint32_t mesh, const char *name, int line);
 /* Removes copies: all of them (scene, scene.meshes), or those of one mesh. */
 void cfg_forget_copies(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item);
 void cfg_check_copies(struct cfg_reader *rd, const struct config *cfg);
-/* places.c: the anchor, and the forms of a station's place. */
+/* places.c: checks the anchor, and the forms of a station's place. */
 void cfg_check_places(struct cfg_reader *rd, struct config *cfg);
-/* tripod.c: the tripods of stations. */
+/* tripod.c: checks the tripods of stations. */
 void cfg_check_tripods(struct cfg_reader *rd, struct config *cfg);
-/* measurement.c: noise, signal, surfaces, and the keys of a profile that concern them. */
+/* measurement.c: checks noise, signal, surfaces, and the keys of a profile that concern them. */
 void cfg_check_signal(struct cfg_reader *rd, struct config *cfg);
 void cfg_check_reaches(struct cfg_reader *rd, struct config_profile *profile);
-/* programs.c: widths of the beam as this project defines them; programs of a profile, and head.prr_hz among them. */
+/* programs.c: converts widths of the beam to this project's definition; completes the programs of a profile; checks
+ * that head.prr_hz is the rate of one. */
 void cfg_convert_widths(struct cfg_reader *rd, struct config_profile *profile);
 void cfg_check_programs(struct cfg_reader *rd, struct config_profile *profile);
 void cfg_check_rate(struct cfg_reader *rd, const struct config *cfg);
 /* The share of a sweep that the field of view takes. */
 double cfg_used_share(const struct config_profile *profile);
-/* profile_list.c: one profile that was read, as config_list_profiles shows it. */
+/* profile_list.c: prints one profile for config_list_profiles. */
 void cfg_list_profile(const struct cfg_reader *rd, const struct config_profile *profile, FILE *out);
 /* The words of enum config_from. */
 extern const char *const cfg_from_names[];
@@ -250,7 +252,7 @@ void cfg_check_emitter(struct cfg_reader *rd, struct config_profile *profile);
 int cfg_needed_by_emitter(const struct cfg_key *key, char *words, size_t len);
 /* Whether a line spans an angle: from start up to stop, of a sphere also across azimuth 0. */
 int cfg_line_has_width(const struct config *cfg);
-/* range.c: head.range_min_m and range_max_m, which then hold for the profile in cfg and its programs. */
+/* range.c: checks head.range_min_m and range_max_m, and limits the profile in cfg and its programs to them. */
 void cfg_limit_range(struct cfg_reader *rd, struct config *cfg);
 /* Copies ranges, noise and step into the scan's settings, which commands may change. After all checks. */
 void cfg_take_scan_settings(struct config *cfg);
@@ -259,7 +261,7 @@ void cfg_check_geometries(struct cfg_reader *rd, struct config_profile *profile)
 void cfg_choose_geometry(struct cfg_reader *rd, struct config *cfg);
 /* The settings of a head whose pulse rate follows from its lines. */
 void cfg_check_emitter_settings(struct cfg_reader *rd, struct config *cfg);
-/* crosscheck.c: the loop. */
+/* crosscheck.c: checks the loop. */
 void cfg_check_loop(struct cfg_reader *rd, const struct config *cfg);
 /* owned.c: keys that only some kinds of link have, and what a link needs. */
 void cfg_check_links(struct cfg_reader *rd, struct config *cfg);

@@ -32,7 +32,7 @@ struct wire_spec {
     int units;              /* 1: each unit is a write of its own */
     int native;             /* frames of the native protocol */
     int datagrams;          /* 1: the system adds a checksum to each unit, and its receiver drops damaged ones */
-    /* Of the protocol (protocol.h). */
+    /* The protocol's functions (protocol.h). */
     void (*content)(const uint8_t *unit, size_t len, uint8_t *mask);
     void (*reseal)(uint8_t *unit, size_t len);
     uint32_t acts;             /* acts that the link can do: bit 0 is FAULT_DISCONNECT, and so on; no others strike */
