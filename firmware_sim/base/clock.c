@@ -17,8 +17,8 @@ int64_t clock_now_ns(void)
     return read_ns(CLOCK_MONOTONIC);
 }
 
-/* Read between two readings of the monotonic clock; of a few tries the tightest, as any may be
- * interrupted. */
+/* Reads the clock between two readings of the monotonic clock, a few times, since any may be interrupted; the tightest
+ * reading counts. */
 static int64_t system_ns(clockid_t id, int64_t now_ns)
 {
     int64_t best_ns = INT64_MAX, result_ns = 0;

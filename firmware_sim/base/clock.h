@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The system's clocks. All that reads or waits for time of the machine does it here.
+/* The system's clocks. All code that reads the machine's time or waits for it does so here.
  *
- * Out: ns, of CLOCK_MONOTONIC unless the name says otherwise. Device time (device.h) is another matter. */
+ * Out: ns, of CLOCK_MONOTONIC unless the name says otherwise. Device time (device.h) is a different time. */
 #ifndef FIRMWARE_SIM_BASE_CLOCK_H
 #define FIRMWARE_SIM_BASE_CLOCK_H
 
@@ -11,7 +11,7 @@
 /* CLOCK_MONOTONIC in nanoseconds. Real-time safe. */
 int64_t clock_now_ns(void);
 /* UTC (ns since 1970, as POSIX counts) and TAI (ns since 1970-01-01 TAI) of the system's clocks at a
- * monotonic time near now. TAI: 0 where the system has no offset from UTC, so that its CLOCK_TAI is a UTC. */
+ * monotonic time near now. TAI: 0 where the system has no offset from UTC, so that its CLOCK_TAI shows UTC. */
 int64_t clock_utc_ns(int64_t now_ns);
 int clock_tai_ns(int64_t now_ns, int64_t *tai_ns);
 /* Sleeps until the monotonic time is reached; goes on after signals. Real-time safe. */
@@ -19,7 +19,7 @@ void clock_sleep_until_ns(int64_t t_ns);
 /* Processor time of the whole process, seconds; of this thread, nanoseconds. */
 double clock_cpu_s(void);
 int64_t clock_thread_ns(void);
-/* Processor time of another thread, by its clock (pthread_getcpuclockid). It is 0 once the thread has ended. */
+/* Processor time of another thread, by its clock (pthread_getcpuclockid). Returns 0 once the thread has ended. */
 int clock_read_of_thread(clockid_t clock, int64_t *ns);
 
 #endif

@@ -29,7 +29,7 @@ static int utf8_len(const unsigned char *p)
         len = 2;
     } else if (p[0] >= 0xe0 && p[0] <= 0xef) {
         len = 3;
-        if (p[0] == 0xe0) low = 0xa0;  /* shorter forms exist */
+        if (p[0] == 0xe0) low = 0xa0;  /* below it, a shorter form exists */
         if (p[0] == 0xed) high = 0x9f; /* surrogates */
     } else if (p[0] >= 0xf0 && p[0] <= 0xf4) {
         len = 4;
@@ -68,7 +68,7 @@ static void new_line(struct json *json, int levels)
     if (!json->one_line) fprintf(json->out, "\n%*s", 2 * levels, "");
 }
 
-/* Comma, line and key before a value. */
+/* Writes the comma, the line's indent and the key before a value. */
 static void put_key(struct json *json, const char *key)
 {
     const int in_object = json->depth > 0 && json->closer[json->depth - 1] == '}';

@@ -10,16 +10,16 @@
 
 #include "firmware_sim/base/clock.h"
 
-/* A pipe takes pieces of PIPE_BUF bytes whole or not at all. So a line that it did not take is not half in it. */
+/* A pipe takes pieces of up to PIPE_BUF bytes whole or not at all, so it never has half a line. */
 enum { PIECE = 4096, STACK_BYTES = 256 * 1024 };
-static const int64_t PATIENCE_NS = 2000000000; /* as readers of links have at the end */
+static const int64_t PATIENCE_NS = 2000000000; /* as for readers of links at the end */
 
 struct line_head {
     uint16_t len;
     uint16_t kind;
 };
 
-/* The bytes that the writing thread has taken out of the queue. */
+/* Bytes that the writing thread has taken out of the queue. */
 struct piece {
     char text[PIECE];
     size_t len;
@@ -30,11 +30,11 @@ struct line_writer {
     pthread_mutex_t lock;
     pthread_cond_t changed;
     struct line_writer_spec spec;
-    char *queue; /* of spec.room bytes, round and round: a head, a line, a head ... */
+    char *queue; /* ring of spec.room bytes: a head, a line, a head ... */
     size_t first;
     _Atomic size_t used;
     uint64_t waiting;          /* lines in the queue, and in the piece that is being written */
-    uint64_t gap[LINE_KINDS];  /* dropped, and the file does not say so yet */
+    uint64_t gap[LINE_KINDS];  /* lines dropped that the file does not report yet */
     uint64_t pieces;           /* written so far */
     _Atomic uint64_t own_lost; /* where the caller has no count */
     _Atomic int error;         /* errno of the first failure */
@@ -75,7 +75,7 @@ static int has_gap(const struct line_writer *w)
     return w->gap[LINE_PLAIN] != 0 || w->gap[LINE_REMARK] != 0;
 }
 
-/* The line that stands for those that were dropped; empty where there are none. */
+/* Takes the line that stands for dropped ones; empty where there are none. */
 static size_t take_gap(struct line_writer *w, char text[LINE_GAP_BYTES])
 {
     text[0] = '\0';
@@ -92,7 +92,7 @@ static void drop(struct line_writer *w, enum line_kind kind)
 
 /* ---- the thread */
 
-/* Whole lines; a gap goes after the last of the queue. */
+/* Takes whole lines out of the queue; a gap goes after the last one. */
 static void take_piece(struct line_writer *w, struct piece *piece)
 {
     struct line_head head;
@@ -124,7 +124,7 @@ static int write_piece(int fd, const struct piece *piece)
     return 0;
 }
 
-/* 0: everything is written, and nothing comes any more. */
+/* Waits for lines and takes a piece. 0: everything is written, and no more lines come. */
 static int wait_for_piece(struct line_writer *w, struct piece *piece)
 {
     while (w->used == 0 && (w->error != 0 || !has_gap(w)) && !w->closing)
@@ -172,7 +172,7 @@ static void *writer_main(void *arg)
     return NULL;
 }
 
-/* A small stack: all memory that is there when a head begins is locked. */
+/* The stack is small, since all memory that a head has when it begins is locked. */
 static int start_thread(struct line_writer *w)
 {
     pthread_attr_t attr;
@@ -224,7 +224,7 @@ int line_writer_put(struct line_writer *w, enum line_kind kind, const char *text
     } else if (len > LINE_MOST_BYTES || w->used + gap + len + sizeof(struct line_head) > room) {
         rc = SH_ELOST;
     } else if (gap != 0) {
-        char both[LINE_GAP_BYTES + LINE_MOST_BYTES]; /* one line as far as it counts */
+        char both[LINE_GAP_BYTES + LINE_MOST_BYTES]; /* counted as one line */
         const size_t n = take_gap(w, both);
         memcpy(both + n, text, len);
         append(w, kind, both, n + len);
@@ -247,7 +247,7 @@ int line_writer_error(const struct line_writer *w)
     return w->error;
 }
 
-/* Until all is written, or nothing has moved for as long as the file is given. */
+/* Waits until all is written, or the file has taken nothing for PATIENCE_NS. */
 static void wait_for_end(struct line_writer *w)
 {
     while (!w->done) {
@@ -275,7 +275,7 @@ int line_writer_close(struct line_writer *w, const char *last, struct sh_err *er
     const pthread_t thread = w->thread;
     pthread_mutex_unlock(&w->lock);
     if (is_stuck) {
-        pthread_detach(thread); /* it can't be woken from its write; it frees what is left if that ever ends */
+        pthread_detach(thread); /* it can't be woken from its write; it frees the writer if that write ever ends */
         return sh_fail(err, SH_EIO, "%s: %s: nothing was taken for %d s; %llu lines are missing", spec.what, spec.path,
                        (int)(PATIENCE_NS / 1000000000), (unsigned long long)lost);
     }

@@ -1,15 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* A text file whose lines are written by a thread of its own, so that whoever has a line never waits for a disk or a
- * reader.
+/* A text file whose lines are written by a thread of its own, so that no caller waits for a disk or a reader.
  *
  * In: lines. Out: the same lines in the file, whole and in order. Between both is a queue of a fixed size. A line that
- * finds no room in it is dropped, whole, and counted. Before the next line that is written, the file itself says how many
- * are missing there (`gap`). After the first error in writing all lines are dropped and counted.
+ * finds no room in it is dropped, whole, and counted. Before the next line that is written, a line in the file says how
+ * many are missing there (`gap`). After the first error in writing all lines are dropped and counted.
  *
  * There are two kinds of lines. Remarks have one half of the queue, so that a flood of them leaves room for the others.
  *
- * Thread: any. line_writer_put holds a lock for as long as a line is copied. It neither allocates nor writes: it is not
- * for the pacing thread, but may be called with other locks held. */
+ * Thread: any but the pacing thread, since line_writer_put holds a lock while a line is copied. It neither allocates
+ * nor writes, so it may be called with other locks held. */
 #ifndef FIRMWARE_SIM_BASE_LINE_WRITER_H
 #define FIRMWARE_SIM_BASE_LINE_WRITER_H
 
@@ -25,8 +24,8 @@ enum { LINE_MOST_BYTES = 2048, LINE_GAP_BYTES = 160 };
 struct line_writer_spec {
     int fd;                  /* for writing, blocking; the writer's from here on, also after a failure */
     const char *what, *path; /* errors begin with them: "journal: FILE"; the caller's */
-    size_t room;             /* bytes that wait at most, at least 2 * (LINE_MOST_BYTES + LINE_GAP_BYTES) */
-    _Atomic uint64_t *lost;  /* lines that are not in the file, kept up to date; the caller's. NULL: nobody asks */
+    size_t room;             /* size of the queue in bytes, at least 2 * (LINE_MOST_BYTES + LINE_GAP_BYTES) */
+    _Atomic uint64_t *lost;  /* counts the lines that are not in the file; the caller's; may be NULL */
     /* The line that stands for lost[kind] lines, which are not all 0: with its '\n', at most LINE_GAP_BYTES - 1. It is
      * called with the writer's lock held. */
     void (*gap)(char text[LINE_GAP_BYTES], const uint64_t lost[LINE_KINDS]);
@@ -40,15 +39,15 @@ int line_writer_open(const struct line_writer_spec *spec, struct line_writer **o
  * dropped, since the file can't be written. */
 int line_writer_put(struct line_writer *writer, enum line_kind kind, const char *text, size_t len);
 
-/* A quarter of the queue is full: who can wait should, so that nothing is dropped. NULL never is. */
+/* 1: a quarter of the queue is full; callers that can wait should, so that nothing is dropped. 0 for NULL. */
 int line_writer_is_filling(const struct line_writer *writer);
 
 /* errno of the first failure in writing, or 0. */
 int line_writer_error(const struct line_writer *writer);
 
-/* Writes what is left, then the line `last` (NULL: none), and closes. The file is given 2 s for each piece that it takes.
- * What it hasn't taken then is dropped. SH_EIO: that was so, or writing failed; the text says how many lines are missing.
- * Lines that were dropped before are in *lost alone. NULL is nothing to close. */
+/* Writes what is left, then the line `last` (NULL: none), and closes. When the file takes nothing for 2 s, the rest is
+ * dropped. SH_EIO: that happened, or writing failed; the text says how many lines are missing. Lines that were dropped
+ * before are counted in *lost alone. A writer of NULL is allowed. */
 int line_writer_close(struct line_writer *writer, const char *last, struct sh_err *err);
 
 #endif

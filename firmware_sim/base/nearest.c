@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-/* V. I. Levenshtein, 1966; row by row of the table of all beginnings. */
+/* V. I. Levenshtein, 1966: the table of distances between all beginnings of both words, row by row. */
 size_t nearest_distance(const char *a, const char *b)
 {
     size_t row[NEAREST_MAX], len_b = strlen(b);

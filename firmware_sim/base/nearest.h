@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* How near two words are, to suggest what a mistyped one may have meant. */
+/* The distance between two words, used to suggest the word that a mistyped one may have meant. */
 #ifndef FIRMWARE_SIM_BASE_NEAREST_H
 #define FIRMWARE_SIM_BASE_NEAREST_H
 
 #include <stddef.h>
 
-/* Letters that must be put in, taken out or changed to make one of the other (Levenshtein's distance). A word
- * of NEAREST_MAX characters or more is near to none: then it is NEAREST_MAX. */
+/* Levenshtein's distance: letters that must be put in, taken out or changed to turn one word into the other. For a word
+ * of NEAREST_MAX characters or more it is NEAREST_MAX. */
 enum { NEAREST_MAX = 96 };
 size_t nearest_distance(const char *a, const char *b);
 

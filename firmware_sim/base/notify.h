@@ -8,11 +8,11 @@
 
 #include "core/err.h"
 
-/* Whether somebody is to be told. */
+/* Whether $NOTIFY_SOCKET names a socket. */
 int notify_is_wanted(void);
 
-/* Sends lines with '\n' between them; SH_OK also where nobody is to be told. Waits a second at most. SH_EINPUT: a name
- * that is none; SH_EIO: nobody is there, or takes it. */
+/* Sends lines with '\n' between them; SH_OK also without a socket. Waits a second at most. SH_EINPUT: the socket's name
+ * is invalid; SH_EIO: nobody is there, or takes it. */
 int notify_send(const char *lines, struct sh_err *err);
 
 #endif

@@ -24,7 +24,7 @@ int command_fail(struct command_call *call, int number, const char *fmt, ...)
     vsnprintf(text, sizeof text, fmt, ap);
     va_end(ap);
     command_queue_push(&call->dev->queue, number, text);
-    /* Composed again: in a full queue the entry is -350, but the reply still says what was wrong. */
+    /* Compose the reply anew: in a full queue the entry is -350, but the reply must still name the error. */
     command_error_compose(entry, sizeof entry, number, text);
     call->out->error = number;
     command_reply(call, "ERR %d,\"%s\"", number, entry);
@@ -71,7 +71,7 @@ static int is_letter(char c)
     return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z');
 }
 
-/* One of a setting's words, or DEF; returns -1 when it failed. */
+/* Parses one of a setting's words, or DEF; returns -1 when it failed. */
 static int parse_word(struct command_call *call)
 {
     const char *const *words = call->row->setting->words;
@@ -90,7 +90,7 @@ static int parse_word(struct command_call *call)
     return command_fail(call, CMD_E_DATA_TYPE, "%s takes %sDEF, not '%s'", call->row->header, list, clip);
 }
 
-/* The one parameter of a setting or a step; returns -1 when it failed. */
+/* Parses the one parameter of a setting or a step; returns -1 when it failed. */
 static int parse_value(struct command_call *call)
 {
     const struct command_row *row = call->row;

@@ -18,31 +18,31 @@
  *
  * Values. A number may be MIN, MAX or DEF, and so may the parameter of a setting's query ("HEAD:PRR? MAX").
  * MIN and MAX are the limits as the profile and the other settings leave them now, so they are never refused.
- * A unit may follow as a suffix: HZ, KHZ, MHZ (mega, as SCPI has it); DEG; DEG/S; M, MM, KM; of a step NS (also
- * without), US, MS, S. Numbers are taken exactly or refused, never rounded; only SCAN:STEP sets the nearest rates,
+ * A unit may follow as a suffix: HZ, KHZ, MHZ (mega, as in SCPI); DEG; DEG/S; M, MM, KM; for a step of time NS (the
+ * default), US, MS, S. Numbers are taken exactly or refused, never rounded; only SCAN:STEP sets the nearest rates,
  * and its reply is the step that they give. SCAN:ECHoes takes ALL, FIRSt,
- * LAST, STRongest or DEF: which echoes of a pulse are sent. Of a head with fixed pulse rates HEAD:PRR takes these
- * alone; another rate is -222 with the list of them.
+ * LAST, STRongest or DEF: which echoes of a pulse are sent. On a head with fixed pulse rates HEAD:PRR takes only these;
+ * another rate is -222 with the list of them.
  *
  * Ranges, noise, and the step of a sphere hold from the next scan on, and can't change within one.
  *
- * Stations. HEAD:STATION goes to stations that have this scanner; one with another is -221.
+ * Stations. HEAD:STATION takes stations that have this scanner; a station with another scanner is -221.
  *
  * `SITE:POSE station, x, y, z, heading, pitch, roll` moves a station of this scanner while the head is idle: metres of
- * the scene frame, degrees as the keys of a station. `SITE:POSE station, DEF` brings it back to its place of power-up;
- * `SITE:POSE? station` has the place, with `, MIN`, `, MAX` or `, DEF` the limits and that of power-up. What is read can
- * be sent back.
+ * the scene frame, degrees as the keys of a station. `SITE:POSE station, DEF` brings it back to its place at power-up.
+ * `SITE:POSE? station` replies with its place; with `, MIN`, `, MAX` or `, DEF` it replies with the limits or the place
+ * at power-up. A reply can be sent back as a command.
  *
  * Steps. With a live platform a step may carry the pose at its end: `TIME:STEP 10 MS, x, y, z, roll, pitch,
  * heading`, in metres of the scene frame and degrees (core/pose.h).
  *
- * Faults. `FAULt:ADD {kind: drop, every: 10}` adds a fault as the configuration's list `faults` has them; it counts from
- * then on, and its number is the reply. `FAULt:CLEar 3` or `ALL` takes faults out. `FAULt:INJected?` has how often they
- * struck, with a number that of one; `FAULt:LIST?` has those that there are.
+ * Faults. `FAULt:ADD {kind: drop, every: 10}` adds a fault, written as in the configuration's list `faults`. It counts
+ * from then on, and the reply is its number. `FAULt:CLEar 3` or `ALL` takes faults out. `FAULt:INJected?` replies with
+ * how often faults struck; with a number, how often that one did. `FAULt:LIST?` lists the faults.
  *
  * Replies. The value, or "OK", or `ERR -222,"Data out of range; HEAD:PRR 5000000 Hz, allowed 1000 to
  * 1200000"`. A value outside of the profile is -222. One that another setting or the state forbids is -221.
- * *STB?: 4 errors are queued, 128 scanning. *CLS, as SYSTem:ERRor?, needs no control.
+ * *STB?: 4: errors are queued; 128: the head scans. *CLS, like SYSTem:ERRor?, needs no control.
  *
  * Pure: no clock, no I/O, no thread. The loop owns the device, calls from one thread, and carries out the
  * effect. */
@@ -57,7 +57,7 @@
 enum {
     COMMAND_MAX_LINE = 256, /* of a line without its end; a longer one is -363 and dropped whole */
     COMMAND_MAX_REPLY = 480,
-    COMMAND_QUEUE_LEN = 32, /* errors kept; when full, the last becomes -350 and counts the rest */
+    COMMAND_QUEUE_LEN = 32, /* errors kept; in a full queue the last one becomes -350 and counts the rest */
 };
 
 enum command_error {
@@ -102,18 +102,18 @@ struct command_place {
     double v[6];
 };
 
-/* Faults on request, as their owner has them. */
+/* The operations on injected faults, which their owner provides. */
 struct command_faults {
-    /* "{kind: drop, every: 10}". Returns 0 and its number, or -1 and why not. */
+    /* text: "{kind: drop, every: 10}". Returns 0 and the fault's number, or -1 and why not. */
     int (*add)(void *owner, const char *text, uint32_t *number, char *why, size_t len);
     uint32_t (*remove)(void *owner, uint32_t number); /* 0: all. Returns how many */
     /* How often so far; 0: all together. Returns 0, or -1: there never was one of that number. */
     int (*injected)(void *owner, uint32_t number, uint64_t *n);
-    /* "1 drop, 2 flip"; empty: none. What has no room is counted at the end: ", and 3 more". */
+    /* "1 drop, 2 flip"; empty: none. Faults without room are counted at the end: ", and 3 more". */
     void (*list)(void *owner, char *text, size_t len);
 };
 
-/* The sessions' clients by kind of link and address, "tcp 127.0.0.1:40312"; empty: not known. [0] is nobody's. */
+/* The sessions' clients by kind of link and address, "tcp 127.0.0.1:40312"; empty: not known. [0] is unused. */
 enum { COMMAND_PEERS = 73, COMMAND_PEER_LEN = 80 };
 struct command_peers {
     char name[COMMAND_PEERS][COMMAND_PEER_LEN];
@@ -129,7 +129,7 @@ struct command_device {
     const char *plan; /* the methods in use, in one line; NULL: not known */
     struct head_limits limits;
     /* Whether a scan can be planned with these settings, whose values are within the limits. Returns 0, or -1 and why
-     * not. NULL: any can. */
+     * not. NULL: all can. */
     int (*can_plan)(void *owner, const struct head_settings *settings, char *why, size_t len);
     void *owner;
     const struct command_faults *faults; /* NULL: it has none */
@@ -139,21 +139,21 @@ struct command_device {
     enum head_state state;
     const char *why_fault; /* why the state is fault, and what ends it; NULL: not known */
     struct command_queue queue;
-    uint32_t control; /* session that may change things; 0: none, the next one that does takes it */
+    uint32_t control; /* session that has control; 0: none, and the next one that changes something takes it */
     struct command_peers peers;
     uint64_t frames_done;                          /* of the scan at hand or the last one */
-    uint64_t lost_journal_lines, lost_truth_lines; /* that their files lack */
+    uint64_t lost_journal_lines, lost_truth_lines; /* lines that these files lack */
     int64_t t_ns;                                  /* device time */
     char utc[40], gps[40];                   /* the same as time of day, by the clock of the head; empty: unknown */
     int step_allowed;                        /* 1 when the pace is `step` */
     int pose_allowed;                        /* 1 when the platform is live: a step may carry a pose */
-    double pose_centre_m[3], pose_reach_m;   /* how far from where the pose may be; scene frame */
+    double pose_centre_m[3], pose_reach_m;   /* the pose must be within pose_reach_m of the centre; scene frame */
     const struct command_place *place;       /* [limits.n_stations] as they are now; NULL: not known */
     const struct command_place *first_place; /* at power-up */
     const char *recorded;                    /* a recording is replayed: why no setting changes; NULL: none is */
-    int is_played;                           /* it is, whatever state its head was in: SCAN:STOP ends it */
+    int is_played;                           /* it is playing, whatever its head's state was: SCAN:STOP ends it */
     const char *fixed;                       /* why no station can be moved; NULL: they can */
-    uint32_t moving;                         /* the station that is being moved; 0: none. Until then no scan starts */
+    uint32_t moving;                         /* the station that is being moved; 0: none. Meanwhile no scan starts */
 };
 
 enum command_effect {
@@ -176,10 +176,10 @@ struct command_result {
     int have_pose;
     double pose[6];   /* of the platform at the end of the step: x, y, z (m), roll, pitch, heading (degrees) */
     uint32_t station; /* that is moved, from 1 */
-    int to_first;     /* back to its place of power-up; else to: */
+    int to_first;     /* it goes back to its place at power-up; else to `to` */
     struct command_place place;
     int error;                     /* 0, or the number that was queued */
-    int took_control;              /* this command made the session the one in control */
+    int took_control;              /* this command gave the session control */
     int changes;                   /* belongs in the journal: effect is not NONE or RELEASE */
     char reply[COMMAND_MAX_REPLY]; /* one line without its end; empty for an empty line (no reply at all) */
 };
@@ -194,7 +194,7 @@ void command_set_peer(struct command_device *dev, uint32_t session, const char *
 /* Never NULL. */
 const char *command_peer(const struct command_device *dev, uint32_t session);
 
-/* What a command set in motion could not be done after all: into the queue, and as its reply. */
+/* What a command began could not be done: puts the error into the queue, and makes it the command's reply. */
 void command_refuse(struct command_device *dev, int number, const char *text, struct command_result *out);
 
 /* Collects bytes into lines: LF, CR or CR LF end a line. */

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The command set from the inside: pieces of a line, numbers, the rows of the table. For the files of this
- * folder. */
+/* Private to the files of this folder: parts of a line, numbers, the rows of the table. */
 #ifndef FIRMWARE_SIM_COMMAND_COMMAND_INSIDE_H
 #define FIRMWARE_SIM_COMMAND_COMMAND_INSIDE_H
 
@@ -8,12 +7,12 @@
 
 enum {
     COMMAND_TEXT_LEN = sizeof(((struct command_queue *)0)->entry[0].text),
-    COMMAND_CLIP_LEN = 36, /* what an error text quotes of a line, with its NUL */
+    COMMAND_CLIP_LEN = 36, /* length of the part of a line that an error quotes, with its NUL */
 };
 
 /* ---- error_queue.c */
 
-/* `standard text; text`. Bytes that are not printable ASCII become '~', and '"' becomes '\''. Cut at its end
+/* Composes `standard text; text`. Bytes that are not printable ASCII become '~', and '"' becomes '\''. Cut at its end
  * to fit. */
 void command_error_compose(char *buf, size_t len, int number, const char *text);
 
@@ -71,7 +70,7 @@ struct command_unit {
     } suffix[4];
 };
 
-/* A bound. Of the profile: value is the offset in struct head_limits. Else value is the bound. */
+/* A bound. If it is the profile's, value is the offset in struct head_limits. Else value is the bound itself. */
 struct command_bound {
     int of_profile;
     int64_t value;
@@ -79,20 +78,20 @@ struct command_bound {
 
 struct command_call;
 
-/* A setting that follows from others, and sets them. Values are integers in its row's unit. */
+/* A setting that is computed from others, and that sets these. Values are integers in its row's unit. */
 struct command_derived {
     /* Why this head has no such setting; NULL: it has. */
     const char *(*why_not)(const struct command_device *dev);
     int64_t (*read)(const struct command_device *dev, const struct head_settings *settings);
-    /* What can be set now; min == max: it is a reading. */
+    /* The range that can be set now; min == max: it can only be read. */
     void (*range)(const struct command_device *dev, int64_t *min, int64_t *max);
-    /* What gives that range: " as HEAD:PRR is 300000"; "" where nothing does. */
+    /* The reason for that range: " as HEAD:PRR is 300000"; "" if there is none. */
     void (*because)(const struct command_device *dev, char *text, size_t len);
     /* Into dev->settings; returns -1 when it failed. The value is within the range. */
     int (*write)(struct command_call *call, int64_t value);
 };
 
-/* A setting, its range by the profile, and the setting that narrows it: other + least <= value <= other +
+/* A setting, its range from the profile, and the setting that narrows it: other + least <= value <= other +
  * most. */
 struct command_setting {
     size_t offset;   /* in struct head_settings */
@@ -102,7 +101,7 @@ struct command_setting {
     const char *other; /* header of the other setting; NULL: none */
     size_t other_offset;
     int64_t least, most;                   /* COMMAND_UNBOUND: no such bound */
-    int is_rate;                           /* where the head has fixed pulse rates, only these */
+    int is_rate;                           /* a head with fixed pulse rates takes only these */
     const char *const *words;              /* the values by name, from 0; NULL: values are numbers */
     const struct command_derived *derived; /* NULL: it is a field of the settings */
 };
@@ -144,7 +143,7 @@ struct command_row {
     int pose;                                /* a pose may follow the number */
     int own;                                 /* both forms take their parameters themselves */
     int word;                                /* the query may have a word, in param */
-    int event; /* of an action that the states allow: enum head_event + 1; 0: it goes by no state */
+    int event; /* of an action that depends on the state: enum head_event + 1; 0: it doesn't */
 };
 
 extern const struct command_row command_rows[]; /* up to one without a header */
@@ -177,19 +176,19 @@ int command_reply(struct command_call *call, const char *fmt, ...) __attribute__
 int command_setting_query(struct command_call *call);
 int command_setting_change(struct command_call *call);
 
-/* The range now: as profile and other settings leave it. */
+/* The present range: as the profile and other settings leave it. */
 void command_setting_range(const struct command_call *call, int64_t *min, int64_t *max);
-/* The last of its words that the head takes. */
+/* The index of the last word that the head takes. */
 uint32_t command_setting_last_word(const struct command_call *call);
-/* The only values that a setting takes, rising: pulse rates of programs, rates or steps of geometries. 0: any in its
- * range. */
+/* The only values that a setting takes, rising: pulse rates of programs, rates or steps of geometries. Returns how
+ * many; 0: it takes any value in its range. */
 uint32_t command_setting_values(const struct command_call *call, int64_t value[HEAD_MAX_RATES]);
 /* Whether it can be set in a state. */
 int command_setting_is_free(const struct command_device *dev, const struct command_setting *setting,
                             enum head_state state);
 
 /* ---- step.c: angular steps, which follow from the rates */
-/* From step to step, of so many a turn, in nano-degrees. */
+/* The angle of a step in nano-degrees, for a number of steps per turn. */
 int64_t command_step_ndeg(uint32_t steps);
 extern const struct command_derived command_step_both, command_step_line, command_step_pan;
 
@@ -197,7 +196,7 @@ extern const struct command_derived command_step_both, command_step_line, comman
 int command_help(struct command_call *call);
 int command_help_settings(struct command_call *call);
 
-/* The number in call->value in the row's unit, or -222 with what is allowed (then returns -1). */
+/* The number in call->value in the row's unit. Outside of the range: -222 with the allowed range, and returns -1. */
 int command_value_in_range(struct command_call *call, int64_t min, int64_t max, int64_t *value);
 
 #endif

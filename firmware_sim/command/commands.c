@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The only list of commands, and what each of them does. What settings have in common is in setting.c. */
+/* The only list of commands, and the function of each. The common part of settings is in setting.c. */
 #include "firmware_sim/command/command_inside.h"
 
 #include <stdio.h>
@@ -73,7 +73,7 @@ static int query_idn(struct command_call *call)
 
 static int query_opc(struct command_call *call)
 {
-    return command_reply(call, "1"); /* no command is still at work once its reply is out */
+    return command_reply(call, "1"); /* each command is complete before its reply goes out */
 }
 
 static int query_stb(struct command_call *call)
@@ -179,7 +179,7 @@ static int act_release(struct command_call *call)
     return command_reply(call, "OK");
 }
 
-/* The effect, or -221 where the state machine refuses the row's event. */
+/* Sets the effect; or fails with -221 where the state machine refuses the row's event. */
 static int act_event(struct command_call *call, enum command_effect effect)
 {
     const enum head_event event = (enum head_event)(call->row->event - 1);
@@ -197,7 +197,7 @@ static int act_start(struct command_call *call)
         return command_fail(call, CMD_E_SETTINGS, "%s waits for SITE:POSE: station %u is being moved",
                             call->row->header, call->dev->moving);
     if (call->dev->recorded == NULL) return act_event(call, COMMAND_START);
-    call->out->effect = COMMAND_START; /* it begins anew */
+    call->out->effect = COMMAND_START; /* the recording begins anew */
     return command_reply(call, "OK");
 }
 
@@ -247,7 +247,7 @@ static int act_step(struct command_call *call)
 const struct command_row command_rows[] = {
     QUERY("*IDN", query_idn),
     CHANGE("*RST", act_reset, HEAD_EV_RESET),
-    ACTION("*CLS", act_clear, 1), /* open, as SYSTem:ERRor? empties the queue too */
+    ACTION("*CLS", act_clear, 1), /* open to all, since SYSTem:ERRor? empties the queue too */
     QUERY("*OPC", query_opc),
     QUERY("*STB", query_stb),
     QUERY("SYSTem:ERRor[:NEXT]", query_error),
@@ -264,7 +264,7 @@ const struct command_row command_rows[] = {
     VALUE("HEAD:LINes", unit_hz, LINES),
     VALUE("HEAD:PAN", unit_deg_s, PAN),
     QUERY("HEAD:STATe", query_state),
-    /* Open, as the plug of a head: clients of its maker's protocol know nothing of control. */
+    /* Open to all, as a head's plug is: clients of its maker's protocol know nothing of control. */
     {"HEAD:REBoot", NULL, act_reboot, NULL, NULL, 1, 0, 0, 0, HEAD_EV_POWER_OFF + 1},
     VALUE("HEAD:STATION", unit_count, STATION), /* no short form: STAT is STATe */
     VALUE("HEAD:RANGe:MIN", unit_m, RANGE_MIN),

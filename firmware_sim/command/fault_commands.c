@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* FAULt: faults on request. What a fault is, its owner knows; here are the lines. */
+/* FAULt: the command lines for injected faults. The owner of the faults reads and keeps them. */
 #include <stdio.h>
 #include <string.h>
 
@@ -26,7 +26,7 @@ int command_fault_add(struct command_call *call)
     return command_reply(call, "%u", number);
 }
 
-/* A fault's number, or ALL (0). Returns -1 when it failed. */
+/* Parses a fault's number, or ALL (0). Returns -1 when it failed. */
 static int take_number(struct command_call *call, int64_t *number)
 {
     struct command_decimal decimal;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The head: its state machine as a pure function, its settings, and what its profile allows. In: a state and
+/* The head: its state machine as a pure function, its settings, and the limits from its profile. In: a state and
  * an event. Out: the next state.
  *
  * Rates and angles are integers in micro-units (uhz = 1e-6 Hz, udeg = 1e-6 degree), distances in nanometres, so
@@ -48,7 +48,7 @@ enum { HEAD_MAX_FRAMES = 1000000 };
 
 struct head_settings {
     int64_t prr_uhz, lines_uhz, pan_udeg_s;
-    int64_t line_start_udeg, line_stop_udeg; /* start < stop, or round: != ; within the field of view */
+    int64_t line_start_udeg, line_stop_udeg; /* start < stop, with `round` only unequal; within the field of view */
     int64_t pan_start_udeg, pan_stop_udeg;   /* start <= stop, at most a turn apart */
     uint32_t frames;                         /* frames per scan; 0: until stopped */
     uint32_t station;                        /* from 1 */
@@ -57,7 +57,7 @@ struct head_settings {
     uint32_t angle_noise;                    /* 0: none */
     int64_t range_min_nm, range_max_nm;      /* nothing nearer or farther is an echo */
     int64_t sigma_nm, ball_nm;               /* one sigma of that noise, its fixed part; radius of the ball noise */
-    int64_t step_udeg; /* of a sphere, as it was asked for; of a planar head with geometries; else 0 */
+    int64_t step_udeg;                       /* of a sphere, as it was set; of a planar head with geometries; else 0 */
 };
 
 enum { HEAD_MAX_RATES = 8 };
@@ -68,13 +68,13 @@ struct head_geometry {
     uint32_t steps;
 };
 
-/* From step to step, of so many a turn. The other way round it is emitter_sphere_steps(), for up to 18000. */
+/* The angle of a step, for a number of steps per turn. emitter_sphere_steps() is its inverse, for up to 18000 steps. */
 static inline int64_t head_step_udeg(uint32_t steps)
 {
     return (360000000 + steps / 2) / steps;
 }
 
-/* What the head can do: from its profile. */
+/* The limits of the head, from its profile. */
 struct head_limits {
     int64_t prr_min_uhz, prr_max_uhz, lines_min_uhz, lines_max_uhz, pan_max_udeg_s;
     uint32_t n_rates;                 /* of a head with fixed pulse rates; 0: any from prr_min to prr_max */
@@ -85,20 +85,20 @@ struct head_limits {
     uint64_t elsewhere;    /* bit i: station i + 1 has another scanner than this head; 0 beyond 64 */
     uint32_t n_geometries; /* of a planar head that has only some; 0: any line rate, at one step */
     struct head_geometry geometry[HEAD_MAX_RATES];
-    uint32_t line_pulses; /* of each line, so that the pulse rate follows from the lines; 0: it doesn't. Where the step
-                           * can be set it is that with the step of power-up: head_line_pulses() */
+    uint32_t line_pulses; /* pulses of each line, from which the pulse rate follows; 0: it doesn't. Where the step can
+                           * be set, this is the number at the step of power-up: head_line_pulses() */
     int round; /* line angles are azimuths of a ring: a window may go across 0, from a start above its stop */
     enum emitter_kind emitter;
     int64_t sweep_udeg;  /* a line head: how far the beam turns in a line, with the blind part */
     int64_t sequence_ps; /* a head with beams: from firing sequence to firing sequence */
     int step_fixed;      /* a head on a platform that moves keeps its step */
     int64_t range_min_nm, range_max_nm;
-    int64_t near_most_nm, far_least_nm; /* so that something is left at each pulse rate: of the nearest, the farthest */
-    uint32_t noise_most, angle_most;    /* of the kinds of range and angle noise, by number */
+    int64_t near_most_nm, far_least_nm; /* largest range_min, smallest range_max: each pulse rate keeps some range */
+    uint32_t noise_most, angle_most;    /* the largest number of a kind of range noise, of angle noise */
     int64_t sigma_min_nm, ball_max_nm;
 };
 
-/* Of each line; 0: as many as the rates give. */
+/* The pulses of each line; 0: as many as the rates give. */
 static inline uint32_t head_line_pulses(const struct head_limits *limits, const struct head_settings *settings)
 {
     if (settings->step_udeg <= 0) return limits->line_pulses;

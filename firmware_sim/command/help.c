@@ -21,7 +21,7 @@ static void add_word(struct command_call *call, const char *word, const char *en
     add(call, "%s%s%s", call->out->reply[0] == '\0' ? "" : " ", word, end);
 }
 
-/* All together don't fit into a reply. */
+/* Lists commands without settings: all together don't fit into a reply. */
 static int list_others(struct command_call *call)
 {
     for (const struct command_row *row = command_rows; row->header != NULL; row++)
@@ -36,7 +36,7 @@ int command_help_settings(struct command_call *call)
     return 0;
 }
 
-/* The states in which it can be set, or is carried out: "all", or some with blanks between them. */
+/* Adds the states in which it can be set or carried out: "all", or some with blanks between them. */
 static void add_states(struct command_call *call)
 {
     const struct command_row *row = call->row;
@@ -72,7 +72,7 @@ static void add_numbers(struct command_call *call)
     add(call, "%s,", setting->words == NULL ? number : "");
 }
 
-/* Its only values, where they are few. */
+/* Adds its values, where it takes only some. */
 static void add_values(struct command_call *call)
 {
     const struct command_setting *setting = call->row->setting;
@@ -89,7 +89,7 @@ static void add_values(struct command_call *call)
     add(call, "\"");
 }
 
-/* Of a head that has no such setting: no limits, no states. */
+/* 0: the head has no such setting, so there are no limits and no states to list. */
 static int has_setting(const struct command_call *call)
 {
     const struct command_derived *derived = call->row->setting->derived;
@@ -122,7 +122,7 @@ int command_help(struct command_call *call)
 {
     const char *header = call->param + (call->param[0] == ':');
     size_t len = strlen(header);
-    len -= len > 0 && header[len - 1] == '?'; /* as HELP? has it */
+    len -= len > 0 && header[len - 1] == '?'; /* HELP? itself lists headers with '?' */
     if (len == 0) return list_others(call);
     for (const struct command_row *row = command_rows; row->header != NULL; row++) {
         if (!command_header_matches(row->header, header, len)) continue;

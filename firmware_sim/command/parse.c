@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A line in its parts, headers against patterns, and decimal numbers as they are written. */
+/* Splits a line into parts, matches headers with patterns, and reads decimal numbers exactly. */
 #include "firmware_sim/command/command_inside.h"
 
 #include <stdio.h>
@@ -60,7 +60,7 @@ int command_split(const char *line, struct command_request *req, const char **wh
     return CMD_E_NONE;
 }
 
-/* One word of a pattern: its leading part without lower-case letters, or the whole. */
+/* Matches one word of a pattern: its leading part without lower-case letters, or the whole. */
 static int node_matches(const char *pattern, size_t pattern_len, const char *text, size_t text_len)
 {
     size_t short_len = 0;
@@ -95,7 +95,7 @@ int command_header_matches(const char *pattern, const char *header, size_t len)
     return text == NULL;
 }
 
-/* The optional exponent; where there is none, p comes back. A value beyond 32000 (IEEE 488.2, 7.7.2.4.1) is
+/* Reads the optional exponent; without one, returns p. A value beyond 32000 (IEEE 488.2, 7.7.2.4.1) is
  * taken as 32000: no mantissa of one line brings that back into any range. */
 static const char *parse_exponent(const char *p, int *exponent)
 {

@@ -55,7 +55,7 @@ static int is_setting(const struct command_call *call, size_t offset)
     return call->row->setting->offset == offset;
 }
 
-/* Into a list that rises, once. */
+/* Inserts a value once into a list that rises. Returns the new length. */
 static uint32_t insert(int64_t *value, uint32_t n, int64_t another)
 {
     uint32_t i = n;
@@ -67,7 +67,7 @@ static uint32_t insert(int64_t *value, uint32_t n, int64_t another)
     return n + 1;
 }
 
-/* The line rates at the step that is set, or the steps at the line rate that is set. */
+/* The line rates at the present step, or the steps at the present line rate. */
 static uint32_t fixed_geometries(const struct command_call *call, int64_t *value)
 {
     const struct head_limits *l = &call->dev->limits;
@@ -92,7 +92,7 @@ uint32_t command_setting_values(const struct command_call *call, int64_t value[H
     return l->n_rates;
 }
 
-/* The ends of a range move inward to rates that the head has. The other setting leaves one at least. */
+/* Moves the ends of a range inward to rates that the head has. The other setting leaves at least one. */
 static void narrow_to_rates(const struct command_call *call, int64_t *min, int64_t *max)
 {
     int64_t rate[HEAD_MAX_RATES];
@@ -110,7 +110,7 @@ static int64_t rate_of_lines(const struct command_call *call)
     return call->dev->settings.lines_uhz * head_line_pulses(&call->dev->limits, &call->dev->settings);
 }
 
-/* MIN and MAX are stations of this head. */
+/* Moves the ends inward: MIN and MAX must be stations of this head. */
 static void narrow_to_stations(const struct command_call *call, int64_t *min, int64_t *max)
 {
     while (*min < *max && head_is_elsewhere(&call->dev->limits, *min))
@@ -135,7 +135,7 @@ static int is_sphere(const struct command_call *call)
     return call->dev->limits.emitter == EMITTER_SPHERE;
 }
 
-/* With more pulses a line fewer lines make the fastest pulse rate. */
+/* The most lines of a sphere: with more pulses a line, the largest pulse rate allows fewer lines. */
 static int64_t most_lines_of_sphere(const struct command_call *call)
 {
     return call->dev->limits.prr_max_uhz / head_line_pulses(&call->dev->limits, &call->dev->settings);
@@ -185,7 +185,7 @@ static int64_t special_value(const struct command_call *call)
     return read_value(call, &call->dev->defaults);
 }
 
-/* -221 where the head has no such setting. */
+/* Fails with -221 where the head has no such setting. */
 static int check_has(struct command_call *call)
 {
     const struct command_derived *derived = call->row->setting->derived;
@@ -193,7 +193,7 @@ static int check_has(struct command_call *call)
     return why == NULL ? 0 : command_fail(call, CMD_E_SETTINGS, "%s: %s", call->row->header, why);
 }
 
-/* -221 where a recording is replayed that does not say it. */
+/* Fails with -221 where a recording is replayed that does not have the setting. */
 static int check_known(struct command_call *call)
 {
     const struct command_setting *setting = call->row->setting;
@@ -214,8 +214,8 @@ int command_setting_query(struct command_call *call)
     return command_reply(call, "%s", in_unit(call, value).text);
 }
 
-/* `HEADER VALUE, allowed MIN to MAX`, or `allowed MAX` where there is one value; value is what the command said, or
- * its number with the unit. */
+/* Refuses with `HEADER VALUE, allowed MIN to MAX`, or `allowed MAX` where there is one value. value: the command's
+ * text, or its number with the unit. */
 static int refuse(struct command_call *call, int number, const char *value, int64_t min, int64_t max, const char *with)
 {
     if (min == max)
@@ -258,7 +258,7 @@ int command_value_in_range(struct command_call *call, int64_t min, int64_t max, 
 
 static void say_because(const struct command_call *call, int no_width, char *text, size_t len);
 
-/* `HEADER VALUE, allowed A, B, C`: a number, or the one of power-up, that is none of the head's values. */
+/* Refuses a number, or the value of power-up, that is none of the head's values: `HEADER VALUE, allowed A, B, C`. */
 static int check_rate(struct command_call *call)
 {
     int64_t rate[HEAD_MAX_RATES], value = 0;
@@ -281,7 +281,7 @@ static int check_rate(struct command_call *call)
                         call->row->unit->name, with);
 }
 
-/* What narrows the range, as the end of an error. */
+/* Writes the reason for the range, as the end of an error. */
 static void say_because(const struct command_call *call, int no_width, char *text, size_t len)
 {
     const struct command_setting *setting = call->row->setting;
@@ -322,14 +322,14 @@ int command_setting_is_free(const struct command_device *dev, const struct comma
     return !in_scan || (!setting->not_in_scan && (setting->derived == NULL || !can_vary));
 }
 
-/* What DEF answers may be beyond MAX: rates of power-up may have steps that are not alike. As a number it does what DEF
- * does, where that gives this step. */
+/* Whether a value beyond MAX is the step of DEF. The rates of power-up may give two different steps, and the coarser
+ * one may be beyond MAX. As a number it does what DEF does, if DEF gives this step. */
 static int is_default_beyond(const struct command_call *call, int64_t value)
 {
     struct head_settings then = call->dev->defaults;
     int64_t min, max;
     if (call->row->setting->derived == NULL) return 0;
-    then.prr_uhz = call->dev->settings.prr_uhz; /* it stays */
+    then.prr_uhz = call->dev->settings.prr_uhz; /* the pulse rate stays */
     command_setting_range(call, &min, &max);
     return (value < min || value > max) && value == read_value(call, &then);
 }
@@ -357,7 +357,7 @@ static int check_value(struct command_call *call, int64_t value)
     if (is_setting(call, offsetof(struct head_settings, station)) && head_is_elsewhere(&call->dev->limits, value))
         return command_fail(call, CMD_E_SETTINGS, "%s %lld has another scanner; run that: --set head.station=%lld",
                             call->row->header, (long long)value, (long long)value);
-    const int as_before = setting->derived != NULL && call->value.kind == COMMAND_VALUE_DEF; /* rates of power-up */
+    const int as_before = setting->derived != NULL && call->value.kind == COMMAND_VALUE_DEF; /* the rates of power-up */
     const enum emitter_kind head = call->dev->limits.emitter;
     const int sets = head == EMITTER_LINE || (head == EMITTER_SPHERE && setting->derived == &command_step_both);
     if (!(as_before && sets) && check_other(call, value) != 0) return -1;
@@ -367,7 +367,7 @@ static int check_value(struct command_call *call, int64_t value)
     return 0;
 }
 
-/* The value into the settings, and what follows from it. */
+/* Writes the value into the settings, and sets those that follow from it. */
 static int write_value(struct command_call *call, int64_t value)
 {
     const struct command_setting *setting = call->row->setting;
@@ -380,7 +380,7 @@ static int write_value(struct command_call *call, int64_t value)
     return 0;
 }
 
-/* Of a recording: what is already so may be set. */
+/* While a recording is replayed, a setting may only be set to the value that it has. */
 static int keep_recorded(struct command_call *call)
 {
     struct command_device *dev = call->dev;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* SITE:POSE: where a station stands, and that it is to stand elsewhere. */
+/* SITE:POSE: reports where a station stands, and moves it. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,7 +10,7 @@
 
 const struct command_unit command_unit_place = {"m, deg", 0, "M, DEG", {{NULL, 0}}};
 
-/* As the keys of a station allow (stations[] in firmware_sim/config/keys.c). */
+/* The limits are those of a station's keys (stations[] in firmware_sim/config/place_rows.h). */
 static const struct {
     const char *name, *unit;
     double most; /* of its absolute value */
@@ -74,7 +74,7 @@ static int take_station(struct command_call *call, const char *field, size_t len
                         whole ? "" : "whole numbers ", n);
 }
 
-/* So few digits as say a number exactly. */
+/* Prints the fewest digits that read back as the same number. */
 static size_t print_number(char *text, size_t room, double value)
 {
     int digits = 15;
@@ -120,7 +120,7 @@ int command_place_query(struct command_call *call)
     return reply_place(call, limit);
 }
 
-/* Station and place into call->out; -1 when it failed. */
+/* Reads station and place into call->out; returns -1 when it failed. */
 static int take_parameters(struct command_call *call)
 {
     struct command_result *out = call->out;

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* SCAN:STEP, SCAN:STEP:LINE, SCAN:STEP:PAN: angles from pulse to pulse and from line to line, in nano-degrees. Of a
- * line head they follow from its rates, which they set, and the pulse rate stays:
+/* SCAN:STEP, SCAN:STEP:LINE, SCAN:STEP:PAN: angles from pulse to pulse and from line to line, in nano-degrees. On a
+ * line head they follow from its rates. Setting them sets the rates, except the pulse rate:
  *
  *     step in the line  = sweep * lines / pulse rate        the sweep with its blind part
  *     step of the pan   = pan speed / lines
  *
- * Rates are multiples of 1e-6 Hz and 1e-6 deg/s, so that few steps are met exactly: the nearest rates are set, and the
- * reply says which step they give. A sphere has one step, for both. Of other heads the pattern is fixed: a reading. */
+ * Rates are multiples of 1e-6 Hz and 1e-6 deg/s, so few steps are possible exactly: the nearest rates are set, and the
+ * reply is the step that they give. A sphere has one step, for both. Other heads have a fixed pattern, so their step
+ * can only be read. */
 #include "firmware_sim/command/command_inside.h"
 
 #include <stdio.h>
@@ -22,14 +23,14 @@ static int64_t nearest(wide num, wide den)
     return (int64_t)((num + den / 2) / den);
 }
 
-/* ---- what a head's settings give */
+/* ---- steps that a head's settings give */
 
 int64_t command_step_ndeg(uint32_t steps)
 {
     return nearest(TURN_NDEG, steps);
 }
 
-/* A sphere has whole numbers of steps in a turn: the step that it has. */
+/* The step of a sphere, which has a whole number of steps in a turn. */
 static int64_t sphere_step(int64_t step_udeg)
 {
     return HALF_UDEG % step_udeg == 0 ? step_udeg * NDEG_PER_UDEG : nearest(TURN_NDEG, emitter_sphere_steps(step_udeg));
@@ -50,14 +51,14 @@ static int64_t pan_step(const struct command_device *dev, const struct head_sett
     return nearest((wide)s->pan_udeg_s * NANO, s->lines_uhz);
 }
 
-/* The coarser one: no two neighbours are further apart. */
+/* The coarser one of both steps: no two neighbours are further apart. */
 static int64_t both_step(const struct command_device *dev, const struct head_settings *s)
 {
     const int64_t in_line = line_step(dev, s), of_pan = dev->limits.emitter == EMITTER_LINE ? pan_step(dev, s) : 0;
     return in_line > of_pan ? in_line : of_pan;
 }
 
-/* ---- what a step needs: the nearest rates, within the head's */
+/* ---- the nearest rates for a step, within the head's limits */
 
 static int64_t most_lines(const struct command_device *dev)
 {
@@ -100,7 +101,7 @@ static int64_t most_of_both(const struct command_device *dev, int64_t most)
 
 /* ---- spheres: a step has to divide half a turn */
 
-/* The nearest of those at or above a step (up: 1), or at or below it. */
+/* The nearest such step at or above a step (up: 1), or at or below it. */
 static int64_t whole_part(int64_t step_udeg, int up)
 {
     int64_t n = HALF_UDEG / step_udeg;
@@ -110,7 +111,7 @@ static int64_t whole_part(int64_t step_udeg, int up)
     return HALF_UDEG / n;
 }
 
-/* DEF sets what power-up had. */
+/* Whether the value is DEF, which sets the rates of power-up. */
 static int is_default(const struct command_call *call)
 {
     return call->value.kind == COMMAND_VALUE_DEF;
@@ -175,7 +176,7 @@ static const char *pan_why_not(const struct command_device *dev)
     return has ? NULL : "the head has no pan";
 }
 
-/* One of the geometries, as the caller has checked. */
+/* Sets one of the geometries; the caller has checked that it is one. */
 static int write_planar(struct command_call *call, int64_t step_ndeg)
 {
     const struct head_limits *l = &call->dev->limits;
@@ -185,7 +186,7 @@ static int write_planar(struct command_call *call, int64_t step_ndeg)
     return 0;
 }
 
-/* The ends of all geometries. The caller leaves those of the line rate that is set. */
+/* The range over all geometries. The caller narrows it to those of the present line rate. */
 static void planar_range(const struct command_device *dev, int64_t *min, int64_t *max)
 {
     for (uint32_t i = 0; i < dev->limits.n_geometries; i++) {

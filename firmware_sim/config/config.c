@@ -12,7 +12,7 @@ void cfg_fail_missing(struct cfg_reader *rd, const struct cfg_key *key, uint32_t
     cfg_fail_key(rd, key->path, item, "missing, and it has no default; %s", cfg_allowed(key, rd->profile, allowed));
 }
 
-/* A bad value gives way to the default, so that what is computed from it can't fail. */
+/* The default replaces a bad value, so that checks that use it can't fail. */
 static void fill_one(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item,
                      const struct config_profile *profile)
 {
@@ -45,7 +45,7 @@ void cfg_fill_defaults(struct cfg_reader *rd, const struct config_profile *profi
     }
 }
 
-/* Which station's section `scanner` counts. */
+/* Chooses the station whose section `scanner` is used. */
 static void find_scanner(struct cfg_reader *rd, struct config *cfg, uint32_t station)
 {
     const size_t row = cfg_row(rd, cfg_find(&rd->table, "head.station"));
@@ -70,7 +70,7 @@ static void read_scanner(struct cfg_reader *rd, struct cfg_document *doc, const 
     cfg_end_scanner(rd);
 }
 
-/* known: the profile, where it was read before; NULL: not yet. Returns whether cfg->profile is read. */
+/* known: the profile, if it was read before; else NULL. Returns whether cfg->profile is read. */
 static int load_once(const char *const *sets, int n_sets, uint32_t station, struct config *cfg,
                      const struct config_profile *known, struct config_faults *faults)
 {
@@ -104,7 +104,7 @@ int cfg_load_for(const char *path, const char *const *sets, int n_sets, uint32_t
     begin(path, sets, n_sets, cfg);
     const int has_profile = load_once(sets, n_sets, station, cfg, NULL, faults);
     if (faults->n == 0) return SH_OK;
-    /* Values are read before the profile, but its limits belong into their errors: so once more. */
+    /* Values are read before the profile, but their errors need its limits. So read them once more. */
     const struct config_profile profile = cfg->profile;
     begin(path, sets, n_sets, cfg);
     if (has_profile) load_once(sets, n_sets, station, cfg, &profile, faults);

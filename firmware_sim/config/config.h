@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* The configuration: a YAML file and --set in, struct config out, checked. One table (keys.c) of key, type,
+/* The configuration. In: a YAML file and --set. Out: struct config, checked. One table (keys.c) of key, type,
  * unit, default, range and help gives parsing, defaults, errors and the reference.
  *
- * Units: as the key's name says (hz, deg, m). Everything is checked. All faults are found at once; each is
+ * Units: as the key's name says (hz, deg, m). Everything is checked. All diagnostics are found at once; each is
  * one line:
  *   FILE:LINE: KEY: what is wrong; what is allowed
  * Unknown keys, duplicate keys, trailing text ("30 kHz"), NaN, wrong types and values out of range are
  * errors. Relative paths in a file are relative to that file; in --set, to the working directory.
  *
- * The struct is constant once it is loaded: what a run measures or chooses stands in the site
+ * The struct is constant once it is loaded. Values that a run measures or chooses are in the site
  * (firmware_sim/site). */
 #ifndef FIRMWARE_SIM_CONFIG_CONFIG_H
 #define FIRMWARE_SIM_CONFIG_CONFIG_H
@@ -34,7 +34,7 @@
 
 enum {
     CONFIG_MAX_MESHES = 64,
-    CONFIG_MAX_COPIES = 256, /* that stand in the configuration itself, of all meshes together */
+    CONFIG_MAX_COPIES = 256, /* copies listed in the configuration itself, of all meshes together */
     CONFIG_MAX_LINKS = 8,
     CONFIG_MAX_STATIONS = 64,
     CONFIG_MAX_SURFACES = 64,
@@ -53,7 +53,7 @@ struct config_mesh {
      * seen from above, then shifted by move_m_s * t; with cycle_s, back and forth. All zero: the mesh stands
      * still. */
     double move_m_s[3], turn_deg_s, pivot_m[3], cycle_s;
-    char copies[CONFIG_PATH_LEN]; /* CSV file of places; empty: they stand in struct config_scene, or there are none */
+    char copies[CONFIG_PATH_LEN]; /* CSV file of places; empty: they are in struct config_scene, or there are none */
     int copy_labels;              /* each copy has surfaces of its own */
 };
 
@@ -62,12 +62,12 @@ static inline int config_mesh_moves(const struct config_mesh *mesh)
     return mesh->turn_deg_s != 0.0 || mesh->move_m_s[0] != 0.0 || mesh->move_m_s[1] != 0.0 || mesh->move_m_s[2] != 0.0;
 }
 
-/* A copy of a mesh that stands in the configuration itself. */
+/* A copy of a mesh that is listed in the configuration itself. */
 struct config_copy {
     uint32_t mesh;
     struct scene_place place;
 };
-enum { CONFIG_COPY_SCALES = 1000 }; /* from one over so much to so much */
+enum { CONFIG_COPY_SCALES = 1000 }; /* a copy's scale: from 1 / CONFIG_COPY_SCALES to CONFIG_COPY_SCALES */
 
 /* How the scene lies on the Earth; core/geoframe.h. */
 enum config_anchor_source { ANCHOR_NONE, ANCHOR_EXPLICIT, ANCHOR_IFC, ANCHOR_UTM, ANCHOR_ECEF, ANCHOR_GEOTIFF };
@@ -76,21 +76,21 @@ struct config_anchor {
     double origin_m[3], lat_deg, lon_deg, height_m, north_deg;
     uint32_t utm_zone; /* 0: UPS */
     int north;         /* hemisphere */
-    int height_given;  /* ifc: height_m stands in for RefElevation; geotiff: it is not 0 by default */
+    int height_given;  /* height_m is given: ifc uses it in place of RefElevation, geotiff in place of 0 */
 };
 
-/* In which form a station's place on the Earth is given. */
+/* The form in which a station's place on the Earth is given. */
 enum config_place { PLACE_NONE, PLACE_GEODETIC, PLACE_UTM, PLACE_ECEF };
 
 enum config_choice { CHOICE_AUTO, CHOICE_OFF, CHOICE_ON };
 
-/* What a station's head stands on (firmware_sim/site/tripod.c). */
+/* The tripod under a station's head (firmware_sim/site/tripod.c). */
 struct config_tripod {
-    int given; /* 0: nothing, which hides nothing */
+    int given; /* 0: no tripod, so nothing is hidden */
     double leg_m, opening_min_deg;
     double head_above_m;     /* the head's origin above the tripod's top */
     enum config_choice cone; /* hides what is below the head; auto: where there are no legs to hide it */
-    int legs;                /* three prisms that are in view, too */
+    int legs;                /* three prisms that the head can scan */
     double leg_diameter_m, legs_heading_deg;
 };
 
@@ -115,14 +115,14 @@ struct config_station {
 enum config_platform_kind { PLATFORM_STATIC, PLATFORM_TRAJECTORY, PLATFORM_LIVE, PLATFORM_STOPS };
 enum config_at_end { PLATFORM_STOP, PLATFORM_HOLD };
 
-/* What the head stands on. Attitudes as core/pose.h has them. */
+/* The platform under the head. Attitudes as core/pose.h defines them. */
 struct config_platform {
     enum config_platform_kind kind;
     char file[CONFIG_PATH_LEN], waypoints[CONFIG_PATH_LEN];   /* trajectory, stops: one of them */
     double start_s, end_s;                                    /* part of the trajectory, after its first sample */
     int has_end;                                              /* 0: to its last sample */
     double step_s;                                            /* stops: from each to the next */
-    double frames_per_s, first_frame, last_frame, frame_step; /* stops: the same in frames; 0 frames a second: not */
+    double frames_per_s, first_frame, last_frame, frame_step; /* stops: the same in frames; frames_per_s 0: unused */
     enum config_at_end at_end;
     double mount_m[3], mount_heading_deg, mount_pitch_deg, mount_roll_deg; /* of the head on the platform */
     double reach_m, extrapolate_ms;                                        /* live */
@@ -180,17 +180,17 @@ struct config_instrument {
 struct config_head {
     struct head_settings settings;
     char serial[32], name[32];
-    int start; /* scan when booted; run alone looks at it */
+    int start; /* scan when booted; only the command run uses it */
     enum detect_ambiguity ambiguity;
     uint32_t mta_zones;
-    /* of a sphere (core/emitter.h), and part of the profile's emitter from then on */
+    /* of a sphere (core/emitter.h); also copied into the profile's emitter */
     int64_t step_udeg, ring_start_udeg, ring_stop_udeg;
     double range_min_m,
         range_max_m; /* nothing nearer or farther is an echo; the profile in this struct has them, too */
-    double profile_min_m, profile_max_m; /* what the head profile's file has */
+    double profile_min_m, profile_max_m; /* the range limits in the head profile's file */
 };
 
-/* What is scanned of the meshes; n_objects 0: all. */
+/* The objects of the meshes that are scanned; n_objects 0: all. */
 enum { CONFIG_MAX_OBJECTS = 64 };
 struct config_target {
     char object[CONFIG_MAX_OBJECTS][SCENE_NAME_LEN]; /* patterns */
@@ -261,14 +261,14 @@ struct config_loop {
     enum config_pace pace;
 };
 
-/* One member per section of the file. A file may have several scanners: stations with a section `scanner`, whose
- * keys stand in for those of the file's own sections. A struct config is that of one of them. */
+/* One member per section of the file. A file may have several scanners: the keys in a station's section `scanner`
+ * replace those of the file's own sections. A struct config is the configuration of one scanner. */
 struct config {
     char file[CONFIG_PATH_LEN];
-    const char *const *sets; /* that it was loaded with; not copied */
+    const char *const *sets; /* the --set that it was loaded with; not copied */
     int n_sets;
-    char scenario_file[CONFIG_PATH_LEN]; /* that was added; empty: none */
-    int links_are_not_here;              /* they are those of head.station's scanner, and this is another */
+    char scenario_file[CONFIG_PATH_LEN]; /* the scenario that was added; empty: none */
+    int links_are_not_here;              /* 1: this is not the scanner of head.station, which has the links */
     char profile_file[CONFIG_PATH_LEN];
     struct config_profile profile;
     struct config_head head;
@@ -295,45 +295,45 @@ struct config {
     struct fault_list faults;
 };
 
-/* What is wrong with a configuration, fault by fault, in the order of the file; then of --set and of the head
- * profile. */
+/* The diagnostics of a configuration, in the order of the file; then those of --set and of the head profile. */
 enum { CONFIG_MAX_FAULTS = 20 };
 struct config_faults {
-    uint32_t n; /* all that were found; fault has the first CONFIG_MAX_FAULTS of them */
+    uint32_t n; /* all diagnostics that were found; fault[] has the first CONFIG_MAX_FAULTS */
     struct sh_err fault[CONFIG_MAX_FAULTS];
     uint64_t place[CONFIG_MAX_FAULTS]; /* what they are ordered by */
 };
 
-/* Reads path, its profile, then the `key=value` settings in order (as from --set, each checked the same way,
- * named `--set KEY` in errors). On failure cfg is unspecified, and err has the first fault. cfg is large:
- * allocate it. */
+/* Reads path, its profile, then the `key=value` settings of --set, in order. These are checked in the same way, and
+ * errors name them `--set KEY`. On failure cfg is unspecified, and err has the first diagnostic. cfg is large: allocate
+ * it. */
 int config_load(const char *path, const char *const *sets, int n_sets, struct config *cfg, struct sh_err *err);
 
-/* The same, with all faults. Returns SH_OK or the code of the first. */
+/* The same, with all diagnostics. Returns SH_OK or the code of the first. */
 int config_load_all(const char *path, const char *const *sets, int n_sets, struct config *cfg,
                     struct config_faults *faults);
 
-/* The same of a text that has links, loop and faults alone; name: in its errors. The rest of cfg is zero. */
+/* The same for a text that has only links, loop and faults. Errors call it `name`. The rest of cfg is zero. */
 int config_load_links(const char *text, const char *name, const char *const *sets, int n_sets, struct config *cfg,
                       struct config_faults *faults);
 
-/* Adds the faults of a scenario, a file that has nothing but a list `faults`: a path, or the name of one that comes with
- * the program. Once. What is wrong with it goes to `faults`; then nothing is added, and the code of the first is
- * returned. */
+/* Adds the injected faults of a scenario, a file that has nothing but a list `faults`. name: a path, or the name of a
+ * scenario that comes with the program. At most once. Diagnostics go to `faults`; then nothing is added, and the code
+ * of the first is returned. */
 int config_add_scenario(struct config *cfg, const char *name, struct config_faults *faults);
-/* "a, b, c": those that come with the program, as far as buf reaches. */
+/* "a, b, c": the scenarios that come with the program, as many as buf holds. */
 void config_name_scenarios(char *buf, size_t len);
-/* A fault as one line of YAML, "{kind: drop, every: 10}", for a head with this configuration. Takes 200 KiB of stack. */
+/* Reads a fault from one line of YAML, "{kind: drop, every: 10}", for a head with this configuration. Takes 200 KiB of
+ * stack. */
 int config_read_fault(const struct config *cfg, const char *text, struct fault *out, struct sh_err *err);
 /* Whether faults of the kind can strike on the link. */
 int config_link_has_fault(const struct link_spec *link, enum fault_kind kind);
 
-/* A configuration is loaded for the scanner of head.station. Whether station i, from 0, has this scanner, and
- * whether all have. The stops of a platform have that of the one station. */
+/* A configuration is loaded for the scanner of head.station. config_serves: whether station i, from 0, has this
+ * scanner. config_is_alone: whether all have it. The stops of a platform have the scanner of the one station. */
 int config_serves(const struct config *cfg, uint32_t i);
 int config_is_alone(const struct config *cfg);
-/* The configuration of the scanner at a station, from 1, with that one as its head.station. It has no links, but
- * output and loop as cfg has them by now, and its scenario. The sets that cfg was loaded with must still be there. */
+/* Loads the configuration of the scanner at a station, from 1, which becomes its head.station. It has no links. Output,
+ * loop and scenario are those of cfg as it is now. The sets that cfg was loaded with must still be there. */
 int config_load_scanner(const struct config *cfg, uint32_t station, struct config *out, struct sh_err *err);
 
 /* The program of a pulse rate, as an index; 0 for a head without programs. */
@@ -341,22 +341,22 @@ uint32_t config_program_of(const struct config_profile *profile, int64_t prr_uhz
 /* The largest pulse rate that the head has up to prr_uhz; its smallest one where it has none. */
 int64_t config_rate_below(const struct config_profile *profile, int64_t prr_uhz);
 
-/* What a profile says about the signal in one of its programs; the rest of it (sharp, extinction, seed) is 0. */
+/* The signal of one of a profile's programs; members that no profile has (sharp, extinction, seed) are 0. */
 void config_signal_spec(const struct config_profile *profile, const struct config_program *program,
                         struct detect_signal_spec *spec);
 
-/* The schedule of a head with some settings; of a list of directions without the list (site_fill_spec). */
+/* The schedule of a head with some settings. A list of directions is left out; site_fill_spec adds it. */
 void config_fill_spec(const struct config_profile *profile, const struct head_settings *settings,
                       struct schedule_spec *spec);
 
-/* The steps of a turn of a planar head: one of its geometries. */
+/* Sets the steps of a turn of a planar head, which are those of one of its geometries. */
 void config_set_steps(struct config_profile *profile, uint32_t steps);
 
-/* Gives a configuration other ranges, noise and step, as if its keys had them. cfg is a copy of one that was loaded; the
- * settings are allowed for it (command.h). SH_EINPUT: no ring is left. */
+/* Gives a configuration other ranges, noise and step, as if its keys had them. cfg is a copy of a loaded one; the
+ * settings must be allowed for it (command.h). SH_EINPUT: no ring of the sphere is left. */
 int config_apply_settings(struct config *cfg, const struct head_settings *settings, struct sh_err *err);
 
-/* head.range_min_m or range_max_m leaves less than the profile has. */
+/* Whether head.range_min_m or range_max_m leaves less than the profile's range. */
 static inline int config_limits_range(const struct config *cfg)
 {
     return cfg->head.range_min_m > cfg->head.profile_min_m || cfg->head.range_max_m < cfg->head.profile_max_m;
@@ -376,23 +376,23 @@ static inline int config_has_footprint(const struct config *cfg)
 /* Threads that cast: loop.threads, or one per processor. */
 uint32_t config_threads(const struct config *cfg);
 
-/* Why the beams of a scan do not all begin at one place of a scene that stands still; NULL: they do. That is
- * what an adaptive beam needs. */
+/* Why the beams of a scan do not all begin at one place of a scene that stands still; NULL: they do. An adaptive beam
+ * needs that. */
 const char *config_beam_moves(const struct config *cfg);
 
-/* Why rays do not all begin at the head's station, as a sight needs it (core/sight.h); NULL: they do. */
+/* Why rays do not all begin at the head's station; NULL: they do. A visibility map (core/sight.h) needs that. */
 const char *config_rays_move(const struct config *cfg);
 
-/* What the tables say of a key. Strings are constant, but for `what`. */
+/* A key as the tables describe it. Strings are constant, except `what`. */
 struct config_key_text {
     const char *path, *help;
-    const char *const *words; /* the values that it takes, NULL at the end; NULL: others */
+    const char *const *words; /* the words that it takes, NULL at the end; NULL: its values are no words */
     int has_value;            /* 0: a section, or a list */
-    char what[1024];          /* type, unit, allowed values, default; may be left out or not */
+    char what[1024];          /* type, unit, allowed values, default, and whether it may be left out */
 };
-/* Of a configuration's keys, or of a head profile's. */
+/* The keys of a configuration, or those of a head profile. */
 enum config_keys { CONFIG_KEYS, CONFIG_PROFILE_KEYS };
-/* What stands above them in the reference. */
+/* The text above them in the reference. */
 const char *config_keys_intro(enum config_keys keys);
 /* Key i, in the order of the reference; 0 after the last one. */
 int config_describe_key(enum config_keys keys, size_t i, struct config_key_text *out);
@@ -401,22 +401,22 @@ int config_describe_key(enum config_keys keys, size_t i, struct config_key_text 
 void config_print_reference(FILE *out);
 
 /* The same for one section ("head", "scene.anchor"), for one key, or for "profile": the keys of head
- * profiles. SH_EINPUT names the sections that there are. */
+ * profiles. SH_EINPUT: there is no such section or key; err names the sections. */
 int config_print_section(const char *section, FILE *out, struct sh_err *err);
 
-/* A configuration with all keys, each with its help, that loads: the needed ones stand there, the others
- * behind a '#' with their defaults. It names a profile and a mesh that come with the program. */
+/* Prints a configuration that loads and has all keys, each with its help. Keys that need a value have one; the others
+ * are commented out with their defaults. It names a profile and a mesh that come with the program. */
 int config_print_example(FILE *out, struct sh_err *err);
 
-/* The profiles in a directory: name, programs, and how sure their figures are. Returns how many. dir NULL: the
- * first directory of the lookup below that exists, without a configuration. */
+/* Lists the profiles in a directory: name, programs, and how sure their figures are. Returns how many. dir NULL: the
+ * first directory that exists of the lookup below, without a configuration. */
 int config_list_profiles(const char *dir, FILE *out, struct sh_err *err);
 
 /* Reads the profile NAME, looked up as for a configuration that lies at config_file. */
 int config_load_profile(const char *name, const char *config_file, struct config_profile *profile, struct sh_err *err);
 
-/* Finds the directory of profiles: $SCANHEAD_HEADS, beside the configuration (heads/), beside the program
- * (installed or in its build folder), or config/heads here. A profile is named by `head.profile: NAME`,
- * looked up there, or by a path that ends in .yaml. */
+/* Finds the directory of profiles: $SCANHEAD_HEADS, heads/ beside the configuration, beside the program
+ * (installed or in its build folder), or config/heads in the working directory. `head.profile` is a NAME that is
+ * looked up there, or a path that ends in .yaml. */
 
 #endif

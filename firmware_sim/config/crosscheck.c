@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What concerns more than one key, or the world: limits of the head profile, order of angles, files, keys of
+/* Checks that concern more than one key, or files: limits of the head profile, order of angles, files, keys of
  * links and platforms. Places on the Earth: places.c; noise, signal, surfaces: measurement.c. */
 #include "firmware_sim/config/table.h"
 
@@ -11,7 +11,7 @@
 #include "core/infile.h"
 #include "firmware_sim/config/epoch.h"
 
-/* Of two keys that contradict, the one to name: the first unless only the second was given. */
+/* The key to name where two contradict each other: the first, unless only the second was given. */
 static const char *given_of(const struct cfg_reader *rd, const char *first, const char *second)
 {
     return !cfg_is_given(rd, first, 0) && cfg_is_given(rd, second, 0) ? second : first;
@@ -174,7 +174,7 @@ const char *config_rays_move(const struct config *cfg)
     return config_head_moves(&cfg->platform) ? "the head moves" : offset_of(cfg);
 }
 
-/* The rest of it, only the loaded scene and the plan can say (firmware_sim/site/sights.c). */
+/* All other checks of it need the loaded scene and the plan (firmware_sim/site/sights.c). */
 static void check_sight(struct cfg_reader *rd, const struct config *cfg)
 {
     const char *why = config_rays_move(cfg);
@@ -185,10 +185,9 @@ static void check_sight(struct cfg_reader *rd, const struct config *cfg)
 
 static const double LEAST_PULSE_NS = 0.1; /* 15 mm of range */
 
-/* A footprint needs a beam that has one, and a pulse that is not too short: sub-rays that meet one oblique
+/* A footprint needs a beam that has one, and a pulse that is not too short: sub-rays that hit one oblique
  * surface have different ranges. Where the pulse is too short to join them, each would be an echo of its
- * own, or be lost because it is too weak. An adaptive beam needs outlines, which are those seen from one
- * place. */
+ * own, or be lost because it is too weak. An adaptive beam needs the outlines that one place sees. */
 static void check_beam(struct cfg_reader *rd, const struct config *cfg)
 {
     const struct config_profile *p = &cfg->profile;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Emitters of head profiles: which keys belong to which of them, and what follows from them: pulse rates,
+/* Emitters of head profiles: the keys that belong to each, and the values that follow from them: pulse rates,
  * limits of line angles, the schedule of a head. */
 #include "firmware_sim/config/table.h"
 
@@ -69,7 +69,7 @@ static void check_owners(struct cfg_reader *rd, int emitter)
     }
 }
 
-/* The pulse rates of a head with so many pulses a line. */
+/* Sets the pulse rates from the pulses of a line and the line rates. */
 static void set_rates(struct cfg_reader *rd, const char *key, struct config_profile *p)
 {
     const uint32_t n = p->emitter.steps;
@@ -140,7 +140,7 @@ static void set_sphere(struct cfg_reader *rd, struct config_profile *p)
     set_rates(rd, "step_deg", p);
 }
 
-/* The list itself is read again where it is used (firmware_sim/site). */
+/* Reads the list only to check and count it; the site reads it again (firmware_sim/site). */
 static void set_directions(struct cfg_reader *rd, struct config_profile *p)
 {
     struct emitter_firing *direction;
@@ -172,7 +172,7 @@ void cfg_check_emitter(struct cfg_reader *rd, struct config_profile *p)
     if (kind == EMITTER_DIRECTIONS) set_directions(rd, p);
 }
 
-/* What is defined for a mirror and a pan alone. */
+/* Refuses keys that are defined only for a mirror and a pan. */
 static void check_instrument(struct cfg_reader *rd, const struct config *cfg)
 {
     static const char *const of_mirror[] = {
@@ -201,8 +201,8 @@ int cfg_line_has_width(const struct config *cfg)
 
 static const char *const of_sphere[] = {"head.step_deg", "head.ring_start_deg", "head.ring_stop_deg"};
 
-/* The step and the rings that the configuration asks for. With many pulses a line the fastest line rate falls: no more
- * pulses a second than any head may have. */
+/* The step and the rings that the configuration asks for. With many pulses a line the fastest line rate falls, so that
+ * the pulse rate stays within what any head may have. */
 static void set_sphere_settings(struct cfg_reader *rd, struct config *cfg)
 {
     struct config_profile *p = &cfg->profile;

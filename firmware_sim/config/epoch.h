@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The key time.epoch: which time of day it is at power-up.
+/* The key time.epoch, which gives the time of day at power-up.
  *
  * In: the key's text and a table of leap seconds. Out: where the time comes from and, for a date, TAI in ns
  * (core/utc.h). */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The list of faults: each is one line that says where, which key, what is wrong and what is allowed. */
+/* The list of diagnostics: each is one line that says where, which key, what is wrong and what is allowed. */
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
@@ -7,7 +7,7 @@
 #include "firmware_sim/base/nearest.h"
 #include "firmware_sim/config/table.h"
 
-/* The last one makes room. */
+/* Where the list is full, the last diagnostic makes room. */
 int cfg_add_fault(struct config_faults *faults, uint64_t place, int code, const char *text)
 {
     uint32_t at = faults->n < CONFIG_MAX_FAULTS ? faults->n : CONFIG_MAX_FAULTS;
@@ -85,7 +85,7 @@ static int is_bad(const struct cfg_reader *rd, const char *of, uint32_t item)
     return 0;
 }
 
-/* One below the section is bad; in a list, of this item. */
+/* A key below the section is bad; in a list, a key of this item. */
 static int has_bad(const struct cfg_reader *rd, const char *section, uint32_t item)
 {
     const size_t len = strlen(section);
@@ -112,7 +112,7 @@ int cfg_fail_key(struct cfg_reader *rd, const char *path, uint32_t item, const c
     if (is_bad(rd, path, item)) return SH_EINPUT;
     rd->bad[cfg_row(rd, key)][item] = 1;
     cfg_full_name(rd, key, item, name);
-    if (rd->scanner >= 0 && !rd->own[cfg_row(rd, key)]) { /* two things that don't fit, one of them the scanner's */
+    if (rd->scanner >= 0 && !rd->own[cfg_row(rd, key)]) { /* the file's key contradicts one of the scanner */
         snprintf(of, sizeof of, "%s, for stations[%d].scanner", name, rd->scanner);
         snprintf(name, sizeof name, "%.190s", of);
     }
@@ -139,8 +139,8 @@ const char *cfg_show(const char *text, char *buf)
     return buf;
 }
 
-/* A known key that the writer may have meant: one letter or two away here, cut short here, or the same word
- * elsewhere. */
+/* A known key that the writer may have meant: in this section one that differs in a letter or two or is cut short, or
+ * the same word in another section. */
 static const struct cfg_key *suggest(const struct cfg_table *table, const char *parent, const char *word)
 {
     const struct cfg_key *best = NULL;
@@ -163,7 +163,7 @@ static const struct cfg_key *suggest(const struct cfg_table *table, const char *
 
 int cfg_fail_unknown(struct cfg_reader *rd, int line, const char *parent, uint32_t item, const char *word)
 {
-    /* Far more faults than are shown come from a hostile file: they cost no search of the table each. */
+    /* A hostile file may have far more diagnostics than are shown: don't search the table for each. */
     if (rd->faults->n >= 10 * CONFIG_MAX_FAULTS) return cfg_fail(rd, line, "configuration", "unknown key");
     char known[256] = "", section[CFG_PATH_MAX], hint[CFG_PATH_MAX], shown[CFG_SHOW_MAX], name[3 * CFG_PATH_MAX];
     char before[CFG_PATH_MAX] = "";

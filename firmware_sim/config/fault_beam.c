@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults that change what is measured: what a head must have, so that they do what they say. */
+/* Injected faults that change what is measured: checks that the head has what they act on. */
 #include "firmware_sim/config/table.h"
 
 static void check_mirror(struct cfg_reader *rd, const struct config *cfg, const struct fault *f, uint32_t i)
@@ -32,7 +32,7 @@ static void check_factor(struct cfg_reader *rd, const struct config *cfg, const 
                      f->factor, lines_hz, cfg->profile.name, most_hz / lines_hz);
 }
 
-/* Amplitudes, or noise that grows: else nobody would see it. */
+/* A soiled window shows only in amplitudes, or in noise that grows as the signal fades. */
 static void check_window(struct cfg_reader *rd, const struct config *cfg, uint32_t i)
 {
     const int is_noisy = cfg->noise.range == RANGE_NOISE_ON && cfg->profile.range_sigma_m > 0.0;

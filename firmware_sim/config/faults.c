@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults on request: their keys with each other, with the links and with the head; scenarios, and faults that commands
- * add. (What is wrong with a configuration is in fault.c.) */
+/* Injected faults: checks of their keys against each other, the links and the head; scenarios, and faults that commands
+ * add. (Diagnostics of a configuration are in fault.c.) */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -23,7 +23,7 @@ enum {
     WHEN_COUNTED = WHEN_FRAME | WHEN_REPLY | WHEN_CONNECTION,
 };
 
-/* Keys that say when, and who has them. */
+/* Keys that say when a fault strikes, and the places that have them. */
 static const struct {
     const char *path;
     unsigned places;
@@ -41,10 +41,10 @@ static const struct {
     {"faults[].until_pulse", WHEN_FRAME | WHEN_MOMENT},
 };
 
-/* Keys that say what. */
+/* Keys that say what a fault does. */
 static const char *const what[] = {"n", "byte", "reseal", "for_ms", "factor", "deg", "hz", "loss_db", "jump_s", "ppm"};
 
-/* Those that a kind has, and up to what n goes. needs_ms: for_ms above 0 must be given. */
+/* The keys that a kind has, and its largest n. needs_ms: for_ms above 0 must be given. */
 static const struct {
     const char *keys;
     double n_max;
@@ -153,7 +153,7 @@ void cfg_check_fault_links(struct cfg_reader *rd, const struct config *cfg, cons
         if (needs_time(f->kind) && (cfg->time.epoch[0] == '\0' || strcmp(cfg->time.epoch, "none") == 0))
             cfg_fail_key(rd, "faults[].kind", i, "%s needs a time of day; allowed where time.epoch is not none",
                          fault_names[f->kind]);
-        if (cfg->links_are_not_here) continue; /* they were checked where they are */
+        if (cfg->links_are_not_here) continue; /* checked with the scanner that has the links */
         if (f->link > cfg->n_links)
             cfg_fail_key(rd, "faults[].link", i, "there is no link %u; allowed 0 to %u", f->link, cfg->n_links);
         else if (f->link != 0 && fault_place_of(f->kind) != FAULT_AT_MOMENT &&

@@ -75,7 +75,7 @@ static const char *list_of(const struct config_emitter *c, char *buf, size_t len
     return buf;
 }
 
-/* The first geometry with what is given. */
+/* Takes the first geometry that has the given line rate and step. */
 void cfg_choose_geometry(struct cfg_reader *rd, struct config *cfg)
 {
     struct config_profile *p = &cfg->profile;

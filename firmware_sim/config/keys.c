@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /* The table of a configuration's keys; profile_keys.c has that of head profiles. A row has the key's path,
  * type, unit, default, limits and member of struct config. Parsing, defaults, errors, --set and `scanhead
- * check --help` come from the rows alone; what concerns more than one key stands in crosscheck.c, places.c
+ * check --help` come from the rows alone; checks of more than one key are in crosscheck.c, places.c
  * and measurement.c. */
 #include "core/cast.h"
 #include "drivers/usb/backend.h"
 #include "firmware_sim/config/table.h"
 
-/* How a row begins: path, offset and size. Where path and member have different names, the path stands
- * before. */
+/* The beginning of a row: path, offset and size. Where path and member have different names, the row writes the path
+ * itself. */
 #define IN_CONFIG(member)  CFG_MEMBER(struct config, member)
 #define IN_STATION(member) CFG_MEMBER(struct config_station, member)
 #define SETTING(member)    IN_CONFIG(head.settings.member)

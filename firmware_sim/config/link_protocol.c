@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a link's protocol needs: of the link, of the stream, of the head, of the time. */
+/* Checks what a link's protocol needs from the link, the stream, the head and the time. */
 #include <stdio.h>
 #include <string.h>
 
@@ -7,7 +7,7 @@
 #include "drivers/protocol/velodyne.h"
 #include "firmware_sim/config/table.h"
 
-/* Kinds of links that each protocol is spoken on. */
+/* The kinds of links that each protocol works on. */
 static const struct {
     unsigned kinds; /* bit per enum link_type */
     const char *allowed;
@@ -94,7 +94,7 @@ int cfg_protocol_fits(const struct protocol_ops *ops, const struct emitter *emit
            (emitter->kind != EMITTER_BEAMS || ops->n_beams == 0 || ops->n_beams == emitter->n_beams);
 }
 
-/* The head must be of a kind that the protocol has words for. */
+/* The head's emitter must be one that the protocol can describe. */
 static void check_head(struct cfg_reader *rd, const struct config *cfg, uint32_t i, const struct protocol_ops *ops)
 {
     const struct emitter *emitter = &cfg->profile.emitter;
@@ -114,7 +114,7 @@ static void check_head(struct cfg_reader *rd, const struct config *cfg, uint32_t
                      ops->n_beams, cfg->profile.name, where, emitter->n_beams, ops->n_beams);
 }
 
-/* As the device's packets. */
+/* The default source port is that of the real device's packets. */
 static void set_source_port(const struct cfg_reader *rd, struct link_spec *link, uint32_t i)
 {
     if (link->type != LINK_UDP || cfg_is_given(rd, "links[].source_port", i)) return;
@@ -138,7 +138,7 @@ static void check_protocol(struct cfg_reader *rd, struct config *cfg, uint32_t i
         return;
     }
     set_source_port(rd, link, i);
-    /* As the device: it turns a second client away. */
+    /* The real device turns a second client away. */
     if (link->protocol == PROTOCOL_SCIP && !cfg_is_given(rd, "links[].max_sessions", i)) link->max_sessions = 1;
     check_stream(rd, cfg, i, ops);
     check_head(rd, cfg, i, ops);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A configuration of links, loop and faults alone, for what has no head and no scene: a recording that is replayed. */
+/* A configuration of links, loop and faults alone, for a recording that is replayed: it has no head and no scene. */
 #include <stdio.h>
 #include <string.h>
 

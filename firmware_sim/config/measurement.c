@@ -20,7 +20,7 @@ void config_signal_spec(const struct config_profile *p, const struct config_prog
         spec->reach[i] = (struct detect_reach){program->reach[i].reflectance, program->reach[i].range_m};
 }
 
-/* Whether a program's reaches are such as some air explains. The fault is of the key that they stand in. */
+/* Checks that some attenuation by air explains a program's reaches. The diagnostic names the key that has them. */
 static void check_signal_of(struct cfg_reader *rd, const struct config_profile *profile, uint32_t program,
                             const char *key)
 {
@@ -49,7 +49,7 @@ void cfg_check_reaches(struct cfg_reader *rd, struct config_profile *profile)
             check_signal_of(rd, profile, i, "programs[].reach_90_m");
 }
 
-/* NaN for what an entry leaves out. */
+/* Sets members that an entry leaves out to NaN. */
 static void mark_unsaid(const struct cfg_reader *rd, uint32_t i, struct surface *s)
 {
     const struct {

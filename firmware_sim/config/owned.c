@@ -11,7 +11,7 @@ struct owned_key {
     unsigned kinds; /* bit per kind that has it */
 };
 
-/* Tells each of these keys that is given though the kind does not have it. Returns whether there is none. */
+/* Reports each of these keys that is given although the kind does not have it. Returns whether there is none. */
 static int check_owned(struct cfg_reader *rd, const struct owned_key *key, size_t n, int kind, uint32_t item,
                        const char *owner, const char *allowed)
 {

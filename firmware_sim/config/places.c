@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* "required, allowed ..." of a key that is missing, after why. */
+/* Reports a missing key: why it is required, and what is allowed. */
 static int fail_required(struct cfg_reader *rd, const char *path, uint32_t item, const char *why)
 {
     char allowed[CFG_ALLOWED_MAX];
@@ -63,7 +63,7 @@ static const struct {
     {"stations[].ecef_m", PLACE_ECEF},
 };
 
-/* Which form is given, and that it is one. */
+/* Finds the form in which the place is given, and checks that it is only one. */
 static int find_form(struct cfg_reader *rd, struct config_station *station, uint32_t i)
 {
     const char *first = NULL;
@@ -85,7 +85,7 @@ static int find_form(struct cfg_reader *rd, struct config_station *station, uint
     return SH_OK;
 }
 
-/* A form is whole. Zone and hemisphere may come from an anchor in UTM. */
+/* Checks that the form is complete. Zone and hemisphere may come from an anchor in UTM. */
 static int complete_form(struct cfg_reader *rd, const struct config *cfg, struct config_station *station, uint32_t i)
 {
     static const char *const why[] = {[PLACE_GEODETIC] = "lat_deg, lon_deg and height_m go together",
@@ -108,8 +108,8 @@ static int complete_form(struct cfg_reader *rd, const struct config *cfg, struct
     return SH_OK;
 }
 
-/* Without an anchor: where it is in the scene, and for a CRS where on the Earth. With one: either, the other
- * follows.
+/* Without an anchor a station needs its place in the scene, and for a CRS its place on the Earth, too. With an anchor
+ * it needs one of them; the other follows.
  */
 static int check_station(struct cfg_reader *rd, const struct config *cfg, struct config_station *station, uint32_t i)
 {

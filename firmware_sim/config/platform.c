@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Checks across the keys of what the head stands on: which part of a trajectory, and where and when it stops. How long
- * a trajectory is, its file says (firmware_sim/site/platform.c). */
+/* Checks of the platform's keys against each other: the part of a trajectory, and where and when it stops. The length
+ * of a trajectory is known only from its file (firmware_sim/site/platform.c). */
 #include "firmware_sim/config/table.h"
 
 static int has_trajectory(const struct config_platform *p)
@@ -8,7 +8,7 @@ static int has_trajectory(const struct config_platform *p)
     return p->file[0] != '\0' || p->waypoints[0] != '\0';
 }
 
-/* Frames become seconds. */
+/* Converts frames to seconds. */
 static void take_frames(struct cfg_reader *rd, struct config_platform *p)
 {
     static const char *const seconds[] = {"platform.start_s", "platform.end_s", "platform.step_s"};

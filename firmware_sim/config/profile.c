@@ -26,7 +26,7 @@ int cfg_shared_path(int i, const char *name, char *buf)
     char *slash = n > 0 ? memrchr(program, '/', (size_t)n) : NULL;
     if (slash == NULL) slash = program;
     const int len = snprintf(buf, CONFIG_PATH_LEN, "%.*s/%s/%s", (int)(slash - program), program, beside[i], name);
-    if (len >= CONFIG_PATH_LEN) buf[0] = '\0'; /* nothing is there */
+    if (len >= CONFIG_PATH_LEN) buf[0] = '\0'; /* a path that is too long names no file */
     return 1;
 }
 
@@ -93,7 +93,7 @@ static void known_profiles(const struct profile_dirs *dirs, char *buf, size_t le
 
 /* ---- one profile */
 
-/* A figure that must not be above another one. strictly: nor equal to it. */
+/* Checks that a figure is not above another one; with `strictly`, nor equal to it. */
 static void check_order(struct cfg_reader *rd, const char *low_key, double low, const char *high_key, double high,
                         int strictly)
 {
@@ -109,7 +109,7 @@ static void check_sweep(struct cfg_reader *rd, const struct config_profile *p)
     if (sweep_deg > 360.0)
         cfg_fail_key(rd, "optical_gain", 0, "a sweep of 360 / facets * optical_gain is %.10g deg; allowed up to 360",
                      sweep_deg);
-    /* Rounding of the quotient and the product is far below one micro-degree. */
+    /* 1e-9 allows for rounding, which is far below one micro-degree. */
     else if (fov_deg > sweep_deg + 1e-9 && CFG_SOUND(rd, 0, "fov_min_deg", "fov_max_deg"))
         cfg_fail_key(rd, "fov_max_deg", 0,
                      "a field of view of %.10g deg does not fit into a sweep; allowed up to %.10g deg, "
@@ -117,7 +117,7 @@ static void check_sweep(struct cfg_reader *rd, const struct config_profile *p)
                      fov_deg, sweep_deg);
 }
 
-/* What a mirror and a pan have. */
+/* Checks the figures of a mirror and a pan. */
 static void check_line_head(struct cfg_reader *rd, const struct config_profile *p)
 {
     const double lines_min_hz = 1e-6 * (double)p->lines_min_uhz, prr_max_hz = 1e-6 * (double)p->prr_max_uhz;
@@ -146,7 +146,7 @@ static void check_profile(struct cfg_reader *rd, struct config_profile *p)
     cfg_check_reaches(rd, p);
 }
 
-/* The file's name is the profile's: two names could differ. */
+/* The profile is named by its file: a second name inside could differ. */
 static int name_profile(struct cfg_reader *rd, struct config_profile *profile)
 {
     const char *slash = strrchr(rd->file, '/');
@@ -163,7 +163,7 @@ static int name_profile(struct cfg_reader *rd, struct config_profile *profile)
     return SH_OK;
 }
 
-/* Returns whether it has no fault. */
+/* Returns whether it has no diagnostic. */
 static int read_profile(struct cfg_reader *rd, const char *file, struct config_profile *profile,
                         struct config_faults *faults)
 {

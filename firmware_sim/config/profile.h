@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A head profile: the figures of a kind of head, as its file in config/heads has them, and what follows from them. In
+/* A head profile: the figures of a kind of head from its file in config/heads, and values that follow from them. In
  * the units of the file's keys; constant once it is loaded. */
 #ifndef FIRMWARE_SIM_CONFIG_PROFILE_H
 #define FIRMWARE_SIM_CONFIG_PROFILE_H
@@ -19,7 +19,7 @@ struct config_reach {
     enum config_from from;
 };
 
-/* What a head does at one of its pulse rates. */
+/* A program: the figures of a head at one of its pulse rates. */
 struct config_program {
     int64_t prr_uhz;  /* 0: any rate of a head without programs */
     int64_t used_uhz; /* pulses within the field of view */
@@ -68,7 +68,7 @@ struct config_profile {
     double range_sigma_m, range_sigma_ppm; /* one sigma of the range noise: fixed part, and part per distance */
     double range_sigma_at_m, range_sigma_reflectance, range_sigma_floor_m; /* where the fixed part holds; its floor */
     double mirror_sigma_deg, pan_sigma_deg;                                /* one sigma of the angle noise */
-    /* Of the head as a whole: what limits any program. */
+    /* Of the head as a whole; they limit each program. */
     struct config_reach reach[DETECT_MAX_REACHES];
     uint32_t n_reaches; /* at least 1: range_max_m on 90 % where the file has none */
     /* One for each pulse rate, which rises. n_programs 0: any rate from prr_min to prr_max; program[0] then holds
@@ -79,8 +79,8 @@ struct config_profile {
     double threshold_snr, overlap_m, wavelength_nm, visibility_m, pulse_width_ns;
     double mirror_counts, pan_counts;        /* encoder counts per turn of the beam angle; 0: ideal (2^32 counts) */
     double beam_exit_m, beam_divergence_rad; /* full ones at 1/e2 (core/footprint.h) */
-    double beam_exit_given_m, beam_divergence_given_rad;                   /* as the maker gives them, ... */
-    enum beam_definition beam_exit_definition, beam_divergence_definition; /* ... and how it defines them */
+    double beam_exit_given_m, beam_divergence_given_rad;                   /* as the maker states them */
+    enum beam_definition beam_exit_definition, beam_divergence_definition; /* the maker's definition of a width */
     uint32_t max_echoes;
     double boot_s, spin_up_s, spin_down_s;
 };

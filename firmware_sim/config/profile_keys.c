@@ -2,8 +2,8 @@
 /* The table of a head profile's keys. */
 #include "firmware_sim/config/table.h"
 
-/* How a row begins: path, offset and size. Where path and member have different names, the path stands
- * before. */
+/* The beginning of a row: path, offset and size. Where path and member have different names, the row writes the path
+ * itself. */
 #define IN_PROFILE(member) CFG_MEMBER(struct config_profile, member)
 #define KEY(member)        #member, IN_PROFILE(member)
 #define EMITTER(member)    #member, IN_PROFILE(arrangement.member)
@@ -31,7 +31,7 @@ static const char *const turn_names[] = {
 
 /* clang-format off */
 #define FIGURE .flags = CFG_FIGURE
-/* The default of a key that only some emitters have: emitter.c says which, and asks for it there. */
+/* The default of a key that only some emitters have: emitter.c says which, and requires it for these. */
 #define OWNED ""
 static const struct cfg_key profile_keys[] = {
     {KEY(maker), CFG_TEXT, .flags = CFG_ASCII, .help = "Maker, as in *IDN?."},

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What `scanhead list` shows of a head profile: its programs, the protocols that speak for it, and how sure its
+/* Prints a head profile for `scanhead list`: its programs, the protocols that can describe it, and how sure its
  * figures are. */
 #include "firmware_sim/config/table.h"
 
@@ -60,7 +60,7 @@ static void put_programs(const struct config_profile *p, FILE *out)
 
 /* ---- beam and accuracy */
 
-/* `3.5 mm FWHM, 5.95 mm at 1/e2`: as the maker gives it, then as the program takes it. */
+/* `3.5 mm FWHM, 5.95 mm at 1/e2`: the maker's width, then the program's. */
 static void put_width(const struct cfg_reader *rd, const char *key, double given, double at_1_e2, FILE *out)
 {
     const struct cfg_key *row = cfg_find(&rd->table, key);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Programs of a head profile: what depends on its pulse rate. In: the figures as the file has them. Out: each
- * program complete, or faults with their lines. Also the widths of the beam, from the maker's definition to
- * this project's. */
+/* Programs of a head profile: the figures that depend on its pulse rate. In: the figures of the file. Out: each
+ * program complete, or diagnostics with their lines. Also converts the widths of the beam from the maker's definition
+ * to this project's. */
 #include "firmware_sim/config/table.h"
 
 #include <math.h>
@@ -9,7 +9,7 @@
 #include <string.h>
 
 static const double WHITE = 0.9, GREY = 0.2; /* reflectances that data sheets give ranges for */
-static const double USED_WITHIN = 0.02;      /* of used_hz: data sheets round it, 42 kHz for 41.67 */
+static const double USED_WITHIN = 0.02;      /* relative, of used_hz: data sheets round it, 42 kHz for 41.67 */
 
 /* ---- widths */
 
@@ -129,13 +129,13 @@ static void check_limits(struct cfg_reader *rd, const struct config_profile *p, 
                      p->range_min_m);
 }
 
-/* Of a figure that was read. */
+/* The grade of a figure that was read. */
 static enum config_from grade_of(const struct cfg_reader *rd, const char *path, uint32_t i)
 {
     return (enum config_from)(rd->from[cfg_row(rd, cfg_find(&rd->table, path))][i] - 1);
 }
 
-/* What the file leaves out is the head's. */
+/* Figures that the file leaves out are those of the head as a whole. */
 static void complete(const struct cfg_reader *rd, const struct config_profile *p, uint32_t i,
                      struct config_program *program)
 {

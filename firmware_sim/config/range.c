@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* head.range_min_m and head.range_max_m: how near and how far the head looks, within its profile. */
+/* head.range_min_m and head.range_max_m: the head's smallest and largest range, within its profile. */
 #include "firmware_sim/config/table.h"
 
 #include <math.h>
@@ -14,7 +14,8 @@ static int check_one(struct cfg_reader *rd, const struct config *cfg, const char
     return 0;
 }
 
-/* Leaves what both have. A program of which nothing is left would be a rate at which the head sees nothing. */
+/* Limits a program to the range of the head's keys. A program without any range left is refused: the head would see
+ * nothing at that rate. */
 static void limit_program(struct cfg_reader *rd, const struct config *cfg, struct config_program *program)
 {
     const double least_m = program->range_min_m, most_m = program->range_max_m;
@@ -76,8 +77,9 @@ void cfg_take_scan_settings(struct config *cfg)
                                                                : 0;
 }
 
-/* A length of the settings: that of the configuration to the last bit, where it wasn't changed. Else the number that
- * the configuration would have read: nm is below 2^53, and so is 1e9, so that the quotient is the nearest double. */
+/* A length of the settings, in metres. Where it wasn't changed it is the configuration's, to the last bit. Else it is
+ * the double that the configuration would have read: nm and 1e9 are below 2^53, so their quotient is the nearest
+ * double. */
 static double take_length(int64_t nm, int64_t own_nm, double own_m)
 {
     return nm == own_nm ? own_m : (double)nm / 1e9;

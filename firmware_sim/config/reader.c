@@ -92,7 +92,7 @@ void cfg_cut_to_parent(char *path)
 int cfg_is_given(const struct cfg_reader *rd, const char *path, uint32_t item)
 {
     const struct cfg_key *key = cfg_find(&rd->table, path);
-    return key != NULL && rd->line[cfg_row(rd, key)][item] != 0; /* a table of some sections has not all keys */
+    return key != NULL && rd->line[cfg_row(rd, key)][item] != 0; /* a table of some sections lacks other keys */
 }
 
 int cfg_where(const struct cfg_reader *rd, const struct cfg_key *key, uint32_t item)

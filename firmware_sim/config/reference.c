@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the tables say of all keys, printed: as a reference, and as a configuration to begin with. */
+/* Prints all keys of the tables: as a reference, and as a configuration to begin with. */
 #include "firmware_sim/config/table.h"
 
 #include <stdio.h>
@@ -9,7 +9,7 @@
 
 #include "firmware_sim/base/nearest.h"
 
-/* The name by which `config_print_section` knows the keys of head profiles. */
+/* config_print_section prints the keys of head profiles for this name. */
 static const char PROFILE[] = "profile";
 
 static const char *type_name(const struct cfg_key *key)
@@ -39,7 +39,7 @@ static void print_wrapped(const char *text, int indent, const char *mark, FILE *
     fputc('\n', out);
 }
 
-/* When it may be left out, and what it is then. */
+/* Adds whether the key may be left out, and its default. */
 static void add_default(const struct cfg_key *key, char *line, size_t room)
 {
     char emitters[64];
@@ -156,7 +156,7 @@ int config_print_section(const char *section, FILE *out, struct sh_err *err)
 
 /* ---- the example */
 
-/* A key that a configuration can't do without; the others stand behind a #. */
+/* Whether a configuration needs the key. The example comments the others out. */
 static int is_needed(const struct cfg_key *key)
 {
     const int has_value = key->type != CFG_MAP && key->type != CFG_LIST;
@@ -170,7 +170,7 @@ static int has_needed(const char *section)
     return 0;
 }
 
-/* Where a key's line begins: sections and elements of lists each take two blanks. */
+/* The indent of a key's line: sections and elements of lists each add two blanks. */
 static int indent_of(const char *path)
 {
     int n = 0;
@@ -179,7 +179,7 @@ static int indent_of(const char *path)
     return 2 * n;
 }
 
-/* The value in the example: the default, that of the profile, or one that shows what may stand there. */
+/* The value in the example: the default, the profile's value, or a typical value. */
 static const char *value_of(const struct cfg_key *key, const struct config_profile *profile, char *buf, size_t len)
 {
     const char *text = key->def != NULL && key->def[0] != '\0' ? key->def : key->example;

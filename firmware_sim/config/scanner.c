@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Several scanners in one file: stations with a section `scanner`, whose keys stand in for the file's own. In: the
- * file, once for each scanner. Out: which stations have which, and faults of any of them. */
+/* Several scanners in one file: the keys in a station's section `scanner` replace the file's own. In: the
+ * file, once for each scanner. Out: the scanner of each station, and diagnostics of all scanners. */
 #include "firmware_sim/config/table.h"
 
 #include <math.h>
@@ -80,7 +80,8 @@ void cfg_take_over(struct cfg_reader *rd, const struct cfg_key *key)
     forget_row(rd, key);
 }
 
-/* The file's settings are those of another head, and so are the errors of its instrument. */
+/* With a profile of its own, the scanner drops the file's settings of the head and the errors of its instrument: they
+ * belong to another head. */
 void cfg_end_scanner(struct cfg_reader *rd)
 {
     if (!rd->own[cfg_row(rd, cfg_find(&rd->table, "head.profile"))]) return;
@@ -100,7 +101,7 @@ int config_serves(const struct config *cfg, uint32_t i)
     const uint32_t n = cfg->n_stations;
     uint32_t here = cfg->head.settings.station;
     if (n < 2 || here == 0) return 1;
-    if (cfg->platform.kind == PLATFORM_STOPS) here = (here - 1) % n + 1; /* all stations, stop after stop */
+    if (cfg->platform.kind == PLATFORM_STOPS) here = (here - 1) % n + 1; /* each stop has all stations, in order */
     if (here > n) return 1;
     return cfg->station[i % n].scanner == cfg->station[here - 1].scanner;
 }
@@ -114,7 +115,7 @@ int config_is_alone(const struct config *cfg)
 
 #define IS_SAME(a, b, member) (memcmp(&(a)->member, &(b)->member, sizeof(a)->member) == 0)
 
-/* All that a section `scanner` may change. */
+/* Compares all that a section `scanner` may change. */
 static int is_same_scanner(const struct config *a, const struct config *b)
 {
     struct config_head head[2] = {a->head, b->head};
@@ -136,7 +137,7 @@ static int copy_text_of(char *text, size_t len, const char *fault)
     return end != NULL;
 }
 
-/* What was wrong in the file's own sections was told before. */
+/* Whether a diagnostic was reported before: those of the file's own sections were. */
 static int is_told(const struct config_faults *faults, const char *fault)
 {
     char text[sizeof faults->fault[0].text], told[sizeof text];
@@ -155,7 +156,7 @@ static void add_faults(struct config_faults *faults, const struct config_faults 
             cfg_add_fault(faults, more->place[i], more->fault[i].code, more->fault[i].text);
 }
 
-/* Stations without a scanner of their own have the file's: the same as the first of them. */
+/* Stations without a scanner of their own have the file's, as the first of them has. */
 static uint32_t loaded_as(const struct config *cfg, uint32_t i)
 {
     uint32_t k = 0;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* --set KEY=VALUE: the same rows, one at a time: a single value, or YAML for a list or a section. */
+/* --set KEY=VALUE, read by the rows of the tables: a single value, or YAML for a list or a section. */
 #include "firmware_sim/config/yaml.h"
 
 #include <stdio.h>
@@ -54,7 +54,7 @@ static int fail_unknown(struct cfg_reader *rd, struct set *set)
     char *dot = strrchr(parent, '.');
     const char *word = dot == NULL ? set->path : set->path + (dot - parent) + 1;
     *(dot == NULL ? parent : dot) = '\0';
-    /* Below something that is no section nothing is known: then the top is listed. */
+    /* A parent that is no section has no known keys: list those at the top. */
     const struct cfg_key *section = cfg_find(&rd->table, parent);
     if (rd->in_scanner && (strncmp(set->path, "surfaces.", 9) == 0 || strncmp(set->path, "surfaces[", 9) == 0))
         return cfg_fail(rd, CFG_FROM_SET, set->name,
@@ -82,7 +82,7 @@ static int reach_item(struct cfg_reader *rd, const struct set *set, const struct
     return SH_OK;
 }
 
-/* The key that the text names, in `set`; or a fault. */
+/* Puts the key that the text names into `set`; or adds a diagnostic. */
 static int take_name(struct cfg_reader *rd, const char *text, const char *equals, struct set *set)
 {
     char shown[CFG_SHOW_MAX];
@@ -103,12 +103,13 @@ static int take_name(struct cfg_reader *rd, const char *text, const char *equals
 
 static const char SCANNER[] = "stations[].scanner";
 
-/* "stations[].scanner.head.prr_hz": 1 where it is this scanner's turn, and the path is that of the key there. */
+/* "stations[].scanner.head.prr_hz": returns 1 if this scanner is being read; the path is then the key's own,
+ * "head.prr_hz". */
 static int enter_scanner(struct cfg_reader *rd, struct set *set)
 {
     const size_t len = strlen(SCANNER);
     const struct cfg_key *section = cfg_find(&rd->table, SCANNER), *list = cfg_find(&rd->table, "stations");
-    if (section == NULL) return 1; /* a table of links alone knows no stations */
+    if (section == NULL) return 1; /* a table of links alone has no stations */
     if (!rd->in_scanner) {
         if (reach_item(rd, set, list) != SH_OK) return 0;
         ((struct config_station *)cfg_address(rd, section, set->item))->has_scanner = 1;
@@ -124,7 +125,7 @@ static int enter_scanner(struct cfg_reader *rd, struct set *set)
     return 0;
 }
 
-/* A value of YAML replaces the list or the section; what it doesn't name has its default. */
+/* A value of YAML replaces the list or the section; keys that it doesn't name get their defaults. */
 static void replace(struct cfg_reader *rd, struct cfg_document *doc, const struct set *set, const struct cfg_key *key,
                     const char *text, int n_before)
 {
@@ -152,7 +153,7 @@ static void apply_set(struct cfg_reader *rd, struct cfg_document *doc, const cha
 {
     struct set set = {.item = 0};
     const char *equals = strchr(text, '=');
-    const int told = rd->in_scanner; /* whatever is wrong with a key's name, with the file's own keys */
+    const int told = rd->in_scanner; /* wrong names were reported when the file's own keys were read */
     if (told && (equals == NULL || equals == text || strncmp(text, "stations", 8) != 0)) return;
     if (take_name(rd, text, equals, &set) != SH_OK) return;
     const int is_scanners = strncmp(set.path, SCANNER, strlen(SCANNER)) == 0 && set.path[strlen(SCANNER)] == '.';

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to this folder: the rows of the tables, and the reader that fills a struct from YAML and --set by
+/* Private to this folder: the rows of the tables, and the reader that fills a struct from YAML and --set with
  * them.
  *
- * A row's path is generic: "stations[].lat_deg" stands for every station; its element number is `item`. Lists
+ * A row's path is generic: "stations[].lat_deg" stands for every station, and `item` is the station's number. Lists
  * do not nest, so one number is enough. Tables are constant; a reader belongs to one thread. */
 #ifndef FIRMWARE_SIM_CONFIG_TABLE_H
 #define FIRMWARE_SIM_CONFIG_TABLE_H
@@ -22,17 +22,17 @@ enum cfg_type {
     CFG_MICRO, /* decimal number, exact to 1e-6 -> int64_t in 1e-6 units */
     CFG_REAL,  /* double */
     CFG_TEXT,  /* char[size] */
-    CFG_PATH,  /* char[size]; relative to the file it stands in, to the working directory in --set */
+    CFG_PATH,  /* char[size]; relative to the file that has it, or, in --set, to the working directory */
     CFG_VEC3,  /* [x, y, z] -> double[3] */
     CFG_PAIR,  /* [low, high] -> double[2] */
 };
 
 enum cfg_flags {
     CFG_FIGURE = 1,   /* written { value: V, from: data sheet|quoted|assumed }; source, note, definition may follow */
-    CFG_HEX = 4,      /* written 0x1209, and only so: 1209 is read both ways */
+    CFG_HEX = 4,      /* written 0x1209, and only so: 1209 could be decimal or hexadecimal */
     CFG_ASCII = 2,    /* goes into *IDN?: printable ASCII without comma and quotes */
     CFG_WRITTEN = 16, /* of CFG_PATH: the file is written; without it, it is read */
-    CFG_NEEDED = 8,   /* has no default that does in most configurations: the example gives it a value */
+    CFG_NEEDED = 8,   /* has no default that suits most configurations: the example gives it a value */
 };
 
 enum { CFG_MAX_ROWS = 256, CFG_MAX_ITEMS = 128, CFG_PATH_MAX = 96, CFG_FROM_SET = -1 };
@@ -49,14 +49,14 @@ struct cfg_key {
     const char *const *names;      /* enum: by value, NULL at the end */
     size_t count_offset;
     int flags;
-    const char *const *definitions; /* of a figure: the words of enum beam_definition, and where it goes */
+    const char *const *definitions; /* of a figure: the words of enum beam_definition */
     size_t definition_offset;
     const char *example; /* a value for the example, where there is no default */
     const char *help;
 };
 
-/* A figure of CFG_MICRO in its unit: the double nearest to what was written, so that errors and lists print just
- * that. */
+/* A figure of CFG_MICRO in its unit: the double nearest to the written number, so that errors and lists print that
+ * number. */
 static inline double from_micro(int64_t micro)
 {
     return (double)micro / 1e6;
@@ -76,19 +76,19 @@ struct cfg_reader {
     struct cfg_table table;
     void *base;                                     /* struct that the offsets count from */
     int line[CFG_MAX_ROWS][CFG_MAX_ITEMS];          /* where a key was given: line, CFG_FROM_SET, 0: not given */
-    unsigned char bad[CFG_MAX_ROWS][CFG_MAX_ITEMS]; /* 1: a fault of this key was told; its value says nothing */
+    unsigned char bad[CFG_MAX_ROWS][CFG_MAX_ITEMS]; /* 1: this key has a diagnostic; its value means nothing */
     int root_line;
-    int profile_read;                                /* the head profile has no fault */
+    int profile_read;                                /* the head profile has no diagnostic */
     const struct config_profile *profile;            /* for the limits in errors; NULL: not known */
     unsigned char from[CFG_MAX_ROWS][CFG_MAX_ITEMS]; /* of figures: 1 + enum config_from; 0: not given */
     struct config_faults *faults;
-    const char *of;  /* what stands before its keys in errors; NULL: nothing */
+    const char *of;  /* the text before its keys in errors; NULL: none */
     const char *set; /* the key of --set whose value is being parsed as YAML; NULL: none */
     /* The scanner of a station (scanner.c): */
-    int scanner;                      /* station, from 0, whose section `scanner` counts; -1: none */
+    int scanner;                      /* station, from 0, whose section `scanner` is used; -1: none */
     int in_scanner;                   /* that section is being read: paths begin there */
-    unsigned char own[CFG_MAX_ROWS];  /* 1: given there, so named so in faults */
-    int scanner_since[CFG_MAX_ITEMS]; /* by station: how many --set come before the section, which one of them gave */
+    unsigned char own[CFG_MAX_ROWS];  /* 1: the row was given there; its diagnostics say so */
+    int scanner_since[CFG_MAX_ITEMS]; /* by station: how many --set come before the one that gave the section */
 };
 
 /* ---- reader.c: rows and places */
@@ -114,10 +114,10 @@ void cfg_cut_to_parent(char *path);
 /* The last word of path, when path is a key directly below parent ("": the top); NULL otherwise. */
 const char *cfg_word_below(const char *path, const char *parent);
 
-/* ---- fault.c: what is wrong, and with what. Each call adds a fault to the reader's list and returns its
- * code, SH_EINPUT. Reading goes on after it. */
-/* "FILE:LINE: text", without the line when it is 0; of a value of --set "--set KEY: character LINE of the value: text".
- * Returns code. */
+/* ---- fault.c: diagnostics. Each call adds one to the reader's list and returns its code, SH_EINPUT. Reading goes on
+ * after it. */
+/* "FILE:LINE: text", without the line when it is 0. Within a value of --set: "--set KEY: character LINE of the value:
+ * text". Returns code. */
 int cfg_fail_file(struct cfg_reader *rd, int code, int line, const char *fmt, ...)
     __attribute__((format(printf, 4, 5)));
 /* "FILE:LINE: KEY: text", or "--set KEY: text" when line is CFG_FROM_SET. */
@@ -126,19 +126,20 @@ int cfg_fail(struct cfg_reader *rd, int line, const char *name, const char *fmt,
 /* The same for the value of a key, which is bad from now on. */
 int cfg_fail_value(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, const char *fmt, ...)
     __attribute__((format(printf, 5, 6)));
-/* The same where the key stands, or should. Nothing is added where a fault of it, or of a section around
- * it, was told before: what follows from a fault is none of its own. */
+/* The same at the key's own line, or at the section's where the key is missing. Nothing is added where the key, or a
+ * section around it, has a diagnostic already: this one may only follow from that one. */
 int cfg_fail_key(struct cfg_reader *rd, const char *path, uint32_t item, const char *fmt, ...)
     __attribute__((format(printf, 4, 5)));
-/* An unknown key below the section parent ("" for the top): suggests a near one and lists what is known
- * there. The near one counts as bad: it isn't missing, too. */
+/* An unknown key below the section parent ("" for the top): suggests a similar key and lists the known ones. The
+ * similar key is marked bad, so that it is not reported as missing, too. */
 int cfg_fail_unknown(struct cfg_reader *rd, int line, const char *parent, uint32_t item, const char *word);
-/* Whether all of these keys (sections: with all in them) were read well, so that a check can ask them. */
+/* Whether all of these keys (of sections: all keys in them) were read without a diagnostic, so that a check can use
+ * their values. */
 int cfg_are_sound(const struct cfg_reader *rd, uint32_t item, const char *const *paths, size_t n);
 #define CFG_SOUND(rd, item, ...)                                    \
     cfg_are_sound((rd), (item), (const char *const[]){__VA_ARGS__}, \
                   sizeof((const char *const[]){__VA_ARGS__}) / sizeof(const char *))
-/* text as it can stand in one line of an error: cut, without control characters. buf holds CFG_SHOW_MAX. */
+/* text made fit for one line of an error: cut, without control characters. buf holds CFG_SHOW_MAX. */
 enum { CFG_SHOW_MAX = 64 };
 const char *cfg_show(const char *text, char *buf);
 
@@ -157,16 +158,15 @@ static inline int cfg_axes(const struct cfg_key *key)
 }
 int cfg_store_vec3(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, int axis,
                    const char *text);
-/* "allowed 1 to 5 Hz": what a row takes. profile gives the limits that depend on it; NULL: those of all
+/* The values that a row takes: "allowed 1 to 5 Hz". profile gives the limits that depend on it; NULL: those of all
  * profiles. */
 enum { CFG_ALLOWED_MAX = 480 }; /* room for the longest list of words, the kinds of faults */
 const char *cfg_allowed(const struct cfg_key *key, const struct config_profile *profile, char *buf);
 /* Directory part of a path, with its '/'; empty for a bare name. buf holds CONFIG_PATH_LEN. */
 const char *cfg_dir_of(const char *path, char *buf);
 
-/* ---- yaml.c, set.c, config.c, profile.c, crosscheck.c. What is wrong with values goes to the list of
- * faults. */
-/* SH_OK, or the code of a fault that leaves nothing to check: no file, no YAML, no section. */
+/* ---- yaml.c, set.c, config.c, profile.c, crosscheck.c. Diagnostics of values go to the reader's list. */
+/* SH_OK, or the code of a diagnostic that leaves nothing to check: no file, no YAML, no section. */
 int cfg_read_file(struct cfg_reader *rd);
 /* The same; the document stays open for the scanner. NULL after an error. */
 struct cfg_document;
@@ -174,39 +174,40 @@ int cfg_open_file(struct cfg_reader *rd, struct cfg_document **doc);
 /* The same from a text in memory. */
 int cfg_open_text(struct cfg_reader *rd, const unsigned char *bytes, size_t len, struct cfg_document **doc);
 void cfg_close_file(struct cfg_document *doc);
-/* The section `scanner` of rd->scanner, over what was read. */
+/* Reads the section `scanner` of rd->scanner over the values that were read before. */
 void cfg_read_scanner(struct cfg_reader *rd, struct cfg_document *doc);
-/* Sets of the file's own keys, with in_scanner those of the scanner; the others are passed over. doc is that of the
- * file, which keeps values that are YAML. */
+/* Applies the sets of the file's own keys, or, with in_scanner, those of the scanner. The others are skipped. doc: the
+ * file's document, which keeps values that are YAML. */
 void cfg_apply_sets(struct cfg_reader *rd, struct cfg_document *doc, const char *const *sets, int n_sets);
-/* A list or a section as YAML, for a key that was forgotten before. */
+/* Reads a list or a section from YAML in a --set. The key must have been forgotten before (cfg_forget). */
 void cfg_read_set_value(struct cfg_reader *rd, struct cfg_document *doc, const struct cfg_key *key, uint32_t item,
                         const char *text);
-/* scanner.c: whether a scanner may have the section, or the key in it ... */
+/* scanner.c: whether a scanner may have the section, or the key in it. */
 int cfg_is_of_scanner(const char *path);
 extern const char cfg_sections_of_scanner[];
-/* ... which is about to be read there: what the file has of it counts no more. */
+/* The key is about to be read in a scanner: the file's value of it is dropped. */
 void cfg_take_over(struct cfg_reader *rd, const struct cfg_key *key);
-/* All of the scanner was read: with a profile of its own it has the file's head no more. */
+/* The scanner is read completely. With a profile of its own it does not inherit the file's head. */
 void cfg_end_scanner(struct cfg_reader *rd);
-/* A list is as if nothing had been given. */
+/* Resets a list as if it had not been given. */
 void cfg_forget_list(struct cfg_reader *rd, const char *path);
 /* The same for a list, a section, or an element of a list. */
 void cfg_forget(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item);
-/* Loads for the scanner of a station, from 1; 0: of head.station. Faults are added to those there are. */
+/* Loads for the scanner of a station, from 1; 0: of head.station. Diagnostics are added to those in the list. */
 int cfg_load_for(const char *path, const char *const *sets, int n_sets, uint32_t station, struct config *cfg,
                  struct config_faults *faults);
-/* Loads the scanners of the other stations, adds their faults, and says in cfg who has which. */
+/* Loads the scanners of the other stations, adds their diagnostics, and notes in cfg which station has which. */
 void cfg_check_scanners(struct config *cfg, struct config_faults *faults);
-/* Adds a fault in the order of its place. */
+/* Adds a diagnostic in the order of its place. */
 int cfg_add_fault(struct config_faults *faults, uint64_t place, int code, const char *text);
 /* A key that is not given and has no default. */
 void cfg_fail_missing(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item);
-/* Values for what was not given or is bad, errors for what must be. profile may be NULL. */
+/* Fills in defaults for keys that were not given or are bad; reports required keys that are missing. profile may be
+ * NULL. */
 void cfg_fill_defaults(struct cfg_reader *rd, const struct config_profile *profile);
 /* Where a file that comes with the program ("heads", "scenes/x.obj") may be, for i from 0: beside an
- * installed program, beside one in its build folder, in config/ here. buf holds CONFIG_PATH_LEN. 0: there
- * is no i-th place. */
+ * installed program, beside one in its build folder, in config/ of the working directory. buf holds CONFIG_PATH_LEN.
+ * 0: there is no i-th place. */
 int cfg_shared_path(int i, const char *name, char *buf);
 /* The first of these places that has it; 0: none. */
 int cfg_find_shared(const char *name, char *buf);
@@ -218,65 +219,67 @@ int64_t cfg_figure(const struct config_profile *profile, const char *path);
 double cfg_real_figure(const struct config_profile *profile, const char *path);
 /* Finds and reads the profile that head.profile names (cfg->profile_file holds the name, then the path). */
 void cfg_load_profile(struct cfg_reader *rd, struct config *cfg);
-/* Everything that concerns more than one key, as far as these were read well. */
+/* Checks everything that concerns more than one key, as far as these keys were read well. */
 void cfg_check(struct cfg_reader *rd, struct config *cfg);
-/* copies.c: a list of copies of a mesh: its rows; a reader of the next one, below a key of that name; its end. */
+/* copies.c: lists of copies of a mesh: the rows of a copy; a reader for the next copy, below the key `name`; the checks
+ * once all are read. */
 extern const struct cfg_table cfg_copy_table;
 void cfg_begin_copy(struct cfg_reader *rd, const struct cfg_reader *of, uint32_t mesh, const char *name, int line);
-/* They are no more: all of them (scene, scene.meshes), or those of a mesh. */
+/* Removes copies: all of them (scene, scene.meshes), or those of one mesh. */
 void cfg_forget_copies(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item);
 void cfg_check_copies(struct cfg_reader *rd, const struct config *cfg);
-/* places.c: the anchor, and the forms of a station's place. */
+/* places.c: checks the anchor, and the forms of a station's place. */
 void cfg_check_places(struct cfg_reader *rd, struct config *cfg);
-/* tripod.c: the tripods of stations. */
+/* tripod.c: checks the tripods of stations. */
 void cfg_check_tripods(struct cfg_reader *rd, struct config *cfg);
-/* measurement.c: noise, signal, surfaces, and what of a profile concerns them. */
+/* measurement.c: checks noise, signal, surfaces, and the keys of a profile that concern them. */
 void cfg_check_signal(struct cfg_reader *rd, struct config *cfg);
 void cfg_check_reaches(struct cfg_reader *rd, struct config_profile *profile);
-/* programs.c: widths of the beam as this project defines them; programs of a profile, and head.prr_hz among them. */
+/* programs.c: converts widths of the beam to this project's definition; completes the programs of a profile; checks
+ * that head.prr_hz is the rate of one. */
 void cfg_convert_widths(struct cfg_reader *rd, struct config_profile *profile);
 void cfg_check_programs(struct cfg_reader *rd, struct config_profile *profile);
 void cfg_check_rate(struct cfg_reader *rd, const struct config *cfg);
 /* The share of a sweep that the field of view takes. */
 double cfg_used_share(const struct config_profile *profile);
-/* profile_list.c: one profile that was read, as config_list_profiles shows it. */
+/* profile_list.c: prints one profile for config_list_profiles. */
 void cfg_list_profile(const struct cfg_reader *rd, const struct config_profile *profile, FILE *out);
 /* The words of enum config_from. */
 extern const char *const cfg_from_names[];
-/* emitter.c: which keys of a profile belong to which emitter, and what follows from them. */
+/* emitter.c: checks which keys of a profile belong to its emitter, and derives values from them. */
 void cfg_check_emitter(struct cfg_reader *rd, struct config_profile *profile);
-/* Whether profiles of some emitters need the key; then `words` names these. */
+/* Whether profiles of some emitters need the key; then `words` gets the names of these emitters. */
 int cfg_needed_by_emitter(const struct cfg_key *key, char *words, size_t len);
-/* Whether a line has an angle to go: from start up to stop, of a sphere also across azimuth 0. */
+/* Whether a line spans an angle: from start up to stop, of a sphere also across azimuth 0. */
 int cfg_line_has_width(const struct config *cfg);
-/* range.c: head.range_min_m and range_max_m, which then hold for the profile in cfg and its programs. */
+/* range.c: checks head.range_min_m and range_max_m, and limits the profile in cfg and its programs to them. */
 void cfg_limit_range(struct cfg_reader *rd, struct config *cfg);
-/* Ranges, noise and step as settings of a scan, which commands may change. Once all of them are checked. */
+/* Copies ranges, noise and step into the scan's settings, which commands may change. After all checks. */
 void cfg_take_scan_settings(struct config *cfg);
 /* Checks the geometries of a planar head's profile; chooses the one that the configuration asks for. */
 void cfg_check_geometries(struct cfg_reader *rd, struct config_profile *profile);
 void cfg_choose_geometry(struct cfg_reader *rd, struct config *cfg);
 /* The settings of a head whose pulse rate follows from its lines. */
 void cfg_check_emitter_settings(struct cfg_reader *rd, struct config *cfg);
-/* crosscheck.c: the loop. */
+/* crosscheck.c: checks the loop. */
 void cfg_check_loop(struct cfg_reader *rd, const struct config *cfg);
 /* owned.c: keys that only some kinds of link have, and what a link needs. */
 void cfg_check_links(struct cfg_reader *rd, struct config *cfg);
-/* usb_look.c: the look of a usb link, by its protocol, and the ids and the serial number that are not given. */
+/* usb_look.c: fills in the USB identity of a usb link from its protocol; and ids and serial number if not given. */
 void cfg_set_usb_serial(struct cfg_reader *rd, const struct config *cfg, struct link_spec *link, uint32_t item);
 void cfg_set_usb_look(struct cfg_reader *rd, struct link_spec *link, uint32_t item);
 /* The same for keys of platforms. Returns whether all of them belong to this kind. */
 int cfg_check_platform_keys(struct cfg_reader *rd, const struct config_platform *platform);
 /* platform.c: the platform's keys with each other. Sets seconds from frames. */
 void cfg_check_platform(struct cfg_reader *rd, struct config *cfg);
-/* faults.c: faults on request, with each other; and with the links of cfg. */
+/* faults.c: checks injected faults against each other; and against the links of cfg. */
 void cfg_check_faults(struct cfg_reader *rd, struct fault_list *list);
 void cfg_check_fault_links(struct cfg_reader *rd, const struct config *cfg, const struct fault_list *list);
-/* fault_beam.c: the faults with the head, its noise and its signal. */
+/* fault_beam.c: checks the faults against the head, its noise and its signal. */
 void cfg_check_fault_beams(struct cfg_reader *rd, const struct config *cfg, const struct fault_list *list);
-/* link_protocol.c: what the protocols of links need. */
+/* link_protocol.c: checks what the protocols of links need. */
 void cfg_check_link_protocols(struct cfg_reader *rd, struct config *cfg);
-/* Whether the protocol has words for a head of this emitter. */
+/* Whether the protocol can describe a head of this emitter. */
 int cfg_protocol_fits(const struct protocol_ops *ops, const struct emitter *emitter);
 /* The first link whose protocol has this need; -1: none. */
 int cfg_link_that_needs(const struct config *cfg, enum protocol_needs need);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Tripods of stations: that a leg is there, and what stands on them. */
+/* Tripods of stations: checks that leg_m is given and fits the legs, and that the platform stands. */
 #include "firmware_sim/config/table.h"
 
 static const char *const keys[] = {

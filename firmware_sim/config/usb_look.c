@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Which device a usb link shows itself as: that whose protocol it speaks, with that device's ids where none are given. */
+/* The USB identity of a usb link: the device whose protocol it speaks, with that device's ids where none are given. */
 #include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,7 +15,7 @@ static enum usb_look_id look_of(int protocol)
         return USB_LOOK_HOKUYO;
     case PROTOCOL_COLA:
         return USB_LOOK_SICK;
-    default: /* native; the others are refused (link_protocol.c) */
+    default: /* native; other protocols are refused (link_protocol.c) */
         return USB_LOOK_NATIVE;
     }
 }
@@ -28,7 +28,7 @@ void cfg_set_usb_look(struct cfg_reader *rd, struct link_spec *link, uint32_t it
     if (!cfg_is_given(rd, "links[].pid", item)) link->pid = look->pid;
 }
 
-/* A head is known by its configuration's file and the link's place in it. */
+/* `whose` identifies the head: the configuration's file and the link's place in it. */
 void cfg_set_usb_serial(struct cfg_reader *rd, const struct config *cfg, struct link_spec *link, uint32_t item)
 {
     char path[PATH_MAX];
@@ -36,7 +36,7 @@ void cfg_set_usb_serial(struct cfg_reader *rd, const struct config *cfg, struct 
     snprintf(link->serial, sizeof link->serial, "%s", cfg->head.serial);
     link->own_serial = !cfg_is_given(rd, "head.serial", 0);
     const char *file = realpath(cfg->file, path) != NULL ? path : cfg->file;
-    const size_t len = strlen(file), most = sizeof link->whose - 12; /* the end of a long one tells it from others */
+    const size_t len = strlen(file), most = sizeof link->whose - 12; /* long paths differ mostly at their ends */
     snprintf(link->whose, sizeof link->whose, "%u %.*s", item, (int)most - 1,
              len < most ? file : file + len - most + 1);
 }

@@ -89,7 +89,7 @@ double cfg_real_figure(const struct config_profile *profile, const char *path)
     return value;
 }
 
-/* A limit that a profile gives: its own figure, or what any profile may have. */
+/* A limit that a profile gives: its own figure, or, without a profile, the limit of all profiles. */
 static void profile_limit(const char *path, double any, const struct config_profile *profile, char *buf)
 {
     if (path != NULL) snprintf(buf, 64, "%.15g", profile != NULL ? 1e-6 * (double)cfg_figure(profile, path) : any);
@@ -181,7 +181,7 @@ static int store_whole(const struct place *at, void *dst, const char *text)
     case CFG_NUMBER_OK:
         break;
     }
-    /* Limits are doubles, so that 0.01 is a little more than that. 2^64 - 1 rounds up to 2^64. */
+    /* Limits are doubles: the double 0.01 is a little more than 0.01, and 2^64 - 1 rounds up to 2^64. */
     if ((long double)value < roundl((long double)key->min * (long double)unit) ||
         (long double)value > roundl((long double)key->max * (long double)unit) || value > (__int128)UINT64_MAX)
         return refuse(at, text, "out of range");
@@ -218,7 +218,7 @@ static int store_word(const struct place *at, void *dst, const char *text)
     return refuse(at, text, "not known");
 }
 
-/* libyaml has checked a file; this is for the command line. */
+/* For the command line; libyaml checks files. */
 static int is_utf8(const char *text)
 {
     yaml_document_t doc;

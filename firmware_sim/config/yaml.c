@@ -10,7 +10,7 @@ struct walk {
     struct cfg_reader *rd;
     yaml_document_t *doc;
     struct cfg_document *of;   /* with doc in it */
-    struct cfg_document *main; /* its scanners are filled in */
+    struct cfg_document *main; /* the file's, whose scanners are filled in */
     int from_set;
     char base_dir[CONFIG_PATH_LEN];
 };
@@ -103,7 +103,7 @@ static int word_of(const yaml_node_t *node, const char *const *names)
     return -1;
 }
 
-/* What a figure says beside its value. */
+/* The parts of a figure. */
 enum figure_part { FIGURE_VALUE, FIGURE_FROM, FIGURE_SOURCE, FIGURE_NOTE, FIGURE_DEFINITION, FIGURE_PARTS };
 static const char *const figure_parts[] = {"value", "from", "source", "note", "definition", NULL};
 
@@ -149,7 +149,7 @@ static void read_part(struct walk *w, const struct cfg_key *key, uint32_t item, 
         sound = word >= 0;
         if (sound) memcpy((char *)w->rd->base + key->definition_offset, &word, sizeof word);
         break;
-    default: /* kept in the file, for its readers */
+    default: /* source and note are for readers of the file */
         sound = is_line_of_text(node);
     }
     if (!sound) refuse_part(w, key, item, part, node);
@@ -237,7 +237,7 @@ static void read_copies(struct walk *w, const struct cfg_key *key, uint32_t item
     }
 }
 
-/* Kept until it is known whose scanner is asked for. */
+/* Keeps the node until the station is known whose scanner is read. */
 static void keep_scanner(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
 {
     struct config_station *station = cfg_address(w->rd, key, item);
@@ -270,7 +270,7 @@ static void read_value(struct walk *w, const struct cfg_key *key, uint32_t item,
     }
 }
 
-/* The row of a key below path, or NULL. A dotted key ("head.prr_hz: 1") is no way to write a section. */
+/* The row of a key below path, or NULL. A dotted key ("head.prr_hz: 1") is not accepted for a key in a section. */
 static const struct cfg_key *row_below(const struct walk *w, const char *path, const yaml_node_t *word)
 {
     char full[CFG_PATH_MAX];
@@ -311,7 +311,7 @@ static void read_pair(struct walk *w, const yaml_node_t *word, const yaml_node_t
     read_value(w, key, item, value);
 }
 
-/* Every fault is told: one does not end the reading. */
+/* Reports every diagnostic: one does not end the reading. */
 static void read_map(struct walk *w, const yaml_node_t *node, const char *path, uint32_t item)
 {
     for (const yaml_node_pair_t *pair = node->data.mapping.pairs.start; pair < node->data.mapping.pairs.top; pair++)

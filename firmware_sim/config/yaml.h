@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to yaml.c and yaml_file.c: a file's one document, and what is read of it later. */
+/* Private to yaml.c and yaml_file.c: a file's one document, and its parts that are read later. */
 #ifndef FIRMWARE_SIM_CONFIG_YAML_H
 #define FIRMWARE_SIM_CONFIG_YAML_H
 
@@ -10,19 +10,19 @@
 struct cfg_document {
     yaml_document_t doc;
     const yaml_node_t *scanner[CFG_MAX_ITEMS];      /* by station; NULL: it has none */
-    struct cfg_document *scanner_of[CFG_MAX_ITEMS]; /* which document has that node: this one, or a value of --set */
-    struct cfg_document *values;                    /* of --set: they live as long as this one */
+    struct cfg_document *scanner_of[CFG_MAX_ITEMS]; /* the document with that node: this one, or a value of --set */
+    struct cfg_document *values;                    /* values of --set, which live as long as this document */
 };
 
-/* Where a mark stands: in a file its line, in a value of --set its character; both from 1. */
+/* The place of a mark, from 1: in a file its line, in a value of --set its character. */
 static inline int cfg_line_of(const struct cfg_reader *rd, yaml_mark_t mark)
 {
     return (int)(rd->set != NULL ? mark.index : mark.line) + 1;
 }
 
-/* All of it by the rows, but the scanners of stations. SH_EINPUT where there is no section. */
+/* Reads the document by the rows of the table, except the scanners of stations. SH_EINPUT: it is no section. */
 int cfg_read_document(struct cfg_reader *rd, struct cfg_document *doc);
-/* One document of this text, which is not read yet. NULL after an error. */
+/* Parses a text that is one document; cfg_read_document then reads it. NULL after an error. */
 int cfg_parse_text(struct cfg_reader *rd, const unsigned char *bytes, size_t len, struct cfg_document **doc);
 
 #endif

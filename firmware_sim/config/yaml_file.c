@@ -28,7 +28,7 @@ static int read_bytes(struct cfg_reader *rd, unsigned char **bytes, size_t *len)
     return code;
 }
 
-/* A line, counted from 1, in the bytes. */
+/* Whether a line, counted from 1, begins with a tab after blanks. */
 static int indented_by_tab(const unsigned char *bytes, size_t len, int line)
 {
     const unsigned char *p = bytes, *end = bytes + len;
@@ -68,7 +68,7 @@ static int start_parser(struct cfg_reader *rd, yaml_parser_t *parser, const unsi
 }
 
 /* libyaml's scanner takes time with the square of the depth of "[[[[", and of the number of anchors: both are
- * bounded by a first pass over the events. What else is wrong is left to the second. */
+ * bounded by a first pass over the events. All other errors are left to the second. */
 static int check_depth(struct cfg_reader *rd, const unsigned char *bytes, size_t len)
 {
     yaml_parser_t parser;
@@ -129,7 +129,7 @@ static int check_end(struct cfg_reader *rd, yaml_parser_t *parser, const unsigne
     return code;
 }
 
-/* Faults of the document, which `read` finds, come before those of what stands after it. */
+/* Diagnostics of the document, which `read` finds, come before those of text after it. */
 static int open_text(struct cfg_reader *rd, const unsigned char *bytes, size_t len,
                      int (*read)(struct cfg_reader *rd, struct cfg_document *doc), struct cfg_document **doc)
 {

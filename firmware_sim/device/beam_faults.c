@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults that change what is measured: from which pulse of a scan to which they strike, and what they do together.
+/* Injected faults that change what is measured: the pulses of a scan at which they strike, and their common
+ * disturbance.
  *
  * A fault strikes at the pulses of a scan between from_pulse and until_pulse that fire at from_s or later, and before
- * until_s. That is exact, whatever ticks are: a tick ends where a fault begins or ends (claim_pulses), and what it
- * leaves comes with the next ones. So all pulses of a tick have the same faults. */
+ * until_s. That is exact, whatever the tick rate is: a tick ends where a fault begins or ends (claim_pulses), and the
+ * rest of its pulses come with the next ones. So all pulses of a tick have the same faults. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -38,9 +39,9 @@ static void note(struct device *device, const struct device_beam_fault *f, uint6
     fault_board_note(device->faults, &note);
 }
 
-/* ---- when */
+/* ---- when faults strike */
 
-/* Pulses begin .. end of the scan, end not included, as the segment has their times; those before it don't count. */
+/* Pulses begin .. end of the scan, without end, by the segment's times; pulses before the segment don't matter. */
 static void find_window(const struct device *device, const struct fault_entry *entry, uint64_t *begin, uint64_t *end)
 {
     const struct fault *f = &entry->fault;
@@ -52,7 +53,7 @@ static void find_window(const struct device *device, const struct fault_entry *e
     if (f->until_pulse < *end) *end = f->until_pulse + 1;
 }
 
-/* Takes over the list as it is now. What was taken out of it while it struck ends at this pulse. */
+/* Takes over the present list. A fault that was taken out while it struck ends at this pulse. */
 static void renew(struct device *device, uint64_t pulse, int64_t t_ns)
 {
     struct device_beam *beam = &device->beam;
@@ -75,7 +76,7 @@ static void renew(struct device *device, uint64_t pulse, int64_t t_ns)
     }
 }
 
-/* ---- what */
+/* ---- what they do */
 
 static double slowness(const struct device_beam *beam)
 {
@@ -86,7 +87,7 @@ static double slowness(const struct device_beam *beam)
     return factor;
 }
 
-/* A head whose lines have a fixed number of pulses fires at steps of its mirror: its pulses are as slow. */
+/* A head whose lines have a fixed number of pulses fires at steps of its mirror, so its pulse rate falls, too. */
 static void slow_down(const struct device *device, const struct site *site, struct schedule_spec *spec)
 {
     const int64_t most = site->cfg->profile.lines_max_uhz;
@@ -130,7 +131,7 @@ static void add_wobble(const struct device *device, const struct device_beam_fau
                                                        .begin_ns = f->begin_ns};
 }
 
-/* What stands does not wobble. Of several that are stuck the first one counts. */
+/* Adds up the faults that strike. A stuck mirror does not wobble. Of several stuck faults the first one counts. */
 static void add_up(struct device *device)
 {
     struct device_upset *now = &device->beam.now;
@@ -151,7 +152,7 @@ static void add_up(struct device *device)
     if (now->stuck) cast->n_wobbles = 0;
 }
 
-/* Where the mirror, or the rotor, is at a pulse. */
+/* The turn of the mirror, or of the rotor, at a pulse. */
 static double find_turn(const struct device *device, uint64_t pulse, int64_t t_ns)
 {
     const struct device_upset *now = &device->beam.now;

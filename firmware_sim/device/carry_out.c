@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Commands: carried out, written to the journal, and replayed from one. */
+/* Carries out commands, writes them to the journal, and replays them from one. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -27,7 +27,7 @@ static void stop(struct device *device, enum head_event event, uint64_t tick)
 static void carry_out(struct device *device, enum command_effect effect, uint64_t released)
 {
     switch (effect) {
-    case COMMAND_MOVE: /* begins it, and is carried out once it is planned */
+    case COMMAND_MOVE: /* only begins the move; it is done once it is planned */
     case COMMAND_SETTINGS:
         change_settings(device);
         break;
@@ -54,15 +54,15 @@ static void carry_out(struct device *device, enum command_effect effect, uint64_
     }
 }
 
-/* A replayed journal moves stations itself. */
+/* Why a session can't move stations: a journal that is being replayed moves them itself. */
 static const char *why_fixed(const struct device *device, uint32_t session)
 {
     const int replays = device->journal.at < device->journal.n_replay;
     return session != 0 && replays ? "a journal is being replayed" : site_why_fixed(device->site);
 }
 
-/* What a session says while power is gone. The old sessions are cut off when that is released, and get no answer more.
- * New ones, as the pace step has them, may ask, and let time pass. */
+/* A command while power is gone. The old sessions are cut off when the tick without power is released, and get no
+ * further answer. New ones, which the pace step has, may ask, and let time pass. */
 static void do_dead(struct device *device, uint32_t session, const char *line, uint64_t released,
                     struct command_result *out)
 {
@@ -71,7 +71,7 @@ static void do_dead(struct device *device, uint32_t session, const char *line, u
     struct command_device *cmd = malloc(sizeof *cmd);
     if (cmd == NULL) return;
     *cmd = device->cmd;
-    cmd->faults = NULL; /* they are the device's own, and would change */
+    cmd->faults = NULL; /* the copy must not change the device's own faults */
     command_execute(cmd, session, line, out);
     if (out->changes && out->effect != COMMAND_STEP) command_refuse(cmd, CMD_E_SETTINGS, "the head has no power", out);
     out->took_control = 0;

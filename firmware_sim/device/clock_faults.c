@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults of the head's time of day: jumps, gains, standstills, leap seconds, PPS that is missing. They hold from their
- * very nanosecond on, not from a tick on. */
+/* Injected faults of the head's time of day: jumps, gains, standstills, leap seconds, missing PPS. They hold from their
+ * exact nanosecond on, not from a tick on. */
 #include <math.h>
 #include <stdio.h>
 
@@ -19,7 +19,7 @@ static void add_leap(struct device *device, const struct head_fault *f)
     if (!added) device_push_error(device, 0, CMD_E_SETTINGS, said);
 }
 
-/* What the clock does from the fault's begin on (sign 1), or no more from its end on (-1). */
+/* Changes the clock from the fault's begin on (sign 1), or undoes that from its end on (-1). */
 static void change(struct device *device, const struct head_fault *f, int64_t t_ns, int sign)
 {
     struct head_clock_change change = {0};

@@ -9,7 +9,7 @@
 #include "firmware_sim/device/device_state.h"
 #include "firmware_sim/site/plan_rows.h"
 
-/* The first pulse of a tick may be 15 periods old. */
+/* A live head needs a pose for the first pulse of a tick, which may be 15 periods old. */
 static int check_live(const struct device *device, struct sh_err *err)
 {
     const struct config *cfg = device->site->cfg;
@@ -24,8 +24,8 @@ static int64_t to_nm(double m)
     return llround(1e9 * m);
 }
 
-/* Methods that were chosen by trying them on the scene, and the outlines of an adaptive beam, hold up to the range at
- * power-up, and for less. */
+/* Whether commands may only narrow the ranges of power-up. Methods that were chosen by trying them on the scene, and
+ * the outlines of an adaptive beam, hold for these ranges. */
 static int was_tried(const struct site *site)
 {
     const struct config *cfg = site->cfg;
@@ -33,7 +33,7 @@ static int was_tried(const struct site *site)
     return beam || (site->detect.surfaces.has_optics && !cfg->optics.depth_given);
 }
 
-/* How near and how far commands may set the ranges: within the profile, with something left at each pulse rate. */
+/* Sets the limits for commands that set ranges: within the profile, and with some range left at each pulse rate. */
 static void set_range_limits(const struct site *site, struct head_limits *l)
 {
     const struct config *cfg = site->cfg;
@@ -134,7 +134,7 @@ static int open_replay(struct device *device, struct sh_err *err)
     for (size_t i = 0; i < journal->n_replay && !journal->ends; i++) {
         if (!journal_is_end(&journal->replay[i])) continue;
         end_run_at(device, journal->replay[i].tick);
-        journal->n_replay = i; /* what came after the end had no effect */
+        journal->n_replay = i; /* commands after the end had no effect */
         journal->ends = 1;
     }
     return SH_OK;
@@ -229,7 +229,7 @@ static int ends_scan(const struct device_work *work)
     return 0;
 }
 
-/* Claims come one after the other: no tick passes while a station's new place is planned. */
+/* Unlocks for planning. Claims come one after the other, so no tick passes meanwhile. */
 static void replay(struct device *device, uint64_t tick)
 {
     struct command_result result;
@@ -244,7 +244,7 @@ static void replay(struct device *device, uint64_t tick)
     }
 }
 
-/* A head without power says nothing of errors and lost ticks, so the end of a run does not wait for that. */
+/* A head without power reports no errors and lost ticks, so the end of a run does not wait for these. */
 static int has_said_all(const struct device *device)
 {
     if (device->events.n != 0) return 0;
@@ -255,7 +255,7 @@ static int has_said_all(const struct device *device)
 int device_claim(struct device *device, struct device_work *work)
 {
     pthread_mutex_lock(&device->lock);
-    if (device->over && has_said_all(device)) { /* what is still to be said has a tick more */
+    if (device->over && has_said_all(device)) { /* else one more tick carries the remaining events */
         pthread_mutex_unlock(&device->lock);
         return 1;
     }
@@ -279,7 +279,7 @@ int device_claim(struct device *device, struct device_work *work)
         device_say_pps(device, tick);
     }
     const int repeated = device_is_repeated(device, tick);
-    if (repeated) device_say_time(device, tick); /* who joins now knows it before the first point */
+    if (repeated) device_say_time(device, tick); /* a reader that joins gets the time before the first point */
     device_take_events(device, work);
     work->n_events_before = work->n_events;
     if (device->scan.on)
@@ -288,7 +288,7 @@ int device_claim(struct device *device, struct device_work *work)
         device_describe(device, work);
     work->telemetry = tick % device->tick_hz == 0 && !off;
     if (work->telemetry || ends_scan(work)) device_fill_telemetry(device, tick, &work->telemetry_frame);
-    int told = device->ending || tick >= device->end_tick; /* to end; else the one scan was over in this tick */
+    int told = device->ending || tick >= device->end_tick; /* 1: told to end; 0: at most its one scan is over */
     if (!was_over && (told || device->over)) device->journal.end_tick = told ? tick : tick + 1;
     device->over |= told;
     device->next_tick = tick + 1;

@@ -26,8 +26,8 @@
 
 enum { DEVICE_MAX_EVENTS = 24, DEVICE_MAX_POSES = 256, DEVICE_POSE_AHEAD_S = 3600 };
 
-/* Counters that casters, pacing thread and readers share. What the words mean, PROTOCOL.md defines (What the
- * counts mean). Once all claimed ticks are released or lost, cast = pulses + lost_pulses. */
+/* Counters that casters, pacing thread and readers share. PROTOCOL.md defines the words (What the counts mean).
+ * Once all claimed ticks are released or lost, cast = pulses + lost_pulses. */
 struct device_counters {
     _Atomic uint64_t fired, cast;             /* claimed */
     _Atomic uint64_t pulses, echoes, lines;   /* delivered, so released */
@@ -35,29 +35,29 @@ struct device_counters {
     _Atomic uint64_t crowded, faint, unfit;   /* hits that are not echoes: struct cast_counters */
     _Atomic uint64_t late_blocks, late_max_ns;
     _Atomic uint64_t reader_lost_frames, reader_lost_pulses; /* left out for readers that were too slow */
-    /* live: poses that were made up because none came in time, and poses that came and could not be used */
+    /* live: poses that were extrapolated because none came in time, and poses that could not be used */
     _Atomic uint64_t late_poses, bad_poses;
     _Atomic uint64_t lost_journal_lines, lost_truth_lines; /* their files were too slow, or could not be written */
 };
 
-/* What becomes of the power in a tick. */
+/* The change of power in a tick. */
 enum device_power_change { DEVICE_POWER_STAYS, DEVICE_POWER_GOES, DEVICE_POWER_COMES };
 
-/* What faults do to the beam in a tick. */
+/* The disturbance of the beam in a tick, by injected faults. */
 struct device_upset {
-    int on;            /* 0: nothing, and the rest is not set */
+    int on;            /* 0: there is none, and the rest is not set */
     int stuck;         /* the mirror, or the rotor, stands at stuck_turn */
     double stuck_turn; /* turns */
     struct cast_upset cast;
 };
 
-/* What one tick consists of. All members are copies, so that no thread waits for another. Frames leave in the
+/* The work of one tick. All members are copies, so that no thread waits for another. Frames leave in the
  * order of the members. */
 struct device_work {
     uint64_t tick;
     struct device_version *version; /* where stations stand: device_site_of, until device_done; NULL: as at power-up */
     int64_t t_ns;                   /* device time at the tick's start */
-    uint32_t n_events_before;       /* of event[]: those that go before the points; the others go after them */
+    uint32_t n_events_before;       /* events of event[] that go before the points; the others go after them */
     uint32_t n_events;
     struct native_event event[DEVICE_MAX_EVENTS];
     int describe, describe_flags; /* descriptor, emitter and anchor frames, with these flags */
@@ -67,7 +67,7 @@ struct device_work {
     struct native_anchor anchor;
     uint32_t surfaces_first, surfaces_n; /* names to send; 0: none */
     int scanning;
-    /* That the scan is made with: that of the version, or one that is planned for its settings. It is there until
+    /* The site of the scan: that of the version, or one that is planned for its settings. It is valid until
      * device_done. */
     const struct site *site;
     struct device_variant *variant; /* NULL: that of the version */
@@ -77,15 +77,15 @@ struct device_work {
     struct device_upset upset;  /* of all its pulses */
     uint32_t scan;              /* its number */
     uint64_t pulse0, pulse_end; /* pulses of this tick */
-    uint64_t n_cast, cast0;     /* of these, how many are cast, and the first of them; UINT64_MAX: none */
+    uint64_t n_cast, cast0;     /* how many of these are cast, and the first of them; UINT64_MAX: none */
     int cut_short;              /* the scan stops at pulse_end, within a line */
     uint32_t station;
-    uint32_t station_scan; /* which scan it is of that station's since power-up, from 1 */
+    uint32_t station_scan; /* number of the scan among that station's since power-up, from 1 */
     size_t stretch;        /* of a trajectory: the one of the last anchor */
     uint32_t echoes;       /* enum beam_select */
     uint32_t n_poses;      /* live: the head's poses of this tick; 0: the head stands still or follows a trajectory */
     struct pose_knot pose[DEVICE_MAX_POSES];
-    enum device_power_change power; /* with the tick's start. While it is off the head says nothing but that it is */
+    enum device_power_change power; /* at the tick's start. While it is off the head reports nothing else */
     int telemetry;                  /* due at the tick's end; it goes before each SCAN_END, too */
     struct native_telemetry telemetry_frame;
 };
@@ -105,70 +105,70 @@ struct device_options {
     const struct sh_report *report; /* warnings of a station's new place, from the thread that plans it; NULL: none */
 };
 
-/* site must outlive the device. What the device makes of it when stations move is freed with the device. */
+/* site must outlive the device. Sites that the device makes from it when stations move are freed with the device. */
 int device_create(const struct site *site, const struct device_options *options, struct device **out,
                   struct sh_err *err);
 void device_free(struct device *device);
 /* 1: the replayed journal ends the run. 0: it has no end, or there is none. */
 int device_replay_ends(const struct device *device);
-/* Ends and closes the journal and the file of the truth, where they are. Returns the first error in writing them; what is
- * not in them is counted. It gives files that stand still 2 s. After the loop is joined. */
+/* Ends and closes the journal and the file of the truth, if there are any. Returns the first error in writing them; the
+ * lines that they lack are counted. A file that takes nothing for 2 s is given up. After the loop is joined. */
 int device_close_journal(struct device *device, struct sh_err *err);
-/* One of these files is behind: time should wait where it can, so that nothing is dropped. Any thread; takes no lock. */
+/* 1: one of these files is behind; callers that can wait should. Any thread; takes no lock. */
 int device_files_fill(const struct device *device);
 
-/* The faults on request of the configuration and of commands; the device's. */
+/* The board of injected faults, from the configuration and from commands. It belongs to the device. */
 struct fault_board *device_faults(const struct device *device);
 
 struct device_counters *device_counters(struct device *device);
 
 /* The next tick's work. Returns 0, or 1 when the run is over and there is no next tick. */
 int device_claim(struct device *device, struct device_work *work);
-/* A claimed tick was lost, and with it the pulses that it should have cast. They are counted. What else the
- * tick said is said again in a later one. */
+/* A claimed tick was lost, and with it the pulses that it should have cast. They are counted. The tick's other frames
+ * go out with a later one. */
 void device_lost(struct device *device, const struct device_work *work);
-/* The work is of no use any more, delivered or lost. Each that was claimed, once. Any thread; takes no lock. */
+/* Ends the use of a work, delivered or lost. Call it once for each claimed work. Any thread; takes no lock. */
 void device_done(struct device_work *work);
-/* The site that a scan is made with, by the scan's number, for others than its works. NULL: that is not the scan at hand,
- * or the last one, any more, or stations have moved since. It stays until device_let_go, before device_free; soon, once the
- * scan is over. Takes the device's lock for a moment. Any thread. */
+/* Holds the site of a scan, by the scan's number, for callers without its works. NULL: that is neither the scan at hand
+ * nor the last one, or stations have moved since. The site is valid until device_let_go, which must come before
+ * device_free, and soon after the scan's end. Takes the device's lock for a moment. Any thread. */
 struct device_held {
     struct device_variant *variant;
     struct device_version *version;
 };
 const struct site *device_hold_scan(struct device *device, uint32_t number, struct device_held *held);
-void device_let_go(struct device_held *held); /* holds nothing afterwards, as when all is 0 */
+void device_let_go(struct device_held *held); /* afterwards it holds nothing: all members are 0 */
 /* True while nothing happens without a command. The pace `fast` waits then. */
 int device_is_idle(struct device *device);
-/* Ends the run: a running scan is stopped first. Async-signal-unsafe. */
+/* Ends the run: stops a running scan first. Not for signal handlers. */
 void device_end(struct device *device);
 
 /* Carries out one command line for a session (from 1). */
 void device_command(struct device *device, uint32_t session, const char *line, uint64_t released,
                     struct command_result *out);
-/* The same for a session of another protocol (drivers/protocol): control is given back at once, without a word. */
+/* The same for a session of another protocol (drivers/protocol): control is given back at once, without an event. */
 void device_command_once(struct device *device, uint32_t session, const char *line, uint64_t released,
                          struct command_result *out);
-/* A line too long for the command set ended. */
+/* A line ended that was too long for the command set. */
 void device_overlong(struct device *device, uint32_t session, struct command_result *out);
 /* A session has begun; who: its kind of link and address, for others to read. */
 void device_session_opened(struct device *device, uint32_t session, const char *who);
 /* A session has gone; partial: in the middle of a command. Gives control back. */
 void device_session_closed(struct device *device, uint32_t session, const char *who, int partial);
-/* Where a live platform (not the head on it) is at a device time: from TIME:STEP or the socket. v: x, y, z
+/* Gives the pose of a live platform (not of the head on it) at a device time, from TIME:STEP or the socket. v: x, y, z
  * (m), roll, pitch, heading (degrees). The platform moves evenly from one pose to the next, however far apart
  * they are. Returns 0, or 1 for a pose that can't be used, which is counted: not later than the one before,
  * out of reach, or more than DEVICE_POSE_AHEAD_S ahead of device time (not in the pace step). */
 int device_pose(struct device *device, int64_t t_ns, const double v[6]);
 
-/* A command whose effect is COMMAND_MOVE has moved nothing yet. First device_plan_move: it takes as long as planning the
- * station's new place takes (maps, beams), some milliseconds to seconds, without the device's lock, in any thread. Then
+/* A command whose effect is COMMAND_MOVE has moved nothing yet. First call device_plan_move, in any thread. It plans
+ * the station's new place (maps, beams), which takes milliseconds to seconds, without the device's lock. Then call
  * device_finish_move: the station stands there from the next tick on, journalled, with an event; or the move is refused
  * (-221) and nothing has changed. Either way *out has the reply. No other move and no scan begins in between. */
 void device_plan_move(struct device *device);
 void device_finish_move(struct device *device, uint64_t released, struct command_result *out);
 
-/* Where the stations are now. Any thread. */
+/* The present places of the stations. Any thread. */
 struct device_station {
     char name[32];
     struct site_place place;
@@ -176,55 +176,55 @@ struct device_station {
     int has_tripod;                    /* else the rest is 0 */
     double leg_m;                      /* length of a leg */
     double height_m;                   /* of the tripod's top above the ground; NaN: no ground below */
-    double opening_rad, foot_radius_m; /* of a leg from the vertical, and how far its foot is from the plumb line */
+    double opening_rad, foot_radius_m; /* of a leg from the vertical; distance of its foot from the plumb line */
     double head_above_m;               /* the head's origin above the tripod's top */
     double legs_heading_deg;           /* of the first leg, from the scene's north */
 };
 uint32_t device_n_stations(const struct device *device);
 void device_get_station(struct device *device, uint32_t station, struct device_station *out); /* 0.. */
-/* The site as it is now, for who asks more of it. It is constant, and stays until it is given back (before device_free):
- * soon, for it may hold maps of hundreds of MiB. */
+/* Holds the present site, for callers that need more of it. It is constant and valid until it is given back, which must
+ * come before device_free, and soon: it may hold maps of hundreds of MiB. */
 const struct site *device_hold_site(struct device *device, struct device_version **version);
 void device_give_back(struct device_version *version);
 const struct site *device_site_of(const struct device_version *version);
 
-/* Something for the error queue (enum command_error), and an event on the wire. */
+/* Adds an error to the error queue (enum command_error), and an event on the wire. */
 void device_report(struct device *device, int number, const char *text);
 
 /* Device time begins now, at this time of clock_now_ns(). The time of day is read from the system where
- * time.epoch says so. Before the first tick is claimed. *warning: something the user should know, or NULL; it
+ * time.epoch says so. Before the first tick is claimed. *warning: a warning for the user, or NULL; it
  * belongs to the device. */
 int device_power_up(struct device *device, int64_t now_ns, const char **warning, struct sh_err *err);
 
 /* UTC by the head's clock at a device time, ns since 1970; INT64_MIN: not known. */
 int64_t device_utc_ns(struct device *device, int64_t t_ns);
-/* The GNSS receiver (gnss.h): device time of its first fix at or after t_ns, INT64_MAX where it has none; and its last
- * fix at or before t_ns, where the head is. 0: there is none. */
+/* The GNSS receiver (gnss.h). device_next_fix_ns: device time of its first fix at or after t_ns; INT64_MAX: it has
+ * none. The other gives its last fix at or before t_ns, at the head's place then. 0: there is none. */
 int64_t device_next_fix_ns(const struct device *device, int64_t t_ns);
 int device_fix(struct device *device, int64_t t_ns, struct nmea_fix *fix);
 /* The pulses per second at a device time that was claimed (pps.h). */
 enum protocol_pps device_pps(struct device *device, int64_t t_ns, int *set);
 
-/* The tick after that which tells that the head waits for a command; UINT64_MAX: it boots, scans, or is about to. */
+/* The tick after the one that reports the head idle; UINT64_MAX: it boots, scans, or is about to. */
 uint64_t device_rests_from(struct device *device);
 
-/* Device time at which power came last, or will come back where it is off; 0: it has always been on. */
+/* Device time at which power last came, or, while it is off, will come back; 0: it has always been on. */
 int64_t device_power_ns(struct device *device);
-/* How often power has come, with the first time. */
+/* How often power has come, including the first time. */
 uint32_t device_power_ons(struct device *device);
-/* Counters begin so many below their wrap, since the last power-up; 0: at 0. */
+/* Since the last power-up counters begin this far below their wrap; 0: they begin at 0. */
 uint32_t device_near_wrap(struct device *device);
 
 /* Scans begun so far. */
 uint64_t device_scans(struct device *device);
-/* How long the last scan was, in whole ticks; 0: none has ended. */
+/* The length of the last scan, in whole ticks; 0: none has ended. */
 int64_t device_scan_ns(struct device *device);
 
 int64_t device_tick_ns(const struct device *device);
 
-/* The descriptor and anchor of now, as a repetition, into the work; it has nothing else. */
+/* Fills a work that has only the present descriptor and anchor, as a repetition. */
 void device_describe_now(struct device *device, struct device_work *work);
-/* The anchor of a station's points; the stretch counts only along a trajectory (site_georef). */
+/* The anchor of a station's points; the stretch matters only along a trajectory (site_georef). */
 void device_fill_anchor(const struct site *site, uint32_t station, size_t stretch, struct native_anchor *a);
 
 /* The most pulses that one tick consists of, and the most lines that end in it, whatever the settings. */

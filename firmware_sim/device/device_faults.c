@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults on request: the board of the run. */
+/* Injected faults: the board of the run. */
 #include "firmware_sim/device/device_state.h"
 
 static void write_note(void *ctx, const struct fault_note *note)

@@ -35,7 +35,7 @@ void device_push_error(struct device *device, uint32_t session, int number, cons
     }
 }
 
-/* At the end of the run it does not wait for the second to be over. */
+/* At the end of the run the events do not wait until the second is over. */
 void device_say_held(struct device *device, uint64_t tick)
 {
     for (uint32_t i = 0; i <= DEVICE_MAX_SESSIONS && device->held != 0; i++) {

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* FAULt commands: what a client says of faults on request, carried out on the board of the run.
+/* FAULt commands: carries them out on the run's board of injected faults.
  *
- * In: a board, the configuration that says which faults there can be, and device time. Out: struct command_faults for the
- * command set. The owner's lock protects it. */
+ * In: a board, the configuration, which decides the possible faults, and device time. Out: struct command_faults for
+ * the command set. The owner's lock protects it. */
 #ifndef FIRMWARE_SIM_DEVICE_FAULT_DESK_H
 #define FIRMWARE_SIM_DEVICE_FAULT_DESK_H
 
@@ -13,13 +13,13 @@
 struct fault_desk {
     const struct config *cfg;
     struct fault_board *board;
-    int64_t now_ns; /* from which a fault counts that is added now; set before each command */
-    int no_head;    /* nothing computes: faults in the head are refused */
+    int64_t now_ns; /* a fault that is added now counts from this device time; set before each command */
+    int no_head;    /* no head computes, so faults in the head are refused */
 };
 
 extern const struct command_faults fault_desk_commands; /* their owner is a struct fault_desk */
 
-/* Why a fault can't be, where nothing computes; NULL: it can. */
+/* Why a fault is not possible without a head that computes; NULL: it is. */
 const char *fault_desk_why_not(const struct fault *fault);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the device says of itself: descriptor, anchor, telemetry. */
+/* Fills the frames in which the device describes itself: descriptor, anchor, telemetry. */
 #include <math.h>
 #include <string.h>
 
@@ -53,7 +53,7 @@ static const uint32_t echoes_sent[] = {[BEAM_ALL] = NATIVE_ECHOES_ALL,
                                        [BEAM_LAST] = NATIVE_ECHOES_LAST,
                                        [BEAM_STRONGEST] = NATIVE_ECHOES_STRONGEST};
 
-/* As it is set: a mirror that turns slowly has other rates in the segment. */
+/* Uses the rate that is set: with a slow mirror the segment has another one. */
 static void set_sequence(const struct device *device, struct native_emitter *e)
 {
     struct schedule_spec spec = device->scan.segment.spec;
@@ -117,8 +117,8 @@ void device_fill_anchor(const struct site *site, uint32_t station, size_t stretc
     a->heights = georef_has_geoid(georef) ? NATIVE_HEIGHTS_GEOID : NATIVE_HEIGHTS_ELLIPSOID;
 }
 
-/* Counts of what was released are filled in at release (stream.c): pulses, echoes and lines. Both counts of lost
- * pulses have what was cast here; the release takes off what was delivered. */
+/* Pulses, echoes and lines are filled in at release (stream.c), since they count what was released. Here both counts of
+ * lost pulses are set to the pulses cast; the release subtracts those delivered. */
 void device_fill_telemetry(const struct device *device, uint64_t tick, struct native_telemetry *t)
 {
     const struct device_counters *c = &device->counters;

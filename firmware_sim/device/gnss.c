@@ -42,7 +42,7 @@ struct gnss_place {
     double velocity_m_s[3]; /* east, north, up */
 };
 
-/* Where a point of the scene lies on the Earth; 0: nowhere. */
+/* The place on the Earth of a point of the scene; 0: there is none. */
 static int locate(const struct site *site, const struct placement *at, const double p_prcs[3], double geodetic[3])
 {
     struct georef_place place;
@@ -71,7 +71,7 @@ static int locate_antenna(const struct gnss *gnss, const struct placement *at, c
     return locate(gnss->site, at, p_prcs, geodetic);
 }
 
-/* East, north, up, from two places 2 GNSS_STEP_NS apart. */
+/* Sets the velocity east, north and up, from two places that are 2 GNSS_STEP_NS apart. */
 static void set_velocity(const double before[3], const double here[3], const double after[3], double velocity_m_s[3])
 {
     const struct georef_place place[3] = {
@@ -84,7 +84,7 @@ static void set_velocity(const double before[3], const double here[3], const dou
     if (locate_axes(&place[1], at_ecef, enu, NULL) == SH_OK) mat3_apply_transposed(enu, d, velocity_m_s);
 }
 
-/* The antenna, and its error shift_m east, north and up. 0: nowhere on the Earth. */
+/* The antenna's place, with its error shift_m east, north and up. 0: it is nowhere on the Earth. */
 static int gnss_position(const struct gnss *gnss, uint32_t station, const struct gnss_track *track,
                          const double shift_m[3], struct gnss_place *out)
 {

@@ -19,7 +19,7 @@
 struct gnss {
     const struct site *site;
     const struct head_clock *clock;
-    int on; /* the time is known, and a link speaks a protocol that may ask for fixes */
+    int on; /* the time is known, and the protocol of a link may ask for fixes */
     int64_t period_ns;
 };
 
@@ -37,8 +37,8 @@ struct gnss_track {
     struct pose before, at, after; /* GNSS_STEP_NS apart */
 };
 
-/* A position. track NULL: the head stands at the station (0..n_stations-1). Else it is where
- * track says; its quality is 0 where that is no place on the Earth. */
+/* A position. track NULL: the head stands at the station (0..n_stations-1). Else the position
+ * follows from track; its quality is 0 where that is no place on the Earth. */
 void gnss_fix(const struct gnss *gnss, uint64_t index, uint32_t station, const struct gnss_track *track,
               struct nmea_fix *fix);
 

@@ -11,7 +11,7 @@
 static const char LEAP_FILE[] = "/usr/share/zoneinfo/leap-seconds.list";
 static const int64_t PPT = 1000000000000;
 
-/* The system's table when it is there and good for longer than ours. */
+/* Takes the system's table where there is one that reaches further than ours. */
 static void choose_table(struct head_clock *clock)
 {
     char text[32768];
@@ -42,7 +42,7 @@ static void warn_expired(struct head_clock *clock)
              day);
 }
 
-/* What the pieces from the i-th on are, by their changes. */
+/* Computes the pieces from the i-th on from their changes. */
 static void renew_pieces(struct head_clock *clock, uint32_t i)
 {
     for (; i < clock->n; i++) {
@@ -57,7 +57,7 @@ static void renew_pieces(struct head_clock *clock, uint32_t i)
     }
 }
 
-/* The two oldest pieces become one. */
+/* Merges the two oldest pieces. */
 static void forget_oldest(struct head_clock *clock)
 {
     struct head_clock_piece *first = &clock->piece[1];
@@ -107,7 +107,7 @@ int64_t head_clock_true_ns(const struct head_clock *clock, int64_t t_ns)
     return clock->tai0_ns + t_ns;
 }
 
-/* Rounded down. */
+/* The clock's time, rounded down. */
 static int64_t piece_ns(const struct head_clock *clock, const struct head_clock_piece *piece, int64_t t_ns)
 {
     const head_clock_wide gained = piece->gained + (head_clock_wide)(t_ns - piece->from_ns) * piece->rate_ppt;
@@ -132,8 +132,7 @@ int head_clock_add_leap(struct head_clock *clock, int64_t t_ns, int64_t *posix_s
     return utc_table_add(&clock->table, *posix_s);
 }
 
-/* What the clock shows a nanosecond before, for an edge at t_ns. A jump is none: there the piece counts as if it had
- * run before. */
+/* The clock's time a nanosecond before t_ns. A jump is no edge: at a jump the piece is extended backward. */
 static int64_t before_ns(const struct head_clock *clock, const struct head_clock_piece *piece, int64_t t_ns)
 {
     const int begins = t_ns == piece->from_ns && piece != clock->piece && piece->change.jump_ns == 0;

@@ -3,11 +3,11 @@
  *
  * In: device time, ns from power-up. Out: TAI, ns (core/utc.h).
  *
- * Device time is exact: it is the simulation's own. Pulses, poses, moving things and the GNSS receiver go by
- * it. The key time.epoch says what the true time of day is at power-up. The head's clock is what the head
- * believes. It is the sum of the true time, time.offset_s, time.drift_ppm of the time since power-up, and,
- * from time.jump_at_s on, time.jump_s. While all of them are 0, the head's clock shows the true time. Faults on
- * request add jumps, gains and times in which it stands. All of these are changes of one kind, and between two of them
+ * Device time is exact: it is the simulation's own. Pulses, poses, moving meshes and the GNSS receiver follow
+ * it. The key time.epoch gives the true time of day at power-up. The head's clock may be wrong:
+ * it is the sum of the true time, time.offset_s, time.drift_ppm of the time since power-up, and,
+ * from time.jump_at_s on, time.jump_s. While all of them are 0, the head's clock shows the true time. Injected
+ * faults add jumps, gains and times in which it stands. All of these are changes of one kind, and between two of them
  * the clock runs evenly.
  *
  *   by the head's clock  PPS events, the GPS time of SCAN_START (and with them scanhead_gps_time), UTC in telemetry,
@@ -18,10 +18,10 @@
  * The system's clock (utc, tai) is read once, at power-up. Device time then runs with CLOCK_MONOTONIC. That
  * clock follows what PTP or NTP do to the rate of the system's clocks, but not their steps.
  *
- * A leap second on request is one of the table: UTC has a second 60 and is a second less from then on, TAI and GPS time
- * go on. The receiver has the same table, as the head has its leap seconds from there.
+ * An injected leap second is added to the table: UTC has a second 60 and is a second less from then on, TAI and GPS
+ * time go on. The receiver has the same table, since the head gets its leap seconds from the receiver.
  *
- * Thread: any for the true time, after head_clock_power_up; else whoever has the device's lock. */
+ * Thread: any for the true time, after head_clock_power_up; all else with the device's lock. */
 #ifndef FIRMWARE_SIM_DEVICE_HEAD_CLOCK_H
 #define FIRMWARE_SIM_DEVICE_HEAD_CLOCK_H
 
@@ -29,12 +29,12 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/epoch.h"
 
-enum { HEAD_CLOCK_CHANGES = 64 }; /* the last ones are kept; the time before the first of these is not asked for */
+enum { HEAD_CLOCK_CHANGES = 64 }; /* the last ones are kept; nobody asks for times before the first of these */
 
-/* What happens to the clock at a device time. */
+/* A change of the clock at a device time. */
 struct head_clock_change {
-    int64_t jump_ns;  /* it is set on by so much */
-    int64_t gain_ppt; /* it gains so much more than before, 1e-12 */
+    int64_t jump_ns;  /* it is set forward by this */
+    int64_t gain_ppt; /* its gain rises by this, in 1e-12 */
     int stands;       /* 1: it stands from now on; -1: no more for this reason */
 };
 
@@ -42,14 +42,14 @@ __extension__ typedef __int128 head_clock_wide;
 
 /* The clock from a change to the next. */
 struct head_clock_piece {
-    int64_t from_ns; /* device time. The first piece has the time before, too */
+    int64_t from_ns; /* device time. The first piece also covers the time before */
     struct head_clock_change change;
-    /* which gives, with the pieces before: */
-    int64_t shift_ns;       /* all jumps */
-    int64_t rate_ppt;       /* what it gains; -1e12: it stands */
-    head_clock_wide gained; /* at from_ns, in 1e-12 ns */
-    int64_t gain_ppt;       /* what it would gain if it didn't stand */
-    int stands;             /* for so many reasons */
+    /* follows from this change and the pieces before: */
+    int64_t shift_ns;       /* sum of all jumps */
+    int64_t rate_ppt;       /* its gain; -1e12: it stands */
+    head_clock_wide gained; /* gained until from_ns, in 1e-12 ns */
+    int64_t gain_ppt;       /* the gain that it would have if it didn't stand */
+    int stands;             /* number of reasons for which it stands */
 };
 
 struct head_clock {
@@ -58,10 +58,10 @@ struct head_clock {
     uint32_t n;
     struct head_clock_piece piece[HEAD_CLOCK_CHANGES];
     struct utc_table table;
-    char warning[160]; /* something the user should know; empty: nothing */
+    char warning[160]; /* for the user; empty: none */
 };
 
-/* Takes the table of leap seconds that is known longer: the built-in one, or the system's. */
+/* Takes the table of leap seconds that reaches further: the built-in one, or the system's. */
 int head_clock_create(const struct config *cfg, struct head_clock *clock, struct sh_err *err);
 /* Device time 0 is at this time of clock_now_ns(): sets the true time by the system's clock where that is the
  * source.
@@ -72,16 +72,17 @@ int head_clock_power_up(struct head_clock *clock, int64_t now_ns, struct sh_err 
 int64_t head_clock_true_ns(const struct head_clock *clock, int64_t t_ns);
 int64_t head_clock_ns(const struct head_clock *clock, int64_t t_ns);
 
-/* Changes the clock from a device time on. No clock runs backwards: one that would loses all, and stands. */
+/* Changes the clock from a device time on. It never runs backwards: a rate that would be negative becomes 0. */
 void head_clock_change(struct head_clock *clock, int64_t t_ns, const struct head_clock_change *change);
 
-/* A leap second that no table has, at the end of the UTC minute at hand at a device time, by the head's clock. Where
- * one is there already, at the end of the next. *posix_s: the second after it, since 1970. 0: the table is full. */
+/* Adds a leap second that no table has, at the end of the UTC minute that the head's clock shows at a device time.
+ * Where that minute has one already, it comes at the end of the next. *posix_s: the second after it, since 1970. 0: the
+ * table is full. */
 int head_clock_add_leap(struct head_clock *clock, int64_t t_ns, int64_t *posix_s);
 
-/* The full second of the head's clock that begins at a device time in [from_ns, to_ns), at most a second
- * apart: 1, the first nanosecond of it and the TAI second, or 0. A jump is no edge, nor is the time in which the clock
- * stands; of two edges in the interval, the later is given. */
+/* Finds a full second of the head's clock that begins in [from_ns, to_ns) of device time, an interval of at most a
+ * second. Returns 1, its first nanosecond and the TAI second; or 0. A jump is no edge, nor is the time in which the
+ * clock stands. Of two edges the later one is given. */
 int head_clock_edge(const struct head_clock *clock, int64_t from_ns, int64_t to_ns, int64_t *edge_ns, int64_t *tai_s);
 
 #endif

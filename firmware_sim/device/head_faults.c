@@ -32,7 +32,7 @@ void head_faults_note(struct head_faults *faults, const struct head_fault *fault
     note(faults, fault, &(struct head_faults_tick){.t_ns = t_ns}, ended, text);
 }
 
-/* The start of the first tick that begins then or later. */
+/* The start of the first tick that begins at t_ns or later. */
 static int64_t round_up(const struct head_faults *faults, int64_t t_ns)
 {
     const int64_t rest_ns = t_ns % faults->tick_ns;
@@ -49,7 +49,7 @@ static void set_window(const struct head_faults *faults, const struct fault_entr
     if (f->until_ns != INT64_MAX) f->until_ns = round_up(faults, f->until_ns);
 }
 
-/* Takes over the list as it is now. Those that were taken out while they were active stay for a step more, and end. */
+/* Takes over the present list. Faults that were taken out while they were active stay for one more step, and end. */
 static void renew(struct head_faults *faults)
 {
     struct fault_entry entry[FAULT_MAX];
@@ -69,7 +69,7 @@ static void renew(struct head_faults *faults)
     const uint32_t n_there = faults->n;
     for (uint32_t i = 0; i < n_was; i++) {
         if (!was[i].active || fault_find(faults->fault, n_there, sizeof *was, was[i].number) != NULL) continue;
-        if (faults->n == 2 * FAULT_MAX) break; /* can't be: what was taken out before has ended since */
+        if (faults->n == 2 * FAULT_MAX) break; /* can't happen: faults that were taken out before have ended */
         faults->fault[faults->n] = was[i];
         faults->fault[faults->n++].cleared = 1;
     }
@@ -86,7 +86,7 @@ static int is_active(const struct head_faults *faults, const struct head_fault *
            tick->pulse0 + tick->n_pulses > f->fault.from_pulse;
 }
 
-/* The moment in or before this tick at which it began, or ended. */
+/* The moment in or before this tick at which the fault began, or ended. */
 static int64_t at_ns(const struct head_faults_tick *tick, const struct head_fault *f)
 {
     if (f->begins) return f->from_ns > tick->t_ns ? f->from_ns : tick->t_ns;
@@ -94,7 +94,7 @@ static int64_t at_ns(const struct head_faults_tick *tick, const struct head_faul
     return by_time && f->until_ns < tick->t_ns ? f->until_ns : tick->t_ns;
 }
 
-/* Notes that it begins, or ends. Jumps and leap seconds have no end. */
+/* Notes that the fault begins, or ends. Jumps and leap seconds have no end. */
 static void say(struct head_faults *faults, struct head_fault *f, const struct head_faults_tick *tick)
 {
     struct head_faults_tick at = *tick;

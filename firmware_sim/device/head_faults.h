@@ -1,18 +1,18 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults in the head: which of them are at work in a tick, when each begins and ends, and the notes of that.
+/* Injected faults in the head: finds those that are active in a tick, and notes when each begins and ends.
  *
- * In: the board of the run, and each tick as it is claimed. Out: the faults that are at work in it. A fault that begins
- * is noted on the board once, with device time and the first pulse that it hits where a scan is on; and once more, as
- * ended, when it is over. All goes by device time, so it is the same at any pace and with any number of threads.
+ * In: the board of the run, and each tick as it is claimed. Out: the faults that are active in it. A fault is noted on
+ * the board when it begins, with device time and, during a scan, the first pulse that it hits. It is noted again, as
+ * ended, when it is over. Everything depends on device time only, so it is the same at any pace and number of threads.
  *
  * A fault begins with the first tick that starts at from_s or later, and ends with the first that starts at until_s or
  * later, as commands do. The clock's faults are exact to the nanosecond instead. With from_pulse or until_pulse it is
- * at work in ticks of a scan that have such a pulse. A power cycle, a jump and a leap second strike once; power is off
- * for for_ms, up to a whole tick. What is taken out of the list while it is at work ends.
+ * active in ticks of a scan that have such a pulse. A power cycle, a jump and a leap second strike once; power is off
+ * for for_ms, rounded up to a whole tick. A fault that is taken out of the list while it is active ends.
  *
- * Those that change what is measured are no part of it: they are exact to the pulse (beam_faults.c).
+ * Faults that change what is measured are not handled here: they are exact to the pulse (beam_faults.c).
  *
- * Thread: whoever has the device's lock. Without faults a step is one atomic load. */
+ * Thread: with the device's lock. Without faults a step is one atomic load. */
 #ifndef FIRMWARE_SIM_DEVICE_HEAD_FAULTS_H
 #define FIRMWARE_SIM_DEVICE_HEAD_FAULTS_H
 
@@ -30,17 +30,17 @@
 _Static_assert(FAULT_N_KINDS <= 64, "a set of kinds has a bit for each");
 
 struct head_fault {
-    uint32_t number; /* on the board; first, for fault_find */
+    uint32_t number; /* on the board; first member, for fault_find */
     struct fault fault;
     int64_t from_ns, until_ns; /* device time; INT64_MAX: no end */
     int active;                /* in the tick of the last step */
     int begins, ends;          /* with the last step */
     int64_t begin_ns;          /* when it last began */
-    uint32_t times;            /* it began, so far */
+    uint32_t times;            /* how often it began so far */
     int cleared;               /* it was taken out of the list: it ends with the next step */
     /* its owner's: */
-    uint64_t n; /* for the note of its end: PPS events that were lost, ...; 0 when it begins */
-    int undone; /* what it did is undone already; 0 when it begins */
+    uint64_t n; /* for the note of its end, such as the number of PPS events that were lost; 0 when it begins */
+    int undone; /* its effect is undone already; 0 when it begins */
 };
 
 struct head_faults {
@@ -48,7 +48,7 @@ struct head_faults {
     int64_t tick_ns;
     uint32_t version;
     uint32_t n;
-    struct head_fault fault[2 * FAULT_MAX]; /* those that were just taken out, too */
+    struct head_fault fault[2 * FAULT_MAX]; /* including those that were just taken out */
 };
 
 /* A tick. */
@@ -60,18 +60,18 @@ struct head_faults_tick {
 
 void head_faults_init(struct head_faults *faults, struct fault_board *board, int64_t tick_ns);
 
-/* Ticks come in order. Faults of these kinds begin and end; each kind belongs to one step of a tick. Returns 1 when one
- * of them is active or has just ended. */
+/* Begins and ends faults of these kinds; each kind belongs to one step of a tick. Ticks come in order. Returns 1 when
+ * one of them is active or has just ended. */
 int head_faults_step(struct head_faults *faults, uint64_t kinds, const struct head_faults_tick *tick);
 
 /* The faults of a kind that are active, one after the other; from NULL to NULL. */
 struct head_fault *head_faults_next(struct head_faults *faults, enum fault_kind kind, const struct head_fault *before);
 
-/* The faults of a kind that strikes at something, as a boot, whose window has this moment. In the same way, after a
- * step of this tick. They are in no step themselves: who makes them strike notes them. */
+/* The same for a kind that strikes at an event, such as a boot: the faults whose window has this moment. After a step
+ * of this tick. Such kinds are in no step themselves: the caller that makes them strike notes them. */
 struct head_fault *head_faults_at(struct head_faults *faults, enum fault_kind kind, int64_t t_ns,
                                   const struct head_fault *before);
-/* A note: text may be NULL; without a pulse. */
+/* Puts a note on the board, without a pulse; text may be NULL. */
 void head_faults_note(struct head_faults *faults, const struct head_fault *fault, int64_t t_ns, int ended,
                       const char *text);
 

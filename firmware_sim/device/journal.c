@@ -26,7 +26,7 @@ struct journal {
     char last[LINE_ROOM]; /* the end of the run; empty: none is known */
 };
 
-/* A remark that is missing does no harm to a replay, a command does: that line is none that a reader takes. */
+/* A missing remark does no harm to a replay. A missing command does, so readers refuse the line that stands for it. */
 static void say_gap(char text[LINE_GAP_BYTES], const uint64_t lost[LINE_KINDS])
 {
     int n = 0;
@@ -77,7 +77,7 @@ static int is_command_line(const char *line)
     return 1;
 }
 
-/* With its '\n', into a buffer of LINE_ROOM bytes. Returns its length. */
+/* Writes a line with its '\n' into a buffer of LINE_ROOM bytes. Returns its length. */
 static size_t compose(char *text, uint64_t tick, int64_t t_ns, uint32_t session, const char *line)
 {
     return (size_t)snprintf(text, LINE_ROOM, "%" PRIu64 " %" PRId64 " %" PRIu32 " %s\n", tick, t_ns, session, line);
@@ -137,7 +137,7 @@ static int take_number(const char **p, uint64_t max, uint64_t *value)
     return 0;
 }
 
-/* NULL, or what is wrong with the line. */
+/* NULL, or why the line is wrong. */
 static const char *parse_entry(const char *text, struct journal_entry *entry)
 {
     uint64_t t_ns, session;
@@ -152,8 +152,8 @@ static const char *parse_entry(const char *text, struct journal_entry *entry)
     return NULL;
 }
 
-/* Longer than any line that is written, and notes of people; and more commands than fit into a day at one
- * each 10 ms. What is beyond is no journal, and would take the memory. */
+/* Limits that no journal reaches: longer than any line that is written, also by people; and more commands than a day
+ * has at one each 10 ms. A larger file would only take memory. */
 enum { LINE_MAX_LEN = 1023, MAX_ENTRIES = 10000000 };
 
 struct reader {
@@ -176,7 +176,7 @@ __attribute__((format(printf, 3, 4))) static int fail_line(const struct reader *
     return sh_fail(err, SH_EINPUT, "journal: %s:%zu: %s", reader->path, reader->line_no, what);
 }
 
-/* 1: a line without its end is in text; 0: end of file; or a failure. */
+/* 1: text has a line, without its line end; 0: end of file; or a failure. */
 static int read_line(struct reader *reader, struct sh_err *err)
 {
     size_t n = 0;
@@ -225,7 +225,7 @@ static int read_all(struct reader *reader, struct sh_err *err)
     return rc;
 }
 
-/* By tick; commands of one tick as they stand in the file. */
+/* Orders by tick; commands of one tick stay in the file's order. */
 static int compare(const void *a, const void *b)
 {
     const struct journal_entry *one = a, *other = b;

@@ -8,9 +8,9 @@
  * the run ended at that tick. It is missing where the head was killed. Other lines that begin with '#' and empty
  * lines are notes.
  *
- * A thread writes the lines at once (line_writer.h), so whoever writes the journal never waits for its file. Where that is
- * slower than commands come, some are dropped: a line `LOST <n>` stands for n of them. journal_read refuses such a file. A
- * note stands for notes that are missing, which no replay needs. */
+ * A thread writes the lines at once (line_writer.h), so the caller never waits for the file. Where the file is too
+ * slow, commands are dropped: a line `LOST <n>` stands for n of them, and journal_read refuses such a file. For dropped
+ * notes there is only a note, since no replay needs them. */
 #ifndef FIRMWARE_SIM_DEVICE_JOURNAL_H
 #define FIRMWARE_SIM_DEVICE_JOURNAL_H
 
@@ -22,13 +22,13 @@
 
 struct journal;
 
-/* Begins a new file; path must outlive the journal. *lost counts the lines that are not in it; NULL: nobody asks. NULL on
- * failure, with the reason in err; journal_close releases. */
+/* Begins a new file; path must outlive the journal. *lost counts the lines that are not in it; it may be NULL. Returns
+ * NULL on failure, with the reason in err. journal_close frees it. */
 struct journal *journal_open(const char *path, _Atomic uint64_t *lost, struct sh_err *err);
 
-/* Adds a line; waits for nothing. SH_EINPUT: t_ns is negative, or line is empty, too long or not printable ASCII; nothing
- * is written. SH_ELOST: the file is too slow, and the line is dropped. SH_EIO: the file can't be written; so it is with all
- * later calls, and journal_close has the reason. */
+/* Adds a line; never waits. SH_EINPUT: t_ns is negative, or line is empty, too long or not printable ASCII; nothing is
+ * written. SH_ELOST: the file is too slow, and the line is dropped. SH_EIO: the file can't be written; all later calls
+ * return that, too, and journal_close gives the reason. */
 int journal_write(struct journal *journal, uint64_t tick, int64_t t_ns, uint32_t session, const char *line);
 
 /* The run ended at this tick; journal_close writes it. SH_EINPUT: t_ns is negative. */
@@ -37,11 +37,11 @@ int journal_end(struct journal *journal, uint64_t tick, int64_t t_ns);
 /* A note, which replaying passes over: one printable line. Failures as in journal_write. */
 int journal_note(struct journal *journal, const char *text);
 
-/* 1: a caller that can wait should, so that nothing is dropped. NULL never is. */
+/* 1: a caller that can wait should, so that nothing is dropped. 0 for NULL. */
 int journal_is_filling(const struct journal *journal);
 
-/* Writes what is left, as long as the file takes some of it every 2 s, closes and releases. The first thing that went
- * wrong in writing, with its text, or 0. NULL is nothing to close. */
+/* Writes what is left, as long as the file takes some of it every 2 s; closes and frees. Returns the first error in
+ * writing, with its text, or 0. A journal of NULL is allowed. */
 int journal_close(struct journal *journal, struct sh_err *err);
 
 struct journal_entry {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Where the head is: the end of a trajectory, and a live platform's poses. */
+/* The head's pose: the end of a trajectory, and a live platform's poses. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -28,8 +28,8 @@ static int is_near(const struct device *device, const struct pose *pose)
     return off_m <= device->site->cfg->platform.reach_m;
 }
 
-/* So far ahead that the time must be wrong. Such a pose would keep all later ones out. In the pace step the
- * time is granted, and so right. */
+/* Whether a pose is so far ahead that its time must be wrong: it would keep all later ones out. In the pace step the
+ * time is granted, so it is right. */
 static int is_early(const struct device *device, int64_t t_ns)
 {
     int64_t now_ns = (int64_t)device->next_tick * device->tick_ns;
@@ -50,7 +50,7 @@ int device_pose(struct device *device, int64_t t_ns, const double v[6])
     return bad;
 }
 
-/* After the last pose: on as from the one before to the last, for extrapolate_ms and within reach. Then it
+/* After the last pose the motion between the last two goes on, for extrapolate_ms and within reach. Then the platform
  * stands. */
 static uint32_t extrapolate(const struct device *device, int64_t t_ns, struct pose *out)
 {
@@ -82,11 +82,11 @@ static uint32_t platform_at(const struct device *device, int64_t t_ns, struct po
                      (double)(t_ns - a_ns) / (double)(b_ns - a_ns), out);
         return 0;
     }
-    *out = sample_at(live, live->n - kept)->pose; /* before the first that is known */
+    *out = sample_at(live, live->n - kept)->pose; /* t_ns is before the first pose that is kept */
     return 0;
 }
 
-/* The head on it. Returns the flags of its pose. */
+/* The pose of the head on the platform. Returns the pose's flags. */
 static uint32_t live_head_at(const struct device *device, int64_t t_ns, struct pose *head)
 {
     struct pose body;
@@ -95,7 +95,7 @@ static uint32_t live_head_at(const struct device *device, int64_t t_ns, struct p
     return flags;
 }
 
-/* On the trajectory. The platform stands before its begin and after its end. */
+/* The pose on the trajectory. The platform stands before its begin and after its end. */
 static void on_path(const struct site *site, int64_t t_ns, struct pose *out)
 {
     const struct pose_knot *knot = site->knot;
@@ -134,7 +134,7 @@ static void make_knot(struct device *device, int64_t t_ns, struct pose_knot *kno
     knot->flags = live_head_at(device, (int64_t)device->scan.tick0 * device->tick_ns + t_ns, &knot->pose);
 }
 
-/* The event once per episode: a second without one ends it. */
+/* Adds the event once per episode: a second without a late pose ends an episode. */
 static void count_late(struct device *device, const struct pose_knot *knot, struct device_work *work)
 {
     struct device_live *live = &device->live;

@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* Stations that are moved: planned without the lock, put in the place of the site of now under it, and freed when nobody
- * uses them any more.
+/* Moving stations: a new site is planned without the lock, replaces the present one under the lock, and earlier ones
+ * are freed when nobody uses them any more.
  *
  *   device_begin_move   the command is taken: from now on no scan starts and no other station moves
- *   device_plan_move    a site beside that of now is loaded (site_load_moved); takes its time, without the lock
- *   device_take_move    it becomes the site of now: for the ticks that are claimed from now on
- *   device_end_move     sites of before that no tick uses any more are freed
+ *   device_plan_move    a site beside the present one is loaded (site_load_moved); may take long, without the lock
+ *   device_take_move    it becomes the present site, for the ticks that are claimed from now on
+ *   device_end_move     earlier sites that no tick uses any more are freed
  *
- * A tick that was given up as too late may be computed on for a while: so it holds the site that it was claimed with. */
+ * A caster may go on for a while with a tick that was given up as too late. So a tick holds the site that it was
+ * claimed with. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,7 +17,7 @@
 #include "firmware_sim/device/device_state.h"
 #include "firmware_sim/site/plan_rows.h"
 
-/* A journal that is replayed in real time: so many moves are planned before time begins. */
+/* Most moves of a journal that are planned before time begins, for a replay in real time. */
 enum { MAX_AHEAD = 16 };
 
 static void read_move(const struct command_result *command, struct device_move *plan)
@@ -28,7 +29,7 @@ static void read_move(const struct command_result *command, struct device_move *
                                  .to = {{v[0], v[1], v[2]}, v[3], v[4], v[5]}};
 }
 
-/* Whether the station stands there already in that site. */
+/* Whether the station stands at the plan's place already in that site. */
 static int is_there(const struct device_moves *moves, const struct site *site, const struct device_move *plan)
 {
     struct site_place now, to = plan->to;
@@ -62,8 +63,8 @@ static int move_stops(void *ctx)
     return atomic_load(&device->moves.stops);
 }
 
-/* Reports to the device's report, but draws no progress: the head serves meanwhile. */
-/* From the site `from` on, as the plan says. */
+/* Makes the site of a plan beside `from`. Warnings go to the device's report; no progress is drawn, since the head
+ * serves meanwhile. */
 static struct device_version *make_moved(struct device *device, const struct site *from, const struct device_move *plan,
                                          struct sh_err *err)
 {
@@ -78,8 +79,8 @@ static struct device_version *make_moved(struct device *device, const struct sit
     return version;
 }
 
-/* Whether what was planned ahead is the site of now but for the station that is to be moved. A replay that refuses what
- * its journal has, since options differ, comes to another one. */
+/* Whether the version that was planned ahead differs from the present site only in the station to be moved. It may not:
+ * a replay with other options may refuse commands of its journal. */
 static int is_next(const struct device_moves *moves)
 {
     const struct site *now = moves->current->site, *next = moves->ahead->site;
@@ -108,8 +109,8 @@ void device_plan_move(struct device *device)
     if (moves->made != NULL) moves->made->next = NULL;
 }
 
-/* Only moves that were done are in a journal, and a replay lets nobody else move a station: so the order is known. What
- * can't be planned, or is one too many, is planned when it is due. */
+/* The order of moves is known: a journal has only moves that were done, and during a replay nobody else moves a
+ * station. A move that can't be planned ahead, or is one too many, is planned when it is due. */
 void device_plan_ahead(struct device *device)
 {
     struct device_moves *moves = &device->moves;
@@ -119,7 +120,7 @@ void device_plan_ahead(struct device *device)
     struct command_device scratch = device->cmd; /* for reading lines */
     scratch.state = HEAD_IDLE;
     scratch.can_plan = NULL;
-    scratch.faults = NULL; /* they are added at their times */
+    scratch.faults = NULL; /* faults are added at their own times */
     int n = 0;
     for (size_t i = 0; i < journal->n_replay && n < MAX_AHEAD; i++) {
         struct command_result result;
@@ -155,7 +156,7 @@ static void use(struct device *device, struct device_version *version)
     device->site = version->site;
 }
 
-/* The last scan, as descriptor and anchor of now say it: with its settings, at the place of now. */
+/* Gives the last scan the present place, with its own settings, since descriptor and anchor are repeated from it. */
 static void move_last_scan(struct device *device)
 {
     struct device_scan *scan = &device->scan;
@@ -167,11 +168,11 @@ static void move_last_scan(struct device *device)
     scan->variant = variant;
     scan->site = variant != NULL ? variant->site : device->site;
     if (scan->segment.spec.emitter != NULL) scan->segment.spec.emitter = &scan->site->emitter;
-    scan->anchor_lost = 1; /* readers that join get the anchor of now */
+    scan->anchor_lost = 1; /* so that the present anchor goes out as a repetition */
 }
 
-/* For the next tick to be claimed, and all after it. Where the settings of now can't be planned at the new place, nothing
- * changes. */
+/* Makes the new site the present one, from the next tick to be claimed on. If the present settings can't be planned at
+ * the new place, nothing changes. */
 static int swap(struct device *device, struct sh_err *err)
 {
     struct device_moves *moves = &device->moves;
@@ -189,11 +190,11 @@ static int swap(struct device *device, struct sh_err *err)
     moves->old = was;
     device_set_places(device->site, moves->place);
     move_last_scan(device);
-    device_free_unused_variants(device); /* they hold the site of before */
+    device_free_unused_variants(device); /* these hold the earlier site */
     return SH_OK;
 }
 
-/* In the journal a new plan stands before the command it came with. */
+/* In the journal a new plan comes before the command that led to it. */
 static void write_journal(struct device *device, int64_t t_ns)
 {
     const struct device_move *plan = &device->moves.plan;

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* What the head loses, announced in events. Ticks and pulses that it could not compute in time are counted here
- * (lost_pulses, lost_ticks). Lines of its files are counted by who writes them (base/line_writer.h), frames that a slow
- * reader lost by loop/lost_frames.c. */
+/* Announces the head's losses in events. Ticks and pulses that it could not compute in time are counted here
+ * (lost_pulses, lost_ticks). base/line_writer.h counts lost lines of files, and loop/lost_frames.c the frames that a
+ * slow reader lost. */
 #include <stdio.h>
 #include <string.h>
 
 #include "firmware_sim/device/device_state.h"
 
-/* The event each time, the error once per episode: a second without a loss ends one. */
+/* Adds the event each time, and the error once per episode: a second without a loss ends an episode. */
 void device_say_overrun(struct device *device, uint64_t tick)
 {
     uint64_t ticks = atomic_load(&device->counters.lost_ticks);
@@ -27,7 +27,7 @@ void device_say_overrun(struct device *device, uint64_t tick)
     device->overrun.first = UINT64_MAX;
 }
 
-/* The event once a second, the error once per episode. */
+/* Adds the event once a second, and the error once per episode. */
 void device_say_lost_lines(struct device *device, uint64_t tick)
 {
     struct device_lost_lines *said = &device->lost_lines;
@@ -44,8 +44,8 @@ void device_say_lost_lines(struct device *device, uint64_t tick)
     said->said = journal + truth;
 }
 
-/* Events of a lost tick go before those that came later. An overrun event is taken back instead: the next one
- * has its losses and the new ones. So a long overload can't fill the room for events. */
+/* Puts the events of a lost tick before later ones. An overrun event is taken back instead: the next one
+ * reports its losses and the new ones. So a long overload can't fill the room for events. */
 static void take_back(struct device *device, const struct device_work *work)
 {
     uint32_t n = 0;
@@ -79,8 +79,8 @@ void device_lost(struct device *device, const struct device_work *work)
     take_back(device, work);
     if (work->describe && work->describe_flags == 0 && device->scan.on) device->scan.describe = 1;
     if (work->scanning && work->stretch != device->scan.stretch)
-        device->scan.anchor_lost = 1; /* maybe not in this tick */
+        device->scan.anchor_lost = 1; /* the anchor may be in this tick, or in another */
     if (work->describe && work->describe_flags != 0)
-        device->scan.anchor_lost = 1; /* maybe said again for one that was */
+        device->scan.anchor_lost = 1; /* this may have been the repetition of a lost one */
     pthread_mutex_unlock(&device->lock);
 }

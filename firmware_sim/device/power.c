@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Power and boots: what a power cycle ends and begins anew, and what goes wrong in a boot on request.
+/* Power and boots: power cycles, and injected faults of a boot.
  *
  * Device time, scan numbers and the stations' places go on over a power cycle, and so does the time of day, which has a
  * battery. All else is as at power-up. A reboot by command is a power cycle of one tick. Protocols whose devices count
@@ -24,7 +24,7 @@ static void end_slow_boots(struct device *device, uint64_t tick)
     }
 }
 
-/* No end of the scan is said: who reads it finds that it stops. */
+/* Turns power off. No event reports the end of the scan: readers see that it stops. */
 static void turn_off(struct device *device, uint64_t tick, uint64_t until_tick)
 {
     struct device_scan *scan = &device->scan;
@@ -51,7 +51,7 @@ static void set_near_wrap(struct device *device, uint64_t tick)
 void device_first_power(struct device *device)
 {
     static const struct head_faults_tick first = {0};
-    head_faults_step(&device->head_faults, 0, &first); /* takes over the list */
+    head_faults_step(&device->head_faults, 0, &first); /* only takes over the list */
     set_near_wrap(device, 0);
     device_transition(device, HEAD_EV_POWER_ON, 0);
 }
@@ -70,7 +70,7 @@ static void turn_on(struct device *device, uint64_t tick)
     device_transition(device, HEAD_EV_POWER_ON, tick);
 }
 
-/* In the first tick of a boot. */
+/* Begins a boot, in its first tick. */
 static void begin_boot(struct device *device, uint64_t tick)
 {
     struct head_faults *faults = &device->head_faults;
@@ -104,11 +104,11 @@ int device_end_boot(struct device *device, uint64_t tick)
     device_push_error(device, 0, CMD_E_SELF_TEST, command_error_text(CMD_E_SELF_TEST));
     device_transition(device, HEAD_EV_FAIL, tick);
     device->cmd.why_fault = "the self-test failed; *RST goes on without it";
-    if (device->options.start && device->options.one_scan) device->over = 1; /* nobody waits for another one */
+    if (device->options.start && device->options.one_scan) device->over = 1; /* there will be no scan to wait for */
     return 1;
 }
 
-/* Until when power is to be off that goes in this tick; 0: none goes. */
+/* The tick at which power comes back that goes in this tick; 0: it does not go. */
 static uint64_t goes_until(struct device *device, uint64_t tick)
 {
     const struct head_fault *f = NULL;
@@ -117,12 +117,12 @@ static uint64_t goes_until(struct device *device, uint64_t tick)
     if (fault_board_version(device->faults) == 0) return until_tick;
     while ((f = head_faults_next(&device->head_faults, FAULT_POWER_CYCLE, f)) != NULL) {
         const uint64_t tick1 = tick + device_ticks_of(device, 1e-3 * f->fault.for_ms);
-        if (f->begins && tick1 > until_tick) until_tick = tick1; /* two of them at once: as long as the longer */
+        if (f->begins && tick1 > until_tick) until_tick = tick1; /* of two at once, the longer one decides */
     }
     return until_tick;
 }
 
-/* Power that would come back with the tick with which it goes again stays away: links see it go and come in turn. */
+/* Where power would come back and go again with one tick, it stays off: links must see it go and come in turn. */
 void device_run_power(struct device *device, uint64_t tick, struct device_work *work)
 {
     const uint64_t until_tick = goes_until(device, tick);

@@ -5,7 +5,7 @@
  * more than a second), whether they agree with the clock, and whether the time of day was ever set. A pulse agrees when
  * the time since the one before is the seconds that the clock counted, to PPS_TOLERANCE_NS a second. One that does not is
  * an error. Pulses without a gap lock the clock after PPS_TO_LOCK of them.
- * The last PPS_KEPT changes are kept, since sessions ask for times that are past. Pure; the owner has the lock. */
+ * The last PPS_KEPT changes are kept, since sessions ask for past times. Pure; the owner has the lock. */
 #ifndef FIRMWARE_SIM_DEVICE_PPS_H
 #define FIRMWARE_SIM_DEVICE_PPS_H
 

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* The scan program: which pulses and frames each tick has while a scan is on. */
+/* The scan program: the pulses and frames of each tick while a scan is on. */
 #include <math.h>
 #include <string.h>
 
 #include "firmware_sim/device/device_state.h"
 
-/* Where no site can be planned for the settings, which the command has tried: out of memory, or at this station. */
+/* Plans the site for the settings. It was possible when the command tried it; it fails without memory, or at this
+ * station. */
 static int plan_scan(struct device *device, struct device_variant **variant, uint64_t tick)
 {
     const struct head_settings *settings = &device->cmd.settings;
@@ -47,7 +48,7 @@ void device_begin_scan(struct device *device, uint64_t tick)
 uint32_t device_tick_pulses(const struct config *cfg)
 {
     uint32_t n = (uint32_t)ceil((double)cfg->profile.prr_max_uhz * 1e-6 / cfg->loop.tick_hz);
-    /* An eighth: to catch up with. A firing sequence may begin with all of its pulses. */
+    /* An eighth more to catch up. A tick may begin with all pulses of a firing sequence. */
     return n + n / 8 + 2 * SCHEDULE_PACKET + cfg->profile.emitter.n_beams;
 }
 
@@ -56,8 +57,8 @@ uint32_t device_tick_lines(const struct config *cfg)
     return (uint32_t)ceil((double)cfg->profile.lines_max_uhz * 1e-6 / cfg->loop.tick_hz) + 2;
 }
 
-/* First pulse that is too many for this tick. When the rates jump up, what is due since the last cut, up to
- * 15 pulses at the old rate, comes at the new one and may fill several ticks. */
+/* The first pulse that is too many for this tick. When the rates rise suddenly, the pulses due since the last cut, up
+ * to 15 at the old rate, are counted at the new rate and may fill several ticks. */
 static uint64_t tick_room_end(const struct device *device)
 {
     const struct schedule_segment *seg = &device->scan.segment;
@@ -68,7 +69,7 @@ static uint64_t tick_room_end(const struct device *device)
     return line.pulse_end < end ? line.pulse_end : schedule_cut(seg, end);
 }
 
-/* Counts the pulses that the tick has: in the work, in the scan and in all. */
+/* Counts the pulses of the tick: in the work, in the scan and in total. */
 static void count_pulses(struct device *device, struct device_work *work)
 {
     const struct schedule_segment *seg = &work->segment;
@@ -91,7 +92,7 @@ static void count_pulses(struct device *device, struct device_work *work)
     atomic_fetch_add(&device->counters.cast, work->n_cast);
 }
 
-/* When the scan ends by itself, whatever its frames: after its time, or where its path ends. Since its start. */
+/* The time since its start at which the scan ends, whatever its frames: after its time, or at its path's end. */
 static int64_t scan_end_ns(const struct device *device)
 {
     int64_t path_end_ns = device_path_end_ns(device);
@@ -100,7 +101,7 @@ static int64_t scan_end_ns(const struct device *device)
     return end_ns < path_end_ns ? end_ns : path_end_ns;
 }
 
-/* Pulses of this tick; ends the scan when it is complete or was told to stop. Returns 1 when the scan is
+/* Claims the pulses of this tick; ends the scan when it is complete or was told to stop. Returns 1 when the scan is
  * over. */
 static int claim_pulses(struct device *device, uint64_t tick, struct device_work *work)
 {
@@ -117,8 +118,8 @@ static int claim_pulses(struct device *device, uint64_t tick, struct device_work
     work->stretch = device->scan.stretch;
     work->echoes = device->cmd.settings.echoes;
     work->pulse0 = device->scan.pulse_next;
-    /* A stop keeps what was fired before this tick began; else the cut leaves whole packets for the next
-     * tick. */
+    /* After a stop all pulses that fired before this tick go out. Otherwise the cut leaves an incomplete packet for the
+     * next tick. */
     int64_t end_ns = scan_end_ns(device), until_ns = stop ? since : since + device->tick_ns;
     int ends = end_ns <= until_ns; /* within this tick */
     if (ends) until_ns = end_ns;
@@ -142,7 +143,7 @@ static int claim_pulses(struct device *device, uint64_t tick, struct device_work
     if (end > work->pulse0) device->scan.stretch = site_stretch_at(device->site, schedule_time_ns(seg, end - 1));
     work->cut_short = (stop || ends) && end < seg->end_pulse;
     device_take_poses(device, work);
-    struct schedule_line line; /* of the next pulse, or of the last one: frames may be set to fewer than there are */
+    struct schedule_line line; /* of the next pulse, or of the last: a command may lower the number of frames */
     const int is_whole = end >= seg->end_pulse && seg->spec.frames != 0;
     schedule_get_line(seg, schedule_line_of(seg, is_whole ? end - 1 : end), &line);
     device->cmd.frames_done = (uint64_t)line.frame + (uint64_t)is_whole;
@@ -195,7 +196,7 @@ static void describe(struct device *device, uint64_t tick, struct device_work *w
 {
     uint64_t since = tick - device->scan.tick0;
     if (device->scan.describe || device_is_repeated(device, tick)) device_describe(device, work);
-    /* All names at the scan's start, then round and round for those who join late. */
+    /* Send all names at the scan's start, then over and over for readers that join late. */
     uint32_t n = device->site->n_surfaces;
     uint64_t chunks = (n + DEVICE_SURFACES_A_FRAME - 1) / DEVICE_SURFACES_A_FRAME;
     uint64_t period = device->tick_hz >= 4 ? device->tick_hz / 4 : 1;
@@ -207,8 +208,8 @@ static void describe(struct device *device, uint64_t tick, struct device_work *w
     }
 }
 
-/* Ticks before this one may yet be lost. So the event has the pulses that were cast, and its release takes
- * off those that were delivered (stream.c). */
+/* Ticks before this one may yet be lost. So the event has the pulses that were cast, and its release subtracts those
+ * that were delivered (stream.c). */
 static void end_scan(struct device *device, uint64_t tick)
 {
     int stopped = device->scan.stop_requested;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The device's time of day: PPS, what TIME: answers, and the GNSS receiver. */
+/* The device's time of day: PPS, the answers to TIME: queries, and the GNSS receiver. */
 #include <stdio.h>
 
 #include "firmware_sim/device/device_state.h"
@@ -62,7 +62,7 @@ int64_t device_utc_ns(struct device *device, int64_t t_ns)
 {
     const struct head_clock *clock = &device->clock;
     if (clock->source == EPOCH_NONE) return INT64_MIN;
-    pthread_mutex_lock(&device->lock); /* faults change it */
+    pthread_mutex_lock(&device->lock); /* faults may change the clock */
     const int64_t utc_ns = utc_posix_from_tai(&clock->table, head_clock_ns(clock, t_ns));
     pthread_mutex_unlock(&device->lock);
     return utc_ns;
@@ -91,10 +91,10 @@ int device_fix(struct device *device, int64_t t_ns, struct nmea_fix *fix)
     struct device_version *version;
     struct gnss gnss = device->gnss;
     struct head_clock clock;
-    gnss.site = device_hold_site(device, &version); /* stations may move meanwhile, */
+    gnss.site = device_hold_site(device, &version); /* stations may move meanwhile */
     gnss.clock = &clock;
     pthread_mutex_lock(&device->lock);
-    clock = device->clock; /* and its table of leap seconds may change */
+    clock = device->clock; /* a copy: faults may change its table of leap seconds */
     uint32_t station = device->cmd.settings.station - 1;
     int moves = device_head_pose(device, at_ns, &track.at);
     if (moves) {

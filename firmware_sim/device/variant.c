@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* Sites that are planned for settings which commands have given: ranges, noise, step of a sphere. Made by the command,
- * which is refused where there is no such plan; taken by the scan; freed once no work of a scan needs it. */
+/* Sites that are planned for settings of commands: ranges, noise, step of a sphere. The command makes one, and is
+ * refused where there is no such plan. The scan takes it. It is freed once no work of a scan needs it. */
 #include <stdio.h>
 #include <stdlib.h>
 
 #include "firmware_sim/device/device_state.h"
 
-/* Whether it is planned for that, and for where the stations are now. */
+/* Whether the variant is planned for these settings and the stations' present places. */
 static int fits(const struct device *device, const struct device_variant *v, const struct head_settings *settings,
                 uint32_t station)
 {

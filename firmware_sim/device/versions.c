@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The sites of now and of before: who uses one holds it, and what nobody uses is freed. And where the stations are now. */
+/* The present site and earlier ones: users hold them, and unused ones are freed. Also the stations' present places. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -31,7 +31,7 @@ void device_free_versions(struct device_version **list)
     }
 }
 
-/* Those before that nobody uses. The first site is its owner's; its maps are not needed any more. */
+/* Frees earlier sites that nobody uses. The first site belongs to its owner: only its maps are freed. */
 void device_free_unused_sites(struct device_moves *moves)
 {
     struct device_version **at = &moves->old;

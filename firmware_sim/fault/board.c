@@ -15,10 +15,10 @@ struct fault_board {
     _Atomic uint32_t version;
     struct fault_entry entry[FAULT_MAX], gone[FAULT_MAX];
     uint32_t n, last_number;
-    uint64_t n_gone; /* so many were taken out; gone has the last of them, round and round */
+    uint64_t n_gone; /* number of faults that were taken out; gone is a ring with the last of them */
     struct truth *truth;
     uint64_t *injected; /* by number; 0: all together */
-    size_t counted;     /* of them there is room for so many */
+    size_t counted;     /* room in injected */
     struct {
         void (*heard)(void *ctx, const struct fault_note *note);
         void *ctx;
@@ -110,7 +110,7 @@ const void *fault_find(const void *items, uint32_t n, size_t size, uint32_t numb
     return NULL;
 }
 
-/* A number for one more, which is counted from 0 on. 0: no memory. */
+/* A number for a new fault, whose count begins at 0. Returns 0 without memory. */
 static uint32_t take_number(struct fault_board *board)
 {
     const uint32_t number = board->last_number + 1;

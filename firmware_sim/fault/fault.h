@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A fault on request, as data: what goes wrong, where, and when.
+/* An injected fault as data: what goes wrong, where, and when.
  *
  * In: a fault of the list, and a place where it may strike (a frame, a reply, a connection, a moment of the head).
  * Out: whether it strikes there, and random numbers that belong to that place. Pure; any thread.
@@ -18,7 +18,7 @@ enum fault_kind {
     /* on the wire: of a frame of the native protocol, or a unit of another (a datagram, a packet, a telegram) */
     FAULT_DROP,
     FAULT_DUPLICATE, /* n copies more */
-    FAULT_REORDER,   /* comes behind up to n later ones */
+    FAULT_REORDER,   /* comes after up to n later ones */
     FAULT_DELAY,     /* it and all after it come for_ms later */
     FAULT_JITTER,    /* the same, by a random time of up to for_ms */
     FAULT_TRUNCATE,  /* its last n bytes are missing; n = 0: a random number */
@@ -31,7 +31,7 @@ enum fault_kind {
     FAULT_NO_REPLY,
     FAULT_LATE_REPLY,  /* by for_ms; frames overtake it */
     FAULT_WRONG_REPLY, /* the reply before it comes instead */
-    FAULT_ECHO,        /* what the client sent comes back before it */
+    FAULT_ECHO,        /* the client's line comes back before its reply */
     /* of the link, at a frame: for all its sessions where not said otherwise */
     FAULT_DISCONNECT,     /* the session at hand ends before the frame */
     FAULT_UNPLUG,         /* the link is not there for for_ms */
@@ -48,7 +48,7 @@ enum fault_kind {
     FAULT_SELF_TEST,     /* fails at the end of boot */
     FAULT_MIRROR_SLOW,   /* turns at `factor` of its speed */
     FAULT_MIRROR_STUCK,  /* stands where it is */
-    FAULT_MIRROR_WOBBLE, /* runs ahead and behind by deg, hz times a second; the encoder shows it */
+    FAULT_MIRROR_WOBBLE, /* swings about its even turn by deg, hz times a second; the encoder shows it */
     FAULT_PAN_SLIP,      /* the head looks deg farther than the pan's encoder says */
     FAULT_LASER_OFF,
     FAULT_WINDOW_SOILED, /* loss_db on the way there and back; noise grows as the signal fades */
@@ -61,7 +61,7 @@ enum fault_kind {
     FAULT_N_KINDS
 };
 
-/* Where a kind strikes. */
+/* The place where a kind strikes. */
 enum fault_place {
     FAULT_AT_FRAME,      /* at frames, or units */
     FAULT_AT_REPLY,      /* at replies */
@@ -69,7 +69,7 @@ enum fault_place {
     FAULT_AT_MOMENT      /* in the head, in device time */
 };
 
-/* Which frames are counted, and may be hit. */
+/* The countings: which frames are counted, and may be hit. */
 enum fault_of { FAULT_OF_STREAM, FAULT_OF_NOTICES, FAULT_OF_REPLIES, FAULT_N_OF };
 
 struct fault {
@@ -77,11 +77,11 @@ struct fault {
     uint32_t link; /* from 1; 0: all that can have it */
     int of;        /* enum fault_of, without replies */
     /* when: all of these together */
-    uint64_t at;          /* one number alone; 0: not so */
+    uint64_t at;          /* one number alone; 0: not given */
     uint64_t from, until; /* numbers; until 0: no end */
     uint64_t every;       /* from `from` on */
     double probability;
-    uint64_t count; /* at most so many times (frames, replies: in a session; what the link does: on it); 0: no limit */
+    uint64_t count; /* most times (frames, replies: in a session; acts of the link: on the link); 0: no limit */
     uint64_t from_pulse, until_pulse; /* of a scan, from 0; until UINT64_MAX: no end. Other frames have no pulses */
     double from_s, until_s;           /* until 0: no end */
     uint64_t seed;
@@ -108,12 +108,12 @@ struct fault_spot {
 
 extern const char *const fault_names[]; /* by kind, NULL at the end */
 enum fault_place fault_place_of(enum fault_kind kind);
-/* Whether the link does it, at a frame: disconnect to short_packets. */
+/* Whether it is an act of the link, at a frame: disconnect to short_packets. */
 int fault_is_act(enum fault_kind kind);
 /* n, or what the kind takes without it. */
 uint32_t fault_n(const struct fault *fault);
 
-/* Whether it strikes there, but for its count. index: in the list; link: that the spot is on. */
+/* Whether it strikes there, without regard to its count. index: in the list; link: the spot's. */
 int fault_strikes(const struct fault *fault, uint32_t index, uint32_t link, const struct fault_spot *spot);
 /* A random number that belongs to fault and place; `draw` tells the draws of one place apart, from 1. */
 uint64_t fault_random(const struct fault *fault, uint32_t index, uint32_t link, uint64_t number, uint32_t draw);

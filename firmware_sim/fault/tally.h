@@ -13,9 +13,9 @@ struct fault_tally {
     uint64_t hits[FAULT_KEPT];
 };
 
-/* The list is another one: counts of faults that are not in it go. */
+/* The list has changed: drops the counts of faults that are not in it. */
 void fault_tally_renew(struct fault_tally *tally, const struct fault_entry *entry, uint32_t n);
-/* Of one that is in the list. */
+/* The count of a fault that is in the list. */
 uint64_t *fault_tally_hits(struct fault_tally *tally, uint32_t number);
 
 #endif

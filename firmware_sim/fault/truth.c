@@ -30,7 +30,7 @@ static void say_gap(char text[LINE_GAP_BYTES], const uint64_t lost[LINE_KINDS])
     snprintf(text, LINE_GAP_BYTES, "{\"missing\":%" PRIu64 "}\n", lost[LINE_PLAIN]);
 }
 
-/* Of standard output a descriptor of its own: nobody else's lines are in its buffer. */
+/* Standard output gets a descriptor of its own, so that no other lines are in its buffer. */
 static int open_stdout(int *fd, struct sh_err *err)
 {
     *fd = dup(STDOUT_FILENO);

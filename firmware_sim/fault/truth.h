@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The truth about injected faults: what was done, where, and when.
+/* The truth: a file that says what was injected, where, and when.
  *
  * In: a note of one fault. Out: a line of JSON in a file, and a line of text for the journal. Thread: a writer may be
  * called by any number of threads, and waits for nothing: a thread of its own writes the file (line_writer.h). Where the
@@ -10,7 +10,7 @@
 #include "core/err.h"
 #include "firmware_sim/fault/fault.h"
 
-/* What was injected. Members that don't concern the kind are 0, or as said. */
+/* One injection. Members that don't concern the kind are 0, unless their comment says otherwise. */
 struct fault_note {
     uint32_t fault; /* number of the entry, from 1 */
     enum fault_kind kind;
@@ -31,8 +31,8 @@ struct fault_note {
 };
 
 struct truth;
-/* Writes to a new file, which outlives it; path "-" is standard output. NULL path: nothing is written, *out is NULL. *lost
- * counts the lines that are not in it; NULL: nobody asks. */
+/* Opens a new file; path "-" is standard output. path NULL: nothing is written, and *out is NULL. *lost counts the
+ * lines that are not in the file; it may be NULL. path and *lost must outlive the truth. */
 int truth_open(const char *path, _Atomic uint64_t *lost, struct truth **out, struct sh_err *err);
 /* truth may be NULL. */
 void truth_write(struct truth *truth, const struct fault_note *note);

@@ -32,7 +32,7 @@ void wire_free(struct wire *wire)
     free(wire);
 }
 
-/* Those that were there keep what they know; new ones count from here. */
+/* Faults that were in the list before keep their counts; new ones count from here. */
 void wire_renew(struct wire *wire, uint64_t ahead)
 {
     struct fault_entry entry[FAULT_KEPT];
@@ -56,7 +56,7 @@ void wire_renew(struct wire *wire, uint64_t ahead)
 
 enum { LAST_RANK = 4 };
 
-/* When it has its turn at a frame. */
+/* The order in which faults strike at a frame. */
 static int rank_of(const struct wire *wire, const struct fault *f)
 {
     switch (f->kind) {
@@ -76,7 +76,7 @@ static int rank_of(const struct wire *wire, const struct fault *f)
     }
 }
 
-/* How often it has struck: what the link does counts for all its sessions. */
+/* How often the fault has struck: an act of the link counts for all its sessions. */
 static uint64_t *hits_of(struct wire *wire, struct wire_fault *fault)
 {
     return fault_is_act(fault->entry.fault.kind) && wire->spec.tally != NULL
@@ -94,7 +94,7 @@ static int concerns(struct wire *wire, struct wire_fault *fault, int of)
                                                        : 0;
 }
 
-/* Frames that were on their way when the fault was added are not counted for it. */
+/* Frames that were on their way when a fault was added are not counted for that fault. */
 static void pass_over_old(struct wire *wire, const struct wire_making *making)
 {
     const int of = making->item->of;
@@ -113,7 +113,7 @@ static int change(struct wire *wire, struct wire_fault *fault, struct wire_makin
     spot.number -= fault->base[of];
     spot.t_ns -= fault->entry.since_ns;
     if (spot.t_ns < 0 && of != FAULT_OF_REPLIES) return SH_OK;
-    if (spot.t_ns < 0) spot.t_ns = 0; /* it is counted from the command on, which is before the head's next tick */
+    if (spot.t_ns < 0) spot.t_ns = 0; /* replies count from the command on, which is before the head's next tick */
     if (!fault_strikes(&fault->entry.fault, fault->entry.number, wire->spec.link, &spot)) return SH_OK;
     const int done = wire_change(wire, fault, spot.number, making);
     if (done > 0) ++*hits_of(wire, fault);
@@ -130,7 +130,7 @@ static int change_all(struct wire *wire, struct wire_making *making)
     return rc;
 }
 
-/* ---- what becomes of an item */
+/* ---- from an item to pieces */
 
 static struct wire_piece *make_piece(const struct wire *wire, const struct wire_making *making, uint32_t i)
 {
@@ -145,7 +145,7 @@ static struct wire_piece *make_piece(const struct wire *wire, const struct wire_
     return piece;
 }
 
-/* One copy of it, in as many writes as it is split into. */
+/* Emits one copy of an item, in as many writes as it is split into. */
 static int emit(struct wire *wire, const struct wire_making *making, int is_first)
 {
     int rc = SH_OK;
@@ -180,7 +180,7 @@ static int is_merging(const struct wire *wire)
            wire->count[FAULT_OF_NOTICES] < wire->merge_until[FAULT_OF_NOTICES];
 }
 
-/* It has come: delays are as long as they now are, and who waited for it goes on. */
+/* Finishes an item: later ones keep its delay, and pieces that were held for it go on. */
 static int finish(struct wire *wire, const struct wire_making *making)
 {
     const int of = making->item->of;
@@ -198,7 +198,7 @@ static int finish(struct wire *wire, const struct wire_making *making)
 
 /* ---- items */
 
-/* Frames that depend on nothing but the scan. */
+/* Whether a frame depends on the scan alone. */
 static int is_of_stream(const struct native_header *header)
 {
     return header->type != NATIVE_TELEMETRY && header->type != NATIVE_EVENT &&

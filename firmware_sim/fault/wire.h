@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: MIT */
-/* The bytes of one session through the faults of its link.
+/* The wire of one session: injects the faults of its link into the session's bytes.
  *
  * In: frames of the native protocol, units of another one, reply lines, in the order in which the session would write
- * them; the clock. Out: pieces to be written, with the time before which they must not go out, and acts that the owner
- * carries out on its link (to hang up, to unplug, and so on) when they are the first. Each fault that strikes is noted
- * on the board; what the link does, by the owner, once it has been done. Without faults a session has no wire.
+ * them; the clock. Out: pieces to be written, each with the time before which it must not go out; and acts (to hang up,
+ * to unplug, and so on), which the owner carries out on its link when they come first. The wire notes each fault that
+ * strikes on the board. The owner notes an act once it is carried out. Without faults a session has no wire.
  *
- * At a frame faults strike in this order: what ends the session; drop (and flips on datagrams, but for those that are
- * resealed); truncate; flips that are resealed; all others, as they stand in the list. A fault that finds nothing to do
- * there does not strike: it is not noted, nor counted. Examples are a flip of a byte that a short frame has not, and
- * anything but what stands before the frame when that is dropped.
+ * At a frame faults strike in this order: acts that end the session; drop, and on datagrams flips without reseal;
+ * truncate; flips with reseal; all others, in the order of the list. A fault that finds nothing to do
+ * there does not strike: it is not noted, nor counted. One example is a flip of a byte beyond the end of a short frame.
+ * Another is a dropped frame: only faults that act before the frame strike there.
  *
  * Thread: one, but for the board. Allocates. */
 #ifndef FIRMWARE_SIM_FAULT_WIRE_H
@@ -19,8 +19,8 @@
 #include "firmware_sim/fault/wire_queue.h"
 
 enum {
-    WIRE_DELAY_BYTES = 8 << 20, /* that delays keep on their way */
-    WIRE_HOLD_MS = 2000,        /* device time that a reordered or merging frame waits for others, at most */
+    WIRE_DELAY_BYTES = 8 << 20, /* most bytes that delays hold */
+    WIRE_HOLD_MS = 2000,        /* most device time that a reordered or merging frame waits for others */
 };
 
 struct wire;
@@ -28,14 +28,14 @@ struct wire;
 struct wire_spec {
     struct fault_board *board;
     uint32_t link, session; /* from 1 */
-    uint32_t max_unit;      /* the longest frame or unit, as a rule: room for it is there at once */
+    uint32_t max_unit;      /* the usual longest frame or unit: room for it is allocated at once */
     int units;              /* 1: each unit is a write of its own */
     int native;             /* frames of the native protocol */
-    int datagrams; /* 1: units with a checksum of the system's, which drops those that are damaged on their way */
-    /* Of the protocol (protocol.h). */
+    int datagrams;          /* 1: the system adds a checksum to each unit, and its receiver drops damaged ones */
+    /* The protocol's functions (protocol.h). */
     void (*content)(const uint8_t *unit, size_t len, uint8_t *mask);
     void (*reseal)(uint8_t *unit, size_t len);
-    uint32_t acts;             /* what the link can do: bit 0 is FAULT_DISCONNECT, and so on; others don't strike */
+    uint32_t acts;             /* acts that the link can do: bit 0 is FAULT_DISCONNECT, and so on; no others strike */
     struct fault_tally *tally; /* of its acts, over all sessions of the link; outlives the wire. NULL: by session */
 };
 
@@ -43,46 +43,46 @@ struct wire_spec {
 struct wire *wire_create(const struct wire_spec *spec);
 void wire_free(struct wire *wire);
 
-/* What a session would write. t_ns: device time. Native frames say themselves what time and counting they are of. */
+/* A frame, unit or reply that the session would write. t_ns: device time. Native frames have their own time and
+ * counting in their headers. */
 struct wire_item {
     int of; /* enum fault_of */
     const uint8_t *bytes;
     size_t len;
     int64_t t_ns;
 };
-/* Returns 0, or SH_ENOMEM: it is lost, or part of it. */
+/* Returns 0, or SH_ENOMEM: the item is lost, or part of it. */
 int wire_put(struct wire *wire, const struct wire_item *item, int64_t now_ns);
 /* The rest of a frame, unit or reply that was begun without the wire: goes out as it is, and is not counted. */
 int wire_put_rest(struct wire *wire, const uint8_t *bytes, size_t len);
-/* The act that should have ended the session could not be carried out: what was put since then is lost. */
+/* An act that should have ended the session could not be carried out. Items that were put since then are lost. */
 void wire_go_on(struct wire *wire);
-/* A command of this session changed the list: its new faults count from here, after `ahead` replies, those to lines
- * up to that one, which are still to be put. Otherwise they count from the next item. */
+/* A command of this session changed the list. New faults count replies from after the next `ahead` ones, which answer
+ * the lines up to that command. All else they count from the next item. */
 void wire_renew(struct wire *wire, uint64_t ahead);
 /* All items from before device time t_ns were put. */
 int wire_time(struct wire *wire, int64_t t_ns);
-/* What the client sent: what an echo sends back with the reply to it. */
+/* Takes bytes that the client sent. An echo sends them back before the reply. */
 void wire_heard(struct wire *wire, const void *bytes, size_t len);
-/* So many replies are still to be put to lines that it did not hear. */
+/* The next n replies answer lines that the wire was not given. */
 void wire_skip_heard(struct wire *wire, uint32_t n);
 
-/* What its owner notes of an act on the board, once it is carried out. Valid as the act is. */
+/* The note that the owner puts on the board once it has carried out an act. Valid as long as the act. */
 const struct fault_note *wire_act_note(const struct wire_piece *act);
 
-/* The first piece, or act, if it may go out now; NULL: none may. Its bytes from `out` on are to be written, which the
- * owner moves on. last: no more items come, nothing is held for them. */
+/* The first piece or act, if it may go out now; else NULL. The owner writes the piece's bytes from `out` on, and moves
+ * `out`. last: no more items come, so none is waited for. */
 struct wire_piece *wire_due(struct wire *wire, int64_t now_ns, int last);
-/* When the next one may; INT64_MAX: there is none. */
+/* When the next one may go out; INT64_MAX: there is none. */
 int64_t wire_next_ns(const struct wire *wire);
 void wire_pop(struct wire *wire);
-/* Whether as much waits as the owner keeps, which is cap bytes, or WIRE_DELAY_BYTES while frames are delayed. What
- * waits for frames to come does not count. */
+/* Whether cap bytes wait, or WIRE_DELAY_BYTES while frames are delayed. Pieces held for later frames don't count. */
 int wire_is_full(const struct wire *wire, size_t cap, int64_t now_ns);
 int wire_is_empty(const struct wire *wire);
-/* Whether a fault keeps the next piece back: a stall that is on or begins now, or a time that is still to come. */
+/* Whether a fault holds back the next piece: a stall that is on or begins now, or a time that is still to come. */
 int wire_keeps_back(const struct wire *wire, int64_t now_ns);
-/* What was put and not written as a whole: frames of the stream (not made for this reader alone) or units, and pulses
- * in them. What a fault dropped counts as written; what comes after an act that ends the session does not. */
+/* Counts the frames of the stream (without those for this reader alone) or units that were put and not written as a
+ * whole, and the pulses in them. Dropped frames count as written; those after an act that ends the session do not. */
 void wire_count_unwritten(const struct wire *wire, uint64_t *frames, uint64_t *pulses);
 
 #endif

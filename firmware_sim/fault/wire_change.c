@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What each kind of fault does to one frame, unit or reply. Each returns 1; 0: there is nothing for it to do; or
+/* Applies each kind of fault to one frame, unit or reply. Each function returns 1; 0: there is nothing for it to do; or
  * SH_ENOMEM. */
 #include <math.h>
 #include <string.h>
@@ -9,7 +9,7 @@
 #include "drivers/protocol/native.h"
 #include "firmware_sim/fault/wire_inside.h"
 
-/* Draws of one place. */
+/* The random draws of one place. */
 enum { DRAW_N = 1, DRAW_MS, DRAW_BYTES };
 
 struct change {
@@ -82,7 +82,7 @@ static int split(struct change *c)
     return 1;
 }
 
-/* Not within a write that a merge began, so that merges follow each other at places that only numbers decide. */
+/* A merge never begins within a write that another one began, so that its place depends on frames' numbers alone. */
 static int merge(struct change *c)
 {
     const int of = c->making->item->of;
@@ -97,7 +97,7 @@ static int merge(struct change *c)
 
 /* ---- its bytes */
 
-/* At least one byte is left, and one is missing. */
+/* Cuts the end off: at least one byte is left, and at least one is missing. */
 static int cut(struct change *c)
 {
     struct wire_making *m = c->making;
@@ -112,7 +112,7 @@ static int cut(struct change *c)
     return 1;
 }
 
-/* Into the wire's mask: the bits that may change. Returns how many. */
+/* Marks the bits that may change in the wire's mask. Returns how many. */
 static uint64_t mark_bits(const struct change *c)
 {
     const struct fault *f = &c->fault->entry.fault;
@@ -129,7 +129,7 @@ static uint64_t mark_bits(const struct change *c)
     return n;
 }
 
-/* Bit k of the mask; it has more. */
+/* The place of the mask's bit number k, from 0. The mask has more than k bits. */
 static uint64_t find_bit(const uint8_t *mask, uint64_t k)
 {
     size_t i = 0;
@@ -141,7 +141,7 @@ static uint64_t find_bit(const uint8_t *mask, uint64_t k)
     return 8 * i + (uint64_t)__builtin_ctz(left);
 }
 
-/* The first bit of the mask that comes after this one, round and round. */
+/* The next bit of the mask after this one; after the last comes the first. */
 static uint64_t next_bit(const uint8_t *mask, size_t len, uint64_t at)
 {
     for (at++;; at = (at / 8 + 1) * 8) {
@@ -151,8 +151,8 @@ static uint64_t next_bit(const uint8_t *mask, size_t len, uint64_t at)
     }
 }
 
-/* n of the marked bits: the first is anywhere, the others follow it. A bit that another fault has changed already is
- * passed over, since it would be right again. Returns how many. */
+/* Flips n of the marked bits: the first by chance, then the next ones. A bit that another fault has flipped is skipped,
+ * since a second flip would restore it. Returns how many were flipped. */
 static uint64_t flip_bits(struct change *c, uint64_t n_bits, uint64_t n)
 {
     uint8_t *bytes = c->wire->unit;
@@ -169,13 +169,13 @@ static uint64_t flip_bits(struct change *c, uint64_t n_bits, uint64_t n)
     return done;
 }
 
-/* A datagram that is damaged on its way is dropped by the system of its reader; with reseal it was wrong before it was
- * sent. */
+/* The reader's system drops a datagram that is damaged on its way, so a flip drops it. With reseal it is wrong before
+ * it is sent, and arrives. */
 static int flip(struct change *c)
 {
     const struct fault *f = &c->fault->entry.fault;
     struct wire *wire = c->wire;
-    if (f->reseal && c->making->is_cut) return 0; /* nothing makes it right */
+    if (f->reseal && c->making->is_cut) return 0; /* no checksum makes a cut frame valid */
     if (!grow(&wire->mask, &wire->mask_room, c->making->len, 1)) return SH_ENOMEM;
     const uint64_t n_bits = mark_bits(c);
     if (n_bits != 0) c->note.n = flip_bits(c, n_bits, fault_n(f));
@@ -188,7 +188,7 @@ static int flip(struct change *c)
     return 1;
 }
 
-/* ---- what stands before it */
+/* ---- pieces before the frame */
 
 static int put_before(struct change *c, struct wire_piece *piece)
 {
@@ -197,7 +197,7 @@ static int put_before(struct change *c, struct wire_piece *piece)
     return wire_queue_put(&c->wire->queue, piece) == SH_OK ? 1 : SH_ENOMEM;
 }
 
-/* No carriage return is in it, without which nothing is a reply line. */
+/* Garbage has no carriage return, since a reply line ends with one. */
 static int garbage(struct change *c)
 {
     enum { GARBAGE_MAX = 1024, CARRIAGE_RETURN = 0x0d };
@@ -219,7 +219,7 @@ static int stall(struct change *c)
     return put_before(c, piece);
 }
 
-/* Nothing is reordered beyond the end of a session. */
+/* Releases all held pieces: no frame is reordered beyond the end of a session. */
 static int end_session(struct change *c)
 {
     c->wire->is_over = 1;
@@ -245,7 +245,7 @@ static int act(struct change *c)
     return put_before(c, piece);
 }
 
-/* As a terminal does it: a line has CR LF at its end. */
+/* Echoes as a terminal does: a line ends with CR LF. */
 static int echo(struct change *c)
 {
     size_t len;
@@ -264,7 +264,7 @@ static int echo(struct change *c)
     return put_before(c, piece);
 }
 
-/* The reply before. Where there is none, or it is the same, another that no query of a number or of words has. */
+/* Sends the reply before instead. Where there is none, or it is the same, OK is sent, or else 0. */
 static int wrong_reply(struct change *c)
 {
     struct wire *wire = c->wire;
@@ -285,7 +285,7 @@ static int wrong_reply(struct change *c)
 
 /* ---- one fault */
 
-/* It needs no frame: it stands before it. */
+/* Whether the fault acts before the frame, and so needs no frame. */
 static int is_before(enum fault_kind kind)
 {
     return kind == FAULT_GARBAGE || kind == FAULT_STALL || kind == FAULT_ECHO || kind >= FAULT_DISCONNECT;

@@ -6,7 +6,7 @@
 
 #include "core/grow.h"
 
-enum { HEARD_MAX = 65536, LINE_MAX_LEN = 256 /* longer ones are answered, too; so much of them is kept */ };
+enum { HEARD_MAX = 65536, LINE_MAX_LEN = 256 /* longer lines are answered, too; this much of them is kept */ };
 
 static void keep(struct wire_heard *heard, const uint8_t *bytes, size_t len)
 {
@@ -16,7 +16,7 @@ static void keep(struct wire_heard *heard, const uint8_t *bytes, size_t len)
     heard->len += len;
 }
 
-/* Lines of blanks have no answer (command_lines_feed), unless they are too long. */
+/* Lines of blanks get no answer (command_lines_feed), unless they are too long. */
 static void end_line(struct wire_heard *heard)
 {
     if (heard->line_len == 0 || (heard->is_blank && heard->line_len <= LINE_MAX_LEN))

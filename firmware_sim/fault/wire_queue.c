@@ -33,7 +33,7 @@ static size_t cost_of(const struct wire_piece *piece)
     return sizeof *piece + piece->len;
 }
 
-/* Into the write of the last one. */
+/* Appends the piece to the last one's write. */
 static int join(struct wire_queue *queue, struct wire_piece *piece)
 {
     struct wire_piece *last = queue->last;
@@ -77,7 +77,7 @@ void wire_queue_close(struct wire_queue *queue)
     if (queue->last != NULL) queue->last->open = 0;
 }
 
-/* From the held ones to the end. */
+/* Moves a held piece to the end. */
 static int release(struct wire_queue *queue, struct wire_piece **at)
 {
     struct wire_piece *piece = *at;
@@ -89,7 +89,7 @@ static int release(struct wire_queue *queue, struct wire_piece **at)
 int wire_queue_pass(struct wire_queue *queue, int of, uint64_t number, int64_t t_ns)
 {
     int rc = SH_OK;
-    for (;;) { /* those first that wait for the least number, and of these the one that came first */
+    for (;;) { /* smallest number first; of equal numbers, the piece that came first */
         struct wire_piece **next = NULL;
         for (struct wire_piece **at = &queue->held; *at != NULL; at = &(*at)->next) {
             const struct wire_piece *piece = *at;

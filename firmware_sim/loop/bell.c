@@ -15,8 +15,8 @@ void bell_free(struct bell *bell)
     sem_destroy(&bell->rings);
 }
 
-/* Either this thread sees that a ring was heard, and rings again; or who heard it sees what was changed. Both need the
- * order of a store and a later load, which a semaphore by itself does not promise. */
+/* Either this thread sees that an earlier ring was heard, and rings again; or the thread that heard it sees the change.
+ * Both need a store to be ordered before a later load, which a semaphore by itself does not promise. */
 void bell_ring(struct bell *bell, uint32_t n)
 {
     int kept = 0;
@@ -28,7 +28,7 @@ void bell_ring(struct bell *bell, uint32_t n)
 
 void bell_sleep(struct bell *bell)
 {
-    sem_wait(&bell->rings); /* a signal is as good as a ring */
+    sem_wait(&bell->rings); /* a signal may end it: then it returns without a ring */
     atomic_thread_fence(memory_order_seq_cst);
 }
 

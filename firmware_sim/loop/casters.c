@@ -6,7 +6,7 @@
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/loop/loop_inside.h"
 
-static const int64_t SAY_NS = 2000000; /* ticks that take long are not kept back for others */
+static const int64_t SAY_NS = 2000000; /* a ready tick waits no longer than that for others in its batch */
 
 /* With claim_lock held. */
 static int may_claim(struct loop *loop)
@@ -29,7 +29,7 @@ static int claim(struct loop *loop, struct device_work *work, struct ring_slot *
         got = -1;
     } else if (may_claim(loop)) {
         if (device_claim(loop->device, work) != 0) {
-            /* A tick that is still computed may yet be lost; what it says then needs one more. */
+            /* A tick that is still being computed may be lost; then one more tick must say what it said. */
             if (atomic_load(&casters->n_computing) == 0) {
                 atomic_store(&loop->final_tick, casters->next_tick);
                 got = -1;
@@ -46,7 +46,7 @@ static int claim(struct loop *loop, struct device_work *work, struct ring_slot *
     return got;
 }
 
-/* The frames into the slot. 0: it has no room for them, and there is no memory for more; said once per
+/* Puts the frames into the slot. 0: it has no room for them, and there is no memory for more. That is reported once per
  * episode. */
 static int put(struct loop *loop, struct ring_slot *slot, const struct ring_tick *tick)
 {
@@ -78,16 +78,16 @@ static int compute(struct loop_caster *caster, const struct device_work *work, s
         if (atomic_load(&casters->in_vain)) atomic_store(&casters->in_vain, 0);
         return whole;
     }
-    /* Computed in vain: the next ones are as late. Taking up each in turn just before its time is over would
-     * lose them all. So leave out as many as give the ones after them half the time ahead; all of it, where half was
-     * not enough. */
+    /* This tick was computed in vain, and the next ones are as late. Computing each in turn just before its time is
+     * over would lose them all. So leave out half the ticks ahead, so that the others have that time; and all but one
+     * where half was not enough. */
     const uint64_t lead = atomic_exchange(&casters->in_vain, 1) ? casters->ahead_ticks - 1 : casters->ahead_ticks / 2;
     atomic_store(&casters->drop_until, stream_released(&loop->stream) + lead);
     return 0;
 }
 
-/* A tick is ready. The pacing thread is told of a batch at once: of all that were made when this caster goes to
- * sleep, and else before the ticks ahead are used up. */
+/* A tick is ready. In the paces that wait, the pacing thread is told once per batch: before the ticks ahead are used
+ * up, after SAY_NS, and when this caster goes to sleep. */
 static void note_ready(struct loop_caster *caster, uint64_t tick)
 {
     struct loop *loop = caster->loop;
@@ -128,7 +128,7 @@ static void *caster_main(void *arg)
         atomic_fetch_sub(&loop->casters.n_computing, 1);
         note_ready(caster, work.tick);
     }
-    stream_poke(&loop->stream); /* the others learn of the end, too */
+    stream_poke(&loop->stream); /* so that the other casters see the end, too */
     return NULL;
 }
 

@@ -9,7 +9,7 @@
 #include "firmware_sim/site/plan_rows.h"
 
 static const double TIMES = 10.0;
-static const double TICK_NS = 10000.0; /* what a tick takes beside its pulses, generously */
+static const double TICK_NS = 10000.0; /* time of a tick beside its pulses; an upper bound */
 static const int64_t EVERY_NS = 1000000000;
 
 struct cost_watch {
@@ -22,8 +22,8 @@ struct cost_watch {
     clockid_t clock[CONFIG_MAX_THREADS]; /* of the casters; they may have ended when it is read */
 };
 
-/* A head that rests releases ticks without pulses: their time is not counted. Where no tick is released either, a pulse
- * of those that were claimed takes all of that time. */
+/* A head that rests releases ticks without pulses: their time is not counted. Where no tick is released either, the
+ * casters work on pulses that are claimed already, so that time is counted. */
 double cost_add(struct cost_figures *f, const struct cost_sample *now)
 {
     const struct cost_sample last = f->last;

@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: MIT */
-/* Warns, once, where casting takes more than ten times what the plan has for a pulse.
+/* Warns, once, where casting takes more than ten times the processor time that the plan has for a pulse.
  *
- * In: the casters' processor time, the pulses that they claimed and the ticks that were released, read once a second by
- * a thread of its own. So the casters and the pacing thread spend nothing on it. Out: one line, through the report of
- * the loop. It goes by processor time, so a busy machine gives no warning. */
+ * In: the casters' processor time, the pulses that they claimed, and the ticks that were released. A thread of its own
+ * reads them once a second, so the casters and the pacing thread spend nothing on it. Out: one line, through the report
+ * of the loop. Only processor time counts, so a busy machine gives no warning. */
 #ifndef FIRMWARE_SIM_LOOP_COST_WATCH_H
 #define FIRMWARE_SIM_LOOP_COST_WATCH_H
 
 #include <stdint.h>
 
-/* So far. */
+/* Sums since the start. */
 struct cost_sample {
     int64_t cast_ns; /* of all casters */
     uint64_t pulses, ticks;
@@ -17,20 +17,20 @@ struct cost_sample {
 
 struct cost_figures {
     double planned_ns;    /* for a pulse */
-    uint64_t open_pulses; /* at most so many were claimed before the first sample and cast after it */
+    uint64_t open_pulses; /* the most that can be claimed before the first sample and cast after it */
     struct cost_sample last, sum;
 };
 
-#define COST_LEAST_NS INT64_C(1000000000) /* of casting, before anything is said of it */
+#define COST_LEAST_NS INT64_C(1000000000) /* of casting, before its cost is judged */
 
-/* ns that a pulse took since the last answer, where that is more than ten times planned_ns; else 0. Pure. */
+/* Adds a sample. Returns the ns that a pulse took since the last verdict where these exceed ten times planned_ns, else
+ * 0. Pure. */
 double cost_add(struct cost_figures *figures, const struct cost_sample *now);
 
 /* The loop's thread. */
 struct cost_watch;
 struct loop;
-/* After the casters were started. NULL: there is nobody to warn. Where no thread can be had there is no warning,
- * either. */
+/* After the casters were started. NULL: nobody is to be warned, or no thread could be started. */
 struct cost_watch *cost_watch_start(struct loop *loop);
 void cost_watch_join(struct cost_watch *watch);
 

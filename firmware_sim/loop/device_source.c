@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The head that computes, as what the loop serves. */
+/* The head that computes, as a source of the loop. */
 #include "firmware_sim/loop/source.h"
 
 static void command(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out)

@@ -38,14 +38,14 @@ static void hash_frames(struct hasher *h, const uint8_t *bytes, uint32_t len)
     }
 }
 
-/* Hashes the next tick, where it lies in the ring. */
+/* Hashes the next tick in the ring itself, without a copy. */
 static enum ring_read take_tick(struct hasher *h)
 {
     struct ring *ring = &h->stream->ring;
     struct ring_copy tick = {.buf = NULL};
     enum ring_read got = ring_look(ring, STREAM_HASH_READER, h->cursor, &tick);
     if (got == RING_READ && tick.n_frames != 0) {
-        /* Nobody is woken for empty ticks, so old ones may be gone; only a gap in the numbers is a loss. */
+        /* Empty ticks wake nobody, so old ones may be gone; only a gap in the frames' numbers is a loss. */
         if (tick.first_seq != h->next_seq) h->lost = 1;
         h->next_seq = tick.first_seq + tick.n_frames;
         hash_frames(h, tick.buf, tick.len);

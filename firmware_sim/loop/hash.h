@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* stream_sha256 of all that is released: a reader of the stream with a thread of its own.
+/* Computes stream_sha256 of all released frames: a reader of the stream, with a thread of its own.
  *
  * In: the stream. Out: SHA-256 of the frames that drivers/protocol/PROTOCOL.md names, in hexadecimal. */
 #ifndef FIRMWARE_SIM_LOOP_HASH_H
@@ -11,8 +11,7 @@ struct hasher;
 
 /* Before the pacing thread starts. */
 int hasher_start(struct stream *stream, struct hasher **out, struct sh_err *err);
-/* Waits until the stream is over and read. 1: hex is the hash; 0: the hasher itself could not follow. Frees
- * it. */
+/* Waits until the stream is over and read; frees the hasher. 1: hex is the hash; 0: the hasher was too slow. */
 int hasher_join(struct hasher *hasher, char hex[65]);
 
 #endif

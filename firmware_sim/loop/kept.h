@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* The last descriptor, emitter and anchor that were released: what a client that joins needs first.
+/* The last descriptor, emitter and anchor that were released, latched for clients that join later.
  *
- * In: frames of the stream, at release. Out: copies of them, with the flags of a repetition. One thread keeps, any number
- * of others read; there are no locks, and keeping never waits. Real-time safe. */
+ * In: stream frames, at release. Out: copies of them, with the flags of a repetition. One thread writes, any number of
+ * others read. There are no locks, and writing never waits. Real-time safe. */
 #ifndef FIRMWARE_SIM_LOOP_KEPT_H
 #define FIRMWARE_SIM_LOOP_KEPT_H
 
@@ -25,10 +25,10 @@ struct kept {
     } frame[3];
 };
 
-/* Keeps a frame if it is one of them. */
+/* Latches a frame if it is a descriptor, an emitter or an anchor. */
 void kept_put(struct kept *kept, const uint8_t *frame);
-/* All that there are, descriptor first, one after the other; dst holds KEPT_MAX_BYTES. Returns their length. *version
- * changes with every frame that is kept. */
+/* Copies the latched frames, one after the other, descriptor first; dst holds KEPT_MAX_BYTES. Returns their length.
+ * *version changes with every frame that is latched. */
 uint32_t kept_copy(struct kept *kept, uint8_t *dst, uint32_t *version);
 
 #endif

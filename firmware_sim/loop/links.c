@@ -8,9 +8,8 @@
 #include "drivers/protocol/native.h"
 #include "firmware_sim/loop/pump.h"
 
-/* Bytes per second of the points at the rates that are set, with one echo per pulse: the least that there
- * will be. A command can raise the rates later. Further echoes and the frames' headers come on top. What a
- * link then loses is announced. */
+/* Bytes per second of the points at the present rates, with one echo per pulse: a lower bound. A command can raise the
+ * rates later. Further echoes and the frames' headers come on top. A link announces what it loses then. */
 static double stream_rate(const struct config *cfg)
 {
     const struct head_settings *h = &cfg->head.settings;
@@ -22,9 +21,8 @@ static double stream_rate(const struct config *cfg)
     return (double)h->prr_uhz * 1e-6 * (used < 1.0 ? used : 1.0) * point_len;
 }
 
-/* Other protocols have rates of their own, which follow from what their clients ask for. What a link of theirs can't
- * carry is lost in whole units, and counted. */
-/* A link that can't carry the stream is refused before it loses any of it. */
+/* A link that can't carry the stream is refused before it loses any of it. Other protocols are not checked: their rates
+ * depend on what clients ask for. What such a link can't carry is lost in whole units, and counted. */
 static int check_capacity(const struct links *links, const struct config *cfg, const struct pump *pump,
                           struct sh_err *err)
 {
@@ -69,14 +67,14 @@ static void identify(struct links *links, const struct config *cfg)
     }
 }
 
-/* Addresses of this machine alone, as they are written. Any other name may be one that others reach. */
+/* Addresses that only this machine reaches, as they are written. Others may reach any other name. */
 static int is_loopback(const char *address)
 {
     return address[0] == '\0' || strncmp(address, "127.", 4) == 0 || strcmp(address, "localhost") == 0 ||
            strcmp(address, "::1") == 0;
 }
 
-/* A head has no password, and a user may not expect that. */
+/* Warns where other machines can reach a link: a head has no password, and a user may not expect that. */
 static void warn_open(const struct links *links, const struct link_spec *spec, const struct pump *pump)
 {
     struct link_place place;

@@ -21,13 +21,13 @@ struct link_place {
     const char *protocol; /* its name; NULL: none */
 };
 
-/* What the readers of a link got, and what was left out for them. PROTOCOL.md defines the words (What the counts
- * mean). */
+/* Counts of what the readers of a link got, and of what was left out for them. PROTOCOL.md defines the words, in What
+ * the counts mean. */
 struct link_counts {
     uint64_t received_pulses; /* in frames that were written out to the link as a whole */
     uint64_t left_out_pulses;
     uint64_t left_out_frames;
-    /* of protocols but the native one */
+    /* of all protocols but the native one */
     uint64_t sent_units, lost_units, lost_points, unsent_pulses, wrong_requests, lost_input_bytes;
 };
 
@@ -45,7 +45,7 @@ struct links {
 
     struct pump *pump[STREAM_MAX_LINKS];
     uint32_t n;
-    _Atomic uint32_t n_busy; /* that still have something to bring out */
+    _Atomic uint32_t n_busy; /* links that still have something to write */
     _Atomic int failed;
     struct sh_err error; /* of the first link that failed, once failed is 1 */
 };
@@ -54,7 +54,7 @@ struct links {
  * the stream needs is refused. links_close is needed after a failure, too. */
 int links_open(struct links *links, const struct config *cfg, const struct link_spec *extra, struct sh_err *err);
 int links_start(struct links *links, struct sh_err *err);
-/* Waits until the links have brought out what their readers take. */
+/* Waits until the links have written all that their readers take. */
 void links_join(struct links *links);
 void links_close(struct links *links);
 

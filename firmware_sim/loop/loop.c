@@ -10,7 +10,7 @@
 #include "firmware_sim/loop/loop_inside.h"
 #include "firmware_sim/loop/pump.h"
 
-static const double SPARE_MS = 250.0; /* that a reader may be interrupted for within a copy, and no claim waits */
+static const double SPARE_MS = 250.0; /* a reader may be interrupted so long within a copy before a claim waits */
 
 static int create_stream(struct loop *loop, struct sh_err *err)
 {
@@ -34,7 +34,7 @@ static int create_stream(struct loop *loop, struct sh_err *err)
     return stream_create(&loop->stream, &size, tick_ns, err);
 }
 
-/* Who joins before the head has said anything finds what it is. */
+/* A client that joins before the first tick finds the head's description. */
 static void keep_description(struct loop *loop)
 {
     struct device_work work;
@@ -136,7 +136,7 @@ void loop_put_endpoints(const struct loop *loop, struct json *json)
     json_open_object(json, NULL);
     json_open_array(json, "endpoints");
     for (uint32_t i = 0; loop_get_place(loop, i, &place); i++) {
-        if (strcmp(place.type, link_ops_get(LINK_FD)->name) == 0) continue; /* nobody else reaches it */
+        if (strcmp(place.type, link_ops_get(LINK_FD)->name) == 0) continue; /* no other program can open it */
         json_open_object(json, NULL);
         json_string(json, "type", place.type);
         json_string(json, "endpoint", place.endpoint);
@@ -172,8 +172,8 @@ void loop_put_links(const struct loop *loop, struct json *json)
     json_close_array(json);
 }
 
-/* What there is, so that nothing the pacing thread touches is paged out or in. Before the threads, whose
- * stacks would be locked whole. */
+/* Locks the memory that is allocated now, so that nothing the pacing thread touches is paged out or in. Before the
+ * threads start, since their whole stacks would be locked. */
 static void lock_memory(const struct loop *loop)
 {
     if (loop->stream.waits || mlockall(MCL_CURRENT) == 0) return;
@@ -225,7 +225,7 @@ void loop_join(struct loop *loop, struct loop_stats *stats)
     struct stream *stream = &loop->stream;
     memset(stats, 0, sizeof *stats);
     const int made = loop->device != NULL ? loop->casters.n_running == loop->casters.n : loop->player.running;
-    if (!made || !loop->pacer.running) { /* a start that failed half-way */
+    if (!made || !loop->pacer.running) { /* the start failed half-way */
         atomic_store(&loop->stopping, 1);
         if (!loop->pacer.running) stream_end(stream);
         stream_poke(stream);

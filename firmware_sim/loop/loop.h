@@ -29,7 +29,7 @@ struct loop_options {
     const struct link_spec *extra;  /* one more link than the configuration has; NULL: none */
     const struct web_source *web;   /* what links of type web serve beside the page; NULL: nothing */
     const struct sh_report *report; /* warnings while running (from any thread); NULL: none */
-    double planned_ns;              /* for a pulse: of much more a warning says so; 0: what the site's plan has */
+    double planned_ns;              /* for a pulse; warns where it takes much more; 0: as the site's plan has */
 };
 
 struct loop_stats {
@@ -46,7 +46,7 @@ struct loop_stats {
 int loop_create(const struct site *site, struct device *device, const struct loop_options *options, struct loop **out,
                 struct sh_err *err);
 
-/* The same for what makes its ticks itself; of the configuration only links, loop and the head's identity count. */
+/* The same for a source that makes its ticks itself. It uses links, loop and the head's identity of cfg alone. */
 int loop_create_of(const struct config *cfg, const struct loop_source *source, const struct loop_options *options,
                    struct loop **out, struct sh_err *err);
 
@@ -65,10 +65,10 @@ int loop_is_over(const struct loop *loop);
 void loop_end(struct loop *loop);
 /* Waits for the end, stops the threads, closes the links, fills stats. */
 void loop_join(struct loop *loop, struct loop_stats *stats);
-/* After loop_join: the files that the source writes are whole, and stats has what is missing in them. The first error in
- * writing them. */
+/* After loop_join: completes the files that the source writes; stats then counts the lines that they lack. Returns the
+ * first error in writing them. */
 int loop_close_files(struct loop *loop, struct loop_stats *stats, struct sh_err *err);
-/* After loop_join: 0, or what kept a link from getting all it should. */
+/* After loop_join: 0, or the error that kept a link from getting all that it should. */
 int loop_check_links(const struct loop *loop, struct sh_err *err);
 void loop_free(struct loop *loop);
 

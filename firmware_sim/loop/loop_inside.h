@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to loop.c, casters.c and pacer.c: the struct loop, whose parts each belong to one of these
- * files. */
+/* Private to the files of the loop: struct loop, whose parts each belong to one of them. */
 #ifndef FIRMWARE_SIM_LOOP_LOOP_INSIDE_H
 #define FIRMWARE_SIM_LOOP_LOOP_INSIDE_H
 
@@ -19,21 +18,21 @@ struct loop_caster {
     struct loop *loop;
     struct worker *worker;
     pthread_t thread;
-    uint64_t unsaid; /* ticks made, and the pacing thread was not told since */
-    int64_t said_ns; /* when it was, clock_now_ns() */
+    uint64_t unsaid; /* ticks made since the pacing thread was last told */
+    int64_t said_ns; /* when it was last told, clock_now_ns() */
 };
 
 /* casters.c */
 struct casters {
     struct loop_caster caster[CONFIG_MAX_THREADS];
     uint32_t n, n_running;
-    uint64_t ahead_ticks; /* claimed and not released, at most */
+    uint64_t ahead_ticks; /* most ticks that are claimed and not released */
     pthread_mutex_t claim_lock;
     uint64_t next_tick;           /* under claim_lock */
-    _Atomic uint32_t n_computing; /* claimed ticks, neither ready nor reported lost yet */
+    _Atomic uint32_t n_computing; /* claimed ticks that are neither ready nor reported lost yet */
     _Atomic uint64_t drop_until;  /* ticks before this one are not worth computing any more */
     _Atomic int in_vain;          /* the last tick that was computed came too late */
-    _Atomic int no_memory;        /* the last tick had no room in its slot; the error queue has heard of it */
+    _Atomic int no_memory;        /* the last tick had no room in its slot, and the error queue has that */
 };
 
 /* pacer.c */
@@ -58,7 +57,7 @@ struct loop {
     struct hasher *hasher;       /* NULL: none is wanted */
     struct cost_watch *cost;     /* NULL: nobody is to be warned */
     struct pose_feed *feed;      /* of a live platform in real time; NULL: none */
-    _Atomic uint64_t final_tick; /* first tick that will never be; UINT64_MAX while unknown */
+    _Atomic uint64_t final_tick; /* first tick after the run's end; UINT64_MAX while unknown */
     _Atomic int stopping;        /* give up waiting for anything */
 };
 

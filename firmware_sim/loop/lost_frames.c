@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Frames that a reader lost: counted here (reader_lost_frames), announced to the reader in an event of its
- * own, and reported to the error queue. Pulses that the head could not compute in time are another matter:
- * device/overrun.c. */
+ * own, and reported to the error queue. Pulses that the head could not compute in time are in device/overrun.c. */
 #include <stdio.h>
 #include <string.h>
 
@@ -34,7 +33,7 @@ void session_count_units(struct pump *pump, struct session *s, uint64_t n)
     report(pump, s);
 }
 
-/* Announces it to the reader in a frame of its own, before the tick's: these make room for it. */
+/* Announces the loss to the reader in a frame of its own. The tick's frames move back to make room before them. */
 static void announce(struct pump *pump, struct session *s, const struct ring_copy *tick, uint32_t frames,
                      uint64_t pulses)
 {
@@ -69,8 +68,8 @@ uint32_t session_check_lost(struct pump *pump, struct session *s, const struct r
     return frames;
 }
 
-/* Frames of the stream, and pulses in them, that lie in the session's buffer and were not written as a whole.
- * Reply lines lie between frames, and have no byte that begins one. */
+/* Frames of the stream, and pulses in them, that are in the session's buffer and were not written as a whole.
+ * Reply lines lie between frames; they have no byte that begins a frame. */
 static uint32_t count_unwritten(const struct session *s, uint64_t *pulses)
 {
     uint32_t frames = 0;
@@ -94,7 +93,8 @@ static uint32_t count_unwritten(const struct session *s, uint64_t *pulses)
     return frames;
 }
 
-/* What lies in its wire, or was to come after the end that a fault made: it was counted as it went in. */
+/* Frames and pulses in the session's wire, or discarded there after a fault ended the session. They were counted as
+ * received when they went in. */
 static void count_in_wire(const struct session *s, uint64_t *frames, uint64_t *pulses)
 {
     *frames = *pulses = 0;
@@ -118,7 +118,7 @@ void session_leave(struct pump *pump, struct session *s)
     uint32_t frames = 0;
     const int native = pump->protocol->passes_native, over = atomic_load(&stream->over);
     count_in_wire(s, &frames_in_wire, &pulses_in_wire);
-    if (s->lost.have_seq) { /* the pacing thread is done with seq */
+    if (s->lost.have_seq) { /* the pacing thread no longer changes seq */
         frames = (native ? count_unwritten(s, &unwritten) : 0) + stream->seq - s->lost.next_seq;
         pulses = unwritten + atomic_load(&stream->counters->pulses) - s->lost.next_pulse;
     }

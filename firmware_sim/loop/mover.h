@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* The thread that plans a station's new place (SITE:POSE), so that no link stands still meanwhile.
  *
- * In: a move that the device has begun (COMMAND_MOVE). Out: its reply, in the box of the session that commanded it, and a
- * word to the session's link. The device lets no two moves be under way. */
+ * In: a move that the device has begun (COMMAND_MOVE). Out: its reply, in the box of the session that commanded it, and
+ * a write to the eventfd of the session's link. The device allows one move at a time. */
 #ifndef FIRMWARE_SIM_LOOP_MOVER_H
 #define FIRMWARE_SIM_LOOP_MOVER_H
 
@@ -10,7 +10,7 @@
 
 #include "firmware_sim/loop/stream.h"
 
-/* Where a session finds the reply. All zero: it waits for none. Under the mover's lock. */
+/* A session finds the reply here. All zero: it waits for none. The mover's lock protects it. */
 struct move_box {
     uint64_t ticket; /* of the move it waits for */
     int done;
@@ -25,7 +25,7 @@ struct mover {
     pthread_t thread;
     int running, ending;
     uint64_t ticket; /* of the last move */
-    int asked;       /* and this is it: */
+    int asked;       /* 1: job is that move, and waits for the thread */
     struct move_job {
         uint64_t ticket;
         struct move_box *box;
@@ -35,11 +35,11 @@ struct mover {
 
 void mover_create(struct mover *mover, struct device *device, struct stream *stream);
 /* Plans the move that the device has begun. The box must stay until mover_join; wake_fd, an eventfd, is written once the
- * reply is there. Where there is no thread to be had, the caller waits. */
+ * reply is there. Where no thread can be started, the caller's thread plans. */
 void mover_ask(struct mover *mover, struct move_box *box, int wake_fd);
-/* 1: the reply is there, and taken. */
+/* Takes the reply. 0: it is not there yet. */
 int mover_take(struct mover *mover, struct move_box *box, char reply[COMMAND_MAX_REPLY]);
-/* Ends a move that is under way: it is refused. Once the casters are joined. */
+/* Ends the thread. A move that is under way is refused. After the casters are joined. */
 void mover_join(struct mover *mover);
 
 #endif

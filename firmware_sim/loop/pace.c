@@ -13,7 +13,7 @@ void pace_begin(struct pace *pace, int64_t now_ns)
     pace->asleep = 0;
 }
 
-/* It looks again. Between two looks it may sleep; whatever is beyond that is time that it stood still. */
+/* The pacing thread looks again. Between two looks it may sleep; any time beyond that it stood still. */
 static void note_look(struct pace *pace, int64_t now_ns)
 {
     const int64_t still_ns = now_ns - pace->expected_ns;
@@ -34,7 +34,7 @@ enum pace_step pace_look(struct pace *pace, uint64_t tick, int ready, int64_t no
     }
     if (ready) return PACE_RELEASE;
     if (late_ns > pace->late_ns + pace->credit_ns) return PACE_GIVE_UP;
-    /* Looking again on each beat of the clock shows how long it stood still. */
+    /* Looking again each time that a tick falls due shows how long it stood still. */
     pace->expected_ns = *until_ns = now_ns + pace->tick_ns - (now_ns - pace->epoch_ns) % pace->tick_ns;
     return PACE_AWAIT;
 }

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* What the pacing thread does next, in real time: pure, the clock is the caller's.
+/* Decides what the pacing thread does next, in real time. Pure: the caller reads the clock.
  *
  * In: the tick whose turn it is, whether it is ready, and the time. Out: sleep, wait for the tick, release it, or give it
  * up; and how late wake-ups and releases were.
  *
- * A tick is due when its last pulse has fired. One that is late is released as soon as it is ready: the pacing thread
- * does not sleep up to the next beat of the clock meanwhile, else a head with few ticks ahead would never catch up.
+ * A tick is due when its last pulse has fired. A late tick is released as soon as it is ready. The pacing thread does
+ * not sleep until the next tick is due meanwhile, since a head with few ticks ahead would never catch up.
  *
- * A tick that is not ready late_ns after its time is given up. A machine that stood still gets credit: the longest time
- * that the pacing thread stood still is added to late_ns until it has caught up. Casters stood still, too.
+ * A tick that is not ready late_ns after its time is given up. A machine that stood still gets credit, since the
+ * casters stood still, too: the longest such time is added to late_ns until the pacing thread has caught up.
  *
  * Units: ns of clock_now_ns(). Thread: the pacing thread alone; lateness may be read by others. Real-time safe. */
 #ifndef FIRMWARE_SIM_LOOP_PACE_H
@@ -24,7 +24,7 @@ struct pace {
     struct device_counters *counters;
 
     int64_t credit_ns;
-    int64_t expected_ns;  /* when it should look again: what is beyond that, it stood still */
+    int64_t expected_ns;  /* when it should look again; beyond that time it stood still */
     int asleep;           /* it was told to sleep up to then */
     struct lateness wake; /* of the wake-ups from such a sleep */
     struct lateness late; /* of releases */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The pacing thread: releases each tick when its time has come. It takes no lock, allocates and logs nothing,
- * and calls the system for the clock, for wake-ups and for the bell of a tick that is late. */
+ * and calls the system only for the clock, for wake-ups, and to wait for a tick that is late. */
 #include <errno.h>
 #include <sched.h>
 #include <string.h>
@@ -30,8 +30,8 @@ static void pace_realtime(struct loop *loop)
             stream_release(stream, slot, tick, now_ns);
             pace_released(pace, tick++, clock_now_ns());
             break;
-        /* Even one that will never be: when casters come late to find that the run is over, the pacing thread may be
-         * beyond its end. */
+        /* This tick may be after the run's end: the pacing thread gets there when the casters, being late, have not yet
+         * found that the run is over. */
         case PACE_GIVE_UP:
             tick += stream_lose(stream, tick) != 0;
             break;

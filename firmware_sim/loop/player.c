@@ -12,7 +12,7 @@ static int may_make(const struct loop *loop)
     return loop->cfg->loop.pace != PACE_STEP || next < atomic_load(&loop->stream.granted);
 }
 
-/* Into the tick's slot. 0: it was given up meanwhile, or has no room. */
+/* Puts the frames into the tick's slot. 0: the tick was given up meanwhile, or the slot has no room. */
 static int put(struct loop *loop, const struct ring_tick *tick, uint64_t number)
 {
     struct ring_slot *slot = ring_claim(&loop->stream.ring, number);
@@ -25,7 +25,7 @@ static int put(struct loop *loop, const struct ring_tick *tick, uint64_t number)
     return ring_ready(slot, number);
 }
 
-/* In the paces that wait the pacing thread is told of batches, as casters do it. */
+/* In the paces that wait, the pacing thread is told once per batch, as by casters. */
 static void say_made(struct loop *loop, uint64_t *unsaid, uint64_t most)
 {
     if (!loop->stream.waits || *unsaid < most) return;

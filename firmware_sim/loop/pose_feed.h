@@ -21,8 +21,7 @@
 
 struct pose_feed;
 
-/* Listens where platform.address and platform.port say. device NULL: only to see whether it can; it is not
- * started. */
+/* Listens at platform.address and platform.port. device NULL: only tries whether it can; it is not started. */
 int pose_feed_open(struct device *device, const struct config *cfg, struct pose_feed **out, struct sh_err *err);
 int pose_feed_start(struct pose_feed *feed, struct sh_err *err);
 /* "udp:127.0.0.1:4711" */

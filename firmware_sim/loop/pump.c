@@ -10,7 +10,7 @@
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/loop/pump_inside.h"
 
-/* At the end a reader may take this long between two bytes, and what faults keep back may take this long in all. */
+/* At the end a reader may take this long between two bytes, and bytes held back by faults this long in all. */
 static const int64_t DRAIN_NS = 2000000000;
 
 int pump_open(struct links *links, uint32_t index, const struct link_spec *spec, struct pump **out, struct sh_err *err)
@@ -87,7 +87,7 @@ void pump_get_counts(const struct pump *pump, struct link_counts *counts)
     counts->lost_units += refused;
 }
 
-/* The first link that could not write what it had to makes the run a failure. */
+/* Keeps the error of the first link that failed to write; the run then fails. */
 static void fail_link(struct pump *pump, const char *why)
 {
     struct links *links = pump->links;
@@ -156,7 +156,7 @@ static int take_events(struct pump *pump, uint32_t want_write, int timeout_ms)
     return n;
 }
 
-/* True while bytes wait in the system that it would throw away. It knows of the last ones a moment late. */
+/* True while the system holds bytes that closing would discard. It reports the last ones a moment late. */
 static int is_unread(struct pump *pump, struct session *s, int index, int64_t now_ns)
 {
     static const int64_t MOMENT_NS = 20000000;
@@ -167,7 +167,7 @@ static int is_unread(struct pump *pump, struct session *s, int index, int64_t no
     return unread > 0 || now_ns - s->moved_ns < MOMENT_NS;
 }
 
-/* True while some session has something to bring out and its reader takes it. */
+/* True while some session has something to write and its reader takes it. */
 static int has_more(struct pump *pump)
 {
     uint64_t released = stream_released(pump->stream);
@@ -185,11 +185,11 @@ static int has_more(struct pump *pump)
     return 0;
 }
 
-/* The stream wakes this thread at ticks with frames while there are sessions, and at those that a protocol needs
- * besides. Returns 1 when such a tick passed meanwhile. */
+/* Asks the stream to wake this thread at ticks with frames while there are sessions, and at further ticks that a
+ * protocol needs. Returns 1 when such a tick passed meanwhile. */
 static int set_wake(struct pump *pump)
 {
-    const int by_frames = pump->protocol->passes_native || pump->stream->waits; /* the latter: and by empty ticks */
+    const int by_frames = pump->protocol->passes_native || pump->stream->waits; /* if it waits, empty ticks wake, too */
     uint64_t tick = UINT64_MAX;
     int sessions = 0;
     for (int i = 0; i < LINK_MAX_SESSIONS; i++) {
@@ -201,7 +201,7 @@ static int set_wake(struct pump *pump)
     return stream_wake_at(pump->stream, pump->listener, sessions, tick);
 }
 
-/* How long to wait for something to happen. */
+/* The time to wait for events. */
 static int timeout_ms(const struct pump *pump, int over)
 {
     const int most_ms = over ? 50 : -1;
@@ -224,7 +224,7 @@ static void *pump_main(void *arg)
 {
     struct pump *pump = arg;
     uint32_t want_write = 0;
-    int at_once = 0; /* there is something to do before anything happens */
+    int at_once = 0; /* there is something to do without waiting for events */
     for (;;) {
         int over = atomic_load(&pump->stream->over);
         if (over && !has_more(pump)) break;
@@ -253,8 +253,7 @@ static void *pump_main(void *arg)
 
 int pump_start(struct pump *pump, struct sh_err *err)
 {
-    /* Sessions that are there from the start (a file's) begin with the first tick, however late the thread
-     * comes. */
+    /* Sessions that are open from the start (a file's) begin with the first tick, however late this thread starts. */
     take_events(pump, 0, 0);
     atomic_fetch_add(&pump->links->n_busy, 1);
     int rc = pthread_create(&pump->thread, NULL, pump_main, pump);

@@ -7,7 +7,7 @@
 
 #include "firmware_sim/loop/links.h"
 
-/* links must outlive the pump. index: of the link, from 0; it gives the sessions their numbers. */
+/* links must outlive the pump. index: of the link, from 0; session numbers follow from it. */
 int pump_open(struct links *links, uint32_t index, const struct link_spec *spec, struct pump **out, struct sh_err *err);
 int pump_start(struct pump *pump, struct sh_err *err);
 void pump_join(struct pump *pump);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults on request at connections: clients that are turned away, and USB enumerations that go wrong. Connections are
- * counted from 1 on the link, those that are turned away too. Of a USB link, each time that a host gets the device is
- * one. */
+/* Injected faults at connections: clients that are turned away, and USB enumerations that go wrong. Connections are
+ * counted from 1 on the link, those that are turned away too. On a USB link, each time that a host gets the device is a
+ * connection. */
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/loop/pump_inside.h"
 
@@ -21,7 +21,7 @@ enum link_fault pump_link_fault(enum fault_kind kind)
     return (enum link_fault)(kind - FAULT_DISCONNECT);
 }
 
-/* The list as it is now. A fault that was added since the connection before counts from the one at hand. */
+/* Takes over the list. A fault that was added since the last connection counts from this one. */
 static void look_at_list(struct pump *pump)
 {
     struct pump_connections *c = &pump->connections;
@@ -32,7 +32,7 @@ static void look_at_list(struct pump *pump)
     if (c->version == fault_board_version(pump->board)) return;
     memcpy(before, c->fault, sizeof before);
     c->version = fault_board_copy_all(pump->board, entry, &n);
-    fault_tally_renew(&pump->tally, entry, n); /* those that were taken out last keep their counts */
+    fault_tally_renew(&pump->tally, entry, n); /* faults that were taken out last keep their counts */
     c->n_faults = 0;
     for (uint32_t i = 0; i < n; i++) {
         if (entry[i].until_ns != INT64_MAX) continue;
@@ -41,7 +41,7 @@ static void look_at_list(struct pump *pump)
     }
 }
 
-/* Whether the fault strikes at the connection at hand. */
+/* Whether the fault strikes at this connection. */
 static int strikes(struct pump *pump, uint32_t i, int64_t t_ns)
 {
     const struct pump_connections *c = &pump->connections;
@@ -76,7 +76,7 @@ static int inject(struct pump *pump, uint32_t i, int index, int64_t t_ns)
     return 1;
 }
 
-/* The next connection is here: the faults of it. Returns 1 when its client was turned away. */
+/* Injects the faults of the next connection. Returns 1 when its client was turned away. */
 static int connect_next(struct pump *pump, int index)
 {
     const int64_t t_ns = (int64_t)stream_released(pump->stream) * pump->stream->tick_ns;

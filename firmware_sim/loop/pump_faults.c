@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults on the wire: what a session would write goes through its wire (firmware_sim/fault/wire.h), and what comes out
- * of that is written. A session has a wire from the first fault on. Without one nothing of this is called.
+/* Injected faults on the wire: a session's bytes go through its wire (firmware_sim/fault/wire.h) before they are
+ * written. A session has a wire from the first fault on. Without one nothing of this is called.
  *
- * A wire that stalls keeps as much as a session's buffer, one that delays WIRE_DELAY_BYTES. Then the session takes no
- * more, and its reader is as any reader that is too slow. What lies in the wire when the client goes away, or at the
- * end of the run, counts as not written; what a fault dropped or changed counts as written. */
+ * A wire that stalls holds as many bytes as a session's buffer; one that delays holds WIRE_DELAY_BYTES. Once it is full
+ * the session takes no more, and its reader counts as too slow. Bytes in the wire when the client goes away, or at the
+ * end of the run, count as not written. Frames that a fault dropped or changed count as written. */
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/loop/pump_inside.h"
 
@@ -12,7 +12,7 @@
 #include <string.h>
 
 static const int64_t NO_TIME = INT64_MAX;
-static const int64_t AGAIN_NS = 100000000; /* between attempts to be there again */
+static const int64_t AGAIN_NS = 100000000; /* between attempts to plug the link in again */
 
 /* Reply lines that are not in the wire yet. */
 static uint32_t count_replies(const struct session *s)
@@ -26,7 +26,7 @@ static uint32_t count_replies(const struct session *s)
     return n;
 }
 
-/* What was read and not answered yet, it did not hear. */
+/* A new wire gets what was read and not answered before it was made. */
 static void hear_again(struct session *s)
 {
     const struct session_commands *c = &s->commands;
@@ -103,7 +103,8 @@ static void put_rest(struct pump *pump, struct session *s, const uint8_t *bytes,
         source_report(pump->links->source, CMD_E_READER, "no memory for the faults of a session: a frame is lost");
 }
 
-/* A frame or a reply of the session's buffer. What was written of it before there was a wire is not written again. */
+/* Puts a frame or a reply of the session's buffer into the wire. Bytes of it that were written before there was a wire
+ * are not written again. */
 static void take_item(struct pump *pump, struct session *s, int of, uint32_t at, uint32_t end)
 {
     if (at >= s->out_pos)
@@ -112,7 +113,7 @@ static void take_item(struct pump *pump, struct session *s, int of, uint32_t at,
         put_rest(pump, s, s->out + s->out_pos, end - s->out_pos);
 }
 
-/* Reply lines, each with its end. */
+/* Puts reply lines into the wire, each with its end. */
 static void take_replies(struct pump *pump, struct session *s, uint32_t at, uint32_t to)
 {
     while (at < to) {
@@ -123,7 +124,7 @@ static void take_replies(struct pump *pump, struct session *s, uint32_t at, uint
     }
 }
 
-/* What lies in the session's buffer goes into its wire. */
+/* Moves the session's buffer into its wire. */
 static void take_over(struct pump *pump, struct session *s)
 {
     take_replies(pump, s, 0, s->frames_from);
@@ -156,7 +157,7 @@ static int64_t in_ms(double ms)
     return clock_now_ns() + (int64_t)(ms * 1e6);
 }
 
-/* What ends by it: the session at hand, or all of the link. */
+/* Closes the sessions that an act ends: this one, or all of the link. */
 static void end_sessions(struct pump *pump, struct session *s, enum link_fault what)
 {
     if (what == LINK_FAULT_DISCONNECT) session_close(pump, s);
@@ -165,7 +166,7 @@ static void end_sessions(struct pump *pump, struct session *s, enum link_fault w
         session_close(pump, &pump->session[i]);
 }
 
-/* The act that is the first of the wire. Returns 1 when the session is over by it. */
+/* Carries out the act that is first in the wire. Returns 1 when that ended the session. */
 static int carry_out(struct pump *pump, struct session *s, int index, const struct wire_piece *act)
 {
     const enum fault_kind kind = (enum fault_kind)act->act;
@@ -174,7 +175,7 @@ static int carry_out(struct pump *pump, struct session *s, int index, const stru
     const struct fault_note note = *wire_act_note(act);
     const int rc = pump->ops->fault(pump->link, what, index, act->n, for_ms);
     wire_pop(s->wire);
-    if (what == LINK_FAULT_BUS_RESET) pump->plug_ns = in_ms(0.0); /* where it takes unplugging, and plugging in fails */
+    if (what == LINK_FAULT_BUS_RESET) pump->plug_ns = in_ms(0.0); /* a reset may unplug, and fail to plug in again */
     if (rc != SH_OK) {
         wire_go_on(s->wire);
         char text[96];
@@ -225,7 +226,7 @@ int session_write_faulty(struct pump *pump, struct session *s, int index)
         if (full || last || session_wire_is_full(pump, s)) return full;
         const int over = atomic_load(&pump->stream->over);
         session_fill(pump, s);
-        last = over && s->out_pos == s->out_len; /* nothing more comes: nothing is held for it */
+        last = over && s->out_pos == s->out_len; /* nothing more comes, so nothing waits for it */
         if (s->out_pos < s->out_len)
             take_over(pump, s);
         else if (!last)
@@ -233,7 +234,7 @@ int session_write_faulty(struct pump *pump, struct session *s, int index)
         wire_time(s->wire, (int64_t)s->cursor * pump->stream->tick_ns);
     }
     wire_time(s->wire, (int64_t)s->cursor * pump->stream->tick_ns);
-    stream_note_written(pump->stream, s->reader, s->cursor); /* nobody waits for what a fault keeps back */
+    stream_note_written(pump->stream, s->reader, s->cursor); /* bytes that a fault holds back hold up nobody */
     return 0;
 }
 
@@ -244,7 +245,7 @@ int64_t pump_next_ns(const struct pump *pump)
     for (int i = 0; i < LINK_MAX_SESSIONS; i++) {
         const struct session *s = &pump->session[i];
         if (!s->open || s->wire == NULL) continue;
-        const int64_t due_ns = wire_next_ns(s->wire); /* what is due already waits for the link */
+        const int64_t due_ns = wire_next_ns(s->wire); /* a time in the past: that piece waits for the link */
         if (due_ns > now_ns && due_ns < next_ns) next_ns = due_ns;
         if (session_waits_for_files(pump, s) && now_ns + STREAM_FILES_NS < next_ns) next_ns = now_ns + STREAM_FILES_NS;
     }

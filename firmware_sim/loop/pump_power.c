@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: MIT */
-/* A power cycle on request, as the clients of a link see it: their sessions end abruptly, and nobody answers until
- * power is there again (device_work.power).
+/* An injected power cycle, as the clients of a link see it: their sessions end abruptly, and nobody answers until
+ * power is back (device_work.power).
  *
- * All before the tick with which power goes is written, if the client reads fast enough; in the paces that wait for
- * readers, in any case. What its system has not taken by then may be lost with the connection. A link that nobody can
- * end, as a file or UDP, goes on where it was. In the pace step links come back at once, since it is their clients that
- * let time pass. */
+ * All frames before the tick with which power goes are written, if the client reads fast enough; in the paces that wait
+ * for readers, in any case. Bytes that the client's system has not taken by then may be lost with the connection. A
+ * link without a connection, such as a file or UDP, goes on where it was. In the pace step links come back at once,
+ * since their clients let time pass. */
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/loop/pump_inside.h"
 
-/* What was released before `tick` is written, or its client does not take it. */
+/* Whether everything released before `tick` is written, or the client does not take it. */
 static int is_drained(const struct pump *pump, const struct session *s, int is_full, uint64_t tick)
 {
     const int taken = s->cursor >= tick,
@@ -45,7 +45,7 @@ static void unplug(struct pump *pump, uint64_t tick)
         if (!can_unplug(pump)) pump->ops->end(pump->link, i);
     }
     if (can_unplug(pump)) pump->ops->fault(pump->link, LINK_FAULT_UNPLUG, 0, 0, 0.0);
-    pump->plug_ns = pump->refuse_until_ns = 0; /* of faults before */
+    pump->plug_ns = pump->refuse_until_ns = 0; /* ends what earlier faults began */
     pump->is_off = 1;
     if (pump->stream->steps) plug(pump);
 }
@@ -65,7 +65,7 @@ int pump_power(struct pump *pump, uint32_t full)
         else
             plug(pump);
         pump->power_seen++;
-        more = 1; /* sessions that go on have this tick before them */
+        more = 1; /* sessions that go on can now take this tick */
     }
     return more;
 }

@@ -2,8 +2,8 @@
 /* A session of a protocol that is not native: frames and time go in, and units come out (drivers/protocol/protocol.h).
  *
  * In real time the protocol keeps up with the head, whether its client reads or not, as the firmware of a device does.
- * A unit that has no room, or that comes while one waits that is older than loop.queue_ms, is lost as a whole; what
- * answers a client at once is lost for want of room alone. In the paces that wait for readers nothing is lost: the
+ * A unit is lost as a whole where it has no room, or where another one has waited for longer than loop.queue_ms.
+ * Answers are lost only where they have no room. In the paces that wait for readers nothing is lost: the
  * session takes no further tick until there is room. */
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,14 +12,14 @@
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/loop/pump_inside.h"
 
-enum { PIECE_BYTES = 64 }; /* of what a client sends: what answers it finds room */
+enum { PIECE_BYTES = 64 }; /* input is given to the protocol in pieces so small that answers find room */
 
 static int64_t time_of(const struct pump *pump, uint64_t tick)
 {
     return (int64_t)tick * pump->stream->tick_ns;
 }
 
-/* ---- what the protocol may call */
+/* ---- functions that the protocol may call */
 
 static int is_stale(const struct pump *pump, const struct session *s)
 {
@@ -79,7 +79,7 @@ static void host_count(void *ctx, enum protocol_count what, uint64_t n)
     struct session *s = ctx;
     struct link_counts *counts = &s->pump->counts;
     if (n == 0) return;
-    if (what == PROTOCOL_UNITS_LOST) counts->lost_units += n; /* not for its reader: session_check_lost has those */
+    if (what == PROTOCOL_UNITS_LOST) counts->lost_units += n; /* frames lost for a slow reader: session_check_lost */
     if (what == PROTOCOL_INPUT_LOST) counts->lost_input_bytes += n;
     if (what == PROTOCOL_WRONG) counts->wrong_requests += n;
     if (what == PROTOCOL_POINTS_LOST) counts->lost_points += n;
@@ -103,12 +103,12 @@ static void give_frames(const struct protocol_ops *ops, struct session *s, const
     }
 }
 
-/* Descriptor, emitter and anchor as they are before the tick at the cursor. */
+/* Gives the protocol the descriptor, emitter and anchor from before the tick at the cursor. */
 static void greet(struct pump *pump, struct session *s)
 {
     static _Thread_local uint8_t frames[KEPT_MAX_BYTES];
     uint32_t len, version, before;
-    do { /* none may be kept between the two: the session would miss it */
+    do { /* a frame latched between copy and cursor would be missed: then copy again */
         kept_copy(&pump->stream->kept, frames, &before);
         s->cursor = stream_released(pump->stream);
         len = kept_copy(&pump->stream->kept, frames, &version);
@@ -162,13 +162,13 @@ void session_close_protocol(struct pump *pump, struct session *s)
     unit_queue_clear(&s->units);
 }
 
-/* Time has come to the cursor. */
+/* Tells the protocol that time has come to the cursor. */
 static void pass_time(struct pump *pump, struct session *s)
 {
     pump->protocol->time(s->protocol, time_of(pump, s->cursor));
 }
 
-/* The next tick into the protocol. Returns 0 when there is none. */
+/* Gives the next tick to the protocol. Returns 0 when there is none. */
 static int take_tick(struct pump *pump, struct session *s)
 {
     struct ring *ring = &pump->stream->ring;
@@ -181,7 +181,7 @@ static int take_tick(struct pump *pump, struct session *s)
     if (got == RING_NONE || (got == RING_READ && tick.len > tick.cap)) return 0;
     uint64_t released = stream_released(pump->stream);
     if (got == RING_LOST && s->cursor + ring->queue_ticks < released) {
-        s->cursor = released - ring->queue_ticks / 2; /* what was lost, the next tick's number says */
+        s->cursor = released - ring->queue_ticks / 2; /* the number of the next tick's frames shows the loss */
         if (s->cursor > off_tick) s->cursor = off_tick;
         return 1;
     }
@@ -201,8 +201,8 @@ static int has_room(const struct session *s)
     return unit_queue_room(&s->units) >= s->units.cap / 2;
 }
 
-/* What the client sent, as long as answers have room. Where there is none and no more can be read, it goes on all the
- * same: a client that sends and never reads loses answers. Returns whether there was something. */
+/* Gives the client's bytes to the protocol while answers have room. Without room it still goes on once the input buffer
+ * is full: a client that sends and never reads loses answers. Returns whether it took any bytes. */
 static int take_input(struct pump *pump, struct session *s)
 {
     struct session_commands *c = &s->commands;
@@ -222,7 +222,7 @@ static int take_input(struct pump *pump, struct session *s)
     return c->in_pos != from;
 }
 
-enum { HELD_BACK = 2 }; /* flush: the link is not full, but a fault keeps back as much as may be */
+enum { HELD_BACK = 2 }; /* flush: the link is not full, but a fault holds back as much as the wire may hold */
 
 /* The same, where the units go through the session's wire. */
 static int flush_faulty(struct pump *pump, struct session *s, int index)
@@ -278,7 +278,7 @@ int session_write_protocol(struct pump *pump, struct session *s, int index)
             return 0;
         }
     }
-    while (full && !pump->stream->waits && take_tick(pump, s)) /* time goes on without the client */
+    while (full && !pump->stream->waits && take_tick(pump, s)) /* in real time, time goes on without the client */
         continue;
     stream_move_reader(pump->stream, s->reader, s->cursor);
     if (s->units.n == 0) {

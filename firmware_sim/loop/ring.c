@@ -27,7 +27,7 @@ void ring_hits_add(struct ring_hits *sum, const struct ring_hits *more)
 
 static size_t round_up(size_t bytes)
 {
-    enum { STEP = 1024 }; /* ticks differ a little: one that is longer fits where another was */
+    enum { STEP = 1024 }; /* sizes differ a little: rounded, a tick's memory fits the next one, too */
     return (bytes + STEP - 1) / STEP * STEP;
 }
 
@@ -71,10 +71,10 @@ struct ring_slot *ring_claim(struct ring *ring, uint64_t tick)
     while (atomic_load(&slot->busy) || (tick >= ring->n_slots && is_being_read(ring, tick - ring->n_slots)))
         sched_yield();
     uint64_t seen = atomic_load(&slot->state);
-    /* Where casters are behind by more than the whole ring, the slot says that a later tick is lost. */
+    /* When casters are late by more than the whole ring, the slot has the state of a later tick. */
     if (tick < atomic_load(&ring->released)) return NULL;
     if (seen == state_of(tick, LOST) || !atomic_compare_exchange_strong(&slot->state, &seen, state_of(tick, COMPUTING)))
-        return NULL; /* only the pacing thread can have changed it: lost */
+        return NULL; /* only the pacing thread can have changed it, to LOST */
     atomic_store(&slot->busy, 1);
     slot->tick = (struct ring_tick){0};
     slot->n_frames = slot->first_seq = 0;
@@ -141,8 +141,8 @@ enum ring_read ring_look(struct ring *ring, int reader, uint64_t tick, struct ri
     uint64_t released = atomic_load(&ring->released);
     if (tick >= released) return RING_NONE;
     atomic_store(&ring->hazard[reader], tick + 1);
-    /* Looked at again after the hazard is up: a claim that did not see it comes only once the tick is this
-     * old. */
+    /* Read `released` again after setting the hazard: a claim that did not see the hazard comes only once the tick is
+     * too old to read. */
     released = atomic_load(&ring->released);
     struct ring_slot *slot = slot_of(ring, tick);
     if (tick + ring->queue_ticks < released || atomic_load(&slot->state) != state_of(tick, READY)) return RING_LOST;

@@ -7,8 +7,8 @@
  * released ticks at their own speed. A tick is there for them as long as it is among the last queue_ticks
  * released.
  *
- * Nobody waits for a reader here (stream.h does, in the paces fast and step). A reader in the middle of a
- * copy, or of a look, says so (hazard), and the slot is not claimed until that is over.
+ * Nobody waits for a slow reader here (stream.h does, in the paces fast and step). A reader announces the slot that it
+ * copies or looks at (hazard). That slot is not claimed until the reader is done.
  *
  * Memory: each slot has room for a usual tick from the start, and more once a tick needed more. The caster
  * makes that room while the slot is its own, so that the pacing thread never allocates.
@@ -26,11 +26,11 @@
 #include "core/err.h"
 #include "core/line.h"
 
-/* Readers: eight sessions of each of nine links, and the hash. Marks: 10,000 lines per second in ticks of 10
- * ms, and the two more of device_tick_lines. */
+/* Readers: eight sessions of each of nine links, and the hash. Marks: 10,000 lines per second in ticks of 10 ms, and
+ * the two that device_tick_lines adds. */
 enum { RING_MAX_READERS = 73, RING_MAX_MARKS = 104 };
 
-/* What pulses hit: echoes, and what is no echo (struct cast_counters). */
+/* Counts of hits: echoes, and hits that gave none (struct cast_counters). */
 struct ring_hits {
     uint32_t echoes, crowded, faint, unfit;
 };
@@ -44,11 +44,11 @@ struct ring_mark {
     struct line_end end;
 };
 
-/* What a caster made of a tick. */
+/* The frames and counts that a caster made of a tick. */
 struct ring_tick {
     uint8_t *bytes; /* whole frames */
     uint32_t len;
-    int broken; /* the frames could not be kept: the line they were of has a gap */
+    int broken; /* there was no memory for the frames, so their line has a gap */
     uint32_t n_marks;
     struct ring_mark *mark;
     uint32_t scan; /* number of the scan that its pulses are of */
@@ -59,12 +59,12 @@ struct ring_tick {
 
 struct ring_slot {
     _Atomic uint64_t state;       /* tick << 2 | phase */
-    _Atomic int busy;             /* a caster has it, even if its tick is lost already */
+    _Atomic int busy;             /* a caster uses it, even if its tick is lost already */
     struct ring_tick tick;        /* its arrays lie in store, or in longer */
-    uint32_t n_frames, first_seq; /* set at release; so is: */
-    uint64_t pulses_before;       /* delivered before this tick, since power-up */
+    uint32_t n_frames, first_seq; /* set at release */
+    uint64_t pulses_before;       /* set at release: delivered before this tick, since power-up */
     uint8_t *store;               /* room for a usual tick */
-    uint8_t *longer;              /* of a tick that needs more; the next one in the slot gives it back. Else NULL */
+    uint8_t *longer;              /* room for a tick that needs more, until the slot's next tick; else NULL */
 };
 
 struct ring {
@@ -76,10 +76,10 @@ struct ring {
 };
 
 struct ring_size {
-    uint64_t ahead_ticks; /* claimed and not released yet, at most */
-    uint64_t queue_ticks; /* released and still there for readers */
-    uint64_t spare_ticks; /* a reader that was interrupted has so long to finish its copy before a claim waits for it */
-    uint32_t usual_bytes; /* a usual tick's */
+    uint64_t ahead_ticks; /* most ticks that are claimed and not released yet */
+    uint64_t queue_ticks; /* released ticks that are still there for readers */
+    uint64_t spare_ticks; /* time for an interrupted reader to finish its copy before a claim waits for it */
+    uint32_t usual_bytes; /* of a usual tick */
 };
 
 int ring_create(struct ring *ring, const struct ring_size *size, struct sh_err *err);
@@ -87,9 +87,9 @@ void ring_free(struct ring *ring);
 
 /* The slot for `tick`, empty; or NULL when the tick is lost already. */
 struct ring_slot *ring_claim(struct ring *ring, uint64_t tick);
-/* Copies frames, marks and counts into a claimed slot. Where they need more than a usual tick, there is room for this one
- * alone: the long ones of each second would in time make all slots as large. SH_ENOMEM: there is none; the slot then
- * holds no frame, and says that it is broken. */
+/* Copies frames, marks and counts into a claimed slot. A tick longer than usual gets memory for itself alone. If slots
+ * kept that memory, all of them would in time be as large as the longest tick. SH_ENOMEM: there is no memory; the slot
+ * then holds no frame, and is marked broken. */
 int ring_put(const struct ring *ring, struct ring_slot *slot, const struct ring_tick *tick);
 /* The caster is done with the slot. 0 when the tick was lost meanwhile. */
 int ring_ready(struct ring_slot *slot, uint64_t tick);
@@ -100,15 +100,15 @@ void ring_drop(struct ring_slot *slot);
 struct ring_slot *ring_peek(struct ring *ring, uint64_t tick);
 /* Publishes the tick that ring_peek gave. */
 void ring_release(struct ring *ring, uint64_t tick);
-/* Gives the next tick up, and publishes that. 0 when it became ready in the same moment: then release it. */
+/* Marks the next tick lost, and publishes that. 0: it became ready in the same moment, and is to be released. */
 int ring_lose(struct ring *ring, uint64_t tick);
 
 /* A reader's copy of a tick. */
 struct ring_copy {
     uint8_t *buf;
     uint32_t cap;                      /* of buf; the reader sets both */
-    uint32_t len, n_frames, first_seq; /* first_seq: the first frame's number; without frames that of the next one */
-    uint64_t n_cast, pulses_before;    /* pulses that the frames have, and that were delivered before */
+    uint32_t len, n_frames, first_seq; /* first_seq: number of the first frame; without frames, of the next one */
+    uint64_t n_cast, pulses_before;    /* pulses in the frames, and those that were delivered before */
 };
 enum ring_read { RING_READ, RING_NONE, RING_LOST };
 /* Copies the frames of `tick`. RING_NONE: it is not released yet. RING_LOST: it is too old, or the head

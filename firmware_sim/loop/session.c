@@ -29,7 +29,7 @@ void session_open(struct pump *pump, struct session *s, const char *peer)
     s->cursor = stream_released(pump->stream);
     s->power_from = 0;
     s->shut = s->left = 0;
-    snprintf(s->peer, sizeof s->peer, "%.63s", peer); /* an address: shorter */
+    snprintf(s->peer, sizeof s->peer, "%.63s", peer); /* an address is shorter */
     if (native && s->out == NULL) s->out = malloc(pump->out_cap);
     if (native ? s->out == NULL : session_open_protocol(pump, s) != SH_OK) {
         source_report(pump->links->source, CMD_E_REFUSED, "no memory for a session");
@@ -70,7 +70,7 @@ uint64_t session_off_tick(const struct pump *pump, const struct session *s)
     return stream_off_tick(pump->stream, s->cursor > s->power_from ? s->cursor : s->power_from);
 }
 
-/* No command comes from it any more: control is given back, once. */
+/* The session sends no more commands: gives its control back, once. */
 static void leave(struct pump *pump, struct session *s)
 {
     const struct command_lines *lines = &s->commands.lines;
@@ -89,7 +89,7 @@ void session_close(struct pump *pump, struct session *s)
     leave(pump, s);
 }
 
-/* Lines that wait for a step, a move or room are carried out first. */
+/* Leaves after the lines that wait for a step, a move or room are carried out. */
 static void leave_when_done(struct pump *pump, struct session *s)
 {
     const struct session_commands *c = &s->commands;
@@ -102,7 +102,8 @@ void session_shut(struct pump *pump, struct session *s)
     if (s->open) leave_when_done(pump, s);
 }
 
-/* Its own protocol owes nothing once the head waits for a command, and the stream up to there is out. */
+/* Whether something is still due to the client. In the native protocol nothing is once the head waits for a command and
+ * the stream up to that tick is written. */
 static int owes(const struct pump *pump, const struct session *s)
 {
     const struct loop_source *source = pump->links->source;
@@ -117,11 +118,11 @@ int session_is_done(const struct pump *pump, const struct session *s)
     return s->hang_up || (s->shut && !owes(pump, s));
 }
 
-/* One tick into the buffer. Returns 0 when there is none or no room. */
+/* Puts one tick into the buffer. Returns 0 when there is none or no room. */
 static int take_tick(struct pump *pump, struct session *s)
 {
     struct ring *ring = &pump->stream->ring;
-    uint32_t end = s->out_len + REPLY_ROOM / 8; /* leaves room for a frame that says what was lost */
+    uint32_t end = s->out_len + REPLY_ROOM / 8; /* leaves room for an event that announces a loss */
     if (end >= pump->out_cap || session_waits_for_files(pump, s)) return 0;
     struct ring_copy tick = {.buf = s->out + s->out_len, .cap = pump->out_cap - end};
     enum ring_read got = ring_read(ring, s->reader, s->cursor, &tick);
@@ -141,7 +142,7 @@ static int take_tick(struct pump *pump, struct session *s)
     return 1;
 }
 
-/* Replies into the buffer; what has no room now comes with the next. */
+/* Puts the replies into the buffer; without room for them, they come next time. */
 static void take_replies(struct pump *pump, struct session *s)
 {
     struct session_commands *c = &s->commands;
@@ -151,7 +152,8 @@ static void take_replies(struct pump *pump, struct session *s)
     c->reply_len = 0;
 }
 
-/* The frames of a step go out before its reply, on all links: whoever has the reply finds them in each client's socket. */
+/* The frames of a step go out on all links before its reply: when a client has the reply, they are in each client's
+ * socket. */
 static int has_stepped(const struct pump *pump, const struct session *s)
 {
     const uint64_t tick = s->commands.step_tick;
@@ -174,13 +176,13 @@ void session_fill(struct pump *pump, struct session *s)
         pump_take_lines(pump, s);
     }
     pump_end_move(pump, s);
-    pump_take_lines(pump, s); /* those that waited for room */
+    pump_take_lines(pump, s); /* lines that waited for room */
     take_replies(pump, s);
     leave_when_done(pump, s);
     stream_move_reader(pump->stream, s->reader, s->cursor);
 }
 
-/* What is written next goes up to here: replies and frames go into messages of their own, where there are messages. */
+/* The end of what is written next. On a link with messages, replies and frames go into messages of their own. */
 static uint32_t write_to(const struct pump *pump, const struct session *s)
 {
     if (!pump->ops->messages) return s->out_len;

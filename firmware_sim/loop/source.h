@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* What the loop serves: a head that computes, or a recording that is replayed.
+/* The contract of a source, which the loop serves: a head that computes, or a recording that is replayed.
  *
- * In: command lines of sessions. Out: their replies; and, where it makes its ticks itself, the frames of each. The head
- * is device_source.c: casters compute its ticks. A recording is firmware_sim/replay: one thread takes its ticks as they
- * are (player.h), with their numbers, and the stream leaves them so. */
+ * In: command lines of sessions. Out: their replies; and, where the source makes its ticks itself, the frames of each.
+ * The head is device_source.c: casters compute its ticks. A recording is firmware_sim/replay: one thread takes its
+ * ticks (player.h). Their frames keep their numbers in the stream. */
 #ifndef FIRMWARE_SIM_LOOP_SOURCE_H
 #define FIRMWARE_SIM_LOOP_SOURCE_H
 
@@ -12,8 +12,8 @@
 
 enum loop_source_tick { LOOP_SOURCE_OVER = -1, LOOP_SOURCE_IDLE, LOOP_SOURCE_TICK };
 
-/* self is the source's own. Any thread, where nothing else is said. What the functions do that have the name of one of
- * the device's, device.h says. */
+/* self is the source's own. Any thread, unless a member says otherwise. Members named like a function of device.h do
+ * what that function does. */
 struct loop_source_ops {
     /* ---- sessions */
     void (*command)(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out);
@@ -40,7 +40,7 @@ struct loop_source_ops {
     /* The run begins, with the thread that paces it. */
     int (*power_up)(void *self, int64_t now_ns, const char **warning, struct sh_err *err);
     void (*end)(void *self);
-    /* In the paces that wait, time waits while this is so: files that the source writes are behind. No lock is taken. */
+    /* True while files that the source writes are behind. In the paces that wait, time waits. Takes no lock. */
     int (*files_fill)(const void *self);
     /* After all threads have ended: writes these files to their end. */
     int (*close_files)(void *self, struct sh_err *err);
@@ -49,11 +49,11 @@ struct loop_source_ops {
     /* No tick has more bytes. */
     uint32_t (*most_bytes)(const void *self);
     uint32_t (*usual_bytes)(const void *self);
-    /* What clients that join before the first tick need: descriptor, emitter, anchor. */
+    /* Descriptor, emitter and anchor, for clients that join before the first tick. */
     void (*describe)(void *self, struct ring_tick *tick);
-    /* The next tick, number `tick`. Its bytes stay until the next call. OVER: the run ends before it. IDLE: nothing
-     * happens without a command; only where `may_idle`. again: the frames of the tick before could not be sent; they
-     * go before those of this one. */
+    /* Makes the next tick, number `tick`. Its bytes stay until the next call. OVER: the run ends before it. IDLE:
+     * nothing happens without a command; returned only where `may_idle`. again: the frames of the tick before could not
+     * be sent; they go before those of this one. */
     enum loop_source_tick (*next)(void *self, uint64_t tick, int may_idle, int again, struct ring_tick *out);
 };
 

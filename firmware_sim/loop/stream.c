@@ -11,8 +11,8 @@ static const int64_t PATIENCE_NS = 2000000000;
 int stream_create(struct stream *stream, const struct ring_size *size, int64_t tick_ns, struct sh_err *err)
 {
     stream->tick_ns = tick_ns;
-    /* Real time: casters keep most of the time ahead, as they may have to wait for a processor. In the paces that wait
-     * some threads fill the queue while others empty it. */
+    /* In real time casters are woken early, so that most of the time ahead is left if they have to wait for a
+     * processor. In the paces that wait, some threads fill the queue while others empty it. */
     stream->say_ticks = 1 + (stream->waits ? size->queue_ticks / 4 : size->ahead_ticks / 8);
     stream->lazy_ticks = 1 + size->queue_ticks / 8;
     atomic_store(&stream->wanted, UINT64_MAX);
@@ -29,7 +29,7 @@ void stream_free(struct stream *stream)
     bell_free(&stream->pace);
 }
 
-/* Real time: those that wait for this tick. */
+/* Real time: wakes the listeners that wait for this tick. */
 static void wake_readers(struct stream *stream, uint64_t tick, int frames)
 {
     for (uint32_t i = 0; i < stream->n_listeners; i++) {
@@ -50,7 +50,7 @@ static void wake_casters(struct stream *stream)
     stream->unsaid = 0;
 }
 
-/* The paces that wait: readers must see empty ticks pass, too. */
+/* In the paces that wait, readers must see empty ticks pass, too. */
 static void say_released(struct stream *stream)
 {
     if (stream->unsaid == 0) return;
@@ -120,7 +120,7 @@ static void complete_event(struct stream *stream, uint8_t *frame, const struct n
     native_encode_event(frame, native_frame_len(frame), &event, header->t_ns, header->flags);
 }
 
-/* Lost is what was cast and not delivered. It is known here: all ticks before were released or lost. */
+/* Lost pulses were cast and not delivered. They are known here: all ticks before were released or lost. */
 static void complete_counts(struct stream *stream, uint8_t *frame)
 {
     struct native_header header;
@@ -144,7 +144,7 @@ static void count(struct stream *stream, const struct ring_tick *tick, int64_t n
     atomic_store(&stream->last_pulse_ns, now_ns);
 }
 
-/* Power that goes leaves a line without its end. */
+/* When power goes, the line at hand has no end. */
 static void pass_power(struct stream *stream, uint64_t tick)
 {
     while (stream_power_tick(stream, stream->power_passed) <= tick) {
@@ -189,7 +189,7 @@ int stream_lose(struct stream *stream, uint64_t tick)
     return 1;
 }
 
-/* Either this thread sees that the tick became ready, or who made it sees that it is awaited. */
+/* Either this thread sees that the tick became ready, or its caster sees that the tick is awaited. */
 void stream_await(struct stream *stream, uint64_t tick, int64_t until_ns)
 {
     atomic_store(&stream->awaited, tick);
@@ -216,13 +216,13 @@ void stream_wait_for_casters(struct stream *stream)
     bell_sleep(&stream->pace);
 }
 
-/* A reader that came to `wanted` rings; one that comes less far rings before it sleeps. */
+/* A reader that gets to `wanted` rings at once; one that does not rings before it sleeps. */
 void stream_wait_for_readers(struct stream *stream, uint64_t tick)
 {
     say_released(stream);
     atomic_store(&stream->wanted, tick + 2 - stream->ring.queue_ticks + stream->ring.queue_ticks / 4);
     if (stream_has_room(stream, tick)) {
-        /* it went on meanwhile */
+        /* the reader went on meanwhile */
     } else if (!atomic_load(&stream->ending)) {
         bell_sleep(&stream->pace);
     } else if (bell_sleep_until(&stream->pace, clock_now_ns() + PATIENCE_NS)) {
@@ -261,7 +261,7 @@ int stream_wake_at(struct stream *stream, struct stream_listener *listener, int 
     return tick < stream_released(stream) || (frames && !wanted);
 }
 
-/* The flag is taken back, so that each wake-up is one; who still waits sets it again. */
+/* Clears the flag, so that a listener is woken once; one that still waits sets it again. */
 static void wake_steppers(struct stream *stream)
 {
     for (uint32_t i = 0; i < stream->n_listeners; i++)
@@ -275,7 +275,7 @@ void stream_set_reader(struct stream *stream, int reader, uint64_t cursor, int a
     atomic_store(&stream->reader[reader].cursor, cursor);
     atomic_store(&stream->reader[reader].written, cursor);
     stream_rest_reader(stream);
-    wake_steppers(stream); /* one that is gone is not waited for */
+    wake_steppers(stream); /* nobody waits for a reader that is gone */
 }
 
 void stream_move_reader(struct stream *stream, int reader, uint64_t cursor)
@@ -294,7 +294,7 @@ void stream_note_written(struct stream *stream, int reader, uint64_t cursor)
 
 int stream_has_written(struct stream *stream, struct stream_listener *listener, int reader, uint64_t tick)
 {
-    /* The flag before the look: who writes meanwhile sees the flag, or is seen. */
+    /* Set the flag before looking: a reader that writes meanwhile either sees the flag, or is seen here. */
     atomic_store(&listener->wants_written, 1);
     for (int i = 0; i < STREAM_HASH_READER; i++) {
         const struct stream_reader *r = &stream->reader[i];

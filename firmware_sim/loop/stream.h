@@ -1,20 +1,20 @@
 /* SPDX-License-Identifier: MIT */
-/* The stream: what casters, the pacing thread and readers share while the loop runs.
+/* The stream, which casters, the pacing thread and readers share while the loop runs.
  *
  * In: ticks that casters filled (ring.h). Out: the native frames of each released tick, numbered, for every
  * reader at its own speed. Readers are the sessions of links (pump.h) and the hash of the stream (hash.c).
  *
- * The stream holds the ring, how far each reader is, the number of the next frame, what is counted at
+ * The stream holds the ring, how far each reader is, the number of the next frame, the counts that are made at
  * release, the time that a peer granted (pace step), and all wake-ups. It knows nothing of casting, of links
  * or of commands.
  *
- * Who is woken, and when. In real time a link is woken at each tick that it wants; casters once an eighth of the ticks
+ * Wake-ups. In real time a link is woken at each tick that it wants. Casters are woken once an eighth of the ticks
  * ahead is free, and the hash once an eighth of the queue was released: they have time. In the paces that wait for
- * readers nobody waits for a single tick. There wake-ups are saved up, and ticks pass from thread to thread in
- * batches. One rule keeps that from standing still: who is about to sleep first wakes all who may go on by what it
- * did. Casters say what they made before they sleep, the pacing thread what it released, readers how far they are.
- * So while all sleep, each has seen all that the others did, and nobody can go on: there is nothing to do. Batches
- * change when a tick is read, never its bytes.
+ * readers, wake-ups are saved up, since nobody waits for a single tick, and ticks pass from thread to thread in
+ * batches. One rule prevents a deadlock: a thread that is about to sleep first wakes all threads that can go on by its
+ * work. Casters announce the ticks that they made, the pacing thread those that it released, readers how far they are.
+ * So when all threads sleep, each has seen all work of the others, and there is nothing to do. Batches change when a
+ * tick is read, never its bytes.
  *
  * Units: ticks from power-up, device time in ns. */
 #ifndef FIRMWARE_SIM_LOOP_STREAM_H
@@ -43,24 +43,24 @@ struct stream_reader {
     _Atomic uint64_t written; /* its link has taken all bytes before this tick */
 };
 
-/* An eventfd that is written to when something was released: a tick with frames, and any tick from wake_tick on. */
+/* An eventfd that is written to when a tick with frames was released, or any tick from wake_tick on. */
 struct stream_listener {
     int fd;
     _Atomic int wants_frames;
     _Atomic uint64_t wake_tick; /* UINT64_MAX: none */
     _Atomic int wants_written;  /* step: a reply waits until other readers have written what was granted */
     /* of the pacing thread alone */
-    uint64_t every, quiet_until; /* so many ticks lie between two writes, at least; the first that may have one */
-    int pending;                 /* something that it wants was released since the last write */
+    uint64_t every, quiet_until; /* least ticks between two writes; the first tick that may have the next one */
+    int pending;                 /* a tick that it wants was released since the last write */
 };
 
 struct stream {
     struct ring ring;
-    struct kept kept; /* what a client that joins needs first */
+    struct kept kept; /* the frames that a client needs first when it joins */
     int64_t tick_ns;
     uint32_t tick_bytes; /* no tick is longer */
     int waits;           /* paces fast and step: release waits for casters and readers, and nothing is lost */
-    int as_they_are;     /* frames have their numbers, and nothing in them is completed */
+    int as_they_are;     /* frames are recorded: numbered already, and complete */
     int steps;           /* pace step: clients let time pass, also while the head has no power */
     struct device_counters *counters;
     struct stream_reader reader[RING_MAX_READERS];
@@ -72,7 +72,7 @@ struct stream {
     struct stream_scan {
         uint32_t number;
         uint64_t delivered; /* pulses */
-    } scan[STREAM_SCANS];   /* the last ones, at number % STREAM_SCANS: an end may be said when the next one is on */
+    } scan[STREAM_SCANS];   /* the last ones, at number % STREAM_SCANS: an end may be reported during the next scan */
     _Atomic int64_t first_pulse_ns, last_pulse_ns; /* when released; 0: not yet */
 
     /* A power cycle on request (device_work.power): ticks with which power goes and comes, in turn. Number i is at i %
@@ -80,12 +80,12 @@ struct stream {
     _Atomic uint64_t power_tick[STREAM_POWER_TICKS];
     _Atomic uint32_t n_power;
     /* of the pacing thread alone */
-    uint32_t power_passed; /* of these, so many were released */
-    int wakes_all;         /* one was since the last wake-up: links without clients are to know, too */
+    uint32_t power_passed; /* how many of these were released */
+    int wakes_all;         /* power changed since the last wake-up: links without clients are woken, too */
 
     _Atomic uint64_t granted;    /* step: ticks that may pass */
     _Atomic uint64_t granted_ns; /* step: the sum of all grants */
-    _Atomic int ending;          /* the run is to end: readers that stand still are not waited for any longer */
+    _Atomic int ending;          /* the run is to end: nobody waits any longer for readers that stand still */
     _Atomic int over;            /* nothing will be released any more */
 
     struct bell work;         /* for casters: a tick may be claimed */
@@ -93,8 +93,8 @@ struct stream {
     _Atomic uint64_t awaited; /* real time: the pacing thread waits for this late tick; UINT64_MAX: for none */
     _Atomic uint64_t wanted; /* the pacing thread sleeps until a reader has come to this tick; UINT64_MAX: it doesn't */
     /* of the pacing thread alone */
-    uint64_t unsaid;     /* ticks released since casters were last woken; in the paces that wait: since anybody was */
-    uint64_t say_ticks;  /* after so many they are woken */
+    uint64_t unsaid;     /* ticks released since casters, or in the paces that wait any thread, were woken */
+    uint64_t say_ticks;  /* casters are woken after so many */
     uint64_t lazy_ticks; /* an eighth of the queue */
     uint32_t n_casters;
     struct stream_listener listener[STREAM_MAX_LISTENERS];
@@ -121,27 +121,26 @@ void stream_wait_for_casters(struct stream *stream);
 /* Waits until a reader went on. Once the run is to end, readers that stand still for 2 s hold back nothing
  * any more. */
 void stream_wait_for_readers(struct stream *stream, uint64_t tick);
-/* Waits a while for files of the source that are behind. A disk rings no bell: so it is looked at again and again. */
+/* Waits STREAM_FILES_NS for files of the source that are behind. A disk wakes nobody, so the caller looks again. */
 void stream_wait_for_files(struct stream *stream);
 /* Nothing more will be released. */
 void stream_end(struct stream *stream);
 
 /* ---- readers */
-/* An eventfd to be written to when frames were released, in real time at most once in `every` ticks; and at the end.
- * Returns its listener. Before the pacing thread starts. */
+/* Adds an eventfd that is written to when frames were released, in real time at most once in `every` ticks; and at the
+ * end. Returns its listener. Before the pacing thread starts. */
 struct stream_listener *stream_listen(struct stream *stream, int fd, uint64_t every);
-/* frames: whether frames are to wake it from now on. And from this tick on every tick's release does, until it is told
- * otherwise. Returns 1 when nobody may have written for what it wants: that tick was released already, or it did not
- * want frames before. */
+/* Sets what wakes a listener from now on: frames, where `frames` is 1, and the release of each tick from `tick` on.
+ * Returns 1 when it must look for itself once: that tick was released already, or frames did not wake it before. */
 int stream_wake_at(struct stream *stream, struct stream_listener *listener, int frames, uint64_t tick);
 /* A reader begins (active) or ends, and has read everything before a tick. */
 void stream_set_reader(struct stream *stream, int reader, uint64_t cursor, int active);
-/* It has read everything before a tick, and goes on. */
+/* A reader has read everything before a tick, and goes on. */
 void stream_move_reader(struct stream *stream, int reader, uint64_t cursor);
-/* Its link has taken all bytes before a tick. Wakes those that wait for it (stream_has_written). */
+/* A reader's link has taken all bytes before a tick. Wakes listeners that wait for that (stream_has_written). */
 void stream_note_written(struct stream *stream, int reader, uint64_t cursor);
-/* Pace step: whether all active readers but `reader` have written everything before a tick. Where one has not, the
- * listener is woken once one of them has written what was granted, and asks again. The hash writes nothing. */
+/* Pace step: whether all active readers but `reader` have written everything before a tick. If not, the listener is
+ * woken once one of them has written what was granted; then it asks again. The hash does not count. */
 int stream_has_written(struct stream *stream, struct stream_listener *listener, int reader, uint64_t tick);
 /* A reader is about to sleep: what it read may let the pacing thread go on. */
 void stream_rest_reader(struct stream *stream);
@@ -152,7 +151,7 @@ void stream_wait_for_work(struct stream *stream);
 void stream_power(struct stream *stream, uint64_t tick);
 /* Some ticks are ready: the pacing thread looks again. Not needed in real time. */
 void stream_say_ready(struct stream *stream);
-/* Real time: this tick is ready. The pacing thread is woken if that one is late, and it waits for it. */
+/* Real time: this tick is ready. Wakes the pacing thread if it waits for this tick because it is late. */
 void stream_say_late(struct stream *stream, uint64_t tick);
 
 /* ---- any thread */

@@ -10,11 +10,11 @@
 
 struct worker {
     const struct site *site; /* as it is for the tick at hand */
-    struct ring_tick tick;   /* what was made of the tick at hand */
+    struct ring_tick tick;   /* the result for the tick at hand */
     uint32_t cap;            /* of tick.bytes */
     struct ring_mark mark[RING_MAX_MARKS];
     struct caster *caster;
-    struct cast_counters counted; /* of the caster, as far as slots have them */
+    struct cast_counters counted; /* the caster's counters, as far as slots have them */
     struct line_block block;
     struct cast_setup setup;
     uint32_t setup_station; /* 1 + the station that setup is for; 0: none yet */
@@ -28,7 +28,7 @@ struct worker {
 
 enum {
     MAX_DT_NS = (1 << 24) - 1, /* a point's time within its frame has 24 bits */
-    OVERHEAD_BYTES = 24576,    /* events, descriptor, anchor, names, telemetry of one tick, generously */
+    OVERHEAD_BYTES = 24576,    /* upper bound of events, descriptor, anchor, names and telemetry in one tick */
     LINE_END_BYTES = 128,
 };
 
@@ -194,7 +194,7 @@ static void take_poses(struct worker *worker, const struct device_work *work)
     added(worker, native_encode_poses(end_of(worker), room_of(worker), worker->pose, setup->n_knots, work->t_ns, 0));
 }
 
-/* An anchor for the points that follow, which are about another place (site_georef). */
+/* Writes an anchor: the points that follow are relative to another place (site_georef). */
 static void move_anchor(struct worker *worker, const struct device_work *work, size_t stretch)
 {
     struct native_anchor anchor;
@@ -220,7 +220,7 @@ static uint64_t enter_stretch(struct worker *worker, const struct device_work *w
     return next < end ? next : end;
 }
 
-/* What a cast has added to the caster's counters. */
+/* Adds to the tick what a cast has added to the caster's counters. */
 static void count_hits(struct worker *worker, uint32_t echoes)
 {
     struct cast_counters now, *was = &worker->counted;
@@ -267,7 +267,7 @@ static void cast_run(struct worker *worker, const struct device_work *work, cons
     }
 }
 
-/* Of the axes at a pulse. */
+/* The angles of the axes at a pulse, in turns. */
 static void find_angles(const struct device_work *work, uint64_t k, double *mirror_turn, double *pan_turn)
 {
     const struct schedule_segment *seg = &work->segment;
@@ -293,7 +293,7 @@ static void end_line(struct worker *worker, const struct device_work *work, cons
     int partial = end < line->pulse_end;
     uint64_t cast_end = line->cast_end < end ? line->cast_end : end;
     uint64_t cast_here = cast_end > line->cast0 ? cast_end - line->cast0 : 0;
-    uint64_t last = end > seg->k0 ? end - 1 : end; /* stopped right after a change of settings: no pulse is nearer */
+    uint64_t last = end > seg->k0 ? end - 1 : end; /* stopped right after a change of settings: use pulse `end` */
     double mirror_turn, pan_turn;
     find_angles(work, last, &mirror_turn, &pan_turn);
     if (setup->detect != NULL && setup->detect->instrument != NULL)
@@ -329,7 +329,7 @@ static void fill_pulses(struct worker *worker, const struct device_work *work)
         worker->stretch = SIZE_MAX;
     }
     worker->anchored = work->stretch;
-    worker->setup.sight = worker->site->station[work->station].sight; /* made anew since the station's last scan */
+    worker->setup.sight = worker->site->station[work->station].sight; /* it may be new since the last scan */
     worker->setup.echoes = (enum beam_select)work->echoes;
     site_set_program(work->site, work->prr_uhz, &worker->setup);
     worker->setup.upset = work->upset.on ? &work->upset.cast : NULL;
@@ -346,7 +346,7 @@ static void fill_pulses(struct worker *worker, const struct device_work *work)
         worker->tick.n_fired += part.end - k;
         if (part.end == part.line.pulse_end) end_line(worker, work, &part.line, part.end);
     }
-    if (worker->site->moving && work->pulse_end > work->pulse0) /* in the blind part of a line, too */
+    if (worker->site->moving && work->pulse_end > work->pulse0) /* also in the blind part of a line */
         move_anchor(worker, work, site_stretch_at(worker->site, schedule_time_ns(&work->segment, work->pulse_end - 1)));
     if (!work->cut_short) return;
     /* The line that was stopped. Its pulses are in this tick or in earlier ones. */

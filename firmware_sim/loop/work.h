@@ -15,7 +15,7 @@ struct worker;
 int worker_create(const struct site *site, struct worker **out, struct sh_err *err);
 void worker_free(struct worker *worker);
 
-/* Bytes of the busiest tick that the profile allows, all pulses with as many echoes as there can be. */
+/* Bytes of the busiest tick that the profile allows, where each pulse has as many echoes as it can. */
 uint32_t worker_tick_bytes(const struct site *site);
 /* Bytes of a usual tick at the settings of power-up: the pulses of a tick with one echo each. */
 uint32_t worker_usual_bytes(const struct site *site);

@@ -65,8 +65,8 @@ void recording_stats(const struct recording *r, struct scanhead_stats *stats)
     scanhead_get_stats(r->stream, stats);
 }
 
-/* A frame that has a time of its own says when those before it went out: not later. Where a scan was stopped, the event
- * that follows its last line went out with it. */
+/* A frame with a time of its own bounds the times of frames before it: they did not go out later. Where a scan was
+ * stopped, the event after its last line went out with that line. */
 static void settle(struct recording *r, const struct timing_moment *by, int is_event)
 {
     for (uint32_t i = 0; i < r->n; i++) {

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* A recording, frame by frame, with the time at which the head released each.
  *
- * In: a file of the native protocol's frames (.shs, .pcapng), read by the client library. Out: its frames as they are, in
- * their order. What the library leaves out is counted: frames that came twice or too late, bytes that are no frame. Of the
- * file only the frames that wait for their time (timing.h) are in memory. One thread. */
+ * In: a file of the native protocol's frames (.shs, .pcapng), read by the client library. Out: its frames as they are,
+ * in their order. Frames that came twice or too late, and bytes that are in no frame, are left out and counted. Only
+ * the frames that wait for their time (timing.h) are in memory. One thread. */
 #ifndef FIRMWARE_SIM_REPLAY_RECORDING_H
 #define FIRMWARE_SIM_REPLAY_RECORDING_H
 
@@ -15,7 +15,7 @@ enum { RECORDING_QUEUE = 256 };
 struct recording_frame {
     const uint8_t *bytes; /* the recording's, until the next call */
     uint32_t len;
-    int64_t t_ns;  /* device time of the recording in the tick at whose end it was released */
+    int64_t t_ns;  /* the recording's device time: a moment in the tick at whose end it was released */
     int restarted; /* another head, or another recording, begins with it: device time may be any */
 };
 
@@ -35,20 +35,20 @@ struct recording {
     /* frames that wait, item i at i % RECORDING_QUEUE */
     struct recording_item item[RECORDING_QUEUE];
     uint32_t first, n;
-    int64_t last_t_ns, first_t_ns; /* of the frame given last; of the first one that has a time, once it was given */
+    int64_t last_t_ns, first_t_ns; /* of the last frame that was given; of the first with a time, once it was given */
     int has_first;
     int at_end, restarted;
 };
 
-/* Opens the file as a stream of the client library. A path such as tcp:1.shs is a file here. */
+/* Opens the file as a stream of the client library. Even a path such as tcp:1.shs names a file here. */
 int recording_open_file(const char *path, struct scanhead **stream, struct sh_err *err);
 /* recording: zeros. SH_EINPUT, SH_EFORMAT, SH_EIO with the path. recording_close is needed after a failure, too. */
 int recording_open(struct recording *recording, const char *path, struct sh_err *err);
-/* From the beginning again. */
+/* Starts again at the beginning. */
 int recording_rewind(struct recording *recording, struct sh_err *err);
 /* 1: *frame is the next one; 0: there is no more; or an error. */
 int recording_next(struct recording *recording, struct recording_frame *frame, struct sh_err *err);
-/* What was left out so far. */
+/* Counts of what was left out so far. */
 void recording_stats(const struct recording *recording, struct scanhead_stats *stats);
 void recording_close(struct recording *recording);
 

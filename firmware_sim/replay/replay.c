@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Ticks of a recording: which frames go out with which. */
+/* Ticks of a recording: assigns each frame to a tick. */
 #include "firmware_sim/replay/replay.h"
 
 #include <math.h>
@@ -12,7 +12,7 @@
 
 enum { MOST_BYTES = 1 << 20, USUAL_MOST_BYTES = 1 << 17, NATIVE_RATE_BYTES = 2 * NATIVE_POINT_LEN };
 static const uint32_t SEQ_BACK = UINT32_C(1) << 30; /* a reader takes that for another sequence (PROTOCOL.md) */
-static const int64_t BACK_NS = 1000000000; /* what comes so much earlier than the frame before is of another head */
+static const int64_t BACK_NS = 1000000000; /* a frame this much earlier than the one before is of another head */
 
 /* ---- the frames */
 
@@ -31,7 +31,7 @@ static void fail(struct replay *r, const struct sh_err *err)
     pthread_mutex_unlock(&r->lock);
 }
 
-/* The next frame of the range into r->frame: 1. 0: there is none; -1: it can't be read, which is said. */
+/* Reads the next frame of the range into r->frame. 1: done; 0: there is none; -1: it failed, which is reported. */
 static int look(struct replay *r)
 {
     struct sh_err err = {0};
@@ -52,7 +52,7 @@ static int look(struct replay *r)
     return 1;
 }
 
-/* Its number, as it is sent. Those that are for one reader have none. */
+/* Gives a frame the sequence number with which it is sent. Frames for one reader alone have none. */
 static void renumber(struct replay *r, uint8_t *frame)
 {
     struct native_header header;
@@ -75,7 +75,8 @@ static void add(struct replay *r, const uint8_t *frame, uint32_t len, uint64_t t
     pthread_mutex_unlock(&r->lock);
 }
 
-/* Who listens knows nothing of what was passed over: it is told what the head was there, as a reader that joins is. */
+/* Readers have not seen the frames that were skipped. So they get descriptor, emitter and anchor, like a reader that
+ * joins late. */
 static void add_front(struct replay *r, uint64_t tick)
 {
     uint8_t frame[REPLAY_FRONT_ROOM];
@@ -90,7 +91,7 @@ static void add_front(struct replay *r, uint64_t tick)
 
 /* ---- time */
 
-/* Frames are counted anew from this tick on: the first of a time, or of another head within the recording. */
+/* Counts frames anew from this tick on: it is the first tick of a time, or of another head within the recording. */
 static void rebase(struct replay *r, uint64_t tick)
 {
     r->start_tick = tick;
@@ -149,14 +150,14 @@ static void begin(struct replay *r, uint64_t tick)
     if (r->has_skipped && r->frame.bytes[1] != NATIVE_DESCRIPTOR) add_front(r, tick);
 }
 
-/* The frames of a tick. may_skip: time without frames passes at once. */
+/* Fills a tick with its frames. may_skip: time without frames passes at once. */
 static void fill(struct replay *r, uint64_t tick, int may_skip)
 {
     int found;
     while ((found = look(r)) == 1) {
         const uint64_t due = due_tick(r, tick);
         if (due > tick && !(may_skip && r->len == 0)) return;
-        if (due > tick) r->start_tick -= due - tick;    /* modulo 2^64, as the sum in due_tick() is */
+        if (due > tick) r->start_tick -= due - tick;    /* may wrap below 0: due_tick() wraps back */
         if (r->len + r->frame.len > MOST_BYTES) return; /* the rest comes with the next tick */
         add(r, r->frame.bytes, r->frame.len, tick);
         r->has_frame = 0;
@@ -167,10 +168,10 @@ static void fill(struct replay *r, uint64_t tick, int may_skip)
 /* ---- the source */
 
 struct wishes {
-    int over, starts, idle; /* idle: nothing is played, and nothing is to be said of it */
+    int over, starts, idle; /* idle: nothing is played, and time need not pass */
 };
 
-/* A time that begins waits for frames that are late already. */
+/* is_late: frames of the tick before are still to be sent. A new time of playing, and the run's end, wait for them. */
 static struct wishes take_wishes(struct replay *r, uint64_t tick, int is_late)
 {
     struct wishes wishes;
@@ -366,7 +367,7 @@ int replay_open(struct config *cfg, const struct replay_options *options, struct
     r->n_ticks = (uint64_t)ceil(options->duration_s * cfg->loop.tick_hz);
     r->end_tick = options->duration_s > 0.0 && !options->start ? r->n_ticks : UINT64_MAX;
     r->wants_start = options->start;
-    for (uint32_t i = 0; i < cfg->n_links; i++) /* each of these opens a session for itself */
+    for (uint32_t i = 0; i < cfg->n_links; i++) /* such a link opens a session for itself */
         r->n_clients -= cfg->link[i].type == LINK_FILE || cfg->link[i].type == LINK_NULL;
     r->ends_then = options->start && !options->loop;
     r->bytes = malloc(MOST_BYTES + REPLAY_FRONT * REPLAY_FRONT_ROOM);

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* A recording as what the loop serves (loop/source.h): the same bytes, with the timing that they had.
+/* A recording as a source of the loop (loop/source.h): the same bytes, with the timing that they had.
  *
  * In: a recording, and commands of clients. Out: ticks with its frames. It is played when a client commands SCAN:STARt, or
  * at once; SCAN:STARt begins it anew at any time. Queries are answered from its descriptor, and no setting changes.
  *
- * The first time that it is played, each frame has the bytes that were recorded. Each further time it is another
- * sequence: numbers go back by 2^30 from where they were, which a reader takes for a head that was started again. All
- * else is as it was recorded, device times, too.
+ * The first time that it is played, each frame has the bytes that were recorded. Each further time the sequence numbers
+ * of frames go back by 2^30; a reader takes that for a head that was started again. All else is as it was recorded,
+ * device times, too.
  *
  * Threads: next() belongs to the player; commands come from links. One lock, held for microseconds; files are read
  * without it. */
@@ -19,19 +19,19 @@ struct replay;
 
 struct replay_options {
     const char *path;
-    double speed;                   /* > 0; 1 but in the pace realtime */
+    double speed;                   /* > 0; 1 in all paces but realtime */
     double from_s, to_s;            /* device time since the recording's first frame; to_s 0: up to its end */
     int loop;                       /* at its end it begins anew */
     int start;                      /* play at once; and end the run at the end, unless loop */
     uint32_t clients;               /* with start: once so many clients are there; 0: at once */
-    double duration_s;              /* > 0: end the run after that time; with start: from when it begins to be played */
+    double duration_s;              /* > 0: end the run after that time; with start: after that time of playing */
     const char *truth;              /* file for the faults that are injected; NULL: none */
     const struct sh_report *report; /* warnings while it is played, from the player's thread */
 };
 
-/* Opens the recording and reads it up to its first anchor. cfg: links, loop and faults count; its profile and settings
- * become those of the recording, as far as links need them. Both must live until replay_free. SH_EINPUT: faults in the
- * head, or links of another protocol; SH_EFORMAT: the file has no descriptor. */
+/* Opens the recording and reads it up to its first anchor. Of cfg, links, loop and faults are used; its profile and
+ * settings are set from the recording, as far as links need them. Both must live until replay_free. SH_EINPUT: faults
+ * in the head, or links of another protocol; SH_EFORMAT: the file has no descriptor. */
 int replay_open(struct config *cfg, const struct replay_options *options, struct replay **out, struct sh_err *err);
 void replay_free(struct replay *replay);
 
@@ -41,8 +41,8 @@ extern const struct loop_source_ops replay_source; /* self: the struct replay */
 struct replay_summary {
     char idn[96];
     uint32_t times;          /* how often it was begun */
-    uint64_t frames;         /* sent, of all times */
-    uint64_t bad_bytes;      /* of the file, that are in no frame; of the last time */
+    uint64_t frames;         /* frames sent, over all times */
+    uint64_t bad_bytes;      /* bytes of the file that are in no frame, in the last time */
     uint64_t repeated, late; /* frames of the file that were left out, since they came twice or too late */
     int cut;                 /* the file ends within a frame */
 };

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Commands to a recording: queries are answered by its descriptor. */
+/* Commands to a recording: its descriptor answers queries. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -14,7 +14,7 @@ void replay_set_state(struct replay *r, uint64_t tick, enum head_state state)
     r->change[r->n_changes++ % REPLAY_CHANGES] = (struct replay_change){tick, state};
 }
 
-/* As of the last released tick. */
+/* The state at the last released tick. */
 static enum head_state visible_state(const struct replay *r, uint64_t released)
 {
     for (uint32_t i = r->n_changes; i > 0 && i + REPLAY_CHANGES > r->n_changes; i--)
@@ -95,7 +95,7 @@ static void carry_out(struct replay *r, enum command_effect effect)
     if (effect != COMMAND_START && effect != COMMAND_STOP && effect != COMMAND_RESET) return;
     r->wants_start = effect == COMMAND_START;
     r->wants_stop = !r->wants_start;
-    if (r->wants_start) r->options.clients = 0; /* who commands it does not wait for others */
+    if (r->wants_start) r->options.clients = 0; /* a client that commands the start does not wait for others */
 }
 
 void replay_command(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out)

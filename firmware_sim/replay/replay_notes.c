@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What of the frames commands and statistics show: settings, states, counts. */
+/* Takes from the frames what commands and statistics show: settings, states, counts. */
 #include "firmware_sim/replay/replay_state.h"
 
 static void note_event(struct replay *r, const uint8_t *frame, uint64_t tick)
@@ -32,7 +32,7 @@ static void count_line(struct replay *r, const uint8_t *payload, size_t len)
     struct line_end end;
     if (native_decode_line_end(payload, len, &end) != SH_OK) return;
     r->tick.n_lines++;
-    if (end.n_fired > end.n_cast) r->tick.n_fired += end.n_fired - end.n_cast; /* the others were counted */
+    if (end.n_fired > end.n_cast) r->tick.n_fired += end.n_fired - end.n_cast; /* cast ones are counted already */
     r->tick.hits.crowded += end.n_crowded;
     r->tick.hits.faint += end.n_faint;
     r->tick.hits.unfit += end.n_unfit;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Opening: what the recording says of its head, before anything is played. */
+/* Opening: reads the description of the head from the recording, before anything is played. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -18,12 +18,12 @@ void replay_keep_front(struct replay_front *front, const uint8_t *frame)
     const int place = front_place(frame[1]);
     const size_t len = native_frame_len(frame);
     if (place < 0 || len > REPLAY_FRONT_ROOM) return;
-    if (place == 0) front->len[1] = 0; /* another head has another emitter, or none */
+    if (place == 0) front->len[1] = 0; /* a new descriptor: its head has another emitter, or none */
     memcpy(front->bytes[place], frame, len);
     front->len[place] = (uint32_t)len;
 }
 
-/* Up to the first anchor that follows a descriptor, or to the end: the recording may begin anywhere. */
+/* Reads up to the first anchor that follows a descriptor, or to the end: the recording may begin anywhere. */
 static int read_front(struct replay *r, struct sh_err *err)
 {
     struct recording_frame frame;
@@ -43,7 +43,7 @@ static int read_front(struct replay *r, struct sh_err *err)
     return recording_rewind(&r->recording, err);
 }
 
-/* "MAKER,MODEL,SERIAL,REST" into the fields of the configuration that links show to hosts. */
+/* Copies "MAKER,MODEL,SERIAL,REST" into the fields of the configuration that links show to hosts. */
 static void take_identity(struct config *cfg, const char *idn)
 {
     char text[96];
@@ -63,9 +63,9 @@ static void take_identity(struct config *cfg, const char *idn)
             snprintf(cfg->link[i].serial, sizeof cfg->link[i].serial, "%.31s", field[2]);
 }
 
-static const double MOST_UHZ = 1e15; /* 1 GHz: what a recording says may be any number */
+static const double MOST_UHZ = 1e15; /* 1 GHz, since a recording may have any number there */
 
-/* For what links are refused by: the rate of the stream. */
+/* Fills in the rates, since a link that can't carry the stream is refused. */
 static void fill_config(struct replay *r, const struct native_descriptor *d)
 {
     struct config *cfg = r->cfg;

@@ -11,7 +11,7 @@
 
 enum { REPLAY_CHANGES = 32, REPLAY_FRONT = 3, REPLAY_FRONT_ROOM = 2048 };
 
-/* Descriptor, emitter and anchor, as the stream has said them last. */
+/* The last descriptor, emitter and anchor of the stream. */
 struct replay_front {
     uint8_t bytes[REPLAY_FRONT][REPLAY_FRONT_ROOM];
     uint32_t len[REPLAY_FRONT]; /* 0: none */
@@ -31,9 +31,9 @@ struct replay {
     struct command_device cmd;
     int wants_start, wants_stop, ending;
     int wants_again; /* it is to begin anew by itself */
-    int n_clients;   /* beside links that are readers themselves */
+    int n_clients;   /* without links that are readers themselves */
     int ends_then;   /* the run ends when it was played */
-    uint32_t times;  /* begun so far */
+    uint32_t times;  /* how often it was begun so far */
     uint64_t frames; /* sent */
     uint64_t scans, frames_done;
     /* The state of the head that was recorded, by the ticks with which it goes out. Number i is at i % REPLAY_CHANGES. */
@@ -44,20 +44,21 @@ struct replay {
     uint32_t n_changes;
     struct sh_err failure; /* code 0: none */
 
-    /* of the player's thread; until it begins, of whoever opens */
-    uint64_t n_ticks, end_tick; /* that the run lasts; with which it ends: UINT64_MAX: none, or not known yet */
+    /* of the player's thread; until that begins, of the thread that opens */
+    uint64_t n_ticks,
+        end_tick; /* the run's length, and the tick at which it ends; UINT64_MAX: none, or not known yet */
     struct recording recording;
     int64_t first_ns; /* of the recording: device time of its first frame */
     struct replay_front front;
     int playing;         /* changed under the lock */
-    uint64_t start_tick; /* with which it began, or began to be counted anew: */
-    int64_t base;        /* that is this tick of the recording */
+    uint64_t start_tick; /* the tick at which it began, or at which counting began anew */
+    int64_t base;        /* the tick of the recording at start_tick */
     int64_t last;        /* tick of the recording of the frame sent last */
-    uint32_t seq_shift;  /* added to numbers */
-    int has_seq;         /* a frame was sent since power-up; its number, as it was sent, is */
+    uint32_t seq_shift;  /* added to sequence numbers */
+    int has_seq;         /* a frame was sent since power-up; last_seq is its number as it was sent */
     uint32_t last_seq;
     int restarts;              /* the next frame begins another sequence */
-    int in_range, has_skipped; /* of this time: frames are sent; some were passed over before */
+    int in_range, has_skipped; /* this time: frames are being sent; some were skipped before them */
     int has_frame;
     struct recording_frame frame; /* the next one */
     uint8_t *bytes;               /* of a tick */
@@ -65,9 +66,9 @@ struct replay {
     struct ring_tick tick; /* counts */
 };
 
-/* replay_commands.c. With the lock held: the state now. */
+/* replay_commands.c: sets the state from this tick on. With the lock held. */
 void replay_set_state(struct replay *replay, uint64_t tick, enum head_state state);
-/* What the stream says of the head's settings; with the lock held. */
+/* Take the head's settings from frames of the stream. With the lock held. */
 void replay_take_descriptor(struct replay *replay, const struct native_descriptor *descriptor);
 void replay_take_emitter(struct replay *replay, const struct native_emitter *emitter);
 void replay_take_anchor(struct replay *replay, const struct native_anchor *anchor);
@@ -84,7 +85,7 @@ void replay_note_frame(struct replay *replay, const uint8_t *frame, uint64_t tic
 
 /* replay_open.c: reads up to the first anchor, and fills in what links need. */
 int replay_open_recording(struct replay *replay, struct sh_err *err);
-/* Keeps a frame that is one of the front's. */
+/* Keeps a frame if it is a descriptor, an emitter or an anchor. */
 void replay_keep_front(struct replay_front *front, const uint8_t *frame);
 
 #endif

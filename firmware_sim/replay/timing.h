@@ -1,23 +1,23 @@
 /* SPDX-License-Identifier: MIT */
-/* When a head released the frames of a recording.
+/* Finds when a head released the frames of a recording.
  *
- * In: frames of the native protocol, in the order of the stream. Out: for each a device time in the tick at whose end the
- * head released it. Most frames have that in their header. Points have it in their pulses: a head releases whole packets of
- * SCHEDULE_PACKET pulses, counted from the line's first, once the last of the packet has fired. Where a line, or the scan,
- * ends within a packet, a later frame says when.
+ * In: frames of the native protocol, in the order of the stream. Out: for each a device time in the tick at whose end
+ * the head released it. Most frames have that time in their header. For points it follows from their pulses: a head
+ * releases packets of SCHEDULE_PACKET pulses, counted from the line's first, once the last pulse of a packet has fired.
+ * Where a line, or the scan, ends within a packet, a later frame gives the time.
  *
- * Exact as far as the stream says exactly when pulses fire: from the scan's start on until the rates change; after that,
- * and where frames are missing, to a nanosecond. One frame in a million then may be taken for one of the tick beside it.
- * Pure; no allocation. */
+ * The time is exact from the scan's start until the rates change, since the stream then says exactly when pulses fire.
+ * After that, and where frames are missing, it is good to a nanosecond, and about one frame in a million may be
+ * assigned to the tick before or after its own. Pure; no allocation. */
 #ifndef FIRMWARE_SIM_REPLAY_TIMING_H
 #define FIRMWARE_SIM_REPLAY_TIMING_H
 
 #include "drivers/protocol/native.h"
 
 enum timing_kind {
-    TIMING_KNOWN,   /* t_ns is it; frames before it went out by then */
+    TIMING_KNOWN,   /* t_ns; frames before it went out by then */
     TIMING_FOLLOWS, /* as the frame before */
-    TIMING_AT_MOST, /* t_ns, or the time of a later frame that went out earlier */
+    TIMING_AT_MOST, /* t_ns, or the time of a later frame where that is earlier */
     TIMING_STOPS,   /* the last line of a scan that was stopped: the time of the next event or telemetry; else t_ns */
 };
 
@@ -29,7 +29,7 @@ struct timing {
     int knows_line; /* the next line's number, and its first pulse */
     uint32_t next_line;
     uint64_t next_first;
-    uint64_t changed_at; /* first pulse with the rates of now */
+    uint64_t changed_at; /* first pulse at the present rates */
 };
 
 struct timing_moment {

@@ -101,7 +101,7 @@ static int find_zone(const double grid_m[3], const struct georef_place *at, int 
     return 0;
 }
 
-/* How far the furthest corner, at the raster's height 0, is from where its system puts it. */
+/* The largest distance of a corner, at the raster's height 0, from its place in the raster's own system. */
 static int measure_corners(const struct terrain *t, const struct geoframe *frame, double height_m, double *worst_m,
                            struct sh_err *err)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The scene's frame from its GeoTIFF meshes: scene.anchor.source geotiff. */
+/* Finds the scene's frame from its GeoTIFF meshes (scene.anchor.source geotiff). */
 #ifndef FIRMWARE_SIM_SITE_ANCHOR_GEOTIFF_H
 #define FIRMWARE_SIM_SITE_ANCHOR_GEOTIFF_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Beam and optics: looks at the scene as the head does, has core/plan choose, and makes the beams. */
+/* Beam and optics: tries methods on the head's own pulses, lets core/plan choose, and makes the beams. */
 #include "firmware_sim/site/site_inside.h"
 
 #include <math.h>
@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { FOOTPRINT_OPTIONS = 9, MANY_TRIANGLES = 1000000 }; /* so many: progress is reported */
+enum { FOOTPRINT_OPTIONS = 9, MANY_TRIANGLES = 1000000 }; /* MANY_TRIANGLES or more: progress is reported */
 
 /* ---- trying methods */
 
@@ -17,7 +17,7 @@ struct trial {
     struct plan_sample *sample;
 };
 
-/* The sample is to be freed, also after an error. */
+/* The caller frees the sample, also after an error. */
 static int open_trial(struct trial *trial, struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     if (site->scene->n_all > MANY_TRIANGLES) sh_progress(report, "trying methods on the scene", -1.0);
@@ -28,7 +28,7 @@ static int open_trial(struct trial *trial, struct site *site, const struct sh_re
 
 /* ---- beams */
 
-/* Nobody knows the outlines of what textures cut out, and those of copies are not made. */
+/* Why the scene has no outlines; NULL: it has. Textures' cut-outs have none, and those of copies are not made. */
 static const char *has_no_outlines(const struct site *site)
 {
     int cutouts = site->scene->cutout != NULL, copies = site->scene->n_copies > 0;
@@ -78,7 +78,7 @@ static void drop_beam(struct site_station *s, int with_beam)
     s->beam = NULL;
 }
 
-/* The beam of each station, as planned. */
+/* Makes the planned beam of each station. */
 static int apply_beam(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const struct plan_methods *methods = &site->plan.methods;
@@ -98,7 +98,7 @@ static int apply_beam(struct site *site, const struct sh_report *report, struct 
 
 /* ---- the choice of a beam */
 
-/* Footprints for the stations that are looked from; outlines, too, where adaptive. */
+/* Makes footprints for the stations of the look; with `adaptive`, outlines, too. */
 static int make_beams(struct trial *trial, int adaptive, const struct sh_report *report, struct sh_err *err)
 {
     int rc = SH_OK;
@@ -115,7 +115,7 @@ struct beam_choice {
     uint32_t rings;
 };
 
-/* All beams, those of known cost in the order of their cost. */
+/* Lists all beams, those of known cost in the order of their cost. */
 static void list_beams(const struct site *site, struct beam_choice *choice, struct plan_option *option)
 {
     static const uint32_t rings[FOOTPRINT_OPTIONS - 2] = {1, 2, 3, 4, 6, 8, 12};
@@ -168,7 +168,7 @@ static int try_beams(struct site *site, const struct beam_choice *choice, struct
     return rc;
 }
 
-/* The tolerance is an RMS over all echoes; few are at an end of a plane. */
+/* Adds the error at the ends of planes: the tolerance is an RMS over all echoes, and few of these are there. */
 static void say_end_error(const struct plan_methods *methods, struct plan_row *row)
 {
     const size_t used = strlen(row->why);
@@ -192,7 +192,7 @@ static int choose_beam(struct site *site, const struct sh_report *report, struct
     return SH_OK;
 }
 
-/* For `plan` its error is measured, too. */
+/* Takes the beam that the configuration forces. For `plan` its error is measured, too. */
 static int force_beam(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
@@ -220,8 +220,8 @@ static int force_beam(struct site *site, const struct sh_report *report, struct 
 
 /* ---- glass and mirrors */
 
-/* Depths up to the first that holds; where the configuration names one, all of them. Returns whether one
- * holds. */
+/* Tries depths up to the first that holds the tolerance; with a forced depth, all of them. Returns whether one
+ * holds it. */
 static int try_depths(const struct trial *trial, int forced, struct plan_option *option)
 {
     int holds = 0;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "firmware_sim/site/site_inside.h"
 
-/* The sites of a world share them: whoever comes first builds them. */
+/* The sites of a world share the BVHs: the first site builds them. */
 int site_build_bvhs(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     struct site_world *world = site->world;

@@ -7,10 +7,10 @@
 
 #include "firmware_sim/site/site.h"
 
-/* A pane scatters some of what it doesn't pass on, also where a file says that all goes through. */
+/* Limits the share of light through a pane: it scatters some, even where a file says that all goes through. */
 static const double MOST_GLASS = 0.9;
 
-/* A rule about glass or a mirror decides, whatever it says. */
+/* Whether a rule about glass or a mirror fits the surface; its value does not matter. */
 static int is_decided(const struct scene_surface *s, const struct surface_rule *rule, uint32_t n)
 {
     for (uint32_t i = 0; i < n; i++)
@@ -19,10 +19,10 @@ static int is_decided(const struct scene_surface *s, const struct surface_rule *
     return 0;
 }
 
-/* A byte becomes up to four: a control character, or a backslash, which fnmatch and YAML take one half of each. */
+/* A byte becomes up to four: a control character does; so does a backslash, since fnmatch and YAML each halve them. */
 enum { NAME_ROOM = 4 * SCENE_NAME_LEN };
 
-/* A pattern that fits this name alone, as a double-quoted scalar of YAML. */
+/* Writes a pattern that fits this name alone, as a double-quoted scalar of YAML. */
 static void quote(const char *name, char out[NAME_ROOM])
 {
     size_t n = 0;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Colours of points: what output.colour shows, and its limits where the configuration gives none. */
+/* Colours of points: the quantity of output.colour, and its limits where the configuration gives none. */
 #include <math.h>
 #include <stdio.h>
 
@@ -54,7 +54,7 @@ static void widen(struct colour_scale *scale, double v)
     scale->high = fmax(scale->high, v);
 }
 
-/* The smallest and the largest that a stream may have; of frames, those of the trajectory's part. */
+/* The smallest and the largest value that a stream may have; of frames, those of the trajectory's part. */
 static void find_limits(const struct site *site, struct colour_scale *scale)
 {
     scale->low = INFINITY;

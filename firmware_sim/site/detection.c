@@ -17,7 +17,7 @@ static uint32_t n_programs(const struct site *site)
     return site->cfg->profile.n_programs > 0 ? site->cfg->profile.n_programs : 1;
 }
 
-/* One for each program: changing from one to another in a scan prepares nothing. */
+/* Prepares a signal for each program, so that a change of program in a scan has nothing to prepare. */
 static int set_up_signals(struct site *site, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
@@ -126,7 +126,7 @@ static int set_up_surfaces(struct site *site, const struct sh_report *report, st
     return rc;
 }
 
-/* Ghosts get labels and names of their own. */
+/* Gives ghosts labels and names of their own. */
 static int name_ghosts(struct site *site, struct sh_err *err)
 {
     struct site_detect *d = &site->detect;
@@ -145,19 +145,19 @@ static int name_ghosts(struct site *site, struct sh_err *err)
         memcpy(ghost[i].object, GHOST, before);
         scene_copy_name(ghost[i].object + before, SCENE_NAME_LEN - before, of->object, strlen(of->object));
     }
-    d->ghost = ghost; /* from here on site_surface knows them */
+    d->ghost = ghost; /* from here on site_surface finds them */
     d->n_real = n;
     site->n_surfaces = 2 * n;
     return SH_OK;
 }
 
-/* Whether a run, or `plan`, may cast footprints: what is built then has room for them. */
+/* Whether a run, or `plan`, may cast footprints, so that room for them is needed. */
 static int casts_footprints(const struct site *site)
 {
     return site->cfg->beam.mode != BEAM_SINGLE || site->measures;
 }
 
-/* The instrument, which has the angle noise; kind of the range noise; the ball. */
+/* Sets the instrument, which has the angle noise; the kind of the range noise; the ball. */
 static void set_up_noise(const struct config *cfg, struct site_detect *d)
 {
     set_up_instrument(cfg, &d->instrument);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What is allowed, and hardly meant. Each doubt is one warning with its figures, and the key to look at. */
+/* Plausibility checks: values that are allowed, but hardly meant. Each gives one warning with its figures and the key
+ * to look at. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,16 +11,16 @@
 #include "core/vec3.h"
 #include "firmware_sim/site/site_inside.h"
 
-/* Sizes that scenes for such a head don't have, mostly: most likely the scale is wrong by a thousand. */
+/* Most scenes for such a head are neither smaller nor larger: then the scale is probably wrong by a thousand. */
 static const double SMALL_M = 0.05, LARGE_M = 10000.0;
 
-/* A scan is mostly empty where fewer pulses than this meet anything. */
+/* A scan is called mostly empty where a smaller share of its pulses hits a surface. */
 static const double EMPTY_SHARE = 0.05;
 
 enum { LOOK_ACROSS = 32, LOOK_UP = 32, LOOKS = LOOK_ACROSS * LOOK_UP, MAX_LINES = 1000 };
 _Static_assert((int)LOOKS <= (int)BVH_CHUNK, "cast at once");
 
-/* How near and how far the head sees at the configured pulse rate. */
+/* The program of the configured pulse rate, which has the smallest and the largest range. */
 static const struct config_program *program_of(const struct site *site)
 {
     const struct config *cfg = site->cfg;
@@ -39,7 +40,8 @@ static void doubt_size(const struct site *site, const struct sh_report *report)
             cfg->file, size_m, program_of(site)->range_min_m, program_of(site)->range_max_m, cfg->scene.mesh[0].scale);
 }
 
-/* Each line has the same window. Where lines and pulses don't go evenly, some lines may have a pulse in it. */
+/* Warns of lines without a pulse. Each line has the same window; unless the pulse rate is a multiple of the line rate,
+ * some lines may still have a pulse in it. */
 static void doubt_lines(const struct site *site, const struct sh_report *report)
 {
     const struct head_settings *s = &site->cfg->head.settings;
@@ -63,7 +65,7 @@ static void doubt_lines(const struct site *site, const struct sh_report *report)
             1e-6 * (double)spec.sweep_udeg * (double)s->lines_uhz / (double)s->prr_uhz);
 }
 
-/* The step of a sphere is rounded to whole ones. */
+/* Warns where the step of a sphere is rounded, so that a turn has a whole number of steps. */
 static void doubt_step(const struct site *site, const struct sh_report *report)
 {
     const struct emitter *e = &site->emitter;
@@ -97,7 +99,8 @@ static void doubt_colours(const struct site *site, const struct sh_report *repor
             cfg->file);
 }
 
-/* A file's transparency is for pictures: whether a laser goes through, the configuration says. */
+/* Warns of transparent surfaces without a rule. A file's transparency is for pictures; only the configuration says
+ * whether a laser goes through. */
 static void doubt_clear(const struct site *site, const struct sh_report *report)
 {
     const struct config *cfg = site->cfg;
@@ -113,7 +116,7 @@ static void doubt_clear(const struct site *site, const struct sh_report *report)
             cfg->file, clear.n, clear.n > 1 ? "s are" : " is", clear.rules[0] != '\0' ? clear.rules : "...", left);
 }
 
-/* A vertex within reach settles most cases without an index of distances. */
+/* A near vertex settles most cases without a search over distances. */
 static int has_near_vertex(const struct scene *scene, const double p[3], double reach_m)
 {
     for (uint32_t v = 0; v < scene->n_vertices; v++) {
@@ -140,7 +143,7 @@ static int is_copy_reached(const struct scene_copied *of, const double p[3], dou
     struct distance_hit hit;
     double in[3], vertex_m[3];
     int rc = SH_OK;
-    for (uint32_t k = 0; k < of->n && !*reached; k++) { /* a vertex settles most cases */
+    for (uint32_t k = 0; k < of->n && !*reached; k++) { /* a near vertex settles most cases */
         scene_copy_put(&of->copy[k], of->mesh->vertex_m[of->mesh->triangle[0][0]], vertex_m);
         *reached = vec3_distance(vertex_m, p) <= reach_m;
     }
@@ -183,7 +186,7 @@ static int doubt_reach(const struct site *site, uint32_t i, const struct sh_repo
     return rc;
 }
 
-/* ---- what a station sees */
+/* ---- the view of a station */
 
 struct look {
     double x[LOOKS], y[LOOKS], z[LOOKS], range_m[LOOKS];
@@ -203,7 +206,7 @@ static void cast(const struct site *site, const struct site_station *s, struct b
     bvh_hits(work, site->bvh, &rays);
 }
 
-/* Below a floor there is a surface above the head, and none under it. */
+/* Warns of a head below its floor: then a surface is above it, and none under it. */
 static int doubt_floor(const struct site *site, uint32_t i, struct bvh_work *work, const struct sh_report *report,
                        struct sh_err *err)
 {
@@ -224,7 +227,7 @@ static int doubt_floor(const struct site *site, uint32_t i, struct bvh_work *wor
     return SH_OK;
 }
 
-/* Pulses evenly over the first frame. */
+/* Draws pulses evenly over the first pan sweep. */
 static void fill_frame(const struct site *site, const struct site_station *s, struct look *look)
 {
     struct head_settings settings = site->cfg->head.settings;
@@ -247,7 +250,7 @@ static void fill_frame(const struct site *site, const struct site_station *s, st
     }
 }
 
-/* Directions evenly over the window of a scan, as its pulses are. */
+/* Draws directions evenly over the window of a scan, as its pulses are. */
 static void fill_window(const struct site *site, const struct site_station *s, struct look *look)
 {
     const struct head_settings *set = &site->cfg->head.settings;
@@ -293,8 +296,8 @@ static void doubt_view(const struct site *site, uint32_t i, struct bvh_work *wor
             near, far);
 }
 
-/* What moves may fill a view, and a path leads elsewhere: then nothing is said of views. Many stops are not
- * all looked at. */
+/* Checks the views of stations. There is no check with moving meshes, which may fill a view, nor with a path, which
+ * leads elsewhere. Of many stops only some are checked. */
 static int doubt_stations(const struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const uint32_t step = site->n_stations / CONFIG_MAX_STATIONS + 1;

@@ -7,15 +7,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* How far points can be from the place that they are relative to: that of a station, or of a leg. */
+/* The largest distance of points from the place that they are relative to: a station, or the middle of a leg. */
 static double reach_m(const struct site *site, const struct site_stretch *stretch)
 {
     double way_m = stretch != NULL ? stretch->reach_m : site->live_reach_m;
     return (site->cfg->profile.range_max_m + way_m) * SITE_MARGIN;
 }
 
-/* Where points can be, seen from there: within the scene, and within the head's range. A hundredth more, and
- * ten sigma, for noise. */
+/* The extent of points around that place: within the scene, and within the head's range; with a margin of a hundredth,
+ * and ten sigma for noise. */
 static void extent_from(const struct site *site, const double centre_m[3], double reach, struct plan_georef_need *need)
 {
     double far[3], noise_m = site_noise_m(site);
@@ -24,8 +24,8 @@ static void extent_from(const struct site *site, const double centre_m[3], doubl
         far[i] = fmax(low, high) * SITE_MARGIN + noise_m;
     }
     need->radius_m = need->height_m = reach;
-    if (site->n_movers > 0) return;                                                 /* they may go anywhere */
-    if (site->detect.ghost != NULL || site->detect.cast.instrument != NULL) return; /* beside the scene */
+    if (site->n_movers > 0) return;                                                 /* movers may go anywhere */
+    if (site->detect.ghost != NULL || site->detect.cast.instrument != NULL) return; /* points outside of the scene */
     need->radius_m = fmin(reach, hypot(far[0], far[1]));
     need->height_m = fmin(reach, far[2]);
 }
@@ -43,8 +43,8 @@ static int plan_one(const struct site *site, struct georef *georef, const double
     return georef_set_method(georef, method, err);
 }
 
-/* The path in legs, each with a georeference of its own about its middle: counts and polynomials have to
- * reach no further, however long it is. */
+/* Cuts the path into legs, each with a georeference of its own about its middle, so that counts and polynomials need
+ * not reach further than a leg, however long the path is. */
 static int plan_legs(const struct site *site, struct site_station *s, struct sh_err *err)
 {
     struct plan_row row;
@@ -65,7 +65,7 @@ static int plan_legs(const struct site *site, struct site_station *s, struct sh_
     return SH_OK;
 }
 
-/* report NULL: of a station with another scanner, whose site says what is to be said. */
+/* report NULL: for a station with another scanner, whose own site gives the warnings. */
 static int plan_station(const struct site *site, struct site_station *s, const struct sh_report *report,
                         struct sh_err *err)
 {
@@ -81,7 +81,7 @@ static int plan_station(const struct site *site, struct site_station *s, const s
     return rc;
 }
 
-/* As output.heights says; site->geoid stays NULL where heights are ellipsoidal. */
+/* Opens the geoid that output.heights asks for; site->geoid stays NULL where heights are ellipsoidal. */
 static int open_geoid(struct site *site, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
@@ -93,7 +93,7 @@ static int open_geoid(struct site *site, struct sh_err *err)
     return sh_fail(err, rc, "%s: output.heights: %.400s", cfg->file, why.text);
 }
 
-/* The longest range that may be read: the head's, as its instrument reads it, and ten sigma. */
+/* The longest range that a point may have: the head's with the errors of its instrument, and ten sigma. */
 static double longest_m(const struct site *site)
 {
     const struct config_instrument *k = &site->cfg->instrument;
@@ -101,7 +101,7 @@ static double longest_m(const struct site *site)
     return (1.0 + 1e-6 * fabs(k->range_scale_ppm)) * range_m + fabs(k->range_offset_m) + site_range_noise_m(site);
 }
 
-/* Of a station, or of its legs. Points that ball-shaped noise takes further are counted. */
+/* Sets the scale of a station, or of its legs. Points that ball-shaped noise takes further are counted as unfit. */
 static int scale_station(const struct site *site, struct site_station *s, double scale_m, struct sh_err *err)
 {
     int rc = SH_OK;
@@ -112,7 +112,7 @@ static int scale_station(const struct site *site, struct site_station *s, double
     return rc;
 }
 
-/* Per station; whether they all fit. Polar points have no coordinates that need to. */
+/* Sets the scale of all stations; fails where one does not fit. Polar points have no coordinates, so all fit. */
 static int scale_stations(struct site *site, double scale_m, struct sh_err *err)
 {
     int rc = SH_OK;
@@ -130,7 +130,7 @@ static int scale_stations(struct site *site, double scale_m, struct sh_err *err)
 
 static const double FINEST_M = 1e-6, MOST_RANGE_COUNTS = 4294967295.0;
 
-/* Polar: a range longer than 32 bits would be read as a short one. */
+/* Polar: a range that needs more than 32 bits would be read as a short one. */
 static int choose_range_scale(struct site *site, double *scale_m, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Loading a site: site_load at the end of this file says in which order. */
+/* Loading a site: `load` at the end of this file has the steps in their order. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -22,7 +22,7 @@ static struct scene_mesh_spec mesh_spec(const struct config *cfg, const struct c
     return spec;
 }
 
-/* A body by itself, in its own frame. */
+/* Adds a body by itself, in its own coordinate frame. */
 static int add_mover(struct site *site, uint32_t number, const struct scene_mesh_spec *spec,
                      const struct sh_report *report, struct sh_err *err)
 {
@@ -40,7 +40,7 @@ static int add_mover(struct site *site, uint32_t number, const struct scene_mesh
     return SH_OK;
 }
 
-/* The sphere around a body, and labels that follow those there are. */
+/* Sets the sphere around a body, and its labels, which follow those given before. */
 static void place_mover(struct site_mover *m, uint32_t label)
 {
     double half2 = 0.0;
@@ -94,7 +94,7 @@ static int load_meshes(struct site *site, const struct scene_mesh_spec *spec, co
     return rc;
 }
 
-/* All lists of copies come before the first mesh: what is wrong with them is soon said. */
+/* Reads all lists of copies before the first mesh, so that their errors are reported soon. */
 static int load_scene(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
@@ -111,21 +111,21 @@ static int load_scene(struct site *site, const struct sh_report *report, struct 
     return rc;
 }
 
-/* Once in a world. */
+/* Loads the meshes, once in a world. */
 static int load_world(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     struct site_world *world = site->world;
     if (world->scene != NULL) return SH_OK;
     int rc = load_scene(site, report, err);
     world->n_loads++;
-    world->scene = site->scene; /* it owns what was loaded, also after an error */
+    world->scene = site->scene; /* the world owns it, also after an error */
     world->n_movers = site->n_movers;
     world->n_surfaces = site->n_surfaces;
     memcpy(world->mover, site->mover, sizeof world->mover);
     return rc;
 }
 
-/* Where the head stands, or stops. */
+/* Places the stations or stops of the head. */
 static int place_stations(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
@@ -141,7 +141,7 @@ static int place_stations(struct site *site, const struct sh_report *report, str
     return rc == SH_OK && cfg->platform.kind == PLATFORM_STOPS ? site_load_stops(site, report, err) : rc;
 }
 
-/* A list of directions is read again: the configuration keeps no more than its length. */
+/* Reads a list of directions again: the configuration keeps only its length. */
 static int load_emitter(struct site *site, struct sh_err *err)
 {
     const struct config_profile *p = &site->cfg->profile;
@@ -157,8 +157,8 @@ static int load_emitter(struct site *site, struct sh_err *err)
     return SH_OK;
 }
 
-/* What is wrong with an IFC file's site shall be reported rather than what follows from it: the anchor comes
- * before the scene. */
+/* The anchor comes before the scene, so that an error of an IFC file's site is reported, not an error that follows from
+ * it. */
 static int load(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     int rc = load_emitter(site, err);
@@ -172,7 +172,7 @@ static int load(struct site *site, const struct sh_report *report, struct sh_err
     if (rc == SH_OK && site->moving) rc = site_load_platform(site, report, err);
     if (rc == SH_OK) rc = site_set_up_tripods(site, report, err);
     if (rc == SH_OK && site->cfg->output.colour != COLOUR_NONE) rc = site_set_up_colours(site, report, err);
-    if (rc == SH_OK) rc = site_warn_doubts(site, report, err); /* trying beams may take long where little is seen */
+    if (rc == SH_OK) rc = site_warn_doubts(site, report, err); /* before beams: little in view makes these slow */
     if (rc == SH_OK) rc = site_georeference(site, report, err);
     if (rc == SH_OK) rc = site_choose_methods(site, report, err);
     if (rc == SH_OK) rc = site_plan_sight(site, report, err);

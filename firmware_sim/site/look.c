@@ -12,7 +12,7 @@ static void enter(void *ctx, int64_t t_ns, struct cast_setup *setup)
     setup->n_knots = (uint32_t)site->n_knots;
 }
 
-/* One frame; along a trajectory all of it. */
+/* Fills a place with one pan sweep; along a trajectory with all of it. */
 static void fill_place(const struct site *site, struct site_look_at *at, struct plan_place *place)
 {
     struct head_settings settings = site->cfg->head.settings;
@@ -28,7 +28,7 @@ static void fill_place(const struct site *site, struct site_look_at *at, struct 
     site_cast_setup(site, at->station, &place->setup);
 }
 
-/* The k-th of those that this scanner scans from, k from 0. */
+/* The k-th station that this scanner scans from, k from 0. */
 static uint32_t served_station(const struct site *site, uint32_t k)
 {
     uint32_t i = 0;

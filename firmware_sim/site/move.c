@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A station that stands elsewhere: the site that a configuration with that place would have, beside the one that is. */
+/* Moving a station: makes the site that a configuration with the new place would have, beside the present one. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -36,8 +36,8 @@ static int is_same(const struct site_place *a, const struct site_place *b)
            a->pitch_deg == b->pitch_deg && a->roll_deg == b->roll_deg;
 }
 
-/* Without an anchor the station's own place says where the scene lies. The scene stays where it is: as with an anchor at
- * that place, and the scene's y axis to true north there. */
+/* Without an anchor the station's own place gives the scene's place on the Earth. The scene stays where it is: as with
+ * an anchor at the station's first place, and the scene's y axis to true north there. */
 static int move_on_earth(const struct placement *was, const struct site_place *to, struct config_station *s,
                          struct sh_err *err)
 {
@@ -54,7 +54,7 @@ static int move_on_earth(const struct placement *was, const struct site_place *t
     return SH_OK;
 }
 
-/* s: as in the configuration. Back at its first place it stays so, with its floor and its place on the Earth. */
+/* s: as configured. Back at its first place it stays so, with its floor and its place on the Earth. */
 static int place(const struct site *first, uint32_t station, const struct site_place *to, struct config_station *s,
                  struct sh_err *err)
 {
@@ -75,7 +75,7 @@ static int place(const struct site *first, uint32_t station, const struct site_p
     return rc;
 }
 
-/* An error's text names the file at its begin, which a client of the head does not know. */
+/* An error's text begins with the file's name, which means nothing to a client of the head. */
 static int fail_without_file(const struct site *site, int rc, const struct sh_err *why, struct sh_err *err)
 {
     const size_t n = strlen(site->cfg->file);
@@ -85,7 +85,7 @@ static int fail_without_file(const struct site *site, int rc, const struct sh_er
 
 static int make_sights(struct site *site, const struct site *from, const struct sh_report *report, struct sh_err *err)
 {
-    struct sh_report quiet = {0}; /* too many stations for maps: that was said at the start */
+    struct sh_report quiet = {0}; /* the start has warned already of too many stations for maps */
     if (report != NULL) quiet = *report;
     quiet.warn = NULL;
     site_share_sights(site, from);
@@ -100,7 +100,7 @@ int site_load_moved(const struct site *from, const struct site *first, uint32_t 
     if (site_why_fixed(from) != NULL) return sh_fail(err, SH_EINPUT, "%s", site_why_fixed(from));
     struct config *cfg = malloc(sizeof *cfg);
     if (cfg == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a configuration");
-    memcpy(cfg, from->cfg, sizeof *cfg); /* with its padding: scenes are compared whole (world.c) */
+    memcpy(cfg, from->cfg, sizeof *cfg); /* with its padding: world.c compares scenes byte by byte */
     cfg->head.settings.frames = from->planned_frames;
     cfg->station[station] = first->cfg->station[station];
     int rc = place(first, station, to, &cfg->station[station], &why);

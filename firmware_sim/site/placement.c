@@ -22,7 +22,7 @@ static int is_ifc(const struct config_mesh *mesh)
     return len > 4 && strcasecmp(mesh->file + len - 4, ".ifc") == 0;
 }
 
-/* The one IFC mesh. Its frame must be the scene's but for a shift. */
+/* Finds the one IFC mesh. Its coordinate frame must be the scene's except for a shift. */
 static int find_ifc(const struct config *cfg, const struct config_mesh **out, struct sh_err *err)
 {
     *out = NULL;
@@ -60,7 +60,7 @@ static double ifc_height(const struct config *cfg, const struct sh_report *repor
     return isnan(height_m) ? 0.0 : height_m;
 }
 
-/* How far two places of a model's own may be from each other before both are named. IfcSite is often that of the town. */
+/* Two places that a model gives may be this far apart without a warning. IfcSite is often the town's place. */
 #define SITE_FROM_MAP_M 10000.0
 
 static void compare_site(const struct sh_report *report, const char *file, const struct ifc_site *site,
@@ -137,7 +137,7 @@ int placement_find_anchor(const struct config *cfg, const struct sh_report *repo
     return SH_OK;
 }
 
-/* The place on the Earth as it is given. */
+/* The place on the Earth as the configuration gives it. */
 static int given_place(const struct config_station *s, struct georef_place *at, struct sh_err *err)
 {
     int rc = SH_OK;
@@ -149,8 +149,8 @@ static int given_place(const struct config_station *s, struct georef_place *at, 
     return rc == SH_OK ? locate_check(at, err) : rc;
 }
 
-/* A UTM place in a scene of the same grid, and an ECEF place in a scene in ECEF, are the scene's to the last
- * bit. */
+/* Finds the position in the scene. A UTM place in a scene of the same grid, and an ECEF place in a scene in ECEF, are
+ * taken over to the last bit. */
 static int find_position(const struct config_station *s, const struct geoframe *frame, const struct georef_place *at,
                          double position_m[3], struct sh_err *err)
 {
@@ -167,7 +167,7 @@ static int find_position(const struct config_station *s, const struct geoframe *
     return geoframe_find(frame, at, position_m, err);
 }
 
-/* From the place given down to the floor, and up by the instrument's height. */
+/* Goes from the given place down to the floor, and up by the instrument's height. */
 static int stand_on_floor(const struct config_station *s, const double level[9], const struct bvh *bvh,
                           struct placement *out, struct sh_err *err)
 {
@@ -203,7 +203,7 @@ static int find(const struct config_station *s, const struct placement_anchor *a
     if (rc == SH_OK && anchor->known) rc = geoframe_level(&anchor->frame, out->position_m, level, err);
     if (rc == SH_OK && s->has_instrument_height) rc = stand_on_floor(s, level, bvh, out, err);
     if (rc == SH_OK && anchor->known) rc = geoframe_locate(&anchor->frame, out->position_m, &at, err);
-    if (!anchor->known) at.height_m += out->position_m[2] - s->position_m[2]; /* both are where the search began */
+    if (!anchor->known) at.height_m += out->position_m[2] - s->position_m[2]; /* both began at the search's start */
     if (rc != SH_OK) return rc;
     out->on_earth = anchor->known || s->place != PLACE_NONE;
     out->place = at;

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Where the stations of a site stand: in the scene, and where the scene's anchor or the station says so, on
- * the Earth.
+/* Places the stations of a site: in the scene, and on the Earth where the scene's anchor or the station gives that.
  */
 #ifndef FIRMWARE_SIM_SITE_PLACEMENT_H
 #define FIRMWARE_SIM_SITE_PLACEMENT_H

@@ -17,7 +17,7 @@ static void name_row(struct plan_row *row, const char *whose)
     memcpy(row->why, why, sizeof row->why);
 }
 
-/* A row for each station; one for all, with the largest bound, where they have the same method. */
+/* Adds a row for each station; or one for all, with the largest bound, where they have the same method. */
 static void add_georef(const struct site *site, struct site_plan *plan)
 {
     const struct site_station *s = site->station;
@@ -46,7 +46,7 @@ static int is_zero(const struct config_instrument *k)
     return memcmp(k, &zero, sizeof zero) == 0;
 }
 
-/* The error of the vertices, of what stands still and of what moves. */
+/* The largest error of vertices, of the scene and of movers. */
 static double mesh_error_m(const struct site *site)
 {
     double error_m = site->scene->error_m;
@@ -77,7 +77,7 @@ static void ask_head(const struct site *site, struct plan_head *head)
         head->reach_m = fmax(head->reach_m, program->reach[i].range_m);
 }
 
-/* There is nothing to choose, but no line head either. */
+/* Adds a row for heads that are no line heads, although there is nothing to choose. */
 static void add_emitter(const struct site *site, struct site_plan *plan)
 {
     char why[160];
@@ -86,7 +86,7 @@ static void add_emitter(const struct site *site, struct site_plan *plan)
     plan_say(&plan->row[plan->n++], "emitter", emitter_names[site->emitter.kind], 0.0, 0.0, why);
 }
 
-/* What the configured pulse rate brings with it, where the head has programs. HEAD:PRR changes it. */
+/* Adds the figures of the configured pulse rate, if the head has programs. HEAD:PRR changes them. */
 static void add_program(const struct site *site, struct site_plan *plan)
 {
     const struct config_profile *p = &site->cfg->profile;
@@ -119,7 +119,7 @@ static void add_range(const struct site *site, struct site_plan *plan)
     plan_say(&plan->row[plan->n++], "range", method, 0.0, 0.0, why);
 }
 
-/* The first tripod; how many more there are. */
+/* Adds the first tripod, and how many more there are. */
 static void add_tripods(const struct site *site, struct site_plan *plan)
 {
     char text[200], why[sizeof plan->row->why];
@@ -160,7 +160,7 @@ int site_plan_rows(struct site *site, struct sh_err *err)
     plan->row[plan->n++] = plan->sight;
     for (size_t i = 0; i < n; i++) {
         plan->row[plan->n++] = of_head[i];
-        if (i != 0) continue; /* after what moves */
+        if (i != 0) continue; /* beam and optics come after the movers' row */
         plan->row[plan->n++] = plan->beam;
         plan->row[plan->n++] = plan->optics;
     }
@@ -171,7 +171,7 @@ int site_plan_rows(struct site *site, struct sh_err *err)
     return site_rate_row(site, &plan->row[plan->n++], err);
 }
 
-/* A row that depends on the scene has no figure: `most` takes its place. */
+/* The cost of a row. A row that depends on the scene has none: then `most` replaces it. */
 static double cost_ns(const struct plan_row *row, double most)
 {
     return isnan(row->cost_ns) ? most : row->cost_ns;

@@ -7,12 +7,12 @@
 
 /* Fills site->plan.row: stage by stage, then what this machine computes of it (firmware_sim/site/rate.h). */
 int site_plan_rows(struct site *site, struct sh_err *err);
-/* Processor time that the plan has for a pulse, ns: the sum of its rows, and what each pulse takes. Rounded figures, for
- * telling what is usual from what is not. */
+/* Processor time that the plan has for a pulse, ns: the sum of its rows, and a part that each pulse takes. The figures
+ * are rounded: good enough to recognise an unusual cost. */
 double site_planned_ns(const struct site *site);
-/* Why a pulse may take far more than that, as far as the plan shows it; and what to do. */
+/* Why a pulse may take far more than that, as far as the plan shows it; and what the user can do. */
 void site_cost_reason(const struct site *site, char *text, size_t room);
-/* In one line: the methods that a run uses. */
+/* The methods that a run uses, in one line. */
 void site_plan_text(const struct site *site, char *text, size_t room);
 
 #endif

@@ -8,14 +8,14 @@
 #include "core/angle.h"
 #include "core/vec3.h"
 
-/* Largest distance of the head's own path from the trajectory, and largest steps between its poses, in metres
- * and ns: a recorded trajectory has them. */
+/* Limits for the head's poses, in metres and ns: largest distance of its path from the trajectory, and largest steps
+ * between poses. Recorded trajectories have such steps. */
 static const double TOLERANCE_M = 1e-4, LONGEST_M = 0.01;
 static const int64_t LONGEST_NS = 10000000;
 
 /* The part of the trajectory that the configuration names, in its own times. */
 struct part {
-    struct trajectory *trajectory; /* to be freed by who opened it; NULL: the head stands at its stations */
+    struct trajectory *trajectory; /* the caller that opened it frees it; NULL: the head stands at its stations */
     double start_s, end_s;
 };
 
@@ -44,7 +44,7 @@ static int open_trajectory(const struct site *site, const struct sh_report *repo
                    wrong_end ? p->start_s : 0.0, last_s - first_s);
 }
 
-/* The head on the platform. */
+/* Sets the pose of the head on the platform. */
 static void set_mount(struct site *site)
 {
     const struct config_platform *p = &site->cfg->platform;
@@ -81,7 +81,8 @@ static int load_knots(struct site *site, const struct sh_report *report, struct 
     return rc;
 }
 
-/* Poses from `first` on whose box fits into the reach; returns the first that does not, centre and radius. */
+/* Gathers poses from `first` on while their box fits into the reach. Returns the first that does not fit; also the
+ * box's centre and radius. */
 static size_t gather(const struct site *site, size_t first, double centre_m[3], double *radius_m)
 {
     double lo[3], hi[3];
@@ -133,9 +134,9 @@ static int cover_path(struct site *site, struct sh_err *err)
         for (size_t k = end; k < site->n_knots && site->knot[k - 1].t_ns < until_ns + 100000000; k++)
             beyond_m =
                 fmax(beyond_m, vec3_distance(site->knot[k].pose.position_m, site->knot[end - 1].pose.position_m));
-        if (until_ns != INT64_MAX) until_ns = (until_ns + 999999) / 1000000 * 1000000; /* as an anchor says it */
+        if (until_ns != INT64_MAX) until_ns = (until_ns + 999999) / 1000000 * 1000000; /* anchors have milliseconds */
         rc = add_stretch(site, centre_m, radius_m + beyond_m + 1e-3, until_ns, err);
-        i = end == site->n_knots || end == i + 1 ? end : end - 1; /* they share a pose */
+        i = end == site->n_knots || end == i + 1 ? end : end - 1; /* two stretches share a pose */
     }
     return rc;
 }
@@ -160,7 +161,7 @@ int site_load_platform(struct site *site, const struct sh_report *report, struct
 
 /* ---- a head that stops */
 
-/* The last stop may lie after the end by a rounding error: 1e-9 of a step, for times as people write them. */
+/* The last stop may be after the end by a rounding error. 1e-9 of a step is enough for times that people write. */
 static int count_stops(const struct site *site, const struct part *part, uint32_t *n, struct sh_err *err)
 {
     const struct config_platform *p = &site->cfg->platform;
@@ -180,7 +181,7 @@ static int count_stops(const struct site *site, const struct part *part, uint32_
     return SH_OK;
 }
 
-/* The only station's place on the Earth as an anchor of the scene. */
+/* Makes the only station's place on the Earth an anchor of the scene. */
 static int anchor_scene(struct site *site, struct sh_err *err)
 {
     const struct placement *at = &site->station[0].at;
@@ -198,7 +199,7 @@ static int place(const struct site *site, const struct pose *head, struct placem
     return at->on_earth ? geoframe_locate(&site->anchor.frame, at->position_m, &at->place, err) : SH_OK;
 }
 
-/* As a station of the configuration would say it. */
+/* Describes a stop as a station of the configuration. */
 static void describe(const struct pose *head, uint32_t i, struct config_station *out)
 {
     double heading, pitch, roll;
@@ -211,7 +212,7 @@ static void describe(const struct pose *head, uint32_t i, struct config_station 
     out->roll_deg = angle_deg(roll);
 }
 
-/* The k-th time: after the first sample, and as a frame where frames are counted. */
+/* Sets the k-th time: after the first sample, and as a frame number where frames are counted. */
 static void set_time(const struct site *site, uint32_t k, struct site_station *s)
 {
     const struct config_platform *p = &site->cfg->platform;
@@ -221,8 +222,8 @@ static void set_time(const struct site *site, uint32_t k, struct site_station *s
     s->t_s = s->frame / p->frames_per_s;
 }
 
-/* Without a trajectory: all stations of the configuration at the first time, then all at the next. They are numbered
- * from 1 on, as way-points are. */
+/* Without a trajectory the stops are all stations of the configuration at the first time, then all at the next. They
+ * are numbered from 1 on, as way-points are. */
 static void add_standing(struct site *site, const struct site_station *standing, uint32_t i)
 {
     const uint32_t n = site->cfg->n_stations, k = i / n;

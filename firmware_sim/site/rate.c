@@ -11,18 +11,18 @@
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/site/site_inside.h"
 
-/* Processor time: to warm the caches, and to measure for. Runs are short enough that one of the most
+/* Processor time for warming the caches, and for measuring. Runs are short enough that one of the most
  * expensive pulses (1,027 sub-rays) ends within a few milliseconds. */
 static const int64_t WARM_NS = 2000000, MEASURE_NS = 6000000;
 enum { RUN = 64, TRIES = 4096, LEAST_RUNS = 2, MOST_RUNS = 4096 };
 enum { MAX_DT_NS = (1 << 24) - 1 };   /* a point's time within its frame has 24 bits */
-static const double MOST_SHARE = 0.8; /* above it a run is warned of */
+static const double MOST_SHARE = 0.8; /* above it a run gets a warning */
 
 struct rate {
     double pulse_ns;          /* processor time for one cast pulse; NaN: no pulse is cast */
     double fired_hz, cast_hz; /* of the configured rate: with the blind part of the sweep, and without */
-    unsigned processors;      /* that casting threads run on */
-    double share;             /* of these processors that cast_hz needs; 1: all of their time */
+    unsigned processors;      /* processors that casting threads run on */
+    double share;             /* share of these processors that cast_hz needs; 1: all of their time */
 };
 
 struct gauge {
@@ -56,7 +56,7 @@ static void close_gauge(struct gauge *g)
     free(g->frame);
 }
 
-/* Some pulses of a line by chance, where it is cast. Returns 0 where none is found. */
+/* Draws some pulses of a line, within the part that is cast. Returns 0 where none is found. */
 static int draw(struct gauge *g, struct plan_place **place, struct schedule_run *run)
 {
     for (int i = 0; i < TRIES; i++) {

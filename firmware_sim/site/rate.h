@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* How many pulses per second this machine computes of a site, measured on the head's own pulses: the whole
- * cast to points, and their frames. Figures are of this machine at this moment, so nothing is chosen by them.
+/* Measures how many pulses per second this machine computes at a site: the head's own pulses, cast to points, and their
+ * frames. The figures hold for this machine at this moment, so no method is chosen by them.
  * Each call takes about 10 ms, at most 20. */
 #ifndef FIRMWARE_SIM_SITE_RATE_H
 #define FIRMWARE_SIM_SITE_RATE_H

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Warnings of loading: which there were, so that a site beside says only what is new. */
+/* Keeps the warnings given while loading, so that a site beside this one only gives new ones. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,7 +13,7 @@ static int has(const struct site_said *said, const char *text)
     return 0;
 }
 
-/* One too many, or without memory, counts as new each time. */
+/* A warning for which there is no room or no memory counts as new each time. */
 static void warn(void *ctx, const char *text)
 {
     struct site_listener *listener = ctx;

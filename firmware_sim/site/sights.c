@@ -8,12 +8,12 @@
 #include <string.h>
 
 enum { LINES = 64 };
-/* A scan without end is taken to last so long. */
+/* Assumed length of a scan without end. */
 static const int64_t ENDLESS_NS = 3600000000000;
-/* The map's maker looks at directions in squares about so wide (core/sight). */
+/* Approximate width of the squares of directions in which a map is made (core/sight). */
 static const double SQUARE_RAD = 0.1;
 
-/* Why no station has a map; NULL: they may. */
+/* Why no station has a map; NULL: stations may have one. */
 static const char *why_not(const struct site *site)
 {
     const char *moves = config_rays_move(site->cfg);
@@ -27,7 +27,7 @@ static const char *why_not(const struct site *site)
 
 /* ---- the plan */
 
-/* Pulses that a scan casts: of its frames; of an hour where it has no end. */
+/* Pulses that a scan casts: those of its frames; without an end, those of an hour. */
 static double pulses_of(const struct plan_place *place, uint32_t frames)
 {
     const struct schedule_segment *seg = &place->segment;
@@ -43,7 +43,7 @@ static double pulses_of(const struct plan_place *place, uint32_t frames)
     return all != 0 ? fired * (double)cast / (double)all : 0.0;
 }
 
-/* Of all maps together. */
+/* The memory of all maps together. */
 static uint64_t memory_bytes(const struct site *site)
 {
     return (uint64_t)(site->cfg->cast.sight_mib * 0x1p20);
@@ -117,7 +117,8 @@ static void close_sight(struct site_station *s)
     free(s->sight_users);
 }
 
-/* A map depends on the BVH, the place and the directions that rays go to. How fine it is changes no hit. */
+/* Whether a map can be reused: it depends on the BVH, the place and the directions of rays. Its fineness changes no
+ * hit. */
 static int still_holds(const struct site *site, const struct site *from, uint32_t i)
 {
     const struct site_station *a = &site->station[i], *b = &from->station[i];

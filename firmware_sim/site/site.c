@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What scans and commands ask of a site that is loaded. Nothing here changes it. */
+/* Queries of scans and commands to a loaded site. Nothing here changes it. */
 #include "firmware_sim/site/site.h"
 
 #include <math.h>

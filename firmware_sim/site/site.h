@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* The site: what a configuration loads once and all scans share. In goes a checked configuration; out come
+/* The site: everything that a configuration loads once and all scans share. In: a checked configuration. Out:
  * the scene, its BVHs, the stations' places (scene frame, metres) and georeferences, and the planned methods.
- * load.c makes it, site.c reads it. It is constant once loaded: any thread. A station that is moved is in another
- * site, made beside this one (site_load_moved). */
+ * load.c makes it, site.c reads it. It is constant once loaded: any thread. Moving a station makes another
+ * site beside this one (site_load_moved). */
 #ifndef FIRMWARE_SIM_SITE_SITE_H
 #define FIRMWARE_SIM_SITE_SITE_H
 
@@ -26,7 +26,7 @@ struct site_tripod {
     double head_m;      /* the head's origin above the ground, along the plumb line; NaN: no ground below */
     double height_m;    /* the tripod's top, likewise */
     double opening_rad; /* of a leg, from the vertical */
-    double gap_m;       /* between feet and ground: more than 0 where it hovers */
+    double gap_m;       /* between feet and ground: above 0 where the tripod hovers */
     struct cast_tripod cast;
     struct scene *legs; /* NULL: not in view */
     struct bvh *bvh;
@@ -34,7 +34,7 @@ struct site_tripod {
 
 struct site_station {
     const struct config_station *station; /* of the configuration, or of stops */
-    struct sight *_Atomic sight;          /* what it sees; NULL: rays go to the BVH (site_open_sights) */
+    struct sight *_Atomic sight;          /* its visibility map; NULL: rays go to the BVH (site_open_sights) */
     _Atomic uint32_t *sight_users;        /* sites that share the map */
     struct georef *georef;
     struct placement at;
@@ -45,7 +45,7 @@ struct site_station {
     struct site_leg *leg;           /* one for each stretch of a trajectory, in the geo layout; else NULL */
     struct plan_row plan;           /* how the georef's method was chosen; of the worst leg */
     struct cast_colour colour;      /* of its points; where output.colour is not none */
-    double t_s, frame; /* a stop: when it is, after the trajectory's first sample; frame scalar of the trajectory */
+    double t_s, frame; /* of a stop: its time after the trajectory's first sample; the trajectory's frame scalar */
 };
 
 struct site_mover {
@@ -56,9 +56,9 @@ struct site_mover {
     double centre_m[3], radius_m;
 };
 
-/* What scans do between a hit and a point (detection.c). */
+/* The steps of a scan from a hit to a point (detection.c). */
 struct site_detect {
-    int on;                                     /* 0: nothing of it, and it costs nothing */
+    int on;                                     /* 0: no such step, and no cost */
     struct cast_detect cast;                    /* of the program that the configuration has; the others below */
     struct cast_detect program[HEAD_MAX_RATES]; /* by program of the head profile: each has a signal of its own */
     struct detect_signal signal[HEAD_MAX_RATES];
@@ -76,17 +76,17 @@ struct site_colours {
     struct surface_colours surfaces; /* texture */
 };
 
-/* What was planned. Scans take their methods from here alone. */
+/* The plan. Scans take their methods from here alone. */
 struct site_plan {
     struct plan_methods methods;
     struct plan_row sight, beam, optics;
-    double sight_rays;    /* of a map: what its cells follow (sight_spec) */
+    double sight_rays;    /* rays that a map's cells are sized for (sight_spec) */
     struct plan_row *row; /* `plan`: all stages in their order, then the total; else NULL */
     size_t n;
 };
 
-/* The sites of one scene share this (world.c): the meshes, and their BVHs. The last site that
- * goes frees it. Sites that share are loaded and freed by one thread; others may cast meanwhile. */
+/* The world: the meshes and their BVHs, which the sites of one scene share (world.c). The last of these
+ * sites frees it. One thread loads and frees them; others may cast meanwhile. */
 struct site_world {
     uint32_t n_users;
     uint32_t n_loads; /* how often the meshes were read: once */
@@ -96,8 +96,8 @@ struct site_world {
     uint32_t n_movers, n_surfaces;
     struct site_target {
         uint8_t *is_target;                   /* [n_surfaces] scene.target fits; NULL: all are scanned */
-        uint32_t surfaces, triangles;         /* that are scanned ... */
-        uint32_t all_surfaces, all_triangles; /* ... of so many in the files */
+        uint32_t surfaces, triangles;         /* scanned ones */
+        uint32_t all_surfaces, all_triangles; /* those in the files */
     } target;
     struct bvh *bvh; /* of what stands still, for rays from anywhere */
 };
@@ -105,16 +105,16 @@ struct site_world {
 /* A stretch of a moving head's path: positions on the wire are relative to its centre. */
 struct site_stretch {
     int64_t until_ns;            /* since the scan's start: whole milliseconds; INT64_MAX: the last one */
-    double centre_m[3], reach_m; /* all of it lies so near to that */
+    double centre_m[3], reach_m; /* the whole stretch is within reach_m of its centre */
 };
 
-/* Warnings of loading, so that a site beside it says only what is new. */
+/* Warnings given while loading, so that a site beside this one only gives new ones. */
 enum { SITE_MAX_SAID = 64 };
 struct site_said {
     char *text[SITE_MAX_SAID];
     uint32_t n;
-    uint32_t n_new;  /* those that the site before did not have */
-    char first[160]; /* of these */
+    uint32_t n_new;  /* warnings that the site before did not have */
+    char first[160]; /* the first of these */
 };
 
 struct site {
@@ -128,20 +128,20 @@ struct site {
     struct placement_anchor anchor;
     struct site_mover mover[CAST_MAX_MOVERS];
     uint32_t n_movers, n_surfaces; /* surfaces of the scene, of the movers, of legs, then the ghosts of all */
-    struct scene_surface *legs;    /* what points on tripods' legs are of, with the label legs_label; NULL: no legs */
+    struct scene_surface *legs;    /* the surface of tripods' legs, with the label legs_label; NULL: no legs */
     uint32_t legs_label;
     uint8_t *silent; /* by label: hides and gives no echo; NULL: none (scene.target) */
     struct site_detect detect;
     struct site_colours colours;
     struct site_plan plan;
     uint32_t planned_frames; /* of a scan, as the plan counts its pulses; a run may scan on (--duration) */
-    int measures;    /* for `plan`: footprints are cast to find the error of a forced beam, even of single rays */
+    int measures;    /* for `plan`: footprints are cast to measure the error of a forced beam, even of single rays */
     struct bvh *bvh; /* the world's */
     struct site_station *station;
     uint32_t n_stations;
     struct config_station *stop; /* the stations where the platform stops; NULL: the configuration's are */
     struct georef_geoid *geoid;  /* NULL: heights are ellipsoidal */
-    /* A moving head; the stations then only say where on Earth the scene lies. */
+    /* A moving head; the stations then only give the scene's place on the Earth. */
     int moving;
     struct pose mount;            /* of the head on the platform */
     struct pose_knot *knot;       /* trajectory: the head's poses from the scan's start on */
@@ -153,7 +153,7 @@ struct site {
     double scale_m;      /* of positions and ranges on the wire, metres per count */
 };
 
-/* A path is cut into stretches whose poses lie so near to a centre. */
+/* A path is cut into stretches whose poses are within this distance of a centre. */
 #define SITE_STRETCH_M 1000.0
 
 /* Room left beyond the head's largest range, for noise. */
@@ -161,59 +161,59 @@ struct site {
 
 /* cfg must outlive the site. */
 int site_load(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err);
-/* The same for tools that look at triangles one by one: copies of meshes are written out. SH_EINPUT where that were more
- * than SITE_MOST_WRITTEN_OUT. */
+/* The same for tools that look at triangles one by one: copies of meshes are written out as triangles. SH_EINPUT: these
+ * would be more than SITE_MOST_WRITTEN_OUT. */
 int site_load_written_out(const struct config *cfg, const struct sh_report *report, struct site **out,
                           struct sh_err *err);
 #define SITE_MOST_WRITTEN_OUT 10000000
-/* The same beside another site, of another scanner of the same file: what is the same scene is loaded no second time,
- * with its BVHs. `other` may be freed before or after. */
+/* The same beside the site of another scanner of the same file. Where both have the same scene, scene and BVHs are
+ * shared, not loaded again. `other` may be freed before or after. */
 int site_load_beside(const struct config *cfg, const struct site *other, const struct sh_report *report,
                      struct site **out, struct sh_err *err);
-/* The same for `plan`: site->plan.row is filled, with bounds also of what is forced. */
+/* The same for `plan`: also fills site->plan.row, with bounds even of methods that the configuration forces. */
 int site_load_plan(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err);
 void site_free(struct site *site);
 
-/* Whether two settings differ in what a site is planned for: ranges, noise, step of a sphere. */
+/* Whether two settings differ in values that a site is planned for: ranges, noise, step of a sphere. */
 int site_varies(const struct head_settings *a, const struct head_settings *b);
-/* The site as it were if its configuration had the ranges, the noise and the sphere's step of the settings: detection,
- * georeference of the station and scale on the wire are made again, by the same steps as in loading. All else is that
+/* Makes the site of a configuration with the ranges, the noise and the sphere's step of the settings. Detection, the
+ * station's georeference and the scale on the wire are made again, by the steps of loading. All else is that
  * of `from`, which must outlive it: scene, BVHs, maps, and the methods that were chosen by trying them on the scene
- * (beam, optics). It serves scans from that station alone; maps are looked up in `from`. Milliseconds. SH_EINPUT: it
- * can't be planned so. Freed by site_vary_free. */
+ * (beam, optics). It serves scans from that station alone; maps are looked up in `from`. Takes milliseconds. SH_EINPUT:
+ * there is no plan for these settings. Freed by site_vary_free. */
 int site_vary(const struct site *from, const struct head_settings *settings, uint32_t station, struct site **out,
               struct sh_err *err);
 void site_vary_free(struct site *site);
-/* Where a station stands and how it is turned, as its keys in the configuration say it: the head's origin in the scene
- * frame, metres; degrees. */
+/* A station's place, as its keys in the configuration give it: the head's origin in the scene frame, metres; its
+ * attitude, degrees. */
 struct site_place {
     double position_m[3], heading_deg, pitch_deg, roll_deg;
 };
 void site_get_place(const struct site *site, uint32_t station, struct site_place *out);
 /* Why no station of a site can be moved; NULL: they can. */
 const char *site_why_fixed(const struct site *site);
-/* The site beside `from` in which a station (0..) of this scanner stands at `to`; NULL: where it stood in `first`, the
- * site that was loaded from the configuration. Loaded as a configuration with that place would be, with the maps of
- * from's stations that still hold, and all others that are planned. Meshes and BVHs are shared.
- * from and first may be cast from meanwhile; sites of one world are loaded and freed by one thread at a time. report is
- * warned of what loading `from` had not to say; out->said counts it. SH_EINPUT: nobody can stand there. */
+/* Makes the site beside `from` in which a station (0..) of this scanner stands at `to`. `to` NULL: where it stood in
+ * `first`, the site that was loaded from the configuration. The result is as from a configuration with that place. Maps
+ * of from's stations that still hold are kept; all others that are planned are made. Meshes and BVHs are shared.
+ * from and first may be cast from meanwhile; sites of one world are loaded and freed by one thread at a time. report
+ * gets the warnings that loading `from` did not give; out->said counts them. SH_EINPUT: no head can stand there. */
 int site_load_moved(const struct site *from, const struct site *first, uint32_t station, const struct site_place *to,
                     const struct sh_report *report, struct site **out, struct sh_err *err);
-/* Nobody casts from this site any more; but it is to be freed by its owner: gives back what it has alone. */
+/* Frees the site's maps, once nobody casts from it any more. The owner still has to free the site. */
 void site_retire(const struct site *site);
-/* How many stations a site of this configuration will have, before it is loaded: where the platform stops, its stops.
+/* How many stations a site of this configuration will have, before it is loaded; with stops, the number of these.
  * Errors as of site_load. */
 int site_count_stations(const struct config *cfg, const struct sh_report *report, uint32_t *n, struct sh_err *err);
 
-/* A site holds the maps of so many stations at a time. Where there are more, a run has none, and a recording
- * that of the station at hand; whether a map is used then changes no hit. */
+/* A site holds the maps of so many stations at a time. With more stations a run has no maps, and a recording
+ * has that of the station at hand. Whether a map is used changes no hit. */
 enum { SITE_MAX_SIGHTS = 16 };
 
 /* Makes the maps of n stations from `first` on, where the plan says so, and gives back those of others. Before
  * their scans, and while none is on: casters take the map with the station's setup. */
 int site_open_sights(struct site *site, uint32_t first, uint32_t n, const struct sh_report *report, struct sh_err *err);
 
-/* How many of its stations this scanner scans from (config_serves); the others only have a place. */
+/* The number of stations that this scanner scans from (config_serves); the others only have a place. */
 uint32_t site_n_served(const struct site *site);
 
 /* The grid of output.crs utm, as georef_spec has it: one for all stations of an anchored scene, that of the
@@ -224,18 +224,18 @@ void site_grid(const struct site *site, int *zone, int *side);
 /* The schedule of its head with some settings. */
 void site_fill_spec(const struct site *site, const struct head_settings *settings, struct schedule_spec *spec);
 
-/* Entries that a pulse may need in a block: its echoes, as far as the plan allows for more than one. */
+/* Entries that a pulse may need in a block: its echoes, at most as many as the plan allows. */
 uint32_t site_points_per_pulse(const struct site *site);
-/* The same whatever is planned once a station was moved. */
+/* The same for any plan that moving a station may lead to. */
 uint32_t site_most_points_per_pulse(const struct site *site);
 
-/* A label's names; it is below n_surfaces. */
+/* The names of a label, which must be below n_surfaces. */
 const struct scene_surface *site_surface(const struct site *site, uint32_t label);
 /* The texture of a real surface; NULL: none. */
 const struct scene_texture *site_texture(const struct site *site, uint32_t label);
 
-/* ---- clear.c: surfaces that their file calls transparent, and that no rule decides about. Zero-initialise. */
-#define SITE_CLEAR_LEAST 0.01 /* a file's rounding lets less than this through */
+/* ---- clear.c: surfaces that their file calls transparent and for which there is no rule. Zero-initialise. */
+#define SITE_CLEAR_LEAST 0.01 /* less transparency than this may be a file's rounding */
 struct site_clear {
     uint32_t n, n_left_out;         /* surfaces; rules that had no room */
     size_t room;                    /* for the rules; 0: all of them */
@@ -243,18 +243,18 @@ struct site_clear {
 };
 void site_clear_add(struct site_clear *c, const struct scene_surface *s, const struct surface_rule *rule, uint32_t n);
 
-/* On which stretch a moving head is at a time of the scan; and what the casters need there, in a setup for
- * the station.
+/* site_stretch_at: the stretch that a moving head is on at a time of the scan. The other puts what casters need there
+ * into a setup for the station.
  */
 size_t site_stretch_at(const struct site *site, int64_t t_ns);
 void site_enter(const struct site *site, uint32_t station, size_t stretch, struct cast_setup *setup);
 
-/* The georeference of a station's points on a stretch, what the anchor is in the scene, and its scale. The
- * stretch counts only along a trajectory. */
+/* The georeference of a station's points on a stretch, the point of the scene that they are relative to, and the scale.
+ * The stretch matters only along a trajectory. */
 const struct georef *site_georef(const struct site *site, uint32_t station, size_t stretch, const double **centre_m,
                                  const double **scale);
 
-/* "top 1.6 m above the ground, opening 27.3 deg, ..."; of a station with a tripod. */
+/* "top 1.6 m above the ground, opening 27.3 deg, ...", for a station with a tripod. */
 void site_describe_tripod(const struct site_station *station, char *text, size_t len);
 
 /* Poses of all movers at a time of the scan; at a stop they stand as at the stop's own (site_mover_time). */
@@ -265,9 +265,9 @@ double site_mover_time(const struct site *site, uint32_t station, double scan_s)
  * without a pan count with their whole field of view, as do spheres and lists. */
 int site_scans(const struct site *site, uint32_t station, const double dir_socs[3]);
 
-/* What the casters need to scan from a station (0..n_stations-1), at the configured pulse rate. */
+/* Fills in what casters need to scan from a station (0..n_stations-1), at the configured pulse rate. */
 void site_cast_setup(const struct site *site, uint32_t station, struct cast_setup *setup);
-/* What of it depends on the pulse rate: reach, echoes, smallest range. Allocates nothing. */
+/* Sets the members that depend on the pulse rate: reach, echoes, smallest range. Allocates nothing. */
 void site_set_program(const struct site *site, int64_t prr_uhz, struct cast_setup *setup);
 
 #endif

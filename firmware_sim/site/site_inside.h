@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to this folder: the steps of loading a site (load.c), and what they share. */
+/* Private to this folder: the steps of loading a site (load.c), and types that they share. */
 #ifndef FIRMWARE_SIM_SITE_SITE_INSIDE_H
 #define FIRMWARE_SIM_SITE_SITE_INSIDE_H
 
@@ -15,37 +15,38 @@ enum site_purpose {
 int site_create(const struct config *cfg, enum site_purpose purpose, const struct site *other,
                 const struct sh_report *report, struct site **out, struct sh_err *err);
 
-/* ---- said.c: warnings of loading. */
+/* ---- said.c: warnings given while loading. */
 struct site_listener {
-    struct sh_report report; /* to be handed on */
+    struct sh_report report; /* pass this one to the steps of loading */
     const struct sh_report *to;
     struct site_said *said;
     const struct site_said *before;
 };
-/* What is warned of goes into `said`, and to `to` unless it is in `before` (NULL: nothing is). */
+/* Warnings go into `said`, and to `to` unless they are in `before` (NULL: it has none). */
 void site_listen(struct site_listener *listener, const struct sh_report *to, struct site_said *said,
                  const struct site_said *before);
 void site_free_said(struct site_said *said);
 
-/* ---- colours.c: what colours show. The scene, detection, the stations and a head's path are there. Warns of textures
- * that can't be read. */
+/* ---- colours.c: the quantity that colours show. After the scene, detection, the stations and a head's path. Warns of
+ * textures that can't be read. */
 int site_set_up_colours(struct site *site, const struct sh_report *report, struct sh_err *err);
 
-/* ---- detection.c: what a site's scans do between a hit and a point (signal, surfaces, instrument, noise),
+/* ---- detection.c: the steps of scans from a hit to a point (signal, surfaces, instrument, noise),
  * made once from the configuration and the loaded scene. */
 
-/* The scene and its movers are loaded. Where there are mirrors, site->n_surfaces grows by the labels of
- * ghosts. Warns of entries of `surfaces` that no surface fits. */
+/* After the scene and its movers are loaded. With mirrors, site->n_surfaces grows by the labels of
+ * ghosts. Warns of entries of `surfaces` that fit no surface. */
 int site_set_up_detect(struct site *site, const struct sh_report *report, struct sh_err *err);
 void site_free_detect(struct site *site);
-/* site is a copy of one that is set up, with another cfg: what of detection depends on ranges and noise, made again. What
- * it points to stays that of the other. */
+/* Makes the parts of detection again that depend on ranges and noise. site is a copy of one that is set up, with
+ * another cfg; what it points to stays that of the original. */
 int site_vary_detect(struct site *site, struct sh_err *err);
 
-/* How many surfaces of glass or mirrors pulses are followed through, once that is known. */
+/* Sets the number of surfaces of glass or mirrors that pulses are followed through. */
 void site_set_depth(struct site *site, uint32_t depth);
 
-/* How far noise may take a point, whether it is on or not; of that, the ball; a range, ten sigma of its noise. */
+/* site_noise_m: how far noise may take a point, whether it is on or not. The others: its part that is ball noise; ten
+ * sigma of the range noise. */
 double site_noise_m(const struct site *site);
 double site_ball_m(const struct site *site);
 double site_range_noise_m(const struct site *site);
@@ -54,40 +55,40 @@ double site_range_noise_m(const struct site *site);
  * In: the configured trajectory and times. Out: its poses (scene frame, metres), or a
  * station for each stop, placed in the scene. */
 
-/* Puts the stops in the place of the configuration's only station. That one has been placed: without an
- * anchor it says where on the Earth the scene lies, as an anchor at its position with the scene's y axis to
+/* Replaces the configuration's only station by the stops. After that station is placed: without an
+ * anchor it gives the scene's place on the Earth, as an anchor at its position with the scene's y axis to
  * true north would. */
 int site_load_stops(struct site *site, const struct sh_report *report, struct sh_err *err);
 
 /* Reads the trajectory, and cuts the path into stretches. */
 int site_load_platform(struct site *site, const struct sh_report *report, struct sh_err *err);
 
-/* ---- world.c: what sites share. */
+/* ---- world.c: the world that sites share. */
 
-/* Joins the world of other (NULL: none) where its scene is the same, or gets a new, empty one. */
+/* Joins the world of `other` (NULL: none) where its scene is the same; else makes a new, empty one. */
 int site_enter_world(struct site *site, const struct site *other, struct sh_err *err);
-/* Gives back what is used of it. */
+/* Leaves the world; the last site frees it. */
 void site_leave_world(struct site *site);
 
 /* ---- target.c: scene.target. */
 
-/* Where the copies of a mesh stand: places->place is to be freed in any case, and NULL where it has none. */
+/* Reads where the copies of a mesh stand. The caller frees places->place in any case; NULL: the mesh has no copies. */
 int site_read_copies(const struct config *cfg, uint32_t number, const struct sh_report *report,
                      struct scene_places *places, struct sh_err *err);
 
 /* The meshes are loaded, each with labels of its own: leaves out what is no target, or notes it. SH_EINPUT where a pattern fits nothing, or nothing is
  * left. */
 int site_select_target(struct site *site, struct sh_err *err);
-/* Labels of ghosts are known: which give no echo. */
+/* Notes which labels give no echo. After the labels of ghosts are known. */
 int site_set_up_silent(struct site *site, struct sh_err *err);
 
 /* ---- bvhs.c: a BVH of what stands still, and one of each body that moves. */
 int site_build_bvhs(struct site *site, const struct sh_report *report, struct sh_err *err);
 
-/* ---- tripod.c: what stations' heads stand on. In: the placed stations and their BVHs. Out: each tripod's opening, what
- * it hides, and its legs where they are in view. */
+/* ---- tripod.c: the tripods under stations' heads. In: the placed stations and their BVHs. Out: each tripod's opening,
+ * the directions that it hides, and its legs where they are in view. */
 
-/* The scene and its movers are loaded: labels for what is seen of legs, if there are any. */
+/* Makes labels for legs, if there are any. After the scene and its movers are loaded. */
 int site_name_legs(struct site *site, struct sh_err *err);
 /* Warns of tripods that hover, and of those without a ground. */
 int site_set_up_tripods(struct site *site, const struct sh_report *report, struct sh_err *err);
@@ -96,17 +97,17 @@ void site_free_tripod(struct site_tripod *tripod);
 /* ---- georeference.c: georeferencing of a site's stations: heights, CRS, method, and how many metres a
  * count is on the wire. */
 
-/* Stations are placed, the path of a moving head is known. Fills the stations' georef, plan, scale and leg,
+/* After stations are placed and the path of a moving head is known. Fills the stations' georef, plan, scale and leg,
  * and site->scale_m. Warns where a tolerance is not met. */
 int site_georeference(struct site *site, const struct sh_report *report, struct sh_err *err);
-/* The same for one station, which has none, and for the scale, which all of them decide; without warnings. */
+/* The same for one station without a georeference, and for the scale, which depends on all stations. No warnings. */
 int site_georeference_one(struct site *site, uint32_t station, struct sh_err *err);
 void site_free_georeference(struct site *site, uint32_t station);
 
-/* ---- look.c: looking at the scene as the head does: the places that pulses are fired from, with setups as
- * the run's. For trying methods (core/plan draws the pulses), and for measuring what they cost. */
+/* ---- look.c: the places that pulses are fired from, with setups like the run's. For trying methods on the head's own
+ * pulses (core/plan draws them), and for measuring what methods cost. */
 
-enum { SITE_LOOK_STATIONS = 4 }; /* at most so many stations are looked from */
+enum { SITE_LOOK_STATIONS = 4 }; /* most stations of a look */
 
 struct site_look {
     struct plan_place place[SITE_LOOK_STATIONS];
@@ -117,16 +118,16 @@ struct site_look {
     uint32_t n;
 };
 
-/* Looks from up to SITE_LOOK_STATIONS stations, evenly chosen, with the beams that they have by then. The
- * look must not be moved or copied: its places point into it. */
+/* Opens a look from up to SITE_LOOK_STATIONS stations, evenly chosen, with the beams that they have by then. It
+ * must not be moved or copied: its places point into it. */
 void site_look_open(struct site_look *look, const struct site *site);
 
-/* ---- beam_choice.c: which beam a pulse is, and how far pulses are followed through glass and mirrors:
- * measured on the scene where the configuration leaves it open. */
+/* ---- beam_choice.c: the beam of a pulse, and how far pulses are followed through glass and mirrors:
+ * measured on the scene where the configuration leaves them open. */
 
-/* All else of the site is in place. Sets beam, rings and depth of site->plan.methods and the rows of beam and
- * optics, and makes the stations' beams. Warns where nothing holds the tolerances. For `plan`
- * (site->measures) the error of what is forced is measured, too. */
+/* After all else of the site. Sets beam, rings and depth of site->plan.methods and the rows of beam and
+ * optics, and makes the stations' beams. Warns where no method holds the tolerances. For `plan`
+ * (site->measures) the error of forced methods is measured, too. */
 int site_choose_methods(struct site *site, const struct sh_report *report, struct sh_err *err);
 
 /* ---- view.c: the directions that a station's rays may go to. */
@@ -134,7 +135,7 @@ int site_choose_methods(struct site *site, const struct sh_report *report, struc
 enum { SITE_VIEW_BANDS = EMITTER_MAX_BEAMS };
 struct site_view {
     double rotation[9]; /* socs -> prcs */
-    double margin_rad;  /* rays may go so far beyond the bands */
+    double margin_rad;  /* how far beyond the bands rays may go */
     uint32_t n;
     struct site_band {
         double low_rad, high_rad;           /* elevation, socs */
@@ -144,20 +145,20 @@ struct site_view {
 
 /* For the settings at power-up. */
 void site_view_of(const struct site *site, uint32_t station, struct site_view *view);
-/* As sight_spec's sees; ctx: the view. */
+/* The function for sight_spec's `sees`; ctx: the view. */
 int site_view_sees(const void *ctx, const double dir[3], double radius_rad);
-/* Of all directions, the share within radius_rad of those that it sees. */
+/* The share of all directions that are within radius_rad of the view. */
 double site_view_share(const struct site_view *view, double radius_rad);
 
-/* ---- sights.c: maps of what the stations see: whether one is made, and making it. */
+/* ---- sights.c: visibility maps of the stations: decides whether to make them, and makes them. */
 
-/* Beam and optics are chosen. Sets site->plan.methods.sight and the row. */
+/* After beam and optics are chosen. Sets site->plan.methods.sight and the row. */
 int site_plan_sight(struct site *site, const struct sh_report *report, struct sh_err *err);
 void site_close_sights(struct site *site);
-/* Maps of another site's stations that stand as they did, before site_open_sights makes the others. */
+/* Takes over the maps of another site's stations that stand as they did. Then site_open_sights makes the others. */
 void site_share_sights(struct site *site, const struct site *from);
 
-/* ---- doubts.c: what is allowed, and hardly meant. Once the scene has its BVHs. */
+/* ---- doubts.c: plausibility checks: values that are allowed, but hardly meant. After the scene has its BVHs. */
 
 /* Warns, with figures, of a scene of an unlikely size, of stations that see nothing or little, of lines
  * without a pulse, and of attributes that nothing fills. */

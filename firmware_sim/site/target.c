@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What of the scene is scanned: objects by name (scene.target). The others are left out of the scene, or stay in it and
- * give no echo. */
+/* scene.target: scans objects by name. The others are left out of the scene, or stay in it and give no echo. */
 #include <fnmatch.h>
 #include <math.h>
 #include <stdio.h>
@@ -17,7 +16,7 @@ static int fits(const char *pattern, const struct scene_surface *surface)
     return fnmatch(pattern, surface->object, 0) == 0;
 }
 
-/* Without the wildcards, small letters: so far is a pattern from a name. */
+/* The distance of a pattern from a name, without wildcards and in small letters. */
 static size_t distance_of(const char *pattern, const char *name)
 {
     char a[SCENE_NAME_LEN], b[SCENE_NAME_LEN];
@@ -29,14 +28,14 @@ static size_t distance_of(const char *pattern, const char *name)
         b[n] = (char)(name[n] >= 'A' && name[n] <= 'Z' ? name[n] + 'a' - 'A' : name[n]);
     b[n] = '\0';
     if (a[0] != '\0' && strstr(b, a) != NULL) return 0;
-    /* A pattern stands for the beginning as well. */
+    /* A pattern may also be similar to the beginning of the name. */
     const size_t whole = nearest_distance(a, b), len = strlen(a);
     if (len < n) b[len] = '\0';
     const size_t part = nearest_distance(a, b);
     return whole < part ? whole : part;
 }
 
-/* Objects whose names are within so many letters of the pattern, the nearest first, each once: "a", "b". */
+/* Lists objects whose names are within `within` letters of the pattern, nearest first, each once: "a", "b". */
 static void list_near(const struct site *site, const char *pattern, size_t within, char *text, size_t len)
 {
     const struct scene_surface *near[MOST_NEAR] = {NULL};
@@ -140,7 +139,7 @@ static void count(const struct site *site, const uint8_t *is_target, struct site
         t->surfaces += is_target[i];
 }
 
-/* Movers that nothing is left of go, too. */
+/* Leaves out all that is no target. Movers without any triangle left go, too. */
 static int leave_out(struct site *site, const uint8_t *is_target, struct sh_err *err)
 {
     uint32_t first = site->scene->n_surfaces, n = 0;
@@ -192,7 +191,7 @@ int site_set_up_silent(struct site *site, struct sh_err *err)
     site->silent = calloc((size_t)site->n_surfaces + 1, 1);
     if (site->silent == NULL) return sh_fail(err, SH_ENOMEM, "no memory for %u surfaces", site->n_surfaces);
     for (uint32_t i = 0; i < site->n_surfaces;
-         i++) /* legs of tripods come after the scene's, and are no object of it */
+         i++) /* labels of tripods' legs come after the scene's; they are no object of it */
         site->silent[i] = i % n_real < t->all_surfaces && !t->is_target[i % n_real];
     return SH_OK;
 }

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* Tripods: how far their legs are open, from the head's height above the ground; what they hide; their legs as a mesh.
+/* Tripods: the opening of their legs, from the head's height above the ground; the directions that they hide; their
+ * legs as a mesh.
  *
- * The ground is the first surface straight below the head's origin, of what stands still; the vertical is the plumb
- * line there (placement.c), however the head is tilted. A leg of length L reaches from the top, at height h above that
+ * The ground is the first surface straight below the head's origin, without movers. The vertical is the plumb line
+ * there (placement.c), however the head is tilted. A leg of length L reaches from the top, at height h above that
  * ground, down to its level: cos(opening) = h / L. */
 #include "firmware_sim/site/site_inside.h"
 
@@ -101,10 +102,10 @@ void site_describe_tripod(const struct site_station *s, char *text, size_t len)
 
 /* ---- legs */
 
-/* A leg begins this part of its length below the top: a head at the top itself would else look into all of them. */
+/* A leg begins this part of its length below the top. Otherwise a head at the top itself would be inside all legs. */
 static const double LEG_BEGINS = 0.1;
 
-/* A prism along the leg, from there to the ground. */
+/* Makes a prism along the leg, from there to the ground. */
 static void fill_leg(const struct site_tripod *t, const double top_m[3], const double level[9], int leg,
                      double (*vertex_m)[3])
 {

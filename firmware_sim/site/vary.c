@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A site with other ranges, noise or step of a sphere: what depends on them is planned again, all else is shared. */
+/* A site with other ranges, noise or step of a sphere: plans again what depends on them, and shares all else. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -8,7 +8,7 @@
 struct site_vary {
     struct site site; /* the first member: site_vary_free gets its address */
     struct config cfg;
-    uint32_t station; /* whose georeference and legs are its own */
+    uint32_t station; /* the station whose georeference and legs are its own */
 };
 
 int site_varies(const struct head_settings *a, const struct head_settings *b)
@@ -18,7 +18,7 @@ int site_varies(const struct head_settings *a, const struct head_settings *b)
            a->step_udeg != b->step_udeg;
 }
 
-/* Settings of a scan that are not planned stay those of power-up, as in the site itself. */
+/* Settings of a scan that no plan depends on stay those of power-up, as in the site itself. */
 static struct head_settings planned_of(const struct head_settings *own, const struct head_settings *now)
 {
     struct head_settings s = *own;

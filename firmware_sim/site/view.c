@@ -8,9 +8,9 @@
 #include "core/instrument.h"
 #include "core/mat3.h"
 
-/* Beyond what is known to bend or move the beam. */
+/* A margin beyond all known effects that bend or move the beam. */
 static const double MARGIN_RAD = 2e-3;
-/* So many sigma of the angle noise; rng_normal's largest is 6.7. */
+/* Limit of the angle noise, in sigma; rng_normal's largest value is 6.7. */
 static const double SIGMAS = 7.0;
 
 enum { DIRECTIONS = 2048 };
@@ -25,7 +25,7 @@ static void add_band(struct site_view *view, const struct site_band *band)
     view->band[view->n++] = *band;
 }
 
-/* Line angles from a to b, of a head that pans. Up to 90 deg they are elevations; beyond, the beam looks
+/* Adds the line angles from a to b of a head that pans. Up to 90 deg they are elevations; beyond, the beam looks
  * backward, over the zenith. Each half turn of the line angle is a band. */
 static void add_lines(struct site_view *view, double a_rad, double b_rad, double azimuth_rad, double azimuth_to_rad)
 {
@@ -38,7 +38,7 @@ static void add_lines(struct site_view *view, double a_rad, double b_rad, double
     }
 }
 
-/* A frame is a whole number of lines: it ends up to a line beyond the pan's window. */
+/* A pan sweep is a whole number of lines: it may end up to a line beyond the pan's window. */
 static void add_sweep(struct site_view *view, const struct head_settings *s)
 {
     const int moves = s->pan_udeg_s > 0 && s->pan_stop_udeg > s->pan_start_udeg;
@@ -49,7 +49,7 @@ static void add_sweep(struct site_view *view, const struct head_settings *s)
               0.5 * turn_rad);
 }
 
-/* The rings of a sphere, and its sector; where poles are among them, what is around them. */
+/* Adds the rings of a sphere, and its sector; with a pole among them, the cap around it. */
 static void add_rings(struct site_view *view, const struct emitter *e, const struct head_settings *s)
 {
     const double start_rad = from_udeg(s->line_start_udeg), stop_rad = from_udeg(s->line_stop_udeg);
@@ -59,7 +59,7 @@ static void add_rings(struct site_view *view, const struct emitter *e, const str
                                        0.5 * to_rad});
 }
 
-/* What heads with beams see is not cut by their window: that saves little. */
+/* The window of heads with beams is not used: it would save little. */
 static void add_emitter(struct site_view *view, const struct emitter *e, const struct head_settings *s)
 {
     const struct site_band all = {-M_PI_2, M_PI_2, 0.0, M_PI};
@@ -87,7 +87,8 @@ void site_view_of(const struct site *site, uint32_t station, struct site_view *v
         add_emitter(view, &site->emitter, &site->cfg->head.settings);
 }
 
-/* A cap of radius r around elevation e goes asin(sin r / cos e) to both sides in azimuth, if it holds no pole. */
+/* Whether a cap meets the band. A cap of radius r around elevation e extends asin(sin r / cos e) to both sides in
+ * azimuth, if it holds no pole. */
 static int meets(const struct site_band *b, double elevation_rad, double azimuth_rad, double radius_rad)
 {
     if (elevation_rad + radius_rad < b->low_rad || elevation_rad - radius_rad > b->high_rad) return 0;
@@ -107,7 +108,7 @@ int site_view_sees(const void *ctx, const double dir[3], double radius_rad)
     return 0;
 }
 
-/* Directions on a spiral of the golden angle, evenly spread: each stands for the same area. */
+/* Tries directions on a spiral of the golden angle: they are spread evenly, so each stands for the same area. */
 double site_view_share(const struct site_view *view, double radius_rad)
 {
     uint32_t seen = 0;

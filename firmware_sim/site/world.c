@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* What sites of one scene share. */
+/* The world, which sites of one scene share. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "firmware_sim/site/site_inside.h"
 
-/* Meshes that are read in the same way, with all that this configuration asks for. Both structs began as zeros. */
+/* Whether the meshes are read in the same way, with all that this configuration needs. Bytes can be compared, since
+ * both structs began as zeros. */
 static int is_same_scene(const struct site *site, const struct site *other)
 {
     const struct config_scene *a = &site->cfg->scene, *b = &other->cfg->scene;
