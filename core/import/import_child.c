@@ -2,9 +2,9 @@
 /* The process that reads: limits first, then the work, then the scene into the file of the task.
  *
  * For all but IFC it is a fork without exec. The parent may have threads; only this one is left in the fork. glibc lets
- * such a process use malloc and stdio; nothing else of the parent's threads is touched. It ends by _exit, which runs
+ * such a process use malloc and stdio; libraries are loaded before the fork. It ends by _exit, which runs
  * no destructors. */
-#include "core/scene/import.h"
+#include "core/import/import.h"
 
 #include <errno.h>
 #include <fcntl.h>

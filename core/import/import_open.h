@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Files as Assimp opens them while it imports: the mesh, and what it names (buffers of a glTF, ...). Only regular
  * files, as in core/infile.h: opening a FIFO would wait. */
-#ifndef CORE_SCENE_IMPORT_OPEN_H
-#define CORE_SCENE_IMPORT_OPEN_H
+#ifndef CORE_IMPORT_IMPORT_OPEN_H
+#define CORE_IMPORT_IMPORT_OPEN_H
 
 #include <assimp/cfileio.h>
 
