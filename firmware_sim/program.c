@@ -9,16 +9,24 @@
 #include "drivers/host/scanhead.h"
 #include "firmware_sim/app/help/help.h"
 
+static int is_elsewhere(const struct program *program, const char *word)
+{
+    for (const char *const *name = program->elsewhere; *name != NULL; name++)
+        if (strcmp(word, *name) == 0) return 1;
+    return 0;
+}
+
+static int fail_elsewhere(const char *word)
+{
+    fprintf(stderr, "scanhead: %s: not in scanheadd; use scanhead\n", word);
+    return APP_USAGE;
+}
+
 static int fail_unknown(const struct program *program, const char *word)
 {
     enum { MOST = 32 };
     const char *known[MOST], *meant;
     size_t n = 0;
-    for (const char *const *name = program->elsewhere; *name != NULL; name++) {
-        if (strcmp(word, *name) != 0) continue;
-        fprintf(stderr, "scanhead: %s: not in scanheadd; use scanhead\n", word);
-        return APP_USAGE;
-    }
     while (program->command[n] != NULL && n < MOST) {
         known[n] = program->command[n]->name;
         n++;
@@ -39,6 +47,8 @@ static int run(const struct program *program, int argc, char **argv)
         help_print(program->command, stdout);
         return APP_OK;
     }
+    const char *word = strcmp(argv[1], "help") == 0 && argc > 2 ? argv[2] : argv[1];
+    if (is_elsewhere(program, word)) return fail_elsewhere(word);
     if (strcmp(argv[1], "help") == 0) return help_run(program->command, argc - 1, argv + 1);
     if (strcmp(argv[1], "--version") == 0) {
         printf("scanhead %s\n", scanhead_version());

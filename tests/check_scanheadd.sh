@@ -39,6 +39,7 @@ commands() {
         commands_of "$head" | grep -qx "$command" && continue
         said=$("$head" "$command" --help 2>&1)
         [ $? = 2 ] && [ "$said" = "scanhead: $command: not in scanheadd; use scanhead" ] || { echo "$command: $said"; return 1; }
+        [ "$("$head" help "$command" 2>&1)" = "$said" ] || { echo "help $command"; return 1; }
     done
     said=$("$head" lits 2>&1)
     [ $? = 2 ] && [[ $said == *"did you mean list?"* ]]
