@@ -2,9 +2,10 @@
 /* A cloud from above, coloured by a figure. In: places (metres, x to the right, y up) and a figure each. Out: an image of
  * the pixels' means.
  *
- * A pixel shows the mean of its points' figures: by colour_ramp 0 is blue, and most and all beyond it
- * are red. Pixels whose points have no finite figure are black; those without points are white, which the ramp has not. The
- * longer side has up to CLOUD_PICTURE_PX pixels, fewer where there are few points, so that areas are filled. */
+ * A pixel shows the mean of its points' figures: in colour_ramp, 0 is blue, and values of `most` and beyond are red.
+ * Pixels whose points have no finite figure are black; those without points are white, which is not in the ramp.
+ * The longer side has up to CLOUD_PICTURE_PX pixels, fewer where there are few points, so that areas are
+ * filled. */
 #ifndef CORE_CLOUD_PICTURE_H
 #define CORE_CLOUD_PICTURE_H
 
