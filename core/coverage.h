@@ -55,7 +55,7 @@ struct coverage_scan {
 };
 
 struct coverage_pulses {
-    uint64_t cast, met;   /* with at least one hit that counts, on what stands still */
+    uint64_t cast, met;   /* with at least one hit that counts, on the scene that stands still */
     uint64_t hits, front; /* of these hits, on the front of a triangle */
 };
 
@@ -136,13 +136,13 @@ struct coverage_directions {
     double range_min_m, range_max_m;
 };
 
-/* The unseen surface that a head at a place would see, estimated by far fewer rays than a scan has. Each ray that meets
+/* The unseen surface that a head at a place would see, estimated by far fewer rays than a scan has. Each ray that hits
  * such a cell stands for the area range^2 each_sr / cos(incidence), cos at least 0.02. Where that is less than the
- * cell's, the cell is met by several rays, and counts as a whole, as it does in a scan. Where it is more, the ray
- * stands for the cells around, too, and counts with its area. An infinite each_sr lets each cell that is met count as a
- * whole. The estimate lacks cells of which only corners are seen, between rays. It adds cells that lie between a
- * scan's own points, and ray areas that reach beyond an outline: on average half of one along all outlines. Glass
- * counts as a wall, and what moves as nothing. */
+ * cell's, several rays hit the cell, and it counts as a whole, as it does in a scan. Where it is more, the ray stands
+ * for the cells around, too, and counts with its area. An infinite each_sr lets each cell that is hit count as a whole.
+ * The estimate lacks cells of which only corners are seen, between rays. It adds cells that lie between a scan's own
+ * points, and ray areas that reach beyond an outline: on average half of one along all outlines. Glass counts as a
+ * wall, and what moves as nothing. */
 struct coverage_gain {
     double gain_m2;
     double front; /* of what the rays meet, the share met from the front; NaN: nothing is met */

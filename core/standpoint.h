@@ -31,7 +31,8 @@ struct standpoint {
     double position_m[3]; /* of the head's origin */
     double floor_m;       /* height above the floor; NaN: outside */
     double seen;          /* share of the directions looked at that meet something within the ranges */
-    /* What to scan. Inside and on the ground: all of it, heading 0. Outside: what holds the scene. */
+    /* What to scan. Inside and on the ground: all of it, heading 0. Outside: the part that holds the
+     * scene. */
     double heading_rad;          /* of pan 0, clockwise from y */
     double pan_rad;              /* from 0 to this */
     double line0_rad, line1_rad; /* within the view */
