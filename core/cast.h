@@ -112,7 +112,7 @@ struct cast_upset {
 /* Adds the wobbles at t_ns to scheduled angles. */
 void cast_wobble(const struct cast_upset *upset, int64_t t_ns, double *mirror_turn, double *pan_turn);
 
-/* What stays the same for all pulses of a scan (the movers' poses: of a run). */
+/* The settings that are the same for all pulses of a scan (movers' poses: of a run). */
 struct cast_setup {
     const struct bvh *bvh;
     /* NULL: none. Else of the BVH and of station_m: rays that begin there are looked up in it, with the same
@@ -150,10 +150,10 @@ struct cast_setup {
     /* NULL: every hit within the limits is one echo, the head is ideal. Its max_echoes is also the beam's. */
     const struct cast_detect *detect;
     const struct cast_colour *colour; /* for blocks with room for colours; NULL: none, and nothing is spent on them */
-    const struct cast_upset *upset;   /* NULL: nothing has gone wrong. Not for caster_meet */
+    const struct cast_upset *upset;   /* NULL: no disturbance. Not for caster_meet */
 };
 
-/* What became of pulses, counted. */
+/* Counts of what became of pulses. */
 struct cast_counters {
     uint64_t decided;    /* struct bvh_counters */
     uint64_t few, asked; /* with a sight: struct sight_counters */

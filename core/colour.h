@@ -6,7 +6,7 @@
 
 #include <stdint.h>
 
-/* What the colours of a cloud show. */
+/* The figure that the colours of a cloud show. */
 enum colour_mode {
     COLOUR_NONE,
     COLOUR_SOLID,       /* one colour for all */

@@ -21,7 +21,7 @@
  * Detection. The signal carries Gaussian noise of sigma 1/k in units of the threshold, k the signal-to-noise
  * ratio at the threshold; it is detected where A + n/k >= 1, with probability Phi(k (A - 1)). So half of the
  * pulses see a target at the data sheet's range. Reflectance, relative to a white Lambertian target at that
- * range, met head on, in the data sheet's air: (A + n/k) rho_min(R) / o(R). Amplitude in dB above the
+ * range, hit head on, in the data sheet's air: (A + n/k) rho_min(R) / o(R). Amplitude in dB above the
  * threshold, as a head measures it, is
  * 10 log10 (A + n/k): 0 dB or more of what is detected.
  *

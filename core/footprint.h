@@ -171,7 +171,7 @@ struct beam_probe {
     void (*cast)(void *ctx, uint32_t n, const struct vec3_in *dir, double *range_m, uint16_t *kind);
     void *ctx;
 };
-/* What outlines are made for. */
+/* The scene, station and beam that outlines are made for. */
 struct beam_outlines_spec {
     const struct scene *scene;
     const double *station_m; /* [3], prcs: where all pulses come from; at most exit_radius_m from it */

@@ -25,7 +25,7 @@ enum {
     LINE_WIDTH_MOST = UINT16_MAX,    /* that much or more */
 };
 
-/* What the three numbers of a point are; chosen per stream. */
+/* The meaning of a point's three numbers; chosen per stream. */
 enum line_layout { LINE_POLAR, LINE_GEO };
 
 struct line_block {

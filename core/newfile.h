@@ -2,10 +2,10 @@
 /* Files that the program makes: recordings, streams, statistics, journals, maps. In: a path. Out: an empty
  * file behind a descriptor.
  *
- * The one rule for links: a symbolic link at the last name of a path is refused, whoever made it. In a folder
- * like /tmp anybody can put one there, and the program would write where it leads. Links to folders are
- * followed, and so are the system's own, /dev/stdout, /dev/stderr and /dev/fd/N. A file with more than one
- * name (hard links) is not overwritten either.
+ * The rule for links: a symbolic link at the last name of a path is always refused. In a folder like /tmp
+ * anybody can put one there, and the program would write to its target. Links to folders are followed, and so
+ * are the system's own, /dev/stdout, /dev/stderr and /dev/fd/N. A file with more than one name (hard links)
+ * is not overwritten either.
  *
  * Any thread. Errors name the path: SH_EINPUT (no such folder, a link, the wrong kind of file), SH_EPERM,
  * SH_EIO. */

@@ -42,7 +42,7 @@ struct plan_row {
     struct plan_option left[PLAN_MAX_OPTIONS]; /* what was left out; why_not says why */
 };
 
-/* What is to be chosen. */
+/* A choice to be made. */
 struct plan_choice {
     const char *stage;
     const struct plan_option *option; /* [n], from rough to exact */
@@ -59,7 +59,7 @@ int plan_holds(const struct plan_option *option, const struct plan_tolerance *to
 
 /* ---- georeferencing */
 
-/* What a georeferencing has to hold. */
+/* The demands on a georeferencing. */
 struct plan_georef_need {
     double radius_m, height_m; /* of the points from the centre: horizontally, and up or down */
     double tolerance_m;
@@ -108,7 +108,7 @@ void plan_sample_optics(struct plan_sample *sample, uint32_t depth, struct plan_
 
 /* ---- sight */
 
-/* What a map of the directions from a station (core/sight.h) has to pay for, and with what. */
+/* The figures that decide whether a map of the directions from a station (core/sight.h) pays. */
 struct plan_sight_need {
     double pulses;         /* cast from a station in a scan */
     double share;          /* of all directions that the map shows */
@@ -153,7 +153,7 @@ void plan_mesh(double error_m, struct plan_row *row);
 /* The row of the cast: what is always done. packet: rays per Embree call. */
 void plan_cast(uint32_t packet, struct plan_row *row);
 
-/* What the rows of the remaining stages depend on. */
+/* The settings of the head that the remaining rows depend on. */
 struct plan_head {
     uint32_t n_movers;
     int noise_on;

@@ -110,7 +110,8 @@ struct scene_texture {
     int unreadable; /* known, and warned of */
 };
 
-/* What the import left out or changed; each kind that is not 0 is also reported as one warning per file. */
+/* Counts of what the import left out or changed; each kind that is not 0 is also reported as one warning
+ * per file. */
 struct scene_counts {
     uint64_t zero_area;     /* triangles without area, left out */
     uint64_t not_triangles; /* points and lines, left out */
@@ -199,7 +200,7 @@ struct scene_arrays {
 /* Builds a scene from arrays, all copied, with the checks of scene_load. */
 int scene_from_arrays(const struct scene_arrays *arrays, struct scene **out, struct sh_err *err);
 
-/* Leaves out all surfaces but those that are to be kept: keep[n_surfaces], by label. What is left has new labels and
+/* Leaves out all surfaces but those that are to be kept: keep[n_surfaces], by label. The rest has new labels and
  * vertices, in the old order, and bounds of its own; there may be nothing left (n_all 0). SH_EINPUT where copies of a
  * mesh would keep different surfaces of it. After an error the scene is only to be freed. To be called before anyone
  * uses the scene, and before label0 is set. */

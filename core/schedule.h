@@ -3,11 +3,11 @@
  * scan, and a pulse number. Out: nanoseconds since the scan's start, angles in turns. Integers and exact
  * ratios; nothing accumulates. core/cast/aim.c makes directions from the turns.
  *
- * A scan is a list of segments; each change of a setting opens one. Within a segment pulse i (from its first
- * pulse) fires at t(i) = t0_ns + floor((t0_acc + i * 1e15) / prr_uhz) ns, its place in the mirror sweep is
- * the ratio r(i)/den with r(i) = r0 + i*num - n*den, n the lines passed and num/den = lines_uhz/prr_uhz
- * reduced, and the pan turns with time: pan_udeg_s * i / prr from the frame's first pulse. The products are
- * formed in 128 bits: exact for pulse numbers to 2^50 (15 years at 2.2 MHz).
+ * A scan is a list of segments; each change of a setting opens one. Within a segment, pulse i (from its
+ * first pulse) fires at t(i) = t0_ns + floor((t0_acc + i * 1e15) / prr_uhz) ns. Its place in the mirror
+ * sweep is the ratio r(i)/den with r(i) = r0 + i*num - n*den. Here n is the lines passed, and num/den is
+ * lines_uhz/prr_uhz reduced. The pan turns with time: pan_udeg_s * i / prr from the frame's first pulse. The
+ * products are formed in 128 bits: exact for pulse numbers to 2^50 (15 years at 2.2 MHz).
  *
  * Angles are in turns (1 turn = 2 pi rad) until a sine is needed, so that reduction is exact.
  * A frame is one sweep of the pan, in a whole number of lines; with pan speed 0, or no pan range, one line.

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* Surfaces: how much of a pulse comes back from what it met. In: label, incidence and texel of each hit. Out:
- * the power that comes back, relative to a white target (below).
+/* Surfaces: how much of a pulse comes back from its hit. In: label, incidence and texel of each hit. Out: the
+ * power that comes back, relative to a white target (below).
  *
- * Monostatic: source and detector look along the same line. What returns is given relative to a white
- * Lambertian target that fills the beam and is met head on at the same range:
+ * Monostatic: source and detector look along the same line. The returned power is relative to that of a
+ * white Lambertian target that fills the beam and is hit head on at the same range:
  *
  *     rho(i) = reflectance cos i + specular (m + 2)/2 cos^m(2i) cos i + retro
  *
@@ -35,8 +35,8 @@ struct surface {
     double glass, mirror;   /* shares of the power that are passed on, or reflected as by a mirror; 0..1 */
 };
 
-/* What a configuration says about surfaces whose names fit. The patterns are those of the shell (fnmatch);
- * NaN: not said, and left unchanged. */
+/* A configuration's rule for surfaces whose names fit. The patterns are those of the shell (fnmatch); NaN:
+ * not said, and left unchanged. */
 struct surface_rule {
     char object[SCENE_NAME_LEN], material[SCENE_NAME_LEN];
     struct surface surface;

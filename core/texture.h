@@ -22,7 +22,7 @@ enum {
     TEXTURE_MAX_MEMORY = 1 << 30,
 };
 
-/* What lies beyond 0..1, in each direction. Decal: no image there, and the surface is as without one. */
+/* The image beyond 0..1, in each direction. Decal: no image there, and the surface is as without one. */
 enum texture_wrap { TEXTURE_REPEAT, TEXTURE_CLAMP, TEXTURE_MIRROR, TEXTURE_DECAL };
 
 struct texture_source {

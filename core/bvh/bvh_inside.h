@@ -10,9 +10,10 @@
  * edges of a triangle by less than their rounding, meets that triangle. So nothing passes at corners, either, nor
  * where a corner lies on another's edge up to rounding.
  *
- * How far. The range is that of the triangle's plane, in double (planes.c). Of all that a ray meets, the nearest is
- * the hit. Hits within 1e-12 of its range count as equal: the one with the lowest number wins, in whatever order they
- * were tried. Where the order may have mattered, the ray is cast again from the nearest range on (packet.c).
+ * How far. The range is that of the triangle's plane, in double (planes.c). The nearest of the triangles that a ray
+ * meets is the hit. Hits within 1e-12 of its range count as equal: the one with the lowest number wins, in whatever
+ * order they were tried. Where the order may have mattered, the ray is cast again from the nearest range on
+ * (packet.c).
  *
  * Why no leaf is left out. Embree works in float. In units of 2^-24 its ray lies off the real one by at most 2 |o| +
  * |h| where it meets something at h, both counted from the BVH's origin: the rounding of the ray's origin, and of its

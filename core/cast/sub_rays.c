@@ -319,7 +319,7 @@ void caster_sub_rays(struct caster *c, const struct chunk *k)
     const struct cast_beam *b = k->s->beam;
     w->n_jobs = w->pool.n = w->n_echoes = w->n_near = w->n_again = 0;
     if (b->mode == BEAM_ADAPTIVE) {
-        /* What lies beyond may or may not have been met. */
+        /* Hits beyond this range may or may not have been reported. */
         kernel_limit(l->range_m, 0.0, k->s->range_max_m, k->n);
         cast_parts(c, k, find_candidates(c, k));
         cast_whole(c, k, w->again, w->n_again);

@@ -38,10 +38,10 @@ struct shim_map *shim_map_create(const struct georef_spec *spec, char *why, size
 struct shim_map *shim_map_recentre(const struct shim_map *map, const double d_prcs[3], char *why, size_t len);
 void shim_map_free(struct shim_map *map);
 
-/* Of the centre: easting and northing with false origin, degrees, or X and Y; height as it leaves, or Z. EPSG
- * code. */
+/* The anchor, at the centre: easting and northing with false origin, degrees, or X and Y; height as it is
+ * sent, or Z. */
 void shim_map_anchor(const struct shim_map *map, double anchor[3]);
-/* Of the centre: degrees, degrees, ellipsoidal height. */
+/* The place of the centre: degrees, degrees, ellipsoidal height. */
 void shim_map_place(const struct shim_map *map, double place[3]);
 /* The figures that longitude depends on: how differences in prcs lie to the centre's meridian. */
 struct shim_meridian {
@@ -51,6 +51,7 @@ struct shim_meridian {
 };
 /* 0 where there is none: from a UTM grid. */
 int shim_map_meridian(const struct shim_map *map, struct shim_meridian *out);
+/* The EPSG code of the CRS. */
 int shim_map_epsg(const struct shim_map *map);
 void shim_map_convergence(const struct shim_map *map, double *convergence_deg, double *scale);
 

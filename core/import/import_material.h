@@ -10,7 +10,7 @@ struct aiScene;
 struct aiMaterial;
 struct aiColor4D;
 
-/* What the material says of a surface; what is there already stays. */
+/* Takes the properties of a surface from its material; values that are set already stay. */
 int import_material(const struct assimp_lib *lib, struct scene_build *b, const struct aiScene *in,
                     const struct aiMaterial *material, struct scene_surface *surface, struct sh_err *err);
 

@@ -23,7 +23,7 @@ static struct plan_row *add(struct plan_row *row, const char *stage, const char 
     return row + 1;
 }
 
-/* What the cast promises for incidence up to 89.9 degrees; tests/stability holds it to that. */
+/* The bound of the cast for incidence up to 89.9 degrees, which tests/stability checks. */
 static const double CAST_ERROR_M = 1e-6;
 
 void plan_mesh(double error_m, struct plan_row *row)

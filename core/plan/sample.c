@@ -208,7 +208,7 @@ static void prepare_beam(struct plan_sample *s)
         cast_beam(s, &s->look[i], BEAM_RINGS, &s->look[i].reference);
 }
 
-/* What was found. Each mixed pulse stands for itself, each other one for many. */
+/* The sums over the sample. Each mixed pulse stands for itself, each other one for many. */
 struct tally {
     double echoes, further;          /* further: beyond the first of a pulse */
     double sum2, sum4;               /* of range errors, squared, and to the fourth power */

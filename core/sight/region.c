@@ -26,7 +26,7 @@ struct seen {
 };
 enum { COVERS_BIT = 31, COVERS = 1U << COVERS_BIT, NO_LEAF = 0xffffffff };
 
-/* What is known of a region while it is divided. */
+/* The state of a region while it is divided. */
 struct division {
     struct build_shared *b;
     struct build_work *w;

@@ -7,8 +7,8 @@
  * d / |d[axis]| = s e_axis + u e_axis+1 + v e_axis+2: any function that is linear in d is linear in u and v,
  * and takes its extremes over a square at the corners.
  *
- * Of a triangle a, b, c (corners relative to the station) two kinds of such functions matter. The side of an
- * edge, (a x (b - a)) . d, is positive inside; and plane . d = 1 / range.
+ * Two kinds of such functions matter for a triangle a, b, c (corners relative to the station). The side of
+ * an edge, (a x (b - a)) . d, is positive inside; and plane . d = 1 / range.
  *
  * A face has cells x cells squares, in tiles of SIGHT_TILE x SIGHT_TILE. A tile is one leaf, or a block of
  * leaves. A look-up may round a direction's coordinates: each leaf is valid for SIGHT_PAD beyond its own
@@ -46,7 +46,7 @@ enum {
     SIGHT_MAX_CELLS = 2048, /* a cell is then a thousand times its pad */
     SIGHT_MAX_LIST = 32,
 };
-/* Of the coordinates on a face: 8 times what single precision leaves of them. */
+/* In the coordinates on a face: 8 times their rounding in single precision. */
 #define SIGHT_PAD 0x1p-20
 
 /* A leaf, or what a tile says: the kind in the two highest bits, a number in the others. */
@@ -78,22 +78,23 @@ struct sight_record {
     uint32_t triangle;
 } __attribute__((aligned(128)));
 
-/* What double precision leaves in doubt of an edge's side, against the distance of its farther end times its
- * length: 10 units of 2^-53 here (the difference of the corners 1, the cross product 6, the product with a
- * direction 3), as many in core/bvh, and 8 more within which an edge that is missed there is nearly hit. */
+/* The doubt of an edge's side, relative to the distance of its farther end times its length. It is 10 units
+ * of 2^-53 here: the difference of the corners 1, the cross product 6, the product with a direction 3. As
+ * many come from core/bvh, and 8 more within which core/bvh takes a missed edge for nearly hit. */
 #define SIGHT_EDGE_DOUBT (32.0 * 0x1p-53)
 /* The doubt of a . (b x c), relative to the product of their lengths, here and in core/bvh together. */
 #define SIGHT_VOLUME_DOUBT (32.0 * 0x1p-53)
-/* How far the plane that core/bvh has of a triangle may lie off it, against its longest edge: far more than rounding
- * leaves. */
+/* A bound of the distance between a triangle and its plane in core/bvh, relative to its longest edge: far more than
+ * rounding. */
 #define SIGHT_TILT_DOUBT 0x1p-38
-/* Of plane . d, against the plane's length: its components 1, the product 3; twice, here and there. */
+/* The doubt of plane . d, relative to the plane's length: its components 1, the product 3; twice, here and
+ * in core/bvh. */
 #define SIGHT_PLANE_DOUBT (16.0 * 0x1p-53)
 /* Planes seen at a smaller sine are not decided here. Below 1e-6 core/bvh limits ranges to those between
  * the edges. */
 #define SIGHT_GRAZE 0x1p-15
-/* core/bvh takes ranges within 1e-12 of each other for the same: the lowest triangle wins. Above
- * this they are not for certain. */
+/* core/bvh takes ranges within 1e-12 of each other for the same: the lowest triangle wins. Ranges that
+ * differ by more than this are certainly different. */
 #define SIGHT_SAME 4e-12
 /* 1 / m. A ray does not hit the surface that it begins on (BVH_AT_ORIGIN_M). Nearer than twice that, the BVH
  * decides. */

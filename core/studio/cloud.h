@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* A recorded point cloud, and how far it lies from the scene. In: a PLY or LAS file, the scene's index of
+/* A recorded point cloud, and its distance from the scene. In: a PLY or LAS file, the scene's index of
  * distances, the stations' georeferences. Out: points; per point a distance in metres and a triangle;
  * statistics and coverage of them.
  *
  * PLY: ASCII, or binary of either byte order, any number types. Element vertex has the properties x, y, z
  * and, where they are there, station (from 1), echo and label, as our recorder writes them. Everything else
  * is ignored. LAS: 1.2 to 1.4, not compressed. There the point source ID is the station, the return number
- * the echo, the extra bytes "label" the label. Further columns are read where they are asked for; colours are
- * those of 8 bits in PLY, and in LAS the upper 8 of 16. Ownership:
+ * the echo, and the extra bytes "label" the label. Further columns are read where they are asked for. Colours
+ * have 8 bits in PLY; of LAS's 16 bits the upper 8 count. Ownership:
  * cloud_read allocates, cloud_free releases. A cloud is constant after cloud_read, any thread.
  *
  * Memory: 29 bytes a point; time 8, range, reflectance and amplitude 4 each, colours 3, the number of echoes 1. The
@@ -65,13 +65,13 @@ int cloud_read_columns(const char *path, unsigned columns, const struct sh_repor
                        struct sh_err *err);
 void cloud_free(struct cloud *cloud);
 
-/* How cloud_compare takes a point to the scene. */
+/* How cloud_compare maps a point to the scene. */
 struct cloud_site {
     const struct distance *index;
     const struct georef *const
         *georef; /* [n_stations], by station - 1; NULL: the cloud is in the scene frame already */
     uint32_t n_stations;
-    double max_m; /* how far to look */
+    double max_m; /* reach of the search */
     /* Bodies that do not stand in the scene; NULL: there are none. Takes a point of such a body's label from
      * the scene to the body's own frame and gives the body's index; NULL: the point is of the scene. From any
      * thread. */
@@ -92,8 +92,8 @@ static inline unsigned cloud_station(const struct cloud *cloud, size_t i)
     return cloud->station != NULL ? cloud->station[i] : 1;
 }
 void cloud_to_scene(const struct cloud *cloud, const struct cloud_site *site, size_t i, double p_prcs[3]);
-/* All points become places in the scene, once for all that follows; then there are no georefs any more. As
- * cloud_compare fails; after that the cloud is of no more use. */
+/* Maps all points to places in the scene, once for all later calls, and removes the georefs from site.
+ * Errors as of cloud_compare; after one, the cloud can't be used. */
 int cloud_into_scene(struct cloud *cloud, struct cloud_site *site, const struct sh_report *report, struct sh_err *err);
 
 struct cloud_coverage {
@@ -109,8 +109,9 @@ uint16_t cloud_surface(const struct cloud *cloud, const struct scene *scene, con
 int cloud_cover(const struct cloud *cloud, const struct scene *scene, uint32_t n_surfaces, const uint32_t *triangle,
                 struct cloud_coverage *out, struct sh_err *err);
 
-/* A percentile is the nearest rank: the smallest value that at least so many of all do not exceed. Mean, RMS,
- * percentiles and maximum are over the points that are not far, and NaN when there are none. */
+/* A percentile is the nearest rank: the smallest value that at least that share of all values does not
+ * exceed. Mean, RMS, percentiles and maximum are over the points that are not far, and NaN when there are
+ * none. */
 struct cloud_stats {
     size_t points; /* with coordinates, far ones included */
     size_t empty;  /* shots without echo */

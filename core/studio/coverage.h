@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Coverage: how much of a scene's surface pulses meet, and where a head would see most of what is left.
+/* Coverage: the part of a scene's surface that pulses hit, and where a head would see most of the rest.
  *
  * In: a scene with its BVH (prcs, metres), and scans as setups and schedules. Out: figures of each cell of the surface,
  * sums over all cells, a mesh of the cells.
@@ -10,11 +10,11 @@
  * a cell, and the two sides of a wall never do. A cell reaches at most 2.5 cell_m along each axis. Area counts, not
  * the number of cells.
  *
- * A cell is seen where the centre of a pulse meets one of its pieces, from whichever side, in a way that the head can
- * report (cast_meet: within its ranges and above its threshold, both without noise; through glass, not in mirrors).
- * Triangles with the same corners are one surface: all but one are left out (scene_find_twins). Bodies that move hide
- * what they hide, and have no cells. What lies between bodies, as the inner faces of layers of a wall, counts as
- * surface that nobody sees.
+ * A cell is seen where the centre of a pulse hits one of its pieces, from either side, and the head can report it
+ * (caster_meet: within its ranges and above its threshold, both without noise; through glass, not in mirrors).
+ * Triangles with the same corners are one surface: all but one are left out (scene_find_twins). Moving bodies hide
+ * the surfaces behind them, and have no cells. Faces between bodies, such as the inner faces of a wall's layers,
+ * count as surface that is never seen.
  *
  * Results do not depend on the number of threads. One coverage belongs to one thread; the work is shared out below. */
 #ifndef CORE_STUDIO_COVERAGE_H
@@ -45,7 +45,7 @@ void coverage_free(struct coverage *coverage);
 
 enum { COVERAGE_MAX_STATIONS = 65535 };
 
-/* A scan: from where and with what, and the pulses. */
+/* A scan: its setup, and its pulses. */
 struct coverage_scan {
     struct cast_setup setup;
     struct schedule_segment segment; /* has an end */
@@ -55,16 +55,16 @@ struct coverage_scan {
 };
 
 struct coverage_pulses {
-    uint64_t cast, met;   /* with at least one hit that counts, on what stands still */
+    uint64_t cast, met;   /* with at least one hit that counts, on the scene that stands still */
     uint64_t hits, front; /* of these hits, on the front of a triangle */
 };
 
-/* Casts a scan. Its result waits until it is kept or dropped. Work of over a second reports how far it is. */
+/* Casts a scan. Its result waits until it is kept or dropped. Reports progress after a second. */
 int coverage_look(struct coverage *coverage, const struct coverage_scan *scan, const char *what,
                   const struct sh_report *report, struct coverage_pulses *pulses, struct sh_err *err);
-/* Of the scan that waits: the area that it sees, and what of that no scan before has seen. */
+/* Figures of the waiting scan: the area that it sees, and the part of it that no scan before has seen. */
 void coverage_waiting(const struct coverage *coverage, double *seen_m2, double *gain_m2);
-/* It becomes the next station's, counted from 1 in this order. */
+/* Makes the waiting scan that of the next station, counted from 1 in this order. */
 void coverage_keep(struct coverage *coverage);
 void coverage_drop(struct coverage *coverage);
 
@@ -78,7 +78,7 @@ struct coverage_spread {
 struct coverage_sums {
     uint32_t stations, cells;
     uint64_t pieces, triangles;
-    double area_m2, twin_m2, silent_m2;   /* of all cells; of faces left out: they lie on others; they give no echo */
+    double area_m2, twin_m2, silent_m2;   /* of all cells; of duplicate faces, and faces without echo: left out */
     double none_m2, one_m2, several_m2;   /* by how many stations see it */
     struct coverage_spread density_1_m2;  /* pulses per area, of all stations; over the area that is seen */
     struct coverage_spread incidence_rad; /* the smallest of each cell, likewise */
@@ -107,7 +107,7 @@ uint32_t coverage_cells(const struct coverage *coverage);
 void coverage_get(const struct coverage *coverage, uint32_t cell, struct coverage_cell *out);
 
 /* The cell of a place on a triangle of the scene, of which p_m is the nearest point or near it; COVERAGE_NO_CELL: the
- * triangle is left out (it lies on another one, or is silent). For points that somebody else has measured. Any thread. */
+ * triangle is left out (it lies on another one, or is silent). For measured points of other sources. Any thread. */
 enum { COVERAGE_NO_CELL = 0xffffffff };
 uint32_t coverage_cell_at(const struct coverage *coverage, uint32_t triangle, const double p_m[3]);
 
@@ -136,13 +136,13 @@ struct coverage_directions {
     double range_min_m, range_max_m;
 };
 
-/* What a head at a place would see that no station has seen, by far fewer rays than a scan has. Each ray that meets
+/* The unseen surface that a head at a place would see, estimated by far fewer rays than a scan has. Each ray that hits
  * such a cell stands for the area range^2 each_sr / cos(incidence), cos at least 0.02. Where that is less than the
- * cell's, the cell is met by several rays, and counts as a whole, as it does in a scan. Where it is more, the ray stands
- * for the cells around, too, and counts with its area. An infinite each_sr lets each cell that is met count as a whole.
- * What this leaves out: cells of which only corners are seen, between rays. What it adds: cells that a scan's own points
- * are too far apart for, and ray areas that reach beyond an outline, half of one on average along all outlines. Glass
- * counts as a wall, and what moves as nothing. */
+ * cell's, several rays hit the cell, and it counts as a whole, as it does in a scan. Where it is more, the ray stands
+ * for the cells around, too, and counts with its area. An infinite each_sr lets each cell that is hit count as a whole.
+ * The estimate lacks cells of which only corners are seen, between rays. It adds cells that lie between a scan's own
+ * points, and ray areas that reach beyond an outline: on average half of one along all outlines. Glass counts as a
+ * wall, and what moves as nothing. */
 struct coverage_gain {
     double gain_m2;
     double front; /* of what the rays meet, the share met from the front; NaN: nothing is met */

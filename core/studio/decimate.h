@@ -8,7 +8,7 @@
  *
  * The grid: along each axis the bounds are divided into n = ceil(extent / cell_m) steps of at most cell_m, and cells are
  * centred on their ends: the first on the lower bound, the last on the upper one. So the bounds move inwards by at most
- * half a cell, and a vertex by less than a cell along each axis. What lies in one plane along two of the axes stays in
+ * half a cell, and a vertex by less than a cell along each axis. Surfaces in one plane along two of the axes stay in
  * it, unless another surface is nearer than a cell.
  *
  * Bounds and means are of the vertices that triangles use. Pure; any thread. Results don't depend on anything else. */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* How far recorded points are from where their beams meet the scene, and how far they may be. In: a cloud
- * (core/studio/cloud.h) with its distances, and what each station's head is. Out: per point the deviation along the
- * beam, its expected sigma, range and incidence, in metres and as cosines.
+/* Deviations of recorded points from the places where their beams hit the scene, and the expected
+ * deviations. In: a cloud (core/studio/cloud.h) with its distances, and each station's head. Out: per point the
+ * deviation along the beam, its expected sigma, range and incidence, in metres and as cosines.
  *
  * Along the beam: the line from the station through the point is followed to the scene. measured - exact range
  * is positive where the point lies beyond the surface. Exact is the range of the BVH's first hit. Where the point
@@ -10,28 +10,29 @@
  *
  * On a smooth face: the point's distance from the nearest triangle is the deviation times the cosine of the
  * incidence, to 1 % and 2 um. So the surface that the beam meets is also the nearest one, and no edge or corner is
- * between. With a footprint twelve rays along its border have to meet the same plane, too. Only there is there a deviation along the beam: at an edge it may be any number, however good the point.
+ * between. With a footprint, twelve rays along its border have to hit the same plane, too. Only such points have a
+ * deviation along the beam: at an edge it may be any number, however good the point.
  *
- * A point is judged where the noise alone decides about its deviation: on a smooth face that is alone. Two balls of
+ * A point is judged where noise alone causes its deviation: on a smooth face with no other surface near. Two balls of
  * DEVIATION_CLEAR sigma touch the face where the beam meets it, in front and behind; nothing else reaches into them.
- * Otherwise large deviations were taken for small ones of the other surface. Up to about DEVIATION_SAMPLE points of a
- * cloud are judged, evenly taken.
+ * Otherwise large deviations would be taken for small ones of the other surface. Up to about DEVIATION_SAMPLE points
+ * of a cloud are judged, evenly taken.
  *
  * Expected sigma of that deviation, to first order. u: the beam, n: the face's normal, i: the incidence, R: the
  * range; with cos i = |n u| a move of the point by m changes the deviation by (n m) / (n u):
  *     range noise      sigma0 + sigma1 R, or by the signal (core/detect.h)
  *     angle noise      R sigma |n e| / cos i, e: where the angle moves the beam, at right angles to it
  *     ball             f_k |n_k| radius / sqrt(5) / cos i over its axes: a ball's uniform points have r^2/5 an axis
- * Counts add, by themselves, as they are no noise:
+ * The steps of counts add to that. They are summed separately, since they are no noise:
  *     of encoders      as angle noise of sigma = step / sqrt(12)
  *     of positions     step / sqrt(12) / cos i; of polar ranges without the cosine
- * That is where all places within a count are as likely. Angles of a schedule need not be so: their share is anything
- * from 0 to sqrt(3) times that.
+ * This holds where all places within a count are equally likely. Angles of a schedule need not be: their part is from
+ * 0 to sqrt(3) times that.
  * Sigma is NaN where it is not known: noise by the signal on textured surfaces and of later echoes; errors of the
  * instrument.
  *
- * The bound of the distance, where nothing random is on but a ball: errors of cast and georeferencing as the plan
- * has them, half a count an axis (sqrt(3)/2 counts of a position; a polar point's range and angles, at right
+ * The bound of the distance, where the only random effect is a ball. It adds: errors of cast and georeferencing
+ * from the plan, half a count an axis (sqrt(3)/2 counts of a position; a polar point's range and angles, at right
  * angles to each other), half an encoder count an axis times R, the ball's radius. */
 #ifndef CORE_STUDIO_DEVIATION_H
 #define CORE_STUDIO_DEVIATION_H
@@ -41,7 +42,7 @@
 
 enum { DEVIATION_CLEAR = 8, DEVIATION_SAMPLE = 400000 };
 
-/* What a station's head is. */
+/* The head of a station. */
 struct deviation_head {
     struct cast_setup setup;             /* as the scan's: station, BVH, noise, counts */
     double angle_sigma_rad[2];           /* noise of mirror and pan */
@@ -55,7 +56,7 @@ struct deviation_head {
 struct deviation_points {
     float *along_m;  /* measured minus exact; NaN: not on a smooth face, far, a shot without echo, of a body */
     float *sigma_m;  /* expected; NaN: not known, the point isn't judged, or along_m is NaN */
-    float *counts_m; /* what counts add to that; NaN where sigma_m is */
+    float *counts_m; /* the counts' part of it; NaN where sigma_m is */
     float *cosine;   /* of the incidence on what the beam meets; NaN: nothing, or the station moves */
     float *range_m;  /* from the station; NaN: a shot without echo */
     uint32_t *met;   /* the triangle that the beam meets there, as the BVH has it, or else the nearest one;

@@ -8,8 +8,8 @@
 #include "core/studio/cloud.h"
 #include "core/studio/deviation.h"
 
-/* Of one group of points. Distances are to the nearest triangle and never negative; `along` is signed (measured minus
- * exact range, on smooth faces). Figures without a point are NaN. */
+/* Figures of one group of points. Distances are to the nearest triangle and never negative; `along` is signed
+ * (measured minus exact range, on smooth faces). Figures without a point are NaN. */
 struct figures {
     size_t points, far;                            /* with coordinates; of these, farther than everything */
     double mean_m, rms_m, p95_m, max_m;            /* of the distances that are not far; nearest rank */
@@ -46,14 +46,15 @@ struct figures_histogram {
     uint32_t bins;
     uint64_t count[FIGURES_MAX_BINS], below, above;
 };
-/* Of values; at least a share of them lies within. Bins begin at multiples of their width (1, 2 or 5 times a power of
- * ten), signed ones go as far to both sides. Values that are not finite don't count. No value: 0 bins. */
+/* Makes a histogram that holds at least a share of the values. Bins begin at multiples of their width (1, 2 or 5
+ * times a power of ten); signed ones reach equally far to both sides. Values that are not finite don't count. No
+ * value: 0 bins. */
 void figures_histogram_of(const double *value, size_t n, double share, struct figures_histogram *out);
 void figures_histogram_of_signed(const float *value, size_t n, double share, struct figures_histogram *out);
 /* The smallest of 1, 2, 5 times a power of ten that is v or more; v > 0. */
 double figures_nice(double v);
 
-/* How dense the points of one station lie on the surfaces. The scene is cut into cells: a triangle's plane is seen
+/* The density of one station's points on the surfaces. The scene is cut into cells: each triangle's plane is projected
  * along the axis that it faces most, and divided into squares of cell_m there. A cell is such a square of one plane,
  * by one station; its area is cell_m^2 / |n|, n the normal's part along that axis. Its density is points / area. Cells
  * at a border count as whole ones, so theirs is a lower limit. A percentile p is the density that p of the points do
@@ -76,18 +77,19 @@ struct figures_density {
 int figures_density_of(const struct cloud *cloud, const struct cloud_site *site, const struct scene *scene,
                        const struct figures_in *in, const uint32_t *triangle, double cell_m,
                        const struct sh_report *report, struct figures_density *out, struct sh_err *err);
-/* The same with a cell that nobody has chosen: first_m, doubled until half of the points lie in cells of 16, or nearly, and
- * up to 50 m. all: the figures of all its cells. */
+/* The same with a cell chosen here: first_m, doubled until half of the points lie in cells of 16, or nearly, and up to
+ * 50 m. all: the figures of all its cells. */
 int figures_density_fit(const struct cloud *cloud, const struct cloud_site *site, const struct scene *scene,
                         const struct figures_in *in, const uint32_t *triangle, double first_m,
                         const struct sh_report *report, struct figures_density *out, struct figures_density_row *all,
                         struct sh_err *err);
 void figures_density_free(struct figures_density *density);
-/* Of the cells of one station (from 1; 0: of all), whose mean range is from from_m to below to_m. NaN: no cell. */
+/* Figures of the cells of one station (from 1; 0: of all) whose mean range is at least from_m and below to_m. NaN:
+ * no cell. */
 void figures_density_within(const struct figures_density *density, unsigned station, double from_m, double to_m,
                             struct figures_density_row *row);
 
-/* When the points of a station came, in the order of the file. Where time goes back another scan begins. */
+/* Times of a station's points, in the order of the file. Where time goes back, another scan begins. */
 struct figures_times {
     size_t points, scans;
     double first_s, last_s, span_s; /* the last: of all scans together */

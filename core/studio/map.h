@@ -5,14 +5,14 @@
  * x goes to the right, y (north) up. Per pixel the map keeps which height levels were hit, and the lowest
  * point.
  *   lightness  shows structure: a pixel with points on many levels (a wall) is dark, one with floor and
- *              ceiling only is light, one without points is white. It does not depend on how dense the points
- *              lie, so far walls stand out as near ones do. Each point is drawn three pixels wide.
+ *              ceiling only is light, one without points is white. It does not depend on the density of
+ *              points, so far walls stand out like near ones. Each point is drawn three pixels wide.
  *   hue        shows the height of the lowest point above the lowest of the map
  * Both are even steps of CIE L*a*b*. Below the map: scale bar, legend of heights, north arrow. Each station has a
- * red triangle, a tick where its heading points, and its name and height beside it. A label stands where it covers
- * neither another label nor a station, if there is such a place near its station, and walls as little as can be;
- * without such a place it is left out and counted. An SVG has the points as an image, and all else as vectors;
- * labels left out are titles there, as those of all stations are.
+ * red triangle, a tick where its heading points, and its name and height beside it. A label stands near its
+ * station where it covers neither another label nor a station, and as little of walls as possible. Without such a
+ * place it is left out and counted. An SVG has the points as an image, and all else as vectors; labels left out
+ * are titles there, as those of all stations are.
  *
  * Ownership: map_create allocates everything, map_free releases it. Thread: one at a time. Not real-time
  * safe. */
@@ -61,8 +61,8 @@ struct map_station {
 /* SH_EINPUT outside the area or beyond MAP_MAX_STATIONS. */
 int map_add_station(struct map *map, const struct map_station *station, struct sh_err *err);
 
-/* A line from a to b, prcs, as an open edge of the scene: red, under the stations. Ends outside of the area are moved to its border.
- * Beyond MAP_MAX_EDGES it is left out and counted. SH_ENOMEM. */
+/* Adds a line from a to b, prcs, such as an open edge of the scene: red, under the stations. Ends outside of the area
+ * are moved to its border. Beyond MAP_MAX_EDGES it is left out and counted. SH_ENOMEM. */
 int map_add_edge(struct map *map, const double a[2], const double b[2], struct sh_err *err);
 
 struct map_counts {
@@ -88,7 +88,7 @@ struct map_label {
     uint32_t station;
     int placed; /* 0: there was no room */
 };
-/* Chooses places for the labels of all stations: out has room for so many; gives how many were left out. */
+/* Chooses places for the labels of all stations; out has room for all. Returns how many were left out. */
 uint32_t map_place_labels(const struct map *map, struct map_label *out);
 
 /* Writes the image: to path.part beside it first, then renamed, so that path is whole or as it was. A map

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Meshes to files: vertices and triangles in, one file out (and the files that it names); which format, its ending
- * says: .ply, .obj, .gltf, .glb, .fbx.
+/* Meshes to files: vertices and triangles in, one file out, and the files that it names. The ending chooses the
+ * format: .ply, .obj, .gltf, .glb, .fbx.
  *
- * Units and frames: metres, z up, right-handed. What each format makes of it:
+ * Units and frames: metres, z up, right-handed. In the formats:
  *   .ply   binary, little-endian: coordinates as double. As text: to the nanometre.
  *   .obj   coordinates to the nanometre; z up (the format has neither unit nor axes). With a material (a texture, or
  *          parts): NAME.mtl beside it.
@@ -32,10 +32,11 @@ enum {
     MESH_NAME_LEN = 256,
 };
 
-/* What a figure is, in memory and in the file. */
+/* The type of a figure, in memory and in the file. */
 enum mesh_type { MESH_DOUBLE, MESH_FLOAT, MESH_UINT16, MESH_UINT8 };
 
-/* A figure a vertex. Of .ply alone. value: [n_vertices] of double, float, uint16_t or uint8_t, as type says. */
+/* A figure for each vertex, in .ply only. value: [n_vertices] of double, float, uint16_t or uint8_t, as type
+ * says. */
 struct mesh_scalar {
     const char *name; /* of the property: a word */
     const void *value;
@@ -81,13 +82,13 @@ int mesh_takes_points(const char *path);
 int mesh_is_float(const char *path);
 
 /* SH_EINPUT where the ending is of a format of floats and they can't hold coordinates between low and high, with the
- * figures and what to do. For an early refusal; mesh_write asks the same. */
+ * figures and what to do. For an early refusal; mesh_write checks the same. */
 int mesh_check_box(const char *path, const double low[3], const double high[3], struct sh_err *err);
 
-/* Whole or not at all (core/newfile.h), with the files that it names: all are written as NAME.part, and once all are whole
- * they are renamed, the mesh last. Where one can't be written, none is left. SH_EINPUT: an ending that is not known, with
- * those that are; a number that is not finite; what the format can't hold. SH_ESTOPPED where report asks to stop; progress
- * of what lasts over a second. */
+/* Writes the mesh and the files that it names, all or none (core/newfile.h): all are written as NAME.part, and once all
+ * are complete they are renamed, the mesh last. Where one can't be written, none is left. SH_EINPUT: an unknown ending,
+ * with the known ones; a number that is not finite; a mesh that the format can't hold. SH_ESTOPPED where report asks to
+ * stop; progress of what lasts over a second. */
 int mesh_write(const char *path, const struct mesh *mesh, const struct sh_report *report, struct sh_err *err);
 
 #endif

@@ -3,7 +3,7 @@
  * corner, x to the right, y down; colours as sRGB, 8 bits a channel. Out: an image, a PNG (libpng), an SVG.
  *
  * A pen draws on either: on an image, where edges are even by coverage, or into an SVG, as elements of vectors. So
- * what is drawn is said once. The font is one of strokes and our own: ASCII, the letters of Latin-1 with their
+ * drawings are described once. The font is one of strokes and our own: ASCII, the letters of Latin-1 with their
  * accents, and the degree sign. Other characters are boxes on an image; an SVG has them as they are.
  *
  * Ownership: picture_make allocates, picture_free releases; so do svg_begin and svg_end. Thread: a picture
@@ -25,7 +25,8 @@ struct picture {
 int picture_make(struct picture *picture, uint32_t width, uint32_t height, const uint8_t rgb[3], struct sh_err *err);
 void picture_free(struct picture *picture);
 
-/* Outside the image nothing happens, here and below. coverage 0..1: how much of the pixel gets the colour. */
+/* Places outside of the image are ignored, here and below. coverage 0..1: how much of the pixel gets the
+ * colour. */
 void picture_blend(struct picture *picture, long column, long row, const uint8_t rgb[3], double coverage);
 void picture_fill(struct picture *picture, long column, long row, long width, long height, const uint8_t rgb[3]);
 /* With round ends; from and to may be the same place: a disc. */
@@ -45,18 +46,18 @@ void picture_text(struct picture *picture, double x, double y, enum picture_anch
                   const struct picture_type *type, const uint8_t rgb[3], const char *text);
 double picture_text_width(const struct picture_type *type, const char *text);
 
-/* CIE 1976 L*a*b* (white D65), L* 0..100, to sRGB; what lies outside the gamut is moved to its border. */
+/* CIE 1976 L*a*b* (white D65), L* 0..100, to sRGB; colours outside the gamut are moved to its border. */
 void picture_lab(double l, double a, double b, uint8_t rgb[3]);
 
 /* Writes the image: to path.part beside it first, then renamed, so that path is whole or as it was. Errors begin
  * with `what` and name the path. */
 int picture_write_png(const struct picture *picture, const char *what, const char *path, struct sh_err *err);
 
-/* Its PNG to a stream, which is flushed. Errors say why alone. */
+/* Writes its PNG to a stream, which is flushed. Errors give only the reason. */
 int picture_put_png(FILE *out, const struct picture *picture, struct sh_err *err);
 
 /* For pages that hold pictures: the image as the URI of a PNG's data, with one colour transparent (NULL: none); and a
- * text in XML or HTML, in an attribute, too. What is no character of XML becomes U+FFFD. */
+ * text in XML or HTML, in an attribute, too. Bytes that are no character of XML become U+FFFD. */
 int picture_put_uri(FILE *out, const struct picture *picture, const uint8_t *clear, struct sh_err *err);
 void picture_put_escaped(FILE *out, const char *text);
 

@@ -5,8 +5,8 @@
  * A cell lies between two rows and two columns that follow each other. Where all four corners have a point it gives two
  * triangles, cut along the shorter diagonal (from the first row of the first column where both are as long). Where three
  * have one, it gives the triangle of these. Nothing is drawn across a missing row or column. The corners of a triangle
- * are in that order in which its normal points to the head: counter-clockwise as the head sees it. A triangle without
- * area, or whose plane the head lies in, faces nowhere; it is left out and counted.
+ * are in the order that makes its normal point to the head: counter-clockwise as the head sees it. A triangle without
+ * area, or with the head in its plane, is left out and counted.
  *
  * The long-edge filter leaves out each triangle with an edge that is longer than `long_edge` times the mean edge. The
  * mean is over all edges of the mesh before the filter, each counted once: along columns, along rows, and diagonals.
@@ -24,7 +24,7 @@
 struct scan_column {
     uint32_t line;  /* in the scan: columns whose lines differ by one are neighbours */
     uint32_t first; /* its first point; the last column ends with the last point */
-    int is_pole; /* all its shots go one way: its first point alone counts, and borders on all rows of its neighbours */
+    int is_pole; /* all its shots have one direction: only its first point counts, next to all rows of its neighbours */
 };
 
 struct scan_grid {
@@ -71,12 +71,12 @@ struct scan_sampler {
     double *sum_m2; /* [n_faces] area of faces 0 to i */
     double area_m2;
 };
-/* Other points for each scan of each station, both counted from 1. */
+/* A key that differs for each scan of each station, both counted from 1. */
 uint64_t scan_sampler_key(uint64_t seed, uint32_t station, uint32_t scan);
 /* SH_ENOMEM. scan_sampler_free is due in any case. */
 int scan_sampler_start(struct scan_sampler *sampler, const double (*xyz_m)[3], const uint32_t (*face)[3],
                        uint32_t n_faces, uint64_t key, struct sh_err *err);
-/* Points for so many a square metre: area times density, rounded. */
+/* The number of points for a density per square metre: area times density, rounded. */
 double scan_sampler_count(const struct scan_sampler *sampler, double per_m2);
 /* Point k < 2^56: in face *face, corner i weighed by weight[i] (the sum is 1). */
 void scan_sampler_point(const struct scan_sampler *sampler, uint64_t k, uint32_t *face, double weight[3]);

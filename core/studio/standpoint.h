@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A place from which a head sees much of a scene: for a first scan of a mesh that nobody has looked at yet.
+/* A viewpoint: a place from which a head sees much of a scene, for a first scan of an unknown mesh.
  *
  * In: a scene (prcs, metres, z up) and what a head reaches. Out: a position, a heading, and the part of the
  * field of view that is worth scanning. Three kinds are tried in this order, and the first that is good
@@ -7,7 +7,8 @@
  *
  *   inside   above a level floor and below a ceiling, in a room whose surfaces face the head
  *   ground   above a level surface under the open sky: terrain, or between buildings
- *   outside  at a distance of the whole, looking at it: an object, or a closed shell whose faces point outward
+ *   outside at a distance from the whole scene, looking at it: an object, or a closed shell whose faces point
+ *   outward
  *
  * What "sees much" means is measured: rays are cast over the field of view from each candidate. The same
  * scene and view give the same place. */
@@ -20,7 +21,7 @@
 
 struct standpoint_view {
     double range_min_m, range_max_m;
-    double line_min_rad, line_max_rad; /* 0 level, pi/2 up; what lies beyond the zenith doesn't count */
+    double line_min_rad, line_max_rad; /* 0 level, pi/2 up; angles beyond the zenith don't count */
 };
 
 enum standpoint_kind { STANDPOINT_INSIDE, STANDPOINT_GROUND, STANDPOINT_OUTSIDE };
@@ -30,7 +31,8 @@ struct standpoint {
     double position_m[3]; /* of the head's origin */
     double floor_m;       /* height above the floor; NaN: outside */
     double seen;          /* share of the directions looked at that meet something within the ranges */
-    /* What to scan. Inside and on the ground: all of it, heading 0. Outside: what holds the scene. */
+    /* What to scan. Inside and on the ground: all of it, heading 0. Outside: the part that holds the
+     * scene. */
     double heading_rad;          /* of pan 0, clockwise from y */
     double pan_rad;              /* from 0 to this */
     double line0_rad, line1_rad; /* within the view */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A picture of points as seen from a place: a pinhole camera, hidden points removed, shading by depth. In: points of
- * any number, one after the other, in prcs (metres), each with a figure or a colour. Out: an image.
+/* A picture of points as seen from a place: a pinhole camera, hidden points removed, shading by depth. In: any
+ * number of points, one after the other, in prcs (metres), each with a figure or a colour. Out: an image.
  *
  * Camera: at eye, looking at look_at, z up in the picture. A point p with right, up and ahead coordinates (r, u, d)
  * from the eye is at
@@ -11,9 +11,9 @@
  * discs bulge, so that on a surface each place takes the nearest centre. Memory depends on the image alone: 12
  * bytes for each of SUB x SUB places of a pixel.
  *
- * Shading: surfaces are bright that face the light from the upper left of the eye; places are dark whose neighbours
- * are nearer (eye-dome lighting, C. Boucheny: Visualisation scientifique de grands volumes de donnees: pour une
- * approche perceptive, thesis, Grenoble 2009), at several distances in the image. Normals come from the depths,
+ * Shading: surfaces that face the light from the upper left of the eye are bright; places whose neighbours are
+ * nearer are dark (eye-dome lighting, C. Boucheny: Visualisation scientifique de grands volumes de donnees: pour
+ * une approche perceptive, thesis, Grenoble 2009), at several distances in the image. Normals come from the depths,
  * which are smoothed within surfaces.
  *
  * Ownership: view_create allocates, view_free releases. One thread at a time. Not real-time safe. */
@@ -63,10 +63,12 @@ struct view_counts {
 };
 void view_get_counts(const struct view *view, struct view_counts *counts);
 
-/* Where a place is in the image; depth_m ahead of the eye. 0: it is not before the eye. */
+/* The position of a place in the image, and its depth_m ahead of the eye. 0: it is not in front of the
+ * eye. */
 int view_project(const struct view *view, const double p_m[3], double place_px[2], double *depth_m);
 
-/* Smallest and largest figure that is seen, but for the lowest and highest half percent of the places; 0: none is. */
+/* The smallest and largest visible figure, without the lowest and highest half percent of the places; 0: none is
+ * visible. */
 int view_range(const struct view *view, double *low, double *high);
 
 /* Colours of figures. */
@@ -83,12 +85,12 @@ int view_draw(const struct view *view, const struct view_colours *colours, struc
 
 /* ---- what stands beside the picture */
 
-/* Even steps of CIE L*a*b* from blue (0) over green and yellow to red (1): as the map's heights, but stronger. NaN:
- * colour_unknown. */
+/* Even steps of CIE L*a*b* from blue (0) over green and yellow to red (1): like the map's heights, but stronger.
+ * NaN: colour_unknown. */
 void view_ramp(double part, uint8_t rgb[3]);
 
-/* Stations' marks, where they are before the eye and in the image, and their names where they cover no other name
- * and no other mark.
+/* Draws marks of stations in front of the eye and in the image, and their names where these cover no other name
+ * or mark.
  * Returns how many names are left out of those whose marks are drawn. */
 struct view_station {
     double p_m[3];
@@ -106,14 +108,15 @@ struct view_entry {
     char name[64];
 };
 enum { VIEW_MAX_NAMES = 12 };
-/* The same for n things that have names, of which the first VIEW_MAX_NAMES are needed; as many as there is room for, and
- * how many more there are. */
+/* The same for n things with names, of which the first VIEW_MAX_NAMES are needed. Draws as many as there is room for,
+ * and the number of the others. */
 void view_draw_names(struct picture *picture, const char *title, const struct view_entry *entry, uint32_t n);
 
 /* ---- where to look from */
 
-/* An eye from which a box fills the image: in the direction azimuth (clockwise from y, seen from above, where the eye
- * stands) and elevation above the horizon, below 90 degrees. fov, width and height are given; eye and look_at are set. */
+/* Chooses an eye from which a box fills the image: in the direction azimuth (clockwise from y, seen from above, where
+ * the eye stands) and elevation above the horizon, below 90 degrees. fov, width and height are given; eye and look_at
+ * are set. */
 void view_frame(const double min_m[3], const double max_m[3], double azimuth_rad, double elevation_rad,
                 struct view_camera *camera);
 
