@@ -92,8 +92,8 @@ static inline unsigned cloud_station(const struct cloud *cloud, size_t i)
     return cloud->station != NULL ? cloud->station[i] : 1;
 }
 void cloud_to_scene(const struct cloud *cloud, const struct cloud_site *site, size_t i, double p_prcs[3]);
-/* All points become places in the scene, once for all that follows; then there are no georefs any more. As
- * cloud_compare fails; after that the cloud is of no more use. */
+/* Moves all points to the scene's frame, and sets site->georef to NULL. Fails as cloud_compare does; the cloud can't be
+ * used after that. */
 int cloud_into_scene(struct cloud *cloud, struct cloud_site *site, const struct sh_report *report, struct sh_err *err);
 
 struct cloud_coverage {
@@ -109,8 +109,8 @@ uint16_t cloud_surface(const struct cloud *cloud, const struct scene *scene, con
 int cloud_cover(const struct cloud *cloud, const struct scene *scene, uint32_t n_surfaces, const uint32_t *triangle,
                 struct cloud_coverage *out, struct sh_err *err);
 
-/* A percentile is the nearest rank: the smallest value that at least so many of all do not exceed. Mean, RMS,
- * percentiles and maximum are over the points that are not far, and NaN when there are none. */
+/* A percentile is the nearest rank: the smallest value that at least that share of all values does not exceed. Mean,
+ * RMS, percentiles and maximum are over the points that are not far, and NaN when there are none. */
 struct cloud_stats {
     size_t points; /* with coordinates, far ones included */
     size_t empty;  /* shots without echo */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Coverage: how much of a scene's surface pulses meet, and where a head would see most of what is left.
+/* Coverage: how much of a scene's surface pulses meet, and where a head would see most of the rest.
  *
  * In: a scene with its BVH (prcs, metres), and scans as setups and schedules. Out: figures of each cell of the surface,
  * sums over all cells, a mesh of the cells.
@@ -12,9 +12,9 @@
  *
  * A cell is seen where the centre of a pulse meets one of its pieces, from whichever side, in a way that the head can
  * report (cast_meet: within its ranges and above its threshold, both without noise; through glass, not in mirrors).
- * Triangles with the same corners are one surface: all but one are left out (scene_find_twins). Bodies that move hide
- * what they hide, and have no cells. What lies between bodies, as the inner faces of layers of a wall, counts as
- * surface that nobody sees.
+ * Triangles with the same corners are one surface: all but one are left out (scene_find_twins). Moving bodies hide
+ * surfaces behind them, and have no cells. Faces that are hidden between bodies, as between the layers of a wall, count
+ * as surface that is not seen.
  *
  * Results do not depend on the number of threads. One coverage belongs to one thread; the work is shared out below. */
 #ifndef CORE_STUDIO_COVERAGE_H

@@ -10,12 +10,13 @@
  *
  * On a smooth face: the point's distance from the nearest triangle is the deviation times the cosine of the
  * incidence, to 1 % and 2 um. So the surface that the beam meets is also the nearest one, and no edge or corner is
- * between. With a footprint twelve rays along its border have to meet the same plane, too. Only there is there a deviation along the beam: at an edge it may be any number, however good the point.
+ * between. With a footprint twelve rays along its border have to meet the same plane, too. Only on smooth faces has a
+ * point a deviation along the beam: at an edge it may be any number, however good the point.
  *
  * A point is judged where the noise alone decides about its deviation: on a smooth face that is alone. Two balls of
  * DEVIATION_CLEAR sigma touch the face where the beam meets it, in front and behind; nothing else reaches into them.
- * Otherwise large deviations were taken for small ones of the other surface. Up to about DEVIATION_SAMPLE points of a
- * cloud are judged, evenly taken.
+ * Otherwise a large deviation could be taken for a small one from another surface. Up to about DEVIATION_SAMPLE points
+ * of a cloud are judged, evenly taken.
  *
  * Expected sigma of that deviation, to first order. u: the beam, n: the face's normal, i: the incidence, R: the
  * range; with cos i = |n u| a move of the point by m changes the deviation by (n m) / (n u):
@@ -25,10 +26,9 @@
  * Counts add, by themselves, as they are no noise:
  *     of encoders      as angle noise of sigma = step / sqrt(12)
  *     of positions     step / sqrt(12) / cos i; of polar ranges without the cosine
- * That is where all places within a count are as likely. Angles of a schedule need not be so: their share is anything
- * from 0 to sqrt(3) times that.
- * Sigma is NaN where it is not known: noise by the signal on textured surfaces and of later echoes; errors of the
- * instrument.
+ * That holds where all places within a count are equally likely. A schedule's angles need not be: their share is
+ * anything from 0 to sqrt(3) times that. Sigma is NaN where it is not known: noise by the signal on textured surfaces
+ * and of later echoes; errors of the instrument.
  *
  * The bound of the distance, where nothing random is on but a ball: errors of cast and georeferencing as the plan
  * has them, half a count an axis (sqrt(3)/2 counts of a position; a polar point's range and angles, at right

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Figures of a compared cloud, for tables and pictures: by groups, as histograms, how dense its points lie, when they
  * came. In: distances (core/studio/cloud.h) and deviations (core/studio/deviation.h), metres. Out: statistics. What is NaN takes no
- * part. Pure; whoever makes arrays says how they are freed. */
+ * part. Pure; functions that make arrays say how these are freed. */
 #ifndef CORE_STUDIO_FIGURES_H
 #define CORE_STUDIO_FIGURES_H
 
@@ -76,8 +76,8 @@ struct figures_density {
 int figures_density_of(const struct cloud *cloud, const struct cloud_site *site, const struct scene *scene,
                        const struct figures_in *in, const uint32_t *triangle, double cell_m,
                        const struct sh_report *report, struct figures_density *out, struct sh_err *err);
-/* The same with a cell that nobody has chosen: first_m, doubled until half of the points lie in cells of 16, or nearly, and
- * up to 50 m. all: the figures of all its cells. */
+/* The same, where the user has chosen no cell: it is first_m, doubled until half of the points lie in cells of 16, or
+ * nearly, and up to 50 m. all: the figures of all its cells. */
 int figures_density_fit(const struct cloud *cloud, const struct cloud_site *site, const struct scene *scene,
                         const struct figures_in *in, const uint32_t *triangle, double first_m,
                         const struct sh_report *report, struct figures_density *out, struct figures_density_row *all,

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Meshes to files: vertices and triangles in, one file out (and the files that it names); which format, its ending
- * says: .ply, .obj, .gltf, .glb, .fbx.
+/* Meshes to files: vertices and triangles in, one file out (and the files that it names). The path's ending chooses the
+ * format: .ply, .obj, .gltf, .glb, .fbx.
  *
  * Units and frames: metres, z up, right-handed. What each format makes of it:
  *   .ply   binary, little-endian: coordinates as double. As text: to the nanometre.

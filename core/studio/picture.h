@@ -2,9 +2,9 @@
 /* Pictures: marks, lines and text on an image, as a PNG file or as SVG. In: places in pixels from the upper left
  * corner, x to the right, y down; colours as sRGB, 8 bits a channel. Out: an image, a PNG (libpng), an SVG.
  *
- * A pen draws on either: on an image, where edges are even by coverage, or into an SVG, as elements of vectors. So
- * what is drawn is said once. The font is one of strokes and our own: ASCII, the letters of Latin-1 with their
- * accents, and the degree sign. Other characters are boxes on an image; an SVG has them as they are.
+ * A pen draws on either: on an image, where edges are even by coverage, or into an SVG, as elements of vectors. So one
+ * function draws both. The font is one of strokes and our own: ASCII, the letters of Latin-1 with their accents, and
+ * the degree sign. Other characters are boxes on an image; an SVG has them as they are.
  *
  * Ownership: picture_make allocates, picture_free releases; so do svg_begin and svg_end. Thread: a picture
  * belongs to one at a time. Not real-time safe. */
@@ -69,7 +69,7 @@ struct pen {
     void (*triangle)(void *on, const double corner[3][2], const uint8_t rgb[3]);
     void (*text)(void *on, double x, double y, enum picture_anchor anchor, const struct picture_type *type,
                  const uint8_t rgb[3], const char *text);
-    /* What is drawn between the two belongs together: a group with a title. */
+    /* All that is drawn between the two is one group with a title. */
     void (*begin)(void *on, const char *class_name, const char *title);
     void (*end)(void *on);
 };

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A place from which a head sees much of a scene: for a first scan of a mesh that nobody has looked at yet.
+/* Finds a place from which a head sees much of a scene: for the first scan of an unknown mesh.
  *
  * In: a scene (prcs, metres, z up) and what a head reaches. Out: a position, a heading, and the part of the
  * field of view that is worth scanning. Three kinds are tried in this order, and the first that is good

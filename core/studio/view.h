@@ -11,10 +11,10 @@
  * discs bulge, so that on a surface each place takes the nearest centre. Memory depends on the image alone: 12
  * bytes for each of SUB x SUB places of a pixel.
  *
- * Shading: surfaces are bright that face the light from the upper left of the eye; places are dark whose neighbours
- * are nearer (eye-dome lighting, C. Boucheny: Visualisation scientifique de grands volumes de donnees: pour une
- * approche perceptive, thesis, Grenoble 2009), at several distances in the image. Normals come from the depths,
- * which are smoothed within surfaces.
+ * Shading: surfaces that face the light, from the upper left of the eye, are bright. Places whose neighbours are nearer
+ * are dark (eye-dome lighting, C. Boucheny: Visualisation scientifique de grands volumes de donnees: pour une approche
+ * perceptive, thesis, Grenoble 2009), at several distances in the image. Normals come from the depths, which are
+ * smoothed within surfaces.
  *
  * Ownership: view_create allocates, view_free releases. One thread at a time. Not real-time safe. */
 #ifndef CORE_STUDIO_VIEW_H

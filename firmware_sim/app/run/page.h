@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The place for what a head that runs tells a page beside its stream. `run` only opens, starts and closes it. The main of
- * scanhead fills the place (firmware_sim/app/studio/watch); that of scanheadd leaves it empty, and its page shows the
- * stream alone.
+/* A hook for what `scanhead run` serves to a page beside the stream. `run` only opens, starts and closes it. scanhead's
+ * main sets it (firmware_sim/app/studio/watch). scanheadd's main leaves it unset, and its page shows the stream alone.
  *
  *     open(cfg, site, &options, &watch, err)            before the loop is made
  *     loop_options.extra = link(watch), loop_options.web = source(watch); loop_create(...)
@@ -30,8 +29,9 @@ enum { WATCH_SCENE_TRIANGLES = 100000 };
 #define WATCH_CPU_SHARE 0.05
 
 struct run_page {
-    /* Builds what the observer needs: index of distances, cells of coverage, the coarse scene. report hears of it, and is
-     * warned of what there is no room for. cfg and site outlive the watch. On failure *out is NULL. */
+    /* Builds what the observer needs: index of distances, cells of coverage, the coarse scene. report gets the
+     * progress, and a warning for each part that there is no memory for. cfg and site outlive the watch. On failure
+     * *out is NULL. */
     int (*open)(const struct config *cfg, const struct site *site, const struct watch_options *options,
                 struct watch **out, struct sh_err *err);
     /* For the loop, which takes its descriptor over. */
