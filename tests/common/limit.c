@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A limit for each test program: one that waits for ever is ended, and says where. It is linked with every test program.
+/* A time limit for each test program: it ends one that waits for ever, and prints where that waits. It is linked with
+ * every test program.
  *
  * The limit is TEST_LIMIT_S seconds (run_tap.sh sets it to its own; 0: none; else DEFAULT_S). It only catches a hang, and
  * no result depends on it: where more want to run than there are processors, it is longer by that ratio. The main thread

@@ -6,8 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* With sanitizers each turn takes up to ten times as long, and more turns show no more faults of the code. Tests whose
- * turns are fewer then run as shipped, too (tests/shipped.sh). */
+/* Sanitizers check the code, and need few turns for that: each takes up to ten times as long with them. Tests that need
+ * the full count run as shipped, too (tests/shipped.sh). */
 #ifdef SH_SANITIZE
 enum { SANITIZED = 1 };
 #else
