@@ -136,7 +136,7 @@ static uint32_t find_fullest(const struct cells *c)
     return best;
 }
 
-/* From here on the survey looks at the bounds of what is in that cell. */
+/* From here on the survey has the bounds of the surface in that cell. */
 static void narrow(struct survey *s, const struct cells *c, uint32_t cell)
 {
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
