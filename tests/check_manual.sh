@@ -105,7 +105,7 @@ completions() {
         completes "scanhead help --completion" "" bash
 }
 
-# Every word that is offered for an option is one that the program takes: the reason of its failure is another one.
+# The program takes every word that is offered for an option: where it fails, it has another reason.
 words_are_known() {
     ! "$program" record none.yaml -o x.ply --colour nothing 2>&1 | grep -qv -e "--colour nothing: allowed are" || return
     for pair in run:--pace record:--colour record:--crs record:--ply-names; do

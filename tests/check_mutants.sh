@@ -1,7 +1,7 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
-# The tool of `make mutants`: draws are the same for a seed, what each operator makes is C, and in an example of few lines each
-# mutant is judged as it should be. Whether the tests find mutants of the product: `make mutants`. Prints TAP.
+# The tool of `make mutants`: draws are the same for a seed, each operator makes valid C, and in an example of few lines
+# each mutant is judged as it should be. `make mutants` shows whether the tests find mutants of the product. Prints TAP.
 set -u
 cd "$(dirname "$0")/.." || exit 1
 top=$PWD

@@ -9,7 +9,7 @@ trap 'rm -rf "$work"' EXIT
 . tests/tap.sh
 packaging=config/packaging
 
-# Both ways: what the library exports, and what it promises; the release in which a symbol came is none of the future.
+# Both ways: what the library exports, and what it promises; no symbol says that it came in a release of the future.
 symbols_agree() {
     nm -D --defined-only --with-symbol-versions "$build/libscanhead.so" | sed -n 's/.* \(scanhead_.*\)@@/\1@/p' | sort >"$work/has"
     sed -n 's/^ \(scanhead_[^ ]*\) [0-9].*/\1/p' $packaging/debian/libscanhead1.symbols | sort >"$work/says"
@@ -57,7 +57,7 @@ licences_are_named() {
         grep -q '^Copyright (c) .* the scanhead authors$' LICENSE
 }
 
-# 1.5 now. What is left is what the head is for: the network, real time.
+# systemd rates the unit's exposure 1.5 now. The rest is what the head needs: the network, real time.
 unit_is_sound() {
     sed "s|@PREFIX@|$work/root/usr|" $packaging/scanhead@.service.in >"$work/scanhead@.service"
     systemd-analyze verify --man=no "$work/scanhead@example.service" 2>&1 | grep "$work" && return 1

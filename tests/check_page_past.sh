@@ -1,6 +1,6 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
-# The points from before a page came, in node; tests/unit/page_past.mjs says what.
+# The points from before a page was opened, in node; tests/unit/page_past.mjs says what is tested.
 set -eu
 cd "$(dirname "$0")/.."
 command -v node >/dev/null || { echo "1..0 # SKIP node is missing"; exit 0; }

@@ -20,7 +20,7 @@
 # and glass.yaml have single rays, which is what they choose (wire/test_plan): to choose takes up to 1 s of processor time a
 # run. The recipes of core/plan choose. Outside of the first page Assimp reads the house: its other readers take 3 s of
 # processor time. With THOROUGH=1 configurations stay as they are.
-# First the script is tried on planted documents: what it can't find there, it can't find here.
+# First the script is tried on planted documents, whose failures are known.
 set -u
 
 limit_s=${RECIPE_LIMIT_S:-180}

@@ -45,7 +45,7 @@ commands() {
     [ $? = 2 ] && [[ $said == *"did you mean list?"* ]]
 }
 
-# With a page, too: it is served without what the studio says of the scan.
+# With a page, too: it is served without the studio's resources on the scan.
 same_stream() {
     sed 's|^links:.*||' tests/guest/head.yaml >"$work/config.yaml"
     cp tests/guest/room.obj "$work/"

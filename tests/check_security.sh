@@ -1,6 +1,6 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
-# Each test that the section Security of firmware_sim/README.md names is there, the case in it, too. Prints TAP.
+# Each test that the section Security of firmware_sim/README.md names exists, and so does the case in it. Prints TAP.
 set -u
 cd "$(dirname "$0")/.." || exit 1
 work=$(mktemp -d) || exit 1

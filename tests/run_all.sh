@@ -6,7 +6,7 @@
 # As many at a time as there are processors, those that take longest first in each folder:
 #   1. accuracy, stability, unit: they compute; beside them the guests, which take longest and so begin first, and the
 #      recipes, which mostly wait
-#   2. wire, which mostly waits; beside it two that wait for other people's clients
+#   2. wire, which mostly waits; beside it two tests that wait for other people's clients
 #   3. those that need a head in real time, but mostly wait: beside each other
 #   4. those that drive a head at its limits, or that spin: each has the machine to itself
 set -eu

@@ -5,14 +5,14 @@
 #   run_tap.sh [-t SECONDS] [-j N] PROGRAM... [--M PROGRAM...] [-- PROGRAM...]
 #
 # SECONDS per program; default $TAP_LIMIT_S, or 300; longer by the load, where more want to run than there are processors.
-# A test program ends itself then, and says where it was (tests/common/limit.c). What goes on for GRACE_S more, a script for
-# one, is killed with all that it started. N programs at a time, default 1; one that begins with `+` runs beside
-# these. Those after `--M` begin once all before have ended, M at a time. Those after `--` have the machine to themselves,
-# one after the other.
-# One line per program, in the order given, and the tables of those that have some; of one that fails, all
-# that it printed but its passed tests. The reasons of skips follow.
+# A test program ends itself then, and says where it was (tests/common/limit.c). A program that goes on for GRACE_S
+# more, such as a script, is killed with all that it started. N programs at a time, default 1; one that begins with
+# `+` runs beside these. Those after `--M` begin once all before have ended, M at a time. Those after `--` have the
+# machine to themselves, one after the other.
+# Prints one line per program, in the order given, and the tables of those that have some. For one that fails, it
+# prints all output but the passed tests. The reasons of skips follow.
 # The last line is `N passed, N failed, N skipped`. Exit status 1 when anything failed, 2 for wrong usage.
-# What counts as a failure beside `not ok`: fewer results than planned; a status other than 0, a signal or no end
+# These count as failures, too, beside `not ok`: fewer results than planned; a status other than 0, a signal or no end
 # within the limit, where no failure says so already; and a program without any result.
 set -u
 
@@ -82,7 +82,7 @@ start() {
     running[$!]=$number
 }
 
-# Kills the groups of those that are beyond their limit: first with SIGTERM, a tick later with SIGKILL.
+# Kills the groups of programs beyond their limit: first with SIGTERM, a tick later with SIGKILL.
 end_overdue() {
     local process number now_ms hundredths limit_ms
     now_ms=$(date +%s%3N)

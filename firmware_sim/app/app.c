@@ -19,7 +19,7 @@
 static atomic_int interrupted; /* lock-free, as a handler needs it; other threads ask for it, too */
 
 /* Signals that come together are one wish to end: `timeout` sends two, one to the process and one to its
- * group. From the third on, or a second after the first, they mean now. */
+ * group. A third signal, or one more than a second after the first, ends the process at once. */
 enum { SIGNALS_TOGETHER = 2 };
 static const int64_t TOGETHER_NS = 1000000000;
 
@@ -114,7 +114,7 @@ static int is_new(const char *text)
 }
 
 static pthread_mutex_t messages_lock = PTHREAD_MUTEX_INITIALIZER;
-static struct line_writer *messages; /* NULL: who has a message prints it */
+static struct line_writer *messages; /* NULL: messages are printed at once */
 
 static void say_gap(char text[LINE_GAP_BYTES], const uint64_t lost[LINE_KINDS])
 {

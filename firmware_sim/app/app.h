@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* What the commands of the command line share: exit status, messages, loading, signals, files of figures.
  *
- * Each command is one file and one struct app_command. Only commands print, and only main exits. An error is
- * one line on standard error; of a configuration each fault is one. */
+ * Each command is one file and one struct app_command. Only commands print, and only main exits. An error is one line
+ * on standard error; each error of a configuration is a line of its own. */
 #ifndef FIRMWARE_SIM_APP_APP_H
 #define FIRMWARE_SIM_APP_APP_H
 
@@ -33,7 +33,7 @@ APP_COMMANDS(APP_DECLARE, APP_DECLARE)
 
 /* Prints "scanhead: TEXT" and gives the exit status for the error. */
 int app_fail(const struct sh_err *err);
-/* The same for each fault of a configuration. */
+/* The same for each error of a configuration. */
 int app_fail_config(const struct config_faults *faults);
 
 /* Loads the configuration that the first operand names, with the settings, and gives it to `work`. `work` may
@@ -42,14 +42,14 @@ int app_fail_config(const struct config_faults *faults);
 int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, void *ctx, struct sh_err *err),
                     void *ctx);
 
-/* Before any file is opened: each that the command writes is another one, and none is read. Files are those of the command
- * line, those of cfg (NULL: there is none), with its links where the command opens them, and what meshes name.
- * app_with_config calls it; commands without a configuration call it themselves. */
+/* To be called before any file is opened. Checks that the command writes no file twice, and none that it reads. Files
+ * are those of the command line, those of cfg (NULL: there is none), with its links where the command opens them, and
+ * what meshes name. app_with_config calls it; commands without a configuration call it themselves. */
 int app_check_files(const struct app_input *in, const struct config *cfg, struct sh_err *err);
 
-/* From here on to app_end_messages a thread writes what the reports below say to standard error. So no thread of a head
- * waits for whoever reads it, or doesn't. What finds no room in 64 KiB is dropped, and its number is said there. The end
- * gives a reader that stands still 2 s. */
+/* From here to app_end_messages, a thread writes the messages of the reports below to standard error. So no thread of a
+ * head waits for its reader. Messages that find no room in 64 KiB are dropped, and their number is printed.
+ * app_end_messages waits at most 2 s for a reader that has stopped. */
 int app_begin_messages(struct sh_err *err);
 void app_end_messages(void);
 

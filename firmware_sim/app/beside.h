@@ -2,9 +2,9 @@
 /* The files that a mesh file names: materials (.mtl), buffers (.bin), images. In: the mesh's path. Out: each one that
  * is there, in the order in which they are named.
  *
- * It doesn't read formats. A name is what ends in such an ending and leads to a file, as it stands or by its last
- * part, from the folder of the file that names it, or the mesh's. So it may find more than a reader opens, but nothing less unless a name is coded
- * otherwise than with %20. */
+ * It doesn't parse the formats. A name is any text that has one of these endings and leads to a file, as it stands or
+ * by its last part. It is looked for in the folder of the file that names it, and in the mesh's. So it may find more
+ * files than a reader opens. It misses a name only where that is escaped in another way than by %20. */
 #ifndef FIRMWARE_SIM_APP_BESIDE_H
 #define FIRMWARE_SIM_APP_BESIDE_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Whether the files that a command reads and those that it is to write are apart, so that none is destroyed. */
+/* Checks that a command writes no file twice, and none that it reads, so that none is destroyed. */
 #include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -115,8 +115,8 @@ static int add_of_mesh(void *ctx, const char *name, const char *path)
     return add(f, join(name, INT_MAX, ", named in ", f->prefix), strdup(path), 0, 0);
 }
 
-/* Adds the files that are named in files that are read. Only one that exists can be overwritten, so the search is made
- * only then: it takes as long as reading the files. */
+/* Adds the files that meshes name. The search takes as long as reading the meshes, so it is made only where a file to
+ * be written exists already (any_is_there). */
 static int add_of_meshes(struct files *f)
 {
     static const char *const endings[] = {".obj", ".ply", ".gltf", ".glb", ".fbx", ".dae", ".ifc"};
@@ -152,7 +152,7 @@ static int add_of_scanners(struct files *f, const struct config *cfg)
     return rc;
 }
 
-/* Whether a file that is written is there: without any, nothing that is there can be destroyed. */
+/* 1: a file that is to be written exists already. Where none does, nothing can be overwritten. */
 static int any_is_there(const struct files *f)
 {
     struct stat st;

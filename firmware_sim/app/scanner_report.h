@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Warnings of the scanners of a configuration: what several of them say is said once, with their stations. In: the
+/* Warnings of a configuration's scanners: one that several of them give is printed once, with their stations. In: the
  * warnings of each scanner while it is set up. Out: one warning for each text. */
 #ifndef FIRMWARE_SIM_APP_SCANNER_REPORT_H
 #define FIRMWARE_SIM_APP_SCANNER_REPORT_H

@@ -57,10 +57,10 @@ struct beam_view {
 int beam_rig_open(struct beam_rig *rig, struct scene *scene, const double station_m[3], const struct beam_view *view,
                   struct sh_err *err);
 void beam_rig_close(struct beam_rig *rig);
-/* 128 sub-rays for a pulse, in place of 1,000, where they see nothing but one smooth surface: ranges within 5 mm. Then
+/* 128 sub-rays for a pulse, in place of 1,000, where they hit nothing but one smooth surface: ranges within 5 mm. Then
  * they are the reference, and this returns 1. 48 of them run around the rim, so that several lie in whatever an edge
- * cuts off with 1 % of the energy (beyond 0.87 of the radius at most); the others 0.2 radii apart. What only fits
- * between those, wires say, is not for this. */
+ * cuts off with 1 % of the energy (beyond 0.87 of the radius at most); the others 0.2 radii apart. Bodies that fit
+ * between those, such as wires, are not for this. */
 int beam_ref_plain(const struct beam_rig *rig, const double dir[3], struct beam_ref *out);
 /* mode SINGLE: no beam. */
 void beam_rig_mode(struct beam_rig *rig, enum beam_mode mode, uint32_t rings);

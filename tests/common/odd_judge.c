@@ -49,7 +49,7 @@ static int is_beside_lines(const struct scene *scene, uint32_t triangle, const d
     return 1;
 }
 
-/* Where it is not known which triangle is claimed, any of them will do. */
+/* Where the claimed triangle is not known, it is enough that the place is beside any of them. */
 static int is_beside_any(const struct scene *scene, const struct odd_shot *shot)
 {
     if (shot->triangle < scene->n_triangles) return is_beside_lines(scene, shot->triangle, shot->at_m, shot->dir);

@@ -19,7 +19,7 @@ struct odd_shot {
     const double *at_m, *dir; /* [3], prcs */
     double range_m;           /* NaN: none */
     uint32_t triangle;        /* of the scene; REFERENCE_NONE: none, or not known */
-    double most_m;            /* what is further may be missing; 0: nothing may */
+    double most_m;            /* hits beyond it may be missing; 0: none may */
 };
 
 /* Returns whether the hit is right, or can't be told; else prints what it is. bound_m: of the range's error, for a true

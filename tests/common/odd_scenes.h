@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Scenes of a few triangles, put together at random from what is hard to see rightly: needles, slivers, faces
- * that overlap, cross, stand twice or lie next to each other, folds, boxes in boxes, giants beside dwarfs;
- * and a station, now and then on a face, in its plane, or in line with an edge. */
+/* Scenes of a few triangles, put together at random from parts that are hard to cast correctly: needles, slivers, faces
+ * that overlap, cross, stand twice or lie next to each other, folds, boxes in boxes, giants beside dwarfs; and a
+ * station, now and then on a face, in its plane, or in line with an edge. */
 #ifndef TESTS_COMMON_ODD_SCENES_H
 #define TESTS_COMMON_ODD_SCENES_H
 

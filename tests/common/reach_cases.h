@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Heads and bodies that move, stations far away, and heads that may go far: cases that may cost no more than a head that
+/* Cases with moving heads and bodies, far stations, and heads with long ways. Each may cost no more than a head that
  * stands near what it scans. Each is a whole configuration, loaded as for a run, so that all that loading sets up is in
  * it. Metres and seconds. */
 #ifndef TESTS_COMMON_REACH_CASES_H

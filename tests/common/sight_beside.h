@@ -37,7 +37,7 @@ void sight_beside_cast(struct sight_beside *beside, uint32_t n, const struct vec
 /* Compares with hits that the BVH has given already, for all n in one call; of labels it says nothing. */
 void sight_beside_check(struct sight_beside *beside, uint32_t n, const struct vec3_in *dir, double range_max_m,
                         const double *range_m, const uint32_t *triangle);
-/* What there is to say of the first rays that differ, on standard output, as TAP comments. */
+/* Prints the first rays that differ on standard output, as TAP comments. */
 void sight_beside_print(const struct sight_beside *beside);
 
 #endif

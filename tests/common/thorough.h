@@ -6,8 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Sanitizers are for the code, not for the count: each turn takes up to ten times as long with them. What depends on these
- * runs as shipped, too (tests/shipped.sh). */
+/* Sanitizers check the code, and need few turns for that: each takes up to ten times as long with them. Tests that need
+ * the full count run as shipped, too (tests/shipped.sh). */
 #ifdef SH_SANITIZE
 enum { SANITIZED = 1 };
 #else

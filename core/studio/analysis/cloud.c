@@ -40,7 +40,7 @@ int cloud_reserve(struct cloud *cloud, size_t n, unsigned has, struct sh_err *er
     return SH_OK;
 }
 
-/* No, where it can't be read: then the reader says why. */
+/* False where the file can't be read: the reader then says why. */
 static bool is_neither(const char *path)
 {
     char magic[3] = "";

@@ -15,8 +15,7 @@ struct reading {
     const struct sh_report *report;
 };
 
-/* Our recorder writes the coordinate reference system as a comment. Other files lack it, which is no
- * fault. */
+/* Our recorder writes the coordinate reference system as a comment. Other files may lack it. */
 static int64_t find_epsg(const struct text *file)
 {
     struct text t = *file;

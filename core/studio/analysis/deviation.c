@@ -18,7 +18,7 @@ static const double SAME_SHARE = 0.01, SAME_M = 2e-6;
 /* The rays around a footprint, by its radius: outlines that cut it don't pass between neighbours of twelve. */
 static const double AROUND = 1.1;
 
-/* So near to each other surfaces can't be told apart by a noise that small in any case. */
+/* Surfaces that are nearer to each other than this can't be told apart, however small the noise. */
 static const double LEAST_CLEAR_M = 2e-5;
 
 struct work {

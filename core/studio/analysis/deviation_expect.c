@@ -50,7 +50,7 @@ static void angle_effects(const double rotation[9], const double beam[3], const 
     effect[1] = vec3_dot(normal, by_pan);
 }
 
-/* Of the part of a move across the face that a ball brings. */
+/* The variance of a ball's moves across the face (formula: core/studio/deviation.h). */
 static double ball_variance(const struct deviation_head *head, double range_m, const double beam[3],
                             const double normal[3])
 {

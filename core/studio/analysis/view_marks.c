@@ -54,7 +54,7 @@ static void draw_mark(struct picture *picture, const double at[2])
     }
 }
 
-/* What names must leave free: other names, and the marks of other stations. */
+/* Boxes that names must leave free: other names, and the marks of other stations. */
 struct taken {
     struct box *name, *mark; /* [n_names], [n_marks]; a mark that is not in the image is an empty box */
     uint32_t n_names, n_marks;

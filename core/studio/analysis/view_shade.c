@@ -77,8 +77,8 @@ int view_smooth(const struct view *view, float *depth_m, uint32_t *near, struct 
     return SH_OK;
 }
 
-/* Boucheny's response: how much nearer the eight neighbours at a distance are, in logarithms of depth. Nothing, as at
- * the sky, is infinitely far and darkens no one. */
+/* Boucheny's response: how much nearer the eight neighbours at a distance are, in logarithms of depth. A place without
+ * depth, as the sky, is infinitely far and darkens none. */
 static float nearer(const struct view *view, const float *log_depth, int x, int y, int reach)
 {
     static const int side[8][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}};

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What heads at other places would see that no station has seen. */
+/* The area that heads at other places would see and that no station has seen. */
 #include <math.h>
 #include <pthread.h>
 #include <stdlib.h>

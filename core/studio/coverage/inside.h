@@ -10,8 +10,8 @@
 
 enum { NO_CELL = COVERAGE_NO_CELL };
 
-/* The nearest a cell was met and the steepest it was met, as the bits of a float: of positive ones these have the same
- * order as the numbers, so that threads can keep the larger one without a lock. */
+/* How near and how steeply a cell was hit at best, as the bits of a float. The bits of positive floats have the same
+ * order as the numbers, so threads can keep the larger one without a lock. */
 struct cell_met {
     _Atomic uint32_t pulses, cosine, nearness; /* nearness: 1 / range */
 };

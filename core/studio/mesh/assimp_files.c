@@ -80,7 +80,7 @@ void assimp_close(struct aiFileIO *io, struct aiFile *handle)
     fflush(file_of(handle)->file);
 }
 
-/* Assimp itself does not look, or says no reason. */
+/* Finds writes that failed: Assimp itself does not check them, or gives no reason. */
 int assimp_check_files(struct exporter *e, struct sh_err *err)
 {
     int rc = SH_OK;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What is made of triangles, whichever they are: normals, the points in use, points spread over them. */
+/* Results from any triangles: normals, the points in use, points spread over them. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

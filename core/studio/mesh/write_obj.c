@@ -31,7 +31,7 @@ static int has_textures(const struct obj *o)
     return 0;
 }
 
-/* Names end their line; blanks within them are read by most, but not by all. */
+/* A name ends its line. Most readers accept blanks within it, but not all. */
 static void put_name(FILE *out, const char *key, const char *name)
 {
     fprintf(out, "%s ", key);

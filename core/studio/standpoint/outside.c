@@ -53,7 +53,7 @@ static void frame(const struct survey *s, double ahead_rad, struct standpoint *a
     at->line1_rad = fmin(atan2(up, up > 0.0 ? near : far_m) + margin, fmin(s->view->line_max_rad, M_PI_2));
 }
 
-/* What a place sees within its frame. */
+/* Casts rays over the part of the view that a place has, and gives what they hit. */
 static struct survey_sight look(struct survey *s, const struct standpoint *at)
 {
     survey_clear(s);
@@ -136,7 +136,7 @@ static uint32_t find_fullest(const struct cells *c)
     return best;
 }
 
-/* From here on the survey looks at the bounds of what is in that cell. */
+/* From here on the survey has the bounds of the surface in that cell. */
 static void narrow(struct survey *s, const struct cells *c, uint32_t cell)
 {
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};

@@ -6,7 +6,7 @@
 
 #include "core/studio/standpoint/survey.h"
 
-/* From outside a wide and sparse scene shows next to nothing: then a part of it is looked at. */
+/* From outside, a wide and sparse scene shows next to nothing. Then the survey takes a part of it. */
 static int look_from_outside(struct survey *s, struct standpoint *out, struct sh_err *err)
 {
     const double least_seen = 0.02;

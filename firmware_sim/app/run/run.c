@@ -92,8 +92,8 @@ static int tells_page(const struct config *cfg)
     return is_there && page != NULL;
 }
 
-/* What a page is told beside the stream; where there is no web link there is nothing to tell. Where its readers hold
- * back the head, the observer does, too, and sees all of it. */
+/* Opens what a page gets beside the stream. Where the web link's readers hold back the head, so does the observer,
+ * which then sees all of the stream. */
 static int open_watch(const struct config *cfg, const struct site *site, struct device *device,
                       struct loop_options *loop, struct watch **watch, struct sh_err *err)
 {

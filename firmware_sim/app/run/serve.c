@@ -45,7 +45,7 @@ static int say_view(const struct loop *loop, struct sh_err *err)
     return fflush(stdout) == 0 ? SH_OK : sh_fail(err, SH_EIO, "standard output: %s", strerror(errno));
 }
 
-/* To the service manager, once the links are open: until then whoever depends on this head waits. */
+/* Tells the service manager that the links are open: services that depend on this head wait for that. */
 static int notify_ready(const struct loop *loop, struct sh_err *err)
 {
     enum { ROOM = 64 + (CONFIG_MAX_LINKS + 1) * (int)sizeof(struct link_place) }; /* one link is the observer's */

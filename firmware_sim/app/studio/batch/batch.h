@@ -2,8 +2,9 @@
 /* A campaign: many recordings off line, each of which is a station and values of keys. In: the command line of
  * `batch`. Out: the list of jobs in its fixed order, which of them are done, their files, and the manifests.
  *
- * Job k, from 1, is station by station of one combination of values after the other. A job is a head of its own from
- * power-up on, so that its files don't depend on which jobs ran before it in the same process. One thread. */
+ * Jobs are numbered from 1: all stations of the first combination of values, then all of the next one. A job is a head
+ * of its own from power-up on, so that its files don't depend on which jobs ran before it in the same process. One
+ * thread. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_BATCH_BATCH_H
 #define FIRMWARE_SIM_APP_STUDIO_BATCH_BATCH_H
 

@@ -13,7 +13,7 @@ struct finding {
     uint32_t beyond; /* the largest number of an entry for which there is no job; 0: none */
 };
 
-/* The later entry of a job counts, but one that was made otherwise never replaces one that fits. */
+/* The later entry of a job counts, but an entry that was made differently never replaces one that fits. */
 static int take_entry(void *ctx, struct batch_entry *entry, struct sh_err *err)
 {
     struct finding *f = ctx;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the files of a job were made of, as hashes: two jobs that say the same make the same bytes. In: a
+/* What the files of a job were made of, as hashes: two jobs whose structs are equal make the same bytes. In: a
  * configuration, what it names, and a job's settings. Out: a struct batch_made.
  *
  * Paths of input files don't count, their content does. So a campaign may go on where its folders are mounted
@@ -22,7 +22,7 @@ struct batch_made {
     char job[BATCH_SHA_LEN];           /* station, values of keys, options */
 };
 
-/* In words, what is another in `b` than in `a`; NULL: nothing. */
+/* In words, how `b` differs from `a`; NULL: it doesn't. */
 const char *batch_made_differs(const struct batch_made *a, const struct batch_made *b);
 
 /* SHA-256 of a whole file, and its length; SH_EINPUT where it isn't there or can't be read. Asks report whether to
@@ -30,7 +30,7 @@ const char *batch_made_differs(const struct batch_made *a, const struct batch_ma
 int batch_sha_file(const char *path, char hex[BATCH_SHA_LEN], uint64_t *bytes, const struct sh_report *report,
                    struct sh_err *err);
 
-/* Of files that were read before: they are read again only where size or time of change are others. */
+/* Hashes of files that were read before. A file is read again only where its size or its time of change differs. */
 struct batch_known {
     char *path;
     struct stat st;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What is done of a campaign. Each shard has a file manifest-I-of-N.jsonl in the campaign's folder, a line of JSON for
- * each job that it has finished; nothing but whole lines counts. Out: the entries of all such files of a folder.
+/* The finished jobs of a campaign. Each shard has a file manifest-I-of-N.jsonl in the campaign's folder, a line of JSON
+ * for each job that it has finished; nothing but whole lines counts. Out: the entries of all such files of a folder.
  *
  * The file is locked while its shard runs. Lines are appended and synced one by one. One thread. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_BATCH_MANIFEST_H

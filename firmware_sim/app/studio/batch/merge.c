@@ -98,7 +98,7 @@ static void warn_of_strangers(const struct batch *b)
         sh_warn(&app_report_stderr, "%s: %u files are of no job of this campaign, the first: %s", b->dir, n, first);
 }
 
-/* ---- the manifest: nothing in it depends on how the campaign was cut, or on when */
+/* ---- the manifest: nothing in it depends on the shards, or on the time */
 
 static void put_job(struct json *json, const struct batch *b, uint32_t i)
 {

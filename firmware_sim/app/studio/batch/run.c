@@ -45,7 +45,7 @@ static int add_file(struct listing *l, const char *path)
     return batch_sha_file(path, file->sha, &file->bytes, NULL, l->err);
 }
 
-/* What a mesh names and has the job's own name was written with it: materials, buffers, images. */
+/* Files that a mesh names were written with it where they have the job's own name: materials, buffers, images. */
 static int add_beside(void *ctx, const char *name, const char *path)
 {
     struct listing *l = ctx;
@@ -70,7 +70,7 @@ static int list_files(const struct batch *b, uint32_t job, const struct record_j
     return rc;
 }
 
-/* The line comes last: what stands in the manifest is whole. */
+/* The line comes last, so that files of all jobs in the manifest are whole. */
 static int note_done(struct runner *r, uint32_t job, const struct record_job *done, int64_t start_ns,
                      struct sh_err *err)
 {
@@ -159,7 +159,7 @@ static int check_inputs(const struct batch *b, struct sh_err *err)
     return SH_OK;
 }
 
-/* What isn't whole any more is done again. */
+/* Jobs whose files aren't whole any more are done again. */
 static int check_done(struct runner *r, struct sh_err *err)
 {
     struct batch *b = r->b;

@@ -55,7 +55,7 @@ void coverage_scan_of(const struct site *site, uint32_t station, struct coverage
     if (site->n_movers > 0) at->scan.enter = enter;
 }
 
-/* The head stands while it scans, or there is no place to speak of. */
+/* Coverage needs heads that stand still: a moving head has no one place. */
 static int check_platform(const struct config *cfg, struct sh_err *err)
 {
     if (!config_head_moves(&cfg->platform)) return SH_OK;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Where to stand next: places, what each would see that nobody has seen, and scans of the best. */
+/* Where to stand next: places, the area that each would see and no station has seen, and scans of the best. */
 #include "firmware_sim/app/studio/coverage/next.h"
 
 #include <math.h>

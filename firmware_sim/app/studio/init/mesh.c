@@ -90,7 +90,7 @@ static int is_survey(const struct scene *scene, int y_up)
     return init_largest_m(scene) <= LARGEST_SURVEY_M && height < LEAST_HEIGHT_MM && width > 10.0 * height;
 }
 
-/* Metres per unit, from what there is to see, and why. */
+/* Metres per unit, guessed from the mesh, and the reason. */
 static double guess_unit(const struct scene *scene, int y_up, char *why, size_t len)
 {
     double middle[3];

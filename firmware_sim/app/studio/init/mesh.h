@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Looking at a mesh file for `scanhead init`. In: its path, and what the user says of it. Out: the mesh in
- * metres with z up, how it has to be read for that, and where that is known from. */
+/* Inspects a mesh file for `scanhead init`. In: its path, and what the user says of it. Out: the mesh in metres with z
+ * up, the settings of the configuration for that, and the source of each. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_INIT_MESH_H
 #define FIRMWARE_SIM_APP_STUDIO_INIT_MESH_H
 

@@ -94,14 +94,14 @@ static int add_station(struct map_run *run, const struct site_station *station, 
         snprintf(mark.height, sizeof mark.height, "%.2f m above the ground", station->tripod.head_m);
     else if (!isnan(at->floor_m))
         snprintf(mark.height, sizeof mark.height, "%.2f m above the floor", at->floor_m);
-    else if (run->turned) /* z is that of the map, which nobody else knows */
+    else if (run->turned) /* z is that of the map, not of the scene */
         snprintf(mark.height, sizeof mark.height, "height %.2f m", at->place.height_m);
     else
         snprintf(mark.height, sizeof mark.height, "z %.2f m", p[2]);
     return map_add_station(run->map, &mark, err);
 }
 
-/* Only the site of a station's own scanner knows how high its head is. */
+/* The height of a head is in the site of its own scanner alone. */
 static int prepare(void *ctx, uint32_t station, struct sh_err *err)
 {
     struct map_run *run = ctx;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What deviations are expected of a recording, by its configuration, and whether they are so. */
+/* The deviations that a recording's configuration lets expect, and whether its points have them. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What a page is made of: its frame, lengths in words, charts. In: figures in metres. Out: HTML 5 and SVG, whole by
- * themselves: no script, nothing from elsewhere; light or dark as the reader's system is; fit for printing. */
+/* The elements of a page: its head and foot, lengths as text, charts. In: figures in metres. Out: HTML 5 and SVG, whole
+ * by themselves: no script, nothing from elsewhere; light or dark as the reader's system is; fit for printing. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_REPORT_PAGE_H
 #define FIRMWARE_SIM_APP_STUDIO_REPORT_PAGE_H
 

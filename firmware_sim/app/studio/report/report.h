@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Parts of `scanhead report`, of nobody else: the figures (work.c), what is expected of them
- * (expect.c), and the forms in which they are written (text.c, json.c, html.c). */
+/* Private to `scanhead report`: the figures (work.c), what is expected of them (expect.c), and the forms in which they
+ * are written (text.c, json.c, html.c). */
 #ifndef FIRMWARE_SIM_APP_STUDIO_REPORT_REPORT_H
 #define FIRMWARE_SIM_APP_STUDIO_REPORT_REPORT_H
 

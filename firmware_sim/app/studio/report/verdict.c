@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What deviations are expected of a head, and whether those of its points are so. */
+/* The deviations that are expected of a head, and whether its points have them. */
 #include "firmware_sim/app/studio/report/verdict.h"
 
 #include <math.h>
@@ -119,7 +119,8 @@ static void beyond_everything(struct report_verdict *v, const struct figures *f,
              reach);
 }
 
-/* With a footprint only points on smooth faces are judged. A cloud of another place has few, and says nothing. */
+/* With a footprint only points on smooth faces are judged. A cloud of another place has too few of them for a
+ * judgement. */
 static int can_judge_bound(const struct report_subject *s, const struct report_verdict *v)
 {
     return s->head->setup.beam == NULL || v->beyond > 0 || 2 * s->figures->along >= s->figures->points;

@@ -119,7 +119,7 @@ static int prepare(struct report *r, struct sh_err *err)
     return deviation_points_create(r->cloud.n, &r->points, err);
 }
 
-/* A head that moved has no one place that beams come from. */
+/* The beams of a head that moved do not come from one place. */
 static void without_beams(struct report *r)
 {
     for (size_t i = 0; i < r->cloud.n; i++) {

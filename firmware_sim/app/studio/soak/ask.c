@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Questions of a recorder whose right answers are known, and what became of the answers. */
+/* Asks the head questions whose right answers are known, and judges the answers. */
 #include <string.h>
 
 #include "firmware_sim/app/studio/soak/soak.h"
@@ -9,7 +9,7 @@
 enum { REPLY_MS = 5000, REPLY_LEN = SOAK_REPLY_LEN };
 static const double MARGIN_MS = 5.0;
 static const int64_t AFTER_END_NS = 1000000000;
-/* The library comes into step with questions of its own; one that has no answer it asks again after a second. */
+/* The library comes into step with questions of its own. It repeats one that has no answer after a second. */
 static const double ASKED_AGAIN_MS = 900.0;
 
 static int is_count(const char *text)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The clean stream: a reader within the head's own process, whom no fault of a link meets. */
+/* The clean stream: a reader within the head's own process, which faults of links don't reach. */
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>

@@ -126,7 +126,7 @@ static void take_others(struct soak_datagrams *d)
         d->n++;
 }
 
-/* Which clean one it is, nearest to the one expected; 0: none. */
+/* The number of the same clean datagram, nearest to the one expected; 0: there is none. */
 static soak_seq find(const struct soak_link *link, const struct datagram *got)
 {
     const struct soak_datagrams *d = link->datagrams;

@@ -243,8 +243,8 @@ static int is_of_mirror(const struct soak_moment *m)
     return m->kind == FAULT_MIRROR_SLOW || m->kind == FAULT_MIRROR_STUCK || m->kind == FAULT_MIRROR_WOBBLE;
 }
 
-/* The rate at which the mirror turns when nothing is wrong with it. With what was wrong before there is nothing to
- * compare. */
+/* The rate at which the mirror turns when nothing is wrong with it. Faults of the mirror from before that rate is known
+ * have nothing to be compared with. */
 static void take_usual_rate(struct soak_link *link, int64_t t_ns, double rate)
 {
     for (uint32_t i = 0; i < link->n_moments; i++)
@@ -257,7 +257,7 @@ static void take_usual_rate(struct soak_link *link, int64_t t_ns, double rate)
 
 static void take_points(struct soak_link *link, const struct scanhead_frame *frame)
 {
-    /* A scan that begins anew shows that power was away, even to who was not connected when it went. */
+    /* A scan that begins anew shows that power was away, even to a client that was not connected when it went. */
     if (link->have_pulse && frame->pulse0 < link->pulse0) soak_saw_power_go(link, frame->t_ns);
     link->have_pulse = 1;
     link->pulse0 = frame->pulse0;

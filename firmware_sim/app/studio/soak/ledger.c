@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* What was done to the frames of a link, as the head says, and what its client saw of them.
+/* For each frame of a link: the injected faults, as the head reports them, and what the client saw of it.
  *
- * The head says it in the thread of the link, before the client can see it. Frames are told apart by their numbers,
- * which are the same on all links. */
+ * The head reports a fault in the thread of the link, before the client can see it. Frames are identified by their
+ * numbers, which are the same on all links. */
 #include <string.h>
 
 #include "firmware_sim/app/studio/soak/soak.h"
@@ -81,7 +81,7 @@ static int row_of(const struct fault_note *note)
     return note->kind == FAULT_FLIP && strcmp(note->text, "resealed") == 0 ? SOAK_RESEALED : (int)note->kind;
 }
 
-/* What the link does itself is noted once it is done. So the client may have seen it already. */
+/* An act of the link itself is noted once it is done. So the client may have seen it already. */
 static int was_just_seen(struct soak_link *link, enum fault_kind kind)
 {
     const int64_t now_ns = clock_now_ns();
@@ -341,7 +341,7 @@ static void forget_acts(struct soak_link *link, uint32_t from)
     link->n_acts = 0;
 }
 
-/* The oldest act is why it ended. */
+/* The oldest act ended it. */
 static void end_by_act(struct soak_link *link)
 {
     link->row[link->act[0].kind].noticed++;

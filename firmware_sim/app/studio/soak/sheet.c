@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What came of a soak: a row for each kind of fault and link, the sums, and the verdict. */
+/* The results of a soak: a row for each kind of fault and link, the sums, and the verdict. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>

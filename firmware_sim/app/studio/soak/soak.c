@@ -91,7 +91,7 @@ static void soak_on(const struct soak_options *o, struct soak *soak)
     soak->wall_s = 1e-9 * (double)(clock_now_ns() - from_ns);
 }
 
-/* No more faults; what was done so far gets the time to be noticed. */
+/* Ends the injection of faults, and gives clients the time to notice those so far. */
 static void drain(struct soak *soak)
 {
     fault_board_remove(soak->board, 0);
@@ -181,7 +181,7 @@ static int open_head(struct soak_options *o, struct config *cfg, struct soak *so
     return rc;
 }
 
-/* What is compared is what went over the wire, not how fast the machine is: a busy one delivers later, and all of it. */
+/* A soak compares what went over the wire, not speed: a busy machine has the time to deliver everything, if later. */
 static void be_patient(struct config *cfg)
 {
     static const double PATIENCE_MS = 3000.0;

@@ -3,14 +3,14 @@
  *
  *   soak.c     the command; runs the head and all threads
  *   clean.c    a thread that reads the clean stream within this process
- *   client.c   a thread per link: a recorder, as good as one can be
+ * client.c a thread per link: a recorder that does all that a good one does
  *   datagrams.c  the same for a link that sends datagrams
  *   usb.c      how a client finds the head on USB, and enumerations
  *   ask.c      its questions and their answers
- *   ledger.c   of each link and frame: what was done to it, and what the client saw of it
+ * ledger.c for each link and frame: the injected faults, and what the client saw of them
  *   judge.c    compares the two, frame by frame
  *   head.c     faults in the head, and what the client saw of them
- *   sheet.c    what came of it, as text and as JSON */
+ * sheet.c the results, as text and as JSON */
 #ifndef FIRMWARE_SIM_APP_STUDIO_SOAK_SOAK_H
 #define FIRMWARE_SIM_APP_STUDIO_SOAK_SOAK_H
 
@@ -48,7 +48,7 @@ struct soak_row {
     const char *why;
 };
 
-/* Numbers of frames that never begin anew: what wraps on the wire goes on here. */
+/* Numbers of frames as 64 bits: those on the wire wrap, these do not. */
 typedef uint64_t soak_seq;
 
 /* ---- the clean stream */
@@ -240,7 +240,8 @@ void soak_clients_join(struct soak *soak);
 void soak_clients_close(struct soak *soak);
 
 /* ---- datagrams.c */
-/* Receives what a link sends, and what its twin will send, which is to be opened beside it. NULL: it can't. */
+/* Receives what a link sends, and what a second link of the same protocol will send, which is to be opened beside it.
+ * NULL: it can't. */
 struct soak_datagrams *soak_datagrams_open(const struct link_spec *spec, struct link_spec *twin);
 void soak_datagrams_close(struct soak_datagrams *datagrams);
 int soak_datagrams_get(const struct soak_datagrams *datagrams, soak_seq seq, struct soak_clean_frame *out);
@@ -259,7 +260,7 @@ void soak_usb_name(struct link_spec *spec, uint32_t number);
 void soak_usb_source(const struct link_spec *spec, char *source, size_t len);
 /* A fault of an enumeration, as it begins; the caller has the link's lock. */
 void soak_usb_plugged(struct soak_link *link, const struct fault_note *note);
-/* The client has opened the device, which took so long: what it noticed of the enumeration. */
+/* The client has opened the device. Notes what it noticed of the enumeration, by the time that this took. */
 void soak_usb_opened(struct soak_link *link, double opened_ms);
 /* No client will notice them; the caller has the link's lock. */
 void soak_usb_forget(struct soak_link *link, const char *why);
@@ -297,7 +298,8 @@ int soak_is_head_seen(struct soak_link *link);
 void soak_judge_head(struct soak_link *link);
 
 /* ---- judge.c */
-/* Frames that nothing more will come of. With `all` those up to the end, too. The caller has the link's lock. */
+/* Judges the frames about which no more news will come. With `all` those up to the end, too. The caller has the link's
+ * lock. */
 void soak_judge(struct soak_link *link, int all);
 
 /* ---- sheet.c */

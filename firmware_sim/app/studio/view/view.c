@@ -15,7 +15,7 @@ struct view_options {
     int quiet;
 };
 
-/* Sessions are told nothing; what they say is read, and has no effect. */
+/* Sessions get no data. What they send is read, and has no effect. */
 static void take_event(const struct link_ops *ops, void *link, const struct link_event *event)
 {
     char said[4096];
@@ -60,7 +60,7 @@ static void say_what_is_shown(const struct viewed *v)
             v->n_meshes == 1 ? "" : "es");
 }
 
-/* The port is taken first: that it is in use shows before a long file is read. */
+/* The port is taken first, so that an error about it comes before a long file is read. */
 static int show(const struct view_options *o, struct viewed *v, struct sh_err *err)
 {
     struct view_serve serving = {.viewed = v, .report = &app_report_seconds};

@@ -21,7 +21,7 @@
 #include "firmware_sim/app/studio/watch/past.h"
 #include "firmware_sim/app/studio/watch/watch.h"
 
-/* Points kept of a scan, at most; so many are compared at a time; one of so many pulses is looked at, at the least. */
+/* Points kept of a scan, at most; points compared at a time; the largest `every`; bins of a histogram. */
 enum { WATCH_MOST_POINTS = 1 << 17, WATCH_BATCH = 1024, WATCH_LEAST_SHARE = 1 << 20, WATCH_BINS = 64 };
 
 /* Points of the scan at hand that are looked at, in the scene's frame. */

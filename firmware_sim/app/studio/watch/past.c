@@ -154,7 +154,7 @@ static void keep(struct past *past, const struct scanhead_frame *frame)
     keep_limits(past);
 }
 
-/* One that came before says nothing new; its flags and its time may differ. */
+/* A frame that is repeated says nothing new; its flags and its time may differ. */
 static int is_same(const struct placing *p, const struct scanhead_frame *frame)
 {
     return p->frame != NULL && p->len == frame->raw_len &&

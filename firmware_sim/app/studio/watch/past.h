@@ -34,8 +34,8 @@ struct past *past_create(const struct past_limits *limits);
 /* lost_frames: of the taker's so far, which readers are told. Where there is no memory for points they are gone, and
  * counted. */
 void past_take(struct past *past, const struct scanhead_frame *frame, uint64_t lost_frames);
-/* The frames from a position on, up to its piece's end. A position that is kept no more is the oldest that is; one beyond
- * all gives no frames. query: "from=POSITION", or "" for 0; else SH_EINPUT. SH_ENOMEM. */
+/* The frames from a position on, up to its piece's end. A position whose piece has gone gives the oldest piece; one
+ * beyond the end gives no frames. query: "from=POSITION", or "" for 0; else SH_EINPUT. SH_ENOMEM. */
 int past_get(struct past *past, const char *query, struct web_body *out, struct sh_err *err);
 /* A number that another run of a head does not have. */
 uint64_t past_run(const struct past *past);

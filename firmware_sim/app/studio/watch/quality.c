@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* /quality: the observer leaves figures, whoever asks gets the last ones. */
+/* /quality: the observer stores figures, and each request gets the latest ones. */
 #include <math.h>
 #include <string.h>
 

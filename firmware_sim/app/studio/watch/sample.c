@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The points of a scan that are looked at: one of `every` pulses, whichever these are by their hash, so that fewer can be
- * kept of them later and still be spread evenly. */
+/* The sampled points of a scan: those of one in `every` pulses, chosen by the pulse's hash. So the sample can be
+ * thinned later and is still spread evenly. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -104,7 +104,7 @@ static struct deviation_points points_from(const struct deviation_points *p, siz
                                      .met = p->met + i};
 }
 
-/* A head that moves has no one place that beams come from. */
+/* The beams of a head that moves do not come from one place. */
 static void without_beams(const struct deviation_points *p, const uint32_t *triangle, size_t n)
 {
     for (size_t i = 0; i < n; i++) {
@@ -115,7 +115,7 @@ static void without_beams(const struct deviation_points *p, const uint32_t *tria
 
 /* As many as the budget allows, from how long one takes and how many have come. Reading the stream and working out
  * figures come first; comparing has what they leave, and a tenth of the budget in any case. Of the first second it may
- * have all at once: what is not looked at now is not looked at later. */
+ * have all at once: points that are passed over now are not sampled later. */
 static void adapt(struct watch *w, size_t n, int64_t took_ns)
 {
     struct watch_sample *s = &w->sample;

@@ -7,8 +7,8 @@
 #include "core/vec3.h"
 #include "firmware_sim/app/studio/watch/inside.h"
 
-/* So many cells at the most, about, and so much memory. A cell's piece takes up to 144 bytes, and a triangle at least
- * one (core/studio/coverage/cells.c). */
+/* The limits of cells, which is approximate, and of memory. A cell's piece takes up to 144 bytes, and a triangle at
+ * least one (core/studio/coverage/cells.c). */
 static const double MOST_CELLS = 20000.0, MOST_MIB = 160.0;
 enum { TRIES = 12 };
 

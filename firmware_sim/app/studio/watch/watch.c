@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The watch as a whole: opened, started, asked, closed. */
+/* The watch as a whole: opens, starts and closes it, and answers requests. */
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
