@@ -38,7 +38,7 @@ upward='
 '
 #
 # By call: nm on the objects. A symbol that one room's object lacks and a higher room's object defines is an arrow upward.
-# First the check is tried on trees with one violation each: what it can't find there, it can't find here.
+# First the check is tried on trees with one violation each, which it must find.
 set -u
 
 # The rules, for includes and for calls.
@@ -164,7 +164,8 @@ call_violations() {
 }
 
 # A README says in its first paragraph what belongs into the folder, and what doesn't: two sentences at least, and a word
-# like "not" or "only" in them. The inputs of fuzzing, a folder a target, are told of in tests/fuzz/README.md.
+# like "not" or "only" in them. The folders with inputs of fuzzing, one for each target, are described in
+# tests/fuzz/README.md.
 readme_violations() {
     (
         cd "$1" || exit 1

@@ -10,7 +10,7 @@ trap '[ -z "$head" ] || kill "$head"; rm -rf "$work"' EXIT
 prefix=/opt/scanhead
 . tests/tap.sh
 
-# Without what the make above this one told it.
+# Without the variables of the make above this one.
 install_it() {
     env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -s install BUILT=yes BUILD="$(dirname "$program")" DESTDIR="$1" \
         PREFIX="$2"

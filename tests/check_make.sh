@@ -1,14 +1,15 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# What make would do elsewhere: for another machine, with both Embrees or the one that is asked for, and what the archive
-# shows of the library. Compilers and headers that aren't here are played by scripts; of those builds only the commands
-# are looked at. Prints TAP.
+# Checks what make would do elsewhere: for another machine, and with both Embrees or the one that is asked for. Checks
+# what the archive shows of the library. Scripts stand in for compilers and headers that aren't here; of those builds
+# only the commands are checked. Prints TAP.
 set -u
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
 . tests/tap.sh
 
-# would TARGET [VARIABLE=...]: the commands that make would run for it in a new folder, without what a make above said.
+# would TARGET [VARIABLE=...]: the commands that make would run for it in a new folder, without the variables of a make
+# above.
 would() {
     target=$1
     shift
@@ -40,7 +41,7 @@ runs_all_of() {
 check "make mutants alone draws from all of the product" runs_all_of mutants "-n 200 --seed '1' --only ''"
 check "make machines alone runs all machines" runs_all_of machines " 'trixie' 'avx' 'sse' 'aarch64'\$"
 
-# Each line of the help is of a target that is there.
+# Each line of the help names a target that exists.
 help_is_true() {
     make -s help >"$work/help" && [ "$(wc -l <"$work/help")" -gt 20 ] || return
     for target in $(awk '{ print $2 }' "$work/help"); do
@@ -222,7 +223,7 @@ check "the archive defines scanhead_... and nothing else for others" only_the_in
 if command -v clang >/dev/null; then
     check "the same of clang's objects" only_the_interface "${BUILD:-build}/clang" OPT=-O0 "CC=$(command -v ccache) clang" CFLAGS=-g0
 fi
-# A client with functions that are called as some of the library's inside are.
+# A client whose functions have the names of some internal ones of the library.
 cat >"$work/client.c" <<END
 #include <scanhead.h>
 #include <stdio.h>

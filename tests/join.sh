@@ -1,13 +1,13 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
-# Joins test programs: twenty of a folder become one file, and test_NAME a link to it, which runs the one of its name. To link each
-# of some 500 takes as much of a processor's time as to compile them. (More than twenty cost again: at the end of a program the
-# sanitizer of leaks looks through the variables of all of them.)
+# Joins test programs: twenty of a folder become one file, and test_NAME a link to it, which runs the one of its name.
+# Linking some 500 one by one takes as much processor time as compiling them. (More than twenty cost again: at the end
+# of a program the sanitizer of leaks looks through the variables of all of them.)
 #   LINK='cc ...' LIBS='-l...' LD=ld OBJCOPY=objcopy JOBS=2 join.sh BUILD PROGRAM...     PROGRAM: BUILD/tests/FOLDER/test_NAME
 #
 # Only main of a program and its rigs is seen from outside, under the program's name: programs may use the same names. One that
-# puts a function of its own in the place of a library's, or of the head's, is linked by itself: in the joined file all would
-# call it.
+# puts a function of its own in the place of a library's, or of the head's, is linked by itself: in the joined file all
+# programs would call that function.
 set -euo pipefail
 build=$1
 shift

@@ -67,8 +67,8 @@ static void choose_up(const struct init_wish *wish, const char *name, const stru
                 name);
 }
 
-/* Eastings and northings of projected systems: large numbers beside the size of what is there. In millimetres they would be
- * some 100 m, where nobody puts an origin by intent. */
+/* Eastings and northings of projected systems are large compared with the size of the mesh. In millimetres they would
+ * be some 100 m, where nobody puts an origin on purpose. */
 static int is_projected(const struct scene *scene, const double middle[3])
 {
     const double least = 50000.0, large = 200000.0, times = 20.0;
@@ -81,7 +81,7 @@ static int is_projected(const struct scene *scene, const double middle[3])
     return up_to >= large && second >= least && up_to >= times * init_largest_m(scene);
 }
 
-/* Wide and flat, and lying. Walls stand, and furniture is not ten times as wide as it is high. */
+/* Wide, flat and level: walls stand upright, and furniture is not ten times as wide as it is high. */
 static int is_survey(const struct scene *scene, int y_up)
 {
     const double *low = scene->min_m, *high = scene->max_m;

@@ -116,7 +116,7 @@ static void put_scene(const struct init_text *t, FILE *out)
                 t->mesh->crs);
 }
 
-/* Glass is nothing that a file can decide: it is for the user to take the mark away. */
+/* A file can't decide what is glass: the line is a comment, whose # the user may remove. */
 static void put_clear(const struct scene *scene, FILE *out)
 {
     struct site_clear clear = {0};

@@ -43,7 +43,7 @@ static int read_numbers(const char *text, char between, double *out, int n)
     return 1;
 }
 
-/* A wind, or degrees clockwise from north. */
+/* A point of the compass, or degrees clockwise from north. */
 static int read_direction(const char *text, double *azimuth_rad, struct sh_err *err)
 {
     double azimuth_deg;

@@ -82,7 +82,7 @@ static void judge_note(struct soak_link *link, const struct fault_note *note, co
         row->missed++;
 }
 
-/* What is odd has no fault that would explain it. A reply that comes next to hurt bytes is lost with them, and one to a
+/* An answer is odd where no fault explains it. A reply that comes next to hurt bytes is lost with them, and one to a
  * question that goes out while the connection is being made again may be lost with the one before. */
 static void judge(struct soak_link *link, const struct answer *a)
 {

@@ -58,7 +58,7 @@ static const struct site *find_head(struct watch *w, const struct scanhead_info 
     return site;
 }
 
-/* What the head is in this scan: as the device has it, at the place and the rate that the stream says. */
+/* The head's setup in this scan: as the device has it, at the place and the rate that the stream gives. */
 static void begin_scan(struct watch *w, const struct scanhead_info *info)
 {
     let_go(w);
@@ -128,7 +128,7 @@ static uint32_t hash_of(uint64_t pulse)
     return (uint32_t)(h >> 32 ^ h >> 13);
 }
 
-/* Echoes of one pulse follow each other, at the same time. Of all points only this is looked at. */
+/* Echoes of one pulse follow each other, at the same time. This is the only work for every point. */
 static void take_points(struct watch *w, const struct scanhead_frame *frame)
 {
     const uint32_t keeps = w->at.in_scene ? w->sample.every - 1 : 0, n_surfaces = w->site->scene->n_surfaces;
@@ -196,7 +196,7 @@ static void rest(struct watch *w)
     if ((w->at.scan != 0 && !w->fresh) || follow_scan(w)) end_scan(w);
 }
 
-/* Figures cost time, too: the more, the less often. */
+/* Figures cost time, too: the more time they take, the less often they are worked out. */
 static int is_due(const struct watch *w)
 {
     const double share = w->options.cpu_share;
@@ -215,8 +215,8 @@ static int next_frame(const struct watch *w, struct scanhead_frame *frame)
     return scanhead_next(w->sh, frame, NEXT_MS);
 }
 
-/* For the processor: of this thread alone; where it fails it is as others are. An observer that the head waits for
- * stays as the head is: on a busy machine the whole head would be as slow as it. */
+/* Lowers the processor priority of this thread alone; where that fails, it stays as it is. An observer that the head
+ * waits for keeps the head's priority: else, on a busy machine, the whole head would be as slow as the observer. */
 static void be_last(void)
 {
     setpriority(PRIO_PROCESS, (id_t)gettid(), LOWEST);
