@@ -70,7 +70,7 @@ static int check_stack(void)
     return APP_USAGE;
 }
 
-/* What a command printed may still be in the buffer. A full disk or a closed pipe shows only here. */
+/* A command's output may still be in the buffer. A full disk or a closed pipe shows only here. */
 int program_main(const struct program *program, int argc, char **argv)
 {
     /* Memory of meshes goes back to the system at once, however large the file was that was freed before. */

@@ -35,7 +35,7 @@ static uint64_t tiles_of(uint32_t cells)
     return SIGHT_FACES * edge * edge;
 }
 
-/* So many cells that FEW_RAYS rays come to each, and that most of the memory is left for leaves and
+/* There are so many cells that FEW_RAYS rays come to each, and that most of the memory is left for leaves and
  * lists. */
 uint32_t sight_cells(double rays, uint64_t memory_bytes)
 {

@@ -31,7 +31,7 @@ struct standpoint {
     double position_m[3]; /* of the head's origin */
     double floor_m;       /* height above the floor; NaN: outside */
     double seen;          /* share of the directions looked at that meet something within the ranges */
-    /* What to scan. Inside and on the ground: all of it, heading 0. Outside: the part that holds the
+    /* The part of the view to scan. Inside and on the ground: all of it, heading 0. Outside: the part that holds the
      * scene. */
     double heading_rad;          /* of pan 0, clockwise from y */
     double pan_rad;              /* from 0 to this */
@@ -60,10 +60,10 @@ struct standpoint_place {
 enum { STANDPOINT_MAX_PLACES = 1000000 };
 
 /* Places where a tripod can stand: on a surface at most 20 degrees steep, with 0.2 m of room above the head; of 8
- * spots 0.3 m around at least 6 on the same level within 0.15 m; nothing within 0.3 m of the head on its level. Which side
- * of the surface is up does not matter: some of the places may lie within closed bodies. In order of x, then y, then z
- * downward. The BVH reaches all of the scene above and within the grid. The caller frees *out. SH_EINPUT: more columns
- * than STANDPOINT_MAX_PLACES. */
+ * spots 0.3 m around at least 6 on the same level within 0.15 m; nothing within 0.3 m of the head on its level.
+ * Which side of the surface is up does not matter: some of the places may lie within closed bodies. In order of x,
+ * then y, then z downward. The BVH reaches all of the scene above and within the grid. The caller frees *out.
+ * SH_EINPUT: more columns than STANDPOINT_MAX_PLACES. */
 int standpoint_places(const struct bvh *bvh, const struct standpoint_grid *grid, const struct sh_report *report,
                       struct standpoint_place **out, uint32_t *n, struct sh_err *err);
 

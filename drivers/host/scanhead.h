@@ -278,7 +278,7 @@ struct scanhead_line_end {
  * payload. */
 int scanhead_line_end(struct scanhead *sh, const struct scanhead_frame *frame, struct scanhead_line_end *end);
 
-/* What descriptor and anchor say about the stream. Strings are the handle's, until its next call. */
+/* Descriptor and anchor say this about the stream. Strings are the handle's, until its next call. */
 struct scanhead_info {
     const char *idn, *profile;
     int geo;           /* 1: geo layout, 0: polar */

@@ -36,7 +36,7 @@ struct ply_facts {
     struct scanhead_stats stats;
 };
 
-/* Those of the columns that points of the track have. To be called once the track has begun. */
+/* The columns that points of the track have. To be called once the track has begun. */
 unsigned ply_columns_there(const struct track *track, unsigned columns);
 /* The meaning of the track's coordinates, in words. */
 const char *ply_crs_text(const struct track *track);
@@ -46,8 +46,8 @@ void ply_put_names(FILE *out, const char *before, const struct scanhead *sh);
 /* Bytes to leave for the header: all that is known now, and room for the names of n_surfaces not known yet. */
 size_t ply_header_reserve(const struct ply_facts *facts, uint32_t n_surfaces);
 
-/* The header, padded by comment lines to exactly `size` bytes; 0: as long as it gets. Names, and heads after the first, that
- * do not fit are left out; *n_left_out says how many. Free *text. */
+/* The header, padded by comment lines to exactly `size` bytes; 0: as long as it gets. Names, and heads after the
+ * first, that do not fit are left out; *n_left_out says how many. Free *text. */
 int ply_header_make(const struct ply_facts *facts, size_t size, char **text, size_t *len, uint64_t *n_left_out,
                     struct sh_err *err);
 /* Lines of comment that take exactly n bytes; n is 0 or at least PLY_PAD_MIN. */

@@ -130,7 +130,7 @@ static int is_padding(const char *line, size_t n)
     return strncmp(line, "comment ", 8) == 0 && strspn(line + 7, " ") >= n - 7;
 }
 
-/* What goes into a renewed header. In bytes: padding of blank comments before the count, blanks at the end of the first
+/* This goes into a renewed header. In bytes: padding of blank comments before the count, blanks at the end of the first
  * comment. */
 struct renewal {
     uint64_t n_vertices;
@@ -167,7 +167,8 @@ static char *put_lines(const struct ply_header *h, struct renewal new, size_t *l
     return NULL;
 }
 
-/* The same header with that count, and with the line of an incomplete one, in the same length. NULL: there is no room. */
+/* The same header with that count, and with the line of an incomplete one, in the same length. NULL: there is no
+ * room. */
 static char *renew(const struct ply_header *h, uint64_t n_vertices, int incomplete)
 {
     struct renewal new = {.n_vertices = n_vertices, .incomplete = incomplete};

@@ -194,7 +194,7 @@ void command_set_peer(struct command_device *dev, uint32_t session, const char *
 /* Never NULL. */
 const char *command_peer(const struct command_device *dev, uint32_t session);
 
-/* What a command began could not be done: puts the error into the queue, and makes it the command's reply. */
+/* Work that a command began could not be done: puts the error into the queue, and makes it the command's reply. */
 void command_refuse(struct command_device *dev, int number, const char *text, struct command_result *out);
 
 /* Collects bytes into lines: LF, CR or CR LF end a line. */

@@ -68,7 +68,7 @@ struct config_profile {
     double range_sigma_m, range_sigma_ppm; /* one sigma of the range noise: fixed part, and part per distance */
     double range_sigma_at_m, range_sigma_reflectance, range_sigma_floor_m; /* where the fixed part holds; its floor */
     double mirror_sigma_deg, pan_sigma_deg;                                /* one sigma of the angle noise */
-    /* Of the head as a whole; they limit each program. */
+    /* These are the head's as a whole; they limit each program. */
     struct config_reach reach[DETECT_MAX_REACHES];
     uint32_t n_reaches; /* at least 1: range_max_m on 90 % where the file has none */
     /* One for each pulse rate, which rises. n_programs 0: any rate from prr_min to prr_max; program[0] then holds

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the files of a job were made of, as hashes: two jobs whose structs are equal make the same bytes. In: a
+/* A job was made of these, as hashes: two jobs whose structs are equal make the same bytes. In: a
  * configuration, what it names, and a job's settings. Out: a struct batch_made.
  *
  * Paths of input files don't count, their content does. So a campaign may go on where its folders are mounted

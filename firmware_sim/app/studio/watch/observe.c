@@ -43,8 +43,8 @@ static void let_go(struct watch *w)
     w->now_georef = NULL;
 }
 
-/* Of the settings and the place that the scan is made with; gives the site that has them. Where the scan is over
- * already, the configuration's settings have to do, at the place that the stream says. */
+/* Takes over the settings and the place that the scan is made with; gives the site that has them. Where the scan is
+ * over already, the configuration's settings have to do, at the place that the stream says. */
 static const struct site *find_head(struct watch *w, const struct scanhead_info *info)
 {
     const uint32_t station = info->station - 1;
