@@ -127,15 +127,16 @@ $(BUILD)/%.cpp.o: %.cpp $(BUILD)/flags
 	$(Q)$(CXX) $(ALL_CPPFLAGS) $(ALL_CXXFLAGS) -c $< -o $@
 # What a build is made of, a file for each: all is built again once the tools or flags have changed, and an archive once a
 # source has come or gone. ccache and -Werror change nothing of an object.
-STAMPS = $(patsubst %,$(BUILD)/%,flags modules.members head.members library.members common.members benches.members joined.members)
+STAMPS = $(patsubst %,$(BUILD)/%,flags modules.members head.members library.members common.members benches.members joined.members sonames)
 $(BUILD)/flags: NOW = $(filter-out ccache %/ccache -Werror,$(CC) $(CXX) $(AR) $(OBJCOPY) $(ALL_CPPFLAGS) $(ALL_CFLAGS) $(ALL_CXXFLAGS) \
-	$(CORE_OPT) $(TEST_WARN) $(LDFLAGS) $(LDLIBS) $(SONAMES))
+	$(CORE_OPT) $(TEST_WARN) $(LDFLAGS) $(LDLIBS))
 $(BUILD)/modules.members: NOW = $(SRC)
 $(BUILD)/head.members: NOW = $(HEAD_OBJ)
 $(BUILD)/library.members: NOW = $(LIBOBJ)
 $(BUILD)/common.members: NOW = $(COMMON)
 $(BUILD)/benches.members: NOW = $(BENCHES)
 $(BUILD)/joined.members: NOW = $(JOINED)
+$(BUILD)/sonames: NOW = $(SONAMES)
 quoted = '$(subst ','\'',$(strip $(1)))'
 $(STAMPS): ALWAYS
 	@mkdir -p $(@D)
@@ -148,6 +149,7 @@ $(BUILD)/drivers/link/web_pages.inc: ALWAYS
 	cmp -s $$new $@ || cp $$new $@; rm $$new
 $(BUILD)/drivers/link/web_pages.c.o: private override ALL_CPPFLAGS += -I$(BUILD)
 $(BUILD)/core/late.c.o: private override ALL_CPPFLAGS += $(SONAMES)
+$(BUILD)/core/late.c.o: $(BUILD)/sonames
 $(BUILD)/drivers/link/web_pages.c.o: $(BUILD)/drivers/link/web_pages.inc $(WEB_FILES)
 ALWAYS:
 # All modules for the program and the tests, and the client library alone.

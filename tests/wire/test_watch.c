@@ -242,8 +242,8 @@ static void a_scan_whose_end_is_lost_is_over(void **state)
     struct wire *wire = *state;
     char config[256];
     prepare(wire, config);
-    struct head head = head_start(
-        wire, config, (const char *const[]){"--set", "links.1.waits=no", "--set", "loop.queue_ms=10", NULL});
+    struct head head =
+        head_start(wire, config, (const char *const[]){"--set", "links.1.waits=no", "--set", "loop.queue_ms=10", NULL});
     struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
     client_wait_state(sh, "idle");
     client_tell(sh, "SCAN:STAR");
