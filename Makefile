@@ -108,8 +108,8 @@ JOINED_unit = $(UNIT)
 JOINED_all = $(filter-out $(call PROGRAMS,guest),$(TESTS))
 JOINED_shipped = $(filter-out $(filter-out $(SHIPPED),$(UNIT)),$(JOINED_all))
 JOINED = $(JOINED_$(JOIN))
-# Each program has a main, and they share the rest.
-MAINS = $(patsubst %,$(BUILD)/firmware_sim/%.c.o,main scanheadd program)
+# Both programs have the one main.c.
+MAINS = $(BUILD)/firmware_sim/main.c.o $(BUILD)/firmware_sim/scanheadd.o
 EVERYTHING = $(OBJ) $(MAINS)
 
 IFC_READERS = $(BUILD)/ifc
@@ -174,13 +174,17 @@ $(BUILD)/libscanhead.so: $(LIBOBJ) $(BUILD)/library.members drivers/host/libscan
 	@echo "  LD    $@"
 	$(Q)$(CC) -shared $(SAN) $(LDFLAGS) -Wl,--version-script=drivers/host/libscanhead.map -Wl,-soname,libscanhead.so.1 \
 		-o $@ $(LIBOBJ) -lnettle -lusb-1.0 -lm
-$(BUILD)/scanhead: $(BUILD)/firmware_sim/main.c.o $(BUILD)/firmware_sim/program.c.o $(BUILD)/modules.a
+$(BUILD)/scanhead: $(BUILD)/firmware_sim/main.c.o $(BUILD)/modules.a
 	@echo "  LD    $@"
 	$(Q)$(CC) $(SAN) $(LDFLAGS) -o $@ $^ $(LDLIBS)
 #? scanheadd         the head alone, for a board: run, plan, check, list
 scanheadd: $(BUILD)/scanheadd
 # It is linked with the libraries that it needs and no others.
-$(BUILD)/scanheadd: $(BUILD)/firmware_sim/scanheadd.c.o $(BUILD)/firmware_sim/program.c.o $(BUILD)/head.a
+$(BUILD)/firmware_sim/scanheadd.o: firmware_sim/main.c $(BUILD)/flags
+	@mkdir -p $(@D)
+	@echo "  CC    $< alone"
+	$(Q)$(CC) $(ALL_CPPFLAGS) -DHEAD_ALONE $(ALL_CFLAGS) -c $< -o $@
+$(BUILD)/scanheadd: $(BUILD)/firmware_sim/scanheadd.o $(BUILD)/head.a
 	@echo "  LD    $@"
 	$(Q)$(CC) $(SAN) $(LDFLAGS) -o $@ $^ -Wl,--as-needed $(LDLIBS)
 

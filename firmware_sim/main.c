@@ -1,15 +1,105 @@
 /* SPDX-License-Identifier: MIT */
-/* scanhead has head and studio, all commands. */
-#include "firmware_sim/program.h"
+/* The command line of both programs: scanhead, and with HEAD_ALONE scanheadd, which is the head alone, for a board. */
+#include <errno.h>
+#include <malloc.h>
+#include <string.h>
+#include <sys/resource.h>
+
+#include "drivers/host/scanhead.h"
+#include "firmware_sim/app/app.h"
+#include "firmware_sim/app/help/help.h"
+#ifndef HEAD_ALONE
 #include "firmware_sim/app/studio/watch/watch.h"
+#endif
 
 #define COMMAND(name) &app_##name,
-static const struct app_command *const COMMANDS[] = {APP_COMMANDS(COMMAND, COMMAND) NULL};
-static const char *const ELSEWHERE[] = {NULL};
+#define NAME(name)    #name,
+#define NOTHING(name)
+#ifdef HEAD_ALONE
+#define STUDIO_HERE      NOTHING
+#define STUDIO_ELSEWHERE NAME
+#else
+#define STUDIO_HERE      COMMAND
+#define STUDIO_ELSEWHERE NOTHING
+#endif
+static const struct app_command *const COMMANDS[] = {APP_COMMANDS(COMMAND, STUDIO_HERE) NULL};
+static const char *const ELSEWHERE[] = {APP_COMMANDS(NOTHING, STUDIO_ELSEWHERE) NULL}; /* scanhead alone has these */
 
+static int is_elsewhere(const char *word)
+{
+    for (const char *const *name = ELSEWHERE; *name != NULL; name++)
+        if (strcmp(word, *name) == 0) return 1;
+    return 0;
+}
+
+static int fail_elsewhere(const char *word)
+{
+    fprintf(stderr, "scanhead: %s: not in scanheadd; use scanhead\n", word);
+    return APP_USAGE;
+}
+
+static int fail_unknown(const char *word)
+{
+    enum { MOST = 32 };
+    const char *known[MOST], *meant;
+    size_t n = 0;
+    while (COMMANDS[n] != NULL && n < MOST) {
+        known[n] = COMMANDS[n]->name;
+        n++;
+    }
+    meant = app_nearest(word, known, n);
+    fprintf(stderr, "scanhead: unknown command %s%s%s%s; see scanhead --help\n", word,
+            meant != NULL ? ", did you mean " : "", meant != NULL ? meant : "", meant != NULL ? "?" : "");
+    return APP_USAGE;
+}
+
+static int run(int argc, char **argv)
+{
+    if (argc < 2) {
+        help_print(COMMANDS, stderr);
+        return APP_USAGE;
+    }
+    if (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0) {
+        help_print(COMMANDS, stdout);
+        return APP_OK;
+    }
+    const char *word = strcmp(argv[1], "help") == 0 && argc > 2 ? argv[2] : argv[1];
+    if (is_elsewhere(word)) return fail_elsewhere(word);
+    if (strcmp(argv[1], "help") == 0) return help_run(COMMANDS, argc - 1, argv + 1);
+    if (strcmp(argv[1], "--version") == 0) {
+        printf("scanhead %s\n", scanhead_version());
+        return APP_OK;
+    }
+    for (const struct app_command *const *c = COMMANDS; *c != NULL; c++)
+        if (strcmp(argv[1], (*c)->name) == 0) return (*c)->run(argc - 1, argv + 1);
+    return fail_unknown(argv[1]);
+}
+
+/* Configurations and blocks of pulses lie on stacks, which threads get as large as this limit; 384 KiB were enough. */
+static int check_stack(void)
+{
+    enum { NEEDED_KIB = 1024 };
+    struct rlimit limit;
+    if (getrlimit(RLIMIT_STACK, &limit) != 0 || limit.rlim_cur >= NEEDED_KIB * 1024) return APP_OK;
+    fprintf(stderr, "scanhead: the stack is limited to %llu KiB; allowed %d and more: ulimit -s %d\n",
+            (unsigned long long)limit.rlim_cur / 1024, NEEDED_KIB, NEEDED_KIB);
+    return APP_USAGE;
+}
+
+/* A command's output may still be in the buffer. A full disk or a closed pipe shows only here. */
 int main(int argc, char **argv)
 {
-    static const struct program program = {COMMANDS, ELSEWHERE};
+    /* Memory of meshes goes back to the system at once, however large the file was that was freed before. */
+    mallopt(M_MMAP_THRESHOLD, 4 << 20);
+#ifndef HEAD_ALONE
     run_take_page(&watch_page);
-    return program_main(&program, argc, argv);
+#endif
+    int status = check_stack();
+    if (status == APP_OK) status = run(argc, argv);
+    errno = 0;
+    const int failed = fflush(stdout) != 0 || ferror(stdout) != 0;
+    if (!failed || status != APP_OK) return status;
+    fprintf(stderr, "scanhead: standard output: writing failed%s%s\n", errno != 0 ? ": " : "",
+            errno != 0 ? strerror(errno) : "");
+    return APP_FAILED;
 }

@@ -26,7 +26,7 @@ check: check-analysers check-tsan
 PLAIN ?= $(BUILD)/test
 TSAN_SHARED = $(wildcard firmware_sim/loop/*.c firmware_sim/device/*.c firmware_sim/fault/*.c drivers/link/*.c)
 TSAN_SHORT = $(TSAN) OPT=-O0 BUILD=$(BUILD)/tsan_short PLAIN=$(PLAIN) $(BUILD)/tsan_short/tsan_head
-$(BUILD)/tsan_head: $(TSAN_SHARED:%=$(BUILD)/%.o) $(PLAIN)/firmware_sim/main.c.o $(PLAIN)/firmware_sim/program.c.o $(PLAIN)/modules.a
+$(BUILD)/tsan_head: $(TSAN_SHARED:%=$(BUILD)/%.o) $(PLAIN)/firmware_sim/main.c.o $(PLAIN)/modules.a
 	@echo "  LD    $@"
 	$(Q)$(CC) $(SAN) $(FAST_LD) -o $@ $^ $(LDLIBS)
 check-tsan-short: deps-check

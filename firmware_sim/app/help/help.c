@@ -24,7 +24,7 @@ static const struct app_option OPTIONS[] = {
 };
 /* clang-format on */
 
-/* Nobody calls it: program.c calls help_run. */
+/* Nobody calls it: main.c calls help_run. */
 static int run(int argc, char **argv)
 {
     (void)argc;
