@@ -35,9 +35,10 @@ class Build:
     def read_commands(self, text):
         """make prints how it compiles; a mutant is compiled in the same way."""
         for line in text.splitlines():
-            if " -c " in line and f" -o {self.folder}/" in line:
-                words = shlex.split(line)
-                self.commands[words[words.index("-c") + 1]] = words
+            words = shlex.split(line) if " -c " in line and " -o " in line else []
+            name = words[words.index("-c") + 1] if words else ""
+            if words and words[words.index("-o") + 1] == self.object(name):  # main.c has a second object, scanheadd's
+                self.commands[name] = words
 
     def read_deps(self):
         """Finds the sources, of the product and of tests, that include a file."""
