@@ -321,12 +321,13 @@ struct device_counters *device_counters(struct device *device)
     return &device->counters;
 }
 
-uint64_t device_scans(struct device *device)
+uint32_t device_last_scan(struct device *device, uint32_t *station)
 {
     pthread_mutex_lock(&device->lock);
-    uint64_t scans = device->scan.number;
+    const uint32_t number = device->scan.number;
+    if (station != NULL) *station = device->scan.station + 1;
     pthread_mutex_unlock(&device->lock);
-    return scans;
+    return number;
 }
 
 int64_t device_scan_ns(struct device *device)

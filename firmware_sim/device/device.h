@@ -215,8 +215,9 @@ uint32_t device_power_ons(struct device *device);
 /* Since the last power-up counters begin this far below their wrap; 0: they begin at 0. */
 uint32_t device_near_wrap(struct device *device);
 
-/* Scans begun so far. */
-uint64_t device_scans(struct device *device);
+/* The number of the last scan that began, which is how many have begun; 0: none. *station: where it stands, from 1;
+ * NULL: not asked for. */
+uint32_t device_last_scan(struct device *device, uint32_t *station);
 /* The length of the last scan, in whole ticks; 0: none has ended. */
 int64_t device_scan_ns(struct device *device);
 

@@ -89,7 +89,7 @@ static struct device_counters *counters(void *self)
 
 static uint64_t scans(void *self)
 {
-    return device_scans(self);
+    return device_last_scan(self, NULL);
 }
 
 static int power_up(void *self, int64_t now_ns, const char **warning, struct sh_err *err)

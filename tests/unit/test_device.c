@@ -103,7 +103,7 @@ static void a_stop_in_spin_up_never_scans(void **state)
     while (rig->next < 500 && rig_claim(rig))
         assert_false(rig->work.scanning);
     assert_string_equal(rig_state(rig, 500), "idle");
-    assert_true(device_scans(rig->device) == 0);
+    assert_true(device_last_scan(rig->device, NULL) == 0);
     /* Ticks that are claimed can't be changed: as told 8 ticks ago, it turns down in 50 ms from the next one on. */
     rig_tell(rig, "SCAN:START", 500);
     rig_go_to(rig, 510);
@@ -214,7 +214,7 @@ static void no_command_leads_to_off_or_fault(void **state)
                 rig->device, (uint32_t)case_between(&seed, 0, 2), line[case_u64(&seed) % (sizeof line / sizeof *line)],
                 rig->next - (uint64_t)case_between(&seed, 0, rig->next < 65 ? (int64_t)rig->next : 65), &result);
     }
-    assert_true(device_scans(rig->device) > 50);
+    assert_true(device_last_scan(rig->device, NULL) > 50);
     rig_close(rig);
 }
 
@@ -277,7 +277,7 @@ static void a_reset_ends_the_scan_and_restores_the_defaults(void **state)
     assert_string_equal(rig_state(rig, 450), "idle");
     rig_tell(rig, "SCAN:START", 450);
     rig_wait(rig, NATIVE_EV_SCAN_START, 100);
-    assert_true(rig->work.segment.spec.prr_uhz == 300000 * HZ && device_scans(rig->device) == 2);
+    assert_true(rig->work.segment.spec.prr_uhz == 300000 * HZ && device_last_scan(rig->device, NULL) == 2);
     rig_close(rig);
 }
 
@@ -307,7 +307,7 @@ static struct device_work *run_session(const struct device_options *options, int
         assert_true(rig_claim(rig));
         works[rig->work.tick] = rig->work;
     }
-    assert_true(device_scans(rig->device) == 3);
+    assert_true(device_last_scan(rig->device, NULL) == 3);
     rig_close(rig);
     return works;
 }

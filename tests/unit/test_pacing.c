@@ -244,7 +244,7 @@ static int use(struct run *run, int turn)
     if (turn >= 50 && turn % 10 == 0) say(run, said[(turn / 10 - 5) % 10]);
     if (turn % 10 == 3) say(run, "*IDN?\n");
     if (turn % 10 == 6) (void)!write(client[2], "HEAD:PRR?\n", 10);
-    return turn < 160 || device_scans(run->rig->device) < 2 || pacing_sleeps() < 350;
+    return turn < 160 || device_last_scan(run->rig->device, NULL) < 2 || pacing_sleeps() < 350;
 }
 
 /* It comes too late, and catches up. */

@@ -50,7 +50,7 @@ static void say_what_runs(const struct config *cfg, const struct site *site, con
 static void say_short_scan(const struct run_options *o, struct device *device)
 {
     const double scan_s = 1e-9 * (double)device_scan_ns(device), tick_s = 1e-9 * (double)device_tick_ns(device);
-    if (o->quiet || !o->device.start || app_interrupted() || device_scans(device) != 1) return;
+    if (o->quiet || !o->device.start || app_interrupted() || device_last_scan(device, NULL) != 1) return;
     if (scan_s <= 0.0 || scan_s + 1.5 * tick_s > o->device.duration_s) return;
     fprintf(stderr, "scanhead: the scan was over after %.3f s, before --duration %.10g: %s\n", scan_s,
             o->device.duration_s,

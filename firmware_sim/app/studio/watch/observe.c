@@ -186,14 +186,27 @@ static void take_frame(struct watch *w, const struct scanhead_frame *frame)
     }
 }
 
+/* A scan of which nothing came that tells where it was made: its points can't be taken. */
+static void begin_unknown(struct watch *w, uint32_t scan, uint32_t station)
+{
+    let_go(w);
+    w->at = (struct watch_scan){.scan = scan, .station = station};
+    w->now = w->head[station - 1];
+    w->fresh = 0;
+    watch_sample_begin(w);
+    watch_seen_begin(&w->seen, station);
+}
+
 /* Nothing has come for QUIET times NEXT_MS. At the pace `fast` no time passes for an idle head, so it sends no
- * telemetry: where the end of its scan was lost, nothing else says that it is over. */
+ * telemetry: where the end of its scan was lost, nothing else says that it is over. Its descriptor may be lost, too. */
 static void rest(struct watch *w)
 {
-    if (!w->missed || device_scans(w->options.device) == 0 || device_rests_from(w->options.device) == UINT64_MAX)
-        return;
+    uint32_t station;
+    const uint32_t scan = device_last_scan(w->options.device, &station);
+    if (!w->missed || scan == 0 || device_rests_from(w->options.device) == UINT64_MAX) return;
     w->missed = 0;
-    if ((w->at.scan != 0 && !w->fresh) || follow_scan(w)) end_scan(w);
+    if ((w->fresh || w->at.scan != scan) && !(follow_scan(w) && w->at.scan == scan)) begin_unknown(w, scan, station);
+    end_scan(w);
 }
 
 /* Figures cost time, too: the more time they take, the less often they are worked out. */
@@ -235,7 +248,7 @@ void *watch_observe(void *watch)
             take_frame(w, &frame);
         else if (rc != SCANHEAD_ETIMEOUT)
             break;
-        else if (quiet == QUIET)
+        else if (quiet % QUIET == 0)
             rest(w);
         if (is_due(w)) watch_publish(w);
     }
