@@ -3,11 +3,11 @@
 # Records scans of the head of hokuyo.yaml with rawlog-grabber, which runs until it has saved some.
 #   sh config/hokuyo.sh INI PREFIX        PREFIX: the rawlog_prefix that INI names
 # It gives up where an answer takes more than 0.1 s (TCP) or 0.2 s (serial), as on a busy machine, and asks no more where
-# the head was still booting. It is started again when it has saved nothing in 10 s; after two minutes no more.
+# the head was still booting. It is started again when it has saved nothing in 10 s; after ten minutes no more.
 set -eu
 ini=$1
 prefix=$2
-end_s=$(($(date +%s) + 120))
+end_s=$(($(date +%s) + 600))
 while [ "$(date +%s)" -lt $end_s ]; do
     rm -f "$prefix"_*.rawlog "$prefix.said"
     # What it reads is a key that ends it, and comes once it has said how it goes.
