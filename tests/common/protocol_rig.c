@@ -19,6 +19,11 @@ static int keep_unit(void *ctx, const void *unit, size_t len)
     if (len > rig->room) return 1;
     if (rig->room != SIZE_MAX) rig->room -= len;
     assert_true(rig->n_units < RIG_UNITS && rig->len + len <= RIG_BYTES);
+    while (rig->len + len > rig->cap) {
+        rig->cap *= 2;
+        rig->bytes = realloc(rig->bytes, rig->cap + 1);
+        assert_non_null(rig->bytes);
+    }
     memcpy(rig->bytes + rig->len, unit, len);
     rig->len += len;
     rig->end[rig->n_units++] = rig->len;
@@ -83,6 +88,9 @@ void protocol_rig_open(struct protocol_rig *rig, enum protocol_id id, const char
 {
     struct sh_err err;
     memset(rig, 0, sizeof *rig);
+    rig->cap = 65536;
+    rig->bytes = calloc(1, rig->cap + 1);
+    assert_non_null(rig->bytes);
     rig->ops = protocol_ops_get(id);
     assert_non_null(rig->ops);
     rig->room = SIZE_MAX;
@@ -106,6 +114,8 @@ void protocol_rig_close(struct protocol_rig *rig)
 {
     rig->ops->destroy(rig->protocol);
     rig->protocol = NULL;
+    free(rig->bytes);
+    rig->bytes = NULL;
 }
 
 void protocol_rig_clear(struct protocol_rig *rig)

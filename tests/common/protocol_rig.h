@@ -16,8 +16,8 @@ struct protocol_rig {
     struct protocol_identity identity;
     struct protocol_spec spec;
     /* what it sent */
-    uint8_t bytes[RIG_BYTES];
-    size_t len;
+    uint8_t *bytes; /* [cap + 1] from open to close; they move when they grow */
+    size_t len, cap;
     size_t end[RIG_UNITS]; /* of each unit in bytes */
     uint32_t n_units;
     size_t room; /* for further bytes; a unit that is longer is refused. SIZE_MAX at first */
@@ -44,7 +44,7 @@ struct protocol_rig {
     uint32_t seq;
 };
 
-/* model as in the profile. The rig is large: allocate it, or make it static. Asserts. */
+/* model as in the profile. The rig is large: make it static. Asserts. */
 void protocol_rig_open(struct protocol_rig *rig, enum protocol_id id, const char *maker, const char *model);
 void protocol_rig_close(struct protocol_rig *rig);
 /* Forgets what was sent and called. */

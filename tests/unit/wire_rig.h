@@ -49,9 +49,9 @@ struct rig {
     uint64_t count[FAULT_N_OF], seq;
     struct fault_note note[RIG_NOTES];
     uint32_t n_notes;
-    struct rig_write write[RIG_WRITES];
+    struct rig_write *write; /* [RIG_WRITES] */
     uint32_t n_writes;
-    uint8_t out[RIG_OUT];
+    uint8_t *out; /* [RIG_OUT] */
     size_t n_out;
 };
 extern struct rig rig;
