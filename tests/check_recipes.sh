@@ -137,10 +137,19 @@ do_block() {
     esac
 }
 
-# Links of the document $1 to files that aren't there.
+# The anchors of the document $1: its headings in lower case, blanks as hyphens, without other marks.
+anchors() {
+    awk '/^[ \t]*(```|~~~)/ { fenced = !fenced }
+        !fenced && /^#+ / { sub(/^#+ /, ""); text = tolower($0); gsub(/[^a-z0-9 _-]/, "", text); gsub(/ /, "-", text); print text }' "$1"
+}
+
+# Links of the document $1 to files that aren't there, and to headings that aren't.
 dead_links() {
-    grep -oE '\]\([^)#: ]+' "$1" | sed 's/^](//' | while read -r link; do
-        [ -e "$(dirname "$1")/$link" ] || echo "$link"
+    local link file
+    grep -oE '\]\([^): ]+' "$1" | sed 's/^](//' | while read -r link; do
+        file=$1
+        [[ $link == '#'* ]] || file=$(dirname "$1")/${link%%#*}
+        [ -e "$file" ] && { [[ $link != *'#'* ]] || anchors "$file" | grep -qxF -e "${link#*#}"; } || echo "$link"
     done
 }
 
@@ -176,7 +185,7 @@ check_document() { # document, as it is called
     report $? "$2: each block says what is done with it" "$unmarked"
     dead=$(dead_links "$1")
     [ -z "$dead" ]
-    report $? "$2: its links lead to files" "$dead"
+    report $? "$2: its links lead to files and headings" "$dead"
 }
 
 # expect HOW_MANY_FAIL NAME LINE...: that many tests of a planted document fail.
@@ -210,6 +219,8 @@ expect 1 'a block without an end' '```text' 'x'
 expect 1 'C that does not compile' '```c as build/a.c' 'int main(void) { return x; }' '```'
 expect 1 'a configuration that is wrong' '```yaml as build/a.yaml' 'head: {profile: none}' '```'
 expect 1 'a link to a file that is not there' 'See [here](nothing.md).'
+expect 0 'a link to a heading' '## Ports, `tcp` and others' 'See [here](#ports-tcp-and-others).'
+expect 1 'a link to a heading that is not there' '```text' '# nothing' '```' 'See [here](#nothing).'
 expect 1 'a file outside of build' '```c as ../a.c' 'int a;' '```'
 limit_s=${RECIPE_LIMIT_S:-180}
 

@@ -385,7 +385,7 @@ struct scanhead_stats {
 };
 void scanhead_get_stats(const struct scanhead *sh, struct scanhead_stats *stats);
 
-/* Hash of the stream so far, as PROTOCOL.md defines stream_sha256: 64 hex digits and a NUL. Counting starts
+/* Hash of the stream so far, as COUNTS.md defines stream_sha256: 64 hex digits and a NUL. Counting starts
  * with scanhead_hash_start() and costs about a nanosecond per byte. */
 void scanhead_hash_start(struct scanhead *sh);
 void scanhead_hash_hex(const struct scanhead *sh, char hex[65]);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Payloads of fixed length as tables: a row for each struct member, in wire order without gaps.
  *
- * The same table encodes and decodes, so the two can't differ. PROTOCOL.md gives the resulting offsets, and
+ * The same table encodes and decodes, so the two can't differ. The protocol's pages give the offsets, and
  * tests/unit/test_native.c holds them. Pure; any thread; real-time safe. */
 #ifndef DRIVERS_PROTOCOL_FIELDS_H
 #define DRIVERS_PROTOCOL_FIELDS_H

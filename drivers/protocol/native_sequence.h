@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The sequence numbers of stream frames: which frame comes in order, which is repeated, which comes late, and which are
- * missing. PROTOCOL.md, *Sequence numbers*, has the rules.
+ * missing. LOSSES.md has the rules.
  *
  * Headers of whole frames go in, one after the other. A kind of notice comes out for each. Numbers are modulo 2^32
  * throughout. A frame in order costs one store; only a jump is examined. */

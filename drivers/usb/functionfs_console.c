@@ -97,7 +97,7 @@ static void look_at_host(struct ffs_console *console)
     offer_tx(console);
 }
 
-/* Native: a reader takes text only in step, after a whole frame (PROTOCOL.md, Resynchronisation). */
+/* Native: a reader takes text only in step, after a whole frame (LOSSES.md, Resynchronisation). */
 static void lead_in(struct ffs_console *console)
 {
     const struct native_event event = {.code = NATIVE_EV_READER_LOST, .text = "the end of an earlier session"};

@@ -26,7 +26,7 @@
 
 enum { DEVICE_MAX_EVENTS = 24, DEVICE_MAX_POSES = 256, DEVICE_POSE_AHEAD_S = 3600 };
 
-/* Counters that casters, pacing thread and readers share. PROTOCOL.md defines the words (What the counts mean).
+/* Counters that casters, pacing thread and readers share. COUNTS.md defines the words.
  * Once all claimed ticks are released or lost, cast = pulses + lost_pulses. */
 struct device_counters {
     _Atomic uint64_t fired, cast;             /* claimed */

@@ -23,7 +23,7 @@ struct hasher {
     pthread_t thread;
 };
 
-/* As PROTOCOL.md defines it: type, length and payload of each hashed frame. */
+/* As COUNTS.md defines it: type, length and payload of each hashed frame. */
 static void hash_frames(struct hasher *h, const uint8_t *bytes, uint32_t len)
 {
     for (uint32_t at = 0; at < len;) {

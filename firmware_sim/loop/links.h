@@ -21,8 +21,8 @@ struct link_place {
     const char *protocol; /* its name; NULL: none */
 };
 
-/* Counts of what the readers of a link got, and of what was left out for them. PROTOCOL.md defines the words, in What
- * the counts mean. */
+/* Counts of what the readers of a link got, and of what was left out for them. COUNTS.md defines the
+ * words. */
 struct link_counts {
     uint64_t received_pulses; /* in frames that were written out to the link as a whole */
     uint64_t left_out_pulses;

@@ -11,7 +11,7 @@
 #include "firmware_sim/replay/replay_state.h"
 
 enum { MOST_BYTES = 1 << 20, USUAL_MOST_BYTES = 1 << 17, NATIVE_RATE_BYTES = 2 * NATIVE_POINT_LEN };
-static const uint32_t SEQ_BACK = UINT32_C(1) << 30; /* a reader takes that for another sequence (PROTOCOL.md) */
+static const uint32_t SEQ_BACK = UINT32_C(1) << 30; /* a reader takes that for another sequence (LOSSES.md) */
 static const int64_t BACK_NS = 1000000000; /* a frame this much earlier than the one before is of another head */
 
 /* ---- the frames */

@@ -246,7 +246,7 @@ static void test_surfaces_split(void **state)
     assert_int_equal(native_encode_surfaces(out, sizeof out, 4096, &one, 1), 0);
 }
 
-/* PROTOCOL.md, 8 poses: each byte of a pose where the table says, and what is refused. */
+/* ANCHOR.md, 8 poses: each byte of a pose where the table says, and what is refused. */
 static void test_poses(void **state)
 {
     (void)state;
@@ -293,7 +293,7 @@ static void test_poses(void **state)
     assert_int_equal(native_decode_poses(payload, 8 + 80, &n), SH_EFORMAT);
 }
 
-/* PROTOCOL.md, 10 emitter: each field where the table says, and what is refused. */
+/* DESCRIPTOR.md, 10 emitter: each field where the table says, and what is refused. */
 static void test_emitter(void **state)
 {
     (void)state;

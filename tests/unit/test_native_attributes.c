@@ -52,7 +52,7 @@ static struct line_block make_block(uint32_t n_points, uint32_t echoes)
                                .width_cns = width};
 }
 
-/* PROTOCOL.md, 9. */
+/* POINTS.md, 9. */
 static void test_bytes(void **state)
 {
     (void)state;

@@ -53,7 +53,7 @@ static struct line_block make_block(uint32_t n_points, uint32_t echoes, int attr
                                .rgb = rgb};
 }
 
-/* PROTOCOL.md, 11. */
+/* POINTS.md, 11. */
 static void test_bytes(void **state)
 {
     (void)state;

@@ -5,15 +5,16 @@
         dump SOURCE OUT     points, attributes, poses and times, frame by frame, as test_python.c reads them
         live SOURCE         a session with a running head
         crs POLAR GEO       the same scan in both layouts: the largest differences, m: in the CRS; in the
-                            scene; in the CRS with the formula of PROTOCOL.md
+                            scene; in the CRS with the formula of ANCHOR.md
         count FILE          the parser's counters
         samples PAGE OUT    decodes the frames in hex of PAGE; what is said below each is what it holds
-        tables PAGE FILE    decodes FILE's frames by PAGE's tables alone; the client must read the same
+        tables FOLDER FILE  decodes FILE's frames by the tables of FOLDER's pages alone; the client must read the same
         hostile FILE SEED   frames of FILE with wrong contents and good checksums: only ScanheadError comes
         older FILE OUT      FILE as heads wrote it whose telemetry had no counts of the scan
         ends FILE           where scan_over is true, with SCAN_END and without; what says that pulses were lost
         misuse FILE         wrong sources and calls: only ScanheadError comes; a late reply answers nothing else
 """
+import glob
 import hashlib
 import math
 import random
@@ -94,7 +95,7 @@ def columns_of(path):
 
 
 def by_the_page(anchor, at):
-    """PROTOCOL.md's formula for UTM and UPS, with the point scale by Snyder's equations."""
+    """ANCHOR.md's formula for UTM and UPS, with the point scale by Snyder's equations."""
     lat, e2 = math.radians(anchor["lat_deg"]), scanhead._E2
     c = e2 / (1 - e2) * math.cos(lat) ** 2
     a = math.radians(anchor["lon_deg"] - (6 * (anchor["epsg"] % 100) - 183)) * math.cos(lat)
@@ -391,10 +392,12 @@ def samples(page, out):
 CODES = {"u32": "I", "u64": "Q", "i32": "i", "i64": "q", "f64": "d", "char": "s"}
 
 
-def tables_of(page):
-    """For each type of frame, the struct format that the first table of its section gives."""
+def tables_of(folder):
+    """For each type of frame, the struct format that the first table of its section gives. A type has one section."""
     found = {}
-    for kind, section in re.findall(r"\n### ([1-9]|1[01]) [a-z ]+\n(.*?)(?=\n##)", open(page).read(), re.S):
+    pages = "".join(open(page).read() for page in sorted(glob.glob(folder + "/*.md")))
+    for kind, section in re.findall(r"\n## ([1-9]|1[01]) [a-z ]+\n(.*?)(?=\n##|\n# |\Z)", pages, re.S):
+        assert int(kind) not in found, f"type {kind}: two sections"
         form = "<"
         for line in section[section.index("| ---"):].split("\n")[1:]:
             row = re.match(r"\| (\d+) \| ([a-z]+\d*)(?:\[(\d+)\])? \|", line)
@@ -411,8 +414,9 @@ def flat(fields):
         yield from value if isinstance(value, tuple) else (value,)
 
 
-def tables(page, path):
-    forms, seen = tables_of(page), []
+def tables(folder, path):
+    forms, seen = tables_of(folder), []
+    assert sorted(forms) == list(range(1, 12)), sorted(forms)
     for frame in scanhead.open(path).frames():
         if not frame.fields:
             continue

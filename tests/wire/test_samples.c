@@ -189,7 +189,7 @@ static void test_frames(void **state)
             native_read_header(frame + i, &header);
             native_seal(again + i, header.seq);
             types |= 1 << header.type;
-            /* The hash in PROTOCOL.md's words: u8 type, u32 length, payload; these stand at 1 and 4. */
+            /* The hash in COUNTS.md's words: u8 type, u32 length, payload; these stand at 1 and 4. */
             if ((header.flags & 3) != 0 || header.type == 5 || header.type == 6 || header.type == 7) continue;
             sha256_update(&sha256, 1, frame + i + 1);
             sha256_update(&sha256, 4, frame + i + 4);
@@ -220,7 +220,7 @@ static char *ask_python(struct wire *wire, const char *what, const char *page, c
     return wire_read(wire_path(wire, "python.out"), NULL);
 }
 
-/* What stands below each frame is what the Python client reads in it, and what the tables of PROTOCOL.md make of it. */
+/* What stands below each frame is what the Python client reads in it, and what the tables of the protocol's pages make of it. */
 static void test_words(void **state)
 {
     struct wire *wire = *state;
@@ -236,7 +236,7 @@ static void test_words(void **state)
     assert_non_null(strstr(page, said + 26));
     free(said);
     free(page);
-    said = ask_python(wire, "tables", "drivers/protocol/PROTOCOL.md", stream);
+    said = ask_python(wire, "tables", "drivers/protocol", stream);
     assert_string_equal(said, "6 1 2 3 9 11 4 5 10 6\n"); /* names and poses have no fixed part that is decoded so */
     free(said);
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* A head whose stream a USB of its speed can't carry says so at start, with both figures; one that it can carry runs.
  *
- * The figures are worked out by hand. A point has 20 bytes (PROTOCOL.md), and full-sweep's mirror (36 facets, gain 10)
+ * The figures are worked out by hand. A point has 20 bytes (POINTS.md), and full-sweep's mirror (36 facets, gain 10)
  * fires over its whole sweep of 100 deg. USB 2.0 fits 19 bulk packets of 64 bytes into a frame of 1 ms at full speed
  * (table 5-9): 1.216 MB/s. At high speed host controllers reach 10 packets of 512 in a microframe of 125 us: 40.96
  * MB/s. Super speed, some 400 MB/s, carries more than any profile may fire (10 MHz, 200 MB/s). */

@@ -10,7 +10,7 @@
         if head.scan_over:
             break
 
-The wire is described in drivers/protocol/PROTOCOL.md; this file follows it section by section. Columns of
+The wire is described in drivers/protocol/PROTOCOL.md and its pages, section by section. Columns of
 points are numpy arrays where numpy is installed, else lists; the numbers are the same, to the last bit those
 of libscanhead. Units are in names: _m metres, _rad radians, _deg degrees, _ns nanoseconds, _db decibels.
 NaN: no value. Errors are exceptions. A Head belongs to one thread at a time.
@@ -1517,7 +1517,7 @@ class Head:
         return self._gps[1] + self._scan_t0_ns + t_ns - self._gps[0]
 
     def stream_sha256(self) -> str:
-        """The hash of all frames so far, as PROTOCOL.md defines it."""
+        """The hash of all frames so far, as COUNTS.md defines it."""
         return self._sha256.hexdigest()
 
 

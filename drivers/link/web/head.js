@@ -107,7 +107,7 @@ export class Head extends EventTarget {
     this.#wire.end();
   }
 
-  /** Counts of this connection, by the words of PROTOCOL.md (*What the counts mean*): - frames, bytes, points
+  /** Counts of this connection, by the words of COUNTS.md: - frames, bytes, points
    * (records, shots without echo among them), pulses (received), empty - lost_frames: missing in the sequence; of these
    * left_out_frames with left_out_pulses because this page was too slow - lost_pulses: lost by the head;
    * missing_pulses: of all scans that ended here, delivered and not received - dropped_points, dropped_pulses: decoded,

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// Losses of a connection's scans, as PROTOCOL.md defines them (*What the counts mean*). It also finds the end of a scan
-// whose SCAN_END was lost (*A reader that lost SCAN_END*). Pure.
+// Losses of a connection's scans, as COUNTS.md defines them. It also finds the end of a scan
+// whose SCAN_END was lost (LOSSES.md). Pure.
 import {STATES} from './native.js';
 
 const IN_SCAN = ['scanning', 'spin-down'];

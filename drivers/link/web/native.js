@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// The native protocol, from PROTOCOL.md alone: bytes to frames (Parser), frames to values and batches of points in the
+// The native protocol, from PROTOCOL.md and its pages alone: bytes to frames (Parser), frames to values and batches of points in the
 // scene frame (Decoder). Pure: it runs in a page, in a worker and in node.
 import {LOCAL, Parser, REPEAT} from './native_parser.js';
 import {readAnchor, readBeside, readDescriptor, readEmitter, readEvent, readLineEnd, readNames, readPoses,

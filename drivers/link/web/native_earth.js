@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// From the CRS of an anchor back to the scene frame: the exact way of PROTOCOL.md, *From the scene to the CRS*.
+// From the CRS of an anchor back to the scene frame: the exact way of ANCHOR.md, *From the scene to the CRS*.
 // WGS 84: NIMA TR8350.2. Transverse Mercator: Krueger's series in the form of Karney, Journal of Geodesy 85 (2011) 475,
 // to the fourth power of the third flattening: below 0.1 um within a zone. Polar stereographic: Snyder, USGS
 // Professional Paper 1395 (1987) 161.

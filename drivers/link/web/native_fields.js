@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// Payloads of fixed layout by the tables of PROTOCOL.md, as objects. A payload that PROTOCOL.md tells a reader to
-// refuse throws Refused.
+// Payloads of fixed layout by the tables of the protocol's pages, as objects. A payload that LOSSES.md tells a
+// reader to refuse throws Refused.
 //
 // Whole numbers of 64 bits: times (`_ns`), the seed and an event's a, b, c are BigInt. All others are Numbers, or
 // BigInt where a Number can't hold them exactly (beyond 2^53).

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// Bytes into frames and reply lines, as PROTOCOL.md has it (*Frames*, *Resynchronisation*). Pure: no page, no network.
+// Bytes into frames and reply lines, by PROTOCOL.md (*Frames*) and LOSSES.md (*Resynchronisation*). Pure: no page, no network.
 import {crc32c} from './crc32c.js';
 import {Sequence} from './native_sequence.js';
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 // Poses of a head that moves: points of the polar layout go from its frame to the scene by the pose of their time
-// (PROTOCOL.md, *8 poses*, Rule).
+// (ANCHOR.md, *Between two poses*).
 
 const KEEP = 8192; // some seconds, and more than two of the longest frames
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// The sequence numbers of frames, as PROTOCOL.md has them (*Sequence numbers*): which are missing, repeated or late.
+// The sequence numbers of frames, as LOSSES.md has them: which are missing, repeated or late.
 const SEEN = 256, GAPS = 64, GAP_MOST = 65536, LATE_RUN = 256; // how far back a jump is looked into, as libscanhead does
 const LOCAL = 2;
 

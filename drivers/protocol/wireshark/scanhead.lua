@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: MIT
--- scanhead's native protocol in Wireshark and tshark: drivers/protocol/PROTOCOL.md, byte by byte.
+-- scanhead's native protocol in Wireshark and tshark: drivers/protocol/PROTOCOL.md and its pages, byte by byte.
 --
 --     wireshark -X lua_script:scanhead.lua scan.pcapng
 --
@@ -139,7 +139,7 @@ local KINDS = {
   text = {nil, ProtoField.string},
 }
 
--- A table of PROTOCOL.md: {name, kind, title, unit or names of values, count}. The fourth is the width for a text; for
+-- A table of the protocol's pages: {name, kind, title, unit or names of values, count}. The fourth is the width for a text; for
 -- `hex` and `zero` it gives the known bits: the bits above them are reserved.
 local function rows_of(prefix, rows)
   local at = 0
@@ -352,7 +352,7 @@ scanhead.prefs.user0 = Pref.bool("Link type 147 (USER0) has frames", true,
                                  "As `scanhead record -o FILE.pcapng` writes them")
 scanhead.prefs.most = Pref.uint("Most points shown of a frame", 4000, "Fewer open faster")
 
--- ---- sequence numbers: PROTOCOL.md, *Sequence numbers*; the same as native_sequence.c
+-- ---- sequence numbers: LOSSES.md; the same as native_sequence.c
 
 local MODULUS, SEEN, GAPS, GAP_MOST, LATE_RUN = 4294967296, 256, 64, 65536, 256
 

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The pulses of a recording: what came, and what the head says of the rest. PROTOCOL.md defines the words (What
- * the counts mean).
+/* The pulses of a recording: what came, and what the head says of the rest. COUNTS.md defines the words.
  *
  * In: each frame of the stream. Out: sums over the scans whose end is known, by SCAN_END or, where that was lost,
  * by telemetry of the idle head. */
