@@ -1,9 +1,16 @@
 /* SPDX-License-Identifier: MIT */
 /* True directions and origins of a chunk's beams, and the directions that the head reads from its
  * encoders. */
+#include "core/cast/aim.h"
+
 #include <string.h>
 
-#include "core/cast/caster_private.h"
+#include "core/cast/caster.h"
+#include "core/cast/chunk.h"
+#include "core/cast/kernels_aim.h"
+#include "core/cast/kernels_moving.h"
+#include "core/cast/kernels_sweep.h"
+#include "core/cast/upset.h"
 #include "core/mat3.h"
 
 /* The rotation from socs to the frame of positions: to the CRS where that is a rotation, else to prcs.
@@ -123,6 +130,13 @@ static void aim_bent(struct caster *c, struct chunk *k, const struct instrument 
     caster_aim_read(c, k);
 }
 
+/* Adds wobbles to the angles. */
+static void wobble(const struct chunk *k, struct echo_list *l)
+{
+    for (uint32_t i = 0; i < k->n; i++)
+        cast_wobble(k->s->upset, k->run->t0_ns + (int64_t)k->dt_ns[i], &l->mirror_turn[i], &l->pan_turn[i]);
+}
+
 void caster_aim(struct caster *c, struct chunk *k)
 {
     const struct cast_setup *s = k->s;
@@ -132,7 +146,7 @@ void caster_aim(struct caster *c, struct chunk *k)
         kernel_angles_table(k->run, k->first, k->n, l->mirror_turn, l->pan_turn);
     else
         kernel_angles(k->run, k->first, k->n, l->mirror_turn, l->pan_turn);
-    if (s->upset != NULL && s->upset->n_wobbles != 0) caster_wobble(c, k);
+    if (s->upset != NULL && s->upset->n_wobbles != 0) wobble(k, l);
     k->from = (struct bvh_origins){.at_m = {s->station_m[0], s->station_m[1], s->station_m[2]}};
     if (s->n_knots != 0) k->from.own = VEC3_IN(l->p, 0);
     k->linear = 0;

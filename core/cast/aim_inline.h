@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/cast/kernels*.c: shared parts of their loops over directions. */
+/* Private to core/cast/kernels_*.c: shared parts of their loops over directions. */
 #ifndef CORE_CAST_AIM_INLINE_H
 #define CORE_CAST_AIM_INLINE_H
 
-#include "core/cast/kernels.h"
+#include "core/cast.h"
 #include "core/vecmath.h"
 
 /* A matrix as values of its own, which no store to an array can change. */

@@ -6,6 +6,8 @@
  * sin(a + b) = sin a + (sin a (cos b - 1) + cos a sin b): what is in brackets is small, and so is its rounding. With
  * the middle's sine in two doubles the sum is good to its last bit; tests/unit/test_sweep.c compares with
  * vec_sincos_turn. */
+#include "core/cast/kernels_sweep.h"
+
 #include <math.h>
 
 #include "core/cast/aim_inline.h"

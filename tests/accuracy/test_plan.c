@@ -12,8 +12,8 @@
 #include <unistd.h>
 #include <cmocka.h>
 
-#include "core/cast/kernels.h"
 #include "firmware_sim/site/plan_rows.h"
+#include "tests/common/aimed.h"
 #include "tests/common/beam_reference.h"
 #include "tests/common/thorough.h"
 
@@ -124,11 +124,9 @@ static void compare_beam(struct side *side, uint32_t station, const struct sched
     const struct config_profile *p = &side->cfg->profile;
     const struct line_block *b = cast(side, station, run, LINE_POLAR, NULL);
     struct cast_setup setup;
-    double turn[2][RUN], d[3][RUN];
+    double d[3][RUN];
     site_cast_setup(side->site, station, &setup);
-    kernel_angles(run, 0, RUN, turn[0], turn[1]);
-    kernel_directions(&(struct kernel_turns){RUN, turn[0], turn[1]}, setup.rotation,
-                      &(struct vec3_out){d[0], d[1], d[2]});
+    aimed_directions(run, setup.rotation, &(struct vec3_out){d[0], d[1], d[2]});
     for (uint32_t i = 0, at = 0; i < RUN; i++) {
         struct beam_ref ref;
         const double dir[3] = {d[0][i], d[1][i], d[2][i]};

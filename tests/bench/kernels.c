@@ -8,7 +8,10 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "core/cast/kernels.h"
+#include "core/cast/kernels_aim.h"
+#include "core/cast/kernels_points.h"
+#include "core/cast/kernels_sweep.h"
+#include "core/cast/kernels_times.h"
 #include "core/mat3.h"
 #include "core/rng.h"
 #include "tests/bench/bench.h"

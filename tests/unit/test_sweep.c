@@ -7,7 +7,9 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/cast/kernels.h"
+#include "core/cast/kernels_aim.h"
+#include "core/cast/kernels_sweep.h"
+#include "core/cast/kernels_times.h"
 #include "core/mat3.h"
 
 enum { N = BVH_CHUNK, RUNS = 300 };

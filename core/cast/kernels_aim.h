@@ -1,0 +1,26 @@
+/* SPDX-License-Identifier: MIT */
+/* Private to core/cast: where the pulses of a run go, as loops over arrays that compilers turn into vector code. */
+#ifndef CORE_CAST_KERNELS_AIM_H
+#define CORE_CAST_KERNELS_AIM_H
+
+#include "core/cast.h"
+
+/* Mirror and pan angle of n pulses of a run, from its pulse `first` on. */
+void kernel_angles(const struct schedule_run *run, uint32_t first, uint32_t n, double *mirror_turn, double *pan_turn);
+/* The same for a run with a table. */
+void kernel_angles_table(const struct schedule_run *run, uint32_t first, uint32_t n, double *mirror_turn,
+                         double *pan_turn);
+
+/* Angles of the axes, in turns. */
+struct kernel_turns {
+    uint32_t n;
+    const double *mirror, *pan;
+};
+/* Directions in prcs: rotation times (sin p cos m, cos p cos m, sin m). */
+void kernel_directions(const struct kernel_turns *turns, const double rotation[9], const struct vec3_out *d);
+/* The same, and also e: the directions as the encoders read them (whole counts), turned by to_crs instead
+ * of rotation. */
+void kernel_directions_read(const struct cast_setup *setup, const struct kernel_turns *turns, const double rotation[9],
+                            const double to_crs[9], const struct vec3_out *d, const struct vec3_out *e);
+
+#endif
