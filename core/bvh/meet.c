@@ -1,11 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /* A packet at a leaf, in double: finds which rays hit its triangles, and at what range. The rules are in
  * bvh_inside.h. */
+#include "core/bvh/meet.h"
+
 #include <math.h>
 
 #include "core/bvh/bvh_inside.h"
 #include "core/bvh/edges.h"
+#include "core/bvh/leaves.h"
 #include "core/bvh/nearest.h"
+#include "core/bvh/packet.h"
 #include "core/vec3.h"
 #include "core/vecmath.h"
 
