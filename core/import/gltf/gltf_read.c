@@ -13,7 +13,7 @@
 #include "core/import/gltf/gltf_json.h"
 #include "core/import/gltf/gltf_material.h"
 #include "core/import/gltf/gltf_nodes.h"
-#include "core/import/import.h"
+#include "core/import/import_assimp.h"
 
 bool gltf_is_name(const char *file)
 {
