@@ -19,6 +19,7 @@
 #include "core/import/import_material.h"
 #include "core/import/import_open.h"
 #include "core/import/import_says.h"
+#include "core/scene/build_surfaces.h"
 
 enum { MAX_DEPTH = 256 };
 

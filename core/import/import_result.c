@@ -12,6 +12,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "core/scene/build_surfaces.h"
+
 enum {
     AT_ONCE = 1 << 13,       /* elements between two looks at `stop` */
     MAX_TEXTURE_NAME = 8192, /* bytes */

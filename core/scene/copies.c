@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* A mesh that stands in a scene many times: its triangles are kept once, or written out for each of its places. */
+#include "core/scene/copies.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

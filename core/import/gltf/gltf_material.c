@@ -14,6 +14,7 @@
 #include "core/import/gltf/gltf_extensions.h"
 #include "core/import/gltf/gltf_json.h"
 #include "core/import/gltf/gltf_uri.h"
+#include "core/scene/build_surfaces.h"
 
 enum { CLAMP_TO_EDGE = 33071, MIRRORED_REPEAT = 33648 };
 

@@ -12,6 +12,7 @@
 #include "core/import/gltf/gltf_json.h"
 #include "core/import/gltf/gltf_material.h"
 #include "core/import/gltf/gltf_pose.h"
+#include "core/scene/build_surfaces.h"
 
 enum { POINTS, LINES, LINE_LOOP, LINE_STRIP, TRIANGLES, TRIANGLE_STRIP, TRIANGLE_FAN, N_MODES };
 
