@@ -86,6 +86,14 @@ struct cloud_site {
 int cloud_compare(const struct cloud *cloud, const struct cloud_site *site, const struct sh_report *report,
                   double *distance_m, uint32_t *triangle, struct sh_err *err);
 
+/* A cloud with what cloud_compare found of it. */
+struct cloud_compared {
+    const struct cloud *cloud;
+    const struct cloud_site *site;
+    const double *distance_m; /* [cloud->n] */
+    const uint32_t *triangle; /* [cloud->n] */
+};
+
 /* The station of point i, from 1, and its place in the scene. */
 static inline unsigned cloud_station(const struct cloud *cloud, size_t i)
 {

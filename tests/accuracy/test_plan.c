@@ -303,7 +303,7 @@ static void test_figures(void **state)
     double strip = threshold(beam) * beam_radius(beam, range_m) / range_m, share = strip / (pan_deg * M_PI / 180.0);
     struct plan_place place = {
         .setup = rig.setup, .beam = &rig.beam, .segment = rig.segment, .pulses = view.lines * view.pulses};
-    assert_int_equal(plan_sample_create(&place, 1, NULL, &sample, &err), SH_OK);
+    assert_int_equal(plan_sample_create(&(struct plan_places){&place, 1}, NULL, &sample, &err), SH_OK);
     plan_sample_beam(sample, BEAM_SINGLE, 0, &single);
     plan_sample_beam(sample, BEAM_ADAPTIVE, 4, &adaptive);
     plan_sample_beam(sample, BEAM_RINGS, 2, &rings);
@@ -348,7 +348,7 @@ static void test_small_steps(void **state)
     const double mean2 = share * sum2, sigma = sqrt(share * sum4 / DRAWN);
     struct plan_place place = {
         .setup = rig.setup, .beam = &rig.beam, .segment = rig.segment, .pulses = view.lines * view.pulses};
-    assert_int_equal(plan_sample_create(&place, 1, NULL, &sample, &err), SH_OK);
+    assert_int_equal(plan_sample_create(&(struct plan_places){&place, 1}, NULL, &sample, &err), SH_OK);
     plan_sample_beam(sample, BEAM_SINGLE, 0, &single);
     const double above = (single.error_m * single.error_m - mean2) / sigma;
     printf("# a step of 4 mm: single rays are wrong by %.3f mm RMS, said %.3f mm: %.2f standard errors above\n",

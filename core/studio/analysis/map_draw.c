@@ -175,11 +175,12 @@ static void draw_label(const struct map *map, const struct map_label *label, str
     }
     double base = label->top + map_name_type.size_px + 2;
     if (station->name[0] != '\0') {
-        pen->text(pen->on, label->left + 2, base, PICTURE_LEFT, &map_name_type, ink, station->name);
+        pen->text(pen->on, (const double[2]){label->left + 2, base}, PICTURE_LEFT, &map_name_type, ink, station->name);
         base += map_height_type.size_px + 6;
     }
     if (station->height[0] != '\0')
-        pen->text(pen->on, label->left + 2, base, PICTURE_LEFT, &map_height_type, ink, station->height);
+        pen->text(pen->on, (const double[2]){label->left + 2, base}, PICTURE_LEFT, &map_height_type, ink,
+                  station->height);
 }
 
 static int draw_stations(const struct map *map, struct pen *pen, struct sh_err *err)
@@ -222,7 +223,7 @@ static void draw_scale(const struct map *map, long column, long row, struct pen 
     pen->fill(pen->on, column, row, length, 4, ink);
     pen->fill(pen->on, column, row - 6, 2, 10, ink);
     pen->fill(pen->on, column + length - 2, row - 6, 2, 10, ink);
-    pen->text(pen->on, (double)column, (double)row + 24, PICTURE_LEFT, &caption, ink, text);
+    pen->text(pen->on, (const double[2]){(double)column, (double)row + 24}, PICTURE_LEFT, &caption, ink, text);
     pen->end(pen->on);
 }
 
@@ -237,8 +238,9 @@ static void draw_heights(struct height_range range, long column, long row, struc
         pen->fill(pen->on, column + i, row - 6, 2, HEIGHT, rgb);
     }
     snprintf(text, sizeof text, "+%.1f m", range.high_m - range.low_m);
-    pen->text(pen->on, (double)column, (double)row + 24, PICTURE_LEFT, &caption, ink, "0");
-    pen->text(pen->on, (double)column + LENGTH, (double)row + 24, PICTURE_RIGHT, &caption, ink, text);
+    pen->text(pen->on, (const double[2]){(double)column, (double)row + 24}, PICTURE_LEFT, &caption, ink, "0");
+    pen->text(pen->on, (const double[2]){(double)column + LENGTH, (double)row + 24}, PICTURE_RIGHT, &caption, ink,
+              text);
     pen->end(pen->on);
 }
 
@@ -251,7 +253,7 @@ static void draw_north(long column, long row, struct pen *pen)
     pen->begin(pen->on, "north", "north");
     pen->triangle(pen->on, left, ink);
     pen->triangle(pen->on, right, pale);
-    pen->text(pen->on, (double)column + 13, (double)row + 2, PICTURE_LEFT, &caption, ink, "N");
+    pen->text(pen->on, (const double[2]){(double)column + 13, (double)row + 2}, PICTURE_LEFT, &caption, ink, "N");
     pen->end(pen->on);
 }
 
