@@ -67,16 +67,16 @@ static void aim_ideal(struct caster *c, struct chunk *k, const struct kernel_tur
     double slipped[9];
     const double *rotation = slipped_rotation(s, moves ? mat3_unit : s->rotation, slipped);
     const struct vec3_out d = moves ? VEC3_OUT(c->socs, 0) : VEC3_OUT(c->d, 0);
-    const struct vec3_out read = moves ? VEC3_OUT(c->read, 0) : VEC3_OUT(c->list.e, 0);
     const struct kernel_pulses sweep = {k->run, k->first, *turns};
     const int even = !wobbles && kernel_sweep_steps(&c->steps, k->run);
     double to_crs[9];
     if (geo) k->linear = !moves && reading_rotation(s, to_crs);
-    const double *q = moves ? mat3_unit : to_crs;
+    const struct kernel_reading reading = {s, moves ? mat3_unit : to_crs,
+                                           moves ? VEC3_OUT(c->read, 0) : VEC3_OUT(c->list.e, 0)};
     if (geo && even)
-        kernel_sweep_read(&c->steps, &sweep, s, rotation, q, &d, &read);
+        kernel_sweep_read(&c->steps, &sweep, rotation, &d, &reading);
     else if (geo)
-        kernel_directions_read(s, turns, rotation, q, &d, &read);
+        kernel_directions_read(turns, rotation, &d, &reading);
     else if (even)
         kernel_sweep(&c->steps, &sweep, rotation, &d);
     else
@@ -166,10 +166,10 @@ static void read_part(struct caster *c, const struct chunk *k, uint32_t at, uint
     double to_crs[9];
     if (s->n_knots == 0) {
         reading_rotation(s, to_crs);
-        kernel_directions_read(s, &turns, s->rotation, to_crs, &socs, &e);
+        kernel_directions_read(&turns, s->rotation, &socs, &(struct kernel_reading){s, to_crs, e});
         return;
     }
-    kernel_directions_read(s, &turns, mat3_unit, mat3_unit, &socs, &VEC3_OUT(c->read, 0));
+    kernel_directions_read(&turns, mat3_unit, &socs, &(struct kernel_reading){s, mat3_unit, VEC3_OUT(c->read, 0)});
     const struct move m = {VEC3_IN(c->read, 0), {0}, e, {0}, VEC3_OUT(l->p, at)};
     move(s, k->run->t0_ns, dt_ns, n, &m);
 }

@@ -40,30 +40,30 @@ void kernel_directions(const struct kernel_turns *turns, const double rotation[9
     const struct vec3_out d = *out;
     VEC_LOOP
     for (uint32_t i = 0; i < t.n; i++) {
-        double sm, cm, sp, cp;
-        vec_sincos_turn(t.mirror[i], &sm, &cm);
-        vec_sincos_turn(t.pan[i], &sp, &cp);
-        aim_direction(m, sm, cm, sp, cp, d, i);
+        struct aim_axes a;
+        vec_sincos_turn(t.mirror[i], &a.sm, &a.cm);
+        vec_sincos_turn(t.pan[i], &a.sp, &a.cp);
+        aim_direction(m, a, d, i);
     }
 }
 
 VEC_CLONES
-void kernel_directions_read(const struct cast_setup *setup, const struct kernel_turns *turns, const double rotation[9],
-                            const double to_crs[9], const struct vec3_out *out, const struct vec3_out *read)
+void kernel_directions_read(const struct kernel_turns *turns, const double rotation[9], const struct vec3_out *out,
+                            const struct kernel_reading *reading)
 {
-    const struct aim_encoder mirror = aim_encoder(setup, setup->mirror_counts);
-    const struct aim_encoder pan = aim_encoder(setup, setup->pan_counts);
-    const struct aim_matrix m = aim_matrix(rotation), q = aim_matrix(to_crs);
+    const struct aim_encoder mirror = aim_encoder(reading->setup, reading->setup->mirror_counts);
+    const struct aim_encoder pan = aim_encoder(reading->setup, reading->setup->pan_counts);
+    const struct aim_matrix m = aim_matrix(rotation), q = aim_matrix(reading->rotation);
     const struct kernel_turns t = *turns;
-    const struct vec3_out d = *out, e = *read;
+    const struct vec3_out d = *out, e = reading->e;
     VEC_LOOP
     for (uint32_t i = 0; i < t.n; i++) {
-        double sm, cm, sp, cp;
-        vec_sincos_turn(t.mirror[i], &sm, &cm);
-        vec_sincos_turn(t.pan[i], &sp, &cp);
-        aim_direction(m, sm, cm, sp, cp, d, i);
-        aim_read(mirror, t.mirror[i], &sm, &cm);
-        aim_read(pan, t.pan[i], &sp, &cp);
-        aim_direction(q, sm, cm, sp, cp, e, i);
+        struct aim_axes a;
+        vec_sincos_turn(t.mirror[i], &a.sm, &a.cm);
+        vec_sincos_turn(t.pan[i], &a.sp, &a.cp);
+        aim_direction(m, a, d, i);
+        aim_read(mirror, t.mirror[i], &a.sm, &a.cm);
+        aim_read(pan, t.pan[i], &a.sp, &a.cp);
+        aim_direction(q, a, e, i);
     }
 }

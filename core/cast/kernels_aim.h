@@ -18,9 +18,14 @@ struct kernel_turns {
 };
 /* Directions in prcs: rotation times (sin p cos m, cos p cos m, sin m). */
 void kernel_directions(const struct kernel_turns *turns, const double rotation[9], const struct vec3_out *d);
-/* The same, and also e: the directions as the encoders read them (whole counts), turned by to_crs instead
- * of rotation. */
-void kernel_directions_read(const struct cast_setup *setup, const struct kernel_turns *turns, const double rotation[9],
-                            const double to_crs[9], const struct vec3_out *d, const struct vec3_out *e);
+/* Directions as the encoders read them, in whole counts: how they are turned, and where they go. */
+struct kernel_reading {
+    const struct cast_setup *setup; /* has the counts */
+    const double *rotation;         /* to the frame of positions */
+    struct vec3_out e;
+};
+/* As kernel_directions, and the directions that are read as well. */
+void kernel_directions_read(const struct kernel_turns *turns, const double rotation[9], const struct vec3_out *d,
+                            const struct kernel_reading *reading);
 
 #endif

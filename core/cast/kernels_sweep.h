@@ -25,8 +25,7 @@ struct kernel_pulses {
 /* As kernel_directions, and kernel_directions_read. */
 void kernel_sweep(const struct kernel_steps *steps, const struct kernel_pulses *sweep, const double rotation[9],
                   const struct vec3_out *d);
-void kernel_sweep_read(const struct kernel_steps *steps, const struct kernel_pulses *sweep,
-                       const struct cast_setup *setup, const double rotation[9], const double to_crs[9],
-                       const struct vec3_out *d, const struct vec3_out *e);
+void kernel_sweep_read(const struct kernel_steps *steps, const struct kernel_pulses *sweep, const double rotation[9],
+                       const struct vec3_out *d, const struct kernel_reading *reading);
 
 #endif

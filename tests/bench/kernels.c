@@ -69,7 +69,7 @@ static void even(void)
 }
 static void even_read(void)
 {
-    kernel_sweep_read(&steps, &sweep, &setup, rotation, mat3_unit, &d, &e);
+    kernel_sweep_read(&steps, &sweep, rotation, &d, &(struct kernel_reading){&setup, mat3_unit, e});
 }
 static void one_by_one(void)
 {
@@ -77,7 +77,7 @@ static void one_by_one(void)
 }
 static void one_by_one_read(void)
 {
-    kernel_directions_read(&setup, &turns, rotation, mat3_unit, &d, &e);
+    kernel_directions_read(&turns, rotation, &d, &(struct kernel_reading){&setup, mat3_unit, e});
 }
 static void limits(void)
 {
