@@ -47,11 +47,6 @@ struct cloud {
     int64_t epsg;          /* of the header's comment "epsg N", 0: scene frame; CLOUD_EPSG_UNKNOWN: it has none */
 };
 
-/* Errors (SH_EINPUT, naming file and line, or byte): missing or unreadable, not a PLY or LAS file, x, y or z
- * missing, a count the file can't hold, truncated, infinite coordinates, or only some of the three NaN, a
- * station, echo or label that is not a whole number in its range. Warns of other elements and of bytes after
- * the last one. */
-int cloud_read(const char *path, const struct sh_report *report, struct cloud *out, struct sh_err *err);
 enum cloud_column {
     CLOUD_TIME = 1,
     CLOUD_RANGE = 2,
@@ -60,7 +55,10 @@ enum cloud_column {
     CLOUD_RGB = 16,
     CLOUD_AMPLITUDE = 32
 };
-/* The same, with these columns. SH_ESTOPPED where report asks to stop. */
+/* Reads positions, stations, echoes and labels, and these columns. Errors (SH_EINPUT, naming file and line, or byte):
+ * missing or unreadable, not a PLY or LAS file, x, y or z missing, a count the file can't hold, truncated, infinite
+ * coordinates, or only some of the three NaN, a station, echo or label that is not a whole number in its range. Warns
+ * of other elements and of bytes after the last one. SH_ESTOPPED where report asks to stop. */
 int cloud_read_columns(const char *path, unsigned columns, const struct sh_report *report, struct cloud *out,
                        struct sh_err *err);
 void cloud_free(struct cloud *cloud);

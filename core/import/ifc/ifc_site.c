@@ -201,7 +201,6 @@ static int read_north(struct reader *r, struct ifc_site *site)
     if (rc != SH_OK) return rc;
     if (!(hypot(north[0], north[1]) > 1e-9)) return fail(r, &direction.record, "a true north without a direction");
     site->north_deg = angle_deg(atan2(north[0], north[1]));
-    site->has_north = 1;
     return SH_OK;
 }
 

@@ -46,7 +46,7 @@ void coverage_corners(const struct coverage *c, uint32_t triangle, double corner
         memcpy(corner[i], c->scene->vertex_m[c->scene->triangle[triangle][i]], sizeof corner[i]);
 }
 
-float coverage_float(uint32_t bits)
+static float float_of(uint32_t bits)
 {
     float f;
     memcpy(&f, &bits, sizeof f);
@@ -329,6 +329,6 @@ void coverage_get(const struct coverage *coverage, uint32_t cell, struct coverag
                                   .label = c->label,
                                   .first_station = c->first_station};
     if (c->stations == 0) return;
-    out->incidence_rad = acos(fmin((double)coverage_float(c->cosine), 1.0));
-    out->range_m = 1.0 / (double)coverage_float(c->nearness);
+    out->incidence_rad = acos(fmin((double)float_of(c->cosine), 1.0));
+    out->range_m = 1.0 / (double)float_of(c->nearness);
 }

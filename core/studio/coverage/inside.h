@@ -40,7 +40,6 @@ struct coverage {
 /* Corners of a triangle, prcs. */
 void coverage_corners(const struct coverage *c, uint32_t triangle, double corner[3][3]);
 
-float coverage_float(uint32_t bits);
 uint32_t coverage_bits(double value);
 
 #endif
