@@ -113,6 +113,7 @@ int map_draw_pixels(const struct map *map, struct picture *out, struct sh_err *e
     return SH_OK;
 }
 
+/* Where a place is in the image. */
 static void place_of(const struct map *map, double x_m, double y_m, double place[2])
 {
     struct map_layout at;
