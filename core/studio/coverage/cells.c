@@ -28,7 +28,6 @@ static const double ASIDE = 0.38196601125010515;
 
 struct build {
     struct coverage *c;
-    const struct sh_report *report;
     struct key *key; /* of each cell */
     size_t key_room, cell_room;
     uint32_t *table; /* 1 + cell, by the key's hash; 0: free */
@@ -210,7 +209,7 @@ static void cut_triangle(struct build *b, uint32_t t)
 
 static int build(struct coverage *c, const struct sh_report *report, struct sh_err *err)
 {
-    struct build b = {.c = c, .report = report, .err = err};
+    struct build b = {.c = c, .err = err};
     for (uint32_t t = 0; t < c->scene->n_triangles && b.rc == SH_OK; t++) {
         if (t % REPORT_EVERY == 0) sh_progress(report, "cutting the surface", (double)b.at / (double)c->n_pieces);
         if (t % 1024 == 0) b.rc = sh_check_stop(report, err);
