@@ -8,7 +8,7 @@
  * is ignored. LAS: 1.2 to 1.4, not compressed. There the point source ID is the station, the return number
  * the echo, and the extra bytes "label" the label. Further columns are read where they are asked for. Colours
  * have 8 bits in PLY; of LAS's 16 bits the upper 8 count. Ownership:
- * cloud_read allocates, cloud_free releases. A cloud is constant after cloud_read, any thread.
+ * cloud_read_columns allocates, cloud_free releases. A cloud is constant after that, any thread.
  *
  * Memory: 29 bytes a point; time 8, range, reflectance and amplitude 4 each, colours 3, the number of echoes 1. The
  * file itself is in memory while it is read. */
