@@ -3,7 +3,8 @@
 #ifndef CORE_CAST_KERNELS_MOVING_H
 #define CORE_CAST_KERNELS_MOVING_H
 
-#include "core/cast.h"
+#include "core/pose.h"
+#include "core/vec3.h"
 
 /* The way between two poses of a moving head. */
 struct kernel_leg {

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/studio/coverage/cut.h"
 #include "core/studio/coverage/inside.h"
 #include "core/grow.h"
 #include "core/huge.h"

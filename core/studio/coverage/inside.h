@@ -6,7 +6,6 @@
 #include <stdatomic.h>
 
 #include "core/studio/coverage.h"
-#include "core/studio/coverage/cut.h"
 
 enum { NO_CELL = COVERAGE_NO_CELL };
 
