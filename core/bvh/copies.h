@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/bvh: copies of meshes, which are primitives of the scene's BVH, with a BVH for each mesh. */
+/* Private to core/bvh: a copy of a mesh is a primitive of the scene's BVH. Each mesh has a BVH of its own. */
 #ifndef CORE_BVH_COPIES_H
 #define CORE_BVH_COPIES_H
 

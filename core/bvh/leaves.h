@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/bvh: leaves, which have the corners of their triangles in double, and their boxes in float. */
+/* Private to core/bvh: leaves have the corners of their triangles in double, and Embree sees their boxes in float. */
 #ifndef CORE_BVH_LEAVES_H
 #define CORE_BVH_LEAVES_H
 

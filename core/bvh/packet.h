@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/bvh: packets of rays through Embree, and their state in double, which leaves see. */
+/* Private to core/bvh: Embree casts packets of rays, and leaves see their state in double. */
 #ifndef CORE_BVH_PACKET_H
 #define CORE_BVH_PACKET_H
 

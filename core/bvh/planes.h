@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/bvh: planes of triangles in double, and what rays get from them. */
+/* Private to core/bvh: planes of triangles, in double, give rays their labels and steepness. */
 #ifndef CORE_BVH_PLANES_H
 #define CORE_BVH_PLANES_H
 

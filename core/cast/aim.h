@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/cast: angles, beam directions and origins; directions as the encoders read them. */
+/* Private to core/cast: this stage turns angles into directions and origins of beams, and into what the encoders
+ * read. */
 #ifndef CORE_CAST_AIM_H
 #define CORE_CAST_AIM_H
 

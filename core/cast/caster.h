@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/cast: the working memory of one thread. Each stage of a pulse finds there what earlier stages have left. */
+/* Private to core/cast: a thread has this working memory. Each stage of a pulse finds there what earlier stages have
+ * left. */
 #ifndef CORE_CAST_CASTER_H
 #define CORE_CAST_CASTER_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/cast: the pulses at hand, and where they go. The stages of a pulse pass it on. */
+/* Private to core/cast: a chunk says which pulses are at hand, and where they go. The stages of a pulse pass it on. */
 #ifndef CORE_CAST_CHUNK_H
 #define CORE_CAST_CHUNK_H
 

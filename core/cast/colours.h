@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/cast: the colours of all echoes in the list that is to be sent. */
+/* Private to core/cast: this stage gives colours to all echoes that are to be sent. */
 #ifndef CORE_CAST_COLOURS_H
 #define CORE_CAST_COLOURS_H
 

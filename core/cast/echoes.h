@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/cast: from hits to the echoes that the head reports, and the list of them. */
+/* Private to core/cast: this stage turns hits into the echoes that the head reports. It keeps them in a list. */
 #ifndef CORE_CAST_ECHOES_H
 #define CORE_CAST_ECHOES_H
 

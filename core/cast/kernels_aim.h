@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/cast: where the pulses of a run go, as loops over arrays that compilers turn into vector code. */
+/* Private to core/cast: these loops over arrays find where the pulses of a run go. Compilers turn them into vector
+ * code. */
 #ifndef CORE_CAST_KERNELS_AIM_H
 #define CORE_CAST_KERNELS_AIM_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/cast: vectors turned and shifted, of a head or a body that moves, as loops over arrays. */
+/* Private to core/cast: these loops over arrays turn and shift vectors, of a head or a body that moves. */
 #ifndef CORE_CAST_KERNELS_MOVING_H
 #define CORE_CAST_KERNELS_MOVING_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/cast: ranges of echoes -> entries of a block, as loops over arrays. */
+/* Private to core/cast: these loops over arrays turn ranges of echoes into entries of a block. */
 #ifndef CORE_CAST_KERNELS_POINTS_H
 #define CORE_CAST_KERNELS_POINTS_H
 

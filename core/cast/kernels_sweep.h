@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/cast: directions of a run whose axes turn evenly, for a fraction of the cost of kernels_aim.h. */
+/* Private to core/cast: where the axes of a run turn evenly, its directions cost a fraction of those of
+ * kernels_aim.h. */
 #ifndef CORE_CAST_KERNELS_SWEEP_H
 #define CORE_CAST_KERNELS_SWEEP_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/cast: when the pulses of a run are fired. */
+/* Private to core/cast: this finds when the pulses of a run are fired. */
 #ifndef CORE_CAST_KERNELS_TIMES_H
 #define CORE_CAST_KERNELS_TIMES_H
 

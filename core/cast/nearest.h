@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/cast: rays -> their first hits, on what stands still, on bodies that move, on the legs of a tripod. */
+/* Private to core/cast: this stage finds the first hits of rays, on what stands still, on bodies that move, and on the
+ * legs of a tripod. */
 #ifndef CORE_CAST_NEAREST_H
 #define CORE_CAST_NEAREST_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/cast: rays that go on through glass or off a mirror, and what they hit. */
+/* Private to core/cast: this stage follows rays through glass and off mirrors. */
 #ifndef CORE_CAST_OPTICS_H
 #define CORE_CAST_OPTICS_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/cast: echoes -> entries of the block. */
+/* Private to core/cast: this stage turns echoes into entries of the block. */
 #ifndef CORE_CAST_POINTS_H
 #define CORE_CAST_POINTS_H
 

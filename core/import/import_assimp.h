@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Reads by Assimp. */
+/* Assimp reads the formats that no reader of ours reads. */
 #ifndef CORE_IMPORT_IMPORT_ASSIMP_H
 #define CORE_IMPORT_IMPORT_ASSIMP_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The process that reads: what it is told, and what it says on its way. It is a fork, or a program that does the work. */
+/* The process that reads is told this, and says this on its way. It is a fork, or a program that does the work. */
 #ifndef CORE_IMPORT_IMPORT_CHILD_H
 #define CORE_IMPORT_IMPORT_CHILD_H
 

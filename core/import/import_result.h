@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The scene on its way back from the process that reads: written there, read and checked here. */
+/* The process that reads writes its scene into a file. The other one reads it, and checks it. */
 #ifndef CORE_IMPORT_IMPORT_RESULT_H
 #define CORE_IMPORT_IMPORT_RESULT_H
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Surfaces of the scene that a builder makes: their labels by name, their textures, and colours between vertices. */
+/* A builder gives the surfaces of its scene their labels, by name, and their textures. It keeps colours between
+ * vertices. */
 #ifndef CORE_SCENE_BUILD_SURFACES_H
 #define CORE_SCENE_BUILD_SURFACES_H
 

@@ -108,7 +108,7 @@ static int add_surfaces(struct scene *scene, struct scene *mesh, const struct sc
 
 /* ---- places */
 
-/* What is copied, and to where. */
+/* A mesh is copied to these places. */
 struct copied {
     const struct scene *mesh;
     const struct scene_hull *hull;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Copies of meshes in a scene, as it is made. */
+/* These functions make copies of meshes, and keep part of them. */
 #ifndef CORE_SCENE_COPIES_H
 #define CORE_SCENE_COPIES_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Holes that textures cut into surfaces, as a scene is made. */
+/* Textures cut holes into surfaces: these functions find them as a scene is made. */
 #ifndef CORE_SCENE_CUTOUTS_H
 #define CORE_SCENE_CUTOUTS_H
 

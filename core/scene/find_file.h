@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Files that a mesh names: libraries of materials, textures. Folders are paths up to their last slash, and may be empty. */
+/* A mesh names files: libraries of materials, and textures. Folders are paths up to their last slash, and may be
+ * empty. */
 #ifndef CORE_SCENE_FIND_FILE_H
 #define CORE_SCENE_FIND_FILE_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Where an ideal head that stands aims the pulses of a run. */
+/* This finds where an ideal head that stands aims the pulses of a run. */
 #ifndef TESTS_COMMON_AIMED_H
 #define TESTS_COMMON_AIMED_H
 

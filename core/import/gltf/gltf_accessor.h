@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Accessors and buffer views: numbers of any type, none of them beyond its buffer. */
+/* Accessors and buffer views give numbers of any type. None of them lies beyond its buffer. */
 #ifndef CORE_IMPORT_GLTF_GLTF_ACCESSOR_H
 #define CORE_IMPORT_GLTF_GLTF_ACCESSOR_H
 

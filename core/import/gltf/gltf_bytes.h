@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Bytes of a glTF file: of its buffers, of parts of them, of data within a URI. */
+/* Bytes of a glTF file lie in its buffers, in parts of these, or within a URI. */
 #ifndef CORE_IMPORT_GLTF_GLTF_BYTES_H
 #define CORE_IMPORT_GLTF_GLTF_BYTES_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Extensions: which are known, what they mean for the file as a whole, and where an object has one. */
+/* This says which extensions are known, what they mean for the file as a whole, and where an object has one. */
 #ifndef CORE_IMPORT_GLTF_GLTF_EXTENSIONS_H
 #define CORE_IMPORT_GLTF_GLTF_EXTENSIONS_H
 
@@ -8,8 +8,8 @@
 
 #include "core/scene/build.h"
 
-/* Refuses unknown extensions that the file requires, and warns of other unknown ones. What root has as
- * extensionsRequired and extensionsUsed are lists, or are not there. *by_assimp: whether Assimp has to read the file. */
+/* Refuses unknown extensions that the file requires, and warns of other unknown ones. root's extensionsRequired and
+ * extensionsUsed are lists, or are not there. *by_assimp: whether Assimp has to read the file. */
 int gltf_check_extensions(struct scene_build *b, const json_t *root, bool *by_assimp, struct sh_err *err);
 bool gltf_is_required(const json_t *root, const char *extension);
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The file as a whole: reads its JSON, alone or in a .glb, and finds its buffers. */
+/* This reads the JSON of a file, alone or in a .glb, and finds the file's buffers. */
 #ifndef CORE_IMPORT_GLTF_GLTF_FILE_H
 #define CORE_IMPORT_GLTF_GLTF_FILE_H
 

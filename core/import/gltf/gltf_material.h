@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Materials as they lie on primitives: the label of their surface, and where texture coordinates come from. */
+/* A primitive's material gives it the label of its surface, and says where its texture coordinates come from. */
 #ifndef CORE_IMPORT_GLTF_GLTF_MATERIAL_H
 #define CORE_IMPORT_GLTF_GLTF_MATERIAL_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Affine matrices in double, as nodes and joints have them. */
+/* Nodes and joints have affine matrices, in double. */
 #ifndef CORE_IMPORT_GLTF_GLTF_MATRIX_H
 #define CORE_IMPORT_GLTF_GLTF_MATRIX_H
 

@@ -6,7 +6,7 @@
 #include "core/import/gltf/gltf_bytes.h"
 #include "core/scene/build.h"
 
-/* What the extension says of a buffer view. */
+/* The extension says this of a buffer view. */
 struct gltf_packed {
     struct gltf_bytes from;
     uint64_t stride, count;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The tree of nodes: where each one is, and the walk through those of the scene. */
+/* Nodes are a tree: this finds where each one is, and walks through those of the scene. */
 #ifndef CORE_IMPORT_GLTF_GLTF_NODES_H
 #define CORE_IMPORT_GLTF_GLTF_NODES_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Where a mesh's vertices are once morph targets and joints have moved them. */
+/* This finds where a mesh's vertices are once morph targets and joints have moved them. */
 #ifndef CORE_IMPORT_GLTF_GLTF_POSE_H
 #define CORE_IMPORT_GLTF_GLTF_POSE_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* URIs of buffers and images: data within them, or names of files. */
+/* The URI of a buffer or an image contains its data, or names a file. */
 #ifndef CORE_IMPORT_GLTF_GLTF_URI_H
 #define CORE_IMPORT_GLTF_GLTF_URI_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* All records of an IFC file, by number. In: a path. Out: records whose references lead to records. */
+/* This finds the records of an IFC file by number. In: a path. Out: records whose references lead to records. */
 #ifndef CORE_IMPORT_IFC_IFC_INDEX_H
 #define CORE_IMPORT_IFC_IFC_INDEX_H
 
@@ -14,8 +14,8 @@ struct ifc_index {
     size_t n, room;
 };
 
-/* ifc_index_close is due in any case. Errors (SH_EINPUT) name file, line and record: a file that is cut off, a number that
- * two records have, a reference to a record that is not there. No reader of bodies reports any of these. */
+/* ifc_index_close is due in any case. Errors (SH_EINPUT) name file, line and record: a file that is cut off, a number
+ * that two records have, a reference to a record that is not there. No reader of bodies reports any of these. */
 int ifc_index_open(struct ifc_index *x, const char *path, struct sh_err *err);
 void ifc_index_close(struct ifc_index *x);
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A product of an IFC file: what its records say of it, and marks of what its geometry consists of. */
+/* The records of an IFC file say this of a product, and marks say what its geometry consists of. */
 #ifndef CORE_IMPORT_IFC_IFC_PRODUCT_H
 #define CORE_IMPORT_IFC_IFC_PRODUCT_H
 

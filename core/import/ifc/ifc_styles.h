@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Styles of surfaces in an IFC file: which items have which name and colour. */
+/* Styles of surfaces say which items of an IFC file have which name and colour. */
 #ifndef CORE_IMPORT_IFC_IFC_STYLES_H
 #define CORE_IMPORT_IFC_IFC_STYLES_H
 

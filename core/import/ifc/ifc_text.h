@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Texts of a STEP file. */
+/* This decodes the texts of a STEP file. */
 #ifndef CORE_IMPORT_IFC_IFC_TEXT_H
 #define CORE_IMPORT_IFC_IFC_TEXT_H
 

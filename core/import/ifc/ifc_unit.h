@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The unit of length of an IFC file. */
+/* This finds the unit of length of an IFC file. */
 #ifndef CORE_IMPORT_IFC_IFC_UNIT_H
 #define CORE_IMPORT_IFC_IFC_UNIT_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the geometry of each product consists of. */
+/* This finds out what the geometry of each product consists of. */
 #ifndef CORE_IMPORT_IFC_IFC_WALK_H
 #define CORE_IMPORT_IFC_IFC_WALK_H
 
