@@ -18,8 +18,7 @@ struct ifc_site {
     double elevation_m; /* above the sea, by a datum the file does not name; NaN: not given */
     double origin_m[3]; /* the point that lies there, in the model's coordinates (z up) */
     double north_deg;   /* true north, clockwise from the model's y axis; 0 when not given */
-    int has_north;
-    int has_place; /* latitude and longitude are known; else there is a map */
+    int has_place;      /* latitude and longitude are known; else there is a map */
     int has_map;
     struct ifc_map {
         char crs[128]; /* the system's name, UTF-8: "EPSG:2056" */

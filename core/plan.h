@@ -86,13 +86,18 @@ struct plan_place {
     void *ctx;
 };
 
+struct plan_places {
+    struct plan_place *place; /* [n] */
+    uint32_t n;
+};
+
 struct plan_sample;
 
 /* Draws equally many pulses of all places. 61 sub-rays show which pulses meet one smooth surface. These are
  * many and alike: only some of them are cast with the reference. The places must outlive the sample.
  * Where report asks to stop, sampling ends at once, and its figures mean nothing. */
-int plan_sample_create(struct plan_place *place, uint32_t n_places, const struct sh_report *report,
-                       struct plan_sample **out, struct sh_err *err);
+int plan_sample_create(const struct plan_places *places, const struct sh_report *report, struct plan_sample **out,
+                       struct sh_err *err);
 void plan_sample_free(struct plan_sample *sample);
 
 /* The error of a beam against BEAM_MAX_RINGS rings (1,027 sub-rays): sets error_m and echo_share of option,
@@ -125,8 +130,8 @@ struct plan_sight_found {
 };
 
 /* Chooses (*map: 1: one is made) and fills row. Casts some pulses of the places, unless a map can't pay anyway. */
-int plan_sight(const struct plan_sight_need *need, struct plan_place *place, uint32_t n_places,
-               const struct sh_report *report, int *map, struct plan_row *row, struct sh_err *err);
+int plan_sight(const struct plan_sight_need *need, const struct plan_places *places, const struct sh_report *report,
+               int *map, struct plan_row *row, struct sh_err *err);
 
 /* The steps of plan_sight. 0: so few pulses don't pay for a map, whatever they hit. */
 int plan_sight_may_pay(const struct plan_sight_need *need);

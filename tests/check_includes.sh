@@ -1,7 +1,7 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
 # The order of the rooms: which folder may use which, by #include and by call; a README in each; C++ in one file; no file
-# has the marks of an unfinished merge.
+# has the marks of an unfinished merge; few files include a private header.
 # Prints TAP.
 #
 #   check_includes.sh [ROOT [OBJECTS]]      ROOT: default the tree this script is in
@@ -36,6 +36,9 @@ prepares='core/scene/build.c core/bvh/bvh.c core/sight/sight.c'
 # At most one in core, one in firmware_sim and one in drivers.
 upward='
 '
+#
+# A header that only files of its own folder include, and tests, is private. In these folders at most 8 files include one.
+divided='core' # an expression: core|drivers/link
 #
 # By call: nm on the objects. A symbol that one room's object lacks and a higher room's object defines is an arrow upward.
 # First the check is tried on trees with one violation each, which it must find.
@@ -189,6 +192,17 @@ conflict_violations() {
         cd "$1" || exit 1
         grep -r -n -I -E '^(<{7}|>{7}|\|{7})( |$)' --exclude-dir=.git --exclude-dir='build*' --exclude-dir=node_modules . |
             sed 's|^\./||'
+    )
+}
+
+# Prints `HEADER: how many files include it` for each private header with too many, below the folder $1.
+crowd_violations() {
+    (
+        cd "$1" || exit 1
+        grep -r -o -E --include='*.[ch]' --include='*.cpp' '^[[:space:]]*#[[:space:]]*include[[:space:]]*"[^"]*' \
+            core drivers firmware_sim tests 2>/dev/null | sed 's|:[^"]*"| |' | awk -v divided="^($divided)/.*/" '
+            { folder = $2; sub(/[^\/]*$/, "", folder); includers[$2]++; if ($1 !~ /^tests\// && index($1, folder) != 1) public[$2] = 1 }
+            END { for (to in includers) if (to ~ divided && !(to in public) && includers[to] > 8) print to ": " includers[to] " files include it" }'
     )
 }
 
@@ -386,6 +400,20 @@ expect_conflict() { # violations line...
 expect_conflict 0 '# A title' '=======' 'a <<<<<<< b' '<<<<<<<<< c'
 expect_conflict 2 '<<<<<<< HEAD' 'a' '=======' 'b' '>>>>>>> other'
 
+expect_crowd() { # violations includers [includer]
+    local found
+    rm -rf "$work/tree"
+    for i in $(seq "$2"); do plant "core/cast/part$i.c" '#include "core/cast/inside.h"'; done
+    [ $# -eq 2 ] || plant "$3" '#include "core/cast/inside.h"'
+    found=$(crowd_violations "$work/tree")
+    [ "$(printf '%s' "$found" | grep -c '')" = "$1" ] && [[ $1 = 0 || $found == "core/cast/inside.h:"* ]]
+    report $? "$([ "$1" = 0 ] && echo passes || echo finds) a header that $2 files of its folder include${3:+, and $3}" "found: ${found:-nothing}"
+}
+expect_crowd 0 8
+expect_crowd 1 9
+expect_crowd 1 8 tests/unit/test_inside.c
+expect_crowd 0 9 core/plan/plan.c
+
 upward_of() { printf '%s\n' "$upward" | grep -c "^$1/"; }
 for folder in core drivers firmware_sim; do
     [ -n "$(find "$root/$folder" -name '*.[ch]' -print -quit 2>/dev/null)" ]
@@ -416,5 +444,7 @@ report $? "each folder has a README that says what belongs into it" "$found"
 found=$(conflict_violations "$root")
 [ -z "$found" ]
 report $? "no file has the marks of a merge" "$found"
+[ -z "$(crowd_violations "$root")" ]
+report $? "no private header of $divided has more than 8 includers" "$(crowd_violations "$root")"
 echo "1..$n"
 exit $failed

@@ -8,6 +8,11 @@
 #include <string.h>
 #include <time.h>
 
+#include "core/bvh/copies.h"
+#include "core/bvh/leaves.h"
+#include "core/bvh/meet.h"
+#include "core/bvh/planes.h"
+
 /* tests/check/tsan.supp has the names of this function and of the two others that Embree's threads
  * call. */
 static bool embree_counts_bytes(void *user, ssize_t bytes, bool post)

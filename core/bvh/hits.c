@@ -5,6 +5,8 @@
 #include <string.h>
 
 #include "core/bvh/bvh_inside.h"
+#include "core/bvh/packet.h"
+#include "core/bvh/planes.h"
 #include "core/vecmath.h"
 
 enum { ROOM = BVH_CHUNK + 48 }; /* arrays of a power of two would collide in a cache */

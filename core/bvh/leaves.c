@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Leaves: two triangles that share an edge make one leaf, where their common box is smaller than their two boxes
  * together. */
+#include "core/bvh/leaves.h"
+
 #include <math.h>
 #include <stdlib.h>
 

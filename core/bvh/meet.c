@@ -1,11 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /* A packet at a leaf, in double: finds which rays hit its triangles, and at what range. The rules are in
  * bvh_inside.h. */
+#include "core/bvh/meet.h"
+
 #include <math.h>
 
 #include "core/bvh/bvh_inside.h"
 #include "core/bvh/edges.h"
+#include "core/bvh/leaves.h"
 #include "core/bvh/nearest.h"
+#include "core/bvh/packet.h"
 #include "core/vec3.h"
 #include "core/vecmath.h"
 
@@ -105,11 +109,20 @@ VEC_INLINE void judge_from_one(const struct bvh_query *query, const double m[EDG
     }
 }
 
-VEC_INLINE double side_of(double px, double py, double pz, double qx, double qy, double qz, double x, double y,
-                          double z)
+/* A corner from a ray's origin, or a direction. */
+struct place {
+    double x, y, z;
+};
+
+VEC_INLINE struct place place_of(const double corner[3], double ox, double oy, double oz)
 {
-    const double ex = qx - px, ey = qy - py, ez = qz - pz;
-    return (py * ez - pz * ey) * x + (pz * ex - px * ez) * y + (px * ey - py * ex) * z;
+    return (struct place){corner[0] - ox, corner[1] - oy, corner[2] - oz};
+}
+
+VEC_INLINE double side_of(struct place p, struct place q, struct place dir)
+{
+    const double ex = q.x - p.x, ey = q.y - p.y, ez = q.z - p.z;
+    return (p.y * ez - p.z * ey) * dir.x + (p.z * ex - p.x * ez) * dir.y + (p.x * ey - p.y * ex) * dir.z;
 }
 
 VEC_INLINE void judge_from_own(const struct bvh_query *query, const struct bvh_leaf *leaf, double doubt, int64_t *found)
@@ -119,13 +132,12 @@ VEC_INLINE void judge_from_own(const struct bvh_query *query, const struct bvh_l
     const double(*c)[3] = leaf->corner_m;
     VEC_LOOP
     for (uint32_t i = 0; i < BVH_PACKET; i++) {
-        const double x = dx[i], y = dy[i], z = dz[i], ox = px[i], oy = py[i], oz = pz[i];
-        const double ax = c[0][0] - ox, ay = c[0][1] - oy, az = c[0][2] - oz, bx = c[1][0] - ox, by = c[1][1] - oy,
-                     bz = c[1][2] - oz, ex = c[2][0] - ox, ey = c[2][1] - oy, ez = c[2][2] - oz, fx = c[3][0] - ox,
-                     fy = c[3][1] - oy, fz = c[3][2] - oz;
-        const double s0 = side_of(ax, ay, az, bx, by, bz, x, y, z), s1 = side_of(bx, by, bz, ex, ey, ez, x, y, z),
-                     s2 = side_of(ex, ey, ez, ax, ay, az, x, y, z), s3 = side_of(bx, by, bz, fx, fy, fz, x, y, z),
-                     s4 = side_of(fx, fy, fz, ex, ey, ez, x, y, z);
+        const double ox = px[i], oy = py[i], oz = pz[i];
+        const struct place d = {dx[i], dy[i], dz[i]};
+        const struct place p0 = place_of(c[0], ox, oy, oz), p1 = place_of(c[1], ox, oy, oz),
+                           p2 = place_of(c[2], ox, oy, oz), p3 = place_of(c[3], ox, oy, oz);
+        const double s0 = side_of(p0, p1, d), s1 = side_of(p1, p2, d), s2 = side_of(p2, p0, d), s3 = side_of(p1, p3, d),
+                     s4 = side_of(p3, p2, d);
         found[i] = judge(s0, s1, s2, doubt) | judge(s3, s4, -s1, doubt) << SECOND;
     }
 }

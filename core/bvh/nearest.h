@@ -3,7 +3,7 @@
 #ifndef CORE_BVH_NEAREST_H
 #define CORE_BVH_NEAREST_H
 
-#include "core/bvh/bvh_inside.h"
+#include "core/bvh/packet.h"
 #include "core/vecmath.h"
 
 /* The next float above a number that is not negative. */

@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Rays into Embree, in packets of 4, 8 or 16, or one by one. */
+#include "core/bvh/packet.h"
+
 #include <math.h>
 
 #include "core/bvh/bvh_inside.h"
@@ -120,7 +122,7 @@ static void take_near(struct bvh_query *query, uint32_t n)
 
 /* Casts rays again whose nearest range is known. No range is smaller, so the lowest number among equally near hits is
  * found in any order. */
-static void settle(const struct bvh *bvh, struct bvh_query *query, struct packet *packet, uint32_t width)
+static void settle(struct bvh_query *query, struct packet *packet, uint32_t width)
 {
     float *tfar = bvh_field(&packet->at, width, tfar);
     for (uint32_t i = 0; i < width; i++) {
@@ -131,19 +133,19 @@ static void settle(const struct bvh *bvh, struct bvh_query *query, struct packet
         query->hit_m[i] = NAN;
     }
     query->unsure = 0;
-    bvh_call_embree(bvh, query, packet->valid, &packet->at, width);
+    bvh_call_embree(query->bvh, query, packet->valid, &packet->at, width);
 }
 
-VEC_INLINE void cast_one(const struct bvh *bvh, struct bvh_query *query, struct packet *packet,
-                         const struct bvh_batch *batch, uint32_t first, uint32_t n, uint32_t width)
+VEC_INLINE void cast_one(struct bvh_query *query, struct packet *packet, const struct bvh_batch *batch, uint32_t first,
+                         uint32_t n, uint32_t width)
 {
     const uint64_t decided = query->decided;
     set_floats(packet, batch, first, n, width);
     set_doubles(query, batch, first, n);
     query->width = width;
     query->dir_float = width == BVH_PACKET ? bvh_field(&packet->at, width, dir_x) : NULL;
-    bvh_call_embree(bvh, query, packet->valid, &packet->at, width);
-    if (query->unsure != 0) settle(bvh, query, packet, width);
+    bvh_call_embree(query->bvh, query, packet->valid, &packet->at, width);
+    if (query->unsure != 0) settle(query, packet, width);
     if (query->decided != decided) take_near(query, n);
     memcpy(batch->rays->range_m + first, query->hit_m, n * sizeof *query->hit_m);
     memcpy(batch->rays->triangle + first, query->triangle, n * sizeof *query->triangle);
@@ -151,13 +153,13 @@ VEC_INLINE void cast_one(const struct bvh *bvh, struct bvh_query *query, struct 
 
 /* Whole packets of 16 are the common case: all lengths are constants there. */
 VEC_CLONES
-static void cast(const struct bvh *bvh, struct bvh_query *query, struct packet *packet, const struct bvh_batch *batch,
-                 uint32_t first, uint32_t n, uint32_t width)
+static void cast(struct bvh_query *query, struct packet *packet, const struct bvh_batch *batch, uint32_t first,
+                 uint32_t n, uint32_t width)
 {
     if (n == BVH_PACKET && width == BVH_PACKET)
-        cast_one(bvh, query, packet, batch, first, BVH_PACKET, BVH_PACKET);
+        cast_one(query, packet, batch, first, BVH_PACKET, BVH_PACKET);
     else
-        cast_one(bvh, query, packet, batch, first, n, width);
+        cast_one(query, packet, batch, first, n, width);
 }
 
 void bvh_intersect(const struct bvh *bvh, struct bvh_query *query, struct bvh_batch *batch)
@@ -178,7 +180,7 @@ void bvh_intersect(const struct bvh *bvh, struct bvh_query *query, struct bvh_ba
     memset(query->start_m, 0, sizeof query->start_m);
     bvh_forget_near(query);
     for (uint32_t at = 0; at < rays->n; at += width)
-        cast(bvh, query, &packet, batch, at, rays->n - at < width ? rays->n - at : width, width);
+        cast(query, &packet, batch, at, rays->n - at < width ? rays->n - at : width, width);
     batch->counters->decided += query->decided;
     batch->counters->leaves += query->leaves;
 }

@@ -1,13 +1,18 @@
 /* SPDX-License-Identifier: MIT */
 /* Planes of triangles in double: ranges, labels and steepness from them. Loops over arrays that compilers turn into
  * vectors. */
+#include "core/bvh/planes.h"
+
 #include <math.h>
 #include <stdlib.h>
 
 #include "core/bvh/bvh_inside.h"
+#include "core/bvh/copies.h"
 #include "core/huge.h"
 #include "core/vec3.h"
 #include "core/vecmath.h"
+
+_Static_assert(sizeof(struct bvh_plane) == 4 * sizeof(double), "gathered as doubles");
 
 /* a b - c d, rounded about once: otherwise a needle's normal would lose all digits (W. Kahan). */
 static double difference(double a, double b, double c, double d)

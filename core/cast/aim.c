@@ -1,9 +1,16 @@
 /* SPDX-License-Identifier: MIT */
 /* True directions and origins of a chunk's beams, and the directions that the head reads from its
  * encoders. */
+#include "core/cast/aim.h"
+
 #include <string.h>
 
-#include "core/cast/caster_private.h"
+#include "core/cast/caster.h"
+#include "core/cast/chunk.h"
+#include "core/cast/kernels_aim.h"
+#include "core/cast/kernels_moving.h"
+#include "core/cast/kernels_sweep.h"
+#include "core/cast/upset.h"
 #include "core/mat3.h"
 
 /* The rotation from socs to the frame of positions: to the CRS where that is a rotation, else to prcs.
@@ -60,16 +67,16 @@ static void aim_ideal(struct caster *c, struct chunk *k, const struct kernel_tur
     double slipped[9];
     const double *rotation = slipped_rotation(s, moves ? mat3_unit : s->rotation, slipped);
     const struct vec3_out d = moves ? VEC3_OUT(c->socs, 0) : VEC3_OUT(c->d, 0);
-    const struct vec3_out read = moves ? VEC3_OUT(c->read, 0) : VEC3_OUT(c->list.e, 0);
     const struct kernel_pulses sweep = {k->run, k->first, *turns};
     const int even = !wobbles && kernel_sweep_steps(&c->steps, k->run);
     double to_crs[9];
     if (geo) k->linear = !moves && reading_rotation(s, to_crs);
-    const double *q = moves ? mat3_unit : to_crs;
+    const struct kernel_reading reading = {s, moves ? mat3_unit : to_crs,
+                                           moves ? VEC3_OUT(c->read, 0) : VEC3_OUT(c->list.e, 0)};
     if (geo && even)
-        kernel_sweep_read(&c->steps, &sweep, s, rotation, q, &d, &read);
+        kernel_sweep_read(&c->steps, &sweep, rotation, &d, &reading);
     else if (geo)
-        kernel_directions_read(s, turns, rotation, q, &d, &read);
+        kernel_directions_read(turns, rotation, &d, &reading);
     else if (even)
         kernel_sweep(&c->steps, &sweep, rotation, &d);
     else
@@ -123,6 +130,13 @@ static void aim_bent(struct caster *c, struct chunk *k, const struct instrument 
     caster_aim_read(c, k);
 }
 
+/* Adds wobbles to the angles. */
+static void wobble(const struct chunk *k, struct echo_list *l)
+{
+    for (uint32_t i = 0; i < k->n; i++)
+        cast_wobble(k->s->upset, k->run->t0_ns + (int64_t)k->dt_ns[i], &l->mirror_turn[i], &l->pan_turn[i]);
+}
+
 void caster_aim(struct caster *c, struct chunk *k)
 {
     const struct cast_setup *s = k->s;
@@ -132,7 +146,7 @@ void caster_aim(struct caster *c, struct chunk *k)
         kernel_angles_table(k->run, k->first, k->n, l->mirror_turn, l->pan_turn);
     else
         kernel_angles(k->run, k->first, k->n, l->mirror_turn, l->pan_turn);
-    if (s->upset != NULL && s->upset->n_wobbles != 0) caster_wobble(c, k);
+    if (s->upset != NULL && s->upset->n_wobbles != 0) wobble(k, l);
     k->from = (struct bvh_origins){.at_m = {s->station_m[0], s->station_m[1], s->station_m[2]}};
     if (s->n_knots != 0) k->from.own = VEC3_IN(l->p, 0);
     k->linear = 0;
@@ -152,10 +166,10 @@ static void read_part(struct caster *c, const struct chunk *k, uint32_t at, uint
     double to_crs[9];
     if (s->n_knots == 0) {
         reading_rotation(s, to_crs);
-        kernel_directions_read(s, &turns, s->rotation, to_crs, &socs, &e);
+        kernel_directions_read(&turns, s->rotation, &socs, &(struct kernel_reading){s, to_crs, e});
         return;
     }
-    kernel_directions_read(s, &turns, mat3_unit, mat3_unit, &socs, &VEC3_OUT(c->read, 0));
+    kernel_directions_read(&turns, mat3_unit, &socs, &(struct kernel_reading){s, mat3_unit, VEC3_OUT(c->read, 0)});
     const struct move m = {VEC3_IN(c->read, 0), {0}, e, {0}, VEC3_OUT(l->p, at)};
     move(s, k->run->t0_ns, dt_ns, n, &m);
 }

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/cast/kernels*.c: shared parts of their loops over directions. */
+/* Private to core/cast/kernels_*.c: shared parts of their loops over directions. */
 #ifndef CORE_CAST_AIM_INLINE_H
 #define CORE_CAST_AIM_INLINE_H
 
-#include "core/cast/kernels.h"
+#include "core/cast.h"
 #include "core/vecmath.h"
 
 /* A matrix as values of its own, which no store to an array can change. */
@@ -15,14 +15,18 @@ VEC_INLINE struct aim_matrix aim_matrix(const double m[9])
     return (struct aim_matrix){m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8]};
 }
 
+/* Sines and cosines of the angles of mirror and pan. */
+struct aim_axes {
+    double sm, cm, sp, cp;
+};
+
 /* m times (sin p cos m, cos p cos m, sin m). */
-VEC_INLINE void aim_direction(struct aim_matrix m, double sm, double cm, double sp, double cp, struct vec3_out d,
-                              uint32_t i)
+VEC_INLINE void aim_direction(struct aim_matrix m, struct aim_axes a, struct vec3_out d, uint32_t i)
 {
-    const double x = sp * cm, y = cp * cm;
-    d.x[i] = m.xx * x + m.xy * y + m.xz * sm;
-    d.y[i] = m.yx * x + m.yy * y + m.yz * sm;
-    d.z[i] = m.zx * x + m.zy * y + m.zz * sm;
+    const double x = a.sp * a.cm, y = a.cp * a.cm;
+    d.x[i] = m.xx * x + m.xy * y + m.xz * a.sm;
+    d.y[i] = m.yx * x + m.yy * y + m.yz * a.sm;
+    d.z[i] = m.zx * x + m.zy * y + m.zz * a.sm;
 }
 
 /* An encoder: counts per turn, and a count in radians; 0 where both encoders of a head are ideal. */

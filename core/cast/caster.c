@@ -13,34 +13,41 @@
  *     echoes     echoes.c         which returns are echoes, how they merge, their noise, which of them are sent
  *     points     points.c         positions, and entries of the block
  *
- * A stage that a setup does not need costs nothing. kernels*.c hold the arithmetic of the stages, texels.c
+ * A stage that a setup does not need costs nothing. kernels_*.c hold the arithmetic of the stages, texels.c
  * looks up textures, colours.c has what else colours may show. For setting up: outlines.c. */
 #include "core/cast.h"
 
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/cast/aim.h"
+#include "core/cast/caster.h"
+#include "core/cast/chunk.h"
+#include "core/cast/kernels_times.h"
+#include "core/cast/points.h"
 #include "core/cast/sub_rays.h"
+#include "core/cast/tripod.h"
+#include "core/cast/upset.h"
 
 void caster_set_profile(struct caster *caster, struct bvh_profile *profile)
 {
     _Static_assert((int)CAST_STAGES <= (int)(sizeof profile->spent / sizeof profile->spent[0]), "room");
     caster->profile = profile;
-    bvh_work_set_profile(caster->bvh, profile);
+    bvh_work_set_profile(caster->nearest.bvh, profile);
 }
 
 int caster_create(struct caster **out, struct sh_err *err)
 {
     struct caster *c = *out = aligned_alloc(64, (sizeof *c + 63) / 64 * 64);
     if (c == NULL) return sh_fail(err, SH_ENOMEM, "cast: no memory for a caster");
-    c->bvh = NULL; /* the arrays are not touched until they are needed */
-    c->sight = NULL;
+    c->nearest.bvh = NULL; /* the arrays are not touched until they are needed */
+    c->nearest.sight = NULL;
     c->sub_rays = NULL;
     c->profile = NULL;
     c->steps.ready = 0;
     memset(&c->counters, 0, sizeof c->counters);
-    int rc = bvh_work_create(&c->bvh, err);
-    if (rc == SH_OK) rc = sight_work_create(&c->sight, err);
+    int rc = bvh_work_create(&c->nearest.bvh, err);
+    if (rc == SH_OK) rc = sight_work_create(&c->nearest.sight, err);
     if (rc == SH_OK) c->sub_rays = aligned_alloc(64, (sizeof *c->sub_rays + 63) / 64 * 64); /* likewise */
     if (rc == SH_OK && c->sub_rays == NULL) rc = sh_fail(err, SH_ENOMEM, "cast: no memory for a caster");
     if (rc == SH_OK) return SH_OK;
@@ -52,16 +59,16 @@ int caster_create(struct caster **out, struct sh_err *err)
 void caster_free(struct caster *caster)
 {
     if (caster == NULL) return;
-    bvh_work_free(caster->bvh);
-    sight_work_free(caster->sight);
+    bvh_work_free(caster->nearest.bvh);
+    sight_work_free(caster->nearest.sight);
     free(caster->sub_rays);
     free(caster);
 }
 
 void caster_get_counters(const struct caster *caster, struct cast_counters *counters)
 {
-    const struct bvh_counters *bvh = bvh_work_counters(caster->bvh);
-    const struct sight_counters *sight = sight_work_counters(caster->sight);
+    const struct bvh_counters *bvh = bvh_work_counters(caster->nearest.bvh);
+    const struct sight_counters *sight = sight_work_counters(caster->nearest.sight);
     *counters = caster->counters;
     counters->decided = bvh->decided;
     counters->few = sight->few;
@@ -70,7 +77,7 @@ void caster_get_counters(const struct caster *caster, struct cast_counters *coun
 
 void caster_hits(struct caster *caster, const struct bvh *bvh, const struct bvh_rays *rays)
 {
-    bvh_hits(caster->bvh, bvh, rays);
+    bvh_hits(caster->nearest.bvh, bvh, rays);
 }
 
 /* Sets the pulses' places in the list, before rays are cast. */
@@ -102,6 +109,11 @@ static struct met centres(struct caster *c, const struct chunk *k)
                         .colour = k->texels ? c->list.colour : NULL};
 }
 
+static void hide(struct caster *c, const struct chunk *k)
+{
+    c->counters.hidden += caster_hide(k->s->tripod, &VEC3_IN(c->d, 0), k->n, &c->list);
+}
+
 /* Returns the number of echoes. */
 static uint32_t cast_chunk(struct caster *c, struct chunk *k)
 {
@@ -111,15 +123,15 @@ static uint32_t cast_chunk(struct caster *c, struct chunk *k)
     caster_aim(c, k);
     begin_echoes(&c->list, k);
     if (s->upset != NULL && s->upset->dark) {
-        caster_darken(c, k);
+        caster_darken(&c->list);
         return caster_points(c, k);
     }
     const struct met met = centres(c, k);
-    if (central) caster_nearest(c, s, &met);
-    if (s->tripod != NULL && s->beam == NULL) caster_hide(c, k);
-    if (met.body != NULL && s->detect != NULL && s->detect->depth > 0) caster_follow(c, s, &met);
+    if (central) caster_nearest(&c->nearest, s, &met);
+    if (s->tripod != NULL && s->beam == NULL) hide(c, k);
+    if (met.body != NULL && s->detect != NULL && s->detect->depth > 0) caster_follow(&c->nearest, s, &met, &c->paths);
     if (s->beam != NULL) caster_sub_rays(c, k);
-    if (s->tripod != NULL && s->beam != NULL) caster_hide(c, k);
+    if (s->tripod != NULL && s->beam != NULL) hide(c, k);
     caster_echoes(c, k);
     return caster_points(c, k);
 }

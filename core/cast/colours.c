@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* Colours of the echoes that are sent. Colours of textures came with the hits. */
-#include "core/colour.h"
+#include "core/cast/colours.h"
 
 #include <math.h>
 
-#include "core/cast/caster_private.h"
+#include "core/cast/chunk.h"
+#include "core/cast/echoes.h"
+#include "core/colour.h"
 
 static uint32_t packed(const uint8_t rgb[3])
 {
@@ -24,19 +26,27 @@ static double frame_at(const struct chunk *k, uint32_t pulse)
     return a->frame + fmin(1.0, f) * (b->frame - a->frame);
 }
 
+/* Echoes that get colours, of these pulses. */
+struct coloured {
+    const struct chunk *k;
+    const double *d_z;
+    struct echo_list *list;
+};
+
 /* Height of echo i, along the true beam of its pulse. */
-static double height_of(const struct caster *c, const struct chunk *k, uint32_t i, uint32_t pulse)
+static double height_of(const struct coloured *c, uint32_t i, uint32_t pulse)
 {
     double from[3];
-    bvh_origin_of(&k->from, pulse, from);
-    return from[2] + c->list.range_m[i] * c->d.z[pulse];
+    bvh_origin_of(&c->k->from, pulse, from);
+    return from[2] + c->list->range_m[i] * c->d_z[pulse];
 }
 
 /* Colour of echo i, which belongs to this pulse. */
-static uint32_t colour_of(const struct caster *c, const struct chunk *k, uint32_t i, uint32_t pulse)
+static uint32_t colour_of(const struct coloured *c, uint32_t i, uint32_t pulse)
 {
+    const struct chunk *k = c->k;
     const struct colour_scale *scale = &k->s->colour->scale;
-    const struct echo_list *l = &c->list;
+    const struct echo_list *l = c->list;
     const int signal = k->s->detect != NULL && k->s->detect->signal != NULL;
     uint8_t rgb[3] = {scale->rgb[0], scale->rgb[1], scale->rgb[2]};
     switch (scale->mode) {
@@ -44,7 +54,7 @@ static uint32_t colour_of(const struct caster *c, const struct chunk *k, uint32_
         colour_between(scale->low, scale->high, l->range_m[i], rgb);
         break;
     case COLOUR_HEIGHT:
-        colour_between(scale->low, scale->high, height_of(c, k, i, pulse), rgb);
+        colour_between(scale->low, scale->high, height_of(c, i, pulse), rgb);
         break;
     case COLOUR_FRAME:
         colour_between(scale->low, scale->high, frame_at(k, pulse), rgb);
@@ -61,20 +71,20 @@ static uint32_t colour_of(const struct caster *c, const struct chunk *k, uint32_
     return packed(rgb);
 }
 
-static void set_colour(struct caster *c, const struct chunk *k, uint32_t i, uint32_t pulse)
+static void set_colour(const struct coloured *c, uint32_t i, uint32_t pulse)
 {
-    if (isnan(c->list.range_m[i]))
-        c->list.colour[i] = packed(colour_grey);
-    else if (!k->texels)
-        c->list.colour[i] = colour_of(c, k, i, pulse);
+    if (isnan(c->list->range_m[i]))
+        c->list->colour[i] = packed(colour_grey);
+    else if (!c->k->texels)
+        c->list->colour[i] = colour_of(c, i, pulse);
 }
 
-void caster_colours(struct caster *c, const struct chunk *k)
+void caster_colours(const struct chunk *k, const double *d_z, struct echo_list *l)
 {
-    const struct echo_list *l = &c->list;
+    const struct coloured coloured = {k, d_z, l};
     for (uint32_t i = 0; i < k->n; i++)
-        set_colour(c, k, i, i);
+        set_colour(&coloured, i, i);
     for (uint32_t g = 0; g < l->n_further; g++)
         for (uint32_t j = 0; j < l->further[g].n; j++)
-            set_colour(c, k, l->further[g].at + j, l->further[g].pulse);
+            set_colour(&coloured, l->further[g].at + j, l->further[g].pulse);
 }

@@ -2,10 +2,15 @@
 /* From the hits of a chunk's pulses to the echoes that the head reports: which are detected, how they merge,
  * their noise, and which a pulse sends. One list, for single rays, footprints, and what glass and mirrors
  * show. */
+#include "core/cast/echoes.h"
+
 #include <math.h>
 #include <string.h>
 
-#include "core/cast/caster_private.h"
+#include "core/cast/caster.h"
+#include "core/cast/chunk.h"
+#include "core/cast/kernels_points.h"
+#include "core/cast/upset.h"
 #include "core/rng.h"
 #include "core/surface.h"
 

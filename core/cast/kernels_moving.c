@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Pulses of a moving head: each turned and placed by the pose of its own time, as pose_between has it. */
+/* Pulses of a moving head are turned and placed by the pose of their own time, as pose_between has it. */
 #include <math.h>
 
-#include "core/cast/kernels.h"
+#include "core/cast/kernels_moving.h"
 #include "core/vecmath.h"
 
 void kernel_leg(const struct pose_knot *a, const struct pose_knot *b, int64_t t0_ns, struct kernel_leg *leg)
@@ -86,5 +86,34 @@ void kernel_scale_from(const double *restrict range_m, const struct vec3_in *ori
         e.x[i] = e.x[i] * range_m[i] + (p.x[i] - x);
         e.y[i] = e.y[i] * range_m[i] + (p.y[i] - y);
         e.z[i] = e.z[i] * range_m[i] + (p.z[i] - z);
+    }
+}
+
+VEC_CLONES
+int kernel_meets_sphere(const struct vec3_in *dir, uint32_t n, const double v[3], double radius_m)
+{
+    const double x = v[0], y = v[1], z = v[2], v2 = x * x + y * y + z * z, r2 = radius_m * radius_m;
+    const struct vec3_in d = *dir;
+    uint64_t meets = v2 <= r2;
+    for (uint32_t i = 0; i < n; i++) {
+        double along = x * d.x[i] + y * d.y[i] + z * d.z[i];
+        uint64_t near = v2 - along * along <= r2, ahead = along > 0.0;
+        meets |= near & ahead;
+    }
+    return meets != 0;
+}
+
+VEC_CLONES
+void kernel_turn_back(const struct vec3_in *from, const double m[9], uint32_t n, const struct vec3_out *to)
+{
+    const double m0 = m[0], m1 = m[1], m2 = m[2], m3 = m[3], m4 = m[4], m5 = m[5], m6 = m[6], m7 = m[7], m8 = m[8];
+    const struct vec3_in d = *from;
+    const struct vec3_out e = *to;
+    VEC_LOOP
+    for (uint32_t i = 0; i < n; i++) {
+        double x = d.x[i], y = d.y[i], z = d.z[i];
+        e.x[i] = m0 * x + m3 * y + m6 * z;
+        e.y[i] = m1 * x + m4 * y + m7 * z;
+        e.z[i] = m2 * x + m5 * y + m8 * z;
     }
 }

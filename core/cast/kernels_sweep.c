@@ -6,6 +6,8 @@
  * sin(a + b) = sin a + (sin a (cos b - 1) + cos a sin b): what is in brackets is small, and so is its rounding. With
  * the middle's sine in two doubles the sum is good to its last bit; tests/unit/test_sweep.c compares with
  * vec_sincos_turn. */
+#include "core/cast/kernels_sweep.h"
+
 #include <math.h>
 
 #include "core/cast/aim_inline.h"
@@ -100,23 +102,23 @@ void kernel_sweep(const struct kernel_steps *steps, const struct kernel_pulses *
         const struct vec3_out d = {out->x + at, out->y + at, out->z + at};
         VEC_LOOP
         for (uint32_t i = 0; i < count; i++) {
-            double sm, cm, sp, cp;
-            turn_on(&p.mirror, b, sin_m[k + i], cos_m[k + i], &sm, &cm);
-            turn_on(&p.pan, b, sin_p[k + i], cos_p[k + i], &sp, &cp);
-            aim_direction(m, sm, cm, sp, cp, d, i);
+            struct aim_axes a;
+            turn_on(&p.mirror, b, sin_m[k + i], cos_m[k + i], &a.sm, &a.cm);
+            turn_on(&p.pan, b, sin_p[k + i], cos_p[k + i], &a.sp, &a.cp);
+            aim_direction(m, a, d, i);
         }
         at += count;
     }
 }
 
 VEC_CLONES
-void kernel_sweep_read(const struct kernel_steps *steps, const struct kernel_pulses *sweep,
-                       const struct cast_setup *setup, const double rotation[9], const double to_crs[9],
-                       const struct vec3_out *out, const struct vec3_out *read)
+void kernel_sweep_read(const struct kernel_steps *steps, const struct kernel_pulses *sweep, const double rotation[9],
+                       const struct vec3_out *out, const struct kernel_reading *reading)
 {
-    const struct aim_encoder mirror = aim_encoder(setup, setup->mirror_counts);
-    const struct aim_encoder pan = aim_encoder(setup, setup->pan_counts);
-    const struct aim_matrix m = aim_matrix(rotation), q = aim_matrix(to_crs);
+    const struct aim_encoder mirror = aim_encoder(reading->setup, reading->setup->mirror_counts);
+    const struct aim_encoder pan = aim_encoder(reading->setup, reading->setup->pan_counts);
+    const struct aim_matrix m = aim_matrix(rotation), q = aim_matrix(reading->rotation);
+    const struct vec3_out *read = &reading->e;
     const double *sin_m = steps->sm, *cos_m = steps->cm, *sin_p = steps->sp, *cos_p = steps->cp;
     const uint32_t n = sweep->turns.n;
     struct part p;
@@ -128,13 +130,13 @@ void kernel_sweep_read(const struct kernel_steps *steps, const struct kernel_pul
         const struct vec3_out e = {read->x + at, read->y + at, read->z + at};
         VEC_LOOP
         for (uint32_t i = 0; i < count; i++) {
-            double sm, cm, sp, cp;
-            turn_on(&p.mirror, b, sin_m[k + i], cos_m[k + i], &sm, &cm);
-            turn_on(&p.pan, b, sin_p[k + i], cos_p[k + i], &sp, &cp);
-            aim_direction(m, sm, cm, sp, cp, d, i);
-            aim_read(mirror, mirror_turn[i], &sm, &cm);
-            aim_read(pan, pan_turn[i], &sp, &cp);
-            aim_direction(q, sm, cm, sp, cp, e, i);
+            struct aim_axes a;
+            turn_on(&p.mirror, b, sin_m[k + i], cos_m[k + i], &a.sm, &a.cm);
+            turn_on(&p.pan, b, sin_p[k + i], cos_p[k + i], &a.sp, &a.cp);
+            aim_direction(m, a, d, i);
+            aim_read(mirror, mirror_turn[i], &a.sm, &a.cm);
+            aim_read(pan, pan_turn[i], &a.sp, &a.cp);
+            aim_direction(q, a, e, i);
         }
         at += count;
     }

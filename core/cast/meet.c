@@ -3,7 +3,11 @@
  * whether there is one. */
 #include <math.h>
 
-#include "core/cast/caster_private.h"
+#include "core/cast/aim.h"
+#include "core/cast/caster.h"
+#include "core/cast/chunk.h"
+#include "core/cast/tripod.h"
+#include "core/surface.h"
 #include "core/vec3.h"
 
 /* Hits of a chunk on their way out. */
@@ -92,9 +96,9 @@ static void meet_chunk(struct caster *c, const struct chunk *k, struct meeting *
                             .cosine = c->list.cosine,
                             .body = c->body};
     const int follows = s->detect != NULL && s->detect->surfaces != NULL && s->detect->depth > 0;
-    caster_nearest(c, s, &met);
-    if (s->tripod != NULL) caster_hide(c, k);
-    if (follows) caster_follow(c, s, &met);
+    caster_nearest(&c->nearest, s, &met);
+    if (s->tripod != NULL) c->counters.hidden += caster_hide(s->tripod, &VEC3_IN(c->d, 0), k->n, &c->list);
+    if (follows) caster_follow(&c->nearest, s, &met, &c->paths);
     m->k = k;
     for (uint32_t i = 0; i < k->n; i++) {
         if (isnan(met.rays.range_m[i])) continue;

@@ -1,10 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /* First hits of a chunk's rays: on the scene that stands still, on the bodies that move in it, on the tripod's
  * legs. */
+#include "core/cast/nearest.h"
+
 #include <math.h>
 #include <string.h>
 
-#include "core/cast/caster_private.h"
+#include "core/cast/kernels_moving.h"
+#include "core/cast/texels.h"
 #include "core/mat3.h"
 
 /* How far the origins lie from the first of them. */
@@ -19,23 +22,23 @@ static double spread_m(const struct vec3_in *p, uint32_t n)
 }
 
 /* Where the body's hit is nearer, it replaces the scene's. */
-static void keep_nearer(struct caster *c, const struct cast_mover *m, uint8_t body, const struct met *met)
+static void keep_nearer(struct nearest *w, const struct cast_mover *m, uint8_t body, const struct met *met)
 {
     const struct bvh_rays *rays = &met->rays;
     for (uint32_t i = 0; i < rays->n; i++) {
-        const double range_m = c->mover_range_m[i];
+        const double range_m = w->mover_range_m[i];
         if (!(range_m < rays->range_m[i]) && !(isnan(rays->range_m[i]) && !isnan(range_m))) continue;
         rays->range_m[i] = range_m;
-        rays->label[i] = c->mover_label[i];
-        rays->triangle[i] = c->mover_hit[i];
+        rays->label[i] = w->mover_label[i];
+        rays->triangle[i] = w->mover_hit[i];
         if (met->body == NULL) continue;
         met->body[i] = body;
-        bvh_cosines(m->bvh, c->mover_hit + i, &VEC3_IN(c->mover_d, i), 1, met->cosine + i);
+        bvh_cosines(m->bvh, w->mover_hit + i, &VEC3_IN(w->mover_d, i), 1, met->cosine + i);
     }
 }
 
 /* Casts into a body outside of the scene, in the body's own frame: its nearer hits replace the others. */
-static void cast_body(struct caster *c, const struct cast_setup *s, uint8_t body, const struct met *met)
+static void cast_body(struct nearest *w, const struct cast_setup *s, uint8_t body, const struct met *met)
 {
     const struct cast_mover *m = caster_body(s, body);
     const struct bvh_origins *from = &met->rays.from;
@@ -45,26 +48,26 @@ static void cast_body(struct caster *c, const struct cast_setup *s, uint8_t body
     const double back_m[3] = {-m->shift_m[0], -m->shift_m[1], -m->shift_m[2]};
     const uint32_t n = met->rays.n;
     struct bvh_rays rays = met->rays;
-    double v[3], w[3];
+    double v[3], from_body[3];
     mat3_apply(m->rotation, m->centre_m, v);
     vec3_add(v, m->shift_m, v);
     vec3_sub(v, at, v);
-    vec3_sub(at, m->shift_m, w);
+    vec3_sub(at, m->shift_m, from_body);
     double radius_m = m->radius_m + (own ? spread_m(&from->own, n) : 0.0);
     if (!kernel_meets_sphere(&met->rays.dir, n, v, radius_m)) return;
-    mat3_apply_transposed(m->rotation, w, rays.from.at_m);
+    mat3_apply_transposed(m->rotation, from_body, rays.from.at_m);
     if (own) {
-        kernel_shift(&from->own, back_m, n, &VEC3_OUT(c->mover_p, 0));
-        kernel_turn_back(&VEC3_IN(c->mover_p, 0), m->rotation, n, &VEC3_OUT(c->mover_p, 0));
-        rays.from.own = VEC3_IN(c->mover_p, 0);
+        kernel_shift(&from->own, back_m, n, &VEC3_OUT(w->mover_p, 0));
+        kernel_turn_back(&VEC3_IN(w->mover_p, 0), m->rotation, n, &VEC3_OUT(w->mover_p, 0));
+        rays.from.own = VEC3_IN(w->mover_p, 0);
     }
-    kernel_turn_back(&met->rays.dir, m->rotation, n, &VEC3_OUT(c->mover_d, 0));
-    rays.dir = VEC3_IN(c->mover_d, 0);
-    rays.range_m = c->mover_range_m;
-    rays.triangle = c->mover_hit;
-    rays.label = c->mover_label;
-    bvh_hits(c->bvh, m->bvh, &rays);
-    keep_nearer(c, m, body, met);
+    kernel_turn_back(&met->rays.dir, m->rotation, n, &VEC3_OUT(w->mover_d, 0));
+    rays.dir = VEC3_IN(w->mover_d, 0);
+    rays.range_m = w->mover_range_m;
+    rays.triangle = w->mover_hit;
+    rays.label = w->mover_label;
+    bvh_hits(w->bvh, m->bvh, &rays);
+    keep_nearer(w, m, body, met);
 }
 
 static int is_from_station(const struct cast_setup *s, const struct bvh_origins *from)
@@ -72,19 +75,19 @@ static int is_from_station(const struct cast_setup *s, const struct bvh_origins 
     return from->own.x == NULL && memcmp(from->at_m, s->station_m, sizeof from->at_m) == 0;
 }
 
-void caster_nearest(struct caster *c, const struct cast_setup *s, const struct met *met)
+void caster_nearest(struct nearest *w, const struct cast_setup *s, const struct met *met)
 {
     const struct bvh_rays *rays = &met->rays;
     if (s->sight != NULL && is_from_station(s, &rays->from))
-        sight_hits(c->sight, c->bvh, s->sight, rays);
+        sight_hits(w->sight, w->bvh, s->sight, rays);
     else
-        bvh_hits(c->bvh, s->bvh, rays);
+        bvh_hits(w->bvh, s->bvh, rays);
     if (met->body != NULL) {
         bvh_cosines(s->bvh, rays->triangle, &rays->dir, rays->n, met->cosine);
         memset(met->body, 0, rays->n * sizeof *met->body);
     }
     for (uint32_t i = 0; i < s->n_movers; i++)
-        cast_body(c, s, (uint8_t)(i + 1), met);
-    if (s->tripod != NULL && s->tripod->has_legs) cast_body(c, s, CAST_LEGS, met);
+        cast_body(w, s, (uint8_t)(i + 1), met);
+    if (s->tripod != NULL && s->tripod->has_legs) cast_body(w, s, CAST_LEGS, met);
     caster_texels(s, met);
 }

@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* Through glass and off mirrors: only rays that meet such a surface are cast again, together. */
+#include "core/cast/optics.h"
+
 #include <math.h>
 #include <string.h>
 
-#include "core/cast/caster_private.h"
+#include "core/cast/nearest.h"
 #include "core/surface.h"
 #include "core/vec3.h"
 
@@ -120,9 +122,8 @@ static void keep(struct path_rays *p, uint32_t k)
     p->last[ray] = at;
 }
 
-void caster_follow(struct caster *c, const struct cast_setup *s, const struct met *first)
+void caster_follow(struct nearest *w, const struct cast_setup *s, const struct met *first, struct path_rays *p)
 {
-    struct path_rays *p = &c->paths;
     begin(s, first, p);
     for (uint32_t depth = 0; depth < s->detect->depth && p->n > 0; depth++) {
         uint32_t on = 0;
@@ -139,7 +140,7 @@ void caster_follow(struct caster *c, const struct cast_setup *s, const struct me
                                 .cosine = p->cosine,
                                 .body = p->body,
                                 .colour = first->colour != NULL ? p->colour : NULL};
-        caster_nearest(c, s, &met);
+        caster_nearest(w, s, &met);
         for (uint32_t k = 0; k < p->n; k++) {
             if (isnan(p->range_m[k])) continue;
             keep(p, k);

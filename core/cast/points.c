@@ -1,10 +1,19 @@
 /* SPDX-License-Identifier: MIT */
 /* Echoes -> points, as entries of the block: the one writer, for single rays and for pulses of several
  * echoes. */
+#include "core/cast/points.h"
+
 #include <math.h>
 #include <string.h>
 
-#include "core/cast/caster_private.h"
+#include "core/cast/aim.h"
+#include "core/cast/caster.h"
+#include "core/cast/chunk.h"
+#include "core/cast/colours.h"
+#include "core/cast/kernels_aim.h"
+#include "core/cast/kernels_moving.h"
+#include "core/cast/kernels_points.h"
+#include "core/colour.h"
 
 /* Copies to further echoes what they share with the pulse's first one. */
 static void follow_pulse(struct caster *c, const struct chunk *k)
@@ -190,7 +199,7 @@ uint32_t caster_points(struct caster *c, struct chunk *k)
     const uint32_t further = l->n - k->n;
     uint32_t entries = l->n;
     if (further > 0) follow_pulse(c, k);
-    if (k->colours) caster_colours(c, k);
+    if (k->colours) caster_colours(k, c->d.z, l);
     if (d != NULL && d->ball != NULL) {
         const struct detect_points points = {l->n, l->key, l->range_m, l->mirror_turn, l->pan_turn, k->s->scan_key};
         detect_move_in_ball(d->ball, k->s->rotation, &points);

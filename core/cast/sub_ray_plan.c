@@ -1,9 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* Which sub-rays a pulse gets, and where in its footprint. */
+#include "core/cast/sub_rays.h"
+
 #include <math.h>
 #include <string.h>
 
-#include "core/cast/sub_rays.h"
+#include "core/cast/caster.h"
+#include "core/cast/chunk.h"
 #include "core/vecmath.h"
 
 /* The sub-ray at (x, y) of a pulse's disc. origin: of the pulse, becomes that of the sub-ray. */

@@ -1,10 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /* Pulses with a footprint: echoes from central hits, and from sub-rays where one hit is not enough. */
+#include "core/cast/sub_rays.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/cast/sub_rays.h"
+#include "core/cast/caster.h"
+#include "core/cast/chunk.h"
+#include "core/cast/kernels_points.h"
 #include "core/surface.h"
 
 /* Finds how much comes back from the surfaces that rays from `first` on have hit. */
@@ -22,7 +26,7 @@ static void look_through(struct caster *c, const struct cast_setup *s, const str
 {
     const struct path_rays *p = &c->paths;
     struct beyond *b = &c->sub_rays->beyond;
-    caster_follow(c, s, met);
+    caster_follow(&c->nearest, s, met, &c->paths);
     for (uint32_t i = 0; i < met->rays.n; i++) {
         b->first[at + i] = b->n;
         for (uint32_t k = p->first[i]; k != CAST_NO_PATH; k = p->found[k].next) {
@@ -58,7 +62,7 @@ static void cast_pool(struct caster *c, const struct chunk *k, uint32_t first)
                           .cosine = plain ? NULL : p->cosine + at,
                           .body = plain ? NULL : p->body + at,
                           .colour = k->texels ? p->colour + at : NULL};
-        caster_nearest(c, s, &met);
+        caster_nearest(&c->nearest, s, &met);
         met.rays.scattered = c->sub_rays->scattered;
         if (through) look_through(c, s, &met, at);
         for (uint32_t i = at; i < at + n && caster_has_bodies(s); i++)
@@ -214,7 +218,7 @@ static uint32_t find_candidates(struct caster *c, const struct chunk *k)
     struct sub_ray_work *w = c->sub_rays;
     const struct cast_setup *s = k->s;
     const uint32_t n = k->n;
-    const struct vec3_floats dir = bvh_work_directions(c->bvh);
+    const struct vec3_floats dir = bvh_work_directions(c->nearest.bvh);
     const int glass = s->detect != NULL && s->detect->depth > 0;
     uint32_t found, all = 0;
     _Static_assert((int)CHUNK <= (int)BEAM_NEAR_MOST, "all at once");

@@ -3,7 +3,7 @@
 #ifndef CORE_CAST_SUB_RAYS_H
 #define CORE_CAST_SUB_RAYS_H
 
-#include "core/cast/caster_private.h"
+#include "core/cast/chunk_arrays.h"
 
 enum {
     POOL = 24 * CHUNK,     /* sub-rays worked on at a time */
@@ -70,6 +70,12 @@ struct sub_ray_work {
     uint32_t n_echoes;
     struct beyond beyond;
 };
+
+struct caster;
+struct chunk;
+
+/* ---- sub_rays.c: the pulses of a chunk as footprints -> the list, with rho where something asks for it. */
+void caster_sub_rays(struct caster *c, const struct chunk *k);
 
 /* ---- sub_ray_plan.c: jobs, their sub-rays at the end of the pool. */
 /* Sub-rays over the whole footprint. */

@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* The place on a texture, or between vertices, where rays have hit a mesh. */
+#include "core/cast/texels.h"
+
 #include <math.h>
 
-#include "core/cast/caster_private.h"
+#include "core/cast/nearest.h"
 #include "core/surface.h"
 
 /* The place of ray i's hit in a mesh, at rest. */

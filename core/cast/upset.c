@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* Disturbances of the head that change what it measures. */
+#include "core/cast/upset.h"
+
 #include <math.h>
 
-#include "core/cast/caster_private.h"
+#include "core/cast/echoes.h"
 #include "core/vecmath.h"
 
 void cast_wobble(const struct cast_upset *upset, int64_t t_ns, double *mirror_turn, double *pan_turn)
@@ -16,13 +18,6 @@ void cast_wobble(const struct cast_upset *upset, int64_t t_ns, double *mirror_tu
     }
 }
 
-void caster_wobble(struct caster *c, const struct chunk *k)
-{
-    struct echo_list *l = &c->list;
-    for (uint32_t i = 0; i < k->n; i++)
-        cast_wobble(k->s->upset, k->run->t0_ns + (int64_t)k->dt_ns[i], &l->mirror_turn[i], &l->pan_turn[i]);
-}
-
 /* The pan turns clockwise, from y to x. */
 void caster_slip(const struct cast_upset *upset, double slip[9])
 {
@@ -33,11 +28,11 @@ void caster_slip(const struct cast_upset *upset, double slip[9])
         slip[i] = m[i];
 }
 
-void caster_darken(struct caster *c, const struct chunk *k)
+void caster_darken(struct echo_list *l)
 {
-    for (uint32_t i = 0; i < k->n; i++) {
-        c->list.range_m[i] = (double)NAN;
-        c->list.label[i] = 0;
+    for (uint32_t i = 0; i < l->n; i++) {
+        l->range_m[i] = (double)NAN;
+        l->label[i] = 0;
     }
 }
 

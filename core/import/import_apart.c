@@ -1,9 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "core/geotiff.h"
-#include "core/import/geotiff/geotiff_read.h"
-#include "core/import/gltf/gltf_read.h"
-#include "core/import/import.h"
-#include "core/late.h"
+#include "core/import/import_apart.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -18,6 +14,14 @@
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
+
+#include "core/geotiff.h"
+#include "core/import/geotiff/geotiff_read.h"
+#include "core/import/gltf/gltf_read.h"
+#include "core/import/import_assimp.h"
+#include "core/import/import_result.h"
+#include "core/import/readers.h"
+#include "core/late.h"
 
 enum { LOOK_MS = 20, MAX_WARNINGS = 1000 };
 

@@ -3,6 +3,8 @@
  *
  * No post-processing: polygons are cut by our own triangulation, and node transforms are applied in double,
  * one level after the other, so that the rounding of single precision on the way is known. */
+#include "core/import/import_assimp.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,10 +16,10 @@
 #include <assimp/scene.h>
 
 #include "core/assimp_lib.h"
-#include "core/import/import.h"
 #include "core/import/import_material.h"
 #include "core/import/import_open.h"
 #include "core/import/import_says.h"
+#include "core/scene/build_surfaces.h"
 
 enum { MAX_DEPTH = 256 };
 

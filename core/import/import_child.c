@@ -4,7 +4,7 @@
  * For all but IFC it is a fork without exec. The parent may have threads; only this one is left in the fork. glibc lets
  * such a process use malloc and stdio; libraries are loaded before the fork. It ends by _exit, which runs
  * no destructors. */
-#include "core/import/import.h"
+#include "core/import/import_child.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -15,6 +15,9 @@
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <unistd.h>
+
+#include "core/import/import_apart.h"
+#include "core/import/import_result.h"
 
 enum { RESULT_FD = 3, NOTE_FD, FIRST_FREE_FD };
 enum { PROGRAM_FILES = 256 }; /* node opens some 30 of its own */

@@ -13,6 +13,7 @@
 #include "core/assimp_lib.h"
 #include "core/colour.h"
 #include "core/import/gltf/gltf_read.h"
+#include "core/scene/build_surfaces.h"
 
 /* Materials that Assimp makes up where a file has none. */
 static bool is_made_up(const char *material)

@@ -2,7 +2,7 @@
 /* A scene as a file in memory, between two processes: head, textures, surfaces, vertices, triangles, labels,
  * texture coordinates, colours, one array after the other. It is read by pread, not mapped: each value is checked in
  * its final place, and a file that has become shorter is an error of read. */
-#include "core/import/import.h"
+#include "core/import/import_result.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -11,6 +11,8 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
+
+#include "core/scene/build_surfaces.h"
 
 enum {
     AT_ONCE = 1 << 13,       /* elements between two looks at `stop` */

@@ -7,6 +7,8 @@
 #include <sys/stat.h>
 
 #include "core/import/readers.h"
+#include "core/scene/copies.h"
+#include "core/scene/cutouts.h"
 
 static const struct {
     const char *ending;

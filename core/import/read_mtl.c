@@ -9,6 +9,8 @@
 #include <unistd.h>
 
 #include "core/import/readers.h"
+#include "core/scene/build_surfaces.h"
+#include "core/scene/find_file.h"
 #include "core/text.h"
 
 /* Missing things of a kind: one warning counts them, and names the first. */

@@ -7,6 +7,7 @@
 
 #include "core/grow.h"
 #include "core/import/readers.h"
+#include "core/scene/build_surfaces.h"
 #include "core/text.h"
 
 /* A face that uses vertices, or texture coordinates, which come later in the file. */

@@ -8,6 +8,7 @@
 #include <stdlib.h>
 
 #include "core/grow.h"
+#include "core/scene/weld.h"
 
 static int check_mesh(const struct ply *y, struct sh_err *err)
 {

@@ -5,6 +5,7 @@
 
 #include "core/ply.h"
 #include "core/import/readers.h"
+#include "core/scene/weld.h"
 
 /* A vertex that is not finite. */
 struct ply_lost {

@@ -8,6 +8,7 @@
 
 #include "core/grow.h"
 #include "core/import/read_ply.h"
+#include "core/scene/build_surfaces.h"
 
 static const struct ply_property *find(const struct ply *y, enum ply_kind kind, enum ply_use use)
 {

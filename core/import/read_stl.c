@@ -7,6 +7,8 @@
 #include <strings.h>
 
 #include "core/import/readers.h"
+#include "core/scene/build_surfaces.h"
+#include "core/scene/weld.h"
 #include "core/text.h"
 
 enum { HEAD = 84, FACET = 50, COUNT_AT = 80 };

@@ -19,7 +19,7 @@ struct mtl_line {
 int read_mtl(struct scene_build *b, const struct mtl_line *line, size_t n, uint32_t first_surface, struct sh_err *err);
 int read_ply(struct scene_build *b, struct sh_err *err);
 int read_stl(struct scene_build *b, struct sh_err *err);
-int import_apart(struct scene_build *b, struct sh_err *err); /* core/import/import.h */
+int import_apart(struct scene_build *b, struct sh_err *err); /* core/import/import_apart.c */
 int read_ifc(struct scene_build *b, struct sh_err *err);     /* core/import/ifc/ */
 
 #endif

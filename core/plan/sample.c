@@ -41,8 +41,7 @@ struct look {
 };
 
 struct plan_sample {
-    struct plan_place *place;
-    uint32_t n_places;
+    struct plan_places places;
     const struct sh_report *report;
     struct caster *caster;
     struct line_block block;
@@ -56,12 +55,12 @@ struct plan_sample {
     uint32_t n_ways;
 };
 
-int plan_sample_create(struct plan_place *place, uint32_t n_places, const struct sh_report *report,
-                       struct plan_sample **out, struct sh_err *err)
+int plan_sample_create(const struct plan_places *places, const struct sh_report *report, struct plan_sample **out,
+                       struct sh_err *err)
 {
     struct plan_sample *s = *out = calloc(1, sizeof *s);
     if (s == NULL) return sh_fail(err, SH_ENOMEM, "plan: no memory");
-    *s = (struct plan_sample){.place = place, .n_places = n_places, .report = report, .key = rng_key(1, RNG_PLAN)};
+    *s = (struct plan_sample){.places = *places, .report = report, .key = rng_key(1, RNG_PLAN)};
     s->look = calloc(MIXED_LOOKS + PLAIN_LOOKS, sizeof *s->look);
     s->way = calloc(OPTICS_DRAWN, sizeof *s->way);
     int rc = s->look != NULL && s->way != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "plan: no memory");
@@ -100,8 +99,8 @@ static int draw(struct plan_sample *s, struct look *look)
     while (s->tries < TRIES) {
         uint64_t number = s->tries++;
         if ((number & 0xfff) == 0 && sh_stopped(s->report)) return 0;
-        look->place = (uint32_t)(number % s->n_places);
-        const struct plan_place *p = &s->place[look->place];
+        look->place = (uint32_t)(number % s->places.n);
+        const struct plan_place *p = &s->places.place[look->place];
         struct schedule_line line;
         look->pulse = p->segment.k0 + rng_u64(s->key, number) % p->pulses;
         schedule_get_line(&p->segment, schedule_line_of(&p->segment, look->pulse), &line);
@@ -117,7 +116,7 @@ static int draw(struct plan_sample *s, struct look *look)
 /* One pulse by itself, as it is set up. */
 static void cast_look(struct plan_sample *s, struct cast_setup *setup, const struct look *look, struct echoes *out)
 {
-    const struct plan_place *p = &s->place[look->place];
+    const struct plan_place *p = &s->places.place[look->place];
     const struct line_block *b = &s->block;
     struct schedule_line line;
     struct schedule_run run;
@@ -159,7 +158,7 @@ static void set_up(const struct plan_place *p, struct exact *e)
 
 static void cast_beam(struct plan_sample *s, const struct look *look, enum beam_mode mode, struct echoes *out)
 {
-    const struct plan_place *p = &s->place[look->place];
+    const struct plan_place *p = &s->places.place[look->place];
     struct exact e;
     set_up(p, &e);
     e.setup.beam = mode == BEAM_SINGLE ? NULL : p->beam;
@@ -169,8 +168,8 @@ static void cast_beam(struct plan_sample *s, const struct look *look, enum beam_
 
 static void set_rings(const struct plan_sample *s, uint32_t rings)
 {
-    for (uint32_t i = 0; i < s->n_places; i++)
-        beam_rings(rings, &s->place[i].beam->pattern);
+    for (uint32_t i = 0; i < s->places.n; i++)
+        beam_rings(rings, &s->places.place[i].beam->pattern);
 }
 
 static int is_mixed(struct plan_sample *s, const struct look *look)
@@ -275,7 +274,7 @@ void plan_sample_beam(struct plan_sample *s, enum beam_mode mode, uint32_t rings
 static void cast_way(struct plan_sample *s, const struct look *look, uint32_t depth, int apart, struct echoes *out)
 {
     struct exact e;
-    set_up(&s->place[look->place], &e);
+    set_up(&s->places.place[look->place], &e);
     e.setup.beam = NULL;
     e.detect.depth = depth;
     if (apart) {
@@ -288,7 +287,7 @@ static void cast_way(struct plan_sample *s, const struct look *look, uint32_t de
 
 static int leads_on(const struct plan_sample *s, const struct echoes *e)
 {
-    const struct cast_detect *d = s->place[0].setup.detect;
+    const struct cast_detect *d = s->places.place[0].setup.detect;
     const struct surface_table *t = d->surfaces;
     uint32_t label = e->last_label;
     if (label == LINE_LABEL_NONE) return 0;
@@ -356,7 +355,7 @@ void plan_sample_sight(struct plan_sample *s, double cell_rad, struct plan_sight
     uint32_t triangle[SIGHT_RAYS], n = 0;
     memset(found, 0, sizeof *found);
     for (; n < SIGHT_DRAWN && draw(s, &look); n++) {
-        const struct plan_place *p = &s->place[look.place];
+        const struct plan_place *p = &s->places.place[look.place];
         const double *at_m = p->setup.station_m;
         const struct bvh_rays rays = {.n = SIGHT_RAYS,
                                       .from.at_m = {at_m[0], at_m[1], at_m[2]},

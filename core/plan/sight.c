@@ -145,14 +145,14 @@ int plan_sight_choose(const struct plan_sight_need *need, const struct plan_sigh
     return map;
 }
 
-int plan_sight(const struct plan_sight_need *need, struct plan_place *place, uint32_t n_places,
-               const struct sh_report *report, int *map, struct plan_row *row, struct sh_err *err)
+int plan_sight(const struct plan_sight_need *need, const struct plan_places *places, const struct sh_report *report,
+               int *map, struct plan_row *row, struct sh_err *err)
 {
     const int looks = need->why_not == NULL && need->forced != 0 && plan_sight_may_pay(need);
     struct plan_sight_found found;
     if (looks) {
         struct plan_sample *sample;
-        int rc = plan_sample_create(place, n_places, report, &sample, err);
+        int rc = plan_sample_create(places, report, &sample, err);
         if (rc != SH_OK) return rc;
         plan_sample_sight(sample, sqrt(4.0 * M_PI / cells(need)), &found);
         plan_sample_free(sample);

@@ -10,6 +10,7 @@
 
 #include "core/grow.h"
 #include "core/huge.h"
+#include "core/scene/build_surfaces.h"
 #include "core/vec3.h"
 
 static int64_t now_ns(void)

@@ -58,37 +58,6 @@ int build_reserve(struct scene_build *b, uint64_t vertices, uint64_t triangles, 
 /* v in the file's units and axes. Its index in the scene is scene->n_vertices before the call. */
 int build_vertex(struct scene_build *b, const double v[3], struct sh_err *err);
 
-/* ---- weld.c: for a reader whose file has a vertex for each corner of a triangle. Zero-initialise. */
-enum { BUILD_RECENT = 65536 };
-struct build_weld {
-    uint32_t *number; /* [n] in the scene, of the file's vertices */
-    uint32_t n;
-    uint32_t *slot; /* [size] of a hash table: numbers in the scene */
-    size_t size, used;
-    /* By a part of the hash: the number + 1 of the last vertex. Most vertices come again soon, and are found here,
-     * without a look at the table, which is larger than any cache. */
-    uint32_t recent[BUILD_RECENT];
-};
-int build_weld_begin(struct scene_build *b, struct build_weld *w, uint64_t vertices, struct sh_err *err);
-/* Adds the next of these vertices, as build_vertex, unless there is one at the same place, bit for bit. */
-int build_weld_vertex(struct scene_build *b, struct build_weld *w, const double v[3], struct sh_err *err);
-void build_weld_free(struct build_weld *w);
-
-/* A colour that a file says, times scale, as scene->rgb has it. Values beyond 0..255, and NaN, are limited and
- * counted. */
-void build_rgb(struct scene_build *b, const double colour[3], double scale, uint8_t rgb[4]);
-
-/* The range of floating colours is judged by these counts. Zero-initialise. */
-struct build_rgb_range {
-    double largest;
-    uint64_t n_above, n_between; /* above 1; between 0 and 1 */
-};
-void build_rgb_look(struct build_rgb_range *range, double number);
-/* The factor that takes colours to 0..255: 255, or 1 where they go up to 255 already. They do where one is 2 at least,
- * and more are above 1 than between 0 and 1: rounding leaves numbers just above 1, and few colours are brighter than
- * white. */
-double build_rgb_scale(const struct build_rgb_range *range);
-
 /* Makes room for n corners in corner, corner_uv and corner_rgb; their contents stay. */
 int build_corners(struct scene_build *b, size_t n, struct sh_err *err);
 /* Adds the polygon of the n >= 3 corners in corner. */
@@ -96,33 +65,11 @@ int build_polygon(struct scene_build *b, size_t n, uint16_t label, struct sh_err
 
 #define BUILD_SINGLE_ROUNDING 6e-8 /* 2^-24: of the nearest float */
 
-/* The names are not searched any more: the scene is done, or given up. */
-void build_forget_surfaces(struct scene_build *b);
-
 /* The file's coordinates, up to `largest`, were rounded to single precision, with an error of up to
  * `error`; both in its units. Records the error, and warns of more than a micrometre. With `refuse` it
  * fails where the error is more than allowed. */
 int build_single(struct scene_build *b, double largest, double error, bool refuse, struct sh_err *err);
 
-/* The label of a pair of names; a new pair gets the next number. Pointers into the scene's surfaces last until the next
- * label. */
-int build_label(struct scene_build *b, struct text_span object, struct text_span material, uint16_t *label,
-                struct sh_err *err);
-
-/* Notes which surfaces have colours at the corners of their triangles. */
-void build_note_colours(struct scene *scene);
-
-/* A texture as a reader finds it. */
-struct build_image {
-    struct text_span name;   /* its file, as the mesh or its library names it */
-    struct text_span folder; /* of the library that names it, which counts before that of the mesh; p NULL: none */
-    const void *bytes;       /* of an image within the mesh's file, else NULL */
-    size_t n_bytes;
-    uint32_t raw_width, raw_height; /* struct texture_source */
-    enum texture_wrap wrap[2];
-};
-/* Its number, from 1. *number stays where there is no memory. */
-int build_texture(struct scene_build *b, const struct build_image *image, uint16_t *number, struct sh_err *err);
 /* Whether texture coordinates and textures are to be read. */
 static inline bool build_wants_textures(const struct scene_build *b)
 {
@@ -134,14 +81,6 @@ static inline bool build_wants_colours(const struct scene_build *b)
 {
     return b->spec->textures;
 }
-
-/* ---- find_file.c: files that a mesh names. Folders are paths up to their last slash, and may be empty. */
-struct text_span build_folder_of(const char *path);
-/* The path, with / for \\, to be freed; NULL: no memory. */
-char *build_join(struct text_span folder, struct text_span name);
-/* The file of that name: in one of the folders, then by its last part there; then both without regard to case. To be
- * freed; NULL: it is nowhere. */
-char *build_find_file(const struct text_span *folder, size_t n, struct text_span name);
 
 /* Reports "reading FILE" about four times a second, once the load takes longer than a second, and heeds the
  * stop: SH_ESTOPPED. build: a struct scene_build. */
@@ -158,19 +97,5 @@ static inline struct scene_import_limits build_limits(const struct scene_build *
 {
     return b->spec->limits != NULL ? *b->spec->limits : scene_import_defaults;
 }
-
-/* ---- copies.c: the mesh, which the scene owns from then on, at all these places. */
-int scene_add_copies(struct scene *scene, struct scene *mesh, const struct scene_places *places,
-                     const struct sh_report *report, struct sh_err *err);
-
-/* Part of scene_keep: each copy keeps what its labels say, and is removed where that is nothing. label: new labels, by
- * old ones. SH_EINPUT where copies of a mesh would keep different surfaces. */
-int scene_keep_copies(struct scene *scene, const uint8_t *keep, const uint16_t *label, struct sh_err *err);
-
-/* ---- cutouts.c */
-/* Finds holes in the textures of a complete scene. Warns of textures that can't be read. */
-int scene_find_cutouts(struct scene *scene, const struct sh_report *report, struct sh_err *err);
-/* Drops texture coordinates and textures, unless they have holes. */
-void scene_drop_textures(struct scene *scene);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Surfaces of the scene that is being built: labels, names, textures. */
-#include "core/scene/build.h"
+#include "core/scene/build_surfaces.h"
 
 #include <inttypes.h>
 #include <math.h>
@@ -11,6 +11,8 @@
 
 #include "core/grow.h"
 #include "core/rng.h"
+#include "core/scene/build.h"
+#include "core/scene/find_file.h"
 
 static int compare_surfaces(const void *a, const void *b)
 {

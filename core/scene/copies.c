@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* A mesh that stands in a scene many times: its triangles are kept once, or written out for each of its places. */
+#include "core/scene/copies.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -106,20 +108,27 @@ static int add_surfaces(struct scene *scene, struct scene *mesh, const struct sc
 
 /* ---- places */
 
-static int set_copy(const struct scene *mesh, const struct scene_hull *hull, const struct scene_places *places,
-                    size_t number, uint32_t label0, struct scene_copy *copy, struct sh_err *err)
+/* A mesh is copied to these places. */
+struct copied {
+    const struct scene *mesh;
+    const struct scene_hull *hull;
+    const struct scene_places *places;
+};
+
+static int set_copy(const struct copied *of, size_t number, uint32_t label0, struct scene_copy *copy,
+                    struct sh_err *err)
 {
-    const struct scene_place *place = &places->place[number];
+    const struct scene_place *place = &of->places->place[number];
     const double turn = angle_rad(fmod(place->turn_deg, 360.0));
     *copy = (struct scene_copy){.scale = place->scale, .cosine = cos(turn), .sine = sin(turn), .label0 = label0};
     memcpy(copy->shift_m, place->at_m, sizeof copy->shift_m);
-    scene_set_copy_bounds(mesh, hull, copy);
+    scene_set_copy_bounds(of->mesh, of->hull, copy);
     for (int k = 0; k < 3; k++)
         if (!(fabs(copy->min_m[k]) <= BUILD_MAX_COORDINATE_M && fabs(copy->max_m[k]) <= BUILD_MAX_COORDINATE_M))
             return sh_fail(err, SH_EINPUT,
                            "%s: copy %zu goes from %g to %g m; allowed are coordinates up to %g m: are its place and "
                            "its scale of %g right?",
-                           places->says, number + 1, copy->min_m[k], copy->max_m[k], BUILD_MAX_COORDINATE_M,
+                           of->places->says, number + 1, copy->min_m[k], copy->max_m[k], BUILD_MAX_COORDINATE_M,
                            copy->scale);
     return SH_OK;
 }
@@ -128,11 +137,12 @@ static int set_copies(const struct scene *mesh, const struct scene_places *place
                       const struct sh_report *report, struct scene_copy *copy, struct sh_err *err)
 {
     struct scene_hull hull;
+    const struct copied of = {mesh, &hull, places};
     int rc = scene_find_hull(mesh, &hull, err);
     for (size_t i = 0; i < places->n && rc == SH_OK; i++) {
         if ((i & 0xff) == 0) rc = sh_check_stop(report, err);
         const uint32_t own = places->own_surfaces ? (uint32_t)i * mesh->n_surfaces : 0;
-        if (rc == SH_OK) rc = set_copy(mesh, &hull, places, i, label0 + own, &copy[i], err);
+        if (rc == SH_OK) rc = set_copy(&of, i, label0 + own, &copy[i], err);
     }
     scene_free_hull(&hull);
     return rc;

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* Holes that textures cut out of surfaces, and texture coordinates and colours at a point. */
+#include "core/scene/cutouts.h"
+
 #include <math.h>
 #include <stdlib.h>
 
-#include "core/scene/build.h"
 #include "core/vec3.h"
 
 int scene_read_texture(const struct scene_texture *texture, int alpha_only, struct texture_image *image,

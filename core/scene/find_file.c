@@ -1,13 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /* Finds files that a mesh or its library names. Many names come from other machines: with \ for /, with folders that
  * are not here, or in another case. */
+#include "core/scene/find_file.h"
+
 #include <dirent.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 #include <sys/stat.h>
 
-#include "core/scene/build.h"
+#include "core/scene.h"
 
 static bool is_there(const char *path)
 {

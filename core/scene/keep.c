@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/scene/build.h"
+#include "core/scene/copies.h"
 
 /* Triangles of surfaces that are kept, with the new labels; their vertices get numbers in the old order. */
 static void keep_triangles(struct scene *s, const uint8_t *keep, const uint16_t *label, uint32_t *vertex)

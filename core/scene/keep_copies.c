@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/scene/build.h"
+#include "core/scene/copies.h"
 #include "core/scene/hull.h"
 
 static int keeps_any(const uint8_t *keep, uint32_t n)

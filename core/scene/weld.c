@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Where a file has vertices for each triangle, those at the same place, bit for bit, become one. */
+#include "core/scene/weld.h"
+
 #include <stdlib.h>
 #include <string.h>
 

@@ -8,7 +8,7 @@
  * is ignored. LAS: 1.2 to 1.4, not compressed. There the point source ID is the station, the return number
  * the echo, and the extra bytes "label" the label. Further columns are read where they are asked for. Colours
  * have 8 bits in PLY; of LAS's 16 bits the upper 8 count. Ownership:
- * cloud_read allocates, cloud_free releases. A cloud is constant after cloud_read, any thread.
+ * cloud_read_columns allocates, cloud_free releases. A cloud is constant after that, any thread.
  *
  * Memory: 29 bytes a point; time 8, range, reflectance and amplitude 4 each, colours 3, the number of echoes 1. The
  * file itself is in memory while it is read. */
@@ -47,11 +47,6 @@ struct cloud {
     int64_t epsg;          /* of the header's comment "epsg N", 0: scene frame; CLOUD_EPSG_UNKNOWN: it has none */
 };
 
-/* Errors (SH_EINPUT, naming file and line, or byte): missing or unreadable, not a PLY or LAS file, x, y or z
- * missing, a count the file can't hold, truncated, infinite coordinates, or only some of the three NaN, a
- * station, echo or label that is not a whole number in its range. Warns of other elements and of bytes after
- * the last one. */
-int cloud_read(const char *path, const struct sh_report *report, struct cloud *out, struct sh_err *err);
 enum cloud_column {
     CLOUD_TIME = 1,
     CLOUD_RANGE = 2,
@@ -60,7 +55,10 @@ enum cloud_column {
     CLOUD_RGB = 16,
     CLOUD_AMPLITUDE = 32
 };
-/* The same, with these columns. SH_ESTOPPED where report asks to stop. */
+/* Reads positions, stations, echoes and labels, and these columns. Errors (SH_EINPUT, naming file and line, or byte):
+ * missing or unreadable, not a PLY or LAS file, x, y or z missing, a count the file can't hold, truncated, infinite
+ * coordinates, or only some of the three NaN, a station, echo or label that is not a whole number in its range. Warns
+ * of other elements and of bytes after the last one. SH_ESTOPPED where report asks to stop. */
 int cloud_read_columns(const char *path, unsigned columns, const struct sh_report *report, struct cloud *out,
                        struct sh_err *err);
 void cloud_free(struct cloud *cloud);
@@ -85,6 +83,14 @@ struct cloud_site {
  * station are of the first one. SH_EINPUT: a point's station is not among n_stations. SH_ESTOPPED. */
 int cloud_compare(const struct cloud *cloud, const struct cloud_site *site, const struct sh_report *report,
                   double *distance_m, uint32_t *triangle, struct sh_err *err);
+
+/* A cloud with what cloud_compare found of it. */
+struct cloud_compared {
+    const struct cloud *cloud;
+    const struct cloud_site *site;
+    const double *distance_m; /* [cloud->n] */
+    const uint32_t *triangle; /* [cloud->n] */
+};
 
 /* The station of point i, from 1, and its place in the scene. */
 static inline unsigned cloud_station(const struct cloud *cloud, size_t i)

@@ -43,8 +43,6 @@ int coverage_create(const struct coverage_spec *spec, const struct sh_report *re
                     struct sh_err *err);
 void coverage_free(struct coverage *coverage);
 
-enum { COVERAGE_MAX_STATIONS = 65535 };
-
 /* A scan: its setup, and its pulses. */
 struct coverage_scan {
     struct cast_setup setup;
@@ -147,9 +145,14 @@ struct coverage_gain {
     double gain_m2;
     double front; /* of what the rays meet, the share met from the front; NaN: nothing is met */
 };
-/* gain[n] for places place_m[n]. bvh: of the coverage's scene; it reaches the places. */
-int coverage_gains(const struct coverage *coverage, const struct bvh *bvh, const struct coverage_directions *directions,
-                   const double (*place_m)[3], uint32_t n, const struct sh_report *report, struct coverage_gain *gain,
+/* Places of a head, prcs. */
+struct coverage_places {
+    uint32_t n;
+    const double (*place_m)[3]; /* [n] */
+};
+/* gain: [places->n] */
+int coverage_gains(const struct coverage *coverage, const struct coverage_directions *directions,
+                   const struct coverage_places *places, const struct sh_report *report, struct coverage_gain *gain,
                    struct sh_err *err);
 
 #endif

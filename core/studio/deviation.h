@@ -65,11 +65,10 @@ struct deviation_points {
 int deviation_points_create(size_t n, struct deviation_points *out, struct sh_err *err);
 void deviation_points_free(struct deviation_points *points);
 
-/* head: [site->n_stations]. distance_m and triangle as cloud_compare gave them. Labels from n_surfaces on are of
+/* head: [compared->site->n_stations]. Labels from n_surfaces on are of
  * bodies that move: they get ranges alone. All threads; the result doesn't depend on them. SH_ESTOPPED. */
-int deviation_along(const struct cloud *cloud, const struct cloud_site *site, const struct deviation_head *head,
-                    const double *distance_m, const uint32_t *triangle, const struct sh_report *report,
-                    const struct deviation_points *out, struct sh_err *err);
+int deviation_along(const struct cloud_compared *compared, const struct deviation_head *head,
+                    const struct sh_report *report, const struct deviation_points *out, struct sh_err *err);
 
 /* Where a beam meets a face. */
 struct deviation_hit {

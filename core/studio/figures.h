@@ -73,16 +73,19 @@ struct figures_density {
     size_t n;
     struct figures_cell *cell; /* [n] by density */
 };
-/* Needs points->range_m. Points without a triangle take no part. Up to 4 million cells, 96 MiB. */
-int figures_density_of(const struct cloud *cloud, const struct cloud_site *site, const struct scene *scene,
-                       const struct figures_in *in, const uint32_t *triangle, double cell_m,
-                       const struct sh_report *report, struct figures_density *out, struct sh_err *err);
+/* Points on the surfaces of a scene. */
+struct figures_on_scene {
+    const struct cloud_compared *compared;
+    const struct scene *scene;
+    const float *range_m; /* [cloud->n] as deviation_points has it */
+};
+/* Points without a triangle take no part. Up to 4 million cells, 96 MiB. */
+int figures_density_of(const struct figures_on_scene *in, double cell_m, const struct sh_report *report,
+                       struct figures_density *out, struct sh_err *err);
 /* The same with a cell chosen here: first_m, doubled until half of the points lie in cells of 16, or nearly, and up to
  * 50 m. all: the figures of all its cells. */
-int figures_density_fit(const struct cloud *cloud, const struct cloud_site *site, const struct scene *scene,
-                        const struct figures_in *in, const uint32_t *triangle, double first_m,
-                        const struct sh_report *report, struct figures_density *out, struct figures_density_row *all,
-                        struct sh_err *err);
+int figures_density_fit(const struct figures_on_scene *in, double first_m, const struct sh_report *report,
+                        struct figures_density *out, struct figures_density_row *all, struct sh_err *err);
 void figures_density_free(struct figures_density *density);
 /* Figures of the cells of one station (from 1; 0: of all) whose mean range is at least from_m and below to_m. NaN:
  * no cell. */

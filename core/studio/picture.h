@@ -41,13 +41,19 @@ struct picture_type {
     int bold;
     double halo_px; /* > 0: so much white around the strokes */
 };
-/* UTF-8; x is the left end, middle or right end, y the baseline. */
-void picture_text(struct picture *picture, double x, double y, enum picture_anchor anchor,
+/* UTF-8; at: x of the left end, middle or right end, y of the baseline. */
+void picture_text(struct picture *picture, const double at[2], enum picture_anchor anchor,
                   const struct picture_type *type, const uint8_t rgb[3], const char *text);
 double picture_text_width(const struct picture_type *type, const char *text);
 
 /* CIE 1976 L*a*b* (white D65), L* 0..100, to sRGB; colours outside the gamut are moved to its border. */
 void picture_lab(double l, double a, double b, uint8_t rgb[3]);
+
+struct picture_part {
+    const struct picture *picture;
+    uint32_t column, row, width, height;
+    const uint8_t *clear; /* this colour is transparent; NULL: none is */
+};
 
 /* Writes the image: to path.part beside it first, then renamed, so that path is whole or as it was. Errors begin
  * with `what` and name the path. */
@@ -68,7 +74,7 @@ struct pen {
     void (*fill)(void *on, long column, long row, long width, long height, const uint8_t rgb[3]);
     void (*line)(void *on, const double from[2], const double to[2], double width, const uint8_t rgb[3]);
     void (*triangle)(void *on, const double corner[3][2], const uint8_t rgb[3]);
-    void (*text)(void *on, double x, double y, enum picture_anchor anchor, const struct picture_type *type,
+    void (*text)(void *on, const double at[2], enum picture_anchor anchor, const struct picture_type *type,
                  const uint8_t rgb[3], const char *text);
     /* What is drawn between the two belongs together: a group with a title. */
     void (*begin)(void *on, const char *class_name, const char *title);
@@ -81,8 +87,7 @@ struct svg;
 int svg_begin(uint32_t width, uint32_t height, const char *title, struct svg **out, struct sh_err *err);
 struct pen svg_pen(struct svg *svg);
 /* Part of an image, as PNG data, at the same place. */
-int svg_image(struct svg *svg, const struct picture *picture, long column, long row, uint32_t width, uint32_t height,
-              struct sh_err *err);
+int svg_image(struct svg *svg, const struct picture_part *part, struct sh_err *err);
 /* Writes as picture_write_png does. */
 int svg_write(struct svg *svg, const char *what, const char *path, struct sh_err *err);
 void svg_end(struct svg *svg);

@@ -23,7 +23,7 @@ static int open_trial(struct trial *trial, struct site *site, const struct sh_re
     if (site->scene->n_all > MANY_TRIANGLES) sh_progress(report, "trying methods on the scene", -1.0);
     trial->site = site;
     site_look_open(&trial->look, site);
-    return plan_sample_create(trial->look.place, trial->look.n, report, &trial->sample, err);
+    return plan_sample_create(&(struct plan_places){trial->look.place, trial->look.n}, report, &trial->sample, err);
 }
 
 /* ---- beams */

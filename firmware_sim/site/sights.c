@@ -67,7 +67,7 @@ static int choose(struct site *site, const struct sh_report *report, int *map, s
                                          .forced = asked == CHOICE_AUTO ? -1 : asked == CHOICE_ON,
                                          .why_not = why_not(site)};
     site->plan.sight_rays = need.pulses / need.share;
-    return plan_sight(&need, look.place, look.n, report, map, &site->plan.sight, err);
+    return plan_sight(&need, &(struct plan_places){look.place, look.n}, report, map, &site->plan.sight, err);
 }
 
 int site_plan_sight(struct site *site, const struct sh_report *report, struct sh_err *err)

@@ -12,8 +12,8 @@
 #include <unistd.h>
 #include <cmocka.h>
 
-#include "core/cast/kernels.h"
 #include "firmware_sim/site/plan_rows.h"
+#include "tests/common/aimed.h"
 #include "tests/common/beam_reference.h"
 #include "tests/common/thorough.h"
 
@@ -124,11 +124,9 @@ static void compare_beam(struct side *side, uint32_t station, const struct sched
     const struct config_profile *p = &side->cfg->profile;
     const struct line_block *b = cast(side, station, run, LINE_POLAR, NULL);
     struct cast_setup setup;
-    double turn[2][RUN], d[3][RUN];
+    double d[3][RUN];
     site_cast_setup(side->site, station, &setup);
-    kernel_angles(run, 0, RUN, turn[0], turn[1]);
-    kernel_directions(&(struct kernel_turns){RUN, turn[0], turn[1]}, setup.rotation,
-                      &(struct vec3_out){d[0], d[1], d[2]});
+    aimed_directions(run, setup.rotation, &(struct vec3_out){d[0], d[1], d[2]});
     for (uint32_t i = 0, at = 0; i < RUN; i++) {
         struct beam_ref ref;
         const double dir[3] = {d[0][i], d[1][i], d[2][i]};
@@ -305,7 +303,7 @@ static void test_figures(void **state)
     double strip = threshold(beam) * beam_radius(beam, range_m) / range_m, share = strip / (pan_deg * M_PI / 180.0);
     struct plan_place place = {
         .setup = rig.setup, .beam = &rig.beam, .segment = rig.segment, .pulses = view.lines * view.pulses};
-    assert_int_equal(plan_sample_create(&place, 1, NULL, &sample, &err), SH_OK);
+    assert_int_equal(plan_sample_create(&(struct plan_places){&place, 1}, NULL, &sample, &err), SH_OK);
     plan_sample_beam(sample, BEAM_SINGLE, 0, &single);
     plan_sample_beam(sample, BEAM_ADAPTIVE, 4, &adaptive);
     plan_sample_beam(sample, BEAM_RINGS, 2, &rings);
@@ -350,7 +348,7 @@ static void test_small_steps(void **state)
     const double mean2 = share * sum2, sigma = sqrt(share * sum4 / DRAWN);
     struct plan_place place = {
         .setup = rig.setup, .beam = &rig.beam, .segment = rig.segment, .pulses = view.lines * view.pulses};
-    assert_int_equal(plan_sample_create(&place, 1, NULL, &sample, &err), SH_OK);
+    assert_int_equal(plan_sample_create(&(struct plan_places){&place, 1}, NULL, &sample, &err), SH_OK);
     plan_sample_beam(sample, BEAM_SINGLE, 0, &single);
     const double above = (single.error_m * single.error_m - mean2) / sigma;
     printf("# a step of 4 mm: single rays are wrong by %.3f mm RMS, said %.3f mm: %.2f standard errors above\n",

@@ -8,7 +8,10 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "core/cast/kernels.h"
+#include "core/cast/kernels_aim.h"
+#include "core/cast/kernels_points.h"
+#include "core/cast/kernels_sweep.h"
+#include "core/cast/kernels_times.h"
 #include "core/mat3.h"
 #include "core/rng.h"
 #include "tests/bench/bench.h"
@@ -66,7 +69,7 @@ static void even(void)
 }
 static void even_read(void)
 {
-    kernel_sweep_read(&steps, &sweep, &setup, rotation, mat3_unit, &d, &e);
+    kernel_sweep_read(&steps, &sweep, rotation, &d, &(struct kernel_reading){&setup, mat3_unit, e});
 }
 static void one_by_one(void)
 {
@@ -74,7 +77,7 @@ static void one_by_one(void)
 }
 static void one_by_one_read(void)
 {
-    kernel_directions_read(&setup, &turns, rotation, mat3_unit, &d, &e);
+    kernel_directions_read(&turns, rotation, &d, &(struct kernel_reading){&setup, mat3_unit, e});
 }
 static void limits(void)
 {

@@ -3,8 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/cast/kernels.h"
 #include "tests/bench/bench.h"
+#include "tests/common/aimed.h"
 
 enum { LINES_HZ = 480 };
 
@@ -29,14 +29,12 @@ void bench_schedule(uint32_t lines, uint32_t frames, struct schedule_spec *spec)
 static void fill_line(struct bench_rays *rays, uint32_t line, size_t at)
 {
     static const double levelled[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
-    double mirror_turn[BENCH_MAX_LINE], pan_turn[BENCH_MAX_LINE];
     struct schedule_line place;
     struct schedule_run run;
     schedule_get_line(&rays->segment, line, &place);
     schedule_get_run(&rays->segment, &place, place.cast0, rays->line_pulses, &run);
-    kernel_angles(&run, 0, run.n, mirror_turn, pan_turn);
     const struct vec3_out d = {rays->dx + at, rays->dy + at, rays->dz + at};
-    kernel_directions(&(struct kernel_turns){run.n, mirror_turn, pan_turn}, levelled, &d);
+    aimed_directions(&run, levelled, &d);
     bvh_to_float(&VEC3_IN(d, 0), run.n, rays->fx + at, rays->fy + at, rays->fz + at);
 }
 

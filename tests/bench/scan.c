@@ -70,7 +70,7 @@ int bench_scan_plan(const struct bench_scan *scan, const struct bvh *bvh, const 
                                          .packet = info.packet,
                                          .memory_bytes = (uint64_t)BENCH_SIGHT_MIB << 20,
                                          .forced = -1};
-    return plan_sight(&need, &place, 1, NULL, map, &row, err);
+    return plan_sight(&need, &(struct plan_places){&place, 1}, NULL, map, &row, err);
 }
 
 double bench_process_s(void)

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/cast/kernels.h"
+#include "tests/common/aimed.h"
 
 struct met {
     double range_m;
@@ -276,9 +276,6 @@ void beam_rig_directions(struct beam_rig *rig, uint32_t l, double *dx, double *d
     struct schedule_run run;
     schedule_get_line(&rig->segment, l, &line);
     uint32_t n = (uint32_t)(line.cast_end - line.cast0);
-    double *turn = malloc(2 * n * sizeof *turn);
     schedule_get_run(&rig->segment, &line, line.cast0, n, &run);
-    kernel_angles(&run, 0, n, turn, turn + n);
-    kernel_directions(&(struct kernel_turns){n, turn, turn + n}, rig->setup.rotation, &(struct vec3_out){dx, dy, dz});
-    free(turn);
+    aimed_directions(&run, rig->setup.rotation, &(struct vec3_out){dx, dy, dz});
 }

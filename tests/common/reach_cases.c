@@ -10,7 +10,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "core/cast/caster_private.h"
+#include "core/cast/caster.h"
 #include "core/studio/mesh.h"
 #include "tests/common/generate.h"
 
@@ -241,15 +241,15 @@ void reach_close(struct reach_run *run)
 uint32_t reach_cast(struct reach_run *run, uint32_t l)
 {
     const struct plan_place *place = &run->look.place[0];
-    const struct bvh_counters before = *bvh_work_counters(run->caster->bvh);
+    const struct bvh_counters before = *bvh_work_counters(run->caster->nearest.bvh);
     struct schedule_line line;
     struct schedule_run pulses;
     schedule_get_line(&place->segment, l, &line);
     schedule_get_run(&place->segment, &line, line.cast0, (uint32_t)(line.cast_end - line.cast0), &pulses);
     if (place->enter != NULL) place->enter(place->ctx, pulses.t0_ns, &run->setup);
     caster_cast(run->caster, &run->setup, &pulses, &run->block);
-    run->counted.leaves += bvh_work_counters(run->caster->bvh)->leaves - before.leaves;
-    run->counted.decided += bvh_work_counters(run->caster->bvh)->decided - before.decided;
+    run->counted.leaves += bvh_work_counters(run->caster->nearest.bvh)->leaves - before.leaves;
+    run->counted.decided += bvh_work_counters(run->caster->nearest.bvh)->decided - before.decided;
     run->pulses += pulses.n;
     return pulses.n;
 }

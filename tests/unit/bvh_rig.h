@@ -3,7 +3,7 @@
 #ifndef TESTS_UNIT_BVH_RIG_H
 #define TESTS_UNIT_BVH_RIG_H
 
-#include "core/bvh/bvh_inside.h"
+#include "core/bvh.h"
 #include "tests/common/cases.h"
 
 extern const double ORIGIN[3]; /* prcs, m */

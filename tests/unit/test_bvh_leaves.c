@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/bvh/bvh_inside.h"
+#include "core/bvh/leaves.h"
 #include "core/rng.h"
 #include "tests/common/generate.h"
 #include "tests/unit/bvh_rig.h"

@@ -2,7 +2,7 @@
 /* Casting: ranges against planes worked out in long double, independence of the cuts, limits and noise. */
 #include <math.h>
 
-#include "core/cast/kernels.h"
+#include "core/cast/kernels_points.h"
 #include "tests/common/hits.h"
 #include "tests/common/thorough.h"
 #include "tests/unit/cast_rig.h"

@@ -13,7 +13,7 @@ static int read_cloud(const char *name, const void *data, size_t len, struct clo
 {
     n_warnings = 0;
     warnings[0] = err->text[0] = '\0';
-    int rc = cloud_read(write_file(name, data, len), &report, c, err);
+    int rc = cloud_read_columns(write_file(name, data, len), 0, &report, c, err);
     unlink(path);
     return rc;
 }
@@ -214,9 +214,9 @@ static void malformed_files_are_refused(void **state)
         must_refuse(table[i].text, strlen(table[i].text), table[i].expected);
     struct cloud c;
     struct sh_err err;
-    assert_int_equal(cloud_read("/nowhere/at all.ply", NULL, &c, &err), SH_EINPUT);
+    assert_int_equal(cloud_read_columns("/nowhere/at all.ply", 0, NULL, &c, &err), SH_EINPUT);
     assert_non_null(strstr(err.text, "/nowhere/at all.ply"));
-    assert_int_equal(cloud_read(folder, NULL, &c, &err), SH_EINPUT);
+    assert_int_equal(cloud_read_columns(folder, 0, NULL, &c, &err), SH_EINPUT);
 }
 
 /* A few bytes of a good file changed: points or one line of error, whatever the bytes say. The sanitizers

@@ -33,7 +33,7 @@ static void test_read(void **state)
         struct cloud cloud;
         struct sh_err err = {0};
         write_las((uint32_t)codes[i][0], (uint32_t)codes[i][1], 1);
-        if (cloud_read(rig_path("a.las"), NULL, &cloud, &err) != 0) fail_msg("%s", err.text);
+        if (cloud_read_columns(rig_path("a.las"), 0, NULL, &cloud, &err) != 0) fail_msg("%s", err.text);
         assert_int_equal(cloud.epsg, codes[i][2]);
         assert_int_equal(cloud.n, 3);
         static const unsigned want[3][3] = {{1, 1, 7}, {1, 2, 40008}, {2, 1, 7}};
@@ -73,7 +73,7 @@ static void test_degrees(void **state)
         rig_anchor(&a);
         rig_points(0, 0, 0, (struct rig_point[]){{3000, 4000, 12000, 0, 7, 1, 1}, {0, -4000, 0, 0, 7, 1, 1}}, 2);
         if (rig_record(rig_path("a.las"), (struct recorder_options){0}, 1, &err) != 0) fail_msg("%s", err.text);
-        if (cloud_read(rig_path("a.las"), NULL, &cloud, &err) != 0) fail_msg("%s", err.text);
+        if (cloud_read_columns(rig_path("a.las"), 0, NULL, &cloud, &err) != 0) fail_msg("%s", err.text);
         const double want[2] = {remainder(lon_deg[i] + 0.004, 360), remainder(lon_deg[i] - 0.004, 360)};
         assert_int_equal(cloud.epsg, 4979);
         assert_true(fabs(cloud.xyz_m[0][0] - 45.003) < 1e-13 && fabs(cloud.xyz_m[0][2] - 412.125) < 1e-12);
@@ -117,7 +117,7 @@ static void test_broken(void **state)
         assert_int_equal(fwrite(las, 1, len, f), len);
         fclose(f);
         free(las);
-        assert_int_equal(cloud_read(rig_path("a.las"), NULL, &cloud, &err), SH_EINPUT);
+        assert_int_equal(cloud_read_columns(rig_path("a.las"), 0, NULL, &cloud, &err), SH_EINPUT);
         if (strstr(err.text, broken[i].says) == NULL) fail_msg("case %zu: %s", i, err.text);
         assert_non_null(strstr(err.text, "a.las"));
         unlink(rig_path("a.las"));
@@ -141,7 +141,7 @@ static void test_geodetic(void **state)
     rig_anchor(&a);
     rig_points(0, 0, 0, &across, 1);
     if (rig_record(rig_path("a.las"), (struct recorder_options){0}, 1, &err) != 0) fail_msg("%s", err.text);
-    if (cloud_read(rig_path("a.las"), NULL, &cloud, &err) != 0) fail_msg("%s", err.text);
+    if (cloud_read_columns(rig_path("a.las"), 0, NULL, &cloud, &err) != 0) fail_msg("%s", err.text);
     assert_int_equal(cloud.epsg, 4979);
     assert_true(fabs(cloud.xyz_m[0][0] - 10.000001) < 1e-12); /* doubles step by 2e-15 and 3e-14 there */
     assert_true(fabs(cloud.xyz_m[0][1] - -179.9999) < 1e-12);
@@ -192,7 +192,7 @@ static void test_label_behind_others(void **state)
     assert_non_null(f);
     assert_int_equal(fwrite(file, 1, sizeof file, f), sizeof file);
     assert_int_equal(fclose(f), 0);
-    if (cloud_read(rig_path("a.las"), NULL, &cloud, &err) != 0) fail_msg("%s", err.text);
+    if (cloud_read_columns(rig_path("a.las"), 0, NULL, &cloud, &err) != 0) fail_msg("%s", err.text);
     assert_int_equal(cloud.label[0], 40123);
     cloud_free(&cloud);
     unlink(rig_path("a.las"));

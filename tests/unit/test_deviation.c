@@ -151,8 +151,9 @@ static void deviations_along_the_beam(void **state)
     head.setup.range_sigma_m = 0.005;
     const struct cloud cloud = {.n = N, .xyz_m = xyz};
     const struct cloud_site site = {.index = index, .n_stations = 1, .max_m = 10, .threads = 2};
+    const struct cloud_compared compared = {&cloud, &site, distance_m, triangle};
     assert_int_equal(cloud_compare(&cloud, &site, NULL, distance_m, triangle, &err), SH_OK);
-    assert_int_equal(deviation_along(&cloud, &site, &head, distance_m, triangle, NULL, &out, &err), SH_OK);
+    assert_int_equal(deviation_along(&compared, &head, NULL, &out, &err), SH_OK);
     for (int i = 0; i < N; i++) {
         const double along_m = (double)out.along_m[i];
         if (isnan(along_m) != isnan(POINT[i].along_m) || fabs(along_m - POINT[i].along_m) > 1e-6)
@@ -164,10 +165,10 @@ static void deviations_along_the_beam(void **state)
     assert_true(fabs((double)out.range_m[0] - (sqrt(110.0) + 0.003)) < 1e-5);
     /* 8 sigma of 0.2 m reach from pane to wall: neither is alone. */
     head.setup.range_sigma_m = 0.2;
-    assert_int_equal(deviation_along(&cloud, &site, &head, distance_m, triangle, NULL, &out, &err), SH_OK);
+    assert_int_equal(deviation_along(&compared, &head, NULL, &out, &err), SH_OK);
     assert_true(isnan(out.sigma_m[3]) && isnan(out.sigma_m[2]) && !isnan(out.along_m[3]));
     head.setup.range_sigma_m = 0.1; /* 0.8 m before and behind the wall there is nothing */
-    assert_int_equal(deviation_along(&cloud, &site, &head, distance_m, triangle, NULL, &out, &err), SH_OK);
+    assert_int_equal(deviation_along(&compared, &head, NULL, &out, &err), SH_OK);
     assert_true(fabs((double)out.sigma_m[0] - 0.1) < 1e-6);
     deviation_points_free(&out);
     bvh_free(bvh);

@@ -141,12 +141,12 @@ static void density_is_points_by_area(void **state)
         }
     const struct cloud cloud = {.n = n, .xyz_m = xyz};
     const struct cloud_site site = {.n_stations = 1, .max_m = 10, .threads = 1};
-    const struct deviation_points points = {.range_m = range_m};
-    const struct figures_in in = {n, distance_m, &points};
+    const struct cloud_compared compared = {&cloud, &site, distance_m, triangle};
+    const struct figures_on_scene in = {&compared, scene, range_m};
     struct figures_density d;
     struct figures_density_row row;
     struct sh_err err;
-    assert_int_equal(figures_density_of(&cloud, &site, scene, &in, triangle, 1.0, NULL, &d, &err), SH_OK);
+    assert_int_equal(figures_density_of(&in, 1.0, NULL, &d, &err), SH_OK);
     assert_int_equal(d.n, 4);
     figures_density_within(&d, 0, 0.0, (double)INFINITY, &row);
     assert_true(row.cells == 4 && row.points == 20);
@@ -167,7 +167,9 @@ static void density_is_points_by_area(void **state)
         station[i] = (uint16_t)(1 + i % 2);
     const struct cloud both = {.n = n, .xyz_m = xyz, .station = station};
     const struct cloud_site two = {.n_stations = 2, .max_m = 10, .threads = 1};
-    assert_int_equal(figures_density_of(&both, &two, scene, &in, triangle, 1.0, NULL, &d, &err), SH_OK);
+    const struct cloud_compared by_two = {&both, &two, distance_m, triangle};
+    assert_int_equal(figures_density_of(&(struct figures_on_scene){&by_two, scene, range_m}, 1.0, NULL, &d, &err),
+                     SH_OK);
     assert_int_equal(d.n, 6);
     figures_density_within(&d, 2, 0.0, (double)INFINITY, &row);
     assert_true(row.cells == 3 && row.points == 10);

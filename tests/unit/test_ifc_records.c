@@ -4,7 +4,9 @@
 #include <math.h>
 
 #include "core/import/ifc/ifc_choose.h"
-#include "core/import/ifc/ifc_read.h"
+#include "core/import/ifc/ifc_records.h"
+#include "core/import/ifc/ifc_styles.h"
+#include "core/import/ifc/ifc_text.h"
 #include "tests/unit/ifc_files.h"
 #include "tests/unit/scene_files.h"
 

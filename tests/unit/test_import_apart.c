@@ -14,7 +14,6 @@
 #include <assimp/version.h>
 
 #include "core/assimp_lib.h"
-#include "core/import/import.h"
 #include "tests/common/collada.h"
 #include "tests/unit/scene_files.h"
 

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <sys/mman.h>
 
-#include "core/import/import.h"
+#include "core/import/import_result.h"
 #include "tests/common/thorough.h"
 #include "tests/unit/scene_files.h"
 

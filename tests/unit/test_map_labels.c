@@ -303,7 +303,7 @@ static uint64_t ink_of(const char *text, double *width)
     struct sh_err err;
     uint64_t hash = 0;
     assert_int_equal(picture_make(&p, 80, 60, white, &err), SH_OK);
-    picture_text(&p, 10, 45, PICTURE_LEFT, &type, black, text);
+    picture_text(&p, (const double[2]){10, 45}, PICTURE_LEFT, &type, black, text);
     for (uint32_t i = 0; i < 80 * 60; i++)
         if (p.rgb[3 * i] < 128) hash = hash * 1099511628211u + i + 1;
     *width = picture_text_width(&type, text);

@@ -5,8 +5,8 @@
 #include <math.h>
 
 #include "core/angle.h"
-#include "core/cast/kernels.h"
 #include "firmware_sim/site/site_inside.h"
+#include "tests/common/aimed.h"
 
 /* A closed box, 16 m wide. */
 static const char BOX[] = "v -8 -8 -3\nv 8 -8 -3\nv 8 8 -3\nv -8 8 -3\nv -8 -8 5\nv 8 -8 5\nv 8 8 5\nv -8 8 5\n"
@@ -45,11 +45,8 @@ static struct site *need_site(const char *head, const char *stations, const char
 static void aim(const struct site *site, uint32_t station, const struct schedule_run *run, double d[3][64])
 {
     struct cast_setup setup;
-    double turn[2][64];
     site_cast_setup(site, station, &setup);
-    (run->firing != NULL ? kernel_angles_table : kernel_angles)(run, 0, run->n, turn[0], turn[1]);
-    kernel_directions(&(struct kernel_turns){run->n, turn[0], turn[1]}, setup.rotation,
-                      &(struct vec3_out){d[0], d[1], d[2]});
+    aimed_directions(run, setup.rotation, &(struct vec3_out){d[0], d[1], d[2]});
 }
 
 /* All pulses of the first lines and of the last ones go to where the view says that rays go. */

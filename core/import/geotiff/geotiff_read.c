@@ -10,6 +10,7 @@
 
 #include "core/geotiff.h"
 #include "core/late.h"
+#include "core/scene/build_surfaces.h"
 
 #define TIFF_CALLS(CALL)                       \
     CALL(TIFFClose)                            \

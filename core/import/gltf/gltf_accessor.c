@@ -1,11 +1,18 @@
 /* SPDX-License-Identifier: MIT */
 /* Accessors and buffer views. Numbers of the file are up to 2^53, counts below 2^32 and strides up to 2^16, so that sums and
  * products of them stay within 64 bits. */
-#include "core/import/gltf/gltf.h"
+#include "core/import/gltf/gltf_accessor.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "core/import/gltf/gltf.h"
+#include "core/import/gltf/gltf_at.h"
+#include "core/import/gltf/gltf_extensions.h"
+#include "core/import/gltf/gltf_file.h"
+#include "core/import/gltf/gltf_json.h"
+#include "core/import/gltf/gltf_meshopt.h"
 
 enum { MAX_STRIDE = 1 << 16 };
 
@@ -55,6 +62,24 @@ static int open_part(struct gltf *g, const json_t *object, const char *at, struc
     return SH_OK;
 }
 
+static int open_packed(struct gltf *g, const json_t *more, const char *at, struct gltf_kept *out)
+{
+    struct gltf_packed p = {.mode = gltf_text(more, "mode"), .filter = gltf_text(more, "filter")};
+    uint64_t offset = 0, length = 0;
+    uint32_t buffer;
+    int rc = gltf_index(g, more, "buffer", at, &buffer);
+    if (rc == SH_OK) rc = gltf_whole(g, more, "byteOffset", at, &offset);
+    if (rc == SH_OK) rc = gltf_whole(g, more, "byteLength", at, &length);
+    if (rc == SH_OK) rc = gltf_whole(g, more, "byteStride", at, &p.stride);
+    if (rc == SH_OK) rc = gltf_whole(g, more, "count", at, &p.count);
+    if (rc == SH_OK) rc = gltf_buffer(g, buffer, &p.from);
+    if (rc != SH_OK) return rc;
+    if (offset > p.from.n || length > p.from.n - offset)
+        return gltf_fail(g, "%s goes beyond its buffer of %zu bytes", at, p.from.n);
+    p.from = (struct gltf_bytes){p.from.p + offset, (size_t)length};
+    return gltf_meshopt(g->b, &p, at, &out->own, &out->bytes, g->err);
+}
+
 int gltf_buffer_view(struct gltf *g, uint32_t view, struct gltf_bytes *out, uint64_t *stride)
 {
     const struct gltf_at at = gltf_at("bufferViews[%u]", view);
@@ -68,7 +93,7 @@ int gltf_buffer_view(struct gltf *g, uint32_t view, struct gltf_bytes *out, uint
                          MAX_STRIDE);
     struct gltf_kept *kept = &g->view[view];
     const json_t *more = meshopt_of(object);
-    if (!kept->is_open) rc = more != NULL ? gltf_meshopt(g, more, at.text, kept) : open_part(g, object, at.text, kept);
+    if (!kept->is_open) rc = more != NULL ? open_packed(g, more, at.text, kept) : open_part(g, object, at.text, kept);
     kept->is_open = rc == SH_OK;
     *out = kept->bytes;
     return rc;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Extensions: the known ones, and the rest. */
-#include "core/import/gltf/gltf.h"
+#include "core/import/gltf/gltf_extensions.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -45,12 +45,12 @@ static bool is_in(const json_t *list, const char *name)
     return false;
 }
 
-bool gltf_is_required(const struct gltf *g, const char *extension)
+bool gltf_is_required(const json_t *root, const char *extension)
 {
-    return is_in(json_object_get(g->root, "extensionsRequired"), extension);
+    return is_in(json_object_get(root, "extensionsRequired"), extension);
 }
 
-static void warn_unknown(struct gltf *g, const json_t *used)
+static void warn_unknown(const struct scene_build *b, const json_t *used)
 {
     char names[256] = "";
     size_t at = 0;
@@ -62,8 +62,14 @@ static void warn_unknown(struct gltf *g, const json_t *used)
         n++;
     }
     if (n > 0)
-        sh_warn(g->b->report, "%s: %u extensions are not known, and were not required: they are not read: %s",
-                g->b->name, n, names);
+        sh_warn(b->report, "%s: %u extensions are not known, and were not required: they are not read: %s", b->name, n,
+                names);
+}
+
+json_t *gltf_extension(const json_t *of, const char *name)
+{
+    json_t *found = json_object_get(json_object_get(of, "extensions"), name);
+    return json_is_object(found) ? found : NULL;
 }
 
 bool gltf_is_by_shaders(const json_t *material)
@@ -73,56 +79,56 @@ bool gltf_is_by_shaders(const json_t *material)
 }
 
 /* Assimp unpacks Draco, and leaves out or misreads these. */
-static int check_for_assimp(struct gltf *g, const json_t *required)
+static int check_for_assimp(struct scene_build *b, const json_t *root, struct sh_err *err)
 {
     static const char *const other[] = {"EXT_mesh_gpu_instancing", "KHR_mesh_quantization", "EXT_meshopt_compression",
                                         "KHR_meshopt_compression"};
     for (size_t i = 0; i < sizeof other / sizeof other[0]; i++)
-        if (is_in(required, other[i]))
-            return gltf_fail(g, "it needs KHR_draco_mesh_compression and %s; allowed is one of them", other[i]);
-    if (json_array_size(json_object_get(g->root, "skins")) > 0)
-        sh_warn(g->b->report,
-                "%s: its meshes are packed by Draco, and so Assimp reads it: its skins move nothing there", g->b->name);
+        if (gltf_is_required(root, other[i]))
+            return build_fail(b, SH_EINPUT, err, "it needs KHR_draco_mesh_compression and %s; allowed is one of them",
+                              other[i]);
+    if (json_array_size(json_object_get(root, "skins")) > 0)
+        sh_warn(b->report, "%s: its meshes are packed by Draco, and so Assimp reads it: its skins move nothing there",
+                b->name);
     return SH_OK;
 }
 
 /* Whether a primitive has its positions only in Draco's form. */
-static bool is_packed(const struct gltf *g, const json_t *primitive)
+static bool is_packed(const json_t *root, const json_t *primitive)
 {
     const json_t *at = json_object_get(json_object_get(primitive, "attributes"), "POSITION");
     const json_t *position =
-        json_array_get(json_object_get(g->root, "accessors"), (size_t)fmax(json_number_value(at), 0.0));
+        json_array_get(json_object_get(root, "accessors"), (size_t)fmax(json_number_value(at), 0.0));
     return gltf_extension(primitive, "KHR_draco_mesh_compression") != NULL &&
            json_object_get(position, "bufferView") == NULL && json_object_get(position, "sparse") == NULL;
 }
 
 /* A file need not require Draco where it has plain accessors, too. Some writers leave out both. */
-static bool has_packed(const struct gltf *g)
+static bool has_packed(const json_t *root)
 {
-    const json_t *meshes = json_object_get(g->root, "meshes");
+    const json_t *meshes = json_object_get(root, "meshes");
     for (size_t i = 0; i < json_array_size(meshes); i++) {
         const json_t *primitives = json_object_get(json_array_get(meshes, i), "primitives");
         for (size_t k = 0; k < json_array_size(primitives); k++)
-            if (is_packed(g, json_array_get(primitives, k))) return true;
+            if (is_packed(root, json_array_get(primitives, k))) return true;
     }
     return false;
 }
 
-int gltf_check_extensions(struct gltf *g)
+int gltf_check_extensions(struct scene_build *b, const json_t *root, bool *by_assimp, struct sh_err *err)
 {
-    json_t *required, *used;
-    int rc = gltf_list(g, g->root, "extensionsRequired", "", &required);
-    if (rc == SH_OK) rc = gltf_list(g, g->root, "extensionsUsed", "", &used);
-    if (rc != SH_OK) return rc;
+    const json_t *required = json_object_get(root, "extensionsRequired"),
+                 *used = json_object_get(root, "extensionsUsed");
     for (size_t i = 0; i < json_array_size(required); i++) {
         const char *name = json_string_value(json_array_get(required, i));
-        if (name == NULL) return gltf_fail(g, "extensionsRequired[%zu] is no text", i);
+        if (name == NULL) return build_fail(b, SH_EINPUT, err, "extensionsRequired[%zu] is no text", i);
         if (!is_known(name))
-            return gltf_fail(g, "it requires the extension %.60s, which is not known; known are " KNOWN_SAYS, name);
+            return build_fail(b, SH_EINPUT, err,
+                              "it requires the extension %.60s, which is not known; known are " KNOWN_SAYS, name);
     }
-    warn_unknown(g, used);
+    warn_unknown(b, used);
     if (is_in(used, "KHR_techniques_webgl") || is_in(used, "KHR_technique_webgl"))
-        sh_warn(g->b->report, "%s: it has colours by shaders (KHR_techniques_webgl), which are not read", g->b->name);
-    g->by_assimp = is_in(required, "KHR_draco_mesh_compression") || has_packed(g);
-    return g->by_assimp ? check_for_assimp(g, required) : SH_OK;
+        sh_warn(b->report, "%s: it has colours by shaders (KHR_techniques_webgl), which are not read", b->name);
+    *by_assimp = gltf_is_required(root, "KHR_draco_mesh_compression") || has_packed(root);
+    return *by_assimp ? check_for_assimp(b, root, err) : SH_OK;
 }

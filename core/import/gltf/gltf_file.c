@@ -3,13 +3,19 @@
  *
  *   .glb   "glTF" version length | length "JSON" ... | length "BIN\0" ... | others, which nobody knows
  *          whole numbers of 32 bits, little-endian; chunks are padded to 4 bytes */
-#include "core/import/gltf/gltf.h"
+#include "core/import/gltf/gltf_file.h"
 
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+
+#include "core/import/gltf/gltf.h"
+#include "core/import/gltf/gltf_at.h"
+#include "core/import/gltf/gltf_json.h"
+#include "core/import/gltf/gltf_nodes.h"
+#include "core/import/gltf/gltf_uri.h"
 
 enum { GLB_HEAD = 12, CHUNK_HEAD = 8, MAX_ENTRIES = 1 << 26 };
 #define CHUNK_JSON 0x4e4f534aU
@@ -183,7 +189,7 @@ static int open_buffer(struct gltf *g, uint32_t buffer, struct gltf_kept *out)
     if (uri == NULL)
         out->bytes = g->bin;
     else if (gltf_uri_is_data(uri))
-        rc = gltf_uri_data(g, uri, at.text, &out->own, &out->bytes);
+        rc = gltf_uri_data(g->b, uri, at.text, &out->own, &out->bytes, g->err);
     else
         rc = read_file(g, uri, out);
     if (rc == SH_OK && out->bytes.n < length)

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* Checks indices of the whole file, also where no scene draws them: those that name nothing are counted, and the first
  * one is named. In drawn parts such an index is an error when it is read; this warns of the rest. */
-#include "core/import/gltf/gltf.h"
+#include "core/import/gltf/gltf_indices.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
+
+#include "core/import/gltf/gltf_at.h"
 
 enum { MAX_DEPTH = 12 };
 
@@ -42,7 +43,7 @@ static const char *const entered[] = {"EXT_mesh_gpu_instancing",
                                       NULL};
 
 struct search {
-    const struct gltf *g;
+    const json_t *root;
     uint64_t n;
     struct gltf_at first; /* of them */
     double number;
@@ -59,7 +60,7 @@ static bool is_one_of(const char *text, const char *const *known)
 static void look_at(struct search *s, const json_t *value, const char *list, const char *at)
 {
     const double number = json_number_value(value);
-    const size_t n = json_array_size(json_object_get(s->g->root, list));
+    const size_t n = json_array_size(json_object_get(s->root, list));
     if (json_is_number(value) && number >= 0.0 && number < (double)n && floor(number) == number) return;
     if (!json_is_number(value) || s->n++ > 0) return; /* a value that is no number is an error where it is read */
     s->first = gltf_at("%s", at);
@@ -128,12 +129,12 @@ static void walk(struct search *s, const json_t *value, const char *key, const c
             walk_object(s, json_array_get(value, i), key, gltf_at("%.80s[%zu]", at, i).text, depth);
 }
 
-void gltf_say_indices(const struct gltf *g)
+void gltf_say_indices(const struct scene_build *b, const json_t *root)
 {
-    struct search s = {.g = g};
-    walk(&s, g->root, "", "", 0);
+    struct search s = {.root = root};
+    walk(&s, root, "", "", 0);
     if (s.n > 0)
-        sh_warn(g->b->report, "%s: %llu ind%s what is not there; the first: %s is %g, and there are %zu %s", g->b->name,
+        sh_warn(b->report, "%s: %llu ind%s what is not there; the first: %s is %g, and there are %zu %s", b->name,
                 (unsigned long long)s.n, s.n > 1 ? "ices name" : "ex names", s.first.text, s.number,
-                json_array_size(json_object_get(g->root, s.list)), s.list);
+                json_array_size(json_object_get(root, s.list)), s.list);
 }

@@ -1,21 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-#include "core/import/gltf/gltf.h"
+#include "core/import/gltf/gltf_json.h"
 
 #include <math.h>
-#include <stdarg.h>
-#include <stdio.h>
+
+#include "core/import/gltf/gltf.h"
 
 #define MOST_WHOLE 0x1p53 /* numbers of JSON are read as doubles: whole ones up to here are exact */
-
-struct gltf_at gltf_at(const char *fmt, ...)
-{
-    struct gltf_at at;
-    va_list ap;
-    va_start(ap, fmt);
-    vsnprintf(at.text, sizeof at.text, fmt, ap);
-    va_end(ap);
-    return at;
-}
 
 int gltf_list(struct gltf *g, const json_t *of, const char *key, const char *at, json_t **out)
 {
@@ -59,11 +49,10 @@ int gltf_index(struct gltf *g, const json_t *of, const char *key, const char *at
     return SH_OK;
 }
 
-int gltf_numbers(struct gltf *g, const json_t *of, const char *key, const char *at, size_t n, double *out, bool *found)
+int gltf_numbers(struct gltf *g, const json_t *of, const char *key, const char *at, size_t n, double *out)
 {
     json_t *list;
     int rc = gltf_list(g, of, key, at, &list);
-    if (found != NULL) *found = list != NULL;
     if (rc != SH_OK || list == NULL) return rc;
     for (size_t i = 0; i < n; i++)
         if (json_array_size(list) != n || !json_is_number(json_array_get(list, i)))
@@ -78,12 +67,6 @@ int gltf_child(struct gltf *g, const json_t *of, const char *key, const char *at
     *out = json_object_get(of, key);
     if (*out == NULL || json_is_object(*out)) return SH_OK;
     return gltf_fail(g, "%s.%s is no object", at, key);
-}
-
-json_t *gltf_extension(const json_t *of, const char *name)
-{
-    json_t *found = json_object_get(json_object_get(of, "extensions"), name);
-    return json_is_object(found) ? found : NULL;
 }
 
 const char *gltf_text(const json_t *of, const char *key)

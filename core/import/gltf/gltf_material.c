@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Materials: the base colour, its texture, how that lies, and what its alpha cuts out. */
-#include "core/import/gltf/gltf.h"
+#include "core/import/gltf/gltf_material.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -8,6 +8,13 @@
 #include <string.h>
 
 #include "core/colour.h"
+#include "core/import/gltf/gltf.h"
+#include "core/import/gltf/gltf_accessor.h"
+#include "core/import/gltf/gltf_at.h"
+#include "core/import/gltf/gltf_extensions.h"
+#include "core/import/gltf/gltf_json.h"
+#include "core/import/gltf/gltf_uri.h"
+#include "core/scene/build_surfaces.h"
 
 enum { CLAMP_TO_EDGE = 33071, MIRRORED_REPEAT = 33648 };
 
@@ -129,7 +136,7 @@ static int add_image(struct gltf *g, uint32_t i, struct build_image *image, uint
     int rc = gltf_object(g, "images", i, &object);
     const char *uri = rc == SH_OK ? gltf_text(object, "uri") : NULL;
     if (uri != NULL && !gltf_uri_is_data(uri)) return add_file(g, uri, image, number);
-    if (rc == SH_OK && uri != NULL) rc = gltf_uri_data(g, uri, at.text, &own, &bytes);
+    if (rc == SH_OK && uri != NULL) rc = gltf_uri_data(g->b, uri, at.text, &own, &bytes, g->err);
     if (rc == SH_OK && uri == NULL) rc = gltf_index(g, object, "bufferView", at.text, &view);
     if (rc == SH_OK && uri == NULL) rc = gltf_buffer_view(g, view, &bytes, &stride);
     const int len = asprintf(&name, "%s*%u", slash != NULL ? slash + 1 : g->b->spec->file, i);
@@ -153,7 +160,7 @@ static int miss_image(struct gltf *g, const json_t *texture, const char *at)
 {
     const char *name = json_object_iter_key(json_object_iter(json_object_get(texture, "extensions")));
     if (name == NULL) return SH_OK; /* a texture without an image is allowed */
-    if (g->b->spec->textures && gltf_is_required(g, name))
+    if (g->b->spec->textures && gltf_is_required(g->root, name))
         return gltf_fail(g,
                          "%s is an image by %.60s, which is not read; allowed are PNG, JPEG, TGA, BMP and WebP: "
                          "convert it, or scan without colours",
@@ -186,8 +193,8 @@ static int read_lay(struct gltf *g, const json_t *info, const char *at, struct g
     uint32_t other = GLTF_NONE;
     int rc = gltf_index(g, info, "texCoord", at, &look->uv_set);
     if (rc == SH_OK) rc = gltf_index(g, lay, "texCoord", at, &other);
-    if (rc == SH_OK) rc = gltf_numbers(g, lay, "offset", at, 2, offset, NULL);
-    if (rc == SH_OK) rc = gltf_numbers(g, lay, "scale", at, 2, scale, NULL);
+    if (rc == SH_OK) rc = gltf_numbers(g, lay, "offset", at, 2, offset);
+    if (rc == SH_OK) rc = gltf_numbers(g, lay, "scale", at, 2, scale);
     if (rc != SH_OK) return rc;
     turn = json_number_value(json_object_get(lay, "rotation"));
     if (other != GLTF_NONE) look->uv_set = other;
@@ -231,7 +238,7 @@ static int keep_clear(struct gltf *g, const struct base *base, const json_t *mat
 {
     const char *mode = gltf_text(material, "alphaMode");
     double rgba[4] = {1, 1, 1, 1}, clear = 0.0;
-    int rc = gltf_numbers(g, base->of, base->factor, at, 4, rgba, NULL);
+    int rc = gltf_numbers(g, base->of, base->factor, at, 4, rgba);
     if (mode != NULL && strcmp(mode, "BLEND") == 0 && rgba[3] >= 0.0 && rgba[3] <= 1.0) clear = 1.0 - rgba[3];
     if (is_share(transmission(material))) clear = fmax(clear, json_number_value(transmission(material)));
     surface->clear = (float)clear;
@@ -242,7 +249,7 @@ static int keep_colour(struct gltf *g, const struct base *base, const char *at, 
 {
     double rgba[4] = {1, 1, 1, 1};
     if (surface->has_colour) return SH_OK;
-    int rc = gltf_numbers(g, base->of, base->factor, at, 4, rgba, NULL);
+    int rc = gltf_numbers(g, base->of, base->factor, at, 4, rgba);
     for (int k = 0; k < 3 && rc == SH_OK; k++) {
         if (!(rgba[k] >= 0.0 && rgba[k] <= 1.0)) return SH_OK; /* no colour of a surface */
         surface->colour[k] = (float)colour_srgb_encode(rgba[k]);

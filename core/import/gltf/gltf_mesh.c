@@ -1,14 +1,18 @@
 /* SPDX-License-Identifier: MIT */
 /* The primitives of a mesh into the builder, of any mode. A vertex is added when a triangle first uses it: primitives
  * may share accessors that are much larger than themselves. */
-#include "core/import/gltf/gltf.h"
+#include "core/import/gltf/gltf_mesh.h"
 
-#include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/colour.h"
+#include "core/import/gltf/gltf.h"
+#include "core/import/gltf/gltf_at.h"
+#include "core/import/gltf/gltf_json.h"
+#include "core/import/gltf/gltf_material.h"
+#include "core/import/gltf/gltf_pose.h"
+#include "core/scene/build_surfaces.h"
 
 enum { POINTS, LINES, LINE_LOOP, LINE_STRIP, TRIANGLES, TRIANGLE_STRIP, TRIANGLE_FAN, N_MODES };
 
@@ -176,16 +180,22 @@ static int add_part(struct part *p, const json_t *primitive, const char *at)
     return rc;
 }
 
-static int add_primitive(struct gltf *g, const json_t *node, const json_t *mesh, const json_t *primitive,
-                         const char *object, const char *at, const gltf_matrix world)
+/* A mesh, as a node draws it. */
+struct drawn {
+    const json_t *node, *mesh;
+    const char *object; /* the node's name */
+    const double (*world)[4];
+};
+
+static int add_primitive(struct gltf *g, const struct drawn *d, const json_t *primitive, const char *at)
 {
-    struct part p = {.g = g, .world = world};
+    struct part p = {.g = g, .world = d->world};
     if (json_object_get(json_object_get(primitive, "attributes"), "POSITION") == NULL) {
         g->n_shapeless++;
         return SH_OK;
     }
-    int rc = gltf_pose_open(g, node, mesh, primitive, at, &p.pose);
-    if (rc == SH_OK) rc = gltf_look_open(g, object, primitive, at, &p.look);
+    int rc = gltf_pose_open(g, d->node, d->mesh, primitive, at, &p.pose);
+    if (rc == SH_OK) rc = gltf_look_open(g, d->object, primitive, at, &p.look);
     if (rc == SH_OK) rc = add_part(&p, primitive, at);
     gltf_pose_close(&p.pose);
     return rc;
@@ -198,12 +208,12 @@ int gltf_add_mesh(struct gltf *g, uint32_t node, const char *object, const gltf_
     int rc = gltf_index(g, of, "mesh", gltf_at("nodes[%u]", node).text, &number);
     if (rc == SH_OK) rc = gltf_object(g, "meshes", number, &mesh);
     const struct gltf_at at = gltf_at("meshes[%u]", number);
+    const struct drawn drawn = {of, mesh, object, world};
     const char *name = gltf_text(mesh, "name");
     if (rc == SH_OK) rc = gltf_list(g, mesh, "primitives", at.text, &primitives);
     g->b->mesh = name != NULL && *name != '\0' ? name : object;
     for (size_t i = 0; i < json_array_size(primitives) && rc == SH_OK; i++)
-        rc = add_primitive(g, of, mesh, json_array_get(primitives, i), object,
-                           gltf_at("%s.primitives[%zu]", at.text, i).text, world);
+        rc = add_primitive(g, &drawn, json_array_get(primitives, i), gltf_at("%s.primitives[%zu]", at.text, i).text);
     g->b->mesh = NULL;
     return rc;
 }

@@ -1,20 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /* EXT_meshopt_compression and KHR_meshopt_compression: buffer views that meshoptimizer has packed. */
-#include "core/import/gltf/gltf.h"
+#include "core/import/gltf/gltf_meshopt.h"
 
 #include <stdlib.h>
 #include <string.h>
 
 #include <meshoptimizer.h>
 
-struct packed {
-    struct gltf_bytes from;
-    uint64_t stride, count;
-    const char *mode, *filter;
-};
-
 /* meshoptimizer asserts the sizes that it gets, so they are checked before. */
-static bool sizes_fit(const struct packed *p)
+static bool sizes_fit(const struct gltf_packed *p)
 {
     const bool is_vertices = strcmp(p->mode, "ATTRIBUTES") == 0;
     if (is_vertices && (p->stride == 0 || p->stride % 4 != 0 || p->stride > 256)) return false;
@@ -25,7 +19,7 @@ static bool sizes_fit(const struct packed *p)
 }
 
 /* 0, or the decoder's error code for damaged data. */
-static int decode(const struct packed *p, void *out)
+static int decode(const struct gltf_packed *p, void *out)
 {
     const size_t n = (size_t)p->count, size = (size_t)p->stride;
     if (strcmp(p->mode, "TRIANGLES") == 0) return meshopt_decodeIndexBuffer(out, n, size, p->from.p, p->from.n);
@@ -45,48 +39,39 @@ static bool is_one_of(const char *text, const char *const *known)
     return false;
 }
 
-static int check(struct gltf *g, const struct packed *p, const char *at)
+static int check(struct scene_build *b, const struct gltf_packed *p, const char *at, struct sh_err *err)
 {
     static const char *const modes[] = {"ATTRIBUTES", "TRIANGLES", "INDICES", NULL}, *const filters[] = {
                                                                                          "NONE", "OCTAHEDRAL",
                                                                                          "QUATERNION", "EXPONENTIAL",
                                                                                          NULL};
     if (!is_one_of(p->mode, modes))
-        return gltf_fail(g, "%s: meshopt's mode %.40s is not known; known are ATTRIBUTES, TRIANGLES, INDICES", at,
-                         p->mode);
+        return build_fail(b, SH_EINPUT, err,
+                          "%s: meshopt's mode %.40s is not known; known are ATTRIBUTES, TRIANGLES, INDICES", at,
+                          p->mode);
     if (!is_one_of(p->filter, filters))
-        return gltf_fail(g, "%s: meshopt's filter %.40s is not known; known are OCTAHEDRAL, QUATERNION, EXPONENTIAL",
-                         at, p->filter);
-    if (!sizes_fit(p) || p->count >= GLTF_NONE)
-        return gltf_fail(g, "%s: meshopt has no %s of %llu times %llu bytes", at, p->mode, (unsigned long long)p->count,
-                         (unsigned long long)p->stride);
+        return build_fail(b, SH_EINPUT, err,
+                          "%s: meshopt's filter %.40s is not known; known are OCTAHEDRAL, QUATERNION, EXPONENTIAL", at,
+                          p->filter);
+    if (!sizes_fit(p) || p->count >= UINT32_MAX)
+        return build_fail(b, SH_EINPUT, err, "%s: meshopt has no %s of %llu times %llu bytes", at, p->mode,
+                          (unsigned long long)p->count, (unsigned long long)p->stride);
     return SH_OK;
 }
 
-int gltf_meshopt(struct gltf *g, const json_t *more, const char *at, struct gltf_kept *out)
+int gltf_meshopt(struct scene_build *b, const struct gltf_packed *packed, const char *at, void **own,
+                 struct gltf_bytes *out, struct sh_err *err)
 {
-    struct packed p = {.mode = gltf_text(more, "mode"), .filter = gltf_text(more, "filter")};
-    uint64_t offset = 0, length = 0;
-    uint32_t buffer;
-    int rc = gltf_index(g, more, "buffer", at, &buffer);
-    if (rc == SH_OK) rc = gltf_whole(g, more, "byteOffset", at, &offset);
-    if (rc == SH_OK) rc = gltf_whole(g, more, "byteLength", at, &length);
-    if (rc == SH_OK) rc = gltf_whole(g, more, "byteStride", at, &p.stride);
-    if (rc == SH_OK) rc = gltf_whole(g, more, "count", at, &p.count);
-    if (rc == SH_OK) rc = gltf_buffer(g, buffer, &p.from);
-    if (rc != SH_OK) return rc;
+    struct gltf_packed p = *packed;
     if (p.mode == NULL) p.mode = "(none)";
     if (p.filter == NULL) p.filter = "NONE";
-    if (offset > p.from.n || length > p.from.n - offset)
-        return gltf_fail(g, "%s goes beyond its buffer of %zu bytes", at, p.from.n);
-    p.from = (struct gltf_bytes){p.from.p + offset, (size_t)length};
-    rc = check(g, &p, at);
+    int rc = check(b, &p, at, err);
     if (rc != SH_OK) return rc;
-    out->own = malloc((size_t)(p.count * p.stride) + 1);
-    if (out->own == NULL) return build_fail(g->b, SH_ENOMEM, g->err, "no memory for %s", at);
-    out->bytes = (struct gltf_bytes){out->own, (size_t)(p.count * p.stride)};
-    rc = decode(&p, out->own);
-    return rc == 0
-               ? SH_OK
-               : gltf_fail(g, "%s: meshoptimizer can't decode it (%d): it is damaged, or of a newer version", at, rc);
+    *own = malloc((size_t)(p.count * p.stride) + 1);
+    if (*own == NULL) return build_fail(b, SH_ENOMEM, err, "no memory for %s", at);
+    *out = (struct gltf_bytes){*own, (size_t)(p.count * p.stride)};
+    rc = decode(&p, *own);
+    if (rc == 0) return SH_OK;
+    return build_fail(b, SH_EINPUT, err, "%s: meshoptimizer can't decode it (%d): it is damaged, or of a newer version",
+                      at, rc);
 }

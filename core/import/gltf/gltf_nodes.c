@@ -1,44 +1,17 @@
 /* SPDX-License-Identifier: MIT */
 /* The tree of nodes, in double. A node has at most one parent, and is not above itself. Other files are refused, so
  * that the walk ends. No recursion: a chain may be as long as the file. */
-#include "core/import/gltf/gltf.h"
+#include "core/import/gltf/gltf_nodes.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
-void gltf_multiply(const gltf_matrix a, const gltf_matrix b, gltf_matrix out)
-{
-    gltf_matrix m;
-    for (int i = 0; i < 3; i++)
-        for (int k = 0; k < 4; k++)
-            m[i][k] = a[i][0] * b[0][k] + a[i][1] * b[1][k] + a[i][2] * b[2][k] + (k == 3 ? a[i][3] : 0.0);
-    memcpy(out, m, sizeof m);
-}
-
-void gltf_apply(const gltf_matrix m, const double v[3], double out[3])
-{
-    const double x = v[0], y = v[1], z = v[2];
-    for (int i = 0; i < 3; i++)
-        out[i] = m[i][0] * x + m[i][1] * y + m[i][2] * z + m[i][3];
-}
-
-bool gltf_compose(const double t[3], const double r[4], const double s[3], gltf_matrix out)
-{
-    const double n2 = r[0] * r[0] + r[1] * r[1] + r[2] * r[2] + r[3] * r[3];
-    if (!(n2 > 1e-12)) return false;
-    const double k = 2.0 / n2, x = r[0], y = r[1], z = r[2], w = r[3];
-    const double turn[3][3] = {{1.0 - k * (y * y + z * z), k * (x * y - z * w), k * (x * z + y * w)},
-                               {k * (x * y + z * w), 1.0 - k * (x * x + z * z), k * (y * z - x * w)},
-                               {k * (x * z - y * w), k * (y * z + x * w), 1.0 - k * (x * x + y * y)}};
-    for (int i = 0; i < 3; i++) {
-        for (int j = 0; j < 3; j++)
-            out[i][j] = turn[i][j] * s[j];
-        out[i][3] = t[i];
-    }
-    return true;
-}
+#include "core/import/gltf/gltf.h"
+#include "core/import/gltf/gltf_accessor.h"
+#include "core/import/gltf/gltf_at.h"
+#include "core/import/gltf/gltf_extensions.h"
+#include "core/import/gltf/gltf_json.h"
+#include "core/import/gltf/gltf_mesh.h"
 
 /* Takes the file's columns; the last row is 0, 0, 0, 1 up to rounding to single precision. */
 static int take_matrix(struct gltf *g, const double in[16], const char *at, gltf_matrix out)
@@ -55,12 +28,11 @@ static int take_matrix(struct gltf *g, const double in[16], const char *at, gltf
 static int read_local(struct gltf *g, const json_t *node, const char *at, gltf_matrix out)
 {
     double m[16], t[3] = {0, 0, 0}, r[4] = {0, 0, 0, 1}, s[3] = {1, 1, 1};
-    bool has_matrix;
-    int rc = gltf_numbers(g, node, "matrix", at, 16, m, &has_matrix);
-    if (rc == SH_OK && has_matrix) return take_matrix(g, m, at, out);
-    if (rc == SH_OK) rc = gltf_numbers(g, node, "translation", at, 3, t, NULL);
-    if (rc == SH_OK) rc = gltf_numbers(g, node, "rotation", at, 4, r, NULL);
-    if (rc == SH_OK) rc = gltf_numbers(g, node, "scale", at, 3, s, NULL);
+    int rc = gltf_numbers(g, node, "matrix", at, 16, m);
+    if (rc == SH_OK && json_object_get(node, "matrix") != NULL) return take_matrix(g, m, at, out);
+    if (rc == SH_OK) rc = gltf_numbers(g, node, "translation", at, 3, t);
+    if (rc == SH_OK) rc = gltf_numbers(g, node, "rotation", at, 4, r);
+    if (rc == SH_OK) rc = gltf_numbers(g, node, "scale", at, 3, s);
     if (rc == SH_OK && !gltf_compose(t, r, s, out)) rc = gltf_fail(g, "%s.rotation is 0 0 0 0, which is none", at);
     return rc;
 }

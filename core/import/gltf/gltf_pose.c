@@ -5,12 +5,15 @@
  *   p     = POSITION + sum of weight * target.POSITION
  *   joint = world of the joint's node * inverse bind matrix
  *   p'    = sum of weight * joint * p         the node of a mesh with a skin moves nothing */
-#include "core/import/gltf/gltf.h"
+#include "core/import/gltf/gltf_pose.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
+
+#include "core/import/gltf/gltf.h"
+#include "core/import/gltf/gltf_at.h"
+#include "core/import/gltf/gltf_json.h"
+#include "core/import/gltf/gltf_nodes.h"
 
 /* ---- morph targets */
 

@@ -7,7 +7,13 @@
 #include <sys/stat.h>
 
 #include "core/import/gltf/gltf.h"
-#include "core/import/import.h"
+#include "core/import/gltf/gltf_extensions.h"
+#include "core/import/gltf/gltf_file.h"
+#include "core/import/gltf/gltf_indices.h"
+#include "core/import/gltf/gltf_json.h"
+#include "core/import/gltf/gltf_material.h"
+#include "core/import/gltf/gltf_nodes.h"
+#include "core/import/import_assimp.h"
 
 bool gltf_is_name(const char *file)
 {
@@ -20,7 +26,7 @@ static void say_counts(const struct gltf *g)
 {
     const struct sh_report *report = g->b->report;
     const char *name = g->b->name;
-    gltf_say_indices(g);
+    gltf_say_indices(g->b, g->root);
     if (g->n_hidden > 0)
         sh_warn(report, "%s: %u nodes are hidden (KHR_node_visibility), and left out with what is below them", name,
                 g->n_hidden);
@@ -73,13 +79,21 @@ static int say_what_to_do(int rc, struct sh_err *err)
     return sh_fail(err, rc, "%.440s: export it again, or convert it to .obj or .ply", said.text);
 }
 
+static int check_extensions(struct gltf *g)
+{
+    json_t *required, *used;
+    int rc = gltf_list(g, g->root, "extensionsRequired", "", &required);
+    if (rc == SH_OK) rc = gltf_list(g, g->root, "extensionsUsed", "", &used);
+    return rc == SH_OK ? gltf_check_extensions(g->b, g->root, &g->by_assimp, g->err) : rc;
+}
+
 int import_gltf(struct scene_build *b, struct sh_err *err)
 {
     struct gltf g = {.b = b, .err = err};
     struct stat st;
     if (stat(b->spec->file, &st) == 0 && st.st_size > 8 << 20) build_announce(b);
     int rc = gltf_open(&g);
-    if (rc == SH_OK && !g.by_assimp) rc = gltf_check_extensions(&g);
+    if (rc == SH_OK && !g.by_assimp) rc = check_extensions(&g);
     const bool by_assimp = g.by_assimp;
     if (rc == SH_OK && !by_assimp) rc = read_scene(&g);
     gltf_close(&g);

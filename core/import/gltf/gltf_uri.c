@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* URIs of glTF: data within them (RFC 2397), and relative names of files (RFC 3986). */
-#include "core/import/gltf/gltf.h"
+#include "core/import/gltf/gltf_uri.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -62,15 +62,17 @@ static const char *decode_base64(const char *in, uint8_t *out, size_t *n)
     return NULL;
 }
 
-int gltf_uri_data(struct gltf *g, const char *uri, const char *at, void **own, struct gltf_bytes *out)
+int gltf_uri_data(struct scene_build *b, const char *uri, const char *at, void **own, struct gltf_bytes *out,
+                  struct sh_err *err)
 {
     const char *comma = strchr(uri, ','), *wrong;
     if (comma == NULL || comma - uri < 7 || strncasecmp(comma - 7, ";base64", 7) != 0)
-        return gltf_fail(g, "%s.uri has data that are not base64", at);
+        return build_fail(b, SH_EINPUT, err, "%s.uri has data that are not base64", at);
     uint8_t *data = malloc(strlen(comma) + 1);
-    if (data == NULL) return build_fail(g->b, SH_ENOMEM, g->err, "no memory for %s", at);
+    if (data == NULL) return build_fail(b, SH_ENOMEM, err, "no memory for %s", at);
     *own = data;
     wrong = decode_base64(comma + 1, data, &out->n);
     out->p = data;
-    return wrong == NULL ? SH_OK : gltf_fail(g, "%s.uri: byte %td is none of base64", at, wrong - uri);
+    if (wrong == NULL) return SH_OK;
+    return build_fail(b, SH_EINPUT, err, "%s.uri: byte %td is none of base64", at, wrong - uri);
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The two readers, each a program of node in a process of its own (core/import/import.h). */
+/* The two readers, each a program of node in a process of its own (core/import/import_apart.h). */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -7,7 +7,7 @@
 #include <unistd.h>
 
 #include "core/import/ifc/ifc_read.h"
-#include "core/import/import.h"
+#include "core/import/import_apart.h"
 
 enum { PATH_LEN = 1024 };
 

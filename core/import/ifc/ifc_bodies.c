@@ -91,7 +91,6 @@ static int read_product(struct reading *r)
     struct ifc_body *body = &r->b->body[r->b->n++];
     *body = (struct ifc_body){.id = head.id,
                               .type = {text, (size_t)(line - text)},
-                              .failure = {line + 1, head.n_text - (size_t)(line + 1 - text)},
                               .n_failures = head.n_failures,
                               .first = r->b->n_parts,
                               .n_parts = head.n_parts};

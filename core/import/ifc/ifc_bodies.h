@@ -27,7 +27,7 @@ struct ifc_figures {
 
 struct ifc_body {
     uint64_t id;
-    struct text_span type, failure; /* as a reader writes the type, in mixed case; its first failure, n 0: none */
+    struct text_span type; /* as a reader writes it, in mixed case */
     uint32_t n_failures;
     size_t first, n_parts; /* in part */
     struct ifc_figures figures;

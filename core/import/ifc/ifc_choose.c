@@ -3,6 +3,8 @@
 
 #include <math.h>
 
+#include "core/import/ifc/ifc_product.h"
+
 /* Facets of curves explain this much of an area or a volume: 24 sides for a circle lack 1.1 % of its area, and half the
  * sides in each direction of a sphere twice that. Without curves, only rounding is allowed. */
 #define CURVED_SHARE     0.03

@@ -4,7 +4,8 @@
 #define CORE_IMPORT_IFC_IFC_CHOOSE_H
 
 #include "core/import/ifc/ifc_bodies.h"
-#include "core/import/ifc/ifc_records.h"
+
+struct ifc_product;
 
 enum ifc_source { IFC_NONE, IFC_WEB, IFC_LITE };
 

@@ -6,7 +6,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/import/import.h"
+#include "core/import/ifc/ifc_records.h"
+#include "core/import/ifc/ifc_styles.h"
+#include "core/import/readers.h"
+#include "core/scene/build_surfaces.h"
 
 enum { LEAST_SEGMENTS = 24, MOST_SEGMENTS = 360 };
 #define FAR_LEVEL_SEGMENTS 48 /* from here on ifc-lite, too, is asked for finer facets */

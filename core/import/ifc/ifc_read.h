@@ -5,8 +5,9 @@
 
 #include "core/import/ifc/ifc_bodies.h"
 #include "core/import/ifc/ifc_choose.h"
-#include "core/import/ifc/ifc_records.h"
 #include "core/scene/build.h"
+
+struct ifc_records;
 
 /* ---- ifc_apart.c */
 

@@ -5,27 +5,13 @@
 #include <string.h>
 
 #include "core/grow.h"
+#include "core/import/ifc/ifc_styles.h"
+#include "core/import/ifc/ifc_text.h"
+#include "core/import/ifc/ifc_unit.h"
+#include "core/import/ifc/ifc_walk.h"
 
 /* Attributes of an IfcProduct: GlobalId, OwnerHistory, Name, Description, ObjectType, ObjectPlacement, Representation. */
 enum { PRODUCT_GUID = 0, PRODUCT_NAME = 2, PRODUCT_PLACEMENT = 5, PRODUCT_SHAPE = 6, PRODUCT_ARGS = 7 };
-
-static int compare_records(const void *a, const void *b)
-{
-    const struct step_record *x = a, *y = b;
-    return (x->id > y->id) - (x->id < y->id);
-}
-
-const struct step_record *ifc_records_find(const struct ifc_records *r, uint64_t id)
-{
-    const struct step_record key = {.id = id};
-    return r->n > 0 ? bsearch(&key, r->record, r->n, sizeof key, compare_records) : NULL;
-}
-
-int ifc_records_fail(const struct ifc_records *r, const struct step_record *at, struct sh_err *err, const char *what)
-{
-    return text_fail(&r->text, at->line, SH_EINPUT, err, "%.*s #%llu: %s", (int)at->type.n, at->type.p,
-                     (unsigned long long)at->id, what);
-}
 
 static int compare_products(const void *a, const void *b)
 {
@@ -39,79 +25,9 @@ const struct ifc_product *ifc_records_product(const struct ifc_records *r, uint6
     return r->n_products > 0 ? bsearch(&key, r->product, r->n_products, sizeof key, compare_products) : NULL;
 }
 
-size_t ifc_first(const void *list, size_t n, size_t size, uint64_t id)
-{
-    size_t low = 0, high = n;
-    while (low < high) {
-        const size_t middle = (low + high) / 2;
-        uint64_t at;
-        memcpy(&at, (const char *)list + middle * size, sizeof at);
-        if (at < id)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    return low;
-}
-
 static int no_memory(const struct ifc_records *r, struct sh_err *err)
 {
-    return text_fail(&r->text, 0, SH_ENOMEM, err, "no memory for its records");
-}
-
-static int read_all(struct ifc_records *r, struct sh_err *err)
-{
-    struct step_record record;
-    bool sorted = true;
-    int rc;
-    while ((rc = step_next(&r->text, &record, err)) == 1) {
-        if (!grow(&r->record, &r->room, r->n + 1, sizeof *r->record)) return no_memory(r, err);
-        sorted = sorted && (r->n == 0 || r->record[r->n - 1].id < record.id);
-        r->record[r->n++] = record;
-    }
-    if (rc < 0) return rc;
-    if (!sorted) qsort(r->record, r->n, sizeof *r->record, compare_records);
-    for (size_t i = 1; i < r->n; i++)
-        if (r->record[i].id == r->record[i - 1].id)
-            return text_fail(&r->text, r->record[i].line, SH_EINPUT, err, "a second record #%llu; allowed one",
-                             (unsigned long long)r->record[i].id);
-    return SH_OK;
-}
-
-static int check_end(const struct ifc_records *r, struct sh_err *err)
-{
-    static const char last[] = "END-ISO-10303-21;";
-    const size_t tail = r->text.size < 1024 ? r->text.size : 1024;
-    if (memmem(r->text.data + r->text.size - tail, tail, last, sizeof last - 1) != NULL) return SH_OK;
-    return text_fail(&r->text, 0, SH_EINPUT, err, "cut off: it doesn't end with %s", last);
-}
-
-uint64_t ifc_next_reference(const char **p, const char *end)
-{
-    for (int quoted = 0; *p < end; (*p)++) {
-        if (**p == '\'') quoted = !quoted;
-        if (quoted || **p != '#') continue;
-        uint64_t id = 0;
-        while (*p + 1 < end && (*p)[1] >= '0' && (*p)[1] <= '9' && id < UINT64_MAX / 20)
-            id = 10 * id + (uint64_t)(*++*p - '0');
-        ++*p;
-        return id;
-    }
-    return 0;
-}
-
-static int check_references(const struct ifc_records *r, struct sh_err *err)
-{
-    for (size_t i = 0; i < r->n; i++) {
-        const struct step_record *from = &r->record[i];
-        const char *p = from->args.p, *end = p + from->args.n;
-        for (uint64_t id; (id = ifc_next_reference(&p, end)) != 0;)
-            if (ifc_records_find(r, id) == NULL)
-                return text_fail(&r->text, from->line, SH_EINPUT, err,
-                                 "%.*s #%llu refers to #%llu, but there is no such record", (int)from->type.n,
-                                 from->type.p, (unsigned long long)from->id, (unsigned long long)id);
-    }
-    return SH_OK;
+    return text_fail(&r->index.text, 0, SH_ENOMEM, err, "no memory for its records");
 }
 
 /* Types without a surface: air, drawings, and connections. */
@@ -134,12 +50,12 @@ static int check_placement(struct ifc_records *r, const struct ifc_product *p, s
     const uint32_t own = ++r->stamp;
     uint64_t id;
     while (step_reference(placement, &id)) {
-        const struct step_record *at = ifc_records_find(r, id);
+        const struct step_record *at = ifc_index_find(&r->index, id);
         if (at == NULL || !text_is(at->type, "IFCLOCALPLACEMENT") || step_split(at->args, &placement, 1) < 1)
             return SH_OK;
-        uint32_t *mark = &r->mark[at - r->record];
+        uint32_t *mark = &r->mark[at - r->index.record];
         if (*mark == own)
-            return text_fail(&r->text, at->line, SH_EINPUT, err,
+            return text_fail(&r->index.text, at->line, SH_EINPUT, err,
                              "IFCLOCALPLACEMENT #%llu is relative to itself, so %.*s '%.40s' %.22s has no place",
                              (unsigned long long)at->id, (int)(p->type.n < 48 ? p->type.n : 48), p->type.p, p->name,
                              p->guid);
@@ -157,7 +73,7 @@ static int add_product(struct ifc_records *r, const struct step_record *record, 
     if (record->args.n < 2 || record->args.p[0] != '\'' || step_split(record->args, arg, PRODUCT_ARGS) < PRODUCT_ARGS ||
         !step_reference(arg[PRODUCT_SHAPE], &shape))
         return SH_OK;
-    const struct step_record *to = ifc_records_find(r, shape);
+    const struct step_record *to = ifc_index_find(&r->index, shape);
     if (to != NULL && !text_is(to->type, "IFCPRODUCTDEFINITIONSHAPE") && !text_is(to->type, "IFCPRODUCTREPRESENTATION"))
         return SH_OK;
     if (!grow(&r->product, &r->room_products, r->n_products + 1, sizeof *r->product)) return no_memory(r, err);
@@ -172,24 +88,16 @@ static int add_product(struct ifc_records *r, const struct step_record *record, 
     return check_placement(r, p, arg[PRODUCT_PLACEMENT], err);
 }
 
-int ifc_records_index(struct ifc_records *r, const char *path, struct sh_err *err)
-{
-    *r = (struct ifc_records){.unit_m = 1.0};
-    int rc = step_open(&r->text, path, err);
-    if (rc == SH_OK) rc = check_end(r, err);
-    if (rc == SH_OK) rc = read_all(r, err);
-    return rc == SH_OK ? check_references(r, err) : rc;
-}
-
 int ifc_records_open(struct ifc_records *r, const char *path, struct sh_err *err)
 {
-    int rc = ifc_records_index(r, path, err);
+    *r = (struct ifc_records){.unit_m = 1.0};
+    int rc = ifc_index_open(&r->index, path, err);
     if (rc != SH_OK) return rc;
-    if (ifc_unit_find(r, &r->unit_m, &r->no_unit) != SH_OK) r->unit_m = 1.0;
-    r->mark = calloc(r->n + 1, sizeof *r->mark);
+    if (ifc_unit_find(&r->index, &r->unit_m, &r->no_unit) != SH_OK) r->unit_m = 1.0;
+    r->mark = calloc(r->index.n + 1, sizeof *r->mark);
     if (r->mark == NULL) return no_memory(r, err);
-    for (size_t i = 0; i < r->n && rc == SH_OK; i++)
-        rc = add_product(r, &r->record[i], err);
+    for (size_t i = 0; i < r->index.n && rc == SH_OK; i++)
+        rc = add_product(r, &r->index.record[i], err);
     if (rc == SH_OK) rc = ifc_styles_collect(r, err);
     return rc == SH_OK ? ifc_walk(r, err) : rc;
 }
@@ -203,10 +111,9 @@ void ifc_records_close(struct ifc_records *r)
         free(p->name);
     }
     free(r->product);
-    free(r->record);
     free(r->mark);
     for (size_t i = 0; i < r->n_styles; i++)
         free(r->style[i].name);
     free(r->style);
-    text_close(&r->text);
+    ifc_index_close(&r->index);
 }

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/import/ifc/ifc_read.h"
+#include "core/import/ifc/ifc_records.h"
 
 enum { MAX_NAMED = 100, LINE_ROOM = 420 };
 

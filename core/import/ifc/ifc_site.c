@@ -7,7 +7,9 @@
 #include <string.h>
 
 #include "core/angle.h"
-#include "core/import/ifc/ifc_records.h"
+#include "core/import/ifc/ifc_index.h"
+#include "core/import/ifc/ifc_text.h"
+#include "core/import/ifc/ifc_unit.h"
 #include "core/import/ifc/step.h"
 
 /* Places of attributes in a record, IFC2x3 TC1 and IFC4 ADD2. */
@@ -19,7 +21,7 @@ enum { CRS_NAME = 0, CRS_UNIT = 6, CRS_ARGS = 7 };
 static const char ADVICE[] = "an anchor of source explicit needs none of this";
 
 struct reader {
-    struct ifc_records records;
+    struct ifc_index index;
     struct step_record site, context, map;
     int n_sites, n_contexts, n_maps, is_model;
     struct sh_err *err;
@@ -29,7 +31,7 @@ static int fail(struct reader *r, const struct step_record *at, const char *what
 {
     char text[256];
     snprintf(text, sizeof text, "%.190s; %s", what, ADVICE);
-    return ifc_records_fail(&r->records, at, r->err, text);
+    return ifc_index_fail(&r->index, at, r->err, text);
 }
 
 /* Adds advice to the error of a unit. */
@@ -77,10 +79,10 @@ static int take_record(struct reader *r, const struct step_record *record)
 static int collect(struct reader *r)
 {
     int rc = SH_OK;
-    for (size_t i = 0; i < r->records.n && rc == SH_OK; i++)
-        rc = take_record(r, &r->records.record[i]);
+    for (size_t i = 0; i < r->index.n && rc == SH_OK; i++)
+        rc = take_record(r, &r->index.record[i]);
     if (rc == SH_OK && r->n_sites == 0 && r->n_maps == 0)
-        return text_fail(&r->records.text, 0, SH_EINPUT, r->err,
+        return text_fail(&r->index.text, 0, SH_EINPUT, r->err,
                          "no IFCMAPCONVERSION, and no IFCSITE with RefLatitude and RefLongitude; %s", ADVICE);
     return rc;
 }
@@ -100,7 +102,7 @@ static int follow(struct reader *r, const struct step_record *from, struct text_
     char what[96];
     snprintf(what, sizeof what, "no reference to %s where one is needed", type);
     if (!step_reference(ref, &id)) return fail(r, from, what);
-    const struct step_record *record = ifc_records_find(&r->records, id);
+    const struct step_record *record = ifc_index_find(&r->index, id);
     if (record == NULL || !text_is(record->type, type)) return fail(r, from, what);
     to->record = *record;
     if (step_split(to->record.args, to->arg, STEP_MAX_ARGS) < n) return fail(r, &to->record, "attributes are missing");
@@ -141,7 +143,7 @@ static int read_numbers(struct reader *r, const struct step_record *at, struct t
     size_t n = step_list(span, &list) ? step_split(list, part, 3) : 0;
     if (n < min || n > max) return fail(r, at, "not the numbers that are needed");
     for (size_t i = 0; i < n; i++)
-        if (!step_real(&r->records.text, part[i], &value[i])) return fail(r, at, "a coordinate that is not a number");
+        if (!step_real(&r->index.text, part[i], &value[i])) return fail(r, at, "a coordinate that is not a number");
     return SH_OK;
 }
 
@@ -199,7 +201,6 @@ static int read_north(struct reader *r, struct ifc_site *site)
     if (rc != SH_OK) return rc;
     if (!(hypot(north[0], north[1]) > 1e-9)) return fail(r, &direction.record, "a true north without a direction");
     site->north_deg = angle_deg(atan2(north[0], north[1]));
-    site->has_north = 1;
     return SH_OK;
 }
 
@@ -230,7 +231,7 @@ static int read_map_unit(struct reader *r, const struct found *crs, double scale
 {
     uint64_t id;
     if (step_reference(crs->arg[CRS_UNIT], &id)) {
-        int rc = advise(r, ifc_unit_of(&r->records, ifc_records_find(&r->records, id), m, r->err));
+        int rc = advise(r, ifc_unit_of(&r->index, ifc_index_find(&r->index, id), m, r->err));
         return rc == SH_OK ? check_scale(r, scale, model_m / *m) : rc;
     }
     *m = known_unit_m(model_m / scale, model_m);
@@ -246,7 +247,7 @@ static int read_number(struct reader *r, struct text_span arg, int which, double
     char what[64];
     *value = which == MAP_HEIGHT ? NAN : which == MAP_ORDINATE ? 0.0 : 1.0;
     if (text_is(arg, "$") && which > MAP_NORTHING) return SH_OK;
-    if (step_real(&r->records.text, arg, value)) return SH_OK;
+    if (step_real(&r->index.text, arg, value)) return SH_OK;
     snprintf(what, sizeof what, "%s is missing, or is no number", name[which]);
     return fail(r, &r->map, what);
 }
@@ -254,7 +255,7 @@ static int read_number(struct reader *r, struct text_span arg, int which, double
 static int read_map_name(struct reader *r, const struct found *crs, struct ifc_map *map)
 {
     char *name = ifc_text(crs->arg[CRS_NAME]);
-    if (name == NULL) return text_fail(&r->records.text, 0, SH_ENOMEM, r->err, "no memory for a name");
+    if (name == NULL) return text_fail(&r->index.text, 0, SH_ENOMEM, r->err, "no memory for a name");
     const size_t n = strlen(name);
     if (n > 0 && n < sizeof map->crs) memcpy(map->crs, name, n + 1);
     free(name);
@@ -295,7 +296,7 @@ static int read_site(struct reader *r, double unit_m, struct ifc_site *site)
     if (rc == SH_OK) rc = read_angle(r, arg[SITE_LONGITUDE], "RefLongitude", 180.0, &site->lon_deg);
     if (rc == SH_OK) rc = read_origin(r, arg[SITE_PLACEMENT], unit_m, site->origin_m);
     if (rc != SH_OK) return rc;
-    if (!text_is(arg[SITE_ELEVATION], "$") && !step_real(&r->records.text, arg[SITE_ELEVATION], &site->elevation_m))
+    if (!text_is(arg[SITE_ELEVATION], "$") && !step_real(&r->index.text, arg[SITE_ELEVATION], &site->elevation_m))
         return fail(r, &r->site, "RefElevation is not a number");
     site->elevation_m *= unit_m;
     return SH_OK;
@@ -306,14 +307,14 @@ int ifc_site_read(const char *path, struct ifc_site *site, struct sh_err *err)
     struct reader r = {.err = err};
     double unit_m = 1.0;
     *site = (struct ifc_site){.elevation_m = NAN};
-    int rc = ifc_records_index(&r.records, path, err);
+    int rc = ifc_index_open(&r.index, path, err);
     if (rc == SH_OK) rc = collect(&r);
-    if (rc == SH_OK) rc = advise(&r, ifc_unit_find(&r.records, &unit_m, err));
+    if (rc == SH_OK) rc = advise(&r, ifc_unit_find(&r.index, &unit_m, err));
     if (rc == SH_OK && r.n_sites > 0) rc = read_site(&r, unit_m, site);
     if (rc == SH_OK) rc = read_north(&r, site);
     if (rc == SH_OK && r.n_maps > 0) rc = read_map(&r, unit_m, &site->map);
     site->has_place = r.n_sites > 0;
     site->has_map = r.n_maps > 0;
-    ifc_records_close(&r.records);
+    ifc_index_close(&r.index);
     return rc;
 }

@@ -1,12 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /* Styles of surfaces: IfcStyledItem, and the records that it refers to. Readers of bodies give colours; the names are
  * only here. */
+#include "core/import/ifc/ifc_styles.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/grow.h"
 #include "core/import/ifc/ifc_records.h"
+#include "core/import/ifc/ifc_text.h"
 
 enum { MAX_DEPTH = 4 };
 #define SAME_COLOUR 0.004f /* a reader may have rounded to 8 bits */
@@ -18,10 +21,10 @@ static bool read_colour(const struct ifc_records *r, const struct step_record *s
     uint64_t id;
     double part;
     if (step_split(shading->args, arg, 1) < 1 || !step_reference(arg[0], &id)) return false;
-    const struct step_record *rgb = ifc_records_find(r, id);
+    const struct step_record *rgb = ifc_index_find(&r->index, id);
     if (rgb == NULL || !text_is(rgb->type, "IFCCOLOURRGB") || step_split(rgb->args, arg, 4) != 4) return false;
     for (int k = 0; k < 3; k++) {
-        if (!step_real(&r->text, arg[1 + k], &part)) return false;
+        if (!step_real(&r->index.text, arg[1 + k], &part)) return false;
         colour[k] = (float)fmin(fmax(part, 0.0), 1.0);
     }
     return true;
@@ -32,7 +35,7 @@ static float read_clear(const struct ifc_records *r, const struct step_record *s
 {
     struct text_span arg[2];
     double share;
-    if (step_split(shading->args, arg, 2) < 2 || !step_real(&r->text, arg[1], &share)) return 0.0f;
+    if (step_split(shading->args, arg, 2) < 2 || !step_real(&r->index.text, arg[1], &share)) return 0.0f;
     return (float)fmin(fmax(share, 0.0), 1.0);
 }
 
@@ -44,7 +47,7 @@ static bool add_style(struct ifc_records *r, uint64_t item, const struct step_re
     bool has_colour = false;
     const char *p = surface_style->args.p, *end = p + surface_style->args.n;
     for (uint64_t id; !has_colour && (id = ifc_next_reference(&p, end)) != 0;) {
-        const struct step_record *to = ifc_records_find(r, id);
+        const struct step_record *to = ifc_index_find(&r->index, id);
         if (to == NULL) continue;
         if (text_is(to->type, "IFCSURFACESTYLERENDERING") || text_is(to->type, "IFCSURFACESTYLESHADING"))
             has_colour = read_colour(r, to, style.colour);
@@ -64,7 +67,7 @@ static bool collect_from(struct ifc_records *r, uint64_t item, const struct step
     bool done = true;
     const char *p = from->args.p, *end = p + from->args.n;
     for (uint64_t id; done && (id = ifc_next_reference(&p, end)) != 0;) {
-        const struct step_record *to = id != item ? ifc_records_find(r, id) : NULL;
+        const struct step_record *to = id != item ? ifc_index_find(&r->index, id) : NULL;
         if (to == NULL) continue;
         if (text_is(to->type, "IFCSURFACESTYLE"))
             done = add_style(r, item, to);
@@ -83,14 +86,15 @@ static int compare_styles(const void *a, const void *b)
 int ifc_styles_collect(struct ifc_records *r, struct sh_err *err)
 {
     bool done = true;
-    for (size_t i = 0; i < r->n && done; i++) {
+    for (size_t i = 0; i < r->index.n && done; i++) {
         struct text_span arg[1];
         uint64_t item = 0;
-        if (!text_is(r->record[i].type, "IFCSTYLEDITEM") || step_split(r->record[i].args, arg, 1) < 1) continue;
+        if (!text_is(r->index.record[i].type, "IFCSTYLEDITEM") || step_split(r->index.record[i].args, arg, 1) < 1)
+            continue;
         if (!step_reference(arg[0], &item)) item = 0;
-        done = collect_from(r, item, &r->record[i], 0);
+        done = collect_from(r, item, &r->index.record[i], 0);
     }
-    if (!done) return text_fail(&r->text, 0, SH_ENOMEM, err, "no memory for its styles");
+    if (!done) return text_fail(&r->index.text, 0, SH_ENOMEM, err, "no memory for its styles");
     if (r->n_styles > 0) qsort(r->style, r->n_styles, sizeof *r->style, compare_styles);
     return SH_OK;
 }

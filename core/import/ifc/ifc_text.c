@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* Texts of STEP files (ISO 10303-21, 6.4.3) as UTF-8. */
+#include "core/import/ifc/ifc_text.h"
+
 #include <stdlib.h>
 #include <string.h>
-
-#include "core/import/ifc/ifc_records.h"
 
 static int hex(const char *p, const char *end, int digits, uint32_t *value)
 {

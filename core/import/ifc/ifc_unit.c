@@ -1,22 +1,22 @@
 /* SPDX-License-Identifier: MIT */
 /* The unit of length of an IFC file's project. Readers of bodies apply it themselves; here it scales figures of the
  * records, and those of an anchor. */
+#include "core/import/ifc/ifc_unit.h"
+
 #include <math.h>
 #include <string.h>
-
-#include "core/import/ifc/ifc_records.h"
 
 enum { PROJECT_UNITS = 8, PROJECT_ARGS = 9, SI_ARGS = 4 };
 
 /* The record that an attribute refers to, if it is of this type. */
-static const struct step_record *follow(const struct ifc_records *r, struct text_span ref, const char *type)
+static const struct step_record *follow(const struct ifc_index *x, struct text_span ref, const char *type)
 {
     uint64_t id;
-    const struct step_record *to = step_reference(ref, &id) ? ifc_records_find(r, id) : NULL;
+    const struct step_record *to = step_reference(ref, &id) ? ifc_index_find(x, id) : NULL;
     return to != NULL && text_is(to->type, type) ? to : NULL;
 }
 
-static int read_si(const struct ifc_records *r, const struct step_record *unit, double *m, struct sh_err *err)
+static int read_si(const struct ifc_index *x, const struct step_record *unit, double *m, struct sh_err *err)
 {
     static const struct {
         const char *name;
@@ -25,33 +25,32 @@ static int read_si(const struct ifc_records *r, const struct step_record *unit, 
                  {".MICRO.", 1e-6}, {".KILO.", 1e3},   {".DECA.", 10.0},  {".HECTO.", 100.0}};
     struct text_span of[SI_ARGS];
     if (step_split(unit->args, of, SI_ARGS) != SI_ARGS)
-        return ifc_records_fail(r, unit, err, "not the 4 attributes that IFC defines");
+        return ifc_index_fail(x, unit, err, "not the 4 attributes that IFC defines");
     for (size_t i = 0; i < sizeof known / sizeof known[0]; i++)
         if (text_is(of[2], known[i].name)) {
             *m = known[i].m;
             return SH_OK;
         }
-    return ifc_records_fail(r, unit, err, "a length unit with an unknown prefix");
+    return ifc_index_fail(x, unit, err, "a length unit with an unknown prefix");
 }
 
 /* IFCCONVERSIONBASEDUNIT(dimensions, .LENGTHUNIT., name, #IFCMEASUREWITHUNIT(measure(x), #unit)), as of feet. */
-static int read_converted(const struct ifc_records *r, const struct step_record *unit, struct text_span ref, double *m,
+static int read_converted(const struct ifc_index *x, const struct step_record *unit, struct text_span ref, double *m,
                           struct sh_err *err)
 {
-    const struct step_record *measure = follow(r, ref, "IFCMEASUREWITHUNIT");
+    const struct step_record *measure = follow(x, ref, "IFCMEASUREWITHUNIT");
     struct text_span arg[2], list;
     double factor;
-    if (measure == NULL)
-        return ifc_records_fail(r, unit, err, "no reference to IFCMEASUREWITHUNIT where one is needed");
-    if (step_split(measure->args, arg, 2) != 2) return ifc_records_fail(r, measure, err, "attributes are missing");
-    const struct step_record *si = follow(r, arg[1], "IFCSIUNIT");
-    if (si == NULL) return ifc_records_fail(r, measure, err, "no reference to IFCSIUNIT where one is needed");
+    if (measure == NULL) return ifc_index_fail(x, unit, err, "no reference to IFCMEASUREWITHUNIT where one is needed");
+    if (step_split(measure->args, arg, 2) != 2) return ifc_index_fail(x, measure, err, "attributes are missing");
+    const struct step_record *si = follow(x, arg[1], "IFCSIUNIT");
+    if (si == NULL) return ifc_index_fail(x, measure, err, "no reference to IFCSIUNIT where one is needed");
     const char *open = memchr(arg[0].p, '(', arg[0].n);
     const size_t skip = open != NULL ? (size_t)(open - arg[0].p) : 0;
     if (!step_list((struct text_span){arg[0].p + skip, arg[0].n - skip}, &list) ||
-        !step_real(&r->text, list, &factor) || factor <= 0.0)
-        return ifc_records_fail(r, measure, err, "no factor of a length unit");
-    int rc = read_si(r, si, m, err);
+        !step_real(&x->text, list, &factor) || factor <= 0.0)
+        return ifc_index_fail(x, measure, err, "no factor of a length unit");
+    int rc = read_si(x, si, m, err);
     *m *= factor;
     return rc;
 }
@@ -62,38 +61,38 @@ static bool is_length(const struct step_record *unit, struct text_span of[SI_ARG
            (text_is(unit->type, "IFCSIUNIT") || text_is(unit->type, "IFCCONVERSIONBASEDUNIT"));
 }
 
-int ifc_unit_of(const struct ifc_records *r, const struct step_record *unit, double *m, struct sh_err *err)
+int ifc_unit_of(const struct ifc_index *x, const struct step_record *unit, double *m, struct sh_err *err)
 {
     struct text_span of[SI_ARGS];
-    if (!is_length(unit, of)) return ifc_records_fail(r, unit, err, "no unit of length where one is needed");
-    return text_is(unit->type, "IFCSIUNIT") ? read_si(r, unit, m, err) : read_converted(r, unit, of[3], m, err);
+    if (!is_length(unit, of)) return ifc_index_fail(x, unit, err, "no unit of length where one is needed");
+    return text_is(unit->type, "IFCSIUNIT") ? read_si(x, unit, m, err) : read_converted(x, unit, of[3], m, err);
 }
 
-static int find_project(const struct ifc_records *r, const struct step_record **out, struct sh_err *err)
+static int find_project(const struct ifc_index *x, const struct step_record **out, struct sh_err *err)
 {
     int n = 0;
-    for (size_t i = 0; i < r->n; i++) {
-        if (!text_is(r->record[i].type, "IFCPROJECT")) continue;
-        *out = &r->record[i];
+    for (size_t i = 0; i < x->n; i++) {
+        if (!text_is(x->record[i].type, "IFCPROJECT")) continue;
+        *out = &x->record[i];
         n++;
     }
-    return n == 1 ? SH_OK : text_fail(&r->text, 0, SH_EINPUT, err, "%d IFCPROJECT records; allowed one", n);
+    return n == 1 ? SH_OK : text_fail(&x->text, 0, SH_EINPUT, err, "%d IFCPROJECT records; allowed one", n);
 }
 
-int ifc_unit_find(const struct ifc_records *r, double *m, struct sh_err *err)
+int ifc_unit_find(const struct ifc_index *x, double *m, struct sh_err *err)
 {
     struct text_span arg[PROJECT_ARGS], of[SI_ARGS];
     const struct step_record *project = NULL;
-    int rc = find_project(r, &project, err);
+    int rc = find_project(x, &project, err);
     if (rc != SH_OK) return rc;
     if (step_split(project->args, arg, PROJECT_ARGS) != PROJECT_ARGS)
-        return ifc_records_fail(r, project, err, "not the 9 attributes that IFC defines");
-    const struct step_record *units = follow(r, arg[PROJECT_UNITS], "IFCUNITASSIGNMENT");
-    if (units == NULL) return ifc_records_fail(r, project, err, "no unit of length: it names no IFCUNITASSIGNMENT");
+        return ifc_index_fail(x, project, err, "not the 9 attributes that IFC defines");
+    const struct step_record *units = follow(x, arg[PROJECT_UNITS], "IFCUNITASSIGNMENT");
+    if (units == NULL) return ifc_index_fail(x, project, err, "no unit of length: it names no IFCUNITASSIGNMENT");
     const char *p = units->args.p, *end = p + units->args.n;
     for (uint64_t id; (id = ifc_next_reference(&p, end)) != 0;) {
-        const struct step_record *unit = ifc_records_find(r, id);
-        if (unit != NULL && is_length(unit, of)) return ifc_unit_of(r, unit, m, err);
+        const struct step_record *unit = ifc_index_find(x, id);
+        if (unit != NULL && is_length(unit, of)) return ifc_unit_of(x, unit, m, err);
     }
-    return ifc_records_fail(r, units, err, "no unit of length");
+    return ifc_index_fail(x, units, err, "no unit of length");
 }

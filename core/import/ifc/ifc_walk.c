@@ -1,12 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /* Finds the entities in the geometry of each product. It walks through the product's shape, and those of its
  * openings, from record to record. */
+#include "core/import/ifc/ifc_walk.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/grow.h"
 #include "core/import/ifc/ifc_records.h"
+#include "core/import/ifc/ifc_styles.h"
 
 #define FAR_M 1000.0
 
@@ -112,8 +115,8 @@ static int kind_of(struct text_span type)
 
 static bool push(struct walk *w, uint64_t id)
 {
-    const struct step_record *to = ifc_records_find(w->r, id);
-    const size_t at = to != NULL ? (size_t)(to - w->r->record) : 0;
+    const struct step_record *to = ifc_index_find(&w->r->index, id);
+    const size_t at = to != NULL ? (size_t)(to - w->r->index.record) : 0;
     if (to == NULL || w->r->mark[at] == w->r->stamp) return true;
     if (!grow(&w->stack, &w->room, w->n + 1, sizeof *w->stack)) return false;
     w->r->mark[at] = w->r->stamp;
@@ -143,7 +146,7 @@ static void keep_radius(struct ifc_records *r, const struct step_record *record)
     /* A disc's later numbers are where its curve begins and ends. */
     const size_t last = strncmp(record->type.p, "IFCSWEPTDISK", 12) == 0 ? 2 : STEP_MAX_ARGS;
     for (size_t i = 0; i < n && i < last; i++)
-        if (step_real(&r->text, arg[i], &radius)) r->radius_m = fmax(r->radius_m, radius * r->unit_m);
+        if (step_real(&r->index.text, arg[i], &radius)) r->radius_m = fmax(r->radius_m, radius * r->unit_m);
 }
 
 static void look_at(struct walk *w, const struct step_record *record, int kind)
@@ -154,7 +157,7 @@ static void look_at(struct walk *w, const struct step_record *record, int kind)
     if ((kind & ASSIMP_ERRS) && p->assimp_wrong.n == 0) p->assimp_wrong = record->type;
     if (kind & RADIUS) keep_radius(w->r, record);
     p->is_turned |= (kind & TURNED) != 0;
-    if (kind & POINTS) p->points_m = fmax(p->points_m, largest_number(&w->r->text, record->args) * w->r->unit_m);
+    if (kind & POINTS) p->points_m = fmax(p->points_m, largest_number(&w->r->index.text, record->args) * w->r->unit_m);
 }
 
 static bool keep_styles(struct walk *w, uint64_t item)
@@ -172,7 +175,7 @@ static bool walk_from(struct walk *w, uint64_t id)
 {
     bool done = push(w, id);
     while (done && w->n > 0) {
-        const struct step_record *record = &w->r->record[w->stack[--w->n]];
+        const struct step_record *record = &w->r->index.record[w->stack[--w->n]];
         const int kind = kind_of(record->type);
         if (kind & STOP) continue;
         look_at(w, record, kind);
@@ -193,11 +196,11 @@ static int compare_pairs(const void *a, const void *b)
 /* IfcRelVoidsElement(..., RelatingBuildingElement, RelatedOpeningElement). */
 static bool collect_voids(struct walk *w)
 {
-    for (size_t i = 0; i < w->r->n; i++) {
+    for (size_t i = 0; i < w->r->index.n; i++) {
         struct text_span arg[6];
         uint64_t pair[2];
-        if (!text_is(w->r->record[i].type, "IFCRELVOIDSELEMENT")) continue;
-        if (step_split(w->r->record[i].args, arg, 6) != 6) continue;
+        if (!text_is(w->r->index.record[i].type, "IFCRELVOIDSELEMENT")) continue;
+        if (step_split(w->r->index.record[i].args, arg, 6) != 6) continue;
         if (!step_reference(arg[4], &pair[0]) || !step_reference(arg[5], &pair[1])) continue;
         if (!grow(&w->voids, &w->room_voids, w->n_voids + 1, sizeof pair)) return false;
         memcpy(&w->voids[2 * w->n_voids++], pair, sizeof pair);
@@ -243,5 +246,5 @@ int ifc_walk(struct ifc_records *r, struct sh_err *err)
     if (done) mark_lost_openings(&w);
     free(w.stack);
     free(w.voids);
-    return done ? SH_OK : text_fail(&r->text, 0, SH_ENOMEM, err, "no memory for its records");
+    return done ? SH_OK : text_fail(&r->index.text, 0, SH_ENOMEM, err, "no memory for its records");
 }

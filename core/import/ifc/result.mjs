@@ -56,7 +56,7 @@ export function end() {
   write(bytes_of(new Uint32Array([0, 0, 0, 0])))
 }
 
-// One line as a struct import_note of core/import/import.h: kind 3 is an error, code -1 that of a wrong file.
+// One line as a struct import_note of core/import/import_child.h: kind 3 is an error, code -1 that of a wrong file.
 export function fail(error) {
   const note = Buffer.alloc(528), put = new DataView(note.buffer, note.byteOffset)
   const little = new Uint8Array(new Uint16Array([1]).buffer)[0] === 1

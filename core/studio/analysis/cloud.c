@@ -52,11 +52,6 @@ static bool is_neither(const char *path)
     return (n != sizeof magic || memcmp(magic, "ply", sizeof magic) != 0) && !cloud_is_las(path);
 }
 
-int cloud_read(const char *path, const struct sh_report *report, struct cloud *out, struct sh_err *err)
-{
-    return cloud_read_columns(path, 0, report, out, err);
-}
-
 int cloud_read_columns(const char *path, unsigned columns, const struct sh_report *report, struct cloud *out,
                        struct sh_err *err)
 {

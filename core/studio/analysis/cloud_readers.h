@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/studio/analysis: the readers that cloud_read chooses from. In: the path of a PLY or LAS file. Out:
+/* Private to core/studio/analysis: the readers that cloud_read_columns chooses from. In: the path of a PLY or LAS file. Out:
  * its points in the file's coordinates, with station, label and echo where the file has them. */
 #ifndef CORE_STUDIO_ANALYSIS_CLOUD_READERS_H
 #define CORE_STUDIO_ANALYSIS_CLOUD_READERS_H

@@ -22,11 +22,8 @@ static const double AROUND = 1.1;
 static const double LEAST_CLEAR_M = 2e-5;
 
 struct work {
-    const struct cloud *cloud;
-    const struct cloud_site *site;
+    const struct cloud_compared *of;
     const struct deviation_head *head;
-    const double *distance_m;
-    const uint32_t *triangle;
     const struct deviation_points *out;
     const struct sh_report *report;
     size_t every; /* so many points have one whose sigma is worked out */
@@ -134,7 +131,7 @@ static void judge(const struct work *w, const struct deviation_head *head, size_
     double counts_m;
     const double sigma_m = deviation_sigma_m(head, hit, &counts_m),
                  radius_m = DEVIATION_CLEAR * hypot(sigma_m, counts_m);
-    if (radius_m > LEAST_CLEAR_M && !is_alone(w->site->index, at_m, hit->normal, radius_m)) return;
+    if (radius_m > LEAST_CLEAR_M && !is_alone(w->of->site->index, at_m, hit->normal, radius_m)) return;
     w->out->sigma_m[i] = (float)sigma_m;
     w->out->counts_m[i] = (float)counts_m;
 }
@@ -156,7 +153,7 @@ static void settle(const struct work *w, const struct batch *b, uint32_t k, cons
     const struct scene *scene = bvh_scene(bvh);
     const size_t i = b->point[k];
     const double *from = head->setup.station_m;
-    const uint32_t first = b->triangle[k], nearest = w->triangle[i];
+    const uint32_t first = b->triangle[k], nearest = w->of->triangle[i];
     struct deviation_hit hit = {.range_m = b->range_m[k], .beam = {b->x[k], b->y[k], b->z[k]}, .label = -1};
     double along_m = (double)NAN, cosine = (double)NAN;
     int same = 0;
@@ -164,7 +161,7 @@ static void settle(const struct work *w, const struct batch *b, uint32_t k, cons
         along_m = b->range_m[k] - b->hit_m[k];
         cosine = normal_of(bvh, first, &hit);
         hit.label = (int32_t)(scene->label[first] - scene->label0);
-        same = is_same(w->distance_m[i], along_m, cosine);
+        same = is_same(w->of->distance_m[i], along_m, cosine);
     }
     if (same && w->out->met != NULL) w->out->met[i] = first;
     if (!same && nearest != first) {
@@ -175,7 +172,7 @@ static void settle(const struct work *w, const struct batch *b, uint32_t k, cons
             along_m = b->range_m[k] - range_m;
             cosine = normal_of(bvh, nearest, &hit);
             hit.label = -1; /* the share of the power that got there is not known */
-            same = is_same(w->distance_m[i], along_m, cosine);
+            same = is_same(w->of->distance_m[i], along_m, cosine);
         }
     }
     w->out->cosine[i] = (float)cosine;
@@ -246,13 +243,13 @@ static void add(const struct work *w, struct batch *b, size_t i, const struct de
     double p[3], d[3];
     const struct deviation_points *out = w->out;
     out->along_m[i] = out->sigma_m[i] = out->counts_m[i] = out->cosine[i] = out->range_m[i] = (float)NAN;
-    if (out->met != NULL) out->met[i] = w->triangle[i];
-    if (isnan(w->cloud->xyz_m[i][0])) return;
-    cloud_to_scene(w->cloud, w->site, i, p);
+    if (out->met != NULL) out->met[i] = w->of->triangle[i];
+    if (isnan(w->of->cloud->xyz_m[i][0])) return;
+    cloud_to_scene(w->of->cloud, w->of->site, i, p);
     vec3_sub(p, head->setup.station_m, d);
     const double range_m = vec3_length(d);
     out->range_m[i] = (float)range_m;
-    if (!isfinite(w->distance_m[i]) || w->triangle[i] == CLOUD_TRIANGLE_NONE || !(range_m > 0.0)) return;
+    if (!isfinite(w->of->distance_m[i]) || w->of->triangle[i] == CLOUD_TRIANGLE_NONE || !(range_m > 0.0)) return;
     const uint32_t k = b->n++;
     b->point[k] = i;
     b->x[k] = d[0] / range_m;
@@ -264,7 +261,7 @@ static void add(const struct work *w, struct batch *b, size_t i, const struct de
 static void work_on(struct work *w, int reports)
 {
     struct batch *b = malloc(sizeof *b);
-    const size_t n = w->cloud->n;
+    const size_t n = w->of->cloud->n;
     size_t first;
     if (b == NULL || bvh_work_create(&b->bvh, NULL) != SH_OK) {
         free(b);
@@ -276,7 +273,7 @@ static void work_on(struct work *w, int reports)
         const size_t end = n - first < CHUNK ? n : first + CHUNK;
         unsigned station = 0;
         for (size_t i = first; i < end; i++) {
-            const unsigned its = cloud_station(w->cloud, i);
+            const unsigned its = cloud_station(w->of->cloud, i);
             if (b->n == BVH_CHUNK || (its != station && station != 0)) cast(w, b, &w->head[station - 1]);
             station = its;
             add(w, b, i, &w->head[station - 1]);
@@ -294,21 +291,17 @@ static void *helper_main(void *work)
     return NULL;
 }
 
-int deviation_along(const struct cloud *cloud, const struct cloud_site *site, const struct deviation_head *head,
-                    const double *distance_m, const uint32_t *triangle, const struct sh_report *report,
-                    const struct deviation_points *out, struct sh_err *err)
+int deviation_along(const struct cloud_compared *compared, const struct deviation_head *head,
+                    const struct sh_report *report, const struct deviation_points *out, struct sh_err *err)
 {
-    struct work w = {.cloud = cloud,
-                     .site = site,
+    struct work w = {.of = compared,
                      .head = head,
-                     .distance_m = distance_m,
-                     .triangle = triangle,
                      .out = out,
                      .report = report,
-                     .every = (cloud->n + DEVIATION_SAMPLE - 1) / DEVIATION_SAMPLE};
+                     .every = (compared->cloud->n + DEVIATION_SAMPLE - 1) / DEVIATION_SAMPLE};
     pthread_t helper[MAX_THREADS];
     unsigned n = 0;
-    while (n + 1 < site->threads && n < MAX_THREADS && pthread_create(&helper[n], NULL, helper_main, &w) == 0)
+    while (n + 1 < compared->site->threads && n < MAX_THREADS && pthread_create(&helper[n], NULL, helper_main, &w) == 0)
         n++;
     work_on(&w, 1);
     while (n > 0)

@@ -2,9 +2,7 @@
 /* The sigma and the bound expected of a point, by noise and counts; formulas in core/studio/deviation.h. */
 #include <math.h>
 
-#include "core/angle.h"
 #include "core/studio/deviation.h"
-#include "core/mat3.h"
 #include "core/vec3.h"
 
 static double square(double v)

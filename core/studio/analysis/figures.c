@@ -92,21 +92,28 @@ static double select_rank(double *v, size_t n, size_t k)
     return v[k];
 }
 
-/* Distances sorted by group, then the 95th percentile of each. at: [n_groups + 1] where each begins. */
-static void find_p95(const struct figures_in *in, uint32_t n_groups, uint32_t (*group)(void *ctx, size_t i), void *ctx,
-                     double *sorted, size_t *at, struct figures *out)
+/* As figures_by is given them. */
+struct groups {
+    uint32_t n;
+    uint32_t (*group)(void *ctx, size_t i);
+    void *ctx;
+};
+
+/* Distances sorted by group, then the 95th percentile of each. at: [by->n + 1] where each begins. */
+static void find_p95(const struct figures_in *in, const struct groups *by, double *sorted, size_t *at,
+                     struct figures *out)
 {
     size_t sum = 0;
-    for (uint32_t g = 0; g < n_groups; g++) {
+    for (uint32_t g = 0; g < by->n; g++) {
         at[g] = sum;
         sum += out[g].points - out[g].far;
     }
     for (size_t i = 0; i < in->n; i++) {
         if (!isfinite(in->distance_m[i])) continue;
-        const uint32_t g = group(ctx, i);
-        if (g < n_groups) sorted[at[g]++] = in->distance_m[i];
+        const uint32_t g = by->group(by->ctx, i);
+        if (g < by->n) sorted[at[g]++] = in->distance_m[i];
     }
-    for (uint32_t g = 0; g < n_groups; g++) {
+    for (uint32_t g = 0; g < by->n; g++) {
         const size_t n = out[g].points - out[g].far, rank = n / 100 * 95 + (n % 100 * 95 + 99) / 100;
         out[g].p95_m = n > 0 ? select_rank(sorted + at[g] - n, n, rank - 1) : (double)NAN;
     }
@@ -131,7 +138,7 @@ int figures_by(const struct figures_in *in, uint32_t n_groups, uint32_t (*group)
     }
     for (uint32_t g = 0; g < n_groups; g++)
         finish(&out[g], &sums[g]);
-    find_p95(in, n_groups, group, ctx, sorted, at, out);
+    find_p95(in, &(struct groups){n_groups, group, ctx}, sorted, at, out);
 done:
     free(sums);
     free(sorted);

@@ -85,19 +85,21 @@ static int add(struct table *t, uint64_t key, double area_m2, double range_m)
     return 0;
 }
 
-static int fill(const struct cloud *cloud, const struct cloud_site *site, const struct figures_in *in,
-                const uint32_t *triangle, const struct cutter *cut, const struct sh_report *report, struct table *t)
+static int fill(const struct figures_on_scene *in, const struct cutter *cut, const struct sh_report *report,
+                struct table *t)
 {
+    const struct cloud *cloud = in->compared->cloud;
+    const uint32_t *triangle = in->compared->triangle;
     for (size_t i = 0; i < cloud->n; i++) {
         double p[3], area_m2;
         if ((i & 0xffff) == 0) {
             sh_progress(report, "counting points by area", (double)i / (double)cloud->n);
             if (sh_stopped(report)) return SH_ESTOPPED;
         }
-        if (triangle[i] == CLOUD_TRIANGLE_NONE || !isfinite(in->distance_m[i])) continue;
-        cloud_to_scene(cloud, site, i, p);
+        if (triangle[i] == CLOUD_TRIANGLE_NONE || !isfinite(in->compared->distance_m[i])) continue;
+        cloud_to_scene(cloud, in->compared->site, i, p);
         const uint64_t key = key_of(cut, triangle[i], p, cloud_station(cloud, i), &area_m2);
-        const double range_m = (double)in->points->range_m[i];
+        const double range_m = (double)in->range_m[i];
         int rc = isfinite(area_m2) ? add(t, key, area_m2, range_m) : 0;
         if (rc != 0) return rc;
     }
@@ -126,23 +128,24 @@ static void keep(struct table *t, struct figures_density *out)
     out->cell = t->cell;
 }
 
-int figures_density_of(const struct cloud *cloud, const struct cloud_site *site, const struct scene *scene,
-                       const struct figures_in *in, const uint32_t *triangle, double cell_m,
-                       const struct sh_report *report, struct figures_density *out, struct sh_err *err)
+int figures_density_of(const struct figures_on_scene *in, double cell_m, const struct sh_report *report,
+                       struct figures_density *out, struct sh_err *err)
 {
+    const struct scene *scene = in->scene;
     struct cutter cut = {.scene = scene, .cell_m = cell_m};
+    const double most_m = in->compared->site->max_m;
     double longest_m = 0.0;
     *out = (struct figures_density){0};
     for (int k = 0; k < 3; k++) {
         longest_m = fmax(longest_m, scene->max_m[k] - scene->min_m[k]);
         cut.low_m[k] = scene->min_m[k];
     }
-    const double reach_m = site->max_m < longest_m ? site->max_m : longest_m; /* of points beside the scene */
+    const double reach_m = most_m < longest_m ? most_m : longest_m; /* of points beside the scene */
     while ((longest_m + 2.0 * reach_m) / cut.cell_m > (double)((1 << KEY_BITS) - 2))
         cut.cell_m *= 2.0;
     for (int rc = 1; rc != 0; cut.cell_m *= 2.0) {
         struct table t = {0};
-        rc = fill(cloud, site, in, triangle, &cut, report, &t);
+        rc = fill(in, &cut, report, &t);
         if (rc == 0) {
             out->cell_m = cut.cell_m;
             keep(&t, out);
@@ -157,13 +160,11 @@ int figures_density_of(const struct cloud *cloud, const struct cloud_site *site,
 
 static const double MOST_CELL_M = 50.0, CELL_POINTS = 16.0;
 
-int figures_density_fit(const struct cloud *cloud, const struct cloud_site *site, const struct scene *scene,
-                        const struct figures_in *in, const uint32_t *triangle, double first_m,
-                        const struct sh_report *report, struct figures_density *out, struct figures_density_row *all,
-                        struct sh_err *err)
+int figures_density_fit(const struct figures_on_scene *in, double first_m, const struct sh_report *report,
+                        struct figures_density *out, struct figures_density_row *all, struct sh_err *err)
 {
     for (double cell_m = first_m;; cell_m *= 2.0) {
-        const int rc = figures_density_of(cloud, site, scene, in, triangle, cell_m, report, out, err);
+        const int rc = figures_density_of(in, cell_m, report, out, err);
         if (rc != SH_OK) return rc;
         figures_density_within(out, 0, 0.0, (double)INFINITY, all);
         if (!(all->p50 * out->cell_m * out->cell_m < CELL_POINTS) || cell_m > MOST_CELL_M) return SH_OK;

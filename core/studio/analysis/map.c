@@ -170,8 +170,9 @@ int map_write_svg(const struct map *map, const char *path, struct sh_err *err)
     struct map_layout at;
     map_get_layout(map, &at);
     int rc = map_draw_pixels(map, &picture, err);
+    const struct picture_part pixels = {&picture, at.left, at.top, at.map_width, at.map_height, NULL};
     if (rc == SH_OK) rc = svg_begin(at.width, at.height, "Scan map", &svg, err);
-    if (rc == SH_OK) rc = svg_image(svg, &picture, (long)at.left, (long)at.top, at.map_width, at.map_height, err);
+    if (rc == SH_OK) rc = svg_image(svg, &pixels, err);
     struct pen pen = svg_pen(svg);
     if (rc == SH_OK) rc = map_draw_marks(map, &pen, err);
     if (rc == SH_OK) rc = svg_write(svg, "map", path, err);

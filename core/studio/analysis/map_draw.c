@@ -83,7 +83,8 @@ double map_structure(const struct map *map, uint32_t column, uint32_t row)
     return fmin(1, fmax(0, (double)(levels - FREE_LEVELS) / (WALL_LEVELS - FREE_LEVELS)));
 }
 
-void map_colour(double structure, double height, uint8_t rgb[3])
+/* Lightness 0..1 of structure and height 0..1 -> sRGB. */
+static void colour_of(double structure, double height, uint8_t rgb[3])
 {
     /* From blue over green and yellow to red, away from the purple that would close the circle. */
     const double hue_rad = angle_rad(255 - 205 * height);
@@ -106,13 +107,14 @@ int map_draw_pixels(const struct map *map, struct picture *out, struct sh_err *e
             double low_m;
             if (!gather(map, column, row, &levels, &low_m)) continue;
             const double structure = (double)(levels - FREE_LEVELS) / (WALL_LEVELS - FREE_LEVELS);
-            map_colour(fmin(1, fmax(0, structure)), height_share(range, low_m), rgb);
+            colour_of(fmin(1, fmax(0, structure)), height_share(range, low_m), rgb);
         }
     }
     return SH_OK;
 }
 
-void map_place(const struct map *map, double x_m, double y_m, double place[2])
+/* Where a place is in the image. */
+static void place_of(const struct map *map, double x_m, double y_m, double place[2])
 {
     struct map_layout at;
     map_get_layout(map, &at);
@@ -122,7 +124,7 @@ void map_place(const struct map *map, double x_m, double y_m, double place[2])
 
 void map_station_place(const struct map *map, uint32_t station, double place[2])
 {
-    map_place(map, map->station[station].x_m, map->station[station].y_m, place);
+    place_of(map, map->station[station].x_m, map->station[station].y_m, place);
 }
 
 static void draw_edges(const struct map *map, struct pen *pen)
@@ -131,8 +133,8 @@ static void draw_edges(const struct map *map, struct pen *pen)
     pen->begin(pen->on, "edges", "open edges of the scene");
     for (uint64_t i = 0; i < map->counts.edges; i++) {
         double from[2], to[2];
-        map_place(map, map->edge[i][0][0], map->edge[i][0][1], from);
-        map_place(map, map->edge[i][1][0], map->edge[i][1][1], to);
+        place_of(map, map->edge[i][0][0], map->edge[i][0][1], from);
+        place_of(map, map->edge[i][1][0], map->edge[i][1][1], to);
         pen->line(pen->on, from, to, 2, red);
     }
     pen->end(pen->on);
@@ -175,11 +177,12 @@ static void draw_label(const struct map *map, const struct map_label *label, str
     }
     double base = label->top + map_name_type.size_px + 2;
     if (station->name[0] != '\0') {
-        pen->text(pen->on, label->left + 2, base, PICTURE_LEFT, &map_name_type, ink, station->name);
+        pen->text(pen->on, (const double[2]){label->left + 2, base}, PICTURE_LEFT, &map_name_type, ink, station->name);
         base += map_height_type.size_px + 6;
     }
     if (station->height[0] != '\0')
-        pen->text(pen->on, label->left + 2, base, PICTURE_LEFT, &map_height_type, ink, station->height);
+        pen->text(pen->on, (const double[2]){label->left + 2, base}, PICTURE_LEFT, &map_height_type, ink,
+                  station->height);
 }
 
 static int draw_stations(const struct map *map, struct pen *pen, struct sh_err *err)
@@ -222,7 +225,7 @@ static void draw_scale(const struct map *map, long column, long row, struct pen 
     pen->fill(pen->on, column, row, length, 4, ink);
     pen->fill(pen->on, column, row - 6, 2, 10, ink);
     pen->fill(pen->on, column + length - 2, row - 6, 2, 10, ink);
-    pen->text(pen->on, (double)column, (double)row + 24, PICTURE_LEFT, &caption, ink, text);
+    pen->text(pen->on, (const double[2]){(double)column, (double)row + 24}, PICTURE_LEFT, &caption, ink, text);
     pen->end(pen->on);
 }
 
@@ -233,12 +236,13 @@ static void draw_heights(struct height_range range, long column, long row, struc
     pen->begin(pen->on, "legend", "height of the lowest point above the lowest of the map");
     for (long i = 0; i < LENGTH; i += 2) {
         uint8_t rgb[3];
-        map_colour(0.15, (double)i / (LENGTH - 2), rgb);
+        colour_of(0.15, (double)i / (LENGTH - 2), rgb);
         pen->fill(pen->on, column + i, row - 6, 2, HEIGHT, rgb);
     }
     snprintf(text, sizeof text, "+%.1f m", range.high_m - range.low_m);
-    pen->text(pen->on, (double)column, (double)row + 24, PICTURE_LEFT, &caption, ink, "0");
-    pen->text(pen->on, (double)column + LENGTH, (double)row + 24, PICTURE_RIGHT, &caption, ink, text);
+    pen->text(pen->on, (const double[2]){(double)column, (double)row + 24}, PICTURE_LEFT, &caption, ink, "0");
+    pen->text(pen->on, (const double[2]){(double)column + LENGTH, (double)row + 24}, PICTURE_RIGHT, &caption, ink,
+              text);
     pen->end(pen->on);
 }
 
@@ -251,7 +255,7 @@ static void draw_north(long column, long row, struct pen *pen)
     pen->begin(pen->on, "north", "north");
     pen->triangle(pen->on, left, ink);
     pen->triangle(pen->on, right, pale);
-    pen->text(pen->on, (double)column + 13, (double)row + 2, PICTURE_LEFT, &caption, ink, "N");
+    pen->text(pen->on, (const double[2]){(double)column + 13, (double)row + 2}, PICTURE_LEFT, &caption, ink, "N");
     pen->end(pen->on);
 }
 

@@ -26,12 +26,9 @@ struct map {
     struct map_counts counts;
 };
 
-/* Lightness 0..1 of structure and height 0..1 -> sRGB. */
-void map_colour(double structure, double height, uint8_t rgb[3]);
-/* The same of the pixels about a place, 0..1: 1 is a wall. */
+/* How much the pixels about a place are like a wall, 0..1. */
 double map_structure(const struct map *map, uint32_t column, uint32_t row);
-/* Where a place is in the image, and a station. */
-void map_place(const struct map *map, double x_m, double y_m, double place[2]);
+/* Where a station is in the image. */
 void map_station_place(const struct map *map, uint32_t station, double place[2]);
 
 enum {

@@ -77,7 +77,7 @@ static int draw_name(struct picture *picture, const double at[2], const char *na
         const double x = at[0] + (left ? -14 - width : 14);
         const struct box own = {x - 3, at[1] - 9, x + width + 3, at[1] + 8};
         if (x < 4 || x + width > picture->width - 4 || !is_free(taken, &own, mark)) continue;
-        picture_text(picture, x, at[1] + 5, PICTURE_LEFT, &name_type, ink, name);
+        picture_text(picture, (const double[2]){x, at[1] + 5}, PICTURE_LEFT, &name_type, ink, name);
         taken->name[taken->n_names++] = own;
         return 1;
     }
@@ -117,7 +117,7 @@ void view_draw_scale(struct picture *picture, const char *title, double low, dou
                      const struct view_colours *colours)
 {
     const long left = MARGIN_PX, top = (long)picture->height - MARGIN_PX - 16 - BAR_HEIGHT_PX;
-    picture_text(picture, (double)left, (double)top - 8, PICTURE_LEFT, &name_type, ink, title);
+    picture_text(picture, (const double[2]){(double)left, (double)top - 8}, PICTURE_LEFT, &name_type, ink, title);
     for (long i = 0; i < BAR_PX; i++) {
         uint8_t rgb[3];
         colours->colour(colours->ctx, low + (high - low) * ((double)i + 0.5) / BAR_PX, rgb);
@@ -126,7 +126,8 @@ void view_draw_scale(struct picture *picture, const char *title, double low, dou
     char text[32];
     if (!(high > low)) {
         snprintf(text, sizeof text, "%.4g", low);
-        picture_text(picture, (double)left, (double)top + BAR_HEIGHT_PX + 15, PICTURE_LEFT, &text_type, ink, text);
+        picture_text(picture, (const double[2]){(double)left, (double)top + BAR_HEIGHT_PX + 15}, PICTURE_LEFT,
+                     &text_type, ink, text);
         return;
     }
     const double step = round_step(high - low);
@@ -138,7 +139,8 @@ void view_draw_scale(struct picture *picture, const char *title, double low, dou
         const double x = (double)left + (v - low) / (high - low) * BAR_PX;
         snprintf(text, sizeof text, "%.*f", digits, fabs(v) < 1e-9 * step ? 0.0 : v);
         picture_fill(picture, lrint(x - 0.5), top + BAR_HEIGHT_PX, 1, 4, ink);
-        picture_text(picture, x, (double)top + BAR_HEIGHT_PX + 17, PICTURE_MIDDLE, &text_type, ink, text);
+        picture_text(picture, (const double[2]){x, (double)top + BAR_HEIGHT_PX + 17}, PICTURE_MIDDLE, &text_type, ink,
+                     text);
     }
 }
 
@@ -150,14 +152,15 @@ void view_draw_names(struct picture *picture, const char *title, const struct vi
     if ((double)n > fmin(VIEW_MAX_NAMES, room)) shown = (uint32_t)fmax(1, fmin(VIEW_MAX_NAMES, room) - 1);
     const uint32_t lines = shown + (shown < n);
     double y = (double)picture->height - MARGIN_PX - line * lines;
-    picture_text(picture, MARGIN_PX, y - 4, PICTURE_LEFT, &name_type, ink, title);
+    picture_text(picture, (const double[2]){MARGIN_PX, y - 4}, PICTURE_LEFT, &name_type, ink, title);
     for (uint32_t i = 0; i < shown; i++) {
         y += line;
         picture_fill(picture, MARGIN_PX, (long)y - SWATCH_PX + 1, SWATCH_PX, SWATCH_PX, entry[i].rgb);
-        picture_text(picture, MARGIN_PX + SWATCH_PX + 8, y, PICTURE_LEFT, &text_type, ink, entry[i].name);
+        picture_text(picture, (const double[2]){MARGIN_PX + SWATCH_PX + 8, y}, PICTURE_LEFT, &text_type, ink,
+                     entry[i].name);
     }
     if (shown == n) return;
     char more[32];
     snprintf(more, sizeof more, "and %u more", n - shown);
-    picture_text(picture, MARGIN_PX, y + line, PICTURE_LEFT, &text_type, ink, more);
+    picture_text(picture, (const double[2]){MARGIN_PX, y + line}, PICTURE_LEFT, &text_type, ink, more);
 }

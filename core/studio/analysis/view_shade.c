@@ -104,13 +104,13 @@ static void spot(const struct view *view, const float *depth_m, int x, int y, fl
 }
 
 /* Difference to the neighbour on that side of the two where the depth changes less. */
-static int slope(const struct view *view, const float *depth_m, int x, int y, int dx, int dy, float out[3])
+static int slope(const struct view *view, const float *depth_m, const int at[2], const int step[2], float out[3])
 {
     float own[3], side[2][3];
     int use = -1;
-    spot(view, depth_m, x, y, own);
+    spot(view, depth_m, at[0], at[1], own);
     for (int s = 0; s < 2; s++) {
-        const int cx = x + (s ? -dx : dx), cy = y + (s ? -dy : dy);
+        const int cx = at[0] + (s ? -step[0] : step[0]), cy = at[1] + (s ? -step[1] : step[1]);
         side[s][2] = INFINITY;
         if (cx < 0 || cy < 0 || cx >= (int)view->width || cy >= (int)view->height) continue;
         spot(view, depth_m, cx, cy, side[s]);
@@ -126,9 +126,11 @@ static int slope(const struct view *view, const float *depth_m, int x, int y, in
 /* Lambert's law for a light at the upper left of the eye, half of it from everywhere. */
 static float facing(const struct view *view, const float *depth_m, int x, int y)
 {
+    static const int right[2] = {3, 0}, up[2] = {0, -3};
     static const float light[3] = {-0.40f, 0.62f, -0.674f}; /* right, up, ahead: towards the light */
+    const int at[2] = {x, y};
     float a[3], b[3];
-    if (!slope(view, depth_m, x, y, 3, 0, a) || !slope(view, depth_m, x, y, 0, -3, b)) return 0.8f;
+    if (!slope(view, depth_m, at, right, a) || !slope(view, depth_m, at, up, b)) return 0.8f;
     float n[3] = {b[1] * a[2] - b[2] * a[1], b[2] * a[0] - b[0] * a[2], b[0] * a[1] - b[1] * a[0]};
     const float length = sqrtf(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
     if (!(length > 0)) return 0.8f;

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/studio/coverage/cut.h"
 #include "core/studio/coverage/inside.h"
 #include "core/grow.h"
 #include "core/huge.h"
@@ -28,7 +29,6 @@ static const double ASIDE = 0.38196601125010515;
 
 struct build {
     struct coverage *c;
-    const struct sh_report *report;
     struct key *key; /* of each cell */
     size_t key_room, cell_room;
     uint32_t *table; /* 1 + cell, by the key's hash; 0: free */
@@ -46,7 +46,7 @@ void coverage_corners(const struct coverage *c, uint32_t triangle, double corner
         memcpy(corner[i], c->scene->vertex_m[c->scene->triangle[triangle][i]], sizeof corner[i]);
 }
 
-float coverage_float(uint32_t bits)
+static float float_of(uint32_t bits)
 {
     float f;
     memcpy(&f, &bits, sizeof f);
@@ -210,7 +210,7 @@ static void cut_triangle(struct build *b, uint32_t t)
 
 static int build(struct coverage *c, const struct sh_report *report, struct sh_err *err)
 {
-    struct build b = {.c = c, .report = report, .err = err};
+    struct build b = {.c = c, .err = err};
     for (uint32_t t = 0; t < c->scene->n_triangles && b.rc == SH_OK; t++) {
         if (t % REPORT_EVERY == 0) sh_progress(report, "cutting the surface", (double)b.at / (double)c->n_pieces);
         if (t % 1024 == 0) b.rc = sh_check_stop(report, err);
@@ -329,6 +329,6 @@ void coverage_get(const struct coverage *coverage, uint32_t cell, struct coverag
                                   .label = c->label,
                                   .first_station = c->first_station};
     if (c->stations == 0) return;
-    out->incidence_rad = acos(fmin((double)coverage_float(c->cosine), 1.0));
-    out->range_m = 1.0 / (double)coverage_float(c->nearness);
+    out->incidence_rad = acos(fmin((double)float_of(c->cosine), 1.0));
+    out->range_m = 1.0 / (double)float_of(c->nearness);
 }

@@ -15,8 +15,7 @@ struct gains {
     const struct coverage *c;
     const struct bvh *bvh;
     const struct coverage_directions *directions;
-    const double (*place_m)[3];
-    uint32_t n;
+    const struct coverage_places *places;
     const struct sh_report *report;
     struct coverage_gain *gain;
     atomic_uint next;
@@ -84,7 +83,7 @@ static void look(struct gain_worker *w, uint32_t place)
     struct coverage_gain *gain = &w->g->gain[place];
     w->met = w->front = w->n_claimed = 0;
     for (uint32_t first = 0; first < n && !sh_stopped(w->g->report); first += BVH_CHUNK)
-        cast(w, w->g->place_m[place], first, n - first < BVH_CHUNK ? n - first : BVH_CHUNK);
+        cast(w, w->g->places->place_m[place], first, n - first < BVH_CHUNK ? n - first : BVH_CHUNK);
     *gain = (struct coverage_gain){0.0, w->met > 0 ? (double)w->front / w->met : (double)NAN};
     for (uint32_t i = 0; i < w->n_claimed; i++) {
         struct claim *c = &w->claim[w->claimed[i]];
@@ -121,9 +120,9 @@ static void work_on(struct gains *g, int reports)
     struct gain_worker *w = make_worker(g);
     uint32_t place;
     if (w == NULL) atomic_store(&g->failed, 1);
-    while (w != NULL && (place = atomic_fetch_add(&g->next, 1)) < g->n && !sh_stopped(g->report)) {
+    while (w != NULL && (place = atomic_fetch_add(&g->next, 1)) < g->places->n && !sh_stopped(g->report)) {
         look(w, place);
-        if (reports) sh_progress(g->report, "comparing places", (double)(place + 1) / g->n);
+        if (reports) sh_progress(g->report, "comparing places", (double)(place + 1) / g->places->n);
     }
     free_worker(w);
 }
@@ -134,15 +133,14 @@ static void *helper_main(void *gains)
     return NULL;
 }
 
-int coverage_gains(const struct coverage *coverage, const struct bvh *bvh, const struct coverage_directions *directions,
-                   const double (*place_m)[3], uint32_t n, const struct sh_report *report, struct coverage_gain *gain,
+int coverage_gains(const struct coverage *coverage, const struct coverage_directions *directions,
+                   const struct coverage_places *places, const struct sh_report *report, struct coverage_gain *gain,
                    struct sh_err *err)
 {
     struct gains g = {.c = coverage,
-                      .bvh = bvh,
+                      .bvh = coverage->spec.bvh,
                       .directions = directions,
-                      .place_m = place_m,
-                      .n = n,
+                      .places = places,
                       .report = report,
                       .gain = gain};
     pthread_t helper[MAX_THREADS];
@@ -154,7 +152,7 @@ int coverage_gains(const struct coverage *coverage, const struct bvh *bvh, const
     while (helpers > 0)
         pthread_join(helper[--helpers], NULL);
     int rc = sh_check_stop(report, err);
-    if (rc == SH_OK && atomic_load(&g.next) < n && atomic_load(&g.failed))
+    if (rc == SH_OK && atomic_load(&g.next) < places->n && atomic_load(&g.failed))
         return sh_fail(err, SH_ENOMEM, "no memory to compare places");
     return rc;
 }

@@ -6,7 +6,6 @@
 #include <stdatomic.h>
 
 #include "core/studio/coverage.h"
-#include "core/studio/coverage/cut.h"
 
 enum { NO_CELL = COVERAGE_NO_CELL };
 
@@ -40,7 +39,6 @@ struct coverage {
 /* Corners of a triangle, prcs. */
 void coverage_corners(const struct coverage *c, uint32_t triangle, double corner[3][3]);
 
-float coverage_float(uint32_t bits);
 uint32_t coverage_bits(double value);
 
 #endif

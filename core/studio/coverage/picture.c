@@ -6,6 +6,7 @@
 
 #include "core/angle.h"
 #include "core/colour.h"
+#include "core/studio/coverage/cut.h"
 #include "core/studio/coverage/inside.h"
 #include "core/studio/mesh.h"
 

@@ -26,7 +26,7 @@ struct nodes {
 };
 
 struct node {
-    uint64_t at, end, n_properties, inside; /* inside: where its nodes begin */
+    uint64_t at, end, inside; /* inside: where its nodes begin */
     const uint8_t *name;
     uint8_t name_len;
 };
@@ -58,7 +58,6 @@ static int read_node(const struct nodes *n, uint64_t at, uint64_t end, struct no
     const uint8_t *p = n->raw + at;
     node->at = at;
     node->end = get64(p);
-    node->n_properties = get64(p + 8);
     const uint64_t bytes = get64(p + 16);
     node->name_len = p[24];
     node->name = p + NODE_LEN;

@@ -84,15 +84,18 @@ static int check_vertices(const char *path, const struct mesh *mesh, struct sh_e
     return mesh->n_vertices > 0 ? mesh_check_box(path, low, high, err) : SH_OK;
 }
 
-/* Faces of a part, or of the whole mesh, within vertices first to end. */
-static int check_faces(const char *path, const struct mesh *mesh, uint32_t from, uint32_t n, uint32_t first,
-                       uint32_t end, struct sh_err *err)
+/* Faces of a part, or of the whole mesh, and the vertices that they may use. */
+struct range {
+    uint32_t face, face_end, vertex, vertex_end;
+};
+
+static int check_faces(const char *path, const struct mesh *mesh, const struct range *in, struct sh_err *err)
 {
-    for (uint32_t i = from; i < from + n; i++)
+    for (uint32_t i = in->face; i < in->face_end; i++)
         for (int k = 0; k < 3; k++)
-            if (mesh->face[i][k] < first || mesh->face[i][k] >= end)
+            if (mesh->face[i][k] < in->vertex || mesh->face[i][k] >= in->vertex_end)
                 return sh_fail(err, SH_EINPUT, "%s: face %u uses vertex %u; allowed are %u to %u", path, i + 1,
-                               mesh->face[i][k], first, end - 1);
+                               mesh->face[i][k], in->vertex, in->vertex_end - 1);
     return SH_OK;
 }
 
@@ -104,8 +107,9 @@ static int check_parts(const char *path, const struct mesh *mesh, struct sh_err 
     for (uint32_t i = 0; i < mesh->n_parts; i++) {
         const struct mesh_part *p = &mesh->part[i];
         if (vertex + p->n_vertices > mesh->n_vertices || face + p->n_faces > mesh->n_faces) break;
-        int rc = check_faces(path, mesh, (uint32_t)face, p->n_faces, (uint32_t)vertex, (uint32_t)vertex + p->n_vertices,
-                             err);
+        const struct range in = {(uint32_t)face, (uint32_t)face + p->n_faces, (uint32_t)vertex,
+                                 (uint32_t)vertex + p->n_vertices};
+        int rc = check_faces(path, mesh, &in, err);
         if (rc != SH_OK) return rc;
         vertex += p->n_vertices;
         face += p->n_faces;
@@ -128,7 +132,8 @@ static int check(const char *path, const struct mesh_format *format, const struc
         return sh_fail(err, SH_EINPUT, "%s: a texture without texture coordinates", path);
     int rc = check_vertices(path, mesh, err);
     if (rc == SH_OK && mesh->n_parts > 0) return check_parts(path, mesh, err);
-    return rc == SH_OK && mesh->face != NULL ? check_faces(path, mesh, 0, mesh->n_faces, 0, mesh->n_vertices, err) : rc;
+    const struct range all = {0, mesh->n_faces, 0, mesh->n_vertices};
+    return rc == SH_OK && mesh->face != NULL ? check_faces(path, mesh, &all, err) : rc;
 }
 
 int mesh_write(const char *path, const struct mesh *mesh, const struct sh_report *report, struct sh_err *err)

@@ -110,17 +110,23 @@ static void free_mesh(struct aiMesh *mesh)
     free(mesh->mFaces);
 }
 
+struct property {
+    enum aiPropertyTypeInfo type;
+    const void *data;
+    size_t n; /* bytes */
+};
+
 static int put_property(struct aiMaterial *to, struct aiMaterialProperty *at, const char *key, unsigned semantic,
-                        enum aiPropertyTypeInfo type, const void *data, size_t n)
+                        struct property value)
 {
     set_string(&at->mKey, key);
     at->mSemantic = semantic;
     at->mIndex = 0;
-    at->mType = type;
-    at->mDataLength = (unsigned)n;
-    at->mData = malloc(n);
+    at->mType = value.type;
+    at->mDataLength = (unsigned)value.n;
+    at->mData = malloc(value.n);
     if (at->mData == NULL) return 0;
-    memcpy(at->mData, data, n);
+    memcpy(at->mData, value.data, value.n);
     to->mProperties[to->mNumProperties++] = at;
     return 1;
 }
@@ -131,7 +137,7 @@ static int put_string(struct aiMaterial *to, struct aiMaterialProperty *at, cons
 {
     struct aiString string;
     set_string(&string, text);
-    return put_property(to, at, key, semantic, aiPTI_String, &string, 4 + (size_t)string.length + 1);
+    return put_property(to, at, key, semantic, (struct property){aiPTI_String, &string, 4 + (size_t)string.length + 1});
 }
 
 /* A PNG within the scene; materials call it by its number. 0: no memory. */
@@ -167,8 +173,8 @@ static int fill_material(struct export_scene *s, const struct mesh_part *part, s
     char name[16] = "";
     if (is_within && !add_image(s, part->image, name)) return 0;
     return put_string(to, &at[0], "?mat.name", 0, part->name) &&
-           put_property(to, &at[1], "$clr.diffuse", 0, aiPTI_Float, white, sizeof white) &&
-           put_property(to, &at[2], "$mat.roughnessFactor", 0, aiPTI_Float, &rough, sizeof rough) &&
+           put_property(to, &at[1], "$clr.diffuse", 0, (struct property){aiPTI_Float, white, sizeof white}) &&
+           put_property(to, &at[2], "$mat.roughnessFactor", 0, (struct property){aiPTI_Float, &rough, sizeof rough}) &&
            (part->texture == NULL ||
             put_string(to, &at[3], "$tex.file", (unsigned)aiTextureType_DIFFUSE, is_within ? name : part->texture));
 }

@@ -21,11 +21,6 @@ typedef int picture_encoder(const void *what, FILE *file, struct sh_err *why);
 int picture_write_file(picture_encoder *encode, const void *source, const char *what, const char *path,
                        struct sh_err *err);
 
-struct picture_part {
-    const struct picture *picture;
-    uint32_t column, row, width, height;
-    const uint8_t *clear; /* this colour is transparent; NULL: none is */
-};
 /* A struct picture_part as a PNG. */
 int picture_encode_png(const void *part, FILE *file, struct sh_err *why);
 

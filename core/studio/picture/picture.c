@@ -100,10 +100,10 @@ static void pen_triangle(void *on, const double corner[3][2], const uint8_t rgb[
     picture_triangle(on, corner, rgb);
 }
 
-static void pen_text(void *on, double x, double y, enum picture_anchor anchor, const struct picture_type *type,
+static void pen_text(void *on, const double at[2], enum picture_anchor anchor, const struct picture_type *type,
                      const uint8_t rgb[3], const char *text)
 {
-    picture_text(on, x, y, anchor, type, rgb, text);
+    picture_text(on, at, anchor, type, rgb, text);
 }
 
 static void pen_begin(void *on, const char *class_name, const char *title)

@@ -133,15 +133,15 @@ static void pen_triangle(void *on, const double corner[3][2], const uint8_t rgb[
 
 /* Capitals of the usual sans-serif fonts are 0.72 of the font's size. The width is that of our own font, so that
  * what was placed beside each other stays so. */
-static void pen_text(void *on, double x, double y, enum picture_anchor anchor, const struct picture_type *type,
+static void pen_text(void *on, const double at[2], enum picture_anchor anchor, const struct picture_type *type,
                      const uint8_t rgb[3], const char *text)
 {
     static const char *const names[] = {"start", "middle", "end"};
     FILE *out = ((struct svg *)on)->out;
     if (text[0] == '\0') return;
     fputs("<text", out);
-    put_attribute(out, "x", x);
-    put_attribute(out, "y", y);
+    put_attribute(out, "x", at[0]);
+    put_attribute(out, "y", at[1]);
     put_attribute(out, "font-size", type->size_px / 0.72);
     put_attribute(out, "textLength", picture_text_width(type, text));
     fprintf(out, " lengthAdjust=\"spacingAndGlyphs\" font-family=\"sans-serif\" text-anchor=\"%s\"", names[anchor]);
@@ -213,14 +213,12 @@ int picture_put_uri(FILE *out, const struct picture *picture, const uint8_t *cle
     return put_uri(out, &whole, err);
 }
 
-int svg_image(struct svg *svg, const struct picture *picture, long column, long row, uint32_t width, uint32_t height,
-              struct sh_err *err)
+int svg_image(struct svg *svg, const struct picture_part *part, struct sh_err *err)
 {
-    const struct picture_part part = {picture, (uint32_t)column, (uint32_t)row, width, height, NULL};
     fprintf(svg->out,
-            "<image x=\"%ld\" y=\"%ld\" width=\"%u\" height=\"%u\" image-rendering=\"optimizeSpeed\" xlink:href=\"",
-            column, row, width, height);
-    int rc = put_uri(svg->out, &part, err);
+            "<image x=\"%u\" y=\"%u\" width=\"%u\" height=\"%u\" image-rendering=\"optimizeSpeed\" xlink:href=\"",
+            part->column, part->row, part->width, part->height);
+    int rc = put_uri(svg->out, part, err);
     fputs("\"/>\n", svg->out);
     return rc;
 }

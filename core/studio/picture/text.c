@@ -163,10 +163,11 @@ static void draw_strokes(struct picture *picture, const struct strokes *s, doubl
         }
 }
 
-static void draw_text(struct picture *picture, double x, double y, const struct picture_type *type, double width,
+static void draw_text(struct picture *picture, const double at[2], const struct picture_type *type, double width,
                       const uint8_t rgb[3], const char *text)
 {
-    const double scale = type->size_px / UNITS;
+    const double scale = type->size_px / UNITS, y = at[1];
+    double x = at[0];
     struct strokes s;
     while (*text != '\0') {
         make_glyph(next_code(&text), &s);
@@ -182,14 +183,15 @@ static void draw_text(struct picture *picture, double x, double y, const struct 
     }
 }
 
-void picture_text(struct picture *picture, double x, double y, enum picture_anchor anchor,
+void picture_text(struct picture *picture, const double at[2], enum picture_anchor anchor,
                   const struct picture_type *type, const uint8_t rgb[3], const char *text)
 {
     static const uint8_t white[3] = {255, 255, 255};
     const double width = fmax(1.2, type->size_px * (type->bold ? 0.16 : 0.11));
-    if (anchor != PICTURE_LEFT) x -= picture_text_width(type, text) * (anchor == PICTURE_RIGHT ? 1 : 0.5);
-    if (type->halo_px > 0) draw_text(picture, x, y, type, width + 2 * type->halo_px, white, text);
-    draw_text(picture, x, y, type, width, rgb, text);
+    double from[2] = {at[0], at[1]};
+    if (anchor != PICTURE_LEFT) from[0] -= picture_text_width(type, text) * (anchor == PICTURE_RIGHT ? 1 : 0.5);
+    if (type->halo_px > 0) draw_text(picture, from, type, width + 2 * type->halo_px, white, text);
+    draw_text(picture, from, type, width, rgb, text);
 }
 
 void picture_line(struct picture *picture, const double from[2], const double to[2], double width, const uint8_t rgb[3])

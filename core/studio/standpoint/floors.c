@@ -4,7 +4,6 @@
 #include <stdlib.h>
 
 #include "core/studio/standpoint/survey.h"
-#include "core/vec3.h"
 
 enum { COLUMNS = 12, MAX_LAYERS = 24, LEGS = 8, AZIMUTHS = 16, LINES = 10, LOOKS = AZIMUTHS * LINES };
 enum { N_COLUMNS = COLUMNS * COLUMNS };

@@ -43,8 +43,8 @@ static int estimate(struct chooser *c, double heading_deg, double (*turned)[3], 
         turn(c->f->dir[i], angle_rad(heading_deg), turned[i]);
     const struct coverage_directions directions = {c->f->n_dir, (const double(*)[3])turned, c->f->each_sr,
                                                    profile->range_min_m, profile->range_max_m};
-    return coverage_gains(c->coverage, c->f->site->bvh, &directions, (const double(*)[3])c->open_m, c->n_open,
-                          c->f->report, c->gain, err);
+    const struct coverage_places places = {c->n_open, (const double(*)[3])c->open_m};
+    return coverage_gains(c->coverage, &directions, &places, c->f->report, c->gain, err);
 }
 
 static int estimate_all(struct chooser *c, double *estimate_m2, struct sh_err *err)

@@ -146,12 +146,12 @@ static int compare(struct report *r, struct sh_err *err)
     if (rc == SH_OK) rc = cloud_cover(&r->cloud, site->scene, site->n_surfaces, r->triangle, &r->f.coverage, &why);
     if (rc == SH_OK && site->moving) without_beams(r);
     if (rc == SH_OK && !site->moving) {
+        const struct cloud_compared compared = {&r->cloud, &r->cloud_site, r->distance_m, r->triangle};
         struct deviation_head *head = malloc(site->n_stations * sizeof *head);
         for (uint32_t s = 0; s < site->n_stations && head != NULL; s++)
             head[s] = r->f.station[s].head;
         rc = head == NULL ? sh_fail(&why, SH_ENOMEM, "no memory")
-                          : deviation_along(&r->cloud, &r->cloud_site, head, r->distance_m, r->triangle, &r->progress,
-                                            &r->points, &why);
+                          : deviation_along(&compared, head, &r->progress, &r->points, &why);
         free(head);
     }
     return rc == SH_OK ? SH_OK : sh_fail(err, rc, "%s: %.300s", r->cloud_path, why.text);
@@ -240,11 +240,10 @@ static const double CELL_M = 0.1;
 static int densities(struct report *r, struct sh_err *err)
 {
     struct report_figures *f = &r->f;
-    const struct figures_in in = {.n = r->cloud.n, .distance_m = r->distance_m, .points = &r->points};
-    int rc = r->cell_m > 0.0 ? figures_density_of(&r->cloud, &r->cloud_site, r->site->scene, &in, r->triangle,
-                                                  r->cell_m, &r->progress, &f->density, err)
-                             : figures_density_fit(&r->cloud, &r->cloud_site, r->site->scene, &in, r->triangle, CELL_M,
-                                                   &r->progress, &f->density, &f->density_all, err);
+    const struct cloud_compared compared = {&r->cloud, &r->cloud_site, r->distance_m, r->triangle};
+    const struct figures_on_scene in = {&compared, r->site->scene, r->points.range_m};
+    int rc = r->cell_m > 0.0 ? figures_density_of(&in, r->cell_m, &r->progress, &f->density, err)
+                             : figures_density_fit(&in, CELL_M, &r->progress, &f->density, &f->density_all, err);
     if (rc != SH_OK) return rc;
     figures_density_within(&f->density, 0, 0.0, (double)INFINITY, &f->density_all);
     for (uint32_t k = 0; k < f->n_ranges; k++)

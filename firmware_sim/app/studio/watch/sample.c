@@ -139,11 +139,11 @@ int watch_sample_compare(struct watch *w, struct sh_err *err)
     const int64_t from_ns = clock_thread_ns();
     const struct cloud cloud = {.n = n, .xyz_m = s->xyz_m + first, .epsg = CLOUD_EPSG_UNKNOWN};
     const struct cloud_site site = {.index = w->index, .n_stations = 1, .max_m = REACH_M, .threads = 1};
+    const struct cloud_compared compared = {&cloud, &site, s->distance_m + first, s->triangle + first};
     const struct deviation_points points = points_from(&s->points, first);
     int rc = cloud_compare(&cloud, &site, NULL, s->distance_m + first, s->triangle + first, err);
     if (rc == SH_OK && w->site->moving) without_beams(&points, s->triangle + first, n);
-    if (rc == SH_OK && !w->site->moving)
-        rc = deviation_along(&cloud, &site, &w->now, s->distance_m + first, s->triangle + first, NULL, &points, err);
+    if (rc == SH_OK && !w->site->moving) rc = deviation_along(&compared, &w->now, NULL, &points, err);
     if (rc != SH_OK) return rc;
     for (size_t i = first; i < s->n; i++)
         if (s->distance_m[i] <= w->seen.cell_m) watch_seen_mark(&w->seen, w->at.station, s->points.met[i], s->xyz_m[i]);
@@ -174,15 +174,16 @@ static void put_histogram(const struct figures_histogram *h, int along, struct w
 
 _Static_assert((int)FIGURES_MAX_BINS <= 2 * (int)WATCH_BINS, "two bins become one, not more");
 
-static int density(struct watch *w, const struct cloud *cloud, const struct figures_in *in, struct sh_err *err)
+static int density(struct watch *w, const struct cloud *cloud, struct sh_err *err)
 {
     struct watch_sample *s = &w->sample;
     const struct cloud_site site = {.index = w->index, .n_stations = 1, .max_m = REACH_M, .threads = 1};
+    const struct cloud_compared compared = {cloud, &site, s->distance_m, s->triangle};
+    const struct figures_on_scene in = {&compared, w->site->scene, s->points.range_m};
     struct figures_density all;
     /* While points come the cells get smaller bit by bit; in the end they are those of a report. */
     const double first_m = w->at.over ? CELL_M : fmax(0.5 * s->cell_m, CELL_M);
-    const int rc =
-        figures_density_fit(cloud, &site, w->site->scene, in, s->triangle, first_m, NULL, &all, &w->at.density, err);
+    const int rc = figures_density_fit(&in, first_m, NULL, &all, &w->at.density, err);
     if (rc != SH_OK) return rc;
     w->at.density_cell_m = s->cell_m = all.cell_m;
     figures_density_free(&all);
@@ -211,7 +212,7 @@ int watch_sample_figures(struct watch *w, struct sh_err *err)
     const struct cloud cloud = {.n = s->n, .xyz_m = s->xyz_m, .epsg = CLOUD_EPSG_UNKNOWN};
     struct figures_histogram h;
     int rc = figures_by(&in, 1, everything, NULL, &w->at.figures, err);
-    if (rc == SH_OK) rc = density(w, &cloud, &in, err);
+    if (rc == SH_OK) rc = density(w, &cloud, err);
     if (rc != SH_OK) return rc;
     const int along = w->at.figures.along > 0;
     if (along)

@@ -7,35 +7,10 @@
  *   import_child.c     the other process: its limits, its messages, its work, or the program that does it
  *   import_assimp.c    the work: Assimp's nodes and meshes into a builder, as the other readers fill one
  *   import_result.c    the scene on its way back: written there, read and checked here */
-#ifndef CORE_IMPORT_IMPORT_H
-#define CORE_IMPORT_IMPORT_H
+#ifndef CORE_IMPORT_IMPORT_APART_H
+#define CORE_IMPORT_IMPORT_APART_H
 
-#include <sys/types.h>
-
-#include "core/import/readers.h"
-
-/* ---- messages of the child, by a pipe, each written in one piece */
-
-enum import_note_kind { IMPORT_WARNING = 1, IMPORT_PROGRESS, IMPORT_ERROR };
-
-struct import_note {
-    int32_t kind, code; /* code: of an error */
-    double fraction;    /* of a progress */
-    char text[512];
-};
-
-/* The child gets this. */
-struct import_task {
-    struct scene_build *b; /* of the parent; the child only reads it */
-    struct scene_import_limits limits;
-    const char *name;        /* of the reader, for messages */
-    const char *const *argv; /* a program that reads, NULL-terminated, found by PATH; NULL: `read`, in a fork */
-    int (*read)(struct scene_build *b, struct sh_err *err); /* fills a builder of the fork */
-    pid_t parent;
-    int result_fd, note_fd; /* the scene, the messages; a program finds them as 3 and 4 */
-};
-
-/* ---- import_apart.c */
+#include "core/import/import_child.h"
 
 /* At the end of errors, after ": ". */
 #define IMPORT_ELSE_CONVERT "export the mesh again, or convert it to .obj or .ply"
@@ -65,23 +40,5 @@ void import_watch(struct import_apart *const a[], size_t n);
 /* Returns how the process ended: 0, or the error. With 0, result_fd has its result. */
 int import_judge(struct import_apart *a, struct sh_err *err);
 void import_close(struct import_apart *a);
-
-/* ---- import_child.c */
-
-/* Reads the file that b is at, in a process that was just forked with all signals blocked. Exit status 0: the
- * scene is written. */
-_Noreturn void import_child(const struct import_task *task);
-
-/* ---- import_assimp.c: fills b as a reader does. Needs the whole process: Assimp's logger is global. */
-int import_assimp(struct scene_build *b, struct sh_err *err);
-
-/* ---- import_result.c */
-
-/* Writes the scene to an empty file. Its arrays are released on the way. */
-int import_result_write(struct scene *scene, int fd, struct sh_err *err);
-
-/* Adds the scene in the file to b, after b's other files. Nothing in it is trusted: SH_EINPUT says what is
- * wrong. The parts that have been read are cut out of the file, to free memory. */
-int import_result_read(struct scene_build *b, int fd, struct sh_err *err);
 
 #endif

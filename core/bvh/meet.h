@@ -1,0 +1,11 @@
+/* SPDX-License-Identifier: MIT */
+/* Private to core/bvh: a packet meets a leaf, in double. */
+#ifndef CORE_BVH_MEET_H
+#define CORE_BVH_MEET_H
+
+#include "core/embree.h"
+
+/* Embree's callback. */
+void bvh_meet_leaf(const struct RTCIntersectFunctionNArguments *args);
+
+#endif

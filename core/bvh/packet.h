@@ -1,0 +1,90 @@
+/* SPDX-License-Identifier: MIT */
+/* Private to core/bvh: Embree casts packets of rays, and leaves see their state in double. */
+#ifndef CORE_BVH_PACKET_H
+#define CORE_BVH_PACKET_H
+
+#include <math.h>
+#include <stddef.h>
+
+#include "core/bvh.h"
+#include "core/embree.h"
+
+/* A surface no further than this from a ray's origin is no hit: the ray begins on it, and goes on. This is
+ * half of the wire's finest count, and far more than rounding makes of zero. */
+#define BVH_AT_ORIGIN_M 5e-7
+/* Ranges that differ by no more than this share of them are the same. */
+#define BVH_SAME 1e-12
+
+enum { BVH_PACKET = 16 };
+
+#if RTC_VERSION_MAJOR >= 4
+typedef struct RTCRayQueryContext bvh_context;
+#else
+typedef struct RTCIntersectContext bvh_context;
+#endif
+
+/* A packet in double, as leaves see it. Embree passes its context on, which is the first member. */
+struct bvh_nested;
+struct bvh_query {
+    bvh_context context;
+    const struct bvh *bvh;
+    struct bvh_nested *nested; /* for copies; of a query within a copy: NULL */
+    double at_origin_m;        /* no hit is nearer than this */
+    uint32_t width;            /* rays of the call */
+    int has_own;               /* each ray begins at its own point, org; else all begin at `at` */
+    double at[3], at_local[3]; /* prcs; from the BVH's origin */
+    double far_m;              /* no ray begins further from the BVH's origin */
+    double most_m;             /* of a float ray, as in struct bvh_batch */
+    double dir[3][BVH_PACKET]; /* of lanes without a ray: any */
+    const float *dir_float;    /* [3][BVH_PACKET] the same for Embree; NULL: the packet is smaller */
+    double org[3][BVH_PACKET], local[3][BVH_PACKET];
+    double start_m[BVH_PACKET];    /* where the float ray begins, along the ray */
+    double range_m[BVH_PACKET];    /* out: of the nearest so far; INFINITY: none */
+    uint32_t triangle[BVH_PACKET]; /* out: the hit */
+    double hit_m[BVH_PACKET];      /* out: its range */
+    uint32_t unsure;               /* a bit for each ray that may have another hit of lower number */
+    double near_m[BVH_PACKET];     /* of the nearest triangle that is missed by rounding alone; INFINITY: none */
+    uint32_t near[BVH_PACKET];
+    uint64_t decided, leaves; /* struct bvh_counters */
+} __attribute__((aligned(64)));
+
+/* A packet within a copy. */
+struct bvh_nested {
+    struct bvh_query query;
+    struct RTCRayHit16 rays; /* or fewer */
+    int valid[BVH_PACKET];
+} __attribute__((aligned(64)));
+
+/* A field of `width` rays, which has as many elements, from the names of struct RTCRayHit. Embree has accessors for C++
+ * alone. */
+#define bvh_field(rays, width, name) \
+    ((float *)(void *)(rays) + offsetof(struct RTCRay, name) / sizeof(float) * (size_t)(width))
+_Static_assert(offsetof(struct RTCRay16, tfar) == 16 * offsetof(struct RTCRay, tfar), "field by field");
+
+/* Embree's context at its beginning; `width` rays through the BVH. */
+void bvh_begin_query(struct bvh_query *query);
+void bvh_call_embree(const struct bvh *bvh, struct bvh_query *query, const int *valid, void *rays, uint32_t width);
+
+/* Forgets the near misses of the packet before. */
+static inline void bvh_forget_near(struct bvh_query *query)
+{
+    for (uint32_t i = 0; i < BVH_PACKET; i++) {
+        query->near_m[i] = INFINITY;
+        query->near[i] = BVH_NO_TRIANGLE;
+    }
+}
+
+/* Casts n <= BVH_CHUNK rays, whose float directions and origins are given. */
+struct bvh_batch {
+    const struct bvh_rays *rays;
+    struct vec3_floats dir, org; /* org.x NULL: all at at_local */
+    const double *start_m;       /* NULL: 0 */
+    struct vec3_in local;        /* origins from the BVH's origin; x NULL: all at at_local */
+    double at_local[3], far_m;
+    float t_max;
+    double most_m;                 /* of a float ray; INFINITY: what is further than t_max may or may not be met */
+    struct bvh_counters *counters; /* counted up */
+};
+void bvh_intersect(const struct bvh *bvh, struct bvh_query *query, struct bvh_batch *batch);
+
+#endif

@@ -1,0 +1,12 @@
+/* SPDX-License-Identifier: MIT */
+/* Private to core/bvh: planes of triangles, in double, give rays their labels and steepness. */
+#ifndef CORE_BVH_PLANES_H
+#define CORE_BVH_PLANES_H
+
+#include "core/bvh.h"
+
+int bvh_make_planes(struct bvh *bvh, const struct sh_report *report, struct sh_err *err);
+/* Fills labels and steepness of all rays; those that hit nothing get the values of a miss. */
+void bvh_refine(const struct bvh *bvh, const struct bvh_rays *rays);
+
+#endif

@@ -1,0 +1,14 @@
+/* SPDX-License-Identifier: MIT */
+/* Private to core/cast: this stage turns angles into directions and origins of beams, and into what the encoders
+ * read. */
+#ifndef CORE_CAST_AIM_H
+#define CORE_CAST_AIM_H
+
+struct caster;
+struct chunk;
+
+void caster_aim(struct caster *c, struct chunk *k);
+/* Computes e of the list again, after the encoders' angles have changed. */
+void caster_aim_read(struct caster *c, struct chunk *k);
+
+#endif

@@ -1,0 +1,31 @@
+/* SPDX-License-Identifier: MIT */
+/* Private to core/cast: a thread has this working memory. Each stage of a pulse finds there what earlier stages have
+ * left. */
+#ifndef CORE_CAST_CASTER_H
+#define CORE_CAST_CASTER_H
+
+#include "core/cast/echoes.h"
+#include "core/cast/kernels_sweep.h"
+#include "core/cast/nearest.h"
+#include "core/cast/optics.h"
+
+struct sub_ray_work;
+
+struct caster {
+    struct nearest nearest;
+    struct sub_ray_work *sub_rays; /* touched only where pulses have a footprint */
+    struct bvh_profile *profile;
+    struct cast_counters counters;
+    struct kernel_steps steps; /* of the run at hand */
+    struct chunk_vectors d;    /* direction of the beam, prcs */
+    uint32_t hit[CHUNK_ROOM];
+    uint8_t body[CHUNK];
+    struct echo_list list;
+    /* touched only where the head moves, or is not ideal: */
+    struct chunk_vectors socs, read; /* directions, socs: of the beam; as the encoders read it, or its origin */
+    struct chunk_vectors origin;     /* of beams that don't begin where the head is, prcs */
+    struct path_rays paths;          /* touched only where there is glass or a mirror */
+    uint32_t further_a[CAST_LIST], further_b[CAST_LIST], further_c[CAST_LIST]; /* on their way into the block */
+};
+
+#endif

@@ -1,0 +1,48 @@
+/* SPDX-License-Identifier: MIT */
+/* Private to core/cast: this stage turns hits into the echoes that the head reports. It keeps them in a list. */
+#ifndef CORE_CAST_ECHOES_H
+#define CORE_CAST_ECHOES_H
+
+#include "core/cast/chunk_arrays.h"
+
+/* Echoes of a pulse after its first one: entries at .. at + n of the list. */
+struct further {
+    uint32_t pulse, at, n;
+};
+
+/* The echoes of a chunk. Entry i < pulses is the first of pulse i, or says that it has none (range NaN):
+ * single rays are in their places without being moved. Further ones follow, those of a pulse together, by
+ * range. */
+struct echo_list {
+    uint32_t n;
+    uint32_t n_further; /* pulses with further echoes, in order */
+    struct further further[CHUNK];
+    double range_m[CAST_LIST]; /* NaN: no echo */
+    uint32_t label[CAST_LIST];
+    double mirror_turn[CAST_LIST], pan_turn[CAST_LIST]; /* as the encoders read them */
+    struct list_vectors e; /* direction as the encoders read it, then the position; geo layout */
+    struct list_vectors p; /* where the head is, prcs; touched only where it moves */
+    /* touched only where something asks for it: */
+    uint8_t number[CAST_LIST]; /* among the pulse's echoes, from 0, left-out ones included */
+    uint64_t key[CAST_LIST];   /* for random numbers */
+    double cosine[CAST_LIST];
+    double energy[CAST_LIST]; /* share of the pulse's energy that took this way */
+    double rho[CAST_LIST];    /* what comes back of it; the energy itself where surfaces are not modelled */
+    uint8_t ghost[CAST_LIST];
+    double amplitude[CAST_LIST];
+    int16_t refl_cdb[CAST_LIST], amplitude_cdb[CAST_LIST];
+    float width_m[CAST_LIST];
+    uint32_t colour[CAST_LIST]; /* packed */
+};
+
+struct caster;
+struct chunk;
+
+/* Further echoes of a pulse: room for n at the end of the list. Returns the first. */
+uint32_t echoes_further(struct echo_list *list, uint32_t pulse, uint32_t n);
+/* The list has a place for each pulse. */
+void caster_echoes(struct caster *c, const struct chunk *k);
+/* How many echoes a pulse may send. */
+uint32_t caster_max_echoes(const struct cast_setup *s);
+
+#endif

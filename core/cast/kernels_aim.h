@@ -1,0 +1,32 @@
+/* SPDX-License-Identifier: MIT */
+/* Private to core/cast: these loops over arrays find where the pulses of a run go. Compilers turn them into vector
+ * code. */
+#ifndef CORE_CAST_KERNELS_AIM_H
+#define CORE_CAST_KERNELS_AIM_H
+
+#include "core/cast.h"
+
+/* Mirror and pan angle of n pulses of a run, from its pulse `first` on. */
+void kernel_angles(const struct schedule_run *run, uint32_t first, uint32_t n, double *mirror_turn, double *pan_turn);
+/* The same for a run with a table. */
+void kernel_angles_table(const struct schedule_run *run, uint32_t first, uint32_t n, double *mirror_turn,
+                         double *pan_turn);
+
+/* Angles of the axes, in turns. */
+struct kernel_turns {
+    uint32_t n;
+    const double *mirror, *pan;
+};
+/* Directions in prcs: rotation times (sin p cos m, cos p cos m, sin m). */
+void kernel_directions(const struct kernel_turns *turns, const double rotation[9], const struct vec3_out *d);
+/* Directions as the encoders read them, in whole counts: how they are turned, and where they go. */
+struct kernel_reading {
+    const struct cast_setup *setup; /* has the counts */
+    const double *rotation;         /* to the frame of positions */
+    struct vec3_out e;
+};
+/* As kernel_directions, and the directions that are read as well. */
+void kernel_directions_read(const struct kernel_turns *turns, const double rotation[9], const struct vec3_out *d,
+                            const struct kernel_reading *reading);
+
+#endif

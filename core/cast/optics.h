@@ -1,0 +1,45 @@
+/* SPDX-License-Identifier: MIT */
+/* Private to core/cast: this stage follows rays through glass and off mirrors. */
+#ifndef CORE_CAST_OPTICS_H
+#define CORE_CAST_OPTICS_H
+
+#include "core/cast/chunk_arrays.h"
+
+enum { CAST_NO_PATH = 0xffffffff };
+
+/* The hit of a ray after it passed glass or left a mirror. */
+struct path_hit {
+    double range_m, cosine, energy; /* along the folded way; the share of the ray's energy */
+    uint32_t label, next;           /* the ray's next one, or CAST_NO_PATH */
+    uint32_t triangle, colour;
+    uint8_t ghost, body;
+};
+
+/* Rays that go on through glass or off a mirror: their origins, directions, and hits before. */
+struct path_rays {
+    uint32_t n;
+    uint32_t ray[CHUNK]; /* number of the ray that each goes on from */
+    struct chunk_vectors p, d;
+    double length_m[CHUNK]; /* of the way so far */
+    double energy[CHUNK];
+    uint8_t ghost[CHUNK];
+    double range_m[CHUNK], cosine[CHUNK];
+    uint32_t label[CHUNK], hit[CHUNK], colour[CHUNK];
+    uint8_t body[CHUNK];
+    /* hits on the paths, chained per ray: first[i] .. last[i] */
+    uint32_t first[CHUNK], last[CHUNK];
+    uint32_t n_found;
+    struct path_hit found[CAST_FOUND];
+};
+
+struct nearest;
+struct met;
+
+/* True for glass and mirrors, where detection has a depth. */
+int caster_goes_on(const struct cast_setup *s, uint32_t label);
+/* A bare pane or mirror sends nothing back: no echo, whether there is a signal model or not. */
+int caster_is_bare(const struct cast_setup *s, uint32_t label, double rho);
+/* Follows up to CHUNK rays through glass and off mirrors. Their hits are chains in p. */
+void caster_follow(struct nearest *w, const struct cast_setup *s, const struct met *first, struct path_rays *p);
+
+#endif

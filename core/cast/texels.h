@@ -1,0 +1,14 @@
+/* SPDX-License-Identifier: MIT */
+/* Private to core/cast: this finds the place on a texture, or between vertices, where rays have hit a mesh. */
+#ifndef CORE_CAST_TEXELS_H
+#define CORE_CAST_TEXELS_H
+
+#include "core/cast.h"
+
+struct met;
+
+/* Labels of hits get the reflectance there, as surface_texel has it, and met->colour gets the colour. Does nothing
+ * where surfaces have no textures and no colours are asked for. */
+void caster_texels(const struct cast_setup *s, const struct met *met);
+
+#endif

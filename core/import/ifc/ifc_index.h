@@ -1,0 +1,34 @@
+/* SPDX-License-Identifier: MIT */
+/* This finds the records of an IFC file by number. In: a path. Out: records whose references lead to records. */
+#ifndef CORE_IMPORT_IFC_IFC_INDEX_H
+#define CORE_IMPORT_IFC_IFC_INDEX_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "core/import/ifc/step.h"
+
+struct ifc_index {
+    struct text text;
+    struct step_record *record; /* [n] by id */
+    size_t n, room;
+};
+
+/* ifc_index_close is due in any case. Errors (SH_EINPUT) name file, line and record: a file that is cut off, a number
+ * that two records have, a reference to a record that is not there. No reader of bodies reports any of these. */
+int ifc_index_open(struct ifc_index *x, const char *path, struct sh_err *err);
+void ifc_index_close(struct ifc_index *x);
+
+/* NULL: there is none of that number. */
+const struct step_record *ifc_index_find(const struct ifc_index *x, uint64_t id);
+
+/* "FILE, line N: TYPE #n: what": SH_EINPUT. */
+int ifc_index_fail(const struct ifc_index *x, const struct step_record *at, struct sh_err *err, const char *what);
+
+/* The next record number in a list of attributes, from *p on; texts are passed over. 0: there is none. */
+uint64_t ifc_next_reference(const char **p, const char *end);
+
+/* The place of the first entry of a sorted list whose number, its first member, is id or above; n: there is none. */
+size_t ifc_first(const void *list, size_t n, size_t size, uint64_t id);
+
+#endif

@@ -1,0 +1,30 @@
+/* SPDX-License-Identifier: MIT */
+/* The records of an IFC file say this of a product, and marks say what its geometry consists of. */
+#ifndef CORE_IMPORT_IFC_IFC_PRODUCT_H
+#define CORE_IMPORT_IFC_IFC_PRODUCT_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "core/text.h"
+
+struct ifc_product {
+    uint64_t id;
+    struct text_span type; /* as the file has it, in capitals */
+    char *guid, *name;     /* UTF-8, whole; may be empty */
+    uint64_t shape;        /* its IfcProductDefinitionShape; 0: none */
+    bool is_air;           /* an opening, a space, a grid or an annotation: no surface */
+    bool opens_nothing;    /* an opening that no IfcRelVoidsElement names */
+    bool has_body;         /* its shape, walked through, has a solid or a surface */
+    bool is_curved;
+    bool is_coarse;                /* curved, and the body is ifc-lite's, which cuts circles up by levels of its own */
+    bool is_turned;                /* it has a solid that is turned about an axis */
+    double points_m;               /* largest coordinate of its points */
+    bool is_far;                   /* it has points beyond 1 km of their own origin */
+    struct text_span assimp_wrong; /* the first entity in it that Assimp is known to get wrong; n 0: none */
+    uint32_t *style;               /* [n_styles] of its items, places in the records' style */
+    size_t n_styles, room_styles;
+};
+
+#endif

@@ -1,0 +1,13 @@
+/* SPDX-License-Identifier: MIT */
+/* This finds the unit of length of an IFC file. */
+#ifndef CORE_IMPORT_IFC_IFC_UNIT_H
+#define CORE_IMPORT_IFC_IFC_UNIT_H
+
+#include "core/import/ifc/ifc_index.h"
+
+/* Metres per unit of length, as the project says; SH_EINPUT where it doesn't. *m is good on success. */
+int ifc_unit_find(const struct ifc_index *x, double *m, struct sh_err *err);
+/* Likewise of one record. */
+int ifc_unit_of(const struct ifc_index *x, const struct step_record *unit, double *m, struct sh_err *err);
+
+#endif

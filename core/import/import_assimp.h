@@ -1,0 +1,11 @@
+/* SPDX-License-Identifier: MIT */
+/* Assimp reads the formats that no reader of ours reads. */
+#ifndef CORE_IMPORT_IMPORT_ASSIMP_H
+#define CORE_IMPORT_IMPORT_ASSIMP_H
+
+#include "core/scene/build.h"
+
+/* Fills b as a reader does. Needs the whole process: Assimp's logger is global. */
+int import_assimp(struct scene_build *b, struct sh_err *err);
+
+#endif

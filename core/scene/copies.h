@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: MIT */
+/* These functions make copies of meshes, and keep part of them. */
+#ifndef CORE_SCENE_COPIES_H
+#define CORE_SCENE_COPIES_H
+
+#include "core/scene.h"
+
+/* Adds the mesh, which the scene owns from then on, at all these places. */
+int scene_add_copies(struct scene *scene, struct scene *mesh, const struct scene_places *places,
+                     const struct sh_report *report, struct sh_err *err);
+
+/* Part of scene_keep: each copy keeps what its labels say, and is removed where that is nothing. label: new labels, by
+ * old ones. SH_EINPUT where copies of a mesh would keep different surfaces. */
+int scene_keep_copies(struct scene *scene, const uint8_t *keep, const uint16_t *label, struct sh_err *err);
+
+#endif

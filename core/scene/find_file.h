@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: MIT */
+/* A mesh names files: libraries of materials, and textures. Folders are paths up to their last slash, and may be
+ * empty. */
+#ifndef CORE_SCENE_FIND_FILE_H
+#define CORE_SCENE_FIND_FILE_H
+
+#include "core/text.h"
+
+struct text_span build_folder_of(const char *path);
+/* The path, with / for \\, to be freed; NULL: no memory. */
+char *build_join(struct text_span folder, struct text_span name);
+/* The file of that name: in one of the folders, then by its last part there; then both without regard to case. To be
+ * freed; NULL: it is nowhere. */
+char *build_find_file(const struct text_span *folder, size_t n, struct text_span name);
+
+#endif
