@@ -8,7 +8,8 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "drivers/host/host.h"
+#include "drivers/host/source.h"
+#include "drivers/protocol/native.h"
 #include "drivers/protocol/pcapng.h"
 
 struct host_capture {
