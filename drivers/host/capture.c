@@ -8,7 +8,8 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "drivers/host/host.h"
+#include "drivers/host/source.h"
+#include "drivers/protocol/native.h"
 #include "drivers/protocol/pcapng.h"
 
 struct host_capture {
@@ -46,9 +47,8 @@ static int next_packet(struct host_source *source)
     struct pcapng_packet packet;
     struct sh_err unsaid;
     for (;;) {
-        size_t used, needed;
-        const int item =
-            pcapng_read(&c->reader, c->buf + c->start, c->end - c->start, &packet, &used, &needed, &unsaid);
+        size_t used;
+        const int item = pcapng_read(&c->reader, c->buf + c->start, c->end - c->start, &packet, &used, &unsaid);
         c->start += used;
         if (item == PCAPNG_PACKET && packet.link == PCAPNG_USER0 && packet.len != 0) {
             c->data = packet.data;
@@ -56,7 +56,7 @@ static int next_packet(struct host_source *source)
             return 1;
         }
         if (item > 0) continue;
-        c->is_raw = item < 0 || needed > sizeof c->buf;
+        c->is_raw = item < 0 || c->reader.needed > sizeof c->buf;
         if (c->is_raw) return 1;
         const ssize_t n = fill(source);
         if (n < 0) return -1;
@@ -113,7 +113,7 @@ static int check_front(struct host_source *source, struct sh_err *err)
     struct sh_err why;
     size_t used, at = 0;
     while (c->reader.n_interfaces == 0) {
-        const int item = pcapng_read(&c->reader, c->buf + at, c->end - at, &packet, &used, NULL, &why);
+        const int item = pcapng_read(&c->reader, c->buf + at, c->end - at, &packet, &used, &why);
         if (item < 0) return sh_fail(err, SH_EFORMAT, "%s: %s", source->name, why.text);
         if (item == PCAPNG_MORE)
             return sh_fail(err, SH_EFORMAT, "%s: no pcapng: no interface is described at its beginning", source->name);

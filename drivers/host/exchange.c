@@ -5,7 +5,7 @@
 #include <string.h>
 #include <strings.h>
 
-#include "drivers/host/host.h"
+#include "drivers/host/exchange.h"
 
 enum { COMMAND_MAX = 1024, STALE_READS = 32, ANSWERS_MS = 200, ASK_AGAIN_MS = 1000 };
 

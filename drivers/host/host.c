@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "drivers/host/host.h"
+#include "drivers/host/exchange.h"
 
 #include <stdio.h>
 #include <stdlib.h>

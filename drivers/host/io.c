@@ -8,7 +8,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "drivers/host/host.h"
+#include "drivers/host/exchange.h"
 
 int64_t host_deadline_ns(int timeout_ms)
 {

@@ -15,7 +15,7 @@
 #include <termios.h>
 #include <unistd.h>
 
-#include "drivers/host/host.h"
+#include "drivers/host/source.h"
 
 enum { CONNECT_TIMEOUT_MS = 10000, RECEIVE_BUFFER = 4 << 20 };
 

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "drivers/host/scanhead.h"
 #include "drivers/host/usb_inside.h"
 
 #define RULE                                                                                                 \

@@ -8,7 +8,7 @@
 
 #include <libusb.h>
 
-#include "drivers/host/host.h"
+#include "drivers/host/source.h"
 
 enum {
     USB_CLASS = 0xff,

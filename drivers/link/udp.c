@@ -250,18 +250,25 @@ static int bind_source(int fd, const struct link_spec *spec, const struct sockad
     return 0;
 }
 
-static int connect_to(int fd, const struct link_spec *spec, const struct sockaddr_storage *to, socklen_t len,
-                      const struct network *net, int broadcast, char notice[200])
+/* Where packets go. */
+struct receiver {
+    struct sockaddr_storage at;
+    socklen_t len;
+    struct network net;
+    int broadcast;
+};
+
+static int connect_to(int fd, const struct link_spec *spec, const struct receiver *to, char notice[200])
 {
     const int one = 1, size = SEND_BUFFER_BYTES;
     struct sockaddr_storage from;
     setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &size, sizeof size);
-    if (broadcast && setsockopt(fd, SOL_SOCKET, SO_BROADCAST, &one, sizeof one) != 0) return -1;
-    if (set_way(fd, spec, (const struct sockaddr *)to) != 0) return -1;
-    const int has_source = find_source(spec, to, len, net, &from);
+    if (to->broadcast && setsockopt(fd, SOL_SOCKET, SO_BROADCAST, &one, sizeof one) != 0) return -1;
+    if (set_way(fd, spec, (const struct sockaddr *)&to->at) != 0) return -1;
+    const int has_source = find_source(spec, &to->at, to->len, &to->net, &from);
     if (has_source < 0) return -1;
-    if (has_source && bind_source(fd, spec, to, len, &from, notice) != 0) return -1;
-    return connect(fd, (const struct sockaddr *)to, len);
+    if (has_source && bind_source(fd, spec, &to->at, to->len, &from, notice) != 0) return -1;
+    return connect(fd, (const struct sockaddr *)&to->at, to->len);
 }
 
 /* ", from 127.0.0.2:2368" for errors. */
@@ -274,17 +281,14 @@ static void source_text(const struct link_spec *spec, char *text, size_t size)
 
 static int udp_open(const struct link_spec *spec, void **link, struct sh_err *err)
 {
-    struct sockaddr_storage to;
-    socklen_t len = 0;
-    struct network net;
-    int broadcast = 0;
-    int rc = find_receiver(spec, &to, &len, err);
-    if (rc == SH_OK) rc = check_receiver(spec, (struct sockaddr *)&to, &net, &broadcast, err);
+    struct receiver to = {.len = 0};
+    int rc = find_receiver(spec, &to.at, &to.len, err);
+    if (rc == SH_OK) rc = check_receiver(spec, (struct sockaddr *)&to.at, &to.net, &to.broadcast, err);
     if (rc != SH_OK) return rc;
     struct udp_link *udp = calloc(1, sizeof *udp);
     if (udp == NULL) return sh_fail(err, SH_ENOMEM, "link udp:%s:%d: no memory", host_of(spec), spec->port);
-    udp->fd = socket(to.ss_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    if (udp->fd < 0 || connect_to(udp->fd, spec, &to, len, &net, broadcast, udp->notice) != 0) {
+    udp->fd = socket(to.at.ss_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    if (udp->fd < 0 || connect_to(udp->fd, spec, &to, udp->notice) != 0) {
         const int why = errno;
         char from[96];
         source_text(spec, from, sizeof from);
@@ -299,7 +303,7 @@ static int udp_open(const struct link_spec *spec, void **link, struct sh_err *er
         return rc;
     }
     char at[72];
-    socket_address_text((struct sockaddr *)&to, len, at, sizeof at);
+    socket_address_text((struct sockaddr *)&to.at, to.len, at, sizeof at);
     snprintf(udp->name, sizeof udp->name, "udp:%s", at);
     *link = udp;
     return SH_OK;

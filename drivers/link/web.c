@@ -20,7 +20,7 @@
 #include <strings.h>
 #include <unistd.h>
 
-#include "drivers/link/link_poll.h"
+#include "drivers/link/link_events.h"
 #include "drivers/link/web_inside.h"
 #include "drivers/socket/socket.h"
 

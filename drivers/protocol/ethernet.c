@@ -153,34 +153,29 @@ static void put_syn_options(uint8_t *to)
     put16(to + 2, ETHERNET_MAX_SEGMENT);
 }
 
-size_t ethernet_put_tcp(uint8_t *to, const struct ethernet_end *from, const struct ethernet_end *dest, uint32_t seq,
-                        uint32_t ack, unsigned flags, const void *data, size_t data_len)
+/* ---- a connection */
+
+/* A segment with TCP_SYN offers segments of ETHERNET_MAX_SEGMENT and windows of 8 MiB. len <= ETHERNET_MAX_SEGMENT. */
+static size_t put_segment(struct tcp_talk *talk, int side, unsigned flags, const void *data, size_t len, uint8_t *to)
 {
-    const size_t head = TCP_LEN + ((flags & TCP_SYN) != 0 ? SYN_OPTIONS_LEN : 0), len = head + data_len;
-    uint8_t *tcp = put_front(to, from, dest, PROTOCOL_TCP, len);
+    const struct ethernet_end *from = &talk->end[side], *dest = &talk->end[!side];
+    const uint32_t ack = (flags & TCP_ACK) != 0 ? talk->next[!side] : 0;
+    const size_t head = TCP_LEN + ((flags & TCP_SYN) != 0 ? SYN_OPTIONS_LEN : 0);
+    uint8_t *tcp = put_front(to, from, dest, PROTOCOL_TCP, head + len);
     put16(tcp, from->port);
     put16(tcp + 2, dest->port);
-    put32(tcp + 4, seq);
+    put32(tcp + 4, talk->next[side]);
     put32(tcp + 8, ack);
     tcp[12] = (uint8_t)(head / 4 << 4);
     tcp[13] = (uint8_t)flags;
     put16(tcp + 14, WINDOW);
     put32(tcp + 16, 0);
     if ((flags & TCP_SYN) != 0) put_syn_options(tcp + TCP_LEN);
-    if (data_len > 0) memcpy(tcp + head, data, data_len);
-    put16(tcp + 16, checksum(tcp, len, from, dest, PROTOCOL_TCP));
-    return (size_t)(tcp - to) + len;
-}
-
-/* ---- a connection */
-
-static size_t put_segment(struct tcp_talk *talk, int side, unsigned flags, const void *data, size_t len, uint8_t *to)
-{
-    const uint32_t ack = (flags & TCP_ACK) != 0 ? talk->next[!side] : 0;
-    const size_t n = ethernet_put_tcp(to, &talk->end[side], &talk->end[!side], talk->next[side], ack, flags, data, len);
+    if (len > 0) memcpy(tcp + head, data, len);
+    put16(tcp + 16, checksum(tcp, head + len, from, dest, PROTOCOL_TCP));
     talk->next[side] += (uint32_t)len + ((flags & (TCP_SYN | TCP_FIN)) != 0);
     if ((flags & TCP_ACK) != 0) talk->acked[side] = ack;
-    return n;
+    return (size_t)(tcp - to) + head + len;
 }
 
 size_t tcp_put_syn(struct tcp_talk *talk, int side, uint8_t *to)

@@ -37,11 +37,6 @@ size_t ethernet_put_udp(uint8_t *to, const struct ethernet_end *from, const stru
 
 enum { TCP_FIN = 1, TCP_SYN = 2, TCP_RST = 4, TCP_PSH = 8, TCP_ACK = 16 };
 
-/* A segment with TCP_SYN offers segments of ETHERNET_MAX_SEGMENT and windows of 8 MiB. data_len <=
- * ETHERNET_MAX_SEGMENT. */
-size_t ethernet_put_tcp(uint8_t *to, const struct ethernet_end *from, const struct ethernet_end *dest, uint32_t seq,
-                        uint32_t ack, unsigned flags, const void *data, size_t data_len);
-
 /* ---- a connection, as segments with the numbers that each end would send */
 
 struct tcp_talk {               /* begins with both ends, and zeros */

@@ -228,19 +228,17 @@ static const char *check_front(const struct pcapng_reader *reader, const uint8_t
 }
 
 int pcapng_read(struct pcapng_reader *reader, const uint8_t *bytes, size_t len, struct pcapng_packet *packet,
-                size_t *used, size_t *needed, struct sh_err *err)
+                size_t *used, struct sh_err *err)
 {
-    size_t unasked;
-    if (needed == NULL) needed = &unasked;
     *used = 0;
-    *needed = LEAST_BLOCK;
+    reader->needed = LEAST_BLOCK;
     if (len < LEAST_BLOCK) return PCAPNG_MORE;
     const char *why = check_front(reader, bytes, len);
     if (why != NULL) return fail(reader, err, why);
     const uint32_t type = le_get32(bytes), size = le_get32(bytes + 4);
     if (size < LEAST_BLOCK || size % 4 != 0 || size > PCAPNG_MAX_BLOCK)
         return fail(reader, err, "a block's length is not possible");
-    *needed = size;
+    reader->needed = size;
     if (len < size) return PCAPNG_MORE;
     if (le_get32(bytes + size - 4) != size) return fail(reader, err, "the two lengths of a block differ");
     const int item = type == BLOCK_SECTION         ? read_section(reader, bytes, size, err)

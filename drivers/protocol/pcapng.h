@@ -51,6 +51,7 @@ size_t pcapng_put_statistics(uint8_t *to, uint32_t interface, int64_t t_ns, uint
 struct pcapng_reader { /* begins as zeros */
     int in_section;
     uint64_t at_byte; /* of the blocks taken so far */
+    size_t needed;    /* after PCAPNG_MORE: number of bytes known to be needed */
     uint32_t n_interfaces;
     struct pcapng_interface {
         uint16_t link;
@@ -69,10 +70,10 @@ struct pcapng_packet {
 
 enum pcapng_item { PCAPNG_MORE = 0, PCAPNG_PACKET = 1, PCAPNG_OTHER = 2 };
 
-/* Takes the block that the bytes begin with. PCAPNG_MORE: they have no whole block yet; *used is 0, and *needed (may be
- * NULL) is the number of bytes known to be needed. PCAPNG_PACKET and PCAPNG_OTHER: *used bytes were the block.
+/* Takes the block that the bytes begin with. PCAPNG_MORE: they have no whole block yet; *used is 0, and reader->needed
+ * says more. PCAPNG_PACKET and PCAPNG_OTHER: *used bytes were the block.
  * SH_EFORMAT: this is no block; err says at which byte of the file, and why. */
 int pcapng_read(struct pcapng_reader *reader, const uint8_t *bytes, size_t len, struct pcapng_packet *packet,
-                size_t *used, size_t *needed, struct sh_err *err);
+                size_t *used, struct sh_err *err);
 
 #endif

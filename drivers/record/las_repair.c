@@ -84,8 +84,10 @@ int las_repair(struct repair *repair, struct sh_err *err)
     const size_t len = repair->len < sizeof header ? (size_t)repair->len : sizeof header;
     int rc = repair_read(repair, 0, header, len, err);
     if (rc == SH_OK) rc = parse_header(repair, header, len, &r, &front_len, err);
-    if (rc == SH_OK)
-        rc = repair_rows(repair, front_len, r.len, (repair->len - front_len) / r.len, take_record, &r, err);
+    if (rc == SH_OK) {
+        const struct repair_rows rows = {front_len, (repair->len - front_len) / r.len, r.len};
+        rc = repair_rows(repair, &rows, take_record, &r, err);
+    }
     if (rc == SH_OK) rc = make_whole(repair, header, &r, front_len, err);
     repair->unit = "points";
     repair->n_kept = r.facts.n_points;

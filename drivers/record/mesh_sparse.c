@@ -76,13 +76,12 @@ static int add_points(const struct mesh_sparse *sparse, const struct scan_sample
     return rc;
 }
 
-int mesh_sparse_add(const struct mesh_sparse *sparse, const struct mesh_points *points, const uint32_t (*face)[3],
-                    uint32_t n_faces, uint32_t station, uint32_t scan, struct mesh_points *out, double *area_m2,
-                    struct sh_err *err)
+int mesh_sparse_add(const struct mesh_sparse *sparse, const struct mesh_points *points,
+                    const struct mesh_sparse_part *part, struct mesh_points *out, double *area_m2, struct sh_err *err)
 {
     struct scan_sampler sampler;
-    int rc = scan_sampler_start(&sampler, (const double(*)[3])points->xyz_m, face, n_faces,
-                                scan_sampler_key(sparse->seed, station, scan), err);
+    int rc = scan_sampler_start(&sampler, (const double(*)[3])points->xyz_m, part->face, part->n_faces,
+                                scan_sampler_key(sparse->seed, part->station, part->scan), err);
     if (rc == SH_OK) {
         const double n = scan_sampler_count(&sampler, sparse->per_m2);
         *area_m2 += sampler.area_m2;

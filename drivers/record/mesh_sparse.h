@@ -13,11 +13,16 @@ struct mesh_sparse {
     const struct sh_report *report;
 };
 
+/* A part of a mesh: triangles of one station and scan. */
+struct mesh_sparse_part {
+    const uint32_t (*face)[3];
+    uint32_t n_faces, station, scan;
+};
+
 /* Takes one part: its triangles, station and scan (core/studio/scan_mesh.h seeds the points by both). Adds round(area *
  * per_m2) points to `out`, black where points->rgb is NULL. *area_m2 grows by the area. SH_EINPUT with the figures
  * where there are more than a file or memory holds. */
-int mesh_sparse_add(const struct mesh_sparse *sparse, const struct mesh_points *points, const uint32_t (*face)[3],
-                    uint32_t n_faces, uint32_t station, uint32_t scan, struct mesh_points *out, double *area_m2,
-                    struct sh_err *err);
+int mesh_sparse_add(const struct mesh_sparse *sparse, const struct mesh_points *points,
+                    const struct mesh_sparse_part *part, struct mesh_points *out, double *area_m2, struct sh_err *err);
 
 #endif

@@ -73,8 +73,8 @@ static int add_twin(struct unwrap *w, uint32_t point, float du, float dv, uint32
 }
 
 /* Moves corners on the near side of the seam beyond it, if the other corners are more than half a turn away. place:
- * line or row of a point, from 0 on. */
-static int cross_seam(struct unwrap *w, uint32_t face[3], const uint32_t place[3], uint32_t turn, float du, float dv,
+ * line or row of a point, from 0 on. by: the step of uv beyond it. */
+static int cross_seam(struct unwrap *w, uint32_t face[3], const uint32_t place[3], uint32_t turn, const float by[2],
                       struct sh_err *err)
 {
     uint32_t most = place[0];
@@ -83,7 +83,7 @@ static int cross_seam(struct unwrap *w, uint32_t face[3], const uint32_t place[3
     for (int k = 0; k < 3; k++) {
         if (most - place[k] <= turn / 2) continue;
         uint32_t *twin = &w->twin[face[k] - w->grid->first];
-        int rc = *twin == SCAN_MESH_NONE ? add_twin(w, face[k], du, dv, twin, err) : SH_OK;
+        int rc = *twin == SCAN_MESH_NONE ? add_twin(w, face[k], by[0], by[1], twin, err) : SH_OK;
         if (rc != SH_OK) return rc;
         face[k] = *twin;
     }
@@ -114,8 +114,8 @@ static int unwrap_face(struct unwrap *w, uint32_t face[3], struct sh_err *err)
         if (mesh_grid_is_pole(g, g->line[i])) pole = k;
     }
     if (pole >= 0) row[pole] = row[(pole + 1) % 3] > row[(pole + 2) % 3] ? row[(pole + 1) % 3] : row[(pole + 2) % 3];
-    int rc = g->rows_per_turn > 0 ? cross_seam(w, face, row, rows_of(g), 0, 1, err)
-                                  : cross_seam(w, face, line, lines_of(g), 1, 0, err);
+    int rc = g->rows_per_turn > 0 ? cross_seam(w, face, row, rows_of(g), (const float[2]){0, 1}, err)
+                                  : cross_seam(w, face, line, lines_of(g), (const float[2]){1, 0}, err);
     return rc == SH_OK && pole >= 0 ? split_pole(w, face, pole, err) : rc;
 }
 

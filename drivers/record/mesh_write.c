@@ -130,10 +130,9 @@ static int write_sparse(struct mesh_recorder *m, struct sh_err *err)
     for (size_t i = 0; rc == SH_OK && i < m->n_parts; i++) {
         const struct part *p = &m->part[i];
         if (p->n_faces == 0) continue;
-        rc = fail_with_path(m,
-                            mesh_sparse_add(&sparse, &m->points, (const uint32_t(*)[3])m->face + face, p->n_faces,
-                                            p->station, p->scan << 16 | p->sweep, &out, &m->area_m2, &why),
-                            &why, err);
+        const struct mesh_sparse_part part = {(const uint32_t(*)[3])m->face + face, p->n_faces, p->station,
+                                              p->scan << 16 | p->sweep};
+        rc = fail_with_path(m, mesh_sparse_add(&sparse, &m->points, &part, &out, &m->area_m2, &why), &why, err);
         face += p->n_faces;
     }
     if (rc == SH_OK) rc = write_mesh(m, &out, 0, NULL, err);

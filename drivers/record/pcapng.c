@@ -84,7 +84,7 @@ static int take_blocks(struct packets *p)
     struct pcapng_packet packet;
     size_t at = 0, used;
     int item;
-    while ((item = pcapng_read(&p->reader, p->block + at, p->held - at, &packet, &used, NULL, NULL)) > 0) {
+    while ((item = pcapng_read(&p->reader, p->block + at, p->held - at, &packet, &used, NULL)) > 0) {
         if (item == PCAPNG_PACKET) count_packet(p, &packet);
         p->is_noted = is_note(p->block + at, used);
         if (p->reader.at_byte == used) p->is_ours = is_own_section(p->block, used);

@@ -235,7 +235,7 @@ static int read_points(const struct repair *r, const struct ply_header *h, struc
         return rc == SH_OK ? repair_check_rest(r, *end, HEADER_BEGIN, err) : rc;
     }
     const uint64_t n = (r->len - h->len) / h->row_len;
-    const int rc = repair_rows(r, h->len, h->row_len, n, take_binary, p, err);
+    const int rc = repair_rows(r, &(struct repair_rows){h->len, n, h->row_len}, take_binary, p, err);
     if (n != h->n_vertices) p->n -= p->n_zero; /* a power cut leaves zeros, a head measures none */
     *end = h->len + p->n * h->row_len;
     return rc;

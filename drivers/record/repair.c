@@ -82,9 +82,11 @@ static int go_on(const struct repair *r, uint64_t at, struct sh_err *err)
     return sh_check_stop(r->report, err);
 }
 
-int repair_rows(const struct repair *r, uint64_t from, size_t row_len, uint64_t n,
-                void (*fn)(void *ctx, const uint8_t *row), void *ctx, struct sh_err *err)
+int repair_rows(const struct repair *r, const struct repair_rows *rows, void (*fn)(void *ctx, const uint8_t *row),
+                void *ctx, struct sh_err *err)
 {
+    const uint64_t from = rows->from, n = rows->n;
+    const size_t row_len = rows->len;
     const size_t at_once = row_len < BLOCK ? BLOCK / row_len : 1;
     uint8_t *block = malloc(at_once * row_len);
     int rc = block != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "%s: no memory to read it", r->path);
@@ -170,7 +172,7 @@ int repair_check_rest(const struct repair *r, uint64_t end, uint64_t most, struc
 {
     struct rest rest = {0};
     if (r->len - end <= most) return SH_OK;
-    const int rc = repair_rows(r, end, 1, r->len - end, count_piece, &rest, err);
+    const int rc = repair_rows(r, &(struct repair_rows){end, r->len - end, 1}, count_piece, &rest, err);
     return rc != SH_OK || rest.n_piece <= most ? rc : repair_fail_damaged(r, end, err);
 }
 

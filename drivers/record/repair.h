@@ -55,9 +55,13 @@ int repair_write(const struct repair *repair, uint64_t at, const void *from, siz
 int repair_is_part(const struct repair *repair);
 /* Cuts the file behind `end`, and counts what is cut. */
 int repair_cut(struct repair *repair, uint64_t end, struct sh_err *err);
-/* Rows of row_len bytes from `from` on, n of them. fn may not keep the pointer. */
-int repair_rows(const struct repair *repair, uint64_t from, size_t row_len, uint64_t n,
-                void (*fn)(void *ctx, const uint8_t *row), void *ctx, struct sh_err *err);
+/* Rows of one length, one after the other. fn may not keep the pointer. */
+struct repair_rows {
+    uint64_t from, n;
+    size_t len; /* of a row */
+};
+int repair_rows(const struct repair *repair, const struct repair_rows *rows, void (*fn)(void *ctx, const uint8_t *row),
+                void *ctx, struct sh_err *err);
 /* A power cut leaves zeros at a file's end. */
 int repair_is_zero(const uint8_t *row, size_t len);
 /* Lines from `from` on, each with its newline but not given with it. fn returns 1: a line of this format, 0: none. *end is

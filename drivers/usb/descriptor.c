@@ -2,7 +2,7 @@
 /* A model as descriptors, byte by byte. */
 #include <string.h>
 
-#include "drivers/usb/usb.h"
+#include "drivers/usb/model.h"
 
 enum {
     BCD_USB_2 = 0x0200,

@@ -8,7 +8,8 @@
 #ifndef DRIVERS_USB_GADGET_H
 #define DRIVERS_USB_GADGET_H
 
-#include "drivers/usb/usb.h"
+#include "core/err.h"
+#include "drivers/usb/model.h"
 
 struct gadget {
     char name[48];  /* scanhead-PID-START-N, in configfs, of both functions and of the mounted instance */

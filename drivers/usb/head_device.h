@@ -8,6 +8,7 @@
 #define DRIVERS_USB_HEAD_DEVICE_H
 
 #include "drivers/usb/looks.h"
+#include "drivers/usb/usb.h"
 
 /* A session as the host sees it. */
 struct scanhead_usb_session {

@@ -14,7 +14,7 @@
 #ifndef DRIVERS_USB_LOOKS_H
 #define DRIVERS_USB_LOOKS_H
 
-#include "drivers/usb/usb.h"
+#include "drivers/usb/model.h"
 
 enum usb_look_id { USB_LOOK_NATIVE, USB_LOOK_HOKUYO, USB_LOOK_SICK, USB_N_LOOKS };
 

@@ -8,7 +8,8 @@
 #ifndef DRIVERS_USB_OWN_IDENTITY_H
 #define DRIVERS_USB_OWN_IDENTITY_H
 
-#include "drivers/usb/usb.h"
+#include "core/err.h"
+#include "drivers/usb/model.h"
 
 enum { USB_MAX_HEADS = 126 }; /* USB/IP shows them as devices 2 to 127 of one bus */
 

@@ -4,7 +4,8 @@
 #ifndef DRIVERS_USB_VHCI_H
 #define DRIVERS_USB_VHCI_H
 
-#include "drivers/usb/usb.h"
+#include "core/err.h"
+#include "drivers/usb/model.h"
 
 /* dir: where the controller is in sysfs; NULL: /sys/devices/platform/vhci_hcd.0. fd is a connected stream
  * socket and stays the caller's; the kernel keeps its own reference. */

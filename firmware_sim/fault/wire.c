@@ -15,7 +15,6 @@ struct wire *wire_create(const struct wire_spec *spec)
     struct wire *wire = calloc(1, sizeof *wire);
     if (wire == NULL) return NULL;
     wire->spec = *spec;
-    wire->heard.has_lines = spec->native;
     if (grow(&wire->unit, &wire->unit_room, spec->max_unit, 1)) return wire;
     wire_free(wire);
     return NULL;
@@ -25,7 +24,6 @@ void wire_free(struct wire *wire)
 {
     if (wire == NULL) return;
     wire_queue_clear(&wire->queue);
-    wire_heard_free(&wire->heard);
     free(wire->unit);
     free(wire->mask);
     free(wire->last_reply);
@@ -189,7 +187,7 @@ static int finish(struct wire *wire, const struct wire_making *making)
     int rc = of != FAULT_OF_REPLIES ? wire_queue_pass(&wire->queue, of, making->spot.number, INT64_MIN) : SH_OK;
     if (!is_merging(wire)) wire_queue_close(&wire->queue);
     if (of != FAULT_OF_REPLIES) return rc;
-    wire_heard_answered(&wire->heard);
+    wire_heard_answered(wire->spec.heard);
     if (!grow(&wire->last_reply, &wire->last_reply_room, making->item->len, 1)) return SH_ENOMEM;
     wire->last_reply_len = making->item->len;
     memcpy(wire->last_reply, making->item->bytes, making->item->len);
@@ -282,16 +280,6 @@ int wire_time(struct wire *wire, int64_t t_ns)
     return rc;
 }
 
-void wire_heard(struct wire *wire, const void *bytes, size_t len)
-{
-    wire_heard_add(&wire->heard, bytes, len);
-}
-
-void wire_skip_heard(struct wire *wire, uint32_t n)
-{
-    wire->heard.unheard += n;
-}
-
 /* ---- out */
 
 const struct fault_note *wire_act_note(const struct wire_piece *act)
@@ -299,13 +287,8 @@ const struct fault_note *wire_act_note(const struct wire_piece *act)
     return (const struct fault_note *)(const void *)act->bytes;
 }
 
-struct wire_piece *wire_due(struct wire *wire, int64_t now_ns, int last)
+struct wire_piece *wire_due(struct wire *wire, int64_t now_ns)
 {
-    if (last && !wire->is_over) {
-        wire_queue_pass(&wire->queue, FAULT_OF_STREAM, UINT64_MAX, 0);
-        wire_queue_pass(&wire->queue, FAULT_OF_NOTICES, UINT64_MAX, 0);
-        wire_queue_close(&wire->queue);
-    }
     if (wire->queue.held != NULL) wire_queue_let_go(&wire->queue, now_ns);
     return wire_queue_due(&wire->queue, now_ns);
 }

@@ -16,6 +16,7 @@
 #define FIRMWARE_SIM_FAULT_WIRE_H
 
 #include "firmware_sim/fault/tally.h"
+#include "firmware_sim/fault/wire_heard.h"
 #include "firmware_sim/fault/wire_queue.h"
 
 enum {
@@ -37,6 +38,7 @@ struct wire_spec {
     void (*reseal)(uint8_t *unit, size_t len);
     uint32_t acts;             /* acts that the link can do: bit 0 is FAULT_DISCONNECT, and so on; no others strike */
     struct fault_tally *tally; /* of its acts, over all sessions of the link; outlives the wire. NULL: by session */
+    struct wire_heard *heard;  /* what the client sent, for echoes; outlives the wire */
 };
 
 /* NULL: no memory. */
@@ -60,19 +62,15 @@ void wire_go_on(struct wire *wire);
 /* A command of this session changed the list. New faults count replies from after the next `ahead` ones, which answer
  * the lines up to that command. All else they count from the next item. */
 void wire_renew(struct wire *wire, uint64_t ahead);
-/* All items from before device time t_ns were put. */
+/* All items from before device time t_ns were put. INT64_MAX: no more items come, so none is waited for. */
 int wire_time(struct wire *wire, int64_t t_ns);
-/* Takes bytes that the client sent. An echo sends them back before the reply. */
-void wire_heard(struct wire *wire, const void *bytes, size_t len);
-/* The next n replies answer lines that the wire was not given. */
-void wire_skip_heard(struct wire *wire, uint32_t n);
 
 /* The note that the owner puts on the board once it has carried out an act. Valid as long as the act. */
 const struct fault_note *wire_act_note(const struct wire_piece *act);
 
 /* The first piece or act, if it may go out now; else NULL. The owner writes the piece's bytes from `out` on, and moves
- * `out`. last: no more items come, so none is waited for. */
-struct wire_piece *wire_due(struct wire *wire, int64_t now_ns, int last);
+ * `out`. */
+struct wire_piece *wire_due(struct wire *wire, int64_t now_ns);
 /* When the next one may go out; INT64_MAX: there is none. */
 int64_t wire_next_ns(const struct wire *wire);
 void wire_pop(struct wire *wire);

@@ -249,7 +249,7 @@ static int act(struct change *c)
 static int echo(struct change *c)
 {
     size_t len;
-    const uint8_t *heard = wire_heard_first(&c->wire->heard, &len);
+    const uint8_t *heard = wire_heard_first(c->wire->spec.heard, &len);
     if (heard == NULL) return 0;
     struct wire_piece *piece = wire_piece_new(c->making->kind, heard, len);
     if (piece != NULL && c->wire->spec.native) {

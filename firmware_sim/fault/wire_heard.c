@@ -10,7 +10,14 @@ enum { HEARD_MAX = 65536, LINE_MAX_LEN = 256 /* longer lines are answered, too; 
 
 static void keep(struct wire_heard *heard, const uint8_t *bytes, size_t len)
 {
-    if (heard->len + len > HEARD_MAX) heard->len = heard->begin = 0; /* too much without an answer */
+    if (heard->first > heard->len / 2) { /* seldom, so that many lines at once cost no time */
+        heard->len -= heard->first;
+        heard->begin -= heard->first;
+        memmove(heard->bytes, heard->bytes + heard->first, heard->len);
+        heard->first = 0;
+    }
+    if (heard->len - heard->first + len > HEARD_MAX)
+        heard->len = heard->begin = heard->first = 0; /* too much without an answer */
     if (!grow(&heard->bytes, &heard->room, heard->len + len, 1)) return;
     memcpy(heard->bytes + heard->len, bytes, len);
     heard->len += len;
@@ -51,23 +58,20 @@ void wire_heard_add(struct wire_heard *heard, const void *bytes, size_t len)
 
 const uint8_t *wire_heard_first(const struct wire_heard *heard, size_t *len)
 {
-    *len = heard->has_lines ? heard->begin : heard->len;
-    if (heard->unheard != 0 || *len == 0) return NULL;
-    if (heard->has_lines) *len = (size_t)((const uint8_t *)memchr(heard->bytes, '\n', *len) - heard->bytes);
-    return heard->bytes;
+    *len = (heard->has_lines ? heard->begin : heard->len) - heard->first;
+    if (*len == 0) return NULL;
+    const uint8_t *first = heard->bytes + heard->first;
+    if (heard->has_lines) *len = (size_t)((const uint8_t *)memchr(first, '\n', *len) - first);
+    return first;
 }
 
 void wire_heard_answered(struct wire_heard *heard)
 {
     size_t n;
-    if (heard->unheard != 0) {
-        heard->unheard--;
-    } else if (!heard->has_lines) {
+    if (!heard->has_lines) {
         heard->len = 0;
     } else if (wire_heard_first(heard, &n) != NULL) {
-        memmove(heard->bytes, heard->bytes + n + 1, heard->len - n - 1);
-        heard->len -= n + 1;
-        heard->begin -= n + 1;
+        heard->first += n + 1;
     }
 }
 

@@ -4,7 +4,6 @@
 #define FIRMWARE_SIM_FAULT_WIRE_INSIDE_H
 
 #include "firmware_sim/fault/wire.h"
-#include "firmware_sim/fault/wire_heard.h"
 
 /* A fault of the list, with this session's counts. */
 struct wire_fault {
@@ -30,7 +29,6 @@ struct wire {
     size_t unit_room, mask_room;
     uint8_t *last_reply; /* the reply before */
     size_t last_reply_len, last_reply_room;
-    struct wire_heard heard;
 };
 
 /* The frame, unit or reply at hand, and the changes that faults make to it. */

@@ -93,39 +93,31 @@ static uint32_t count_unwritten(const struct session *s, uint64_t *pulses)
     return frames;
 }
 
-/* Frames and pulses in the session's wire, or discarded there after a fault ended the session. They were counted as
- * received when they went in. */
-static void count_in_wire(const struct session *s, uint64_t *frames, uint64_t *pulses)
-{
-    *frames = *pulses = 0;
-    if (s->wire != NULL) wire_count_unwritten(s->wire, frames, pulses);
-}
-
 void session_gone(struct pump *pump, struct session *s)
 {
-    uint64_t frames, in_wire, pulses = 0;
+    uint64_t pulses = 0;
     const int native = pump->protocol->passes_native;
-    count_in_wire(s, &frames, &in_wire);
+    const struct faulty_unwritten in_link = faulty_forget(pump->link, session_index(pump, s));
     if (native) count_unwritten(s, &pulses);
-    pump->counts.received_pulses -= pulses + in_wire;
-    if (!native) pump->counts.sent_units -= frames;
+    pump->counts.received_pulses -= pulses + in_link.pulses; /* counted as received when the link took them */
+    if (!native) pump->counts.sent_units -= in_link.frames;
 }
 
 void session_leave(struct pump *pump, struct session *s)
 {
     struct stream *stream = pump->stream;
-    uint64_t pulses = 0, unwritten = 0, frames_in_wire, pulses_in_wire;
+    uint64_t pulses = 0, unwritten = 0;
     uint32_t frames = 0;
     const int native = pump->protocol->passes_native, over = atomic_load(&stream->over);
-    count_in_wire(s, &frames_in_wire, &pulses_in_wire);
+    const struct faulty_unwritten in_link = faulty_forget(pump->link, session_index(pump, s));
     if (s->lost.have_seq) { /* the pacing thread no longer changes seq */
         frames = (native ? count_unwritten(s, &unwritten) : 0) + stream->seq - s->lost.next_seq;
         pulses = unwritten + atomic_load(&stream->counters->pulses) - s->lost.next_pulse;
     }
-    pump->counts.received_pulses -= unwritten + pulses_in_wire;
-    if (over) count_lost(pump, frames + (native ? (uint32_t)frames_in_wire : 0), pulses + pulses_in_wire);
-    if (!native) pump->counts.sent_units -= frames_in_wire;
-    const uint64_t units = native ? 0 : s->units.n + frames_in_wire;
+    pump->counts.received_pulses -= unwritten + in_link.pulses;
+    if (over) count_lost(pump, frames + (native ? (uint32_t)in_link.frames : 0), pulses + in_link.pulses);
+    if (!native) pump->counts.sent_units -= in_link.frames;
+    const uint64_t units = native ? 0 : s->units.n + in_link.frames;
     if (over && units != 0) session_count_units(pump, s, units);
     stream_set_reader(stream, s->reader, s->cursor, 0);
     if (!native) session_close_protocol(pump, s);

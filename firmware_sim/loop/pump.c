@@ -13,6 +13,40 @@
 /* At the end a reader may take this long between two bytes, and bytes held back by faults this long in all. */
 static const int64_t DRAIN_NS = 2000000000;
 
+static void say(void *owner, const char *text)
+{
+    const struct pump *pump = owner;
+    struct link_place place;
+    pump_get_place(pump, &place);
+    sh_warn(pump->links->report, "link %s: %s", place.endpoint, text);
+}
+
+static int64_t device_time_ns(void *owner)
+{
+    const struct pump *pump = owner;
+    return (int64_t)stream_released(pump->stream) * pump->stream->tick_ns;
+}
+
+static int open_link(struct pump *pump, const struct link_spec *spec, uint32_t index, struct sh_err *err)
+{
+    const struct loop_source *source = pump->links->source;
+    const struct faulty_spec faults = {
+        .board = pump->is_clean ? NULL : source->ops->faults(source->self),
+        .number = index + 1,
+        .first_session = pump->session[0].id,
+        .protocol = pump->protocol,
+        .room = pump->out_cap,
+        .owner = pump,
+        .time_ns = device_time_ns,
+        .say = say,
+        .source = source->self,
+        .report = source->ops->report,
+    };
+    const int rc = faulty_open(&faults, spec, &pump->link, err);
+    if (rc == SH_OK) pump->ops = faulty_ops(pump->link);
+    return rc;
+}
+
 int pump_open(struct links *links, uint32_t index, const struct link_spec *spec, struct pump **out, struct sh_err *err)
 {
     *out = NULL;
@@ -20,11 +54,8 @@ int pump_open(struct links *links, uint32_t index, const struct link_spec *spec,
     if (pump == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     pump->links = links;
     pump->stream = links->stream;
-    pump->number = index + 1;
-    if (spec->type != LINK_FD && !spec->clean)
-        pump->board = links->source->ops->faults(links->source->self); /* readers here get the clean stream */
-    pump->ops = link_ops_get(spec->type);
-    pump->can = link_faults(spec);
+    pump->is_clean = spec->type == LINK_FD || spec->clean;
+    pump->can_unplug = (link_faults(spec) & LINK_FAULT_BIT(LINK_FAULT_UNPLUG)) != 0;
     pump->protocol = protocol_ops_get((enum protocol_id)spec->protocol);
     pump->out_cap = links->stream->tick_bytes + BATCH_BYTES + REPLY_ROOM;
     struct link_spec with = *spec;
@@ -37,7 +68,7 @@ int pump_open(struct links *links, uint32_t index, const struct link_spec *spec,
         pump->session[i].id = index * LINK_MAX_SESSIONS + i + 1;
     }
     if (rc == SH_OK && pump->protocol == NULL)
-        rc = sh_fail(err, SH_EINPUT, "link %s: this build does not have its protocol", pump->ops->name);
+        rc = sh_fail(err, SH_EINPUT, "link %s: this build does not have its protocol", link_ops_get(spec->type)->name);
     if (rc == SH_OK && !pump->protocol->passes_native) {
         with.units = 1;
         with.brief = pump->protocol->brief;
@@ -45,7 +76,7 @@ int pump_open(struct links *links, uint32_t index, const struct link_spec *spec,
         pump->tick = malloc(links->stream->tick_bytes);
         if (pump->tick == NULL) rc = sh_fail(err, SH_ENOMEM, "no memory");
     }
-    if (rc == SH_OK) rc = pump->ops->open(&with, &pump->link, err);
+    if (rc == SH_OK) rc = open_link(pump, &with, index, err);
     if (rc != SH_OK) {
         pump_close(pump);
         return rc;
@@ -62,7 +93,6 @@ void pump_close(struct pump *pump)
     if (pump->wake_fd >= 0) close(pump->wake_fd);
     for (uint32_t i = 0; i < LINK_MAX_SESSIONS; i++) {
         free(pump->session[i].out);
-        session_close_wire(&pump->session[i]);
         unit_queue_free(&pump->session[i].units);
     }
     free(pump->tick);
@@ -100,13 +130,6 @@ static void fail_link(struct pump *pump, const char *why)
         sh_fail(&links->error, SH_EIO, "link %s: %s; it is cut short", place.endpoint, why);
 }
 
-void pump_say(struct pump *pump, const char *text)
-{
-    struct link_place place;
-    pump_get_place(pump, &place);
-    sh_warn(pump->links->report, "link %s: %s", place.endpoint, text);
-}
-
 static void handle(struct pump *pump, const struct link_event *event)
 {
     struct session *s = &pump->session[event->session];
@@ -114,11 +137,8 @@ static void handle(struct pump *pump, const struct link_event *event)
     case LINK_OPENED:
         if (pump->is_off && pump->ops->end != NULL) /* nobody is there to take it */
             pump->ops->end(pump->link, event->session);
-        else if (!pump_turns_away(pump, event->session))
+        else
             session_open(pump, s, event->peer);
-        break;
-    case LINK_PLUGGED:
-        pump_plugged(pump);
         break;
     case LINK_CLOSED:
         if (pump->failed) fail_link(pump, event->peer);
@@ -138,10 +158,11 @@ static void handle(struct pump *pump, const struct link_event *event)
         stream_poke(pump->stream);
         break;
     case LINK_NOTICE:
-        pump_say(pump, event->peer);
+        say(pump, event->peer);
         break;
     case LINK_WRITABLE:
     case LINK_WOKEN:
+    case LINK_PLUGGED:
         break;
     }
 }
@@ -175,11 +196,13 @@ static int has_more(struct pump *pump)
     if (pump->over_ns == 0) pump->over_ns = now_ns;
     for (int i = 0; i < LINK_MAX_SESSIONS; i++) {
         struct session *s = &pump->session[i];
+        const struct faulty_state link = faulty_look(pump->link, i);
+        if (link.moved_ns > s->moved_ns) s->moved_ns = link.moved_ns;
         const int pending =
             (s->open && (s->out_pos < s->out_len || s->cursor < released || s->commands.reply_len != 0 ||
-                         s->commands.moving || s->units.n != 0 || session_wire_waits(s))) ||
+                         s->commands.moving || s->units.n != 0 || link.waits)) ||
             is_unread(pump, s, i, now_ns);
-        const int in_time = now_ns - pump->over_ns < DRAIN_NS || !session_wire_keeps_back(s, now_ns);
+        const int in_time = now_ns - pump->over_ns < DRAIN_NS || !link.keeps_back;
         if (pending && in_time && now_ns - s->moved_ns < DRAIN_NS) return 1;
     }
     return 0;
@@ -204,11 +227,9 @@ static int set_wake(struct pump *pump)
 /* The time to wait for events. */
 static int timeout_ms(const struct pump *pump, int over)
 {
-    const int most_ms = over ? 50 : -1;
-    const int64_t next_ns = pump_next_ns(pump);
-    if (next_ns == INT64_MAX) return most_ms;
-    const int64_t ms = (next_ns - clock_now_ns()) / 1000000 + 1;
-    return ms < 0 ? 0 : over && ms > most_ms ? most_ms : ms > 60000 ? 60000 : (int)ms;
+    for (int i = 0; i < LINK_MAX_SESSIONS; i++)
+        if (pump->session[i].open && session_waits_for_files(pump)) return STREAM_FILES_NS / 1000000;
+    return over ? 50 : -1;
 }
 
 /* Returns the session's bit where the link is full. */
@@ -233,7 +254,6 @@ static void *pump_main(void *arg)
             break;
         }
         want_write = 0;
-        pump_plug(pump);
         for (int i = 0; i < LINK_MAX_SESSIONS; i++)
             if (pump->session[i].open) want_write |= write_one(pump, i);
         stream_rest_reader(pump->stream);

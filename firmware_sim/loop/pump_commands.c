@@ -19,6 +19,18 @@ void pump_add_reply(struct session *s, const char *text)
     c->reply_len += (uint32_t)n + 2;
 }
 
+/* Reply lines that are not written yet. */
+static uint32_t count_replies(const struct session *s)
+{
+    const struct session_commands *c = &s->commands;
+    uint32_t n = (uint32_t)(c->stepping + c->moving);
+    for (uint32_t i = 0; i < c->reply_len; i++)
+        n += c->reply[i] == '\n';
+    for (uint32_t i = s->out_pos; i < s->out_len; i++)
+        n += s->out[i] == '\n' && (i < s->frames_from || i >= s->frames_to);
+    return n;
+}
+
 static void start_step(struct pump *pump, struct session *s, const struct command_result *result)
 {
     struct session_commands *c = &s->commands;
@@ -39,7 +51,7 @@ static void do_line(struct pump *pump, struct session *s, enum command_line_kind
     else
         source->ops->command(source->self, s->id, s->commands.lines.buf, stream_released(pump->stream), &result);
     s->commands.wrong += result.error != 0;
-    if (result.effect == COMMAND_FAULTS) session_faults_changed(pump, s);
+    if (result.effect == COMMAND_FAULTS) faulty_changed(pump->link, session_index(pump, s), count_replies(s) + 1);
     if (result.effect == COMMAND_STEP) {
         start_step(pump, s, &result);
     } else if (result.effect == COMMAND_MOVE) {
@@ -97,7 +109,6 @@ void pump_read(struct pump *pump, struct session *s, int index)
     c->in_pos = 0;
     ssize_t n =
         c->in_len < READ_BYTES ? pump->ops->read(pump->link, index, c->in + c->in_len, READ_BYTES - c->in_len) : 0;
-    if (n > 0) session_heard(s, c->in + c->in_len, (size_t)n);
     if (n > 0) c->in_len += (uint32_t)n;
 }
 

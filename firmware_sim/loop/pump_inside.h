@@ -5,7 +5,7 @@
 
 #include <pthread.h>
 
-#include "firmware_sim/fault/wire.h"
+#include "firmware_sim/fault/faulty_link.h"
 #include "firmware_sim/loop/pump.h"
 #include "firmware_sim/loop/unit_queue.h"
 
@@ -57,23 +57,11 @@ struct session {
     struct pump *pump;
     void *protocol;
     struct unit_queue units;
-    int answering;     /* input() is being called */
-    int hang_up;       /* the session ends once its units are out */
-    struct wire *wire; /* NULL: no fault so far */
+    int answering; /* input() is being called */
+    int hang_up;   /* the session ends once its units are out */
     char peer[64];
-    int64_t moved_ns; /* clock_now_ns() when a byte last went out, or, at the end, was taken by the reader */
+    int64_t moved_ns; /* clock_now_ns() when it began, a byte last went out or, at the end, was taken by the reader */
     int unread;       /* at the end: bytes that wait in the system for the reader */
-};
-
-/* Faults at connections (USB: at enumerations); pump_connections.c */
-struct pump_connections {
-    uint64_t n;       /* connections so far, refused ones too */
-    uint32_t version; /* of the list */
-    struct pump_fault {
-        struct fault_entry entry;
-        uint64_t base; /* connections before it was there */
-    } fault[FAULT_MAX];
-    uint32_t n_faults;
 };
 
 struct pump {
@@ -81,23 +69,17 @@ struct pump {
     struct links *links;
     struct stream *stream;
     const struct link_ops *ops;
-    void *link;
+    struct faulty_link *link;
     const struct protocol_ops *protocol;
     uint8_t *tick; /* frames of the tick at hand, for a protocol; NULL: it is native */
     int wake_fd;
     struct stream_listener *listener;
-    uint32_t out_cap;          /* of each session */
-    int holds;                 /* its readers hold back the paces fast and step */
-    uint32_t number;           /* of the link, from 1 */
-    struct fault_board *board; /* NULL: no faults strike here */
-    uint32_t can;              /* link_faults() */
-    struct fault_tally tally;  /* of what the link does */
-    struct pump_connections connections;
-    int64_t plug_ns;         /* clock: when an unplugged link is there again; 0: it is */
-    int plug_failed;         /* it could not come back so far, and that was reported */
-    int64_t refuse_until_ns; /* clock: until then clients are turned away */
-    uint32_t power_seen;     /* changes of power that were done here */
-    int is_off;              /* the head has no power */
+    uint32_t out_cap;    /* of each session */
+    int holds;           /* its readers hold back the paces fast and step */
+    int is_clean;        /* its readers see nothing of faults, power cycles included */
+    int can_unplug;      /* its endpoint goes when power goes */
+    uint32_t power_seen; /* changes of power that were done here */
+    int is_off;          /* the head has no power */
     struct session session[LINK_MAX_SESSIONS];
     pthread_t thread;
     int running;
@@ -123,47 +105,19 @@ int session_write(struct pump *pump, struct session *s, int index);
  * nothing more and nothing is due to it. */
 int session_is_done(const struct pump *pump, const struct session *s);
 
-/* Puts the next ticks and replies into the buffer, which was written out. */
-void session_fill(struct pump *pump, struct session *s);
-
-/* pump_faults.c */
-/* Whether the session's bytes go through a wire: there is an injected fault, or there was one. */
-int session_has_wire(struct pump *pump, struct session *s);
-void session_close_wire(struct session *s);
-int session_wire_waits(const struct session *s);
-/* Whether a fault holds back bytes in the wire. */
-int session_wire_keeps_back(const struct session *s, int64_t now_ns);
-/* In the paces that wait, a session with faults takes no frames while the file of the truth is behind. Its client still
- * gets its replies. */
-int session_waits_for_files(const struct pump *pump, const struct session *s);
-/* As session_write, through the session's wire. */
-int session_write_faulty(struct pump *pump, struct session *s, int index);
-/* Writes the bytes in the wire. 1: the link is full; 0: nothing may go out now; -1: the session is closed. last: no
- * bytes come after these. */
-int session_write_wire(struct pump *pump, struct session *s, int index, int last);
-/* Whether the wire has no room for more. */
-int session_wire_is_full(const struct pump *pump, const struct session *s);
-/* Puts the oldest unit of a protocol, or the rest of it, into the wire. */
-void session_put_unit(struct pump *pump, struct session *s);
-/* A command line of this session has changed the faults; its reply is still to come. */
-void session_faults_changed(struct pump *pump, struct session *s);
-/* Takes bytes that the client sent. */
-void session_heard(struct session *s, const void *bytes, size_t len);
-/* The time at which a wire or the link next has something to do; INT64_MAX: none. */
-int64_t pump_next_ns(const struct pump *pump);
-/* Brings an unplugged link back when its time is over. */
-void pump_plug(struct pump *pump);
-
-/* pump_connections.c */
-/* A client has come. 1: it is turned away, by an injected fault. index: of the session. */
-int pump_turns_away(struct pump *pump, int index);
-/* A host has got the USB device. */
-void pump_plugged(struct pump *pump);
-/* The link fault that carries out a fault of this kind. */
-enum link_fault pump_link_fault(enum fault_kind kind);
-
-/* pump.c: warns the user who runs the head. */
-void pump_say(struct pump *pump, const char *text);
+/* Lets the link know that all before the session's cursor was written (is_last: and that nothing follows), so that it
+ * passes on what is due. As faulty_pass. */
+int session_pass(struct pump *pump, struct session *s, int is_last);
+/* Whether bytes that were written wait in the link. */
+int session_waits(const struct pump *pump, const struct session *s);
+/* In the paces that wait, sessions take no frames while the file of the truth is behind. Their clients still get their
+ * replies. */
+int session_waits_for_files(const struct pump *pump);
+/* Of the session on its link. */
+static inline int session_index(const struct pump *pump, const struct session *s)
+{
+    return (int)(s - pump->session);
+}
 
 /* pump_power.c: the links of a head that loses power, and has it again. */
 /* Does what is due. full: a bit for each session whose link takes no more. 1: there is more to do at once. */

@@ -6,29 +6,20 @@
  * for readers, in any case. Bytes that the client's system has not taken by then may be lost with the connection. A
  * link without a connection, such as a file or UDP, goes on where it was. In the pace step links come back at once,
  * since their clients let time pass. */
-#include "firmware_sim/base/clock.h"
 #include "firmware_sim/loop/pump_inside.h"
 
 /* Whether everything released before `tick` is written, or the client does not take it. */
 static int is_drained(const struct pump *pump, const struct session *s, int is_full, uint64_t tick)
 {
     const int taken = s->cursor >= tick,
-              written = s->out_pos == s->out_len && s->units.n == 0 && !session_wire_waits(s);
+              written = s->out_pos == s->out_len && s->units.n == 0 && !session_waits(pump, s);
     if (pump->stream->waits) return taken && written;
-    return taken || is_full || session_wire_waits(s);
-}
-
-static int can_unplug(const struct pump *pump)
-{
-    return (pump->can & LINK_FAULT_BIT(LINK_FAULT_UNPLUG)) != 0;
+    return taken || is_full || session_waits(pump, s);
 }
 
 static void plug(struct pump *pump)
 {
-    if (pump->is_off && can_unplug(pump)) {
-        pump->plug_ns = clock_now_ns(); /* now, or once its endpoint is free */
-        pump_plug(pump);
-    }
+    if (pump->is_off && pump->can_unplug) pump->ops->fault(pump->link, LINK_FAULT_PLUG, 0, 0, 0.0);
     pump->is_off = 0;
 }
 
@@ -37,15 +28,14 @@ static void unplug(struct pump *pump, uint64_t tick)
     for (int i = 0; i < LINK_MAX_SESSIONS; i++) {
         struct session *s = &pump->session[i];
         if (!s->open) continue;
-        if (!can_unplug(pump) && pump->ops->end == NULL) {
+        if (!pump->can_unplug && pump->ops->end == NULL) {
             session_restart(pump, s, tick);
             continue;
         }
         session_cut(pump, s);
-        if (!can_unplug(pump)) pump->ops->end(pump->link, i);
+        if (!pump->can_unplug) pump->ops->end(pump->link, i);
     }
-    if (can_unplug(pump)) pump->ops->fault(pump->link, LINK_FAULT_UNPLUG, 0, 0, 0.0);
-    pump->plug_ns = pump->refuse_until_ns = 0; /* ends what earlier faults began */
+    if (pump->can_unplug) pump->ops->fault(pump->link, LINK_FAULT_UNPLUG, 0, 0, 0.0);
     pump->is_off = 1;
     if (pump->stream->steps) plug(pump);
 }
@@ -54,7 +44,7 @@ int pump_power(struct pump *pump, uint32_t full)
 {
     uint64_t tick;
     int more = 0;
-    while (pump->board != NULL && (tick = stream_power_tick(pump->stream, pump->power_seen)) != UINT64_MAX) {
+    while (!pump->is_clean && (tick = stream_power_tick(pump->stream, pump->power_seen)) != UINT64_MAX) {
         const int goes = pump->power_seen % 2 == 0;
         if (stream_released(pump->stream) <= tick) return more;
         for (int i = 0; i < LINK_MAX_SESSIONS && goes; i++)

@@ -173,7 +173,7 @@ static int take_tick(struct pump *pump, struct session *s)
 {
     struct ring *ring = &pump->stream->ring;
     const struct protocol_ops *ops = pump->protocol;
-    if (session_waits_for_files(pump, s)) return 0;
+    if (session_waits_for_files(pump)) return 0;
     struct ring_copy tick = {.buf = pump->tick, .cap = pump->stream->tick_bytes};
     enum ring_read got = ring_read(ring, s->reader, s->cursor, &tick);
     const uint64_t off_tick = session_off_tick(pump, s); /* known before the tick was released */
@@ -222,38 +222,27 @@ static int take_input(struct pump *pump, struct session *s)
     return c->in_pos != from;
 }
 
-enum { HELD_BACK = 2 }; /* flush: the link is not full, but a fault holds back as much as the wire may hold */
-
-/* The same, where the units go through the session's wire. */
-static int flush_faulty(struct pump *pump, struct session *s, int index)
-{
-    const int over = atomic_load(&pump->stream->over) && s->cursor >= stream_released(pump->stream);
-    for (;;) {
-        size_t len;
-        const int none = unit_queue_next(&s->units, &len) == NULL;
-        const int full = session_write_wire(pump, s, index, over && none);
-        if (full != 0 || none) return full;
-        if (session_wire_is_full(pump, s)) return HELD_BACK;
-        session_put_unit(pump, s);
-        if (unit_queue_written(&s->units, len)) pump->counts.sent_units++;
-    }
-}
-
-/* Writes until the link is full (1), or HELD_BACK, or there is nothing left (0). Negative: the session is gone. */
+/* Writes until the link is full (1), or there is nothing left (0). Negative: the session is gone. */
 static int flush(struct pump *pump, struct session *s, int index)
 {
-    if (session_has_wire(pump, s)) return flush_faulty(pump, s, index);
+    const int is_over = atomic_load(&pump->stream->over) && s->cursor >= stream_released(pump->stream);
     for (;;) {
         size_t len;
         const uint8_t *unit = unit_queue_next(&s->units, &len);
-        if (unit == NULL) return 0;
-        ssize_t n = pump->ops->write(pump->link, index, unit, len);
+        ssize_t n;
+        if (unit == NULL) {
+            n = session_pass(pump, s, is_over);
+            if (n > 0) return 0;
+        } else {
+            const struct unit_kind kind = unit_queue_kind(&s->units);
+            faulty_next(pump->link, index, kind.is_reply, time_of(pump, kind.made_tick));
+            n = pump->ops->write(pump->link, index, unit, len);
+        }
         if (n == 0) return 1;
         if (n < 0) {
             if (n != SH_ECLOSED) pump->failed = 1; /* the reason comes with LINK_CLOSED */
             return -1;
         }
-        s->moved_ns = clock_now_ns();
         if (unit_queue_written(&s->units, (size_t)n)) pump->counts.sent_units++;
     }
 }
@@ -274,7 +263,7 @@ int session_write_protocol(struct pump *pump, struct session *s, int index)
         more |= take_input(pump, s);
         full = flush(pump, s, index);
         if (full < 0) {
-            session_close(pump, s); /* if it is not closed already */
+            session_close(pump, s);
             return 0;
         }
     }
@@ -285,8 +274,7 @@ int session_write_protocol(struct pump *pump, struct session *s, int index)
         s->lost.lagging = 0;
         stream_note_written(pump->stream, s->reader, s->cursor);
     }
-    if (s->wire != NULL) wire_time(s->wire, time_of(pump, s->cursor));
-    return full == 1;
+    return full;
 }
 
 uint64_t session_wake_tick(const struct pump *pump, const struct session *s)

@@ -48,7 +48,6 @@ void session_cut(struct pump *pump, struct session *s)
 {
     s->open = 0;
     session_gone(pump, s);
-    session_close_wire(s);
     stream_set_reader(pump->stream, s->reader, s->cursor, 0);
     if (!pump->protocol->passes_native) session_close_protocol(pump, s);
 }
@@ -58,7 +57,7 @@ void session_restart(struct pump *pump, struct session *s, uint64_t tick)
     s->power_from = tick + 1;
     if (pump->protocol->passes_native) return;
     clear(s);
-    session_close_wire(s);
+    faulty_forget(pump->link, session_index(pump, s));
     if (session_restart_protocol(pump, s) == SH_OK) return;
     source_report(pump->links->source, CMD_E_REFUSED, "no memory for a session");
     session_cut(pump, s);
@@ -66,7 +65,7 @@ void session_restart(struct pump *pump, struct session *s, uint64_t tick)
 
 uint64_t session_off_tick(const struct pump *pump, const struct session *s)
 {
-    if (pump->board == NULL) return UINT64_MAX;
+    if (pump->is_clean) return UINT64_MAX;
     return stream_off_tick(pump->stream, s->cursor > s->power_from ? s->cursor : s->power_from);
 }
 
@@ -114,7 +113,7 @@ static int owes(const struct pump *pump, const struct session *s)
 
 int session_is_done(const struct pump *pump, const struct session *s)
 {
-    if (pump->ops->end == NULL || session_wire_waits(s)) return 0;
+    if (pump->ops->end == NULL || session_waits(pump, s)) return 0;
     return s->hang_up || (s->shut && !owes(pump, s));
 }
 
@@ -123,7 +122,7 @@ static int take_tick(struct pump *pump, struct session *s)
 {
     struct ring *ring = &pump->stream->ring;
     uint32_t end = s->out_len + REPLY_ROOM / 8; /* leaves room for an event that announces a loss */
-    if (end >= pump->out_cap || session_waits_for_files(pump, s)) return 0;
+    if (end >= pump->out_cap || session_waits_for_files(pump)) return 0;
     struct ring_copy tick = {.buf = s->out + s->out_len, .cap = pump->out_cap - end};
     enum ring_read got = ring_read(ring, s->reader, s->cursor, &tick);
     const uint64_t off_tick = session_off_tick(pump, s); /* known before the tick was released */
@@ -161,7 +160,8 @@ static int has_stepped(const struct pump *pump, const struct session *s)
     return s->cursor >= tick && stream_has_written(pump->stream, pump->listener, s->reader, tick);
 }
 
-void session_fill(struct pump *pump, struct session *s)
+/* Puts the next ticks and replies into the buffer, which was written out. */
+static void fill(struct pump *pump, struct session *s)
 {
     struct session_commands *c = &s->commands;
     s->out_len = s->out_pos = 0;
@@ -189,17 +189,43 @@ static uint32_t write_to(const struct pump *pump, const struct session *s)
     return s->out_pos < s->frames_from ? s->frames_from : s->out_pos < s->frames_to ? s->frames_to : s->out_len;
 }
 
+int session_waits(const struct pump *pump, const struct session *s)
+{
+    return faulty_look(pump->link, session_index(pump, s)).waits;
+}
+
+int session_waits_for_files(const struct pump *pump)
+{
+    const struct loop_source *source = pump->links->source;
+    return pump->stream->waits && faulty_is_on(pump->link) && !atomic_load(&pump->stream->over) &&
+           !atomic_load(&pump->stream->ending) && source->ops->files_fill(source->self);
+}
+
+int session_pass(struct pump *pump, struct session *s, int is_last)
+{
+    const int64_t t_ns = is_last ? INT64_MAX : (int64_t)s->cursor * pump->stream->tick_ns;
+    return faulty_pass(pump->link, session_index(pump, s), t_ns);
+}
+
+/* Takes more once the link has taken all. As session_pass; when there is nothing, the buffer stays empty. */
+static int fill_if_link_takes(struct pump *pump, struct session *s)
+{
+    const int is_over = atomic_load(&pump->stream->over);
+    const int takes = session_pass(pump, s, 0);
+    if (takes > 0) fill(pump, s);
+    return takes > 0 && is_over && s->out_pos == s->out_len ? session_pass(pump, s, 1) : takes;
+}
+
 int session_write(struct pump *pump, struct session *s, int index)
 {
     if (!pump->protocol->passes_native) return session_write_protocol(pump, s, index);
-    if (session_has_wire(pump, s)) return session_write_faulty(pump, s, index);
     for (;;) {
-        if (s->out_pos == s->out_len) session_fill(pump, s);
-        if (s->out_pos == s->out_len) {
-            stream_note_written(pump->stream, s->reader, s->cursor);
+        ssize_t n = s->out_pos == s->out_len ? fill_if_link_takes(pump, s) : 1;
+        if (n > 0 && s->out_pos == s->out_len) {
+            stream_note_written(pump->stream, s->reader, s->cursor); /* bytes that a fault holds back hold up nobody */
             return 0;
         }
-        ssize_t n = pump->ops->write(pump->link, index, s->out + s->out_pos, write_to(pump, s) - s->out_pos);
+        if (n > 0) n = pump->ops->write(pump->link, index, s->out + s->out_pos, write_to(pump, s) - s->out_pos);
         if (n == 0) return 1;
         if (n < 0) {
             if (n != SH_ECLOSED) pump->failed = 1; /* the reason comes with LINK_CLOSED */
@@ -207,6 +233,5 @@ int session_write(struct pump *pump, struct session *s, int index)
             return 0;
         }
         s->out_pos += (uint32_t)n;
-        s->moved_ns = clock_now_ns();
     }
 }

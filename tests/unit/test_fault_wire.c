@@ -286,7 +286,7 @@ static void what_is_not_written_is_counted(void **state)
     for (int i = 0; i < 4; i++) {
         wire_count_unwritten(rig.wire, &frames, &pulses);
         assert_true(frames == (i < 2) && pulses == (i < 2 ? 100 : 0));
-        assert_non_null(wire_due(rig.wire, rig.now_ns, 0));
+        assert_non_null(wire_due(rig.wire, rig.now_ns));
         wire_pop(rig.wire);
     }
 }

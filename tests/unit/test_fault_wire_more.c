@@ -185,7 +185,7 @@ static void an_item_longer_than_usual_is_taken(void **state)
     uint8_t *big = calloc(1, 100000);
     const struct wire_item item = {FAULT_OF_REPLIES, big, 100000, 0};
     assert_int_equal(wire_put(rig.wire, &item, rig.now_ns), SH_OK);
-    const struct wire_piece *piece = wire_due(rig.wire, rig.now_ns, 0);
+    const struct wire_piece *piece = wire_due(rig.wire, rig.now_ns);
     assert_true(piece != NULL && piece->len == 100000);
     free(big);
 }

@@ -81,10 +81,10 @@ static uint32_t read_packets(const uint8_t *bytes, size_t len, size_t piece, siz
     struct pcapng_packet packet;
     struct sh_err err = {0};
     uint32_t n = 0;
-    size_t have = 0, used, needed;
-    for (*end = 0; (*rc = pcapng_read(&reader, bytes + *end, have - *end, &packet, &used, &needed, &err)) >= 0;) {
+    size_t have = 0, used;
+    for (*end = 0; (*rc = pcapng_read(&reader, bytes + *end, have - *end, &packet, &used, &err)) >= 0;) {
         if (*rc == PCAPNG_MORE) {
-            assert_true(used == 0 && needed > have - *end);
+            assert_true(used == 0 && reader.needed > have - *end);
             if (have == len) break;
             have = len - have < piece ? len : have + piece;
         }
@@ -136,7 +136,7 @@ static void test_damaged(void **state)
             const uint64_t r = rng_u64(7 + k, i);
             hurt[r % (i % 2 == 0 ? 128 : len)] = (uint8_t)(r >> 32);
         }
-        while ((item = pcapng_read(&reader, hurt + at, len - at, &packet, &used, NULL, &err)) > 0) {
+        while ((item = pcapng_read(&reader, hurt + at, len - at, &packet, &used, &err)) > 0) {
             if (item == PCAPNG_PACKET)
                 assert_true(packet.data >= hurt + at && packet.data + packet.len <= hurt + at + used);
             at += used;
@@ -154,7 +154,7 @@ static void test_statistics(void **state)
     struct sh_err err = {0};
     size_t used;
     const size_t len = pcapng_put_statistics(file, 3, INT64_C(0x123456789abcd), 1000, 7);
-    assert_int_equal(pcapng_read(&reader, file, len, &packet, &used, NULL, &err), PCAPNG_OTHER);
+    assert_int_equal(pcapng_read(&reader, file, len, &packet, &used, &err), PCAPNG_OTHER);
     assert_true(used == len && len == 20 + 12 + 12 + 4 + 4);
     assert_true(rig_uint(file, 4) == 5 && rig_uint(file + 8, 4) == 3);
     assert_int_equal(rig_uint(file + 12, 4) << 32 | rig_uint(file + 16, 4), INT64_C(0x123456789abcd));
@@ -174,7 +174,7 @@ static void test_loss(void **state)
     const size_t plain = pcapng_put_packet(file, 0, 7, "abcde", 5);
     const size_t len = pcapng_put_packet_after_loss(with, 0, 7, "abcde", 5, 300);
     assert_true(plain == pcapng_packet_len(5) && len == plain + PCAPNG_LOST);
-    assert_int_equal(pcapng_read(&reader, with, len, &packet, &used, NULL, &err), PCAPNG_PACKET);
+    assert_int_equal(pcapng_read(&reader, with, len, &packet, &used, &err), PCAPNG_PACKET);
     assert_true(used == len && packet.t_ns == 7 && packet.len == 5 && memcmp(packet.data, "abcde", 5) == 0);
     assert_memory_equal(with + 8, file + 8, plain - 12);
     assert_true(rig_uint(with + 36, 4) == (4 | 8 << 16) && rig_uint(with + 40, 8) == 300);
@@ -198,18 +198,18 @@ static void test_of_others(void **state)
     memcpy(file + len + sizeof interface + sizeof unknown, simple, sizeof simple);
     len += sizeof interface + sizeof unknown + sizeof simple;
     len += pcapng_put_packet(file + len, 0, 3000007, "x", 1);
-    assert_int_equal(pcapng_read(&reader, file, len, &packet, &used, NULL, &err), PCAPNG_OTHER);
+    assert_int_equal(pcapng_read(&reader, file, len, &packet, &used, &err), PCAPNG_OTHER);
     for (int i = 0; i < 2; i++, at += used)
-        assert_int_equal(pcapng_read(&reader, file + at, len - at, &packet, &used, NULL, &err), PCAPNG_OTHER);
-    assert_int_equal(pcapng_read(&reader, file + at, len - at, &packet, &used, NULL, &err), PCAPNG_PACKET);
+        assert_int_equal(pcapng_read(&reader, file + at, len - at, &packet, &used, &err), PCAPNG_OTHER);
+    assert_int_equal(pcapng_read(&reader, file + at, len - at, &packet, &used, &err), PCAPNG_PACKET);
     assert_true(!packet.has_time && packet.len == 4 && packet.original_len == 6);
     assert_memory_equal(packet.data, "abcd", 4);
     at += used;
-    assert_int_equal(pcapng_read(&reader, file + at, len - at, &packet, &used, NULL, &err), PCAPNG_PACKET);
+    assert_int_equal(pcapng_read(&reader, file + at, len - at, &packet, &used, &err), PCAPNG_PACKET);
     assert_int_equal(packet.t_ns, INT64_C(3000007000)); /* microseconds, as the interface says nothing else */
     assert_int_equal(at + used, len);
     memcpy(file + 8, "\x1a\x2b\x3c\x4d", 4);
-    assert_int_equal(pcapng_read(&(struct pcapng_reader){0}, file, len, &packet, &used, NULL, &err), SH_EFORMAT);
+    assert_int_equal(pcapng_read(&(struct pcapng_reader){0}, file, len, &packet, &used, &err), SH_EFORMAT);
     assert_non_null(strstr(err.text, "big-endian"));
 }
 

@@ -217,6 +217,7 @@ static void test_sparse_labels(void **state)
     static const uint32_t face[1][3] = {{0, 1, 2}};
     struct mesh_points from = {0}, to = {0};
     const struct mesh_sparse sparse = {.per_m2 = 200, .seed = 3};
+    const struct mesh_sparse_part part = {face, 1, 1, 1};
     struct sh_err err = {0};
     double area_m2 = 0;
     int seen[3] = {0};
@@ -225,7 +226,7 @@ static void test_sparse_labels(void **state)
         memcpy(p.xyz_m, corner[k], sizeof p.xyz_m);
         assert_int_equal(mesh_points_add(&from, &p, &err), 0);
     }
-    if (mesh_sparse_add(&sparse, &from, face, 1, 1, 1, &to, &area_m2, &err) != 0) fail_msg("%s", err.text);
+    if (mesh_sparse_add(&sparse, &from, &part, &to, &area_m2, &err) != 0) fail_msg("%s", err.text);
     assert_true(fabs(area_m2 - 0.5) < 1e-12);
     assert_int_equal(to.n, 100);
     for (uint32_t i = 0; i < to.n; i++) {

@@ -52,7 +52,9 @@ void rig_open(const struct fault *fault, uint32_t n, int native)
                                    .native = native,
                                    .content = native ? protocol_ops_get(PROTOCOL_NATIVE)->content : NULL,
                                    .reseal = native ? native_reseal : reseal_sum,
-                                   .acts = UINT32_MAX};
+                                   .acts = UINT32_MAX,
+                                   .heard = &rig.heard};
+    rig.heard.has_lines = native;
     rig.wire = wire_create(&spec);
     assert_non_null(rig.wire);
 }
@@ -60,6 +62,7 @@ void rig_open(const struct fault *fault, uint32_t n, int native)
 void rig_close(void)
 {
     wire_free(rig.wire);
+    wire_heard_free(&rig.heard);
     fault_board_free(rig.board);
     rig.wire = NULL;
     rig.board = NULL;
@@ -131,7 +134,8 @@ struct rig_item *rig_unit(size_t len, int is_reply)
 uint32_t rig_take(int last)
 {
     uint32_t n = 0;
-    for (struct wire_piece *piece; (piece = wire_due(rig.wire, rig.now_ns, last)) != NULL; n++) {
+    if (last) wire_time(rig.wire, INT64_MAX);
+    for (struct wire_piece *piece; (piece = wire_due(rig.wire, rig.now_ns)) != NULL; n++) {
         const size_t len = piece->kind != WIRE_ACT ? piece->len - piece->out : 0;
         if (piece->kind == WIRE_ACT) fault_board_note(rig.board, wire_act_note(piece)); /* it is carried out */
         assert_true(rig.n_writes < RIG_WRITES && rig.n_out + len <= RIG_OUT);

@@ -43,6 +43,7 @@ struct rig {
     int native;
     struct fault_board *board;
     struct wire *wire;
+    struct wire_heard heard;
     int64_t now_ns;
     struct rig_item item[RIG_ITEMS];
     uint32_t n_items;

@@ -118,7 +118,7 @@ void captured_read(const struct wire *wire, struct captured *captured)
     int item;
     *captured = (struct captured){.bytes = wire_read(wire_path(wire, "cap.pcapng"), &len)};
     const uint8_t *bytes = (const uint8_t *)captured->bytes;
-    while ((item = pcapng_read(&reader, bytes + at, len - at, &packet, &used, NULL, &err)) > 0) {
+    while ((item = pcapng_read(&reader, bytes + at, len - at, &packet, &used, &err)) > 0) {
         at += used;
         if (item != PCAPNG_PACKET) continue;
         captured->packet = realloc(captured->packet, (captured->n + 1) * sizeof *captured->packet);

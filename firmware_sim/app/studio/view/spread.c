@@ -77,10 +77,9 @@ static int spread_one(const struct viewed *v, const struct viewed_mesh *m, const
     } else {
         const uint32_t n = keep_faces(m, wish->long_edge, face);
         const struct mesh_points points = points_of(v, m, range_m);
-        rc = check_count(&points, (const uint32_t(*)[3])face, n, wish, sum_m2, err);
-        if (rc == SH_OK)
-            rc = mesh_sparse_add(&sparse, &points, (const uint32_t(*)[3])face, n, m->station, m->scan << 16 | m->sweep,
-                                 &made, &area_m2, err);
+        const struct mesh_sparse_part part = {(const uint32_t(*)[3])face, n, m->station, m->scan << 16 | m->sweep};
+        rc = check_count(&points, part.face, n, wish, sum_m2, err);
+        if (rc == SH_OK) rc = mesh_sparse_add(&sparse, &points, &part, &made, &area_m2, err);
         if (rc == SH_OK) rc = append(out, &made, v->points.rgb != NULL, err);
     }
     mesh_points_free(&made);

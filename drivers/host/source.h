@@ -1,0 +1,56 @@
+/* SPDX-License-Identifier: MIT */
+/* Where a handle's bytes come from: a descriptor, a device on USB, or a captured file. Private to libscanhead.
+ *
+ * In: the name of a source. Out: its bytes, without blocking, and waits with a deadline. */
+#ifndef DRIVERS_HOST_SOURCE_H
+#define DRIVERS_HOST_SOURCE_H
+
+#include <stdint.h>
+#include <sys/types.h>
+
+#include "core/err.h"
+
+/* How bytes come and go, without blocking; one table for descriptors, one for USB. */
+struct host_source;
+struct host_source_ops {
+    /* Bytes moved; 0 from read: the end; -1 with errno: EAGAIN when none can be now. */
+    ssize_t (*read)(struct host_source *source, void *to, size_t len);
+    ssize_t (*write)(struct host_source *source, const void *data, size_t len);
+    /* poll() for POLLIN and POLLOUT until the deadline (host_deadline_ns): 1, 0 when it is over, -1 with
+     * errno. */
+    int (*wait)(struct host_source *source, short events, int64_t deadline_ns, short *revents);
+    void (*close)(struct host_source *source);
+};
+
+struct host_source {
+    const struct host_source_ops *ops;
+    int fd;
+    struct host_usb *usb;
+    struct host_capture *capture; /* of a .pcapng; else NULL */
+    int is_file, is_socket;
+    int unsettled;  /* lines may come that answer no command of ours: on a new terminal, after a time-out */
+    int asked;      /* *IDN? that went out to skip such lines, and have no answer yet */
+    char name[256]; /* for messages, and to open it again */
+};
+
+/* Opens what `source` names, non-blocking. */
+int host_source_open(const char *source, struct host_source *out, struct sh_err *err);
+int host_source_is_usb(const char *source);
+/* usb_transfers.c: the same for "usb..."; out is zero but for its name. */
+int host_usb_open(const char *source, struct host_source *out, struct sh_err *err);
+extern const struct host_source_ops host_fd_ops;
+/* capture.c: source is an open file of that kind. Where it fails, the descriptor is still the caller's. */
+int host_capture_open(struct host_source *source, struct sh_err *err);
+
+/* usb_watch.c: waits between two tries to open a source. NULL where a source is not on USB, or where the
+ * system does not report devices that come: then the waits are short. Devices that come after this call are
+ * not missed. */
+struct host_usb_watch *host_usb_watch_open(const char *source);
+void host_usb_watch_close(struct host_usb_watch *watch);
+/* rc: why the last try failed. 0: try again, or the deadline is over; -1: a signal came. */
+int host_usb_watch_wait(struct host_usb_watch *watch, int rc, int64_t deadline_ns);
+
+/* Nanoseconds of the monotonic clock at which timeout_ms from now is over; INT64_MAX for a negative one. */
+int64_t host_deadline_ns(int timeout_ms);
+
+#endif
