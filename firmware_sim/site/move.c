@@ -4,7 +4,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "firmware_sim/site/site_inside.h"
+#include "firmware_sim/site/create.h"
+#include "firmware_sim/site/sights.h"
+#include "firmware_sim/site/site.h"
 
 void site_get_place(const struct site *site, uint32_t station, struct site_place *out)
 {

@@ -8,7 +8,7 @@
 
 #include "core/plan/cost.h"
 #include "firmware_sim/site/rate.h"
-#include "firmware_sim/site/site_inside.h"
+#include "firmware_sim/site/site.h"
 
 static void name_row(struct plan_row *row, const char *whose)
 {

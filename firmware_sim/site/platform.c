@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-#include "firmware_sim/site/site_inside.h"
+#include "firmware_sim/site/platform.h"
+#include "firmware_sim/site/site.h"
 
 #include <math.h>
 #include <stdlib.h>

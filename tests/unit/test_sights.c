@@ -6,7 +6,8 @@
 
 #include "core/angle.h"
 #include "core/cast/kernels.h"
-#include "firmware_sim/site/site_inside.h"
+#include "firmware_sim/site/site.h"
+#include "firmware_sim/site/view.h"
 
 /* A closed box, 16 m wide. */
 static const char BOX[] = "v -8 -8 -3\nv 8 -8 -3\nv 8 8 -3\nv -8 8 -3\nv -8 -8 5\nv 8 -8 5\nv 8 8 5\nv -8 8 5\n"
