@@ -12,6 +12,7 @@
 #include "drivers/host/scanhead.h"
 #include "drivers/protocol/native.h"
 #include "firmware_sim/app/studio/soak/clean.h"
+#include "firmware_sim/app/studio/soak/frame.h"
 #include "firmware_sim/app/studio/soak/head.h"
 #include "firmware_sim/app/studio/soak/judge.h"
 #include "firmware_sim/app/studio/soak/ledger.h"

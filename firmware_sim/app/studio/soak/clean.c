@@ -10,6 +10,7 @@
 #include "drivers/link/link.h"
 #include "drivers/protocol/bytes.h"
 #include "firmware_sim/app/studio/soak/clean.h"
+#include "firmware_sim/app/studio/soak/frame.h"
 #include "firmware_sim/app/studio/soak/soak.h"
 
 enum { NEXT_MS = 50, REPLY_MS = 5000 };

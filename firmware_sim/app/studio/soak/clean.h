@@ -11,22 +11,9 @@
 #include "core/err.h"
 #include "drivers/host/scanhead.h"
 #include "drivers/link/link.h"
+#include "firmware_sim/app/studio/soak/frame.h"
 
 struct soak;
-
-/* Frames that are remembered, clean and by link: a power of two. Half of them at most wait to be judged. */
-enum { SOAK_RING = 1 << 16 };
-
-/* Numbers of frames as 64 bits: those on the wire wrap, these do not. */
-typedef uint64_t soak_seq;
-
-struct soak_clean_frame {
-    soak_seq seq;
-    uint64_t digest;
-    int64_t t_ns;
-    uint32_t len;
-    int there;
-};
 
 struct soak_clean {
     pthread_mutex_t lock;

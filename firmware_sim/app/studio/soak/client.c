@@ -8,7 +8,6 @@
 #include "drivers/host/scanhead.h"
 #include "drivers/link/link.h"
 #include "firmware_sim/app/studio/soak/ask.h"
-#include "firmware_sim/app/studio/soak/clean.h"
 #include "firmware_sim/app/studio/soak/client.h"
 #include "firmware_sim/app/studio/soak/datagrams.h"
 #include "firmware_sim/app/studio/soak/head.h"
@@ -75,7 +74,7 @@ static int open_link(struct soak *soak, uint32_t i, const struct link_place *pla
                                            : NULL;
     link->usable = link->not_soaked == NULL;
     if (!link->usable) return 0;
-    link->fact = calloc(SOAK_RING, sizeof *link->fact);
+    link->fact = soak_ledger_open();
     return link->fact != NULL ? 1 : -1;
 }
 

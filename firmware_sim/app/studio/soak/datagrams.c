@@ -18,8 +18,8 @@
 
 #include "drivers/link/link.h"
 #include "drivers/protocol/crc32c.h"
-#include "firmware_sim/app/studio/soak/clean.h"
 #include "firmware_sim/app/studio/soak/datagrams.h"
+#include "firmware_sim/app/studio/soak/frame.h"
 #include "firmware_sim/app/studio/soak/ledger.h"
 #include "firmware_sim/app/studio/soak/link.h"
 #include "firmware_sim/base/clock.h"

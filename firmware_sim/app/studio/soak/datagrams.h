@@ -7,7 +7,7 @@
 #include <stdint.h>
 
 #include "drivers/link/link.h"
-#include "firmware_sim/app/studio/soak/clean.h"
+#include "firmware_sim/app/studio/soak/frame.h"
 
 struct soak_datagrams;
 struct soak_link;

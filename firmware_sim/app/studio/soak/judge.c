@@ -5,6 +5,7 @@
  * reader has it. */
 #include "firmware_sim/app/studio/soak/clean.h"
 #include "firmware_sim/app/studio/soak/datagrams.h"
+#include "firmware_sim/app/studio/soak/frame.h"
 #include "firmware_sim/app/studio/soak/judge.h"
 #include "firmware_sim/app/studio/soak/ledger.h"
 #include "firmware_sim/app/studio/soak/link.h"

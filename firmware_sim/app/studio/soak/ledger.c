@@ -3,12 +3,14 @@
  *
  * The head reports a fault in the thread of the link, before the client can see it. Frames are identified by their
  * numbers, which are the same on all links. */
+#include <stdlib.h>
 #include <string.h>
 
 #include "drivers/host/scanhead.h"
 #include "firmware_sim/app/studio/soak/ask.h"
 #include "firmware_sim/app/studio/soak/clean.h"
 #include "firmware_sim/app/studio/soak/datagrams.h"
+#include "firmware_sim/app/studio/soak/frame.h"
 #include "firmware_sim/app/studio/soak/head.h"
 #include "firmware_sim/app/studio/soak/judge.h"
 #include "firmware_sim/app/studio/soak/ledger.h"
@@ -21,6 +23,11 @@
 
 /* Blocks are computed so far ahead, at most. */
 static const int64_t AHEAD_NS = 500000000, JUST_NS = 500000000;
+
+struct soak_fact *soak_ledger_open(void)
+{
+    return calloc(SOAK_RING, sizeof(struct soak_fact));
+}
 
 struct soak_fact *soak_fact_at(struct soak_link *link, soak_seq seq)
 {

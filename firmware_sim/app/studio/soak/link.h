@@ -9,7 +9,7 @@
 
 #include "drivers/host/scanhead.h"
 #include "firmware_sim/app/studio/soak/ask.h"
-#include "firmware_sim/app/studio/soak/clean.h"
+#include "firmware_sim/app/studio/soak/frame.h"
 #include "firmware_sim/app/studio/soak/head.h"
 #include "firmware_sim/app/studio/soak/ledger.h"
 #include "firmware_sim/app/studio/soak/row.h"
