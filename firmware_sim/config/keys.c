@@ -5,7 +5,9 @@
  * and measurement.c. */
 #include "core/cast.h"
 #include "drivers/usb/backend.h"
-#include "firmware_sim/config/table.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/keys.h"
+#include "firmware_sim/config/table/row.h"
 
 /* The beginning of a row: path, offset and size. Where path and member have different names, the row writes the path
  * itself. */

@@ -4,7 +4,11 @@
 #include <string.h>
 
 #include "drivers/usb/backend.h"
-#include "firmware_sim/config/table.h"
+#include "firmware_sim/config/check_links.h"
+#include "firmware_sim/config/check_places.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/table/given.h"
+#include "firmware_sim/config/table/row.h"
 
 struct owned_key {
     const char *path;
