@@ -15,6 +15,8 @@
 #include "firmware_sim/app/progress.h"
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/base/line_writer.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/load.h"
 
 static atomic_int interrupted; /* lock-free, as a handler needs it; other threads ask for it, too */
 

@@ -12,7 +12,9 @@
 #include "core/err.h"
 #include "firmware_sim/app/options.h"
 #include "firmware_sim/base/json.h"
-#include "firmware_sim/config/config.h"
+
+struct config;
+struct config_faults;
 
 /* The only list of commands, in the order of `scanhead --help`. scanheadd has those of HEAD, scanhead has all of them. */
 #define APP_COMMANDS(HEAD, STUDIO) \

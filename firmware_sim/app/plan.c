@@ -8,6 +8,7 @@
 #include "core/plan.h"
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/base/json.h"
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/site/site.h"
 
 static void put_option(struct json *json, const struct plan_option *option)

@@ -5,6 +5,7 @@
 #include "firmware_sim/config/keys.h"
 #include "firmware_sim/config/load.h"
 #include "firmware_sim/config/profiles.h"
+#include "firmware_sim/config/scanners.h"
 #include "firmware_sim/config/table/document.h"
 #include "firmware_sim/config/table/forget.h"
 #include "firmware_sim/config/table/reader.h"

@@ -9,6 +9,7 @@
 #include "firmware_sim/config/table/value.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 

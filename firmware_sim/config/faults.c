@@ -7,6 +7,7 @@
 
 #include "firmware_sim/config/check_faults.h"
 #include "firmware_sim/config/config.h"
+#include "firmware_sim/config/load.h"
 #include "firmware_sim/config/shared.h"
 #include "firmware_sim/config/table/diagnostics.h"
 #include "firmware_sim/config/table/document.h"

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+#include <stdio.h>
+
 #include "firmware_sim/config/files.h"
 
 #include "firmware_sim/config/config.h"

@@ -4,6 +4,7 @@
  * check --help` come from the rows alone; checks of more than one key are in crosscheck.c, places.c
  * and measurement.c. */
 #include "core/cast.h"
+#include "drivers/protocol/protocol.h"
 #include "drivers/usb/backend.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/keys.h"

@@ -8,6 +8,7 @@
 #include "firmware_sim/config/check_links.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/keys.h"
+#include "firmware_sim/config/load.h"
 #include "firmware_sim/config/table/document.h"
 #include "firmware_sim/config/table/reader.h"
 #include "firmware_sim/config/table/row.h"

@@ -15,6 +15,7 @@
 #include <unistd.h>
 
 #include "firmware_sim/base/nearest.h"
+#include "firmware_sim/config/reference.h"
 
 /* config_print_section prints the keys of head profiles for this name. */
 static const char PROFILE[] = "profile";

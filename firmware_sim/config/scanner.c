@@ -3,6 +3,7 @@
  * file, once for each scanner. Out: the scanner of each station, and diagnostics of all scanners. */
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/load.h"
+#include "firmware_sim/config/scanners.h"
 #include "firmware_sim/config/table/diagnostics.h"
 
 #include <math.h>

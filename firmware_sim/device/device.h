@@ -19,7 +19,6 @@
 #include "drivers/protocol/native.h"
 #include "drivers/protocol/protocol.h"
 #include "firmware_sim/command/command.h"
-#include "firmware_sim/config/config.h"
 #include "firmware_sim/device/journal.h"
 #include "firmware_sim/fault/board.h"
 #include "firmware_sim/site/site.h"
@@ -92,6 +91,7 @@ struct device_work {
 
 struct device;
 struct device_version;
+struct config;
 
 struct device_options {
     int start;    /* scan at once when booted */

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "firmware_sim/base/clock.h"
+#include "firmware_sim/config/config.h"
 
 static const char LEAP_FILE[] = "/usr/share/zoneinfo/leap-seconds.list";
 static const int64_t PPT = 1000000000000;

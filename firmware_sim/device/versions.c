@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/places.h"
 #include "firmware_sim/device/device_state.h"
 
 struct device_version *device_make_version(const struct site *site, struct site *own)

@@ -2,11 +2,14 @@
 #include "firmware_sim/site/anchor_geotiff.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "core/angle.h"
 #include "core/crs.h"
 #include "core/geotiff.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/places.h"
 
 /* Two libraries agree on the same projection to nanometres; other grids differ by metres. */
 #define SAME_GRID_M 1e-3

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdio.h>
 
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/site/colours.h"
 #include "firmware_sim/site/site.h"
 

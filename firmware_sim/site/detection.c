@@ -10,6 +10,7 @@
 #include "core/angle.h"
 #include "core/light.h"
 #include "core/rng.h"
+#include "firmware_sim/config/config.h"
 
 static const char GHOST[] = "ghost of ";
 

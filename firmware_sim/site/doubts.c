@@ -9,6 +9,7 @@
 #include "core/distance.h"
 #include "core/mat3.h"
 #include "core/vec3.h"
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/site/doubts.h"
 #include "firmware_sim/site/site.h"
 

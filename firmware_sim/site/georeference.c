@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Georeferencing of a site: heights, method, counts. */
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/site/detection.h"
 #include "firmware_sim/site/georeference.h"
 #include "firmware_sim/site/site.h"

@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/places.h"
 #include "firmware_sim/site/create.h"
 #include "firmware_sim/site/sights.h"
 #include "firmware_sim/site/site.h"

@@ -7,6 +7,8 @@
 #include <string.h>
 
 #include "core/plan/cost.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/places.h"
 #include "firmware_sim/site/rate.h"
 #include "firmware_sim/site/site.h"
 

@@ -9,6 +9,7 @@
 #include "core/rng.h"
 #include "drivers/protocol/native_encode.h"
 #include "firmware_sim/base/clock.h"
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/site/look.h"
 #include "firmware_sim/site/site.h"
 

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/site/look.h"
 #include "firmware_sim/site/sights.h"
 #include "firmware_sim/site/site.h"

@@ -6,13 +6,20 @@
 #ifndef FIRMWARE_SIM_SITE_SITE_H
 #define FIRMWARE_SIM_SITE_SITE_H
 
+#include <stdint.h>
+
 #include "core/cast.h"
-#include "core/georef.h"
+#include "core/colour.h"
+#include "core/detect.h"
+#include "core/instrument.h"
 #include "core/plan.h"
 #include "core/pose.h"
 #include "core/scene.h"
-#include "firmware_sim/config/config.h"
+#include "core/surface.h"
+#include "firmware_sim/command/head.h"
 #include "firmware_sim/site/placement.h"
+
+struct config;
 
 /* Points of the geo layout along one stretch of a head's path: about its centre. */
 struct site_leg {

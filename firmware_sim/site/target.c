@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "firmware_sim/base/nearest.h"
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/site/site.h"
 #include "firmware_sim/site/target.h"
 

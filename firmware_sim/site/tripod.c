@@ -9,12 +9,14 @@
 #include "firmware_sim/site/tripod.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/angle.h"
 #include "core/mat3.h"
 #include "core/vec3.h"
+#include "firmware_sim/config/config.h"
 
 /* A prism of SIDES faces a leg, and its two ends. */
 enum { LEGS = 3, SIDES = 6, LEG_VERTICES = 2 * SIDES, LEG_TRIANGLES = 2 * SIDES + 2 * (SIDES - 2) };

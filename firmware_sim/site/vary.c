@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/site/detection.h"
 #include "firmware_sim/site/georeference.h"
 #include "firmware_sim/site/site.h"

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/site/site.h"
 #include "firmware_sim/site/world.h"
 

@@ -13,6 +13,8 @@
 #include <cmocka.h>
 
 #include "core/cast/kernels.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/load.h"
 #include "firmware_sim/site/plan_rows.h"
 #include "tests/common/beam_reference.h"
 #include "tests/common/thorough.h"

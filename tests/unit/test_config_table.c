@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* The configuration table itself: its reference, its example, and the soundness of its rows. */
 #include "firmware_sim/config/keys.h"
+#include "firmware_sim/config/load.h"
 #include "firmware_sim/config/profile_keys.h"
+#include "firmware_sim/config/reference.h"
 #include "firmware_sim/config/table/document.h"
 #include "firmware_sim/config/table/reader.h"
 #include "firmware_sim/config/table/row.h"

@@ -6,6 +6,7 @@
 
 #include "core/angle.h"
 #include "core/pose.h"
+#include "firmware_sim/config/load.h"
 
 static const char ROOM[] = "o floor\nv -50 -50 0.25\nv 50 -50 0.25\nv 50 50 0.25\nv -50 50 0.25\nf 1 2 3 4\n";
 

@@ -5,6 +5,7 @@
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/help/help.h"
 #include "firmware_sim/config/config.h"
+#include "firmware_sim/config/reference.h"
 
 enum { NAME_MAX_LEN = 64 };
 static const char PROGRAM[] = "scanhead.1", KEYS[] = "scanhead.yaml.5";

@@ -5,6 +5,8 @@
 #include <string.h>
 
 #include "firmware_sim/app/run/run.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/load.h"
 
 static const char DEFAULT_LINKS[] = "links:\n- {type: pty}\n- {type: tcp}\n";
 

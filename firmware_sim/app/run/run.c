@@ -7,6 +7,7 @@
 #include "firmware_sim/app/run/page.h"
 #include "firmware_sim/app/run/run.h"
 #include "firmware_sim/app/surfaces.h"
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/site/plan_rows.h"
 #include "firmware_sim/site/rate.h"
 

@@ -9,6 +9,7 @@
 #include "firmware_sim/app/run/run.h"
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/base/notify.h"
+#include "firmware_sim/config/config.h"
 
 enum { VIEW_SESSIONS = 4 };
 

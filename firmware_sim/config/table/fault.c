@@ -6,6 +6,7 @@
 
 #include "firmware_sim/base/nearest.h"
 #include "firmware_sim/config/config.h"
+#include "firmware_sim/config/load.h"
 #include "firmware_sim/config/profile_keys.h"
 #include "firmware_sim/config/table/diagnostics.h"
 #include "firmware_sim/config/table/forget.h"

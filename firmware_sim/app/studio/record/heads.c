@@ -7,6 +7,8 @@
 #include <string.h>
 
 #include "firmware_sim/base/clock.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/load.h"
 
 /* Which of those that are known has the scanner of station i, from 0; n: none yet. */
 static uint32_t find(const struct heads *heads, uint32_t i)

@@ -9,8 +9,9 @@
 #include <unistd.h>
 
 #include "core/newfile.h"
-#include "firmware_sim/app/studio/report/report.h"
 #include "firmware_sim/app/studio/report/page.h"
+#include "firmware_sim/app/studio/report/report.h"
+#include "firmware_sim/config/config.h"
 
 static const char *file_name(const char *path)
 {

@@ -4,13 +4,14 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/studio/cloud_picture.h"
 #include "core/colour.h"
 #include "core/geoframe.h"
 #include "core/mat3.h"
+#include "core/studio/cloud_picture.h"
 #include "core/vec3.h"
-#include "firmware_sim/app/studio/report/report.h"
 #include "firmware_sim/app/studio/report/page.h"
+#include "firmware_sim/app/studio/report/report.h"
+#include "firmware_sim/config/places.h"
 
 enum { MOST_NAMES = 40, WIDTH = 900 };
 

@@ -5,8 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "firmware_sim/app/studio/report/report.h"
 #include "firmware_sim/app/studio/report/page.h"
+#include "firmware_sim/app/studio/report/report.h"
+#include "firmware_sim/config/places.h"
 
 enum { MOST_LABELS = 200 };
 

@@ -16,6 +16,7 @@
 #include "firmware_sim/app/studio/soak/soak.h"
 #include "firmware_sim/app/studio/soak/usb.h"
 #include "firmware_sim/base/clock.h"
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/fault/fault.h"
 #include "firmware_sim/loop/loop.h"
 

@@ -10,6 +10,7 @@
 #include "firmware_sim/app/studio/soak/soak.h"
 #include "firmware_sim/app/studio/soak/usb.h"
 #include "firmware_sim/command/head.h"
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/fault/fault.h"
 
 /* What another reader of the stream would take for a step of the clock: far above a nanosecond, far below a jump. */

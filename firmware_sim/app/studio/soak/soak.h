@@ -8,10 +8,11 @@
 
 #include "firmware_sim/app/studio/soak/clean.h"
 #include "firmware_sim/app/studio/soak/link.h"
-#include "firmware_sim/config/config.h"
 #include "firmware_sim/fault/board.h"
 #include "firmware_sim/fault/fault.h"
 #include "firmware_sim/loop/loop.h"
+
+struct config;
 
 enum soak_phase { SOAK_RUNS, SOAK_DRAINS, SOAK_ENDS };
 

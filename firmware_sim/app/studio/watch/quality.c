@@ -7,6 +7,7 @@
 #include "firmware_sim/app/studio/watch/inside.h"
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/base/json.h"
+#include "firmware_sim/config/places.h"
 
 /* ---- the observer */
 
