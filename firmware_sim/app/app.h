@@ -33,7 +33,7 @@ struct config_faults;
 #define APP_DECLARE(name) extern const struct app_command app_##name;
 APP_COMMANDS(APP_DECLARE, APP_DECLARE)
 
-/* Prints "scanhead: TEXT" and gives the exit status for the error. */
+/* Prints "PROGRAM: TEXT" and gives the exit status for the error. */
 int app_fail(const struct sh_err *err);
 /* The same for each error of a configuration. */
 int app_fail_config(const struct config_faults *faults);
