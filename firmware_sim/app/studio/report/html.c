@@ -172,25 +172,33 @@ static void put_histograms(FILE *out, struct report *r)
     fputs("</figcaption></figure>\n</div>\n", out);
 }
 
-static void put_bars(FILE *out, const char *title, const char *axis, uint32_t n, const char (*group)[32],
-                     const struct figures *figures, const char *caption)
+/* A chart of bars: its texts, and the figures of each group. */
+struct chart {
+    const char *title, *axis, *caption;
+    uint32_t n;
+    const char (*group)[32];
+    const struct figures *figures;
+};
+
+static void put_bars(FILE *out, const struct chart *chart)
 {
+    const struct figures *figures = chart->figures;
     double value_m[REPORT_MAX_RANGES][PAGE_SERIES];
-    for (uint32_t k = 0; k < n; k++) {
+    for (uint32_t k = 0; k < chart->n; k++) {
         value_m[k][0] = figures[k].rms_m;
         value_m[k][1] = figures[k].p95_m;
         value_m[k][2] = figures[k].judged_rms_m;
         value_m[k][3] = figures[k].expected_rms_m;
     }
-    const struct page_bars bars = {.title = title,
-                                   .axis = axis,
+    const struct page_bars bars = {.title = chart->title,
+                                   .axis = chart->axis,
                                    .series = {"RMS distance", "95 % distance", "RMS along the beam", "expected"},
-                                   .n_groups = n,
-                                   .group = group,
+                                   .n_groups = chart->n,
+                                   .group = chart->group,
                                    .value_m = (const double(*)[PAGE_SERIES])value_m};
     fputs("<figure>\n", out);
     page_bars(out, &bars);
-    fprintf(out, "<figcaption>%s</figcaption></figure>\n", caption);
+    fprintf(out, "<figcaption>%s</figcaption></figure>\n", chart->caption);
 }
 
 static void put_charts(FILE *out, const struct report *r)
@@ -200,13 +208,20 @@ static void put_charts(FILE *out, const struct report *r)
     report_name_incidences(incidences);
     if (r->f.n_ranges == 0) return;
     fputs("<div class=\"pair\">\n", out);
-    put_bars(out, "Deviations by range", "distance from the station, m", r->f.n_ranges, (const char(*)[32])ranges,
-             r->f.range, "Deviations by the distance from the station.");
+    put_bars(out, &(struct chart){.title = "Deviations by range",
+                                  .axis = "distance from the station, m",
+                                  .caption = "Deviations by the distance from the station.",
+                                  .n = r->f.n_ranges,
+                                  .group = (const char(*)[32])ranges,
+                                  .figures = r->f.range});
     if (!r->site->moving)
-        put_bars(out, "Deviations by incidence", "angle between the beam and the surface's normal", REPORT_INCIDENCES,
-                 (const char(*)[32])incidences, r->f.incidence,
-                 "Deviations by the angle at which the beam meets the surface; 0\xc2\xb0 is head on. Beyond 80\xc2\xb0 "
-                 "there are distances alone.");
+        put_bars(out, &(struct chart){.title = "Deviations by incidence",
+                                      .axis = "angle between the beam and the surface's normal",
+                                      .caption = "Deviations by the angle at which the beam meets the surface; "
+                                                 "0\xc2\xb0 is head on. Beyond 80\xc2\xb0 there are distances alone.",
+                                      .n = REPORT_INCIDENCES,
+                                      .group = (const char(*)[32])incidences,
+                                      .figures = r->f.incidence});
     fputs("</div>\n", out);
 }
 
