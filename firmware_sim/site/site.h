@@ -206,10 +206,11 @@ struct site_station_move {
     uint32_t station;
     const struct site_place *to;
 };
-/* Makes the site beside `from` in which the station stands at its new place. The result is as from a configuration with that place. Maps
- * of from's stations that still hold are kept; all others that are planned are made. Meshes and BVHs are shared.
- * from and move->first may be cast from meanwhile; sites of one world are loaded and freed by one thread at a time. report
- * gets the warnings that loading `from` did not give; out->said counts them. SH_EINPUT: no head can stand there. */
+/* Makes the site beside `from` in which the station stands at its new place. The result is as from a configuration with
+ * that place. Maps of from's stations that still hold are kept; all others that are planned are made. Meshes and BVHs
+ * are shared. from and move->first may be cast from meanwhile; sites of one world are loaded and freed by one thread at
+ * a time. report gets the warnings that loading `from` did not give; out->said counts them. SH_EINPUT: no head can stand
+ * there. */
 int site_load_moved(const struct site *from, const struct site_station_move *move, const struct sh_report *report,
                     struct site **out, struct sh_err *err);
 /* Frees the site's maps, once nobody casts from it any more. The owner still has to free the site. */

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "core/newfile.h"
+#include "core/studio/picture.h"
 #include "firmware_sim/app/studio/report/page.h"
 #include "firmware_sim/app/studio/report/report.h"
 #include "firmware_sim/config/config.h"
@@ -22,7 +23,7 @@ static const char *file_name(const char *path)
 static void put_fact(FILE *out, const char *what, const char *text)
 {
     fprintf(out, "<dt>%s</dt><dd>", what);
-    page_text(out, text);
+    picture_put_escaped(out, text);
     fputs("</dd>\n", out);
 }
 
@@ -56,7 +57,7 @@ static void put_top(FILE *out, const struct report *r)
     char text[CONFIG_PATH_LEN + 64];
     struct tm day;
     fputs("<h1>Scan report: ", out);
-    page_text(out, file_name(r->cloud_path));
+    picture_put_escaped(out, file_name(r->cloud_path));
     fputs("</h1>\n<dl class=\"facts\">\n", out);
     put_fact(out, "Recording", r->cloud_path);
     if (gmtime_r(&r->modified.tv_sec, &day) != NULL && strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S UTC", &day) > 0)
@@ -81,7 +82,7 @@ static void put_verdict(FILE *out, const struct report_verdict *v)
     fprintf(out, "<div class=\"verdict %s\"><b>%s</b>", kind[v->judgement], sign[v->judgement]);
     if (text == NULL) text = v->text;
     if (*text != 0) fputc(toupper((unsigned char)*text), out); /* ours begin with a letter of ASCII */
-    page_text(out, *text != 0 ? text + 1 : text);
+    picture_put_escaped(out, *text != 0 ? text + 1 : text);
     fputs("</div>\n", out);
 }
 
@@ -238,7 +239,7 @@ static void put_worst(FILE *out, const struct report *r)
         char name[REPORT_SURFACE_LEN];
         report_name_surface(s, name);
         fputs(", on ", out);
-        page_text(out, name);
+        picture_put_escaped(out, name);
     }
     fputs(".</p>\n", out);
 }
