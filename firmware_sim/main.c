@@ -34,7 +34,7 @@ static int is_elsewhere(const char *word)
 
 static int fail_elsewhere(const char *word)
 {
-    fprintf(stderr, "scanhead: %s: not in scanheadd; use scanhead\n", word);
+    fprintf(stderr, "%s: %s: not in scanheadd; use scanhead\n", app_program, word);
     return APP_USAGE;
 }
 
@@ -48,8 +48,8 @@ static int fail_unknown(const char *word)
         n++;
     }
     meant = app_nearest(word, known, n);
-    fprintf(stderr, "scanhead: unknown command %s%s%s%s; see scanhead --help\n", word,
-            meant != NULL ? ", did you mean " : "", meant != NULL ? meant : "", meant != NULL ? "?" : "");
+    fprintf(stderr, "%s: unknown command %s%s%s%s; see %s --help\n", app_program, word,
+            meant != NULL ? ", did you mean " : "", meant != NULL ? meant : "", meant != NULL ? "?" : "", app_program);
     return APP_USAGE;
 }
 
@@ -81,7 +81,7 @@ static int check_stack(void)
     enum { NEEDED_KIB = 1024 };
     struct rlimit limit;
     if (getrlimit(RLIMIT_STACK, &limit) != 0 || limit.rlim_cur >= NEEDED_KIB * 1024) return APP_OK;
-    fprintf(stderr, "scanhead: the stack is limited to %llu KiB; allowed %d and more: ulimit -s %d\n",
+    fprintf(stderr, "%s: the stack is limited to %llu KiB; allowed %d and more: ulimit -s %d\n", app_program,
             (unsigned long long)limit.rlim_cur / 1024, NEEDED_KIB, NEEDED_KIB);
     return APP_USAGE;
 }
@@ -91,7 +91,9 @@ int main(int argc, char **argv)
 {
     /* Memory of meshes goes back to the system at once, however large the file was that was freed before. */
     mallopt(M_MMAP_THRESHOLD, 4 << 20);
-#ifndef HEAD_ALONE
+#ifdef HEAD_ALONE
+    app_program = "scanheadd";
+#else
     run_take_page(&watch_page);
 #endif
     int status = check_stack();
@@ -99,7 +101,7 @@ int main(int argc, char **argv)
     errno = 0;
     const int failed = fflush(stdout) != 0 || ferror(stdout) != 0;
     if (!failed || status != APP_OK) return status;
-    fprintf(stderr, "scanhead: standard output: writing failed%s%s\n", errno != 0 ? ": " : "",
+    fprintf(stderr, "%s: standard output: writing failed%s%s\n", app_program, errno != 0 ? ": " : "",
             errno != 0 ? strerror(errno) : "");
     return APP_FAILED;
 }

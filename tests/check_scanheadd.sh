@@ -31,18 +31,28 @@ without_studio() {
 }
 
 commands_of() {
-    "$1" --help | sed -n 's/^  scanhead \([a-z]*\) .*/\1/p'
+    "$1" --help | sed -n "s/^  ${1##*/} \\([a-z]*\\) .*/\\1/p"
 }
 commands() {
     [ "$(commands_of "$head" | tr '\n' ' ')" = "run plan check list help " ] || return
     for command in $(commands_of "$built/scanhead"); do
         commands_of "$head" | grep -qx "$command" && continue
         said=$("$head" "$command" --help 2>&1)
-        [ $? = 2 ] && [ "$said" = "scanhead: $command: not in scanheadd; use scanhead" ] || { echo "$command: $said"; return 1; }
+        [ $? = 2 ] && [ "$said" = "scanheadd: $command: not in scanheadd; use scanhead" ] || { echo "$command: $said"; return 1; }
         [ "$("$head" help "$command" 2>&1)" = "$said" ] || { echo "help $command"; return 1; }
     done
     said=$("$head" lits 2>&1)
     [ $? = 2 ] && [[ $said == *"did you mean list?"* ]]
+}
+
+# Its messages, its help and its pages have its own name; there are pages of its own commands alone.
+name() {
+    pages=$("$head" help --man list | tr '\n' ' ')
+    [ "$pages" = "scanheadd.1 scanheadd-run.1 scanheadd-plan.1 scanheadd-check.1 scanheadd-list.1 scanheadd-help.1 scanhead.yaml.5 " ] || { echo "$pages"; return 1; }
+    "$head" help --man scanheadd-run.1 | grep -q '^\\fBscanheadd run\\fR' || return
+    "$head" run --help | grep -q '^usage: scanheadd run ' || return
+    said=$("$head" check "$work/none.yaml" 2>&1)
+    [[ $said == "scanheadd: "* ]]
 }
 
 # With a page, too: it is served without the studio's resources on the scan.
@@ -60,5 +70,6 @@ same_stream() {
 check "scanheadd is linked with the libraries of the head, and no others" libraries
 check "nothing of the studio is in it" without_studio
 check "its commands, and what it says to others" commands
+check "messages, help and pages have its name" name
 check "its stream has the bytes of scanhead's" same_stream
 echo "1..$tests"

@@ -15,6 +15,8 @@
 #include "firmware_sim/app/progress.h"
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/base/line_writer.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/load.h"
 
 static atomic_int interrupted; /* lock-free, as a handler needs it; other threads ask for it, too */
 
@@ -60,7 +62,7 @@ int app_fail(const struct sh_err *err)
 {
     struct sh_err line = *err;
     sh_keep_line(line.text); /* a path may have any bytes */
-    fprintf(stderr, "scanhead: %s\n", line.text);
+    fprintf(stderr, "%s: %s\n", app_program, line.text);
     return err->code == SH_EINPUT ? APP_USAGE : APP_FAILED;
 }
 
@@ -69,7 +71,7 @@ int app_fail_config(const struct config_faults *faults)
     int status = APP_USAGE;
     for (uint32_t i = 0; i < faults->n && i < CONFIG_MAX_FAULTS; i++)
         status = app_fail(&faults->fault[i]);
-    if (faults->n > CONFIG_MAX_FAULTS) fprintf(stderr, "scanhead: and %u more\n", faults->n - CONFIG_MAX_FAULTS);
+    if (faults->n > CONFIG_MAX_FAULTS) fprintf(stderr, "%s: and %u more\n", app_program, faults->n - CONFIG_MAX_FAULTS);
     return status;
 }
 
@@ -118,7 +120,7 @@ static struct line_writer *messages; /* NULL: messages are printed at once */
 
 static void say_gap(char text[LINE_GAP_BYTES], const uint64_t lost[LINE_KINDS])
 {
-    snprintf(text, LINE_GAP_BYTES, "scanhead: %llu messages are missing here: nobody read them\n",
+    snprintf(text, LINE_GAP_BYTES, "%s: %llu messages are missing here: nobody read them\n", app_program,
              (unsigned long long)lost[LINE_PLAIN]);
 }
 
@@ -158,9 +160,9 @@ static void print_warning(void *ctx, const char *text)
 {
     (void)ctx;
     if (warned_of == NULL)
-        print("scanhead: warning: %s\n", text);
+        print("%s: warning: %s\n", app_program, text);
     else if (is_new(text))
-        print("scanhead: warning: %s: %s\n", warned_of, text);
+        print("%s: warning: %s: %s\n", app_program, warned_of, text);
 }
 
 static void print_progress(void *ctx, const char *what, double fraction)
@@ -172,9 +174,9 @@ static void print_progress(void *ctx, const char *what, double fraction)
     if (left_s >= 0.0 && left_s < 120.0) snprintf(left, sizeof left, ", %.0f s left", ceil(left_s));
     if (left_s >= 120.0) snprintf(left, sizeof left, ", %.0f min left", ceil(left_s / 60.0));
     if (fraction < 0.0)
-        print("scanhead: %s ...\n", what);
+        print("%s: %s ...\n", app_program, what);
     else
-        print("scanhead: %s: %.0f %%%s\n", what, 100.0 * fraction, left);
+        print("%s: %s: %.0f %%%s\n", app_program, what, 100.0 * fraction, left);
 }
 
 static void print_each_second(void *ctx, const char *what, double fraction)

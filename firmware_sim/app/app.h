@@ -12,7 +12,9 @@
 #include "core/err.h"
 #include "firmware_sim/app/options.h"
 #include "firmware_sim/base/json.h"
-#include "firmware_sim/config/config.h"
+
+struct config;
+struct config_faults;
 
 /* The only list of commands, in the order of `scanhead --help`. scanheadd has those of HEAD, scanhead has all of them. */
 #define APP_COMMANDS(HEAD, STUDIO) \
@@ -31,7 +33,7 @@
 #define APP_DECLARE(name) extern const struct app_command app_##name;
 APP_COMMANDS(APP_DECLARE, APP_DECLARE)
 
-/* Prints "scanhead: TEXT" and gives the exit status for the error. */
+/* Prints "PROGRAM: TEXT" and gives the exit status for the error. */
 int app_fail(const struct sh_err *err);
 /* The same for each error of a configuration. */
 int app_fail_config(const struct config_faults *faults);

@@ -9,6 +9,8 @@
 #include "firmware_sim/app/check_heads.h"
 #include "firmware_sim/app/check_places.h"
 #include "firmware_sim/app/check_scene.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/reference.h"
 #include "firmware_sim/device/head_clock.h"
 #include "firmware_sim/loop/pose_feed.h"
 

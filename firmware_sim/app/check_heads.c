@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "firmware_sim/app/check_heads.h"
+#include "firmware_sim/config/config.h"
 
 static void print_stations(const struct config *cfg, FILE *out)
 {

@@ -8,6 +8,8 @@
 #include "core/locate.h"
 #include "core/mat3.h"
 #include "core/vec3.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/places.h"
 
 /* From 0 to below 360, and no -0. */
 static double turn_deg(double deg)

@@ -4,7 +4,10 @@
 #include <string.h>
 
 #include "drivers/host/scanhead.h"
+#include "drivers/protocol/protocol.h"
 #include "firmware_sim/app/app.h"
+#include "firmware_sim/config/load.h"
+#include "firmware_sim/config/reference.h"
 
 enum { MAX_HEADS = 64 };
 

@@ -10,6 +10,8 @@
 
 #include "firmware_sim/base/nearest.h"
 
+const char *app_program = "scanhead";
+
 enum { FIRST_VALUE = 256, HELP_COLUMNS = 110, APP_MAX_WORDS = 8 };
 
 int app_usage(const struct app_command *command, const char *fmt, ...)
@@ -19,14 +21,14 @@ int app_usage(const struct app_command *command, const char *fmt, ...)
     va_start(ap, fmt);
     vsnprintf(text, sizeof text, fmt, ap);
     va_end(ap);
-    fprintf(stderr, "scanhead %s: %s; see scanhead %s --help\n", command->name, text, command->name);
+    fprintf(stderr, "%s %s: %s; see %s %s --help\n", app_program, command->name, text, app_program, command->name);
     return APP_USAGE;
 }
 
 int app_add_set(struct app_sets *sets, const char *set)
 {
     if (sets->n == APP_MAX_SETS) {
-        fprintf(stderr, "scanhead: too many settings; at most %d\n", APP_MAX_SETS);
+        fprintf(stderr, "%s: too many settings; at most %d\n", app_program, APP_MAX_SETS);
         return APP_USAGE;
     }
     sets->set[sets->n++] = set;
@@ -36,7 +38,7 @@ int app_add_set(struct app_sets *sets, const char *set)
 int app_add_file(struct app_input *in, const struct app_file *file)
 {
     if (in->n_files == APP_MAX_FILES) {
-        fprintf(stderr, "scanhead: too many files; at most %d\n", APP_MAX_FILES);
+        fprintf(stderr, "%s: too many files; at most %d\n", app_program, APP_MAX_FILES);
         return APP_USAGE;
     }
     in->file[in->n_files++] = *file;
@@ -48,7 +50,7 @@ static int add_key(struct app_sets *sets, const char *key, const char *value)
     char *text = sets->text + sets->used;
     const size_t room = sizeof sets->text - sets->used, n = strlen(key) + strlen(value) + 2;
     if (n > room) {
-        fprintf(stderr, "scanhead: %s: too long; options that stand for a key have %zu characters in all\n", key,
+        fprintf(stderr, "%s: %s: too long; options that stand for a key have %zu characters in all\n", app_program, key,
                 sizeof sets->text);
         return APP_USAGE;
     }
@@ -191,7 +193,8 @@ static void print_help(const struct app_command *command)
         if (n > longest) longest = n;
     }
     app_arguments(command, arguments, sizeof arguments);
-    printf("scanhead %s: %s\n\nusage: scanhead %s%s\n\n", command->name, command->summary, command->name, arguments);
+    printf("%s %s: %s\n\nusage: %s %s%s\n\n", app_program, command->name, command->summary, app_program, command->name,
+           arguments);
     for (const struct app_option *row = command->options; row->kind != APP_LAST; row++)
         print_row(row, (int)longest + 10);
     print_row(&help, (int)longest + 10);

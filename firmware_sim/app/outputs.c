@@ -9,7 +9,9 @@
 #include "core/grow.h"
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/beside.h"
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/config/files.h"
+#include "firmware_sim/config/load.h"
 
 struct named {
     char *who, *path;

@@ -8,6 +8,7 @@
 #include "core/plan.h"
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/base/json.h"
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/site/site.h"
 
 static void put_option(struct json *json, const struct plan_option *option)
@@ -96,9 +97,8 @@ static int plan(struct config *cfg, void *ctx, struct sh_err *err)
     const struct plan_options *o = ctx;
     struct site *site = NULL;
     if (!config_is_alone(cfg))
-        fprintf(stderr,
-                "scanhead: the plan of the scanner of station %u; others have other scanners: --set head.station=N\n",
-                cfg->head.settings.station);
+        fprintf(stderr, "%s: the plan of the scanner of station %u; others have other scanners: --set head.station=N\n",
+                app_program, cfg->head.settings.station);
     int rc = site_load_plan(cfg, &app_report_stderr, &site, err);
     if (rc == SH_OK && o->json) rc = app_write_json("-", put_rows, &site->plan, err);
     if (rc == SH_OK && !o->json) print_text(&site->plan);

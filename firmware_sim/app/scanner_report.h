@@ -4,6 +4,7 @@
 #ifndef FIRMWARE_SIM_APP_SCANNER_REPORT_H
 #define FIRMWARE_SIM_APP_SCANNER_REPORT_H
 
+#include "firmware_sim/config/limits.h"
 #include "firmware_sim/site/site.h"
 
 /* Begins as zeros. To be freed. */

@@ -4,6 +4,8 @@
 #include <stdlib.h>
 
 #include "firmware_sim/base/clock.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/load.h"
 
 static int add(const struct config *cfg, uint32_t station, const struct sh_report *report, struct sites *sites,
                struct sh_err *err)

@@ -1,6 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /* One line from split to reply: find its row, take its value, check control, let the row act. */
-#include "firmware_sim/command/command_inside.h"
+#include "firmware_sim/command/call.h"
+#include "firmware_sim/command/command.h"
+#include "firmware_sim/command/decimal.h"
+#include "firmware_sim/command/error_queue.h"
+#include "firmware_sim/command/fault_commands.h"
+#include "firmware_sim/command/parse.h"
+#include "firmware_sim/command/row.h"
+#include "firmware_sim/command/setting.h"
 
 #include <stdarg.h>
 #include <stdio.h>

@@ -1,6 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /* The only list of commands, and the function of each. The common part of settings is in setting.c. */
-#include "firmware_sim/command/command_inside.h"
+#include "firmware_sim/command/call.h"
+#include "firmware_sim/command/command.h"
+#include "firmware_sim/command/fault_commands.h"
+#include "firmware_sim/command/help.h"
+#include "firmware_sim/command/row.h"
+#include "firmware_sim/command/setting.h"
+#include "firmware_sim/command/site_pose.h"
+#include "firmware_sim/command/step.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The error queue and its texts. */
-#include "firmware_sim/command/command_inside.h"
+#include "firmware_sim/command/command.h"
+#include "firmware_sim/command/error_queue.h"
 
 #include <stdio.h>
 

@@ -3,7 +3,13 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "firmware_sim/command/command_inside.h"
+#include "firmware_sim/command/call.h"
+#include "firmware_sim/command/command.h"
+#include "firmware_sim/command/decimal.h"
+#include "firmware_sim/command/error_queue.h"
+#include "firmware_sim/command/fault_commands.h"
+#include "firmware_sim/command/parse.h"
+#include "firmware_sim/command/row.h"
 
 const struct command_unit command_unit_fault = {"", 0, "no unit", {{NULL, 0}}};
 

@@ -1,6 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* HELP? and HELP:SETtings?: the table of commands, for people and for programs. */
-#include "firmware_sim/command/command_inside.h"
+#include "firmware_sim/command/call.h"
+#include "firmware_sim/command/command.h"
+#include "firmware_sim/command/help.h"
+#include "firmware_sim/command/parse.h"
+#include "firmware_sim/command/row.h"
+#include "firmware_sim/command/setting.h"
 
 #include <stdarg.h>
 #include <stdio.h>

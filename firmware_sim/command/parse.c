@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Splits a line into parts, matches headers with patterns, and reads decimal numbers exactly. */
-#include "firmware_sim/command/command_inside.h"
+#include "firmware_sim/command/command.h"
+#include "firmware_sim/command/decimal.h"
+#include "firmware_sim/command/parse.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -1,6 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /* Query and change of a setting: its row gives the field, the limits and the unit. */
-#include "firmware_sim/command/command_inside.h"
+#include "firmware_sim/command/call.h"
+#include "firmware_sim/command/command.h"
+#include "firmware_sim/command/decimal.h"
+#include "firmware_sim/command/error_queue.h"
+#include "firmware_sim/command/parse.h"
+#include "firmware_sim/command/row.h"
+#include "firmware_sim/command/setting.h"
+#include "firmware_sim/command/step.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -6,7 +6,12 @@
 #include <string.h>
 #include <strings.h>
 
-#include "firmware_sim/command/command_inside.h"
+#include "firmware_sim/command/call.h"
+#include "firmware_sim/command/command.h"
+#include "firmware_sim/command/decimal.h"
+#include "firmware_sim/command/parse.h"
+#include "firmware_sim/command/row.h"
+#include "firmware_sim/command/site_pose.h"
 
 const struct command_unit command_unit_place = {"m, deg", 0, "M, DEG", {{NULL, 0}}};
 

@@ -5,7 +5,12 @@
 #include <string.h>
 
 #include "core/vec3.h"
-#include "firmware_sim/command/command_inside.h"
+#include "firmware_sim/command/call.h"
+#include "firmware_sim/command/command.h"
+#include "firmware_sim/command/decimal.h"
+#include "firmware_sim/command/parse.h"
+#include "firmware_sim/command/row.h"
+#include "firmware_sim/command/site_pose.h"
 
 static const struct {
     const char *name;

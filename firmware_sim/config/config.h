@@ -1,140 +1,35 @@
 /* SPDX-License-Identifier: MIT */
-/* The configuration. In: a YAML file and --set. Out: struct config, checked. One table (keys.c) of key, type,
- * unit, default, range and help gives parsing, defaults, errors and the reference.
+/* The configuration: what load.h makes of a YAML file and --set. One table (keys.c) of key, type, unit, default, range and
+ * help gives parsing, defaults, errors and the reference.
  *
- * Units: as the key's name says (hz, deg, m). Everything is checked. All diagnostics are found at once; each is
- * one line:
- *   FILE:LINE: KEY: what is wrong; what is allowed
- * Unknown keys, duplicate keys, trailing text ("30 kHz"), NaN, wrong types and values out of range are
- * errors. Relative paths in a file are relative to that file; in --set, to the working directory.
+ * Units: as the key's name says (hz, deg, m). Everything is checked. Unknown keys, duplicate keys, trailing text
+ * ("30 kHz"), NaN, wrong types and values out of range are errors. Relative paths in a file are relative to that file; in
+ * --set, to the working directory.
  *
- * The struct is constant once it is loaded. Values that a run measures or chooses are in the site
- * (firmware_sim/site). */
+ * The struct is constant once it is loaded. Values that a run measures or chooses are in the site (firmware_sim/site).
+ * Who needs only places, a head profile, limits, loading or the reference includes these headers and not this one. */
 #ifndef FIRMWARE_SIM_CONFIG_CONFIG_H
 #define FIRMWARE_SIM_CONFIG_CONFIG_H
 
 #include <stdint.h>
-#include <stdio.h>
 
 #include "core/colour.h"
-#include "core/footprint.h"
 #include "core/detect.h"
-#include "core/err.h"
+#include "core/footprint.h"
 #include "core/georef.h"
 #include "core/line.h"
 #include "core/plan.h"
 #include "core/scene.h"
-#include "core/schedule.h"
 #include "core/surface.h"
 #include "drivers/link/link.h"
-#include "drivers/protocol/protocol.h"
 #include "firmware_sim/command/head.h"
+#include "firmware_sim/config/limits.h"
+#include "firmware_sim/config/places.h"
 #include "firmware_sim/config/profile.h"
 #include "firmware_sim/fault/fault.h"
 
-enum {
-    CONFIG_MAX_MESHES = 64,
-    CONFIG_MAX_COPIES = 256, /* copies listed in the configuration itself, of all meshes together */
-    CONFIG_MAX_LINKS = 8,
-    CONFIG_MAX_STATIONS = 64,
-    CONFIG_MAX_SURFACES = 64,
-    CONFIG_MAX_STOPS = 4096,
-    CONFIG_MAX_THREADS = 64
-};
-
 enum config_heights { HEIGHTS_ELLIPSOID, HEIGHTS_GEOID, HEIGHTS_AUTO };
 enum config_pace { PACE_REALTIME, PACE_FAST, PACE_STEP };
-
-struct config_mesh {
-    char file[CONFIG_PATH_LEN];
-    enum scene_up up;
-    double scale, offset_m[3];
-    /* Motion, at time t of the scan: turned by turn_deg_s * t about the vertical through pivot_m, clockwise
-     * seen from above, then shifted by move_m_s * t; with cycle_s, back and forth. All zero: the mesh stands
-     * still. */
-    double move_m_s[3], turn_deg_s, pivot_m[3], cycle_s;
-    char copies[CONFIG_PATH_LEN]; /* CSV file of places; empty: they are in struct config_scene, or there are none */
-    int copy_labels;              /* each copy has surfaces of its own */
-};
-
-static inline int config_mesh_moves(const struct config_mesh *mesh)
-{
-    return mesh->turn_deg_s != 0.0 || mesh->move_m_s[0] != 0.0 || mesh->move_m_s[1] != 0.0 || mesh->move_m_s[2] != 0.0;
-}
-
-/* A copy of a mesh that is listed in the configuration itself. */
-struct config_copy {
-    uint32_t mesh;
-    struct scene_place place;
-};
-enum { CONFIG_COPY_SCALES = 1000 }; /* a copy's scale: from 1 / CONFIG_COPY_SCALES to CONFIG_COPY_SCALES */
-
-/* How the scene lies on the Earth; core/geoframe.h. */
-enum config_anchor_source { ANCHOR_NONE, ANCHOR_EXPLICIT, ANCHOR_IFC, ANCHOR_UTM, ANCHOR_ECEF, ANCHOR_GEOTIFF };
-struct config_anchor {
-    enum config_anchor_source source;
-    double origin_m[3], lat_deg, lon_deg, height_m, north_deg;
-    uint32_t utm_zone; /* 0: UPS */
-    int north;         /* hemisphere */
-    int height_given;  /* height_m is given: ifc uses it in place of RefElevation, geotiff in place of 0 */
-};
-
-/* The form in which a station's place on the Earth is given. */
-enum config_place { PLACE_NONE, PLACE_GEODETIC, PLACE_UTM, PLACE_ECEF };
-
-enum config_choice { CHOICE_AUTO, CHOICE_OFF, CHOICE_ON };
-
-/* The tripod under a station's head (firmware_sim/site/tripod.c). */
-struct config_tripod {
-    int given; /* 0: no tripod, so nothing is hidden */
-    double leg_m, opening_min_deg;
-    double head_above_m;     /* the head's origin above the tripod's top */
-    enum config_choice cone; /* hides what is below the head; auto: where there are no legs to hide it */
-    int legs;                /* three prisms that the head can scan */
-    double leg_diameter_m, legs_heading_deg;
-};
-
-struct config_station {
-    char name[32];
-    double position_m[3];                    /* of the head's origin in the scene frame */
-    int has_position;                        /* 0: it follows from the place on the Earth, through the anchor */
-    double heading_deg, pitch_deg, roll_deg; /* pose_attitude */
-    double instrument_height_m;              /* of the head's origin above the floor below position_m */
-    int has_instrument_height;
-    enum config_place place;
-    double lat_deg, lon_deg, height_m; /* of the head's origin; height_m also with PLACE_UTM */
-    uint32_t utm_zone;                 /* 0: UPS */
-    int north;                         /* hemisphere */
-    double easting_m, northing_m;
-    double ecef_m[3];
-    struct config_tripod tripod;
-    int has_scanner;  /* there is a section `scanner` */
-    uint32_t scanner; /* the first station, from 1, of those with the same scanner */
-};
-
-enum config_platform_kind { PLATFORM_STATIC, PLATFORM_TRAJECTORY, PLATFORM_LIVE, PLATFORM_STOPS };
-enum config_at_end { PLATFORM_STOP, PLATFORM_HOLD };
-
-/* The platform under the head. Attitudes as core/pose.h defines them. */
-struct config_platform {
-    enum config_platform_kind kind;
-    char file[CONFIG_PATH_LEN], waypoints[CONFIG_PATH_LEN];   /* trajectory, stops: one of them */
-    double start_s, end_s;                                    /* part of the trajectory, after its first sample */
-    int has_end;                                              /* 0: to its last sample */
-    double step_s;                                            /* stops: from each to the next */
-    double frames_per_s, first_frame, last_frame, frame_step; /* stops: the same in frames; frames_per_s 0: unused */
-    enum config_at_end at_end;
-    double mount_m[3], mount_heading_deg, mount_pitch_deg, mount_roll_deg; /* of the head on the platform */
-    double reach_m, extrapolate_ms;                                        /* live */
-    char address[64];
-    uint32_t port; /* live, in real time: UDP; 0: the system chooses */
-};
-
-/* The head moves while it scans. */
-static inline int config_head_moves(const struct config_platform *platform)
-{
-    return platform->kind == PLATFORM_TRAJECTORY || platform->kind == PLATFORM_LIVE;
-}
 
 /* Time of day (head_clock.h). */
 struct config_time {
@@ -295,63 +190,10 @@ struct config {
     struct fault_list faults;
 };
 
-/* The diagnostics of a configuration, in the order of the file; then those of --set and of the head profile. */
-enum { CONFIG_MAX_FAULTS = 20 };
-struct config_faults {
-    uint32_t n; /* all diagnostics that were found; fault[] has the first CONFIG_MAX_FAULTS */
-    struct sh_err fault[CONFIG_MAX_FAULTS];
-    uint64_t place[CONFIG_MAX_FAULTS]; /* what they are ordered by */
-};
-
-/* Reads path, its profile, then the `key=value` settings of --set, in order. These are checked in the same way, and
- * errors name them `--set KEY`. On failure cfg is unspecified, and err has the first diagnostic. cfg is large: allocate
- * it. */
-int config_load(const char *path, const char *const *sets, int n_sets, struct config *cfg, struct sh_err *err);
-
-/* The same, with all diagnostics. Returns SH_OK or the code of the first. */
-int config_load_all(const char *path, const char *const *sets, int n_sets, struct config *cfg,
-                    struct config_faults *faults);
-
-/* The same for a text that has only links, loop and faults. Errors call it `name`. The rest of cfg is zero. */
-int config_load_links(const char *text, const char *name, const char *const *sets, int n_sets, struct config *cfg,
-                      struct config_faults *faults);
-
-/* Adds the injected faults of a scenario, a file that has nothing but a list `faults`. name: a path, or the name of a
- * scenario that comes with the program. At most once. Diagnostics go to `faults`; then nothing is added, and the code
- * of the first is returned. */
-int config_add_scenario(struct config *cfg, const char *name, struct config_faults *faults);
-/* "a, b, c": the scenarios that come with the program, as many as buf holds. */
-void config_name_scenarios(char *buf, size_t len);
-/* Reads a fault from one line of YAML, "{kind: drop, every: 10}", for a head with this configuration. Takes 200 KiB of
- * stack. */
-int config_read_fault(const struct config *cfg, const char *text, struct fault *out, struct sh_err *err);
-/* Whether faults of the kind can strike on the link. */
-int config_link_has_fault(const struct link_spec *link, enum fault_kind kind);
-
 /* A configuration is loaded for the scanner of head.station. config_serves: whether station i, from 0, has this
  * scanner. config_is_alone: whether all have it. The stops of a platform have the scanner of the one station. */
 int config_serves(const struct config *cfg, uint32_t i);
 int config_is_alone(const struct config *cfg);
-/* Loads the configuration of the scanner at a station, from 1, which becomes its head.station. It has no links. Output,
- * loop and scenario are those of cfg as it is now. The sets that cfg was loaded with must still be there. */
-int config_load_scanner(const struct config *cfg, uint32_t station, struct config *out, struct sh_err *err);
-
-/* The program of a pulse rate, as an index; 0 for a head without programs. */
-uint32_t config_program_of(const struct config_profile *profile, int64_t prr_uhz);
-/* The largest pulse rate that the head has up to prr_uhz; its smallest one where it has none. */
-int64_t config_rate_below(const struct config_profile *profile, int64_t prr_uhz);
-
-/* The signal of one of a profile's programs; members that no profile has (sharp, extinction, seed) are 0. */
-void config_signal_spec(const struct config_profile *profile, const struct config_program *program,
-                        struct detect_signal_spec *spec);
-
-/* The schedule of a head with some settings. A list of directions is left out; site_fill_spec adds it. */
-void config_fill_spec(const struct config_profile *profile, const struct head_settings *settings,
-                      struct schedule_spec *spec);
-
-/* Sets the steps of a turn of a planar head, which are those of one of its geometries. */
-void config_set_steps(struct config_profile *profile, uint32_t steps);
-
 /* Gives a configuration other ranges, noise and step, as if its keys had them. cfg is a copy of a loaded one; the
  * settings must be allowed for it (command.h). SH_EINPUT: no ring of the sphere is left. */
 int config_apply_settings(struct config *cfg, const struct head_settings *settings, struct sh_err *err);
@@ -382,41 +224,5 @@ const char *config_beam_moves(const struct config *cfg);
 
 /* Why rays do not all begin at the head's station; NULL: they do. A visibility map (core/sight.h) needs that. */
 const char *config_rays_move(const struct config *cfg);
-
-/* A key as the tables describe it. Strings are constant, except `what`. */
-struct config_key_text {
-    const char *path, *help;
-    const char *const *words; /* the words that it takes, NULL at the end; NULL: its values are no words */
-    int has_value;            /* 0: a section, or a list */
-    char what[1024];          /* type, unit, allowed values, default, and whether it may be left out */
-};
-/* The keys of a configuration, or those of a head profile. */
-enum config_keys { CONFIG_KEYS, CONFIG_PROFILE_KEYS };
-/* The text above them in the reference. */
-const char *config_keys_intro(enum config_keys keys);
-/* Key i, in the order of the reference; 0 after the last one. */
-int config_describe_key(enum config_keys keys, size_t i, struct config_key_text *out);
-
-/* The reference: every key with type, unit, default, range and help. */
-void config_print_reference(FILE *out);
-
-/* The same for one section ("head", "scene.anchor"), for one key, or for "profile": the keys of head
- * profiles. SH_EINPUT: there is no such section or key; err names the sections. */
-int config_print_section(const char *section, FILE *out, struct sh_err *err);
-
-/* Prints a configuration that loads and has all keys, each with its help. Keys that need a value have one; the others
- * are commented out with their defaults. It names a profile and a mesh that come with the program. */
-int config_print_example(FILE *out, struct sh_err *err);
-
-/* Lists the profiles in a directory: name, programs, and how sure their figures are. Returns how many. dir NULL: the
- * first directory that exists of the lookup below, without a configuration. */
-int config_list_profiles(const char *dir, FILE *out, struct sh_err *err);
-
-/* Reads the profile NAME, looked up as for a configuration that lies at config_file. */
-int config_load_profile(const char *name, const char *config_file, struct config_profile *profile, struct sh_err *err);
-
-/* Finds the directory of profiles: $SCANHEAD_HEADS, heads/ beside the configuration, beside the program
- * (installed or in its build folder), or config/heads in the working directory. `head.profile` is a NAME that is
- * looked up there, or a path that ends in .yaml. */
 
 #endif

@@ -3,7 +3,12 @@
 #include <string.h>
 
 #include "core/infile.h"
-#include "firmware_sim/config/table.h"
+#include "firmware_sim/config/check_places.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/copies.h"
+#include "firmware_sim/config/table/given.h"
+#include "firmware_sim/config/table/reader.h"
+#include "firmware_sim/config/table/row.h"
 
 /* clang-format off */
 static const struct cfg_key rows[] = {

@@ -1,7 +1,17 @@
 /* SPDX-License-Identifier: MIT */
 /* Checks that concern more than one key, or files: limits of the head profile, order of angles, files, keys of
  * links and platforms. Places on the Earth: places.c; noise, signal, surfaces: measurement.c. */
-#include "firmware_sim/config/table.h"
+#include "firmware_sim/config/check.h"
+#include "firmware_sim/config/check_faults.h"
+#include "firmware_sim/config/check_head.h"
+#include "firmware_sim/config/check_links.h"
+#include "firmware_sim/config/check_places.h"
+#include "firmware_sim/config/check_signal.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/table/given.h"
+#include "firmware_sim/config/table/reader.h"
+#include "firmware_sim/config/table/row.h"
+#include "firmware_sim/config/table/value.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -20,7 +30,7 @@ static const char *given_of(const struct cfg_reader *rd, const char *first, cons
 /* Settings within the head profile: limits that a row of keys.c names by min_key and max_key. */
 static void check_limits(struct cfg_reader *rd, const struct config *cfg)
 {
-    for (size_t i = 0; i < rd->table.n && rd->profile_read; i++) {
+    for (size_t i = 0; i < rd->table.n && cfg_has_profile(rd); i++) {
         const struct cfg_key *key = &rd->table.keys[i];
         if (key->max_key == NULL) continue;
         int64_t value, high = cfg_figure(&cfg->profile, key->max_key);
@@ -143,7 +153,7 @@ static void check_output(struct cfg_reader *rd, struct config *cfg)
     if (output->scale_m != 0.0 && output->scale_m < 1e-6)
         cfg_fail_key(rd, "output.scale_m", 0, "%.10g is out of range; allowed 0 (automatic) or 1e-6 to 1 m",
                      output->scale_m);
-    else if (output->scale_m != 0.0 && rd->profile_read && cfg->profile.range_max_m / output->scale_m >= counts)
+    else if (output->scale_m != 0.0 && cfg_has_profile(rd) && cfg->profile.range_max_m / output->scale_m >= counts)
         cfg_fail_key(rd, "output.scale_m", 0,
                      "%.10g is too fine: %.10g m of head profile %s do not fit into %d bits; allowed above %.4g to "
                      "1 m, or 0 (automatic)",
@@ -194,11 +204,11 @@ static void check_beam(struct cfg_reader *rd, const struct config *cfg)
     const char *why = config_beam_moves(cfg);
     const int has_footprint = config_has_footprint(cfg);
     if (cfg->beam.mode == BEAM_SINGLE) return;
-    if (rd->profile_read && !has_footprint && cfg->beam.mode != BEAM_AUTO)
+    if (cfg_has_profile(rd) && !has_footprint && cfg->beam.mode != BEAM_AUTO)
         cfg_fail_key(rd, "beam.mode", 0, "head profile %s has no footprint; allowed single", p->name);
     else if (cfg->beam.mode == BEAM_ADAPTIVE && why != NULL && CFG_SOUND(rd, 0, "platform.kind"))
         cfg_fail_key(rd, "beam.mode", 0, "adaptive, but %s; allowed single, rings, auto", why);
-    else if (rd->profile_read && has_footprint && p->pulse_width_ns < LEAST_PULSE_NS)
+    else if (cfg_has_profile(rd) && has_footprint && p->pulse_width_ns < LEAST_PULSE_NS)
         cfg_fail_key(rd, "beam.mode", 0,
                      "pulse_width_ns of head profile %s is %.10g: too short to tell echoes of a footprint apart; "
                      "allowed single, or a pulse_width_ns of at least %.10g",

@@ -1,9 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /* Emitters of head profiles: the keys that belong to each, and the values that follow from them: pulse rates,
  * limits of line angles, the schedule of a head. */
-#include "firmware_sim/config/table.h"
+#include "firmware_sim/config/check_head.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/profile_keys.h"
+#include "firmware_sim/config/table/given.h"
+#include "firmware_sim/config/table/row.h"
+#include "firmware_sim/config/table/value.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -65,7 +71,7 @@ static void check_owners(struct cfg_reader *rd, int emitter)
             cfg_fail_key(rd, key->path, 0, "no key of this emitter; allowed only with emitter: %s",
                          words_of(key->emitters, words, sizeof words));
         else if (!given && has && key->needed)
-            cfg_fail_missing(rd, cfg_find(&rd->table, key->path), 0);
+            cfg_fail_missing(rd, key->path, 0);
     }
 }
 
@@ -240,10 +246,10 @@ void cfg_check_emitter_settings(struct cfg_reader *rd, struct config *cfg)
 {
     struct head_settings *s = &cfg->head.settings;
     const enum emitter_kind kind = cfg->profile.emitter.kind;
-    if (rd->profile_read && kind == EMITTER_SPHERE) set_sphere_settings(rd, cfg);
-    if (rd->profile_read && kind != EMITTER_SPHERE) refuse_sphere_settings(rd, cfg);
-    if (rd->profile_read && cfg->profile.arrangement.n_geometries > 0) cfg_choose_geometry(rd, cfg);
-    if (!rd->profile_read || kind == EMITTER_LINE) return;
+    if (cfg_has_profile(rd) && kind == EMITTER_SPHERE) set_sphere_settings(rd, cfg);
+    if (cfg_has_profile(rd) && kind != EMITTER_SPHERE) refuse_sphere_settings(rd, cfg);
+    if (cfg_has_profile(rd) && cfg->profile.arrangement.n_geometries > 0) cfg_choose_geometry(rd, cfg);
+    if (!cfg_has_profile(rd) || kind == EMITTER_LINE) return;
     check_instrument(rd, cfg);
     if (kind == EMITTER_BEAMS && cfg->head.ambiguity != DETECT_AMBIGUITY_NONE)
         cfg_fail_key(rd, "head.ambiguity", 0,

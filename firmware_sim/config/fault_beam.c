@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Injected faults that change what is measured: checks that the head has what they act on. */
-#include "firmware_sim/config/table.h"
+#include "firmware_sim/config/check_faults.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/table/given.h"
 
 static void check_mirror(struct cfg_reader *rd, const struct config *cfg, const struct fault *f, uint32_t i)
 {

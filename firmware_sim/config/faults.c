@@ -5,7 +5,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "firmware_sim/config/table.h"
+#include "firmware_sim/config/check_faults.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/load.h"
+#include "firmware_sim/config/shared.h"
+#include "firmware_sim/config/table/diagnostics.h"
+#include "firmware_sim/config/table/document.h"
+#include "firmware_sim/config/table/given.h"
+#include "firmware_sim/config/table/reader.h"
+#include "firmware_sim/config/table/row.h"
 
 /* clang-format off */
 #define FAULT_LIST_AT(member) offsetof(struct fault_list, member)

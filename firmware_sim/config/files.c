@@ -1,7 +1,12 @@
 /* SPDX-License-Identifier: MIT */
+#include <stdio.h>
+
 #include "firmware_sim/config/files.h"
 
-#include "firmware_sim/config/table.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/keys.h"
+#include "firmware_sim/config/profile_keys.h"
+#include "firmware_sim/config/table/row.h"
 
 static int take_key(const struct cfg_table *table, const void *base, const struct cfg_key *key, const char *of,
                     config_take_file *take, void *ctx)

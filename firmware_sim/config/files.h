@@ -4,7 +4,7 @@
 #ifndef FIRMWARE_SIM_CONFIG_FILES_H
 #define FIRMWARE_SIM_CONFIG_FILES_H
 
-#include "firmware_sim/config/config.h"
+struct config;
 
 /* Called for one file; `key` and `path` are valid during the call. A result other than SH_OK ends the walk. */
 typedef int config_take_file(void *ctx, const char *key, const char *path, int is_written);

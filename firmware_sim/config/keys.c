@@ -4,8 +4,11 @@
  * check --help` come from the rows alone; checks of more than one key are in crosscheck.c, places.c
  * and measurement.c. */
 #include "core/cast.h"
+#include "drivers/protocol/protocol.h"
 #include "drivers/usb/backend.h"
-#include "firmware_sim/config/table.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/keys.h"
+#include "firmware_sim/config/table/row.h"
 
 /* The beginning of a row: path, offset and size. Where path and member have different names, the row writes the path
  * itself. */

@@ -5,7 +5,11 @@
 
 #include "drivers/protocol/native.h"
 #include "drivers/protocol/velodyne.h"
-#include "firmware_sim/config/table.h"
+#include "firmware_sim/config/check_links.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/table/given.h"
+#include "firmware_sim/config/table/reader.h"
+#include "firmware_sim/config/table/row.h"
 
 /* The kinds of links that each protocol works on. */
 static const struct {
@@ -99,7 +103,7 @@ static void check_head(struct cfg_reader *rd, const struct config *cfg, uint32_t
 {
     const struct emitter *emitter = &cfg->profile.emitter;
     char where[40], allowed[64] = "";
-    if (!rd->profile_read || cfg_protocol_fits(ops, emitter)) return;
+    if (!cfg_has_profile(rd) || cfg_protocol_fits(ops, emitter)) return;
     for (int kind = EMITTER_LINE; kind <= EMITTER_DIRECTIONS; kind++)
         if ((ops->emitters & 1u << kind) != 0)
             snprintf(allowed + strlen(allowed), sizeof allowed - strlen(allowed), "%s%s",

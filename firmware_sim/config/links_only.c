@@ -3,7 +3,15 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "firmware_sim/config/table.h"
+#include "firmware_sim/config/check.h"
+#include "firmware_sim/config/check_faults.h"
+#include "firmware_sim/config/check_links.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/keys.h"
+#include "firmware_sim/config/load.h"
+#include "firmware_sim/config/table/document.h"
+#include "firmware_sim/config/table/reader.h"
+#include "firmware_sim/config/table/row.h"
 
 static const char *const sections[] = {"links", "loop", "faults"};
 

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Noise, signal and surfaces: checks that concern more than one key. */
-#include "firmware_sim/config/table.h"
+#include "firmware_sim/config/check_signal.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/table/given.h"
 
 #include <math.h>
 #include <string.h>
@@ -80,7 +82,7 @@ static void check_surface(struct cfg_reader *rd, uint32_t i, const struct surfac
 static void check_sigma(struct cfg_reader *rd, struct config *cfg)
 {
     const double least_m = cfg->profile.range_sigma_floor_m;
-    if (!rd->profile_read || !CFG_SOUND(rd, 0, "noise.sigma_m")) return;
+    if (!cfg_has_profile(rd) || !CFG_SOUND(rd, 0, "noise.sigma_m")) return;
     if (cfg->signal.on && cfg_is_given(rd, "noise.sigma_m", 0) && cfg->noise.sigma_m < least_m)
         cfg_fail_key(rd, "noise.sigma_m", 0,
                      "%.10g is below range_sigma_floor_m of head profile %s; allowed %.10g to 10 m", cfg->noise.sigma_m,
@@ -94,7 +96,7 @@ static void check_noise(struct cfg_reader *rd, struct config *cfg)
     if (!cfg_is_given(rd, "noise.ball.seed", 0)) cfg->noise.ball.seed = cfg->noise.seed;
     if (cfg->noise.range == RANGE_NOISE_SIGNAL && !cfg->signal.on && CFG_SOUND(rd, 0, "signal.model"))
         cfg_fail_key(rd, "noise.range", 0, "signal, but no signal is modelled; allowed with signal.model: on");
-    if (cfg->noise.angle && rd->profile_read && cfg->profile.mirror_sigma_deg == 0.0 &&
+    if (cfg->noise.angle && cfg_has_profile(rd) && cfg->profile.mirror_sigma_deg == 0.0 &&
         cfg->profile.pan_sigma_deg == 0.0)
         cfg_fail_key(rd, "noise.angle", 0,
                      "head profile %s gives no angle noise; required is mirror_sigma_deg or pan_sigma_deg there",

@@ -4,21 +4,31 @@
 #include <string.h>
 
 #include "drivers/usb/backend.h"
-#include "firmware_sim/config/table.h"
+#include "firmware_sim/config/check_links.h"
+#include "firmware_sim/config/check_places.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/table/given.h"
+#include "firmware_sim/config/table/row.h"
 
 struct owned_key {
     const char *path;
     unsigned kinds; /* bit per kind that has it */
 };
 
+/* A link, back end or platform, and what errors say of it. */
+struct owner {
+    int kind;
+    uint32_t item;
+    const char *name, *allowed;
+};
+
 /* Reports each of these keys that is given although the kind does not have it. Returns whether there is none. */
-static int check_owned(struct cfg_reader *rd, const struct owned_key *key, size_t n, int kind, uint32_t item,
-                       const char *owner, const char *allowed)
+static int check_owned(struct cfg_reader *rd, const struct owned_key *key, size_t n, const struct owner *owner)
 {
     int fits = 1;
     for (size_t i = 0; i < n; i++) {
-        if (!cfg_is_given(rd, key[i].path, item) || (key[i].kinds & 1u << kind)) continue;
-        cfg_fail_key(rd, key[i].path, item, "%s has no such key; allowed %s", owner, allowed);
+        if (!cfg_is_given(rd, key[i].path, owner->item) || (key[i].kinds & 1u << owner->kind)) continue;
+        cfg_fail_key(rd, key[i].path, owner->item, "%s has no such key; allowed %s", owner->name, owner->allowed);
         fits = 0;
     }
     return fits;
@@ -44,7 +54,7 @@ static void check_usb_link(struct cfg_reader *rd, const struct config *cfg, stru
     if (link->backend == USB_BACKEND_USBIP && !has_port) link->port = USB_BACKEND_USBIP_PORT;
     if (!CFG_SOUND(rd, i, "links[].backend")) return;
     snprintf(owner, sizeof owner, "the back end %s", cfg_word(rd, "links[].backend", link->backend));
-    if (!check_owned(rd, keys, CFG_LEN(keys), link->backend, i, owner, "without it")) return;
+    if (!check_owned(rd, keys, CFG_LEN(keys), &(struct owner){link->backend, i, owner, "without it"})) return;
     if (has_path && (has_port || has_address))
         cfg_fail_key(rd, "links[].path", i, "both a path and a port or address; allowed one of them");
     else if (link->backend == USB_BACKEND_USBIP && link->attach && (has_port || has_address))
@@ -88,7 +98,7 @@ static void check_link(struct cfg_reader *rd, struct config *cfg, uint32_t i)
     char owner[64];
     if (!CFG_SOUND(rd, i, "links[].type")) return;
     snprintf(owner, sizeof owner, "a %s link", cfg_word(rd, "links[].type", (int)link->type));
-    if (!check_owned(rd, keys, CFG_LEN(keys), (int)link->type, i, owner, has[link->type])) return;
+    if (!check_owned(rd, keys, CFG_LEN(keys), &(struct owner){(int)link->type, i, owner, has[link->type]})) return;
     if (link->type == LINK_FILE && link->path[0] == '\0')
         cfg_fail_key(rd, "links[].path", i, "missing; required for a file link is the file to write");
     for (uint32_t k = 0; k < i && link->path[0] != '\0'; k++)
@@ -137,5 +147,5 @@ int cfg_check_platform_keys(struct cfg_reader *rd, const struct config_platform 
     };
     char owner[64];
     snprintf(owner, sizeof owner, "a %s platform", cfg_word(rd, "platform.kind", (int)p->kind));
-    return check_owned(rd, keys, CFG_LEN(keys), (int)p->kind, 0, owner, has[p->kind]);
+    return check_owned(rd, keys, CFG_LEN(keys), &(struct owner){(int)p->kind, 0, owner, has[p->kind]});
 }

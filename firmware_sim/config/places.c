@@ -1,7 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /* Keys that say where things are on the Earth: the scene's anchor, and each station in one of several
  * forms. */
-#include "firmware_sim/config/table.h"
+#include "firmware_sim/config/check_links.h"
+#include "firmware_sim/config/check_places.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/table/given.h"
+#include "firmware_sim/config/table/reader.h"
+#include "firmware_sim/config/table/row.h"
+#include "firmware_sim/config/table/value.h"
 
 #include <stdio.h>
 #include <string.h>

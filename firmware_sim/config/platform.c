@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* Checks of the platform's keys against each other: the part of a trajectory, and where and when it stops. The length
  * of a trajectory is known only from its file (firmware_sim/site/platform.c). */
-#include "firmware_sim/config/table.h"
+#include "firmware_sim/config/check_places.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/table/given.h"
 
 static int has_trajectory(const struct config_platform *p)
 {

@@ -1,6 +1,19 @@
 /* SPDX-License-Identifier: MIT */
 /* Head profiles: where they are, reading one, listing them. */
-#include "firmware_sim/config/table.h"
+#include "firmware_sim/config/check_head.h"
+#include "firmware_sim/config/check_signal.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/load.h"
+#include "firmware_sim/config/profile_keys.h"
+#include "firmware_sim/config/profiles.h"
+#include "firmware_sim/config/reference.h"
+#include "firmware_sim/config/shared.h"
+#include "firmware_sim/config/table/diagnostics.h"
+#include "firmware_sim/config/table/document.h"
+#include "firmware_sim/config/table/given.h"
+#include "firmware_sim/config/table/reader.h"
+#include "firmware_sim/config/table/row.h"
+#include "firmware_sim/config/table/value.h"
 
 #include <dirent.h>
 #include <math.h>

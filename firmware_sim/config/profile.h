@@ -8,8 +8,9 @@
 #include "core/footprint.h"
 #include "core/schedule.h"
 #include "firmware_sim/command/head.h"
+#include "firmware_sim/config/limits.h"
 
-enum { CONFIG_PATH_LEN = 512 };
+struct sh_err;
 
 /* How sure a figure of a profile is; config/heads/README.md says what each word means. */
 enum config_from { FROM_DATA_SHEET, FROM_QUOTED, FROM_ASSUMED };
@@ -84,5 +85,28 @@ struct config_profile {
     uint32_t max_echoes;
     double boot_s, spin_up_s, spin_down_s;
 };
+
+/* The program of a pulse rate, as an index; 0 for a head without programs. */
+uint32_t config_program_of(const struct config_profile *profile, int64_t prr_uhz);
+/* The largest pulse rate that the head has up to prr_uhz; its smallest one where it has none. */
+int64_t config_rate_below(const struct config_profile *profile, int64_t prr_uhz);
+
+/* The signal of one of a profile's programs; members that no profile has (sharp, extinction, seed) are 0. */
+void config_signal_spec(const struct config_profile *profile, const struct config_program *program,
+                        struct detect_signal_spec *spec);
+
+/* The schedule of a head with some settings. A list of directions is left out; site_fill_spec adds it. */
+void config_fill_spec(const struct config_profile *profile, const struct head_settings *settings,
+                      struct schedule_spec *spec);
+
+/* Sets the steps of a turn of a planar head, which are those of one of its geometries. */
+void config_set_steps(struct config_profile *profile, uint32_t steps);
+
+/* Reads the profile NAME, looked up as for a configuration that lies at config_file. */
+int config_load_profile(const char *name, const char *config_file, struct config_profile *profile, struct sh_err *err);
+
+/* Finds the directory of profiles: $SCANHEAD_HEADS, heads/ beside the configuration, beside the program
+ * (installed or in its build folder), or config/heads in the working directory. `head.profile` is a NAME that is
+ * looked up there, or a path that ends in .yaml. */
 
 #endif

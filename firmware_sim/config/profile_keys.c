@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* The table of a head profile's keys. */
-#include "firmware_sim/config/table.h"
+#include "firmware_sim/config/profile.h"
+#include "firmware_sim/config/profile_keys.h"
+#include "firmware_sim/config/profiles.h"
+#include "firmware_sim/config/table/row.h"
 
 /* The beginning of a row: path, offset and size. Where path and member have different names, the row writes the path
  * itself. */

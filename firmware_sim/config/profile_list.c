@@ -1,7 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /* Prints a head profile for `scanhead list`: its programs, the protocols that can describe it, and how sure its
  * figures are. */
-#include "firmware_sim/config/table.h"
+#include "firmware_sim/config/check_head.h"
+#include "firmware_sim/config/check_links.h"
+#include "firmware_sim/config/profile.h"
+#include "firmware_sim/config/profiles.h"
+#include "firmware_sim/config/table/given.h"
+#include "firmware_sim/config/table/reader.h"
+#include "firmware_sim/config/table/row.h"
+#include "firmware_sim/config/table/value.h"
 
 #include <stdio.h>
 #include <string.h>

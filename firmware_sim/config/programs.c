@@ -2,7 +2,12 @@
 /* Programs of a head profile: the figures that depend on its pulse rate. In: the figures of the file. Out: each
  * program complete, or diagnostics with their lines. Also converts the widths of the beam from the maker's definition
  * to this project's. */
-#include "firmware_sim/config/table.h"
+#include "firmware_sim/config/check_head.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/table/given.h"
+#include "firmware_sim/config/table/reader.h"
+#include "firmware_sim/config/table/row.h"
+#include "firmware_sim/config/table/value.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -192,7 +197,7 @@ void cfg_check_rate(struct cfg_reader *rd, const struct config *cfg)
     const struct config_profile *p = &cfg->profile;
     const int64_t rate = cfg->head.settings.prr_uhz;
     char rates[200] = "";
-    if (!rd->profile_read || p->n_programs == 0) return;
+    if (!cfg_has_profile(rd) || p->n_programs == 0) return;
     if (p->program[config_program_of(p, rate)].prr_uhz == rate) return;
     for (uint32_t i = 0; i < p->n_programs; i++) {
         const size_t used = strlen(rates);

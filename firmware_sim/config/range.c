@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* head.range_min_m and head.range_max_m: the head's smallest and largest range, within its profile. */
-#include "firmware_sim/config/table.h"
+#include "firmware_sim/config/check_head.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/table/given.h"
 
 #include <math.h>
 
@@ -33,7 +35,7 @@ void cfg_limit_range(struct cfg_reader *rd, struct config *cfg)
 {
     struct config_profile *p = &cfg->profile;
     struct config_head *head = &cfg->head;
-    if (!rd->profile_read) return;
+    if (!cfg_has_profile(rd)) return;
     head->profile_min_m = p->range_min_m;
     head->profile_max_m = p->range_max_m;
     for (uint32_t i = 0; i < HEAD_MAX_RATES; i++) {

@@ -1,6 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /* Prints all keys of the tables: as a reference, and as a configuration to begin with. */
-#include "firmware_sim/config/table.h"
+#include "firmware_sim/config/check_head.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/keys.h"
+#include "firmware_sim/config/profile_keys.h"
+#include "firmware_sim/config/shared.h"
+#include "firmware_sim/config/table/given.h"
+#include "firmware_sim/config/table/row.h"
+#include "firmware_sim/config/table/value.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -8,6 +15,7 @@
 #include <unistd.h>
 
 #include "firmware_sim/base/nearest.h"
+#include "firmware_sim/config/reference.h"
 
 /* config_print_section prints the keys of head profiles for this name. */
 static const char PROFILE[] = "profile";

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Scenarios by name: those that come with the program, in the folder faults. */
-#include "firmware_sim/config/table.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/load.h"
+#include "firmware_sim/config/shared.h"
 
 #include <dirent.h>
 #include <stdio.h>

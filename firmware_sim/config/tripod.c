@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* Tripods of stations: checks that leg_m is given and fits the legs, and that the platform stands. */
-#include "firmware_sim/config/table.h"
+#include "firmware_sim/config/check_places.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/table/given.h"
+#include "firmware_sim/config/table/row.h"
 
 static const char *const keys[] = {
     "stations[].tripod",
@@ -19,7 +22,7 @@ static void check_tripod(struct cfg_reader *rd, const struct config *cfg, struct
         t->given |= cfg_is_given(rd, keys[k], i);
     if (!t->given || !CFG_SOUND(rd, i, "stations[].tripod")) return;
     if (!cfg_is_given(rd, "stations[].tripod.leg_m", i))
-        cfg_fail_missing(rd, cfg_find(&rd->table, "stations[].tripod.leg_m"), i);
+        cfg_fail_missing(rd, "stations[].tripod.leg_m", i);
     else if (t->legs && t->leg_diameter_m >= 0.5 * t->leg_m)
         cfg_fail_key(rd, "stations[].tripod.leg_diameter_m", i,
                      "%.10g m, and a leg is %.10g m long; allowed below half of that, %.10g m", t->leg_diameter_m,

@@ -6,7 +6,9 @@
 #include <string.h>
 
 #include "drivers/usb/looks.h"
-#include "firmware_sim/config/table.h"
+#include "firmware_sim/config/check_links.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/table/given.h"
 
 static enum usb_look_id look_of(int protocol)
 {

@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "core/angle.h"
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/device/device_state.h"
 
 static const double TURN_DEG = 360.0;

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/device/device_state.h"
 #include "firmware_sim/site/plan_rows.h"
 

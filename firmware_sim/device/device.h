@@ -19,7 +19,6 @@
 #include "drivers/protocol/native.h"
 #include "drivers/protocol/protocol.h"
 #include "firmware_sim/command/command.h"
-#include "firmware_sim/config/config.h"
 #include "firmware_sim/device/journal.h"
 #include "firmware_sim/fault/board.h"
 #include "firmware_sim/site/site.h"
@@ -92,6 +91,7 @@ struct device_work {
 
 struct device;
 struct device_version;
+struct config;
 
 struct device_options {
     int start;    /* scan at once when booted */
@@ -180,7 +180,6 @@ struct device_station {
     double head_above_m;               /* the head's origin above the tripod's top */
     double legs_heading_deg;           /* of the first leg, from the scene's north */
 };
-uint32_t device_n_stations(const struct device *device);
 void device_get_station(struct device *device, uint32_t station, struct device_station *out); /* 0.. */
 /* Holds the present site, for callers that need more of it. It is constant and valid until it is given back, which must
  * come before device_free, and soon: it may hold maps of hundreds of MiB. */

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Injected faults: the board of the run. */
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/device/device_state.h"
 
 static void write_note(void *ctx, const struct fault_note *note)

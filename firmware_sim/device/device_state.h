@@ -6,12 +6,13 @@
 #include <pthread.h>
 
 #include "drivers/link/link.h"
+#include "firmware_sim/config/limits.h"
 #include "firmware_sim/device/device.h"
 #include "firmware_sim/device/fault_desk.h"
 #include "firmware_sim/device/gnss.h"
-#include "firmware_sim/device/pps.h"
 #include "firmware_sim/device/head_clock.h"
 #include "firmware_sim/device/head_faults.h"
+#include "firmware_sim/device/pps.h"
 
 /* Poses of a live platform. Each tick begins with a pose of the head, made once from the poses that had
  * come. */

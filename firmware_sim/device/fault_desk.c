@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+#include "firmware_sim/config/load.h"
 #include "firmware_sim/device/fault_desk.h"
 
 #include <stdio.h>

@@ -7,8 +7,9 @@
 #define FIRMWARE_SIM_DEVICE_FAULT_DESK_H
 
 #include "firmware_sim/command/command.h"
-#include "firmware_sim/config/config.h"
 #include "firmware_sim/fault/board.h"
+
+struct config;
 
 struct fault_desk {
     const struct config *cfg;

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/device/device_state.h"
 
 void device_fill_descriptor(const struct device *device, struct native_descriptor *d)

@@ -8,6 +8,8 @@
 #include "core/locate.h"
 #include "core/mat3.h"
 #include "core/rng.h"
+#include "drivers/protocol/protocol.h"
+#include "firmware_sim/config/config.h"
 
 void gnss_init(struct gnss *gnss, const struct site *site, const struct head_clock *clock)
 {

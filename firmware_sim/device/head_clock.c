@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "firmware_sim/base/clock.h"
+#include "firmware_sim/config/config.h"
 
 static const char LEAP_FILE[] = "/usr/share/zoneinfo/leap-seconds.list";
 static const int64_t PPT = 1000000000000;
@@ -57,12 +58,10 @@ static void renew_pieces(struct head_clock *clock, uint32_t i)
     }
 }
 
-/* Merges the two oldest pieces. */
+/* The oldest piece goes: the next one has the sums up to it, and its own change is not needed any more. */
 static void forget_oldest(struct head_clock *clock)
 {
-    struct head_clock_piece *first = &clock->piece[1];
-    first->change = (struct head_clock_change){first->shift_ns, first->gain_ppt, first->stands};
-    memmove(clock->piece, first, (clock->n - 1) * sizeof *first);
+    memmove(clock->piece, &clock->piece[1], (clock->n - 1) * sizeof clock->piece[0]);
     clock->n--;
 }
 

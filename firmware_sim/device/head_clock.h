@@ -26,8 +26,9 @@
 #define FIRMWARE_SIM_DEVICE_HEAD_CLOCK_H
 
 #include "core/utc.h"
-#include "firmware_sim/config/config.h"
 #include "firmware_sim/config/epoch.h"
+
+struct config;
 
 enum { HEAD_CLOCK_CHANGES = 64 }; /* the last ones are kept; nobody asks for times before the first of these */
 

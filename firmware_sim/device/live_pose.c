@@ -6,6 +6,7 @@
 
 #include "core/angle.h"
 #include "core/vec3.h"
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/device/device_state.h"
 
 #define LEN(array) ((int64_t)(sizeof(array) / sizeof((array)[0])))

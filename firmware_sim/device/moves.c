@@ -14,6 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "firmware_sim/config/places.h"
 #include "firmware_sim/device/device_state.h"
 #include "firmware_sim/site/plan_rows.h"
 
@@ -70,8 +71,9 @@ static struct device_version *make_moved(struct device *device, const struct sit
 {
     struct device_moves *moves = &device->moves;
     const struct sh_report report = {device, warn, NULL, move_stops};
+    const struct site_station_move move = {moves->first, plan->station, plan->to_first ? NULL : &plan->to};
     struct site *site;
-    int rc = site_load_moved(from, moves->first, plan->station, plan->to_first ? NULL : &plan->to, &report, &site, err);
+    int rc = site_load_moved(from, &move, &report, &site, err);
     if (rc != SH_OK) return NULL;
     struct device_version *version = device_make_version(site, site);
     if (version == NULL) site_free(site);

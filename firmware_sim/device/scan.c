@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/device/device_state.h"
 
 /* Plans the site for the settings. It was possible when the command tried it; it fails without memory, or at this

@@ -2,6 +2,7 @@
 /* The states of the head, and when each one ends. */
 #include <math.h>
 
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/device/device_state.h"
 
 enum head_state device_visible_state(const struct device *device, uint64_t released)

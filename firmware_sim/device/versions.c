@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/places.h"
 #include "firmware_sim/device/device_state.h"
 
 struct device_version *device_make_version(const struct site *site, struct site *own)
@@ -120,11 +122,6 @@ void device_close_moves(struct device *device)
     device_free_version(moves->current);
     free(moves->place);
     free(moves->first_place);
-}
-
-uint32_t device_n_stations(const struct device *device)
-{
-    return device->moves.first->n_stations;
 }
 
 void device_get_station(struct device *device, uint32_t station, struct device_station *out)

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "firmware_sim/base/clock.h"
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/loop/loop_inside.h"
 
 static const int64_t SAY_NS = 2000000; /* a ready tick waits no longer than that for others in its batch */

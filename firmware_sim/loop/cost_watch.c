@@ -5,6 +5,7 @@
 #include <stdlib.h>
 
 #include "firmware_sim/base/clock.h"
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/loop/loop_inside.h"
 #include "firmware_sim/site/plan_rows.h"
 

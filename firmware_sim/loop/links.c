@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "drivers/protocol/native.h"
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/loop/pump.h"
 
 /* Bytes per second of the points at the present rates, with one echo per pulse: a lower bound. A command can raise the

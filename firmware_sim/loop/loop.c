@@ -7,6 +7,7 @@
 #include <string.h>
 #include <sys/mman.h>
 
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/loop/loop_inside.h"
 #include "firmware_sim/loop/pump.h"
 

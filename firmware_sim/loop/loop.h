@@ -16,13 +16,13 @@
 #include <stdatomic.h>
 
 #include "firmware_sim/base/json.h"
-#include "firmware_sim/config/config.h"
 #include "firmware_sim/device/device.h"
 #include "firmware_sim/loop/lateness.h"
 #include "firmware_sim/loop/links.h"
 #include "firmware_sim/loop/source.h"
 
 struct loop;
+struct config;
 
 struct loop_options {
     int hash;                       /* keep stream_sha256 */

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "firmware_sim/base/clock.h"
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/loop/loop_inside.h"
 
 enum { PACER_PRIORITY = 80 };

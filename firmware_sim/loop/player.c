@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/loop/loop_inside.h"
 
 static int may_make(const struct loop *loop)

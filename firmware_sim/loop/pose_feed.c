@@ -15,6 +15,7 @@
 
 #include "drivers/socket/socket.h"
 #include "firmware_sim/base/clock.h"
+#include "firmware_sim/config/config.h"
 
 enum { DATAGRAM = 65536 };
 

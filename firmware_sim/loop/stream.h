@@ -21,6 +21,7 @@
 #define FIRMWARE_SIM_LOOP_STREAM_H
 
 #include "drivers/link/link.h"
+#include "firmware_sim/config/limits.h"
 #include "firmware_sim/device/device.h"
 #include "firmware_sim/loop/bell.h"
 #include "firmware_sim/loop/kept.h"

@@ -7,6 +7,7 @@
 
 #include "core/rng.h"
 #include "drivers/protocol/native_encode.h"
+#include "firmware_sim/config/config.h"
 
 struct worker {
     const struct site *site; /* as it is for the tick at hand */

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "drivers/protocol/native_encode.h"
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/replay/replay_state.h"
 
 enum { MOST_BYTES = 1 << 20, USUAL_MOST_BYTES = 1 << 17, NATIVE_RATE_BYTES = 2 * NATIVE_POINT_LEN };

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/replay/replay_state.h"
 
 static const char RECORDED[] = "a recording is replayed, and its settings are as they were";

@@ -6,6 +6,7 @@
 
 #include "drivers/protocol/native_encode.h"
 #include "drivers/protocol/protocol.h"
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/replay/replay_state.h"
 
 static int front_place(uint8_t type)

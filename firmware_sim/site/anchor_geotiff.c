@@ -2,11 +2,14 @@
 #include "firmware_sim/site/anchor_geotiff.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "core/angle.h"
 #include "core/crs.h"
 #include "core/geotiff.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/places.h"
 
 /* Two libraries agree on the same projection to nanometres; other grids differ by metres. */
 #define SAME_GRID_M 1e-3
@@ -131,15 +134,20 @@ static void say(const struct config *cfg, const struct sh_report *report, const 
         sh_warn(report, "%s: coordinates in %s are good to %.2g m on WGS 84", t->file, t->crs, at->accuracy_m);
 }
 
-static int set_tangent(const struct sh_report *report, const struct terrain *t, const double middle_m[2],
-                       const struct crs_place *at, int is_utm, struct geoframe *frame, struct sh_err *err)
+/* *worst_m: how far a corner is from its place. */
+static int set_tangent(const struct terrain *t, const double middle_m[2], const struct crs_place *at,
+                       struct geoframe *frame, double *worst_m, struct sh_err *err)
 {
     const double *o = t->offset_m, origin_m[3] = {middle_m[0] + o[0], middle_m[1] + o[1], o[2]};
-    double worst_m = 0.0;
     int rc = geoframe_set_tangent(frame, origin_m, &at->at, -angle_deg(at->convergence_rad), err);
-    if (rc == SH_OK) rc = measure_corners(t, frame, at->at.height_m, &worst_m, err);
-    if (rc != SH_OK || worst_m < CORNER_M) return rc;
+    return rc == SH_OK ? measure_corners(t, frame, at->at.height_m, worst_m, err) : rc;
+}
+
+static void say_corners(const struct sh_report *report, const struct terrain *t, const struct crs_place *at, int is_utm,
+                        double worst_m)
+{
     char exact[112];
+    if (worst_m < CORNER_M) return;
     if (is_utm)
         snprintf(exact, sizeof exact, "offset_m: [0, 0, %.10g]", at->at.height_m);
     else
@@ -150,7 +158,6 @@ static int set_tangent(const struct sh_report *report, const struct terrain *t, 
         "%s: the scene is tangent to the Earth at its middle, which puts its corners up to %.2g m from where %s has "
         "them; exact is %s",
         t->file, worst_m, t->crs, exact);
-    return rc;
 }
 
 int anchor_by_geotiff(const struct config *cfg, const struct sh_report *report, struct geoframe *frame,
@@ -169,5 +176,8 @@ int anchor_by_geotiff(const struct config *cfg, const struct sh_report *report, 
     const int zone = find_zone(middle_m, &at.at, &north);
     if (zone > 0 && t.offset_m[0] == 0.0 && t.offset_m[1] == 0.0 && t.offset_m[2] == height_m)
         return geoframe_set_grid(frame, zone, north, err);
-    return set_tangent(report, &t, middle_m, &at, zone > 0, frame, err);
+    double worst_m = 0.0;
+    rc = set_tangent(&t, middle_m, &at, frame, &worst_m, err);
+    if (rc == SH_OK) say_corners(report, &t, &at, zone > 0, worst_m);
+    return rc;
 }

@@ -4,7 +4,8 @@
 #define FIRMWARE_SIM_SITE_ANCHOR_GEOTIFF_H
 
 #include "core/geoframe.h"
-#include "firmware_sim/config/config.h"
+
+struct config;
 
 /* A raster in UTM makes the scene a grid, exactly. Else the scene is tangent to the Earth at the raster's middle, and a warning
  * says how far its corners are from their place. SH_EINPUT: no such mesh, several systems, or none that PROJ knows. */

@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-#include "firmware_sim/site/site_inside.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/site/bvhs.h"
+#include "firmware_sim/site/site.h"
 
 /* The sites of a world share the BVHs: the first site builds them. */
 int site_build_bvhs(struct site *site, const struct sh_report *report, struct sh_err *err)

@@ -3,7 +3,9 @@
 #include <math.h>
 #include <stdio.h>
 
-#include "firmware_sim/site/site_inside.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/site/colours.h"
+#include "firmware_sim/site/site.h"
 
 /* Warns of textures that can't be read, and of a scene without colours. */
 static int load_textures(struct site *site, const struct sh_report *report, struct sh_err *err)

@@ -5,7 +5,9 @@
 
 #include "core/csv.h"
 #include "core/grow.h"
-#include "firmware_sim/site/site_inside.h"
+#include "core/scene.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/site/copies.h"
 
 enum { X, Y, Z, TURN, SCALE };
 static const char *const columns[] = {"x_m", "y_m", "z_m", "turn_deg", "scale", NULL};

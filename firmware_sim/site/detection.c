@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-#include "firmware_sim/site/site_inside.h"
+#include "firmware_sim/site/detection.h"
+#include "firmware_sim/site/site.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -9,6 +10,7 @@
 #include "core/angle.h"
 #include "core/light.h"
 #include "core/rng.h"
+#include "firmware_sim/config/config.h"
 
 static const char GHOST[] = "ghost of ";
 

@@ -9,7 +9,9 @@
 #include "core/distance.h"
 #include "core/mat3.h"
 #include "core/vec3.h"
-#include "firmware_sim/site/site_inside.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/site/doubts.h"
+#include "firmware_sim/site/site.h"
 
 /* Most scenes for such a head are neither smaller nor larger: then the scale is probably wrong by a thousand. */
 static const double SMALL_M = 0.05, LARGE_M = 10000.0;

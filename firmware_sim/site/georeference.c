@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* Georeferencing of a site: heights, method, counts. */
-#include "firmware_sim/site/site_inside.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/site/detection.h"
+#include "firmware_sim/site/georeference.h"
+#include "firmware_sim/site/site.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -5,8 +5,24 @@
 #include <string.h>
 
 #include "core/scene_copies.h"
-#include "firmware_sim/site/site_inside.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/places.h"
+#include "firmware_sim/site/beam_choice.h"
+#include "firmware_sim/site/bvhs.h"
+#include "firmware_sim/site/colours.h"
+#include "firmware_sim/site/copies.h"
+#include "firmware_sim/site/create.h"
+#include "firmware_sim/site/detection.h"
+#include "firmware_sim/site/doubts.h"
+#include "firmware_sim/site/georeference.h"
 #include "firmware_sim/site/plan_rows.h"
+#include "firmware_sim/site/platform.h"
+#include "firmware_sim/site/said.h"
+#include "firmware_sim/site/sights.h"
+#include "firmware_sim/site/site.h"
+#include "firmware_sim/site/target.h"
+#include "firmware_sim/site/tripod.h"
+#include "firmware_sim/site/world.h"
 
 static struct scene_mesh_spec mesh_spec(const struct config *cfg, const struct config_mesh *mesh)
 {

@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-#include "firmware_sim/site/site_inside.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/site/look.h"
+#include "firmware_sim/site/site.h"
 
 static void enter(void *ctx, int64_t t_ns, struct cast_setup *setup)
 {

@@ -4,7 +4,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "firmware_sim/site/site_inside.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/places.h"
+#include "firmware_sim/site/create.h"
+#include "firmware_sim/site/sights.h"
+#include "firmware_sim/site/site.h"
 
 void site_get_place(const struct site *site, uint32_t station, struct site_place *out)
 {
@@ -92,9 +96,10 @@ static int make_sights(struct site *site, const struct site *from, const struct 
     return site_open_sights(site, 0, site->n_stations, &quiet, err);
 }
 
-int site_load_moved(const struct site *from, const struct site *first, uint32_t station, const struct site_place *to,
-                    const struct sh_report *report, struct site **out, struct sh_err *err)
+int site_load_moved(const struct site *from, const struct site_station_move *move, const struct sh_report *report,
+                    struct site **out, struct sh_err *err)
 {
+    const uint32_t station = move->station;
     struct sh_err why = {0, ""};
     *out = NULL;
     if (site_why_fixed(from) != NULL) return sh_fail(err, SH_EINPUT, "%s", site_why_fixed(from));
@@ -102,8 +107,8 @@ int site_load_moved(const struct site *from, const struct site *first, uint32_t 
     if (cfg == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a configuration");
     memcpy(cfg, from->cfg, sizeof *cfg); /* with its padding: world.c compares scenes byte by byte */
     cfg->head.settings.frames = from->planned_frames;
-    cfg->station[station] = first->cfg->station[station];
-    int rc = place(first, station, to, &cfg->station[station], &why);
+    cfg->station[station] = move->first->cfg->station[station];
+    int rc = place(move->first, station, move->to, &cfg->station[station], &why);
     if (rc == SH_OK) rc = site_create(cfg, SITE_MOVED, from, report, out, &why);
     if (rc != SH_OK) {
         rc = fail_without_file(from, rc, &why, err);

@@ -11,6 +11,8 @@
 #include "core/ifc_site.h"
 #include "core/locate.h"
 #include "core/mat3.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/places.h"
 #include "firmware_sim/site/anchor_geotiff.h"
 
 /* A floor at the place that was given, or this little above it, is still found. */

@@ -4,9 +4,10 @@
 #ifndef FIRMWARE_SIM_SITE_PLACEMENT_H
 #define FIRMWARE_SIM_SITE_PLACEMENT_H
 
-#include "core/geoframe.h"
 #include "core/bvh.h"
-#include "firmware_sim/config/config.h"
+#include "core/geoframe.h"
+
+struct config;
 
 struct placement_anchor {
     int known; /* 0: source none */

@@ -7,8 +7,10 @@
 #include <string.h>
 
 #include "core/plan/cost.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/places.h"
 #include "firmware_sim/site/rate.h"
-#include "firmware_sim/site/site_inside.h"
+#include "firmware_sim/site/site.h"
 
 static void name_row(struct plan_row *row, const char *whose)
 {

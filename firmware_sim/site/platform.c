@@ -1,12 +1,15 @@
 /* SPDX-License-Identifier: MIT */
-#include "firmware_sim/site/site_inside.h"
+#include "firmware_sim/site/platform.h"
+#include "firmware_sim/site/site.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/angle.h"
 #include "core/vec3.h"
+#include "firmware_sim/config/config.h"
 
 /* Limits for the head's poses, in metres and ns: largest distance of its path from the trajectory, and largest steps
  * between poses. Recorded trajectories have such steps. */

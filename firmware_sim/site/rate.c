@@ -9,7 +9,9 @@
 #include "core/rng.h"
 #include "drivers/protocol/native_encode.h"
 #include "firmware_sim/base/clock.h"
-#include "firmware_sim/site/site_inside.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/site/look.h"
+#include "firmware_sim/site/site.h"
 
 /* Processor time for warming the caches, and for measuring. Runs are short enough that one of the most
  * expensive pulses (1,027 sub-rays) ends within a few milliseconds. */

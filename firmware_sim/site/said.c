@@ -4,7 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "firmware_sim/site/site_inside.h"
+#include "firmware_sim/site/said.h"
+#include "firmware_sim/site/site.h"
 
 static int has(const struct site_said *said, const char *text)
 {

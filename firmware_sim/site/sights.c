@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-#include "firmware_sim/site/site_inside.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/site/look.h"
+#include "firmware_sim/site/sights.h"
+#include "firmware_sim/site/site.h"
+#include "firmware_sim/site/view.h"
 
 #include <math.h>
 #include <stdatomic.h>

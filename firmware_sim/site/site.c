@@ -9,6 +9,8 @@
 #include "core/locate.h"
 #include "core/rng.h"
 #include "core/vec3.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/profile.h"
 
 void site_fill_spec(const struct site *site, const struct head_settings *settings, struct schedule_spec *spec)
 {

@@ -6,13 +6,20 @@
 #ifndef FIRMWARE_SIM_SITE_SITE_H
 #define FIRMWARE_SIM_SITE_SITE_H
 
+#include <stdint.h>
+
 #include "core/cast.h"
-#include "core/georef.h"
+#include "core/colour.h"
+#include "core/detect.h"
+#include "core/instrument.h"
 #include "core/plan.h"
 #include "core/pose.h"
 #include "core/scene.h"
-#include "firmware_sim/config/config.h"
+#include "core/surface.h"
+#include "firmware_sim/command/head.h"
 #include "firmware_sim/site/placement.h"
+
+struct config;
 
 /* Points of the geo layout along one stretch of a head's path: about its centre. */
 struct site_leg {
@@ -192,13 +199,20 @@ struct site_place {
 void site_get_place(const struct site *site, uint32_t station, struct site_place *out);
 /* Why no station of a site can be moved; NULL: they can. */
 const char *site_why_fixed(const struct site *site);
-/* Makes the site beside `from` in which a station (0..) of this scanner stands at `to`. `to` NULL: where it stood in
- * `first`, the site that was loaded from the configuration. The result is as from a configuration with that place. Maps
- * of from's stations that still hold are kept; all others that are planned are made. Meshes and BVHs are shared.
- * from and first may be cast from meanwhile; sites of one world are loaded and freed by one thread at a time. report
- * gets the warnings that loading `from` did not give; out->said counts them. SH_EINPUT: no head can stand there. */
-int site_load_moved(const struct site *from, const struct site *first, uint32_t station, const struct site_place *to,
-                    const struct sh_report *report, struct site **out, struct sh_err *err);
+/* A station (0..) of a scanner that is moved. `to` NULL: back to where it stood in `first`, the site that was loaded from
+ * the configuration. */
+struct site_station_move {
+    const struct site *first;
+    uint32_t station;
+    const struct site_place *to;
+};
+/* Makes the site beside `from` in which the station stands at its new place. The result is as from a configuration with
+ * that place. Maps of from's stations that still hold are kept; all others that are planned are made. Meshes and BVHs
+ * are shared. from and move->first may be cast from meanwhile; sites of one world are loaded and freed by one thread at
+ * a time. report gets the warnings that loading `from` did not give; out->said counts them. SH_EINPUT: no head can stand
+ * there. */
+int site_load_moved(const struct site *from, const struct site_station_move *move, const struct sh_report *report,
+                    struct site **out, struct sh_err *err);
 /* Frees the site's maps, once nobody casts from it any more. The owner still has to free the site. */
 void site_retire(const struct site *site);
 /* How many stations a site of this configuration will have, before it is loaded; with stops, the number of these.

@@ -7,7 +7,9 @@
 #include <string.h>
 
 #include "firmware_sim/base/nearest.h"
-#include "firmware_sim/site/site_inside.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/site/site.h"
+#include "firmware_sim/site/target.h"
 
 enum { MOST_NEAR = 3, NEAR_LETTERS = 2 };
 

@@ -5,15 +5,18 @@
  * The ground is the first surface straight below the head's origin, without movers. The vertical is the plumb line
  * there (placement.c), however the head is tilted. A leg of length L reaches from the top, at height h above that
  * ground, down to its level: cos(opening) = h / L. */
-#include "firmware_sim/site/site_inside.h"
+#include "firmware_sim/site/site.h"
+#include "firmware_sim/site/tripod.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/angle.h"
 #include "core/mat3.h"
 #include "core/vec3.h"
+#include "firmware_sim/config/config.h"
 
 /* A prism of SIDES faces a leg, and its two ends. */
 enum { LEGS = 3, SIDES = 6, LEG_VERTICES = 2 * SIDES, LEG_TRIANGLES = 2 * SIDES + 2 * (SIDES - 2) };

@@ -3,7 +3,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "firmware_sim/site/site_inside.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/site/detection.h"
+#include "firmware_sim/site/georeference.h"
+#include "firmware_sim/site/site.h"
 
 struct site_vary {
     struct site site; /* the first member: site_vary_free gets its address */

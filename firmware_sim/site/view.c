@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-#include "firmware_sim/site/site_inside.h"
+#include "firmware_sim/site/site.h"
+#include "firmware_sim/site/view.h"
 
 #include <math.h>
 #include <string.h>
@@ -7,6 +8,7 @@
 #include "core/angle.h"
 #include "core/instrument.h"
 #include "core/mat3.h"
+#include "firmware_sim/config/config.h"
 
 /* A margin beyond all known effects that bend or move the beam. */
 static const double MARGIN_RAD = 2e-3;

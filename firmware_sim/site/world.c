@@ -4,7 +4,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "firmware_sim/site/site_inside.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/site/site.h"
+#include "firmware_sim/site/world.h"
 
 /* Whether the meshes are read in the same way, with all that this configuration needs. Bytes can be compared, since
  * both structs began as zeros. */

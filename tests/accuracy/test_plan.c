@@ -12,6 +12,8 @@
 #include <unistd.h>
 #include <cmocka.h>
 
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/load.h"
 #include "firmware_sim/site/plan_rows.h"
 #include "tests/common/aimed.h"
 #include "tests/common/beam_reference.h"

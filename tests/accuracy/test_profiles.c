@@ -2,6 +2,7 @@
 /* From a configuration to points: with each shipped head, a wall of 20 or 90 % head on vanishes where the profile says,
  * and the range noise is the profile's where it says. */
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -9,6 +10,8 @@
 #include "tests/common/cases.h"
 
 #include "core/rng.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/load.h"
 #include "firmware_sim/site/site.h"
 
 enum { PULSES = 1666, WALL_LINES = 20, NOISE_LINES = 200 };

@@ -14,12 +14,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "tests/common/generate.h"
 #include "core/rng.h"
+#include "firmware_sim/config/keys.h"
+#include "firmware_sim/config/table/row.h"
 #include "tests/bench/bench.h"
-#include "firmware_sim/config/table.h"
-#include "tests/common/beam_reference.h"
 #include "tests/bench/pin.h"
+#include "tests/common/beam_reference.h"
+#include "tests/common/generate.h"
 
 enum { ROUNDS = 15, FEW_ROUNDS = 3, MAX_METHODS = 10, LINES = 200 };
 

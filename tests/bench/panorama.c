@@ -15,9 +15,11 @@
 #include <unistd.h>
 
 #include "drivers/protocol/bytes.h"
-#include "firmware_sim/app/studio/record/offline.h"
 #include "firmware_sim/app/studio/record/files.h"
+#include "firmware_sim/app/studio/record/offline.h"
 #include "firmware_sim/app/studio/record/recording.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/load.h"
 #include "tests/bench/options.h"
 #include "tests/bench/sight.h"
 

@@ -10,9 +10,10 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "tests/bench/bench.h"
 #include "firmware_sim/config/config.h"
+#include "firmware_sim/config/load.h"
 #include "firmware_sim/site/site.h"
+#include "tests/bench/bench.h"
 #include "tests/bench/pin.h"
 
 enum { LINES = 100, ROUNDS = 41, MAX_SETS = 24, STATION = 2 };

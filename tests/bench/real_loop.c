@@ -8,9 +8,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "tests/bench/bench.h"
 #include "firmware_sim/base/clock.h"
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/loop/loop.h"
+#include "tests/bench/bench.h"
 
 enum { ROUNDS = 3, MAX_THREADS = 64, MIN_FRAMES = 4 };
 

@@ -12,6 +12,8 @@
 
 #include "core/cast/caster.h"
 #include "core/studio/mesh.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/load.h"
 #include "tests/common/generate.h"
 
 #define LIVE(reach) "platform: {kind: live, reach_m: " reach "}\n"

@@ -6,7 +6,8 @@
 #define TESTS_COMMON_REACH_CASES_H
 
 #include "core/cast.h"
-#include "firmware_sim/site/site_inside.h"
+#include "firmware_sim/site/look.h"
+#include "firmware_sim/site/site.h"
 
 enum { REACH_LINES = 48 }; /* of a case: two fifths of a second, 24 degrees of pan */
 

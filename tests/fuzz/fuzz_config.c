@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "firmware_sim/config/config.h"
+#include "firmware_sim/config/load.h"
 #include "tests/fuzz/rig.h"
 
 enum { MAX_SETS = 8, SET_LEN = 256, MAX_INPUT = 1 << 14 };

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+#include "firmware_sim/config/load.h"
 #include "tests/unit/config_rig.h"
 
 const char base[] = "head:\n"                     /* 1 */

@@ -15,7 +15,7 @@
 #include <unistd.h>
 #include <cmocka.h>
 
-#include "firmware_sim/config/table.h"
+#include "firmware_sim/config/config.h"
 
 extern const char base[];
 

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/load.h"
 #include "tests/unit/device_rig.h"
 
 char folder[64];

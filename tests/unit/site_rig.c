@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+#include "firmware_sim/config/config.h"
 #include "tests/unit/site_rig.h"
 
 enum { MAX_FILES = 8 };

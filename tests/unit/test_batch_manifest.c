@@ -14,6 +14,7 @@
 
 #include "firmware_sim/app/beside.h"
 #include "firmware_sim/app/studio/batch/manifest.h"
+#include "firmware_sim/config/config.h"
 
 static char dir[64];
 

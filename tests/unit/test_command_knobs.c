@@ -9,7 +9,9 @@
 
 #include <cmocka.h>
 
-#include "firmware_sim/command/command_inside.h"
+#include "firmware_sim/command/command.h"
+#include "firmware_sim/command/row.h"
+#include "firmware_sim/command/setting.h"
 #include "tests/unit/command_device.h"
 
 static struct command_result result;

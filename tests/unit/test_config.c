@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The configuration: what it takes, what it refuses and where it says so. */
+#include "firmware_sim/config/load.h"
+#include "firmware_sim/config/table/value.h"
 #include "tests/common/thorough.h"
 #include "tests/unit/config_cases.h"
 

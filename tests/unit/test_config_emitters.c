@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Emitters of head profiles: what follows from them, and what is refused, with file, line and key. */
+#include "firmware_sim/config/load.h"
 #include "tests/unit/config_rig.h"
 
 /* A shipped profile with its first `old` replaced, as heads/mine.yaml beside the configuration. */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* All faults of a configuration at once, in their order, and none that only follows from another one; and
  * files that are none. */
+#include "firmware_sim/config/load.h"
 #include "tests/unit/config_rig.h"
 
 /* The faults are these, in this order: each begins with PATH:LINE: KEY, or as it stands here. */

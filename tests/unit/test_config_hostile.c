@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Configurations that are made to cost much: anchors without end, lists that name each other, a document within itself.
  * Each is refused by a limit, with its line, long before it costs anything. Depth and size: test_config. */
+#include "firmware_sim/config/load.h"
 #include "tests/unit/config_rig.h"
 
 enum { MOST_ANCHORS = 256 };

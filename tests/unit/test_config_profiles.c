@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Head profiles: those that come with the program, and what is refused of one. */
+#include "firmware_sim/config/load.h"
+#include "firmware_sim/config/reference.h"
 #include "tests/unit/config_rig.h"
 
 #include <dirent.h>

@@ -1,5 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* The configuration table itself: its reference, its example, and the soundness of its rows. */
+#include "firmware_sim/config/keys.h"
+#include "firmware_sim/config/load.h"
+#include "firmware_sim/config/profile_keys.h"
+#include "firmware_sim/config/reference.h"
+#include "firmware_sim/config/table/document.h"
+#include "firmware_sim/config/table/reader.h"
+#include "firmware_sim/config/table/row.h"
 #include "tests/unit/config_rig.h"
 
 static void the_reference_names_every_key(void **state)

@@ -5,6 +5,7 @@
 
 #include <math.h>
 
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/device/device_state.h"
 #include "firmware_sim/device/journal.h"
 

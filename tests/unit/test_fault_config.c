@@ -2,6 +2,7 @@
 /* Faults on request as the configuration, scenarios and FAULt:ADD read them: which keys a kind has, their limits, and
  * what they are when not given. */
 #include "firmware_sim/command/command.h"
+#include "firmware_sim/config/load.h"
 #include "tests/unit/config_rig.h"
 
 /* Kinds with the keys that say what; and whether for_ms must be given. By hand, from fault/README.md. */

@@ -5,6 +5,7 @@
 #include <math.h>
 
 #include "core/crs.h"
+#include "firmware_sim/config/load.h"
 #include "tests/common/tif.h"
 
 static struct site *site;

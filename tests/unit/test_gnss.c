@@ -5,6 +5,8 @@
 #include <math.h>
 
 #include "drivers/protocol/nmea.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/load.h"
 #include "firmware_sim/device/gnss.h"
 #include "firmware_sim/device/head_clock.h"
 #include "tests/common/nmea_reader.h"

@@ -6,6 +6,7 @@
 #include <sys/timex.h>
 #include <time.h>
 
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/device/head_clock.h"
 
 __extension__ typedef __int128 i128;

@@ -5,6 +5,7 @@
 
 #include <dlfcn.h>
 
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/device/head_clock.h"
 
 static char list[4096]; /* the file's text; empty: the system's own */

@@ -5,6 +5,8 @@
 
 #include <math.h>
 
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/load.h"
 #include "firmware_sim/site/site.h"
 
 /* A hall of 30 m: its farthest coordinate is off by 31 * 6e-8 = 1.86e-6 m, told with two digits. */

@@ -6,6 +6,7 @@
 
 #include "core/locate.h"
 #include "firmware_sim/app/check_places.h"
+#include "firmware_sim/config/load.h"
 
 static struct site *site;
 

@@ -4,6 +4,7 @@
 #include <dirent.h>
 #include <math.h>
 
+#include "firmware_sim/config/load.h"
 #include "tests/unit/config_rig.h"
 
 /* A profile with programs; each line is a case's to change. Line 17 is the first program. */

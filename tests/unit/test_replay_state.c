@@ -11,6 +11,7 @@
 #include <cmocka.h>
 
 #include "drivers/protocol/native_encode.h"
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/replay/replay_state.h"
 
 /* ---- times of frames */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Stations with scanners of their own: what they take from the file and what not, faults, and what their sites share. */
 #include "firmware_sim/command/command.h"
+#include "firmware_sim/config/load.h"
 #include "firmware_sim/device/device.h"
 #include "firmware_sim/site/site.h"
 #include "tests/unit/config_rig.h"

@@ -5,7 +5,8 @@
 #include <math.h>
 
 #include "core/angle.h"
-#include "firmware_sim/site/site_inside.h"
+#include "firmware_sim/site/site.h"
+#include "firmware_sim/site/view.h"
 #include "tests/common/aimed.h"
 
 /* A closed box, 16 m wide. */

@@ -4,6 +4,8 @@
 
 #include <unistd.h>
 
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/load.h"
 #include "firmware_sim/site/site.h"
 
 static char folder[] = "/tmp/scanhead-site-XXXXXX";

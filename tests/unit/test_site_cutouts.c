@@ -7,6 +7,8 @@
 #include <png.h>
 
 #include "core/cast.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/load.h"
 #include "firmware_sim/site/site.h"
 
 enum { SQUARES = 8 };

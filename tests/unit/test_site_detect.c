@@ -5,6 +5,7 @@
 #include <math.h>
 
 #include "core/instrument.h"
+#include "firmware_sim/config/load.h"
 
 static const char FLOOR[] = "o floor\nv -9 -9 0\nv 9 -9 0\nv 9 9 0\nf 1 2 3\n";
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* What is allowed and hardly meant is said once, with figures; what is usual is not. Run from the top of the
  * source tree. */
+#include "firmware_sim/config/load.h"
 #include "tests/unit/site_rig.h"
 
 #include <glob.h>

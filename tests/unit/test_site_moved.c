@@ -6,6 +6,7 @@
 
 #include "core/angle.h"
 #include "core/pose.h"
+#include "firmware_sim/config/load.h"
 
 static const char ROOM[] = "o floor\nv -50 -50 0.25\nv 50 -50 0.25\nv 50 50 0.25\nv -50 50 0.25\nf 1 2 3 4\n";
 
@@ -28,7 +29,8 @@ static struct site *load(const char *station)
 static struct site *move(const struct site *from, const struct site *first, const struct site_place *to)
 {
     struct site *moved;
-    if (site_load_moved(from, first, 0, to, &report, &moved, &err) != SH_OK) fail_msg("%s", err.text);
+    if (site_load_moved(from, &(struct site_station_move){first, 0, to}, &report, &moved, &err) != SH_OK)
+        fail_msg("%s", err.text);
     return moved;
 }
 

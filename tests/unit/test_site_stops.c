@@ -6,6 +6,7 @@
 
 #include "core/angle.h"
 #include "core/pose.h"
+#include "firmware_sim/config/load.h"
 
 /* 2 m/s along x in 1.2 s from 5 s on, looking north. */
 static const char PATH[] = "t_s,x_m,y_m,z_m,heading_deg,pitch_deg,roll_deg\n5,0,0,2,0,0,0\n6.2,2.4,0,2,0,0,0\n";

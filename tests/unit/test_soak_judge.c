@@ -9,8 +9,19 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "drivers/host/scanhead.h"
 #include "drivers/protocol/native.h"
+#include "firmware_sim/app/studio/soak/clean.h"
+#include "firmware_sim/app/studio/soak/frame.h"
+#include "firmware_sim/app/studio/soak/head.h"
+#include "firmware_sim/app/studio/soak/judge.h"
+#include "firmware_sim/app/studio/soak/ledger.h"
+#include "firmware_sim/app/studio/soak/link.h"
+#include "firmware_sim/app/studio/soak/row.h"
+#include "firmware_sim/app/studio/soak/sheet.h"
 #include "firmware_sim/app/studio/soak/soak.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/fault/fault.h"
 
 enum { FIRST = 1000, N_FRAMES = 200, TICK_NS = 1000000, PAYLOAD = 20 };
 

@@ -164,7 +164,8 @@ static void points_as_bytes(void **state)
     struct web_body b;
     (void)state;
     fill(&p);
-    assert_int_equal(view_encode_points(&p, origin_m, 100, 1, 3, 9, &b, &err), SH_OK); /* points 1 and 4 */
+    assert_int_equal(view_encode_points(&p, origin_m, 100, &(struct view_part){1, 3, 9}, &b, &err),
+                     SH_OK); /* points 1 and 4 */
     /* head 56, four columns of 32: 184; xyz 24, t 8, station 4, rgb 6 and 2 to fill it up */
     assert_int_equal(b.len, 184 + 24 + 8 + 4 + 8);
     assert_memory_equal(b.bytes, "SHCL", 4);
@@ -191,7 +192,8 @@ static void points_as_bytes(void **state)
     assert_int_equal(le_get16(b.bytes + 218), 5);
     assert_memory_equal(b.bytes + 220, "\12\12\12\50\50\50\0\0", 8);
     free(b.bytes);
-    assert_int_equal(view_encode_points(&p, origin_m, 100, N, 1, 9, &b, &err), SH_OK); /* beyond the last one */
+    assert_int_equal(view_encode_points(&p, origin_m, 100, &(struct view_part){N, 1, 9}, &b, &err),
+                     SH_OK); /* beyond the last one */
     assert_int_equal(le_get32(b.bytes + 8), 0);
     assert_int_equal(b.len, 184);
     free(b.bytes);

@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* Every file that a command writes, beside every file that it reads and every other that it writes: one line that names
  * both, status 2, and nothing has changed. The tables of options and of keys say whether these tables are whole. */
-#include "firmware_sim/config/table.h"
+#include "firmware_sim/config/keys.h"
+#include "firmware_sim/config/profile_keys.h"
+#include "firmware_sim/config/table/row.h"
 #include "tests/wire/emitter_rig.h"
 #include "tests/wire/room.h"
 #include "tests/wire/usage_rig.h"

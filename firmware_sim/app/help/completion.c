@@ -5,6 +5,7 @@
 
 #include "firmware_sim/app/help/help.h"
 #include "firmware_sim/config/config.h"
+#include "firmware_sim/config/reference.h"
 
 /* What does not depend on the tables. bash takes words apart at '=', so KEY=VALUE comes as three. Answers of
  * _scanhead_value: words W..., keys, files, folders, or text, which nothing completes. */

@@ -17,7 +17,7 @@ static const char *const shells[] = {"bash"};
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
     {APP_TEXT, "man", "PAGE", .at = AT(man),
-     .help = "print a manual page as roff, by its name: scanhead.1, scanhead-run.1, ..., scanhead.yaml.5; list: all names"},
+     .help = "print a manual page as roff, by its name; list: the names of all"},
     {APP_TEXT, "completion", "SHELL", .at = AT(completion), OPTION_CHOICES(shells),
      .help = "print a completion for bash, to be sourced"},
     OPTION_END
@@ -37,7 +37,7 @@ const struct app_command help_command = {
     .needs = "[COMMAND]",
     .summary = "this text, that of a command, manual pages, a completion",
     .options = OPTIONS,
-    .notes = "scanhead help --man scanhead-run.1 | man -l - shows a page that is not installed.\n",
+    .notes = "help --man PAGE | man -l - shows a page that is not installed.\n",
     .run = run,
 };
 
@@ -45,20 +45,21 @@ static void print_command(const struct app_command *command, FILE *out)
 {
     char arguments[128];
     app_arguments(command, arguments, sizeof arguments);
-    fprintf(out, "  scanhead %s%-*s %s\n", command->name, 38 - (int)strlen(command->name), arguments, command->summary);
+    fprintf(out, "  %s %s%-*s %s\n", app_program, command->name, 38 - (int)strlen(command->name), arguments,
+            command->summary);
 }
 
 void help_print(const struct app_command *const *commands, FILE *out)
 {
-    fprintf(out, "scanhead: %s\n\n", help_title);
+    fprintf(out, "%s: %s\n\n", app_program, help_title);
     for (; *commands != NULL; commands++)
         print_command(*commands, out);
     print_command(&help_command, out);
     fprintf(out,
-            "\nEach command has --help. `scanhead check --help` lists all configuration keys.\n"
-            "scanhead --version says which release this is.\n"
+            "\nEach command has --help. `%s check --help` lists all configuration keys.\n"
+            "%s --version says which release this is.\n"
             "Exit status: %s\n",
-            help_status);
+            app_program, app_program, help_status);
 }
 
 void help_of(const struct app_command *command, const char *second, void (*print)(const struct app_command *command))
@@ -87,7 +88,7 @@ static int print_one(const struct app_command *const *commands, const char *word
         if (strcmp(word, (*commands)->name) == 0) return help_of(*commands, NULL, NULL), APP_OK;
     meant = app_nearest(word, known, n);
     if (meant != NULL) return app_usage(&help_command, "no command %s, did you mean %s?", word, meant);
-    return app_usage(&help_command, "no command %s; scanhead --help has all of them", word);
+    return app_usage(&help_command, "no command %s; %s --help has all of them", word, app_program);
 }
 
 int help_run(const struct app_command *const *commands, int argc, char **argv)

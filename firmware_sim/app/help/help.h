@@ -25,7 +25,8 @@ extern const struct app_command help_command;
 /* Calls the command with --help and has its table given to `print`. words: "record", or "record --raw". */
 void help_of(const struct app_command *command, const char *second, void (*print)(const struct app_command *command));
 
-/* man.c. name: "scanhead-run.1"; NULL: prints the names of all pages. APP_OK, or APP_USAGE with the reason printed. */
+/* man.c. name: "scanhead-run.1", with the name of the program; NULL: prints the names of all pages. APP_OK, or APP_USAGE
+ * with the reason printed. */
 int man_print(const struct app_command *const *commands, const char *name);
 
 /* completion.c */

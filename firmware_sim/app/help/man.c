@@ -5,19 +5,21 @@
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/help/help.h"
 #include "firmware_sim/config/config.h"
+#include "firmware_sim/config/reference.h"
 
 enum { NAME_MAX_LEN = 64 };
-static const char PROGRAM[] = "scanhead.1", KEYS[] = "scanhead.yaml.5";
+static const char KEYS[] = "scanhead.yaml.5";
 
 /* Commands that have a second help, by an option. */
 static const struct {
     const char *name, *option, *page;
-} seconds[] = {{"record", "--raw", "scanhead-record-raw"}};
+} seconds[] = {{"record", "--raw", "record-raw"}};
 enum { N_SECONDS = sizeof seconds / sizeof seconds[0] };
 
-static const char *page_name(const struct app_command *command, char *name)
+/* The name of a command's page. */
+static const char *page_name(const char *command, char *name)
 {
-    snprintf(name, NAME_MAX_LEN, "scanhead-%s", command->name);
+    snprintf(name, NAME_MAX_LEN, "%s-%s", app_program, command);
     return name;
 }
 
@@ -71,7 +73,7 @@ static void put_command(const struct app_command *command)
 {
     char arguments[128], usage[192];
     app_arguments(command, arguments, sizeof arguments);
-    snprintf(usage, sizeof usage, "scanhead %s", command->name);
+    snprintf(usage, sizeof usage, "%s %s", app_program, command->name);
     roff_head(this_page, "1", command->summary);
     puts(".SH SYNOPSIS");
     bold(usage);
@@ -85,7 +87,7 @@ static void put_command(const struct app_command *command)
         puts(".SH NOTES");
         roff_notes(command->notes);
     }
-    put_ends("scanhead", "1");
+    put_ends(app_program, "1");
 }
 
 /* It names the commands that scanheadd has. */
@@ -96,8 +98,9 @@ static const char HEAD_ALONE[] = APP_COMMANDS(SPACED, NOTHING);
 static void put_program(const struct app_command *const *commands)
 {
     char arguments[128], name[NAME_MAX_LEN];
-    roff_head("scanhead", "1", help_title);
-    puts(".SH SYNOPSIS\n.B scanhead\n\\fICOMMAND\\fR ...\n.PP\n.B scanhead \\-\\-version\n.SH COMMANDS");
+    roff_head(app_program, "1", help_title);
+    printf(".SH SYNOPSIS\n.B %s\n\\fICOMMAND\\fR ...\n.PP\n.B %s \\-\\-version\n.SH COMMANDS\n", app_program,
+           app_program);
     for (size_t i = 0;; i++) {
         const struct app_command *command = commands[i] != NULL ? commands[i] : &help_command;
         app_arguments(command, arguments, sizeof arguments);
@@ -106,7 +109,7 @@ static void put_program(const struct app_command *const *commands)
         roff_text(arguments);
         roff_put(command->summary, strlen(command->summary));
         fputs(";\n", stdout);
-        refer(page_name(command, name), "1");
+        refer(page_name(command->name, name), "1");
         putchar('\n');
         if (commands[i] == NULL) break;
     }
@@ -142,6 +145,7 @@ static void put_keys(enum config_keys keys, const char *title)
 
 static void put_configuration(void)
 {
+    char name[NAME_MAX_LEN];
     roff_head("scanhead.yaml", "5", "configurations and head profiles of scanhead");
     puts(".SH DESCRIPTION");
     roff_text(
@@ -150,19 +154,20 @@ static void put_configuration(void)
     put_keys(CONFIG_KEYS, "KEYS OF CONFIGURATIONS");
     put_keys(CONFIG_PROFILE_KEYS, "KEYS OF HEAD PROFILES");
     puts(".SH SEE ALSO");
-    refer("scanhead-check", "1");
+    refer(page_name("check", name), "1");
     putchar('\n');
 }
 
 static void list_pages(const struct app_command *const *commands)
 {
     char name[NAME_MAX_LEN];
-    puts(PROGRAM);
-    for (; *commands != NULL; commands++)
-        printf("%s.1\n", page_name(*commands, name));
-    printf("%s.1\n", page_name(&help_command, name));
-    for (int i = 0; i < N_SECONDS; i++)
-        printf("%s.1\n", seconds[i].page);
+    printf("%s.1\n", app_program);
+    for (size_t i = 0; commands[i] != NULL; i++)
+        printf("%s.1\n", page_name(commands[i]->name, name));
+    printf("%s.1\n", page_name(help_command.name, name));
+    for (int k = 0; k < N_SECONDS; k++)
+        for (size_t i = 0; commands[i] != NULL; i++)
+            if (strcmp(seconds[k].name, commands[i]->name) == 0) printf("%s.1\n", page_name(seconds[k].page, name));
     puts(KEYS);
 }
 
@@ -177,9 +182,9 @@ static int is_page(const char *page, const char *wanted)
 static int put_one(const struct app_command *command, const char *wanted)
 {
     char name[NAME_MAX_LEN];
-    if (is_page(page_name(command, name), wanted)) return help_of(command, NULL, put_command), 1;
+    if (is_page(page_name(command->name, name), wanted)) return help_of(command, NULL, put_command), 1;
     for (int i = 0; i < N_SECONDS; i++)
-        if (strcmp(seconds[i].name, command->name) == 0 && is_page(seconds[i].page, wanted))
+        if (strcmp(seconds[i].name, command->name) == 0 && is_page(page_name(seconds[i].page, name), wanted))
             return help_of(command, seconds[i].option, put_command), 1;
     return 0;
 }
@@ -187,7 +192,7 @@ static int put_one(const struct app_command *command, const char *wanted)
 int man_print(const struct app_command *const *commands, const char *name)
 {
     if (name == NULL) return list_pages(commands), APP_OK;
-    if (strcmp(name, PROGRAM) == 0) return put_program(commands), APP_OK;
+    if (is_page(app_program, name)) return put_program(commands), APP_OK;
     if (strcmp(name, KEYS) == 0) return put_configuration(), APP_OK;
     for (; *commands != NULL; commands++)
         if (put_one(*commands, name)) return APP_OK;

@@ -5,6 +5,8 @@
 #include <string.h>
 
 #include "firmware_sim/app/run/run.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/load.h"
 
 static const char DEFAULT_LINKS[] = "links:\n- {type: pty}\n- {type: tcp}\n";
 
@@ -62,9 +64,9 @@ static void say_what_runs(const struct run_options *o, struct replay *replay, co
 {
     struct replay_summary s;
     replay_get_summary(replay, &s);
-    fprintf(stderr, "scanhead: replay of %s: %s\n", o->in.operand[0], s.idn);
+    fprintf(stderr, "%s: replay of %s: %s\n", app_program, o->in.operand[0], s.idn);
     run_say_links(loop);
-    if (!o->device.start) fprintf(stderr, "scanhead: it is played when a client commands SCAN:START\n");
+    if (!o->device.start) fprintf(stderr, "%s: it is played when a client commands SCAN:START\n", app_program);
 }
 
 static void say_what_ran(const struct run_options *o, struct replay *replay)
@@ -78,8 +80,8 @@ static void say_what_ran(const struct run_options *o, struct replay *replay)
         sh_warn(&app_report_stderr, "%s: %llu bytes are in no whole frame, and were left out%s", o->in.operand[0],
                 (unsigned long long)s.bad_bytes, s.cut ? "; it is cut at its end" : "");
     if (!o->quiet)
-        fprintf(stderr, "scanhead: %llu frames replayed, begun %u time%s\n", (unsigned long long)s.frames, s.times,
-                s.times == 1 ? "" : "s");
+        fprintf(stderr, "%s: %llu frames replayed, begun %u time%s\n", app_program, (unsigned long long)s.frames,
+                s.times, s.times == 1 ? "" : "s");
 }
 
 static int serve(const struct run_options *o, struct replay *replay, struct loop *loop, struct sh_err *err)

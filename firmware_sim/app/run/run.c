@@ -7,6 +7,7 @@
 #include "firmware_sim/app/run/page.h"
 #include "firmware_sim/app/run/run.h"
 #include "firmware_sim/app/surfaces.h"
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/site/plan_rows.h"
 #include "firmware_sim/site/rate.h"
 
@@ -23,26 +24,24 @@ static void say_sights(const struct site *site)
         n++;
     }
     if (n == 0) return;
-    fprintf(stderr, "scanhead: maps of what is seen from %u station%s in %.2f s, %.1f MiB\n", n, n > 1 ? "s" : "",
-            build_s, mib);
+    fprintf(stderr, "%s: maps of what is seen from %u station%s in %.2f s, %.1f MiB\n", app_program, n,
+            n > 1 ? "s" : "", build_s, mib);
 }
 
 static void say_what_runs(const struct config *cfg, const struct site *site, const struct loop *loop)
 {
     struct bvh_info info;
     bvh_get_info(site->bvh, &info);
-    fprintf(stderr,
-            "scanhead: %s %s, %s, %u triangles, %u surfaces; BVH in %.2f s, %.0f bytes per triangle, packets of %u\n",
-            cfg->profile.maker, cfg->profile.model, cfg->profile.name, site->scene->n_all, site->scene->n_surfaces,
-            info.build_s, (double)info.bytes / (double)scene_n_kept(site->scene), info.packet);
+    fprintf(stderr, "%s: %s %s, %s, %u triangles, %u surfaces; BVH in %.2f s, %.0f bytes per triangle, packets of %u\n",
+            app_program, cfg->profile.maker, cfg->profile.model, cfg->profile.name, site->scene->n_all,
+            site->scene->n_surfaces, info.build_s, (double)info.bytes / (double)scene_n_kept(site->scene), info.packet);
     if (!config_is_alone(cfg))
-        fprintf(stderr,
-                "scanhead: it is the scanner of %u of %u stations; --set head.station=N serves that of another\n",
-                site_n_served(site), site->n_stations);
+        fprintf(stderr, "%s: it is the scanner of %u of %u stations; --set head.station=N serves that of another\n",
+                app_program, site_n_served(site), site->n_stations);
     say_sights(site);
     char plan[512];
     site_plan_text(site, plan, sizeof plan);
-    fprintf(stderr, "scanhead: plan: %s\n", plan);
+    fprintf(stderr, "%s: plan: %s\n", app_program, plan);
     run_say_links(loop);
 }
 
@@ -52,7 +51,7 @@ static void say_short_scan(const struct run_options *o, struct device *device)
     const double scan_s = 1e-9 * (double)device_scan_ns(device), tick_s = 1e-9 * (double)device_tick_ns(device);
     if (o->quiet || !o->device.start || app_interrupted() || device_last_scan(device, NULL) != 1) return;
     if (scan_s <= 0.0 || scan_s + 1.5 * tick_s > o->device.duration_s) return;
-    fprintf(stderr, "scanhead: the scan was over after %.3f s, before --duration %.10g: %s\n", scan_s,
+    fprintf(stderr, "%s: the scan was over after %.3f s, before --duration %.10g: %s\n", app_program, scan_s,
             o->device.duration_s,
             o->frames_given ? "all its frames were scanned" : "its path ended, or it was stopped");
 }

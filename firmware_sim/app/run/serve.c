@@ -9,6 +9,7 @@
 #include "firmware_sim/app/run/run.h"
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/base/notify.h"
+#include "firmware_sim/config/config.h"
 
 enum { VIEW_SESSIONS = 4 };
 
@@ -28,7 +29,7 @@ void run_say_links(const struct loop *loop)
     struct link_place place;
     for (uint32_t i = 0; loop_get_place(loop, i, &place); i++)
         if (strcmp(place.type, "fd") != 0) /* within this process */
-            fprintf(stderr, "scanhead: link %s%s%s\n", place.endpoint, place.protocol != NULL ? ", " : "",
+            fprintf(stderr, "%s: link %s%s%s\n", app_program, place.endpoint, place.protocol != NULL ? ", " : "",
                     place.protocol != NULL ? place.protocol : "");
 }
 

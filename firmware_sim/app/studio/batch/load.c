@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "firmware_sim/app/studio/record/offline.h"
+#include "firmware_sim/config/config.h"
 
 struct loading {
     struct batch *b;

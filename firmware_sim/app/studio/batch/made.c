@@ -10,6 +10,8 @@
 #include "core/infile.h"
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/beside.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/load.h"
 
 const char *batch_made_differs(const struct batch_made *a, const struct batch_made *b)
 {

@@ -7,10 +7,13 @@
 #ifndef FIRMWARE_SIM_APP_STUDIO_BATCH_MADE_H
 #define FIRMWARE_SIM_APP_STUDIO_BATCH_MADE_H
 
+#include <stddef.h>
 #include <stdint.h>
 #include <sys/stat.h>
 
-#include "firmware_sim/config/config.h"
+struct config;
+struct sh_err;
+struct sh_report;
 
 enum { BATCH_SHA_LEN = 65 };
 

@@ -7,7 +7,9 @@
 #include <stdint.h>
 
 #include "core/err.h"
-#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/limits.h"
+
+struct config;
 
 enum { BATCH_MAX_SWEEPS = 16, BATCH_MAX_VALUES = 10000, BATCH_MAX_JOBS = 1000000 };
 

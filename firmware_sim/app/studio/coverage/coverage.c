@@ -7,11 +7,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/studio/mesh.h"
 #include "core/newfile.h"
+#include "core/studio/mesh.h"
 #include "firmware_sim/app/app.h"
-#include "firmware_sim/app/studio/coverage/next.h"
 #include "firmware_sim/app/sites.h"
+#include "firmware_sim/app/studio/coverage/next.h"
+#include "firmware_sim/config/config.h"
 
 static const char *const COLOURS[] = {[COVERAGE_SEEN] = "seen",
                                       [COVERAGE_COUNT] = "count",

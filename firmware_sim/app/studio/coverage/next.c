@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "core/angle.h"
+#include "firmware_sim/config/config.h"
 
 static const double LEAST_FRONT = 0.5;
 

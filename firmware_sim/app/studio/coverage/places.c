@@ -10,6 +10,7 @@
 #include "core/studio/standpoint.h"
 #include "core/vec3.h"
 #include "firmware_sim/app/studio/coverage/next.h"
+#include "firmware_sim/config/config.h"
 
 enum { MOST_PLACES = 100000, PULSES = 40000 };
 

@@ -7,6 +7,7 @@
 
 #include "core/angle.h"
 #include "firmware_sim/app/studio/coverage/coverage.h"
+#include "firmware_sim/config/places.h"
 
 double coverage_percent(double part, double whole)
 {

@@ -14,6 +14,10 @@
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/studio/init/mesh.h"
 #include "firmware_sim/app/studio/init/text.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/limits.h"
+#include "firmware_sim/config/load.h"
+#include "firmware_sim/config/profile.h"
 #include "firmware_sim/site/site.h"
 
 /* The head for rooms sees up to the ceiling; the other one sees farther. */

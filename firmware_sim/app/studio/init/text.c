@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "core/angle.h"
+#include "firmware_sim/config/profile.h"
 #include "firmware_sim/site/site.h"
 
 static const double MOST_PULSES = 200000.0, MOST_LINES_HZ = 200.0;

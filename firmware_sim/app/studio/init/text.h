@@ -8,7 +8,8 @@
 
 #include "core/studio/standpoint.h"
 #include "firmware_sim/app/studio/init/mesh.h"
-#include "firmware_sim/config/config.h"
+
+struct config;
 
 /* A coarse scan of what the station sees. */
 struct init_scan {

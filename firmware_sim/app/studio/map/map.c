@@ -5,14 +5,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/studio/map.h"
 #include "core/mat3.h"
 #include "core/newfile.h"
 #include "core/scene_objects.h"
+#include "core/studio/map.h"
 #include "core/vec3.h"
 #include "firmware_sim/app/app.h"
-#include "firmware_sim/app/studio/record/heads.h"
 #include "firmware_sim/app/studio/map/view.h"
+#include "firmware_sim/app/studio/record/heads.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/places.h"
 
 enum { BATCH = 256 };
 

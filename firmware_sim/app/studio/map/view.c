@@ -5,12 +5,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/studio/cloud.h"
 #include "core/grow.h"
+#include "core/studio/cloud.h"
 #include "firmware_sim/app/app.h"
-#include "firmware_sim/app/studio/record/heads.h"
 #include "firmware_sim/app/studio/map/view_inside.h"
+#include "firmware_sim/app/studio/record/heads.h"
 #include "firmware_sim/base/clock.h"
+#include "firmware_sim/config/config.h"
 
 /* ---- a scan */
 

@@ -7,7 +7,8 @@
 
 #include "core/err.h"
 #include "core/studio/view.h"
-#include "firmware_sim/config/config.h"
+
+struct config;
 
 enum map_view_colour {
     MAP_VIEW_HEIGHT,

@@ -5,11 +5,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/studio/cloud.h"
 #include "core/colour.h"
 #include "core/newfile.h"
+#include "core/studio/cloud.h"
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/studio/map/view_inside.h"
+#include "firmware_sim/config/places.h"
 
 /* ---- points */
 

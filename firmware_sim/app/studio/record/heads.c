@@ -7,6 +7,8 @@
 #include <string.h>
 
 #include "firmware_sim/base/clock.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/load.h"
 
 /* Which of those that are known has the scanner of station i, from 0; n: none yet. */
 static uint32_t find(const struct heads *heads, uint32_t i)
@@ -149,9 +151,10 @@ static void say_progress(struct heads *heads, const struct recording_options *al
 }
 
 /* From stations first to last, which have one scanner. */
-static int record_some(struct heads *heads, struct heads_one *one, const struct recording_options *all, uint32_t first,
-                       uint32_t last, struct recording_result *sum, struct sh_err *err)
+static int record_some(struct heads *heads, const struct recording_options *all, uint32_t first, uint32_t last,
+                       struct recording_result *sum, struct sh_err *err)
 {
+    struct heads_one *one = &heads->one[of(heads, first)];
     struct recording_options options = *all;
     struct recording_result result;
     say_progress(heads, all, first);
@@ -244,7 +247,7 @@ int heads_record(struct heads *heads, const struct recording_options *options, s
          from = to + 1) {
         for (to = from; to < last && of(heads, to + 1) == of(heads, from);)
             to++;
-        rc = record_some(heads, &heads->one[of(heads, from)], options, from, to, result, err);
+        rc = record_some(heads, options, from, to, result, err);
     }
     add_streams(heads, options->hash, result);
     result->wall_s = 1e-9 * (double)(clock_now_ns() - start_ns);

@@ -11,6 +11,7 @@
 #include "firmware_sim/app/studio/record/heads.h"
 #include "firmware_sim/app/surfaces.h"
 #include "firmware_sim/base/clock.h"
+#include "firmware_sim/config/config.h"
 
 enum { WAIT_MS = 1000 };
 

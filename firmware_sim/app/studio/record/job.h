@@ -6,10 +6,10 @@
 
 #include "firmware_sim/app/studio/record/files.h"
 #include "firmware_sim/app/studio/record/recording.h"
-#include "firmware_sim/config/config.h"
 
 struct heads;
 struct site;
+struct config;
 
 struct record_job {
     const char *source;   /* of record_job_stream, as libscanhead opens it */

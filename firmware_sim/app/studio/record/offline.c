@@ -7,6 +7,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/loop/loop.h"
 
 static int connect_client(struct offline *off, int fd, struct sh_err *err)

@@ -6,8 +6,9 @@
 
 #include "core/err.h"
 #include "drivers/host/scanhead.h"
-#include "firmware_sim/config/config.h"
 #include "firmware_sim/site/site.h"
+
+struct config;
 
 struct offline {
     const char *truth;   /* the caller's: file for the faults that are injected; NULL: none */

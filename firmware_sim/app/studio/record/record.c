@@ -9,6 +9,8 @@
 #include "firmware_sim/app/studio/record/line.h"
 #include "firmware_sim/app/studio/record/raw.h"
 #include "firmware_sim/app/studio/record/repair.h"
+#include "firmware_sim/command/head.h"
+#include "firmware_sim/config/limits.h"
 
 static const double LONG_EDGE = 10;
 

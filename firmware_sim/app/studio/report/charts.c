@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/studio/picture.h"
 #include "firmware_sim/app/studio/report/page.h"
 
 enum { WIDTH = 640, HEIGHT = 272, LEFT = 70, RIGHT = 625, TOP = 12, BOTTOM = 245 };
@@ -16,7 +17,7 @@ static double y_of(double part)
 static void begin(FILE *out, const char *title)
 {
     fprintf(out, "<svg class=\"chart\" viewBox=\"0 0 %d %d\" role=\"img\"><title>", WIDTH, HEIGHT);
-    page_text(out, title);
+    picture_put_escaped(out, title);
     fputs("</title>\n", out);
 }
 
@@ -36,7 +37,7 @@ static void put_scale(FILE *out, double most, double per_unit)
 static void put_axis_name(FILE *out, const char *text)
 {
     fputs("<p class=\"key\">", out);
-    page_text(out, text);
+    picture_put_escaped(out, text);
     fputs("</p>\n", out);
 }
 
@@ -110,7 +111,7 @@ static void put_legend(FILE *out, const struct page_bars *b)
             fprintf(out, "<span><i class=\"s%d\"></i>", s);
         else
             fputs("<span><i class=\"line\"></i>", out);
-        page_text(out, b->series[s]);
+        picture_put_escaped(out, b->series[s]);
         fputs("</span> ", out);
     }
     fputs("</p>\n", out);
@@ -148,7 +149,7 @@ static void put_group(FILE *out, const struct page_bars *b, uint32_t g, uint32_t
     if (g % apart != 0) return;
     fprintf(out, "<text%s x=\"%.1f\" y=\"%d\" text-anchor=\"middle\">", g / apart % 2 == 1 ? " class=\"odd\"" : "",
             left + 0.5 * wide, BOTTOM + 17);
-    page_text(out, b->group[g]);
+    picture_put_escaped(out, b->group[g]);
     fputs("</text>\n", out);
 }
 

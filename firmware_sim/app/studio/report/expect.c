@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "firmware_sim/app/studio/report/report.h"
+#include "firmware_sim/config/config.h"
 
 /* LAS files of ours hold the stream's own counts of the first scan's station; all else they round once more. */
 static double file_count_m(const struct report *r, uint32_t station, int polar)

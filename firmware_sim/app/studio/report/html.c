@@ -9,8 +9,10 @@
 #include <unistd.h>
 
 #include "core/newfile.h"
-#include "firmware_sim/app/studio/report/report.h"
+#include "core/studio/picture.h"
 #include "firmware_sim/app/studio/report/page.h"
+#include "firmware_sim/app/studio/report/report.h"
+#include "firmware_sim/config/config.h"
 
 static const char *file_name(const char *path)
 {
@@ -21,7 +23,7 @@ static const char *file_name(const char *path)
 static void put_fact(FILE *out, const char *what, const char *text)
 {
     fprintf(out, "<dt>%s</dt><dd>", what);
-    page_text(out, text);
+    picture_put_escaped(out, text);
     fputs("</dd>\n", out);
 }
 
@@ -55,7 +57,7 @@ static void put_top(FILE *out, const struct report *r)
     char text[CONFIG_PATH_LEN + 64];
     struct tm day;
     fputs("<h1>Scan report: ", out);
-    page_text(out, file_name(r->cloud_path));
+    picture_put_escaped(out, file_name(r->cloud_path));
     fputs("</h1>\n<dl class=\"facts\">\n", out);
     put_fact(out, "Recording", r->cloud_path);
     if (gmtime_r(&r->modified.tv_sec, &day) != NULL && strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S UTC", &day) > 0)
@@ -80,7 +82,7 @@ static void put_verdict(FILE *out, const struct report_verdict *v)
     fprintf(out, "<div class=\"verdict %s\"><b>%s</b>", kind[v->judgement], sign[v->judgement]);
     if (text == NULL) text = v->text;
     if (*text != 0) fputc(toupper((unsigned char)*text), out); /* ours begin with a letter of ASCII */
-    page_text(out, *text != 0 ? text + 1 : text);
+    picture_put_escaped(out, *text != 0 ? text + 1 : text);
     fputs("</div>\n", out);
 }
 
@@ -171,25 +173,33 @@ static void put_histograms(FILE *out, struct report *r)
     fputs("</figcaption></figure>\n</div>\n", out);
 }
 
-static void put_bars(FILE *out, const char *title, const char *axis, uint32_t n, const char (*group)[32],
-                     const struct figures *figures, const char *caption)
+/* A chart of bars: its texts, and the figures of each group. */
+struct chart {
+    const char *title, *axis, *caption;
+    uint32_t n;
+    const char (*group)[32];
+    const struct figures *figures;
+};
+
+static void put_bars(FILE *out, const struct chart *chart)
 {
+    const struct figures *figures = chart->figures;
     double value_m[REPORT_MAX_RANGES][PAGE_SERIES];
-    for (uint32_t k = 0; k < n; k++) {
+    for (uint32_t k = 0; k < chart->n; k++) {
         value_m[k][0] = figures[k].rms_m;
         value_m[k][1] = figures[k].p95_m;
         value_m[k][2] = figures[k].judged_rms_m;
         value_m[k][3] = figures[k].expected_rms_m;
     }
-    const struct page_bars bars = {.title = title,
-                                   .axis = axis,
+    const struct page_bars bars = {.title = chart->title,
+                                   .axis = chart->axis,
                                    .series = {"RMS distance", "95 % distance", "RMS along the beam", "expected"},
-                                   .n_groups = n,
-                                   .group = group,
+                                   .n_groups = chart->n,
+                                   .group = chart->group,
                                    .value_m = (const double(*)[PAGE_SERIES])value_m};
     fputs("<figure>\n", out);
     page_bars(out, &bars);
-    fprintf(out, "<figcaption>%s</figcaption></figure>\n", caption);
+    fprintf(out, "<figcaption>%s</figcaption></figure>\n", chart->caption);
 }
 
 static void put_charts(FILE *out, const struct report *r)
@@ -199,13 +209,20 @@ static void put_charts(FILE *out, const struct report *r)
     report_name_incidences(incidences);
     if (r->f.n_ranges == 0) return;
     fputs("<div class=\"pair\">\n", out);
-    put_bars(out, "Deviations by range", "distance from the station, m", r->f.n_ranges, (const char(*)[32])ranges,
-             r->f.range, "Deviations by the distance from the station.");
+    put_bars(out, &(struct chart){.title = "Deviations by range",
+                                  .axis = "distance from the station, m",
+                                  .caption = "Deviations by the distance from the station.",
+                                  .n = r->f.n_ranges,
+                                  .group = (const char(*)[32])ranges,
+                                  .figures = r->f.range});
     if (!r->site->moving)
-        put_bars(out, "Deviations by incidence", "angle between the beam and the surface's normal", REPORT_INCIDENCES,
-                 (const char(*)[32])incidences, r->f.incidence,
-                 "Deviations by the angle at which the beam meets the surface; 0\xc2\xb0 is head on. Beyond 80\xc2\xb0 "
-                 "there are distances alone.");
+        put_bars(out, &(struct chart){.title = "Deviations by incidence",
+                                      .axis = "angle between the beam and the surface's normal",
+                                      .caption = "Deviations by the angle at which the beam meets the surface; "
+                                                 "0\xc2\xb0 is head on. Beyond 80\xc2\xb0 there are distances alone.",
+                                      .n = REPORT_INCIDENCES,
+                                      .group = (const char(*)[32])incidences,
+                                      .figures = r->f.incidence});
     fputs("</div>\n", out);
 }
 
@@ -222,7 +239,7 @@ static void put_worst(FILE *out, const struct report *r)
         char name[REPORT_SURFACE_LEN];
         report_name_surface(s, name);
         fputs(", on ", out);
-        page_text(out, name);
+        picture_put_escaped(out, name);
     }
     fputs(".</p>\n", out);
 }

@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "firmware_sim/app/studio/report/report.h"
+#include "firmware_sim/config/places.h"
 
 static void put_worst(struct json *json, const struct report *r)
 {

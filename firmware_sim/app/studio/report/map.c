@@ -4,13 +4,14 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/studio/cloud_picture.h"
 #include "core/colour.h"
 #include "core/geoframe.h"
 #include "core/mat3.h"
+#include "core/studio/cloud_picture.h"
 #include "core/vec3.h"
-#include "firmware_sim/app/studio/report/report.h"
 #include "firmware_sim/app/studio/report/page.h"
+#include "firmware_sim/app/studio/report/report.h"
+#include "firmware_sim/config/places.h"
 
 enum { MOST_NAMES = 40, WIDTH = 900 };
 
@@ -109,7 +110,7 @@ static void put_mark(FILE *out, const double at[2], const char *name)
 {
     fprintf(out, "<polygon class=\"station\" points=\"%.1f,%.1f %.1f,%.1f %.1f,%.1f\"><title>", at[0], at[1] - 9.0,
             at[0] - 8.0, at[1] + 6.0, at[0] + 8.0, at[1] + 6.0);
-    page_text(out, name);
+    picture_put_escaped(out, name);
     fputs("</title></polygon>\n", out);
 }
 
@@ -146,7 +147,7 @@ static uint32_t put_stations(FILE *out, const struct view *v, const struct cloud
                 is_right  ? "start"
                 : is_left ? "end"
                           : "middle");
-        page_text(out, name);
+        picture_put_escaped(out, name);
         fputs("</text>\n", out);
     }
     return left_out;

@@ -57,18 +57,13 @@ void page_begin(FILE *out, const char *title)
     fputs("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
           "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>",
           out);
-    page_text(out, title);
+    picture_put_escaped(out, title);
     fprintf(out, "</title>\n<style>\n%s</style>\n</head>\n<body>\n", STYLE);
 }
 
 void page_end(FILE *out)
 {
     fputs("</body>\n</html>\n", out);
-}
-
-void page_text(FILE *out, const char *text)
-{
-    picture_put_escaped(out, text);
 }
 
 const char *page_unit(double largest_m, double *per_m)

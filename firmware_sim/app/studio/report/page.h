@@ -13,8 +13,6 @@
 void page_begin(FILE *out, const char *title);
 void page_end(FILE *out);
 
-/* The text, escaped. */
-void page_text(FILE *out, const char *text);
 /* A length in the unit that suits it, nm to m, with three or four digits; NaN: a dash. */
 void page_length(FILE *out, double m);
 /* The same with its sign. */

@@ -5,8 +5,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "firmware_sim/app/studio/report/report.h"
+#include "core/studio/picture.h"
 #include "firmware_sim/app/studio/report/page.h"
+#include "firmware_sim/app/studio/report/report.h"
+#include "firmware_sim/config/places.h"
 
 enum { MOST_LABELS = 200 };
 
@@ -39,7 +41,7 @@ static void begin_row(FILE *out, const char *name, const struct figures *f)
 {
     const double length[] = {f->mean_m, f->rms_m, f->p95_m, f->max_m};
     fputs("<tr><td>", out);
-    page_text(out, name);
+    picture_put_escaped(out, name);
     fputs("</td><td>", out);
     page_count(out, f->points);
     for (int k = 0; k < 4; k++) {
@@ -93,9 +95,9 @@ void report_put_stations(FILE *out, const struct report *r)
         const char *verdict = r->f.station[s].verdict.text;
         if (r->f.station[s].figures.points == 0 || strcmp(verdict, r->f.verdict.text) == 0) continue;
         fprintf(out, "<p>Station %" PRIu32 ", ", s + 1);
-        page_text(out, r->site->station[s].station->name);
+        picture_put_escaped(out, r->site->station[s].station->name);
         fputs(". ", out);
-        page_text(out, verdict);
+        picture_put_escaped(out, verdict);
         fputs("</p>\n", out);
     }
 }
@@ -197,7 +199,7 @@ void report_put_times(FILE *out, const struct report *r)
             const struct figures_times *t = &r->f.station[s].times;
             if (t->points == 0) continue;
             fprintf(out, "<tr><td>%" PRIu32 " ", s + 1);
-            page_text(out, r->site->station[s].station->name);
+            picture_put_escaped(out, r->site->station[s].station->name);
             fprintf(out, "</td><td>%zu</td><td>%zu</td><td>%.6g</td><td>", t->points, t->scans, t->span_s);
             page_number(out, t->span_s > 0.0 ? (double)t->points / t->span_s : (double)NAN);
             fprintf(out, "</td><td>%zu</td><td>%.3g</td><td>%.6f</td></tr>\n", t->gaps, t->longest_s, t->longest_at_s);

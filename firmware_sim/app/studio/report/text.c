@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "firmware_sim/app/studio/report/report.h"
+#include "firmware_sim/config/places.h"
 
 enum { MOST_LABELS = 20 };
 

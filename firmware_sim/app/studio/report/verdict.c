@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "core/angle.h"
+#include "firmware_sim/config/config.h"
 
 /* What the plan says of the cast; rays per call don't matter to it. */
 static double cast_error_m(void)

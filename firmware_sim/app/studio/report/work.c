@@ -8,6 +8,8 @@
 #include "core/mat3.h"
 #include "firmware_sim/app/studio/report/report.h"
 #include "firmware_sim/base/clock.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/places.h"
 
 /* core/studio/analysis reports every piece of its work. A line a second is enough for a terminal, and none for short
  * work. */

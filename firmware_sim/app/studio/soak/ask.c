@@ -1,9 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /* Asks the head questions whose right answers are known, and judges the answers. */
+#include <stdio.h>
 #include <string.h>
 
-#include "firmware_sim/app/studio/soak/soak.h"
+#include "drivers/host/scanhead.h"
+#include "firmware_sim/app/studio/soak/ask.h"
+#include "firmware_sim/app/studio/soak/head.h"
+#include "firmware_sim/app/studio/soak/link.h"
+#include "firmware_sim/app/studio/soak/row.h"
 #include "firmware_sim/base/clock.h"
+#include "firmware_sim/fault/fault.h"
 
 /* On a busy machine a reply takes seconds behind the frames that a terminal still has to carry. */
 enum { REPLY_MS = 5000, REPLY_LEN = SOAK_REPLY_LEN };

@@ -6,7 +6,11 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "drivers/host/scanhead.h"
+#include "drivers/link/link.h"
 #include "drivers/protocol/bytes.h"
+#include "firmware_sim/app/studio/soak/clean.h"
+#include "firmware_sim/app/studio/soak/frame.h"
 #include "firmware_sim/app/studio/soak/soak.h"
 
 enum { NEXT_MS = 50, REPLY_MS = 5000 };
@@ -39,10 +43,9 @@ static void keep(struct soak *soak, const struct scanhead_frame *frame)
     pthread_mutex_unlock(&c->lock);
 }
 
-int soak_clean_get(struct soak_link *link, soak_seq seq, struct soak_clean_frame *out)
+int soak_clean_get(struct soak *soak, soak_seq seq, struct soak_clean_frame *out)
 {
-    struct soak_clean *c = &link->soak->clean;
-    if (link->datagrams != NULL) return soak_datagrams_get(link->datagrams, seq, out);
+    struct soak_clean *c = &soak->clean;
     pthread_mutex_lock(&c->lock);
     *out = c->ring[seq % SOAK_RING];
     pthread_mutex_unlock(&c->lock);

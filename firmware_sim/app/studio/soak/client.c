@@ -5,8 +5,20 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "drivers/host/scanhead.h"
+#include "drivers/link/link.h"
+#include "firmware_sim/app/studio/soak/ask.h"
+#include "firmware_sim/app/studio/soak/client.h"
+#include "firmware_sim/app/studio/soak/datagrams.h"
+#include "firmware_sim/app/studio/soak/head.h"
+#include "firmware_sim/app/studio/soak/ledger.h"
+#include "firmware_sim/app/studio/soak/link.h"
 #include "firmware_sim/app/studio/soak/soak.h"
+#include "firmware_sim/app/studio/soak/usb.h"
 #include "firmware_sim/base/clock.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/fault/fault.h"
+#include "firmware_sim/loop/loop.h"
 
 enum { NEXT_MS = 50 };
 static const int64_t OPEN_EVERY_NS = 20000000, ASK_EVERY_NS = 200000000, POINTS_WITHIN_NS = 500000000;
@@ -63,7 +75,7 @@ static int open_link(struct soak *soak, uint32_t i, const struct link_place *pla
                                            : NULL;
     link->usable = link->not_soaked == NULL;
     if (!link->usable) return 0;
-    link->fact = calloc(SOAK_RING, sizeof *link->fact);
+    link->fact = soak_ledger_open();
     return link->fact != NULL ? 1 : -1;
 }
 
@@ -129,7 +141,10 @@ static void open_head(struct recorder *r)
             link->sh == NULL ? scanhead_open(link->source, &link->sh, why, sizeof why) : scanhead_reattach(link->sh, 0);
         if (rc == SCANHEAD_OK) {
             scanhead_on_notice(link->sh, soak_saw_notice, link);
-            soak_usb_opened(link, 1e-6 * (double)(clock_now_ns() - from_ns));
+            const double opened_ms = 1e-6 * (double)(clock_now_ns() - from_ns);
+            pthread_mutex_lock(&link->lock);
+            soak_usb_opened(&link->plugs, link->row, link->source, opened_ms);
+            pthread_mutex_unlock(&link->lock);
             began(r);
             return;
         }

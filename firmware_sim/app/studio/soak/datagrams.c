@@ -8,6 +8,7 @@
 #include <errno.h>
 #include <netinet/in.h>
 #include <poll.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
@@ -15,8 +16,12 @@
 
 #include <arpa/inet.h>
 
+#include "drivers/link/link.h"
 #include "drivers/protocol/crc32c.h"
-#include "firmware_sim/app/studio/soak/soak.h"
+#include "firmware_sim/app/studio/soak/datagrams.h"
+#include "firmware_sim/app/studio/soak/frame.h"
+#include "firmware_sim/app/studio/soak/ledger.h"
+#include "firmware_sim/app/studio/soak/link.h"
 #include "firmware_sim/base/clock.h"
 
 enum { LONGEST = 65536, RECEIVE_BYTES = 4 << 20, POLL_MS = 20, LOOK_BACK = 4096, WAITING = 1 << 14 };

@@ -3,8 +3,15 @@
 #include <math.h>
 #include <string.h>
 
+#include "drivers/host/scanhead.h"
+#include "firmware_sim/app/studio/soak/head.h"
+#include "firmware_sim/app/studio/soak/link.h"
+#include "firmware_sim/app/studio/soak/row.h"
 #include "firmware_sim/app/studio/soak/soak.h"
+#include "firmware_sim/app/studio/soak/usb.h"
 #include "firmware_sim/command/head.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/fault/fault.h"
 
 /* What another reader of the stream would take for a step of the clock: far above a nanosecond, far below a jump. */
 static const double STEP_S = 1e-3, GAIN_S = 1e-6, PPS_WITHIN_S = 1.5;
@@ -37,7 +44,8 @@ static void add_moment(struct soak_link *link, const struct fault_note *note)
     const char *why = why_hidden(link->soak, note->kind);
     row->injected++;
     link->ask.others++;
-    if (note->kind == FAULT_POWER_CYCLE) soak_usb_forget(link, "power went before a client opened it");
+    if (note->kind == FAULT_POWER_CYCLE)
+        soak_usb_forget(&link->plugs, link->row, "power went before a client opened it");
     if (link->datagrams != NULL) why = "the packets are compared with those of the same head";
     if (!link->usable) why = "the link has no client here";
     if (why == NULL && link->n_moments == SOAK_MAX_MOMENTS) why = "too many at a time";

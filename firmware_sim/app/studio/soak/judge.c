@@ -3,7 +3,15 @@
  *
  * A frame is judged once thousands of later ones came, or at the end. Then nothing more will come of it, and the clean
  * reader has it. */
+#include "firmware_sim/app/studio/soak/clean.h"
+#include "firmware_sim/app/studio/soak/datagrams.h"
+#include "firmware_sim/app/studio/soak/frame.h"
+#include "firmware_sim/app/studio/soak/judge.h"
+#include "firmware_sim/app/studio/soak/ledger.h"
+#include "firmware_sim/app/studio/soak/link.h"
+#include "firmware_sim/app/studio/soak/row.h"
 #include "firmware_sim/app/studio/soak/soak.h"
+#include "firmware_sim/fault/fault.h"
 
 /* Noticed by its time: a frame that comes so much later than it says. A block of pulses lasts a tick, and the smallest
  * time that any frame took is not the smallest possible. */
@@ -107,11 +115,18 @@ static void judge_late(struct soak_link *link, const struct soak_fact *f)
     }
 }
 
+/* The clean frame that the link's is compared with. 0: it is not known (any more, or not yet). */
+static int get_clean(struct soak_link *link, soak_seq seq, struct soak_clean_frame *out)
+{
+    return link->datagrams != NULL ? soak_datagrams_get(link->datagrams, seq, out)
+                                   : soak_clean_get(link->soak, seq, out);
+}
+
 /* Bytes that belong to no frame, at about this place. */
 static int take_bytes(struct soak_link *link, const struct soak_fact *f, uint64_t n)
 {
     struct soak_clean_frame before;
-    const int64_t from_ns = soak_clean_get(link, f->seq - NEAR_FRAMES, &before) ? before.t_ns : f->t_ns - FAR_NS;
+    const int64_t from_ns = get_clean(link, f->seq - NEAR_FRAMES, &before) ? before.t_ns : f->t_ns - FAR_NS;
     for (uint32_t i = 0; i < link->n_runs; i++) {
         struct soak_run *run = &link->run[i];
         if (run->t_ns < from_ns || run->t_ns > f->t_ns + NEAR_NS || run->n < n) continue;
@@ -183,7 +198,7 @@ static void judge_loss(struct soak_link *link, const struct soak_fact *f)
 static void judge_frame(struct soak_link *link, const struct soak_fact *f)
 {
     struct soak_clean_frame clean = {0};
-    const int is_known = soak_clean_get(link, f->seq, &clean);
+    const int is_known = get_clean(link, f->seq, &clean);
     const uint64_t bad = bad_bytes_of(link, f, &clean);
     link->expected_bad_max += bad;
     if (f->away) {

@@ -3,18 +3,30 @@
  *
  * The head reports a fault in the thread of the link, before the client can see it. Frames are identified by their
  * numbers, which are the same on all links. */
+#include <stdlib.h>
 #include <string.h>
 
+#include "drivers/host/scanhead.h"
+#include "firmware_sim/app/studio/soak/ask.h"
+#include "firmware_sim/app/studio/soak/clean.h"
+#include "firmware_sim/app/studio/soak/datagrams.h"
+#include "firmware_sim/app/studio/soak/frame.h"
+#include "firmware_sim/app/studio/soak/head.h"
+#include "firmware_sim/app/studio/soak/judge.h"
+#include "firmware_sim/app/studio/soak/ledger.h"
+#include "firmware_sim/app/studio/soak/link.h"
+#include "firmware_sim/app/studio/soak/row.h"
 #include "firmware_sim/app/studio/soak/soak.h"
+#include "firmware_sim/app/studio/soak/usb.h"
 #include "firmware_sim/base/clock.h"
+#include "firmware_sim/fault/fault.h"
 
 /* Blocks are computed so far ahead, at most. */
 static const int64_t AHEAD_NS = 500000000, JUST_NS = 500000000;
 
-void soak_hide(struct soak_row *row, uint64_t n, const char *why)
+struct soak_fact *soak_ledger_open(void)
 {
-    row->hidden += n;
-    if (n != 0) row->why = why;
+    return calloc(SOAK_RING, sizeof(struct soak_fact));
 }
 
 struct soak_fact *soak_fact_at(struct soak_link *link, soak_seq seq)
@@ -150,7 +162,7 @@ static void hit_connection(struct soak_link *link, const struct fault_note *note
     if (note->kind == FAULT_REFUSE && link->n_refusals < SOAK_MAX_ACTS)
         link->refusal[link->n_refusals++] = (struct soak_act){note->kind, note->t_ns};
     else if (note->kind != FAULT_REFUSE)
-        soak_usb_plugged(link, note);
+        soak_usb_plugged(&link->plugs, link->row, note);
     else
         soak_hide(&link->row[note->kind], 1, "too many at a time");
 }

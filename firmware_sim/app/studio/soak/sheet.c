@@ -4,7 +4,13 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "firmware_sim/app/studio/soak/link.h"
+#include "firmware_sim/app/studio/soak/row.h"
+#include "firmware_sim/app/studio/soak/sheet.h"
 #include "firmware_sim/app/studio/soak/soak.h"
+#include "firmware_sim/base/json.h"
+#include "firmware_sim/fault/board.h"
+#include "firmware_sim/fault/fault.h"
 
 static const char *row_name(int row)
 {
@@ -57,8 +63,8 @@ static void conclude_link(struct soak *soak, struct soak_link *link)
         link->row[link->act[i].kind].missed++;
     for (uint32_t i = 0; i < link->n_refusals; i++)
         link->row[link->refusal[i].kind].missed++;
-    for (uint32_t i = 0; i < link->n_plugs; i++)
-        link->row[link->plug[i].kind].missed++;
+    for (uint32_t i = 0; i < link->plugs.n; i++)
+        link->row[link->plugs.note[i].kind].missed++;
     for (int row = 0; row < SOAK_N_ROWS; row++)
         add(&sum, &link->row[row]);
     fail(soak, has_open_rows(link->row), "a fault was neither noticed nor known to be hidden");

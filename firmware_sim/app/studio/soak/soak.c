@@ -1,11 +1,23 @@
 /* SPDX-License-Identifier: MIT */
 /* scanhead soak: the head with faults on request, and our own clients; at the end a sheet of what each noticed. */
-#include "firmware_sim/app/studio/soak/soak.h"
+#include "drivers/link/link.h"
+#include "firmware_sim/app/studio/soak/clean.h"
+#include "firmware_sim/app/studio/soak/client.h"
+#include "firmware_sim/app/studio/soak/datagrams.h"
+#include "firmware_sim/app/studio/soak/head.h"
+#include "firmware_sim/app/studio/soak/judge.h"
+#include "firmware_sim/app/studio/soak/ledger.h"
+#include "firmware_sim/app/studio/soak/sheet.h"
+#include "firmware_sim/app/studio/soak/usb.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/fault/board.h"
+#include "firmware_sim/loop/loop.h"
 
 #include <poll.h>
 #include <stdlib.h>
 
 #include "firmware_sim/app/app.h"
+#include "firmware_sim/app/studio/soak/soak.h"
 #include "firmware_sim/base/clock.h"
 
 enum { WAIT_MS = 20, READY_MS = 30000, HEAD_SEEN_MS = 2500, DRAIN_MS = 5000, HEALTH_MS = 6000 };

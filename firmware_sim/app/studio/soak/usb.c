@@ -1,12 +1,16 @@
 /* SPDX-License-Identifier: MIT */
 /* A head that is attached to this machine as a USB device: how its client finds it, and enumerations that went wrong. */
 #include <glob.h>
+#include <stdio.h>
 #include <string.h>
 #include <unistd.h>
 
+#include "drivers/link/link.h"
 #include "drivers/protocol/bytes.h"
 #include "drivers/usb/backend.h"
-#include "firmware_sim/app/studio/soak/soak.h"
+#include "firmware_sim/app/studio/soak/row.h"
+#include "firmware_sim/app/studio/soak/usb.h"
+#include "firmware_sim/fault/fault.h"
 
 /* Shorter ones can't be told from an enumeration on a busy machine. */
 static const double SLOW_MS = 10.0, MARGIN_MS = 5.0;
@@ -69,26 +73,25 @@ static int64_t excess_of(const char *serial)
 
 /* ---- enumerations */
 
-void soak_usb_forget(struct soak_link *link, const char *why)
+void soak_usb_forget(struct soak_plugs *plugs, struct soak_row *row, const char *why)
 {
-    for (uint32_t i = 0; i < link->n_plugs; i++)
-        soak_hide(&link->row[link->plug[i].kind], 1, why);
-    link->n_plugs = 0;
+    for (uint32_t i = 0; i < plugs->n; i++)
+        soak_hide(&row[plugs->note[i].kind], 1, why);
+    plugs->n = 0;
 }
 
-void soak_usb_plugged(struct soak_link *link, const struct fault_note *note)
+void soak_usb_plugged(struct soak_plugs *plugs, struct soak_row *row, const struct fault_note *note)
 {
-    if (link->n_plugs != 0 && link->plug[0].number != note->number)
-        soak_usb_forget(link, "it was plugged in again before a client opened it");
-    if (link->n_plugs < SOAK_MAX_PLUGS)
-        link->plug[link->n_plugs++] = *note;
+    if (plugs->n != 0 && plugs->note[0].number != note->number)
+        soak_usb_forget(plugs, row, "it was plugged in again before a client opened it");
+    if (plugs->n < SOAK_MAX_PLUGS)
+        plugs->note[plugs->n++] = *note;
     else
-        soak_hide(&link->row[note->kind], 1, "too many at a time");
+        soak_hide(&row[note->kind], 1, "too many at a time");
 }
 
-static void judge_plug(struct soak_link *link, const struct fault_note *note, double opened_ms, int64_t excess)
+static void judge_plug(struct soak_row *row, const struct fault_note *note, double opened_ms, int64_t excess)
 {
-    struct soak_row *row = &link->row[note->kind];
     const int is_slow = note->kind == FAULT_SLOW_ENUMERATION;
     if (is_slow && note->for_ms < SLOW_MS)
         soak_hide(row, 1, "shorter than 10 ms");
@@ -98,13 +101,11 @@ static void judge_plug(struct soak_link *link, const struct fault_note *note, do
         row->missed++;
 }
 
-void soak_usb_opened(struct soak_link *link, double opened_ms)
+void soak_usb_opened(struct soak_plugs *plugs, struct soak_row *row, const char *source, double opened_ms)
 {
-    const char *serial = strrchr(link->source, ':');
-    pthread_mutex_lock(&link->lock);
-    const int64_t excess = link->n_plugs != 0 && serial != NULL ? excess_of(serial + 1) : -1;
-    for (uint32_t i = 0; i < link->n_plugs; i++)
-        judge_plug(link, &link->plug[i], opened_ms, excess);
-    link->n_plugs = 0;
-    pthread_mutex_unlock(&link->lock);
+    const char *serial = strrchr(source, ':');
+    const int64_t excess = plugs->n != 0 && serial != NULL ? excess_of(serial + 1) : -1;
+    for (uint32_t i = 0; i < plugs->n; i++)
+        judge_plug(&row[plugs->note[i].kind], &plugs->note[i], opened_ms, excess);
+    plugs->n = 0;
 }

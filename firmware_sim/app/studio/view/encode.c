@@ -120,11 +120,11 @@ static size_t lay_out(const struct slice *s, uint32_t n_columns, char *body)
     return at;
 }
 
-int view_encode_points(const struct viewed_points *points, const double origin_m[3], double t0_s, uint32_t first,
-                       uint32_t every, uint32_t most, struct web_body *body, struct sh_err *err)
+int view_encode_points(const struct viewed_points *points, const double origin_m[3], double t0_s,
+                       const struct view_part *part, struct web_body *body, struct sh_err *err)
 {
-    const struct slice s = {points, origin_m, t0_s,
-                            first,  every,    count_of(points->n, first, every, most, VIEW_MAX_POINTS)};
+    const uint32_t n = count_of(points->n, part->first, part->every, part->most, VIEW_MAX_POINTS);
+    const struct slice s = {points, origin_m, t0_s, part->first, part->every, n};
     uint32_t n_columns = 1;
     size_t size;
     for (int c = 0; c < VIEWED_COLUMNS; c++)
@@ -133,7 +133,7 @@ int view_encode_points(const struct viewed_points *points, const double origin_m
     char *to = calloc(1, len);
     if (to == NULL) return sh_fail(err, SH_ENOMEM, "no memory for %u points", s.n);
     memcpy(to, "SHCL", 4);
-    const uint32_t head[] = {1, s.n, n_columns, first, every, points->n, 0};
+    const uint32_t head[] = {1, s.n, n_columns, part->first, part->every, points->n, 0};
     for (size_t i = 0; i < sizeof head / sizeof head[0]; i++)
         le_put32(to + 4 + 4 * i, head[i]);
     for (int k = 0; k < 3; k++)

@@ -28,10 +28,13 @@ struct view_column {
 extern const struct view_column view_columns[VIEWED_COLUMNS];
 const char *view_type_name(enum view_type type);
 
-/* Points first, first + every, ...: at most `most` of them, and no more than an answer holds. every >= 1. Positions are
- * relative to origin_m, times to t0_s. SH_ENOMEM. */
-int view_encode_points(const struct viewed_points *points, const double origin_m[3], double t0_s, uint32_t first,
-                       uint32_t every, uint32_t most, struct web_body *body, struct sh_err *err);
+/* Points first, first + every, ...: at most `most` of them, and no more than an answer holds. every >= 1. */
+struct view_part {
+    uint32_t first, every, most;
+};
+/* Positions are relative to origin_m, times to t0_s. SH_ENOMEM. */
+int view_encode_points(const struct viewed_points *points, const double origin_m[3], double t0_s,
+                       const struct view_part *part, struct web_body *body, struct sh_err *err);
 /* Triangles of a mesh by rising ratio, from `first` on. SH_ENOMEM. */
 int view_encode_mesh(const struct viewed_mesh *mesh, uint32_t first, uint32_t most, struct web_body *body,
                      struct sh_err *err);

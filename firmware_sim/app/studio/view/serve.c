@@ -79,9 +79,8 @@ static int get_cloud(struct view_serve *s, const char *query, struct web_body *o
                            {"every", 1, UINT32_MAX, 1, 1},
                            {.name = NULL}};
     int rc = read_query(words, query, err);
-    return rc == SH_OK ? view_encode_points(&v->points, v->origin_m, v->t0_s, (uint32_t)words[0].value,
-                                            (uint32_t)words[2].value, (uint32_t)words[1].value, out, err)
-                       : rc;
+    const struct view_part part = {(uint32_t)words[0].value, (uint32_t)words[2].value, (uint32_t)words[1].value};
+    return rc == SH_OK ? view_encode_points(&v->points, v->origin_m, v->t0_s, &part, out, err) : rc;
 }
 
 static int need_mesh(const struct viewed *v, struct sh_err *err)
@@ -133,9 +132,8 @@ static int get_sparse(struct view_serve *s, const char *query, struct web_body *
     const struct view_spread wish = {words[0].value, words[1].value, (uint64_t)words[3].value,
                                      (uint64_t)words[2].value};
     if (rc == SH_OK) rc = make_sparse(s, &wish, err);
-    return rc == SH_OK ? view_encode_points(&s->sparse, v->origin_m, v->t0_s, (uint32_t)words[4].value, 1,
-                                            (uint32_t)words[5].value, out, err)
-                       : rc;
+    const struct view_part part = {(uint32_t)words[4].value, 1, (uint32_t)words[5].value};
+    return rc == SH_OK ? view_encode_points(&s->sparse, v->origin_m, v->t0_s, &part, out, err) : rc;
 }
 
 int view_serve_get(void *ctx, const char *path, const char *query, struct web_body *out, struct sh_err *err)

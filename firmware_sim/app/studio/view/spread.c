@@ -63,10 +63,18 @@ static int check_count(const struct mesh_points *points, const uint32_t (*face)[
                    VIEW_MAX_SPARSE, *sum_m2, 0.99 * VIEW_MAX_SPARSE / *sum_m2);
 }
 
-static int spread_one(const struct viewed *v, const struct viewed_mesh *m, const struct view_spread *wish,
-                      const struct sh_report *report, double *sum_m2, struct viewed_points *out, struct sh_err *err)
+/* Meshes that are spread, one after the other. */
+struct spread {
+    const struct viewed *viewed;
+    const struct view_spread *wish;
+    const struct sh_report *report;
+    struct viewed_points *out;
+    double sum_m2; /* of all so far */
+};
+
+static int spread_one(struct spread *s, const struct viewed_mesh *m, struct sh_err *err)
 {
-    const struct mesh_sparse sparse = {wish->per_m2, wish->seed, report};
+    const struct mesh_sparse sparse = {s->wish->per_m2, s->wish->seed, s->report};
     struct mesh_points made = {0};
     double area_m2 = 0;
     uint32_t(*face)[3] = malloc((size_t)m->n_faces * sizeof *face);
@@ -75,12 +83,12 @@ static int spread_one(const struct viewed *v, const struct viewed_mesh *m, const
     if (face == NULL || range_m == NULL) {
         sh_fail(err, rc, "no memory to spread points over %u triangles", m->n_faces);
     } else {
-        const uint32_t n = keep_faces(m, wish->long_edge, face);
-        const struct mesh_points points = points_of(v, m, range_m);
+        const uint32_t n = keep_faces(m, s->wish->long_edge, face);
+        const struct mesh_points points = points_of(s->viewed, m, range_m);
         const struct mesh_sparse_part part = {(const uint32_t(*)[3])face, n, m->station, m->scan << 16 | m->sweep};
-        rc = check_count(&points, part.face, n, wish, sum_m2, err);
+        rc = check_count(&points, part.face, n, s->wish, &s->sum_m2, err);
         if (rc == SH_OK) rc = mesh_sparse_add(&sparse, &points, &part, &made, &area_m2, err);
-        if (rc == SH_OK) rc = append(out, &made, v->points.rgb != NULL, err);
+        if (rc == SH_OK) rc = append(s->out, &made, s->viewed->points.rgb != NULL, err);
     }
     mesh_points_free(&made);
     free(face);
@@ -91,10 +99,10 @@ static int spread_one(const struct viewed *v, const struct viewed_mesh *m, const
 int view_spread(const struct viewed *v, const struct view_spread *wish, const struct sh_report *report,
                 struct viewed_points *out, struct sh_err *err)
 {
-    double sum_m2 = 0;
+    struct spread s = {v, wish, report, out, 0};
     int rc = SH_OK;
     memset(out, 0, sizeof *out);
     for (size_t i = 0; rc == SH_OK && i < v->n_meshes; i++)
-        if (wish->scan == 0 || wish->scan == i + 1) rc = spread_one(v, &v->mesh[i], wish, report, &sum_m2, out, err);
+        if (wish->scan == 0 || wish->scan == i + 1) rc = spread_one(&s, &v->mesh[i], err);
     return rc;
 }

@@ -4,11 +4,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/studio/decimate.h"
 #include "core/mat3.h"
+#include "core/studio/decimate.h"
 #include "core/vec3.h"
 #include "firmware_sim/app/studio/page_json.h"
 #include "firmware_sim/app/studio/watch/inside.h"
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/site/plan_rows.h"
 
 enum { PLAN_LEN = 512, HEAD_BYTES = 40, VERTEX_BYTES = 12, TRIANGLE_BYTES = 12, VERSION = 1 };

@@ -6,6 +6,7 @@
 
 #include "core/vec3.h"
 #include "firmware_sim/app/studio/watch/inside.h"
+#include "firmware_sim/config/config.h"
 
 /* The limits of cells, which is approximate, and of memory. A cell's piece takes up to 144 bytes, and a triangle at
  * least one (core/studio/coverage/cells.c). */

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "firmware_sim/app/studio/watch/inside.h"
+#include "firmware_sim/config/config.h"
 
 static int get(void *ctx, const char *path, const char *query, struct web_body *out, struct sh_err *err)
 {

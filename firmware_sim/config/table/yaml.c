@@ -1,6 +1,16 @@
 /* SPDX-License-Identifier: MIT */
 /* YAML to the struct, by the table. libyaml's document API keeps the line of each node. */
-#include "firmware_sim/config/yaml.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/copies.h"
+#include "firmware_sim/config/profiles.h"
+#include "firmware_sim/config/table/diagnostics.h"
+#include "firmware_sim/config/table/document.h"
+#include "firmware_sim/config/table/forget.h"
+#include "firmware_sim/config/table/given.h"
+#include "firmware_sim/config/table/reader.h"
+#include "firmware_sim/config/table/row.h"
+#include "firmware_sim/config/table/value.h"
+#include "firmware_sim/config/table/yaml.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -5,7 +5,14 @@
 #include <string.h>
 
 #include "firmware_sim/base/nearest.h"
-#include "firmware_sim/config/table.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/load.h"
+#include "firmware_sim/config/profile_keys.h"
+#include "firmware_sim/config/table/diagnostics.h"
+#include "firmware_sim/config/table/forget.h"
+#include "firmware_sim/config/table/given.h"
+#include "firmware_sim/config/table/reader.h"
+#include "firmware_sim/config/table/row.h"
 
 /* Where the list is full, the last diagnostic makes room. */
 int cfg_add_fault(struct config_faults *faults, uint64_t place, int code, const char *text)

@@ -1,6 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /* --set KEY=VALUE, read by the rows of the tables: a single value, or YAML for a list or a section. */
-#include "firmware_sim/config/yaml.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/copies.h"
+#include "firmware_sim/config/table/diagnostics.h"
+#include "firmware_sim/config/table/document.h"
+#include "firmware_sim/config/table/forget.h"
+#include "firmware_sim/config/table/given.h"
+#include "firmware_sim/config/table/reader.h"
+#include "firmware_sim/config/table/row.h"
+#include "firmware_sim/config/table/value.h"
+#include "firmware_sim/config/table/yaml.h"
 
 #include <stdio.h>
 #include <stdlib.h>

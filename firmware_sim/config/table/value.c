@@ -1,6 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* Texts to values: exact decimals, ranges, words, paths. */
-#include "firmware_sim/config/table.h"
+#include "firmware_sim/config/profile.h"
+#include "firmware_sim/config/profile_keys.h"
+#include "firmware_sim/config/table/diagnostics.h"
+#include "firmware_sim/config/table/given.h"
+#include "firmware_sim/config/table/reader.h"
+#include "firmware_sim/config/table/row.h"
+#include "firmware_sim/config/table/value.h"
 
 #include <inttypes.h>
 #include <math.h>

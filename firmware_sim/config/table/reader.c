@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* Rows of the table, and where they were given. */
-#include "firmware_sim/config/table.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/table/given.h"
+#include "firmware_sim/config/table/reader.h"
+#include "firmware_sim/config/table/row.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -17,25 +20,9 @@ void cfg_reader_init(struct cfg_reader *rd, const char *file, const struct cfg_t
     rd->scanner = -1;
 }
 
-const struct cfg_key *cfg_find(const struct cfg_table *table, const char *path)
-{
-    for (size_t i = 0; i < table->n; i++)
-        if (strcmp(table->keys[i].path, path) == 0) return &table->keys[i];
-    return NULL;
-}
-
 size_t cfg_row(const struct cfg_reader *rd, const struct cfg_key *key)
 {
     return (size_t)(key - rd->table.keys);
-}
-
-const struct cfg_key *cfg_list_of(const struct cfg_table *table, const struct cfg_key *key)
-{
-    const char *bracket = strstr(key->path, "[]");
-    if (bracket == NULL) return NULL;
-    char path[CFG_PATH_MAX];
-    snprintf(path, sizeof path, "%.*s", (int)(bracket - key->path), key->path);
-    return cfg_find(table, path);
 }
 
 uint32_t *cfg_list_count(const struct cfg_reader *rd, const struct cfg_key *list)
@@ -56,16 +43,6 @@ const char *cfg_word(const struct cfg_reader *rd, const char *path, int value)
     return cfg_find(&rd->table, path)->names[value];
 }
 
-const char *cfg_name(const char *path, uint32_t item, char *buf)
-{
-    const char *bracket = strstr(path, "[]");
-    if (bracket == NULL)
-        snprintf(buf, CFG_PATH_MAX, "%s", path);
-    else
-        snprintf(buf, CFG_PATH_MAX, "%.*s[%u]%s", (int)(bracket - path), path, item, bracket + 2);
-    return buf;
-}
-
 const char *cfg_full_name(const struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, char *buf)
 {
     char name[CFG_PATH_MAX];
@@ -77,22 +54,15 @@ const char *cfg_full_name(const struct cfg_reader *rd, const struct cfg_key *key
     return buf;
 }
 
-void cfg_cut_to_parent(char *path)
-{
-    size_t len = strlen(path);
-    if (len >= 2 && strcmp(path + len - 2, "[]") == 0) {
-        path[len - 2] = '\0';
-        return;
-    }
-    char *dot = strrchr(path, '.');
-    if (dot == NULL) dot = path;
-    *dot = '\0';
-}
-
 int cfg_is_given(const struct cfg_reader *rd, const char *path, uint32_t item)
 {
     const struct cfg_key *key = cfg_find(&rd->table, path);
     return key != NULL && rd->line[cfg_row(rd, key)][item] != 0; /* a table of some sections lacks other keys */
+}
+
+int cfg_has_profile(const struct cfg_reader *rd)
+{
+    return rd->profile_read;
 }
 
 int cfg_where(const struct cfg_reader *rd, const struct cfg_key *key, uint32_t item)
@@ -106,13 +76,4 @@ int cfg_where(const struct cfg_reader *rd, const struct cfg_key *key, uint32_t i
         cfg_cut_to_parent(path);
     }
     return rd->root_line;
-}
-
-const char *cfg_word_below(const char *path, const char *parent)
-{
-    size_t len = strlen(parent);
-    if (strncmp(path, parent, len) != 0) return NULL;
-    const char *word = path + len;
-    if (len > 0 && *word++ != '.') return NULL;
-    return *word != '\0' && strpbrk(word, ".[") == NULL ? word : NULL;
 }

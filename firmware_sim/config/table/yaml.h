@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* Private to yaml.c and yaml_file.c: a file's one document, and its parts that are read later. */
-#ifndef FIRMWARE_SIM_CONFIG_YAML_H
-#define FIRMWARE_SIM_CONFIG_YAML_H
+#ifndef FIRMWARE_SIM_CONFIG_TABLE_YAML_H
+#define FIRMWARE_SIM_CONFIG_TABLE_YAML_H
 
 #include <yaml.h>
 
-#include "firmware_sim/config/table.h"
+#include "firmware_sim/config/table/reader.h"
 
 struct cfg_document {
     yaml_document_t doc;

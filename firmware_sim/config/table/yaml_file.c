@@ -1,12 +1,16 @@
 /* SPDX-License-Identifier: MIT */
 /* A YAML file as one document: bytes, limits, syntax. */
-#include "firmware_sim/config/yaml.h"
+#include "firmware_sim/config/table/diagnostics.h"
+#include "firmware_sim/config/table/document.h"
+#include "firmware_sim/config/table/reader.h"
+#include "firmware_sim/config/table/yaml.h"
 
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/err.h"
 #include "core/infile.h"
 
 enum { FILE_MAX = 1 << 20, MAX_DEPTH = 16, MAX_ANCHORS = 256 };

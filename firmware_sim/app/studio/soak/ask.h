@@ -1,0 +1,33 @@
+/* SPDX-License-Identifier: MIT */
+/* The questions of a client, and how their answers are judged. */
+#ifndef FIRMWARE_SIM_APP_STUDIO_SOAK_ASK_H
+#define FIRMWARE_SIM_APP_STUDIO_SOAK_ASK_H
+
+#include <stdint.h>
+
+#include "firmware_sim/fault/board.h"
+
+struct soak_link;
+
+enum { SOAK_MAX_REPLY_NOTES = 16, SOAK_REPLY_LEN = 600 };
+
+struct soak_ask {
+    int active;   /* a question is out */
+    int settling; /* the library first comes into step, with questions of its own */
+    uint32_t n;   /* faults that hit replies since the question went out */
+    struct fault_note note[SOAK_MAX_REPLY_NOTES];
+    uint32_t echoes; /* noticed since then, and: */
+    uint64_t bad_bytes;
+    uint64_t others;             /* faults of any other kind since then */
+    int64_t ended_ns;            /* clock: when a session last ended, or a client was turned away; 0: not yet */
+    char before[SOAK_REPLY_LEN]; /* the last reply that came */
+    uint64_t asked, answered, timeouts, wrong, hurt, odd;
+    uint32_t next;
+};
+
+/* Asks the next question, and judges its answer. */
+void soak_ask_next(struct soak_link *link);
+/* Sees to it that the head scans. */
+void soak_ask_scan(struct soak_link *link);
+
+#endif

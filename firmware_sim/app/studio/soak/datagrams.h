@@ -1,0 +1,26 @@
+/* SPDX-License-Identifier: MIT */
+/* The client of a link that sends datagrams. What it gets is compared with what a second link of the same protocol
+ * sends, which has no faults. */
+#ifndef FIRMWARE_SIM_APP_STUDIO_SOAK_DATAGRAMS_H
+#define FIRMWARE_SIM_APP_STUDIO_SOAK_DATAGRAMS_H
+
+#include <stdint.h>
+
+#include "drivers/link/link.h"
+#include "firmware_sim/app/studio/soak/frame.h"
+
+struct soak_datagrams;
+struct soak_link;
+
+/* Receives what a link sends, and what a second link of the same protocol will send, which is to be opened beside it.
+ * NULL: it can't. */
+struct soak_datagrams *soak_datagrams_open(const struct link_spec *spec, struct link_spec *twin);
+void soak_datagrams_close(struct soak_datagrams *datagrams);
+int soak_datagrams_get(const struct soak_datagrams *datagrams, soak_seq seq, struct soak_clean_frame *out);
+void soak_datagrams_step(struct soak_link *link);
+/* Takes what is on its way still. */
+void soak_datagrams_finish(struct soak_link *link);
+uint64_t soak_datagrams_top(struct soak_link *link);
+soak_seq soak_unit(uint64_t number);
+
+#endif

@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: MIT */
+/* Faults in the head, and what the client saw of them: by states, times and encoders. */
+#ifndef FIRMWARE_SIM_APP_STUDIO_SOAK_HEAD_H
+#define FIRMWARE_SIM_APP_STUDIO_SOAK_HEAD_H
+
+#include <stdint.h>
+
+#include "drivers/host/scanhead.h"
+#include "firmware_sim/fault/board.h"
+
+struct soak_link;
+
+enum { SOAK_MAX_MOMENTS = 64 };
+
+/* A fault in the head that the client has not noticed yet. */
+struct soak_moment {
+    enum fault_kind kind;
+    uint32_t fault;         /* its number */
+    struct fault what;      /* as configured */
+    int64_t from_ns, to_ns; /* device time; INT64_MAX: it is at work */
+    double for_ms;
+};
+
+/* The head's clock, as it last said. */
+struct soak_times {
+    int have;
+    int64_t at_ns, gps_ns; /* device time, GPS time */
+    int have_pps;
+    int64_t pps_ns, leap_s; /* device time of the last PPS; GPS time less UTC then */
+};
+
+/* The caller of the first three has the link's lock. */
+void soak_heard_head(struct soak_link *link, const struct fault_note *note);
+/* Its client's first frame. */
+void soak_head_begins(struct soak_link *link, const struct scanhead_frame *frame);
+/* A power cycle that began before that device time, and was not noticed, is. 0: there is none. */
+int soak_saw_power_go(struct soak_link *link, int64_t before_ns);
+void soak_saw_inside(struct soak_link *link, const struct scanhead_frame *frame);
+void soak_saw_state(struct soak_link *link, const char *state);
+int soak_is_head_seen(struct soak_link *link);
+/* At the end. */
+void soak_judge_head(struct soak_link *link);
+
+#endif

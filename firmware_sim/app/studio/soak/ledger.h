@@ -1,0 +1,59 @@
+/* SPDX-License-Identifier: MIT */
+/* The ledger of a link: for each frame the injected faults, and what the client saw of them. */
+#ifndef FIRMWARE_SIM_APP_STUDIO_SOAK_LEDGER_H
+#define FIRMWARE_SIM_APP_STUDIO_SOAK_LEDGER_H
+
+#include <stdint.h>
+
+#include "drivers/host/scanhead.h"
+#include "firmware_sim/app/studio/soak/frame.h"
+#include "firmware_sim/fault/board.h"
+
+struct soak_link;
+
+enum { SOAK_MAX_RUNS = 1024, SOAK_MAX_ACTS = 64 };
+
+/* A frame of a link. */
+struct soak_fact {
+    soak_seq seq;
+    int there;
+    /* what the client saw */
+    uint64_t digest;
+    uint32_t got, gap, repeated, late;
+    int64_t after_ns; /* from the time that the frame itself says to its arrival, by another clock: link->offset_ns */
+    int away;         /* there was no session then */
+    /* what was done to it */
+    int64_t t_ns;
+    uint8_t times[FAULT_REFUSE]; /* by kind */
+    uint8_t resealed, merged;    /* merged: it went into one datagram with others */
+    uint32_t copies, behind, garbage;
+    uint32_t cut_to; /* bytes that truncation left; 0: all */
+    double for_ms;   /* delay, jitter and stall: the longest */
+};
+
+/* Bytes that belong to no frame, as the client noticed them: after the frame of that time. */
+struct soak_run {
+    int64_t t_ns;
+    uint64_t n;
+};
+
+struct soak_act {
+    enum fault_kind kind;
+    int64_t t_ns; /* device time */
+};
+
+/* The frames of a ledger, SOAK_RING of them, for free(). NULL: no memory. */
+struct soak_fact *soak_ledger_open(void);
+/* The listener of the board. */
+void soak_heard(void *soak, const struct fault_note *note);
+void soak_saw_frame(struct soak_link *link, const struct scanhead_frame *frame, int64_t now_ns);
+/* A datagram; the caller has the link's lock. */
+void soak_saw_unit(struct soak_link *link, soak_seq seq, uint64_t digest, uint32_t len);
+void soak_saw_notice(void *link, const struct scanhead_notice *notice);
+/* A connection came about; it ended; it did not even begin. */
+void soak_saw_open(struct soak_link *link);
+void soak_saw_end(struct soak_link *link);
+void soak_saw_no_open(struct soak_link *link);
+struct soak_fact *soak_fact_at(struct soak_link *link, soak_seq seq); /* NULL: not known */
+
+#endif

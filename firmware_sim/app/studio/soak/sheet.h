@@ -1,0 +1,18 @@
+/* SPDX-License-Identifier: MIT */
+/* The results, as text and as JSON. */
+#ifndef FIRMWARE_SIM_APP_STUDIO_SOAK_SHEET_H
+#define FIRMWARE_SIM_APP_STUDIO_SOAK_SHEET_H
+
+#include <stdio.h>
+
+struct json;
+struct soak;
+
+/* Fills soak->failures. */
+void soak_conclude(struct soak *soak);
+void soak_print(const struct soak *soak, FILE *out);
+void soak_put(struct json *json, const void *soak);
+/* A line on standard error. */
+void soak_say_progress(struct soak *soak, double s);
+
+#endif

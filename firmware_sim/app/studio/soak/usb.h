@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: MIT */
+/* A head that is attached to this machine as a USB device: how its client finds it, and enumerations that went wrong. */
+#ifndef FIRMWARE_SIM_APP_STUDIO_SOAK_USB_H
+#define FIRMWARE_SIM_APP_STUDIO_SOAK_USB_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "firmware_sim/fault/board.h"
+
+struct link_spec;
+struct soak_row;
+
+/* Whether the link's device is attached to this machine, and has the native stream. */
+int soak_usb_is_here(const struct link_spec *spec);
+/* Gives it a serial number where none is configured, so that its client can name it. number: of the link, from 1. */
+void soak_usb_name(struct link_spec *spec, uint32_t number);
+/* What its client opens. */
+void soak_usb_source(const struct link_spec *spec, char *source, size_t len);
+
+/* The faults of the enumeration at hand, until a client opens the device. */
+enum { SOAK_MAX_PLUGS = 8 };
+struct soak_plugs {
+    struct fault_note note[SOAK_MAX_PLUGS];
+    uint32_t n;
+};
+/* `row` has the rows of the link; the caller has the link's lock. */
+/* A fault of an enumeration, as it begins. */
+void soak_usb_plugged(struct soak_plugs *plugs, struct soak_row *row, const struct fault_note *note);
+/* The client has opened the device, `source`. Notes what it noticed of the enumeration, by the time that this took. */
+void soak_usb_opened(struct soak_plugs *plugs, struct soak_row *row, const char *source, double opened_ms);
+/* No client will notice them. */
+void soak_usb_forget(struct soak_plugs *plugs, struct soak_row *row, const char *why);
+
+#endif

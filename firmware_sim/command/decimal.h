@@ -1,0 +1,26 @@
+/* SPDX-License-Identifier: MIT */
+/* Decimal numbers, read and written exactly. */
+#ifndef FIRMWARE_SIM_COMMAND_DECIMAL_H
+#define FIRMWARE_SIM_COMMAND_DECIMAL_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "firmware_sim/command/command.h"
+
+/* A decimal number as it was written: +-digits * 10^exponent. Digits have no zeros at either end; 0 has no
+ * digits. */
+struct command_decimal {
+    char digits[COMMAND_MAX_LINE + 1];
+    int n_digits, exponent, negative;
+};
+
+/* NRf of IEEE 488.2, 7.7.2. Returns what follows the number and its blanks, or NULL when text is not a
+ * number. */
+const char *command_parse_decimal(const char *text, struct command_decimal *decimal);
+
+enum command_fit { COMMAND_FIT_EXACT, COMMAND_FIT_FINE, COMMAND_FIT_BIG };
+/* number * 10^shift as an integer. FINE: it has a fraction; BIG: it needs more than 63 bits. */
+enum command_fit command_decimal_to_int(const struct command_decimal *decimal, int shift, int64_t *value);
+
+#endif

@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: MIT */
+/* `SITE:POSE`: a station and its place; and the pose that `TIME:STEP` may carry. */
+#ifndef FIRMWARE_SIM_COMMAND_SITE_POSE_H
+#define FIRMWARE_SIM_COMMAND_SITE_POSE_H
+
+struct command_call;
+struct command_unit;
+
+/* step_pose.c: takes call->pose as six numbers into call->out. Returns -1 when it failed. */
+int command_take_pose(struct command_call *call);
+
+extern const struct command_unit command_unit_place;
+int command_place_query(struct command_call *call);
+int command_place_change(struct command_call *call);
+
+#endif

@@ -1,0 +1,13 @@
+/* SPDX-License-Identifier: MIT */
+/* Checks everything that concerns more than one key, as far as these keys were read well. */
+#ifndef FIRMWARE_SIM_CONFIG_CHECK_H
+#define FIRMWARE_SIM_CONFIG_CHECK_H
+
+struct cfg_reader;
+struct config;
+
+void cfg_check(struct cfg_reader *rd, struct config *cfg);
+/* The loop alone. */
+void cfg_check_loop(struct cfg_reader *rd, const struct config *cfg);
+
+#endif

@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: MIT */
+/* Checks of injected faults: their keys, the links, the head. */
+#ifndef FIRMWARE_SIM_CONFIG_CHECK_FAULTS_H
+#define FIRMWARE_SIM_CONFIG_CHECK_FAULTS_H
+
+struct cfg_reader;
+struct config;
+struct fault_list;
+
+/* Injected faults against each other; and against the links of cfg. */
+void cfg_check_faults(struct cfg_reader *rd, struct fault_list *list);
+void cfg_check_fault_links(struct cfg_reader *rd, const struct config *cfg, const struct fault_list *list);
+/* The faults against the head, its noise and its signal. */
+void cfg_check_fault_beams(struct cfg_reader *rd, const struct config *cfg, const struct fault_list *list);
+
+#endif

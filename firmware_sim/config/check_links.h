@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: MIT */
+/* Checks of links: their keys, their protocols, and the identity of a USB device. */
+#ifndef FIRMWARE_SIM_CONFIG_CHECK_LINKS_H
+#define FIRMWARE_SIM_CONFIG_CHECK_LINKS_H
+
+#include <stdint.h>
+
+#include "drivers/protocol/protocol.h"
+
+struct cfg_reader;
+struct config;
+struct emitter;
+struct link_spec;
+
+/* Keys that only some kinds of link have, and what a link needs. */
+void cfg_check_links(struct cfg_reader *rd, struct config *cfg);
+/* Fills in the USB identity of a usb link from its protocol; and ids and serial number if not given. */
+void cfg_set_usb_serial(struct cfg_reader *rd, const struct config *cfg, struct link_spec *link, uint32_t item);
+void cfg_set_usb_look(struct cfg_reader *rd, struct link_spec *link, uint32_t item);
+/* What the protocols of links need. */
+void cfg_check_link_protocols(struct cfg_reader *rd, struct config *cfg);
+/* Whether the protocol can describe a head of this emitter. */
+int cfg_protocol_fits(const struct protocol_ops *ops, const struct emitter *emitter);
+/* The first link whose protocol has this need; -1: none. */
+int cfg_link_that_needs(const struct config *cfg, enum protocol_needs need);
+
+#endif

@@ -1,0 +1,21 @@
+/* SPDX-License-Identifier: MIT */
+/* Checks of where things stand: copies of meshes, the anchor, stations, their tripods, the platform. */
+#ifndef FIRMWARE_SIM_CONFIG_CHECK_PLACES_H
+#define FIRMWARE_SIM_CONFIG_CHECK_PLACES_H
+
+struct cfg_reader;
+struct config;
+struct config_platform;
+
+/* The lists of copies, once all are read. */
+void cfg_check_copies(struct cfg_reader *rd, const struct config *cfg);
+/* The anchor, and the forms of a station's place. */
+void cfg_check_places(struct cfg_reader *rd, struct config *cfg);
+/* The tripods of stations. */
+void cfg_check_tripods(struct cfg_reader *rd, struct config *cfg);
+/* Keys that only some kinds of platform have. Returns whether all of them belong to this kind. */
+int cfg_check_platform_keys(struct cfg_reader *rd, const struct config_platform *platform);
+/* The platform's keys with each other. Sets seconds from frames. */
+void cfg_check_platform(struct cfg_reader *rd, struct config *cfg);
+
+#endif

@@ -1,0 +1,10 @@
+/* SPDX-License-Identifier: MIT */
+/* The table of all keys of a head profile. */
+#ifndef FIRMWARE_SIM_CONFIG_PROFILE_KEYS_H
+#define FIRMWARE_SIM_CONFIG_PROFILE_KEYS_H
+
+#include "firmware_sim/config/table/row.h"
+
+extern const struct cfg_table cfg_profile_table;
+
+#endif

@@ -1,0 +1,17 @@
+/* SPDX-License-Identifier: MIT */
+/* Loads the configuration of one scanner, and checks those of all. */
+#ifndef FIRMWARE_SIM_CONFIG_SCANNERS_H
+#define FIRMWARE_SIM_CONFIG_SCANNERS_H
+
+#include <stdint.h>
+
+struct config;
+struct config_faults;
+
+/* Loads for the scanner of a station, from 1; 0: of head.station. Diagnostics are added to those in the list. */
+int cfg_load_for(const char *path, const char *const *sets, int n_sets, uint32_t station, struct config *cfg,
+                 struct config_faults *faults);
+/* Loads the scanners of the other stations, adds their diagnostics, and notes in cfg which station has which. */
+void cfg_check_scanners(struct config *cfg, struct config_faults *faults);
+
+#endif

@@ -1,0 +1,53 @@
+/* SPDX-License-Identifier: MIT */
+/* Rows of a table, by their paths. */
+#include "firmware_sim/config/table/row.h"
+
+#include <stdio.h>
+#include <string.h>
+
+const struct cfg_key *cfg_find(const struct cfg_table *table, const char *path)
+{
+    for (size_t i = 0; i < table->n; i++)
+        if (strcmp(table->keys[i].path, path) == 0) return &table->keys[i];
+    return NULL;
+}
+
+const struct cfg_key *cfg_list_of(const struct cfg_table *table, const struct cfg_key *key)
+{
+    const char *bracket = strstr(key->path, "[]");
+    if (bracket == NULL) return NULL;
+    char path[CFG_PATH_MAX];
+    snprintf(path, sizeof path, "%.*s", (int)(bracket - key->path), key->path);
+    return cfg_find(table, path);
+}
+
+const char *cfg_name(const char *path, uint32_t item, char *buf)
+{
+    const char *bracket = strstr(path, "[]");
+    if (bracket == NULL)
+        snprintf(buf, CFG_PATH_MAX, "%s", path);
+    else
+        snprintf(buf, CFG_PATH_MAX, "%.*s[%u]%s", (int)(bracket - path), path, item, bracket + 2);
+    return buf;
+}
+
+void cfg_cut_to_parent(char *path)
+{
+    size_t len = strlen(path);
+    if (len >= 2 && strcmp(path + len - 2, "[]") == 0) {
+        path[len - 2] = '\0';
+        return;
+    }
+    char *dot = strrchr(path, '.');
+    if (dot == NULL) dot = path;
+    *dot = '\0';
+}
+
+const char *cfg_word_below(const char *path, const char *parent)
+{
+    size_t len = strlen(parent);
+    if (strncmp(path, parent, len) != 0) return NULL;
+    const char *word = path + len;
+    if (len > 0 && *word++ != '.') return NULL;
+    return *word != '\0' && strpbrk(word, ".[") == NULL ? word : NULL;
+}

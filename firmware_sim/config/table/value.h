@@ -1,0 +1,40 @@
+/* SPDX-License-Identifier: MIT */
+/* Texts to values, by their rows, and what rows allow. */
+#ifndef FIRMWARE_SIM_CONFIG_TABLE_VALUE_H
+#define FIRMWARE_SIM_CONFIG_TABLE_VALUE_H
+
+#include <stdint.h>
+
+#include "firmware_sim/config/table/row.h"
+
+struct cfg_reader;
+struct config_profile;
+
+enum cfg_number { CFG_NUMBER_OK, CFG_NOT_A_NUMBER, CFG_TOO_FINE, CFG_TOO_LARGE };
+/* Exact: text * 10^decimals as a whole number. Grammar: [+-] digits [. digits] [e [+-] digits], no leading
+ * zeros, which YAML 1.1 reads as octal. */
+enum cfg_number cfg_parse_decimal(const char *text, int decimals, __int128 *out);
+/* Stores one scalar; base_dir (with its '/', may be empty) is put before relative paths. */
+int cfg_store(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, const char *text,
+              const char *base_dir);
+int cfg_store_vec3(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, int axis,
+                   const char *text);
+/* The values that a row takes: "allowed 1 to 5 Hz". profile gives the limits that depend on it; NULL: those of all
+ * profiles. */
+enum { CFG_ALLOWED_MAX = 480 }; /* room for the longest list of words, the kinds of faults */
+const char *cfg_allowed(const struct cfg_key *key, const struct config_profile *profile, char *buf);
+/* Directory part of a path, with its '/'; empty for a bare name. buf holds CONFIG_PATH_LEN. */
+const char *cfg_dir_of(const char *path, char *buf);
+
+/* A figure of a profile that is written in 1e-6 units. */
+int64_t cfg_figure(const struct config_profile *profile, const char *path);
+double cfg_real_figure(const struct config_profile *profile, const char *path);
+
+/* A figure of CFG_MICRO in its unit: the double nearest to the written number, so that errors and lists print that
+ * number. */
+static inline double from_micro(int64_t micro)
+{
+    return (double)micro / 1e6;
+}
+
+#endif

@@ -1,0 +1,12 @@
+/* SPDX-License-Identifier: MIT */
+/* Makes a BVH of what stands still, and one of each body that moves. */
+#ifndef FIRMWARE_SIM_SITE_BVHS_H
+#define FIRMWARE_SIM_SITE_BVHS_H
+
+struct sh_err;
+struct sh_report;
+struct site;
+
+int site_build_bvhs(struct site *site, const struct sh_report *report, struct sh_err *err);
+
+#endif

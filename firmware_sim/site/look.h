@@ -1,0 +1,26 @@
+/* SPDX-License-Identifier: MIT */
+/* The places that pulses are fired from, with setups like the run's. For trying methods on the head's own pulses
+ * (core/plan draws them), and for measuring what methods cost. */
+#ifndef FIRMWARE_SIM_SITE_LOOK_H
+#define FIRMWARE_SIM_SITE_LOOK_H
+
+#include "core/plan.h"
+
+struct site;
+
+enum { SITE_LOOK_STATIONS = 4 }; /* most stations of a look */
+
+struct site_look {
+    struct plan_place place[SITE_LOOK_STATIONS];
+    struct site_look_at {
+        const struct site *site;
+        uint32_t station;
+    } at[SITE_LOOK_STATIONS];
+    uint32_t n;
+};
+
+/* Opens a look from up to SITE_LOOK_STATIONS stations, evenly chosen, with the beams that they have by then. It
+ * must not be moved or copied: its places point into it. */
+void site_look_open(struct site_look *look, const struct site *site);
+
+#endif

@@ -1,0 +1,19 @@
+/* SPDX-License-Identifier: MIT */
+/* A head that moves while it scans, or that scans where its platform stops (platform.kind: stops). In: the configured
+ * trajectory and times. Out: its poses (scene frame, metres), or a station for each stop, placed in the scene. */
+#ifndef FIRMWARE_SIM_SITE_PLATFORM_H
+#define FIRMWARE_SIM_SITE_PLATFORM_H
+
+struct sh_err;
+struct sh_report;
+struct site;
+
+/* Replaces the configuration's only station by the stops. After that station is placed: without an
+ * anchor it gives the scene's place on the Earth, as an anchor at its position with the scene's y axis to
+ * true north would. */
+int site_load_stops(struct site *site, const struct sh_report *report, struct sh_err *err);
+
+/* Reads the trajectory, and cuts the path into stretches. */
+int site_load_platform(struct site *site, const struct sh_report *report, struct sh_err *err);
+
+#endif
