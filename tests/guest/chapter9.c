@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "tests/guest/chapter9.h"
 
+#include "drivers/protocol/native_parser.h"
+
 struct t t;
 uint8_t buf[BUFFER];
 static struct native_parser parser;

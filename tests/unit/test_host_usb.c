@@ -13,6 +13,7 @@
 #include <unistd.h>
 #include <cmocka.h>
 
+#include "drivers/host/scanhead.h"
 #include "drivers/host/usb_inside.h"
 #include "drivers/protocol/native_encode.h"
 
