@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "tests/guest/chapter9.h"
 
-#include "drivers/protocol/native_parser.h"
+#include "drivers/protocol/native.h"
 
 struct t t;
 uint8_t buf[BUFFER];
