@@ -203,7 +203,8 @@ int session_waits_for_files(const struct pump *pump)
 
 int session_pass(struct pump *pump, struct session *s, int is_last)
 {
-    const int64_t t_ns = is_last ? INT64_MAX : (int64_t)s->cursor * pump->stream->tick_ns;
+    const int ends = is_last || s->cursor >= session_off_tick(pump, s); /* a power cycle ends what came before it */
+    const int64_t t_ns = ends ? INT64_MAX : (int64_t)s->cursor * pump->stream->tick_ns;
     return faulty_pass(pump->link, session_index(pump, s), t_ns);
 }
 

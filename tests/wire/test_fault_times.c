@@ -76,6 +76,32 @@ static void test_late_replies_do_not_keep_a_head(void **state)
     close(told[0]);
 }
 
+/* Lines that wait for a step are carried out while its frames are taken. A fault that one of them adds strikes at the
+ * replies to those after it. */
+static void test_a_fault_strikes_at_once(void **state)
+{
+    static const char lines[] = "TIME:STEP 5 MS\nFAUL:ADD {kind: echo}\nSYST:VERS?\nSYST:VERS?\n",
+                      want[] = "1\r\nSYST:VERS?\r\n1999.0\r\nSYST:VERS?\r\n1999.0\r\n";
+    const char *const more[] = {"--pace", "step", NULL};
+    struct wire *wire = *state;
+    char got[8192];
+    size_t n = 0;
+    struct head head = fault_head_start(wire, &FAULT_ROOM, NULL, more);
+    int fd = raw_connect(head_endpoint(&head, "tcp"));
+    raw_send(fd, lines, sizeof lines - 1);
+    while (n < 8 || memcmp(got + n - 8, "1999.0\r\n", 8) != 0 || memmem(got, n - 8, "1999.0\r\n", 8) == NULL) {
+        struct pollfd slot = {.fd = fd, .events = POLLIN};
+        assert_int_equal(poll(&slot, 1, DEADLINE_MS), 1);
+        const ssize_t more_n = read(fd, got + n, sizeof got - n);
+        assert_true(more_n > 0);
+        n += (size_t)more_n;
+    }
+    assert_true(n >= sizeof want - 1);
+    assert_memory_equal(got + n - (sizeof want - 1), want, sizeof want - 1);
+    close(fd);
+    head_end(&head, SIGTERM);
+}
+
 /* ---- stalls, and the end of the run */
 
 /* The wire keeps about 140 kB, the queue 50 ms of 2 MB/s: a stall of 300 ms is too long. */
@@ -142,13 +168,43 @@ static void test_the_end_waits_for_what_is_on_its_way(void **state)
     }
 }
 
+/* A power cycle is the end of the bytes before it: a run that waits for its readers does not wait for frames that
+ * others are to overtake, or to join. */
+static void test_power_does_not_wait_for_what_is_held(void **state)
+{
+    static const char *const held[] = {"{kind: reorder, at: 60, n: 1000}", "{kind: merge, at: 60, n: 64}"};
+    const char *const more[] = {"--start", "--frames", "1", "--pace", "fast", NULL};
+    struct wire *wire = *state;
+    for (int i = 0; i < 2; i++) {
+        char faults[256];
+        struct room_config c = FAULT_ROOM;
+        struct scanhead_stats stats;
+        struct scanhead_frame frame;
+        c.more = "loop: {queue_ms: 100}\n"; /* less than the time without power: the run waits for its reader */
+        c.links = "links: [{type: file, path: out.bin}]\n";
+        snprintf(faults, sizeof faults, "faults: [%s, {kind: power_cycle, from_pulse: 10000, for_ms: 300}]\n", held[i]);
+        struct head head = fault_head_start(wire, &c, faults, more);
+        head_end(&head, 0);
+        assert_int_equal(stats_link_uint(wire, "left_out_frames"), 0);
+        struct scanhead *sh = client_open(wire_path(wire, "out.bin"));
+        while (scanhead_next(sh, &frame, 0) == SCANHEAD_OK)
+            continue;
+        scanhead_get_stats(sh, &stats);
+        assert_int_equal(stats.bad_bytes + stats.bad_payload, 0);
+        assert_true(stats.late == stats.seq_lost && stats.late == (i == 0));
+        scanhead_close(sh);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_replies_that_go_wrong, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_late_replies_do_not_keep_a_head, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_a_fault_strikes_at_once, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_a_stall_makes_a_slow_reader, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_the_end_waits_for_what_is_on_its_way, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_power_does_not_wait_for_what_is_held, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests_name("faults in time", tests, NULL, NULL);
 }
