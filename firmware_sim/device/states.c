@@ -41,7 +41,7 @@ void device_transition(struct device *device, enum head_event event, uint64_t ti
     device->machine.state = (enum head_state)next;
     device->machine.change[device->machine.n_changes++ % DEVICE_MAX_CHANGES] =
         (struct device_state_change){tick, device->machine.state};
-    device_push_event(device, NATIVE_EV_STATE, (uint64_t)device->machine.state, (uint64_t)before, 0,
+    device_push_event(&device->events, NATIVE_EV_STATE, (uint64_t)device->machine.state, (uint64_t)before, 0,
                       head_state_name(device->machine.state));
     uint64_t from = tick > device->next_tick ? tick : device->next_tick;
     switch (device->machine.state) {
