@@ -10,7 +10,7 @@
 #include <string.h>
 
 #include "core/angle.h"
-#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/profile.h"
 #include "firmware_sim/device/beam_faults.h"
 #include "firmware_sim/device/head_faults.h"
 
@@ -91,8 +91,8 @@ static double slowness(const struct device_beam *beam)
 /* A head whose lines have a fixed number of pulses fires at steps of its mirror, so its pulse rate falls, too. */
 static void slow_down(const struct device_beam *beam, const struct site *site, struct schedule_spec *spec)
 {
-    const int64_t most = site->cfg->profile.lines_max_uhz;
-    const uint32_t steps = emitter_line_pulses(&site->cfg->profile.emitter);
+    const int64_t most = site_profile(site)->lines_max_uhz;
+    const uint32_t steps = emitter_line_pulses(&site_profile(site)->emitter);
     const double factor = slowness(beam);
     if (factor == 1.0) return;
     spec->lines_uhz = llround((double)spec->lines_uhz * factor);
@@ -125,7 +125,7 @@ static void add_wobble(const struct device_beam *beam, const struct device_beam_
 {
     _Static_assert((int)FAULT_MAX <= (int)CAST_MAX_WOBBLES, "room for all");
     const double turn = f->entry.fault.deg / TURN_DEG;
-    const int is_rotor = beam->scan->site->cfg->profile.emitter.kind == EMITTER_BEAMS;
+    const int is_rotor = site_profile(beam->scan->site)->emitter.kind == EMITTER_BEAMS;
     to->wobble[to->n_wobbles++] = (struct cast_wobble){.mirror_turn = is_rotor ? 0.0 : turn,
                                                        .pan_turn = is_rotor ? turn : 0.0,
                                                        .hz = f->entry.fault.hz,

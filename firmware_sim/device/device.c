@@ -138,7 +138,7 @@ int device_create(const struct site *site, const struct device_options *options,
     if (rc == SH_OK) rc = device_open_moves(&device->moves, device->site, err);
     if (rc == SH_OK) rc = set_up_commands(device, err);
     if (rc == SH_OK) rc = check_live(device, err);
-    if (rc == SH_OK) rc = head_clock_create(site->cfg, &device->clock, err);
+    if (rc == SH_OK) rc = head_clock_create(&site->cfg->time, &device->clock, err);
     gnss_init(&device->gnss, site, &device->clock);
     if (rc == SH_OK) rc = open_journals(device, err);
     if (rc == SH_OK) rc = open_faults(device, err);

@@ -14,7 +14,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "firmware_sim/config/config.h"
 #include "firmware_sim/config/places.h"
 #include "firmware_sim/device/device_state.h"
 #include "firmware_sim/site/plan_rows.h"
@@ -294,7 +293,7 @@ void device_get_station(struct device *device, uint32_t station, struct device_s
     memset(out, 0, sizeof *out);
     memcpy(out->name, site->station[station].station->name, sizeof out->name);
     site_get_place(site, station, &out->place);
-    out->served = config_serves(site->cfg, station);
+    out->served = site_serves(site, station);
     out->has_tripod = t->from != NULL && out->served;
     if (out->has_tripod) {
         out->leg_m = t->from->leg_m;

@@ -4,7 +4,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "firmware_sim/config/config.h"
 #include "firmware_sim/device/variant.h"
 
 /* Whether the variant is planned for these settings and the stations' present places. */
@@ -39,7 +38,7 @@ int device_find_variant(struct device_variants *variants, const struct head_sett
 {
     const struct site *site = variants->moves->current->site;
     *out = NULL;
-    if (!site_varies(settings, &site->cfg->head.settings)) return SH_OK;
+    if (!site_varies(settings, site_settings(site))) return SH_OK;
     for (struct device_variant *v = variants->list; v != NULL; v = v->next)
         if (fits(variants, v, settings, station)) {
             *out = v;
